@@ -1,0 +1,48 @@
+// OpenCL devices: what there is, which one to use, and what goes wrong with them.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace bilayer {
+
+/// Trouble with a device: the text names the call, the code and the device, and holds the build log where a kernel failed
+/// to build.
+struct DeviceError : std::runtime_error {
+    using std::runtime_error::runtime_error;
+};
+
+struct DeviceInfo {
+    std::string platform;      ///< "Portable Computing Language"
+    std::string name;          ///< "pthread-AMD EPYC"
+    std::string version;       ///< "OpenCL 3.0 PoCL HSTR: ..."
+    std::string driver;
+    bool gpu = false;
+    unsigned computeUnits = 0;
+    std::uint64_t memoryBytes = 0;         ///< global memory [bytes]
+    std::uint64_t maxAllocationBytes = 0;  ///< largest single buffer [bytes]
+};
+
+/// An OpenCL device with its context, queue and compiled programs. Copies share them. Not to be used by two builds at once.
+class Device {
+  public:
+    struct Impl;
+    explicit Device(std::shared_ptr<Impl> impl) : impl_(std::move(impl)) {}
+    const DeviceInfo& info() const;
+    Impl& impl() const { return *impl_; }
+
+  private:
+    std::shared_ptr<Impl> impl_;
+};
+
+/// All devices of all platforms, GPUs first. Empty where there is none, or no platform.
+std::vector<DeviceInfo> devices();
+
+/// Opens the first device whose platform or device name contains `text`, ignoring case; empty: the environment variable
+/// BILAYER_DEVICE, else the first device. Throws DeviceError that lists what there is when none fits.
+Device openDevice(const std::string& text = {});
+
+}  // namespace bilayer

@@ -1,0 +1,62 @@
+// A rigid body's shape, and the contacts between two of them.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "collider/field.h"
+#include "collider/mass.h"
+#include "collider/points.h"
+#include "collider/pose.h"
+
+namespace bilayer {
+
+struct ColliderOptions {
+    /// Distance between neighbouring surface points [voxels of the field]. Smaller finds finer contacts and costs more.
+    float pointSpacing = 2.0f;
+};
+
+/// A field, points on the surface, and what else contacts need. Immutable; share it between bodies and threads.
+class Collider {
+  public:
+    /// `levelSet` must be of `mesh`. Throws std::invalid_argument if the mesh is empty.
+    Collider(Mesh mesh, const LevelSet& levelSet, const ColliderOptions& options = {});
+
+    const Mesh& mesh() const { return mesh_; }
+    const Field& field() const { return field_; }
+    const SurfacePoints& points() const { return points_; }
+    const Bounds& bounds() const { return bounds_; }      ///< of the mesh [m]
+
+  private:
+    Mesh mesh_;
+    Field field_;
+    SurfacePoints points_;
+    Bounds bounds_;
+};
+
+/// A point where two bodies touch or nearly do.
+struct Contact {
+    glm::vec3 position;     ///< on the surface of B, in the world [m]
+    glm::vec3 normal;       ///< from B to A, of unit length
+    float distance;         ///< gap between the surfaces, negative when they overlap [m]
+    std::uint32_t feature;  ///< index of the surface point; the top bit is set where the point is of B, else it is of A
+};
+
+inline constexpr std::uint32_t featureOfB = 0x80000000u;
+
+struct ContactOptions {
+    float margin = 0;  ///< contacts are reported up to this distance [m]; at most the band's exterior width is useful
+};
+
+/// What collide() saw beside the contacts.
+struct ContactReport {
+    std::uint32_t pointsTested = 0;  ///< surface points sampled in the other body's field
+    std::uint32_t beyondBand = 0;    ///< points so deep that the band does not reach them: no contact is made of them
+};
+
+/// Appends the contacts between two bodies: surface points of A in B's field, then those of B in A's field, each in
+/// ascending order of feature. Deterministic; safe from any thread. O(points near the other body).
+ContactReport collide(const Collider& a, const Pose& poseA, const Collider& b, const Pose& poseB,
+                      const ContactOptions& options, std::vector<Contact>& contacts);
+
+}  // namespace bilayer

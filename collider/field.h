@@ -1,0 +1,58 @@
+// What a collider samples: distance, gradient, rays. Built from a LevelSet, independent of OpenVDB afterwards.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+
+#include "sdf/level_set.h"
+#include "sdf/mesh.h"
+
+namespace bilayer {
+
+/// The answer to a query at a point.
+struct Sample {
+    /// In the band: the signed distance [m]. Elsewhere: a bound with the right sign, whose magnitude the true distance is
+    /// not below (but for the field's own error), and no distance.
+    float distance = 0;
+    /// In the band: the analytic gradient of the same trilinear interpolant (its length is near 1, not exactly 1).
+    /// Elsewhere: zero.
+    glm::vec3 gradient{0};
+    bool inBand = false;  ///< all eight voxels around the point are active
+};
+
+/// Where a ray meets the surface.
+struct RayHit {
+    float distance = 0;     ///< along the ray [m]
+    glm::vec3 position{0};  ///< [m]
+    glm::vec3 normal{0};    ///< outward, of unit length
+};
+
+/// A field laid out for queries. Copies share memory. All queries are noexcept, allocate nothing, and may run on any
+/// number of threads at once.
+class Field {
+  public:
+    explicit Field(const LevelSet& levelSet);
+
+    /// Distance and gradient at a point in the field's own coordinates [m].
+    Sample sample(const glm::vec3& point) const noexcept;
+
+    /// The distance alone, with the same meaning as Sample::distance, at half the cost.
+    float distance(const glm::vec3& point) const noexcept;
+
+    /// The first point from outside to inside along a ray, by sphere tracing; also when the ray starts inside (distance 0).
+    /// @param direction  of unit length
+    std::optional<RayHit> raycast(const glm::vec3& origin, const glm::vec3& direction, float maxDistance) const noexcept;
+
+    float voxelSize() const noexcept;       ///< [m]
+    float exteriorWidth() const noexcept;   ///< [m]
+    float interiorWidth() const noexcept;   ///< [m]
+    const Bounds& bounds() const noexcept;  ///< around all points in the band [m]
+    std::size_t memoryBytes() const noexcept;
+
+  private:
+    struct Data;
+    std::shared_ptr<const Data> data_;
+};
+
+}  // namespace bilayer

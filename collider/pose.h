@@ -1,0 +1,24 @@
+// Where a rigid body is.
+#pragma once
+
+#include <glm/gtc/quaternion.hpp>
+#include <glm/vec3.hpp>
+
+namespace bilayer {
+
+/// A rigid motion: body coordinates x become rotation * x + position in the world.
+struct Pose {
+    glm::vec3 position{0};               ///< [m]
+    glm::quat rotation{1, 0, 0, 0};      ///< of unit length; w, x, y, z
+
+    glm::vec3 toWorld(const glm::vec3& point) const { return rotation * point + position; }
+    glm::vec3 toBody(const glm::vec3& point) const { return glm::conjugate(rotation) * (point - position); }
+};
+
+/// The pose of b seen from a: inverse(a) * b.
+inline Pose relative(const Pose& a, const Pose& b) {
+    const glm::quat inverse = glm::conjugate(a.rotation);
+    return {inverse * (b.position - a.position), inverse * b.rotation};
+}
+
+}  // namespace bilayer

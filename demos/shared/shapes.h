@@ -1,0 +1,38 @@
+// Closed, oriented meshes by formula: for demos, tests and benchmarks. Lengths in metres, centred on the origin.
+#pragma once
+
+#include <glm/vec2.hpp>
+#include <vector>
+
+#include "sdf/mesh.h"
+
+namespace bilayer::shapes {
+
+/// A box of 12 * cells^2 triangles.
+Mesh box(const glm::vec3& halfExtents, int cells = 1);
+
+/// An icosahedron whose triangles are quartered `levels` times, vertices on the sphere: 20 * 4^levels triangles.
+Mesh sphere(float radius, int levels = 4);
+
+/// A torus around z: `major` from the axis to the tube's centre, `minor` the tube's radius.
+Mesh torus(float major, float minor, int around = 96, int across = 48);
+
+/// A tube of radius `thickness` along the (p, q) torus knot around z: the p = 2, q = 3 knot is the trefoil.
+Mesh torusKnot(int p, int q, float radius, float thickness, int along = 600, int across = 32);
+
+/// The solid that a closed profile (radius >= 0, height) sweeps around z. The profile runs counter-clockwise seen with the
+/// radius to the right and the height up; points of radius 0 become poles.
+Mesh revolve(const std::vector<glm::vec2>& profile, int segments = 96);
+
+/// A solid cylinder and a cone around z, from -height / 2 to height / 2 (the apex on top).
+Mesh cylinder(float radius, float height, int segments = 96);
+Mesh cone(float radius, float height, int segments = 96);
+
+/// An open bowl around z with a round rim: a spherical shell of outer radius `radius` and thickness `wall`, cut at its
+/// equator, the opening upward.
+Mesh bowl(float radius, float wall, int segments = 128);
+
+/// Several meshes as one.
+Mesh join(const std::vector<Mesh>& meshes);
+
+}  // namespace bilayer::shapes

@@ -1,0 +1,73 @@
+// From a triangle mesh to a narrow-band signed distance field.
+//
+// Method: Y. Wu, J. Man, Z. Xie, "A double layer method for constructing signed distance fields from triangle meshes",
+// Graphical Models 76 (2014) 214-223. docs/method.md tells how it is done here and where it departs from the paper.
+#pragma once
+
+#include <functional>
+#include <stdexcept>
+
+#include "sdf/level_set.h"
+#include "sdf/mesh.h"
+
+namespace bilayer {
+
+/// How a triangle is divided into the parts whose barycentres are sampled.
+enum class Subdivision {
+    rows,       ///< Algorithm 1 of the paper: n rows, n (n + 1) / 2 samples
+    recursive,  ///< Fig. 2 of the paper: by halves and quarters until the area is below epsilon
+};
+
+/// The parameters of the double layer method; the defaults are the paper's.
+struct DoubleLayerOptions {
+    float delta = 0.5f;       ///< distance of each layer from the surface [voxels], in (0, 4]
+    float epsilon = 1.0f;     ///< area that one sample stands for [voxels^2], in [1e-4, 1e4]
+    int neighbourhood = 2;    ///< K: a sample reaches at least K + 1/2 voxels, and farther if the band asks, in 1..64
+    int maxSubdivision = 32;  ///< n_max: most rows of samples in one piece of a triangle, in 1..1024
+    Subdivision subdivision = Subdivision::rows;
+    /// true: triangles for which Algorithm 1 would leave gaps (too large for n_max rows, or slivers) are first cut into
+    /// pieces, and K grows with the band, so that the band is complete. false: the paper to the letter, n clamped to n_max
+    /// and a cube of (2K + 1)^3 voxels around each sample, gaps included.
+    bool fillGaps = true;
+};
+
+struct BuildOptions {
+    float voxelSize = 0;      ///< edge of a voxel [m]; must be given
+    float exteriorWidth = 3;  ///< every voxel with 0 <= distance < this is active [voxels], in (0, 1000]
+    float interiorWidth = 3;  ///< every voxel with -this < distance < 0 is active [voxels], in (0, 1000]
+    DoubleLayerOptions doubleLayer;
+    bool triangles = false;   ///< also keep the nearest triangle of each active voxel
+    int threads = 0;          ///< most threads to use; 0: all
+    /// Called now and then, from any thread but one at a time, with the part done (0..1); false cancels the build.
+    std::function<bool(float)> progress;
+};
+
+/// Thrown by build() when `BuildOptions::progress` returned false.
+struct Cancelled : std::runtime_error {
+    Cancelled() : std::runtime_error("cancelled") {}
+};
+
+/// Fills blocks on some device; defined in blocks.h. The default is TBB on the processor.
+struct BlockFiller;
+
+/// Seconds that the parts of a build took.
+struct BuildTimes {
+    double tiles = 0;     ///< triangles to tiles of samples
+    double fill = 0;      ///< binning into blocks, the two layers, Eq. 3
+    double assemble = 0;  ///< leaves into the tree, far signs
+    double total = 0;
+};
+
+/// Builds the field of a mesh. The bytes of the result do not depend on the number of threads.
+/// @param filler  where the blocks are filled; null: TBB
+/// @param times   if not null, receives the seconds of each part
+/// Throws std::invalid_argument that names the option or triangle at fault, Cancelled, and what the filler throws.
+LevelSet build(const Mesh& mesh, const BuildOptions& options, const BlockFiller* filler = nullptr,
+               BuildTimes* times = nullptr);
+LevelSet build(const Mesh& mesh, const BuildOptions& options, const BlockFiller& filler, BuildTimes* times = nullptr);
+
+/// The voxel size that puts `resolution` voxels along the longest side of the mesh's bounds [m].
+/// Throws std::invalid_argument for a resolution that is not positive or a mesh without extent.
+float voxelSizeFor(const Mesh& mesh, float resolution);
+
+}  // namespace bilayer

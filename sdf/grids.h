@@ -1,0 +1,26 @@
+// The OpenVDB grids inside a LevelSet. Include this only where grids are touched: it costs seconds of compile time.
+#pragma once
+
+#include <openvdb/openvdb.h>
+
+#include "sdf/level_set.h"
+
+namespace bilayer {
+
+struct Grids {
+    /// GRID_LEVEL_SET; world units; background = exterior width, inactive inside = -interior width.
+    openvdb::FloatGrid::ConstPtr distance;
+    /// Index of the nearest triangle at each active voxel of `distance`; null unless asked for.
+    openvdb::Int32Grid::ConstPtr triangle;
+};
+
+/// Names of the metadata that bilayer writes on the distance grid. `inside_width` is there for fields whose interior
+/// width differs from the background.
+namespace metadata {
+inline constexpr const char* method = "bilayer:method";
+inline constexpr const char* meshHash = "bilayer:mesh_hash";
+inline constexpr const char* interiorWidth = "bilayer:interior_width";
+inline constexpr const char* version = "bilayer:version";
+}  // namespace metadata
+
+}  // namespace bilayer

@@ -1,0 +1,38 @@
+// What is wrong with a mesh, counted.
+#pragma once
+
+#include <cstddef>
+
+#include "sdf/mesh.h"
+
+namespace bilayer {
+
+/// What inspect() found. All zero but the first four means: closed, oriented, clean.
+struct MeshReport {
+    std::size_t points = 0;
+    std::size_t triangles = 0;
+    std::size_t components = 0;           ///< sets of triangles that share vertices
+    Bounds bounds;                        ///< [m]
+    std::size_t boundaryEdges = 0;        ///< edges of one triangle: holes
+    std::size_t nonManifoldEdges = 0;     ///< edges of three triangles or more
+    std::size_t misorientedEdges = 0;     ///< edges whose two triangles run them in the same direction
+    std::size_t degenerateTriangles = 0;  ///< triangles without area
+    std::size_t duplicateTriangles = 0;   ///< triangles whose three vertices another one has already
+    std::size_t insideOutComponents = 0;  ///< closed components that bound space from the wrong side (nested ones allowed)
+    float thinnestWall = 0;               ///< smallest thickness of the solid behind a triangle [m]; 0: none was found
+    std::size_t thinWalls = 0;            ///< triangles with less than `wall` of solid behind them
+    double area = 0;                      ///< [m^2]
+    double volume = 0;                    ///< signed [m^3]; means something only where `closed`
+
+    /// Every edge has exactly two triangles.
+    bool closed() const { return boundaryEdges == 0 && nonManifoldEdges == 0 && triangles > 0; }
+    /// No edge is run twice in one direction, and no closed component is inside out.
+    bool oriented() const { return misorientedEdges == 0 && insideOutComponents == 0; }
+};
+
+/// Examines a mesh in O(n log n). Vertices count as one where their coordinates are equal.
+/// @param wall  thickness below which a wall counts as thin [m], often one voxel; 0 counts none
+/// Throws as validate() does.
+MeshReport inspect(const Mesh& mesh, float wall = 0);
+
+}  // namespace bilayer

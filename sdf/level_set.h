@@ -1,0 +1,37 @@
+// A narrow-band signed distance field as a value. OpenVDB's headers are heavy, so its grids are behind grids.h.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+
+namespace bilayer {
+
+struct Grids;
+
+/// An immutable narrow-band signed distance field: cheap to copy, safe to share between threads. Distances are negative
+/// inside, in world units; voxel centres lie at integer index coordinates times the voxel size.
+class LevelSet {
+  public:
+    /// Takes over grids that are complete and no longer change. Throws std::invalid_argument if they are no level set:
+    /// another grid class, a transform that is more than a uniform scale and whole voxels of shift, or no active voxel.
+    explicit LevelSet(std::shared_ptr<const Grids> grids);
+
+    float voxelSize() const;               ///< [m]
+    float exteriorWidth() const;           ///< every voxel with 0 <= distance < this is active [m]
+    float interiorWidth() const;           ///< every voxel with -this < distance < 0 is active [m]
+    std::uint64_t activeVoxels() const;    ///< count
+    std::uint64_t leaves() const;          ///< count of 8x8x8 blocks
+    std::uint64_t memoryBytes() const;     ///< of all grids [bytes]
+    const std::string& method() const;     ///< "double-layer", ..., or "" for a field from elsewhere
+    std::uint64_t meshHash() const;        ///< hash() of the mesh it came from, or 0
+    const Grids& grids() const { return *grids_; }
+
+  private:
+    std::shared_ptr<const Grids> grids_;
+    float exteriorWidth_, interiorWidth_;
+    std::uint64_t meshHash_;
+    std::string method_;
+};
+
+}  // namespace bilayer

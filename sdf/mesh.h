@@ -1,0 +1,47 @@
+// The triangle mesh that everything starts from, and the small things one asks of it.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <glm/mat4x4.hpp>
+#include <glm/vec3.hpp>
+#include <vector>
+
+namespace bilayer {
+
+/// A triangle mesh in world units. Triangles are counter-clockwise seen from outside.
+struct Mesh {
+    std::vector<glm::vec3> points;      ///< vertex positions [m]
+    std::vector<glm::uvec3> triangles;  ///< three indices into `points` a triangle
+};
+
+/// An axis-aligned box [m]; empty (lower > upper) by default.
+struct Bounds {
+    glm::vec3 lower{1e30f};
+    glm::vec3 upper{-1e30f};
+
+    glm::vec3 size() const { return upper - lower; }
+    glm::vec3 centre() const { return 0.5f * (lower + upper); }
+    float longestSide() const;
+    bool empty() const { return lower.x > upper.x; }
+    void add(const glm::vec3& point);
+};
+
+/// The box around all vertices that some triangle uses; empty for a mesh without triangles.
+Bounds bounds(const Mesh& mesh);
+
+/// Throws std::invalid_argument that names the first triangle or vertex at fault: no triangle, an index out of range,
+/// a coordinate that is NaN or infinite.
+void validate(const Mesh& mesh);
+
+/// Merges vertices with equal coordinates (0 and -0 are equal), drops triangles that use a vertex twice, and drops vertices
+/// that no triangle uses. Keeps the order of what remains.
+Mesh weld(const Mesh& mesh);
+
+/// The mesh under an affine map; triangles are turned around when the map mirrors, so that normals stay outward.
+Mesh transformed(const Mesh& mesh, const glm::mat4& map);
+
+/// 64 bits that change with any vertex or triangle; the same on every machine (FNV-1a over the bytes).
+std::uint64_t hash(const Mesh& mesh);
+
+}  // namespace bilayer
