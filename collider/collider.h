@@ -25,13 +25,20 @@ class Collider {
     const Mesh& mesh() const { return mesh_; }
     const Field& field() const { return field_; }
     const SurfacePoints& points() const { return points_; }
-    const Bounds& bounds() const { return bounds_; }      ///< of the mesh [m]
+    const Bounds& bounds() const { return bounds_; }  ///< of the mesh [m]
 
   private:
     Mesh mesh_;
     Field field_;
     SurfacePoints points_;
     Bounds bounds_;
+};
+
+/// A collider somewhere in the world, perhaps grown: body coordinates x become pose.toWorld(scale * x).
+struct Placed {
+    const Collider& collider;
+    Pose pose;
+    float scale = 1;  ///< positive; distances grow by it
 };
 
 /// A point where two bodies touch or nearly do.
@@ -56,7 +63,12 @@ struct ContactReport {
 
 /// Appends the contacts between two bodies: surface points of A in B's field, then those of B in A's field, each in
 /// ascending order of feature. Deterministic; safe from any thread. O(points near the other body).
-ContactReport collide(const Collider& a, const Pose& poseA, const Collider& b, const Pose& poseB,
-                      const ContactOptions& options, std::vector<Contact>& contacts);
+ContactReport collide(const Placed& a, const Placed& b, const ContactOptions& options, std::vector<Contact>& contacts);
+
+/// The same for bodies of their own size.
+inline ContactReport collide(const Collider& a, const Pose& poseA, const Collider& b, const Pose& poseB,
+                             const ContactOptions& options, std::vector<Contact>& contacts) {
+    return collide(Placed{a, poseA}, Placed{b, poseB}, options, contacts);
+}
 
 }  // namespace bilayer

@@ -10,10 +10,10 @@ namespace bilayer {
 
 /// Of a solid of density 1; multiply mass and inertia by the density.
 struct MassProperties {
-    double volume = 0;                ///< [m^3]
-    glm::vec3 centre{0};              ///< centre of mass [m]
-    glm::mat3 inertia{0};             ///< about the centre of mass, mesh axes [m^5]
-    glm::vec3 principalInertia{0};    ///< eigenvalues of `inertia`, ascending [m^5]
+    double volume = 0;                    ///< [m^3]
+    glm::vec3 centre{0};                  ///< centre of mass [m]
+    glm::mat3 inertia{0};                 ///< about the centre of mass, mesh axes [m^5]
+    glm::vec3 principalInertia{0};        ///< eigenvalues of `inertia`, ascending [m^5]
     glm::quat principalAxes{1, 0, 0, 0};  ///< takes principal axes to mesh axes
 };
 

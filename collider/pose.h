@@ -8,8 +8,8 @@ namespace bilayer {
 
 /// A rigid motion: body coordinates x become rotation * x + position in the world.
 struct Pose {
-    glm::vec3 position{0};               ///< [m]
-    glm::quat rotation{1, 0, 0, 0};      ///< of unit length; w, x, y, z
+    glm::vec3 position{0};           ///< [m]
+    glm::quat rotation{1, 0, 0, 0};  ///< of unit length; w, x, y, z
 
     glm::vec3 toWorld(const glm::vec3& point) const { return rotation * point + position; }
     glm::vec3 toBody(const glm::vec3& point) const { return glm::conjugate(rotation) * (point - position); }
