@@ -32,6 +32,11 @@ struct BrickBlocks {
     std::vector<glm::ivec3> origins;     ///< index coordinates of each block's first voxel, multiples of 8
     std::vector<std::uint32_t> offsets;  ///< as Bricks::offsets
     std::vector<std::uint32_t> tiles;    ///< indices into Tiles::tiles
+
+    struct Pair {
+        std::uint32_t block, tile;
+    };
+    std::vector<Pair> pairs;  ///< scratch of binBlocks()
 };
 
 /// Bins tiles into bricks. `reach` is how far from a sample a voxel may lie [voxels].

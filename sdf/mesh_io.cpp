@@ -1,0 +1,99 @@
+#include "sdf/mesh_io.h"
+
+#include <fmt/format.h>
+
+#include <assimp/Exporter.hpp>
+#include <assimp/Importer.hpp>
+#include <assimp/config.h>
+#include <assimp/postprocess.h>
+#include <assimp/scene.h>
+
+#include <memory>
+#include <stdexcept>
+
+#include "sdf/atomic_file.h"
+
+namespace bilayer {
+namespace {
+
+constexpr unsigned unwanted = aiComponent_NORMALS | aiComponent_TANGENTS_AND_BITANGENTS | aiComponent_COLORS |
+                              aiComponent_TEXCOORDS | aiComponent_BONEWEIGHTS | aiComponent_ANIMATIONS |
+                              aiComponent_TEXTURES | aiComponent_LIGHTS | aiComponent_CAMERAS | aiComponent_MATERIALS;
+
+void add(Mesh& mesh, const aiMesh& part) {
+    const auto base = unsigned(mesh.points.size());
+    for (unsigned i = 0; i < part.mNumVertices; ++i)
+        mesh.points.push_back({part.mVertices[i].x, part.mVertices[i].y, part.mVertices[i].z});
+    for (unsigned i = 0; i < part.mNumFaces; ++i) {
+        const aiFace& face = part.mFaces[i];
+        if (face.mNumIndices == 3)
+            mesh.triangles.push_back({base + face.mIndices[0], base + face.mIndices[1], base + face.mIndices[2]});
+    }
+}
+
+// The one mesh as an Assimp scene, which owns it.
+std::unique_ptr<aiScene> toScene(const Mesh& mesh) {
+    auto scene = std::make_unique<aiScene>();
+    scene->mMaterials = new aiMaterial* [1] { new aiMaterial };
+    scene->mNumMaterials = 1;
+    auto* part = new aiMesh;
+    scene->mMeshes = new aiMesh* [1] { part };
+    scene->mNumMeshes = 1;
+    scene->mRootNode = new aiNode;
+    scene->mRootNode->mMeshes = new unsigned[1]{0};
+    scene->mRootNode->mNumMeshes = 1;
+    part->mPrimitiveTypes = aiPrimitiveType_TRIANGLE;
+    part->mNumVertices = unsigned(mesh.points.size());
+    part->mVertices = new aiVector3D[mesh.points.size()];
+    for (std::size_t i = 0; i < mesh.points.size(); ++i)
+        part->mVertices[i] = {mesh.points[i].x, mesh.points[i].y, mesh.points[i].z};
+    part->mNumFaces = unsigned(mesh.triangles.size());
+    part->mFaces = new aiFace[mesh.triangles.size()];
+    for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
+        part->mFaces[i].mNumIndices = 3;
+        part->mFaces[i].mIndices = new unsigned[3]{mesh.triangles[i].x, mesh.triangles[i].y, mesh.triangles[i].z};
+    }
+    return scene;
+}
+
+}  // namespace
+
+Mesh readMesh(const std::filesystem::path& path) {
+    Assimp::Importer importer;
+    importer.SetPropertyInteger(AI_CONFIG_PP_RVC_FLAGS, int(unwanted));
+    importer.SetPropertyInteger(AI_CONFIG_PP_SBP_REMOVE, aiPrimitiveType_POINT | aiPrimitiveType_LINE);
+    const aiScene* scene =
+        importer.ReadFile(path.string(), aiProcess_RemoveComponent | aiProcess_Triangulate | aiProcess_SortByPType |
+                                             aiProcess_PreTransformVertices);
+    if (!scene) {
+        if (!std::filesystem::exists(path)) throw std::runtime_error(fmt::format("{}: no such file", path.string()));
+        throw std::runtime_error(fmt::format("{}: {}", path.string(), importer.GetErrorString()));
+    }
+    Mesh mesh;
+    for (unsigned i = 0; i < scene->mNumMeshes; ++i) add(mesh, *scene->mMeshes[i]);
+    if (mesh.triangles.empty()) throw std::runtime_error(fmt::format("{}: holds no triangle", path.string()));
+    try {
+        validate(mesh);
+    } catch (const std::invalid_argument& error) {
+        throw std::invalid_argument(fmt::format("{}: {}", path.string(), error.what()));
+    }
+    mesh = weld(mesh);
+    if (mesh.triangles.empty())
+        throw std::runtime_error(fmt::format("{}: holds no triangle with three different corners", path.string()));
+    return mesh;
+}
+
+void writeMesh(const std::filesystem::path& path, const Mesh& mesh) {
+    const std::string ending = path.extension().string();
+    const char* format = ending == ".obj" ? "objnomtl" : ending == ".ply" ? "plyb" : ending == ".stl" ? "stlb" : nullptr;
+    if (!format) throw std::invalid_argument(fmt::format("{}: meshes are written as .obj, .ply or .stl", path.string()));
+    validate(mesh);
+    AtomicFile file(path);
+    const std::unique_ptr<aiScene> scene = toScene(mesh);
+    Assimp::Exporter exporter;
+    if (exporter.Export(scene.get(), format, file.temporary().string()) != aiReturn_SUCCESS)
+        throw std::runtime_error(fmt::format("{}: {}", path.string(), exporter.GetErrorString()));
+    file.commit();
+}
+
+}  // namespace bilayer

@@ -1,0 +1,150 @@
+// Triangles to tiles: section 3.2, Algorithm 1 and Fig. 2 of the paper.
+#include "sdf/tiles.h"
+
+#include <oneapi/tbb/blocked_range.h>
+#include <oneapi/tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+
+namespace bilayer {
+namespace {
+
+/// Algorithm 1 divides the longest edge into as many parts as the others. For a triangle of ordinary shape a part is at
+/// most 2 sqrt(epsilon) long (half a square: exactly 2); beyond this factor the triangle counts as a sliver.
+constexpr double sliverStep = 3.0;
+
+/// Triangles that one task cuts: enough to hide what a task costs, few enough to share out.
+constexpr std::size_t grain = 2048;
+
+using Corners = std::array<glm::dvec3, 3>;  // of a triangle, in voxels
+
+struct Shape {
+    double area;         // [voxels^2]
+    double longestEdge;  // [voxels]
+    int longest;         // the edge from this corner to the next
+};
+
+Shape shapeOf(const Corners& c) {
+    Shape shape{0.5 * glm::length(glm::cross(c[1] - c[0], c[2] - c[0])), 0, 0};
+    for (int k = 0; k < 3; ++k)
+        if (const double length = glm::distance(c[k], c[(k + 1) % 3]); length > shape.longestEdge) {
+            shape.longestEdge = length;
+            shape.longest = k;
+        }
+    return shape;
+}
+
+// Cuts one triangle into tiles and hands each to `emit`.
+template <class Emit>
+class Cutter {
+  public:
+    Cutter(const DoubleLayerOptions& options, Emit emit) : options_(options), emit_(emit) {}
+
+    void cut(const Corners& corners) {
+        const glm::dvec3 normal = glm::cross(corners[1] - corners[0], corners[2] - corners[0]);
+        const double length = glm::length(normal);
+        if (!(length > 0)) return;  // no area, no normal, no sample
+        normal_ = normal / length;
+        if (options_.subdivision == Subdivision::recursive)
+            recurse(corners);
+        else
+            rows(corners);
+    }
+
+  private:
+    // Algorithm 1; where it would leave gaps, on halves or quarters of the triangle.
+    void rows(const Corners& c) {
+        const Shape shape = shapeOf(c);
+        const double n = std::max(1.0, std::ceil(std::sqrt(shape.area / options_.epsilon)));
+        if (options_.fillGaps) {
+            if (shape.longestEdge > sliverStep * n * std::sqrt(options_.epsilon)) return halve(c, shape, &Cutter::rows);
+            if (n > options_.maxSubdivision) return quarter(c, &Cutter::rows);
+        }
+        emit(c, int(std::min(n, double(options_.maxSubdivision))));
+    }
+
+    // Fig. 2: barycentres of parts below epsilon.
+    void recurse(const Corners& c) {
+        const Shape shape = shapeOf(c);
+        if (options_.fillGaps && shape.longestEdge > sliverStep * std::sqrt(options_.epsilon) && shape.area <= options_.epsilon)
+            return halve(c, shape, &Cutter::recurse);
+        if (shape.area <= options_.epsilon) return emit(c, 1);
+        if (shape.area <= 2 * options_.epsilon) return halve(c, shape, &Cutter::recurse);
+        quarter(c, &Cutter::recurse);
+    }
+
+    using Next = void (Cutter::*)(const Corners&);
+
+    void halve(const Corners& c, const Shape& shape, Next next) {
+        const int i = shape.longest, j = (i + 1) % 3, k = (i + 2) % 3;
+        const glm::dvec3 middle = 0.5 * (c[i] + c[j]);
+        (this->*next)({c[i], middle, c[k]});
+        (this->*next)({middle, c[j], c[k]});
+    }
+
+    void quarter(const Corners& c, Next next) {
+        const glm::dvec3 ab = 0.5 * (c[0] + c[1]), bc = 0.5 * (c[1] + c[2]), ca = 0.5 * (c[2] + c[0]);
+        (this->*next)({c[0], ab, ca});
+        (this->*next)({ab, c[1], bc});
+        (this->*next)({ca, bc, c[2]});
+        (this->*next)({ab, bc, ca});
+    }
+
+    void emit(const Corners& c, int n) {
+        const glm::dvec3 s1 = (c[1] - c[0]) / double(n), s2 = (c[2] - c[1]) / double(n), s3 = (c[2] - c[0]) / double(n);
+        const glm::dvec3 first = c[0] + (s1 + s3) / 3.0;
+        const glm::ivec3 base(glm::floor(first + 0.5));
+        emit_(Tile{base, glm::vec3(first - glm::dvec3(base)), glm::vec3(s1), glm::vec3(s2),
+                   glm::vec3(double(options_.delta) * normal_), n});
+    }
+
+    const DoubleLayerOptions& options_;
+    Emit emit_;
+    glm::dvec3 normal_{0};
+};
+
+}  // namespace
+
+Tiles makeTiles(const Mesh& mesh, const BuildOptions& options) {
+    const double voxels = 1.0 / double(options.voxelSize);
+    const auto corners = [&](std::size_t triangle) {
+        const glm::uvec3 t = mesh.triangles[triangle];
+        return Corners{glm::dvec3(mesh.points[t.x]) * voxels, glm::dvec3(mesh.points[t.y]) * voxels,
+                       glm::dvec3(mesh.points[t.z]) * voxels};
+    };
+    // each task cuts a run of triangles into a list of its own; the lists are then joined in the order of the triangles
+    const std::size_t runs = (mesh.triangles.size() + grain - 1) / grain;
+    std::vector<Tiles> parts(runs);
+    tbb::parallel_for(std::size_t(0), runs, [&](std::size_t run) {
+        Tiles& part = parts[run];
+        part.tiles.reserve(grain);
+        part.triangles.reserve(grain);
+        std::int32_t triangle = 0;
+        Cutter cutter(options.doubleLayer, [&](const Tile& tile) {
+            part.tiles.push_back(tile);
+            part.triangles.push_back(triangle);
+        });
+        const std::size_t end = std::min(mesh.triangles.size(), (run + 1) * grain);
+        for (std::size_t t = run * grain; t < end; ++t) {
+            triangle = std::int32_t(t);
+            cutter.cut(corners(t));
+        }
+    });
+    std::vector<std::size_t> begins(runs + 1, 0);
+    for (std::size_t run = 0; run < runs; ++run) begins[run + 1] = begins[run] + parts[run].tiles.size();
+    Tiles all;
+    all.tiles.resize(begins[runs]);
+    all.triangles.resize(begins[runs]);
+    tbb::parallel_for(std::size_t(0), runs, [&](std::size_t run) {
+        std::copy(parts[run].tiles.begin(), parts[run].tiles.end(), all.tiles.begin() + std::ptrdiff_t(begins[run]));
+        std::copy(parts[run].triangles.begin(), parts[run].triangles.end(),
+                  all.triangles.begin() + std::ptrdiff_t(begins[run]));
+    });
+    return all;
+}
+
+}  // namespace bilayer

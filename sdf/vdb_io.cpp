@@ -1,0 +1,69 @@
+#include "sdf/vdb_io.h"
+
+#include <fmt/format.h>
+#include <openvdb/io/File.h>
+#include <openvdb/io/Stream.h>
+
+#include <fstream>
+#include <stdexcept>
+
+#include "sdf/atomic_file.h"
+#include "sdf/grids.h"
+
+namespace bilayer {
+namespace {
+
+template <class Grid>
+typename Grid::ConstPtr first(const openvdb::GridPtrVec& grids, auto accept) {
+    for (const auto& base : grids)
+        if (auto grid = openvdb::gridPtrCast<Grid>(base); grid && accept(*grid)) return grid;
+    return nullptr;
+}
+
+}  // namespace
+
+void writeVdb(const std::filesystem::path& path, const LevelSet& levelSet, const VdbOptions& options) {
+    openvdb::initialize();
+    // a shallow copy, since how distances are stored is a property of the grid
+    const auto distance = openvdb::ConstPtrCast<openvdb::FloatGrid>(levelSet.grids().distance)->copy();
+    distance->setSaveFloatAsHalf(options.halfFloat);
+    openvdb::GridCPtrVec grids{distance};
+    if (levelSet.grids().triangle) grids.push_back(levelSet.grids().triangle);
+    AtomicFile file(path);
+    try {
+        std::ofstream stream(file.temporary(), std::ios::binary);
+        stream.exceptions(std::ios::failbit | std::ios::badbit);
+        openvdb::io::Stream(stream).write(grids);
+        stream.close();
+    } catch (const std::exception&) {
+        throw std::runtime_error(fmt::format("{}: cannot be written (is the disk full?)", path.string()));
+    }
+    file.commit();
+}
+
+LevelSet readVdb(const std::filesystem::path& path) {
+    openvdb::initialize();
+    if (!std::filesystem::is_regular_file(path)) throw std::runtime_error(fmt::format("{}: no such file", path.string()));
+    openvdb::GridPtrVec grids;
+    try {
+        std::ifstream stream(path, std::ios::binary);
+        stream.exceptions(std::ios::failbit | std::ios::badbit);
+        // delayed loading would leave the values, and any damage to them, in the file
+        grids = *openvdb::io::Stream(stream, /*delayLoad=*/false).getGrids();
+    } catch (const std::exception& error) {
+        throw std::runtime_error(fmt::format("{}: is no .vdb file or is damaged ({})", path.string(), error.what()));
+    }
+    auto result = std::make_shared<Grids>();
+    result->distance = first<openvdb::FloatGrid>(
+        grids, [](const auto& grid) { return grid.getGridClass() == openvdb::GRID_LEVEL_SET; });
+    if (!result->distance) throw std::runtime_error(fmt::format("{}: holds no level set", path.string()));
+    result->triangle =
+        first<openvdb::Int32Grid>(grids, [](const auto& grid) { return grid.getName() == "triangle"; });
+    try {
+        return LevelSet(std::move(result));
+    } catch (const std::invalid_argument& error) {
+        throw std::runtime_error(fmt::format("{}: {}", path.string(), error.what()));
+    }
+}
+
+}  // namespace bilayer

@@ -1,0 +1,24 @@
+// From the distances that a filler found to what a leaf of the band holds: trimmed to the band, every voxel signed.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "sdf/blocks.h"
+
+namespace bilayer {
+
+/// One bit a voxel, in the order of an OpenVDB leaf: voxel (x, y, z) is bit y * 8 + z of word x.
+using BlockMask = std::array<std::uint64_t, blockSide>;
+
+struct BandWidths {
+    float exterior, interior;  ///< [voxels]
+    float voxelSize;           ///< [m]
+};
+
+/// Turns one block's signed distances [voxels] into a leaf's values [m]: active where -interior < distance < exterior, else
+/// plus the exterior or minus the interior width. Voxels of unknown distance take the sign of the known ones that they are
+/// connected with inside the block, the nearest first. Returns false, and leaves the outputs alone, if nothing is known.
+bool trimToBand(const float* distances, const BandWidths& widths, float* values, BlockMask& active);
+
+}  // namespace bilayer
