@@ -1,0 +1,351 @@
+// A level set laid out for queries: each leaf becomes a block of 9^3 floats, so that all eight voxels around a point
+// lie in one block, and a dense directory over the blocks' box tells which block a point is in. Where there is none, it
+// tells the side and how many blocks around are empty, which bounds the distance from below.
+#include "collider/field.h"
+
+#include <oneapi/tbb/parallel_for.h>
+#include <openvdb/tree/LeafManager.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <limits>
+#include <stdexcept>
+#include <string>
+
+#include "sdf/grids.h"
+
+namespace bilayer {
+namespace {
+
+using openvdb::Coord;
+using openvdb::FloatTree;
+using Accessor = openvdb::FloatGrid::ConstAccessor;
+
+constexpr int side = 8;           // voxels along a block: an OpenVDB leaf
+constexpr int stride = side + 1;  // with the apron that completes the last cells
+constexpr int blockFloats = stride * stride * stride;
+constexpr std::int64_t mostBlocks = 1 << 28;  // entries of the directory: 1 GiB
+constexpr float cellDiagonal = 1.7320508f;    // [voxels]; also the Lipschitz bound of the trilinear interpolant
+constexpr double smallestStep = 0.1;          // of a ray [voxels]: bounds the steps of rays that graze the surface
+constexpr double rayTolerance = 1e-5;         // [voxels]
+constexpr float infinity = std::numeric_limits<float>::infinity();
+
+// Of an empty block: how many blocks it is away from the nearest one that is not (1: adjacent), and its side.
+std::int32_t encodeEmpty(std::int32_t gap, bool inside) {
+    return -1 - (2 * gap + (inside ? 1 : 0));
+}
+std::int32_t emptyGap(std::int32_t entry) {
+    return (-1 - entry) / 2;
+}
+bool emptyInside(std::int32_t entry) {
+    return ((-1 - entry) & 1) != 0;
+}
+
+// The eight voxels around a point, the last axis fastest, and where the point lies between them.
+struct Cell {
+    std::array<float, 8> values;
+    glm::vec3 fraction;
+};
+
+float mix(float a, float b, float t) {
+    return a + t * (b - a);
+}
+
+float interpolate(const Cell& cell) {
+    const auto& [v, f] = cell;
+    const float low = mix(mix(v[0], v[1], f.z), mix(v[2], v[3], f.z), f.y);
+    const float high = mix(mix(v[4], v[5], f.z), mix(v[6], v[7], f.z), f.y);
+    return mix(low, high, f.x);
+}
+
+// The gradient of interpolate() [distance a voxel].
+glm::vec3 interpolantGradient(const Cell& cell) {
+    const auto& [v, f] = cell;
+    const float x0y0 = mix(v[0], v[1], f.z), x0y1 = mix(v[2], v[3], f.z);
+    const float x1y0 = mix(v[4], v[5], f.z), x1y1 = mix(v[6], v[7], f.z);
+    return {mix(x1y0, x1y1, f.y) - mix(x0y0, x0y1, f.y), mix(x0y1 - x0y0, x1y1 - x1y0, f.x),
+            mix(mix(v[1] - v[0], v[3] - v[2], f.y), mix(v[5] - v[4], v[7] - v[6], f.y), f.x)};
+}
+
+// The best bound that the eight voxels give, since a distance changes by no more than one goes.
+float boundFromCorners(const Cell& cell, float voxelSize) {
+    float bound = 0;
+    for (int corner = 0; corner < 8; ++corner) {
+        const glm::vec3 offset = cell.fraction - glm::vec3(corner >> 2, corner >> 1 & 1, corner & 1);
+        bound = std::max(bound, std::abs(cell.values[corner]) - voxelSize * glm::length(offset));
+    }
+    return bound;
+}
+
+// A leaf needs a block if it has voxels of the band, or lies on both sides of it (where the band is below one voxel).
+bool needsBlock(const FloatTree::LeafNodeType& leaf) {
+    if (!leaf.getValueMask().isOff()) return true;
+    const auto [low, high] = std::minmax_element(leaf.buffer().data(), leaf.buffer().data() + side * side * side);
+    return (*low < 0) != (*high < 0);
+}
+
+// Copies a leaf, and the first layer of voxels of its seven upper neighbours.
+void copyBlock(const Accessor& tree, const Coord& origin, float* block) {
+    for (int part = 0; part < 8; ++part) {
+        const glm::ivec3 first = side * glm::ivec3(part >> 2, part >> 1 & 1, part & 1);
+        const glm::ivec3 count = glm::min(glm::ivec3(side), stride - first);
+        const Coord corner = origin.offsetBy(first.x, first.y, first.z);
+        const auto* leaf = tree.probeConstLeaf(corner);
+        const float tile = leaf ? 0.f : tree.getValue(corner);
+        for (int x = 0; x < count.x; ++x)
+            for (int y = 0; y < count.y; ++y) {
+                float* row = block + ((first.x + x) * stride + first.y + y) * stride + first.z;
+                if (leaf)
+                    std::copy_n(leaf->buffer().data() + (x * side + y) * side, count.z, row);
+                else
+                    std::fill_n(row, count.z, tile);
+            }
+    }
+}
+
+// Chessboard distances to the cells that are 0, in two sweeps over half of the 26 neighbours each
+// (A. Rosenfeld, J. L. Pfaltz, "Distance functions on digital pictures", 1968). The others must be large.
+void chessboard(std::vector<std::int32_t>& cells, const glm::ivec3& size) {
+    const auto at = [&](const glm::ivec3& p) -> std::int32_t& {
+        return cells[(std::size_t(p.x) * size.y + p.y) * size.z + p.z];
+    };
+    const auto relax = [&](const glm::ivec3& p, int direction) {
+        std::int32_t& cell = at(p);
+        for (int neighbour = 0; neighbour < 13; ++neighbour) {
+            const glm::ivec3 offset(neighbour / 9 - 1, neighbour / 3 % 3 - 1, neighbour % 3 - 1);
+            const glm::ivec3 q = p + direction * offset;
+            const bool within = glm::clamp(q, glm::ivec3(0), size - 1) == q;
+            if (within) cell = std::min(cell, at(q) + 1);
+        }
+    };
+    for (int x = 0; x < size.x; ++x)
+        for (int y = 0; y < size.y; ++y)
+            for (int z = 0; z < size.z; ++z) relax({x, y, z}, 1);
+    for (int x = size.x; x-- > 0;)
+        for (int y = size.y; y-- > 0;)
+            for (int z = size.z; z-- > 0;) relax({x, y, z}, -1);
+}
+
+}  // namespace
+
+struct Field::Data {
+    glm::dvec3 origin;  // of the directory: its first voxel [m]
+    glm::ivec3 blocks;  // of the directory, along each axis
+    std::vector<std::int32_t> directory;
+    std::unique_ptr<float[]> values;
+    std::size_t stored = 0;
+    double voxel;  // its edge [m], unrounded: far from the origin it counts
+    float voxelSize, exteriorWidth, interiorWidth;
+    Bounds bounds;
+
+    explicit Data(const LevelSet& levelSet);
+
+    void layOut(const FloatTree& tree, const std::vector<Coord>& origins, const Coord& first);
+
+    // Points are in voxels from the directory's first one, in double: exact enough however far the mesh is from the
+    // origin.
+    glm::dvec3 toLocal(const glm::vec3& point) const { return (glm::dvec3(point) - origin) / voxel; }
+    glm::vec3 toWorld(const glm::dvec3& local) const { return glm::vec3(local * voxel + origin); }
+    glm::dvec3 extent() const { return double(side) * glm::dvec3(blocks); }
+
+    template <bool withGradient>
+    Sample sample(const glm::dvec3& local) const;
+    float boundOutside(const glm::dvec3& local) const;
+    float boundInEmptyBlock(std::int32_t entry, const glm::vec3& inBlock) const;
+    double crossing(const glm::dvec3& start, const glm::dvec3& direction, double outside, double inside) const;
+    std::optional<double> trace(const glm::dvec3& start, const glm::dvec3& direction, double length) const;
+};
+
+Field::Data::Data(const LevelSet& levelSet)
+    : voxelSize(levelSet.voxelSize()),
+      exteriorWidth(levelSet.exteriorWidth()),
+      interiorWidth(levelSet.interiorWidth()) {
+    const openvdb::FloatGrid& grid = *levelSet.grids().distance;
+    const openvdb::tree::LeafManager<const FloatTree> leaves(grid.tree());
+    std::vector<Coord> origins;
+    openvdb::CoordBBox box;
+    for (std::size_t i = 0; i < leaves.leafCount(); ++i)
+        if (needsBlock(leaves.leaf(i))) {
+            origins.push_back(leaves.leaf(i).origin());
+            box.expand(origins.back());
+        }
+    if (origins.empty()) throw std::invalid_argument("field: the level set has no voxel in its band");
+
+    const Coord first = box.min();
+    blocks = glm::ivec3((box.max() - first).x(), (box.max() - first).y(), (box.max() - first).z()) / side + 1;
+    const double count = double(blocks.x) * blocks.y * blocks.z;
+    if (count > double(mostBlocks))
+        throw std::invalid_argument("field: the bounds hold more than 2^28 blocks of 8^3 voxels: take larger voxels");
+    layOut(grid.tree(), origins, first);
+
+    const auto world = [&](const Coord& voxel) {
+        const openvdb::Vec3d p = grid.indexToWorld(voxel);
+        return glm::dvec3(p.x(), p.y(), p.z());
+    };
+    origin = world(first);
+    const openvdb::CoordBBox active = grid.evalActiveVoxelBoundingBox();
+    bounds = {glm::vec3(world(active.min())), glm::vec3(world(active.max()))};
+}
+
+void Field::Data::layOut(const FloatTree& tree, const std::vector<Coord>& origins, const Coord& first) {
+    const auto entryOf = [&](const Coord& voxel) -> std::int32_t& {
+        const Coord block = (voxel - first) >> 3;
+        return directory[(std::size_t(block.x()) * blocks.y + block.y()) * blocks.z + block.z()];
+    };
+    directory.assign(std::size_t(blocks.x) * blocks.y * blocks.z, std::numeric_limits<std::int32_t>::max() / 4);
+    for (const Coord& block : origins) entryOf(block) = 0;
+    chessboard(directory, blocks);
+
+    tbb::parallel_for(0, blocks.x, [&](int x) {
+        const Accessor accessor(tree);
+        for (int y = 0; y < blocks.y; ++y)
+            for (int z = 0; z < blocks.z; ++z) {
+                const Coord block = first.offsetBy(side * x, side * y, side * z);
+                std::int32_t& entry = entryOf(block);
+                if (entry > 0) entry = encodeEmpty(entry, accessor.getValue(block) < 0);
+            }
+    });
+
+    stored = origins.size();
+    values = std::make_unique_for_overwrite<float[]>(stored * blockFloats);
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, stored), [&](const auto& range) {
+        const Accessor accessor(tree);
+        for (std::size_t i = range.begin(); i < range.end(); ++i) {
+            entryOf(origins[i]) = std::int32_t(i);
+            copyBlock(accessor, origins[i], values.get() + i * blockFloats);
+        }
+    });
+}
+
+template <bool withGradient>
+Sample Field::Data::sample(const glm::dvec3& local) const {
+    // compared before any conversion to integers, so that NaN and huge coordinates end here
+    const glm::dvec3 size = extent();
+    const bool within =
+        local.x >= 0 && local.y >= 0 && local.z >= 0 && local.x < size.x && local.y < size.y && local.z < size.z;
+    if (!within) return {.distance = boundOutside(local)};
+
+    const glm::ivec3 voxel(local), block = voxel >> 3, inBlock = voxel & 7;
+    const std::int32_t entry = directory[(std::size_t(block.x) * blocks.y + block.y) * blocks.z + block.z];
+    if (entry < 0) return {.distance = boundInEmptyBlock(entry, glm::vec3(local - glm::dvec3(side * block)))};
+
+    const float* v =
+        values.get() + std::size_t(entry) * blockFloats + (inBlock.x * stride + inBlock.y) * stride + inBlock.z;
+    constexpr int x = stride * stride, y = stride;
+    const Cell cell{{v[0], v[1], v[y], v[y + 1], v[x], v[x + 1], v[x + y], v[x + y + 1]},
+                    glm::vec3(local - glm::dvec3(voxel))};
+    const float distance = interpolate(cell);
+    const auto [low, high] = std::minmax_element(cell.values.begin(), cell.values.end());
+    const bool inBand = *low > -interiorWidth && *high < exteriorWidth;
+    if (!inBand) return {.distance = std::copysign(boundFromCorners(cell, voxelSize), distance)};
+    if constexpr (withGradient)
+        return {.distance = distance, .gradient = interpolantGradient(cell) / voxelSize, .inBand = true};
+    else
+        return {.distance = distance, .inBand = true};
+}
+
+// Who comes from outside the directory's box has that way to go, and is then no more than a cell's diagonal from a
+// voxel beyond the band.
+float Field::Data::boundOutside(const glm::dvec3& local) const {
+    const double way = glm::distance(local, glm::clamp(local, glm::dvec3(0), extent()));
+    if (!std::isfinite(way)) return infinity;
+    return std::max(0.f, float(way - double(cellDiagonal)) * voxelSize + exteriorWidth);
+}
+
+// As above from block to block; beside the band the nearest voxel of the block itself often bounds better.
+float Field::Data::boundInEmptyBlock(std::int32_t entry, const glm::vec3& inBlock) const {
+    const glm::vec3 toFaces = glm::min(inBlock, float(side) - inBlock);
+    const float way = float(side * (emptyGap(entry) - 1)) + std::min({toFaces.x, toFaces.y, toFaces.z});
+    const glm::vec3 nearest = glm::clamp(glm::round(inBlock), 0.f, float(side - 1));
+    const float gain = std::max(way - cellDiagonal, -glm::distance(inBlock, nearest));
+    const bool inside = emptyInside(entry);
+    const float bound = std::max(0.f, gain * voxelSize + (inside ? interiorWidth : exteriorWidth));
+    return inside ? -bound : bound;
+}
+
+// Where between two lengths along a ray the interpolant changes its sign.
+double Field::Data::crossing(const glm::dvec3& start, const glm::dvec3& direction, double outside,
+                             double inside) const {
+    while (inside - outside > rayTolerance) {
+        const double middle = 0.5 * (outside + inside);
+        (sample<false>(start + middle * direction).distance < 0 ? inside : outside) = middle;
+    }
+    return inside;
+}
+
+// Sphere tracing along a unit direction [voxels]. In the band the interpolant may be steeper than 1, by sqrt(3) at
+// most.
+std::optional<double> Field::Data::trace(const glm::dvec3& start, const glm::dvec3& direction, double length) const {
+    double outside = 0;
+    for (double along = 0;;) {
+        const Sample here = sample<false>(start + along * direction);
+        if (here.distance < 0) return crossing(start, direction, outside, along);
+        if (along >= length) return std::nullopt;
+        outside = along;
+        const double way = here.distance / voxel;
+        along = std::min(length, along + std::max(here.inBand ? way / cellDiagonal : way, smallestStep));
+    }
+}
+
+Field::Field(const LevelSet& levelSet) : data_(std::make_shared<Data>(levelSet)) {}
+
+Sample Field::sample(const glm::vec3& point) const noexcept {
+    return data_->sample<true>(data_->toLocal(point));
+}
+
+float Field::distance(const glm::vec3& point) const noexcept {
+    return data_->sample<false>(data_->toLocal(point)).distance;
+}
+
+std::optional<RayHit> Field::raycast(const glm::vec3& origin, const glm::vec3& direction,
+                                     float maxDistance) const noexcept {
+    const glm::dvec3 from = data_->toLocal(origin);
+    const double directionLength = glm::length(glm::dvec3(direction));
+    const bool valid = std::isfinite(from.x + from.y + from.z) && std::isfinite(directionLength) &&
+                       directionLength > 0 && maxDistance >= 0;
+    if (!valid) return std::nullopt;
+    const glm::dvec3 unit = glm::dvec3(direction) / directionLength;
+
+    // clipped to the directory's box: no surface lies outside, and the steps are bounded by its size
+    const glm::dvec3 size = data_->extent();
+    double enter = 0, leave = maxDistance / data_->voxel;
+    for (int axis = 0; axis < 3; ++axis) {
+        if (unit[axis] == 0 && (from[axis] < 0 || from[axis] > size[axis])) return std::nullopt;
+        if (unit[axis] == 0) continue;
+        const double low = -from[axis] / unit[axis], high = (size[axis] - from[axis]) / unit[axis];
+        enter = std::max(enter, std::min(low, high));
+        leave = std::min(leave, std::max(low, high));
+    }
+    if (enter > leave) return std::nullopt;
+    const glm::dvec3 start = glm::clamp(from + enter * unit, glm::dvec3(0), size);
+    const auto along = data_->trace(start, unit, std::min(leave - enter, glm::length(size)));
+    if (!along) return std::nullopt;
+
+    const glm::dvec3 hit = start + *along * unit;
+    const glm::vec3 gradient = data_->sample<true>(hit).gradient;
+    const float steepness = glm::length(gradient);
+    return RayHit{.distance = float((enter + *along) * data_->voxel),
+                  .position = data_->toWorld(hit),
+                  .normal = steepness > 0 ? gradient / steepness : glm::vec3(-unit)};
+}
+
+float Field::voxelSize() const noexcept {
+    return data_->voxelSize;
+}
+float Field::exteriorWidth() const noexcept {
+    return data_->exteriorWidth;
+}
+float Field::interiorWidth() const noexcept {
+    return data_->interiorWidth;
+}
+const Bounds& Field::bounds() const noexcept {
+    return data_->bounds;
+}
+
+std::size_t Field::memoryBytes() const noexcept {
+    return sizeof(Data) + data_->directory.size() * sizeof(std::int32_t) + data_->stored * blockFloats * sizeof(float);
+}
+
+}  // namespace bilayer

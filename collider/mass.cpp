@@ -1,0 +1,112 @@
+// Volume, centre and inertia as sums over tetrahedra, and the principal axes by Jacobi's rotations.
+#include "collider/mass.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/gtc/matrix_access.hpp>
+#include <stdexcept>
+#include <utility>
+
+namespace bilayer {
+namespace {
+
+constexpr double leastThickness = 1e-7;  // of volume / (area * length): what single precision leaves of a flat sheet
+constexpr int mostSweeps = 32;           // of Jacobi's method, which needs about five
+
+struct Integrals {
+    double volume = 0, area = 0;
+    glm::dvec3 first{0};   // of x
+    glm::dmat3 second{0};  // of x x^T
+};
+
+// Over the tetrahedra between `centre`, which becomes the origin, and the triangles.
+Integrals integrate(const Mesh& mesh, const glm::dvec3& centre) {
+    Integrals sum;
+    for (const glm::uvec3& t : mesh.triangles) {
+        const glm::dvec3 a = glm::dvec3(mesh.points[t.x]) - centre, b = glm::dvec3(mesh.points[t.y]) - centre,
+                         c = glm::dvec3(mesh.points[t.z]) - centre, s = a + b + c;
+        const double det = glm::dot(a, glm::cross(b, c));
+        sum.volume += det / 6;
+        sum.first += det / 24 * s;
+        sum.second +=
+            det / 120 *
+            (glm::outerProduct(a, a) + glm::outerProduct(b, b) + glm::outerProduct(c, c) + glm::outerProduct(s, s));
+        sum.area += glm::length(glm::cross(b - a, c - a)) / 2;
+    }
+    return sum;
+}
+
+struct Eigen {
+    glm::dvec3 values;   // ascending
+    glm::dmat3 vectors;  // a right-handed system of columns
+};
+
+// Turns the plane of axes p and q so that the entry (p, q) vanishes.
+void rotate(glm::dmat3& matrix, glm::dmat3& vectors, int p, int q) {
+    if (matrix[p][q] == 0) return;
+    const double theta = (matrix[q][q] - matrix[p][p]) / (2 * matrix[p][q]);
+    const double t = std::copysign(1 / (std::abs(theta) + std::sqrt(theta * theta + 1)), theta);
+    const double c = 1 / std::sqrt(t * t + 1), s = t * c;
+    glm::dmat3 turn(1);
+    turn[p][p] = turn[q][q] = c;
+    turn[q][p] = s;
+    turn[p][q] = -s;
+    matrix = glm::transpose(turn) * matrix * turn;
+    matrix[p][q] = matrix[q][p] = 0;
+    vectors = vectors * turn;
+}
+
+Eigen eigen(glm::dmat3 matrix) {
+    glm::dmat3 vectors(1);
+    const double negligible = 1e-30 * glm::dot(matrix[0] + matrix[1] + matrix[2], matrix[0] + matrix[1] + matrix[2]);
+    for (int sweep = 0; sweep < mostSweeps; ++sweep) {
+        const glm::dvec3 off(matrix[0][1], matrix[0][2], matrix[1][2]);
+        if (glm::dot(off, off) <= negligible) break;
+        rotate(matrix, vectors, 0, 1);
+        rotate(matrix, vectors, 0, 2);
+        rotate(matrix, vectors, 1, 2);
+    }
+    std::array<int, 3> order{0, 1, 2};
+    std::stable_sort(order.begin(), order.end(), [&](int i, int j) { return matrix[i][i] < matrix[j][j]; });
+    Eigen result;
+    for (int i = 0; i < 3; ++i) {
+        result.values[i] = matrix[order[i]][order[i]];
+        result.vectors[i] = vectors[order[i]];
+    }
+    if (glm::determinant(result.vectors) < 0) result.vectors[2] = -result.vectors[2];
+    return result;
+}
+
+}  // namespace
+
+MassProperties massProperties(const Mesh& mesh) {
+    validate(mesh);
+    const Bounds box = bounds(mesh);
+    const glm::dvec3 origin = 0.5 * (glm::dvec3(box.lower) + glm::dvec3(box.upper));
+    Integrals sum = integrate(mesh, origin);
+    if (!(std::abs(sum.volume) > leastThickness * sum.area * double(box.longestSide())))
+        throw std::invalid_argument("mass properties: the mesh encloses no volume");
+    if (sum.volume < 0) {
+        sum.volume = -sum.volume;
+        sum.first = -sum.first;
+        sum.second = -sum.second;
+    }
+
+    const glm::dvec3 centre = sum.first / sum.volume;
+    const glm::dmat3 second = sum.second - sum.volume * glm::outerProduct(centre, centre);
+    const glm::dmat3 inertia = glm::dmat3(second[0][0] + second[1][1] + second[2][2]) - second;
+    const Eigen principal = eigen(inertia);
+    const glm::dquat axes = glm::normalize(glm::quat_cast(principal.vectors));
+
+    MassProperties result;
+    result.volume = sum.volume;
+    result.centre = glm::vec3(centre + origin);
+    result.inertia = glm::mat3(inertia);
+    result.principalInertia = glm::vec3(principal.values);
+    result.principalAxes = glm::quat(axes);
+    return result;
+}
+
+}  // namespace bilayer
