@@ -1,0 +1,109 @@
+#include "cl/device.h"
+
+#include <algorithm>
+#include <cctype>
+#include <cstdlib>
+
+#include "cl/program.h"
+
+namespace bilayer {
+namespace {
+
+constexpr cl_int noPlatform = -1001;  // CL_PLATFORM_NOT_FOUND_KHR, of the loader's extension cl_khr_icd
+
+struct Found {
+    cl::Device device;
+    DeviceInfo info;
+};
+
+DeviceInfo describe(const cl::Platform& platform, const cl::Device& device) {
+    const cl_device_type type = device.getInfo<CL_DEVICE_TYPE>();
+    const cl_device_fp_config floats = device.getInfo<CL_DEVICE_SINGLE_FP_CONFIG>();
+    return {.platform = platform.getInfo<CL_PLATFORM_NAME>(),
+            .name = device.getInfo<CL_DEVICE_NAME>(),
+            .version = device.getInfo<CL_DEVICE_VERSION>(),
+            .platformVersion = platform.getInfo<CL_PLATFORM_VERSION>(),
+            .driver = device.getInfo<CL_DRIVER_VERSION>(),
+            .gpu = (type & CL_DEVICE_TYPE_GPU) != 0,
+            .unifiedMemory = device.getInfo<CL_DEVICE_HOST_UNIFIED_MEMORY>() == CL_TRUE,
+            .exactSquareRoots = (floats & CL_FP_CORRECTLY_ROUNDED_DIVIDE_SQRT) != 0,
+            .computeUnits = device.getInfo<CL_DEVICE_MAX_COMPUTE_UNITS>(),
+            .memoryBytes = device.getInfo<CL_DEVICE_GLOBAL_MEM_SIZE>(),
+            .maxAllocationBytes = device.getInfo<CL_DEVICE_MAX_MEM_ALLOC_SIZE>()};
+}
+
+// Usable devices in the order of the platforms, GPUs before all others.
+std::vector<Found> find() {
+    std::vector<Found> found;
+    try {
+        std::vector<cl::Platform> platforms;
+        cl::Platform::get(&platforms);
+        for (const cl::Platform& platform : platforms) {
+            std::vector<cl::Device> all;
+            platform.getDevices(CL_DEVICE_TYPE_ALL, &all);
+            for (const cl::Device& device : all)
+                if (device.getInfo<CL_DEVICE_AVAILABLE>() && device.getInfo<CL_DEVICE_COMPILER_AVAILABLE>())
+                    found.push_back({device, describe(platform, device)});
+        }
+    } catch (const cl::Error& error) {
+        if (error.err() != noPlatform) throw deviceError(error, "any device, while listing them");
+    }
+    std::stable_partition(found.begin(), found.end(), [](const Found& f) { return f.info.gpu; });
+    return found;
+}
+
+std::string lowered(std::string text) {
+    std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return char(std::tolower(c)); });
+    return text;
+}
+
+std::string listed(const std::vector<Found>& found) {
+    std::string list;
+    for (const Found& f : found) list += "\n  " + f.info.name + " (" + f.info.platform + ")";
+    return list;
+}
+
+Found choose(const std::string& text) {
+    const std::vector<Found> found = find();
+    if (found.empty())
+        throw DeviceError(
+            "there is no OpenCL device on this machine: no driver is installed, or none finds its hardware");
+    const std::string wanted = lowered(text);
+    const auto fits = [&](const Found& f) {
+        return lowered(f.info.name).find(wanted) != std::string::npos ||
+               lowered(f.info.platform).find(wanted) != std::string::npos;
+    };
+    const auto chosen = std::find_if(found.begin(), found.end(), fits);
+    if (chosen == found.end())
+        throw DeviceError("no OpenCL device is called '" + text + "'; there is:" + listed(found));
+    return *chosen;
+}
+
+}  // namespace
+
+const DeviceInfo& Device::info() const {
+    return impl_->info;
+}
+
+std::vector<DeviceInfo> devices() {
+    std::vector<DeviceInfo> infos;
+    for (Found& f : find()) infos.push_back(std::move(f.info));
+    return infos;
+}
+
+Device openDevice(const std::string& text) {
+    const char* fallback = std::getenv("BILAYER_DEVICE");
+    const Found found = choose(text.empty() && fallback ? fallback : text);
+    auto impl = std::make_shared<Device::Impl>();
+    impl->info = found.info;
+    impl->device = found.device;
+    try {
+        impl->context = cl::Context(found.device);
+        impl->queue = cl::CommandQueue(impl->context, found.device);
+    } catch (const cl::Error& error) {
+        throw deviceError(error, found.info.name);
+    }
+    return Device(std::move(impl));
+}
+
+}  // namespace bilayer

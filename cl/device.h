@@ -5,28 +5,33 @@
 #include <memory>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace bilayer {
 
-/// Trouble with a device: the text names the call, the code and the device, and holds the build log where a kernel failed
-/// to build.
+/// Trouble with a device: the text names the call, the code and the device, and holds the build log where a kernel
+/// failed to build.
 struct DeviceError : std::runtime_error {
     using std::runtime_error::runtime_error;
 };
 
 struct DeviceInfo {
-    std::string platform;      ///< "Portable Computing Language"
-    std::string name;          ///< "pthread-AMD EPYC"
-    std::string version;       ///< "OpenCL 3.0 PoCL HSTR: ..."
-    std::string driver;
+    std::string platform;         ///< "Portable Computing Language"
+    std::string name;             ///< "pthread-AMD EPYC"
+    std::string version;          ///< "OpenCL 3.0 PoCL HSTR: ..."
+    std::string platformVersion;  ///< "OpenCL 3.0 PoCL 3.1 ..."
+    std::string driver;           ///< "3.1"
     bool gpu = false;
+    bool unifiedMemory = false;     ///< host and device share one memory
+    bool exactSquareRoots = false;  ///< can round square roots correctly
     unsigned computeUnits = 0;
     std::uint64_t memoryBytes = 0;         ///< global memory [bytes]
     std::uint64_t maxAllocationBytes = 0;  ///< largest single buffer [bytes]
 };
 
-/// An OpenCL device with its context, queue and compiled programs. Copies share them. Not to be used by two builds at once.
+/// An OpenCL device with its context, queue and compiled programs. Copies share them. Several threads may use it at
+/// once; each build takes device memory of its own.
 class Device {
   public:
     struct Impl;
@@ -38,7 +43,8 @@ class Device {
     std::shared_ptr<Impl> impl_;
 };
 
-/// All devices of all platforms, GPUs first. Empty where there is none, or no platform.
+/// All devices of all platforms that can compile kernels, GPUs first. Empty where there is none, or no platform.
+/// Throws DeviceError when a platform fails to answer.
 std::vector<DeviceInfo> devices();
 
 /// Opens the first device whose platform or device name contains `text`, ignoring case; empty: the environment variable
