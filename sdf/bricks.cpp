@@ -9,6 +9,7 @@
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <glm/vector_relational.hpp>
 #include <limits>
 #include <utility>
 
@@ -26,13 +27,22 @@ struct Box {
     glm::ivec3 lower{std::numeric_limits<int>::max()}, upper{std::numeric_limits<int>::min()};  // both included
 };
 
+// Rounds down; many times quicker than glm::floor without SSE 4.1.
+glm::ivec3 floorToInt(const glm::vec3& v) {
+    const glm::ivec3 cut(v);
+    return cut - glm::ivec3(glm::lessThan(v, glm::vec3(cut)));
+}
+
 // The voxels that lie within `reach` of a tile's samples, axis by axis.
 Box voxelsOf(const Tile& tile, float reach) {
-    const float last = float(tile.rows - 1);
-    const glm::vec3 a = tile.first, b = a + last * tile.down, c = b + last * tile.across;
-    const glm::vec3 lower = glm::ceil(glm::min(a, glm::min(b, c)) - reach);
-    const glm::vec3 upper = glm::floor(glm::max(a, glm::max(b, c)) + reach);
-    return {tile.base + glm::ivec3(lower), tile.base + glm::ivec3(upper)};
+    glm::vec3 lower = tile.first, upper = tile.first;
+    if (tile.rows > 1) {
+        const float last = float(tile.rows - 1);
+        const glm::vec3 left = tile.first + last * tile.down, right = left + last * tile.across;
+        lower = glm::min(lower, glm::min(left, right));
+        upper = glm::max(upper, glm::max(left, right));
+    }
+    return {tile.base - floorToInt(reach - lower), tile.base + floorToInt(upper + reach)};
 }
 
 // Rounds down to whole cells of 2^shift voxels, for negative coordinates too.

@@ -10,6 +10,7 @@
 #include <hwy/highway.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -32,103 +33,113 @@ struct Layers {
     HWY_ALIGN std::int32_t outerOwner[blockVoxels];
 };
 
+// A sample of the surface and its two layers, in the block's own voxels.
 struct Sample {
-    float x, y, z;              // in the block's own voxels
-    float innerX, innerY, innerZ;
-    float outerX, outerY, outerZ;
+    glm::vec3 centre, inner, outer;
 };
 
 inline float square(float value) { return value * value; }
-inline float outside(float coordinate) { return coordinate - std::clamp(coordinate, 0.f, float(blockSide - 1)); }
+inline float max(float a, float b) { return a > b ? a : b; }
+inline float outside(float coordinate) { return max(max(-coordinate, coordinate - float(blockSide - 1)), 0.f); }
 
-// Applies a sample to the rows of voxels that a ball or a cube around it touches.
-template <bool withOwners>
-class Splat {
-  public:
-    Splat(const FillParameters& parameters, Layers& layers) : parameters_(parameters), layers_(layers) {}
+/// Rows of eight voxels along z, a bit each: row (x, y) is bit 8 x + y.
+using Rows = std::uint64_t;
+constexpr int rowCount = blockSide * blockSide;
 
-    void operator()(const Sample& s, std::int32_t owner) const {
-        if (parameters_.cube > 0)
-            cube(s, owner);
-        else
-            ball(s, owner);
-    }
-
-  private:
-    // Whole rows are updated: voxels of a row beyond the ball do no harm, since a voxel counts only if it lies certainly
-    // within the reach of its nearest sample.
-    void ball(const Sample& s, std::int32_t owner) const {
-        const float reach2 = square(parameters_.reach);
-        const float left = reach2 - square(outside(s.z));
-        if (left <= square(outside(s.x)) + square(outside(s.y))) return;
-        const RowDistances rows(s);
-        const float halfX = std::sqrt(left);
-        const int firstX = std::max(0, int(s.x - halfX + 1)), lastX = std::min(blockSide - 1, int(s.x + halfX));
-        for (int x = firstX; x <= lastX; ++x) {
-            const float leftY = left - square(float(x) - s.x);
-            if (leftY <= square(outside(s.y))) continue;
-            const float halfY = std::sqrt(leftY);
-            const int firstY = std::max(0, int(s.y - halfY + 1)), lastY = std::min(blockSide - 1, int(s.y + halfY));
-            update(s, rows, x, firstY, lastY, owner);
-        }
-    }
-
-    // The paper's neighbourhood: (2K + 1)^3 voxels around the voxel nearest to the sample.
-    void cube(const Sample& s, std::int32_t owner) const {
-        const int k = parameters_.cube;
-        const int cx = int(std::floor(s.x + 0.5f)), cy = int(std::floor(s.y + 0.5f)), cz = int(std::floor(s.z + 0.5f));
-        RowDistances rows(s);
-        rows.keep(cz - k, cz + k);
-        for (int x = std::max(0, cx - k); x <= std::min(blockSide - 1, cx + k); ++x)
-            update(s, rows, x, std::max(0, cy - k), std::min(blockSide - 1, cy + k), owner);
-    }
-
-    // The squared distances along z to both layers' samples, the same for every row.
-    struct RowDistances {
-        explicit RowDistances(const Sample& s) {
-            const Tag tag;
-            for (std::size_t z = 0; z < std::size_t(blockSide); z += hn::Lanes(tag)) {
-                const Vec at = hn::Iota(tag, float(z));
-                const Vec inner = hn::Sub(at, hn::Set(tag, s.innerZ)), outer = hn::Sub(at, hn::Set(tag, s.outerZ));
-                hn::Store(hn::Mul(inner, inner), tag, inner2 + z);
-                hn::Store(hn::Mul(outer, outer), tag, outer2 + z);
-            }
-        }
-        void keep(int first, int last) {
-            for (int z = 0; z < blockSide; ++z)
-                if (z < first || z > last) inner2[z] = outer2[z] = std::numeric_limits<float>::infinity();
-        }
-        HWY_ALIGN float inner2[blockSide];
-        HWY_ALIGN float outer2[blockSide];
-    };
-
-    void update(const Sample& s, const RowDistances& rows, int x, int firstY, int lastY, std::int32_t owner) const {
-        const float inner2 = square(float(x) - s.innerX), outer2 = square(float(x) - s.outerX);
-        for (int y = firstY; y <= lastY; ++y) {
-            const int row = (x * blockSide + y) * blockSide;
-            nearer(rows.inner2, inner2 + square(float(y) - s.innerY), layers_.inner2 + row, layers_.innerOwner + row, owner);
-            nearer(rows.outer2, outer2 + square(float(y) - s.outerY), layers_.outer2 + row, layers_.outerOwner + row, owner);
-        }
-    }
-
-    // A row of eight voxels keeps the smaller distance; the first triangle of equal ones stays.
-    static void nearer(const float* alongZ, float across2, float* best, std::int32_t* owners, std::int32_t owner) {
+// Squared distances to a point along one axis of the block.
+struct AxisDistances {
+    explicit AxisDistances(float coordinate) {
         const Tag tag;
-        const IntTag intTag;
-        for (std::size_t z = 0; z < std::size_t(blockSide); z += hn::Lanes(tag)) {
-            const Vec distance2 = hn::Add(hn::Set(tag, across2), hn::Load(tag, alongZ + z));
-            const Vec old = hn::Load(tag, best + z);
-            if constexpr (withOwners) {
-                const auto wins = hn::RebindMask(intTag, hn::Lt(distance2, old));
-                hn::Store(hn::IfThenElse(wins, hn::Set(intTag, owner), hn::Load(intTag, owners + z)), intTag, owners + z);
-            }
-            hn::Store(hn::Min(distance2, old), tag, best + z);
+        for (std::size_t i = 0; i < std::size_t(blockSide); i += hn::Lanes(tag)) {
+            const Vec away = hn::Sub(hn::Iota(tag, float(i)), hn::Set(tag, coordinate));
+            hn::Store(hn::Mul(away, away), tag, squares + i);
         }
     }
-
-    const FillParameters& parameters_;
-    Layers& layers_;
+    HWY_ALIGN float squares[blockSide];
 };
+
+// The rows that come nearer to the sample than `limit2` across z.
+inline Rows rowsWithin(const Sample& s, float limit2) {
+    const Tag tag;
+    const AxisDistances alongX(s.centre.x), alongY(s.centre.y);
+    const Vec limit = hn::Set(tag, limit2);
+    Rows rows = 0;
+    for (unsigned row = 0; row < unsigned(rowCount); row += unsigned(hn::Lanes(tag))) {
+        const Vec x = hn::Set(tag, alongX.squares[row / blockSide]), y = hn::Load(tag, alongY.squares + row % blockSide);
+        std::uint8_t bits = 0;
+        hn::StoreMaskBits(tag, hn::Lt(hn::Add(x, y), limit), &bits);
+        rows |= Rows(bits) << row;
+    }
+    return rows;
+}
+
+// Squared distances from a layer's point to the rows, across z.
+struct RowDistances {
+    explicit RowDistances(const glm::vec3& point) {
+        const Tag tag;
+        const AxisDistances alongX(point.x), alongY(point.y);
+        for (int row = 0; row < rowCount; row += int(hn::Lanes(tag)))
+            hn::Store(hn::Add(hn::Set(tag, alongX.squares[row / blockSide]), hn::Load(tag, alongY.squares + row % blockSide)),
+                      tag, squares + row);
+    }
+    HWY_ALIGN float squares[rowCount];
+};
+
+// Applies samples to one layer's voxels.
+template <bool withOwners>
+inline void nearer(float across2, const float* along2, float* best, std::int32_t* owners, std::int32_t owner) {
+    const Tag tag;
+    const IntTag intTag;
+    for (std::size_t z = 0; z < std::size_t(blockSide); z += hn::Lanes(tag)) {
+        const Vec distance2 = hn::Add(hn::Set(tag, across2), hn::Load(tag, along2 + z));
+        const Vec old = hn::Load(tag, best + z);
+        if constexpr (withOwners) {
+            // the first triangle of equally near ones stays
+            const auto wins = hn::RebindMask(intTag, hn::Lt(distance2, old));
+            hn::Store(hn::IfThenElse(wins, hn::Set(intTag, owner), hn::Load(intTag, owners + z)), intTag, owners + z);
+        }
+        hn::Store(hn::Min(distance2, old), tag, best + z);
+    }
+}
+
+template <bool withOwners>
+inline void update(const Sample& s, Rows rows, const AxisDistances& innerZ, const AxisDistances& outerZ, Layers& layers,
+                   std::int32_t owner) {
+    const RowDistances inner(s.inner), outer(s.outer);
+    for (; rows != 0; rows &= rows - 1) {
+        const int row = std::countr_zero(rows), voxel = row * blockSide;
+        nearer<withOwners>(inner.squares[row], innerZ.squares, layers.inner2 + voxel, layers.innerOwner + voxel, owner);
+        nearer<withOwners>(outer.squares[row], outerZ.squares, layers.outer2 + voxel, layers.outerOwner + voxel, owner);
+    }
+}
+
+// Applies a sample to all rows that meet the ball of radius `reach` around it. Voxels of such a row that lie beyond the
+// ball do no harm: a voxel counts only if it is certainly within the reach of its nearest sample.
+template <bool withOwners>
+inline void splatBall(const Sample& s, float reach, Layers& layers, std::int32_t owner) {
+    const float limit2 = square(reach) - square(outside(s.centre.z));
+    if (square(outside(s.centre.x)) + square(outside(s.centre.y)) >= limit2) return;
+    update<withOwners>(s, rowsWithin(s, limit2), AxisDistances(s.inner.z), AxisDistances(s.outer.z), layers, owner);
+}
+
+// Applies a sample to the paper's neighbourhood, the (2K + 1)^3 voxels around the voxel nearest to it.
+template <bool withOwners>
+inline void splatCube(const Sample& s, int k, Layers& layers, std::int32_t owner) {
+    const auto spread = [&](float coordinate) {  // the neighbourhood along one axis, a bit each
+        const int centre = int(std::floor(coordinate + 0.5f));
+        unsigned bits = 0;
+        for (int i = std::max(0, centre - k); i <= std::min(blockSide - 1, centre + k); ++i) bits |= 1u << i;
+        return bits;
+    };
+    const unsigned x = spread(s.centre.x), y = spread(s.centre.y), z = spread(s.centre.z);
+    Rows rows = 0;
+    for (int i = 0; i < blockSide; ++i)
+        if ((x >> i) & 1) rows |= Rows(y) << (i * blockSide);
+    AxisDistances innerZ(s.inner.z), outerZ(s.outer.z);
+    for (int i = 0; i < blockSide; ++i)
+        if (!((z >> i) & 1)) innerZ.squares[i] = outerZ.squares[i] = std::numeric_limits<float>::infinity();
+    update<withOwners>(s, rows, innerZ, outerZ, layers, owner);
+}
 
 // Whether a run of samples from a to b comes near the block at all.
 inline bool runMisses(const glm::vec3& a, const glm::vec3& b, float reach) {
@@ -140,7 +151,6 @@ inline bool runMisses(const glm::vec3& a, const glm::vec3& b, float reach) {
 template <bool withOwners>
 void applyTiles(const Tiles& tiles, std::span<const std::uint32_t> indices, const glm::ivec3& block,
                 const FillParameters& parameters, Layers& layers) {
-    const Splat<withOwners> splat(parameters, layers);
     for (const std::uint32_t index : indices) {
         const Tile& tile = tiles.tiles[index];
         const std::int32_t owner = withOwners ? tiles.triangles[index] : 0;
@@ -150,8 +160,11 @@ void applyTiles(const Tiles& tiles, std::span<const std::uint32_t> indices, cons
             if (i > 0 && runMisses(start + shift, start + float(i) * tile.across + shift, parameters.reach)) continue;
             for (int j = 0; j <= i; ++j) {
                 const glm::vec3 p = start + float(j) * tile.across + shift;
-                const glm::vec3 inner = p - tile.offset, outer = p + tile.offset;
-                splat({p.x, p.y, p.z, inner.x, inner.y, inner.z, outer.x, outer.y, outer.z}, owner);
+                const Sample sample{p, p - tile.offset, p + tile.offset};
+                if (parameters.cube > 0)
+                    splatCube<withOwners>(sample, parameters.cube, layers, owner);
+                else
+                    splatBall<withOwners>(sample, parameters.reach, layers, owner);
             }
         }
     }
@@ -168,7 +181,7 @@ void combine(const Layers& layers, const FillParameters& parameters, float* dist
         const Vec distance = hn::Sub(hn::Sqrt(hn::IfThenElse(inside, outer2, inner2)), delta);
         const Vec clamped = hn::Max(distance, hn::Zero(tag));
         const Vec phi = hn::IfThenElse(inside, hn::Neg(clamped), clamped);
-        hn::Store(hn::IfThenElse(hn::Lt(hn::Min(inner2, outer2), certain2), phi, unknown), tag, distances + i);
+        hn::StoreU(hn::IfThenElse(hn::Lt(hn::Min(inner2, outer2), certain2), phi, unknown), tag, distances + i);
     }
 }
 
