@@ -1,0 +1,223 @@
+#include "integration/bullet/dispatcher.h"
+
+#include <BulletCollision/BroadphaseCollision/btCollisionAlgorithm.h>
+#include <BulletCollision/BroadphaseCollision/btOverlappingPairCache.h>
+#include <BulletCollision/CollisionDispatch/btCollisionObjectWrapper.h>
+#include <BulletCollision/CollisionDispatch/btManifoldResult.h>
+#include <BulletCollision/CollisionShapes/btStaticPlaneShape.h>
+#include <tbb/parallel_for_each.h>
+
+#include <algorithm>
+#include <chrono>
+#include <new>
+#include <optional>
+
+#include "integration/bullet/convert.h"
+#include "integration/bullet/manifolds.h"
+#include "integration/bullet/narrow.h"
+
+namespace bilayer::bullet {
+
+namespace {
+
+// Bullet's pool hands out elements of this size, that of its own largest algorithm, whatever it is asked for [bytes].
+constexpr std::size_t poolElement = 184;
+
+bool isField(const btCollisionShape* shape) {
+    return shape->getShapeType() == FAST_CONCAVE_MESH_PROXYTYPE;
+}
+
+/// A shape where it stands in the world; for the child of a compound, the child's own.
+struct Side {
+    const btCollisionShape* shape;
+    btTransform transform;
+};
+
+Side sideOf(const btCollisionObjectWrapper& wrap) {
+    return {wrap.getCollisionShape(), wrap.getWorldTransform()};
+}
+
+/// Two overlapping bodies of which B is a field. Collides them without a call that changes anything in Bullet, so that
+/// many pairs can do it at once, and hands the contacts over later.
+class Pair {
+  public:
+    Pair(btDispatcher& dispatcher, DispatchStatistics& statistics) : manifolds_(dispatcher), statistics_(statistics) {}
+
+    /// Finds and reduces contacts up to `margin` at least.
+    void collide(const Side& a, const Side& b, float margin) {
+        contacts_.clear();
+        const auto& field = static_cast<const Shape&>(*b.shape);
+        margin = std::max(margin, field.getMargin());
+        if (isField(a.shape)) margin = std::max(margin, a.shape->getMargin());
+        report_ = find(a, field.placed(b.transform), margin);
+        found_ = static_cast<int>(contacts_.size());
+        patches_ = reduce(contacts_);
+        isReady_ = true;
+    }
+
+    /// Writes what collide() found into the manifolds; once.
+    void commit(btManifoldResult& result, bool bIsSecond, float sameWithin) {
+        manifolds_.write(patches_, result, bIsSecond, sameWithin);
+        ++statistics_.pairs;
+        statistics_.contactsFound += found_;
+        for (const Patch& patch : patches_) statistics_.contactsKept += patch.count;
+        statistics_.beyondBand += static_cast<int>(report_.beyondBand);
+        isReady_ = false;
+    }
+
+    bool isReady() const { return isReady_; }
+    void forget() { isReady_ = false; }
+    const Manifolds& manifolds() const { return manifolds_; }
+
+  private:
+    ContactReport find(const Side& a, const Placed& field, float margin) {
+        if (isField(a.shape))
+            return bilayer::collide(static_cast<const Shape&>(*a.shape).placed(a.transform), field, {margin},
+                                    contacts_);
+        if (a.shape->getShapeType() == STATIC_PLANE_PROXYTYPE) {
+            const auto& plane = static_cast<const btStaticPlaneShape&>(*a.shape);
+            const btVector3 normal = a.transform.getBasis() * plane.getPlaneNormal();
+            const float offset = plane.getPlaneConstant() + normal.dot(a.transform.getOrigin());
+            return collidePlane(toGlm(normal), offset, field, margin, contacts_);
+        }
+        if (a.shape->isConvex()) {
+            const auto& convex = static_cast<const btConvexShape&>(*a.shape);
+            if (!convex_ || !convex_->isOf(convex)) convex_.emplace(convex);
+            return collideConvex(*convex_, toPose(a.transform), field, margin, contacts_);
+        }
+        return collideTriangles(static_cast<const btConcaveShape&>(*a.shape), a.transform, field, margin, contacts_);
+    }
+
+    Manifolds manifolds_;
+    DispatchStatistics& statistics_;
+    std::optional<Convex> convex_;  ///< of A
+    std::vector<Contact> contacts_;
+    std::vector<Patch> patches_;
+    ContactReport report_;
+    int found_ = 0;
+    bool isReady_ = false;
+};
+
+class Algorithm : public btCollisionAlgorithm {
+  public:
+    Algorithm(const btCollisionAlgorithmConstructionInfo& info, bool bIsSecond, DispatchStatistics& statistics)
+        : btCollisionAlgorithm(info),
+          pair_(std::make_shared<Pair>(*info.m_dispatcher1, statistics)),
+          bIsSecond_(bIsSecond) {}
+
+    /// Shared, since a callback of the user's may remove the bodies while a batch is under way.
+    const std::shared_ptr<Pair>& pair() const { return pair_; }
+    bool bIsSecond() const { return bIsSecond_; }
+
+    void processCollision(const btCollisionObjectWrapper* first, const btCollisionObjectWrapper* second,
+                          const btDispatcherInfo&, btManifoldResult* result) override {
+        const Side a = sideOf(bIsSecond_ ? *first : *second), b = sideOf(bIsSecond_ ? *second : *first);
+        if (!pair_->isReady()) pair_->collide(a, b, result->m_closestPointDistanceThreshold);
+        pair_->commit(*result, bIsSecond_, static_cast<const Shape&>(*b.shape).getContactBreakingThreshold(0));
+    }
+
+    /// Bullet asks this of pairs in continuous dispatch, which its worlds never use.
+    btScalar calculateTimeOfImpact(btCollisionObject*, btCollisionObject*, const btDispatcherInfo&,
+                                   btManifoldResult*) override {
+        return 1;
+    }
+
+    void getAllContactManifolds(btManifoldArray& manifolds) override {
+        for (btPersistentManifold* manifold : pair_->manifolds().all()) manifolds.push_back(manifold);
+    }
+
+  private:
+    std::shared_ptr<Pair> pair_;
+    bool bIsSecond_;
+};
+static_assert(sizeof(Algorithm) <= poolElement);
+
+struct CreateFunction : btCollisionAlgorithmCreateFunc {
+    CreateFunction(bool bIsSecond, DispatchStatistics& statistics) : bIsSecond(bIsSecond), statistics(statistics) {}
+
+    btCollisionAlgorithm* CreateCollisionAlgorithm(btCollisionAlgorithmConstructionInfo& info,
+                                                   const btCollisionObjectWrapper*,
+                                                   const btCollisionObjectWrapper*) override {
+        void* memory = info.m_dispatcher1->allocateCollisionAlgorithm(sizeof(Algorithm));
+        return new (memory) Algorithm(info, bIsSecond, statistics);
+    }
+
+    bool bIsSecond;
+    DispatchStatistics& statistics;
+};
+
+}  // namespace
+
+struct Dispatcher::Functions {
+    DispatchStatistics running;  ///< contact tests between steps count here too
+    DispatchStatistics last;
+    CreateFunction fieldSecond{true, running};
+    CreateFunction fieldFirst{false, running};
+};
+
+Dispatcher::Dispatcher(btCollisionConfiguration* configuration)
+    : btCollisionDispatcher(configuration), functions_(std::make_unique<Functions>()) {
+    registerFields();
+}
+
+Dispatcher::~Dispatcher() = default;
+
+void Dispatcher::registerFields() {
+    std::vector<int> others{
+        STATIC_PLANE_PROXYTYPE,  TRIANGLE_MESH_SHAPE_PROXYTYPE, SCALED_TRIANGLE_MESH_SHAPE_PROXYTYPE,
+        TERRAIN_SHAPE_PROXYTYPE, GIMPACT_SHAPE_PROXYTYPE,       MULTIMATERIAL_TRIANGLE_MESH_PROXYTYPE};
+    for (int type = 0; type < CONCAVE_SHAPES_START_HERE; ++type) others.push_back(type);
+    const int field = FAST_CONCAVE_MESH_PROXYTYPE;
+    // Bullet looks contacts and contact tests up in different tables.
+    const auto fill = [&](int first, int second, CreateFunction& function) {
+        registerCollisionCreateFunc(first, second, &function);
+        registerClosestPointsCreateFunc(first, second, &function);
+    };
+    for (int other : others) {
+        fill(other, field, functions_->fieldSecond);
+        fill(field, other, functions_->fieldFirst);
+    }
+    fill(field, field, functions_->fieldSecond);
+}
+
+void Dispatcher::dispatchAllCollisionPairs(btOverlappingPairCache* cache, const btDispatcherInfo& info,
+                                           btDispatcher* dispatcher) {
+    const auto start = std::chrono::steady_clock::now();
+    functions_->running = {};
+
+    struct Task {
+        std::shared_ptr<Pair> pair;
+        Side a, b;
+    };
+    std::vector<Task> tasks;
+    for (int i = 0; i < cache->getNumOverlappingPairs(); ++i) {
+        btBroadphasePair& overlap = cache->getOverlappingPairArrayPtr()[i];
+        auto* first = static_cast<btCollisionObject*>(overlap.m_pProxy0->m_clientObject);
+        auto* second = static_cast<btCollisionObject*>(overlap.m_pProxy1->m_clientObject);
+        if (!isField(first->getCollisionShape()) && !isField(second->getCollisionShape())) continue;
+        if (!needsCollision(first, second)) continue;
+        const btCollisionObjectWrapper one(nullptr, first->getCollisionShape(), first, first->getWorldTransform(), -1,
+                                           -1);
+        const btCollisionObjectWrapper two(nullptr, second->getCollisionShape(), second, second->getWorldTransform(),
+                                           -1, -1);
+        if (!overlap.m_algorithm) overlap.m_algorithm = findAlgorithm(&one, &two, nullptr, BT_CONTACT_POINT_ALGORITHMS);
+        // Not ours: a compound's, which comes to us for its children, or one that the user has registered.
+        const auto* algorithm = dynamic_cast<Algorithm*>(overlap.m_algorithm);
+        if (!algorithm) continue;
+        const bool straight = algorithm->bIsSecond();
+        tasks.push_back({algorithm->pair(), sideOf(straight ? one : two), sideOf(straight ? two : one)});
+    }
+    tbb::parallel_for_each(tasks, [](Task& task) { task.pair->collide(task.a, task.b, 0); });
+
+    btCollisionDispatcher::dispatchAllCollisionPairs(cache, info, dispatcher);
+
+    for (const Task& task : tasks) task.pair->forget();
+    functions_->last = functions_->running;
+    functions_->last.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+const DispatchStatistics& Dispatcher::statistics() const {
+    return functions_->last;
+}
+
+}  // namespace bilayer::bullet

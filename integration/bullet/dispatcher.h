@@ -11,19 +11,28 @@ namespace bilayer::bullet {
 
 /// What the last step's narrow phase did.
 struct DispatchStatistics {
-    int pairs = 0;              ///< pairs with a field in them
-    int contactsFound = 0;      ///< before reduction
-    int contactsKept = 0;       ///< handed to the solver
-    int beyondBand = 0;         ///< points too deep for the band (see ContactReport)
-    double seconds = 0;         ///< for all of these pairs
+    int pairs = 0;          ///< pairs with a field in them that were awake and whose boxes overlapped
+    int contactsFound = 0;  ///< before reduction
+    int contactsKept = 0;   ///< handed to the solver
+    int beyondBand = 0;     ///< points too deep for the band (see ContactReport)
+    double seconds = 0;     ///< for all of these pairs, Bullet's own included
 };
 
-/// Use it in place of btCollisionDispatcher. All pairs of a step in which both shapes are fields are collided as one TBB
-/// batch, and their contacts are handed to Bullet in order: the same bits for any number of threads.
+/// Use it in place of btCollisionDispatcher: fields then collide with every convex shape, planes, triangle meshes,
+/// height fields and fields, also inside compounds, in contact tests, and in either order.
+///
+/// All pairs of a step that hold a field are collided as one TBB batch, and their contacts are handed to Bullet in
+/// order: the same bits for any number of threads. Also set
+/// btCollisionWorld::getDispatchInfo().m_deterministicOverlappingPairs where runs that add and remove bodies in another
+/// order must agree.
 class Dispatcher : public btCollisionDispatcher {
   public:
     explicit Dispatcher(btCollisionConfiguration* configuration);
     ~Dispatcher() override;
+
+    /// Fills Bullet's tables once more. The constructor has done so; btGImpactCollisionAlgorithm::registerAlgorithm
+    /// overwrites a row and a column.
+    void registerFields();
 
     void dispatchAllCollisionPairs(btOverlappingPairCache* pairs, const btDispatcherInfo& info,
                                    btDispatcher* dispatcher) override;
@@ -31,22 +40,8 @@ class Dispatcher : public btCollisionDispatcher {
     const DispatchStatistics& statistics() const;
 
   private:
-    struct Batch;
-    std::unique_ptr<Batch> batch_;
-};
-
-/// Owns what Bullet calls to make the algorithms of field pairs; must outlive the dispatcher it is registered on.
-class Algorithms {
-  public:
-    Algorithms();
-    ~Algorithms();
-    /// Fills both dispatch tables: fields against every convex shape, planes, triangle meshes, height fields and fields,
-    /// in either order. Call it after btGImpactCollisionAlgorithm::registerAlgorithm, which overwrites rows.
-    void registerOn(btCollisionDispatcher& dispatcher);
-
-  private:
-    struct Impl;
-    std::unique_ptr<Impl> impl_;
+    struct Functions;
+    std::unique_ptr<Functions> functions_;
 };
 
 }  // namespace bilayer::bullet

@@ -12,19 +12,21 @@
 namespace bilayer::bullet {
 
 struct ShapeOptions {
-    /// Where the collider sits in the body. Bullet takes the body's origin for the centre of mass and its axes for the
-    /// principal ones: centreOfMassFrame() makes that true for a mesh modelled about any other point.
+    /// Where the collider sits in the body: collider coordinates x become frame.toWorld(x). Bullet takes the body's
+    /// origin for the centre of mass and its axes for the principal ones: centreOfMassFrame() makes that true for a
+    /// mesh modelled about any other point.
     Pose frame;
-    /// Contacts are made up to this distance between the surfaces, and the bodies' boxes grow by it [m]. It keeps
-    /// resting contacts alive; bodies still rest surface on surface. Negative: one voxel of the field.
+    /// Contacts are made up to this distance between the surfaces, and the bodies' boxes grow by it [m, before
+    /// scaling]. It keeps resting contacts alive; bodies still rest surface on surface. Negative: one voxel of the
+    /// field.
     float margin = -1;
 };
 
 /// The frame in which the body's origin is the mesh's centre of mass and its axes are the principal ones.
 Pose centreOfMassFrame(const Collider& collider);
 
-/// Needs a bilayer::bullet::Dispatcher, or registerAlgorithms() on a stock dispatcher; without either, Bullet falls back
-/// to the triangles of the mesh against convex bodies, and to nothing against concave ones.
+/// Needs a bilayer::bullet::Dispatcher; with a stock one, Bullet falls back to the triangles of the mesh against convex
+/// bodies, and to nothing against concave ones. Like all shapes, it may serve any number of bodies.
 class Shape : public btConcaveShape {
   public:
     explicit Shape(std::shared_ptr<const Collider> collider, const ShapeOptions& options = {});
@@ -32,28 +34,37 @@ class Shape : public btConcaveShape {
 
     const Collider& collider() const { return *collider_; }
     const Pose& frame() const { return frame_; }
-    /// The pose of the collider in the world for a body transform.
-    Pose colliderPose(const btTransform& bodyTransform) const;
+    /// The collider in the world, for a body's transform.
+    Placed placed(const btTransform& bodyTransform) const;
+    /// The voxels' edge after scaling [m].
+    float voxelSize() const { return scale() * collider_->field().voxelSize(); }
 
-    /// Uniform scales only; others throw std::invalid_argument.
+    /// Positive uniform scales only; others throw std::invalid_argument.
     void setLocalScaling(const btVector3& scaling) override;
     const btVector3& getLocalScaling() const override { return scaling_; }
     float scale() const { return scaling_.x(); }
 
+    /// As in ShapeOptions, but after scaling [m].
+    void setMargin(btScalar margin) override;
+    btScalar getMargin() const override { return m_collisionMargin; }
+
     void getAabb(const btTransform& transform, btVector3& lower, btVector3& upper) const override;
     /// From the mesh, about the body's origin. Throws std::invalid_argument for a mesh without volume.
     void calculateLocalInertia(btScalar mass, btVector3& inertia) const override;
-    /// Serves rays and sphere sweeps from the field itself, everything else (debug drawing, soft bodies) from the mesh.
-    void processAllTriangles(btTriangleCallback* callback, const btVector3& lower, const btVector3& upper) const override;
+    /// Serves rays and sphere sweeps within the band from the field itself, everything else (wide spheres, other casts,
+    /// debug drawing, soft bodies) from the triangles of the mesh that meet the box.
+    void processAllTriangles(btTriangleCallback* callback, const btVector3& lower,
+                             const btVector3& upper) const override;
+    /// In voxels, not in parts of the body's size as Bullet's default, which merges contacts on fine features.
     btScalar getContactBreakingThreshold(btScalar defaultFactor) const override;
     const char* getName() const override { return "bilayer"; }
 
   private:
-    struct Triangles;
+    class Triangles;
     std::shared_ptr<const Collider> collider_;
     Pose frame_;
     btVector3 scaling_{1, 1, 1};
-    std::unique_ptr<const Triangles> triangles_;
+    std::unique_ptr<Triangles> triangles_;
 };
 
 }  // namespace bilayer::bullet

@@ -1,0 +1,52 @@
+// From hundreds of contacts to the few that Bullet's solver needs, and into its manifolds.
+#pragma once
+
+#include <BulletCollision/BroadphaseCollision/btDispatcher.h>
+#include <BulletCollision/CollisionDispatch/btManifoldResult.h>
+
+#include <array>
+#include <span>
+#include <vector>
+
+#include "collider/collider.h"
+
+namespace bilayer::bullet {
+
+/// Contacts with about the same normal: the deepest, and those that span the largest area with it.
+struct Patch {
+    std::array<Contact, MANIFOLD_CACHE_SIZE> contacts;
+    int count = 0;
+};
+
+/// Divides contacts into patches by their normals and keeps up to four a patch. Deterministic: depends on the contacts
+/// and their order only. The deepest contact of all comes first. `contacts` is left in another order.
+std::vector<Patch> reduce(std::vector<Contact>& contacts);
+
+/// The manifolds of one pair of bodies, one for each patch. Contacts are written anew each step, since Bullet refreshes
+/// the positions of old ones but not their normals; impulses are handed on to the new contacts nearest the old ones,
+/// and so the solver starts warm.
+class Manifolds {
+  public:
+    explicit Manifolds(btDispatcher& dispatcher) : dispatcher_(dispatcher) {}
+    ~Manifolds();
+    Manifolds(const Manifolds&) = delete;
+    Manifolds& operator=(const Manifolds&) = delete;
+
+    /// Replaces all contacts. Goes through btManifoldResult::addContactPoint, so that friction, restitution, callbacks
+    /// and contact tests work as for Bullet's own shapes.
+    /// @param bIsSecond  body B of the patches (whose normals point away from it) is body 1 of `result`
+    /// @param sameWithin  an old and a new contact nearer than this on either body are the same [m]
+    void write(std::span<const Patch> patches, btManifoldResult& result, bool bIsSecond, float sameWithin);
+
+    std::span<btPersistentManifold* const> all() const { return manifolds_; }
+
+  private:
+    void emit(const Contact& contact, btManifoldResult& result, bool bIsSecond);
+    void inherit(btManifoldPoint& point, float sameWithin);
+
+    btDispatcher& dispatcher_;
+    std::vector<btPersistentManifold*> manifolds_;
+    std::vector<btManifoldPoint> old_;  ///< points of the last step that no new one has inherited from yet
+};
+
+}  // namespace bilayer::bullet

@@ -1,0 +1,236 @@
+#include "integration/bullet/narrow.h"
+
+#include <BulletCollision/CollisionShapes/btTriangleCallback.h>
+#include <LinearMath/btAabbUtil2.h>
+
+#include <algorithm>
+#include <glm/geometric.hpp>
+#include <glm/mat3x3.hpp>
+#include <optional>
+
+#include "integration/bullet/convert.h"
+
+namespace bilayer::bullet {
+
+namespace {
+
+// Distance between probes along an edge [voxels], like that of the surface points.
+constexpr float probeSpacing = 2;
+// On the medial axis the interpolated gradient is short and says nothing of a direction.
+constexpr float shortestGradient = 0.5f;
+// A surface point touches a face that looks against its own normal, by this cosine at least: the points below the edge
+// of a box must not be pushed out sideways. The corners of a cube, whose normals are mixed of three, reach 0.57.
+constexpr float leastOpposition = 0.3f;
+
+/// A field in metres of the world and the axes of its body.
+class Local {
+  public:
+    explicit Local(const Placed& field) : field_(field.collider.field()), scale_(field.scale), pose_(field.pose) {}
+
+    struct Answer {
+        enum { near, outside, inside, unclear } where = unclear;
+        float distance = 0;   ///< [m]
+        glm::vec3 normal{0};  ///< of unit length if near
+    };
+
+    Answer at(const glm::vec3& point) const {
+        const Sample sample = field_.sample(point / scale_);
+        if (!sample.inBand)
+            return {sample.distance > 0 ? Answer::outside : Answer::inside, scale_ * sample.distance, {}};
+        const float length = glm::length(sample.gradient);
+        if (length < shortestGradient) return {Answer::unclear, scale_ * sample.distance, {}};
+        return {Answer::near, scale_ * sample.distance, sample.gradient / length};
+    }
+
+    /// The contact of a point of the other body's core, grown by a radius.
+    std::optional<Contact> probe(const glm::vec3& point, float radius, std::uint32_t feature, float margin,
+                                 ContactReport& report) const {
+        ++report.pointsTested;
+        const Answer answer = at(point);
+        if (answer.where == Answer::inside) ++report.beyondBand;
+        if (answer.where != Answer::near || answer.distance - radius > margin) return std::nullopt;
+        return contact(point - answer.distance * answer.normal, answer.normal, answer.distance - radius, feature);
+    }
+
+    Contact contact(const glm::vec3& position, const glm::vec3& normal, float distance, std::uint32_t feature) const {
+        return {pose_.toWorld(position), pose_.rotation * normal, distance, feature};
+    }
+
+  private:
+    const Field& field_;
+    float scale_;
+    Pose pose_;
+};
+
+/// A convex body in the coordinates of a Local field.
+class Touching {
+  public:
+    Touching(const Convex& convex, const Pose& pose, const Placed& field, float margin)
+        : convex_(convex), local_(field), margin_(margin), scale_(field.scale) {
+        const Pose inField = relative(field.pose, pose);
+        toField_ = glm::mat3(inField.rotation);
+        toConvex_ = glm::transpose(toField_);
+        origin_ = inField.position;
+    }
+
+    bool reject(const glm::vec3& centre, float radius) const {
+        const float reach = scale_ * radius + margin_;
+        return convex_.nearest(intoConvex(scale_ * centre), reach).distance > reach;
+    }
+
+    /// A surface point against the convex body's formula.
+    void visit(std::uint32_t index, const SurfacePoint& point, ContactReport& report,
+               std::vector<Contact>& contacts) const {
+        ++report.pointsTested;
+        const glm::vec3 position = scale_ * point.position;
+        const Convex::Near near = convex_.nearest(intoConvex(position), margin_);
+        if (near.distance > margin_) return;
+        const glm::vec3 normal = -(toField_ * near.normal);
+        if (glm::dot(normal, point.normal) < leastOpposition) return;
+        const std::uint32_t feature = index | featureOfB;
+        if (convex_.isCurved())
+            if (const auto better = refine(near, feature)) {
+                contacts.push_back(*better);
+                return;
+            }
+        contacts.push_back(local_.contact(position, normal, near.distance, feature));
+    }
+
+    void visitProbes(const Bounds& bounds, float spacing, ContactReport& report, std::vector<Contact>& contacts) const {
+        const float within = 0.5f * glm::length(scale_ * bounds.size()) + convex_.radius() + margin_;
+        const auto ask = [&](const glm::vec3& point, std::uint32_t number) {
+            if (const auto contact = local_.probe(intoField(point), convex_.radius(), number, margin_, report))
+                contacts.push_back(*contact);
+        };
+        convex_.visitProbes(intoConvex(scale_ * bounds.centre()), within, spacing, ask);
+    }
+
+  private:
+    glm::vec3 intoConvex(const glm::vec3& point) const { return toConvex_ * (point - origin_); }
+    glm::vec3 intoField(const glm::vec3& point) const { return toField_ * point + origin_; }
+
+    /// Follows the field's normal from the place of a round surface under a surface point to the deepest place nearby.
+    std::optional<Contact> refine(const Convex::Near& near, std::uint32_t feature) const {
+        const Local::Answer start = local_.at(intoField(near.core + convex_.radius() * near.normal));
+        if (start.where != Local::Answer::near) return std::nullopt;
+        const glm::vec3 deepest = intoField(convex_.slide(near, -(toConvex_ * start.normal)));
+        const Local::Answer answer = local_.at(deepest);
+        if (answer.where != Local::Answer::near || answer.distance > margin_) return std::nullopt;
+        return local_.contact(deepest - answer.distance * answer.normal, answer.normal, answer.distance, feature);
+    }
+
+    const Convex& convex_;
+    Local local_;
+    float margin_, scale_;
+    glm::mat3 toField_, toConvex_;
+    glm::vec3 origin_;
+};
+
+/// Triangles as Bullet hands them over, one by one.
+class TriangleProbes : public btTriangleCallback {
+  public:
+    TriangleProbes(const btTransform& transform, const Placed& field, float margin, ContactReport& report,
+                   std::vector<Contact>& contacts)
+        : inField_(relative(field.pose, toPose(transform))),
+          field_(field),
+          local_(field),
+          margin_(margin),
+          reach_(std::max(margin, field.scale * field.collider.field().interiorWidth())),
+          spacing_(probeSpacing * field.scale * field.collider.field().voxelSize()),
+          report_(report),
+          contacts_(contacts) {
+        const Bounds& bounds = field.collider.bounds();
+        centre_ = field.scale * bounds.centre();
+        within_ = 0.5f * field.scale * glm::length(bounds.size()) + margin;
+    }
+
+    void processTriangle(btVector3* triangle, int, int) override {
+        const glm::vec3 corners[3] = {inField_.toWorld(toGlm(triangle[0])), inField_.toWorld(toGlm(triangle[1])),
+                                      inField_.toWorld(toGlm(triangle[2]))};
+        const glm::vec3 nearest = nearestOnTriangle(centre_, corners[0], corners[1], corners[2]);
+        if (glm::distance(nearest, centre_) > within_) return;
+        for (int i = 0; i < 3; ++i) {
+            probe(corners[i], 0);
+            visitAlong(corners[i], corners[(i + 1) % 3], centre_, within_, spacing_,
+                       [&](const glm::vec3& point, std::uint32_t) { probe(point, 0); });
+        }
+        visitFace(corners);
+    }
+
+  private:
+    void probe(const glm::vec3& point, std::uint32_t feature) {
+        if (const auto contact = local_.probe(point, 0, feature, margin_, report_)) contacts_.push_back(*contact);
+    }
+
+    /// Asks the field at the feet of its own surface points on the triangle: a bump finds a large face.
+    void visitFace(const glm::vec3 (&corners)[3]) {
+        const float scale = field_.scale;
+        const auto foot = [&](const glm::vec3& point) {
+            return nearestOnTriangle(scale * point, corners[0], corners[1], corners[2]);
+        };
+        const auto reject = [&](const glm::vec3& centre, float radius) {
+            return glm::distance(foot(centre), scale * centre) > scale * radius + reach_;
+        };
+        field_.collider.points().visit(reject, [&](std::uint32_t index, const SurfacePoint& point) {
+            const glm::vec3 below = foot(point.position);
+            if (glm::distance(below, scale * point.position) <= reach_) probe(below, index | featureOfB);
+        });
+    }
+
+    Pose inField_;  ///< of the mesh
+    const Placed& field_;
+    Local local_;
+    float margin_, reach_, spacing_;
+    glm::vec3 centre_;
+    float within_;
+    ContactReport& report_;
+    std::vector<Contact>& contacts_;
+};
+
+}  // namespace
+
+ContactReport collidePlane(const glm::vec3& normal, float offset, const Placed& field, float margin,
+                           std::vector<Contact>& contacts) {
+    ContactReport report;
+    // The plane in the collider's own coordinates.
+    const glm::vec3 up = glm::conjugate(field.pose.rotation) * normal;
+    const float height = (offset - glm::dot(normal, field.pose.position)) / field.scale;
+    const float reach = margin / field.scale;
+    const auto above = [&](const glm::vec3& point) { return glm::dot(up, point) - height; };
+    const auto reject = [&](const glm::vec3& centre, float radius) { return above(centre) - radius > reach; };
+    field.collider.points().visit(reject, [&](std::uint32_t index, const SurfacePoint& point) {
+        ++report.pointsTested;
+        const float distance = above(point.position);
+        if (distance > reach) return;
+        const glm::vec3 position = field.pose.toWorld(field.scale * point.position);
+        contacts.push_back({position, -normal, field.scale * distance, index | featureOfB});
+    });
+    return report;
+}
+
+ContactReport collideConvex(const Convex& convex, const Pose& pose, const Placed& field, float margin,
+                            std::vector<Contact>& contacts) {
+    ContactReport report;
+    const Touching touching(convex, pose, field, margin);
+    field.collider.points().visit(
+        [&](const glm::vec3& centre, float radius) { return touching.reject(centre, radius); },
+        [&](std::uint32_t index, const SurfacePoint& point) { touching.visit(index, point, report, contacts); });
+    const float spacing = probeSpacing * field.scale * field.collider.field().voxelSize();
+    touching.visitProbes(field.collider.bounds(), spacing, report, contacts);
+    return report;
+}
+
+ContactReport collideTriangles(const btConcaveShape& mesh, const btTransform& transform, const Placed& field,
+                               float margin, std::vector<Contact>& contacts) {
+    ContactReport report;
+    TriangleProbes probes(transform, field, margin, report, contacts);
+    const Pose inMesh = relative(toPose(transform), field.pose);
+    const Bounds& bounds = field.collider.bounds();
+    btVector3 lower, upper;
+    const btTransform place(toBullet(inMesh.rotation), toBullet(inMesh.toWorld(field.scale * bounds.centre())));
+    btTransformAabb(toBullet(0.5f * field.scale * bounds.size()), margin, place, lower, upper);
+    mesh.processAllTriangles(&probes, lower, upper);
+    return report;
+}
+
+}  // namespace bilayer::bullet

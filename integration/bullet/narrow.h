@@ -1,0 +1,26 @@
+// Contacts between a field and the shapes that Bullet brings along. Body A is the other shape, body B the field.
+#pragma once
+
+#include <BulletCollision/CollisionShapes/btConcaveShape.h>
+
+#include <vector>
+
+#include "collider/collider.h"
+#include "integration/bullet/convex.h"
+
+namespace bilayer::bullet {
+
+/// Against everything below a plane.
+/// @param normal, offset  in the world: dot(normal, x) <= offset is solid; `normal` of unit length
+ContactReport collidePlane(const glm::vec3& normal, float offset, const Placed& field, float margin,
+                           std::vector<Contact>& contacts);
+
+/// Against a convex body: the field's surface points against its formula, then its own points in the field.
+ContactReport collideConvex(const Convex& convex, const Pose& pose, const Placed& field, float margin,
+                            std::vector<Contact>& contacts);
+
+/// Against the triangles of a mesh or a height field, from both sides: a triangle is a sheet.
+ContactReport collideTriangles(const btConcaveShape& mesh, const btTransform& transform, const Placed& field,
+                               float margin, std::vector<Contact>& contacts);
+
+}  // namespace bilayer::bullet

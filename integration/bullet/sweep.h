@@ -1,0 +1,24 @@
+// Spheres moved through a field until they touch.
+#pragma once
+
+#include <optional>
+
+#include "collider/collider.h"
+
+namespace bilayer::bullet {
+
+struct SweepHit {
+    float fraction;      ///< of the way, 0..1
+    glm::vec3 position;  ///< where the surfaces touch, in the world [m]
+    glm::vec3 normal;    ///< of the field, outward, in the world, of unit length
+};
+
+/// True if the band is wide enough to tell when a sphere of this radius [m] touches.
+bool sweepable(const Placed& body, float radius);
+
+/// The first place on the way of a sphere's centre where the sphere enters the field by `allowed` [m]; a sphere that
+/// starts deeper hits at once if it moves inward, as in Bullet. By conservative advancement on the field.
+std::optional<SweepHit> sweepSphere(const Placed& body, const glm::vec3& from, const glm::vec3& to, float radius,
+                                    float allowed);
+
+}  // namespace bilayer::bullet
