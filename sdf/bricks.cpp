@@ -61,7 +61,7 @@ void forEachCell(const Box& cells, Visit visit) {
             for (int z = cells.lower.z; z <= cells.upper.z; ++z) visit(glm::ivec3(x, y, z));
 }
 
-Box bricksOfAll(const std::vector<Tile>& tiles, float reach) {
+Box bricksOfAll(std::span<const Tile> tiles, float reach) {
     const auto unite = [](const Box& a, const Box& b) {
         return Box{glm::min(a.lower, b.lower), glm::max(a.upper, b.upper)};
     };

@@ -3,7 +3,7 @@
 
 #include <fmt/format.h>
 #include <oneapi/tbb/global_control.h>
-#include <oneapi/tbb/parallel_for.h>
+#include <oneapi/tbb/parallel_reduce.h>
 #include <oneapi/tbb/task_arena.h>
 #include <openvdb/tools/Prune.h>
 #include <openvdb/tools/SignedFloodFill.h>
@@ -56,12 +56,17 @@ void check(const BuildOptions& options) {
 }
 
 double areaOf(const Mesh& mesh) {
-    double area = 0;
-    for (const auto& t : mesh.triangles) {
-        const glm::dvec3 a(mesh.points[t.x]), b(mesh.points[t.y]), c(mesh.points[t.z]);
-        area += 0.5 * glm::length(glm::cross(b - a, c - a));
-    }
-    return area;
+    return tbb::parallel_reduce(
+        tbb::blocked_range<std::size_t>(0, mesh.triangles.size(), 4096), 0.0,
+        [&](const auto& range, double area) {
+            for (std::size_t i = range.begin(); i < range.end(); ++i) {
+                const glm::uvec3 t = mesh.triangles[i];
+                const glm::dvec3 a(mesh.points[t.x]), b(mesh.points[t.y]), c(mesh.points[t.z]);
+                area += 0.5 * glm::length(glm::cross(b - a, c - a));
+            }
+            return area;
+        },
+        std::plus<>());
 }
 
 // Refuses a voxel size that cannot work before anything is allocated for it.

@@ -1,13 +1,16 @@
 #include "sdf/mesh.h"
 
+#include <oneapi/tbb/parallel_for.h>
+#include <oneapi/tbb/parallel_reduce.h>
+
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <fmt/format.h>
 #include <glm/common.hpp>
 #include <glm/mat3x3.hpp>
 #include <glm/matrix.hpp>
 #include <limits>
+#include <span>
 #include <stdexcept>
 #include <tuple>
 
@@ -31,6 +34,26 @@ std::vector<unsigned> firstOfEqual(const std::vector<glm::vec3>& points) {
     return first;
 }
 
+// Mixes a word into a hash: FNV-1a's step on 64 bits at once, with the high bits folded down.
+std::uint64_t mixed(std::uint64_t hash, std::uint64_t word) {
+    constexpr std::uint64_t prime = 1099511628211ull;
+    const std::uint64_t product = (hash ^ word) * prime;
+    return product ^ (product >> 32);
+}
+
+// A hash of runs of fixed length, so that they can be hashed side by side.
+std::uint64_t hashOfRuns(std::span<const std::uint32_t> words) {
+    constexpr std::size_t run = 1 << 15;
+    std::vector<std::uint64_t> hashes((words.size() + run - 1) / run, 0);
+    tbb::parallel_for(std::size_t(0), hashes.size(), [&](std::size_t i) {
+        for (const std::uint32_t word : words.subspan(i * run, std::min(run, words.size() - i * run)))
+            hashes[i] = mixed(hashes[i], word);
+    });
+    std::uint64_t all = words.size();
+    for (const std::uint64_t hash : hashes) all = mixed(all, hash);
+    return all;
+}
+
 }  // namespace
 
 float Bounds::longestSide() const { return empty() ? 0.f : std::max({size().x, size().y, size().z}); }
@@ -41,10 +64,16 @@ void Bounds::add(const glm::vec3& point) {
 }
 
 Bounds bounds(const Mesh& mesh) {
-    Bounds box;
-    for (const auto& triangle : mesh.triangles)
-        for (int k = 0; k < 3; ++k) box.add(mesh.points[triangle[k]]);
-    return box;
+    return tbb::parallel_reduce(
+        tbb::blocked_range<std::size_t>(0, mesh.triangles.size(), 4096), Bounds{},
+        [&](const auto& range, Bounds box) {
+            for (std::size_t i = range.begin(); i < range.end(); ++i)
+                for (int k = 0; k < 3; ++k) box.add(mesh.points[mesh.triangles[i][k]]);
+            return box;
+        },
+        [](const Bounds& a, const Bounds& b) {
+            return Bounds{glm::min(a.lower, b.lower), glm::max(a.upper, b.upper)};
+        });
 }
 
 void validate(const Mesh& mesh) {
@@ -93,17 +122,11 @@ Mesh transformed(const Mesh& mesh, const glm::mat4& map) {
 }
 
 std::uint64_t hash(const Mesh& mesh) {
-    constexpr std::uint64_t offset = 14695981039346656037ull, prime = 1099511628211ull;
-    std::uint64_t value = offset;
-    // a word at a time, least significant byte first whatever the machine's order
-    const auto mix = [&](std::uint32_t word) {
-        for (int byte = 0; byte < 4; ++byte) value = (value ^ ((word >> (8 * byte)) & 0xffu)) * prime;
+    const auto words = [](const auto& items) {
+        return std::span(reinterpret_cast<const std::uint32_t*>(items.data()), 3 * items.size());
     };
-    for (const auto& point : mesh.points)
-        for (int k = 0; k < 3; ++k) mix(std::bit_cast<std::uint32_t>(point[k]));
-    for (const auto& triangle : mesh.triangles)
-        for (int k = 0; k < 3; ++k) mix(triangle[k]);
-    return value;
+    const std::uint64_t points = hashOfRuns(words(mesh.points)), triangles = hashOfRuns(words(mesh.triangles));
+    return mixed(mixed(mesh.points.size(), points), triangles);
 }
 
 }  // namespace bilayer

@@ -41,7 +41,7 @@ Mesh weld(const Mesh& mesh);
 /// The mesh under an affine map; triangles are turned around when the map mirrors, so that normals stay outward.
 Mesh transformed(const Mesh& mesh, const glm::mat4& map);
 
-/// 64 bits that change with any vertex or triangle; the same on every machine (FNV-1a over the bytes).
+/// 64 bits that change with any vertex or triangle; the same for any number of threads.
 std::uint64_t hash(const Mesh& mesh);
 
 }  // namespace bilayer

@@ -1,14 +1,14 @@
 // Triangles to tiles: section 3.2, Algorithm 1 and Fig. 2 of the paper.
 #include "sdf/tiles.h"
 
-#include <oneapi/tbb/blocked_range.h>
 #include <oneapi/tbb/parallel_for.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <numeric>
+#include <vector>
 
 namespace bilayer {
 namespace {
@@ -30,15 +30,18 @@ struct Shape {
 
 Shape shapeOf(const Corners& c) {
     Shape shape{0.5 * glm::length(glm::cross(c[1] - c[0], c[2] - c[0])), 0, 0};
-    for (int k = 0; k < 3; ++k)
-        if (const double length = glm::distance(c[k], c[(k + 1) % 3]); length > shape.longestEdge) {
-            shape.longestEdge = length;
+    for (int k = 0; k < 3; ++k) {
+        const glm::dvec3 edge = c[(k + 1) % 3] - c[k];
+        if (const double length2 = glm::dot(edge, edge); length2 > shape.longestEdge) {
+            shape.longestEdge = length2;
             shape.longest = k;
         }
+    }
+    shape.longestEdge = std::sqrt(shape.longestEdge);
     return shape;
 }
 
-// Cuts one triangle into tiles and hands each to `emit`.
+// Cuts one triangle into tiles; for each, `emit` gets a function that makes it.
 template <class Emit>
 class Cutter {
   public:
@@ -95,11 +98,16 @@ class Cutter {
     }
 
     void emit(const Corners& c, int n) {
-        const glm::dvec3 s1 = (c[1] - c[0]) / double(n), s2 = (c[2] - c[1]) / double(n), s3 = (c[2] - c[0]) / double(n);
+        emit_([&] { return tile(c, n); });
+    }
+
+    Tile tile(const Corners& c, int n) const {
+        const double part = 1.0 / double(n);
+        const glm::dvec3 s1 = (c[1] - c[0]) * part, s2 = (c[2] - c[1]) * part, s3 = (c[2] - c[0]) * part;
         const glm::dvec3 first = c[0] + (s1 + s3) / 3.0;
-        const glm::ivec3 base(glm::floor(first + 0.5));
-        emit_(Tile{base, glm::vec3(first - glm::dvec3(base)), glm::vec3(s1), glm::vec3(s2),
-                   glm::vec3(double(options_.delta) * normal_), n});
+        const glm::ivec3 base(std::lrint(first.x), std::lrint(first.y), std::lrint(first.z));
+        return {base, glm::vec3(first - glm::dvec3(base)), glm::vec3(s1), glm::vec3(s2),
+                glm::vec3(double(options_.delta) * normal_), n};
     }
 
     const DoubleLayerOptions& options_;
@@ -116,33 +124,35 @@ Tiles makeTiles(const Mesh& mesh, const BuildOptions& options) {
         return Corners{glm::dvec3(mesh.points[t.x]) * voxels, glm::dvec3(mesh.points[t.y]) * voxels,
                        glm::dvec3(mesh.points[t.z]) * voxels};
     };
-    // each task cuts a run of triangles into a list of its own; the lists are then joined in the order of the triangles
+    // a run of triangles is a task's; all runs are cut twice, first to count their tiles, then to put them in their place
     const std::size_t runs = (mesh.triangles.size() + grain - 1) / grain;
-    std::vector<Tiles> parts(runs);
-    tbb::parallel_for(std::size_t(0), runs, [&](std::size_t run) {
-        Tiles& part = parts[run];
-        part.tiles.reserve(grain);
-        part.triangles.reserve(grain);
+    const auto cutRun = [&](std::size_t run, auto emit) {
         std::int32_t triangle = 0;
-        Cutter cutter(options.doubleLayer, [&](const Tile& tile) {
-            part.tiles.push_back(tile);
-            part.triangles.push_back(triangle);
-        });
+        Cutter cutter(options.doubleLayer, [&](const auto& makeTile) { emit(triangle, makeTile); });
         const std::size_t end = std::min(mesh.triangles.size(), (run + 1) * grain);
         for (std::size_t t = run * grain; t < end; ++t) {
             triangle = std::int32_t(t);
             cutter.cut(corners(t));
         }
-    });
+    };
     std::vector<std::size_t> begins(runs + 1, 0);
-    for (std::size_t run = 0; run < runs; ++run) begins[run + 1] = begins[run] + parts[run].tiles.size();
-    Tiles all;
-    all.tiles.resize(begins[runs]);
-    all.triangles.resize(begins[runs]);
     tbb::parallel_for(std::size_t(0), runs, [&](std::size_t run) {
-        std::copy(parts[run].tiles.begin(), parts[run].tiles.end(), all.tiles.begin() + std::ptrdiff_t(begins[run]));
-        std::copy(parts[run].triangles.begin(), parts[run].triangles.end(),
-                  all.triangles.begin() + std::ptrdiff_t(begins[run]));
+        std::size_t count = 0;
+        cutRun(run, [&](std::int32_t, const auto&) { ++count; });
+        begins[run + 1] = count;
+    });
+    std::partial_sum(begins.begin(), begins.end(), begins.begin());
+    Tiles all;
+    all.tileMemory = std::make_unique_for_overwrite<Tile[]>(begins[runs]);
+    all.triangleMemory = std::make_unique_for_overwrite<std::int32_t[]>(begins[runs]);
+    all.tiles = {all.tileMemory.get(), begins[runs]};
+    all.triangles = {all.triangleMemory.get(), begins[runs]};
+    tbb::parallel_for(std::size_t(0), runs, [&](std::size_t run) {
+        std::size_t at = begins[run];
+        cutRun(run, [&](std::int32_t triangle, const auto& makeTile) {
+            all.tileMemory[at] = makeTile();
+            all.triangleMemory[at++] = triangle;
+        });
     });
     return all;
 }

@@ -3,7 +3,8 @@
 
 #include <cstdint>
 #include <glm/vec3.hpp>
-#include <vector>
+#include <memory>
+#include <span>
 
 #include "sdf/build.h"
 
@@ -22,9 +23,14 @@ struct Tile {
 };
 static_assert(sizeof(Tile) == 64, "one cache line, and the layout of the OpenCL struct");
 
+/// The tiles of a mesh, in the order of its triangles.
 struct Tiles {
-    std::vector<Tile> tiles;              ///< in the order of the triangles
-    std::vector<std::int32_t> triangles;  ///< the triangle that each tile is of
+    std::span<const Tile> tiles;
+    std::span<const std::int32_t> triangles;  ///< the triangle that each tile is of
+
+    /// What the spans look at: arrays that are not cleared before they are written.
+    std::unique_ptr<Tile[]> tileMemory;
+    std::unique_ptr<std::int32_t[]> triangleMemory;
 };
 
 /// Cuts all triangles into tiles, in parallel. Triangles without area give none.
