@@ -37,7 +37,7 @@ class Collider {
 /// A collider somewhere in the world, perhaps grown: body coordinates x become pose.toWorld(scale * x).
 struct Placed {
     const Collider& collider;
-    Pose pose;
+    Pose pose{};
     float scale = 1;  ///< positive; distances grow by it
 };
 

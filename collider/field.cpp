@@ -159,7 +159,8 @@ struct Field::Data {
 };
 
 Field::Data::Data(const LevelSet& levelSet)
-    : voxelSize(levelSet.voxelSize()),
+    : voxel(levelSet.grids().distance->voxelSize()[0]),
+      voxelSize(levelSet.voxelSize()),
       exteriorWidth(levelSet.exteriorWidth()),
       interiorWidth(levelSet.interiorWidth()) {
     const openvdb::FloatGrid& grid = *levelSet.grids().distance;

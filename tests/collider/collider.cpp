@@ -1,0 +1,285 @@
+#include "collider/collider.h"
+
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <glm/geometric.hpp>
+#include <glm/gtc/constants.hpp>
+#include <limits>
+#include <map>
+#include <stdexcept>
+
+#include "demos/shared/shapes.h"
+#include "tests/collider/analytic.h"
+#include "tests/support/support.h"
+
+using namespace bilayer;
+using namespace bilayer::test;
+
+namespace {
+
+constexpr float h = 0.02f;
+
+const Collider& ball() {
+    static const Collider collider(shapes::sphere(0.4f, 4), levelSetOf(sphereSolid(0.4), h));
+    return collider;
+}
+
+const Collider& brick() {
+    static const Collider collider(shapes::box({0.3f, 0.2f, 0.1f}), levelSetOf(boxSolid({0.3, 0.2, 0.1}), h));
+    return collider;
+}
+
+const Collider& slab() {
+    static const Collider collider(shapes::box({0.6f, 0.6f, 0.1f}), levelSetOf(boxSolid({0.6, 0.6, 0.1}), h));
+    return collider;
+}
+
+const Collider& ring() {
+    static const Collider collider(shapes::torus(0.35f, 0.13f), levelSetOf(torusSolid(0.35, 0.13), h));
+    return collider;
+}
+
+std::vector<Contact> contactsOf(const Placed& a, const Placed& b, float margin, ContactReport* report = nullptr) {
+    std::vector<Contact> contacts;
+    const ContactReport seen = collide(a, b, {.margin = margin}, contacts);
+    if (report) *report = seen;
+    return contacts;
+}
+
+float deepest(const std::vector<Contact>& contacts) {
+    float least = std::numeric_limits<float>::infinity();
+    for (const Contact& contact : contacts) least = std::min(least, contact.distance);
+    return least;
+}
+
+Pose randomPose(Random& random, double reach) {
+    return {random.point(reach), glm::angleAxis(float(random(0, 6.28)), random.direction())};
+}
+
+Pose compose(const Pose& a, const Pose& b) {
+    return {a.toWorld(b.position), a.rotation * b.rotation};
+}
+
+// Two bodies that touch each other somewhere: one is moved until the other's surface is near its own.
+std::vector<std::pair<Placed, Placed>> touchingPairs(Random& random) {
+    std::vector<std::pair<Placed, Placed>> pairs;
+    const std::vector<const Collider*> all{&ball(), &brick(), &slab(), &ring()};
+    for (int i = 0; pairs.size() < 30 && i < 10000; ++i) {
+        const Placed a{*all[i % 4], randomPose(random, 0.6)}, b{*all[i / 4 % 4], randomPose(random, 0.6)};
+        const float depth = deepest(contactsOf(a, b, h));
+        if (depth < 0 && depth > -1.5f * h) pairs.emplace_back(a, b);
+    }
+    REQUIRE(pairs.size() >= 10);
+    return pairs;
+}
+
+}  // namespace
+
+TEST_CASE("two balls touch where the line of their centres goes through") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    Random random(seed);
+    for (const float gap : {-1.5f * h, -0.3f * h, 0.f, 0.8f * h, 1.9f * h}) {
+        const Pose poseB = randomPose(random, 2);
+        const glm::vec3 line = random.direction();
+        const Pose poseA{poseB.position + (0.8f + gap) * line, randomPose(random, 1).rotation};
+        std::vector<Contact> contacts;
+        const ContactReport report = collide(ball(), poseA, ball(), poseB, {.margin = 2 * h}, contacts);
+        CAPTURE(gap, contacts.size());
+        REQUIRE(contacts.size() > 2);
+        REQUIRE(report.beyondBand == 0);
+        REQUIRE(report.pointsTested < ball().points().points().size());
+        // points are 2 voxels apart, so the nearest may miss the line by 1.25 spacings: 0.05 on a radius of 0.4
+        REQUIRE(deepest(contacts) == Approx(gap).margin(0.0063));
+        REQUIRE(deepest(contacts) >= gap - 0.02f * h);
+        for (const Contact& contact : contacts) {
+            REQUIRE(glm::length(contact.normal) == Approx(1).margin(1e-5));
+            REQUIRE(contact.distance <= 2 * h);
+            REQUIRE(glm::distance(contact.position, poseB.position) == Approx(0.4).margin(0.02 * h));
+            const bool ofB = contact.feature & featureOfB;
+            const glm::vec3 centre = ofB ? poseA.position : poseB.position;
+            const glm::vec3 point = ofB ? contact.position : contact.position + contact.distance * contact.normal;
+            const glm::vec3 expected = glm::normalize(ofB ? centre - point : point - centre);
+            REQUIRE(glm::dot(contact.normal, expected) > 0.9995f);
+            REQUIRE(glm::dot(contact.normal, line) > 0.8f);
+            REQUIRE(contact.distance == Approx(glm::distance(point, centre) - 0.4).margin(0.02 * h));
+        }
+    }
+}
+
+TEST_CASE("a brick on a slab touches with its corners") {
+    for (const float gap : {-1.2f * h, 0.f, 0.7f * h}) {
+        const Pose above{{0.03f, -0.02f, 0.2f + gap}};
+        const auto contacts = contactsOf({brick(), above}, {slab()}, h);
+        int corners = 0;
+        for (const Contact& contact : contacts) {
+            const bool ofA = !(contact.feature & featureOfB);
+            // the slab's points lie all around the brick's edges too, where its field is rounded
+            if (ofA) REQUIRE(contact.distance == Approx(gap + 0).margin(1e-5));
+            if (ofA) REQUIRE(contact.position.z == Approx(0.1).margin(1e-5));
+            if (ofA) REQUIRE(contact.normal.z == Approx(1).margin(1e-4));
+            if (!ofA) REQUIRE(contact.position.z == Approx(0.1).margin(1e-6));
+            const glm::vec3 inBrick = glm::abs(contact.position - above.position);
+            corners += ofA && inBrick.x > 0.2999f && inBrick.y > 0.1999f;
+        }
+        REQUIRE(corners == 4);
+    }
+}
+
+TEST_CASE("a corner that points into a slab is the deepest contact") {
+    // the brick stands on the corner (-,-,-): its diagonal is turned upright
+    const glm::vec3 diagonal(0.3f, 0.2f, 0.1f);
+    const glm::vec3 axis = glm::normalize(glm::cross(diagonal, glm::vec3(0, 0, 1)));
+    const float angle = std::acos(diagonal.z / glm::length(diagonal));
+    const float depth = 0.5f * h;
+    const Pose pose{{0, 0, 0.1f + glm::length(diagonal) - depth}, glm::angleAxis(angle, axis)};
+    const auto contacts = contactsOf({brick(), pose}, {slab()}, 0);
+    REQUIRE_FALSE(contacts.empty());
+    const auto least = *std::min_element(contacts.begin(), contacts.end(),
+                                         [](const Contact& a, const Contact& b) { return a.distance < b.distance; });
+    REQUIRE(least.distance == Approx(-depth).margin(1e-5));
+    REQUIRE(glm::distance(least.position, {0, 0, 0.1f}) < 1e-5f);
+    REQUIRE(glm::distance(least.normal, {0, 0, 1}) < 1e-4f);
+    REQUIRE_FALSE(least.feature & featureOfB);
+}
+
+TEST_CASE("exchanged bodies have the same contacts, seen from the other side") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    Random random(seed);
+    for (const auto& [a, b] : touchingPairs(random)) {
+        const auto there = contactsOf(a, b, h), back = contactsOf(b, a, h);
+        REQUIRE(there.size() == back.size());
+        std::map<std::uint32_t, Contact> byFeature;
+        for (const Contact& contact : back) byFeature[contact.feature ^ featureOfB] = contact;
+        for (const Contact& contact : there) {
+            REQUIRE(byFeature.contains(contact.feature));
+            const Contact& other = byFeature[contact.feature];
+            REQUIRE(contact.distance == other.distance);
+            REQUIRE(glm::distance(contact.normal, -other.normal) < 1e-6f);
+            // on the surface of the one and of the other: a distance apart
+            const glm::vec3 across = contact.position + contact.distance * contact.normal;
+            REQUIRE(glm::distance(across, other.position) < 1e-6f);
+        }
+    }
+}
+
+TEST_CASE("contacts move with the bodies") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    Random random(seed);
+    for (const auto& [a, b] : touchingPairs(random)) {
+        const Pose motion = randomPose(random, 1);
+        const auto still = contactsOf(a, b, h);
+        const auto moved = contactsOf({a.collider, compose(motion, a.pose)}, {b.collider, compose(motion, b.pose)}, h);
+        std::map<std::uint32_t, Contact> byFeature;
+        for (const Contact& contact : moved) byFeature[contact.feature] = contact;
+        for (const Contact& contact : still) {
+            if (contact.distance > h - 1e-5f) continue;  // rounding may take it over the margin
+            REQUIRE(byFeature.contains(contact.feature));
+            const Contact& other = byFeature[contact.feature];
+            REQUIRE(other.distance == Approx(contact.distance).margin(5e-6));
+            REQUIRE(glm::distance(other.position, motion.toWorld(contact.position)) < 1e-5f);
+            REQUIRE(glm::dot(other.normal, motion.rotation * contact.normal) > 0.99f);
+        }
+    }
+}
+
+TEST_CASE("contacts of scaled bodies are the contacts scaled") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    Random random(seed);
+    for (const auto& [a, b] : touchingPairs(random)) {
+        const float scale = 4;  // a power of two: nothing is rounded differently
+        const auto small = contactsOf(a, b, h);
+        const Placed bigA{a.collider, {scale * a.pose.position, a.pose.rotation}, scale};
+        const Placed bigB{b.collider, {scale * b.pose.position, b.pose.rotation}, scale};
+        const auto big = contactsOf(bigA, bigB, scale * h);
+        REQUIRE(small.size() == big.size());
+        for (std::size_t i = 0; i < small.size(); ++i) {
+            REQUIRE(big[i].feature == small[i].feature);
+            REQUIRE(big[i].distance == Approx(scale * small[i].distance).margin(1e-6));
+            REQUIRE(glm::distance(big[i].position, scale * small[i].position) < 1e-5f);
+            REQUIRE(glm::distance(big[i].normal, small[i].normal) < 1e-5f);
+        }
+    }
+    // one large, one small: a ball of 0.2 above a ball of 0.8
+    const auto contacts = contactsOf({ball(), {{0, 0, 1.005f}}, 0.5f}, {ball(), {}, 2}, h);
+    REQUIRE(deepest(contacts) == Approx(0.005).margin(0.0063));
+    for (const Contact& contact : contacts) REQUIRE(glm::length(contact.position) == Approx(0.8).margin(0.04 * h));
+}
+
+TEST_CASE("the tree leaves no contact out") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    Random random(seed);
+    for (const auto& [a, b] : touchingPairs(random)) {
+        ContactReport report;
+        const auto contacts = contactsOf(a, b, h, &report);
+        std::vector<std::uint32_t> all;
+        const auto test = [&](const Placed& body, const Placed& other, std::uint32_t flag) {
+            for (std::uint32_t i = 0; i < body.collider.points().points().size(); ++i) {
+                const glm::vec3 world = body.pose.toWorld(body.collider.points().points()[i].position);
+                const Sample sample = other.collider.field().sample(other.pose.toBody(world));
+                if (sample.inBand && sample.distance < h - 1e-5f) all.push_back(i | flag);
+            }
+        };
+        test(a, b, 0);
+        test(b, a, featureOfB);
+        std::vector<std::uint32_t> found;
+        for (const Contact& contact : contacts) found.push_back(contact.feature);
+        REQUIRE(std::is_sorted(found.begin(), found.end()));
+        REQUIRE(std::includes(found.begin(), found.end(), all.begin(), all.end()));
+        REQUIRE(report.pointsTested < a.collider.points().points().size() + b.collider.points().points().size());
+    }
+}
+
+TEST_CASE("bodies apart have no contact and cost next to nothing") {
+    ContactReport report;
+    REQUIRE(contactsOf({ball(), {{5, 0, 0}}}, {ring()}, h, &report).empty());
+    REQUIRE(report.pointsTested == 0);
+    REQUIRE(contactsOf({ball(), {{1e30f, 0, 0}}}, {ring()}, h, &report).empty());
+    // a small ball in the hole of a ring: their boxes overlap, they do not
+    REQUIRE(contactsOf({ball(), {}, 0.3f}, {ring()}, h, &report).empty());
+    REQUIRE(report.pointsTested < 300);
+    const float nan = std::numeric_limits<float>::quiet_NaN();
+    REQUIRE(contactsOf({ball(), {{nan, 0, 0}}}, {ball()}, h, &report).empty());
+    REQUIRE(report.beyondBand == 0);
+}
+
+TEST_CASE("points too deep for the band are counted") {
+    ContactReport report;
+    const auto contacts = contactsOf({brick(), {}, 0.5f}, {ball()}, 0, &report);
+    REQUIRE(report.beyondBand == brick().points().points().size());
+    REQUIRE(contacts.empty());
+}
+
+TEST_CASE("what was in the list stays, and the same question has the same answer") {
+    std::vector<Contact> contacts(3);
+    collide(ball(), {{0.79f, 0, 0}}, ball(), {}, {.margin = h}, contacts);
+    const auto again = contactsOf({ball(), {{0.79f, 0, 0}}}, {ball()}, h);
+    REQUIRE(contacts.size() == again.size() + 3);
+    for (std::size_t i = 0; i < again.size(); ++i) {
+        REQUIRE(contacts[i + 3].feature == again[i].feature);
+        REQUIRE(contacts[i + 3].position == again[i].position);
+        REQUIRE(contacts[i + 3].normal == again[i].normal);
+        REQUIRE(contacts[i + 3].distance == again[i].distance);
+    }
+}
+
+TEST_CASE("bodies whose fields the double layer method made touch within its error") {
+    const Mesh mesh = shapes::box({0.3f, 0.2f, 0.1f});
+    const Collider box(mesh, built(mesh, h));
+    for (const float gap : {-1.f * h, 0.5f * h}) {
+        const auto contacts = contactsOf({box, {{0.05f, 0.03f, 0.2f + gap}}}, {box}, h);
+        REQUIRE_FALSE(contacts.empty());
+        REQUIRE(deepest(contacts) == Approx(gap).margin(0.5 * h));
+        for (const Contact& contact : contacts)
+            if (glm::all(glm::lessThan(glm::abs(contact.position), glm::vec3(0.2f, 0.1f, 1))))
+                REQUIRE(contact.normal.z > 0.95f);
+    }
+}
+
+TEST_CASE("a collider refuses an empty mesh") {
+    REQUIRE_THROWS_AS(Collider(Mesh{}, levelSetOf(sphereSolid(0.4), h)), std::invalid_argument);
+}

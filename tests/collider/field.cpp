@@ -1,0 +1,362 @@
+#include "collider/field.h"
+
+#include <oneapi/tbb/global_control.h>
+#include <oneapi/tbb/parallel_for.h>
+#include <openvdb/tools/Interpolation.h>
+#include <openvdb/tools/LevelSetSphere.h>
+
+#include <bit>
+#include <catch2/catch.hpp>
+#include <limits>
+
+#include "demos/shared/shapes.h"
+#include "tests/collider/analytic.h"
+#include "tests/support/support.h"
+
+using namespace bilayer;
+using namespace bilayer::test;
+
+namespace {
+
+constexpr double h = 0.02;                 // of most fields here [m]
+constexpr double rounding = 4e-7 * 3 * h;  // of single precision at the band's width
+constexpr float infinity = std::numeric_limits<float>::infinity();
+constexpr float notANumber = std::numeric_limits<float>::quiet_NaN();
+
+std::vector<Solid> solids() {
+    return {sphereSolid(0.4), boxSolid({0.35, 0.22, 0.3}), torusSolid(0.35, 0.13)};
+}
+
+openvdb::Vec3d toIndex(const LevelSet& levelSet, const glm::vec3& p) {
+    return levelSet.grids().distance->worldToIndex(openvdb::Vec3d(p.x, p.y, p.z));
+}
+
+double trilinear(const LevelSet& levelSet, const openvdb::Vec3d& index) {
+    return openvdb::tools::BoxSampler::sample(levelSet.grids().distance->tree(), index);
+}
+
+bool allEightActive(const LevelSet& levelSet, const openvdb::Vec3d& index) {
+    for (int corner = 0; corner < 8; ++corner)
+        if (!levelSet.grids().distance->tree().isValueOn(
+                openvdb::Coord::floor(index).offsetBy(corner >> 2, corner >> 1 & 1, corner & 1)))
+            return false;
+    return true;
+}
+
+bool sameBits(const Sample& a, const Sample& b) {
+    return a.inBand == b.inBand && a.gradient == b.gradient &&
+           std::bit_cast<std::uint32_t>(a.distance) == std::bit_cast<std::uint32_t>(b.distance);
+}
+
+}  // namespace
+
+TEST_CASE("in the band a sample is OpenVDB's trilinear interpolation, and only there it is in the band") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    Random random(seed);
+    for (const Solid& solid : solids()) {
+        const LevelSet levelSet = levelSetOf(solid, h, 3, 2);
+        const Field field(levelSet);
+        int inBand = 0;
+        for (int i = 0; i < 40000; ++i) {
+            const glm::vec3 p = random.point(0.6);
+            CAPTURE(p.x, p.y, p.z);
+            const openvdb::Vec3d index = toIndex(levelSet, p);
+            const Sample sample = field.sample(p);
+            REQUIRE(sample.inBand == allEightActive(levelSet, index));
+            REQUIRE(field.distance(p) == sample.distance);
+            if (!sample.inBand) {
+                REQUIRE(sample.gradient == glm::vec3(0));
+                continue;
+            }
+            ++inBand;
+            REQUIRE(std::abs(sample.distance - trilinear(levelSet, index)) <= rounding);
+            // along an axis, within a cell, the interpolant is linear: differences are the derivative itself
+            for (int axis = 0; axis < 3; ++axis) {
+                openvdb::Vec3d low = index, high = index;
+                low[axis] = std::floor(index[axis]);
+                high[axis] = low[axis] + 1;
+                const double slope = (trilinear(levelSet, high) - trilinear(levelSet, low)) / h;
+                REQUIRE(std::abs(sample.gradient[axis] - slope) <= 2 * rounding / h);
+            }
+        }
+        REQUIRE(inBand > 1000);
+    }
+}
+
+TEST_CASE("voxel centres, cell borders and block borders give the stored values") {
+    const LevelSet levelSet = levelSetOf(sphereSolid(0.4), 0.0625);  // a power of two: points fall on voxels exactly
+    const Field field(levelSet);
+    for (auto value = levelSet.grids().distance->cbeginValueOn(); value; ++value) {
+        const openvdb::Coord c = value.getCoord();
+        const glm::vec3 p = 0.0625f * glm::vec3(c.x(), c.y(), c.z());
+        const Sample sample = field.sample(p);
+        if (sample.inBand) REQUIRE(sample.distance == *value);
+        REQUIRE(std::abs(sample.distance) <= std::abs(*value));
+    }
+}
+
+TEST_CASE("out of the band a sample is a bound of the true distance with the right sign") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    Random random(seed);
+    for (const auto& [exterior, interior] : {std::pair(3.f, 3.f), std::pair(2.f, 4.f), std::pair(6.5f, 2.f)})
+        for (const Solid& solid : solids()) {
+            const LevelSet levelSet = levelSetOf(solid, h, exterior, interior);
+            const Field field(levelSet);
+            for (int i = 0; i < 20000; ++i) {
+                const glm::vec3 p = random.point(i % 2 ? 0.5 : 3);
+                const double truth = solid.distance(glm::dvec3(p));
+                const Sample sample = field.sample(p);
+                CAPTURE(p.x, p.y, p.z, truth, sample.distance, sample.inBand, exterior, interior);
+                if (sample.inBand) {
+                    REQUIRE(std::abs(sample.distance - truth) < 0.5 * h);
+                    continue;
+                }
+                REQUIRE((sample.distance < 0) == (truth < 0));
+                REQUIRE(std::abs(sample.distance) <= std::abs(truth) + 1e-6);
+                const double width = (truth < 0 ? interior : exterior) * h;
+                REQUIRE(std::abs(sample.distance) >= width - 1.7321 * h - 1e-6);
+                if (truth > 1) REQUIRE(sample.distance > 0.5 * truth);
+            }
+        }
+}
+
+TEST_CASE("the bound grows with the number of empty blocks, outside and inside") {
+    const Field field(levelSetOf(sphereSolid(1), h));
+    REQUIRE(field.distance({0, 0, 0}) < -0.4f);  // of 1: blocks count by the longest axis
+    REQUIRE(field.distance({0, 0, 0}) >= -1.f);
+    REQUIRE(field.distance({1, 1, 1}) > 0.2f);  // of 0.73
+    REQUIRE(field.distance({100, 0, 0}) == Approx(99).epsilon(0.01));
+}
+
+TEST_CASE("a band narrower than a cell still tells the sides apart") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    Random random(seed);
+    const Solid solid = sphereSolid(0.4);
+    const Field field(levelSetOf(solid, h, 1, 1));
+    for (int i = 0; i < 20000; ++i) {
+        const glm::vec3 p = random.point(0.5);
+        const double truth = solid.distance(glm::dvec3(p));
+        if (std::abs(truth) < h) continue;
+        REQUIRE(std::signbit(field.distance(p)) == (truth < 0));
+        if (!field.sample(p).inBand) REQUIRE(std::abs(field.distance(p)) <= std::abs(truth));
+    }
+}
+
+TEST_CASE("points that are nowhere are far outside") {
+    const Field field(levelSetOf(sphereSolid(0.4), h));
+    for (int axis = 0; axis < 3; ++axis)
+        for (const float bad : {notANumber, infinity, -infinity}) {
+            glm::vec3 p(0);
+            p[axis] = bad;
+            const Sample sample = field.sample(p);
+            REQUIRE(sample.distance == infinity);
+            REQUIRE_FALSE(sample.inBand);
+            REQUIRE(sample.gradient == glm::vec3(0));
+        }
+    for (const float far : {1e9f, 1e20f, 3e38f})
+        for (const float sign : {-1.f, 1.f}) {
+            const Sample sample = field.sample({sign * far, 0, far});
+            REQUIRE_FALSE(sample.inBand);
+            REQUIRE(sample.distance > 0.9f * far);
+        }
+}
+
+TEST_CASE("far from the origin a field is as good as near it") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    Random random(seed);
+    const glm::dvec3 centre(1e4, -1e4, 5e3);
+    const Solid solid = sphereSolid(0.3, centre);
+    const Field field(levelSetOf(solid, 0.01));
+    for (int i = 0; i < 20000; ++i) {
+        const glm::vec3 p = glm::vec3(centre) + random.point(0.4);  // rounded to a millimetre, and exact from here on
+        const Sample sample = field.sample(p);
+        if (sample.inBand) REQUIRE(std::abs(sample.distance - solid.distance(glm::dvec3(p))) < 0.02 * 0.01);
+    }
+    const auto hit = field.raycast(glm::vec3(centre) + glm::vec3(2, 0, 0), {-1, 0, 0}, 10);
+    REQUIRE(hit);
+    REQUIRE(hit->distance == Approx(1.7).margin(2e-4));
+}
+
+TEST_CASE("bounds hold all points in the band, and what a field says of itself is its level set's") {
+    const LevelSet levelSet = levelSetOf(torusSolid(0.35, 0.13), h, 3, 2);
+    const Field field(levelSet);
+    REQUIRE(field.voxelSize() == levelSet.voxelSize());
+    REQUIRE(field.exteriorWidth() == Approx(3 * h));
+    REQUIRE(field.interiorWidth() == Approx(2 * h));
+    REQUIRE(field.memoryBytes() > levelSet.leaves() * 729 * sizeof(float));
+    REQUIRE(field.bounds().upper.x == Approx(0.48 + 3 * h).margin(1.5 * h));
+    REQUIRE(field.bounds().lower.z == Approx(-0.13 - 3 * h).margin(1.5 * h));
+
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    Random random(seed);
+    for (int i = 0; i < 20000; ++i) {
+        const glm::vec3 p = random.point(0.7);
+        if (!field.sample(p).inBand) continue;
+        const glm::vec3 inside = glm::clamp(p, field.bounds().lower, field.bounds().upper);
+        REQUIRE(glm::distance(p, inside) < 1e-6f);
+    }
+}
+
+TEST_CASE("a field whose box is too large for its voxels is refused") {
+    const auto grid = openvdb::FloatGrid::create(1.f);
+    grid->setGridClass(openvdb::GRID_LEVEL_SET);
+    grid->tree().setValueOn({0, 0, 0}, 0.5f);
+    grid->tree().setValueOn({1000000, 1000000, 1000000}, 0.5f);
+    auto grids = std::make_shared<Grids>();
+    grids->distance = grid;
+    const LevelSet levelSet(grids);
+    REQUIRE_THROWS_AS(Field(levelSet), std::invalid_argument);
+}
+
+TEST_CASE("rays meet a sphere and a box where geometry says") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    Random random(seed);
+    for (const Solid& solid : {sphereSolid(0.4), boxSolid({0.35, 0.22, 0.3})}) {
+        const Field field(levelSetOf(solid, h));
+        int hits = 0, misses = 0;
+        for (int i = 0; i < 4000; ++i) {
+            const glm::vec3 origin = float(random(0.8, 5)) * random.direction();
+            const glm::vec3 towards = glm::normalize(random.point(0.6) - origin);
+            CAPTURE(origin.x, origin.y, origin.z, towards.x, towards.y, towards.z);
+            // the truth by tiny steps of the formula's own distance, in double precision
+            const glm::dvec3 from(origin), along = glm::normalize(glm::dvec3(towards));
+            double t = 0, nearest = 1e9;
+            for (int step = 0; step < 2000 && t < 12 && nearest > 1e-9; ++step) {
+                const double distance = solid.distance(from + t * along);
+                nearest = std::min(nearest, distance);
+                t += distance;
+            }
+            const auto hit = field.raycast(origin, towards, 100);
+            if (nearest > 0.3 * h) {
+                ++misses;
+                REQUIRE_FALSE(hit);
+                continue;
+            }
+            if (nearest > 1e-6) continue;  // grazes the surface by less than the interpolant's error
+            const glm::dvec3 p = from + t * along;
+            const double deep = solid.distance(p + 0.5 * h * along);
+            if (deep > -0.2 * h) continue;
+            ++hits;
+            REQUIRE(hit);
+            REQUIRE(std::abs(field.distance(hit->position)) < 2e-4 * h);
+            REQUIRE(std::abs(solid.distance(glm::dvec3(hit->position))) < 0.3 * h);
+            REQUIRE(std::abs(hit->distance - t) < 2 * h);
+            REQUIRE(glm::distance(origin + hit->distance * towards, hit->position) < 1e-5f);
+            REQUIRE(glm::length(hit->normal) == Approx(1).margin(1e-5));
+            REQUIRE(glm::dot(hit->normal, towards) < 0.2f);
+        }
+        REQUIRE(hits > 500);
+        REQUIRE(misses > 200);
+    }
+}
+
+TEST_CASE("rays straight at flat and round walls are exact") {
+    const Field box(levelSetOf(boxSolid({0.35, 0.22, 0.3}), h));
+    const auto hit = box.raycast({2, 0.05f, -0.07f}, {-1, 0, 0}, infinity);
+    REQUIRE(hit);
+    REQUIRE(hit->distance == Approx(1.65).margin(2e-4 * h));
+    REQUIRE(hit->normal.x == Approx(1).margin(1e-5));
+
+    const Field sphere(levelSetOf(sphereSolid(0.4), h));
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    Random random(seed);
+    for (int i = 0; i < 500; ++i) {
+        const glm::vec3 out = random.direction();
+        const auto round = sphere.raycast(3.f * out, -out, 10);
+        REQUIRE(round);
+        REQUIRE(round->distance == Approx(2.6).margin(0.02 * h));
+        REQUIRE(glm::dot(round->normal, out) > 0.999f);
+    }
+}
+
+TEST_CASE("a ray does not pass a wall of one voxel") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    Random random(seed);
+    for (int i = 0; i < 20; ++i) {
+        const double offset = random(-0.5, 0.5) * h;
+        const Solid slab{[=](const glm::dvec3& p) {
+                             return boxSolid({0.4, 0.4, 0.55 * h}).distance(p - glm::dvec3(0, 0, offset));
+                         },
+                         {0.4, 0.4, 2 * h}};
+        const Field field(levelSetOf(slab, h));
+        for (int k = 0; k < 200; ++k) {
+            const glm::vec3 target(float(random(-0.3, 0.3)), float(random(-0.3, 0.3)), float(offset));
+            glm::vec3 towards = random.direction();
+            if (std::abs(towards.z) < 0.2f) towards.z = 0.2f;
+            towards = glm::normalize(towards);
+            const auto hit = field.raycast(target - 0.9f * towards, towards, 10);
+            CAPTURE(offset, target.x, target.y, towards.x, towards.y, towards.z);
+            REQUIRE(hit);
+            REQUIRE(glm::distance(hit->position, target) < 5 * h);
+        }
+    }
+}
+
+TEST_CASE("rays that start inside, end early or are no rays") {
+    const Field field(levelSetOf(sphereSolid(0.4), h));
+    for (const glm::vec3 start : {glm::vec3(0), glm::vec3(0.39f, 0, 0)}) {
+        const auto hit = field.raycast(start, {1, 0, 0}, 10);
+        REQUIRE(hit);
+        REQUIRE(hit->distance == 0);
+        REQUIRE(hit->position == start);
+        REQUIRE(glm::length(hit->normal) == Approx(1));
+    }
+    REQUIRE(field.raycast({1, 0, 0}, {-1, 0, 0}, 0.61f));
+    REQUIRE_FALSE(field.raycast({1, 0, 0}, {-1, 0, 0}, 0.59f));
+    REQUIRE_FALSE(field.raycast({1, 0, 0}, {1, 0, 0}, infinity));
+    REQUIRE(field.raycast({1, 0, 0}, {-5, 0, 0}, 1)->distance == Approx(0.6).margin(1e-4));
+
+    REQUIRE_FALSE(field.raycast({1, 0, 0}, {0, 0, 0}, infinity));
+    REQUIRE_FALSE(field.raycast({notANumber, 0, 0}, {1, 0, 0}, 10));
+    REQUIRE_FALSE(field.raycast({1, 0, 0}, {notANumber, 0, 0}, 10));
+    REQUIRE_FALSE(field.raycast({infinity, 0, 0}, {-1, 0, 0}, infinity));
+    REQUIRE_FALSE(field.raycast({1, 0, 0}, {-1, 0, 0}, notANumber));
+    REQUIRE_FALSE(field.raycast({1, 0, 0}, {-1, 0, 0}, -1));
+    // from so far that single precision cannot tell whether it hits: it must only end
+    (void)field.raycast({1e30f, 1e30f, 1e30f}, {-1, -1, -1}, infinity);
+    (void)field.raycast({3e38f, 0, 0}, {-1, 0, 0}, infinity);
+    // along the surface all the way
+    (void)field.raycast({0.4f, -3, 0}, {0, 1, 0}, infinity);
+}
+
+TEST_CASE("fields are the same for any number of threads, and so are queries") {
+    const LevelSet levelSet = levelSetOf(torusSolid(0.35, 0.13), h);
+    const Field field(levelSet);
+    const Field alone = [&] {
+        const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
+        return Field(levelSet);
+    }();
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    Random random(seed);
+    std::vector<glm::vec3> points(50000);
+    for (glm::vec3& p : points) p = random.point(0.6);
+    std::vector<Sample> samples(points.size());
+    tbb::parallel_for(std::size_t(0), points.size(), [&](std::size_t i) { samples[i] = field.sample(points[i]); });
+    for (std::size_t i = 0; i < points.size(); ++i) REQUIRE(sameBits(samples[i], alone.sample(points[i])));
+}
+
+TEST_CASE("a level set of OpenVDB's own and one of the double layer method serve as well") {
+    const auto grid = openvdb::tools::createLevelSetSphere<openvdb::FloatGrid>(0.4f, openvdb::Vec3f(0), float(h), 3.f);
+    auto grids = std::make_shared<Grids>();
+    grids->distance = grid;
+    const Field theirs{LevelSet(grids)};
+    const Field ours(built(shapes::sphere(0.4f, 5), float(h)));
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    Random random(seed);
+    for (int i = 0; i < 20000; ++i) {
+        const glm::vec3 p = random.point(0.5);
+        const double truth = glm::length(p) - 0.4;
+        if (theirs.sample(p).inBand) REQUIRE(std::abs(theirs.distance(p) - truth) < 0.05 * h);
+        if (ours.sample(p).inBand) REQUIRE(std::abs(ours.distance(p) - truth) < 0.5 * h);
+    }
+}

@@ -1,0 +1,234 @@
+#include "collider/points.h"
+
+#include <catch2/catch.hpp>
+#include <glm/geometric.hpp>
+#include <glm/gtc/matrix_transform.hpp>
+#include <glm/gtc/quaternion.hpp>
+#include <limits>
+#include <stdexcept>
+
+#include "demos/shared/shapes.h"
+#include "tests/collider/analytic.h"
+#include "tests/support/support.h"
+
+using namespace bilayer;
+using namespace bilayer::test;
+
+namespace {
+
+struct Case {
+    const char* name;
+    Mesh mesh;
+    float spacing;
+};
+
+// Triangles much larger than the spacing, much smaller, mixed, slivers, thin walls.
+std::vector<Case> cases() {
+    return {{"box of 12 triangles", shapes::box({1, 0.6f, 0.4f}), 0.1f},
+            {"fine box", shapes::box({1, 0.6f, 0.4f}, 20), 0.3f},
+            {"sphere", shapes::sphere(1, 4), 0.2f},
+            {"torus", shapes::torus(1, 0.3f, 40, 12), 0.1f},
+            {"cone of slivers", shapes::cone(0.5f, 2, 64), 0.15f},
+            {"plate", shapes::box({1, 1, 0.02f}), 0.1f}};
+}
+
+double area(const Mesh& mesh, const glm::uvec3& t) {
+    const glm::dvec3 a(mesh.points[t.x]), b(mesh.points[t.y]), c(mesh.points[t.z]);
+    return 0.5 * glm::length(glm::cross(b - a, c - a));
+}
+
+double area(const Mesh& mesh) {
+    double sum = 0;
+    for (const glm::uvec3& t : mesh.triangles) sum += area(mesh, t);
+    return sum;
+}
+
+// A point anywhere on the surface, all places alike.
+glm::dvec3 randomSurfacePoint(const Mesh& mesh, double total, Random& random) {
+    double left = random(0, total);
+    std::size_t i = 0;
+    while (i + 1 < mesh.triangles.size() && left > area(mesh, mesh.triangles[i]))
+        left -= area(mesh, mesh.triangles[i++]);
+    const glm::uvec3 t = mesh.triangles[i];
+    double u = random(0, 1), v = random(0, 1);
+    if (u + v > 1) u = 1 - u, v = 1 - v;
+    return glm::dvec3(mesh.points[t.x]) * (1 - u - v) + glm::dvec3(mesh.points[t.y]) * u +
+           glm::dvec3(mesh.points[t.z]) * v;
+}
+
+const SurfacePoint& nearest(const SurfacePoints& points, const glm::dvec3& place) {
+    const SurfacePoint* best = &points.points().front();
+    for (const SurfacePoint& p : points.points())
+        if (glm::distance(glm::dvec3(p.position), place) < glm::distance(glm::dvec3(best->position), place)) best = &p;
+    return *best;
+}
+
+}  // namespace
+
+TEST_CASE("points lie on the mesh, cover it at the spacing, and are not many more than that takes") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    Random random(seed);
+    for (const auto& [name, mesh, spacing] : cases()) {
+        CAPTURE(name);
+        const SurfacePoints points(mesh, spacing);
+        for (const SurfacePoint& p : points.points()) {
+            REQUIRE(test::distance(mesh, glm::dvec3(p.position)) < 2e-7);
+            REQUIRE(glm::length(p.normal) == Approx(1).margin(1e-6));
+        }
+        const double total = area(mesh);
+        for (int i = 0; i < 1500; ++i) {
+            const glm::dvec3 place = randomSurfacePoint(mesh, total, random);
+            REQUIRE(glm::distance(glm::dvec3(nearest(points, place).position), place) < 1.25 * spacing);
+        }
+        REQUIRE(double(points.points().size()) < 3 * total / (spacing * spacing) + 50);
+    }
+}
+
+TEST_CASE("no two points on one side of a surface are closer than the spacing allows, but for corners") {
+    const SurfacePoints points(shapes::sphere(1, 5), 0.2f);
+    for (const SurfacePoint& p : points.points())
+        for (const SurfacePoint& q : points.points())
+            if (&p != &q) REQUIRE(glm::distance(p.position, q.position) > 0.69f * 0.2f);
+}
+
+TEST_CASE("convex corners stay, whatever the spacing") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    Random random(seed);
+    const glm::vec3 half(1, 0.6f, 0.4f);
+    for (const float spacing : {0.07f, 0.5f, 1.f, 3.f})
+        for (const int cells : {1, 7}) {
+            const glm::mat4 motion = glm::mat4_cast(glm::angleAxis(float(random(0, 6)), random.direction()));
+            const SurfacePoints points(transformed(shapes::box(half, cells), motion), spacing);
+            for (int i = 0; i < 8; ++i) {
+                const glm::vec3 sign(i & 1 ? 1 : -1, i & 2 ? 1 : -1, i & 4 ? 1 : -1);
+                const glm::vec3 corner = glm::mat3(motion) * (sign * half);
+                const SurfacePoint& found = nearest(points, glm::dvec3(corner));
+                REQUIRE(glm::distance(found.position, corner) < 1e-6f);
+                REQUIRE(glm::dot(found.normal, glm::mat3(motion) * sign) > 0.999f * std::sqrt(3.f));
+            }
+        }
+    const SurfacePoints cone(shapes::cone(0.5f, 2, 64), 0.4f);
+    REQUIRE(glm::distance(nearest(cone, {0, 0, 1}).position, glm::vec3(0, 0, 1)) < 1e-6f);
+}
+
+TEST_CASE("an edge keeps its points before the faces beside it") {
+    // finely divided, so that all of its points are vertices to choose from
+    const SurfacePoints points(shapes::box({1, 1, 1}, 30), 0.25f);
+    for (float along = -1; along <= 1; along += 0.01f) {
+        float gap = 2;
+        for (const SurfacePoint& p : points.points())
+            if (p.position.y == 1 && p.position.z == 1) gap = std::min(gap, std::abs(p.position.x - along));
+        REQUIRE(gap < 0.7f * 0.25f + 1 / 30.f);
+    }
+}
+
+TEST_CASE("normals point outward") {
+    const SurfacePoints sphere(shapes::sphere(2, 4), 0.1f);
+    for (const SurfacePoint& p : sphere.points()) REQUIRE(glm::dot(p.normal, glm::normalize(p.position)) > 0.998f);
+    for (const auto& [name, mesh, spacing] : cases()) {
+        CAPTURE(name);
+        const SurfacePoints points(mesh, spacing);
+        for (std::size_t i = 0; i < points.points().size(); i += 7) {
+            const auto& [position, normal] = points.points()[i];
+            REQUIRE(windingNumber(mesh, glm::dvec3(position + 1e-3f * normal)) < 0.5);
+            REQUIRE(windingNumber(mesh, glm::dvec3(position - 1e-3f * normal)) > 0.5);
+        }
+    }
+}
+
+TEST_CASE("both sides of a thin plate have points") {
+    const SurfacePoints points(shapes::box({1, 1, 0.01f}), 0.2f);
+    int above = 0, below = 0;
+    for (const SurfacePoint& p : points.points()) (p.position.z > 0 ? above : below) += std::abs(p.normal.z) > 0.9f;
+    REQUIRE(above > 40);
+    REQUIRE(below > 40);
+}
+
+TEST_CASE("the spheres of the tree hold their points, and its nodes part them") {
+    for (const auto& [name, mesh, spacing] : cases()) {
+        CAPTURE(name);
+        const SurfacePoints points(mesh, spacing);
+        const auto nodes = points.nodes();
+        REQUIRE(nodes[0].begin == 0);
+        REQUIRE(nodes[0].end == points.points().size());
+        REQUIRE(nodes[0].next == nodes.size());
+        for (std::uint32_t i = 0; i < nodes.size(); ++i) {
+            for (std::uint32_t p = nodes[i].begin; p < nodes[i].end; ++p)
+                REQUIRE(glm::distance(points.points()[p].position, nodes[i].centre) <= nodes[i].radius);
+            REQUIRE(nodes[i].next > i);
+            if (nodes[i].next == i + 1) {
+                REQUIRE(nodes[i].end - nodes[i].begin <= 8);
+                continue;
+            }
+            const PointNode &first = nodes[i + 1], &second = nodes[first.next];
+            REQUIRE(first.begin == nodes[i].begin);
+            REQUIRE(first.end == second.begin);
+            REQUIRE(second.end == nodes[i].end);
+            REQUIRE(second.next == nodes[i].next);
+        }
+    }
+}
+
+TEST_CASE("a visit sees every point of a region once, in order") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    Random random(seed);
+    const SurfacePoints points(shapes::torus(1, 0.3f), 0.05f);
+    for (int i = 0; i < 50; ++i) {
+        const glm::vec3 centre = random.point(1.5);
+        const auto radius = float(random(0.05, 1));
+        std::vector<bool> seen(points.points().size(), false);
+        std::uint32_t next = 0, looked = 0;
+        points.visit([&](const glm::vec3& c, float r) { return glm::distance(c, centre) > r + radius; },
+                     [&](std::uint32_t index, const SurfacePoint& p) {
+                         REQUIRE(index >= next);
+                         REQUIRE(&p == &points.points()[index]);
+                         next = index + 1;
+                         seen[index] = true;
+                         ++looked;
+                     });
+        for (std::uint32_t p = 0; p < seen.size(); ++p)
+            if (glm::distance(points.points()[p].position, centre) <= radius) REQUIRE(seen[p]);
+        REQUIRE(looked <= points.points().size());
+    }
+    SurfacePoints().visit([](const glm::vec3&, float) { return false; },
+                          [](std::uint32_t, const SurfacePoint&) { FAIL("there is no point"); });
+}
+
+TEST_CASE("the same mesh gives the same points, its vertices shared or not") {
+    const Mesh mesh = shapes::cone(0.5f, 2, 20);
+    Mesh loose;
+    for (const glm::uvec3& t : mesh.triangles) {
+        const auto first = unsigned(loose.points.size());
+        for (int k = 0; k < 3; ++k) loose.points.push_back(mesh.points[t[k]]);
+        loose.triangles.push_back({first, first + 1, first + 2});
+    }
+    const SurfacePoints a(mesh, 0.1f), b(mesh, 0.1f), c(loose, 0.1f);
+    REQUIRE(a.points().size() == b.points().size());
+    for (std::size_t i = 0; i < a.points().size(); ++i) {
+        REQUIRE(a.points()[i].position == b.points()[i].position);
+        REQUIRE(a.points()[i].normal == b.points()[i].normal);
+    }
+    for (const SurfacePoint& p : c.points()) REQUIRE(glm::length(p.normal) == Approx(1));
+    REQUIRE(double(c.points().size()) == Approx(double(a.points().size())).epsilon(0.1));
+}
+
+TEST_CASE("dirty meshes have points, empty ones are refused") {
+    Mesh dirty = shapes::box({1, 1, 1});
+    dirty.triangles.push_back({0, 1, 1});  // no triangle
+    dirty.points.insert(dirty.points.end(), {{0, 0, 0}, {1, 0, 0}, {2, 0, 0}});
+    const auto last = unsigned(dirty.points.size());
+    dirty.triangles.push_back({last - 3, last - 2, last - 1});  // no area
+    dirty.triangles.push_back(dirty.triangles[0]);              // twice
+    const SurfacePoints points(dirty, 0.2f);
+    for (const SurfacePoint& p : points.points()) REQUIRE(glm::length(p.normal) == Approx(1));
+
+    REQUIRE_THROWS_AS(SurfacePoints(Mesh{}, 1), std::invalid_argument);
+    REQUIRE_THROWS_AS(SurfacePoints(dirty, 0), std::invalid_argument);
+    REQUIRE_THROWS_AS(SurfacePoints(dirty, -1), std::invalid_argument);
+    REQUIRE_THROWS_AS(SurfacePoints(dirty, std::numeric_limits<float>::quiet_NaN()), std::invalid_argument);
+    const Mesh line{{{0, 0, 0}, {1, 0, 0}, {2, 0, 0}}, {{0, 1, 2}}};
+    REQUIRE_THROWS_AS(SurfacePoints(line, 1), std::invalid_argument);
+}
