@@ -46,7 +46,7 @@ constant float lastVoxel = 7.0f;
 
 float square(float value) { return value * value; }
 float outside(float coordinate) { return coordinate - clamp(coordinate, 0.0f, lastVoxel); }
-float3 vector(const float* v) { return (float3)(v[0], v[1], v[2]); }
+float3 toFloat3(const float* v) { return (float3)(v[0], v[1], v[2]); }
 
 Sample makeSample(float3 at, float3 offset, int cube) {
     const float8 z = (float8)(0, 1, 2, 3, 4, 5, 6, 7);
@@ -143,10 +143,10 @@ bool runMisses(float3 a, float3 b, float reach) {
 
 // Applies all samples of a tile: Algorithm 1 and Eq. 2 of the paper.
 void applyTile(Layers* layers, Tile tile, int3 block, Parameters parameters, int owner) {
-    const float3 across = vector(tile.across), offset = vector(tile.offset);
+    const float3 across = toFloat3(tile.across), offset = toFloat3(tile.offset);
     const float3 shift = convert_float3((int3)(tile.base[0], tile.base[1], tile.base[2]) - block);
     for (int i = 0; i < tile.rows; ++i) {
-        const float3 start = vector(tile.first) + (float)(i) * vector(tile.down);
+        const float3 start = toFloat3(tile.first) + (float)(i) * toFloat3(tile.down);
         if (i > 0 && runMisses(start + shift, start + (float)(i) * across + shift, parameters.reach)) continue;
         for (int j = 0; j <= i; ++j) splat(layers, start + (float)(j) * across + shift, offset, parameters, owner);
     }
@@ -175,7 +175,7 @@ void store(const Layers* layers, size_t place, Parameters parameters, global flo
 // of each tile; without TRIANGLES it is not read, nor is `triangles` written.
 #ifdef ROW_PER_ITEM
 
-__attribute__((reqd_work_group_size(64, 1, 1))) kernel void fillBlocks(
+kernel __attribute__((reqd_work_group_size(64, 1, 1))) void fillBlocks(
     global const Tile* tiles, global const int* owners, global const int* origins, global const uint* offsets,
     global const uint* reaching, Parameters parameters, global float* distances, global int* triangles) {
     local Tile staged[64];

@@ -7,7 +7,10 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <iterator>
 #include <limits>
+#include <span>
+#include <string>
 #include <vector>
 
 #include "cl/program.h"
@@ -213,7 +216,6 @@ void Fill::reserve(Batch& batch, const Load& load) const {
     if (batch.capacity.covers(load)) return;
     const Load grown{std::max(load.blocks, batch.capacity.blocks), std::max(load.entries, batch.capacity.entries)};
     batch.capacity = fits(grown) ? grown : load;
-    // what is released first can be used again at once
     batch.originBuffer = batch.offsetBuffer = batch.tileBuffer = batch.distanceBuffer = batch.triangleBuffer =
         cl::Buffer();
     const auto buffer = [&](cl_mem_flags flags, std::uint64_t bytes) {

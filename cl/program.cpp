@@ -1,11 +1,11 @@
 #include "cl/program.h"
 
-#include <array>
 #include <cstdlib>
-#include <cstring>
 #include <fstream>
 #include <iterator>
 #include <optional>
+#include <sstream>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -17,6 +17,29 @@ namespace {
 using Binary = std::vector<unsigned char>;
 
 constexpr std::string_view fileMark = "bilayer program\n";  // first bytes of a file in the cache; its checksum follows
+
+// The names of OpenCL 1.2's codes without "CL_", from 0 down, and without "CL_INVALID_", from CL_INVALID_VALUE down.
+constexpr const char* runTimeCodes =
+    "SUCCESS DEVICE_NOT_FOUND DEVICE_NOT_AVAILABLE COMPILER_NOT_AVAILABLE MEM_OBJECT_ALLOCATION_FAILURE "
+    "OUT_OF_RESOURCES OUT_OF_HOST_MEMORY PROFILING_INFO_NOT_AVAILABLE MEM_COPY_OVERLAP IMAGE_FORMAT_MISMATCH "
+    "IMAGE_FORMAT_NOT_SUPPORTED BUILD_PROGRAM_FAILURE MAP_FAILURE MISALIGNED_SUB_BUFFER_OFFSET "
+    "EXEC_STATUS_ERROR_FOR_EVENTS_IN_WAIT_LIST COMPILE_PROGRAM_FAILURE LINKER_NOT_AVAILABLE LINK_PROGRAM_FAILURE "
+    "DEVICE_PARTITION_FAILED KERNEL_ARG_INFO_NOT_AVAILABLE";
+constexpr const char* invalidCodes =
+    "VALUE DEVICE_TYPE PLATFORM DEVICE CONTEXT QUEUE_PROPERTIES COMMAND_QUEUE HOST_PTR MEM_OBJECT "
+    "IMAGE_FORMAT_DESCRIPTOR IMAGE_SIZE SAMPLER BINARY BUILD_OPTIONS PROGRAM PROGRAM_EXECUTABLE KERNEL_NAME "
+    "KERNEL_DEFINITION KERNEL ARG_INDEX ARG_VALUE ARG_SIZE KERNEL_ARGS WORK_DIMENSION WORK_GROUP_SIZE WORK_ITEM_SIZE "
+    "GLOBAL_OFFSET EVENT_WAIT_LIST EVENT OPERATION GL_OBJECT BUFFER_SIZE MIP_LEVEL GLOBAL_WORK_SIZE PROPERTY "
+    "IMAGE_DESCRIPTOR COMPILER_OPTIONS LINKER_OPTIONS DEVICE_PARTITION_COUNT";
+
+// The word at this index, or nothing beyond the last.
+std::string word(const char* words, int index) {
+    std::istringstream stream(words);
+    std::string found;
+    for (int i = 0; i <= index; ++i)
+        if (!(stream >> found)) return {};
+    return found;
+}
 
 // FNV-1a.
 std::uint64_t checksum(std::string_view bytes) {
@@ -42,17 +65,21 @@ std::optional<Binary> readBinary(const std::filesystem::path& path) {
 }
 
 // A full disk or a folder without permission costs only the next start's time, so nobody hears of it.
-void writeBinary(const std::filesystem::path& path, const Binary& binary) try {
-    std::filesystem::create_directories(path.parent_path());
-    AtomicFile target(path);
-    std::ofstream file(target.temporary(), std::ios::binary);
-    const std::uint64_t sum = checksum(viewed(binary));
-    file.write(fileMark.data(), std::streamsize(fileMark.size()));
-    file.write(reinterpret_cast<const char*>(&sum), sizeof sum);
-    file.write(viewed(binary).data(), std::streamsize(binary.size()));
-    file.close();
-    if (file) target.commit();
-} catch (const std::runtime_error&) {
+void writeBinary(const std::filesystem::path& path, const cl::Program& program) {
+    try {
+        const Binary binary = program.getInfo<CL_PROGRAM_BINARIES>().front();
+        std::filesystem::create_directories(path.parent_path());
+        AtomicFile target(path);
+        std::ofstream file(target.temporary(), std::ios::binary);
+        const std::uint64_t sum = checksum(viewed(binary));
+        file.write(fileMark.data(), std::streamsize(fileMark.size()));
+        file.write(reinterpret_cast<const char*>(&sum), sizeof sum);
+        file.write(viewed(binary).data(), std::streamsize(binary.size()));
+        file.close();
+        if (file) target.commit();
+    } catch (const cl::Error&) {
+    } catch (const std::runtime_error&) {
+    }
 }
 
 // Null where the driver no longer takes the binary.
@@ -75,70 +102,11 @@ cl::Program compiled(const Device::Impl& device, const std::string& source, cons
 }  // namespace
 
 std::string errorName(cl_int code) {
-    // the codes of OpenCL 1.2, by their negative
-    static constexpr std::array<const char*, 20> runTime{"CL_SUCCESS",
-                                                         "CL_DEVICE_NOT_FOUND",
-                                                         "CL_DEVICE_NOT_AVAILABLE",
-                                                         "CL_COMPILER_NOT_AVAILABLE",
-                                                         "CL_MEM_OBJECT_ALLOCATION_FAILURE",
-                                                         "CL_OUT_OF_RESOURCES",
-                                                         "CL_OUT_OF_HOST_MEMORY",
-                                                         "CL_PROFILING_INFO_NOT_AVAILABLE",
-                                                         "CL_MEM_COPY_OVERLAP",
-                                                         "CL_IMAGE_FORMAT_MISMATCH",
-                                                         "CL_IMAGE_FORMAT_NOT_SUPPORTED",
-                                                         "CL_BUILD_PROGRAM_FAILURE",
-                                                         "CL_MAP_FAILURE",
-                                                         "CL_MISALIGNED_SUB_BUFFER_OFFSET",
-                                                         "CL_EXEC_STATUS_ERROR_FOR_EVENTS_IN_WAIT_LIST",
-                                                         "CL_COMPILE_PROGRAM_FAILURE",
-                                                         "CL_LINKER_NOT_AVAILABLE",
-                                                         "CL_LINK_PROGRAM_FAILURE",
-                                                         "CL_DEVICE_PARTITION_FAILED",
-                                                         "CL_KERNEL_ARG_INFO_NOT_AVAILABLE"};
-    static constexpr int firstInvalid = 30;
-    static constexpr std::array<const char*, 39> invalid{"VALUE",
-                                                         "DEVICE_TYPE",
-                                                         "PLATFORM",
-                                                         "DEVICE",
-                                                         "CONTEXT",
-                                                         "QUEUE_PROPERTIES",
-                                                         "COMMAND_QUEUE",
-                                                         "HOST_PTR",
-                                                         "MEM_OBJECT",
-                                                         "IMAGE_FORMAT_DESCRIPTOR",
-                                                         "IMAGE_SIZE",
-                                                         "SAMPLER",
-                                                         "BINARY",
-                                                         "BUILD_OPTIONS",
-                                                         "PROGRAM",
-                                                         "PROGRAM_EXECUTABLE",
-                                                         "KERNEL_NAME",
-                                                         "KERNEL_DEFINITION",
-                                                         "KERNEL",
-                                                         "ARG_INDEX",
-                                                         "ARG_VALUE",
-                                                         "ARG_SIZE",
-                                                         "KERNEL_ARGS",
-                                                         "WORK_DIMENSION",
-                                                         "WORK_GROUP_SIZE",
-                                                         "WORK_ITEM_SIZE",
-                                                         "GLOBAL_OFFSET",
-                                                         "EVENT_WAIT_LIST",
-                                                         "EVENT",
-                                                         "OPERATION",
-                                                         "GL_OBJECT",
-                                                         "BUFFER_SIZE",
-                                                         "MIP_LEVEL",
-                                                         "GLOBAL_WORK_SIZE",
-                                                         "PROPERTY",
-                                                         "IMAGE_DESCRIPTOR",
-                                                         "COMPILER_OPTIONS",
-                                                         "LINKER_OPTIONS",
-                                                         "DEVICE_PARTITION_COUNT"};
-    if (code <= 0 && -code < int(runTime.size())) return runTime[std::size_t(-code)];
-    if (const int i = -code - firstInvalid; i >= 0 && i < int(invalid.size()))
-        return std::string("CL_INVALID_") + invalid[std::size_t(i)];
+    if (code <= 0)
+        if (const std::string name = word(runTimeCodes, -code); !name.empty()) return "CL_" + name;
+    if (code <= CL_INVALID_VALUE)
+        if (const std::string name = word(invalidCodes, CL_INVALID_VALUE - code); !name.empty())
+            return "CL_INVALID_" + name;
     return "code " + std::to_string(code);
 }
 
@@ -175,7 +143,7 @@ cl::Program buildProgram(Device::Impl& device, const std::string& source, const 
     if (const auto binary = readBinary(path)) program = loaded(device, *binary, options);
     if (program()) return program;
     program = compiled(device, source, options);
-    if (!path.empty()) writeBinary(path, program.getInfo<CL_PROGRAM_BINARIES>().front());
+    if (!path.empty()) writeBinary(path, program);
     return program;
 }
 

@@ -1,0 +1,320 @@
+// OpenCL's filler against TBB's on whole meshes, and against sums over all samples in double precision on loose tiles.
+#include "cl/filler.h"
+
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <limits>
+#include <mutex>
+#include <numeric>
+#include <optional>
+#include <random>
+#include <span>
+#include <thread>
+
+#include "demos/shared/shapes.h"
+#include "sdf/grids.h"
+#include "sdf/mesh_io.h"
+#include "tests/support/support.h"
+
+using namespace bilayer;
+using Catch::Matchers::Contains;
+
+namespace {
+
+// Voxels along the longest side, and the mapping under test; a GPU's mapping crawls on a processor.
+struct Way {
+    KernelMapping mapping;
+    float resolution;
+};
+const Way blockPerItem{KernelMapping::blockPerItem, 90}, rowPerItem{KernelMapping::rowPerItem, 24};
+
+BuildOptions optionsFor(const Mesh& mesh, float resolution) {
+    BuildOptions options;
+    options.voxelSize = voxelSizeFor(mesh, resolution);
+    options.exteriorWidth = options.interiorWidth = 2;
+    return options;
+}
+
+// Both fields have the same voxels and signs everywhere, and distances within the margin.
+void checkSame(const LevelSet& a, const LevelSet& b) {
+    const openvdb::FloatGrid &expected = *a.grids().distance, &found = *b.grids().distance;
+    REQUIRE(found.activeVoxelCount() == expected.activeVoxelCount());
+    REQUIRE(found.tree().hasSameTopology(expected.tree()));
+    std::size_t signs = 0;
+    float farthest = 0;
+    auto f = found.cbeginValueAll();
+    for (auto e = expected.cbeginValueAll(); e; ++e, ++f) {
+        signs += std::signbit(*e) != std::signbit(*f);
+        farthest = std::max(farthest, std::abs(*e - *f));
+    }
+    CHECK(signs == 0);
+    CHECK(farthest <= openclMargin * a.voxelSize());
+}
+
+void checkSameTriangles(const LevelSet& a, const LevelSet& b) {
+    REQUIRE(a.grids().triangle);
+    REQUIRE(b.grids().triangle);
+    REQUIRE(b.grids().triangle->tree().hasSameTopology(a.grids().triangle->tree()));
+    std::size_t differing = 0, none = 0;
+    auto f = b.grids().triangle->cbeginValueOn();
+    for (auto e = a.grids().triangle->cbeginValueOn(); e; ++e, ++f) {
+        differing += *e != *f;
+        none += *f < 0;
+    }
+    CHECK(differing == 0);
+    CHECK(none == 0);
+}
+
+// The one test body over both fillers.
+void checkFillers(const Mesh& mesh, const BuildOptions& options, const OpenclOptions& opencl = {}) {
+    const LevelSet expected = build(mesh, options);
+    REQUIRE(expected.activeVoxels() > 0);
+    const LevelSet found = build(mesh, options, openclFiller(openDevice(), opencl));
+    checkSame(expected, found);
+    if (options.triangles) checkSameTriangles(expected, found);
+}
+
+struct Shape {
+    const char* name;
+    Mesh mesh;
+};
+
+std::vector<Shape> allShapes() {
+    return {{"sphere", shapes::sphere(1.f)},
+            {"torus", shapes::torus(1.f, 0.4f)},
+            {"box of 12 triangles", shapes::box({1.f, 0.6f, 0.3f})},
+            {"knot", shapes::torusKnot(2, 3, 1.f, 0.3f)}};
+}
+
+}  // namespace
+
+TEST_CASE("OpenCL and TBB agree on shapes") {
+    const Way way = GENERATE(blockPerItem, rowPerItem);
+    for (const Shape& shape : allShapes()) {
+        CAPTURE(shape.name, way.resolution);
+        BuildOptions options = optionsFor(shape.mesh, way.resolution);
+        options.triangles = true;
+        checkFillers(shape.mesh, options, {.mapping = way.mapping});
+    }
+}
+
+TEST_CASE("OpenCL and TBB agree without triangles") {
+    const Way way = GENERATE(blockPerItem, rowPerItem);
+    const Mesh mesh = shapes::torus(1.f, 0.4f);
+    checkFillers(mesh, optionsFor(mesh, way.resolution), {.mapping = way.mapping});
+}
+
+TEST_CASE("OpenCL and TBB agree on the corpus") {
+    for (const char* name : {"TinyTorus.obj", "cow.obj", "bunny_watertight.obj", "cgal-knot2.off", "beetle.obj"}) {
+        const auto path = bilayer::test::corpusMesh(name);
+        if (!path) continue;
+        CAPTURE(name);
+        const Mesh mesh = readMesh(*path);
+        BuildOptions options = optionsFor(mesh, 64);
+        options.triangles = true;
+        checkFillers(mesh, options);
+    }
+}
+
+TEST_CASE("OpenCL and TBB agree by the paper to the letter, by recursion and with other parameters") {
+    const Way way = GENERATE(blockPerItem, rowPerItem);
+    const bool triangles = GENERATE(false, true);
+    const Mesh mesh = shapes::box({1.f, 0.6f, 0.3f}, 2);
+    BuildOptions options = optionsFor(mesh, way.resolution);
+    options.triangles = triangles;
+    SECTION("letter") {
+        options.doubleLayer.fillGaps = false;
+        options.doubleLayer.neighbourhood = GENERATE(1, 2, 9);
+    }
+    SECTION("recursion") {
+        options.doubleLayer.subdivision = Subdivision::recursive;
+    }
+    SECTION("fine samples, thick layers, unequal widths") {
+        options.doubleLayer.epsilon = 0.3f;
+        options.doubleLayer.delta = 0.9f;
+        options.exteriorWidth = 4.5f;
+        options.interiorWidth = 1.25f;
+    }
+    checkFillers(mesh, options, {.mapping = way.mapping});
+}
+
+TEST_CASE("OpenCL and TBB agree far from the origin") {
+    const Mesh mesh =
+        transformed(shapes::sphere(1.f, 3), glm::mat4(1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, -900, 700, -1300, 1));
+    BuildOptions options = optionsFor(mesh, 40);
+    options.triangles = true;
+    checkFillers(mesh, options);
+}
+
+TEST_CASE("a little device memory means many batches and the same field") {
+    const Mesh mesh = shapes::sphere(1.f, 3);
+    BuildOptions options = optionsFor(mesh, 150);
+    options.triangles = GENERATE(false, true);
+    const std::uint64_t memory = GENERATE(2, 3);
+    CAPTURE(memory);
+    const LevelSet expected = build(mesh, options);
+    REQUIRE(expected.leaves() * blockVoxels * sizeof(float) > memory << 20);
+    checkFillers(mesh, options, {.memoryMiB = memory});
+}
+
+TEST_CASE("too little device memory is an error that says how much is needed") {
+    const Device device = openDevice();
+    SECTION("for the mesh") {
+        const Mesh mesh = shapes::sphere(1.f, 6);
+        CHECK_THROWS_AS(build(mesh, optionsFor(mesh, 60), openclFiller(device, {.memoryMiB = 1})), DeviceError);
+        CHECK_THROWS_WITH(build(mesh, optionsFor(mesh, 60), openclFiller(device, {.memoryMiB = 1})),
+                          Contains("MiB") && Contains(device.info().name));
+    }
+    SECTION("for a brick") {
+        const Mesh mesh = shapes::sphere(1.f, 3);
+        BuildOptions options = optionsFor(mesh, 100);
+        options.triangles = true;
+        options.exteriorWidth = options.interiorWidth = 6;
+        CHECK_THROWS_WITH(build(mesh, options, openclFiller(device, {.memoryMiB = 1})),
+                          Contains("brick") && Contains("MiB") && Contains(device.info().name));
+    }
+}
+
+TEST_CASE("a cancelled build leaves the device usable") {
+    const Mesh mesh = shapes::sphere(1.f, 3);
+    BuildOptions options = optionsFor(mesh, 150);
+    const BlockFiller filler = openclFiller(openDevice(), {.memoryMiB = 2});
+    options.progress = [](float) { return false; };
+    CHECK_THROWS_AS(build(mesh, options, filler), Cancelled);
+    options.progress = nullptr;
+    checkSame(build(mesh, options), build(mesh, options, filler));
+}
+
+TEST_CASE("one device serves two builds at once") {
+    const Mesh ball = shapes::sphere(1.f, 4), ring = shapes::torus(1.f, 0.4f);
+    const BlockFiller filler = openclFiller(openDevice());
+    std::optional<LevelSet> ringField;
+    std::thread other([&] { ringField = build(ring, optionsFor(ring, 60), filler); });
+    const LevelSet ballField = build(ball, optionsFor(ball, 60), filler);
+    other.join();
+    checkSame(build(ball, optionsFor(ball, 60)), ballField);
+    checkSame(build(ring, optionsFor(ring, 60)), *ringField);
+}
+
+TEST_CASE("an empty job is done at once") {
+    const Tiles tiles;
+    const Bricks bricks = binBricks(tiles, 3.f);
+    openclFiller(openDevice()).fill({tiles, bricks, {0.5f, 3.f, 2.5f, 0, false}, [](std::size_t, const FilledBlocks&) {
+                                         FAIL("there is nothing to hand over");
+                                     }});
+}
+
+TEST_CASE("the filler tells its name and device") {
+    const Device device = openDevice();
+    CHECK(openclFiller(device).backend == "opencl");
+    CHECK(openclFiller(device).device == device.info().name);
+}
+
+namespace {
+
+// Tiles that no mesh has: any size, any direction, each on its own. Samples lie at multiples of 1/64 voxel, so that
+// rounding to whole voxels is the same in floats and in doubles.
+std::vector<Tile> looseTiles(unsigned seed) {
+    std::mt19937 random(seed);
+    const auto within = [&](int size) { return std::uniform_int_distribution(-size, size)(random); };
+    const auto vector = [&](int size) { return glm::ivec3(within(size), within(size), within(size)); };
+    std::vector<Tile> tiles(24);
+    for (Tile& tile : tiles) {
+        const glm::vec3 down = glm::vec3(vector(64)) / 64.f, across = glm::vec3(vector(64)) / 64.f;
+        const glm::vec3 normal = glm::normalize(glm::cross(down, across) + glm::vec3(1e-3f));
+        tile = {vector(70), glm::vec3(vector(32)) / 64.f, down, across, 0.5f * normal, 4 + within(3)};
+    }
+    return tiles;
+}
+
+// Distances to the nearest samples of both layers; infinite where there is none.
+struct Nearest {
+    double inner = std::numeric_limits<double>::infinity(), outer = std::numeric_limits<double>::infinity();
+
+    double nearer() const { return std::min(inner, outer); }
+    double farther() const { return std::max(inner, outer); }
+};
+
+// Over all samples; in cube mode over those that have the voxel in their cube.
+Nearest nearest(std::span<const Tile> tiles, const glm::ivec3& voxel, int cube) {
+    const glm::dvec3 v(voxel);
+    Nearest best;
+    for (const Tile& tile : tiles)
+        for (int i = 0; i < tile.rows; ++i)
+            for (int j = 0; j <= i; ++j) {
+                const glm::dvec3 p = glm::dvec3(tile.base) + glm::dvec3(tile.first) +
+                                     double(i) * glm::dvec3(tile.down) + double(j) * glm::dvec3(tile.across);
+                const glm::dvec3 gap = glm::abs(v - glm::floor(p + 0.5));
+                if (cube > 0 && std::max({gap.x, gap.y, gap.z}) > cube) continue;
+                best.inner = std::min(best.inner, glm::distance(v, p - glm::dvec3(tile.offset)));
+                best.outer = std::min(best.outer, glm::distance(v, p + glm::dvec3(tile.offset)));
+            }
+    return best;
+}
+
+// Counts what is wrong with filled blocks.
+struct Judge {
+    static constexpr double rounding = 1e-4;  // of coordinates to floats [voxels]
+    std::span<const Tile> tiles;              // tile t is of triangle t
+    FillParameters parameters;
+    std::size_t known = 0, unknown = 0, wrong = 0;
+
+    void see(const glm::ivec3& voxel, float distance, std::int32_t triangle) {
+        const Nearest best = nearest(tiles, voxel, parameters.cube);
+        if (best.nearer() > double(parameters.certain) + rounding || std::isinf(best.nearer())) {
+            ++unknown;
+            wrong += distance != std::numeric_limits<float>::infinity();
+        }
+        // the farther layer decides, and its sample must be within reach; where both are as near, either side will do
+        if (!(best.farther() < double(parameters.certain) - rounding) || best.farther() - best.nearer() < rounding)
+            return;
+        ++known;
+        const bool inside = best.inner < best.outer;
+        const double expected = std::max(0.0, best.farther() - double(parameters.delta));
+        wrong += std::signbit(distance) != inside || !(std::abs(std::abs(double(distance)) - expected) < rounding);
+        if (triangle < 0 || std::size_t(triangle) >= tiles.size()) {
+            ++wrong;
+            return;
+        }
+        const Nearest owner = nearest(tiles.subspan(std::size_t(triangle), 1), voxel, parameters.cube);
+        wrong += !((inside ? owner.outer : owner.inner) - best.farther() < rounding);
+    }
+};
+
+}  // namespace
+
+TEST_CASE("blocks hold Eq. 3 of the nearest samples") {
+    const Way way = GENERATE(blockPerItem, rowPerItem);
+    const FillParameters parameters =
+        GENERATE(FillParameters{0.5f, 4.f, 3.5f, 0, true},
+                 FillParameters{0.5f, 2.5f, std::numeric_limits<float>::infinity(), 2, true});
+    const unsigned seed = bilayer::test::seed();
+    CAPTURE(seed, parameters.cube, way.resolution);
+    const std::vector<Tile> loose = looseTiles(seed);
+    std::vector<std::int32_t> triangles(loose.size());
+    std::iota(triangles.begin(), triangles.end(), 0);
+    Tiles tiles;
+    tiles.tiles = loose;
+    tiles.triangles = triangles;
+    const Bricks bricks = binBricks(tiles, parameters.reach);
+
+    std::mutex mutex;
+    Judge judge{loose, parameters};
+    std::vector<int> calls(bricks.count(), 0);
+    openclFiller(openDevice(), {.mapping = way.mapping})
+        .fill({tiles, bricks, parameters, [&](std::size_t brick, const FilledBlocks& blocks) {
+                   const std::lock_guard lock(mutex);
+                   ++calls[brick];
+                   for (std::size_t i = 0; i < blocks.distances.size(); ++i) {
+                       const int v = int(i % blockVoxels);
+                       judge.see(blocks.origins[i / blockVoxels] + glm::ivec3(v / 64, v / 8 % 8, v % 8),
+                                 blocks.distances[i], blocks.triangles[i]);
+                   }
+               }});
+    CHECK(std::count(calls.begin(), calls.end(), 1) == std::ptrdiff_t(bricks.count()));
+    CHECK(judge.known > 1000);
+    CHECK(judge.unknown > 1000);
+    CHECK(judge.wrong == 0);
+}
