@@ -35,11 +35,11 @@ struct BuildOptions {
     float voxelSize = 0;      ///< edge of a voxel [m]; must be given
     float exteriorWidth = 3;  ///< every voxel with 0 <= distance < this is active [voxels], in (0, 1000]
     float interiorWidth = 3;  ///< every voxel with -this < distance < 0 is active [voxels], in (0, 1000]
-    DoubleLayerOptions doubleLayer;
+    DoubleLayerOptions doubleLayer{};
     bool triangles = false;   ///< also keep the nearest triangle of each active voxel
     int threads = 0;          ///< most threads to use; 0: all
     /// Called now and then, from any thread but one at a time, with the part done (0..1); false cancels the build.
-    std::function<bool(float)> progress;
+    std::function<bool(float)> progress{};
 };
 
 /// Thrown by build() when `BuildOptions::progress` returned false.

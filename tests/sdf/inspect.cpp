@@ -1,0 +1,106 @@
+#include "sdf/inspect.h"
+
+#include <catch2/catch.hpp>
+#include <glm/gtc/constants.hpp>
+#include <glm/gtc/matrix_transform.hpp>
+
+#include "demos/shared/shapes.h"
+#include "sdf/mesh_io.h"
+#include "tests/support/support.h"
+
+using namespace bilayer;
+
+namespace {
+
+Mesh flipped(Mesh mesh) {
+    for (auto& t : mesh.triangles) std::swap(t.y, t.z);
+    return mesh;
+}
+
+Mesh moved(const Mesh& mesh, const glm::vec3& by) { return transformed(mesh, glm::translate(glm::mat4(1), by)); }
+
+}  // namespace
+
+TEST_CASE("shapes by formula are closed and oriented, and have the volume of the formula") {
+    const double pi = glm::pi<double>();
+    const std::vector<std::pair<Mesh, double>> all = {
+        {shapes::box({1, 2, 3}), 48},
+        {shapes::box({1, 2, 3}, 7), 48},
+        {shapes::sphere(1, 5), 4 * pi / 3},
+        {shapes::torus(2, 0.5, 200, 100), 2 * pi * pi * 2 * 0.25},
+        {shapes::cylinder(1, 2, 200), 2 * pi},
+        {shapes::cone(1, 3, 200), pi},
+        {shapes::bowl(1, 0.1f, 256), 2 * pi / 3 * (1 - 0.729) + pi * 0.0025 / 2 * 2 * pi * 0.95},
+        {shapes::torusKnot(2, 3, 1, 0.1f), 0}};
+    for (const auto& [mesh, volume] : all) {
+        const MeshReport report = inspect(mesh);
+        CAPTURE(report.triangles, report.points, report.volume, volume);
+        CHECK(report.closed());
+        CHECK(report.oriented());
+        CHECK(report.components == 1);
+        CHECK(report.degenerateTriangles == 0);
+        CHECK(report.duplicateTriangles == 0);
+        CHECK(report.volume > 0);
+        if (volume > 0) CHECK(report.volume == Approx(volume).epsilon(0.003));
+    }
+}
+
+TEST_CASE("holes, folds and flips are counted") {
+    Mesh mesh = shapes::box({1, 1, 1});
+    mesh.triangles.pop_back();
+    CHECK(inspect(mesh).boundaryEdges == 3);
+    CHECK_FALSE(inspect(mesh).closed());
+    mesh = shapes::box({1, 1, 1});
+    std::swap(mesh.triangles[5].x, mesh.triangles[5].y);
+    CHECK(inspect(mesh).misorientedEdges == 3);
+    CHECK_FALSE(inspect(mesh).oriented());
+    mesh = shapes::box({1, 1, 1});
+    mesh.triangles.push_back(mesh.triangles[2]);
+    CHECK(inspect(mesh).duplicateTriangles == 1);
+    CHECK(inspect(mesh).nonManifoldEdges == 3);
+    mesh.triangles.push_back({0, 0, 1});
+    CHECK(inspect(mesh).degenerateTriangles == 1);
+}
+
+TEST_CASE("inside-out components are told from cavities") {
+    const Mesh big = shapes::sphere(2, 3), small = shapes::sphere(1, 3), tiny = shapes::sphere(0.5f, 3);
+    CHECK(inspect(flipped(big)).insideOutComponents == 1);
+    CHECK(inspect(shapes::join({big, flipped(small)})).insideOutComponents == 0);
+    CHECK(inspect(shapes::join({big, small})).insideOutComponents == 1);
+    CHECK(inspect(shapes::join({big, flipped(small), tiny})).insideOutComponents == 0);
+    CHECK(inspect(shapes::join({big, moved(small, {5, 0, 0})})).insideOutComponents == 0);
+    CHECK(inspect(shapes::join({big, moved(flipped(small), {5, 0, 0})})).insideOutComponents == 1);
+}
+
+TEST_CASE("the thinnest wall is measured through the solid") {
+    const MeshReport plate = inspect(shapes::box({1, 1, 0.05f}, 8), 0.2f);
+    CHECK(plate.thinnestWall == Approx(0.1));
+    CHECK(plate.thinWalls == 2 * 2 * 8 * 8);
+    CHECK(inspect(shapes::box({1, 1, 0.05f}, 8), 0.05f).thinWalls == 0);
+    CHECK(inspect(shapes::bowl(1, 0.1f, 256)).thinnestWall == Approx(0.1).epsilon(0.05));
+    // the gap between two bodies is no wall
+    const Mesh pair = shapes::join({shapes::box({1, 1, 1}), moved(shapes::box({1, 1, 1}), {2.01f, 0, 0})});
+    CHECK(inspect(pair).thinnestWall == Approx(2));
+}
+
+TEST_CASE("the public corpus is reported as it is known to be") {
+    struct Case {
+        const char* name;
+        std::size_t boundary, nonManifold, duplicates, components;
+    };
+    for (const Case& c :
+         {Case{"bunny_zipper.ply", 223, 0, 0, 1}, Case{"bunny_res2_nasty.ply", 123, 150, 87, 1},
+          Case{"dragon_vrip_res2_nasty.ply", 0, 2534, 1489, 7}, Case{"cgal-elephant-with-holes.off", 1353, 0, 0, 1},
+          Case{"cgal-bones.off", 0, 0, 0, 26}, Case{"armadillo_100k.ply", 0, 0, 0, 1}}) {
+        const auto path = test::corpusMesh(c.name);
+        if (!path) return;
+        const MeshReport report = inspect(readMesh(*path));
+        CAPTURE(c.name);
+        CHECK(report.boundaryEdges == c.boundary);
+        CHECK(report.nonManifoldEdges == c.nonManifold);
+        CHECK(report.duplicateTriangles == c.duplicates);
+        CHECK(report.components == c.components);
+    }
+    CHECK(inspect(readMesh(*test::corpusMesh("casting_inverted.off"))).insideOutComponents == 1);
+    CHECK(inspect(readMesh(*test::corpusMesh("cgal-cube-shuffled.off"))).misorientedEdges == 9);
+}

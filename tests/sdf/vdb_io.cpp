@@ -1,0 +1,107 @@
+#include "sdf/vdb_io.h"
+
+#include <openvdb/io/File.h>
+
+#include <catch2/catch.hpp>
+#include <fstream>
+#include <iterator>
+
+#include "demos/shared/shapes.h"
+#include "sdf/build.h"
+#include "sdf/grids.h"
+#include "tests/support/support.h"
+
+using namespace bilayer;
+
+namespace {
+
+LevelSet torus() {
+    return build(shapes::torus(1, 0.3f, 60, 30),
+                 {.voxelSize = 0.05f, .exteriorWidth = 3, .interiorWidth = 2, .triangles = true});
+}
+
+std::string bytes(const std::filesystem::path& path) {
+    std::ifstream file(path, std::ios::binary);
+    return {std::istreambuf_iterator<char>(file), {}};
+}
+
+}  // namespace
+
+TEST_CASE("a field survives its file") {
+    const LevelSet field = torus();
+    const auto path = test::scratch("torus.vdb");
+    writeVdb(path, field);
+    const LevelSet back = readVdb(path);
+    CHECK(back.voxelSize() == field.voxelSize());
+    CHECK(back.exteriorWidth() == field.exteriorWidth());
+    CHECK(back.interiorWidth() == field.interiorWidth());
+    CHECK(back.activeVoxels() == field.activeVoxels());
+    CHECK(back.leaves() == field.leaves());
+    CHECK(back.method() == "double-layer");
+    CHECK(back.meshHash() == hash(shapes::torus(1, 0.3f, 60, 30)));
+    REQUIRE(back.grids().triangle);
+    const auto values = back.grids().distance->getConstAccessor();
+    for (auto value = field.grids().distance->cbeginValueAll(); value; ++value)
+        REQUIRE(values.getValue(value.getCoord()) == value.getValue());
+}
+
+TEST_CASE("half floats halve the file and keep three digits") {
+    const LevelSet field = torus();
+    writeVdb(test::scratch("full.vdb"), field);
+    writeVdb(test::scratch("half.vdb"), field, {.halfFloat = true});
+    CHECK(std::filesystem::file_size(test::scratch("half.vdb")) < std::filesystem::file_size(test::scratch("full.vdb")));
+    const LevelSet back = readVdb(test::scratch("half.vdb"));
+    CHECK(back.activeVoxels() == field.activeVoxels());
+    const auto values = back.grids().distance->getConstAccessor();
+    for (auto value = field.grids().distance->cbeginValueOn(); value; ++value)
+        REQUIRE(values.getValue(value.getCoord()) == Approx(value.getValue()).margin(1e-4));
+}
+
+TEST_CASE("a plain OpenVDB program reads the file") {
+    writeVdb(test::scratch("plain.vdb"), torus());
+    openvdb::io::File file(test::scratch("plain.vdb").string());
+    file.open();
+    CHECK(file.hasGrid("distance"));
+    CHECK(file.hasGrid("triangle"));
+    CHECK(file.readGrid("distance")->getGridClass() == openvdb::GRID_LEVEL_SET);
+}
+
+TEST_CASE("truncated and foreign files are refused by name, wherever they are cut") {
+    writeVdb(test::scratch("whole.vdb"), torus());
+    const std::string whole = bytes(test::scratch("whole.vdb"));
+    for (const double part : {0.0, 0.001, 0.01, 0.1, 0.5, 0.9, 0.999}) {
+        const auto path = test::scratch("cut.vdb");
+        std::ofstream(path, std::ios::binary) << whole.substr(0, std::size_t(part * double(whole.size())));
+        CAPTURE(part);
+        CHECK_THROWS_WITH(readVdb(path), Catch::Contains("cut.vdb"));
+    }
+    std::ofstream(test::scratch("text.vdb")) << "hello, this is no grid at all";
+    CHECK_THROWS_WITH(readVdb(test::scratch("text.vdb")), Catch::Contains("text.vdb"));
+    CHECK_THROWS_WITH(readVdb("/nonexistent.vdb"), Catch::Contains("/nonexistent.vdb"));
+    CHECK_THROWS_WITH(writeVdb("/nonexistent/a.vdb", torus()), Catch::Contains("/nonexistent/a.vdb"));
+}
+
+TEST_CASE("a file without a level set is refused") {
+    openvdb::initialize();
+    auto fog = openvdb::FloatGrid::create(0.f);
+    fog->setGridClass(openvdb::GRID_FOG_VOLUME);
+    fog->tree().setValue(openvdb::Coord(1, 2, 3), 1.f);
+    openvdb::io::File(test::scratch("fog.vdb").string()).write({fog});
+    CHECK_THROWS_WITH(readVdb(test::scratch("fog.vdb")), Catch::Contains("no level set"));
+}
+
+TEST_CASE("a rotated or empty grid is no level set to us") {
+    const auto grids = [](auto change) {
+        auto grid = openvdb::ConstPtrCast<openvdb::FloatGrid>(torus().grids().distance)->deepCopy();
+        change(*grid);
+        return std::make_shared<Grids>(Grids{grid, nullptr});
+    };
+    CHECK_NOTHROW(LevelSet(grids([](auto&) {})));
+    CHECK_THROWS_AS(LevelSet(grids([](auto& grid) { grid.transform().postRotate(0.3, openvdb::math::X_AXIS); })),
+                    std::invalid_argument);
+    CHECK_THROWS_AS(LevelSet(grids([](auto& grid) { grid.transform().postScale(openvdb::Vec3d(1, 2, 1)); })),
+                    std::invalid_argument);
+    CHECK_THROWS_AS(LevelSet(grids([](auto& grid) { grid.transform().postTranslate({0.02, 0, 0}); })), std::invalid_argument);
+    CHECK_THROWS_AS(LevelSet(grids([](auto& grid) { grid.clear(); })), std::invalid_argument);
+    CHECK_THROWS_AS(LevelSet(std::make_shared<Grids>()), std::invalid_argument);
+}
