@@ -135,22 +135,27 @@ Mesh cone(float radius, float height, int segments) {
     return revolve({{0, -height / 2}, {radius, -height / 2}, {0, height / 2}}, segments);
 }
 
-Mesh bowl(float radius, float wall, int segments) {
+Mesh bowl(float radius, float wall, int segments, float opening, float foot) {
     const float inner = radius - wall, middle = radius - wall / 2;
     const int arc = segments / 4, rim = std::max(4, arc / 8);
+    const auto at = [](float r, float angle) {  // angles from the bottom
+        return glm::vec2(angle == 0 ? 0.f : r * std::sin(angle), -r * std::cos(angle));
+    };
     std::vector<glm::vec2> profile;
-    for (int i = 0; i <= arc; ++i) {  // outside, from the bottom to the rim
-        const float angle = -pi / 2 + pi / 2 * float(i) / float(arc);
-        profile.push_back({i == 0 ? 0.f : radius * std::cos(angle), radius * std::sin(angle)});
+    if (foot > 0) {
+        const float bottom = -radius - wall / 2, bevel = wall / 8;
+        profile = {{0, bottom}, {foot - bevel, bottom}, {foot, bottom + bevel}};
     }
+    for (int i = 0; i <= arc; ++i) {  // outside, from the bottom to the rim
+        const glm::vec2 point = at(radius, opening * float(i) / float(arc));
+        if (foot <= 0 || point.x >= foot) profile.push_back(point);
+    }
+    const glm::vec2 outward = at(1, opening), onward(-outward.y, outward.x);
     for (int i = 1; i < rim; ++i) {  // over the round rim
         const float angle = pi * float(i) / float(rim);
-        profile.push_back({middle + wall / 2 * std::cos(angle), wall / 2 * std::sin(angle)});
+        profile.push_back(middle * outward + wall / 2 * (std::cos(angle) * outward + std::sin(angle) * onward));
     }
-    for (int i = arc; i >= 0; --i) {  // inside, back to the bottom
-        const float angle = -pi / 2 + pi / 2 * float(i) / float(arc);
-        profile.push_back({i == 0 ? 0.f : inner * std::cos(angle), inner * std::sin(angle)});
-    }
+    for (int i = arc; i >= 0; --i) profile.push_back(at(inner, opening * float(i) / float(arc)));  // inside, back down
     return revolve(profile, segments);
 }
 

@@ -28,9 +28,11 @@ Mesh revolve(const std::vector<glm::vec2>& profile, int segments = 96);
 Mesh cylinder(float radius, float height, int segments = 96);
 Mesh cone(float radius, float height, int segments = 96);
 
-/// An open bowl around z with a round rim: a spherical shell of outer radius `radius` and thickness `wall`, cut at its
-/// equator, the opening upward.
-Mesh bowl(float radius, float wall, int segments = 128);
+/// An open bowl around z with a round rim: a spherical shell of outer radius `radius` and thickness `wall`, the opening
+/// upward. The sphere's centre is the origin.
+/// @param opening  angle between the bottom and the rim, seen from the sphere's centre [rad]; a hemisphere by default
+/// @param foot     radius of a flat solid foot below it, half a wall high; 0: none
+Mesh bowl(float radius, float wall, int segments = 128, float opening = 1.57079633f, float foot = 0);
 
 /// Several meshes as one.
 Mesh join(const std::vector<Mesh>& meshes);

@@ -1,0 +1,65 @@
+#include "demos/shared/world.h"
+
+namespace bilayer::demo {
+namespace {
+
+constexpr float gravity = 9.81f;  // [m/s^2]
+
+// Slower than this, a body may fall asleep. Bullet's own thresholds (0.8 m/s, 1 rad/s) are for crates and cars.
+constexpr float restingSpeed = 0.03f;  // [m/s]
+constexpr float restingSpin = 0.3f;    // [rad/s]
+
+btTransform toTransform(const Pose& pose) {
+    const auto& [p, q] = pose;
+    return btTransform(btQuaternion(q.x, q.y, q.z, q.w), btVector3(p.x, p.y, p.z));
+}
+
+}  // namespace
+
+World::World() {
+    world_.setGravity({0, 0, -gravity});
+}
+
+World::~World() {
+    for (const Body& body : bodies_) world_.removeRigidBody(body.body.get());
+}
+
+btRigidBody& World::add(std::shared_ptr<bullet::Shape> shape, const Matter& matter, const Pose& pose) {
+    btVector3 inertia(0, 0, 0);
+    if (matter.mass > 0) shape->calculateLocalInertia(matter.mass, inertia);
+    btRigidBody::btRigidBodyConstructionInfo info(matter.mass, nullptr, shape.get(), inertia);
+    // a body's origin is its centre of mass, a mesh's is anywhere: the shape's frame lies between the two
+    info.m_startWorldTransform = toTransform(pose) * toTransform(shape->frame()).inverse();
+    info.m_friction = matter.friction;
+    info.m_rollingFriction = matter.rollingFriction;
+    info.m_restitution = matter.restitution;
+    info.m_linearSleepingThreshold = restingSpeed;
+    info.m_angularSleepingThreshold = restingSpin;
+    bodies_.push_back({std::move(shape), std::make_unique<btRigidBody>(info)});
+    world_.addRigidBody(bodies_.back().body.get());
+    return *bodies_.back().body;
+}
+
+void World::step(float seconds) {
+    world_.stepSimulation(seconds, 1, seconds);
+}
+
+std::vector<Pose> World::poses() const {
+    std::vector<Pose> poses;
+    for (const auto& [shape, body] : bodies_) poses.push_back(shape->placed(body->getWorldTransform()).pose);
+    return poses;
+}
+
+int World::moving() const {
+    int count = 0;
+    for (const auto& [shape, body] : bodies_) count += !body->isStaticObject();
+    return count;
+}
+
+int World::asleep() const {
+    int count = 0;
+    for (const auto& [shape, body] : bodies_) count += !body->isStaticObject() && !body->isActive();
+    return count;
+}
+
+}  // namespace bilayer::demo

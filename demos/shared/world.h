@@ -1,0 +1,61 @@
+// A Bullet world whose bodies collide by their fields: the few lines that every program with bilayer in Bullet has.
+#pragma once
+
+#include <BulletCollision/BroadphaseCollision/btDbvtBroadphase.h>
+#include <BulletCollision/CollisionDispatch/btDefaultCollisionConfiguration.h>
+#include <BulletDynamics/ConstraintSolver/btSequentialImpulseConstraintSolver.h>
+#include <BulletDynamics/Dynamics/btDiscreteDynamicsWorld.h>
+#include <BulletDynamics/Dynamics/btRigidBody.h>
+
+#include <memory>
+#include <vector>
+
+#include "collider/pose.h"
+#include "integration/bullet/dispatcher.h"
+#include "integration/bullet/shape.h"
+
+namespace bilayer::demo {
+
+/// What bodies are made of.
+struct Matter {
+    float mass = 0;  ///< 0: it never moves [kg]
+    float friction = 0.5f;
+    float rollingFriction = 0;  ///< [m]
+    float restitution = 0;
+};
+
+/// Bodies, in the order in which they were added, under gravity along -z.
+class World {
+  public:
+    World();
+    ~World();
+
+    /// Adds a body whose collider stands at a pose. Several bodies may share a shape.
+    btRigidBody& add(std::shared_ptr<bullet::Shape> shape, const Matter& matter, const Pose& pose);
+
+    /// One step of fixed length [s].
+    void step(float seconds);
+
+    /// Where the colliders are, that is, the meshes as they were modelled.
+    std::vector<Pose> poses() const;
+
+    /// Bodies that move, and those of them that have come to rest.
+    int moving() const;
+    int asleep() const;
+
+    const bullet::DispatchStatistics& statistics() const { return dispatcher_.statistics(); }
+
+  private:
+    struct Body {
+        std::shared_ptr<bullet::Shape> shape;
+        std::unique_ptr<btRigidBody> body;
+    };
+    btDefaultCollisionConfiguration configuration_;
+    bullet::Dispatcher dispatcher_{&configuration_};
+    btDbvtBroadphase broadphase_;
+    btSequentialImpulseConstraintSolver solver_;
+    btDiscreteDynamicsWorld world_{&dispatcher_, &broadphase_, &solver_, &configuration_};
+    std::vector<Body> bodies_;
+};
+
+}  // namespace bilayer::demo
