@@ -56,8 +56,8 @@ class Pair {
     }
 
     /// Writes what collide() found into the manifolds; once.
-    void commit(btManifoldResult& result, bool bIsSecond, float sameWithin) {
-        manifolds_.write(patches_, result, bIsSecond, sameWithin);
+    void commit(const btCollisionObject& a, const btCollisionObject& b, float sameWithin, btManifoldResult& result) {
+        manifolds_.write(patches_, a, b, sameWithin, result);
         ++statistics_.pairs;
         statistics_.contactsFound += found_;
         for (const Patch& patch : patches_) statistics_.contactsKept += patch.count;
@@ -111,9 +111,10 @@ class Algorithm : public btCollisionAlgorithm {
 
     void processCollision(const btCollisionObjectWrapper* first, const btCollisionObjectWrapper* second,
                           const btDispatcherInfo&, btManifoldResult* result) override {
-        const Side a = sideOf(bIsSecond_ ? *first : *second), b = sideOf(bIsSecond_ ? *second : *first);
-        if (!pair_->isReady()) pair_->collide(a, b, result->m_closestPointDistanceThreshold);
-        pair_->commit(*result, bIsSecond_, static_cast<const Shape&>(*b.shape).getContactBreakingThreshold(0));
+        const btCollisionObjectWrapper &a = bIsSecond_ ? *first : *second, &b = bIsSecond_ ? *second : *first;
+        if (!pair_->isReady()) pair_->collide(sideOf(a), sideOf(b), result->m_closestPointDistanceThreshold);
+        const float sameWithin = b.getCollisionShape()->getContactBreakingThreshold(gContactBreakingThreshold);
+        pair_->commit(*a.getCollisionObject(), *b.getCollisionObject(), sameWithin, *result);
     }
 
     /// Bullet asks this of pairs in continuous dispatch, which its worlds never use.

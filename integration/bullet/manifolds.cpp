@@ -93,14 +93,13 @@ Manifolds::~Manifolds() {
     for (btPersistentManifold* manifold : manifolds_) dispatcher_.releaseManifold(manifold);
 }
 
-void Manifolds::write(std::span<const Patch> patches, btManifoldResult& result, bool bIsSecond, float sameWithin) {
-    const btCollisionObject* first = result.getBody0Internal();
-    const btCollisionObject* second = result.getBody1Internal();
-    if (!bIsSecond) std::swap(first, second);
+void Manifolds::write(std::span<const Patch> patches, const btCollisionObject& a, const btCollisionObject& b,
+                      float sameWithin, btManifoldResult& result) {
     // One manifold at least: users expect a pair that overlaps to have one.
     while (manifolds_.size() < std::max<std::size_t>(patches.size(), 1))
-        manifolds_.push_back(dispatcher_.getNewManifold(first, second));
+        manifolds_.push_back(dispatcher_.getNewManifold(&a, &b));
 
+    const bool aIsFirst = result.getBody0Internal() == &a;
     old_.clear();
     for (btPersistentManifold* manifold : manifolds_)
         for (int i = 0; i < manifold->getNumContacts(); ++i) old_.push_back(manifold->getContactPoint(i));
@@ -112,7 +111,7 @@ void Manifolds::write(std::span<const Patch> patches, btManifoldResult& result, 
         manifold->setNumContacts(0);
         result.setPersistentManifold(manifold);
         if (m < patches.size())
-            for (int i = 0; i < patches[m].count; ++i) emit(patches[m].contacts[i], result, bIsSecond);
+            for (int i = 0; i < patches[m].count; ++i) emit(patches[m].contacts[i], aIsFirst, result);
         for (int i = 0; i < manifold->getNumContacts(); ++i) inherit(manifold->getContactPoint(i), sameWithin);
         manifold->setContactBreakingThreshold(sameWithin);
         if (touched && manifold->getNumContacts() == 0 && gContactEndedCallback) gContactEndedCallback(manifold);
@@ -123,12 +122,11 @@ void Manifolds::write(std::span<const Patch> patches, btManifoldResult& result, 
             gContactDestroyedCallback(point.m_userPersistentData);
 }
 
-void Manifolds::emit(const Contact& contact, btManifoldResult& result, bool bIsSecond) {
-    const bool ofB = contact.feature & featureOfB;
+void Manifolds::emit(const Contact& contact, bool aIsFirst, btManifoldResult& result) {
+    const bool ofFirst = aIsFirst != static_cast<bool>(contact.feature & featureOfB);
     const int index = static_cast<int>(contact.feature & ~featureOfB);
-    const int second = ofB == bIsSecond ? index : -1, first = ofB == bIsSecond ? -1 : index;
-    result.setShapeIdentifiersA(0, first);
-    result.setShapeIdentifiersB(0, second);
+    result.setShapeIdentifiersA(0, ofFirst ? index : -1);
+    result.setShapeIdentifiersB(0, ofFirst ? -1 : index);
 
     // Bullet drops points beyond the threshold and merges those within it: open it as far as this point needs.
     result.getPersistentManifold()->setContactBreakingThreshold(std::max(contact.distance, 0.f));

@@ -34,14 +34,15 @@ class Manifolds {
 
     /// Replaces all contacts. Goes through btManifoldResult::addContactPoint, so that friction, restitution, callbacks
     /// and contact tests work as for Bullet's own shapes.
-    /// @param bIsSecond  body B of the patches (whose normals point away from it) is body 1 of `result`
+    /// @param a, b  the bodies A and B of the patches; `result` may hold them in either order, as within a compound
     /// @param sameWithin  an old and a new contact nearer than this on either body are the same [m]
-    void write(std::span<const Patch> patches, btManifoldResult& result, bool bIsSecond, float sameWithin);
+    void write(std::span<const Patch> patches, const btCollisionObject& a, const btCollisionObject& b, float sameWithin,
+               btManifoldResult& result);
 
     std::span<btPersistentManifold* const> all() const { return manifolds_; }
 
   private:
-    void emit(const Contact& contact, btManifoldResult& result, bool bIsSecond);
+    void emit(const Contact& contact, bool aIsFirst, btManifoldResult& result);
     void inherit(btManifoldPoint& point, float sameWithin);
 
     btDispatcher& dispatcher_;

@@ -10,6 +10,10 @@
 
 namespace bilayer::bullet {
 
+/// Two fields, without the contacts whose normals look along the surface they touch: those of points just under the
+/// edge of the other body.
+ContactReport collideFields(const Placed& a, const Placed& b, float margin, std::vector<Contact>& contacts);
+
 /// Against everything below a plane.
 /// @param normal, offset  in the world: dot(normal, x) <= offset is solid; `normal` of unit length
 ContactReport collidePlane(const glm::vec3& normal, float offset, const Placed& field, float margin,

@@ -1,0 +1,229 @@
+// Every pair of shapes comes to rest where it must, in either order of insertion.
+#include <BulletCollision/CollisionShapes/btHeightfieldTerrainShape.h>
+
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <glm/trigonometric.hpp>
+
+#include "demos/shared/shapes.h"
+#include "world.h"
+
+using namespace bilayer;
+using namespace bilayer::test;
+using bullet::Shape;
+
+namespace {
+
+constexpr float h = 0.05f;         // voxel [m]
+constexpr float tolerance = 0.1f;  // of rest heights [voxels]
+
+/// Drops `falling` onto `lying` from a little above, and checks where it comes to rest.
+void rests(btCollisionShape& falling, btCollisionShape& lying, const btVector3& lyingAt, const btVector3& expected,
+           float scale = 1, bool rolls = false) {
+    const bool fallingFirst = GENERATE(false, true);
+    CAPTURE(fallingFirst, scale);
+    World world;
+    const btVector3 start = expected + btVector3(0, 0, scale * h);
+    btRigidBody* body = nullptr;
+    if (fallingFirst) body = world.add(falling, 2, start);
+    world.add(lying, 0, lyingAt);
+    if (!fallingFirst) body = world.add(falling, 2, start);
+    world.run(2.5f);
+
+    const btTransform& at = body->getWorldTransform();
+    CAPTURE(at.getOrigin().x(), at.getOrigin().y(), at.getOrigin().z());
+    CHECK(at.getOrigin().z() == Approx(expected.z()).margin(tolerance * scale * h));
+    if (!rolls) {
+        CHECK(std::hypot(at.getOrigin().x() - expected.x(), at.getOrigin().y() - expected.y()) < scale * h);
+        CHECK(at.getBasis()[2][2] > std::cos(glm::radians(1.f)));  // upright; it may have turned about the vertical
+    }
+    CHECK(motion(*body) < 1e-2f);
+    CHECK(world.dispatcher.statistics().beyondBand == 0);
+}
+
+struct Mesh3 {
+    explicit Mesh3(const Mesh& mesh) {
+        for (const glm::uvec3& t : mesh.triangles)
+            triangles.addTriangle(at(mesh.points[t.x]), at(mesh.points[t.y]), at(mesh.points[t.z]));
+        shape = std::make_unique<btBvhTriangleMeshShape>(&triangles, true);
+    }
+    static btVector3 at(const glm::vec3& p) { return {p.x, p.y, p.z}; }
+
+    btTriangleMesh triangles;
+    std::unique_ptr<btBvhTriangleMeshShape> shape;
+};
+
+}  // namespace
+
+TEST_CASE("A field's body rests on each static shape") {
+    static const auto box = exactBox({0.5f, 0.4f, 0.3f}, h);
+    static const auto sphere = exactSphere(0.4f, h);
+    static const auto torus = exactTorus(0.5f, 0.2f, h);
+    static const auto slab = exactBox({1.5f, 1.5f, 0.3f}, h);
+    const auto [collider, height] = GENERATE(table<int, float>({{0, 0.3f}, {1, 0.4f}, {2, 0.2f}}));
+    const bool round = collider == 1;
+    CAPTURE(collider);
+    Shape body(collider == 0 ? box : collider == 1 ? sphere : torus);
+
+    SECTION("plane") {
+        btStaticPlaneShape plane({0, 0, 1}, 0.1f);
+        rests(body, plane, {0, 0, -0.1f}, {0, 0, height}, 1, round);
+    }
+    SECTION("box") {
+        btBoxShape flat({3, 3, 0.5f});
+        rests(body, flat, {0, 0, -0.5f}, {0, 0, height}, 1, round);
+    }
+    SECTION("hull") {
+        btConvexHullShape flat;
+        for (int i = 0; i < 8; ++i) flat.addPoint({i & 1 ? 3.f : -3.f, i & 2 ? 3.f : -3.f, i & 4 ? 0.f : -1.f});
+        rests(body, flat, {0, 0, -flat.getMargin()}, {0, 0, height}, 1, round);
+    }
+    SECTION("cylinder") {
+        btCylinderShapeZ flat({2, 2, 0.5f});
+        rests(body, flat, {0, 0, -0.5f}, {0, 0, height}, 1, round);
+    }
+    SECTION("triangle mesh, coarse, scaled") {
+        const Mesh3 mesh(shapes::box({1, 1, 0.5f}));
+        btScaledBvhTriangleMeshShape scaled(mesh.shape.get(), {2, 2, 1});
+        rests(body, scaled, {0, 0, -0.5f}, {0, 0, height}, 1, round);
+    }
+    SECTION("triangle mesh, fine") {
+        const Mesh3 mesh(shapes::box({1.2f, 1.2f, 0.5f}, 40));
+        rests(body, *mesh.shape, {0, 0, -0.5f}, {0, 0, height}, 1, round);
+    }
+    SECTION("height field") {
+        const std::vector<float> heights(16 * 16, 0.f);
+        btHeightfieldTerrainShape terrain(16, 16, heights.data(), 1, -1, 1, 2, PHY_FLOAT, false);
+        terrain.setLocalScaling({0.4f, 0.4f, 1});
+        rests(body, terrain, {0, 0, 0}, {0, 0, height}, 1, round);
+    }
+    SECTION("field") {
+        Shape flat(slab);
+        rests(body, flat, {0, 0, -0.3f}, {0, 0, height}, 1, round);
+    }
+    SECTION("field in a compound") {
+        Shape flat(slab);
+        btCompoundShape compound;
+        compound.addChildShape(btTransform(btQuaternion::getIdentity(), {0, 0, -1}), &flat);
+        rests(body, compound, {0, 0, 0.7f}, {0, 0, height}, 1, round);
+    }
+}
+
+TEST_CASE("Each convex shape rests on a field") {
+    static const auto slabCollider = exactBox({1.5f, 1.5f, 0.3f}, h);
+    Shape slab(slabCollider);
+    const btVector3 below(0, 0, -0.3f);
+
+    SECTION("sphere, narrow and wide") {
+        const float radius = GENERATE(0.06f, 0.4f);
+        btSphereShape sphere(radius);
+        rests(sphere, slab, below, {0, 0, radius}, 1, true);
+    }
+    SECTION("box") {
+        btBoxShape box({0.4f, 0.3f, 0.2f});
+        rests(box, slab, below, {0, 0, 0.2f});
+    }
+    SECTION("capsule, lying") {
+        btCapsuleShapeX lying(0.3f, 0.8f);
+        rests(lying, slab, below, {0, 0, 0.3f});
+    }
+    SECTION("cylinder, upright") {
+        btCylinderShapeZ cylinder({0.3f, 0.3f, 0.4f});
+        rests(cylinder, slab, below, {0, 0, 0.4f});
+    }
+    SECTION("cylinder, lying") {
+        btCylinderShapeX cylinder({0.4f, 0.3f, 0.3f});
+        rests(cylinder, slab, below, {0, 0, 0.3f});
+    }
+    SECTION("cone") {
+        btConeShapeZ cone(0.4f, 0.6f);
+        rests(cone, slab, below, {0, 0, 0.3f + cone.getMargin()});
+    }
+    SECTION("hull") {
+        btConvexHullShape hull;
+        for (int i = 0; i < 8; ++i) hull.addPoint({i & 1 ? .4f : -.4f, i & 2 ? .3f : -.3f, i & 4 ? .2f : -.2f});
+        hull.setMargin(0.02f);
+        rests(hull, slab, below, {0, 0, 0.22f});
+    }
+    SECTION("multisphere") {
+        const btVector3 centres[] = {{-0.3f, -0.2f, 0}, {0.3f, -0.2f, 0}, {0, 0.3f, 0}};
+        const float radii[] = {0.25f, 0.25f, 0.25f};
+        btMultiSphereShape spheres(centres, radii, 3);
+        rests(spheres, slab, below, {0, 0, 0.25f});
+    }
+    SECTION("compound of two boxes") {
+        btBoxShape box({0.2f, 0.2f, 0.2f});
+        btCompoundShape compound;
+        compound.addChildShape(btTransform(btQuaternion::getIdentity(), {-0.3f, 0, 0}), &box);
+        compound.addChildShape(btTransform(btQuaternion::getIdentity(), {0.3f, 0, 0}), &box);
+        rests(compound, slab, below, {0, 0, 0.2f});
+    }
+}
+
+TEST_CASE("Scaled fields rest where scaled bodies do") {
+    const float scale = GENERATE(0.1f, 10.f);
+    Shape body(exactTorus(0.5f, 0.2f, h)), slab(exactBox({1.5f, 1.5f, 0.3f}, h));
+    body.setLocalScaling({scale, scale, scale});
+    slab.setLocalScaling({scale, scale, scale});
+    const btVector3 below(0, 0, -0.3f * scale);
+    SECTION("field on field") {
+        rests(body, slab, below, {0, 0, 0.2f * scale}, scale);
+    }
+    SECTION("box on field") {
+        btBoxShape box(scale * btVector3(0.4f, 0.3f, 0.2f));
+        rests(box, slab, below, {0, 0, 0.2f * scale}, scale);
+    }
+    SECTION("field on plane") {
+        btStaticPlaneShape plane({0, 0, 1}, 0);
+        rests(body, plane, {0, 0, 0}, {0, 0, 0.2f * scale}, scale);
+    }
+    SECTION("a body of another scale") {
+        slab.setLocalScaling({2 * scale, 2 * scale, 2 * scale});
+        rests(body, slab, 2 * below, {0, 0, 0.2f * scale}, scale);
+    }
+}
+
+TEST_CASE("Bodies lie at the bottom of a field's bowl") {
+    static const auto bowlCollider = exactBowl(1.5f, 0.2f, h);
+    Shape bowl(bowlCollider);
+    // the lowest place of the cavity is at -1.3
+    SECTION("a field's sphere") {
+        Shape sphere(exactSphere(0.4f, h));
+        rests(sphere, bowl, {0, 0, 0}, {0, 0, -1.3f + 0.4f}, 1, true);
+    }
+    SECTION("a sphere") {
+        btSphereShape sphere(0.4f);
+        rests(sphere, bowl, {0, 0, 0}, {0, 0, -1.3f + 0.4f}, 1, true);
+    }
+    SECTION("a box, on its lower edges' corners") {
+        btBoxShape box({0.5f, 0.5f, 0.2f});
+        rests(box, bowl, {0, 0, 0}, {0, 0, -std::sqrt(1.3f * 1.3f - 0.5f) + 0.2f});
+    }
+    SECTION("a cylinder, on its rim") {
+        btCylinderShapeZ cylinder({0.6f, 0.6f, 0.2f});
+        rests(cylinder, bowl, {0, 0, 0}, {0, 0, -std::sqrt(1.3f * 1.3f - 0.36f) + 0.2f});
+    }
+    SECTION("a lying capsule, on its ends") {
+        btCapsuleShapeX capsule(0.2f, 1.2f);
+        rests(capsule, bowl, {0, 0, 0}, {0, 0, -std::sqrt(1.1f * 1.1f - 0.36f)}, 1, true);
+    }
+}
+
+TEST_CASE("A bump of a field carries a flat face, and a groove both flanks of a sphere") {
+    SECTION("a plate on three bumps") {
+        // three spheres of one field under a plate: only the field's own points can meet its face
+        Shape sphere(exactSphere(0.4f, h));
+        btCompoundShape three;
+        for (int i = 0; i < 3; ++i)
+            three.addChildShape(
+                btTransform(btQuaternion::getIdentity(), {0.8f * std::cos(2.1f * i), 0.8f * std::sin(2.1f * i), -0.4f}),
+                &sphere);
+        btBoxShape plate({1.5f, 1.5f, 0.1f});
+        rests(plate, three, {0, 0, 0}, {0, 0, 0.1f});
+    }
+    SECTION("a sphere over the hole of a torus") {
+        Shape torus(exactTorus(0.6f, 0.2f, h));
+        btSphereShape sphere(0.6f);
+        rests(sphere, torus, {0, 0, 0}, {0, 0, std::sqrt(0.8f * 0.8f - 0.36f)});
+    }
+}

@@ -1,0 +1,100 @@
+#include "world.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/vec2.hpp>
+
+#include "demos/shared/shapes.h"
+#include "sdf/grids.h"
+
+namespace bilayer::test {
+
+World::World() {
+    dynamics.setGravity({0, 0, -9.81f});
+    dynamics.getDispatchInfo().m_deterministicOverlappingPairs = true;
+    // Small parts: overlaps of centimetres are not to be answered with speed.
+    dynamics.getSolverInfo().m_splitImpulsePenetrationThreshold = -1e-3f;
+}
+
+World::~World() {
+    for (const auto& body : bodies_) dynamics.removeRigidBody(body.get());
+}
+
+btRigidBody* World::add(btCollisionShape& shape, float mass, const btVector3& position, const btQuaternion& rotation) {
+    btVector3 inertia(0, 0, 0);
+    if (mass > 0) shape.calculateLocalInertia(mass, inertia);
+    btRigidBody::btRigidBodyConstructionInfo info(mass, nullptr, &shape, inertia);
+    info.m_startWorldTransform = btTransform(rotation, position);
+    info.m_friction = 0.5f;
+    bodies_.push_back(std::make_unique<btRigidBody>(info));
+    dynamics.addRigidBody(bodies_.back().get());
+    return bodies_.back().get();
+}
+
+void World::run(float seconds) {
+    const float step = 1.f / 240;
+    for (int i = 0; i < std::lround(seconds / step); ++i) dynamics.stepSimulation(step, 1, step);
+}
+
+std::shared_ptr<const Collider> exactCollider(const Mesh& mesh, const std::function<float(const glm::vec3&)>& distance,
+                                              float voxelSize) {
+    const float width = 3 * voxelSize;
+    auto grid = openvdb::FloatGrid::create(width);
+    grid->setTransform(openvdb::math::Transform::createLinearTransform(voxelSize));
+    grid->setGridClass(openvdb::GRID_LEVEL_SET);
+    const Bounds box = bounds(mesh);
+    const auto first = glm::ivec3(glm::floor((box.lower - width) / voxelSize)) - 1;
+    const auto last = glm::ivec3(glm::ceil((box.upper + width) / voxelSize)) + 1;
+    auto accessor = grid->getAccessor();
+    for (int x = first.x; x <= last.x; ++x)
+        for (int y = first.y; y <= last.y; ++y)
+            for (int z = first.z; z <= last.z; ++z) {
+                const float d = distance(voxelSize * glm::vec3(x, y, z));
+                if (std::abs(d) < width)
+                    accessor.setValueOn({x, y, z}, d);
+                else if (d < 0)
+                    accessor.setValueOff({x, y, z}, -width);
+            }
+    auto grids = std::make_shared<Grids>();
+    grids->distance = grid;
+    return std::make_shared<Collider>(mesh, LevelSet(grids));
+}
+
+std::shared_ptr<const Collider> exactBox(const glm::vec3& halfExtents, float voxelSize) {
+    return exactCollider(
+        shapes::box(halfExtents),
+        [=](const glm::vec3& p) {
+            const glm::vec3 q = glm::abs(p) - halfExtents;
+            return glm::length(glm::max(q, 0.f)) + std::min(std::max({q.x, q.y, q.z}), 0.f);
+        },
+        voxelSize);
+}
+
+std::shared_ptr<const Collider> exactSphere(float radius, float voxelSize) {
+    return exactCollider(
+        shapes::sphere(radius, 5), [=](const glm::vec3& p) { return glm::length(p) - radius; }, voxelSize);
+}
+
+std::shared_ptr<const Collider> exactTorus(float major, float minor, float voxelSize) {
+    const auto distance = [=](const glm::vec3& p) {
+        return glm::length(glm::vec2(glm::length(glm::vec2(p)) - major, p.z)) - minor;
+    };
+    return exactCollider(shapes::torus(major, minor, 192, 96), distance, voxelSize);
+}
+
+std::shared_ptr<const Collider> exactBowl(float radius, float wall, float voxelSize) {
+    const float middle = radius - 0.5f * wall;
+    const auto distance = [=](const glm::vec3& p) {
+        const glm::vec2 q(glm::length(glm::vec2(p)), p.z);
+        const float toArc = q.y < 0 ? std::abs(glm::length(q) - middle) : glm::distance(q, glm::vec2(middle, 0));
+        return toArc - 0.5f * wall;
+    };
+    return exactCollider(shapes::bowl(radius, wall, 256), distance, voxelSize);
+}
+
+float motion(const btRigidBody& body) {
+    return body.getLinearVelocity().length() + body.getAngularVelocity().length();
+}
+
+}  // namespace bilayer::test

@@ -1,0 +1,53 @@
+// A small Bullet world for tests, and fields to put into it.
+#pragma once
+
+#include <btBulletDynamicsCommon.h>
+
+#include <functional>
+#include <glm/vec3.hpp>
+#include <memory>
+#include <vector>
+
+#include "collider/collider.h"
+#include "integration/bullet/dispatcher.h"
+#include "integration/bullet/shape.h"
+
+namespace bilayer::test {
+
+/// A world with gravity (0, 0, -9.81) m/s^2 that owns its bodies.
+class World {
+  public:
+    World();
+    ~World();
+
+    /// mass 0: static. The shape must outlive the world.
+    btRigidBody* add(btCollisionShape& shape, float mass, const btVector3& position,
+                     const btQuaternion& rotation = btQuaternion::getIdentity());
+    /// Steps of 1/240 s.
+    void run(float seconds);
+
+    btDefaultCollisionConfiguration configuration;
+    bullet::Dispatcher dispatcher{&configuration};
+    btDbvtBroadphase broadphase;
+    btSequentialImpulseConstraintSolver solver;
+    btDiscreteDynamicsWorld dynamics{&dispatcher, &broadphase, &solver, &configuration};
+
+  private:
+    std::vector<std::unique_ptr<btRigidBody>> bodies_;
+};
+
+/// A field whose distances are those of a formula, not of the mesh's triangles: what is left of an error is the
+/// contacts'.
+std::shared_ptr<const Collider> exactCollider(const Mesh& mesh, const std::function<float(const glm::vec3&)>& distance,
+                                              float voxelSize);
+
+std::shared_ptr<const Collider> exactBox(const glm::vec3& halfExtents, float voxelSize);
+std::shared_ptr<const Collider> exactSphere(float radius, float voxelSize);
+std::shared_ptr<const Collider> exactTorus(float major, float minor, float voxelSize);
+/// A shell like shapes::bowl: the lower half of the sphere of `radius`, `wall` thick, with a round rim.
+std::shared_ptr<const Collider> exactBowl(float radius, float wall, float voxelSize);
+
+/// Speed at which a body at rest may still creep: linear [m/s] and angular [1/s] together.
+float motion(const btRigidBody& body);
+
+}  // namespace bilayer::test
