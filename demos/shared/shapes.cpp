@@ -105,7 +105,7 @@ Mesh torusKnot(int p, int q, float radius, float thickness, int along, int acros
         const glm::vec3 up = glm::cross(side, tangent);
         for (int j = 0; j < across; ++j) {
             const float w = 2 * pi * float(j) / float(across);
-            mesh.points.push_back(centre + thickness * (std::cos(w) * up + std::sin(w) * side));
+            mesh.points.push_back(centre + thickness * (std::cos(w) * side + std::sin(w) * up));
         }
     }
     addTorusFaces(mesh, along, across);
