@@ -1,0 +1,194 @@
+// OpenVDB calls a grid a level set only if |gradient|^2, by WENO differences and Godunov's upwinding, lies in
+// [0.5, 1.5] at all voxels next to the surface. Creases, walls below a voxel and noise break that. Where much is
+// broken, the equation |gradient| = 1 is iterated everywhere; what remains is mended voxel by voxel, by descent on the
+// sum of all violations.
+#include "integration/fluid/mend.h"
+
+#include <openvdb/math/Stencils.h>
+#include <openvdb/tools/LevelSetTracker.h>
+#include <openvdb/tree/LeafManager.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <stdexcept>
+#include <vector>
+
+namespace bilayer::fluid {
+namespace {
+
+using openvdb::Coord;
+using openvdb::FloatGrid;
+using Stencil = openvdb::math::WenoStencil<FloatGrid>;
+
+// The range of checkLevelSet, less what rounding may take.
+constexpr float lowest = 0.501f, highest = 1.499f;
+constexpr std::size_t manyBroken = 20;  // one broken voxel in so many next to the surface is noise, not creases
+constexpr int maxRounds = 60;           // of descent; six or so do for what real meshes give
+constexpr int patience = 3;             // rounds without a gain before the surroundings are smoothed
+constexpr int reach = 3;                // [voxels] of the WENO stencil along the axes
+// Changes that are tried at a voxel [voxels], either way.
+constexpr std::array<float, 6> steps{0.02f, 0.05f, 0.1f, 0.2f, 0.4f, 0.8f};
+constexpr float stepCost = 1e-3f;   // prefers small changes among equally good ones
+constexpr float leastGain = 1e-4f;  // of a change, so that descent ends
+
+struct Survey {
+    std::vector<Coord> broken;  // in the order of the leaves
+    std::size_t crossed = 0;    // voxels next to the surface
+};
+
+float violation(const Stencil& stencil) {
+    if (!stencil.zeroCrossing()) return 0;
+    const float q = stencil.normSqGrad();
+    return std::max({0.0f, lowest - q, q - highest});
+}
+
+Survey survey(const FloatGrid& grid) {
+    openvdb::tree::LeafManager<const openvdb::FloatTree> leaves(grid.tree());
+    std::vector<Survey> parts(leaves.leafCount());
+    leaves.foreach ([&](const openvdb::FloatTree::LeafNodeType& leaf, std::size_t index) {
+        Stencil stencil(grid);
+        for (auto voxel = leaf.cbeginValueOn(); voxel; ++voxel) {
+            stencil.moveTo(voxel.getCoord());
+            parts[index].crossed += stencil.zeroCrossing();
+            if (violation(stencil) > 0) parts[index].broken.push_back(voxel.getCoord());
+        }
+    });
+    Survey whole;
+    for (const Survey& part : parts) {
+        whole.broken.insert(whole.broken.end(), part.broken.begin(), part.broken.end());
+        whole.crossed += part.crossed;
+    }
+    return whole;
+}
+
+// A voxel and those on its axes up to `distance` away.
+template <class Visit>
+void alongAxes(const Coord& centre, int distance, Visit visit) {
+    visit(centre);
+    for (int axis = 0; axis < 3; ++axis)
+        for (int step = 1; step <= distance; ++step) {
+            Coord ahead = centre, behind = centre;
+            ahead[axis] += step;
+            behind[axis] -= step;
+            visit(ahead);
+            visit(behind);
+        }
+}
+
+class Mender {
+  public:
+    explicit Mender(FloatGrid& grid)
+        : grid_(grid), values_(grid.getAccessor()), stencil_(grid), voxel_(float(grid.voxelSize()[0])) {}
+
+    // One pass over the broken voxels; returns those that are broken now.
+    std::vector<Coord> descend(const std::vector<Coord>& broken) {
+        std::vector<Coord> touched;
+        for (const Coord& voxel : broken) {
+            touched.push_back(voxel);
+            if (violationAt(voxel) == 0) continue;
+            if (Coord changed; improve(voxel, changed))
+                alongAxes(changed, reach, [&](const Coord& near) { touched.push_back(near); });
+        }
+        return stillBroken(touched);
+    }
+
+    // Means over the neighbours around what resists, so that features below a voxel go.
+    std::vector<Coord> smooth(const std::vector<Coord>& broken) {
+        std::vector<Coord> around, touched;
+        for (const Coord& voxel : broken) alongAxes(voxel, 1, [&](const Coord& near) { around.push_back(near); });
+        sortUnique(around);
+        std::vector<float> means;
+        for (const Coord& voxel : around) means.push_back(mean(voxel));
+        for (std::size_t i = 0; i < around.size(); ++i) {
+            if (values_.isValueOn(around[i])) values_.setValueOnly(around[i], means[i]);
+            alongAxes(around[i], reach, [&](const Coord& near) { touched.push_back(near); });
+        }
+        return stillBroken(touched);
+    }
+
+  private:
+    static void sortUnique(std::vector<Coord>& voxels) {
+        std::sort(voxels.begin(), voxels.end());
+        voxels.erase(std::unique(voxels.begin(), voxels.end()), voxels.end());
+    }
+
+    float violationAt(const Coord& voxel) {
+        if (!values_.isValueOn(voxel)) return 0;
+        stencil_.moveTo(voxel);
+        return violation(stencil_);
+    }
+
+    // Of all voxels whose stencils read this one.
+    float violationAround(const Coord& voxel) {
+        float sum = 0;
+        alongAxes(voxel, reach, [&](const Coord& near) { sum += violationAt(near); });
+        return sum;
+    }
+
+    float mean(const Coord& voxel) {
+        float sum = 0;
+        alongAxes(voxel, 1, [&](const Coord& near) { sum += values_.getValue(near); });
+        return sum / 7;
+    }
+
+    // Makes the change of the voxel or one of its neighbours that lessens the violations most.
+    bool improve(const Coord& voxel, Coord& changed) {
+        float best = -leastGain, bestValue = 0;
+        bool found = false;
+        alongAxes(voxel, 1, [&](const Coord& candidate) {
+            if (!values_.isValueOn(candidate)) return;
+            const float old = values_.getValue(candidate), before = violationAround(candidate);
+            for (const float step : steps)
+                for (const float change : {step, -step}) {
+                    const float value = old + change * voxel_;
+                    if (std::abs(value) >= grid_.background()) continue;
+                    values_.setValueOnly(candidate, value);
+                    const float gain = violationAround(candidate) - before + stepCost * step;
+                    if (gain >= best) continue;
+                    best = gain;
+                    bestValue = value;
+                    changed = candidate;
+                    found = true;
+                }
+            values_.setValueOnly(candidate, old);
+        });
+        if (found) values_.setValueOnly(changed, bestValue);
+        return found;
+    }
+
+    std::vector<Coord> stillBroken(std::vector<Coord>& touched) {
+        sortUnique(touched);
+        std::erase_if(touched, [&](const Coord& voxel) { return violationAt(voxel) == 0; });
+        return std::move(touched);
+    }
+
+    FloatGrid& grid_;
+    FloatGrid::Accessor values_;
+    Stencil stencil_;
+    float voxel_;
+};
+
+}  // namespace
+
+void mend(FloatGrid& grid) {
+    Survey found = survey(grid);
+    if (found.broken.size() > found.crossed / manyBroken) {
+        openvdb::tools::LevelSetTracker<FloatGrid> tracker(grid);
+        tracker.normalize();
+        tracker.prune();
+        found = survey(grid);
+    }
+    Mender mender(grid);
+    std::vector<Coord> broken = std::move(found.broken);
+    std::size_t fewest = broken.size();
+    for (int round = 0, idle = 0; !broken.empty(); ++round) {
+        if (round == maxRounds)
+            throw std::runtime_error("seed: the surface cannot be made a level set at this voxel size");
+        broken = idle < patience ? mender.descend(broken) : mender.smooth(broken);
+        idle = broken.size() < fewest || idle == patience ? 0 : idle + 1;
+        fewest = std::min(fewest, broken.size());
+    }
+}
+
+}  // namespace bilayer::fluid

@@ -1,0 +1,196 @@
+// Seeding: the result passes OpenVDB's own check, has the distances it should have, and bad input changes nothing.
+#include "integration/fluid/seed.h"
+
+#include <openvdb/tools/Diagnostics.h>
+#include <openvdb/tools/LevelSetMeasure.h>
+#include <openvdb/tools/LevelSetSphere.h>
+
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <limits>
+#include <random>
+
+#include "demos/shared/shapes.h"
+#include "sdf/build.h"
+#include "sdf/grids.h"
+#include "sdf/mesh_io.h"
+#include "tests/support/support.h"
+
+using namespace bilayer;
+using openvdb::FloatGrid;
+
+namespace {
+
+LevelSet fieldOf(const Mesh& mesh, float voxelSize, float width = 3) {
+    return build(mesh, {.voxelSize = voxelSize, .exteriorWidth = width, .interiorWidth = width});
+}
+
+FloatGrid::Ptr emptyLiquid(float voxelSize, float halfWidth = 3) {
+    return openvdb::createLevelSet<FloatGrid>(voxelSize, halfWidth);
+}
+
+Pose poseOf(float angle, const glm::vec3& position = {0.11f, -0.07f, 0.23f}) {
+    return {position, glm::angleAxis(angle, glm::normalize(glm::vec3(1, -2, 0.5f)))};
+}
+
+void requireLevelSet(const FloatGrid& liquid) {
+    REQUIRE(openvdb::tools::checkLevelSet(liquid) == "");
+    CHECK(liquid.tree().isValueOff(openvdb::Coord(100000)));
+}
+
+// The largest difference between the active values and a formula [voxels].
+template <class Formula>
+double error(const FloatGrid& liquid, Formula distance) {
+    double largest = 0;
+    for (auto voxel = liquid.cbeginValueOn(); voxel; ++voxel) {
+        const openvdb::Vec3d p = liquid.indexToWorld(voxel.getCoord());
+        largest = std::max(largest, std::abs(*voxel - distance(glm::dvec3(p.x(), p.y(), p.z()))));
+    }
+    return largest / liquid.voxelSize()[0];
+}
+
+double volume(const FloatGrid& liquid) {
+    return openvdb::tools::levelSetVolume(liquid);
+}
+
+const double ball = 4.0 / 3.0 * 3.141592653589793 * 0.125;  // of radius 0.5
+
+}  // namespace
+
+TEST_CASE("a sphere's field of any resolution seeds the sphere under the pose") {
+    const Mesh sphere = shapes::sphere(0.5f, 5);
+    const float fieldVoxel = GENERATE(0.0125f, 0.03f, 0.06f);
+    const float liquidVoxel = GENERATE(0.02f, 0.03f, 0.05f);
+    const float width = GENERATE(1.5f, 3.0f);
+    CAPTURE(fieldVoxel, liquidVoxel, width);
+    const auto liquid = emptyLiquid(liquidVoxel);
+    const Pose pose = poseOf(0.8f);
+    fluid::seed(*liquid, fieldOf(sphere, fieldVoxel, width), pose);
+    requireLevelSet(*liquid);
+    // the field's own error of some tenths of its voxel, and first-order sweeping beyond its band
+    const double allowed = 0.35 + 0.35 * fieldVoxel / liquidVoxel;
+    CHECK(error(*liquid, [&](const glm::dvec3& p) { return glm::length(p - glm::dvec3(pose.position)) - 0.5; }) <
+          allowed);
+    CHECK(volume(*liquid) == Approx(ball).epsilon(0.06));
+    CHECK(liquid->background() == Approx(3 * liquidVoxel));
+    CHECK(liquid->voxelSize()[0] == Approx(liquidVoxel));
+}
+
+TEST_CASE("the band is complete: every voxel nearer than the half width is active") {
+    const float halfWidth = GENERATE(3.0f, 5.0f);
+    const auto liquid = emptyLiquid(0.04f, halfWidth);
+    fluid::seed(*liquid, fieldOf(shapes::sphere(0.5f, 5), 0.02f, 2));
+    requireLevelSet(*liquid);
+    int missing = 0;
+    for (const openvdb::Coord& at : openvdb::CoordBBox(openvdb::Coord(-25), openvdb::Coord(25))) {
+        const double distance = at.asVec3d().length() * 0.04 - 0.5;
+        const bool inside = std::abs(distance) < (halfWidth - 0.75) * 0.04;
+        missing += inside && !liquid->tree().isValueOn(at);
+        if (distance < -0.04) missing += !(liquid->tree().getValue(at) < 0);
+    }
+    CHECK(missing == 0);
+}
+
+TEST_CASE("overlapping and touching bodies stay a level set") {
+    const Mesh mesh = GENERATE(shapes::sphere(0.5f, 4), shapes::box({0.4f, 0.3f, 0.2f}, 4), shapes::bowl(0.5f, 0.06f),
+                               shapes::torus(0.5f, 0.12f));
+    const LevelSet field = fieldOf(mesh, 0.025f);
+    const float liquidVoxel = GENERATE(0.02f, 0.05f);
+    const auto liquid = emptyLiquid(liquidVoxel);
+    for (int i = 0; i < 4; ++i) {
+        fluid::seed(*liquid, field, poseOf(0.9f * float(i), {0.21f * float(i), 0.13f * float(i), 0}));
+        requireLevelSet(*liquid);
+    }
+    CHECK(volume(*liquid) > 0);
+}
+
+TEST_CASE("a mesh of the corpus seeds at any rotation") {
+    const auto path = test::corpusMesh("bunny_watertight.obj");
+    if (!path) return;
+    const Mesh mesh = readMesh(*path);
+    const float h = voxelSizeFor(mesh, 60);
+    const LevelSet field = fieldOf(mesh, h);
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    std::mt19937 random(seed);
+    std::normal_distribution<float> normal;
+    const auto liquid = emptyLiquid(h);
+    for (int i = 0; i < 3; ++i) {
+        const glm::quat q(normal(random), normal(random), normal(random), normal(random));
+        fluid::seed(*liquid, field, {glm::vec3(normal(random), normal(random), normal(random)), glm::normalize(q)});
+        requireLevelSet(*liquid);
+    }
+}
+
+TEST_CASE("a cavity stays empty") {
+    Mesh inner = shapes::sphere(0.3f, 4);
+    for (auto& t : inner.triangles) std::swap(t.y, t.z);
+    const LevelSet shell = fieldOf(shapes::join({shapes::sphere(0.5f, 4), inner}), 0.02f);
+    const auto liquid = emptyLiquid(0.03f);
+    fluid::seed(*liquid, shell, poseOf(1));
+    requireLevelSet(*liquid);
+    CHECK(volume(*liquid) == Approx(ball * (1 - 0.216)).epsilon(0.05));
+}
+
+TEST_CASE("subtract and intersect") {
+    const LevelSet field = fieldOf(shapes::sphere(0.5f, 5), 0.02f);
+    const auto liquid = openvdb::tools::createLevelSetSphere<FloatGrid>(0.5f, openvdb::Vec3f(0.5f, 0, 0), 0.025f, 3);
+    const double whole = volume(*liquid), lens = ball * 5 / 16;  // of unit spheres whose centres lie one radius apart
+    SECTION("subtract") {
+        fluid::seed(*liquid, field, {}, fluid::SeedMode::subtract);
+        requireLevelSet(*liquid);
+        CHECK(volume(*liquid) == Approx(whole - lens).epsilon(0.05));
+    }
+    SECTION("intersect") {
+        fluid::seed(*liquid, field, {}, fluid::SeedMode::intersect);
+        requireLevelSet(*liquid);
+        CHECK(volume(*liquid) == Approx(lens).epsilon(0.08));
+    }
+    SECTION("intersect with what is far away leaves nothing") {
+        fluid::seed(*liquid, field, {glm::vec3(9, 0, 0)}, fluid::SeedMode::intersect);
+        CHECK(openvdb::tools::checkLevelSet(*liquid) == "");
+        CHECK(liquid->activeVoxelCount() == 0);
+    }
+}
+
+TEST_CASE("a half width that floats cannot hold is still three voxels") {
+    for (const float voxel : {0.7f, 0.1f, 0.3f, 0.0123f}) {
+        const auto liquid = emptyLiquid(voxel);
+        fluid::seed(*liquid, fieldOf(shapes::sphere(10 * voxel, 4), voxel));
+        requireLevelSet(*liquid);
+    }
+}
+
+TEST_CASE("bad input throws and changes nothing") {
+    const LevelSet field = fieldOf(shapes::sphere(0.5f, 3), 0.05f);
+    const float nan = std::numeric_limits<float>::quiet_NaN();
+    const auto refused = [&](const FloatGrid::Ptr& liquid, const Pose& pose = {}) {
+        const auto tree = liquid->treePtr();
+        const auto before = liquid->deepCopy();
+        CHECK_THROWS_AS(fluid::seed(*liquid, field, pose), std::invalid_argument);
+        CHECK(liquid->treePtr() == tree);
+        CHECK(liquid->activeVoxelCount() == before->activeVoxelCount());
+        for (auto voxel = before->cbeginValueOn(); voxel; ++voxel)
+            if (const float now = liquid->tree().getValue(voxel.getCoord()); now == now) REQUIRE(now == *voxel);
+    };
+    const auto sphere = [] {
+        return openvdb::tools::createLevelSetSphere<FloatGrid>(0.5f, openvdb::Vec3f(0), 0.05f, 3);
+    };
+    auto fog = sphere();
+    fog->setGridClass(openvdb::GRID_FOG_VOLUME);
+    refused(fog);
+    auto stretched = sphere();
+    stretched->transform().preScale(openvdb::Vec3d(1, 2, 1));
+    refused(stretched);
+    refused(openvdb::tools::createLevelSetSphere<FloatGrid>(0.5f, openvdb::Vec3f(0), 0.05f, 2));
+    auto poisoned = sphere();
+    poisoned->tree().setValueOn(openvdb::Coord(10, 0, 0), nan);
+    refused(poisoned);
+    refused(sphere(), {glm::vec3(nan, 0, 0)});
+    refused(sphere(), {glm::vec3(std::numeric_limits<float>::infinity(), 0, 0)});
+    refused(sphere(), {glm::vec3(1e30f, 0, 0)});
+    refused(sphere(), {glm::vec3(0), glm::quat(2, 0, 0, 0)});
+    refused(sphere(), {glm::vec3(0), glm::quat(0, 0, 0, 0)});
+    refused(sphere(), {glm::vec3(0), glm::quat(1, nan, 0, 0)});
+    refused(emptyLiquid(1e-9f));
+}

@@ -1,0 +1,143 @@
+// `bilayer` on input that it must refuse: status 1 and one line that names the culprit, or status 2.
+#include <catch2/catch.hpp>
+#include <chrono>
+#include <fstream>
+
+#include "tests/support/support.h"
+#include "tests/tools/program.h"
+
+using namespace bilayer::test;
+
+namespace {
+
+// Status 1, one line on stderr with `culprit` in it, nothing on stdout.
+void requireFault(const Words& words, const std::string& culprit, const Surroundings& surroundings = {}) {
+    std::string command;
+    for (const std::string& word : words) command += word + " ";
+    const Result r = run(words, surroundings);
+    INFO(command << "\n" << r.err);
+    CHECK(r.status == 1);
+    CHECK(r.errorLines() == 1);
+    CHECK(r.err.find(culprit) != std::string::npos);
+    CHECK(r.out.empty());
+}
+
+void requireUsage(const Words& words) {
+    std::string command;
+    for (const std::string& word : words) command += word + " ";
+    const Result r = run(words);
+    INFO(command << "\n" << r.err);
+    CHECK(r.status == 2);
+    CHECK_FALSE(r.err.empty());
+    CHECK(r.out.empty());
+}
+
+std::string output() {
+    return scratch("refused.vdb").string();
+}
+
+Words buildOf(const std::filesystem::path& mesh, Words options = {"--voxel-size", "0.1"}) {
+    Words words{"build", mesh.string(), "-o", output()};
+    words.insert(words.end(), options.begin(), options.end());
+    return words;
+}
+
+std::filesystem::path cut(const std::filesystem::path& path, const std::string& name, double part) {
+    const std::filesystem::path copy = scratch(name);
+    std::filesystem::copy_file(path, copy, std::filesystem::copy_options::overwrite_existing);
+    std::filesystem::resize_file(copy, std::uintmax_t(part * double(std::filesystem::file_size(copy))));
+    return copy;
+}
+
+}  // namespace
+
+TEST_CASE("meshes that cannot be read") {
+    requireFault(buildOf(scratch("absent.obj")), "absent.obj");
+    requireFault({"inspect", scratch("absent.obj").string()}, "absent.obj");
+    requireFault(buildOf(scratch("")), scratch("").string());
+    requireFault(buildOf(textFile("empty.obj", "")), "empty.obj");
+    requireFault(buildOf(textFile("points.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\n")), "points.obj");
+    requireFault(buildOf(textFile("noise.ply", "ply\nformat nonsense\n")), "noise.ply");
+    requireFault(buildOf(textFile("unknown.xyz", "1 2 3\n")), "unknown.xyz");
+    requireFault(buildOf(cut(sphereFile(), "cut.ply", 0.6)), "cut.ply");
+    requireFault(buildOf(textFile("nan.obj", "v 0 0 0\nv nan 0 0\nv 0 1 0\nf 1 2 3\n")), "nan.obj");
+    requireFault(buildOf(textFile("range.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 7\n")), "range.off");
+    CHECK_FALSE(std::filesystem::exists(output()));
+}
+
+TEST_CASE("fields that cannot be read") {
+    const std::string field = scratch("whole.vdb").string();
+    REQUIRE(run({"build", sphereFile().string(), "-o", field, "--voxel-size", "0.1"}).status == 0);
+    for (const double part : {0.0, 0.001, 0.3, 0.9, 0.999}) {
+        const std::string broken = cut(field, "cut.vdb", part).string();
+        requireFault({"info", broken}, "cut.vdb");
+        requireFault({"query", broken}, "cut.vdb");
+        requireFault({"surface", broken, "-o", scratch("cut.obj").string()}, "cut.vdb");
+        requireFault({"seed", broken, "-o", output()}, "cut.vdb");
+    }
+    requireFault({"info", scratch("absent.vdb").string()}, "absent.vdb");
+    requireFault({"info", textFile("text.vdb", "not a grid").string()}, "text.vdb");
+    requireFault({"query", field}, "line 2", {.input = "0 0 0\n0 0 zero\n"});
+    CHECK_FALSE(std::filesystem::exists(scratch("cut.obj")));
+    CHECK_FALSE(std::filesystem::exists(output()));
+}
+
+TEST_CASE("points that cannot be parsed") {
+    const std::string field = scratch("points.vdb").string();
+    REQUIRE(run({"build", sphereFile().string(), "-o", field, "--voxel-size", "0.1"}).status == 0);
+    for (const char* line :
+         {"", "1 2", "1 2 3 4", "1,2,3", "1 2 nan", "1 2 inf", "1 2 1e99", "a b c", "1 2 3x", "0x1 0 0"})
+        requireFault({"query", field}, "line 1", {.input = std::string(line) + "\n"});
+}
+
+TEST_CASE("voxel sizes that no machine can serve are refused at once") {
+    const auto start = std::chrono::steady_clock::now();
+    for (const char* size : {"1e-9", "1e-12", "1e-30"})
+        requireFault(buildOf(sphereFile(), {"--voxel-size", size}), "voxel");
+    requireFault(buildOf(sphereFile(), {"--resolution", "1e9"}), "voxel");
+    requireFault({"seed", sphereFile().string(), "-o", output(), "--voxel-size", "1e-9"}, "voxel");
+    CHECK(std::chrono::steady_clock::now() - start < std::chrono::seconds(30));
+    CHECK_FALSE(std::filesystem::exists(output()));
+}
+
+TEST_CASE("what this version does not have") {
+    for (const char* method : {"exact", "pseudonormal", "prism"})
+        requireFault(buildOf(sphereFile(), {"--voxel-size", "0.1", "--method", method}),
+                     std::string("--method ") + method + ": not in this version");
+    for (const char* sign : {"normals", "winding", "flood"})
+        requireFault(buildOf(sphereFile(), {"--voxel-size", "0.1", "--sign", sign}),
+                     std::string("--sign ") + sign + ": not in this version");
+}
+
+TEST_CASE("devices that are not there") {
+    requireFault(buildOf(sphereFile(), {"--voxel-size", "0.1", "--backend", "opencl", "--device", "no such device"}),
+                 "no such device");
+}
+
+TEST_CASE("wrong usage") {
+    const std::string mesh = sphereFile().string();
+    requireUsage({});
+    requireUsage({"unknown"});
+    requireUsage({"build"});
+    requireUsage({"build", mesh, "--voxel-size", "0.1"});
+    requireUsage(buildOf(mesh, {}));
+    requireUsage(buildOf(mesh, {"--voxel-size", "0.1", "--resolution", "10"}));
+    for (const char* size : {"0", "-1", "nan", "inf", "wide"}) requireUsage(buildOf(mesh, {"--voxel-size", size}));
+    for (const char* count : {"0", "-3", "nan"}) requireUsage(buildOf(mesh, {"--resolution", count}));
+    for (const Words& options :
+         {Words{"--nonsense"}, Words{"--method", "magic"}, Words{"--sign", "magic"}, Words{"--backend", "cuda"},
+          Words{"--device", "x"}, Words{"--device-memory", "100"}, Words{"--threads", "0"}, Words{"--half-width", "0"},
+          Words{"--exterior-width", "3"}, Words{"--half-width", "3", "--exterior-width", "3", "--interior-width", "3"},
+          Words{"--delta", "0"}, Words{"--epsilon", "-1"}, Words{"--neighbourhood", "0"},
+          Words{"--max-subdivision", "0"}}) {
+        Words words = buildOf(mesh);
+        words.insert(words.end(), options.begin(), options.end());
+        requireUsage(words);
+    }
+    requireUsage({"build", mesh, "-o", mesh, "--voxel-size", "0.1"});
+    requireUsage({"surface", "a.vdb", "-o", "a.xyz"});
+    requireUsage({"seed", mesh, "-o", output()});
+    requireUsage({"seed", mesh, "-o", output(), "--voxel-size", "0.1", "--rotate", "0", "0", "0", "1"});
+    requireUsage({"seed", mesh, "-o", output(), "--voxel-size", "0.1", "--seed", "1"});
+    CHECK_FALSE(std::filesystem::exists(output()));
+}

@@ -1,0 +1,224 @@
+// Every command of `bilayer` on input that it must take.
+#include <openvdb/openvdb.h>
+
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <sstream>
+
+#include "demos/shared/shapes.h"
+#include "sdf/grids.h"
+#include "sdf/mesh_io.h"
+#include "sdf/vdb_io.h"
+#include "tests/support/support.h"
+#include "tests/tools/program.h"
+
+using namespace bilayer;
+using namespace bilayer::test;
+
+namespace {
+
+// A field of the sphere at 0.05, built once.
+std::string fieldFile() {
+    const std::string path = scratch("sphere.vdb").string();
+    if (!std::filesystem::exists(path)) {
+        const Result r = run({"build", sphereFile().string(), "-o", path, "--voxel-size", "0.05"});
+        INFO(r.err);
+        REQUIRE(r.status == 0);
+    }
+    return path;
+}
+
+nlohmann::json build(const std::string& output, const Words& options) {
+    Words words{"build", sphereFile().string(), "-o", output, "--json"};
+    words.insert(words.end(), options.begin(), options.end());
+    const Result r = run(words);
+    INFO(r.err);
+    REQUIRE(r.status == 0);
+    CHECK(r.err.empty());
+    return r.json();
+}
+
+}  // namespace
+
+TEST_CASE("help and version") {
+    CHECK(run({"--help"}).status == 0);
+    CHECK(run({"--version"}).out.rfind("bilayer 0.", 0) == 0);
+    for (const char* command : {"build", "inspect", "info", "query", "surface", "seed", "devices"}) {
+        const Result r = run({command, "--help"});
+        CHECK(r.status == 0);
+        CHECK_FALSE(r.out.empty());
+    }
+}
+
+TEST_CASE("build reports what the file then holds") {
+    const std::string output = scratch("report.vdb").string();
+    const auto json = build(output, {"--voxel-size", "0.05"});
+    const LevelSet field = readVdb(output);
+    CHECK(json["triangles"] == 1280);
+    CHECK(json["voxelSize"] == 0.05);
+    CHECK(json["activeVoxels"] == field.activeVoxels());
+    CHECK(json["leaves"] == field.leaves());
+    CHECK(json["method"] == "double-layer");
+    CHECK(json["backend"] == "tbb");
+    CHECK(json["device"].is_string());
+    CHECK(json["sign"] == "layers");
+    for (const char* part : {"read", "build", "write"}) CHECK(json["seconds"][part].get<double>() >= 0);
+    CHECK(json["seconds"]["parts"].is_object());
+    CHECK(json["mesh"]["closed"] == true);
+    CHECK(json["mesh"]["wall"] == 0.05);
+    CHECK(json["peakRssBytes"].get<std::uint64_t>() > 1'000'000);
+    CHECK(field.voxelSize() == 0.05f);
+    CHECK(field.exteriorWidth() == Approx(0.15f));
+}
+
+TEST_CASE("build --resolution counts voxels along the longest side") {
+    const auto json = build(scratch("resolution.vdb").string(), {"--resolution", "20"});
+    CHECK(json["voxelSize"].get<double>() == Approx(1.0 / 20).epsilon(0.01));
+}
+
+TEST_CASE("every option of build has an effect") {
+    const std::string output = scratch("options.vdb").string();
+    const Words size{"--voxel-size", "0.05"};
+    const auto with = [&](Words options) {
+        options.insert(options.begin(), size.begin(), size.end());
+        return build(output, options);
+    };
+    const auto plain = with({});
+    CHECK(with({"--half-width", "2"})["activeVoxels"] < plain["activeVoxels"]);
+    const auto wide = with({"--exterior-width", "5", "--interior-width", "1"});
+    CHECK(wide["exteriorWidth"].get<double>() == Approx(5));
+    CHECK(wide["interiorWidth"].get<double>() == Approx(1));
+    CHECK(with({"--fill"})["activeVoxels"] > plain["activeVoxels"]);
+    CHECK(with({"--triangles"})["memoryBytes"] > plain["memoryBytes"]);
+    CHECK(readVdb(output).grids().triangle);
+
+    const auto phi = [&](const Words& options) {
+        with(options);
+        return readVdb(output).grids().distance->deepCopy();
+    };
+    const auto values = [](const openvdb::FloatGrid& grid) {
+        std::vector<float> all;
+        for (auto voxel = grid.cbeginValueOn(); voxel; ++voxel) all.push_back(*voxel);
+        return all;
+    };
+    const auto reference = values(*phi({}));
+    CHECK(values(*phi({"--threads", "1"})) == reference);
+    CHECK(values(*phi({"--delta", "0.25"})) != reference);
+    CHECK(values(*phi({"--epsilon", "0.1"})) != reference);
+    CHECK(values(*phi({"--method", "double-layer", "--sign", "auto", "--backend", "tbb"})) == reference);
+    phi({});
+    const auto full = std::filesystem::file_size(output);
+    phi({"--half-float"});
+    CHECK(std::filesystem::file_size(output) < full);
+}
+
+TEST_CASE("inspect tells of holes") {
+    Mesh open = shapes::sphere(1, 2);
+    open.triangles.pop_back();
+    const auto path = scratch("open.obj");
+    writeMesh(path, open);
+    const Result r = run({"inspect", path.string(), "--json"});
+    REQUIRE(r.status == 0);
+    CHECK(r.json()["boundaryEdges"] == 3);
+    CHECK(r.json()["closed"] == false);
+    CHECK(r.json()["triangles"] == 319);
+    CHECK(run({"inspect", path.string()}).out.find("3 boundary edges") != std::string::npos);
+}
+
+TEST_CASE("info tells what is in a file") {
+    const Result r = run({"info", fieldFile(), "--json"});
+    INFO(r.err);
+    REQUIRE(r.status == 0);
+    const auto json = r.json();
+    const LevelSet field = readVdb(fieldFile());
+    CHECK(json["grids"][0]["name"] == "distance");
+    CHECK(json["grids"][0]["class"] == "level set");
+    CHECK(json["activeVoxels"] == field.activeVoxels());
+    CHECK(json["exteriorWidth"].get<double>() == Approx(3));
+    CHECK(json["method"] == "double-layer");
+    CHECK(json["bounds"]["lower"][0].get<double>() == Approx(-0.6).margin(0.06));
+    CHECK(json["meshHash"].get<std::string>().size() == 16);
+    CHECK(run({"info", fieldFile()}).status == 0);
+}
+
+TEST_CASE("query answers line by line") {
+    const Result r = run({"query", fieldFile()}, {.input = "0.55 0 0\n 0\t-0.45 +0\r\n0 0 0\n9 9 9"});
+    INFO(r.err);
+    REQUIRE(r.status == 0);
+    std::istringstream lines(r.out);
+    double d[4], x[4], y[4], z[4];
+    int band[4];
+    for (int i = 0; i < 4; ++i) REQUIRE(lines >> d[i] >> x[i] >> y[i] >> z[i] >> band[i]);
+    CHECK(d[0] == Approx(0.05).margin(0.015));
+    CHECK(x[0] == Approx(1).margin(0.15));
+    CHECK(d[1] == Approx(-0.05).margin(0.015));
+    CHECK(y[1] == Approx(-1).margin(0.15));
+    CHECK(band[0] == 1);
+    CHECK(band[1] == 1);
+    CHECK((d[2] < 0 && band[2] == 0));
+    CHECK((d[3] > 0 && band[3] == 0 && x[3] == 0));
+}
+
+TEST_CASE("surface gives the sphere back") {
+    for (const char* name : {"surface.ply", "surface.obj", "surface.stl"}) {
+        const std::string output = scratch(name).string();
+        const Result r = run({"surface", fieldFile(), "-o", output});
+        INFO(r.err);
+        REQUIRE(r.status == 0);
+        float far = 0;
+        for (const glm::vec3& p : readMesh(output).points) far = std::max(far, std::abs(glm::length(p) - 0.5f));
+        CHECK(far < 0.02f);
+    }
+    const std::string output = scratch("offset.ply").string();
+    REQUIRE(run({"surface", fieldFile(), "-o", output, "--isovalue", "0.1", "--adaptivity", "0.5"}).status == 0);
+    CHECK(bounds(readMesh(output)).longestSide() == Approx(1.2f).margin(0.04f));
+}
+
+TEST_CASE("seed unites inputs, moves them, and adds particles") {
+    const std::string output = scratch("liquid.vdb").string(), mesh = sphereFile().string();
+    const double ball = 4.0 / 3.0 * 3.14159265 * 0.125;
+    const auto seeded = [&](Words words) {
+        words.insert(words.begin(), "seed");
+        words.insert(words.end(), {"-o", output, "--json"});
+        const Result r = run(words);
+        INFO(r.err);
+        REQUIRE(r.status == 0);
+        return r.json();
+    };
+    CHECK(seeded({mesh, "--voxel-size", "0.05"})["volume"].get<double>() == Approx(ball).epsilon(0.05));
+    const auto moved = seeded({fieldFile(), "--into", output, "--translate", "3", "0", "0", "--rotate", "0", "0", "1",
+                               "0.5", "--particles", "4", "--seed", "7"});
+    CHECK(moved["volume"].get<double>() == Approx(2 * ball).epsilon(0.05));
+    const double perVoxel = moved["particles"].get<double>() * 0.05 * 0.05 * 0.05 / (2 * ball);
+    CHECK(perVoxel == Approx(4).epsilon(0.05));
+    const auto info = run({"info", output, "--json"}).json();
+    CHECK(info["grids"].size() == 2);
+    CHECK(info["levelSetCheck"] == "");
+    CHECK(seeded({fieldFile(), "--into", output, "--mode", "subtract"})["volume"].get<double>() ==
+          Approx(ball).epsilon(0.05));
+    CHECK(seeded({fieldFile(), mesh})["volume"].get<double>() == Approx(ball).epsilon(0.05));
+    CHECK(seeded({mesh, "--resolution", "10", "--half-width", "4"})["halfWidth"].get<double>() == Approx(4));
+}
+
+TEST_CASE("devices may be none") {
+    CHECK(run({"devices", "--json"}).json()["devices"].is_array());
+    CHECK(run({"devices"}).status == 0);
+    const Result none = run({"devices"}, {.variables = {"OCL_ICD_VENDORS=/nonexistent"}});
+    CHECK(none.status == 0);
+    CHECK(none.out == "no OpenCL device\n");
+}
+
+TEST_CASE("build on an OpenCL device gives the same voxels") {
+    const auto devices = run({"devices", "--json"}).json()["devices"];
+    if (devices.empty()) {
+        WARN("skipped: there is no OpenCL device");
+        return;
+    }
+    const auto tbb = build(scratch("tbb.vdb").string(), {"--voxel-size", "0.05"});
+    const auto cl = build(scratch("cl.vdb").string(), {"--voxel-size", "0.05", "--backend", "opencl", "--device",
+                                                       devices[0]["name"], "--device-memory", "512"});
+    CHECK(cl["backend"] == "opencl");
+    CHECK(cl["device"] == devices[0]["name"]);
+    CHECK(cl["activeVoxels"] == tbb["activeVoxels"]);
+}

@@ -1,0 +1,90 @@
+#include "tests/tools/program.h"
+
+#include <fcntl.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <fstream>
+#include <iterator>
+#include <stdexcept>
+
+#include "demos/shared/shapes.h"
+#include "sdf/mesh_io.h"
+#include "tests/support/support.h"
+
+namespace bilayer::test {
+namespace {
+
+std::string contents(const std::filesystem::path& path) {
+    std::ifstream stream(path, std::ios::binary);
+    return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+void redirect(const std::string& path, int flags, int target) {
+    const int file = ::open(path.c_str(), flags, 0600);
+    if (file < 0 || ::dup2(file, target) < 0) ::_exit(126);
+    ::close(file);
+}
+
+pid_t launch(const Words& arguments, const Surroundings& s, const std::string& in, const std::string& out,
+             const std::string& err) {
+    std::vector<char*> words{const_cast<char*>(BILAYER_PROGRAM)};
+    for (const std::string& word : arguments) words.push_back(const_cast<char*>(word.c_str()));
+    words.push_back(nullptr);
+    const pid_t process = ::fork();
+    if (process < 0) throw std::runtime_error("fork failed");
+    if (process > 0) return process;
+    redirect(in, O_RDONLY, STDIN_FILENO);
+    redirect(out, O_WRONLY | O_CREAT | O_TRUNC, STDOUT_FILENO);
+    redirect(err, O_WRONLY | O_CREAT | O_TRUNC, STDERR_FILENO);
+    for (const std::string& variable : s.variables) ::putenv(const_cast<char*>(variable.c_str()));
+    if (s.fileSizeLimit >= 0) {
+        const rlimit limit{rlim_t(s.fileSizeLimit), rlim_t(s.fileSizeLimit)};
+        ::setrlimit(RLIMIT_FSIZE, &limit);
+    }
+    ::execv(words[0], words.data());
+    ::_exit(127);
+}
+
+}  // namespace
+
+std::size_t Result::errorLines() const {
+    return std::size_t(std::count(err.begin(), err.end(), '\n'));
+}
+
+Result run(const Words& arguments, const Surroundings& surroundings) {
+    const std::string in = textFile("stdin", surroundings.input).string();
+    const std::string out = surroundings.output.empty() ? scratch("stdout").string() : surroundings.output;
+    const std::string err = scratch("stderr").string();
+    Result result;
+    result.status = wait(launch(arguments, surroundings, in, out, err));
+    if (surroundings.output.empty()) result.out = contents(out);
+    result.err = contents(err);
+    return result;
+}
+
+pid_t start(const Words& arguments) {
+    return launch(arguments, {}, "/dev/null", "/dev/null", "/dev/null");
+}
+
+int wait(pid_t process) {
+    int status = 0;
+    ::waitpid(process, &status, 0);
+    return WIFSIGNALED(status) ? 128 + WTERMSIG(status) : WEXITSTATUS(status);
+}
+
+std::filesystem::path sphereFile(const std::string& name, int levels) {
+    const std::filesystem::path path = scratch(name);
+    if (!std::filesystem::exists(path)) writeMesh(path, shapes::sphere(0.5f, levels));
+    return path;
+}
+
+std::filesystem::path textFile(const std::string& name, const std::string& text) {
+    const std::filesystem::path path = scratch(name);
+    std::ofstream(path, std::ios::binary) << text;
+    return path;
+}
+
+}  // namespace bilayer::test

@@ -1,0 +1,45 @@
+// Runs the built `bilayer` as a child process.
+#pragma once
+
+#include <sys/types.h>
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+namespace bilayer::test {
+
+struct Result {
+    int status = -1;  ///< exit status, or 128 plus the signal
+    std::string out, err;
+
+    nlohmann::json json() const { return nlohmann::json::parse(out); }
+    std::size_t errorLines() const;
+};
+
+struct Surroundings {
+    std::string input;                   ///< for its standard input
+    long fileSizeLimit = -1;             ///< RLIMIT_FSIZE [bytes]
+    std::string output;                  ///< a path for its standard output instead of Result::out
+    std::vector<std::string> variables;  ///< "NAME=value"
+};
+
+using Words = std::vector<std::string>;
+
+/// Runs it to its end.
+Result run(const Words& arguments, const Surroundings& surroundings = {});
+
+/// Starts it and returns its process; its output goes to /dev/null.
+pid_t start(const Words& arguments);
+
+/// Waits for a process; exit status, or 128 plus the signal.
+int wait(pid_t process);
+
+/// A sphere of radius 0.5 as a mesh file of its own.
+std::filesystem::path sphereFile(const std::string& name = "sphere.ply", int levels = 3);
+
+/// A text file in the scratch folder.
+std::filesystem::path textFile(const std::string& name, const std::string& text);
+
+}  // namespace bilayer::test

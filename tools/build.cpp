@@ -1,0 +1,207 @@
+// `bilayer build`: a mesh file becomes a .vdb file.
+#include <fmt/format.h>
+#include <tbb/global_control.h>
+
+#include <memory>
+#include <optional>
+#include <stdexcept>
+
+#include "cl/device.h"
+#include "cl/filler.h"
+#include "integration/fluid/fill.h"
+#include "sdf/build.h"
+#include "sdf/double_layer.h"
+#include "sdf/mesh_io.h"
+#include "sdf/vdb_io.h"
+#include "tools/commands.h"
+#include "tools/output.h"
+
+namespace bilayer::tools {
+namespace {
+
+// Words of the contract; those that this version lacks are answered by name.
+constexpr const char* methodHere = "double-layer";
+const std::vector<std::string> methods{"exact", methodHere, "pseudonormal", "prism"};
+constexpr const char* signHere = "auto";
+const std::vector<std::string> signs{signHere, "normals", "winding", "flood"};
+constexpr const char* signByLayers = "layers";  // the layers sign the voxels near the surface, a flood those beyond
+
+struct Arguments {
+    std::filesystem::path mesh, output;
+    BuildOptions options;
+    float resolution = 0;
+    float halfWidth = 3;
+    std::string method = methodHere, backend = "tbb", sign = signHere, device;
+    std::uint64_t deviceMemory = 0;
+    bool fill = false, halfFloat = false, json = false;
+    CLI::Option *resolutionGiven = nullptr, *exteriorGiven = nullptr, *deviceGiven = nullptr, *memoryGiven = nullptr;
+};
+
+struct Outcome {
+    float wall = 0;
+    MeshReport report;
+    std::string device;
+    BuildTimes times;
+    double read = 0, inspect = 0, build = 0, fill = 0, write = 0;
+};
+
+void requireHere(const char* option, const std::string& word, const std::string& here) {
+    if (word != here) throw std::runtime_error(fmt::format("{} {}: not in this version", option, word));
+}
+
+void requireUsage(const Arguments& a) {
+    if (a.backend != "opencl" && (a.deviceGiven->count() || a.memoryGiven->count()))
+        throw CLI::ValidationError("--device and --device-memory", "need --backend opencl");
+    std::error_code absent;
+    if (std::filesystem::equivalent(a.mesh, a.output, absent))
+        throw CLI::ValidationError("--output", "would overwrite the mesh");
+}
+
+BlockFiller makeFiller(const Arguments& a) {
+    if (a.backend == "tbb") return tbbFiller();
+    return openclFiller(openDevice(a.device), {.memoryMiB = a.deviceMemory});
+}
+
+LevelSet timedBuild(const Mesh& mesh, const Arguments& a, Outcome& outcome) {
+    const BlockFiller filler = makeFiller(a);
+    outcome.device = a.backend == "tbb" ? fmt::format("processor ({})", simdName()) : filler.device;
+    ProgressBar bar("building");
+    BuildOptions options = a.options;
+    options.progress = bar.callback();
+    const Stopwatch watch;
+    LevelSet field = build(mesh, options, filler, &outcome.times);
+    outcome.build = watch.seconds();
+    return field;
+}
+
+void printJson(const Arguments& a, const Outcome& o, const LevelSet& field) {
+    print({{"mesh", toJson(o.report, o.wall)},
+           {"output", a.output.string()},
+           {"triangles", o.report.triangles},
+           {"voxelSize", number(field.voxelSize())},
+           {"exteriorWidth", number(field.exteriorWidth() / field.voxelSize())},
+           {"interiorWidth", number(field.interiorWidth() / field.voxelSize())},
+           {"activeVoxels", field.activeVoxels()},
+           {"leaves", field.leaves()},
+           {"memoryBytes", field.memoryBytes()},
+           {"method", a.method},
+           {"backend", a.backend},
+           {"device", o.device},
+           {"sign", signByLayers},
+           {"seconds",
+            {{"read", o.read},
+             {"inspect", o.inspect},
+             {"build", o.build},
+             {"parts", {{"tiles", o.times.tiles}, {"fill", o.times.fill}, {"assemble", o.times.assemble}}},
+             {"farFill", o.fill},
+             {"write", o.write}}},
+           {"peakRssBytes", peakMemory()}});
+}
+
+void printTable(const Arguments& a, const Outcome& o, const LevelSet& field) {
+    Table mesh(a.mesh.string());
+    addRows(mesh, o.report, o.wall);
+    mesh.print();
+    Table table(a.output.string());
+    addRows(table, field);
+    table.row("filled by", fmt::format("{} on {}", a.backend, o.device));
+    table.row("build", fmt::format("{:.3f} s: tiles {:.3f}, fill {:.3f}, assemble {:.3f}", o.build, o.times.tiles,
+                                   o.times.fill, o.times.assemble));
+    table.row("files", fmt::format("{:.3f} s to read, {:.3f} s to write", o.read, o.write));
+    table.row("peak memory", bytes(peakMemory()));
+    table.print();
+}
+
+void run(Arguments a) {
+    requireUsage(a);
+    requireHere("--method", a.method, methodHere);
+    requireHere("--sign", a.sign, signHere);
+    std::optional<tbb::global_control> threads;
+    if (a.options.threads > 0)
+        threads.emplace(tbb::global_control::max_allowed_parallelism, std::size_t(a.options.threads));
+
+    Outcome outcome;
+    const Stopwatch reading;
+    const Mesh mesh = readMesh(a.mesh);
+    outcome.read = reading.seconds();
+    requireWritable(a.output);
+    if (a.resolutionGiven->count()) a.options.voxelSize = voxelSizeFor(mesh, a.resolution);
+    if (!a.exteriorGiven->count()) a.options.exteriorWidth = a.options.interiorWidth = a.halfWidth;
+
+    LevelSet field = timedBuild(mesh, a, outcome);
+    if (a.fill) {
+        const Stopwatch filling;
+        field = fluid::fill(field);
+        outcome.fill = filling.seconds();
+    }
+    const Stopwatch inspecting;
+    outcome.wall = a.options.voxelSize;
+    outcome.report = inspect(mesh, outcome.wall);
+    outcome.inspect = inspecting.seconds();
+    const Stopwatch writing;
+    writeVdb(a.output, field, {.halfFloat = a.halfFloat});
+    outcome.write = writing.seconds();
+    a.json ? printJson(a, outcome, field) : printTable(a, outcome, field);
+}
+
+void addBand(CLI::App& command, Arguments& a) {
+    auto* size = command.add_option_group("voxel size", "exactly one of");
+    size->add_option("--voxel-size", a.options.voxelSize, "edge of a voxel in the mesh's unit")
+        ->check(CLI::PositiveNumber);
+    a.resolutionGiven = size->add_option("--resolution", a.resolution, "voxels along the longest side of the bounds")
+                            ->check(CLI::PositiveNumber);
+    size->require_option(1);
+    const CLI::Range widths(1e-3, 1e3);
+    auto* half =
+        command.add_option("--half-width", a.halfWidth, "band on either side of the surface [voxels], default 3")
+            ->check(widths);
+    a.exteriorGiven =
+        command.add_option("--exterior-width", a.options.exteriorWidth, "band outside [voxels]")->check(widths);
+    auto* interior =
+        command.add_option("--interior-width", a.options.interiorWidth, "band inside [voxels]")->check(widths);
+    a.exteriorGiven->needs(interior)->excludes(half);
+    interior->needs(a.exteriorGiven)->excludes(half);
+}
+
+void addMethod(CLI::App& command, Arguments& a) {
+    command.add_option("--method", a.method, "exact, double-layer, pseudonormal or prism")
+        ->check(CLI::IsMember(methods));
+    command.add_option("--sign", a.sign, "auto, normals, winding or flood")->check(CLI::IsMember(signs));
+    DoubleLayerOptions& layers = a.options.doubleLayer;
+    command.add_option("--delta", layers.delta, "distance of each layer from the surface [voxels], default 0.5")
+        ->check(CLI::Range(1e-3, 4.0));
+    command.add_option("--epsilon", layers.epsilon, "area that one sample stands for [voxels^2], default 1")
+        ->check(CLI::Range(1e-4, 1e4));
+    command.add_option("--neighbourhood", layers.neighbourhood, "voxels that a sample reaches at least, default 2")
+        ->check(CLI::Range(1, 64));
+    command
+        .add_option("--max-subdivision", layers.maxSubdivision, "rows of samples in a piece of a triangle, default 32")
+        ->check(CLI::Range(1, 1024));
+}
+
+void addMachine(CLI::App& command, Arguments& a) {
+    command.add_option("--backend", a.backend, "tbb (default) or opencl")->check(CLI::IsMember({"tbb", "opencl"}));
+    a.deviceGiven = command.add_option("--device", a.device, "part of an OpenCL device's or platform's name");
+    a.memoryGiven = command.add_option("--device-memory", a.deviceMemory, "most memory of the device to use [MiB]")
+                        ->check(CLI::Range(std::uint64_t(1), std::uint64_t(1) << 30));
+    command.add_option("--threads", a.options.threads, "most threads, default all")->check(CLI::Range(1, 4096));
+}
+
+}  // namespace
+
+void addBuild(CLI::App& app) {
+    auto* command = app.add_subcommand("build", "Build the field of a mesh");
+    const auto a = std::make_shared<Arguments>();
+    command->add_option("mesh", a->mesh, "OBJ, PLY, STL, OFF, glTF, ...")->required();
+    command->add_option("-o,--output", a->output, "the .vdb file")->required();
+    addBand(*command, *a);
+    addMethod(*command, *a);
+    addMachine(*command, *a);
+    command->add_flag("--triangles", a->options.triangles, "keep the nearest triangle of each voxel too");
+    command->add_flag("--fill", a->fill, "sweep distances into all voxels of the field's box");
+    command->add_flag("--half-float", a->halfFloat, "store 16-bit distances");
+    command->add_flag("--json", a->json, "print one JSON object");
+    command->callback([a] { run(*a); });
+}
+
+}  // namespace bilayer::tools

@@ -1,0 +1,102 @@
+// `bilayer query` and `surface`: what a field says, as numbers and as a mesh.
+#include <fmt/format.h>
+
+#include <charconv>
+#include <cmath>
+#include <iostream>
+#include <memory>
+#include <stdexcept>
+#include <string>
+
+#include "collider/field.h"
+#include "sdf/mesh_io.h"
+#include "sdf/surface.h"
+#include "sdf/vdb_io.h"
+#include "tools/commands.h"
+#include "tools/output.h"
+
+namespace bilayer::tools {
+namespace {
+
+constexpr const char* blanks = " \t\r";
+
+struct Arguments {
+    std::filesystem::path field, output;
+    SurfaceOptions options;
+};
+
+// Three finite numbers and nothing else. Locales and hexadecimal digits have no say.
+bool parsePoint(const std::string& line, glm::vec3& point) {
+    std::size_t at = 0;
+    for (int axis = 0; axis < 3; ++axis) {
+        at = line.find_first_not_of(blanks, at);
+        if (at == std::string::npos) return false;
+        at += line[at] == '+';
+        const char* end = line.data() + std::min(line.find_first_of(blanks, at), line.size());
+        const auto [stop, error] = std::from_chars(line.data() + at, end, point[axis]);
+        if (error != std::errc() || stop != end || !std::isfinite(point[axis])) return false;
+        at = std::size_t(end - line.data());
+    }
+    return line.find_first_not_of(blanks, at) == std::string::npos;
+}
+
+void runQuery(const Arguments& a) {
+    const Field field(readVdb(a.field));
+    std::ios::sync_with_stdio(false);
+    std::string line;
+    for (std::size_t count = 1;; ++count) {
+        // a program that asks and waits for the answer gets it; a long list is not slowed down by that
+        if (std::cin.rdbuf()->in_avail() <= 0) std::fflush(stdout);
+        if (!std::getline(std::cin, line)) break;
+        glm::vec3 point;
+        if (!parsePoint(line, point))
+            throw std::runtime_error(fmt::format("standard input, line {}: expected three numbers x y z", count));
+        const Sample s = field.sample(point);
+        fmt::print("{:.9g} {:.9g} {:.9g} {:.9g} {}\n", s.distance, s.gradient.x, s.gradient.y, s.gradient.z,
+                   int(s.inBand));
+    }
+}
+
+void runSurface(const Arguments& a) {
+    const LevelSet field = readVdb(a.field);
+    requireWritable(a.output);
+    const Mesh mesh = surface(field, a.options);
+    if (mesh.triangles.empty())
+        throw std::runtime_error(fmt::format("{}: no surface at {}", a.field.string(), metres(a.options.isovalue)));
+    writeMesh(a.output, mesh);
+    Table table(a.output.string());
+    table.row("points", grouped(mesh.points.size()));
+    table.row("triangles", grouped(mesh.triangles.size()));
+    table.print();
+}
+
+std::string requireMeshEnding(const std::string& path) {
+    const std::string ending = std::filesystem::path(path).extension().string();
+    return ending == ".ply" || ending == ".obj" || ending == ".stl" ? "" : "must end in .ply, .obj or .stl";
+}
+
+}  // namespace
+
+void addQuery(CLI::App& app) {
+    auto* command = app.add_subcommand(
+        "query",
+        "Read points x y z from standard input, a line each; print distance, gradient and whether in the band");
+    const auto a = std::make_shared<Arguments>();
+    command->add_option("field", a->field, "a .vdb file")->required();
+    command->callback([a] { runQuery(*a); });
+}
+
+void addSurface(CLI::App& app) {
+    auto* command = app.add_subcommand("surface", "Extract an isosurface as a mesh");
+    const auto a = std::make_shared<Arguments>();
+    command->add_option("field", a->field, "a .vdb file")->required();
+    command->add_option("-o,--output", a->output, "a .ply, .obj or .stl file")
+        ->required()
+        ->check(CLI::Validator(requireMeshEnding, "PATH"));
+    command->add_option("--isovalue", a->options.isovalue, "distance of the surface, default 0");
+    command->add_option("--adaptivity", a->options.adaptivity, "0 (default): uniform .. 1: fewest triangles")
+        ->check(CLI::Range(0.0, 1.0));
+    command->callback([a] { runSurface(*a); });
+}
+
+}  // namespace bilayer::tools

@@ -1,0 +1,61 @@
+// `bilayer`: fields from meshes on the command line. Status 0: done; 1: input or machine at fault, one line on stderr;
+// 2: wrong usage.
+#include <cerrno>
+#include <csignal>
+#include <cstdio>
+#include <new>
+#include <regex>
+#include <string>
+#include <system_error>
+
+#include "sdf/atomic_file.h"
+#include "tools/commands.h"
+
+namespace {
+
+enum Status { done = 0, fault = 1, usage = 2 };
+
+void setSignals() {
+    bilayer::removeAtomicFilesOnSignal();
+    // a reader that closes the pipe ends the command quietly, and a file above the size limit is an error like any
+    // other
+    std::signal(SIGPIPE, SIG_DFL);
+    std::signal(SIGXFSZ, SIG_IGN);
+}
+
+// Errors of devices and files may hold several lines; the contract is one.
+int complain(const std::string& message) {
+    std::fprintf(stderr, "bilayer: %s\n", std::regex_replace(message, std::regex("\\s*\n\\s*"), "; ").c_str());
+    return fault;
+}
+
+int flushOutput() {
+    if (std::fflush(stdout) == 0 && !std::ferror(stdout)) return done;
+    return complain("cannot write to standard output: " + std::generic_category().message(errno));
+}
+
+}  // namespace
+
+int main(int count, char** arguments) {
+    setSignals();
+    CLI::App app("Narrow-band signed distance fields from triangle meshes, in OpenVDB files.", "bilayer");
+    app.set_version_flag("--version", "bilayer " BILAYER_VERSION);
+    app.require_subcommand(1);
+    bilayer::tools::addBuild(app);
+    bilayer::tools::addInspect(app);
+    bilayer::tools::addInfo(app);
+    bilayer::tools::addQuery(app);
+    bilayer::tools::addSurface(app);
+    bilayer::tools::addSeed(app);
+    bilayer::tools::addDevices(app);
+    try {
+        app.parse(count, arguments);
+        return flushOutput();
+    } catch (const CLI::ParseError& error) {
+        return app.exit(error) == 0 ? flushOutput() : usage;
+    } catch (const std::bad_alloc&) {
+        return complain("out of memory");
+    } catch (const std::exception& error) {
+        return complain(error.what());
+    }
+}

@@ -1,0 +1,160 @@
+#include "tools/output.h"
+
+#include <fmt/format.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "sdf/atomic_file.h"
+
+namespace bilayer::tools {
+namespace {
+
+constexpr int barColumns = 40;  // characters of a full bar: fits a narrow terminal with its label
+constexpr const char* clearLine = "\r\033[K";
+
+Json vector(const glm::vec3& v) {
+    return Json::array({number(v.x), number(v.y), number(v.z)});
+}
+
+std::string holes(const MeshReport& report) {
+    return fmt::format("{} ({} boundary edges, {} non-manifold edges)", report.closed() ? "yes" : "no",
+                       grouped(report.boundaryEdges), grouped(report.nonManifoldEdges));
+}
+
+std::string orientation(const MeshReport& report) {
+    return fmt::format("{} ({} misoriented edges, {} inside-out components)", report.oriented() ? "yes" : "no",
+                       grouped(report.misorientedEdges), grouped(report.insideOutComponents));
+}
+
+}  // namespace
+
+void Table::print() const {
+    std::size_t width = 0;
+    for (const auto& [label, value] : rows_) width = std::max(width, label.size());
+    fmt::print("{}\n", title_);
+    for (const auto& [label, value] : rows_) fmt::print("  {:<{}}  {}\n", label, width, value);
+}
+
+void print(const Json& json) {
+    fmt::print("{}\n", json.dump(2, ' ', false, Json::error_handler_t::replace));
+}
+
+std::string grouped(std::uint64_t count) {
+    std::string digits = std::to_string(count);
+    for (auto at = std::ptrdiff_t(digits.size()) - 3; at > 0; at -= 3) digits.insert(std::size_t(at), ",");
+    return digits;
+}
+
+std::string metres(double length) {
+    return fmt::format("{:.6g} m", length);
+}
+
+std::string bytes(std::uint64_t count) {
+    const double kib = double(count) / 1024;
+    if (kib < 1024) return fmt::format("{:.1f} KiB", kib);
+    return kib < 1024 * 1024 ? fmt::format("{:.1f} MiB", kib / 1024) : fmt::format("{:.2f} GiB", kib / (1024 * 1024));
+}
+
+std::string hex(std::uint64_t hash) {
+    return fmt::format("{:016x}", hash);
+}
+
+Json number(float value) {
+    return std::isfinite(value) ? Json(std::stod(fmt::format("{}", value))) : Json();
+}
+
+Json box(const Bounds& bounds) {
+    return {{"lower", vector(bounds.lower)}, {"upper", vector(bounds.upper)}};
+}
+
+std::string boxText(const Bounds& bounds) {
+    const glm::vec3 &a = bounds.lower, &b = bounds.upper;
+    return fmt::format("{:.6g} {:.6g} {:.6g} .. {:.6g} {:.6g} {:.6g} m", a.x, a.y, a.z, b.x, b.y, b.z);
+}
+
+Json toJson(const MeshReport& report, float wall) {
+    return {{"points", report.points},
+            {"triangles", report.triangles},
+            {"components", report.components},
+            {"bounds", box(report.bounds)},
+            {"closed", report.closed()},
+            {"oriented", report.oriented()},
+            {"boundaryEdges", report.boundaryEdges},
+            {"nonManifoldEdges", report.nonManifoldEdges},
+            {"misorientedEdges", report.misorientedEdges},
+            {"degenerateTriangles", report.degenerateTriangles},
+            {"duplicateTriangles", report.duplicateTriangles},
+            {"insideOutComponents", report.insideOutComponents},
+            {"wall", number(wall)},
+            {"thinWalls", report.thinWalls},
+            {"thinnestWall", number(report.thinnestWall)},
+            {"area", report.area},
+            {"volume", report.volume}};
+}
+
+void addRows(Table& table, const MeshReport& report, float wall) {
+    table.row("points", grouped(report.points));
+    table.row("triangles", grouped(report.triangles));
+    table.row("components", grouped(report.components));
+    table.row("bounds", boxText(report.bounds));
+    table.row("closed", holes(report));
+    table.row("oriented", orientation(report));
+    table.row("degenerate triangles", grouped(report.degenerateTriangles));
+    table.row("duplicate triangles", grouped(report.duplicateTriangles));
+    if (report.thinnestWall > 0) table.row("thinnest wall", metres(report.thinnestWall));
+    if (wall > 0)
+        table.row("thin walls", fmt::format("{} triangles, below {}", grouped(report.thinWalls), metres(wall)));
+    table.row("area", fmt::format("{:.6g} m^2", report.area));
+    if (report.closed()) table.row("volume", fmt::format("{:.6g} m^3", report.volume));
+}
+
+void addRows(Table& table, const LevelSet& levelSet) {
+    const double size = levelSet.voxelSize();
+    table.row("voxel size", metres(size));
+    table.row("band", fmt::format("{:.6g} voxels outside, {:.6g} inside", levelSet.exteriorWidth() / size,
+                                  levelSet.interiorWidth() / size));
+    table.row("active voxels", grouped(levelSet.activeVoxels()));
+    table.row("leaves", grouped(levelSet.leaves()));
+    table.row("memory", bytes(levelSet.memoryBytes()));
+    if (!levelSet.method().empty()) table.row("method", levelSet.method());
+}
+
+ProgressBar::ProgressBar(std::string label) : label_(std::move(label)), visible_(::isatty(STDERR_FILENO)) {}
+
+ProgressBar::~ProgressBar() {
+    if (drawn_ >= 0) fmt::print(stderr, "{}", clearLine);
+}
+
+std::function<bool(float)> ProgressBar::callback() {
+    if (!visible_) return {};
+    return [this](float part) {
+        draw(part);
+        return true;
+    };
+}
+
+void ProgressBar::draw(float part) {
+    const int percent = int(100 * std::clamp(part, 0.0f, 1.0f));
+    if (percent == drawn_) return;
+    drawn_ = percent;
+    const std::size_t full = std::size_t(barColumns * percent / 100);
+    const std::string bar = std::string(full, '#') + std::string(barColumns - full, '.');
+    fmt::print(stderr, "{}{} [{}] {:3} %", clearLine, label_, bar, percent);
+    std::fflush(stderr);
+}
+
+void requireWritable(const std::filesystem::path& path) {
+    const AtomicFile probe(path);
+}
+
+std::uint64_t peakMemory() {
+    rusage usage = {};
+    ::getrusage(RUSAGE_SELF, &usage);
+    return std::uint64_t(usage.ru_maxrss) * 1024;
+}
+
+}  // namespace bilayer::tools

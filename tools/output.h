@@ -1,0 +1,84 @@
+// What the commands print: tables for people, JSON for programs, a progress bar on a terminal.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "sdf/inspect.h"
+#include "sdf/level_set.h"
+
+namespace bilayer::tools {
+
+using Json = nlohmann::ordered_json;
+
+/// Rows of a label and a value, printed in two columns.
+class Table {
+  public:
+    explicit Table(std::string title) : title_(std::move(title)) {}
+    void row(std::string label, std::string value) { rows_.emplace_back(std::move(label), std::move(value)); }
+    void print() const;
+
+  private:
+    std::string title_;
+    std::vector<std::pair<std::string, std::string>> rows_;
+};
+
+/// Prints one JSON object as the only thing on stdout.
+void print(const Json& json);
+
+std::string grouped(std::uint64_t count);   ///< 1234567 as "1,234,567"
+std::string metres(double length);          ///< six digits and the unit
+std::string bytes(std::uint64_t count);     ///< in KiB, MiB or GiB
+std::string hex(std::uint64_t hash);        ///< 16 digits
+Json number(float value);                   ///< with the digits that the float has, not those of its double
+Json box(const Bounds& bounds);             ///< {"lower": [x, y, z], "upper": [x, y, z]}
+std::string boxText(const Bounds& bounds);  ///< "x y z .. x y z m"
+
+/// A mesh's report. `wall` is the thickness that counted as thin [m]; 0: none did.
+Json toJson(const MeshReport& report, float wall);
+void addRows(Table& table, const MeshReport& report, float wall);
+
+/// Size, widths and method of a field.
+void addRows(Table& table, const LevelSet& levelSet);
+
+/// Seconds since its construction.
+class Stopwatch {
+  public:
+    double seconds() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
+
+  private:
+    std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+/// A bar on stderr while it lives, where stderr is a terminal.
+class ProgressBar {
+  public:
+    explicit ProgressBar(std::string label);
+    ~ProgressBar();
+    ProgressBar(const ProgressBar&) = delete;
+    ProgressBar& operator=(const ProgressBar&) = delete;
+
+    /// For BuildOptions::progress: null where nobody looks.
+    std::function<bool(float)> callback();
+
+  private:
+    void draw(float part);
+
+    std::string label_;
+    bool visible_;
+    int drawn_ = -1;
+};
+
+/// Throws std::runtime_error that names the path if a file could not be put there: asked before work that takes time.
+void requireWritable(const std::filesystem::path& path);
+
+/// The most memory that the process has had [bytes].
+std::uint64_t peakMemory();
+
+}  // namespace bilayer::tools

@@ -1,0 +1,148 @@
+// `bilayer inspect`, `info` and `devices`: commands that only look.
+#include <fmt/format.h>
+#include <openvdb/io/File.h>
+#include <openvdb/tools/Diagnostics.h>
+
+#include <memory>
+#include <stdexcept>
+
+#include "cl/device.h"
+#include "sdf/grids.h"
+#include "sdf/mesh_io.h"
+#include "sdf/vdb_io.h"
+#include "tools/commands.h"
+#include "tools/output.h"
+
+namespace bilayer::tools {
+namespace {
+
+struct Arguments {
+    std::filesystem::path input;
+    bool json = false;
+};
+
+std::shared_ptr<Arguments> addArguments(CLI::App& command, const char* name, const char* help) {
+    auto arguments = std::make_shared<Arguments>();
+    if (name) command.add_option(name, arguments->input, help)->required();
+    command.add_flag("--json", arguments->json, "print one JSON object");
+    return arguments;
+}
+
+void runInspect(const Arguments& a) {
+    const MeshReport report = inspect(readMesh(a.input));
+    if (a.json) return print(toJson(report, 0));
+    Table table(a.input.string());
+    addRows(table, report, 0);
+    table.print();
+}
+
+// What OpenVDB has to say about the grid as a level set: a remark, since a field may well have widths that differ.
+std::string remark(const LevelSet& field) {
+    const std::string text = openvdb::tools::checkLevelSet(*field.grids().distance);
+    return text.substr(0, text.find('\n'));
+}
+
+Bounds activeBounds(const LevelSet& field) {
+    const openvdb::FloatGrid& grid = *field.grids().distance;
+    const openvdb::CoordBBox box = grid.evalActiveVoxelBoundingBox();
+    const openvdb::Vec3d lower = grid.indexToWorld(box.min()), upper = grid.indexToWorld(box.max());
+    Bounds bounds;
+    bounds.add({float(lower.x()), float(lower.y()), float(lower.z())});
+    bounds.add({float(upper.x()), float(upper.y()), float(upper.z())});
+    return bounds;
+}
+
+Json gridList(const std::filesystem::path& path) {
+    openvdb::io::File file(path.string());
+    file.open(/*delayLoad=*/false);
+    Json list = Json::array();
+    for (const auto& grid : *file.readAllGridMetadata())
+        list.push_back({{"name", grid->getName()},
+                        {"type", grid->valueType()},
+                        {"class", openvdb::GridBase::gridClassToString(grid->getGridClass())},
+                        {"halfFloat", grid->saveFloatAsHalf()}});
+    return list;
+}
+
+void printInfo(const Arguments& a, const LevelSet& field, const Json& grids) {
+    Table table(a.input.string());
+    for (const Json& grid : grids)
+        table.row("grid",
+                  fmt::format("'{}': {}, {}{}", grid["name"].get<std::string>(), grid["type"].get<std::string>(),
+                              grid["class"].get<std::string>(), grid["halfFloat"] ? ", 16 bits" : ""));
+    addRows(table, field);
+    table.row("bounds", boxText(activeBounds(field)));
+    if (field.meshHash()) table.row("mesh hash", hex(field.meshHash()));
+    const std::string text = remark(field);
+    table.row("level-set check", text.empty() ? "passed" : text);
+    table.print();
+}
+
+void runInfo(const Arguments& a) {
+    const LevelSet field = readVdb(a.input);
+    const Json grids = gridList(a.input);
+    if (!a.json) return printInfo(a, field, grids);
+    print({{"grids", grids},
+           {"voxelSize", number(field.voxelSize())},
+           {"exteriorWidth", number(field.exteriorWidth() / field.voxelSize())},
+           {"interiorWidth", number(field.interiorWidth() / field.voxelSize())},
+           {"activeVoxels", field.activeVoxels()},
+           {"leaves", field.leaves()},
+           {"bounds", box(activeBounds(field))},
+           {"method", field.method()},
+           {"meshHash", hex(field.meshHash())},
+           {"memoryBytes", field.memoryBytes()},
+           {"levelSetCheck", remark(field)}});
+}
+
+Json toJson(const DeviceInfo& device) {
+    return {{"platform", device.platform},
+            {"name", device.name},
+            {"version", device.version},
+            {"driver", device.driver},
+            {"gpu", device.gpu},
+            {"computeUnits", device.computeUnits},
+            {"memoryBytes", device.memoryBytes},
+            {"maxAllocationBytes", device.maxAllocationBytes}};
+}
+
+void runDevices(const Arguments& a) {
+    const std::vector<DeviceInfo> found = devices();
+    if (a.json) {
+        Json list = Json::array();
+        for (const DeviceInfo& device : found) list.push_back(toJson(device));
+        return print({{"devices", list}});
+    }
+    if (found.empty()) fmt::print("no OpenCL device\n");
+    for (const DeviceInfo& device : found) {
+        Table table(device.name);
+        table.row("platform", fmt::format("{} ({})", device.platform, device.version));
+        table.row("driver", device.driver);
+        table.row("kind", fmt::format("{}, {} compute units", device.gpu ? "GPU" : "no GPU", device.computeUnits));
+        table.row("memory",
+                  fmt::format("{}, {} in one piece", bytes(device.memoryBytes), bytes(device.maxAllocationBytes)));
+        table.print();
+    }
+}
+
+}  // namespace
+
+void addInspect(CLI::App& app) {
+    auto* command = app.add_subcommand("inspect", "Count what is wrong with a mesh");
+    const auto a = addArguments(*command, "mesh", "OBJ, PLY, STL, OFF, glTF, ...");
+    command->callback([a] { runInspect(*a); });
+}
+
+void addInfo(CLI::App& app) {
+    auto* command = app.add_subcommand("info", "Tell what is in a .vdb file");
+    const auto a = addArguments(*command, "field", "a .vdb file");
+    command->callback([a] { runInfo(*a); });
+}
+
+void addDevices(CLI::App& app) {
+    auto* command = app.add_subcommand("devices", "List the OpenCL devices");
+    const auto a = addArguments(*command, nullptr, nullptr);
+    command->callback([a] { runDevices(*a); });
+}
+
+}  // namespace bilayer::tools

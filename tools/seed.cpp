@@ -1,0 +1,180 @@
+// `bilayer seed`: meshes and fields become one liquid level set, with marker particles if asked for.
+#include <fmt/format.h>
+#include <openvdb/io/Stream.h>
+#include <openvdb/points/PointCount.h>
+#include <openvdb/tools/LevelSetMeasure.h>
+
+#include <cmath>
+#include <fstream>
+#include <memory>
+#include <optional>
+#include <stdexcept>
+
+#include "integration/fluid/particles.h"
+#include "integration/fluid/seed.h"
+#include "sdf/atomic_file.h"
+#include "sdf/build.h"
+#include "sdf/grids.h"
+#include "sdf/mesh_io.h"
+#include "sdf/vdb_io.h"
+#include "tools/commands.h"
+#include "tools/output.h"
+
+namespace bilayer::tools {
+namespace {
+
+constexpr float spareWidth =
+    2;  // [voxels] a mesh's field beyond the liquid's band, so that a rotated one is sampled whole
+
+struct Arguments {
+    std::vector<std::filesystem::path> inputs;
+    std::filesystem::path output, into;
+    float voxelSize = 0, resolution = 0, halfWidth = 3;
+    std::vector<float> translate{0, 0, 0}, rotate{0, 0, 1, 0};
+    std::string mode = "unite";
+    fluid::ParticleOptions particles;
+    bool json = false;
+    CLI::Option* particlesGiven = nullptr;
+};
+
+struct Input {
+    std::optional<Mesh> mesh;  // built when the liquid's voxel size is known
+    std::optional<LevelSet> field;
+};
+
+bool isVdb(const std::filesystem::path& path) {
+    return path.extension() == ".vdb";
+}
+
+Pose makePose(const Arguments& a) {
+    const glm::vec3 axis(a.rotate[0], a.rotate[1], a.rotate[2]);
+    const float length = glm::length(axis);
+    if (!(length > 0) || !std::isfinite(length)) throw CLI::ValidationError("--rotate", "the axis has no direction");
+    return {glm::vec3(a.translate[0], a.translate[1], a.translate[2]), glm::angleAxis(a.rotate[3], axis / length)};
+}
+
+fluid::SeedMode makeMode(const std::string& word) {
+    if (word == "intersect") return fluid::SeedMode::intersect;
+    return word == "subtract" ? fluid::SeedMode::subtract : fluid::SeedMode::unite;
+}
+
+void requireUsage(const Arguments& a) {
+    if (!a.into.empty() || a.voxelSize > 0 || a.resolution > 0) {
+        if (a.resolution > 0 && isVdb(a.inputs.front()))
+            throw CLI::ValidationError("--resolution", "needs a mesh as the first input");
+        return;
+    }
+    if (!isVdb(a.inputs.front()))
+        throw CLI::ValidationError("seed", "a mesh needs one of --voxel-size, --resolution and --into");
+}
+
+Input read(const std::filesystem::path& path) {
+    if (isVdb(path)) return {std::nullopt, readVdb(path)};
+    return {readMesh(path), std::nullopt};
+}
+
+openvdb::FloatGrid::Ptr startingLiquid(const Arguments& a, const Input& first) {
+    openvdb::initialize();
+    if (!a.into.empty()) return readVdb(a.into).grids().distance->deepCopy();
+    float voxelSize = a.voxelSize;
+    if (a.resolution > 0) voxelSize = voxelSizeFor(*first.mesh, a.resolution);
+    if (!(voxelSize > 0)) voxelSize = first.field->voxelSize();
+    return openvdb::createLevelSet<openvdb::FloatGrid>(voxelSize, a.halfWidth);
+}
+
+void add(openvdb::FloatGrid& liquid, const Input& input, const Arguments& a, const Pose& pose) {
+    const float voxelSize = float(liquid.voxelSize()[0]);
+    const float width = std::ceil(liquid.background() / voxelSize) + spareWidth;
+    const LevelSet field =
+        input.field ? *input.field
+                    : build(*input.mesh, {.voxelSize = voxelSize, .exteriorWidth = width, .interiorWidth = width});
+    fluid::seed(liquid, field, pose, makeMode(a.mode));
+}
+
+void write(const std::filesystem::path& path, const openvdb::GridCPtrVec& grids) {
+    AtomicFile file(path);
+    try {
+        std::ofstream stream(file.temporary(), std::ios::binary);
+        stream.exceptions(std::ios::failbit | std::ios::badbit);
+        openvdb::io::Stream(stream).write(grids);
+        stream.close();
+    } catch (const std::exception&) {
+        throw std::runtime_error(fmt::format("{}: cannot be written (is the disk full?)", path.string()));
+    }
+    file.commit();
+}
+
+void report(const Arguments& a, const openvdb::FloatGrid& liquid, std::uint64_t particles, double seconds) {
+    const double volume = liquid.empty() ? 0 : openvdb::tools::levelSetVolume(liquid);
+    const float voxelSize = float(liquid.voxelSize()[0]);
+    if (a.json)
+        return print({{"output", a.output.string()},
+                      {"voxelSize", number(voxelSize)},
+                      {"halfWidth", number(liquid.background() / voxelSize)},
+                      {"activeVoxels", liquid.activeVoxelCount()},
+                      {"leaves", liquid.tree().leafCount()},
+                      {"volume", volume},
+                      {"particles", particles},
+                      {"seconds", seconds}});
+    Table table(a.output.string());
+    table.row("voxel size", metres(voxelSize));
+    table.row("active voxels", grouped(liquid.activeVoxelCount()));
+    table.row("volume", fmt::format("{:.6g} m^3", volume));
+    if (a.particlesGiven->count()) table.row("particles", grouped(particles));
+    table.row("time", fmt::format("{:.3f} s", seconds));
+    table.print();
+}
+
+void run(const Arguments& a) {
+    requireUsage(a);
+    const Pose pose = makePose(a);
+    const Stopwatch watch;
+    std::vector<Input> inputs;
+    for (const auto& path : a.inputs) inputs.push_back(read(path));
+    requireWritable(a.output);
+
+    const openvdb::FloatGrid::Ptr liquid = startingLiquid(a, inputs.front());
+    liquid->setName("liquid");
+    for (const Input& input : inputs) add(*liquid, input, a, pose);
+    openvdb::GridCPtrVec grids{liquid};
+    std::uint64_t count = 0;
+    if (a.particlesGiven->count()) {
+        const auto points = fluid::particleGrid(*liquid, a.particles);
+        count = openvdb::points::pointCount(points->tree());
+        grids.push_back(points);
+    }
+    write(a.output, grids);
+    report(a, *liquid, count, watch.seconds());
+}
+
+}  // namespace
+
+void addSeed(CLI::App& app) {
+    auto* command = app.add_subcommand("seed", "Unite meshes and fields into the level set of a liquid");
+    const auto a = std::make_shared<Arguments>();
+    command->add_option("inputs", a->inputs, "meshes and .vdb fields")->required();
+    command->add_option("-o,--output", a->output, "the .vdb file")->required();
+    auto* into = command->add_option("--into", a->into, "a liquid to start from, instead of an empty one");
+    auto* size =
+        command->add_option("--voxel-size", a->voxelSize, "edge of the liquid's voxels, default the first field's")
+            ->check(CLI::PositiveNumber);
+    auto* resolution =
+        command->add_option("--resolution", a->resolution, "voxels along the longest side of the first mesh's bounds")
+            ->check(CLI::PositiveNumber);
+    size->excludes(into)->excludes(resolution);
+    resolution->excludes(into);
+    command->add_option("--half-width", a->halfWidth, "the liquid's band [voxels], default 3")
+        ->check(CLI::Range(3.0, 1e3))
+        ->excludes(into);
+    command->add_option("--translate", a->translate, "moves all inputs: x y z")->expected(3);
+    command->add_option("--rotate", a->rotate, "turns all inputs first: axis x y z and angle [radians]")->expected(4);
+    command->add_option("--mode", a->mode, "unite (default), intersect or subtract")
+        ->check(CLI::IsMember({"unite", "intersect", "subtract"}));
+    a->particlesGiven = command->add_option("--particles", a->particles.perVoxel, "particles in a voxel: a points grid")
+                            ->check(CLI::Range(1, 1000));
+    command->add_option("--seed", a->particles.seed, "other particles for another number")->needs(a->particlesGiven);
+    command->add_flag("--json", a->json, "print one JSON object");
+    command->callback([a] { run(*a); });
+}
+
+}  // namespace bilayer::tools
