@@ -52,7 +52,9 @@ struct Contact {
 inline constexpr std::uint32_t featureOfB = 0x80000000u;
 
 struct ContactOptions {
-    float margin = 0;  ///< contacts are reported up to this distance [m]; at most the band's exterior width is useful
+    /// Contacts are reported up to this distance [m]. The band must reach sqrt(3) voxels farther for all of them to be
+    /// found, and as much deeper than bodies sink into each other (see Sample::inBand).
+    float margin = 0;
 };
 
 /// What collide() saw beside the contacts.

@@ -19,7 +19,9 @@ struct Sample {
     /// In the band: the analytic gradient of the same trilinear interpolant (its length is near 1, not exactly 1).
     /// Elsewhere: zero.
     glm::vec3 gradient{0};
-    bool inBand = false;  ///< all eight voxels around the point are active
+    /// All eight voxels around the point are active: sure up to sqrt(3) voxels less than the band's width on either
+    /// side.
+    bool inBand = false;
 };
 
 /// Where a ray meets the surface.

@@ -2,7 +2,7 @@
 #pragma once
 
 #include <openvdb/openvdb.h>
-#include <openvdb/tools/SignedFloodFill.h>
+#include <openvdb/tools/Prune.h>
 
 #include <algorithm>
 #include <cmath>
@@ -56,9 +56,12 @@ inline LevelSet levelSetOf(const Solid& solid, double voxel, float exterior = 3,
         for (int y = int(lower.y); y <= int(upper.y); ++y)
             for (int z = int(lower.z); z <= int(upper.z); ++z) {
                 const auto distance = float(solid.distance(voxel * glm::dvec3(x, y, z)));
-                if (-inside < distance && distance < outside) accessor.setValue({x, y, z}, distance);
+                if (distance <= -inside)
+                    accessor.setValueOff({x, y, z}, -inside);
+                else if (distance < outside)
+                    accessor.setValue({x, y, z}, distance);
             }
-    openvdb::tools::signedFloodFillWithValues(grid->tree(), outside, -inside);
+    openvdb::tools::prune(grid->tree());
     auto grids = std::make_shared<Grids>();
     grids->distance = grid;
     return LevelSet(grids);

@@ -79,7 +79,7 @@ TEST_CASE("two balls touch where the line of their centres goes through") {
     const unsigned seed = test::seed();
     CAPTURE(seed);
     Random random(seed);
-    for (const float gap : {-1.5f * h, -0.3f * h, 0.f, 0.8f * h, 1.9f * h}) {
+    for (const float gap : {-1.2f * h, -0.3f * h, 0.f, 0.8f * h, 1.2f * h}) {
         const Pose poseB = randomPose(random, 2);
         const glm::vec3 line = random.direction();
         const Pose poseA{poseB.position + (0.8f + gap) * line, randomPose(random, 1).rotation};
@@ -100,7 +100,9 @@ TEST_CASE("two balls touch where the line of their centres goes through") {
             const glm::vec3 centre = ofB ? poseA.position : poseB.position;
             const glm::vec3 point = ofB ? contact.position : contact.position + contact.distance * contact.normal;
             const glm::vec3 expected = glm::normalize(ofB ? centre - point : point - centre);
-            REQUIRE(glm::dot(contact.normal, expected) > 0.9995f);
+            // a gradient turns by h / R in a cell, so it is off by half of that at most, in either direction along the
+            // ball
+            REQUIRE(glm::distance(contact.normal, expected) < std::sqrt(2.f) * 0.5f * h / (0.4f - 2 * h));
             REQUIRE(glm::dot(contact.normal, line) > 0.8f);
             REQUIRE(contact.distance == Approx(glm::distance(point, centre) - 0.4).margin(0.02 * h));
         }
@@ -113,14 +115,17 @@ TEST_CASE("a brick on a slab touches with its corners") {
         const auto contacts = contactsOf({brick(), above}, {slab()}, h);
         int corners = 0;
         for (const Contact& contact : contacts) {
-            const bool ofA = !(contact.feature & featureOfB);
-            // the slab's points lie all around the brick's edges too, where its field is rounded
-            if (ofA) REQUIRE(contact.distance == Approx(gap + 0).margin(1e-5));
-            if (ofA) REQUIRE(contact.position.z == Approx(0.1).margin(1e-5));
-            if (ofA) REQUIRE(contact.normal.z == Approx(1).margin(1e-4));
-            if (!ofA) REQUIRE(contact.position.z == Approx(0.1).margin(1e-6));
-            const glm::vec3 inBrick = glm::abs(contact.position - above.position);
-            corners += ofA && inBrick.x > 0.2999f && inBrick.y > 0.1999f;
+            // beyond the brick's edges, from where it is seen by the slab's points, its field is round
+            if (contact.feature & featureOfB) {
+                REQUIRE(contact.position.z == Approx(0.1).margin(1e-6));
+                continue;
+            }
+            const glm::vec3 point = contact.position + contact.distance * contact.normal;
+            REQUIRE(contact.distance == Approx(point.z - 0.1).margin(1e-5));
+            REQUIRE(contact.position.z == Approx(0.1).margin(1e-5));
+            REQUIRE(contact.normal.z == Approx(1).margin(1e-4));
+            const glm::vec3 inBrick = point - above.position;
+            corners += std::abs(inBrick.x) > 0.2999f && std::abs(inBrick.y) > 0.1999f && inBrick.z < -0.0999f;
         }
         REQUIRE(corners == 4);
     }
@@ -241,7 +246,7 @@ TEST_CASE("bodies apart have no contact and cost next to nothing") {
     REQUIRE(contactsOf({ball(), {{1e30f, 0, 0}}}, {ring()}, h, &report).empty());
     // a small ball in the hole of a ring: their boxes overlap, they do not
     REQUIRE(contactsOf({ball(), {}, 0.3f}, {ring()}, h, &report).empty());
-    REQUIRE(report.pointsTested < 300);
+    REQUIRE(report.pointsTested < (ball().points().points().size() + ring().points().points().size()) / 4);
     const float nan = std::numeric_limits<float>::quiet_NaN();
     REQUIRE(contactsOf({ball(), {{nan, 0, 0}}}, {ball()}, h, &report).empty());
     REQUIRE(report.beyondBand == 0);
