@@ -58,7 +58,8 @@ void countEdges(const Mesh& mesh, const std::vector<unsigned>& componentOf, std:
             components[componentOf[edges[i].triangle]].closed = false;
         }
         report.nonManifoldEdges += j - i > 2;
-        report.misorientedEdges += j - i == 2 && edges[i].forward == edges[i + 1].forward;
+        const auto forward = std::count_if(&edges[i], &edges[i] + (j - i), [](const Edge& edge) { return edge.forward; });
+        report.misorientedEdges += j - i > 1 && 2 * std::size_t(forward) != j - i;
     }
 }
 

@@ -15,7 +15,7 @@ struct MeshReport {
     Bounds bounds;                        ///< [m]
     std::size_t boundaryEdges = 0;        ///< edges of one triangle: holes
     std::size_t nonManifoldEdges = 0;     ///< edges of three triangles or more
-    std::size_t misorientedEdges = 0;     ///< edges whose two triangles run them in the same direction
+    std::size_t misorientedEdges = 0;     ///< edges that their triangles do not run both ways equally often
     std::size_t degenerateTriangles = 0;  ///< triangles without area
     std::size_t duplicateTriangles = 0;   ///< triangles whose three vertices another one has already
     std::size_t insideOutComponents = 0;  ///< closed components that bound space from the wrong side (nested ones allowed)

@@ -8,8 +8,11 @@
 #include <assimp/postprocess.h>
 #include <assimp/scene.h>
 
+#include <cctype>
+#include <fstream>
 #include <memory>
 #include <stdexcept>
+#include <string>
 
 #include "sdf/atomic_file.h"
 
@@ -19,6 +22,52 @@ namespace {
 constexpr unsigned unwanted = aiComponent_NORMALS | aiComponent_TANGENTS_AND_BITANGENTS | aiComponent_COLORS |
                               aiComponent_TEXCOORDS | aiComponent_BONEWEIGHTS | aiComponent_ANIMATIONS |
                               aiComponent_TEXTURES | aiComponent_LIGHTS | aiComponent_CAMERAS | aiComponent_MATERIALS;
+
+constexpr unsigned steps = aiProcess_RemoveComponent | aiProcess_Triangulate | aiProcess_SortByPType |
+                           aiProcess_PreTransformVertices;
+
+std::string lowerEnding(const std::filesystem::path& path) {
+    std::string ending = path.extension().string();
+    for (char& c : ending) c = char(std::tolower(static_cast<unsigned char>(c)));
+    return ending;
+}
+
+// The text of an OFF file without comments and empty lines, for each of which Assimp 5.2 loses a face at the end, and with
+// the counts on a line of their own.
+std::string cleanOff(std::istream& file) {
+    std::string text, line;
+    while (std::getline(file, line)) {
+        line.erase(std::min(line.find('#'), line.size()));
+        if (line.find_first_not_of(" \t\r") == std::string::npos) continue;
+        if (text.empty())
+            if (const auto counts = line.find("OFF"); counts != std::string::npos && line.size() > counts + 3)
+                if (line.find_first_of("0123456789", counts + 3) == line.find_first_not_of(" \t", counts + 3))
+                    line.insert(counts + 3, "\n");
+        text += line + '\n';
+    }
+    return text;
+}
+
+// Assimp reads such files as if they had no faces, or one.
+bool hasTriangleStrips(std::istream& file) {
+    std::string line;
+    while (std::getline(file, line) && line.rfind("end_header", 0) != 0)
+        if (line.rfind("element tristrips", 0) == 0) return true;
+    return false;
+}
+
+const aiScene* readScene(Assimp::Importer& importer, const std::filesystem::path& path) {
+    const std::string ending = lowerEnding(path);
+    std::ifstream file(path, std::ios::binary);
+    if (ending == ".ply" && hasTriangleStrips(file))
+        throw std::runtime_error(fmt::format("{}: stores triangle strips, which are not read; convert it to plain faces",
+                                             path.string()));
+    if (ending == ".off") {
+        const std::string text = cleanOff(file);
+        return importer.ReadFileFromMemory(text.data(), text.size(), steps, "off");
+    }
+    return importer.ReadFile(path.string(), steps);
+}
 
 void add(Mesh& mesh, const aiMesh& part) {
     const auto base = unsigned(mesh.points.size());
@@ -62,13 +111,9 @@ Mesh readMesh(const std::filesystem::path& path) {
     Assimp::Importer importer;
     importer.SetPropertyInteger(AI_CONFIG_PP_RVC_FLAGS, int(unwanted));
     importer.SetPropertyInteger(AI_CONFIG_PP_SBP_REMOVE, aiPrimitiveType_POINT | aiPrimitiveType_LINE);
-    const aiScene* scene =
-        importer.ReadFile(path.string(), aiProcess_RemoveComponent | aiProcess_Triangulate | aiProcess_SortByPType |
-                                             aiProcess_PreTransformVertices);
-    if (!scene) {
-        if (!std::filesystem::exists(path)) throw std::runtime_error(fmt::format("{}: no such file", path.string()));
-        throw std::runtime_error(fmt::format("{}: {}", path.string(), importer.GetErrorString()));
-    }
+    if (!std::filesystem::is_regular_file(path)) throw std::runtime_error(fmt::format("{}: no such file", path.string()));
+    const aiScene* scene = readScene(importer, path);
+    if (!scene) throw std::runtime_error(fmt::format("{}: {}", path.string(), importer.GetErrorString()));
     Mesh mesh;
     for (unsigned i = 0; i < scene->mNumMeshes; ++i) add(mesh, *scene->mMeshes[i]);
     if (mesh.triangles.empty()) throw std::runtime_error(fmt::format("{}: holds no triangle", path.string()));
@@ -84,7 +129,7 @@ Mesh readMesh(const std::filesystem::path& path) {
 }
 
 void writeMesh(const std::filesystem::path& path, const Mesh& mesh) {
-    const std::string ending = path.extension().string();
+    const std::string ending = lowerEnding(path);
     const char* format = ending == ".obj" ? "objnomtl" : ending == ".ply" ? "plyb" : ending == ".stl" ? "stlb" : nullptr;
     if (!format) throw std::invalid_argument(fmt::format("{}: meshes are written as .obj, .ply or .stl", path.string()));
     validate(mesh);

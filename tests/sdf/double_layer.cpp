@@ -45,6 +45,11 @@ class Dense {
         return inner2_[i] <= outer2_[i] ? -std::max(0.f, std::sqrt(outer2_[i]) - delta_)
                                         : std::max(0.f, std::sqrt(inner2_[i]) - delta_);
     }
+    // Both layers are equally near, up to rounding: either sign is right.
+    bool tie(const glm::ivec3& v) const {
+        const std::size_t i = index(v);
+        return std::abs(inner2_[i] - outer2_[i]) <= 1e-5f * inner2_[i];
+    }
     std::int32_t owner(const glm::ivec3& v) const {
         const std::size_t i = index(v);
         return inner2_[i] <= outer2_[i] ? outerOwner_[i] : innerOwner_[i];
@@ -108,6 +113,7 @@ void compare(const Mesh& mesh, const BuildOptions& options, int k) {
         const bool inBand = phi < options.exteriorWidth && phi > -options.interiorWidth;
         const float edge = std::min(std::abs(phi - options.exteriorWidth), std::abs(phi + options.interiorWidth));
         active += values.isValueOn(at);
+        if (dense.tie(v)) return;
         if (values.isValueOn(at) && inBand)
             worst = std::max(worst, std::abs(values.getValue(at) / options.voxelSize - phi));
         else if (edge > rounding) {

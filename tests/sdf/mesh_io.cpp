@@ -52,6 +52,13 @@ TEST_CASE("polygons, negative indices and node transforms are understood") {
     CHECK(bounds(moved).upper == glm::vec3(11, 1, 0));
 }
 
+TEST_CASE("OFF files may hold comments and empty lines anywhere") {
+    const Mesh mesh = readMesh(write("comments.off", "OFF 4 4 6 # counts\n\n0 0 0\n1 0 0 # x\n\n0 1 0\n0 0 1\n# faces\n"
+                                                     "3 0 2 1\n\n3 0 1 3\n3 0 3 2\n\n3 1 2 3\n"));
+    CHECK(mesh.triangles.size() == 4);
+    CHECK(inspect(mesh).closed());
+}
+
 TEST_CASE("unreadable files give an error that names them") {
     CHECK_THROWS_WITH(readMesh("/nonexistent.obj"), Catch::Contains("/nonexistent.obj") && Catch::Contains("no such file"));
     for (const auto& [name, text] : {std::pair("empty.obj", ""), std::pair("noise.ply", "ply\nnot a ply"),
@@ -72,12 +79,14 @@ TEST_CASE("the public corpus's formats are read") {
                           Case{"formats/polygonfaces.obj", 3}, Case{"formats/nancolor.obj", 12},
                           Case{"formats/two_objects_mixed_case_names.stl", 24}, Case{"formats/20mm-xyz-cube.stl", 260},
                           Case{"formats/cube_blender_uv.ply", 12}, Case{"bunny_zipper_soup.stl", 69451},
-                          Case{"dragon_vrip_871k.ply", 871306}, Case{"screwdriver.off", 54300}}) {
+                          Case{"dragon_vrip_871k.ply", 871306}, Case{"formats/whitespace.off", 12},
+                          Case{"cgal-cube-shuffled.off", 12}, Case{"screwdriver.off", 54300}}) {
         const auto path = test::corpusMesh(c.name);
         if (!path) return;
         CAPTURE(c.name);
         CHECK(readMesh(*path).triangles.size() == c.triangles);
     }
+    CHECK_THROWS_WITH(readMesh(*test::corpusMesh("formats/brain_tristrips.ply")), Catch::Contains("triangle strips"));
     CHECK_THROWS(readMesh(*test::corpusMesh("formats/empty.obj")));
     CHECK_THROWS(readMesh(*test::corpusMesh("formats/stl_empty_bin.stl")));
 }
