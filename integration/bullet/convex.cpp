@@ -27,8 +27,8 @@ namespace {
 constexpr int mostProbes = 64;
 // Chords of a rim: enough that each lies within 0.5 % of the radius from its arc before it is put onto it.
 constexpr std::uint32_t rimChords = 32;
-// Support points on a shape that has no formula here: directions on a spiral, about 8 degrees apart.
-constexpr int supportDirections = 512;
+// Support points on a shape that has no formula here: directions on a spiral, about 12 degrees apart.
+constexpr int supportDirections = 256;
 // A normal that is tilted less than this off the axis belongs to a flat end.
 constexpr float flatEnd = 0.1f;
 
@@ -159,6 +159,7 @@ void Convex::makeHull(const std::vector<btVector3>& points) {
         const auto* first = &hull.edges[hull.faces[i]];
         const auto apex = static_cast<std::uint32_t>(first->getSourceVertex());
         glm::vec3 area(0);
+        const std::size_t begin = faces_.triangles.size();
         for (const auto* edge = first->getNextEdgeOfFace(); edge != first; edge = edge->getNextEdgeOfFace()) {
             const glm::uvec3 triangle(apex, edge->getSourceVertex(), edge->getTargetVertex());
             if (triangle.z == apex) continue;
@@ -167,7 +168,9 @@ void Convex::makeHull(const std::vector<btVector3>& points) {
             faces_.triangles.push_back(triangle);
         }
         const float length = glm::length(area);
-        if (length > 0) planes_.push_back({area / length, glm::dot(area / length, faces_.points[apex])});
+        if (length > 0)
+            planes_.push_back(
+                {area / length, glm::dot(area / length, faces_.points[apex]), begin, faces_.triangles.size()});
     }
 }
 
@@ -246,8 +249,13 @@ Convex::Near Convex::nearestOfHull(const glm::vec3& point, float reach) const {
         const glm::vec3 way = point - q;
         if (const float s = glm::dot(way, way); s < squared) squared = s, core = q;
     };
-    for (const glm::uvec3& t : faces_.triangles)
-        consider(nearestOnTriangle(point, faces_.points[t.x], faces_.points[t.y], faces_.points[t.z]));
+    // Only faces that the point sees can be nearest.
+    for (const Plane& plane : planes_)
+        if (glm::dot(plane.normal, point) > plane.offset)
+            for (std::size_t i = plane.begin; i < plane.end; ++i) {
+                const glm::uvec3& t = faces_.triangles[i];
+                consider(nearestOnTriangle(point, faces_.points[t.x], faces_.points[t.y], faces_.points[t.z]));
+            }
     // A hull without faces is flat, a line or a point.
     if (!farthest) {
         for (const Edge& edge : edges_)

@@ -49,6 +49,7 @@ class Convex {
     struct Plane {
         glm::vec3 normal;
         float offset;
+        std::size_t begin, end;  ///< triangles of `faces_` that lie in it
     };
 
     void makeRevolution(int axis, float halfHeight, float lowerRadius, float upperRadius);

@@ -72,8 +72,7 @@ class Pair {
   private:
     ContactReport find(const Side& a, const Placed& field, float margin) {
         if (isField(a.shape))
-            return bilayer::collide(static_cast<const Shape&>(*a.shape).placed(a.transform), field, {margin},
-                                    contacts_);
+            return collideFields(static_cast<const Shape&>(*a.shape).placed(a.transform), field, margin, contacts_);
         if (a.shape->getShapeType() == STATIC_PLANE_PROXYTYPE) {
             const auto& plane = static_cast<const btStaticPlaneShape&>(*a.shape);
             const btVector3 normal = a.transform.getBasis() * plane.getPlaneNormal();

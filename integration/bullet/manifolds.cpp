@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <glm/geometric.hpp>
+#include <glm/vec2.hpp>
+#include <limits>
 
 #include "integration/bullet/convert.h"
 
@@ -16,6 +18,10 @@ constexpr std::size_t mostPatches = 8;
 // Of two contacts, the one that is deeper by d is preferred up to this many times d nearer to the others: overlap that
 // is left out of a patch is not resolved.
 constexpr float depthWeight = 8;
+// Where a patch is flatter than this part of its extent, the deepest contact is a matter of rounding.
+constexpr float flatness = 1e-3f;
+// Four sides of a patch, askew to everything one models: a rectangle's corners are then each alone on their side.
+constexpr glm::vec2 sides[] = {{0.87f, 0.49f}, {-0.49f, 0.87f}, {-0.87f, -0.49f}, {0.49f, -0.87f}};
 
 /// Contacts of one patch, as indices in ascending order of distance.
 using Group = std::vector<std::uint32_t>;
@@ -37,33 +43,50 @@ std::vector<Group> groupByNormal(const std::vector<Contact>& contacts) {
     return groups;
 }
 
-/// Adds the contact of the group that scores highest, if any scores above zero.
-template <class Score>
-void addBest(Patch& patch, const std::vector<Contact>& contacts, const Group& group, Score score) {
-    float best = 0;
-    const Contact* choice = nullptr;
-    const float deepest = patch.contacts[0].distance;
+/// The contact of the group that lies farthest in a direction, depth weighing in.
+std::uint32_t farthest(const std::vector<Contact>& contacts, const Group& group, const glm::vec3& direction) {
+    std::uint32_t best = group.front();
+    float bestScore = -std::numeric_limits<float>::max();
     for (std::uint32_t i : group) {
-        const float value = score(contacts[i].position) - depthWeight * (contacts[i].distance - deepest);
-        if (value > best) best = value, choice = &contacts[i];
+        const float score = glm::dot(contacts[i].position, direction) - depthWeight * contacts[i].distance;
+        if (score > bestScore) best = i, bestScore = score;
     }
-    if (choice) patch.contacts[patch.count++] = *choice;
+    return best;
 }
 
+/// The contacts farthest to four sides. Of many that are equally deep but for rounding, as under a flat face, these
+/// stay the same from step to step, while the deepest does not; so the deepest only goes in if it is so by more than
+/// that.
 Patch spread(const std::vector<Contact>& contacts, const Group& group) {
-    Patch patch;
-    patch.contacts[patch.count++] = contacts[group.front()];
-    const glm::vec3 first = patch.contacts[0].position, normal = patch.contacts[0].normal;
-    addBest(patch, contacts, group, [&](const glm::vec3& p) { return glm::distance(p, first); });
-    if (patch.count < 2) return patch;
+    glm::vec3 normal(0);
+    for (std::uint32_t i : group) normal += contacts[i].normal;
+    btVector3 first, second;
+    btPlaneSpace1(toBullet(glm::normalize(normal)), first, second);
 
-    // The farthest to either side of the line through the first two.
-    const glm::vec3 across = glm::cross(normal, patch.contacts[1].position - first);
-    const float length = glm::length(across);
-    if (!(length > 0)) return patch;
-    const glm::vec3 side = across / length;
-    addBest(patch, contacts, group, [&](const glm::vec3& p) { return glm::dot(p - first, side); });
-    addBest(patch, contacts, group, [&](const glm::vec3& p) { return glm::dot(first - p, side); });
+    std::vector<std::uint32_t> chosen;
+    for (const glm::vec2& side : sides) {
+        const std::uint32_t i = farthest(contacts, group, side.x * toGlm(first) + side.y * toGlm(second));
+        if (std::find(chosen.begin(), chosen.end(), i) == chosen.end()) chosen.push_back(i);
+    }
+    const std::uint32_t deepest = group.front();
+    const auto place = [&](std::uint32_t i) { return contacts[i].position; };
+    float extent = 0, depth = std::numeric_limits<float>::max();
+    for (std::uint32_t i : chosen) {
+        extent = std::max(extent, glm::distance(place(i), place(chosen.front())));
+        depth = std::min(depth, contacts[i].distance);
+    }
+    if (depth - contacts[deepest].distance > flatness * extent) {
+        const auto nearer = [&](std::uint32_t i, std::uint32_t j) {
+            return glm::distance(place(i), place(deepest)) < glm::distance(place(j), place(deepest));
+        };
+        if (chosen.size() < MANIFOLD_CACHE_SIZE)
+            chosen.push_back(deepest);
+        else
+            *std::min_element(chosen.begin(), chosen.end(), nearer) = deepest;
+    }
+
+    Patch patch;
+    for (std::uint32_t i : chosen) patch.contacts[patch.count++] = contacts[i];
     return patch;
 }
 

@@ -12,14 +12,14 @@
 
 namespace bilayer::bullet {
 
-/// Contacts with about the same normal: the deepest, and those that span the largest area with it.
+/// Contacts with about the same normal: those farthest to four sides, and the deepest.
 struct Patch {
     std::array<Contact, MANIFOLD_CACHE_SIZE> contacts;
     int count = 0;
 };
 
 /// Divides contacts into patches by their normals and keeps up to four a patch. Deterministic: depends on the contacts
-/// and their order only. The deepest contact of all comes first. `contacts` is left in another order.
+/// and their order only. The patch of the deepest contact of all comes first. `contacts` is left in another order.
 std::vector<Patch> reduce(std::vector<Contact>& contacts);
 
 /// The manifolds of one pair of bodies, one for each patch. Contacts are written anew each step, since Bullet refreshes

@@ -21,6 +21,8 @@ constexpr float shortestGradient = 0.5f;
 // A surface point touches a face that looks against its own normal, by this cosine at least: the points below the edge
 // of a box must not be pushed out sideways. The corners of a cube, whose normals are mixed of three, reach 0.57.
 constexpr float leastOpposition = 0.3f;
+// Steps towards the deepest place of a round surface; each divides the error by the ratio of the radii of curvature.
+constexpr int mostRefinements = 6;
 
 /// A field in metres of the world and the axes of its body.
 class Local {
@@ -111,12 +113,18 @@ class Touching {
 
     /// Follows the field's normal from the place of a round surface under a surface point to the deepest place nearby.
     std::optional<Contact> refine(const Convex::Near& near, std::uint32_t feature) const {
-        const Local::Answer start = local_.at(intoField(near.core + convex_.radius() * near.normal));
-        if (start.where != Local::Answer::near) return std::nullopt;
-        const glm::vec3 deepest = intoField(convex_.slide(near, -(toConvex_ * start.normal)));
-        const Local::Answer answer = local_.at(deepest);
-        if (answer.where != Local::Answer::near || answer.distance > margin_) return std::nullopt;
-        return local_.contact(deepest - answer.distance * answer.normal, answer.normal, answer.distance, feature);
+        glm::vec3 place = intoField(near.core + convex_.radius() * near.normal);
+        Local::Answer here = local_.at(place);
+        if (here.where != Local::Answer::near) return std::nullopt;
+        for (int i = 0; i < mostRefinements; ++i) {
+            const glm::vec3 next = intoField(convex_.slide(near, -(toConvex_ * here.normal)));
+            const Local::Answer there = local_.at(next);
+            if (there.where != Local::Answer::near || !(there.distance < here.distance)) break;
+            place = next;
+            here = there;
+        }
+        if (here.distance > margin_) return std::nullopt;
+        return local_.contact(place - here.distance * here.normal, here.normal, here.distance, feature);
     }
 
     const Convex& convex_;
@@ -147,14 +155,19 @@ class TriangleProbes : public btTriangleCallback {
     void processTriangle(btVector3* triangle, int, int) override {
         const glm::vec3 corners[3] = {inField_.toWorld(toGlm(triangle[0])), inField_.toWorld(toGlm(triangle[1])),
                                       inField_.toWorld(toGlm(triangle[2]))};
-        const glm::vec3 nearest = nearestOnTriangle(centre_, corners[0], corners[1], corners[2]);
-        if (glm::distance(nearest, centre_) > within_) return;
+        const glm::vec3 middle = (corners[0] + corners[1] + corners[2]) / 3.f;
+        float around = 0, longest = 0;
+        for (int i = 0; i < 3; ++i) {
+            around = std::max(around, glm::distance(corners[i], middle));
+            longest = std::max(longest, glm::distance(corners[i], corners[(i + 1) % 3]));
+        }
+        if (local_.at(middle).distance > around + margin_ + spacing_) return;
         for (int i = 0; i < 3; ++i) {
             probe(corners[i], 0);
             visitAlong(corners[i], corners[(i + 1) % 3], centre_, within_, spacing_,
                        [&](const glm::vec3& point, std::uint32_t) { probe(point, 0); });
         }
-        visitFace(corners);
+        if (longest > spacing_) visitFace(corners);
     }
 
   private:

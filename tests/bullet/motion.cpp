@@ -1,0 +1,146 @@
+// What bodies do over many steps: stay threaded, stay linked, and do the same for any number of threads.
+#include <tbb/global_control.h>
+#include <tbb/task_arena.h>
+
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <cstring>
+
+#include "world.h"
+
+using namespace bilayer;
+using namespace bilayer::test;
+using bullet::Shape;
+
+namespace {
+
+constexpr float h = 0.05f;  // voxel [m]
+
+/// The transforms of a heap of bodies of several kinds after some steps, on a number of threads.
+std::vector<float> heap(int threads) {
+    static const auto torus = exactTorus(0.4f, 0.15f, h), box = exactBox({0.3f, 0.2f, 0.15f}, h),
+                      bowl = exactBowl(2.f, 0.2f, 0.1f);
+    tbb::global_control limit(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads));
+    tbb::task_arena arena(threads);
+    std::vector<float> state;
+    arena.execute([&] {
+        Shape torusShape(torus), boxShape(box), bowlShape(bowl);
+        btSphereShape ball(0.2f);
+        btCapsuleShape capsule(0.15f, 0.4f);
+        btCollisionShape* const kinds[] = {&torusShape, &boxShape, &ball, &capsule};
+        World world;
+        world.add(bowlShape, 0, {0, 0, 0});
+        std::vector<btRigidBody*> bodies;
+        for (int i = 0; i < 12; ++i)
+            bodies.push_back(world.add(*kinds[i % 4], 1, {0.3f * (i % 3) - 0.3f, 0.1f * i - 0.6f, -1.f + 0.3f * i},
+                                       btQuaternion(btVector3(1, 0.3f * i, 2).normalized(), 0.7f * i)));
+        world.run(1.25f);
+        for (const btRigidBody* body : bodies) {
+            btScalar matrix[16];
+            body->getWorldTransform().getOpenGLMatrix(matrix);
+            state.insert(state.end(), matrix, matrix + 16);
+        }
+    });
+    return state;
+}
+
+}  // namespace
+
+TEST_CASE("Three hundred steps give the same bits on 1, 2 and 8 threads") {
+    const std::vector<float> one = heap(1);
+    for (float value : one) REQUIRE(std::isfinite(value));
+    for (int threads : {2, 8}) {
+        const std::vector<float> more = heap(threads);
+        REQUIRE(more.size() == one.size());
+        CHECK(std::memcmp(more.data(), one.data(), one.size() * sizeof(float)) == 0);
+    }
+}
+
+TEST_CASE("A ring dropped over a pole stays on it and comes to rest on the ground") {
+    const bool capsule = GENERATE(true, false);
+    CAPTURE(capsule);
+    Shape ring(exactTorus(0.5f, 0.15f, h));
+    btCapsuleShapeZ roundPole(0.2f, 3);
+    btCylinderShapeZ pole({0.2f, 0.2f, 1.7f});
+    btStaticPlaneShape ground({0, 0, 1}, 0);
+    World world;
+    world.add(ground, 0, {0, 0, 0});
+    world.add(capsule ? static_cast<btCollisionShape&>(roundPole) : pole, 0, {0, 0, 1.7f});
+    btRigidBody* body = world.add(ring, 1, {0.1f, 0, 2.6f}, btQuaternion(btVector3(1, 0, 0), 0.3f));
+    for (int i = 0; i < 40; ++i) {
+        world.run(0.1f);
+        const btVector3& at = body->getWorldTransform().getOrigin();
+        CAPTURE(i, at.x(), at.y(), at.z());
+        REQUIRE(std::hypot(at.x(), at.y()) < 0.5f);
+        REQUIRE(at.z() > 0.14f);
+    }
+    CHECK(body->getWorldTransform().getOrigin().z() == Approx(0.15f).margin(0.1 * h));
+    CHECK(motion(*body) < 1e-2f);
+}
+
+TEST_CASE("A ring hangs in another") {
+    const auto collider = exactTorus(0.5f, 0.12f, 0.04f);
+    Shape ring(collider);
+    World world;
+    // the fixed one stands upright in the plane of x and z; the other lies across its lowest part
+    world.add(ring, 0, {0, 0, 0}, btQuaternion(btVector3(1, 0, 0), SIMD_HALF_PI));
+    btRigidBody* body = world.add(ring, 1, {0, 0, -0.85f}, btQuaternion(btVector3(0, 1, 0), SIMD_HALF_PI));
+    world.run(4);
+    const btVector3& at = body->getWorldTransform().getOrigin();
+    // it hangs by the inside of its tube on the inside of the other's: 2 (R - r)
+    CAPTURE(at.x(), at.y(), at.z());
+    CHECK(at.z() == Approx(-2 * (0.5f - 0.12f)).margin(0.2 * 0.04));
+    CHECK(std::hypot(at.x(), at.y()) < 0.05f);
+    CHECK(motion(*body) < 0.05f);
+}
+
+TEST_CASE("A slope holds a body by friction, and lets it slide where it must") {
+    const float friction = GENERATE(0.7f, 0.3f);  // of the pair: the product of both
+    const float slope = std::atan(0.5f);
+    Shape block(exactBox({0.3f, 0.3f, 0.2f}, h)), ramp(exactBox({2, 1, 0.3f}, h));
+    World world;
+    const btQuaternion tilt(btVector3(0, 1, 0), slope);
+    world.add(ramp, 0, {0, 0, 0}, tilt)->setFriction(1);
+    const btVector3 start = quatRotate(tilt, {-1.2f, 0, 0.5f});
+    btRigidBody* body = world.add(block, 1, start, tilt);
+    body->setFriction(friction);
+    world.run(0.5f);
+    const float way = (body->getWorldTransform().getOrigin() - start).length();
+    CAPTURE(friction, way);
+    if (friction > 0.5f)
+        CHECK(way < 0.2f * h);
+    else
+        CHECK(way == Approx(0.5f * 9.81f * (std::sin(slope) - friction * std::cos(slope)) * 0.25f).epsilon(0.03));
+}
+
+TEST_CASE("Callbacks see contacts with their features, and impulses are handed on from step to step") {
+    static int added, started;
+    added = started = 0;
+    Shape box(exactBox({0.3f, 0.3f, 0.2f}, h));
+    btStaticPlaneShape plane({0, 0, 1}, 0);
+    World world;
+    world.add(plane, 0, {0, 0, 0});
+    btRigidBody* body = world.add(box, 2, {0, 0, 0.2f});
+    body->setCollisionFlags(body->getCollisionFlags() | btCollisionObject::CF_CUSTOM_MATERIAL_CALLBACK);
+    gContactAddedCallback = [](btManifoldPoint&, const btCollisionObjectWrapper*, int, int index0,
+                               const btCollisionObjectWrapper*, int, int index1) {
+        added += index0 == -1 && index1 >= 0;
+        return false;
+    };
+    gContactStartedCallback = [](btPersistentManifold* const&) { ++started; };
+    world.run(0.5f);
+    gContactAddedCallback = nullptr;
+    gContactStartedCallback = nullptr;
+
+    CHECK(added >= 4 * 100);
+    CHECK(started <= 3);
+    REQUIRE(world.dispatcher.getNumManifolds() == 1);
+    const btPersistentManifold& manifold = *world.dispatcher.getManifoldByIndexInternal(0);
+    REQUIRE(manifold.getNumContacts() == 4);
+    float impulse = 0;
+    for (int i = 0; i < 4; ++i) {
+        impulse += manifold.getContactPoint(i).getAppliedImpulse();
+        CHECK(manifold.getContactPoint(i).getLifeTime() > 50);
+    }
+    CHECK(impulse == Approx(2 * 9.81f / 240).epsilon(0.02));
+}

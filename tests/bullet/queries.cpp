@@ -1,0 +1,232 @@
+// What a world is asked between steps: rays, sweeps, contact tests, inertia, bounds, drawing.
+#include <BulletCollision/CollisionDispatch/btCollisionWorld.h>
+
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+#include "demos/shared/shapes.h"
+#include "sdf/build.h"
+#include "world.h"
+
+using namespace bilayer;
+using namespace bilayer::test;
+using bullet::Shape;
+
+namespace {
+
+constexpr float h = 0.05f;  // voxel [m]
+
+// On a sphere of radius R, the gradient of the trilinear interpolant is off by up to h / (2 R) along either tangent, so
+// that the deepest place of a ball is found that far beside the true one.
+constexpr float fieldRadius = 0.5f;
+const float leastCosine = std::cos(h / fieldRadius);
+constexpr double depthError = 0.1 * h;
+
+struct Contacts : btCollisionWorld::ContactResultCallback {
+    btScalar addSingleResult(btManifoldPoint& point, const btCollisionObjectWrapper* first, int, int,
+                             const btCollisionObjectWrapper*, int, int) override {
+        ++count;
+        if (point.getDistance() < deepest) {
+            deepest = point.getDistance();
+            normal = point.m_normalWorldOnB;
+            firstObject = first->getCollisionObject();
+        }
+        return 0;
+    }
+    int count = 0;
+    float deepest = std::numeric_limits<float>::max();
+    btVector3 normal{0, 0, 0};
+    const btCollisionObject* firstObject = nullptr;
+};
+
+struct CountingDrawer : btIDebugDraw {
+    void drawLine(const btVector3& from, const btVector3& to, const btVector3&) override {
+        ++lines;
+        for (const btVector3& p : {from, to}) upper.setMax(p), lower.setMin(p);
+    }
+    void drawContactPoint(const btVector3&, const btVector3&, btScalar, int, const btVector3&) override {}
+    void reportErrorWarning(const char*) override {}
+    void draw3dText(const btVector3&, const char*) override {}
+    void setDebugMode(int) override {}
+    int getDebugMode() const override { return DBG_DrawWireframe; }
+    int lines = 0;
+    btVector3 lower{1e9f, 1e9f, 1e9f}, upper{-1e9f, -1e9f, -1e9f};
+};
+
+}  // namespace
+
+TEST_CASE("Rays meet a field's sphere where the formula says") {
+    const float scale = GENERATE(1.f, 3.f);
+    const btVector3 centre(0.3f, -0.2f, 0.7f);
+    Shape shape(exactSphere(0.6f, h));
+    shape.setLocalScaling({scale, scale, scale});
+    const float radius = 0.6f * scale;
+    World world;
+    world.add(shape, 1, centre, btQuaternion(btVector3(1, 2, 3).normalized(), 0.8f));
+
+    int hits = 0;
+    for (int i = 0; i < 40; ++i) {
+        // around the rim too, so that some pass by
+        const float offset = radius * i / 35.f;
+        const btVector3 from = centre + btVector3(-5, offset, 0.1f), to = from + btVector3(10, 0, 0);
+        btCollisionWorld::ClosestRayResultCallback ray(from, to);
+        world.dynamics.rayTest(from, to, ray);
+        const float square = radius * radius - offset * offset - 0.01f;
+        CAPTURE(i, scale);
+        // the interpolant of a sphere's distances lies up to h^2 / (4 R) inside
+        const float error = scale * h * h / (4 * 0.6f) + 1e-5f;
+        if (std::abs(square) < 2 * radius * error) continue;
+        REQUIRE(ray.hasHit() == (square > 0));
+        if (!ray.hasHit()) continue;
+        ++hits;
+        const btVector3 exact(centre.x() - std::sqrt(square), from.y(), from.z());
+        const btVector3 normal = (exact - centre) / radius;
+        CHECK((ray.m_hitPointWorld - exact).length() < error / std::abs(normal.x()) + 1e-4f);
+        CHECK(ray.m_hitNormalWorld.dot(normal) > 0.998f);
+    }
+    CHECK(hits > 30);
+}
+
+TEST_CASE("Spheres are swept against the field, or against the mesh where they are wider than the band") {
+    const float radius = GENERATE(0.05f, 0.3f);
+    CAPTURE(radius);
+    Shape shape(exactBox({0.5f, 0.4f, 0.3f}, h));
+    World world;
+    world.add(shape, 1, {0, 0, 1});
+    const btSphereShape sphere(radius);
+    const btVector3 from(0.1f, 0.1f, 3), to(0.1f, 0.1f, 1);
+    btCollisionWorld::ClosestConvexResultCallback sweep(from, to);
+    world.dynamics.convexSweepTest(&sphere, btTransform(btQuaternion::getIdentity(), from),
+                                   btTransform(btQuaternion::getIdentity(), to), sweep);
+    REQUIRE(sweep.hasHit());
+    CHECK(sweep.m_closestHitFraction == Approx((3 - 1.3f - radius) / 2).margin(1e-3));
+    CHECK(sweep.m_hitNormalWorld.z() == Approx(1).margin(1e-3));
+    CHECK(sweep.m_hitPointWorld.z() == Approx(1.3f).margin(1e-3));
+
+    // beside the box, and away from it
+    for (const auto& [a, b] :
+         {std::pair(btVector3(0.9f, 0, 3), btVector3(0.9f, 0, -3)), std::pair(from, from + btVector3(0, 0, 1))}) {
+        btCollisionWorld::ClosestConvexResultCallback miss(a, b);
+        world.dynamics.convexSweepTest(&sphere, btTransform(btQuaternion::getIdentity(), a),
+                                       btTransform(btQuaternion::getIdentity(), b), miss);
+        CHECK_FALSE(miss.hasHit());
+    }
+}
+
+TEST_CASE("A box is swept against the triangles of the mesh") {
+    Shape shape(exactBox({0.5f, 0.4f, 0.3f}, h));
+    World world;
+    world.add(shape, 1, {0, 0, 1});
+    btBoxShape box({0.1f, 0.1f, 0.1f});
+    const btTransform from(btQuaternion::getIdentity(), {0, 0, 3}), to(btQuaternion::getIdentity(), {0, 0, 1});
+    btCollisionWorld::ClosestConvexResultCallback sweep(from.getOrigin(), to.getOrigin());
+    world.dynamics.convexSweepTest(&box, from, to, sweep);
+    REQUIRE(sweep.hasHit());
+    CHECK(sweep.m_closestHitFraction == Approx((3 - 1.3f - 0.1f) / 2).margin(2e-3));
+}
+
+TEST_CASE("Contact tests give the depth and the normal from the second body to the first") {
+    Shape shape(exactSphere(fieldRadius, h));
+    btSphereShape ball(0.3f);
+    World world;
+    btRigidBody* field = world.add(shape, 1, {0, 0, 0});
+    const float gap = GENERATE(-0.05f, 0.02f);
+    btRigidBody* other = world.add(ball, 1, {0, 0, 0.8f + gap});
+    CAPTURE(gap);
+
+    SECTION("a pair, either way around") {
+        const bool fieldFirst = GENERATE(true, false);
+        Contacts found;
+        world.dynamics.contactPairTest(fieldFirst ? field : other, fieldFirst ? other : field, found);
+        REQUIRE(found.count > 0);
+        CHECK(found.deepest == Approx(gap).margin(depthError));
+        CHECK(found.normal.z() * (found.firstObject == field ? -1 : 1) > leastCosine);
+    }
+    SECTION("one against all") {
+        Contacts found;
+        world.dynamics.contactTest(other, found);
+        REQUIRE(found.count > 0);
+        CHECK(found.deepest == Approx(gap).margin(depthError));
+    }
+    SECTION("up to a distance") {
+        other->setWorldTransform(btTransform(btQuaternion::getIdentity(), {0, 0, 0.9f}));
+        Contacts found;
+        found.m_closestDistanceThreshold = 0.2f;
+        world.dynamics.contactPairTest(field, other, found);
+        REQUIRE(found.count > 0);
+        CHECK(found.deepest == Approx(0.1f).margin(depthError));
+    }
+    SECTION("inside a compound") {
+        btCompoundShape compound;
+        compound.addChildShape(btTransform(btQuaternion::getIdentity(), {0, 0, 0.2f}), &shape);
+        btRigidBody* body = world.add(compound, 0, {0, 0, -0.2f});
+        Contacts found;
+        world.dynamics.contactPairTest(other, body, found);
+        REQUIRE(found.count > 0);
+        CHECK(found.deepest == Approx(gap).margin(depthError));
+    }
+    CHECK(world.dispatcher.getNumManifolds() == 0);
+}
+
+TEST_CASE("Points deeper than the band are counted, not guessed") {
+    Shape slab(exactBox({1, 1, 1}, h));
+    btConvexHullShape needle;
+    needle.setMargin(0);
+    for (int i = 0; i < 4; ++i) needle.addPoint({i == 1 ? 0.01f : 0, i == 2 ? 0.01f : 0, i == 3 ? -0.2f : 0});
+    World world;
+    world.add(slab, 0, {0, 0, -1});
+    world.add(needle, 1, {0.3f, 0.3f, -0.6f});
+    world.dynamics.performDiscreteCollisionDetection();
+    CHECK(world.dispatcher.statistics().beyondBand >= 4);
+    CHECK(world.dispatcher.statistics().contactsKept == 0);
+}
+
+TEST_CASE("Inertia is that of the solid, about the centre of mass and its principal axes") {
+    const float scale = GENERATE(1.f, 0.1f);
+    const glm::vec3 half(0.5f, 0.4f, 0.3f);
+    Mesh mesh = shapes::box(half);
+    for (glm::vec3& point : mesh.points) point = glm::vec3(point.y, point.z, point.x) + glm::vec3(0.7f, 0, -0.2f);
+    const auto collider = std::make_shared<Collider>(mesh, build(mesh, {.voxelSize = h}));
+    Shape shape(collider, {.frame = bullet::centreOfMassFrame(*collider)});
+    shape.setLocalScaling({scale, scale, scale});
+
+    btVector3 inertia;
+    shape.calculateLocalInertia(3, inertia);
+    const glm::vec3 square = 4.f * half * half * scale * scale;
+    // ascending: about the longest side first
+    CHECK(inertia.x() == Approx(3.f / 12 * (square.y + square.z)).epsilon(1e-4));
+    CHECK(inertia.y() == Approx(3.f / 12 * (square.x + square.z)).epsilon(1e-4));
+    CHECK(inertia.z() == Approx(3.f / 12 * (square.x + square.y)).epsilon(1e-4));
+
+    btVector3 lower, upper;
+    shape.getAabb(btTransform(btQuaternion::getIdentity(), {1, 2, 3}), lower, upper);
+    const btVector3 expected = scale * (btVector3(half.x, half.y, half.z) + btVector3(h, h, h));
+    CHECK((upper - btVector3(1, 2, 3) - expected).length() < 1e-5f);
+    CHECK((lower - btVector3(1, 2, 3) + expected).length() < 1e-5f);
+}
+
+TEST_CASE("Drawing shows the mesh where the body is") {
+    const Mesh mesh = shapes::sphere(0.5f, 3);
+    Shape shape(std::make_shared<Collider>(mesh, build(mesh, {.voxelSize = h})),
+                {.frame = {{0.1f, 0, 0}, {1, 0, 0, 0}}});
+    shape.setLocalScaling({2, 2, 2});
+    World world;
+    btRigidBody* body = world.add(shape, 1, {1, 2, 3});
+    CountingDrawer drawer;
+    world.dynamics.setDebugDrawer(&drawer);
+    world.dynamics.debugDrawObject(body->getWorldTransform(), &shape, {1, 1, 1});
+    CHECK(drawer.lines == static_cast<int>(3 * mesh.triangles.size()));
+    CHECK((0.5f * (drawer.lower + drawer.upper) - btVector3(1.2f, 2, 3)).length() < 0.01f);
+    world.dynamics.setDebugDrawer(nullptr);
+}
+
+TEST_CASE("Bad input is refused by name") {
+    Shape shape(exactSphere(0.3f, h));
+    CHECK_THROWS_AS(Shape(nullptr), std::invalid_argument);
+    CHECK_THROWS_AS(shape.setLocalScaling({1, 2, 1}), std::invalid_argument);
+    CHECK_THROWS_AS(shape.setLocalScaling({0, 0, 0}), std::invalid_argument);
+    CHECK_THROWS_AS(shape.setLocalScaling({-1, -1, -1}), std::invalid_argument);
+    CHECK_THROWS_AS(shape.setMargin(-1), std::invalid_argument);
+}
