@@ -36,16 +36,18 @@ constexpr float bowlVoxels = 3;                                           // edg
 
 constexpr float stepsPerSecond = 240;
 constexpr int stepsPerFrame = 4;    // 60 frames a second are recorded
-constexpr int measuredFrames = 15;  // penetrations in motion are measured every so many frames
+constexpr int measuredFrames = 30;  // penetrations in motion are measured every so many frames
 constexpr float restShown = 0.5f;   // how long the recording goes on when all is at rest [s]
 constexpr int bodiesPerLayer = 5;
 constexpr float layerHeight = 0.26f;  // between layers at the start: more than any bunny is long [m]
+// between surface points; the finest part of a bunny, its ears, is 8 of its voxels thick [voxels of the body's own]
+constexpr float bunnySpacing = 4, bowlSpacing = 2;
 // at 6 m/s a bunny moves 16 of its voxels in one step: the bands must still hold it then [voxels]
 constexpr float bunnyInteriorWidth = 20, bowlInteriorWidth = 6;
 
-constexpr std::uint32_t bowlColour = 0xf1ebe1;
-constexpr std::uint32_t bunnyColours[] = {0xc9694c, 0xdca94a, 0x7f9f80, 0x3f7f8c,
-                                          0x6d8db8, 0xdba79b, 0xe9dcc3, 0x7a5a78};
+constexpr std::uint32_t bowlColour = 0x35506b;
+constexpr std::uint32_t bunnyColours[] = {0xe07a5f, 0xf2cc8f, 0x81b29a, 0xf4f1de,
+                                          0x9db4d6, 0xe8a598, 0xc9b1d9, 0x7fb7be};
 
 struct Options {
     int bodies = 30, resolution = 128, threads = 0;
@@ -55,17 +57,21 @@ struct Options {
 
 // A thing that bodies are made of: what Bullet collides, and what measures whether it did.
 struct Thing {
-    std::string name;
     Mesh mesh;
     LevelSet field;
     std::shared_ptr<bullet::Shape> shape;
 };
 
-struct Simulation {
+using Phases = std::vector<std::pair<const char*, double>>;  // what was done, and the seconds that it took
+
+struct Run {
     std::vector<std::vector<Pose>> frames;  // the bowl first
-    std::vector<double> stepSeconds;
-    long contactsFound = 0, contactsKept = 0, beyondBand = 0;
-    int pairs = 0, asleep = 0;
+    std::vector<double> stepMs;
+    long contactsFound = 0, contactsKept = 0, beyondBand = 0;  // sums over all steps
+    int asleep = 0, inBowl = 0;                                // at the end
+    double penetrationAtRest = 0, penetrationInMotion = 0;     // [m]
+
+    double meanStep() const { return std::accumulate(stepMs.begin(), stepMs.end(), 0.0) / double(stepMs.size()); }
 };
 
 double secondsOf(const std::function<void()>& work) {
@@ -76,22 +82,21 @@ double secondsOf(const std::function<void()>& work) {
 
 // The bunny, upright along z; a knot where Debian's bunny is not installed.
 std::pair<std::string, Mesh> readBunny() {
-    if (!std::filesystem::exists(bunnyFile)) return {"knot", shapes::torusKnot(2, 3, 0.06f, 0.02f)};
+    if (!std::filesystem::exists(bunnyFile)) return {"knots", shapes::torusKnot(2, 3, 0.06f, 0.02f)};
     const Mesh mesh = readMesh(bunnyFile);
     const glm::mat4 smaller = glm::scale(glm::mat4(1), glm::vec3(bunnySize / bounds(mesh).longestSide()));
-    return {"bunny", transformed(mesh, glm::rotate(smaller, glm::radians(90.f), glm::vec3(1, 0, 0)))};
+    return {"bunnies", transformed(mesh, glm::rotate(smaller, glm::radians(90.f), glm::vec3(1, 0, 0)))};
 }
 
 // From a mesh to a shape for Bullet: this is all there is to it.
-Thing makeThing(std::string name, Mesh mesh, float voxelSize, float interiorWidth) {
+Thing makeThing(Mesh mesh, float voxelSize, float interiorWidth, float spacing) {
     BuildOptions options;
     options.voxelSize = voxelSize;
     options.interiorWidth = interiorWidth;
     LevelSet field = build(mesh, options);
-    auto collider = std::make_shared<Collider>(mesh, field);
-    auto shape =
-        std::make_shared<bullet::Shape>(collider, bullet::ShapeOptions{.frame = bullet::centreOfMassFrame(*collider)});
-    return {std::move(name), std::move(mesh), std::move(field), std::move(shape)};
+    auto collider = std::make_shared<Collider>(mesh, field, ColliderOptions{spacing});
+    bullet::ShapeOptions centred{.frame = bullet::centreOfMassFrame(*collider)};
+    return {std::move(mesh), std::move(field), std::make_shared<bullet::Shape>(collider, centred)};
 }
 
 // Layers above the bowl, each a ring turned against the one below, every bunny turned at random.
@@ -109,42 +114,45 @@ std::vector<Pose> startPoses(int count) {
     return poses;
 }
 
-Simulation simulate(const Thing& bowl, const Thing& bunny, const Options& options) {
+Run simulate(const Thing& bowl, const Thing& bunny, const Options& options) {
     demo::World world;
     world.add(bowl.shape, {}, {});
     for (const Pose& pose : startPoses(options.bodies)) world.add(bunny.shape, {.mass = 1}, pose);
 
-    Simulation result;
-    result.frames.push_back(world.poses());
+    Run run;
+    run.frames.push_back(world.poses());
     int stepsLeft = int(options.seconds * stepsPerSecond), stepsOfRest = 0;
     while (stepsLeft-- > 0 && float(stepsOfRest) < restShown * stepsPerSecond) {
-        result.stepSeconds.push_back(secondsOf([&] { world.step(1 / stepsPerSecond); }));
-        const auto& statistics = world.statistics();
-        result.pairs = std::max(result.pairs, statistics.pairs);
-        result.contactsFound += statistics.contactsFound;
-        result.contactsKept += statistics.contactsKept;
-        result.beyondBand += statistics.beyondBand;
-        if (result.stepSeconds.size() % stepsPerFrame == 0) result.frames.push_back(world.poses());
+        run.stepMs.push_back(1e3 * secondsOf([&] { world.step(1 / stepsPerSecond); }));
+        run.contactsFound += world.statistics().contactsFound;
+        run.contactsKept += world.statistics().contactsKept;
+        run.beyondBand += world.statistics().beyondBand;
+        if (run.stepMs.size() % stepsPerFrame == 0) run.frames.push_back(world.poses());
         stepsOfRest = world.asleep() == world.moving() ? stepsOfRest + 1 : 0;
     }
-    result.asleep = world.asleep();
-    return result;
+    run.asleep = world.asleep();
+    return run;
 }
 
-// The deepest overlap of any two bodies, against the meshes themselves [m].
-double deepestPenetration(const demo::Specimen& bowl, const demo::Specimen& bunny, const std::vector<Pose>& poses) {
-    double deepest = 0;
+// The deepest overlap of any two bodies, against the meshes themselves, if deeper than `least` [m].
+double penetration(const demo::Specimen& bowl, const demo::Specimen& bunny, const std::vector<Pose>& poses,
+                   double least) {
     for (std::size_t i = 1; i < poses.size(); ++i) {
-        deepest = std::max(deepest, demo::penetration(bowl, poses[0], bunny, poses[i]));
-        for (std::size_t j = 1; j < i; ++j)
-            deepest = std::max(deepest, demo::penetration(bunny, poses[i], bunny, poses[j]));
+        least = demo::penetration(bowl, poses[0], bunny, poses[i], least);
+        for (std::size_t j = 1; j < i; ++j) least = demo::penetration(bunny, poses[i], bunny, poses[j], least);
     }
-    return deepest;
+    return least;
 }
 
-int inBowl(const std::vector<Pose>& poses) {
-    return int(std::count_if(poses.begin() + 1, poses.end(),
-                             [](const Pose& pose) { return glm::length(pose.position) < bowlRadius; }));
+void measure(const Thing& bowl, const Thing& bunny, Run& run) {
+    const double spacing = 2 * bunny.field.voxelSize();
+    const demo::Specimen bowlSpecimen(bowl.mesh, spacing), bunnySpecimen(bunny.mesh, spacing);
+    run.penetrationAtRest = penetration(bowlSpecimen, bunnySpecimen, run.frames.back(), 0);
+    run.penetrationInMotion = run.penetrationAtRest;
+    for (std::size_t i = 0; i < run.frames.size(); i += measuredFrames)
+        run.penetrationInMotion = penetration(bowlSpecimen, bunnySpecimen, run.frames[i], run.penetrationInMotion);
+    for (std::size_t i = 1; i < run.frames.back().size(); ++i)
+        run.inBowl += glm::length(run.frames.back()[i].position) < bowlRadius;
 }
 
 std::string grouped(std::uint64_t count) {
@@ -153,91 +161,88 @@ std::string grouped(std::uint64_t count) {
     return text;
 }
 
-void record(const Thing& bowl, const Thing& bunny, const Simulation& simulation, double meanMs,
-            const Options& options) {
-    demo::Recording recording(
-        fmt::format("{} {} fall into a bowl", options.bodies, bunny.name + (options.bodies > 1 ? "s" : "")));
+void record(const Thing& bowl, const Thing& bunny, const Run& run, const std::string& title, const Options& options) {
+    demo::Recording recording(title);
     recording.note("bodies", fmt::format("{} + bowl", options.bodies));
-    recording.note("triangles", fmt::format("{} each", grouped(bunny.mesh.triangles.size())));
-    recording.note("voxels", fmt::format("{} each", grouped(bunny.field.activeVoxels())));
-    recording.note("time per step", fmt::format("{:.1f} ms", meanMs));
-    recording.view = {.target = {0, 0, -0.42f},
-                      .distance = 3.1f,
+    recording.note("triangles", grouped(bunny.mesh.triangles.size()) + " each");
+    recording.note("voxels", grouped(bunny.field.activeVoxels()) + " each");
+    recording.note("time per step", fmt::format("{:.1f} ms", run.meanStep()));
+    recording.view = {.target = {0, 0, -0.44f},
+                      .distance = 2.75f,
                       .azimuth = -1.35f,
-                      .elevation = 0.7f,
+                      .elevation = 0.74f,
                       .groundHeight = bounds(bowl.mesh).lower.z};
 
-    recording.addBody(recording.addMesh(bowl.mesh), {.colour = bowlColour, .roughness = 0.4f, .clearcoat = 0.6f});
+    recording.addBody(recording.addMesh(bowl.mesh), {.colour = bowlColour, .roughness = 0.35f, .clearcoat = 0.7f});
     const int mesh = recording.addMesh(bunny.mesh);
     for (int i = 0; i < options.bodies; ++i)
         recording.addBody(
             mesh,
-            {.colour = bunnyColours[std::size_t(i) % std::size(bunnyColours)], .roughness = 0.5f, .clearcoat = 0.2f});
-    for (std::size_t i = 0; i < simulation.frames.size(); ++i)
-        recording.frame(double(i) * stepsPerFrame / stepsPerSecond, simulation.frames[i]);
+            {.colour = bunnyColours[std::size_t(i) % std::size(bunnyColours)], .roughness = 0.55f, .clearcoat = 0.12f});
+    for (std::size_t i = 0; i < run.frames.size(); ++i)
+        recording.frame(double(i) * stepsPerFrame / stepsPerSecond, run.frames[i]);
     recording.write(options.out / "bowl.html");
 }
 
-void run(const Options& options) {
+void row(const char* label, const std::string& value) {
+    fmt::print("  {:<32}{}\n", label, value);
+}
+
+void printTable(const Thing& bowl, const Thing& bunny, const Run& run, const Phases& phases, const Options& options) {
+    const double voxel = bunny.field.voxelSize(), steps = double(run.stepMs.size());
+    const auto field = [](const LevelSet& f) {
+        return fmt::format("{} voxels of {:.2f} mm, {:.1f} MB", grouped(f.activeVoxels()), 1e3 * f.voxelSize(),
+                           1e-6 * double(f.memoryBytes()));
+    };
+    const auto depth = [&](double d) { return fmt::format("{:.2f} mm = {:.2f} voxels", 1e3 * d, d / voxel); };
+    const MeshReport report = inspect(bunny.mesh);
+    row("mesh", fmt::format("{} triangles, {}", grouped(report.triangles),
+                            report.closed() && report.oriented() ? "closed" : "NOT closed"));
+    row("field", field(bunny.field));
+    row("field of the bowl", field(bowl.field));
+    for (const auto& [name, seconds] : phases) row(name, fmt::format("{:.2f} s", seconds));
+    row("simulated", fmt::format("{:.2f} s in {:.0f} steps", steps / stepsPerSecond, steps));
+    row("a step", fmt::format("{:.2f} ms, at most {:.2f} ms", run.meanStep(),
+                              *std::max_element(run.stepMs.begin(), run.stepMs.end())));
+    row("contacts a step",
+        fmt::format("{:.0f} found, {:.0f} kept", double(run.contactsFound) / steps, double(run.contactsKept) / steps));
+    row("points too deep for the band", grouped(std::uint64_t(run.beyondBand)));
+    row("asleep", fmt::format("{} of {}", run.asleep, options.bodies));
+    row("in the bowl", fmt::format("{} of {}", run.inBowl, options.bodies));
+    row("deepest penetration", depth(run.penetrationAtRest) + ", by the meshes");
+    row("deepest while moving", depth(run.penetrationInMotion) + ", by the meshes");
+}
+
+void runDemo(const Options& options) {
     std::filesystem::create_directories(options.out);
     std::optional<tbb::global_control> limit;
     if (options.threads > 0) limit.emplace(tbb::global_control::max_allowed_parallelism, std::size_t(options.threads));
 
+    Phases phases;
+    const auto phase = [&](const char* name, const std::function<void()>& work) {
+        phases.emplace_back(name, secondsOf(work));
+    };
     std::pair<std::string, Mesh> read;
-    const double readSeconds = secondsOf([&] { read = readBunny(); });
-
-    const float voxel = voxelSizeFor(read.second, float(options.resolution));
     std::optional<Thing> bunny, bowl;
-    const double buildSeconds = secondsOf([&] {
-        bunny = makeThing(read.first, read.second, voxel, bunnyInteriorWidth);
-        bowl = makeThing("bowl", shapes::bowl(bowlRadius, bowlWall, 192, bowlOpening, bowlFoot), bowlVoxels * voxel,
-                         bowlInteriorWidth);
+    Run run;
+    phase("read the mesh", [&] { read = readBunny(); });
+    const auto& [name, mesh] = read;
+    const std::string title = fmt::format("{} {} in a bowl", options.bodies, name);
+    fmt::print("{}\n", title);
+
+    const float voxel = voxelSizeFor(mesh, float(options.resolution));
+    phase("build both fields", [&] {
+        bunny = makeThing(mesh, voxel, bunnyInteriorWidth, bunnySpacing);
+        bowl = makeThing(shapes::bowl(bowlRadius, bowlWall, 192, bowlOpening, bowlFoot), bowlVoxels * voxel,
+                         bowlInteriorWidth, bowlSpacing);
     });
-    writeVdb(options.out / (bunny->name + ".vdb"), bunny->field);
-
-    Simulation simulation;
-    const double simulateSeconds = secondsOf([&] { simulation = simulate(*bowl, *bunny, options); });
-    const double steps = double(simulation.stepSeconds.size());
-    const double meanMs =
-        1e3 * std::accumulate(simulation.stepSeconds.begin(), simulation.stepSeconds.end(), 0.0) / steps;
-    const double maxMs = 1e3 * *std::max_element(simulation.stepSeconds.begin(), simulation.stepSeconds.end());
-
-    double atRest = 0, inMotion = 0;
-    const double measureSeconds = secondsOf([&] {
-        const demo::Specimen bowlSpecimen(bowl->mesh, voxel), bunnySpecimen(bunny->mesh, voxel);
-        for (std::size_t i = 0; i < simulation.frames.size(); i += measuredFrames)
-            inMotion = std::max(inMotion, deepestPenetration(bowlSpecimen, bunnySpecimen, simulation.frames[i]));
-        atRest = deepestPenetration(bowlSpecimen, bunnySpecimen, simulation.frames.back());
+    phase("simulate", [&] { run = simulate(*bowl, *bunny, options); });
+    phase("measure", [&] { measure(*bowl, *bunny, run); });
+    phase("write", [&] {
+        writeVdb(options.out / (name == "bunnies" ? "bunny.vdb" : "knot.vdb"), bunny->field);
+        record(*bowl, *bunny, run, title, options);
     });
-    const double recordSeconds = secondsOf([&] { record(*bowl, *bunny, simulation, meanMs, options); });
-
-    const MeshReport report = inspect(bunny->mesh);
-    const double recorded = double(simulation.frames.size() - 1) * stepsPerFrame / stepsPerSecond;
-    const auto row = [](const char* label, const std::string& value) { fmt::print("  {:<34}{}\n", label, value); };
-    const auto depth = [&](double d) { return fmt::format("{:.2f} mm = {:.2f} voxels", 1e3 * d, d / voxel); };
-    fmt::print("{} {} fall into a bowl\n", options.bodies, bunny->name);
-    row("mesh", fmt::format("{} triangles, {}", grouped(report.triangles),
-                            report.closed() && report.oriented() ? "closed" : "not closed"));
-    row("field", fmt::format("{} voxels of {:.2f} mm, {:.1f} MB", grouped(bunny->field.activeVoxels()), 1e3 * voxel,
-                             1e-6 * double(bunny->field.memoryBytes())));
-    row("field of the bowl",
-        fmt::format("{} voxels of {:.2f} mm", grouped(bowl->field.activeVoxels()), 1e3 * bowl->field.voxelSize()));
-    fmt::print("phase\n");
-    row("read", fmt::format("{:.2f} s", readSeconds));
-    row("build two fields", fmt::format("{:.2f} s", buildSeconds));
-    row("simulate", fmt::format("{:.2f} s for {:.2f} s", simulateSeconds, recorded));
-    row("measure", fmt::format("{:.2f} s", measureSeconds));
-    row("record", fmt::format("{:.2f} s", recordSeconds));
-    fmt::print("step of {:.2f} ms\n", 1e3 / stepsPerSecond);
-    row("time", fmt::format("{:.2f} ms mean, {:.2f} ms at most", meanMs, maxMs));
-    row("contacts", fmt::format("{:.0f} found, {:.0f} kept, mean", double(simulation.contactsFound) / steps,
-                                double(simulation.contactsKept) / steps));
-    row("points beyond the band", grouped(std::uint64_t(simulation.beyondBand)));
-    fmt::print("at the end\n");
-    row("asleep", fmt::format("{} of {}", simulation.asleep, options.bodies));
-    row("in the bowl", fmt::format("{} of {}", inBowl(simulation.frames.back()), options.bodies));
-    row("deepest penetration", depth(atRest));
-    row("deepest penetration in motion", depth(inMotion));
+    printTable(*bowl, *bunny, run, phases, options);
 }
 
 }  // namespace
@@ -258,7 +263,7 @@ int main(int argc, char** argv) {
     app.add_option("--out", options.out, "folder for the results")->capture_default_str();
     CLI11_PARSE(app, argc, argv);
     try {
-        run(options);
+        runDemo(options);
     } catch (const std::exception& error) {
         fmt::print(stderr, "bowl: {}\n", error.what());
         return 1;

@@ -236,8 +236,8 @@ double Specimen::deepestIn(const ExactDistance& other, const Pose& self, const P
     return descent.deepest;
 }
 
-double penetration(const Specimen& a, const Pose& poseA, const Specimen& b, const Pose& poseB) {
-    return a.deepestIn(b.distance(), poseA, poseB, b.deepestIn(a.distance(), poseB, poseA));
+double penetration(const Specimen& a, const Pose& poseA, const Specimen& b, const Pose& poseB, double least) {
+    return a.deepestIn(b.distance(), poseA, poseB, b.deepestIn(a.distance(), poseB, poseA, least));
 }
 
 }  // namespace bilayer::demo

@@ -78,7 +78,8 @@ class Specimen {
     std::vector<Ball> balls_;
 };
 
-/// How deep some surface point of one body lies under the surface of the other [m]; 0 if none does.
-double penetration(const Specimen& a, const Pose& poseA, const Specimen& b, const Pose& poseB);
+/// How deep some surface point of one body lies under the surface of the other, if deeper than `least`; else `least`
+/// [m].
+double penetration(const Specimen& a, const Pose& poseA, const Specimen& b, const Pose& poseB, double least = 0);
 
 }  // namespace bilayer::demo

@@ -5,9 +5,17 @@ namespace {
 
 constexpr float gravity = 9.81f;  // [m/s^2]
 
-// Slower than this, a body may fall asleep. Bullet's own thresholds (0.8 m/s, 1 rad/s) are for crates and cars.
-constexpr float restingSpeed = 0.03f;  // [m/s]
-constexpr float restingSpin = 0.3f;    // [rad/s]
+// Slower than this for so long, bodies that touch fall asleep together. Bullet's own thresholds (0.8 m/s, 1 rad/s, 2 s)
+// are for crates and cars: small things that still roll would freeze.
+constexpr float restingSpeed = 0.1f;  // [m/s]
+constexpr float restingSpin = 1;      // [rad/s]
+constexpr float restingTime = 1;      // [s]
+
+// Bodies at rest overlap by this much, so that their contacts last from step to step [m].
+constexpr float restingOverlap = 0.0003f;
+
+// What air and soft surfaces take: a share of the speed and of the spin a second.
+constexpr float linearDamping = 0.05f, angularDamping = 0.2f;
 
 btTransform toTransform(const Pose& pose) {
     const auto& [p, q] = pose;
@@ -33,6 +41,8 @@ btRigidBody& World::add(std::shared_ptr<bullet::Shape> shape, const Matter& matt
     info.m_friction = matter.friction;
     info.m_rollingFriction = matter.rollingFriction;
     info.m_restitution = matter.restitution;
+    info.m_linearDamping = linearDamping;
+    info.m_angularDamping = angularDamping;
     info.m_linearSleepingThreshold = restingSpeed;
     info.m_angularSleepingThreshold = restingSpin;
     bodies_.push_back({std::move(shape), std::make_unique<btRigidBody>(info)});

@@ -43,6 +43,8 @@ class World {
     int moving() const;
     int asleep() const;
 
+    /// For constraints, rays and whatever else Bullet offers.
+    btDiscreteDynamicsWorld& bullet() { return world_; }
     const bullet::DispatchStatistics& statistics() const { return dispatcher_.statistics(); }
 
   private:
