@@ -136,7 +136,8 @@ struct Field::Data {
     std::vector<std::int32_t> directory;
     std::unique_ptr<float[]> values;
     std::size_t stored = 0;
-    double voxel;  // its edge [m], unrounded: far from the origin it counts
+    double voxel;     // its edge [m], unrounded: far from the origin it counts
+    double perMetre;  // voxels
     float voxelSize, exteriorWidth, interiorWidth;
     Bounds bounds;
 
@@ -146,7 +147,7 @@ struct Field::Data {
 
     // Points are in voxels from the directory's first one, in double: exact enough however far the mesh is from the
     // origin.
-    glm::dvec3 toLocal(const glm::vec3& point) const { return (glm::dvec3(point) - origin) / voxel; }
+    glm::dvec3 toLocal(const glm::vec3& point) const { return (glm::dvec3(point) - origin) * perMetre; }
     glm::vec3 toWorld(const glm::dvec3& local) const { return glm::vec3(local * voxel + origin); }
     glm::dvec3 extent() const { return double(side) * glm::dvec3(blocks); }
 
@@ -160,6 +161,7 @@ struct Field::Data {
 
 Field::Data::Data(const LevelSet& levelSet)
     : voxel(levelSet.grids().distance->voxelSize()[0]),
+      perMetre(1 / voxel),
       voxelSize(levelSet.voxelSize()),
       exteriorWidth(levelSet.exteriorWidth()),
       interiorWidth(levelSet.interiorWidth()) {
@@ -238,11 +240,15 @@ Sample Field::Data::sample(const glm::dvec3& local) const {
     const Cell cell{{v[0], v[1], v[y], v[y + 1], v[x], v[x + 1], v[x + y], v[x + y + 1]},
                     glm::vec3(local - glm::dvec3(voxel))};
     const float distance = interpolate(cell);
-    const auto [low, high] = std::minmax_element(cell.values.begin(), cell.values.end());
-    const bool inBand = *low > -interiorWidth && *high < exteriorWidth;
+    float low = cell.values[0], high = low;
+    for (const float value : cell.values) {
+        low = std::min(low, value);
+        high = std::max(high, value);
+    }
+    const bool inBand = low > -interiorWidth && high < exteriorWidth;
     if (!inBand) return {.distance = std::copysign(boundFromCorners(cell, voxelSize), distance)};
     if constexpr (withGradient)
-        return {.distance = distance, .gradient = interpolantGradient(cell) / voxelSize, .inBand = true};
+        return {.distance = distance, .gradient = interpolantGradient(cell) * float(perMetre), .inBand = true};
     else
         return {.distance = distance, .inBand = true};
 }
