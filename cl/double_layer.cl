@@ -39,7 +39,7 @@ typedef struct {
 // A sample in the block's own voxels, and the squared distances along z from its two layers, the same for every row.
 typedef struct {
     float3 at, inner, outer;
-    float8 inner2, outer2;
+    float8 innerZ2, outerZ2;
 } Sample;
 
 constant float lastVoxel = 7.0f;
@@ -48,18 +48,28 @@ float square(float value) { return value * value; }
 float outside(float coordinate) { return coordinate - clamp(coordinate, 0.0f, lastVoxel); }
 float3 toFloat3(const float* v) { return (float3)(v[0], v[1], v[2]); }
 
+// Squared distances from the eight voxels along an axis to a coordinate.
+float8 axisDistances(float coordinate) {
+    const float8 away = (float8)(0, 1, 2, 3, 4, 5, 6, 7) - coordinate;
+    return away * away;
+}
+
+// Which of the eight voxels along an axis lie in the paper's neighbourhood: within K of the voxel nearest to the sample.
+int8 inCube(float coordinate, int k) {
+    return fabs((float8)(0, 1, 2, 3, 4, 5, 6, 7) - floor(coordinate + 0.5f)) <= (float8)(k);
+}
+
 Sample makeSample(float3 at, float3 offset, int cube) {
-    const float8 z = (float8)(0, 1, 2, 3, 4, 5, 6, 7);
     Sample s;
     s.at = at;
     s.inner = at - offset;
     s.outer = at + offset;
-    s.inner2 = (z - s.inner.z) * (z - s.inner.z);
-    s.outer2 = (z - s.outer.z) * (z - s.outer.z);
+    s.innerZ2 = axisDistances(s.inner.z);
+    s.outerZ2 = axisDistances(s.outer.z);
     if (cube > 0) {
-        const int8 beyond = fabs(z - floor(at.z + 0.5f)) > (float8)(cube);
-        s.inner2 = select(s.inner2, (float8)(INFINITY), beyond);
-        s.outer2 = select(s.outer2, (float8)(INFINITY), beyond);
+        const int8 kept = inCube(at.z, cube);
+        s.innerZ2 = select((float8)(INFINITY), s.innerZ2, kept);
+        s.outerZ2 = select((float8)(INFINITY), s.outerZ2, kept);
     }
     return s;
 }
@@ -71,10 +81,8 @@ void clear(Layers* layers) {
     }
 }
 
-// Keeps the smaller distances of the row at (x, y); the first triangle of equal ones stays.
-void nearer(Layers* layers, int row, const Sample* s, float x, float y, int owner) {
-    const float8 inner2 = square(x - s->inner.x) + square(y - s->inner.y) + s->inner2;
-    const float8 outer2 = square(x - s->outer.x) + square(y - s->outer.y) + s->outer2;
+// Keeps the smaller distances of a row; the first triangle of equal ones stays.
+void nearer(Layers* layers, int row, float8 inner2, float8 outer2, int owner) {
     if (TRIANGLES) {
         layers->innerOwner[row] = select(layers->innerOwner[row], (int8)(owner), inner2 < layers->inner2[row]);
         layers->outerOwner[row] = select(layers->outerOwner[row], (int8)(owner), outer2 < layers->outer2[row]);
@@ -83,6 +91,8 @@ void nearer(Layers* layers, int row, const Sample* s, float x, float y, int owne
     layers->outer2[row] = min(layers->outer2[row], outer2);
 }
 
+// A sample applies to all rows that meet the ball of radius `reach` around it, or the cube. Voxels of such a row beyond
+// the ball do no harm: a voxel counts only if it is certainly within the reach of its nearest sample.
 #ifdef ROW_PER_ITEM
 
 // Applies a sample to the one row of this work-item.
@@ -91,47 +101,60 @@ void splat(Layers* layers, float3 at, float3 offset, Parameters parameters, int 
     if (parameters.cube > 0) {
         const float k = (float)(parameters.cube);
         if (fabs(x - floor(at.x + 0.5f)) > k || fabs(y - floor(at.y + 0.5f)) > k) return;
-    } else if (square(x - at.x) + square(y - at.y) + square(outside(at.z)) >= square(parameters.reach)) {
+    } else if (square(x - at.x) + square(y - at.y) >= square(parameters.reach) - square(outside(at.z))) {
         return;
     }
     const Sample s = makeSample(at, offset, parameters.cube);
-    nearer(layers, 0, &s, x, y, owner);
+    nearer(layers, 0, square(x - s.inner.x) + square(y - s.inner.y) + s.innerZ2,
+           square(x - s.outer.x) + square(y - s.outer.y) + s.outerZ2, owner);
 }
 
 #else
 
-// The paper's neighbourhood: (2K + 1)^3 voxels around the voxel nearest to the sample.
-void splatCube(Layers* layers, const Sample* s, int k, int owner) {
-    const int x = convert_int(floor(s->at.x + 0.5f)), y = convert_int(floor(s->at.y + 0.5f));
-    for (int i = max(0, x - k); i <= min(7, x + k); ++i)
-        for (int j = max(0, y - k); j <= min(7, y + k); ++j)
-            nearer(layers, i * 8 + j, s, (float)(i), (float)(j), owner);
+// Rows of a block as a bit each: row (x, y) is bit 8 x + y.
+typedef ulong Rows;
+
+#ifndef __ENDIAN_LITTLE__
+#error "bits of rows are gathered from bytes in little endian order"
+#endif
+
+Rows rowsWithin(float3 at, float limit2) {
+    const float8 x2 = axisDistances(at.x);
+    float y2[8];
+    vstore8(axisDistances(at.y), 0, y2);
+    int8 bits = 0;
+    for (int y = 0; y < 8; ++y) bits |= (x2 + y2[y] < limit2) & (1 << y);
+    return as_ulong(convert_uchar8(bits));
 }
 
-// Whole rows are updated: voxels of a row beyond the ball do no harm, since a voxel counts only if it lies certainly
-// within the reach of its nearest sample.
-void splatBall(Layers* layers, const Sample* s, float left, int owner) {
-    const float halfX = sqrt(left);
-    const int lastX = min(7, (int)(s->at.x + halfX));
-    for (int i = max(0, (int)(s->at.x - halfX + 1)); i <= lastX; ++i) {
-        const float leftY = left - square((float)(i) - s->at.x);
-        if (leftY <= square(outside(s->at.y))) continue;
-        const float halfY = sqrt(leftY);
-        const int lastY = min(7, (int)(s->at.y + halfY));
-        for (int j = max(0, (int)(s->at.y - halfY + 1)); j <= lastY; ++j)
-            nearer(layers, i * 8 + j, s, (float)(i), (float)(j), owner);
-    }
+Rows rowsInCube(float3 at, int k) {
+    int inY[8], bits = 0;
+    vstore8(inCube(at.y, k), 0, inY);
+    for (int y = 0; y < 8; ++y) bits |= inY[y] & (1 << y);
+    return as_ulong(convert_uchar8(inCube(at.x, k) & bits));
 }
 
-// Applies a sample to the rows of a block that a ball or a cube around it touches.
+// Squared distances from a point to the rows across z.
+void rowDistances(float3 point, float* squares) {
+    float x2[8];
+    vstore8(axisDistances(point.x), 0, x2);
+    const float8 y2 = axisDistances(point.y);
+    for (int x = 0; x < 8; ++x) vstore8(x2[x] + y2, x, squares);
+}
+
+// Applies a sample to the rows of a block.
 void splat(Layers* layers, float3 at, float3 offset, Parameters parameters, int owner) {
-    const float left = square(parameters.reach) - square(outside(at.z));
-    if (parameters.cube == 0 && left <= square(outside(at.x)) + square(outside(at.y))) return;
+    const float limit2 = square(parameters.reach) - square(outside(at.z));
+    if (parameters.cube == 0 && square(outside(at.x)) + square(outside(at.y)) >= limit2) return;
     const Sample s = makeSample(at, offset, parameters.cube);
-    if (parameters.cube > 0)
-        splatCube(layers, &s, parameters.cube, owner);
-    else
-        splatBall(layers, &s, left, owner);
+    float inner2[64], outer2[64];
+    rowDistances(s.inner, inner2);
+    rowDistances(s.outer, outer2);
+    Rows rows = parameters.cube > 0 ? rowsInCube(at, parameters.cube) : rowsWithin(at, limit2);
+    for (; rows != 0; rows &= rows - 1) {
+        const int row = 63 - (int)(clz(rows & -rows));
+        nearer(layers, row, inner2[row] + s.innerZ2, outer2[row] + s.outerZ2, owner);
+    }
 }
 
 #endif
