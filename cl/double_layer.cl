@@ -54,7 +54,7 @@ float8 axisDistances(float coordinate) {
     return away * away;
 }
 
-// Which of the eight voxels along an axis lie in the paper's neighbourhood: within K of the voxel nearest to the sample.
+// Which of the eight voxels on an axis lie in the paper's neighbourhood: within K of the voxel nearest to the sample.
 int8 inCube(float coordinate, int k) {
     return fabs((float8)(0, 1, 2, 3, 4, 5, 6, 7) - floor(coordinate + 0.5f)) <= (float8)(k);
 }
