@@ -56,7 +56,8 @@ Json gridList(const std::filesystem::path& path) {
     openvdb::io::File file(path.string());
     file.open(/*delayLoad=*/false);
     Json list = Json::array();
-    for (const auto& grid : *file.readAllGridMetadata())
+    const openvdb::GridPtrVecPtr grids = file.readAllGridMetadata();
+    for (const auto& grid : *grids)
         list.push_back({{"name", grid->getName()},
                         {"type", grid->valueType()},
                         {"class", openvdb::GridBase::gridClassToString(grid->getGridClass())},

@@ -79,7 +79,11 @@ openvdb::FloatGrid::Ptr startingLiquid(const Arguments& a, const Input& first) {
     float voxelSize = a.voxelSize;
     if (a.resolution > 0) voxelSize = voxelSizeFor(*first.mesh, a.resolution);
     if (!(voxelSize > 0)) voxelSize = first.field->voxelSize();
-    return openvdb::createLevelSet<openvdb::FloatGrid>(voxelSize, a.halfWidth);
+    try {
+        return openvdb::createLevelSet<openvdb::FloatGrid>(voxelSize, a.halfWidth);
+    } catch (const openvdb::ArithmeticError&) {
+        throw std::runtime_error(fmt::format("a voxel size of {} is too small for OpenVDB", voxelSize));
+    }
 }
 
 void add(openvdb::FloatGrid& liquid, const Input& input, const Arguments& a, const Pose& pose) {

