@@ -173,7 +173,7 @@ void record(const Thing& bowl, const Thing& bunny, const Run& run, const std::st
                       .elevation = 0.74f,
                       .groundHeight = bounds(bowl.mesh).lower.z};
 
-    recording.addBody(recording.addMesh(bowl.mesh), {.colour = bowlColour, .roughness = 0.35f, .clearcoat = 0.7f});
+    recording.addBody(recording.addMesh(bowl.mesh), {.colour = bowlColour, .roughness = 0.45f, .clearcoat = 0.6f});
     const int mesh = recording.addMesh(bunny.mesh);
     for (int i = 0; i < options.bodies; ++i)
         recording.addBody(
@@ -261,9 +261,11 @@ int main(int argc, char** argv) {
         ->check(CLI::Range(0, 1024))
         ->capture_default_str();
     app.add_option("--out", options.out, "folder for the results")->capture_default_str();
-    CLI11_PARSE(app, argc, argv);
     try {
+        app.parse(argc, argv);
         runDemo(options);
+    } catch (const CLI::ParseError& error) {
+        return app.exit(error) == 0 ? 0 : 2;
     } catch (const std::exception& error) {
         fmt::print(stderr, "bowl: {}\n", error.what());
         return 1;
