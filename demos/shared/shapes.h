@@ -20,8 +20,8 @@ Mesh torus(float major, float minor, int around = 96, int across = 48);
 /// A tube of radius `thickness` along the (p, q) torus knot around z: the p = 2, q = 3 knot is the trefoil.
 Mesh torusKnot(int p, int q, float radius, float thickness, int along = 600, int across = 32);
 
-/// The solid that a closed profile (radius >= 0, height) sweeps around z. The profile runs counter-clockwise seen with the
-/// radius to the right and the height up; points of radius 0 become poles.
+/// The solid that a closed profile (radius >= 0, height) sweeps around z. The profile runs counter-clockwise seen with
+/// the radius to the right and the height up; points of radius 0 become poles.
 Mesh revolve(const std::vector<glm::vec2>& profile, int segments = 96);
 
 /// A solid cylinder and a cone around z, from -height / 2 to height / 2 (the apex on top).
