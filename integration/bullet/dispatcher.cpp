@@ -27,6 +27,12 @@ bool isField(const btCollisionShape* shape) {
     return shape->getShapeType() == FAST_CONCAVE_MESH_PROXYTYPE;
 }
 
+/// GImpact counts locks while its triangles are read, without atomics: such pairs wait for their turn in Bullet's
+/// order.
+bool locks(const btCollisionShape* shape) {
+    return shape->getShapeType() == GIMPACT_SHAPE_PROXYTYPE;
+}
+
 /// A shape where it stands in the world; for the child of a compound, the child's own.
 struct Side {
     const btCollisionShape* shape;
@@ -203,7 +209,7 @@ void Dispatcher::dispatchAllCollisionPairs(btOverlappingPairCache* cache, const 
         if (!overlap.m_algorithm) overlap.m_algorithm = findAlgorithm(&one, &two, nullptr, BT_CONTACT_POINT_ALGORITHMS);
         // Not ours: a compound's, which comes to us for its children, or one that the user has registered.
         const auto* algorithm = dynamic_cast<Algorithm*>(overlap.m_algorithm);
-        if (!algorithm) continue;
+        if (!algorithm || locks(one.getCollisionShape()) || locks(two.getCollisionShape())) continue;
         const bool straight = algorithm->bIsSecond();
         tasks.push_back({algorithm->pair(), sideOf(straight ? one : two), sideOf(straight ? two : one)});
     }
