@@ -7,6 +7,7 @@
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "sdf/double_layer.cpp"
 #include <hwy/foreach_target.h>
+#include <hwy/cache_control.h>
 #include <hwy/highway.h>
 
 #include <algorithm>
@@ -25,6 +26,9 @@ using Tag = hn::CappedTag<float, blockSide>;
 using IntTag = hn::RebindToSigned<Tag>;
 using Vec = hn::Vec<Tag>;
 
+/// Tiles that are fetched before they are needed: about the latency of memory.
+constexpr std::size_t tilesAhead = 6;
+
 // Squared distances of one block to the samples of both layers, and whose they are.
 struct Layers {
     HWY_ALIGN float inner2[blockVoxels];
@@ -39,8 +43,13 @@ struct Sample {
 };
 
 inline float square(float value) { return value * value; }
-inline float max(float a, float b) { return a > b ? a : b; }
-inline float outside(float coordinate) { return max(max(-coordinate, coordinate - float(blockSide - 1)), 0.f); }
+
+// The squared distance to the block along one axis.
+inline float outside2(float coordinate) {
+    constexpr float half = 0.5f * float(blockSide - 1);
+    const float away = std::abs(coordinate - half) - half;
+    return away > 0.f ? square(away) : 0.f;
+}
 
 /// Rows of eight voxels along z, a bit each: row (x, y) is bit 8 x + y.
 using Rows = std::uint64_t;
@@ -117,8 +126,8 @@ inline void update(const Sample& s, Rows rows, const AxisDistances& innerZ, cons
 // ball do no harm: a voxel counts only if it is certainly within the reach of its nearest sample.
 template <bool withOwners>
 inline void splatBall(const Sample& s, float reach, Layers& layers, std::int32_t owner) {
-    const float limit2 = square(reach) - square(outside(s.centre.z));
-    if (square(outside(s.centre.x)) + square(outside(s.centre.y)) >= limit2) return;
+    const float limit2 = square(reach) - outside2(s.centre.z);
+    if (outside2(s.centre.x) + outside2(s.centre.y) >= limit2) return;
     update<withOwners>(s, rowsWithin(s, limit2), AxisDistances(s.inner.z), AxisDistances(s.outer.z), layers, owner);
 }
 
@@ -151,7 +160,9 @@ inline bool runMisses(const glm::vec3& a, const glm::vec3& b, float reach) {
 template <bool withOwners>
 void applyTiles(const Tiles& tiles, std::span<const std::uint32_t> indices, const glm::ivec3& block,
                 const FillParameters& parameters, Layers& layers) {
-    for (const std::uint32_t index : indices) {
+    for (std::size_t k = 0; k < indices.size(); ++k) {
+        if (k + tilesAhead < indices.size()) hwy::Prefetch(&tiles.tiles[indices[k + tilesAhead]]);
+        const std::uint32_t index = indices[k];
         const Tile& tile = tiles.tiles[index];
         const std::int32_t owner = withOwners ? tiles.triangles[index] : 0;
         const glm::vec3 shift(tile.base - block);
