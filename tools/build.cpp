@@ -146,10 +146,9 @@ void run(Arguments a) {
 
 void addBand(CLI::App& command, Arguments& a) {
     auto* size = command.add_option_group("voxel size", "exactly one of");
-    size->add_option("--voxel-size", a.options.voxelSize, "edge of a voxel in the mesh's unit")
-        ->check(CLI::PositiveNumber);
+    size->add_option("--voxel-size", a.options.voxelSize, "edge of a voxel in the mesh's unit")->check(positive());
     a.resolutionGiven = size->add_option("--resolution", a.resolution, "voxels along the longest side of the bounds")
-                            ->check(CLI::PositiveNumber);
+                            ->check(positive());
     size->require_option(1);
     const CLI::Range widths(1e-3, 1e3);
     auto* half =

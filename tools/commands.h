@@ -3,8 +3,21 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <limits>
+#include <string>
 
 namespace bilayer::tools {
+
+/// Accepts finite numbers above zero; CLI::PositiveNumber lets NaN through.
+inline CLI::Validator positive() {
+    const auto complaint = [](const std::string& word) -> std::string {
+        float value = 0;
+        const bool good =
+            CLI::detail::lexical_cast(word, value) && value > 0 && value <= std::numeric_limits<float>::max();
+        return good ? "" : "must be a finite number above zero";
+    };
+    return CLI::Validator(complaint, "POSITIVE");
+}
 
 void addBuild(CLI::App& app);
 void addInspect(CLI::App& app);

@@ -161,10 +161,10 @@ void addSeed(CLI::App& app) {
     auto* into = command->add_option("--into", a->into, "a liquid to start from, instead of an empty one");
     auto* size =
         command->add_option("--voxel-size", a->voxelSize, "edge of the liquid's voxels, default the first field's")
-            ->check(CLI::PositiveNumber);
+            ->check(positive());
     auto* resolution =
         command->add_option("--resolution", a->resolution, "voxels along the longest side of the first mesh's bounds")
-            ->check(CLI::PositiveNumber);
+            ->check(positive());
     size->excludes(into)->excludes(resolution);
     resolution->excludes(into);
     command->add_option("--half-width", a->halfWidth, "the liquid's band [voxels], default 3")
