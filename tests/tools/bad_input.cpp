@@ -61,7 +61,7 @@ TEST_CASE("meshes that cannot be read") {
     requireFault(buildOf(textFile("unknown.xyz", "1 2 3\n")), "unknown.xyz");
     requireFault(buildOf(cut(sphereFile(), "cut.ply", 0.6)), "cut.ply");
     requireFault(buildOf(textFile("nan.obj", "v 0 0 0\nv nan 0 0\nv 0 1 0\nf 1 2 3\n")), "nan.obj");
-    requireFault(buildOf(textFile("range.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 7\n")), "range.off");
+    requireFault(buildOf(textFile("range.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 7\n")), "range.obj");
     CHECK_FALSE(std::filesystem::exists(output()));
 }
 
