@@ -59,11 +59,13 @@ void requireLiquid(const FloatGrid& liquid) {
     if (!fault.empty()) refuse("the liquid's grid is no level set: " + fault.substr(0, fault.find('\n')));
 }
 
-void requirePose(const Pose& pose) {
+void requirePose(const Pose& pose, double voxelSize) {
     const auto finite = [](float x) { return std::isfinite(x); };
     const glm::vec3& p = pose.position;
     const glm::quat& q = pose.rotation;
     if (!finite(p.x) || !finite(p.y) || !finite(p.z)) refuse("the pose's position is not finite");
+    if (std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}) > maxIndex * voxelSize)
+        refuse("the pose is too far away for the liquid's voxels");
     if (!finite(q.w) || !finite(q.x) || !finite(q.y) || !finite(q.z)) refuse("the pose's rotation is not finite");
     if (!(std::abs(glm::length(q) - 1) <= unitTolerance)) refuse("the pose's rotation is not of unit length");
 }
@@ -254,7 +256,7 @@ FloatGrid::Ptr combined(const FloatGrid& liquid, const FloatGrid& body, SeedMode
 
 void seed(FloatGrid& liquid, const LevelSet& field, const Pose& pose, SeedMode mode) {
     requireLiquid(liquid);
-    requirePose(pose);
+    requirePose(pose, liquid.voxelSize()[0]);
     requireField(field, liquid);
     const float width = bandWidth(liquid);
     const FloatGrid::Ptr body = resampled(field, pose, liquid, width);
