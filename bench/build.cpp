@@ -1,5 +1,5 @@
-// The builders side by side: the same mesh, voxel size and band, in one run. Prints each builder's median time, its ratio to
-// openvdb::tools::meshToVolume, and the memory that it takes at its peak.
+// The builders side by side: the same mesh, voxel size and band, in one run. Prints each builder's median time, its
+// ratio to openvdb::tools::meshToVolume, and the memory that it takes at its peak.
 //
 // Reading the mesh is not timed, nor is putting its vertices into the form that each builder wants.
 #include <benchmark/benchmark.h>
@@ -40,7 +40,8 @@ Work prepare(const std::string& name, Mesh mesh, float resolution, float halfWid
     Work work{name, std::move(mesh), {}, {}, {}};
     work.options.voxelSize = voxelSizeFor(work.mesh, resolution);
     work.options.exteriorWidth = work.options.interiorWidth = halfWidth;
-    for (const auto& p : work.mesh.points) work.points.push_back(openvdb::Vec3s(p.x, p.y, p.z) / work.options.voxelSize);
+    for (const auto& p : work.mesh.points)
+        work.points.push_back(openvdb::Vec3s(p.x, p.y, p.z) / work.options.voxelSize);
     for (const auto& t : work.mesh.triangles) work.triangles.push_back({t.x, t.y, t.z});
     return work;
 }
@@ -63,14 +64,19 @@ double statusMiB(const std::string& key) {
 }
 
 void add(const std::string& name, std::function<std::uint64_t()> voxels) {
-    benchmark::RegisterBenchmark(name.c_str(), [voxels](benchmark::State& state) {
-        std::ofstream("/proc/self/clear_refs") << resetPeak;
-        const double before = statusMiB("VmRSS:");
-        std::uint64_t count = 0;
-        for (auto _ : state) benchmark::DoNotOptimize(count = voxels());
-        state.counters["activeVoxels"] = double(count);
-        state.counters["peakMiB"] = statusMiB("VmHWM:") - before;
-    })->Unit(benchmark::kMillisecond)->UseRealTime()->Repetitions(repetitions)->MinTime(0.05);
+    benchmark::RegisterBenchmark(name.c_str(),
+                                 [voxels](benchmark::State& state) {
+                                     std::ofstream("/proc/self/clear_refs") << resetPeak;
+                                     const double before = statusMiB("VmRSS:");
+                                     std::uint64_t count = 0;
+                                     for (auto _ : state) benchmark::DoNotOptimize(count = voxels());
+                                     state.counters["activeVoxels"] = double(count);
+                                     state.counters["peakMiB"] = statusMiB("VmHWM:") - before;
+                                 })
+        ->Unit(benchmark::kMillisecond)
+        ->UseRealTime()
+        ->Repetitions(repetitions)
+        ->MinTime(0.05);
 }
 
 // Prints what Google Benchmark prints, and keeps the medians for the table.
@@ -87,15 +93,16 @@ class Reporter : public benchmark::ConsoleReporter {
     }
 
     void table(const std::vector<Work>& works, const std::vector<std::string>& builders) const {
-        fmt::print("\n{:<24} {:<26} {:>10} {:>14} {:>10} {:>14}\n", "mesh", "builder", "median ms", "times faster", "peak MiB",
-                   "active voxels");
+        fmt::print("\n{:<24} {:<26} {:>10} {:>14} {:>10} {:>14}\n", "mesh", "builder", "median ms", "times faster",
+                   "peak MiB", "active voxels");
         for (const Work& work : works)
             for (const std::string& builder : builders) {
-                const auto found = medians_.find(work.name + "/" + builder), reference = medians_.find(work.name + "/" + rival);
+                const auto found = medians_.find(work.name + "/" + builder),
+                           reference = medians_.find(work.name + "/" + rival);
                 if (found == medians_.end() || reference == medians_.end()) continue;
                 const Median &m = found->second, &r = reference->second;
-                fmt::print("{:<24} {:<26} {:>10.1f} {:>14.1f} {:>10.0f} {:>14.0f}\n", work.name, builder, m.milliseconds,
-                           r.milliseconds / m.milliseconds, m.peakMiB, m.voxels);
+                fmt::print("{:<24} {:<26} {:>10.1f} {:>14.1f} {:>10.0f} {:>14.0f}\n", work.name, builder,
+                           m.milliseconds, r.milliseconds / m.milliseconds, m.peakMiB, m.voxels);
             }
     }
 
@@ -123,7 +130,8 @@ int run(int argc, char** argv) {
     std::vector<std::string> paths;
     float resolution = 251, halfWidth = 2;
     std::string deviceText;
-    app.add_option("meshes", paths, "mesh files; by default the bunny and the dragon, where they are")->check(CLI::ExistingFile);
+    app.add_option("meshes", paths, "mesh files; by default the bunny and the dragon, where they are")
+        ->check(CLI::ExistingFile);
     app.add_option("--resolution", resolution, "voxels along the longest side")->capture_default_str();
     app.add_option("--half-width", halfWidth, "of the band [voxels]")->capture_default_str();
     app.add_option("--device", deviceText, "OpenCL device, by a part of its name");
@@ -134,19 +142,22 @@ int run(int argc, char** argv) {
     std::vector<Work> works;
     for (const std::string& path : paths)
         works.push_back(prepare(std::filesystem::path(path).stem().string(), readMesh(path), resolution, halfWidth));
-    if (works.empty()) works.push_back(prepare("knot", shapes::torusKnot(2, 3, 1, 0.2f, 2400, 64), resolution, halfWidth));
+    if (works.empty())
+        works.push_back(prepare("knot", shapes::torusKnot(2, 3, 1, 0.2f, 2400, 64), resolution, halfWidth));
 
     const Device device = openDevice(deviceText);
     const BlockFiller opencl = openclFiller(device);
     const std::vector<std::string> builders = {rival, "OpenVDB exact", "bilayer TBB", "bilayer OpenCL"};
     for (const Work& work : works) {
         add(work.name + "/" + builders[0], [&work] { return openvdbVoxels(work, 0); });
-        add(work.name + "/" + builders[1], [&work] { return openvdbVoxels(work, openvdb::tools::DISABLE_RENORMALIZATION); });
+        add(work.name + "/" + builders[1],
+            [&work] { return openvdbVoxels(work, openvdb::tools::DISABLE_RENORMALIZATION); });
         add(work.name + "/" + builders[2], [&work] { return build(work.mesh, work.options).activeVoxels(); });
-        add(work.name + "/" + builders[3], [&work, &opencl] { return build(work.mesh, work.options, opencl).activeVoxels(); });
+        add(work.name + "/" + builders[3],
+            [&work, &opencl] { return build(work.mesh, work.options, opencl).activeVoxels(); });
     }
-    fmt::print("resolution {:g}, half width {:g} voxels, method double-layer, SIMD {}, OpenCL device {}\n", resolution, halfWidth,
-               simdName(), device.info().name);
+    fmt::print("resolution {:g}, half width {:g} voxels, method double-layer, SIMD {}, OpenCL device {}\n", resolution,
+               halfWidth, simdName(), device.info().name);
     Reporter reporter;
     benchmark::RunSpecifiedBenchmarks(&reporter);
     reporter.table(works, builders);

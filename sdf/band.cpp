@@ -6,7 +6,7 @@
 namespace bilayer {
 namespace {
 
-constexpr std::uint64_t lowestZ = 0x0101010101010101ull;   // the voxels with z = 0 of a slice
+constexpr std::uint64_t lowestZ = 0x0101010101010101ull;  // the voxels with z = 0 of a slice
 constexpr std::uint64_t highestZ = lowestZ << 7;
 
 bool any(const BlockMask& mask) {

@@ -1,4 +1,5 @@
-// What a device needs to fill blocks, and what it gives back. TBB's filler is in double_layer.h, OpenCL's in cl/filler.h.
+// What a device needs to fill blocks, and what it gives back. TBB's filler is in double_layer.h, OpenCL's in
+// cl/filler.h.
 #pragma once
 
 #include <cstdint>
@@ -13,23 +14,23 @@
 
 namespace bilayer {
 
-inline constexpr int blockSide = 8;                                      ///< voxels: an OpenVDB leaf
-inline constexpr int blockVoxels = blockSide * blockSide * blockSide;    ///< voxel (x, y, z) at (x * 8 + y) * 8 + z
+inline constexpr int blockSide = 8;                                    ///< voxels: an OpenVDB leaf
+inline constexpr int blockVoxels = blockSide * blockSide * blockSide;  ///< voxel (x, y, z) at (x * 8 + y) * 8 + z
 
 /// The constants of a fill, in voxels, the same for every device.
 struct FillParameters {
-    float delta;    ///< distance of each layer from the surface
-    float reach;    ///< a sample counts for voxels nearer to it than this
-    float certain;  ///< a voxel is known if the nearer of its two layers is nearer than this
-    int cube;       ///< 0, or K where the paper's cube of (2K + 1)^3 voxels replaces the ball of radius `reach`
-    bool triangles; ///< whether the nearest triangle is asked for
+    float delta;     ///< distance of each layer from the surface
+    float reach;     ///< a sample counts for voxels nearer to it than this
+    float certain;   ///< a voxel is known if the nearer of its two layers is nearer than this
+    int cube;        ///< 0, or K where the paper's cube of (2K + 1)^3 voxels replaces the ball of radius `reach`
+    bool triangles;  ///< whether the nearest triangle is asked for
 };
 
 /// Blocks that a filler hands over. Distances are signed, in voxels, by Eq. 3 of the paper; +infinity where unknown.
 struct FilledBlocks {
-    std::span<const glm::ivec3> origins;         ///< index coordinates of each block's first voxel
-    std::span<const float> distances;            ///< blockVoxels a block
-    std::span<const std::int32_t> triangles;     ///< blockVoxels a block; empty unless asked for
+    std::span<const glm::ivec3> origins;      ///< index coordinates of each block's first voxel
+    std::span<const float> distances;         ///< blockVoxels a block
+    std::span<const std::int32_t> triangles;  ///< blockVoxels a block; empty unless asked for
 };
 
 /// Everything a filler works from.
@@ -37,8 +38,8 @@ struct FillJob {
     const Tiles& tiles;
     const Bricks& bricks;
     FillParameters parameters;
-    /// Takes filled blocks; may be called from several threads at once. `brick` is the index of the brick that all of the
-    /// blocks belong to; the blocks of one brick come in one call.
+    /// Takes filled blocks; may be called from several threads at once. `brick` is the index of the brick that all of
+    /// the blocks belong to; the blocks of one brick come in one call.
     std::function<void(std::size_t brick, const FilledBlocks&)> sink;
 };
 

@@ -18,10 +18,10 @@
 namespace bilayer {
 namespace {
 
-constexpr std::size_t tilesPerRun = 8192;       // what one task bins
-constexpr std::size_t countersAtMost = 1 << 24; // over all runs: 64 MiB
+constexpr std::size_t tilesPerRun = 8192;        // what one task bins
+constexpr std::size_t countersAtMost = 1 << 24;  // over all runs: 64 MiB
 constexpr int blocksPerBrick = brickBlocks * brickBlocks * brickBlocks;
-constexpr int blocksWorthCulling = 8;           // a tile over more blocks than this is tested against each block
+constexpr int blocksWorthCulling = 8;  // a tile over more blocks than this is tested against each block
 
 struct Box {
     glm::ivec3 lower{std::numeric_limits<int>::max()}, upper{std::numeric_limits<int>::min()};  // both included
@@ -100,7 +100,8 @@ Bricks binBricks(const Tiles& tiles, float reach) {
 
     // a counting sort, stable whatever the number of runs: count in each run, sum up, scatter
     const std::size_t count = tiles.tiles.size();
-    const std::size_t runs = std::clamp<std::size_t>(countersAtMost / cells, 1, (count + tilesPerRun - 1) / tilesPerRun);
+    const std::size_t runs =
+        std::clamp<std::size_t>(countersAtMost / cells, 1, (count + tilesPerRun - 1) / tilesPerRun);
     const auto forEachTile = [&](std::size_t run, auto visit) {
         for (std::size_t i = count * run / runs; i < count * (run + 1) / runs; ++i)
             forEachCell(cellsOf(voxelsOf(tiles.tiles[i], reach), brickShift),
@@ -122,7 +123,8 @@ Bricks binBricks(const Tiles& tiles, float reach) {
     }
     bricks.tiles.resize(sum);
     tbb::parallel_for(std::size_t(0), runs, [&](std::size_t run) {
-        forEachTile(run, [&](std::size_t cell, std::uint32_t tile) { bricks.tiles[cursors[run * cells + cell]++] = tile; });
+        forEachTile(run,
+                    [&](std::size_t cell, std::uint32_t tile) { bricks.tiles[cursors[run * cells + cell]++] = tile; });
     });
     return bricks;
 }

@@ -1,5 +1,5 @@
-// Which tiles reach which 8x8x8 block. Blocks are grouped into bricks of 8x8x8 blocks: tiles are binned into bricks first
-// and, brick by brick, into blocks, so that only small counters are needed and a brick's work stays in cache.
+// Which tiles reach which 8x8x8 block. Blocks are grouped into bricks of 8x8x8 blocks: tiles are binned into bricks
+// first and, brick by brick, into blocks, so that only small counters are needed and a brick's work stays in cache.
 #pragma once
 
 #include <cstddef>
@@ -17,9 +17,9 @@ inline constexpr int brickSide = 64;   ///< voxels along the side of a brick
 
 /// The bricks that some tile reaches, each with its tiles in ascending order.
 struct Bricks {
-    std::vector<glm::ivec3> origins;       ///< index coordinates of each brick's first voxel, multiples of brickSide
-    std::vector<std::uint64_t> offsets;    ///< tiles of brick b: tiles[offsets[b]] .. tiles[offsets[b + 1]]
-    std::vector<std::uint32_t> tiles;      ///< indices into Tiles::tiles
+    std::vector<glm::ivec3> origins;     ///< index coordinates of each brick's first voxel, multiples of brickSide
+    std::vector<std::uint64_t> offsets;  ///< tiles of brick b: tiles[offsets[b]] .. tiles[offsets[b + 1]]
+    std::vector<std::uint32_t> tiles;    ///< indices into Tiles::tiles
 
     std::size_t count() const { return origins.size(); }
     std::span<const std::uint32_t> tilesOf(std::size_t brick) const {

@@ -43,7 +43,8 @@ void require(bool condition, const char* option, const char* range, double value
 void check(const BuildOptions& options) {
     const auto within = [](double value, double low, double high) { return value >= low && value <= high; };
     const DoubleLayerOptions& layers = options.doubleLayer;
-    require(options.voxelSize > 0 && std::isnormal(options.voxelSize), "voxelSize", "a positive length", options.voxelSize);
+    require(options.voxelSize > 0 && std::isnormal(options.voxelSize), "voxelSize", "a positive length",
+            options.voxelSize);
     require(options.exteriorWidth > 0 && options.exteriorWidth <= 1000, "exteriorWidth", "in (0, 1000] voxels",
             options.exteriorWidth);
     require(options.interiorWidth > 0 && options.interiorWidth <= 1000, "interiorWidth", "in (0, 1000] voxels",
@@ -93,8 +94,8 @@ void checkSize(const Mesh& mesh, const BuildOptions& options, float reach) {
     if (bytes > memory) refuse(fmt::format("it would need about {:.0f} GiB of memory", bytes / double(1 << 30)));
 }
 
-// A sample must reach every voxel whose distance it may decide: a voxel of the band is nearer than the width plus delta to
-// its layer's sample, and that sample is delta from the point of the surface that the neighbourhood is centred on.
+// A sample must reach every voxel whose distance it may decide: a voxel of the band is nearer than the width plus delta
+// to its layer's sample, and that sample is delta from the point of the surface that the neighbourhood is centred on.
 FillParameters fillParameters(const BuildOptions& options) {
     const DoubleLayerOptions& layers = options.doubleLayer;
     const float cube = float(layers.neighbourhood) + 0.5f;
@@ -148,7 +149,8 @@ class Assembler {
             auto leaf = std::make_unique<Leaf>(openvdb::PartialCreate(), openvdb::Coord(o.x, o.y, o.z));
             leaf->buffer().allocate();
             BlockMask active;
-            if (!trimToBand(blocks.distances.data() + b * blockVoxels, widths_, leaf->buffer().data(), active)) continue;
+            if (!trimToBand(blocks.distances.data() + b * blockVoxels, widths_, leaf->buffer().data(), active))
+                continue;
             Leaf::NodeMaskType mask;
             for (openvdb::Index word = 0; word < blockSide; ++word) mask.getWord<std::uint64_t>(word) = active[word];
             leaf->setValueMask(mask);
@@ -162,8 +164,8 @@ class Assembler {
         const float exterior = widths_.exterior * widths_.voxelSize, interior = -widths_.interior * widths_.voxelSize;
         auto grid = openvdb::FloatGrid::create(exterior);
         move(leaves_, grid->tree());
-        // leaves carry their signs already: only tiles between them are flooded. Leaves that turn out to hold one far value
-        // become tiles too.
+        // leaves carry their signs already: only tiles between them are flooded. Leaves that turn out to hold one far
+        // value become tiles too.
         openvdb::tools::signedFloodFillWithValues(grid->tree(), exterior, interior, true, 1, 1);
         openvdb::tools::prune(grid->tree());
         grid->setName("distance");
@@ -266,7 +268,8 @@ float voxelSizeFor(const Mesh& mesh, float resolution) {
         throw std::invalid_argument(fmt::format("the resolution must be positive, not {:g}", resolution));
     validate(mesh);
     const float side = bounds(mesh).longestSide();
-    if (!(side > 0) || !std::isfinite(side)) throw std::invalid_argument("the mesh has no extent, or one beyond floats");
+    if (!(side > 0) || !std::isfinite(side))
+        throw std::invalid_argument("the mesh has no extent, or one beyond floats");
     return side / resolution;
 }
 

@@ -26,8 +26,8 @@ struct DoubleLayerOptions {
     int maxSubdivision = 32;  ///< n_max: most rows of samples in one piece of a triangle, in 1..1024
     Subdivision subdivision = Subdivision::rows;
     /// true: triangles for which Algorithm 1 would leave gaps (too large for n_max rows, or slivers) are first cut into
-    /// pieces, and K grows with the band, so that the band is complete. false: the paper to the letter, n clamped to n_max
-    /// and a cube of (2K + 1)^3 voxels around each sample, gaps included.
+    /// pieces, and K grows with the band, so that the band is complete. false: the paper to the letter, n clamped to
+    /// n_max and a cube of (2K + 1)^3 voxels around each sample, gaps included.
     bool fillGaps = true;
 };
 
@@ -36,8 +36,8 @@ struct BuildOptions {
     float exteriorWidth = 3;  ///< every voxel with 0 <= distance < this is active [voxels], in (0, 1000]
     float interiorWidth = 3;  ///< every voxel with -this < distance < 0 is active [voxels], in (0, 1000]
     DoubleLayerOptions doubleLayer{};
-    bool triangles = false;   ///< also keep the nearest triangle of each active voxel
-    int threads = 0;          ///< most threads to use; 0: all
+    bool triangles = false;  ///< also keep the nearest triangle of each active voxel
+    int threads = 0;         ///< most threads to use; 0: all
     /// Called now and then, from any thread but one at a time, with the part done (0..1); false cancels the build.
     std::function<bool(float)> progress{};
 };

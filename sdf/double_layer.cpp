@@ -1,13 +1,14 @@
-// The two layers of the paper's section 3.2 and Eq. 3, block by block. A block's squared distances stay in the first-level
-// cache while all samples that reach it are applied, so there are no atomics and no order that threads could change.
+// The two layers of the paper's section 3.2 and Eq. 3, block by block. A block's squared distances stay in the
+// first-level cache while all samples that reach it are applied, so there are no atomics and no order that threads
+// could change.
 //
 // Highway compiles the part between HWY_BEFORE_NAMESPACE and HWY_AFTER_NAMESPACE once for each instruction set.
 #include "sdf/double_layer.h"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "sdf/double_layer.cpp"
-#include <hwy/foreach_target.h>
 #include <hwy/cache_control.h>
+#include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
 #include <algorithm>
@@ -42,7 +43,9 @@ struct Sample {
     glm::vec3 centre, inner, outer;
 };
 
-inline float square(float value) { return value * value; }
+inline float square(float value) {
+    return value * value;
+}
 
 // The squared distance to the block along one axis.
 inline float outside2(float coordinate) {
@@ -74,7 +77,8 @@ inline Rows rowsWithin(const Sample& s, float limit2) {
     const Vec limit = hn::Set(tag, limit2);
     Rows rows = 0;
     for (unsigned row = 0; row < unsigned(rowCount); row += unsigned(hn::Lanes(tag))) {
-        const Vec x = hn::Set(tag, alongX.squares[row / blockSide]), y = hn::Load(tag, alongY.squares + row % blockSide);
+        const Vec x = hn::Set(tag, alongX.squares[row / blockSide]),
+                  y = hn::Load(tag, alongY.squares + row % blockSide);
         std::uint8_t bits = 0;
         hn::StoreMaskBits(tag, hn::Lt(hn::Add(x, y), limit), &bits);
         rows |= Rows(bits) << row;
@@ -88,8 +92,9 @@ struct RowDistances {
         const Tag tag;
         const AxisDistances alongX(point.x), alongY(point.y);
         for (int row = 0; row < rowCount; row += int(hn::Lanes(tag)))
-            hn::Store(hn::Add(hn::Set(tag, alongX.squares[row / blockSide]), hn::Load(tag, alongY.squares + row % blockSide)),
-                      tag, squares + row);
+            hn::Store(
+                hn::Add(hn::Set(tag, alongX.squares[row / blockSide]), hn::Load(tag, alongY.squares + row % blockSide)),
+                tag, squares + row);
     }
     HWY_ALIGN float squares[rowCount];
 };
@@ -213,7 +218,9 @@ void fillBlock(const Tiles& tiles, std::span<const std::uint32_t> indices, const
     combine(layers, parameters, distances);
 }
 
-const char* targetName() { return hwy::TargetName(HWY_TARGET); }
+const char* targetName() {
+    return hwy::TargetName(HWY_TARGET);
+}
 
 }  // namespace bilayer::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
@@ -260,7 +267,9 @@ BlockFiller tbbFiller() {
             }};
 }
 
-const char* simdName() { return HWY_DYNAMIC_DISPATCH(targetName)(); }
+const char* simdName() {
+    return HWY_DYNAMIC_DISPATCH(targetName)();
+}
 
 }  // namespace bilayer
 #endif  // HWY_ONCE

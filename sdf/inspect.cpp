@@ -58,7 +58,8 @@ void countEdges(const Mesh& mesh, const std::vector<unsigned>& componentOf, std:
             components[componentOf[edges[i].triangle]].closed = false;
         }
         report.nonManifoldEdges += j - i > 2;
-        const auto forward = std::count_if(&edges[i], &edges[i] + (j - i), [](const Edge& edge) { return edge.forward; });
+        const auto forward =
+            std::count_if(&edges[i], &edges[i] + (j - i), [](const Edge& edge) { return edge.forward; });
         report.misorientedEdges += j - i > 1 && 2 * std::size_t(forward) != j - i;
     }
 }
@@ -132,7 +133,8 @@ bool contains(const Bounds& box, const glm::vec3& p) {
     return glm::all(glm::lessThanEqual(box.lower, p)) && glm::all(glm::lessThanEqual(p, box.upper));
 }
 
-// A component within an even number of others should have positive volume, a cavity within an odd number negative volume.
+// A component within an even number of others should have positive volume, a cavity within an odd number negative
+// volume.
 std::size_t countInsideOut(const Mesh& mesh, const std::vector<Component>& all) {
     std::size_t wrong = 0;
     for (const Component& inner : all) {
@@ -153,7 +155,8 @@ class WallFinder {
     explicit WallFinder(const Mesh& mesh) : mesh_(mesh), box_(bounds(mesh)) {
         const double count = cellsPerTriangle * double(mesh.triangles.size());
         const glm::dvec3 size = glm::max(glm::dvec3(box_.size()), 1e-6 * double(box_.longestSide()));
-        cell_ = float(std::max(std::cbrt(size.x * size.y * size.z / count), double(box_.longestSide()) / mostCellsAlongSide));
+        cell_ = float(
+            std::max(std::cbrt(size.x * size.y * size.z / count), double(box_.longestSide()) / mostCellsAlongSide));
         cells_ = glm::ivec3(glm::vec3(size) / cell_) + 1;
         std::vector<unsigned> counts(std::size_t(cells_.x) * cells_.y * cells_.z + 1, 0);
         forEachPlace([&](std::size_t cell, unsigned) { ++counts[cell + 1]; });
@@ -220,7 +223,8 @@ class WallFinder {
     float exit(const glm::vec3& origin, const glm::vec3& direction, unsigned triangle) const {
         const auto& t = mesh_.triangles[triangle];
         const glm::dvec3 a(mesh_.points[t.x]), ab = glm::dvec3(mesh_.points[t.y]) - a,
-                         ac = glm::dvec3(mesh_.points[t.z]) - a, d(direction), from = glm::dvec3(origin) - a;
+                                               ac = glm::dvec3(mesh_.points[t.z]) - a, d(direction),
+                                               from = glm::dvec3(origin) - a;
         const glm::dvec3 normal = glm::cross(ab, ac);
         const double facing = glm::dot(normal, d);
         if (facing <= double(leastFacing) * glm::length(normal)) return infinite;
@@ -252,7 +256,9 @@ void findThinWalls(const Mesh& mesh, float wall, MeshReport& report) {
             }
             return part;
         },
-        [](const Result& a, const Result& b) { return Result{std::min(a.first, b.first), a.second + b.second}; });
+        [](const Result& a, const Result& b) {
+            return Result{std::min(a.first, b.first), a.second + b.second};
+        });
     report.thinnestWall = std::isfinite(result.first) ? result.first : 0.f;
     report.thinWalls = result.second;
 }

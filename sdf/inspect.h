@@ -18,11 +18,12 @@ struct MeshReport {
     std::size_t misorientedEdges = 0;     ///< edges that their triangles do not run both ways equally often
     std::size_t degenerateTriangles = 0;  ///< triangles without area
     std::size_t duplicateTriangles = 0;   ///< triangles whose three vertices another one has already
-    std::size_t insideOutComponents = 0;  ///< closed components that bound space from the wrong side (nested ones allowed)
-    float thinnestWall = 0;               ///< smallest thickness of the solid behind a triangle [m]; 0: none was found
-    std::size_t thinWalls = 0;            ///< triangles with less than `wall` of solid behind them
-    double area = 0;                      ///< [m^2]
-    double volume = 0;                    ///< signed [m^3]; means something only where `closed`
+    std::size_t insideOutComponents =
+        0;                      ///< closed components that bound space from the wrong side (nested ones allowed)
+    float thinnestWall = 0;     ///< smallest thickness of the solid behind a triangle [m]; 0: none was found
+    std::size_t thinWalls = 0;  ///< triangles with less than `wall` of solid behind them
+    double area = 0;            ///< [m^2]
+    double volume = 0;          ///< signed [m^3]; means something only where `closed`
 
     /// Every edge has exactly two triangles.
     bool closed() const { return boundaryEdges == 0 && nonManifoldEdges == 0 && triangles > 0; }

@@ -1,7 +1,7 @@
 #include "sdf/level_set.h"
 
-#include <cmath>
 #include <fmt/format.h>
+#include <cmath>
 #include <stdexcept>
 
 #include "sdf/grids.h"
@@ -49,15 +49,29 @@ LevelSet::LevelSet(std::shared_ptr<const Grids> grids) : grids_(std::move(grids)
     meshHash_ = std::uint64_t(meta<std::int64_t>(grid, metadata::meshHash, 0));
 }
 
-float LevelSet::voxelSize() const { return float(grids_->distance->voxelSize()[0]); }
-float LevelSet::exteriorWidth() const { return exteriorWidth_; }
-float LevelSet::interiorWidth() const { return interiorWidth_; }
-std::uint64_t LevelSet::activeVoxels() const { return grids_->distance->activeVoxelCount(); }
-std::uint64_t LevelSet::leaves() const { return grids_->distance->tree().leafCount(); }
+float LevelSet::voxelSize() const {
+    return float(grids_->distance->voxelSize()[0]);
+}
+float LevelSet::exteriorWidth() const {
+    return exteriorWidth_;
+}
+float LevelSet::interiorWidth() const {
+    return interiorWidth_;
+}
+std::uint64_t LevelSet::activeVoxels() const {
+    return grids_->distance->activeVoxelCount();
+}
+std::uint64_t LevelSet::leaves() const {
+    return grids_->distance->tree().leafCount();
+}
 std::uint64_t LevelSet::memoryBytes() const {
     return grids_->distance->memUsage() + (grids_->triangle ? grids_->triangle->memUsage() : 0);
 }
-const std::string& LevelSet::method() const { return method_; }
-std::uint64_t LevelSet::meshHash() const { return meshHash_; }
+const std::string& LevelSet::method() const {
+    return method_;
+}
+std::uint64_t LevelSet::meshHash() const {
+    return meshHash_;
+}
 
 }  // namespace bilayer

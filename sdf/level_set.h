@@ -17,14 +17,14 @@ class LevelSet {
     /// another grid class, a transform that is more than a uniform scale and whole voxels of shift, or no active voxel.
     explicit LevelSet(std::shared_ptr<const Grids> grids);
 
-    float voxelSize() const;               ///< [m]
-    float exteriorWidth() const;           ///< every voxel with 0 <= distance < this is active [m]
-    float interiorWidth() const;           ///< every voxel with -this < distance < 0 is active [m]
-    std::uint64_t activeVoxels() const;    ///< count
-    std::uint64_t leaves() const;          ///< count of 8x8x8 blocks
-    std::uint64_t memoryBytes() const;     ///< of all grids [bytes]
-    const std::string& method() const;     ///< "double-layer", ..., or "" for a field from elsewhere
-    std::uint64_t meshHash() const;        ///< hash() of the mesh it came from, or 0
+    float voxelSize() const;             ///< [m]
+    float exteriorWidth() const;         ///< every voxel with 0 <= distance < this is active [m]
+    float interiorWidth() const;         ///< every voxel with -this < distance < 0 is active [m]
+    std::uint64_t activeVoxels() const;  ///< count
+    std::uint64_t leaves() const;        ///< count of 8x8x8 blocks
+    std::uint64_t memoryBytes() const;   ///< of all grids [bytes]
+    const std::string& method() const;   ///< "double-layer", ..., or "" for a field from elsewhere
+    std::uint64_t meshHash() const;      ///< hash() of the mesh it came from, or 0
     const Grids& grids() const { return *grids_; }
 
   private:

@@ -3,9 +3,9 @@
 #include <oneapi/tbb/parallel_for.h>
 #include <oneapi/tbb/parallel_reduce.h>
 
+#include <fmt/format.h>
 #include <algorithm>
 #include <cmath>
-#include <fmt/format.h>
 #include <glm/common.hpp>
 #include <glm/mat3x3.hpp>
 #include <glm/matrix.hpp>
@@ -19,7 +19,9 @@ namespace {
 
 constexpr unsigned unseen = std::numeric_limits<unsigned>::max();
 
-bool finite(const glm::vec3& p) { return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z); }
+bool finite(const glm::vec3& p) {
+    return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z);
+}
 
 // For each vertex, the first vertex with equal coordinates.
 std::vector<unsigned> firstOfEqual(const std::vector<glm::vec3>& points) {
@@ -56,7 +58,9 @@ std::uint64_t hashOfRuns(std::span<const std::uint32_t> words) {
 
 }  // namespace
 
-float Bounds::longestSide() const { return empty() ? 0.f : std::max({size().x, size().y, size().z}); }
+float Bounds::longestSide() const {
+    return empty() ? 0.f : std::max({size().x, size().y, size().z});
+}
 
 void Bounds::add(const glm::vec3& point) {
     lower = glm::min(lower, point);

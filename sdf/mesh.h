@@ -34,8 +34,8 @@ Bounds bounds(const Mesh& mesh);
 /// a coordinate that is NaN or infinite.
 void validate(const Mesh& mesh);
 
-/// Merges vertices with equal coordinates (0 and -0 are equal), drops triangles that use a vertex twice, and drops vertices
-/// that no triangle uses. Keeps the order of what remains.
+/// Merges vertices with equal coordinates (0 and -0 are equal), drops triangles that use a vertex twice, and drops
+/// vertices that no triangle uses. Keeps the order of what remains.
 Mesh weld(const Mesh& mesh);
 
 /// The mesh under an affine map; triangles are turned around when the map mirrors, so that normals stay outward.

@@ -2,11 +2,11 @@
 
 #include <fmt/format.h>
 
-#include <assimp/Exporter.hpp>
-#include <assimp/Importer.hpp>
 #include <assimp/config.h>
 #include <assimp/postprocess.h>
 #include <assimp/scene.h>
+#include <assimp/Exporter.hpp>
+#include <assimp/Importer.hpp>
 
 #include <cctype>
 #include <fstream>
@@ -15,6 +15,7 @@
 #include <string>
 
 #include "sdf/atomic_file.h"
+#include "sdf/mesh_guard.h"
 
 namespace bilayer {
 namespace {
@@ -23,8 +24,8 @@ constexpr unsigned unwanted = aiComponent_NORMALS | aiComponent_TANGENTS_AND_BIT
                               aiComponent_TEXCOORDS | aiComponent_BONEWEIGHTS | aiComponent_ANIMATIONS |
                               aiComponent_TEXTURES | aiComponent_LIGHTS | aiComponent_CAMERAS | aiComponent_MATERIALS;
 
-constexpr unsigned steps = aiProcess_RemoveComponent | aiProcess_Triangulate | aiProcess_SortByPType |
-                           aiProcess_PreTransformVertices;
+constexpr unsigned steps =
+    aiProcess_RemoveComponent | aiProcess_Triangulate | aiProcess_SortByPType | aiProcess_PreTransformVertices;
 
 std::string lowerEnding(const std::filesystem::path& path) {
     std::string ending = path.extension().string();
@@ -32,41 +33,29 @@ std::string lowerEnding(const std::filesystem::path& path) {
     return ending;
 }
 
-// The text of an OFF file without comments and empty lines, for each of which Assimp 5.2 loses a face at the end, and with
-// the counts on a line of their own.
-std::string cleanOff(std::istream& file) {
-    std::string text, line;
-    while (std::getline(file, line)) {
-        line.erase(std::min(line.find('#'), line.size()));
-        if (line.find_first_not_of(" \t\r") == std::string::npos) continue;
-        if (text.empty())
-            if (const auto counts = line.find("OFF"); counts != std::string::npos && line.size() > counts + 3)
-                if (line.find_first_of("0123456789", counts + 3) == line.find_first_not_of(" \t", counts + 3))
-                    line.insert(counts + 3, "\n");
-        text += line + '\n';
-    }
-    return text;
-}
-
-// Assimp reads such files as if they had no faces, or one.
-bool hasTriangleStrips(std::istream& file) {
-    std::string line;
-    while (std::getline(file, line) && line.rfind("end_header", 0) != 0)
-        if (line.rfind("element tristrips", 0) == 0) return true;
-    return false;
-}
-
 const aiScene* readScene(Assimp::Importer& importer, const std::filesystem::path& path) {
+    constexpr unsigned none = 0;
     const std::string ending = lowerEnding(path);
-    std::ifstream file(path, std::ios::binary);
-    if (ending == ".ply" && hasTriangleStrips(file))
-        throw std::runtime_error(fmt::format("{}: stores triangle strips, which are not read; convert it to plain faces",
-                                             path.string()));
     if (ending == ".off") {
-        const std::string text = cleanOff(file);
-        return importer.ReadFileFromMemory(text.data(), text.size(), steps, "off");
+        const std::string text = guardedOff(path);
+        return importer.ReadFileFromMemory(text.data(), text.size(), none, "off");
     }
-    return importer.ReadFile(path.string(), steps);
+    if (ending == ".ply") guardPly(path);
+    if (ending == ".stl") guardStl(path);
+    return importer.ReadFile(path.string(), none);
+}
+
+// Assimp's later steps take it for granted that faces use vertices that exist.
+void checkFaces(const aiScene& scene, const std::filesystem::path& path) {
+    for (unsigned m = 0; m < scene.mNumMeshes; ++m)
+        for (unsigned f = 0; f < scene.mMeshes[m]->mNumFaces; ++f) {
+            const aiFace& face = scene.mMeshes[m]->mFaces[f];
+            for (unsigned k = 0; k < face.mNumIndices; ++k)
+                if (face.mIndices[k] >= scene.mMeshes[m]->mNumVertices)
+                    throw std::runtime_error(fmt::format("{}: face {} uses vertex {}, but there are only {}",
+                                                         path.string(), f, face.mIndices[k],
+                                                         scene.mMeshes[m]->mNumVertices));
+        }
 }
 
 void add(Mesh& mesh, const aiMesh& part) {
@@ -111,8 +100,13 @@ Mesh readMesh(const std::filesystem::path& path) {
     Assimp::Importer importer;
     importer.SetPropertyInteger(AI_CONFIG_PP_RVC_FLAGS, int(unwanted));
     importer.SetPropertyInteger(AI_CONFIG_PP_SBP_REMOVE, aiPrimitiveType_POINT | aiPrimitiveType_LINE);
-    if (!std::filesystem::is_regular_file(path)) throw std::runtime_error(fmt::format("{}: no such file", path.string()));
+    if (!std::filesystem::is_regular_file(path))
+        throw std::runtime_error(fmt::format("{}: no such file", path.string()));
     const aiScene* scene = readScene(importer, path);
+    if (scene) {
+        checkFaces(*scene, path);
+        scene = importer.ApplyPostProcessing(steps);
+    }
     if (!scene) throw std::runtime_error(fmt::format("{}: {}", path.string(), importer.GetErrorString()));
     Mesh mesh;
     for (unsigned i = 0; i < scene->mNumMeshes; ++i) add(mesh, *scene->mMeshes[i]);
@@ -130,14 +124,22 @@ Mesh readMesh(const std::filesystem::path& path) {
 
 void writeMesh(const std::filesystem::path& path, const Mesh& mesh) {
     const std::string ending = lowerEnding(path);
-    const char* format = ending == ".obj" ? "objnomtl" : ending == ".ply" ? "plyb" : ending == ".stl" ? "stlb" : nullptr;
-    if (!format) throw std::invalid_argument(fmt::format("{}: meshes are written as .obj, .ply or .stl", path.string()));
+    const char* format = ending == ".obj"   ? "objnomtl"
+                         : ending == ".ply" ? "plyb"
+                         : ending == ".stl" ? "stlb"
+                                            : nullptr;
+    if (!format)
+        throw std::invalid_argument(fmt::format("{}: meshes are written as .obj, .ply or .stl", path.string()));
     validate(mesh);
-    AtomicFile file(path);
     const std::unique_ptr<aiScene> scene = toScene(mesh);
     Assimp::Exporter exporter;
-    if (exporter.Export(scene.get(), format, file.temporary().string()) != aiReturn_SUCCESS)
-        throw std::runtime_error(fmt::format("{}: {}", path.string(), exporter.GetErrorString()));
+    const aiExportDataBlob* blob = exporter.ExportToBlob(scene.get(), format);
+    if (!blob) throw std::runtime_error(fmt::format("{}: {}", path.string(), exporter.GetErrorString()));
+    AtomicFile file(path);
+    std::ofstream stream(file.temporary(), std::ios::binary);
+    stream.write(static_cast<const char*>(blob->data), std::streamsize(blob->size));
+    stream.close();
+    if (!stream) throw std::runtime_error(fmt::format("{}: cannot be written (is the disk full?)", path.string()));
     file.commit();
 }
 

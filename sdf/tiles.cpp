@@ -73,7 +73,8 @@ class Cutter {
     // Fig. 2: barycentres of parts below epsilon.
     void recurse(const Corners& c) {
         const Shape shape = shapeOf(c);
-        if (options_.fillGaps && shape.longestEdge > sliverStep * std::sqrt(options_.epsilon) && shape.area <= options_.epsilon)
+        if (options_.fillGaps && shape.longestEdge > sliverStep * std::sqrt(options_.epsilon) &&
+            shape.area <= options_.epsilon)
             return halve(c, shape, &Cutter::recurse);
         if (shape.area <= options_.epsilon) return emit(c, 1);
         if (shape.area <= 2 * options_.epsilon) return halve(c, shape, &Cutter::recurse);
@@ -106,8 +107,8 @@ class Cutter {
         const glm::dvec3 s1 = (c[1] - c[0]) * part, s2 = (c[2] - c[1]) * part, s3 = (c[2] - c[0]) * part;
         const glm::dvec3 first = c[0] + (s1 + s3) / 3.0;
         const glm::ivec3 base(std::lrint(first.x), std::lrint(first.y), std::lrint(first.z));
-        return {base, glm::vec3(first - glm::dvec3(base)), glm::vec3(s1), glm::vec3(s2),
-                glm::vec3(double(options_.delta) * normal_), n};
+        return {base,          glm::vec3(first - glm::dvec3(base)),         glm::vec3(s1),
+                glm::vec3(s2), glm::vec3(double(options_.delta) * normal_), n};
     }
 
     const DoubleLayerOptions& options_;
@@ -124,7 +125,8 @@ Tiles makeTiles(const Mesh& mesh, const BuildOptions& options) {
         return Corners{glm::dvec3(mesh.points[t.x]) * voxels, glm::dvec3(mesh.points[t.y]) * voxels,
                        glm::dvec3(mesh.points[t.z]) * voxels};
     };
-    // a run of triangles is a task's; all runs are cut twice, first to count their tiles, then to put them in their place
+    // a run of triangles is a task's; all runs are cut twice, first to count their tiles, then to put them in their
+    // place
     const std::size_t runs = (mesh.triangles.size() + grain - 1) / grain;
     const auto cutRun = [&](std::size_t run, auto emit) {
         std::int32_t triangle = 0;

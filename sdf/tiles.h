@@ -10,16 +10,16 @@
 
 namespace bilayer {
 
-/// A triangle or a piece of one, in voxels. Row i of `rows` has i + 1 samples at `base + first + i * down + j * across`;
-/// the sample of the inner layer lies at minus `offset` from it, that of the outer layer at plus `offset` (Eq. 2).
-/// Local coordinates are small, so floats hold them well however far the mesh is from the origin.
+/// A triangle or a piece of one, in voxels. Row i of `rows` has i + 1 samples at `base + first + i * down + j *
+/// across`; the sample of the inner layer lies at minus `offset` from it, that of the outer layer at plus `offset` (Eq.
+/// 2). Local coordinates are small, so floats hold them well however far the mesh is from the origin.
 struct Tile {
-    glm::ivec3 base;   ///< a voxel near the tile [index coordinates]
-    glm::vec3 first;   ///< the first sample, from `base` [voxels]
-    glm::vec3 down;    ///< s1 of Algorithm 1: from a row to the next [voxels]
-    glm::vec3 across;  ///< s2 of Algorithm 1: along a row [voxels]
-    glm::vec3 offset;  ///< delta times the outward normal [voxels]
-    std::int32_t rows; ///< n of Algorithm 1
+    glm::ivec3 base;    ///< a voxel near the tile [index coordinates]
+    glm::vec3 first;    ///< the first sample, from `base` [voxels]
+    glm::vec3 down;     ///< s1 of Algorithm 1: from a row to the next [voxels]
+    glm::vec3 across;   ///< s2 of Algorithm 1: along a row [voxels]
+    glm::vec3 offset;   ///< delta times the outward normal [voxels]
+    std::int32_t rows;  ///< n of Algorithm 1
 };
 static_assert(sizeof(Tile) == 64, "one cache line, and the layout of the OpenCL struct");
 
@@ -37,6 +37,8 @@ struct Tiles {
 Tiles makeTiles(const Mesh& mesh, const BuildOptions& options);
 
 /// Samples of a tile with n rows.
-inline std::int64_t sampleCount(std::int64_t rows) { return rows * (rows + 1) / 2; }
+inline std::int64_t sampleCount(std::int64_t rows) {
+    return rows * (rows + 1) / 2;
+}
 
 }  // namespace bilayer

@@ -43,7 +43,8 @@ void writeVdb(const std::filesystem::path& path, const LevelSet& levelSet, const
 
 LevelSet readVdb(const std::filesystem::path& path) {
     openvdb::initialize();
-    if (!std::filesystem::is_regular_file(path)) throw std::runtime_error(fmt::format("{}: no such file", path.string()));
+    if (!std::filesystem::is_regular_file(path))
+        throw std::runtime_error(fmt::format("{}: no such file", path.string()));
     openvdb::GridPtrVec grids;
     try {
         std::ifstream stream(path, std::ios::binary);
@@ -57,8 +58,7 @@ LevelSet readVdb(const std::filesystem::path& path) {
     result->distance = first<openvdb::FloatGrid>(
         grids, [](const auto& grid) { return grid.getGridClass() == openvdb::GRID_LEVEL_SET; });
     if (!result->distance) throw std::runtime_error(fmt::format("{}: holds no level set", path.string()));
-    result->triangle =
-        first<openvdb::Int32Grid>(grids, [](const auto& grid) { return grid.getName() == "triangle"; });
+    result->triangle = first<openvdb::Int32Grid>(grids, [](const auto& grid) { return grid.getName() == "triangle"; });
     try {
         return LevelSet(std::move(result));
     } catch (const std::invalid_argument& error) {

@@ -11,8 +11,8 @@ struct VdbOptions {
     bool halfFloat = false;  ///< store distances as 16-bit floats: half the size, 3 decimal digits
 };
 
-/// Writes the grids "distance" and, where present, "triangle": whole or not at all (a temporary file beside the target is
-/// renamed at the end). Throws std::runtime_error that names the file when it cannot be written.
+/// Writes the grids "distance" and, where present, "triangle": whole or not at all (a temporary file beside the target
+/// is renamed at the end). Throws std::runtime_error that names the file when it cannot be written.
 void writeVdb(const std::filesystem::path& path, const LevelSet& levelSet, const VdbOptions& options = {});
 
 /// Reads the first level set of a .vdb file, from bilayer or elsewhere, with its grid of triangles if it has one.

@@ -12,7 +12,9 @@ namespace {
 
 constexpr float unknown = std::numeric_limits<float>::infinity();
 
-std::size_t at(int x, int y, int z) { return std::size_t((x * 8 + y) * 8 + z); }
+std::size_t at(int x, int y, int z) {
+    return std::size_t((x * 8 + y) * 8 + z);
+}
 
 }  // namespace
 

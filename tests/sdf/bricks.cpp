@@ -65,8 +65,8 @@ TEST_CASE("every block that a sample reaches has its tile, each once and in orde
             for (const Key& key : reached(tiles.tiles[tile], reach)) {
                 ++needed;
                 const auto found = binned.find(key);
-                missing += found == binned.end() ||
-                           !std::binary_search(found->second.begin(), found->second.end(), tile);
+                missing +=
+                    found == binned.end() || !std::binary_search(found->second.begin(), found->second.end(), tile);
             }
         CHECK(missing == 0);
         CHECK(kept < 3 * needed);  // and not far more than needed

@@ -27,8 +27,8 @@ Mesh flipped(Mesh mesh) {
 }
 
 struct Errors {
-    double worst = 0, mean = 0;    // [voxels]
-    double wrongSign = 0;          // largest true distance of a voxel of the wrong sign [voxels]
+    double worst = 0, mean = 0;  // [voxels]
+    double wrongSign = 0;        // largest true distance of a voxel of the wrong sign [voxels]
     std::size_t count = 0;
 };
 
@@ -109,7 +109,8 @@ TEST_CASE("public meshes get the distances that brute force finds") {
         const Mesh mesh = readMesh(*path);
         const LevelSet field = build(mesh, {.voxelSize = voxelSizeFor(mesh, 60)});
         const std::size_t every = std::max<std::size_t>(1, field.activeVoxels() / 2000);
-        const Errors e = errors(field, [&](const glm::dvec3& p) { return test::signedDistance(mesh, p); }, every);
+        const Errors e = errors(
+            field, [&](const glm::dvec3& p) { return test::signedDistance(mesh, p); }, every);
         CAPTURE(name, e.worst, e.mean, e.wrongSign, e.count);
         CHECK(e.worst < 1.6);
         CHECK(e.mean < 0.25);
@@ -118,8 +119,9 @@ TEST_CASE("public meshes get the distances that brute force finds") {
 }
 
 TEST_CASE("far voxels have the right sign, in cavities too") {
-    const Mesh mesh = shapes::join({shapes::sphere(1, 4), flipped(shapes::sphere(0.6f, 4)), shapes::sphere(0.25f, 4),
-                                    transformed(shapes::box({0.5f, 0.5f, 0.5f}), glm::translate(glm::mat4(1), {3, 0, 0}))});
+    const Mesh mesh =
+        shapes::join({shapes::sphere(1, 4), flipped(shapes::sphere(0.6f, 4)), shapes::sphere(0.25f, 4),
+                      transformed(shapes::box({0.5f, 0.5f, 0.5f}), glm::translate(glm::mat4(1), {3, 0, 0}))});
     const auto truth = [](const glm::dvec3& p) {
         const double r = glm::length(p);
         const glm::dvec3 q = glm::abs(p - glm::dvec3(3, 0, 0)) - 0.5;
@@ -135,7 +137,8 @@ TEST_CASE("far voxels have the right sign, in cavities too") {
         const auto values = field.grids().distance->getConstAccessor();
         std::size_t wrong = 0;
         for (int i = 0; i < 20000; ++i) {
-            const openvdb::Coord at = openvdb::Coord::round(openvdb::Vec3d(uniform(random), uniform(random) / 3, uniform(random) / 3) / 0.02);
+            const openvdb::Coord at =
+                openvdb::Coord::round(openvdb::Vec3d(uniform(random), uniform(random) / 3, uniform(random) / 3) / 0.02);
             const glm::dvec3 p(0.02 * at.x(), 0.02 * at.y(), 0.02 * at.z());
             if (std::abs(truth(p)) < 0.02) continue;
             wrong += (values.getValue(at) < 0) != (truth(p) < 0);
@@ -190,7 +193,8 @@ TEST_CASE("a shift by whole blocks keeps the bytes") {
     for (auto& p : mesh.points) p = glm::round(p * 1024.f) / 1024.f;
     const LevelSet here = build(mesh, {.voxelSize = 1.f / 64});
     const glm::ivec3 shift(64 * 7, -64 * 5, 8 * 3);
-    const LevelSet there = build(transformed(mesh, glm::translate(glm::mat4(1), glm::vec3(shift) / 64.f)), {.voxelSize = 1.f / 64});
+    const LevelSet there =
+        build(transformed(mesh, glm::translate(glm::mat4(1), glm::vec3(shift) / 64.f)), {.voxelSize = 1.f / 64});
     CHECK(here.activeVoxels() == there.activeVoxels());
     const auto values = there.grids().distance->getConstAccessor();
     std::size_t differ = 0;
@@ -224,7 +228,8 @@ TEST_CASE("a mesh smaller than a voxel, and one far from the origin, still have 
     CHECK(tiny.activeVoxels() > 27);
     const Mesh far = transformed(shapes::sphere(0.5f, 4), glm::translate(glm::mat4(1), {1e4f, -1e4f, 1e4f}));
     const LevelSet field = build(far, {.voxelSize = 0.01f});
-    const Errors e = errors(field, [](const glm::dvec3& p) { return glm::distance(p, glm::dvec3(1e4, -1e4, 1e4)) - 0.5; });
+    const Errors e =
+        errors(field, [](const glm::dvec3& p) { return glm::distance(p, glm::dvec3(1e4, -1e4, 1e4)) - 0.5; });
     CAPTURE(e.worst, e.mean);
     CHECK(e.worst < 0.8);  // coordinates of 1e4 are themselves known to 0.05 voxels only
 }

@@ -17,7 +17,9 @@ Mesh flipped(Mesh mesh) {
     return mesh;
 }
 
-Mesh moved(const Mesh& mesh, const glm::vec3& by) { return transformed(mesh, glm::translate(glm::mat4(1), by)); }
+Mesh moved(const Mesh& mesh, const glm::vec3& by) {
+    return transformed(mesh, glm::translate(glm::mat4(1), by));
+}
 
 }  // namespace
 
@@ -89,11 +91,11 @@ TEST_CASE("the public corpus is reported as it is known to be") {
         const char* name;
         std::size_t boundary, nonManifold, misoriented, duplicates, components;
     };
-    for (const Case& c :
-         {Case{"bunny_zipper.ply", 223, 0, 0, 0, 1}, Case{"bunny_res2_nasty.ply", 123, 150, 2, 87, 1},
-          Case{"dragon_vrip_res2_nasty.ply", 0, 2534, 0, 1489, 7}, Case{"cgal-elephant-with-holes.off", 1353, 0, 0, 0, 1},
-          Case{"cgal-bones.off", 0, 0, 0, 0, 26}, Case{"armadillo_100k.ply", 0, 0, 0, 0, 1}, Case{"cgal-blobby-shuffled.off", 0, 0, 3069, 0, 1},
-          Case{"moebius.obj", 112, 0, 4, 0, 1}}) {
+    for (const Case& c : {Case{"bunny_zipper.ply", 223, 0, 0, 0, 1}, Case{"bunny_res2_nasty.ply", 123, 150, 2, 87, 1},
+                          Case{"dragon_vrip_res2_nasty.ply", 0, 2534, 0, 1489, 7},
+                          Case{"cgal-elephant-with-holes.off", 1353, 0, 0, 0, 1},
+                          Case{"cgal-bones.off", 0, 0, 0, 0, 26}, Case{"armadillo_100k.ply", 0, 0, 0, 0, 1},
+                          Case{"cgal-blobby-shuffled.off", 0, 0, 3069, 0, 1}, Case{"moebius.obj", 112, 0, 4, 0, 1}}) {
         const auto path = test::corpusMesh(c.name);
         if (!path) return;
         const MeshReport report = inspect(readMesh(*path));

@@ -10,7 +10,9 @@ using namespace bilayer;
 
 namespace {
 
-Mesh triangle() { return {{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}}; }
+Mesh triangle() {
+    return {{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}};
+}
 
 }  // namespace
 

@@ -1,7 +1,9 @@
 #include "sdf/mesh_io.h"
 
+#include <fmt/format.h>
 #include <catch2/catch.hpp>
 #include <fstream>
+#include <iterator>
 
 #include "demos/shared/shapes.h"
 #include "sdf/inspect.h"
@@ -53,14 +55,16 @@ TEST_CASE("polygons, negative indices and node transforms are understood") {
 }
 
 TEST_CASE("OFF files may hold comments and empty lines anywhere") {
-    const Mesh mesh = readMesh(write("comments.off", "OFF 4 4 6 # counts\n\n0 0 0\n1 0 0 # x\n\n0 1 0\n0 0 1\n# faces\n"
-                                                     "3 0 2 1\n\n3 0 1 3\n3 0 3 2\n\n3 1 2 3\n"));
+    const Mesh mesh = readMesh(write("comments.off",
+                                     "OFF 4 4 6 # counts\n\n0 0 0\n1 0 0 # x\n\n0 1 0\n0 0 1\n# faces\n"
+                                     "3 0 2 1\n\n3 0 1 3\n3 0 3 2\n\n3 1 2 3\n"));
     CHECK(mesh.triangles.size() == 4);
     CHECK(inspect(mesh).closed());
 }
 
 TEST_CASE("unreadable files give an error that names them") {
-    CHECK_THROWS_WITH(readMesh("/nonexistent.obj"), Catch::Contains("/nonexistent.obj") && Catch::Contains("no such file"));
+    CHECK_THROWS_WITH(readMesh("/nonexistent.obj"),
+                      Catch::Contains("/nonexistent.obj") && Catch::Contains("no such file"));
     for (const auto& [name, text] : {std::pair("empty.obj", ""), std::pair("noise.ply", "ply\nnot a ply"),
                                      std::pair("points.obj", "v 0 0 0\nv 1 0 0\n"), std::pair("text.stl", "hello"),
                                      std::pair("flat.obj", "v 0 0 0\nv 1 0 0\nv 0 0 0\nf 1 2 3\n")}) {
@@ -68,6 +72,61 @@ TEST_CASE("unreadable files give an error that names them") {
         CHECK_THROWS_WITH(readMesh(write(name, text)), Catch::Contains(name));
     }
     CHECK_THROWS_WITH(readMesh(write("nan.obj", "v 0 0 nan\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")), Catch::Contains("nan.obj"));
+}
+
+TEST_CASE("files that end early are refused, wherever they end") {
+    const Mesh mesh = shapes::sphere(1, 3);
+    std::vector<std::filesystem::path> whole;
+    for (const std::string ending : {".ply", ".stl"}) {
+        whole.push_back(test::scratch("whole" + ending));
+        writeMesh(whole.back(), mesh);
+    }
+    std::string off = fmt::format("OFF\n{} {} 0\n", mesh.points.size(), mesh.triangles.size());
+    std::string ascii = fmt::format(
+        "ply\nformat ascii 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\nelement face "
+        "{}\n"
+        "property list uchar int vertex_indices\nend_header\n",
+        mesh.points.size(), mesh.triangles.size());
+    std::string stl = "solid sphere\n";
+    for (const auto& p : mesh.points) off += fmt::format("{} {} {}\n", p.x, p.y, p.z);
+    for (const auto& p : mesh.points) ascii += fmt::format("{} {} {}\n", p.x, p.y, p.z);
+    for (const auto& t : mesh.triangles) {
+        off += fmt::format("3 {} {} {}\n", t.x, t.y, t.z);
+        ascii += fmt::format("3 {} {} {}\n", t.x, t.y, t.z);
+        stl += "facet normal 0 0 0\nouter loop\n";
+        for (int k = 0; k < 3; ++k) {
+            const glm::vec3 p = mesh.points[t[k]];
+            stl += fmt::format("vertex {} {} {}\n", p.x, p.y, p.z);
+        }
+        stl += "endloop\nendfacet\n";
+    }
+    whole.push_back(write("whole.off", off));
+    whole.push_back(write("ascii.ply", ascii));
+    whole.push_back(write("ascii.stl", stl + "endsolid sphere\n"));
+    for (const char* name : {"brain.ply", "bunny_zipper.ply", "cgal-knot2.off", "screwdriver_7k.off", "busted.STL"})
+        if (const auto path = test::corpusMesh(name)) whole.push_back(*path);
+    for (const auto& path : whole) {
+        CAPTURE(path);
+        std::ifstream file(path, std::ios::binary);
+        const std::string bytes{std::istreambuf_iterator<char>(file), {}};
+        CHECK_NOTHROW(readMesh(path));
+        for (const double part : {0.0, 0.01, 0.05, 0.2, 0.3, 0.5, 0.6, 0.7, 0.9, 0.97, 0.995}) {
+            CAPTURE(part);
+            const auto cut =
+                write("cut" + path.extension().string(), bytes.substr(0, std::size_t(part * double(bytes.size()))));
+            CHECK_THROWS_WITH(readMesh(cut), Catch::Contains(cut.string()));
+        }
+    }
+}
+
+TEST_CASE("faces that use vertices which are not there are refused") {
+    CHECK_THROWS_WITH(readMesh(write("index.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 7\n")),
+                      Catch::Contains("face 0"));
+    CHECK_THROWS(readMesh(write("index.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n")));
+    CHECK_THROWS(readMesh(write("index.ply",
+                                "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
+                                "property float z\nelement face 1\nproperty list uchar int vertex_indices\n"
+                                "end_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 9\n")));
 }
 
 TEST_CASE("the public corpus's formats are read") {

@@ -22,7 +22,8 @@ std::vector<glm::dvec3> samples(const Tile& tile) {
 }
 
 // Algorithm 1 of the paper, word by word.
-std::vector<glm::dvec3> algorithm1(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c, double epsilon, int most) {
+std::vector<glm::dvec3> algorithm1(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c, double epsilon,
+                                   int most) {
     const double area = 0.5 * glm::length(glm::cross(b - a, c - a));
     int n = int(std::ceil(std::sqrt(area / epsilon)));
     if (n > most) n = most;
@@ -72,9 +73,9 @@ TEST_CASE("tiles hold the samples of Algorithm 1 to the letter") {
         const Tiles tiles = makeTiles(mesh, options);
         REQUIRE(tiles.tiles.size() == 1);
         const std::vector<glm::dvec3> ours = samples(tiles.tiles[0]);
-        const std::vector<glm::dvec3> paper =
-            algorithm1(4.0 * glm::dvec3(mesh.points[0]), 4.0 * glm::dvec3(mesh.points[1]), 4.0 * glm::dvec3(mesh.points[2]),
-                       double(options.doubleLayer.epsilon), options.doubleLayer.maxSubdivision);
+        const std::vector<glm::dvec3> paper = algorithm1(
+            4.0 * glm::dvec3(mesh.points[0]), 4.0 * glm::dvec3(mesh.points[1]), 4.0 * glm::dvec3(mesh.points[2]),
+            double(options.doubleLayer.epsilon), options.doubleLayer.maxSubdivision);
         REQUIRE(ours.size() == paper.size());
         CHECK(std::int64_t(ours.size()) == sampleCount(tiles.tiles[0].rows));
         double worst = 0;
@@ -119,7 +120,8 @@ TEST_CASE("recursive subdivision samples barycentres of parts no larger than eps
     options.doubleLayer.subdivision = Subdivision::recursive;
     const Tiles tiles = makeTiles(right, options);
     REQUIRE(tiles.tiles.size() == 2);
-    CHECK(glm::distance(samples(tiles.tiles[0])[0] + samples(tiles.tiles[1])[0], glm::dvec3(4.0 / 3, 4.0 / 3, 0)) < 1e-6);
+    CHECK(glm::distance(samples(tiles.tiles[0])[0] + samples(tiles.tiles[1])[0], glm::dvec3(4.0 / 3, 4.0 / 3, 0)) <
+          1e-6);
 }
 
 TEST_CASE("no gap is left on large triangles and slivers") {

@@ -49,7 +49,8 @@ TEST_CASE("half floats halve the file and keep three digits") {
     const LevelSet field = torus();
     writeVdb(test::scratch("full.vdb"), field);
     writeVdb(test::scratch("half.vdb"), field, {.halfFloat = true});
-    CHECK(std::filesystem::file_size(test::scratch("half.vdb")) < std::filesystem::file_size(test::scratch("full.vdb")));
+    CHECK(std::filesystem::file_size(test::scratch("half.vdb")) <
+          std::filesystem::file_size(test::scratch("full.vdb")));
     const LevelSet back = readVdb(test::scratch("half.vdb"));
     CHECK(back.activeVoxels() == field.activeVoxels());
     const auto values = back.grids().distance->getConstAccessor();
@@ -101,7 +102,10 @@ TEST_CASE("a rotated or empty grid is no level set to us") {
                     std::invalid_argument);
     CHECK_THROWS_AS(LevelSet(grids([](auto& grid) { grid.transform().postScale(openvdb::Vec3d(1, 2, 1)); })),
                     std::invalid_argument);
-    CHECK_THROWS_AS(LevelSet(grids([](auto& grid) { grid.transform().postTranslate({0.02, 0, 0}); })), std::invalid_argument);
+    CHECK_THROWS_AS(LevelSet(grids([](auto& grid) {
+                        grid.transform().postTranslate({0.02, 0, 0});
+                    })),
+                    std::invalid_argument);
     CHECK_THROWS_AS(LevelSet(grids([](auto& grid) { grid.clear(); })), std::invalid_argument);
     CHECK_THROWS_AS(LevelSet(std::make_shared<Grids>()), std::invalid_argument);
 }
