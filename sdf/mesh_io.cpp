@@ -45,11 +45,13 @@ const aiScene* readScene(Assimp::Importer& importer, const std::filesystem::path
     return importer.ReadFile(path.string(), none);
 }
 
-// Assimp's later steps take it for granted that faces use vertices that exist.
+// Assimp's later steps take it for granted that faces have corners, which are vertices that exist.
 void checkFaces(const aiScene& scene, const std::filesystem::path& path) {
     for (unsigned m = 0; m < scene.mNumMeshes; ++m)
         for (unsigned f = 0; f < scene.mMeshes[m]->mNumFaces; ++f) {
             const aiFace& face = scene.mMeshes[m]->mFaces[f];
+            if (face.mNumIndices == 0)
+                throw std::runtime_error(fmt::format("{}: face {} has no corner", path.string(), f));
             for (unsigned k = 0; k < face.mNumIndices; ++k)
                 if (face.mIndices[k] >= scene.mMeshes[m]->mNumVertices)
                     throw std::runtime_error(fmt::format("{}: face {} uses vertex {}, but there are only {}",
