@@ -4,6 +4,7 @@
 // Reading the mesh is not timed, nor is putting its vertices into the form that each builder wants.
 #include <benchmark/benchmark.h>
 #include <fmt/format.h>
+#include <malloc.h>
 #include <openvdb/tools/MeshToVolume.h>
 
 #include <CLI/CLI.hpp>
@@ -67,7 +68,8 @@ void add(const std::string& name, std::function<std::uint64_t()> voxels) {
     benchmark::RegisterBenchmark(name.c_str(),
                                  [voxels](benchmark::State& state) {
                                      std::ofstream("/proc/self/clear_refs") << resetPeak;
-                                     const double before = statusMiB("VmRSS:");
+                                     ::malloc_trim(0);
+        const double before = statusMiB("VmRSS:");
                                      std::uint64_t count = 0;
                                      for (auto _ : state) benchmark::DoNotOptimize(count = voxels());
                                      state.counters["activeVoxels"] = double(count);

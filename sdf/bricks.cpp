@@ -1,8 +1,6 @@
 #include "sdf/bricks.h"
 
-#include <oneapi/tbb/blocked_range.h>
 #include <oneapi/tbb/parallel_for.h>
-#include <oneapi/tbb/parallel_reduce.h>
 
 #include <algorithm>
 #include <array>
@@ -10,7 +8,6 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/vector_relational.hpp>
-#include <limits>
 #include <utility>
 
 #include "sdf/blocks.h"
@@ -24,7 +21,7 @@ constexpr int blocksPerBrick = brickBlocks * brickBlocks * brickBlocks;
 constexpr int blocksWorthCulling = 8;  // a tile over more blocks than this is tested against each block
 
 struct Box {
-    glm::ivec3 lower{std::numeric_limits<int>::max()}, upper{std::numeric_limits<int>::min()};  // both included
+    glm::ivec3 lower, upper;  // both included
 };
 
 // Rounds down; many times quicker than glm::floor without SSE 4.1.
@@ -61,20 +58,6 @@ void forEachCell(const Box& cells, Visit visit) {
             for (int z = cells.lower.z; z <= cells.upper.z; ++z) visit(glm::ivec3(x, y, z));
 }
 
-Box bricksOfAll(std::span<const Tile> tiles, float reach) {
-    const auto unite = [](const Box& a, const Box& b) {
-        return Box{glm::min(a.lower, b.lower), glm::max(a.upper, b.upper)};
-    };
-    return tbb::parallel_reduce(
-        tbb::blocked_range<std::size_t>(0, tiles.size(), tilesPerRun), Box{},
-        [&](const auto& range, Box box) {
-            for (std::size_t i = range.begin(); i < range.end(); ++i)
-                box = unite(box, cellsOf(voxelsOf(tiles[i], reach), brickShift));
-            return box;
-        },
-        unite);
-}
-
 // Whether the plane of a tile passes a block at a distance that no sample can bridge.
 bool planeMisses(const Tile& tile, const glm::vec3& normal, const glm::ivec3& block, float reach) {
     constexpr float half = 0.5f * (blockSide - 1);
@@ -90,7 +73,8 @@ Bricks binBricks(const Tiles& tiles, float reach) {
     Bricks bricks;
     bricks.offsets.push_back(0);
     if (tiles.tiles.empty()) return bricks;
-    const Box range = bricksOfAll(tiles.tiles, reach);
+    const int margin = int(std::ceil(reach)) + 1;
+    const Box range = cellsOf({tiles.lower - margin, tiles.upper + margin}, brickShift);
     const glm::ivec3 size = range.upper - range.lower + 1;
     const std::size_t cells = std::size_t(size.x) * std::size_t(size.y) * std::size_t(size.z);
     const auto cellIndex = [&](const glm::ivec3& brick) {

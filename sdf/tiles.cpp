@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <numeric>
 #include <vector>
@@ -28,6 +29,11 @@ struct Shape {
     int longest;         // the edge from this corner to the next
 };
 
+double longestEdge2(const Corners& c) {
+    const glm::dvec3 ab = c[1] - c[0], bc = c[2] - c[1], ca = c[0] - c[2];
+    return std::max({glm::dot(ab, ab), glm::dot(bc, bc), glm::dot(ca, ca)});
+}
+
 Shape shapeOf(const Corners& c) {
     Shape shape{0.5 * glm::length(glm::cross(c[1] - c[0], c[2] - c[0])), 0, 0};
     for (int k = 0; k < 3; ++k) {
@@ -47,15 +53,17 @@ class Cutter {
   public:
     Cutter(const DoubleLayerOptions& options, Emit emit) : options_(options), emit_(emit) {}
 
-    void cut(const Corners& corners) {
-        const glm::dvec3 normal = glm::cross(corners[1] - corners[0], corners[2] - corners[0]);
-        const double length = glm::length(normal);
-        if (!(length > 0)) return;  // no area, no normal, no sample
-        normal_ = normal / length;
+    void cut(const Corners& c) {
+        normal_ = glm::cross(c[1] - c[0], c[2] - c[0]);
+        const double twiceArea2 = glm::dot(normal_, normal_);
+        if (!(twiceArea2 > 0)) return;  // no area, no normal, no sample
+        // most triangles of a fine mesh end here, before any square root
+        const double epsilon = double(options_.epsilon);
+        if (twiceArea2 <= 4 * epsilon * epsilon && longestEdge2(c) <= sliverStep * sliverStep * epsilon) return emit(c, 1);
         if (options_.subdivision == Subdivision::recursive)
-            recurse(corners);
+            recurse(c);
         else
-            rows(corners);
+            rows(c);
     }
 
   private:
@@ -113,7 +121,7 @@ class Cutter {
 
     const DoubleLayerOptions& options_;
     Emit emit_;
-    glm::dvec3 normal_{0};
+    glm::dvec3 normal_{0};  // of the whole triangle, twice its area long
 };
 
 }  // namespace
@@ -145,6 +153,9 @@ Tiles makeTiles(const Mesh& mesh, const BuildOptions& options) {
     });
     std::partial_sum(begins.begin(), begins.end(), begins.begin());
     Tiles all;
+    const Bounds box = bounds(mesh);
+    all.lower = glm::ivec3(glm::floor(glm::dvec3(box.lower) * voxels));
+    all.upper = glm::ivec3(glm::ceil(glm::dvec3(box.upper) * voxels));
     all.tileMemory = std::make_unique_for_overwrite<Tile[]>(begins[runs]);
     all.triangleMemory = std::make_unique_for_overwrite<std::int32_t[]>(begins[runs]);
     all.tiles = {all.tileMemory.get(), begins[runs]};

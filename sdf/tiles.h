@@ -27,6 +27,7 @@ static_assert(sizeof(Tile) == 64, "one cache line, and the layout of the OpenCL 
 struct Tiles {
     std::span<const Tile> tiles;
     std::span<const std::int32_t> triangles;  ///< the triangle that each tile is of
+    glm::ivec3 lower{0}, upper{0};            ///< voxels around all samples, both included [index coordinates]
 
     /// What the spans look at: arrays that are not cleared before they are written.
     std::unique_ptr<Tile[]> tileMemory;
