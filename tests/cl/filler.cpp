@@ -298,6 +298,8 @@ TEST_CASE("blocks hold Eq. 3 of the nearest samples") {
     Tiles tiles;
     tiles.tiles = loose;
     tiles.triangles = triangles;
+    tiles.lower = glm::ivec3(-90);
+    tiles.upper = glm::ivec3(90);
     const Bricks bricks = binBricks(tiles, parameters.reach);
 
     std::mutex mutex;
