@@ -59,7 +59,8 @@ class Cutter {
         if (!(twiceArea2 > 0)) return;  // no area, no normal, no sample
         // most triangles of a fine mesh end here, before any square root
         const double epsilon = double(options_.epsilon);
-        if (twiceArea2 <= 4 * epsilon * epsilon && longestEdge2(c) <= sliverStep * sliverStep * epsilon) return emit(c, 1);
+        if (twiceArea2 <= 4 * epsilon * epsilon && longestEdge2(c) <= sliverStep * sliverStep * epsilon)
+            return emit(c, 1);
         if (options_.subdivision == Subdivision::recursive)
             recurse(c);
         else
@@ -115,8 +116,12 @@ class Cutter {
         const glm::dvec3 s1 = (c[1] - c[0]) * part, s2 = (c[2] - c[1]) * part, s3 = (c[2] - c[0]) * part;
         const glm::dvec3 first = c[0] + (s1 + s3) / 3.0;
         const glm::ivec3 base(std::lrint(first.x), std::lrint(first.y), std::lrint(first.z));
-        return {base,          glm::vec3(first - glm::dvec3(base)),         glm::vec3(s1),
-                glm::vec3(s2), glm::vec3(double(options_.delta) * normal_), n};
+        return {base,
+                glm::vec3(first - glm::dvec3(base)),
+                glm::vec3(s1),
+                glm::vec3(s2),
+                glm::vec3(double(options_.delta) / glm::length(normal_) * normal_),
+                n};
     }
 
     const DoubleLayerOptions& options_;
