@@ -24,6 +24,16 @@ struct Map {
         shift = pose.position / into.scale;
     }
     glm::vec3 operator()(const glm::vec3& point) const { return linear * point + shift; }
+
+    // The same map, into the parts of a field's clearance.
+    Map inParts(const Field& field) const {
+        const float edge = float(Clearance::partSide) * field.voxelSize();
+        Map map = *this;
+        map.scale /= edge;
+        map.linear *= 1 / edge;
+        map.shift = glm::vec3((glm::dvec3(shift) - field.origin()) / double(edge));
+        return map;
+    }
 };
 
 // Calls found(index, point, sample) for the points of one body within `margin` [m] of another's surface or in it.
@@ -32,16 +42,18 @@ void samplePoints(const Placed& body, const Placed& other, float margin, Contact
     const Map map(body, other);
     const Field& field = other.collider.field();
     const float reach = margin / other.scale;
-    const float kept = reach + fieldError * field.voxelSize();
+    const Clearance clearance = field.clearance();
+    const Map coarse = map.inParts(field);
+    const float kept = (reach / field.voxelSize() + fieldError) / float(Clearance::partSide);
     const auto reject = [&](const glm::vec3& centre, float radius) {
-        return field.distance(map(centre)) > radius * map.scale + kept;
+        return clearance.isOutside(coarse(centre), radius * coarse.scale + kept);
     };
     body.collider.points().visit(reject, [&](std::uint32_t index, const SurfacePoint& point) {
-        const glm::vec3 place = map(point.position);
+        const glm::vec3 place = coarse(point.position);
+        if (clearance.isAbove(place, reach) || clearance.isOutside(place, kept)) return;
         ++report.pointsTested;
-        // most points are beside the body: the distance alone tells that sooner
-        if (!(field.distance(place) <= reach)) return;
-        const Sample sample = field.sample(place);
+        const Sample sample = field.sampleWithin(map(point.position), reach);
+        if (!(sample.distance <= reach)) return;
         if (sample.inBand) found(index, point, sample);
         if (!sample.inBand && sample.distance < 0) ++report.beyondBand;
     });

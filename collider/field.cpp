@@ -1,6 +1,6 @@
 // A level set laid out for queries: each leaf becomes a block of 9^3 floats, so that all eight voxels around a point
-// lie in one block, and a dense directory over the blocks' box tells which block a point is in. Where there is none, it
-// tells the side and how many blocks around are empty, which bounds the distance from below.
+// lie in one block, and a dense directory over the blocks' box tells which block a point is in, or on which side.
+// Beside the band, distances are bounded from below by a coarse exact distance transform of where the surface can be.
 #include "collider/field.h"
 
 #include <oneapi/tbb/parallel_for.h>
@@ -26,22 +26,17 @@ using Accessor = openvdb::FloatGrid::ConstAccessor;
 constexpr int side = 8;           // voxels along a block: an OpenVDB leaf
 constexpr int stride = side + 1;  // with the apron that completes the last cells
 constexpr int blockFloats = stride * stride * stride;
-constexpr std::int64_t mostBlocks = 1 << 28;  // entries of the directory: 1 GiB
-constexpr float cellDiagonal = 1.7320508f;    // [voxels]; also the Lipschitz bound of the trilinear interpolant
-constexpr double smallestStep = 0.1;          // of a ray [voxels]: bounds the steps of rays that graze the surface
-constexpr double rayTolerance = 1e-5;         // [voxels]
+constexpr std::int64_t mostBlocks = 1 << 26;  // of the box: 4.3 GiB at 68 bytes each
+constexpr int partSide = Clearance::partSide;
+constexpr int mostParts = 16;                       // away from the surface: farther away, bounds grow no more
+constexpr float cellDiagonal = 1.7320508f;          // [voxels]; also the Lipschitz bound of the trilinear interpolant
+constexpr float nearSurface = 0.5f * cellDiagonal;  // some voxel of a cell that the surface meets is as near [voxels]
+constexpr double smallestStep = 0.1;   // of a ray [voxels]: bounds the steps of rays that graze the surface
+constexpr double rayTolerance = 1e-5;  // [voxels]
 constexpr float infinity = std::numeric_limits<float>::infinity();
 
-// Of an empty block: how many blocks it is away from the nearest one that is not (1: adjacent), and its side.
-std::int32_t encodeEmpty(std::int32_t gap, bool inside) {
-    return -1 - (2 * gap + (inside ? 1 : 0));
-}
-std::int32_t emptyGap(std::int32_t entry) {
-    return (-1 - entry) / 2;
-}
-bool emptyInside(std::int32_t entry) {
-    return ((-1 - entry) & 1) != 0;
-}
+// Entries of the directory for blocks that lie beside the band altogether.
+constexpr std::int32_t emptyOutside = -1, emptyInside = -2;
 
 // The eight voxels around a point, the last axis fastest, and where the point lies between them.
 struct Cell {
@@ -69,14 +64,11 @@ glm::vec3 interpolantGradient(const Cell& cell) {
             mix(mix(v[1] - v[0], v[3] - v[2], f.y), mix(v[5] - v[4], v[7] - v[6], f.y), f.x)};
 }
 
-// The best bound that the eight voxels give, since a distance changes by no more than one goes.
-float boundFromCorners(const Cell& cell, float voxelSize) {
-    float bound = 0;
-    for (int corner = 0; corner < 8; ++corner) {
-        const glm::vec3 offset = cell.fraction - glm::vec3(corner >> 2, corner >> 1 & 1, corner & 1);
-        bound = std::max(bound, std::abs(cell.values[corner]) - voxelSize * glm::length(offset));
-    }
-    return bound;
+// What the interpolant of values that go no faster than the distance itself may be off by: the mean way to the eight
+// voxels, by their weights, which is at most the root of its mean square [voxels].
+float interpolationError(const glm::vec3& fraction) {
+    const glm::vec3 spread = fraction * (1.f - fraction);
+    return std::sqrt(spread.x + spread.y + spread.z);
 }
 
 // A leaf needs a block if it has voxels of the band, or lies on both sides of it (where the band is below one voxel).
@@ -105,27 +97,54 @@ void copyBlock(const Accessor& tree, const Coord& origin, float* block) {
     }
 }
 
-// Chessboard distances to the cells that are 0, in two sweeps over half of the 26 neighbours each
-// (A. Rosenfeld, J. L. Pfaltz, "Distance functions on digital pictures", 1968). The others must be large.
-void chessboard(std::vector<std::int32_t>& cells, const glm::ivec3& size) {
-    const auto at = [&](const glm::ivec3& p) -> std::int32_t& {
-        return cells[(std::size_t(p.x) * size.y + p.y) * size.z + p.z];
-    };
-    const auto relax = [&](const glm::ivec3& p, int direction) {
-        std::int32_t& cell = at(p);
-        for (int neighbour = 0; neighbour < 13; ++neighbour) {
-            const glm::ivec3 offset(neighbour / 9 - 1, neighbour / 3 % 3 - 1, neighbour % 3 - 1);
-            const glm::ivec3 q = p + direction * offset;
-            const bool within = glm::clamp(q, glm::ivec3(0), size - 1) == q;
-            if (within) cell = std::min(cell, at(q) + 1);
+// The least value of the voxels around a part's cells, and of their magnitudes.
+std::pair<float, float> leastOf(const float* part) {
+    float least = infinity, nearest = infinity;
+    for (int x = 0; x <= partSide; ++x)
+        for (int y = 0; y <= partSide; ++y)
+            for (int z = 0; z <= partSide; ++z) {
+                const float value = part[(x * stride + y) * stride + z];
+                least = std::min(least, value);
+                nearest = std::min(nearest, std::abs(value));
+            }
+    return {least, nearest};
+}
+
+// Along one line of parts: the least squared way from each one's centre to a part anywhere on it, plus what that part
+// holds already (as P. Felzenszwalb, D. Huttenlocher, "Distance transforms of sampled functions", 2012, but to the
+// faces of parts) [parts^2].
+void transformLine(Clearance::Part* line, std::size_t step, int count, std::vector<float>& before) {
+    before.resize(std::size_t(count));
+    for (int i = 0; i < count; ++i) before[i] = line[i * step].centre;
+    for (int i = 0; i < count; ++i) {
+        float best = before[i];
+        const int reach = std::min(mostParts, std::max(i, count - 1 - i));
+        for (int d = 1; d <= reach; ++d) {
+            const float way = (float(d) - 0.5f) * (float(d) - 0.5f);
+            if (way >= best) break;
+            if (i >= d) best = std::min(best, way + before[i - d]);
+            if (i + d < count) best = std::min(best, way + before[i + d]);
         }
-    };
-    for (int x = 0; x < size.x; ++x)
-        for (int y = 0; y < size.y; ++y)
-            for (int z = 0; z < size.z; ++z) relax({x, y, z}, 1);
-    for (int x = size.x; x-- > 0;)
-        for (int y = size.y; y-- > 0;)
-            for (int z = size.z; z-- > 0;) relax({x, y, z}, -1);
+        line[i * step].centre = best;
+    }
+}
+
+// From 0 for parts that meet the surface, and much for others, to the ways from their centres to the nearest such part:
+// axis by axis, since a squared way is a sum over the axes. Negative where all is inside.
+void transform(std::vector<Clearance::Part>& parts, const glm::ivec3& size) {
+    const std::size_t step[] = {std::size_t(size.y) * size.z, std::size_t(size.z), 1};
+    for (int axis = 2; axis >= 0; --axis) {
+        const int u = axis == 0 ? 1 : 0, v = axis == 2 ? 1 : 2;
+        tbb::parallel_for(0, size[u], [&](int i) {
+            std::vector<float> before;
+            for (int j = 0; j < size[v]; ++j)
+                transformLine(parts.data() + i * step[u] + j * step[v], step[axis], size[axis], before);
+        });
+    }
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, parts.size()), [&](const auto& range) {
+        for (std::size_t i = range.begin(); i < range.end(); ++i)
+            parts[i].centre = std::copysign(std::sqrt(parts[i].centre), parts[i].least);
+    });
 }
 
 }  // namespace
@@ -134,6 +153,7 @@ struct Field::Data {
     glm::dvec3 origin;  // of the directory: its first voxel [m]
     glm::ivec3 blocks;  // of the directory, along each axis
     std::vector<std::int32_t> directory;
+    std::vector<Clearance::Part> clearances;
     std::unique_ptr<float[]> values;
     std::size_t stored = 0;
     double voxel;     // its edge [m], unrounded: far from the origin it counts
@@ -144,6 +164,7 @@ struct Field::Data {
     explicit Data(const LevelSet& levelSet);
 
     void layOut(const FloatTree& tree, const std::vector<Coord>& origins, const Coord& first);
+    void measureClearances();
 
     // Points are in voxels from the directory's first one, in double: exact enough however far the mesh is from the
     // origin.
@@ -151,10 +172,17 @@ struct Field::Data {
     glm::vec3 toWorld(const glm::dvec3& local) const { return glm::vec3(local * voxel + origin); }
     glm::dvec3 extent() const { return double(side) * glm::dvec3(blocks); }
 
-    template <bool withGradient>
-    Sample sample(const glm::dvec3& local) const;
+    glm::ivec3 parts() const { return side / partSide * blocks; }
+
+    Sample sample(const glm::dvec3& local, float gradientReach) const;
+    float distance(const glm::dvec3& local) const { return sample(local, -infinity).distance; }
     float boundOutside(const glm::dvec3& local) const;
-    float boundInEmptyBlock(std::int32_t entry, const glm::vec3& inBlock) const;
+    float boundInEmptyBlock(bool inside, const glm::dvec3& local, const glm::ivec3& block) const;
+    Clearance clearance() const { return {clearances.data(), parts()}; }
+    // [voxels]
+    float clearanceAt(const glm::dvec3& local) const {
+        return float(partSide) * clearance().around(glm::vec3(local) / float(partSide));
+    }
     double crossing(const glm::dvec3& start, const glm::dvec3& direction, double outside, double inside) const;
     std::optional<double> trace(const glm::dvec3& start, const glm::dvec3& direction, double length) const;
 };
@@ -180,8 +208,9 @@ Field::Data::Data(const LevelSet& levelSet)
     blocks = glm::ivec3((box.max() - first).x(), (box.max() - first).y(), (box.max() - first).z()) / side + 1;
     const double count = double(blocks.x) * blocks.y * blocks.z;
     if (count > double(mostBlocks))
-        throw std::invalid_argument("field: the bounds hold more than 2^28 blocks of 8^3 voxels: take larger voxels");
+        throw std::invalid_argument("field: the bounds hold more than 2^26 blocks of 8^3 voxels: take larger voxels");
     layOut(grid.tree(), origins, first);
+    measureClearances();
 
     const auto world = [&](const Coord& voxel) {
         const openvdb::Vec3d p = grid.indexToWorld(voxel);
@@ -197,17 +226,13 @@ void Field::Data::layOut(const FloatTree& tree, const std::vector<Coord>& origin
         const Coord block = (voxel - first) >> 3;
         return directory[(std::size_t(block.x()) * blocks.y + block.y()) * blocks.z + block.z()];
     };
-    directory.assign(std::size_t(blocks.x) * blocks.y * blocks.z, std::numeric_limits<std::int32_t>::max() / 4);
-    for (const Coord& block : origins) entryOf(block) = 0;
-    chessboard(directory, blocks);
-
+    directory.resize(std::size_t(blocks.x) * blocks.y * blocks.z);
     tbb::parallel_for(0, blocks.x, [&](int x) {
         const Accessor accessor(tree);
         for (int y = 0; y < blocks.y; ++y)
             for (int z = 0; z < blocks.z; ++z) {
                 const Coord block = first.offsetBy(side * x, side * y, side * z);
-                std::int32_t& entry = entryOf(block);
-                if (entry > 0) entry = encodeEmpty(entry, accessor.getValue(block) < 0);
+                entryOf(block) = accessor.getValue(block) < 0 ? emptyInside : emptyOutside;
             }
     });
 
@@ -222,8 +247,35 @@ void Field::Data::layOut(const FloatTree& tree, const std::vector<Coord>& origin
     });
 }
 
-template <bool withGradient>
-Sample Field::Data::sample(const glm::dvec3& local) const {
+void Field::Data::measureClearances() {
+    // a narrower band does not tell where the surface is
+    const bool known = std::min(exteriorWidth, interiorWidth) >= nearSurface * voxelSize;
+    const float far = known ? float(mostParts * mostParts) : 0.f;
+    const glm::ivec3 size = parts();
+    clearances.resize(std::size_t(size.x) * size.y * size.z);
+    const auto partsOf = [&](const glm::ivec3& block, auto&& measure) {
+        for (int i = 0; i < 8; ++i) {
+            const glm::ivec3 inBlock(i >> 2, i >> 1 & 1, i & 1), part = 2 * block + inBlock;
+            clearances[(std::size_t(part.x) * size.y + part.y) * size.z + part.z] = measure(partSide * inBlock);
+        }
+    };
+    tbb::parallel_for(0, blocks.x, [&](int x) {
+        for (int y = 0; y < blocks.y; ++y)
+            for (int z = 0; z < blocks.z; ++z) {
+                const std::int32_t entry = directory[(std::size_t(x) * blocks.y + y) * blocks.z + z];
+                partsOf({x, y, z}, [&](const glm::ivec3& corner) -> Clearance::Part {
+                    if (entry < 0) return {far, entry == emptyInside ? -interiorWidth : exteriorWidth};
+                    const auto [least, nearest] = leastOf(values.get() + std::size_t(entry) * blockFloats +
+                                                          (corner.x * stride + corner.y) * stride + corner.z);
+                    return {nearest <= nearSurface * voxelSize ? 0 : far, least};
+                });
+            }
+    });
+    transform(clearances, size);
+}
+
+// With the gradient where the distance is no more than some length.
+Sample Field::Data::sample(const glm::dvec3& local, float gradientReach) const {
     // compared before any conversion to integers, so that NaN and huge coordinates end here
     const glm::dvec3 size = extent();
     const bool within =
@@ -232,7 +284,7 @@ Sample Field::Data::sample(const glm::dvec3& local) const {
 
     const glm::ivec3 voxel(local), block = voxel >> 3, inBlock = voxel & 7;
     const std::int32_t entry = directory[(std::size_t(block.x) * blocks.y + block.y) * blocks.z + block.z];
-    if (entry < 0) return {.distance = boundInEmptyBlock(entry, glm::vec3(local - glm::dvec3(side * block)))};
+    if (entry < 0) return {.distance = boundInEmptyBlock(entry == emptyInside, local, block)};
 
     const float* v =
         values.get() + std::size_t(entry) * blockFloats + (inBlock.x * stride + inBlock.y) * stride + inBlock.z;
@@ -246,11 +298,15 @@ Sample Field::Data::sample(const glm::dvec3& local) const {
         high = std::max(high, value);
     }
     const bool inBand = low > -interiorWidth && high < exteriorWidth;
-    if (!inBand) return {.distance = std::copysign(boundFromCorners(cell, voxelSize), distance)};
-    if constexpr (withGradient)
-        return {.distance = distance, .gradient = interpolantGradient(cell) * float(perMetre), .inBand = true};
-    else
-        return {.distance = distance, .inBand = true};
+    if (!inBand) {
+        // one of the voxels is beyond the band
+        const float besideBand = (distance < 0 ? interiorWidth : exteriorWidth) - cellDiagonal * voxelSize;
+        const float between = std::abs(distance) - voxelSize * interpolationError(cell.fraction);
+        const float bound = std::max({0.f, besideBand, between, voxelSize * clearanceAt(local)});
+        return {.distance = std::copysign(bound, distance)};
+    }
+    if (!(distance <= gradientReach)) return {.distance = distance, .inBand = true};
+    return {.distance = distance, .gradient = interpolantGradient(cell) * float(perMetre), .inBand = true};
 }
 
 // Who comes from outside the directory's box has that way to go, and is then no more than a cell's diagonal from a
@@ -261,14 +317,14 @@ float Field::Data::boundOutside(const glm::dvec3& local) const {
     return std::max(0.f, float(way - double(cellDiagonal)) * voxelSize + exteriorWidth);
 }
 
-// As above from block to block; beside the band the nearest voxel of the block itself often bounds better.
-float Field::Data::boundInEmptyBlock(std::int32_t entry, const glm::vec3& inBlock) const {
-    const glm::vec3 toFaces = glm::min(inBlock, float(side) - inBlock);
-    const float way = float(side * (emptyGap(entry) - 1)) + std::min({toFaces.x, toFaces.y, toFaces.z});
-    const glm::vec3 nearest = glm::clamp(glm::round(inBlock), 0.f, float(side - 1));
-    const float gain = std::max(way - cellDiagonal, -glm::distance(inBlock, nearest));
-    const bool inside = emptyInside(entry);
-    const float bound = std::max(0.f, gain * voxelSize + (inside ? interiorWidth : exteriorWidth));
+// The nearest voxel of the block itself is beyond the band. It is half a cell's diagonal away, or a whole one where the
+// cell ends in another block.
+float Field::Data::boundInEmptyBlock(bool inside, const glm::dvec3& local, const glm::ivec3& block) const {
+    const glm::vec3 inBlock(local - glm::dvec3(side * block));
+    const bool ownCell = std::max({inBlock.x, inBlock.y, inBlock.z}) <= float(side - 1);
+    const float width = inside ? interiorWidth : exteriorWidth;
+    const float besideBand = width - (ownCell ? 0.5f : 1.f) * cellDiagonal * voxelSize;
+    const float bound = std::max({0.f, besideBand, voxelSize * clearanceAt(local)});
     return inside ? -bound : bound;
 }
 
@@ -277,7 +333,7 @@ double Field::Data::crossing(const glm::dvec3& start, const glm::dvec3& directio
                              double inside) const {
     while (inside - outside > rayTolerance) {
         const double middle = 0.5 * (outside + inside);
-        (sample<false>(start + middle * direction).distance < 0 ? inside : outside) = middle;
+        (distance(start + middle * direction) < 0 ? inside : outside) = middle;
     }
     return inside;
 }
@@ -287,7 +343,7 @@ double Field::Data::crossing(const glm::dvec3& start, const glm::dvec3& directio
 std::optional<double> Field::Data::trace(const glm::dvec3& start, const glm::dvec3& direction, double length) const {
     double outside = 0;
     for (double along = 0;;) {
-        const Sample here = sample<false>(start + along * direction);
+        const Sample here = sample(start + along * direction, -infinity);
         if (here.distance < 0) return crossing(start, direction, outside, along);
         if (along >= length) return std::nullopt;
         outside = along;
@@ -299,11 +355,23 @@ std::optional<double> Field::Data::trace(const glm::dvec3& start, const glm::dve
 Field::Field(const LevelSet& levelSet) : data_(std::make_shared<Data>(levelSet)) {}
 
 Sample Field::sample(const glm::vec3& point) const noexcept {
-    return data_->sample<true>(data_->toLocal(point));
+    return data_->sample(data_->toLocal(point), infinity);
+}
+
+Clearance Field::clearance() const noexcept {
+    return data_->clearance();
+}
+
+glm::dvec3 Field::origin() const noexcept {
+    return data_->origin;
+}
+
+Sample Field::sampleWithin(const glm::vec3& point, float reach) const noexcept {
+    return data_->sample(data_->toLocal(point), reach);
 }
 
 float Field::distance(const glm::vec3& point) const noexcept {
-    return data_->sample<false>(data_->toLocal(point)).distance;
+    return data_->distance(data_->toLocal(point));
 }
 
 std::optional<RayHit> Field::raycast(const glm::vec3& origin, const glm::vec3& direction,
@@ -331,7 +399,7 @@ std::optional<RayHit> Field::raycast(const glm::vec3& origin, const glm::vec3& d
     if (!along) return std::nullopt;
 
     const glm::dvec3 hit = start + *along * unit;
-    const glm::vec3 gradient = data_->sample<true>(hit).gradient;
+    const glm::vec3 gradient = data_->sample(hit, infinity).gradient;
     const float steepness = glm::length(gradient);
     return RayHit{.distance = float((enter + *along) * data_->voxel),
                   .position = data_->toWorld(hit),
@@ -352,7 +420,8 @@ const Bounds& Field::bounds() const noexcept {
 }
 
 std::size_t Field::memoryBytes() const noexcept {
-    return sizeof(Data) + data_->directory.size() * sizeof(std::int32_t) + data_->stored * blockFloats * sizeof(float);
+    return sizeof(Data) + data_->directory.size() * sizeof(std::int32_t) +
+           data_->clearances.size() * sizeof(Clearance::Part) + data_->stored * blockFloats * sizeof(float);
 }
 
 }  // namespace bilayer

@@ -122,6 +122,54 @@ TEST_CASE("out of the band a sample is a bound of the true distance with the rig
         }
 }
 
+TEST_CASE("what a clearance rules out is ruled out, and little else far from the surface") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    Random random(seed);
+    const float edge = Clearance::partSide * float(h);
+    for (const Solid& solid : solids()) {
+        const Field field(levelSetOf(solid, h, 3, 6));
+        const Clearance clearance = field.clearance();
+        int beside = 0, ruledOut = 0;
+        for (int i = 0; i < 20000; ++i) {
+            const glm::vec3 p = random.point(i % 4 ? 0.6 : 3);
+            const auto radius = float(random(0, 0.3)), reach = float(random(-2, 2) * h);
+            const glm::vec3 place = glm::vec3(glm::dvec3(p) - field.origin()) / edge;
+            const double truth = solid.distance(glm::dvec3(p));
+            const Sample sample = field.sample(p);
+            CAPTURE(p.x, p.y, p.z, truth, radius, reach);
+            REQUIRE(clearance.around(place) * edge <= std::abs(truth) + 1e-6);
+            if (clearance.isOutside(place, radius / edge)) REQUIRE(truth >= radius - 1e-6);
+            if (clearance.isAbove(place, reach)) REQUIRE((!sample.inBand || sample.distance > reach - 1e-6f));
+            // a part's diagonal, and the way to where the surface is in another
+            if (truth < radius + 2 * 1.7321 * edge) continue;
+            ++beside;
+            ruledOut += clearance.isOutside(place, radius / edge);
+        }
+        REQUIRE(beside > 1000);
+        REQUIRE(ruledOut > 0.95 * beside);
+    }
+    const Field field(levelSetOf(sphereSolid(0.4), h));
+    for (const glm::vec3& p : {glm::vec3(notANumber, 0, 0), glm::vec3(0, notANumber, 0)})
+        REQUIRE_FALSE(field.clearance().isOutside(p, 1));
+    for (const float far : {1e9f, 1e30f, infinity, -infinity}) REQUIRE(field.clearance().isOutside({0, far, 0}, 1));
+}
+
+TEST_CASE("a sample within a reach is the sample, its gradient only there") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    Random random(seed);
+    const Field field(levelSetOf(torusSolid(0.35, 0.13), h));
+    for (int i = 0; i < 20000; ++i) {
+        const glm::vec3 p = random.point(0.5);
+        const auto reach = float(random(-3, 3) * h);
+        const Sample whole = field.sample(p);
+        Sample expected = whole;
+        if (!(whole.distance <= reach)) expected.gradient = glm::vec3(0);
+        REQUIRE(sameBits(field.sampleWithin(p, reach), expected));
+    }
+}
+
 TEST_CASE("the bound grows with the number of empty blocks, outside and inside") {
     const Field field(levelSetOf(sphereSolid(1), h));
     REQUIRE(field.distance({0, 0, 0}) < -0.3f);  // of 1: blocks are counted by the longest axis, 0.16 each
