@@ -59,7 +59,7 @@ std::string lowered(std::string text) {
 
 std::string listed(const std::vector<Found>& found) {
     std::string list;
-    for (const Found& f : found) list += "\n  " + f.info.name + " (" + f.info.platform + ")";
+    for (const Found& f : found) list += (list.empty() ? "" : ", ") + f.info.name + " (" + f.info.platform + ")";
     return list;
 }
 
@@ -75,7 +75,7 @@ Found choose(const std::string& text) {
     };
     const auto chosen = std::find_if(found.begin(), found.end(), fits);
     if (chosen == found.end())
-        throw DeviceError("no OpenCL device is called '" + text + "'; there is:" + listed(found));
+        throw DeviceError("no OpenCL device is called '" + text + "'; there is " + listed(found));
     return *chosen;
 }
 

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 #include <openvdb/io/File.h>
 #include <openvdb/tools/Diagnostics.h>
+#include <cmath>
 
 #include <memory>
 #include <stdexcept>
@@ -79,14 +80,19 @@ void printInfo(const Arguments& a, const LevelSet& field, const Json& grids) {
     table.print();
 }
 
+// To five digits: a width in metres over a voxel size is a whole number of voxels but for rounding.
+Json inVoxels(float width, const LevelSet& field) {
+    return std::round(1e5 * double(width) / double(field.voxelSize())) / 1e5;
+}
+
 void runInfo(const Arguments& a) {
     const LevelSet field = readVdb(a.input);
     const Json grids = gridList(a.input);
     if (!a.json) return printInfo(a, field, grids);
     print({{"grids", grids},
            {"voxelSize", number(field.voxelSize())},
-           {"exteriorWidth", number(field.exteriorWidth() / field.voxelSize())},
-           {"interiorWidth", number(field.interiorWidth() / field.voxelSize())},
+           {"exteriorWidth", inVoxels(field.exteriorWidth(), field)},
+           {"interiorWidth", inVoxels(field.interiorWidth(), field)},
            {"activeVoxels", field.activeVoxels()},
            {"leaves", field.leaves()},
            {"bounds", box(activeBounds(field))},
