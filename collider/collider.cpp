@@ -75,17 +75,22 @@ Collider::Collider(Mesh mesh, const LevelSet& levelSet, const ColliderOptions& o
 
 ContactReport collide(const Placed& a, const Placed& b, const ContactOptions& options, std::vector<Contact>& contacts) {
     ContactReport report;
+    const auto opposes = [&](const glm::vec3& normal, const Placed& body, const SurfacePoint& point) {
+        return -glm::dot(normal, body.pose.rotation * point.normal) >= options.leastOpposition;
+    };
     samplePoints(
         a, b, options.margin, report, [&](std::uint32_t index, const SurfacePoint& point, const Sample& sample) {
             const glm::vec3 normal = outwardNormal(b, sample, a, point);
+            if (!opposes(normal, a, point)) return;
             const float distance = sample.distance * b.scale;
             contacts.push_back({a.pose.toWorld(a.scale * point.position) - distance * normal, normal, distance, index});
         });
     samplePoints(
         b, a, options.margin, report, [&](std::uint32_t index, const SurfacePoint& point, const Sample& sample) {
-            const glm::vec3 normal = -outwardNormal(a, sample, b, point);
+            const glm::vec3 normal = outwardNormal(a, sample, b, point);
+            if (!opposes(normal, b, point)) return;
             contacts.push_back(
-                {b.pose.toWorld(b.scale * point.position), normal, sample.distance * a.scale, index | featureOfB});
+                {b.pose.toWorld(b.scale * point.position), -normal, sample.distance * a.scale, index | featureOfB});
         });
     return report;
 }

@@ -55,6 +55,10 @@ struct ContactOptions {
     /// Contacts are reported up to this distance [m]. The band must reach sqrt(3) voxels farther for all of them to be
     /// found, and as much deeper than bodies sink into each other (see Sample::inBand).
     float margin = 0;
+    /// Least cosine between the point's own normal and the opposite of the surface's that it touches; contacts below
+    /// are left out. Points just under the edge of the other body look along the surface that is nearest to them. The
+    /// corners of a cube, whose normals are mixed of three, reach 0.57. Below -1: no contact is left out.
+    float leastOpposition = -2;
 };
 
 /// What collide() saw beside the contacts.

@@ -203,15 +203,7 @@ class TriangleProbes : public btTriangleCallback {
 }  // namespace
 
 ContactReport collideFields(const Placed& a, const Placed& b, float margin, std::vector<Contact>& contacts) {
-    const ContactReport report = collide(a, b, {margin}, contacts);
-    std::erase_if(contacts, [&](const Contact& contact) {
-        const bool ofB = contact.feature & featureOfB;
-        const Placed& owner = ofB ? b : a;
-        const SurfacePoint& point = owner.collider.points().points()[contact.feature & ~featureOfB];
-        const float cosine = glm::dot(contact.normal, owner.pose.rotation * point.normal);
-        return (ofB ? cosine : -cosine) < leastOpposition;
-    });
-    return report;
+    return collide(a, b, {.margin = margin, .leastOpposition = leastOpposition}, contacts);
 }
 
 ContactReport collidePlane(const glm::vec3& normal, float offset, const Placed& field, float margin,

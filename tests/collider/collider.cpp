@@ -252,6 +252,29 @@ TEST_CASE("bodies apart have no contact and cost next to nothing") {
     REQUIRE(report.beyondBand == 0);
 }
 
+TEST_CASE("contacts that look along the surface of their point are left out where asked") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    Random random(seed);
+    std::size_t all = 0, kept = 0;
+    for (const auto& [a, b] : touchingPairs(random)) {
+        std::vector<Contact> expected, found;
+        for (const Contact& contact : contactsOf(a, b, h)) {
+            const bool ofB = contact.feature & featureOfB;
+            const SurfacePoint& point = (ofB ? b : a).collider.points().points()[contact.feature & ~featureOfB];
+            const float cosine = glm::dot((ofB ? b : a).pose.rotation * point.normal, contact.normal);
+            if ((ofB ? cosine : -cosine) >= 0.3f) expected.push_back(contact);
+            ++all;
+        }
+        collide(a, b, {.margin = h, .leastOpposition = 0.3f}, found);
+        REQUIRE(found.size() == expected.size());
+        for (std::size_t i = 0; i < found.size(); ++i) REQUIRE(found[i].feature == expected[i].feature);
+        kept += found.size();
+    }
+    REQUIRE(kept > 0);
+    REQUIRE(kept < all);
+}
+
 TEST_CASE("points too deep for the band are counted") {
     ContactReport report;
     const auto contacts = contactsOf({brick(), {}, 0.5f}, {ball()}, 0, &report);
