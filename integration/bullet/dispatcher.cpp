@@ -57,7 +57,7 @@ class Pair {
         if (isField(a.shape)) margin = std::max(margin, a.shape->getMargin());
         report_ = find(a, field.placed(b.transform), margin);
         found_ = static_cast<int>(contacts_.size());
-        patches_ = reduce(contacts_);
+        patches_ = reduce(contacts_, patches_);
         isReady_ = true;
     }
 

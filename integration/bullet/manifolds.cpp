@@ -1,9 +1,12 @@
 #include "integration/bullet/manifolds.h"
 
 #include <algorithm>
+#include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/vec2.hpp>
 #include <limits>
+#include <numeric>
+#include <utility>
 
 #include "integration/bullet/convert.h"
 
@@ -18,6 +21,14 @@ constexpr std::size_t mostPatches = 8;
 // Of two contacts, the one that is deeper by d is preferred up to this many times d nearer to the others: overlap that
 // is left out of a patch is not resolved.
 constexpr float depthWeight = 8;
+// A patch of the last step goes on until its normal is within about 15 degrees of another's.
+constexpr float mergedDirection = 0.966f;
+// A contact that was kept in the last step is preferred up to this part of its patch's extent farther in: which of two
+// that are nearly as good is the better one is a matter of rounding, and bodies would tremble with each change.
+constexpr float loyalty = 0.1f;
+// All this holds for bodies about at rest: when the deepest overlap has changed by less than this part of the contacts'
+// extent in one step. In an impact every contact is judged anew.
+constexpr float stillness = 3e-3f;
 // Where a patch is flatter than this part of its extent, the deepest contact is a matter of rounding.
 constexpr float flatness = 1e-3f;
 // Four sides of a patch, askew to everything one models: a rectangle's corners are then each alone on their side.
@@ -26,30 +37,92 @@ constexpr glm::vec2 sides[] = {{0.87f, 0.49f}, {-0.49f, 0.87f}, {-0.87f, -0.49f}
 /// Contacts of one patch, as indices in ascending order of distance.
 using Group = std::vector<std::uint32_t>;
 
-std::vector<Group> groupByNormal(const std::vector<Contact>& contacts) {
-    std::vector<Group> groups;
-    for (std::uint32_t i = 0; i < contacts.size(); ++i) {
-        Group* best = nullptr;
-        float bestCosine = -2;
-        for (Group& group : groups) {
-            const float cosine = glm::dot(contacts[i].normal, contacts[group.front()].normal);
-            if (cosine > bestCosine) best = &group, bestCosine = cosine;
-        }
-        if (bestCosine < sameDirection && groups.size() < mostPatches)
-            groups.push_back({i});
-        else
-            best->push_back(i);
+/// The contacts of the last step, by feature.
+class Memory {
+  public:
+    explicit Memory(std::span<const Patch> last) {
+        for (const Patch& patch : last)
+            for (int i = 0; i < patch.count; ++i) features_.push_back(patch.contacts[i].feature);
+        std::sort(features_.begin(), features_.end());
     }
+
+    bool kept(const Contact& contact) const {
+        return std::binary_search(features_.begin(), features_.end(), contact.feature);
+    }
+
+  private:
+    std::vector<std::uint32_t> features_;
+};
+
+/// @param seeds  contacts that found groups first, in this order
+std::vector<Group> groupByNormal(const std::vector<Contact>& contacts, const std::vector<std::uint32_t>& seeds) {
+    std::vector<glm::vec3> directions;
+    const auto nearest = [&](const glm::vec3& normal) {
+        std::pair<float, std::size_t> best{-2.f, 0};
+        for (std::size_t g = 0; g < directions.size(); ++g)
+            if (const float cosine = glm::dot(normal, directions[g]); cosine > best.first) best = {cosine, g};
+        return best;
+    };
+    for (const std::uint32_t seed : seeds)
+        if (nearest(contacts[seed].normal).first < mergedDirection) directions.push_back(contacts[seed].normal);
+
+    std::vector<Group> groups(directions.size());
+    for (std::uint32_t i = 0; i < contacts.size(); ++i) {
+        const auto [cosine, best] = nearest(contacts[i].normal);
+        if (cosine < sameDirection && groups.size() < mostPatches) {
+            directions.push_back(contacts[i].normal);
+            groups.push_back({i});
+        } else {
+            groups[best].push_back(i);
+        }
+    }
+    std::erase_if(groups, [](const Group& group) { return group.empty(); });
     return groups;
 }
 
-/// The contact of the group that lies farthest in a direction, depth weighing in.
-std::uint32_t farthest(const std::vector<Contact>& contacts, const Group& group, const glm::vec3& direction) {
+/// Of each patch of the last step, the contact that is still there and was named first.
+std::vector<std::uint32_t> seedsOf(const std::vector<Contact>& contacts, std::span<const Patch> last) {
+    std::vector<std::uint32_t> seeds;
+    for (const Patch& patch : last)
+        for (int k = 0; k < patch.count; ++k) {
+            const auto same = [&](const Contact& c) { return c.feature == patch.contacts[k].feature; };
+            const auto found = std::find_if(contacts.begin(), contacts.end(), same);
+            if (found == contacts.end()) continue;
+            seeds.push_back(std::uint32_t(found - contacts.begin()));
+            break;
+        }
+    return seeds;
+}
+
+/// The extent of a group, by the box of its places.
+float extentOf(const std::vector<Contact>& contacts, const Group& group) {
+    glm::vec3 lower = contacts[group.front()].position, upper = lower;
+    for (std::uint32_t i : group) {
+        lower = glm::min(lower, contacts[i].position);
+        upper = glm::max(upper, contacts[i].position);
+    }
+    return glm::distance(lower, upper);
+}
+
+bool isStill(const std::vector<Contact>& contacts, std::span<const Patch> last) {
+    if (contacts.empty() || last.empty()) return false;
+    float before = std::numeric_limits<float>::max();
+    for (const Patch& patch : last)
+        for (int i = 0; i < patch.count; ++i) before = std::min(before, patch.contacts[i].distance);
+    Group all(contacts.size());
+    std::iota(all.begin(), all.end(), 0u);
+    return std::abs(contacts.front().distance - before) <= stillness * extentOf(contacts, all);
+}
+
+/// The contact of the group that lies farthest in a direction, depth and a bonus weighing in.
+std::uint32_t farthest(const std::vector<Contact>& contacts, const Group& group, const std::vector<float>& bonus,
+                       const glm::vec3& direction) {
     std::uint32_t best = group.front();
     float bestScore = -std::numeric_limits<float>::max();
-    for (std::uint32_t i : group) {
-        const float score = glm::dot(contacts[i].position, direction) - depthWeight * contacts[i].distance;
-        if (score > bestScore) best = i, bestScore = score;
+    for (std::size_t k = 0; k < group.size(); ++k) {
+        const Contact& contact = contacts[group[k]];
+        const float score = glm::dot(contact.position, direction) - depthWeight * contact.distance + bonus[k];
+        if (score > bestScore) best = group[k], bestScore = score;
     }
     return best;
 }
@@ -57,15 +130,19 @@ std::uint32_t farthest(const std::vector<Contact>& contacts, const Group& group,
 /// The contacts farthest to four sides. Of many that are equally deep but for rounding, as under a flat face, these
 /// stay the same from step to step, while the deepest does not; so the deepest only goes in if it is so by more than
 /// that.
-Patch spread(const std::vector<Contact>& contacts, const Group& group) {
+Patch spread(const std::vector<Contact>& contacts, const Group& group, const Memory& memory) {
     glm::vec3 normal(0);
     for (std::uint32_t i : group) normal += contacts[i].normal;
     btVector3 first, second;
     btPlaneSpace1(toBullet(glm::normalize(normal)), first, second);
 
+    const float whole = extentOf(contacts, group);
+    std::vector<float> bonus;
+    for (std::uint32_t i : group) bonus.push_back(memory.kept(contacts[i]) ? loyalty * whole : 0);
+
     std::vector<std::uint32_t> chosen;
     for (const glm::vec2& side : sides) {
-        const std::uint32_t i = farthest(contacts, group, side.x * toGlm(first) + side.y * toGlm(second));
+        const std::uint32_t i = farthest(contacts, group, bonus, side.x * toGlm(first) + side.y * toGlm(second));
         if (std::find(chosen.begin(), chosen.end(), i) == chosen.end()) chosen.push_back(i);
     }
     const std::uint32_t deepest = group.front();
@@ -104,11 +181,14 @@ class StartSilenced {
 
 }  // namespace
 
-std::vector<Patch> reduce(std::vector<Contact>& contacts) {
+std::vector<Patch> reduce(std::vector<Contact>& contacts, std::span<const Patch> last) {
     std::stable_sort(contacts.begin(), contacts.end(),
                      [](const Contact& a, const Contact& b) { return a.distance < b.distance; });
+    if (!isStill(contacts, last)) last = {};
     std::vector<Patch> patches;
-    for (const Group& group : groupByNormal(contacts)) patches.push_back(spread(contacts, group));
+    const Memory memory(last);
+    for (const Group& group : groupByNormal(contacts, seedsOf(contacts, last)))
+        patches.push_back(spread(contacts, group, memory));
     return patches;
 }
 

@@ -18,9 +18,13 @@ struct Patch {
     int count = 0;
 };
 
-/// Divides contacts into patches by their normals and keeps up to four a patch. Deterministic: depends on the contacts
-/// and their order only. The patch of the deepest contact of all comes first. `contacts` is left in another order.
-std::vector<Patch> reduce(std::vector<Contact>& contacts);
+/// Divides contacts into patches by their normals and keeps up to four a patch. Deterministic: depends on the contacts,
+/// their order and `last` only. The patch of the deepest contact of all comes first if there was none in the last step.
+/// `contacts` is left in another order.
+/// @param last  the result for the same pair in the last step, or nothing: while the bodies hardly move, patches keep
+/// their places, and of contacts
+///              that are nearly as good, those that were kept then are kept again
+std::vector<Patch> reduce(std::vector<Contact>& contacts, std::span<const Patch> last = {});
 
 /// The manifolds of one pair of bodies, one for each patch. Contacts are written anew each step, since Bullet refreshes
 /// the positions of old ones but not their normals; impulses are handed on to the new contacts nearest the old ones,

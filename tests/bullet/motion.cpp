@@ -5,7 +5,10 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <cstring>
+#include <random>
+#include <set>
 
+#include "integration/bullet/manifolds.h"
 #include "world.h"
 
 using namespace bilayer;
@@ -54,6 +57,40 @@ TEST_CASE("Three hundred steps give the same bits on 1, 2 and 8 threads") {
         REQUIRE(more.size() == one.size());
         CHECK(std::memcmp(more.data(), one.data(), one.size() * sizeof(float)) == 0);
     }
+}
+
+TEST_CASE("Of contacts that tremble by rounding the same are kept, of those that move apart the deepest") {
+    std::mt19937 random(5);
+    std::uniform_real_distribution<float> tremble(-2e-5f, 2e-5f);
+    std::vector<Contact> flat;
+    for (std::uint32_t i = 0; i < 400; ++i) {
+        // on a disc: every side has many that are farthest but for rounding
+        const float angle = 0.0157f * float(i);
+        flat.push_back({{0.1f * std::cos(angle), 0.1f * std::sin(angle), 0}, {0, 0, 1}, -1e-4f, i});
+    }
+    const auto features = [](const std::vector<bullet::Patch>& patches) {
+        std::set<std::uint32_t> found;
+        for (const bullet::Patch& patch : patches)
+            for (int i = 0; i < patch.count; ++i) found.insert(patch.contacts[i].feature);
+        return found;
+    };
+    std::vector<bullet::Patch> last;
+    std::set<std::uint32_t> first;
+    for (int step = 0; step < 50; ++step) {
+        std::vector<Contact> contacts = flat;
+        for (Contact& contact : contacts) contact.distance += tremble(random);
+        last = bullet::reduce(contacts, last);
+        if (step == 0) first = features(last);
+        REQUIRE(last.size() == 1);
+        REQUIRE(features(last) == first);
+    }
+    std::vector<Contact> tilted = flat;
+    for (Contact& contact : tilted) contact.distance -= 0.05f * contact.position.x;
+    const std::vector<bullet::Patch> anew = bullet::reduce(tilted, last);
+    CHECK(features(anew).contains(0u));
+    tilted = flat;
+    for (Contact& contact : tilted) contact.distance -= 0.05f * contact.position.x;
+    CHECK(features(bullet::reduce(tilted)) == features(anew));
 }
 
 TEST_CASE("A ring dropped over a pole stays on it and comes to rest on the ground") {
