@@ -5,11 +5,10 @@ namespace {
 
 constexpr float gravity = 9.81f;  // [m/s^2]
 
-// Slower than this for so long, bodies that touch fall asleep together. Bullet's own thresholds (0.8 m/s, 1 rad/s, 2 s)
+// Slower than this for two seconds, bodies that touch fall asleep together. Bullet's own thresholds (0.8 m/s, 1 rad/s)
 // are for crates and cars: small things that still roll would freeze.
 constexpr float restingSpeed = 0.1f;  // [m/s]
 constexpr float restingSpin = 1;      // [rad/s]
-constexpr float restingTime = 1;      // [s]
 
 // Bodies at rest overlap by this much, so that their contacts last from step to step [m].
 constexpr float restingOverlap = 0.0003f;
