@@ -10,9 +10,6 @@ constexpr float gravity = 9.81f;  // [m/s^2]
 constexpr float restingSpeed = 0.1f;  // [m/s]
 constexpr float restingSpin = 1;      // [rad/s]
 
-// Bodies at rest overlap by this much, so that their contacts last from step to step [m].
-constexpr float restingOverlap = 0.0003f;
-
 // What air and soft surfaces take: a share of the speed and of the spin a second.
 constexpr float linearDamping = 0.05f, angularDamping = 0.2f;
 
