@@ -3,6 +3,8 @@
 
 #include <openvdb/openvdb.h>
 
+#include <filesystem>
+
 #include "sdf/level_set.h"
 
 namespace bilayer {
@@ -22,5 +24,9 @@ inline constexpr const char* meshHash = "bilayer:mesh_hash";
 inline constexpr const char* interiorWidth = "bilayer:interior_width";
 inline constexpr const char* version = "bilayer:version";
 }  // namespace metadata
+
+/// Writes any grids to a .vdb file, whole or not at all. Throws std::runtime_error that names the file when it cannot
+/// be written. writeVdb() in vdb_io.h does so for a LevelSet.
+void writeGrids(const std::filesystem::path& path, const openvdb::GridCPtrVec& grids);
 
 }  // namespace bilayer

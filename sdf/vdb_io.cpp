@@ -22,13 +22,7 @@ typename Grid::ConstPtr first(const openvdb::GridPtrVec& grids, auto accept) {
 
 }  // namespace
 
-void writeVdb(const std::filesystem::path& path, const LevelSet& levelSet, const VdbOptions& options) {
-    openvdb::initialize();
-    // a shallow copy, since how distances are stored is a property of the grid
-    const auto distance = openvdb::ConstPtrCast<openvdb::FloatGrid>(levelSet.grids().distance)->copy();
-    distance->setSaveFloatAsHalf(options.halfFloat);
-    openvdb::GridCPtrVec grids{distance};
-    if (levelSet.grids().triangle) grids.push_back(levelSet.grids().triangle);
+void writeGrids(const std::filesystem::path& path, const openvdb::GridCPtrVec& grids) {
     AtomicFile file(path);
     try {
         std::ofstream stream(file.temporary(), std::ios::binary);
@@ -39,6 +33,16 @@ void writeVdb(const std::filesystem::path& path, const LevelSet& levelSet, const
         throw std::runtime_error(fmt::format("{}: cannot be written (is the disk full?)", path.string()));
     }
     file.commit();
+}
+
+void writeVdb(const std::filesystem::path& path, const LevelSet& levelSet, const VdbOptions& options) {
+    openvdb::initialize();
+    // a shallow copy, since how distances are stored is a property of the grid
+    const auto distance = openvdb::ConstPtrCast<openvdb::FloatGrid>(levelSet.grids().distance)->copy();
+    distance->setSaveFloatAsHalf(options.halfFloat);
+    openvdb::GridCPtrVec grids{distance};
+    if (levelSet.grids().triangle) grids.push_back(levelSet.grids().triangle);
+    writeGrids(path, grids);
 }
 
 LevelSet readVdb(const std::filesystem::path& path) {

@@ -1,18 +1,15 @@
 // `bilayer seed`: meshes and fields become one liquid level set, with marker particles if asked for.
 #include <fmt/format.h>
-#include <openvdb/io/Stream.h>
 #include <openvdb/points/PointCount.h>
 #include <openvdb/tools/LevelSetMeasure.h>
 
 #include <cmath>
-#include <fstream>
 #include <memory>
 #include <optional>
 #include <stdexcept>
 
 #include "integration/fluid/particles.h"
 #include "integration/fluid/seed.h"
-#include "sdf/atomic_file.h"
 #include "sdf/build.h"
 #include "sdf/grids.h"
 #include "sdf/mesh_io.h"
@@ -95,19 +92,6 @@ void add(openvdb::FloatGrid& liquid, const Input& input, const Arguments& a, con
     fluid::seed(liquid, field, pose, makeMode(a.mode));
 }
 
-void write(const std::filesystem::path& path, const openvdb::GridCPtrVec& grids) {
-    AtomicFile file(path);
-    try {
-        std::ofstream stream(file.temporary(), std::ios::binary);
-        stream.exceptions(std::ios::failbit | std::ios::badbit);
-        openvdb::io::Stream(stream).write(grids);
-        stream.close();
-    } catch (const std::exception&) {
-        throw std::runtime_error(fmt::format("{}: cannot be written (is the disk full?)", path.string()));
-    }
-    file.commit();
-}
-
 void report(const Arguments& a, const openvdb::FloatGrid& liquid, std::uint64_t particles, double seconds) {
     const double volume = liquid.empty() ? 0 : openvdb::tools::levelSetVolume(liquid);
     const float voxelSize = float(liquid.voxelSize()[0]);
@@ -147,7 +131,7 @@ void run(const Arguments& a) {
         count = openvdb::points::pointCount(points->tree());
         grids.push_back(points);
     }
-    write(a.output, grids);
+    writeGrids(a.output, grids);
     report(a, *liquid, count, watch.seconds());
 }
 
