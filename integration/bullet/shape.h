@@ -15,7 +15,7 @@ struct ShapeOptions {
     /// Where the collider sits in the body: collider coordinates x become frame.toWorld(x). Bullet takes the body's
     /// origin for the centre of mass and its axes for the principal ones: centreOfMassFrame() makes that true for a
     /// mesh modelled about any other point.
-    Pose frame;
+    Pose frame{};
     /// Contacts are made up to this distance between the surfaces, and the bodies' boxes grow by it [m, before
     /// scaling]. It keeps resting contacts alive; bodies still rest surface on surface. Negative: one voxel of the
     /// field.
