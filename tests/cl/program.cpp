@@ -44,6 +44,8 @@ void overwrite(const std::filesystem::path& path, const std::string& bytes) {
 
 // The cache goes to this folder from now on; each test runs in a process of its own or sets it anew.
 void cacheIn(const std::filesystem::path& folder) {
+    // PoCL keeps files of its own there too, and is no device without them
+    ::setenv("POCL_CACHE_DIR", bilayer::test::scratch("pocl").c_str(), 1);
     ::setenv("XDG_CACHE_HOME", folder.c_str(), 1);
 }
 
@@ -129,7 +131,11 @@ TEST_CASE("damaged files in the cache are compiled anew and replaced") {
     CAPTURE(damaged.size());
     overwrite(path, damaged);
     CHECK(answerAnew() == 42);
-    CHECK(contents(path).size() == whole.size());
+    // replaced by one that is taken as it is the next time; its size may differ, PoCL's binaries are not always the same
+    CHECK(contents(path) != damaged);
+    const auto written = std::filesystem::last_write_time(path);
+    CHECK(answerAnew() == 42);
+    CHECK(std::filesystem::last_write_time(path) == written);
 }
 
 TEST_CASE("a cache that cannot be written is done without") {

@@ -147,7 +147,7 @@ TEST_CASE("what a clearance rules out is ruled out, and little else far from the
             ruledOut += clearance.isOutside(place, radius / edge);
         }
         REQUIRE(beside > 1000);
-        REQUIRE(ruledOut > 0.95 * beside);
+        REQUIRE(ruledOut > 0.9 * beside);  // about 0.95, and these are a few thousand random points
     }
     const Field field(levelSetOf(sphereSolid(0.4), h));
     for (const glm::vec3& p : {glm::vec3(notANumber, 0, 0), glm::vec3(0, notANumber, 0)})
