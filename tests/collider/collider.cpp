@@ -169,6 +169,16 @@ TEST_CASE("exchanged bodies have the same contacts, seen from the other side") {
     }
 }
 
+namespace {
+
+// The point that a contact was found at: on the surface of the body that its feature is of.
+glm::vec3 surfacePoint(const Contact& contact) {
+    const bool ofB = (contact.feature & featureOfB) != 0;
+    return ofB ? contact.position : contact.position + contact.distance * contact.normal;
+}
+
+}  // namespace
+
 TEST_CASE("contacts move with the bodies") {
     const unsigned seed = test::seed();
     CAPTURE(seed);
@@ -184,7 +194,8 @@ TEST_CASE("contacts move with the bodies") {
             REQUIRE(byFeature.contains(contact.feature));
             const Contact& other = byFeature[contact.feature];
             REQUIRE(other.distance == Approx(contact.distance).margin(5e-6));
-            REQUIRE(glm::distance(other.position, motion.toWorld(contact.position)) < 1e-5f);
+            // the surface point; the normal may jump where rounding takes that point into the next cell of the field
+            REQUIRE(glm::distance(surfacePoint(other), motion.toWorld(surfacePoint(contact))) < 1e-5f);
             REQUIRE(glm::dot(other.normal, motion.rotation * contact.normal) > 0.99f);
         }
     }
