@@ -324,7 +324,7 @@ TEST_CASE("rays meet the interpolant where steps of a fiftieth of a voxel do") {
             const auto hit = field.raycast(origin, towards, 2);
             CAPTURE(origin.x, origin.y, origin.z, towards.x, towards.y, towards.z, longest, first);
             // chords below a tenth of a voxel may be seen or not
-            if (longest == 0) REQUIRE_FALSE(hit);
+            if (longest == 0 && hit) REQUIRE(std::abs(field.distance(hit->position)) < 2e-4 * h);
             if (longest < 6) continue;
             REQUIRE(hit);
             REQUIRE(hit->distance <= first + 0.01 * h);
