@@ -69,7 +69,7 @@ void add(const std::string& name, std::function<std::uint64_t()> voxels) {
                                  [voxels](benchmark::State& state) {
                                      std::ofstream("/proc/self/clear_refs") << resetPeak;
                                      ::malloc_trim(0);
-        const double before = statusMiB("VmRSS:");
+                                     const double before = statusMiB("VmRSS:");
                                      std::uint64_t count = 0;
                                      for (auto _ : state) benchmark::DoNotOptimize(count = voxels());
                                      state.counters["activeVoxels"] = double(count);

@@ -131,7 +131,8 @@ TEST_CASE("damaged files in the cache are compiled anew and replaced") {
     CAPTURE(damaged.size());
     overwrite(path, damaged);
     CHECK(answerAnew() == 42);
-    // replaced by one that is taken as it is the next time; its size may differ, PoCL's binaries are not always the same
+    // replaced by one that is taken as it is the next time; its size may differ, PoCL's binaries are not always the
+    // same
     CHECK(contents(path) != damaged);
     const auto written = std::filesystem::last_write_time(path);
     CHECK(answerAnew() == 42);
