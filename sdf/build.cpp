@@ -29,6 +29,8 @@ static_assert(Leaf::DIM == blockSide);
 
 /// Index coordinates stay well inside 32 bits, with room for the band around them.
 constexpr double farthestIndex = 1e9;
+/// OpenVDB takes a transform for singular below a determinant of 3e-15.
+constexpr float smallestVoxel = 2e-5f;
 /// Bricks along all axes together that the binning counts; a cube of 40,000 voxels a side.
 constexpr double mostBricks = double(1u << 28);
 /// Bytes that the build needs for a sample (its share of a tile and of the bins) and for a block, roughly.
@@ -44,6 +46,8 @@ void check(const BuildOptions& options) {
     const auto within = [](double value, double low, double high) { return value >= low && value <= high; };
     const DoubleLayerOptions& layers = options.doubleLayer;
     require(options.voxelSize > 0 && std::isnormal(options.voxelSize), "voxelSize", "a positive length",
+            options.voxelSize);
+    require(options.voxelSize >= smallestVoxel, "voxelSize", "at least 2e-5 (OpenVDB takes no smaller: scale the mesh)",
             options.voxelSize);
     require(options.exteriorWidth > 0 && options.exteriorWidth <= 1000, "exteriorWidth", "in (0, 1000] voxels",
             options.exteriorWidth);

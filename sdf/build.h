@@ -9,6 +9,8 @@
 
 #include "sdf/level_set.h"
 #include "sdf/mesh.h"
+#include "sdf/mesh_io.h"
+#include "sdf/vdb_io.h"
 
 namespace bilayer {
 
@@ -32,7 +34,8 @@ struct DoubleLayerOptions {
 };
 
 struct BuildOptions {
-    float voxelSize = 0;      ///< edge of a voxel [m]; must be given
+    float voxelSize = 0;  ///< edge of a voxel [m]; must be given, at least 2e-5
+    // a band of w voxels costs time with the cube of w: hundreds take minutes
     float exteriorWidth = 3;  ///< every voxel with 0 <= distance < this is active [voxels], in (0, 1000]
     float interiorWidth = 3;  ///< every voxel with -this < distance < 0 is active [voxels], in (0, 1000]
     DoubleLayerOptions doubleLayer{};

@@ -69,7 +69,13 @@ LevelSet timedBuild(const Mesh& mesh, const Arguments& a, Outcome& outcome) {
     BuildOptions options = a.options;
     options.progress = bar.callback();
     const Stopwatch watch;
-    LevelSet field = build(mesh, options, filler, &outcome.times);
+    LevelSet field = [&] {
+        try {
+            return build(mesh, options, filler, &outcome.times);
+        } catch (const std::invalid_argument& error) {
+            throw std::invalid_argument(fmt::format("{}: {}", a.mesh.string(), error.what()));
+        }
+    }();
     outcome.build = watch.seconds();
     return field;
 }

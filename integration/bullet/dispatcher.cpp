@@ -15,6 +15,7 @@
 #include "integration/bullet/convert.h"
 #include "integration/bullet/manifolds.h"
 #include "integration/bullet/narrow.h"
+#include "integration/bullet/shape.h"
 
 namespace bilayer::bullet {
 

@@ -2,10 +2,9 @@
 #pragma once
 
 #include <BulletCollision/CollisionDispatch/btCollisionDispatcher.h>
+#include <BulletCollision/CollisionDispatch/btDefaultCollisionConfiguration.h>
 
 #include <memory>
-
-#include "integration/bullet/shape.h"
 
 namespace bilayer::bullet {
 

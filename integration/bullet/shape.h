@@ -8,6 +8,7 @@
 #include <memory>
 
 #include "collider/collider.h"
+#include "integration/bullet/dispatcher.h"
 
 namespace bilayer::bullet {
 

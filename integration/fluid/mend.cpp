@@ -5,6 +5,7 @@
 #include "integration/fluid/mend.h"
 
 #include <openvdb/math/Stencils.h>
+#include <openvdb/tools/LevelSetFilter.h>
 #include <openvdb/tools/LevelSetTracker.h>
 #include <openvdb/tree/LeafManager.h>
 
@@ -24,9 +25,11 @@ using Stencil = openvdb::math::WenoStencil<FloatGrid>;
 // The range of checkLevelSet, less what rounding may take.
 constexpr float lowest = 0.501f, highest = 1.499f;
 constexpr std::size_t manyBroken = 20;  // one broken voxel in so many next to the surface is noise, not creases
-constexpr int maxRounds = 60;           // of descent; six or so do for what real meshes give
-constexpr int patience = 3;             // rounds without a gain before the surroundings are smoothed
-constexpr int reach = 3;                // [voxels] of the WENO stencil along the axes
+// Where single voxels cannot be mended, the surface is smoothed around them, farther each time [voxels].
+constexpr int maxSmoothings = 12, firstRadius = 2;
+constexpr int maxRounds = 60;  // of descent; six or so do for what real meshes give
+constexpr int patience = 3;    // rounds without a gain before the surroundings are smoothed
+constexpr int reach = 3;       // [voxels] of the WENO stencil along the axes
 // Changes that are tried at a voxel [voxels], either way.
 constexpr std::array<float, 6> steps{0.02f, 0.05f, 0.1f, 0.2f, 0.4f, 0.8f};
 constexpr float stepCost = 1e-3f;   // prefers small changes among equally good ones
@@ -169,9 +172,8 @@ class Mender {
     float voxel_;
 };
 
-}  // namespace
-
-void mend(FloatGrid& grid) {
+// Mends what single voxels can mend; returns those still broken.
+std::vector<Coord> descend(FloatGrid& grid) {
     Survey found = survey(grid);
     if (found.broken.size() > found.crossed / manyBroken) {
         openvdb::tools::LevelSetTracker<FloatGrid> tracker(grid);
@@ -182,12 +184,33 @@ void mend(FloatGrid& grid) {
     Mender mender(grid);
     std::vector<Coord> broken = std::move(found.broken);
     std::size_t fewest = broken.size();
-    for (int round = 0, idle = 0; !broken.empty(); ++round) {
-        if (round == maxRounds)
-            throw std::runtime_error("seed: the surface cannot be made a level set at this voxel size");
+    for (int round = 0, idle = 0; round < maxRounds && !broken.empty(); ++round) {
         broken = idle < patience ? mender.descend(broken) : mender.smooth(broken);
         idle = broken.size() < fewest || idle == patience ? 0 : idle + 1;
         fewest = std::min(fewest, broken.size());
+    }
+    return broken;
+}
+
+// Smooths the surface within some voxels of the broken ones: features thinner than a voxel are more than it can hold.
+void smoothAround(FloatGrid& grid, const std::vector<Coord>& broken, int radius) {
+    FloatGrid mask(0);
+    mask.setTransform(grid.transformPtr());
+    for (const Coord& voxel : broken) mask.fill({voxel.offsetBy(-radius), voxel.offsetBy(radius)}, 1.f);
+    openvdb::tools::LevelSetFilter<FloatGrid> filter(grid);
+    filter.gaussian(1, &mask);
+    filter.prune();
+}
+
+}  // namespace
+
+void mend(FloatGrid& grid) {
+    for (int smoothing = 0;; ++smoothing) {
+        const std::vector<Coord> broken = descend(grid);
+        if (broken.empty()) return;
+        if (smoothing == maxSmoothings)
+            throw std::runtime_error("seed: the surface cannot be made a level set at this voxel size");
+        smoothAround(grid, broken, firstRadius + smoothing);
     }
 }
 
