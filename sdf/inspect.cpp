@@ -243,7 +243,7 @@ class WallFinder {
 };
 
 void findThinWalls(const Mesh& mesh, float wall, MeshReport& report) {
-    if (!(bounds(mesh).longestSide() > 0)) return;
+    if (!(report.bounds.longestSide() > 0)) return;
     const WallFinder finder(mesh);
     using Result = std::pair<float, std::size_t>;
     const Result result = tbb::parallel_reduce(

@@ -132,7 +132,7 @@ void checkText(std::istream& file, const PlyHeader& header, const std::filesyste
         for (std::uint64_t i = 0; i < element.count;) {
             if (!std::getline(file, line)) refuse(path, "ends before all that its header announces");
             std::istringstream words(line);
-            std::size_t numbers = 0, expected = 0;
+            std::size_t expected = 0;
             std::vector<std::string> values{std::istream_iterator<std::string>(words), {}};
             if (values.empty()) continue;
             for (const Property& property : element.properties) {
@@ -143,8 +143,7 @@ void checkText(std::istream& file, const PlyHeader& header, const std::filesyste
                 if (expected >= values.size()) refuse(path, fmt::format("{} {} ends early", element.name, i));
                 expected += 1 + std::size_t(std::strtoul(values[expected].c_str(), nullptr, 10));
             }
-            numbers = values.size();
-            if (numbers < expected) refuse(path, fmt::format("{} {} ends early", element.name, i));
+            if (values.size() < expected) refuse(path, fmt::format("{} {} ends early", element.name, i));
             ++i;
         }
 }
