@@ -33,6 +33,21 @@ struct FilledBlocks {
     std::span<const std::int32_t> triangles;  ///< blockVoxels a block; empty unless asked for
 };
 
+/// Stands for every distance beyond the reach of a job; its sign is right where signs are asked for [voxels].
+inline constexpr float farAway = 1e30f;
+
+/// What the exact methods work from: they want the mesh itself.
+struct MeshJob {
+    const Mesh& mesh;
+    float voxelSize;  ///< [m]
+    float reach;      ///< distances up to this must be found; beyond it they may be +-farAway [voxels], at least 1
+    bool triangles;   ///< whether the nearest triangle is asked for
+    bool sign;        ///< false: all distances are positive
+    /// Takes filled blocks; may be called from several threads at once. Throws Cancelled when the user wants no more.
+    /// Blocks without a voxel within the reach need not come.
+    std::function<void(const FilledBlocks&)> sink;
+};
+
 /// Everything a filler works from.
 struct FillJob {
     const Tiles& tiles;

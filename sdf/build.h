@@ -33,11 +33,29 @@ struct DoubleLayerOptions {
     bool fillGaps = true;
 };
 
+/// How distances are found.
+enum class Method {
+    exact,         ///< samples find the triangles that can be nearest, triangles decide: exact_fill.h
+    doubleLayer,   ///< the paper's: distances of two layers of samples
+    pseudonormal,  ///< a bounding hierarchy, asked at each voxel; sign by the angle-weighted pseudonormal
+};
+
+/// How signs are found. The double layer method has its own and ignores this.
+enum class Sign {
+    automatic,  ///< normals if the mesh is closed and oriented, else what suits it: chooseSign() in sign.h
+    normals,    ///< angle-weighted pseudonormal of the closest feature; components inside out are turned around first
+    winding,    ///< generalized winding number above a half: inside
+    flood,      ///< what cannot be reached from outside through gaps wider than `gap`: inside
+};
+
 struct BuildOptions {
     float voxelSize = 0;  ///< edge of a voxel [m]; must be given, at least 2e-5
     // a band of w voxels costs time with the cube of w: hundreds take minutes
     float exteriorWidth = 3;  ///< every voxel with 0 <= distance < this is active [voxels], in (0, 1000]
     float interiorWidth = 3;  ///< every voxel with -this < distance < 0 is active [voxels], in (0, 1000]
+    Method method = Method::exact;
+    Sign sign = Sign::automatic;
+    float gap = 2;  ///< Sign::flood closes gaps up to this wide [voxels], in [0, 100]
     DoubleLayerOptions doubleLayer{};
     bool triangles = false;  ///< also keep the nearest triangle of each active voxel
     int threads = 0;         ///< most threads to use; 0: all
