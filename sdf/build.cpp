@@ -2,6 +2,7 @@
 #include "sdf/build.h"
 
 #include <fmt/format.h>
+#include <oneapi/tbb/enumerable_thread_specific.h>
 #include <oneapi/tbb/global_control.h>
 #include <oneapi/tbb/parallel_reduce.h>
 #include <oneapi/tbb/task_arena.h>
@@ -18,6 +19,7 @@
 #include "sdf/band.h"
 #include "sdf/blocks.h"
 #include "sdf/double_layer.h"
+#include "sdf/exact.h"
 #include "sdf/grids.h"
 
 namespace bilayer {
@@ -138,16 +140,19 @@ class Progress {
     std::mutex mutex_;
 };
 
-// Collects filled blocks as leaves, brick by brick, and joins them into trees whose order no thread has changed.
+template <class LeafType>
+using PerThread = tbb::enumerable_thread_specific<std::vector<std::unique_ptr<LeafType>>>;
+
+// Collects filled blocks as leaves and joins them into trees; where a leaf goes follows from its origin, so no thread
+// changes the result.
 class Assembler {
   public:
-    Assembler(const BuildOptions& options, std::size_t bricks)
-        : widths_{options.exteriorWidth, options.interiorWidth, options.voxelSize},
-          wantTriangles_(options.triangles),
-          leaves_(bricks),
-          triangleLeaves_(bricks) {}
+    explicit Assembler(const BuildOptions& options)
+        : widths_{options.exteriorWidth, options.interiorWidth, options.voxelSize}, wantTriangles_(options.triangles) {}
 
-    void take(std::size_t brick, const FilledBlocks& blocks) {
+    // Safe from any thread.
+    void take(const FilledBlocks& blocks) {
+        std::vector<std::unique_ptr<Leaf>>& leaves = leaves_.local();
         for (std::size_t b = 0; b < blocks.origins.size(); ++b) {
             const glm::ivec3 o = blocks.origins[b];
             auto leaf = std::make_unique<Leaf>(openvdb::PartialCreate(), openvdb::Coord(o.x, o.y, o.z));
@@ -159,8 +164,8 @@ class Assembler {
             for (openvdb::Index word = 0; word < blockSide; ++word) mask.getWord<std::uint64_t>(word) = active[word];
             leaf->setValueMask(mask);
             if (wantTriangles_ && !mask.isOff())
-                triangleLeaves_[brick].push_back(triangleLeaf(blocks.triangles.data() + b * blockVoxels, *leaf));
-            leaves_[brick].push_back(std::move(leaf));
+                triangleLeaves_.local().push_back(triangleLeaf(blocks.triangles.data() + b * blockVoxels, *leaf));
+            leaves.push_back(std::move(leaf));
         }
     }
 
@@ -196,40 +201,66 @@ class Assembler {
     }
 
     template <class LeafType, class Tree>
-    static void move(std::vector<std::vector<std::unique_ptr<LeafType>>>& leaves, Tree& tree) {
-        for (auto& brick : leaves)
-            for (auto& leaf : brick) tree.addLeaf(leaf.release());
+    static void move(PerThread<LeafType>& leaves, Tree& tree) {
+        for (auto& some : leaves)
+            for (auto& leaf : some) tree.addLeaf(leaf.release());
     }
 
     BandWidths widths_;
     bool wantTriangles_;
-    std::vector<std::vector<std::unique_ptr<Leaf>>> leaves_;
-    std::vector<std::vector<std::unique_ptr<TriangleLeaf>>> triangleLeaves_;
+    PerThread<Leaf> leaves_;
+    PerThread<TriangleLeaf> triangleLeaves_;
 };
+
+const char* name(Method method) {
+    switch (method) {
+        case Method::exact:
+            return "exact";
+        case Method::doubleLayer:
+            return "double-layer";
+        case Method::pseudonormal:
+            return "pseudonormal";
+    }
+    return "";
+}
 
 void describe(openvdb::FloatGrid& grid, const Mesh& mesh, const BuildOptions& options) {
     grid.setTransform(openvdb::math::Transform::createLinearTransform(options.voxelSize));
     grid.setCreator("bilayer");
     grid.insertMeta(metadata::version, openvdb::StringMetadata(BILAYER_VERSION));
-    grid.insertMeta(metadata::method, openvdb::StringMetadata("double-layer"));
+    grid.insertMeta(metadata::method, openvdb::StringMetadata(name(options.method)));
     grid.insertMeta(metadata::meshHash, openvdb::Int64Metadata(std::int64_t(hash(mesh))));
     grid.insertMeta(metadata::interiorWidth, openvdb::FloatMetadata(options.interiorWidth * options.voxelSize));
 }
 
-LevelSet run(const Mesh& mesh, const BuildOptions& options, const BlockFiller& filler, BuildTimes& times) {
-    Stopwatch total, part;
+void fillLayers(const Mesh& mesh, const BuildOptions& options, const BlockFiller& filler, Assembler& assembler,
+                BuildTimes& times) {
+    Stopwatch part;
     const FillParameters parameters = fillParameters(options);
     const Tiles tiles = makeTiles(mesh, options);
     if (tiles.tiles.empty()) throw std::invalid_argument("the mesh has no triangle with an area");
     times.tiles = part.lap();
-
     const Bricks bricks = binBricks(tiles, parameters.reach);
-    Assembler assembler(options, bricks.count());
     Progress progress(options.progress, bricks.count());
-    filler.fill({tiles, bricks, parameters, [&](std::size_t brick, const FilledBlocks& blocks) {
-                     assembler.take(brick, blocks);
+    filler.fill({tiles, bricks, parameters, [&](std::size_t, const FilledBlocks& blocks) {
+                     assembler.take(blocks);
                      progress.advance();
                  }});
+}
+
+// Voxels up to a voxel away are measured even for thinner bands: their signs carry over to all others by links.
+float reachOf(const BuildOptions& options) {
+    return std::max({options.exteriorWidth, options.interiorWidth, 1.f}) + reachSlack;
+}
+
+LevelSet run(const Mesh& mesh, const BuildOptions& options, const BlockFiller& filler, BuildTimes& times) {
+    Stopwatch total, part;
+    Assembler assembler(options);
+    if (options.method == Method::doubleLayer)
+        fillLayers(mesh, options, filler, assembler, times);
+    else
+        fillExact({mesh, options.voxelSize, reachOf(options), options.triangles, true,
+                   [&](const FilledBlocks& blocks) { assembler.take(blocks); }});
     times.fill = part.lap();
 
     auto grids = std::make_shared<Grids>();

@@ -1,0 +1,121 @@
+#include "sdf/closest_side.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/gtc/constants.hpp>
+
+namespace bilayer {
+namespace {
+
+/// Points this close together are one: far above the rounding of doubles at 1e6 voxels from the origin, far below what
+/// the field resolves [voxels].
+constexpr double samePlace = 1e-7;
+/// A height below this part of the longest edge leaves no foot on the plane that is better than the edges.
+constexpr double flatness = 1e-10;
+/// Sums of unit normals below this part of their weights have cancelled out.
+constexpr double cancelled = 1e-9;
+
+glm::dvec3 closestOnSegment(const glm::dvec3& a, const glm::dvec3& b) {
+    const glm::dvec3 ab = b - a;
+    const double length2 = glm::dot(ab, ab);
+    const double t = length2 > 0 ? std::clamp(-glm::dot(a, ab) / length2, 0.0, 1.0) : 0.0;
+    // from the nearer end, so that both triangles of an edge find the same point whichever way they run it
+    return t <= 0.5 ? a + t * ab : b - (1 - t) * ab;
+}
+
+double longestEdge2(const std::array<glm::dvec3, 3>& c) {
+    const glm::dvec3 ab = c[1] - c[0], bc = c[2] - c[1], ca = c[0] - c[2];
+    return std::max({glm::dot(ab, ab), glm::dot(bc, bc), glm::dot(ca, ca)});
+}
+
+// The angle under which a triangle is seen from one of its points: all round from within, half from an edge.
+double angleAt(const std::array<glm::dvec3, 3>& c, const glm::dvec3& p) {
+    for (std::size_t i = 0; i < 3; ++i)
+        if (glm::distance(c[i], p) <= samePlace) {
+            const glm::dvec3 a = c[(i + 1) % 3] - c[i], b = c[(i + 2) % 3] - c[i];
+            return std::atan2(glm::length(glm::cross(a, b)), glm::dot(a, b));
+        }
+    for (std::size_t i = 0; i < 3; ++i) {
+        const glm::dvec3 edge = c[(i + 1) % 3] - c[i];
+        if (glm::length(glm::cross(edge, p - c[i])) <= samePlace * glm::length(edge)) return glm::pi<double>();
+    }
+    return 2 * glm::pi<double>();
+}
+
+bool sameCorners(const std::array<glm::dvec3, 3>& a, const std::array<glm::dvec3, 3>& b) {
+    for (std::size_t turn = 0; turn < 3; ++turn)
+        if (a[0] == b[turn] && a[1] == b[(turn + 1) % 3] && a[2] == b[(turn + 2) % 3]) return true;
+    return false;
+}
+
+}  // namespace
+
+glm::dvec3 closestToOrigin(const std::array<glm::dvec3, 3>& c) {
+    const glm::dvec3 ab = c[1] - c[0], ac = c[2] - c[0], n = glm::cross(ab, ac);
+    const double n2 = glm::dot(n, n), longest2 = longestEdge2(c);
+    if (n2 > flatness * flatness * longest2 * longest2) {
+        // inside all three edges: the foot on the plane
+        const auto inner = [&](const glm::dvec3& p, const glm::dvec3& q) {
+            return glm::dot(glm::cross(q - p, -p), n) >= 0;
+        };
+        if (inner(c[0], c[1]) && inner(c[1], c[2]) && inner(c[2], c[0])) return (glm::dot(c[0], n) / n2) * n;
+    }
+    glm::dvec3 best = closestOnSegment(c[0], c[1]);
+    for (std::size_t i = 1; i < 3; ++i) {
+        const glm::dvec3 other = closestOnSegment(c[i], c[(i + 1) % 3]);
+        if (glm::dot(other, other) < glm::dot(best, best)) best = other;
+    }
+    return best;
+}
+
+std::array<glm::dvec3, 3> ClosestSide::cornersOf(std::uint32_t triangle) const {
+    const glm::uvec3 t = mesh_.triangles[triangle];
+    return {glm::dvec3(mesh_.points[t.x]) * voxelsPerUnit_ - point_,
+            glm::dvec3(mesh_.points[t.y]) * voxelsPerUnit_ - point_,
+            glm::dvec3(mesh_.points[t.z]) * voxelsPerUnit_ - point_};
+}
+
+Side ClosestSide::begin(const glm::dvec3& point, std::uint32_t nearest) {
+    point_ = point;
+    sum_ = weights_ = 0;
+    faces_.clear();
+    const Face face{nearest, cornersOf(nearest)};
+    closest_ = closestToOrigin(face.corners);
+    add(face, closest_);
+    return weights_ == 2 * glm::pi<double>() ? side() : Side::undecided;
+}
+
+void ClosestSide::offer(std::uint32_t triangle) {
+    const auto same = [&](const Face& f) { return f.triangle == triangle; };
+    if (std::any_of(faces_.begin(), faces_.end(), same)) return;
+    const Face face{triangle, cornersOf(triangle)};
+    const glm::dvec3 closest = closestToOrigin(face.corners);
+    if (glm::distance(closest, closest_) > samePlace) return;
+    const auto duplicate = [&](const Face& f) { return sameCorners(f.corners, face.corners); };
+    if (std::any_of(faces_.begin(), faces_.end(), duplicate)) return;
+    add(face, closest);
+}
+
+void ClosestSide::add(const Face& face, const glm::dvec3& closest) {
+    faces_.push_back(face);
+    const auto& c = face.corners;
+    const glm::dvec3 n = glm::cross(c[1] - c[0], c[2] - c[0]);
+    const double length = glm::length(n);
+    // thinner than a place: its far side's neighbour meets the closest point as well and speaks for it
+    if (!(length > samePlace * std::sqrt(longestEdge2(c)))) return;
+    const double angle = angleAt(c, closest);
+    sum_ -= angle * glm::dot(n / length, closest_);
+    weights_ += angle;
+}
+
+Side ClosestSide::side() const {
+    if (std::abs(sum_) <= cancelled * weights_ * glm::length(closest_)) return Side::undecided;
+    return sum_ < 0 ? Side::inside : Side::outside;
+}
+
+double ClosestSide::distance() const {
+    return glm::length(closest_);
+}
+
+}  // namespace bilayer

@@ -1,0 +1,58 @@
+// On which side of the mesh a point lies, by the angle-weighted pseudonormal of the closest feature: J. A. Baerentzen,
+// H. Aanaes, "Signed distance computation using the angle weighted pseudonormal", IEEE TVCG 11 (2005) 243-253.
+//
+// The normals are summed over the triangles that meet the closest point, found by geometry and not by indices: vertices
+// need not be welded, edges need no adjacency, duplicate faces count once and faces without area not at all.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <vector>
+
+#include "sdf/mesh.h"
+
+namespace bilayer {
+
+/// What the closest feature says of a point.
+enum class Side { outside, inside, undecided };
+
+/// Finds the side of one point. Offer the nearest triangle first; if that alone does not decide, offer every triangle
+/// that may touch the closest point, in any order and more than once if need be.
+class ClosestSide {
+  public:
+    ClosestSide(const Mesh& mesh, double voxelsPerUnit) : mesh_(mesh), voxelsPerUnit_(voxelsPerUnit) {}
+
+    /// Begins with a point [voxels] and the triangle nearest to it. `undecided` if the closest point lies on an edge or
+    /// a corner, or if the triangle has no area.
+    Side begin(const glm::dvec3& point, std::uint32_t nearest);
+
+    /// Adds another triangle's normal if it meets the closest point.
+    void offer(std::uint32_t triangle);
+
+    /// The side by all triangles offered; `undecided` where their normals cancel out.
+    Side side() const;
+
+    /// The distance to the closest point [voxels].
+    double distance() const;
+
+  private:
+    struct Face {
+        std::uint32_t triangle;
+        std::array<glm::dvec3, 3> corners;  // from the point [voxels]
+    };
+
+    std::array<glm::dvec3, 3> cornersOf(std::uint32_t triangle) const;
+    void add(const Face& face, const glm::dvec3& closest);
+
+    const Mesh& mesh_;
+    double voxelsPerUnit_;
+    glm::dvec3 point_{0}, closest_{0};  // the closest point as seen from the point
+    double sum_ = 0, weights_ = 0;
+    std::vector<Face> faces_;  // that meet the closest point
+};
+
+/// The point of a triangle that is closest to the origin. Right for triangles without area too.
+glm::dvec3 closestToOrigin(const std::array<glm::dvec3, 3>& corners);
+
+}  // namespace bilayer

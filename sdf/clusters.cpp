@@ -1,0 +1,98 @@
+#include "sdf/clusters.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <utility>
+
+namespace bilayer {
+namespace {
+
+/// Pieces with a mean radius below this are grouped: several of them share a voxel [voxels].
+constexpr double smallRadius = 0.45;
+/// More cells than this, 4 MiB of counters, and a brick's pieces stay alone.
+constexpr double mostCells = 1 << 20;
+constexpr float cellSize = 1;  // [voxels]
+/// Rounding of a cluster's own numbers [voxels].
+constexpr float clusterSlack = 1e-4f;
+
+}  // namespace
+
+void Clusters::build(std::span<const Piece> pieces, const glm::ivec3& origin) {
+    members_.clear();
+    clusters_.clear();
+    if (pieces.empty()) return;
+    double radii = 0;
+    glm::vec3 lower(1e30f), upper(-1e30f);
+    for (std::size_t i = 0; i < pieces.size(); ++i) {
+        const Piece& piece = pieces[i];
+        const glm::vec3 sample = glm::vec3(piece.base - origin) + piece.sample;
+        members_.push_back({sample, piece.radius, piece.n, std::uint32_t(i)});
+        radii += double(piece.radius);
+        lower = glm::min(lower, sample);
+        upper = glm::max(upper, sample);
+    }
+    const glm::ivec3 size = glm::ivec3((upper - lower) / cellSize) + 1;
+    const bool grouped =
+        radii < smallRadius * double(pieces.size()) && double(size.x) * double(size.y) * double(size.z) <= mostCells;
+    if (!grouped) {
+        for (std::uint32_t i = 0; i < members_.size(); ++i)
+            clusters_.push_back({members_[i].sample, members_[i].radius, members_[i].normal, 0, i, i + 1});
+        return;
+    }
+    sortByCell(lower, size);
+    for (std::uint32_t begin = 0, end; begin < members_.size(); begin = end) {
+        for (end = begin + 1; end < members_.size() && cells_[end] == cells_[begin];) ++end;
+        addCluster(begin, end);
+    }
+}
+
+// A counting sort of the members; `cells_` then holds their cells in the new order.
+void Clusters::sortByCell(const glm::vec3& lower, const glm::ivec3& size) {
+    cells_.resize(members_.size());
+    cursors_.assign(std::size_t(size.x) * std::size_t(size.y) * std::size_t(size.z), 0);
+    for (std::size_t i = 0; i < members_.size(); ++i) {
+        const glm::ivec3 cell((members_[i].sample - lower) / cellSize);
+        cells_[i] = std::uint32_t((cell.x * size.y + cell.y) * size.z + cell.z);
+        ++cursors_[cells_[i]];
+    }
+    std::uint32_t sum = 0;
+    for (std::uint32_t& cursor : cursors_) sum += std::exchange(cursor, sum);
+    unsorted_.swap(members_);
+    members_.resize(unsorted_.size());
+    for (std::size_t i = 0; i < unsorted_.size(); ++i) members_[cursors_[cells_[i]]++] = unsorted_[i];
+    // each cursor now stands at the end of its cell
+    std::uint32_t at = 0;
+    for (std::uint32_t cell = 0; cell < cursors_.size(); ++cell)
+        for (; at < cursors_[cell]; ++at) cells_[at] = cell;
+}
+
+void Clusters::addCluster(std::uint32_t begin, std::uint32_t end) {
+    glm::vec3 mean(0), normal(0);
+    for (std::uint32_t m = begin; m < end; ++m) {
+        mean += members_[m].sample;
+        normal += members_[m].normal;
+    }
+    mean /= float(end - begin);
+    const float length = glm::length(normal);
+    normal = length > 0 ? normal / length : glm::vec3(0, 0, 1);
+    // the sample must be a point of the surface: the member's nearest to the middle
+    const auto nearer = [&](const Member& a, const Member& b) {
+        const glm::vec3 toA = a.sample - mean, toB = b.sample - mean;
+        return glm::dot(toA, toA) < glm::dot(toB, toB);
+    };
+    const glm::vec3 sample = std::min_element(&members_[begin], &members_[begin] + (end - begin), nearer)->sample;
+    float radius = 0, thickness = 0;
+    for (std::uint32_t m = begin; m < end; ++m) {
+        const Member& member = members_[m];
+        const glm::vec3 away = member.sample - sample;
+        const float facing = glm::dot(member.normal, normal);
+        radius = std::max(radius, glm::length(away) + member.radius);
+        thickness = std::max(thickness, std::abs(glm::dot(away, normal)) +
+                                            member.radius * std::sqrt(std::max(0.f, 1 - facing * facing)));
+    }
+    clusters_.push_back({sample, radius + clusterSlack, normal, thickness + clusterSlack, begin, end});
+}
+
+}  // namespace bilayer

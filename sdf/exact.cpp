@@ -1,0 +1,194 @@
+// The exact method, brick by brick: pieces, clusters, blocks, sides.
+#include "sdf/exact.h"
+
+#include <oneapi/tbb/enumerable_thread_specific.h>
+#include <oneapi/tbb/parallel_for.h>
+
+#include <algorithm>
+#include <bit>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <utility>
+#include <vector>
+
+#include "sdf/closest_side.h"
+#include "sdf/clusters.h"
+#include "sdf/triangle_bins.h"
+
+namespace bilayer {
+namespace {
+
+/// Longer edges are halved, so that a piece stays near the blocks that ask for it and floats hold its frame [voxels].
+constexpr double longestPieceEdge = 16;
+/// A triangle must come this much nearer than a sample's piece might to be left out of a closer look [voxels].
+constexpr float sideSlack = 1e-3f;
+
+// Which clusters reach which block of a brick.
+struct BlockBins {
+    struct Pair {
+        std::uint32_t block, cluster;
+    };
+    std::vector<Pair> pairs;
+    std::vector<std::uint32_t> cursors, offsets, clusters;
+};
+
+// What a thread works in; kept from brick to brick.
+struct Scratch {
+    std::vector<Piece> pieces;
+    Clusters clusters;
+    BlockBins bins;
+    std::vector<glm::ivec3> origins;
+    std::vector<float> distances;
+    std::vector<std::int32_t> triangles;
+};
+
+class BrickFiller {
+  public:
+    BrickFiller(const MeshJob& job, const TriangleBins& bins, double voxelsPerUnit, Scratch& scratch)
+        : job_(job), bins_(bins), voxelsPerUnit_(voxelsPerUnit), s_(scratch), side_(job.mesh, voxelsPerUnit) {}
+
+    void fill(std::size_t brick) {
+        origin_ = bins_.origins[brick];
+        blocks_ = bins_.side / blockSide;
+        cut(brick);
+        s_.clusters.build(s_.pieces, origin_);
+        bin();
+        s_.origins.clear();
+        s_.distances.clear();
+        s_.triangles.clear();
+        for (int x = 0, b = 0; x < blocks_; ++x)
+            for (int y = 0; y < blocks_; ++y)
+                for (int z = 0; z < blocks_; ++z) fillBlock(std::size_t(b++), blockSide * glm::ivec3(x, y, z));
+        if (!s_.origins.empty()) job_.sink({s_.origins, s_.distances, s_.triangles});
+    }
+
+  private:
+    void cut(std::size_t brick) {
+        s_.pieces.clear();
+        const glm::dvec3 lower(origin_), upper = lower + double(bins_.side - 1);
+        const PieceLimits limits{lower - double(job_.reach) - 1.0, upper + double(job_.reach) + 1.0};
+        for (const std::uint32_t triangle : bins_.trianglesOf(brick)) {
+            const glm::uvec3 t = job_.mesh.triangles[triangle];
+            const auto corner = [&](unsigned i) { return glm::dvec3(job_.mesh.points[i]) * voxelsPerUnit_; };
+            cutTriangle({corner(t.x), corner(t.y), corner(t.z)}, triangle, longestPieceEdge, limits, s_.pieces);
+        }
+    }
+
+    // Gives each block the clusters that reach it.
+    void bin() {
+        BlockBins& bins = s_.bins;
+        bins.pairs.clear();
+        bins.cursors.assign(std::size_t(blocks_) * std::size_t(blocks_) * std::size_t(blocks_), 0);
+        const std::span<const Cluster> clusters = s_.clusters.clusters();
+        for (std::uint32_t i = 0; i < clusters.size(); ++i)
+            forEachBlock(clusters[i], [&](std::uint32_t block) {
+                ++bins.cursors[block];
+                bins.pairs.push_back({block, i});
+            });
+        bins.offsets.assign(1, 0);
+        std::uint32_t sum = 0;
+        for (std::uint32_t& cursor : bins.cursors) {
+            sum += std::exchange(cursor, sum);
+            bins.offsets.push_back(sum);
+        }
+        bins.clusters.resize(sum);
+        for (const auto& pair : bins.pairs) bins.clusters[bins.cursors[pair.block]++] = pair.cluster;
+    }
+
+    template <class Visit>
+    void forEachBlock(const Cluster& cluster, Visit visit) const {
+        const float reach = job_.reach + cluster.radius;
+        const auto block = [&](float coordinate) { return std::clamp(int(coordinate) / blockSide, 0, blocks_ - 1); };
+        const glm::vec3 lower = cluster.sample - reach, upper = cluster.sample + reach;
+        for (int x = block(lower.x); x <= block(upper.x); ++x)
+            for (int y = block(lower.y); y <= block(upper.y); ++y)
+                for (int z = block(lower.z); z <= block(upper.z); ++z) {
+                    constexpr float half = 0.5f * float(blockSide - 1);
+                    const glm::vec3 centre = float(blockSide) * glm::vec3(x, y, z) + half;
+                    const glm::vec3 away = glm::max(glm::abs(cluster.sample - centre) - half, glm::vec3(0));
+                    if (glm::dot(away, away) < reach * reach) visit(std::uint32_t((x * blocks_ + y) * blocks_ + z));
+                }
+    }
+
+    void fillBlock(std::size_t number, const glm::ivec3& inBrick) {
+        const BlockBins& bins = s_.bins;
+        reaching_ = {bins.clusters.data() + bins.offsets[number], bins.clusters.data() + bins.offsets[number + 1]};
+        if (reaching_.empty()) return;
+        block_ = origin_ + inBrick;
+        inBrick_ = inBrick;
+        if (!measureBlock({reaching_, s_.clusters.clusters().data(), s_.clusters.members().data(), s_.pieces.data(),
+                           block_, glm::vec3(inBrick), job_.reach},
+                          found_))
+            return;
+        const std::size_t first = s_.distances.size();
+        s_.origins.push_back(block_);
+        s_.distances.resize(first + blockVoxels);
+        signDistances(found_, job_.sign ? insideVoxels() : BlockMask{}, s_.distances.data() + first);
+        if (!job_.triangles) return;
+        for (const std::int32_t nearest : found_.nearest)
+            s_.triangles.push_back(nearest < 0 ? -1
+                                               : std::int32_t(s_.pieces[std::size_t(nearest >> sideBits)].triangle));
+    }
+
+    // Sides over faces are known; links carry them on. What they do not reach is asked for, a voxel a component, those
+    // far from the surface first.
+    BlockMask insideVoxels() {
+        const Links links = findLinks(found_);
+        BlockMask outside = found_.outside, inside = found_.inside;
+        spread(links, outside);
+        spread(links, inside);
+        for (const BlockMask* some : {&found_.far, &found_.mid, &found_.known})
+            for (std::size_t x = 0; x < inside.size(); ++x)
+                while (const std::uint64_t seeds = (*some)[x] & ~(outside[x] | inside[x])) {
+                    const int voxel = int(x) * 64 + std::countr_zero(seeds);
+                    BlockMask& side = isInside(voxel) ? inside : outside;
+                    side[x] |= std::uint64_t(1) << (voxel % 64);
+                    spread(links, side);
+                }
+        return inside;
+    }
+
+    bool isInside(int voxel) {
+        const glm::ivec3 local(voxel / 64, voxel / 8 % 8, voxel % 8);
+        const auto nearest = std::size_t(found_.nearest[voxel] >> sideBits);
+        const Side first = side_.begin(glm::dvec3(block_ + local), s_.pieces[nearest].triangle);
+        if (first != Side::undecided) return first == Side::inside;
+        const float distance = float(side_.distance()) + sideSlack;
+        const glm::vec3 at(local + inBrick_);
+        const auto near = [&](const glm::vec3& sample, float radius) {
+            const glm::vec3 away = at - sample;
+            return glm::dot(away, away) <= (distance + radius) * (distance + radius);
+        };
+        for (const std::uint32_t c : reaching_) {
+            const Cluster& cluster = s_.clusters.clusters()[c];
+            if (!near(cluster.sample, cluster.radius)) continue;
+            for (std::uint32_t m = cluster.begin; m < cluster.end; ++m) {
+                const Member& member = s_.clusters.members()[m];
+                if (near(member.sample, member.radius)) side_.offer(s_.pieces[member.piece].triangle);
+            }
+        }
+        return side_.side() == Side::inside;
+    }
+
+    const MeshJob& job_;
+    const TriangleBins& bins_;
+    double voxelsPerUnit_;
+    Scratch& s_;
+    ClosestSide side_;
+    BlockDistances found_;
+    std::span<const std::uint32_t> reaching_;  // clusters of the current block
+    glm::ivec3 origin_{0}, block_{0}, inBrick_{0};
+    int blocks_ = 0;
+};
+
+}  // namespace
+
+void fillExact(const MeshJob& job) {
+    const double voxelsPerUnit = 1.0 / double(job.voxelSize);
+    const TriangleBins bins = binTriangles(job.mesh, voxelsPerUnit, job.reach);
+    tbb::enumerable_thread_specific<Scratch> scratch;
+    tbb::parallel_for(std::size_t(0), bins.count(),
+                      [&](std::size_t brick) { BrickFiller(job, bins, voxelsPerUnit, scratch.local()).fill(brick); });
+}
+
+}  // namespace bilayer

@@ -1,0 +1,330 @@
+// Highway compiles the part between HWY_BEFORE_NAMESPACE and HWY_AFTER_NAMESPACE once for each instruction set.
+#include "sdf/exact_block.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "sdf/exact_block.cpp"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstring>
+
+HWY_BEFORE_NAMESPACE();
+namespace bilayer::HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+/// As many voxels at once as there are lanes: half a row along z, a row, or two.
+using Tag = hn::CappedTag<float, 2 * blockSide>;
+using IntTag = hn::RebindToSigned<Tag>;
+using Vec = hn::Vec<Tag>;
+using Mask = hn::Mask<Tag>;
+
+/// What a distance computed in floats may be off by, with room to spare: pieces this much too far are still asked, so
+/// that which distance wins never depends on the order [voxels].
+constexpr float boundSlack = 1e-4f;
+/// Nearer to a face than this its side is left to a closer look [voxels].
+constexpr float leastHeight = 0.1f;
+/// Voxels farther from the surface than this are asked first for their side, then those beyond the next [voxels].
+constexpr float farFrom = 0.5f, midFrom = 0.1f;
+
+/// A slice is the 64 voxels of one x; a chunk is what one vector holds of it.
+constexpr int sliceVoxels = blockSide * blockSide;
+constexpr int chunkVoxels = int(hn::MaxLanes(Tag()));
+
+// Lattice coordinates of a slice's voxels.
+struct Lattice {
+    HWY_ALIGN float y[sliceVoxels], z[sliceVoxels];
+};
+constexpr Lattice lattice = [] {
+    Lattice l{};
+    for (int i = 0; i < sliceVoxels; ++i) {
+        l.y[i] = float(i / blockSide);
+        l.z[i] = float(i % blockSide);
+    }
+    return l;
+}();
+
+inline float square(float value) {
+    return value * value;
+}
+
+inline Vec squareOf(Vec v) {
+    return hn::Mul(v, v);
+}
+
+// The slices and chunks that a ball may reach.
+struct Range {
+    Range(const glm::vec3& centre, float radius)
+        : x0(firstFrom(centre.x - radius)),
+          x1(lastTo(centre.x + radius)),
+          c0(firstFrom(centre.y - radius) * blockSide / chunkVoxels),
+          c1((lastTo(centre.y + radius) * blockSide + blockSide - 1) / chunkVoxels) {
+        if (lastTo(centre.y + radius) < 0) c1 = -1;
+    }
+    static int firstFrom(float coordinate) { return coordinate > 0 ? int(coordinate) : 0; }
+    static int lastTo(float coordinate) { return coordinate < 0 ? -1 : std::min(blockSide - 1, int(coordinate)); }
+    int x0, x1, c0, c1;
+};
+
+// Lowers squared distances to those to a sample.
+inline void applySample(const glm::vec3& sample, float reach, BlockDistances& block) {
+    const Tag tag;
+    const Range range(sample, reach);
+    const Vec sy = hn::Set(tag, sample.y), sz = hn::Set(tag, sample.z);
+    for (int c = range.c0; c <= range.c1; ++c) {
+        const Vec py = hn::Sub(hn::Load(tag, lattice.y + c * chunkVoxels), sy),
+                  pz = hn::Sub(hn::Load(tag, lattice.z + c * chunkVoxels), sz);
+        const Vec across2 = hn::Add(squareOf(py), squareOf(pz));
+        for (int x = range.x0; x <= range.x1; ++x) {
+            float* nearest2 = block.nearest2 + x * sliceVoxels + c * chunkVoxels;
+            const Vec distance2 = hn::Add(hn::Set(tag, square(float(x) - sample.x)), across2);
+            hn::Store(hn::Min(hn::Load(tag, nearest2), distance2), tag, nearest2);
+        }
+    }
+}
+
+// A disc, or a drum of some thickness, that holds pieces; seen from a block. A voxel at height h over its plane and r
+// from its axis, with a bound b of its distance, is farther from all of the drum if r exceeds the radius +
+// sqrt(b^2 - g^2), where g = max(0, |h| - thickness). Squared twice this is free of roots; r^2 = d^2 - h^2 comes from
+// the distance d to the centre.
+class Drum {
+  public:
+    Drum(const glm::vec3& centre, float radius, const glm::vec3& normal, float thickness)
+        : centre_(centre), normal_(normal), thickness_(thickness + boundSlack), radius2_(square(radius + boundSlack)) {}
+
+    // Bits of the slices out of `among` whose chunk c has a voxel that the drum may be nearest to.
+    template <bool thick>
+    inline unsigned near(int c, unsigned among, const BlockDistances& block) const {
+        const Tag tag;
+        const Vec py = hn::Sub(hn::Load(tag, lattice.y + c * chunkVoxels), hn::Set(tag, centre_.y)),
+                  pz = hn::Sub(hn::Load(tag, lattice.z + c * chunkVoxels), hn::Set(tag, centre_.z));
+        const Vec acrossLess = hn::Sub(hn::Add(squareOf(py), squareOf(pz)), hn::Set(tag, radius2_));
+        const Vec acrossH = hn::Add(hn::Mul(py, hn::Set(tag, normal_.y)), hn::Mul(pz, hn::Set(tag, normal_.z)));
+        const Vec fourRadius2 = hn::Set(tag, 4 * radius2_), slack = hn::Set(tag, boundSlack);
+        unsigned near = 0;
+        for (; among != 0; among &= among - 1) {
+            const int x = std::countr_zero(among);
+            const float px = float(x) - centre_.x;
+            const Vec bound2 = hn::Load(tag, block.nearest2 + x * sliceVoxels + c * chunkVoxels);
+            const Vec h = hn::Add(hn::Set(tag, px * normal_.x), acrossH);
+            Vec excess = hn::Sub(hn::Add(hn::Set(tag, px * px), acrossLess), bound2);
+            Vec g2 = squareOf(h);
+            if constexpr (thick) {
+                const Vec h2 = g2;
+                g2 = squareOf(hn::Max(hn::Sub(hn::Abs(h), hn::Set(tag, thickness_)), hn::Zero(tag)));
+                excess = hn::Add(excess, hn::Sub(g2, h2));
+            }
+            const Mask may =
+                hn::Le(hn::Mul(excess, hn::Abs(excess)), hn::Add(hn::Mul(fourRadius2, hn::Sub(bound2, g2)), slack));
+            near |= unsigned(!hn::AllFalse(tag, may)) << x;
+        }
+        return near;
+    }
+
+  private:
+    glm::vec3 centre_, normal_;
+    float thickness_, radius2_;
+};
+
+// A piece seen from a block.
+class SeenPiece {
+  public:
+    SeenPiece(const Piece& piece, std::uint32_t number, const glm::ivec3& block)
+        : piece_(piece), code_(std::int32_t(number << sideBits)), shift_(block - piece.base) {}
+
+    // Lowers the distances of a chunk to those to the piece. Lattice coordinates are exact in floats, so each voxel
+    // gets the same bytes whichever block it is asked in.
+    inline void apply(int x, int c, BlockDistances& block) const {
+        const Tag tag;
+        const Piece& t = piece_;
+        const float px = float(x + shift_.x) - t.origin.x;
+        const auto place = [&](const float* along, int shift, float origin) {
+            return hn::Sub(hn::Add(hn::Load(tag, along + c * chunkVoxels), hn::Set(tag, float(shift))),
+                           hn::Set(tag, origin));
+        };
+        const Vec py = place(lattice.y, shift_.y, t.origin.y), pz = place(lattice.z, shift_.z, t.origin.z);
+        const auto coordinate = [&](const glm::vec3& axis) {
+            return hn::Add(hn::Add(hn::Set(tag, px * axis.x), hn::Mul(py, hn::Set(tag, axis.y))),
+                           hn::Mul(pz, hn::Set(tag, axis.z)));
+        };
+        const Vec u = coordinate(t.u), w = coordinate(t.w), n = coordinate(t.n);
+        const Vec base2 = hn::Add(squareOf(beyond(u, t.length)), squareOf(w));
+        // the edges from both ends of the longest one to the third corner
+        const Vec ox = hn::Set(tag, t.ox), oy = hn::Set(tag, t.oy), ex = hn::Set(tag, t.ex), ey = hn::Set(tag, t.ey);
+        const Vec v = hn::Sub(u, hn::Set(tag, t.length));
+        const Vec leftOf = hn::Sub(hn::Mul(w, ox), hn::Mul(u, oy)), rightOf = hn::Sub(hn::Mul(w, ex), hn::Mul(v, ey));
+        const Vec left2 = hn::Add(squareOf(beyond(hn::Add(hn::Mul(u, ox), hn::Mul(w, oy)), t.olen)), squareOf(leftOf));
+        const Vec right2 =
+            hn::Add(squareOf(beyond(hn::Add(hn::Mul(v, ex), hn::Mul(w, ey)), t.elen)), squareOf(rightOf));
+        const Vec zero = hn::Zero(tag), n2 = squareOf(n);
+        const Mask above = hn::And(hn::And(hn::Ge(w, zero), hn::Le(leftOf, zero)), hn::Ge(rightOf, zero));
+        const Vec distance2 = hn::Add(n2, hn::IfThenZeroElse(above, hn::Min(base2, hn::Min(left2, right2))));
+        store(distance2, n, hn::And(above, hn::Gt(n2, hn::Set(tag, square(leastHeight)))),
+              x * sliceVoxels + c * chunkVoxels, block);
+    }
+
+  private:
+    // How far a coordinate along an edge lies beyond its ends.
+    static Vec beyond(Vec along, float length) {
+        const Tag tag;
+        return hn::Sub(along, hn::Min(hn::Max(along, hn::Zero(tag)), hn::Set(tag, length)));
+    }
+
+    // Keeps the smaller distances, and whose they are; over a face its normal tells the side.
+    inline void store(Vec distance2, Vec height, Mask overFace, int voxel, BlockDistances& block) const {
+        const Tag tag;
+        const IntTag intTag;
+        const Vec old = hn::Load(tag, block.nearest2 + voxel);
+        const auto wins = hn::RebindMask(intTag, hn::Lt(distance2, old));
+        const auto side = hn::IfThenElse(hn::RebindMask(intTag, hn::Gt(height, hn::Zero(tag))),
+                                         hn::Set(intTag, code_ + sideOutside), hn::Set(intTag, code_ + sideInside));
+        const auto code = hn::IfThenElse(hn::RebindMask(intTag, overFace), side, hn::Set(intTag, code_));
+        hn::Store(hn::Min(distance2, old), tag, block.nearest2 + voxel);
+        hn::Store(hn::IfThenElse(wins, code, hn::Load(intTag, block.nearest + voxel)), intTag, block.nearest + voxel);
+    }
+
+    const Piece& piece_;
+    std::int32_t code_;
+    glm::ivec3 shift_;
+};
+
+// First bounds: the distances to the samples, a little raised so that a piece's own distance wins over its sample's.
+void applySamples(const BlockInput& input, BlockDistances& block) {
+    const Tag tag;
+    const IntTag intTag;
+    const Vec reach2 = hn::Set(tag, square(input.reach));
+    for (int i = 0; i < blockVoxels; i += chunkVoxels) hn::Store(reach2, tag, block.nearest2 + i);
+    for (const std::uint32_t index : input.reaching)
+        applySample(input.clusters[index].sample - input.inBrick, input.reach, block);
+    for (int i = 0; i < blockVoxels; i += chunkVoxels) {
+        const Vec raised = hn::Add(hn::Mul(hn::Load(tag, block.nearest2 + i), hn::Set(tag, 1 + boundSlack)),
+                                   hn::Set(tag, square(boundSlack)));
+        hn::Store(hn::Min(raised, reach2), tag, block.nearest2 + i);
+        hn::Store(hn::Set(intTag, -1), intTag, block.nearest + i);
+    }
+}
+
+void askPieces(const BlockInput& input, BlockDistances& block) {
+    for (const std::uint32_t index : input.reaching) {
+        const Cluster& cluster = input.clusters[index];
+        const glm::vec3 sample = cluster.sample - input.inBrick;
+        const Range range(sample, input.reach + cluster.radius);
+        const Drum drum(sample, cluster.radius, cluster.normal, cluster.thickness);
+        const unsigned slices = (2u << range.x1) - (1u << range.x0);
+        const bool alone = cluster.end - cluster.begin == 1;
+        for (int c = range.c0; c <= range.c1; ++c) {
+            const unsigned near = alone ? drum.near<false>(c, slices, block) : drum.near<true>(c, slices, block);
+            if (near == 0) continue;
+            for (std::uint32_t m = cluster.begin; m < cluster.end; ++m) {
+                const Member& member = input.members[m];
+                unsigned ask = alone ? near
+                                     : Drum(member.sample - input.inBrick, member.radius, member.normal, 0)
+                                           .near<false>(c, near, block);
+                if (ask == 0) continue;
+                const SeenPiece piece(input.pieces[member.piece], member.piece, input.origin);
+                for (; ask != 0; ask &= ask - 1) piece.apply(std::countr_zero(ask), c, block);
+            }
+        }
+    }
+}
+
+inline void setBits(Mask mask, int voxel, BlockMask& bits) {
+    std::uint8_t some[8] = {};
+    hn::StoreMaskBits(Tag(), mask, some);
+    std::uint64_t word;
+    std::memcpy(&word, some, sizeof word);
+    bits[std::size_t(voxel / sliceVoxels)] |= word << (voxel % sliceVoxels);
+}
+
+void summarize(BlockDistances& block) {
+    const Tag tag;
+    const IntTag intTag;
+    block.known = block.outside = block.inside = block.far = block.mid = {};
+    for (int i = 0; i < blockVoxels; i += chunkVoxels) {
+        const Vec distance = hn::Sqrt(hn::Load(tag, block.nearest2 + i));
+        hn::Store(distance, tag, block.distance + i);
+        const auto nearest = hn::Load(intTag, block.nearest + i);
+        const auto has = [&](std::int32_t side) {
+            return hn::RebindMask(tag, hn::Eq(hn::And(nearest, hn::Set(intTag, 3)), hn::Set(intTag, side)));
+        };
+        const Mask known = hn::RebindMask(tag, hn::Gt(nearest, hn::Set(intTag, -1)));
+        setBits(known, i, block.known);
+        setBits(has(sideOutside), i, block.outside);
+        setBits(has(sideInside), i, block.inside);
+        setBits(hn::And(known, hn::Gt(distance, hn::Set(tag, farFrom))), i, block.far);
+        setBits(hn::And(known, hn::Gt(distance, hn::Set(tag, midFrom))), i, block.mid);
+    }
+}
+
+bool measureBlock(const BlockInput& input, BlockDistances& block) {
+    applySamples(input, block);
+    askPieces(input, block);
+    summarize(block);
+    return !none(block.known);
+}
+
+// Bits of the voxels of a row whose distance and a neighbour's together exceed a voxel.
+inline std::uint64_t linked(const float* a, const float* b) {
+    const hn::CappedTag<float, blockSide> tag;
+    std::uint64_t bits = 0;
+    for (std::size_t z = 0; z < std::size_t(blockSide); z += hn::Lanes(tag)) {
+        std::uint8_t some = 0;
+        const auto sum = hn::Add(hn::LoadU(tag, a + z), hn::LoadU(tag, b + z));
+        hn::StoreMaskBits(tag, hn::Gt(sum, hn::Set(tag, 1.f + linkSlack)), &some);
+        bits |= std::uint64_t(some) << z;
+    }
+    return bits;
+}
+
+Links findLinks(const BlockDistances& block) {
+    constexpr std::uint64_t withoutLast = 0x7f;
+    Links links{};
+    for (int x = 0; x < blockSide; ++x)
+        for (int y = 0; y < blockSide; ++y) {
+            const float* row = block.distance + (x * blockSide + y) * blockSide;
+            links.z[std::size_t(x)] |= (linked(row, row + 1) & withoutLast) << (y * blockSide);
+            if (y + 1 < blockSide) links.y[std::size_t(x)] |= linked(row, row + blockSide) << (y * blockSide);
+            if (x + 1 < blockSide) links.x[std::size_t(x)] |= linked(row, row + sliceVoxels) << (y * blockSide);
+        }
+    return links;
+}
+
+void signDistances(const BlockDistances& block, const BlockMask& inside, float* distances) {
+    const Tag tag;
+    const IntTag intTag;
+    for (int i = 0; i < blockVoxels; i += chunkVoxels) {
+        const std::uint64_t word = inside[std::size_t(i / sliceVoxels)] >> (i % sliceVoxels);
+        std::uint8_t bits[8];
+        std::memcpy(bits, &word, sizeof bits);
+        const Mask known = hn::RebindMask(tag, hn::Gt(hn::Load(intTag, block.nearest + i), hn::Set(intTag, -1)));
+        const Vec distance = hn::IfThenElse(known, hn::Load(tag, block.distance + i), hn::Set(tag, farAway));
+        hn::StoreU(hn::IfThenElse(hn::LoadMaskBits(tag, bits), hn::Neg(distance), distance), tag, distances + i);
+    }
+}
+
+}  // namespace bilayer::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace bilayer {
+
+HWY_EXPORT(measureBlock);
+HWY_EXPORT(findLinks);
+HWY_EXPORT(signDistances);
+
+bool measureBlock(const BlockInput& input, BlockDistances& block) {
+    return HWY_DYNAMIC_DISPATCH(measureBlock)(input, block);
+}
+
+Links findLinks(const BlockDistances& block) {
+    return HWY_DYNAMIC_DISPATCH(findLinks)(block);
+}
+
+void signDistances(const BlockDistances& block, const BlockMask& inside, float* distances) {
+    HWY_DYNAMIC_DISPATCH(signDistances)(block, inside, distances);
+}
+
+}  // namespace bilayer
+#endif  // HWY_ONCE
