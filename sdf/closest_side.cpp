@@ -4,6 +4,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/gtc/constants.hpp>
+#include <limits>
 
 namespace bilayer {
 namespace {
@@ -15,6 +16,7 @@ constexpr double samePlace = 1e-7;
 constexpr double flatness = 1e-10;
 /// Sums of unit normals below this part of their weights have cancelled out.
 constexpr double cancelled = 1e-9;
+constexpr double wholeTurn = 2 * glm::pi<double>();
 
 glm::dvec3 closestOnSegment(const glm::dvec3& a, const glm::dvec3& b) {
     const glm::dvec3 ab = b - a;
@@ -40,7 +42,13 @@ double angleAt(const std::array<glm::dvec3, 3>& c, const glm::dvec3& p) {
         const glm::dvec3 edge = c[(i + 1) % 3] - c[i];
         if (glm::length(glm::cross(edge, p - c[i])) <= samePlace * glm::length(edge)) return glm::pi<double>();
     }
-    return 2 * glm::pi<double>();
+    return wholeTurn;
+}
+
+// Thinner than a place, a triangle has no normal to trust; its far side's neighbour meets the closest point as well and
+// speaks for it.
+bool hasNormal(const std::array<glm::dvec3, 3>& c) {
+    return glm::length(glm::cross(c[1] - c[0], c[2] - c[0])) > samePlace * std::sqrt(longestEdge2(c));
 }
 
 bool sameCorners(const std::array<glm::dvec3, 3>& a, const std::array<glm::dvec3, 3>& b) {
@@ -69,53 +77,44 @@ glm::dvec3 closestToOrigin(const std::array<glm::dvec3, 3>& c) {
     return best;
 }
 
-std::array<glm::dvec3, 3> ClosestSide::cornersOf(std::uint32_t triangle) const {
-    const glm::uvec3 t = mesh_.triangles[triangle];
-    return {glm::dvec3(mesh_.points[t.x]) * voxelsPerUnit_ - point_,
-            glm::dvec3(mesh_.points[t.y]) * voxelsPerUnit_ - point_,
-            glm::dvec3(mesh_.points[t.z]) * voxelsPerUnit_ - point_};
-}
-
 Side ClosestSide::begin(const glm::dvec3& point, std::uint32_t nearest) {
     point_ = point;
-    sum_ = weights_ = 0;
+    distance_ = std::numeric_limits<double>::infinity();
     faces_.clear();
-    const Face face{nearest, cornersOf(nearest)};
-    closest_ = closestToOrigin(face.corners);
-    add(face, closest_);
-    return weights_ == 2 * glm::pi<double>() ? side() : Side::undecided;
+    offer(nearest);
+    const Face& face = faces_.front();
+    const bool inside = angleAt(face.corners, face.closest) == wholeTurn && hasNormal(face.corners);
+    return inside ? side() : Side::undecided;
 }
 
 void ClosestSide::offer(std::uint32_t triangle) {
-    const auto same = [&](const Face& f) { return f.triangle == triangle; };
+    const auto same = [&](const Face& face) { return face.triangle == triangle; };
     if (std::any_of(faces_.begin(), faces_.end(), same)) return;
-    const Face face{triangle, cornersOf(triangle)};
-    const glm::dvec3 closest = closestToOrigin(face.corners);
-    if (glm::distance(closest, closest_) > samePlace) return;
-    const auto duplicate = [&](const Face& f) { return sameCorners(f.corners, face.corners); };
-    if (std::any_of(faces_.begin(), faces_.end(), duplicate)) return;
-    add(face, closest);
-}
-
-void ClosestSide::add(const Face& face, const glm::dvec3& closest) {
+    const glm::uvec3 t = mesh_.triangles[triangle];
+    const auto corner = [&](unsigned i) { return glm::dvec3(mesh_.points[i]) * voxelsPerUnit_ - point_; };
+    Face face{triangle, {corner(t.x), corner(t.y), corner(t.z)}, {}, 0};
+    face.closest = closestToOrigin(face.corners);
+    face.distance = glm::length(face.closest);
+    if (face.distance > distance_ + samePlace) return;
+    distance_ = std::min(distance_, face.distance);
     faces_.push_back(face);
-    const auto& c = face.corners;
-    const glm::dvec3 n = glm::cross(c[1] - c[0], c[2] - c[0]);
-    const double length = glm::length(n);
-    // thinner than a place: its far side's neighbour meets the closest point as well and speaks for it
-    if (!(length > samePlace * std::sqrt(longestEdge2(c)))) return;
-    const double angle = angleAt(c, closest);
-    sum_ -= angle * glm::dot(n / length, closest_);
-    weights_ += angle;
 }
 
 Side ClosestSide::side() const {
-    if (std::abs(sum_) <= cancelled * weights_ * glm::length(closest_)) return Side::undecided;
-    return sum_ < 0 ? Side::inside : Side::outside;
-}
-
-double ClosestSide::distance() const {
-    return glm::length(closest_);
+    const auto nearer = [](const Face& a, const Face& b) { return a.distance < b.distance; };
+    const glm::dvec3 closest = std::min_element(faces_.begin(), faces_.end(), nearer)->closest;
+    double sum = 0, weights = 0;
+    for (auto face = faces_.begin(); face != faces_.end(); ++face) {
+        if (glm::distance(face->closest, closest) > samePlace || !hasNormal(face->corners)) continue;
+        const auto duplicate = [&](const Face& other) { return sameCorners(other.corners, face->corners); };
+        if (std::any_of(faces_.begin(), face, duplicate)) continue;
+        const auto& c = face->corners;
+        const double angle = angleAt(c, closest);
+        sum -= angle * glm::dot(glm::normalize(glm::cross(c[1] - c[0], c[2] - c[0])), closest);
+        weights += angle;
+    }
+    if (std::abs(sum) <= cancelled * weights * distance_) return Side::undecided;
+    return sum < 0 ? Side::inside : Side::outside;
 }
 
 }  // namespace bilayer

@@ -17,8 +17,8 @@ namespace bilayer {
 /// What the closest feature says of a point.
 enum class Side { outside, inside, undecided };
 
-/// Finds the side of one point. Offer the nearest triangle first; if that alone does not decide, offer every triangle
-/// that may touch the closest point, in any order and more than once if need be.
+/// Finds the side of one point. Offer the triangle that is thought nearest first; if that alone does not decide, offer
+/// every triangle that may be as near, in any order and more than once if need be.
 class ClosestSide {
   public:
     ClosestSide(const Mesh& mesh, double voxelsPerUnit) : mesh_(mesh), voxelsPerUnit_(voxelsPerUnit) {}
@@ -27,29 +27,28 @@ class ClosestSide {
     /// a corner, or if the triangle has no area.
     Side begin(const glm::dvec3& point, std::uint32_t nearest);
 
-    /// Adds another triangle's normal if it meets the closest point.
+    /// Adds another triangle that may be as near.
     void offer(std::uint32_t triangle);
 
-    /// The side by all triangles offered; `undecided` where their normals cancel out.
+    /// The side by all triangles offered; `undecided` where the normals at the closest point cancel out.
     Side side() const;
 
-    /// The distance to the closest point [voxels].
-    double distance() const;
+    /// The distance to the nearest triangle offered [voxels].
+    double distance() const { return distance_; }
 
   private:
     struct Face {
         std::uint32_t triangle;
         std::array<glm::dvec3, 3> corners;  // from the point [voxels]
+        glm::dvec3 closest;                 // likewise
+        double distance;
     };
-
-    std::array<glm::dvec3, 3> cornersOf(std::uint32_t triangle) const;
-    void add(const Face& face, const glm::dvec3& closest);
 
     const Mesh& mesh_;
     double voxelsPerUnit_;
-    glm::dvec3 point_{0}, closest_{0};  // the closest point as seen from the point
-    double sum_ = 0, weights_ = 0;
-    std::vector<Face> faces_;  // that meet the closest point
+    glm::dvec3 point_{0};
+    double distance_ = 0;
+    std::vector<Face> faces_;
 };
 
 /// The point of a triangle that is closest to the origin. Right for triangles without area too.
