@@ -1,10 +1,71 @@
+// Highway compiles the part between HWY_BEFORE_NAMESPACE and HWY_AFTER_NAMESPACE once for each instruction set.
 #include "sdf/band.h"
 
-#include <bit>
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "sdf/band.cpp"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
+#include <cstring>
 #include <limits>
 
+HWY_BEFORE_NAMESPACE();
+namespace bilayer::HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+using Tag = hn::CappedTag<float, 2 * blockSide>;
+using Mask = hn::Mask<Tag>;
+
+inline void setBits(Mask mask, int voxel, BlockMask& bits) {
+    std::uint8_t some[8] = {};
+    hn::StoreMaskBits(Tag(), mask, some);
+    std::uint64_t word;
+    std::memcpy(&word, some, sizeof word);
+    bits[std::size_t(voxel / 64)] |= word << (voxel % 64);
+}
+
+inline Mask getBits(const BlockMask& bits, int voxel) {
+    const std::uint64_t word = bits[std::size_t(voxel / 64)] >> (voxel % 64);
+    std::uint8_t some[8];
+    std::memcpy(some, &word, sizeof some);
+    return hn::LoadMaskBits(Tag(), some);
+}
+
+// What each voxel's distance says of it: unknown, inside, in the band.
+void sortVoxels(const float* distances, const BandWidths& widths, BlockMask& unknown, BlockMask& inside,
+                BlockMask& band) {
+    const Tag tag;
+    unknown = inside = band = {};
+    for (int i = 0; i < blockVoxels; i += int(hn::Lanes(tag))) {
+        const auto d = hn::LoadU(tag, distances + i);
+        setBits(hn::Eq(d, hn::Set(tag, std::numeric_limits<float>::infinity())), i, unknown);
+        setBits(hn::MaskFromVec(hn::BitCast(tag, hn::BroadcastSignBit(hn::BitCast(hn::RebindToSigned<Tag>(), d)))), i,
+                inside);
+        setBits(hn::And(hn::Lt(d, hn::Set(tag, widths.exterior)), hn::Gt(d, hn::Set(tag, -widths.interior))), i, band);
+    }
+}
+
+void writeValues(const float* distances, const BandWidths& widths, const BlockMask& inside, const BlockMask& band,
+                 float* values) {
+    const Tag tag;
+    const auto size = hn::Set(tag, widths.voxelSize), exterior = hn::Set(tag, widths.exterior * widths.voxelSize),
+               interior = hn::Set(tag, -widths.interior * widths.voxelSize);
+    for (int i = 0; i < blockVoxels; i += int(hn::Lanes(tag))) {
+        const auto far = hn::IfThenElse(getBits(inside, i), interior, exterior);
+        const auto near = hn::Mul(hn::LoadU(tag, distances + i), size);
+        hn::StoreU(hn::IfThenElse(getBits(band, i), near, far), tag, values + i);
+    }
+}
+
+}  // namespace bilayer::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
 namespace bilayer {
 namespace {
+
+HWY_EXPORT(sortVoxels);
+HWY_EXPORT(writeValues);
 
 constexpr std::uint64_t lowestZ = 0x0101010101010101ull;  // the voxels with z = 0 of a slice
 constexpr std::uint64_t highestZ = lowestZ << 7;
@@ -46,30 +107,18 @@ void flood(BlockMask unknown, BlockMask& outside, BlockMask& inside) {
 }  // namespace
 
 bool trimToBand(const float* distances, const BandWidths& widths, float* values, BlockMask& active) {
-    BlockMask unknown, inside, outside, band;
-    for (std::size_t x = 0; x < blockSide; ++x) {
-        std::uint64_t unknownBits = 0, insideBits = 0, bandBits = 0;
-        for (unsigned i = 0; i < 64; ++i) {
-            const float d = distances[x * 64 + i];
-            unknownBits |= std::uint64_t(d == std::numeric_limits<float>::infinity()) << i;
-            insideBits |= std::uint64_t(std::bit_cast<std::uint32_t>(d) >> 31) << i;
-            bandBits |= std::uint64_t(int(d < widths.exterior) & int(d > -widths.interior)) << i;
-        }
-        unknown[x] = unknownBits;
-        inside[x] = insideBits;
-        outside[x] = ~(unknownBits | insideBits);
-        band[x] = bandBits;
+    BlockMask unknown, inside, band;
+    HWY_DYNAMIC_DISPATCH(sortVoxels)(distances, widths, unknown, inside, band);
+    if (any(unknown)) {
+        BlockMask outside;
+        for (std::size_t x = 0; x < blockSide; ++x) outside[x] = ~(unknown[x] | inside[x]);
+        if (!any(inside) && !any(outside)) return false;
+        flood(unknown, outside, inside);
     }
-    if (!any(inside) && !any(outside)) return false;
-    if (any(unknown)) flood(unknown, outside, inside);
     active = band;
-    const float exterior = widths.exterior * widths.voxelSize, interior = -widths.interior * widths.voxelSize;
-    for (std::size_t x = 0; x < blockSide; ++x)
-        for (unsigned i = 0; i < 64; ++i) {
-            const float far = (inside[x] >> i) & 1 ? interior : exterior;
-            values[x * 64 + i] = (band[x] >> i) & 1 ? distances[x * 64 + i] * widths.voxelSize : far;
-        }
+    HWY_DYNAMIC_DISPATCH(writeValues)(distances, widths, inside, band, values);
     return true;
 }
 
 }  // namespace bilayer
+#endif  // HWY_ONCE

@@ -13,6 +13,8 @@ namespace {
 constexpr float radiusSlack = 1e-5f;
 /// Below this height a piece is as good as its longest edge [voxels].
 constexpr float flatHeight = 1e-9f;
+/// Below this part of the longest edge the height is too rounded to give a direction at once.
+constexpr float flatPart = 0.1f;
 
 // Rounds to the nearest, halves always up, so that a shift by whole voxels shifts the result. For |value| < 2^31.
 int roundToInt(double value) {
@@ -31,8 +33,8 @@ struct Edge2 {
 };
 
 Edge2 edgeTo(float x, float y) {
-    const float length = std::sqrt(x * x + y * y);
-    return length > 0 ? Edge2{x / length, y / length, length} : Edge2{1, 0, 0};
+    const float length = std::sqrt(x * x + y * y), part = 1 / length;
+    return length > 0 ? Edge2{x * part, y * part, length} : Edge2{1, 0, 0};
 }
 
 // The longest edge runs from corner `first` to the next.
@@ -44,12 +46,14 @@ Piece makePiece(const PieceCorners& corners, int first, std::uint32_t triangle) 
     piece.origin = glm::vec3(a - glm::dvec3(piece.base));
     const glm::vec3 ab(b - a), ac(c - a);
     piece.length = glm::length(ab);
-    piece.u = piece.length > 0 ? ab / piece.length : glm::vec3(1, 0, 0);
+    piece.u = piece.length > 0 ? ab * (1 / piece.length) : glm::vec3(1, 0, 0);
     const float along = glm::dot(ac, piece.u);
     const glm::vec3 rest = ac - along * piece.u;
     const float height = glm::length(rest);
-    if (height > flatHeight) {
-        // once more, for flat pieces, where the rest is mostly rounding
+    if (height > flatPart * piece.length) {
+        piece.w = rest * (1 / height);
+    } else if (height > flatHeight) {
+        // once more, because the rest is mostly rounding
         const glm::vec3 w = rest / height;
         piece.w = glm::normalize(w - glm::dot(w, piece.u) * piece.u);
     } else {
