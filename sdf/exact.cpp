@@ -100,13 +100,17 @@ class BrickFiller {
         const float reach = job_.reach + cluster.radius;
         const auto block = [&](float coordinate) { return std::clamp(int(coordinate) / blockSide, 0, blocks_ - 1); };
         const glm::vec3 lower = cluster.sample - reach, upper = cluster.sample + reach;
+        constexpr float half = 0.5f * float(blockSide - 1);
+        const float slab =
+            job_.reach + cluster.thickness +
+            half * (std::abs(cluster.normal.x) + std::abs(cluster.normal.y) + std::abs(cluster.normal.z)) + sideSlack;
         for (int x = block(lower.x); x <= block(upper.x); ++x)
             for (int y = block(lower.y); y <= block(upper.y); ++y)
                 for (int z = block(lower.z); z <= block(upper.z); ++z) {
-                    constexpr float half = 0.5f * float(blockSide - 1);
-                    const glm::vec3 centre = float(blockSide) * glm::vec3(x, y, z) + half;
-                    const glm::vec3 away = glm::max(glm::abs(cluster.sample - centre) - half, glm::vec3(0));
-                    if (glm::dot(away, away) < reach * reach) visit(std::uint32_t((x * blocks_ + y) * blocks_ + z));
+                    const glm::vec3 toCentre = float(blockSide) * glm::vec3(x, y, z) + half - cluster.sample;
+                    const glm::vec3 away = glm::max(glm::abs(toCentre) - half, glm::vec3(0));
+                    if (glm::dot(away, away) < reach * reach && std::abs(glm::dot(toCentre, cluster.normal)) < slab)
+                        visit(std::uint32_t((x * blocks_ + y) * blocks_ + z));
                 }
     }
 

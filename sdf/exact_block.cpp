@@ -25,7 +25,7 @@ using Mask = hn::Mask<Tag>;
 /// that which distance wins never depends on the order [voxels].
 constexpr float boundSlack = 1e-4f;
 /// Nearer to a face than this its side is left to a closer look [voxels].
-constexpr float leastHeight = 0.1f;
+constexpr float leastHeight = 1e-3f;
 /// Voxels farther from the surface than this are asked first for their side, then those beyond the next [voxels].
 constexpr float farFrom = 0.5f, midFrom = 0.1f;
 
@@ -54,35 +54,38 @@ inline Vec squareOf(Vec v) {
     return hn::Mul(v, v);
 }
 
-// The slices and chunks that a ball may reach.
-struct Range {
-    Range(const glm::vec3& centre, float radius)
-        : x0(firstFrom(centre.x - radius)),
-          x1(lastTo(centre.x + radius)),
-          c0(firstFrom(centre.y - radius) * blockSide / chunkVoxels),
-          c1((lastTo(centre.y + radius) * blockSide + blockSide - 1) / chunkVoxels) {
-        if (lastTo(centre.y + radius) < 0) c1 = -1;
-    }
-    static int firstFrom(float coordinate) { return coordinate > 0 ? int(coordinate) : 0; }
-    static int lastTo(float coordinate) { return coordinate < 0 ? -1 : std::min(blockSide - 1, int(coordinate)); }
-    int x0, x1, c0, c1;
-};
+inline int firstFrom(float coordinate) {
+    return coordinate > 0 ? int(coordinate) : 0;
+}
+
+inline int lastTo(float coordinate) {
+    return coordinate < 0 ? -1 : std::min(blockSide - 1, int(coordinate));
+}
+
+// Calls visit(c, first slice, last slice) for the chunks that a ball may reach. Only its box counts: that much less to
+// work out for each is worth more than the corners.
+template <class Visit>
+inline void forEachChunk(const glm::vec3& centre, float radius, Visit visit) {
+    const int x0 = firstFrom(centre.x - radius), x1 = lastTo(centre.x + radius);
+    if (x0 > x1) return;
+    const int end = (lastTo(centre.y + radius) + 1) * blockSide;
+    for (int c = firstFrom(centre.y - radius) * blockSide / chunkVoxels; c * chunkVoxels < end; ++c) visit(c, x0, x1);
+}
 
 // Lowers squared distances to those to a sample.
 inline void applySample(const glm::vec3& sample, float reach, BlockDistances& block) {
     const Tag tag;
-    const Range range(sample, reach);
     const Vec sy = hn::Set(tag, sample.y), sz = hn::Set(tag, sample.z);
-    for (int c = range.c0; c <= range.c1; ++c) {
+    forEachChunk(sample, reach, [&](int c, int x0, int x1) {
         const Vec py = hn::Sub(hn::Load(tag, lattice.y + c * chunkVoxels), sy),
                   pz = hn::Sub(hn::Load(tag, lattice.z + c * chunkVoxels), sz);
         const Vec across2 = hn::Add(squareOf(py), squareOf(pz));
-        for (int x = range.x0; x <= range.x1; ++x) {
+        for (int x = x0; x <= x1; ++x) {
             float* nearest2 = block.nearest2 + x * sliceVoxels + c * chunkVoxels;
             const Vec distance2 = hn::Add(hn::Set(tag, square(float(x) - sample.x)), across2);
             hn::Store(hn::Min(hn::Load(tag, nearest2), distance2), tag, nearest2);
         }
-    }
+    });
 }
 
 // A disc, or a drum of some thickness, that holds pieces; seen from a block. A voxel at height h over its plane and r
@@ -206,27 +209,31 @@ void applySamples(const BlockInput& input, BlockDistances& block) {
     }
 }
 
+// Asks the members of a cluster that come near the slices `near` of chunk c.
+inline void askMembers(const BlockInput& input, const Cluster& cluster, int c, unsigned near, BlockDistances& block) {
+    const bool alone = cluster.end - cluster.begin == 1;
+    for (std::uint32_t m = cluster.begin; m < cluster.end; ++m) {
+        const Member& member = input.members[m];
+        unsigned ask = near;
+        if (!alone)
+            ask = Drum(member.sample - input.inBrick, member.radius, member.normal, 0).near<false>(c, near, block);
+        if (ask == 0) continue;
+        const SeenPiece piece(input.pieces[member.piece], member.piece, input.origin);
+        for (; ask != 0; ask &= ask - 1) piece.apply(std::countr_zero(ask), c, block);
+    }
+}
+
 void askPieces(const BlockInput& input, BlockDistances& block) {
     for (const std::uint32_t index : input.reaching) {
         const Cluster& cluster = input.clusters[index];
         const glm::vec3 sample = cluster.sample - input.inBrick;
-        const Range range(sample, input.reach + cluster.radius);
         const Drum drum(sample, cluster.radius, cluster.normal, cluster.thickness);
-        const unsigned slices = (2u << range.x1) - (1u << range.x0);
-        const bool alone = cluster.end - cluster.begin == 1;
-        for (int c = range.c0; c <= range.c1; ++c) {
-            const unsigned near = alone ? drum.near<false>(c, slices, block) : drum.near<true>(c, slices, block);
-            if (near == 0) continue;
-            for (std::uint32_t m = cluster.begin; m < cluster.end; ++m) {
-                const Member& member = input.members[m];
-                unsigned ask = alone ? near
-                                     : Drum(member.sample - input.inBrick, member.radius, member.normal, 0)
-                                           .near<false>(c, near, block);
-                if (ask == 0) continue;
-                const SeenPiece piece(input.pieces[member.piece], member.piece, input.origin);
-                for (; ask != 0; ask &= ask - 1) piece.apply(std::countr_zero(ask), c, block);
-            }
-        }
+        forEachChunk(sample, input.reach + cluster.radius, [&](int c, int x0, int x1) {
+            const unsigned slices = (2u << x1) - (1u << x0);
+            const unsigned near =
+                cluster.thickness > 0 ? drum.near<true>(c, slices, block) : drum.near<false>(c, slices, block);
+            if (near != 0) askMembers(input, cluster, c, near, block);
+        });
     }
 }
 
@@ -251,7 +258,8 @@ void summarize(BlockDistances& block) {
         };
         const Mask known = hn::RebindMask(tag, hn::Gt(nearest, hn::Set(intTag, -1)));
         setBits(known, i, block.known);
-        setBits(has(sideOutside), i, block.outside);
+        // on the surface either side is right, and no link can carry it on
+        setBits(hn::Or(has(sideOutside), hn::Lt(distance, hn::Set(tag, 0.5f * linkSlack))), i, block.outside);
         setBits(has(sideInside), i, block.inside);
         setBits(hn::And(known, hn::Gt(distance, hn::Set(tag, farFrom))), i, block.far);
         setBits(hn::And(known, hn::Gt(distance, hn::Set(tag, midFrom))), i, block.mid);
