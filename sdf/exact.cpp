@@ -67,11 +67,13 @@ class BrickFiller {
         s_.pieces.clear();
         const glm::dvec3 lower(origin_), upper = lower + double(bins_.side - 1);
         const PieceLimits limits{lower - double(job_.reach) - 1.0, upper + double(job_.reach) + 1.0};
+        PieceCutter cutter(longestPieceEdge, s_.pieces);
         for (const std::uint32_t triangle : bins_.trianglesOf(brick)) {
             const glm::uvec3 t = job_.mesh.triangles[triangle];
             const auto corner = [&](unsigned i) { return glm::dvec3(job_.mesh.points[i]) * voxelsPerUnit_; };
-            cutTriangle({corner(t.x), corner(t.y), corner(t.z)}, triangle, longestPieceEdge, limits, s_.pieces);
+            cutter.cut({corner(t.x), corner(t.y), corner(t.z)}, triangle, limits);
         }
+        cutter.finish();
     }
 
     // Gives each block the clusters that reach it.

@@ -1,20 +1,162 @@
+// Highway compiles the part between HWY_BEFORE_NAMESPACE and HWY_AFTER_NAMESPACE once for each instruction set.
 #include "sdf/pieces.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "sdf/pieces.cpp"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
 
 #include <algorithm>
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
-#include <glm/vector_relational.hpp>
 
-namespace bilayer {
-namespace {
+HWY_BEFORE_NAMESPACE();
+namespace bilayer::HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+using Tag = hn::CappedTag<float, PieceCutter::batch>;
+using Vec = hn::Vec<Tag>;
+using Mask = hn::Mask<Tag>;
 
 /// Rounding of a sample's place and of the radius around it [voxels].
 constexpr float radiusSlack = 1e-5f;
 /// Below this height a piece is as good as its longest edge [voxels].
 constexpr float flatHeight = 1e-9f;
-/// Below this part of the longest edge the height is too rounded to give a direction at once.
-constexpr float flatPart = 0.1f;
+
+struct Vec3 {
+    Vec x, y, z;
+};
+
+inline Vec3 operator+(Vec3 a, Vec3 b) {
+    return {hn::Add(a.x, b.x), hn::Add(a.y, b.y), hn::Add(a.z, b.z)};
+}
+inline Vec3 operator-(Vec3 a, Vec3 b) {
+    return {hn::Sub(a.x, b.x), hn::Sub(a.y, b.y), hn::Sub(a.z, b.z)};
+}
+inline Vec3 operator*(Vec s, Vec3 a) {
+    return {hn::Mul(s, a.x), hn::Mul(s, a.y), hn::Mul(s, a.z)};
+}
+inline Vec dot(Vec3 a, Vec3 b) {
+    return hn::Add(hn::Add(hn::Mul(a.x, b.x), hn::Mul(a.y, b.y)), hn::Mul(a.z, b.z));
+}
+inline Vec3 cross(Vec3 a, Vec3 b) {
+    return {hn::Sub(hn::Mul(a.y, b.z), hn::Mul(a.z, b.y)), hn::Sub(hn::Mul(a.z, b.x), hn::Mul(a.x, b.z)),
+            hn::Sub(hn::Mul(a.x, b.y), hn::Mul(a.y, b.x))};
+}
+inline Vec3 select(Mask mask, Vec3 yes, Vec3 no) {
+    return {hn::IfThenElse(mask, yes.x, no.x), hn::IfThenElse(mask, yes.y, no.y), hn::IfThenElse(mask, yes.z, no.z)};
+}
+inline Vec3 load(const float (&from)[3][PieceCutter::batch], std::size_t i) {
+    const Tag tag;
+    return {hn::Load(tag, from[0] + i), hn::Load(tag, from[1] + i), hn::Load(tag, from[2] + i)};
+}
+
+// One over a length; zero for none.
+inline Vec inverse(Vec length) {
+    const Tag tag;
+    return hn::IfThenElseZero(hn::Gt(length, hn::Zero(tag)), hn::Div(hn::Set(tag, 1.f), length));
+}
+
+// A unit vector across a unit vector: for pieces without a height.
+inline Vec3 across(Vec3 u) {
+    const Tag tag;
+    const Mask useX = hn::Lt(hn::Abs(u.x), hn::Set(tag, 0.6f));
+    const Vec one = hn::Set(tag, 1.f), zero = hn::Zero(tag);
+    const Vec3 way = cross(u, select(useX, {one, zero, zero}, {zero, one, zero}));
+    return inverse(hn::Sqrt(dot(way, way))) * way;
+}
+
+// The numbers of a batch of pieces, a column each.
+struct Columns {
+    void put(int row, std::size_t i, Vec value) { hn::Store(value, Tag(), values[row] + i); }
+    void put(int row, std::size_t i, Vec3 value) {
+        put(row, i, value.x);
+        put(row + 1, i, value.y);
+        put(row + 2, i, value.z);
+    }
+    glm::vec3 vec3(int row, std::size_t i) const { return {values[row][i], values[row + 1][i], values[row + 2][i]}; }
+    alignas(64) float values[24][PieceCutter::batch];
+};
+enum Row { origin = 0, axisU = 3, axisW = 6, axisN = 9, length = 12, left = 13, right = 16, sample = 19, radius = 22 };
+
+// The unit vector and the length of an edge in (u, w).
+inline void putEdge(Columns& columns, int row, std::size_t i, Vec x, Vec y) {
+    const Tag tag;
+    const Vec size = hn::Sqrt(hn::Add(hn::Mul(x, x), hn::Mul(y, y))), part = inverse(size);
+    columns.put(row, i, hn::IfThenElse(hn::Gt(size, hn::Zero(tag)), hn::Mul(x, part), hn::Set(tag, 1.f)));
+    columns.put(row + 1, i, hn::Mul(y, part));
+    columns.put(row + 2, i, size);
+}
+
+inline void makeColumns(const PieceCutter::Waiting& waiting, std::size_t i, Columns& columns) {
+    const Tag tag;
+    const Vec3 corner = load(waiting.corner, i), ab = load(waiting.ab, i), ac = load(waiting.ac, i), bc = ac - ab;
+    // turned so that the longest edge comes first
+    const Vec ab2 = dot(ab, ab), bc2 = dot(bc, bc), ca2 = dot(ac, ac);
+    const Mask first = hn::And(hn::Ge(ab2, bc2), hn::Ge(ab2, ca2)), second = hn::Ge(bc2, ca2);
+    const Vec3 none{hn::Zero(tag), hn::Zero(tag), hn::Zero(tag)};
+    const Vec3 begin = select(first, corner, select(second, corner + ab, corner + ac));
+    const Vec3 edge = select(first, ab, select(second, bc, none - ac));
+    const Vec3 third = select(first, ac, select(second, none - ab, ab - ac));
+
+    const Vec size = hn::Sqrt(dot(edge, edge));
+    const Vec3 u =
+        select(hn::Gt(size, hn::Zero(tag)), inverse(size) * edge, {hn::Set(tag, 1.f), hn::Zero(tag), hn::Zero(tag)});
+    const Vec along = dot(third, u);
+    const Vec3 rest = third - along * u;
+    const Vec height = hn::Sqrt(dot(rest, rest));
+    // once more across u: the rest of a flat piece is mostly rounding
+    const Vec3 rough = inverse(height) * rest, way = rough - dot(rough, u) * u;
+    const Mask flat = hn::Le(height, hn::Set(tag, flatHeight));
+    const Vec3 w = select(flat, across(u), inverse(hn::Sqrt(dot(way, way))) * way);
+    columns.put(Row::origin, i, begin);
+    columns.put(Row::axisU, i, u);
+    columns.put(Row::axisW, i, w);
+    columns.put(Row::axisN, i, cross(u, w));
+    columns.put(Row::length, i, size);
+    putEdge(columns, Row::left, i, along, height);
+    putEdge(columns, Row::right, i, hn::Sub(along, size), height);
+    // the centre of the smallest circle around the piece: of its corners', or the middle of the longest edge
+    const Vec half = hn::Mul(hn::Set(tag, 0.5f), size);
+    const Vec lift = hn::Div(hn::Sub(hn::Add(hn::Mul(along, along), hn::Mul(height, height)), hn::Mul(along, size)),
+                             hn::Add(height, height));
+    const Vec up = hn::IfThenZeroElse(flat, hn::Max(lift, hn::Zero(tag)));
+    columns.put(Row::sample, i, begin + half * u + up * w);
+    columns.put(Row::radius, i,
+                hn::Add(hn::Sqrt(hn::Add(hn::Mul(half, half), hn::Mul(up, up))), hn::Set(tag, radiusSlack)));
+}
+
+void makePieces(const PieceCutter::Waiting& waiting, std::size_t count, Piece* pieces) {
+    Columns columns;
+    for (std::size_t i = 0; i < count; i += hn::Lanes(Tag())) makeColumns(waiting, i, columns);
+    const auto& v = columns.values;
+    for (std::size_t i = 0; i < count; ++i)
+        pieces[i] = {waiting.base[i],
+                     columns.vec3(Row::origin, i),
+                     columns.vec3(Row::axisU, i),
+                     columns.vec3(Row::axisW, i),
+                     columns.vec3(Row::axisN, i),
+                     v[Row::length][i],
+                     v[Row::left][i],
+                     v[Row::left + 1][i],
+                     v[Row::left + 2][i],
+                     v[Row::right][i],
+                     v[Row::right + 1][i],
+                     v[Row::right + 2][i],
+                     columns.vec3(Row::sample, i),
+                     v[Row::radius][i],
+                     waiting.triangle[i]};
+}
+
+}  // namespace bilayer::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace bilayer {
+namespace {
+
+HWY_EXPORT(makePieces);
 
 // Rounds to the nearest, halves always up, so that a shift by whole voxels shifts the result. For |value| < 2^31.
 int roundToInt(double value) {
@@ -22,77 +164,45 @@ int roundToInt(double value) {
     return int(std::int64_t(value + 0.5 + shift) - std::int64_t(shift));
 }
 
-// Any unit vector across a unit vector.
-glm::vec3 across(const glm::vec3& u) {
-    const glm::vec3 axis = std::abs(u.x) < 0.6f ? glm::vec3(1, 0, 0) : glm::vec3(0, 1, 0);
-    return glm::normalize(glm::cross(u, axis));
-}
-
-struct Edge2 {
-    float x, y, length;  // unit vector and length
-};
-
-Edge2 edgeTo(float x, float y) {
-    const float length = std::sqrt(x * x + y * y), part = 1 / length;
-    return length > 0 ? Edge2{x * part, y * part, length} : Edge2{1, 0, 0};
-}
-
-// The longest edge runs from corner `first` to the next.
-Piece makePiece(const PieceCorners& corners, int first, std::uint32_t triangle) {
-    Piece piece;
-    const glm::dvec3& a = corners[std::size_t(first)];
-    const glm::dvec3 &b = corners[std::size_t((first + 1) % 3)], &c = corners[std::size_t((first + 2) % 3)];
-    piece.base = {roundToInt(a.x), roundToInt(a.y), roundToInt(a.z)};
-    piece.origin = glm::vec3(a - glm::dvec3(piece.base));
-    const glm::vec3 ab(b - a), ac(c - a);
-    piece.length = glm::length(ab);
-    piece.u = piece.length > 0 ? ab * (1 / piece.length) : glm::vec3(1, 0, 0);
-    const float along = glm::dot(ac, piece.u);
-    const glm::vec3 rest = ac - along * piece.u;
-    const float height = glm::length(rest);
-    if (height > flatPart * piece.length) {
-        piece.w = rest * (1 / height);
-    } else if (height > flatHeight) {
-        // once more, because the rest is mostly rounding
-        const glm::vec3 w = rest / height;
-        piece.w = glm::normalize(w - glm::dot(w, piece.u) * piece.u);
-    } else {
-        piece.w = across(piece.u);
-    }
-    piece.n = glm::cross(piece.u, piece.w);
-    const Edge2 left = edgeTo(along, height), right = edgeTo(along - piece.length, height);
-    piece.ox = left.x, piece.oy = left.y, piece.olen = left.length;
-    piece.ex = right.x, piece.ey = right.y, piece.elen = right.length;
-    // the centre of the smallest circle around the piece: of its corners', or the middle of the longest edge
-    const float up = height > flatHeight
-                         ? std::max(0.f, (along * along + height * height - along * piece.length) / (2 * height))
-                         : 0.f;
-    piece.sample = piece.origin + 0.5f * piece.length * piece.u + up * piece.w;
-    piece.radius = std::sqrt(0.25f * piece.length * piece.length + up * up) + radiusSlack;
-    piece.triangle = triangle;
-    return piece;
+bool misses(const PieceCorners& c, const PieceLimits& limits) {
+    const glm::dvec3 lower = glm::min(c[0], glm::min(c[1], c[2])), upper = glm::max(c[0], glm::max(c[1], c[2]));
+    return lower.x > limits.upper.x || lower.y > limits.upper.y || lower.z > limits.upper.z ||
+           upper.x < limits.lower.x || upper.y < limits.lower.y || upper.z < limits.lower.z;
 }
 
 }  // namespace
 
-void cutTriangle(const PieceCorners& c, std::uint32_t triangle, double longestEdge, const PieceLimits& limits,
-                 std::vector<Piece>& pieces) {
-    const glm::dvec3 lower = glm::min(c[0], glm::min(c[1], c[2])), upper = glm::max(c[0], glm::max(c[1], c[2]));
-    if (lower.x > limits.upper.x || lower.y > limits.upper.y || lower.z > limits.upper.z || upper.x < limits.lower.x ||
-        upper.y < limits.lower.y || upper.z < limits.lower.z)
-        return;
+void PieceCutter::cut(const PieceCorners& c, std::uint32_t triangle, const PieceLimits& limits) {
     const glm::dvec3 ab = c[1] - c[0], bc = c[2] - c[1], ca = c[0] - c[2];
-    const double lengths2[3] = {glm::dot(ab, ab), glm::dot(bc, bc), glm::dot(ca, ca)};
-    const int first =
-        lengths2[0] >= lengths2[1] ? (lengths2[0] >= lengths2[2] ? 0 : 2) : (lengths2[1] >= lengths2[2] ? 1 : 2);
-    if (lengths2[first] <= longestEdge * longestEdge) {
-        pieces.push_back(makePiece(c, first, triangle));
-        return;
-    }
-    const auto i = std::size_t(first), j = (i + 1) % 3, k = (i + 2) % 3;
+    const std::array<double, 3> lengths2{glm::dot(ab, ab), glm::dot(bc, bc), glm::dot(ca, ca)};
+    const auto longest = std::max_element(lengths2.begin(), lengths2.end());
+    if (*longest <= longestEdge2_) return add(c, triangle);
+    const auto i = std::size_t(longest - lengths2.begin()), j = (i + 1) % 3, k = (i + 2) % 3;
     const glm::dvec3 middle = 0.5 * (c[i] + c[j]);
-    cutTriangle({c[i], middle, c[k]}, triangle, longestEdge, limits, pieces);
-    cutTriangle({middle, c[j], c[k]}, triangle, longestEdge, limits, pieces);
+    for (const PieceCorners& half : {PieceCorners{c[i], middle, c[k]}, PieceCorners{middle, c[j], c[k]}})
+        if (!misses(half, limits)) cut(half, triangle, limits);
+}
+
+void PieceCutter::add(const PieceCorners& c, std::uint32_t triangle) {
+    const auto at = std::size_t(count_);
+    const glm::ivec3 base(roundToInt(c[0].x), roundToInt(c[0].y), roundToInt(c[0].z));
+    const glm::vec3 corner(c[0] - glm::dvec3(base)), ab(c[1] - c[0]), ac(c[2] - c[0]);
+    waiting_.base[at] = base;
+    waiting_.triangle[at] = triangle;
+    for (int axis = 0; axis < 3; ++axis) {
+        waiting_.corner[axis][at] = corner[axis];
+        waiting_.ab[axis][at] = ab[axis];
+        waiting_.ac[axis][at] = ac[axis];
+    }
+    if (++count_ == batch) finish();
+}
+
+void PieceCutter::finish() {
+    const std::size_t before = pieces_.size();
+    pieces_.resize(before + std::size_t(count_));
+    HWY_DYNAMIC_DISPATCH(makePieces)(waiting_, std::size_t(count_), pieces_.data() + before);
+    count_ = 0;
 }
 
 }  // namespace bilayer
+#endif  // HWY_ONCE

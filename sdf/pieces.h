@@ -34,10 +34,40 @@ struct PieceLimits {
     glm::dvec3 lower, upper;
 };
 
-/// Cuts a triangle into pieces with edges of at most `longestEdge` [voxels] by halving longest edges, and appends those
-/// whose box meets the limits. The pieces do not depend on the limits, and those of two triangles meet at the same
-/// points of a shared edge.
-void cutTriangle(const PieceCorners& corners, std::uint32_t triangle, double longestEdge, const PieceLimits& limits,
-                 std::vector<Piece>& pieces);
+/// Cuts triangles into pieces.
+class PieceCutter {
+  public:
+    /// @param longestEdge  no piece has a longer edge than this [voxels]
+    /// @param pieces       where they go
+    PieceCutter(double longestEdge, std::vector<Piece>& pieces)
+        : longestEdge2_(longestEdge * longestEdge), pieces_(pieces) {}
+
+    /// Cuts a triangle by halving longest edges, and leaves out pieces whose box misses the limits. Pieces do not
+    /// depend on the limits, and those of two triangles meet at the same points of a shared edge.
+    void cut(const PieceCorners& corners, std::uint32_t triangle, const PieceLimits& limits);
+
+    /// Finishes the pieces that are still waiting: call it after the last triangle.
+    void finish();
+
+    /// Pieces are made by SIMD, this many at a time.
+    static constexpr int batch = 16;
+
+    /// Pieces to be made: a lattice point, a corner as seen from it, the ways from there to the next corners.
+    struct Waiting {
+        std::array<glm::ivec3, batch> base;
+        std::array<std::uint32_t, batch> triangle;
+        alignas(64) float corner[3][batch];
+        alignas(64) float ab[3][batch];
+        alignas(64) float ac[3][batch];
+    };
+
+  private:
+    void add(const PieceCorners& corners, std::uint32_t triangle);
+
+    double longestEdge2_;
+    std::vector<Piece>& pieces_;
+    Waiting waiting_{};
+    int count_ = 0;
+};
 
 }  // namespace bilayer
