@@ -72,19 +72,41 @@ inline void forEachChunk(const glm::vec3& centre, float radius, Visit visit) {
     for (int c = firstFrom(centre.y - radius) * blockSide / chunkVoxels; c * chunkVoxels < end; ++c) visit(c, x0, x1);
 }
 
+// A number for each slice.
+struct Slices {
+    using Row = hn::CappedTag<float, blockSide>;
+    using RowVec = hn::Vec<Row>;
+
+    // make(x) for all slices at once, from x less `centre`
+    template <class Make>
+    Slices(float centre, Make make) {
+        const Row row;
+        for (std::size_t x = 0; x < std::size_t(blockSide); x += hn::Lanes(row))
+            hn::Store(make(hn::Sub(hn::Iota(row, float(x)), hn::Set(row, centre))), row, of + x);
+    }
+    static RowVec square(RowVec v) { return hn::Mul(v, v); }
+
+    HWY_ALIGN float of[blockSide];
+};
+
+inline Vec latticeY(int c) {
+    return hn::Load(Tag(), lattice.y + c * chunkVoxels);
+}
+
+inline Vec latticeZ(int c) {
+    return hn::Load(Tag(), lattice.z + c * chunkVoxels);
+}
+
 // Lowers squared distances to those to a sample.
 inline void applySample(const glm::vec3& sample, float reach, BlockDistances& block) {
     const Tag tag;
-    const Vec sy = hn::Set(tag, sample.y), sz = hn::Set(tag, sample.z);
+    const Slices px2(sample.x, Slices::square);
     forEachChunk(sample, reach, [&](int c, int x0, int x1) {
-        const Vec py = hn::Sub(hn::Load(tag, lattice.y + c * chunkVoxels), sy),
-                  pz = hn::Sub(hn::Load(tag, lattice.z + c * chunkVoxels), sz);
-        const Vec across2 = hn::Add(squareOf(py), squareOf(pz));
-        for (int x = x0; x <= x1; ++x) {
-            float* nearest2 = block.nearest2 + x * sliceVoxels + c * chunkVoxels;
-            const Vec distance2 = hn::Add(hn::Set(tag, square(float(x) - sample.x)), across2);
-            hn::Store(hn::Min(hn::Load(tag, nearest2), distance2), tag, nearest2);
-        }
+        const Vec across2 = hn::Add(squareOf(hn::Sub(latticeY(c), hn::Set(tag, sample.y))),
+                                    squareOf(hn::Sub(latticeZ(c), hn::Set(tag, sample.z))));
+        float* nearest2 = block.nearest2 + x0 * sliceVoxels + c * chunkVoxels;
+        for (int x = x0; x <= x1; ++x, nearest2 += sliceVoxels)
+            hn::Store(hn::Min(hn::Load(tag, nearest2), hn::Add(hn::Set(tag, px2.of[x]), across2)), tag, nearest2);
     });
 }
 
@@ -95,64 +117,120 @@ inline void applySample(const glm::vec3& sample, float reach, BlockDistances& bl
 class Drum {
   public:
     Drum(const glm::vec3& centre, float radius, const glm::vec3& normal, float thickness)
-        : centre_(centre), normal_(normal), thickness_(thickness + boundSlack), radius2_(square(radius + boundSlack)) {}
+        : centre_(centre),
+          normal_(normal),
+          thickness_(thickness + boundSlack),
+          radius2_(square(radius + boundSlack)),
+          px2_(centre.x, Slices::square),
+          height_(centre.x, [&](auto px) { return hn::Mul(px, hn::Set(Slices::Row(), normal.x)); }) {}
 
-    // Bits of the slices out of `among` whose chunk c has a voxel that the drum may be nearest to.
+    // Bits of the slices out of x0 .. x1 whose chunk c has a voxel that the drum may be nearest to.
     template <bool thick>
+    inline unsigned near(int c, int x0, int x1, const BlockDistances& block) const {
+        const Column column(*this, c);
+        const float* bound2 = block.nearest2 + x0 * sliceVoxels + c * chunkVoxels;
+        unsigned near = 0;
+        for (int x = x0; x <= x1; ++x, bound2 += sliceVoxels)
+            near |= unsigned(mayBeNearest<thick>(column, x, bound2)) << x;
+        return near;
+    }
+
+    // The same out of some slices.
     inline unsigned near(int c, unsigned among, const BlockDistances& block) const {
-        const Tag tag;
-        const Vec py = hn::Sub(hn::Load(tag, lattice.y + c * chunkVoxels), hn::Set(tag, centre_.y)),
-                  pz = hn::Sub(hn::Load(tag, lattice.z + c * chunkVoxels), hn::Set(tag, centre_.z));
-        const Vec acrossLess = hn::Sub(hn::Add(squareOf(py), squareOf(pz)), hn::Set(tag, radius2_));
-        const Vec acrossH = hn::Add(hn::Mul(py, hn::Set(tag, normal_.y)), hn::Mul(pz, hn::Set(tag, normal_.z)));
-        const Vec fourRadius2 = hn::Set(tag, 4 * radius2_), slack = hn::Set(tag, boundSlack);
+        const Column column(*this, c);
         unsigned near = 0;
         for (; among != 0; among &= among - 1) {
             const int x = std::countr_zero(among);
-            const float px = float(x) - centre_.x;
-            const Vec bound2 = hn::Load(tag, block.nearest2 + x * sliceVoxels + c * chunkVoxels);
-            const Vec h = hn::Add(hn::Set(tag, px * normal_.x), acrossH);
-            Vec excess = hn::Sub(hn::Add(hn::Set(tag, px * px), acrossLess), bound2);
-            Vec g2 = squareOf(h);
-            if constexpr (thick) {
-                const Vec h2 = g2;
-                g2 = squareOf(hn::Max(hn::Sub(hn::Abs(h), hn::Set(tag, thickness_)), hn::Zero(tag)));
-                excess = hn::Add(excess, hn::Sub(g2, h2));
-            }
-            const Mask may =
-                hn::Le(hn::Mul(excess, hn::Abs(excess)), hn::Add(hn::Mul(fourRadius2, hn::Sub(bound2, g2)), slack));
-            near |= unsigned(!hn::AllFalse(tag, may)) << x;
+            const bool may = mayBeNearest<false>(column, x, block.nearest2 + x * sliceVoxels + c * chunkVoxels);
+            near |= unsigned(may) << x;
         }
         return near;
     }
 
   private:
+    // What all chunks of a column have in common.
+    struct Column {
+        Column(const Drum& drum, int c) {
+            const Tag tag;
+            const Vec py = hn::Sub(latticeY(c), hn::Set(tag, drum.centre_.y)),
+                      pz = hn::Sub(latticeZ(c), hn::Set(tag, drum.centre_.z));
+            excess = hn::Sub(hn::Add(squareOf(py), squareOf(pz)), hn::Set(tag, drum.radius2_));
+            height = hn::Add(hn::Mul(py, hn::Set(tag, drum.normal_.y)), hn::Mul(pz, hn::Set(tag, drum.normal_.z)));
+            fourRadius2 = hn::Set(tag, 4 * drum.radius2_);
+        }
+        Vec excess, height, fourRadius2;
+    };
+
+    template <bool thick>
+    inline bool mayBeNearest(const Column& column, int x, const float* bounds2) const {
+        const Tag tag;
+        const Vec bound2 = hn::Load(tag, bounds2);
+        const Vec h = hn::Add(hn::Set(tag, height_.of[x]), column.height);
+        Vec excess = hn::Sub(hn::Add(hn::Set(tag, px2_.of[x]), column.excess), bound2), g2 = squareOf(h);
+        if constexpr (thick) {
+            const Vec h2 = g2;
+            g2 = squareOf(hn::Max(hn::Sub(hn::Abs(h), hn::Set(tag, thickness_)), hn::Zero(tag)));
+            excess = hn::Add(excess, hn::Sub(g2, h2));
+        }
+        const Vec limit = hn::Add(hn::Mul(column.fourRadius2, hn::Sub(bound2, g2)), hn::Set(tag, boundSlack));
+        return !hn::AllFalse(tag, hn::Le(hn::Mul(excess, hn::Abs(excess)), limit));
+    }
+
     glm::vec3 centre_, normal_;
     float thickness_, radius2_;
+    Slices px2_, height_;
 };
 
 // A piece seen from a block.
 class SeenPiece {
   public:
     SeenPiece(const Piece& piece, std::uint32_t number, const glm::ivec3& block)
-        : piece_(piece), code_(std::int32_t(number << sideBits)), shift_(block - piece.base) {}
+        : piece_(piece),
+          code_(std::int32_t(number << sideBits)),
+          shift_(block - piece.base),
+          u_(along(piece.u.x)),
+          w_(along(piece.w.x)),
+          n_(along(piece.n.x)) {}
 
-    // Lowers the distances of a chunk to those to the piece. Lattice coordinates are exact in floats, so each voxel
-    // gets the same bytes whichever block it is asked in.
-    inline void apply(int x, int c, BlockDistances& block) const {
+    // Lowers the distances in some slices of chunk c to those to the piece. Lattice coordinates are exact in floats, so
+    // each voxel gets the same bytes whichever block it is asked in.
+    inline void apply(int c, unsigned slices, BlockDistances& block) const {
+        const Tag tag;
+        const auto place = [&](Vec lattice, int shift, float origin) {
+            return hn::Sub(hn::Add(lattice, hn::Set(tag, float(shift))), hn::Set(tag, origin));
+        };
+        const Vec py = place(latticeY(c), shift_.y, piece_.origin.y),
+                  pz = place(latticeZ(c), shift_.z, piece_.origin.z);
+        const auto across = [&](const glm::vec3& axis) {
+            return hn::Add(hn::Mul(py, hn::Set(tag, axis.y)), hn::Mul(pz, hn::Set(tag, axis.z)));
+        };
+        const Vec u = across(piece_.u), w = across(piece_.w), n = across(piece_.n);
+        for (; slices != 0; slices &= slices - 1) {
+            const int x = std::countr_zero(slices);
+            const auto at = [&](const Slices& along, Vec across) { return hn::Add(hn::Set(tag, along.of[x]), across); };
+            lower(at(u_, u), at(w_, w), at(n_, n), x * sliceVoxels + c * chunkVoxels, block);
+        }
+    }
+
+  private:
+    // The part of a coordinate along an axis that follows from x.
+    Slices along(float axis) const {
+        const Slices::Row row;
+        // the shift is added first: it and x are whole, and their sum is exact
+        Slices part(-float(shift_.x),
+                    [&](auto x) { return hn::Mul(hn::Sub(x, hn::Set(row, piece_.origin.x)), hn::Set(row, axis)); });
+        return part;
+    }
+
+    // How far a coordinate along an edge lies beyond its ends.
+    static Vec beyond(Vec along, float length) {
+        const Tag tag;
+        return hn::Sub(along, hn::Min(hn::Max(along, hn::Zero(tag)), hn::Set(tag, length)));
+    }
+
+    inline void lower(Vec u, Vec w, Vec n, int voxel, BlockDistances& block) const {
         const Tag tag;
         const Piece& t = piece_;
-        const float px = float(x + shift_.x) - t.origin.x;
-        const auto place = [&](const float* along, int shift, float origin) {
-            return hn::Sub(hn::Add(hn::Load(tag, along + c * chunkVoxels), hn::Set(tag, float(shift))),
-                           hn::Set(tag, origin));
-        };
-        const Vec py = place(lattice.y, shift_.y, t.origin.y), pz = place(lattice.z, shift_.z, t.origin.z);
-        const auto coordinate = [&](const glm::vec3& axis) {
-            return hn::Add(hn::Add(hn::Set(tag, px * axis.x), hn::Mul(py, hn::Set(tag, axis.y))),
-                           hn::Mul(pz, hn::Set(tag, axis.z)));
-        };
-        const Vec u = coordinate(t.u), w = coordinate(t.w), n = coordinate(t.n);
         const Vec base2 = hn::Add(squareOf(beyond(u, t.length)), squareOf(w));
         // the edges from both ends of the longest one to the third corner
         const Vec ox = hn::Set(tag, t.ox), oy = hn::Set(tag, t.oy), ex = hn::Set(tag, t.ex), ey = hn::Set(tag, t.ey);
@@ -164,15 +242,7 @@ class SeenPiece {
         const Vec zero = hn::Zero(tag), n2 = squareOf(n);
         const Mask above = hn::And(hn::And(hn::Ge(w, zero), hn::Le(leftOf, zero)), hn::Ge(rightOf, zero));
         const Vec distance2 = hn::Add(n2, hn::IfThenZeroElse(above, hn::Min(base2, hn::Min(left2, right2))));
-        store(distance2, n, hn::And(above, hn::Gt(n2, hn::Set(tag, square(leastHeight)))),
-              x * sliceVoxels + c * chunkVoxels, block);
-    }
-
-  private:
-    // How far a coordinate along an edge lies beyond its ends.
-    static Vec beyond(Vec along, float length) {
-        const Tag tag;
-        return hn::Sub(along, hn::Min(hn::Max(along, hn::Zero(tag)), hn::Set(tag, length)));
+        store(distance2, n, hn::And(above, hn::Gt(n2, hn::Set(tag, square(leastHeight)))), voxel, block);
     }
 
     // Keeps the smaller distances, and whose they are; over a face its normal tells the side.
@@ -191,6 +261,7 @@ class SeenPiece {
     const Piece& piece_;
     std::int32_t code_;
     glm::ivec3 shift_;
+    Slices u_, w_, n_;
 };
 
 // First bounds: the distances to the samples, a little raised so that a piece's own distance wins over its sample's.
@@ -209,17 +280,30 @@ void applySamples(const BlockInput& input, BlockDistances& block) {
     }
 }
 
-// Asks the members of a cluster that come near the slices `near` of chunk c.
-inline void askMembers(const BlockInput& input, const Cluster& cluster, int c, unsigned near, BlockDistances& block) {
-    const bool alone = cluster.end - cluster.begin == 1;
+// Slices of the chunks near a cluster, a bit each.
+struct NearChunks {
+    int first, last;
+    unsigned slices[sliceVoxels / chunkVoxels];
+};
+
+// Asks the members of a cluster that come near its chunks.
+inline void askMembers(const BlockInput& input, const Cluster& cluster, const NearChunks& near, BlockDistances& block) {
+    if (cluster.end - cluster.begin == 1) {
+        const std::uint32_t number = input.members[cluster.begin].piece;
+        const SeenPiece piece(input.pieces[number], number, input.origin);
+        for (int c = near.first; c <= near.last; ++c) piece.apply(c, near.slices[c], block);
+        return;
+    }
     for (std::uint32_t m = cluster.begin; m < cluster.end; ++m) {
         const Member& member = input.members[m];
-        unsigned ask = near;
-        if (!alone)
-            ask = Drum(member.sample - input.inBrick, member.radius, member.normal, 0).near<false>(c, near, block);
-        if (ask == 0) continue;
+        const Drum drum(member.sample - input.inBrick, member.radius, member.normal, 0);
+        NearChunks ask{near.first, near.last, {}};
+        unsigned any = 0;
+        for (int c = near.first; c <= near.last; ++c) any |= ask.slices[c] = drum.near(c, near.slices[c], block);
+        if (any == 0) continue;
         const SeenPiece piece(input.pieces[member.piece], member.piece, input.origin);
-        for (; ask != 0; ask &= ask - 1) piece.apply(std::countr_zero(ask), c, block);
+        for (int c = near.first; c <= near.last; ++c)
+            if (ask.slices[c] != 0) piece.apply(c, ask.slices[c], block);
     }
 }
 
@@ -228,12 +312,15 @@ void askPieces(const BlockInput& input, BlockDistances& block) {
         const Cluster& cluster = input.clusters[index];
         const glm::vec3 sample = cluster.sample - input.inBrick;
         const Drum drum(sample, cluster.radius, cluster.normal, cluster.thickness);
+        NearChunks near{sliceVoxels, -1, {}};
         forEachChunk(sample, input.reach + cluster.radius, [&](int c, int x0, int x1) {
-            const unsigned slices = (2u << x1) - (1u << x0);
-            const unsigned near =
-                cluster.thickness > 0 ? drum.near<true>(c, slices, block) : drum.near<false>(c, slices, block);
-            if (near != 0) askMembers(input, cluster, c, near, block);
+            near.slices[c] =
+                cluster.thickness > 0 ? drum.near<true>(c, x0, x1, block) : drum.near<false>(c, x0, x1, block);
+            if (near.slices[c] == 0) return;
+            near.first = std::min(near.first, c);
+            near.last = c;
         });
+        if (near.first <= near.last) askMembers(input, cluster, near, block);
     }
 }
 
