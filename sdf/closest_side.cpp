@@ -15,7 +15,7 @@ constexpr double samePlace = 1e-7;
 /// A height below this part of the longest edge leaves no foot on the plane that is better than the edges.
 constexpr double flatness = 1e-10;
 /// Sums of unit normals below this part of their weights have cancelled out.
-constexpr double cancelled = 1e-9;
+constexpr double cancelled = 1e-5;
 constexpr double wholeTurn = 2 * glm::pi<double>();
 
 glm::dvec3 closestOnSegment(const glm::dvec3& a, const glm::dvec3& b) {
@@ -77,14 +77,10 @@ glm::dvec3 closestToOrigin(const std::array<glm::dvec3, 3>& c) {
     return best;
 }
 
-Side ClosestSide::begin(const glm::dvec3& point, std::uint32_t nearest) {
+void ClosestSide::begin(const glm::dvec3& point) {
     point_ = point;
     distance_ = std::numeric_limits<double>::infinity();
     faces_.clear();
-    offer(nearest);
-    const Face& face = faces_.front();
-    const bool inside = angleAt(face.corners, face.closest) == wholeTurn && hasNormal(face.corners);
-    return inside ? side() : Side::undecided;
 }
 
 void ClosestSide::offer(std::uint32_t triangle) {

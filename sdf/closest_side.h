@@ -17,17 +17,15 @@ namespace bilayer {
 /// What the closest feature says of a point.
 enum class Side { outside, inside, undecided };
 
-/// Finds the side of one point. Offer the triangle that is thought nearest first; if that alone does not decide, offer
-/// every triangle that may be as near, in any order and more than once if need be.
+/// Finds the side of one point: offer every triangle that may be nearest, in any order and more than once if need be.
 class ClosestSide {
   public:
     ClosestSide(const Mesh& mesh, double voxelsPerUnit) : mesh_(mesh), voxelsPerUnit_(voxelsPerUnit) {}
 
-    /// Begins with a point [voxels] and the triangle nearest to it. `undecided` if the closest point lies on an edge or
-    /// a corner, or if the triangle has no area.
-    Side begin(const glm::dvec3& point, std::uint32_t nearest);
+    /// Begins with a point [voxels].
+    void begin(const glm::dvec3& point);
 
-    /// Adds another triangle that may be as near.
+    /// Adds a triangle.
     void offer(std::uint32_t triangle);
 
     /// The side by all triangles offered; `undecided` where the normals at the closest point cancel out.

@@ -157,8 +157,8 @@ class BrickFiller {
     bool isInside(int voxel) {
         const glm::ivec3 local(voxel / 64, voxel / 8 % 8, voxel % 8);
         const auto nearest = std::size_t(found_.nearest[voxel] >> sideBits);
-        const Side first = side_.begin(glm::dvec3(block_ + local), s_.pieces[nearest].triangle);
-        if (first != Side::undecided) return first == Side::inside;
+        side_.begin(glm::dvec3(block_ + local));
+        side_.offer(s_.pieces[nearest].triangle);
         const float distance = float(side_.distance()) + sideSlack;
         const glm::vec3 at(local + inBrick_);
         const auto near = [&](const glm::vec3& sample, float radius) {

@@ -24,6 +24,13 @@ using Mask = hn::Mask<Tag>;
 /// What a distance computed in floats may be off by, with room to spare: pieces this much too far are still asked, so
 /// that which distance wins never depends on the order [voxels].
 constexpr float boundSlack = 1e-4f;
+/// Squared distances that differ by less than this part may be equal.
+constexpr float tieSlack = 1e-5f;
+/// Bounds by samples are raised by this part and this much, so that a piece's own distance wins over its sample's
+/// although the two are rounded differently: by 2e-5 voxels at least.
+constexpr float raisedPart = 1e-3f, raisedBy = 5e-7f;  // [voxels^2]
+/// Rounding of squared heights, with room to spare [voxels^2].
+constexpr float heightSlack = 1e-3f;
 /// Nearer to a face than this its side is left to a closer look [voxels].
 constexpr float leastHeight = 1e-3f;
 /// Voxels farther from the surface than this are asked first for their side, then those beyond the next [voxels].
@@ -172,7 +179,7 @@ class Drum {
             g2 = squareOf(hn::Max(hn::Sub(hn::Abs(h), hn::Set(tag, thickness_)), hn::Zero(tag)));
             excess = hn::Add(excess, hn::Sub(g2, h2));
         }
-        const Vec limit = hn::Add(hn::Mul(column.fourRadius2, hn::Sub(bound2, g2)), hn::Set(tag, boundSlack));
+        const Vec limit = hn::Mul(column.fourRadius2, hn::Add(hn::Sub(bound2, g2), hn::Set(tag, heightSlack)));
         return !hn::AllFalse(tag, hn::Le(hn::Mul(excess, hn::Abs(excess)), limit));
     }
 
@@ -240,22 +247,27 @@ class SeenPiece {
         const Vec right2 =
             hn::Add(squareOf(beyond(hn::Add(hn::Mul(v, ex), hn::Mul(w, ey)), t.elen)), squareOf(rightOf));
         const Vec zero = hn::Zero(tag), n2 = squareOf(n);
-        const Mask above = hn::And(hn::And(hn::Ge(w, zero), hn::Le(leftOf, zero)), hn::Ge(rightOf, zero));
+        const Mask above = hn::And(hn::And(hn::Gt(w, zero), hn::Le(leftOf, zero)), hn::Ge(rightOf, zero));
         const Vec distance2 = hn::Add(n2, hn::IfThenZeroElse(above, hn::Min(base2, hn::Min(left2, right2))));
         store(distance2, n, hn::And(above, hn::Gt(n2, hn::Set(tag, square(leastHeight)))), voxel, block);
     }
 
-    // Keeps the smaller distances, and whose they are; over a face its normal tells the side.
+    // Keeps the smaller distances, and whose they are. Over a face its normal tells the side, unless two pieces are as
+    // near as floats can tell and say different things.
     inline void store(Vec distance2, Vec height, Mask overFace, int voxel, BlockDistances& block) const {
         const Tag tag;
         const IntTag intTag;
-        const Vec old = hn::Load(tag, block.nearest2 + voxel);
-        const auto wins = hn::RebindMask(intTag, hn::Lt(distance2, old));
+        const Vec old2 = hn::Load(tag, block.nearest2 + voxel), nearest2 = hn::Min(distance2, old2);
+        const auto old = hn::Load(intTag, block.nearest + voxel), sides = hn::Set(intTag, (1 << sideBits) - 1);
         const auto side = hn::IfThenElse(hn::RebindMask(intTag, hn::Gt(height, hn::Zero(tag))),
                                          hn::Set(intTag, code_ + sideOutside), hn::Set(intTag, code_ + sideInside));
         const auto code = hn::IfThenElse(hn::RebindMask(intTag, overFace), side, hn::Set(intTag, code_));
-        hn::Store(hn::Min(distance2, old), tag, block.nearest2 + voxel);
-        hn::Store(hn::IfThenElse(wins, code, hn::Load(intTag, block.nearest + voxel)), intTag, block.nearest + voxel);
+        const auto winner = hn::IfThenElse(hn::RebindMask(intTag, hn::Lt(distance2, old2)), code, old);
+        const Vec difference = hn::Sub(hn::Max(distance2, old2), nearest2);
+        const Mask tied = hn::Le(difference, hn::Mul(nearest2, hn::Set(tag, tieSlack)));
+        const auto agreed = hn::Or(hn::AndNot(sides, winner), hn::And(hn::And(code, old), sides));
+        hn::Store(nearest2, tag, block.nearest2 + voxel);
+        hn::Store(hn::IfThenElse(hn::RebindMask(intTag, tied), agreed, winner), intTag, block.nearest + voxel);
     }
 
     const Piece& piece_;
@@ -273,8 +285,8 @@ void applySamples(const BlockInput& input, BlockDistances& block) {
     for (const std::uint32_t index : input.reaching)
         applySample(input.clusters[index].sample - input.inBrick, input.reach, block);
     for (int i = 0; i < blockVoxels; i += chunkVoxels) {
-        const Vec raised = hn::Add(hn::Mul(hn::Load(tag, block.nearest2 + i), hn::Set(tag, 1 + boundSlack)),
-                                   hn::Set(tag, square(boundSlack)));
+        const Vec raised =
+            hn::Add(hn::Mul(hn::Load(tag, block.nearest2 + i), hn::Set(tag, 1 + raisedPart)), hn::Set(tag, raisedBy));
         hn::Store(hn::Min(raised, reach2), tag, block.nearest2 + i);
         hn::Store(hn::Set(intTag, -1), intTag, block.nearest + i);
     }

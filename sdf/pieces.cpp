@@ -103,13 +103,15 @@ inline void makeColumns(const PieceCutter::Waiting& waiting, std::size_t i, Colu
     const Vec size = hn::Sqrt(dot(edge, edge));
     const Vec3 u =
         select(hn::Gt(size, hn::Zero(tag)), inverse(size) * edge, {hn::Set(tag, 1.f), hn::Zero(tag), hn::Zero(tag)});
-    const Vec along = dot(third, u);
+    const Vec along = hn::Min(hn::Max(dot(third, u), hn::Zero(tag)), size);
     const Vec3 rest = third - along * u;
-    const Vec height = hn::Sqrt(dot(rest, rest));
-    // once more across u: the rest of a flat piece is mostly rounding
+    Vec height = hn::Sqrt(dot(rest, rest));
+    // once more across u, because the rest of a flat piece is mostly rounding; if nothing remains then, all of it was
     const Vec3 rough = inverse(height) * rest, way = rough - dot(rough, u) * u;
-    const Mask flat = hn::Le(height, hn::Set(tag, flatHeight));
-    const Vec3 w = select(flat, across(u), inverse(hn::Sqrt(dot(way, way))) * way);
+    const Vec wayLength = hn::Sqrt(dot(way, way));
+    const Mask flat = hn::Or(hn::Le(height, hn::Set(tag, flatHeight)), hn::Lt(wayLength, hn::Set(tag, 0.5f)));
+    const Vec3 w = select(flat, across(u), inverse(wayLength) * way);
+    height = hn::IfThenZeroElse(flat, height);
     columns.put(Row::origin, i, begin);
     columns.put(Row::axisU, i, u);
     columns.put(Row::axisW, i, w);
