@@ -180,7 +180,7 @@ struct Options {
     std::string method = "exact", markdownFile;
     std::size_t samples = 200000;
     unsigned seed = 1;
-    bool json = false, alone = false;
+    bool json = false, alone = false, unsignedOnly = false;
 };
 
 std::vector<Case> cases(const Options& options) {
@@ -212,6 +212,7 @@ class Run {
   private:
     void judge(const std::string& name, const Mesh& mesh, const test::Truth& truth, const Case& c) {
         const float voxelSize = voxelSizeFor(mesh, c.resolution);
+        const auto signs = options_.unsignedOnly ? test::Signs::ignored : test::Signs::judged;
         std::vector<test::TrueVoxel> voxels;
         for (const Builder& builder : builders_) {
             const bool tested = &builder == &builders_.front();
@@ -220,7 +221,8 @@ class Run {
             if (tested)
                 voxels = test::trueVoxels(
                     truth, test::chooseVoxels(*grid, mesh, c.band, options_.samples, options_.seed), voxelSize);
-            rows_.push_back({name, c.name(), builder.name, mesh.triangles.size(), test::judge(*grid, c.band, voxels)});
+            rows_.push_back(
+                {name, c.name(), builder.name, mesh.triangles.size(), test::judge(*grid, c.band, voxels, signs)});
             report(rows_.back(), tested);
         }
     }
@@ -254,6 +256,8 @@ int run(int argc, char** argv) {
     app.add_option("--seed", options.seed, "of the choice of voxels")->capture_default_str();
     app.add_option("--markdown", options.markdownFile, "also write the tables to this file");
     app.add_flag("--json", options.json, "print one JSON array and nothing else");
+    app.add_flag("--unsigned", options.unsignedOnly,
+                 "judge distances and the band only: for meshes that bound no solid, with equal widths");
     app.add_flag("--alone", options.alone, "without the peers");
     CLI11_PARSE(app, argc, argv);
 

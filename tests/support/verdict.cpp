@@ -208,14 +208,19 @@ std::vector<TrueVoxel> trueVoxels(const Truth& truth, const std::vector<openvdb:
     return result;
 }
 
-Verdict judge(const openvdb::FloatGrid& grid, const Band& band, const std::vector<TrueVoxel>& voxels) {
+Verdict judge(const openvdb::FloatGrid& grid, const Band& band, const std::vector<TrueVoxel>& voxels, Signs signs) {
     const auto values = grid.getConstAccessor();
     const double h = grid.voxelSize()[0];
     Verdict verdict;
     for (const TrueVoxel& voxel : voxels) {
         float value = 0;
         const bool active = values.probeValue(voxel.at, value);
-        judgeVoxel(verdict, band, {Fault::distance, voxel.at, double(value) / h, voxel.distance, active});
+        Witness witness{Fault::distance, voxel.at, double(value) / h, voxel.distance, active};
+        if (signs == Signs::ignored) {
+            witness.value = std::abs(witness.value);
+            witness.truth = std::abs(witness.truth);
+        }
+        judgeVoxel(verdict, band, witness);
     }
     return verdict;
 }

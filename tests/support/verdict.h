@@ -66,7 +66,11 @@ std::vector<openvdb::Coord> chooseVoxels(const openvdb::FloatGrid& grid, const M
 /// The true distances at voxels, on all threads of the current arena.
 std::vector<TrueVoxel> trueVoxels(const Truth& truth, const std::vector<openvdb::Coord>& voxels, double voxelSize);
 
-/// Judges a field at voxels.
-Verdict judge(const openvdb::FloatGrid& grid, const Band& band, const std::vector<TrueVoxel>& voxels);
+/// Whether signs count: they mean something only where the mesh bounds a solid.
+enum class Signs { judged, ignored };
+
+/// Judges a field at voxels. Where signs are ignored the band's widths must be equal.
+Verdict judge(const openvdb::FloatGrid& grid, const Band& band, const std::vector<TrueVoxel>& voxels,
+              Signs signs = Signs::judged);
 
 }  // namespace bilayer::test
