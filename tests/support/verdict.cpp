@@ -14,9 +14,7 @@ namespace {
 
 constexpr double farFromSurface = 0.1;    // voxels: what Verdict::wrongFar counts from
 constexpr std::size_t mostWitnesses = 3;  // of a kind of fault: enough to see what is wrong
-constexpr std::size_t drawsPerActive =
-    64;                     // thin bands fill leaves sparsely; more draws only where almost none is active
-constexpr int margin = 10;  // voxels beyond the band: one leaf and a little
+constexpr int margin = 10;                // voxels beyond the band: one leaf and a little
 
 using Random = std::mt19937_64;
 
@@ -64,7 +62,8 @@ class Chooser {
             for (auto at = box_.begin(); at; ++at) chosen_.push_back(*at);
             return std::move(chosen_);
         }
-        drawFromLeaves(count);
+        drawActive(count);
+        drawInactive(count / 4);
         drawNearBorders(count / 4);
         for (std::size_t i = 0; i < count / 4; ++i) chosen_.push_back(randomIn(box_, random_));
         std::sort(chosen_.begin(), chosen_.end());
@@ -73,22 +72,29 @@ class Chooser {
     }
 
   private:
-    // `count` active voxels, a quarter as many inactive ones beside them in the leaves, and a quarter just beyond.
-    void drawFromLeaves(std::size_t count) {
+    // `count` active voxels, or all where there are fewer, and for every fourth one that lies just beyond the band.
+    void drawActive(std::size_t count) {
+        const double part = double(count) / double(grid_.activeVoxelCount());
+        for (auto voxel = grid_.cbeginValueOn(); voxel; ++voxel)
+            if (part >= 1 || uniform(random_, 0, 1) < part) {
+                chosen_.push_back(voxel.getCoord());
+                if (random_() % 4 == 0) chosen_.push_back(beyondBand(voxel.getCoord()));
+            }
+    }
+
+    // Inactive voxels among the active ones; fewer where almost none is inactive.
+    void drawInactive(std::size_t count) {
         std::vector<const openvdb::FloatTree::LeafNodeType*> leaves;
         grid_.tree().getNodes(leaves);
         if (leaves.empty()) return;
         std::uniform_int_distribution<std::size_t> anyLeaf(0, leaves.size() - 1);
         std::uniform_int_distribution<openvdb::Index> anyVoxel(0, openvdb::FloatTree::LeafNodeType::SIZE - 1);
-        std::size_t active = 0, inactive = 0;
-        for (std::size_t draw = 0; draw < drawsPerActive * count && active < count; ++draw) {
+        for (std::size_t draw = 0; draw < 4 * count && count > 0; ++draw) {
             const auto& leaf = *leaves[anyLeaf(random_)];
             const openvdb::Index voxel = anyVoxel(random_);
-            const bool on = leaf.isValueOn(voxel);
-            if (!on && inactive >= count / 4) continue;
-            ++(on ? active : inactive);
+            if (leaf.isValueOn(voxel)) continue;
             chosen_.push_back(leaf.offsetToGlobalCoord(voxel));
-            if (on && active % 4 == 0) chosen_.push_back(beyondBand(chosen_.back()));
+            --count;
         }
     }
 
