@@ -124,19 +124,48 @@ std::vector<Row> totals(const std::vector<Row>& rows) {
     return sums;
 }
 
-std::string markdown(const std::vector<Row>& rows) {
+std::string totalsTable(const std::vector<Row>& sums) {
     std::string text =
-        "| mesh | triangles | voxels, band | builder | checked | active | worst error [voxels] | inexact | wrong sign "
-        "| "
-        "> 0.1 voxel away | wrong background | missing | extra "
-        "|\n|---|---|---|---|---|---|---|---|---|---|---|---|---|\n";
-    for (const Row& row : rows) {
-        const test::Verdict& v = row.verdict;
-        text += fmt::format("| {} | {} | {} | {} | {} | {} | {:.1e} | {} | {} | {} | {} | {} | {} |\n", row.mesh,
-                            row.triangles, row.grid, row.builder, v.checked, v.active, v.worst, v.inexact, v.wrong,
-                            v.wrongFar, v.wrongBackground, v.missing, v.extra);
+        "| voxels along the longest side, band | builder | exact meshes | voxels checked | active | worst error "
+        "[voxels] | off by > 1e-4 | wrong sign | of these > 0.1 voxel away | wrong background | missing | extra |\n"
+        "|---|---|---|---|---|---|---|---|---|---|---|---|\n";
+    for (const Row& sum : sums) {
+        const test::Verdict& v = sum.verdict;
+        text += fmt::format("| {} | {} | {} | {} | {} | {:.1e} | {} | {} | {} | {} | {} | {} |\n", sum.grid,
+                            sum.builder, sum.mesh, v.checked, v.active, v.worst, v.inexact, v.wrong, v.wrongFar,
+                            v.wrongBackground, v.missing, v.extra);
     }
     return text;
+}
+
+// The builders beside each other, a line a mesh, for the cases that all of them met.
+std::string meshTable(const std::vector<Row>& rows, const std::vector<Builder>& builders) {
+    std::string text = "| mesh | triangles | voxels, band |", rule = "|---|---|---|";
+    for (const Builder& builder : builders) {
+        text += fmt::format(" {} |", builder.name);
+        rule += "---|";
+    }
+    text += "\n" + rule + "\n";
+    for (std::size_t i = 0; i + builders.size() <= rows.size(); ++i) {
+        // a case that all met stands in the rows as one run of builders
+        const Row &first = rows[i], &last = rows[i + builders.size() - 1];
+        if (first.builder != builders.front().name || last.mesh != first.mesh || last.grid != first.grid) continue;
+        text += fmt::format("| {} | {} | {} |", first.mesh, first.triangles, first.grid);
+        for (std::size_t b = 0; b < builders.size(); ++b) {
+            const test::Verdict& v = rows[i + b].verdict;
+            text += fmt::format(" {:.1e}; {} ({}); {}; {}, {} |", v.worst, v.wrong, v.wrongFar, v.wrongBackground,
+                                v.missing, v.extra);
+        }
+        text += "\n";
+    }
+    return text;
+}
+
+std::string markdown(const std::vector<Row>& rows, const std::vector<Builder>& builders) {
+    return totalsTable(totals(rows)) +
+           "\nFor each builder: worst error [voxels]; wrong signs in the band (of these more than 0.1 voxel from the "
+           "surface); wrong signs in the background; voxels missing, voxels too many.\n\n" +
+           meshTable(rows, builders);
 }
 
 nlohmann::json json(const std::vector<Row>& rows) {
@@ -206,6 +235,7 @@ class Run {
         for (const Case& c : cases(options_)) judge(name, mesh, truth, c);
     }
 
+    const std::vector<Builder>& builders() const { return builders_; }
     const std::vector<Row>& rows() const { return rows_; }
     bool exact() const { return exact_; }
 
@@ -276,8 +306,7 @@ int run(int argc, char** argv) {
         printHeader();
         for (const Row& row : sums) print(row);
     }
-    if (!options.markdownFile.empty())
-        std::ofstream(options.markdownFile) << markdown(sums) << "\n" << markdown(run.rows());
+    if (!options.markdownFile.empty()) std::ofstream(options.markdownFile) << markdown(run.rows(), run.builders());
     return run.exact() ? 0 : 1;
 }
 

@@ -4,6 +4,7 @@
 #include <oneapi/tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/gtc/constants.hpp>
@@ -64,7 +65,7 @@ class Chooser {
         }
         drawActive(count);
         drawInactive(count / 4);
-        drawNearBorders(count / 4);
+        drawNearTriangles(count / 4);
         for (std::size_t i = 0; i < count / 4; ++i) chosen_.push_back(randomIn(box_, random_));
         std::sort(chosen_.begin(), chosen_.end());
         chosen_.erase(std::unique(chosen_.begin(), chosen_.end()), chosen_.end());
@@ -106,8 +107,9 @@ class Chooser {
         return at;
     }
 
-    // Voxels about a band's width away from points of the surface.
-    void drawNearBorders(std::size_t count) {
+    // Voxels about a band's width away from points of the surface, and voxels next to it; as many at each triangle,
+    // for where triangles are small the shape is intricate.
+    void drawNearTriangles(std::size_t count) {
         std::uniform_int_distribution<std::size_t> anyTriangle(0, mesh_.triangles.size() - 1);
         for (std::size_t i = 0; i < count; ++i) {
             const glm::uvec3 t = mesh_.triangles[anyTriangle(random_)];
@@ -116,7 +118,7 @@ class Chooser {
             const glm::dvec3 normal = glm::cross(b - a, c - a);
             const bool straight = i % 2 == 0 && glm::length(normal) > 0;
             const glm::dvec3 direction = straight ? glm::normalize(normal) : randomDirection(random_);
-            const double side = i % 4 < 2 ? band_.exterior : -band_.interior;
+            const double side = std::array{band_.exterior, -band_.interior, 0.0}[i % 3];
             const glm::dvec3 p =
                 ((1 - u) * a + u * (1 - v) * b + u * v * c) / h_ + (side + uniform(random_, -1.5, 1.5)) * direction;
             chosen_.push_back(openvdb::Coord::round(openvdb::Vec3d(p.x, p.y, p.z)));

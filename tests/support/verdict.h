@@ -59,7 +59,7 @@ struct Verdict {
 
 /// Chooses voxels to judge a field of a mesh at: all voxels in and around the mesh's box where these are no more than
 /// `count`. Else about 2 * `count` of them at random: `count` active ones, and others in the leaves, next to the band,
-/// near the band's true borders, and anywhere in the box.
+/// near the band's true borders, at small triangles, and anywhere in the box.
 std::vector<openvdb::Coord> chooseVoxels(const openvdb::FloatGrid& grid, const Mesh& mesh, const Band& band,
                                          std::size_t count, unsigned seed);
 
