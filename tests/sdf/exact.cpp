@@ -356,7 +356,7 @@ TEST_CASE("exact: far from the origin, and smaller than a voxel") {
     checkExact(weld(moved(shapes::box({0.5f, 0.25f, 0.125f}), {-1e4f, 1e4f, 1e4f})), 0.01f, {5, 2}, seed);
     for (int i = 0; i < 5; ++i) {
         const Mesh tiny = anyPose(shapes::sphere(0.4f * std::pow(0.1f, float(i)), 2), random);
-        checkExact(tiny, 1, anyBand(random), seed);
+        checkExact(tiny, 1, {double(1 + i), 1}, seed);  // narrower bands may meet no voxel at all
     }
 }
 
