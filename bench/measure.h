@@ -43,7 +43,7 @@ struct Footprint {
 /// Builds in a child process, so that no builder finds memory that another one left, or a heap that it has broken up.
 /// Repeats until `repetitions` builds are done or `seconds` are spent, at least once.
 /// @param make  makes the scene, in the child
-/// Throws std::logic_error if this process already runs several threads: they would be missing from the child, and what
+/// Throws std::logic_error if this process has started threads: they would be missing from the child, and what
 /// waits for them there would wait for ever. Throws std::runtime_error with its text if the child failed.
 Footprint inChild(const std::function<Scene()>& make, const Job& job, int repetitions = 1, double seconds = 0);
 
