@@ -16,8 +16,8 @@ using namespace bilayer::bench;
 namespace {
 
 constexpr double MiB = 1 << 20;
-/// Memory at the peak may be this times input plus output, plus a constant for what does not grow (thread stacks, the
-/// allocator's pools, one brick in work for each thread).
+// Memory at the peak may be this times input plus output, plus a constant for what does not grow (thread stacks, the
+// allocator's pools, one brick in work for each thread).
 constexpr double memoryFactor = 1.5, memoryConstant = 64 * MiB;
 
 struct Options {

@@ -13,7 +13,7 @@ namespace bilayer::bench {
 namespace {
 
 // [pixels]
-constexpr double panelWidth = 560, panelHeight = 400, left = 70, right = 150, top = 44, bottom = 54;
+constexpr double panelWidth = 620, panelHeight = 400, left = 70, right = 200, top = 44, bottom = 54;
 constexpr double labelSpacing = 34;  // of the two lines of text at the ends of lines
 constexpr std::array<const char*, 4> colours{"#1f5fa8", "#c4572b", "#3d8a4f", "#7a4fa0"};
 
