@@ -118,18 +118,17 @@ std::string cell(const std::optional<double>& value, double scale = 1, int digit
 
 void printHeader() {
     fmt::print("{:<13}{:>5}  {:<20}{:>3}{:>11}{:>11}{:>8}{:>8}{:>10}{:>10}{:>12}{:>6}\n", "mesh", "N", "builder", "W",
-               "ms, 1 th.", "ms, 2 th.", "1->2", "ratio", "peak MiB", "grid MiB", "voxels", "runs");
+               "ms, 1 th.", "ms, 2 th.", "1->2", "ratio", "peak MiB", "allowed", "voxels", "runs");
 }
 
 void printRow(const std::vector<Row>& rows, const Row& row) {
-    constexpr double MiB = 1 << 20;
     const auto runs = row.seconds.find(comparedThreads);
     const bool hasMemory = row.footprint.peakBytes > 0;
     fmt::print("{:<13}{:>5}  {:<20}{:>3}{:>11}{:>11}{:>8}{:>8}{:>10}{:>10}{:>12}{:>6}\n", row.mesh, row.resolution,
                nameOf(row.builder), row.halfWidth, cell(row.time(1), 1e3), cell(row.time(2), 1e3),
                cell(row.speedUp(), 1, 2), cell(ratio(rows, row, comparedThreads)),
-               hasMemory ? fmt::format("{:.0f}", double(row.footprint.peakBytes) / MiB) : "-",
-               hasMemory ? fmt::format("{:.0f}", double(row.footprint.outcome.bytes) / MiB) : "-", row.activeVoxels,
+               hasMemory ? fmt::format("{:.0f}", row.footprint.peakMiB()) : "-",
+               hasMemory ? fmt::format("{:.0f}", row.footprint.allowedMiB()) : "-", row.activeVoxels,
                runs == row.seconds.end() ? 0 : runs->second.size());
 }
 
@@ -258,9 +257,9 @@ int run(int argc, char** argv) {
     if (meshes.empty()) meshes = sources();
     fmt::print(
         "N voxels along the longest side, half width W voxels, SIMD {}. Medians of up to {} runs in turns; a builder\n"
-        "takes no more turns after {} s. Ratio: to meshToVolume-0x4 of the same W on {} threads. Peak: most memory\n"
-        "above the mesh, in a process of its own.\n\n",
-        simdName(), options.repetitions, options.seconds, comparedThreads);
+        "takes no more turns after {} s. Ratio: to meshToVolume-0x4 of the same W on {} threads. Peak: mesh and build\n"
+        "together, in a process of its own; allowed: {} x (mesh + grid) + {} MiB.\n\n",
+        simdName(), options.repetitions, options.seconds, comparedThreads, memoryFactor, memoryConstantMiB);
     const std::vector<Row> rows = compare(meshes, options);
     printSummary(rows);
     if (!options.json.empty()) writeJson(options.json, rows);

@@ -15,11 +15,6 @@ using namespace bilayer::bench;
 
 namespace {
 
-constexpr double MiB = 1 << 20;
-// Memory at the peak may be this times input plus output, plus a constant for what does not grow (thread stacks, the
-// allocator's pools, one brick in work for each thread).
-constexpr double memoryFactor = 1.5, memoryConstant = 64 * MiB;
-
 struct Options {
     std::vector<double> triangles{1e4, 3e4, 1e5, 3e5, 1e6, 3e6, 1e7};
     std::vector<double> resolutions{64, 128, 256, 512, 1024, 2048};
@@ -38,11 +33,6 @@ struct Point {
     Footprint footprint;
 
     double seconds() const { return footprint.outcome.seconds; }
-    // The mesh is resident too.
-    double peak() const { return double(footprint.peakBytes + footprint.inputBytes); }
-    double allowed() const {
-        return memoryFactor * double(footprint.inputBytes + footprint.outcome.bytes) + memoryConstant;
-    }
 };
 
 using Curve = std::vector<Point>;
@@ -50,7 +40,7 @@ using Curve = std::vector<Point>;
 Curve measure(Builder builder, const std::vector<std::pair<double, float>>& sizes, const Options& options) {
     Curve curve;
     for (const auto& [triangles, resolution] : sizes) {
-        std::size_t made = shapes::carvedBox(std::size_t(triangles)).triangles.size();
+        const std::size_t made = shapes::carvedBox(std::size_t(triangles)).triangles.size();
         const auto make = [n = std::size_t(triangles), r = resolution] { return scene("", shapes::carvedBox(n), r); };
         curve.push_back({double(made), resolution,
                          inChild(make, {builder, 3, options.threads}, options.repetitions, options.seconds)});
@@ -59,7 +49,8 @@ Curve measure(Builder builder, const std::vector<std::pair<double, float>>& size
         fmt::print("{:<14}{:>10}{:>7}{:>11.4f}{:>12}{:>10.1f}{:>10.1f}{:>11.0f}{:>11.0f}{:>6}\n", nameOf(builder), made,
                    resolution, point.seconds(), outcome.activeVoxels,
                    1e9 * point.seconds() / double(outcome.activeVoxels), 1e9 * point.seconds() / point.triangles,
-                   point.peak() / MiB, point.allowed() / MiB, point.peak() <= point.allowed() ? "yes" : "no");
+                   point.footprint.peakMiB(), point.footprint.allowedMiB(),
+                   point.footprint.peakMiB() <= point.footprint.allowedMiB() ? "yes" : "no");
         std::fflush(stdout);
     }
     return curve;
@@ -95,8 +86,8 @@ void growth(const Options& options) {
     fmt::print(
         "Carved boxes, half width 3, {} threads; medians of up to {} builds. Peak: mesh and build together; allowed:\n"
         "{} x (mesh + grid) + {:.0f} MiB.\n\n{:<14}{:>10}{:>7}{:>11}{:>12}{:>10}{:>10}{:>11}{:>11}{:>6}\n",
-        options.threads, options.repetitions, memoryFactor, memoryConstant / MiB, "builder", "triangles", "N",
-        "seconds", "voxels", "ns/voxel", "ns/tri.", "peak MiB", "allowed", "kept");
+        options.threads, options.repetitions, memoryFactor, memoryConstantMiB, "builder", "triangles", "N", "seconds",
+        "voxels", "ns/voxel", "ns/tri.", "peak MiB", "allowed", "kept");
     for (const std::string& name : options.methods) {
         const Builder builder = builderNamed(name);
         overTriangles.lines.push_back(lineOf(builder, measure(builder, meshes, options), true));

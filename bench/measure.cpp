@@ -15,6 +15,7 @@
 namespace bilayer::bench {
 namespace {
 
+constexpr double MiB = 1 << 20;
 constexpr double none = std::numeric_limits<double>::quiet_NaN();
 // "VmHWM" of /proc/self/status is the peak since this was last written to /proc/self/clear_refs
 constexpr const char* resetPeak = "5";
@@ -77,6 +78,14 @@ std::size_t threadsOfThisProcess() {
 const std::size_t threadsAtStart = threadsOfThisProcess();
 
 }  // namespace
+
+double Footprint::peakMiB() const {
+    return double(inputBytes + peakBytes) / MiB;
+}
+
+double Footprint::allowedMiB() const {
+    return memoryFactor * double(inputBytes + outcome.bytes) / MiB + memoryConstantMiB;
+}
 
 double median(std::vector<double> values) {
     if (values.empty()) return none;

@@ -24,6 +24,10 @@ class Stopwatch {
     std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
 
+/// Memory at the peak may be this times input plus output, plus a constant for what does not grow: thread stacks, the
+/// allocator's pools, one brick in work for each thread.
+inline constexpr double memoryFactor = 1.5, memoryConstantMiB = 64;
+
 /// The median; NaN of nothing.
 double median(std::vector<double> values);
 
@@ -38,6 +42,9 @@ struct Footprint {
     Outcome outcome;               ///< `seconds` is the median of all repetitions
     std::uint64_t inputBytes = 0;  ///< of the mesh
     std::uint64_t peakBytes = 0;   ///< most that was resident during the first build, less what was before it
+
+    double peakMiB() const;     ///< of mesh and build together
+    double allowedMiB() const;  ///< what the peak may be: a part more than mesh and grid, and a constant
 };
 
 /// Builds in a child process, so that no builder finds memory that another one left, or a heap that it has broken up.
