@@ -28,10 +28,10 @@ struct Options {
 
 // One mesh at one resolution.
 struct Point {
-    double triangles;
     float resolution;
     Footprint footprint;
 
+    double triangles() const { return double(footprint.triangles); }
     double seconds() const { return footprint.outcome.seconds; }
 };
 
@@ -40,15 +40,14 @@ using Curve = std::vector<Point>;
 Curve measure(Builder builder, const std::vector<std::pair<double, float>>& sizes, const Options& options) {
     Curve curve;
     for (const auto& [triangles, resolution] : sizes) {
-        const std::size_t made = shapes::carvedBox(std::size_t(triangles)).triangles.size();
         const auto make = [n = std::size_t(triangles), r = resolution] { return scene("", shapes::carvedBox(n), r); };
-        curve.push_back({double(made), resolution,
-                         inChild(make, {builder, 3, options.threads}, options.repetitions, options.seconds)});
+        curve.push_back(
+            {resolution, inChild(make, {builder, 3, options.threads}, options.repetitions, options.seconds)});
         const Point& point = curve.back();
         const Outcome& outcome = point.footprint.outcome;
-        fmt::print("{:<14}{:>10}{:>7}{:>11.4f}{:>12}{:>10.1f}{:>10.1f}{:>11.0f}{:>11.0f}{:>6}\n", nameOf(builder), made,
-                   resolution, point.seconds(), outcome.activeVoxels,
-                   1e9 * point.seconds() / double(outcome.activeVoxels), 1e9 * point.seconds() / point.triangles,
+        fmt::print("{:<14}{:>10}{:>7}{:>11.4f}{:>12}{:>10.1f}{:>10.1f}{:>11.0f}{:>11.0f}{:>6}\n", nameOf(builder),
+                   point.footprint.triangles, resolution, point.seconds(), outcome.activeVoxels,
+                   1e9 * point.seconds() / double(outcome.activeVoxels), 1e9 * point.seconds() / point.triangles(),
                    point.footprint.peakMiB(), point.footprint.allowedMiB(),
                    point.footprint.peakMiB() <= point.footprint.allowedMiB() ? "yes" : "no");
         std::fflush(stdout);
@@ -59,7 +58,7 @@ Curve measure(Builder builder, const std::vector<std::pair<double, float>>& size
 Line lineOf(Builder builder, const Curve& curve, bool overTriangles) {
     Line line;
     for (const Point& point : curve) {
-        line.x.push_back(overTriangles ? point.triangles : double(point.resolution));
+        line.x.push_back(overTriangles ? point.triangles() : double(point.resolution));
         line.y.push_back(point.seconds());
     }
     // the slope where size dominates: over the last three points

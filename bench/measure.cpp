@@ -43,6 +43,7 @@ Footprint measure(const Scene& scene, const Job& job, int repetitions, double se
     Footprint result;
     result.outcome = run(scene, job);
     result.peakBytes = statusBytes("VmHWM:") - before;
+    result.triangles = scene.mesh.triangles.size();
     result.inputBytes = scene.mesh.points.size() * sizeof(scene.mesh.points[0]) +
                         scene.mesh.triangles.size() * sizeof(scene.mesh.triangles[0]);
     std::vector<double> times{result.outcome.seconds};

@@ -40,6 +40,7 @@ double logSlope(const std::vector<double>& x, const std::vector<double>& y);
 /// What a build takes in a process of its own.
 struct Footprint {
     Outcome outcome;               ///< `seconds` is the median of all repetitions
+    std::uint64_t triangles = 0;   ///< of the mesh
     std::uint64_t inputBytes = 0;  ///< of the mesh
     std::uint64_t peakBytes = 0;   ///< most that was resident during the first build, less what was before it
 

@@ -17,6 +17,9 @@ constexpr double panelWidth = 620, panelHeight = 400, left = 70, right = 200, to
 constexpr double labelSpacing = 34;  // of the two lines of text at the ends of lines
 constexpr std::array<const char*, 4> colours{"#1f5fa8", "#c4572b", "#3d8a4f", "#7a4fa0"};
 
+// A point this far beyond a decade does not ask for another one [decades].
+constexpr double decadeSlack = 0.02;
+
 // A logarithmic axis from whole decade to whole decade, or from tick to tick, onto pixels.
 struct Axis {
     double low, high, from, to;
@@ -28,8 +31,8 @@ Axis axisOf(const std::vector<double>& values, bool wholeDecades, double from, d
     const auto [least, most] = std::minmax_element(values.begin(), values.end());
     double low = std::log10(*least), high = std::log10(*most);
     if (wholeDecades) {
-        low = std::floor(low + 1e-9);
-        high = std::ceil(high - 1e-9);
+        low = std::floor(low + decadeSlack);
+        high = std::ceil(high - decadeSlack);
     }
     if (high <= low) high = low + 1;
     return {low, high, from, to};
