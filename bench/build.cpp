@@ -1,179 +1,278 @@
-// The builders side by side: the same mesh, voxel size and band, in one run. Prints each builder's median time, its
-// ratio to openvdb::tools::meshToVolume, and the memory that it takes at its peak.
-//
-// Reading the mesh is not timed, nor is putting its vertices into the form that each builder wants.
-#include <benchmark/benchmark.h>
+// The builders side by side: the same mesh, voxel size and band, in one run. Prints each builder's median time on each
+// number of threads, its ratio to openvdb::tools::meshToVolume with flag 0x4 (exact distances) at the same half width,
+// the memory that it takes at its peak, and what the whole comes to.
 #include <fmt/format.h>
-#include <malloc.h>
-#include <openvdb/tools/MeshToVolume.h>
 
 #include <CLI/CLI.hpp>
-#include <filesystem>
+#include <algorithm>
 #include <fstream>
-#include <functional>
-#include <map>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <unordered_map>
 
-#include "cl/filler.h"
-#include "demos/shared/shapes.h"
-#include "sdf/build.h"
+#include "bench/builders.h"
+#include "bench/measure.h"
 #include "sdf/double_layer.h"
-#include "sdf/grids.h"
-#include "sdf/mesh_io.h"
 
 using namespace bilayer;
+using namespace bilayer::bench;
 
 namespace {
 
-constexpr const char* rival = "OpenVDB";
-constexpr int repetitions = 7;
-// "VmHWM" of /proc/self/status is the peak since this was last written to /proc/self/clear_refs
-constexpr const char* resetPeak = "5";
+// What the summary is held against: times as fast as meshToVolume (0x4) on 2 threads, geometric mean over the cells.
+constexpr double exactRequired = 15, doubleLayerRequired = 30;
+constexpr double cellRequired = 8;       // the same, of the slowest cell
+constexpr double speedUpRequired = 1.8;  // from 1 to 2 threads, geometric mean
+constexpr int comparedThreads = 2;
 
-struct Work {
-    std::string name;
-    Mesh mesh;
-    BuildOptions options;
-    std::vector<openvdb::Vec3s> points;  // in voxels
-    std::vector<openvdb::Vec3I> triangles;
+struct Options {
+    std::vector<std::string> meshes,
+        methods{"meshToVolume-0x4", "meshToVolume", "pseudonormal", "exact", "double-layer"};
+    std::vector<float> resolutions{128, 251, 715};
+    std::vector<int> threads{1, comparedThreads};
+    int repetitions = 9;
+    double seconds = 1.2;  // a builder takes no further turns in a scene once it has used up this time
+    bool memory = true;
+    std::string json;
 };
 
-Work prepare(const std::string& name, Mesh mesh, float resolution, float halfWidth) {
-    Work work{name, std::move(mesh), {}, {}, {}};
-    work.options.voxelSize = voxelSizeFor(work.mesh, resolution);
-    work.options.exteriorWidth = work.options.interiorWidth = halfWidth;
-    for (const auto& p : work.mesh.points)
-        work.points.push_back(openvdb::Vec3s(p.x, p.y, p.z) / work.options.voxelSize);
-    for (const auto& t : work.mesh.triangles) work.triangles.push_back({t.x, t.y, t.z});
-    return work;
+// One builder in one scene: its times on each number of threads.
+struct Row {
+    std::string mesh;
+    float resolution;
+    Builder builder;
+    float halfWidth;
+    std::unordered_map<int, std::vector<double>> seconds;
+    std::uint64_t activeVoxels = 0;
+    Footprint footprint;
+
+    std::optional<double> time(int threads) const {
+        const auto found = seconds.find(threads);
+        return found == seconds.end() ? std::nullopt : std::optional(median(found->second));
+    }
+    std::optional<double> speedUp() const {
+        const auto one = time(1), two = time(comparedThreads);
+        return one && two ? std::optional(*one / *two) : std::nullopt;
+    }
+};
+
+// Half width 3 for all; 2, which the double layer method was made for, for it and its reference.
+std::vector<float> halfWidths(Builder builder) {
+    if (builder == Builder::reference || builder == Builder::doubleLayer) return {3, 2};
+    return {3};
 }
 
-std::uint64_t openvdbVoxels(const Work& work, int flags) {
-    const auto transform = openvdb::math::Transform::createLinearTransform(work.options.voxelSize);
-    const openvdb::tools::QuadAndTriangleDataAdapter<openvdb::Vec3s, openvdb::Vec3I> mesh(work.points, work.triangles);
-    return openvdb::tools::meshToVolume<openvdb::FloatGrid>(mesh, *transform, work.options.exteriorWidth,
-                                                            work.options.interiorWidth, flags)
-        ->activeVoxelCount();
-}
-
-double statusMiB(const std::string& key) {
-    std::ifstream file("/proc/self/status");
-    std::string word;
-    double kiB = 0;
-    while (file >> word)
-        if (word == key) file >> kiB;
-    return kiB / 1024;
-}
-
-void add(const std::string& name, std::function<std::uint64_t()> voxels) {
-    benchmark::RegisterBenchmark(name.c_str(),
-                                 [voxels](benchmark::State& state) {
-                                     std::ofstream("/proc/self/clear_refs") << resetPeak;
-                                     ::malloc_trim(0);
-                                     const double before = statusMiB("VmRSS:");
-                                     std::uint64_t count = 0;
-                                     for (auto _ : state) benchmark::DoNotOptimize(count = voxels());
-                                     state.counters["activeVoxels"] = double(count);
-                                     state.counters["peakMiB"] = statusMiB("VmHWM:") - before;
-                                 })
-        ->Unit(benchmark::kMillisecond)
-        ->UseRealTime()
-        ->Repetitions(repetitions)
-        ->MinTime(0.05);
-}
-
-// Prints what Google Benchmark prints, and keeps the medians for the table.
-class Reporter : public benchmark::ConsoleReporter {
-  public:
-    void ReportRuns(const std::vector<Run>& runs) override {
-        for (const Run& run : runs) {
-            if (run.run_type == Run::RT_Aggregate && run.aggregate_name == "median")
-                medians_[run.run_name.function_name] = {run.GetAdjustedRealTime(), run.counters.at("activeVoxels"),
-                                                        run.counters.at("peakMiB")};
-            if (run.error_occurred) failed_ = true;
+std::vector<Row> emptyRows(const std::string& mesh, float resolution, const Options& options) {
+    std::vector<Row> rows;
+    for (const float halfWidth : {3.f, 2.f})
+        for (const Builder builder : builders()) {
+            const auto widths = halfWidths(builder);
+            const bool wanted = std::count(options.methods.begin(), options.methods.end(), nameOf(builder)) > 0;
+            if (wanted && std::count(widths.begin(), widths.end(), halfWidth))
+                rows.push_back({mesh, resolution, builder, halfWidth, {}, 0, {}});
         }
-        benchmark::ConsoleReporter::ReportRuns(runs);
-    }
+    return rows;
+}
 
-    void table(const std::vector<Work>& works, const std::vector<std::string>& builders) const {
-        fmt::print("\n{:<24} {:<26} {:>10} {:>14} {:>10} {:>14}\n", "mesh", "builder", "median ms", "times faster",
-                   "peak MiB", "active voxels");
-        for (const Work& work : works)
-            for (const std::string& builder : builders) {
-                const auto found = medians_.find(work.name + "/" + builder),
-                           reference = medians_.find(work.name + "/" + rival);
-                if (found == medians_.end() || reference == medians_.end()) continue;
-                const Median &m = found->second, &r = reference->second;
-                fmt::print("{:<24} {:<26} {:>10.1f} {:>14.1f} {:>10.0f} {:>14.0f}\n", work.name, builder,
-                           m.milliseconds, r.milliseconds / m.milliseconds, m.peakMiB, m.voxels);
+void measureMemory(const Source& source, std::vector<Row>& rows) {
+    for (Row& row : rows)
+        row.footprint =
+            inChild([&] { return scene(source, row.resolution); }, {row.builder, row.halfWidth, comparedThreads});
+}
+
+// On one thread OpenVDB is asked for one thing only, what the speed-up from 1 to 2 threads needs: the rest would double
+// the minutes that it takes of the whole run.
+bool wanted(const Row& row, int threads) {
+    return threads > 1 ||
+           (row.builder != Builder::defaults && !(row.builder == Builder::reference && row.halfWidth < 3));
+}
+
+// Builders take turns. What takes long is repeated less.
+void measureTime(const Scene& scene, std::vector<Row>& rows, const Options& options) {
+    for (int round = 0; round < options.repetitions; ++round)
+        for (Row& row : rows)
+            for (const int threads : options.threads) {
+                if (!wanted(row, threads)) continue;
+                std::vector<double>& seconds = row.seconds[threads];
+                double spent = 0;
+                for (const double s : seconds) spent += s;
+                if (spent >= options.seconds) continue;
+                const Outcome outcome = run(scene, {row.builder, row.halfWidth, threads});
+                seconds.push_back(outcome.seconds);
+                row.activeVoxels = outcome.activeVoxels;
             }
-    }
+}
 
-    bool failed() const { return failed_; }
+// How many times as fast as the reference in the same scene, with the same half width and threads.
+std::optional<double> ratio(const std::vector<Row>& rows, const Row& row, int threads) {
+    for (const Row& other : rows)
+        if (other.builder == Builder::reference && other.mesh == row.mesh && other.resolution == row.resolution &&
+            other.halfWidth == row.halfWidth && other.time(threads) && row.time(threads))
+            return *other.time(threads) / *row.time(threads);
+    return std::nullopt;
+}
 
-  private:
-    struct Median {
-        double milliseconds, voxels, peakMiB;
-    };
-    std::map<std::string, Median> medians_;
-    bool failed_ = false;
+std::string cell(const std::optional<double>& value, double scale = 1, int digits = 1) {
+    return value ? fmt::format("{:.{}f}", *value * scale, digits) : "-";
+}
+
+void printHeader() {
+    fmt::print("{:<13}{:>5}  {:<20}{:>3}{:>11}{:>11}{:>8}{:>8}{:>10}{:>10}{:>12}{:>6}\n", "mesh", "N", "builder", "W",
+               "ms, 1 th.", "ms, 2 th.", "1->2", "ratio", "peak MiB", "allowed", "voxels", "runs");
+}
+
+void printRow(const std::vector<Row>& rows, const Row& row) {
+    const auto runs = row.seconds.find(comparedThreads);
+    const bool hasMemory = row.footprint.peakBytes > 0;
+    fmt::print("{:<13}{:>5}  {:<20}{:>3}{:>11}{:>11}{:>8}{:>8}{:>10}{:>10}{:>12}{:>6}\n", row.mesh, row.resolution,
+               nameOf(row.builder), row.halfWidth, cell(row.time(1), 1e3), cell(row.time(2), 1e3),
+               cell(row.speedUp(), 1, 2), cell(ratio(rows, row, comparedThreads)),
+               hasMemory ? fmt::format("{:.0f}", row.footprint.peakMiB()) : "-",
+               hasMemory ? fmt::format("{:.0f}", row.footprint.allowedMiB()) : "-", row.activeVoxels,
+               runs == row.seconds.end() ? 0 : runs->second.size());
+}
+
+// One builder at one half width over all scenes.
+struct Summary {
+    std::vector<double> ratios, speedUps;
+    std::string slowestCell;
 };
 
-std::vector<std::string> defaultMeshes() {
-    std::vector<std::string> found;
-    const std::filesystem::path corpus = BILAYER_MESHES;
-    for (const auto& path : {corpus / "bunny_watertight.obj", corpus / "dragon_vrip_871k.ply",
-                             std::filesystem::path("/usr/share/glmark2/models/bunny.obj")})
-        if (std::filesystem::exists(path) && found.size() < 2) found.push_back(path.string());
-    return found;
+Summary summarize(const std::vector<Row>& rows, Builder builder, float halfWidth) {
+    Summary summary;
+    for (const Row& row : rows) {
+        if (row.builder != builder || row.halfWidth != halfWidth) continue;
+        if (const auto speedUp = row.speedUp()) summary.speedUps.push_back(*speedUp);
+        const auto times = ratio(rows, row, comparedThreads);
+        if (!times) continue;
+        if (summary.ratios.empty() || *times < *std::min_element(summary.ratios.begin(), summary.ratios.end()))
+            summary.slowestCell = fmt::format("{} {}", row.mesh, row.resolution);
+        summary.ratios.push_back(*times);
+    }
+    return summary;
+}
+
+std::string judged(double value, double required) {
+    return fmt::format("{:.1f} (required {:g}: {})", value, required, value >= required ? "met" : "short");
+}
+
+void printSummary(const std::vector<Row>& rows) {
+    fmt::print("\nTimes as fast as meshToVolume (0x4) at the same half width, on {} threads\n", comparedThreads);
+    for (const float halfWidth : {3.f, 2.f})
+        for (const Builder builder : builders()) {
+            const Summary summary = summarize(rows, builder, halfWidth);
+            if (summary.ratios.empty() || builder == Builder::reference) continue;
+            const double mean = geometricMean(summary.ratios),
+                         least = *std::min_element(summary.ratios.begin(), summary.ratios.end());
+            const bool held = builder == Builder::exact || builder == Builder::doubleLayer;
+            const double required = builder == Builder::exact ? exactRequired : doubleLayerRequired;
+            fmt::print("  {:<20} half width {}: geometric mean {}, least {} at {}\n", nameOf(builder), halfWidth,
+                       held ? judged(mean, required) : fmt::format("{:.1f}", mean),
+                       held ? judged(least, cellRequired) : fmt::format("{:.1f}", least), summary.slowestCell);
+        }
+    fmt::print("Times as fast on 2 threads as on 1\n");
+    for (const float halfWidth : {3.f, 2.f})
+        for (const Builder builder : builders()) {
+            const Summary summary = summarize(rows, builder, halfWidth);
+            if (summary.speedUps.empty()) continue;
+            const double mean = geometricMean(summary.speedUps);
+            const bool held = builder == Builder::exact || builder == Builder::doubleLayer;
+            fmt::print(
+                "  {:<20} half width {}: geometric mean {:.2f}{}, least {:.2f}\n", nameOf(builder), halfWidth, mean,
+                held ? fmt::format(" (required {}: {})", speedUpRequired, mean >= speedUpRequired ? "met" : "short")
+                     : "",
+                *std::min_element(summary.speedUps.begin(), summary.speedUps.end()));
+        }
+}
+
+void writeJson(const std::string& path, const std::vector<Row>& rows) {
+    nlohmann::json list = nlohmann::json::array();
+    for (const Row& row : rows) {
+        nlohmann::json item{{"mesh", row.mesh},
+                            {"resolution", row.resolution},
+                            {"builder", nameOf(row.builder)},
+                            {"halfWidth", row.halfWidth},
+                            {"activeVoxels", row.activeVoxels}};
+        for (const auto& [threads, seconds] : row.seconds) item["seconds"][std::to_string(threads)] = seconds;
+        if (const auto times = ratio(rows, row, comparedThreads)) item["ratio"] = *times;
+        if (row.footprint.peakBytes > 0) {
+            item["peakBytes"] = row.footprint.peakBytes;
+            item["gridBytes"] = row.footprint.outcome.bytes;
+            item["inputBytes"] = row.footprint.inputBytes;
+        }
+        list.push_back(item);
+    }
+    std::ofstream file(path);
+    file << list.dump(1) << "\n";
+    if (!file.flush()) throw std::runtime_error("cannot write " + path);
+}
+
+// Memory comes first: a child can be forked only while this process has started no threads.
+std::vector<Row> compare(const std::vector<Source>& meshes, const Options& options) {
+    std::vector<std::vector<Row>> scenes;
+    for (const Source& source : meshes)
+        for (const float resolution : options.resolutions) {
+            scenes.push_back(emptyRows(source.name, resolution, options));
+            if (!options.memory) continue;
+            fmt::print(stderr, "memory: {} {}\n", source.name, resolution);
+            measureMemory(source, scenes.back());
+        }
+    std::vector<Row> all;
+    auto rows = scenes.begin();
+    printHeader();
+    for (const Source& source : meshes)
+        for (const float resolution : options.resolutions) {
+            measureTime(scene(source, resolution), *rows, options);
+            for (const Row& row : *rows) printRow(*rows, row);
+            std::fflush(stdout);
+            all.insert(all.end(), rows->begin(), rows->end());
+            ++rows;
+        }
+    return all;
 }
 
 int run(int argc, char** argv) {
-    CLI::App app("Builds narrow-band fields with bilayer and with OpenVDB, and compares the times.");
-    std::vector<std::string> paths;
-    float resolution = 251, halfWidth = 2;
-    std::string deviceText;
-    app.add_option("meshes", paths, "mesh files; by default the bunny and the dragon, where they are")
-        ->check(CLI::ExistingFile);
-    app.add_option("--resolution", resolution, "voxels along the longest side")->capture_default_str();
-    app.add_option("--half-width", halfWidth, "of the band [voxels]")->capture_default_str();
-    app.add_option("--device", deviceText, "OpenCL device, by a part of its name");
+    CLI::App app("Builds narrow-band fields with bilayer and with OpenVDB, and compares times and memory.");
+    Options options;
+    bool quick = false, noMemory = false;
+    app.add_option("--mesh", options.meshes, "names or files; by default all that are here");
+    app.add_option("--resolution", options.resolutions, "voxels along the longest side")->capture_default_str();
+    app.add_option("--method", options.methods, "builders")->capture_default_str();
+    app.add_option("--threads", options.threads)->capture_default_str();
+    app.add_option("--repetitions", options.repetitions, "at most, of each builder in a scene")->capture_default_str();
+    app.add_option("--seconds", options.seconds, "that end the repetitions of a builder")->capture_default_str();
+    app.add_option("--json", options.json, "also write all times to this file");
+    app.add_flag("--no-memory", noMemory, "leave out the peaks of memory");
+    app.add_flag("--quick", quick, "only 128 voxels and few repetitions");
     CLI11_PARSE(app, argc, argv);
-    if (paths.empty()) paths = defaultMeshes();
-
-    openvdb::initialize();
-    std::vector<Work> works;
-    for (const std::string& path : paths)
-        works.push_back(prepare(std::filesystem::path(path).stem().string(), readMesh(path), resolution, halfWidth));
-    if (works.empty())
-        works.push_back(prepare("knot", shapes::torusKnot(2, 3, 1, 0.2f, 2400, 64), resolution, halfWidth));
-
-    const Device device = openDevice(deviceText);
-    const BlockFiller opencl = openclFiller(device);
-    const std::vector<std::string> builders = {rival, "OpenVDB exact", "bilayer TBB", "bilayer OpenCL"};
-    for (const Work& work : works) {
-        add(work.name + "/" + builders[0], [&work] { return openvdbVoxels(work, 0); });
-        add(work.name + "/" + builders[1],
-            [&work] { return openvdbVoxels(work, openvdb::tools::DISABLE_RENORMALIZATION); });
-        add(work.name + "/" + builders[2], [&work] { return build(work.mesh, work.options).activeVoxels(); });
-        add(work.name + "/" + builders[3],
-            [&work, &opencl] { return build(work.mesh, work.options, opencl).activeVoxels(); });
+    options.memory = !noMemory;
+    if (quick) {
+        options.resolutions = {128};
+        options.repetitions = 3;
     }
-    fmt::print("resolution {:g}, half width {:g} voxels, method double-layer, SIMD {}, OpenCL device {}\n", resolution,
-               halfWidth, simdName(), device.info().name);
-    Reporter reporter;
-    benchmark::RunSpecifiedBenchmarks(&reporter);
-    reporter.table(works, builders);
-    return reporter.failed() ? 1 : 0;
+    for (const std::string& method : options.methods) builderNamed(method);
+
+    std::vector<Source> meshes;
+    for (const std::string& mesh : options.meshes) meshes.push_back(findSource(mesh));
+    if (meshes.empty()) meshes = sources();
+    fmt::print(
+        "N voxels along the longest side, half width W voxels, SIMD {}. Medians of up to {} runs in turns; a builder\n"
+        "takes no more turns after {} s. Ratio: to meshToVolume-0x4 of the same W on {} threads. Peak: mesh and build\n"
+        "together, in a process of its own; allowed: {} x (mesh + grid) + {} MiB.\n\n",
+        simdName(), options.repetitions, options.seconds, comparedThreads, memoryFactor, memoryConstantMiB);
+    const std::vector<Row> rows = compare(meshes, options);
+    printSummary(rows);
+    if (!options.json.empty()) writeJson(options.json, rows);
+    return 0;
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
-    benchmark::Initialize(&argc, argv);
     try {
         return run(argc, argv);
     } catch (const std::exception& error) {
-        fmt::print(stderr, "bench_build: {}\n", error.what());
+        fmt::print(stderr, "bench build: {}\n", error.what());
         return 1;
     }
 }

@@ -1,8 +1,10 @@
 #include "demos/shared/shapes.h"
 
 #include <cmath>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/gtc/constants.hpp>
+#include <stdexcept>
 
 namespace bilayer::shapes {
 namespace {
@@ -21,6 +23,91 @@ void addTorusFaces(Mesh& mesh, int around, int across) {
     for (int i = 0; i < around; ++i)
         for (int j = 0; j < across; ++j)
             addQuad(mesh, vertex(i, j), vertex(i + 1, j), vertex(i + 1, j + 1), vertex(i, j + 1));
+}
+
+// From 0 at `low` to 1 at `high`, flat at both.
+float smoothStep(float low, float high, float x) {
+    const float t = glm::clamp((x - low) / (high - low), 0.f, 1.f);
+    return t * t * (3 - 2 * t);
+}
+
+// 1 between `low` and `high`, 0 beyond `margin` around them.
+float window(float low, float high, float margin, float x) {
+    return smoothStep(low - margin, low, x) * (1 - smoothStep(high, high + margin, x));
+}
+
+// A square [-1, 1]^2 onto the unit disc, square rings onto circles. P. Shirley, K. Chiu, "A low distortion map between
+// disk and square", 1997.
+glm::vec2 onDisc(const glm::vec2& square) {
+    const bool flat = std::abs(square.x) >= std::abs(square.y);
+    const float r = flat ? square.x : square.y;
+    if (r == 0) return {0, 0};
+    const float turn = pi / 4 * (flat ? square.y : square.x) / r;
+    return flat ? glm::vec2(r * std::cos(turn), r * std::sin(turn)) : glm::vec2(r * std::sin(turn), r * std::cos(turn));
+}
+
+// The surface of the carved box of lid radius 1 and rims at -0.6 and 0.6.
+namespace carved {
+
+constexpr float halfHeight = 0.6f, dome = 0.08f;
+constexpr float footRadius = 0.92f, bodyRadius = 0.9f, lidRadius = 1;
+constexpr float wallDepth = 0.03f, topDepth = 0.02f;  // the latter is nowhere more than the dome is high
+
+// How much of a lozenge pattern is carved away: 0 on the lozenges, 1 between them.
+float pattern(float a, float b) {
+    return 1 - smoothStep(-0.25f, 0.25f, std::sin(a) * std::sin(b));
+}
+
+float wallRadius(float angle, float rise) {
+    const float foot = 1 - smoothStep(0.03f, 0.06f, rise), lid = smoothStep(0.72f, 0.75f, rise);
+    const float body = pattern(12 * angle + 20 * rise, 12 * angle - 20 * rise) * window(0.12f, 0.65f, 0.03f, rise);
+    const float beads = pattern(24 * angle, 8 * pi * (rise - 0.805f)) * window(0.82f, 0.92f, 0.02f, rise);
+    return bodyRadius + (footRadius - bodyRadius) * foot + (lidRadius - bodyRadius) * lid - wallDepth * (body + beads);
+}
+
+float topHeight(const glm::vec2& point) {
+    const float r2 = glm::dot(point, point), r = std::sqrt(r2), angle = r > 0 ? std::atan2(point.y, point.x) : 0.f;
+    const float rosette = pattern(6 * angle + 16 * r, 6 * angle - 16 * r) * window(0.15f, 0.75f, 0.05f, r);
+    return halfHeight + dome * (1 - r2) - topDepth * rosette;
+}
+
+}  // namespace carved
+
+// The vertices of a cube's grid of across x across x up cells, without those inside: its top, its bottom, its wall.
+struct CubeGrid {
+    int across, up;
+
+    int around() const { return 4 * across; }
+    int capSize() const { return (across + 1) * (across + 1); }
+    unsigned cap(bool top, int i, int j) const { return unsigned((top ? 0 : capSize()) + i * (across + 1) + j); }
+    // The k-th column and row of a cap's border, counter-clockwise.
+    glm::ivec2 border(int k) const {
+        const int side = k / across, step = k % across;
+        if (side == 0) return {step, 0};
+        if (side == 1) return {across, step};
+        return side == 2 ? glm::ivec2(across - step, across) : glm::ivec2(0, across - step);
+    }
+    unsigned wall(int k, int row) const {
+        const int column = k % around();
+        const glm::ivec2 at = border(column);
+        if (row == 0 || row == up) return cap(row == up, at.x, at.y);
+        return unsigned(2 * capSize() + (row - 1) * around() + column);
+    }
+    glm::vec2 disc(int i, int j) const { return onDisc(glm::vec2(2 * i - across, 2 * j - across) / float(across)); }
+};
+
+// Each cell of a cap is cut along the diagonal that runs towards the middle: the other one would lie on the rim where
+// a corner of the square has become a part of the circle.
+void addCap(Mesh& mesh, const CubeGrid& grid, bool top) {
+    const int n = grid.across;
+    for (int i = 0; i < n; ++i)
+        for (int j = 0; j < n; ++j) {
+            unsigned a = grid.cap(top, i, j), b = grid.cap(top, i + 1, j), c = grid.cap(top, i + 1, j + 1),
+                     d = grid.cap(top, i, j + 1);
+            if (!top) std::swap(b, d);
+            const bool rising = (2 * i + 1 > n) == (2 * j + 1 > n);
+            rising ? addQuad(mesh, a, b, c, d) : addQuad(mesh, b, c, d, a);
+        }
 }
 
 }  // namespace
@@ -157,6 +244,39 @@ Mesh bowl(float radius, float wall, int segments, float opening, float foot) {
     }
     for (int i = arc; i >= 0; --i) profile.push_back(at(inner, opening * float(i) / float(arc)));  // inside, back down
     return revolve(profile, segments);
+}
+
+Mesh carvedBox(std::size_t triangles, float radius) {
+    if (triangles < 100) throw std::invalid_argument("a carved box has at least 100 triangles");
+    // 4 n^2 triangles on the caps, 8 n m on the wall, whose cells are square: 2 pi around, 2 halfHeight up
+    const float upPerAcross = 4 * 2 * carved::halfHeight / (2 * pi);
+    const int n = int(std::lround(std::sqrt(double(triangles) / (4 + 8 * double(upPerAcross)))));
+    const CubeGrid grid{n, int(std::lround((double(triangles) / (4 * n) - n) / 2))};
+
+    Mesh mesh;
+    mesh.points.reserve(std::size_t(2 * grid.capSize()) + std::size_t(grid.around()) * std::size_t(grid.up - 1));
+    mesh.triangles.reserve(std::size_t(4 * n) * std::size_t(n + 2 * grid.up));
+    for (const bool top : {true, false})
+        for (int i = 0; i <= n; ++i)
+            for (int j = 0; j <= n; ++j) {
+                const glm::vec2 p = grid.disc(i, j) * (top ? carved::lidRadius : carved::footRadius);
+                mesh.points.push_back(glm::vec3(p, top ? carved::topHeight(p) : -carved::halfHeight));
+            }
+    for (int row = 1; row < grid.up; ++row)
+        for (int k = 0; k < grid.around(); ++k) {
+            const glm::ivec2 at = grid.border(k);
+            const glm::vec2 outward = grid.disc(at.x, at.y);
+            const float rise = float(row) / float(grid.up);
+            mesh.points.push_back(glm::vec3(outward * carved::wallRadius(std::atan2(outward.y, outward.x), rise),
+                                            carved::halfHeight * (2 * rise - 1)));
+        }
+    for (auto& point : mesh.points) point *= radius;
+
+    for (const bool top : {true, false}) addCap(mesh, grid, top);
+    for (int row = 0; row < grid.up; ++row)
+        for (int k = 0; k < grid.around(); ++k)
+            addQuad(mesh, grid.wall(k, row), grid.wall(k + 1, row), grid.wall(k + 1, row + 1), grid.wall(k, row + 1));
+    return mesh;
 }
 
 Mesh join(const std::vector<Mesh>& meshes) {

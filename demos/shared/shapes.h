@@ -1,12 +1,16 @@
 // Closed, oriented meshes by formula: for demos, tests and benchmarks. Lengths in metres, centred on the origin.
 #pragma once
 
+#include <cstddef>
 #include <glm/vec2.hpp>
 #include <vector>
 
 #include "sdf/mesh.h"
 
 namespace bilayer::shapes {
+
+/// Triangles of the circular box in Wu, Man, Xie (2014): 1369.77 K, where K is 1024.
+inline constexpr std::size_t paperCircularBox = 1402644;
 
 /// A box of 12 * cells^2 triangles.
 Mesh box(const glm::vec3& halfExtents, int cells = 1);
@@ -33,6 +37,14 @@ Mesh cone(float radius, float height, int segments = 96);
 /// @param opening  angle between the bottom and the rim, seen from the sphere's centre [rad]; a hemisphere by default
 /// @param foot     radius of a flat solid foot below it, half a wall high; 0: none
 Mesh bowl(float radius, float wall, int segments = 128, float opening = 1.57079633f, float foot = 0);
+
+/// A round box with a lid, carved all over with a relief that repeats around z: stands in for the circular box of
+/// Wu, Man, Xie (2014), which is not public. Its triangles are about equally large. Free of self-intersections for any
+/// number of triangles: the top is a height field above the rim, each horizontal slice of the wall is star-shaped.
+/// @param triangles  about how many: within 2 % from 10^4 on
+/// @param radius     of the lid; the box is 1.28 times as high
+/// Throws std::invalid_argument for fewer than 100 triangles.
+Mesh carvedBox(std::size_t triangles = paperCircularBox, float radius = 1);
 
 /// Several meshes as one.
 Mesh join(const std::vector<Mesh>& meshes);

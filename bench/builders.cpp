@@ -1,0 +1,155 @@
+#include "bench/builders.h"
+
+#include <fmt/format.h>
+#include <oneapi/tbb/global_control.h>
+#include <oneapi/tbb/task_arena.h>
+#include <openvdb/tools/MeshToVolume.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <stdexcept>
+
+#include "bench/measure.h"
+#include "cl/filler.h"
+#include "demos/shared/shapes.h"
+#include "sdf/build.h"
+
+namespace bilayer::bench {
+namespace {
+
+const Source carvedBox{"carved box", ""};
+
+// OpenVDB reads the mesh in place, in voxels: no copy that it would have to pay for.
+class InVoxels {
+  public:
+    explicit InVoxels(const Scene& scene) : mesh_(scene.mesh), perMetre_(1 / double(scene.voxelSize)) {}
+    std::size_t polygonCount() const { return mesh_.triangles.size(); }
+    std::size_t pointCount() const { return mesh_.points.size(); }
+    std::size_t vertexCount(std::size_t) const { return 3; }
+    void getIndexSpacePoint(std::size_t triangle, std::size_t corner, openvdb::Vec3d& position) const {
+        const glm::vec3& p = mesh_.points[mesh_.triangles[triangle][int(corner)]];
+        position = openvdb::Vec3d(p.x, p.y, p.z) * perMetre_;
+    }
+
+  private:
+    const Mesh& mesh_;
+    double perMetre_;
+};
+
+Outcome runOpenvdb(const Scene& scene, const Job& job) {
+    openvdb::initialize();
+    const int flags = job.builder == Builder::reference ? openvdb::tools::DISABLE_RENORMALIZATION : 0;
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, std::size_t(job.threads));
+    return tbb::task_arena(job.threads).execute([&] {
+        const Stopwatch watch;
+        const auto transform = openvdb::math::Transform::createLinearTransform(scene.voxelSize);
+        const auto grid = openvdb::tools::meshToVolume<openvdb::FloatGrid>(InVoxels(scene), *transform, job.halfWidth,
+                                                                           job.halfWidth, flags);
+        return Outcome{watch.seconds(), grid->activeVoxelCount(), grid->memUsage()};
+    });
+}
+
+const char* methodName(Method method) {
+    if (method == Method::exact) return "exact";
+    return method == Method::doubleLayer ? "double-layer" : "pseudonormal";
+}
+
+Outcome runOurs(const Scene& scene, const Job& job, Method method, const BlockFiller* filler = nullptr) {
+    BuildOptions options;
+    options.voxelSize = scene.voxelSize;
+    options.exteriorWidth = options.interiorWidth = job.halfWidth;
+    options.method = method;
+    options.threads = job.threads;
+    const Stopwatch watch;
+    const LevelSet field = build(scene.mesh, options, filler);
+    const double seconds = watch.seconds();
+    if (field.method() != methodName(method)) throw std::logic_error("the field came from method " + field.method());
+    return {seconds, field.activeVoxels(), field.memoryBytes()};
+}
+
+const BlockFiller& openclOnce() {
+    static const BlockFiller filler = openclFiller(openDevice(""));
+    return filler;
+}
+
+}  // namespace
+
+std::vector<Source> sources() {
+    const std::filesystem::path corpus = BILAYER_MESHES;
+    std::vector<Source> found;
+    for (const auto& [name, file] : {std::pair{"bunny", "bunny_watertight.obj"},
+                                     {"dragon", "dragon_vrip_871k.ply"},
+                                     {"armadillo", "armadillo_100k.ply"},
+                                     {"screwdriver", "screwdriver.off"},
+                                     {"fandisk", "fandisk.obj"}})
+        if (std::filesystem::exists(corpus / file)) found.push_back({name, (corpus / file).string()});
+    found.push_back(carvedBox);
+    return found;
+}
+
+Source findSource(const std::string& nameOrFile) {
+    for (const Source& source : sources())
+        if (source.name == nameOrFile) return source;
+    if (!std::filesystem::exists(nameOrFile))
+        throw std::invalid_argument(fmt::format("no mesh is called {}, and no file", nameOrFile));
+    return {std::filesystem::path(nameOrFile).stem().string(), nameOrFile};
+}
+
+Scene scene(const std::string& name, Mesh mesh, float resolution) {
+    Scene result{name, resolution, std::move(mesh), 0};
+    result.voxelSize = voxelSizeFor(result.mesh, resolution);
+    return result;
+}
+
+Scene scene(const Source& source, float resolution) {
+    return scene(source.name, source.file.empty() ? shapes::carvedBox() : readMesh(source.file), resolution);
+}
+
+const std::vector<Builder>& builders() {
+    static const std::vector<Builder> all{Builder::reference, Builder::defaults,    Builder::pseudonormal,
+                                          Builder::exact,     Builder::doubleLayer, Builder::doubleLayerOpencl};
+    return all;
+}
+
+const char* nameOf(Builder builder) {
+    switch (builder) {
+        case Builder::reference:
+            return "meshToVolume-0x4";
+        case Builder::defaults:
+            return "meshToVolume";
+        case Builder::pseudonormal:
+            return "pseudonormal";
+        case Builder::exact:
+            return "exact";
+        case Builder::doubleLayer:
+            return "double-layer";
+        case Builder::doubleLayerOpencl:
+            return "double-layer-opencl";
+    }
+    throw std::invalid_argument("no such builder");
+}
+
+Builder builderNamed(const std::string& name) {
+    const auto found = std::find_if(builders().begin(), builders().end(), [&](Builder b) { return name == nameOf(b); });
+    if (found == builders().end()) throw std::invalid_argument("no builder is called " + name);
+    return *found;
+}
+
+Outcome run(const Scene& scene, const Job& job) {
+    switch (job.builder) {
+        case Builder::reference:
+        case Builder::defaults:
+            return runOpenvdb(scene, job);
+        case Builder::pseudonormal:
+            return runOurs(scene, job, Method::pseudonormal);
+        case Builder::exact:
+            return runOurs(scene, job, Method::exact);
+        case Builder::doubleLayer:
+            return runOurs(scene, job, Method::doubleLayer);
+        case Builder::doubleLayerOpencl:
+            return runOurs(scene, job, Method::doubleLayer, &openclOnce());
+    }
+    throw std::invalid_argument("no such builder");
+}
+
+}  // namespace bilayer::bench

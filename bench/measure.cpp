@@ -1,0 +1,140 @@
+#include "bench/measure.h"
+
+#include <malloc.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <limits>
+#include <stdexcept>
+
+namespace bilayer::bench {
+namespace {
+
+constexpr double MiB = 1 << 20;
+constexpr double none = std::numeric_limits<double>::quiet_NaN();
+// "VmHWM" of /proc/self/status is the peak since this was last written to /proc/self/clear_refs
+constexpr const char* resetPeak = "5";
+
+// What the child sends back, in one piece through a pipe.
+struct Answer {
+    bool ok = false;
+    Footprint footprint;
+    std::array<char, 256> error{};
+};
+
+std::uint64_t statusBytes(const std::string& key) {
+    std::ifstream file("/proc/self/status");
+    std::string word;
+    std::uint64_t kiB = 0;
+    while (file >> word)
+        if (word == key) file >> kiB;
+    return kiB * 1024;
+}
+
+Footprint measure(const Scene& scene, const Job& job, int repetitions, double seconds) {
+    ::malloc_trim(0);
+    const std::uint64_t before = statusBytes("VmRSS:");
+    std::ofstream("/proc/self/clear_refs") << resetPeak;
+    Footprint result;
+    result.outcome = run(scene, job);
+    result.peakBytes = statusBytes("VmHWM:") - before;
+    result.triangles = scene.mesh.triangles.size();
+    result.inputBytes = scene.mesh.points.size() * sizeof(scene.mesh.points[0]) +
+                        scene.mesh.triangles.size() * sizeof(scene.mesh.triangles[0]);
+    std::vector<double> times{result.outcome.seconds};
+    double spent = times[0];
+    while (int(times.size()) < repetitions && spent < seconds) {
+        times.push_back(run(scene, job).seconds);
+        spent += times.back();
+    }
+    result.outcome.seconds = median(times);
+    return result;
+}
+
+// The child's whole life: it must not return into what its parent was doing, nor run what its parent runs at exit.
+[[noreturn]] void live(int pipe, const std::function<Scene()>& make, const Job& job, int repetitions, double seconds) {
+    Answer answer;
+    try {
+        answer.footprint = measure(make(), job, repetitions, seconds);
+        answer.ok = true;
+    } catch (const std::exception& error) {
+        std::string(error.what()).copy(answer.error.data(), answer.error.size() - 1);
+    }
+    const bool sent = ::write(pipe, &answer, sizeof answer) == ssize_t(sizeof answer);
+    ::_exit(sent ? 0 : 1);
+}
+
+std::size_t threadsOfThisProcess() {
+    const std::filesystem::directory_iterator tasks("/proc/self/task");
+    return std::size_t(std::distance(begin(tasks), end(tasks)));
+}
+
+// Before main() there are only the threads that libraries start as they are loaded (log4cplus, which OpenVDB brings);
+// they wait for log messages, and nobody waits for them.
+const std::size_t threadsAtStart = threadsOfThisProcess();
+
+}  // namespace
+
+double Footprint::peakMiB() const {
+    return double(inputBytes + peakBytes) / MiB;
+}
+
+double Footprint::allowedMiB() const {
+    return memoryFactor * double(inputBytes + outcome.bytes) / MiB + memoryConstantMiB;
+}
+
+double median(std::vector<double> values) {
+    if (values.empty()) return none;
+    std::sort(values.begin(), values.end());
+    const std::size_t middle = values.size() / 2;
+    return values.size() % 2 ? values[middle] : (values[middle - 1] + values[middle]) / 2;
+}
+
+double geometricMean(const std::vector<double>& values) {
+    double sum = 0;
+    for (const double value : values) sum += std::log(value);
+    return values.empty() ? none : std::exp(sum / double(values.size()));
+}
+
+double logSlope(const std::vector<double>& x, const std::vector<double>& y) {
+    const std::size_t count = std::min(x.size(), y.size());
+    if (count < 2) return none;
+    double mx = 0, my = 0, xx = 0, xy = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+        mx += std::log(x[i]) / double(count);
+        my += std::log(y[i]) / double(count);
+    }
+    for (std::size_t i = 0; i < count; ++i) {
+        xx += (std::log(x[i]) - mx) * (std::log(x[i]) - mx);
+        xy += (std::log(x[i]) - mx) * (std::log(y[i]) - my);
+    }
+    return xy / xx;
+}
+
+Footprint inChild(const std::function<Scene()>& make, const Job& job, int repetitions, double seconds) {
+    if (threadsOfThisProcess() != threadsAtStart)
+        throw std::logic_error("a process that runs several threads cannot be forked safely");
+    int ends[2];
+    if (::pipe(ends) != 0) throw std::runtime_error("no pipe to a child process");
+    const pid_t child = ::fork();
+    if (child < 0) throw std::runtime_error("no child process");
+    if (child == 0) {
+        ::close(ends[0]);
+        live(ends[1], make, job, repetitions, seconds);
+    }
+    ::close(ends[1]);
+    Answer answer;
+    const bool received = ::read(ends[0], &answer, sizeof answer) == ssize_t(sizeof answer);
+    ::close(ends[0]);
+    ::waitpid(child, nullptr, 0);
+    if (!received) throw std::runtime_error(std::string(nameOf(job.builder)) + ": the child process died");
+    if (!answer.ok) throw std::runtime_error(std::string(nameOf(job.builder)) + ": " + answer.error.data());
+    return answer.footprint;
+}
+
+}  // namespace bilayer::bench

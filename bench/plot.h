@@ -1,0 +1,28 @@
+// A log-log plot as an SVG file: panels side by side, labelled lines, decades with grid lines.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace bilayer::bench {
+
+/// A line: its points and the text at its end.
+struct Line {
+    std::string label;
+    std::vector<double> x, y;  ///< positive
+};
+
+struct Panel {
+    std::string title, xLabel, yLabel;
+    std::vector<double> xTicks;  ///< where x is labelled; empty: at each decade
+    std::vector<Line> lines;     ///< at least one, of at least one point
+};
+
+/// Draws the panels; lines of the same place in each panel share a colour.
+std::string svg(const std::vector<Panel>& panels);
+
+/// Throws std::runtime_error that names the file when it cannot be written.
+void writeSvg(const std::filesystem::path& path, const std::vector<Panel>& panels);
+
+}  // namespace bilayer::bench

@@ -1,0 +1,46 @@
+// A plot shows each point where its numbers say.
+#include "bench/plot.h"
+
+#include <catch2/catch.hpp>
+#include <fstream>
+#include <iterator>
+#include <regex>
+
+#include "tests/support/support.h"
+
+using namespace bilayer;
+
+namespace {
+
+std::vector<std::pair<double, double>> circles(const std::string& svg) {
+    static const std::regex pattern(R"re(<circle cx="([0-9.]+)" cy="([0-9.]+)")re");
+    std::vector<std::pair<double, double>> found;
+    for (auto it = std::sregex_iterator(svg.begin(), svg.end(), pattern); it != std::sregex_iterator(); ++it)
+        found.push_back({std::stod((*it)[1]), std::stod((*it)[2])});
+    return found;
+}
+
+}  // namespace
+
+TEST_CASE("equal ratios are equal distances in a plot") {
+    const bench::Panel panel{"title", "x", "y", {}, {{"line, slope 1", {10, 100, 1000}, {0.02, 0.2, 2}}}};
+    const std::string svg = bench::svg({panel, panel});
+    const auto at = circles(svg);
+    REQUIRE(at.size() == 6);
+    CHECK(at[1].first - at[0].first == Approx(at[2].first - at[1].first).margin(0.11));
+    CHECK(at[0].second - at[1].second == Approx(at[1].second - at[2].second).margin(0.11));
+    CHECK(at[0].first < at[1].first);
+    CHECK(at[0].second > at[1].second);  // pixels count downward
+    for (const char* words : {">title<", ">line<", ">slope 1<", ">0.1<", ">100<"})
+        CHECK(svg.find(words) != std::string::npos);
+}
+
+TEST_CASE("a plot is written to a file, or the file is named") {
+    const std::vector<bench::Panel> panels{{"t", "x", "y", {64, 128}, {{"a", {64, 128}, {1, 4}}}}};
+    const auto path = test::scratch("plot.svg");
+    bench::writeSvg(path, panels);
+    std::ifstream file(path);
+    CHECK(std::string(std::istreambuf_iterator<char>(file), {}) == bench::svg(panels));
+    CHECK_THROWS_WITH(bench::writeSvg("/nonexistent/plot.svg", panels), Catch::Contains("/nonexistent/plot.svg"));
+    CHECK_THROWS_AS(bench::svg({{"t", "x", "y", {}, {}}}), std::invalid_argument);
+}
