@@ -21,6 +21,8 @@ constexpr double leastRoundnessOpen = 1e-2;
 /// Points at which an open piece of negative volume is asked whether it bounds a solid as it stands: a half is told
 /// from little.
 constexpr std::size_t samplesOfPiece = 32;
+/// Nested doubts of open pieces settle one a pass; more than a few are not worth the time.
+constexpr int mostPasses = 8;
 
 struct Piece {
     Bounds bounds;
@@ -297,11 +299,26 @@ class Orienter {
     std::vector<bool> turned_;       // of each triangle
 };
 
+std::size_t countDifferent(const Mesh& a, const Mesh& b) {
+    std::size_t count = 0;
+    for (std::size_t i = 0; i < a.triangles.size(); ++i) count += a.triangles[i] != b.triangles[i];
+    return count;
+}
+
 }  // namespace
 
 Orientation orient(const Mesh& mesh) {
     validate(mesh);
-    return Orienter(mesh).run();
+    Orientation all = Orienter(mesh).run();
+    // open pieces are judged by what is around them, which may just have been turned
+    for (int pass = 1; pass < mostPasses && all.turnedTriangles > 0; ++pass) {
+        const Orientation next = Orienter(all.mesh).run();
+        if (next.turnedTriangles == 0) break;
+        all.mesh = next.mesh;
+        all.turnedComponents += next.turnedComponents;
+    }
+    all.turnedTriangles = countDifferent(mesh, all.mesh);
+    return all;
 }
 
 }  // namespace bilayer
