@@ -53,9 +53,9 @@ Bounding Sides::measure(std::span<const unsigned> triangles, std::size_t samples
 // The copies of a triangle add half of their number to the winding number on either side, all others the mean of their
 // crossings.
 void Sides::add(unsigned triangle, std::size_t sample, Bounding& sum) const {
-    // a large triangle gets many samples: points of R. Kronecker's sequence, not always the centre
-    double u = std::fmod(0.5 + 0.7548776662466927 * double(sample), 1);
-    double v = std::fmod(0.5 + 0.5698402909980532 * double(sample), 1);
+    // a large triangle gets many samples: points of R. Kronecker's sequence, the first of them off the edges
+    double u = std::fmod(0.25 + 0.7548776662466927 * double(sample), 1);
+    double v = std::fmod(0.25 + 0.5698402909980532 * double(sample), 1);
     if (u + v > 1) {
         u = 1 - u;
         v = 1 - v;
