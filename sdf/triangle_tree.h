@@ -22,10 +22,11 @@ class TriangleTree {
   public:
     explicit TriangleTree(const Mesh& mesh);
 
-    /// Calls visit(triangle) for the triangles whose own boxes meet the box, borders included.
-    template <class Visit>
-    void overlapping(const Bounds& box, Visit visit) const {
-        descend([&](const Bounds& node) { return meet(node, box); }, visit);
+    /// Calls visit(triangle) for the triangles whose own boxes meets(box) holds for; it must hold for any box around
+    /// such a box.
+    template <class Meets, class Visit>
+    void descend(const Meets& meets, const Visit& visit) const {
+        if (!levels_.empty() && meets(levels_.back()[0])) descend(levels_.size() - 1, 0, meets, visit);
     }
 
     /// All triangles that a line meets, both ways, in no order. An edge that two triangles share is met once, but for
@@ -37,15 +38,6 @@ class TriangleTree {
   private:
     static constexpr std::size_t fanOut = 4;  // children of a box, and triangles of the lowest ones
 
-    static bool meet(const Bounds& a, const Bounds& b) {
-        return a.lower.x <= b.upper.x && b.lower.x <= a.upper.x && a.lower.y <= b.upper.y && b.lower.y <= a.upper.y &&
-               a.lower.z <= b.upper.z && b.lower.z <= a.upper.z;
-    }
-
-    template <class Meets, class Visit>
-    void descend(const Meets& meets, const Visit& visit) const {
-        if (!levels_.empty() && meets(levels_.back()[0])) descend(levels_.size() - 1, 0, meets, visit);
-    }
     template <class Meets, class Visit>
     void descend(std::size_t level, std::size_t node, const Meets& meets, const Visit& visit) const {
         const std::size_t count = level ? levels_[level - 1].size() : order_.size();
