@@ -14,9 +14,9 @@
 namespace bilayer {
 namespace {
 
-/// The most of the area that may bound nothing for winding numbers to make sense of the rest. Of the public meshes that
-/// are open or broken, 30 have less than a tenth, the others (soups, sheets, furniture of single walls) a quarter or
-/// more.
+/// The most of the area that may bound nothing for winding numbers to make sense of the rest. Of the 35 public meshes
+/// that stay open or broken after orienting, 24 have less than a tenth of it; the others (soups, sheets, furniture of
+/// single walls) have a fifth or more.
 constexpr double mostNothing = 0.15;
 
 std::string holes(const Mesh& mesh) {
