@@ -1,17 +1,21 @@
 #include "sdf/inspect.h"
 
+#include <fmt/format.h>
+#include <oneapi/tbb/blocked_range.h>
 #include <oneapi/tbb/parallel_reduce.h>
-#include <oneapi/tbb/parallel_sort.h>
 
 #include <algorithm>
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
-#include <glm/gtc/constants.hpp>
-#include <glm/vector_relational.hpp>
 #include <limits>
 #include <numeric>
-#include <tuple>
+#include <span>
+
+#include "sdf/orient.h"
+#include "sdf/piercing.h"
+#include "sdf/topology.h"
+#include "sdf/triangle_tree.h"
 
 namespace bilayer {
 namespace {
@@ -22,16 +26,7 @@ constexpr int mostCellsAlongSide = 512;
 /// A wall that a ray leaves under a flatter angle than this is an edge, not a wall (cosine).
 constexpr float leastFacing = 0.2f;
 
-struct Edge {
-    unsigned low, high, triangle;
-    bool forward;  // the triangle runs it from low to high
-    bool operator<(const Edge& other) const { return std::tie(low, high) < std::tie(other.low, other.high); }
-    bool same(const Edge& other) const { return low == other.low && high == other.high; }
-};
-
 struct Component {
-    std::vector<unsigned> triangles;
-    Bounds bounds;
     double volume = 0;
     bool closed = true;
 };
@@ -41,62 +36,75 @@ glm::dvec3 areaVector(const Mesh& mesh, const glm::uvec3& t) {
     return 0.5 * glm::cross(b - a, c - a);
 }
 
-void countEdges(const Mesh& mesh, const std::vector<unsigned>& componentOf, std::vector<Component>& components,
-                MeshReport& report) {
-    std::vector<Edge> edges;
-    edges.reserve(3 * mesh.triangles.size());
-    for (unsigned i = 0; i < mesh.triangles.size(); ++i)
-        for (int k = 0; k < 3; ++k) {
-            const unsigned a = mesh.triangles[i][k], b = mesh.triangles[i][(k + 1) % 3];
-            edges.push_back({std::min(a, b), std::max(a, b), i, a < b});
-        }
-    tbb::parallel_sort(edges.begin(), edges.end());
-    for (std::size_t i = 0, j; i < edges.size(); i = j) {
-        for (j = i; j < edges.size() && edges[j].same(edges[i]);) ++j;
-        if (j - i == 1) {
-            ++report.boundaryEdges;
-            components[componentOf[edges[i].triangle]].closed = false;
-        }
-        report.nonManifoldEdges += j - i > 2;
-        const auto forward =
-            std::count_if(&edges[i], &edges[i] + (j - i), [](const Edge& edge) { return edge.forward; });
-        report.misorientedEdges += j - i > 1 && 2 * std::size_t(forward) != j - i;
-    }
+int netRuns(std::span<const EdgeUse> uses) {
+    int net = 0;
+    for (const EdgeUse& use : uses) net += use.direction();
+    return net;
 }
 
-std::size_t countDuplicates(const Mesh& mesh) {
-    std::vector<std::tuple<unsigned, unsigned, unsigned>> corners;
-    corners.reserve(mesh.triangles.size());
-    for (const auto& t : mesh.triangles) {
-        unsigned sorted[3] = {t.x, t.y, t.z};
-        std::sort(sorted, sorted + 3);
-        corners.emplace_back(sorted[0], sorted[1], sorted[2]);
-    }
-    tbb::parallel_sort(corners.begin(), corners.end());
+void countEdges(const Topology& topology, const std::vector<unsigned>& componentOf, std::vector<Component>& components,
+                MeshReport& report) {
+    topology.forEachEdge([&](std::span<const EdgeUse> uses) {
+        if (uses.size() == 1) {
+            ++report.boundaryEdges;
+            components[componentOf[uses[0].triangle]].closed = false;
+        }
+        report.nonManifoldEdges += uses.size() > 2;
+        report.misorientedEdges += uses.size() > 1 && netRuns(uses) != 0;
+    });
+}
+
+// Holes: sets of boundary edges that share vertices.
+std::size_t countLoops(const Topology& topology, std::size_t vertices) {
+    Sets sets(vertices);
+    std::vector<unsigned> ends;
+    topology.forEachEdge([&](std::span<const EdgeUse> uses) {
+        if (uses.size() != 1) return;
+        sets.join(uses[0].low, uses[0].high);
+        ends.push_back(uses[0].low);
+    });
+    for (unsigned& end : ends) end = sets.root(end);
+    std::sort(ends.begin(), ends.end());
+    return std::size_t(std::unique(ends.begin(), ends.end()) - ends.begin());
+}
+
+// Vertices whose triangles form several fans: the corners at a vertex that edges connect are one fan.
+std::size_t countNonManifoldVertices(const Topology& topology, std::size_t vertices) {
+    const auto corner = [&](unsigned triangle, unsigned vertex) {
+        const glm::uvec3& t = topology.triangles[triangle];
+        return 3 * triangle + (t.x == vertex ? 0 : t.y == vertex ? 1 : 2);
+    };
+    Sets fans(3 * topology.triangles.size());
+    topology.forEachEdge([&](std::span<const EdgeUse> uses) {
+        for (const EdgeUse& use : uses.subspan(1)) {
+            fans.join(corner(uses[0].triangle, use.low), corner(use.triangle, use.low));
+            fans.join(corner(uses[0].triangle, use.high), corner(use.triangle, use.high));
+        }
+    });
+    std::vector<unsigned> count(vertices, 0);
+    for (unsigned i = 0; i < topology.triangles.size(); ++i)
+        for (unsigned k = 0; k < 3; ++k) count[topology.triangles[i][k]] += fans.root(3 * i + k) == 3 * i + k;
+    return std::size_t(std::count_if(count.begin(), count.end(), [](unsigned n) { return n > 1; }));
+}
+
+std::size_t countDuplicates(const Topology& topology) {
     std::size_t duplicates = 0;
-    for (std::size_t i = 1; i < corners.size(); ++i) duplicates += corners[i] == corners[i - 1];
+    for (unsigned i = 0; i < topology.original.size(); ++i) duplicates += topology.original[i] != i;
     return duplicates;
 }
 
-// Sets of vertices that triangles connect, by union-find; gives each triangle the number of its set.
+// Sets of triangles that share vertices; gives each triangle the number of its set.
 std::vector<unsigned> components(const Mesh& mesh, std::size_t& count) {
-    std::vector<unsigned> parent(mesh.points.size());
-    std::iota(parent.begin(), parent.end(), 0u);
-    const auto root = [&](unsigned i) {
-        while (parent[i] != i) i = parent[i] = parent[parent[i]];
-        return i;
-    };
+    Sets sets(mesh.points.size());
     for (const auto& t : mesh.triangles) {
-        const unsigned a = root(t.x);
-        parent[root(t.y)] = a;
-        parent[root(t.z)] = a;
+        sets.join(t.x, t.y);
+        sets.join(t.x, t.z);
     }
-    constexpr unsigned none = ~0u;
-    std::vector<unsigned> number(mesh.points.size(), none), of(mesh.triangles.size());
+    std::vector<unsigned> number(mesh.points.size(), noPart), of(mesh.triangles.size());
     count = 0;
     for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
-        unsigned& n = number[root(mesh.triangles[i].x)];
-        if (n == none) n = unsigned(count++);
+        unsigned& n = number[sets.root(mesh.triangles[i].x)];
+        if (n == noPart) n = unsigned(count++);
         of[i] = n;
     }
     return of;
@@ -107,45 +115,21 @@ std::vector<Component> gather(const Mesh& mesh, const std::vector<unsigned>& of,
     const glm::dvec3 origin(bounds(mesh).centre());
     for (std::size_t i = 0; i < of.size(); ++i) {
         const auto& t = mesh.triangles[i];
-        Component& c = all[of[i]];
-        c.triangles.push_back(unsigned(i));
-        for (int k = 0; k < 3; ++k) c.bounds.add(mesh.points[t[k]]);
-        c.volume += glm::dot(areaVector(mesh, t), glm::dvec3(mesh.points[t.x]) - origin) / 3;
+        all[of[i]].volume += glm::dot(areaVector(mesh, t), glm::dvec3(mesh.points[t.x]) - origin) / 3;
     }
     return all;
 }
 
-double windingNumber(const Mesh& mesh, const Component& component, const glm::dvec3& point) {
-    // solid angles: A. Van Oosterom, J. Strackee, "The Solid Angle of a Plane Triangle", 1983
-    double angle = 0;
-    for (const unsigned i : component.triangles) {
-        const auto& t = mesh.triangles[i];
-        const glm::dvec3 a = glm::dvec3(mesh.points[t.x]) - point, b = glm::dvec3(mesh.points[t.y]) - point,
-                         c = glm::dvec3(mesh.points[t.z]) - point;
-        const double la = glm::length(a), lb = glm::length(b), lc = glm::length(c);
-        angle += 2 * std::atan2(glm::dot(a, glm::cross(b, c)),
-                                la * lb * lc + glm::dot(a, b) * lc + glm::dot(b, c) * la + glm::dot(c, a) * lb);
-    }
-    return angle / (4 * glm::pi<double>());
-}
-
-bool contains(const Bounds& box, const glm::vec3& p) {
-    return glm::all(glm::lessThanEqual(box.lower, p)) && glm::all(glm::lessThanEqual(p, box.upper));
-}
-
 // A component within an even number of others should have positive volume, a cavity within an odd number negative
 // volume.
-std::size_t countInsideOut(const Mesh& mesh, const std::vector<Component>& all) {
+std::size_t countInsideOut(const Mesh& mesh, const TriangleTree& tree, std::vector<unsigned> of,
+                           const std::vector<Component>& all) {
+    for (unsigned& component : of)
+        if (!all[component].closed) component = noPart;
+    const auto enclosing = enclosingParts(mesh, tree, of, all.size());
     std::size_t wrong = 0;
-    for (const Component& inner : all) {
-        if (!inner.closed) continue;
-        const glm::vec3 point = mesh.points[mesh.triangles[inner.triangles[0]].x];
-        int depth = 0;
-        for (const Component& outer : all)
-            if (&outer != &inner && outer.closed && contains(outer.bounds, point))
-                depth += std::abs(windingNumber(mesh, outer, point)) > 0.5;
-        wrong += (inner.volume < 0) != (depth % 2 == 1);
-    }
+    for (std::size_t i = 0; i < all.size(); ++i)
+        wrong += all[i].closed && (all[i].volume < 0) != (enclosing[i].size() % 2 == 1);
     return wrong;
 }
 
@@ -274,19 +258,49 @@ MeshReport inspect(const Mesh& input, float wall) {
     report.degenerateTriangles = input.triangles.size() - mesh.triangles.size();
     if (mesh.triangles.empty()) return report;
     report.bounds = bounds(mesh);
+    const Topology topology(mesh);
+    const TriangleTree tree(mesh);
     const std::vector<unsigned> of = components(mesh, report.components);
     std::vector<Component> all = gather(mesh, of, report.components);
-    countEdges(mesh, of, all, report);
+    countEdges(topology, of, all, report);
+    report.boundaryLoops = countLoops(topology, mesh.points.size());
+    report.nonManifoldVertices = countNonManifoldVertices(topology, mesh.points.size());
     for (const Component& component : all) report.volume += component.volume;
     for (const auto& t : mesh.triangles) {
         const double area = glm::length(areaVector(mesh, t));
         report.area += area;
         report.degenerateTriangles += !(area > 0);
     }
-    report.duplicateTriangles = countDuplicates(mesh);
-    report.insideOutComponents = countInsideOut(mesh, all);
+    report.duplicateTriangles = countDuplicates(topology);
+    report.insideOutComponents = countInsideOut(mesh, tree, of, all);
+    report.selfIntersections = countPiercingPairs(mesh, tree);
+    report.flippedTriangles = orient(mesh).turnedTriangles;
     findThinWalls(mesh, wall, report);
     return report;
+}
+
+std::string verdict(const MeshReport& report) {
+    if (report.triangles == 0 || report.triangles == report.degenerateTriangles) return "no triangle has an area";
+    std::string text = !report.closed()    ? (report.boundaryEdges ? "open" : "closed, but not everywhere a surface")
+                       : report.oriented() ? "closed and oriented"
+                                           : "closed, but not oriented";
+    const char* separator = ": ";
+    const auto add = [&](std::size_t count, const char* one, const char* many, const std::string& more = "") {
+        if (count == 0) return;
+        text += fmt::format("{}{} {}{}", separator, count, count == 1 ? one : many, more);
+        separator = ", ";
+    };
+    add(report.boundaryEdges, "boundary edge", "boundary edges",
+        fmt::format(" in {} {}", report.boundaryLoops, report.boundaryLoops == 1 ? "loop" : "loops"));
+    add(report.nonManifoldEdges, "non-manifold edge", "non-manifold edges");
+    add(report.misorientedEdges, "misoriented edge", "misoriented edges");
+    add(report.insideOutComponents, "component inside out", "components inside out");
+    add(report.flippedTriangles, "triangle to be turned", "triangles to be turned");
+    add(report.selfIntersections, "pair of triangles intersecting", "pairs of triangles intersecting");
+    add(report.nonManifoldVertices, "non-manifold vertex", "non-manifold vertices");
+    add(report.duplicateTriangles, "repeated triangle", "repeated triangles");
+    add(report.degenerateTriangles, "triangle without area", "triangles without area");
+    return text;
 }
 
 }  // namespace bilayer

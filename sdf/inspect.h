@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <string>
 
 #include "sdf/mesh.h"
 
@@ -13,11 +14,15 @@ struct MeshReport {
     std::size_t triangles = 0;
     std::size_t components = 0;           ///< sets of triangles that share vertices
     Bounds bounds;                        ///< [m]
-    std::size_t boundaryEdges = 0;        ///< edges of one triangle: holes
+    std::size_t boundaryEdges = 0;        ///< edges of one triangle
     std::size_t nonManifoldEdges = 0;     ///< edges of three triangles or more
     std::size_t misorientedEdges = 0;     ///< edges that their triangles do not run both ways equally often
     std::size_t degenerateTriangles = 0;  ///< triangles without area
     std::size_t duplicateTriangles = 0;   ///< triangles whose three vertices another one has already
+    std::size_t boundaryLoops = 0;        ///< sets of boundary edges that share vertices: holes
+    std::size_t nonManifoldVertices = 0;  ///< vertices whose triangles form more than one fan
+    std::size_t selfIntersections = 0;    ///< pairs of triangles that share no edge and where an edge pierces the other
+    std::size_t flippedTriangles = 0;     ///< triangles that orient() would turn around
     std::size_t insideOutComponents =
         0;                      ///< closed components that bound space from the wrong side (nested ones allowed)
     float thinnestWall = 0;     ///< smallest thickness of the solid behind a triangle [m]; 0: none was found
@@ -35,5 +40,8 @@ struct MeshReport {
 /// @param wall  thickness below which a wall counts as thin [m], often one voxel; 0 counts none
 /// Throws as validate() does.
 MeshReport inspect(const Mesh& mesh, float wall = 0);
+
+/// The report in one sentence without a full stop: "closed and oriented", or what is wrong, the worst first.
+std::string verdict(const MeshReport& report);
 
 }  // namespace bilayer

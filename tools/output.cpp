@@ -21,13 +21,15 @@ Json vector(const glm::vec3& v) {
 }
 
 std::string holes(const MeshReport& report) {
-    return fmt::format("{} ({} boundary edges, {} non-manifold edges)", report.closed() ? "yes" : "no",
-                       grouped(report.boundaryEdges), grouped(report.nonManifoldEdges));
+    return fmt::format("{} ({} boundary edges in {} loops, {} non-manifold edges, {} non-manifold vertices)",
+                       report.closed() ? "yes" : "no", grouped(report.boundaryEdges), grouped(report.boundaryLoops),
+                       grouped(report.nonManifoldEdges), grouped(report.nonManifoldVertices));
 }
 
 std::string orientation(const MeshReport& report) {
-    return fmt::format("{} ({} misoriented edges, {} inside-out components)", report.oriented() ? "yes" : "no",
-                       grouped(report.misorientedEdges), grouped(report.insideOutComponents));
+    return fmt::format("{} ({} misoriented edges, {} inside-out components, {} triangles to be turned)",
+                       report.oriented() ? "yes" : "no", grouped(report.misorientedEdges),
+                       grouped(report.insideOutComponents), grouped(report.flippedTriangles));
 }
 
 }  // namespace
@@ -77,18 +79,23 @@ std::string boxText(const Bounds& bounds) {
 }
 
 Json toJson(const MeshReport& report, float wall) {
-    return {{"points", report.points},
+    return {{"verdict", verdict(report)},
+            {"points", report.points},
             {"triangles", report.triangles},
             {"components", report.components},
             {"bounds", box(report.bounds)},
             {"closed", report.closed()},
             {"oriented", report.oriented()},
             {"boundaryEdges", report.boundaryEdges},
+            {"boundaryLoops", report.boundaryLoops},
             {"nonManifoldEdges", report.nonManifoldEdges},
+            {"nonManifoldVertices", report.nonManifoldVertices},
             {"misorientedEdges", report.misorientedEdges},
             {"degenerateTriangles", report.degenerateTriangles},
             {"duplicateTriangles", report.duplicateTriangles},
             {"insideOutComponents", report.insideOutComponents},
+            {"flippedTriangles", report.flippedTriangles},
+            {"selfIntersections", report.selfIntersections},
             {"wall", number(wall)},
             {"thinWalls", report.thinWalls},
             {"thinnestWall", number(report.thinnestWall)},
@@ -97,12 +104,14 @@ Json toJson(const MeshReport& report, float wall) {
 }
 
 void addRows(Table& table, const MeshReport& report, float wall) {
+    table.row("verdict", verdict(report));
     table.row("points", grouped(report.points));
     table.row("triangles", grouped(report.triangles));
     table.row("components", grouped(report.components));
     table.row("bounds", boxText(report.bounds));
     table.row("closed", holes(report));
     table.row("oriented", orientation(report));
+    table.row("self-intersections", fmt::format("{} pairs of triangles", grouped(report.selfIntersections)));
     table.row("degenerate triangles", grouped(report.degenerateTriangles));
     table.row("duplicate triangles", grouped(report.duplicateTriangles));
     if (report.thinnestWall > 0) table.row("thinnest wall", metres(report.thinnestWall));

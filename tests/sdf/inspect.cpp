@@ -109,3 +109,46 @@ TEST_CASE("the public corpus is reported as it is known to be") {
     CHECK(inspect(readMesh(*test::corpusMesh("casting_inverted.off"))).insideOutComponents == 1);
     CHECK(inspect(readMesh(*test::corpusMesh("cgal-cube-shuffled.off"))).misorientedEdges == 9);
 }
+
+TEST_CASE("pairs of triangles that run through each other are counted") {
+    const Mesh box = shapes::box({1, 1, 1});
+    CHECK(inspect(box).selfIntersections == 0);
+    // touching in a plane, along an edge or at a corner is no piercing
+    CHECK(inspect(shapes::join({box, moved(box, {2, 0.5f, 0.25f})})).selfIntersections == 0);
+    CHECK(inspect(shapes::join({box, moved(box, {2, 2, 2})})).selfIntersections == 0);
+    Mesh needle = box;
+    needle.points.insert(needle.points.end(), {{0.25f, 0.5f, -3}, {0.25f, 0.5f, 3}, {9, 0.5f, 3}});
+    needle.triangles.push_back({8, 9, 10});
+    CHECK(inspect(needle).selfIntersections > 2);
+    CHECK(inspect(needle).boundaryLoops == 1);
+}
+
+TEST_CASE("piercings, loops and fans of the public corpus are those of an independent count") {
+    struct Case {
+        const char* name;
+        std::size_t piercings, loops, vertices;
+    };
+    for (const Case& c :
+         {Case{"dragon_vrip_871k.ply", 206, 0, 0}, Case{"brain.ply", 2182, 9, 2}, Case{"hippo.ply", 274, 1, 3},
+          Case{"kiva_pod_lowres.stl", 6815, 4, 44}, Case{"diff_ring.stl", 706, 0, 0},
+          Case{"counter.unitsmm.STL", 2272, 0, 0}, Case{"soup.stl", 1248, 100, 0}, Case{"suzanne.obj", 90, 4, 2},
+          Case{"cgal-elephant-with-holes.off", 0, 106, 65}, Case{"bunny_watertight.obj", 0, 0, 0}}) {
+        const auto path = test::corpusMesh(c.name);
+        if (!path) return;
+        const MeshReport report = inspect(readMesh(*path));
+        CAPTURE(c.name);
+        CHECK(report.selfIntersections == c.piercings);
+        CHECK(report.boundaryLoops == c.loops);
+        CHECK(report.nonManifoldVertices == c.vertices);
+    }
+}
+
+TEST_CASE("the verdict says what is wrong") {
+    Mesh mesh = shapes::box({1, 1, 1});
+    CHECK(verdict(inspect(mesh)) == "closed and oriented");
+    CHECK(verdict(inspect(flipped(mesh))) ==
+          "closed, but not oriented: 1 component inside out, 12 triangles to be turned");
+    mesh.triangles.pop_back();
+    CHECK(verdict(inspect(mesh)) == "open: 3 boundary edges in 1 loop");
+    CHECK(verdict(inspect(Mesh{{{0, 0, 0}, {1, 0, 0}}, {{0, 0, 1}}})) == "no triangle has an area");
+}

@@ -1,0 +1,118 @@
+#include "sdf/topology.h"
+
+#include <oneapi/tbb/blocked_range.h>
+#include <oneapi/tbb/parallel_for.h>
+#include <oneapi/tbb/parallel_sort.h>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <tuple>
+
+namespace bilayer {
+namespace {
+
+// Spreads every bit of a word over all of it: the finalizer of S. Vigna's and G. Steele's SplitMix64.
+std::uint64_t mixed(std::uint64_t word) {
+    word = (word ^ (word >> 30)) * 0xbf58476d1ce4e5b9u;
+    word = (word ^ (word >> 27)) * 0x94d049bb133111ebu;
+    return word ^ (word >> 31);
+}
+
+// The bits of a coordinate; adding zero makes -0 into 0.
+std::uint64_t bitsOf(float coordinate) {
+    return std::bit_cast<std::uint32_t>(coordinate + 0.0f);
+}
+
+// For each vertex, the first vertex with equal coordinates.
+std::vector<unsigned> firstOfEqual(const Mesh& mesh) {
+    struct Vertex {
+        glm::vec3 point;
+        unsigned number;
+        auto key() const { return std::tie(point.x, point.y, point.z, number); }
+    };
+    std::vector<Vertex> order(mesh.points.size());
+    tbb::parallel_for(std::size_t(0), order.size(), [&](std::size_t i) { order[i] = {mesh.points[i], unsigned(i)}; });
+    tbb::parallel_sort(order.begin(), order.end(), [](const Vertex& a, const Vertex& b) { return a.key() < b.key(); });
+    std::vector<unsigned> first(order.size());
+    for (std::size_t i = 0; i < order.size(); ++i) {
+        const bool same = i > 0 && order[i].point == order[i - 1].point;
+        first[order[i].number] = same ? first[order[i - 1].number] : order[i].number;
+    }
+    return first;
+}
+
+// Buckets by the lower vertex, then a small sort in each: linear, where a sort of all edges is not.
+std::vector<EdgeUse> sortedEdges(const Topology& topology, std::size_t vertices) {
+    std::vector<unsigned> begins(vertices + 1, 0);
+    const auto forEachUse = [&](auto visit) {
+        for (unsigned i = 0; i < topology.triangles.size(); ++i) {
+            if (!topology.proper(i)) continue;
+            for (int k = 0; k < 3; ++k) {
+                const unsigned a = topology.triangles[i][k], b = topology.triangles[i][(k + 1) % 3];
+                visit(EdgeUse{std::min(a, b), std::max(a, b), i, a < b});
+            }
+        }
+    };
+    forEachUse([&](const EdgeUse& use) { ++begins[use.low + 1]; });
+    std::partial_sum(begins.begin(), begins.end(), begins.begin());
+    std::vector<EdgeUse> edges(begins.back());
+    std::vector<unsigned> next(begins.begin(), begins.end() - 1);
+    forEachUse([&](const EdgeUse& use) { edges[next[use.low]++] = use; });
+    tbb::parallel_for(std::size_t(0), vertices, [&](std::size_t v) {
+        std::sort(edges.begin() + begins[v], edges.begin() + begins[v + 1], [](const EdgeUse& a, const EdgeUse& b) {
+            return std::tie(a.high, a.triangle) < std::tie(b.high, b.triangle);
+        });
+    });
+    return edges;
+}
+
+std::array<unsigned, 3> corners(glm::uvec3 t) {
+    std::array<unsigned, 3> sorted = {t.x, t.y, t.z};
+    std::sort(sorted.begin(), sorted.end());
+    return sorted;
+}
+
+// Triangles with the same vertices share all edges, so the uses of one edge are enough to find them.
+std::vector<unsigned> originals(const Topology& topology) {
+    std::vector<unsigned> original(topology.triangles.size());
+    std::iota(original.begin(), original.end(), 0u);
+    std::vector<std::pair<std::array<unsigned, 3>, unsigned>> all;
+    topology.forEachEdge([&](std::span<const EdgeUse> uses) {
+        if (uses.size() < 2) return;
+        all.clear();
+        for (const EdgeUse& use : uses) all.emplace_back(corners(topology.triangles[use.triangle]), use.triangle);
+        std::sort(all.begin(), all.end());
+        for (std::size_t i = 1; i < all.size(); ++i)
+            if (all[i].first == all[i - 1].first) original[all[i].second] = original[all[i - 1].second];
+    });
+    return original;
+}
+
+}  // namespace
+
+Topology::Topology(const Mesh& mesh) : triangles(mesh.triangles.size()) {
+    const std::vector<unsigned> first = firstOfEqual(mesh);
+    for (std::size_t i = 0; i < triangles.size(); ++i)
+        for (int k = 0; k < 3; ++k) triangles[i][k] = first[mesh.triangles[i][k]];
+    edges = sortedEdges(*this, mesh.points.size());
+    original = originals(*this);
+}
+
+bool Topology::proper(std::size_t triangle) const {
+    const glm::uvec3& t = triangles[triangle];
+    return t.x != t.y && t.y != t.z && t.z != t.x;
+}
+
+std::vector<std::uint64_t> hashVertices(const Mesh& mesh) {
+    std::vector<std::uint64_t> hashes(mesh.points.size());
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, hashes.size(), 4096), [&](const auto& range) {
+        for (std::size_t i = range.begin(); i < range.end(); ++i) {
+            const glm::vec3& p = mesh.points[i];
+            hashes[i] = mixed(mixed(bitsOf(p.x) | bitsOf(p.y) << 32) + bitsOf(p.z));
+        }
+    });
+    return hashes;
+}
+
+}  // namespace bilayer

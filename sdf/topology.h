@@ -1,0 +1,104 @@
+// Who shares what in a mesh, where vertices count as one if their coordinates are equal: edges with their triangles,
+// and sets that grow together. Triangles keep their numbers.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <numeric>
+#include <span>
+#include <vector>
+
+#include "sdf/mesh.h"
+
+namespace bilayer {
+
+/// One triangle's use of an edge.
+struct EdgeUse {
+    unsigned low, high;  ///< the edge's vertices
+    unsigned triangle;
+    bool forward;  ///< the triangle runs it from low to high
+
+    bool sameEdge(const EdgeUse& other) const { return low == other.low && high == other.high; }
+    int direction() const { return forward ? 1 : -1; }
+};
+
+/// The triangles and edges of a mesh after welding by coordinates (0 and -0 are equal).
+struct Topology {
+    explicit Topology(const Mesh& mesh);
+
+    std::vector<glm::uvec3> triangles;  ///< as in the mesh, each vertex replaced by the first of equal coordinates
+    std::vector<EdgeUse> edges;         ///< by (low, high, triangle); none of triangles that use a vertex twice
+    std::vector<unsigned> original;     ///< a triangle's first triangle with the same three vertices, often itself
+
+    /// Whether a triangle uses no vertex twice.
+    bool proper(std::size_t triangle) const;
+
+    /// Calls visit(std::span<const EdgeUse>) with all uses of each edge.
+    template <class Visit>
+    void forEachEdge(Visit visit) const {
+        for (std::size_t i = 0, j; i < edges.size(); i = j) {
+            for (j = i + 1; j < edges.size() && edges[j].sameEdge(edges[i]);) ++j;
+            visit(std::span(&edges[i], j - i));
+        }
+    }
+};
+
+/// 64 bits for each vertex that are equal where coordinates are.
+std::vector<std::uint64_t> hashVertices(const Mesh& mesh);
+
+/// 64 bits for an edge run from one vertex to another, given the hashes of both. Running it the other way gives the
+/// negative, so that the sum (modulo 2^64) over the triangles of a closed and oriented surface is zero; for any other
+/// it is zero with a probability of about 2^-63.
+inline std::uint64_t hashEdge(std::uint64_t from, std::uint64_t to) {
+    // the halves of a 128-bit product, each operand with a constant of its own, so that the order counts
+    __extension__ using Wide = unsigned __int128;
+    const auto folded = [](std::uint64_t a, std::uint64_t b) {
+        const Wide product = Wide(a ^ 0x9e3779b97f4a7c15u) * (b ^ 0xd1b54a32d192ed03u);
+        return std::uint64_t(product) ^ std::uint64_t(product >> 64);
+    };
+    return folded(from, to) - folded(to, from);
+}
+
+/// Disjoint sets of the numbers below n, by union-find (R. E. Tarjan, 1975). Each member is either like its set's root
+/// or its opposite.
+class Sets {
+  public:
+    explicit Sets(std::size_t n) : parent_(n), opposite_(n, 0) { std::iota(parent_.begin(), parent_.end(), 0u); }
+
+    unsigned root(unsigned i) { return find(i).root; }
+    bool oppositeToRoot(unsigned i) { return find(i).opposite; }
+
+    /// Puts a and b into one set, as opposites or alike; false if they are in one set already and otherwise related.
+    bool join(unsigned a, unsigned b, bool opposite = false) {
+        const Place pa = find(a), pb = find(b);
+        if (pa.root == pb.root) return (pa.opposite != pb.opposite) == opposite;
+        // the smaller number becomes the root: the same roots whatever the order of joining
+        const auto [low, high] = pa.root < pb.root ? std::pair(pa, pb) : std::pair(pb, pa);
+        parent_[high.root] = low.root;
+        opposite_[high.root] = (low.opposite != high.opposite) != opposite;
+        return true;
+    }
+
+  private:
+    struct Place {
+        unsigned root;
+        bool opposite;
+    };
+
+    Place find(unsigned i) {
+        bool opposite = false;
+        while (parent_[i] != i) {
+            // halve the path on the way
+            opposite_[i] ^= opposite_[parent_[i]];
+            parent_[i] = parent_[parent_[i]];
+            opposite ^= bool(opposite_[i]);
+            i = parent_[i];
+        }
+        return {i, opposite};
+    }
+
+    std::vector<unsigned> parent_;
+    std::vector<std::uint8_t> opposite_;  // to the parent; a root is not opposite to itself
+};
+
+}  // namespace bilayer

@@ -1,0 +1,183 @@
+#include "sdf/sign.h"
+
+#include <catch2/catch.hpp>
+#include <random>
+
+#include "demos/shared/shapes.h"
+#include "sdf/inspect.h"
+#include "sdf/mesh_io.h"
+#include "sdf/sides.h"
+#include "tests/support/support.h"
+
+using namespace bilayer;
+
+namespace {
+
+std::optional<Mesh> corpus(const std::string& name) {
+    const auto path = test::corpusMesh(name);
+    return path ? std::optional(readMesh(*path)) : std::nullopt;
+}
+
+// Every edge run equally often both ways, by counting.
+bool balancedByCounting(const Mesh& input) {
+    const Mesh mesh = weld(input);
+    std::vector<std::pair<std::pair<unsigned, unsigned>, int>> runs;
+    for (const auto& t : mesh.triangles)
+        for (int k = 0; k < 3; ++k) {
+            const unsigned a = t[k], b = t[(k + 1) % 3];
+            runs.push_back({std::minmax(a, b), a < b ? 1 : -1});
+        }
+    std::sort(runs.begin(), runs.end());
+    int net = 0;
+    for (std::size_t i = 0; i < runs.size(); ++i) {
+        net += runs[i].second;
+        const bool last = i + 1 == runs.size() || runs[i + 1].first != runs[i].first;
+        if (last && net != 0) return false;
+    }
+    return true;
+}
+
+}  // namespace
+
+TEST_CASE("balanced() agrees with counting edges, whatever is done to a mesh") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    std::mt19937 random(seed);
+    std::size_t yes = 0;
+    for (int round = 0; round < 2000; ++round) {
+        Mesh mesh = round % 2 ? shapes::box({1, 2, 3}, 2) : shapes::torus(2, 0.5f, 6, 5);
+        const auto any = [&] { return random() % mesh.triangles.size(); };
+        for (unsigned change = random() % 4; change > 0; --change) switch (random() % 6) {
+                case 0:
+                    std::swap(mesh.triangles[any()].x, mesh.triangles[any()].x);
+                    break;
+                case 1:
+                    mesh.triangles.erase(mesh.triangles.begin() + std::ptrdiff_t(any()));
+                    break;
+                case 2:
+                    mesh.triangles.push_back(mesh.triangles[any()]);
+                    break;
+                case 3: {
+                    glm::uvec3 t = mesh.triangles[any()];
+                    mesh.triangles.push_back(t);
+                    std::swap(t.y, t.z);
+                    mesh.triangles.push_back(t);
+                    break;
+                }
+                case 4:
+                    mesh.triangles.push_back({0, 0, 1});
+                    break;
+                default:  // a vertex of its own at the same place
+                    glm::uvec3& t = mesh.triangles[any()];
+                    mesh.points.push_back(mesh.points[t.x] * 1.f);
+                    t.x = unsigned(mesh.points.size() - 1);
+            }
+        CHECK(balanced(mesh) == balancedByCounting(mesh));
+        yes += balanced(mesh);
+    }
+    CHECK(yes > 200);
+    CHECK(yes < 1800);
+}
+
+TEST_CASE("balanced() takes zeros of both signs for one") {
+    Mesh mesh = shapes::box({1, 1, 1}, 2);
+    for (auto& t : mesh.triangles) {
+        glm::vec3 point = mesh.points[t.x];
+        for (int axis = 0; axis < 3; ++axis)
+            if (point[axis] == 0) point[axis] = -point[axis];
+        mesh.points.push_back(point);
+        t.x = unsigned(mesh.points.size() - 1);
+    }
+    CHECK(balanced(mesh));
+}
+
+TEST_CASE("what a surface bounds is told by area") {
+    CHECK(bounding(shapes::sphere(1, 3)).solid == 1);
+    const Bounding both = bounding(shapes::join({shapes::box({2, 2, 2}, 4), shapes::box({1, 1, 1}, 4)}));
+    CHECK(both.solid == Approx(0.8).margin(0.02));
+    CHECK(both.buried == Approx(0.2).margin(0.02));
+    Mesh sheet = shapes::box({1, 1, 1});
+    sheet.triangles.resize(2);
+    CHECK(bounding(sheet).nothing == 1);
+    // doubled faces: the winding number goes up by two behind a surface, and back to none behind a sheet
+    Mesh doubled = shapes::sphere(1, 2);
+    doubled.triangles.insert(doubled.triangles.end(), doubled.triangles.begin(), doubled.triangles.end());
+    CHECK(bounding(doubled).solid == 1);
+}
+
+TEST_CASE("closed and oriented public meshes keep their normals") {
+    for (const char* name : {"bunny_watertight.obj", "armadillo_100k.ply", "fandisk.obj", "cgal-cheese.off",
+                             "thingi_88566.stl", "sliver_tet.ply", "dinner_plate.obj", "cgal-knot2.off",
+                             "cube_with_fold.ply", "dragon_vrip_871k.ply", "factory_bolt_m16_loose.obj"}) {
+        const auto mesh = corpus(name);
+        if (!mesh) return;
+        CAPTURE(name);
+        const SignChoice choice = chooseSign(*mesh);
+        CHECK(choice.sign == Sign::normals);
+        CHECK(choice.reason == "closed and oriented");
+        CHECK_FALSE(choice.mended);
+    }
+}
+
+TEST_CASE("flipped and inside-out public meshes are mended") {
+    struct Case {
+        const char* name;
+        double volume;
+        bool conflict;  // balanced, so that only the build sees it
+    };
+    // the volumes are those of the same surfaces with outward normals; the shuffled files say nothing of theirs
+    for (const Case& c : {Case{"casting_inverted.off", 0.03391, true}, Case{"cgal-cube-shuffled.off", 8, false},
+                          Case{"cgal-blobby-shuffled.off", 0, false}}) {
+        const auto mesh = corpus(c.name);
+        if (!mesh) return;
+        CAPTURE(c.name);
+        const SignChoice choice = c.conflict ? chooseSignAfterConflict(*mesh) : chooseSign(*mesh);
+        CAPTURE(choice.reason);
+        CHECK(choice.sign == Sign::normals);
+        REQUIRE(choice.mended);
+        CHECK(balanced(*choice.mended));
+        const MeshReport report = inspect(*choice.mended);
+        CHECK(report.oriented());
+        CHECK(report.volume > 0);
+        if (c.volume > 0) CHECK(report.volume == Approx(c.volume).epsilon(1e-3));
+    }
+}
+
+TEST_CASE("open, broken and soup-like public meshes get what suits them") {
+    struct Case {
+        const char* name;
+        Sign sign;
+    };
+    for (const Case& c :
+         {Case{"bunny_zipper.ply", Sign::winding}, Case{"bunny_res2_nasty.ply", Sign::winding},
+          Case{"cgal-elephant-with-holes.off", Sign::winding}, Case{"hippo.ply", Sign::winding},
+          Case{"factory_nut_m16_loose_subdiv_3x.obj", Sign::winding},
+          Case{"cgal-tetra_intersected_by_triangle.off", Sign::winding}, Case{"kiva_pod_lowres.stl", Sign::winding},
+          Case{"truck.obj", Sign::winding}, Case{"moebius.obj", Sign::flood}, Case{"soup.stl", Sign::flood},
+          Case{"mp_chair.off", Sign::flood}, Case{"leoTest1.obj", Sign::flood},
+          Case{"cgal-degtri_sliding.off", Sign::flood}, Case{"formats/multi.ply", Sign::flood}}) {
+        const auto mesh = corpus(c.name);
+        if (!mesh) return;
+        const SignChoice choice = chooseSign(*mesh);
+        CAPTURE(c.name, choice.reason);
+        CHECK(choice.sign == c.sign);
+        CHECK_FALSE(choice.reason.empty());
+    }
+}
+
+TEST_CASE("after a conflict, surfaces that meet themselves get winding numbers, doubled sheets a flood") {
+    struct Case {
+        const char* name;
+        Sign sign;
+    };
+    for (const Case& c : {Case{"cgal-bones.off", Sign::winding}, Case{"self_intersectA.obj", Sign::winding},
+                          Case{"counter.unitsmm.STL", Sign::winding}, Case{"cow.obj", Sign::winding},
+                          Case{"mesh2sdf_plane.obj", Sign::flood}, Case{"degenerated.obj", Sign::flood}}) {
+        const auto mesh = corpus(c.name);
+        if (!mesh) return;
+        const SignChoice choice = chooseSignAfterConflict(*mesh);
+        CAPTURE(c.name, choice.reason);
+        CHECK(choice.sign == c.sign);
+        CHECK_FALSE(choice.mended);
+    }
+}
