@@ -21,13 +21,18 @@
 namespace bilayer {
 namespace {
 
-constexpr std::size_t leafTriangles = 8;
+using Symmetric2 = std::array<double, 6>;
+using Symmetric3 = std::array<double, 10>;
+
+constexpr std::size_t leafTriangles = 12;
 /// Ranges of triangles or edges below this are sorted out by one task.
 constexpr std::size_t taskItems = 4096;
 /// Expansions that may err by more than this are of no use: the node is opened. It also keeps sums of errors accurate.
 constexpr double uselessError = 10;
-/// The error of an estimate in parts of the way from its value to a half.
-constexpr double errorShare = 0.25;
+/// Where the sign of a voxel is to be handed on, the error of an estimate in parts of the way to a half.
+constexpr double handOn = 0.5;
+/// Room for rounding where nothing but the side of a half is asked for [1].
+constexpr double onlySide = 0.999;
 /// Room for the rounding of floats in distances that are added up [voxels].
 constexpr float slack = 1e-3f;
 /// Where the winding number may change by more than this from voxel to voxel it is asked for in smaller regions.
@@ -97,14 +102,46 @@ double solidAngle(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c)
     return 2 * std::atan2(determinant(a, b, c), below);
 }
 
-// Adds the symmetric part of s n^T.
-void addMoment(std::array<double, 6>& moment, const glm::dvec3& s, const glm::dvec3& n) {
-    moment[0] += s.x * n.x;
-    moment[1] += s.y * n.y;
-    moment[2] += s.z * n.z;
-    moment[3] += 0.5 * (s.x * n.y + s.y * n.x);
-    moment[4] += 0.5 * (s.y * n.z + s.z * n.y);
-    moment[5] += 0.5 * (s.z * n.x + s.x * n.z);
+// The symmetric part of a b^T: xx, yy, zz, xy, yz, zx.
+Symmetric2 product(const glm::dvec3& a, const glm::dvec3& b) {
+    return {a.x * b.x,
+            a.y * b.y,
+            a.z * b.z,
+            0.5 * (a.x * b.y + a.y * b.x),
+            0.5 * (a.y * b.z + a.z * b.y),
+            0.5 * (a.z * b.x + a.x * b.z)};
+}
+
+// The symmetric part of m (x) v: xxx, yyy, zzz, xxy, xxz, yyx, yyz, zzx, zzy, xyz.
+Symmetric3 product(const Symmetric2& m, const glm::dvec3& v) {
+    const auto& [xx, yy, zz, xy, yz, zx] = m;
+    const double third = 1.0 / 3;
+    return {xx * v.x,
+            yy * v.y,
+            zz * v.z,
+            third * (xx * v.y + 2 * xy * v.x),
+            third * (xx * v.z + 2 * zx * v.x),
+            third * (yy * v.x + 2 * xy * v.y),
+            third * (yy * v.z + 2 * yz * v.y),
+            third * (zz * v.x + 2 * zx * v.z),
+            third * (zz * v.y + 2 * yz * v.z),
+            third * (xy * v.z + yz * v.x + zx * v.y)};
+}
+
+template <std::size_t n>
+void add(std::array<double, n>& sum, const std::array<double, n>& part, double times = 1) {
+    for (std::size_t i = 0; i < n; ++i) sum[i] += times * part[i];
+}
+
+// What a tensor gives for one vector in all places, and what its trace gives for that vector.
+double cubic(const Symmetric3& t, const glm::dvec3& u) {
+    return t[0] * u.x * u.x * u.x + t[1] * u.y * u.y * u.y + t[2] * u.z * u.z * u.z +
+           3 * (u.x * u.x * (t[3] * u.y + t[4] * u.z) + u.y * u.y * (t[5] * u.x + t[6] * u.z) +
+                u.z * u.z * (t[7] * u.x + t[8] * u.y)) +
+           6 * t[9] * u.x * u.y * u.z;
+}
+double trace(const Symmetric3& t, const glm::dvec3& u) {
+    return (t[0] + t[5] + t[7]) * u.x + (t[1] + t[3] + t[8]) * u.y + (t[2] + t[4] + t[6]) * u.z;
 }
 
 // Touching counts. A shared edge's determinants are each other's negative to the last bit, so nothing slips between two
@@ -144,7 +181,7 @@ WindingNumber::WindingNumber(const Mesh& mesh) {
         WindingNumber& tree;
         const Mesh& mesh;
         std::vector<Item>& items;
-        void operator()(std::size_t at, std::size_t begin, std::size_t end) const {
+        Bounds operator()(std::size_t at, std::size_t begin, std::size_t end) const {
             Node& node = tree.nodes_[at];
             node.begin = std::uint32_t(begin);
             node.end = std::uint32_t(end);
@@ -161,15 +198,19 @@ WindingNumber::WindingNumber(const Mesh& mesh) {
             const std::size_t middle = split(items, begin, end), left = at + 1;
             const std::size_t right = left + nodesOver(middle - begin, leafTriangles);
             node.right = std::uint32_t(right);
+            Bounds box, other;
             both(
-                end - begin, [&] { (*this)(left, begin, middle); }, [&] { (*this)(right, middle, end); });
-            tree.sumChildren(node, tree.nodes_[left], tree.nodes_[right]);
+                end - begin, [&] { box = (*this)(left, begin, middle); }, [&] { other = (*this)(right, middle, end); });
+            box.add(other.lower);
+            box.add(other.upper);
+            tree.sumChildren(node, tree.nodes_[left], tree.nodes_[right], box);
+            return box;
         }
     };
     Builder{*this, mesh, items}(0, 0, count);
 }
 
-void WindingNumber::sumTriangles(Node& node) const {
+Bounds WindingNumber::sumTriangles(Node& node) const {
     const std::span triangles(triangles_.data() + node.begin, triangles_.data() + node.end);
     glm::dvec3 weighted(0), plain(0);
     node.total = 0;
@@ -184,31 +225,46 @@ void WindingNumber::sumTriangles(Node& node) const {
     node.centre = node.total > 0 ? weighted / node.total : plain / double(triangles.size());
     node.radius = node.spread = 0;
     node.moment = {};
+    node.moment2 = {};
+    Bounds box;
     for (const Corners& t : triangles) {
         const glm::dvec3 a = glm::dvec3(t[0]) - node.centre, b = glm::dvec3(t[1]) - node.centre,
                          c = glm::dvec3(t[2]) - node.centre;
         const glm::dvec3 n = 0.5 * glm::cross(b - a, c - a), s = (a + b + c) / 3.0;
         node.radius = std::max({node.radius, glm::length(a), glm::length(b), glm::length(c)});
-        // the integral of |x|^2 over a triangle: area / 12 (|a|^2 + |b|^2 + |c|^2 + 9 |s|^2)
-        node.spread += glm::length(n) / 12 * (glm::dot(a, a) + glm::dot(b, b) + glm::dot(c, c) + 9 * glm::dot(s, s));
-        addMoment(node.moment, s, n);
+        // the integral of x x^T over a triangle: area / 12 (a a^T + b b^T + c c^T + 9 s s^T)
+        Symmetric2 second{};
+        for (const glm::dvec3& corner : {a, b, c}) add(second, product(corner, corner), 1.0 / 12);
+        add(second, product(s, s), 9.0 / 12);
+        node.spread += glm::length(n) * (second[0] + second[1] + second[2]);
+        add(node.moment, product(s, n));
+        add(node.moment2, product(second, n));
+        for (const glm::vec3& corner : t) box.add(corner);
     }
+    return box;
 }
 
-void WindingNumber::sumChildren(Node& node, const Node& left, const Node& right) const {
+void WindingNumber::sumChildren(Node& node, const Node& left, const Node& right, const Bounds& box) const {
     node.total = left.total + right.total;
     node.centre = node.total > 0 ? (left.total * left.centre + right.total * right.centre) / node.total
                                  : 0.5 * (left.centre + right.centre);
     node.area = left.area + right.area;
     node.moment = {};
-    node.radius = node.spread = 0;
+    node.moment2 = {};
+    node.spread = 0;
+    double radius = 0;
     for (const Node* child : {&left, &right}) {
         const glm::dvec3 s = child->centre - node.centre;
-        node.radius = std::max(node.radius, glm::length(s) + child->radius);
+        radius = std::max(radius, glm::length(s) + child->radius);
         node.spread += child->spread + child->total * glm::dot(s, s);
-        for (std::size_t i = 0; i < 6; ++i) node.moment[i] += child->moment[i];
-        addMoment(node.moment, s, child->area);
+        add(node.moment, child->moment);
+        add(node.moment, product(s, child->area));
+        add(node.moment2, child->moment2);
+        add(node.moment2, product(child->moment, s), 2);
+        add(node.moment2, product(product(s, s), child->area));
     }
+    const glm::dvec3 corner = glm::max(node.centre - glm::dvec3(box.lower), glm::dvec3(box.upper) - node.centre);
+    node.radius = std::min(radius, glm::length(corner));
 }
 
 double WindingNumber::solidAngles(const Node& node, const glm::dvec3& point) const {
@@ -220,23 +276,26 @@ double WindingNumber::solidAngles(const Node& node, const glm::dvec3& point) con
     return angle / (4 * glm::pi<double>());
 }
 
-// The kernel n . (x - q) / |x - q|^3 is expanded in s = x - centre to first order. The term of order k - 1 is the
+// The kernel n . (x - q) / |x - q|^3 is expanded in s = x - centre to second order. The term of order k - 1 is the
 // gradient of a solid harmonic of degree k, at most k |s|^(k - 1) / R^(k + 1) (Bernstein's inequality), R = |centre -
-// q|. With |s| <= t R the terms that are left out sum up to at most |s|^2 / R^4 (3 - 2 t) / (1 - t)^2.
+// q|. With |s| <= t R the terms that are left out sum up to at most t |s|^2 / R^4 (4 - 3 t) / (1 - t)^2.
 WindingNumber::Estimate WindingNumber::expansion(const Node& node, const glm::dvec3& point) const {
     const glm::dvec3 way = node.centre - point;
     const double squared = glm::dot(way, way), distance = std::sqrt(squared);
     if (!(node.radius < distance)) return {0, std::numeric_limits<double>::infinity()};
     const double t = node.radius / distance, unit = 1 / (4 * glm::pi<double>() * squared);
+    const double error = unit * node.spread / squared * t * (4 - 3 * t) / ((1 - t) * (1 - t));
+    if (!(error < uselessError)) return {0, error};
     const glm::dvec3 u = way / distance;
-    const auto& m = node.moment;
+    const Symmetric2& m = node.moment;
     const double along = m[0] * u.x * u.x + m[1] * u.y * u.y + m[2] * u.z * u.z +
                          2 * (m[3] * u.x * u.y + m[4] * u.y * u.z + m[5] * u.z * u.x);
-    return {unit * (glm::dot(node.area, u) + (m[0] + m[1] + m[2] - 3 * along) / distance),
-            unit * node.spread / squared * (3 - 2 * t) / ((1 - t) * (1 - t))};
+    const double first = (m[0] + m[1] + m[2] - 3 * along) / distance;
+    const double second = (7.5 * cubic(node.moment2, u) - 4.5 * trace(node.moment2, u)) / squared;
+    return {unit * (glm::dot(node.area, u) + first + second), error};
 }
 
-WindingNumber::Estimate WindingNumber::estimate(const glm::dvec3& point) const {
+WindingNumber::Estimate WindingNumber::estimate(const glm::dvec3& point, double share) const {
     struct Far {
         Estimate estimate;
         std::uint32_t node;
@@ -260,7 +319,7 @@ WindingNumber::Estimate WindingNumber::estimate(const glm::dvec3& point) const {
                 refine(node, at, point, sum, open);
         }
         if (heap.empty()) return {sum.value, 0};
-        if (sum.error < errorShare * std::abs(sum.value - 0.5)) return {sum.value, std::max(sum.error, 0.0)};
+        if (sum.error < share * std::abs(sum.value - 0.5)) return {sum.value, std::max(sum.error, 0.0)};
         std::pop_heap(heap.begin(), heap.end());
         const Far worst = heap.back();
         heap.pop_back();
@@ -419,8 +478,11 @@ struct Answer {
 };
 
 Answer ask(const Question& question, const glm::dvec3& point) {
-    const WindingNumber::Estimate e = question.winding.estimate(point);
-    return {e.value > 0.5, std::max(std::abs(e.value - 0.5) - e.error, 0.0)};
+    const WindingNumber::Estimate e = question.winding.estimate(point, question.slope ? handOn : onlySide);
+    // where nothing changes without a surface between, an answer goes as far as the surface
+    const double margin =
+        question.slope ? std::max(std::abs(e.value - 0.5) - e.error, 0.0) : std::numeric_limits<double>::infinity();
+    return {e.value > 0.5, margin};
 }
 
 // The signs of one brick: of leaves voxel by voxel, of the cells between them at once.
@@ -573,7 +635,7 @@ Answer BrickSigns::decide(State& state, unsigned voxel) {
 void BrickSigns::spreadCalm(std::size_t leaf, unsigned voxel) {
     const Answer answer = decide(leaves_[leaf], voxel);
     double left = answer.margin - reserve;
-    if (question_.slope && left <= 0) return;
+    if (left <= 0) return;
     set(leaves_[leaf].firm, voxel);
     set(leaves_[leaf].front, voxel);
     std::vector<std::size_t> wave{leaf};

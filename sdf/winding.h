@@ -30,11 +30,11 @@ class WindingNumber {
         double value, error;
     };
 
-    /// The winding number at a point [m], refined down to single triangles (A. Van Oosterom, J. Strackee, "The solid
-    /// angle of a plane triangle", IEEE TBME 30 (1983)) until the error is below a quarter of the way to a half: which
-    /// side of a half it is on is certain, unless it is a half up to rounding.
-    Estimate estimate(const glm::dvec3& point) const;
-    double operator()(const glm::dvec3& point) const { return estimate(point).value; }
+    /// The winding number at a point [m], refined until the error is below a `share` (0..1) of the way from the value
+    /// to a half, down to single triangles (A. Van Oosterom, J. Strackee, "The solid angle of a plane triangle", IEEE
+    /// TBME 30 (1983)) if need be: which side of a half it is on is certain, unless it is a half up to rounding.
+    Estimate estimate(const glm::dvec3& point, double share) const;
+    double operator()(const glm::dvec3& point) const { return estimate(point, 0.5).value; }
 
     /// Whether some triangle meets or touches the segment between two points [m].
     bool meets(const glm::dvec3& from, const glm::dvec3& to) const;
@@ -44,19 +44,20 @@ class WindingNumber {
   private:
     using Corners = std::array<glm::vec3, 3>;
     struct Node {
-        glm::dvec3 centre;             // of area
-        double radius;                 // of a ball around it that holds all triangles
-        double total;                  // area
-        glm::dvec3 area;               // the integral of the normal n
-        std::array<double, 6> moment;  // of s n^T, symmetric part, s from the centre: xx, yy, zz, xy, yz, zx
-        double spread;                 // the integral of |s|^2
-        std::uint32_t begin, end;      // triangles
-        std::uint32_t right;           // the second child, the first is the next node; 0: a leaf
+        glm::dvec3 centre;               // of area
+        double radius;                   // of a ball around it that holds all triangles
+        double total;                    // area
+        glm::dvec3 area;                 // the integral of the normal n
+        std::array<double, 6> moment;    // of s n^T, symmetric part, s from the centre: xx, yy, zz, xy, yz, zx
+        std::array<double, 10> moment2;  // of s s^T (x) n, symmetric part: see product() in winding.cpp
+        double spread;                   // the integral of |s|^2
+        std::uint32_t begin, end;        // triangles
+        std::uint32_t right;             // the second child, the first is the next node; 0: a leaf
     };
     struct Item;
 
-    void sumTriangles(Node& node) const;
-    void sumChildren(Node& node, const Node& left, const Node& right) const;
+    Bounds sumTriangles(Node& node) const;
+    void sumChildren(Node& node, const Node& left, const Node& right, const Bounds& box) const;
     double solidAngles(const Node& node, const glm::dvec3& point) const;
     Estimate expansion(const Node& node, const glm::dvec3& point) const;
     void refine(const Node& node, std::uint32_t at, const glm::dvec3& point, Estimate& sum,

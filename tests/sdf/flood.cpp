@@ -38,8 +38,8 @@ struct Field {
     openvdb::FloatGrid::Ptr distances, field;
 };
 
-Field flooded(const Mesh& mesh, float h, float gap, const BandWidths& given) {
-    const BandWidths widths{given.exterior, given.interior, h};
+Field flooded(const Mesh& mesh, float h, float gap, float interior = 3) {
+    const BandWidths widths{3, interior, h};
     Field f{test::unsignedBand(mesh, h, std::max({widths.exterior, widths.interior, gap / 2 + 1})), nullptr};
     f.field = f.distances->deepCopy();
     signByFlood(*f.field, mesh, gap, widths);
@@ -77,7 +77,7 @@ TEST_CASE("closed meshes get the right sign in every voxel, whichever way their 
     const Mesh sphere = shapes::sphere(1, 3), plate = transformed(shapes::box({1, 0.8f, 0.03f}, 2), skew);
     for (const float gap : {0.f, 2.f, 5.f})
         for (const Mesh& mesh : {sphere, plate, shapes::torus(1, 0.3f, 24, 12)}) {
-            const Field f = flooded(someFlipped(mesh, seed), 0.07f, gap, {3, 2});
+            const Field f = flooded(someFlipped(mesh, seed), 0.07f, gap, 2);
             CAPTURE(gap);
             CHECK(wrongSigns(f, 1e-4 * 0.07, [&](const glm::dvec3& p) { return test::windingNumber(mesh, p) > 0.5; }) ==
                   0);
@@ -104,7 +104,7 @@ TEST_CASE("gaps up to the stated width are closed and wide openings stay open") 
             };
             CAPTURE(gap, offset);
             const openvdb::Coord middle(0, 0, 0), under(0, 0, 15);
-            const auto closed = flooded(slit(gap), 1, gap, {3, 3}), open = flooded(slit(gap + 2.9f), 1, gap, {3, 3});
+            const auto closed = flooded(slit(gap), 1, gap), open = flooded(slit(gap + 2.9f), 1, gap);
             CHECK(closed.field->getConstAccessor().getValue(middle) == -3);
             CHECK(closed.field->getConstAccessor().getValue(under) == -3);
             CHECK(open.field->getConstAccessor().getValue(middle) == 3);
@@ -115,7 +115,7 @@ TEST_CASE("gaps up to the stated width are closed and wide openings stay open") 
 TEST_CASE("a small hole leaves the rest of a solid as it was") {
     const Mesh sphere = shapes::sphere(1, 4);
     const Mesh holed = without(sphere, [](const glm::vec3& p) { return p.z > 0.985f; });  // 0.35 wide
-    const Field f = flooded(holed, 0.05f, 8, {3, 3});
+    const Field f = flooded(holed, 0.05f, 8);
     CHECK(wrongSigns(f, 1e-4 * 0.05, [&](const glm::dvec3& p) {
               // in the hole the border lies somewhere between
               if (p.z > 0.8 && glm::length(glm::dvec2(p)) < 0.3)
@@ -123,7 +123,7 @@ TEST_CASE("a small hole leaves the rest of a solid as it was") {
                       openvdb::Coord::round(openvdb::Vec3d(p.x, p.y, p.z) / 0.05)));
               return test::windingNumber(sphere, p) > 0.5;
           }) == 0);
-    const Field leaking = flooded(holed, 0.05f, 2, {3, 3});
+    const Field leaking = flooded(holed, 0.05f, 2);
     CHECK(leaking.field->getConstAccessor().getValue({0, 0, 0}) > 0);
 }
 
@@ -132,15 +132,15 @@ TEST_CASE("sheets without thickness have no inside") {
     const glm::mat4 skew = glm::rotate(glm::mat4(1), 0.7f, glm::vec3(1, 2, 3));
     const Mesh sheet = without(shapes::box({20, 20, 0.5f}, 1), [](const glm::vec3& p) { return p.z < 0.4f; });
     for (const Mesh& one : {sheet, transformed(sheet, skew)}) {
-        CHECK(wrongSigns(flooded(one, 1, 2, {3, 3}), 0, nowhere) == 0);
+        CHECK(wrongSigns(flooded(one, 1, 2), 0, nowhere) == 0);
         // two sheets with less room between than the ball needs, open all around
-        CHECK(wrongSigns(flooded(shapes::join({one, moved(one, {0, 0, 2.3f})}), 1, 4, {3, 3}), 0, nowhere) == 0);
+        CHECK(wrongSigns(flooded(shapes::join({one, moved(one, {0, 0, 2.3f})}), 1, 4), 0, nowhere) == 0);
     }
 }
 
 TEST_CASE("a cavity that nothing leads to is inside") {
     const Mesh mesh = shapes::join({shapes::box({20, 20, 20}, 1), shapes::box({9.7f, 9.7f, 9.7f}, 1)});
-    const Field f = flooded(mesh, 1, 2, {3, 2});
+    const Field f = flooded(mesh, 1, 2, 2);
     CHECK(wrongSigns(f, 1e-4, [](const glm::dvec3& p) { return inBox(p, glm::dvec3(20)); }) == 0);
 }
 
@@ -157,7 +157,7 @@ TEST_CASE("public meshes flood to a solid of plausible size", "[corpus]") {
         if (!path) return;
         const Mesh mesh = readMesh(*path);
         const float h = voxelSizeFor(mesh, 48);
-        const Field f = flooded(mesh, h, e.gap, {3, 3});
+        const Field f = flooded(mesh, h, e.gap);
         const auto at = [&](const glm::vec3& part) {
             const glm::vec3 p = (bounds(mesh).lower + part * bounds(mesh).size()) / h;
             return f.field->getConstAccessor().getValue(openvdb::Coord::round(openvdb::Vec3d(p.x, p.y, p.z)));

@@ -51,7 +51,7 @@ inline std::string fault(const openvdb::FloatGrid& field, const openvdb::FloatGr
     const auto known = distances.getConstAccessor();
     for (auto value = field.cbeginValueAll(); value; ++value) {
         if (value.isValueOn() && !(value.isVoxelValue() && known.isValueOn(value.getCoord()))) return "active voxel";
-        if (value.isValueOff() && *value != exterior && *value != -interior) return "inactive value";
+        if (!value.isValueOn() && *value != exterior && *value != -interior) return "inactive value";
     }
     for (auto leaf = field.tree().cbeginLeaf(); leaf; ++leaf) {
         float first;
