@@ -14,6 +14,8 @@
 
 namespace bilayer {
 
+class Progress;
+
 inline constexpr int blockSide = 8;                                    ///< voxels: an OpenVDB leaf
 inline constexpr int blockVoxels = blockSide * blockSide * blockSide;  ///< voxel (x, y, z) at (x * 8 + y) * 8 + z
 
@@ -43,9 +45,9 @@ struct MeshJob {
     float reach;      ///< distances up to this must be found; beyond it they may be +-farAway [voxels], at least 1
     bool triangles;   ///< whether the nearest triangle is asked for
     bool sign;        ///< false: all distances are positive
-    /// Takes filled blocks; may be called from several threads at once. Throws Cancelled when the user wants no more.
-    /// Blocks without a voxel within the reach need not come.
+    /// Takes filled blocks; may be called from several threads at once. Blocks without a voxel within the reach need not come.
     std::function<void(const FilledBlocks&)> sink;
+    Progress& progress;
 };
 
 /// Everything a filler works from.

@@ -2,32 +2,34 @@
 #include "sdf/build.h"
 
 #include <fmt/format.h>
-#include <oneapi/tbb/enumerable_thread_specific.h>
 #include <oneapi/tbb/global_control.h>
 #include <oneapi/tbb/parallel_reduce.h>
 #include <oneapi/tbb/task_arena.h>
-#include <openvdb/tools/Prune.h>
-#include <openvdb/tools/SignedFloodFill.h>
 #include <unistd.h>
 
 #include <chrono>
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
-#include <mutex>
+#include <limits>
+#include <optional>
+#include <string>
 
+#include "sdf/assemble.h"
 #include "sdf/band.h"
 #include "sdf/blocks.h"
 #include "sdf/double_layer.h"
 #include "sdf/exact.h"
+#include "sdf/flood.h"
 #include "sdf/grids.h"
+#include "sdf/orient.h"
+#include "sdf/progress.h"
+#include "sdf/pseudonormal.h"
+#include "sdf/sign.h"
+#include "sdf/winding.h"
 
 namespace bilayer {
 namespace {
-
-using Leaf = openvdb::FloatTree::LeafNodeType;
-using TriangleLeaf = openvdb::Int32Tree::LeafNodeType;
-static_assert(Leaf::DIM == blockSide);
 
 /// Index coordinates stay well inside 32 bits, with room for the band around them.
 constexpr double farthestIndex = 1e9;
@@ -37,6 +39,10 @@ constexpr float smallestVoxel = 2e-5f;
 constexpr double mostBricks = double(1u << 28);
 /// Bytes that the build needs for a sample (its share of a tile and of the bins) and for a block, roughly.
 constexpr double bytesPerSample = 120, bytesPerBlock = 2300;
+/// What exact methods promise [voxels]; it is ten times what was ever seen.
+constexpr float exactError = 1e-4f;
+/// No point of a triangle is farther from a sample than this times the root of epsilon: samples stand no farther apart.
+constexpr float coveringRadius = 3;
 /// Room between the reach of a sample and what the band needs, against rounding [voxels].
 constexpr float reachSlack = 1e-3f;
 
@@ -124,93 +130,42 @@ class Stopwatch {
     std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
 };
 
-// Reports progress from any thread, one at a time, and turns a false answer into Cancelled.
-class Progress {
-  public:
-    Progress(const std::function<bool(float)>& report, std::size_t total) : report_(report), total_(total) {}
-    void advance() {
-        if (!report_) return;
-        const std::lock_guard lock(mutex_);
-        if (!report_(float(++done_) / float(total_))) throw Cancelled();
-    }
-
-  private:
-    const std::function<bool(float)>& report_;
-    std::size_t total_, done_ = 0;
-    std::mutex mutex_;
+// How a field got its signs.
+struct Signs {
+    std::string name, reason;
+    std::size_t conflicts = 0;  // neighbours that contradict each other
 };
 
-template <class LeafType>
-using PerThread = tbb::enumerable_thread_specific<std::vector<std::unique_ptr<LeafType>>>;
-
-// Collects filled blocks as leaves and joins them into trees; where a leaf goes follows from its origin, so no thread
-// changes the result.
-class Assembler {
-  public:
-    explicit Assembler(const BuildOptions& options)
-        : widths_{options.exteriorWidth, options.interiorWidth, options.voxelSize}, wantTriangles_(options.triangles) {}
-
-    // Safe from any thread.
-    void take(const FilledBlocks& blocks) {
-        std::vector<std::unique_ptr<Leaf>>& leaves = leaves_.local();
-        for (std::size_t b = 0; b < blocks.origins.size(); ++b) {
-            const glm::ivec3 o = blocks.origins[b];
-            auto leaf = std::make_unique<Leaf>(openvdb::PartialCreate(), openvdb::Coord(o.x, o.y, o.z));
-            leaf->buffer().allocate();
-            BlockMask active;
-            if (!trimToBand(blocks.distances.data() + b * blockVoxels, widths_, leaf->buffer().data(), active))
-                continue;
-            Leaf::NodeMaskType mask;
-            for (openvdb::Index word = 0; word < blockSide; ++word) mask.getWord<std::uint64_t>(word) = active[word];
-            leaf->setValueMask(mask);
-            if (wantTriangles_ && !mask.isOff())
-                triangleLeaves_.local().push_back(triangleLeaf(blocks.triangles.data() + b * blockVoxels, *leaf));
-            leaves.push_back(std::move(leaf));
-        }
+const char* name(Sign sign) {
+    switch (sign) {
+        case Sign::automatic: return "auto";
+        case Sign::normals: return "normals";
+        case Sign::winding: return "winding";
+        case Sign::flood: return "flood";
     }
+    return "";
+}
 
-    openvdb::FloatGrid::Ptr distances() {
-        const float exterior = widths_.exterior * widths_.voxelSize, interior = -widths_.interior * widths_.voxelSize;
-        auto grid = openvdb::FloatGrid::create(exterior);
-        move(leaves_, grid->tree());
-        // leaves carry their signs already: only tiles between them are flooded. Leaves that turn out to hold one far
-        // value become tiles too.
-        openvdb::tools::signedFloodFillWithValues(grid->tree(), exterior, interior, true, 1, 1);
-        openvdb::tools::prune(grid->tree());
-        grid->setName("distance");
-        grid->setGridClass(openvdb::GRID_LEVEL_SET);
-        return grid;
-    }
+BandWidths bandOf(const BuildOptions& options) {
+    return {options.exteriorWidth, options.interiorWidth, options.voxelSize};
+}
 
-    openvdb::Int32Grid::Ptr triangles() {
-        if (!wantTriangles_) return nullptr;
-        auto grid = openvdb::Int32Grid::create(-1);
-        move(triangleLeaves_, grid->tree());
-        grid->setName("triangle");
-        return grid;
-    }
+// Voxels up to a voxel away are measured even for thinner bands: their signs carry over to all others by links. A flood
+// wants to know where a ball of the gap's width fits.
+float reachOf(const BuildOptions& options, Sign sign) {
+    const float ball = sign == Sign::flood ? options.gap / 2 + 1 : 1;
+    return std::max({options.exteriorWidth, options.interiorWidth, ball}) + reachSlack;
+}
 
-  private:
-    static std::unique_ptr<TriangleLeaf> triangleLeaf(const std::int32_t* triangles, const Leaf& like) {
-        auto leaf = std::make_unique<TriangleLeaf>(openvdb::PartialCreate(), like.origin());
-        leaf->buffer().allocate();
-        for (openvdb::Index i = 0; i < blockVoxels; ++i)
-            leaf->buffer().data()[i] = like.isValueOn(i) ? triangles[i] : -1;
-        leaf->setValueMask(like.getValueMask());
-        return leaf;
-    }
-
-    template <class LeafType, class Tree>
-    static void move(PerThread<LeafType>& leaves, Tree& tree) {
-        for (auto& some : leaves)
-            for (auto& leaf : some) tree.addLeaf(leaf.release());
-    }
-
-    BandWidths widths_;
-    bool wantTriangles_;
-    PerThread<Leaf> leaves_;
-    PerThread<TriangleLeaf> triangleLeaves_;
-};
+// What the distances may be off by [voxels].
+float errorBound(const BuildOptions& options) {
+    if (options.method != Method::doubleLayer) return exactError;
+    // a sample of the inner or outer layer is delta from the surface, and the nearest one at most the covering radius
+    // farther than that from the voxel's closest point; without gaps filled nothing bounds it
+    const DoubleLayerOptions& layers = options.doubleLayer;
+    if (!layers.fillGaps) return std::numeric_limits<float>::infinity();
+    return std::max(2 * layers.delta, coveringRadius * std::sqrt(layers.epsilon));
+}
 
 const char* name(Method method) {
     switch (method) {
@@ -224,60 +179,138 @@ const char* name(Method method) {
     return "";
 }
 
-void describe(openvdb::FloatGrid& grid, const Mesh& mesh, const BuildOptions& options) {
+void describe(openvdb::FloatGrid& grid, const Mesh& mesh, const BuildOptions& options, const Signs& signs) {
     grid.setTransform(openvdb::math::Transform::createLinearTransform(options.voxelSize));
+    grid.setName("distance");
+    grid.setGridClass(openvdb::GRID_LEVEL_SET);
     grid.setCreator("bilayer");
     grid.insertMeta(metadata::version, openvdb::StringMetadata(BILAYER_VERSION));
     grid.insertMeta(metadata::method, openvdb::StringMetadata(name(options.method)));
+    grid.insertMeta(metadata::sign, openvdb::StringMetadata(signs.name));
+    grid.insertMeta(metadata::signReason, openvdb::StringMetadata(signs.reason));
+    grid.insertMeta(metadata::signConflicts, openvdb::Int64Metadata(std::int64_t(signs.conflicts)));
+    grid.insertMeta(metadata::errorBound, openvdb::FloatMetadata(errorBound(options) * options.voxelSize));
     grid.insertMeta(metadata::meshHash, openvdb::Int64Metadata(std::int64_t(hash(mesh))));
     grid.insertMeta(metadata::interiorWidth, openvdb::FloatMetadata(options.interiorWidth * options.voxelSize));
 }
 
-void fillLayers(const Mesh& mesh, const BuildOptions& options, const BlockFiller& filler, Assembler& assembler,
-                BuildTimes& times) {
-    Stopwatch part;
-    const FillParameters parameters = fillParameters(options);
-    const Tiles tiles = makeTiles(mesh, options);
-    if (tiles.tiles.empty()) throw std::invalid_argument("the mesh has no triangle with an area");
-    times.tiles = part.lap();
-    const Bricks bricks = binBricks(tiles, parameters.reach);
-    Progress progress(options.progress, bricks.count());
-    filler.fill({tiles, bricks, parameters, [&](std::size_t, const FilledBlocks& blocks) {
-                     assembler.take(blocks);
-                     progress.advance();
-                 }});
-}
+// A build under way: what it works from, and what it has found.
+class Build {
+  public:
+    Build(const Mesh& mesh, const BuildOptions& options, const BlockFiller& filler, BuildTimes& times)
+        : mesh_(mesh), options_(options), filler_(filler), times_(times), progress_(options.progress) {}
 
-// Voxels up to a voxel away are measured even for thinner bands: their signs carry over to all others by links.
-float reachOf(const BuildOptions& options) {
-    return std::max({options.exteriorWidth, options.interiorWidth, 1.f}) + reachSlack;
-}
-
-LevelSet run(const Mesh& mesh, const BuildOptions& options, const BlockFiller& filler, BuildTimes& times) {
-    Stopwatch total, part;
-    Assembler assembler(options);
-    if (options.method == Method::doubleLayer)
-        fillLayers(mesh, options, filler, assembler, times);
-    else
-        fillExact({mesh, options.voxelSize, reachOf(options), options.triangles, true,
-                   [&](const FilledBlocks& blocks) { assembler.take(blocks); }});
-    times.fill = part.lap();
-
-    auto grids = std::make_shared<Grids>();
-    const openvdb::FloatGrid::Ptr distance = assembler.distances();
-    if (distance->activeVoxelCount() == 0)
-        throw std::invalid_argument("no voxel lies within the band: the widths are too small for this voxel size");
-    describe(*distance, mesh, options);
-    grids->distance = distance;
-    if (const openvdb::Int32Grid::Ptr triangle = assembler.triangles()) {
-        triangle->setTransform(distance->transformPtr());
-        grids->triangle = triangle;
+    LevelSet run() {
+        Stopwatch total;
+        if (options_.method == Method::doubleLayer)
+            fillLayers();
+        else if (options_.sign == Sign::automatic)
+            fillChosen();
+        else
+            fillAsAsked();
+        Stopwatch part;
+        if (distance_->empty() || distance_->activeVoxelCount() == 0)
+            throw std::invalid_argument("no voxel lies within the band: the widths are too small for this voxel size");
+        describe(*distance_, mesh_, options_, signs_);
+        auto grids = std::make_shared<Grids>();
+        grids->distance = distance_;
+        if (triangle_) {
+            // where a sign decided which of two widths holds, fewer voxels may be left
+            triangle_->tree().topologyIntersection(distance_->tree());
+            triangle_->setTransform(distance_->transformPtr());
+            grids->triangle = triangle_;
+        }
+        LevelSet levelSet(std::move(grids));
+        progress_.finish();
+        times_.assemble += part.lap();
+        times_.total = total.lap();
+        return levelSet;
     }
-    LevelSet levelSet(std::move(grids));
-    times.assemble = part.lap();
-    times.total = total.lap();
-    return levelSet;
-}
+
+  private:
+    void fillLayers() {
+        Stopwatch part;
+        signs_ = {"layers", "the nearer of two layers tells the side", 0};
+        const FillParameters parameters = fillParameters(options_);
+        const Tiles tiles = makeTiles(mesh_, options_);
+        if (tiles.tiles.empty()) throw std::invalid_argument("the mesh has no triangle with an area");
+        times_.tiles += part.lap();
+        const Bricks bricks = binBricks(tiles, parameters.reach);
+        progress_.begin(bricks.count());
+        Assembler assembler(bandOf(options_), options_.triangles);
+        filler_.fill({tiles, bricks, parameters, [&](std::size_t, const FilledBlocks& blocks) {
+                          assembler.take(blocks);
+                          progress_.advance();
+                      }});
+        times_.fill += part.lap();
+        finish(assembler);
+    }
+
+    // Picks a way, and another one where the first contradicts itself.
+    void fillChosen() {
+        Stopwatch part;
+        SignChoice choice = chooseSign(mesh_);
+        times_.tiles += part.lap();
+        for (;;) {
+            // kept over the next choice, which may be made from it
+            const std::optional<Mesh> mended = std::move(choice.mended);
+            const Mesh& mesh = mended ? *mended : mesh_;
+            fill(mesh, choice.sign, choice.reason);
+            if (choice.sign != Sign::normals || signs_.conflicts == 0) return;
+            choice = chooseSignAfterConflict(mesh);
+            if (!choice.mended && mended) choice.mended = *mended;
+        }
+    }
+
+    // Normals are taken from a mesh that is mended, should it be inside out.
+    void fillAsAsked() {
+        fill(mesh_, options_.sign, "as asked for");
+        if (options_.sign != Sign::normals || signs_.conflicts == 0) return;
+        const Orientation orientation = orient(mesh_);
+        if (orientation.turnedTriangles > 0)
+            fill(orientation.mesh, Sign::normals,
+                 fmt::format("as asked for, with {} triangles turned around", orientation.turnedTriangles));
+    }
+
+    void fill(const Mesh& mesh, Sign sign, const std::string& reason) {
+        Stopwatch part;
+        const bool byNormals = sign == Sign::normals;
+        const float reach = reachOf(options_, sign);
+        const BandWidths widths = bandOf(options_);
+        Assembler assembler(byNormals ? widths : BandWidths{reach, reach, options_.voxelSize}, options_.triangles);
+        const MeshJob job{mesh,
+                          options_.voxelSize,
+                          reach,
+                          options_.triangles,
+                          byNormals,
+                          [&](const FilledBlocks& blocks) { assembler.take(blocks); },
+                          progress_};
+        options_.method == Method::exact ? fillExact(job) : fillPseudonormal(job);
+        times_.fill += part.lap();
+        finish(assembler);
+        if (sign == Sign::winding) signByWinding(*distance_, mesh, widths, balanced(mesh));
+        if (sign == Sign::flood) signByFlood(*distance_, mesh, options_.gap, widths);
+        signs_ = {name(sign), reason, byNormals ? countConflicts(*distance_) : 0};
+        times_.assemble += part.lap();
+    }
+
+    void finish(Assembler& assembler) {
+        Stopwatch part;
+        distance_ = assembler.distances();
+        distance_->setTransform(openvdb::math::Transform::createLinearTransform(options_.voxelSize));
+        triangle_ = assembler.triangles();
+        times_.assemble += part.lap();
+    }
+
+    const Mesh& mesh_;
+    const BuildOptions& options_;
+    const BlockFiller& filler_;
+    BuildTimes& times_;
+    Progress progress_;
+    Signs signs_;
+    openvdb::FloatGrid::Ptr distance_;
+    openvdb::Int32Grid::Ptr triangle_;
+};
 
 }  // namespace
 
@@ -288,7 +321,7 @@ LevelSet build(const Mesh& mesh, const BuildOptions& options, const BlockFiller*
     openvdb::initialize();
     const BlockFiller tbb = tbbFiller();
     BuildTimes ignored;
-    const auto work = [&] { return run(mesh, options, filler ? *filler : tbb, times ? *times : ignored); };
+    const auto work = [&] { return Build(mesh, options, filler ? *filler : tbb, times ? *times : ignored).run(); };
     if (options.threads == 0) return work();
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, std::size_t(options.threads));
     return tbb::task_arena(options.threads).execute(work);

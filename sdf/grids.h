@@ -20,6 +20,10 @@ struct Grids {
 /// width differs from the background.
 namespace metadata {
 inline constexpr const char* method = "bilayer:method";
+inline constexpr const char* sign = "bilayer:sign";
+inline constexpr const char* signReason = "bilayer:sign_reason";
+inline constexpr const char* signConflicts = "bilayer:sign_conflicts";
+inline constexpr const char* errorBound = "bilayer:error_bound";
 inline constexpr const char* meshHash = "bilayer:mesh_hash";
 inline constexpr const char* interiorWidth = "bilayer:interior_width";
 inline constexpr const char* version = "bilayer:version";

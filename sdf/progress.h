@@ -1,6 +1,7 @@
 // Tells how far a build is, and stops it when the listener wants no more.
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <functional>
@@ -16,11 +17,9 @@ class Progress {
     /// A null listener costs nothing.
     explicit Progress(const std::function<bool(float)>& listener) : listener_(listener) {}
 
-    /// Sets what advance() counts against. The listener hears parts from `from` to `to`.
-    void begin(std::size_t total, float from, float to) {
+    /// Sets what advance() counts against.
+    void begin(std::size_t total) {
         total_ = total;
-        from_ = from;
-        to_ = to;
         done_ = 0;
     }
 
@@ -38,21 +37,32 @@ class Progress {
         if (now < next_.load(std::memory_order_relaxed)) return;
         const std::unique_lock lock(mutex_, std::try_to_lock);
         if (!lock || now < next_.load(std::memory_order_relaxed)) return;
-        const float part = total_ == 0 ? 1.f : float(done_) / float(total_);
-        if (!listener_(from_ + (to_ - from_) * part)) {
-            cancelled_ = true;
-            throw Cancelled();
-        }
+        // a second go, over a mended mesh, must not fall behind the first
+        told_ = std::max(told_, total_ == 0 ? 0.f : workShare * float(done_) / float(total_));
+        tell(told_);
         next_ = std::chrono::steady_clock::now().time_since_epoch() + interval;
     }
 
+    /// All is done.
+    void finish() {
+        if (listener_) tell(1);
+    }
+
   private:
+    void tell(float part) {
+        if (listener_(part)) return;
+        cancelled_ = true;
+        throw Cancelled();
+    }
+
+    /// The rest is for joining blocks, which cannot be counted.
+    static constexpr float workShare = 0.95f;
     /// Often enough for a bar that moves and a user who stops it.
     static constexpr std::chrono::steady_clock::duration interval = std::chrono::milliseconds(5);
 
     const std::function<bool(float)>& listener_;
     std::atomic<std::size_t> total_{0}, done_{0};
-    std::atomic<float> from_{0}, to_{1};
+    float told_ = 0;
     std::atomic<bool> cancelled_{false};
     std::atomic<std::chrono::steady_clock::duration> next_{std::chrono::steady_clock::duration::min()};
     std::mutex mutex_;

@@ -1,0 +1,231 @@
+#include "sdf/winding.h"
+
+#include <oneapi/tbb/parallel_for.h>
+
+#include <catch2/catch.hpp>
+#include <glm/geometric.hpp>
+#include <glm/gtc/matrix_transform.hpp>
+#include <random>
+
+#include "demos/shared/shapes.h"
+#include "sdf/build.h"
+#include "sdf/inspect.h"
+#include "tests/sdf/unsigned_band.h"
+#include "tests/support/support.h"
+
+using namespace bilayer;
+
+namespace {
+
+// Below this distance of the winding number from a half rounding may decide [1].
+constexpr double undecided = 1e-9;
+
+Mesh moved(const Mesh& mesh, const glm::vec3& by) {
+    return transformed(mesh, glm::translate(glm::mat4(1), by));
+}
+
+Mesh flipped(Mesh mesh) {
+    for (auto& t : mesh.triangles) std::swap(t.y, t.z);
+    return mesh;
+}
+
+// Without the triangles whose centre `gone` holds for.
+template <class Gone>
+Mesh without(const Mesh& mesh, const Gone& gone) {
+    Mesh rest{mesh.points, {}};
+    for (const auto& t : mesh.triangles)
+        if (!gone((mesh.points[t.x] + mesh.points[t.y] + mesh.points[t.z]) / 3.f)) rest.triangles.push_back(t);
+    return rest;
+}
+
+Mesh soup(const glm::vec3& extent, int triangles, unsigned seed) {
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<float> uniform(-1, 1);
+    const auto point = [&] { return glm::vec3(uniform(random), uniform(random), uniform(random)); };
+    Mesh mesh;
+    for (int i = 0; i < triangles; ++i) {
+        const glm::vec3 centre = extent * point();
+        for (int k = 0; k < 3; ++k) mesh.points.push_back(centre + 0.3f * point());
+        mesh.triangles.push_back({3 * i, 3 * i + 1, 3 * i + 2});
+    }
+    return mesh;
+}
+
+struct Field {
+    openvdb::FloatGrid::Ptr distances, field;
+    BandWidths widths;
+};
+
+Field signedField(const Mesh& mesh, float h, bool closed, float exterior = 3, float interior = 2) {
+    Field result{test::unsignedBand(mesh, h, std::max(exterior, interior)), nullptr, {exterior, interior, h}};
+    result.field = result.distances->deepCopy();
+    signByWinding(*result.field, mesh, result.widths, closed);
+    CHECK(test::fault(*result.field, *result.distances, result.widths) == "");
+    return result;
+}
+
+// Voxels in and around the box of the band, near the surface and far from it alike.
+std::vector<openvdb::Coord> voxelsOf(const openvdb::FloatGrid& distances, std::size_t count, unsigned seed) {
+    std::mt19937 random(seed);
+    std::vector<openvdb::Coord> voxels;
+    const std::size_t every = std::max<std::size_t>(1, 2 * distances.activeVoxelCount() / count);
+    std::size_t i = random() % every;
+    for (auto value = distances.cbeginValueOn(); value; ++value)
+        if (i++ % every == 0) voxels.push_back(value.getCoord());
+    const openvdb::CoordBBox box = distances.evalActiveVoxelBoundingBox();
+    for (std::size_t n = 0; n < count / 2; ++n) {
+        openvdb::Coord at;
+        for (int axis = 0; axis < 3; ++axis)
+            at[axis] = std::uniform_int_distribution<int>(box.min()[axis] - 8, box.max()[axis] + 8)(random);
+        voxels.push_back(at);
+    }
+    return voxels;
+}
+
+// Voxels whose sign is not what brute force finds at `at(voxel)`.
+template <class At>
+std::size_t wrongSigns(const openvdb::FloatGrid& field, const Mesh& mesh, const std::vector<openvdb::Coord>& voxels,
+                       const At& at) {
+    std::vector<char> wrong(voxels.size());
+    const auto values = field.getConstAccessor();
+    std::vector<bool> inside;
+    for (const openvdb::Coord& voxel : voxels) inside.push_back(std::signbit(values.getValue(voxel)));
+    const double h = field.voxelSize()[0];
+    tbb::parallel_for(std::size_t(0), voxels.size(), [&](std::size_t v) {
+        const openvdb::Vec3d p = at(voxels[v]) * h;
+        const double w = test::windingNumber(mesh, {p.x(), p.y(), p.z()});
+        wrong[v] = inside[v] != (w > 0.5) && std::abs(w - 0.5) > undecided;
+    });
+    return std::size_t(std::count(wrong.begin(), wrong.end(), 1));
+}
+
+// In leaves each voxel has its own sign; between them an open mesh's blocks have their centre's.
+std::size_t wrongSigns(const Field& f, const Mesh& mesh, bool closed, std::size_t count, unsigned seed) {
+    return wrongSigns(*f.field, mesh, voxelsOf(*f.distances, count, seed), [&](const openvdb::Coord& voxel) {
+        if (closed || f.distances->tree().probeConstLeaf(voxel)) return voxel.asVec3d();
+        return openvdb::Vec3d(voxel.x() & ~7, voxel.y() & ~7, voxel.z() & ~7) + 3.5;
+    });
+}
+
+}  // namespace
+
+TEST_CASE("the winding number is on the side of a half that brute force finds") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> uniform(-1.3, 1.3);
+    const Mesh sphere = shapes::sphere(1, 4);
+    for (const Mesh& mesh : {sphere, without(sphere, [](const glm::vec3& p) { return p.z > 0.3f; }),
+                             soup(glm::vec3(0.5f), 3000, seed), shapes::box({1, 0.5f, 0.01f}, 3)}) {
+        const WindingNumber winding(mesh);
+        for (int i = 0; i < 3000; ++i) {
+            glm::dvec3 p(uniform(random), uniform(random), uniform(random));
+            if (i % 3 == 0)  // very near the surface
+                p = glm::dvec3(mesh.points[random() % mesh.points.size()]) + 1e-4 * p;
+            const double exact = test::windingNumber(mesh, p);
+            const auto estimate = winding.estimate(p, i % 2 ? 1.0 : 0.01);
+            CAPTURE(p.x, p.y, p.z, exact, estimate.value, estimate.error);
+            REQUIRE(std::abs(estimate.value - exact) <= estimate.error + 1e-10);
+            if (std::abs(exact - 0.5) > undecided) REQUIRE((estimate.value > 0.5) == (exact > 0.5));
+        }
+    }
+}
+
+TEST_CASE("a point in the opening of a hemisphere sees half of all directions up to its own precision") {
+    // there the number is a half to 1e-6 and less: only single triangles can decide
+    const Mesh half = without(shapes::sphere(1, 5), [](const glm::vec3& p) { return p.z > 0; });
+    const WindingNumber winding(half);
+    for (double height = 1e-3; height > 1e-8; height /= 10)
+        for (const double z : {height, -height}) {
+            const double exact = test::windingNumber(half, {0.1, 0.2, z});
+            CAPTURE(z, exact);
+            CHECK((winding({0.1, 0.2, z}) > 0.5) == (exact > 0.5));
+        }
+}
+
+TEST_CASE("closed meshes get the signs of brute force in every voxel") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    const Mesh ball = shapes::sphere(1, 3);
+    // shells in one another count twice inside; a cavity not at all; overlapping boxes count as their union
+    const std::vector<Mesh> meshes{
+        ball,
+        shapes::join({ball, shapes::sphere(0.5f, 3)}),
+        shapes::join({ball, flipped(shapes::sphere(0.5f, 3))}),
+        shapes::join({shapes::box({0.5f, 0.4f, 0.3f}), moved(shapes::box({0.5f, 0.4f, 0.3f}), {0.3f, 0.3f, 0.2f})}),
+        shapes::box({1, 1, 0.013f}),
+        flipped(ball),
+        shapes::torus(1, 0.3f)};
+    for (std::size_t m = 0; m < meshes.size(); ++m)
+        for (const float h : {0.05f, 0.21f}) {
+            const Field f = signedField(meshes[m], h, true);
+            CAPTURE(m, h);
+            CHECK(wrongSigns(f, meshes[m], true, 12000, seed) == 0);
+            CHECK(wrongSigns(signedField(meshes[m], h, false), meshes[m], true, 3000, seed) == 0);
+        }
+}
+
+TEST_CASE("open meshes get the signs of brute force in every voxel of a leaf and every block between") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    const Mesh ball = shapes::sphere(1, 3);
+    const std::vector<Mesh> meshes{
+        without(ball, [](const glm::vec3& p) { return p.z > 0.9f; }),
+        without(ball, [](const glm::vec3& p) { return p.z > -0.2f; }),
+        without(shapes::box({1, 0.8f, 0.6f}, 4), [](const glm::vec3& p) { return p.z > 0.59f; }),
+        soup({1, 1, 0.2f}, 100, seed)};
+    for (std::size_t m = 0; m < meshes.size(); ++m) {
+        const Field f = signedField(meshes[m], 0.03f, false);
+        CAPTURE(m);
+        CHECK(wrongSigns(f, meshes[m], false, 12000, seed) == 0);
+    }
+}
+
+TEST_CASE("what a mesh of many sheets has inside may lie outside its box") {
+    // ten hemispheres in one: their sum is above a half far out of the opening
+    const Mesh half = without(shapes::sphere(1, 3), [](const glm::vec3& p) { return p.z > 0; });
+    const Mesh mesh = shapes::join(std::vector<Mesh>(10, half));
+    const Field f = signedField(mesh, 0.02f, false);
+    const auto values = f.field->getConstAccessor();
+    for (const double z : {0.5, 1.0, 2.0}) {
+        CAPTURE(z);
+        const openvdb::Coord block(0, 0, int(z / 0.02) & ~7);
+        const double height = 0.02 * (block.z() + 3.5);
+        const bool inside = test::windingNumber(mesh, {0.07, 0.07, height}) > 0.5;
+        CHECK((values.getValue(block) < 0) == inside);
+    }
+}
+
+TEST_CASE("public meshes get the signs of brute force", "[corpus]") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    for (const char* name : {"bunny_zipper.ply", "cow.obj", "teapot.obj", "kiva_pod_lowres.stl", "beetle.obj",
+                             "office_chair.obj", "many_small_holes.ply", "factory_gear_medium.ply"}) {
+        const auto path = test::corpusMesh(name);
+        if (!path) return;
+        const Mesh mesh = readMesh(*path);
+        const bool closed = inspect(mesh).closed() && inspect(mesh).misorientedEdges == 0;
+        const Field f = signedField(mesh, voxelSizeFor(mesh, 48), closed);
+        CAPTURE(name, closed);
+        CHECK(wrongSigns(f, mesh, closed, 4000, seed) == 0);
+    }
+}
+
+TEST_CASE("a thin band far apart in a huge box is signed without a walk through the box") {
+    const Mesh ball = shapes::sphere(10, 2);
+    const Mesh mesh = shapes::join({ball, moved(ball, {4e5f, -3e5f, 2e5f})});
+    for (const bool closed : {true, false}) {
+        const Field f = signedField(mesh, 1, closed);
+        CHECK(f.field->getConstAccessor().getValue({0, 0, 0}) == -2);
+        CHECK(f.field->getConstAccessor().getValue({400000, -300000, 200000}) == -2);
+        CHECK(f.field->getConstAccessor().getValue({200000, -150000, 100000}) == 3);
+    }
+}
+
+TEST_CASE("signs by winding number have the same bytes for any number of threads") {
+    const Mesh mesh = without(shapes::sphere(1, 4), [](const glm::vec3& p) { return p.z > 0.8f; });
+    const auto distances = test::unsignedBand(mesh, 0.02f, 3);
+    CHECK(test::sameForAnyThreads(*distances, [&](openvdb::FloatGrid& grid) {
+        signByWinding(grid, mesh, {3, 3, 0.02f}, false);
+    }));
+}
