@@ -30,6 +30,10 @@ constexpr float tie = 1e-5f;
 constexpr float leastHeight = 1e-5f;
 /// Up to this reach the two above hold; they grow with it beyond, as the rounding of distances does [voxels].
 constexpr float usualReach = 16;
+/// Room for the rounding of distances, and for ties, when a bound is taken from one place to another [voxels].
+constexpr float slack = 1e-3f;
+/// The eight corners of a cube, each beside the one before.
+constexpr int path[8][3] = {{0, 0, 0}, {0, 0, 1}, {0, 1, 1}, {0, 1, 0}, {1, 1, 0}, {1, 1, 1}, {1, 0, 1}, {1, 0, 0}};
 /// Room for the rounding of a squared distance.
 constexpr float roundUp = 1 + 1e-6f;
 
@@ -129,15 +133,14 @@ struct Query {
     const TriangleTree& tree;
     const NodeList& list;
     BlockAnswer& answer;
-    float tieWidth;
+    float tieWidth2;  // at least the difference of the squares of distances that are `tie` apart
     VoxelBox voxel;
     float best2, limit2;  // boxes farther away than the latter do not matter
     std::uint32_t first;  // the leaf that was visited first
 
     void lower(float distance2) {
         best2 = distance2;
-        const float limit = std::sqrt(best2) + tieWidth;
-        limit2 = limit * limit * roundUp;
+        limit2 = best2 * roundUp + tieWidth2;
     }
 
     // The squared distances to the triangles of a leaf. The distance along the plane is the least over the three edges
@@ -240,59 +243,71 @@ struct Query {
     }
 };
 
-void answerVoxel(const TriangleTree& tree, const NodeList& list, const glm::vec3& position, int voxel, float reach,
-                 bool sign, BlockAnswer& answer) {
-    const float scale = std::max(1.f, reach / usualReach);
-    Query query{tree, list, answer, sign ? tie * scale : 0.f, {position, position}, 0, 0, answer.lastWinner};
-    const float reach2 = reach * reach * roundUp;
-    query.lower(reach2);
-    answer.visits.clear();
-    query.visit(query.first);
-    query.look(Boxes(list), 0, list.count, list.nodes.data(), 0);
-    answer.distances[voxel] = farAway;
-    if (answer.triangles) answer.triangles[voxel] = -1;
-    if (query.best2 >= reach2) return;
+// What all voxels of a block share.
+struct BlockQuery {
+    const TriangleTree& tree;
+    const glm::vec3& origin;
+    float reach;
+    bool sign;
+    BlockAnswer& answer;
 
-    answer.any = true;
-    const auto [visit, place] = query.winner();
-    answer.lastWinner = answer.visits[visit].leaf;
-    answer.distances[voxel] = std::sqrt(query.best2);
-    if (answer.triangles) answer.triangles[voxel] = std::int32_t(tree.leaves[answer.lastWinner].triangles[place]);
-    if (!sign) return;
-    const int side = query.side(leastHeight * scale);
-    if (side < 0) answer.distances[voxel] = -answer.distances[voxel];
-    if (side == 0) query.doubt(voxel);
-}
+    // Asks for what is nearer than `bound`.
+    Query ask(const NodeList& list, const glm::vec3& position, float bound) const {
+        const float ties = sign ? 2 * tie * std::max(1.f, reach / usualReach) * (reach + 1) : 0.f;
+        Query query{tree, list, answer, ties, {position, position}, 0, 0, answer.lastWinner};
+        query.lower(bound * bound * roundUp);
+        answer.visits.clear();
+        query.visit(query.first);
+        query.look(Boxes(list), 0, list.count, list.nodes.data(), 0);
+        return query;
+    }
 
-// The eight corners of a cube, each beside the one before.
-constexpr int path[8][3] = {{0, 0, 0}, {0, 0, 1}, {0, 1, 1}, {0, 1, 0}, {1, 1, 0}, {1, 1, 1}, {1, 0, 1}, {1, 0, 0}};
+    // The voxels of a cube, which are no farther than `radius` from its centre: what is known of the centre rules
+    // out most of the list, if not all voxels.
+    void answerCube(const NodeList& from, const glm::vec3& lower, int level) {
+        const float side = float(blockSide >> level), radius = 0.5f * (side - 1) * std::sqrt(3.f) + slack;
+        const float bound = reach + radius;
+        const Query centre = ask(from, lower + 0.5f * (side - 1), bound);
+        if (!(centre.best2 < bound * bound)) return;
+        answer.lastWinner = answer.visits[centre.winner().first].leaf;
+        NodeList& list = answer.lists[level];
+        const float atMost = std::min(reach, std::sqrt(centre.best2) + radius);
+        narrowList(tree, from, {lower, lower + (side - 1)}, atMost + slack, side, list);
+        for (const auto& step : path) {
+            const glm::vec3 part = lower + 0.5f * side * glm::vec3(step[0], step[1], step[2]);
+            if (level < 2)
+                answerCube(list, part, level + 1);
+            else
+                answerVoxel(list, part, atMost);
+        }
+    }
+
+    void answerVoxel(const NodeList& list, const glm::vec3& position, float atMost) {
+        const Query query = ask(list, position, std::min(reach, atMost + slack));
+        if (query.best2 > reach * reach * roundUp || answer.visits.empty()) return;
+        const auto [visit, place] = query.winner();
+        if (answer.visits[visit].distance2[place] != query.best2) return;
+        const glm::ivec3 p(position - origin);
+        const int voxel = (p.x * blockSide + p.y) * blockSide + p.z;
+        answer.any = true;
+        answer.lastWinner = answer.visits[visit].leaf;
+        answer.distances[voxel] = std::sqrt(query.best2);
+        if (answer.triangles) answer.triangles[voxel] = std::int32_t(tree.leaves[answer.lastWinner].triangles[place]);
+        if (!sign) return;
+        const int side = query.side(leastHeight * std::max(1.f, reach / usualReach));
+        if (side < 0) answer.distances[voxel] = -answer.distances[voxel];
+        if (side == 0) query.doubt(voxel);
+    }
+};
 
 void answerVoxels(const TriangleTree& tree, const NodeList& list, const glm::vec3& origin, float reach, bool sign,
                   BlockAnswer& answer) {
-    constexpr float quarterSide = 4, eighthSide = 2;
-    const auto at = [](int i, float side) { return side * glm::vec3(path[i][0], path[i][1], path[i][2]); };
     answer.any = false;
     answer.doubts.clear();
     answer.candidates.clear();
     std::fill_n(answer.distances, blockVoxels, farAway);
     if (answer.triangles) std::fill_n(answer.triangles, blockVoxels, -1);
-    for (int i = 0; i < 8; ++i) {
-        const glm::vec3 quarter = at(i, quarterSide);
-        narrowList(tree, list, {origin + quarter, origin + quarter + (quarterSide - 1)}, reach, quarterSide,
-                   answer.quarter);
-        if (answer.quarter.count == 0) continue;
-        for (int j = 0; j < 8; ++j) {
-            const glm::vec3 eighth = quarter + at(j, eighthSide);
-            narrowList(tree, answer.quarter, {origin + eighth, origin + eighth + (eighthSide - 1)}, reach, eighthSide,
-                       answer.eighth);
-            if (answer.eighth.count == 0) continue;
-            for (int k = 0; k < 8; ++k) {
-                const glm::vec3 place = eighth + at(k, 1);
-                const int voxel = (int(place.x) * blockSide + int(place.y)) * blockSide + int(place.z);
-                answerVoxel(tree, answer.eighth, origin + place, voxel, reach, sign, answer);
-            }
-        }
-    }
+    BlockQuery{tree, origin, reach, sign, answer}.answerCube(list, origin, 0);
 }
 
 }  // namespace bilayer::HWY_NAMESPACE

@@ -57,7 +57,7 @@ struct BlockAnswer {
     };
     std::vector<Visit> visits;     ///< scratch
     std::uint32_t lastWinner = 0;  ///< scratch: a leaf to begin with
-    NodeList quarter, eighth;      ///< scratch
+    NodeList lists[3];             ///< scratch: of the block, of its eighths, of theirs
 };
 
 /// Finds the distances of the voxels of a block, `farAway` beyond the reach.
