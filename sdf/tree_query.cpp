@@ -152,7 +152,7 @@ struct Query {
         answer.visits.emplace_back();
         BlockAnswer::Visit& found = answer.visits.back();
         found.leaf = index;
-        const glm::vec3 p = voxel.lower - leaf.origin;
+        const glm::vec3 p = voxel.lower;
         float nearest = best2;
         for (std::size_t i = 0; i < treeWidth; i += hn::Lanes(tag)) {
             const auto load = [&](const float* from) { return hn::Load(tag, from + i); };
@@ -160,9 +160,9 @@ struct Query {
                 return hn::Add(hn::Add(hn::Mul(ax, bx), hn::Mul(ay, by)), hn::Mul(az, bz));
             };
             const auto det = [&](Vec a, Vec b, Vec c, Vec d) { return hn::Sub(hn::Mul(a, d), hn::Mul(b, c)); };
-            const Vec qx = hn::Sub(hn::Set(tag, p.x), load(leaf.corner[0]));
-            const Vec qy = hn::Sub(hn::Set(tag, p.y), load(leaf.corner[1]));
-            const Vec qz = hn::Sub(hn::Set(tag, p.z), load(leaf.corner[2]));
+            const Vec qx = hn::Sub(hn::Sub(hn::Set(tag, p.x), load(leaf.cell[0])), load(leaf.corner[0]));
+            const Vec qy = hn::Sub(hn::Sub(hn::Set(tag, p.y), load(leaf.cell[1])), load(leaf.corner[1]));
+            const Vec qz = hn::Sub(hn::Sub(hn::Set(tag, p.z), load(leaf.cell[2])), load(leaf.corner[2]));
             const Vec nx = load(leaf.normal[0]), ny = load(leaf.normal[1]), nz = load(leaf.normal[2]);
             const Vec ax = load(leaf.along[0]), ay = load(leaf.along[1]), az = load(leaf.along[2]);
             const Vec x = dot(qx, qy, qz, ax, ay, az), z = dot(qx, qy, qz, nx, ny, nz);

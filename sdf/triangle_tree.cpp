@@ -16,7 +16,7 @@
 namespace bilayer {
 namespace {
 
-/// Triangles with a longer edge are halved: floats stay exact to 1e-6 within a leaf [voxels].
+/// Triangles with a longer edge are halved: floats stay exact to 1e-6 around them [voxels].
 constexpr double longestEdge = 8;
 /// Floats hold all whole numbers up to twice this [voxels].
 constexpr double longestMesh = 1 << 23;
@@ -208,9 +208,10 @@ void writeTriangle(TriangleLeaf& leaf, std::size_t place, const Corners& corners
     const glm::dvec3 z = glm::dot(normal, normal) > 0 ? normal / glm::length(normal) : across(x), y = glm::cross(z, x);
     const glm::dvec2 flatB(glm::dot(b - a, x), 0), flatC(glm::dot(c - a, x), glm::dot(c - a, y));
     const glm::dvec2 bc = unitOr(flatC - flatB, glm::dvec2(1, 0)), ac = unitOr(flatC, glm::dvec2(1, 0));
-    const glm::dvec3 corner = a - glm::dvec3(leaf.origin);
+    const glm::dvec3 cell = glm::floor(a);
     for (int i = 0; i < 3; ++i) {
-        leaf.corner[i][place] = float(corner[i]);
+        leaf.cell[i][place] = float(cell[i]);
+        leaf.corner[i][place] = float(a[i] - cell[i]);
         leaf.normal[i][place] = float(z[i]);
         leaf.along[i][place] = float(x[i]);
     }
@@ -246,7 +247,6 @@ void makeLeaf(const Parts& parts, const std::vector<std::uint64_t>& keys, std::s
         leaf.triangles[i] = parts.triangle(part);
         for (const glm::dvec3& corner : corners[i]) box.add(corner);
     }
-    leaf.origin = glm::vec3(glm::floor(0.5 * (box.lower + box.upper)));
     for (std::size_t i = 0; i < treeWidth; ++i) writeTriangle(leaf, i, corners[i]);
     setBox(tree.groups[index / treeWidth], index % treeWidth,
            {below(box.lower.x), below(box.lower.y), below(box.lower.z)},

@@ -1,7 +1,7 @@
 // A bounding hierarchy over the triangles of a mesh, made for questions about the nearest triangle: triangles sorted
 // along Hilbert's curve, eight to a leaf, eight boxes to a group, and so on upward, with no pointers and no choices
 // that cost time. Long triangles are halved first until they are as small as a block: their boxes fit well and single
-// precision is enough for all that is measured from the leaf's own origin.
+// precision is enough for all that is measured from a triangle's own cell.
 #pragma once
 
 #include <cstddef>
@@ -17,15 +17,15 @@ namespace bilayer {
 inline constexpr int treeWidth = 8;  ///< triangles a leaf and boxes a group: a vector of floats
 
 /// Eight triangles, each in a frame of its own: corner A is its origin, x runs from A to B, z along the normal, and
-/// C = (c.x, c.y) has y >= 0. Lengths in voxels, positions from `origin`. Places that are left over repeat a triangle.
+/// C = (c.x, c.y) has y >= 0. Lengths in voxels. Places that are left over repeat a triangle.
 struct TriangleLeaf {
-    alignas(64) float corner[3][treeWidth];  ///< A
-    float normal[3][treeWidth];              ///< the direction of z
-    float along[3][treeWidth];               ///< the direction of x
+    alignas(64) float cell[3][treeWidth];  ///< A rounded down to whole voxels, in the tree's frame
+    float corner[3][treeWidth];            ///< A from there
+    float normal[3][treeWidth];            ///< the direction of z
+    float along[3][treeWidth];             ///< the direction of x
     float lengthAB[treeWidth];
     float directionBC[2][treeWidth], lengthBC[treeWidth];
     float directionAC[2][treeWidth], lengthAC[treeWidth];
-    glm::vec3 origin;                    ///< whole numbers, in the tree's frame [voxels]
     std::uint32_t triangles[treeWidth];  ///< indices into Mesh::triangles
 };
 
