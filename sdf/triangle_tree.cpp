@@ -12,6 +12,7 @@
 #include <glm/geometric.hpp>
 #include <limits>
 #include <stdexcept>
+#include <utility>
 
 namespace bilayer {
 namespace {
@@ -48,9 +49,7 @@ void forAll(std::size_t count, Body body) {
 class Parts {
   public:
     Parts(const Mesh& mesh, const glm::dvec3& base, double voxelSize)
-        : mesh_(mesh), base_(base), voxelSize_(voxelSize) {
-        split();
-    }
+        : mesh_(mesh), base_(base), perVoxelSize_(1 / voxelSize) {}
 
     Corners corners(std::size_t part) const {
         return part < mesh_.triangles.size() ? ofTriangle(part) : halves_[part - mesh_.triangles.size()].corners;
@@ -59,7 +58,20 @@ class Parts {
         return part < mesh_.triangles.size() ? std::uint32_t(part) : halves_[part - mesh_.triangles.size()].triangle;
     }
     std::size_t count() const { return mesh_.triangles.size() + halves_.size(); }
-    bool used(std::size_t part) const { return part >= mesh_.triangles.size() || halves_.empty() || isShort(part); }
+
+    // The longest edge, from this corner to the next, and its squared length.
+    static std::pair<std::size_t, double> longest(const Corners& c) {
+        const auto length2 = [&](std::size_t i) {
+            const glm::dvec3 edge = c[(i + 1) % 3] - c[i];
+            return glm::dot(edge, edge);
+        };
+        const std::array<double, 3> all{length2(0), length2(1), length2(2)};
+        const auto edge = std::size_t(std::max_element(all.begin(), all.end()) - all.begin());
+        return {edge, all[edge]};
+    }
+    static bool isLong(const Corners& c) { return longest(c).second > longestEdge * longestEdge; }
+
+    void halve(std::uint32_t triangle) { halve(ofTriangle(triangle), triangle); }
 
   private:
     struct Half {
@@ -71,43 +83,17 @@ class Parts {
         const glm::uvec3& t = mesh_.triangles[index];
         return {local(t.x), local(t.y), local(t.z)};
     }
-    glm::dvec3 local(unsigned point) const { return glm::dvec3(mesh_.points[point]) / voxelSize_ - base_; }
-
-    static int longest(const Corners& c, double& length2) {
-        int edge = 0;
-        length2 = -1;
-        for (int i = 0; i < 3; ++i) {
-            const glm::dvec3 e = c[std::size_t((i + 1) % 3)] - c[std::size_t(i)];
-            if (glm::dot(e, e) > length2) length2 = glm::dot(e, e), edge = i;
-        }
-        return edge;
-    }
-    bool isShort(std::size_t index) const {
-        double length2;
-        longest(ofTriangle(index), length2);
-        return length2 <= longestEdge * longestEdge;
-    }
-
-    void split() {
-        tbb::enumerable_thread_specific<std::vector<std::uint32_t>> found;
-        forAll(mesh_.triangles.size(), [&](std::size_t i) {
-            if (!isShort(i)) found.local().push_back(std::uint32_t(i));
-        });
-        std::vector<std::uint32_t> large;
-        for (const auto& some : found) large.insert(large.end(), some.begin(), some.end());
-        std::sort(large.begin(), large.end());
-        for (const std::uint32_t triangle : large) halve(ofTriangle(triangle), triangle);
-    }
+    glm::dvec3 local(unsigned point) const { return glm::dvec3(mesh_.points[point]) * perVoxelSize_ - base_; }
 
     void halve(const Corners& c, std::uint32_t triangle) {
-        double length2;
-        const auto i = std::size_t(longest(c, length2)), j = (i + 1) % 3, k = (i + 2) % 3;
+        const auto [i, length2] = longest(c);
         if (length2 <= longestEdge * longestEdge) {
-            if (halves_.size() + mesh_.triangles.size() >= (std::size_t(1) << indexBits))
-                throw std::invalid_argument("the mesh has too many triangles, or too large ones for this voxel size");
+            if (count() >= (std::size_t(1) << indexBits))
+                throw std::invalid_argument("voxelSize is too small: the mesh has triangles too large for it");
             halves_.push_back({c, triangle});
             return;
         }
+        const std::size_t j = (i + 1) % 3, k = (i + 2) % 3;
         const glm::dvec3 middle = 0.5 * (c[i] + c[j]);
         halve({c[i], middle, c[k]}, triangle);
         halve({middle, c[j], c[k]}, triangle);
@@ -115,7 +101,7 @@ class Parts {
 
     const Mesh& mesh_;
     glm::dvec3 base_;
-    double voxelSize_;
+    double perVoxelSize_;
     std::vector<Half> halves_;
 };
 
@@ -127,21 +113,38 @@ std::uint64_t spread(std::uint64_t x) {
     return (x | x << 2) & 0x249249249;
 }
 
-// The place of a cell along Hilbert's curve, by Skilling's transformation without branches.
-std::uint64_t hilbert(std::array<std::uint32_t, 3> x) {
-    const auto undo = [&](std::uint32_t q, std::size_t i) {
-        const std::uint32_t inverts = 0u - std::uint32_t((x[i] & q) != 0), low = q - 1;
-        const std::uint32_t swapped = (x[0] ^ x[i]) & low & ~inverts;
-        x[0] ^= (low & inverts) | swapped;
-        x[i] ^= swapped;
+// Cells in runs, so that the compiler can use vectors.
+struct Cells {
+    static constexpr std::size_t most = 64;
+    std::uint32_t x[3][most];
+};
+
+// From cells to their places along Hilbert's curve, by Skilling's transformation without branches; the place of a cell
+// is in the bits of the three numbers taken in turn.
+void transformToHilbert(Cells& cells) {
+    auto& [x, y, z] = cells.x;
+    const auto undo = [&](int bit, std::uint32_t* v) {
+        for (std::size_t i = 0; i < Cells::most; ++i) {
+            const std::uint32_t inverts = 0u - (v[i] >> bit & 1), low = (1u << bit) - 1;
+            const std::uint32_t swapped = (x[i] ^ v[i]) & low & ~inverts;
+            x[i] ^= (low & inverts) | swapped;
+            v[i] ^= swapped;
+        }
     };
-    for (std::uint32_t q = 1u << (bitsPerAxis - 1); q > 1; q >>= 1)
-        for (std::size_t i = 0; i < 3; ++i) undo(q, i);
-    x[1] ^= x[0];
-    x[2] ^= x[1];
-    std::uint32_t t = 0;  // bit b is the parity of the bits of x[2] above b
-    for (std::uint32_t y = x[2] >> 1; y != 0; y >>= 1) t ^= y;
-    return spread(x[0] ^ t) << 2 | spread(x[1] ^ t) << 1 | spread(x[2] ^ t);
+    for (int bit = bitsPerAxis - 1; bit > 0; --bit) {
+        for (std::size_t i = 0; i < Cells::most; ++i) x[i] ^= (0u - (x[i] >> bit & 1)) & ((1u << bit) - 1);
+        undo(bit, y);
+        undo(bit, z);
+    }
+    for (std::size_t i = 0; i < Cells::most; ++i) {
+        y[i] ^= x[i];
+        z[i] ^= y[i];
+        std::uint32_t parity = z[i] >> 1;  // bit b: of the bits of z above b
+        for (int shift = 1; shift < bitsPerAxis; shift *= 2) parity ^= parity >> shift;
+        x[i] ^= parity;
+        y[i] ^= parity;
+        z[i] ^= parity;
+    }
 }
 
 // Sorts keys by their upper bits, stably: radix sort, runs side by side.
@@ -169,18 +172,54 @@ void sortKeys(std::vector<std::uint64_t>& keys) {
     }
 }
 
-std::vector<std::uint64_t> sortedKeys(const Parts& parts, const glm::ivec3& size) {
-    const double cells = (1 << bitsPerAxis) / (double(std::max({size.x, size.y, size.z})) * 3);
-    std::vector<std::uint64_t> keys(parts.count());
-    forAll(keys.size(), [&](std::size_t i) {
-        const auto [a, b, c] = parts.corners(i);
-        std::array<std::uint32_t, 3> cell;
+/// The key of a part that is not used.
+constexpr std::uint64_t unused = ~std::uint64_t(0);
+
+// Keys of parts first .. first + count - 1; long triangles have none and are noted.
+void makeKeys(const Parts& parts, const glm::ivec3& size, std::size_t first, std::size_t count, std::uint64_t* keys,
+              std::vector<std::uint32_t>& longOnes) {
+    constexpr double cells = 1 << bitsPerAxis;
+    const double scale = cells / (3.0 * std::max({size.x, size.y, size.z}));
+    Cells run{};
+    std::array<bool, Cells::most> isLong{};
+    for (std::size_t i = 0; i < count; ++i) {
+        const Corners c = parts.corners(first + i);
         for (int k = 0; k < 3; ++k)
-            cell[std::size_t(k)] =
-                std::uint32_t(std::clamp((a[k] + b[k] + c[k]) * cells, 0.0, double((1 << bitsPerAxis) - 1)));
-        keys[i] = hilbert(cell) << indexBits | i;
+            run.x[k][i] = std::uint32_t(std::clamp((c[0][k] + c[1][k] + c[2][k]) * scale, 0.0, cells - 1));
+        isLong[i] = Parts::isLong(c);
+    }
+    transformToHilbert(run);
+    for (std::size_t i = 0; i < count; ++i) {
+        const std::uint64_t place = spread(run.x[0][i]) << 2 | spread(run.x[1][i]) << 1 | spread(run.x[2][i]);
+        keys[i] = isLong[i] ? unused : place << indexBits | (first + i);
+        if (isLong[i]) longOnes.push_back(std::uint32_t(first + i));
+    }
+}
+
+// Adds the keys of the parts that have none yet; the long ones among them are returned in order.
+std::vector<std::uint32_t> addKeys(const Parts& parts, const glm::ivec3& size, std::vector<std::uint64_t>& keys) {
+    const std::size_t begin = keys.size();
+    keys.resize(parts.count());
+    tbb::enumerable_thread_specific<std::vector<std::uint32_t>> found;
+    const std::size_t runs = (keys.size() - begin + Cells::most - 1) / Cells::most;
+    tbb::parallel_for(std::size_t(0), runs, [&](std::size_t run) {
+        const std::size_t first = begin + run * Cells::most, count = std::min(Cells::most, keys.size() - first);
+        makeKeys(parts, size, first, count, keys.data() + first, found.local());
     });
-    std::erase_if(keys, [&](std::uint64_t key) { return !parts.used(key & ((1u << indexBits) - 1)); });
+    std::vector<std::uint32_t> longOnes;
+    for (const auto& some : found) longOnes.insert(longOnes.end(), some.begin(), some.end());
+    std::sort(longOnes.begin(), longOnes.end());
+    return longOnes;
+}
+
+std::vector<std::uint64_t> sortedKeys(Parts& parts, const glm::ivec3& size) {
+    std::vector<std::uint64_t> keys;
+    const std::vector<std::uint32_t> longOnes = addKeys(parts, size, keys);
+    if (!longOnes.empty()) {
+        for (const std::uint32_t triangle : longOnes) parts.halve(triangle);
+        addKeys(parts, size, keys);
+        std::erase(keys, unused);
+    }
     sortKeys(keys);
     return keys;
 }
@@ -195,7 +234,7 @@ glm::dvec3 across(const glm::dvec3& direction) {
 template <class Vector>
 Vector unitOr(const Vector& v, const Vector& otherwise) {
     const double length2 = glm::dot(v, v);
-    return length2 > 0 ? v / std::sqrt(length2) : otherwise;
+    return length2 > 0 ? v * (1 / std::sqrt(length2)) : otherwise;
 }
 
 // Writes a triangle in its frame; one without an area becomes a segment or a point.
@@ -308,7 +347,7 @@ TriangleTree makeTriangleTree(const Mesh& mesh, float voxelSize) {
     tree.base = glm::ivec3(base);
     tree.size = glm::ivec3(size);
 
-    const Parts parts(mesh, base, voxelSize);
+    Parts parts(mesh, base, voxelSize);
     const std::vector<std::uint64_t> keys = sortedKeys(parts, tree.size);
     tree.leafCount = std::uint32_t((keys.size() + treeWidth - 1) / treeWidth);
     tree.groupCount = groupsOver(tree.leafCount);
