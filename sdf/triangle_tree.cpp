@@ -2,6 +2,7 @@
 // that of packed R-trees: I. Kamel, C. Faloutsos, "On packing R-trees", CIKM 1993, 490-499.
 #include "sdf/triangle_tree.h"
 
+#include <hwy/cache_control.h>
 #include <oneapi/tbb/enumerable_thread_specific.h>
 #include <oneapi/tbb/parallel_for.h>
 
@@ -23,6 +24,7 @@ constexpr double longestEdge = 8;
 constexpr double longestMesh = 1 << 23;
 /// A sort key and the number of a part share 64 bits.
 constexpr int bitsPerAxis = 12, indexBits = 28, keyBits = 3 * bitsPerAxis;
+constexpr std::uint64_t indexMask = (std::uint64_t(1) << indexBits) - 1;
 /// A pass of the radix sort; three passes sort a key.
 constexpr int digitBits = 12;
 constexpr std::size_t digits = std::size_t(1) << digitBits;
@@ -56,6 +58,14 @@ class Parts {
     }
     std::uint32_t triangle(std::size_t part) const {
         return part < mesh_.triangles.size() ? std::uint32_t(part) : halves_[part - mesh_.triangles.size()].triangle;
+    }
+    // Asks for memory ahead of its use: parts come in an order that the mesh does not know.
+    void fetchIndices(std::size_t part) const {
+        if (part < mesh_.triangles.size()) hwy::Prefetch(&mesh_.triangles[part]);
+    }
+    void fetchCorners(std::size_t part) const {
+        if (part >= mesh_.triangles.size()) return;
+        for (int i = 0; i < 3; ++i) hwy::Prefetch(&mesh_.points[mesh_.triangles[part][i]]);
     }
     std::size_t count() const { return mesh_.triangles.size() + halves_.size(); }
 
@@ -277,11 +287,16 @@ float below(double x) {
 
 void makeLeaf(const Parts& parts, const std::vector<std::uint64_t>& keys, std::size_t index, TriangleTree& tree) {
     const std::size_t begin = index * treeWidth, count = std::min<std::size_t>(treeWidth, keys.size() - begin);
+    const auto partAt = [&](std::size_t i) { return std::size_t(keys[std::min(i, keys.size() - 1)] & indexMask); };
+    for (std::size_t i = begin; i < begin + treeWidth; ++i) {
+        parts.fetchIndices(partAt(i + 4 * treeWidth));
+        parts.fetchCorners(partAt(i + 2 * treeWidth));
+    }
     std::array<Corners, treeWidth> corners;
     TriangleLeaf& leaf = tree.leaves[index];
     Box box;
     for (std::size_t i = 0; i < treeWidth; ++i) {
-        const std::size_t part = keys[begin + std::min(i, count - 1)] & ((1u << indexBits) - 1);
+        const std::size_t part = partAt(begin + std::min(i, count - 1));
         corners[i] = parts.corners(part);
         leaf.triangles[i] = parts.triangle(part);
         for (const glm::dvec3& corner : corners[i]) box.add(corner);
