@@ -45,7 +45,8 @@ struct MeshJob {
     float reach;      ///< distances up to this must be found; beyond it they may be +-farAway [voxels], at least 1
     bool triangles;   ///< whether the nearest triangle is asked for
     bool sign;        ///< false: all distances are positive
-    /// Takes filled blocks; may be called from several threads at once. Blocks without a voxel within the reach need not come.
+    /// Takes filled blocks; may be called from several threads at once. Blocks without a voxel within the reach need
+    /// not come.
     std::function<void(const FilledBlocks&)> sink;
     Progress& progress;
 };

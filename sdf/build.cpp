@@ -138,10 +138,14 @@ struct Signs {
 
 const char* name(Sign sign) {
     switch (sign) {
-        case Sign::automatic: return "auto";
-        case Sign::normals: return "normals";
-        case Sign::winding: return "winding";
-        case Sign::flood: return "flood";
+        case Sign::automatic:
+            return "auto";
+        case Sign::normals:
+            return "normals";
+        case Sign::winding:
+            return "winding";
+        case Sign::flood:
+            return "flood";
     }
     return "";
 }
@@ -278,12 +282,9 @@ class Build {
         const float reach = reachOf(options_, sign);
         const BandWidths widths = bandOf(options_);
         Assembler assembler(byNormals ? widths : BandWidths{reach, reach, options_.voxelSize}, options_.triangles);
-        const MeshJob job{mesh,
-                          options_.voxelSize,
-                          reach,
-                          options_.triangles,
-                          byNormals,
-                          [&](const FilledBlocks& blocks) { assembler.take(blocks); },
+        const MeshJob job{mesh,      options_.voxelSize,
+                          reach,     options_.triangles,
+                          byNormals, [&](const FilledBlocks& blocks) { assembler.take(blocks); },
                           progress_};
         options_.method == Method::exact ? fillExact(job) : fillPseudonormal(job);
         times_.fill += part.lap();
@@ -316,6 +317,9 @@ class Build {
 
 LevelSet build(const Mesh& mesh, const BuildOptions& options, const BlockFiller* filler, BuildTimes* times) {
     check(options);
+    if (filler && filler->backend != "tbb" && options.method != Method::doubleLayer)
+        throw std::invalid_argument(fmt::format("the {} back end has no method {}: it has double-layer",
+                                                filler->backend, name(options.method)));
     validate(mesh);
     checkSize(mesh, options, fillParameters(options).reach);
     openvdb::initialize();

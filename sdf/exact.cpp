@@ -3,17 +3,22 @@
 
 #include <oneapi/tbb/enumerable_thread_specific.h>
 #include <oneapi/tbb/parallel_for.h>
+#include <oneapi/tbb/task_arena.h>
 
 #include <algorithm>
 #include <bit>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <mutex>
+#include <optional>
 #include <utility>
 #include <vector>
 
 #include "sdf/closest_side.h"
 #include "sdf/clusters.h"
+#include "sdf/progress.h"
 #include "sdf/triangle_bins.h"
+#include "sdf/winding.h"
 
 namespace bilayer {
 namespace {
@@ -22,6 +27,7 @@ namespace {
 constexpr double longestPieceEdge = 16;
 /// A triangle must come this much nearer than a sample's piece might to be left out of a closer look [voxels].
 constexpr float sideSlack = 1e-3f;
+constexpr std::size_t trianglesPerPoll = 1024;  // a tenth of a millisecond
 
 // Which clusters reach which block of a brick.
 struct BlockBins {
@@ -42,10 +48,33 @@ struct Scratch {
     std::vector<std::int32_t> triangles;
 };
 
+// The winding number, for the rare voxel whose closest normals cancel out; made when it is first asked.
+class LastResort {
+  public:
+    explicit LastResort(const Mesh& mesh) : mesh_(mesh) {}
+
+    bool isInside(const glm::dvec3& point) {
+        // isolated: a thread that waits for the tree must not be given a brick that would wait for it too
+        std::call_once(made_, [&] { tbb::this_task_arena::isolate([&] { winding_.emplace(mesh_); }); });
+        return (*winding_)(point) > 0.5;
+    }
+
+  private:
+    const Mesh& mesh_;
+    std::once_flag made_;
+    std::optional<WindingNumber> winding_;
+};
+
 class BrickFiller {
   public:
-    BrickFiller(const MeshJob& job, const TriangleBins& bins, double voxelsPerUnit, Scratch& scratch)
-        : job_(job), bins_(bins), voxelsPerUnit_(voxelsPerUnit), s_(scratch), side_(job.mesh, voxelsPerUnit) {}
+    BrickFiller(const MeshJob& job, const TriangleBins& bins, double voxelsPerUnit, LastResort& lastResort,
+                Scratch& scratch)
+        : job_(job),
+          bins_(bins),
+          voxelsPerUnit_(voxelsPerUnit),
+          lastResort_(lastResort),
+          s_(scratch),
+          side_(job.mesh, voxelsPerUnit) {}
 
     void fill(std::size_t brick) {
         origin_ = bins_.origins[brick];
@@ -71,6 +100,7 @@ class BrickFiller {
         for (const std::uint32_t triangle : bins_.trianglesOf(brick)) {
             const glm::uvec3 t = job_.mesh.triangles[triangle];
             const auto corner = [&](unsigned i) { return glm::dvec3(job_.mesh.points[i]) * voxelsPerUnit_; };
+            if (++cut_ % trianglesPerPoll == 0) job_.progress.poll();
             cutter.cut({corner(t.x), corner(t.y), corner(t.z)}, triangle, limits);
         }
         cutter.finish();
@@ -120,6 +150,7 @@ class BrickFiller {
         const BlockBins& bins = s_.bins;
         reaching_ = {bins.clusters.data() + bins.offsets[number], bins.clusters.data() + bins.offsets[number + 1]};
         if (reaching_.empty()) return;
+        job_.progress.poll();
         block_ = origin_ + inBrick;
         inBrick_ = inBrick;
         if (!measureBlock({reaching_, s_.clusters.clusters().data(), s_.clusters.members().data(), s_.pieces.data(),
@@ -157,7 +188,8 @@ class BrickFiller {
     bool isInside(int voxel) {
         const glm::ivec3 local(voxel / 64, voxel / 8 % 8, voxel % 8);
         const auto nearest = std::size_t(found_.nearest[voxel] >> sideBits);
-        side_.begin(glm::dvec3(block_ + local));
+        const glm::dvec3 point(block_ + local);
+        side_.begin(point);
         side_.offer(s_.pieces[nearest].triangle);
         const float distance = float(side_.distance()) + sideSlack;
         const glm::vec3 at(local + inBrick_);
@@ -173,13 +205,16 @@ class BrickFiller {
                 if (near(member.sample, member.radius)) side_.offer(s_.pieces[member.piece].triangle);
             }
         }
-        return side_.side() == Side::inside;
+        const Side side = side_.side();
+        return side == Side::undecided ? lastResort_.isInside(point / voxelsPerUnit_) : side == Side::inside;
     }
 
     const MeshJob& job_;
     const TriangleBins& bins_;
     double voxelsPerUnit_;
+    LastResort& lastResort_;
     Scratch& s_;
+    std::size_t cut_ = 0;
     ClosestSide side_;
     BlockDistances found_;
     std::span<const std::uint32_t> reaching_;  // clusters of the current block
@@ -192,9 +227,13 @@ class BrickFiller {
 void fillExact(const MeshJob& job) {
     const double voxelsPerUnit = 1.0 / double(job.voxelSize);
     const TriangleBins bins = binTriangles(job.mesh, voxelsPerUnit, job.reach);
+    job.progress.begin(bins.count());
+    LastResort lastResort(job.mesh);
     tbb::enumerable_thread_specific<Scratch> scratch;
-    tbb::parallel_for(std::size_t(0), bins.count(),
-                      [&](std::size_t brick) { BrickFiller(job, bins, voxelsPerUnit, scratch.local()).fill(brick); });
+    tbb::parallel_for(std::size_t(0), bins.count(), [&](std::size_t brick) {
+        BrickFiller(job, bins, voxelsPerUnit, lastResort, scratch.local()).fill(brick);
+        job.progress.advance();
+    });
 }
 
 }  // namespace bilayer

@@ -32,6 +32,7 @@ const Way blockPerItem{KernelMapping::blockPerItem, 90}, rowPerItem{KernelMappin
 
 BuildOptions optionsFor(const Mesh& mesh, float resolution) {
     BuildOptions options;
+    options.method = Method::doubleLayer;
     options.voxelSize = voxelSizeFor(mesh, resolution);
     options.exteriorWidth = options.interiorWidth = 2;
     return options;

@@ -101,9 +101,14 @@ class Dense {
 /// Squared distances are sums in another order, from another origin: a few units in the last place of 100 voxels^2.
 constexpr float rounding = 2e-5f;
 
+BuildOptions layered(BuildOptions options) {
+    options.method = Method::doubleLayer;
+    return options;
+}
+
 void compare(const Mesh& mesh, const BuildOptions& options, int k) {
     const Dense dense(mesh, options, k);
-    const LevelSet field = build(mesh, options);
+    const LevelSet field = build(mesh, layered(options));
     const auto values = field.grids().distance->getConstAccessor();
     std::size_t active = 0, missing = 0, extra = 0;
     float worst = 0;
@@ -167,7 +172,7 @@ TEST_CASE("the triangle of a voxel is the owner of the sample that decides its d
     const Mesh mesh = shapes::torusKnot(2, 3, 5, 1, 150, 12);
     const BuildOptions options{.voxelSize = 0.5f, .triangles = true};
     const Dense dense(mesh, options, -1);
-    const LevelSet field = build(mesh, options);
+    const LevelSet field = build(mesh, layered(options));
     REQUIRE(field.grids().triangle);
     CHECK(field.grids().triangle->activeVoxelCount() == field.activeVoxels());
     std::size_t differ = 0, count = 0;

@@ -1,0 +1,349 @@
+// Highway compiles the part between HWY_BEFORE_NAMESPACE and HWY_AFTER_NAMESPACE once for each instruction set. Lanes
+// never add up, so all of them give the same bytes.
+#include "sdf/tree_query.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "sdf/tree_query.cpp"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <limits>
+
+#include "sdf/blocks.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace bilayer::HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+using Tag = hn::CappedTag<float, treeWidth>;
+using IndexTag = hn::RebindToUnsigned<Tag>;
+using NumberTag = hn::RebindToSigned<Tag>;
+using Vec = hn::Vec<Tag>;
+using Mask = hn::Mask<Tag>;
+
+/// Triangles whose distances differ by less may share the closest point: more than floats blur [voxels].
+constexpr float tie = 1e-5f;
+/// A height over a plane below this does not tell the side [voxels].
+constexpr float leastHeight = 1e-5f;
+/// Up to this reach the two above hold; they grow with it beyond, as the rounding of distances does [voxels].
+constexpr float usualReach = 16;
+/// Room for the rounding of distances, and for ties, when a bound is taken from one place to another [voxels].
+constexpr float slack = 1e-3f;
+/// The eight corners of a cube, each beside the one before.
+constexpr int path[8][3] = {{0, 0, 0}, {0, 0, 1}, {0, 1, 1}, {0, 1, 0}, {1, 1, 0}, {1, 1, 1}, {1, 0, 1}, {1, 0, 0}};
+/// Room for the rounding of a squared distance.
+constexpr float roundUp = 1 + 1e-6f;
+
+inline Vec square(Vec x) {
+    return hn::Mul(x, x);
+}
+
+inline unsigned bitsOf(Mask mask) {
+    std::uint8_t bits[8] = {};
+    hn::StoreMaskBits(Tag(), mask, bits);
+    return bits[0];
+}
+
+// The squared distances of eight boxes, or as many as a vector holds, from a box of voxels.
+inline Vec boxDistance2(const float* const lower[3], const float* const upper[3], std::size_t i,
+                        const VoxelBox& voxels) {
+    const Tag tag;
+    Vec sum = hn::Zero(tag);
+    for (int k = 0; k < 3; ++k) {
+        const Vec gap = hn::Max(hn::Sub(hn::LoadU(tag, lower[k] + i), hn::Set(tag, voxels.upper[k])),
+                                hn::Sub(hn::Set(tag, voxels.lower[k]), hn::LoadU(tag, upper[k] + i)));
+        sum = hn::Add(sum, square(hn::Max(gap, hn::Zero(tag))));
+    }
+    return sum;
+}
+
+// Where boxes are stored: in a list or in a group.
+struct Boxes {
+    const float *lower[3], *upper[3];
+
+    explicit Boxes(const NodeList& list) {
+        for (int k = 0; k < 3; ++k) lower[k] = list.lower[k].data(), upper[k] = list.upper[k].data();
+    }
+    explicit Boxes(const BoxGroup& group) {
+        for (int k = 0; k < 3; ++k) lower[k] = group.lower[k], upper[k] = group.upper[k];
+    }
+};
+
+struct Narrowing {
+    const WideTree& tree;
+    const VoxelBox& voxels;
+    float reach2, largest;
+    NodeList& to;
+
+    void take(const Boxes& boxes, std::size_t i, hn::Vec<IndexTag> nodes, Mask valid) {
+        const Tag tag;
+        Vec side = hn::Zero(tag);
+        for (int k = 0; k < 3; ++k)
+            side = hn::Max(side, hn::Sub(hn::LoadU(tag, boxes.upper[k] + i), hn::LoadU(tag, boxes.lower[k] + i)));
+        const Mask near =
+            hn::And(valid, hn::Le(boxDistance2(boxes.lower, boxes.upper, i, voxels), hn::Set(tag, reach2)));
+        const Mask isGroup = hn::RebindMask(
+            tag, hn::Gt(hn::BitCast(NumberTag(), nodes), hn::Set(NumberTag(), std::int32_t(tree.leafCount) - 1)));
+        const Mask open = hn::And(near, hn::And(isGroup, hn::Gt(side, hn::Set(tag, largest))));
+        keep(boxes, i, nodes, hn::AndNot(open, near));
+        HWY_ALIGN std::uint32_t numbers[treeWidth];
+        hn::Store(nodes, IndexTag(), numbers);
+        for (unsigned bits = bitsOf(open); bits != 0; bits &= bits - 1)
+            takeGroup(tree.group(numbers[std::countr_zero(bits)]));
+    }
+
+    void takeGroup(const BoxGroup& group) {
+        const Boxes boxes(group);
+        for (std::size_t i = 0; i < treeWidth; i += hn::Lanes(Tag()))
+            take(boxes, i, hn::Iota(IndexTag(), group.firstChild + std::uint32_t(i)), hn::FirstN(Tag(), treeWidth));
+    }
+
+    void keep(const Boxes& boxes, std::size_t i, hn::Vec<IndexTag> nodes, Mask mask) {
+        const Tag tag;
+        to.makeRoom(treeWidth);
+        for (int k = 0; k < 3; ++k) {
+            hn::CompressStore(hn::LoadU(tag, boxes.lower[k] + i), mask, tag, to.lower[k].data() + to.count);
+            hn::CompressStore(hn::LoadU(tag, boxes.upper[k] + i), mask, tag, to.upper[k].data() + to.count);
+        }
+        to.count += hn::CompressStore(nodes, hn::RebindMask(IndexTag(), mask), IndexTag(), to.nodes.data() + to.count);
+    }
+};
+
+void narrowList(const WideTree& tree, const NodeList& from, const VoxelBox& voxels, float reach, float largest,
+                NodeList& to) {
+    const Tag tag;
+    to.count = 0;
+    Narrowing narrowing{tree, voxels, reach * reach * roundUp, largest, to};
+    const Boxes boxes(from);
+    for (std::size_t i = 0; i < from.count; i += hn::Lanes(tag))
+        narrowing.take(boxes, i, hn::LoadU(IndexTag(), from.nodes.data() + i), hn::FirstN(tag, from.count - i));
+}
+
+// Adds the square of what a place on an edge's line lies beyond the edge.
+inline Vec beyond2(Vec place, Vec length) {
+    const Vec zero = hn::Zero(Tag());
+    return square(hn::Max(hn::Max(hn::Neg(place), hn::Sub(place, length)), zero));
+}
+
+// One voxel's question.
+struct Query {
+    const WideTree& tree;
+    const NodeList& list;
+    BlockAnswer& answer;
+    float tieWidth2;  // at least the difference of the squares of distances that are `tie` apart
+    VoxelBox voxel;
+    float best2, limit2;  // boxes farther away than the latter do not matter
+    std::uint32_t first;  // the leaf that was visited first
+
+    void lower(float distance2) {
+        best2 = distance2;
+        limit2 = best2 * roundUp + tieWidth2;
+    }
+
+    // The squared distances to the triangles of a leaf. The distance along the plane is the least over the three edges
+    // of how far the point lies beside and beyond them; over the triangle itself only the latter counts, which is zero
+    // for one edge at least, so that rounding can not take a sliver's line for its inside.
+    void visit(std::uint32_t index) {
+        const Tag tag;
+        const WideLeaf& leaf = tree.leaves[index];
+        answer.visits.emplace_back();
+        BlockAnswer::Visit& found = answer.visits.back();
+        found.leaf = index;
+        const glm::vec3 p = voxel.lower;
+        float nearest = best2;
+        for (std::size_t i = 0; i < treeWidth; i += hn::Lanes(tag)) {
+            const auto load = [&](const float* from) { return hn::Load(tag, from + i); };
+            const auto dot = [&](Vec ax, Vec ay, Vec az, Vec bx, Vec by, Vec bz) {
+                return hn::Add(hn::Add(hn::Mul(ax, bx), hn::Mul(ay, by)), hn::Mul(az, bz));
+            };
+            const auto det = [&](Vec a, Vec b, Vec c, Vec d) { return hn::Sub(hn::Mul(a, d), hn::Mul(b, c)); };
+            const Vec qx = hn::Sub(hn::Sub(hn::Set(tag, p.x), load(leaf.cell[0])), load(leaf.corner[0]));
+            const Vec qy = hn::Sub(hn::Sub(hn::Set(tag, p.y), load(leaf.cell[1])), load(leaf.corner[1]));
+            const Vec qz = hn::Sub(hn::Sub(hn::Set(tag, p.z), load(leaf.cell[2])), load(leaf.corner[2]));
+            const Vec nx = load(leaf.normal[0]), ny = load(leaf.normal[1]), nz = load(leaf.normal[2]);
+            const Vec ax = load(leaf.along[0]), ay = load(leaf.along[1]), az = load(leaf.along[2]);
+            const Vec x = dot(qx, qy, qz, ax, ay, az), z = dot(qx, qy, qz, nx, ny, nz);
+            const Vec y = dot(qx, qy, qz, det(ny, nz, ay, az), det(nz, nx, az, ax), det(nx, ny, ax, ay));
+
+            const Vec ab = load(leaf.lengthAB), fromB = hn::Sub(x, ab);
+            const Vec bcx = load(leaf.directionBC[0]), bcy = load(leaf.directionBC[1]);
+            const Vec acx = load(leaf.directionAC[0]), acy = load(leaf.directionAC[1]);
+            const Vec besideBC = det(bcx, bcy, fromB, y), besideAC = det(x, y, acx, acy);
+            const Vec alongBC = hn::Add(hn::Mul(fromB, bcx), hn::Mul(y, bcy));
+            const Vec alongAC = hn::Add(hn::Mul(x, acx), hn::Mul(y, acy));
+            const Mask over = hn::Gt(hn::Min(y, hn::Min(besideBC, besideAC)), hn::Zero(tag));
+            const auto edge = [&](Vec beside, Vec along, Vec length) {
+                return hn::Add(beyond2(along, length), hn::IfThenZeroElse(over, square(beside)));
+            };
+            const Vec flat2 = hn::Min(edge(y, x, ab), hn::Min(edge(besideBC, alongBC, load(leaf.lengthBC)),
+                                                              edge(besideAC, alongAC, load(leaf.lengthAC))));
+            const Vec distance2 = hn::Add(flat2, square(z));
+            hn::Store(distance2, tag, found.distance2 + i);
+            hn::Store(z, tag, found.height + i);
+            nearest = std::min(nearest, hn::GetLane(hn::MinOfLanes(tag, distance2)));
+        }
+        if (nearest < best2) lower(nearest);
+    }
+
+    void look(const Boxes& boxes, std::size_t begin, std::size_t count, const std::uint32_t* nodes,
+              std::uint32_t firstNode) {
+        const Tag tag;
+        for (std::size_t i = begin; i < begin + count; i += hn::Lanes(tag)) {
+            const Vec distance2 = boxDistance2(boxes.lower, boxes.upper, i, voxel);
+            unsigned bits = bitsOf(hn::Le(distance2, hn::Set(tag, limit2)));
+            if (begin + count - i < hn::Lanes(tag)) bits &= (1u << (begin + count - i)) - 1;
+            if (bits == 0) continue;
+            HWY_ALIGN float gaps[treeWidth];
+            hn::Store(distance2, tag, gaps);
+            for (; bits != 0; bits &= bits - 1) {
+                const auto lane = std::size_t(std::countr_zero(bits));
+                if (gaps[lane] > limit2) continue;  // something nearer was found meanwhile
+                const std::uint32_t node = nodes ? nodes[i + lane] : firstNode + std::uint32_t(i + lane);
+                if (!tree.isLeaf(node))
+                    look(Boxes(tree.group(node)), 0, treeWidth, nullptr, tree.group(node).firstChild);
+                else if (node != first)
+                    visit(node);
+            }
+        }
+    }
+
+    // Where the nearest triangle's leaf stands in the visits, and its place there.
+    std::pair<std::size_t, std::size_t> winner() const {
+        for (std::size_t v = 0; v < answer.visits.size(); ++v)
+            for (std::size_t i = 0; i < treeWidth; ++i)
+                if (answer.visits[v].distance2[i] == best2) return {v, i};
+        return {0, 0};
+    }
+
+    // The sign that all triangles around the closest point agree on, or 0.
+    int side(float least) const {
+        const Tag tag;
+        const Vec infinity = hn::Set(tag, std::numeric_limits<float>::infinity());
+        Vec lowest = infinity, highest = hn::Neg(infinity);
+        for (const auto& v : answer.visits)
+            for (std::size_t i = 0; i < treeWidth; i += hn::Lanes(tag)) {
+                const Mask tied = hn::Le(hn::Load(tag, v.distance2 + i), hn::Set(tag, limit2));
+                const Vec height = hn::Load(tag, v.height + i);
+                lowest = hn::Min(lowest, hn::IfThenElse(tied, height, infinity));
+                highest = hn::Max(highest, hn::IfThenElse(tied, height, hn::Neg(infinity)));
+            }
+        if (hn::GetLane(hn::MinOfLanes(tag, lowest)) > least) return 1;
+        return hn::GetLane(hn::MaxOfLanes(tag, highest)) < -least ? -1 : 0;
+    }
+
+    void doubt(int voxelIndex) const {
+        const auto begin = std::uint32_t(answer.candidates.size());
+        for (const auto& v : answer.visits)
+            for (std::size_t i = 0; i < treeWidth; ++i)
+                if (v.distance2[i] <= limit2) answer.candidates.push_back(tree.leaves[v.leaf].triangles[i]);
+        answer.doubts.push_back({voxelIndex, begin, std::uint32_t(answer.candidates.size())});
+    }
+};
+
+// What all voxels of a block share.
+struct BlockQuery {
+    const WideTree& tree;
+    const glm::vec3& origin;
+    float reach;
+    bool sign;
+    BlockAnswer& answer;
+
+    // Asks for what is nearer than `bound`.
+    Query ask(const NodeList& list, const glm::vec3& position, float bound) const {
+        const float ties = sign ? 2 * tie * std::max(1.f, reach / usualReach) * (reach + 1) : 0.f;
+        Query query{tree, list, answer, ties, {position, position}, 0, 0, answer.lastWinner};
+        query.lower(bound * bound * roundUp);
+        answer.visits.clear();
+        query.visit(query.first);
+        query.look(Boxes(list), 0, list.count, list.nodes.data(), 0);
+        return query;
+    }
+
+    // The voxels of a cube, which are no farther than `radius` from its centre: what is known of the centre rules
+    // out most of the list, if not all voxels.
+    void answerCube(const NodeList& from, const glm::vec3& lower, int level) {
+        const float side = float(blockSide >> level), radius = 0.5f * (side - 1) * std::sqrt(3.f) + slack;
+        const float bound = reach + radius;
+        const Query centre = ask(from, lower + 0.5f * (side - 1), bound);
+        if (!(centre.best2 < bound * bound)) return;
+        answer.lastWinner = answer.visits[centre.winner().first].leaf;
+        NodeList& list = answer.lists[level];
+        const float atMost = std::min(reach, std::sqrt(centre.best2) + radius);
+        narrowList(tree, from, {lower, lower + (side - 1)}, atMost + slack, side, list);
+        for (const auto& step : path) {
+            const glm::vec3 part = lower + 0.5f * side * glm::vec3(step[0], step[1], step[2]);
+            if (level < 2)
+                answerCube(list, part, level + 1);
+            else
+                answerVoxel(list, part, atMost);
+        }
+    }
+
+    void answerVoxel(const NodeList& list, const glm::vec3& position, float atMost) {
+        const Query query = ask(list, position, std::min(reach, atMost + slack));
+        if (query.best2 > reach * reach * roundUp || answer.visits.empty()) return;
+        const auto [visit, place] = query.winner();
+        if (answer.visits[visit].distance2[place] != query.best2) return;
+        const glm::ivec3 p(position - origin);
+        const int voxel = (p.x * blockSide + p.y) * blockSide + p.z;
+        answer.any = true;
+        answer.lastWinner = answer.visits[visit].leaf;
+        answer.distances[voxel] = std::sqrt(query.best2);
+        if (answer.triangles) answer.triangles[voxel] = std::int32_t(tree.leaves[answer.lastWinner].triangles[place]);
+        if (!sign) return;
+        const int side = query.side(leastHeight * std::max(1.f, reach / usualReach));
+        if (side < 0) answer.distances[voxel] = -answer.distances[voxel];
+        if (side == 0) query.doubt(voxel);
+    }
+};
+
+void answerVoxels(const WideTree& tree, const NodeList& list, const glm::vec3& origin, float reach, bool sign,
+                  BlockAnswer& answer) {
+    answer.any = false;
+    answer.doubts.clear();
+    answer.candidates.clear();
+    std::fill_n(answer.distances, blockVoxels, farAway);
+    if (answer.triangles) std::fill_n(answer.triangles, blockVoxels, -1);
+    BlockQuery{tree, origin, reach, sign, answer}.answerCube(list, origin, 0);
+}
+
+}  // namespace bilayer::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace bilayer {
+
+HWY_EXPORT(narrowList);
+HWY_EXPORT(answerVoxels);
+
+void NodeList::makeRoom(std::size_t more) {
+    if (count + 2 * more <= nodes.size()) return;
+    const std::size_t size = 2 * (count + 2 * more);
+    for (int k = 0; k < 3; ++k) lower[k].resize(size), upper[k].resize(size);
+    nodes.resize(size);
+}
+
+NodeList wholeTree(const WideTree& tree) {
+    NodeList list;
+    list.makeRoom(treeWidth);
+    for (int k = 0; k < 3; ++k) list.lower[k][0] = -1, list.upper[k][0] = float(tree.size[k] + 1);
+    list.nodes[0] = tree.root();
+    list.count = 1;
+    return list;
+}
+
+void narrow(const WideTree& tree, const NodeList& from, const VoxelBox& voxels, float reach, float largest,
+            NodeList& to) {
+    HWY_DYNAMIC_DISPATCH(narrowList)(tree, from, voxels, reach, largest, to);
+}
+
+void answerBlock(const WideTree& tree, const NodeList& list, const glm::vec3& origin, float reach, bool sign,
+                 BlockAnswer& answer) {
+    HWY_DYNAMIC_DISPATCH(answerVoxels)(tree, list, origin, reach, sign, answer);
+}
+
+}  // namespace bilayer
+#endif  // HWY_ONCE

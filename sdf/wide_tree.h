@@ -1,0 +1,58 @@
+// A bounding hierarchy over the triangles of a mesh, made for questions about the nearest triangle: triangles sorted
+// along Hilbert's curve, eight to a leaf, eight boxes to a group, and so on upward, with no pointers and no choices
+// that cost time. Long triangles are halved first until they are as small as a block: their boxes fit well and single
+// precision is enough for all that is measured from a triangle's own cell.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <memory>
+#include <vector>
+
+#include "sdf/mesh.h"
+
+namespace bilayer {
+
+inline constexpr int treeWidth = 8;  ///< triangles a leaf and boxes a group: a vector of floats
+
+/// Eight triangles, each in a frame of its own: corner A is its origin, x runs from A to B, z along the normal, and
+/// C = (c.x, c.y) has y >= 0. Lengths in voxels. Places that are left over repeat a triangle.
+struct WideLeaf {
+    alignas(64) float cell[3][treeWidth];  ///< A rounded down to whole voxels, in the tree's frame
+    float corner[3][treeWidth];            ///< A from there
+    float normal[3][treeWidth];            ///< the direction of z
+    float along[3][treeWidth];             ///< the direction of x
+    float lengthAB[treeWidth];
+    float directionBC[2][treeWidth], lengthBC[treeWidth];
+    float directionAC[2][treeWidth], lengthAC[treeWidth];
+    std::uint32_t triangles[treeWidth];  ///< indices into Mesh::triangles
+};
+
+/// The boxes of eight leaves or of eight groups [voxels]; a box that is left over is empty: infinitely far away.
+struct BoxGroup {
+    alignas(64) float lower[3][treeWidth];
+    float upper[3][treeWidth];
+    std::uint32_t firstChild;  ///< the node of the first box; the others follow
+};
+
+/// Nodes are numbered: first the leaves, then the groups from the finest to the coarsest; the last one is the root.
+struct WideTree {
+    glm::ivec3 base{0};  ///< index coordinates of the origin of the tree's frame, multiples of 8
+    glm::ivec3 size{0};  ///< a box of this size from `base` holds the mesh [voxels]
+    std::uint32_t leafCount = 0, groupCount = 0;
+    std::unique_ptr<WideLeaf[]> leaves;
+    std::unique_ptr<BoxGroup[]> groups;
+
+    bool isLeaf(std::uint32_t node) const { return node < leafCount; }
+    const BoxGroup& group(std::uint32_t node) const { return groups[node - leafCount]; }
+    std::uint32_t root() const { return leafCount + groupCount - 1; }
+};
+
+/// Builds the hierarchy of a valid mesh on all cores; the result does not depend on their number.
+/// @param voxelSize  [m]
+/// Throws std::invalid_argument if the mesh is longer than 2^23 voxels or has more than 2^28 triangles and parts of
+/// halved ones.
+WideTree makeWideTree(const Mesh& mesh, float voxelSize);
+
+}  // namespace bilayer
