@@ -272,7 +272,7 @@ struct BlockQuery {
         answer.lastWinner = answer.visits[centre.winner().first].leaf;
         NodeList& list = answer.lists[level];
         const float atMost = std::min(reach, std::sqrt(centre.best2) + radius);
-        narrowList(tree, from, {lower, lower + (side - 1)}, atMost + slack, side, list);
+        narrowList(tree, from, {lower, lower + (side - 1)}, atMost + slack, 2 * side, list);
         for (const auto& step : path) {
             const glm::vec3 part = lower + 0.5f * side * glm::vec3(step[0], step[1], step[2]);
             if (level < 2)
