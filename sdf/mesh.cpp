@@ -62,11 +62,6 @@ float Bounds::longestSide() const {
     return empty() ? 0.f : std::max({size().x, size().y, size().z});
 }
 
-void Bounds::add(const glm::vec3& point) {
-    lower = glm::min(lower, point);
-    upper = glm::max(upper, point);
-}
-
 Bounds bounds(const Mesh& mesh) {
     return tbb::parallel_reduce(
         tbb::blocked_range<std::size_t>(0, mesh.triangles.size(), 4096), Bounds{},

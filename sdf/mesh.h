@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <glm/mat4x4.hpp>
+#include <glm/common.hpp>
 #include <glm/vec3.hpp>
 #include <vector>
 
@@ -24,7 +25,10 @@ struct Bounds {
     glm::vec3 centre() const { return 0.5f * (lower + upper); }
     float longestSide() const;
     bool empty() const { return lower.x > upper.x; }
-    void add(const glm::vec3& point);
+    void add(const glm::vec3& point) {
+        lower = glm::min(lower, point);
+        upper = glm::max(upper, point);
+    }
 };
 
 /// The box around all vertices that some triangle uses; empty for a mesh without triangles.
