@@ -14,8 +14,10 @@ namespace {
 constexpr double samePlace = 1e-7;
 /// A height below this part of the longest edge leaves no foot on the plane that is better than the edges.
 constexpr double flatness = 1e-10;
-/// Sums of unit normals below this part of their weights have cancelled out.
-constexpr double cancelled = 1e-5;
+/// Sums of unit normals below this part of their weights have nearly cancelled out.
+constexpr double cancelled = 1e-2;
+/// Solid angles below this, of sides about a voxel long, are too flat to tell on which side of an edge a way passes.
+constexpr double tooClose = 1e-9;
 constexpr double wholeTurn = 2 * glm::pi<double>();
 
 glm::dvec3 closestOnSegment(const glm::dvec3& a, const glm::dvec3& b) {
@@ -77,6 +79,28 @@ glm::dvec3 closestToOrigin(const std::array<glm::dvec3, 3>& c) {
     return best;
 }
 
+std::optional<int> passing(const std::array<glm::dvec3, 3>& c, const glm::dvec3& way) {
+    const glm::dvec3 n = glm::cross(c[1] - c[0], c[2] - c[0]);
+    int positive = 0, negative = 0;
+    for (std::size_t i = 0; i < 3; ++i) {
+        const glm::dvec3 &a = c[(i + 1) % 3], &b = c[(i + 2) % 3];
+        const double volume = glm::dot(way, glm::cross(a, b));
+        const double scale = glm::length(way) * glm::length(a) * glm::length(b);
+        if (std::abs(volume) > tooClose * scale) ++(volume > 0 ? positive : negative);
+    }
+    if (positive > 0 && negative > 0) return 0;
+    const double from = -glm::dot(c[0], n), to = glm::dot(way, n) + from, flat = tooClose * glm::length(n);
+    if ((from > flat && to > flat) || (from < -flat && to < -flat)) return 0;
+    if (positive + negative < 3 || std::abs(from) <= flat || std::abs(to) <= flat) return std::nullopt;
+    return to > from ? 1 : -1;
+}
+
+std::array<glm::dvec3, 3> ClosestSide::cornersOf(std::uint32_t triangle) const {
+    const glm::uvec3 t = mesh_.triangles[triangle];
+    const auto corner = [&](unsigned i) { return glm::dvec3(mesh_.points[i]) * voxelsPerUnit_ - point_; };
+    return {corner(t.x), corner(t.y), corner(t.z)};
+}
+
 void ClosestSide::begin(const glm::dvec3& point) {
     point_ = point;
     distance_ = std::numeric_limits<double>::infinity();
@@ -86,9 +110,7 @@ void ClosestSide::begin(const glm::dvec3& point) {
 void ClosestSide::offer(std::uint32_t triangle) {
     const auto same = [&](const Face& face) { return face.triangle == triangle; };
     if (std::any_of(faces_.begin(), faces_.end(), same)) return;
-    const glm::uvec3 t = mesh_.triangles[triangle];
-    const auto corner = [&](unsigned i) { return glm::dvec3(mesh_.points[i]) * voxelsPerUnit_ - point_; };
-    Face face{triangle, {corner(t.x), corner(t.y), corner(t.z)}, {}, 0};
+    Face face{triangle, cornersOf(triangle), {}, 0};
     face.closest = closestToOrigin(face.corners);
     face.distance = glm::length(face.closest);
     if (face.distance > distance_ + samePlace) return;

@@ -8,13 +8,15 @@
 #include <array>
 #include <cstdint>
 #include <glm/vec3.hpp>
+#include <optional>
 #include <vector>
 
 #include "sdf/mesh.h"
 
 namespace bilayer {
 
-/// What the closest feature says of a point.
+/// What the closest feature says of a point. `undecided` where normals nearly cancel out: at a vertex where two parts
+/// of the surface touch they mean nothing, and at a needle's tip little.
 enum class Side { outside, inside, undecided };
 
 /// Finds the side of one point: offer every triangle that may be nearest, in any order and more than once if need be.
@@ -30,6 +32,9 @@ class ClosestSide {
 
     /// The side by all triangles offered; `undecided` where the normals at the closest point cancel out.
     Side side() const;
+
+    /// The corners of a triangle as seen from the point [voxels].
+    std::array<glm::dvec3, 3> cornersOf(std::uint32_t triangle) const;
 
     /// The distance to the nearest triangle offered [voxels].
     double distance() const { return distance_; }
@@ -48,6 +53,10 @@ class ClosestSide {
     double distance_ = 0;
     std::vector<Face> faces_;
 };
+
+/// How the way from the origin to `way` passes a triangle: +1 along its normal, -1 against it, 0 not at all; nothing if
+/// it passes too close to an edge, a corner or its own ends to tell.
+std::optional<int> passing(const std::array<glm::dvec3, 3>& corners, const glm::dvec3& way);
 
 /// The point of a triangle that is closest to the origin. Right for triangles without area too.
 glm::dvec3 closestToOrigin(const std::array<glm::dvec3, 3>& corners);

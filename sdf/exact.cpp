@@ -27,6 +27,8 @@ namespace {
 constexpr double longestPieceEdge = 16;
 /// A triangle must come this much nearer than a sample's piece might to be left out of a closer look [voxels].
 constexpr float sideSlack = 1e-3f;
+/// Ways that are tried before the winding number of the whole mesh.
+constexpr int mostWays = 16;
 constexpr std::size_t trianglesPerPoll = 1024;  // a tenth of a millisecond
 
 // Which clusters reach which block of a brick.
@@ -178,35 +180,78 @@ class BrickFiller {
             for (std::size_t x = 0; x < inside.size(); ++x)
                 while (const std::uint64_t seeds = (*some)[x] & ~(outside[x] | inside[x])) {
                     const int voxel = int(x) * 64 + std::countr_zero(seeds);
-                    BlockMask& side = isInside(voxel) ? inside : outside;
+                    BlockMask& side = isInside(voxel, outside, inside) ? inside : outside;
                     side[x] |= std::uint64_t(1) << (voxel % 64);
                     spread(links, side);
                 }
         return inside;
     }
 
-    bool isInside(int voxel) {
-        const glm::ivec3 local(voxel / 64, voxel / 8 % 8, voxel % 8);
+    // Asks the closest feature; where its normals cancel out, the way to a voxel whose side is known; at last the
+    // winding number.
+    bool isInside(int voxel, const BlockMask& outside, const BlockMask& inside) {
+        const glm::ivec3 local = inBlock(voxel);
         const auto nearest = std::size_t(found_.nearest[voxel] >> sideBits);
         const glm::dvec3 point(block_ + local);
         side_.begin(point);
         side_.offer(s_.pieces[nearest].triangle);
         const float distance = float(side_.distance()) + sideSlack;
-        const glm::vec3 at(local + inBrick_);
-        const auto near = [&](const glm::vec3& sample, float radius) {
-            const glm::vec3 away = at - sample;
-            return glm::dot(away, away) <= (distance + radius) * (distance + radius);
-        };
+        forEachTriangle(
+            [&](const glm::vec3& sample, float radius) {
+                const glm::vec3 away = glm::vec3(local + inBrick_) - sample;
+                return glm::dot(away, away) <= (distance + radius) * (distance + radius);
+            },
+            [&](std::uint32_t triangle) { side_.offer(triangle); });
+        if (const Side side = side_.side(); side != Side::undecided) return side == Side::inside;
+        if (const auto known = insideByWays(local, outside, inside)) return *known;
+        return lastResort_.isInside(point / voxelsPerUnit_);
+    }
+
+    static glm::ivec3 inBlock(int voxel) { return {voxel / 64, voxel / 8 % 8, voxel % 8}; }
+
+    // Visits the triangles of all pieces near enough, some of them more than once.
+    template <class Near, class Visit>
+    void forEachTriangle(Near near, Visit visit) const {
         for (const std::uint32_t c : reaching_) {
             const Cluster& cluster = s_.clusters.clusters()[c];
             if (!near(cluster.sample, cluster.radius)) continue;
             for (std::uint32_t m = cluster.begin; m < cluster.end; ++m) {
                 const Member& member = s_.clusters.members()[m];
-                if (near(member.sample, member.radius)) side_.offer(s_.pieces[member.piece].triangle);
+                if (near(member.sample, member.radius)) visit(s_.pieces[member.piece].triangle);
             }
         }
-        const Side side = side_.side();
-        return side == Side::undecided ? lastResort_.isInside(point / voxelsPerUnit_) : side == Side::inside;
+    }
+
+    // Tries the ways to a few voxels well away from the surface whose side is known.
+    std::optional<bool> insideByWays(const glm::ivec3& from, const BlockMask& outside, const BlockMask& inside) {
+        int tries = 0;
+        for (std::size_t x = 0; x < inside.size(); ++x)
+            for (std::uint64_t targets = found_.far[x] & (outside[x] | inside[x]); targets != 0;
+                 targets &= targets - 1) {
+                const int bit = std::countr_zero(targets);
+                const bool knownInside = (inside[x] >> bit) & 1;
+                const auto winding = windingAfter(inBlock(int(x) * 64 + bit) - from, knownInside ? 1 : 0);
+                if (winding && (*winding == 0 || *winding == 1)) return *winding == 1;
+                if (++tries == mostWays) return std::nullopt;
+            }
+        return std::nullopt;
+    }
+
+    // The winding number at the beginning of a way from the point in question, by that at its end. The way lies in the
+    // block, so all that it passes reaches the block.
+    std::optional<int> windingAfter(const glm::ivec3& way, int atEnd) {
+        passed_.clear();
+        forEachTriangle([](const glm::vec3&, float) { return true; },
+                        [&](std::uint32_t triangle) { passed_.push_back(triangle); });
+        std::sort(passed_.begin(), passed_.end());
+        passed_.erase(std::unique(passed_.begin(), passed_.end()), passed_.end());
+        int winding = atEnd;
+        for (const std::uint32_t triangle : passed_) {
+            const std::optional<int> turn = passing(side_.cornersOf(triangle), glm::dvec3(way));
+            if (!turn) return std::nullopt;
+            winding += *turn;
+        }
+        return winding;
     }
 
     const MeshJob& job_;
@@ -217,6 +262,7 @@ class BrickFiller {
     std::size_t cut_ = 0;
     ClosestSide side_;
     BlockDistances found_;
+    std::vector<std::uint32_t> passed_;
     std::span<const std::uint32_t> reaching_;  // clusters of the current block
     glm::ivec3 origin_{0}, block_{0}, inBrick_{0};
     int blocks_ = 0;
