@@ -130,6 +130,19 @@ void addRows(Table& table, const LevelSet& levelSet) {
     table.row("leaves", grouped(levelSet.leaves()));
     table.row("memory", bytes(levelSet.memoryBytes()));
     if (!levelSet.method().empty()) table.row("method", levelSet.method());
+    if (const float bound = levelSet.errorBound(); std::isfinite(bound))
+        table.row("error bound", fmt::format("{}, {:.4g} voxels", metres(bound), bound / size));
+    if (levelSet.sign().empty()) return;
+    table.row("sign", fmt::format("{}: {}", levelSet.sign(), levelSet.signReason()));
+    table.row("sign conflicts", fmt::format("{} pairs of neighbours", grouped(levelSet.signConflicts())));
+}
+
+Json provenance(const LevelSet& levelSet) {
+    return {{"method", levelSet.method()},
+            {"sign", levelSet.sign()},
+            {"signReason", levelSet.signReason()},
+            {"signConflicts", levelSet.signConflicts()},
+            {"errorBound", number(levelSet.errorBound())}};
 }
 
 ProgressBar::ProgressBar(std::string label) : label_(std::move(label)), visible_(::isatty(STDERR_FILENO)) {}

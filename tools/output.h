@@ -44,8 +44,11 @@ std::string boxText(const Bounds& bounds);  ///< "x y z .. x y z m"
 Json toJson(const MeshReport& report, float wall);
 void addRows(Table& table, const MeshReport& report, float wall);
 
-/// Size, widths and method of a field.
+/// Size, widths, method and signs of a field.
 void addRows(Table& table, const LevelSet& levelSet);
+
+/// How a field got its distances and signs: method, sign, signReason, signConflicts, errorBound [m].
+Json provenance(const LevelSet& levelSet);
 
 /// Seconds since its construction.
 class Stopwatch {
