@@ -34,7 +34,8 @@ struct Arguments {
     float halfWidth = 3;
     std::string method = "exact", backend = "tbb", sign = "auto", device;
     std::uint64_t deviceMemory = 0;
-    bool fill = false, halfFloat = false, json = false;
+    VdbOptions stored;
+    bool fill = false, json = false;
     CLI::Option *resolutionGiven = nullptr, *exteriorGiven = nullptr, *gapGiven = nullptr;
     CLI::Option *deviceGiven = nullptr, *memoryGiven = nullptr;
     std::vector<CLI::Option*> layerOptions;  // what only the double layer method understands
@@ -112,7 +113,7 @@ void printJson(const Arguments& a, const Outcome& o, const LevelSet& field) {
                 {"farFill", o.fill},
                 {"write", o.write}}},
               {"peakRssBytes", peakMemory()}};
-    json.update(provenance(field));
+    json.update(provenance(field, a.stored));
     print(json);
 }
 
@@ -121,7 +122,7 @@ void printTable(const Arguments& a, const Outcome& o, const LevelSet& field) {
     addRows(mesh, o.report, o.wall);
     mesh.print();
     Table table(a.output.string());
-    addRows(table, field);
+    addRows(table, field, a.stored);
     table.row("filled by", fmt::format("{} on {}", a.backend, o.device));
     table.row("build", fmt::format("{:.3f} s: tiles {:.3f}, fill {:.3f}, assemble {:.3f}", o.build, o.times.tiles,
                                    o.times.fill, o.times.assemble));
@@ -158,7 +159,7 @@ void run(Arguments a) {
     outcome.report = inspect(mesh, outcome.wall);
     outcome.inspect = inspecting.seconds();
     const Stopwatch writing;
-    writeVdb(a.output, field, {.halfFloat = a.halfFloat});
+    writeVdb(a.output, field, a.stored);
     outcome.write = writing.seconds();
     a.json ? printJson(a, outcome, field) : printTable(a, outcome, field);
 }
@@ -226,7 +227,7 @@ void addBuild(CLI::App& app) {
     addMachine(*command, *a);
     command->add_flag("--triangles", a->options.triangles, "keep the nearest triangle of each voxel too");
     command->add_flag("--fill", a->fill, "sweep distances into all voxels of the field's box");
-    command->add_flag("--half-float", a->halfFloat, "store 16-bit distances");
+    command->add_flag("--half-float", a->stored.halfFloat, "store 16-bit distances");
     command->add_flag("--json", a->json, "print one JSON object");
     command->callback([a] { run(*a); });
 }

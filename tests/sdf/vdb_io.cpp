@@ -60,7 +60,11 @@ TEST_CASE("half floats halve the file and keep three digits") {
     CHECK(back.activeVoxels() == field.activeVoxels());
     const auto values = back.grids().distance->getConstAccessor();
     for (auto value = field.grids().distance->cbeginValueOn(); value; ++value)
-        REQUIRE(values.getValue(value.getCoord()) == Approx(value.getValue()).margin(1e-4));
+        REQUIRE(values.getValue(value.getCoord()) ==
+                Approx(value.getValue()).margin(double(back.errorBound() - field.errorBound())).epsilon(0));
+    CHECK(back.errorBound() == storedErrorBound(field, {.halfFloat = true}));
+    CHECK(back.errorBound() > field.errorBound());
+    CHECK(back.errorBound() < 1.6e-3f * field.voxelSize());
 }
 
 TEST_CASE("a plain OpenVDB program reads the file") {

@@ -120,11 +120,14 @@ TEST_CASE("every option of build has an effect") {
     CHECK(layers({"--delta", "0.25"}) != byLayers);
     CHECK(layers({"--epsilon", "0.1"}) != byLayers);
     CHECK(layers({"--neighbourhood", "9"}) == byLayers);  // the band is complete with any
-    CHECK(layers({"--epsilon", "1e-4", "--max-subdivision", "1"}) != layers({"--epsilon", "1e-4"}));
+    CHECK(layers({"--epsilon", "0.1", "--max-subdivision", "1"}) != layers({"--epsilon", "0.1"}));
     phi({});
     const auto full = std::filesystem::file_size(output);
-    phi({"--half-float"});
+    const float bound = readVdb(output).errorBound();
+    const auto half = with({"--half-float"});
     CHECK(std::filesystem::file_size(output) < full);
+    CHECK(readVdb(output).errorBound() > bound);
+    CHECK(half["errorBound"].get<float>() == readVdb(output).errorBound());
 }
 
 TEST_CASE("each method says what it did, and both exact ones agree") {
@@ -138,12 +141,16 @@ TEST_CASE("each method says what it did, and both exact ones agree") {
         return readVdb(output);
     };
     const LevelSet exact = with("exact"), pseudonormal = with("pseudonormal"), layers = with("double-layer");
-    const auto other = pseudonormal.grids().distance->getConstAccessor();
-    std::size_t voxels = 0;
-    for (auto value = exact.grids().distance->cbeginValueOn(); value; ++value, ++voxels)
-        REQUIRE(other.getValue(value.getCoord()) == Approx(*value).margin(2e-4 * 0.05));
-    CHECK(voxels > 1000);
-    CHECK(pseudonormal.activeVoxels() == exact.activeVoxels());
+    // at the band's limit one may have a voxel that is background to the other
+    const auto contains = [](const LevelSet& a, const LevelSet& b) {
+        const auto other = a.grids().distance->getConstAccessor();
+        for (auto value = b.grids().distance->cbeginValueOn(); value; ++value)
+            REQUIRE(other.getValue(value.getCoord()) == Approx(*value).margin(2e-4 * 0.05));
+    };
+    CHECK(exact.activeVoxels() > 5000);
+    CHECK(layers.activeVoxels() > 5000);
+    contains(exact, pseudonormal);
+    contains(pseudonormal, exact);
 }
 
 TEST_CASE("each sign says who asked for it") {
