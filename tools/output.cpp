@@ -134,7 +134,8 @@ void addRows(Table& table, const LevelSet& levelSet, const VdbOptions& stored) {
         table.row("error bound", fmt::format("{}, {:.4g} voxels", metres(bound), bound / size));
     if (levelSet.sign().empty()) return;
     table.row("sign", fmt::format("{}: {}", levelSet.sign(), levelSet.signReason()));
-    table.row("sign conflicts", fmt::format("{} pairs of neighbours", grouped(levelSet.signConflicts())));
+    if (levelSet.sign() == "normals")
+        table.row("sign conflicts", fmt::format("{} pairs of neighbours", grouped(levelSet.signConflicts())));
 }
 
 Json provenance(const LevelSet& levelSet, const VdbOptions& stored) {
