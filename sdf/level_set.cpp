@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 
 #include "sdf/grids.h"
@@ -45,7 +46,11 @@ LevelSet::LevelSet(std::shared_ptr<const Grids> grids) : grids_(std::move(grids)
     const openvdb::FloatGrid& grid = *grids_->distance;
     exteriorWidth_ = grid.background();
     interiorWidth_ = meta<float>(grid, metadata::interiorWidth, exteriorWidth_);
+    errorBound_ = meta<float>(grid, metadata::errorBound, std::numeric_limits<float>::quiet_NaN());
     method_ = meta<std::string>(grid, metadata::method, "");
+    sign_ = meta<std::string>(grid, metadata::sign, "");
+    signReason_ = meta<std::string>(grid, metadata::signReason, "");
+    signConflicts_ = std::uint64_t(meta<std::int64_t>(grid, metadata::signConflicts, 0));
     meshHash_ = std::uint64_t(meta<std::int64_t>(grid, metadata::meshHash, 0));
 }
 
@@ -69,6 +74,18 @@ std::uint64_t LevelSet::memoryBytes() const {
 }
 const std::string& LevelSet::method() const {
     return method_;
+}
+const std::string& LevelSet::sign() const {
+    return sign_;
+}
+const std::string& LevelSet::signReason() const {
+    return signReason_;
+}
+std::uint64_t LevelSet::signConflicts() const {
+    return signConflicts_;
+}
+float LevelSet::errorBound() const {
+    return errorBound_;
 }
 std::uint64_t LevelSet::meshHash() const {
     return meshHash_;

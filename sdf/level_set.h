@@ -23,15 +23,21 @@ class LevelSet {
     std::uint64_t activeVoxels() const;  ///< count
     std::uint64_t leaves() const;        ///< count of 8x8x8 blocks
     std::uint64_t memoryBytes() const;   ///< of all grids [bytes]
-    const std::string& method() const;   ///< "double-layer", ..., or "" for a field from elsewhere
-    std::uint64_t meshHash() const;      ///< hash() of the mesh it came from, or 0
+    const std::string& method() const;   ///< "exact", ..., or "" for a field from elsewhere
+    /// What told inside from outside: "normals", "winding", "flood" or "layers"; "" for a field from elsewhere.
+    const std::string& sign() const;
+    const std::string& signReason() const;  ///< why it was taken, without a full stop: "closed and oriented"
+    std::uint64_t signConflicts() const;    ///< pairs of voxels whose normals contradict each other
+    /// What distances in the band as built are off by at most [m]; infinite: there is no bound; NaN: nobody knows.
+    float errorBound() const;
+    std::uint64_t meshHash() const;  ///< hash() of the mesh it came from, or 0
     const Grids& grids() const { return *grids_; }
 
   private:
     std::shared_ptr<const Grids> grids_;
-    float exteriorWidth_, interiorWidth_;
-    std::uint64_t meshHash_;
-    std::string method_;
+    float exteriorWidth_, interiorWidth_, errorBound_;
+    std::uint64_t meshHash_, signConflicts_;
+    std::string method_, sign_, signReason_;
 };
 
 }  // namespace bilayer

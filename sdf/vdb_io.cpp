@@ -4,6 +4,7 @@
 #include <openvdb/io/File.h>
 #include <openvdb/io/Stream.h>
 
+#include <algorithm>
 #include <fstream>
 #include <stdexcept>
 
@@ -12,6 +13,9 @@
 
 namespace bilayer {
 namespace {
+
+/// 16-bit floats have 11 binary digits: rounding is off by this part of a number at most.
+constexpr float halfRounding = 1.f / 2048;
 
 template <class Grid>
 typename Grid::ConstPtr first(const openvdb::GridPtrVec& grids, auto accept) {
@@ -35,11 +39,18 @@ void writeGrids(const std::filesystem::path& path, const openvdb::GridCPtrVec& g
     file.commit();
 }
 
+float storedErrorBound(const LevelSet& levelSet, const VdbOptions& options) {
+    if (!options.halfFloat) return levelSet.errorBound();
+    return levelSet.errorBound() + halfRounding * std::max(levelSet.exteriorWidth(), levelSet.interiorWidth());
+}
+
 void writeVdb(const std::filesystem::path& path, const LevelSet& levelSet, const VdbOptions& options) {
     openvdb::initialize();
     // a shallow copy, since how distances are stored is a property of the grid
     const auto distance = openvdb::ConstPtrCast<openvdb::FloatGrid>(levelSet.grids().distance)->copy();
     distance->setSaveFloatAsHalf(options.halfFloat);
+    if (options.halfFloat && distance->getMetadata<openvdb::FloatMetadata>(metadata::errorBound))
+        distance->insertMeta(metadata::errorBound, openvdb::FloatMetadata(storedErrorBound(levelSet, options)));
     openvdb::GridCPtrVec grids{distance};
     if (levelSet.grids().triangle) grids.push_back(levelSet.grids().triangle);
     writeGrids(path, grids);

@@ -11,6 +11,9 @@ struct VdbOptions {
     bool halfFloat = false;  ///< store distances as 16-bit floats: half the size, 3 decimal digits
 };
 
+/// LevelSet::errorBound() of the field that a file with these options gives back: rounding included [m].
+float storedErrorBound(const LevelSet& levelSet, const VdbOptions& options);
+
 /// Writes the grids "distance" and, where present, "triangle": whole or not at all (a temporary file beside the target
 /// is renamed at the end). Throws std::runtime_error that names the file when it cannot be written.
 void writeVdb(const std::filesystem::path& path, const LevelSet& levelSet, const VdbOptions& options = {});

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 #include <tbb/global_control.h>
 
+#include <map>
 #include <memory>
 #include <optional>
 #include <stdexcept>
@@ -19,22 +20,25 @@
 namespace bilayer::tools {
 namespace {
 
-// Words of the contract; those that this version lacks are answered by name.
-constexpr const char* methodHere = "double-layer";
-const std::vector<std::string> methods{"exact", methodHere, "pseudonormal", "prism"};
-constexpr const char* signHere = "auto";
-const std::vector<std::string> signs{signHere, "normals", "winding", "flood"};
-constexpr const char* signByLayers = "layers";  // the layers sign the voxels near the surface, a flood those beyond
+// Words of the contract. The paper's prism method is answered by name: this version lacks it.
+constexpr const char* absentMethod = "prism";
+const std::map<std::string, Method> methods{
+    {"exact", Method::exact}, {"double-layer", Method::doubleLayer}, {"pseudonormal", Method::pseudonormal}};
+const std::map<std::string, Sign> signs{
+    {"auto", Sign::automatic}, {"normals", Sign::normals}, {"winding", Sign::winding}, {"flood", Sign::flood}};
 
 struct Arguments {
     std::filesystem::path mesh, output;
     BuildOptions options;
     float resolution = 0;
     float halfWidth = 3;
-    std::string method = methodHere, backend = "tbb", sign = signHere, device;
+    std::string method = "exact", backend = "tbb", sign = "auto", device;
     std::uint64_t deviceMemory = 0;
-    bool fill = false, halfFloat = false, json = false;
-    CLI::Option *resolutionGiven = nullptr, *exteriorGiven = nullptr, *deviceGiven = nullptr, *memoryGiven = nullptr;
+    VdbOptions stored;
+    bool fill = false, json = false;
+    CLI::Option *resolutionGiven = nullptr, *exteriorGiven = nullptr, *gapGiven = nullptr;
+    CLI::Option *deviceGiven = nullptr, *memoryGiven = nullptr;
+    std::vector<CLI::Option*> layerOptions;  // what only the double layer method understands
 };
 
 struct Outcome {
@@ -45,16 +49,25 @@ struct Outcome {
     double read = 0, inspect = 0, build = 0, fill = 0, write = 0;
 };
 
-void requireHere(const char* option, const std::string& word, const std::string& here) {
-    if (word != here) throw std::runtime_error(fmt::format("{} {}: not in this version", option, word));
-}
-
 void requireUsage(const Arguments& a) {
     if (a.backend != "opencl" && (a.deviceGiven->count() || a.memoryGiven->count()))
         throw CLI::ValidationError("--device and --device-memory", "need --backend opencl");
-    std::error_code absent;
-    if (std::filesystem::equivalent(a.mesh, a.output, absent))
-        throw CLI::ValidationError("--output", "would overwrite the mesh");
+    const bool layers = a.method == "double-layer";
+    for (const CLI::Option* option : a.layerOptions)
+        if (!layers && option->count()) throw CLI::ValidationError(option->get_name(), "needs --method double-layer");
+    if (layers && a.sign != "auto")
+        throw CLI::ValidationError("--sign", "is not for --method double-layer: the layers tell the signs");
+    if (a.gapGiven->count() && (layers || (a.sign != "auto" && a.sign != "flood")))
+        throw CLI::ValidationError("--gap", "needs --sign flood or auto, and another method than double-layer");
+    requireOther(a.output, a.mesh);
+}
+
+// What this version has not got.
+void requirePresent(const Arguments& a) {
+    if (a.method == absentMethod) throw std::runtime_error(fmt::format("--method {}: not in this version", a.method));
+    if (a.backend == "opencl" && a.method != "double-layer")
+        throw std::runtime_error(
+            fmt::format("--backend opencl: has no method {}, give it --method double-layer", a.method));
 }
 
 BlockFiller makeFiller(const Arguments& a) {
@@ -81,27 +94,27 @@ LevelSet timedBuild(const Mesh& mesh, const Arguments& a, Outcome& outcome) {
 }
 
 void printJson(const Arguments& a, const Outcome& o, const LevelSet& field) {
-    print({{"mesh", toJson(o.report, o.wall)},
-           {"output", a.output.string()},
-           {"triangles", o.report.triangles},
-           {"voxelSize", number(field.voxelSize())},
-           {"exteriorWidth", number(a.options.exteriorWidth)},
-           {"interiorWidth", number(a.options.interiorWidth)},
-           {"activeVoxels", field.activeVoxels()},
-           {"leaves", field.leaves()},
-           {"memoryBytes", field.memoryBytes()},
-           {"method", a.method},
-           {"backend", a.backend},
-           {"device", o.device},
-           {"sign", signByLayers},
-           {"seconds",
-            {{"read", o.read},
-             {"inspect", o.inspect},
-             {"build", o.build},
-             {"parts", {{"tiles", o.times.tiles}, {"fill", o.times.fill}, {"assemble", o.times.assemble}}},
-             {"farFill", o.fill},
-             {"write", o.write}}},
-           {"peakRssBytes", peakMemory()}});
+    Json json{{"mesh", toJson(o.report, o.wall)},
+              {"output", a.output.string()},
+              {"triangles", o.report.triangles},
+              {"voxelSize", number(field.voxelSize())},
+              {"exteriorWidth", number(a.options.exteriorWidth)},
+              {"interiorWidth", number(a.options.interiorWidth)},
+              {"activeVoxels", field.activeVoxels()},
+              {"leaves", field.leaves()},
+              {"memoryBytes", field.memoryBytes()},
+              {"backend", a.backend},
+              {"device", o.device},
+              {"seconds",
+               {{"read", o.read},
+                {"inspect", o.inspect},
+                {"build", o.build},
+                {"parts", {{"tiles", o.times.tiles}, {"fill", o.times.fill}, {"assemble", o.times.assemble}}},
+                {"farFill", o.fill},
+                {"write", o.write}}},
+              {"peakRssBytes", peakMemory()}};
+    json.update(provenance(field, a.stored));
+    print(json);
 }
 
 void printTable(const Arguments& a, const Outcome& o, const LevelSet& field) {
@@ -109,7 +122,7 @@ void printTable(const Arguments& a, const Outcome& o, const LevelSet& field) {
     addRows(mesh, o.report, o.wall);
     mesh.print();
     Table table(a.output.string());
-    addRows(table, field);
+    addRows(table, field, a.stored);
     table.row("filled by", fmt::format("{} on {}", a.backend, o.device));
     table.row("build", fmt::format("{:.3f} s: tiles {:.3f}, fill {:.3f}, assemble {:.3f}", o.build, o.times.tiles,
                                    o.times.fill, o.times.assemble));
@@ -120,8 +133,9 @@ void printTable(const Arguments& a, const Outcome& o, const LevelSet& field) {
 
 void run(Arguments a) {
     requireUsage(a);
-    requireHere("--method", a.method, methodHere);
-    requireHere("--sign", a.sign, signHere);
+    requirePresent(a);
+    a.options.method = methods.at(a.method);
+    a.options.sign = signs.at(a.sign);
     std::optional<tbb::global_control> threads;
     if (a.options.threads > 0)
         threads.emplace(tbb::global_control::max_allowed_parallelism, std::size_t(a.options.threads));
@@ -145,7 +159,7 @@ void run(Arguments a) {
     outcome.report = inspect(mesh, outcome.wall);
     outcome.inspect = inspecting.seconds();
     const Stopwatch writing;
-    writeVdb(a.output, field, {.halfFloat = a.halfFloat});
+    writeVdb(a.output, field, a.stored);
     outcome.write = writing.seconds();
     a.json ? printJson(a, outcome, field) : printTable(a, outcome, field);
 }
@@ -156,7 +170,7 @@ void addBand(CLI::App& command, Arguments& a) {
     a.resolutionGiven = size->add_option("--resolution", a.resolution, "voxels along the longest side of the bounds")
                             ->check(positive());
     size->require_option(1);
-    const CLI::Range widths(1e-3, 1e3);
+    const CLI::Validator widths = within(1e-3, 1e3);
     auto* half =
         command.add_option("--half-width", a.halfWidth, "band on either side of the surface [voxels], default 3")
             ->check(widths);
@@ -169,19 +183,27 @@ void addBand(CLI::App& command, Arguments& a) {
 }
 
 void addMethod(CLI::App& command, Arguments& a) {
-    command.add_option("--method", a.method, "exact, double-layer, pseudonormal or prism")
-        ->check(CLI::IsMember(methods));
-    command.add_option("--sign", a.sign, "auto, normals, winding or flood")->check(CLI::IsMember(signs));
+    command.add_option("--method", a.method, "exact (default), double-layer, pseudonormal or prism")
+        ->check(CLI::IsMember({"exact", "double-layer", "pseudonormal", absentMethod}));
+    command.add_option("--sign", a.sign, "auto (default), normals, winding or flood")->check(CLI::IsMember(signs));
+    a.gapGiven = command.add_option("--gap", a.options.gap, "gaps that --sign flood closes [voxels], default 2")
+                     ->check(within(0, 100));
+}
+
+void addLayers(CLI::App& command, Arguments& a) {
     DoubleLayerOptions& layers = a.options.doubleLayer;
-    command.add_option("--delta", layers.delta, "distance of each layer from the surface [voxels], default 0.5")
-        ->check(CLI::Range(1e-3, 4.0));
-    command.add_option("--epsilon", layers.epsilon, "area that one sample stands for [voxels^2], default 1")
-        ->check(CLI::Range(1e-4, 1e4));
-    command.add_option("--neighbourhood", layers.neighbourhood, "voxels that a sample reaches at least, default 2")
-        ->check(CLI::Range(1, 64));
-    command
-        .add_option("--max-subdivision", layers.maxSubdivision, "rows of samples in a piece of a triangle, default 32")
-        ->check(CLI::Range(1, 1024));
+    auto* group = command.add_option_group("layers", "only for --method double-layer");
+    a.layerOptions = {
+        group->add_option("--delta", layers.delta, "distance of each layer from the surface [voxels], default 0.5")
+            ->check(within(1e-3, 4)),
+        group->add_option("--epsilon", layers.epsilon, "area that one sample stands for [voxels^2], default 1")
+            ->check(within(1e-4, 1e4)),
+        group->add_option("--neighbourhood", layers.neighbourhood, "voxels that a sample reaches at least, default 2")
+            ->check(CLI::Range(1, 64)),
+        group
+            ->add_option("--max-subdivision", layers.maxSubdivision,
+                         "rows of samples in a piece of a triangle, default 32")
+            ->check(CLI::Range(1, 1024))};
 }
 
 void addMachine(CLI::App& command, Arguments& a) {
@@ -201,10 +223,11 @@ void addBuild(CLI::App& app) {
     command->add_option("-o,--output", a->output, "the .vdb file")->required();
     addBand(*command, *a);
     addMethod(*command, *a);
+    addLayers(*command, *a);
     addMachine(*command, *a);
     command->add_flag("--triangles", a->options.triangles, "keep the nearest triangle of each voxel too");
     command->add_flag("--fill", a->fill, "sweep distances into all voxels of the field's box");
-    command->add_flag("--half-float", a->halfFloat, "store 16-bit distances");
+    command->add_flag("--half-float", a->stored.halfFloat, "store 16-bit distances");
     command->add_flag("--json", a->json, "print one JSON object");
     command->callback([a] { run(*a); });
 }

@@ -2,21 +2,52 @@
 // CLI::ParseError for wrong usage and any other exception where the input or the machine is at fault.
 #pragma once
 
+#include <fmt/format.h>
+
 #include <CLI/CLI.hpp>
+#include <cmath>
+#include <filesystem>
 #include <limits>
 #include <string>
+#include <system_error>
 
 namespace bilayer::tools {
 
-/// Accepts finite numbers above zero; CLI::PositiveNumber lets NaN through.
-inline CLI::Validator positive() {
-    const auto complaint = [](const std::string& word) -> std::string {
-        float value = 0;
-        const bool good =
-            CLI::detail::lexical_cast(word, value) && value > 0 && value <= std::numeric_limits<float>::max();
-        return good ? "" : "must be a finite number above zero";
+/// Accepts numbers for which `good` holds. NaN must not: CLI::Range and CLI::PositiveNumber let it through.
+template <class Good>
+CLI::Validator numbers(Good good, const std::string& complaint, const std::string& name) {
+    const auto check = [=](const std::string& word) -> std::string {
+        double value = 0;
+        return CLI::detail::lexical_cast(word, value) && good(value) ? "" : "must be " + complaint;
     };
-    return CLI::Validator(complaint, "POSITIVE");
+    return CLI::Validator(check, name);
+}
+
+/// Accepts numbers that a float can hold.
+inline CLI::Validator finite() {
+    const auto good = [](double value) { return std::abs(value) <= double(std::numeric_limits<float>::max()); };
+    return numbers(good, "a finite number", "FINITE");
+}
+
+/// Accepts finite numbers above zero.
+inline CLI::Validator positive() {
+    const auto good = [](double value) {
+        return float(value) > 0 && value <= double(std::numeric_limits<float>::max());
+    };
+    return numbers(good, "a finite number above zero", "POSITIVE");
+}
+
+/// Accepts numbers in low..high.
+inline CLI::Validator within(double low, double high) {
+    const auto good = [=](double value) { return value >= low && value <= high; };
+    return numbers(good, fmt::format("in {:g}..{:g}", low, high), fmt::format("{:g}..{:g}", low, high));
+}
+
+/// Throws CLI::ValidationError if writing the output would overwrite an input.
+inline void requireOther(const std::filesystem::path& output, const std::filesystem::path& input) {
+    std::error_code absent;
+    if (std::filesystem::equivalent(input, output, absent))
+        throw CLI::ValidationError("--output", "would overwrite " + input.string());
 }
 
 void addBuild(CLI::App& app);

@@ -58,6 +58,7 @@ void runQuery(const Arguments& a) {
 }
 
 void runSurface(const Arguments& a) {
+    requireOther(a.output, a.field);
     const LevelSet field = readVdb(a.field);
     requireWritable(a.output);
     const Mesh mesh = surface(field, a.options);
@@ -93,9 +94,9 @@ void addSurface(CLI::App& app) {
     command->add_option("-o,--output", a->output, "a .ply, .obj or .stl file")
         ->required()
         ->check(CLI::Validator(requireMeshEnding, "PATH"));
-    command->add_option("--isovalue", a->options.isovalue, "distance of the surface, default 0");
+    command->add_option("--isovalue", a->options.isovalue, "distance of the surface, default 0")->check(finite());
     command->add_option("--adaptivity", a->options.adaptivity, "0 (default): uniform .. 1: fewest triangles")
-        ->check(CLI::Range(0.0, 1.0));
+        ->check(within(0, 1));
     command->callback([a] { runSurface(*a); });
 }
 

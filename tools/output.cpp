@@ -121,7 +121,7 @@ void addRows(Table& table, const MeshReport& report, float wall) {
     if (report.closed()) table.row("volume", fmt::format("{:.6g} m^3", report.volume));
 }
 
-void addRows(Table& table, const LevelSet& levelSet) {
+void addRows(Table& table, const LevelSet& levelSet, const VdbOptions& stored) {
     const double size = levelSet.voxelSize();
     table.row("voxel size", metres(size));
     table.row("band", fmt::format("{:.6g} voxels outside, {:.6g} inside", levelSet.exteriorWidth() / size,
@@ -130,6 +130,20 @@ void addRows(Table& table, const LevelSet& levelSet) {
     table.row("leaves", grouped(levelSet.leaves()));
     table.row("memory", bytes(levelSet.memoryBytes()));
     if (!levelSet.method().empty()) table.row("method", levelSet.method());
+    if (const float bound = storedErrorBound(levelSet, stored); std::isfinite(bound))
+        table.row("error bound", fmt::format("{}, {:.4g} voxels", metres(bound), bound / size));
+    if (levelSet.sign().empty()) return;
+    table.row("sign", fmt::format("{}: {}", levelSet.sign(), levelSet.signReason()));
+    if (levelSet.sign() == "normals")
+        table.row("sign conflicts", fmt::format("{} pairs of neighbours", grouped(levelSet.signConflicts())));
+}
+
+Json provenance(const LevelSet& levelSet, const VdbOptions& stored) {
+    return {{"method", levelSet.method()},
+            {"sign", levelSet.sign()},
+            {"signReason", levelSet.signReason()},
+            {"signConflicts", levelSet.signConflicts()},
+            {"errorBound", number(storedErrorBound(levelSet, stored))}};
 }
 
 ProgressBar::ProgressBar(std::string label) : label_(std::move(label)), visible_(::isatty(STDERR_FILENO)) {}

@@ -12,6 +12,7 @@
 
 #include "sdf/inspect.h"
 #include "sdf/level_set.h"
+#include "sdf/vdb_io.h"
 
 namespace bilayer::tools {
 
@@ -44,8 +45,11 @@ std::string boxText(const Bounds& bounds);  ///< "x y z .. x y z m"
 Json toJson(const MeshReport& report, float wall);
 void addRows(Table& table, const MeshReport& report, float wall);
 
-/// Size, widths and method of a field.
-void addRows(Table& table, const LevelSet& levelSet);
+/// Size, widths, method and signs of a field that comes from a file, or goes into one with these options.
+void addRows(Table& table, const LevelSet& levelSet, const VdbOptions& stored = {});
+
+/// How it got its distances and signs: method, sign, signReason, signConflicts, errorBound [m].
+Json provenance(const LevelSet& levelSet, const VdbOptions& stored = {});
 
 /// Seconds since its construction.
 class Stopwatch {

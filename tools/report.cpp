@@ -89,17 +89,18 @@ void runInfo(const Arguments& a) {
     const LevelSet field = readVdb(a.input);
     const Json grids = gridList(a.input);
     if (!a.json) return printInfo(a, field, grids);
-    print({{"grids", grids},
-           {"voxelSize", number(field.voxelSize())},
-           {"exteriorWidth", inVoxels(field.exteriorWidth(), field)},
-           {"interiorWidth", inVoxels(field.interiorWidth(), field)},
-           {"activeVoxels", field.activeVoxels()},
-           {"leaves", field.leaves()},
-           {"bounds", box(activeBounds(field))},
-           {"method", field.method()},
-           {"meshHash", hex(field.meshHash())},
-           {"memoryBytes", field.memoryBytes()},
-           {"levelSetCheck", remark(field)}});
+    Json json{{"grids", grids},
+              {"voxelSize", number(field.voxelSize())},
+              {"exteriorWidth", inVoxels(field.exteriorWidth(), field)},
+              {"interiorWidth", inVoxels(field.interiorWidth(), field)},
+              {"activeVoxels", field.activeVoxels()},
+              {"leaves", field.leaves()},
+              {"bounds", box(activeBounds(field))},
+              {"meshHash", hex(field.meshHash())},
+              {"memoryBytes", field.memoryBytes()},
+              {"levelSetCheck", remark(field)}};
+    json.update(provenance(field));
+    print(json);
 }
 
 Json toJson(const DeviceInfo& device) {

@@ -56,6 +56,7 @@ fluid::SeedMode makeMode(const std::string& word) {
 }
 
 void requireUsage(const Arguments& a) {
+    for (const auto& input : a.inputs) requireOther(a.output, input);
     if (!a.into.empty() || a.voxelSize > 0 || a.resolution > 0) {
         if (a.resolution > 0 && isVdb(a.inputs.front()))
             throw CLI::ValidationError("--resolution", "needs a mesh as the first input");
@@ -152,10 +153,12 @@ void addSeed(CLI::App& app) {
     size->excludes(into)->excludes(resolution);
     resolution->excludes(into);
     command->add_option("--half-width", a->halfWidth, "the liquid's band [voxels], default 3")
-        ->check(CLI::Range(3.0, 1e3))
+        ->check(within(3, 1e3))
         ->excludes(into);
-    command->add_option("--translate", a->translate, "moves all inputs: x y z")->expected(3);
-    command->add_option("--rotate", a->rotate, "turns all inputs first: axis x y z and angle [radians]")->expected(4);
+    command->add_option("--translate", a->translate, "moves all inputs: x y z")->expected(3)->check(finite());
+    command->add_option("--rotate", a->rotate, "turns all inputs first: axis x y z and angle [radians]")
+        ->expected(4)
+        ->check(finite());
     command->add_option("--mode", a->mode, "unite (default), intersect or subtract")
         ->check(CLI::IsMember({"unite", "intersect", "subtract"}));
     a->particlesGiven = command->add_option("--particles", a->particles.perVoxel, "particles in a voxel: a points grid")

@@ -3,6 +3,7 @@
 #include <openvdb/io/File.h>
 
 #include <catch2/catch.hpp>
+#include <cmath>
 #include <fstream>
 #include <iterator>
 
@@ -37,7 +38,11 @@ TEST_CASE("a field survives its file") {
     CHECK(back.interiorWidth() == field.interiorWidth());
     CHECK(back.activeVoxels() == field.activeVoxels());
     CHECK(back.leaves() == field.leaves());
-    CHECK(back.method() == "double-layer");
+    CHECK(back.method() == "exact");
+    CHECK(back.sign() == "normals");
+    CHECK(back.signReason() == "closed and oriented");
+    CHECK(back.signConflicts() == 0);
+    CHECK(back.errorBound() == Approx(1e-4 * 0.05));
     CHECK(back.meshHash() == hash(shapes::torus(1, 0.3f, 60, 30)));
     REQUIRE(back.grids().triangle);
     const auto values = back.grids().distance->getConstAccessor();
@@ -55,7 +60,11 @@ TEST_CASE("half floats halve the file and keep three digits") {
     CHECK(back.activeVoxels() == field.activeVoxels());
     const auto values = back.grids().distance->getConstAccessor();
     for (auto value = field.grids().distance->cbeginValueOn(); value; ++value)
-        REQUIRE(values.getValue(value.getCoord()) == Approx(value.getValue()).margin(1e-4));
+        REQUIRE(values.getValue(value.getCoord()) ==
+                Approx(value.getValue()).margin(double(back.errorBound() - field.errorBound())).epsilon(0));
+    CHECK(back.errorBound() == storedErrorBound(field, {.halfFloat = true}));
+    CHECK(back.errorBound() > field.errorBound());
+    CHECK(back.errorBound() < 1.6e-3f * field.voxelSize());
 }
 
 TEST_CASE("a plain OpenVDB program reads the file") {
@@ -65,6 +74,34 @@ TEST_CASE("a plain OpenVDB program reads the file") {
     CHECK(file.hasGrid("distance"));
     CHECK(file.hasGrid("triangle"));
     CHECK(file.readGrid("distance")->getGridClass() == openvdb::GRID_LEVEL_SET);
+}
+
+TEST_CASE("a field tells who signed it") {
+    const Mesh mesh = shapes::torus(1, 0.3f, 60, 30);
+    BuildOptions options{.voxelSize = 0.05f};
+    options.method = Method::doubleLayer;
+    const LevelSet layers = build(mesh, options);
+    CHECK(layers.method() == "double-layer");
+    CHECK(layers.sign() == "layers");
+    CHECK(layers.errorBound() >= 4.0f / 3 * 0.05f);  // theorem 1 of the paper
+    options.method = Method::pseudonormal;
+    options.sign = Sign::winding;
+    const LevelSet winding = build(mesh, options);
+    CHECK(winding.method() == "pseudonormal");
+    CHECK(winding.sign() == "winding");
+    CHECK(winding.signReason() == "as asked for");
+}
+
+TEST_CASE("a field from elsewhere has no history") {
+    const auto grid = openvdb::ConstPtrCast<openvdb::FloatGrid>(torus().grids().distance)->deepCopy();
+    grid->clearMetadata();
+    grid->setGridClass(openvdb::GRID_LEVEL_SET);
+    const LevelSet field(std::make_shared<Grids>(Grids{grid, nullptr}));
+    CHECK(field.method().empty());
+    CHECK(field.sign().empty());
+    CHECK(field.signReason().empty());
+    CHECK(field.signConflicts() == 0);
+    CHECK(std::isnan(field.errorBound()));
 }
 
 TEST_CASE("truncated and foreign files are refused by name, wherever they are cut") {

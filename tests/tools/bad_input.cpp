@@ -22,13 +22,15 @@ void requireFault(const Words& words, const std::string& culprit, const Surround
     CHECK(r.out.empty());
 }
 
-void requireUsage(const Words& words) {
+// Status 2, a complaint on stderr with `culprit` in it, nothing on stdout.
+void requireUsage(const Words& words, const std::string& culprit = "") {
     std::string command;
     for (const std::string& word : words) command += word + " ";
     const Result r = run(words);
     INFO(command << "\n" << r.err);
     CHECK(r.status == 2);
     CHECK_FALSE(r.err.empty());
+    CHECK(r.err.find(culprit) != std::string::npos);
     CHECK(r.out.empty());
 }
 
@@ -104,16 +106,17 @@ TEST_CASE("voxel sizes that no machine can serve are refused at once") {
 }
 
 TEST_CASE("what this version does not have") {
-    for (const char* method : {"exact", "pseudonormal", "prism"})
-        requireFault(buildOf(sphereFile(), {"--voxel-size", "0.1", "--method", method}),
-                     std::string("--method ") + method + ": not in this version");
-    for (const char* sign : {"normals", "winding", "flood"})
-        requireFault(buildOf(sphereFile(), {"--voxel-size", "0.1", "--sign", sign}),
-                     std::string("--sign ") + sign + ": not in this version");
+    requireFault(buildOf(sphereFile(), {"--voxel-size", "0.1", "--method", "prism"}),
+                 "--method prism: not in this version");
+    requireFault(buildOf(sphereFile(), {"--voxel-size", "0.1", "--backend", "opencl"}), "has no method exact");
+    requireFault(buildOf(sphereFile(), {"--voxel-size", "0.1", "--backend", "opencl", "--method", "pseudonormal"}),
+                 "has no method pseudonormal");
+    CHECK_FALSE(std::filesystem::exists(output()));
 }
 
 TEST_CASE("devices that are not there") {
-    requireFault(buildOf(sphereFile(), {"--voxel-size", "0.1", "--backend", "opencl", "--device", "no such device"}),
+    requireFault(buildOf(sphereFile(), {"--voxel-size", "0.1", "--method", "double-layer", "--backend", "opencl",
+                                        "--device", "no such device"}),
                  "no such device");
 }
 
@@ -131,16 +134,73 @@ TEST_CASE("wrong usage") {
          {Words{"--nonsense"}, Words{"--method", "magic"}, Words{"--sign", "magic"}, Words{"--backend", "cuda"},
           Words{"--device", "x"}, Words{"--device-memory", "100"}, Words{"--threads", "0"}, Words{"--half-width", "0"},
           Words{"--exterior-width", "3"}, Words{"--half-width", "3", "--exterior-width", "3", "--interior-width", "3"},
-          Words{"--delta", "0"}, Words{"--epsilon", "-1"}, Words{"--neighbourhood", "0"},
-          Words{"--max-subdivision", "0"}}) {
+          Words{"--gap", "-1"}, Words{"--gap", "101"}}) {
         Words words = buildOf(mesh);
         words.insert(words.end(), options.begin(), options.end());
-        requireUsage(words);
+        requireUsage(words, options.front());
     }
-    requireUsage({"build", mesh, "-o", mesh, "--voxel-size", "0.1"});
+    requireUsage({"build", mesh, "-o", mesh, "--voxel-size", "0.1"}, "would overwrite " + mesh);
     requireUsage({"surface", "a.vdb", "-o", "a.xyz"});
     requireUsage({"seed", mesh, "-o", output()});
+    requireUsage({"seed", mesh, "-o", mesh, "--voxel-size", "0.1"}, "would overwrite " + mesh);
     requireUsage({"seed", mesh, "-o", output(), "--voxel-size", "0.1", "--rotate", "0", "0", "0", "1"});
     requireUsage({"seed", mesh, "-o", output(), "--voxel-size", "0.1", "--seed", "1"});
     CHECK_FALSE(std::filesystem::exists(output()));
+}
+
+TEST_CASE("options that belong to other methods are wrong usage") {
+    const std::string mesh = sphereFile().string();
+    const auto with = [&](Words options) {
+        options.insert(options.begin(), {"--voxel-size", "0.1"});
+        return buildOf(mesh, options);
+    };
+    for (const Words& option : {Words{"--delta", "0.5"}, Words{"--epsilon", "1"}, Words{"--neighbourhood", "2"},
+                                Words{"--max-subdivision", "32"}}) {
+        requireUsage(with(option), option[0] + ": needs --method double-layer");
+        requireUsage(with({"--method", "exact", option[0], option[1]}), option[0] + ": needs --method double-layer");
+        requireUsage(with({"--method", "pseudonormal", option[0], option[1]}),
+                     option[0] + ": needs --method double-layer");
+        requireUsage(with({"--method", "double-layer", option[0], "0"}), option[0]);
+    }
+    for (const char* sign : {"normals", "winding", "flood"})
+        requireUsage(with({"--method", "double-layer", "--sign", sign}), "--sign: is not for --method double-layer");
+    requireUsage(with({"--method", "double-layer", "--gap", "2"}), "--gap: needs");
+    for (const char* sign : {"normals", "winding"}) requireUsage(with({"--sign", sign, "--gap", "2"}), "--gap: needs");
+    CHECK_FALSE(std::filesystem::exists(output()));
+}
+
+TEST_CASE("what is no number is wrong usage wherever a number is expected") {
+    const std::string mesh = sphereFile().string();
+    for (const char* word : {"nan", "-nan", "inf", "1e400", "x"}) {
+        for (const char* option : {"--half-width", "--gap", "--threads", "--device-memory"})
+            requireUsage(buildOf(mesh, {"--voxel-size", "0.1", option, word}), option);
+        requireUsage(buildOf(mesh, {"--voxel-size", "0.1", "--exterior-width", word, "--interior-width", "3"}),
+                     "--exterior-width");
+        requireUsage(buildOf(mesh, {"--voxel-size", "0.1", "--exterior-width", "3", "--interior-width", word}),
+                     "--interior-width");
+        for (const char* option : {"--delta", "--epsilon", "--neighbourhood", "--max-subdivision"})
+            requireUsage(buildOf(mesh, {"--voxel-size", "0.1", "--method", "double-layer", option, word}), option);
+        for (const char* option : {"--isovalue", "--adaptivity"})
+            requireUsage({"surface", "a.vdb", "-o", "a.ply", option, word}, option);
+        for (const char* option : {"--voxel-size", "--resolution", "--half-width", "--particles"})
+            requireUsage({"seed", mesh, "-o", output(), option, word}, option);
+        requireUsage({"seed", mesh, "-o", output(), "--voxel-size", "0.1", "--translate", "0", word, "0"},
+                     "--translate");
+        requireUsage({"seed", mesh, "-o", output(), "--voxel-size", "0.1", "--rotate", "0", "0", "1", word},
+                     "--rotate");
+    }
+    CHECK_FALSE(std::filesystem::exists(output()));
+}
+
+TEST_CASE("an input is never overwritten") {
+    const std::string field = scratch("kept.vdb").string();
+    REQUIRE(run({"build", sphereFile().string(), "-o", field, "--voxel-size", "0.1"}).status == 0);
+    const auto when = std::filesystem::last_write_time(field);
+    requireUsage({"seed", field, "-o", field}, "would overwrite " + field);
+    requireUsage({"seed", sphereFile().string(), field, "-o", field, "--voxel-size", "0.1"}, "would overwrite");
+    const auto link = scratch("kept.ply");
+    std::filesystem::remove(link);
+    std::filesystem::create_symlink(field, link);
+    requireUsage({"surface", field, "-o", link.string()}, "would overwrite");
+    CHECK(std::filesystem::last_write_time(field) == when);
 }

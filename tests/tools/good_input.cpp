@@ -1,10 +1,12 @@
 // Every command of `bilayer` on input that it must take.
 #include <openvdb/openvdb.h>
+#include <openvdb/tools/LevelSetSphere.h>
 
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <sstream>
+#include <vector>
 
 #include "demos/shared/shapes.h"
 #include "sdf/grids.h"
@@ -59,10 +61,13 @@ TEST_CASE("build reports what the file then holds") {
     CHECK(json["voxelSize"] == 0.05);
     CHECK(json["activeVoxels"] == field.activeVoxels());
     CHECK(json["leaves"] == field.leaves());
-    CHECK(json["method"] == "double-layer");
+    CHECK(json["method"] == "exact");
     CHECK(json["backend"] == "tbb");
     CHECK(json["device"].is_string());
-    CHECK(json["sign"] == "layers");
+    CHECK(json["sign"] == "normals");
+    CHECK(json["signReason"] == "closed and oriented");
+    CHECK(json["signConflicts"] == 0);
+    CHECK(json["errorBound"].get<double>() == Approx(1e-4 * 0.05));
     for (const char* part : {"read", "build", "write"}) CHECK(json["seconds"][part].get<double>() >= 0);
     CHECK(json["seconds"]["parts"].is_object());
     CHECK(json["mesh"]["closed"] == true);
@@ -104,13 +109,85 @@ TEST_CASE("every option of build has an effect") {
     };
     const auto reference = values(*phi({}));
     CHECK(values(*phi({"--threads", "1"})) == reference);
-    CHECK(values(*phi({"--delta", "0.25"})) != reference);
-    CHECK(values(*phi({"--epsilon", "0.1"})) != reference);
-    CHECK(values(*phi({"--method", "double-layer", "--sign", "auto", "--backend", "tbb"})) == reference);
+    CHECK(values(*phi({"--method", "exact", "--sign", "auto", "--gap", "2", "--backend", "tbb"})) == reference);
+    const auto layers = [&](Words options) {
+        options.insert(options.begin(), {"--method", "double-layer"});
+        return values(*phi(options));
+    };
+    const auto byLayers = layers({"--sign", "auto"});
+    CHECK(byLayers != reference);
+    CHECK(layers({"--threads", "1"}) == byLayers);
+    CHECK(layers({"--delta", "0.25"}) != byLayers);
+    CHECK(layers({"--epsilon", "0.1"}) != byLayers);
+    CHECK(layers({"--neighbourhood", "9"}) == byLayers);  // the band is complete with any
+    CHECK(layers({"--epsilon", "0.1", "--max-subdivision", "1"}) != layers({"--epsilon", "0.1"}));
     phi({});
     const auto full = std::filesystem::file_size(output);
-    phi({"--half-float"});
+    const float bound = readVdb(output).errorBound();
+    const auto half = with({"--half-float"});
     CHECK(std::filesystem::file_size(output) < full);
+    CHECK(readVdb(output).errorBound() > bound);
+    CHECK(half["errorBound"].get<float>() == readVdb(output).errorBound());
+}
+
+TEST_CASE("each method says what it did, and both exact ones agree") {
+    const std::string output = scratch("methods.vdb").string();
+    const auto with = [&](const std::string& method) {
+        const auto json = build(output, {"--voxel-size", "0.05", "--method", method});
+        CHECK(json["method"] == method);
+        CHECK(run({"info", output, "--json"}).json()["method"] == method);
+        CHECK(json["sign"] == (method == "double-layer" ? "layers" : "normals"));
+        CHECK(json["errorBound"].get<double>() == Approx((method == "double-layer" ? 3 : 1e-4) * 0.05));
+        return readVdb(output);
+    };
+    const LevelSet exact = with("exact"), pseudonormal = with("pseudonormal"), layers = with("double-layer");
+    // at the band's limit one may have a voxel that is background to the other
+    const auto contains = [](const LevelSet& a, const LevelSet& b) {
+        const auto other = a.grids().distance->getConstAccessor();
+        for (auto value = b.grids().distance->cbeginValueOn(); value; ++value)
+            REQUIRE(other.getValue(value.getCoord()) == Approx(*value).margin(2e-4 * 0.05));
+    };
+    CHECK(exact.activeVoxels() > 5000);
+    CHECK(layers.activeVoxels() > 5000);
+    contains(exact, pseudonormal);
+    contains(pseudonormal, exact);
+}
+
+TEST_CASE("each sign says who asked for it") {
+    for (const std::string method : {"exact", "pseudonormal"})
+        for (const std::string sign : {"normals", "winding", "flood"}) {
+            const std::string output = scratch("signs.vdb").string();
+            const auto json = build(output, {"--voxel-size", "0.05", "--method", method, "--sign", sign});
+            CHECK(json["sign"] == sign);
+            CHECK(json["signReason"] == "as asked for");
+            CHECK(readVdb(output).grids().distance->tree().getValue(openvdb::Coord(0)) < 0);
+        }
+}
+
+TEST_CASE("an open mesh is signed by other means, and build says why") {
+    // a sphere without the triangles around one vertex: a hole about 0.13 wide
+    Mesh open = shapes::sphere(0.5f, 3);
+    std::erase_if(open.triangles, [](const glm::uvec3& t) { return t.x == 0 || t.y == 0 || t.z == 0; });
+    const auto path = scratch("holed.ply"), output = scratch("holed.vdb");
+    writeMesh(path, open);
+    const auto built = [&](Words options) {
+        options.insert(options.begin(), {"build", path.string(), "-o", output.string(), "--voxel-size", "0.01"});
+        const Result r = run(options);
+        INFO(r.err);
+        REQUIRE(r.status == 0);
+        return r.out;
+    };
+    const auto centre = [&] { return readVdb(output).grids().distance->tree().getValue(openvdb::Coord(0)); };
+    const auto json = nlohmann::json::parse(built({"--json"}));
+    CHECK(json["sign"] == "winding");
+    CHECK_THAT(json["signReason"].get<std::string>(), Catch::Contains("boundary edges"));
+    CHECK(centre() < 0);
+    CHECK_THAT(built({}), Catch::Contains("winding: ") && Catch::Contains("boundary edges"));
+    CHECK_THAT(run({"info", output.string()}).out, Catch::Contains("winding: ") && Catch::Contains("boundary edges"));
+    built({"--sign", "flood", "--gap", "2"});
+    CHECK(centre() > 0);
+    built({"--sign", "flood", "--gap", "25"});
+    CHECK(centre() < 0);
 }
 
 TEST_CASE("inspect tells of holes") {
@@ -136,10 +213,30 @@ TEST_CASE("info tells what is in a file") {
     CHECK(json["grids"][0]["class"] == "level set");
     CHECK(json["activeVoxels"] == field.activeVoxels());
     CHECK(json["exteriorWidth"].get<double>() == Approx(3));
-    CHECK(json["method"] == "double-layer");
+    CHECK(json["method"] == "exact");
+    CHECK(json["sign"] == "normals");
+    CHECK(json["signReason"] == "closed and oriented");
+    CHECK(json["signConflicts"] == 0);
+    CHECK(json["errorBound"].get<double>() == Approx(1e-4 * 0.05));
     CHECK(json["bounds"]["lower"][0].get<double>() == Approx(-0.6).margin(0.06));
     CHECK(json["meshHash"].get<std::string>().size() == 16);
-    CHECK(run({"info", fieldFile()}).status == 0);
+    const Result table = run({"info", fieldFile()});
+    CHECK(table.status == 0);
+    CHECK_THAT(table.out, Catch::Contains("normals: closed and oriented") && Catch::Contains("0.0001 voxels"));
+}
+
+TEST_CASE("info takes fields from elsewhere") {
+    openvdb::initialize();
+    const auto grid = openvdb::tools::createLevelSetSphere<openvdb::FloatGrid>(1, openvdb::Vec3f(0), 0.1f);
+    const std::string path = scratch("elsewhere.vdb").string();
+    openvdb::io::File(path).write({grid});
+    const auto json = run({"info", path, "--json"}).json();
+    CHECK(json["method"] == "");
+    CHECK(json["sign"] == "");
+    CHECK(json["errorBound"].is_null());
+    const Result table = run({"info", path});
+    CHECK(table.status == 0);
+    CHECK(table.out.find("sign") == std::string::npos);
 }
 
 TEST_CASE("query answers line by line") {
@@ -218,9 +315,10 @@ TEST_CASE("build on an OpenCL device gives the same voxels") {
         WARN("skipped: there is no OpenCL device");
         return;
     }
-    const auto tbb = build(scratch("tbb.vdb").string(), {"--voxel-size", "0.05"});
-    const auto cl = build(scratch("cl.vdb").string(), {"--voxel-size", "0.05", "--backend", "opencl", "--device",
-                                                       devices[0]["name"], "--device-memory", "512"});
+    const auto tbb = build(scratch("tbb.vdb").string(), {"--voxel-size", "0.05", "--method", "double-layer"});
+    const auto cl =
+        build(scratch("cl.vdb").string(), {"--voxel-size", "0.05", "--method", "double-layer", "--backend", "opencl",
+                                           "--device", devices[0]["name"], "--device-memory", "512"});
     CHECK(cl["backend"] == "opencl");
     CHECK(cl["device"] == devices[0]["name"]);
     CHECK(cl["activeVoxels"] == tbb["activeVoxels"]);
