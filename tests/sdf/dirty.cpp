@@ -53,13 +53,14 @@ std::vector<std::string> corpus() {
     return names;
 }
 
-// Voxels whose value is no number, is active outside the band, or is inactive and no width.
+// Voxels whose value is no number, is active outside the band, or is inactive and no width. A distance just within the
+// band may round to its width.
 std::size_t countOddValues(const Built& built) {
     const float out = built.field.exteriorWidth(), in = -built.field.interiorWidth();
     std::size_t odd = 0;
     for (auto value = built.grid->cbeginValueAll(); value; ++value)
         odd += !std::isfinite(*value) ||
-               !(value.isValueOn() ? *value > in && *value < out : *value == in || *value == out);
+               !(value.isValueOn() ? *value >= in && *value <= out : *value == in || *value == out);
     return odd;
 }
 
