@@ -16,6 +16,7 @@ namespace {
 
 using Leaf = openvdb::FloatTree::LeafNodeType;
 using TriangleLeaf = openvdb::Int32Tree::LeafNodeType;
+using LargeNode = openvdb::FloatTree::RootNodeType::ChildNodeType;
 static_assert(Leaf::DIM == blockSide);
 
 std::unique_ptr<TriangleLeaf> triangleLeaf(const std::int32_t* triangles, const Leaf& like) {
@@ -50,16 +51,42 @@ class ConflictCounter {
     std::size_t count() const {
         const openvdb::tree::LeafManager<const openvdb::FloatTree> leaves(tree_);
         return tbb::parallel_reduce(
-            tbb::blocked_range<std::size_t>(0, leaves.leafCount(), 64), std::size_t(0),
-            [&](const auto& range, std::size_t sum) {
-                const openvdb::tree::ValueAccessor<const openvdb::FloatTree> accessor(tree_);
-                for (std::size_t i = range.begin(); i < range.end(); ++i) sum += atLeaf(leaves.leaf(i), accessor);
-                return sum;
-            },
-            std::plus<>());
+                   tbb::blocked_range<std::size_t>(0, leaves.leafCount(), 64), std::size_t(0),
+                   [&](const auto& range, std::size_t sum) {
+                       const openvdb::tree::ValueAccessor<const openvdb::FloatTree> accessor(tree_);
+                       for (std::size_t i = range.begin(); i < range.end(); ++i)
+                           sum += atLeaf(leaves.leaf(i), accessor);
+                       return sum;
+                   },
+                   std::plus<>()) +
+               atLargeTiles();
     }
 
   private:
+    // The flood of tiles stops at the edges of the tree's largest nodes. So a mesh inside out shows as large tiles that
+    // are inside, next to the space outside all nodes.
+    std::size_t atLargeTiles() const {
+        std::size_t sum = 0;
+        for (auto node = tree_.root().cbeginChildOn(); node; ++node)
+            for (openvdb::Index n = 0; n < LargeNode::NUM_VALUES; ++n)
+                if (node->isChildMaskOff(n) && node->getTable()[n].getValue() < 0)
+                    sum += towardsOutside(node->offsetToGlobalCoord(n));
+        return sum;
+    }
+
+    std::size_t towardsOutside(const openvdb::Coord& tile) const {
+        constexpr int side = LargeNode::ChildNodeType::DIM;
+        std::size_t sum = 0;
+        for (int axis = 0; axis < 3; ++axis)
+            for (const int step : {-side, side}) {
+                openvdb::Coord next = tile;
+                next[axis] += step;
+                float value = 0;
+                sum += !tree_.probeConstLeaf(next) && !tree_.probeValue(next, value) && value > 0;
+            }
+        return sum;
+    }
+
     template <class Accessor>
     std::size_t atLeaf(const Leaf& leaf, const Accessor& accessor) const {
         std::size_t sum = 0;

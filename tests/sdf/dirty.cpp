@@ -1,0 +1,213 @@
+// Meshes as they are found: every public one gets a sensible field, whatever is wrong with it, or a clear refusal.
+#include <openvdb/openvdb.h>
+
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <filesystem>
+#include <glm/gtc/matrix_transform.hpp>
+#include <random>
+
+#include "demos/shared/shapes.h"
+#include "sdf/build.h"
+#include "sdf/grids.h"
+#include "sdf/sign.h"
+#include "tests/support/support.h"
+
+using namespace bilayer;
+
+namespace {
+
+// Few voxels, so that all meshes together take seconds.
+constexpr float resolution = 24;
+// What distances are promised to, and what they are checked to; sums over two voxels in single precision [voxels].
+constexpr double exactness = 1e-4, slack = 1e-3;
+// Triangles times voxels that brute force may look at for one mesh.
+constexpr std::size_t work = 1'000'000;
+
+struct Built {
+    LevelSet field;
+    openvdb::FloatGrid::ConstPtr grid;
+    std::string sign, reason;
+
+    explicit Built(const Mesh& mesh, float voxels = resolution)
+        : field(build(mesh, {.voxelSize = voxelSizeFor(mesh, voxels)})),
+          grid(field.grids().distance),
+          sign(grid->metaValue<std::string>(metadata::sign)),
+          reason(grid->metaValue<std::string>(metadata::signReason)) {}
+
+    double at(const glm::vec3& point) const {
+        const openvdb::Vec3d index = grid->worldToIndex(openvdb::Vec3d(point.x, point.y, point.z));
+        return double(grid->tree().getValue(openvdb::Coord::round(index)));
+    }
+};
+
+std::vector<std::string> corpus() {
+    std::vector<std::string> names;
+    const auto any = test::corpusMesh("SOURCES.md");
+    if (!any) return names;
+    for (const auto& entry : std::filesystem::recursive_directory_iterator(any->parent_path()))
+        if (entry.is_regular_file() && entry.path().extension() != ".md")
+            names.push_back(std::filesystem::relative(entry.path(), any->parent_path()).string());
+    std::sort(names.begin(), names.end());
+    return names;
+}
+
+// Voxels whose value is no number, is active outside the band, or is inactive and no width. A distance just within the
+// band may round to its width.
+std::size_t countOddValues(const Built& built) {
+    const float out = built.field.exteriorWidth(), in = -built.field.interiorWidth();
+    std::size_t odd = 0;
+    for (auto value = built.grid->cbeginValueAll(); value; ++value)
+        odd += !std::isfinite(*value) ||
+               !(value.isValueOn() ? *value >= in && *value <= out : *value == in || *value == out);
+    return odd;
+}
+
+// Neighbours on different sides without room for the surface between them.
+std::size_t countBridges(const Built& built) {
+    const double h = built.field.voxelSize();
+    auto voxels = built.grid->getConstAccessor();
+    std::size_t bridges = 0;
+    for (auto leaf = built.grid->tree().cbeginLeaf(); leaf; ++leaf)
+        for (auto voxel = leaf->cbeginValueAll(); voxel; ++voxel)
+            for (int k = 0; k < 6; ++k) {
+                openvdb::Coord next = voxel.getCoord();
+                next[k / 2] += k % 2 ? 1 : -1;
+                const double here = *voxel, there = voxels.getValue(next);
+                bridges += (here < 0) != (there < 0) && std::abs(here) + std::abs(there) > h * (1 + slack);
+            }
+    return bridges;
+}
+
+// Active voxels at random, as many as brute force has time for.
+std::vector<openvdb::Coord> someVoxels(const Built& built, std::size_t triangles, std::mt19937& random) {
+    std::vector<openvdb::Coord> all;
+    for (auto voxel = built.grid->cbeginValueOn(); voxel; ++voxel) all.push_back(voxel.getCoord());
+    std::shuffle(all.begin(), all.end(), random);
+    all.resize(std::min(all.size(), std::clamp<std::size_t>(work / triangles, 5, 300)));
+    return all;
+}
+
+glm::dvec3 centre(const Built& built, const openvdb::Coord& voxel) {
+    const openvdb::Vec3d world = built.grid->indexToWorld(voxel);
+    return {world.x(), world.y(), world.z()};
+}
+
+void checkDistances(const Mesh& mesh, const Built& built, const std::vector<openvdb::Coord>& voxels) {
+    double worst = 0;
+    for (const auto& voxel : voxels)
+        worst = std::max(worst, std::abs(std::abs(double(built.grid->tree().getValue(voxel))) -
+                                         test::distance(mesh, centre(built, voxel))));
+    CHECK(worst <= exactness * double(built.field.voxelSize()));
+}
+
+// Against the winding numbers of the mesh that the build took, which may have triangles turned.
+void checkWinding(const Mesh& mesh, const Built& built, const std::vector<openvdb::Coord>& voxels) {
+    const SignChoice choice = balanced(mesh) ? chooseSignAfterConflict(mesh) : chooseSign(mesh);
+    const Mesh& oriented = choice.mended ? *choice.mended : mesh;
+    std::size_t wrong = 0;
+    for (const auto& voxel : voxels) {
+        const double value = built.grid->tree().getValue(voxel);
+        const double winding = test::windingNumber(oriented, centre(built, voxel));
+        const bool either =
+            std::abs(winding - 0.5) < 1e-6 || std::abs(value) < exactness * double(built.field.voxelSize());
+        wrong += !either && (value < 0) != (winding > 0.5);
+    }
+    CHECK(wrong == 0);
+}
+
+Mesh moved(const Mesh& mesh, const glm::vec3& by) {
+    return transformed(mesh, glm::translate(glm::mat4(1), by));
+}
+
+Mesh insideOut(Mesh mesh) {
+    for (auto& t : mesh.triangles) std::swap(t.y, t.z);
+    return mesh;
+}
+
+}  // namespace
+
+TEST_CASE("every public mesh has a sensible field or is refused by name") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    std::mt19937 random(seed);
+    const std::vector<std::string> refused = {"formats/brain_tristrips.ply", "formats/empty.obj",
+                                              "formats/ply_empty_bin.ply", "formats/stl_empty_bin.stl"};
+    const std::vector<std::string> names = corpus();
+    if (names.empty()) return;
+    CHECK(names.size() == 107);
+    for (const std::string& name : names) {
+        CAPTURE(name);
+        const auto path = *test::corpusMesh(name);
+        if (std::find(refused.begin(), refused.end(), name) != refused.end()) {
+            CHECK_THROWS_WITH(readMesh(path), Catch::Contains(path.filename().string()));
+            continue;
+        }
+        const Mesh mesh = readMesh(path);
+        const Built built(mesh);
+        CAPTURE(built.sign, built.reason);
+        CHECK_FALSE(built.reason.empty());
+        CHECK(countOddValues(built) == 0);
+        CHECK(built.at(bounds(mesh).lower - 0.5f * bounds(mesh).size()) == double(built.field.exteriorWidth()));
+        // sides change where the surface is, but for lids over holes
+        if (built.sign == "normals") CHECK(countBridges(built) == 0);
+        const auto voxels = someVoxels(built, mesh.triangles.size(), random);
+        checkDistances(mesh, built, voxels);
+        if (built.sign == "winding") checkWinding(mesh, built, voxels);
+    }
+}
+
+TEST_CASE("public meshes get their signs in the way that suits them") {
+    struct Case {
+        const char *name, *sign, *reason;
+        float voxels = 48;
+    };
+    const char *closed = "closed and oriented", *meets = "intersects itself", *open = "boundary edge";
+    for (const Case& c :
+         {Case{"fandisk.obj", "normals", closed}, Case{"cgal-cheese.off", "normals", closed},
+          Case{"casting_inverted.off", "normals", "turned"}, Case{"cgal-cube-shuffled.off", "normals", "turned"},
+          Case{"cgal-blobby-shuffled.off", "normals", "turned"}, Case{"cow.obj", "winding", meets, 128},
+          Case{"cgal-bones.off", "winding", meets, 128}, Case{"bunny_5k_open.obj", "winding", open},
+          Case{"cgal-elephant-with-holes.off", "winding", open}, Case{"suzanne.obj", "winding", open},
+          Case{"teapot.obj", "winding", open}, Case{"cgal-three_knives.off", "winding", "unbalanced"},
+          Case{"moebius.obj", "flood", "one side only"}, Case{"soup.stl", "flood", "only"},
+          Case{"mp_chair.off", "flood", "only"}, Case{"leoTest1.obj", "flood", "only"},
+          Case{"many_small_holes.ply", "flood", "only"}}) {
+        const auto path = test::corpusMesh(c.name);
+        if (!path) return;
+        const Built built(readMesh(*path), c.voxels);
+        CAPTURE(c.name, built.reason);
+        CHECK(built.sign == c.sign);
+        CHECK_THAT(built.reason, Catch::Contains(c.reason));
+    }
+}
+
+TEST_CASE("a mesh inside out is turned around, wherever it lies") {
+    const Mesh ball = shapes::sphere(1, 3);
+    // at the origin its field spreads over eight of the tree's largest nodes, elsewhere over one
+    for (const glm::vec3 by : {glm::vec3(0), glm::vec3(5, 6, 7), glm::vec3(0, 40, 0), glm::vec3(-9, 3, -4)}) {
+        const Built built(insideOut(moved(ball, by)));
+        CAPTURE(by.x, by.y, by.z, built.reason);
+        CHECK(built.sign == "normals");
+        CHECK(built.at(by) < 0);
+        CHECK(built.at(by + glm::vec3(3, 0, 0)) > 0);
+        CHECK(built.at(by + glm::vec3(0, 0.95f, 0)) < 0);
+        CHECK(built.at(by + glm::vec3(0, 0, -1.05f)) > 0);
+    }
+}
+
+TEST_CASE("one component inside out beside one that is not is turned alone") {
+    const Mesh ball = shapes::sphere(1, 3);
+    for (const glm::vec3 axis : {glm::vec3(1, 0, 0), glm::vec3(0, 1, 0), glm::vec3(0, 0, 1)})
+        for (const float apart : {1.5f, 8.f}) {
+            const glm::vec3 by = apart * axis + glm::vec3(2, 2, 2) * (glm::vec3(1) - axis);
+            const Mesh pair = shapes::join({moved(ball, by), insideOut(moved(ball, by - 2 * apart * axis))});
+            const Built built(pair, 100);
+            CAPTURE(axis.x, axis.y, axis.z, apart, built.reason);
+            CHECK(built.sign == "normals");
+            CHECK(built.at(by) < 0);
+            CHECK(built.at(by - 2 * apart * axis) < 0);
+            CHECK(built.at(by - apart * axis) > 0);
+        }
+}
