@@ -160,8 +160,8 @@ TEST_CASE("closed meshes get the signs of brute force in every voxel") {
         for (const float h : {0.05f, 0.21f}) {
             const Field f = signedField(meshes[m], h, true);
             CAPTURE(m, h);
-            CHECK(wrongSigns(f, meshes[m], true, 12000, seed) == 0);
-            CHECK(wrongSigns(signedField(meshes[m], h, false), meshes[m], true, 3000, seed) == 0);
+            CHECK(wrongSigns(f, meshes[m], true, 5000, seed) == 0);
+            CHECK(wrongSigns(signedField(meshes[m], h, false), meshes[m], true, 1500, seed) == 0);
         }
 }
 
@@ -207,7 +207,7 @@ TEST_CASE("public meshes get the signs of brute force", "[corpus]") {
         const bool closed = inspect(mesh).closed() && inspect(mesh).misorientedEdges == 0;
         const Field f = signedField(mesh, voxelSizeFor(mesh, 48), closed);
         CAPTURE(name, closed);
-        CHECK(wrongSigns(f, mesh, closed, 4000, seed) == 0);
+        CHECK(wrongSigns(f, mesh, closed, 2000, seed) == 0);
     }
 }
 
