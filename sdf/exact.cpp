@@ -51,9 +51,10 @@ struct Scratch {
 // The winding number, for the rare voxel whose closest normals cancel out; made when it is first asked.
 class LastResort {
   public:
-    explicit LastResort(const Mesh& mesh) : mesh_(mesh) {}
+    explicit LastResort(const MeshJob& job) : mesh_(job.mesh), asked_(job.undecided) {}
 
     bool isInside(const glm::dvec3& point) {
+        if (asked_) ++*asked_;
         // isolated: a thread that waits for the tree must not be given a brick that would wait for it too
         std::call_once(made_, [&] { tbb::this_task_arena::isolate([&] { winding_.emplace(mesh_); }); });
         return (*winding_)(point) > 0.5;
@@ -61,6 +62,7 @@ class LastResort {
 
   private:
     const Mesh& mesh_;
+    std::atomic<std::size_t>* asked_;
     std::once_flag made_;
     std::optional<WindingNumber> winding_;
 };
@@ -78,6 +80,7 @@ class BrickFiller {
 
     void fill(std::size_t brick) {
         origin_ = bins_.origins[brick];
+        if (!wanted(origin_, bins_.side)) return;
         blocks_ = bins_.side / blockSide;
         cut(brick);
         s_.clusters.build(s_.pieces, origin_);
@@ -92,6 +95,8 @@ class BrickFiller {
     }
 
   private:
+    bool wanted(const glm::ivec3& first, int side) const { return !job_.wanted || job_.wanted(first, side); }
+
     void cut(std::size_t brick) {
         s_.pieces.clear();
         const glm::dvec3 lower(origin_), upper = lower + double(bins_.side - 1);
@@ -149,9 +154,9 @@ class BrickFiller {
     void fillBlock(std::size_t number, const glm::ivec3& inBrick) {
         const BlockBins& bins = s_.bins;
         reaching_ = {bins.clusters.data() + bins.offsets[number], bins.clusters.data() + bins.offsets[number + 1]};
-        if (reaching_.empty()) return;
-        job_.progress.poll();
         block_ = origin_ + inBrick;
+        if (reaching_.empty() || !wanted(block_, blockSide)) return;
+        job_.progress.poll();
         inBrick_ = inBrick;
         if (!measureBlock({reaching_, s_.clusters.clusters().data(), s_.clusters.members().data(), s_.pieces.data(),
                            block_, glm::vec3(inBrick), job_.reach},
@@ -226,9 +231,9 @@ class BrickFiller {
 
 void fillExact(const MeshJob& job) {
     const double voxelsPerUnit = 1.0 / double(job.voxelSize);
-    const TriangleBins bins = binTriangles(job.mesh, voxelsPerUnit, job.reach);
+    const TriangleBins bins = binTriangles(job.mesh, voxelsPerUnit, job.reach, &job.progress);
     job.progress.begin(bins.count());
-    LastResort lastResort(job.mesh);
+    LastResort lastResort(job);
     tbb::enumerable_thread_specific<Scratch> scratch;
     tbb::parallel_for(std::size_t(0), bins.count(), [&](std::size_t brick) {
         BrickFiller(job, bins, voxelsPerUnit, lastResort, scratch.local()).fill(brick);
