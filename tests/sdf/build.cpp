@@ -282,7 +282,7 @@ TEST_CASE("bad options and meshes are refused by name") {
         CHECK_THROWS_WITH(build(flat, {.voxelSize = 1, .method = method}), Catch::Contains("no triangle with an area"));
     refused({.voxelSize = 0.1f, .exteriorWidth = 101, .bandUnit = BandUnit::world}, "exteriorWidth");
     refused({.voxelSize = 0, .bandUnit = BandUnit::world}, "voxelSize");
-    // a band of a thousand voxels around a surface of a few is as large as a ball of that radius
+    // 3e8 voxels of surface with 2000 across each
     refused({.voxelSize = 2e-4f, .exteriorWidth = 1000, .interiorWidth = 1000, .method = Method::pseudonormal},
             "memory");
     CHECK_THROWS_AS(voxelSizeFor(mesh, 0), std::invalid_argument);
