@@ -9,6 +9,7 @@
 #include <bit>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <glm/vector_relational.hpp>
 #include <mutex>
 #include <optional>
 #include <utility>
@@ -88,25 +89,52 @@ class BrickFiller {
         s_.origins.clear();
         s_.distances.clear();
         s_.triangles.clear();
-        for (int x = 0, b = 0; x < blocks_; ++x)
-            for (int y = 0; y < blocks_; ++y)
-                for (int z = 0; z < blocks_; ++z) fillBlock(std::size_t(b++), blockSide * glm::ivec3(x, y, z));
+        std::size_t number = 0;
+        forEachBlockOfBrick([&](const glm::ivec3& inBrick) { fillBlock(number++, inBrick); });
         if (!s_.origins.empty()) job_.sink({s_.origins, s_.distances, s_.triangles});
     }
 
   private:
     bool wanted(const glm::ivec3& first, int side) const { return !job_.wanted || job_.wanted(first, side); }
 
+    // Pieces beyond these reach none of the wanted blocks.
+    PieceLimits limitsOfWanted() const {
+        glm::ivec3 lower = origin_, upper = origin_ + (bins_.side - blockSide);
+        if (job_.wanted) {
+            std::swap(lower, upper);
+            forEachBlockOfBrick([&](const glm::ivec3& inBrick) {
+                const glm::ivec3 block = origin_ + inBrick;
+                if (!job_.wanted(block, blockSide)) return;
+                lower = glm::min(lower, block);
+                upper = glm::max(upper, block);
+            });
+        }
+        const double margin = double(job_.reach) + 1.0;
+        return {glm::dvec3(lower) - margin, glm::dvec3(upper + (blockSide - 1)) + margin};
+    }
+
+    static bool meets(const PieceCorners& c, const PieceLimits& limits) {
+        const glm::dvec3 lower = glm::min(c[0], glm::min(c[1], c[2])), upper = glm::max(c[0], glm::max(c[1], c[2]));
+        return glm::all(glm::lessThanEqual(lower, limits.upper)) && glm::all(glm::lessThanEqual(limits.lower, upper));
+    }
+
+    template <class Visit>
+    void forEachBlockOfBrick(Visit visit) const {
+        for (int x = 0; x < blocks_; ++x)
+            for (int y = 0; y < blocks_; ++y)
+                for (int z = 0; z < blocks_; ++z) visit(blockSide * glm::ivec3(x, y, z));
+    }
+
     void cut(std::size_t brick) {
         s_.pieces.clear();
-        const glm::dvec3 lower(origin_), upper = lower + double(bins_.side - 1);
-        const PieceLimits limits{lower - double(job_.reach) - 1.0, upper + double(job_.reach) + 1.0};
+        const PieceLimits limits = limitsOfWanted();
         PieceCutter cutter(longestPieceEdge, s_.pieces);
         for (const std::uint32_t triangle : bins_.trianglesOf(brick)) {
             const glm::uvec3 t = job_.mesh.triangles[triangle];
             const auto corner = [&](unsigned i) { return glm::dvec3(job_.mesh.points[i]) * voxelsPerUnit_; };
             if (++cut_ % trianglesPerPoll == 0) job_.progress.poll();
-            cutter.cut({corner(t.x), corner(t.y), corner(t.z)}, triangle, limits);
+            const PieceCorners corners{corner(t.x), corner(t.y), corner(t.z)};
+            if (!job_.wanted || meets(corners, limits)) cutter.cut(corners, triangle, limits);
         }
         cutter.finish();
     }
