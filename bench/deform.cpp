@@ -12,6 +12,7 @@
 #include "bench/builders.h"
 #include "bench/measure.h"
 #include "demos/shared/shapes.h"
+#include "sdf/build.h"
 
 using namespace bilayer;
 using namespace bilayer::bench;
