@@ -354,8 +354,10 @@ class Build {
         signs_ = {"layers", "the nearer of two layers tells the side", 0};
         const FillParameters parameters = fillParameters(options_);
         const Tiles tiles = makeTiles(mesh_, options_);
+        progress_.poll();
         times_.tiles += part.lap();
         const Bricks bricks = binBricks(tiles, parameters.reach);
+        progress_.poll();
         progress_.begin(bricks.count());
         Assembler assembler(bandOf(options_), options_.triangles, Assembler::Plain::keep, progress_);
         filler_.fill({tiles, bricks, parameters, [&](std::size_t, const FilledBlocks& blocks) {
@@ -371,6 +373,7 @@ class Build {
     void fillChosen() {
         Stopwatch part;
         SignChoice choice = chooseSign(mesh_);
+        progress_.poll();
         times_.tiles += part.lap();
         for (;;) {
             // kept over the next choice, which may be made from it
@@ -418,6 +421,7 @@ class Build {
         options_.method == Method::exact ? fillExact(job) : fillPseudonormal(job);
         times_.fill += part.lap();
         finish(assembler);
+        progress_.poll();
         if (sign == Sign::winding) signByWinding(*distance_, mesh, widths, balanced(mesh));
         if (sign == Sign::flood) signByFlood(*distance_, mesh, options_.gap, widths);
         signs_ = {name(sign), reason, byNormals ? assembler.conflicts(*distance_) : 0, undecided};
