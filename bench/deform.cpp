@@ -1,14 +1,18 @@
-// A mesh that deforms from frame to frame, its field built anew for each: frames per second.
+// A mesh that deforms from frame to frame: frames per second where its field is built in full for each, and where it is
+// rebuilt from the frame before because only a part of the mesh moves.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <glm/geometric.hpp>
 #include <glm/gtc/constants.hpp>
 
 #include "bench/builders.h"
 #include "bench/measure.h"
 #include "demos/shared/shapes.h"
+#include "sdf/build.h"
 
 using namespace bilayer;
 using namespace bilayer::bench;
@@ -18,6 +22,8 @@ namespace {
 constexpr float swing = 0.05f;       // to each side, as a part of the longest side of the mesh
 constexpr float wavesAlongMesh = 1;  // from the bottom to the top
 constexpr int framesPerSwing = 40;
+constexpr float tug = 2;  // [voxels]
+constexpr std::array movingShares{0.01, 0.1, 1.0};
 
 struct Options {
     std::string mesh;
@@ -80,6 +86,68 @@ void deform(const Options& options) {
     for (const Row& row : rows) print(row);
 }
 
+// The part of a mesh nearest to one of its points, and how far it goes.
+struct Part {
+    glm::vec3 centre;
+    float radius;
+};
+
+Part partOf(const Mesh& mesh, double share) {
+    const glm::vec3 centre = mesh.points[mesh.triangles[mesh.triangles.size() / 2].x];
+    std::vector<float> distances;
+    for (const auto& t : mesh.triangles) distances.push_back(glm::distance(centre, mesh.points[t.x]));
+    std::sort(distances.begin(), distances.end());
+    return {centre, distances[std::min(distances.size() - 1, std::size_t(share * double(distances.size())))]};
+}
+
+// Moves the part to and fro sideways, most in its middle, by a voxel or two.
+Mesh tugged(const Mesh& mesh, const Part& part, float voxelSize, int frame) {
+    const float phase = glm::two_pi<float>() * float(frame) / framesPerSwing;
+    Mesh moved = mesh;
+    for (auto& point : moved.points) {
+        const float away = glm::distance(point, part.centre) / part.radius;
+        if (away < 1) point += tug * voxelSize * (1 - away * away) * glm::vec3(std::sin(phase), std::cos(phase), 0);
+    }
+    return moved;
+}
+
+std::vector<std::uint32_t> trianglesThatMoved(const Mesh& before, const Mesh& after) {
+    std::vector<std::uint32_t> moved;
+    for (std::uint32_t i = 0; i < before.triangles.size(); ++i) {
+        const glm::uvec3 t = before.triangles[i];
+        const auto differs = [&](unsigned p) { return before.points[p] != after.points[p]; };
+        if (differs(t.x) || differs(t.y) || differs(t.z)) moved.push_back(i);
+    }
+    return moved;
+}
+
+// Full and incremental builds of the same frames, side by side.
+void deformInPart(const Options& options, double share, int threads) {
+    const Scene rest = restingScene(options);
+    const Part part = partOf(rest.mesh, share);
+    const BuildOptions how{.voxelSize = rest.voxelSize,
+                           .exteriorWidth = options.halfWidth,
+                           .interiorWidth = options.halfWidth,
+                           .threads = threads};
+    Mesh before = tugged(rest.mesh, part, rest.voxelSize, 0);
+    LevelSet field = build(before, how);
+    std::vector<double> full, incremental;
+    std::size_t movedTriangles = 0;
+    for (int i = 1; i <= options.frames; ++i) {
+        const Mesh after = tugged(rest.mesh, part, rest.voxelSize, i);
+        const auto moved = trianglesThatMoved(before, after);
+        movedTriangles = std::max(movedTriangles, moved.size());
+        BuildTimes times;
+        build(after, how, nullptr, &times);
+        full.push_back(times.total);
+        field = rebuild(field, before, after, moved, how, &times);
+        incremental.push_back(times.total);
+        before = after;
+    }
+    fmt::print("{:>9}{:>9}{:>14.1f}{:>14.1f}{:>20.1f}\n", movedTriangles, threads, 1 / median(full),
+               1 / median(incremental), median(full) / median(incremental));
+}
+
 int run(int argc, char** argv) {
     CLI::App app("Builds the field of a deforming mesh for each frame, and counts frames per second.");
     Options options;
@@ -91,6 +159,10 @@ int run(int argc, char** argv) {
     app.add_option("--frames", options.frames)->capture_default_str()->check(CLI::PositiveNumber);
     CLI11_PARSE(app, argc, argv);
     deform(options);
+    fmt::print("\na part moves, frames/s of the exact method\n\n{:>9}{:>9}{:>14}{:>14}{:>20}\n", "triangles", "threads",
+               "in full", "incremental", "times as fast");
+    for (const double share : movingShares)
+        for (const int threads : options.threads) deformInPart(options, share, threads);
     return 0;
 }
 

@@ -1,15 +1,19 @@
 #include "sdf/assemble.h"
 
+#include <oneapi/tbb/parallel_for.h>
 #include <oneapi/tbb/parallel_reduce.h>
 #include <openvdb/tools/Prune.h>
 #include <openvdb/tools/SignedFloodFill.h>
 #include <openvdb/tree/LeafManager.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <functional>
+#include <type_traits>
 
 #include "sdf/links.h"
+#include "sdf/progress.h"
 
 namespace bilayer {
 namespace {
@@ -27,10 +31,42 @@ std::unique_ptr<TriangleLeaf> triangleLeaf(const std::int32_t* triangles, const 
     return leaf;
 }
 
-template <class Leaves, class Tree>
-void move(Leaves& leaves, Tree& tree) {
-    for (auto& some : leaves)
-        for (auto& leaf : some) tree.addLeaf(leaf.release());
+constexpr std::size_t leavesPerPoll = 256;  // tens of microseconds
+
+// The first voxels of all rows, as a byte: a bit a row.
+std::uint64_t firstOfRows(std::uint64_t slice) {
+    constexpr std::uint64_t everyFirst = 0x0101010101010101ull, gather = 0x0102040810204080ull;
+    return ((slice & everyFirst) * gather) >> 56;
+}
+
+FaceBits facesOf(const BlockMask& inside) {
+    FaceBits faces{};
+    faces[0] = inside.front();
+    faces[3] = inside.back();
+    for (std::size_t x = 0; x < inside.size(); ++x) {
+        const std::uint64_t slice = inside[x];
+        const auto put = [&](std::size_t face, std::uint64_t row) { faces[face] |= row << (x * blockSide); };
+        put(1, slice & 0xff);
+        put(4, slice >> 56);
+        put(2, firstOfRows(slice));
+        put(5, firstOfRows(slice >> (blockSide - 1)));
+    }
+    return faces;
+}
+
+BlockMask insideOf(const Leaf& leaf) {
+    BlockMask inside{};
+    const float* values = leaf.buffer().data();
+    for (std::size_t i = 0; i < std::size_t(blockVoxels); ++i)
+        inside[i / 64] |= std::uint64_t(std::signbit(values[i])) << (i % 64);
+    return inside;
+}
+
+// All on one side, and nothing of it in the band.
+bool isPlain(const BandMasks& masks) {
+    return none(masks.active) && std::all_of(masks.inside.begin(), masks.inside.end(), [&](std::uint64_t word) {
+               return word == masks.inside[0] && word + 1 <= 1;
+           });
 }
 
 // Pairs of voxels across a face of a block: the block's own are at first + i * rowStep + j * step, the other side's at
@@ -44,9 +80,11 @@ const Face forwardFaces[3] = {{{blockSide, 0, 0}, lastLayer* xStep, yStep, 1, -l
                               {{0, blockSide, 0}, lastLayer* yStep, xStep, 1, -lastLayer* yStep},
                               {{0, 0, blockSide}, lastLayer, xStep, yStep, -lastLayer}};
 
+// Looks at distances only where the bits of two faces differ, which is where the surface passes between them.
 class ConflictCounter {
   public:
-    explicit ConflictCounter(const openvdb::FloatGrid& grid) : tree_(grid.tree()), voxel_(float(grid.voxelSize()[0])) {}
+    ConflictCounter(const openvdb::FloatTree& tree, const std::vector<FaceBits>& faces, float voxelSize)
+        : tree_(tree), faces_(faces), voxel_(voxelSize) {}
 
     std::size_t count() const {
         const openvdb::tree::LeafManager<const openvdb::FloatTree> leaves(tree_);
@@ -90,68 +128,95 @@ class ConflictCounter {
     template <class Accessor>
     std::size_t atLeaf(const Leaf& leaf, const Accessor& accessor) const {
         std::size_t sum = 0;
-        for (const Face& face : forwardFaces) {
+        const float* values = leaf.buffer().data();
+        const FaceBits& bits = faces_[leaf.transientData()];
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+            const Face& face = forwardFaces[axis];
             const openvdb::Coord next = leaf.origin() + face.toNeighbour, previous = leaf.origin() - face.toNeighbour;
-            const float* values = leaf.buffer().data();
             if (const Leaf* other = accessor.probeConstLeaf(next))
-                sum += between(face, values + face.first, other->buffer().data() + face.first + face.across);
+                sum += between(face, bits[axis + 3] ^ faces_[other->transientData()][axis], values + face.first,
+                               other->buffer().data() + face.first + face.across);
             else
-                sum += towards(face, values + face.first, accessor.getValue(next));
+                sum += towards(face, bits[axis + 3], values + face.first, accessor.getValue(next));
             if (!accessor.probeConstLeaf(previous))
-                sum += towards(face, values + face.first + face.across, accessor.getValue(previous));
+                sum += towards(face, bits[axis], values + face.first + face.across, accessor.getValue(previous));
         }
         return sum;
     }
 
-    std::size_t between(const Face& face, const float* a, const float* b) const {
+    static int place(const Face& face, int bit) { return bit / blockSide * face.rowStep + bit % blockSide * face.step; }
+
+    std::size_t between(const Face& face, std::uint64_t differ, const float* a, const float* b) const {
         const float room = voxel_ * (1 + linkSlack);
         std::size_t sum = 0;
-        for (int i = 0; i < blockSide; ++i)
-            for (int j = 0; j < blockSide; ++j) {
-                const float p = a[i * face.rowStep + j * face.step], q = b[i * face.rowStep + j * face.step];
-                sum += std::size_t(int((p < 0) != (q < 0)) & int(std::abs(p) + std::abs(q) > room));
-            }
+        for (; differ; differ &= differ - 1) {
+            const int i = place(face, std::countr_zero(differ));
+            sum += std::abs(a[i]) + std::abs(b[i]) > room;
+        }
         return sum;
     }
 
     // Empty space is a voxel away from the surface at least.
-    std::size_t towards(const Face& face, const float* a, float tile) const {
+    std::size_t towards(const Face& face, std::uint64_t inside, const float* a, float tile) const {
         std::size_t sum = 0;
-        for (int i = 0; i < blockSide; ++i)
-            for (int j = 0; j < blockSide; ++j) {
-                const float p = a[i * face.rowStep + j * face.step];
-                sum += std::size_t(int((p < 0) != (tile < 0)) & int(std::abs(p) > voxel_ * linkSlack));
-            }
+        for (std::uint64_t differ = tile < 0 ? ~inside : inside; differ; differ &= differ - 1)
+            sum += std::abs(a[place(face, std::countr_zero(differ))]) > voxel_ * linkSlack;
         return sum;
     }
 
     const openvdb::FloatTree& tree_;
+    const std::vector<FaceBits>& faces_;
     float voxel_;
 };
 
 }  // namespace
 
 void Assembler::take(const FilledBlocks& blocks) {
-    std::vector<std::unique_ptr<Leaf>>& leaves = leaves_.local();
+    std::vector<Collected>& leaves = leaves_.local();
+    BandMasks masks;
     for (std::size_t b = 0; b < blocks.origins.size(); ++b) {
         const glm::ivec3 o = blocks.origins[b];
         auto leaf = std::make_unique<Leaf>(openvdb::PartialCreate(), openvdb::Coord(o.x, o.y, o.z));
         leaf->buffer().allocate();
-        BlockMask active;
-        if (!trimToBand(blocks.distances.data() + b * blockVoxels, widths_, leaf->buffer().data(), active)) continue;
+        if (!trimToBand(blocks.distances.data() + b * blockVoxels, widths_, leaf->buffer().data(), masks)) continue;
+        if (plain_ == Plain::drop && isPlain(masks)) continue;
         Leaf::NodeMaskType mask;
-        for (openvdb::Index word = 0; word < blockSide; ++word) mask.getWord<std::uint64_t>(word) = active[word];
+        for (openvdb::Index word = 0; word < blockSide; ++word) mask.getWord<std::uint64_t>(word) = masks.active[word];
         leaf->setValueMask(mask);
         if (wantTriangles_ && !mask.isOff())
             triangleLeaves_.local().push_back(triangleLeaf(blocks.triangles.data() + b * blockVoxels, *leaf));
-        leaves.push_back(std::move(leaf));
+        leaves.push_back({std::move(leaf), facesOf(masks.inside)});
     }
+}
+
+void Assembler::copy(const Grids& from, const std::function<bool(const openvdb::Coord&)>& keep) {
+    const auto forEachKept = [&](const auto& tree, auto visit) {
+        const openvdb::tree::LeafManager<std::remove_reference_t<decltype(tree)>> leaves(tree);
+        tbb::parallel_for(tbb::blocked_range<std::size_t>(0, leaves.leafCount(), 64), [&](const auto& range) {
+            progress_.poll();
+            for (std::size_t i = range.begin(); i < range.end(); ++i)
+                if (keep(leaves.leaf(i).origin())) visit(leaves.leaf(i));
+        });
+    };
+    forEachKept(from.distance->tree(), [&](const Leaf& leaf) {
+        leaves_.local().push_back({std::make_unique<Leaf>(leaf), facesOf(insideOf(leaf))});
+    });
+    if (wantTriangles_)
+        forEachKept(from.triangle->tree(), [&](const TriangleLeaf& leaf) {
+            triangleLeaves_.local().push_back(std::make_unique<TriangleLeaf>(leaf));
+        });
 }
 
 openvdb::FloatGrid::Ptr Assembler::distances() {
     const float exterior = widths_.exterior * widths_.voxelSize, interior = -widths_.interior * widths_.voxelSize;
     auto grid = openvdb::FloatGrid::create(exterior);
-    move(leaves_, grid->tree());
+    for (auto& some : leaves_)
+        for (Collected& one : some) {
+            if (faces_.size() % leavesPerPoll == 0) progress_.poll();
+            one.leaf->setTransientData(openvdb::Index32(faces_.size()));
+            faces_.push_back(one.faces);
+            grid->tree().addLeaf(one.leaf.release());
+        }
     // leaves carry their signs already: only tiles between them are flooded. Leaves that turn out to hold one far
     // value become tiles too.
     openvdb::tools::signedFloodFillWithValues(grid->tree(), exterior, interior, true, 1, 1);
@@ -164,13 +229,18 @@ openvdb::FloatGrid::Ptr Assembler::distances() {
 openvdb::Int32Grid::Ptr Assembler::triangles() {
     if (!wantTriangles_) return nullptr;
     auto grid = openvdb::Int32Grid::create(-1);
-    move(triangleLeaves_, grid->tree());
+    std::size_t added = 0;
+    for (auto& some : triangleLeaves_)
+        for (auto& leaf : some) {
+            if (added++ % leavesPerPoll == 0) progress_.poll();
+            grid->tree().addLeaf(leaf.release());
+        }
     grid->setName("triangle");
     return grid;
 }
 
-std::size_t countConflicts(const openvdb::FloatGrid& grid) {
-    return ConflictCounter(grid).count();
+std::size_t Assembler::conflicts(const openvdb::FloatGrid& distances) const {
+    return ConflictCounter(distances.tree(), faces_, float(distances.voxelSize()[0])).count();
 }
 
 }  // namespace bilayer

@@ -106,7 +106,7 @@ void flood(BlockMask unknown, BlockMask& outside, BlockMask& inside) {
 
 }  // namespace
 
-bool trimToBand(const float* distances, const BandWidths& widths, float* values, BlockMask& active) {
+bool trimToBand(const float* distances, const BandWidths& widths, float* values, BandMasks& masks) {
     BlockMask unknown, inside, band;
     HWY_DYNAMIC_DISPATCH(sortVoxels)(distances, widths, unknown, inside, band);
     if (any(unknown)) {
@@ -115,7 +115,7 @@ bool trimToBand(const float* distances, const BandWidths& widths, float* values,
         if (!any(inside) && !any(outside)) return false;
         flood(unknown, outside, inside);
     }
-    active = band;
+    masks = {band, inside};
     HWY_DYNAMIC_DISPATCH(writeValues)(distances, widths, inside, band, values);
     return true;
 }

@@ -16,10 +16,15 @@ struct BandWidths {
     float voxelSize;           ///< [m]
 };
 
+/// Which voxels of a leaf lie in the band, and which inside the surface.
+struct BandMasks {
+    BlockMask active, inside;
+};
+
 /// Turns one block's signed distances [voxels] into a leaf's values [m]: active where -interior < distance < exterior,
 /// else plus the exterior or minus the interior width. Voxels of unknown distance take the sign of the known ones that
 /// they are connected with inside the block, the nearest first. Returns false, and leaves the outputs alone, if nothing
 /// is known.
-bool trimToBand(const float* distances, const BandWidths& widths, float* values, BlockMask& active);
+bool trimToBand(const float* distances, const BandWidths& widths, float* values, BandMasks& masks);
 
 }  // namespace bilayer

@@ -2,6 +2,7 @@
 // cl/filler.h.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <functional>
 #include <glm/vec3.hpp>
@@ -49,6 +50,10 @@ struct MeshJob {
     /// not come.
     std::function<void(const FilledBlocks&)> sink;
     Progress& progress;
+    /// Whether any block is wanted of a cube of voxels with this first voxel and side; null: all are.
+    std::function<bool(const glm::ivec3& first, int side)> wanted{};
+    /// Counts the voxels whose side the triangles within reach leave open, so that all of the mesh was asked; or null.
+    std::atomic<std::size_t>* undecided = nullptr;
 };
 
 /// Everything a filler works from.

@@ -7,10 +7,12 @@
 #include <oneapi/tbb/task_arena.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <glm/gtc/constants.hpp>
 #include <limits>
 #include <optional>
 #include <string>
@@ -22,10 +24,12 @@
 #include "sdf/exact.h"
 #include "sdf/flood.h"
 #include "sdf/grids.h"
+#include "sdf/moved.h"
 #include "sdf/orient.h"
 #include "sdf/progress.h"
 #include "sdf/pseudonormal.h"
 #include "sdf/sign.h"
+#include "sdf/triangle_bins.h"
 #include "sdf/winding.h"
 
 namespace bilayer {
@@ -37,8 +41,12 @@ constexpr double farthestIndex = 1e9;
 constexpr float smallestVoxel = 2e-5f;
 /// Bricks along all axes together that the binning counts; a cube of 40,000 voxels a side.
 constexpr double mostBricks = double(1u << 28);
-/// Bytes that the build needs for a sample (its share of a tile and of the bins) and for a block, roughly.
-constexpr double bytesPerSample = 120, bytesPerBlock = 2300;
+/// Bytes that the build needs for a sample (its share of a tile and of the bins), for a triangle of the exact methods
+/// (bins or hierarchy), and for a block, roughly.
+constexpr double bytesPerSample = 120, bytesPerTriangle = 60, bytesPerBlock = 2300;
+/// Of more moved triangles than this part of all, the field is built in full: little would be left to copy.
+constexpr double mostMoved = 0.5;
+constexpr const char* asAskedFor = "as asked for";
 /// What exact methods promise [voxels]; it is ten times what was ever seen.
 constexpr float exactError = 1e-4f;
 /// No point of a triangle is farther from a sample than this times the root of epsilon: samples stand no farther apart.
@@ -68,6 +76,17 @@ void check(const BuildOptions& options) {
     require(within(options.threads, 0, 4096), "threads", "in 0..4096", options.threads);
 }
 
+// The same options with the widths in voxels.
+BuildOptions inVoxels(BuildOptions options) {
+    if (options.bandUnit == BandUnit::world) {
+        require(options.voxelSize > 0, "voxelSize", "a positive length", options.voxelSize);
+        options.exteriorWidth /= options.voxelSize;
+        options.interiorWidth /= options.voxelSize;
+        options.bandUnit = BandUnit::voxels;
+    }
+    return options;
+}
+
 double areaOf(const Mesh& mesh) {
     return tbb::parallel_reduce(
         tbb::blocked_range<std::size_t>(0, mesh.triangles.size(), 4096), 0.0,
@@ -82,7 +101,18 @@ double areaOf(const Mesh& mesh) {
         std::plus<>());
 }
 
-// Refuses a voxel size that cannot work before anything is allocated for it.
+// Blocks that the band meets, roughly: as many as fill the space near the surface or, where that folds over itself,
+// near its box.
+double countBlocks(const Bounds& box, double area, double h, double reach) {
+    const double pi = glm::pi<double>(), r = reach + 0.5 * blockSide;
+    const glm::dvec3 s = glm::dvec3(box.size()) / h;
+    const double aroundSurface = 2 * r * area + 8 * pi / 3 * r * r * r;
+    const double aroundBox = s.x * s.y * s.z + 2 * r * (s.x * s.y + s.y * s.z + s.z * s.x) +
+                             pi * r * r * (s.x + s.y + s.z) + 4 * pi / 3 * r * r * r;
+    return std::min(aroundSurface, aroundBox) / blockVoxels;
+}
+
+// Refuses what cannot work before anything is allocated for it.
 void checkSize(const Mesh& mesh, const BuildOptions& options, float reach) {
     const Bounds box = bounds(mesh);
     const double h = options.voxelSize;
@@ -98,12 +128,17 @@ void checkSize(const Mesh& mesh, const BuildOptions& options, float reach) {
         bricks *= (high - low + 2 * double(reach)) / brickSide + 2;
     }
     if (bricks > mostBricks) refuse("its box would have more than 2^28 bricks of 64^3 voxels");
-    const double voxelArea = areaOf(mesh) / (h * h);
-    const double samples = voxelArea / double(options.doubleLayer.epsilon) + double(mesh.triangles.size());
-    const double blocks = voxelArea / (blockSide * blockSide) * (1 + 2 * double(reach) / blockSide);
-    const double bytes = samples * bytesPerSample + blocks * bytesPerBlock;
+    const double area = areaOf(mesh) / (h * h);
+    if (!(area > 0)) throw std::invalid_argument("the mesh has no triangle with an area");
+    const double triangles = double(mesh.triangles.size());
+    const double input = options.method == Method::doubleLayer
+                             ? (area / double(options.doubleLayer.epsilon) + triangles) * bytesPerSample
+                             : triangles * bytesPerTriangle;
+    const double block = bytesPerBlock * (options.triangles ? 2 : 1);
+    const double bytes = input + countBlocks(box, area, h, double(reach)) * block;
     const double memory = double(::sysconf(_SC_PHYS_PAGES)) * double(::sysconf(_SC_PAGESIZE));
-    if (bytes > memory) refuse(fmt::format("it would need about {:.0f} GiB of memory", bytes / double(1 << 30)));
+    if (bytes > memory)
+        refuse(fmt::format("with its band it would need about {:.0f} GiB of memory", bytes / double(1 << 30)));
 }
 
 // A sample must reach every voxel whose distance it may decide: a voxel of the band is nearer than the width plus delta
@@ -134,6 +169,7 @@ class Stopwatch {
 struct Signs {
     std::string name, reason;
     std::size_t conflicts = 0;  // neighbours that contradict each other
+    std::size_t undecided = 0;  // voxels whose nearest normals cancel out
 };
 
 const char* name(Sign sign) {
@@ -193,6 +229,7 @@ void describe(openvdb::FloatGrid& grid, const Mesh& mesh, const BuildOptions& op
     grid.insertMeta(metadata::sign, openvdb::StringMetadata(signs.name));
     grid.insertMeta(metadata::signReason, openvdb::StringMetadata(signs.reason));
     grid.insertMeta(metadata::signConflicts, openvdb::Int64Metadata(std::int64_t(signs.conflicts)));
+    grid.insertMeta(metadata::signUndecided, openvdb::Int64Metadata(std::int64_t(signs.undecided)));
     grid.insertMeta(metadata::errorBound, openvdb::FloatMetadata(errorBound(options) * options.voxelSize));
     grid.insertMeta(metadata::meshHash, openvdb::Int64Metadata(std::int64_t(hash(mesh))));
     grid.insertMeta(metadata::interiorWidth, openvdb::FloatMetadata(options.interiorWidth * options.voxelSize));
@@ -205,13 +242,38 @@ class Build {
         : mesh_(mesh), options_(options), filler_(filler), times_(times), progress_(options.progress) {}
 
     LevelSet run() {
-        Stopwatch total;
+        check();
         if (options_.method == Method::doubleLayer)
             fillLayers();
         else if (options_.sign == Sign::automatic)
             fillChosen();
         else
             fillAsAsked();
+        return levelSet();
+    }
+
+    LevelSet runFrom(const LevelSet& old, const Mesh& oldMesh, std::span<const std::uint32_t> moved) {
+        check();
+        validate(oldMesh);
+        checkOld(old, oldMesh);
+        checkMoved(oldMesh, mesh_, moved);
+        if (double(moved.size()) > mostMoved * double(mesh_.triangles.size()) || !canCopy(old) ||
+            !fillMoved(old, oldMesh, moved))
+            return run();
+        return levelSet();
+    }
+
+  private:
+    void check() {
+        progress_.poll();
+        validate(mesh_);
+        progress_.poll();
+        const bool layers = options_.method == Method::doubleLayer;
+        checkSize(mesh_, options_, layers ? fillParameters(options_).reach : reachOf(options_, options_.sign));
+        progress_.poll();
+    }
+
+    LevelSet levelSet() {
         Stopwatch part;
         if (distance_->empty() || distance_->activeVoxelCount() == 0)
             throw std::invalid_argument("no voxel lies within the band: the widths are too small for this voxel size");
@@ -224,36 +286,94 @@ class Build {
             triangle_->setTransform(distance_->transformPtr());
             grids->triangle = triangle_;
         }
-        LevelSet levelSet(std::move(grids));
+        LevelSet result(std::move(grids));
         progress_.finish();
         times_.assemble += part.lap();
-        times_.total = total.lap();
-        return levelSet;
+        times_.total = total_.lap();
+        return result;
     }
 
-  private:
+    // Throws if the old field cannot be one that the options ask for.
+    void checkOld(const LevelSet& old, const Mesh& oldMesh) const {
+        const auto refuse = [](const std::string& why) { throw std::invalid_argument("the old field " + why); };
+        const BandWidths widths = bandOf(options_);
+        if (old.voxelSize() != options_.voxelSize) refuse(fmt::format("has voxels of {:g}", old.voxelSize()));
+        if (old.exteriorWidth() != widths.exterior * widths.voxelSize ||
+            old.interiorWidth() != widths.interior * widths.voxelSize)
+            refuse(fmt::format("has a band {:g} wide outside, {:g} inside", old.exteriorWidth(), old.interiorWidth()));
+        if (old.method() != name(options_.method)) refuse(fmt::format("is of the method '{}'", old.method()));
+        if (options_.triangles && !old.grids().triangle) refuse("lacks the nearest triangles");
+        if (old.meshHash() != hash(oldMesh)) refuse("is of another mesh");
+    }
+
+    // Whether blocks of the old field are what a full build would make of triangles that have not moved.
+    bool canCopy(const LevelSet& old) {
+        if (options_.method != Method::exact || plain(Sign::normals) == Assembler::Plain::keep) return false;
+        if (options_.sign == Sign::automatic && !balanced(mesh_)) return false;
+        if (options_.sign != Sign::automatic && options_.sign != Sign::normals) return false;
+        const openvdb::FloatGrid& grid = *old.grids().distance;
+        const auto text = [&](const char* key) {
+            const auto meta = grid.getMetadata<openvdb::StringMetadata>(key);
+            return meta ? meta->value() : std::string();
+        };
+        const auto isNone = [&](const char* key) {
+            const auto meta = grid.getMetadata<openvdb::Int64Metadata>(key);
+            return meta && meta->value() == 0;
+        };
+        const std::string reason = text(metadata::signReason);
+        return text(metadata::version) == BILAYER_VERSION && text(metadata::sign) == name(Sign::normals) &&
+               (reason == asAskedFor || reason == closedAndOriented) && isNone(metadata::signConflicts) &&
+               isNone(metadata::signUndecided);
+    }
+
+    // Fills what the moved triangles reach and copies the rest. False if signs then contradict each other.
+    bool fillMoved(const LevelSet& old, const Mesh& oldMesh, std::span<const std::uint32_t> moved) {
+        Stopwatch part;
+        const double voxelsPerUnit = 1.0 / double(options_.voxelSize);
+        const float reach = reachOf(options_, Sign::normals);
+        // which of two triangles at the same distance is the nearest goes by their order in a brick: bricks stay whole
+        int side = blockSide;
+        if (options_.triangles) {
+            side = brickSideFor(mesh_, voxelsPerUnit, reach);
+            if (side != brickSideFor(oldMesh, voxelsPerUnit, reach)) return false;
+        }
+        const TouchedCells touched(oldMesh, mesh_, moved, voxelsPerUnit, reach, side);
+        times_.tiles += part.lap();
+        const std::string reason = options_.sign == Sign::automatic ? closedAndOriented : asAskedFor;
+        fill(mesh_, Sign::normals, reason, [&](MeshJob& job, Assembler& assembler) {
+            job.wanted = [&](const glm::ivec3& first, int cube) { return touched.any(first, cube); };
+            assembler.copy(old.grids(), [&](const openvdb::Coord& block) {
+                return !touched.any({block.x(), block.y(), block.z()}, blockSide);
+            });
+        });
+        return signs_.conflicts == 0;
+    }
+
     void fillLayers() {
         Stopwatch part;
         signs_ = {"layers", "the nearer of two layers tells the side", 0};
         const FillParameters parameters = fillParameters(options_);
         const Tiles tiles = makeTiles(mesh_, options_);
-        if (tiles.tiles.empty()) throw std::invalid_argument("the mesh has no triangle with an area");
+        progress_.poll();
         times_.tiles += part.lap();
         const Bricks bricks = binBricks(tiles, parameters.reach);
+        progress_.poll();
         progress_.begin(bricks.count());
-        Assembler assembler(bandOf(options_), options_.triangles);
+        Assembler assembler(bandOf(options_), options_.triangles, Assembler::Plain::keep, progress_);
         filler_.fill({tiles, bricks, parameters, [&](std::size_t, const FilledBlocks& blocks) {
                           assembler.take(blocks);
                           progress_.advance();
                       }});
         times_.fill += part.lap();
         finish(assembler);
+        times_.assemble += part.lap();
     }
 
     // Picks a way, and another one where the first contradicts itself.
     void fillChosen() {
         Stopwatch part;
         SignChoice choice = chooseSign(mesh_);
+        progress_.poll();
         times_.tiles += part.lap();
         for (;;) {
             // kept over the next choice, which may be made from it
@@ -268,7 +388,7 @@ class Build {
 
     // Normals are taken from a mesh that is mended, should it be inside out.
     void fillAsAsked() {
-        fill(mesh_, options_.sign, "as asked for");
+        fill(mesh_, options_.sign, asAskedFor);
         if (options_.sign != Sign::normals || signs_.conflicts == 0) return;
         const Orientation orientation = orient(mesh_);
         if (orientation.turnedTriangles > 0)
@@ -276,59 +396,86 @@ class Build {
                  fmt::format("as asked for, with {} triangles turned around", orientation.turnedTriangles));
     }
 
-    void fill(const Mesh& mesh, Sign sign, const std::string& reason) {
+    // Bands wider than a voxel surround the surface: where it passes between two voxels, both are in the band.
+    Assembler::Plain plain(Sign sign) const {
+        const bool wide = std::min(options_.exteriorWidth, options_.interiorWidth) > 1 + reachSlack;
+        return sign == Sign::normals && wide ? Assembler::Plain::drop : Assembler::Plain::keep;
+    }
+
+    // `adapt` may change the job, and add leaves that are known already.
+    void fill(const Mesh& mesh, Sign sign, const std::string& reason,
+              const std::function<void(MeshJob&, Assembler&)>& adapt = {}) {
         Stopwatch part;
         const bool byNormals = sign == Sign::normals;
         const float reach = reachOf(options_, sign);
         const BandWidths widths = bandOf(options_);
-        Assembler assembler(byNormals ? widths : BandWidths{reach, reach, options_.voxelSize}, options_.triangles);
-        const MeshJob job{mesh,      options_.voxelSize,
-                          reach,     options_.triangles,
-                          byNormals, [&](const FilledBlocks& blocks) { assembler.take(blocks); },
-                          progress_};
+        Assembler assembler(byNormals ? widths : BandWidths{reach, reach, options_.voxelSize}, options_.triangles,
+                            plain(sign), progress_);
+        std::atomic<std::size_t> undecided = 0;
+        MeshJob job{mesh,      options_.voxelSize,
+                    reach,     options_.triangles,
+                    byNormals, [&](const FilledBlocks& blocks) { assembler.take(blocks); },
+                    progress_, {},
+                    &undecided};
+        if (adapt) adapt(job, assembler);
         options_.method == Method::exact ? fillExact(job) : fillPseudonormal(job);
         times_.fill += part.lap();
         finish(assembler);
+        progress_.poll();
         if (sign == Sign::winding) signByWinding(*distance_, mesh, widths, balanced(mesh));
         if (sign == Sign::flood) signByFlood(*distance_, mesh, options_.gap, widths);
-        signs_ = {name(sign), reason, byNormals ? countConflicts(*distance_) : 0};
+        signs_ = {name(sign), reason, byNormals ? assembler.conflicts(*distance_) : 0, undecided};
         times_.assemble += part.lap();
     }
 
     void finish(Assembler& assembler) {
-        Stopwatch part;
         distance_ = assembler.distances();
         distance_->setTransform(openvdb::math::Transform::createLinearTransform(options_.voxelSize));
         triangle_ = assembler.triangles();
-        times_.assemble += part.lap();
     }
 
     const Mesh& mesh_;
     const BuildOptions& options_;
     const BlockFiller& filler_;
     BuildTimes& times_;
+    Stopwatch total_;
     Progress progress_;
     Signs signs_;
     openvdb::FloatGrid::Ptr distance_;
     openvdb::Int32Grid::Ptr triangle_;
 };
 
+template <class Work>
+LevelSet withThreads(int threads, const Work& work) {
+    if (threads == 0) return work();
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, std::size_t(threads));
+    return tbb::task_arena(threads).execute(work);
+}
+
 }  // namespace
 
-LevelSet build(const Mesh& mesh, const BuildOptions& options, const BlockFiller* filler, BuildTimes* times) {
+LevelSet build(const Mesh& mesh, const BuildOptions& given, const BlockFiller* filler, BuildTimes* times) {
+    const BuildOptions options = inVoxels(given);
     check(options);
     if (filler && filler->backend != "tbb" && options.method != Method::doubleLayer)
         throw std::invalid_argument(fmt::format("the {} back end has no method {}: it has double-layer",
                                                 filler->backend, name(options.method)));
-    validate(mesh);
-    checkSize(mesh, options, fillParameters(options).reach);
     openvdb::initialize();
     const BlockFiller tbb = tbbFiller();
     BuildTimes ignored;
-    const auto work = [&] { return Build(mesh, options, filler ? *filler : tbb, times ? *times : ignored).run(); };
-    if (options.threads == 0) return work();
-    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, std::size_t(options.threads));
-    return tbb::task_arena(options.threads).execute(work);
+    return withThreads(options.threads,
+                       [&] { return Build(mesh, options, filler ? *filler : tbb, times ? *times : ignored).run(); });
+}
+
+LevelSet rebuild(const LevelSet& old, const Mesh& oldMesh, const Mesh& newMesh, std::span<const std::uint32_t> moved,
+                 const BuildOptions& given, BuildTimes* times) {
+    const BuildOptions options = inVoxels(given);
+    check(options);
+    const BlockFiller tbb = tbbFiller();
+    BuildTimes ignored;
+    return withThreads(options.threads, [&] {
+        return Build(newMesh, options, tbb, times ? *times : ignored).runFrom(old, oldMesh, moved);
+    });
 }
 
 LevelSet build(const Mesh& mesh, const BuildOptions& options, const BlockFiller& filler, BuildTimes* times) {

@@ -4,7 +4,9 @@
 // Graphical Models 76 (2014) 214-223. docs/method.md tells how it is done here and where it departs from the paper.
 #pragma once
 
+#include <cstdint>
 #include <functional>
+#include <span>
 #include <stdexcept>
 
 #include "sdf/level_set.h"
@@ -48,11 +50,18 @@ enum class Sign {
     flood,      ///< what cannot be reached from outside through gaps wider than `gap`: inside
 };
 
+/// What the widths of the band are given in.
+enum class BandUnit {
+    voxels,
+    world,  ///< metres: the band keeps its place when the voxel size changes
+};
+
 struct BuildOptions {
     float voxelSize = 0;  ///< edge of a voxel [m]; must be given, at least 2e-5
     // a band of w voxels costs time with the cube of w: hundreds take minutes
-    float exteriorWidth = 3;  ///< every voxel with 0 <= distance < this is active [voxels], in (0, 1000]
-    float interiorWidth = 3;  ///< every voxel with -this < distance < 0 is active [voxels], in (0, 1000]
+    float exteriorWidth = 3;  ///< every voxel with 0 <= distance < this is active [bandUnit], in (0, 1000] voxels
+    float interiorWidth = 3;  ///< every voxel with -this < distance < 0 is active [bandUnit], in (0, 1000] voxels
+    BandUnit bandUnit = BandUnit::voxels;
     Method method = Method::exact;
     Sign sign = Sign::automatic;
     float gap = 2;  ///< Sign::flood closes gaps up to this wide [voxels], in [0, 100]
@@ -73,9 +82,9 @@ struct BlockFiller;
 
 /// Seconds that the parts of a build took.
 struct BuildTimes {
-    double tiles = 0;     ///< triangles to tiles of samples
-    double fill = 0;      ///< binning into blocks, the two layers, Eq. 3
-    double assemble = 0;  ///< leaves into the tree, far signs
+    double tiles = 0;     ///< triangles to tiles of samples, or the choice of the way to signs
+    double fill = 0;      ///< binning into blocks, distances
+    double assemble = 0;  ///< leaves into the tree, far signs, signs by winding number or flood
     double total = 0;
 };
 
@@ -86,6 +95,21 @@ struct BuildTimes {
 LevelSet build(const Mesh& mesh, const BuildOptions& options, const BlockFiller* filler = nullptr,
                BuildTimes* times = nullptr);
 LevelSet build(const Mesh& mesh, const BuildOptions& options, const BlockFiller& filler, BuildTimes* times = nullptr);
+
+/// Builds the field of a mesh of which a part has moved, from the field before: only the blocks that the moved
+/// triangles reach from their old or new places are filled, all others are copied. The bytes are those of
+/// build(newMesh, options).
+///
+/// That needs Method::exact, Sign::normals (or automatic, where it comes to normals), widths of more than a voxel, and
+/// a field in which nothing contradicted itself. For all else, and where most triangles have moved, it builds in full.
+/// @param old      the field of `oldMesh`, built with the same options
+/// @param newMesh  as many triangles as `oldMesh`
+/// @param moved    indices of all triangles with a corner that moved, in any order; more do no harm
+/// Throws as build() does, and std::invalid_argument if the field is of another mesh, voxel size, method or width, or
+/// lacks the nearest triangles that the options ask for; if the numbers of triangles differ; if an index is out of
+/// range; if a triangle has other corners without being in `moved` (the first one is named).
+LevelSet rebuild(const LevelSet& old, const Mesh& oldMesh, const Mesh& newMesh, std::span<const std::uint32_t> moved,
+                 const BuildOptions& options, BuildTimes* times = nullptr);
 
 /// The voxel size that puts `resolution` voxels along the longest side of the mesh's bounds [m].
 /// Throws std::invalid_argument for a resolution that is not positive or a mesh without extent.

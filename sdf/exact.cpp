@@ -9,6 +9,7 @@
 #include <bit>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <glm/vector_relational.hpp>
 #include <mutex>
 #include <optional>
 #include <utility>
@@ -53,9 +54,10 @@ struct Scratch {
 // The winding number, for the rare voxel whose closest normals cancel out; made when it is first asked.
 class LastResort {
   public:
-    explicit LastResort(const Mesh& mesh) : mesh_(mesh) {}
+    explicit LastResort(const MeshJob& job) : mesh_(job.mesh), asked_(job.undecided) {}
 
     bool isInside(const glm::dvec3& point) {
+        if (asked_) ++*asked_;
         // isolated: a thread that waits for the tree must not be given a brick that would wait for it too
         std::call_once(made_, [&] { tbb::this_task_arena::isolate([&] { winding_.emplace(mesh_); }); });
         return (*winding_)(point) > 0.5;
@@ -63,6 +65,7 @@ class LastResort {
 
   private:
     const Mesh& mesh_;
+    std::atomic<std::size_t>* asked_;
     std::once_flag made_;
     std::optional<WindingNumber> winding_;
 };
@@ -80,6 +83,7 @@ class BrickFiller {
 
     void fill(std::size_t brick) {
         origin_ = bins_.origins[brick];
+        if (!wanted(origin_, bins_.side)) return;
         blocks_ = bins_.side / blockSide;
         cut(brick);
         s_.clusters.build(s_.pieces, origin_);
@@ -87,23 +91,52 @@ class BrickFiller {
         s_.origins.clear();
         s_.distances.clear();
         s_.triangles.clear();
-        for (int x = 0, b = 0; x < blocks_; ++x)
-            for (int y = 0; y < blocks_; ++y)
-                for (int z = 0; z < blocks_; ++z) fillBlock(std::size_t(b++), blockSide * glm::ivec3(x, y, z));
+        std::size_t number = 0;
+        forEachBlockOfBrick([&](const glm::ivec3& inBrick) { fillBlock(number++, inBrick); });
         if (!s_.origins.empty()) job_.sink({s_.origins, s_.distances, s_.triangles});
     }
 
   private:
+    bool wanted(const glm::ivec3& first, int side) const { return !job_.wanted || job_.wanted(first, side); }
+
+    // Pieces beyond these reach none of the wanted blocks.
+    PieceLimits limitsOfWanted() const {
+        glm::ivec3 lower = origin_, upper = origin_ + (bins_.side - blockSide);
+        if (job_.wanted) {
+            std::swap(lower, upper);
+            forEachBlockOfBrick([&](const glm::ivec3& inBrick) {
+                const glm::ivec3 block = origin_ + inBrick;
+                if (!job_.wanted(block, blockSide)) return;
+                lower = glm::min(lower, block);
+                upper = glm::max(upper, block);
+            });
+        }
+        const double margin = double(job_.reach) + 1.0;
+        return {glm::dvec3(lower) - margin, glm::dvec3(upper + (blockSide - 1)) + margin};
+    }
+
+    static bool meets(const PieceCorners& c, const PieceLimits& limits) {
+        const glm::dvec3 lower = glm::min(c[0], glm::min(c[1], c[2])), upper = glm::max(c[0], glm::max(c[1], c[2]));
+        return glm::all(glm::lessThanEqual(lower, limits.upper)) && glm::all(glm::lessThanEqual(limits.lower, upper));
+    }
+
+    template <class Visit>
+    void forEachBlockOfBrick(Visit visit) const {
+        for (int x = 0; x < blocks_; ++x)
+            for (int y = 0; y < blocks_; ++y)
+                for (int z = 0; z < blocks_; ++z) visit(blockSide * glm::ivec3(x, y, z));
+    }
+
     void cut(std::size_t brick) {
         s_.pieces.clear();
-        const glm::dvec3 lower(origin_), upper = lower + double(bins_.side - 1);
-        const PieceLimits limits{lower - double(job_.reach) - 1.0, upper + double(job_.reach) + 1.0};
+        const PieceLimits limits = limitsOfWanted();
         PieceCutter cutter(longestPieceEdge, s_.pieces);
         for (const std::uint32_t triangle : bins_.trianglesOf(brick)) {
             const glm::uvec3 t = job_.mesh.triangles[triangle];
             const auto corner = [&](unsigned i) { return glm::dvec3(job_.mesh.points[i]) * voxelsPerUnit_; };
             if (++cut_ % trianglesPerPoll == 0) job_.progress.poll();
-            cutter.cut({corner(t.x), corner(t.y), corner(t.z)}, triangle, limits);
+            const PieceCorners corners{corner(t.x), corner(t.y), corner(t.z)};
+            if (!job_.wanted || meets(corners, limits)) cutter.cut(corners, triangle, limits);
         }
         cutter.finish();
     }
@@ -151,9 +184,9 @@ class BrickFiller {
     void fillBlock(std::size_t number, const glm::ivec3& inBrick) {
         const BlockBins& bins = s_.bins;
         reaching_ = {bins.clusters.data() + bins.offsets[number], bins.clusters.data() + bins.offsets[number + 1]};
-        if (reaching_.empty()) return;
-        job_.progress.poll();
         block_ = origin_ + inBrick;
+        if (reaching_.empty() || !wanted(block_, blockSide)) return;
+        job_.progress.poll();
         inBrick_ = inBrick;
         if (!measureBlock({reaching_, s_.clusters.clusters().data(), s_.clusters.members().data(), s_.pieces.data(),
                            block_, glm::vec3(inBrick), job_.reach},
@@ -272,9 +305,9 @@ class BrickFiller {
 
 void fillExact(const MeshJob& job) {
     const double voxelsPerUnit = 1.0 / double(job.voxelSize);
-    const TriangleBins bins = binTriangles(job.mesh, voxelsPerUnit, job.reach);
+    const TriangleBins bins = binTriangles(job.mesh, voxelsPerUnit, job.reach, &job.progress);
     job.progress.begin(bins.count());
-    LastResort lastResort(job.mesh);
+    LastResort lastResort(job);
     tbb::enumerable_thread_specific<Scratch> scratch;
     tbb::parallel_for(std::size_t(0), bins.count(), [&](std::size_t brick) {
         BrickFiller(job, bins, voxelsPerUnit, lastResort, scratch.local()).fill(brick);

@@ -23,6 +23,7 @@ inline constexpr const char* method = "bilayer:method";
 inline constexpr const char* sign = "bilayer:sign";
 inline constexpr const char* signReason = "bilayer:sign_reason";
 inline constexpr const char* signConflicts = "bilayer:sign_conflicts";
+inline constexpr const char* signUndecided = "bilayer:sign_undecided";
 inline constexpr const char* errorBound = "bilayer:error_bound";
 inline constexpr const char* meshHash = "bilayer:mesh_hash";
 inline constexpr const char* interiorWidth = "bilayer:interior_width";

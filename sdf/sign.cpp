@@ -87,7 +87,7 @@ bool balanced(const Mesh& mesh) {
 
 SignChoice chooseSign(const Mesh& mesh) {
     validate(mesh);
-    if (balanced(mesh)) return {Sign::normals, "closed and oriented", {}};
+    if (balanced(mesh)) return {Sign::normals, closedAndOriented, {}};
     return chooseFor(orient(mesh), holes(mesh));
 }
 

@@ -21,6 +21,9 @@ struct SignChoice {
     std::optional<Mesh> mended;  ///< the mesh to build from instead: the same triangles, some turned around
 };
 
+/// The reason of a choice that took no more than balanced().
+inline constexpr const char* closedAndOriented = "closed and oriented";
+
 /// What Sign::automatic picks. `normals` as they stand for a balanced mesh, which is all that it asks first and takes
 /// milliseconds; else the mesh is oriented: `normals` if that closes it, `winding` if winding numbers tell the two
 /// sides of most of the surface apart, `flood` where they do not. Throws as validate() does.

@@ -9,6 +9,8 @@
 #include <glm/geometric.hpp>
 #include <utility>
 
+#include "sdf/progress.h"
+
 namespace bilayer {
 namespace {
 
@@ -17,6 +19,7 @@ constexpr double cellsAtMost = 1 << 22;          // beyond this bricks are large
 constexpr std::size_t countersAtMost = 1 << 22;  // over all runs: 16 MiB
 constexpr std::size_t trianglesPerRun = 8192;    // what one task bins
 constexpr std::size_t runsPerThread = 8;         // enough to share out unequal runs
+constexpr std::size_t trianglesPerPoll = 1024;   // tens of microseconds, but for huge triangles
 constexpr int bricksWorthCulling = 8;            // a triangle over more bricks than this is tested against each brick
 
 struct Box {
@@ -52,7 +55,9 @@ class Binner {
         cells_ = std::size_t(size_.x) * std::size_t(size_.y) * std::size_t(size_.z);
     }
 
-    TriangleBins run() {
+    int side() const { return 1 << shift_; }
+
+    TriangleBins run(Progress* progress) {
         // a counting sort, stable whatever the number of runs: count in each run, sum up, scatter
         const std::size_t count = mesh_.triangles.size();
         const auto threads = std::size_t(tbb::this_task_arena::max_concurrency());
@@ -60,20 +65,22 @@ class Binner {
                                                                     (count + trianglesPerRun - 1) / trianglesPerRun}));
         std::vector<std::uint32_t> cursors(runs * cells_, 0);
         const auto forEachPlace = [&](std::size_t run, auto visit) {
-            for (std::size_t i = count * run / runs; i < count * (run + 1) / runs; ++i)
-                forEachBrick(i, [&](std::size_t cell) { visit(cursors[run * cells_ + cell], i); });
+            for (std::size_t i = count * run / runs; i < count * (run + 1) / runs; ++i) {
+                if (progress && i % trianglesPerPoll == 0) progress->poll();
+                forEachBrick(i, [&](std::size_t cell) { visit(cell, cursors[run * cells_ + cell], i); });
+            }
         };
-        tbb::parallel_for(std::size_t(0), runs,
-                          [&](std::size_t run) { forEachPlace(run, [](std::uint32_t& n, std::size_t) { ++n; }); });
+        tbb::parallel_for(std::size_t(0), runs, [&](std::size_t run) {
+            forEachPlace(run, [](std::size_t, std::uint32_t& n, std::size_t) { ++n; });
+        });
         TriangleBins bins;
-        bins.side = 1 << shift_;
+        bins.side = side();
         std::vector<std::uint64_t> begins = sumUp(cursors, runs, bins);
         bins.triangles.resize(bins.offsets.back());
         tbb::parallel_for(std::size_t(0), runs, [&](std::size_t run) {
-            for (std::size_t i = count * run / runs; i < count * (run + 1) / runs; ++i)
-                forEachBrick(i, [&](std::size_t cell) {
-                    bins.triangles[begins[cell] + cursors[run * cells_ + cell]++] = std::uint32_t(i);
-                });
+            forEachPlace(run, [&](std::size_t cell, std::uint32_t& n, std::size_t i) {
+                bins.triangles[begins[cell] + n++] = std::uint32_t(i);
+            });
         });
         return bins;
     }
@@ -139,8 +146,12 @@ class Binner {
 
 }  // namespace
 
-TriangleBins binTriangles(const Mesh& mesh, double voxelsPerUnit, float reach) {
-    return Binner(mesh, voxelsPerUnit, reach).run();
+TriangleBins binTriangles(const Mesh& mesh, double voxelsPerUnit, float reach, Progress* progress) {
+    return Binner(mesh, voxelsPerUnit, reach).run(progress);
+}
+
+int brickSideFor(const Mesh& mesh, double voxelsPerUnit, float reach) {
+    return Binner(mesh, voxelsPerUnit, reach).side();
 }
 
 }  // namespace bilayer

@@ -12,6 +12,8 @@
 
 namespace bilayer {
 
+class Progress;
+
 /// The bricks that some triangle reaches, each with its triangles in ascending order.
 struct TriangleBins {
     int side = 0;                          ///< of a brick [voxels], a power of two, at least 32
@@ -26,7 +28,11 @@ struct TriangleBins {
 };
 
 /// Bins triangles into bricks. `reach` is how far from a triangle a voxel may lie [voxels]. A brick may hold triangles
-/// that reach none of its voxels.
-TriangleBins binTriangles(const Mesh& mesh, double voxelsPerUnit, float reach);
+/// that reach none of its voxels. Throws Cancelled.
+/// @param progress  polled, unless null
+TriangleBins binTriangles(const Mesh& mesh, double voxelsPerUnit, float reach, Progress* progress = nullptr);
+
+/// The side of the bricks that binTriangles() would make [voxels].
+int brickSideFor(const Mesh& mesh, double voxelsPerUnit, float reach);
 
 }  // namespace bilayer

@@ -25,18 +25,18 @@ TEST_CASE("a block is trimmed to the band, exclusive of its widths") {
     distances[at(1, 2, 5)] = -1.999f;
     distances[at(1, 2, 6)] = -2.f;
     distances[at(1, 2, 7)] = -0.f;
-    BlockMask active{};
-    REQUIRE(trimToBand(distances.data(), {3, 2, 0.5f}, values.data(), active));
+    BandMasks masks{};
+    REQUIRE(trimToBand(distances.data(), {3, 2, 0.5f}, values.data(), masks));
     CHECK(values[at(1, 2, 3)] == 2.999f * 0.5f);
     CHECK(values[at(1, 2, 4)] == 1.5f);
     CHECK(values[at(1, 2, 5)] == -1.999f * 0.5f);
     CHECK(values[at(1, 2, 6)] == -1.f);
     CHECK(values[at(0, 0, 0)] == 1.5f);
     std::size_t count = 0;
-    for (int x = 0; x < 8; ++x) count += std::bitset<64>(active[std::size_t(x)]).count();
+    for (int x = 0; x < 8; ++x) count += std::bitset<64>(masks.active[std::size_t(x)]).count();
     CHECK(count == 3);
-    CHECK(((active[1] >> (2 * 8 + 3)) & 1) == 1);
-    CHECK(((active[1] >> (2 * 8 + 7)) & 1) == 1);
+    CHECK(((masks.active[1] >> (2 * 8 + 3)) & 1) == 1);
+    CHECK(((masks.active[1] >> (2 * 8 + 7)) & 1) == 1);
 }
 
 TEST_CASE("unknown voxels take the sign that they are connected with") {
@@ -47,8 +47,8 @@ TEST_CASE("unknown voxels take the sign that they are connected with") {
             distances[at(3, y, z)] = -0.5f;
             distances[at(4, y, z)] = 0.5f;
         }
-    BlockMask active{};
-    REQUIRE(trimToBand(distances.data(), {1, 1, 1}, values.data(), active));
+    BandMasks masks{};
+    REQUIRE(trimToBand(distances.data(), {1, 1, 1}, values.data(), masks));
     for (int x = 0; x < 8; ++x)
         for (int y = 0; y < 8; ++y)
             for (int z = 0; z < 8; ++z) {
@@ -63,14 +63,14 @@ TEST_CASE("known voxels beyond a narrow band sign the background") {
     for (int x = 0; x < 8; ++x)
         for (int y = 0; y < 8; ++y)
             for (int z = 0; z < 8; ++z) distances[at(x, y, z)] = float(z) - 3.4f;
-    BlockMask active{};
-    REQUIRE(trimToBand(distances.data(), {0.25f, 0.25f, 1}, values.data(), active));
+    BandMasks masks{};
+    REQUIRE(trimToBand(distances.data(), {0.25f, 0.25f, 1}, values.data(), masks));
     for (int z = 0; z < 8; ++z) CHECK(values[at(2, 2, z)] == (z < 4 ? -0.25f : 0.25f));
 }
 
 TEST_CASE("a block of which nothing is known is left alone") {
     std::vector<float> distances(blockVoxels, unknown), values(blockVoxels, 42.f);
-    BlockMask active{};
-    CHECK_FALSE(trimToBand(distances.data(), {3, 3, 1}, values.data(), active));
+    BandMasks masks{};
+    CHECK_FALSE(trimToBand(distances.data(), {3, 3, 1}, values.data(), masks));
     CHECK(values[5] == 42.f);
 }

@@ -166,6 +166,21 @@ TEST_CASE("values outside the band are plus the exterior or minus the interior w
     }
 }
 
+TEST_CASE("widths in metres are widths in voxels of that size") {
+    const Mesh mesh = shapes::sphere(1, 4);
+    const LevelSet voxels = build(mesh, {.voxelSize = 0.125f, .exteriorWidth = 4, .interiorWidth = 2.5f});
+    const LevelSet metres = build(
+        mesh, {.voxelSize = 0.125f, .exteriorWidth = 0.5f, .interiorWidth = 0.3125f, .bandUnit = BandUnit::world});
+    CHECK(metres.exteriorWidth() == 0.5f);
+    CHECK(metres.interiorWidth() == 0.3125f);
+    CHECK(sameBytes(*voxels.grids().distance, *metres.grids().distance));
+    // the same band at another resolution
+    const LevelSet fine = build(
+        mesh, {.voxelSize = 0.0625f, .exteriorWidth = 0.5f, .interiorWidth = 0.3125f, .bandUnit = BandUnit::world});
+    CHECK(fine.exteriorWidth() == 0.5f);
+    CHECK(fine.interiorWidth() == 0.3125f);
+}
+
 TEST_CASE("OpenVDB finds a level set in it") {
     for (const Mesh& mesh : {shapes::sphere(1, 5), shapes::torus(1, 0.4f, 200, 100)}) {
         const LevelSet field = build(mesh, {.voxelSize = voxelSizeFor(mesh, 100)});
@@ -263,7 +278,13 @@ TEST_CASE("bad options and meshes are refused by name") {
     refused(options, "maxSubdivision");
     CHECK_THROWS_WITH(build(Mesh{}, {.voxelSize = 1}), Catch::Contains("no triangle"));
     const Mesh flat{{{0, 0, 0}, {1, 0, 0}, {2, 0, 0}}, {{0, 1, 2}}};
-    CHECK_THROWS_WITH(build(flat, {.voxelSize = 1}), Catch::Contains("area"));
+    for (const Method method : {Method::exact, Method::doubleLayer, Method::pseudonormal})
+        CHECK_THROWS_WITH(build(flat, {.voxelSize = 1, .method = method}), Catch::Contains("no triangle with an area"));
+    refused({.voxelSize = 0.1f, .exteriorWidth = 101, .bandUnit = BandUnit::world}, "exteriorWidth");
+    refused({.voxelSize = 0, .bandUnit = BandUnit::world}, "voxelSize");
+    // 3e8 voxels of surface with 2000 across each
+    refused({.voxelSize = 2e-4f, .exteriorWidth = 1000, .interiorWidth = 1000, .method = Method::pseudonormal},
+            "memory");
     CHECK_THROWS_AS(voxelSizeFor(mesh, 0), std::invalid_argument);
     CHECK_THROWS_AS(voxelSizeFor(mesh, -5), std::invalid_argument);
 }
@@ -281,6 +302,36 @@ TEST_CASE("progress rises to one, and a false answer cancels") {
     CHECK(last == 1.f);
     options.progress = [](float part) { return part < 0.3f; };
     CHECK_THROWS_AS(build(mesh, options), Cancelled);
+}
+
+TEST_CASE("a build can be cancelled at any moment, whatever the method") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    std::mt19937 random(seed);
+    const Mesh mesh = shapes::torusKnot(2, 3, 1, 0.2f);
+    for (const Method method : {Method::exact, Method::doubleLayer, Method::pseudonormal}) {
+        BuildOptions options{.voxelSize = voxelSizeFor(mesh, 200), .method = method};
+        int calls = 0;
+        options.progress = [&](float) { return ++calls > 0; };
+        build(mesh, options);
+        for (int i = 0; i < 5; ++i) {
+            // the listener hears by the clock, so a quick run may end before the moment comes
+            int left = 1 + int(random() % unsigned(calls));
+            bool asked = false;
+            options.progress = [&](float) {
+                asked = --left <= 0;
+                return !asked;
+            };
+            CAPTURE(int(method), calls, left);
+            bool cancelled = false;
+            try {
+                build(mesh, options);
+            } catch (const Cancelled&) {
+                cancelled = true;
+            }
+            CHECK(cancelled == asked);
+        }
+    }
 }
 
 TEST_CASE("what a filler throws ends the build") {

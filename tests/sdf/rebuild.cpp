@@ -1,0 +1,188 @@
+#include "sdf/build.h"
+
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <cstring>
+#include <glm/geometric.hpp>
+#include <glm/gtc/matrix_transform.hpp>
+#include <numeric>
+#include <random>
+
+#include "demos/shared/shapes.h"
+#include "sdf/grids.h"
+#include "tests/support/support.h"
+
+using namespace bilayer;
+
+namespace {
+
+template <class Grid>
+bool sameTrees(const Grid& a, const Grid& b) {
+    if (!a.tree().hasSameTopology(b.tree()) || a.background() != b.background()) return false;
+    auto other = b.tree().cbeginLeaf();
+    for (auto leaf = a.tree().cbeginLeaf(); leaf; ++leaf, ++other)
+        if (leaf->origin() != other->origin() ||
+            std::memcmp(leaf->buffer().data(), other->buffer().data(), 512 * sizeof(typename Grid::ValueType)) != 0)
+            return false;
+    auto tile = b.cbeginValueAll();
+    for (auto value = a.cbeginValueAll(); value; ++value, ++tile)
+        if (value.getValue() != tile.getValue() || value.getCoord() != tile.getCoord() ||
+            value.getLevel() != tile.getLevel())
+            return false;
+    return true;
+}
+
+bool sameMetadata(const openvdb::GridBase& a, const openvdb::GridBase& b) {
+    if (a.metaCount() != b.metaCount()) return false;
+    auto other = b.beginMeta();
+    for (auto entry = a.beginMeta(); entry != a.endMeta(); ++entry, ++other)
+        if (entry->first != other->first || *entry->second != *other->second) return false;
+    return a.transform() == b.transform();
+}
+
+bool sameFields(const LevelSet& a, const LevelSet& b) {
+    const Grids &p = a.grids(), &q = b.grids();
+    if (bool(p.triangle) != bool(q.triangle)) return false;
+    return sameTrees(*p.distance, *q.distance) && sameMetadata(*p.distance, *q.distance) &&
+           (!p.triangle || (sameTrees(*p.triangle, *q.triangle) && p.triangle->transform() == q.triangle->transform()));
+}
+
+std::vector<std::uint32_t> trianglesThatMoved(const Mesh& before, const Mesh& after) {
+    std::vector<std::uint32_t> moved;
+    for (std::uint32_t i = 0; i < before.triangles.size(); ++i)
+        for (int k = 0; k < 3; ++k)
+            if (before.points[before.triangles[i][k]] != after.points[after.triangles[i][k]]) {
+                moved.push_back(i);
+                break;
+            }
+    return moved;
+}
+
+// Pulls what lies within a radius of a point along with it.
+Mesh dented(Mesh mesh, const glm::vec3& centre, float radius, const glm::vec3& pull) {
+    for (auto& point : mesh.points) {
+        const float part = glm::distance(point, centre) / radius;
+        if (part < 1) point += (1 - part * part) * pull;
+    }
+    return mesh;
+}
+
+void checkFrame(const Mesh& before, const Mesh& after, const BuildOptions& options) {
+    const LevelSet old = build(before, options), full = build(after, options);
+    const auto moved = trianglesThatMoved(before, after);
+    CAPTURE(moved.size(), before.triangles.size());
+    CHECK(sameFields(rebuild(old, before, after, moved, options), full));
+}
+
+// A knot of a tube thick enough that dents do not push it through itself.
+Mesh knot() {
+    return shapes::torusKnot(2, 3, 1, 0.2f);
+}
+
+}  // namespace
+
+TEST_CASE("a field rebuilt from the one before is the one built in full") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<float> uniform(-1, 1);
+    std::vector<Mesh> meshes{knot(), shapes::sphere(1, 5), shapes::box({1, 0.7f, 0.4f})};
+    if (const auto bunny = test::corpusMesh("bunny_watertight.obj")) meshes.push_back(readMesh(*bunny));
+    for (const Mesh& rest : meshes) {
+        const float side = bounds(rest).longestSide();
+        Mesh before = rest;
+        BuildOptions options{.voxelSize = side / 60};
+        LevelSet field = build(before, options);
+        for (int frame = 0; frame < 4; ++frame) {
+            const glm::vec3 centre = before.points[random() % before.points.size()];
+            const glm::vec3 pull(uniform(random), uniform(random), uniform(random));
+            const Mesh after = dented(before, centre, 0.2f * side, 0.03f * side * pull);
+            const auto moved = trianglesThatMoved(before, after);
+            CAPTURE(frame, moved.size(), before.triangles.size());
+            // each frame from the last, so that no fault is lost
+            field = rebuild(field, before, after, moved, options);
+            CHECK(sameFields(field, build(after, options)));
+            before = after;
+        }
+    }
+}
+
+TEST_CASE("rebuilding keeps the nearest triangles, asymmetric bands and other ways of building") {
+    const Mesh before = knot();
+    const glm::vec3 centre = before.points[before.points.size() / 3];
+    const Mesh after = dented(before, centre, 0.3f, {0.04f, 0.03f, -0.05f});
+    const float h = voxelSizeFor(before, 70);
+    checkFrame(before, after, {.voxelSize = h, .triangles = true});
+    checkFrame(before, after, {.voxelSize = h, .exteriorWidth = 6.5f, .interiorWidth = 1.5f});
+    checkFrame(before, after, {.voxelSize = h, .sign = Sign::normals, .threads = 1});
+    checkFrame(before, after, {.voxelSize = h, .exteriorWidth = 0.4f, .interiorWidth = 1});
+    checkFrame(before, after, {.voxelSize = h, .sign = Sign::winding});
+    checkFrame(before, after, {.voxelSize = h, .method = Method::pseudonormal});
+    checkFrame(before, after, {.voxelSize = h, .method = Method::doubleLayer});
+}
+
+TEST_CASE("nothing may move, or all, or far away and back") {
+    const Mesh still = knot();
+    const BuildOptions options{.voxelSize = voxelSizeFor(still, 60), .triangles = true};
+    checkFrame(still, still, options);
+    checkFrame(still, transformed(still, glm::translate(glm::mat4(1), {0.3f, 5, -0.1f})), options);
+
+    // a ball leaves the band, whose voxels are to vanish, and comes back; another one inside a hollow one turns its
+    // tiles
+    const Mesh ball = shapes::sphere(0.3f, 3);
+    const auto scene = [&](const glm::vec3& at) {
+        return shapes::join({still, transformed(ball, glm::translate(glm::mat4(1), at))});
+    };
+    checkFrame(scene({3, 0, 0}), scene({12, 7, -40}), options);
+    checkFrame(scene({12, 7, -40}), scene({3, 0, 0}), options);
+    const auto grown = [&](float radius) {
+        return shapes::join({still, transformed(ball, glm::scale(glm::mat4(1), glm::vec3(radius)))});
+    };
+    checkFrame(grown(0.1f), grown(1.2f), {.voxelSize = 0.02f});
+    checkFrame(grown(1.2f), grown(0.1f), {.voxelSize = 0.02f});
+}
+
+TEST_CASE("a mesh that turns inside out or into itself is built as in full") {
+    const Mesh ball = shapes::sphere(1, 4);
+    const auto pair = [&](float apart) {
+        return shapes::join({ball, transformed(ball, glm::translate(glm::mat4(1), {apart, 0, 0}))});
+    };
+    checkFrame(pair(3), pair(1.5f), {.voxelSize = 0.05f});
+    checkFrame(pair(1.5f), pair(3), {.voxelSize = 0.05f});
+    Mesh torn = pair(3);
+    torn.points[0] += glm::vec3(0.01f, 0.02f, 0);
+    checkFrame(pair(3), torn, {.voxelSize = 0.05f});
+    Mesh open = pair(3);
+    open.triangles[7] = {open.triangles[7].x, open.triangles[7].x, open.triangles[7].y};
+    const BuildOptions options{.voxelSize = 0.05f};
+    const std::uint32_t moved[] = {7};
+    CHECK(sameFields(rebuild(build(pair(3), options), pair(3), open, moved, options), build(open, options)));
+}
+
+TEST_CASE("a rebuild refuses what does not belong together, by name") {
+    const Mesh before = knot();
+    Mesh after = before;
+    after.points[before.triangles[42].y] += glm::vec3(0.01f);
+    const auto moved = trianglesThatMoved(before, after);
+    const BuildOptions options{.voxelSize = 0.05f};
+    const LevelSet old = build(before, options);
+    const auto refused = [&](const Mesh& from, const Mesh& to, std::vector<std::uint32_t> which, BuildOptions asked,
+                             const std::string& words) {
+        CHECK_THROWS_AS(rebuild(old, from, to, which, asked), std::invalid_argument);
+        CHECK_THROWS_WITH(rebuild(old, from, to, which, asked), Catch::Contains(words));
+    };
+    auto fewer = moved;
+    const std::uint32_t first = fewer[1];
+    fewer.erase(fewer.begin() + 1);
+    refused(before, after, fewer, options, "triangle " + std::to_string(first) + " ");
+    refused(before, after, {std::uint32_t(before.triangles.size())}, options, "there are only");
+    Mesh shorter = after;
+    shorter.triangles.pop_back();
+    refused(before, shorter, moved, options, "triangles and now has");
+    refused(after, after, {}, options, "another mesh");
+    refused(before, after, moved, {.voxelSize = 0.06f}, "voxels of");
+    refused(before, after, moved, {.voxelSize = 0.05f, .exteriorWidth = 4}, "band");
+    refused(before, after, moved, {.voxelSize = 0.05f, .method = Method::pseudonormal}, "method");
+    refused(before, after, moved, {.voxelSize = 0.05f, .triangles = true}, "nearest triangles");
+    refused(before, after, moved, {.voxelSize = 0}, "voxelSize");
+}
