@@ -23,8 +23,9 @@ namespace bilayer {
 /// - The voxels nearer to the surface, where the ball's centre cannot be, then take their side from their neighbours,
 ///   a step at a time, outside first where both arrive at once, and never across the surface. So inside a gap that is
 ///   closed the border lies about half-way.
-/// - What neither reaches is outside if its ways out are blocked by nothing but distances below 1e-4 voxel, else it is
-///   inside: a closed solid too thin for the ball is kept, and a sheet without thickness has no inside.
+/// - What neither reaches is shut in by triangles on all sides and is inside: a closed solid too thin for the ball is
+///   kept, and a sheet without thickness has no inside. Voxels within 1e-4 voxel of the surface that neither reaches
+///   are outside.
 /// The orientation of faces does not matter. The bytes do not depend on the number of threads. Throws
 /// std::invalid_argument as validate() does, or if the gap is negative or the grid's background is too small.
 void signByFlood(openvdb::FloatGrid& grid, const Mesh& mesh, float gap, const BandWidths& widths);

@@ -19,7 +19,7 @@
 namespace bilayer {
 
 /// The generalized winding number of a mesh: near 1 inside of a closed, outward mesh, near 0 outside. A hierarchy of
-/// triangles; about 80 bytes a triangle. Safe from any thread.
+/// triangles; 72 to 108 bytes a triangle. Safe from any thread.
 class WindingNumber {
   public:
     /// Throws std::invalid_argument as validate() does. The mesh need not outlive the constructor.

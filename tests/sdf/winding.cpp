@@ -131,6 +131,29 @@ TEST_CASE("the winding number is on the side of a half that brute force finds") 
     }
 }
 
+TEST_CASE("the expansion about a far cluster is of second order") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    std::mt19937 random(seed);
+    std::normal_distribution<double> normal;
+    const Mesh mesh = soup({1, 0.7f, 0.4f}, 60, seed);
+    const WindingNumber winding(mesh);
+    double near = 0, far = 0;
+    for (int i = 0; i < 100; ++i) {
+        const glm::dvec3 way = glm::normalize(glm::dvec3(normal(random), normal(random), normal(random)));
+        const auto error = [&](double distance) {
+            return std::abs(winding(distance * way) - test::windingNumber(mesh, distance * way));
+        };
+        near = std::max(near, error(40));
+        far = std::max(far, error(80));
+    }
+    CAPTURE(near, far);
+    // the first term left out falls with the fifth power of the distance
+    CHECK(far > 0);
+    CHECK(near / far > 28);
+    CHECK(near / far < 37);
+}
+
 TEST_CASE("a point in the opening of a hemisphere sees half of all directions up to its own precision") {
     // there the number is a half to 1e-6 and less: only single triangles can decide
     const Mesh half = without(shapes::sphere(1, 5), [](const glm::vec3& p) { return p.z > 0; });
@@ -179,6 +202,16 @@ TEST_CASE("open meshes get the signs of brute force in every voxel of a leaf and
         CAPTURE(m);
         CHECK(wrongSigns(f, meshes[m], false, 12000, seed) == 0);
     }
+}
+
+TEST_CASE("signs change where the number passes a half slowly, amid the voxels of a leaf") {
+    // a ball in the opening of a hemisphere brings leaves to where nothing but the opening parts inside from outside
+    const Mesh half = without(shapes::sphere(1, 3), [](const glm::vec3& p) { return p.z > 0; });
+    const Mesh mesh = shapes::join({half, moved(shapes::sphere(0.3f, 2), {0.1f, 0, 0})});
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    const Field f = signedField(mesh, 0.015f, false, 6, 6);
+    CHECK(wrongSigns(f, mesh, false, 12000, seed) == 0);
 }
 
 TEST_CASE("what a mesh of many sheets has inside may lie outside its box") {
