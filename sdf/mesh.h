@@ -3,8 +3,8 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <glm/mat4x4.hpp>
 #include <glm/common.hpp>
+#include <glm/mat4x4.hpp>
 #include <glm/vec3.hpp>
 #include <vector>
 
