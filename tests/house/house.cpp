@@ -61,6 +61,8 @@ std::string complaint(const std::string& file, const std::string& line) {
     const std::string from = room(file), to = room(match[1].str());
     if (match[1].str().find("../") != std::string::npos) return "includes by a relative path";
     if (from.empty()) return {};
+    // the truth that tests go by is also what the benchmark of accuracy measures against
+    if (from == "bench" && match[1].str().rfind("tests/support/", 0) == 0) return {};
     if (match[1].str().rfind("tests/", 0) == 0) return "includes tests";
     if (to.empty() || to == from || allowed.at(from).count(to)) return {};
     return "includes " + to + " from " + from;
