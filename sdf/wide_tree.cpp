@@ -249,12 +249,16 @@ Vector unitOr(const Vector& v, const Vector& otherwise) {
 
 // Writes a triangle in its frame; one without an area becomes a segment or a point.
 void writeTriangle(WideLeaf& leaf, std::size_t place, const Corners& corners) {
-    const auto& [a, b, c] = corners;
-    const glm::dvec3 normal = glm::cross(b - a, c - a);
-    glm::dvec3 x = b - a;
-    if (glm::dot(x, x) == 0) x = c - a;
-    x = unitOr(x, glm::dvec3(1, 0, 0));
-    const glm::dvec3 z = glm::dot(normal, normal) > 0 ? normal / glm::length(normal) : across(x), y = glm::cross(z, x);
+    // x along the longest edge, z straightened up from it: a sliver's normal is mostly rounding, but whatever is left
+    // of it then tilts the sliver about its own length
+    const Corners edges{corners[1] - corners[0], corners[2] - corners[1], corners[0] - corners[2]};
+    const auto shorter = [](const glm::dvec3& p, const glm::dvec3& q) { return glm::dot(p, p) < glm::dot(q, q); };
+    const auto first = std::size_t(std::max_element(edges.begin(), edges.end(), shorter) - edges.begin());
+    const glm::dvec3 &a = corners[first], &b = corners[(first + 1) % 3], &c = corners[(first + 2) % 3];
+    const glm::dvec3 x = unitOr(b - a, glm::dvec3(1, 0, 0));
+    const glm::dvec3 normal = unitOr(glm::cross(b - a, c - a), glm::dvec3(0)),
+                     upright = normal - glm::dot(normal, x) * x;
+    const glm::dvec3 z = glm::dot(upright, upright) > 0.25 ? glm::normalize(upright) : across(x), y = glm::cross(z, x);
     const glm::dvec2 flatB(glm::dot(b - a, x), 0), flatC(glm::dot(c - a, x), glm::dot(c - a, y));
     const glm::dvec2 bc = unitOr(flatC - flatB, glm::dvec2(1, 0)), ac = unitOr(flatC, glm::dvec2(1, 0));
     const glm::dvec3 cell = glm::floor(a);
