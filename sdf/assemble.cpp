@@ -64,9 +64,9 @@ BlockMask insideOf(const Leaf& leaf) {
 
 // All on one side, and nothing of it in the band.
 bool isPlain(const BandMasks& masks) {
-    return none(masks.active) && std::all_of(masks.inside.begin(), masks.inside.end(), [&](std::uint64_t word) {
-               return word == masks.inside[0] && word + 1 <= 1;
-           });
+    return !any(masks.active) && std::all_of(masks.inside.begin(), masks.inside.end(), [&](std::uint64_t word) {
+        return word == masks.inside[0] && word + 1 <= 1;
+    });
 }
 
 // Pairs of voxels across a face of a block: the block's own are at first + i * rowStep + j * step, the other side's at

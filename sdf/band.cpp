@@ -70,24 +70,6 @@ HWY_EXPORT(writeValues);
 constexpr std::uint64_t lowestZ = 0x0101010101010101ull;  // the voxels with z = 0 of a slice
 constexpr std::uint64_t highestZ = lowestZ << 7;
 
-bool any(const BlockMask& mask) {
-    std::uint64_t bits = 0;
-    for (const std::uint64_t word : mask) bits |= word;
-    return bits != 0;
-}
-
-// The mask and all voxels that share a face with it.
-BlockMask grown(const BlockMask& mask) {
-    BlockMask result;
-    for (std::size_t x = 0; x < blockSide; ++x) {
-        const std::uint64_t m = mask[x];
-        result[x] = m | ((m & ~highestZ) << 1) | ((m & ~lowestZ) >> 1) | (m << 8) | (m >> 8);
-        if (x > 0) result[x] |= mask[x - 1];
-        if (x + 1 < blockSide) result[x] |= mask[x + 1];
-    }
-    return result;
-}
-
 // Lets the known signs grow into the unknown voxels, a step at a time; where both arrive at once the outside wins.
 void flood(BlockMask unknown, BlockMask& outside, BlockMask& inside) {
     while (any(unknown)) {
@@ -105,6 +87,17 @@ void flood(BlockMask unknown, BlockMask& outside, BlockMask& inside) {
 }
 
 }  // namespace
+
+BlockMask grown(const BlockMask& mask) {
+    BlockMask result;
+    for (std::size_t x = 0; x < blockSide; ++x) {
+        const std::uint64_t m = mask[x];
+        result[x] = m | ((m & ~highestZ) << 1) | ((m & ~lowestZ) >> 1) | (m << 8) | (m >> 8);
+        if (x > 0) result[x] |= mask[x - 1];
+        if (x + 1 < blockSide) result[x] |= mask[x + 1];
+    }
+    return result;
+}
 
 bool trimToBand(const float* distances, const BandWidths& widths, float* values, BandMasks& masks) {
     BlockMask unknown, inside, band;

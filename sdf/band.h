@@ -11,6 +11,15 @@ namespace bilayer {
 /// One bit a voxel, in the order of an OpenVDB leaf: voxel (x, y, z) is bit y * 8 + z of word x.
 using BlockMask = std::array<std::uint64_t, blockSide>;
 
+inline bool any(const BlockMask& mask) {
+    std::uint64_t bits = 0;
+    for (const std::uint64_t word : mask) bits |= word;
+    return bits != 0;
+}
+
+/// The mask and all voxels that share a face with it inside the block.
+BlockMask grown(const BlockMask& mask);
+
 struct BandWidths {
     float exterior, interior;  ///< [voxels]
     float voxelSize;           ///< [m]

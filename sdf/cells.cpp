@@ -88,23 +88,6 @@ std::size_t Cells::find(const openvdb::Coord& voxel) const {
     return std::size_t(next - cells_.begin()) - 1;
 }
 
-bool any(const BlockMask& mask) {
-    std::uint64_t bits = 0;
-    for (const std::uint64_t word : mask) bits |= word;
-    return bits != 0;
-}
-
-BlockMask grown(const BlockMask& mask) {
-    BlockMask result;
-    for (std::size_t x = 0; x < blockSide; ++x) {
-        const std::uint64_t m = mask[x];
-        result[x] = m | ((m & ~(lowestZ << 7)) << 1) | ((m & ~lowestZ) >> 1) | (m << 8) | (m >> 8);
-        if (x > 0) result[x] |= mask[x - 1];
-        if (x + 1 < blockSide) result[x] |= mask[x + 1];
-    }
-    return result;
-}
-
 BlockMask across(const BlockMask& mask, int axis, int side) {
     BlockMask result{};
     if (axis == 0) {

@@ -46,10 +46,6 @@ class Cells {
     std::vector<std::size_t> bricks_;
 };
 
-/// The voxels that share a face with one of the mask, and the mask.
-BlockMask grown(const BlockMask& mask);
-bool any(const BlockMask& mask);
-
 inline bool test(const BlockMask& mask, unsigned voxel) {
     return (mask[voxel / 64] >> (voxel % 64)) & 1;
 }

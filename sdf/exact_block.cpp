@@ -369,7 +369,7 @@ bool measureBlock(const BlockInput& input, BlockDistances& block) {
     applySamples(input, block);
     askPieces(input, block);
     summarize(block);
-    return !none(block.known);
+    return any(block.known);
 }
 
 // Bits of the voxels of a row whose distance and a neighbour's together exceed a voxel.

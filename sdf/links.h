@@ -17,12 +17,6 @@ struct Links {
     BlockMask x, y, z;
 };
 
-inline bool none(const BlockMask& mask) {
-    std::uint64_t bits = 0;
-    for (const std::uint64_t word : mask) bits |= word;
-    return bits == 0;
-}
-
 /// Adds to a set all voxels that links connect with it.
 void spread(const Links& links, BlockMask& set);
 
