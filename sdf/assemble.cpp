@@ -113,14 +113,14 @@ class ConflictCounter {
     }
 
     std::size_t towardsOutside(const openvdb::Coord& tile) const {
-        constexpr int side = LargeNode::ChildNodeType::DIM;
+        constexpr int side = LargeNode::ChildNodeType::DIM, depthOfLargeTiles = 1;
         std::size_t sum = 0;
         for (int axis = 0; axis < 3; ++axis)
             for (const int step : {-side, side}) {
                 openvdb::Coord next = tile;
                 next[axis] += step;
-                float value = 0;
-                sum += !tree_.probeConstLeaf(next) && !tree_.probeValue(next, value) && value > 0;
+                // a neighbour that is finer may well begin outside: leaves lie between
+                sum += tree_.getValueDepth(next) <= depthOfLargeTiles && tree_.getValue(next) > 0;
             }
         return sum;
     }

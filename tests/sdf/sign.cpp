@@ -4,6 +4,7 @@
 #include <random>
 
 #include "demos/shared/shapes.h"
+#include "sdf/build.h"
 #include "sdf/inspect.h"
 #include "sdf/mesh_io.h"
 #include "sdf/sides.h"
@@ -162,6 +163,26 @@ TEST_CASE("open, broken and soup-like public meshes get what suits them") {
         CAPTURE(c.name, choice.reason);
         CHECK(choice.sign == c.sign);
         CHECK_FALSE(choice.reason.empty());
+    }
+}
+
+TEST_CASE("a clean solid that holds the tree's large tiles has no conflict wherever it lies") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    std::mt19937 random(seed);
+    for (int round = 0; round < 4; ++round) {
+        Mesh mesh = shapes::sphere(200, 5);
+        const glm::vec3 shift(random() % 4096, random() % 4096, random() % 4096);
+        CAPTURE(round, shift.x, shift.y, shift.z);
+        for (glm::vec3& p : mesh.points) p += shift;
+        BuildOptions options;
+        options.voxelSize = 1;
+        const LevelSet field = build(mesh, options);
+        CHECK(field.sign() == "normals");
+        CHECK(field.signConflicts() == 0);
+        // turned inside out the same tiles give it away
+        for (glm::uvec3& t : mesh.triangles) std::swap(t.x, t.y);
+        CHECK(build(mesh, options).signReason().find("triangles were turned") != std::string::npos);
     }
 }
 
