@@ -238,7 +238,7 @@ void describe(openvdb::FloatGrid& grid, const Mesh& mesh, const BuildOptions& op
 // A build under way: what it works from, and what it has found.
 class Build {
   public:
-    Build(const Mesh& mesh, const BuildOptions& options, const BlockFiller& filler, BuildTimes& times)
+    Build(const Mesh& mesh, const BuildOptions& options, const BlockFiller* filler, BuildTimes& times)
         : mesh_(mesh), options_(options), filler_(filler), times_(times), progress_(options.progress) {}
 
     LevelSet run() {
@@ -353,20 +353,30 @@ class Build {
         Stopwatch part;
         signs_ = {"layers", "the nearer of two layers tells the side", 0};
         const FillParameters parameters = fillParameters(options_);
+        Assembler assembler(bandOf(options_), options_.triangles, Assembler::Plain::keep, progress_);
+        if (filler_)
+            fillTiles(parameters, assembler, part);
+        else
+            fillDoubleLayer({mesh_, options_.voxelSize, parameters.reach, options_.triangles, true,
+                             [&](const FilledBlocks& blocks) { assembler.take(blocks); }, progress_},
+                            options_.doubleLayer, parameters);
+        times_.fill += part.lap();
+        finish(assembler);
+        times_.assemble += part.lap();
+    }
+
+    // Another device takes tiles.
+    void fillTiles(const FillParameters& parameters, Assembler& assembler, Stopwatch& part) {
         const Tiles tiles = makeTiles(mesh_, options_);
         progress_.poll();
         times_.tiles += part.lap();
         const Bricks bricks = binBricks(tiles, parameters.reach);
         progress_.poll();
         progress_.begin(bricks.count());
-        Assembler assembler(bandOf(options_), options_.triangles, Assembler::Plain::keep, progress_);
-        filler_.fill({tiles, bricks, parameters, [&](std::size_t, const FilledBlocks& blocks) {
+        filler_->fill({tiles, bricks, parameters, [&](std::size_t, const FilledBlocks& blocks) {
                           assembler.take(blocks);
                           progress_.advance();
                       }});
-        times_.fill += part.lap();
-        finish(assembler);
-        times_.assemble += part.lap();
     }
 
     // Picks a way, and another one where the first contradicts itself.
@@ -436,7 +446,7 @@ class Build {
 
     const Mesh& mesh_;
     const BuildOptions& options_;
-    const BlockFiller& filler_;
+    const BlockFiller* filler_;
     BuildTimes& times_;
     Stopwatch total_;
     Progress progress_;
@@ -457,24 +467,22 @@ LevelSet withThreads(int threads, const Work& work) {
 LevelSet build(const Mesh& mesh, const BuildOptions& given, const BlockFiller* filler, BuildTimes* times) {
     const BuildOptions options = inVoxels(given);
     check(options);
-    if (filler && filler->backend != "tbb" && options.method != Method::doubleLayer)
+    if (filler && options.method != Method::doubleLayer)
         throw std::invalid_argument(fmt::format("the {} back end has no method {}: it has double-layer",
                                                 filler->backend, name(options.method)));
     openvdb::initialize();
-    const BlockFiller tbb = tbbFiller();
     BuildTimes ignored;
     return withThreads(options.threads,
-                       [&] { return Build(mesh, options, filler ? *filler : tbb, times ? *times : ignored).run(); });
+                       [&] { return Build(mesh, options, filler, times ? *times : ignored).run(); });
 }
 
 LevelSet rebuild(const LevelSet& old, const Mesh& oldMesh, const Mesh& newMesh, std::span<const std::uint32_t> moved,
                  const BuildOptions& given, BuildTimes* times) {
     const BuildOptions options = inVoxels(given);
     check(options);
-    const BlockFiller tbb = tbbFiller();
     BuildTimes ignored;
     return withThreads(options.threads, [&] {
-        return Build(newMesh, options, tbb, times ? *times : ignored).runFrom(old, oldMesh, moved);
+        return Build(newMesh, options, nullptr, times ? *times : ignored).runFrom(old, oldMesh, moved);
     });
 }
 

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <glm/vector_relational.hpp>
 #include <numeric>
 #include <vector>
 
@@ -21,7 +22,7 @@ constexpr double sliverStep = 3.0;
 /// Triangles that one task cuts: enough to hide what a task costs, few enough to share out.
 constexpr std::size_t grain = 2048;
 
-using Corners = std::array<glm::dvec3, 3>;  // of a triangle, in voxels
+using Corners = TriangleCorners;
 
 struct Shape {
     double area;         // [voxels^2]
@@ -51,7 +52,9 @@ Shape shapeOf(const Corners& c) {
 template <class Emit>
 class Cutter {
   public:
-    Cutter(const DoubleLayerOptions& options, Emit emit) : options_(options), emit_(emit) {}
+    // null limits: all pieces are wanted
+    Cutter(const DoubleLayerOptions& options, const TileLimits* limits, Emit emit)
+        : options_(options), limits_(limits), emit_(emit) {}
 
     void cut(const Corners& c) {
         normal_ = glm::cross(c[1] - c[0], c[2] - c[0]);
@@ -95,16 +98,25 @@ class Cutter {
     void halve(const Corners& c, const Shape& shape, Next next) {
         const int i = shape.longest, j = (i + 1) % 3, k = (i + 2) % 3;
         const glm::dvec3 middle = 0.5 * (c[i] + c[j]);
-        (this->*next)({c[i], middle, c[k]});
-        (this->*next)({middle, c[j], c[k]});
+        goOn({c[i], middle, c[k]}, next);
+        goOn({middle, c[j], c[k]}, next);
     }
 
     void quarter(const Corners& c, Next next) {
         const glm::dvec3 ab = 0.5 * (c[0] + c[1]), bc = 0.5 * (c[1] + c[2]), ca = 0.5 * (c[2] + c[0]);
-        (this->*next)({c[0], ab, ca});
-        (this->*next)({ab, c[1], bc});
-        (this->*next)({ca, bc, c[2]});
-        (this->*next)({ab, bc, ca});
+        goOn({c[0], ab, ca}, next);
+        goOn({ab, c[1], bc}, next);
+        goOn({ca, bc, c[2]}, next);
+        goOn({ab, bc, ca}, next);
+    }
+
+    void goOn(const Corners& c, Next next) {
+        if (!limits_ || !misses(c, *limits_)) (this->*next)(c);
+    }
+
+    static bool misses(const Corners& c, const TileLimits& limits) {
+        const glm::dvec3 lower = glm::min(c[0], glm::min(c[1], c[2])), upper = glm::max(c[0], glm::max(c[1], c[2]));
+        return glm::any(glm::greaterThan(lower, limits.upper)) || glm::any(glm::lessThan(upper, limits.lower));
     }
 
     void emit(const Corners& c, int n) {
@@ -125,11 +137,17 @@ class Cutter {
     }
 
     const DoubleLayerOptions& options_;
+    const TileLimits* limits_;
     Emit emit_;
     glm::dvec3 normal_{0};  // of the whole triangle, twice its area long
 };
 
 }  // namespace
+
+void cutTriangle(const TriangleCorners& corners, const DoubleLayerOptions& options, const TileLimits& limits,
+                 std::vector<Tile>& tiles) {
+    Cutter(options, &limits, [&](const auto& makeTile) { tiles.push_back(makeTile()); }).cut(corners);
+}
 
 Tiles makeTiles(const Mesh& mesh, const BuildOptions& options) {
     const double voxels = 1.0 / double(options.voxelSize);
@@ -143,7 +161,7 @@ Tiles makeTiles(const Mesh& mesh, const BuildOptions& options) {
     const std::size_t runs = (mesh.triangles.size() + grain - 1) / grain;
     const auto cutRun = [&](std::size_t run, auto emit) {
         std::int32_t triangle = 0;
-        Cutter cutter(options.doubleLayer, [&](const auto& makeTile) { emit(triangle, makeTile); });
+        Cutter cutter(options.doubleLayer, nullptr, [&](const auto& makeTile) { emit(triangle, makeTile); });
         const std::size_t end = std::min(mesh.triangles.size(), (run + 1) * grain);
         for (std::size_t t = run * grain; t < end; ++t) {
             triangle = std::int32_t(t);
