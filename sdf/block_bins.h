@@ -24,13 +24,9 @@ class BlockBins {
     /// @param reach   how far beyond a ball a voxel may lie [voxels]
     template <class Ball>
     void build(std::span<const Ball> balls, int blocks, float reach) {
-        pairs_.clear();
         cursors_.assign(std::size_t(blocks) * std::size_t(blocks) * std::size_t(blocks), 0);
-        for (std::uint32_t i = 0; i < balls.size(); ++i)
-            forEachBlock(balls[i], blocks, reach, [&](std::uint32_t block) {
-                ++cursors_[block];
-                pairs_.push_back({block, i});
-            });
+        std::size_t count = 0;
+        for (std::uint32_t i = 0; i < balls.size(); ++i) count = addPairs(balls[i], i, blocks, reach, count);
         offsets_.assign(1, 0);
         std::uint32_t sum = 0;
         for (std::uint32_t& cursor : cursors_) {
@@ -38,7 +34,7 @@ class BlockBins {
             offsets_.push_back(sum);
         }
         balls_.resize(sum);
-        for (const Pair& pair : pairs_) balls_[cursors_[pair.block]++] = pair.ball;
+        for (std::size_t i = 0; i < count; ++i) balls_[cursors_[pairs_[i].block]++] = pairs_[i].ball;
     }
 
     /// The balls that reach a block, in ascending order.
@@ -52,21 +48,42 @@ class BlockBins {
     };
     static constexpr float slack = 1e-3f;  // far above rounding [voxels]
 
-    template <class Ball, class Visit>
-    static void forEachBlock(const Ball& ball, int blocks, float beyond, Visit visit) {
+    // Adds the pairs of a ball behind the first `count`, and returns how many there are then.
+    template <class Ball>
+    std::size_t addPairs(const Ball& ball, std::uint32_t index, int blocks, float beyond, std::size_t count) {
         const float reach = beyond + ball.radius;
-        const auto block = [&](float coordinate) { return std::clamp(int(coordinate) / blockSide, 0, blocks - 1); };
-        const glm::vec3 lower = ball.sample - reach, upper = ball.sample + reach, normal = glm::abs(ball.normal);
-        constexpr float half = 0.5f * float(blockSide - 1);
-        const float slab = beyond + ball.thickness + half * (normal.x + normal.y + normal.z) + slack;
-        for (int x = block(lower.x); x <= block(upper.x); ++x)
-            for (int y = block(lower.y); y <= block(upper.y); ++y)
-                for (int z = block(lower.z); z <= block(upper.z); ++z) {
-                    const glm::vec3 toCentre = float(blockSide) * glm::vec3(x, y, z) + half - ball.sample;
-                    const glm::vec3 away = glm::max(glm::abs(toCentre) - half, glm::vec3(0));
-                    if (glm::dot(away, away) < reach * reach && std::abs(glm::dot(toCentre, ball.normal)) < slab)
-                        visit(std::uint32_t((x * blocks + y) * blocks + z));
+        constexpr float half = 0.5f * float(blockSide - 1), perBlock = 1.f / float(blockSide);
+        const float slab = beyond + ball.thickness + slack +
+                           half * (std::abs(ball.normal.x) + std::abs(ball.normal.y) + std::abs(ball.normal.z));
+        // rounded to zero below the first block, which is the first block
+        const auto block = [&](float coordinate) { return std::clamp(int(coordinate * perBlock), 0, blocks - 1); };
+        const glm::vec3 lower = ball.sample - reach, upper = ball.sample + reach;
+        const int x1 = block(upper.x), y0 = block(lower.y), y1 = block(upper.y), z0 = block(lower.z), z1 = block(upper.z);
+        const auto toCentre = [&](int at, float coordinate) { return float(blockSide * at) + half - coordinate; };
+        const auto away2 = [&](float toCentre) {
+            const float away = std::max(std::abs(toCentre) - half, 0.f);
+            return away * away;
+        };
+        const int x0 = block(lower.x);
+        const std::size_t most = count + std::size_t((x1 - x0 + 1) * (y1 - y0 + 1) * (z1 - z0 + 1));
+        if (pairs_.size() < most) pairs_.resize(2 * most);
+        for (int x = x0; x <= x1; ++x) {
+            const float dx = toCentre(x, ball.sample.x), left = reach * reach - away2(dx), hx = dx * ball.normal.x;
+            for (int y = y0; y <= y1; ++y) {
+                const float dy = toCentre(y, ball.sample.y), rest = left - away2(dy), hy = hx + dy * ball.normal.y;
+                for (int z = z0; z <= z1; ++z) {
+                    const float dz = toCentre(z, ball.sample.z);
+                    // written in any case and kept if it reaches: a branch would be guessed wrong half of the time
+                    const auto number = std::uint32_t((x * blocks + y) * blocks + z);
+                    const std::uint32_t reaches =
+                        unsigned(away2(dz) < rest) & unsigned(std::abs(hy + dz * ball.normal.z) < slab);
+                    pairs_[count] = {number, index};
+                    count += reaches;
+                    cursors_[number] += reaches;
                 }
+            }
+        }
+        return count;
     }
 
     std::vector<Pair> pairs_;

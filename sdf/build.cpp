@@ -87,18 +87,27 @@ BuildOptions inVoxels(BuildOptions options) {
     return options;
 }
 
-double areaOf(const Mesh& mesh) {
+// What one pass over the triangles tells.
+struct Survey {
+    Bounds box;
+    double area = 0;  // [m^2]
+};
+
+Survey survey(const Mesh& mesh) {
     return tbb::parallel_reduce(
-        tbb::blocked_range<std::size_t>(0, mesh.triangles.size(), 4096), 0.0,
-        [&](const auto& range, double area) {
+        tbb::blocked_range<std::size_t>(0, mesh.triangles.size(), 4096), Survey{},
+        [&](const auto& range, Survey seen) {
             for (std::size_t i = range.begin(); i < range.end(); ++i) {
                 const glm::uvec3 t = mesh.triangles[i];
-                const glm::dvec3 a(mesh.points[t.x]), b(mesh.points[t.y]), c(mesh.points[t.z]);
-                area += 0.5 * glm::length(glm::cross(b - a, c - a));
+                const glm::vec3 &a = mesh.points[t.x], &b = mesh.points[t.y], &c = mesh.points[t.z];
+                for (const glm::vec3* p : {&a, &b, &c}) seen.box.add(*p);
+                seen.area += 0.5 * glm::length(glm::cross(glm::dvec3(b) - glm::dvec3(a), glm::dvec3(c) - glm::dvec3(a)));
             }
-            return area;
+            return seen;
         },
-        std::plus<>());
+        [](const Survey& a, const Survey& b) {
+            return Survey{{glm::min(a.box.lower, b.box.lower), glm::max(a.box.upper, b.box.upper)}, a.area + b.area};
+        });
 }
 
 // Blocks that the band meets, roughly: as many as fill the space near the surface or, where that folds over itself,
@@ -113,8 +122,8 @@ double countBlocks(const Bounds& box, double area, double h, double reach) {
 }
 
 // Refuses what cannot work before anything is allocated for it.
-void checkSize(const Mesh& mesh, const BuildOptions& options, float reach) {
-    const Bounds box = bounds(mesh);
+void checkSize(const Mesh& mesh, const Survey& seen, const BuildOptions& options, float reach) {
+    const Bounds& box = seen.box;
     const double h = options.voxelSize;
     const auto refuse = [&](const std::string& why) {
         throw std::invalid_argument(fmt::format("voxelSize {:g} is too small for this mesh, {:g} voxels long: {}", h,
@@ -128,7 +137,7 @@ void checkSize(const Mesh& mesh, const BuildOptions& options, float reach) {
         bricks *= (high - low + 2 * double(reach)) / brickSide + 2;
     }
     if (bricks > mostBricks) refuse("its box would have more than 2^28 bricks of 64^3 voxels");
-    const double area = areaOf(mesh) / (h * h);
+    const double area = seen.area / (h * h);
     if (!(area > 0)) throw std::invalid_argument("the mesh has no triangle with an area");
     const double triangles = double(mesh.triangles.size());
     const double input = options.method == Method::doubleLayer
@@ -269,7 +278,8 @@ class Build {
         validate(mesh_);
         progress_.poll();
         const bool layers = options_.method == Method::doubleLayer;
-        checkSize(mesh_, options_, layers ? fillParameters(options_).reach : reachOf(options_, options_.sign));
+        survey_ = survey(mesh_);
+        checkSize(mesh_, survey_, options_, layers ? fillParameters(options_).reach : reachOf(options_, options_.sign));
         progress_.poll();
     }
 
@@ -334,8 +344,8 @@ class Build {
         // which of two triangles at the same distance is the nearest goes by their order in a brick: bricks stay whole
         int side = blockSide;
         if (options_.triangles) {
-            side = brickSideFor(mesh_, voxelsPerUnit, reach);
-            if (side != brickSideFor(oldMesh, voxelsPerUnit, reach)) return false;
+            side = brickSideFor(survey_.box, voxelsPerUnit, reach);
+            if (side != brickSideFor(bounds(oldMesh), voxelsPerUnit, reach)) return false;
         }
         const TouchedCells touched(oldMesh, mesh_, moved, voxelsPerUnit, reach, side);
         times_.tiles += part.lap();
@@ -357,7 +367,7 @@ class Build {
         if (filler_)
             fillTiles(parameters, assembler, part);
         else
-            fillDoubleLayer({mesh_, options_.voxelSize, parameters.reach, options_.triangles, true,
+            fillDoubleLayer({mesh_, survey_.box, options_.voxelSize, parameters.reach, options_.triangles, true,
                              [&](const FilledBlocks& blocks) { assembler.take(blocks); }, progress_},
                             options_.doubleLayer, parameters);
         times_.fill += part.lap();
@@ -422,7 +432,8 @@ class Build {
         Assembler assembler(byNormals ? widths : BandWidths{reach, reach, options_.voxelSize}, options_.triangles,
                             plain(sign), progress_);
         std::atomic<std::size_t> undecided = 0;
-        MeshJob job{mesh,      options_.voxelSize,
+        // turned triangles, in a mended mesh, have the same box
+        MeshJob job{mesh,      survey_.box, options_.voxelSize,
                     reach,     options_.triangles,
                     byNormals, [&](const FilledBlocks& blocks) { assembler.take(blocks); },
                     progress_, {},
@@ -450,6 +461,7 @@ class Build {
     BuildTimes& times_;
     Stopwatch total_;
     Progress progress_;
+    Survey survey_;
     Signs signs_;
     openvdb::FloatGrid::Ptr distance_;
     openvdb::Int32Grid::Ptr triangle_;

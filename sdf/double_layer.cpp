@@ -12,7 +12,7 @@
 #include "sdf/layer_block.h"
 #include "sdf/layer_samples.h"
 #include "sdf/progress.h"
-#include "sdf/tiles.h"
+#include "sdf/tile_cutter.h"
 #include "sdf/triangle_bins.h"
 
 namespace bilayer {
@@ -22,7 +22,6 @@ constexpr std::size_t trianglesPerPoll = 1024;  // a tenth of a millisecond
 
 // What a thread works in; kept from brick to brick.
 struct Scratch {
-    std::vector<Tile> tiles;
     LayerSamples samples;
     BlockBins bins;
     LayerScratch block;
@@ -55,18 +54,18 @@ class BrickFiller {
   private:
     void sample(std::size_t brick, const glm::ivec3& origin) {
         const double voxelsPerUnit = 1.0 / double(job_.voxelSize);
-        const glm::dvec3 lower = glm::dvec3(origin) - double(reach_),
-                         upper = glm::dvec3(origin + (bins_.side - 1)) + double(reach_);
-        s_.samples.begin(origin, bins_.side, reach_, parameters_.cube > 0);
+        const TileLimits limits{glm::dvec3(origin) - double(reach_),
+                                glm::dvec3(origin + (bins_.side - 1)) + double(reach_)};
+        s_.samples.begin(origin, bins_.side, reach_, parameters_.delta, parameters_.cube > 0);
+        std::uint32_t triangle = 0;
+        TileCutter cutter(options_, &limits, [&](const TilePart& part) { s_.samples.add(part, triangle); });
         std::size_t cut = 0;
-        for (const std::uint32_t triangle : bins_.trianglesOf(brick)) {
-            if (++cut % trianglesPerPoll == 0) job_.progress.poll();
-            const glm::uvec3 t = job_.mesh.triangles[triangle];
-            const auto corner = [&](unsigned i) { return glm::dvec3(job_.mesh.points[i]) * voxelsPerUnit; };
-            s_.tiles.clear();
-            cutTriangle({corner(t.x), corner(t.y), corner(t.z)}, options_, {lower, upper}, s_.tiles);
-            for (const Tile& tile : s_.tiles) s_.samples.add(tile, std::int32_t(triangle));
-        }
+        forEachTriangle(job_.mesh, bins_.trianglesOf(brick), voxelsPerUnit,
+                        [&](std::uint32_t index, const TriangleCorners& corners) {
+                            if (++cut % trianglesPerPoll == 0) job_.progress.poll();
+                            triangle = index;
+                            cutter.cut(corners);
+                        });
         s_.samples.finish();
     }
 
@@ -95,7 +94,7 @@ class BrickFiller {
 void fillDoubleLayer(const MeshJob& job, const DoubleLayerOptions& options, const FillParameters& parameters) {
     // the paper's cube sticks out of the ball
     const float reach = parameters.reach * (parameters.cube > 0 ? std::sqrt(3.f) : 1.f);
-    const TriangleBins bins = binTriangles(job.mesh, 1.0 / double(job.voxelSize), reach, &job.progress);
+    const TriangleBins bins = binTriangles(job.mesh, job.box, 1.0 / double(job.voxelSize), reach, &job.progress);
     job.progress.begin(bins.count());
     tbb::enumerable_thread_specific<Scratch> scratch;
     tbb::parallel_for(std::size_t(0), bins.count(), [&](std::size_t brick) {

@@ -7,6 +7,7 @@
 #include <hwy/highway.h>
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <cstring>
@@ -182,7 +183,7 @@ HWY_INLINE bool mayImprove(const Voxels& v, const glm::vec3& centre, float radiu
 }
 
 template <bool cube, bool withOwners>
-HWY_INLINE void applyGroups(const LayerBlockInput& input, const std::vector<std::uint32_t>& groups, Voxels<withOwners>& v) {
+HWY_INLINE void applyGroups(const LayerBlockInput& input, std::span<const std::uint32_t> groups, Voxels<withOwners>& v) {
     const LayerRun* runs = input.samples.runs().data();
     const float half = float(input.parameters.cube), delta2 = input.parameters.delta * input.parameters.delta;
     bool large = false;
@@ -237,7 +238,7 @@ HWY_INLINE void combine(const Voxels<withOwners>& v, const FillParameters& param
 }
 
 template <bool cube, bool withOwners>
-void fillCube(const LayerBlockInput& input, const std::vector<std::uint32_t>& groups, const glm::ivec3& inBlock,
+void fillCube(const LayerBlockInput& input, std::span<const std::uint32_t> groups, const glm::ivec3& inBlock,
               float* distances, std::int32_t* triangles) {
     const FillParameters& parameters = input.parameters;
     const float farthest2 = parameters.certain * parameters.certain - parameters.delta * parameters.delta;
@@ -249,13 +250,15 @@ void fillCube(const LayerBlockInput& input, const std::vector<std::uint32_t>& gr
     }
 }
 
-// Gives each cube the groups that reach it: their ball and their slab must.
-void binCubes(const LayerBlockInput& input, LayerScratch& scratch) {
+using CubeGroups = std::array<std::span<const std::uint32_t>, cubesPerBlock>;
+
+// The groups that reach each cube: their ball and their slab must.
+CubeGroups binCubes(const LayerBlockInput& input, LayerScratch& scratch) {
     const Tag tag;
     const std::size_t lanes = hn::Lanes(tag), count = input.reaching.size(), stride = (count + lanes - 1) / lanes * lanes;
     enum Row { x, y, z, reach, normalX, normalY, normalZ, slab, rows };
     // columns beyond the last group reach nothing
-    scratch.columns.assign(stride * rows + lanes, -1.f);
+    scratch.columns.resize(stride * rows);
     float* columns = scratch.columns.data();
     // a cube of (2K + 1)^3 voxels sticks out of the ball
     const float beyond = input.parameters.reach * (input.parameters.cube > 0 ? std::sqrt(3.f) : 1.f);
@@ -266,7 +269,11 @@ void binCubes(const LayerBlockInput& input, LayerScratch& scratch) {
                                     group.normal.x, group.normal.y, group.normal.z, group.thickness + beyond};
         for (int row = 0; row < rows; ++row) columns[std::size_t(row) * stride + i] = values[row];
     }
-    for (auto& cube : scratch.cubes) cube.clear();
+    for (std::size_t i = count; i < stride; ++i)
+        for (int row = 0; row < rows; ++row) columns[std::size_t(row) * stride + i] = -1;
+    scratch.groups.resize(count * cubesPerBlock);
+    std::size_t ends[cubesPerBlock];
+    for (int cube = 0; cube < cubesPerBlock; ++cube) ends[cube] = std::size_t(cube) * count;
     constexpr float half = 0.5f * float(cubeSide - 1);
     for (std::size_t i = 0; i < count; i += lanes) {
         const auto row = [&](int r) { return hn::LoadU(tag, columns + std::size_t(r) * stride + i); };
@@ -291,19 +298,24 @@ void binCubes(const LayerBlockInput& input, LayerScratch& scratch) {
             hn::StoreMaskBits(tag, hn::And(real, hn::And(ball, plane)), bytes);
             std::uint64_t bits;
             std::memcpy(&bits, bytes, sizeof bits);
-            for (; bits != 0; bits &= bits - 1)
-                scratch.cubes[cube].push_back(input.reaching[i + std::size_t(std::countr_zero(bits))]);
+            std::uint32_t* to = scratch.groups.data() + ends[cube];
+            ends[cube] += std::size_t(std::popcount(bits));
+            for (; bits != 0; bits &= bits - 1) *to++ = input.reaching[i + std::size_t(std::countr_zero(bits))];
         }
     }
+    CubeGroups groups;
+    for (int cube = 0; cube < cubesPerBlock; ++cube)
+        groups[std::size_t(cube)] = {scratch.groups.data() + std::size_t(cube) * count, scratch.groups.data() + ends[cube]};
+    return groups;
 }
 
 void fillLayerBlock(const LayerBlockInput& input, LayerScratch& scratch, float* distances, std::int32_t* triangles) {
-    binCubes(input, scratch);
+    const CubeGroups groups = binCubes(input, scratch);
     for (int cube = 0; cube < cubesPerBlock; ++cube) {
         const glm::ivec3 inBlock = cubeSide * glm::ivec3(cube / 4, cube / 2 % 2, cube % 2);
         const auto fill = input.parameters.cube > 0 ? (triangles ? fillCube<true, true> : fillCube<true, false>)
                                                     : (triangles ? fillCube<false, true> : fillCube<false, false>);
-        fill(input, scratch.cubes[cube], inBlock, distances, triangles);
+        fill(input, groups[std::size_t(cube)], inBlock, distances, triangles);
     }
 }
 

@@ -26,7 +26,7 @@ struct LayerBlockInput {
 /// Groups of a block in columns, and those of each of its cubes. Memory is used again from block to block.
 struct LayerScratch {
     std::vector<float> columns;
-    std::vector<std::uint32_t> cubes[8];
+    std::vector<std::uint32_t> groups;
 };
 
 /// Fills a block with signed distances [voxels]; +infinity where unknown.

@@ -10,86 +10,101 @@
 namespace bilayer {
 namespace {
 
-/// Rows and columns of samples in one run: as many as a voxel's neighbourhood holds.
-constexpr int runSide = 3;
-/// Runs with a mean size below this are gathered: several of them share a voxel [voxels].
-constexpr double smallSize = 0.9;
+/// Most rows and columns of samples in one run: about what a voxel's neighbourhood holds.
+constexpr int mostRows = 4;
+/// Runs of triangles with a mean area below this are gathered: several of them share a voxel [voxels^2].
+constexpr double smallArea = 0.35;
 /// More cells than this, 1 MiB of counters, and runs stay alone.
 constexpr double mostCells = 1 << 18;
-constexpr float cellSize = 1.f;  // finer or coarser took longer (measured) [voxels]
+constexpr float cellSize = 1.f;  // finer or coarser took longer (measured) [voxels]  // finer or coarser took longer (measured) [voxels]
 /// Rounding of a group's own numbers [voxels].
 constexpr float groupSlack = 1e-4f;
 
 }  // namespace
 
-void LayerSamples::begin(const glm::ivec3& origin, int side, float reach, bool cells) {
+void LayerSamples::begin(const glm::ivec3& origin, int side, float reach, float delta, bool cells) {
     origin_ = origin;
     lower_ = glm::vec3(-reach);
     upper_ = glm::vec3(float(side - 1) + reach);
+    twiceDelta_ = 2 * delta;
     wantCells_ = cells;
-    sizes_ = 0;
+    areas_ = 0;
     groups_.clear();
     runs_.clear();
     places_.clear();
     cells_.clear();
 }
 
-void LayerSamples::add(const Tile& tile, std::int32_t triangle) {
-    for (int i = 0; i < tile.rows; i += runSide)
-        for (int j = 0; j <= std::min(i + runSide, tile.rows) - 1; j += runSide) addPart(tile, triangle, i, j);
-}
-
-// Adds a run of at most runSide x runSide samples, if it comes near the brick.
-void LayerSamples::addPart(const Tile& tile, std::int32_t triangle, int firstRow, int firstColumn) {
-    const glm::vec3 shift(tile.base - origin_);
-    const auto begin = std::uint32_t(places_.size());
-    glm::vec3 lower(1e30f), upper(-1e30f);
-    for (int i = firstRow; i < std::min(firstRow + runSide, tile.rows); ++i)
-        for (int j = firstColumn; j < std::min(firstColumn + runSide, i + 1); ++j) {
-            const glm::vec3 local = tile.first + float(i) * tile.down + float(j) * tile.across;
-            const glm::vec3 place = shift + local;
-            places_.push_back(place);
-            if (wantCells_) cells_.push_back(shift + glm::floor(local + 0.5f));
-            lower = glm::min(lower, place);
-            upper = glm::max(upper, place);
+// Adds the samples of Algorithm 1 in runs of equal sides, without those that stay away from the brick.
+void LayerSamples::addRows(const TilePart& part, std::uint32_t triangle) {
+    const TriangleCorners& c = part.corners;
+    const int n = part.rows;
+    const int parts = (n + mostRows - 1) / mostRows, runSide = (n + parts - 1) / parts;
+    const double step = 1.0 / double(n);
+    const glm::dvec3 s1 = (c[1] - c[0]) * step, s2 = (c[2] - c[1]) * step, s3 = (c[2] - c[0]) * step;
+    const glm::dvec3 start = c[0] + (s1 + s3) / 3.0;
+    const glm::vec3 first(start - origin_), down(s1), across(s2);
+    for (int row = 0; row < n; row += runSide)
+        for (int column = 0; column <= std::min(row + runSide, n) - 1; column += runSide) {
+            const auto begin = std::uint32_t(places_.size());
+            glm::vec3 lower(1e30f), upper(-1e30f);
+            for (int i = row; i < std::min(row + runSide, n); ++i)
+                for (int j = column; j < std::min(column + runSide, i + 1); ++j) {
+                    const glm::vec3 place = first + float(i) * down + float(j) * across;
+                    places_.push_back(place);
+                    lower = glm::min(lower, place);
+                    upper = glm::max(upper, place);
+                }
+            if (glm::any(glm::lessThan(upper, lower_)) || glm::any(glm::greaterThan(lower, upper_))) {
+                places_.resize(begin);
+                continue;
+            }
+            addRun(part, triangle, begin);
         }
-    if (glm::any(glm::lessThan(upper, lower_)) || glm::any(glm::greaterThan(lower, upper_))) {
-        places_.resize(begin);
-        if (wantCells_) cells_.resize(begin);
-        return;
-    }
-    const auto end = std::uint32_t(places_.size()), run = std::uint32_t(runs_.size());
-    const glm::vec3 middle = 0.5f * (lower + upper);
-    float radius2 = 0;
-    for (std::uint32_t i = begin; i < end; ++i) {
-        const glm::vec3 away = places_[i] - middle;
-        radius2 = std::max(radius2, glm::dot(away, away));
-    }
-    sizes_ += double(std::abs(tile.down.x) + std::abs(tile.down.y) + std::abs(tile.down.z)) * (end - begin);
-    runs_.push_back({2.f * tile.offset, triangle, begin, end});
-    const glm::vec3 normal = glm::normalize(tile.offset);
-    const float height = std::abs(glm::dot(places_[begin] - middle, normal));
-    groups_.push_back(
-        {middle, std::sqrt(radius2) + groupSlack, normal, height + groupSlack, tile.offset, run, run + 1});
+    if (!wantCells_) return;
+    const auto known = std::uint32_t(cells_.size());
+    for (std::size_t i = known; i < places_.size(); ++i) cells_.push_back(glm::floor(places_[i] + 0.5f));
 }
 
 void LayerSamples::finish() {
-    if (sizes_ < smallSize * double(runs_.size())) groupRuns();
+    if (areas_ < 2 * smallArea * double(runs_.size())) gatherRuns();
+    if (!groups_.empty()) return;
+    groups_.reserve(runs_.size());
+    for (std::uint32_t run = 0; run < runs_.size(); ++run) groups_.push_back(groupOf(run));
 }
 
-void LayerSamples::groupRuns() {
+LayerGroup LayerSamples::groupOf(std::uint32_t index) const {
+    const LayerRun& run = runs_[index];
+    const glm::vec3 normal = run.twiceOffset / twiceDelta_, offset = 0.5f * run.twiceOffset;
+    if (run.end - run.begin == 1)
+        return {places_[run.begin], groupSlack, normal, groupSlack, offset, index, index + 1};
     glm::vec3 lower(1e30f), upper(-1e30f);
-    for (const LayerGroup& group : groups_) {
-        lower = glm::min(lower, group.sample);
-        upper = glm::max(upper, group.sample);
+    for (std::uint32_t i = run.begin; i < run.end; ++i) {
+        lower = glm::min(lower, places_[i]);
+        upper = glm::max(upper, places_[i]);
+    }
+    const glm::vec3 middle = 0.5f * (lower + upper);
+    float radius2 = 0;
+    for (std::uint32_t i = run.begin; i < run.end; ++i) {
+        const glm::vec3 away = places_[i] - middle;
+        radius2 = std::max(radius2, glm::dot(away, away));
+    }
+    const float height = std::abs(glm::dot(places_[run.begin] - middle, normal));
+    return {middle, std::sqrt(radius2) + groupSlack, normal, height + groupSlack, offset, index, index + 1};
+}
+
+void LayerSamples::gatherRuns() {
+    glm::vec3 lower(1e30f), upper(-1e30f);
+    for (const LayerRun& run : runs_) {
+        lower = glm::min(lower, places_[run.begin]);
+        upper = glm::max(upper, places_[run.begin]);
     }
     const glm::ivec3 size = glm::ivec3((upper - lower) / cellSize) + 1;
     if (double(size.x) * double(size.y) * double(size.z) > mostCells) return;
     sortByCell(lower, size);
-    groups_.clear();
     for (std::uint32_t begin = 0, end; begin < runs_.size(); begin = end) {
         for (end = begin + 1; end < runs_.size() && cellOf_[end] == cellOf_[begin];) ++end;
-        addCluster(begin, end);
+        groups_.push_back(cluster(begin, end));
     }
 }
 
@@ -98,7 +113,7 @@ void LayerSamples::sortByCell(const glm::vec3& lower, const glm::ivec3& size) {
     cellOf_.resize(runs_.size());
     cursors_.assign(std::size_t(size.x) * std::size_t(size.y) * std::size_t(size.z), 0);
     for (std::size_t i = 0; i < runs_.size(); ++i) {
-        const glm::ivec3 cell((groups_[i].sample - lower) / cellSize);
+        const glm::ivec3 cell((places_[runs_[i].begin] - lower) / cellSize);
         cellOf_[i] = std::uint32_t((cell.x * size.y + cell.y) * size.z + cell.z);
         ++cursors_[cellOf_[i]];
     }
@@ -113,7 +128,7 @@ void LayerSamples::sortByCell(const glm::vec3& lower, const glm::ivec3& size) {
         for (; at < cursors_[cell]; ++at) cellOf_[at] = cell;
 }
 
-void LayerSamples::addCluster(std::uint32_t begin, std::uint32_t end) {
+LayerGroup LayerSamples::cluster(std::uint32_t begin, std::uint32_t end) {
     glm::vec3 middle(0), offset(0);
     float count = 0;
     for (std::uint32_t r = begin; r < end; ++r) {
@@ -143,7 +158,7 @@ void LayerSamples::addCluster(std::uint32_t begin, std::uint32_t end) {
         }
     }
     std::swap(runs_[begin], runs_[first]);
-    groups_.push_back({middle, std::sqrt(radius2) + groupSlack, normal, thickness + groupSlack, offset, begin, end});
+    return {middle, std::sqrt(radius2) + groupSlack, normal, thickness + groupSlack, offset, begin, end};
 }
 
 }  // namespace bilayer

@@ -1,12 +1,10 @@
 // Samples of a mesh: triangles become tiles, and a tile is n rows of samples by Algorithm 1 of the paper.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <glm/vec3.hpp>
 #include <memory>
 #include <span>
-#include <vector>
 
 #include "sdf/build.h"
 
@@ -24,19 +22,6 @@ struct Tile {
     std::int32_t rows;  ///< n of Algorithm 1
 };
 static_assert(sizeof(Tile) == 64, "one cache line, and the layout of the OpenCL struct");
-
-/// Corners of a triangle [voxels].
-using TriangleCorners = std::array<glm::dvec3, 3>;
-
-/// A box in index coordinates [voxels].
-struct TileLimits {
-    glm::dvec3 lower, upper;
-};
-
-/// Adds the tiles of one triangle. Of a triangle that is cut into pieces, those whose box misses the limits are left out.
-/// A triangle without area gives none.
-void cutTriangle(const TriangleCorners& corners, const DoubleLayerOptions& options, const TileLimits& limits,
-                 std::vector<Tile>& tiles);
 
 /// The tiles of a mesh, in the order of its triangles.
 struct Tiles {
