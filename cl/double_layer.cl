@@ -1,5 +1,5 @@
 // The double layer method on a device: the same samples in the same order by the same operations as
-// sdf/double_layer.cpp, so that both give the same distances where square roots are rounded alike.
+// sdf/layer_block.cpp.
 //
 // Two mappings of blocks of 8x8x8 voxels to work-items, chosen when this text is built:
 //   default          a work-item fills a whole block: for processors, whose vector units take a row of voxels at once
@@ -54,9 +54,15 @@ float8 axisDistances(float coordinate) {
     return away * away;
 }
 
+// The lattice point nearest to a sample. Halves go up, whatever the rounding: LayerSamples::nearestLattice() of
+// sdf/layer_samples.h.
+float nearestLattice(float coordinate) {
+    return floor(coordinate + 0.5001f);
+}
+
 // Which of the eight voxels on an axis lie in the paper's neighbourhood: within K of the voxel nearest to the sample.
 int8 inCube(float coordinate, int k) {
-    return fabs((float8)(0, 1, 2, 3, 4, 5, 6, 7) - floor(coordinate + 0.5f)) <= (float8)(k);
+    return fabs((float8)(0, 1, 2, 3, 4, 5, 6, 7) - nearestLattice(coordinate)) <= (float8)(k);
 }
 
 Sample makeSample(float3 at, float3 offset, int cube) {
@@ -100,7 +106,7 @@ void splat(Layers* layers, float3 at, float3 offset, Parameters parameters, int 
     const float x = (float)(get_local_id(0) / 8), y = (float)(get_local_id(0) % 8);
     if (parameters.cube > 0) {
         const float k = (float)(parameters.cube);
-        if (fabs(x - floor(at.x + 0.5f)) > k || fabs(y - floor(at.y + 0.5f)) > k) return;
+        if (fabs(x - nearestLattice(at.x)) > k || fabs(y - nearestLattice(at.y)) > k) return;
     } else if (square(x - at.x) + square(y - at.y) >= square(parameters.reach) - square(outside(at.z))) {
         return;
     }
@@ -176,8 +182,13 @@ void applyTile(Layers* layers, Tile tile, int3 block, Parameters parameters, int
 }
 
 // Eq. 3. The inside keeps its sign bit where the distance is clamped to zero.
+// The voxel is inside where both layers are equally near up to rounding: layerTie of sdf/blocks.h.
+int8 isInside(float8 inner2, float8 outer2) {
+    return inner2 <= outer2 + 1e-5f;
+}
+
 float8 combine(float8 inner2, float8 outer2, Parameters parameters) {
-    const int8 inside = inner2 <= outer2;
+    const int8 inside = isInside(inner2, outer2);
     const float8 clamped = max(sqrt(select(inner2, outer2, inside)) - parameters.delta, (float8)(0.0f));
     const int8 known = min(inner2, outer2) < square(parameters.certain);
     return select((float8)(INFINITY), select(clamped, -clamped, inside), known);
@@ -189,7 +200,7 @@ void store(const Layers* layers, size_t place, Parameters parameters, global flo
         const float8 inner2 = layers->inner2[row], outer2 = layers->outer2[row];
         vstore8(combine(inner2, outer2, parameters), place + row, distances);
         if (TRIANGLES)
-            vstore8(select(layers->innerOwner[row], layers->outerOwner[row], inner2 <= outer2), place + row, triangles);
+            vstore8(select(layers->innerOwner[row], layers->outerOwner[row], isInside(inner2, outer2)), place + row, triangles);
     }
 }
 

@@ -41,7 +41,9 @@ void sortVoxels(const float* distances, const BandWidths& widths, BlockMask& unk
         setBits(hn::Eq(d, hn::Set(tag, std::numeric_limits<float>::infinity())), i, unknown);
         setBits(hn::MaskFromVec(hn::BitCast(tag, hn::BroadcastSignBit(hn::BitCast(hn::RebindToSigned<Tag>(), d)))), i,
                 inside);
-        setBits(hn::And(hn::Lt(d, hn::Set(tag, widths.exterior)), hn::Gt(d, hn::Set(tag, -widths.interior))), i, band);
+        setBits(hn::And(hn::Lt(d, hn::Set(tag, widths.exterior - bandEdge)),
+                        hn::Gt(d, hn::Set(tag, bandEdge - widths.interior))),
+                i, band);
     }
 }
 

@@ -36,13 +36,16 @@ struct FilledBlocks {
     std::span<const std::int32_t> triangles;  ///< blockVoxels a block; empty unless asked for
 };
 
+/// Where the squared distances to both layers differ by less than this they are equal, whatever a device's rounding, and
+/// the voxel is inside [voxels^2].
+inline constexpr float layerTie = 1e-5f;
+
 /// Stands for every distance beyond the reach of a job; its sign is right where signs are asked for [voxels].
 inline constexpr float farAway = 1e30f;
 
 /// What the exact methods work from: they want the mesh itself.
 struct MeshJob {
     const Mesh& mesh;
-    const Bounds& box;  ///< of the mesh [m]
     float voxelSize;  ///< [m]
     float reach;      ///< distances up to this must be found; beyond it they may be +-farAway [voxels], at least 1
     bool triangles;   ///< whether the nearest triangle is asked for

@@ -367,9 +367,9 @@ class Build {
         if (filler_)
             fillTiles(parameters, assembler, part);
         else
-            fillDoubleLayer({mesh_, survey_.box, options_.voxelSize, parameters.reach, options_.triangles, true,
+            fillDoubleLayer({mesh_, options_.voxelSize, parameters.reach, options_.triangles, true,
                              [&](const FilledBlocks& blocks) { assembler.take(blocks); }, progress_},
-                            options_.doubleLayer, parameters);
+                            survey_.box, options_.doubleLayer, parameters);
         times_.fill += part.lap();
         finish(assembler);
         times_.assemble += part.lap();
@@ -432,14 +432,14 @@ class Build {
         Assembler assembler(byNormals ? widths : BandWidths{reach, reach, options_.voxelSize}, options_.triangles,
                             plain(sign), progress_);
         std::atomic<std::size_t> undecided = 0;
-        // turned triangles, in a mended mesh, have the same box
-        MeshJob job{mesh,      survey_.box, options_.voxelSize,
+        MeshJob job{mesh,      options_.voxelSize,
                     reach,     options_.triangles,
                     byNormals, [&](const FilledBlocks& blocks) { assembler.take(blocks); },
                     progress_, {},
                     &undecided};
         if (adapt) adapt(job, assembler);
-        options_.method == Method::exact ? fillExact(job) : fillPseudonormal(job);
+        // triangles turned around, in a mended mesh, have the same box
+        options_.method == Method::exact ? fillExact(job, survey_.box) : fillPseudonormal(job);
         times_.fill += part.lap();
         finish(assembler);
         progress_.poll();

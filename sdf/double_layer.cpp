@@ -91,10 +91,11 @@ class BrickFiller {
 
 }  // namespace
 
-void fillDoubleLayer(const MeshJob& job, const DoubleLayerOptions& options, const FillParameters& parameters) {
+void fillDoubleLayer(const MeshJob& job, const Bounds& box, const DoubleLayerOptions& options,
+                     const FillParameters& parameters) {
     // the paper's cube sticks out of the ball
     const float reach = parameters.reach * (parameters.cube > 0 ? std::sqrt(3.f) : 1.f);
-    const TriangleBins bins = binTriangles(job.mesh, job.box, 1.0 / double(job.voxelSize), reach, &job.progress);
+    const TriangleBins bins = binTriangles(job.mesh, box, 1.0 / double(job.voxelSize), reach, &job.progress);
     job.progress.begin(bins.count());
     tbb::enumerable_thread_specific<Scratch> scratch;
     tbb::parallel_for(std::size_t(0), bins.count(), [&](std::size_t brick) {

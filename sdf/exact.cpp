@@ -252,9 +252,9 @@ class BrickFiller {
 
 }  // namespace
 
-void fillExact(const MeshJob& job) {
+void fillExact(const MeshJob& job, const Bounds& box) {
     const double voxelsPerUnit = 1.0 / double(job.voxelSize);
-    const TriangleBins bins = binTriangles(job.mesh, job.box, voxelsPerUnit, job.reach, &job.progress);
+    const TriangleBins bins = binTriangles(job.mesh, box, voxelsPerUnit, job.reach, &job.progress);
     job.progress.begin(bins.count());
     LastResort lastResort(job);
     tbb::enumerable_thread_specific<Scratch> scratch;

@@ -9,6 +9,7 @@ namespace bilayer {
 /// Fills all blocks of a job by TBB and SIMD. Distances are right within 1e-4 voxels of the true ones. Their bytes do
 /// not depend on the number of threads, on the order of the triangles, or on a shift by whole voxels (where the voxel
 /// size and the vertices are binary fractions, so that the shift itself is exact).
-void fillExact(const MeshJob& job);
+/// @param box  of the mesh
+void fillExact(const MeshJob& job, const Bounds& box);
 
 }  // namespace bilayer

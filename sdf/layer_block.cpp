@@ -225,7 +225,7 @@ HWY_INLINE void combine(const Voxels<withOwners>& v, const FillParameters& param
     const Vec certain2 = hn::Set(tag, parameters.certain * parameters.certain - parameters.delta * parameters.delta);
     for (int x = 0; x < cubeSide; ++x) {
         const int slice = x * blockSide * blockSide;
-        const auto inside = hn::Le(v.inner2[x], v.outer2[x]);
+        const auto inside = hn::Le(v.inner2[x], hn::Add(v.outer2[x], hn::Set(tag, layerTie)));
         const Vec other2 = hn::Max(hn::Add(hn::Max(v.inner2[x], v.outer2[x]), delta2), hn::Zero(tag));
         const Vec clamped = hn::Max(hn::Sub(hn::Sqrt(other2), delta), hn::Zero(tag));
         const Vec phi = hn::IfThenElse(inside, hn::Neg(clamped), clamped);
@@ -252,22 +252,29 @@ void fillCube(const LayerBlockInput& input, std::span<const std::uint32_t> group
 
 using CubeGroups = std::array<std::span<const std::uint32_t>, cubesPerBlock>;
 
-// The groups that reach each cube: their ball and their slab must.
+// The groups that reach each cube: the balls around their inner or outer samples must, and their slab.
 CubeGroups binCubes(const LayerBlockInput& input, LayerScratch& scratch) {
     const Tag tag;
     const std::size_t lanes = hn::Lanes(tag), count = input.reaching.size(), stride = (count + lanes - 1) / lanes * lanes;
-    enum Row { x, y, z, reach, normalX, normalY, normalZ, slab, rows };
+    enum Row { inner, outer = inner + 3, normal = outer + 3, reach = normal + 3, slab, rows };
     // columns beyond the last group reach nothing
     scratch.columns.resize(stride * rows);
     float* columns = scratch.columns.data();
-    // a cube of (2K + 1)^3 voxels sticks out of the ball
-    const float beyond = input.parameters.reach * (input.parameters.cube > 0 ? std::sqrt(3.f) : 1.f);
+    // the paper's cube of (2K + 1)^3 voxels is around the sample itself, and sticks out of the ball
+    const bool cubes = input.parameters.cube > 0;
+    const float slabReach = input.parameters.reach * (cubes ? std::sqrt(3.f) : 1.f),
+                ballReach = cubes ? slabReach : input.parameters.certain;
     for (std::size_t i = 0; i < count; ++i) {
         const LayerGroup& group = input.samples.groups()[input.reaching[i]];
-        const glm::vec3 at = group.sample - input.inBrick;
-        const float values[rows] = {at.x,           at.y,           at.z,           group.radius + beyond,
-                                    group.normal.x, group.normal.y, group.normal.z, group.thickness + beyond};
-        for (int row = 0; row < rows; ++row) columns[std::size_t(row) * stride + i] = values[row];
+        const glm::vec3 at = group.sample - input.inBrick, offset = cubes ? glm::vec3(0) : group.offset;
+        const auto put = [&](int row, float value) { columns[std::size_t(row) * stride + i] = value; };
+        for (int axis = 0; axis < 3; ++axis) {
+            put(inner + axis, at[axis] - offset[axis]);
+            put(outer + axis, at[axis] + offset[axis]);
+            put(normal + axis, group.normal[axis]);
+        }
+        put(reach, group.radius + ballReach);
+        put(slab, group.thickness + slabReach);
     }
     for (std::size_t i = count; i < stride; ++i)
         for (int row = 0; row < rows; ++row) columns[std::size_t(row) * stride + i] = -1;
@@ -277,23 +284,32 @@ CubeGroups binCubes(const LayerBlockInput& input, LayerScratch& scratch) {
     constexpr float half = 0.5f * float(cubeSide - 1);
     for (std::size_t i = 0; i < count; i += lanes) {
         const auto row = [&](int r) { return hn::LoadU(tag, columns + std::size_t(r) * stride + i); };
-        Vec away2[3][cubesPerSide], height[3][cubesPerSide];
+        Vec toInner2[3][cubesPerSide], toOuter2[3][cubesPerSide], height[3][cubesPerSide];
         Vec slabWidth = row(slab);
         for (int axis = 0; axis < 3; ++axis) {
-            const Vec centre = row(axis), normal = row(normalX + axis);
+            const Vec in = row(inner + axis), out = row(outer + axis), up = row(normal + axis);
+            const Vec centre = hn::Mul(hn::Set(tag, 0.5f), hn::Add(in, out));
             for (int side = 0; side < cubesPerSide; ++side) {
-                const Vec toMiddle = hn::Sub(hn::Set(tag, float(side * cubeSide) + half), centre);
-                away2[axis][side] = squareOf(hn::Max(hn::Sub(hn::Abs(toMiddle), hn::Set(tag, half)), hn::Zero(tag)));
-                height[axis][side] = hn::Mul(toMiddle, normal);
+                const Vec middle = hn::Set(tag, float(side * cubeSide) + half);
+                const auto away2 = [&](Vec from) {
+                    return squareOf(
+                        hn::Max(hn::Sub(hn::Abs(hn::Sub(middle, from)), hn::Set(tag, half)), hn::Zero(tag)));
+                };
+                toInner2[axis][side] = away2(in);
+                toOuter2[axis][side] = away2(out);
+                height[axis][side] = hn::Mul(hn::Sub(middle, centre), up);
             }
-            slabWidth = hn::MulAdd(hn::Set(tag, half), hn::Abs(normal), slabWidth);
+            slabWidth = hn::MulAdd(hn::Set(tag, half), hn::Abs(up), slabWidth);
         }
         const Vec reaches = row(reach), reach2 = squareOf(reaches);
         const Mask real = hn::Gt(reaches, hn::Zero(tag));
         for (int cube = 0; cube < cubesPerBlock; ++cube) {
             const int a = cube / 4, b = cube / 2 % 2, c = cube % 2;
-            const Mask ball = hn::Lt(hn::Add(hn::Add(away2[0][a], away2[1][b]), away2[2][c]), reach2);
-            const Mask plane = hn::Lt(hn::Abs(hn::Add(hn::Add(height[0][a], height[1][b]), height[2][c])), slabWidth);
+            const auto sum = [&](const Vec(&of)[3][cubesPerSide]) {
+                return hn::Add(hn::Add(of[0][a], of[1][b]), of[2][c]);
+            };
+            const Mask ball = hn::Lt(hn::Min(sum(toInner2), sum(toOuter2)), reach2);
+            const Mask plane = hn::Lt(hn::Abs(sum(height)), slabWidth);
             std::uint8_t bytes[8] = {};
             hn::StoreMaskBits(tag, hn::And(real, hn::And(ball, plane)), bytes);
             std::uint64_t bits;

@@ -63,7 +63,7 @@ void LayerSamples::addRows(const TilePart& part, std::uint32_t triangle) {
         }
     if (!wantCells_) return;
     const auto known = std::uint32_t(cells_.size());
-    for (std::size_t i = known; i < places_.size(); ++i) cells_.push_back(glm::floor(places_[i] + 0.5f));
+    for (std::size_t i = known; i < places_.size(); ++i) cells_.push_back(nearestLattice(places_[i]));
 }
 
 void LayerSamples::finish() {

@@ -34,6 +34,9 @@ struct LayerGroup {
 /// The samples of a brick. Memory is used again from brick to brick.
 class LayerSamples {
   public:
+    /// The lattice point nearest to a place. Halves go up, whatever the rounding.
+    static glm::vec3 nearestLattice(const glm::vec3& place) { return glm::floor(place + 0.5001f); }
+
     /// Begins with a brick.
     /// @param origin  index coordinates of its first voxel
     /// @param side    [voxels]
@@ -43,7 +46,7 @@ class LayerSamples {
     void begin(const glm::ivec3& origin, int side, float reach, float delta, bool cells);
 
     /// Adds the samples of a part of a triangle.
-    void add(const TilePart& part, std::uint32_t triangle) {
+    [[gnu::always_inline]] void add(const TilePart& part, std::uint32_t triangle) {
         if (part.rows == 1 && !wantCells_)
             addOne(part, triangle);
         else
@@ -60,7 +63,7 @@ class LayerSamples {
 
   private:
     // Most parts of a fine mesh have one sample.
-    void addOne(const TilePart& part, std::uint32_t triangle) {
+    [[gnu::always_inline]] void addOne(const TilePart& part, std::uint32_t triangle) {
         const TriangleCorners& c = part.corners;
         const glm::vec3 place((c[0] + c[1] + c[2]) * (1.0 / 3.0) - origin_);
         if (glm::any(glm::lessThan(place, lower_)) || glm::any(glm::greaterThan(place, upper_))) return;
@@ -68,7 +71,7 @@ class LayerSamples {
         addRun(part, triangle, std::uint32_t(places_.size() - 1));
     }
     // A run of all places from `begin` on.
-    void addRun(const TilePart& part, std::uint32_t triangle, std::uint32_t begin) {
+    [[gnu::always_inline]] void addRun(const TilePart& part, std::uint32_t triangle, std::uint32_t begin) {
         areas_ += part.length;
         const float scale = twiceDelta_ / float(part.length);
         runs_.push_back({scale * glm::vec3(part.normal), std::int32_t(triangle), begin,

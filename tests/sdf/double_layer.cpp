@@ -10,6 +10,7 @@
 
 #include "demos/shared/shapes.h"
 #include "sdf/grids.h"
+#include "sdf/layer_samples.h"
 
 using namespace bilayer;
 
@@ -48,7 +49,7 @@ class Dense {
     // Both layers are equally near, up to rounding: either sign is right.
     bool tie(const glm::ivec3& v) const {
         const std::size_t i = index(v);
-        return std::abs(inner2_[i] - outer2_[i]) <= 1e-5f * inner2_[i];
+        return std::abs(inner2_[i] - outer2_[i]) <= 2 * layerTie + 1e-5f * inner2_[i];
     }
     std::int32_t owner(const glm::ivec3& v) const {
         const std::size_t i = index(v);
@@ -64,7 +65,7 @@ class Dense {
 
   private:
     void apply(const Tile& tile, const glm::vec3& p, std::int32_t owner, int k) {
-        const glm::ivec3 nearest = tile.base + glm::ivec3(glm::floor(p + 0.5f));
+        const glm::ivec3 nearest = tile.base + glm::ivec3(LayerSamples::nearestLattice(p));
         glm::ivec3 from = lower_, to = lower_ + size_ - 1;
         if (k >= 0) {
             from = glm::max(from, nearest - k);
