@@ -168,7 +168,7 @@ class Stopwatch {
 // How a field got its signs.
 struct Signs {
     std::string name, reason;
-    std::size_t conflicts = 0;  // neighbours that contradict each other
+    std::size_t conflicts = 0;  // voxels on both sides, and neighbours that contradict each other
     std::size_t undecided = 0;  // voxels whose nearest normals cancel out
 };
 
@@ -411,12 +411,12 @@ class Build {
         const BandWidths widths = bandOf(options_);
         Assembler assembler(byNormals ? widths : BandWidths{reach, reach, options_.voxelSize}, options_.triangles,
                             plain(sign), progress_);
-        std::atomic<std::size_t> undecided = 0;
-        MeshJob job{mesh,      options_.voxelSize,
-                    reach,     options_.triangles,
-                    byNormals, [&](const FilledBlocks& blocks) { assembler.take(blocks); },
-                    progress_, {},
-                    &undecided};
+        std::atomic<std::size_t> undecided = 0, conflicts = 0;
+        MeshJob job{mesh,       options_.voxelSize,
+                    reach,      options_.triangles,
+                    byNormals,  [&](const FilledBlocks& blocks) { assembler.take(blocks); },
+                    progress_,  {},
+                    &undecided, &conflicts};
         if (adapt) adapt(job, assembler);
         options_.method == Method::exact ? fillExact(job) : fillPseudonormal(job);
         times_.fill += part.lap();
@@ -424,7 +424,8 @@ class Build {
         progress_.poll();
         if (sign == Sign::winding) signByWinding(*distance_, mesh, widths, balanced(mesh));
         if (sign == Sign::flood) signByFlood(*distance_, mesh, options_.gap, widths);
-        signs_ = {name(sign), reason, byNormals ? assembler.conflicts(*distance_) : 0, undecided};
+        if (byNormals) conflicts += assembler.conflicts(*distance_);
+        signs_ = {name(sign), reason, conflicts, undecided};
         times_.assemble += part.lap();
     }
 
