@@ -26,8 +26,8 @@ using Mask = hn::Mask<Tag>;
 
 /// Triangles whose distances differ by less may share the closest point: more than floats blur [voxels].
 constexpr float tie = 1e-5f;
-/// A height over a plane below this does not tell the side [voxels].
-constexpr float leastHeight = 1e-5f;
+/// Nearer to a face than this its side is left to a closer look [voxels].
+constexpr float leastHeight = 1e-3f;
 /// Up to this reach the two above hold; they grow with it beyond, as the rounding of distances does [voxels].
 constexpr float usualReach = 16;
 /// Room for the rounding of distances, and for ties, when a bound is taken from one place to another [voxels].
@@ -182,7 +182,7 @@ struct Query {
                                                               edge(besideAC, alongAC, load(leaf.lengthAC))));
             const Vec distance2 = hn::Add(flat2, square(z));
             hn::Store(distance2, tag, found.distance2 + i);
-            hn::Store(z, tag, found.height + i);
+            hn::Store(hn::IfThenElseZero(over, z), tag, found.height + i);
             nearest = std::min(nearest, hn::GetLane(hn::MinOfLanes(tag, distance2)));
         }
         if (nearest < best2) lower(nearest);
@@ -218,7 +218,7 @@ struct Query {
         return {0, 0};
     }
 
-    // The sign that all triangles around the closest point agree on, or 0.
+    // The side of all faces that hold the closest point, or 0 if they do not agree or it lies on an edge.
     int side(float least) const {
         const Tag tag;
         const Vec infinity = hn::Set(tag, std::numeric_limits<float>::infinity());
@@ -232,14 +232,6 @@ struct Query {
             }
         if (hn::GetLane(hn::MinOfLanes(tag, lowest)) > least) return 1;
         return hn::GetLane(hn::MaxOfLanes(tag, highest)) < -least ? -1 : 0;
-    }
-
-    void doubt(int voxelIndex) const {
-        const auto begin = std::uint32_t(answer.candidates.size());
-        for (const auto& v : answer.visits)
-            for (std::size_t i = 0; i < treeWidth; ++i)
-                if (v.distance2[i] <= limit2) answer.candidates.push_back(tree.leaves[v.leaf].triangles[i]);
-        answer.doubts.push_back({voxelIndex, begin, std::uint32_t(answer.candidates.size())});
     }
 };
 
@@ -289,24 +281,29 @@ struct BlockQuery {
         if (answer.visits[visit].distance2[place] != query.best2) return;
         const glm::ivec3 p(position - origin);
         const int voxel = (p.x * blockSide + p.y) * blockSide + p.z;
-        answer.any = true;
+        const float distance = std::sqrt(query.best2);
+        const auto x = std::size_t(p.x);
+        const std::uint64_t bit = std::uint64_t(1) << (p.y * blockSide + p.z);
         answer.lastWinner = answer.visits[visit].leaf;
-        answer.distances[voxel] = std::sqrt(query.best2);
-        if (answer.triangles) answer.triangles[voxel] = std::int32_t(tree.leaves[answer.lastWinner].triangles[place]);
+        answer.distances[voxel] = distance;
+        answer.triangles[voxel] = std::int32_t(tree.leaves[answer.lastWinner].triangles[place]);
+        answer.known[x] |= bit;
         if (!sign) return;
+        if (distance > farFrom) answer.far[x] |= bit;
+        if (distance > midFrom) answer.mid[x] |= bit;
         const int side = query.side(leastHeight * std::max(1.f, reach / usualReach));
-        if (side < 0) answer.distances[voxel] = -answer.distances[voxel];
-        if (side == 0) query.doubt(voxel);
+        // on the surface either side is right, and no link can carry it on
+        if (side > 0 || distance < 0.5f * linkSlack) answer.sides.outside[x] |= bit;
+        if (side < 0) answer.sides.inside[x] |= bit;
     }
 };
 
 void answerVoxels(const WideTree& tree, const NodeList& list, const glm::vec3& origin, float reach, bool sign,
                   BlockAnswer& answer) {
-    answer.any = false;
-    answer.doubts.clear();
-    answer.candidates.clear();
+    answer.known = answer.far = answer.mid = {};
+    answer.sides = {};
     std::fill_n(answer.distances, blockVoxels, farAway);
-    if (answer.triangles) std::fill_n(answer.triangles, blockVoxels, -1);
+    std::fill_n(answer.triangles, blockVoxels, -1);
     BlockQuery{tree, origin, reach, sign, answer}.answerCube(list, origin, 0);
 }
 
