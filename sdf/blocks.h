@@ -42,6 +42,7 @@ inline constexpr float farAway = 1e30f;
 /// What the exact methods work from: they want the mesh itself.
 struct MeshJob {
     const Mesh& mesh;
+    const Bounds& box;  ///< of the mesh [m]
     float voxelSize;  ///< [m]
     float reach;      ///< distances up to this must be found; beyond it they may be +-farAway [voxels], at least 1
     bool triangles;   ///< whether the nearest triangle is asked for

@@ -87,18 +87,28 @@ BuildOptions inVoxels(BuildOptions options) {
     return options;
 }
 
-double areaOf(const Mesh& mesh) {
+// What one pass over the triangles tells.
+struct Survey {
+    Bounds box;
+    double area = 0;  // [m^2]
+};
+
+Survey survey(const Mesh& mesh) {
     return tbb::parallel_reduce(
-        tbb::blocked_range<std::size_t>(0, mesh.triangles.size(), 4096), 0.0,
-        [&](const auto& range, double area) {
+        tbb::blocked_range<std::size_t>(0, mesh.triangles.size(), 4096), Survey{},
+        [&](const auto& range, Survey seen) {
             for (std::size_t i = range.begin(); i < range.end(); ++i) {
                 const glm::uvec3 t = mesh.triangles[i];
-                const glm::dvec3 a(mesh.points[t.x]), b(mesh.points[t.y]), c(mesh.points[t.z]);
-                area += 0.5 * glm::length(glm::cross(b - a, c - a));
+                const glm::vec3 &a = mesh.points[t.x], &b = mesh.points[t.y], &c = mesh.points[t.z];
+                for (const glm::vec3* p : {&a, &b, &c}) seen.box.add(*p);
+                seen.area +=
+                    0.5 * glm::length(glm::cross(glm::dvec3(b) - glm::dvec3(a), glm::dvec3(c) - glm::dvec3(a)));
             }
-            return area;
+            return seen;
         },
-        std::plus<>());
+        [](const Survey& a, const Survey& b) {
+            return Survey{{glm::min(a.box.lower, b.box.lower), glm::max(a.box.upper, b.box.upper)}, a.area + b.area};
+        });
 }
 
 // Blocks that the band meets, roughly: as many as fill the space near the surface or, where that folds over itself,
@@ -113,8 +123,8 @@ double countBlocks(const Bounds& box, double area, double h, double reach) {
 }
 
 // Refuses what cannot work before anything is allocated for it.
-void checkSize(const Mesh& mesh, const BuildOptions& options, float reach) {
-    const Bounds box = bounds(mesh);
+void checkSize(const Mesh& mesh, const Survey& seen, const BuildOptions& options, float reach) {
+    const Bounds& box = seen.box;
     const double h = options.voxelSize;
     const auto refuse = [&](const std::string& why) {
         throw std::invalid_argument(fmt::format("voxelSize {:g} is too small for this mesh, {:g} voxels long: {}", h,
@@ -128,7 +138,7 @@ void checkSize(const Mesh& mesh, const BuildOptions& options, float reach) {
         bricks *= (high - low + 2 * double(reach)) / brickSide + 2;
     }
     if (bricks > mostBricks) refuse("its box would have more than 2^28 bricks of 64^3 voxels");
-    const double area = areaOf(mesh) / (h * h);
+    const double area = seen.area / (h * h);
     if (!(area > 0)) throw std::invalid_argument("the mesh has no triangle with an area");
     const double triangles = double(mesh.triangles.size());
     const double input = options.method == Method::doubleLayer
@@ -238,7 +248,7 @@ void describe(openvdb::FloatGrid& grid, const Mesh& mesh, const BuildOptions& op
 // A build under way: what it works from, and what it has found.
 class Build {
   public:
-    Build(const Mesh& mesh, const BuildOptions& options, const BlockFiller& filler, BuildTimes& times)
+    Build(const Mesh& mesh, const BuildOptions& options, const BlockFiller* filler, BuildTimes& times)
         : mesh_(mesh), options_(options), filler_(filler), times_(times), progress_(options.progress) {}
 
     LevelSet run() {
@@ -269,7 +279,8 @@ class Build {
         validate(mesh_);
         progress_.poll();
         const bool layers = options_.method == Method::doubleLayer;
-        checkSize(mesh_, options_, layers ? fillParameters(options_).reach : reachOf(options_, options_.sign));
+        survey_ = survey(mesh_);
+        checkSize(mesh_, survey_, options_, layers ? fillParameters(options_).reach : reachOf(options_, options_.sign));
         progress_.poll();
     }
 
@@ -334,8 +345,8 @@ class Build {
         // which of two triangles at the same distance is the nearest goes by their order in a brick: bricks stay whole
         int side = blockSide;
         if (options_.triangles) {
-            side = brickSideFor(mesh_, voxelsPerUnit, reach);
-            if (side != brickSideFor(oldMesh, voxelsPerUnit, reach)) return false;
+            side = brickSideFor(survey_.box, voxelsPerUnit, reach);
+            if (side != brickSideFor(bounds(oldMesh), voxelsPerUnit, reach)) return false;
         }
         const TouchedCells touched(oldMesh, mesh_, moved, voxelsPerUnit, reach, side);
         times_.tiles += part.lap();
@@ -353,20 +364,30 @@ class Build {
         Stopwatch part;
         signs_ = {"layers", "the nearer of two layers tells the side", 0};
         const FillParameters parameters = fillParameters(options_);
+        Assembler assembler(bandOf(options_), options_.triangles, Assembler::Plain::keep, progress_);
+        if (filler_)
+            fillTiles(parameters, assembler, part);
+        else
+            fillDoubleLayer({mesh_, survey_.box, options_.voxelSize, parameters.reach, options_.triangles, true,
+                             [&](const FilledBlocks& blocks) { assembler.take(blocks); }, progress_},
+                            options_.doubleLayer, parameters);
+        times_.fill += part.lap();
+        finish(assembler);
+        times_.assemble += part.lap();
+    }
+
+    // Another device takes tiles.
+    void fillTiles(const FillParameters& parameters, Assembler& assembler, Stopwatch& part) {
         const Tiles tiles = makeTiles(mesh_, options_);
         progress_.poll();
         times_.tiles += part.lap();
         const Bricks bricks = binBricks(tiles, parameters.reach);
         progress_.poll();
         progress_.begin(bricks.count());
-        Assembler assembler(bandOf(options_), options_.triangles, Assembler::Plain::keep, progress_);
-        filler_.fill({tiles, bricks, parameters, [&](std::size_t, const FilledBlocks& blocks) {
-                          assembler.take(blocks);
-                          progress_.advance();
-                      }});
-        times_.fill += part.lap();
-        finish(assembler);
-        times_.assemble += part.lap();
+        filler_->fill({tiles, bricks, parameters, [&](std::size_t, const FilledBlocks& blocks) {
+                           assembler.take(blocks);
+                           progress_.advance();
+                       }});
     }
 
     // Picks a way, and another one where the first contradicts itself.
@@ -412,11 +433,18 @@ class Build {
         Assembler assembler(byNormals ? widths : BandWidths{reach, reach, options_.voxelSize}, options_.triangles,
                             plain(sign), progress_);
         std::atomic<std::size_t> undecided = 0, conflicts = 0;
-        MeshJob job{mesh,       options_.voxelSize,
-                    reach,      options_.triangles,
-                    byNormals,  [&](const FilledBlocks& blocks) { assembler.take(blocks); },
-                    progress_,  {},
-                    &undecided, &conflicts};
+        // turned triangles, in a mended mesh, have the same box
+        MeshJob job{mesh,
+                    survey_.box,
+                    options_.voxelSize,
+                    reach,
+                    options_.triangles,
+                    byNormals,
+                    [&](const FilledBlocks& blocks) { assembler.take(blocks); },
+                    progress_,
+                    {},
+                    &undecided,
+                    &conflicts};
         if (adapt) adapt(job, assembler);
         options_.method == Method::exact ? fillExact(job) : fillPseudonormal(job);
         times_.fill += part.lap();
@@ -437,10 +465,11 @@ class Build {
 
     const Mesh& mesh_;
     const BuildOptions& options_;
-    const BlockFiller& filler_;
+    const BlockFiller* filler_;
     BuildTimes& times_;
     Stopwatch total_;
     Progress progress_;
+    Survey survey_;
     Signs signs_;
     openvdb::FloatGrid::Ptr distance_;
     openvdb::Int32Grid::Ptr triangle_;
@@ -458,24 +487,21 @@ LevelSet withThreads(int threads, const Work& work) {
 LevelSet build(const Mesh& mesh, const BuildOptions& given, const BlockFiller* filler, BuildTimes* times) {
     const BuildOptions options = inVoxels(given);
     check(options);
-    if (filler && filler->backend != "tbb" && options.method != Method::doubleLayer)
+    if (filler && options.method != Method::doubleLayer)
         throw std::invalid_argument(fmt::format("the {} back end has no method {}: it has double-layer",
                                                 filler->backend, name(options.method)));
     openvdb::initialize();
-    const BlockFiller tbb = tbbFiller();
     BuildTimes ignored;
-    return withThreads(options.threads,
-                       [&] { return Build(mesh, options, filler ? *filler : tbb, times ? *times : ignored).run(); });
+    return withThreads(options.threads, [&] { return Build(mesh, options, filler, times ? *times : ignored).run(); });
 }
 
 LevelSet rebuild(const LevelSet& old, const Mesh& oldMesh, const Mesh& newMesh, std::span<const std::uint32_t> moved,
                  const BuildOptions& given, BuildTimes* times) {
     const BuildOptions options = inVoxels(given);
     check(options);
-    const BlockFiller tbb = tbbFiller();
     BuildTimes ignored;
     return withThreads(options.threads, [&] {
-        return Build(newMesh, options, tbb, times ? *times : ignored).runFrom(old, oldMesh, moved);
+        return Build(newMesh, options, nullptr, times ? *times : ignored).runFrom(old, oldMesh, moved);
     });
 }
 

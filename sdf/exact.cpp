@@ -13,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include "sdf/block_bins.h"
 #include "sdf/closest_side.h"
 #include "sdf/clusters.h"
 #include "sdf/last_resort.h"
@@ -29,15 +30,6 @@ constexpr float sideSlack = 1e-3f;
 /// Ways that are tried before the winding number of the whole mesh.
 constexpr int mostWays = 16;
 constexpr std::size_t trianglesPerPoll = 1024;  // a tenth of a millisecond
-
-// Which clusters reach which block of a brick.
-struct BlockBins {
-    struct Pair {
-        std::uint32_t block, cluster;
-    };
-    std::vector<Pair> pairs;
-    std::vector<std::uint32_t> cursors, offsets, clusters;
-};
 
 // What a thread works in; kept from brick to brick.
 struct Scratch {
@@ -66,7 +58,7 @@ class BrickFiller {
         blocks_ = bins_.side / blockSide;
         cut(brick);
         s_.clusters.build(s_.pieces, origin_);
-        bin();
+        s_.bins.build(s_.clusters.clusters(), blocks_, job_.reach);
         s_.origins.clear();
         s_.distances.clear();
         s_.triangles.clear();
@@ -110,59 +102,16 @@ class BrickFiller {
         s_.pieces.clear();
         const PieceLimits limits = limitsOfWanted();
         PieceCutter cutter(longestPieceEdge, s_.pieces);
-        for (const std::uint32_t triangle : bins_.trianglesOf(brick)) {
-            const glm::uvec3 t = job_.mesh.triangles[triangle];
-            const auto corner = [&](unsigned i) { return glm::dvec3(job_.mesh.points[i]) * voxelsPerUnit_; };
-            if (++cut_ % trianglesPerPoll == 0) job_.progress.poll();
-            const PieceCorners corners{corner(t.x), corner(t.y), corner(t.z)};
-            if (!job_.wanted || meets(corners, limits)) cutter.cut(corners, triangle, limits);
-        }
+        bilayer::forEachTriangle(job_.mesh, bins_.trianglesOf(brick), voxelsPerUnit_,
+                        [&](std::uint32_t triangle, const PieceCorners& corners) {
+                            if (++cut_ % trianglesPerPoll == 0) job_.progress.poll();
+                            if (!job_.wanted || meets(corners, limits)) cutter.cut(corners, triangle, limits);
+                        });
         cutter.finish();
     }
 
-    // Gives each block the clusters that reach it.
-    void bin() {
-        BlockBins& bins = s_.bins;
-        bins.pairs.clear();
-        bins.cursors.assign(std::size_t(blocks_) * std::size_t(blocks_) * std::size_t(blocks_), 0);
-        const std::span<const Cluster> clusters = s_.clusters.clusters();
-        for (std::uint32_t i = 0; i < clusters.size(); ++i)
-            forEachBlock(clusters[i], [&](std::uint32_t block) {
-                ++bins.cursors[block];
-                bins.pairs.push_back({block, i});
-            });
-        bins.offsets.assign(1, 0);
-        std::uint32_t sum = 0;
-        for (std::uint32_t& cursor : bins.cursors) {
-            sum += std::exchange(cursor, sum);
-            bins.offsets.push_back(sum);
-        }
-        bins.clusters.resize(sum);
-        for (const auto& pair : bins.pairs) bins.clusters[bins.cursors[pair.block]++] = pair.cluster;
-    }
-
-    template <class Visit>
-    void forEachBlock(const Cluster& cluster, Visit visit) const {
-        const float reach = job_.reach + cluster.radius;
-        const auto block = [&](float coordinate) { return std::clamp(int(coordinate) / blockSide, 0, blocks_ - 1); };
-        const glm::vec3 lower = cluster.sample - reach, upper = cluster.sample + reach;
-        constexpr float half = 0.5f * float(blockSide - 1);
-        const float slab =
-            job_.reach + cluster.thickness +
-            half * (std::abs(cluster.normal.x) + std::abs(cluster.normal.y) + std::abs(cluster.normal.z)) + sideSlack;
-        for (int x = block(lower.x); x <= block(upper.x); ++x)
-            for (int y = block(lower.y); y <= block(upper.y); ++y)
-                for (int z = block(lower.z); z <= block(upper.z); ++z) {
-                    const glm::vec3 toCentre = float(blockSide) * glm::vec3(x, y, z) + half - cluster.sample;
-                    const glm::vec3 away = glm::max(glm::abs(toCentre) - half, glm::vec3(0));
-                    if (glm::dot(away, away) < reach * reach && std::abs(glm::dot(toCentre, cluster.normal)) < slab)
-                        visit(std::uint32_t((x * blocks_ + y) * blocks_ + z));
-                }
-    }
-
     void fillBlock(std::size_t number, const glm::ivec3& inBrick) {
-        const BlockBins& bins = s_.bins;
-        reaching_ = {bins.clusters.data() + bins.offsets[number], bins.clusters.data() + bins.offsets[number + 1]};
+        reaching_ = s_.bins.at(number);
         block_ = origin_ + inBrick;
         if (reaching_.empty() || !wanted(block_, blockSide)) return;
         job_.progress.poll();
@@ -201,7 +150,7 @@ class BrickFiller {
         side_.begin(point);
         side_.offer(s_.pieces[nearest].triangle);
         const float distance = float(side_.distance()) + sideSlack;
-        forEachTriangle(
+        forEachNear(
             [&](const glm::vec3& sample, float radius) {
                 const glm::vec3 away = glm::vec3(local + inBrick_) - sample;
                 return glm::dot(away, away) <= (distance + radius) * (distance + radius);
@@ -216,7 +165,7 @@ class BrickFiller {
 
     // Visits the triangles of all pieces near enough, some of them more than once.
     template <class Near, class Visit>
-    void forEachTriangle(Near near, Visit visit) const {
+    void forEachNear(Near near, Visit visit) const {
         for (const std::uint32_t c : reaching_) {
             const Cluster& cluster = s_.clusters.clusters()[c];
             if (!near(cluster.sample, cluster.radius)) continue;
@@ -246,7 +195,7 @@ class BrickFiller {
     // block, so all that it passes reaches the block.
     std::optional<int> windingAfter(const glm::ivec3& way, int atEnd) {
         passed_.clear();
-        forEachTriangle([](const glm::vec3&, float) { return true; },
+        forEachNear([](const glm::vec3&, float) { return true; },
                         [&](std::uint32_t triangle) { passed_.push_back(triangle); });
         std::sort(passed_.begin(), passed_.end());
         passed_.erase(std::unique(passed_.begin(), passed_.end()), passed_.end());
@@ -277,7 +226,7 @@ class BrickFiller {
 
 void fillExact(const MeshJob& job) {
     const double voxelsPerUnit = 1.0 / double(job.voxelSize);
-    const TriangleBins bins = binTriangles(job.mesh, voxelsPerUnit, job.reach, &job.progress);
+    const TriangleBins bins = binTriangles(job.mesh, job.box, voxelsPerUnit, job.reach, &job.progress);
     job.progress.begin(bins.count());
     LastResort lastResort(job);
     tbb::enumerable_thread_specific<Scratch> scratch;

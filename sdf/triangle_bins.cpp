@@ -7,6 +7,7 @@
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <memory>
 #include <utility>
 
 #include "sdf/progress.h"
@@ -20,11 +21,7 @@ constexpr std::size_t countersAtMost = 1 << 22;  // over all runs: 16 MiB
 constexpr std::size_t trianglesPerRun = 8192;    // what one task bins
 constexpr std::size_t runsPerThread = 8;         // enough to share out unequal runs
 constexpr std::size_t trianglesPerPoll = 1024;   // tens of microseconds, but for huge triangles
-constexpr int bricksWorthCulling = 8;            // a triangle over more bricks than this is tested against each brick
-
-struct Box {
-    glm::ivec3 lower, upper;  // both included
-};
+constexpr std::size_t trianglesAhead = 16;       // whose corners are fetched: about the latency of memory
 
 // Rounds down; quicker than std::floor without SSE 4.1. Right for |value| < 2^31.
 int floorToInt(double value) {
@@ -40,97 +37,155 @@ struct Corners {
     glm::dvec3 a, b, c;  // [voxels]
 };
 
-class Binner {
-  public:
-    Binner(const Mesh& mesh, double voxelsPerUnit, float reach)
-        : mesh_(mesh), voxelsPerUnit_(voxelsPerUnit), reach_(double(reach)) {
-        const Bounds box = bounds(mesh);
-        const glm::dvec3 lower = glm::dvec3(box.lower) * voxelsPerUnit - reach_,
-                         upper = glm::dvec3(box.upper) * voxelsPerUnit + reach_;
-        for (shift_ = smallestShift;; ++shift_) {
-            range_ = {floorToInt(lower) >> shift_, floorToInt(upper) >> shift_};
-            size_ = range_.upper - range_.lower + 1;
-            if (double(size_.x) * double(size_.y) * double(size_.z) <= cellsAtMost) break;
+// The bricks along the axes.
+struct BrickRange {
+    BrickRange(const Bounds& box, double voxelsPerUnit, double reach) {
+        const glm::dvec3 lower = glm::dvec3(box.lower) * voxelsPerUnit - reach,
+                         upper = glm::dvec3(box.upper) * voxelsPerUnit + reach;
+        for (shift = smallestShift;; ++shift) {
+            first = floorToInt(lower) >> shift;
+            size = (floorToInt(upper) >> shift) - first + 1;
+            if (double(size.x) * double(size.y) * double(size.z) <= cellsAtMost) return;
         }
-        cells_ = std::size_t(size_.x) * std::size_t(size_.y) * std::size_t(size_.z);
+    }
+    std::size_t cells() const { return std::size_t(size.x) * std::size_t(size.y) * std::size_t(size.z); }
+    std::size_t cell(int x, int y, int z) const {
+        return (std::size_t(x) * std::size_t(size.y) + std::size_t(y)) * std::size_t(size.z) + std::size_t(z);
     }
 
-    int side() const { return 1 << shift_; }
+    int shift;              // bricks have 2^shift voxels a side
+    glm::ivec3 first, size;  // [bricks]
+};
+
+// The bricks around most triangles: two at most along each axis. In 32 bits, so that they are worked out once.
+class FewBricks {
+  public:
+    FewBricks() = default;
+    FewBricks(std::size_t lowest, const glm::ivec3& extent)
+        : code_(std::uint32_t(lowest) << 3 | unsigned(extent.x > 1) << 2 | unsigned(extent.y > 1) << 1 |
+                unsigned(extent.z > 1)) {}
+    static FewBricks many() {
+        FewBricks code;
+        code.code_ = ~0u;
+        return code;
+    }
+    bool areMany() const { return code_ == ~0u; }
+
+    template <class Visit>
+    void forEach(const BrickRange& range, Visit visit) const {
+        const std::size_t lowest = code_ >> 3, xStep = std::size_t(range.size.y) * std::size_t(range.size.z);
+        for (std::size_t x = 0; x <= ((code_ >> 2) & 1); ++x)
+            for (std::size_t y = 0; y <= ((code_ >> 1) & 1); ++y)
+                for (std::size_t z = 0; z <= (code_ & 1); ++z)
+                    visit(lowest + x * xStep + y * std::size_t(range.size.z) + z);
+    }
+
+  private:
+    std::uint32_t code_;
+};
+static_assert(cellsAtMost < double(1u << 29), "a code holds any cell");
+
+class Binner {
+  public:
+    Binner(const Mesh& mesh, const Bounds& box, double voxelsPerUnit, float reach)
+        : mesh_(mesh),
+          voxelsPerUnit_(voxelsPerUnit),
+          reach_(double(reach)),
+          range_(box, voxelsPerUnit, double(reach)) {}
 
     TriangleBins run(Progress* progress) {
         // a counting sort, stable whatever the number of runs: count in each run, sum up, scatter
-        const std::size_t count = mesh_.triangles.size();
+        const std::size_t count = mesh_.triangles.size(), cells = range_.cells();
         const auto threads = std::size_t(tbb::this_task_arena::max_concurrency());
-        const std::size_t runs = std::max<std::size_t>(1, std::min({threads * runsPerThread, countersAtMost / cells_,
-                                                                    (count + trianglesPerRun - 1) / trianglesPerRun}));
-        std::vector<std::uint32_t> cursors(runs * cells_, 0);
-        const auto forEachPlace = [&](std::size_t run, auto visit) {
+        const std::size_t runs = std::max<std::size_t>(
+            1, std::min({threads * runsPerThread, countersAtMost / cells, (count + trianglesPerRun - 1) / trianglesPerRun}));
+        std::vector<std::uint32_t> cursors(runs * cells, 0);
+        const auto codes = std::make_unique_for_overwrite<FewBricks[]>(count);
+        const auto forEachTriangle = [&](std::size_t run, auto visit) {
             for (std::size_t i = count * run / runs; i < count * (run + 1) / runs; ++i) {
                 if (progress && i % trianglesPerPoll == 0) progress->poll();
-                forEachBrick(i, [&](std::size_t cell) { visit(cell, cursors[run * cells_ + cell], i); });
+                visit(i, cursors.data() + run * cells);
             }
         };
         tbb::parallel_for(std::size_t(0), runs, [&](std::size_t run) {
-            forEachPlace(run, [](std::size_t, std::uint32_t& n, std::size_t) { ++n; });
+            forEachTriangle(run, [&](std::size_t i, std::uint32_t* cursor) {
+                prefetch(i);
+                codes[i] = visitBricks(i, [&](std::size_t cell) { ++cursor[cell]; });
+            });
         });
         TriangleBins bins;
-        bins.side = side();
+        bins.side = 1 << range_.shift;
         std::vector<std::uint64_t> begins = sumUp(cursors, runs, bins);
         bins.triangles.resize(bins.offsets.back());
         tbb::parallel_for(std::size_t(0), runs, [&](std::size_t run) {
-            forEachPlace(run, [&](std::size_t cell, std::uint32_t& n, std::size_t i) {
-                bins.triangles[begins[cell] + n++] = std::uint32_t(i);
+            forEachTriangle(run, [&](std::size_t i, std::uint32_t* cursor) {
+                const auto put = [&](std::size_t cell) {
+                    bins.triangles[begins[cell] + cursor[cell]++] = std::uint32_t(i);
+                };
+                codes[i].areMany() ? void(visitBricks(i, put)) : codes[i].forEach(range_, put);
             });
         });
         return bins;
     }
 
   private:
+    // Corners of triangles in the order of a file are all over memory.
+    void prefetch(std::size_t i) const {
+        if (i + trianglesAhead >= mesh_.triangles.size()) return;
+        const glm::uvec3& ahead = mesh_.triangles[i + trianglesAhead];
+        for (int k = 0; k < 3; ++k) __builtin_prefetch(&mesh_.points[ahead[k]]);
+    }
+
     // Turns counts into places: `cursors` become offsets inside their brick, and the result the begin of each cell.
     std::vector<std::uint64_t> sumUp(std::vector<std::uint32_t>& cursors, std::size_t runs, TriangleBins& bins) const {
-        std::vector<std::uint64_t> begins(cells_);
+        const std::size_t cells = range_.cells();
+        std::vector<std::uint64_t> begins(cells);
         std::uint64_t sum = 0;
         bins.offsets.push_back(0);
-        for (std::size_t cell = 0; cell < cells_; ++cell) {
+        for (std::size_t cell = 0; cell < cells; ++cell) {
             begins[cell] = sum;
             std::uint32_t inCell = 0;
-            for (std::size_t run = 0; run < runs; ++run) inCell += std::exchange(cursors[run * cells_ + cell], inCell);
+            for (std::size_t run = 0; run < runs; ++run) inCell += std::exchange(cursors[run * cells + cell], inCell);
             if (inCell == 0) continue;
             sum += inCell;
-            bins.origins.push_back((range_.lower + place(cell)) * bins.side);
+            bins.origins.push_back((range_.first + place(cell)) * bins.side);
             bins.offsets.push_back(sum);
         }
         return begins;
     }
 
     glm::ivec3 place(std::size_t cell) const {
-        return {int(cell / std::size_t(size_.z) / std::size_t(size_.y)),
-                int(cell / std::size_t(size_.z) % std::size_t(size_.y)), int(cell % std::size_t(size_.z))};
+        const auto y = std::size_t(range_.size.y), z = std::size_t(range_.size.z);
+        return {int(cell / z / y), int(cell / z % y), int(cell % z)};
     }
 
+    // Visits the bricks around a triangle.
     template <class Visit>
-    void forEachBrick(std::size_t triangle, Visit visit) const {
+    FewBricks visitBricks(std::size_t triangle, Visit visit) const {
         const glm::uvec3 t = mesh_.triangles[triangle];
         const Corners c{glm::dvec3(mesh_.points[t.x]) * voxelsPerUnit_, glm::dvec3(mesh_.points[t.y]) * voxelsPerUnit_,
                         glm::dvec3(mesh_.points[t.z]) * voxelsPerUnit_};
-        const glm::ivec3 lower = (floorToInt(glm::min(c.a, glm::min(c.b, c.c)) - reach_) >> shift_) - range_.lower,
-                         upper = (floorToInt(glm::max(c.a, glm::max(c.b, c.c)) + reach_) >> shift_) - range_.lower;
+        const glm::ivec3
+            lower = (floorToInt(glm::min(c.a, glm::min(c.b, c.c)) - reach_) >> range_.shift) - range_.first,
+            upper = (floorToInt(glm::max(c.a, glm::max(c.b, c.c)) + reach_) >> range_.shift) - range_.first;
         const glm::ivec3 extent = upper - lower + 1;
-        const bool large = std::int64_t(extent.x) * extent.y * extent.z > bricksWorthCulling;
-        const glm::dvec3 normal = large ? glm::cross(c.b - c.a, c.c - c.a) : glm::dvec3(0);
+        if (extent.x <= 2 && extent.y <= 2 && extent.z <= 2) {
+            const FewBricks few(range_.cell(lower.x, lower.y, lower.z), extent);
+            few.forEach(range_, visit);
+            return few;
+        }
+        const glm::dvec3 normal = glm::cross(c.b - c.a, c.c - c.a);
         for (int x = lower.x; x <= upper.x; ++x)
             for (int y = lower.y; y <= upper.y; ++y)
-                for (int z = lower.z; z <= upper.z; ++z) {
-                    if (large && planeMisses(c.a, normal, {x, y, z})) continue;
-                    visit((std::size_t(x) * std::size_t(size_.y) + std::size_t(y)) * std::size_t(size_.z) +
-                          std::size_t(z));
-                }
+                for (int z = lower.z; z <= upper.z; ++z)
+                    if (!planeMisses(c.a, normal, {x, y, z})) visit(range_.cell(x, y, z));
+        return FewBricks::many();
     }
 
     // Whether the plane of a triangle passes a brick farther away than the reach.
     bool planeMisses(const glm::dvec3& a, const glm::dvec3& normal, const glm::ivec3& cell) const {
-        const double half = 0.5 * double(1 << shift_);
-        const glm::dvec3 centre = glm::dvec3((range_.lower + cell) * (1 << shift_)) + half;
+        const double half = 0.5 * double(1 << range_.shift);
+        const glm::dvec3 centre = glm::dvec3((range_.first + cell) * (1 << range_.shift)) + half;
         const glm::dvec3 spread = glm::abs(normal) * half;
         return std::abs(glm::dot(normal, centre - a)) >
                spread.x + spread.y + spread.z + (reach_ + 1) * glm::length(normal);
@@ -138,20 +193,17 @@ class Binner {
 
     const Mesh& mesh_;
     double voxelsPerUnit_, reach_;
-    int shift_ = smallestShift;
-    Box range_;  // of all bricks, in bricks
-    glm::ivec3 size_;
-    std::size_t cells_ = 0;
+    BrickRange range_;
 };
 
 }  // namespace
 
-TriangleBins binTriangles(const Mesh& mesh, double voxelsPerUnit, float reach, Progress* progress) {
-    return Binner(mesh, voxelsPerUnit, reach).run(progress);
+TriangleBins binTriangles(const Mesh& mesh, const Bounds& box, double voxelsPerUnit, float reach, Progress* progress) {
+    return Binner(mesh, box, voxelsPerUnit, reach).run(progress);
 }
 
-int brickSideFor(const Mesh& mesh, double voxelsPerUnit, float reach) {
-    return Binner(mesh, voxelsPerUnit, reach).side();
+int brickSideFor(const Bounds& box, double voxelsPerUnit, float reach) {
+    return 1 << BrickRange(box, voxelsPerUnit, double(reach)).shift;
 }
 
 }  // namespace bilayer

@@ -2,6 +2,7 @@
 // that memory stays a fraction of the mesh's own.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <glm/vec3.hpp>
@@ -29,10 +30,30 @@ struct TriangleBins {
 
 /// Bins triangles into bricks. `reach` is how far from a triangle a voxel may lie [voxels]. A brick may hold triangles
 /// that reach none of its voxels. Throws Cancelled.
+/// @param box       of the mesh
 /// @param progress  polled, unless null
-TriangleBins binTriangles(const Mesh& mesh, double voxelsPerUnit, float reach, Progress* progress = nullptr);
+TriangleBins binTriangles(const Mesh& mesh, const Bounds& box, double voxelsPerUnit, float reach,
+                          Progress* progress = nullptr);
+
+/// Calls visit(triangle, corners) for the triangles of a brick, with their corners in voxels. Those to come are fetched
+/// ahead, since they are all over memory.
+template <class Visit>
+void forEachTriangle(const Mesh& mesh, std::span<const std::uint32_t> triangles, double voxelsPerUnit, Visit visit) {
+    // as far ahead as memory takes to answer: first the indices, then the corners
+    constexpr std::size_t indicesAhead = 16, cornersAhead = 8;
+    for (std::size_t i = 0; i < triangles.size(); ++i) {
+        if (i + indicesAhead < triangles.size()) __builtin_prefetch(&mesh.triangles[triangles[i + indicesAhead]]);
+        if (i + cornersAhead < triangles.size()) {
+            const glm::uvec3& ahead = mesh.triangles[triangles[i + cornersAhead]];
+            for (int k = 0; k < 3; ++k) __builtin_prefetch(&mesh.points[ahead[k]]);
+        }
+        const glm::uvec3& t = mesh.triangles[triangles[i]];
+        const auto corner = [&](unsigned k) { return glm::dvec3(mesh.points[k]) * voxelsPerUnit; };
+        visit(triangles[i], std::array<glm::dvec3, 3>{corner(t.x), corner(t.y), corner(t.z)});
+    }
+}
 
 /// The side of the bricks that binTriangles() would make [voxels].
-int brickSideFor(const Mesh& mesh, double voxelsPerUnit, float reach);
+int brickSideFor(const Bounds& box, double voxelsPerUnit, float reach);
 
 }  // namespace bilayer

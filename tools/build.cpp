@@ -70,21 +70,22 @@ void requirePresent(const Arguments& a) {
             fmt::format("--backend opencl: has no method {}, give it --method double-layer", a.method));
 }
 
-BlockFiller makeFiller(const Arguments& a) {
-    if (a.backend == "tbb") return tbbFiller();
+// Nothing for the processor.
+std::optional<BlockFiller> makeFiller(const Arguments& a) {
+    if (a.backend == "tbb") return std::nullopt;
     return openclFiller(openDevice(a.device), {.memoryMiB = a.deviceMemory});
 }
 
 LevelSet timedBuild(const Mesh& mesh, const Arguments& a, Outcome& outcome) {
-    const BlockFiller filler = makeFiller(a);
-    outcome.device = a.backend == "tbb" ? fmt::format("processor ({})", simdName()) : filler.device;
+    const std::optional<BlockFiller> filler = makeFiller(a);
+    outcome.device = filler ? filler->device : fmt::format("processor ({})", simdName());
     ProgressBar bar("building");
     BuildOptions options = a.options;
     options.progress = bar.callback();
     const Stopwatch watch;
     LevelSet field = [&] {
         try {
-            return build(mesh, options, filler, &outcome.times);
+            return build(mesh, options, filler ? &*filler : nullptr, &outcome.times);
         } catch (const std::invalid_argument& error) {
             throw std::invalid_argument(fmt::format("{}: {}", a.mesh.string(), error.what()));
         }

@@ -38,7 +38,8 @@ Blocks fill(const Mesh& mesh, float voxelSize, float reach = 3, bool sign = true
     std::size_t taken = 0;
     const std::function<bool(float)> nobody;
     Progress progress(nobody);
-    fillPseudonormal({mesh, voxelSize, reach, true, sign,
+    const Bounds box = bounds(mesh);
+    fillPseudonormal({mesh, box, voxelSize, reach, true, sign,
                       [&](const FilledBlocks& blocks) {
                           const std::lock_guard lock(mutex);
                           taken += blocks.origins.size();
@@ -347,5 +348,5 @@ TEST_CASE("pseudonormal: what the sink throws ends the work") {
     const std::function<bool(float)> nobody;
     Progress progress(nobody);
     const auto broken = [](const FilledBlocks&) { throw Cancelled(); };
-    CHECK_THROWS_AS(fillPseudonormal({mesh, 0.3f, 3, false, true, broken, progress}), Cancelled);
+    CHECK_THROWS_AS(fillPseudonormal({mesh, bounds(mesh), 0.3f, 3, false, true, broken, progress}), Cancelled);
 }

@@ -1,0 +1,94 @@
+// The samples of the double layer method in one brick: parts of triangles spread out into runs, runs gathered into groups
+// that a block can look at or leave out as a whole.
+#pragma once
+
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <span>
+#include <vector>
+
+#include "sdf/tile_cutter.h"
+
+namespace bilayer {
+
+/// Samples of one part of a triangle. They lie in a plane, and their inner and outer samples are the same offset away from all of
+/// them. So for a voxel p with squared distance A to the nearest of them and height h over the plane, the nearest inner
+/// and outer samples are at squared distances A + delta^2 + 2 delta h and A + delta^2 - 2 delta h.
+struct LayerRun {
+    glm::vec3 twiceOffset;     ///< 2 delta times the outward normal [voxels]
+    std::int32_t triangle;     ///< owner
+    std::uint32_t begin, end;  ///< its samples, at least one
+};
+
+/// Runs that lie together.
+struct LayerGroup {
+    glm::vec3 sample;  ///< the middle of all samples, in the voxels of the brick
+    /// No sample is farther from the middle, no inner or outer sample from the middle less or plus `offset` [voxels].
+    float radius;
+    glm::vec3 normal;          ///< of a plane through the middle
+    float thickness;           ///< no sample is farther from that plane [voxels]
+    glm::vec3 offset;          ///< mean of the runs' offsets [voxels]
+    std::uint32_t begin, end;  ///< its runs; the first one is near the middle
+};
+
+/// The samples of a brick. Memory is used again from brick to brick.
+class LayerSamples {
+  public:
+    /// Begins with a brick.
+    /// @param origin  index coordinates of its first voxel
+    /// @param side    [voxels]
+    /// @param reach   samples farther than this from the brick are left out [voxels]
+    /// @param delta   distance of each layer from the surface [voxels]
+    /// @param cells   whether the lattice point nearest to each sample is asked for
+    void begin(const glm::ivec3& origin, int side, float reach, float delta, bool cells);
+
+    /// Adds the samples of a part of a triangle.
+    void add(const TilePart& part, std::uint32_t triangle) {
+        if (part.rows == 1 && !wantCells_)
+            addOne(part, triangle);
+        else
+            addRows(part, triangle);
+    }
+
+    /// Gathers runs into groups; call it after the last tile.
+    void finish();
+
+    std::span<const LayerGroup> groups() const { return groups_; }
+    std::span<const LayerRun> runs() const { return runs_; }
+    std::span<const glm::vec3> places() const { return places_; }  ///< of all samples, in the voxels of the brick
+    std::span<const glm::vec3> cells() const { return cells_; }    ///< the lattice points nearest to them, if asked for
+
+  private:
+    // Most parts of a fine mesh have one sample.
+    void addOne(const TilePart& part, std::uint32_t triangle) {
+        const TriangleCorners& c = part.corners;
+        const glm::vec3 place((c[0] + c[1] + c[2]) * (1.0 / 3.0) - origin_);
+        if (glm::any(glm::lessThan(place, lower_)) || glm::any(glm::greaterThan(place, upper_))) return;
+        places_.push_back(place);
+        addRun(part, triangle, std::uint32_t(places_.size() - 1));
+    }
+    // A run of all places from `begin` on.
+    void addRun(const TilePart& part, std::uint32_t triangle, std::uint32_t begin) {
+        areas_ += part.length;
+        const float scale = twiceDelta_ / float(part.length);
+        runs_.push_back({scale * glm::vec3(part.normal), std::int32_t(triangle), begin,
+                         std::uint32_t(places_.size())});
+    }
+    void addRows(const TilePart& part, std::uint32_t triangle);
+    LayerGroup groupOf(std::uint32_t run) const;
+    void gatherRuns();
+    void sortByCell(const glm::vec3& lower, const glm::ivec3& size);
+    LayerGroup cluster(std::uint32_t begin, std::uint32_t end);
+
+    glm::dvec3 origin_{0};
+    glm::vec3 lower_{0}, upper_{0};  // of all places that can matter
+    float twiceDelta_ = 1;
+    bool wantCells_ = false;
+    double areas_ = 0;  // of all runs' triangles, twice [voxels^2]
+    std::vector<LayerGroup> groups_;
+    std::vector<LayerRun> runs_, unsorted_;
+    std::vector<glm::vec3> places_, cells_;
+    std::vector<std::uint32_t> cellOf_, cursors_;
+};
+
+}  // namespace bilayer
