@@ -50,8 +50,8 @@ class Assembler {
 
     /// Counts the neighbouring voxels in what distances() gave that are on different sides of the surface without room
     /// for it between them: their distances together exceed a voxel. None in the field of a closed, oriented mesh that
-    /// does not meet itself. Only pairs in different blocks count: inside a block sides agree by construction. The
-    /// space outside all blocks must be outside.
+    /// does not meet itself. Only pairs in different blocks count: what contradicts itself inside a block is known to
+    /// completeSides() in links.h. The space outside all blocks must be outside.
     std::size_t conflicts(const openvdb::FloatGrid& distances) const;
 
   private:

@@ -58,6 +58,8 @@ struct MeshJob {
     std::function<bool(const glm::ivec3& first, int side)> wanted{};
     /// Counts the voxels whose side the triangles within reach leave open, so that all of the mesh was asked; or null.
     std::atomic<std::size_t>* undecided = nullptr;
+    /// Counts the voxels that normals say are on both sides of the surface; or null.
+    std::atomic<std::size_t>* conflicts = nullptr;
 };
 
 /// Everything a filler works from.

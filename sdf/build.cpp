@@ -101,7 +101,8 @@ Survey survey(const Mesh& mesh) {
                 const glm::uvec3 t = mesh.triangles[i];
                 const glm::vec3 &a = mesh.points[t.x], &b = mesh.points[t.y], &c = mesh.points[t.z];
                 for (const glm::vec3* p : {&a, &b, &c}) seen.box.add(*p);
-                seen.area += 0.5 * glm::length(glm::cross(glm::dvec3(b) - glm::dvec3(a), glm::dvec3(c) - glm::dvec3(a)));
+                seen.area +=
+                    0.5 * glm::length(glm::cross(glm::dvec3(b) - glm::dvec3(a), glm::dvec3(c) - glm::dvec3(a)));
             }
             return seen;
         },
@@ -177,7 +178,7 @@ class Stopwatch {
 // How a field got its signs.
 struct Signs {
     std::string name, reason;
-    std::size_t conflicts = 0;  // neighbours that contradict each other
+    std::size_t conflicts = 0;  // voxels on both sides, and neighbours that contradict each other
     std::size_t undecided = 0;  // voxels whose nearest normals cancel out
 };
 
@@ -384,9 +385,9 @@ class Build {
         progress_.poll();
         progress_.begin(bricks.count());
         filler_->fill({tiles, bricks, parameters, [&](std::size_t, const FilledBlocks& blocks) {
-                          assembler.take(blocks);
-                          progress_.advance();
-                      }});
+                           assembler.take(blocks);
+                           progress_.advance();
+                       }});
     }
 
     // Picks a way, and another one where the first contradicts itself.
@@ -431,12 +432,17 @@ class Build {
         const BandWidths widths = bandOf(options_);
         Assembler assembler(byNormals ? widths : BandWidths{reach, reach, options_.voxelSize}, options_.triangles,
                             plain(sign), progress_);
-        std::atomic<std::size_t> undecided = 0;
-        MeshJob job{mesh,      options_.voxelSize,
-                    reach,     options_.triangles,
-                    byNormals, [&](const FilledBlocks& blocks) { assembler.take(blocks); },
-                    progress_, {},
-                    &undecided};
+        std::atomic<std::size_t> undecided = 0, conflicts = 0;
+        MeshJob job{mesh,
+                    options_.voxelSize,
+                    reach,
+                    options_.triangles,
+                    byNormals,
+                    [&](const FilledBlocks& blocks) { assembler.take(blocks); },
+                    progress_,
+                    {},
+                    &undecided,
+                    &conflicts};
         if (adapt) adapt(job, assembler);
         // triangles turned around, in a mended mesh, have the same box
         options_.method == Method::exact ? fillExact(job, survey_.box) : fillPseudonormal(job);
@@ -445,7 +451,8 @@ class Build {
         progress_.poll();
         if (sign == Sign::winding) signByWinding(*distance_, mesh, widths, balanced(mesh));
         if (sign == Sign::flood) signByFlood(*distance_, mesh, options_.gap, widths);
-        signs_ = {name(sign), reason, byNormals ? assembler.conflicts(*distance_) : 0, undecided};
+        if (byNormals) conflicts += assembler.conflicts(*distance_);
+        signs_ = {name(sign), reason, conflicts, undecided};
         times_.assemble += part.lap();
     }
 
@@ -484,8 +491,7 @@ LevelSet build(const Mesh& mesh, const BuildOptions& given, const BlockFiller* f
                                                 filler->backend, name(options.method)));
     openvdb::initialize();
     BuildTimes ignored;
-    return withThreads(options.threads,
-                       [&] { return Build(mesh, options, filler, times ? *times : ignored).run(); });
+    return withThreads(options.threads, [&] { return Build(mesh, options, filler, times ? *times : ignored).run(); });
 }
 
 LevelSet rebuild(const LevelSet& old, const Mesh& oldMesh, const Mesh& newMesh, std::span<const std::uint32_t> moved,

@@ -3,14 +3,12 @@
 
 #include <oneapi/tbb/enumerable_thread_specific.h>
 #include <oneapi/tbb/parallel_for.h>
-#include <oneapi/tbb/task_arena.h>
 
 #include <algorithm>
 #include <bit>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/vector_relational.hpp>
-#include <mutex>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -18,9 +16,9 @@
 #include "sdf/block_bins.h"
 #include "sdf/closest_side.h"
 #include "sdf/clusters.h"
+#include "sdf/last_resort.h"
 #include "sdf/progress.h"
 #include "sdf/triangle_bins.h"
-#include "sdf/winding.h"
 
 namespace bilayer {
 namespace {
@@ -41,25 +39,6 @@ struct Scratch {
     std::vector<glm::ivec3> origins;
     std::vector<float> distances;
     std::vector<std::int32_t> triangles;
-};
-
-// The winding number, for the rare voxel whose closest normals cancel out; made when it is first asked.
-class LastResort {
-  public:
-    explicit LastResort(const MeshJob& job) : mesh_(job.mesh), asked_(job.undecided) {}
-
-    bool isInside(const glm::dvec3& point) {
-        if (asked_) ++*asked_;
-        // isolated: a thread that waits for the tree must not be given a brick that would wait for it too
-        std::call_once(made_, [&] { tbb::this_task_arena::isolate([&] { winding_.emplace(mesh_); }); });
-        return (*winding_)(point) > 0.5;
-    }
-
-  private:
-    const Mesh& mesh_;
-    std::atomic<std::size_t>* asked_;
-    std::once_flag made_;
-    std::optional<WindingNumber> winding_;
 };
 
 class BrickFiller {
@@ -154,19 +133,12 @@ class BrickFiller {
     // Sides over faces are known; links carry them on. What they do not reach is asked for, a voxel a component, those
     // far from the surface first.
     BlockMask insideVoxels() {
-        const Links links = findLinks(found_);
-        BlockMask outside = found_.outside, inside = found_.inside;
-        spread(links, outside);
-        spread(links, inside);
-        for (const BlockMask* some : {&found_.far, &found_.mid, &found_.known})
-            for (std::size_t x = 0; x < inside.size(); ++x)
-                while (const std::uint64_t seeds = (*some)[x] & ~(outside[x] | inside[x])) {
-                    const int voxel = int(x) * 64 + std::countr_zero(seeds);
-                    BlockMask& side = isInside(voxel, outside, inside) ? inside : outside;
-                    side[x] |= std::uint64_t(1) << (voxel % 64);
-                    spread(links, side);
-                }
-        return inside;
+        BlockSides sides{found_.outside, found_.inside};
+        const std::size_t onBoth =
+            completeSides(findLinks(found_.distance), {&found_.far, &found_.mid, &found_.known}, sides,
+                          [&](int voxel) { return isInside(voxel, sides.outside, sides.inside); });
+        if (onBoth > 0 && job_.conflicts) *job_.conflicts += onBoth;
+        return sides.inside;
     }
 
     // Asks the closest feature; where its normals cancel out, the way to a voxel whose side is known; at last the

@@ -33,8 +33,6 @@ constexpr float raisedPart = 1e-3f, raisedBy = 5e-7f;  // [voxels^2]
 constexpr float heightSlack = 1e-3f;
 /// Nearer to a face than this its side is left to a closer look [voxels].
 constexpr float leastHeight = 1e-3f;
-/// Voxels farther from the surface than this are asked first for their side, then those beyond the next [voxels].
-constexpr float farFrom = 0.5f, midFrom = 0.1f;
 
 /// A slice is the 64 voxels of one x; a chunk is what one vector holds of it.
 constexpr int sliceVoxels = blockSide * blockSide;
@@ -372,32 +370,6 @@ bool measureBlock(const BlockInput& input, BlockDistances& block) {
     return any(block.known);
 }
 
-// Bits of the voxels of a row whose distance and a neighbour's together exceed a voxel.
-inline std::uint64_t linked(const float* a, const float* b) {
-    const hn::CappedTag<float, blockSide> tag;
-    std::uint64_t bits = 0;
-    for (std::size_t z = 0; z < std::size_t(blockSide); z += hn::Lanes(tag)) {
-        std::uint8_t some = 0;
-        const auto sum = hn::Add(hn::LoadU(tag, a + z), hn::LoadU(tag, b + z));
-        hn::StoreMaskBits(tag, hn::Gt(sum, hn::Set(tag, 1.f + linkSlack)), &some);
-        bits |= std::uint64_t(some) << z;
-    }
-    return bits;
-}
-
-Links findLinks(const BlockDistances& block) {
-    constexpr std::uint64_t withoutLast = 0x7f;
-    Links links{};
-    for (int x = 0; x < blockSide; ++x)
-        for (int y = 0; y < blockSide; ++y) {
-            const float* row = block.distance + (x * blockSide + y) * blockSide;
-            links.z[std::size_t(x)] |= (linked(row, row + 1) & withoutLast) << (y * blockSide);
-            if (y + 1 < blockSide) links.y[std::size_t(x)] |= linked(row, row + blockSide) << (y * blockSide);
-            if (x + 1 < blockSide) links.x[std::size_t(x)] |= linked(row, row + sliceVoxels) << (y * blockSide);
-        }
-    return links;
-}
-
 void signDistances(const BlockDistances& block, const BlockMask& inside, float* distances) {
     const Tag tag;
     const IntTag intTag;
@@ -418,15 +390,10 @@ HWY_AFTER_NAMESPACE();
 namespace bilayer {
 
 HWY_EXPORT(measureBlock);
-HWY_EXPORT(findLinks);
 HWY_EXPORT(signDistances);
 
 bool measureBlock(const BlockInput& input, BlockDistances& block) {
     return HWY_DYNAMIC_DISPATCH(measureBlock)(input, block);
-}
-
-Links findLinks(const BlockDistances& block) {
-    return HWY_DYNAMIC_DISPATCH(findLinks)(block);
 }
 
 void signDistances(const BlockDistances& block, const BlockMask& inside, float* distances) {

@@ -62,9 +62,6 @@ struct BlockDistances {
 /// Measures a block. False if no voxel is within the reach; `block` then holds nothing of use.
 bool measureBlock(const BlockInput& input, BlockDistances& block);
 
-/// The links between the voxels of a measured block.
-Links findLinks(const BlockDistances& block);
-
 /// Distances with their signs, farAway beyond the reach.
 void signDistances(const BlockDistances& block, const BlockMask& inside, float* distances);
 

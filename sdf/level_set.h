@@ -27,7 +27,7 @@ class LevelSet {
     /// What told inside from outside: "normals", "winding", "flood" or "layers"; "" for a field from elsewhere.
     const std::string& sign() const;
     const std::string& signReason() const;  ///< why it was taken, without a full stop: "closed and oriented"
-    std::uint64_t signConflicts() const;    ///< pairs of voxels whose normals contradict each other
+    std::uint64_t signConflicts() const;    ///< voxels and pairs of neighbours whose normals contradict each other
     /// What distances in the band as built are off by at most [m]; infinite: there is no bound; NaN: nobody knows.
     float errorBound() const;
     std::uint64_t meshHash() const;  ///< hash() of the mesh it came from, or 0

@@ -1,8 +1,50 @@
+// Highway compiles the part between HWY_BEFORE_NAMESPACE and HWY_AFTER_NAMESPACE once for each instruction set.
 #include "sdf/links.h"
 
-#include <bit>
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "sdf/links.cpp"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
 
+HWY_BEFORE_NAMESPACE();
+namespace bilayer::HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+// Bits of the voxels of a row whose distance and a neighbour's together exceed a voxel.
+inline std::uint64_t linked(const float* a, const float* b) {
+    const hn::CappedTag<float, blockSide> tag;
+    std::uint64_t bits = 0;
+    for (std::size_t z = 0; z < std::size_t(blockSide); z += hn::Lanes(tag)) {
+        std::uint8_t some = 0;
+        const auto sum = hn::Add(hn::LoadU(tag, a + z), hn::LoadU(tag, b + z));
+        hn::StoreMaskBits(tag, hn::Gt(sum, hn::Set(tag, 1.f + linkSlack)), &some);
+        bits |= std::uint64_t(some) << z;
+    }
+    return bits;
+}
+
+Links linksOf(const float* distances) {
+    constexpr std::uint64_t withoutLast = 0x7f;
+    Links links{};
+    for (int x = 0; x < blockSide; ++x)
+        for (int y = 0; y < blockSide; ++y) {
+            const float* row = distances + (x * blockSide + y) * blockSide;
+            links.z[std::size_t(x)] |= (linked(row, row + 1) & withoutLast) << (y * blockSide);
+            if (y + 1 < blockSide) links.y[std::size_t(x)] |= linked(row, row + blockSide) << (y * blockSide);
+            if (x + 1 < blockSide)
+                links.x[std::size_t(x)] |= linked(row, row + blockSide * blockSide) << (y * blockSide);
+        }
+    return links;
+}
+
+}  // namespace bilayer::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
 namespace bilayer {
+
+HWY_EXPORT(linksOf);
+
 namespace {
 
 // Lets a set grow inside one slice of 64 voxels until it stops.
@@ -16,6 +58,10 @@ std::uint64_t grownInSlice(std::uint64_t set, std::uint64_t linkY, std::uint64_t
 }
 
 }  // namespace
+
+Links findLinks(const float* distances) {
+    return HWY_DYNAMIC_DISPATCH(linksOf)(distances);
+}
 
 void spread(const Links& links, BlockMask& set) {
     unsigned changed = 0;  // slices whose neighbours have not heard of them yet
@@ -38,3 +84,4 @@ void spread(const Links& links, BlockMask& set) {
 }
 
 }  // namespace bilayer
+#endif  // HWY_ONCE

@@ -8,8 +8,9 @@
 namespace bilayer {
 
 /// Fills all blocks that hold a voxel within the job's reach: distances to 1e-5 voxel (beyond 16 voxels in proportion),
-/// nearest triangles, signs at each voxel by the pseudonormal. Vertices with equal coordinates are one, and faces with
-/// equal vertices count once. The bytes of each block do not depend on the number of threads.
+/// nearest triangles, and signs: over a face by its normal, elsewhere from linked voxels (links.h) or, where these know
+/// nothing, by the pseudonormal. Vertices with equal coordinates are one, and faces with equal vertices count once. The
+/// bytes of each block do not depend on the number of threads.
 /// Throws std::invalid_argument where makeWideTree() does, and what the sink throws.
 void fillPseudonormal(const MeshJob& job);
 

@@ -26,14 +26,17 @@ using Mask = hn::Mask<Tag>;
 
 /// Triangles whose distances differ by less may share the closest point: more than floats blur [voxels].
 constexpr float tie = 1e-5f;
-/// A height over a plane below this does not tell the side [voxels].
-constexpr float leastHeight = 1e-5f;
+/// Nearer to a face than this its side is left to a closer look [voxels].
+constexpr float leastHeight = 1e-3f;
 /// Up to this reach the two above hold; they grow with it beyond, as the rounding of distances does [voxels].
 constexpr float usualReach = 16;
 /// Room for the rounding of distances, and for ties, when a bound is taken from one place to another [voxels].
 constexpr float slack = 1e-3f;
 /// The eight corners of a cube, each beside the one before.
 constexpr int path[8][3] = {{0, 0, 0}, {0, 0, 1}, {0, 1, 1}, {0, 1, 0}, {1, 1, 0}, {1, 1, 1}, {1, 0, 1}, {1, 0, 0}};
+/// The eight voxels of a cube are measured together against no more triangles than this: with more it is quicker to let
+/// each choose its own. Cubes with more nodes around them have more.
+constexpr std::size_t mostTogether = 64, mostNodes = 16;
 /// Room for the rounding of a squared distance.
 constexpr float roundUp = 1 + 1e-6f;
 
@@ -128,6 +131,51 @@ inline Vec beyond2(Vec place, Vec length) {
     return square(hn::Max(hn::Max(hn::Neg(place), hn::Sub(place, length)), zero));
 }
 
+// Squared distances, and heights over triangles; 0 beside them.
+struct Measured {
+    Vec distance2, height;
+};
+
+// Measures points against triangles, a pair a lane; load() takes a lane's triangle from an array of a leaf. The
+// distance along the plane is the least over the three edges of how far the point lies beside and beyond them; over the
+// triangle itself only the latter counts, which is zero for one edge at least, so that rounding can not take a sliver's
+// line for its inside.
+template <class Load>
+inline Measured measure(const WideLeaf& leaf, Load load, Vec px, Vec py, Vec pz) {
+    const Tag tag;
+    const auto dot = [&](Vec ax, Vec ay, Vec az, Vec bx, Vec by, Vec bz) {
+        return hn::Add(hn::Add(hn::Mul(ax, bx), hn::Mul(ay, by)), hn::Mul(az, bz));
+    };
+    const auto det = [&](Vec a, Vec b, Vec c, Vec d) { return hn::Sub(hn::Mul(a, d), hn::Mul(b, c)); };
+    const Vec qx = hn::Sub(hn::Sub(px, load(leaf.cell[0])), load(leaf.corner[0]));
+    const Vec qy = hn::Sub(hn::Sub(py, load(leaf.cell[1])), load(leaf.corner[1]));
+    const Vec qz = hn::Sub(hn::Sub(pz, load(leaf.cell[2])), load(leaf.corner[2]));
+    const Vec nx = load(leaf.normal[0]), ny = load(leaf.normal[1]), nz = load(leaf.normal[2]);
+    const Vec ax = load(leaf.along[0]), ay = load(leaf.along[1]), az = load(leaf.along[2]);
+    const Vec x = dot(qx, qy, qz, ax, ay, az), z = dot(qx, qy, qz, nx, ny, nz);
+    const Vec y = dot(qx, qy, qz, det(ny, nz, ay, az), det(nz, nx, az, ax), det(nx, ny, ax, ay));
+
+    const Vec ab = load(leaf.lengthAB), fromB = hn::Sub(x, ab);
+    const Vec bcx = load(leaf.directionBC[0]), bcy = load(leaf.directionBC[1]);
+    const Vec acx = load(leaf.directionAC[0]), acy = load(leaf.directionAC[1]);
+    const Vec besideBC = det(bcx, bcy, fromB, y), besideAC = det(x, y, acx, acy);
+    const Vec alongBC = hn::Add(hn::Mul(fromB, bcx), hn::Mul(y, bcy));
+    const Vec alongAC = hn::Add(hn::Mul(x, acx), hn::Mul(y, acy));
+    const Mask over = hn::Gt(hn::Min(y, hn::Min(besideBC, besideAC)), hn::Zero(tag));
+    const auto edge = [&](Vec beside, Vec along, Vec length) {
+        return hn::Add(beyond2(along, length), hn::IfThenZeroElse(over, square(beside)));
+    };
+    const Vec flat2 = hn::Min(edge(y, x, ab), hn::Min(edge(besideBC, alongBC, load(leaf.lengthBC)),
+                                                      edge(besideAC, alongAC, load(leaf.lengthAC))));
+    return {hn::Add(flat2, square(z)), hn::IfThenElseZero(over, z)};
+}
+
+// The range of a voxel's heights over the triangles around its closest point. It lies on a side that all of them agree
+// on; 0 stands for a triangle that the closest point is on an edge of.
+struct Heights {
+    float lowest = 0, highest = 0;
+};
+
 // One voxel's question.
 struct Query {
     const WideTree& tree;
@@ -136,16 +184,27 @@ struct Query {
     float tieWidth2;  // at least the difference of the squares of distances that are `tie` apart
     VoxelBox voxel;
     float best2, limit2;  // boxes farther away than the latter do not matter
-    std::uint32_t first;  // the leaf that was visited first
+    std::size_t repeats;  // so many of the visits may come up again: the first one was a guess
 
     void lower(float distance2) {
         best2 = distance2;
         limit2 = best2 * roundUp + tieWidth2;
     }
 
-    // The squared distances to the triangles of a leaf. The distance along the plane is the least over the three edges
-    // of how far the point lies beside and beyond them; over the triangle itself only the latter counts, which is zero
-    // for one edge at least, so that rounding can not take a sliver's line for its inside.
+    // From now on nothing is nearest: all leaves whose boxes are nearer than this are visited that were not yet.
+    void widen(float distance) {
+        best2 = 0;
+        limit2 = distance * distance * roundUp;
+        repeats = answer.visits.size();
+    }
+
+    bool met(std::uint32_t leaf) const {
+        for (std::size_t v = 0; v < repeats; ++v)
+            if (answer.visits[v].leaf == leaf) return true;
+        return false;
+    }
+
+    // The squared distances to the triangles of a leaf.
     void visit(std::uint32_t index) {
         const Tag tag;
         const WideLeaf& leaf = tree.leaves[index];
@@ -156,34 +215,10 @@ struct Query {
         float nearest = best2;
         for (std::size_t i = 0; i < treeWidth; i += hn::Lanes(tag)) {
             const auto load = [&](const float* from) { return hn::Load(tag, from + i); };
-            const auto dot = [&](Vec ax, Vec ay, Vec az, Vec bx, Vec by, Vec bz) {
-                return hn::Add(hn::Add(hn::Mul(ax, bx), hn::Mul(ay, by)), hn::Mul(az, bz));
-            };
-            const auto det = [&](Vec a, Vec b, Vec c, Vec d) { return hn::Sub(hn::Mul(a, d), hn::Mul(b, c)); };
-            const Vec qx = hn::Sub(hn::Sub(hn::Set(tag, p.x), load(leaf.cell[0])), load(leaf.corner[0]));
-            const Vec qy = hn::Sub(hn::Sub(hn::Set(tag, p.y), load(leaf.cell[1])), load(leaf.corner[1]));
-            const Vec qz = hn::Sub(hn::Sub(hn::Set(tag, p.z), load(leaf.cell[2])), load(leaf.corner[2]));
-            const Vec nx = load(leaf.normal[0]), ny = load(leaf.normal[1]), nz = load(leaf.normal[2]);
-            const Vec ax = load(leaf.along[0]), ay = load(leaf.along[1]), az = load(leaf.along[2]);
-            const Vec x = dot(qx, qy, qz, ax, ay, az), z = dot(qx, qy, qz, nx, ny, nz);
-            const Vec y = dot(qx, qy, qz, det(ny, nz, ay, az), det(nz, nx, az, ax), det(nx, ny, ax, ay));
-
-            const Vec ab = load(leaf.lengthAB), fromB = hn::Sub(x, ab);
-            const Vec bcx = load(leaf.directionBC[0]), bcy = load(leaf.directionBC[1]);
-            const Vec acx = load(leaf.directionAC[0]), acy = load(leaf.directionAC[1]);
-            const Vec besideBC = det(bcx, bcy, fromB, y), besideAC = det(x, y, acx, acy);
-            const Vec alongBC = hn::Add(hn::Mul(fromB, bcx), hn::Mul(y, bcy));
-            const Vec alongAC = hn::Add(hn::Mul(x, acx), hn::Mul(y, acy));
-            const Mask over = hn::Gt(hn::Min(y, hn::Min(besideBC, besideAC)), hn::Zero(tag));
-            const auto edge = [&](Vec beside, Vec along, Vec length) {
-                return hn::Add(beyond2(along, length), hn::IfThenZeroElse(over, square(beside)));
-            };
-            const Vec flat2 = hn::Min(edge(y, x, ab), hn::Min(edge(besideBC, alongBC, load(leaf.lengthBC)),
-                                                              edge(besideAC, alongAC, load(leaf.lengthAC))));
-            const Vec distance2 = hn::Add(flat2, square(z));
-            hn::Store(distance2, tag, found.distance2 + i);
-            hn::Store(z, tag, found.height + i);
-            nearest = std::min(nearest, hn::GetLane(hn::MinOfLanes(tag, distance2)));
+            const Measured m = measure(leaf, load, hn::Set(tag, p.x), hn::Set(tag, p.y), hn::Set(tag, p.z));
+            hn::Store(m.distance2, tag, found.distance2 + i);
+            hn::Store(m.height, tag, found.height + i);
+            nearest = std::min(nearest, hn::GetLane(hn::MinOfLanes(tag, m.distance2)));
         }
         if (nearest < best2) lower(nearest);
     }
@@ -204,7 +239,7 @@ struct Query {
                 const std::uint32_t node = nodes ? nodes[i + lane] : firstNode + std::uint32_t(i + lane);
                 if (!tree.isLeaf(node))
                     look(Boxes(tree.group(node)), 0, treeWidth, nullptr, tree.group(node).firstChild);
-                else if (node != first)
+                else if (!met(node))
                     visit(node);
             }
         }
@@ -218,8 +253,8 @@ struct Query {
         return {0, 0};
     }
 
-    // The sign that all triangles around the closest point agree on, or 0.
-    int side(float least) const {
+    // The heights over all faces that share the closest point.
+    Heights heights() const {
         const Tag tag;
         const Vec infinity = hn::Set(tag, std::numeric_limits<float>::infinity());
         Vec lowest = infinity, highest = hn::Neg(infinity);
@@ -230,16 +265,74 @@ struct Query {
                 lowest = hn::Min(lowest, hn::IfThenElse(tied, height, infinity));
                 highest = hn::Max(highest, hn::IfThenElse(tied, height, hn::Neg(infinity)));
             }
-        if (hn::GetLane(hn::MinOfLanes(tag, lowest)) > least) return 1;
-        return hn::GetLane(hn::MaxOfLanes(tag, highest)) < -least ? -1 : 0;
+        return {hn::GetLane(hn::MinOfLanes(tag, lowest)), hn::GetLane(hn::MaxOfLanes(tag, highest))};
+    }
+};
+
+// The eight voxels of a cube of side 2, a lane each, and the triangles that they were measured against.
+struct Together {
+    struct Candidate {
+        alignas(64) float distance2[treeWidth];
+        float height[treeWidth];
+        std::int32_t triangle;
+    };
+    // What a voxel's nearest triangles say.
+    struct Answers {
+        alignas(64) float lowest[treeWidth], highest[treeWidth], winner[treeWidth];
+    };
+
+    const WideTree& tree;
+    alignas(64) float x[treeWidth], y[treeWidth], z[treeWidth], best2[treeWidth];
+    std::size_t count = 0;
+    Candidate candidates[mostTogether];
+
+    Together(const WideTree& whole, const glm::vec3& lower) : tree(whole) {
+        for (int i = 0; i < treeWidth; ++i) {
+            x[i] = lower.x + float(path[i][0]);
+            y[i] = lower.y + float(path[i][1]);
+            z[i] = lower.z + float(path[i][2]);
+            best2[i] = std::numeric_limits<float>::max();
+        }
     }
 
-    void doubt(int voxelIndex) const {
-        const auto begin = std::uint32_t(answer.candidates.size());
-        for (const auto& v : answer.visits)
-            for (std::size_t i = 0; i < treeWidth; ++i)
-                if (v.distance2[i] <= limit2) answer.candidates.push_back(tree.leaves[v.leaf].triangles[i]);
-        answer.doubts.push_back({voxelIndex, begin, std::uint32_t(answer.candidates.size())});
+    void ask(std::uint32_t leafIndex, std::size_t place) {
+        const Tag tag;
+        const WideLeaf& leaf = tree.leaves[leafIndex];
+        Candidate& candidate = candidates[count++];
+        candidate.triangle = std::int32_t(leaf.triangles[place]);
+        const auto load = [&](const float* from) { return hn::Set(tag, from[place]); };
+        for (std::size_t i = 0; i < treeWidth; i += hn::Lanes(tag)) {
+            const Measured m = measure(leaf, load, hn::Load(tag, x + i), hn::Load(tag, y + i), hn::Load(tag, z + i));
+            hn::Store(m.distance2, tag, candidate.distance2 + i);
+            hn::Store(m.height, tag, candidate.height + i);
+            hn::Store(hn::Min(m.distance2, hn::Load(tag, best2 + i)), tag, best2 + i);
+        }
+    }
+
+    // The distance that no voxel's nearest triangle exceeds.
+    float farthest() const { return std::sqrt(*std::max_element(best2, best2 + treeWidth)); }
+
+    // The first of the nearest triangles, and the heights over all that share the closest point.
+    Answers answers(float tieWidth2) const {
+        const Tag tag;
+        Answers found;
+        for (std::size_t i = 0; i < treeWidth; i += hn::Lanes(tag)) {
+            const Vec best = hn::Load(tag, best2 + i), infinity = hn::Set(tag, std::numeric_limits<float>::infinity());
+            const Vec limit = hn::Add(hn::Mul(best, hn::Set(tag, roundUp)), hn::Set(tag, tieWidth2));
+            Vec lowest = infinity, highest = hn::Neg(infinity), winner = hn::Zero(tag);
+            for (std::size_t c = count; c-- > 0;) {
+                const Vec distance2 = hn::Load(tag, candidates[c].distance2 + i);
+                const Vec height = hn::Load(tag, candidates[c].height + i);
+                const Mask tied = hn::Le(distance2, limit);
+                lowest = hn::Min(lowest, hn::IfThenElse(tied, height, infinity));
+                highest = hn::Max(highest, hn::IfThenElse(tied, height, hn::Neg(infinity)));
+                winner = hn::IfThenElse(hn::Eq(distance2, best), hn::Set(tag, float(c)), winner);
+            }
+            hn::Store(lowest, tag, found.lowest + i);
+            hn::Store(highest, tag, found.highest + i);
+            hn::Store(winner, tag, found.winner + i);
+        }
+        return found;
     }
 };
 
@@ -254,10 +347,10 @@ struct BlockQuery {
     // Asks for what is nearer than `bound`.
     Query ask(const NodeList& list, const glm::vec3& position, float bound) const {
         const float ties = sign ? 2 * tie * std::max(1.f, reach / usualReach) * (reach + 1) : 0.f;
-        Query query{tree, list, answer, ties, {position, position}, 0, 0, answer.lastWinner};
+        Query query{tree, list, answer, ties, {position, position}, 0, 0, 1};
         query.lower(bound * bound * roundUp);
         answer.visits.clear();
-        query.visit(query.first);
+        query.visit(answer.lastWinner);
         query.look(Boxes(list), 0, list.count, list.nodes.data(), 0);
         return query;
     }
@@ -267,12 +360,13 @@ struct BlockQuery {
     void answerCube(const NodeList& from, const glm::vec3& lower, int level) {
         const float side = float(blockSide >> level), radius = 0.5f * (side - 1) * std::sqrt(3.f) + slack;
         const float bound = reach + radius;
-        const Query centre = ask(from, lower + 0.5f * (side - 1), bound);
+        Query centre = ask(from, lower + 0.5f * (side - 1), bound);
         if (!(centre.best2 < bound * bound)) return;
         answer.lastWinner = answer.visits[centre.winner().first].leaf;
         NodeList& list = answer.lists[level];
         const float atMost = std::min(reach, std::sqrt(centre.best2) + radius);
         narrowList(tree, from, {lower, lower + (side - 1)}, atMost + slack, 2 * side, list);
+        if (level == 2 && answerTogether(centre, list, lower, atMost, radius)) return;
         for (const auto& step : path) {
             const glm::vec3 part = lower + 0.5f * side * glm::vec3(step[0], step[1], step[2]);
             if (level < 2)
@@ -287,26 +381,60 @@ struct BlockQuery {
         if (query.best2 > reach * reach * roundUp || answer.visits.empty()) return;
         const auto [visit, place] = query.winner();
         if (answer.visits[visit].distance2[place] != query.best2) return;
+        answer.lastWinner = answer.visits[visit].leaf;
+        keep(position, query.best2, std::int32_t(tree.leaves[answer.lastWinner].triangles[place]),
+             sign ? query.heights() : Heights{});
+    }
+
+    // Answers the voxels of a cube of side 2 at once, if few triangles matter to any of them: those that are no farther
+    // from the centre, where all are measured first, than the nearest one of some voxel may be.
+    bool answerTogether(Query& centre, const NodeList& list, const glm::vec3& lower, float atMost, float radius) {
+        if (list.count > mostNodes) return false;
+        Together cube(tree, lower);
+        const auto [visit, place] = centre.winner();
+        const std::uint32_t winner = answer.visits[visit].leaf;
+        cube.ask(winner, place);
+        centre.widen(std::min(atMost, cube.farthest()) + radius + slack);
+        centre.look(Boxes(list), 0, list.count, list.nodes.data(), 0);
+        for (const auto& v : answer.visits)
+            for (std::size_t i = 0; i < treeWidth; ++i) {
+                if (v.distance2[i] > centre.limit2 || (v.leaf == winner && i == place)) continue;
+                if (cube.count == mostTogether) return false;
+                cube.ask(v.leaf, i);
+            }
+        const Together::Answers found = cube.answers(centre.tieWidth2);
+        for (std::size_t i = 0; i < treeWidth; ++i)
+            if (cube.best2[i] <= reach * reach * roundUp)
+                keep({cube.x[i], cube.y[i], cube.z[i]}, cube.best2[i],
+                     cube.candidates[std::size_t(found.winner[i])].triangle, {found.lowest[i], found.highest[i]});
+        return true;
+    }
+
+    void keep(const glm::vec3& position, float best2, std::int32_t triangle, const Heights& heights) {
         const glm::ivec3 p(position - origin);
         const int voxel = (p.x * blockSide + p.y) * blockSide + p.z;
-        answer.any = true;
-        answer.lastWinner = answer.visits[visit].leaf;
-        answer.distances[voxel] = std::sqrt(query.best2);
-        if (answer.triangles) answer.triangles[voxel] = std::int32_t(tree.leaves[answer.lastWinner].triangles[place]);
+        const auto x = std::size_t(p.x);
+        const std::uint64_t bit = std::uint64_t(1) << (p.y * blockSide + p.z);
+        const float distance = std::sqrt(best2);
+        answer.distances[voxel] = distance;
+        answer.triangles[voxel] = triangle;
+        answer.known[x] |= bit;
         if (!sign) return;
-        const int side = query.side(leastHeight * std::max(1.f, reach / usualReach));
-        if (side < 0) answer.distances[voxel] = -answer.distances[voxel];
-        if (side == 0) query.doubt(voxel);
+        if (distance > farFrom) answer.far[x] |= bit;
+        if (distance > midFrom) answer.mid[x] |= bit;
+        const float least = leastHeight * std::max(1.f, reach / usualReach);
+        // on the surface either side is right, and no link can carry it on
+        if (heights.lowest > least || distance < 0.5f * linkSlack) answer.sides.outside[x] |= bit;
+        if (heights.highest < -least) answer.sides.inside[x] |= bit;
     }
 };
 
 void answerVoxels(const WideTree& tree, const NodeList& list, const glm::vec3& origin, float reach, bool sign,
                   BlockAnswer& answer) {
-    answer.any = false;
-    answer.doubts.clear();
-    answer.candidates.clear();
+    answer.known = answer.far = answer.mid = {};
+    answer.sides = {};
     std::fill_n(answer.distances, blockVoxels, farAway);
-    if (answer.triangles) std::fill_n(answer.triangles, blockVoxels, -1);
+    std::fill_n(answer.triangles, blockVoxels, -1);
     BlockQuery{tree, origin, reach, sign, answer}.answerCube(list, origin, 0);
 }
 

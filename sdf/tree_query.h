@@ -8,6 +8,7 @@
 #include <glm/vec3.hpp>
 #include <vector>
 
+#include "sdf/links.h"
 #include "sdf/wide_tree.h"
 
 namespace bilayer {
@@ -34,25 +35,19 @@ struct VoxelBox {
 void narrow(const WideTree& tree, const NodeList& from, const VoxelBox& voxels, float reach, float largest,
             NodeList& to);
 
-/// A voxel whose sign the heights over the triangles around its closest point do not settle.
-struct Doubt {
-    int voxel;            ///< place in the block
-    std::uint32_t begin;  ///< its nearest triangles: BlockAnswer::candidates[begin] .. [end], some more than once
-    std::uint32_t end;
-};
-
 /// What is known of the voxels of a block; memory is used again from block to block.
 struct BlockAnswer {
-    bool any = false;                       ///< whether a voxel lies within the reach
-    float* distances = nullptr;             ///< blockVoxels of them: signed where known, else positive [voxels]
-    std::int32_t* triangles = nullptr;      ///< the nearest ones, -1 beyond the reach; null: not asked for
-    std::vector<Doubt> doubts;              ///< voxels that have a positive distance until their sign is found
-    std::vector<std::uint32_t> candidates;  ///< triangles that Doubt refers to
+    /// `farAway` beyond the reach; a row more can be read [voxels].
+    alignas(64) float distances[blockVoxels + blockSide]{};
+    std::int32_t triangles[blockVoxels];  ///< the nearest ones, -1 beyond the reach
+    BlockMask known;                      ///< voxels within the reach
+    BlockMask far, mid;                   ///< of these, those beyond `farFrom` and `midFrom` (links.h)
+    BlockSides sides;                     ///< what faces tell, where they are asked for
 
     /// A leaf that was looked at for the current voxel, and what was found there.
     struct Visit {
         alignas(64) float distance2[treeWidth];
-        float height[treeWidth];  ///< over the planes of the triangles
+        float height[treeWidth];  ///< over the triangles; 0 beside them
         std::uint32_t leaf;
     };
     std::vector<Visit> visits;     ///< scratch
@@ -60,11 +55,10 @@ struct BlockAnswer {
     NodeList lists[3];             ///< scratch: of the block, of its eighths, of theirs
 };
 
-/// Finds the distances of the voxels of a block, `farAway` beyond the reach.
+/// Finds the distances of the voxels of a block, and the sides of those whose closest point lies inside a face.
 /// @param list    nodes, all that come within the reach of the block
 /// @param origin  the block's first voxel in the tree's frame
-/// @param sign    whether to find signs: by the heights of the voxel over the triangles around its closest point; where
-///                they agree, so does every positive combination of their normals
+/// @param sign    whether to find sides
 void answerBlock(const WideTree& tree, const NodeList& list, const glm::vec3& origin, float reach, bool sign,
                  BlockAnswer& answer);
 

@@ -12,6 +12,8 @@
 #include <tuple>
 
 #include "demos/shared/shapes.h"
+#include "sdf/build.h"
+#include "sdf/grids.h"
 #include "sdf/mesh_io.h"
 #include "sdf/progress.h"
 #include "tests/support/support.h"
@@ -290,6 +292,33 @@ TEST_CASE("pseudonormal: meshes of the corpus") {
         for (const float resolution : {20.f, 110.f}) check(mesh, voxelSizeFor(mesh, resolution), 3, true, 600);
     }
     if (met == 0) WARN("skipped: no corpus");
+}
+
+TEST_CASE("pseudonormal: signs are found in the same way and are the same as those of the exact method") {
+    const unsigned seed = test::seed();
+    std::mt19937 random(seed);
+    for (const char* name : {"fandisk.obj", "spot.obj", "cow.obj", "cgal-bones.off", "self_intersectA.obj",
+                             "counter.unitsmm.STL", "dragon_vrip_871k.ply", "bunny_5k_open.obj"}) {
+        const auto path = test::corpusMesh(name);
+        if (!path) return;
+        const Mesh mesh = readMesh(*path);
+        const auto resolution = float(40 + random() % 100);
+        CAPTURE(seed, name, resolution);
+        const float h = voxelSizeFor(mesh, resolution);
+        const LevelSet field = build(mesh, {.voxelSize = h, .method = Method::pseudonormal});
+        const LevelSet exact = build(mesh, {.voxelSize = h});
+        CHECK(field.sign() == exact.sign());
+        CHECK(field.signReason() == exact.signReason());
+        std::size_t different = 0, met = 0;
+        const auto values = exact.grids().distance->getConstAccessor();
+        for (auto value = field.grids().distance->cbeginValueAll(); value; ++value) {
+            const bool matters = double(std::abs(*value)) > signsMatter * double(h);
+            different += matters && (values.getValue(value.getCoord()) < 0) != (*value < 0);
+            met += matters;
+        }
+        CHECK(met > 1000);
+        CHECK(different == 0);
+    }
 }
 
 TEST_CASE("pseudonormal: open meshes and soup have distances, and signs from the faces") {
