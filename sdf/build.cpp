@@ -309,7 +309,7 @@ class Build {
     // Whether blocks of the old field are what a full build would make of triangles that have not moved.
     bool canCopy(const LevelSet& old) {
         if (options_.method != Method::exact || plain(Sign::normals) == Assembler::Plain::keep) return false;
-        if (options_.sign == Sign::automatic && !balanced(mesh_)) return false;
+        if (options_.sign == Sign::automatic && !balanced(mesh_, &progress_)) return false;
         if (options_.sign != Sign::automatic && options_.sign != Sign::normals) return false;
         const openvdb::FloatGrid& grid = *old.grids().distance;
         const auto text = [&](const char* key) {
@@ -372,8 +372,7 @@ class Build {
     // Picks a way, and another one where the first contradicts itself.
     void fillChosen() {
         Stopwatch part;
-        SignChoice choice = chooseSign(mesh_);
-        progress_.poll();
+        SignChoice choice = chooseSign(mesh_, &progress_);
         times_.tiles += part.lap();
         for (;;) {
             // kept over the next choice, which may be made from it
@@ -381,7 +380,7 @@ class Build {
             const Mesh& mesh = mended ? *mended : mesh_;
             fill(mesh, choice.sign, choice.reason);
             if (choice.sign != Sign::normals || signs_.conflicts == 0) return;
-            choice = chooseSignAfterConflict(mesh);
+            choice = chooseSignAfterConflict(mesh, &progress_);
             if (!choice.mended && mended) choice.mended = *mended;
         }
     }
@@ -390,7 +389,7 @@ class Build {
     void fillAsAsked() {
         fill(mesh_, options_.sign, asAskedFor);
         if (options_.sign != Sign::normals || signs_.conflicts == 0) return;
-        const Orientation orientation = orient(mesh_);
+        const Orientation orientation = orient(mesh_, &progress_);
         if (orientation.turnedTriangles > 0)
             fill(orientation.mesh, Sign::normals,
                  fmt::format("as asked for, with {} triangles turned around", orientation.turnedTriangles));
@@ -422,8 +421,8 @@ class Build {
         times_.fill += part.lap();
         finish(assembler);
         progress_.poll();
-        if (sign == Sign::winding) signByWinding(*distance_, mesh, widths, balanced(mesh));
-        if (sign == Sign::flood) signByFlood(*distance_, mesh, options_.gap, widths);
+        if (sign == Sign::winding) signByWinding(*distance_, mesh, widths, balanced(mesh, &progress_), &progress_);
+        if (sign == Sign::flood) signByFlood(*distance_, mesh, options_.gap, widths, &progress_);
         signs_ = {name(sign), reason, byNormals ? assembler.conflicts(*distance_) : 0, undecided};
         times_.assemble += part.lap();
     }

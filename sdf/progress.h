@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <cstddef>
 #include <functional>
 #include <mutex>
 
@@ -67,5 +68,54 @@ class Progress {
     std::atomic<std::chrono::steady_clock::duration> next_{std::chrono::steady_clock::duration::min()};
     std::mutex mutex_;
 };
+
+/// Asks, if there is somebody to ask. Throws Cancelled.
+inline void poll(Progress* progress) {
+    if (progress) progress->poll();
+}
+
+/// The numbers below n, for a loop that asks on its way: `for (const std::size_t i : Polled(n, progress))`. Throws
+/// Cancelled.
+class Polled {
+  public:
+    /// @param progress  null: nobody is asked
+    Polled(std::size_t n, Progress* progress) : n_(n), progress_(progress) {}
+
+    class Iterator {
+      public:
+        Iterator(std::size_t at, Progress* progress) : at_(at), progress_(progress) {}
+        std::size_t operator*() const { return at_; }
+        Iterator& operator++() {
+            if (++at_ % stepsPerPoll == 0) poll(progress_);
+            return *this;
+        }
+        bool operator!=(const Iterator& other) const { return at_ != other.at_; }
+
+      private:
+        std::size_t at_;
+        Progress* progress_;
+    };
+    Iterator begin() const { return {0, progress_}; }
+    Iterator end() const { return {n_, progress_}; }
+
+  private:
+    /// For steps of some microseconds at most.
+    static constexpr std::size_t stepsPerPoll = 1024;
+
+    std::size_t n_;
+    Progress* progress_;
+};
+
+/// A comparison that asks on its way, so that what sorts by it can be cancelled; items are then in between. Throws
+/// Cancelled.
+template <class Less>
+auto polled(Less less, Progress* progress) {
+    return [less, progress](const auto& a, const auto& b) {
+        constexpr unsigned comparisonsPerPoll = 8192;
+        thread_local unsigned comparisons = 0;
+        if (++comparisons % comparisonsPerPoll == 0) poll(progress);
+        return less(a, b);
+    };
+}
 
 }  // namespace bilayer

@@ -11,6 +11,8 @@
 #include <glm/vector_relational.hpp>
 #include <limits>
 
+#include "sdf/progress.h"
+
 namespace bilayer {
 namespace {
 
@@ -114,7 +116,7 @@ std::vector<unsigned> common(const std::vector<unsigned>& a, const std::vector<u
 
 }  // namespace
 
-TriangleTree::TriangleTree(const Mesh& mesh) : mesh_(mesh), boxes_(mesh.triangles.size()) {
+TriangleTree::TriangleTree(const Mesh& mesh, Progress* progress) : mesh_(mesh), boxes_(mesh.triangles.size()) {
     const Bounds all = bounds(mesh);
     slack_ = roundingOfBoxes * double(std::max(glm::length(all.lower), glm::length(all.upper)));
     std::vector<std::pair<std::uint64_t, unsigned>> codes(boxes_.size());
@@ -123,16 +125,19 @@ TriangleTree::TriangleTree(const Mesh& mesh) : mesh_(mesh), boxes_(mesh.triangle
         for (int k = 0; k < 3; ++k) boxes_[i].add(mesh.points[mesh.triangles[i][k]]);
         codes[i] = {mortonCode((glm::dvec3(boxes_[i].centre()) - glm::dvec3(all.lower)) * scale), unsigned(i)};
     });
-    tbb::parallel_sort(codes.begin(), codes.end());
+    poll(progress);
+    tbb::parallel_sort(codes.begin(), codes.end(), polled(std::less<>(), progress));
     std::vector<Bounds> below;
-    for (const auto& [code, triangle] : codes) {
-        order_.push_back(triangle);
-        below.push_back(boxes_[triangle]);
+    for (const std::size_t i : Polled(codes.size(), progress)) {
+        order_.push_back(codes[i].second);
+        below.push_back(boxes_[codes[i].second]);
     }
     while (!below.empty() && (levels_.empty() || below.size() > 1)) {
         std::vector<Bounds> level;
-        for (std::size_t i = 0; i < below.size(); i += fanOut)
-            level.push_back(around(std::span(below).subspan(i, std::min(fanOut, below.size() - i))));
+        for (const std::size_t node : Polled((below.size() + fanOut - 1) / fanOut, progress)) {
+            const std::size_t first = fanOut * node;
+            level.push_back(around(std::span(below).subspan(first, std::min(fanOut, below.size() - first))));
+        }
         levels_.push_back(level);
         below = std::move(level);
     }
@@ -165,10 +170,11 @@ std::vector<glm::dvec3> spreadDirections(std::size_t count) {
 }
 
 std::vector<std::vector<unsigned>> enclosingParts(const Mesh& mesh, const TriangleTree& tree,
-                                                  std::span<const unsigned> partOf, std::size_t parts) {
+                                                  std::span<const unsigned> partOf, std::size_t parts,
+                                                  Progress* progress) {
     std::vector<std::vector<unsigned>> members(parts), enclosing(parts);
     std::vector<Bounds> boxes(parts);
-    for (unsigned i = 0; i < partOf.size(); ++i) {
+    for (const unsigned i : Polled(partOf.size(), progress)) {
         if (partOf[i] == noPart) continue;
         members[partOf[i]].push_back(i);
         for (int k = 0; k < 3; ++k) boxes[partOf[i]].add(mesh.points[mesh.triangles[i][k]]);
@@ -177,6 +183,7 @@ std::vector<std::vector<unsigned>> enclosingParts(const Mesh& mesh, const Triang
     const std::vector<glm::dvec3> directions = spreadDirections(votes);
     tbb::parallel_for(std::size_t(0), parts, [&](std::size_t part) {
         if (members[part].empty()) return;
+        poll(progress);
         for (std::size_t vote = 0; vote < votes; ++vote) {
             const unsigned triangle = members[part][vote * members[part].size() / votes];
             const auto odd = oddParts(tree, centroid(mesh, triangle), directions[vote], partOf);
