@@ -76,7 +76,7 @@ class Flood {
           background_(background),
           h_(voxelSize),
           progress_(progress),
-          states_(cells.all().size()) {}
+          states_(vectorOf<State>(cells.all().size(), progress)) {}
 
     // The sides of all voxels of all leaves, and of the cells between them.
     void run();

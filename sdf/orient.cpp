@@ -279,8 +279,10 @@ class Orienter {
 
     Orientation result() const {
         Orientation orientation;
-        orientation.mesh = mesh_;
-        for (std::size_t i = 0; i < turned_.size(); ++i) {
+        orientation.mesh.points = mesh_.points;
+        poll(progress_);
+        orientation.mesh.triangles = mesh_.triangles;
+        for (const unsigned i : eachTriangle()) {
             if (!turned_[i]) continue;
             std::swap(orientation.mesh.triangles[i].y, orientation.mesh.triangles[i].z);
             ++orientation.turnedTriangles;

@@ -36,6 +36,7 @@ double Sides::area(unsigned triangle) const {
 Bounding Sides::measure(std::span<const unsigned> triangles, std::size_t samples) const {
     std::vector<double> upTo;
     double sum = 0;
+    upTo.reserve(triangles.size());
     for (const std::size_t i : Polled(triangles.size(), progress_)) upTo.push_back(sum += area(triangles[i]));
     if (!(sum > 0)) return {0, 0, 0, 1};
     const Bounding counts = tbb::parallel_reduce(

@@ -34,11 +34,11 @@ std::vector<unsigned> firstOfEqual(const Mesh& mesh, Progress* progress) {
         unsigned number;
         auto key() const { return std::tie(point.x, point.y, point.z, number); }
     };
-    std::vector<Vertex> order(mesh.points.size());
-    tbb::parallel_for(std::size_t(0), order.size(), [&](std::size_t i) { order[i] = {mesh.points[i], unsigned(i)}; });
+    auto order = vectorOf<Vertex>(mesh.points.size(), progress);
+    for (const std::size_t i : Polled(order.size(), progress)) order[i] = {mesh.points[i], unsigned(i)};
     const auto less = [](const Vertex& a, const Vertex& b) { return a.key() < b.key(); };
     tbb::parallel_sort(order.begin(), order.end(), polled(less, progress));
-    std::vector<unsigned> first(order.size());
+    auto first = vectorOf<unsigned>(order.size(), progress);
     for (const std::size_t i : Polled(order.size(), progress)) {
         const bool same = i > 0 && order[i].point == order[i - 1].point;
         first[order[i].number] = same ? first[order[i - 1].number] : order[i].number;
@@ -60,7 +60,7 @@ std::vector<EdgeUse> sortedEdges(const Topology& topology, std::size_t vertices)
     };
     forEachUse([&](const EdgeUse& use) { ++begins[use.low + 1]; });
     std::partial_sum(begins.begin(), begins.end(), begins.begin());
-    std::vector<EdgeUse> edges(begins.back());
+    auto edges = vectorOf<EdgeUse>(begins.back(), topology.progress);
     std::vector<unsigned> next(begins.begin(), begins.end() - 1);
     forEachUse([&](const EdgeUse& use) { edges[next[use.low]++] = use; });
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, vertices, grain), [&](const auto& range) {
@@ -97,7 +97,8 @@ std::vector<unsigned> originals(const Topology& topology) {
 
 }  // namespace
 
-Topology::Topology(const Mesh& mesh, Progress* asked) : triangles(mesh.triangles.size()), progress(asked) {
+Topology::Topology(const Mesh& mesh, Progress* asked)
+    : triangles(vectorOf<glm::uvec3>(mesh.triangles.size(), asked)), progress(asked) {
     const std::vector<unsigned> first = firstOfEqual(mesh, progress);
     for (const std::size_t i : Polled(triangles.size(), progress))
         for (int k = 0; k < 3; ++k) triangles[i][k] = first[mesh.triangles[i][k]];
@@ -111,7 +112,7 @@ bool Topology::proper(std::size_t triangle) const {
 }
 
 std::vector<std::uint64_t> hashVertices(const Mesh& mesh, Progress* progress) {
-    std::vector<std::uint64_t> hashes(mesh.points.size());
+    auto hashes = vectorOf<std::uint64_t>(mesh.points.size(), progress);
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, hashes.size(), grain), [&](const auto& range) {
         poll(progress);
         for (std::size_t i = range.begin(); i < range.end(); ++i) {

@@ -21,6 +21,7 @@ constexpr int mortonBits = 21;  // a coordinate: three fill a word
 constexpr double roundingOfBoxes = 1e-12;
 /// Lines that vote on whether a part lies within another: odd, and more than one against lines along edges.
 constexpr std::size_t votes = 3;
+constexpr std::size_t boxesPerPoll = 4096;
 
 // Two zero bits before each of the lowest 21 (S. E. Anderson, "Bit Twiddling Hacks").
 std::uint64_t spread(std::uint64_t x) {
@@ -116,24 +117,28 @@ std::vector<unsigned> common(const std::vector<unsigned>& a, const std::vector<u
 
 }  // namespace
 
-TriangleTree::TriangleTree(const Mesh& mesh, Progress* progress) : mesh_(mesh), boxes_(mesh.triangles.size()) {
+TriangleTree::TriangleTree(const Mesh& mesh, Progress* progress)
+    : mesh_(mesh), boxes_(vectorOf<Bounds>(mesh.triangles.size(), progress)) {
     const Bounds all = bounds(mesh);
     slack_ = roundingOfBoxes * double(std::max(glm::length(all.lower), glm::length(all.upper)));
-    std::vector<std::pair<std::uint64_t, unsigned>> codes(boxes_.size());
+    auto codes = vectorOf<std::pair<std::uint64_t, unsigned>>(boxes_.size(), progress);
     const double scale = 1 / std::max(double(all.longestSide()), std::numeric_limits<double>::min());
     tbb::parallel_for(std::size_t(0), boxes_.size(), [&](std::size_t i) {
+        if (i % boxesPerPoll == 0) poll(progress);
         for (int k = 0; k < 3; ++k) boxes_[i].add(mesh.points[mesh.triangles[i][k]]);
         codes[i] = {mortonCode((glm::dvec3(boxes_[i].centre()) - glm::dvec3(all.lower)) * scale), unsigned(i)};
     });
-    poll(progress);
     tbb::parallel_sort(codes.begin(), codes.end(), polled(std::less<>(), progress));
+    order_.reserve(codes.size());
     std::vector<Bounds> below;
+    below.reserve(codes.size());
     for (const std::size_t i : Polled(codes.size(), progress)) {
         order_.push_back(codes[i].second);
         below.push_back(boxes_[codes[i].second]);
     }
     while (!below.empty() && (levels_.empty() || below.size() > 1)) {
         std::vector<Bounds> level;
+        level.reserve((below.size() + fanOut - 1) / fanOut);
         for (const std::size_t node : Polled((below.size() + fanOut - 1) / fanOut, progress)) {
             const std::size_t first = fanOut * node;
             level.push_back(around(std::span(below).subspan(first, std::min(fanOut, below.size() - first))));

@@ -169,15 +169,15 @@ struct WindingNumber::Item {
 WindingNumber::WindingNumber(const Mesh& mesh, Progress* progress) {
     validate(mesh);
     const std::size_t count = mesh.triangles.size();
-    std::vector<Item> items(count);
+    auto items = vectorOf<Item>(count, progress);
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, taskItems), [&](const auto& range) {
         for (std::size_t i = range.begin(); i < range.end(); ++i) {
             const glm::uvec3 t = mesh.triangles[i];
             items[i] = {(mesh.points[t.x] + mesh.points[t.y] + mesh.points[t.z]) / 3.f, std::uint32_t(i)};
         }
     });
-    nodes_.resize(nodesOver(count, leafTriangles));
-    triangles_.resize(count);
+    nodes_ = vectorOf<Node>(nodesOver(count, leafTriangles), progress);
+    triangles_ = vectorOf<Corners>(count, progress);
     // corners are copied as the ranges settle; sums go up on the way back
     struct Builder {
         WindingNumber& tree;
