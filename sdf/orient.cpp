@@ -154,7 +154,7 @@ class Orienter {
     template <class Takes>
     std::vector<std::uint64_t> edgeSums(Sets& sets, Takes takes) const {
         const std::vector<std::uint64_t> vertices = hashVertices(mesh_, progress_);
-        std::vector<std::uint64_t> sums(mesh_.triangles.size(), 0);
+        auto sums = vectorOf<std::uint64_t>(mesh_.triangles.size(), progress_);
         for (const unsigned i : eachTriangle()) {
             if (!takes(i)) continue;
             const glm::uvec3& t = mesh_.triangles[i];

@@ -130,21 +130,22 @@ TriangleTree::TriangleTree(const Mesh& mesh, Progress* progress)
     });
     tbb::parallel_sort(codes.begin(), codes.end(), polled(std::less<>(), progress));
     order_.reserve(codes.size());
-    std::vector<Bounds> below;
-    below.reserve(codes.size());
+    std::vector<Bounds> sorted;
+    sorted.reserve(codes.size());
     for (const std::size_t i : Polled(codes.size(), progress)) {
         order_.push_back(codes[i].second);
-        below.push_back(boxes_[codes[i].second]);
+        sorted.push_back(boxes_[codes[i].second]);
     }
+    std::span<const Bounds> below = sorted;
     while (!below.empty() && (levels_.empty() || below.size() > 1)) {
         std::vector<Bounds> level;
         level.reserve((below.size() + fanOut - 1) / fanOut);
         for (const std::size_t node : Polled((below.size() + fanOut - 1) / fanOut, progress)) {
             const std::size_t first = fanOut * node;
-            level.push_back(around(std::span(below).subspan(first, std::min(fanOut, below.size() - first))));
+            level.push_back(around(below.subspan(first, std::min(fanOut, below.size() - first))));
         }
-        levels_.push_back(level);
-        below = std::move(level);
+        levels_.push_back(std::move(level));
+        below = levels_.back();
     }
 }
 
