@@ -71,7 +71,7 @@ Corners fromLeast(Corners c) {
 
 class Filler {
   public:
-    explicit Filler(const MeshJob& job) : job_(job), tree_(makeWideTree(job.mesh, job.voxelSize)) {}
+    explicit Filler(const MeshJob& job) : job_(job), tree_(makeWideTree(job.mesh, job.voxelSize, &job.progress)) {}
 
     void fill() {
         const int margin = int(std::ceil(job_.reach)) / blockSide * blockSide + blockSide;

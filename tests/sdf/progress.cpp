@@ -13,6 +13,7 @@
 #include "sdf/sign.h"
 #include "sdf/topology.h"
 #include "sdf/triangle_tree.h"
+#include "sdf/wide_tree.h"
 #include "sdf/winding.h"
 #include "tests/sdf/unsigned_band.h"
 #include "tests/support/support.h"
@@ -131,10 +132,11 @@ TEST_CASE("everything that the choice of signs goes through can be cancelled") {
     }
 }
 
-TEST_CASE("winding numbers and floods can be cancelled") {
+TEST_CASE("hierarchies, winding numbers and floods can be cancelled") {
     const float h = 0.05f;
     const BandWidths widths{3, 3, h};
     const Mesh closed = knot(), open = openKnot(), loose = soup(200);
+    checkCancelling("boxes", 10, [&](Progress* p) { makeWideTree(closed, h, p); });
     checkCancelling("hierarchy", 20, [&](Progress* p) { WindingNumber(closed, p); });
     for (const Mesh* mesh : {&closed, &open, &loose}) {
         const auto band = test::unsignedBand(*mesh, h, 3);
