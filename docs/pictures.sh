@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Draws docs/slice.png: a cut through the field of Debian's bunny, every pixel a `bilayer query`.
+# Draws docs/slice.png: a cut through the double layer method's field of Debian's bunny, every pixel a `bilayer query`.
 # Needs ./run build, and the packages glmark2-data and chromium.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
@@ -7,7 +7,7 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 mesh=/usr/share/glmark2/models/bunny.obj
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
-build/release/bilayer build "$mesh" -o "$work/bunny.vdb" --resolution 64 --half-width 4 >/dev/null
+build/release/bilayer build "$mesh" -o "$work/bunny.vdb" --resolution 64 --half-width 4 --method double-layer >/dev/null
 
 # the cut z = 0.1 through the mesh's bounds, 700 pixels wide
 awk 'BEGIN { for (j = 0; j < 600; ++j) for (i = 0; i < 700; ++i) print -1.2 + i / 300, 0.95 - j / 300, 0.1 }' |

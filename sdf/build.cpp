@@ -58,19 +58,28 @@ void require(bool condition, const char* option, const char* range, double value
     if (!condition) throw std::invalid_argument(fmt::format("{} must be {}, not {}", option, range, value));
 }
 
+void checkWidth(const char* option, float voxels, float voxelSize) {
+    require(voxels > 0 && voxels <= 1000, option, "in (0, 1000] voxels", voxels);
+    // [m]; the field's background
+    const float width = voxels * voxelSize;
+    require(std::isnormal(width), option, "a width that floats can hold", width);
+}
+
 void check(const BuildOptions& options) {
-    const auto within = [](double value, double low, double high) { return value >= low && value <= high; };
+    // false for NaN, and in floats: 1e-4f is no less than itself
+    const auto within = [](auto value, decltype(value) low, decltype(value) high) {
+        return value >= low && value <= high;
+    };
     const DoubleLayerOptions& layers = options.doubleLayer;
     require(options.voxelSize > 0 && std::isnormal(options.voxelSize), "voxelSize", "a positive length",
             options.voxelSize);
     require(options.voxelSize >= smallestVoxel, "voxelSize", "at least 2e-5 (OpenVDB takes no smaller: scale the mesh)",
             options.voxelSize);
-    require(options.exteriorWidth > 0 && options.exteriorWidth <= 1000, "exteriorWidth", "in (0, 1000] voxels",
-            options.exteriorWidth);
-    require(options.interiorWidth > 0 && options.interiorWidth <= 1000, "interiorWidth", "in (0, 1000] voxels",
-            options.interiorWidth);
+    checkWidth("exteriorWidth", options.exteriorWidth, options.voxelSize);
+    checkWidth("interiorWidth", options.interiorWidth, options.voxelSize);
+    require(within(options.gap, 0, 100), "gap", "in 0..100 voxels", options.gap);
     require(layers.delta > 0 && layers.delta <= 4, "delta", "in (0, 4] voxels", layers.delta);
-    require(within(layers.epsilon, 1e-4, 1e4), "epsilon", "in 1e-4..1e4 square voxels", layers.epsilon);
+    require(within(layers.epsilon, 1e-4f, 1e4f), "epsilon", "in 1e-4..1e4 square voxels", layers.epsilon);
     require(within(layers.neighbourhood, 1, 64), "neighbourhood", "in 1..64", layers.neighbourhood);
     require(within(layers.maxSubdivision, 1, 1024), "maxSubdivision", "in 1..1024", layers.maxSubdivision);
     require(within(options.threads, 0, 4096), "threads", "in 0..4096", options.threads);
@@ -249,7 +258,9 @@ void describe(openvdb::FloatGrid& grid, const Mesh& mesh, const BuildOptions& op
 class Build {
   public:
     Build(const Mesh& mesh, const BuildOptions& options, const BlockFiller* filler, BuildTimes& times)
-        : mesh_(mesh), options_(options), filler_(filler), times_(times), progress_(options.progress) {}
+        : mesh_(mesh), options_(options), filler_(filler), times_(times), progress_(options.progress) {
+        times_ = {};
+    }
 
     LevelSet run() {
         check();
@@ -288,6 +299,7 @@ class Build {
         Stopwatch part;
         if (distance_->empty() || distance_->activeVoxelCount() == 0)
             throw std::invalid_argument("no voxel lies within the band: the widths are too small for this voxel size");
+        progress_.poll();
         describe(*distance_, mesh_, options_, signs_);
         auto grids = std::make_shared<Grids>();
         grids->distance = distance_;
@@ -301,6 +313,7 @@ class Build {
         progress_.finish();
         times_.assemble += part.lap();
         times_.total = total_.lap();
+        times_.filledBlocks = filledBlocks_;
         return result;
     }
 
@@ -320,7 +333,7 @@ class Build {
     // Whether blocks of the old field are what a full build would make of triangles that have not moved.
     bool canCopy(const LevelSet& old) {
         if (options_.method != Method::exact || plain(Sign::normals) == Assembler::Plain::keep) return false;
-        if (options_.sign == Sign::automatic && !balanced(mesh_)) return false;
+        if (options_.sign == Sign::automatic && !balanced(mesh_, &progress_)) return false;
         if (options_.sign != Sign::automatic && options_.sign != Sign::normals) return false;
         const openvdb::FloatGrid& grid = *old.grids().distance;
         const auto text = [&](const char* key) {
@@ -332,9 +345,11 @@ class Build {
             return meta && meta->value() == 0;
         };
         const std::string reason = text(metadata::signReason);
-        return text(metadata::version) == BILAYER_VERSION && text(metadata::sign) == name(Sign::normals) &&
-               (reason == asAskedFor || reason == closedAndOriented) && isNone(metadata::signConflicts) &&
-               isNone(metadata::signUndecided);
+        // another bound than that of a build: distances were swept or rounded since
+        return text(metadata::version) == BILAYER_VERSION &&
+               old.errorBound() == errorBound(options_) * options_.voxelSize &&
+               text(metadata::sign) == name(Sign::normals) && (reason == asAskedFor || reason == closedAndOriented) &&
+               isNone(metadata::signConflicts) && isNone(metadata::signUndecided);
     }
 
     // Fills what the moved triangles reach and copies the rest. False if signs then contradict each other.
@@ -369,7 +384,7 @@ class Build {
             fillTiles(parameters, assembler, part);
         else
             fillDoubleLayer({mesh_, options_.voxelSize, parameters.reach, options_.triangles, true,
-                             [&](const FilledBlocks& blocks) { assembler.take(blocks); }, progress_},
+                             [&](const FilledBlocks& blocks) { take(assembler, blocks); }, progress_},
                             survey_.box, options_.doubleLayer, parameters);
         times_.fill += part.lap();
         finish(assembler);
@@ -385,7 +400,7 @@ class Build {
         progress_.poll();
         progress_.begin(bricks.count());
         filler_->fill({tiles, bricks, parameters, [&](std::size_t, const FilledBlocks& blocks) {
-                           assembler.take(blocks);
+                           take(assembler, blocks);
                            progress_.advance();
                        }});
     }
@@ -393,8 +408,7 @@ class Build {
     // Picks a way, and another one where the first contradicts itself.
     void fillChosen() {
         Stopwatch part;
-        SignChoice choice = chooseSign(mesh_);
-        progress_.poll();
+        SignChoice choice = chooseSign(mesh_, &progress_);
         times_.tiles += part.lap();
         for (;;) {
             // kept over the next choice, which may be made from it
@@ -402,7 +416,7 @@ class Build {
             const Mesh& mesh = mended ? *mended : mesh_;
             fill(mesh, choice.sign, choice.reason);
             if (choice.sign != Sign::normals || signs_.conflicts == 0) return;
-            choice = chooseSignAfterConflict(mesh);
+            choice = chooseSignAfterConflict(mesh, &progress_);
             if (!choice.mended && mended) choice.mended = *mended;
         }
     }
@@ -411,7 +425,7 @@ class Build {
     void fillAsAsked() {
         fill(mesh_, options_.sign, asAskedFor);
         if (options_.sign != Sign::normals || signs_.conflicts == 0) return;
-        const Orientation orientation = orient(mesh_);
+        const Orientation orientation = orient(mesh_, &progress_);
         if (orientation.turnedTriangles > 0)
             fill(orientation.mesh, Sign::normals,
                  fmt::format("as asked for, with {} triangles turned around", orientation.turnedTriangles));
@@ -438,7 +452,7 @@ class Build {
                     reach,
                     options_.triangles,
                     byNormals,
-                    [&](const FilledBlocks& blocks) { assembler.take(blocks); },
+                    [&](const FilledBlocks& blocks) { take(assembler, blocks); },
                     progress_,
                     {},
                     &undecided,
@@ -449,11 +463,17 @@ class Build {
         times_.fill += part.lap();
         finish(assembler);
         progress_.poll();
-        if (sign == Sign::winding) signByWinding(*distance_, mesh, widths, balanced(mesh));
-        if (sign == Sign::flood) signByFlood(*distance_, mesh, options_.gap, widths);
+        if (sign == Sign::winding) signByWinding(*distance_, mesh, widths, balanced(mesh, &progress_), &progress_);
+        if (sign == Sign::flood) signByFlood(*distance_, mesh, options_.gap, widths, &progress_);
         if (byNormals) conflicts += assembler.conflicts(*distance_);
         signs_ = {name(sign), reason, conflicts, undecided};
         times_.assemble += part.lap();
+    }
+
+    // Safe from any thread.
+    void take(Assembler& assembler, const FilledBlocks& blocks) {
+        filledBlocks_ += blocks.origins.size();
+        assembler.take(blocks);
     }
 
     void finish(Assembler& assembler) {
@@ -470,6 +490,7 @@ class Build {
     Progress progress_;
     Survey survey_;
     Signs signs_;
+    std::atomic<std::size_t> filledBlocks_ = 0;
     openvdb::FloatGrid::Ptr distance_;
     openvdb::Int32Grid::Ptr triangle_;
 };

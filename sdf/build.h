@@ -4,6 +4,7 @@
 // Graphical Models 76 (2014) 214-223. docs/method.md tells how it is done here and where it departs from the paper.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <span>
@@ -80,17 +81,20 @@ struct Cancelled : std::runtime_error {
 /// Fills blocks on some device; defined in blocks.h. The default is TBB on the processor.
 struct BlockFiller;
 
-/// Seconds that the parts of a build took.
+/// What a build took: the seconds of its parts, and blocks.
 struct BuildTimes {
     double tiles = 0;     ///< triangles to tiles of samples, or the choice of the way to signs
     double fill = 0;      ///< binning into blocks, distances
     double assemble = 0;  ///< leaves into the tree, far signs, signs by winding number or flood
     double total = 0;
+    /// Blocks of 8x8x8 voxels whose distances were computed, over again for each go at the signs; rebuild() copies all
+    /// others.
+    std::size_t filledBlocks = 0;
 };
 
 /// Builds the field of a mesh. The bytes of the result do not depend on the number of threads.
 /// @param filler  where the blocks are filled; null: TBB
-/// @param times   if not null, receives the seconds of each part
+/// @param times   if not null, receives what it took
 /// Throws std::invalid_argument that names the option or triangle at fault, Cancelled, and what the filler throws.
 LevelSet build(const Mesh& mesh, const BuildOptions& options, const BlockFiller* filler = nullptr,
                BuildTimes* times = nullptr);
@@ -101,7 +105,8 @@ LevelSet build(const Mesh& mesh, const BuildOptions& options, const BlockFiller&
 /// build(newMesh, options).
 ///
 /// That needs Method::exact, Sign::normals (or automatic, where it comes to normals), widths of more than a voxel, and
-/// a field in which nothing contradicted itself. For all else, and where most triangles have moved, it builds in full.
+/// a field as it was built (not swept or rounded since) in which nothing contradicted itself. For all else, and where
+/// most triangles have moved, it builds in full.
 /// @param old      the field of `oldMesh`, built with the same options
 /// @param newMesh  as many triangles as `oldMesh`
 /// @param moved    indices of all triangles with a corner that moved, in any order; more do no harm

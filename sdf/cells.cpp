@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <array>
 
+#include "sdf/progress.h"
+
 namespace bilayer {
 namespace {
 
@@ -42,20 +44,23 @@ openvdb::Coord child(const openvdb::Coord& origin, std::int64_t side, int octant
 
 }  // namespace
 
-Cells::Cells(std::vector<BandLeaf*> leaves, const openvdb::CoordBBox& space) {
+Cells::Cells(std::vector<BandLeaf*> leaves, const openvdb::CoordBBox& space, Progress* progress) {
     openvdb::CoordBBox box = space;
     for (const BandLeaf* leaf : leaves) box.expand(leaf->origin());
     for (int axis = 0; axis < 3; ++axis) base_[axis] = std::int32_t(box.min()[axis] & ~(nodeVoxels - 1));
     const auto reaches = [&](int axis) { return box.max()[axis] - std::int64_t(base_[axis]) < side_; };
     for (side_ = nodeVoxels; !(reaches(0) && reaches(1) && reaches(2));) side_ *= 2;
-    tbb::parallel_sort(leaves.begin(), leaves.end(), [this](const BandLeaf* a, const BandLeaf* b) {
+    const auto less = [this](const BandLeaf* a, const BandLeaf* b) {
         return before(offset(a->origin(), base_), offset(b->origin(), base_));
-    });
-    cut(leaves, base_, side_);
+    };
+    tbb::parallel_sort(leaves.begin(), leaves.end(), polled(less, progress));
+    cut(leaves, base_, side_, progress);
     bricks_.push_back(cells_.size());
 }
 
-void Cells::cut(std::span<BandLeaf* const> leaves, const openvdb::Coord& origin, std::int64_t side) {
+void Cells::cut(std::span<BandLeaf* const> leaves, const openvdb::Coord& origin, std::int64_t side,
+                Progress* progress) {
+    if (side == brickVoxels) poll(progress);
     if (side == brickVoxels || (side > brickVoxels && leaves.empty())) bricks_.push_back(cells_.size());
     if (leaves.empty() || side == BandLeaf::DIM) {
         cells_.push_back({origin, std::int32_t(side), leaves.empty() ? nullptr : leaves.front()});
@@ -71,7 +76,7 @@ void Cells::cut(std::span<BandLeaf* const> leaves, const openvdb::Coord& origin,
                    std::uint32_t(o[2] - from[2]) < side / 2;
         });
         const std::size_t count = std::size_t(end - leaves.begin());
-        cut(leaves.first(count), corner, side / 2);
+        cut(leaves.first(count), corner, side / 2, progress);
         leaves = leaves.subspan(count);
     }
 }
@@ -130,20 +135,23 @@ void signLeaf(BandLeaf& leaf, const BlockMask& inside, const BandWidths& widths)
     leaf.setValueMask(active);
 }
 
-std::vector<BandLeaf*> takeLeaves(openvdb::FloatGrid& grid) {
+std::vector<BandLeaf*> leavesOf(openvdb::FloatGrid& grid) {
     std::vector<BandLeaf*> leaves;
     leaves.reserve(grid.tree().leafCount());
-    grid.tree().stealNodes(leaves);
+    grid.tree().getNodes(leaves);
     return leaves;
 }
 
-void assemble(openvdb::FloatGrid& grid, const std::vector<BandLeaf*>& leaves,
-              const std::vector<openvdb::CoordBBox>& inside, const BandWidths& widths) {
+void assemble(openvdb::FloatGrid& grid, const std::vector<openvdb::CoordBBox>& inside, const BandWidths& widths,
+              Progress* progress) {
     const float exterior = widths.exterior * widths.voxelSize, interior = widths.interior * widths.voxelSize;
     const auto tree = std::make_shared<openvdb::FloatTree>(exterior);
     openvdb::tree::ValueAccessor<openvdb::FloatTree> access(*tree);
+    std::vector<BandLeaf*> leaves;
+    grid.tree().stealNodes(leaves);
     for (BandLeaf* leaf : leaves) access.addLeaf(leaf);
-    for (const openvdb::CoordBBox& box : inside) tree->sparseFill(box, -interior, false);
+    for (const std::size_t i : Polled(inside.size(), progress)) tree->sparseFill(inside[i], -interior, false);
+    poll(progress);
     openvdb::tools::prune(*tree);
     grid.setTree(tree);
     grid.setGridClass(openvdb::GRID_LEVEL_SET);

@@ -14,6 +14,8 @@
 
 namespace bilayer {
 
+class Progress;
+
 using BandLeaf = openvdb::FloatTree::LeafNodeType;
 
 /// A cube of voxels: a leaf, or space without leaves.
@@ -28,7 +30,8 @@ class Cells {
     static constexpr std::size_t none = std::numeric_limits<std::size_t>::max();
 
     /// Cuts up a cube that holds the leaves (any order, at least one) and the box `space` [voxels].
-    Cells(std::vector<BandLeaf*> leaves, const openvdb::CoordBBox& space);
+    /// @param progress  polled, unless null
+    Cells(std::vector<BandLeaf*> leaves, const openvdb::CoordBBox& space, Progress* progress = nullptr);
 
     std::span<const Cell> all() const { return cells_; }
     /// Cells come brick by brick: those of one aligned cube of 64 voxels, or one larger cell. Brick b is
@@ -38,7 +41,7 @@ class Cells {
     std::size_t find(const openvdb::Coord& voxel) const;
 
   private:
-    void cut(std::span<BandLeaf* const> leaves, const openvdb::Coord& origin, std::int64_t side);
+    void cut(std::span<BandLeaf* const> leaves, const openvdb::Coord& origin, std::int64_t side, Progress* progress);
 
     openvdb::Coord base_;
     std::int64_t side_;
@@ -64,12 +67,13 @@ BlockMask farther(const BandLeaf& leaf, float limit);
 /// interior width.
 void signLeaf(BandLeaf& leaf, const BlockMask& inside, const BandWidths& widths);
 
-/// Takes the leaves out of a grid; it is empty afterwards.
-std::vector<BandLeaf*> takeLeaves(openvdb::FloatGrid& grid);
+/// The leaves of a grid, which go on being its own.
+std::vector<BandLeaf*> leavesOf(openvdb::FloatGrid& grid);
 
-/// Puts signed leaves into an empty grid, and inactive tiles of minus the interior width into the boxes `inside`, which
-/// hold no leaf; whatever holds one inactive value becomes a tile.
-void assemble(openvdb::FloatGrid& grid, const std::vector<BandLeaf*>& leaves,
-              const std::vector<openvdb::CoordBBox>& inside, const BandWidths& widths);
+/// Makes a grid of signed leaves a level set: plus the exterior width between them, and inactive tiles of minus the
+/// interior width in the boxes `inside`, which hold no leaf; whatever holds one inactive value becomes a tile.
+/// @param progress  polled, unless null; where it throws, the grid has lost its leaves
+void assemble(openvdb::FloatGrid& grid, const std::vector<openvdb::CoordBBox>& inside, const BandWidths& widths,
+              Progress* progress = nullptr);
 
 }  // namespace bilayer

@@ -11,6 +11,7 @@
 #include <stdexcept>
 
 #include "sdf/cells.h"
+#include "sdf/progress.h"
 #include "sdf/winding.h"
 
 namespace bilayer {
@@ -68,13 +69,14 @@ enum class Side : std::uint8_t { unknown, outside, inside };
 
 class Flood {
   public:
-    Flood(const Cells& cells, const Mesh& mesh, float gap, float background, double voxelSize)
+    Flood(const Cells& cells, const Mesh& mesh, float gap, float background, double voxelSize, Progress* progress)
         : cells_(cells),
-          winding_(mesh),
+          winding_(mesh, progress),
           gap_(gap),
           background_(background),
           h_(voxelSize),
-          states_(cells.all().size()) {}
+          progress_(progress),
+          states_(vectorOf<State>(cells.all().size(), progress)) {}
 
     // The sides of all voxels of all leaves, and of the cells between them.
     void run();
@@ -113,6 +115,7 @@ class Flood {
     const WindingNumber winding_;
     float gap_, background_;
     double h_;
+    Progress* progress_;
     std::vector<State> states_;
 };
 
@@ -130,6 +133,7 @@ void Flood::run() {
     for (State& state : states_) state.fresh = state.known;
     const auto clear = [this](std::size_t cell, unsigned voxel, const openvdb::Coord& link, float a, float b) {
         if (!(std::min(a, b) > onSurface * float(h_))) return false;
+        poll(progress_);
         const openvdb::Coord at = cells_.all()[cell].leaf->offsetToGlobalCoord(voxel), to = at + link;
         return !winding_.meets(glm::dvec3(at.x(), at.y(), at.z()) * h_, glm::dvec3(to.x(), to.y(), to.z()) * h_);
     };
@@ -145,6 +149,7 @@ void Flood::findParts() {
         const Cell& cell = cells_.all()[c];
         State& state = states_[c];
         if (!cell.leaf) return;
+        poll(progress_);
         state.parts = components(farther(*cell.leaf, free));
         for (int i = 0; i < 27; ++i) {
             const openvdb::Coord shift((i / 9 - 1) * blockSide, (i / 3 % 3 - 1) * blockSide, (i % 3 - 1) * blockSide);
@@ -184,24 +189,25 @@ void Flood::joinAcross(std::size_t cell, int face, const Join& join) const {
 
 void Flood::joinParts() {
     std::uint32_t count = infinity + 1;
-    for (std::size_t c = 0; c < states_.size(); ++c) {
+    for (const std::size_t c : Polled(states_.size(), progress_)) {
         states_[c].first = count;
         count += cells_.all()[c].leaf ? std::uint32_t(states_[c].parts.size()) : 1;
     }
     tbb::enumerable_thread_specific<std::vector<std::pair<std::uint32_t, std::uint32_t>>> pairs;
     tbb::parallel_for(std::size_t(0), states_.size(), [&](std::size_t c) {
+        poll(progress_);
         auto& mine = pairs.local();
         for (int face = 0; face < 6; ++face)
             joinAcross(c, face, [&](std::uint32_t a, std::uint32_t b) { mine.emplace_back(a, b); });
     });
     Parts parts(count);
     for (const auto& some : pairs)
-        for (const auto& [a, b] : some) parts.join(a, b);
+        for (const std::size_t i : Polled(some.size(), progress_)) parts.join(some[i].first, some[i].second);
     sidesOfParts(parts);
 }
 
 void Flood::sidesOfParts(Parts& parts) {
-    for (std::size_t c = 0; c < states_.size(); ++c) {
+    for (const std::size_t c : Polled(states_.size(), progress_)) {
         State& state = states_[c];
         if (!cells_.all()[c].leaf) {
             state.known.fill(~0ull);
@@ -234,7 +240,9 @@ Flood::Neighbour Flood::neighbour(const State& state, const openvdb::Coord& loca
 template <class Passes>
 bool Flood::step(const Passes& passes) {
     tbb::parallel_for(std::size_t(0), states_.size(), [&](std::size_t c) {
-        if (cells_.all()[c].leaf) stepIn(c, passes);
+        if (!cells_.all()[c].leaf) return;
+        poll(progress_);
+        stepIn(c, passes);
     });
     std::atomic<bool> grew = false;
     tbb::parallel_for(std::size_t(0), states_.size(), [&](std::size_t c) {
@@ -280,18 +288,18 @@ void Flood::settleRest() {
 
 }  // namespace
 
-void signByFlood(openvdb::FloatGrid& grid, const Mesh& mesh, float gap, const BandWidths& widths) {
+void signByFlood(openvdb::FloatGrid& grid, const Mesh& mesh, float gap, const BandWidths& widths, Progress* progress) {
     const float reach = 0.5f * gap + 1;
     if (!(gap >= 0)) throw std::invalid_argument(fmt::format("gap must be at least 0 voxels, not {}", gap));
     if (grid.background() < (reach - slack) * widths.voxelSize)
         throw std::invalid_argument(fmt::format("a gap of {} voxels needs distances up to {} voxels", gap, reach));
     validate(mesh);
     const float background = grid.background();
-    const std::vector<BandLeaf*> leaves = takeLeaves(grid);
+    const std::vector<BandLeaf*> leaves = leavesOf(grid);
     std::vector<openvdb::CoordBBox> inside;
     if (!leaves.empty()) {
-        const Cells cells(leaves, {});
-        Flood flood(cells, mesh, gap, background, double(widths.voxelSize));
+        const Cells cells(leaves, {}, progress);
+        Flood flood(cells, mesh, gap, background, double(widths.voxelSize), progress);
         flood.run();
         tbb::parallel_for(std::size_t(0), cells.all().size(), [&](std::size_t c) {
             if (BandLeaf* leaf = cells.all()[c].leaf) signLeaf(*leaf, flood.inside(c), widths);
@@ -302,7 +310,7 @@ void signByFlood(openvdb::FloatGrid& grid, const Mesh& mesh, float gap, const Ba
                 inside.push_back(openvdb::CoordBBox::createCube(cell.origin, cell.side));
         }
     }
-    assemble(grid, leaves, inside, widths);
+    assemble(grid, inside, widths, progress);
 }
 
 }  // namespace bilayer

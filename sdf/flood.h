@@ -9,6 +9,8 @@
 
 namespace bilayer {
 
+class Progress;
+
 /// Signs a narrow band of unsigned distances: outside is what a ball `gap` voxels wide reaches from infinity without
 /// touching the surface, and inside is the rest of where such a ball fits.
 ///
@@ -27,7 +29,10 @@ namespace bilayer {
 ///   kept, and a sheet without thickness has no inside. Voxels within 1e-4 voxel of the surface that neither reaches
 ///   are outside.
 /// The orientation of faces does not matter. The bytes do not depend on the number of threads. Throws
-/// std::invalid_argument as validate() does, or if the gap is negative or the grid's background is too small.
-void signByFlood(openvdb::FloatGrid& grid, const Mesh& mesh, float gap, const BandWidths& widths);
+/// std::invalid_argument as validate() does, or if the gap is negative or the grid's background is too small, and
+/// Cancelled; the grid is then in between.
+/// @param progress  polled, unless null
+void signByFlood(openvdb::FloatGrid& grid, const Mesh& mesh, float gap, const BandWidths& widths,
+                 Progress* progress = nullptr);
 
 }  // namespace bilayer

@@ -17,18 +17,19 @@ namespace bilayer {
 class LastResort {
   public:
     /// Works from the job's mesh, and adds to its count of undecided voxels.
-    explicit LastResort(const MeshJob& job) : mesh_(job.mesh), asked_(job.undecided) {}
+    explicit LastResort(const MeshJob& job) : mesh_(job.mesh), progress_(job.progress), asked_(job.undecided) {}
 
     /// Whether a point is inside [m].
     bool isInside(const glm::dvec3& point) {
         if (asked_) ++*asked_;
         // isolated: a thread that waits for the tree must not be given a task that would wait for it too
-        std::call_once(made_, [&] { tbb::this_task_arena::isolate([&] { winding_.emplace(mesh_); }); });
+        std::call_once(made_, [&] { tbb::this_task_arena::isolate([&] { winding_.emplace(mesh_, &progress_); }); });
         return (*winding_)(point) > 0.5;
     }
 
   private:
     const Mesh& mesh_;
+    Progress& progress_;
     std::atomic<std::size_t>* asked_;
     std::once_flag made_;
     std::optional<WindingNumber> winding_;

@@ -28,7 +28,7 @@ class LevelSet {
     const std::string& sign() const;
     const std::string& signReason() const;  ///< why it was taken, without a full stop: "closed and oriented"
     std::uint64_t signConflicts() const;    ///< voxels and pairs of neighbours whose normals contradict each other
-    /// What distances in the band as built are off by at most [m]; infinite: there is no bound; NaN: nobody knows.
+    /// What distances of active voxels are off by at most [m]; infinite: there is no bound; NaN: nobody knows.
     float errorBound() const;
     std::uint64_t meshHash() const;  ///< hash() of the mesh it came from, or 0
     const Grids& grids() const { return *grids_; }

@@ -37,6 +37,10 @@ struct Piece {
     bool turned = false;  // turned as a whole
 
     bool closed() const { return edgeSum == 0; }
+    // Where volumes are measured from.
+    glm::dvec3 apex() const {
+        return borderLength > 0 && !closed() ? borderCentre / borderLength : glm::dvec3(bounds.centre());
+    }
     double roundness() const { return 6 * std::sqrt(glm::pi<double>()) * std::abs(volume) / std::pow(area, 1.5); }
     bool bounding() const {
         return !oneSided && area > 0 && roundness() > (closed() ? leastRoundnessClosed : leastRoundnessOpen);
@@ -45,7 +49,8 @@ struct Piece {
 
 class Orienter {
   public:
-    explicit Orienter(const Mesh& mesh) : mesh_(mesh), topology_(mesh), sets_(mesh.triangles.size()) {}
+    Orienter(const Mesh& mesh, Progress* progress)
+        : mesh_(mesh), progress_(progress), topology_(mesh, progress), sets_(mesh.triangles.size()) {}
 
     Orientation run() {
         findSound();
@@ -59,6 +64,8 @@ class Orienter {
     }
 
   private:
+    Polled eachTriangle() const { return {mesh_.triangles.size(), progress_}; }
+
     // Repeated triangles would hide the edges of two: but in sound bodies they take no part and go with their
     // originals.
     bool counts(unsigned triangle) const { return sound_[triangle] || topology_.original[triangle] == triangle; }
@@ -73,7 +80,7 @@ class Orienter {
         const std::vector<std::uint64_t> sums = edgeSums(bodies, [](unsigned) { return true; });
         body_.resize(mesh_.triangles.size());
         sound_.resize(mesh_.triangles.size());
-        for (unsigned i = 0; i < body_.size(); ++i) {
+        for (const unsigned i : eachTriangle()) {
             body_[i] = bodies.root(i);
             sound_[i] = sums[body_[i]] == 0;
         }
@@ -94,7 +101,7 @@ class Orienter {
             const bool agree = uses[0].forward != uses[1].forward;
             if (!sets_.join(uses[0].triangle, uses[1].triangle, !agree)) contradictions_.push_back(uses[0].triangle);
         });
-        for (unsigned i = 0; i < mesh_.triangles.size(); ++i)
+        for (const unsigned i : eachTriangle())
             if (!counts(i)) sets_.join(topology_.original[i], i);
     }
 
@@ -119,7 +126,7 @@ class Orienter {
     // The open patches of a sound body stay as they are to each other; closed ones may be turned alone.
     void joinSound(Sets& patches, const std::vector<std::uint64_t>& sums) {
         std::vector<unsigned> firstOpen(mesh_.triangles.size(), noPart);
-        for (unsigned i = 0; i < mesh_.triangles.size(); ++i) {
+        for (const unsigned i : eachTriangle()) {
             if (!sound_[i] || sums[patches.root(i)] == 0) continue;
             unsigned& first = firstOpen[body_[i]];
             if (first == noPart) first = i;
@@ -146,9 +153,9 @@ class Orienter {
     // For each set, by its root: zero if its triangles, turned as their places in it say, close a surface.
     template <class Takes>
     std::vector<std::uint64_t> edgeSums(Sets& sets, Takes takes) const {
-        const std::vector<std::uint64_t> vertices = hashVertices(mesh_);
-        std::vector<std::uint64_t> sums(mesh_.triangles.size(), 0);
-        for (unsigned i = 0; i < mesh_.triangles.size(); ++i) {
+        const std::vector<std::uint64_t> vertices = hashVertices(mesh_, progress_);
+        auto sums = vectorOf<std::uint64_t>(mesh_.triangles.size(), progress_);
+        for (const unsigned i : eachTriangle()) {
             if (!takes(i)) continue;
             const glm::uvec3& t = mesh_.triangles[i];
             const std::uint64_t a = vertices[t.x], b = vertices[t.y], c = vertices[t.z];
@@ -162,7 +169,7 @@ class Orienter {
         const std::vector<std::uint64_t> sums = edgeSums(sets_, [&](unsigned i) { return counts(i); });
         pieceOf_.assign(mesh_.triangles.size(), 0);
         turned_.assign(mesh_.triangles.size(), false);
-        for (unsigned i = 0; i < mesh_.triangles.size(); ++i) {
+        for (const unsigned i : eachTriangle()) {
             const unsigned root = sets_.root(i);
             // a root is the smallest number of its set, so it comes first
             if (root == i) {
@@ -183,14 +190,15 @@ class Orienter {
     }
 
     void keepMajority() {
+        for (const unsigned i : eachTriangle()) {
+            Piece& piece = pieces_[pieceOf_[i]];
+            const double area = glm::length(areaVector(i));
+            piece.area += area;
+            if (turned_[i]) piece.turnedArea += area;
+            piece.mixed |= turned_[i] && topology_.proper(i);
+            for (int k = 0; k < 3; ++k) piece.bounds.add(mesh_.points[mesh_.triangles[i][k]]);
+        }
         for (Piece& piece : pieces_) {
-            for (const unsigned i : piece.triangles) {
-                const double area = glm::length(areaVector(i));
-                piece.area += area;
-                if (turned_[i]) piece.turnedArea += area;
-                piece.mixed |= turned_[i] && topology_.proper(i);
-                for (int k = 0; k < 3; ++k) piece.bounds.add(mesh_.points[mesh_.triangles[i][k]]);
-            }
             if (piece.oneSided) {
                 for (const unsigned i : piece.triangles) turned_[i] = false;
                 piece.mixed = false;
@@ -206,14 +214,11 @@ class Orienter {
 
     void measure() {
         findBorders();
-        for (Piece& piece : pieces_) {
-            const glm::dvec3 apex = piece.borderLength > 0 && !piece.closed() ? piece.borderCentre / piece.borderLength
-                                                                              : glm::dvec3(piece.bounds.centre());
-            for (const unsigned i : piece.triangles) {
-                if (!counts(i)) continue;
-                const double volume = glm::dot(areaVector(i), point(i, 0) - apex) / 3;
-                piece.volume += turned_[i] ? -volume : volume;
-            }
+        for (const unsigned i : eachTriangle()) {
+            if (!counts(i)) continue;
+            Piece& piece = pieces_[pieceOf_[i]];
+            const double volume = glm::dot(areaVector(i), point(i, 0) - piece.apex()) / 3;
+            piece.volume += turned_[i] ? -volume : volume;
         }
     }
 
@@ -247,9 +252,9 @@ class Orienter {
             for (const unsigned i : pieces_[p].triangles)
                 if (counts(i)) partOf[i] = p;
         if (bounding.empty()) return;
-        const TriangleTree tree(mesh_);
-        const auto enclosing = enclosingParts(mesh_, tree, partOf, pieces_.size());
-        const Sides sides(mesh_, tree, topology_);
+        const TriangleTree tree(mesh_, progress_);
+        const auto enclosing = enclosingParts(mesh_, tree, partOf, pieces_.size(), progress_);
+        const Sides sides(mesh_, tree, topology_, progress_);
         for (const unsigned p : bounding)
             if (wrong(pieces_[p], enclosing[p]) && !standsRight(pieces_[p], sides)) {
                 flip(pieces_[p]);
@@ -274,8 +279,10 @@ class Orienter {
 
     Orientation result() const {
         Orientation orientation;
-        orientation.mesh = mesh_;
-        for (std::size_t i = 0; i < turned_.size(); ++i) {
+        orientation.mesh.points = mesh_.points;
+        poll(progress_);
+        orientation.mesh.triangles = mesh_.triangles;
+        for (const unsigned i : eachTriangle()) {
             if (!turned_[i]) continue;
             std::swap(orientation.mesh.triangles[i].y, orientation.mesh.triangles[i].z);
             ++orientation.turnedTriangles;
@@ -289,6 +296,7 @@ class Orienter {
     }
 
     const Mesh& mesh_;
+    Progress* progress_;
     Topology topology_;
     Sets sets_;                             // triangles; opposites: exactly one of the two must be turned
     std::vector<unsigned> body_;            // of each triangle: the first one that it hangs together with by edges
@@ -307,12 +315,12 @@ std::size_t countDifferent(const Mesh& a, const Mesh& b) {
 
 }  // namespace
 
-Orientation orient(const Mesh& mesh) {
+Orientation orient(const Mesh& mesh, Progress* progress) {
     validate(mesh);
-    Orientation all = Orienter(mesh).run();
+    Orientation all = Orienter(mesh, progress).run();
     // open pieces are judged by what is around them, which may just have been turned
     for (int pass = 1; pass < mostPasses && all.turnedTriangles > 0; ++pass) {
-        const Orientation next = Orienter(all.mesh).run();
+        const Orientation next = Orienter(all.mesh, progress).run();
         if (next.turnedTriangles == 0) break;
         all.mesh = next.mesh;
         all.turnedComponents += next.turnedComponents;

@@ -11,6 +11,8 @@
 
 namespace bilayer {
 
+class Progress;
+
 /// What orient() made of a mesh.
 struct Orientation {
     Mesh mesh;                          ///< the same triangles in the same order, some turned around
@@ -27,7 +29,8 @@ struct Orientation {
 /// numbers understand. Only if one of the pieces around it was turned or mixed, so that the file is not to be trusted,
 /// it becomes a cavity. Pieces that bound next to no volume keep the orientation of most of their area. A repeated
 /// triangle goes with the one that it repeats. A mesh that is fine keeps its bytes.
+/// @param progress  polled, unless null
 /// Throws as validate() does.
-Orientation orient(const Mesh& mesh);
+Orientation orient(const Mesh& mesh, Progress* progress = nullptr);
 
 }  // namespace bilayer

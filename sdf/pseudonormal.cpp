@@ -28,7 +28,7 @@ class Filler {
   public:
     explicit Filler(const MeshJob& job)
         : job_(job),
-          tree_(makeWideTree(job.mesh, job.voxelSize)),
+          tree_(makeWideTree(job.mesh, job.voxelSize, &job.progress)),
           lastResort_(job),
           scratch_([&job] { return Scratch(job); }) {}
 

@@ -20,8 +20,12 @@ constexpr double unclear = 0.15;
 
 }  // namespace
 
-Sides::Sides(const Mesh& mesh, const TriangleTree& tree, const Topology& topology)
-    : mesh_(mesh), tree_(tree), topology_(topology), directions_(spreadDirections(linesPerSample)) {}
+Sides::Sides(const Mesh& mesh, const TriangleTree& tree, const Topology& topology, Progress* progress)
+    : mesh_(mesh),
+      tree_(tree),
+      topology_(topology),
+      progress_(progress),
+      directions_(spreadDirections(linesPerSample)) {}
 
 double Sides::area(unsigned triangle) const {
     const glm::uvec3& t = mesh_.triangles[triangle];
@@ -32,7 +36,8 @@ double Sides::area(unsigned triangle) const {
 Bounding Sides::measure(std::span<const unsigned> triangles, std::size_t samples) const {
     std::vector<double> upTo;
     double sum = 0;
-    for (const unsigned triangle : triangles) upTo.push_back(sum += area(triangle));
+    upTo.reserve(triangles.size());
+    for (const std::size_t i : Polled(triangles.size(), progress_)) upTo.push_back(sum += area(triangles[i]));
     if (!(sum > 0)) return {0, 0, 0, 1};
     const Bounding counts = tbb::parallel_reduce(
         tbb::blocked_range<std::size_t>(0, samples), Bounding{},
@@ -66,6 +71,7 @@ void Sides::add(unsigned triangle, std::size_t sample, Bounding& sum) const {
     std::vector<Crossing> found;
     double others = 0, copies = 0;
     for (const glm::dvec3& direction : directions_) {
+        poll(progress_);
         tree_.crossings(point, direction, found);
         const int facing = glm::dot(normal, direction) > 0 ? 1 : -1;
         for (const Crossing& crossing : found) {
@@ -90,12 +96,12 @@ void Sides::add(unsigned triangle, std::size_t sample, Bounding& sum) const {
         ++sum.nothing;
 }
 
-Bounding bounding(const Mesh& mesh) {
-    const TriangleTree tree(mesh);
-    const Topology topology(mesh);
+Bounding bounding(const Mesh& mesh, Progress* progress) {
+    const TriangleTree tree(mesh, progress);
+    const Topology topology(mesh, progress);
     std::vector<unsigned> all(mesh.triangles.size());
     std::iota(all.begin(), all.end(), 0u);
-    return Sides(mesh, tree, topology).measure(all, samplesOfMesh);
+    return Sides(mesh, tree, topology, progress).measure(all, samplesOfMesh);
 }
 
 }  // namespace bilayer

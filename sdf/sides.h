@@ -26,7 +26,8 @@ struct Bounding {
 /// Estimates the winding numbers on both sides of a surface. Keeps references to what it is given.
 class Sides {
   public:
-    Sides(const Mesh& mesh, const TriangleTree& tree, const Topology& topology);
+    /// @param progress  polled, unless null
+    Sides(const Mesh& mesh, const TriangleTree& tree, const Topology& topology, Progress* progress = nullptr);
 
     /// What some of the triangles bound, at `samples` points of equal shares of their area. Deterministic.
     Bounding measure(std::span<const unsigned> triangles, std::size_t samples) const;
@@ -38,10 +39,12 @@ class Sides {
     const Mesh& mesh_;
     const TriangleTree& tree_;
     const Topology& topology_;
+    Progress* progress_;
     std::vector<glm::dvec3> directions_;
 };
 
 /// Measures what a mesh bounds as a whole. The mesh must be valid.
-Bounding bounding(const Mesh& mesh);
+/// @param progress  polled, unless null
+Bounding bounding(const Mesh& mesh, Progress* progress = nullptr);
 
 }  // namespace bilayer

@@ -19,9 +19,9 @@ namespace {
 /// single walls) have a fifth or more.
 constexpr double mostNothing = 0.15;
 
-std::string holes(const Mesh& mesh) {
+std::string holes(const Mesh& mesh, Progress* progress) {
     std::size_t boundary = 0, odd = 0, misoriented = 0;
-    Topology(mesh).forEachEdge([&](std::span<const EdgeUse> uses) {
+    Topology(mesh, progress).forEachEdge([&](std::span<const EdgeUse> uses) {
         int net = 0;
         for (const EdgeUse& use : uses) net += use.direction();
         boundary += uses.size() == 1;
@@ -47,12 +47,12 @@ std::string turned(const Orientation& orientation) {
 }
 
 // Normals for a mesh that turning triangles has closed, else winding numbers where they tell the sides apart.
-SignChoice chooseFor(Orientation orientation, std::string trouble) {
+SignChoice chooseFor(Orientation orientation, std::string trouble, Progress* progress) {
     SignChoice choice;
     trouble += turned(orientation);
-    const bool closedByTurning = orientation.turnedTriangles > 0 && balanced(orientation.mesh);
+    const bool closedByTurning = orientation.turnedTriangles > 0 && balanced(orientation.mesh, progress);
     const bool oneSided = 2 * orientation.oneSidedTriangles > orientation.mesh.triangles.size();
-    const Bounding share = bounding(orientation.mesh);
+    const Bounding share = bounding(orientation.mesh, progress);
     const bool separates = !oneSided && share.nothing + share.reversed <= mostNothing;
     if (orientation.turnedTriangles) choice.mended = std::move(orientation.mesh);
     choice.sign = !separates ? Sign::flood : closedByTurning ? Sign::normals : Sign::winding;
@@ -68,12 +68,13 @@ SignChoice chooseFor(Orientation orientation, std::string trouble) {
 
 }  // namespace
 
-bool balanced(const Mesh& mesh) {
-    const std::vector<std::uint64_t> vertices = hashVertices(mesh);
+bool balanced(const Mesh& mesh, Progress* progress) {
+    const std::vector<std::uint64_t> vertices = hashVertices(mesh, progress);
     // sums modulo 2^64 do not depend on their order
     const std::uint64_t sum = tbb::parallel_reduce(
         tbb::blocked_range<std::size_t>(0, mesh.triangles.size(), 4096), std::uint64_t(0),
         [&](const auto& range, std::uint64_t part) {
+            poll(progress);
             for (std::size_t i = range.begin(); i < range.end(); ++i) {
                 const glm::uvec3& t = mesh.triangles[i];
                 const std::uint64_t a = vertices[t.x], b = vertices[t.y], c = vertices[t.z];
@@ -85,14 +86,14 @@ bool balanced(const Mesh& mesh) {
     return sum == 0;
 }
 
-SignChoice chooseSign(const Mesh& mesh) {
+SignChoice chooseSign(const Mesh& mesh, Progress* progress) {
     validate(mesh);
-    if (balanced(mesh)) return {Sign::normals, closedAndOriented, {}};
-    return chooseFor(orient(mesh), holes(mesh));
+    if (balanced(mesh, progress)) return {Sign::normals, closedAndOriented, {}};
+    return chooseFor(orient(mesh, progress), holes(mesh, progress), progress);
 }
 
-SignChoice chooseSignAfterConflict(const Mesh& mesh) {
-    return chooseFor(orient(mesh), "closed and oriented, but the surface intersects itself");
+SignChoice chooseSignAfterConflict(const Mesh& mesh, Progress* progress) {
+    return chooseFor(orient(mesh, progress), "closed and oriented, but the surface intersects itself", progress);
 }
 
 }  // namespace bilayer

@@ -9,10 +9,13 @@
 
 namespace bilayer {
 
+class Progress;
+
 /// Whether every edge is run equally often both ways, where vertices count as one if their coordinates are equal. Never
 /// false for a mesh that is; true for one that is not with a probability of about 2^-63. O(n), on all threads, and
 /// 8 bytes a vertex. The mesh must be valid.
-bool balanced(const Mesh& mesh);
+/// @param progress  polled, unless null, here and below
+bool balanced(const Mesh& mesh, Progress* progress = nullptr);
 
 /// How signs are to be found.
 struct SignChoice {
@@ -27,10 +30,10 @@ inline constexpr const char* closedAndOriented = "closed and oriented";
 /// What Sign::automatic picks. `normals` as they stand for a balanced mesh, which is all that it asks first and takes
 /// milliseconds; else the mesh is oriented: `normals` if that closes it, `winding` if winding numbers tell the two
 /// sides of most of the surface apart, `flood` where they do not. Throws as validate() does.
-SignChoice chooseSign(const Mesh& mesh);
+SignChoice chooseSign(const Mesh& mesh, Progress* progress = nullptr);
 
 /// What to do where the normals of a balanced mesh contradict each other: it is inside out (then it is mended), or
 /// intersects itself. Returns `normals` only together with a mended mesh. Throws as validate() does.
-SignChoice chooseSignAfterConflict(const Mesh& mesh);
+SignChoice chooseSignAfterConflict(const Mesh& mesh, Progress* progress = nullptr);
 
 }  // namespace bilayer

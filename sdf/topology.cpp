@@ -12,6 +12,9 @@
 namespace bilayer {
 namespace {
 
+/// Vertices that are worth a task.
+constexpr std::size_t grain = 4096;
+
 // Spreads every bit of a word over all of it: the finalizer of S. Vigna's and G. Steele's SplitMix64.
 std::uint64_t mixed(std::uint64_t word) {
     word = (word ^ (word >> 30)) * 0xbf58476d1ce4e5b9u;
@@ -25,17 +28,18 @@ std::uint64_t bitsOf(float coordinate) {
 }
 
 // For each vertex, the first vertex with equal coordinates.
-std::vector<unsigned> firstOfEqual(const Mesh& mesh) {
+std::vector<unsigned> firstOfEqual(const Mesh& mesh, Progress* progress) {
     struct Vertex {
         glm::vec3 point;
         unsigned number;
         auto key() const { return std::tie(point.x, point.y, point.z, number); }
     };
-    std::vector<Vertex> order(mesh.points.size());
-    tbb::parallel_for(std::size_t(0), order.size(), [&](std::size_t i) { order[i] = {mesh.points[i], unsigned(i)}; });
-    tbb::parallel_sort(order.begin(), order.end(), [](const Vertex& a, const Vertex& b) { return a.key() < b.key(); });
-    std::vector<unsigned> first(order.size());
-    for (std::size_t i = 0; i < order.size(); ++i) {
+    auto order = vectorOf<Vertex>(mesh.points.size(), progress);
+    for (const std::size_t i : Polled(order.size(), progress)) order[i] = {mesh.points[i], unsigned(i)};
+    const auto less = [](const Vertex& a, const Vertex& b) { return a.key() < b.key(); };
+    tbb::parallel_sort(order.begin(), order.end(), polled(less, progress));
+    auto first = vectorOf<unsigned>(order.size(), progress);
+    for (const std::size_t i : Polled(order.size(), progress)) {
         const bool same = i > 0 && order[i].point == order[i - 1].point;
         first[order[i].number] = same ? first[order[i - 1].number] : order[i].number;
     }
@@ -46,7 +50,7 @@ std::vector<unsigned> firstOfEqual(const Mesh& mesh) {
 std::vector<EdgeUse> sortedEdges(const Topology& topology, std::size_t vertices) {
     std::vector<unsigned> begins(vertices + 1, 0);
     const auto forEachUse = [&](auto visit) {
-        for (unsigned i = 0; i < topology.triangles.size(); ++i) {
+        for (const unsigned i : Polled(topology.triangles.size(), topology.progress)) {
             if (!topology.proper(i)) continue;
             for (int k = 0; k < 3; ++k) {
                 const unsigned a = topology.triangles[i][k], b = topology.triangles[i][(k + 1) % 3];
@@ -56,13 +60,15 @@ std::vector<EdgeUse> sortedEdges(const Topology& topology, std::size_t vertices)
     };
     forEachUse([&](const EdgeUse& use) { ++begins[use.low + 1]; });
     std::partial_sum(begins.begin(), begins.end(), begins.begin());
-    std::vector<EdgeUse> edges(begins.back());
+    auto edges = vectorOf<EdgeUse>(begins.back(), topology.progress);
     std::vector<unsigned> next(begins.begin(), begins.end() - 1);
     forEachUse([&](const EdgeUse& use) { edges[next[use.low]++] = use; });
-    tbb::parallel_for(std::size_t(0), vertices, [&](std::size_t v) {
-        std::sort(edges.begin() + begins[v], edges.begin() + begins[v + 1], [](const EdgeUse& a, const EdgeUse& b) {
-            return std::tie(a.high, a.triangle) < std::tie(b.high, b.triangle);
-        });
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, vertices, grain), [&](const auto& range) {
+        poll(topology.progress);
+        for (std::size_t v = range.begin(); v < range.end(); ++v)
+            std::sort(edges.begin() + begins[v], edges.begin() + begins[v + 1], [](const EdgeUse& a, const EdgeUse& b) {
+                return std::tie(a.high, a.triangle) < std::tie(b.high, b.triangle);
+            });
     });
     return edges;
 }
@@ -91,9 +97,10 @@ std::vector<unsigned> originals(const Topology& topology) {
 
 }  // namespace
 
-Topology::Topology(const Mesh& mesh) : triangles(mesh.triangles.size()) {
-    const std::vector<unsigned> first = firstOfEqual(mesh);
-    for (std::size_t i = 0; i < triangles.size(); ++i)
+Topology::Topology(const Mesh& mesh, Progress* asked)
+    : triangles(vectorOf<glm::uvec3>(mesh.triangles.size(), asked)), progress(asked) {
+    const std::vector<unsigned> first = firstOfEqual(mesh, progress);
+    for (const std::size_t i : Polled(triangles.size(), progress))
         for (int k = 0; k < 3; ++k) triangles[i][k] = first[mesh.triangles[i][k]];
     edges = sortedEdges(*this, mesh.points.size());
     original = originals(*this);
@@ -104,9 +111,10 @@ bool Topology::proper(std::size_t triangle) const {
     return t.x != t.y && t.y != t.z && t.z != t.x;
 }
 
-std::vector<std::uint64_t> hashVertices(const Mesh& mesh) {
-    std::vector<std::uint64_t> hashes(mesh.points.size());
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, hashes.size(), 4096), [&](const auto& range) {
+std::vector<std::uint64_t> hashVertices(const Mesh& mesh, Progress* progress) {
+    auto hashes = vectorOf<std::uint64_t>(mesh.points.size(), progress);
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, hashes.size(), grain), [&](const auto& range) {
+        poll(progress);
         for (std::size_t i = range.begin(); i < range.end(); ++i) {
             const glm::vec3& p = mesh.points[i];
             hashes[i] = mixed(mixed(bitsOf(p.x) | bitsOf(p.y) << 32) + bitsOf(p.z));

@@ -1,5 +1,5 @@
 // Who shares what in a mesh, where vertices count as one if their coordinates are equal: edges with their triangles,
-// and sets that grow together. Triangles keep their numbers.
+// and sets that grow together. Triangles keep their numbers. All that takes long polls a Progress, unless it is null.
 #pragma once
 
 #include <cstddef>
@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "sdf/mesh.h"
+#include "sdf/progress.h"
 
 namespace bilayer {
 
@@ -24,11 +25,13 @@ struct EdgeUse {
 
 /// The triangles and edges of a mesh after welding by coordinates (0 and -0 are equal).
 struct Topology {
-    explicit Topology(const Mesh& mesh);
+    /// @param progress  kept, for forEachEdge() to poll too
+    explicit Topology(const Mesh& mesh, Progress* progress = nullptr);
 
     std::vector<glm::uvec3> triangles;  ///< as in the mesh, each vertex replaced by the first of equal coordinates
     std::vector<EdgeUse> edges;         ///< by (low, high, triangle); none of triangles that use a vertex twice
     std::vector<unsigned> original;     ///< a triangle's first triangle with the same three vertices, often itself
+    Progress* progress;
 
     /// Whether a triangle uses no vertex twice.
     bool proper(std::size_t triangle) const;
@@ -36,15 +39,17 @@ struct Topology {
     /// Calls visit(std::span<const EdgeUse>) with all uses of each edge.
     template <class Visit>
     void forEachEdge(Visit visit) const {
-        for (std::size_t i = 0, j; i < edges.size(); i = j) {
-            for (j = i + 1; j < edges.size() && edges[j].sameEdge(edges[i]);) ++j;
-            visit(std::span(&edges[i], j - i));
+        std::size_t next = 0;
+        for (const std::size_t i : Polled(edges.size(), progress)) {
+            if (i < next) continue;
+            for (next = i + 1; next < edges.size() && edges[next].sameEdge(edges[i]);) ++next;
+            visit(std::span(&edges[i], next - i));
         }
     }
 };
 
 /// 64 bits for each vertex that are equal where coordinates are.
-std::vector<std::uint64_t> hashVertices(const Mesh& mesh);
+std::vector<std::uint64_t> hashVertices(const Mesh& mesh, Progress* progress = nullptr);
 
 /// 64 bits for an edge run from one vertex to another, given the hashes of both. Running it the other way gives the
 /// negative, so that the sum (modulo 2^64) over the triangles of a closed and oriented surface is zero; for any other

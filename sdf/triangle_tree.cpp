@@ -11,6 +11,8 @@
 #include <glm/vector_relational.hpp>
 #include <limits>
 
+#include "sdf/progress.h"
+
 namespace bilayer {
 namespace {
 
@@ -19,6 +21,7 @@ constexpr int mortonBits = 21;  // a coordinate: three fill a word
 constexpr double roundingOfBoxes = 1e-12;
 /// Lines that vote on whether a part lies within another: odd, and more than one against lines along edges.
 constexpr std::size_t votes = 3;
+constexpr std::size_t boxesPerPoll = 4096;
 
 // Two zero bits before each of the lowest 21 (S. E. Anderson, "Bit Twiddling Hacks").
 std::uint64_t spread(std::uint64_t x) {
@@ -114,27 +117,35 @@ std::vector<unsigned> common(const std::vector<unsigned>& a, const std::vector<u
 
 }  // namespace
 
-TriangleTree::TriangleTree(const Mesh& mesh) : mesh_(mesh), boxes_(mesh.triangles.size()) {
+TriangleTree::TriangleTree(const Mesh& mesh, Progress* progress)
+    : mesh_(mesh), boxes_(vectorOf<Bounds>(mesh.triangles.size(), progress)) {
     const Bounds all = bounds(mesh);
     slack_ = roundingOfBoxes * double(std::max(glm::length(all.lower), glm::length(all.upper)));
-    std::vector<std::pair<std::uint64_t, unsigned>> codes(boxes_.size());
+    auto codes = vectorOf<std::pair<std::uint64_t, unsigned>>(boxes_.size(), progress);
     const double scale = 1 / std::max(double(all.longestSide()), std::numeric_limits<double>::min());
     tbb::parallel_for(std::size_t(0), boxes_.size(), [&](std::size_t i) {
+        if (i % boxesPerPoll == 0) poll(progress);
         for (int k = 0; k < 3; ++k) boxes_[i].add(mesh.points[mesh.triangles[i][k]]);
         codes[i] = {mortonCode((glm::dvec3(boxes_[i].centre()) - glm::dvec3(all.lower)) * scale), unsigned(i)};
     });
-    tbb::parallel_sort(codes.begin(), codes.end());
-    std::vector<Bounds> below;
-    for (const auto& [code, triangle] : codes) {
-        order_.push_back(triangle);
-        below.push_back(boxes_[triangle]);
+    tbb::parallel_sort(codes.begin(), codes.end(), polled(std::less<>(), progress));
+    order_.reserve(codes.size());
+    std::vector<Bounds> sorted;
+    sorted.reserve(codes.size());
+    for (const std::size_t i : Polled(codes.size(), progress)) {
+        order_.push_back(codes[i].second);
+        sorted.push_back(boxes_[codes[i].second]);
     }
+    std::span<const Bounds> below = sorted;
     while (!below.empty() && (levels_.empty() || below.size() > 1)) {
         std::vector<Bounds> level;
-        for (std::size_t i = 0; i < below.size(); i += fanOut)
-            level.push_back(around(std::span(below).subspan(i, std::min(fanOut, below.size() - i))));
-        levels_.push_back(level);
-        below = std::move(level);
+        level.reserve((below.size() + fanOut - 1) / fanOut);
+        for (const std::size_t node : Polled((below.size() + fanOut - 1) / fanOut, progress)) {
+            const std::size_t first = fanOut * node;
+            level.push_back(around(below.subspan(first, std::min(fanOut, below.size() - first))));
+        }
+        levels_.push_back(std::move(level));
+        below = levels_.back();
     }
 }
 
@@ -165,10 +176,11 @@ std::vector<glm::dvec3> spreadDirections(std::size_t count) {
 }
 
 std::vector<std::vector<unsigned>> enclosingParts(const Mesh& mesh, const TriangleTree& tree,
-                                                  std::span<const unsigned> partOf, std::size_t parts) {
+                                                  std::span<const unsigned> partOf, std::size_t parts,
+                                                  Progress* progress) {
     std::vector<std::vector<unsigned>> members(parts), enclosing(parts);
     std::vector<Bounds> boxes(parts);
-    for (unsigned i = 0; i < partOf.size(); ++i) {
+    for (const unsigned i : Polled(partOf.size(), progress)) {
         if (partOf[i] == noPart) continue;
         members[partOf[i]].push_back(i);
         for (int k = 0; k < 3; ++k) boxes[partOf[i]].add(mesh.points[mesh.triangles[i][k]]);
@@ -177,6 +189,7 @@ std::vector<std::vector<unsigned>> enclosingParts(const Mesh& mesh, const Triang
     const std::vector<glm::dvec3> directions = spreadDirections(votes);
     tbb::parallel_for(std::size_t(0), parts, [&](std::size_t part) {
         if (members[part].empty()) return;
+        poll(progress);
         for (std::size_t vote = 0; vote < votes; ++vote) {
             const unsigned triangle = members[part][vote * members[part].size() / votes];
             const auto odd = oddParts(tree, centroid(mesh, triangle), directions[vote], partOf);

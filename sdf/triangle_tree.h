@@ -11,6 +11,8 @@
 
 namespace bilayer {
 
+class Progress;
+
 /// A triangle met by a line.
 struct Crossing {
     unsigned triangle;
@@ -20,7 +22,8 @@ struct Crossing {
 
 class TriangleTree {
   public:
-    explicit TriangleTree(const Mesh& mesh);
+    /// @param progress  polled, unless null
+    explicit TriangleTree(const Mesh& mesh, Progress* progress = nullptr);
 
     /// Calls visit(triangle) for the triangles whose own boxes meets(box) holds for; it must hold for any box around
     /// such a box.
@@ -63,8 +66,10 @@ inline constexpr unsigned noPart = ~0u;
 
 /// For each part of a mesh, the parts that it lies within: lines from three of its triangles cross them an odd number
 /// of times, and their boxes hold its box. Their orientation does not matter.
-/// @param partOf  the part of each triangle; `noPart` for triangles that neither hold nor lie in anything
+/// @param partOf    the part of each triangle; `noPart` for triangles that neither hold nor lie in anything
+/// @param progress  polled, unless null
 std::vector<std::vector<unsigned>> enclosingParts(const Mesh& mesh, const TriangleTree& tree,
-                                                  std::span<const unsigned> partOf, std::size_t parts);
+                                                  std::span<const unsigned> partOf, std::size_t parts,
+                                                  Progress* progress = nullptr);
 
 }  // namespace bilayer

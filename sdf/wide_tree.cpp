@@ -15,6 +15,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "sdf/progress.h"
+
 namespace bilayer {
 namespace {
 
@@ -41,9 +43,12 @@ struct Box {
 };
 
 template <class Body>
-void forAll(std::size_t count, Body body) {
+void forAll(std::size_t count, Progress* progress, Body body) {
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, grain), [&](const auto& range) {
-        for (std::size_t i = range.begin(); i < range.end(); ++i) body(i);
+        for (std::size_t i = range.begin(); i < range.end(); ++i) {
+            if (i % grain == 0) poll(progress);
+            body(i);
+        }
     });
 }
 
@@ -158,12 +163,13 @@ void transformToHilbert(Cells& cells) {
 }
 
 // Sorts keys by their upper bits, stably: radix sort, runs side by side.
-void sortKeys(std::vector<std::uint64_t>& keys) {
+void sortKeys(std::vector<std::uint64_t>& keys, Progress* progress) {
     const std::size_t runs = (keys.size() + runLength - 1) / runLength;
-    std::vector<std::uint64_t> other(keys.size());
+    auto other = vectorOf<std::uint64_t>(keys.size(), progress);
     std::vector<std::uint32_t> places(runs * digits);
     for (int shift = indexBits; shift < 64; shift += digitBits) {
         const auto forRun = [&](std::size_t run, auto body) {
+            poll(progress);
             std::uint32_t* counts = places.data() + run * digits;
             for (std::size_t i = run * runLength; i < std::min(keys.size(), (run + 1) * runLength); ++i)
                 body(keys[i], counts[keys[i] >> shift & (digits - 1)]);
@@ -207,12 +213,13 @@ void makeKeys(const Parts& parts, const glm::ivec3& size, std::size_t first, std
 }
 
 // Adds the keys of the parts that have none yet; the long ones among them are returned in order.
-std::vector<std::uint32_t> addKeys(const Parts& parts, const glm::ivec3& size, std::vector<std::uint64_t>& keys) {
+std::vector<std::uint32_t> addKeys(const Parts& parts, const glm::ivec3& size, std::vector<std::uint64_t>& keys,
+                                   Progress* progress) {
     const std::size_t begin = keys.size();
     keys.resize(parts.count());
     tbb::enumerable_thread_specific<std::vector<std::uint32_t>> found;
     const std::size_t runs = (keys.size() - begin + Cells::most - 1) / Cells::most;
-    tbb::parallel_for(std::size_t(0), runs, [&](std::size_t run) {
+    forAll(runs, progress, [&](std::size_t run) {
         const std::size_t first = begin + run * Cells::most, count = std::min(Cells::most, keys.size() - first);
         makeKeys(parts, size, first, count, keys.data() + first, found.local());
     });
@@ -222,15 +229,15 @@ std::vector<std::uint32_t> addKeys(const Parts& parts, const glm::ivec3& size, s
     return longOnes;
 }
 
-std::vector<std::uint64_t> sortedKeys(Parts& parts, const glm::ivec3& size) {
+std::vector<std::uint64_t> sortedKeys(Parts& parts, const glm::ivec3& size, Progress* progress) {
     std::vector<std::uint64_t> keys;
-    const std::vector<std::uint32_t> longOnes = addKeys(parts, size, keys);
+    const std::vector<std::uint32_t> longOnes = addKeys(parts, size, keys, progress);
     if (!longOnes.empty()) {
-        for (const std::uint32_t triangle : longOnes) parts.halve(triangle);
-        addKeys(parts, size, keys);
+        for (const std::size_t i : Polled(longOnes.size(), progress)) parts.halve(longOnes[i]);
+        addKeys(parts, size, keys, progress);
         std::erase(keys, unused);
     }
-    sortKeys(keys);
+    sortKeys(keys, progress);
     return keys;
 }
 
@@ -326,14 +333,14 @@ void emptyBoxes(BoxGroup& group, std::size_t from) {
     for (std::size_t i = from; i < treeWidth; ++i) setBox(group, i, glm::vec3(infinity), glm::vec3(-infinity));
 }
 
-void makeGroups(WideTree& tree) {
+void makeGroups(WideTree& tree, Progress* progress) {
     std::uint32_t begin = 0, children = tree.leafCount, firstChild = 0;  // of the level below
     for (;;) {
         const std::uint32_t count = (children + treeWidth - 1) / treeWidth;
         for (std::uint32_t i = 0; i < count; ++i) tree.groups[begin + i].firstChild = firstChild + i * treeWidth;
         emptyBoxes(tree.groups[begin + count - 1], children - (count - 1) * treeWidth);
         if (count == 1) return;
-        forAll(count, [&](std::size_t i) {
+        forAll(count, progress, [&](std::size_t i) {
             joinBoxes(tree.groups[begin + i], tree.groups[begin + count + i / treeWidth], i % treeWidth);
         });
         firstChild = tree.leafCount + begin;
@@ -353,7 +360,7 @@ std::uint32_t groupsOver(std::uint32_t leaves) {
 
 }  // namespace
 
-WideTree makeWideTree(const Mesh& mesh, float voxelSize) {
+WideTree makeWideTree(const Mesh& mesh, float voxelSize, Progress* progress) {
     if (mesh.triangles.size() >= (std::size_t(1) << indexBits))
         throw std::invalid_argument("the mesh has 2^28 triangles or more");
     const Bounds box = bounds(mesh);
@@ -367,13 +374,13 @@ WideTree makeWideTree(const Mesh& mesh, float voxelSize) {
     tree.size = glm::ivec3(size);
 
     Parts parts(mesh, base, voxelSize);
-    const std::vector<std::uint64_t> keys = sortedKeys(parts, tree.size);
+    const std::vector<std::uint64_t> keys = sortedKeys(parts, tree.size, progress);
     tree.leafCount = std::uint32_t((keys.size() + treeWidth - 1) / treeWidth);
     tree.groupCount = groupsOver(tree.leafCount);
     tree.leaves = std::make_unique_for_overwrite<WideLeaf[]>(tree.leafCount);
     tree.groups = std::make_unique_for_overwrite<BoxGroup[]>(tree.groupCount);
-    forAll(tree.leafCount, [&](std::size_t i) { makeLeaf(parts, keys, i, tree); });
-    makeGroups(tree);
+    forAll(tree.leafCount, progress, [&](std::size_t i) { makeLeaf(parts, keys, i, tree); });
+    makeGroups(tree, progress);
     return tree;
 }
 

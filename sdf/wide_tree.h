@@ -14,6 +14,8 @@
 
 namespace bilayer {
 
+class Progress;
+
 inline constexpr int treeWidth = 8;  ///< triangles a leaf and boxes a group: a vector of floats
 
 /// Eight triangles, each in a frame of its own: corner A is its origin, x runs from A to B, z along the normal, and
@@ -51,8 +53,9 @@ struct WideTree {
 
 /// Builds the hierarchy of a valid mesh on all cores; the result does not depend on their number.
 /// @param voxelSize  [m]
+/// @param progress   polled, unless null
 /// Throws std::invalid_argument if the mesh is longer than 2^23 voxels or has more than 2^28 triangles and parts of
 /// halved ones.
-WideTree makeWideTree(const Mesh& mesh, float voxelSize);
+WideTree makeWideTree(const Mesh& mesh, float voxelSize, Progress* progress = nullptr);
 
 }  // namespace bilayer

@@ -3,7 +3,6 @@
 #include <oneapi/tbb/enumerable_thread_specific.h>
 #include <oneapi/tbb/parallel_for.h>
 #include <oneapi/tbb/parallel_invoke.h>
-#include <oneapi/tbb/parallel_sort.h>
 
 #include <algorithm>
 #include <cmath>
@@ -17,6 +16,8 @@
 
 #include "sdf/bricks.h"
 #include "sdf/cells.h"
+#include "sdf/progress.h"
+#include "sdf/topology.h"
 
 namespace bilayer {
 namespace {
@@ -43,7 +44,8 @@ const double halfDiagonal = std::sqrt(3.0) / 2;  // of a cube of side 1
 
 // The median split of items by the longest side of the box around them; returns the middle.
 template <class Item>
-std::size_t split(std::vector<Item>& items, std::size_t begin, std::size_t end) {
+std::size_t split(std::vector<Item>& items, std::size_t begin, std::size_t end, Progress* progress) {
+    poll(progress);
     glm::vec3 lower = items[begin].at, upper = lower;
     for (std::size_t i = begin; i < end; ++i) {
         lower = glm::min(lower, items[i].at);
@@ -56,7 +58,7 @@ std::size_t split(std::vector<Item>& items, std::size_t begin, std::size_t end) 
         return a.at[axis] != b.at[axis] ? a.at[axis] < b.at[axis] : a.index < b.index;
     };
     std::nth_element(items.begin() + std::ptrdiff_t(begin), items.begin() + std::ptrdiff_t(middle),
-                     items.begin() + std::ptrdiff_t(end), less);
+                     items.begin() + std::ptrdiff_t(end), polled(less, progress));
     return middle;
 }
 
@@ -164,23 +166,24 @@ struct WindingNumber::Item {
     std::uint32_t index;
 };
 
-WindingNumber::WindingNumber(const Mesh& mesh) {
+WindingNumber::WindingNumber(const Mesh& mesh, Progress* progress) {
     validate(mesh);
     const std::size_t count = mesh.triangles.size();
-    std::vector<Item> items(count);
+    auto items = vectorOf<Item>(count, progress);
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, taskItems), [&](const auto& range) {
         for (std::size_t i = range.begin(); i < range.end(); ++i) {
             const glm::uvec3 t = mesh.triangles[i];
             items[i] = {(mesh.points[t.x] + mesh.points[t.y] + mesh.points[t.z]) / 3.f, std::uint32_t(i)};
         }
     });
-    nodes_.resize(nodesOver(count, leafTriangles));
-    triangles_.resize(count);
+    nodes_ = vectorOf<Node>(nodesOver(count, leafTriangles), progress);
+    triangles_ = vectorOf<Corners>(count, progress);
     // corners are copied as the ranges settle; sums go up on the way back
     struct Builder {
         WindingNumber& tree;
         const Mesh& mesh;
         std::vector<Item>& items;
+        Progress* progress;
         Bounds operator()(std::size_t at, std::size_t begin, std::size_t end) const {
             Node& node = tree.nodes_[at];
             node.begin = std::uint32_t(begin);
@@ -195,7 +198,7 @@ WindingNumber::WindingNumber(const Mesh& mesh) {
                 node.right = 0;
                 return tree.sumTriangles(node);
             }
-            const std::size_t middle = split(items, begin, end), left = at + 1;
+            const std::size_t middle = split(items, begin, end, progress), left = at + 1;
             const std::size_t right = left + nodesOver(middle - begin, leafTriangles);
             node.right = std::uint32_t(right);
             Bounds box, other;
@@ -207,7 +210,7 @@ WindingNumber::WindingNumber(const Mesh& mesh) {
             return box;
         }
     };
-    Builder{*this, mesh, items}(0, 0, count);
+    Builder{*this, mesh, items, progress}(0, 0, count);
 }
 
 Bounds WindingNumber::sumTriangles(Node& node) const {
@@ -365,7 +368,7 @@ namespace {
 // boundary of the mesh would have (Biot and Savart): edges that their triangles run both ways equally often count not.
 class Slope {
   public:
-    explicit Slope(const Mesh& mesh);
+    Slope(const Mesh& mesh, Progress* progress);
 
     // No less than the gradient's length anywhere in a ball, links of which do not cross the surface [1/m].
     double operator()(const glm::dvec3& centre, double radius) const {
@@ -386,7 +389,7 @@ class Slope {
     };
     static constexpr std::size_t leafEdges = 4;
 
-    void build(std::size_t at, std::size_t begin, std::size_t end);
+    void build(std::size_t at, std::size_t begin, std::size_t end, Progress* progress);
     double bound(std::size_t at, const glm::dvec3& centre, double radius) const;
     static double ofEdge(const Edge& edge, const glm::dvec3& centre, double radius);
 
@@ -394,34 +397,20 @@ class Slope {
     std::vector<Node> nodes_;
 };
 
-Slope::Slope(const Mesh& given) {
-    const Mesh mesh = weld(given);
-    struct Run {
-        std::uint32_t low, high;
-        int sign;
-    };
-    std::vector<Run> runs;
-    runs.reserve(3 * mesh.triangles.size());
-    for (const glm::uvec3& t : mesh.triangles)
-        for (int k = 0; k < 3; ++k) {
-            const std::uint32_t a = t[k], b = t[(k + 1) % 3];
-            runs.push_back({std::min(a, b), std::max(a, b), a < b ? 1 : -1});
-        }
-    tbb::parallel_sort(runs.begin(), runs.end(),
-                       [](const Run& a, const Run& b) { return a.low != b.low ? a.low < b.low : a.high < b.high; });
-    for (std::size_t i = 0, next = 0; i < runs.size(); i = next) {
+Slope::Slope(const Mesh& mesh, Progress* progress) {
+    Topology(mesh, progress).forEachEdge([&](std::span<const EdgeUse> uses) {
         int times = 0;
-        for (next = i; next < runs.size() && runs[next].low == runs[i].low && runs[next].high == runs[i].high; ++next)
-            times += runs[next].sign;
-        const glm::vec3 from = mesh.points[runs[i].low], to = mesh.points[runs[i].high];
-        if (times != 0) edges_.push_back({from, to, std::abs(double(times)), 0.5f * (from + to), std::uint32_t(i)});
-    }
+        for (const EdgeUse& use : uses) times += use.direction();
+        const glm::vec3 from = mesh.points[uses[0].low], to = mesh.points[uses[0].high];
+        if (times != 0)
+            edges_.push_back({from, to, std::abs(double(times)), 0.5f * (from + to), std::uint32_t(edges_.size())});
+    });
     if (edges_.empty()) return;
     nodes_.resize(nodesOver(edges_.size(), leafEdges));
-    build(0, 0, edges_.size());
+    build(0, 0, edges_.size(), progress);
 }
 
-void Slope::build(std::size_t at, std::size_t begin, std::size_t end) {
+void Slope::build(std::size_t at, std::size_t begin, std::size_t end, Progress* progress) {
     Node& node = nodes_[at];
     node = {glm::dvec3(edges_[begin].at), 0, 0, begin, end, 0};
     for (std::size_t i = begin; i < end; ++i) {
@@ -430,10 +419,11 @@ void Slope::build(std::size_t at, std::size_t begin, std::size_t end) {
         node.radius = std::max({node.radius, glm::length(edge.from - node.centre), glm::length(edge.to - node.centre)});
     }
     if (end - begin <= leafEdges) return;
-    const std::size_t middle = split(edges_, begin, end);
+    const std::size_t middle = split(edges_, begin, end, progress);
     node.right = at + 1 + nodesOver(middle - begin, leafEdges);
     both(
-        end - begin, [&] { build(at + 1, begin, middle); }, [&] { build(node.right, middle, end); });
+        end - begin, [&] { build(at + 1, begin, middle, progress); },
+        [&] { build(node.right, middle, end, progress); });
 }
 
 double Slope::bound(std::size_t at, const glm::dvec3& centre, double radius) const {
@@ -461,6 +451,7 @@ struct Question {
     const WindingNumber& winding;
     const Slope* slope;  // null: the number changes only across the surface
     double voxelSize;
+    Progress* progress;
 
     glm::dvec3 at(const openvdb::Coord& voxel) const { return glm::dvec3(voxel.x(), voxel.y(), voxel.z()) * voxelSize; }
     glm::dvec3 centre(const openvdb::Coord& origin, std::int32_t side) const {
@@ -478,6 +469,7 @@ struct Answer {
 };
 
 Answer ask(const Question& question, const glm::dvec3& point) {
+    poll(question.progress);
     const WindingNumber::Estimate e = question.winding.estimate(point, question.slope ? handOn : onlySide);
     // where nothing changes without a surface between, an answer goes as far as the surface
     const double margin =
@@ -559,6 +551,7 @@ int BrickSigns::slot(const openvdb::Coord& voxel) const {
 }
 
 void BrickSigns::sign(const BandWidths& widths) {
+    poll(question_.progress);
     signEmpty();
     for (std::size_t i = 0; i < leaves_.size(); ++i) {
         State& state = leaves_[i];
@@ -759,15 +752,16 @@ openvdb::CoordBBox spaceOf(const std::vector<BandLeaf*>& leaves, const Question&
 
 }  // namespace
 
-void signByWinding(openvdb::FloatGrid& grid, const Mesh& mesh, const BandWidths& widths, bool closed) {
-    const WindingNumber winding(mesh);
+void signByWinding(openvdb::FloatGrid& grid, const Mesh& mesh, const BandWidths& widths, bool closed,
+                   Progress* progress) {
+    const WindingNumber winding(mesh, progress);
     std::optional<Slope> slope;
-    if (!closed) slope.emplace(mesh);
-    const Question question{winding, slope ? &*slope : nullptr, double(widths.voxelSize)};
-    const std::vector<BandLeaf*> leaves = takeLeaves(grid);
+    if (!closed) slope.emplace(mesh, progress);
+    const Question question{winding, slope ? &*slope : nullptr, double(widths.voxelSize), progress};
+    const std::vector<BandLeaf*> leaves = leavesOf(grid);
     tbb::enumerable_thread_specific<std::vector<openvdb::CoordBBox>> found;
     if (!leaves.empty()) {
-        const Cells cells(leaves, spaceOf(leaves, question));
+        const Cells cells(leaves, spaceOf(leaves, question), progress);
         const std::span bricks = cells.bricks();
         tbb::parallel_for(std::size_t(0), bricks.size() - 1, [&](std::size_t b) {
             BrickSigns(question, cells.all().subspan(bricks[b], bricks[b + 1] - bricks[b]), found.local()).sign(widths);
@@ -775,7 +769,7 @@ void signByWinding(openvdb::FloatGrid& grid, const Mesh& mesh, const BandWidths&
     }
     std::vector<openvdb::CoordBBox> inside;
     for (const auto& boxes : found) inside.insert(inside.end(), boxes.begin(), boxes.end());
-    assemble(grid, leaves, inside, widths);
+    assemble(grid, inside, widths, progress);
 }
 
 }  // namespace bilayer

@@ -18,12 +18,15 @@
 
 namespace bilayer {
 
+class Progress;
+
 /// The generalized winding number of a mesh: near 1 inside of a closed, outward mesh, near 0 outside. A hierarchy of
 /// triangles; 72 to 108 bytes a triangle. Safe from any thread.
 class WindingNumber {
   public:
     /// Throws std::invalid_argument as validate() does. The mesh need not outlive the constructor.
-    explicit WindingNumber(const Mesh& mesh);
+    /// @param progress  polled while the hierarchy is built, unless null
+    explicit WindingNumber(const Mesh& mesh, Progress* progress = nullptr);
 
     /// The true number lies within `error` of `value`, rounding (about 1e-12) aside.
     struct Estimate {
@@ -77,7 +80,10 @@ class WindingNumber {
 ///                wherever no surface lies between, and few voxels need to be asked. false: it changes across a hole,
 ///                away from any surface. Then voxels of leaves get the sign at their own centre, and the space between
 ///                leaves gets one sign for each 8x8x8 block, that of the block's centre.
-/// The bytes do not depend on the number of threads. Throws std::invalid_argument as validate() does.
-void signByWinding(openvdb::FloatGrid& grid, const Mesh& mesh, const BandWidths& widths, bool closed);
+/// @param progress  polled, unless null
+/// The bytes do not depend on the number of threads. Throws std::invalid_argument as validate() does, and Cancelled;
+/// the grid is then in between.
+void signByWinding(openvdb::FloatGrid& grid, const Mesh& mesh, const BandWidths& widths, bool closed,
+                   Progress* progress = nullptr);
 
 }  // namespace bilayer

@@ -26,17 +26,20 @@ const std::map<std::string, Method> methods{
     {"exact", Method::exact}, {"double-layer", Method::doubleLayer}, {"pseudonormal", Method::pseudonormal}};
 const std::map<std::string, Sign> signs{
     {"auto", Sign::automatic}, {"normals", Sign::normals}, {"winding", Sign::winding}, {"flood", Sign::flood}};
+const std::map<std::string, BandUnit> bandUnits{{"voxels", BandUnit::voxels}, {"world", BandUnit::world}};
+constexpr double thinnestBand = 1e-3, widestBand = 1e3;  // [voxels]
 
 struct Arguments {
     std::filesystem::path mesh, output;
     BuildOptions options;
     float resolution = 0;
     float halfWidth = 3;
-    std::string method = "exact", backend = "tbb", sign = "auto", device;
+    std::string bandUnit = "voxels", method = "exact", backend = "tbb", sign = "auto", device;
     std::uint64_t deviceMemory = 0;
     VdbOptions stored;
     bool fill = false, json = false;
-    CLI::Option *resolutionGiven = nullptr, *exteriorGiven = nullptr, *gapGiven = nullptr;
+    CLI::Option *resolutionGiven = nullptr, *halfGiven = nullptr, *exteriorGiven = nullptr, *interiorGiven = nullptr;
+    CLI::Option* gapGiven = nullptr;
     CLI::Option *deviceGiven = nullptr, *memoryGiven = nullptr;
     std::vector<CLI::Option*> layerOptions;  // what only the double layer method understands
 };
@@ -59,7 +62,27 @@ void requireUsage(const Arguments& a) {
         throw CLI::ValidationError("--sign", "is not for --method double-layer: the layers tell the signs");
     if (a.gapGiven->count() && (layers || (a.sign != "auto" && a.sign != "flood")))
         throw CLI::ValidationError("--gap", "needs --sign flood or auto, and another method than double-layer");
+    if (a.bandUnit == "world" && !a.halfGiven->count() && !a.exteriorGiven->count())
+        throw CLI::ValidationError("--band-unit", "world needs --half-width, or --exterior-width and --interior-width");
     requireOther(a.output, a.mesh);
+}
+
+// The API's range is (0, 1000] voxels too; here the message names the option.
+void requireWidth(const CLI::Option* option, float width, const Arguments& a) {
+    const bool world = a.options.bandUnit == BandUnit::world;
+    const double voxels = double(width) / (world ? double(a.options.voxelSize) : 1);
+    if (option->count() && !(voxels >= thinnestBand && voxels <= widestBand))
+        throw CLI::ValidationError(
+            option->get_name(),
+            fmt::format("{:g}{} must be {:g} to {:g} voxels", width,
+                        world ? fmt::format(" is {:g} voxels of {:g}; it", voxels, a.options.voxelSize) : "",
+                        thinnestBand, widestBand));
+}
+
+void requireBand(const Arguments& a) {
+    requireWidth(a.halfGiven, a.halfWidth, a);
+    requireWidth(a.exteriorGiven, a.options.exteriorWidth, a);
+    requireWidth(a.interiorGiven, a.options.interiorWidth, a);
 }
 
 // What this version has not got.
@@ -99,6 +122,7 @@ void printJson(const Arguments& a, const Outcome& o, const LevelSet& field) {
               {"output", a.output.string()},
               {"triangles", o.report.triangles},
               {"voxelSize", number(field.voxelSize())},
+              {"bandUnit", a.bandUnit},
               {"exteriorWidth", number(a.options.exteriorWidth)},
               {"interiorWidth", number(a.options.interiorWidth)},
               {"activeVoxels", field.activeVoxels()},
@@ -134,6 +158,9 @@ void printTable(const Arguments& a, const Outcome& o, const LevelSet& field) {
 
 void run(Arguments a) {
     requireUsage(a);
+    a.options.bandUnit = bandUnits.at(a.bandUnit);
+    // in the mesh's unit they wait for the voxel size
+    if (a.options.bandUnit == BandUnit::voxels || !a.resolutionGiven->count()) requireBand(a);
     requirePresent(a);
     a.options.method = methods.at(a.method);
     a.options.sign = signs.at(a.sign);
@@ -146,7 +173,10 @@ void run(Arguments a) {
     const Mesh mesh = readMesh(a.mesh);
     outcome.read = reading.seconds();
     requireWritable(a.output);
-    if (a.resolutionGiven->count()) a.options.voxelSize = voxelSizeFor(mesh, a.resolution);
+    if (a.resolutionGiven->count()) {
+        a.options.voxelSize = voxelSizeFor(mesh, a.resolution);
+        requireBand(a);
+    }
     if (!a.exteriorGiven->count()) a.options.exteriorWidth = a.options.interiorWidth = a.halfWidth;
 
     LevelSet field = timedBuild(mesh, a, outcome);
@@ -171,16 +201,18 @@ void addBand(CLI::App& command, Arguments& a) {
     a.resolutionGiven = size->add_option("--resolution", a.resolution, "voxels along the longest side of the bounds")
                             ->check(positive());
     size->require_option(1);
-    const CLI::Validator widths = within(1e-3, 1e3);
-    auto* half =
-        command.add_option("--half-width", a.halfWidth, "band on either side of the surface [voxels], default 3")
-            ->check(widths);
+    a.halfGiven =
+        command.add_option("--half-width", a.halfWidth, "band on either side of the surface, default 3 voxels")
+            ->check(positive());
     a.exteriorGiven =
-        command.add_option("--exterior-width", a.options.exteriorWidth, "band outside [voxels]")->check(widths);
-    auto* interior =
-        command.add_option("--interior-width", a.options.interiorWidth, "band inside [voxels]")->check(widths);
-    a.exteriorGiven->needs(interior)->excludes(half);
-    interior->needs(a.exteriorGiven)->excludes(half);
+        command.add_option("--exterior-width", a.options.exteriorWidth, "band outside")->check(positive());
+    a.interiorGiven = command.add_option("--interior-width", a.options.interiorWidth, "band inside")->check(positive());
+    a.exteriorGiven->needs(a.interiorGiven)->excludes(a.halfGiven);
+    a.interiorGiven->needs(a.exteriorGiven)->excludes(a.halfGiven);
+    command
+        .add_option("--band-unit", a.bandUnit,
+                    "of the three widths: voxels (default) or world, the mesh's unit; 0.001 to 1000 voxels either way")
+        ->check(CLI::IsMember(bandUnits));
 }
 
 void addMethod(CLI::App& command, Arguments& a) {

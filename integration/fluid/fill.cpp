@@ -17,6 +17,8 @@ LevelSet fill(const LevelSet& levelSet) {
     const auto filled = openvdb::tools::maskSdf(band, box);
     openvdb::tools::changeAsymmetricLevelSetBackground(filled->tree(), levelSet.exteriorWidth(),
                                                        -levelSet.interiorWidth());
+    // what was promised for the band does not hold for what is swept
+    filled->removeMeta(metadata::errorBound);
     auto grids = std::make_shared<Grids>(levelSet.grids());
     grids->distance = filled;
     return LevelSet(std::move(grids));

@@ -32,4 +32,7 @@ TEST_CASE("fill keeps the band and knows every other voxel of the box") {
     CHECK(filled.method() == band.method());
     CHECK(filled.meshHash() == band.meshHash());
     CHECK(after.background() == before.background());
+    // the sweep is off by more than the band was
+    CHECK(largest > 2 * double(band.errorBound()));
+    CHECK(std::isnan(filled.errorBound()));
 }

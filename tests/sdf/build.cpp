@@ -264,12 +264,35 @@ TEST_CASE("bad options and meshes are refused by name") {
     refused({.voxelSize = 1, .exteriorWidth = 0}, "exteriorWidth");
     refused({.voxelSize = 1, .interiorWidth = 1e6f}, "interiorWidth");
     refused({.voxelSize = 1, .threads = -1}, "threads");
+    for (const float bad : {NAN, -1.f, 101.f, 1e30f, INFINITY})
+        for (const Sign sign : {Sign::automatic, Sign::flood})
+            refused({.voxelSize = 1, .sign = sign, .gap = bad}, "gap must be in 0..100 voxels");
+    for (const float bad : {NAN, -1.f, 0.f, 1001.f, INFINITY})
+        for (const BandUnit unit : {BandUnit::voxels, BandUnit::world}) {
+            refused({.voxelSize = 1, .exteriorWidth = bad, .bandUnit = unit}, "exteriorWidth");
+            refused({.voxelSize = 1, .interiorWidth = bad, .bandUnit = unit}, "interiorWidth");
+            refused({.voxelSize = bad > 0 ? INFINITY : bad, .bandUnit = unit}, "voxelSize");
+        }
+    // widths that overflow or vanish in the mesh's unit
+    refused({.voxelSize = 1e37f, .exteriorWidth = 100}, "exteriorWidth");
+    refused({.voxelSize = 1e-3f, .interiorWidth = 1e-37f}, "interiorWidth");
+    refused({.voxelSize = 1, .threads = 4097}, "threads");
     BuildOptions options{.voxelSize = 0.1f};
     options.doubleLayer.delta = 0;
     refused(options, "delta");
     options = {.voxelSize = 0.1f};
-    options.doubleLayer.epsilon = NAN;
-    refused(options, "epsilon");
+    options.doubleLayer.delta = NAN;
+    refused(options, "delta");
+    for (const float bad : {NAN, 0.f, 0.9e-4f, 1.1e4f, INFINITY}) {
+        options = {.voxelSize = 0.1f};
+        options.doubleLayer.epsilon = bad;
+        refused(options, "epsilon");
+    }
+    for (const float limit : {1e-4f, 1e4f}) {
+        options = {.voxelSize = 0.1f, .method = Method::doubleLayer};
+        options.doubleLayer.epsilon = limit;
+        CHECK(build(shapes::sphere(0.1f, 2), options).activeVoxels() > 100);
+    }
     options = {.voxelSize = 0.1f};
     options.doubleLayer.neighbourhood = 0;
     refused(options, "neighbourhood");

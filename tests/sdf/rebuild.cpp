@@ -74,6 +74,17 @@ void checkFrame(const Mesh& before, const Mesh& after, const BuildOptions& optio
     CHECK(sameFields(rebuild(old, before, after, moved, options), full));
 }
 
+// Leaves of either grid that the other one lacks or has with other values.
+std::size_t changedLeaves(const openvdb::FloatGrid& a, const openvdb::FloatGrid& b) {
+    std::size_t changed = 0;
+    for (auto leaf = a.tree().cbeginLeaf(); leaf; ++leaf) {
+        const auto* other = b.tree().probeConstLeaf(leaf->origin());
+        changed += !other || std::memcmp(leaf->buffer().data(), other->buffer().data(), 512 * sizeof(float)) != 0;
+    }
+    for (auto leaf = b.tree().cbeginLeaf(); leaf; ++leaf) changed += !a.tree().probeConstLeaf(leaf->origin());
+    return changed;
+}
+
 // A knot of a tube thick enough that dents do not push it through itself.
 Mesh knot() {
     return shapes::torusKnot(2, 3, 1, 0.2f);
@@ -157,6 +168,61 @@ TEST_CASE("a mesh that turns inside out or into itself is built as in full") {
     const BuildOptions options{.voxelSize = 0.05f};
     const std::uint32_t moved[] = {7};
     CHECK(sameFields(rebuild(build(pair(3), options), pair(3), open, moved, options), build(open, options)));
+}
+
+TEST_CASE("a rebuild fills the blocks around what moved and copies the others") {
+    // 70,200 triangles, of which one in a hundred moves
+    const Mesh before = shapes::torus(1, 0.3f, 270, 130);
+    const Mesh after = dented(before, before.points[before.points.size() / 3], 0.16f, {0.01f, 0.02f, 0.03f});
+    const auto moved = trianglesThatMoved(before, after);
+    const double share = double(moved.size()) / double(before.triangles.size());
+    CAPTURE(share);
+    REQUIRE((share > 0.005 && share < 0.02));
+    const BuildOptions options{.voxelSize = voxelSizeFor(before, 128)};
+    BuildTimes full, part;
+    const LevelSet old = build(before, options), expected = build(after, options, nullptr, &full);
+    CHECK(sameFields(rebuild(old, before, after, moved, options, &part), expected));
+    const std::size_t changed = changedLeaves(*old.grids().distance, *expected.grids().distance);
+    CAPTURE(full.filledBlocks, part.filledBlocks, changed);
+    CHECK(full.filledBlocks >= expected.leaves());
+    CHECK(part.filledBlocks >= changed);
+    CHECK(changed > 10);
+    CHECK(part.filledBlocks < full.filledBlocks / 10);
+    // nothing is to be filled where nothing moved
+    CHECK(sameFields(rebuild(old, before, before, {}, options, &part), old));
+    CHECK(part.filledBlocks == 0);
+}
+
+TEST_CASE("a rebuild is a build in full where old blocks cannot be copied") {
+    const Mesh before = knot();
+    const Mesh after = dented(before, before.points[before.points.size() / 3], 0.2f, {0.04f, 0.03f, -0.05f});
+    const auto moved = trianglesThatMoved(before, after);
+    const auto filledInFull = [&](const LevelSet& old, const BuildOptions& options) {
+        BuildTimes full, part;
+        const LevelSet expected = build(after, options, nullptr, &full);
+        CHECK(sameFields(rebuild(old, before, after, moved, options, &part), expected));
+        return part.filledBlocks == full.filledBlocks;
+    };
+    const float h = 1.f / 32;  // widths are the same in 16 bits
+    const BuildOptions plain{.voxelSize = h};
+    CHECK_FALSE(filledInFull(build(before, plain), plain));
+    for (const BuildOptions& options : {BuildOptions{.voxelSize = h, .sign = Sign::winding},
+                                        BuildOptions{.voxelSize = h, .method = Method::pseudonormal},
+                                        BuildOptions{.voxelSize = h, .method = Method::doubleLayer},
+                                        BuildOptions{.voxelSize = h, .interiorWidth = 0.9f}})
+        CHECK(filledInFull(build(before, options), options));
+
+    // rounded to 16 bits in a file
+    const auto path = test::scratch("rounded.vdb");
+    writeVdb(path, build(before, plain), {.halfFloat = true});
+    CHECK(filledInFull(readVdb(path), plain));
+    // swept, as fluid::fill() does: no bound is known, other voxels are active
+    auto swept = std::make_shared<Grids>();
+    const auto grid = build(before, plain).grids().distance->deepCopy();
+    grid->removeMeta(metadata::errorBound);
+    for (auto leaf = grid->tree().beginLeaf(); leaf; ++leaf) leaf->setValuesOn();
+    swept->distance = grid;
+    CHECK(filledInFull(LevelSet(swept), plain));
 }
 
 TEST_CASE("a rebuild refuses what does not belong together, by name") {

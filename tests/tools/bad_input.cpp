@@ -134,7 +134,8 @@ TEST_CASE("wrong usage") {
          {Words{"--nonsense"}, Words{"--method", "magic"}, Words{"--sign", "magic"}, Words{"--backend", "cuda"},
           Words{"--device", "x"}, Words{"--device-memory", "100"}, Words{"--threads", "0"}, Words{"--half-width", "0"},
           Words{"--exterior-width", "3"}, Words{"--half-width", "3", "--exterior-width", "3", "--interior-width", "3"},
-          Words{"--gap", "-1"}, Words{"--gap", "101"}}) {
+          Words{"--gap", "-1"}, Words{"--gap", "101"}, Words{"--half-width", "1001"}, Words{"--half-width", "1e-4"},
+          Words{"--band-unit", "furlongs"}, Words{"--band-unit", "world"}}) {
         Words words = buildOf(mesh);
         words.insert(words.end(), options.begin(), options.end());
         requireUsage(words, options.front());
@@ -145,6 +146,20 @@ TEST_CASE("wrong usage") {
     requireUsage({"seed", mesh, "-o", mesh, "--voxel-size", "0.1"}, "would overwrite " + mesh);
     requireUsage({"seed", mesh, "-o", output(), "--voxel-size", "0.1", "--rotate", "0", "0", "0", "1"});
     requireUsage({"seed", mesh, "-o", output(), "--voxel-size", "0.1", "--seed", "1"});
+    CHECK_FALSE(std::filesystem::exists(output()));
+}
+
+TEST_CASE("widths in the mesh's unit must come to as many voxels as others") {
+    const std::string mesh = sphereFile().string();
+    const auto refused = [&](Words options, const std::string& culprit) {
+        options.insert(options.end(), {"--band-unit", "world"});
+        requireUsage(buildOf(mesh, options), culprit);
+    };
+    refused({"--voxel-size", "0.125", "--half-width", "250"}, "--half-width: 250 is 2000 voxels of 0.125");
+    refused({"--voxel-size", "0.125", "--half-width", "1e-5"}, "--half-width: 1e-05 is 8e-05 voxels of 0.125");
+    refused({"--voxel-size", "0.125", "--exterior-width", "1", "--interior-width", "250"}, "--interior-width: 250 is");
+    refused({"--voxel-size", "0.125", "--exterior-width", "250", "--interior-width", "1"}, "--exterior-width: 250 is");
+    refused({"--resolution", "10", "--half-width", "250"}, "--half-width: 250 is");
     CHECK_FALSE(std::filesystem::exists(output()));
 }
 

@@ -94,6 +94,7 @@ TEST_CASE("every option of build has an effect") {
     const auto wide = with({"--exterior-width", "5", "--interior-width", "1"});
     CHECK(wide["exteriorWidth"].get<double>() == Approx(5));
     CHECK(wide["interiorWidth"].get<double>() == Approx(1));
+    CHECK(wide["bandUnit"] == "voxels");
     CHECK(with({"--fill"})["activeVoxels"] > plain["activeVoxels"]);
     CHECK(with({"--triangles"})["memoryBytes"] > plain["memoryBytes"]);
     CHECK(readVdb(output).grids().triangle);
@@ -128,6 +129,30 @@ TEST_CASE("every option of build has an effect") {
     CHECK(std::filesystem::file_size(output) < full);
     CHECK(readVdb(output).errorBound() > bound);
     CHECK(half["errorBound"].get<float>() == readVdb(output).errorBound());
+}
+
+TEST_CASE("widths may be given in the mesh's unit") {
+    const std::string output = scratch("world.vdb").string();
+    const auto voxels = build(output, {"--voxel-size", "0.0625", "--exterior-width", "4", "--interior-width", "2"});
+    const auto world = build(output, {"--voxel-size", "0.0625", "--band-unit", "world", "--exterior-width", "0.25",
+                                      "--interior-width", "0.125"});
+    CHECK(world["bandUnit"] == "world");
+    CHECK(world["exteriorWidth"] == 0.25);
+    CHECK(world["interiorWidth"] == 0.125);
+    CHECK(world["activeVoxels"] == voxels["activeVoxels"]);
+    CHECK(readVdb(output).exteriorWidth() == 0.25f);
+    CHECK(readVdb(output).interiorWidth() == 0.125f);
+    // the band stays where it is at another resolution
+    build(output, {"--resolution", "40", "--band-unit", "world", "--half-width", "0.1"});
+    CHECK(readVdb(output).exteriorWidth() == Approx(0.1f));
+    CHECK(readVdb(output).interiorWidth() == Approx(0.1f));
+    CHECK_THAT(run({"build", "--help"}).out, Catch::Contains("--band-unit") && Catch::Contains("world"));
+}
+
+TEST_CASE("a filled field promises no bound of its error") {
+    const std::string output = scratch("filled.vdb").string();
+    CHECK(build(output, {"--voxel-size", "0.05", "--fill"})["errorBound"].is_null());
+    CHECK(run({"info", output, "--json"}).json()["errorBound"].is_null());
 }
 
 TEST_CASE("each method says what it did, and both exact ones agree") {
