@@ -160,12 +160,6 @@ namespace {
 
 HWY_EXPORT(makePieces);
 
-// Rounds to the nearest, halves always up, so that a shift by whole voxels shifts the result. For |value| < 2^31.
-int roundToInt(double value) {
-    constexpr double shift = 2147483648.0;
-    return int(std::int64_t(value + 0.5 + shift) - std::int64_t(shift));
-}
-
 bool misses(const PieceCorners& c, const PieceLimits& limits) {
     const glm::dvec3 lower = glm::min(c[0], glm::min(c[1], c[2])), upper = glm::max(c[0], glm::max(c[1], c[2]));
     return lower.x > limits.upper.x || lower.y > limits.upper.y || lower.z > limits.upper.z ||
@@ -174,29 +168,14 @@ bool misses(const PieceCorners& c, const PieceLimits& limits) {
 
 }  // namespace
 
-void PieceCutter::cut(const PieceCorners& c, std::uint32_t triangle, const PieceLimits& limits) {
+void PieceCutter::halve(const PieceCorners& c, std::uint32_t triangle, const PieceLimits& limits) {
     const glm::dvec3 ab = c[1] - c[0], bc = c[2] - c[1], ca = c[0] - c[2];
     const std::array<double, 3> lengths2{glm::dot(ab, ab), glm::dot(bc, bc), glm::dot(ca, ca)};
     const auto longest = std::max_element(lengths2.begin(), lengths2.end());
-    if (*longest <= longestEdge2_) return add(c, triangle);
     const auto i = std::size_t(longest - lengths2.begin()), j = (i + 1) % 3, k = (i + 2) % 3;
     const glm::dvec3 middle = 0.5 * (c[i] + c[j]);
     for (const PieceCorners& half : {PieceCorners{c[i], middle, c[k]}, PieceCorners{middle, c[j], c[k]}})
         if (!misses(half, limits)) cut(half, triangle, limits);
-}
-
-void PieceCutter::add(const PieceCorners& c, std::uint32_t triangle) {
-    const auto at = std::size_t(count_);
-    const glm::ivec3 base(roundToInt(c[0].x), roundToInt(c[0].y), roundToInt(c[0].z));
-    const glm::vec3 corner(c[0] - glm::dvec3(base)), ab(c[1] - c[0]), ac(c[2] - c[0]);
-    waiting_.base[at] = base;
-    waiting_.triangle[at] = triangle;
-    for (int axis = 0; axis < 3; ++axis) {
-        waiting_.corner[axis][at] = corner[axis];
-        waiting_.ab[axis][at] = ab[axis];
-        waiting_.ac[axis][at] = ac[axis];
-    }
-    if (++count_ == batch) finish();
 }
 
 void PieceCutter::finish() {

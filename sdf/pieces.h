@@ -4,8 +4,10 @@
 // sufficient: the nearest piece has its sample within its radius plus any upper bound of the distance.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
+#include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
 #include <vector>
 
@@ -44,7 +46,15 @@ class PieceCutter {
 
     /// Cuts a triangle by halving longest edges, and leaves out pieces whose box misses the limits. Pieces do not
     /// depend on the limits, and those of two triangles meet at the same points of a shared edge.
-    void cut(const PieceCorners& corners, std::uint32_t triangle, const PieceLimits& limits);
+    void cut(const PieceCorners& corners, std::uint32_t triangle, const PieceLimits& limits) {
+        const PieceCorners& c = corners;
+        const glm::dvec3 ab = c[1] - c[0], bc = c[2] - c[1], ca = c[0] - c[2];
+        // most triangles of a fine mesh are short, and a call for each would take as long as the rest
+        if (std::max({glm::dot(ab, ab), glm::dot(bc, bc), glm::dot(ca, ca)}) <= longestEdge2_)
+            add(c[0], ab, -ca, triangle);
+        else
+            halve(c, triangle, limits);
+    }
 
     /// Finishes the pieces that are still waiting: call it after the last triangle.
     void finish();
@@ -62,7 +72,25 @@ class PieceCutter {
     };
 
   private:
-    void add(const PieceCorners& corners, std::uint32_t triangle);
+    void add(const glm::dvec3& corner, const glm::dvec3& ab, const glm::dvec3& ac, std::uint32_t triangle) {
+        const auto at = std::size_t(count_);
+        const glm::ivec3 base(roundToInt(corner.x), roundToInt(corner.y), roundToInt(corner.z));
+        waiting_.base[at] = base;
+        waiting_.triangle[at] = triangle;
+        for (int axis = 0; axis < 3; ++axis) {
+            waiting_.corner[axis][at] = float(corner[axis] - double(base[axis]));
+            waiting_.ab[axis][at] = float(ab[axis]);
+            waiting_.ac[axis][at] = float(ac[axis]);
+        }
+        if (++count_ == batch) finish();
+    }
+    void halve(const PieceCorners& corners, std::uint32_t triangle, const PieceLimits& limits);
+
+    // Rounds to the nearest, halves always up, so that a shift by whole voxels shifts the result. For |value| < 2^31.
+    static int roundToInt(double value) {
+        constexpr double shift = 2147483648.0;
+        return int(std::int64_t(value + 0.5 + shift) - std::int64_t(shift));
+    }
 
     double longestEdge2_;
     std::vector<Piece>& pieces_;
