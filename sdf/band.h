@@ -30,8 +30,8 @@ struct BandMasks {
     BlockMask active, inside;
 };
 
-/// Nearer to the edge of the band than this is outside of it, so that a face of the mesh exactly as far away as the band
-/// is wide gives the same voxels whatever the rounding [voxels].
+/// Nearer to the edge of the band than this is outside of it, so that a face of the mesh exactly as far away as the
+/// band is wide gives the same voxels whatever the rounding [voxels].
 inline constexpr float bandEdge = 1e-5f;
 
 /// Turns one block's signed distances [voxels] into a leaf's values [m]: active where -interior < distance < exterior,

@@ -58,7 +58,8 @@ class BlockBins {
         // rounded to zero below the first block, which is the first block
         const auto block = [&](float coordinate) { return std::clamp(int(coordinate * perBlock), 0, blocks - 1); };
         const glm::vec3 lower = ball.sample - reach, upper = ball.sample + reach;
-        const int x1 = block(upper.x), y0 = block(lower.y), y1 = block(upper.y), z0 = block(lower.z), z1 = block(upper.z);
+        const int x1 = block(upper.x), y0 = block(lower.y), y1 = block(upper.y), z0 = block(lower.z),
+                  z1 = block(upper.z);
         const auto toCentre = [&](int at, float coordinate) { return float(blockSide * at) + half - coordinate; };
         const auto away2 = [&](float toCentre) {
             const float away = std::max(std::abs(toCentre) - half, 0.f);

@@ -36,8 +36,8 @@ struct FilledBlocks {
     std::span<const std::int32_t> triangles;  ///< blockVoxels a block; empty unless asked for
 };
 
-/// Where the squared distances to both layers differ by less than this they are equal, whatever a device's rounding, and
-/// the voxel is inside [voxels^2].
+/// Where the squared distances to both layers differ by less than this they are equal, whatever a device's rounding,
+/// and the voxel is inside [voxels^2].
 inline constexpr float layerTie = 1e-5f;
 
 /// Stands for every distance beyond the reach of a job; its sign is right where signs are asked for [voxels].

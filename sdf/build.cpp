@@ -447,16 +447,11 @@ class Build {
         Assembler assembler(byNormals ? widths : BandWidths{reach, reach, options_.voxelSize}, options_.triangles,
                             plain(sign), progress_);
         std::atomic<std::size_t> undecided = 0, conflicts = 0;
-        MeshJob job{mesh,
-                    options_.voxelSize,
-                    reach,
-                    options_.triangles,
-                    byNormals,
-                    [&](const FilledBlocks& blocks) { take(assembler, blocks); },
-                    progress_,
-                    {},
-                    &undecided,
-                    &conflicts};
+        MeshJob job{mesh,       options_.voxelSize,
+                    reach,      options_.triangles,
+                    byNormals,  [&](const FilledBlocks& blocks) { take(assembler, blocks); },
+                    progress_,  {},
+                    &undecided, &conflicts};
         if (adapt) adapt(job, assembler);
         // triangles turned around, in a mended mesh, have the same box
         options_.method == Method::exact ? fillExact(job, survey_.box) : fillPseudonormal(job);

@@ -10,10 +10,12 @@ namespace bilayer {
 namespace {
 
 /// Pieces with a mean radius below this are grouped: several of them share a voxel [voxels].
-constexpr double smallRadius = 0.45;
+constexpr double smallRadius = 1.6;
 /// More cells than this, 4 MiB of counters, and a brick's pieces stay alone.
 constexpr double mostCells = 1 << 20;
-constexpr float cellSize = 1.5f;  // finer or coarser took longer (measured) [voxels]
+/// Side of the cells that pieces are grouped by, as a multiple of their mean radius, and its limits; others took longer
+/// (measured) [voxels].
+constexpr float cellFactor = 4.f, smallestCell = 1.1f, largestCell = 3.f;
 /// Rounding of a cluster's own numbers [voxels].
 constexpr float clusterSlack = 1e-4f;
 
@@ -33,7 +35,9 @@ void Clusters::build(std::span<const Piece> pieces, const glm::ivec3& origin) {
         lower = glm::min(lower, sample);
         upper = glm::max(upper, sample);
     }
-    const glm::ivec3 size = glm::ivec3((upper - lower) / cellSize) + 1;
+    const float meanRadius = float(radii / double(pieces.size()));
+    cellSize_ = std::clamp(cellFactor * meanRadius, smallestCell, largestCell);
+    const glm::ivec3 size = glm::ivec3((upper - lower) / cellSize_) + 1;
     const bool grouped =
         radii < smallRadius * double(pieces.size()) && double(size.x) * double(size.y) * double(size.z) <= mostCells;
     if (!grouped) {
@@ -53,7 +57,7 @@ void Clusters::sortByCell(const glm::vec3& lower, const glm::ivec3& size) {
     cells_.resize(members_.size());
     cursors_.assign(std::size_t(size.x) * std::size_t(size.y) * std::size_t(size.z), 0);
     for (std::size_t i = 0; i < members_.size(); ++i) {
-        const glm::ivec3 cell((members_[i].sample - lower) / cellSize);
+        const glm::ivec3 cell((members_[i].sample - lower) / cellSize_);
         cells_[i] = std::uint32_t((cell.x * size.y + cell.y) * size.z + cell.z);
         ++cursors_[cells_[i]];
     }

@@ -23,6 +23,7 @@ class Clusters {
     void sortByCell(const glm::vec3& lower, const glm::ivec3& size);
     void addCluster(std::uint32_t begin, std::uint32_t end);
 
+    float cellSize_ = 1;  // [voxels]
     std::vector<Cluster> clusters_;
     std::vector<Member> members_, unsorted_;
     std::vector<std::uint32_t> cells_, cursors_;

@@ -1,5 +1,5 @@
-// The double layer method, brick by brick: tiles, runs of samples, blocks. Nothing is kept of a mesh but the bins of its
-// triangles, so that memory stays a fraction of the mesh's own however many samples it has.
+// The double layer method, brick by brick: tiles, runs of samples, blocks. Nothing is kept of a mesh but the bins of
+// its triangles, so that memory stays a fraction of the mesh's own however many samples it has.
 #include "sdf/double_layer.h"
 
 #include <oneapi/tbb/enumerable_thread_specific.h>

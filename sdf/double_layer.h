@@ -6,8 +6,8 @@
 namespace bilayer {
 
 /// Fills all blocks of a job by the double layer method, with the widest SIMD instructions that the processor has.
-/// `MeshJob::reach` and `sign` follow from the method: `parameters` tells how far samples reach, and every known distance
-/// has its sign.
+/// `MeshJob::reach` and `sign` follow from the method: `parameters` tells how far samples reach, and every known
+/// distance has its sign.
 /// @param box  of the mesh
 void fillDoubleLayer(const MeshJob& job, const Bounds& box, const DoubleLayerOptions& options,
                      const FillParameters& parameters);

@@ -103,10 +103,10 @@ class BrickFiller {
         const PieceLimits limits = limitsOfWanted();
         PieceCutter cutter(longestPieceEdge, s_.pieces);
         bilayer::forEachTriangle(job_.mesh, bins_.trianglesOf(brick), voxelsPerUnit_,
-                        [&](std::uint32_t triangle, const PieceCorners& corners) {
-                            if (++cut_ % trianglesPerPoll == 0) job_.progress.poll();
-                            if (!job_.wanted || meets(corners, limits)) cutter.cut(corners, triangle, limits);
-                        });
+                                 [&](std::uint32_t triangle, const PieceCorners& corners) {
+                                     if (++cut_ % trianglesPerPoll == 0) job_.progress.poll();
+                                     if (!job_.wanted || meets(corners, limits)) cutter.cut(corners, triangle, limits);
+                                 });
         cutter.finish();
     }
 
@@ -196,7 +196,7 @@ class BrickFiller {
     std::optional<int> windingAfter(const glm::ivec3& way, int atEnd) {
         passed_.clear();
         forEachNear([](const glm::vec3&, float) { return true; },
-                        [&](std::uint32_t triangle) { passed_.push_back(triangle); });
+                    [&](std::uint32_t triangle) { passed_.push_back(triangle); });
         std::sort(passed_.begin(), passed_.end());
         passed_.erase(std::unique(passed_.begin(), passed_.end()), passed_.end());
         int winding = atEnd;

@@ -17,8 +17,8 @@ HWY_BEFORE_NAMESPACE();
 namespace bilayer::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-constexpr int cubeSide = 4;                          // voxels
-constexpr int sliceVoxels = cubeSide * cubeSide;     // of one x
+constexpr int cubeSide = 4;                       // voxels
+constexpr int sliceVoxels = cubeSide * cubeSide;  // of one x
 constexpr int cubesPerSide = blockSide / cubeSide;
 constexpr int cubesPerBlock = cubesPerSide * cubesPerSide * cubesPerSide;
 
@@ -183,7 +183,8 @@ HWY_INLINE bool mayImprove(const Voxels& v, const glm::vec3& centre, float radiu
 }
 
 template <bool cube, bool withOwners>
-HWY_INLINE void applyGroups(const LayerBlockInput& input, std::span<const std::uint32_t> groups, Voxels<withOwners>& v) {
+HWY_INLINE void applyGroups(const LayerBlockInput& input, std::span<const std::uint32_t> groups,
+                            Voxels<withOwners>& v) {
     const LayerRun* runs = input.samples.runs().data();
     const float half = float(input.parameters.cube), delta2 = input.parameters.delta * input.parameters.delta;
     bool large = false;
@@ -255,7 +256,8 @@ using CubeGroups = std::array<std::span<const std::uint32_t>, cubesPerBlock>;
 // The groups that reach each cube: the balls around their inner or outer samples must, and their slab.
 CubeGroups binCubes(const LayerBlockInput& input, LayerScratch& scratch) {
     const Tag tag;
-    const std::size_t lanes = hn::Lanes(tag), count = input.reaching.size(), stride = (count + lanes - 1) / lanes * lanes;
+    const std::size_t lanes = hn::Lanes(tag), count = input.reaching.size(),
+                      stride = (count + lanes - 1) / lanes * lanes;
     enum Row { inner, outer = inner + 3, normal = outer + 3, reach = normal + 3, slab, rows };
     // columns beyond the last group reach nothing
     scratch.columns.resize(stride * rows);
@@ -321,7 +323,8 @@ CubeGroups binCubes(const LayerBlockInput& input, LayerScratch& scratch) {
     }
     CubeGroups groups;
     for (int cube = 0; cube < cubesPerBlock; ++cube)
-        groups[std::size_t(cube)] = {scratch.groups.data() + std::size_t(cube) * count, scratch.groups.data() + ends[cube]};
+        groups[std::size_t(cube)] = {scratch.groups.data() + std::size_t(cube) * count,
+                                     scratch.groups.data() + ends[cube]};
     return groups;
 }
 

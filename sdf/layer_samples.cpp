@@ -13,10 +13,11 @@ namespace {
 /// Most rows and columns of samples in one run: about what a voxel's neighbourhood holds.
 constexpr int mostRows = 4;
 /// Runs of triangles with a mean area below this are gathered: several of them share a voxel [voxels^2].
-constexpr double smallArea = 0.35;
+constexpr double smallArea = 0.5;
 /// More cells than this, 1 MiB of counters, and runs stay alone.
 constexpr double mostCells = 1 << 18;
-constexpr float cellSize = 1.f;  // finer or coarser took longer (measured) [voxels]  // finer or coarser took longer (measured) [voxels]
+constexpr float cellSize =
+    1.f;  // finer or coarser took longer (measured) [voxels]  // finer or coarser took longer (measured) [voxels]
 /// Rounding of a group's own numbers [voxels].
 constexpr float groupSlack = 1e-4f;
 
@@ -76,8 +77,7 @@ void LayerSamples::finish() {
 LayerGroup LayerSamples::groupOf(std::uint32_t index) const {
     const LayerRun& run = runs_[index];
     const glm::vec3 normal = run.twiceOffset / twiceDelta_, offset = 0.5f * run.twiceOffset;
-    if (run.end - run.begin == 1)
-        return {places_[run.begin], groupSlack, normal, groupSlack, offset, index, index + 1};
+    if (run.end - run.begin == 1) return {places_[run.begin], groupSlack, normal, groupSlack, offset, index, index + 1};
     glm::vec3 lower(1e30f), upper(-1e30f);
     for (std::uint32_t i = run.begin; i < run.end; ++i) {
         lower = glm::min(lower, places_[i]);

@@ -1,5 +1,5 @@
-// The samples of the double layer method in one brick: parts of triangles spread out into runs, runs gathered into groups
-// that a block can look at or leave out as a whole.
+// The samples of the double layer method in one brick: parts of triangles spread out into runs, runs gathered into
+// groups that a block can look at or leave out as a whole.
 #pragma once
 
 #include <cstdint>
@@ -11,9 +11,9 @@
 
 namespace bilayer {
 
-/// Samples of one part of a triangle. They lie in a plane, and their inner and outer samples are the same offset away from all of
-/// them. So for a voxel p with squared distance A to the nearest of them and height h over the plane, the nearest inner
-/// and outer samples are at squared distances A + delta^2 + 2 delta h and A + delta^2 - 2 delta h.
+/// Samples of one part of a triangle. They lie in a plane, and their inner and outer samples are the same offset away
+/// from all of them. So for a voxel p with squared distance A to the nearest of them and height h over the plane, the
+/// nearest inner and outer samples are at squared distances A + delta^2 + 2 delta h and A + delta^2 - 2 delta h.
 struct LayerRun {
     glm::vec3 twiceOffset;     ///< 2 delta times the outward normal [voxels]
     std::int32_t triangle;     ///< owner
@@ -74,8 +74,7 @@ class LayerSamples {
     [[gnu::always_inline]] void addRun(const TilePart& part, std::uint32_t triangle, std::uint32_t begin) {
         areas_ += part.length;
         const float scale = twiceDelta_ / float(part.length);
-        runs_.push_back({scale * glm::vec3(part.normal), std::int32_t(triangle), begin,
-                         std::uint32_t(places_.size())});
+        runs_.push_back({scale * glm::vec3(part.normal), std::int32_t(triangle), begin, std::uint32_t(places_.size())});
     }
     void addRows(const TilePart& part, std::uint32_t triangle);
     LayerGroup groupOf(std::uint32_t run) const;

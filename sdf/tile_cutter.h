@@ -1,5 +1,5 @@
-// Cuts triangles into parts that Algorithm 1 of the paper can sample without gaps. A header, because most triangles of a
-// fine mesh are one part with one sample, and a call for each would cost as much as the cut.
+// Cuts triangles into parts that Algorithm 1 of the paper can sample without gaps. A header, because most triangles of
+// a fine mesh are one part with one sample, and a call for each would cost as much as the cut.
 #pragma once
 
 #include <algorithm>
@@ -52,8 +52,8 @@ class TileCutter {
     }
 
   private:
-    /// Algorithm 1 divides the longest edge into as many parts as the others. For a triangle of ordinary shape a part is
-    /// at most 2 sqrt(epsilon) long (half a square: exactly 2); beyond this factor the triangle counts as a sliver.
+    /// Algorithm 1 divides the longest edge into as many parts as the others. For a triangle of ordinary shape a part
+    /// is at most 2 sqrt(epsilon) long (half a square: exactly 2); beyond this factor the triangle counts as a sliver.
     static constexpr double sliverStep = 3.0;
 
     using Next = void (TileCutter::*)(const TriangleCorners&, double area, double longest2);

@@ -38,7 +38,7 @@ Tiles makeTiles(const Mesh& mesh, const BuildOptions& options) {
     const auto corners = [&](std::size_t triangle) {
         const glm::uvec3 t = mesh.triangles[triangle];
         return TriangleCorners{glm::dvec3(mesh.points[t.x]) * voxels, glm::dvec3(mesh.points[t.y]) * voxels,
-                       glm::dvec3(mesh.points[t.z]) * voxels};
+                               glm::dvec3(mesh.points[t.z]) * voxels};
     };
     // a run of triangles is a task's; all runs are cut twice, first to count their tiles, then to put them in their
     // place

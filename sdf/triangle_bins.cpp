@@ -53,7 +53,7 @@ struct BrickRange {
         return (std::size_t(x) * std::size_t(size.y) + std::size_t(y)) * std::size_t(size.z) + std::size_t(z);
     }
 
-    int shift;              // bricks have 2^shift voxels a side
+    int shift;               // bricks have 2^shift voxels a side
     glm::ivec3 first, size;  // [bricks]
 };
 
@@ -97,8 +97,8 @@ class Binner {
         // a counting sort, stable whatever the number of runs: count in each run, sum up, scatter
         const std::size_t count = mesh_.triangles.size(), cells = range_.cells();
         const auto threads = std::size_t(tbb::this_task_arena::max_concurrency());
-        const std::size_t runs = std::max<std::size_t>(
-            1, std::min({threads * runsPerThread, countersAtMost / cells, (count + trianglesPerRun - 1) / trianglesPerRun}));
+        const std::size_t runs = std::max<std::size_t>(1, std::min({threads * runsPerThread, countersAtMost / cells,
+                                                                    (count + trianglesPerRun - 1) / trianglesPerRun}));
         std::vector<std::uint32_t> cursors(runs * cells, 0);
         const auto codes = std::make_unique_for_overwrite<FewBricks[]>(count);
         const auto forEachTriangle = [&](std::size_t run, auto visit) {
@@ -165,9 +165,10 @@ class Binner {
         const glm::uvec3 t = mesh_.triangles[triangle];
         const Corners c{glm::dvec3(mesh_.points[t.x]) * voxelsPerUnit_, glm::dvec3(mesh_.points[t.y]) * voxelsPerUnit_,
                         glm::dvec3(mesh_.points[t.z]) * voxelsPerUnit_};
-        const glm::ivec3
-            lower = (floorToInt(glm::min(c.a, glm::min(c.b, c.c)) - reach_) >> range_.shift) - range_.first,
-            upper = (floorToInt(glm::max(c.a, glm::max(c.b, c.c)) + reach_) >> range_.shift) - range_.first;
+        const glm::ivec3 lower =
+                             (floorToInt(glm::min(c.a, glm::min(c.b, c.c)) - reach_) >> range_.shift) - range_.first,
+                         upper =
+                             (floorToInt(glm::max(c.a, glm::max(c.b, c.c)) + reach_) >> range_.shift) - range_.first;
         const glm::ivec3 extent = upper - lower + 1;
         if (extent.x <= 2 && extent.y <= 2 && extent.z <= 2) {
             const FewBricks few(range_.cell(lower.x, lower.y, lower.z), extent);
