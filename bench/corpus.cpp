@@ -147,7 +147,7 @@ nlohmann::json slice(const openvdb::FloatGrid& grid, const Mesh& mesh, int axis,
             {"active", active}};
 }
 
-// What docs/dirty.html draws.
+// What docs/dirty.sh draws.
 void writeScene(const Options& options, const Row& row, const Mesh& mesh, const Mesh& border,
                 const openvdb::FloatGrid& grid) {
     const std::string name = std::filesystem::path(row.mesh).stem().string();
@@ -242,7 +242,7 @@ int run(int argc, char** argv) {
         ->check(CLI::PositiveNumber)
         ->capture_default_str();
     app.add_option("--markdown", options.markdownFile, "also write the table to this file");
-    app.add_option("--scenes", options.scenes, "also write what docs/dirty.html draws into this folder")
+    app.add_option("--scenes", options.scenes, "also write what docs/dirty.sh draws into this folder")
         ->check(CLI::ExistingDirectory);
     app.add_option("--axis", options.axis, "of the slice in a scene")
         ->check(CLI::IsMember({'x', 'y', 'z'}))

@@ -1,5 +1,5 @@
-// What a device needs to fill blocks, and what it gives back. TBB's filler is in double_layer.h, OpenCL's in
-// cl/filler.h.
+// What fills blocks on the processor or on a device, and what it gives back. The processor's are in exact.h,
+// pseudonormal.h and double_layer.h, OpenCL's is in cl/filler.h.
 #pragma once
 
 #include <atomic>
@@ -62,7 +62,7 @@ struct MeshJob {
     std::atomic<std::size_t>* conflicts = nullptr;
 };
 
-/// Everything a filler works from.
+/// Everything a device works from.
 struct FillJob {
     const Tiles& tiles;
     const Bricks& bricks;
@@ -74,8 +74,8 @@ struct FillJob {
 
 /// Fills all blocks of a job on some device. Throws what the device's trouble calls for; the build then ends with it.
 struct BlockFiller {
-    std::string backend;  ///< "tbb" or "opencl"
-    std::string device;   ///< the device's name, or "" for the processor
+    std::string backend;  ///< "opencl"
+    std::string device;   ///< the device's name
     std::function<void(const FillJob&)> fill;
 };
 

@@ -41,8 +41,8 @@ constexpr double farthestIndex = 1e9;
 constexpr float smallestVoxel = 2e-5f;
 /// Bricks along all axes together that the binning counts; a cube of 40,000 voxels a side.
 constexpr double mostBricks = double(1u << 28);
-/// Bytes that the build needs for a sample (its share of a tile and of the bins), for a triangle of the exact methods
-/// (bins or hierarchy), and for a block, roughly.
+/// Bytes that the build needs for a sample on a device (its share of a tile and of the bins), for a triangle on the
+/// processor (bins or hierarchy), and for a block, roughly.
 constexpr double bytesPerSample = 120, bytesPerTriangle = 60, bytesPerBlock = 2300;
 /// Of more moved triangles than this part of all, the field is built in full: little would be left to copy.
 constexpr double mostMoved = 0.5;
@@ -132,7 +132,7 @@ double countBlocks(const Bounds& box, double area, double h, double reach) {
 }
 
 // Refuses what cannot work before anything is allocated for it.
-void checkSize(const Mesh& mesh, const Survey& seen, const BuildOptions& options, float reach) {
+void checkSize(const Mesh& mesh, const Survey& seen, const BuildOptions& options, float reach, bool tiles) {
     const Bounds& box = seen.box;
     const double h = options.voxelSize;
     const auto refuse = [&](const std::string& why) {
@@ -150,9 +150,8 @@ void checkSize(const Mesh& mesh, const Survey& seen, const BuildOptions& options
     const double area = seen.area / (h * h);
     if (!(area > 0)) throw std::invalid_argument("the mesh has no triangle with an area");
     const double triangles = double(mesh.triangles.size());
-    const double input = options.method == Method::doubleLayer
-                             ? (area / double(options.doubleLayer.epsilon) + triangles) * bytesPerSample
-                             : triangles * bytesPerTriangle;
+    const double input = tiles ? (area / double(options.doubleLayer.epsilon) + triangles) * bytesPerSample
+                               : triangles * bytesPerTriangle;
     const double block = bytesPerBlock * (options.triangles ? 2 : 1);
     const double bytes = input + countBlocks(box, area, h, double(reach)) * block;
     const double memory = double(::sysconf(_SC_PHYS_PAGES)) * double(::sysconf(_SC_PAGESIZE));
@@ -291,7 +290,8 @@ class Build {
         progress_.poll();
         const bool layers = options_.method == Method::doubleLayer;
         survey_ = survey(mesh_);
-        checkSize(mesh_, survey_, options_, layers ? fillParameters(options_).reach : reachOf(options_, options_.sign));
+        checkSize(mesh_, survey_, options_, layers ? fillParameters(options_).reach : reachOf(options_, options_.sign),
+                  filler_ != nullptr);
         progress_.poll();
     }
 

@@ -38,7 +38,7 @@ struct DoubleLayerOptions {
 
 /// How distances are found.
 enum class Method {
-    exact,         ///< samples find the triangles that can be nearest, triangles decide: exact_fill.h
+    exact,         ///< samples find the triangles that can be nearest, triangles decide: exact.h
     doubleLayer,   ///< the paper's: distances of two layers of samples
     pseudonormal,  ///< a bounding hierarchy, asked at each voxel; sign by the angle-weighted pseudonormal
 };

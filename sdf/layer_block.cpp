@@ -1,6 +1,8 @@
 // Highway compiles the part between HWY_BEFORE_NAMESPACE and HWY_AFTER_NAMESPACE once for each instruction set.
 #include "sdf/layer_block.h"
 
+#include "sdf/double_layer.h"
+
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "sdf/layer_block.cpp"
 #include <hwy/foreach_target.h>

@@ -33,7 +33,4 @@ struct LayerScratch {
 /// @param triangles  if not null, receives the owners of the samples that decide
 void fillLayerBlock(const LayerBlockInput& input, LayerScratch& scratch, float* distances, std::int32_t* triangles);
 
-/// The name of the SIMD instruction set in use, for reports: "AVX2", "SSE4", ...
-const char* simdName();
-
 }  // namespace bilayer

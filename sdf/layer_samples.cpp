@@ -16,8 +16,7 @@ constexpr int mostRows = 4;
 constexpr double smallArea = 0.5;
 /// More cells than this, 1 MiB of counters, and runs stay alone.
 constexpr double mostCells = 1 << 18;
-constexpr float cellSize =
-    1.f;  // finer or coarser took longer (measured) [voxels]  // finer or coarser took longer (measured) [voxels]
+constexpr float cellSize = 1;  // finer or coarser took longer (measured) [voxels]
 /// Rounding of a group's own numbers [voxels].
 constexpr float groupSlack = 1e-4f;
 
@@ -45,23 +44,30 @@ void LayerSamples::addRows(const TilePart& part, std::uint32_t triangle) {
     const glm::dvec3 s1 = (c[1] - c[0]) * step, s2 = (c[2] - c[1]) * step, s3 = (c[2] - c[0]) * step;
     const glm::dvec3 start = c[0] + (s1 + s3) / 3.0;
     const glm::vec3 first(start - origin_), down(s1), across(s2);
-    for (int row = 0; row < n; row += runSide)
-        for (int column = 0; column <= std::min(row + runSide, n) - 1; column += runSide) {
+    for (int row = 0; row < n; row += runSide) {
+        const int end = std::min(row + runSide, n);
+        // rows that stay away as a whole: a triangle may be much larger than a brick
+        const glm::vec3 begins[2] = {first + float(row) * down, first + float(end - 1) * down};
+        const glm::vec3 ends[2] = {begins[0] + float(row) * across, begins[1] + float(end - 1) * across};
+        if (staysAway(glm::min(glm::min(begins[0], begins[1]), glm::min(ends[0], ends[1])),
+                      glm::max(glm::max(begins[0], begins[1]), glm::max(ends[0], ends[1]))))
+            continue;
+        for (int column = 0; column < end; column += runSide) {
             const auto begin = std::uint32_t(places_.size());
             glm::vec3 lower(1e30f), upper(-1e30f);
-            for (int i = row; i < std::min(row + runSide, n); ++i)
+            for (int i = row; i < end; ++i)
                 for (int j = column; j < std::min(column + runSide, i + 1); ++j) {
                     const glm::vec3 place = first + float(i) * down + float(j) * across;
                     places_.push_back(place);
                     lower = glm::min(lower, place);
                     upper = glm::max(upper, place);
                 }
-            if (glm::any(glm::lessThan(upper, lower_)) || glm::any(glm::greaterThan(lower, upper_))) {
+            if (staysAway(lower, upper))
                 places_.resize(begin);
-                continue;
-            }
-            addRun(part, triangle, begin);
+            else
+                addRun(part, triangle, begin);
         }
+    }
     if (!wantCells_) return;
     const auto known = std::uint32_t(cells_.size());
     for (std::size_t i = known; i < places_.size(); ++i) cells_.push_back(nearestLattice(places_[i]));

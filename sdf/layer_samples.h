@@ -66,17 +66,21 @@ class LayerSamples {
     [[gnu::always_inline]] void addOne(const TilePart& part, std::uint32_t triangle) {
         const TriangleCorners& c = part.corners;
         const glm::vec3 place((c[0] + c[1] + c[2]) * (1.0 / 3.0) - origin_);
-        if (glm::any(glm::lessThan(place, lower_)) || glm::any(glm::greaterThan(place, upper_))) return;
+        if (staysAway(place, place)) return;
         places_.push_back(place);
         addRun(part, triangle, std::uint32_t(places_.size() - 1));
     }
     // A run of all places from `begin` on.
     [[gnu::always_inline]] void addRun(const TilePart& part, std::uint32_t triangle, std::uint32_t begin) {
         areas_ += part.length;
-        const float scale = twiceDelta_ / float(part.length);
-        runs_.push_back({scale * glm::vec3(part.normal), std::int32_t(triangle), begin, std::uint32_t(places_.size())});
+        // divided in double: floats cannot hold the area of a very small triangle
+        const glm::vec3 normal(part.normal / part.length);
+        runs_.push_back({twiceDelta_ * normal, std::int32_t(triangle), begin, std::uint32_t(places_.size())});
     }
     void addRows(const TilePart& part, std::uint32_t triangle);
+    bool staysAway(const glm::vec3& lower, const glm::vec3& upper) const {
+        return glm::any(glm::lessThan(upper, lower_)) || glm::any(glm::greaterThan(lower, upper_));
+    }
     LayerGroup groupOf(std::uint32_t run) const;
     void gatherRuns();
     void sortByCell(const glm::vec3& lower, const glm::ivec3& size);

@@ -27,7 +27,7 @@ Tile tileOf(const TilePart& part, float delta) {
             glm::vec3(first - glm::dvec3(base)),
             glm::vec3(s1),
             glm::vec3(s2),
-            glm::vec3(double(delta) / part.length * part.normal),
+            glm::vec3(double(delta) * (part.normal / part.length)),
             part.rows};
 }
 

@@ -20,7 +20,7 @@ constexpr double cellsAtMost = 1 << 22;          // beyond this bricks are large
 constexpr std::size_t countersAtMost = 1 << 22;  // over all runs: 16 MiB
 constexpr std::size_t trianglesPerRun = 8192;    // what one task bins
 constexpr std::size_t runsPerThread = 8;         // enough to share out unequal runs
-constexpr std::size_t trianglesPerPoll = 1024;   // tens of microseconds, but for huge triangles
+constexpr std::size_t trianglesPerPoll = 1024;   // tens of microseconds; huge triangles poll at each step
 constexpr std::size_t trianglesAhead = 16;       // whose corners are fetched: about the latency of memory
 
 // Rounds down; quicker than std::floor without SSE 4.1. Right for |value| < 2^31.
@@ -87,13 +87,14 @@ static_assert(cellsAtMost < double(1u << 29), "a code holds any cell");
 
 class Binner {
   public:
-    Binner(const Mesh& mesh, const Bounds& box, double voxelsPerUnit, float reach)
+    Binner(const Mesh& mesh, const Bounds& box, double voxelsPerUnit, float reach, Progress* progress)
         : mesh_(mesh),
           voxelsPerUnit_(voxelsPerUnit),
           reach_(double(reach)),
-          range_(box, voxelsPerUnit, double(reach)) {}
+          range_(box, voxelsPerUnit, double(reach)),
+          progress_(progress) {}
 
-    TriangleBins run(Progress* progress) {
+    TriangleBins run() {
         // a counting sort, stable whatever the number of runs: count in each run, sum up, scatter
         const std::size_t count = mesh_.triangles.size(), cells = range_.cells();
         const auto threads = std::size_t(tbb::this_task_arena::max_concurrency());
@@ -103,7 +104,7 @@ class Binner {
         const auto codes = std::make_unique_for_overwrite<FewBricks[]>(count);
         const auto forEachTriangle = [&](std::size_t run, auto visit) {
             for (std::size_t i = count * run / runs; i < count * (run + 1) / runs; ++i) {
-                if (progress && i % trianglesPerPoll == 0) progress->poll();
+                if (progress_ && i % trianglesPerPoll == 0) progress_->poll();
                 visit(i, cursors.data() + run * cells);
             }
         };
@@ -175,32 +176,55 @@ class Binner {
             few.forEach(range_, visit);
             return few;
         }
-        const glm::dvec3 normal = glm::cross(c.b - c.a, c.c - c.a);
-        for (int x = lower.x; x <= upper.x; ++x)
-            for (int y = lower.y; y <= upper.y; ++y)
-                for (int z = lower.z; z <= upper.z; ++z)
-                    if (!planeMisses(c.a, normal, {x, y, z})) visit(range_.cell(x, y, z));
+        divide(c, lower, upper, visit);
         return FewBricks::many();
     }
 
-    // Whether the plane of a triangle passes a brick farther away than the reach.
-    bool planeMisses(const glm::dvec3& a, const glm::dvec3& normal, const glm::ivec3& cell) const {
-        const double half = 0.5 * double(1 << range_.shift);
-        const glm::dvec3 centre = glm::dvec3((range_.first + cell) * (1 << range_.shift)) + half;
-        const glm::dvec3 spread = glm::abs(normal) * half;
-        return std::abs(glm::dot(normal, centre - a)) >
-               spread.x + spread.y + spread.z + (reach_ + 1) * glm::length(normal);
+    // Visits the bricks of a box that a triangle reaches: boxes of bricks are halved, and left out where it stays away.
+    // So a needle costs its length, not the box around it.
+    template <class Visit>
+    void divide(const Corners& c, const glm::ivec3& lower, const glm::ivec3& upper, const Visit& visit) const {
+        if (staysAway(c, lower, upper)) return;
+        const glm::ivec3 size = upper - lower;
+        const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
+        if (size[axis] == 0) return visit(range_.cell(lower.x, lower.y, lower.z));
+        glm::ivec3 middle = upper, next = lower;
+        middle[axis] = lower[axis] + size[axis] / 2;
+        next[axis] = middle[axis] + 1;
+        divide(c, lower, middle, visit);
+        divide(c, next, upper, visit);
+    }
+
+    // Whether a plane parts a triangle from a box of bricks and all within reach of it: one along the triangle, a side
+    // of the box, or one along an edge of each (S. Gottschalk and others, SIGGRAPH 1996).
+    bool staysAway(const Corners& c, const glm::ivec3& lower, const glm::ivec3& upper) const {
+        if (progress_) progress_->poll();
+        const double side = double(1 << range_.shift), reach = reach_ + 1;
+        const glm::dvec3 low = glm::dvec3(range_.first + lower) * side,
+                         high = glm::dvec3(range_.first + upper + 1) * side;
+        const glm::dvec3 centre = 0.5 * (low + high), half = 0.5 * (high - low);
+        const glm::dvec3 a = c.a - centre, b = c.b - centre, p = c.c - centre;
+        const auto parts = [&](const glm::dvec3& axis) {
+            const double x = glm::dot(axis, a), y = glm::dot(axis, b), z = glm::dot(axis, p);
+            const double room = glm::dot(glm::abs(axis), half) + reach * glm::length(axis);
+            return std::min({x, y, z}) > room || std::max({x, y, z}) < -room;
+        };
+        if (parts({1, 0, 0}) || parts({0, 1, 0}) || parts({0, 0, 1}) || parts(glm::cross(b - a, p - a))) return true;
+        for (const glm::dvec3& edge : {b - a, p - b, a - p})
+            if (parts({0, -edge.z, edge.y}) || parts({edge.z, 0, -edge.x}) || parts({-edge.y, edge.x, 0})) return true;
+        return false;
     }
 
     const Mesh& mesh_;
     double voxelsPerUnit_, reach_;
     BrickRange range_;
+    Progress* progress_;
 };
 
 }  // namespace
 
 TriangleBins binTriangles(const Mesh& mesh, const Bounds& box, double voxelsPerUnit, float reach, Progress* progress) {
-    return Binner(mesh, box, voxelsPerUnit, reach).run(progress);
+    return Binner(mesh, box, voxelsPerUnit, reach, progress).run();
 }
 
 int brickSideFor(const Bounds& box, double voxelsPerUnit, float reach) {

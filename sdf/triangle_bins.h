@@ -1,4 +1,5 @@
-// Which triangles reach which brick of space: the first, coarse step of the exact method. Bins hold indices only, so
+// Which triangles reach which brick of space: the first, coarse step of the exact and the double layer
+// method. Bins hold indices only, so
 // that memory stays a fraction of the mesh's own.
 #pragma once
 

@@ -36,3 +36,14 @@ TEST_CASE("fill keeps the band and knows every other voxel of the box") {
     CHECK(largest > 2 * double(band.errorBound()));
     CHECK(std::isnan(filled.errorBound()));
 }
+
+TEST_CASE("fill refuses what cannot be swept") {
+    // a sheet that the flood finds no inside of
+    const Mesh sheet{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}};
+    const LevelSet outside = build(sheet, {.voxelSize = 0.1f, .sign = Sign::flood});
+    CHECK_THROWS_WITH(fluid::fill(outside), Catch::Matchers::Contains("no inside"));
+    Mesh far = shapes::box({1, 1, 1});
+    for (glm::vec3& p : far.points) p += glm::vec3(4000);
+    const LevelSet apart = build(shapes::join({shapes::box({1, 1, 1}), far}), {.voxelSize = 0.1f});
+    CHECK_THROWS_WITH(fluid::fill(apart), Catch::Matchers::Contains("GiB"));
+}

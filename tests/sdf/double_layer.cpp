@@ -188,3 +188,21 @@ TEST_CASE("the triangle of a voxel is the owner of the sample that decides its d
     CAPTURE(differ, count);
     CHECK(double(differ) < 1e-3 * double(count));
 }
+
+TEST_CASE("a triangle whose area floats cannot hold changes nothing but what is at it") {
+    Mesh mesh = shapes::sphere(1, 5);  // several triangles a voxel: runs are gathered
+    const BuildOptions options = layered({.voxelSize = 0.15f});
+    const LevelSet before = build(mesh, options);
+    const auto first = unsigned(mesh.points.size());
+    for (const glm::vec3& p : {glm::vec3(0, 0, 0), glm::vec3(1e-25f, 0, 0), glm::vec3(0, 1e-25f, 0)})
+        mesh.points.push_back(p + glm::vec3(0, 0, 1e-20f));
+    mesh.triangles.push_back({first, first + 1, first + 2});
+    const LevelSet after = build(mesh, options);
+    const auto values = after.grids().distance->getConstAccessor();
+    std::size_t changed = 0, count = 0;
+    for (auto voxel = before.grids().distance->cbeginValueOn(); voxel; ++voxel, ++count)
+        if (voxel.getCoord().asVec3d().length() > 5) changed += values.getValue(voxel.getCoord()) != *voxel;
+    CHECK(count > 500);
+    CHECK(changed == 0);
+    CHECK(values.getValue(openvdb::Coord(0)) > -0.5f * options.voxelSize);  // it has a sample too
+}

@@ -70,8 +70,9 @@ void checkExact(const Mesh& mesh, float voxelSize, const test::Band& band, unsig
     checkExact(mesh, mesh, voxelSize, band, seed, count);
 }
 
+// None of a half: all faces of a cube may lie half-way between voxels, and no voxel in its band.
 test::Band anyBand(Random& random) {
-    const test::Band bands[] = {{3, 3}, {1, 1}, {5, 2}, {1, 4}, {0.5, 0.5}, {2.25, 3.5}, {10, 10}};
+    const test::Band bands[] = {{3, 3}, {1, 1}, {5, 2}, {1, 4}, {0.6, 0.6}, {2.25, 3.5}, {10, 10}};
     return bands[random() % std::size(bands)];
 }
 
