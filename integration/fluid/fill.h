@@ -7,8 +7,8 @@ namespace bilayer::fluid {
 
 /// The field with a signed distance in every voxel of its own box: the band's voxels keep their values, the others are
 /// swept from them (first order: errors grow with the distance from the band, so errorBound() is NaN: nobody knows a
-/// bound that holds for all of them). Dense in memory. Throws std::invalid_argument for a field without inside, where no
-/// distance can begin, and for a box that the machine's memory does not hold.
+/// bound that holds for all of them). Dense in memory. Throws std::invalid_argument for a field without inside, where
+/// no distance can begin, and for a box that the machine's memory does not hold.
 LevelSet fill(const LevelSet& levelSet);
 
 }  // namespace bilayer::fluid
