@@ -4,7 +4,6 @@
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
-#include <utility>
 
 namespace bilayer {
 namespace {
@@ -36,40 +35,16 @@ void Clusters::build(std::span<const Piece> pieces, const glm::ivec3& origin) {
         upper = glm::max(upper, sample);
     }
     const float meanRadius = float(radii / double(pieces.size()));
-    cellSize_ = std::clamp(cellFactor * meanRadius, smallestCell, largestCell);
-    const glm::ivec3 size = glm::ivec3((upper - lower) / cellSize_) + 1;
-    const bool grouped =
-        radii < smallRadius * double(pieces.size()) && double(size.x) * double(size.y) * double(size.z) <= mostCells;
+    const Cells cells(lower, upper, std::clamp(cellFactor * meanRadius, smallestCell, largestCell));
+    const bool grouped = radii < smallRadius * double(pieces.size()) && cells.count() <= mostCells;
     if (!grouped) {
         for (std::uint32_t i = 0; i < members_.size(); ++i)
             clusters_.push_back({members_[i].sample, members_[i].radius, members_[i].normal, 0, i, i + 1});
         return;
     }
-    sortByCell(lower, size);
-    for (std::uint32_t begin = 0, end; begin < members_.size(); begin = end) {
-        for (end = begin + 1; end < members_.size() && cells_[end] == cells_[begin];) ++end;
-        addCluster(begin, end);
-    }
-}
-
-// A counting sort of the members; `cells_` then holds their cells in the new order.
-void Clusters::sortByCell(const glm::vec3& lower, const glm::ivec3& size) {
-    cells_.resize(members_.size());
-    cursors_.assign(std::size_t(size.x) * std::size_t(size.y) * std::size_t(size.z), 0);
-    for (std::size_t i = 0; i < members_.size(); ++i) {
-        const glm::ivec3 cell((members_[i].sample - lower) / cellSize_);
-        cells_[i] = std::uint32_t((cell.x * size.y + cell.y) * size.z + cell.z);
-        ++cursors_[cells_[i]];
-    }
-    std::uint32_t sum = 0;
-    for (std::uint32_t& cursor : cursors_) sum += std::exchange(cursor, sum);
-    unsorted_.swap(members_);
-    members_.resize(unsorted_.size());
-    for (std::size_t i = 0; i < unsorted_.size(); ++i) members_[cursors_[cells_[i]]++] = unsorted_[i];
-    // each cursor now stands at the end of its cell
-    std::uint32_t at = 0;
-    for (std::uint32_t cell = 0; cell < cursors_.size(); ++cell)
-        for (; at < cursors_[cell]; ++at) cells_[at] = cell;
+    sort_.run(
+        members_, cells, [](const Member& member) { return member.sample; },
+        [&](std::uint32_t begin, std::uint32_t end) { addCluster(begin, end); });
 }
 
 void Clusters::addCluster(std::uint32_t begin, std::uint32_t end) {

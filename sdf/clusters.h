@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "sdf/cell_sort.h"
 #include "sdf/exact_block.h"
 
 namespace bilayer {
@@ -20,13 +21,11 @@ class Clusters {
     std::span<const Member> members() const { return members_; }
 
   private:
-    void sortByCell(const glm::vec3& lower, const glm::ivec3& size);
     void addCluster(std::uint32_t begin, std::uint32_t end);
 
-    float cellSize_ = 1;  // [voxels]
     std::vector<Cluster> clusters_;
-    std::vector<Member> members_, unsorted_;
-    std::vector<std::uint32_t> cells_, cursors_;
+    std::vector<Member> members_;
+    CellSort<Member> sort_;
 };
 
 }  // namespace bilayer

@@ -54,8 +54,8 @@ class BrickFiller {
   private:
     void sample(std::size_t brick, const glm::ivec3& origin) {
         const double voxelsPerUnit = 1.0 / double(job_.voxelSize);
-        const TileLimits limits{glm::dvec3(origin) - double(reach_),
-                                glm::dvec3(origin + (bins_.side - 1)) + double(reach_)};
+        const TriangleLimits limits{glm::dvec3(origin) - double(reach_),
+                                    glm::dvec3(origin + (bins_.side - 1)) + double(reach_)};
         s_.samples.begin(origin, bins_.side, reach_, parameters_.delta, parameters_.cube > 0);
         std::uint32_t triangle = 0;
         TileCutter cutter(options_, &limits, [&](const TilePart& part) { s_.samples.add(part, triangle); });

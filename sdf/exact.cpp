@@ -71,7 +71,7 @@ class BrickFiller {
     bool wanted(const glm::ivec3& first, int side) const { return !job_.wanted || job_.wanted(first, side); }
 
     // Pieces beyond these reach none of the wanted blocks.
-    PieceLimits limitsOfWanted() const {
+    TriangleLimits limitsOfWanted() const {
         glm::ivec3 lower = origin_, upper = origin_ + (bins_.side - blockSide);
         if (job_.wanted) {
             std::swap(lower, upper);
@@ -86,11 +86,6 @@ class BrickFiller {
         return {glm::dvec3(lower) - margin, glm::dvec3(upper + (blockSide - 1)) + margin};
     }
 
-    static bool meets(const PieceCorners& c, const PieceLimits& limits) {
-        const glm::dvec3 lower = glm::min(c[0], glm::min(c[1], c[2])), upper = glm::max(c[0], glm::max(c[1], c[2]));
-        return glm::all(glm::lessThanEqual(lower, limits.upper)) && glm::all(glm::lessThanEqual(limits.lower, upper));
-    }
-
     template <class Visit>
     void forEachBlockOfBrick(Visit visit) const {
         for (int x = 0; x < blocks_; ++x)
@@ -100,12 +95,13 @@ class BrickFiller {
 
     void cut(std::size_t brick) {
         s_.pieces.clear();
-        const PieceLimits limits = limitsOfWanted();
+        const TriangleLimits limits = limitsOfWanted();
         PieceCutter cutter(longestPieceEdge, s_.pieces);
         bilayer::forEachTriangle(job_.mesh, bins_.trianglesOf(brick), voxelsPerUnit_,
-                                 [&](std::uint32_t triangle, const PieceCorners& corners) {
+                                 [&](std::uint32_t triangle, const TriangleCorners& corners) {
                                      if (++cut_ % trianglesPerPoll == 0) job_.progress.poll();
-                                     if (!job_.wanted || meets(corners, limits)) cutter.cut(corners, triangle, limits);
+                                     if (!job_.wanted || !misses(corners, limits))
+                                         cutter.cut(corners, triangle, limits);
                                  });
         cutter.finish();
     }

@@ -5,7 +5,6 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/vector_relational.hpp>
-#include <utility>
 
 namespace bilayer {
 namespace {
@@ -105,33 +104,11 @@ void LayerSamples::gatherRuns() {
         lower = glm::min(lower, places_[run.begin]);
         upper = glm::max(upper, places_[run.begin]);
     }
-    const glm::ivec3 size = glm::ivec3((upper - lower) / cellSize) + 1;
-    if (double(size.x) * double(size.y) * double(size.z) > mostCells) return;
-    sortByCell(lower, size);
-    for (std::uint32_t begin = 0, end; begin < runs_.size(); begin = end) {
-        for (end = begin + 1; end < runs_.size() && cellOf_[end] == cellOf_[begin];) ++end;
-        groups_.push_back(cluster(begin, end));
-    }
-}
-
-// A counting sort of the runs; `cellOf_` then holds their cells in the new order.
-void LayerSamples::sortByCell(const glm::vec3& lower, const glm::ivec3& size) {
-    cellOf_.resize(runs_.size());
-    cursors_.assign(std::size_t(size.x) * std::size_t(size.y) * std::size_t(size.z), 0);
-    for (std::size_t i = 0; i < runs_.size(); ++i) {
-        const glm::ivec3 cell((places_[runs_[i].begin] - lower) / cellSize);
-        cellOf_[i] = std::uint32_t((cell.x * size.y + cell.y) * size.z + cell.z);
-        ++cursors_[cellOf_[i]];
-    }
-    std::uint32_t sum = 0;
-    for (std::uint32_t& cursor : cursors_) sum += std::exchange(cursor, sum);
-    unsorted_.swap(runs_);
-    runs_.resize(unsorted_.size());
-    for (std::size_t i = 0; i < unsorted_.size(); ++i) runs_[cursors_[cellOf_[i]]++] = unsorted_[i];
-    // each cursor now stands at the end of its cell
-    std::uint32_t at = 0;
-    for (std::uint32_t cell = 0; cell < cursors_.size(); ++cell)
-        for (; at < cursors_[cell]; ++at) cellOf_[at] = cell;
+    const Cells cells(lower, upper, cellSize);
+    if (cells.count() > mostCells) return;
+    sort_.run(
+        runs_, cells, [&](const LayerRun& run) { return places_[run.begin]; },
+        [&](std::uint32_t begin, std::uint32_t end) { groups_.push_back(cluster(begin, end)); });
 }
 
 LayerGroup LayerSamples::cluster(std::uint32_t begin, std::uint32_t end) {

@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "sdf/cell_sort.h"
 #include "sdf/tile_cutter.h"
 
 namespace bilayer {
@@ -83,7 +84,6 @@ class LayerSamples {
     }
     LayerGroup groupOf(std::uint32_t run) const;
     void gatherRuns();
-    void sortByCell(const glm::vec3& lower, const glm::ivec3& size);
     LayerGroup cluster(std::uint32_t begin, std::uint32_t end);
 
     glm::dvec3 origin_{0};
@@ -92,9 +92,9 @@ class LayerSamples {
     bool wantCells_ = false;
     double areas_ = 0;  // of all runs' triangles, twice [voxels^2]
     std::vector<LayerGroup> groups_;
-    std::vector<LayerRun> runs_, unsorted_;
+    std::vector<LayerRun> runs_;
+    CellSort<LayerRun> sort_;
     std::vector<glm::vec3> places_, cells_;
-    std::vector<std::uint32_t> cellOf_, cursors_;
 };
 
 }  // namespace bilayer

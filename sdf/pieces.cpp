@@ -160,21 +160,15 @@ namespace {
 
 HWY_EXPORT(makePieces);
 
-bool misses(const PieceCorners& c, const PieceLimits& limits) {
-    const glm::dvec3 lower = glm::min(c[0], glm::min(c[1], c[2])), upper = glm::max(c[0], glm::max(c[1], c[2]));
-    return lower.x > limits.upper.x || lower.y > limits.upper.y || lower.z > limits.upper.z ||
-           upper.x < limits.lower.x || upper.y < limits.lower.y || upper.z < limits.lower.z;
-}
-
 }  // namespace
 
-void PieceCutter::halve(const PieceCorners& c, std::uint32_t triangle, const PieceLimits& limits) {
+void PieceCutter::halve(const TriangleCorners& c, std::uint32_t triangle, const TriangleLimits& limits) {
     const glm::dvec3 ab = c[1] - c[0], bc = c[2] - c[1], ca = c[0] - c[2];
     const std::array<double, 3> lengths2{glm::dot(ab, ab), glm::dot(bc, bc), glm::dot(ca, ca)};
     const auto longest = std::max_element(lengths2.begin(), lengths2.end());
     const auto i = std::size_t(longest - lengths2.begin()), j = (i + 1) % 3, k = (i + 2) % 3;
     const glm::dvec3 middle = 0.5 * (c[i] + c[j]);
-    for (const PieceCorners& half : {PieceCorners{c[i], middle, c[k]}, PieceCorners{middle, c[j], c[k]}})
+    for (const TriangleCorners& half : {TriangleCorners{c[i], middle, c[k]}, TriangleCorners{middle, c[j], c[k]}})
         if (!misses(half, limits)) cut(half, triangle, limits);
 }
 

@@ -11,10 +11,9 @@
 #include <glm/vec3.hpp>
 #include <vector>
 
-namespace bilayer {
+#include "sdf/triangle_limits.h"
 
-/// Corners of a triangle or of a part of one [voxels].
-using PieceCorners = std::array<glm::dvec3, 3>;
+namespace bilayer {
 
 /// A piece in a frame of its own: the longest edge runs from the origin along `u`, the third corner lies on the side of
 /// `w`. All numbers follow from the corners' differences to a lattice point beside them, so distances do not depend on
@@ -31,11 +30,6 @@ struct Piece {
     std::uint32_t triangle;
 };
 
-/// A box in index coordinates [voxels].
-struct PieceLimits {
-    glm::dvec3 lower, upper;
-};
-
 /// Cuts triangles into pieces.
 class PieceCutter {
   public:
@@ -46,8 +40,8 @@ class PieceCutter {
 
     /// Cuts a triangle by halving longest edges, and leaves out pieces whose box misses the limits. Pieces do not
     /// depend on the limits, and those of two triangles meet at the same points of a shared edge.
-    void cut(const PieceCorners& corners, std::uint32_t triangle, const PieceLimits& limits) {
-        const PieceCorners& c = corners;
+    void cut(const TriangleCorners& corners, std::uint32_t triangle, const TriangleLimits& limits) {
+        const TriangleCorners& c = corners;
         const glm::dvec3 ab = c[1] - c[0], bc = c[2] - c[1], ca = c[0] - c[2];
         // most triangles of a fine mesh are short, and a call for each would take as long as the rest
         if (std::max({glm::dot(ab, ab), glm::dot(bc, bc), glm::dot(ca, ca)}) <= longestEdge2_)
@@ -84,7 +78,7 @@ class PieceCutter {
         }
         if (++count_ == batch) finish();
     }
-    void halve(const PieceCorners& corners, std::uint32_t triangle, const PieceLimits& limits);
+    void halve(const TriangleCorners& corners, std::uint32_t triangle, const TriangleLimits& limits);
 
     // Rounds to the nearest, halves always up, so that a shift by whole voxels shifts the result. For |value| < 2^31.
     static int roundToInt(double value) {

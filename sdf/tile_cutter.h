@@ -3,24 +3,14 @@
 #pragma once
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
-#include <glm/vector_relational.hpp>
 
 #include "sdf/tiles.h"
+#include "sdf/triangle_limits.h"
 
 namespace bilayer {
-
-/// Corners of a triangle or a part of one [voxels].
-using TriangleCorners = std::array<glm::dvec3, 3>;
-
-/// A box in index coordinates [voxels].
-struct TileLimits {
-    glm::dvec3 lower, upper;
-};
 
 /// A part of a triangle with the rows of samples that it gets.
 struct TilePart {
@@ -35,7 +25,7 @@ template <class Emit>
 class TileCutter {
   public:
     /// @param limits  not null: of a triangle that is cut, parts whose box misses the limits are left out
-    TileCutter(const DoubleLayerOptions& options, const TileLimits* limits, Emit emit)
+    TileCutter(const DoubleLayerOptions& options, const TriangleLimits* limits, Emit emit)
         : options_(options), epsilon_(double(options.epsilon)), limits_(limits), emit_(emit) {}
 
     /// A triangle without area gives no part.
@@ -109,16 +99,11 @@ class TileCutter {
         if (!limits_ || !misses(c, *limits_)) (this->*next)(c, area, longest2);
     }
 
-    static bool misses(const TriangleCorners& c, const TileLimits& limits) {
-        const glm::dvec3 lower = glm::min(c[0], glm::min(c[1], c[2])), upper = glm::max(c[0], glm::max(c[1], c[2]));
-        return glm::any(glm::greaterThan(lower, limits.upper)) || glm::any(glm::lessThan(upper, limits.lower));
-    }
-
     void emit(const TriangleCorners& c, int n) { emit_(TilePart{c, n, normal_, length_}); }
 
     const DoubleLayerOptions& options_;
     double epsilon_;
-    const TileLimits* limits_;
+    const TriangleLimits* limits_;
     Emit emit_;
     glm::dvec3 normal_{0};
     double length_ = 0;
