@@ -14,6 +14,9 @@
 #include <vector>
 
 #include "cl/program.h"
+#include "sdf/bricks.h"
+#include "sdf/progress.h"
+#include "sdf/tiles.h"
 
 namespace bilayer {
 
@@ -69,9 +72,16 @@ std::string mebibytes(std::uint64_t bytes) {
     return std::to_string((bytes + mebibyte - 1) / mebibyte) + " MiB";
 }
 
+struct TileJob {
+    const Tiles& tiles;
+    const Bricks& bricks;
+    FillParameters parameters;
+    const MeshJob& mesh;
+};
+
 class Fill {
   public:
-    Fill(Device::Impl& device, const OpenclOptions& options, const FillJob& job);
+    Fill(Device::Impl& device, const OpenclOptions& options, const TileJob& job);
     ~Fill();
     void run();
 
@@ -86,7 +96,7 @@ class Fill {
     void finish(Batch& batch);
 
     Device::Impl& device_;
-    const FillJob& job_;
+    const TileJob job_;
     const bool triangles_, rowPerItem_;
     const std::uint64_t budget_;   // for everything [bytes]
     std::uint64_t tileBytes_ = 0;  // what the tiles take of it
@@ -109,7 +119,7 @@ std::string buildOptions(const Device::Impl& device, bool rowPerItem, bool trian
     return options;
 }
 
-Fill::Fill(Device::Impl& device, const OpenclOptions& options, const FillJob& job)
+Fill::Fill(Device::Impl& device, const OpenclOptions& options, const TileJob& job)
     : device_(device),
       job_(job),
       triangles_(job.parameters.triangles),
@@ -267,8 +277,9 @@ void Fill::finish(Batch& batch) {
     tbb::parallel_for(std::size_t(0), batch.bricks(), [&](std::size_t brick) {
         const std::size_t begin = batch.begins[brick], count = batch.begins[brick + 1] - begin;
         const auto values = [&](const auto* all) { return std::span(all + begin * blockVoxels, count * blockVoxels); };
-        job_.sink(batch.firstBrick + brick, {std::span(batch.origins).subspan(begin, count), values(batch.distances),
-                                             triangles_ ? values(batch.triangles) : std::span<const std::int32_t>()});
+        job_.mesh.progress.advance();
+        job_.mesh.sink({std::span(batch.origins).subspan(begin, count), values(batch.distances),
+                        triangles_ ? values(batch.triangles) : std::span<const std::int32_t>()});
     });
     if (filled) {
         device_.queue.enqueueUnmapMemObject(batch.distanceBuffer, const_cast<float*>(batch.distances));
@@ -283,9 +294,11 @@ void Fill::finish(Batch& batch) {
 
 BlockFiller openclFiller(const Device& device, const OpenclOptions& options) {
     return {"opencl", device.info().name, [device, options](const FillJob& job) {
-                if (job.bricks.count() == 0) return;
                 try {
-                    Fill(device.impl(), options, job).run();
+                    const Tiles tiles = makeTiles(job.mesh.mesh, job.options);
+                    const Bricks bricks = binBricks(tiles, job.layers.reach);
+                    job.mesh.progress.begin(bricks.count());
+                    Fill(device.impl(), options, {tiles, bricks, job.layers, job.mesh}).run();
                 } catch (const cl::Error& error) {
                     throw deviceError(error, device.info().name);
                 }

@@ -9,9 +9,7 @@
 #include <span>
 #include <string>
 
-#include "sdf/bricks.h"
 #include "sdf/build.h"
-#include "sdf/tiles.h"
 
 namespace bilayer {
 
@@ -43,7 +41,7 @@ inline constexpr float layerTie = 1e-5f;
 /// Stands for every distance beyond the reach of a job; its sign is right where signs are asked for [voxels].
 inline constexpr float farAway = 1e30f;
 
-/// What the exact methods work from: they want the mesh itself.
+/// What all methods work from.
 struct MeshJob {
     const Mesh& mesh;
     float voxelSize;  ///< [m]
@@ -62,17 +60,16 @@ struct MeshJob {
     std::atomic<std::size_t>* conflicts = nullptr;
 };
 
-/// Everything a device works from.
+/// Everything that a device works from.
 struct FillJob {
-    const Tiles& tiles;
-    const Bricks& bricks;
-    FillParameters parameters;
-    /// Takes filled blocks; may be called from several threads at once. `brick` is the index of the brick that all of
-    /// the blocks belong to; the blocks of one brick come in one call.
-    std::function<void(std::size_t brick, const FilledBlocks&)> sink;
+    const MeshJob& mesh;
+    const BuildOptions& options;
+    const Bounds& box;      ///< of the mesh
+    FillParameters layers;  ///< of the double layer method
 };
 
-/// Fills all blocks of a job on some device. Throws what the device's trouble calls for; the build then ends with it.
+/// Fills all blocks of a job on some device, by the method that its options name. Throws what the device's trouble calls
+/// for; the build then ends with it.
 struct BlockFiller {
     std::string backend;  ///< "opencl"
     std::string device;   ///< the device's name

@@ -39,11 +39,11 @@ namespace {
 constexpr double farthestIndex = 1e9;
 /// OpenVDB takes a transform for singular below a determinant of 3e-15.
 constexpr float smallestVoxel = 2e-5f;
-/// Bricks along all axes together that the binning counts; a cube of 40,000 voxels a side.
+/// Bricks of this side that a box may have; a cube of 40,000 voxels a side.
+constexpr int brickSide = 64;  // [voxels]
 constexpr double mostBricks = double(1u << 28);
-/// Bytes that the build needs for a sample on a device (its share of a tile and of the bins), for a triangle on the
-/// processor (bins or hierarchy), and for a block, roughly.
-constexpr double bytesPerSample = 120, bytesPerTriangle = 60, bytesPerBlock = 2300;
+/// Bytes that the build needs for a triangle (bins or hierarchy) and for a block, roughly.
+constexpr double bytesPerTriangle = 60, bytesPerBlock = 2300;
 /// Of more moved triangles than this part of all, the field is built in full: little would be left to copy.
 constexpr double mostMoved = 0.5;
 constexpr const char* asAskedFor = "as asked for";
@@ -132,7 +132,7 @@ double countBlocks(const Bounds& box, double area, double h, double reach) {
 }
 
 // Refuses what cannot work before anything is allocated for it.
-void checkSize(const Mesh& mesh, const Survey& seen, const BuildOptions& options, float reach, bool tiles) {
+void checkSize(const Mesh& mesh, const Survey& seen, const BuildOptions& options, float reach) {
     const Bounds& box = seen.box;
     const double h = options.voxelSize;
     const auto refuse = [&](const std::string& why) {
@@ -149,11 +149,9 @@ void checkSize(const Mesh& mesh, const Survey& seen, const BuildOptions& options
     if (bricks > mostBricks) refuse("its box would have more than 2^28 bricks of 64^3 voxels");
     const double area = seen.area / (h * h);
     if (!(area > 0)) throw std::invalid_argument("the mesh has no triangle with an area");
-    const double triangles = double(mesh.triangles.size());
-    const double input = tiles ? (area / double(options.doubleLayer.epsilon) + triangles) * bytesPerSample
-                               : triangles * bytesPerTriangle;
     const double block = bytesPerBlock * (options.triangles ? 2 : 1);
-    const double bytes = input + countBlocks(box, area, h, double(reach)) * block;
+    const double bytes =
+        double(mesh.triangles.size()) * bytesPerTriangle + countBlocks(box, area, h, double(reach)) * block;
     const double memory = double(::sysconf(_SC_PHYS_PAGES)) * double(::sysconf(_SC_PAGESIZE));
     if (bytes > memory)
         refuse(fmt::format("with its band it would need about {:.0f} GiB of memory", bytes / double(1 << 30)));
@@ -217,12 +215,17 @@ float reachOf(const BuildOptions& options, Sign sign) {
 
 // What the distances may be off by [voxels].
 float errorBound(const BuildOptions& options) {
+    if (options.method == Method::prism) return std::numeric_limits<float>::infinity();  // where prisms leave gaps
     if (options.method != Method::doubleLayer) return exactError;
     // a sample of the inner or outer layer is delta from the surface, and the nearest one at most the covering radius
     // farther than that from the voxel's closest point; without gaps filled nothing bounds it
     const DoubleLayerOptions& layers = options.doubleLayer;
     if (!layers.fillGaps) return std::numeric_limits<float>::infinity();
     return std::max(2 * layers.delta, coveringRadius * std::sqrt(layers.epsilon));
+}
+
+bool hasOwnSigns(Method method) {
+    return method == Method::doubleLayer || method == Method::prism;
 }
 
 const char* name(Method method) {
@@ -233,6 +236,8 @@ const char* name(Method method) {
             return "double-layer";
         case Method::pseudonormal:
             return "pseudonormal";
+        case Method::prism:
+            return "prism";
     }
     return "";
 }
@@ -263,8 +268,8 @@ class Build {
 
     LevelSet run() {
         check();
-        if (options_.method == Method::doubleLayer)
-            fillLayers();
+        if (hasOwnSigns(options_.method))
+            fillOwnSigns();
         else if (options_.sign == Sign::automatic)
             fillChosen();
         else
@@ -288,10 +293,9 @@ class Build {
         progress_.poll();
         validate(mesh_);
         progress_.poll();
-        const bool layers = options_.method == Method::doubleLayer;
         survey_ = survey(mesh_);
-        checkSize(mesh_, survey_, options_, layers ? fillParameters(options_).reach : reachOf(options_, options_.sign),
-                  filler_ != nullptr);
+        const bool layers = options_.method == Method::doubleLayer;
+        checkSize(mesh_, survey_, options_, layers ? fillParameters(options_).reach : reachOf(options_, options_.sign));
         progress_.poll();
     }
 
@@ -375,34 +379,30 @@ class Build {
         return signs_.conflicts == 0;
     }
 
-    void fillLayers() {
+    void fillOwnSigns() {
         Stopwatch part;
-        signs_ = {"layers", "the nearer of two layers tells the side", 0};
-        const FillParameters parameters = fillParameters(options_);
-        Assembler assembler(bandOf(options_), options_.triangles, Assembler::Plain::keep, progress_);
-        if (filler_)
-            fillTiles(parameters, assembler, part);
+        const bool prism = options_.method == Method::prism;
+        if (prism)
+            signs_ = {"prisms", "the side of the nearest triangle whose prism holds the voxel"};
         else
-            fillDoubleLayer({mesh_, options_.voxelSize, parameters.reach, options_.triangles, true,
-                             [&](const FilledBlocks& blocks) { take(assembler, blocks); }, progress_},
-                            survey_.box, options_.doubleLayer, parameters);
+            signs_ = {"layers", "the nearer of two layers tells the side"};
+        FillParameters parameters = fillParameters(options_);
+        if (prism) parameters.reach = reachOf(options_, Sign::normals);
+        Assembler assembler(bandOf(options_), options_.triangles, Assembler::Plain::keep, progress_);
+        const MeshJob job{mesh_,
+                          options_.voxelSize,
+                          parameters.reach,
+                          options_.triangles,
+                          true,
+                          [&](const FilledBlocks& blocks) { take(assembler, blocks); },
+                          progress_};
+        if (filler_)
+            filler_->fill({job, options_, survey_.box, parameters});
+        else
+            fillDoubleLayer(job, survey_.box, options_.doubleLayer, parameters);
         times_.fill += part.lap();
         finish(assembler);
         times_.assemble += part.lap();
-    }
-
-    // Another device takes tiles.
-    void fillTiles(const FillParameters& parameters, Assembler& assembler, Stopwatch& part) {
-        const Tiles tiles = makeTiles(mesh_, options_);
-        progress_.poll();
-        times_.tiles += part.lap();
-        const Bricks bricks = binBricks(tiles, parameters.reach);
-        progress_.poll();
-        progress_.begin(bricks.count());
-        filler_->fill({tiles, bricks, parameters, [&](std::size_t, const FilledBlocks& blocks) {
-                           take(assembler, blocks);
-                           progress_.advance();
-                       }});
     }
 
     // Picks a way, and another one where the first contradicts itself.
@@ -454,7 +454,12 @@ class Build {
                     &undecided, &conflicts};
         if (adapt) adapt(job, assembler);
         // triangles turned around, in a mended mesh, have the same box
-        options_.method == Method::exact ? fillExact(job, survey_.box) : fillPseudonormal(job);
+        if (filler_)
+            filler_->fill({job, options_, survey_.box, {}});
+        else if (options_.method == Method::exact)
+            fillExact(job, survey_.box);
+        else
+            fillPseudonormal(job);
         times_.fill += part.lap();
         finish(assembler);
         progress_.poll();
@@ -502,9 +507,11 @@ LevelSet withThreads(int threads, const Work& work) {
 LevelSet build(const Mesh& mesh, const BuildOptions& given, const BlockFiller* filler, BuildTimes* times) {
     const BuildOptions options = inVoxels(given);
     check(options);
-    if (filler && options.method != Method::doubleLayer)
-        throw std::invalid_argument(fmt::format("the {} back end has no method {}: it has double-layer",
-                                                filler->backend, name(options.method)));
+    if (filler && options.method == Method::pseudonormal)
+        throw std::invalid_argument(
+            fmt::format("the {} back end has no method {}", filler->backend, name(options.method)));
+    if (!filler && options.method == Method::prism)
+        throw std::invalid_argument("the method prism needs an OpenCL device: give build() its filler");
     openvdb::initialize();
     BuildTimes ignored;
     return withThreads(options.threads, [&] { return Build(mesh, options, filler, times ? *times : ignored).run(); });

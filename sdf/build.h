@@ -41,9 +41,10 @@ enum class Method {
     exact,         ///< samples find the triangles that can be nearest, triangles decide: exact.h
     doubleLayer,   ///< the paper's: distances of two layers of samples
     pseudonormal,  ///< a bounding hierarchy, asked at each voxel; sign by the angle-weighted pseudonormal
+    prism,         ///< the paper's rival [11]: prisms around triangles; on OpenCL devices only, leaks at creases
 };
 
-/// How signs are found. The double layer method has its own and ignores this.
+/// How signs are found. The double layer and the prism method have their own and ignore this.
 enum class Sign {
     automatic,  ///< normals if the mesh is closed and oriented, else what suits it: chooseSign() in sign.h
     normals,    ///< angle-weighted pseudonormal of the closest feature; components inside out are turned around first

@@ -7,7 +7,7 @@
 #include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
 
-#include "sdf/tiles.h"
+#include "sdf/build.h"
 #include "sdf/triangle_limits.h"
 
 namespace bilayer {

@@ -7,16 +7,13 @@
 #include <glm/geometric.hpp>
 #include <limits>
 #include <map>
-#include <mutex>
-#include <numeric>
 #include <optional>
-#include <random>
-#include <span>
 #include <thread>
 
 #include "demos/shared/shapes.h"
 #include "sdf/grids.h"
 #include "sdf/mesh_io.h"
+#include "sdf/tiles.h"
 #include "tests/support/support.h"
 
 using namespace bilayer;
@@ -235,125 +232,8 @@ TEST_CASE("one device serves two builds at once") {
     checkSame(build(ring, optionsFor(ring, 60)), *ringField);
 }
 
-TEST_CASE("an empty job is done at once") {
-    const Tiles tiles;
-    const Bricks bricks = binBricks(tiles, 3.f);
-    openclFiller(openDevice()).fill({tiles, bricks, {0.5f, 3.f, 2.5f, 0, false}, [](std::size_t, const FilledBlocks&) {
-                                         FAIL("there is nothing to hand over");
-                                     }});
-}
-
 TEST_CASE("the filler tells its name and device") {
     const Device device = openDevice();
     CHECK(openclFiller(device).backend == "opencl");
     CHECK(openclFiller(device).device == device.info().name);
-}
-
-namespace {
-
-// Tiles that no mesh has: any size, any direction, each on its own. Samples lie at multiples of 1/64 voxel, so that
-// rounding to whole voxels is the same in floats and in doubles.
-std::vector<Tile> looseTiles(unsigned seed) {
-    std::mt19937 random(seed);
-    const auto within = [&](int size) { return std::uniform_int_distribution(-size, size)(random); };
-    const auto vector = [&](int size) { return glm::ivec3(within(size), within(size), within(size)); };
-    std::vector<Tile> tiles(24);
-    for (Tile& tile : tiles) {
-        const glm::vec3 down = glm::vec3(vector(64)) / 64.f, across = glm::vec3(vector(64)) / 64.f;
-        const glm::vec3 normal = glm::normalize(glm::cross(down, across) + glm::vec3(1e-3f));
-        tile = {vector(70), glm::vec3(vector(32)) / 64.f, down, across, 0.5f * normal, 4 + within(3)};
-    }
-    return tiles;
-}
-
-// Distances to the nearest samples of both layers; infinite where there is none.
-struct Nearest {
-    double inner = std::numeric_limits<double>::infinity(), outer = std::numeric_limits<double>::infinity();
-
-    double nearer() const { return std::min(inner, outer); }
-    double farther() const { return std::max(inner, outer); }
-};
-
-// Over all samples; in cube mode over those that have the voxel in their cube.
-Nearest nearest(std::span<const Tile> tiles, const glm::ivec3& voxel, int cube) {
-    const glm::dvec3 v(voxel);
-    Nearest best;
-    for (const Tile& tile : tiles)
-        for (int i = 0; i < tile.rows; ++i)
-            for (int j = 0; j <= i; ++j) {
-                const glm::dvec3 p = glm::dvec3(tile.base) + glm::dvec3(tile.first) +
-                                     double(i) * glm::dvec3(tile.down) + double(j) * glm::dvec3(tile.across);
-                const glm::dvec3 gap = glm::abs(v - glm::floor(p + 0.5));
-                if (cube > 0 && std::max({gap.x, gap.y, gap.z}) > cube) continue;
-                best.inner = std::min(best.inner, glm::distance(v, p - glm::dvec3(tile.offset)));
-                best.outer = std::min(best.outer, glm::distance(v, p + glm::dvec3(tile.offset)));
-            }
-    return best;
-}
-
-// Counts what is wrong with filled blocks.
-struct Judge {
-    static constexpr double rounding = 1e-4;  // of coordinates to floats [voxels]
-    std::span<const Tile> tiles;              // tile t is of triangle t
-    FillParameters parameters;
-    std::size_t known = 0, unknown = 0, wrong = 0;
-
-    void see(const glm::ivec3& voxel, float distance, std::int32_t triangle) {
-        const Nearest best = nearest(tiles, voxel, parameters.cube);
-        if (best.nearer() > double(parameters.certain) + rounding || std::isinf(best.nearer())) {
-            ++unknown;
-            wrong += distance != std::numeric_limits<float>::infinity();
-        }
-        // the farther layer decides, and its sample must be within reach; where both are as near, either side will do
-        if (!(best.farther() < double(parameters.certain) - rounding) || best.farther() - best.nearer() < rounding)
-            return;
-        ++known;
-        const bool inside = best.inner < best.outer;
-        const double expected = std::max(0.0, best.farther() - double(parameters.delta));
-        wrong += std::signbit(distance) != inside || !(std::abs(std::abs(double(distance)) - expected) < rounding);
-        if (triangle < 0 || std::size_t(triangle) >= tiles.size()) {
-            ++wrong;
-            return;
-        }
-        const Nearest owner = nearest(tiles.subspan(std::size_t(triangle), 1), voxel, parameters.cube);
-        wrong += !((inside ? owner.outer : owner.inner) - best.farther() < rounding);
-    }
-};
-
-}  // namespace
-
-TEST_CASE("blocks hold Eq. 3 of the nearest samples") {
-    const Way way = GENERATE(blockPerItem, rowPerItem);
-    const FillParameters parameters =
-        GENERATE(FillParameters{0.5f, 4.f, 3.5f, 0, true},
-                 FillParameters{0.5f, 2.5f, std::numeric_limits<float>::infinity(), 2, true});
-    const unsigned seed = bilayer::test::seed();
-    CAPTURE(seed, parameters.cube, way.resolution);
-    const std::vector<Tile> loose = looseTiles(seed);
-    std::vector<std::int32_t> triangles(loose.size());
-    std::iota(triangles.begin(), triangles.end(), 0);
-    Tiles tiles;
-    tiles.tiles = loose;
-    tiles.triangles = triangles;
-    tiles.lower = glm::ivec3(-90);
-    tiles.upper = glm::ivec3(90);
-    const Bricks bricks = binBricks(tiles, parameters.reach);
-
-    std::mutex mutex;
-    Judge judge{loose, parameters};
-    std::vector<int> calls(bricks.count(), 0);
-    openclFiller(openDevice(), {.mapping = way.mapping})
-        .fill({tiles, bricks, parameters, [&](std::size_t brick, const FilledBlocks& blocks) {
-                   const std::lock_guard lock(mutex);
-                   ++calls[brick];
-                   for (std::size_t i = 0; i < blocks.distances.size(); ++i) {
-                       const int v = int(i % blockVoxels);
-                       judge.see(blocks.origins[i / blockVoxels] + glm::ivec3(v / 64, v / 8 % 8, v % 8),
-                                 blocks.distances[i], blocks.triangles[i]);
-                   }
-               }});
-    CHECK(std::count(calls.begin(), calls.end(), 1) == std::ptrdiff_t(bricks.count()));
-    CHECK(judge.known > 1000);
-    CHECK(judge.unknown > 1000);
-    CHECK(judge.wrong == 0);
 }

@@ -11,6 +11,7 @@
 #include "demos/shared/shapes.h"
 #include "sdf/grids.h"
 #include "sdf/layer_samples.h"
+#include "sdf/tiles.h"
 
 using namespace bilayer;
 
