@@ -421,7 +421,8 @@ void summarize(const Found* found, const Share* own, SHARED Block* block) {
         for (int column = own->firstColumn; column <= own->lastColumn; ++column) {
             const int i = chunkAt(slice, column), chunk = slice * COLUMNS + column;
             const Lanes distance = sqrt(found->nearest2[i]);
-            const IntLanes nearest = found->nearest[i], side = nearest & ((1 << SIDE_BITS) - 1), known = nearest >= 0;
+            const IntLanes nearest = found->nearest[i], known = nearest >= 0;
+            const IntLanes side = known & nearest & ((1 << SIDE_BITS) - 1);
             vstoreLanes(distance, chunk, block->distance);
             vstoreLanes(nearest, chunk, block->nearest);
             block->known.chunk[chunk] = bitsOf(known);
