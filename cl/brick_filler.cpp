@@ -34,7 +34,7 @@ constexpr std::size_t bricksForProcessor = 64, bricksForGpu = 512;
 constexpr std::size_t groupsPerUnit = 4;
 constexpr std::uint64_t scratchPart = 8;  // of the budget, at most
 /// A part's numbers in the buffers of a batch: the part, two orders of members, a cell, a cluster's columns and begin.
-constexpr std::uint64_t pieceBytes = 108, memberBytes = 32, clusterBytes = 36;
+constexpr std::uint64_t pieceBytes = 112, memberBytes = 32, clusterBytes = 36;
 /// Cells as small as those that pieces are grouped by, and how far beyond its reach a brick's samples lie [voxels].
 constexpr float smallestCell = 1.1f, aroundBrick = 3;
 
@@ -201,9 +201,10 @@ bool BrickFill::fits(const Load& load) const {
 std::size_t BrickFill::lastFitting(std::size_t first) const {
     if (!fits(loadOf(first, first + 1)))
         memory_.refuse(batchesInFlight * bytesOf(loadOf(first, first + 1)), "a brick of the grid");
-    const std::size_t end = std::min(bins_->bricks(), first + (gpuMapping_ ? bricksForGpu : bricksForProcessor));
+    const std::size_t end = std::min(bins_->bricks(), first + (gpuMapping_ ? bricksForGpu : (getenv("BR")?atoi(getenv("BR")):bricksForProcessor)));
+    const std::size_t mostParts = getenv("PA")?atoi(getenv("PA")):60000;
     std::size_t last = first + 1;
-    while (last < end && fits(loadOf(first, last + 1))) ++last;
+    while (last < end && fits(loadOf(first, last + 1)) && loadOf(first, last + 1).parts<mostParts) ++last;
     return last;
 }
 

@@ -12,6 +12,8 @@
 #define ROWS_AT_ONCE (LANES / BLOCK_SIDE)
 #define COLUMNS (BLOCK_SIDE / ROWS_AT_ONCE)
 #define CHUNKS (BLOCK_SIDE * COLUMNS / ITEMS)
+// Slices that an item works on.
+#define SLICES (ITEMS > 1 ? 1 : BLOCK_SIDE)
 // Clusters near a block that are looked at in one go.
 #define PAGE 1024
 
@@ -64,14 +66,13 @@ GROUP_KERNEL void prepareBricks(global const float* points, global const uint* t
         const uint b = firstBrick + taken, first = partOffsets[b] - firstPart;
         const int3 brick = brickAt(&grid, cellOfBrick[b]);
         const Limits limits = limitsOf(&grid, brick);
-        const Cut cut = {pieces + first, &count};
+        Cut cut = {pieces + first, unsorted + first, &count, first, brick * (1 << grid.shift),
+                   {0, {INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}}};
         cutTriangles(&cut, points, triangles, list, triangleOffsets[b], triangleOffsets[b + 1], grid.voxelsPerUnit,
                      &limits);
+        extents[ITEM] = cut.extent;
         MEET;
         const uint found = count;
-        const int3 origin = brick * (1 << grid.shift);
-        extents[ITEM] = makeMembers(pieces, first, found, origin, unsorted + first);
-        MEET;
         Extent all = extents[0];
         for (int i = 1; i < ITEMS; ++i) {
             const Extent other = extents[i];
@@ -174,51 +175,82 @@ void applySample(Found* found, const Share* own, float3 sample, float reach) {
     }
 }
 
-// Drum of sdf/exact_block.cpp: a disc of some thickness that holds pieces, seen from a block.
+// Drum of sdf/exact_block.cpp: a disc of some thickness that holds pieces, seen from a block. What follows from a slice
+// is worked out once.
 typedef struct {
     float3 centre, normal;
     float thickness, radius2;
+    float px2[SLICES], height[SLICES];
 } Drum;
 
-Drum makeDrum(float3 centre, float radius, float3 normal, float thickness) {
-    const Drum drum = {centre, normal, thickness + BOUND_SLACK, square(radius + BOUND_SLACK)};
-    return drum;
+void makeDrum(Drum* drum, const Share* own, float3 centre, float radius, float3 normal, float thickness) {
+    drum->centre = centre;
+    drum->normal = normal;
+    drum->thickness = thickness + BOUND_SLACK;
+    drum->radius2 = square(radius + BOUND_SLACK);
+    for (int i = 0; i < SLICES; ++i) {
+        const float px = (float)(own->firstSlice + i) - centre.x;
+        drum->px2[i] = px * px;
+        drum->height[i] = px * normal.x;
+    }
+}
+
+// What all chunks of a column have in common.
+typedef struct {
+    Lanes excess, height;
+} Column;
+
+Column makeColumn(const Drum* drum, int column) {
+    const Lanes py = latticeY(column) - drum->centre.y, pz = latticeZ() - drum->centre.z;
+    const Column result = {py * py + pz * pz - drum->radius2, py * drum->normal.y + pz * drum->normal.z};
+    return result;
+}
+
+// Whether the drum may be nearest to some voxel of a chunk.
+bool mayBeNearest(const Found* found, const Drum* drum, const Column* column, int slice, int chunk, bool thick) {
+    const Lanes bound2 = found->nearest2[chunk], h = drum->height[slice] + column->height;
+    Lanes excess = drum->px2[slice] + column->excess - bound2, g2 = h * h;
+    if (thick) {
+        const Lanes h2 = g2;
+        g2 = squareLanes(max(fabs(h) - drum->thickness, (Lanes)(0.0f)));
+        excess += g2 - h2;
+    }
+    return anyLane(excess * fabs(excess) <= 4 * drum->radius2 * (bound2 - g2 + HEIGHT_SLACK));
 }
 
 // Bits of the chunks, out of a part of a share, that have a voxel which the drum may be nearest to.
-uint nearChunks(const Found* found, const Share* part, const Drum* drum, bool thick) {
+uint nearChunks(const Found* found, const Share* own, const Share* part, const Drum* drum, bool thick) {
     uint near = 0;
-    const Lanes pz = latticeZ() - drum->centre.z, pz2 = pz * pz, hz = pz * drum->normal.z;
-    const float fourRadius2 = 4 * drum->radius2;
-    for (int column = part->firstColumn; column <= part->lastColumn; ++column) {
-        const Lanes py = latticeY(column) - drum->centre.y;
-        const Lanes across = py * py + pz2 - drum->radius2, height = py * drum->normal.y + hz;
+    for (int c = part->firstColumn; c <= part->lastColumn; ++c) {
+        const Column column = makeColumn(drum, c);
         for (int slice = part->firstSlice; slice <= part->lastSlice; ++slice) {
-            const float px = (float)(slice)-drum->centre.x;
-            const int chunk = chunkAt(slice, column);
-            const Lanes bound2 = found->nearest2[chunk], h = px * drum->normal.x + height;
-            Lanes excess = px * px + across - bound2, g2 = h * h;
-            if (thick) {
-                const Lanes h2 = g2;
-                g2 = squareLanes(max(fabs(h) - drum->thickness, (Lanes)(0.0f)));
-                excess += g2 - h2;
-            }
-            const IntLanes may = excess * fabs(excess) <= fourRadius2 * (bound2 - g2 + HEIGHT_SLACK);
-            if (anyLane(may)) near |= 1u << chunk;
+            const int chunk = chunkAt(slice, c);
+            near |= (uint)(mayBeNearest(found, drum, &column, slice - own->firstSlice, chunk, thick)) << chunk;
         }
     }
     return near;
 }
 
+// Bits of the chunks of a column.
+uint ofColumn(uint chunks, int column) {
+    return ITEMS > 1 ? chunks : chunks & 0x11111111u << column;
+}
+
+int sliceOf(int chunk) {
+    return ITEMS > 1 ? 0 : chunk / COLUMNS;
+}
+
 // The same out of some chunks, for a disc.
 uint nearAmong(const Found* found, const Share* own, uint among, const Drum* drum) {
     uint near = 0;
-    for (; among != 0; among &= among - 1) {
-        const int chunk = lowestBit(among);
-        const int slice = ITEMS > 1 ? own->firstSlice : chunk / COLUMNS,
-                  column = ITEMS > 1 ? own->firstColumn : chunk % COLUMNS;
-        const Share one = {slice, slice, column, column};
-        near |= nearChunks(found, &one, drum, false);
+    for (int c = own->firstColumn; c <= own->lastColumn; ++c) {
+        uint chunks = ofColumn(among, c);
+        if (chunks == 0) continue;
+        const Column column = makeColumn(drum, c);
+        for (; chunks != 0; chunks &= chunks - 1) {
+            const int chunk = lowestBit(chunks);
+            near |= (uint)(mayBeNearest(found, drum, &column, sliceOf(chunk), chunk, false)) << chunk;
+        }
     }
     return near;
 }
@@ -248,17 +280,23 @@ void askPiece(Found* found, const Share* own, uint chunks, global const Piece* p
     const float size = piece->length, ox = piece->ox, oy = piece->oy, olen = piece->olen, ex = piece->ex,
                 ey = piece->ey, elen = piece->elen;
     const int code = (int)(number << SIDE_BITS);
+    float uAlong[SLICES], wAlong[SLICES], nAlong[SLICES];
+    for (int i = 0; i < SLICES; ++i) {
+        const float px = (float)(own->firstSlice + i) + shift.x - origin.x;
+        uAlong[i] = px * u.x;
+        wAlong[i] = px * w.x;
+        nAlong[i] = px * n.x;
+    }
     const Lanes pz = latticeZ() + shift.z - origin.z;
-    const uint ofColumn = ITEMS > 1 ? 1u : 0x11111111u;
     for (int column = own->firstColumn; column <= own->lastColumn; ++column) {
-        uint slices = ITEMS > 1 ? chunks : chunks & ofColumn << column;
+        uint slices = ofColumn(chunks, column);
         if (slices == 0) continue;
         const Lanes py = latticeY(column) + shift.y - origin.y;
         const Lanes uAcross = py * u.y + pz * u.z, wAcross = py * w.y + pz * w.z, nAcross = py * n.y + pz * n.z;
         for (; slices != 0; slices &= slices - 1) {
-            const int chunk = lowestBit(slices), slice = ITEMS > 1 ? own->firstSlice : chunk / COLUMNS;
-            const float px = (float)(slice) + shift.x - origin.x;
-            const Lanes along = px * u.x + uAcross, aside = px * w.x + wAcross, height = px * n.x + nAcross;
+            const int chunk = lowestBit(slices), slice = sliceOf(chunk);
+            const Lanes along = uAlong[slice] + uAcross, aside = wAlong[slice] + wAcross,
+                        height = nAlong[slice] + nAcross;
             const Lanes base2 = squareLanes(beyond(along, size)) + aside * aside;
             // the edges from both ends of the longest one to the third corner
             const Lanes v = along - size;
@@ -346,8 +384,9 @@ void askMembers(const Input* input, const Share* own, uint cluster, uint near, F
         global const Member* member = input->members + m;
         uint ask = near;
         if (end - begin > 1) {
-            const Drum drum = makeDrum(vload3(0, member->sample) - input->inBrick, member->radius,
-                                       vload3(0, member->normal), 0);
+            Drum drum;
+            makeDrum(&drum, own, vload3(0, member->sample) - input->inBrick, member->radius,
+                     vload3(0, member->normal), 0);
             ask = nearAmong(found, own, near, &drum);
         }
         if (ask != 0) askPiece(found, own, ask, input->pieces + member->piece, member->piece, input->block);
@@ -361,11 +400,12 @@ void askClusters(const Input* input, const Share* own, SHARED const uint* page, 
         global const float* columns = input->clusters.columns + c;
         const float3 sample = sampleOf(&input->clusters, c) - input->inBrick;
         const float radius = columns[RADIUS * stride], thickness = columns[THICKNESS * stride];
-        const Drum drum = makeDrum(
-            sample, radius,
-            (float3)(columns[NORMAL_X * stride], columns[NORMAL_Y * stride], columns[NORMAL_Z * stride]), thickness);
+        Drum drum;
+        makeDrum(&drum, own, sample, radius,
+                 (float3)(columns[NORMAL_X * stride], columns[NORMAL_Y * stride], columns[NORMAL_Z * stride]),
+                 thickness);
         const Share part = within(own, sample, input->reach + radius);
-        const uint near = nearChunks(found, &part, &drum, thickness > 0);
+        const uint near = nearChunks(found, own, &part, &drum, thickness > 0);
         if (near != 0) askMembers(input, own, c, near, found);
     }
 }

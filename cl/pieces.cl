@@ -22,11 +22,12 @@
 // A piece in a frame of its own: Piece of sdf/pieces.h.
 typedef struct {
     int base[3];
+    uint triangle;
     float origin[3], u[3], w[3], n[3];
     float length, ox, oy, olen, ex, ey, elen;
     float sample[3];
     float radius;
-    uint triangle;
+    float unused;  // the numbers are written four at a time
 } Piece;
 
 // A piece as its brick sees it: Member of sdf/exact_block.h.
@@ -105,19 +106,37 @@ uint countParts(const Corners* t, const Limits* limits) {
 #define BATCH 1
 typedef float Real;
 typedef int RealInt;
+typedef double Exact;
 #define loadReal(p) (*(p))
 #define storeReal(v, p) (*(p) = (v))
+#define loadRealInt(p) (*(p))
+#define toExact convert_double
+#define toReal convert_float
+#define toRealInt convert_int
+#define toRealFromInt convert_float
+#define bitsOfReal(held) ((uint)((held) != 0))
 #else
 #define BATCH LANES
 typedef Lanes Real;
 typedef IntLanes RealInt;
+typedef double16 Exact;
 #define loadReal(p) vloadLanes(0, p)
 #define storeReal(v, p) vstoreLanes(v, 0, p)
+#define loadRealInt(p) vloadLanes(0, p)
+#define toExact convert_double16
+#define toReal convert_float16
+#define toRealInt convert_int16
+#define toRealFromInt convert_float16
+#define bitsOfReal bitsOf
 #endif
 
 typedef struct {
     Real x, y, z;
 } Real3;
+
+typedef struct {
+    Exact x, y, z;
+} Exact3;
 
 Real3 make3(Real x, Real y, Real z) {
     const Real3 v = {x, y, z};
@@ -141,6 +160,16 @@ Real3 cross3(Real3 a, Real3 b) {
 Real3 select3(Real3 no, Real3 yes, RealInt which) {
     return make3(select(no.x, yes.x, which), select(no.y, yes.y, which), select(no.z, yes.z, which));
 }
+Exact3 subExact(Exact3 a, Exact3 b) {
+    const Exact3 v = {a.x - b.x, a.y - b.y, a.z - b.z};
+    return v;
+}
+Exact squareExact(Exact3 a) {
+    return a.x * a.x + a.y * a.y + a.z * a.z;
+}
+Real3 toReal3(Exact3 a) {
+    return make3(toReal(a.x), toReal(a.y), toReal(a.z));
+}
 
 // One over a length; zero for none.
 Real inverse(Real length) {
@@ -155,20 +184,9 @@ Real3 across(Real3 u) {
     return scale3(inverse(sqrt(dot3(way, way))), way);
 }
 
-// Pieces to be made: a lattice point, a corner as seen from it, the ways from there to the next corners.
-typedef struct {
-    int base[3][BATCH];
-    uint triangle[BATCH];
-    float corner[3][BATCH], ab[3][BATCH], ac[3][BATCH];
-    uint count;
-} Waiting;
-
-// The numbers of a batch of pieces, a column each.
-enum { ORIGIN = 0, AXIS_U = 3, AXIS_W = 6, AXIS_N = 9, LENGTH = 12, LEFT = 13, RIGHT = 16, SAMPLE = 19, COVER = 22, ROWS };
-
-Real3 load3(float (*from)[BATCH]) {
-    return make3(loadReal(from[0]), loadReal(from[1]), loadReal(from[2]));
-}
+// The numbers of a batch of pieces, a column each: those of Piece, then the sample in the voxels of the brick.
+enum { ORIGIN = 0, AXIS_U = 3, AXIS_W = 6, AXIS_N = 9, LENGTH = 12, LEFT = 13, RIGHT = 16, SAMPLE = 19, COVER = 22,
+       PIECE_ROWS = 24, IN_BRICK = 24, ROWS = 27 };
 
 void put3(float (*columns)[BATCH], int row, Real3 value) {
     storeReal(value.x, columns[row]);
@@ -182,10 +200,11 @@ void putEdge(float (*columns)[BATCH], int row, Real x, Real y) {
     put3(columns, row, make3(select((Real)(1.0f), x * part, size > 0.0f), y * part, size));
 }
 
-void makeColumns(Waiting* waiting, float (*columns)[BATCH]) {
+// The frames of pieces, by a corner as seen from a lattice point and the ways from there to the next corners.
+// `shift` leads from the lattice points to the brick. Returns the samples in the voxels of the brick.
+void makeColumns(Real3 corner, Real3 ab, Real3 ac, Real3 shift, float (*columns)[BATCH]) {
     const Real zero = 0.0f, one = 1.0f;
-    const Real3 corner = load3(waiting->corner), ab = load3(waiting->ab), ac = load3(waiting->ac), bc = sub3(ac, ab),
-                none = make3(zero, zero, zero);
+    const Real3 bc = sub3(ac, ab), none = make3(zero, zero, zero);
     // turned so that the longest edge comes first
     const Real ab2 = dot3(ab, ab), bc2 = dot3(bc, bc), ca2 = dot3(ac, ac);
     const RealInt isFirst = ab2 >= bc2 && ab2 >= ca2, isSecond = bc2 >= ca2;
@@ -215,99 +234,18 @@ void makeColumns(Waiting* waiting, float (*columns)[BATCH]) {
     const Real middle = 0.5f * size;
     const Real lift = (along * along + height * height - along * size) / (height + height);
     const Real up = select(max(lift, zero), zero, flat);
-    put3(columns, SAMPLE, add3(begin, add3(scale3(middle, u), scale3(up, w))));
+    const Real3 sample = add3(begin, add3(scale3(middle, u), scale3(up, w)));
+    put3(columns, SAMPLE, sample);
+    put3(columns, IN_BRICK, add3(sample, shift));
     storeReal(sqrt(middle * middle + up * up) + RADIUS_SLACK, columns[COVER]);
+    storeReal(zero, columns[COVER + 1]);
 }
 
-void makePieces(Waiting* waiting, global Piece* pieces) {
-    float columns[ROWS][BATCH];
-    makeColumns(waiting, columns);
-    for (uint i = 0; i < waiting->count; ++i) {
-        global Piece* piece = pieces + i;
-        for (int axis = 0; axis < 3; ++axis) piece->base[axis] = waiting->base[axis][i];
-        global float* numbers = piece->origin;
-        for (int row = 0; row < ROWS; ++row) numbers[row] = columns[row][i];
-        piece->triangle = waiting->triangle[i];
-    }
-    waiting->count = 0;
-}
-
-// The pieces of a brick, and how many of them there are so far.
+// What is known of all samples of a brick, or of an item's part of them.
 typedef struct {
-    global Piece* pieces;
-    SHARED uint* count;
-} Cut;
-
-void flush(const Cut* cut, Waiting* waiting) {
-    if (waiting->count == 0) return;
-#if ITEMS > 1
-    const uint place = atomic_add(cut->count, waiting->count);
-#else
-    const uint place = *cut->count;
-    *cut->count += waiting->count;
-#endif
-    makePieces(waiting, cut->pieces + place);
-}
-
-void addPart(const Cut* cut, Waiting* waiting, const Corners* t, uint triangle) {
-    const uint at = waiting->count;
-    // rounded to the nearest, halves always up, so that a shift by whole voxels shifts the result
-    const int3 base = convert_int3_rtn(t->a + 0.5);
-    const float3 corner = convert_float3(t->a - convert_double3(base)), ab = convert_float3(t->b - t->a),
-                 ac = convert_float3(t->c - t->a);
-    waiting->base[0][at] = base.x;
-    waiting->base[1][at] = base.y;
-    waiting->base[2][at] = base.z;
-    waiting->corner[0][at] = corner.x;
-    waiting->corner[1][at] = corner.y;
-    waiting->corner[2][at] = corner.z;
-    waiting->ab[0][at] = ab.x;
-    waiting->ab[1][at] = ab.y;
-    waiting->ab[2][at] = ab.z;
-    waiting->ac[0][at] = ac.x;
-    waiting->ac[1][at] = ac.y;
-    waiting->ac[2][at] = ac.z;
-    waiting->triangle[at] = triangle;
-    if (++waiting->count == BATCH) flush(cut, waiting);
-}
-
-void cutTriangles(const Cut* cut, global const float* points, global const uint* triangles, global const uint* list,
-                  uint begin, uint end, double voxelsPerUnit, const Limits* limits) {
-    Waiting waiting;
-    waiting.count = 0;
-    for (uint i = begin + ITEM; i < end; i += ITEMS) {
-        const uint triangle = list[i];
-        const Corners t = cornersOf(points, triangles, triangle, voxelsPerUnit);
-        if (isShort(&t)) {
-            addPart(cut, &waiting, &t, triangle);
-            continue;
-        }
-        Parts parts;
-        Corners part;
-        parts.waiting[0] = t;
-        parts.count = 1;
-        while (nextPart(&parts, limits, &part)) addPart(cut, &waiting, &part, triangle);
-    }
-    flush(cut, &waiting);
-}
-
-// What the items of a group tell each other about the samples of a brick.
-typedef struct {
-    double radii;
+    double radii;  // their sum
     float lower[3], upper[3];
 } Extent;
-
-// Cells of a box.
-typedef struct {
-    float lower[3];
-    float side;
-    int size[3];
-} Cells;
-
-uint cellOf(const Cells* cells, float3 place) {
-    const int3 cell = convert_int3((place - vload3(0, cells->lower)) / cells->side);
-    return (uint)((cell.x * cells->size[1] + cell.y) * cells->size[2] + cell.z);
-}
 
 Extent addExtents(const Extent* a, const Extent* b) {
     Extent sum;
@@ -319,21 +257,164 @@ Extent addExtents(const Extent* a, const Extent* b) {
     return sum;
 }
 
-// Makes members of pieces, unsorted.
-Extent makeMembers(global const Piece* pieces, uint first, uint count, int3 origin, global Member* members) {
-    Extent extent = {0, {INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
-    for (uint i = ITEM; i < count; i += ITEMS) {
-        global const Piece* piece = pieces + first + i;
-        const float3 sample = convert_float3(vload3(0, piece->base) - origin) + vload3(0, piece->sample);
-        global Member* member = members + i;
-        vstore3(sample, 0, member->sample);
-        member->radius = piece->radius;
-        vstore3(vload3(0, piece->n), 0, member->normal);
-        member->piece = first + i;
-        const Extent one = {piece->radius, {sample.x, sample.y, sample.z}, {sample.x, sample.y, sample.z}};
-        extent = addExtents(&extent, &one);
+// The pieces of a brick, and how many of them there are so far.
+typedef struct {
+    global Piece* pieces;
+    global Member* members;
+    SHARED uint* count;
+    uint first;    // the number of the brick's first piece
+    int3 origin;   // of the brick
+    Extent extent;
+} Cut;
+
+float4 fourOf(float (*columns)[BATCH], int row, int lane) {
+    return (float4)(columns[row][lane], columns[row + 1][lane], columns[row + 2][lane], columns[row + 3][lane]);
+}
+
+// Makes pieces and their members of some lanes.
+void makePieces(Cut* cut, uint lanes, Real3 corner, Real3 ab, Real3 ac, int (*base)[BATCH], const uint* triangles) {
+    float columns[ROWS][BATCH];
+    const Real3 shift = make3(toRealFromInt(loadRealInt(base[0]) - cut->origin.x),
+                              toRealFromInt(loadRealInt(base[1]) - cut->origin.y),
+                              toRealFromInt(loadRealInt(base[2]) - cut->origin.z));
+    makeColumns(corner, ab, ac, shift, columns);
+#if ITEMS > 1
+    uint place = atomic_add(cut->count, popcount(lanes));
+#else
+    uint place = *cut->count;
+    *cut->count += popcount(lanes);
+#endif
+    float3 lower = vload3(0, cut->extent.lower), upper = vload3(0, cut->extent.upper);
+    float radii = 0;
+    for (; lanes != 0; lanes &= lanes - 1, ++place) {
+        const int lane = lowestBit(lanes);
+        global Piece* piece = cut->pieces + place;
+        vstore4((int4)(base[0][lane], base[1][lane], base[2][lane], (int)(triangles[lane])), 0, piece->base);
+        for (int row = 0; row < PIECE_ROWS; row += 4) vstore4(fourOf(columns, row, lane), row / 4, piece->origin);
+        const float3 sample = fourOf(columns, IN_BRICK, lane).xyz;
+        const float radius = columns[COVER][lane];
+        global float* member = cut->members[place].sample;
+        vstore4((float4)(sample, radius), 0, member);
+        vstore4((float4)(columns[AXIS_N][lane], columns[AXIS_N + 1][lane], columns[AXIS_N + 2][lane],
+                         as_float(cut->first + place)),
+                1, member);
+        lower = min(lower, sample);
+        upper = max(upper, sample);
+        radii += radius;
     }
-    return extent;
+    vstore3(lower, 0, cut->extent.lower);
+    vstore3(upper, 0, cut->extent.upper);
+    cut->extent.radii += radii;
+}
+
+// Parts of long triangles that wait until they are a batch: their lattice points, a corner as seen from there, the ways
+// from it to the next corners.
+typedef struct {
+    int base[3][BATCH];
+    uint triangle[BATCH];
+    float corner[3][BATCH], ab[3][BATCH], ac[3][BATCH];
+    uint count;
+} Waiting;
+
+Real3 load3(float (*from)[BATCH]) {
+    return make3(loadReal(from[0]), loadReal(from[1]), loadReal(from[2]));
+}
+
+void flush(Cut* cut, Waiting* waiting) {
+    if (waiting->count == 0) return;
+    makePieces(cut, (1u << waiting->count) - 1, load3(waiting->corner), load3(waiting->ab), load3(waiting->ac),
+               waiting->base, waiting->triangle);
+    waiting->count = 0;
+}
+
+// The lattice point nearest to a place. Halves go up, so that a shift by whole voxels shifts the result.
+#define nearestLattice(place) floor((place) + 0.5)
+
+void addPart(Cut* cut, Waiting* waiting, const Corners* t, uint triangle) {
+    const uint at = waiting->count;
+    const double3 base = nearestLattice(t->a), corner = t->a - base, ab = t->b - t->a, ac = t->c - t->a;
+    const double from[12] = {base.x, base.y, base.z, corner.x, corner.y, corner.z,
+                             ab.x,   ab.y,   ab.z,   ac.x,     ac.y,     ac.z};
+    for (int axis = 0; axis < 3; ++axis) {
+        waiting->base[axis][at] = (int)(from[axis]);
+        waiting->corner[axis][at] = (float)(from[3 + axis]);
+        waiting->ab[axis][at] = (float)(from[6 + axis]);
+        waiting->ac[axis][at] = (float)(from[9 + axis]);
+    }
+    waiting->triangle[at] = triangle;
+    if (++waiting->count == BATCH) flush(cut, waiting);
+}
+
+void cutLong(Cut* cut, Waiting* waiting, const Corners* t, uint triangle, const Limits* limits) {
+    Parts parts;
+    Corners part;
+    parts.waiting[0] = *t;
+    parts.count = 1;
+    while (nextPart(&parts, limits, &part)) addPart(cut, waiting, &part, triangle);
+}
+
+// A corner of each triangle of a batch [voxels].
+Exact3 corners(global const float* points, uint (*indices)[BATCH], int corner, double voxelsPerUnit) {
+    float places[3][BATCH];
+    for (int i = 0; i < BATCH; ++i) {
+        global const float* point = points + 3 * (size_t)(indices[corner][i]);
+        places[0][i] = point[0];
+        places[1][i] = point[1];
+        places[2][i] = point[2];
+    }
+    const Exact3 all = {toExact(loadReal(places[0])) * voxelsPerUnit, toExact(loadReal(places[1])) * voxelsPerUnit,
+                        toExact(loadReal(places[2])) * voxelsPerUnit};
+    return all;
+}
+
+// Cuts the triangles of a list, a batch at a time: all indices are fetched before all corners, so that the processor
+// waits for memory once and not for each triangle.
+void cutTriangles(Cut* cut, global const float* points, global const uint* triangles, global const uint* list,
+                  uint begin, uint end, double voxelsPerUnit, const Limits* limits) {
+    Waiting waiting;
+    waiting.count = 0;
+    for (uint first = begin + ITEM * BATCH; first < end; first += ITEMS * BATCH) {
+        uint triangle[BATCH], indices[3][BATCH];
+        const uint count = min(end - first, (uint)(BATCH));
+        for (uint i = 0; i < BATCH; ++i) {
+            triangle[i] = list[first + min(i, count - 1)];
+            const uint3 t = vload3(triangle[i], triangles);
+            indices[0][i] = t.x;
+            indices[1][i] = t.y;
+            indices[2][i] = t.z;
+        }
+        const Exact3 a = corners(points, indices, 0, voxelsPerUnit), b = corners(points, indices, 1, voxelsPerUnit),
+                     c = corners(points, indices, 2, voxelsPerUnit);
+        const Exact3 base = {nearestLattice(a.x), nearestLattice(a.y), nearestLattice(a.z)};
+        const Exact3 ab = subExact(b, a), ac = subExact(c, a);
+        const Exact longest2 = max(squareExact(ab), max(squareExact(ac), squareExact(subExact(c, b))));
+        const RealInt isLong = toReal(longest2) > (float)(LONGEST_PIECE_EDGE * LONGEST_PIECE_EDGE);
+        const uint real = (1u << count) - 1, longOnes = bitsOfReal(isLong) & real;
+        int bases[3][BATCH];
+        storeReal(toRealInt(base.x), bases[0]);
+        storeReal(toRealInt(base.y), bases[1]);
+        storeReal(toRealInt(base.z), bases[2]);
+        if (real & ~longOnes)
+            makePieces(cut, real & ~longOnes, toReal3(subExact(a, base)), toReal3(ab), toReal3(ac), bases, triangle);
+        for (uint rest = longOnes; rest != 0; rest &= rest - 1) {
+            const uint one = triangle[lowestBit(rest)];
+            const Corners t = cornersOf(points, triangles, one, voxelsPerUnit);
+            cutLong(cut, &waiting, &t, one, limits);
+        }
+    }
+    flush(cut, &waiting);
+}
+
+// Cells of a box.
+typedef struct {
+    float lower[3];
+    float side;
+    int size[3];
+} Cells;
+
+uint cellOf(const Cells* cells, float3 place) {
+    const int3 cell = convert_int3((place - vload3(0, cells->lower)) / cells->side);
+    return (uint)((cell.x * cells->size[1] + cell.y) * cells->size[2] + cell.z);
 }
 
 // The columns of clusters of a batch, and what of them is a brick's.
