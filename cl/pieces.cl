@@ -1,6 +1,6 @@
 // Triangles cut into pieces of about a voxel, and pieces grouped into clusters, brick by brick: sdf/pieces.h and
 // sdf/clusters.h on a device.
-#include "bins.cl"
+#include "groups.cl"
 
 // Longer edges are halved [voxels].
 #define LONGEST_PIECE_EDGE 16.0
@@ -16,8 +16,6 @@
 #define CELL_FACTOR 4.0f
 #define SMALLEST_CELL 1.1f
 #define LARGEST_CELL 3.0f
-// Rounding of a cluster's own numbers [voxels].
-#define CLUSTER_SLACK 1e-4f
 
 // A piece in a frame of its own: Piece of sdf/pieces.h.
 typedef struct {
@@ -29,18 +27,6 @@ typedef struct {
     float radius;
     float unused;  // the numbers are written four at a time
 } Piece;
-
-// A piece as its brick sees it: Member of sdf/exact_block.h.
-typedef struct {
-    float sample[3];
-    float radius;
-    float normal[3];
-    uint piece;
-} Member;
-
-// Clusters of all bricks of a batch, a column for each number: Cluster of sdf/exact_block.h. The members of a cluster
-// end where those of the next one begin.
-enum { SAMPLE_X, SAMPLE_Y, SAMPLE_Z, RADIUS, NORMAL_X, NORMAL_Y, NORMAL_Z, THICKNESS, CLUSTER_COLUMNS };
 
 bool isShort(const Corners* t) {
     return max(lengthSquared(t->b - t->a), max(lengthSquared(t->c - t->b), lengthSquared(t->a - t->c))) <=
@@ -99,76 +85,6 @@ uint countParts(const Corners* t, const Limits* limits) {
     uint count = 0;
     while (nextPart(&parts, limits, &part)) ++count;
     return count;
-}
-
-// Pieces are made as many at once as there are lanes where one item does a group's work, else one by one.
-#if ITEMS > 1
-#define BATCH 1
-typedef float Real;
-typedef int RealInt;
-typedef double Exact;
-#define loadReal(p) (*(p))
-#define storeReal(v, p) (*(p) = (v))
-#define loadRealInt(p) (*(p))
-#define toExact convert_double
-#define toReal convert_float
-#define toRealInt convert_int
-#define toRealFromInt convert_float
-#define bitsOfReal(held) ((uint)((held) != 0))
-#else
-#define BATCH LANES
-typedef Lanes Real;
-typedef IntLanes RealInt;
-typedef double16 Exact;
-#define loadReal(p) vloadLanes(0, p)
-#define storeReal(v, p) vstoreLanes(v, 0, p)
-#define loadRealInt(p) vloadLanes(0, p)
-#define toExact convert_double16
-#define toReal convert_float16
-#define toRealInt convert_int16
-#define toRealFromInt convert_float16
-#define bitsOfReal bitsOf
-#endif
-
-typedef struct {
-    Real x, y, z;
-} Real3;
-
-typedef struct {
-    Exact x, y, z;
-} Exact3;
-
-Real3 make3(Real x, Real y, Real z) {
-    const Real3 v = {x, y, z};
-    return v;
-}
-Real3 add3(Real3 a, Real3 b) {
-    return make3(a.x + b.x, a.y + b.y, a.z + b.z);
-}
-Real3 sub3(Real3 a, Real3 b) {
-    return make3(a.x - b.x, a.y - b.y, a.z - b.z);
-}
-Real3 scale3(Real s, Real3 a) {
-    return make3(s * a.x, s * a.y, s * a.z);
-}
-Real dot3(Real3 a, Real3 b) {
-    return a.x * b.x + a.y * b.y + a.z * b.z;
-}
-Real3 cross3(Real3 a, Real3 b) {
-    return make3(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x);
-}
-Real3 select3(Real3 no, Real3 yes, RealInt which) {
-    return make3(select(no.x, yes.x, which), select(no.y, yes.y, which), select(no.z, yes.z, which));
-}
-Exact3 subExact(Exact3 a, Exact3 b) {
-    const Exact3 v = {a.x - b.x, a.y - b.y, a.z - b.z};
-    return v;
-}
-Exact squareExact(Exact3 a) {
-    return a.x * a.x + a.y * a.y + a.z * a.z;
-}
-Real3 toReal3(Exact3 a) {
-    return make3(toReal(a.x), toReal(a.y), toReal(a.z));
 }
 
 // One over a length; zero for none.
@@ -241,22 +157,6 @@ void makeColumns(Real3 corner, Real3 ab, Real3 ac, Real3 shift, float (*columns)
     storeReal(zero, columns[COVER + 1]);
 }
 
-// What is known of all samples of a brick, or of an item's part of them.
-typedef struct {
-    double radii;  // their sum
-    float lower[3], upper[3];
-} Extent;
-
-Extent addExtents(const Extent* a, const Extent* b) {
-    Extent sum;
-    sum.radii = a->radii + b->radii;
-    for (int axis = 0; axis < 3; ++axis) {
-        sum.lower[axis] = min(a->lower[axis], b->lower[axis]);
-        sum.upper[axis] = max(a->upper[axis], b->upper[axis]);
-    }
-    return sum;
-}
-
 // The pieces of a brick, and how many of them there are so far.
 typedef struct {
     global Piece* pieces;
@@ -293,7 +193,7 @@ void makePieces(Cut* cut, uint lanes, Real3 corner, Real3 ab, Real3 ac, int (*ba
         for (int row = 0; row < PIECE_ROWS; row += 4) vstore4(fourOf(columns, row, lane), row / 4, piece->origin);
         const float3 sample = fourOf(columns, IN_BRICK, lane).xyz;
         const float radius = columns[COVER][lane];
-        global float* member = cut->members[place].sample;
+        global float* member = cut->members[place].place;
         vstore4((float4)(sample, radius), 0, member);
         vstore4((float4)(columns[AXIS_N][lane], columns[AXIS_N + 1][lane], columns[AXIS_N + 2][lane],
                          as_float(cut->first + place)),
@@ -304,7 +204,7 @@ void makePieces(Cut* cut, uint lanes, Real3 corner, Real3 ab, Real3 ac, int (*ba
     }
     vstore3(lower, 0, cut->extent.lower);
     vstore3(upper, 0, cut->extent.upper);
-    cut->extent.radii += radii;
+    cut->extent.sizes += radii;
 }
 
 // Parts of long triangles that wait until they are a batch: their lattice points, a corner as seen from there, the ways
@@ -353,51 +253,28 @@ void cutLong(Cut* cut, Waiting* waiting, const Corners* t, uint triangle, const 
     while (nextPart(&parts, limits, &part)) addPart(cut, waiting, &part, triangle);
 }
 
-// A corner of each triangle of a batch [voxels].
-Exact3 corners(global const float* points, uint (*indices)[BATCH], int corner, double voxelsPerUnit) {
-    float places[3][BATCH];
-    for (int i = 0; i < BATCH; ++i) {
-        global const float* point = points + 3 * (size_t)(indices[corner][i]);
-        places[0][i] = point[0];
-        places[1][i] = point[1];
-        places[2][i] = point[2];
-    }
-    const Exact3 all = {toExact(loadReal(places[0])) * voxelsPerUnit, toExact(loadReal(places[1])) * voxelsPerUnit,
-                        toExact(loadReal(places[2])) * voxelsPerUnit};
-    return all;
-}
-
-// Cuts the triangles of a list, a batch at a time: all indices are fetched before all corners, so that the processor
-// waits for memory once and not for each triangle.
+// Cuts the triangles of a list.
 void cutTriangles(Cut* cut, global const float* points, global const uint* triangles, global const uint* list,
                   uint begin, uint end, double voxelsPerUnit, const Limits* limits) {
     Waiting waiting;
     waiting.count = 0;
     for (uint first = begin + ITEM * BATCH; first < end; first += ITEMS * BATCH) {
-        uint triangle[BATCH], indices[3][BATCH];
-        const uint count = min(end - first, (uint)(BATCH));
-        for (uint i = 0; i < BATCH; ++i) {
-            triangle[i] = list[first + min(i, count - 1)];
-            const uint3 t = vload3(triangle[i], triangles);
-            indices[0][i] = t.x;
-            indices[1][i] = t.y;
-            indices[2][i] = t.z;
-        }
-        const Exact3 a = corners(points, indices, 0, voxelsPerUnit), b = corners(points, indices, 1, voxelsPerUnit),
-                     c = corners(points, indices, 2, voxelsPerUnit);
-        const Exact3 base = {nearestLattice(a.x), nearestLattice(a.y), nearestLattice(a.z)};
-        const Exact3 ab = subExact(b, a), ac = subExact(c, a);
-        const Exact longest2 = max(squareExact(ab), max(squareExact(ac), squareExact(subExact(c, b))));
+        Batch batch;
+        fetchBatch(&batch, points, triangles, list, first, end, voxelsPerUnit);
+        const Exact3 base = {nearestLattice(batch.a.x), nearestLattice(batch.a.y), nearestLattice(batch.a.z)};
+        const Exact3 ab = subExact(batch.b, batch.a), ac = subExact(batch.c, batch.a);
+        const Exact longest2 = max(squareExact(ab), max(squareExact(ac), squareExact(subExact(batch.c, batch.b))));
         const RealInt isLong = toReal(longest2) > (float)(LONGEST_PIECE_EDGE * LONGEST_PIECE_EDGE);
-        const uint real = (1u << count) - 1, longOnes = bitsOfReal(isLong) & real;
+        const uint longOnes = bitsOfReal(isLong) & batch.real;
         int bases[3][BATCH];
         storeReal(toRealInt(base.x), bases[0]);
         storeReal(toRealInt(base.y), bases[1]);
         storeReal(toRealInt(base.z), bases[2]);
-        if (real & ~longOnes)
-            makePieces(cut, real & ~longOnes, toReal3(subExact(a, base)), toReal3(ab), toReal3(ac), bases, triangle);
+        if (batch.real & ~longOnes)
+            makePieces(cut, batch.real & ~longOnes, toReal3(subExact(batch.a, base)), toReal3(ab), toReal3(ac), bases,
+                       batch.triangle);
         for (uint rest = longOnes; rest != 0; rest &= rest - 1) {
-            const uint one = triangle[lowestBit(rest)];
+            const uint one = batch.triangle[lowestBit(rest)];
             const Corners t = cornersOf(points, triangles, one, voxelsPerUnit);
             cutLong(cut, &waiting, &t, one, limits);
         }
@@ -405,45 +282,12 @@ void cutTriangles(Cut* cut, global const float* points, global const uint* trian
     flush(cut, &waiting);
 }
 
-// Cells of a box.
-typedef struct {
-    float lower[3];
-    float side;
-    int size[3];
-} Cells;
-
-uint cellOf(const Cells* cells, float3 place) {
-    const int3 cell = convert_int3((place - vload3(0, cells->lower)) / cells->side);
-    return (uint)((cell.x * cells->size[1] + cell.y) * cells->size[2] + cell.z);
-}
-
-// The columns of clusters of a batch, and what of them is a brick's.
-typedef struct {
-    global float* columns;
-    global uint* begins;  // the first member of each cluster, and the end of the last one
-    uint stride;
-} Clusters;
-
-void putCluster(const Clusters* clusters, uint index, float3 sample, float radius, float3 normal, float thickness,
-                uint begin) {
-    global float* column = clusters->columns + index;
-    const uint stride = clusters->stride;
-    column[SAMPLE_X * stride] = sample.x;
-    column[SAMPLE_Y * stride] = sample.y;
-    column[SAMPLE_Z * stride] = sample.z;
-    column[RADIUS * stride] = radius;
-    column[NORMAL_X * stride] = normal.x;
-    column[NORMAL_Y * stride] = normal.y;
-    column[NORMAL_Z * stride] = normal.z;
-    column[THICKNESS * stride] = thickness;
-    clusters->begins[index] = begin;
-}
-
-// Members begin .. end become a cluster; returns how far it reaches around its sample.
-void addCluster(const Clusters* clusters, uint index, global const Member* members, uint begin, uint end) {
+// A group of pieces becomes a cluster, with a sample and a radius that covers all of them: sdf/clusters.h.
+void makeCluster(const Groups* groups, uint index, global const Member* members) {
+    const uint begin = groups->begins[index], end = groups->begins[index + 1];
     float3 mean = 0, normal = 0;
     for (uint m = begin; m < end; ++m) {
-        mean += vload3(0, members[m].sample);
+        mean += vload3(0, members[m].place);
         normal += vload3(0, members[m].normal);
     }
     mean /= (float)(end - begin);
@@ -453,7 +297,7 @@ void addCluster(const Clusters* clusters, uint index, global const Member* membe
     float3 sample = 0;
     float nearest2 = INFINITY;
     for (uint m = begin; m < end; ++m) {
-        const float3 place = vload3(0, members[m].sample), away = place - mean;
+        const float3 place = vload3(0, members[m].place), away = place - mean;
         const float away2 = dot(away, away);
         if (away2 < nearest2) {
             nearest2 = away2;
@@ -462,77 +306,10 @@ void addCluster(const Clusters* clusters, uint index, global const Member* membe
     }
     float radius = 0, thickness = 0;
     for (uint m = begin; m < end; ++m) {
-        const float3 away = vload3(0, members[m].sample) - sample;
+        const float3 away = vload3(0, members[m].place) - sample;
         const float facing = dot(vload3(0, members[m].normal), normal), own = members[m].radius;
         radius = max(radius, length(away) + own);
         thickness = max(thickness, fabs(dot(away, normal)) + own * sqrt(max(0.0f, 1 - facing * facing)));
     }
-    putCluster(clusters, index, sample, radius + CLUSTER_SLACK, normal, thickness + CLUSTER_SLACK, begin);
-}
-
-// Sorts members by cell into `sorted`; each cell that has some becomes a cluster. Returns the number of clusters.
-uint groupMembers(const Clusters* clusters, uint first, global const Member* unsorted, global Member* sorted,
-                  global uint* cellOfMember, uint count, const Cells* cells, global uint* cursors,
-                  SHARED uint2* sums) {
-    const uint cellCount = (uint)(cells->size[0] * cells->size[1] * cells->size[2]);
-    for (uint cell = ITEM; cell < cellCount; cell += ITEMS) cursors[cell] = 0;
-    MEET;
-    for (uint i = ITEM; i < count; i += ITEMS) {
-        const uint cell = cellOf(cells, vload3(0, unsorted[i].sample));
-        cellOfMember[i] = cell;
-        takeGlobal(cursors + cell, 1);
-    }
-    MEET;
-    // how many members and clusters come before the cells of each item
-    const uint begin = (uint)((ulong)(cellCount) * ITEM / ITEMS), end = (uint)((ulong)(cellCount) * (ITEM + 1) / ITEMS);
-    uint2 sum = 0;
-    if (ITEMS > 1) {
-        for (uint cell = begin; cell < end; ++cell) sum += (uint2)(cursors[cell], cursors[cell] > 0);
-        sums[ITEM] = sum;
-        MEET;
-        sum = 0;
-        for (uint i = 0; i < ITEM; ++i) sum += sums[i];
-    }
-    uint cluster = first + sum.y;
-    for (uint cell = begin; cell < end; ++cell) {
-        const uint inCell = cursors[cell];
-        if (inCell > 0) clusters->begins[cluster++] = first + sum.x;
-        cursors[cell] = sum.x;
-        sum.x += inCell;
-    }
-    if (ITEM == ITEMS - 1) {
-        clusters->begins[cluster] = first + count;
-        sums[0].y = cluster - first;
-    }
-    MEET;
-    const uint found = sums[0].y;
-    for (uint i = ITEM; i < count; i += ITEMS) sorted[takeGlobal(cursors + cellOfMember[i], 1)] = unsorted[i];
-    MEET;
-    for (uint c = first + ITEM; c < first + found; c += ITEMS) {
-        const uint beginOf = clusters->begins[c] - first, endOf = clusters->begins[c + 1] - first;
-        addCluster(clusters, c, sorted - first, beginOf + first, endOf + first);
-    }
-    return found;
-}
-
-// Which clusters of a brick, in their order, may reach each slice of blocks of the same x.
-void rangeClusters(const Clusters* clusters, uint first, uint count, int slices, float reach, global uint2* ranges) {
-    for (int slice = (int)(ITEM); slice < slices; slice += ITEMS) ranges[slice] = (uint2)(UINT_MAX, 0);
-    MEET;
-    for (uint c = first + ITEM; c < first + count; c += ITEMS) {
-        const float x = clusters->columns[SAMPLE_X * clusters->stride + c],
-                    beyond = reach + clusters->columns[RADIUS * clusters->stride + c] + CLUSTER_SLACK;
-        const int low = clamp(convert_int_rtn((x - beyond - (BLOCK_SIDE - 1)) / BLOCK_SIDE), 0, slices),
-                  high = clamp(convert_int_rtn((x + beyond) / BLOCK_SIDE), -1, slices - 1);
-        for (int slice = low; slice <= high; ++slice) {
-            global uint* range = (global uint*)(ranges + slice);
-#if ITEMS > 1
-            atomic_min(range, c);
-            atomic_max(range + 1, c + 1);
-#else
-            range[0] = min(range[0], c);
-            range[1] = max(range[1], c + 1);
-#endif
-        }
-    }
+    putGroup(groups, index, sample, radius + GROUP_SLACK, normal, thickness + GROUP_SLACK);
 }
