@@ -33,7 +33,8 @@ bool isShort(const Corners* t) {
            LONGEST_PIECE_EDGE * LONGEST_PIECE_EDGE;
 }
 
-bool isOnePart(const Corners* t) {
+bool isOnePart(const Grid* grid, const Corners* t) {
+    (void)(grid);
     return isShort(t);
 }
 
@@ -77,7 +78,8 @@ bool nextPart(Parts* parts, const Limits* limits, Corners* part) {
     return false;
 }
 
-uint countParts(const Corners* t, const Limits* limits) {
+uint countParts(const Grid* grid, const Corners* t, const Limits* limits) {
+    (void)(grid);
     Parts parts;
     Corners part;
     parts.waiting[0] = *t;

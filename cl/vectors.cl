@@ -14,6 +14,8 @@ typedef double Exact;
 #define toRealInt convert_int
 #define toRealFromInt convert_float
 #define bitsOfReal(held) ((uint)((held) != 0))
+#define bitsOfExact(held) ((uint)((held) != 0))
+#define storeExact(v, p) (*(p) = (v))
 #else
 #define BATCH LANES
 typedef Lanes Real;
@@ -27,6 +29,8 @@ typedef double16 Exact;
 #define toRealInt convert_int16
 #define toRealFromInt convert_float16
 #define bitsOfReal bitsOf
+#define bitsOfExact(held) bitsOf(convert_int16(held))
+#define storeExact(v, p) vstore16(v, 0, p)
 #endif
 
 typedef struct {
