@@ -121,39 +121,58 @@ void divide(const Bins* bins, const Grid* grid, const Corners* t, int3 lowest, i
     }
 }
 
-// Visits the bricks around a triangle, of which most have two at most along each axis.
-void binTriangle(const Bins* bins, const Grid* grid, const Corners* t) {
+// The bricks around most triangles: two at most along each axis. A code of 32 bits for the lowest of them and for the
+// axes along which there are two, so that they are worked out once.
+#define MANY_BRICKS UINT_MAX
+
+void visitFew(const Bins* bins, const Grid* grid, const Corners* t, uint code, bool onePart) {
+    const uint lowest = code >> 3, xStep = (uint)(grid->size[1] * grid->size[2]), yStep = (uint)(grid->size[2]);
+    for (uint x = 0; x <= (code >> 2 & 1); ++x)
+        for (uint y = 0; y <= (code >> 1 & 1); ++y)
+            for (uint z = 0; z <= (code & 1); ++z)
+                visit(bins, grid, t, lowest + x * xStep + y * yStep + z, onePart);
+}
+
+// Visits the bricks around a triangle, and returns their code.
+uint binTriangle(const Bins* bins, const Grid* grid, const Corners* t) {
     const double3 low = min(t->a, min(t->b, t->c)) - grid->reach, high = max(t->a, max(t->b, t->c)) + grid->reach;
-    const int3 lower = (convert_int3_rtn(low) >> grid->shift) - toInt3(grid->first),
-               upper = (convert_int3_rtn(high) >> grid->shift) - toInt3(grid->first);
-    if (any(upper - lower > 1)) {
+    const int3 lower = (convert_int3(floor(low)) >> grid->shift) - toInt3(grid->first),
+               upper = (convert_int3(floor(high)) >> grid->shift) - toInt3(grid->first), extent = upper - lower;
+    if (any(extent > 1)) {
         divide(bins, grid, t, lower, upper);
-        return;
+        return MANY_BRICKS;
     }
-    const bool onePart = bins->list || isOnePart(grid, t);
-    for (int x = lower.x; x <= upper.x; ++x)
-        for (int y = lower.y; y <= upper.y; ++y)
-            for (int z = lower.z; z <= upper.z; ++z) visit(bins, grid, t, cellAt(grid, (int3)(x, y, z)), onePart);
+    const uint code = cellAt(grid, lower) << 3 | (uint)(extent.x << 2 | extent.y << 1 | extent.z);
+    visitFew(bins, grid, t, code, bins->list || isOnePart(grid, t));
+    return code;
 }
 
-// All triangles of this item: a run of them with counters of its own where an item does a group's work, so that no
+// The triangles of this item: a run of them with counters of its own where an item does a group's work, so that no
 // counter is shared and the lists are in ascending order; else all items count together.
-void binTriangles(global const float* points, global const uint* triangles, Grid grid, global uint* cursors,
-                  global uint* more, global uint* list) {
-    const ulong count = grid.triangles, item = get_global_id(0), items = get_global_size(0);
-    Bins bins = {cursors + (item % grid.runs) * grid.cells, more, list, 0};
-    const ulong begin = ITEMS > 1 ? item : count * item / items, end = ITEMS > 1 ? count : count * (item + 1) / items;
-    for (ulong i = begin; i < end; i += ITEMS > 1 ? items : 1) {
-        const Corners t = cornersOf(points, triangles, (uint)(i), grid.voxelsPerUnit);
-        bins.triangle = (uint)(i);
-        binTriangle(&bins, &grid, &t);
-    }
+typedef struct {
+    ulong begin, end, step;
+    uint run;
+} Turn;
+
+Turn ownTurn(const Grid* grid) {
+    const ulong count = grid->triangles, item = get_global_id(0), items = get_global_size(0);
+#if ITEMS > 1
+    const Turn turn = {item, count, items, 0};
+#else
+    const Turn turn = {count * item / items, count * (item + 1) / items, 1, (uint)(item)};
+#endif
+    return turn;
 }
 
-// `cursors` has runs x cells counters, `more` cells of them; all are zero before.
+// `cursors` has runs x cells counters, `more` cells of them; all are zero before. Each triangle gets its code.
 kernel void countTriangles(global const float* points, global const uint* triangles, Grid grid, global uint* cursors,
-                           global uint* more) {
-    binTriangles(points, triangles, grid, cursors, more, 0);
+                           global uint* more, global uint* codes) {
+    const Turn turn = ownTurn(&grid);
+    const Bins bins = {cursors + turn.run * grid.cells, more, 0, 0};
+    for (ulong i = turn.begin; i < turn.end; i += turn.step) {
+        const Corners t = cornersOf(points, triangles, (uint)(i), grid.voxelsPerUnit);
+        codes[i] = binTriangle(&bins, &grid, &t);
+    }
 }
 
 // Turns counts into places. The b-th brick that has triangles gets its cell, and the first of its triangles and of its
@@ -205,6 +224,16 @@ GROUP_KERNEL void placeBricks(Grid grid, global uint* cursors, global const uint
 
 // Lists the triangles of each brick, by the places that placeBricks() made of the counts.
 kernel void listTriangles(global const float* points, global const uint* triangles, Grid grid, global uint* cursors,
-                          global uint* list) {
-    binTriangles(points, triangles, grid, cursors, 0, list);
+                          global const uint* codes, global uint* list) {
+    const Turn turn = ownTurn(&grid);
+    Bins bins = {cursors + turn.run * grid.cells, 0, list, 0};
+    for (ulong i = turn.begin; i < turn.end; i += turn.step) {
+        bins.triangle = (uint)(i);
+        if (codes[i] != MANY_BRICKS) {
+            visitFew(&bins, &grid, 0, codes[i], true);
+        } else {
+            const Corners t = cornersOf(points, triangles, (uint)(i), grid.voxelsPerUnit);
+            binTriangle(&bins, &grid, &t);
+        }
+    }
 }

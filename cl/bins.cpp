@@ -60,7 +60,8 @@ DeviceBins::DeviceBins(Device::Impl& device, const cl::Program& program, DeviceM
     const std::uint64_t cursorBytes = std::uint64_t(grid_.runs) * grid_.cells * sizeof(cl_uint),
                         cellBytes = std::uint64_t(grid_.cells) * sizeof(cl_uint);
     const auto bins = [&](std::uint64_t bytes) { return memory.allocate(bytes, "the binning of the mesh"); };
-    const cl::Buffer cursors = bins(cursorBytes), more = bins(cellBytes), total = bins(3 * sizeof(cl_ulong));
+    const cl::Buffer cursors = bins(cursorBytes), more = bins(cellBytes), total = bins(3 * sizeof(cl_ulong)),
+                     codes = bins(count * sizeof(cl_uint));
     cellOfBrick_ = bins(cellBytes);
     triangleOffsets_ = bins(cellBytes + sizeof(cl_uint));
     partOffsetBuffer_ = bins(cellBytes + sizeof(cl_uint));
@@ -74,7 +75,7 @@ DeviceBins::DeviceBins(Device::Impl& device, const cl::Program& program, DeviceM
                                    timing.event(Timing::Of::kernel));
     };
     const std::size_t local = gpuMapping ? groupItems : 1;
-    run("countTriangles", items, local, points_, triangles_, grid_, cursors, more);
+    run("countTriangles", items, local, points_, triangles_, grid_, cursors, more, codes);
     run("placeBricks", local, local, grid_, cursors, more, cellOfBrick_, triangleOffsets_, partOffsetBuffer_, total);
     std::array<cl_ulong, 3> totals{};
     queue.enqueueReadBuffer(total, CL_TRUE, 0, sizeof totals, totals.data(), nullptr,
@@ -83,11 +84,11 @@ DeviceBins::DeviceBins(Device::Impl& device, const cl::Program& program, DeviceM
     if (std::max(entries, parts) > std::numeric_limits<cl_uint>::max())
         memory.refuse(entries * sizeof(cl_uint), "the binning of the mesh");
     list_ = bins(std::max<std::uint64_t>(1, entries) * sizeof(cl_uint));
-    run("listTriangles", items, local, points_, triangles_, grid_, cursors, list_);
+    run("listTriangles", items, local, points_, triangles_, grid_, cursors, codes, list_);
     partOffsets_.resize(bricks + 1);
     queue.enqueueReadBuffer(partOffsetBuffer_, CL_TRUE, 0, partOffsets_.size() * sizeof(cl_uint), partOffsets_.data(),
                             nullptr, timing.event(Timing::Of::download));
-    memory.free(cursorBytes + cellBytes);
+    memory.free(cursorBytes + cellBytes + count * sizeof(cl_uint));
 }
 
 }  // namespace bilayer

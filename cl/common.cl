@@ -40,6 +40,10 @@ typedef int16 IntLanes;
 
 #endif
 
+// Loops over what shall stay in registers, and functions that take part in such loops.
+#define UNROLLED _Pragma("unroll")
+#define INLINED inline __attribute__((always_inline))
+
 // Stands for every distance beyond reach: farAway of sdf/blocks.h.
 #define FAR_AWAY 1e30f
 

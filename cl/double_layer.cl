@@ -13,11 +13,9 @@
 
 // What stays in registers: a cube of 4x4x4 voxels, a vector for each slice of one x, or a GPU's row of 8.
 #if ITEMS > 1
-#define CUBE_SIDE 8
 #define SLICES 1
 #define CUBES 1
 #else
-#define CUBE_SIDE 4
 #define SLICES 4
 #define CUBES 8
 #endif
@@ -76,7 +74,7 @@ GROUP_KERNEL void prepareBricks(global const float* points, global const uint* t
         const uint found = counts[RUNS];
         const Extent all = sumExtents(extents);
         uint groupCount = found;
-        bool gathered = all.sizes < 2 * SMALL_AREA * (double)(found);
+        bool gathered = all.sizes < (double)(2 * SMALL_AREA) * found;
         if (gathered) {
             const Cells cells = makeCells(&all, CELL_SIZE);
             gathered = countCells(&cells) <= (float)(scratchCells);
@@ -94,7 +92,7 @@ GROUP_KERNEL void prepareBricks(global const float* points, global const uint* t
                 groupRun(&groups, g, samples, runs + g, twiceDelta);
             }
         }
-        if (!gathered && ITEM == 0) groups.begins[first + found] = first + found;
+        if (ITEM == 0 && !gathered) groups.begins[first + found] = first + found;
         MEET;
         rangeGroups(&groups, first, groupCount, slices, reach, ranges + taken * slices);
     }
@@ -115,12 +113,12 @@ typedef struct {
 } Voxels;
 
 // The first voxel of an item's cube, in the block.
-int3 cornerOf(int cube) {
+float3 cornerOf(int cube) {
 #if ITEMS > 1
     (void)(cube);
-    return (int3)((int)(ITEM) / BLOCK_SIDE, (int)(ITEM) % BLOCK_SIDE, 0);
+    return (float3)((float)(ITEM / BLOCK_SIDE), (float)(ITEM % BLOCK_SIDE), 0);
 #else
-    return CUBE_SIDE * (int3)(cube / 4, cube / 2 % 2, cube % 2);
+    return (float)(SLICES) * (float3)((float)(cube / 4), (float)(cube / 2 % 2), (float)(cube % 2));
 #endif
 }
 
@@ -143,39 +141,43 @@ float3 nearestLattice(float3 place) {
 // Squared distances from a cube's voxels to a sample: along x for each slice, and across. Infinite outside of the
 // paper's cube, if that is asked for.
 typedef struct {
-    float along2[SLICES];
-    Lanes across2;
+    float along[SLICES], along2[SLICES];
+    Lanes y, z, across2;
 } Measured;
 
-Measured measure(const Voxels* v, float3 place, int k) {
+INLINED Measured measure(const Voxels* v, float3 place, int k) {
     Measured m;
-    for (int i = 0; i < SLICES; ++i) m.along2[i] = square(v->x + (float)(i)-place.x);
-    const Lanes dy = v->y - place.y, dz = v->z - place.z;
-    m.across2 = multiplyAdd(dy, dy, dz * dz);
+    UNROLLED for (int i = 0; i < SLICES; ++i) {
+        m.along[i] = v->x + (float)(i)-place.x;
+        m.along2[i] = m.along[i] * m.along[i];
+    }
+    m.y = v->y - place.y;
+    m.z = v->z - place.z;
+    m.across2 = multiplyAdd(m.y, m.y, m.z * m.z);
     if (PAPER_CUBE) {
         const float3 centre = nearestLattice(place);
         const Lanes away = max(fabs(v->y - centre.y), fabs(v->z - centre.z));
         m.across2 = select((Lanes)(INFINITY), m.across2, away <= (float)(k));
-        for (int i = 0; i < SLICES; ++i)
+        UNROLLED for (int i = 0; i < SLICES; ++i)
             if (fabs(v->x + (float)(i)-centre.x) > (float)(k)) m.along2[i] = INFINITY;
     }
     return m;
 }
 
-void applyRun(Found* found, const Voxels* v, global const float* samples, global const Run* run, int k) {
-    const float3 place = vload3(0, run->place), normal = vload3(0, run->twiceOffset);
+INLINED void applyRun(Found* found, const Voxels* v, global const float* samples, global const Run* run, int k) {
+    const float3 normal = vload3(0, run->twiceOffset);
     const uint count = sampleCount(run);
     Lanes nearest2[SLICES];
-    const Measured first = measure(v, place, k);
-    for (int i = 0; i < SLICES; ++i) nearest2[i] = first.along2[i] + first.across2;
+    const Measured first = measure(v, vload3(0, run->place), k);
+    UNROLLED for (int i = 0; i < SLICES; ++i) nearest2[i] = first.along2[i] + first.across2;
     for (uint s = 1; s < count; ++s) {
         const Measured next = measure(v, sampleOf(samples, run, s), k);
-        for (int i = 0; i < SLICES; ++i) nearest2[i] = min(nearest2[i], next.along2[i] + next.across2);
+        UNROLLED for (int i = 0; i < SLICES; ++i) nearest2[i] = min(nearest2[i], next.along2[i] + next.across2);
     }
     // 2 delta times the height over the plane
-    const Lanes across = multiplyAdd(v->y - place.y, (Lanes)(normal.y), (v->z - place.z) * normal.z);
-    for (int i = 0; i < SLICES; ++i) {
-        const Lanes height = (v->x + (float)(i)-place.x) * normal.x + across;
+    const Lanes across = multiplyAdd(first.y, (Lanes)(normal.y), first.z * normal.z);
+    UNROLLED for (int i = 0; i < SLICES; ++i) {
+        const Lanes height = first.along[i] * normal.x + across;
         const Lanes inner2 = nearest2[i] + height, outer2 = nearest2[i] - height;
 #if TRIANGLES
         found->innerOwner[i] = select(found->innerOwner[i], (IntLanes)(run->triangle), inner2 < found->inner2[i]);
@@ -187,11 +189,11 @@ void applyRun(Found* found, const Voxels* v, global const float* samples, global
 }
 
 // Whether a ball may hold a sample nearer to some voxel than what was found: |p - centre| - radius < bound.
-bool mayImprove(const Voxels* v, float3 centre, float radius, float delta2, const Lanes* bound, const Lanes* best2) {
+INLINED bool mayImprove(const Voxels* v, float3 centre, float radius, float delta2, const Lanes* bound, const Lanes* best2) {
     const float rest = delta2 + radius * radius;
     const Lanes dy = v->y - centre.y, dz = v->z - centre.z, across2 = multiplyAdd(dy, dy, dz * dz);
     IntLanes may = 0;
-    for (int i = 0; i < SLICES; ++i) {
+    UNROLLED for (int i = 0; i < SLICES; ++i) {
         const Lanes distance2 = square(v->x + (float)(i)-centre.x) + across2;
         may |= distance2 < multiplyAdd((Lanes)(2 * radius), bound[i], best2[i]) + rest;
     }
@@ -214,19 +216,18 @@ float3 offsetOf(const Groups* groups, uint g) {
 
 // Bounds of distances to a layer.
 void boundDistances(const Lanes* best2, float delta2, Lanes* bound) {
-    for (int i = 0; i < SLICES; ++i) bound[i] = sqrt(max(best2[i] + delta2, (Lanes)(0.0f)));
+    UNROLLED for (int i = 0; i < SLICES; ++i) bound[i] = sqrt(max(best2[i] + delta2, (Lanes)(0.0f)));
 }
 
-// Applies groups to a cube; the page says which, and `list` which of the page, if it is not null. Large ones are looked
-// at once the others, and their own first runs, have been applied.
-void applyGroups(const Input* input, const Voxels* v, SHARED const uint* page, const ushort* list, uint count,
-                 Found* found) {
+// Applies the listed groups to a cube. Large ones are looked at once the others, and their own first runs, have been
+// applied.
+INLINED void applyGroups(const Input* input, const Voxels* v, const uint* list, uint count, Found* found) {
     const Groups* groups = &input->near.groups;
     const int k = input->layers.cube;
     const float delta2 = square(input->layers.delta);
     bool large = false;
     for (uint i = 0; i < count; ++i) {
-        const uint g = page[list[i]], begin = groups->begins[g], end = groups->begins[g + 1];
+        const uint g = list[i], begin = groups->begins[g], end = groups->begins[g + 1];
         const bool worthALook = end - begin >= RUNS_WORTH_A_LOOK;
         large = large || worthALook;
         for (uint r = begin; r < (worthALook ? begin + 1 : end); ++r)
@@ -237,7 +238,7 @@ void applyGroups(const Input* input, const Voxels* v, SHARED const uint* page, c
     boundDistances(found->inner2, delta2, inner);
     boundDistances(found->outer2, delta2, outer);
     for (uint i = 0; i < count; ++i) {
-        const uint g = page[list[i]], begin = groups->begins[g], end = groups->begins[g + 1];
+        const uint g = list[i], begin = groups->begins[g], end = groups->begins[g + 1];
         if (end - begin < RUNS_WORTH_A_LOOK) continue;
         const float3 place = placeOf(groups, g), offset = offsetOf(groups, g);
         const float radius = groups->columns[RADIUS * groups->stride + g];
@@ -248,70 +249,78 @@ void applyGroups(const Input* input, const Voxels* v, SHARED const uint* page, c
     }
 }
 
+#if ITEMS > 1
+
+// Whether a group reaches the row of this item.
+bool reachesRow(const Input* input, uint g, float3 middle) {
+    const Groups* groups = &input->near.groups;
+    global const float* columns = groups->columns + g;
+    const uint stride = groups->stride;
+    const float slabReach = input->near.reach, ballReach = PAPER_CUBE ? slabReach : input->layers.certain,
+                halfRow = 0.5f * (BLOCK_SIDE - 1);
+    const float3 away = placeOf(groups, g) - middle, offset = PAPER_CUBE ? (float3)(0.0f) : offsetOf(groups, g),
+                 normal = (float3)(columns[NORMAL_X * stride], columns[NORMAL_Y * stride], columns[NORMAL_Z * stride]);
+    const float3 inner = away - offset, outer = away + offset;
+    const float inner2 = square(inner.x) + square(inner.y) + square(max(fabs(inner.z) - halfRow, 0.0f)),
+                outer2 = square(outer.x) + square(outer.y) + square(max(fabs(outer.z) - halfRow, 0.0f));
+    return min(inner2, outer2) < square(columns[RADIUS * stride] + ballReach) &&
+           fabs(dot(away, normal)) < columns[THICKNESS * stride] + slabReach + halfRow * fabs(normal.z);
+}
+
+// Applies all groups that reach the block to the row of this item.
+void applyAll(const Input* input, SHARED uint* page, SHARED uint* count, Found* found) {
+    const float3 first = input->near.inBrick + cornerOf(0);
+    const Voxels voxels = voxelsOf(first);
+    for (uint next = input->near.range.x; next < input->near.range.y;) {
+        next = turnPage(&input->near, next, page, count);
+        uint list[PAGE], listed = 0;
+        for (uint i = 0; i < *count; ++i)
+            if (reachesRow(input, page[i], first + (float3)(0, 0, 0.5f * (BLOCK_SIDE - 1)))) list[listed++] = page[i];
+        applyGroups(input, &voxels, list, listed, found);
+    }
+}
+
+#else
+
 // Distance from the middle of a side to beyond its end, squared.
 Lanes outsideOf(Lanes middle, float halfSide) {
     return squareLanes(max(fabs(middle) - halfSide, (Lanes)(0.0f)));
 }
 
-#if ITEMS > 1
-
-// Which groups of a page reach the row of this item.
-uint listGroups(const Input* input, SHARED const uint* page, uint count, ushort (*lists)[PAGE], uint* counts) {
-    const Groups* groups = &input->near.groups;
-    const uint stride = groups->stride;
-    const float slabReach = (float)(input->near.reach), ballReach = PAPER_CUBE ? slabReach : input->layers.certain;
-    const float halfRow = 0.5f * (BLOCK_SIDE - 1);
-    const float3 middle = input->near.inBrick + convert_float3(cornerOf(0)) + (float3)(0, 0, halfRow);
-    uint listed = 0;
-    for (uint i = 0; i < count; ++i) {
-        const uint g = page[i];
-        global const float* columns = groups->columns + g;
-        const float3 away = placeOf(groups, g) - middle, offset = PAPER_CUBE ? 0 : offsetOf(groups, g);
-        const float3 inner = away - offset, outer = away + offset;
-        const float reach = columns[RADIUS * stride] + ballReach, slab = columns[THICKNESS * stride] + slabReach;
-        const float inner2 = square(inner.x) + square(inner.y) + square(max(fabs(inner.z) - halfRow, 0.0f)),
-                    outer2 = square(outer.x) + square(outer.y) + square(max(fabs(outer.z) - halfRow, 0.0f));
-        const float3 normal =
-            (float3)(columns[NORMAL_X * stride], columns[NORMAL_Y * stride], columns[NORMAL_Z * stride]);
-        if (min(inner2, outer2) < square(reach) && fabs(dot(away, normal)) < slab + halfRow * fabs(normal.z))
-            lists[0][listed++] = (ushort)(i);
-    }
-    counts[0] = listed;
-    return listed;
+// A column of some groups.
+Lanes columnOf(const Groups* groups, int column, const uint* which) {
+    global const float* all = groups->columns + column * groups->stride;
+    float some[LANES];
+    for (int lane = 0; lane < LANES; ++lane) some[lane] = all[which[lane]];
+    return vloadLanes(0, some);
 }
-
-#else
 
 // Which groups of a page reach each cube: the balls around their inner or outer samples must, and their slab. A vector
 // of groups at a time, with what cubes have in common worked out once.
-uint listGroups(const Input* input, SHARED const uint* page, uint count, ushort (*lists)[PAGE], uint* counts) {
+void listGroups(const Input* input, const uint* page, uint count, uint (*lists)[PAGE], uint* counts) {
     const Groups* groups = &input->near.groups;
     const float slabReach = input->near.reach, ballReach = PAPER_CUBE ? slabReach : input->layers.certain;
-    const float halfCube = 0.5f * (CUBE_SIDE - 1);
+    const float halfCube = 0.5f * (SLICES - 1);
+    const float inBrick[3] = {input->near.inBrick.x, input->near.inBrick.y, input->near.inBrick.z};
     for (int cube = 0; cube < CUBES; ++cube) counts[cube] = 0;
     for (uint i = 0; i < count; i += LANES) {
-        float values[ALL_COLUMNS][LANES];
-        const uint some = min(count - i, (uint)(LANES));
-        for (uint lane = 0; lane < some; ++lane) {
-            global const float* columns = groups->columns + page[i + lane];
-            for (int column = 0; column < ALL_COLUMNS; ++column)
-                values[column][lane] = columns[column * groups->stride];
-        }
+        const uint* which = page + i;
+        const uint some = count - i < LANES ? (1u << (count - i)) - 1 : (1u << LANES) - 1;
         Lanes toInner2[3][2], toOuter2[3][2], height[3][2];
-        Lanes slab = vloadLanes(0, values[THICKNESS]) + slabReach;
+        Lanes slab = columnOf(groups, THICKNESS, which) + slabReach;
         for (int axis = 0; axis < 3; ++axis) {
-            const Lanes place = vloadLanes(0, values[PLACE_X + axis]) - ((const float*)(&input->near.inBrick))[axis],
-                        offset = PAPER_CUBE ? (Lanes)(0.0f) : vloadLanes(0, values[OFFSET_X + axis]),
-                        normal = vloadLanes(0, values[NORMAL_X + axis]);
+            const Lanes place = columnOf(groups, PLACE_X + axis, which) - inBrick[axis],
+                        offset = PAPER_CUBE ? (Lanes)(0.0f) : columnOf(groups, OFFSET_X + axis, which),
+                        normal = columnOf(groups, NORMAL_X + axis, which);
             for (int side = 0; side < 2; ++side) {
-                const float middle = (float)(side * CUBE_SIDE) + halfCube;
+                const float middle = (float)(side * SLICES) + halfCube;
                 toInner2[axis][side] = outsideOf(middle - (place - offset), halfCube);
                 toOuter2[axis][side] = outsideOf(middle - (place + offset), halfCube);
                 height[axis][side] = (middle - place) * normal;
             }
             slab += halfCube * fabs(normal);
         }
-        const Lanes reach2 = squareLanes(vloadLanes(0, values[RADIUS]) + ballReach);
+        const Lanes reach2 = squareLanes(columnOf(groups, RADIUS, which) + ballReach);
         for (int cube = 0; cube < CUBES; ++cube) {
             const int a = cube / 4, b = cube / 2 % 2, c = cube % 2;
             const Lanes inner2 = toInner2[0][a] + toInner2[1][b] + toInner2[2][c],
@@ -319,14 +328,28 @@ uint listGroups(const Input* input, SHARED const uint* page, uint count, ushort 
             const IntLanes reaches =
                 (min(inner2, outer2) < reach2) & (fabs(height[0][a] + height[1][b] + height[2][c]) < slab);
             uint listed = counts[cube];
-            for (uint bits = bitsOf(reaches) & ((1u << some) - 1); bits != 0; bits &= bits - 1)
-                lists[cube][listed++] = (ushort)(i + (uint)(lowestBit(bits)));
+            for (uint bits = bitsOf(reaches) & some; bits != 0; bits &= bits - 1)
+                lists[cube][listed++] = which[lowestBit(bits)];
             counts[cube] = listed;
         }
     }
-    uint any = 0;
-    for (int cube = 0; cube < CUBES; ++cube) any |= counts[cube];
-    return any;
+}
+
+// Applies all groups that reach the block to its cubes.
+void applyAll(const Input* input, SHARED uint* page, SHARED uint* count, Found* found) {
+    uint lists[CUBES][PAGE], counts[CUBES];
+    for (uint next = input->near.range.x; next < input->near.range.y;) {
+        next = turnPage(&input->near, next, page, count);
+        for (int lane = 0; lane < LANES; ++lane) page[*count + lane] = input->near.range.x;  // any group
+        listGroups(input, page, *count, lists, counts);
+        for (int cube = 0; cube < CUBES; ++cube) {
+            if (counts[cube] == 0) continue;
+            const Voxels voxels = voxelsOf(input->near.inBrick + cornerOf(cube));
+            Found own = found[cube];  // in registers
+            applyGroups(input, &voxels, lists[cube], counts[cube], &own);
+            found[cube] = own;
+        }
+    }
 }
 
 #endif
@@ -343,8 +366,8 @@ Lanes combine(const Found* found, int slice, const Layers* layers, IntLanes* kno
 }
 
 // Writes a slice of a cube into its block.
-void putFloats(Lanes values, int3 at, global float* block) {
-    global float* corner = block + (at.x * BLOCK_SIDE + at.y) * BLOCK_SIDE + at.z;
+void putFloats(Lanes values, float3 at, global float* block) {
+    global float* corner = block + (int)((at.x * BLOCK_SIDE + at.y) * BLOCK_SIDE + at.z);
 #if ITEMS > 1
     vstore8(values, 0, corner);
 #else
@@ -363,7 +386,7 @@ GROUP_KERNEL void fillBlocks(Grid grid, global const uint* cellOfBrick, uint fir
                              global const Run* runs, global float* groupColumns, global uint* groupBegins, uint stride,
                              global const uint2* ranges, Layers layers, global int* origins, global float* distances,
                              global int* nearestTriangles, global uint* counters) {
-    SHARED uint page[PAGE], count, slot, anyKnown;
+    SHARED uint page[PAGE + LANES], count, slot, anyKnown;
     const Groups groups = {groupColumns, groupBegins, stride};
     const Input input = {nearBlock(&grid, &groups, cellOfBrick, firstBrick, ranges), samples, runs, layers};
     if (input.near.range.x >= input.near.range.y) return;
@@ -371,31 +394,19 @@ GROUP_KERNEL void fillBlocks(Grid grid, global const uint* cellOfBrick, uint fir
     Found found[CUBES];
     const float farthest2 = square(layers.certain) - square(layers.delta);
     for (int cube = 0; cube < CUBES; ++cube)
-        for (int i = 0; i < SLICES; ++i) {
+        UNROLLED for (int i = 0; i < SLICES; ++i) {
             found[cube].inner2[i] = found[cube].outer2[i] = farthest2;
 #if TRIANGLES
             found[cube].innerOwner[i] = found[cube].outerOwner[i] = -1;
 #endif
         }
-    ushort lists[CUBES][PAGE];
-    uint counts[CUBES];
-    uint next = input.near.range.x;
-    do {
-        next = turnPage(&input.near, next, page, &count);
-        if (listGroups(&input, page, count, lists, counts) == 0) continue;
-        for (int cube = 0; cube < CUBES; ++cube) {
-            const Voxels voxels = voxelsOf(input.near.inBrick + convert_float3(cornerOf(cube)));
-            Found own = found[cube];  // in registers
-            applyGroups(&input, &voxels, page, lists[cube], counts[cube], &own);
-            found[cube] = own;
-        }
-    } while (next < input.near.range.y);
+    applyAll(&input, page, &count, found);
 
     if (ITEM == 0) anyKnown = 0;
     MEET;
     uint known = 0;
     for (int cube = 0; cube < CUBES; ++cube)
-        for (int i = 0; i < SLICES; ++i) {
+        UNROLLED for (int i = 0; i < SLICES; ++i) {
             IntLanes knownLanes;
             combine(&found[cube], i, &layers, &knownLanes);
             known |= (uint)(anyLane(knownLanes));
@@ -409,8 +420,8 @@ GROUP_KERNEL void fillBlocks(Grid grid, global const uint* cellOfBrick, uint fir
     }
     MEET;
     for (int cube = 0; cube < CUBES; ++cube)
-        for (int i = 0; i < SLICES; ++i) {
-            const int3 at = cornerOf(cube) + (int3)(i, 0, 0);
+        UNROLLED for (int i = 0; i < SLICES; ++i) {
+            const float3 at = cornerOf(cube) + (float3)((float)(i), 0, 0);
             IntLanes knownLanes;
             putFloats(combine(&found[cube], i, &layers, &knownLanes), at,
                       distances + (size_t)(slot)*BLOCK_VOXELS);

@@ -2,7 +2,9 @@
 #include "vectors.cl"
 
 // Groups near a block that are looked at in one go.
+#ifndef PAGE
 #define PAGE 1024
+#endif
 // Rounding of a group's own numbers, and of where it lies to a block [voxels].
 #define GROUP_SLACK 1e-4f
 #define BIN_SLACK 1e-3f

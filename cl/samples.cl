@@ -78,65 +78,60 @@ void quarter(Tiles* tiles, const Limits* limits, const Tile* tile) {
     wait(tiles, limits, cornersFrom(t->a, ab, ca), area, longest2);
 }
 
-// Rows of samples that Algorithm 1, or Fig. 2 of the paper, gives a tile; 0 if it is cut instead.
-int rowsOf(Tiles* tiles, const Sampling* sampling, const Limits* limits, const Tile* tile) {
+// Rows of samples that Algorithm 1, or Fig. 2 of the paper, gives a part of a triangle; 0 if it must be cut.
+int rowsOf(const Sampling* sampling, double area, double longest2) {
     const double epsilon = sampling->epsilon, sliver2 = SLIVER_STEP * SLIVER_STEP * epsilon;
-    if (sampling->recursive) {
-        const bool isSliver = sampling->fillGaps && tile->longest2 > sliver2;
-        if (tile->area <= epsilon && !isSliver) return 1;
-        if (tile->area <= 2 * epsilon)
-            halve(tiles, limits, tile);
-        else
-            quarter(tiles, limits, tile);
-        return 0;
-    }
-    const double n = max(1.0, ceil(sqrt(tile->area / epsilon)));
-    if (sampling->fillGaps && tile->longest2 > sliver2 * n * n) {
+    if (sampling->recursive) return area <= epsilon && !(sampling->fillGaps && longest2 > sliver2) ? 1 : 0;
+    const double n = max(1.0, ceil(sqrt(area / epsilon))), most = sampling->maxSubdivision;
+    if (sampling->fillGaps && (longest2 > sliver2 * n * n || n > most)) return 0;
+    return (int)(min(n, most));
+}
+
+void cutTile(Tiles* tiles, const Sampling* sampling, const Limits* limits, const Tile* tile) {
+    const double epsilon = sampling->epsilon, n2 = ceil(sqrt(tile->area / epsilon)) * ceil(sqrt(tile->area / epsilon));
+    const bool isSliver = tile->longest2 > SLIVER_STEP * SLIVER_STEP * epsilon * max(1.0, n2);
+    if (sampling->recursive ? tile->area <= 2 * epsilon : isSliver)
         halve(tiles, limits, tile);
-        return 0;
-    }
-    if (sampling->fillGaps && n > sampling->maxSubdivision) {
+    else
         quarter(tiles, limits, tile);
-        return 0;
-    }
-    return (int)(min(n, (double)(sampling->maxSubdivision)));
 }
 
 // Takes the next tile that is to be sampled, and its rows; 0 if there is none left.
 int nextTile(Tiles* tiles, const Sampling* sampling, const Limits* limits, Tile* tile) {
     while (tiles->count > 0) {
         *tile = tiles->waiting[--tiles->count];
-        const int rows = rowsOf(tiles, sampling, limits, tile);
+        const int rows = rowsOf(sampling, tile->area, tile->longest2);
         if (rows > 0) return rows;
+        cutTile(tiles, sampling, limits, tile);
     }
     return 0;
 }
 
-// The normal of a triangle, twice its area long, and the tiles to begin with: none for one without area.
-double3 beginTiles(Tiles* tiles, const Corners* t) {
-    const double3 normal = cross(t->b - t->a, t->c - t->a);
-    const double size = length(normal);
-    tiles->waiting[0].corners = *t;
-    tiles->waiting[0].area = 0.5 * size;
-    tiles->waiting[0].longest2 = longestEdge2(t);
-    tiles->count = size > 0 ? 1 : 0;
-    return normal;
+Tile wholeTile(const Corners* t, double3 normal) {
+    const Tile tile = {*t, 0.5 * length(normal), longestEdge2(t)};
+    return tile;
+}
+
+double3 normalOf(const Corners* t) {
+    return cross(t->b - t->a, t->c - t->a);
 }
 
 bool isOnePart(const Grid* grid, const Corners* t) {
     const double epsilon = grid->sampling.epsilon;
-    return 0.5 * length(cross(t->b - t->a, t->c - t->a)) <= epsilon &&
-           longestEdge2(t) <= SLIVER_STEP * SLIVER_STEP * epsilon;
+    return 0.5 * length(normalOf(t)) <= epsilon && longestEdge2(t) <= SLIVER_STEP * SLIVER_STEP * epsilon;
 }
 
 // A part is a sample here.
 uint countParts(const Grid* grid, const Corners* t, const Limits* limits) {
+    const Tile whole = wholeTile(t, normalOf(t));
+    int rows = rowsOf(&grid->sampling, whole.area, whole.longest2);
+    if (rows > 0) return (uint)(rows * (rows + 1) / 2);
     Tiles tiles;
     Tile tile;
-    beginTiles(&tiles, t);
+    tiles.waiting[0] = whole;
+    tiles.count = 1;
     uint count = 0;
-    for (int rows; (rows = nextTile(&tiles, &grid->sampling, limits, &tile)) > 0;)
-        count += (uint)(rows * (rows + 1) / 2);
+    while ((rows = nextTile(&tiles, &grid->sampling, limits, &tile)) > 0) count += (uint)(rows * (rows + 1) / 2);
     return count;
 }
 
@@ -249,6 +244,16 @@ Exact3 crossExact(Exact3 a, Exact3 b) {
     return v;
 }
 
+// Samples a triangle that must be cut.
+void cutLarge(Cut* cut, const Grid* grid, uint triangle, const Tile* whole, double3 normal, const Limits* limits) {
+    Tiles tiles;
+    Tile tile;
+    tiles.waiting[0] = *whole;
+    tiles.count = 1;
+    for (int rows; (rows = nextTile(&tiles, &grid->sampling, limits, &tile)) > 0;)
+        addTile(cut, triangle, &tile.corners, rows, normal);
+}
+
 // Samples the triangles of a list.
 void cutTriangles(Cut* cut, const Grid* grid, global const float* points, global const uint* triangles,
                   global const uint* list, uint begin, uint end, const Limits* limits) {
@@ -266,11 +271,13 @@ void cutTriangles(Cut* cut, const Grid* grid, global const float* points, global
         for (uint rest = some & ~singles; rest != 0; rest &= rest - 1) {
             const uint triangle = batch.triangle[lowestBit(rest)];
             const Corners t = cornersOf(points, triangles, triangle, grid->voxelsPerUnit);
-            Tiles tiles;
-            Tile tile;
-            const double3 outward = beginTiles(&tiles, &t);
-            for (int rows; (rows = nextTile(&tiles, &grid->sampling, limits, &tile)) > 0;)
-                addTile(cut, triangle, &tile.corners, rows, outward);
+            const double3 outward = normalOf(&t);
+            const Tile whole = wholeTile(&t, outward);
+            int rows = rowsOf(&grid->sampling, whole.area, whole.longest2);
+            if (rows > 0)
+                addTile(cut, triangle, &t, rows, outward);
+            else
+                cutLarge(cut, grid, triangle, &whole, outward, limits);
         }
     }
 }
