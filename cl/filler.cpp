@@ -13,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include "cl/prism.h"
 #include "cl/program.h"
 #include "sdf/bricks.h"
 #include "sdf/progress.h"
@@ -295,6 +296,7 @@ void Fill::finish(Batch& batch) {
 BlockFiller openclFiller(const Device& device, const OpenclOptions& options) {
     return {"opencl", device.info().name, [device, options](const FillJob& job) {
                 try {
+                    if (job.options.method == Method::prism) return fillPrism(device.impl(), options, job);
                     const Tiles tiles = makeTiles(job.mesh.mesh, job.options);
                     const Bricks bricks = binBricks(tiles, job.layers.reach);
                     job.mesh.progress.begin(bricks.count());
