@@ -335,3 +335,10 @@ TEST_CASE("a cancelled build of prisms leaves the device usable") {
     options.progress = nullptr;
     checkSame(expected, build(mesh, options, filler));
 }
+
+TEST_CASE("without a device there are no prisms") {
+    const Mesh mesh = shapes::sphere(1.f, 2);
+    const BuildOptions options = optionsFor(mesh, 20);
+    CHECK_THROWS_WITH(build(mesh, options), Contains("prism") && Contains("OpenCL"));
+    CHECK_THROWS_WITH(rebuild(built(mesh, options), mesh, mesh, {}, options), Contains("prism") && Contains("OpenCL"));
+}
