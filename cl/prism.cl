@@ -20,13 +20,22 @@
 
 // Prism of cl/prism_bins.h.
 typedef struct {
-    float u[3], w[3], n[3];
-    float origin[3];
+    float u[3], n[3], origin[3];
     float lower[3], upper[3];
-    float corner[3][2], along[3][2], length[3];
+    float length, apex[2];
     float lean[3][2];
     int triangle;
 } Prism;
+
+// A prism in the voxels of a block, with all that the rows ask for. Edge k of the triangle starts at corner k.
+typedef struct {
+    float3 u, w, n, origin;
+    float lower[2], upper[2];  // in x and y
+    float2 corner[3], along[3];
+    float length[3];
+    float2 lean[3];
+    int triangle;
+} Scanned;
 
 // The rows of 8 voxels along z of one work-item: squared distances, negative inside, and whose they are.
 typedef struct {
@@ -47,32 +56,47 @@ void clear(Rows* rows) {
     }
 }
 
-// A prism in the voxels of a block, whose first one is at `place` in the brick.
-void moveInto(Prism* prism, float3 place) {
-    prism->origin[0] += dot(toFloat3(prism->u), place);
-    prism->origin[1] += dot(toFloat3(prism->w), place);
-    prism->origin[2] += dot(toFloat3(prism->n), place);
-    prism->lower[0] -= place.x, prism->lower[1] -= place.y, prism->lower[2] -= place.z;
-    prism->upper[0] -= place.x, prism->upper[1] -= place.y, prism->upper[2] -= place.z;
+// A prism, for a block whose first voxel is at `place` in the brick.
+Scanned scanned(Prism prism, float3 place) {
+    Scanned s;
+    s.u = toFloat3(prism.u);
+    s.n = toFloat3(prism.n);
+    s.w = cross(s.n, s.u);
+    s.origin = toFloat3(prism.origin) + (float3)(dot(s.u, place), dot(s.w, place), dot(s.n, place));
+    s.lower[0] = prism.lower[0] - place.x, s.upper[0] = prism.upper[0] - place.x;
+    s.lower[1] = prism.lower[1] - place.y, s.upper[1] = prism.upper[1] - place.y;
+    s.corner[0] = (float2)(0.0f, 0.0f);
+    s.corner[1] = (float2)(prism.length, 0.0f);
+    s.corner[2] = (float2)(prism.apex[0], prism.apex[1]);
+    for (int k = 0; k < 3; ++k) {
+        const float2 edge = s.corner[(k + 1) % 3] - s.corner[k];
+        s.length[k] = sqrt(edge.x * edge.x + edge.y * edge.y);
+        s.along[k] = edge / s.length[k];
+        s.lean[k] = (float2)(prism.lean[k][0], prism.lean[k][1]);
+    }
+    s.triangle = prism.triangle;
+    return s;
 }
 
 // Scans a row of voxels, the first of which is at (x, y, 0). The first triangle of equally near ones stays.
-void scanRow(Rows* rows, int row, const Prism* prism, float x, float y, float reach) {
+void scanRow(Rows* rows, int row, const Scanned* prism, float x, float y, float reach) {
     const float8 z = (float8)(0, 1, 2, 3, 4, 5, 6, 7);
-    const float8 u = prism->origin[0] + prism->u[0] * x + prism->u[1] * y + prism->u[2] * z,
-                 w = prism->origin[1] + prism->w[0] * x + prism->w[1] * y + prism->w[2] * z,
-                 h = prism->origin[2] + prism->n[0] * x + prism->n[1] * y + prism->n[2] * z;
+    const float8 u = prism->origin.x + prism->u.x * x + prism->u.y * y + prism->u.z * z,
+                 w = prism->origin.y + prism->w.x * x + prism->w.y * y + prism->w.z * z,
+                 h = prism->origin.z + prism->n.x * x + prism->n.y * y + prism->n.z * z;
     float8 within[3];  // how far on the triangle's side of each edge
     int8 held = fabs(h) <= reach, overFace = (int8)(-1);
     for (int k = 0; k < 3; ++k) {
-        within[k] = prism->along[k][0] * (w - prism->corner[k][1]) - prism->along[k][1] * (u - prism->corner[k][0]);
-        held &= prism->lean[k][0] * within[k] + prism->lean[k][1] * h >= -overlap;
+        const float2 corner = prism->corner[k], along = prism->along[k], lean = prism->lean[k];
+        within[k] = along.x * (w - corner.y) - along.y * (u - corner.x);
+        held &= lean.x * within[k] + lean.y * h >= -overlap;
         overFace &= within[k] >= 0.0f;
     }
     if (!any(held)) return;
     float8 beside2 = (float8)(INFINITY);
     for (int k = 0; k < 3; ++k) {
-        const float8 s = prism->along[k][0] * (u - prism->corner[k][0]) + prism->along[k][1] * (w - prism->corner[k][1]),
+        const float2 corner = prism->corner[k], along = prism->along[k];
+        const float8 s = along.x * (u - corner.x) + along.y * (w - corner.y),
                      beyond = s - clamp(s, 0.0f, prism->length[k]);
         beside2 = min(beside2, beyond * beyond + within[k] * within[k]);
     }
@@ -100,7 +124,7 @@ void store(const Rows* rows, size_t place, float reach, global float* distances,
 kernel __attribute__((reqd_work_group_size(64, 1, 1))) void fillBlocks(
     global const Prism* prisms, global const int* places, global const uint* offsets, global const uint* reaching,
     float reach, global float* distances, global int* triangles) {
-    local Prism staged[64];
+    local Scanned staged[64];
     Rows rows;
     clear(&rows);
     const size_t block = get_group_id(0), item = get_local_id(0);
@@ -111,16 +135,12 @@ kernel __attribute__((reqd_work_group_size(64, 1, 1))) void fillBlocks(
     for (uint begin = offsets[block]; begin < end; begin += 64) {
         const uint count = min(end - begin, 64u);
         barrier(CLK_LOCAL_MEM_FENCE);
-        if (item < count) {
-            Prism prism = prisms[reaching[begin + item]];
-            moveInto(&prism, place);
-            staged[item] = prism;
-        }
+        if (item < count) staged[item] = scanned(prisms[reaching[begin + item]], place);
         barrier(CLK_LOCAL_MEM_FENCE);
         for (uint i = 0; i < count; ++i) {
             if (x < staged[i].lower[0] || x > staged[i].upper[0] || y < staged[i].lower[1] || y > staged[i].upper[1])
                 continue;
-            const Prism prism = staged[i];
+            const Scanned prism = staged[i];
             scanRow(&rows, 0, &prism, x, y, reach);
         }
     }
@@ -130,7 +150,7 @@ kernel __attribute__((reqd_work_group_size(64, 1, 1))) void fillBlocks(
 #else
 
 // Scans the slices of a block, and in each the rows, that the box around a prism meets.
-void scan(Rows* rows, const Prism* prism, float reach) {
+void scan(Rows* rows, const Scanned* prism, float reach) {
     const int x0 = max((int)(ceil(prism->lower[0])), 0), x1 = min((int)(floor(prism->upper[0])), 7),
               y0 = max((int)(ceil(prism->lower[1])), 0), y1 = min((int)(floor(prism->upper[1])), 7);
     for (int x = x0; x <= x1; ++x)
@@ -144,8 +164,7 @@ kernel void fillBlocks(global const Prism* prisms, global const int* places, glo
     const size_t block = get_global_id(0);
     const float3 place = convert_float3(vload3(block, places));
     for (uint i = offsets[block]; i < offsets[block + 1]; ++i) {
-        Prism prism = prisms[reaching[i]];
-        moveInto(&prism, place);
+        const Scanned prism = scanned(prisms[reaching[i]], place);
         scan(&rows, &prism, reach);
     }
     store(&rows, block * 64, reach, distances, triangles);

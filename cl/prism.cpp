@@ -56,27 +56,16 @@ Load loadOf(const PrismBlocks& blocks) {
 }
 
 struct Batch {
-    std::vector<std::size_t> begins;  // the first block of each brick, and the end of the last
+    std::vector<Load> begins;         // what comes before each brick, and in all
     std::vector<glm::ivec3> origins;  // of blocks
-    std::vector<Prism> prisms;
-    std::vector<glm::ivec3> places;
-    std::vector<cl_uint> offsets, reaching;
-    Load capacity;  // of the buffers
+    Load capacity;                    // of the buffers
     cl::Buffer prismBuffer, placeBuffer, offsetBuffer, reachingBuffer, distanceBuffer, triangleBuffer;
     const float* distances = nullptr;         // mapped once `filled` has happened
     const std::int32_t* triangles = nullptr;  // likewise
     cl::Event filled;
 
     std::size_t bricks() const { return begins.empty() ? 0 : begins.size() - 1; }
-    Load load() const { return {places.size(), prisms.size(), reaching.size()}; }
-    void clear() {
-        begins.assign(1, 0);
-        origins.clear();
-        prisms.clear();
-        places.clear();
-        offsets.assign(1, 0);
-        reaching.clear();
-    }
+    Load load() const { return begins.back(); }
 };
 
 std::string mebibytes(std::uint64_t bytes) {
@@ -102,9 +91,10 @@ class Fill {
     void prepare(std::size_t first, std::size_t last);
     bool fits(const Load& load) const;
     std::size_t lastFitting(std::size_t first) const;
-    void gather(Batch& batch, std::size_t first, std::size_t last) const;
+    void take(Batch& batch, std::size_t first, std::size_t last) const;
     void reserve(Batch& batch) const;
-    void start(Batch& batch);
+    std::vector<cl::Event> upload(Batch& batch, std::size_t first);
+    void start(Batch& batch, std::size_t first);
     void finish(Batch& batch);
 
     Device::Impl& device_;
@@ -114,6 +104,7 @@ class Fill {
     const bool rowPerItem_;
     const std::uint64_t budget_;  // for everything [bytes]
     cl::Kernel kernel_;
+    cl::CommandQueue uploads_;         // beside the device's own, so that a batch goes up while another is filled
     std::vector<PrismBlocks> window_;  // the bricks from firstPrepared_ on
     std::size_t firstPrepared_ = 0;
     std::array<Batch, batchesInFlight> batches_;
@@ -128,11 +119,13 @@ Fill::Fill(Device::Impl& device, const OpenclOptions& options, const PrismJob& j
       rowPerItem_(options.mapping == KernelMapping::automatic ? device.info.gpu
                                                               : options.mapping == KernelMapping::rowPerItem),
       budget_(options.memoryMiB > 0 ? options.memoryMiB * mebibyte : device.info.memoryBytes / 4 * 3),
-      kernel_(buildProgram(device, prism_cl, buildOptions(device, rowPerItem_, mesh.triangles)), "fillBlocks") {}
+      kernel_(buildProgram(device, prism_cl, buildOptions(device, rowPerItem_, mesh.triangles)), "fillBlocks"),
+      uploads_(device.context, device.device) {}
 
 // Commands in flight use the memory of the batches: they must have ended, whatever else went wrong.
 Fill::~Fill() {
     try {
+        uploads_.finish();
         device_.queue.finish();
     } catch (const cl::Error&) {
     }
@@ -147,8 +140,8 @@ void Fill::run() {
             to = lastFitting(from);
             Batch& batch = batches_[turn++ % batchesInFlight];
             finish(batch);
-            gather(batch, from, to);
-            start(batch);
+            take(batch, from, to);
+            start(batch, from);
         }
     }
     for (std::size_t i = 0; i < batchesInFlight; ++i) finish(batches_[turn++ % batchesInFlight]);
@@ -188,21 +181,14 @@ std::size_t Fill::lastFitting(std::size_t first) const {
     return last;
 }
 
-// Joins the bricks' prisms and blocks.
-void Fill::gather(Batch& batch, std::size_t first, std::size_t last) const {
-    batch.clear();
+// Notes what a batch is to hold: the bricks' blocks.
+void Fill::take(Batch& batch, std::size_t first, std::size_t last) const {
+    batch.begins.assign(1, {});
     for (std::size_t brick = first; brick < last; ++brick) {
         const PrismBlocks& blocks = window_[brick - firstPrepared_];
-        const auto firstPrism = cl_uint(batch.prisms.size()), firstEntry = cl_uint(batch.reaching.size());
-        batch.prisms.insert(batch.prisms.end(), blocks.prisms.begin(), blocks.prisms.end());
-        batch.places.insert(batch.places.end(), blocks.places.begin(), blocks.places.end());
         std::transform(blocks.places.begin(), blocks.places.end(), std::back_inserter(batch.origins),
                        [&](const glm::ivec3& place) { return bins_.origins[brick] + place; });
-        std::transform(blocks.offsets.begin() + 1, blocks.offsets.end(), std::back_inserter(batch.offsets),
-                       [&](cl_uint offset) { return firstEntry + offset; });
-        std::transform(blocks.reaching.begin(), blocks.reaching.end(), std::back_inserter(batch.reaching),
-                       [&](cl_uint prism) { return firstPrism + prism; });
-        batch.begins.push_back(batch.origins.size());
+        batch.begins.push_back(batch.begins.back() + loadOf(blocks));
     }
 }
 
@@ -224,18 +210,42 @@ void Fill::reserve(Batch& batch) const {
     if (mesh_.triangles) batch.triangleBuffer = buffer(CL_MEM_WRITE_ONLY, batch.capacity.resultBytes());
 }
 
+// Joins the bricks' prisms and lists right where the device, or its driver, wants them.
+std::vector<cl::Event> Fill::upload(Batch& batch, std::size_t first) {
+    const Load load = batch.load();
+    const auto mapped = [&](const cl::Buffer& buffer, std::uint64_t bytes) {
+        return uploads_.enqueueMapBuffer(buffer, CL_TRUE, CL_MAP_WRITE_INVALIDATE_REGION, 0, bytes);
+    };
+    auto* const prisms = static_cast<Prism*>(mapped(batch.prismBuffer, load.prismBytes()));
+    auto* const places = static_cast<glm::ivec3*>(mapped(batch.placeBuffer, load.placeBytes()));
+    auto* const offsets = static_cast<cl_uint*>(mapped(batch.offsetBuffer, load.offsetBytes()));
+    auto* const reaching = static_cast<cl_uint*>(mapped(batch.reachingBuffer, load.entryBytes()));
+    offsets[0] = 0;
+    tbb::parallel_for(std::size_t(0), batch.bricks(), [&](std::size_t brick) {
+        const Load& begin = batch.begins[brick];
+        const PrismBlocks& blocks = window_[first + brick - firstPrepared_];
+        std::copy(blocks.prisms.begin(), blocks.prisms.end(), prisms + begin.prisms);
+        std::copy(blocks.places.begin(), blocks.places.end(), places + begin.blocks);
+        std::transform(blocks.offsets.begin() + 1, blocks.offsets.end(), offsets + begin.blocks + 1,
+                       [&](cl_uint offset) { return cl_uint(begin.entries) + offset; });
+        std::transform(blocks.reaching.begin(), blocks.reaching.end(), reaching + begin.entries,
+                       [&](cl_uint prism) { return cl_uint(begin.prisms) + prism; });
+    });
+    std::vector<cl::Event> uploaded(4);
+    uploads_.enqueueUnmapMemObject(batch.prismBuffer, prisms, nullptr, &uploaded[0]);
+    uploads_.enqueueUnmapMemObject(batch.placeBuffer, places, nullptr, &uploaded[1]);
+    uploads_.enqueueUnmapMemObject(batch.offsetBuffer, offsets, nullptr, &uploaded[2]);
+    uploads_.enqueueUnmapMemObject(batch.reachingBuffer, reaching, nullptr, &uploaded[3]);
+    uploads_.flush();
+    return uploaded;
+}
+
 // Sends a batch on its way: prisms and lists up, kernel, distances down.
-void Fill::start(Batch& batch) {
-    const std::size_t blocks = batch.places.size();
+void Fill::start(Batch& batch, std::size_t first) {
+    const std::size_t blocks = batch.origins.size();
     if (blocks == 0) return;
     reserve(batch);
-    const auto write = [&](const cl::Buffer& buffer, const auto& data) {
-        device_.queue.enqueueWriteBuffer(buffer, CL_FALSE, 0, data.size() * sizeof data[0], data.data());
-    };
-    write(batch.prismBuffer, batch.prisms);
-    write(batch.placeBuffer, batch.places);
-    write(batch.offsetBuffer, batch.offsets);
-    write(batch.reachingBuffer, batch.reaching);
+    const std::vector<cl::Event> uploaded = upload(batch, first);
 
     cl_uint argument = 0;
     for (const cl::Buffer* buffer :
@@ -245,7 +255,8 @@ void Fill::start(Batch& batch) {
     kernel_.setArg(argument++, batch.distanceBuffer);
     kernel_.setArg(argument++, batch.triangleBuffer);
     const std::size_t items = rowPerItem_ ? itemsPerBlock : 1;
-    device_.queue.enqueueNDRangeKernel(kernel_, cl::NullRange, cl::NDRange(blocks * items), cl::NDRange(items));
+    device_.queue.enqueueNDRangeKernel(kernel_, cl::NullRange, cl::NDRange(blocks * items), cl::NDRange(items),
+                                       &uploaded);
 
     // mapping copies nothing where the memory is shared
     const auto mapped = [&](const cl::Buffer& buffer) {
@@ -262,7 +273,7 @@ void Fill::finish(Batch& batch) {
     const bool filled = !batch.origins.empty();
     if (filled) batch.filled.wait();
     tbb::parallel_for(std::size_t(0), batch.bricks(), [&](std::size_t brick) {
-        const std::size_t begin = batch.begins[brick], count = batch.begins[brick + 1] - begin;
+        const std::size_t begin = batch.begins[brick].blocks, count = batch.begins[brick + 1].blocks - begin;
         const auto values = [&](const auto* all) { return std::span(all + begin * blockVoxels, count * blockVoxels); };
         mesh_.progress.advance();
         if (count > 0)
@@ -274,7 +285,8 @@ void Fill::finish(Batch& batch) {
         if (mesh_.triangles)
             device_.queue.enqueueUnmapMemObject(batch.triangleBuffer, const_cast<std::int32_t*>(batch.triangles));
     }
-    batch.clear();
+    batch.begins.clear();
+    batch.origins.clear();
 }
 
 }  // namespace

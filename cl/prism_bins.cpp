@@ -140,17 +140,13 @@ Box boxOf(const Shape& shape, const Triangle& corners, double reach) {
 Prism rounded(const Shape& shape, const Box& box, std::uint32_t triangle) {
     Prism prism;
     prism.u = glm::vec3(shape.axes[0]);
-    prism.w = glm::vec3(shape.axes[1]);
     prism.n = glm::vec3(shape.axes[2]);
     prism.origin = glm::vec3(shape.inFrame(-shape.start));
     prism.lower = glm::vec3(box.lower);
     prism.upper = glm::vec3(box.upper);
-    for (int k = 0; k < 3; ++k) {
-        prism.corners[k] = glm::vec2(shape.corners[k]);
-        prism.along[k] = glm::vec2(shape.along[k]);
-        prism.lengths[k] = float(shape.lengths[k]);
-        prism.lean[k] = glm::vec2(shape.lean[k]);
-    }
+    prism.length = float(shape.lengths[0]);
+    prism.apex = glm::vec2(shape.corners[2]);
+    for (int k = 0; k < 3; ++k) prism.lean[k] = glm::vec2(shape.lean[k]);
     prism.triangle = std::int32_t(triangle);
     return prism;
 }

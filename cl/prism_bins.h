@@ -20,21 +20,20 @@
 
 namespace bilayer {
 
-/// A prism in the frame of its triangle: corner 0 in the origin, corner 1 along u, corner 2 at w > 0, n to the outside.
+/// A prism in the frame (u, n x u, n) of its triangle, with corner 0 in the origin, corner 1 on u and n to the outside.
 /// Edge k runs from corner k to the next one. Lengths are in voxels, voxels are counted from the first of the brick. As
 /// in prism.cl.
 struct Prism {
-    glm::vec3 u, w, n;       ///< the frame's axes
+    glm::vec3 u, n;          ///< axes
     glm::vec3 origin;        ///< the brick's first voxel, in the frame
-    glm::vec3 lower, upper;  ///< a box around the prism and around all within reach of the triangle
-    glm::vec2 corners[3];    ///< (u, w)
-    glm::vec2 along[3];      ///< edges, of length 1
-    float lengths[3];        ///< of the edges
+    glm::vec3 lower, upper;  ///< a box around the part of the prism within reach of the triangle
+    float length;            ///< of edge 0, the longest
+    glm::vec2 apex;          ///< corner 2, in the frame
     glm::vec2 lean[3];       ///< a point is on this side of edge k if lean.x * (its depth behind the edge) + lean.y *
                              ///< (its height) >= 0; zero where no two triangles share the edge: no plane ends it there
     std::int32_t triangle;   ///< index into Mesh::triangles
 };
-static_assert(sizeof(Prism) == 40 * sizeof(float));
+static_assert(sizeof(Prism) == 25 * sizeof(float));
 
 /// For each edge of each triangle (edge k runs from corner k to the next one) the vertex across it, of the one other
 /// triangle that shares it; `none` where there is no other one, or several. Throws Cancelled.
