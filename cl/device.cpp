@@ -99,7 +99,7 @@ Device openDevice(const std::string& text) {
     impl->device = found.device;
     try {
         impl->context = cl::Context(found.device);
-        impl->queue = cl::CommandQueue(impl->context, found.device);
+        impl->queue = cl::CommandQueue(impl->context, found.device, CL_QUEUE_PROFILING_ENABLE);
     } catch (const cl::Error& error) {
         throw deviceError(error, found.info.name);
     }

@@ -13,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include "cl/brick_filler.h"
 #include "cl/prism.h"
 #include "cl/program.h"
 #include "sdf/bricks.h"
@@ -109,7 +110,7 @@ class Fill {
 };
 
 bool wantsRowPerItem(const Device::Impl& device, KernelMapping mapping) {
-    return mapping == KernelMapping::automatic ? device.info.gpu : mapping == KernelMapping::rowPerItem;
+    return mapping == KernelMapping::automatic ? device.info.gpu : mapping == KernelMapping::groupPerBlock;
 }
 
 std::string buildOptions(const Device::Impl& device, bool rowPerItem, bool triangles) {
@@ -296,6 +297,7 @@ void Fill::finish(Batch& batch) {
 BlockFiller openclFiller(const Device& device, const OpenclOptions& options) {
     return {"opencl", device.info().name, [device, options](const FillJob& job) {
                 try {
+                    if (job.options.method == Method::exact) return fillByBricks(device.impl(), options, job);
                     if (job.options.method == Method::prism) return fillPrism(device.impl(), options, job);
                     const Tiles tiles = makeTiles(job.mesh.mesh, job.options);
                     const Bricks bricks = binBricks(tiles, job.layers.reach);

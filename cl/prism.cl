@@ -3,8 +3,8 @@
 // smallest absolute value; rows of voxels are scanned against the five planes of a prism.
 //
 // Two mappings of blocks of 8x8x8 voxels to work-items, chosen when this text is built:
-//   default          a work-item fills a whole block: for processors, whose vector units take a row of voxels at once
-//   -D ROW_PER_ITEM  a work-group of 64 items fills a block, each item one row of 8 voxels in registers: for GPUs
+//   default             a work-item fills a whole block: for processors, whose vector units take a row of voxels at once
+//   -D GROUP_PER_BLOCK  a work-group of 64 items fills a block, each item one row of 8 voxels in registers: for GPUs
 // -D TRIANGLES=1 also keeps whose distance it is.
 #pragma OPENCL FP_CONTRACT OFF
 
@@ -12,7 +12,7 @@
 #define TRIANGLES 0
 #endif
 
-#ifdef ROW_PER_ITEM
+#ifdef GROUP_PER_BLOCK
 #define ROWS 1
 #else
 #define ROWS 64
@@ -119,7 +119,7 @@ void store(const Rows* rows, size_t place, float reach, global float* distances,
 // Block b has its first voxel at places[3 b] in its brick and the prisms reaching[offsets[b]] .. reaching[offsets[b + 1]],
 // in ascending order. Voxel (x, y, z) of it goes to place (x * 8 + y) * 8 + z of its 512 places. Without TRIANGLES
 // `triangles` is not written.
-#ifdef ROW_PER_ITEM
+#ifdef GROUP_PER_BLOCK
 
 kernel __attribute__((reqd_work_group_size(64, 1, 1))) void fillBlocks(
     global const Prism* prisms, global const int* places, global const uint* offsets, global const uint* reaching,

@@ -13,8 +13,9 @@
 #include <string>
 #include <vector>
 
+#include "cl/memory.h"
 #include "cl/prism_bins.h"
-#include "cl/program.h"
+#include "cl/timing.h"
 #include "sdf/progress.h"
 #include "sdf/triangle_bins.h"
 
@@ -24,7 +25,6 @@ extern const char* const prism_cl;  // the text of prism.cl
 
 namespace {
 
-constexpr std::uint64_t mebibyte = 1 << 20;
 constexpr std::size_t windowBricks = 128;  // prepared at once: a few thousand blocks, enough to keep a large GPU busy
 constexpr std::size_t itemsPerBlock = 64;  // of a row an item; as in the kernel
 constexpr std::size_t batchesInFlight = 2;
@@ -68,14 +68,19 @@ struct Batch {
     Load load() const { return begins.back(); }
 };
 
-std::string mebibytes(std::uint64_t bytes) {
-    return std::to_string((bytes + mebibyte - 1) / mebibyte) + " MiB";
+std::uint64_t budget(const Device::Impl& device, const OpenclOptions& options) {
+    constexpr std::uint64_t mebibyte = 1 << 20;
+    return options.memoryMiB > 0 ? options.memoryMiB * mebibyte : device.info.memoryBytes / 4 * 3;
 }
 
-std::string buildOptions(const Device::Impl& device, bool rowPerItem, bool triangles) {
+bool wantsGroups(const Device::Impl& device, KernelMapping mapping) {
+    return mapping == KernelMapping::automatic ? device.info.gpu : mapping == KernelMapping::groupPerBlock;
+}
+
+std::string buildOptions(const Device::Impl& device, bool groups, bool triangles) {
     std::string options = "-cl-std=CL1.2";
     if (device.info.exactSquareRoots) options += " -cl-fp32-correctly-rounded-divide-sqrt";
-    if (rowPerItem) options += " -D ROW_PER_ITEM";
+    if (groups) options += " -D GROUP_PER_BLOCK";
     if (triangles) options += " -D TRIANGLES=1";
     return options;
 }
@@ -92,7 +97,7 @@ class Fill {
     bool fits(const Load& load) const;
     std::size_t lastFitting(std::size_t first) const;
     void take(Batch& batch, std::size_t first, std::size_t last) const;
-    void reserve(Batch& batch) const;
+    void reserve(Batch& batch);
     std::vector<cl::Event> upload(Batch& batch, std::size_t first);
     void start(Batch& batch, std::size_t first);
     void finish(Batch& batch);
@@ -101,8 +106,11 @@ class Fill {
     const PrismJob job_;
     const MeshJob& mesh_;
     const TriangleBins& bins_;
-    const bool rowPerItem_;
-    const std::uint64_t budget_;  // for everything [bytes]
+    const bool groups_;
+    OpenclTimes* times_;
+    Timing timing_;
+    DeviceMemory memory_;
+    const std::uint64_t share_;  // of the memory, for a batch [bytes]
     cl::Kernel kernel_;
     cl::CommandQueue uploads_;         // beside the device's own, so that a batch goes up while another is filled
     std::vector<PrismBlocks> window_;  // the bricks from firstPrepared_ on
@@ -116,11 +124,13 @@ Fill::Fill(Device::Impl& device, const OpenclOptions& options, const PrismJob& j
       job_(job),
       mesh_(mesh),
       bins_(bins),
-      rowPerItem_(options.mapping == KernelMapping::automatic ? device.info.gpu
-                                                              : options.mapping == KernelMapping::rowPerItem),
-      budget_(options.memoryMiB > 0 ? options.memoryMiB * mebibyte : device.info.memoryBytes / 4 * 3),
-      kernel_(buildProgram(device, prism_cl, buildOptions(device, rowPerItem_, mesh.triangles)), "fillBlocks"),
-      uploads_(device.context, device.device) {}
+      groups_(wantsGroups(device, options.mapping)),
+      times_(options.times),
+      timing_(options.times),
+      memory_(device, budget(device, options)),
+      share_(memory_.left() / batchesInFlight),
+      kernel_(buildProgram(device, prism_cl, buildOptions(device, groups_, mesh.triangles)), "fillBlocks"),
+      uploads_(device.context, device.device, CL_QUEUE_PROFILING_ENABLE) {}
 
 // Commands in flight use the memory of the batches: they must have ended, whatever else went wrong.
 Fill::~Fill() {
@@ -145,6 +155,9 @@ void Fill::run() {
         }
     }
     for (std::size_t i = 0; i < batchesInFlight; ++i) finish(batches_[turn++ % batchesInFlight]);
+    device_.queue.finish();
+    timing_.sumUp();
+    if (times_) times_->peakBytes = std::max(times_->peakBytes, memory_.peak());
 }
 
 void Fill::prepare(std::size_t first, std::size_t last) {
@@ -159,8 +172,7 @@ void Fill::prepare(std::size_t first, std::size_t last) {
 // Whether a batch may be as large as this: its share of the memory, the largest buffer, and 32 bits for the kernel's
 // indices.
 bool Fill::fits(const Load& load) const {
-    return load.bytes(mesh_.triangles) <= budget_ / batchesInFlight &&
-           load.largestBuffer() <= device_.info.maxAllocationBytes &&
+    return load.bytes(mesh_.triangles) <= share_ && load.largestBuffer() <= device_.info.maxAllocationBytes &&
            std::max(load.entries, load.prisms) <= std::numeric_limits<cl_uint>::max();
 }
 
@@ -169,10 +181,8 @@ std::size_t Fill::lastFitting(std::size_t first) const {
     const std::size_t end = std::min(firstPrepared_ + windowBricks, bins_.count());
     Load load = loadOf(window_[first - firstPrepared_]);
     if (!fits(load))
-        throw DeviceError("the prisms of one brick of " + std::to_string(bins_.side) + " voxels a side need " +
-                          mebibytes(batchesInFlight * load.bytes(mesh_.triangles)) + " on " + device_.info.name +
-                          ", which may use " + mebibytes(budget_) + " in all and " +
-                          mebibytes(device_.info.maxAllocationBytes) + " in one buffer");
+        memory_.refuse(std::max(batchesInFlight * load.bytes(mesh_.triangles), load.largestBuffer()),
+                       "a brick of prisms");
     std::size_t last = first + 1;
     for (; last < end; ++last) {
         load = load + loadOf(window_[last - firstPrepared_]);
@@ -193,21 +203,20 @@ void Fill::take(Batch& batch, std::size_t first, std::size_t last) const {
 }
 
 // Makes the buffers large enough. They grow, but never beyond the batch's share of the memory.
-void Fill::reserve(Batch& batch) const {
+void Fill::reserve(Batch& batch) {
     const Load load = batch.load(), grown = load.atLeast(batch.capacity);
     if (grown == batch.capacity) return;
-    batch.capacity = fits(grown) ? grown : load;
     batch.prismBuffer = batch.placeBuffer = batch.offsetBuffer = batch.reachingBuffer = batch.distanceBuffer =
         batch.triangleBuffer = cl::Buffer();
-    const auto buffer = [&](cl_mem_flags flags, std::uint64_t bytes) {
-        return cl::Buffer(device_.context, flags, bytes);
-    };
-    batch.prismBuffer = buffer(CL_MEM_READ_ONLY, batch.capacity.prismBytes());
-    batch.placeBuffer = buffer(CL_MEM_READ_ONLY, batch.capacity.placeBytes());
-    batch.offsetBuffer = buffer(CL_MEM_READ_ONLY, batch.capacity.offsetBytes());
-    batch.reachingBuffer = buffer(CL_MEM_READ_ONLY, batch.capacity.entryBytes());
-    batch.distanceBuffer = buffer(CL_MEM_WRITE_ONLY, batch.capacity.resultBytes());
-    if (mesh_.triangles) batch.triangleBuffer = buffer(CL_MEM_WRITE_ONLY, batch.capacity.resultBytes());
+    if (batch.capacity.blocks > 0) memory_.free(batch.capacity.bytes(mesh_.triangles));
+    batch.capacity = fits(grown) ? grown : load;
+    const auto buffer = [&](std::uint64_t bytes) { return memory_.allocate(bytes, "a batch of bricks"); };
+    batch.prismBuffer = buffer(batch.capacity.prismBytes());
+    batch.placeBuffer = buffer(batch.capacity.placeBytes());
+    batch.offsetBuffer = buffer(batch.capacity.offsetBytes());
+    batch.reachingBuffer = buffer(batch.capacity.entryBytes());
+    batch.distanceBuffer = buffer(batch.capacity.resultBytes());
+    if (mesh_.triangles) batch.triangleBuffer = buffer(batch.capacity.resultBytes());
 }
 
 // Joins the bricks' prisms and lists right where the device, or its driver, wants them.
@@ -237,6 +246,7 @@ std::vector<cl::Event> Fill::upload(Batch& batch, std::size_t first) {
     uploads_.enqueueUnmapMemObject(batch.offsetBuffer, offsets, nullptr, &uploaded[2]);
     uploads_.enqueueUnmapMemObject(batch.reachingBuffer, reaching, nullptr, &uploaded[3]);
     uploads_.flush();
+    for (const cl::Event& event : uploaded) timing_.keep(Timing::Of::upload, event);
     return uploaded;
 }
 
@@ -254,9 +264,9 @@ void Fill::start(Batch& batch, std::size_t first) {
     kernel_.setArg(argument++, cl_float(job_.reach));
     kernel_.setArg(argument++, batch.distanceBuffer);
     kernel_.setArg(argument++, batch.triangleBuffer);
-    const std::size_t items = rowPerItem_ ? itemsPerBlock : 1;
+    const std::size_t items = groups_ ? itemsPerBlock : 1;
     device_.queue.enqueueNDRangeKernel(kernel_, cl::NullRange, cl::NDRange(blocks * items), cl::NDRange(items),
-                                       &uploaded);
+                                       &uploaded, timing_.event(Timing::Of::kernel));
 
     // mapping copies nothing where the memory is shared
     const auto mapped = [&](const cl::Buffer& buffer) {
@@ -264,7 +274,9 @@ void Fill::start(Batch& batch, std::size_t first) {
                                               &batch.filled);
     };
     if (mesh_.triangles) batch.triangles = static_cast<const std::int32_t*>(mapped(batch.triangleBuffer));
+    if (mesh_.triangles) timing_.keep(Timing::Of::download, batch.filled);
     batch.distances = static_cast<const float*>(mapped(batch.distanceBuffer));
+    timing_.keep(Timing::Of::download, batch.filled);
     device_.queue.flush();
 }
 

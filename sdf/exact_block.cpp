@@ -350,10 +350,12 @@ void summarize(BlockDistances& block) {
         const Vec distance = hn::Sqrt(hn::Load(tag, block.nearest2 + i));
         hn::Store(distance, tag, block.distance + i);
         const auto nearest = hn::Load(intTag, block.nearest + i);
-        const auto has = [&](std::int32_t side) {
-            return hn::RebindMask(tag, hn::Eq(hn::And(nearest, hn::Set(intTag, 3)), hn::Set(intTag, side)));
-        };
         const Mask known = hn::RebindMask(tag, hn::Gt(nearest, hn::Set(intTag, -1)));
+        // a piece that is as near as the reach leaves its side, but is not kept
+        const auto has = [&](std::int32_t side) {
+            const auto sides = hn::And(nearest, hn::Set(intTag, (1 << sideBits) - 1));
+            return hn::And(known, hn::RebindMask(tag, hn::Eq(sides, hn::Set(intTag, side))));
+        };
         setBits(known, i, block.known);
         // on the surface either side is right, and no link can carry it on
         setBits(hn::Or(has(sideOutside), hn::Lt(distance, hn::Set(tag, 0.5f * linkSlack))), i, block.outside);

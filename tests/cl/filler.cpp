@@ -26,7 +26,7 @@ struct Way {
     KernelMapping mapping;
     float resolution;
 };
-const Way blockPerItem{KernelMapping::blockPerItem, 90}, rowPerItem{KernelMapping::rowPerItem, 24};
+const Way blockPerItem{KernelMapping::blockPerItem, 90}, groupPerBlock{KernelMapping::groupPerBlock, 24};
 
 BuildOptions optionsFor(const Mesh& mesh, float resolution) {
     BuildOptions options;
@@ -125,7 +125,7 @@ std::vector<Shape> allShapes() {
 }  // namespace
 
 TEST_CASE("OpenCL and TBB agree on shapes") {
-    const Way way = GENERATE(blockPerItem, rowPerItem);
+    const Way way = GENERATE(blockPerItem, groupPerBlock);
     for (const Shape& shape : allShapes()) {
         CAPTURE(shape.name, way.resolution);
         BuildOptions options = optionsFor(shape.mesh, way.resolution);
@@ -135,7 +135,7 @@ TEST_CASE("OpenCL and TBB agree on shapes") {
 }
 
 TEST_CASE("OpenCL and TBB agree without triangles") {
-    const Way way = GENERATE(blockPerItem, rowPerItem);
+    const Way way = GENERATE(blockPerItem, groupPerBlock);
     const Mesh mesh = shapes::torus(1.f, 0.4f);
     checkFillers(mesh, optionsFor(mesh, way.resolution), {.mapping = way.mapping});
 }
@@ -153,7 +153,7 @@ TEST_CASE("OpenCL and TBB agree on the corpus") {
 }
 
 TEST_CASE("OpenCL and TBB agree by the paper to the letter, by recursion and with other parameters") {
-    const Way way = GENERATE(blockPerItem, rowPerItem);
+    const Way way = GENERATE(blockPerItem, groupPerBlock);
     const bool triangles = GENERATE(false, true);
     const Mesh mesh = shapes::box({1.f, 0.6f, 0.3f}, 2);
     BuildOptions options = optionsFor(mesh, way.resolution);

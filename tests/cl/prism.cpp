@@ -179,7 +179,7 @@ std::vector<Shape> shapesOf() {
 }  // namespace
 
 TEST_CASE("prisms give what asking all of them at every voxel gives") {
-    const KernelMapping mapping = GENERATE(KernelMapping::blockPerItem, KernelMapping::rowPerItem);
+    const KernelMapping mapping = GENERATE(KernelMapping::blockPerItem, KernelMapping::groupPerBlock);
     const float width = GENERATE(1.25f, 2.f, 4.5f);
     for (const Shape& shape : shapesOf()) {
         CAPTURE(shape.name, width);
@@ -268,7 +268,7 @@ TEST_CASE("both mappings of prisms give the same") {
     BuildOptions options = optionsFor(mesh, 40);
     options.triangles = triangles;
     checkSame(built(mesh, options, {.mapping = KernelMapping::blockPerItem}),
-              built(mesh, options, {.mapping = KernelMapping::rowPerItem}));
+              built(mesh, options, {.mapping = KernelMapping::groupPerBlock}));
 }
 
 TEST_CASE("prisms in a little device memory are many batches and the same field") {
@@ -287,6 +287,16 @@ TEST_CASE("too little device memory for prisms is an error that says how much is
     CHECK_THROWS_AS(build(mesh, optionsFor(mesh, 20), filler), DeviceError);
     CHECK_THROWS_WITH(build(mesh, optionsFor(mesh, 20), filler),
                       Contains("prisms") && Contains("MiB") && Contains(device.info().name));
+}
+
+TEST_CASE("a build of prisms tells what it took on the device") {
+    const Mesh mesh = shapes::sphere(1.f, 4);
+    const std::uint64_t memory = 16;
+    OpenclTimes times;
+    built(mesh, optionsFor(mesh, 150), {.memoryMiB = memory, .times = &times});
+    CHECK(times.kernels > 0);
+    CHECK(times.peakBytes > sizeof(float) * blockVoxels);
+    CHECK(times.peakBytes <= memory << 20);
 }
 
 TEST_CASE("the triangle of a voxel is the one whose distance it has") {

@@ -1,0 +1,203 @@
+// Which triangles reach which brick of space, by count, scan and scatter: sdf/triangle_bins.h on a device. A program
+// that includes this text says what parts it cuts a triangle into.
+#include "common.cl"
+
+// Whether a triangle is one part, whatever brick asks.
+bool isOnePart(const Corners* triangle);
+
+// The number of parts that a brick with these limits cuts a triangle into.
+uint countParts(const Corners* triangle, const Limits* limits);
+
+// BrickRange of sdf/triangle_bins.cpp, and how the triangles are shared out.
+typedef struct {
+    double voxelsPerUnit;  // [1/m]
+    double reach;          // how far from a triangle a voxel may lie [voxels]
+    double margin;         // parts beyond this from a brick do not matter to it [voxels]
+    int first[3];          // [bricks]
+    int size[3];           // [bricks]
+    int shift;             // bricks have 2^shift voxels a side
+    uint triangles;
+    uint cells;  // bricks in all
+    uint runs;   // of triangles, with counters of their own each
+} Grid;
+
+int3 toInt3(const int* v) {
+    return (int3)(v[0], v[1], v[2]);
+}
+
+int3 brickAt(const Grid* grid, uint cell) {
+    const uint y = (uint)(grid->size[1]), z = (uint)(grid->size[2]);
+    return toInt3(grid->first) + (int3)((int)(cell / z / y), (int)(cell / z % y), (int)(cell % z));
+}
+
+uint cellAt(const Grid* grid, int3 brick) {
+    return ((uint)(brick.x) * (uint)(grid->size[1]) + (uint)(brick.y)) * (uint)(grid->size[2]) + (uint)(brick.z);
+}
+
+Limits limitsOf(const Grid* grid, int3 brick) {
+    const double3 origin = convert_double3(brick * (1 << grid->shift));
+    const Limits limits = {origin - grid->margin, origin + ((double)((1 << grid->shift) - 1) + grid->margin)};
+    return limits;
+}
+
+bool parts(double3 axis, double3 a, double3 b, double3 c, double3 room, double reach) {
+    const double x = dot(axis, a), y = dot(axis, b), z = dot(axis, c);
+    const double most = dot(fabs(axis), room) + reach * length(axis);
+    return min(x, min(y, z)) > most || max(x, max(y, z)) < -most;
+}
+
+// Whether a plane parts a triangle from a box of bricks and all within reach of it: one along the triangle, a side of
+// the box, or one along an edge of each (S. Gottschalk and others, SIGGRAPH 1996).
+bool staysAway(const Grid* grid, const Corners* t, int3 lower, int3 upper) {
+    const double side = (double)(1 << grid->shift), reach = grid->reach + 1;
+    const double3 low = convert_double3(toInt3(grid->first) + lower) * side,
+                  high = convert_double3(toInt3(grid->first) + upper + 1) * side;
+    const double3 centre = 0.5 * (low + high), size = 0.5 * (high - low);
+    const double3 a = t->a - centre, b = t->b - centre, c = t->c - centre;
+    const double3 edges[3] = {b - a, c - b, a - c};
+    if (parts((double3)(1, 0, 0), a, b, c, size, reach) || parts((double3)(0, 1, 0), a, b, c, size, reach) ||
+        parts((double3)(0, 0, 1), a, b, c, size, reach) || parts(cross(edges[0], c - a), a, b, c, size, reach))
+        return true;
+    for (int i = 0; i < 3; ++i) {
+        const double3 e = edges[i];
+        if (parts((double3)(0, -e.z, e.y), a, b, c, size, reach) ||
+            parts((double3)(e.z, 0, -e.x), a, b, c, size, reach) ||
+            parts((double3)(-e.y, e.x, 0), a, b, c, size, reach))
+            return true;
+    }
+    return false;
+}
+
+// Where the bricks around a triangle are counted or listed.
+typedef struct {
+    global uint* cursors;  // of each cell: how many triangles, later the place of the next one
+    global uint* more;     // counted: parts of a cell's triangles beyond one each
+    global uint* list;     // listed: triangles of each cell; null while counting
+    uint triangle;
+} Bins;
+
+void visit(const Bins* bins, const Grid* grid, const Corners* t, uint cell, bool onePart) {
+    const uint place = takeGlobal(bins->cursors + cell, 1);
+    if (bins->list) {
+        bins->list[place] = bins->triangle;
+    } else if (!onePart) {
+        const Limits limits = limitsOf(grid, brickAt(grid, cell));
+        // fewer than one comes out right too: sums of unsigned numbers wrap around
+        atomic_add(bins->more + cell, countParts(t, &limits) - 1);
+    }
+}
+
+// Boxes of bricks are halved, and left out where the triangle stays away. So a needle costs its length, not the box
+// around it.
+#define MOST_BOXES 100  // three times the bits of a coordinate
+void divide(const Bins* bins, const Grid* grid, const Corners* t, int3 lowest, int3 highest) {
+    int3 lower[MOST_BOXES], upper[MOST_BOXES];
+    int waiting = 1;
+    lower[0] = lowest;
+    upper[0] = highest;
+    while (waiting > 0) {
+        --waiting;
+        const int3 low = lower[waiting], high = upper[waiting], size = high - low;
+        if (staysAway(grid, t, low, high)) continue;
+        if (size.x + size.y + size.z == 0) {
+            visit(bins, grid, t, cellAt(grid, low), false);
+            continue;
+        }
+        const int3 way = size.x >= size.y && size.x >= size.z ? (int3)(1, 0, 0)
+                         : size.y >= size.z                   ? (int3)(0, 1, 0)
+                                                              : (int3)(0, 0, 1);
+        const int3 middle = way * (low + size / 2) + (1 - way) * high;
+        lower[waiting] = low;
+        upper[waiting++] = middle;
+        lower[waiting] = way * (middle + 1) + (1 - way) * low;
+        upper[waiting++] = high;
+    }
+}
+
+// Visits the bricks around a triangle, of which most have two at most along each axis.
+void binTriangle(const Bins* bins, const Grid* grid, const Corners* t) {
+    const double3 low = min(t->a, min(t->b, t->c)) - grid->reach, high = max(t->a, max(t->b, t->c)) + grid->reach;
+    const int3 lower = (convert_int3_rtn(low) >> grid->shift) - toInt3(grid->first),
+               upper = (convert_int3_rtn(high) >> grid->shift) - toInt3(grid->first);
+    if (any(upper - lower > 1)) {
+        divide(bins, grid, t, lower, upper);
+        return;
+    }
+    const bool onePart = bins->list || isOnePart(t);
+    for (int x = lower.x; x <= upper.x; ++x)
+        for (int y = lower.y; y <= upper.y; ++y)
+            for (int z = lower.z; z <= upper.z; ++z) visit(bins, grid, t, cellAt(grid, (int3)(x, y, z)), onePart);
+}
+
+// All triangles of this item: a run of them with counters of its own where an item does a group's work, so that no
+// counter is shared and the lists are in ascending order; else all items count together.
+void binTriangles(global const float* points, global const uint* triangles, Grid grid, global uint* cursors,
+                  global uint* more, global uint* list) {
+    const ulong count = grid.triangles, item = get_global_id(0), items = get_global_size(0);
+    Bins bins = {cursors + (item % grid.runs) * grid.cells, more, list, 0};
+    const ulong begin = ITEMS > 1 ? item : count * item / items, end = ITEMS > 1 ? count : count * (item + 1) / items;
+    for (ulong i = begin; i < end; i += ITEMS > 1 ? items : 1) {
+        const Corners t = cornersOf(points, triangles, (uint)(i), grid.voxelsPerUnit);
+        bins.triangle = (uint)(i);
+        binTriangle(&bins, &grid, &t);
+    }
+}
+
+// `cursors` has runs x cells counters, `more` cells of them; all are zero before.
+kernel void countTriangles(global const float* points, global const uint* triangles, Grid grid, global uint* cursors,
+                           global uint* more) {
+    binTriangles(points, triangles, grid, cursors, more, 0);
+}
+
+// Turns counts into places. The b-th brick that has triangles gets its cell, and the first of its triangles and of its
+// parts; `total` receives the number of such bricks, of triangles and of parts. One group does all.
+GROUP_KERNEL void placeBricks(Grid grid, global uint* cursors, global const uint* more, global uint* cellOfBrick,
+                              global uint* triangleOffsets, global uint* partOffsets, global ulong* total) {
+    SHARED ulong bricks[ITEMS], triangles[ITEMS], pieces[ITEMS];
+    const uint begin = (uint)((ulong)(grid.cells) * ITEM / ITEMS), end = (uint)((ulong)(grid.cells) * (ITEM + 1) / ITEMS);
+    ulong brick = 0, triangle = 0, part = 0;
+    for (uint cell = begin; cell < end; ++cell) {
+        uint inCell = 0;
+        for (uint run = 0; run < grid.runs; ++run) inCell += cursors[run * grid.cells + cell];
+        brick += inCell > 0;
+        triangle += inCell;
+        part += (uint)(inCell + more[cell]);
+    }
+    bricks[ITEM] = brick;
+    triangles[ITEM] = triangle;
+    pieces[ITEM] = part;
+    MEET;
+    brick = triangle = part = 0;
+    for (uint i = 0; i < ITEM; ++i) {
+        brick += bricks[i];
+        triangle += triangles[i];
+        part += pieces[i];
+    }
+    for (uint cell = begin; cell < end; ++cell) {
+        const ulong first = triangle;
+        for (uint run = 0; run < grid.runs; ++run) {
+            global uint* cursor = cursors + run * grid.cells + cell;
+            const uint count = *cursor;
+            *cursor = (uint)(triangle);
+            triangle += count;
+        }
+        const uint inCell = (uint)(triangle - first);
+        if (inCell == 0) continue;
+        cellOfBrick[brick] = cell;
+        triangleOffsets[brick] = (uint)(first);
+        partOffsets[brick++] = (uint)(part);
+        part += (uint)(inCell + more[cell]);
+    }
+    if (ITEM < ITEMS - 1) return;
+    triangleOffsets[brick] = (uint)(triangle);
+    partOffsets[brick] = (uint)(part);
+    total[0] = brick;
+    total[1] = triangle;
+    total[2] = part;
+}
+
+// Lists the triangles of each brick, by the places that placeBricks() made of the counts.
+kernel void listTriangles(global const float* points, global const uint* triangles, Grid grid, global uint* cursors,
+                          global uint* list) {
+    binTriangles(points, triangles, grid, cursors, 0, list);
+}

@@ -1,0 +1,320 @@
+// Two batches of bricks take turns: while the device fills one, the host takes the blocks of the other.
+#include "cl/brick_filler.h"
+
+#include <oneapi/tbb/blocked_range.h>
+#include <oneapi/tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+#include <optional>
+#include <span>
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include "cl/bins.h"
+#include "cl/memory.h"
+#include "cl/timing.h"
+#include "sdf/exact.h"
+#include "sdf/progress.h"
+
+namespace bilayer {
+
+extern const char* const exact_cl;  // the text of exact.cl
+
+namespace {
+
+constexpr std::size_t batchesInFlight = 2;
+constexpr std::size_t blocksPerTask = 16;  // that the host takes at once
+/// Work-items of a group, lanes of a vector: ITEMS and LANES of common.cl.
+constexpr std::size_t groupItems = 64, lanes = 16;
+/// Bricks of a batch at most: results of a few megabytes stay in a processor's cache, and a GPU has enough to do.
+constexpr std::size_t bricksForProcessor = 64, bricksForGpu = 512;
+/// Groups for each compute unit that prepare bricks, each with scratch memory of its own.
+constexpr std::size_t groupsPerUnit = 4;
+constexpr std::uint64_t scratchPart = 8;  // of the budget, at most
+/// A part's numbers in the buffers of a batch: the part, two orders of members, a cell, a cluster's columns and begin.
+constexpr std::uint64_t pieceBytes = 108, memberBytes = 32, clusterBytes = 36;
+/// Cells as small as those that pieces are grouped by, and how far beyond its reach a brick's samples lie [voxels].
+constexpr float smallestCell = 1.1f, aroundBrick = 3;
+
+enum Counter { filledBlocks, openBlocks, conflicts, counters };
+
+// What a batch of bricks needs, or what its buffers hold.
+struct Load {
+    std::uint64_t bricks = 0, parts = 0;
+
+    bool covers(const Load& other) const { return bricks >= other.bricks && parts >= other.parts; }
+};
+
+struct Batch {
+    Load capacity, load;  // of the buffers, and of what is under way
+    cl::Buffer pieces, unsorted, members, cells, columns, begins, ranges;
+    cl::Buffer origins, distances, triangles, open, counts;
+    std::array<cl_uint, counters> found{};
+    cl::Event counted;
+};
+
+// What a buffer holds, as the host sees it from when the queue's commands have ended until this goes.
+template <class Item>
+class Mapped {
+  public:
+    Mapped(const cl::CommandQueue& queue, const cl::Buffer& buffer, std::size_t count, Timing& timing)
+        : queue_(queue), buffer_(buffer) {
+        if (count > 0)
+            data_ = queue.enqueueMapBuffer(buffer, CL_FALSE, CL_MAP_READ, 0, count * sizeof(Item), nullptr,
+                                           timing.event(Timing::Of::download));
+    }
+    Mapped(const Mapped&) = delete;
+    Mapped& operator=(const Mapped&) = delete;
+    ~Mapped() {
+        if (data_) ::clEnqueueUnmapMemObject(queue_(), buffer_(), data_, 0, nullptr, nullptr);
+    }
+    const Item* data() const { return static_cast<const Item*>(data_); }
+
+  private:
+    const cl::CommandQueue& queue_;
+    const cl::Buffer& buffer_;
+    void* data_ = nullptr;
+};
+
+class BrickFill {
+  public:
+    BrickFill(Device::Impl& device, const OpenclOptions& options, const FillJob& job);
+    ~BrickFill();
+    void run();
+
+  private:
+    std::uint64_t slices() const { return std::uint64_t(bins_->grid().blocksPerSide()); }
+    std::uint64_t bytesOf(const Load& load) const;
+    std::uint64_t blocksOf(const Load& load) const;
+    bool fits(const Load& load) const;
+    Load loadOf(std::size_t first, std::size_t last) const;
+    std::size_t lastFitting(std::size_t first) const;
+    void makeScratch();
+    void reserve(Batch& batch, const Load& load);
+    void start(Batch& batch, std::size_t first, std::size_t last);
+    void finish(Batch& batch);
+    void fillOpen();
+
+    template <class... Arguments>
+    void enqueue(const char* name, std::size_t groups, const Arguments&... arguments) {
+        cl::Kernel kernel(program_, name);
+        cl_uint index = 0;
+        (kernel.setArg(index++, arguments), ...);
+        const std::size_t items = gpuMapping_ ? groupItems : 1;
+        device_.queue.enqueueNDRangeKernel(kernel, cl::NullRange, cl::NDRange(groups * items), cl::NDRange(items),
+                                           nullptr, timing_.event(Timing::Of::kernel));
+    }
+
+    Device::Impl& device_;
+    const FillJob& job_;
+    const bool gpuMapping_;
+    OpenclTimes* times_;
+    Timing timing_;
+    DeviceMemory memory_;
+    cl::Program program_;
+    std::optional<DeviceBins> bins_;
+    cl::CommandQueue transfers_;
+    cl::Buffer scratch_, next_;
+    std::size_t scratchGroups_ = 0;
+    cl_uint scratchCells_ = 0;
+    std::uint64_t share_ = 0;  // of the memory, for a batch
+    std::array<Batch, batchesInFlight> batches_;
+    std::vector<glm::ivec3> open_;  // blocks that are left to the host
+};
+
+bool wantsGroups(const Device::Impl& device, KernelMapping mapping) {
+    return mapping == KernelMapping::automatic ? device.info.gpu : mapping == KernelMapping::groupPerBlock;
+}
+
+std::uint64_t budget(const Device::Impl& device, const OpenclOptions& options) {
+    constexpr std::uint64_t mebibyte = 1 << 20;
+    return options.memoryMiB > 0 ? options.memoryMiB * mebibyte : device.info.memoryBytes / 4 * 3;
+}
+
+std::string buildOptions(const Device::Impl& device, bool gpuMapping, bool triangles) {
+    std::string options = "-cl-std=CL1.2";
+    if (device.info.exactSquareRoots) options += " -cl-fp32-correctly-rounded-divide-sqrt";
+    if (gpuMapping) options += " -D GROUP_PER_BLOCK";
+    if (triangles) options += " -D TRIANGLES=1";
+    return options;
+}
+
+BrickFill::BrickFill(Device::Impl& device, const OpenclOptions& options, const FillJob& job)
+    : device_(device),
+      job_(job),
+      gpuMapping_(wantsGroups(device, options.mapping)),
+      times_(options.times),
+      timing_(options.times),
+      memory_(device, budget(device, options)),
+      program_(buildProgram(device, exact_cl, buildOptions(device, gpuMapping_, job.mesh.triangles))),
+      transfers_(device.context, device.device, CL_QUEUE_PROFILING_ENABLE) {
+    const float reach = job.mesh.reach;
+    bins_.emplace(device, program_, memory_, job, reach, reach + 1, gpuMapping_, timing_);
+    job.mesh.progress.begin(bins_->bricks());
+    makeScratch();
+}
+
+// Commands in flight use the memory of the batches: they must have ended, whatever else went wrong.
+BrickFill::~BrickFill() {
+    try {
+        device_.queue.finish();
+        transfers_.finish();
+    } catch (const cl::Error&) {
+    }
+}
+
+void BrickFill::makeScratch() {
+    const float side = float(1 << bins_->grid().shift) + 2 * (float(bins_->grid().margin) + aroundBrick);
+    const std::size_t cells = std::size_t(side / smallestCell) + 2;
+    scratchCells_ = cl_uint(std::min<std::size_t>(cells * cells * cells, 1 << 20));
+    const std::uint64_t bytes = std::uint64_t(scratchCells_) * sizeof(cl_uint);
+    const std::size_t wanted = std::max(1u, device_.info.computeUnits) * groupsPerUnit;
+    scratchGroups_ = std::clamp<std::size_t>(memory_.left() / scratchPart / bytes, 1, wanted);
+    scratch_ = memory_.allocate(scratchGroups_ * bytes, "grouping the triangles of a brick");
+    next_ = memory_.allocate(sizeof(cl_uint), "grouping the triangles of a brick");
+    share_ = memory_.left() / batchesInFlight;
+}
+
+std::uint64_t BrickFill::bytesOf(const Load& load) const {
+    const std::uint64_t perBlock = 2 * sizeof(glm::ivec3) + blockVoxels * sizeof(float) * (job_.mesh.triangles ? 2 : 1);
+    return load.parts * (pieceBytes + 2 * memberBytes + sizeof(cl_uint)) + (load.parts + lanes) * clusterBytes +
+           blocksOf(load) * perBlock + load.bricks * slices() * sizeof(cl_uint2) + counters * sizeof(cl_uint);
+}
+
+std::uint64_t BrickFill::blocksOf(const Load& load) const {
+    return load.bricks * slices() * slices() * slices();
+}
+
+Load BrickFill::loadOf(std::size_t first, std::size_t last) const {
+    return {last - first, bins_->firstPart(last) - bins_->firstPart(first)};
+}
+
+// Whether a batch may be as large as this: its share of the memory, and the largest buffer.
+bool BrickFill::fits(const Load& load) const {
+    const std::uint64_t largest = std::max(blocksOf(load) * blockVoxels * sizeof(float), load.parts * pieceBytes);
+    return bytesOf(load) <= share_ && largest <= device_.info.maxAllocationBytes;
+}
+
+// The end of the run of bricks from `first` on that go into one batch.
+std::size_t BrickFill::lastFitting(std::size_t first) const {
+    if (!fits(loadOf(first, first + 1)))
+        memory_.refuse(batchesInFlight * bytesOf(loadOf(first, first + 1)), "a brick of the grid");
+    const std::size_t end = std::min(bins_->bricks(), first + (gpuMapping_ ? bricksForGpu : bricksForProcessor));
+    std::size_t last = first + 1;
+    while (last < end && fits(loadOf(first, last + 1))) ++last;
+    return last;
+}
+
+// Makes the buffers large enough. They grow, but never beyond the batch's share of the memory.
+void BrickFill::reserve(Batch& batch, const Load& load) {
+    if (batch.capacity.covers(load)) return;
+    const Load grown{std::max(load.bricks, batch.capacity.bricks), std::max(load.parts, batch.capacity.parts)};
+    if (batch.capacity.bricks > 0) memory_.free(bytesOf(batch.capacity));
+    batch = Batch{};
+    batch.capacity = fits(grown) ? grown : load;
+    const Load& c = batch.capacity;
+    const auto buffer = [&](std::uint64_t bytes) { return memory_.allocate(bytes, "a batch of bricks"); };
+    batch.pieces = buffer(c.parts * pieceBytes);
+    batch.unsorted = buffer(c.parts * memberBytes);
+    batch.members = buffer(c.parts * memberBytes);
+    batch.cells = buffer(c.parts * sizeof(cl_uint));
+    batch.columns = buffer((c.parts + lanes) * (clusterBytes - sizeof(cl_uint)));
+    batch.begins = buffer((c.parts + lanes) * sizeof(cl_uint));
+    batch.ranges = buffer(c.bricks * slices() * sizeof(cl_uint2));
+    batch.origins = buffer(blocksOf(c) * sizeof(glm::ivec3));
+    batch.open = buffer(blocksOf(c) * sizeof(glm::ivec3));
+    batch.distances = buffer(blocksOf(c) * blockVoxels * sizeof(float));
+    if (job_.mesh.triangles) batch.triangles = buffer(blocksOf(c) * blockVoxels * sizeof(cl_int));
+    batch.counts = buffer(counters * sizeof(cl_uint));
+}
+
+// Sends the kernels of a batch on their way, and the number of blocks that come of it.
+void BrickFill::start(Batch& batch, std::size_t first, std::size_t last) {
+    const Load load = loadOf(first, last);
+    reserve(batch, load);
+    batch.load = load;
+    const cl_uint none = 0, stride = cl_uint(batch.capacity.parts + lanes), firstBrick = cl_uint(first),
+                  bricks = cl_uint(load.bricks);
+    device_.queue.enqueueFillBuffer(next_, none, 0, sizeof none);
+    device_.queue.enqueueFillBuffer(batch.counts, none, 0, counters * sizeof none);
+    enqueue("prepareBricks", std::min<std::size_t>(scratchGroups_, bricks), bins_->points(), bins_->triangles(),
+            bins_->grid(), bins_->cellOfBrick(), bins_->triangleOffsets(), bins_->partOffsets(), bins_->list(),
+            firstBrick, bricks, batch.pieces, batch.unsorted, batch.members, batch.cells, batch.columns, batch.begins,
+            stride, scratch_, scratchCells_, batch.ranges, next_);
+    enqueue("fillBlocks", blocksOf(load), bins_->points(), bins_->triangles(), bins_->grid(), bins_->cellOfBrick(),
+            firstBrick, batch.pieces, batch.members, batch.columns, batch.begins, stride, batch.ranges,
+            cl_int(job_.mesh.sign), batch.origins, batch.distances,
+            job_.mesh.triangles ? batch.triangles : batch.origins, batch.open, batch.counts);
+    device_.queue.enqueueReadBuffer(batch.counts, CL_FALSE, 0, sizeof batch.found, batch.found.data(), nullptr,
+                                    &batch.counted);
+    timing_.keep(Timing::Of::download, batch.counted);
+    device_.queue.flush();
+}
+
+// Waits for a batch, if it is under way, and hands its blocks on.
+void BrickFill::finish(Batch& batch) {
+    if (batch.load.bricks == 0) return;
+    batch.counted.wait();
+    const std::size_t blocks = batch.found[filledBlocks], open = batch.found[openBlocks];
+    if (job_.mesh.conflicts) *job_.mesh.conflicts += batch.found[conflicts];
+    const Mapped<glm::ivec3> openOrigins(transfers_, batch.open, open, timing_);
+    const Mapped<glm::ivec3> origins(transfers_, batch.origins, blocks, timing_);
+    const Mapped<float> distances(transfers_, batch.distances, blocks * blockVoxels, timing_);
+    const Mapped<std::int32_t> triangles(transfers_, batch.triangles, job_.mesh.triangles ? blocks * blockVoxels : 0,
+                                         timing_);
+    transfers_.finish();
+    open_.insert(open_.end(), openOrigins.data(), openOrigins.data() + open);
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, blocks, blocksPerTask), [&](const auto& range) {
+        job_.mesh.progress.poll();
+        const auto part = [&](const auto* all, std::size_t each) {
+            return std::span(all + range.begin() * each, range.size() * each);
+        };
+        job_.mesh.sink({part(origins.data(), 1), part(distances.data(), blockVoxels),
+                        job_.mesh.triangles ? part(triangles.data(), blockVoxels) : std::span<const std::int32_t>()});
+    });
+    for (std::size_t brick = 0; brick < batch.load.bricks; ++brick) job_.mesh.progress.advance();
+    batch.load = {};
+}
+
+void BrickFill::run() {
+    std::size_t turn = 0;
+    for (std::size_t first = 0, last; first < bins_->bricks(); first = last) {
+        last = lastFitting(first);
+        Batch& batch = batches_[turn++ % batchesInFlight];
+        finish(batch);
+        transfers_.finish();  // the host has let go of the batch's buffers
+        start(batch, first, last);
+    }
+    for (std::size_t i = 0; i < batchesInFlight; ++i) finish(batches_[turn++ % batchesInFlight]);
+    device_.queue.finish();
+    timing_.sumUp();
+    if (times_) times_->peakBytes = std::max(times_->peakBytes, memory_.peak());
+    if (!open_.empty()) fillOpen();
+}
+
+// Fills the blocks whose sides the triangles near them leave open on the processor, which knows the whole mesh.
+void BrickFill::fillOpen() {
+    const auto before = [](const glm::ivec3& a, const glm::ivec3& b) {
+        return std::tie(a.x, a.y, a.z) < std::tie(b.x, b.y, b.z);
+    };
+    std::sort(open_.begin(), open_.end(), before);
+    MeshJob job = job_.mesh;
+    job.wanted = [&](const glm::ivec3& first, int side) {
+        if (side == blockSide) return std::binary_search(open_.begin(), open_.end(), first, before);
+        return std::any_of(open_.begin(), open_.end(), [&](const glm::ivec3& block) {
+            const glm::ivec3 away = block - first;
+            return std::min({away.x, away.y, away.z}) >= 0 && std::max({away.x, away.y, away.z}) < side;
+        });
+    };
+    fillExact(job, job_.box);
+}
+
+}  // namespace
+
+void fillByBricks(Device::Impl& device, const OpenclOptions& options, const FillJob& job) {
+    BrickFill(device, options, job).run();
+}
+
+}  // namespace bilayer

@@ -1,0 +1,116 @@
+// What all kernels share: how work is spread over work-items, vectors of voxels, the mesh.
+//
+// Two mappings of work to work-items, chosen when a program is built:
+//   default             a work-item does the work of a whole group: for processors, whose vector units take two rows of
+//                       voxels at once
+//   -D GROUP_PER_BLOCK  a work-group of 64 items works together, each on one row of a block: for GPUs
+// The text is the same: the items of a group share out loops, `ITEM, ITEM + ITEMS, ...`, and meet at barriers; a group
+// of one has all of the loop and needs no barrier.
+#pragma OPENCL FP_CONTRACT OFF
+#pragma OPENCL EXTENSION cl_khr_fp64 : enable
+
+#define BLOCK_SIDE 8
+#define BLOCK_VOXELS 512
+
+#ifdef GROUP_PER_BLOCK
+
+#define ITEMS 64
+#define ITEM ((uint)(get_local_id(0)))
+#define MEET barrier(CLK_LOCAL_MEM_FENCE | CLK_GLOBAL_MEM_FENCE)
+#define SHARED local
+#define GROUP_KERNEL kernel __attribute__((reqd_work_group_size(ITEMS, 1, 1)))
+#define LANES 8
+typedef float8 Lanes;
+typedef int8 IntLanes;
+#define vloadLanes vload8
+#define vstoreLanes vstore8
+
+#else
+
+#define ITEMS 1
+#define ITEM 0u
+#define MEET
+#define SHARED private
+#define GROUP_KERNEL kernel __attribute__((reqd_work_group_size(1, 1, 1)))
+#define LANES 16
+typedef float16 Lanes;
+typedef int16 IntLanes;
+#define vloadLanes vload16
+#define vstoreLanes vstore16
+
+#endif
+
+// Stands for every distance beyond reach: farAway of sdf/blocks.h.
+#define FAR_AWAY 1e30f
+
+// Corners of a triangle or of a part of one [voxels].
+typedef struct {
+    double3 a, b, c;
+} Corners;
+
+// A box in index coordinates [voxels].
+typedef struct {
+    double3 lower, upper;
+} Limits;
+
+float square(float value) {
+    return value * value;
+}
+
+Lanes squareLanes(Lanes value) {
+    return value * value;
+}
+
+double lengthSquared(double3 v) {
+    return dot(v, v);
+}
+
+bool misses(const Corners* t, const Limits* limits) {
+    const double3 lower = min(t->a, min(t->b, t->c)), upper = max(t->a, max(t->b, t->c));
+    return any(lower > limits->upper) || any(upper < limits->lower);
+}
+
+Corners cornersOf(global const float* points, global const uint* triangles, uint triangle, double voxelsPerUnit) {
+    const uint3 t = vload3(triangle, triangles);
+    Corners corners;
+    corners.a = convert_double3(vload3(t.x, points)) * voxelsPerUnit;
+    corners.b = convert_double3(vload3(t.y, points)) * voxelsPerUnit;
+    corners.c = convert_double3(vload3(t.z, points)) * voxelsPerUnit;
+    return corners;
+}
+
+// The place of the lowest bit.
+int lowestBit(uint bits) {
+    return 31 - (int)(clz(bits & -bits));
+}
+
+// A bit for each lane whose comparison held.
+uint bitsOf(IntLanes held) {
+    const ulong gather = 0x0102040810204080ul;
+#if LANES == 16
+    const ulong2 bytes = as_ulong2(convert_uchar16(held & 1)) * gather >> 56;
+    return (uint)(bytes.x | bytes.y << 8);
+#else
+    return (uint)(as_ulong(convert_uchar8(held & 1)) * gather >> 56);
+#endif
+}
+
+bool anyLane(IntLanes held) {
+#if LANES == 16
+    const ulong2 bytes = as_ulong2(convert_char16(held));
+    return (bytes.x | bytes.y) != 0;
+#else
+    return as_ulong(convert_char8(held)) != 0;
+#endif
+}
+
+// Adds to a counter that the items of a group, or all groups, share; returns what it was.
+#if ITEMS > 1
+#define takeGlobal(counter, count) atomic_add(counter, count)
+#else
+uint takeGlobal(global uint* counter, uint count) {
+    const uint before = *counter;
+    *counter = before + count;
+    return before;
+}
+#endif

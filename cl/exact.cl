@@ -1,0 +1,722 @@
+// The exact method on a device: sdf/exact.cpp, with the same pieces, bounds, links and closest features. Blocks whose
+// sides the nearest triangles leave open are named and left to the host.
+//
+// -D TRIANGLES=1 also keeps the nearest triangle of each voxel.
+#include "pieces.cl"
+
+#ifndef TRIANGLES
+#define TRIANGLES 0
+#endif
+
+// Rows of a block along z that a vector holds, vectors of a slice of one x, vectors of a block.
+#define ROWS_AT_ONCE (LANES / BLOCK_SIDE)
+#define COLUMNS (BLOCK_SIDE / ROWS_AT_ONCE)
+#define CHUNKS (BLOCK_SIDE * COLUMNS / ITEMS)
+// Clusters near a block that are looked at in one go.
+#define PAGE 1024
+
+// See sdf/exact_block.cpp for these: rounding [voxels, voxels^2 or parts].
+#define BOUND_SLACK 1e-4f
+#define TIE_PART 1e-5f
+#define TIE_SLACK 1e-8f
+#define RAISED_PART 1e-3f
+#define RAISED_BY 5e-7f
+#define HEIGHT_SLACK 1e-3f
+#define LEAST_HEIGHT 1e-3f
+#define BIN_SLACK 1e-3f
+// See sdf/links.h.
+#define LINK_SLACK 1e-4f
+#define FAR_FROM 0.5f
+#define MID_FROM 0.1f
+// See sdf/closest_side.cpp, and what sdf/exact.cpp calls sideSlack.
+#define SAME_PLACE 1e-7
+#define FLATNESS 1e-10
+#define CANCELLED 1e-2
+#define SIDE_SLACK 1e-3f
+// Faces that meet in the closest point of a voxel; with more of them the host is asked.
+#define MOST_FACES 48
+
+// What a voxel's code says besides the number of its nearest piece: PieceSide of sdf/exact_block.h.
+enum { SIDE_OUTSIDE = 1, SIDE_INSIDE = 2, SIDE_BITS = 2 };
+
+// Bricks into pieces and clusters. Groups take the bricks one after another, so that few need scratch memory.
+GROUP_KERNEL void prepareBricks(global const float* points, global const uint* triangles, Grid grid,
+                                global const uint* cellOfBrick, global const uint* triangleOffsets,
+                                global const uint* partOffsets, global const uint* list, uint firstBrick, uint bricks,
+                                global Piece* pieces, global Member* unsorted, global Member* members,
+                                global uint* cellOfMember, global float* clusterColumns, global uint* clusterBegins,
+                                uint stride, global uint* scratch, uint scratchCells, global uint2* ranges,
+                                global uint* next) {
+    SHARED uint taken, count;
+    SHARED Extent extents[ITEMS];
+    SHARED uint2 sums[ITEMS];
+    global uint* cursors = scratch + get_group_id(0) * scratchCells;
+    const int slices = (1 << grid.shift) / BLOCK_SIDE;
+    const uint firstPart = partOffsets[firstBrick];
+    for (;;) {
+        MEET;
+        if (ITEM == 0) {
+            taken = atomic_inc(next);
+            count = 0;
+        }
+        MEET;
+        if (taken >= bricks) return;
+        const uint b = firstBrick + taken, first = partOffsets[b] - firstPart;
+        const int3 brick = brickAt(&grid, cellOfBrick[b]);
+        const Limits limits = limitsOf(&grid, brick);
+        const Cut cut = {pieces + first, &count};
+        cutTriangles(&cut, points, triangles, list, triangleOffsets[b], triangleOffsets[b + 1], grid.voxelsPerUnit,
+                     &limits);
+        MEET;
+        const uint found = count;
+        const int3 origin = brick * (1 << grid.shift);
+        extents[ITEM] = makeMembers(pieces, first, found, origin, unsorted + first);
+        MEET;
+        Extent all = extents[0];
+        for (int i = 1; i < ITEMS; ++i) {
+            const Extent other = extents[i];
+            all = addExtents(&all, &other);
+        }
+        const float meanRadius = (float)(all.radii / found);
+        Cells cells;
+        cells.side = clamp(CELL_FACTOR * meanRadius, SMALLEST_CELL, LARGEST_CELL);
+        float cellCount = 1;
+        for (int axis = 0; axis < 3; ++axis) {
+            cells.lower[axis] = all.lower[axis];
+            cells.size[axis] = (int)((all.upper[axis] - all.lower[axis]) / cells.side) + 1;
+            cellCount *= (float)(cells.size[axis]);
+        }
+        const Clusters clusters = {clusterColumns, clusterBegins, stride};
+        uint clusterCount = found;
+        if (all.radii < SMALL_RADIUS * found && cellCount <= (float)(scratchCells)) {
+            clusterCount = groupMembers(&clusters, first, unsorted + first, members + first, cellOfMember + first,
+                                        found, &cells, cursors, sums);
+        } else {
+            for (uint i = ITEM; i < found; i += ITEMS) {
+                const Member member = unsorted[first + i];
+                members[first + i] = member;
+                putCluster(&clusters, first + i, vload3(0, member.sample), member.radius, vload3(0, member.normal), 0,
+                           first + i);
+            }
+            if (ITEM == 0) clusterBegins[first + found] = first + found;
+        }
+        MEET;
+        rangeClusters(&clusters, first, clusterCount, slices, (float)(grid.reach), ranges + taken * slices);
+    }
+}
+
+// The part of a block that an item works on, in slices of one x and columns of rows.
+typedef struct {
+    int firstSlice, lastSlice, firstColumn, lastColumn;
+} Share;
+
+Share ownShare() {
+#if ITEMS > 1
+    const int row = (int)(ITEM);
+    const Share own = {row / COLUMNS, row / COLUMNS, row % COLUMNS, row % COLUMNS};
+#else
+    const Share own = {0, BLOCK_SIDE - 1, 0, COLUMNS - 1};
+#endif
+    return own;
+}
+
+// The place of a chunk among those of its item.
+int chunkAt(int slice, int column) {
+    return ITEMS > 1 ? 0 : slice * COLUMNS + column;
+}
+
+// Lattice coordinates of a column's voxels.
+Lanes latticeY(int column) {
+#if LANES == 16
+    return (Lanes)((float8)(0), (float8)(1)) + (float)(column * ROWS_AT_ONCE);
+#else
+    return (Lanes)((float)(column));
+#endif
+}
+
+Lanes latticeZ() {
+    const float8 row = (float8)(0, 1, 2, 3, 4, 5, 6, 7);
+#if LANES == 16
+    return (Lanes)(row, row);
+#else
+    return row;
+#endif
+}
+
+// What is known of an item's voxels: squared distance to the nearest piece, and its number with the side (-1: none).
+typedef struct {
+    Lanes nearest2[CHUNKS];
+    IntLanes nearest[CHUNKS];
+} Found;
+
+// The slices and columns of a share that a box around a ball meets.
+Share within(const Share* own, float3 centre, float radius) {
+    // cut off towards zero is rounded down here, as below zero is all the same
+    const int low = (int)(max(centre.y - radius, 0.0f)) / ROWS_AT_ONCE,
+              high = centre.y + radius < 0 ? -1 : (int)(min(centre.y + radius, 7.0f)) / ROWS_AT_ONCE;
+    const int from = (int)(max(centre.x - radius, 0.0f)),
+              to = centre.x + radius < 0 ? -1 : (int)(min(centre.x + radius, 7.0f));
+    const Share part = {max(own->firstSlice, from), min(own->lastSlice, to), max(own->firstColumn, low),
+                        min(own->lastColumn, high)};
+    return part;
+}
+
+// Lowers squared distances to those to a sample.
+void applySample(Found* found, const Share* own, float3 sample, float reach) {
+    const Share part = within(own, sample, reach);
+    const Lanes z2 = squareLanes(latticeZ() - sample.z);
+    for (int column = part.firstColumn; column <= part.lastColumn; ++column) {
+        const Lanes across2 = squareLanes(latticeY(column) - sample.y) + z2;
+        for (int slice = part.firstSlice; slice <= part.lastSlice; ++slice) {
+            Lanes* nearest2 = found->nearest2 + chunkAt(slice, column);
+            *nearest2 = min(*nearest2, square((float)(slice)-sample.x) + across2);
+        }
+    }
+}
+
+// Drum of sdf/exact_block.cpp: a disc of some thickness that holds pieces, seen from a block.
+typedef struct {
+    float3 centre, normal;
+    float thickness, radius2;
+} Drum;
+
+Drum makeDrum(float3 centre, float radius, float3 normal, float thickness) {
+    const Drum drum = {centre, normal, thickness + BOUND_SLACK, square(radius + BOUND_SLACK)};
+    return drum;
+}
+
+// Bits of the chunks, out of a part of a share, that have a voxel which the drum may be nearest to.
+uint nearChunks(const Found* found, const Share* part, const Drum* drum, bool thick) {
+    uint near = 0;
+    const Lanes pz = latticeZ() - drum->centre.z, pz2 = pz * pz, hz = pz * drum->normal.z;
+    const float fourRadius2 = 4 * drum->radius2;
+    for (int column = part->firstColumn; column <= part->lastColumn; ++column) {
+        const Lanes py = latticeY(column) - drum->centre.y;
+        const Lanes across = py * py + pz2 - drum->radius2, height = py * drum->normal.y + hz;
+        for (int slice = part->firstSlice; slice <= part->lastSlice; ++slice) {
+            const float px = (float)(slice)-drum->centre.x;
+            const int chunk = chunkAt(slice, column);
+            const Lanes bound2 = found->nearest2[chunk], h = px * drum->normal.x + height;
+            Lanes excess = px * px + across - bound2, g2 = h * h;
+            if (thick) {
+                const Lanes h2 = g2;
+                g2 = squareLanes(max(fabs(h) - drum->thickness, (Lanes)(0.0f)));
+                excess += g2 - h2;
+            }
+            const IntLanes may = excess * fabs(excess) <= fourRadius2 * (bound2 - g2 + HEIGHT_SLACK);
+            if (anyLane(may)) near |= 1u << chunk;
+        }
+    }
+    return near;
+}
+
+// The same out of some chunks, for a disc.
+uint nearAmong(const Found* found, const Share* own, uint among, const Drum* drum) {
+    uint near = 0;
+    for (; among != 0; among &= among - 1) {
+        const int chunk = lowestBit(among);
+        const int slice = ITEMS > 1 ? own->firstSlice : chunk / COLUMNS,
+                  column = ITEMS > 1 ? own->firstColumn : chunk % COLUMNS;
+        const Share one = {slice, slice, column, column};
+        near |= nearChunks(found, &one, drum, false);
+    }
+    return near;
+}
+
+// How far a coordinate along an edge lies beyond its ends.
+Lanes beyond(Lanes along, float length) {
+    return along - min(max(along, (Lanes)(0.0f)), (Lanes)(length));
+}
+
+// Keeps the smaller distances, and whose they are. Over a face its normal tells the side, unless two pieces are as near
+// as floats can tell and say different things.
+void keepNearer(Found* found, int chunk, Lanes distance2, Lanes height, IntLanes overFace, int code) {
+    const Lanes old2 = found->nearest2[chunk], nearest2 = min(distance2, old2);
+    const IntLanes old = found->nearest[chunk], sides = (1 << SIDE_BITS) - 1;
+    const IntLanes side = select((IntLanes)(code + SIDE_INSIDE), (IntLanes)(code + SIDE_OUTSIDE), height > 0.0f);
+    const IntLanes own = select((IntLanes)(code), side, overFace);
+    const IntLanes winner = select(old, own, distance2 < old2);
+    const IntLanes tied = max(distance2, old2) - nearest2 <= nearest2 * TIE_PART + TIE_SLACK;
+    found->nearest2[chunk] = nearest2;
+    found->nearest[chunk] = select(winner, (winner & ~sides) | (own & old & sides), tied);
+}
+
+// Lowers the distances in some chunks to those to a piece. Lattice coordinates are exact in floats.
+void askPiece(Found* found, const Share* own, uint chunks, global const Piece* piece, uint number, int3 block) {
+    const float3 shift = convert_float3(block - vload3(0, piece->base)), origin = vload3(0, piece->origin);
+    const float3 u = vload3(0, piece->u), w = vload3(0, piece->w), n = vload3(0, piece->n);
+    const float size = piece->length, ox = piece->ox, oy = piece->oy, olen = piece->olen, ex = piece->ex,
+                ey = piece->ey, elen = piece->elen;
+    const int code = (int)(number << SIDE_BITS);
+    const Lanes pz = latticeZ() + shift.z - origin.z;
+    const uint ofColumn = ITEMS > 1 ? 1u : 0x11111111u;
+    for (int column = own->firstColumn; column <= own->lastColumn; ++column) {
+        uint slices = ITEMS > 1 ? chunks : chunks & ofColumn << column;
+        if (slices == 0) continue;
+        const Lanes py = latticeY(column) + shift.y - origin.y;
+        const Lanes uAcross = py * u.y + pz * u.z, wAcross = py * w.y + pz * w.z, nAcross = py * n.y + pz * n.z;
+        for (; slices != 0; slices &= slices - 1) {
+            const int chunk = lowestBit(slices), slice = ITEMS > 1 ? own->firstSlice : chunk / COLUMNS;
+            const float px = (float)(slice) + shift.x - origin.x;
+            const Lanes along = px * u.x + uAcross, aside = px * w.x + wAcross, height = px * n.x + nAcross;
+            const Lanes base2 = squareLanes(beyond(along, size)) + aside * aside;
+            // the edges from both ends of the longest one to the third corner
+            const Lanes v = along - size;
+            const Lanes leftOf = aside * ox - along * oy, rightOf = aside * ex - v * ey;
+            const Lanes left2 = squareLanes(beyond(along * ox + aside * oy, olen)) + leftOf * leftOf;
+            const Lanes right2 = squareLanes(beyond(v * ex + aside * ey, elen)) + rightOf * rightOf;
+            const Lanes height2 = height * height;
+            const IntLanes above = (aside > 0.0f) & (leftOf <= 0.0f) & (rightOf >= 0.0f);
+            const Lanes distance2 = height2 + select(min(base2, min(left2, right2)), (Lanes)(0.0f), above);
+            keepNearer(found, chunk, distance2, height, above & (height2 > square(LEAST_HEIGHT)), code);
+        }
+    }
+}
+
+// What a block works from.
+typedef struct {
+    Clusters clusters;
+    global const Member* members;
+    global const Piece* pieces;
+    uint2 range;     // of clusters that may reach its slice of blocks
+    int3 block;      // index coordinates of its first voxel
+    float3 inBrick;  // the same in the voxels of the brick
+    float reach;     // [voxels]
+} Input;
+
+// Which of LANES clusters from the c-th on reach the block.
+IntLanes reaching(const Input* input, uint c) {
+    const float halfBlock = 0.5f * (BLOCK_SIDE - 1);
+    global const float* columns = input->clusters.columns + c;
+    const uint stride = input->clusters.stride;
+    const Lanes dx = input->inBrick.x + halfBlock - vloadLanes(0, columns + SAMPLE_X * stride),
+                dy = input->inBrick.y + halfBlock - vloadLanes(0, columns + SAMPLE_Y * stride),
+                dz = input->inBrick.z + halfBlock - vloadLanes(0, columns + SAMPLE_Z * stride);
+    const Lanes nx = vloadLanes(0, columns + NORMAL_X * stride), ny = vloadLanes(0, columns + NORMAL_Y * stride),
+                nz = vloadLanes(0, columns + NORMAL_Z * stride);
+    const Lanes zero = 0.0f, reach = vloadLanes(0, columns + RADIUS * stride) + input->reach,
+                slab = vloadLanes(0, columns + THICKNESS * stride) + (input->reach + BIN_SLACK);
+    const Lanes away2 = squareLanes(max(fabs(dx) - halfBlock, zero)) + squareLanes(max(fabs(dy) - halfBlock, zero)) +
+                        squareLanes(max(fabs(dz) - halfBlock, zero));
+    return (away2 < reach * reach) &
+           (fabs(dx * nx + dy * ny + dz * nz) < slab + halfBlock * (fabs(nx) + fabs(ny) + fabs(nz)));
+}
+
+// Lists clusters that reach the block, from the c-th on, until the page may be full or there are no more. Returns the
+// cluster to go on with.
+uint turnPage(const Input* input, uint c, SHARED uint* page, SHARED uint* count) {
+    MEET;
+    if (ITEM == 0) *count = 0;
+    MEET;
+    while (c < input->range.y && *count <= PAGE - ITEMS * LANES) {
+        const uint at = c + ITEM * LANES;
+        uint bits = at < input->range.y ? bitsOf(reaching(input, at)) : 0;
+        // the columns have room for a vector more, and what stands there does not count
+        if (at < input->range.y && input->range.y - at < LANES) bits &= (1u << (input->range.y - at)) - 1;
+        MEET;
+        for (; bits != 0; bits &= bits - 1) {
+#if ITEMS > 1
+            const uint place = atomic_inc(count);
+#else
+            const uint place = (*count)++;
+#endif
+            page[place] = at + (uint)(lowestBit(bits));
+        }
+        c += ITEMS * LANES;
+        MEET;
+    }
+    return min(c, input->range.y);
+}
+
+float3 sampleOf(const Clusters* clusters, uint c) {
+    global const float* columns = clusters->columns + c;
+    return (float3)(columns[SAMPLE_X * clusters->stride], columns[SAMPLE_Y * clusters->stride],
+                    columns[SAMPLE_Z * clusters->stride]);
+}
+
+void applySamples(const Input* input, const Share* own, SHARED const uint* page, uint count, Found* found) {
+    for (uint i = 0; i < count; ++i)
+        applySample(found, own, sampleOf(&input->clusters, page[i]) - input->inBrick, input->reach);
+}
+
+// Asks the members of a cluster that come near some chunks.
+void askMembers(const Input* input, const Share* own, uint cluster, uint near, Found* found) {
+    const uint begin = input->clusters.begins[cluster], end = input->clusters.begins[cluster + 1];
+    for (uint m = begin; m < end; ++m) {
+        global const Member* member = input->members + m;
+        uint ask = near;
+        if (end - begin > 1) {
+            const Drum drum = makeDrum(vload3(0, member->sample) - input->inBrick, member->radius,
+                                       vload3(0, member->normal), 0);
+            ask = nearAmong(found, own, near, &drum);
+        }
+        if (ask != 0) askPiece(found, own, ask, input->pieces + member->piece, member->piece, input->block);
+    }
+}
+
+void askClusters(const Input* input, const Share* own, SHARED const uint* page, uint count, Found* found) {
+    const uint stride = input->clusters.stride;
+    for (uint i = 0; i < count; ++i) {
+        const uint c = page[i];
+        global const float* columns = input->clusters.columns + c;
+        const float3 sample = sampleOf(&input->clusters, c) - input->inBrick;
+        const float radius = columns[RADIUS * stride], thickness = columns[THICKNESS * stride];
+        const Drum drum = makeDrum(
+            sample, radius,
+            (float3)(columns[NORMAL_X * stride], columns[NORMAL_Y * stride], columns[NORMAL_Z * stride]), thickness);
+        const Share part = within(own, sample, input->reach + radius);
+        const uint near = nearChunks(found, &part, &drum, thickness > 0);
+        if (near != 0) askMembers(input, own, c, near, found);
+    }
+}
+
+// First bounds by samples, a little raised so that a piece's own distance wins over its sample's; then the pieces. The
+// page holds all clusters that reach the block, or else is turned once more. False if there is none.
+bool measure(const Input* input, const Share* own, SHARED uint* page, SHARED uint* count, Found* found) {
+    for (int i = 0; i < CHUNKS; ++i) found->nearest2[i] = square(input->reach);
+    uint next = input->range.x, pages = 0;
+    do {
+        next = turnPage(input, next, page, count);
+        applySamples(input, own, page, *count, found);
+        ++pages;
+    } while (next < input->range.y);
+    if (pages == 1 && *count == 0) return false;
+    for (int i = 0; i < CHUNKS; ++i) {
+        found->nearest2[i] = min(found->nearest2[i] * (1 + RAISED_PART) + RAISED_BY, (Lanes)(square(input->reach)));
+        found->nearest[i] = -1;
+    }
+    if (pages > 1) next = input->range.x;
+    do {
+        if (pages > 1) next = turnPage(input, next, page, count);
+        askClusters(input, own, page, *count, found);
+    } while (next < input->range.y);
+    return true;
+}
+
+// One bit a voxel: voxel (x, y, z) is bit 8 y + z of slice x.
+typedef union {
+    ulong slice[BLOCK_SIDE];
+#if LANES == 16
+    ushort chunk[BLOCK_SIDE * COLUMNS];
+#else
+    uchar chunk[BLOCK_SIDE * COLUMNS];
+#endif
+} Mask;
+
+#ifndef __ENDIAN_LITTLE__
+#error "masks of chunks are read as masks of slices in little endian order"
+#endif
+
+// A block as all items of its group see it. A row more of distances can be read.
+typedef struct {
+    float distance[BLOCK_VOXELS + BLOCK_SIDE * 2];
+    int nearest[BLOCK_VOXELS];
+    Mask known, outside, inside, far, mid;
+    Mask linkX, linkY, linkZ;
+    uint slot, open;
+} Block;
+
+void summarize(const Found* found, const Share* own, SHARED Block* block) {
+    for (int slice = own->firstSlice; slice <= own->lastSlice; ++slice)
+        for (int column = own->firstColumn; column <= own->lastColumn; ++column) {
+            const int i = chunkAt(slice, column), chunk = slice * COLUMNS + column;
+            const Lanes distance = sqrt(found->nearest2[i]);
+            const IntLanes nearest = found->nearest[i], known = nearest >= 0;
+            const IntLanes side = known & nearest & ((1 << SIDE_BITS) - 1);
+            vstoreLanes(distance, chunk, block->distance);
+            vstoreLanes(nearest, chunk, block->nearest);
+            block->known.chunk[chunk] = bitsOf(known);
+            // on the surface either side is right, and no link can carry it on
+            block->outside.chunk[chunk] = bitsOf((side == SIDE_OUTSIDE) | (distance < 0.5f * LINK_SLACK));
+            block->inside.chunk[chunk] = bitsOf(side == SIDE_INSIDE);
+            block->far.chunk[chunk] = bitsOf(known & (distance > FAR_FROM));
+            block->mid.chunk[chunk] = bitsOf(known & (distance > MID_FROM));
+        }
+}
+
+// Voxels whose distance and a neighbour's together exceed a voxel.
+uint linked(SHARED const float* distance, int step) {
+    return bitsOf(vloadLanes(0, distance) + vloadLanes(0, distance + step) > 1 + LINK_SLACK);
+}
+
+// Links of sdf/links.h.
+void findLinks(const Share* own, SHARED Block* block) {
+    const uint notLastZ = 0x7f7fu, notLastY = ROWS_AT_ONCE > 1 ? 0xffu : 0u;
+    for (int slice = own->firstSlice; slice <= own->lastSlice; ++slice)
+        for (int column = own->firstColumn; column <= own->lastColumn; ++column) {
+            const int chunk = slice * COLUMNS + column;
+            SHARED const float* row = block->distance + chunk * LANES;
+            block->linkZ.chunk[chunk] = linked(row, 1) & notLastZ;
+            block->linkY.chunk[chunk] = linked(row, BLOCK_SIDE) & (column == COLUMNS - 1 ? notLastY : ~0u);
+            block->linkX.chunk[chunk] = slice < BLOCK_SIDE - 1 ? linked(row, BLOCK_SIDE * BLOCK_SIDE) : 0;
+        }
+}
+
+// Lets a set grow inside one slice until it stops.
+ulong grownInSlice(ulong set, ulong linkY, ulong linkZ) {
+    for (;;) {
+        const ulong old = set;
+        set |= (set & linkZ) << 1 | (set >> 1 & linkZ);
+        set |= (set & linkY) << 8 | (set >> 8 & linkY);
+        if (set == old) return set;
+    }
+}
+
+// Adds to a set all voxels that links connect with it.
+void spread(SHARED const Block* block, SHARED Mask* set) {
+    uint changed = 0;  // slices whose neighbours have not heard of them yet
+    for (int x = 0; x < BLOCK_SIDE; ++x) {
+        if (set->slice[x] == 0) continue;
+        set->slice[x] = grownInSlice(set->slice[x], block->linkY.slice[x], block->linkZ.slice[x]);
+        changed |= 1u << x;
+    }
+    while (changed != 0) {
+        const int x = lowestBit(changed);
+        changed &= changed - 1;
+        for (int to = x - 1; to <= x + 1; to += 2) {
+            if (to < 0 || to >= BLOCK_SIDE) continue;
+            const ulong given = set->slice[x] & block->linkX.slice[min(x, to)];
+            if ((given & ~set->slice[to]) == 0) continue;
+            set->slice[to] = grownInSlice(set->slice[to] | given, block->linkY.slice[to], block->linkZ.slice[to]);
+            changed |= 1u << to;
+        }
+    }
+}
+
+double3 closestOnSegment(double3 a, double3 b) {
+    const double3 ab = b - a;
+    const double length2 = dot(ab, ab);
+    const double t = length2 > 0 ? clamp(-dot(a, ab) / length2, 0.0, 1.0) : 0.0;
+    // from the nearer end, so that both triangles of an edge find the same point whichever way they run it
+    return t <= 0.5 ? a + t * ab : b - (1 - t) * ab;
+}
+
+// The point of a triangle that is closest to the origin. Right for triangles without area too.
+double3 closestToOrigin(const Corners* t) {
+    const double3 ab = t->b - t->a, ac = t->c - t->a, bc = t->c - t->b, n = cross(ab, ac);
+    const double n2 = dot(n, n), longest2 = max(dot(ab, ab), max(dot(ac, ac), dot(bc, bc)));
+    // inside all three edges: the foot on the plane
+    if (n2 > FLATNESS * FLATNESS * longest2 * longest2 && dot(cross(ab, -t->a), n) >= 0 &&
+        dot(cross(bc, -t->b), n) >= 0 && dot(cross(-ac, -t->c), n) >= 0)
+        return dot(t->a, n) / n2 * n;
+    double3 best = closestOnSegment(t->a, t->b);
+    const double3 second = closestOnSegment(t->b, t->c), third = closestOnSegment(t->c, t->a);
+    if (dot(second, second) < dot(best, best)) best = second;
+    if (dot(third, third) < dot(best, best)) best = third;
+    return best;
+}
+
+// The angle under which a triangle is seen from one of its points: all round from within, half from an edge.
+double angleAt(const Corners* t, double3 p) {
+    const double3 c[3] = {t->a, t->b, t->c};
+    for (int i = 0; i < 3; ++i)
+        if (distance(c[i], p) <= SAME_PLACE) {
+            const double3 a = c[(i + 1) % 3] - c[i], b = c[(i + 2) % 3] - c[i];
+            return atan2(length(cross(a, b)), dot(a, b));
+        }
+    for (int i = 0; i < 3; ++i) {
+        const double3 edge = c[(i + 1) % 3] - c[i];
+        if (length(cross(edge, p - c[i])) <= SAME_PLACE * length(edge)) return M_PI;
+    }
+    return 2 * M_PI;
+}
+
+bool sameCorners(const Corners* s, const Corners* t) {
+    return (all(s->a == t->a) && all(s->b == t->b) && all(s->c == t->c)) ||
+           (all(s->a == t->b) && all(s->b == t->c) && all(s->c == t->a)) ||
+           (all(s->a == t->c) && all(s->b == t->a) && all(s->c == t->b));
+}
+
+// The mesh as seen from a point.
+typedef struct {
+    global const float* points;
+    global const uint* triangles;
+    double voxelsPerUnit;
+    double3 from;  // [voxels]
+} View;
+
+Corners seen(const View* view, uint triangle) {
+    Corners t = cornersOf(view->points, view->triangles, triangle, view->voxelsPerUnit);
+    t.a -= view->from;
+    t.b -= view->from;
+    t.c -= view->from;
+    return t;
+}
+
+// Triangles that may be nearest to a point.
+typedef struct {
+    uint triangle[MOST_FACES];
+    int count;
+    bool all;  // none was left out for want of room
+    double nearest;
+    double3 closest;  // the point of the nearest of them
+} Faces;
+
+void offer(Faces* faces, const View* view, uint triangle) {
+    for (int i = 0; i < faces->count; ++i)
+        if (faces->triangle[i] == triangle) return;
+    const Corners t = seen(view, triangle);
+    const double3 closest = closestToOrigin(&t);
+    const double away = length(closest);
+    if (away > faces->nearest + SAME_PLACE) return;
+    if (away < faces->nearest) {
+        // what was nearest may be so no more
+        if (away < faces->nearest - SAME_PLACE) faces->count = 0;
+        faces->nearest = away;
+        faces->closest = closest;
+    }
+    if (faces->count == MOST_FACES)
+        faces->all = false;
+    else
+        faces->triangle[faces->count++] = triangle;
+}
+
+// ClosestSide::side() of sdf/closest_side.cpp: below zero inside, above outside, zero where the normals at the closest
+// point cancel out or there are too many of them.
+double sideBy(const Faces* faces, const View* view) {
+    double sum = 0, weights = 0;
+    for (int i = 0; i < faces->count; ++i) {
+        const Corners t = seen(view, faces->triangle[i]);
+        const double3 closest = closestToOrigin(&t), ab = t.b - t.a, ac = t.c - t.a, bc = t.c - t.b,
+                      normal = cross(ab, ac);
+        const double size = length(normal), longest = sqrt(max(dot(ab, ab), max(dot(ac, ac), dot(bc, bc))));
+        // thinner than a place, a triangle has no normal to trust
+        if (distance(closest, faces->closest) > SAME_PLACE || size <= SAME_PLACE * longest) continue;
+        bool duplicate = false;
+        for (int j = 0; j < i; ++j) {
+            const Corners other = seen(view, faces->triangle[j]);
+            duplicate = duplicate || sameCorners(&other, &t);
+        }
+        if (duplicate) continue;
+        const double angle = angleAt(&t, faces->closest);
+        sum -= angle * dot(normal / size, faces->closest);
+        weights += angle;
+    }
+    return !faces->all || fabs(sum) <= CANCELLED * weights * faces->nearest ? 0 : sum;
+}
+
+// The same for a voxel of a block, by all pieces that may be as near as its nearest one.
+double sideOf(const Input* input, SHARED const Block* block, View* view, int voxel) {
+    const int3 at = (int3)(voxel / 64, voxel / 8 % 8, voxel % 8);
+    view->from = convert_double3(input->block + at);
+    Faces faces;
+    faces.count = 0;
+    faces.all = true;
+    faces.nearest = INFINITY;
+    offer(&faces, view, input->pieces[block->nearest[voxel] >> SIDE_BITS].triangle);
+    const float3 place = input->inBrick + convert_float3(at);
+    const float away = (float)(faces.nearest) + SIDE_SLACK;
+    global const float* radii = input->clusters.columns + RADIUS * input->clusters.stride;
+    for (uint c = input->range.x; c < input->range.y; ++c) {
+        if (distance(place, sampleOf(&input->clusters, c)) > away + radii[c]) continue;
+        for (uint m = input->clusters.begins[c]; m < input->clusters.begins[c + 1]; ++m) {
+            global const Member* member = input->members + m;
+            if (distance(place, vload3(0, member->sample)) <= away + member->radius)
+                offer(&faces, view, input->pieces[member->piece].triangle);
+        }
+    }
+    return sideBy(&faces, view);
+}
+
+// completeSides() of sdf/links.h: what sides are known spread over links; of each group of linked voxels that this
+// leaves without a side, one voxel is asked for. Returns the number of voxels on both sides; marks the block as open
+// where the closest feature leaves a side open.
+uint completeSides(const Input* input, SHARED Block* block, View* view) {
+    spread(block, &block->outside);
+    spread(block, &block->inside);
+    uint onBoth = 0;
+    for (int x = 0; x < BLOCK_SIDE; ++x) onBoth += (uint)(popcount(block->outside.slice[x] & block->inside.slice[x]));
+    for (int seeds = 0; seeds < 3; ++seeds) {
+        SHARED const Mask* some = seeds == 0 ? &block->far : seeds == 1 ? &block->mid : &block->known;
+        for (int x = 0; x < BLOCK_SIDE; ++x)
+            for (;;) {
+                const ulong open = some->slice[x] & ~(block->outside.slice[x] | block->inside.slice[x]);
+                if (open == 0) break;
+                const int bit = 63 - (int)(clz(open & -open));
+                const double side = sideOf(input, block, view, x * 64 + bit);
+                if (side == 0) {
+                    block->open = 1;
+                    return 0;
+                }
+                SHARED Mask* set = side < 0 ? &block->inside : &block->outside;
+                set->slice[x] |= 1ul << bit;
+                spread(block, set);
+            }
+    }
+    return onBoth;
+}
+
+// Lanes whose bit is set.
+IntLanes lanesOf(uint bits) {
+#if LANES == 16
+    const IntLanes lane = (IntLanes)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+#else
+    const IntLanes lane = (IntLanes)(0, 1, 2, 3, 4, 5, 6, 7);
+#endif
+    return ((IntLanes)(bits) & (IntLanes)(1) << lane) != 0;
+}
+
+enum { FILLED_BLOCKS, OPEN_BLOCKS, CONFLICTS };
+
+// A group fills a block of a brick. Blocks that hold distances go to the next places of `origins`, `distances` and
+// `nearestTriangles`; the places of those whose sides stay open go to `openBlocks`. With sign = 0 all distances are
+// positive.
+GROUP_KERNEL void fillBlocks(global const float* points, global const uint* triangles, Grid grid,
+                             global const uint* cellOfBrick, uint firstBrick, global const Piece* pieces,
+                             global const Member* members, global float* clusterColumns, global uint* clusterBegins,
+                             uint stride, global const uint2* ranges, int sign, global int* origins,
+                             global float* distances, global int* nearestTriangles, global int* openBlocks,
+                             global uint* counters) {
+    SHARED uint page[PAGE], count;
+    SHARED Block block;
+    const int side = (1 << grid.shift) / BLOCK_SIDE;
+    const uint perBrick = (uint)(side * side * side), brick = (uint)(get_group_id(0)) / perBrick,
+               number = (uint)(get_group_id(0)) % perBrick;
+    const int3 inBrick =
+        BLOCK_SIDE * (int3)((int)(number) / side / side, (int)(number) / side % side, (int)(number) % side);
+    const Input input = {{clusterColumns, clusterBegins, stride},
+                         members,
+                         pieces,
+                         ranges[brick * side + inBrick.x / BLOCK_SIDE],
+                         brickAt(&grid, cellOfBrick[firstBrick + brick]) * (1 << grid.shift) + inBrick,
+                         convert_float3(inBrick),
+                         (float)(grid.reach)};
+    if (input.range.x >= input.range.y) return;
+
+    const Share own = ownShare();
+    Found found;
+    if (!measure(&input, &own, page, &count, &found)) return;
+    summarize(&found, &own, &block);
+    MEET;
+    ulong known = 0;
+    for (int x = 0; x < BLOCK_SIDE; ++x) known |= block.known.slice[x];
+    if (known == 0) return;
+    if (sign) findLinks(&own, &block);
+    MEET;
+    if (ITEM == 0) {
+        block.open = 0;
+        View view = {points, triangles, grid.voxelsPerUnit, 0};
+        const uint conflicts = sign ? completeSides(&input, &block, &view) : 0;
+        if (conflicts > 0) atomic_add(counters + CONFLICTS, conflicts);
+        block.slot = atomic_inc(counters + (block.open ? OPEN_BLOCKS : FILLED_BLOCKS));
+        vstore3(input.block, block.slot, block.open ? openBlocks : origins);
+    }
+    MEET;
+    if (block.open) return;
+    for (int slice = own.firstSlice; slice <= own.lastSlice; ++slice)
+        for (int column = own.firstColumn; column <= own.lastColumn; ++column) {
+            const int chunk = slice * COLUMNS + column;
+            const size_t place = (size_t)(block.slot) * (BLOCK_VOXELS / LANES) + chunk;
+            const IntLanes nearest = vloadLanes(chunk, block.nearest);
+            const Lanes distance = select((Lanes)(FAR_AWAY), vloadLanes(chunk, block.distance), nearest >= 0);
+            const IntLanes inside = lanesOf(sign ? block.inside.chunk[chunk] : 0);
+            vstoreLanes(select(distance, -distance, inside), place, distances);
+            if (TRIANGLES) {
+                int owners[LANES];
+                vstoreLanes(nearest, 0, owners);
+                for (int i = 0; i < LANES; ++i)
+                    owners[i] = owners[i] < 0 ? -1 : (int)(pieces[owners[i] >> SIDE_BITS].triangle);
+                vstoreLanes(vloadLanes(0, owners), place, nearestTriangles);
+            }
+        }
+}

@@ -1,0 +1,43 @@
+// Device memory with a budget.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "cl/program.h"
+
+namespace bilayer {
+
+/// Hands out buffers and keeps count, so that a build stays within its budget whatever the device would give.
+class DeviceMemory {
+  public:
+    /// @param budget  most bytes in use at once
+    DeviceMemory(Device::Impl& device, std::uint64_t budget) : device_(device), budget_(budget) {}
+
+    /// A buffer. Throws DeviceError that says what it is for and how much that needs in all, if the budget or the
+    /// device's largest buffer are too small.
+    /// @param purpose  "the mesh"
+    cl::Buffer allocate(std::uint64_t bytes, const std::string& purpose);
+
+    /// A buffer that holds data of the host: in place where host and device share memory, else copied by the device's
+    /// queue. The data must stay until the commands that use it have ended.
+    /// @param event  if not null, receives the copy's
+    cl::Buffer upload(const void* data, std::uint64_t bytes, const std::string& purpose, cl::Event* event);
+
+    /// Counts a buffer of this size as freed.
+    void free(std::uint64_t bytes) { used_ -= bytes; }
+
+    /// Throws what allocate() throws for the want of memory.
+    [[noreturn]] void refuse(std::uint64_t bytes, const std::string& purpose) const;
+
+    std::uint64_t left() const { return budget_ - used_; }
+    std::uint64_t peak() const { return peak_; }  ///< most bytes that were in use at once
+
+  private:
+    void count(std::uint64_t bytes, const std::string& purpose);
+
+    Device::Impl& device_;
+    std::uint64_t budget_, used_ = 0, peak_ = 0;
+};
+
+}  // namespace bilayer

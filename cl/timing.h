@@ -1,0 +1,47 @@
+// What a device took for a build, by the events of its queues.
+#pragma once
+
+#include <utility>
+#include <vector>
+
+#include "cl/filler.h"
+#include "cl/program.h"
+
+namespace bilayer {
+
+/// Collects the events of one build.
+class Timing {
+  public:
+    enum class Of { kernel, upload, download };
+
+    /// @param times  where the sums go; null: nobody asks, and no event is kept
+    explicit Timing(OpenclTimes* times) : times_(times) {}
+
+    /// Where a command's event shall go; null if nobody asks.
+    cl::Event* event(Of what) {
+        if (!times_) return nullptr;
+        events_.emplace_back(what, cl::Event());
+        return &events_.back().second;
+    }
+    void keep(Of what, const cl::Event& event) {
+        if (times_) events_.emplace_back(what, event);
+    }
+
+    /// Adds up all events so far. Call it when the commands have ended.
+    void sumUp() {
+        for (const auto& [what, event] : events_) {
+            if (!event()) continue;  // nothing was sent: host and device share the memory
+            const auto begin = event.getProfilingInfo<CL_PROFILING_COMMAND_START>(),
+                       end = event.getProfilingInfo<CL_PROFILING_COMMAND_END>();
+            double& sum = what == Of::kernel ? times_->kernels : what == Of::upload ? times_->upload : times_->download;
+            sum += 1e-9 * double(end - begin);
+        }
+        events_.clear();
+    }
+
+  private:
+    OpenclTimes* times_;
+    std::vector<std::pair<Of, cl::Event>> events_;
+};
+
+}  // namespace bilayer
