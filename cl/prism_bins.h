@@ -3,9 +3,9 @@
 // C. Sigg, R. Peikert, M. Gross, "Signed distance transform using graphics hardware", IEEE Visualization 2003. The
 // prism of a triangle is as high as the band on both sides, and its three side planes halve the angles to the
 // neighbours across its edges: one polyhedron a triangle, that stands for the Voronoi cell of the face and for parts of
-// those of its edges and vertices. Beside an edge that is good: every voxel near to it is in one of two prisms. Around
-// a vertex of more than three edges the side planes do not meet in one line; there prisms overlap or leave gaps, which
-// is the method's leak.
+// those of its edges and vertices. Around a vertex of more than three edges the side planes do not meet in one line, so
+// that prisms overlap there or leave gaps; and those of triangles narrower than the band may close below it. That is
+// the method's leak.
 #pragma once
 
 #include <cstddef>

@@ -197,7 +197,7 @@ TEST_CASE("prisms give what asking all of them at every voxel gives") {
 }
 
 TEST_CASE("prisms give what asking all of them gives where they leak") {
-    for (const char* name : {"thingi_88566.stl", "marian_chair.obj"}) {
+    for (const char* name : {"thingi_88566.stl", "marian_chair.obj", "sliver_tet.ply"}) {
         const auto path = test::corpusMesh(name);
         if (!path) continue;
         CAPTURE(name);
