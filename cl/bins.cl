@@ -2,11 +2,11 @@
 // that includes this text says what parts it cuts a triangle into.
 #include "common.cl"
 
-// Whether a triangle is one part, whatever brick asks.
-bool isOnePart(const Corners* triangle);
-
-// The number of parts that a brick with these limits cuts a triangle into.
-uint countParts(const Corners* triangle, const Limits* limits);
+// What the double layer method samples triangles by (DoubleLayerOptions of sdf/build.h); nothing to others.
+typedef struct {
+    double epsilon;
+    int maxSubdivision, fillGaps, recursive;
+} Sampling;
 
 // BrickRange of sdf/triangle_bins.cpp, and how the triangles are shared out.
 typedef struct {
@@ -19,7 +19,14 @@ typedef struct {
     uint triangles;
     uint cells;  // bricks in all
     uint runs;   // of triangles, with counters of their own each
+    Sampling sampling;
 } Grid;
+
+// Whether a triangle is one part, whatever brick asks.
+bool isOnePart(const Grid* grid, const Corners* triangle);
+
+// The most parts that a brick with these limits cuts a triangle into.
+uint countParts(const Grid* grid, const Corners* triangle, const Limits* limits);
 
 int3 toInt3(const int* v) {
     return (int3)(v[0], v[1], v[2]);
@@ -83,7 +90,7 @@ void visit(const Bins* bins, const Grid* grid, const Corners* t, uint cell, bool
     } else if (!onePart) {
         const Limits limits = limitsOf(grid, brickAt(grid, cell));
         // fewer than one comes out right too: sums of unsigned numbers wrap around
-        atomic_add(bins->more + cell, countParts(t, &limits) - 1);
+        atomic_add(bins->more + cell, countParts(grid, t, &limits) - 1);
     }
 }
 
@@ -123,7 +130,7 @@ void binTriangle(const Bins* bins, const Grid* grid, const Corners* t) {
         divide(bins, grid, t, lower, upper);
         return;
     }
-    const bool onePart = bins->list || isOnePart(t);
+    const bool onePart = bins->list || isOnePart(grid, t);
     for (int x = lower.x; x <= upper.x; ++x)
         for (int y = lower.y; y <= upper.y; ++y)
             for (int z = lower.z; z <= upper.z; ++z) visit(bins, grid, t, cellAt(grid, (int3)(x, y, z)), onePart);

@@ -32,6 +32,9 @@ BrickGrid gridFor(const FillJob& job, float reach, float margin) {
         grid.cells *= cl_uint(grid.size[axis]);
     }
     grid.triangles = cl_uint(job.mesh.mesh.triangles.size());
+    const DoubleLayerOptions& layers = job.options.doubleLayer;
+    grid.sampling = {double(layers.epsilon), layers.maxSubdivision, layers.fillGaps,
+                     layers.subdivision == Subdivision::recursive};
     return grid;
 }
 

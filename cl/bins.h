@@ -19,6 +19,10 @@ struct BrickGrid {
     cl_int size[3];          ///< [bricks]
     cl_int shift;            ///< bricks have 2^shift voxels a side
     cl_uint triangles, cells, runs;
+    struct {
+        double epsilon;
+        cl_int maxSubdivision, fillGaps, recursive;
+    } sampling;  ///< by the double layer method
 
     int blocksPerSide() const { return (1 << shift) / blockSide; }
 };

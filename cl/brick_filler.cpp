@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <optional>
 #include <span>
 #include <string>
@@ -20,7 +21,9 @@
 
 namespace bilayer {
 
-extern const char* const exact_cl;  // the text of exact.cl
+// The texts of exact.cl and double_layer.cl.
+extern const char* const exact_cl;
+extern const char* const double_layer_cl;
 
 namespace {
 
@@ -33,12 +36,26 @@ constexpr std::size_t bricksForProcessor = 64, bricksForGpu = 512;
 /// Groups for each compute unit that prepare bricks, each with scratch memory of its own.
 constexpr std::size_t groupsPerUnit = 4;
 constexpr std::uint64_t scratchPart = 8;  // of the budget, at most
-/// A part's numbers in the buffers of a batch: the part, two orders of members, a cell, a cluster's columns and begin.
-constexpr std::uint64_t pieceBytes = 108, memberBytes = 32, clusterBytes = 36;
+/// Bytes of Member in groups.cl.
+constexpr std::uint64_t memberBytes = 32;
+/// Parts that a kernel can number in one batch.
+constexpr std::uint64_t mostParts = 1 << 27;
 /// Cells as small as those that pieces are grouped by, and how far beyond its reach a brick's samples lie [voxels].
 constexpr float smallestCell = 1.1f, aroundBrick = 3;
 
 enum Counter { filledBlocks, openBlocks, conflicts, counters };
+
+// What the kernels of a method keep of a part of a triangle: Piece of pieces.cl or a sample, and columns of a group.
+struct PartSizes {
+    std::uint64_t bytes, columns;
+};
+constexpr PartSizes pieceSizes{112, 8}, sampleSizes{12, 11};
+
+// `Layers` of double_layer.cl.
+struct KernelLayers {
+    cl_float delta, reach, certain;
+    cl_int cube;
+};
 
 // What a batch of bricks needs, or what its buffers hold.
 struct Load {
@@ -49,7 +66,7 @@ struct Load {
 
 struct Batch {
     Load capacity, load;  // of the buffers, and of what is under way
-    cl::Buffer pieces, unsorted, members, cells, columns, begins, ranges;
+    cl::Buffer parts, unsorted, members, cells, columns, begins, ranges;
     cl::Buffer origins, distances, triangles, open, counts;
     std::array<cl_uint, counters> found{};
     cl::Event counted;
@@ -113,6 +130,8 @@ class BrickFill {
     OpenclTimes* times_;
     Timing timing_;
     DeviceMemory memory_;
+    const bool layered_;  // by the double layer method, else exact
+    const PartSizes sizes_;
     cl::Program program_;
     std::optional<DeviceBins> bins_;
     cl::CommandQueue transfers_;
@@ -133,11 +152,18 @@ std::uint64_t budget(const Device::Impl& device, const OpenclOptions& options) {
     return options.memoryMiB > 0 ? options.memoryMiB * mebibyte : device.info.memoryBytes / 4 * 3;
 }
 
-std::string buildOptions(const Device::Impl& device, bool gpuMapping, bool triangles) {
+// How far a voxel may lie from a triangle that matters to it: the paper's cube sticks out of the ball.
+float reachOf(const FillJob& job) {
+    if (job.options.method != Method::doubleLayer) return job.mesh.reach;
+    return job.layers.reach * (job.layers.cube > 0 ? std::sqrt(3.f) : 1.f);
+}
+
+std::string buildOptions(const Device::Impl& device, bool gpuMapping, bool triangles, bool cube) {
     std::string options = "-cl-std=CL1.2";
     if (device.info.exactSquareRoots) options += " -cl-fp32-correctly-rounded-divide-sqrt";
     if (gpuMapping) options += " -D GROUP_PER_BLOCK";
     if (triangles) options += " -D TRIANGLES=1";
+    if (cube) options += " -D PAPER_CUBE=1";
     return options;
 }
 
@@ -148,10 +174,13 @@ BrickFill::BrickFill(Device::Impl& device, const OpenclOptions& options, const F
       times_(options.times),
       timing_(options.times),
       memory_(device, budget(device, options)),
-      program_(buildProgram(device, exact_cl, buildOptions(device, gpuMapping_, job.mesh.triangles))),
+      layered_(job.options.method == Method::doubleLayer),
+      sizes_(layered_ ? sampleSizes : pieceSizes),
+      program_(buildProgram(device, layered_ ? double_layer_cl : exact_cl,
+                            buildOptions(device, gpuMapping_, job.mesh.triangles, layered_ && job.layers.cube > 0))),
       transfers_(device.context, device.device, CL_QUEUE_PROFILING_ENABLE) {
-    const float reach = job.mesh.reach;
-    bins_.emplace(device, program_, memory_, job, reach, reach + 1, gpuMapping_, timing_);
+    const float reach = reachOf(job);
+    bins_.emplace(device, program_, memory_, job, reach, layered_ ? reach : reach + 1, gpuMapping_, timing_);
     job.mesh.progress.begin(bins_->bricks());
     makeScratch();
 }
@@ -179,7 +208,8 @@ void BrickFill::makeScratch() {
 
 std::uint64_t BrickFill::bytesOf(const Load& load) const {
     const std::uint64_t perBlock = 2 * sizeof(glm::ivec3) + blockVoxels * sizeof(float) * (job_.mesh.triangles ? 2 : 1);
-    return load.parts * (pieceBytes + 2 * memberBytes + sizeof(cl_uint)) + (load.parts + lanes) * clusterBytes +
+    return load.parts * (sizes_.bytes + 2 * memberBytes + sizeof(cl_uint)) +
+           (load.parts + lanes) * (sizes_.columns * sizeof(cl_float) + sizeof(cl_uint)) +
            blocksOf(load) * perBlock + load.bricks * slices() * sizeof(cl_uint2) + counters * sizeof(cl_uint);
 }
 
@@ -193,17 +223,18 @@ Load BrickFill::loadOf(std::size_t first, std::size_t last) const {
 
 // Whether a batch may be as large as this: its share of the memory, and the largest buffer.
 bool BrickFill::fits(const Load& load) const {
-    const std::uint64_t largest = std::max(blocksOf(load) * blockVoxels * sizeof(float), load.parts * pieceBytes);
-    return bytesOf(load) <= share_ && largest <= device_.info.maxAllocationBytes;
+    const std::uint64_t largest = std::max(blocksOf(load) * blockVoxels * sizeof(float), load.parts * (sizes_.columns + 2) * sizeof(cl_float) * 4);
+    return load.parts < mostParts && bytesOf(load) <= share_ && largest <= device_.info.maxAllocationBytes;
 }
 
 // The end of the run of bricks from `first` on that go into one batch.
 std::size_t BrickFill::lastFitting(std::size_t first) const {
     if (!fits(loadOf(first, first + 1)))
         memory_.refuse(batchesInFlight * bytesOf(loadOf(first, first + 1)), "a brick of the grid");
-    const std::size_t end = std::min(bins_->bricks(), first + (gpuMapping_ ? bricksForGpu : bricksForProcessor));
+    const std::size_t end = std::min(bins_->bricks(), first + (gpuMapping_ ? bricksForGpu : (getenv("BR")?atoi(getenv("BR")):bricksForProcessor)));
+    const std::size_t mostParts = getenv("PA")?atoi(getenv("PA")):60000;
     std::size_t last = first + 1;
-    while (last < end && fits(loadOf(first, last + 1))) ++last;
+    while (last < end && fits(loadOf(first, last + 1)) && loadOf(first, last + 1).parts<mostParts) ++last;
     return last;
 }
 
@@ -216,11 +247,11 @@ void BrickFill::reserve(Batch& batch, const Load& load) {
     batch.capacity = fits(grown) ? grown : load;
     const Load& c = batch.capacity;
     const auto buffer = [&](std::uint64_t bytes) { return memory_.allocate(bytes, "a batch of bricks"); };
-    batch.pieces = buffer(c.parts * pieceBytes);
+    batch.parts = buffer(c.parts * sizes_.bytes);
     batch.unsorted = buffer(c.parts * memberBytes);
     batch.members = buffer(c.parts * memberBytes);
     batch.cells = buffer(c.parts * sizeof(cl_uint));
-    batch.columns = buffer((c.parts + lanes) * (clusterBytes - sizeof(cl_uint)));
+    batch.columns = buffer((c.parts + lanes) * sizes_.columns * sizeof(cl_float));
     batch.begins = buffer((c.parts + lanes) * sizeof(cl_uint));
     batch.ranges = buffer(c.bricks * slices() * sizeof(cl_uint2));
     batch.origins = buffer(blocksOf(c) * sizeof(glm::ivec3));
@@ -239,14 +270,27 @@ void BrickFill::start(Batch& batch, std::size_t first, std::size_t last) {
                   bricks = cl_uint(load.bricks);
     device_.queue.enqueueFillBuffer(next_, none, 0, sizeof none);
     device_.queue.enqueueFillBuffer(batch.counts, none, 0, counters * sizeof none);
-    enqueue("prepareBricks", std::min<std::size_t>(scratchGroups_, bricks), bins_->points(), bins_->triangles(),
-            bins_->grid(), bins_->cellOfBrick(), bins_->triangleOffsets(), bins_->partOffsets(), bins_->list(),
-            firstBrick, bricks, batch.pieces, batch.unsorted, batch.members, batch.cells, batch.columns, batch.begins,
-            stride, scratch_, scratchCells_, batch.ranges, next_);
-    enqueue("fillBlocks", blocksOf(load), bins_->points(), bins_->triangles(), bins_->grid(), bins_->cellOfBrick(),
-            firstBrick, batch.pieces, batch.members, batch.columns, batch.begins, stride, batch.ranges,
-            cl_int(job_.mesh.sign), batch.origins, batch.distances,
-            job_.mesh.triangles ? batch.triangles : batch.origins, batch.open, batch.counts);
+    const FillParameters& p = job_.layers;
+    const KernelLayers layers{p.delta, p.reach, p.certain, p.cube};
+    const DeviceBins& bins = *bins_;
+    const auto prepare = [&](const auto&... more) {
+        enqueue("prepareBricks", std::min<std::size_t>(scratchGroups_, bricks), bins.points(), bins.triangles(),
+                bins.grid(), bins.cellOfBrick(), bins.triangleOffsets(), bins.partOffsets(), bins.list(), firstBrick,
+                bricks, batch.parts, batch.unsorted, batch.members, batch.cells, batch.columns, batch.begins, stride,
+                scratch_, scratchCells_, batch.ranges, next_, more...);
+    };
+    const cl::Buffer& triangles = job_.mesh.triangles ? batch.triangles : batch.origins;
+    if (layered_) {
+        prepare(layers);
+        enqueue("fillBlocks", blocksOf(load), bins.grid(), bins.cellOfBrick(), firstBrick, batch.parts, batch.members,
+                batch.columns, batch.begins, stride, batch.ranges, layers, batch.origins, batch.distances, triangles,
+                batch.counts);
+    } else {
+        prepare();
+        enqueue("fillBlocks", blocksOf(load), bins.points(), bins.triangles(), bins.grid(), bins.cellOfBrick(),
+                firstBrick, batch.parts, batch.members, batch.columns, batch.begins, stride, batch.ranges,
+                cl_int(job_.mesh.sign), batch.origins, batch.distances, triangles, batch.open, batch.counts);
+    }
     device_.queue.enqueueReadBuffer(batch.counts, CL_FALSE, 0, sizeof batch.found, batch.found.data(), nullptr,
                                     &batch.counted);
     timing_.keep(Timing::Of::download, batch.counted);

@@ -1,253 +1,430 @@
-// The double layer method on a device: the same samples in the same order by the same operations as
-// sdf/layer_block.cpp.
+// The double layer method on a device: the samples of sdf/layer_samples.h, applied as sdf/layer_block.cpp does it.
 //
-// Two mappings of blocks of 8x8x8 voxels to work-items, chosen when this text is built:
-//   default          a work-item fills a whole block: for processors, whose vector units take a row of voxels at once
-//   -D ROW_PER_ITEM  a work-group of 64 items fills a block, each item one row of 8 voxels in registers: for GPUs
-// -D TRIANGLES=1 also keeps whose sample is the nearest.
-#pragma OPENCL FP_CONTRACT OFF
+// -D TRIANGLES=1 also keeps whose sample is the nearest; -D PAPER_CUBE=1 replaces the ball around a sample by the
+// paper's cube of (2 K + 1)^3 voxels.
+#include "samples.cl"
 
 #ifndef TRIANGLES
 #define TRIANGLES 0
 #endif
-
-#ifdef ROW_PER_ITEM
-#define ROWS 1
-#else
-#define ROWS 64
+#ifndef PAPER_CUBE
+#define PAPER_CUBE 0
 #endif
 
-// Tile of sdf/tiles.h.
-typedef struct {
-    int base[3];
-    float first[3], down[3], across[3], offset[3];
-    int rows;
-} Tile;
+// What stays in registers: a cube of 4x4x4 voxels, a vector for each slice of one x, or a GPU's row of 8.
+#if ITEMS > 1
+#define CUBE_SIDE 8
+#define SLICES 1
+#define CUBES 1
+#else
+#define CUBE_SIDE 4
+#define SLICES 4
+#define CUBES 8
+#endif
 
-// FillParameters of sdf/blocks.h.
+// layerTie of sdf/blocks.h [voxels^2].
+#define LAYER_TIE 1e-5f
+// Groups with fewer runs than this are applied without a look at what they could improve.
+#define RUNS_WORTH_A_LOOK 5
+
+#ifdef FP_FAST_FMAF
+#define multiplyAdd fma
+#else
+#define multiplyAdd(a, b, c) ((a) * (b) + (c))
+#endif
+
+// FillParameters of sdf/blocks.h [voxels].
 typedef struct {
     float delta, reach, certain;
     int cube;
-} Parameters;
-
-// The rows of 8 voxels along z of one work-item: squared distances to both layers, and whose samples these are.
-typedef struct {
-    float8 inner2[ROWS], outer2[ROWS];
-    int8 innerOwner[ROWS], outerOwner[ROWS];  // only if TRIANGLES
 } Layers;
 
-// A sample in the block's own voxels, and the squared distances along z from its two layers, the same for every row.
-typedef struct {
-    float3 at, inner, outer;
-    float8 innerZ2, outerZ2;
-} Sample;
-
-constant float lastVoxel = 7.0f;
-
-float square(float value) { return value * value; }
-float outside(float coordinate) { return coordinate - clamp(coordinate, 0.0f, lastVoxel); }
-float3 toFloat3(const float* v) { return (float3)(v[0], v[1], v[2]); }
-
-// Squared distances from the eight voxels along an axis to a coordinate.
-float8 axisDistances(float coordinate) {
-    const float8 away = (float8)(0, 1, 2, 3, 4, 5, 6, 7) - coordinate;
-    return away * away;
-}
-
-// The lattice point nearest to a sample. Halves go up, whatever the rounding: LayerSamples::nearestLattice() of
-// sdf/layer_samples.h.
-float nearestLattice(float coordinate) {
-    return floor(coordinate + 0.5001f);
-}
-
-// Which of the eight voxels on an axis lie in the paper's neighbourhood: within K of the voxel nearest to the sample.
-int8 inCube(float coordinate, int k) {
-    return fabs((float8)(0, 1, 2, 3, 4, 5, 6, 7) - nearestLattice(coordinate)) <= (float8)(k);
-}
-
-Sample makeSample(float3 at, float3 offset, int cube) {
-    Sample s;
-    s.at = at;
-    s.inner = at - offset;
-    s.outer = at + offset;
-    s.innerZ2 = axisDistances(s.inner.z);
-    s.outerZ2 = axisDistances(s.outer.z);
-    if (cube > 0) {
-        const int8 kept = inCube(at.z, cube);
-        s.innerZ2 = select((float8)(INFINITY), s.innerZ2, kept);
-        s.outerZ2 = select((float8)(INFINITY), s.outerZ2, kept);
-    }
-    return s;
-}
-
-void clear(Layers* layers) {
-    for (int row = 0; row < ROWS; ++row) {
-        layers->inner2[row] = layers->outer2[row] = (float8)(INFINITY);
-        if (TRIANGLES) layers->innerOwner[row] = layers->outerOwner[row] = (int8)(-1);
-    }
-}
-
-// Keeps the smaller distances of a row; the first triangle of equal ones stays.
-void nearer(Layers* layers, int row, float8 inner2, float8 outer2, int owner) {
-    if (TRIANGLES) {
-        layers->innerOwner[row] = select(layers->innerOwner[row], (int8)(owner), inner2 < layers->inner2[row]);
-        layers->outerOwner[row] = select(layers->outerOwner[row], (int8)(owner), outer2 < layers->outer2[row]);
-    }
-    layers->inner2[row] = min(layers->inner2[row], inner2);
-    layers->outer2[row] = min(layers->outer2[row], outer2);
-}
-
-// A sample applies to all rows that meet the ball of radius `reach` around it, or the cube. Voxels of such a row beyond
-// the ball do no harm: a voxel counts only if it is certainly within the reach of its nearest sample.
-#ifdef ROW_PER_ITEM
-
-// Applies a sample to the one row of this work-item.
-void splat(Layers* layers, float3 at, float3 offset, Parameters parameters, int owner) {
-    const float x = (float)(get_local_id(0) / 8), y = (float)(get_local_id(0) % 8);
-    if (parameters.cube > 0) {
-        const float k = (float)(parameters.cube);
-        if (fabs(x - nearestLattice(at.x)) > k || fabs(y - nearestLattice(at.y)) > k) return;
-    } else if (square(x - at.x) + square(y - at.y) >= square(parameters.reach) - square(outside(at.z))) {
-        return;
-    }
-    const Sample s = makeSample(at, offset, parameters.cube);
-    nearer(layers, 0, square(x - s.inner.x) + square(y - s.inner.y) + s.innerZ2,
-           square(x - s.outer.x) + square(y - s.outer.y) + s.outerZ2, owner);
-}
-
-#else
-
-// Rows of a block as a bit each: row (x, y) is bit 8 x + y.
-typedef ulong Rows;
-
-#ifndef __ENDIAN_LITTLE__
-#error "bits of rows are gathered from bytes in little endian order"
-#endif
-
-Rows rowsWithin(float3 at, float limit2) {
-    const float8 x2 = axisDistances(at.x);
-    float y2[8];
-    vstore8(axisDistances(at.y), 0, y2);
-    int8 bits = 0;
-    for (int y = 0; y < 8; ++y) bits |= (x2 + y2[y] < limit2) & (1 << y);
-    return as_ulong(convert_uchar8(bits));
-}
-
-Rows rowsInCube(float3 at, int k) {
-    int inY[8], bits = 0;
-    vstore8(inCube(at.y, k), 0, inY);
-    for (int y = 0; y < 8; ++y) bits |= inY[y] & (1 << y);
-    return as_ulong(convert_uchar8(inCube(at.x, k) & bits));
-}
-
-// Squared distances from a point to the rows across z.
-void rowDistances(float3 point, float* squares) {
-    float x2[8];
-    vstore8(axisDistances(point.x), 0, x2);
-    const float8 y2 = axisDistances(point.y);
-    for (int x = 0; x < 8; ++x) vstore8(x2[x] + y2, x, squares);
-}
-
-// Applies a sample to the rows of a block.
-void splat(Layers* layers, float3 at, float3 offset, Parameters parameters, int owner) {
-    const float limit2 = square(parameters.reach) - square(outside(at.z));
-    if (parameters.cube == 0 && square(outside(at.x)) + square(outside(at.y)) >= limit2) return;
-    const Sample s = makeSample(at, offset, parameters.cube);
-    float inner2[64], outer2[64];
-    rowDistances(s.inner, inner2);
-    rowDistances(s.outer, outer2);
-    Rows rows = parameters.cube > 0 ? rowsInCube(at, parameters.cube) : rowsWithin(at, limit2);
-    for (; rows != 0; rows &= rows - 1) {
-        const int row = 63 - (int)(clz(rows & -rows));
-        nearer(layers, row, inner2[row] + s.innerZ2, outer2[row] + s.outerZ2, owner);
-    }
-}
-
-#endif
-
-// Whether a run of samples from a to b stays away from the block.
-bool runMisses(float3 a, float3 b, float reach) {
-    return any(max(a, b) < -reach) || any(min(a, b) > lastVoxel + reach);
-}
-
-// Applies all samples of a tile: Algorithm 1 and Eq. 2 of the paper.
-void applyTile(Layers* layers, Tile tile, int3 block, Parameters parameters, int owner) {
-    const float3 across = toFloat3(tile.across), offset = toFloat3(tile.offset);
-    const float3 shift = convert_float3((int3)(tile.base[0], tile.base[1], tile.base[2]) - block);
-    for (int i = 0; i < tile.rows; ++i) {
-        const float3 start = toFloat3(tile.first) + (float)(i) * toFloat3(tile.down);
-        if (i > 0 && runMisses(start + shift, start + (float)(i) * across + shift, parameters.reach)) continue;
-        for (int j = 0; j <= i; ++j) splat(layers, start + (float)(j) * across + shift, offset, parameters, owner);
-    }
-}
-
-// Eq. 3. The inside keeps its sign bit where the distance is clamped to zero.
-// The voxel is inside where both layers are equally near up to rounding: layerTie of sdf/blocks.h.
-int8 isInside(float8 inner2, float8 outer2) {
-    return inner2 <= outer2 + 1e-5f;
-}
-
-float8 combine(float8 inner2, float8 outer2, Parameters parameters) {
-    const int8 inside = isInside(inner2, outer2);
-    const float8 clamped = max(sqrt(select(inner2, outer2, inside)) - parameters.delta, (float8)(0.0f));
-    const int8 known = min(inner2, outer2) < square(parameters.certain);
-    return select((float8)(INFINITY), select(clamped, -clamped, inside), known);
-}
-
-// Writes the rows of a work-item; `place` counts rows over all blocks.
-void store(const Layers* layers, size_t place, Parameters parameters, global float* distances, global int* triangles) {
-    for (int row = 0; row < ROWS; ++row) {
-        const float8 inner2 = layers->inner2[row], outer2 = layers->outer2[row];
-        vstore8(combine(inner2, outer2, parameters), place + row, distances);
-        if (TRIANGLES)
-            vstore8(select(layers->innerOwner[row], layers->outerOwner[row], isInside(inner2, outer2)), place + row, triangles);
-    }
-}
-
-// Block b has its first voxel at origins[3 b] and the tiles reaching[offsets[b]] .. reaching[offsets[b + 1]], in
-// ascending order. Voxel (x, y, z) of it goes to place (x * 8 + y) * 8 + z of its 512 places. `owners` has the triangle
-// of each tile; without TRIANGLES it is not read, nor is `triangles` written.
-#ifdef ROW_PER_ITEM
-
-kernel __attribute__((reqd_work_group_size(64, 1, 1))) void fillBlocks(
-    global const Tile* tiles, global const int* owners, global const int* origins, global const uint* offsets,
-    global const uint* reaching, Parameters parameters, global float* distances, global int* triangles) {
-    local Tile staged[64];
-    local int stagedOwners[64];
-    Layers layers;
-    clear(&layers);
-    const size_t block = get_group_id(0), item = get_local_id(0);
-    const int3 origin = vload3(block, origins);
-    const uint end = offsets[block + 1];
-    // the items of a group fetch 64 tiles at once, then each applies all of them to its own row
-    for (uint begin = offsets[block]; begin < end; begin += 64) {
-        const uint count = min(end - begin, 64u);
-        barrier(CLK_LOCAL_MEM_FENCE);
-        if (item < count) {
-            const uint index = reaching[begin + item];
-            staged[item] = tiles[index];
-            stagedOwners[item] = TRIANGLES ? owners[index] : 0;
+// Bricks into runs of samples and groups of them. Work-groups take the bricks one after another, so that few need
+// scratch memory.
+GROUP_KERNEL void prepareBricks(global const float* points, global const uint* triangles, Grid grid,
+                                global const uint* cellOfBrick, global const uint* triangleOffsets,
+                                global const uint* partOffsets, global const uint* list, uint firstBrick, uint bricks,
+                                global float* samples, global Run* unsorted, global Run* runs,
+                                global uint* cellOfRun, global float* groupColumns, global uint* groupBegins,
+                                uint stride, global uint* scratch, uint scratchCells, global uint2* ranges,
+                                global uint* next, Layers layers) {
+    SHARED uint taken, counts[2];
+    SHARED Extent extents[ITEMS];
+    SHARED uint2 sums[ITEMS];
+    const Groups groups = {groupColumns, groupBegins, stride};
+    const int side = 1 << grid.shift, slices = side / BLOCK_SIDE;
+    const float reach = (float)(grid.reach), twiceDelta = 2 * layers.delta;
+    for (;;) {
+        MEET;
+        if (ITEM == 0) {
+            taken = atomic_inc(next);
+            counts[RUNS] = counts[SAMPLES] = 0;
         }
-        barrier(CLK_LOCAL_MEM_FENCE);
-        for (uint t = 0; t < count; ++t) applyTile(&layers, staged[t], origin, parameters, stagedOwners[t]);
+        MEET;
+        if (taken >= bricks) return;
+        const uint b = firstBrick + taken, first = partOffsets[b] - partOffsets[firstBrick];
+        const int3 brick = brickAt(&grid, cellOfBrick[b]);
+        const Limits limits = limitsOf(&grid, brick);
+        Cut cut = {samples + 3 * (size_t)(first), unsorted + first,
+                   counts,                        first,
+                   convert_double3(brick * side), -reach,
+                   (float)(side - 1) + reach,     twiceDelta,
+                   noExtent()};
+        cutTriangles(&cut, &grid, points, triangles, list, triangleOffsets[b], triangleOffsets[b + 1], &limits);
+        extents[ITEM] = cut.extent;
+        MEET;
+        const uint found = counts[RUNS];
+        const Extent all = sumExtents(extents);
+        uint groupCount = found;
+        bool gathered = all.sizes < 2 * SMALL_AREA * (double)(found);
+        if (gathered) {
+            const Cells cells = makeCells(&all, CELL_SIZE);
+            gathered = countCells(&cells) <= (float)(scratchCells);
+            if (gathered)
+                groupCount = sortMembers(&groups, first, (global const Member*)(unsorted + first),
+                                         (global Member*)(runs + first), cellOfRun + first, found, &cells,
+                                         scratch + get_group_id(0) * scratchCells, sums);
+        }
+        for (uint g = first + ITEM; g < first + groupCount; g += ITEMS) {
+            if (gathered) {
+                groupRuns(&groups, g, samples, runs);
+            } else {
+                runs[g] = unsorted[g];
+                groups.begins[g] = g;
+                groupRun(&groups, g, samples, runs + g, twiceDelta);
+            }
+        }
+        if (!gathered && ITEM == 0) groups.begins[first + found] = first + found;
+        MEET;
+        rangeGroups(&groups, first, groupCount, slices, reach, ranges + taken * slices);
     }
-    store(&layers, block * 64 + item, parameters, distances, triangles);
+}
+
+// What was found for the voxels of a cube: squared distances to both layers less delta^2, and whose samples these are.
+typedef struct {
+    Lanes inner2[SLICES], outer2[SLICES];
+#if TRIANGLES
+    IntLanes innerOwner[SLICES], outerOwner[SLICES];
+#endif
+} Found;
+
+// Where the voxels of a cube are, in the voxels of the brick.
+typedef struct {
+    float x;
+    Lanes y, z;
+} Voxels;
+
+// The first voxel of an item's cube, in the block.
+int3 cornerOf(int cube) {
+#if ITEMS > 1
+    (void)(cube);
+    return (int3)((int)(ITEM) / BLOCK_SIDE, (int)(ITEM) % BLOCK_SIDE, 0);
+#else
+    return CUBE_SIDE * (int3)(cube / 4, cube / 2 % 2, cube % 2);
+#endif
+}
+
+Voxels voxelsOf(float3 first) {
+#if ITEMS > 1
+    const Voxels v = {first.x, first.y, first.z + (Lanes)(0, 1, 2, 3, 4, 5, 6, 7)};
+#else
+    const float4 row = (float4)(0, 1, 2, 3), one = 1.0f;
+    const Voxels v = {first.x, first.y + (Lanes)(0 * one, one, 2 * one, 3 * one),
+                      first.z + (Lanes)(row, row, row, row)};
+#endif
+    return v;
+}
+
+// The lattice point nearest to a sample. Halves go up, whatever the rounding: LayerSamples::nearestLattice().
+float3 nearestLattice(float3 place) {
+    return floor(place + 0.5001f);
+}
+
+// Squared distances from a cube's voxels to a sample: along x for each slice, and across. Infinite outside of the
+// paper's cube, if that is asked for.
+typedef struct {
+    float along2[SLICES];
+    Lanes across2;
+} Measured;
+
+Measured measure(const Voxels* v, float3 place, int k) {
+    Measured m;
+    for (int i = 0; i < SLICES; ++i) m.along2[i] = square(v->x + (float)(i)-place.x);
+    const Lanes dy = v->y - place.y, dz = v->z - place.z;
+    m.across2 = multiplyAdd(dy, dy, dz * dz);
+    if (PAPER_CUBE) {
+        const float3 centre = nearestLattice(place);
+        const Lanes away = max(fabs(v->y - centre.y), fabs(v->z - centre.z));
+        m.across2 = select((Lanes)(INFINITY), m.across2, away <= (float)(k));
+        for (int i = 0; i < SLICES; ++i)
+            if (fabs(v->x + (float)(i)-centre.x) > (float)(k)) m.along2[i] = INFINITY;
+    }
+    return m;
+}
+
+void applyRun(Found* found, const Voxels* v, global const float* samples, global const Run* run, int k) {
+    const float3 place = vload3(0, run->place), normal = vload3(0, run->twiceOffset);
+    const uint count = sampleCount(run);
+    Lanes nearest2[SLICES];
+    const Measured first = measure(v, place, k);
+    for (int i = 0; i < SLICES; ++i) nearest2[i] = first.along2[i] + first.across2;
+    for (uint s = 1; s < count; ++s) {
+        const Measured next = measure(v, sampleOf(samples, run, s), k);
+        for (int i = 0; i < SLICES; ++i) nearest2[i] = min(nearest2[i], next.along2[i] + next.across2);
+    }
+    // 2 delta times the height over the plane
+    const Lanes across = multiplyAdd(v->y - place.y, (Lanes)(normal.y), (v->z - place.z) * normal.z);
+    for (int i = 0; i < SLICES; ++i) {
+        const Lanes height = (v->x + (float)(i)-place.x) * normal.x + across;
+        const Lanes inner2 = nearest2[i] + height, outer2 = nearest2[i] - height;
+#if TRIANGLES
+        found->innerOwner[i] = select(found->innerOwner[i], (IntLanes)(run->triangle), inner2 < found->inner2[i]);
+        found->outerOwner[i] = select(found->outerOwner[i], (IntLanes)(run->triangle), outer2 < found->outer2[i]);
+#endif
+        found->inner2[i] = min(found->inner2[i], inner2);
+        found->outer2[i] = min(found->outer2[i], outer2);
+    }
+}
+
+// Whether a ball may hold a sample nearer to some voxel than what was found: |p - centre| - radius < bound.
+bool mayImprove(const Voxels* v, float3 centre, float radius, float delta2, const Lanes* bound, const Lanes* best2) {
+    const float rest = delta2 + radius * radius;
+    const Lanes dy = v->y - centre.y, dz = v->z - centre.z, across2 = multiplyAdd(dy, dy, dz * dz);
+    IntLanes may = 0;
+    for (int i = 0; i < SLICES; ++i) {
+        const Lanes distance2 = square(v->x + (float)(i)-centre.x) + across2;
+        may |= distance2 < multiplyAdd((Lanes)(2 * radius), bound[i], best2[i]) + rest;
+    }
+    return anyLane(may);
+}
+
+// What a block works from.
+typedef struct {
+    Near near;
+    global const float* samples;
+    global const Run* runs;
+    Layers layers;
+} Input;
+
+float3 offsetOf(const Groups* groups, uint g) {
+    global const float* columns = groups->columns + g;
+    return (float3)(columns[OFFSET_X * groups->stride], columns[OFFSET_Y * groups->stride],
+                    columns[OFFSET_Z * groups->stride]);
+}
+
+// Bounds of distances to a layer.
+void boundDistances(const Lanes* best2, float delta2, Lanes* bound) {
+    for (int i = 0; i < SLICES; ++i) bound[i] = sqrt(max(best2[i] + delta2, (Lanes)(0.0f)));
+}
+
+// Applies groups to a cube; the page says which, and `list` which of the page, if it is not null. Large ones are looked
+// at once the others, and their own first runs, have been applied.
+void applyGroups(const Input* input, const Voxels* v, SHARED const uint* page, const ushort* list, uint count,
+                 Found* found) {
+    const Groups* groups = &input->near.groups;
+    const int k = input->layers.cube;
+    const float delta2 = square(input->layers.delta);
+    bool large = false;
+    for (uint i = 0; i < count; ++i) {
+        const uint g = page[list[i]], begin = groups->begins[g], end = groups->begins[g + 1];
+        const bool worthALook = end - begin >= RUNS_WORTH_A_LOOK;
+        large = large || worthALook;
+        for (uint r = begin; r < (worthALook ? begin + 1 : end); ++r)
+            applyRun(found, v, input->samples, input->runs + r, k);
+    }
+    if (!large) return;
+    Lanes inner[SLICES], outer[SLICES];
+    boundDistances(found->inner2, delta2, inner);
+    boundDistances(found->outer2, delta2, outer);
+    for (uint i = 0; i < count; ++i) {
+        const uint g = page[list[i]], begin = groups->begins[g], end = groups->begins[g + 1];
+        if (end - begin < RUNS_WORTH_A_LOOK) continue;
+        const float3 place = placeOf(groups, g), offset = offsetOf(groups, g);
+        const float radius = groups->columns[RADIUS * groups->stride + g];
+        if (!mayImprove(v, place - offset, radius, delta2, inner, found->inner2) &&
+            !mayImprove(v, place + offset, radius, delta2, outer, found->outer2))
+            continue;
+        for (uint r = begin + 1; r < end; ++r) applyRun(found, v, input->samples, input->runs + r, k);
+    }
+}
+
+// Distance from the middle of a side to beyond its end, squared.
+Lanes outsideOf(Lanes middle, float halfSide) {
+    return squareLanes(max(fabs(middle) - halfSide, (Lanes)(0.0f)));
+}
+
+#if ITEMS > 1
+
+// Which groups of a page reach the row of this item.
+uint listGroups(const Input* input, SHARED const uint* page, uint count, ushort (*lists)[PAGE], uint* counts) {
+    const Groups* groups = &input->near.groups;
+    const uint stride = groups->stride;
+    const float slabReach = (float)(input->near.reach), ballReach = PAPER_CUBE ? slabReach : input->layers.certain;
+    const float halfRow = 0.5f * (BLOCK_SIDE - 1);
+    const float3 middle = input->near.inBrick + convert_float3(cornerOf(0)) + (float3)(0, 0, halfRow);
+    uint listed = 0;
+    for (uint i = 0; i < count; ++i) {
+        const uint g = page[i];
+        global const float* columns = groups->columns + g;
+        const float3 away = placeOf(groups, g) - middle, offset = PAPER_CUBE ? 0 : offsetOf(groups, g);
+        const float3 inner = away - offset, outer = away + offset;
+        const float reach = columns[RADIUS * stride] + ballReach, slab = columns[THICKNESS * stride] + slabReach;
+        const float inner2 = square(inner.x) + square(inner.y) + square(max(fabs(inner.z) - halfRow, 0.0f)),
+                    outer2 = square(outer.x) + square(outer.y) + square(max(fabs(outer.z) - halfRow, 0.0f));
+        const float3 normal =
+            (float3)(columns[NORMAL_X * stride], columns[NORMAL_Y * stride], columns[NORMAL_Z * stride]);
+        if (min(inner2, outer2) < square(reach) && fabs(dot(away, normal)) < slab + halfRow * fabs(normal.z))
+            lists[0][listed++] = (ushort)(i);
+    }
+    counts[0] = listed;
+    return listed;
 }
 
 #else
 
-kernel void fillBlocks(global const Tile* tiles, global const int* owners, global const int* origins,
-                       global const uint* offsets, global const uint* reaching, Parameters parameters,
-                       global float* distances, global int* triangles) {
-    Layers layers;
-    clear(&layers);
-    const size_t block = get_global_id(0);
-    const int3 origin = vload3(block, origins);
-    for (uint t = offsets[block]; t < offsets[block + 1]; ++t) {
-        const uint index = reaching[t];
-        applyTile(&layers, tiles[index], origin, parameters, TRIANGLES ? owners[index] : 0);
+// Which groups of a page reach each cube: the balls around their inner or outer samples must, and their slab. A vector
+// of groups at a time, with what cubes have in common worked out once.
+uint listGroups(const Input* input, SHARED const uint* page, uint count, ushort (*lists)[PAGE], uint* counts) {
+    const Groups* groups = &input->near.groups;
+    const float slabReach = input->near.reach, ballReach = PAPER_CUBE ? slabReach : input->layers.certain;
+    const float halfCube = 0.5f * (CUBE_SIDE - 1);
+    for (int cube = 0; cube < CUBES; ++cube) counts[cube] = 0;
+    for (uint i = 0; i < count; i += LANES) {
+        float values[ALL_COLUMNS][LANES];
+        const uint some = min(count - i, (uint)(LANES));
+        for (uint lane = 0; lane < some; ++lane) {
+            global const float* columns = groups->columns + page[i + lane];
+            for (int column = 0; column < ALL_COLUMNS; ++column)
+                values[column][lane] = columns[column * groups->stride];
+        }
+        Lanes toInner2[3][2], toOuter2[3][2], height[3][2];
+        Lanes slab = vloadLanes(0, values[THICKNESS]) + slabReach;
+        for (int axis = 0; axis < 3; ++axis) {
+            const Lanes place = vloadLanes(0, values[PLACE_X + axis]) - ((const float*)(&input->near.inBrick))[axis],
+                        offset = PAPER_CUBE ? (Lanes)(0.0f) : vloadLanes(0, values[OFFSET_X + axis]),
+                        normal = vloadLanes(0, values[NORMAL_X + axis]);
+            for (int side = 0; side < 2; ++side) {
+                const float middle = (float)(side * CUBE_SIDE) + halfCube;
+                toInner2[axis][side] = outsideOf(middle - (place - offset), halfCube);
+                toOuter2[axis][side] = outsideOf(middle - (place + offset), halfCube);
+                height[axis][side] = (middle - place) * normal;
+            }
+            slab += halfCube * fabs(normal);
+        }
+        const Lanes reach2 = squareLanes(vloadLanes(0, values[RADIUS]) + ballReach);
+        for (int cube = 0; cube < CUBES; ++cube) {
+            const int a = cube / 4, b = cube / 2 % 2, c = cube % 2;
+            const Lanes inner2 = toInner2[0][a] + toInner2[1][b] + toInner2[2][c],
+                        outer2 = toOuter2[0][a] + toOuter2[1][b] + toOuter2[2][c];
+            const IntLanes reaches =
+                (min(inner2, outer2) < reach2) & (fabs(height[0][a] + height[1][b] + height[2][c]) < slab);
+            uint listed = counts[cube];
+            for (uint bits = bitsOf(reaches) & ((1u << some) - 1); bits != 0; bits &= bits - 1)
+                lists[cube][listed++] = (ushort)(i + (uint)(lowestBit(bits)));
+            counts[cube] = listed;
+        }
     }
-    store(&layers, block * 64, parameters, distances, triangles);
+    uint any = 0;
+    for (int cube = 0; cube < CUBES; ++cube) any |= counts[cube];
+    return any;
 }
 
 #endif
+
+// Eq. 3: from both layers to a slice's signed distances. The inside keeps its sign bit where the distance is clamped to
+// zero.
+Lanes combine(const Found* found, int slice, const Layers* layers, IntLanes* known) {
+    const Lanes inner2 = found->inner2[slice], outer2 = found->outer2[slice];
+    const float delta2 = square(layers->delta), certain2 = square(layers->certain) - delta2;
+    const Lanes farther = sqrt(max(max(inner2, outer2) + delta2, (Lanes)(0.0f)));
+    const Lanes clamped = max(farther - layers->delta, (Lanes)(0.0f));
+    *known = min(inner2, outer2) < certain2;
+    return select((Lanes)(INFINITY), select(clamped, -clamped, inner2 <= outer2 + LAYER_TIE), *known);
+}
+
+// Writes a slice of a cube into its block.
+void putFloats(Lanes values, int3 at, global float* block) {
+    global float* corner = block + (at.x * BLOCK_SIDE + at.y) * BLOCK_SIDE + at.z;
+#if ITEMS > 1
+    vstore8(values, 0, corner);
+#else
+    vstore4(values.s0123, 0, corner);
+    vstore4(values.s4567, 2, corner);
+    vstore4(values.s89ab, 4, corner);
+    vstore4(values.scdef, 6, corner);
+#endif
+}
+
+enum { FILLED_BLOCKS };
+
+// A group fills a block of a brick. Blocks that hold distances go to the next places of `origins`, `distances` and
+// `nearestTriangles`.
+GROUP_KERNEL void fillBlocks(Grid grid, global const uint* cellOfBrick, uint firstBrick, global const float* samples,
+                             global const Run* runs, global float* groupColumns, global uint* groupBegins, uint stride,
+                             global const uint2* ranges, Layers layers, global int* origins, global float* distances,
+                             global int* nearestTriangles, global uint* counters) {
+    SHARED uint page[PAGE], count, slot, anyKnown;
+    const Groups groups = {groupColumns, groupBegins, stride};
+    const Input input = {nearBlock(&grid, &groups, cellOfBrick, firstBrick, ranges), samples, runs, layers};
+    if (input.near.range.x >= input.near.range.y) return;
+
+    Found found[CUBES];
+    const float farthest2 = square(layers.certain) - square(layers.delta);
+    for (int cube = 0; cube < CUBES; ++cube)
+        for (int i = 0; i < SLICES; ++i) {
+            found[cube].inner2[i] = found[cube].outer2[i] = farthest2;
+#if TRIANGLES
+            found[cube].innerOwner[i] = found[cube].outerOwner[i] = -1;
+#endif
+        }
+    ushort lists[CUBES][PAGE];
+    uint counts[CUBES];
+    uint next = input.near.range.x;
+    do {
+        next = turnPage(&input.near, next, page, &count);
+        if (listGroups(&input, page, count, lists, counts) == 0) continue;
+        for (int cube = 0; cube < CUBES; ++cube) {
+            const Voxels voxels = voxelsOf(input.near.inBrick + convert_float3(cornerOf(cube)));
+            Found own = found[cube];  // in registers
+            applyGroups(&input, &voxels, page, lists[cube], counts[cube], &own);
+            found[cube] = own;
+        }
+    } while (next < input.near.range.y);
+
+    if (ITEM == 0) anyKnown = 0;
+    MEET;
+    uint known = 0;
+    for (int cube = 0; cube < CUBES; ++cube)
+        for (int i = 0; i < SLICES; ++i) {
+            IntLanes knownLanes;
+            combine(&found[cube], i, &layers, &knownLanes);
+            known |= (uint)(anyLane(knownLanes));
+        }
+    if (known) anyKnown = 1;
+    MEET;
+    if (!anyKnown) return;
+    if (ITEM == 0) {
+        slot = atomic_inc(counters + FILLED_BLOCKS);
+        vstore3(input.near.block, slot, origins);
+    }
+    MEET;
+    for (int cube = 0; cube < CUBES; ++cube)
+        for (int i = 0; i < SLICES; ++i) {
+            const int3 at = cornerOf(cube) + (int3)(i, 0, 0);
+            IntLanes knownLanes;
+            putFloats(combine(&found[cube], i, &layers, &knownLanes), at,
+                      distances + (size_t)(slot)*BLOCK_VOXELS);
+#if TRIANGLES
+            const IntLanes inside = found[cube].inner2[i] <= found[cube].outer2[i] + LAYER_TIE;
+#if LANES == 16
+            putFloats(as_float16(select(found[cube].innerOwner[i], found[cube].outerOwner[i], inside)), at,
+                      (global float*)(nearestTriangles) + (size_t)(slot)*BLOCK_VOXELS);
+#else
+            putFloats(as_float8(select(found[cube].innerOwner[i], found[cube].outerOwner[i], inside)), at,
+                      (global float*)(nearestTriangles) + (size_t)(slot)*BLOCK_VOXELS);
+#endif
+#else
+            (void)(nearestTriangles);
+#endif
+        }
+}

@@ -12,8 +12,8 @@
 #define ROWS_AT_ONCE (LANES / BLOCK_SIDE)
 #define COLUMNS (BLOCK_SIDE / ROWS_AT_ONCE)
 #define CHUNKS (BLOCK_SIDE * COLUMNS / ITEMS)
-// Clusters near a block that are looked at in one go.
-#define PAGE 1024
+// Slices that an item works on.
+#define SLICES (ITEMS > 1 ? 1 : BLOCK_SIDE)
 
 // See sdf/exact_block.cpp for these: rounding [voxels, voxels^2 or parts].
 #define BOUND_SLACK 1e-4f
@@ -23,7 +23,6 @@
 #define RAISED_BY 5e-7f
 #define HEIGHT_SLACK 1e-3f
 #define LEAST_HEIGHT 1e-3f
-#define BIN_SLACK 1e-3f
 // See sdf/links.h.
 #define LINK_SLACK 1e-4f
 #define FAR_FROM 0.5f
@@ -39,20 +38,20 @@
 // What a voxel's code says besides the number of its nearest piece: PieceSide of sdf/exact_block.h.
 enum { SIDE_OUTSIDE = 1, SIDE_INSIDE = 2, SIDE_BITS = 2 };
 
-// Bricks into pieces and clusters. Groups take the bricks one after another, so that few need scratch memory.
+// Bricks into pieces and groups of them. Work-groups take the bricks one after another, so that few need scratch
+// memory.
 GROUP_KERNEL void prepareBricks(global const float* points, global const uint* triangles, Grid grid,
                                 global const uint* cellOfBrick, global const uint* triangleOffsets,
                                 global const uint* partOffsets, global const uint* list, uint firstBrick, uint bricks,
                                 global Piece* pieces, global Member* unsorted, global Member* members,
-                                global uint* cellOfMember, global float* clusterColumns, global uint* clusterBegins,
+                                global uint* cellOfMember, global float* groupColumns, global uint* groupBegins,
                                 uint stride, global uint* scratch, uint scratchCells, global uint2* ranges,
                                 global uint* next) {
     SHARED uint taken, count;
     SHARED Extent extents[ITEMS];
     SHARED uint2 sums[ITEMS];
-    global uint* cursors = scratch + get_group_id(0) * scratchCells;
+    const Groups groups = {groupColumns, groupBegins, stride};
     const int slices = (1 << grid.shift) / BLOCK_SIDE;
-    const uint firstPart = partOffsets[firstBrick];
     for (;;) {
         MEET;
         if (ITEM == 0) {
@@ -61,47 +60,34 @@ GROUP_KERNEL void prepareBricks(global const float* points, global const uint* t
         }
         MEET;
         if (taken >= bricks) return;
-        const uint b = firstBrick + taken, first = partOffsets[b] - firstPart;
+        const uint b = firstBrick + taken, first = partOffsets[b] - partOffsets[firstBrick];
         const int3 brick = brickAt(&grid, cellOfBrick[b]);
         const Limits limits = limitsOf(&grid, brick);
-        const Cut cut = {pieces + first, &count};
+        Cut cut = {pieces + first, unsorted + first, &count, first, brick * (1 << grid.shift), noExtent()};
         cutTriangles(&cut, points, triangles, list, triangleOffsets[b], triangleOffsets[b + 1], grid.voxelsPerUnit,
                      &limits);
+        extents[ITEM] = cut.extent;
         MEET;
         const uint found = count;
-        const int3 origin = brick * (1 << grid.shift);
-        extents[ITEM] = makeMembers(pieces, first, found, origin, unsorted + first);
-        MEET;
-        Extent all = extents[0];
-        for (int i = 1; i < ITEMS; ++i) {
-            const Extent other = extents[i];
-            all = addExtents(&all, &other);
-        }
-        const float meanRadius = (float)(all.radii / found);
-        Cells cells;
-        cells.side = clamp(CELL_FACTOR * meanRadius, SMALLEST_CELL, LARGEST_CELL);
-        float cellCount = 1;
-        for (int axis = 0; axis < 3; ++axis) {
-            cells.lower[axis] = all.lower[axis];
-            cells.size[axis] = (int)((all.upper[axis] - all.lower[axis]) / cells.side) + 1;
-            cellCount *= (float)(cells.size[axis]);
-        }
-        const Clusters clusters = {clusterColumns, clusterBegins, stride};
-        uint clusterCount = found;
-        if (all.radii < SMALL_RADIUS * found && cellCount <= (float)(scratchCells)) {
-            clusterCount = groupMembers(&clusters, first, unsorted + first, members + first, cellOfMember + first,
-                                        found, &cells, cursors, sums);
+        const Extent all = sumExtents(extents);
+        const float meanRadius = (float)(all.sizes / found);
+        const Cells cells = makeCells(&all, clamp(CELL_FACTOR * meanRadius, SMALLEST_CELL, LARGEST_CELL));
+        uint groupCount = found;
+        if (all.sizes < SMALL_RADIUS * found && countCells(&cells) <= (float)(scratchCells)) {
+            groupCount = sortMembers(&groups, first, unsorted + first, members + first, cellOfMember + first, found,
+                                     &cells, scratch + get_group_id(0) * scratchCells, sums);
+            for (uint g = first + ITEM; g < first + groupCount; g += ITEMS) makeCluster(&groups, g, members);
         } else {
-            for (uint i = ITEM; i < found; i += ITEMS) {
-                const Member member = unsorted[first + i];
-                members[first + i] = member;
-                putCluster(&clusters, first + i, vload3(0, member.sample), member.radius, vload3(0, member.normal), 0,
-                           first + i);
+            for (uint i = first + ITEM; i < first + found; i += ITEMS) {
+                const Member member = unsorted[i];
+                members[i] = member;
+                groups.begins[i] = i;
+                putGroup(&groups, i, vload3(0, member.place), member.radius, vload3(0, member.normal), 0);
             }
-            if (ITEM == 0) clusterBegins[first + found] = first + found;
+            if (ITEM == 0) groups.begins[first + found] = first + found;
         }
         MEET;
-        rangeClusters(&clusters, first, clusterCount, slices, (float)(grid.reach), ranges + taken * slices);
+        rangeGroups(&groups, first, groupCount, slices, (float)(grid.reach), ranges + taken * slices);
     }
 }
 
@@ -174,51 +160,82 @@ void applySample(Found* found, const Share* own, float3 sample, float reach) {
     }
 }
 
-// Drum of sdf/exact_block.cpp: a disc of some thickness that holds pieces, seen from a block.
+// Drum of sdf/exact_block.cpp: a disc of some thickness that holds pieces, seen from a block. What follows from a slice
+// is worked out once.
 typedef struct {
     float3 centre, normal;
     float thickness, radius2;
+    float px2[SLICES], height[SLICES];
 } Drum;
 
-Drum makeDrum(float3 centre, float radius, float3 normal, float thickness) {
-    const Drum drum = {centre, normal, thickness + BOUND_SLACK, square(radius + BOUND_SLACK)};
-    return drum;
+void makeDrum(Drum* drum, const Share* own, float3 centre, float radius, float3 normal, float thickness) {
+    drum->centre = centre;
+    drum->normal = normal;
+    drum->thickness = thickness + BOUND_SLACK;
+    drum->radius2 = square(radius + BOUND_SLACK);
+    for (int i = 0; i < SLICES; ++i) {
+        const float px = (float)(own->firstSlice + i) - centre.x;
+        drum->px2[i] = px * px;
+        drum->height[i] = px * normal.x;
+    }
+}
+
+// What all chunks of a column have in common.
+typedef struct {
+    Lanes excess, height;
+} Column;
+
+Column makeColumn(const Drum* drum, int column) {
+    const Lanes py = latticeY(column) - drum->centre.y, pz = latticeZ() - drum->centre.z;
+    const Column result = {py * py + pz * pz - drum->radius2, py * drum->normal.y + pz * drum->normal.z};
+    return result;
+}
+
+// Whether the drum may be nearest to some voxel of a chunk.
+bool mayBeNearest(const Found* found, const Drum* drum, const Column* column, int slice, int chunk, bool thick) {
+    const Lanes bound2 = found->nearest2[chunk], h = drum->height[slice] + column->height;
+    Lanes excess = drum->px2[slice] + column->excess - bound2, g2 = h * h;
+    if (thick) {
+        const Lanes h2 = g2;
+        g2 = squareLanes(max(fabs(h) - drum->thickness, (Lanes)(0.0f)));
+        excess += g2 - h2;
+    }
+    return anyLane(excess * fabs(excess) <= 4 * drum->radius2 * (bound2 - g2 + HEIGHT_SLACK));
 }
 
 // Bits of the chunks, out of a part of a share, that have a voxel which the drum may be nearest to.
-uint nearChunks(const Found* found, const Share* part, const Drum* drum, bool thick) {
+uint nearChunks(const Found* found, const Share* own, const Share* part, const Drum* drum, bool thick) {
     uint near = 0;
-    const Lanes pz = latticeZ() - drum->centre.z, pz2 = pz * pz, hz = pz * drum->normal.z;
-    const float fourRadius2 = 4 * drum->radius2;
-    for (int column = part->firstColumn; column <= part->lastColumn; ++column) {
-        const Lanes py = latticeY(column) - drum->centre.y;
-        const Lanes across = py * py + pz2 - drum->radius2, height = py * drum->normal.y + hz;
+    for (int c = part->firstColumn; c <= part->lastColumn; ++c) {
+        const Column column = makeColumn(drum, c);
         for (int slice = part->firstSlice; slice <= part->lastSlice; ++slice) {
-            const float px = (float)(slice)-drum->centre.x;
-            const int chunk = chunkAt(slice, column);
-            const Lanes bound2 = found->nearest2[chunk], h = px * drum->normal.x + height;
-            Lanes excess = px * px + across - bound2, g2 = h * h;
-            if (thick) {
-                const Lanes h2 = g2;
-                g2 = squareLanes(max(fabs(h) - drum->thickness, (Lanes)(0.0f)));
-                excess += g2 - h2;
-            }
-            const IntLanes may = excess * fabs(excess) <= fourRadius2 * (bound2 - g2 + HEIGHT_SLACK);
-            if (anyLane(may)) near |= 1u << chunk;
+            const int chunk = chunkAt(slice, c);
+            near |= (uint)(mayBeNearest(found, drum, &column, slice - own->firstSlice, chunk, thick)) << chunk;
         }
     }
     return near;
 }
 
+// Bits of the chunks of a column.
+uint ofColumn(uint chunks, int column) {
+    return ITEMS > 1 ? chunks : chunks & 0x11111111u << column;
+}
+
+int sliceOf(int chunk) {
+    return ITEMS > 1 ? 0 : chunk / COLUMNS;
+}
+
 // The same out of some chunks, for a disc.
 uint nearAmong(const Found* found, const Share* own, uint among, const Drum* drum) {
     uint near = 0;
-    for (; among != 0; among &= among - 1) {
-        const int chunk = lowestBit(among);
-        const int slice = ITEMS > 1 ? own->firstSlice : chunk / COLUMNS,
-                  column = ITEMS > 1 ? own->firstColumn : chunk % COLUMNS;
-        const Share one = {slice, slice, column, column};
-        near |= nearChunks(found, &one, drum, false);
+    for (int c = own->firstColumn; c <= own->lastColumn; ++c) {
+        uint chunks = ofColumn(among, c);
+        if (chunks == 0) continue;
+        const Column column = makeColumn(drum, c);
+        for (; chunks != 0; chunks &= chunks - 1) {
+            const int chunk = lowestBit(chunks);
+            near |= (uint)(mayBeNearest(found, drum, &column, sliceOf(chunk), chunk, false)) << chunk;
+        }
     }
     return near;
 }
@@ -248,17 +265,23 @@ void askPiece(Found* found, const Share* own, uint chunks, global const Piece* p
     const float size = piece->length, ox = piece->ox, oy = piece->oy, olen = piece->olen, ex = piece->ex,
                 ey = piece->ey, elen = piece->elen;
     const int code = (int)(number << SIDE_BITS);
+    float uAlong[SLICES], wAlong[SLICES], nAlong[SLICES];
+    for (int i = 0; i < SLICES; ++i) {
+        const float px = (float)(own->firstSlice + i) + shift.x - origin.x;
+        uAlong[i] = px * u.x;
+        wAlong[i] = px * w.x;
+        nAlong[i] = px * n.x;
+    }
     const Lanes pz = latticeZ() + shift.z - origin.z;
-    const uint ofColumn = ITEMS > 1 ? 1u : 0x11111111u;
     for (int column = own->firstColumn; column <= own->lastColumn; ++column) {
-        uint slices = ITEMS > 1 ? chunks : chunks & ofColumn << column;
+        uint slices = ofColumn(chunks, column);
         if (slices == 0) continue;
         const Lanes py = latticeY(column) + shift.y - origin.y;
         const Lanes uAcross = py * u.y + pz * u.z, wAcross = py * w.y + pz * w.z, nAcross = py * n.y + pz * n.z;
         for (; slices != 0; slices &= slices - 1) {
-            const int chunk = lowestBit(slices), slice = ITEMS > 1 ? own->firstSlice : chunk / COLUMNS;
-            const float px = (float)(slice) + shift.x - origin.x;
-            const Lanes along = px * u.x + uAcross, aside = px * w.x + wAcross, height = px * n.x + nAcross;
+            const int chunk = lowestBit(slices), slice = sliceOf(chunk);
+            const Lanes along = uAlong[slice] + uAcross, aside = wAlong[slice] + wAcross,
+                        height = nAlong[slice] + nAcross;
             const Lanes base2 = squareLanes(beyond(along, size)) + aside * aside;
             // the edges from both ends of the longest one to the third corner
             const Lanes v = along - size;
@@ -275,97 +298,45 @@ void askPiece(Found* found, const Share* own, uint chunks, global const Piece* p
 
 // What a block works from.
 typedef struct {
-    Clusters clusters;
+    Near near;
     global const Member* members;
     global const Piece* pieces;
-    uint2 range;     // of clusters that may reach its slice of blocks
-    int3 block;      // index coordinates of its first voxel
-    float3 inBrick;  // the same in the voxels of the brick
-    float reach;     // [voxels]
 } Input;
-
-// Which of LANES clusters from the c-th on reach the block.
-IntLanes reaching(const Input* input, uint c) {
-    const float halfBlock = 0.5f * (BLOCK_SIDE - 1);
-    global const float* columns = input->clusters.columns + c;
-    const uint stride = input->clusters.stride;
-    const Lanes dx = input->inBrick.x + halfBlock - vloadLanes(0, columns + SAMPLE_X * stride),
-                dy = input->inBrick.y + halfBlock - vloadLanes(0, columns + SAMPLE_Y * stride),
-                dz = input->inBrick.z + halfBlock - vloadLanes(0, columns + SAMPLE_Z * stride);
-    const Lanes nx = vloadLanes(0, columns + NORMAL_X * stride), ny = vloadLanes(0, columns + NORMAL_Y * stride),
-                nz = vloadLanes(0, columns + NORMAL_Z * stride);
-    const Lanes zero = 0.0f, reach = vloadLanes(0, columns + RADIUS * stride) + input->reach,
-                slab = vloadLanes(0, columns + THICKNESS * stride) + (input->reach + BIN_SLACK);
-    const Lanes away2 = squareLanes(max(fabs(dx) - halfBlock, zero)) + squareLanes(max(fabs(dy) - halfBlock, zero)) +
-                        squareLanes(max(fabs(dz) - halfBlock, zero));
-    return (away2 < reach * reach) &
-           (fabs(dx * nx + dy * ny + dz * nz) < slab + halfBlock * (fabs(nx) + fabs(ny) + fabs(nz)));
-}
-
-// Lists clusters that reach the block, from the c-th on, until the page may be full or there are no more. Returns the
-// cluster to go on with.
-uint turnPage(const Input* input, uint c, SHARED uint* page, SHARED uint* count) {
-    MEET;
-    if (ITEM == 0) *count = 0;
-    MEET;
-    while (c < input->range.y && *count <= PAGE - ITEMS * LANES) {
-        const uint at = c + ITEM * LANES;
-        uint bits = at < input->range.y ? bitsOf(reaching(input, at)) : 0;
-        // the columns have room for a vector more, and what stands there does not count
-        if (at < input->range.y && input->range.y - at < LANES) bits &= (1u << (input->range.y - at)) - 1;
-        MEET;
-        for (; bits != 0; bits &= bits - 1) {
-#if ITEMS > 1
-            const uint place = atomic_inc(count);
-#else
-            const uint place = (*count)++;
-#endif
-            page[place] = at + (uint)(lowestBit(bits));
-        }
-        c += ITEMS * LANES;
-        MEET;
-    }
-    return min(c, input->range.y);
-}
-
-float3 sampleOf(const Clusters* clusters, uint c) {
-    global const float* columns = clusters->columns + c;
-    return (float3)(columns[SAMPLE_X * clusters->stride], columns[SAMPLE_Y * clusters->stride],
-                    columns[SAMPLE_Z * clusters->stride]);
-}
 
 void applySamples(const Input* input, const Share* own, SHARED const uint* page, uint count, Found* found) {
     for (uint i = 0; i < count; ++i)
-        applySample(found, own, sampleOf(&input->clusters, page[i]) - input->inBrick, input->reach);
+        applySample(found, own, placeOf(&input->near.groups, page[i]) - input->near.inBrick, input->near.reach);
 }
 
 // Asks the members of a cluster that come near some chunks.
 void askMembers(const Input* input, const Share* own, uint cluster, uint near, Found* found) {
-    const uint begin = input->clusters.begins[cluster], end = input->clusters.begins[cluster + 1];
+    const uint begin = input->near.groups.begins[cluster], end = input->near.groups.begins[cluster + 1];
     for (uint m = begin; m < end; ++m) {
         global const Member* member = input->members + m;
         uint ask = near;
         if (end - begin > 1) {
-            const Drum drum = makeDrum(vload3(0, member->sample) - input->inBrick, member->radius,
-                                       vload3(0, member->normal), 0);
+            Drum drum;
+            makeDrum(&drum, own, vload3(0, member->place) - input->near.inBrick, member->radius,
+                     vload3(0, member->normal), 0);
             ask = nearAmong(found, own, near, &drum);
         }
-        if (ask != 0) askPiece(found, own, ask, input->pieces + member->piece, member->piece, input->block);
+        if (ask != 0) askPiece(found, own, ask, input->pieces + member->content, member->content, input->near.block);
     }
 }
 
-void askClusters(const Input* input, const Share* own, SHARED const uint* page, uint count, Found* found) {
-    const uint stride = input->clusters.stride;
+void askGroups(const Input* input, const Share* own, SHARED const uint* page, uint count, Found* found) {
+    const uint stride = input->near.groups.stride;
     for (uint i = 0; i < count; ++i) {
         const uint c = page[i];
-        global const float* columns = input->clusters.columns + c;
-        const float3 sample = sampleOf(&input->clusters, c) - input->inBrick;
+        global const float* columns = input->near.groups.columns + c;
+        const float3 sample = placeOf(&input->near.groups, c) - input->near.inBrick;
         const float radius = columns[RADIUS * stride], thickness = columns[THICKNESS * stride];
-        const Drum drum = makeDrum(
-            sample, radius,
-            (float3)(columns[NORMAL_X * stride], columns[NORMAL_Y * stride], columns[NORMAL_Z * stride]), thickness);
-        const Share part = within(own, sample, input->reach + radius);
-        const uint near = nearChunks(found, &part, &drum, thickness > 0);
+        Drum drum;
+        makeDrum(&drum, own, sample, radius,
+                 (float3)(columns[NORMAL_X * stride], columns[NORMAL_Y * stride], columns[NORMAL_Z * stride]),
+                 thickness);
+        const Share part = within(own, sample, input->near.reach + radius);
+        const uint near = nearChunks(found, own, &part, &drum, thickness > 0);
         if (near != 0) askMembers(input, own, c, near, found);
     }
 }
@@ -373,23 +344,23 @@ void askClusters(const Input* input, const Share* own, SHARED const uint* page, 
 // First bounds by samples, a little raised so that a piece's own distance wins over its sample's; then the pieces. The
 // page holds all clusters that reach the block, or else is turned once more. False if there is none.
 bool measure(const Input* input, const Share* own, SHARED uint* page, SHARED uint* count, Found* found) {
-    for (int i = 0; i < CHUNKS; ++i) found->nearest2[i] = square(input->reach);
-    uint next = input->range.x, pages = 0;
+    for (int i = 0; i < CHUNKS; ++i) found->nearest2[i] = square(input->near.reach);
+    uint next = input->near.range.x, pages = 0;
     do {
-        next = turnPage(input, next, page, count);
+        next = turnPage(&input->near, next, page, count);
         applySamples(input, own, page, *count, found);
         ++pages;
-    } while (next < input->range.y);
+    } while (next < input->near.range.y);
     if (pages == 1 && *count == 0) return false;
     for (int i = 0; i < CHUNKS; ++i) {
-        found->nearest2[i] = min(found->nearest2[i] * (1 + RAISED_PART) + RAISED_BY, (Lanes)(square(input->reach)));
+        found->nearest2[i] = min(found->nearest2[i] * (1 + RAISED_PART) + RAISED_BY, (Lanes)(square(input->near.reach)));
         found->nearest[i] = -1;
     }
-    if (pages > 1) next = input->range.x;
+    if (pages > 1) next = input->near.range.x;
     do {
-        if (pages > 1) next = turnPage(input, next, page, count);
-        askClusters(input, own, page, *count, found);
-    } while (next < input->range.y);
+        if (pages > 1) next = turnPage(&input->near, next, page, count);
+        askGroups(input, own, page, *count, found);
+    } while (next < input->near.range.y);
     return true;
 }
 
@@ -598,21 +569,21 @@ double sideBy(const Faces* faces, const View* view) {
 // The same for a voxel of a block, by all pieces that may be as near as its nearest one.
 double sideOf(const Input* input, SHARED const Block* block, View* view, int voxel) {
     const int3 at = (int3)(voxel / 64, voxel / 8 % 8, voxel % 8);
-    view->from = convert_double3(input->block + at);
+    view->from = convert_double3(input->near.block + at);
     Faces faces;
     faces.count = 0;
     faces.all = true;
     faces.nearest = INFINITY;
     offer(&faces, view, input->pieces[block->nearest[voxel] >> SIDE_BITS].triangle);
-    const float3 place = input->inBrick + convert_float3(at);
+    const float3 place = input->near.inBrick + convert_float3(at);
     const float away = (float)(faces.nearest) + SIDE_SLACK;
-    global const float* radii = input->clusters.columns + RADIUS * input->clusters.stride;
-    for (uint c = input->range.x; c < input->range.y; ++c) {
-        if (distance(place, sampleOf(&input->clusters, c)) > away + radii[c]) continue;
-        for (uint m = input->clusters.begins[c]; m < input->clusters.begins[c + 1]; ++m) {
+    global const float* radii = input->near.groups.columns + RADIUS * input->near.groups.stride;
+    for (uint c = input->near.range.x; c < input->near.range.y; ++c) {
+        if (distance(place, placeOf(&input->near.groups, c)) > away + radii[c]) continue;
+        for (uint m = input->near.groups.begins[c]; m < input->near.groups.begins[c + 1]; ++m) {
             global const Member* member = input->members + m;
-            if (distance(place, vload3(0, member->sample)) <= away + member->radius)
-                offer(&faces, view, input->pieces[member->piece].triangle);
+            if (distance(place, vload3(0, member->place)) <= away + member->radius)
+                offer(&faces, view, input->pieces[member->content].triangle);
         }
     }
     return sideBy(&faces, view);
@@ -663,26 +634,15 @@ enum { FILLED_BLOCKS, OPEN_BLOCKS, CONFLICTS };
 // positive.
 GROUP_KERNEL void fillBlocks(global const float* points, global const uint* triangles, Grid grid,
                              global const uint* cellOfBrick, uint firstBrick, global const Piece* pieces,
-                             global const Member* members, global float* clusterColumns, global uint* clusterBegins,
+                             global const Member* members, global float* groupColumns, global uint* groupBegins,
                              uint stride, global const uint2* ranges, int sign, global int* origins,
                              global float* distances, global int* nearestTriangles, global int* openBlocks,
                              global uint* counters) {
     SHARED uint page[PAGE], count;
     SHARED Block block;
-    const int side = (1 << grid.shift) / BLOCK_SIDE;
-    const uint perBrick = (uint)(side * side * side), brick = (uint)(get_group_id(0)) / perBrick,
-               number = (uint)(get_group_id(0)) % perBrick;
-    const int3 inBrick =
-        BLOCK_SIDE * (int3)((int)(number) / side / side, (int)(number) / side % side, (int)(number) % side);
-    const Input input = {{clusterColumns, clusterBegins, stride},
-                         members,
-                         pieces,
-                         ranges[brick * side + inBrick.x / BLOCK_SIDE],
-                         brickAt(&grid, cellOfBrick[firstBrick + brick]) * (1 << grid.shift) + inBrick,
-                         convert_float3(inBrick),
-                         (float)(grid.reach)};
-    if (input.range.x >= input.range.y) return;
-
+    const Groups groups = {groupColumns, groupBegins, stride};
+    const Input input = {nearBlock(&grid, &groups, cellOfBrick, firstBrick, ranges), members, pieces};
+    if (input.near.range.x >= input.near.range.y) return;
     const Share own = ownShare();
     Found found;
     if (!measure(&input, &own, page, &count, &found)) return;
@@ -699,7 +659,7 @@ GROUP_KERNEL void fillBlocks(global const float* points, global const uint* tria
         const uint conflicts = sign ? completeSides(&input, &block, &view) : 0;
         if (conflicts > 0) atomic_add(counters + CONFLICTS, conflicts);
         block.slot = atomic_inc(counters + (block.open ? OPEN_BLOCKS : FILLED_BLOCKS));
-        vstore3(input.block, block.slot, block.open ? openBlocks : origins);
+        vstore3(input.near.block, block.slot, block.open ? openBlocks : origins);
     }
     MEET;
     if (block.open) return;

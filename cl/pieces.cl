@@ -1,6 +1,6 @@
 // Triangles cut into pieces of about a voxel, and pieces grouped into clusters, brick by brick: sdf/pieces.h and
 // sdf/clusters.h on a device.
-#include "bins.cl"
+#include "groups.cl"
 
 // Longer edges are halved [voxels].
 #define LONGEST_PIECE_EDGE 16.0
@@ -16,37 +16,25 @@
 #define CELL_FACTOR 4.0f
 #define SMALLEST_CELL 1.1f
 #define LARGEST_CELL 3.0f
-// Rounding of a cluster's own numbers [voxels].
-#define CLUSTER_SLACK 1e-4f
 
 // A piece in a frame of its own: Piece of sdf/pieces.h.
 typedef struct {
     int base[3];
+    uint triangle;
     float origin[3], u[3], w[3], n[3];
     float length, ox, oy, olen, ex, ey, elen;
     float sample[3];
     float radius;
-    uint triangle;
+    float unused;  // the numbers are written four at a time
 } Piece;
-
-// A piece as its brick sees it: Member of sdf/exact_block.h.
-typedef struct {
-    float sample[3];
-    float radius;
-    float normal[3];
-    uint piece;
-} Member;
-
-// Clusters of all bricks of a batch, a column for each number: Cluster of sdf/exact_block.h. The members of a cluster
-// end where those of the next one begin.
-enum { SAMPLE_X, SAMPLE_Y, SAMPLE_Z, RADIUS, NORMAL_X, NORMAL_Y, NORMAL_Z, THICKNESS, CLUSTER_COLUMNS };
 
 bool isShort(const Corners* t) {
     return max(lengthSquared(t->b - t->a), max(lengthSquared(t->c - t->b), lengthSquared(t->a - t->c))) <=
            LONGEST_PIECE_EDGE * LONGEST_PIECE_EDGE;
 }
 
-bool isOnePart(const Corners* t) {
+bool isOnePart(const Grid* grid, const Corners* t) {
+    (void)(grid);
     return isShort(t);
 }
 
@@ -90,7 +78,8 @@ bool nextPart(Parts* parts, const Limits* limits, Corners* part) {
     return false;
 }
 
-uint countParts(const Corners* t, const Limits* limits) {
+uint countParts(const Grid* grid, const Corners* t, const Limits* limits) {
+    (void)(grid);
     Parts parts;
     Corners part;
     parts.waiting[0] = *t;
@@ -98,48 +87,6 @@ uint countParts(const Corners* t, const Limits* limits) {
     uint count = 0;
     while (nextPart(&parts, limits, &part)) ++count;
     return count;
-}
-
-// Pieces are made as many at once as there are lanes where one item does a group's work, else one by one.
-#if ITEMS > 1
-#define BATCH 1
-typedef float Real;
-typedef int RealInt;
-#define loadReal(p) (*(p))
-#define storeReal(v, p) (*(p) = (v))
-#else
-#define BATCH LANES
-typedef Lanes Real;
-typedef IntLanes RealInt;
-#define loadReal(p) vloadLanes(0, p)
-#define storeReal(v, p) vstoreLanes(v, 0, p)
-#endif
-
-typedef struct {
-    Real x, y, z;
-} Real3;
-
-Real3 make3(Real x, Real y, Real z) {
-    const Real3 v = {x, y, z};
-    return v;
-}
-Real3 add3(Real3 a, Real3 b) {
-    return make3(a.x + b.x, a.y + b.y, a.z + b.z);
-}
-Real3 sub3(Real3 a, Real3 b) {
-    return make3(a.x - b.x, a.y - b.y, a.z - b.z);
-}
-Real3 scale3(Real s, Real3 a) {
-    return make3(s * a.x, s * a.y, s * a.z);
-}
-Real dot3(Real3 a, Real3 b) {
-    return a.x * b.x + a.y * b.y + a.z * b.z;
-}
-Real3 cross3(Real3 a, Real3 b) {
-    return make3(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x);
-}
-Real3 select3(Real3 no, Real3 yes, RealInt which) {
-    return make3(select(no.x, yes.x, which), select(no.y, yes.y, which), select(no.z, yes.z, which));
 }
 
 // One over a length; zero for none.
@@ -155,20 +102,9 @@ Real3 across(Real3 u) {
     return scale3(inverse(sqrt(dot3(way, way))), way);
 }
 
-// Pieces to be made: a lattice point, a corner as seen from it, the ways from there to the next corners.
-typedef struct {
-    int base[3][BATCH];
-    uint triangle[BATCH];
-    float corner[3][BATCH], ab[3][BATCH], ac[3][BATCH];
-    uint count;
-} Waiting;
-
-// The numbers of a batch of pieces, a column each.
-enum { ORIGIN = 0, AXIS_U = 3, AXIS_W = 6, AXIS_N = 9, LENGTH = 12, LEFT = 13, RIGHT = 16, SAMPLE = 19, COVER = 22, ROWS };
-
-Real3 load3(float (*from)[BATCH]) {
-    return make3(loadReal(from[0]), loadReal(from[1]), loadReal(from[2]));
-}
+// The numbers of a batch of pieces, a column each: those of Piece, then the sample in the voxels of the brick.
+enum { ORIGIN = 0, AXIS_U = 3, AXIS_W = 6, AXIS_N = 9, LENGTH = 12, LEFT = 13, RIGHT = 16, SAMPLE = 19, COVER = 22,
+       PIECE_ROWS = 24, IN_BRICK = 24, ROWS = 27 };
 
 void put3(float (*columns)[BATCH], int row, Real3 value) {
     storeReal(value.x, columns[row]);
@@ -182,10 +118,11 @@ void putEdge(float (*columns)[BATCH], int row, Real x, Real y) {
     put3(columns, row, make3(select((Real)(1.0f), x * part, size > 0.0f), y * part, size));
 }
 
-void makeColumns(Waiting* waiting, float (*columns)[BATCH]) {
+// The frames of pieces, by a corner as seen from a lattice point and the ways from there to the next corners.
+// `shift` leads from the lattice points to the brick. Returns the samples in the voxels of the brick.
+void makeColumns(Real3 corner, Real3 ab, Real3 ac, Real3 shift, float (*columns)[BATCH]) {
     const Real zero = 0.0f, one = 1.0f;
-    const Real3 corner = load3(waiting->corner), ab = load3(waiting->ab), ac = load3(waiting->ac), bc = sub3(ac, ab),
-                none = make3(zero, zero, zero);
+    const Real3 bc = sub3(ac, ab), none = make3(zero, zero, zero);
     // turned so that the longest edge comes first
     const Real ab2 = dot3(ab, ab), bc2 = dot3(bc, bc), ca2 = dot3(ac, ac);
     const RealInt isFirst = ab2 >= bc2 && ab2 >= ca2, isSecond = bc2 >= ca2;
@@ -215,154 +152,144 @@ void makeColumns(Waiting* waiting, float (*columns)[BATCH]) {
     const Real middle = 0.5f * size;
     const Real lift = (along * along + height * height - along * size) / (height + height);
     const Real up = select(max(lift, zero), zero, flat);
-    put3(columns, SAMPLE, add3(begin, add3(scale3(middle, u), scale3(up, w))));
+    const Real3 sample = add3(begin, add3(scale3(middle, u), scale3(up, w)));
+    put3(columns, SAMPLE, sample);
+    put3(columns, IN_BRICK, add3(sample, shift));
     storeReal(sqrt(middle * middle + up * up) + RADIUS_SLACK, columns[COVER]);
-}
-
-void makePieces(Waiting* waiting, global Piece* pieces) {
-    float columns[ROWS][BATCH];
-    makeColumns(waiting, columns);
-    for (uint i = 0; i < waiting->count; ++i) {
-        global Piece* piece = pieces + i;
-        for (int axis = 0; axis < 3; ++axis) piece->base[axis] = waiting->base[axis][i];
-        global float* numbers = piece->origin;
-        for (int row = 0; row < ROWS; ++row) numbers[row] = columns[row][i];
-        piece->triangle = waiting->triangle[i];
-    }
-    waiting->count = 0;
+    storeReal(zero, columns[COVER + 1]);
 }
 
 // The pieces of a brick, and how many of them there are so far.
 typedef struct {
     global Piece* pieces;
+    global Member* members;
     SHARED uint* count;
+    uint first;    // the number of the brick's first piece
+    int3 origin;   // of the brick
+    Extent extent;
 } Cut;
 
-void flush(const Cut* cut, Waiting* waiting) {
-    if (waiting->count == 0) return;
-#if ITEMS > 1
-    const uint place = atomic_add(cut->count, waiting->count);
-#else
-    const uint place = *cut->count;
-    *cut->count += waiting->count;
-#endif
-    makePieces(waiting, cut->pieces + place);
+float4 fourOf(float (*columns)[BATCH], int row, int lane) {
+    return (float4)(columns[row][lane], columns[row + 1][lane], columns[row + 2][lane], columns[row + 3][lane]);
 }
 
-void addPart(const Cut* cut, Waiting* waiting, const Corners* t, uint triangle) {
+// Makes pieces and their members of some lanes.
+void makePieces(Cut* cut, uint lanes, Real3 corner, Real3 ab, Real3 ac, int (*base)[BATCH], const uint* triangles) {
+    float columns[ROWS][BATCH];
+    const Real3 shift = make3(toRealFromInt(loadRealInt(base[0]) - cut->origin.x),
+                              toRealFromInt(loadRealInt(base[1]) - cut->origin.y),
+                              toRealFromInt(loadRealInt(base[2]) - cut->origin.z));
+    makeColumns(corner, ab, ac, shift, columns);
+#if ITEMS > 1
+    uint place = atomic_add(cut->count, popcount(lanes));
+#else
+    uint place = *cut->count;
+    *cut->count += popcount(lanes);
+#endif
+    float3 lower = vload3(0, cut->extent.lower), upper = vload3(0, cut->extent.upper);
+    float radii = 0;
+    for (; lanes != 0; lanes &= lanes - 1, ++place) {
+        const int lane = lowestBit(lanes);
+        global Piece* piece = cut->pieces + place;
+        vstore4((int4)(base[0][lane], base[1][lane], base[2][lane], (int)(triangles[lane])), 0, piece->base);
+        for (int row = 0; row < PIECE_ROWS; row += 4) vstore4(fourOf(columns, row, lane), row / 4, piece->origin);
+        const float3 sample = fourOf(columns, IN_BRICK, lane).xyz;
+        const float radius = columns[COVER][lane];
+        global float* member = cut->members[place].place;
+        vstore4((float4)(sample, radius), 0, member);
+        vstore4((float4)(columns[AXIS_N][lane], columns[AXIS_N + 1][lane], columns[AXIS_N + 2][lane],
+                         as_float(cut->first + place)),
+                1, member);
+        lower = min(lower, sample);
+        upper = max(upper, sample);
+        radii += radius;
+    }
+    vstore3(lower, 0, cut->extent.lower);
+    vstore3(upper, 0, cut->extent.upper);
+    cut->extent.sizes += radii;
+}
+
+// Parts of long triangles that wait until they are a batch: their lattice points, a corner as seen from there, the ways
+// from it to the next corners.
+typedef struct {
+    int base[3][BATCH];
+    uint triangle[BATCH];
+    float corner[3][BATCH], ab[3][BATCH], ac[3][BATCH];
+    uint count;
+} Waiting;
+
+Real3 load3(float (*from)[BATCH]) {
+    return make3(loadReal(from[0]), loadReal(from[1]), loadReal(from[2]));
+}
+
+void flush(Cut* cut, Waiting* waiting) {
+    if (waiting->count == 0) return;
+    makePieces(cut, (1u << waiting->count) - 1, load3(waiting->corner), load3(waiting->ab), load3(waiting->ac),
+               waiting->base, waiting->triangle);
+    waiting->count = 0;
+}
+
+// The lattice point nearest to a place. Halves go up, so that a shift by whole voxels shifts the result.
+#define nearestLattice(place) floor((place) + 0.5)
+
+void addPart(Cut* cut, Waiting* waiting, const Corners* t, uint triangle) {
     const uint at = waiting->count;
-    // rounded to the nearest, halves always up, so that a shift by whole voxels shifts the result
-    const int3 base = convert_int3_rtn(t->a + 0.5);
-    const float3 corner = convert_float3(t->a - convert_double3(base)), ab = convert_float3(t->b - t->a),
-                 ac = convert_float3(t->c - t->a);
-    waiting->base[0][at] = base.x;
-    waiting->base[1][at] = base.y;
-    waiting->base[2][at] = base.z;
-    waiting->corner[0][at] = corner.x;
-    waiting->corner[1][at] = corner.y;
-    waiting->corner[2][at] = corner.z;
-    waiting->ab[0][at] = ab.x;
-    waiting->ab[1][at] = ab.y;
-    waiting->ab[2][at] = ab.z;
-    waiting->ac[0][at] = ac.x;
-    waiting->ac[1][at] = ac.y;
-    waiting->ac[2][at] = ac.z;
+    const double3 base = nearestLattice(t->a), corner = t->a - base, ab = t->b - t->a, ac = t->c - t->a;
+    const double from[12] = {base.x, base.y, base.z, corner.x, corner.y, corner.z,
+                             ab.x,   ab.y,   ab.z,   ac.x,     ac.y,     ac.z};
+    for (int axis = 0; axis < 3; ++axis) {
+        waiting->base[axis][at] = (int)(from[axis]);
+        waiting->corner[axis][at] = (float)(from[3 + axis]);
+        waiting->ab[axis][at] = (float)(from[6 + axis]);
+        waiting->ac[axis][at] = (float)(from[9 + axis]);
+    }
     waiting->triangle[at] = triangle;
     if (++waiting->count == BATCH) flush(cut, waiting);
 }
 
-void cutTriangles(const Cut* cut, global const float* points, global const uint* triangles, global const uint* list,
+void cutLong(Cut* cut, Waiting* waiting, const Corners* t, uint triangle, const Limits* limits) {
+    Parts parts;
+    Corners part;
+    parts.waiting[0] = *t;
+    parts.count = 1;
+    while (nextPart(&parts, limits, &part)) addPart(cut, waiting, &part, triangle);
+}
+
+// Cuts the triangles of a list.
+void cutTriangles(Cut* cut, global const float* points, global const uint* triangles, global const uint* list,
                   uint begin, uint end, double voxelsPerUnit, const Limits* limits) {
     Waiting waiting;
     waiting.count = 0;
-    for (uint i = begin + ITEM; i < end; i += ITEMS) {
-        const uint triangle = list[i];
-        const Corners t = cornersOf(points, triangles, triangle, voxelsPerUnit);
-        if (isShort(&t)) {
-            addPart(cut, &waiting, &t, triangle);
-            continue;
+    for (uint first = begin + ITEM * BATCH; first < end; first += ITEMS * BATCH) {
+        Batch batch;
+        fetchBatch(&batch, points, triangles, list, first, end, voxelsPerUnit);
+        const Exact3 base = {nearestLattice(batch.a.x), nearestLattice(batch.a.y), nearestLattice(batch.a.z)};
+        const Exact3 ab = subExact(batch.b, batch.a), ac = subExact(batch.c, batch.a);
+        const Exact longest2 = max(squareExact(ab), max(squareExact(ac), squareExact(subExact(batch.c, batch.b))));
+        const RealInt isLong = toReal(longest2) > (float)(LONGEST_PIECE_EDGE * LONGEST_PIECE_EDGE);
+        const uint longOnes = bitsOfReal(isLong) & batch.real;
+        int bases[3][BATCH];
+        storeReal(toRealInt(base.x), bases[0]);
+        storeReal(toRealInt(base.y), bases[1]);
+        storeReal(toRealInt(base.z), bases[2]);
+        if (batch.real & ~longOnes)
+            makePieces(cut, batch.real & ~longOnes, toReal3(subExact(batch.a, base)), toReal3(ab), toReal3(ac), bases,
+                       batch.triangle);
+        for (uint rest = longOnes; rest != 0; rest &= rest - 1) {
+            const uint one = batch.triangle[lowestBit(rest)];
+            const Corners t = cornersOf(points, triangles, one, voxelsPerUnit);
+            cutLong(cut, &waiting, &t, one, limits);
         }
-        Parts parts;
-        Corners part;
-        parts.waiting[0] = t;
-        parts.count = 1;
-        while (nextPart(&parts, limits, &part)) addPart(cut, &waiting, &part, triangle);
     }
     flush(cut, &waiting);
 }
 
-// What the items of a group tell each other about the samples of a brick.
-typedef struct {
-    double radii;
-    float lower[3], upper[3];
-} Extent;
-
-// Cells of a box.
-typedef struct {
-    float lower[3];
-    float side;
-    int size[3];
-} Cells;
-
-uint cellOf(const Cells* cells, float3 place) {
-    const int3 cell = convert_int3((place - vload3(0, cells->lower)) / cells->side);
-    return (uint)((cell.x * cells->size[1] + cell.y) * cells->size[2] + cell.z);
-}
-
-Extent addExtents(const Extent* a, const Extent* b) {
-    Extent sum;
-    sum.radii = a->radii + b->radii;
-    for (int axis = 0; axis < 3; ++axis) {
-        sum.lower[axis] = min(a->lower[axis], b->lower[axis]);
-        sum.upper[axis] = max(a->upper[axis], b->upper[axis]);
-    }
-    return sum;
-}
-
-// Makes members of pieces, unsorted.
-Extent makeMembers(global const Piece* pieces, uint first, uint count, int3 origin, global Member* members) {
-    Extent extent = {0, {INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
-    for (uint i = ITEM; i < count; i += ITEMS) {
-        global const Piece* piece = pieces + first + i;
-        const float3 sample = convert_float3(vload3(0, piece->base) - origin) + vload3(0, piece->sample);
-        global Member* member = members + i;
-        vstore3(sample, 0, member->sample);
-        member->radius = piece->radius;
-        vstore3(vload3(0, piece->n), 0, member->normal);
-        member->piece = first + i;
-        const Extent one = {piece->radius, {sample.x, sample.y, sample.z}, {sample.x, sample.y, sample.z}};
-        extent = addExtents(&extent, &one);
-    }
-    return extent;
-}
-
-// The columns of clusters of a batch, and what of them is a brick's.
-typedef struct {
-    global float* columns;
-    global uint* begins;  // the first member of each cluster, and the end of the last one
-    uint stride;
-} Clusters;
-
-void putCluster(const Clusters* clusters, uint index, float3 sample, float radius, float3 normal, float thickness,
-                uint begin) {
-    global float* column = clusters->columns + index;
-    const uint stride = clusters->stride;
-    column[SAMPLE_X * stride] = sample.x;
-    column[SAMPLE_Y * stride] = sample.y;
-    column[SAMPLE_Z * stride] = sample.z;
-    column[RADIUS * stride] = radius;
-    column[NORMAL_X * stride] = normal.x;
-    column[NORMAL_Y * stride] = normal.y;
-    column[NORMAL_Z * stride] = normal.z;
-    column[THICKNESS * stride] = thickness;
-    clusters->begins[index] = begin;
-}
-
-// Members begin .. end become a cluster; returns how far it reaches around its sample.
-void addCluster(const Clusters* clusters, uint index, global const Member* members, uint begin, uint end) {
+// A group of pieces becomes a cluster, with a sample and a radius that covers all of them: sdf/clusters.h.
+void makeCluster(const Groups* groups, uint index, global const Member* members) {
+    const uint begin = groups->begins[index], end = groups->begins[index + 1];
     float3 mean = 0, normal = 0;
     for (uint m = begin; m < end; ++m) {
-        mean += vload3(0, members[m].sample);
+        mean += vload3(0, members[m].place);
         normal += vload3(0, members[m].normal);
     }
     mean /= (float)(end - begin);
@@ -372,7 +299,7 @@ void addCluster(const Clusters* clusters, uint index, global const Member* membe
     float3 sample = 0;
     float nearest2 = INFINITY;
     for (uint m = begin; m < end; ++m) {
-        const float3 place = vload3(0, members[m].sample), away = place - mean;
+        const float3 place = vload3(0, members[m].place), away = place - mean;
         const float away2 = dot(away, away);
         if (away2 < nearest2) {
             nearest2 = away2;
@@ -381,77 +308,10 @@ void addCluster(const Clusters* clusters, uint index, global const Member* membe
     }
     float radius = 0, thickness = 0;
     for (uint m = begin; m < end; ++m) {
-        const float3 away = vload3(0, members[m].sample) - sample;
+        const float3 away = vload3(0, members[m].place) - sample;
         const float facing = dot(vload3(0, members[m].normal), normal), own = members[m].radius;
         radius = max(radius, length(away) + own);
         thickness = max(thickness, fabs(dot(away, normal)) + own * sqrt(max(0.0f, 1 - facing * facing)));
     }
-    putCluster(clusters, index, sample, radius + CLUSTER_SLACK, normal, thickness + CLUSTER_SLACK, begin);
-}
-
-// Sorts members by cell into `sorted`; each cell that has some becomes a cluster. Returns the number of clusters.
-uint groupMembers(const Clusters* clusters, uint first, global const Member* unsorted, global Member* sorted,
-                  global uint* cellOfMember, uint count, const Cells* cells, global uint* cursors,
-                  SHARED uint2* sums) {
-    const uint cellCount = (uint)(cells->size[0] * cells->size[1] * cells->size[2]);
-    for (uint cell = ITEM; cell < cellCount; cell += ITEMS) cursors[cell] = 0;
-    MEET;
-    for (uint i = ITEM; i < count; i += ITEMS) {
-        const uint cell = cellOf(cells, vload3(0, unsorted[i].sample));
-        cellOfMember[i] = cell;
-        takeGlobal(cursors + cell, 1);
-    }
-    MEET;
-    // how many members and clusters come before the cells of each item
-    const uint begin = (uint)((ulong)(cellCount) * ITEM / ITEMS), end = (uint)((ulong)(cellCount) * (ITEM + 1) / ITEMS);
-    uint2 sum = 0;
-    if (ITEMS > 1) {
-        for (uint cell = begin; cell < end; ++cell) sum += (uint2)(cursors[cell], cursors[cell] > 0);
-        sums[ITEM] = sum;
-        MEET;
-        sum = 0;
-        for (uint i = 0; i < ITEM; ++i) sum += sums[i];
-    }
-    uint cluster = first + sum.y;
-    for (uint cell = begin; cell < end; ++cell) {
-        const uint inCell = cursors[cell];
-        if (inCell > 0) clusters->begins[cluster++] = first + sum.x;
-        cursors[cell] = sum.x;
-        sum.x += inCell;
-    }
-    if (ITEM == ITEMS - 1) {
-        clusters->begins[cluster] = first + count;
-        sums[0].y = cluster - first;
-    }
-    MEET;
-    const uint found = sums[0].y;
-    for (uint i = ITEM; i < count; i += ITEMS) sorted[takeGlobal(cursors + cellOfMember[i], 1)] = unsorted[i];
-    MEET;
-    for (uint c = first + ITEM; c < first + found; c += ITEMS) {
-        const uint beginOf = clusters->begins[c] - first, endOf = clusters->begins[c + 1] - first;
-        addCluster(clusters, c, sorted - first, beginOf + first, endOf + first);
-    }
-    return found;
-}
-
-// Which clusters of a brick, in their order, may reach each slice of blocks of the same x.
-void rangeClusters(const Clusters* clusters, uint first, uint count, int slices, float reach, global uint2* ranges) {
-    for (int slice = (int)(ITEM); slice < slices; slice += ITEMS) ranges[slice] = (uint2)(UINT_MAX, 0);
-    MEET;
-    for (uint c = first + ITEM; c < first + count; c += ITEMS) {
-        const float x = clusters->columns[SAMPLE_X * clusters->stride + c],
-                    beyond = reach + clusters->columns[RADIUS * clusters->stride + c] + CLUSTER_SLACK;
-        const int low = clamp(convert_int_rtn((x - beyond - (BLOCK_SIDE - 1)) / BLOCK_SIDE), 0, slices),
-                  high = clamp(convert_int_rtn((x + beyond) / BLOCK_SIDE), -1, slices - 1);
-        for (int slice = low; slice <= high; ++slice) {
-            global uint* range = (global uint*)(ranges + slice);
-#if ITEMS > 1
-            atomic_min(range, c);
-            atomic_max(range + 1, c + 1);
-#else
-            range[0] = min(range[0], c);
-            range[1] = max(range[1], c + 1);
-#endif
-        }
-    }
+    putGroup(groups, index, sample, radius + GROUP_SLACK, normal, thickness + GROUP_SLACK);
 }

@@ -1,0 +1,232 @@
+// What lies in a brick, sorted by cells of space into groups that a block can look at or leave out as a whole.
+#include "vectors.cl"
+
+// Groups near a block that are looked at in one go.
+#define PAGE 1024
+// Rounding of a group's own numbers, and of where it lies to a block [voxels].
+#define GROUP_SLACK 1e-4f
+#define BIN_SLACK 1e-3f
+
+// Something that lies in a brick, to be grouped with what lies near it.
+typedef struct {
+    float place[3];  // in the voxels of the brick
+    float radius;    // around the place
+    float normal[3];
+    uint content;  // what it is: the kernels know
+} Member;
+
+// Groups of members of all bricks of a batch, a column for each number. The members of a group end where those of the
+// next one begin; so do the places of bricks in these columns.
+enum { PLACE_X, PLACE_Y, PLACE_Z, RADIUS, NORMAL_X, NORMAL_Y, NORMAL_Z, THICKNESS, COMMON_COLUMNS };
+
+// What is known of all members of a brick, or of an item's part of them.
+typedef struct {
+    double sizes;  // their radii or areas, summed up
+    float lower[3], upper[3];
+} Extent;
+
+Extent addExtents(const Extent* a, const Extent* b) {
+    Extent sum;
+    sum.sizes = a->sizes + b->sizes;
+    for (int axis = 0; axis < 3; ++axis) {
+        sum.lower[axis] = min(a->lower[axis], b->lower[axis]);
+        sum.upper[axis] = max(a->upper[axis], b->upper[axis]);
+    }
+    return sum;
+}
+
+Extent noExtent(void) {
+    const Extent none = {0, {INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
+    return none;
+}
+
+Extent sumExtents(SHARED const Extent* extents) {
+    Extent sum = extents[0];
+    for (int i = 1; i < ITEMS; ++i) {
+        const Extent other = extents[i];
+        sum = addExtents(&sum, &other);
+    }
+    return sum;
+}
+
+// Cells of a box.
+typedef struct {
+    float lower[3];
+    float side;
+    int size[3];
+} Cells;
+
+uint cellOf(const Cells* cells, float3 place) {
+    const int3 cell = convert_int3((place - vload3(0, cells->lower)) / cells->side);
+    return (uint)((cell.x * cells->size[1] + cell.y) * cells->size[2] + cell.z);
+}
+
+Cells makeCells(const Extent* extent, float side) {
+    Cells cells;
+    cells.side = side;
+    for (int axis = 0; axis < 3; ++axis) {
+        cells.lower[axis] = extent->lower[axis];
+        cells.size[axis] = (int)((extent->upper[axis] - extent->lower[axis]) / side) + 1;
+    }
+    return cells;
+}
+
+float countCells(const Cells* cells) {
+    return (float)(cells->size[0]) * (float)(cells->size[1]) * (float)(cells->size[2]);
+}
+
+// The groups of a batch.
+typedef struct {
+    global float* columns;
+    global uint* begins;  // the first member of each cluster, and the end of the last one
+    uint stride;
+} Groups;
+
+void putGroup(const Groups* groups, uint index, float3 place, float radius, float3 normal, float thickness) {
+    global float* column = groups->columns + index;
+    const uint stride = groups->stride;
+    column[PLACE_X * stride] = place.x;
+    column[PLACE_Y * stride] = place.y;
+    column[PLACE_Z * stride] = place.z;
+    column[RADIUS * stride] = radius;
+    column[NORMAL_X * stride] = normal.x;
+    column[NORMAL_Y * stride] = normal.y;
+    column[NORMAL_Z * stride] = normal.z;
+    column[THICKNESS * stride] = thickness;
+}
+
+// Sorts members by cell into `sorted`; those of each cell that has some are a group.
+// Returns the number of groups.
+uint sortMembers(const Groups* groups, uint first, global const Member* unsorted, global Member* sorted,
+                  global uint* cellOfMember, uint count, const Cells* cells, global uint* cursors,
+                  SHARED uint2* sums) {
+    const uint cellCount = (uint)(cells->size[0] * cells->size[1] * cells->size[2]);
+    for (uint cell = ITEM; cell < cellCount; cell += ITEMS) cursors[cell] = 0;
+    MEET;
+    for (uint i = ITEM; i < count; i += ITEMS) {
+        const uint cell = cellOf(cells, vload3(0, unsorted[i].place));
+        cellOfMember[i] = cell;
+        takeGlobal(cursors + cell, 1);
+    }
+    MEET;
+    // how many members and groups come before the cells of each item
+    const uint begin = (uint)((ulong)(cellCount) * ITEM / ITEMS), end = (uint)((ulong)(cellCount) * (ITEM + 1) / ITEMS);
+    uint2 sum = 0;
+    if (ITEMS > 1) {
+        for (uint cell = begin; cell < end; ++cell) sum += (uint2)(cursors[cell], cursors[cell] > 0);
+        sums[ITEM] = sum;
+        MEET;
+        sum = 0;
+        for (uint i = 0; i < ITEM; ++i) sum += sums[i];
+    }
+    uint group = first + sum.y;
+    for (uint cell = begin; cell < end; ++cell) {
+        const uint inCell = cursors[cell];
+        if (inCell > 0) groups->begins[group++] = first + sum.x;
+        cursors[cell] = sum.x;
+        sum.x += inCell;
+    }
+    if (ITEM == ITEMS - 1) {
+        groups->begins[group] = first + count;
+        sums[0].y = group - first;
+    }
+    MEET;
+    const uint found = sums[0].y;
+    for (uint i = ITEM; i < count; i += ITEMS) sorted[takeGlobal(cursors + cellOfMember[i], 1)] = unsorted[i];
+    MEET;
+    return found;
+}
+
+// Which groups of a brick, in their order, may reach each slice of blocks of the same x.
+void rangeGroups(const Groups* groups, uint first, uint count, int slices, float reach, global uint2* ranges) {
+    for (int slice = (int)(ITEM); slice < slices; slice += ITEMS) ranges[slice] = (uint2)(UINT_MAX, 0);
+    MEET;
+    for (uint c = first + ITEM; c < first + count; c += ITEMS) {
+        const float x = groups->columns[PLACE_X * groups->stride + c],
+                    beyond = reach + groups->columns[RADIUS * groups->stride + c] + GROUP_SLACK;
+        const int low = clamp(convert_int_rtn((x - beyond - (BLOCK_SIDE - 1)) / BLOCK_SIDE), 0, slices),
+                  high = clamp(convert_int_rtn((x + beyond) / BLOCK_SIDE), -1, slices - 1);
+        for (int slice = low; slice <= high; ++slice) {
+            global uint* range = (global uint*)(ranges + slice);
+#if ITEMS > 1
+            atomic_min(range, c);
+            atomic_max(range + 1, c + 1);
+#else
+            range[0] = min(range[0], c);
+            range[1] = max(range[1], c + 1);
+#endif
+        }
+    }
+}
+
+// Where a block lies, and the groups that may reach it.
+typedef struct {
+    Groups groups;
+    uint2 range;     // of groups that may reach its slice of blocks
+    int3 block;      // index coordinates of its first voxel
+    float3 inBrick;  // the same in the voxels of the brick
+    float reach;     // [voxels]
+} Near;
+
+// The block of this group of items, of all blocks of a batch of bricks.
+Near nearBlock(const Grid* grid, const Groups* groups, global const uint* cellOfBrick, uint firstBrick,
+               global const uint2* ranges) {
+    const int side = (1 << grid->shift) / BLOCK_SIDE;
+    const uint perBrick = (uint)(side * side * side), brick = (uint)(get_group_id(0)) / perBrick;
+    const int number = (int)(get_group_id(0) % perBrick);
+    const int3 inBrick = BLOCK_SIDE * (int3)(number / side / side, number / side % side, number % side);
+    const Near near = {*groups, ranges[brick * side + inBrick.x / BLOCK_SIDE],
+                       brickAt(grid, cellOfBrick[firstBrick + brick]) * (1 << grid->shift) + inBrick,
+                       convert_float3(inBrick), (float)(grid->reach)};
+    return near;
+}
+
+// Which of LANES groups from the c-th on reach the block.
+IntLanes reaching(const Near* near, uint c) {
+    const float halfBlock = 0.5f * (BLOCK_SIDE - 1);
+    global const float* columns = near->groups.columns + c;
+    const uint stride = near->groups.stride;
+    const Lanes dx = near->inBrick.x + halfBlock - vloadLanes(0, columns + PLACE_X * stride),
+                dy = near->inBrick.y + halfBlock - vloadLanes(0, columns + PLACE_Y * stride),
+                dz = near->inBrick.z + halfBlock - vloadLanes(0, columns + PLACE_Z * stride);
+    const Lanes nx = vloadLanes(0, columns + NORMAL_X * stride), ny = vloadLanes(0, columns + NORMAL_Y * stride),
+                nz = vloadLanes(0, columns + NORMAL_Z * stride);
+    const Lanes zero = 0.0f, reach = vloadLanes(0, columns + RADIUS * stride) + near->reach,
+                slab = vloadLanes(0, columns + THICKNESS * stride) + (near->reach + BIN_SLACK);
+    const Lanes away2 = squareLanes(max(fabs(dx) - halfBlock, zero)) + squareLanes(max(fabs(dy) - halfBlock, zero)) +
+                        squareLanes(max(fabs(dz) - halfBlock, zero));
+    return (away2 < reach * reach) &
+           (fabs(dx * nx + dy * ny + dz * nz) < slab + halfBlock * (fabs(nx) + fabs(ny) + fabs(nz)));
+}
+
+// Lists groups that reach the block, from the c-th on, until the page may be full or there are no more. Returns the
+// group to go on with.
+uint turnPage(const Near* near, uint c, SHARED uint* page, SHARED uint* count) {
+    MEET;
+    if (ITEM == 0) *count = 0;
+    MEET;
+    while (c < near->range.y && *count <= PAGE - ITEMS * LANES) {
+        const uint at = c + ITEM * LANES;
+        uint bits = at < near->range.y ? bitsOf(reaching(near, at)) : 0;
+        // the columns have room for a vector more, and what stands there does not count
+        if (at < near->range.y && near->range.y - at < LANES) bits &= (1u << (near->range.y - at)) - 1;
+        MEET;
+        for (; bits != 0; bits &= bits - 1) {
+#if ITEMS > 1
+            const uint place = atomic_inc(count);
+#else
+            const uint place = (*count)++;
+#endif
+            page[place] = at + (uint)(lowestBit(bits));
+        }
+        c += ITEMS * LANES;
+        MEET;
+    }
+    return min(c, near->range.y);
+}
+
+float3 placeOf(const Groups* groups, uint c) {
+    global const float* columns = groups->columns + c;
+    return (float3)(columns[PLACE_X * groups->stride], columns[PLACE_Y * groups->stride],
+                    columns[PLACE_Z * groups->stride]);
+}
