@@ -273,8 +273,10 @@ void Fill::start(Batch& batch, std::size_t first) {
         return device_.queue.enqueueMapBuffer(buffer, CL_FALSE, CL_MAP_READ, 0, batch.load().resultBytes(), nullptr,
                                               &batch.filled);
     };
-    if (mesh_.triangles) batch.triangles = static_cast<const std::int32_t*>(mapped(batch.triangleBuffer));
-    if (mesh_.triangles) timing_.keep(Timing::Of::download, batch.filled);
+    if (mesh_.triangles) {
+        batch.triangles = static_cast<const std::int32_t*>(mapped(batch.triangleBuffer));
+        timing_.keep(Timing::Of::download, batch.filled);
+    }
     batch.distances = static_cast<const float*>(mapped(batch.distanceBuffer));
     timing_.keep(Timing::Of::download, batch.filled);
     device_.queue.flush();
