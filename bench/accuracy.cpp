@@ -11,8 +11,10 @@
 #include <functional>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <set>
 
+#include "cl/filler.h"
 #include "sdf/build.h"
 #include "sdf/grids.h"
 #include "sdf/mesh_io.h"
@@ -52,16 +54,23 @@ struct Row {
 };
 
 const std::map<std::string, Method> methods = {
-    {"exact", Method::exact}, {"double-layer", Method::doubleLayer}, {"pseudonormal", Method::pseudonormal}};
+    {"exact", Method::exact},
+    {"double-layer", Method::doubleLayer},
+    {"pseudonormal", Method::pseudonormal},
+    {"prism", Method::prism},
+};
 
+// The prism method runs on the first OpenCL device.
 Builder ours(const std::string& name) {
-    return {name, [method = methods.at(name)](const Mesh& mesh, float voxelSize, const test::Band& band) {
-                return build(mesh, {.voxelSize = voxelSize,
-                                    .exteriorWidth = float(band.exterior),
-                                    .interiorWidth = float(band.interior),
-                                    .method = method})
-                    .grids()
-                    .distance;
+    const Method method = methods.at(name);
+    std::optional<BlockFiller> filler;
+    if (method == Method::prism) filler = openclFiller(openDevice());
+    return {name, [method, filler](const Mesh& mesh, float voxelSize, const test::Band& band) {
+                const BuildOptions options{.voxelSize = voxelSize,
+                                           .exteriorWidth = float(band.exterior),
+                                           .interiorWidth = float(band.interior),
+                                           .method = method};
+                return build(mesh, options, filler ? &*filler : nullptr).grids().distance;
             }};
 }
 
@@ -84,7 +93,9 @@ std::vector<Builder> allBuilders(const std::string& method) {
     std::vector<Builder> builders = {ours(method)};
     builders.push_back(openvdbs("meshToVolume 0x4", openvdb::tools::DISABLE_RENORMALIZATION));
     builders.push_back(openvdbs("meshToVolume", 0));
-    for (const char* other : {"pseudonormal", "double-layer"})
+    std::vector<std::string> others = {"pseudonormal", "double-layer"};
+    if (!devices().empty()) others.push_back("prism");
+    for (const std::string& other : others)
         if (other != method) builders.push_back(ours(other));
     return builders;
 }
@@ -278,7 +289,7 @@ int run(int argc, char** argv) {
     app.add_option("--resolution", options.resolutions, "voxels along the longest side");
     app.add_option("--half-width", options.bands, "of the band [voxels]: W, or EXTERIOR/INTERIOR");
     app.add_option("--method", options.method, "the method under test")
-        ->check(CLI::IsMember({"exact", "double-layer", "pseudonormal"}))
+        ->check(CLI::IsMember(methods))
         ->capture_default_str();
     app.add_option("--samples", options.samples, "active voxels to check; smaller grids are checked whole")
         ->check(CLI::PositiveNumber)

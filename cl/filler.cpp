@@ -1,6 +1,7 @@
 #include "cl/filler.h"
 
 #include "cl/brick_filler.h"
+#include "cl/prism.h"
 #include "cl/program.h"
 
 namespace bilayer {
@@ -8,6 +9,7 @@ namespace bilayer {
 BlockFiller openclFiller(const Device& device, const OpenclOptions& options) {
     return {"opencl", device.info().name, [device, options](const FillJob& job) {
                 try {
+                    if (job.options.method == Method::prism) return fillPrism(device.impl(), options, job);
                     fillByBricks(device.impl(), options, job);
                 } catch (const cl::Error& error) {
                     throw deviceError(error, device.info().name);

@@ -495,6 +495,11 @@ class Build {
     openvdb::Int32Grid::Ptr triangle_;
 };
 
+void refusePrism(const BuildOptions& options) {
+    if (options.method == Method::prism)
+        throw std::invalid_argument("the method prism needs an OpenCL device: give build() its filler");
+}
+
 template <class Work>
 LevelSet withThreads(int threads, const Work& work) {
     if (threads == 0) return work();
@@ -510,8 +515,7 @@ LevelSet build(const Mesh& mesh, const BuildOptions& given, const BlockFiller* f
     if (filler && options.method == Method::pseudonormal)
         throw std::invalid_argument(
             fmt::format("the {} back end has no method {}", filler->backend, name(options.method)));
-    if (!filler && options.method == Method::prism)
-        throw std::invalid_argument("the method prism needs an OpenCL device: give build() its filler");
+    if (!filler) refusePrism(options);
     openvdb::initialize();
     BuildTimes ignored;
     return withThreads(options.threads, [&] { return Build(mesh, options, filler, times ? *times : ignored).run(); });
@@ -521,6 +525,7 @@ LevelSet rebuild(const LevelSet& old, const Mesh& oldMesh, const Mesh& newMesh, 
                  const BuildOptions& given, BuildTimes* times) {
     const BuildOptions options = inVoxels(given);
     check(options);
+    refusePrism(options);
     BuildTimes ignored;
     return withThreads(options.threads, [&] {
         return Build(newMesh, options, nullptr, times ? *times : ignored).runFrom(old, oldMesh, moved);

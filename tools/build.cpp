@@ -20,10 +20,11 @@
 namespace bilayer::tools {
 namespace {
 
-// Words of the contract. The paper's prism method is answered by name: this version lacks it.
-constexpr const char* absentMethod = "prism";
-const std::map<std::string, Method> methods{
-    {"exact", Method::exact}, {"double-layer", Method::doubleLayer}, {"pseudonormal", Method::pseudonormal}};
+// Words of the contract.
+const std::map<std::string, Method> methods{{"exact", Method::exact},
+                                            {"double-layer", Method::doubleLayer},
+                                            {"pseudonormal", Method::pseudonormal},
+                                            {"prism", Method::prism}};
 const std::map<std::string, Sign> signs{
     {"auto", Sign::automatic}, {"normals", Sign::normals}, {"winding", Sign::winding}, {"flood", Sign::flood}};
 const std::map<std::string, BandUnit> bandUnits{{"voxels", BandUnit::voxels}, {"world", BandUnit::world}};
@@ -55,13 +56,16 @@ struct Outcome {
 void requireUsage(const Arguments& a) {
     if (a.backend != "opencl" && (a.deviceGiven->count() || a.memoryGiven->count()))
         throw CLI::ValidationError("--device and --device-memory", "need --backend opencl");
-    const bool layers = a.method == "double-layer";
+    const bool layers = a.method == "double-layer", prism = a.method == "prism";
+    if (prism && a.backend != "opencl") throw CLI::ValidationError("--method prism", "needs --backend opencl");
     for (const CLI::Option* option : a.layerOptions)
         if (!layers && option->count()) throw CLI::ValidationError(option->get_name(), "needs --method double-layer");
     if (layers && a.sign != "auto")
         throw CLI::ValidationError("--sign", "is not for --method double-layer: the layers tell the signs");
-    if (a.gapGiven->count() && (layers || (a.sign != "auto" && a.sign != "flood")))
-        throw CLI::ValidationError("--gap", "needs --sign flood or auto, and another method than double-layer");
+    if (prism && a.sign != "auto")
+        throw CLI::ValidationError("--sign", "is not for --method prism: the triangles tell the signs");
+    if (a.gapGiven->count() && (layers || prism || (a.sign != "auto" && a.sign != "flood")))
+        throw CLI::ValidationError("--gap", "needs --sign flood or auto, and --method exact or pseudonormal");
     if (a.bandUnit == "world" && !a.halfGiven->count() && !a.exteriorGiven->count())
         throw CLI::ValidationError("--band-unit", "world needs --half-width, or --exterior-width and --interior-width");
     requireOther(a.output, a.mesh);
@@ -87,8 +91,7 @@ void requireBand(const Arguments& a) {
 
 // What this version has not got.
 void requirePresent(const Arguments& a) {
-    if (a.method == absentMethod) throw std::runtime_error(fmt::format("--method {}: not in this version", a.method));
-    if (a.backend == "opencl" && a.method != "double-layer")
+    if (a.backend == "opencl" && a.method != "double-layer" && a.method != "prism")
         throw std::runtime_error(
             fmt::format("--backend opencl: has no method {}, give it --method double-layer", a.method));
 }
@@ -216,8 +219,10 @@ void addBand(CLI::App& command, Arguments& a) {
 }
 
 void addMethod(CLI::App& command, Arguments& a) {
-    command.add_option("--method", a.method, "exact (default), double-layer, pseudonormal or prism")
-        ->check(CLI::IsMember({"exact", "double-layer", "pseudonormal", absentMethod}));
+    command
+        .add_option("--method", a.method,
+                    "exact (default), double-layer, pseudonormal or prism (with --backend opencl)")
+        ->check(CLI::IsMember(methods));
     command.add_option("--sign", a.sign, "auto (default), normals, winding or flood")->check(CLI::IsMember(signs));
     a.gapGiven = command.add_option("--gap", a.options.gap, "gaps that --sign flood closes [voxels], default 2")
                      ->check(within(0, 100));

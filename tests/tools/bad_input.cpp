@@ -106,8 +106,6 @@ TEST_CASE("voxel sizes that no machine can serve are refused at once") {
 }
 
 TEST_CASE("what this version does not have") {
-    requireFault(buildOf(sphereFile(), {"--voxel-size", "0.1", "--method", "prism"}),
-                 "--method prism: not in this version");
     requireFault(buildOf(sphereFile(), {"--voxel-size", "0.1", "--backend", "opencl"}), "has no method exact");
     requireFault(buildOf(sphereFile(), {"--voxel-size", "0.1", "--backend", "opencl", "--method", "pseudonormal"}),
                  "has no method pseudonormal");
@@ -180,6 +178,19 @@ TEST_CASE("options that belong to other methods are wrong usage") {
     for (const char* sign : {"normals", "winding", "flood"})
         requireUsage(with({"--method", "double-layer", "--sign", sign}), "--sign: is not for --method double-layer");
     requireUsage(with({"--method", "double-layer", "--gap", "2"}), "--gap: needs");
+    for (const Words& words : {Words{}, Words{"--backend", "tbb"}, Words{"--sign", "normals"}}) {
+        Words options{"--method", "prism"};
+        options.insert(options.end(), words.begin(), words.end());
+        requireUsage(with(options), "--method prism: needs --backend opencl");
+    }
+    const auto prism = [&](Words options) {
+        options.insert(options.begin(), {"--method", "prism", "--backend", "opencl"});
+        return with(options);
+    };
+    for (const char* sign : {"normals", "winding", "flood"})
+        requireUsage(prism({"--sign", sign}), "--sign: is not for --method prism");
+    requireUsage(prism({"--gap", "2"}), "--gap: needs");
+    requireUsage(prism({"--delta", "0.5"}), "--delta: needs --method double-layer");
     for (const char* sign : {"normals", "winding"}) requireUsage(with({"--sign", sign, "--gap", "2"}), "--gap: needs");
     CHECK_FALSE(std::filesystem::exists(output()));
 }

@@ -348,3 +348,24 @@ TEST_CASE("build on an OpenCL device gives the same voxels") {
     CHECK(cl["device"] == devices[0]["name"]);
     CHECK(cl["activeVoxels"] == tbb["activeVoxels"]);
 }
+
+TEST_CASE("build by prisms says that nothing bounds its error") {
+    const auto devices = run({"devices", "--json"}).json()["devices"];
+    if (devices.empty()) {
+        WARN("skipped: there is no OpenCL device");
+        return;
+    }
+    const std::string output = scratch("prism.vdb").string();
+    const auto json = build(output, {"--voxel-size", "0.05", "--method", "prism", "--backend", "opencl", "--half-width",
+                                     "2", "--triangles", "--device-memory", "64"});
+    CHECK(json["method"] == "prism");
+    CHECK(json["backend"] == "opencl");
+    CHECK(json["sign"] == "prisms");
+    CHECK(json["errorBound"].is_null());
+    CHECK(json["activeVoxels"] > 1000);
+    CHECK(run({"info", output, "--json"}).json()["method"] == "prism");
+    const LevelSet field = readVdb(output);
+    REQUIRE(field.grids().triangle);
+    CHECK(field.grids().triangle->activeVoxelCount() == field.activeVoxels());
+    CHECK(field.grids().distance->tree().getValue(openvdb::Coord(0)) < 0);
+}
