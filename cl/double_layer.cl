@@ -15,9 +15,13 @@
 #if ITEMS > 1
 #define SLICES 1
 #define CUBES 1
+typedef float Slices;  // a number for each slice
+#define sliceOf(numbers, i) (numbers)
 #else
 #define SLICES 4
 #define CUBES 8
+typedef float4 Slices;  // a number for each slice
+#define sliceOf(numbers, i) (i == 0 ? numbers.x : i == 1 ? numbers.y : i == 2 ? numbers.z : numbers.w)
 #endif
 
 // layerTie of sdf/blocks.h [voxels^2].
@@ -25,7 +29,7 @@
 // Groups with fewer runs than this are applied without a look at what they could improve.
 #define RUNS_WORTH_A_LOOK 5
 
-#ifdef FP_FAST_FMAF
+#if defined(FP_FAST_FMAF) || defined(__FMA__)
 #define multiplyAdd fma
 #else
 #define multiplyAdd(a, b, c) ((a) * (b) + (c))
@@ -108,7 +112,7 @@ typedef struct {
 
 // Where the voxels of a cube are, in the voxels of the brick.
 typedef struct {
-    float x;
+    Slices x;
     Lanes y, z;
 } Voxels;
 
@@ -127,7 +131,7 @@ Voxels voxelsOf(float3 first) {
     const Voxels v = {first.x, first.y, first.z + (Lanes)(0, 1, 2, 3, 4, 5, 6, 7)};
 #else
     const float4 row = (float4)(0, 1, 2, 3), one = 1.0f;
-    const Voxels v = {first.x, first.y + (Lanes)(0 * one, one, 2 * one, 3 * one),
+    const Voxels v = {first.x + row, first.y + (Lanes)(0 * one, one, 2 * one, 3 * one),
                       first.z + (Lanes)(row, row, row, row)};
 #endif
     return v;
@@ -141,16 +145,14 @@ float3 nearestLattice(float3 place) {
 // Squared distances from a cube's voxels to a sample: along x for each slice, and across. Infinite outside of the
 // paper's cube, if that is asked for.
 typedef struct {
-    float along[SLICES], along2[SLICES];
+    Slices along, along2;
     Lanes y, z, across2;
 } Measured;
 
 INLINED Measured measure(const Voxels* v, float3 place, int k) {
     Measured m;
-    UNROLLED for (int i = 0; i < SLICES; ++i) {
-        m.along[i] = v->x + (float)(i)-place.x;
-        m.along2[i] = m.along[i] * m.along[i];
-    }
+    m.along = v->x - place.x;
+    m.along2 = m.along * m.along;
     m.y = v->y - place.y;
     m.z = v->z - place.z;
     m.across2 = multiplyAdd(m.y, m.y, m.z * m.z);
@@ -158,8 +160,7 @@ INLINED Measured measure(const Voxels* v, float3 place, int k) {
         const float3 centre = nearestLattice(place);
         const Lanes away = max(fabs(v->y - centre.y), fabs(v->z - centre.z));
         m.across2 = select((Lanes)(INFINITY), m.across2, away <= (float)(k));
-        UNROLLED for (int i = 0; i < SLICES; ++i)
-            if (fabs(v->x + (float)(i)-centre.x) > (float)(k)) m.along2[i] = INFINITY;
+        m.along2 = select((Slices)(INFINITY), m.along2, fabs(v->x - centre.x) <= (float)(k));
     }
     return m;
 }
@@ -169,15 +170,16 @@ INLINED void applyRun(Found* found, const Voxels* v, global const float* samples
     const uint count = sampleCount(run);
     Lanes nearest2[SLICES];
     const Measured first = measure(v, vload3(0, run->place), k);
-    UNROLLED for (int i = 0; i < SLICES; ++i) nearest2[i] = first.along2[i] + first.across2;
+    UNROLLED for (int i = 0; i < SLICES; ++i) nearest2[i] = sliceOf(first.along2, i) + first.across2;
     for (uint s = 1; s < count; ++s) {
         const Measured next = measure(v, sampleOf(samples, run, s), k);
-        UNROLLED for (int i = 0; i < SLICES; ++i) nearest2[i] = min(nearest2[i], next.along2[i] + next.across2);
+        UNROLLED for (int i = 0; i < SLICES; ++i) nearest2[i] = min(nearest2[i], sliceOf(next.along2, i) + next.across2);
     }
     // 2 delta times the height over the plane
+    const Slices along = first.along * normal.x;
     const Lanes across = multiplyAdd(first.y, (Lanes)(normal.y), first.z * normal.z);
     UNROLLED for (int i = 0; i < SLICES; ++i) {
-        const Lanes height = first.along[i] * normal.x + across;
+        const Lanes height = sliceOf(along, i) + across;
         const Lanes inner2 = nearest2[i] + height, outer2 = nearest2[i] - height;
 #if TRIANGLES
         found->innerOwner[i] = select(found->innerOwner[i], (IntLanes)(run->triangle), inner2 < found->inner2[i]);
@@ -192,9 +194,10 @@ INLINED void applyRun(Found* found, const Voxels* v, global const float* samples
 INLINED bool mayImprove(const Voxels* v, float3 centre, float radius, float delta2, const Lanes* bound, const Lanes* best2) {
     const float rest = delta2 + radius * radius;
     const Lanes dy = v->y - centre.y, dz = v->z - centre.z, across2 = multiplyAdd(dy, dy, dz * dz);
+    const Slices dx = v->x - centre.x, along2 = dx * dx;
     IntLanes may = 0;
     UNROLLED for (int i = 0; i < SLICES; ++i) {
-        const Lanes distance2 = square(v->x + (float)(i)-centre.x) + across2;
+        const Lanes distance2 = sliceOf(along2, i) + across2;
         may |= distance2 < multiplyAdd((Lanes)(2 * radius), bound[i], best2[i]) + rest;
     }
     return anyLane(may);
