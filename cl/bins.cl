@@ -1,6 +1,6 @@
 // Which triangles reach which brick of space, by count, scan and scatter: sdf/triangle_bins.h on a device. A program
 // that includes this text says what parts it cuts a triangle into.
-#include "common.cl"
+#include "vectors.cl"
 
 // What the double layer method samples triangles by (DoubleLayerOptions of sdf/build.h); nothing to others.
 typedef struct {
@@ -22,8 +22,8 @@ typedef struct {
     Sampling sampling;
 } Grid;
 
-// Whether a triangle is one part, whatever brick asks.
-bool isOnePart(const Grid* grid, const Corners* triangle);
+// Bits of the triangles of a batch that are one part, whatever brick asks.
+uint onePartBits(const Grid* grid, const Batch* batch);
 
 // The most parts that a brick with these limits cuts a triangle into.
 uint countParts(const Grid* grid, const Corners* triangle, const Limits* limits);
@@ -133,22 +133,55 @@ void visitFew(const Bins* bins, const Grid* grid, const Corners* t, uint code, b
                 visit(bins, grid, t, lowest + x * xStep + y * yStep + z, onePart);
 }
 
-// Visits the bricks around a triangle, and returns their code.
-uint binTriangle(const Bins* bins, const Grid* grid, const Corners* t) {
-    const double3 low = min(t->a, min(t->b, t->c)) - grid->reach, high = max(t->a, max(t->b, t->c)) + grid->reach;
-    const int3 lower = (convert_int3(floor(low)) >> grid->shift) - toInt3(grid->first),
-               upper = (convert_int3(floor(high)) >> grid->shift) - toInt3(grid->first), extent = upper - lower;
-    if (any(extent > 1)) {
-        divide(bins, grid, t, lower, upper);
-        return MANY_BRICKS;
+// The bricks around the triangles of a batch: lowest and extent, all inclusive.
+void bricksAround(const Grid* grid, const Batch* batch, Int3* lowest, Int3* extent) {
+    const Exact3 low = minExact(batch->a, minExact(batch->b, batch->c)),
+                 high = maxExact(batch->a, maxExact(batch->b, batch->c));
+    const Int3 first = {toRealInt(floor(low.x - grid->reach)) >> grid->shift,
+                        toRealInt(floor(low.y - grid->reach)) >> grid->shift,
+                        toRealInt(floor(low.z - grid->reach)) >> grid->shift};
+    lowest->x = first.x - grid->first[0];
+    lowest->y = first.y - grid->first[1];
+    lowest->z = first.z - grid->first[2];
+    extent->x = (toRealInt(floor(high.x + grid->reach)) >> grid->shift) - first.x;
+    extent->y = (toRealInt(floor(high.y + grid->reach)) >> grid->shift) - first.y;
+    extent->z = (toRealInt(floor(high.z + grid->reach)) >> grid->shift) - first.z;
+}
+
+void divideTriangle(const Bins* bins, const Grid* grid, global const float* points, global const uint* triangles) {
+    const Corners t = cornersOf(points, triangles, bins->triangle, grid->voxelsPerUnit);
+    const double3 low = min(t.a, min(t.b, t.c)) - grid->reach, high = max(t.a, max(t.b, t.c)) + grid->reach;
+    divide(bins, grid, &t, (convert_int3(floor(low)) >> grid->shift) - toInt3(grid->first),
+           (convert_int3(floor(high)) >> grid->shift) - toInt3(grid->first));
+}
+
+// Counts the triangles of a batch in the bricks around them, and gives them their codes.
+void countBatch(Bins* bins, const Grid* grid, const Batch* batch, global const float* points,
+                global const uint* triangles, global uint* codes) {
+    Int3 lowest, extent;
+    bricksAround(grid, batch, &lowest, &extent);
+    const RealInt code = ((lowest.x * grid->size[1] + lowest.y) * grid->size[2] + lowest.z) << 3 | extent.x << 2 |
+                         extent.y << 1 | extent.z;
+    const uint few = bitsOfReal((extent.x <= 1) & (extent.y <= 1) & (extent.z <= 1)), single = onePartBits(grid, batch);
+    int all[BATCH];
+    storeRealInt(code, all);
+    for (uint rest = batch->real; rest != 0; rest &= rest - 1) {
+        const int lane = lowestBit(rest);
+        bins->triangle = batch->triangle[lane];
+        if (few >> lane & 1) {
+            codes[bins->triangle] = (uint)(all[lane]);
+            Corners t;
+            if (!(single >> lane & 1)) t = cornersOf(points, triangles, bins->triangle, grid->voxelsPerUnit);
+            visitFew(bins, grid, &t, (uint)(all[lane]), single >> lane & 1);
+        } else {
+            codes[bins->triangle] = MANY_BRICKS;
+            divideTriangle(bins, grid, points, triangles);
+        }
     }
-    const uint code = cellAt(grid, lower) << 3 | (uint)(extent.x << 2 | extent.y << 1 | extent.z);
-    visitFew(bins, grid, t, code, bins->list || isOnePart(grid, t));
-    return code;
 }
 
 // The triangles of this item: a run of them with counters of its own where an item does a group's work, so that no
-// counter is shared and the lists are in ascending order; else all items count together.
+// counter is shared and the lists are in ascending order; else all items count together. A batch at each step.
 typedef struct {
     ulong begin, end, step;
     uint run;
@@ -159,7 +192,7 @@ Turn ownTurn(const Grid* grid) {
 #if ITEMS > 1
     const Turn turn = {item, count, items, 0};
 #else
-    const Turn turn = {count * item / items, count * (item + 1) / items, 1, (uint)(item)};
+    const Turn turn = {count * item / items, count * (item + 1) / items, BATCH, (uint)(item)};
 #endif
     return turn;
 }
@@ -168,10 +201,11 @@ Turn ownTurn(const Grid* grid) {
 kernel void countTriangles(global const float* points, global const uint* triangles, Grid grid, global uint* cursors,
                            global uint* more, global uint* codes) {
     const Turn turn = ownTurn(&grid);
-    const Bins bins = {cursors + turn.run * grid.cells, more, 0, 0};
+    Bins bins = {cursors + turn.run * grid.cells, more, 0, 0};
     for (ulong i = turn.begin; i < turn.end; i += turn.step) {
-        const Corners t = cornersOf(points, triangles, (uint)(i), grid.voxelsPerUnit);
-        codes[i] = binTriangle(&bins, &grid, &t);
+        Batch batch;
+        fetchBatch(&batch, points, triangles, 0, (uint)(i), (uint)(turn.end), grid.voxelsPerUnit);
+        countBatch(&bins, &grid, &batch, points, triangles, codes);
     }
 }
 
@@ -227,13 +261,11 @@ kernel void listTriangles(global const float* points, global const uint* triangl
                           global const uint* codes, global uint* list) {
     const Turn turn = ownTurn(&grid);
     Bins bins = {cursors + turn.run * grid.cells, 0, list, 0};
-    for (ulong i = turn.begin; i < turn.end; i += turn.step) {
+    for (ulong i = turn.begin; i < turn.end; i += ITEMS > 1 ? turn.step : 1) {
         bins.triangle = (uint)(i);
-        if (codes[i] != MANY_BRICKS) {
+        if (codes[i] != MANY_BRICKS)
             visitFew(&bins, &grid, 0, codes[i], true);
-        } else {
-            const Corners t = cornersOf(points, triangles, (uint)(i), grid.voxelsPerUnit);
-            binTriangle(&bins, &grid, &t);
-        }
+        else
+            divideTriangle(&bins, &grid, points, triangles);
     }
 }

@@ -1,5 +1,5 @@
 // What lies in a brick, sorted by cells of space into groups that a block can look at or leave out as a whole.
-#include "vectors.cl"
+#include "bins.cl"
 
 // Groups near a block that are looked at in one go.
 #ifndef PAGE

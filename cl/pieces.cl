@@ -33,9 +33,9 @@ bool isShort(const Corners* t) {
            LONGEST_PIECE_EDGE * LONGEST_PIECE_EDGE;
 }
 
-bool isOnePart(const Grid* grid, const Corners* t) {
+uint onePartBits(const Grid* grid, const Batch* batch) {
     (void)(grid);
-    return isShort(t);
+    return ~bitsOfReal(toReal(longestEdges2(batch)) > (float)(LONGEST_PIECE_EDGE * LONGEST_PIECE_EDGE));
 }
 
 // Cuts a triangle in two at the middle of its longest edge.
@@ -265,17 +265,15 @@ void cutTriangles(Cut* cut, global const float* points, global const uint* trian
         fetchBatch(&batch, points, triangles, list, first, end, voxelsPerUnit);
         const Exact3 base = {nearestLattice(batch.a.x), nearestLattice(batch.a.y), nearestLattice(batch.a.z)};
         const Exact3 ab = subExact(batch.b, batch.a), ac = subExact(batch.c, batch.a);
-        const Exact longest2 = max(squareExact(ab), max(squareExact(ac), squareExact(subExact(batch.c, batch.b))));
-        const RealInt isLong = toReal(longest2) > (float)(LONGEST_PIECE_EDGE * LONGEST_PIECE_EDGE);
-        const uint longOnes = bitsOfReal(isLong) & batch.real;
+        const uint shortOnes = onePartBits(0, &batch) & batch.real;
         int bases[3][BATCH];
         storeReal(toRealInt(base.x), bases[0]);
         storeReal(toRealInt(base.y), bases[1]);
         storeReal(toRealInt(base.z), bases[2]);
-        if (batch.real & ~longOnes)
-            makePieces(cut, batch.real & ~longOnes, toReal3(subExact(batch.a, base)), toReal3(ab), toReal3(ac), bases,
+        if (shortOnes)
+            makePieces(cut, shortOnes, toReal3(subExact(batch.a, base)), toReal3(ab), toReal3(ac), bases,
                        batch.triangle);
-        for (uint rest = longOnes; rest != 0; rest &= rest - 1) {
+        for (uint rest = batch.real & ~shortOnes; rest != 0; rest &= rest - 1) {
             const uint one = batch.triangle[lowestBit(rest)];
             const Corners t = cornersOf(points, triangles, one, voxelsPerUnit);
             cutLong(cut, &waiting, &t, one, limits);

@@ -116,9 +116,19 @@ double3 normalOf(const Corners* t) {
     return cross(t->b - t->a, t->c - t->a);
 }
 
-bool isOnePart(const Grid* grid, const Corners* t) {
-    const double epsilon = grid->sampling.epsilon;
-    return 0.5 * length(normalOf(t)) <= epsilon && longestEdge2(t) <= SLIVER_STEP * SLIVER_STEP * epsilon;
+// Bits of the triangles of a batch that get one sample each.
+uint singleBits(const Sampling* sampling, const Batch* batch, Exact size) {
+    const double epsilon = sampling->epsilon;
+    return bitsOfExact((0.5 * size <= epsilon) &
+                       (longestEdges2(batch) <= SLIVER_STEP * SLIVER_STEP * epsilon));
+}
+
+Exact3 normals(const Batch* batch) {
+    return crossExact(subExact(batch->b, batch->a), subExact(batch->c, batch->a));
+}
+
+uint onePartBits(const Grid* grid, const Batch* batch) {
+    return singleBits(&grid->sampling, batch, sqrt(squareExact(normals(batch))));
 }
 
 // A part is a sample here.
@@ -239,11 +249,6 @@ void addSingles(Cut* cut, const Batch* batch, uint lanes, Exact3 normal, Exact s
     }
 }
 
-Exact3 crossExact(Exact3 a, Exact3 b) {
-    const Exact3 v = {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
-    return v;
-}
-
 // Samples a triangle that must be cut.
 void cutLarge(Cut* cut, const Grid* grid, uint triangle, const Tile* whole, double3 normal, const Limits* limits) {
     Tiles tiles;
@@ -257,16 +262,13 @@ void cutLarge(Cut* cut, const Grid* grid, uint triangle, const Tile* whole, doub
 // Samples the triangles of a list.
 void cutTriangles(Cut* cut, const Grid* grid, global const float* points, global const uint* triangles,
                   global const uint* list, uint begin, uint end, const Limits* limits) {
-    const double epsilon = grid->sampling.epsilon;
     for (uint first = begin + ITEM * BATCH; first < end; first += ITEMS * BATCH) {
         Batch batch;
         fetchBatch(&batch, points, triangles, list, first, end, grid->voxelsPerUnit);
-        const Exact3 ab = subExact(batch.b, batch.a), ac = subExact(batch.c, batch.a), normal = crossExact(ab, ac);
+        const Exact3 normal = normals(&batch);
         const Exact size = sqrt(squareExact(normal));
-        const Exact longest2 = max(squareExact(ab), max(squareExact(ac), squareExact(subExact(batch.c, batch.b))));
         const uint some = bitsOfExact(size > 0.0) & batch.real;
-        const uint singles =
-            bitsOfExact(0.5 * size <= epsilon && longest2 <= SLIVER_STEP * SLIVER_STEP * epsilon) & some;
+        const uint singles = singleBits(&grid->sampling, &batch, size) & some;
         if (singles) addSingles(cut, &batch, singles, normal, size);
         for (uint rest = some & ~singles; rest != 0; rest &= rest - 1) {
             const uint triangle = batch.triangle[lowestBit(rest)];

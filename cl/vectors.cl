@@ -1,5 +1,5 @@
 // Triangles a batch at a time: as many at once as there are lanes where one item does a group's work, else one by one.
-#include "bins.cl"
+#include "common.cl"
 
 #if ITEMS > 1
 #define BATCH 1
@@ -16,6 +16,7 @@ typedef double Exact;
 #define bitsOfReal(held) ((uint)((held) != 0))
 #define bitsOfExact(held) ((uint)((held) != 0))
 #define storeExact(v, p) (*(p) = (v))
+#define storeRealInt(v, p) (*(p) = (v))
 #else
 #define BATCH LANES
 typedef Lanes Real;
@@ -31,6 +32,7 @@ typedef double16 Exact;
 #define bitsOfReal bitsOf
 #define bitsOfExact(held) bitsOf(convert_int16(held))
 #define storeExact(v, p) vstore16(v, 0, p)
+#define storeRealInt(v, p) vstoreLanes(v, 0, p)
 #endif
 
 typedef struct {
@@ -40,6 +42,10 @@ typedef struct {
 typedef struct {
     Exact x, y, z;
 } Exact3;
+
+typedef struct {
+    RealInt x, y, z;
+} Int3;
 
 Real3 make3(Real x, Real y, Real z) {
     const Real3 v = {x, y, z};
@@ -65,6 +71,18 @@ Real3 select3(Real3 no, Real3 yes, RealInt which) {
 }
 Exact3 subExact(Exact3 a, Exact3 b) {
     const Exact3 v = {a.x - b.x, a.y - b.y, a.z - b.z};
+    return v;
+}
+Exact3 minExact(Exact3 a, Exact3 b) {
+    const Exact3 v = {min(a.x, b.x), min(a.y, b.y), min(a.z, b.z)};
+    return v;
+}
+Exact3 maxExact(Exact3 a, Exact3 b) {
+    const Exact3 v = {max(a.x, b.x), max(a.y, b.y), max(a.z, b.z)};
+    return v;
+}
+Exact3 crossExact(Exact3 a, Exact3 b) {
+    const Exact3 v = {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
     return v;
 }
 Exact squareExact(Exact3 a) {
@@ -95,14 +113,21 @@ Exact3 corners(global const float* points, uint (*indices)[BATCH], int corner, d
     return all;
 }
 
-// The batch that begins at `first`: all indices are fetched before all corners, so that the processor waits for memory
+// The longest edges of a batch, squared.
+Exact longestEdges2(const Batch* batch) {
+    return max(squareExact(subExact(batch->b, batch->a)),
+               max(squareExact(subExact(batch->c, batch->b)), squareExact(subExact(batch->a, batch->c))));
+}
+
+// The batch that begins at `first` of a list of triangles, or of all of them if the list is null: all indices are fetched before all corners, so that the processor waits for memory
 // once and not for each triangle.
 void fetchBatch(Batch* batch, global const float* points, global const uint* triangles, global const uint* list,
                 uint first, uint end, double voxelsPerUnit) {
     uint indices[3][BATCH];
     const uint count = min(end - first, (uint)(BATCH));
     for (uint i = 0; i < BATCH; ++i) {
-        batch->triangle[i] = list[first + min(i, count - 1)];
+        const uint at = first + min(i, count - 1);
+        batch->triangle[i] = list ? list[at] : at;
         const uint3 t = vload3(batch->triangle[i], triangles);
         indices[0][i] = t.x;
         indices[1][i] = t.y;
