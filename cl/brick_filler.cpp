@@ -209,8 +209,8 @@ void BrickFill::makeScratch() {
 std::uint64_t BrickFill::bytesOf(const Load& load) const {
     const std::uint64_t perBlock = 2 * sizeof(glm::ivec3) + blockVoxels * sizeof(float) * (job_.mesh.triangles ? 2 : 1);
     return load.parts * (sizes_.bytes + 2 * memberBytes + sizeof(cl_uint)) +
-           (load.parts + lanes) * (sizes_.columns * sizeof(cl_float) + sizeof(cl_uint)) +
-           blocksOf(load) * perBlock + load.bricks * slices() * sizeof(cl_uint2) + counters * sizeof(cl_uint);
+           (load.parts + lanes) * (sizes_.columns * sizeof(cl_float) + sizeof(cl_uint)) + blocksOf(load) * perBlock +
+           load.bricks * slices() * sizeof(cl_uint2) + counters * sizeof(cl_uint);
 }
 
 std::uint64_t BrickFill::blocksOf(const Load& load) const {
@@ -223,7 +223,8 @@ Load BrickFill::loadOf(std::size_t first, std::size_t last) const {
 
 // Whether a batch may be as large as this: its share of the memory, and the largest buffer.
 bool BrickFill::fits(const Load& load) const {
-    const std::uint64_t largest = std::max(blocksOf(load) * blockVoxels * sizeof(float), load.parts * (sizes_.columns + 2) * sizeof(cl_float) * 4);
+    const std::uint64_t largest = std::max(blocksOf(load) * blockVoxels * sizeof(float),
+                                           load.parts * (sizes_.columns + 2) * sizeof(cl_float) * 4);
     return load.parts < mostParts && bytesOf(load) <= share_ && largest <= device_.info.maxAllocationBytes;
 }
 
@@ -231,10 +232,12 @@ bool BrickFill::fits(const Load& load) const {
 std::size_t BrickFill::lastFitting(std::size_t first) const {
     if (!fits(loadOf(first, first + 1)))
         memory_.refuse(batchesInFlight * bytesOf(loadOf(first, first + 1)), "a brick of the grid");
-    const std::size_t end = std::min(bins_->bricks(), first + (gpuMapping_ ? bricksForGpu : (getenv("BR")?atoi(getenv("BR")):bricksForProcessor)));
-    const std::size_t mostParts = getenv("PA")?atoi(getenv("PA")):60000;
+    const std::size_t end =
+        std::min(bins_->bricks(),
+                 first + (gpuMapping_ ? bricksForGpu : (getenv("BR") ? atoi(getenv("BR")) : bricksForProcessor)));
+    const std::size_t mostParts = getenv("PA") ? atoi(getenv("PA")) : 60000;
     std::size_t last = first + 1;
-    while (last < end && fits(loadOf(first, last + 1)) && loadOf(first, last + 1).parts<mostParts) ++last;
+    while (last < end && fits(loadOf(first, last + 1)) && loadOf(first, last + 1).parts < mostParts) ++last;
     return last;
 }
 
@@ -358,6 +361,9 @@ void BrickFill::fillOpen() {
 }  // namespace
 
 void fillByBricks(Device::Impl& device, const OpenclOptions& options, const FillJob& job) {
+    if (!device.info.doubles)
+        throw DeviceError(device.info.name +
+                          " cannot compute in double precision, which exact and double-layer need; prism does not");
     BrickFill(device, options, job).run();
 }
 
