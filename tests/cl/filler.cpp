@@ -13,6 +13,7 @@
 #include <memory>
 #include <optional>
 #include <thread>
+#include <utility>
 
 #include "cl/program.h"
 #include "demos/shared/shapes.h"
@@ -255,6 +256,18 @@ TEST_CASE("blocks whose sides the nearest normals leave open come from the proce
                       transformed(shapes::box(glm::vec3(0.5f)), glm::translate(glm::mat4(1), glm::vec3(-0.5f)))});
     BuildOptions options = optionsFor(mesh, 40, Method::exact);
     const Way way = GENERATE(blockPerItem, groupPerBlock);
+    checkFillers(mesh, options, {.mapping = way.mapping});
+}
+
+TEST_CASE("OpenCL and TBB agree where faces of opposite sides lie on each other") {
+    // a box in a box of the same height, inside out or not: their tops and bottoms share planes
+    Mesh inner = shapes::box({0.7f, 0.4f, 0.5f}, GENERATE(1, 3));
+    if (GENERATE(false, true))
+        for (glm::uvec3& t : inner.triangles) std::swap(t.x, t.y);
+    const Mesh mesh = shapes::join({shapes::box({1.f, 0.6f, 0.5f}), inner});
+    const Way way = GENERATE(blockPerItem, groupPerBlock);
+    BuildOptions options = optionsFor(mesh, 2 * way.resolution / 3, Method::exact);
+    options.sign = GENERATE(Sign::normals, Sign::automatic);
     checkFillers(mesh, options, {.mapping = way.mapping});
 }
 
