@@ -19,7 +19,7 @@ HWY_BEFORE_NAMESPACE();
 namespace bilayer::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-constexpr int cubeSide = 4;                       // voxels
+constexpr int cubeSide = LayerSamples::cellSide;  // voxels
 constexpr int sliceVoxels = cubeSide * cubeSide;  // of one x
 constexpr int cubesPerSide = blockSide / cubeSide;
 constexpr int cubesPerBlock = cubesPerSide * cubesPerSide * cubesPerSide;
@@ -31,119 +31,104 @@ using Vec = hn::Vec<Tag>;
 using Mask = hn::Mask<Tag>;
 using IntVec = hn::Vec<IntTag>;
 
-/// Groups with fewer runs than this are applied without a look at what they could improve.
-constexpr std::uint32_t runsWorthALook = 5;
 constexpr float infinite = std::numeric_limits<float>::infinity();
+constexpr float halfCube = 0.5f * float(cubeSide - 1);  // from the middle of a cube to its last voxels
 
-// Places of a slice's voxels in their cube.
+// Places of a slice's voxels, from the middle of their cube.
 struct Lattice {
     alignas(64) float y[sliceVoxels], z[sliceVoxels];
 };
 constexpr Lattice lattice = [] {
     Lattice l{};
     for (int i = 0; i < sliceVoxels; ++i) {
-        l.y[i] = float(i / cubeSide);
-        l.z[i] = float(i % cubeSide);
+        l.y[i] = float(i / cubeSide) - halfCube;
+        l.z[i] = float(i % cubeSide) - halfCube;
     }
     return l;
 }();
 
-// A number for each slice.
-struct Slices {
-    using Tag = hn::CappedTag<float, cubeSide>;
-
-    // make(x - centre) of the slices from x = first on
-    template <class Make>
-    HWY_INLINE Slices(float first, float centre, Make make) {
-        const Tag tag;
-        for (std::size_t i = 0; i < std::size_t(cubeSide); i += hn::Lanes(tag))
-            hn::Store(make(hn::Sub(hn::Iota(tag, first + float(i)), hn::Set(tag, centre))), tag, of + i);
-    }
-    alignas(16) float of[cubeSide];
-};
-
-// One vector's part of each slice of a cube: where its voxels are, and what was found for them. Distances are squared
-// and less delta^2.
-template <bool withOwners>
-struct Voxels {
-    Voxels(const glm::vec3& first, int part, float farthest2) {
-        const Tag tag;
-        const auto at = std::size_t(part) * hn::Lanes(tag);
-        x = first.x;
-        y = hn::Add(hn::Load(tag, lattice.y + at), hn::Set(tag, first.y));
-        z = hn::Add(hn::Load(tag, lattice.z + at), hn::Set(tag, first.z));
-        for (int i = 0; i < cubeSide; ++i) {
-            inner2[i] = outer2[i] = hn::Set(tag, farthest2);
-            if constexpr (withOwners) innerOwner[i] = outerOwner[i] = hn::Set(IntTag(), -1);
-        }
-    }
-    float x;
-    Vec y, z, inner2[cubeSide], outer2[cubeSide];
-    IntVec innerOwner[cubeSide], outerOwner[cubeSide];
-};
+inline float sliceAt(int x) {
+    return float(x) - halfCube;
+}
 
 inline Vec squareOf(Vec v) {
     return hn::Mul(v, v);
 }
 
-// The paper's neighbourhood: voxels of a cube around the lattice point nearest to the sample.
-struct Neighbourhood {
-    glm::vec3 centre;
-    float half;
+// a x + b y + c z + d for one vector's part of all slices of a cube.
+struct Linear {
+    HWY_INLINE Linear(float a, float b, float c, float d, Vec y, Vec z) {
+        const Tag tag;
+        along = hn::Set(tag, a);
+        across = hn::MulAdd(z, hn::Set(tag, c), hn::MulAdd(y, hn::Set(tag, b), hn::Set(tag, d)));
+    }
+    HWY_INLINE Vec at(int x) const { return hn::MulAdd(along, hn::Set(Tag(), sliceAt(x)), across); }
+    Vec along, across;
 };
 
-// Squared distances to a sample: along x for each slice, and across. Infinite outside of a neighbourhood, if there is
-// one.
-template <bool cube>
-struct Measured {
-    template <class Voxels>
-    HWY_INLINE Measured(const Voxels& v, const glm::vec3& place, const Neighbourhood& near = {})
-        : along2(v.x, place.x, [](auto dx) { return hn::Mul(dx, dx); }) {
+// One vector's part of each slice of a cube: where its voxels are, from the middle of the cube, and what was found for
+// them. Distances are squared and less delta^2 and the voxel's own squared distance from the middle: what remains of
+// |v - s|^2 is linear in v.
+template <bool withOwners>
+struct Voxels {
+    explicit Voxels(int part) {
         const Tag tag;
-        const Vec dy = hn::Sub(v.y, hn::Set(tag, place.y)), dz = hn::Sub(v.z, hn::Set(tag, place.z));
-        across2 = hn::MulAdd(dy, dy, squareOf(dz));
-        if constexpr (cube) {
-            const Vec y = hn::Abs(hn::Sub(v.y, hn::Set(tag, near.centre.y))),
-                      z = hn::Abs(hn::Sub(v.z, hn::Set(tag, near.centre.z)));
-            across2 = hn::IfThenElse(hn::Le(hn::Max(y, z), hn::Set(tag, near.half)), across2, hn::Set(tag, infinite));
-            for (int x = 0; x < cubeSide; ++x)
-                if (std::abs(v.x + float(x) - near.centre.x) > near.half) along2.of[x] = infinite;
+        const auto at = std::size_t(part) * hn::Lanes(tag);
+        y = hn::Load(tag, lattice.y + at);
+        z = hn::Load(tag, lattice.z + at);
+        for (int i = 0; i < cubeSide; ++i) {
+            inner2[i] = outer2[i] = hn::Set(tag, infinite);
+            if constexpr (withOwners) innerOwner[i] = outerOwner[i] = hn::Set(IntTag(), -1);
         }
     }
-    HWY_INLINE Vec at(int x) const { return hn::Add(hn::Set(Tag(), along2.of[x]), across2); }
-
-    Slices along2;
-    Vec across2;
+    HWY_INLINE Vec own2(int x) const {
+        return hn::MulAdd(y, y, hn::MulAdd(z, z, hn::Set(Tag(), sliceAt(x) * sliceAt(x))));
+    }
+    Vec y, z, inner2[cubeSide], outer2[cubeSide];
+    IntVec innerOwner[cubeSide], outerOwner[cubeSide];
 };
 
-template <bool cube, bool withOwners>
-HWY_INLINE void apply(const LayerSamples& samples, const LayerRun& run, float half, Voxels<withOwners>& v) {
+// The samples around a cube, in the order of the brick's: -2 s, |s|^2, and minus twice the product of s and its offset,
+// where s is the sample from the middle of the cube.
+struct Candidates {
+    const float *x, *y, *z, *square, *height;
+    std::span<const std::uint32_t> picked;  // those that reach the cube
+};
+
+// Lowers squared distances to those of a sample; with cubes, where the voxel is in the paper's neighbourhood: a cube
+// around the lattice point nearest to the sample.
+template <bool cube, class Voxels>
+HWY_INLINE void approach(const LayerBlockInput& input, const Candidates& from, std::uint32_t s, const glm::vec3& middle,
+                         const Voxels& v, Vec* nearest2) {
     const Tag tag;
-    const glm::vec3* places = samples.places().data();
-    const glm::vec3* cells = samples.cells().data();
-    const auto measure = [&](std::uint32_t s) {
-        return Measured<cube>(v, places[s], cube ? Neighbourhood{cells[s], half} : Neighbourhood{});
-    };
-    Vec nearest2[cubeSide];
-    {
-        const auto first = measure(run.begin);
-        for (int x = 0; x < cubeSide; ++x) nearest2[x] = first.at(x);
+    Linear distance2(from.x[s], from.y[s], from.z[s], from.square[s], v.y, v.z);
+    glm::vec3 centre(0);
+    const auto half = float(input.parameters.cube);
+    if constexpr (cube) {
+        const auto& places = input.samples.columns().place;
+        centre = LayerSamples::nearestLattice({places[0][s], places[1][s], places[2][s]}) - middle;
+        const Vec y = hn::Abs(hn::Sub(v.y, hn::Set(tag, centre.y))), z = hn::Abs(hn::Sub(v.z, hn::Set(tag, centre.z)));
+        distance2.across =
+            hn::IfThenElse(hn::Le(hn::Max(y, z), hn::Set(tag, half)), distance2.across, hn::Set(tag, infinite));
     }
-    for (std::uint32_t s = run.begin + 1; s < run.end; ++s) {
-        const auto next = measure(s);
-        for (int x = 0; x < cubeSide; ++x) nearest2[x] = hn::Min(nearest2[x], next.at(x));
-    }
-    // 2 delta times the height over the plane
-    const glm::vec3 &place = places[run.begin], &normal = run.twiceOffset;
-    const Slices along(v.x, place.x, [&](auto dx) { return hn::Mul(dx, hn::Set(Slices::Tag(), normal.x)); });
-    const Vec across = hn::MulAdd(hn::Sub(v.y, hn::Set(tag, place.y)), hn::Set(tag, normal.y),
-                                  hn::Mul(hn::Sub(v.z, hn::Set(tag, place.z)), hn::Set(tag, normal.z)));
+    for (int x = 0; x < cubeSide; ++x)
+        if (!cube || std::abs(sliceAt(x) - centre.x) <= half) nearest2[x] = hn::Min(nearest2[x], distance2.at(x));
+}
+
+// Samples of one triangle lie in a plane and share their offset. So where A is the squared distance to the nearest of
+// them and h the height over the plane, the nearest inner and outer samples are at squared distances
+// A + delta^2 + 2 delta h and A + delta^2 - 2 delta h.
+template <bool withOwners>
+HWY_INLINE void spread(const LayerBlockInput& input, const Candidates& from, std::uint32_t s, const Vec* nearest2,
+                       Voxels<withOwners>& v) {
+    const auto& columns = input.samples.columns();
+    const auto twice = [&](std::size_t axis) { return 2 * columns.offset[axis][s]; };
+    const Linear height(twice(0), twice(1), twice(2), from.height[s], v.y, v.z);
     for (int x = 0; x < cubeSide; ++x) {
-        const Vec height = hn::Add(hn::Set(tag, along.of[x]), across);
-        const Vec inner2 = hn::Add(nearest2[x], height), outer2 = hn::Sub(nearest2[x], height);
+        const Vec up = height.at(x), inner2 = hn::Add(nearest2[x], up), outer2 = hn::Sub(nearest2[x], up);
         if constexpr (withOwners) {
             const IntTag intTag;
-            const IntVec owner = hn::Set(intTag, run.triangle);
+            const IntVec owner = hn::Set(intTag, columns.triangle[s]);
             const auto wins = [&](Vec distance2, Vec best2) {
                 return hn::RebindMask(intTag, hn::Lt(distance2, best2));
             };
@@ -155,57 +140,18 @@ HWY_INLINE void apply(const LayerSamples& samples, const LayerRun& run, float ha
     }
 }
 
-// Upper bounds of the distances to both layers.
-struct Bounds {
-    template <bool withOwners>
-    Bounds(const Voxels<withOwners>& v, float delta2) {
-        const Tag tag;
-        for (int x = 0; x < cubeSide; ++x) {
-            inner[x] = hn::Sqrt(hn::Max(hn::Add(v.inner2[x], hn::Set(tag, delta2)), hn::Zero(tag)));
-            outer[x] = hn::Sqrt(hn::Max(hn::Add(v.outer2[x], hn::Set(tag, delta2)), hn::Zero(tag)));
-        }
-    }
-    Vec inner[cubeSide], outer[cubeSide];
-};
-
-// Whether a ball may hold a sample nearer to some voxel than what was found: |p - centre| - radius < bound.
-template <class Voxels>
-HWY_INLINE bool mayImprove(const Voxels& v, const glm::vec3& centre, float radius, float delta2, const Vec* bound,
-                           const Vec* best2) {
-    const Tag tag;
-    const Measured<false> distance2(v, centre);
-    // squared: |p - centre|^2 < bound^2 + 2 radius bound + radius^2
-    const Vec twice = hn::Set(tag, 2 * radius), rest = hn::Set(tag, delta2 + radius * radius);
-    const auto mayAt = [&](int x) {
-        return hn::Lt(distance2.at(x), hn::Add(hn::MulAdd(twice, bound[x], best2[x]), rest));
-    };
-    Mask may = mayAt(0);
-    for (int x = 1; x < cubeSide; ++x) may = hn::Or(may, mayAt(x));
-    return !hn::AllFalse(tag, may);
-}
-
 template <bool cube, bool withOwners>
-HWY_INLINE void applyGroups(const LayerBlockInput& input, std::span<const std::uint32_t> groups,
-                            Voxels<withOwners>& v) {
-    const LayerRun* runs = input.samples.runs().data();
-    const float half = float(input.parameters.cube), delta2 = input.parameters.delta * input.parameters.delta;
-    bool large = false;
-    for (const std::uint32_t index : groups) {
-        const LayerGroup& group = input.samples.groups()[index];
-        const bool worthALook = group.end - group.begin >= runsWorthALook;
-        large |= worthALook;
-        const std::uint32_t end = worthALook ? group.begin + 1 : group.end;
-        for (std::uint32_t r = group.begin; r < end; ++r) apply<cube>(input.samples, runs[r], half, v);
-    }
-    if (!large) return;
-    const Bounds bounds(v, delta2);
-    for (const std::uint32_t index : groups) {
-        const LayerGroup& group = input.samples.groups()[index];
-        if (group.end - group.begin < runsWorthALook) continue;
-        if (!mayImprove(v, group.sample - group.offset, group.radius, delta2, bounds.inner, v.inner2) &&
-            !mayImprove(v, group.sample + group.offset, group.radius, delta2, bounds.outer, v.outer2))
-            continue;
-        for (std::uint32_t r = group.begin + 1; r < group.end; ++r) apply<cube>(input.samples, runs[r], half, v);
+HWY_INLINE void applyAll(const LayerBlockInput& input, const Candidates& from, const glm::vec3& middle,
+                         Voxels<withOwners>& v) {
+    const std::int32_t* triangles = input.samples.columns().triangle.data();
+    const std::uint32_t *next = from.picked.data(), *end = next + from.picked.size();
+    while (next < end) {
+        const std::uint32_t first = *next;
+        Vec nearest2[cubeSide];
+        for (Vec& some : nearest2) some = hn::Set(Tag(), infinite);
+        do approach<cube>(input, from, *next, middle, v, nearest2);
+        while (++next < end && triangles[*next] == triangles[first]);
+        spread(input, from, first, nearest2, v);
     }
 }
 
@@ -228,11 +174,13 @@ HWY_INLINE void combine(const Voxels<withOwners>& v, const FillParameters& param
     const Vec certain2 = hn::Set(tag, parameters.certain * parameters.certain - parameters.delta * parameters.delta);
     for (int x = 0; x < cubeSide; ++x) {
         const int slice = x * blockSide * blockSide;
-        const auto inside = hn::Le(v.inner2[x], hn::Add(v.outer2[x], hn::Set(tag, layerTie)));
-        const Vec other2 = hn::Max(hn::Add(hn::Max(v.inner2[x], v.outer2[x]), delta2), hn::Zero(tag));
+        const Vec own2 = v.own2(x), inner2 = hn::Min(hn::Add(v.inner2[x], own2), certain2),
+                  outer2 = hn::Min(hn::Add(v.outer2[x], own2), certain2);
+        const auto inside = hn::Le(inner2, hn::Add(outer2, hn::Set(tag, layerTie)));
+        const Vec other2 = hn::Max(hn::Add(hn::Max(inner2, outer2), delta2), hn::Zero(tag));
         const Vec clamped = hn::Max(hn::Sub(hn::Sqrt(other2), delta), hn::Zero(tag));
         const Vec phi = hn::IfThenElse(inside, hn::Neg(clamped), clamped);
-        const auto known = hn::Lt(hn::Min(v.inner2[x], v.outer2[x]), certain2);
+        const auto known = hn::Lt(hn::Min(inner2, outer2), certain2);
         putRows(tag, hn::IfThenElse(known, phi, hn::Set(tag, infinite)), part, distances + slice);
         if constexpr (withOwners)
             putRows(IntTag(), hn::IfThenElse(hn::RebindMask(IntTag(), inside), v.outerOwner[x], v.innerOwner[x]), part,
@@ -240,104 +188,89 @@ HWY_INLINE void combine(const Voxels<withOwners>& v, const FillParameters& param
     }
 }
 
-template <bool cube, bool withOwners>
-void fillCube(const LayerBlockInput& input, std::span<const std::uint32_t> groups, const glm::ivec3& inBlock,
-              float* distances, std::int32_t* triangles) {
-    const FillParameters& parameters = input.parameters;
-    const float farthest2 = parameters.certain * parameters.certain - parameters.delta * parameters.delta;
-    const int corner = (inBlock.x * blockSide + inBlock.y) * blockSide + inBlock.z;
-    for (int part = 0; part * int(hn::Lanes(Tag())) < sliceVoxels; ++part) {
-        Voxels<withOwners> voxels(input.inBrick + glm::vec3(inBlock), part, farthest2);
-        applyGroups<cube>(input, groups, voxels);
-        combine(voxels, parameters, part, distances + corner, withOwners ? triangles + corner : nullptr);
-    }
-}
-
-using CubeGroups = std::array<std::span<const std::uint32_t>, cubesPerBlock>;
-
-// The groups that reach each cube: the balls around their inner or outer samples must, and their slab.
-CubeGroups binCubes(const LayerBlockInput& input, LayerScratch& scratch) {
+// How far numbers lie beyond the cube's voxels.
+inline Vec beyond(Vec at) {
     const Tag tag;
-    const std::size_t lanes = hn::Lanes(tag), count = input.reaching.size(),
-                      stride = (count + lanes - 1) / lanes * lanes;
-    enum Row { inner, outer = inner + 3, normal = outer + 3, reach = normal + 3, slab, rows };
-    // columns beyond the last group reach nothing
-    scratch.columns.resize(stride * rows);
-    float* columns = scratch.columns.data();
-    // the paper's cube of (2K + 1)^3 voxels is around the sample itself, and sticks out of the ball
-    const bool cubes = input.parameters.cube > 0;
-    const float slabReach = input.parameters.reach * (cubes ? std::sqrt(3.f) : 1.f),
-                ballReach = cubes ? slabReach : input.parameters.certain;
-    for (std::size_t i = 0; i < count; ++i) {
-        const LayerGroup& group = input.samples.groups()[input.reaching[i]];
-        const glm::vec3 at = group.sample - input.inBrick, offset = cubes ? glm::vec3(0) : group.offset;
-        const auto put = [&](int row, float value) { columns[std::size_t(row) * stride + i] = value; };
-        for (int axis = 0; axis < 3; ++axis) {
-            put(inner + axis, at[axis] - offset[axis]);
-            put(outer + axis, at[axis] + offset[axis]);
-            put(normal + axis, group.normal[axis]);
-        }
-        put(reach, group.radius + ballReach);
-        put(slab, group.thickness + slabReach);
-    }
-    for (std::size_t i = count; i < stride; ++i)
-        for (int row = 0; row < rows; ++row) columns[std::size_t(row) * stride + i] = -1;
-    scratch.groups.resize(count * cubesPerBlock);
-    std::size_t ends[cubesPerBlock];
-    for (int cube = 0; cube < cubesPerBlock; ++cube) ends[cube] = std::size_t(cube) * count;
-    constexpr float half = 0.5f * float(cubeSide - 1);
-    for (std::size_t i = 0; i < count; i += lanes) {
-        const auto row = [&](int r) { return hn::LoadU(tag, columns + std::size_t(r) * stride + i); };
-        Vec toInner2[3][cubesPerSide], toOuter2[3][cubesPerSide], height[3][cubesPerSide];
-        Vec slabWidth = row(slab);
-        for (int axis = 0; axis < 3; ++axis) {
-            const Vec in = row(inner + axis), out = row(outer + axis), up = row(normal + axis);
-            const Vec centre = hn::Mul(hn::Set(tag, 0.5f), hn::Add(in, out));
-            for (int side = 0; side < cubesPerSide; ++side) {
-                const Vec middle = hn::Set(tag, float(side * cubeSide) + half);
-                const auto away2 = [&](Vec from) {
-                    return squareOf(
-                        hn::Max(hn::Sub(hn::Abs(hn::Sub(middle, from)), hn::Set(tag, half)), hn::Zero(tag)));
-                };
-                toInner2[axis][side] = away2(in);
-                toOuter2[axis][side] = away2(out);
-                height[axis][side] = hn::Mul(hn::Sub(middle, centre), up);
-            }
-            slabWidth = hn::MulAdd(hn::Set(tag, half), hn::Abs(up), slabWidth);
-        }
-        const Vec reaches = row(reach), reach2 = squareOf(reaches);
-        const Mask real = hn::Gt(reaches, hn::Zero(tag));
-        for (int cube = 0; cube < cubesPerBlock; ++cube) {
-            const int a = cube / 4, b = cube / 2 % 2, c = cube % 2;
-            const auto sum = [&](const Vec(&of)[3][cubesPerSide]) {
-                return hn::Add(hn::Add(of[0][a], of[1][b]), of[2][c]);
-            };
-            const Mask ball = hn::Lt(hn::Min(sum(toInner2), sum(toOuter2)), reach2);
-            const Mask plane = hn::Lt(hn::Abs(sum(height)), slabWidth);
-            std::uint8_t bytes[8] = {};
-            hn::StoreMaskBits(tag, hn::And(real, hn::And(ball, plane)), bytes);
-            std::uint64_t bits;
-            std::memcpy(&bits, bytes, sizeof bits);
-            std::uint32_t* to = scratch.groups.data() + ends[cube];
-            ends[cube] += std::size_t(std::popcount(bits));
-            for (; bits != 0; bits &= bits - 1) *to++ = input.reaching[i + std::size_t(std::countr_zero(bits))];
-        }
-    }
-    CubeGroups groups;
-    for (int cube = 0; cube < cubesPerBlock; ++cube)
-        groups[std::size_t(cube)] = {scratch.groups.data() + std::size_t(cube) * count,
-                                     scratch.groups.data() + ends[cube]};
-    return groups;
+    return hn::Max(hn::Sub(hn::Abs(at), hn::Set(tag, halfCube)), hn::Zero(tag));
 }
 
-void fillLayerBlock(const LayerBlockInput& input, LayerScratch& scratch, float* distances, std::int32_t* triangles) {
-    const CubeGroups groups = binCubes(input, scratch);
-    for (int cube = 0; cube < cubesPerBlock; ++cube) {
-        const glm::ivec3 inBlock = cubeSide * glm::ivec3(cube / 4, cube / 2 % 2, cube % 2);
-        const auto fill = input.parameters.cube > 0 ? (triangles ? fillCube<true, true> : fillCube<true, false>)
-                                                    : (triangles ? fillCube<false, true> : fillCube<false, false>);
-        fill(input, groups[std::size_t(cube)], inBlock, distances, triangles);
+// Picks the samples that reach a cube: of inner or outer samples that are near enough or, with cubes, by their
+// neighbourhood.
+template <bool cube>
+Candidates pick(const LayerBlockInput& input, const glm::ivec3& inBrick, const glm::vec3& middle,
+                LayerScratch& scratch) {
+    const Tag tag;
+    const hn::RebindToUnsigned<Tag> indexTag;
+    const std::size_t lanes = hn::Lanes(tag), size = input.samples.count() + lanes;
+    for (auto& column : scratch.columns)
+        if (column.size() < size) column.resize(size);
+    if (scratch.picked.size() < size) scratch.picked.resize(size);
+    const auto& columns = input.samples.columns();
+    const Vec reach2 = hn::Set(tag, input.parameters.certain * input.parameters.certain),
+              half = hn::Set(tag, float(input.parameters.cube) + halfCube);
+    std::uint32_t* picked = scratch.picked.data();
+    input.samples.forEachNear(inBrick / cubeSide, 1, [&](std::uint32_t begin, std::uint32_t end) {
+        for (std::uint32_t i = begin; i < end; i += std::uint32_t(lanes)) {
+            Vec toInner2 = hn::Zero(tag), toOuter2 = toInner2, square = toInner2, height = toInner2, away = toInner2;
+            for (std::size_t axis = 0; axis < 3; ++axis) {
+                const Vec place = hn::LoadU(tag, columns.place[axis].data() + i),
+                          offset = hn::LoadU(tag, columns.offset[axis].data() + i),
+                          centre = hn::Set(tag, middle[int(axis)]), at = hn::Sub(place, centre),
+                          minusTwice = hn::Mul(at, hn::Set(tag, -2.f));
+                if constexpr (cube) {
+                    const Vec nearest = hn::Floor(hn::Add(place, hn::Set(tag, 0.5001f)));
+                    away = hn::Max(away, hn::Abs(hn::Sub(nearest, centre)));
+                } else {
+                    const Vec inner = beyond(hn::Sub(at, offset)), outer = beyond(hn::Add(at, offset));
+                    toInner2 = hn::MulAdd(inner, inner, toInner2);
+                    toOuter2 = hn::MulAdd(outer, outer, toOuter2);
+                }
+                square = hn::MulAdd(at, at, square);
+                height = hn::MulAdd(minusTwice, offset, height);
+                hn::StoreU(minusTwice, tag, scratch.columns[axis].data() + i);
+            }
+            hn::StoreU(square, tag, scratch.columns[3].data() + i);
+            hn::StoreU(height, tag, scratch.columns[4].data() + i);
+            const Mask reaches = cube ? hn::Le(away, half) : hn::Lt(hn::Min(toInner2, toOuter2), reach2);
+            const auto valid = hn::FirstN(indexTag, end - i);
+            const auto mask = hn::And(hn::RebindMask(indexTag, reaches), valid);
+            hn::StoreU(hn::Compress(hn::Iota(indexTag, i), mask), indexTag, picked);
+            picked += hn::CountTrue(indexTag, mask);
+        }
+    });
+    const auto& to = scratch.columns;
+    return {to[0].data(), to[1].data(), to[2].data(), to[3].data(), to[4].data(), {scratch.picked.data(), picked}};
+}
+
+template <bool cube, bool withOwners>
+bool fillCube(const LayerBlockInput& input, const glm::ivec3& inBlock, LayerScratch& scratch, float* distances,
+              std::int32_t* triangles) {
+    const glm::ivec3 inBrick = input.inBrick + inBlock;
+    const glm::vec3 middle = glm::vec3(inBrick) + halfCube;
+    const Candidates candidates = pick<cube>(input, inBrick, middle, scratch);
+    const int corner = (inBlock.x * blockSide + inBlock.y) * blockSide + inBlock.z;
+    if (candidates.picked.empty()) {
+        for (int x = 0; x < cubeSide; ++x)
+            for (int y = 0; y < cubeSide; ++y)
+                std::fill_n(distances + corner + (x * blockSide + y) * blockSide, cubeSide, infinite);
+        return false;
     }
+    for (int part = 0; part * int(hn::Lanes(Tag())) < sliceVoxels; ++part) {
+        Voxels<withOwners> voxels(part);
+        applyAll<cube>(input, candidates, middle, voxels);
+        combine(voxels, input.parameters, part, distances + corner, withOwners ? triangles + corner : nullptr);
+    }
+    return true;
+}
+
+bool fillLayerBlock(const LayerBlockInput& input, LayerScratch& scratch, float* distances, std::int32_t* triangles) {
+    const auto fill = input.parameters.cube > 0 ? (triangles ? fillCube<true, true> : fillCube<true, false>)
+                                                : (triangles ? fillCube<false, true> : fillCube<false, false>);
+    bool any = false;
+    if (!input.samples.anyNear(input.inBrick / cubeSide, cubesPerSide)) return false;
+    for (int cube = 0; cube < cubesPerBlock; ++cube)
+        any |= fill(input, cubeSide * glm::ivec3(cube / 4, cube / 2 % 2, cube % 2), scratch, distances, triangles);
+    return any;
 }
 
 const char* targetName() {
@@ -353,8 +286,8 @@ namespace bilayer {
 HWY_EXPORT(fillLayerBlock);
 HWY_EXPORT(targetName);
 
-void fillLayerBlock(const LayerBlockInput& input, LayerScratch& scratch, float* distances, std::int32_t* triangles) {
-    HWY_DYNAMIC_DISPATCH(fillLayerBlock)(input, scratch, distances, triangles);
+bool fillLayerBlock(const LayerBlockInput& input, LayerScratch& scratch, float* distances, std::int32_t* triangles) {
+    return HWY_DYNAMIC_DISPATCH(fillLayerBlock)(input, scratch, distances, triangles);
 }
 
 const char* simdName() {

@@ -5,9 +5,9 @@
 // nearer than what the others gave.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <glm/vec3.hpp>
-#include <span>
 #include <vector>
 
 #include "sdf/blocks.h"
@@ -15,22 +15,22 @@
 
 namespace bilayer {
 
-/// What reaches a block.
+/// What a block is filled from.
 struct LayerBlockInput {
-    std::span<const std::uint32_t> reaching;  ///< indices of groups
     const LayerSamples& samples;
-    glm::vec3 inBrick;  ///< the block's first voxel in the voxels of the brick
+    glm::ivec3 inBrick;  ///< the block's first voxel in the voxels of the brick
     const FillParameters& parameters;
 };
 
-/// Groups of a block in columns, and those of each of its cubes. Memory is used again from block to block.
+/// The samples around a cube, seen from its middle. Memory is used again from cube to cube.
 struct LayerScratch {
-    std::vector<float> columns;
-    std::vector<std::uint32_t> groups;
+    std::array<std::vector<float>, 5> columns;
+    std::vector<std::uint32_t> picked;
 };
 
-/// Fills a block with signed distances [voxels]; +infinity where unknown.
+/// Fills a block with signed distances [voxels]; +infinity where unknown. Returns whether any sample reaches the block;
+/// else nothing is written.
 /// @param triangles  if not null, receives the owners of the samples that decide
-void fillLayerBlock(const LayerBlockInput& input, LayerScratch& scratch, float* distances, std::int32_t* triangles);
+bool fillLayerBlock(const LayerBlockInput& input, LayerScratch& scratch, float* distances, std::int32_t* triangles);
 
 }  // namespace bilayer
