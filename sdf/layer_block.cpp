@@ -55,105 +55,74 @@ inline Vec squareOf(Vec v) {
     return hn::Mul(v, v);
 }
 
-// a x + b y + c z + d for one vector's part of all slices of a cube.
-struct Linear {
-    HWY_INLINE Linear(float a, float b, float c, float d, Vec y, Vec z) {
-        const Tag tag;
-        along = hn::Set(tag, a);
-        across = hn::MulAdd(z, hn::Set(tag, c), hn::MulAdd(y, hn::Set(tag, b), hn::Set(tag, d)));
-    }
-    HWY_INLINE Vec at(int x) const { return hn::MulAdd(along, hn::Set(Tag(), sliceAt(x)), across); }
-    Vec along, across;
-};
-
-// One vector's part of each slice of a cube: where its voxels are, from the middle of the cube, and what was found for
-// them. Distances are squared and less delta^2 and the voxel's own squared distance from the middle: what remains of
-// |v - s|^2 is linear in v.
-template <bool withOwners>
+// One vector's part of each slice of a cube, from the middle of the cube.
 struct Voxels {
     explicit Voxels(int part) {
-        const Tag tag;
-        const auto at = std::size_t(part) * hn::Lanes(tag);
-        y = hn::Load(tag, lattice.y + at);
-        z = hn::Load(tag, lattice.z + at);
-        for (int i = 0; i < cubeSide; ++i) {
-            inner2[i] = outer2[i] = hn::Set(tag, infinite);
-            if constexpr (withOwners) innerOwner[i] = outerOwner[i] = hn::Set(IntTag(), -1);
-        }
+        const auto at = std::size_t(part) * hn::Lanes(Tag());
+        y = hn::Load(Tag(), lattice.y + at);
+        z = hn::Load(Tag(), lattice.z + at);
     }
-    HWY_INLINE Vec own2(int x) const {
+    HWY_INLINE Vec square(int x) const {
         return hn::MulAdd(y, y, hn::MulAdd(z, z, hn::Set(Tag(), sliceAt(x) * sliceAt(x))));
     }
-    Vec y, z, inner2[cubeSide], outer2[cubeSide];
-    IntVec innerOwner[cubeSide], outerOwner[cubeSide];
+    Vec y, z;
 };
 
-// The samples around a cube, in the order of the brick's: -2 s, |s|^2, and minus twice the product of s and its offset,
-// where s is the sample from the middle of the cube.
-struct Candidates {
-    const float *x, *y, *z, *square, *height;
+// The points of a layer around a cube, from its middle.
+struct Points {
+    const float *x, *y, *z, *halfSquare;    // of all points, in the order of the brick's samples
     std::span<const std::uint32_t> picked;  // those that reach the cube
 };
 
-// Lowers squared distances to those of a sample; with cubes, where the voxel is in the paper's neighbourhood: a cube
-// around the lattice point nearest to the sample.
-template <bool cube, class Voxels>
-HWY_INLINE void approach(const LayerBlockInput& input, const Candidates& from, std::uint32_t s, const glm::vec3& middle,
-                         const Voxels& v, Vec* nearest2) {
-    const Tag tag;
-    Linear distance2(from.x[s], from.y[s], from.z[s], from.square[s], v.y, v.z);
-    glm::vec3 centre(0);
-    const auto half = float(input.parameters.cube);
-    if constexpr (cube) {
-        const auto& places = input.samples.columns().place;
-        centre = LayerSamples::nearestLattice({places[0][s], places[1][s], places[2][s]}) - middle;
-        const Vec y = hn::Abs(hn::Sub(v.y, hn::Set(tag, centre.y))), z = hn::Abs(hn::Sub(v.z, hn::Set(tag, centre.z)));
-        distance2.across =
-            hn::IfThenElse(hn::Le(hn::Max(y, z), hn::Set(tag, half)), distance2.across, hn::Set(tag, infinite));
-    }
-    for (int x = 0; x < cubeSide; ++x)
-        if (!cube || std::abs(sliceAt(x) - centre.x) <= half) nearest2[x] = hn::Min(nearest2[x], distance2.at(x));
-}
-
-// Samples of one triangle lie in a plane and share their offset. So where A is the squared distance to the nearest of
-// them and h the height over the plane, the nearest inner and outer samples are at squared distances
-// A + delta^2 + 2 delta h and A + delta^2 - 2 delta h.
-template <bool withOwners>
-HWY_INLINE void spread(const LayerBlockInput& input, const Candidates& from, std::uint32_t s, const Vec* nearest2,
-                       Voxels<withOwners>& v) {
-    const auto& columns = input.samples.columns();
-    const auto twice = [&](std::size_t axis) { return 2 * columns.offset[axis][s]; };
-    const Linear height(twice(0), twice(1), twice(2), from.height[s], v.y, v.z);
-    for (int x = 0; x < cubeSide; ++x) {
-        const Vec up = height.at(x), inner2 = hn::Add(nearest2[x], up), outer2 = hn::Sub(nearest2[x], up);
-        if constexpr (withOwners) {
-            const IntTag intTag;
-            const IntVec owner = hn::Set(intTag, columns.triangle[s]);
-            const auto wins = [&](Vec distance2, Vec best2) {
-                return hn::RebindMask(intTag, hn::Lt(distance2, best2));
-            };
-            v.innerOwner[x] = hn::IfThenElse(wins(inner2, v.inner2[x]), owner, v.innerOwner[x]);
-            v.outerOwner[x] = hn::IfThenElse(wins(outer2, v.outer2[x]), owner, v.outerOwner[x]);
-        }
-        v.inner2[x] = hn::Min(v.inner2[x], inner2);
-        v.outer2[x] = hn::Min(v.outer2[x], outer2);
-    }
-}
-
+// The points of a layer that are nearest to voxels. They are those with the greatest p . v - |p|^2 / 2, as
+// |v - p|^2 = |v|^2 - 2 (p . v - |p|^2 / 2): one multiplication a voxel and point.
 template <bool cube, bool withOwners>
-HWY_INLINE void applyAll(const LayerBlockInput& input, const Candidates& from, const glm::vec3& middle,
-                         Voxels<withOwners>& v) {
-    const std::int32_t* triangles = input.samples.columns().triangle.data();
-    const std::uint32_t *next = from.picked.data(), *end = next + from.picked.size();
-    while (next < end) {
-        const std::uint32_t first = *next;
-        Vec nearest2[cubeSide];
-        for (Vec& some : nearest2) some = hn::Set(Tag(), infinite);
-        do approach<cube>(input, from, *next, middle, v, nearest2);
-        while (++next < end && triangles[*next] == triangles[first]);
-        spread(input, from, first, nearest2, v);
+struct Nearest {
+    HWY_INLINE Nearest(const LayerBlockInput& input, const Points& points, const glm::vec3& middle, const Voxels& v) {
+        const Tag tag;
+        for (int x = 0; x < cubeSide; ++x) {
+            greatest[x] = hn::Set(tag, -infinite);
+            if constexpr (withOwners) owner[x] = hn::Set(IntTag(), -1);
+        }
+        for (const std::uint32_t p : points.picked) {
+            const Vec along = hn::Set(tag, points.x[p]);
+            Vec across = hn::MulAdd(v.z, hn::Set(tag, points.z[p]),
+                                    hn::MulSub(v.y, hn::Set(tag, points.y[p]), hn::Set(tag, points.halfSquare[p])));
+            glm::vec3 centre(0);
+            if constexpr (cube) {
+                centre = centreOf(input, p) - middle;
+                across = hn::IfThenElse(isNear(input, centre, v), across, hn::Set(tag, -infinite));
+            }
+            for (int x = 0; x < cubeSide; ++x) {
+                if (cube && std::abs(sliceAt(x) - centre.x) > float(input.parameters.cube)) continue;
+                const Vec some = hn::MulAdd(along, hn::Set(tag, sliceAt(x)), across);
+                if constexpr (withOwners)
+                    owner[x] = hn::IfThenElse(hn::RebindMask(IntTag(), hn::Gt(some, greatest[x])),
+                                              hn::Set(IntTag(), input.samples.columns().triangle[p]), owner[x]);
+                greatest[x] = hn::Max(greatest[x], some);
+            }
+        }
     }
-}
+
+    HWY_INLINE Vec distance2(const Voxels& v, int x) const {
+        return hn::NegMulAdd(hn::Set(Tag(), 2.f), greatest[x], v.square(x));
+    }
+
+    Vec greatest[cubeSide];
+    IntVec owner[cubeSide];
+
+  private:
+    // The paper's neighbourhood: voxels of a cube around the lattice point nearest to the sample.
+    static glm::vec3 centreOf(const LayerBlockInput& input, std::uint32_t p) {
+        const auto& place = input.samples.columns().place;
+        return LayerSamples::nearestLattice({place[0][p], place[1][p], place[2][p]});
+    }
+    static Mask isNear(const LayerBlockInput& input, const glm::vec3& centre, const Voxels& v) {
+        const Tag tag;
+        const Vec y = hn::Abs(hn::Sub(v.y, hn::Set(tag, centre.y))), z = hn::Abs(hn::Sub(v.z, hn::Set(tag, centre.z)));
+        return hn::Le(hn::Max(y, z), hn::Set(tag, float(input.parameters.cube)));
+    }
+};
 
 // Writes rows of a part of a slice into the block.
 template <class D, class T>
@@ -166,24 +135,22 @@ HWY_INLINE void putRows(D tag, hn::Vec<D> values, int part, T* corner) {
 }
 
 // Eq. 3: from both layers to signed distances. The inside keeps its sign bit where the distance is clamped to zero.
-template <bool withOwners>
-HWY_INLINE void combine(const Voxels<withOwners>& v, const FillParameters& parameters, int part, float* distances,
-                        std::int32_t* triangles) {
+template <class Nearest>
+HWY_INLINE void combine(const Nearest& inner, const Nearest& outer, const Voxels& v, const FillParameters& parameters,
+                        int part, float* distances, std::int32_t* triangles) {
     const Tag tag;
-    const Vec delta = hn::Set(tag, parameters.delta), delta2 = squareOf(delta);
-    const Vec certain2 = hn::Set(tag, parameters.certain * parameters.certain - parameters.delta * parameters.delta);
+    const Vec delta = hn::Set(tag, parameters.delta), certain2 = hn::Set(tag, parameters.certain * parameters.certain);
     for (int x = 0; x < cubeSide; ++x) {
         const int slice = x * blockSide * blockSide;
-        const Vec own2 = v.own2(x), inner2 = hn::Min(hn::Add(v.inner2[x], own2), certain2),
-                  outer2 = hn::Min(hn::Add(v.outer2[x], own2), certain2);
+        const Vec inner2 = hn::Min(inner.distance2(v, x), certain2), outer2 = hn::Min(outer.distance2(v, x), certain2);
         const auto inside = hn::Le(inner2, hn::Add(outer2, hn::Set(tag, layerTie)));
-        const Vec other2 = hn::Max(hn::Add(hn::Max(inner2, outer2), delta2), hn::Zero(tag));
+        const Vec other2 = hn::Max(hn::Max(inner2, outer2), hn::Zero(tag));
         const Vec clamped = hn::Max(hn::Sub(hn::Sqrt(other2), delta), hn::Zero(tag));
         const Vec phi = hn::IfThenElse(inside, hn::Neg(clamped), clamped);
         const auto known = hn::Lt(hn::Min(inner2, outer2), certain2);
         putRows(tag, hn::IfThenElse(known, phi, hn::Set(tag, infinite)), part, distances + slice);
-        if constexpr (withOwners)
-            putRows(IntTag(), hn::IfThenElse(hn::RebindMask(IntTag(), inside), v.outerOwner[x], v.innerOwner[x]), part,
+        if (triangles)
+            putRows(IntTag(), hn::IfThenElse(hn::RebindMask(IntTag(), inside), outer.owner[x], inner.owner[x]), part,
                     triangles + slice);
     }
 }
@@ -194,52 +161,69 @@ inline Vec beyond(Vec at) {
     return hn::Max(hn::Sub(hn::Abs(at), hn::Set(tag, halfCube)), hn::Zero(tag));
 }
 
-// Picks the samples that reach a cube: of inner or outer samples that are near enough or, with cubes, by their
-// neighbourhood.
+// Places a vector of points of a layer, and picks those that are near enough.
+class Picker {
+  public:
+    Picker(LayerScratch::Layer& to, std::size_t size) : to_(to), end_(0) {
+        for (auto& column : to.columns)
+            if (column.size() < size) column.resize(size);
+        if (to.picked.size() < size) to.picked.resize(size);
+    }
+
+    HWY_INLINE void add(Vec x, Vec y, Vec z, std::uint32_t first, Mask among, Vec reach2) {
+        const Tag tag;
+        const auto square = [](Vec a, Vec b, Vec c) { return hn::MulAdd(a, a, hn::MulAdd(b, b, hn::Mul(c, c))); };
+        const hn::RebindToUnsigned<Tag> indexTag;
+        const Mask near = hn::And(among, hn::Lt(square(beyond(x), beyond(y), beyond(z)), reach2));
+        hn::StoreU(x, tag, to_.columns[0].data() + first);
+        hn::StoreU(y, tag, to_.columns[1].data() + first);
+        hn::StoreU(z, tag, to_.columns[2].data() + first);
+        hn::StoreU(hn::Mul(square(x, y, z), hn::Set(tag, 0.5f)), tag, to_.columns[3].data() + first);
+        hn::StoreU(hn::Compress(hn::Iota(indexTag, first), hn::RebindMask(indexTag, near)), indexTag,
+                   to_.picked.data() + end_);
+        end_ += hn::CountTrue(tag, near);
+    }
+
+    Points points() const {
+        const auto& columns = to_.columns;
+        return {columns[0].data(), columns[1].data(), columns[2].data(), columns[3].data(), {to_.picked.data(), end_}};
+    }
+
+  private:
+    LayerScratch::Layer& to_;
+    std::size_t end_;
+};
+
+// Picks the points of both layers that reach a cube: those near enough or, with the paper's cubes, those whose
+// neighbourhood meets it.
 template <bool cube>
-Candidates pick(const LayerBlockInput& input, const glm::ivec3& inBrick, const glm::vec3& middle,
-                LayerScratch& scratch) {
+void pick(const LayerBlockInput& input, const glm::ivec3& inBrick, const glm::vec3& middle, Picker& inner,
+          Picker& outer) {
     const Tag tag;
-    const hn::RebindToUnsigned<Tag> indexTag;
-    const std::size_t lanes = hn::Lanes(tag), size = input.samples.count() + lanes;
-    for (auto& column : scratch.columns)
-        if (column.size() < size) column.resize(size);
-    if (scratch.picked.size() < size) scratch.picked.resize(size);
     const auto& columns = input.samples.columns();
     const Vec reach2 = hn::Set(tag, input.parameters.certain * input.parameters.certain),
               half = hn::Set(tag, float(input.parameters.cube) + halfCube);
-    std::uint32_t* picked = scratch.picked.data();
-    input.samples.forEachNear(inBrick / cubeSide, 1, [&](std::uint32_t begin, std::uint32_t end) {
-        for (std::uint32_t i = begin; i < end; i += std::uint32_t(lanes)) {
-            Vec toInner2 = hn::Zero(tag), toOuter2 = toInner2, square = toInner2, height = toInner2, away = toInner2;
-            for (std::size_t axis = 0; axis < 3; ++axis) {
-                const Vec place = hn::LoadU(tag, columns.place[axis].data() + i),
-                          offset = hn::LoadU(tag, columns.offset[axis].data() + i),
-                          centre = hn::Set(tag, middle[int(axis)]), at = hn::Sub(place, centre),
-                          minusTwice = hn::Mul(at, hn::Set(tag, -2.f));
-                if constexpr (cube) {
-                    const Vec nearest = hn::Floor(hn::Add(place, hn::Set(tag, 0.5001f)));
-                    away = hn::Max(away, hn::Abs(hn::Sub(nearest, centre)));
-                } else {
-                    const Vec inner = beyond(hn::Sub(at, offset)), outer = beyond(hn::Add(at, offset));
-                    toInner2 = hn::MulAdd(inner, inner, toInner2);
-                    toOuter2 = hn::MulAdd(outer, outer, toOuter2);
-                }
-                square = hn::MulAdd(at, at, square);
-                height = hn::MulAdd(minusTwice, offset, height);
-                hn::StoreU(minusTwice, tag, scratch.columns[axis].data() + i);
+    const auto pickFrom = [&](std::uint32_t i, std::size_t count) {
+        Mask among = hn::FirstN(tag, count);
+        Vec in[3], out[3];
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+            const Vec place = hn::LoadU(tag, columns.place[axis].data() + i),
+                      offset = hn::LoadU(tag, columns.offset[axis].data() + i),
+                      centre = hn::Set(tag, middle[int(axis)]), at = hn::Sub(place, centre);
+            if constexpr (cube) {
+                const Vec nearest = hn::Floor(hn::Add(place, hn::Set(tag, 0.5001f)));
+                among = hn::And(among, hn::Le(hn::Abs(hn::Sub(nearest, centre)), half));
             }
-            hn::StoreU(square, tag, scratch.columns[3].data() + i);
-            hn::StoreU(height, tag, scratch.columns[4].data() + i);
-            const Mask reaches = cube ? hn::Le(away, half) : hn::Lt(hn::Min(toInner2, toOuter2), reach2);
-            const auto valid = hn::FirstN(indexTag, end - i);
-            const auto mask = hn::And(hn::RebindMask(indexTag, reaches), valid);
-            hn::StoreU(hn::Compress(hn::Iota(indexTag, i), mask), indexTag, picked);
-            picked += hn::CountTrue(indexTag, mask);
+            in[axis] = hn::Sub(at, offset);
+            out[axis] = hn::Add(at, offset);
         }
+        inner.add(in[0], in[1], in[2], i, among, reach2);
+        outer.add(out[0], out[1], out[2], i, among, reach2);
+    };
+    const auto lanes = std::uint32_t(hn::Lanes(tag));
+    input.samples.forEachNear(inBrick / cubeSide, 1, [&](std::uint32_t begin, std::uint32_t end) {
+        for (std::uint32_t i = begin; i < end; i += lanes) pickFrom(i, end - i);
     });
-    const auto& to = scratch.columns;
-    return {to[0].data(), to[1].data(), to[2].data(), to[3].data(), to[4].data(), {scratch.picked.data(), picked}};
 }
 
 template <bool cube, bool withOwners>
@@ -247,18 +231,23 @@ bool fillCube(const LayerBlockInput& input, const glm::ivec3& inBlock, LayerScra
               std::int32_t* triangles) {
     const glm::ivec3 inBrick = input.inBrick + inBlock;
     const glm::vec3 middle = glm::vec3(inBrick) + halfCube;
-    const Candidates candidates = pick<cube>(input, inBrick, middle, scratch);
+    const std::size_t size = input.samples.count() + hn::Lanes(Tag());
+    Picker inner(scratch.inner, size), outer(scratch.outer, size);
+    pick<cube>(input, inBrick, middle, inner, outer);
+    const Points innerPoints = inner.points(), outerPoints = outer.points();
     const int corner = (inBlock.x * blockSide + inBlock.y) * blockSide + inBlock.z;
-    if (candidates.picked.empty()) {
+    if (innerPoints.picked.empty() && outerPoints.picked.empty()) {
         for (int x = 0; x < cubeSide; ++x)
             for (int y = 0; y < cubeSide; ++y)
                 std::fill_n(distances + corner + (x * blockSide + y) * blockSide, cubeSide, infinite);
         return false;
     }
     for (int part = 0; part * int(hn::Lanes(Tag())) < sliceVoxels; ++part) {
-        Voxels<withOwners> voxels(part);
-        applyAll<cube>(input, candidates, middle, voxels);
-        combine(voxels, input.parameters, part, distances + corner, withOwners ? triangles + corner : nullptr);
+        const Voxels voxels(part);
+        const Nearest<cube, withOwners> nearestInner(input, innerPoints, middle, voxels),
+            nearestOuter(input, outerPoints, middle, voxels);
+        combine(nearestInner, nearestOuter, voxels, input.parameters, part, distances + corner,
+                withOwners ? triangles + corner : nullptr);
     }
     return true;
 }

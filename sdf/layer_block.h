@@ -22,10 +22,13 @@ struct LayerBlockInput {
     const FillParameters& parameters;
 };
 
-/// The samples around a cube, seen from its middle. Memory is used again from cube to cube.
+/// Both layers around a cube, seen from its middle. Memory is used again from cube to cube.
 struct LayerScratch {
-    std::array<std::vector<float>, 5> columns;
-    std::vector<std::uint32_t> picked;
+    struct Layer {
+        std::array<std::vector<float>, 4> columns;
+        std::vector<std::uint32_t> picked;
+    };
+    Layer inner, outer;
 };
 
 /// Fills a block with signed distances [voxels]; +infinity where unknown. Returns whether any sample reaches the block;
