@@ -40,8 +40,6 @@ class BrickFiller {
         sample(brick, origin);
         const int blocks = bins_.side / blockSide;
         s_.origins.clear();
-        s_.distances.clear();
-        s_.triangles.clear();
         for (int x = 0; x < blocks; ++x)
             for (int y = 0; y < blocks; ++y)
                 for (int z = 0; z < blocks; ++z) fillBlock(origin, blockSide * glm::ivec3(x, y, z));
@@ -61,16 +59,12 @@ class BrickFiller {
 
     void fillBlock(const glm::ivec3& origin, const glm::ivec3& inBrick) {
         job_.progress.poll();
-        const std::size_t first = s_.distances.size(), firstTriangle = s_.triangles.size();
-        s_.distances.resize(first + blockVoxels);
-        if (job_.triangles) s_.triangles.resize(first + blockVoxels);
+        const std::size_t first = s_.origins.size() * blockVoxels;
+        if (s_.distances.size() == first) s_.distances.resize(first + blockVoxels);
+        if (job_.triangles) s_.triangles.resize(s_.distances.size());
         if (fillLayerBlock({s_.samples, inBrick, parameters_}, s_.block, s_.distances.data() + first,
-                           job_.triangles ? s_.triangles.data() + first : nullptr)) {
+                           job_.triangles ? s_.triangles.data() + first : nullptr))
             s_.origins.push_back(origin + inBrick);
-        } else {
-            s_.distances.resize(first);
-            s_.triangles.resize(firstTriangle);
-        }
     }
 
     const MeshJob& job_;

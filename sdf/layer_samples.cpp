@@ -21,6 +21,8 @@ namespace hn = hwy::HWY_NAMESPACE;
 /// As many triangles at once as there are lanes of doubles, and as many samples of one triangle as of floats.
 using Wide = hn::CappedTag<double, 8>;
 constexpr std::size_t mostLanes = 8;
+/// Triangles of up to so many rows are taken together; of one with more, samples fill a vector of their own.
+constexpr int fewRows = 4;
 
 using Small = hn::Rebind<float, Wide>;
 using Row = hn::CappedTag<float, 16>;
@@ -34,6 +36,20 @@ struct Points {
 template <class D>
 HWY_INLINE Points<D> operator-(const Points<D>& a, const Points<D>& b) {
     return {hn::Sub(a.x, b.x), hn::Sub(a.y, b.y), hn::Sub(a.z, b.z)};
+}
+
+template <class D>
+HWY_INLINE Points<D> operator+(const Points<D>& a, const Points<D>& b) {
+    return {hn::Add(a.x, b.x), hn::Add(a.y, b.y), hn::Add(a.z, b.z)};
+}
+
+template <class D>
+HWY_INLINE Points<D> scaled(const Points<D>& a, hn::Vec<D> factor) {
+    return {hn::Mul(a.x, factor), hn::Mul(a.y, factor), hn::Mul(a.z, factor)};
+}
+
+inline Points<Small> narrowed(const Points<Wide>& a) {
+    return {hn::DemoteTo(Small(), a.x), hn::DemoteTo(Small(), a.y), hn::DemoteTo(Small(), a.z)};
 }
 
 template <class D>
@@ -66,7 +82,7 @@ class Spreader {
         for (std::size_t i = 0; i < triangles.size(); i += lanes) {
             const std::size_t count = std::min(lanes, triangles.size() - i);
             load(triangles, i, count);
-            for (std::uint64_t others = addSmall(count); others != 0; others &= others - 1) {
+            for (std::uint64_t others = addFew(count); others != 0; others &= others - 1) {
                 const auto lane = std::size_t(std::countr_zero(others));
                 triangle = triangles[i + lane];
                 const auto at = [&](const auto& rows) {
@@ -116,31 +132,33 @@ class Spreader {
         hn::Store(points.z, Wide(), rows[2]);
     }
 
-    // Adds those of one sample. Returns a bit for each of the others that have an area.
-    std::uint64_t addSmall(std::size_t count) {
+    // Adds those of few rows, many triangles at once. Returns a bit for each of the others that have an area.
+    std::uint64_t addFew(std::size_t count) {
         const Wide wide;
-        const Small small;
         const Points<Wide> a = corner(0), b = corner(1), c = corner(2), ab = b - a, ac = c - a, bc = c - b,
                            normal = cross(ab, ac);
         const auto length = hn::Sqrt(dot(normal, normal)),
                    longest2 = hn::Max(dot(ab, ab), hn::Max(dot(bc, bc), dot(ac, ac)));
         const DoubleLayerOptions& options = brick_.options;
-        const auto real = hn::And(hn::FirstN(wide, count), hn::Gt(length, hn::Zero(wide)));
-        const auto one = hn::And(real, hn::And(hn::Le(length, hn::Set(wide, 2 * double(options.epsilon))),
-                                               hn::Le(longest2, hn::Set(wide, longestOfOneSample2(options)))));
-        if (!hn::AllFalse(wide, one)) {
-            const auto third = hn::Set(wide, 1.0 / 3.0), scale = hn::Div(hn::Set(wide, double(options.delta)), length);
-            const auto middle = [&](auto p, auto q, auto r) {
-                return hn::DemoteTo(small, hn::Mul(hn::Add(hn::Add(p, q), r), third));
-            };
-            const auto scaled = [&](auto along) { return hn::DemoteTo(small, hn::Mul(along, scale)); };
-            Points<Small> place{middle(a.x, b.x, c.x), middle(a.y, b.y, c.y), middle(a.z, b.z, c.z)};
-            // the others are nowhere
-            place.x = hn::DemoteTo(small, hn::IfThenElse(one, hn::PromoteTo(wide, place.x), hn::Set(wide, 1e30)));
-            put(small, count, place, {scaled(normal.x), scaled(normal.y), scaled(normal.z)},
-                hn::Load(hn::RebindToSigned<Small>(), triangles_));
+        const auto epsilon = hn::Set(wide, double(options.epsilon)), one = hn::Set(wide, 1.0);
+        const auto area = hn::Mul(length, hn::Set(wide, 0.5));
+        auto rows = one, step = one;
+        if (!hn::AllFalse(wide, hn::Gt(area, epsilon))) {
+            rows = hn::Max(one, hn::Ceil(hn::Sqrt(hn::Div(area, epsilon))));
+            step = hn::Div(one, rows);
         }
-        const auto others = hn::AndNot(one, real);
+        const auto real = hn::And(hn::FirstN(wide, count), hn::Gt(length, hn::Zero(wide)));
+        const int mostRows = options.subdivision == Subdivision::rows ? std::min(fewRows, options.maxSubdivision) : 1;
+        const auto whole = hn::Le(longest2, hn::Mul(hn::Mul(rows, rows), hn::Set(wide, longestOfOneSample2(options))));
+        const auto few = hn::And(hn::And(real, whole), hn::Le(rows, hn::Set(wide, double(mostRows))));
+        if (!hn::AllFalse(wide, few)) {
+            const Points<Wide> down = scaled(ab, step),
+                               start = scaled(down + scaled(ac, step), hn::Set(wide, 1.0 / 3.0));
+            addRows(hn::DemoteTo(Small(), hn::IfThenElseZero(few, rows)), narrowed(a + start), narrowed(down),
+                    narrowed(scaled(bc, step)),
+                    narrowed(scaled(normal, hn::Div(hn::Set(wide, double(options.delta)), length))));
+        }
+        const auto others = hn::AndNot(few, real);
         if (hn::AllFalse(wide, others)) return 0;
         keep(normal, known_.normal);
         hn::Store(length, wide, known_.length);
@@ -150,7 +168,29 @@ class Spreader {
         return bytes[0];
     }
 
-    // Adds the samples of Algorithm 1: row i has i + 1 of them.
+    // Adds the samples of Algorithm 1, each of as many triangles as there are lanes: row i has i + 1 of them.
+    void addRows(hn::Vec<Small> rows, const Points<Small>& start, const Points<Small>& down,
+                 const Points<Small>& across, const Points<Small>& offset) {
+        const Small small;
+        const auto owners = hn::Load(hn::RebindToSigned<Small>(), triangles_);
+        for (int i = 0;; ++i) {
+            const auto row = hn::Set(small, float(i));
+            const auto among = hn::Gt(rows, row);
+            if (hn::AllFalse(small, among)) return;
+            for (int j = 0; j <= i; ++j) {
+                const auto column = hn::Set(small, float(j));
+                const auto place = [&](auto begin, auto s1, auto s2) {
+                    return hn::MulAdd(column, s2, hn::MulAdd(row, s1, begin));
+                };
+                put(small, among,
+                    {place(start.x, down.x, across.x), place(start.y, down.y, across.y),
+                     place(start.z, down.z, across.z)},
+                    offset, owners);
+            }
+        }
+    }
+
+    // The same for one triangle, many samples at once.
     void addRows(const TilePart& part, std::uint32_t triangle) {
         const Row tag;
         const hn::RebindToSigned<Row> intTag;
@@ -173,22 +213,21 @@ class Spreader {
             const auto place = [&](auto begin, auto s1, auto s2) {
                 return hn::MulAdd(column, s2, hn::MulAdd(row, s1, begin));
             };
-            put(tag, std::size_t(count - k),
+            put(tag, hn::FirstN(tag, std::size_t(count - k)),
                 {place(first.x, down.x, across.x), place(first.y, down.y, across.y), place(first.z, down.z, across.z)},
                 offset, owner);
         }
     }
 
-    // Adds the first `count` of some samples, without those that stay away from the brick.
+    // Adds those `among` some samples, without those that stay away from the brick.
     template <class Tag>
-    HWY_INLINE void put(Tag tag, std::size_t count, const Points<Tag>& place, const Points<Tag>& offset,
+    HWY_INLINE void put(Tag tag, hn::Mask<Tag> among, const Points<Tag>& place, const Points<Tag>& offset,
                         hn::Vec<hn::RebindToSigned<Tag>> triangle) {
         const hn::RebindToSigned<Tag> intTag;
         const auto within = [&](auto at, int axis) {
             return hn::And(hn::Ge(at, hn::Set(tag, cells_.lower[axis])), hn::Le(at, hn::Set(tag, cells_.upper[axis])));
         };
-        const auto near = hn::And(hn::And(hn::FirstN(tag, count), within(place.x, 0)),
-                                  hn::And(within(place.y, 1), within(place.z, 2)));
+        const auto near = hn::And(hn::And(among, within(place.x, 0)), hn::And(within(place.y, 1), within(place.z, 2)));
         const auto cellAt = [&](auto at) {
             return hn::ConvertTo(intTag, hn::Mul(hn::Sub(at, hn::Set(tag, cells_.firstCorner)),
                                                  hn::Set(tag, 1.f / float(LayerSamples::cellSide))));
