@@ -70,8 +70,38 @@ struct Voxels {
 
 // The points of a layer around a cube, from its middle.
 struct Points {
-    const float *x, *y, *z, *halfSquare;    // of all points, in the order of the brick's samples
-    std::span<const std::uint32_t> picked;  // those that reach the cube
+    Points(LayerScratch::Layer& memory, std::size_t size) {
+        for (auto& column : memory.columns)
+            if (column.size() < size) column.resize(size);
+        if (memory.picked.size() < size) memory.picked.resize(size);
+        x = memory.columns[0].data();
+        y = memory.columns[1].data();
+        z = memory.columns[2].data();
+        halfSquare = memory.columns[3].data();
+        picked = memory.picked.data();
+    }
+
+    // Places a vector of points, and picks those nearer to the cube's voxels than the root of reach2.
+    HWY_INLINE void put(std::uint32_t first, Vec px, Vec py, Vec pz, Mask among, Vec reach2) {
+        const Tag tag;
+        const auto square = [](Vec a, Vec b, Vec c) { return hn::MulAdd(a, a, hn::MulAdd(b, b, hn::Mul(c, c))); };
+        const auto beyond = [](Vec at) {
+            return hn::Max(hn::Sub(hn::Abs(at), hn::Set(Tag(), halfCube)), hn::Zero(Tag()));
+        };
+        const hn::RebindToUnsigned<Tag> indexTag;
+        const Mask near = hn::And(among, hn::Lt(square(beyond(px), beyond(py), beyond(pz)), reach2));
+        const auto numbers = hn::Add(hn::Iota(indexTag, 0), hn::Set(indexTag, first));
+        hn::StoreU(px, tag, x + first);
+        hn::StoreU(py, tag, y + first);
+        hn::StoreU(pz, tag, z + first);
+        hn::StoreU(hn::Mul(square(px, py, pz), hn::Set(tag, 0.5f)), tag, halfSquare + first);
+        hn::StoreU(hn::Compress(numbers, hn::RebindMask(indexTag, near)), indexTag, picked + count);
+        count += hn::CountTrue(tag, near);
+    }
+
+    float *x, *y, *z, *halfSquare;  // of all points, in the order of the brick's samples
+    std::uint32_t* picked;          // those that reach the cube
+    std::size_t count = 0;          // of those
 };
 
 // The points of a layer that are nearest to voxels. They are those with the greatest p . v - |p|^2 / 2, as
@@ -84,7 +114,7 @@ struct Nearest {
             greatest[x] = hn::Set(tag, -infinite);
             if constexpr (withOwners) owner[x] = hn::Set(IntTag(), -1);
         }
-        for (const std::uint32_t p : points.picked) {
+        for (const std::uint32_t p : std::span(points.picked, points.count)) {
             const Vec along = hn::Set(tag, points.x[p]);
             Vec across = hn::MulAdd(v.z, hn::Set(tag, points.z[p]),
                                     hn::MulSub(v.y, hn::Set(tag, points.y[p]), hn::Set(tag, points.halfSquare[p])));
@@ -155,75 +185,35 @@ HWY_INLINE void combine(const Nearest& inner, const Nearest& outer, const Voxels
     }
 }
 
-// How far numbers lie beyond the cube's voxels.
-inline Vec beyond(Vec at) {
-    const Tag tag;
-    return hn::Max(hn::Sub(hn::Abs(at), hn::Set(tag, halfCube)), hn::Zero(tag));
-}
-
-// Places a vector of points of a layer, and picks those that are near enough.
-class Picker {
-  public:
-    Picker(LayerScratch::Layer& to, std::size_t size) : to_(to), end_(0) {
-        for (auto& column : to.columns)
-            if (column.size() < size) column.resize(size);
-        if (to.picked.size() < size) to.picked.resize(size);
-    }
-
-    HWY_INLINE void add(Vec x, Vec y, Vec z, std::uint32_t first, Mask among, Vec reach2) {
-        const Tag tag;
-        const auto square = [](Vec a, Vec b, Vec c) { return hn::MulAdd(a, a, hn::MulAdd(b, b, hn::Mul(c, c))); };
-        const hn::RebindToUnsigned<Tag> indexTag;
-        const Mask near = hn::And(among, hn::Lt(square(beyond(x), beyond(y), beyond(z)), reach2));
-        hn::StoreU(x, tag, to_.columns[0].data() + first);
-        hn::StoreU(y, tag, to_.columns[1].data() + first);
-        hn::StoreU(z, tag, to_.columns[2].data() + first);
-        hn::StoreU(hn::Mul(square(x, y, z), hn::Set(tag, 0.5f)), tag, to_.columns[3].data() + first);
-        hn::StoreU(hn::Compress(hn::Iota(indexTag, first), hn::RebindMask(indexTag, near)), indexTag,
-                   to_.picked.data() + end_);
-        end_ += hn::CountTrue(tag, near);
-    }
-
-    Points points() const {
-        const auto& columns = to_.columns;
-        return {columns[0].data(), columns[1].data(), columns[2].data(), columns[3].data(), {to_.picked.data(), end_}};
-    }
-
-  private:
-    LayerScratch::Layer& to_;
-    std::size_t end_;
-};
-
 // Picks the points of both layers that reach a cube: those near enough or, with the paper's cubes, those whose
 // neighbourhood meets it.
 template <bool cube>
-void pick(const LayerBlockInput& input, const glm::ivec3& inBrick, const glm::vec3& middle, Picker& inner,
-          Picker& outer) {
+HWY_INLINE void pick(const LayerBlockInput& input, const glm::vec3& middle,
+                     const std::vector<LayerSamples::Range>& ranges, Points& inner, Points& outer) {
     const Tag tag;
-    const auto& columns = input.samples.columns();
+    const SampleColumns& columns = input.samples.columns();
+    const float* places[] = {columns.place[0].data(), columns.place[1].data(), columns.place[2].data()};
+    const float* offsets[] = {columns.offset[0].data(), columns.offset[1].data(), columns.offset[2].data()};
     const Vec reach2 = hn::Set(tag, input.parameters.certain * input.parameters.certain),
-              half = hn::Set(tag, float(input.parameters.cube) + halfCube);
-    const auto pickFrom = [&](std::uint32_t i, std::size_t count) {
-        Mask among = hn::FirstN(tag, count);
-        Vec in[3], out[3];
-        for (std::size_t axis = 0; axis < 3; ++axis) {
-            const Vec place = hn::LoadU(tag, columns.place[axis].data() + i),
-                      offset = hn::LoadU(tag, columns.offset[axis].data() + i),
-                      centre = hn::Set(tag, middle[int(axis)]), at = hn::Sub(place, centre);
-            if constexpr (cube) {
-                const Vec nearest = hn::Floor(hn::Add(place, hn::Set(tag, 0.5001f)));
-                among = hn::And(among, hn::Le(hn::Abs(hn::Sub(nearest, centre)), half));
+              half = hn::Set(tag, float(input.parameters.cube) + halfCube),
+              centre[] = {hn::Set(tag, middle.x), hn::Set(tag, middle.y), hn::Set(tag, middle.z)};
+    for (const LayerSamples::Range& range : ranges)
+        for (std::uint32_t i = range.begin; i < range.end; i += std::uint32_t(hn::Lanes(tag))) {
+            Mask among = hn::FirstN(tag, range.end - i);
+            Vec in[3], out[3];
+            for (int axis = 0; axis < 3; ++axis) {
+                const Vec place = hn::LoadU(tag, places[axis] + i), offset = hn::LoadU(tag, offsets[axis] + i),
+                          at = hn::Sub(place, centre[axis]);
+                if constexpr (cube) {
+                    const Vec nearest = hn::Floor(hn::Add(place, hn::Set(tag, 0.5001f)));
+                    among = hn::And(among, hn::Le(hn::Abs(hn::Sub(nearest, centre[axis])), half));
+                }
+                in[axis] = hn::Sub(at, offset);
+                out[axis] = hn::Add(at, offset);
             }
-            in[axis] = hn::Sub(at, offset);
-            out[axis] = hn::Add(at, offset);
+            inner.put(i, in[0], in[1], in[2], among, reach2);
+            outer.put(i, out[0], out[1], out[2], among, reach2);
         }
-        inner.add(in[0], in[1], in[2], i, among, reach2);
-        outer.add(out[0], out[1], out[2], i, among, reach2);
-    };
-    const auto lanes = std::uint32_t(hn::Lanes(tag));
-    input.samples.forEachNear(inBrick / cubeSide, 1, [&](std::uint32_t begin, std::uint32_t end) {
-        for (std::uint32_t i = begin; i < end; i += lanes) pickFrom(i, end - i);
-    });
 }
 
 template <bool cube, bool withOwners>
@@ -232,11 +222,11 @@ bool fillCube(const LayerBlockInput& input, const glm::ivec3& inBlock, LayerScra
     const glm::ivec3 inBrick = input.inBrick + inBlock;
     const glm::vec3 middle = glm::vec3(inBrick) + halfCube;
     const std::size_t size = input.samples.count() + hn::Lanes(Tag());
-    Picker inner(scratch.inner, size), outer(scratch.outer, size);
-    pick<cube>(input, inBrick, middle, inner, outer);
-    const Points innerPoints = inner.points(), outerPoints = outer.points();
+    Points inner(scratch.inner, size), outer(scratch.outer, size);
+    input.samples.near(inBrick / cubeSide, 1, scratch.near);
+    pick<cube>(input, middle, scratch.near, inner, outer);
     const int corner = (inBlock.x * blockSide + inBlock.y) * blockSide + inBlock.z;
-    if (innerPoints.picked.empty() && outerPoints.picked.empty()) {
+    if (inner.count + outer.count == 0) {
         for (int x = 0; x < cubeSide; ++x)
             for (int y = 0; y < cubeSide; ++y)
                 std::fill_n(distances + corner + (x * blockSide + y) * blockSide, cubeSide, infinite);
@@ -244,8 +234,8 @@ bool fillCube(const LayerBlockInput& input, const glm::ivec3& inBlock, LayerScra
     }
     for (int part = 0; part * int(hn::Lanes(Tag())) < sliceVoxels; ++part) {
         const Voxels voxels(part);
-        const Nearest<cube, withOwners> nearestInner(input, innerPoints, middle, voxels),
-            nearestOuter(input, outerPoints, middle, voxels);
+        const Nearest<cube, withOwners> nearestInner(input, inner, middle, voxels),
+            nearestOuter(input, outer, middle, voxels);
         combine(nearestInner, nearestOuter, voxels, input.parameters, part, distances + corner,
                 withOwners ? triangles + corner : nullptr);
     }
@@ -256,7 +246,8 @@ bool fillLayerBlock(const LayerBlockInput& input, LayerScratch& scratch, float* 
     const auto fill = input.parameters.cube > 0 ? (triangles ? fillCube<true, true> : fillCube<true, false>)
                                                 : (triangles ? fillCube<false, true> : fillCube<false, false>);
     bool any = false;
-    if (!input.samples.anyNear(input.inBrick / cubeSide, cubesPerSide)) return false;
+    input.samples.near(input.inBrick / cubeSide, cubesPerSide, scratch.near);
+    if (scratch.near.empty()) return false;
     for (int cube = 0; cube < cubesPerBlock; ++cube)
         any |= fill(input, cubeSide * glm::ivec3(cube / 4, cube / 2 % 2, cube % 2), scratch, distances, triangles);
     return any;

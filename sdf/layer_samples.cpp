@@ -206,7 +206,7 @@ class Spreader {
         const int count = part.rows * (part.rows + 1) / 2;
         for (int k = 0; k < count; k += int(hn::Lanes(tag))) {
             // the roots are exact where a row begins, and far enough from it before
-            const auto number = hn::Iota(tag, float(k));
+            const auto number = hn::Add(hn::Iota(tag, 0), hn::Set(tag, float(k)));
             const auto root = hn::Sqrt(hn::MulAdd(number, hn::Set(tag, 8.f), one));
             const auto row = hn::Floor(hn::Mul(hn::Sub(root, one), half)),
                        column = hn::Sub(number, hn::Mul(half, hn::MulAdd(row, row, row)));

@@ -75,23 +75,21 @@ class LayerSamples {
     std::size_t count() const { return added_.count; }
     const SampleColumns& columns() const { return sorted_; }
 
-    /// Calls visit(begin, end) for samples that hold all those within reach of some cells, and no sample twice.
-    /// @param cells  along each axis
-    template <class Visit>
-    void forEachNear(const glm::ivec3& first, int cells, Visit visit) const {
+    struct Range {
+        std::uint32_t begin, end;
+    };
+
+    /// Tells which samples may reach some cells, and perhaps others.
+    /// @param cells   along each axis
+    /// @param ranges  overwritten
+    void near(const glm::ivec3& first, int cells, std::vector<Range>& ranges) const {
         const int along = cells + 2 * cells_.around;
+        ranges.clear();
         for (int x = first.x; x < first.x + along; ++x)
             for (int y = first.y; y < first.y + along; ++y) {
                 const std::uint32_t* row = begins_.data() + (x * cells_.size + y) * cells_.size + first.z;
-                if (row[0] < row[along]) visit(row[0], row[along]);
+                if (row[0] < row[along]) ranges.push_back({row[0], row[along]});
             }
-    }
-
-    /// Whether any sample may reach some cells.
-    bool anyNear(const glm::ivec3& first, int cells) const {
-        bool any = false;
-        forEachNear(first, cells, [&](std::uint32_t, std::uint32_t) { any = true; });
-        return any;
     }
 
   private:
