@@ -11,6 +11,7 @@
 #include <cmath>
 #include <functional>
 #include <type_traits>
+#include <utility>
 
 #include "sdf/links.h"
 #include "sdf/progress.h"
@@ -179,13 +180,14 @@ void Assembler::take(const FilledBlocks& blocks) {
         auto leaf = std::make_unique<Leaf>(openvdb::PartialCreate(), openvdb::Coord(o.x, o.y, o.z));
         leaf->buffer().allocate();
         if (!trimToBand(blocks.distances.data() + b * blockVoxels, widths_, leaf->buffer().data(), masks)) continue;
-        if (plain_ == Plain::drop && isPlain(masks)) continue;
+        const bool plain = isPlain(masks);
+        if (plain && plain_ == Plain::drop) continue;
         Leaf::NodeMaskType mask;
         for (openvdb::Index word = 0; word < blockSide; ++word) mask.getWord<std::uint64_t>(word) = masks.active[word];
         leaf->setValueMask(mask);
         if (wantTriangles_ && !mask.isOff())
             triangleLeaves_.local().push_back(triangleLeaf(blocks.triangles.data() + b * blockVoxels, *leaf));
-        leaves.push_back({std::move(leaf), facesOf(masks.inside)});
+        leaves.push_back({std::move(leaf), facesOf(masks.inside), plain});
     }
 }
 
@@ -199,7 +201,7 @@ void Assembler::copy(const Grids& from, const std::function<bool(const openvdb::
         });
     };
     forEachKept(from.distance->tree(), [&](const Leaf& leaf) {
-        leaves_.local().push_back({std::make_unique<Leaf>(leaf), facesOf(insideOf(leaf))});
+        leaves_.local().push_back({std::make_unique<Leaf>(leaf), facesOf(insideOf(leaf)), false});
     });
     if (wantTriangles_)
         forEachKept(from.triangle->tree(), [&](const TriangleLeaf& leaf) {
@@ -210,17 +212,19 @@ void Assembler::copy(const Grids& from, const std::function<bool(const openvdb::
 openvdb::FloatGrid::Ptr Assembler::distances() {
     const float exterior = widths_.exterior * widths_.voxelSize, interior = -widths_.interior * widths_.voxelSize;
     auto grid = openvdb::FloatGrid::create(exterior);
+    std::vector<std::pair<openvdb::Coord, float>> plain;
     for (auto& some : leaves_)
         for (Collected& one : some) {
             if (faces_.size() % leavesPerPoll == 0) progress_.poll();
             one.leaf->setTransientData(openvdb::Index32(faces_.size()));
             faces_.push_back(one.faces);
+            if (one.plain) plain.emplace_back(one.leaf->origin(), one.leaf->getFirstValue());
             grid->tree().addLeaf(one.leaf.release());
         }
-    // leaves carry their signs already: only tiles between them are flooded. Leaves that turn out to hold one far
-    // value become tiles too.
+    // leaves carry their signs already: only tiles between them are flooded. Leaves of one far value become tiles too.
     openvdb::tools::signedFloodFillWithValues(grid->tree(), exterior, interior, true, 1, 1);
-    openvdb::tools::prune(grid->tree());
+    for (const auto& [origin, value] : plain) grid->tree().addTile(1, origin, value, false);
+    openvdb::tools::pruneTiles(grid->tree());
     grid->setName("distance");
     grid->setGridClass(openvdb::GRID_LEVEL_SET);
     return grid;

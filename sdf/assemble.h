@@ -60,6 +60,7 @@ class Assembler {
     struct Collected {
         std::unique_ptr<Leaf> leaf;
         FaceBits faces;
+        bool plain;  // all on one side, and nothing of it in the band
     };
     template <class Item>
     using PerThread = tbb::enumerable_thread_specific<std::vector<Item>>;
