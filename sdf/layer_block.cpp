@@ -188,8 +188,8 @@ HWY_INLINE void combine(const Nearest& inner, const Nearest& outer, const Voxels
 // Picks the points of both layers that reach a cube: those near enough or, with the paper's cubes, those whose
 // neighbourhood meets it.
 template <bool cube>
-HWY_INLINE void pick(const LayerBlockInput& input, const glm::vec3& middle,
-                     const std::vector<LayerSamples::Range>& ranges, Points& inner, Points& outer) {
+HWY_INLINE void pick(const LayerBlockInput& input, const glm::vec3& middle, std::span<const LayerSamples::Range> ranges,
+                     Points& inner, Points& outer) {
     const Tag tag;
     const SampleColumns& columns = input.samples.columns();
     const float* places[] = {columns.place[0].data(), columns.place[1].data(), columns.place[2].data()};
@@ -223,8 +223,7 @@ bool fillCube(const LayerBlockInput& input, const glm::ivec3& inBlock, LayerScra
     const glm::vec3 middle = glm::vec3(inBrick) + halfCube;
     const std::size_t size = input.samples.count() + hn::Lanes(Tag());
     Points inner(scratch.inner, size), outer(scratch.outer, size);
-    input.samples.near(inBrick / cubeSide, 1, scratch.near);
-    pick<cube>(input, middle, scratch.near, inner, outer);
+    pick<cube>(input, middle, input.samples.near(inBrick / cubeSide, 1, scratch.near), inner, outer);
     const int corner = (inBlock.x * blockSide + inBlock.y) * blockSide + inBlock.z;
     if (inner.count + outer.count == 0) {
         for (int x = 0; x < cubeSide; ++x)
@@ -246,8 +245,7 @@ bool fillLayerBlock(const LayerBlockInput& input, LayerScratch& scratch, float* 
     const auto fill = input.parameters.cube > 0 ? (triangles ? fillCube<true, true> : fillCube<true, false>)
                                                 : (triangles ? fillCube<false, true> : fillCube<false, false>);
     bool any = false;
-    input.samples.near(input.inBrick / cubeSide, cubesPerSide, scratch.near);
-    if (scratch.near.empty()) return false;
+    if (input.samples.near(input.inBrick / cubeSide, cubesPerSide, scratch.near).empty()) return false;
     for (int cube = 0; cube < cubesPerBlock; ++cube)
         any |= fill(input, cubeSide * glm::ivec3(cube / 4, cube / 2 % 2, cube % 2), scratch, distances, triangles);
     return any;

@@ -81,15 +81,19 @@ class LayerSamples {
 
     /// Tells which samples may reach some cells, and perhaps others.
     /// @param cells   along each axis
-    /// @param ranges  overwritten
-    void near(const glm::ivec3& first, int cells, std::vector<Range>& ranges) const {
+    /// @param memory  that of the result
+    std::span<const Range> near(const glm::ivec3& first, int cells, std::vector<Range>& memory) const {
         const int along = cells + 2 * cells_.around;
-        ranges.clear();
+        if (memory.size() < std::size_t(along * along)) memory.resize(std::size_t(along * along));
+        std::size_t count = 0;
         for (int x = first.x; x < first.x + along; ++x)
             for (int y = first.y; y < first.y + along; ++y) {
+                // written in any case and kept if it holds some: a branch would be guessed wrong half of the time
                 const std::uint32_t* row = begins_.data() + (x * cells_.size + y) * cells_.size + first.z;
-                if (row[0] < row[along]) ranges.push_back({row[0], row[along]});
+                memory[count] = {row[0], row[along]};
+                count += row[0] < row[along];
             }
+        return {memory.data(), count};
     }
 
   private:
