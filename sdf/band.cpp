@@ -94,8 +94,12 @@ bool trimToBand(const float* distances, const BandWidths& widths, float* values,
     if (any(unknown)) {
         BlockMask outside;
         for (std::size_t x = 0; x < blockSide; ++x) outside[x] = ~(unknown[x] | inside[x]);
-        if (!any(inside) && !any(outside)) return false;
-        HWY_DYNAMIC_DISPATCH(flood)(unknown, outside, inside);
+        const bool anyInside = any(inside), anyOutside = any(outside);
+        if (!anyInside && !anyOutside) return false;
+        if (anyInside && anyOutside)
+            HWY_DYNAMIC_DISPATCH(flood)(unknown, outside, inside);
+        else if (anyInside)
+            inside.fill(~0ull);
     }
     masks = {band, inside};
     HWY_DYNAMIC_DISPATCH(writeValues)(distances, widths, inside, band, values);

@@ -217,12 +217,10 @@ HWY_INLINE void pick(const LayerBlockInput& input, const glm::vec3& middle, std:
 }
 
 template <bool cube, bool withOwners>
-bool fillCube(const LayerBlockInput& input, const glm::ivec3& inBlock, LayerScratch& scratch, float* distances,
-              std::int32_t* triangles) {
+bool fillCube(const LayerBlockInput& input, const glm::ivec3& inBlock, LayerScratch& scratch, Points inner,
+              Points outer, float* distances, std::int32_t* triangles) {
     const glm::ivec3 inBrick = input.inBrick + inBlock;
     const glm::vec3 middle = glm::vec3(inBrick) + halfCube;
-    const std::size_t size = input.samples.count() + hn::Lanes(Tag());
-    Points inner(scratch.inner, size), outer(scratch.outer, size);
     pick<cube>(input, middle, input.samples.near(inBrick / cubeSide, 1, scratch.near), inner, outer);
     const int corner = (inBlock.x * blockSide + inBlock.y) * blockSide + inBlock.z;
     if (inner.count + outer.count == 0) {
@@ -246,8 +244,11 @@ bool fillLayerBlock(const LayerBlockInput& input, LayerScratch& scratch, float* 
                                                 : (triangles ? fillCube<false, true> : fillCube<false, false>);
     bool any = false;
     if (input.samples.near(input.inBrick / cubeSide, cubesPerSide, scratch.near).empty()) return false;
+    const std::size_t size = input.samples.count() + hn::Lanes(Tag());
+    const Points inner(scratch.inner, size), outer(scratch.outer, size);
     for (int cube = 0; cube < cubesPerBlock; ++cube)
-        any |= fill(input, cubeSide * glm::ivec3(cube / 4, cube / 2 % 2, cube % 2), scratch, distances, triangles);
+        any |= fill(input, cubeSide * glm::ivec3(cube / 4, cube / 2 % 2, cube % 2), scratch, inner, outer, distances,
+                    triangles);
     return any;
 }
 
