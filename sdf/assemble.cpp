@@ -10,8 +10,8 @@
 #include <bit>
 #include <cmath>
 #include <functional>
+#include <map>
 #include <type_traits>
-#include <utility>
 
 #include "sdf/links.h"
 #include "sdf/progress.h"
@@ -22,6 +22,7 @@ namespace {
 using Leaf = openvdb::FloatTree::LeafNodeType;
 using TriangleLeaf = openvdb::Int32Tree::LeafNodeType;
 using LargeNode = openvdb::FloatTree::RootNodeType::ChildNodeType;
+using SmallNode = LargeNode::ChildNodeType;
 static_assert(Leaf::DIM == blockSide);
 
 std::unique_ptr<TriangleLeaf> triangleLeaf(const std::int32_t* triangles, const Leaf& like) {
@@ -209,21 +210,72 @@ void Assembler::copy(const Grids& from, const std::function<bool(const openvdb::
         });
 }
 
+// The leaves below each node of the level above.
+struct Assembler::Branch {
+    std::vector<Collected*> leaves;
+    std::size_t firstFaces = 0;
+    std::unique_ptr<SmallNode> owned{};  // until it is in the tree
+    SmallNode* node = nullptr;
+    std::vector<const Leaf*> plain{};
+};
+
+std::vector<Assembler::Branch> Assembler::branches() {
+    std::vector<Branch> all;
+    std::map<openvdb::Coord, std::size_t> places;
+    std::size_t place = 0;
+    openvdb::Coord last;
+    for (auto& some : leaves_)
+        for (Collected& one : some) {
+            // leaves taken one after the other are mostly below the same node
+            const openvdb::Coord origin = one.leaf->origin() & ~(SmallNode::DIM - 1);
+            if (all.empty() || origin != last) {
+                place = places.try_emplace(origin, all.size()).first->second;
+                if (place == all.size()) all.emplace_back();
+                last = origin;
+            }
+            all[place].leaves.push_back(&one);
+        }
+    for (std::size_t i = 1; i < all.size(); ++i) all[i].firstFaces = all[i - 1].firstFaces + all[i - 1].leaves.size();
+    return all;
+}
+
+void Assembler::grow(Branch& branch, float background) {
+    branch.owned = std::make_unique<SmallNode>(branch.leaves.front()->leaf->origin(), background);
+    branch.node = branch.owned.get();
+    std::size_t faces = branch.firstFaces;
+    for (Collected* one : branch.leaves) {
+        if (one->plain) branch.plain.push_back(one->leaf.get());
+        one->leaf->setTransientData(openvdb::Index32(faces));
+        faces_[faces++] = one->faces;
+        branch.node->addLeaf(one->leaf.release());
+    }
+}
+
 openvdb::FloatGrid::Ptr Assembler::distances() {
     const float exterior = widths_.exterior * widths_.voxelSize, interior = -widths_.interior * widths_.voxelSize;
     auto grid = openvdb::FloatGrid::create(exterior);
-    std::vector<std::pair<openvdb::Coord, float>> plain;
-    for (auto& some : leaves_)
-        for (Collected& one : some) {
-            if (faces_.size() % leavesPerPoll == 0) progress_.poll();
-            one.leaf->setTransientData(openvdb::Index32(faces_.size()));
-            faces_.push_back(one.faces);
-            if (one.plain) plain.emplace_back(one.leaf->origin(), one.leaf->getFirstValue());
-            grid->tree().addLeaf(one.leaf.release());
-        }
+    std::vector<Branch> branches = this->branches();
+    if (!branches.empty()) faces_.resize(branches.back().firstFaces + branches.back().leaves.size());
+    const auto forEachBranch = [&](auto visit) {
+        tbb::parallel_for(std::size_t(0), branches.size(), [&](std::size_t i) {
+            progress_.poll();
+            visit(branches[i]);
+        });
+    };
+    forEachBranch([&](Branch& branch) { grow(branch, exterior); });
+    for (Branch& branch : branches) {
+        const openvdb::Coord origin = branch.node->origin();
+        if (!grid->tree().probeNode<LargeNode>(origin)) grid->tree().root().addChild(new LargeNode(origin, exterior));
+        grid->tree().probeNode<LargeNode>(origin)->addChild(branch.owned.release());
+    }
     // leaves carry their signs already: only tiles between them are flooded. Leaves of one far value become tiles too.
     openvdb::tools::signedFloodFillWithValues(grid->tree(), exterior, interior, true, 1, 1);
-    for (const auto& [origin, value] : plain) grid->tree().addTile(1, origin, value, false);
+    forEachBranch([](Branch& branch) {
+        for (const Leaf* leaf : branch.plain) {
+            const float value = leaf->getFirstValue();  // the leaf goes before the tile comes
+            branch.node->addTile(1, leaf->origin(), value, false);
+        }
+    });
     openvdb::tools::pruneTiles(grid->tree());
     grid->setName("distance");
     grid->setGridClass(openvdb::GRID_LEVEL_SET);
