@@ -1,4 +1,4 @@
-// The double layer method, brick by brick: tiles, runs of samples, blocks. Nothing is kept of a mesh but the bins of
+// The double layer method, brick by brick: triangles, samples, blocks. Nothing is kept of a mesh but the bins of
 // its triangles, so that memory stays a fraction of the mesh's own however many samples it has.
 #include "sdf/double_layer.h"
 

@@ -51,10 +51,6 @@ inline float sliceAt(int x) {
     return float(x) - halfCube;
 }
 
-inline Vec squareOf(Vec v) {
-    return hn::Mul(v, v);
-}
-
 // One vector's part of each slice of a cube, from the middle of the cube.
 struct Voxels {
     explicit Voxels(int part) {

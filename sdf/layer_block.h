@@ -1,8 +1,7 @@
 // Both layers of one 8x8x8 block and the signed distances between them (section 3.2 and Eq. 3 of the paper).
 //
-// The block is taken in cubes of 4x4x4 voxels, whose squared distances to both layers stay in registers while all runs
-// of samples that reach the cube are applied. Large groups of runs are left out where none of their samples can be
-// nearer than what the others gave.
+// The block is taken in cubes of 4x4x4 voxels. The points of both layers that reach a cube are picked from the cells
+// around it, then the voxels' nearest ones are kept in registers while all picked points are applied.
 #pragma once
 
 #include <array>

@@ -190,7 +190,7 @@ TEST_CASE("the triangle of a voxel is the owner of the sample that decides its d
 }
 
 TEST_CASE("a triangle whose area floats cannot hold changes nothing but what is at it") {
-    Mesh mesh = shapes::sphere(1, 5);  // several triangles a voxel: runs are gathered
+    Mesh mesh = shapes::sphere(1, 5);  // several triangles a voxel
     const BuildOptions options = layered({.voxelSize = 0.15f});
     const LevelSet before = build(mesh, options);
     const auto first = unsigned(mesh.points.size());
