@@ -155,9 +155,9 @@ template <class D, class T>
 HWY_INLINE void putRows(D tag, hn::Vec<D> values, int part, T* corner) {
     alignas(64) T rows[sliceVoxels];
     hn::Store(values, tag, rows);
-    const int first = part * int(hn::Lanes(tag));
-    for (int i = 0; i < int(hn::Lanes(tag)); i += cubeSide)
-        std::memcpy(corner + (first + i) / cubeSide * blockSide, rows + i, cubeSide * sizeof(T));
+    const int lanes = int(hn::Lanes(tag)), inRow = std::min(lanes, cubeSide);
+    for (int i = 0, at = part * lanes; i < lanes; i += inRow, at += inRow)
+        std::memcpy(corner + at / cubeSide * blockSide + at % cubeSide, rows + i, std::size_t(inRow) * sizeof(T));
 }
 
 // Eq. 3: from both layers to signed distances. The inside keeps its sign bit where the distance is clamped to zero.
