@@ -313,14 +313,18 @@ void LayerSamples::finish() {
     for (std::size_t i = 0; i < added_.count; ++i) ++begins_[std::size_t(added_.cell[i]) + 1];
     std::partial_sum(begins_.begin(), begins_.end(), begins_.begin());
     sorted_.reserve(added_.count);
-    for (std::size_t i = 0; i < added_.count; ++i) {
-        const std::size_t to = begins_[std::size_t(added_.cell[i])]++;
-        for (std::size_t axis = 0; axis < 3; ++axis) {
-            sorted_.place[axis][to] = added_.columns.place[axis][i];
-            sorted_.offset[axis][to] = added_.columns.offset[axis][i];
-        }
-        sorted_.triangle[to] = added_.columns.triangle[i];
+    // from cells to places
+    for (std::size_t i = 0; i < added_.count; ++i)
+        added_.cell[i] = std::int32_t(begins_[std::size_t(added_.cell[i])]++);
+    const auto sort = [&](const auto& from, auto& to) {
+        const std::int32_t* places = added_.cell.data();
+        for (std::size_t i = 0; i < added_.count; ++i) to[std::size_t(places[i])] = from[i];
+    };
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+        sort(added_.columns.place[axis], sorted_.place[axis]);
+        sort(added_.columns.offset[axis], sorted_.offset[axis]);
     }
+    sort(added_.columns.triangle, sorted_.triangle);
     // each cursor now stands at the end of its cell
     std::copy_backward(begins_.begin(), begins_.end() - 1, begins_.end());
     begins_[0] = 0;
