@@ -296,7 +296,8 @@ void LayerSamples::begin(const SampledBrick& brick) {
     brick_.emplace(brick);
     cells_.lower = glm::vec3(-brick.reach);
     cells_.upper = glm::vec3(float(brick.side - 1) + brick.reach);
-    cells_.around = int(std::ceil((brick.reach - 0.5f) / float(cellSide)));
+    // a cell begins half a voxel before its voxels; a tenth of one is against rounding
+    cells_.around = 1 + int(std::floor((brick.reach - 0.4f) / float(cellSide)));
     cells_.firstCorner = -0.5f - float(cells_.around * cellSide);
     cells_.size = brick.side / cellSide + 2 * cells_.around;
     added_.count = 0;
