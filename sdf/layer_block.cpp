@@ -65,8 +65,8 @@ struct Voxels {
 };
 
 // The points of a layer around a cube, from its middle.
-struct Points {
-    Points(LayerScratch::Layer& memory, std::size_t size) {
+struct LayerPoints {
+    LayerPoints(LayerScratch::Layer& memory, std::size_t size) {
         for (auto& column : memory.columns)
             if (column.size() < size) column.resize(size);
         if (memory.picked.size() < size) memory.picked.resize(size);
@@ -104,7 +104,8 @@ struct Points {
 // |v - p|^2 = |v|^2 - 2 (p . v - |p|^2 / 2): one multiplication a voxel and point.
 template <bool cube, bool withOwners>
 struct Nearest {
-    HWY_INLINE Nearest(const LayerBlockInput& input, const Points& points, const glm::vec3& middle, const Voxels& v) {
+    HWY_INLINE Nearest(const LayerBlockInput& input, const LayerPoints& points, const glm::vec3& middle,
+                       const Voxels& v) {
         const Tag tag;
         for (int x = 0; x < cubeSide; ++x) {
             greatest[x] = hn::Set(tag, -infinite);
@@ -185,7 +186,7 @@ HWY_INLINE void combine(const Nearest& inner, const Nearest& outer, const Voxels
 // neighbourhood meets it.
 template <bool cube>
 HWY_INLINE void pick(const LayerBlockInput& input, const glm::vec3& middle, std::span<const LayerSamples::Range> ranges,
-                     Points& inner, Points& outer) {
+                     LayerPoints& inner, LayerPoints& outer) {
     const Tag tag;
     const SampleColumns& columns = input.samples.columns();
     const float* places[] = {columns.place[0].data(), columns.place[1].data(), columns.place[2].data()};
@@ -213,8 +214,8 @@ HWY_INLINE void pick(const LayerBlockInput& input, const glm::vec3& middle, std:
 }
 
 template <bool cube, bool withOwners>
-bool fillCube(const LayerBlockInput& input, const glm::ivec3& inBlock, LayerScratch& scratch, Points inner,
-              Points outer, float* distances, std::int32_t* triangles) {
+bool fillCube(const LayerBlockInput& input, const glm::ivec3& inBlock, LayerScratch& scratch, LayerPoints inner,
+              LayerPoints outer, float* distances, std::int32_t* triangles) {
     const glm::ivec3 inBrick = input.inBrick + inBlock;
     const glm::vec3 middle = glm::vec3(inBrick) + halfCube;
     pick<cube>(input, middle, input.samples.near(inBrick / cubeSide, 1, scratch.near), inner, outer);
@@ -241,7 +242,7 @@ bool fillLayerBlock(const LayerBlockInput& input, LayerScratch& scratch, float* 
     bool any = false;
     if (input.samples.near(input.inBrick / cubeSide, cubesPerSide, scratch.near).empty()) return false;
     const std::size_t size = input.samples.count() + hn::Lanes(Tag());
-    const Points inner(scratch.inner, size), outer(scratch.outer, size);
+    const LayerPoints inner(scratch.inner, size), outer(scratch.outer, size);
     for (int cube = 0; cube < cubesPerBlock; ++cube)
         any |= fill(input, cubeSide * glm::ivec3(cube / 4, cube / 2 % 2, cube % 2), scratch, inner, outer, distances,
                     triangles);

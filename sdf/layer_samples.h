@@ -40,6 +40,7 @@ struct AddedSamples {
     std::vector<std::int32_t> cell;
     std::size_t count = 0;
 
+    /// Makes room for so many.
     void reserve(std::size_t size) {
         columns.reserve(size);
         if (cell.size() < columns.triangle.size()) cell.resize(columns.triangle.size());
@@ -75,6 +76,7 @@ class LayerSamples {
     std::size_t count() const { return added_.count; }
     const SampleColumns& columns() const { return sorted_; }
 
+    /// Samples `begin` to `end` - 1.
     struct Range {
         std::uint32_t begin, end;
     };
