@@ -619,16 +619,6 @@ uint completeSides(const Input* input, SHARED Block* block, View* view) {
     return onBoth;
 }
 
-// Lanes whose bit is set.
-IntLanes lanesOf(uint bits) {
-#if LANES == 16
-    const IntLanes lane = (IntLanes)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
-#else
-    const IntLanes lane = (IntLanes)(0, 1, 2, 3, 4, 5, 6, 7);
-#endif
-    return ((IntLanes)(bits) & (IntLanes)(1) << lane) != 0;
-}
-
 enum { FILLED_BLOCKS, OPEN_BLOCKS, CONFLICTS };
 
 // A group fills a block of a brick. Blocks that hold distances go to the next places of `origins`, `distances` and
