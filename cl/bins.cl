@@ -22,8 +22,8 @@ typedef struct {
     Sampling sampling;
 } Grid;
 
-// Bits of the triangles of a batch that are one part, whatever brick asks.
-uint onePartBits(const Grid* grid, const Batch* batch);
+// The parts of each triangle of a batch, whatever brick asks; 0 where that goes by the brick.
+RealInt partsOfAny(const Grid* grid, const Batch* batch);
 
 // The most parts that a brick with these limits cuts a triangle into.
 uint countParts(const Grid* grid, const Corners* triangle, const Limits* limits);
@@ -83,14 +83,15 @@ typedef struct {
     uint triangle;
 } Bins;
 
-void visit(const Bins* bins, const Grid* grid, const Corners* t, uint cell, bool onePart) {
+// `parts` of the triangle come into the cell; 0 if they are to be counted.
+void visit(const Bins* bins, const Grid* grid, const Corners* t, uint cell, uint parts) {
     const uint place = takeGlobal(bins->cursors + cell, 1);
     if (bins->list) {
         bins->list[place] = bins->triangle;
-    } else if (!onePart) {
+    } else if (parts != 1) {
         const Limits limits = limitsOf(grid, brickAt(grid, cell));
         // fewer than one comes out right too: sums of unsigned numbers wrap around
-        atomic_add(bins->more + cell, countParts(grid, t, &limits) - 1);
+        atomic_add(bins->more + cell, (parts ? parts : countParts(grid, t, &limits)) - 1);
     }
 }
 
@@ -107,7 +108,7 @@ void divide(const Bins* bins, const Grid* grid, const Corners* t, int3 lowest, i
         const int3 low = lower[waiting], high = upper[waiting], size = high - low;
         if (staysAway(grid, t, low, high)) continue;
         if (size.x + size.y + size.z == 0) {
-            visit(bins, grid, t, cellAt(grid, low), false);
+            visit(bins, grid, t, cellAt(grid, low), 0);
             continue;
         }
         const int3 way = size.x >= size.y && size.x >= size.z ? (int3)(1, 0, 0)
@@ -125,12 +126,12 @@ void divide(const Bins* bins, const Grid* grid, const Corners* t, int3 lowest, i
 // axes along which there are two, so that they are worked out once.
 #define MANY_BRICKS UINT_MAX
 
-void visitFew(const Bins* bins, const Grid* grid, const Corners* t, uint code, bool onePart) {
+void visitFew(const Bins* bins, const Grid* grid, const Corners* t, uint code, uint parts) {
     const uint lowest = code >> 3, xStep = (uint)(grid->size[1] * grid->size[2]), yStep = (uint)(grid->size[2]);
     for (uint x = 0; x <= (code >> 2 & 1); ++x)
         for (uint y = 0; y <= (code >> 1 & 1); ++y)
             for (uint z = 0; z <= (code & 1); ++z)
-                visit(bins, grid, t, lowest + x * xStep + y * yStep + z, onePart);
+                visit(bins, grid, t, lowest + x * xStep + y * yStep + z, parts);
 }
 
 // The bricks around the triangles of a batch: lowest and extent, all inclusive.
@@ -162,17 +163,18 @@ void countBatch(Bins* bins, const Grid* grid, const Batch* batch, global const f
     bricksAround(grid, batch, &lowest, &extent);
     const RealInt code = ((lowest.x * grid->size[1] + lowest.y) * grid->size[2] + lowest.z) << 3 | extent.x << 2 |
                          extent.y << 1 | extent.z;
-    const uint few = bitsOfReal((extent.x <= 1) & (extent.y <= 1) & (extent.z <= 1)), single = onePartBits(grid, batch);
-    int all[BATCH];
+    const uint few = bitsOfReal((extent.x <= 1) & (extent.y <= 1) & (extent.z <= 1));
+    int all[BATCH], parts[BATCH];
     storeRealInt(code, all);
+    storeRealInt(partsOfAny(grid, batch), parts);
     for (uint rest = batch->real; rest != 0; rest &= rest - 1) {
         const int lane = lowestBit(rest);
         bins->triangle = batch->triangle[lane];
         if (few >> lane & 1) {
             codes[bins->triangle] = (uint)(all[lane]);
             Corners t;
-            if (!(single >> lane & 1)) t = cornersOf(points, triangles, bins->triangle, grid->voxelsPerUnit);
-            visitFew(bins, grid, &t, (uint)(all[lane]), single >> lane & 1);
+            if (parts[lane] == 0) t = cornersOf(points, triangles, bins->triangle, grid->voxelsPerUnit);
+            visitFew(bins, grid, &t, (uint)(all[lane]), (uint)(parts[lane]));
         } else {
             codes[bins->triangle] = MANY_BRICKS;
             divideTriangle(bins, grid, points, triangles);
@@ -264,7 +266,7 @@ kernel void listTriangles(global const float* points, global const uint* triangl
     for (ulong i = turn.begin; i < turn.end; i += ITEMS > 1 ? turn.step : 1) {
         bins.triangle = (uint)(i);
         if (codes[i] != MANY_BRICKS)
-            visitFew(&bins, &grid, 0, codes[i], true);
+            visitFew(&bins, &grid, 0, codes[i], 1);
         else
             divideTriangle(&bins, &grid, points, triangles);
     }

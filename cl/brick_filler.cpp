@@ -37,8 +37,8 @@ constexpr std::size_t bricksForProcessor = 64, bricksForGpu = 512;
 /// Groups for each compute unit that prepare bricks, each with scratch memory of its own.
 constexpr std::size_t groupsPerUnit = 4;
 constexpr std::uint64_t scratchPart = 8;  // of the budget, at most
-/// Parts that a kernel can number in one batch.
-constexpr std::uint64_t mostParts = 1 << 27;
+/// Parts that a kernel can number in one batch, and those whose numbers stay in a processor's cache.
+constexpr std::uint64_t partsInBatch = 1 << 27, partsForProcessor = 60000;
 /// Cells as small as those that pieces are grouped by, and how far beyond its reach a brick's samples lie [voxels].
 constexpr float smallestCell = 1.1f, aroundBrick = 3;
 
@@ -141,7 +141,7 @@ class BrickFill {
     cl::Program program_;
     std::optional<DeviceBins> bins_;
     cl::CommandQueue transfers_;
-    cl::Buffer scratch_, next_;
+    cl::Buffer scratch_, next_, orders_;
     std::size_t scratchGroups_ = 0;
     cl_uint scratchCells_ = 0;
     std::uint64_t share_ = 0;  // of the memory, for a batch
@@ -172,6 +172,18 @@ std::uint64_t sampleCells(const BrickGrid& grid) {
     return side * side * side + 2;
 }
 
+// For each byte the places of its bits in ascending order, a byte each: `orders` of double_layer.cl.
+const std::array<cl_ulong, 256>& bitOrders() {
+    static const std::array<cl_ulong, 256> orders = [] {
+        std::array<cl_ulong, 256> made{};
+        for (unsigned byte = 0; byte < made.size(); ++byte)
+            for (unsigned bit = 0, at = 0; bit < 8; ++bit)
+                if (byte >> bit & 1) made[byte] |= cl_ulong(bit) << 8 * at++;
+        return made;
+    }();
+    return orders;
+}
+
 std::string buildOptions(const Device::Impl& device, bool gpuMapping, bool triangles, bool cube) {
     std::string options = "-cl-std=CL1.2";
     if (device.info.exactSquareRoots) options += " -cl-fp32-correctly-rounded-divide-sqrt";
@@ -198,6 +210,8 @@ BrickFill::BrickFill(Device::Impl& device, const OpenclOptions& options, const F
     next_ = memory_.allocate(sizeof(cl_uint), "a batch of bricks");
     if (layered_) {
         kept_ = {0, 32, 0, 0, 28, 0, sampleCells(bins_->grid()) * sizeof(cl_uint)};
+        orders_ = memory_.upload(bitOrders().data(), sizeof bitOrders(), "a batch of bricks",
+                                 timing_.event(Timing::Of::upload));
     } else {
         kept_ = {112, 32, 32, sizeof(cl_uint), 32, sizeof(cl_uint), slices() * sizeof(cl_uint2)};
         makeScratch();
@@ -242,17 +256,15 @@ Load BrickFill::loadOf(std::size_t first, std::size_t last) const {
 bool BrickFill::fits(const Load& load) const {
     const std::uint64_t largest = std::max(blocksOf(load) * blockVoxels * sizeof(float),
                                            (load.parts + lanes) * std::max(kept_.part, kept_.columns));
-    return load.parts < mostParts && bytesOf(load) <= share_ && largest <= device_.info.maxAllocationBytes;
+    return load.parts < partsInBatch && bytesOf(load) <= share_ && largest <= device_.info.maxAllocationBytes;
 }
 
 // The end of the run of bricks from `first` on that go into one batch.
 std::size_t BrickFill::lastFitting(std::size_t first) const {
     if (!fits(loadOf(first, first + 1)))
         memory_.refuse(batchesInFlight * bytesOf(loadOf(first, first + 1)), "a brick of the grid");
-    const std::size_t end =
-        std::min(bins_->bricks(),
-                 first + (gpuMapping_ ? bricksForGpu : (getenv("BR") ? atoi(getenv("BR")) : bricksForProcessor)));
-    const std::size_t mostParts = getenv("PA") ? atoi(getenv("PA")) : 60000;
+    const std::size_t end = std::min(bins_->bricks(), first + (gpuMapping_ ? bricksForGpu : bricksForProcessor));
+    const std::uint64_t mostParts = gpuMapping_ ? partsInBatch : partsForProcessor;
     std::size_t last = first + 1;
     while (last < end && fits(loadOf(first, last + 1)) && loadOf(first, last + 1).parts < mostParts) ++last;
     return last;
@@ -303,7 +315,8 @@ void BrickFill::start(Batch& batch, std::size_t first, std::size_t last) {
     if (layered_) {
         prepare(bricks, batch.unsorted, batch.columns, batch.ofBricks, stride, next_, layers);
         enqueue("fillBlocks", blocksOf(load), bins.grid(), bins.cellOfBrick(), bins.partOffsets(), firstBrick,
-                batch.columns, batch.ofBricks, stride, layers, batch.origins, batch.distances, triangles, batch.counts);
+                batch.columns, batch.ofBricks, stride, layers, orders_, batch.origins, batch.distances, triangles,
+                batch.counts);
     } else {
         prepare(scratchGroups_, batch.parts, batch.unsorted, batch.sorted, batch.cells, batch.columns, batch.begins,
                 stride, scratch_, scratchCells_, batch.ofBricks, next_);

@@ -23,7 +23,6 @@
 typedef float8 Lanes;
 typedef int8 IntLanes;
 #define vloadLanes vload8
-#define vstoreLanes vstore8
 
 #else
 
@@ -36,9 +35,17 @@ typedef int8 IntLanes;
 typedef float16 Lanes;
 typedef int16 IntLanes;
 #define vloadLanes vload16
-#define vstoreLanes vstore16
 
 #endif
+
+// Vectors that lie anywhere. vstore16() does the same, but PoCL makes many small stores of it.
+typedef Lanes LooseLanes __attribute__((aligned(4)));
+typedef IntLanes LooseIntLanes __attribute__((aligned(4)));
+#define storeLanes(value, index, pointer) (*(LooseLanes*)((pointer) + (index) * LANES) = (value))
+#define storeSharedLanes(value, index, pointer) (*(SHARED LooseLanes*)((pointer) + (index) * LANES) = (value))
+#define storeSharedInts(value, index, pointer) (*(SHARED LooseIntLanes*)((pointer) + (index) * LANES) = (value))
+#define storeGlobalLanes(value, index, pointer) (*(global LooseLanes*)((pointer) + (index) * LANES) = (value))
+#define storeGlobalInts(value, index, pointer) (*(global LooseIntLanes*)((pointer) + (index) * LANES) = (value))
 
 // Loops over what shall stay in registers, and functions that take part in such loops.
 #define UNROLLED _Pragma("unroll")

@@ -24,8 +24,8 @@
 #endif
 #define HALF_SIDE (0.5f * (PICKED_SIDE - 1))
 
-// Points of a layer that are applied in one go.
-#define PAGE 256
+// Points of a layer that are looked at in one go.
+#define PAGE 1024
 // layerTie of sdf/blocks.h [voxels^2].
 #define LAYER_TIE 1e-5f
 
@@ -92,7 +92,7 @@ float sliceAt(int slice) {
 // The lattice point nearest to a coordinate. Halves go up, whatever the rounding: LayerSamples::nearestLattice().
 #define nearestLattice(coordinate) floor((coordinate) + 0.5001f)
 
-// Points of a layer.
+// Points of a layer, and those of them that reach the voxels.
 typedef struct {
     float x[PAGE], y[PAGE], z[PAGE], halfSquare[PAGE];
 #if TRIANGLES
@@ -101,7 +101,8 @@ typedef struct {
 #if PAPER_CUBE
     float centre[3][PAGE];  // the lattice point nearest to the sample
 #endif
-    uint count;
+    ushort picked[PAGE + BLOCK_SIDE];  // some more are written
+    uint count;                        // of those picked
 } Points;
 
 // The nearest points of a layer so far. They are those with the greatest p . v - |p|^2 / 2, as
@@ -123,7 +124,8 @@ INLINED void clear(Nearest* nearest) {
 }
 
 INLINED void applyPoints(SHARED const Points* points, const Voxels* v, int cube, Nearest* nearest) {
-    for (uint p = 0; p < points->count; ++p) {
+    for (uint i = 0; i < points->count; ++i) {
+        const uint p = points->picked[i];
         const float along = points->x[p];
         Lanes across = multiplyAdd(
             v->z, (Lanes)(points->z[p]), multiplyAdd(v->y, (Lanes)(points->y[p]), (Lanes)(-points->halfSquare[p])));
@@ -133,16 +135,16 @@ INLINED void applyPoints(SHARED const Points* points, const Voxels* v, int cube,
 #else
         (void)(cube);
 #endif
-        UNROLLED for (int i = 0; i < SLICES; ++i) {
+        UNROLLED for (int slice = 0; slice < SLICES; ++slice) {
 #if PAPER_CUBE
-            if (fabs(sliceAt(i) - points->centre[0][p]) > (float)(cube)) continue;
+            if (fabs(sliceAt(slice) - points->centre[0][p]) > (float)(cube)) continue;
 #endif
-            const Lanes some = multiplyAdd((Lanes)(along), (Lanes)(sliceAt(i)), across);
+            const Lanes some = multiplyAdd((Lanes)(along), (Lanes)(sliceAt(slice)), across);
 #if TRIANGLES
-            nearest->owner[i] =
-                select(nearest->owner[i], (IntLanes)(points->owner[p]), some > nearest->greatest[i]);
+            nearest->owner[slice] =
+                select(nearest->owner[slice], (IntLanes)(points->owner[p]), some > nearest->greatest[slice]);
 #endif
-            nearest->greatest[i] = max(nearest->greatest[i], some);
+            nearest->greatest[slice] = max(nearest->greatest[slice], some);
         }
     }
 }
@@ -161,45 +163,34 @@ Real beyondSide(Real at) {
     return max(fabs(at) - HALF_SIDE, (Real)(0.0f));
 }
 
-// Picks the points of a layer, out of some, that reach the voxels: those nearer than the root of reach2.
-INLINED void pick(SHARED Points* points, uint among, Real3 at, float reach2, const int* owners, const Real3* centre) {
-    const Real away2 = squareSum(beyondSide(at.x), beyondSide(at.y), beyondSide(at.z));
-    uint near = bitsOfReal(away2 < reach2) & among;
-    if (near == 0) return;
-    float numbers[4][BATCH];
-    storeReal(at.x, numbers[0]);
-    storeReal(at.y, numbers[1]);
-    storeReal(at.z, numbers[2]);
-    storeReal(0.5f * squareSum(at.x, at.y, at.z), numbers[3]);
-#if PAPER_CUBE
-    float centres[3][BATCH];
-    storeReal(centre->x, centres[0]);
-    storeReal(centre->y, centres[1]);
-    storeReal(centre->z, centres[2]);
-#else
-    (void)(centre);
-#endif
+typedef ushort8 LooseUshort8 __attribute__((aligned(2)));
+
+// Adds the numbers of some lanes, counted from `first`, to those picked. `orders` has the places of its bits, in
+// ascending order, for each byte: without it there were a branch for each bit, and processors would guess it wrong.
+INLINED void addPicked(SHARED Points* points, uint lanes, uint first, global const ulong* orders) {
 #if ITEMS > 1
-    uint to = atomic_add(&points->count, popcount(near));
+    (void)(orders);
+    if (lanes) points->picked[atomic_inc(&points->count)] = (ushort)(first);
 #else
-    uint to = points->count;
-    points->count += popcount(near);
-#endif
-    for (; near != 0; near &= near - 1, ++to) {
-        const int lane = lowestBit(near);
-        points->x[to] = numbers[0][lane];
-        points->y[to] = numbers[1][lane];
-        points->z[to] = numbers[2][lane];
-        points->halfSquare[to] = numbers[3][lane];
-#if TRIANGLES
-        points->owner[to] = owners[lane];
-#else
-        (void)(owners);
-#endif
-#if PAPER_CUBE
-        for (int axis = 0; axis < 3; ++axis) points->centre[axis][to] = centres[axis][lane];
-#endif
+    uint count = points->count;
+    UNROLLED for (uint i = 0; i < LANES / 8; ++i) {
+        const uint byte = lanes >> 8 * i & 255;
+        *(LooseUshort8*)(points->picked + count) = convert_ushort8(as_uchar8(orders[byte])) + (ushort)(first + 8 * i);
+        count += popcount(byte);
     }
+    points->count = count;
+#endif
+}
+
+// Places points of a layer, and picks those that reach the voxels: nearer than the root of reach2.
+INLINED void placePoints(SHARED Points* points, uint first, uint among, Real3 at, float reach2,
+                         global const ulong* orders) {
+    const Real away2 = squareSum(beyondSide(at.x), beyondSide(at.y), beyondSide(at.z));
+    storeReal(at.x, points->x + first);
+    storeReal(at.y, points->y + first);
+    storeReal(at.z, points->z + first);
+    storeReal(0.5f * squareSum(at.x, at.y, at.z), points->halfSquare + first);
+    addPicked(points, bitsOfReal(away2 < reach2) & among, first, orders);
 }
 
 // What a block works from.
@@ -209,12 +200,13 @@ typedef struct {
     global const uint* begins;  // of the brick's cells
     SampleCells cells;
     Layers layers;
+    global const ulong* orders;  // see addPicked()
 } Input;
 
-// Picks the points of both layers around samples begin + ITEM * BATCH ..
-INLINED void pickSome(const Input* input, uint begin, uint end, float3 middle, SHARED Points* inner,
-                      SHARED Points* outer) {
-    const uint at = begin + ITEM * BATCH;
+// Places the points of both layers around samples begin + ITEM * BATCH .. as those from `first` + ITEM * BATCH on.
+INLINED void placeLayers(const Input* input, uint begin, uint end, float3 middle, uint first, SHARED Points* inner,
+                         SHARED Points* outer) {
+    const uint at = begin + ITEM * BATCH, to = first + ITEM * BATCH;
     if (at >= end) return;
     global const float* columns = input->columns + at;
     const uint stride = input->stride;
@@ -224,20 +216,38 @@ INLINED void pickSome(const Input* input, uint begin, uint end, float3 middle, S
                 offset = make3(loadReal(columns + OFFSET_X * stride), loadReal(columns + OFFSET_Y * stride),
                                loadReal(columns + OFFSET_Z * stride)),
                 seen = make3(place.x - middle.x, place.y - middle.y, place.z - middle.z);
-    Real3 centre = seen;
 #if PAPER_CUBE
     const float most = (float)(input->layers.cube) + HALF_SIDE;
-    centre = make3(nearestLattice(place.x) - middle.x, nearestLattice(place.y) - middle.y,
-                   nearestLattice(place.z) - middle.z);
+    const Real3 centre = make3(nearestLattice(place.x) - middle.x, nearestLattice(place.y) - middle.y,
+                               nearestLattice(place.z) - middle.z);
     among &= bitsOfReal((fabs(centre.x) <= most) & (fabs(centre.y) <= most) & (fabs(centre.z) <= most));
+    storeReal(centre.x, inner->centre[0] + to);
+    storeReal(centre.y, inner->centre[1] + to);
+    storeReal(centre.z, inner->centre[2] + to);
+    storeReal(centre.x, outer->centre[0] + to);
+    storeReal(centre.y, outer->centre[1] + to);
+    storeReal(centre.z, outer->centre[2] + to);
 #endif
-    int owners[BATCH];
 #if TRIANGLES
-    for (int lane = 0; lane < BATCH; ++lane) owners[lane] = as_int(columns[OWNER * stride + lane]);
+    const Real owners = loadReal(columns + OWNER * stride);
+    storeReal(owners, (SHARED float*)(inner->owner) + to);
+    storeReal(owners, (SHARED float*)(outer->owner) + to);
 #endif
     const float reach2 = square(input->layers.certain);
-    pick(inner, among, sub3(seen, offset), reach2, owners, &centre);
-    pick(outer, among, add3(seen, offset), reach2, owners, &centre);
+    placePoints(inner, to, among, sub3(seen, offset), reach2, input->orders);
+    placePoints(outer, to, among, add3(seen, offset), reach2, input->orders);
+}
+
+// Whether any sample lies in the cells around a block.
+bool hasSamples(const Input* input, int3 corner) {
+    const int size = input->cells.size, along = BLOCK_SIDE / CELL_SIDE + 2 * input->cells.around;
+    const int3 cell = corner / CELL_SIDE;
+    for (int x = cell.x; x < cell.x + along; ++x)
+        for (int y = cell.y; y < cell.y + along; ++y) {
+            global const uint* row = input->begins + (x * size + y) * size + cell.z;
+            if (row[along] > row[0]) return true;
+        }
+    return false;
 }
 
 // The nearest points of both layers for the voxels of a cube; `corner` is its first voxel in the brick.
@@ -252,22 +262,26 @@ INLINED void fillCube(const Input* input, int3 corner, const Voxels* v, SHARED P
     MEET;
     if (ITEM == 0) inner->count = outer->count = 0;
     MEET;
+    uint placed = 0;
     for (int x = cell.x; x < cell.x + along; ++x)
         for (int y = cell.y; y < cell.y + along; ++y) {
             global const uint* row = input->begins + (x * size + y) * size + cell.z;
             const uint end = row[along];
             for (uint i = row[0]; i < end; i += ITEMS * BATCH) {
-                pickSome(input, i, end, middle, inner, outer);
-                MEET;
-                if (max(inner->count, outer->count) > PAGE - ITEMS * BATCH) {
+                if (placed == PAGE) {
+                    MEET;
                     applyPoints(inner, v, cube, nearestInner);
                     applyPoints(outer, v, cube, nearestOuter);
                     MEET;
                     if (ITEM == 0) inner->count = outer->count = 0;
+                    MEET;
+                    placed = 0;
                 }
-                MEET;
+                placeLayers(input, i, end, middle, placed, inner, outer);
+                placed += ITEMS * BATCH;
             }
         }
+    MEET;
     applyPoints(inner, v, cube, nearestInner);
     applyPoints(outer, v, cube, nearestOuter);
 }
@@ -292,10 +306,10 @@ void putSlice(Lanes values, int slice, int3 inBlock, SHARED float* block) {
     vstore8(values, ITEM, block);
 #else
     SHARED float* corner = block + ((inBlock.x + slice) * BLOCK_SIDE + inBlock.y) * BLOCK_SIDE + inBlock.z;
-    vstore4(values.s0123, 0, corner);
-    vstore4(values.s4567, 2, corner);
-    vstore4(values.s89ab, 4, corner);
-    vstore4(values.scdef, 6, corner);
+    *(float4*)(corner) = values.s0123;
+    *(float4*)(corner + BLOCK_SIDE) = values.s4567;
+    *(float4*)(corner + 2 * BLOCK_SIDE) = values.s89ab;
+    *(float4*)(corner + 3 * BLOCK_SIDE) = values.scdef;
 #endif
 }
 
@@ -307,14 +321,15 @@ void putSlice(Lanes values, int slice, int3 inBlock, SHARED float* block) {
 
 enum { FILLED_BLOCKS };
 
-// A group fills a block of a brick. Blocks that hold distances go to the next places of `origins`, `distances` and
+// A group fills a block of a brick. For each byte `orders` has the places of its bits. Blocks that hold distances go to the next places of `origins`, `distances` and
 // `nearestTriangles`.
 GROUP_KERNEL void fillBlocks(Grid grid, global const uint* cellOfBrick, global const uint* partOffsets,
                              uint firstBrick, global const float* columns, global const uint* begins, uint stride,
-                             Layers layers, global int* origins, global float* distances, global int* nearestTriangles,
+                             Layers layers, global const ulong* orders, global int* origins, global float* distances, global int* nearestTriangles,
                              global uint* counters) {
     SHARED Points inner, outer;
-    SHARED float values[BLOCK_VOXELS], owners[TRIANGLES ? BLOCK_VOXELS : 1];
+    SHARED float values[BLOCK_VOXELS] __attribute__((aligned(64)));
+    SHARED float owners[TRIANGLES ? BLOCK_VOXELS : 1] __attribute__((aligned(64)));
     SHARED uint slot, anyKnown;
     const int side = (1 << grid.shift) / BLOCK_SIDE;
     const uint perBrick = (uint)(side * side * side), brick = (uint)(get_group_id(0)) / perBrick;
@@ -323,7 +338,8 @@ GROUP_KERNEL void fillBlocks(Grid grid, global const uint* cellOfBrick, global c
     const SampleCells cells = cellsFor(&grid);
     const uint cursors = (uint)(cells.size * cells.size * cells.size + 2);
     const Input input = {columns + (partOffsets[firstBrick + brick] - partOffsets[firstBrick]), stride,
-                         begins + (size_t)(brick)*cursors, cells, layers};
+                         begins + (size_t)(brick)*cursors, cells, layers, orders};
+    if (!hasSamples(&input, inBrick)) return;
     const Voxels v = ownVoxels();
     uint known = 0;
     for (int cube = 0; cube < CUBES; ++cube) {
@@ -354,9 +370,9 @@ GROUP_KERNEL void fillBlocks(Grid grid, global const uint* cellOfBrick, global c
     MEET;
     for (uint i = ITEM; i < BLOCK_VOXELS / LANES; i += ITEMS) {
         const size_t place = (size_t)(slot) * (BLOCK_VOXELS / LANES) + i;
-        vstoreLanes(vloadLanes(i, values), place, distances);
+        storeGlobalLanes(vloadLanes(i, values), place, distances);
 #if TRIANGLES
-        vstoreLanes(vloadLanes(i, owners), place, (global float*)(nearestTriangles));
+        storeGlobalLanes(vloadLanes(i, owners), place, (global float*)(nearestTriangles));
 #else
         (void)(nearestTriangles);
 #endif

@@ -396,8 +396,8 @@ void summarize(const Found* found, const Share* own, SHARED Block* block) {
             const Lanes distance = sqrt(found->nearest2[i]);
             const IntLanes nearest = found->nearest[i], known = nearest >= 0;
             const IntLanes side = known & nearest & ((1 << SIDE_BITS) - 1);
-            vstoreLanes(distance, chunk, block->distance);
-            vstoreLanes(nearest, chunk, block->nearest);
+            storeSharedLanes(distance, chunk, block->distance);
+            storeSharedInts(nearest, chunk, block->nearest);
             block->known.chunk[chunk] = bitsOf(known);
             // on the surface either side is right, and no link can carry it on
             block->outside.chunk[chunk] = bitsOf((side == SIDE_OUTSIDE) | (distance < 0.5f * LINK_SLACK));
@@ -662,13 +662,13 @@ GROUP_KERNEL void fillBlocks(global const float* points, global const uint* tria
             const IntLanes nearest = vloadLanes(chunk, block.nearest);
             const Lanes distance = select((Lanes)(FAR_AWAY), vloadLanes(chunk, block.distance), nearest >= 0);
             const IntLanes inside = lanesOf(sign ? block.inside.chunk[chunk] : 0);
-            vstoreLanes(select(distance, -distance, inside), place, distances);
+            storeGlobalLanes(select(distance, -distance, inside), place, distances);
             if (TRIANGLES) {
                 int owners[LANES];
-                vstoreLanes(nearest, 0, owners);
+                *(LooseIntLanes*)(owners) = nearest;
                 for (int i = 0; i < LANES; ++i)
                     owners[i] = owners[i] < 0 ? -1 : (int)(pieces[owners[i] >> SIDE_BITS].triangle);
-                vstoreLanes(vloadLanes(0, owners), place, nearestTriangles);
+                storeGlobalInts(vloadLanes(0, owners), place, nearestTriangles);
             }
         }
 }

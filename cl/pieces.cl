@@ -33,9 +33,13 @@ bool isShort(const Corners* t) {
            LONGEST_PIECE_EDGE * LONGEST_PIECE_EDGE;
 }
 
-uint onePartBits(const Grid* grid, const Batch* batch) {
+uint shortBits(const Batch* batch) {
+    return bitsOfReal(toReal(longestEdges2(batch)) <= (float)(LONGEST_PIECE_EDGE * LONGEST_PIECE_EDGE)) & batch->real;
+}
+
+RealInt partsOfAny(const Grid* grid, const Batch* batch) {
     (void)(grid);
-    return ~bitsOfReal(toReal(longestEdges2(batch)) > (float)(LONGEST_PIECE_EDGE * LONGEST_PIECE_EDGE));
+    return lanesOfBits(shortBits(batch)) & 1;
 }
 
 // Cuts a triangle in two at the middle of its longest edge.
@@ -191,15 +195,15 @@ void makePieces(Cut* cut, uint lanes, Real3 corner, Real3 ab, Real3 ac, int (*ba
     for (; lanes != 0; lanes &= lanes - 1, ++place) {
         const int lane = lowestBit(lanes);
         global Piece* piece = cut->pieces + place;
-        vstore4((int4)(base[0][lane], base[1][lane], base[2][lane], (int)(triangles[lane])), 0, piece->base);
-        for (int row = 0; row < PIECE_ROWS; row += 4) vstore4(fourOf(columns, row, lane), row / 4, piece->origin);
+        *(global int4*)(piece->base) = (int4)(base[0][lane], base[1][lane], base[2][lane], (int)(triangles[lane]));
+        global float4* numbers = (global float4*)(piece->origin);
+        UNROLLED for (int row = 0; row < PIECE_ROWS; row += 4) numbers[row / 4] = fourOf(columns, row, lane);
         const float3 sample = fourOf(columns, IN_BRICK, lane).xyz;
         const float radius = columns[COVER][lane];
-        global float* member = cut->members[place].place;
-        vstore4((float4)(sample, radius), 0, member);
-        vstore4((float4)(columns[AXIS_N][lane], columns[AXIS_N + 1][lane], columns[AXIS_N + 2][lane],
-                         as_float(cut->first + place)),
-                1, member);
+        global float4* member = (global float4*)(cut->members + place);
+        member[0] = (float4)(sample, radius);
+        member[1] = (float4)(columns[AXIS_N][lane], columns[AXIS_N + 1][lane], columns[AXIS_N + 2][lane],
+                             as_float(cut->first + place));
         lower = min(lower, sample);
         upper = max(upper, sample);
         radii += radius;
@@ -265,11 +269,11 @@ void cutTriangles(Cut* cut, global const float* points, global const uint* trian
         fetchBatch(&batch, points, triangles, list, first, end, voxelsPerUnit);
         const Exact3 base = {nearestLattice(batch.a.x), nearestLattice(batch.a.y), nearestLattice(batch.a.z)};
         const Exact3 ab = subExact(batch.b, batch.a), ac = subExact(batch.c, batch.a);
-        const uint shortOnes = onePartBits(0, &batch) & batch.real;
+        const uint shortOnes = shortBits(&batch);
         int bases[3][BATCH];
-        storeReal(toRealInt(base.x), bases[0]);
-        storeReal(toRealInt(base.y), bases[1]);
-        storeReal(toRealInt(base.z), bases[2]);
+        storeRealInt(toRealInt(base.x), bases[0]);
+        storeRealInt(toRealInt(base.y), bases[1]);
+        storeRealInt(toRealInt(base.z), bases[2]);
         if (shortOnes)
             makePieces(cut, shortOnes, toReal3(subExact(batch.a, base)), toReal3(ab), toReal3(ac), bases,
                        batch.triangle);

@@ -139,22 +139,24 @@ double3 normalOf(const Corners* t) {
     return cross(t->b - t->a, t->c - t->a);
 }
 
-// Bits of the triangles of a batch that get one sample each.
-uint singleBits(const Sampling* sampling, const Batch* batch, Exact size) {
-    const double epsilon = sampling->epsilon;
-    return bitsOfExact((0.5 * size <= epsilon) &
-                       (longestEdges2(batch) <= SLIVER_STEP * SLIVER_STEP * epsilon));
-}
-
 Exact3 normals(const Batch* batch) {
     return crossExact(subExact(batch->b, batch->a), subExact(batch->c, batch->a));
 }
 
-uint onePartBits(const Grid* grid, const Batch* batch) {
-    return singleBits(&grid->sampling, batch, sqrt(squareExact(normals(batch))));
+// Rows of Algorithm 1 for triangles of a batch that need no cut; 0 for the others.
+Exact rowsOfAny(const Sampling* sampling, const Batch* batch, Exact size) {
+    const double epsilon = sampling->epsilon, most = sampling->recursive ? 1 : sampling->maxSubdivision;
+    const Exact rows = max((Exact)(1.0), ceil(sqrt(0.5 * size / epsilon)));
+    const Exact sliver2 = rows * rows * (SLIVER_STEP * SLIVER_STEP * epsilon);
+    return ((longestEdges2(batch) <= sliver2) & (rows <= most)) ? rows : (Exact)(0.0);
 }
 
 // A part is a sample here.
+RealInt partsOfAny(const Grid* grid, const Batch* batch) {
+    const Exact rows = rowsOfAny(&grid->sampling, batch, sqrt(squareExact(normals(batch))));
+    return toRealInt(0.5 * rows * (rows + 1.0));
+}
+
 uint countParts(const Grid* grid, const Corners* t, const Limits* limits) {
     const Tile whole = wholeTile(t, normalOf(t));
     int rows = rowsOf(&grid->sampling, whole.area, whole.longest2);
@@ -207,9 +209,9 @@ void addSamples(Cut* cut, uint among, Real3 place, Real3 offset, RealInt owner) 
 #endif
     for (; among != 0; among &= among - 1, ++at) {
         const int lane = lowestBit(among);
-        global float* sample = cut->samples[at].place;
-        vstore4((float4)(numbers[0][lane], numbers[1][lane], numbers[2][lane], as_float(owners[lane])), 0, sample);
-        vstore4((float4)(numbers[3][lane], numbers[4][lane], numbers[5][lane], as_float(cells[lane])), 1, sample);
+        global float4* sample = (global float4*)(cut->samples + at);
+        sample[0] = (float4)(numbers[0][lane], numbers[1][lane], numbers[2][lane], as_float(owners[lane]));
+        sample[1] = (float4)(numbers[3][lane], numbers[4][lane], numbers[5][lane], as_float(cells[lane]));
         takeGlobal(cut->cursors + cells[lane] + 2, 1);
     }
 }
@@ -283,16 +285,11 @@ Exact3 addExact(Exact3 a, Exact3 b) {
 
 // Samples those triangles of a batch that have few rows. Returns bits of the others that have an area.
 uint cutFew(Cut* cut, const Grid* grid, const Batch* batch) {
-    const Sampling* sampling = &grid->sampling;
-    const double epsilon = sampling->epsilon, most = sampling->recursive ? 1 : min(FEW_ROWS, sampling->maxSubdivision);
     const Exact3 ab = subExact(batch->b, batch->a), ac = subExact(batch->c, batch->a),
-                 bc = subExact(batch->c, batch->b), normal = crossExact(ab, ac);
-    const Exact size = sqrt(squareExact(normal));
-    const Exact rows = max((Exact)(1.0), ceil(sqrt(0.5 * size / epsilon))), step = 1.0 / rows;
+                 bc = subExact(batch->c, batch->b), normal = normals(batch);
+    const Exact size = sqrt(squareExact(normal)), rows = rowsOfAny(&grid->sampling, batch, size), step = 1.0 / rows;
     const uint real = bitsOfExact(size > 0.0) & batch->real;
-    const uint few = bitsOfExact((longestEdges2(batch) <= rows * rows * (SLIVER_STEP * SLIVER_STEP * epsilon)) &
-                                 (rows <= most)) &
-                     real;
+    const uint few = bitsOfExact((rows > 0.0) & (rows <= (double)(FEW_ROWS))) & real;
     if (few != 0) {
         const Exact3 s1 = scaleExact(ab, step), start = scaleExact(addExact(s1, scaleExact(ac, step)), 1.0 / 3.0);
         const Spread spread = {toReal3(addExact(fromOrigin(batch->a, cut->origin), start)), toReal3(s1),

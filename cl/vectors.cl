@@ -15,7 +15,6 @@ typedef double Exact;
 #define toRealFromInt convert_float
 #define bitsOfReal(held) ((uint)((held) != 0))
 #define bitsOfExact(held) ((uint)((held) != 0))
-#define storeExact(v, p) (*(p) = (v))
 #define storeRealInt(v, p) (*(p) = (v))
 #define laneNumbers 0.0f
 #define lanesOfBits(bits) ((int)(bits))
@@ -25,7 +24,7 @@ typedef Lanes Real;
 typedef IntLanes RealInt;
 typedef double16 Exact;
 #define loadReal(p) vloadLanes(0, p)
-#define storeReal(v, p) vstoreLanes(v, 0, p)
+#define storeReal(v, p) storeLanes(v, 0, p)
 #define loadRealInt(p) vloadLanes(0, p)
 #define toExact convert_double16
 #define toReal convert_float16
@@ -33,8 +32,7 @@ typedef double16 Exact;
 #define toRealFromInt convert_float16
 #define bitsOfReal bitsOf
 #define bitsOfExact(held) bitsOf(convert_int16(held))
-#define storeExact(v, p) vstore16(v, 0, p)
-#define storeRealInt(v, p) vstoreLanes(v, 0, p)
+#define storeRealInt(v, p) (*(LooseIntLanes*)(p) = (v))
 #define laneNumbers ((Real)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15))
 #define lanesOfBits lanesOf
 #endif
@@ -123,10 +121,28 @@ Exact longestEdges2(const Batch* batch) {
                max(squareExact(subExact(batch->c, batch->b)), squareExact(subExact(batch->a, batch->c))));
 }
 
+#if ITEMS == 1 && defined(__clang__)
+
+#define fetchAhead(pointer) __builtin_prefetch((const void*)(size_t)(pointer))
+
+// Fetches what the next batches of a list will ask for: a processor's item waits for memory where a GPU's others run.
+void prefetchBatches(global const float* points, global const uint* triangles, global const uint* list, uint first,
+                     uint end) {
+    for (uint i = first + 2 * BATCH; i < min(first + 3 * BATCH, end); ++i)
+        fetchAhead(triangles + 3 * (size_t)(list ? list[i] : i));
+    for (uint i = first + BATCH; i < min(first + 2 * BATCH, end); ++i)
+        for (int k = 0; k < 3; ++k) fetchAhead(points + 3 * (size_t)(triangles[3 * (size_t)(list ? list[i] : i) + k]));
+}
+
+#else
+#define prefetchBatches(points, triangles, list, first, end)
+#endif
+
 // The batch that begins at `first` of a list of triangles, or of all of them if the list is null: all indices are fetched before all corners, so that the processor waits for memory
 // once and not for each triangle.
 void fetchBatch(Batch* batch, global const float* points, global const uint* triangles, global const uint* list,
                 uint first, uint end, double voxelsPerUnit) {
+    prefetchBatches(points, triangles, list, first, end);
     uint indices[3][BATCH];
     const uint count = min(end - first, (uint)(BATCH));
     for (uint i = 0; i < BATCH; ++i) {

@@ -14,7 +14,6 @@
 #include <optional>
 #include <span>
 
-#include "sdf/bricks.h"
 #include "sdf/cells.h"
 #include "sdf/progress.h"
 #include "sdf/topology.h"
@@ -25,6 +24,7 @@ namespace {
 using Symmetric2 = std::array<double, 6>;
 using Symmetric3 = std::array<double, 10>;
 
+constexpr int brickSide = 64;  // of what one task signs [voxels]
 constexpr std::size_t leafTriangles = 12;
 /// Ranges of triangles or edges below this are sorted out by one task.
 constexpr std::size_t taskItems = 4096;

@@ -19,7 +19,7 @@
 #include "demos/shared/shapes.h"
 #include "sdf/grids.h"
 #include "sdf/mesh_io.h"
-#include "sdf/tiles.h"
+#include "tests/support/tiles.h"
 #include "tests/support/support.h"
 
 using namespace bilayer;

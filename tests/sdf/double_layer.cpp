@@ -11,7 +11,7 @@
 #include "demos/shared/shapes.h"
 #include "sdf/grids.h"
 #include "sdf/layer_samples.h"
-#include "sdf/tiles.h"
+#include "tests/support/tiles.h"
 
 using namespace bilayer;
 

@@ -1,4 +1,4 @@
-#include "sdf/tiles.h"
+#include "tests/support/tiles.h"
 
 #include <catch2/catch.hpp>
 #include <cmath>

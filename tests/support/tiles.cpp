@@ -1,5 +1,5 @@
 // Triangles to tiles: section 3.2, Algorithm 1 and Fig. 2 of the paper.
-#include "sdf/tiles.h"
+#include "tests/support/tiles.h"
 
 #include <oneapi/tbb/parallel_for.h>
 
