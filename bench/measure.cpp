@@ -18,6 +18,7 @@ namespace bilayer::bench {
 namespace {
 
 constexpr double MiB = 1 << 20;
+constexpr float infinity = std::numeric_limits<float>::infinity();
 constexpr double none = std::numeric_limits<double>::quiet_NaN();
 // "VmHWM" of /proc/self/status is the peak since this was last written to /proc/self/clear_refs
 constexpr const char* resetPeak = "5";
@@ -132,8 +133,9 @@ Difference difference(const LevelSet& a, const LevelSet& b) {
         for (openvdb::Index i = 0; i < Leaf::SIZE; ++i) {
             const float x = leaf->getValue(i), y = match->getValue(i);
             result.signs += std::signbit(x) != std::signbit(y);
-            if (leaf->isValueOn(i) && match->isValueOn(i))
-                result.distance = std::max(result.distance, std::abs(x - y) / a.voxelSize());
+            if (!leaf->isValueOn(i) || !match->isValueOn(i)) continue;
+            const float apart = std::abs(x - y) / a.voxelSize();
+            result.distance = std::max(result.distance, std::isnan(apart) ? infinity : apart);
         }
     }
     for (auto leaf = other.cbeginLeaf(); leaf; ++leaf)

@@ -41,7 +41,7 @@ double logSlope(const std::vector<double>& x, const std::vector<double>& y);
 struct Difference {
     std::uint64_t voxels = 0;  ///< active in one of them only
     std::uint64_t signs = 0;   ///< of voxels in blocks that both have
-    float distance = 0;        ///< the largest, over voxels active in both [voxels]
+    float distance = 0;        ///< the largest, over voxels active in both; infinite for no number [voxels]
 };
 Difference difference(const LevelSet& a, const LevelSet& b);
 

@@ -213,12 +213,13 @@ bool printSummary(const std::vector<Row>& rows, const std::vector<Engine>& engin
                        worst->mesh, worst->voxels,
                        contest.same ? fmt::format(" (required {}: {})", required, verdict) : "");
         }
+    const auto held = std::count_if(rows.begin(), rows.end(), [](const Row&row) { return row.held(); }),
+               differing = std::count_if(rows.begin(), rows.end(), [](const Row&row) { return row.differs(); });
     float margin = 0;
     for (const Row& row : rows) margin = std::max(margin, row.difference.distance);
-    const auto differing = std::count_if(rows.begin(), rows.end(), [](const Row& row) { return row.differs(); });
     if (differing > 0)
-        fmt::print("Of the fields {} differ from tbb's by more than they may\n", differing);
-    else
+        fmt::print("{} of {} fields differ from tbb's by more than they may\n", differing, held);
+    else if (held > 0)
         fmt::print("Active voxels and signs are tbb's; distances differ by {:.1e} voxel at most (allowed {:.0e})\n",
                    margin, openclMargin);
     return differing == 0;

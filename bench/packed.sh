@@ -12,7 +12,7 @@ shift
 
 # Folders where drivers lie: those that this machine searches, then those that containers and distributions use.
 path=${LD_LIBRARY_PATH:-}
-known=$( (PATH=$PATH:/sbin:/usr/sbin ldconfig -p 2>/dev/null || true) | sed -n 's|.*=> \(.*\)/libnvidia-opencl\.so\.1$|\1|p')
+known=$( (PATH=$PATH:/sbin:/usr/sbin ldconfig -p 2>/dev/null || true) | sed -n 's|.*x86-64.*=> \(.*\)/libnvidia-opencl\.so\.1$|\1|p')
 if [ -z "${OCL_ICD_VENDORS:-}" ]; then
   for folder in $(echo "$path" | tr : ' ') $known /usr/local/nvidia/lib64 /usr/lib/x86_64-linux-gnu /usr/lib64 \
     /run/opengl-driver/lib; do
@@ -25,5 +25,7 @@ if [ -z "${OCL_ICD_VENDORS:-}" ]; then
 fi
 export OCL_ICD_VENDORS
 export BILAYER_MESHES="${BILAYER_MESHES:-$here/meshes}" BILAYER_SCRATCH="${BILAYER_SCRATCH:-$here/scratch}"
+# for a test that starts itself anew
+export BILAYER_SELF="'$here/run' $program"
 # by the loader's option and not by the environment: what a driver starts must keep its own libraries
 exec "$here/lib/ld-linux-x86-64.so.2" --library-path "$here/lib${path:+:$path}" "$here/bin/$program" "$@"
