@@ -56,9 +56,10 @@ struct Row {
     }
 };
 
-// Half width 3 for all; 2, which the double layer method was made for, for it and its reference.
+// Half width 3 for all that has it; 2, which the double layer method was made for, for it, its rival and its reference.
 std::vector<float> halfWidths(Builder builder) {
     if (builder == Builder::reference || builder == Builder::doubleLayer) return {3, 2};
+    if (builder == Builder::doubleLayerOpencl || builder == Builder::prism) return {2};
     return {3};
 }
 

@@ -6,6 +6,7 @@
 #include <openvdb/tools/MeshToVolume.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <filesystem>
 #include <stdexcept>
 
@@ -49,22 +50,33 @@ Outcome runOpenvdb(const Scene& scene, const Job& job) {
     });
 }
 
-const char* methodName(Method method) {
-    if (method == Method::exact) return "exact";
-    return method == Method::doubleLayer ? "double-layer" : "pseudonormal";
+Method methodOf(Builder builder) {
+    switch (builder) {
+        case Builder::reference:
+        case Builder::defaults:
+            break;
+        case Builder::pseudonormal:
+            return Method::pseudonormal;
+        case Builder::exact:
+        case Builder::exactOpencl:
+            return Method::exact;
+        case Builder::doubleLayer:
+        case Builder::doubleLayerOpencl:
+            return Method::doubleLayer;
+        case Builder::prism:
+            return Method::prism;
+    }
+    throw std::invalid_argument("not a builder of ours");
 }
 
-Outcome runOurs(const Scene& scene, const Job& job, Method method, const BlockFiller* filler = nullptr) {
-    BuildOptions options;
-    options.voxelSize = scene.voxelSize;
-    options.exteriorWidth = options.interiorWidth = job.halfWidth;
-    options.method = method;
-    options.threads = job.threads;
-    const Stopwatch watch;
-    const LevelSet field = build(scene.mesh, options, filler);
-    const double seconds = watch.seconds();
-    if (field.method() != methodName(method)) throw std::logic_error("the field came from method " + field.method());
-    return {seconds, field.activeVoxels(), field.memoryBytes()};
+bool isOpencl(Builder builder) {
+    return builder == Builder::exactOpencl || builder == Builder::doubleLayerOpencl || builder == Builder::prism;
+}
+
+const char* methodName(Method method) {
+    if (method == Method::exact) return "exact";
+    if (method == Method::prism) return "prism";
+    return method == Method::doubleLayer ? "double-layer" : "pseudonormal";
 }
 
 const BlockFiller& openclOnce() {
@@ -72,10 +84,20 @@ const BlockFiller& openclOnce() {
     return filler;
 }
 
+Outcome runOurs(const Scene& scene, const Job& job) {
+    const Stopwatch watch;
+    const LevelSet field = fieldOf(scene, job);
+    const double seconds = watch.seconds();
+    if (field.method() != methodName(methodOf(job.builder)))
+        throw std::logic_error("the field came from method " + field.method());
+    return {seconds, field.activeVoxels(), field.memoryBytes()};
+}
+
 }  // namespace
 
 std::vector<Source> sources() {
-    const std::filesystem::path corpus = BILAYER_MESHES;
+    const char* const elsewhere = std::getenv("BILAYER_MESHES");
+    const std::filesystem::path corpus = elsewhere ? elsewhere : BILAYER_MESHES;
     std::vector<Source> found;
     for (const auto& [name, file] : {std::pair{"bunny", "bunny_watertight.obj"},
                                      {"dragon", "dragon_vrip_871k.ply"},
@@ -106,8 +128,9 @@ Scene scene(const Source& source, float resolution) {
 }
 
 const std::vector<Builder>& builders() {
-    static const std::vector<Builder> all{Builder::reference, Builder::defaults,    Builder::pseudonormal,
-                                          Builder::exact,     Builder::doubleLayer, Builder::doubleLayerOpencl};
+    static const std::vector<Builder> all{
+        Builder::reference,   Builder::defaults,    Builder::pseudonormal,      Builder::exact,
+        Builder::doubleLayer, Builder::exactOpencl, Builder::doubleLayerOpencl, Builder::prism};
     return all;
 }
 
@@ -123,8 +146,12 @@ const char* nameOf(Builder builder) {
             return "exact";
         case Builder::doubleLayer:
             return "double-layer";
+        case Builder::exactOpencl:
+            return "exact-opencl";
         case Builder::doubleLayerOpencl:
             return "double-layer-opencl";
+        case Builder::prism:
+            return "prism";
     }
     throw std::invalid_argument("no such builder");
 }
@@ -136,20 +163,18 @@ Builder builderNamed(const std::string& name) {
 }
 
 Outcome run(const Scene& scene, const Job& job) {
-    switch (job.builder) {
-        case Builder::reference:
-        case Builder::defaults:
-            return runOpenvdb(scene, job);
-        case Builder::pseudonormal:
-            return runOurs(scene, job, Method::pseudonormal);
-        case Builder::exact:
-            return runOurs(scene, job, Method::exact);
-        case Builder::doubleLayer:
-            return runOurs(scene, job, Method::doubleLayer);
-        case Builder::doubleLayerOpencl:
-            return runOurs(scene, job, Method::doubleLayer, &openclOnce());
-    }
-    throw std::invalid_argument("no such builder");
+    const bool openvdb = job.builder == Builder::reference || job.builder == Builder::defaults;
+    return openvdb ? runOpenvdb(scene, job) : runOurs(scene, job);
+}
+
+LevelSet fieldOf(const Scene& scene, const Job& job) {
+    BuildOptions options;
+    options.voxelSize = scene.voxelSize;
+    options.exteriorWidth = options.interiorWidth = job.halfWidth;
+    options.method = methodOf(job.builder);
+    options.threads = job.threads;
+    if (!isOpencl(job.builder)) return build(scene.mesh, options);
+    return build(scene.mesh, options, job.filler ? *job.filler : openclOnce());
 }
 
 }  // namespace bilayer::bench

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "sdf/mesh.h"
+#include "sdf/build.h"
 
 namespace bilayer::bench {
 
@@ -16,7 +16,8 @@ struct Source {
     std::string name, file;
 };
 
-/// The meshes of the comparison that are here: of the corpus those present, and the carved box.
+/// The meshes of the comparison that are here: of the corpus those present, and the carved box. The environment
+/// variable BILAYER_MESHES names the corpus' folder where it is not where it was at compile time.
 std::vector<Source> sources();
 
 /// A source by its name above, or a mesh file. Throws std::invalid_argument for neither.
@@ -40,13 +41,16 @@ enum class Builder {
     pseudonormal,
     exact,
     doubleLayer,
-    doubleLayerOpencl,  ///< on the first OpenCL device
+    exactOpencl,
+    doubleLayerOpencl,
+    prism,  ///< on OpenCL only
 };
 
 /// Every builder, in the order of the tables.
 const std::vector<Builder>& builders();
 
-/// "meshToVolume-0x4", "meshToVolume", "pseudonormal", "exact", "double-layer", "double-layer-opencl".
+/// "meshToVolume-0x4", "meshToVolume", "pseudonormal", "exact", "double-layer", "exact-opencl", "double-layer-opencl",
+/// "prism".
 const char* nameOf(Builder builder);
 /// Throws std::invalid_argument for an unknown name.
 Builder builderNamed(const std::string& name);
@@ -56,6 +60,7 @@ struct Job {
     Builder builder = Builder::exact;
     float halfWidth = 3;  ///< on both sides [voxels]
     int threads = 2;
+    const BlockFiller* filler = nullptr;  ///< of the builders on OpenCL; null: the first device
 };
 
 /// What a build took and gave.
@@ -67,5 +72,8 @@ struct Outcome {
 
 /// Builds once. Throws what the builder throws.
 Outcome run(const Scene& scene, const Job& job);
+
+/// Builds once and gives the field. Throws what the builder throws, and std::invalid_argument for OpenVDB's builders.
+LevelSet fieldOf(const Scene& scene, const Job& job);
 
 }  // namespace bilayer::bench

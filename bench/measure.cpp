@@ -12,10 +12,13 @@
 #include <limits>
 #include <stdexcept>
 
+#include "sdf/grids.h"
+
 namespace bilayer::bench {
 namespace {
 
 constexpr double MiB = 1 << 20;
+constexpr float infinity = std::numeric_limits<float>::infinity();
 constexpr double none = std::numeric_limits<double>::quiet_NaN();
 // "VmHWM" of /proc/self/status is the peak since this was last written to /proc/self/clear_refs
 constexpr const char* resetPeak = "5";
@@ -114,6 +117,30 @@ double logSlope(const std::vector<double>& x, const std::vector<double>& y) {
         xy += (std::log(x[i]) - mx) * (std::log(y[i]) - my);
     }
     return xy / xx;
+}
+
+Difference difference(const LevelSet& a, const LevelSet& b) {
+    using Leaf = openvdb::FloatTree::LeafNodeType;
+    const openvdb::FloatTree &one = a.grids().distance->tree(), &other = b.grids().distance->tree();
+    Difference result;
+    for (auto leaf = one.cbeginLeaf(); leaf; ++leaf) {
+        const Leaf* const match = other.probeConstLeaf(leaf->origin());
+        if (!match) {
+            result.voxels += leaf->onVoxelCount();
+            continue;
+        }
+        result.voxels += (leaf->getValueMask() ^ match->getValueMask()).countOn();
+        for (openvdb::Index i = 0; i < Leaf::SIZE; ++i) {
+            const float x = leaf->getValue(i), y = match->getValue(i);
+            result.signs += std::signbit(x) != std::signbit(y);
+            if (!leaf->isValueOn(i) || !match->isValueOn(i)) continue;
+            const float apart = std::abs(x - y) / a.voxelSize();
+            result.distance = std::max(result.distance, std::isnan(apart) ? infinity : apart);
+        }
+    }
+    for (auto leaf = other.cbeginLeaf(); leaf; ++leaf)
+        if (!one.probeConstLeaf(leaf->origin())) result.voxels += leaf->onVoxelCount();
+    return result;
 }
 
 Footprint inChild(const std::function<Scene()>& make, const Job& job, int repetitions, double seconds) {

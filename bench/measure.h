@@ -37,6 +37,14 @@ double geometricMean(const std::vector<double>& values);
 /// The slope of the line through (log x, log y) that fits best: y grows with x to this power. NaN below two points.
 double logSlope(const std::vector<double>& x, const std::vector<double>& y);
 
+/// How two fields of the same mesh differ.
+struct Difference {
+    std::uint64_t voxels = 0;  ///< active in one of them only
+    std::uint64_t signs = 0;   ///< of voxels in blocks that both have
+    float distance = 0;        ///< the largest, over voxels active in both; infinite for no number [voxels]
+};
+Difference difference(const LevelSet& a, const LevelSet& b);
+
 /// What a build takes in a process of its own.
 struct Footprint {
     Outcome outcome;               ///< `seconds` is the median of all repetitions

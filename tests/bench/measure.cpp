@@ -53,3 +53,21 @@ TEST_CASE("builders and meshes are found by name") {
     CHECK(findSource("carved box").file.empty());
     CHECK_THROWS_AS(findSource("no such mesh"), std::invalid_argument);
 }
+
+TEST_CASE("fields differ where their meshes do") {
+    const Scene ball = scene("ball", shapes::sphere(1, 3), 32);
+    const LevelSet one = fieldOf(ball, {}), narrow = fieldOf(ball, {.halfWidth = 2});
+    const Difference none = difference(one, one), width = difference(one, narrow);
+    CHECK((none.voxels == 0 && none.signs == 0 && none.distance == 0));
+    CHECK(width.voxels == one.activeVoxels() - narrow.activeVoxels());
+    CHECK(difference(narrow, one).voxels == width.voxels);
+    CHECK(width.signs == 0);
+
+    // half a voxel to the side: distances on the axis differ by as much, voxels around the equator change sign
+    Scene moved = ball;
+    for (glm::vec3& point : moved.mesh.points) point.x += moved.voxelSize / 2;
+    const Difference shifted = difference(one, fieldOf(moved, {}));
+    CHECK(shifted.distance == Approx(0.5f).margin(0.02));
+    CHECK(shifted.signs > 100);
+    CHECK(shifted.voxels > 100);
+}

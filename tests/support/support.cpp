@@ -13,8 +13,14 @@
 namespace bilayer::test {
 namespace {
 
+// A folder known at compile time, or where an environment variable says that it is: tests may run on another machine.
+std::filesystem::path folderOf(const char* variable, const char* atCompileTime) {
+    const char* const elsewhere = std::getenv(variable);
+    return elsewhere ? elsewhere : atCompileTime;
+}
+
 struct Scratch {
-    std::filesystem::path folder = std::filesystem::path(BILAYER_SCRATCH) / std::to_string(::getpid());
+    std::filesystem::path folder = folderOf("BILAYER_SCRATCH", BILAYER_SCRATCH) / std::to_string(::getpid());
     Scratch() { std::filesystem::create_directories(folder); }
     ~Scratch() {
         std::error_code ignored;
@@ -33,7 +39,7 @@ double squaredDistanceToSegment(const glm::dvec3& point, const glm::dvec3& a, co
 }  // namespace
 
 std::optional<std::filesystem::path> corpusMesh(const std::string& name) {
-    const std::filesystem::path path = std::filesystem::path(BILAYER_MESHES) / name;
+    const std::filesystem::path path = folderOf("BILAYER_MESHES", BILAYER_MESHES) / name;
     if (std::filesystem::exists(path)) return path;
     std::cerr << "skipped: the corpus mesh " << name << " is not here\n";
     return std::nullopt;

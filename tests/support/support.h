@@ -11,9 +11,10 @@
 namespace bilayer::test {
 
 /// A mesh of the public corpus, or nothing where the corpus is absent; then a message says that the test is skipped.
+/// The environment variable BILAYER_MESHES names the corpus' folder where it is not where it was at compile time.
 std::optional<std::filesystem::path> corpusMesh(const std::string& name);
 
-/// A path in an empty folder of this process's own, removed at exit.
+/// A path in an empty folder of this process's own, removed at exit; within BILAYER_SCRATCH, likewise.
 std::filesystem::path scratch(const std::string& name);
 
 /// A random seed: from the environment variable BILAYER_SEED, else from the clock. Printed with every failure by
