@@ -68,8 +68,8 @@ struct FillJob {
     FillParameters layers;  ///< of the double layer method
 };
 
-/// Fills all blocks of a job on some device, by the method that its options name. Throws what the device's trouble calls
-/// for; the build then ends with it.
+/// Fills all blocks of a job on some device, by the method that its options name. Throws what the device's trouble
+/// calls for; the build then ends with it.
 struct BlockFiller {
     std::string backend;  ///< "opencl"
     std::string device;   ///< the device's name

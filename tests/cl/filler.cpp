@@ -19,8 +19,8 @@
 #include "demos/shared/shapes.h"
 #include "sdf/grids.h"
 #include "sdf/mesh_io.h"
-#include "tests/support/tiles.h"
 #include "tests/support/support.h"
+#include "tests/support/tiles.h"
 
 using namespace bilayer;
 using Catch::Matchers::Contains;
