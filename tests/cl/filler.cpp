@@ -309,7 +309,7 @@ TEST_CASE("too little device memory is an error that says how much is needed") {
                           Contains("MiB") && Contains(device.info().name));
     }
     SECTION("for a brick") {
-        const Mesh mesh = shapes::sphere(1.f, 3);
+        const Mesh mesh = shapes::sphere(1.f, 5);
         BuildOptions options = optionsFor(mesh, 100);
         options.triangles = true;
         options.exteriorWidth = options.interiorWidth = 6;
