@@ -97,7 +97,7 @@ class Mapped {
 
 class BrickFill {
   public:
-    BrickFill(Device::Impl& device, const OpenclOptions& options, const FillJob& job);
+    BrickFill(Device::Impl& device, const OpenclOptions& options, const FillJob& job, const DeviceSink& keep);
     ~BrickFill();
     void run();
 
@@ -112,6 +112,7 @@ class BrickFill {
     void reserve(Batch& batch, const Load& load);
     void start(Batch& batch, std::size_t first, std::size_t last);
     void finish(Batch& batch);
+    void handOver(Batch& batch, std::size_t blocks);
     void fillOpen();
 
     template <class... Arguments>
@@ -126,6 +127,7 @@ class BrickFill {
 
     Device::Impl& device_;
     const FillJob& job_;
+    const DeviceSink& keep_;
     const bool gpuMapping_;
     OpenclTimes* times_;
     Timing timing_;
@@ -167,9 +169,10 @@ std::string buildOptions(const Device::Impl& device, bool gpuMapping, bool trian
     return options;
 }
 
-BrickFill::BrickFill(Device::Impl& device, const OpenclOptions& options, const FillJob& job)
+BrickFill::BrickFill(Device::Impl& device, const OpenclOptions& options, const FillJob& job, const DeviceSink& keep)
     : device_(device),
       job_(job),
+      keep_(keep),
       gpuMapping_(wantsGroups(device, options.mapping)),
       times_(options.times),
       timing_(options.times),
@@ -297,19 +300,33 @@ void BrickFill::start(Batch& batch, std::size_t first, std::size_t last) {
     device_.queue.flush();
 }
 
-// Waits for a batch, if it is under way, and hands its blocks on.
+// Waits for a batch, if it is under way, and hands its blocks on, on the device or to the host.
 void BrickFill::finish(Batch& batch) {
     if (batch.load.bricks == 0) return;
     batch.counted.wait();
     const std::size_t blocks = batch.found[filledBlocks], open = batch.found[openBlocks];
     if (job_.mesh.conflicts) *job_.mesh.conflicts += batch.found[conflicts];
-    const Mapped<glm::ivec3> openOrigins(transfers_, batch.open, open, timing_);
+    if (open > 0) {
+        const Mapped<glm::ivec3> openOrigins(transfers_, batch.open, open, timing_);
+        transfers_.finish();
+        open_.insert(open_.end(), openOrigins.data(), openOrigins.data() + open);
+    }
+    job_.mesh.progress.poll();
+    if (keep_)
+        keep_(batch.origins, batch.distances, blocks);
+    else
+        handOver(batch, blocks);
+    for (std::size_t brick = 0; brick < batch.load.bricks; ++brick) job_.mesh.progress.advance();
+    batch.load = {};
+}
+
+// Hands blocks to the host.
+void BrickFill::handOver(Batch& batch, std::size_t blocks) {
     const Mapped<glm::ivec3> origins(transfers_, batch.origins, blocks, timing_);
     const Mapped<float> distances(transfers_, batch.distances, blocks * blockVoxels, timing_);
     const Mapped<std::int32_t> triangles(transfers_, batch.triangles, job_.mesh.triangles ? blocks * blockVoxels : 0,
                                          timing_);
     transfers_.finish();
-    open_.insert(open_.end(), openOrigins.data(), openOrigins.data() + open);
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, blocks, blocksPerTask), [&](const auto& range) {
         job_.mesh.progress.poll();
         const auto part = [&](const auto* all, std::size_t each) {
@@ -318,8 +335,6 @@ void BrickFill::finish(Batch& batch) {
         job_.mesh.sink({part(origins.data(), 1), part(distances.data(), blockVoxels),
                         job_.mesh.triangles ? part(triangles.data(), blockVoxels) : std::span<const std::int32_t>()});
     });
-    for (std::size_t brick = 0; brick < batch.load.bricks; ++brick) job_.mesh.progress.advance();
-    batch.load = {};
 }
 
 void BrickFill::run() {
@@ -357,8 +372,8 @@ void BrickFill::fillOpen() {
 
 }  // namespace
 
-void fillByBricks(Device::Impl& device, const OpenclOptions& options, const FillJob& job) {
-    BrickFill(device, options, job).run();
+void fillByBricks(Device::Impl& device, const OpenclOptions& options, const FillJob& job, const DeviceSink& keep) {
+    BrickFill(device, options, job, keep).run();
 }
 
 }  // namespace bilayer

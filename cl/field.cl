@@ -1,30 +1,9 @@
 // Samples of a field that is laid out as in sdf/field_layout.h: what Field::sample() does in collider/field.cpp,
 // operation by operation.
-#pragma OPENCL FP_CONTRACT OFF
-#pragma OPENCL EXTENSION cl_khr_fp64 : enable
+#include "layout.cl"
 
-#define BLOCK_SIDE 8
-// A block with the apron that completes its last cells.
-#define STRIDE 9
-#define BLOCK_FLOATS 729
-// An entry of the directory; all other entries below 0 are outside.
-#define EMPTY_INSIDE -2
-// Of clearances [voxels].
-#define PART_SIDE 4
 // [voxels]
 #define CELL_DIAGONAL 1.7320508f
-
-// FieldFrame of sdf/field_layout.h; metres and voxels as there.
-typedef struct {
-    double origin[3], perMetre;
-    int blocks[3];
-    float voxelSize, exteriorWidth, interiorWidth;
-} Frame;
-
-// Clearance::Part of sdf/clearance.h.
-typedef struct {
-    float centre, least;
-} Part;
 
 // Sample of sdf/sample.h.
 typedef struct {
@@ -47,10 +26,6 @@ typedef struct {
 
 int3 blocksOf(const Field* field) {
     return vload3(0, field->frame.blocks);
-}
-
-size_t indexOf(int3 at, int3 size) {
-    return ((size_t)(at.x) * size.y + at.y) * size.z + at.z;
 }
 
 // mix() may round otherwise.
@@ -112,8 +87,7 @@ float boundInEmptyBlock(const Field* field, bool inside, double3 place, int3 blo
 }
 
 Cell cellAt(const Field* field, int entry, int3 inBlock, float3 fraction) {
-    global const float* v =
-        field->values + (size_t)(entry) * BLOCK_FLOATS + (inBlock.x * STRIDE + inBlock.y) * STRIDE + inBlock.z;
+    global const float* v = field->values + voxelOf(entry, inBlock);
     const int x = STRIDE * STRIDE, y = STRIDE;
     const Cell cell = {{v[0], v[1], v[y], v[y + 1], v[x], v[x + 1], v[x + y], v[x + y + 1]}, fraction};
     return cell;

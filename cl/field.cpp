@@ -11,6 +11,7 @@
 
 #include "cl/memory.h"
 #include "cl/program.h"
+#include "cl/resident.h"
 #include "cl/setup.h"
 #include "cl/timing.h"
 #include "sdf/field_layout.h"
@@ -26,21 +27,6 @@ constexpr std::size_t batchesInFlight = 2;
 constexpr std::size_t batchPoints = 1 << 17;
 /// Work-items of a group on a GPU, and points that an item samples on a processor.
 constexpr std::size_t groupItems = 64, pointsPerProcessorItem = 1024;
-
-// `Frame` of field.cl.
-struct KernelFrame {
-    cl_double origin[3], perMetre;
-    cl_int blocks[3];
-    cl_float voxelSize, exteriorWidth, interiorWidth;
-
-    explicit KernelFrame(const FieldFrame& f)
-        : origin{f.origin.x, f.origin.y, f.origin.z},
-          perMetre(f.perMetre),
-          blocks{f.blocks.x, f.blocks.y, f.blocks.z},
-          voxelSize(f.voxelSize),
-          exteriorWidth(f.exteriorWidth),
-          interiorWidth(f.interiorWidth) {}
-};
 
 // The kernel reads points and writes samples as they lie in the host's memory.
 static_assert(sizeof(glm::vec3) == 3 * sizeof(cl_float));
@@ -70,51 +56,47 @@ class Ended {
 struct DeviceField::Data {
     Device device;
     const bool gpuMapping;
-    FieldFrame frame;
-    std::optional<FieldLayout> shared;  // what the buffers lie in where host and device share memory
-    cl::Buffer directory, parts, values;
-    std::array<Batch, batchesInFlight> batches;
+    DeviceMemory memory;
     cl::Program program;
-    std::uint64_t bytes = 0;
+    DeviceLayout layout;
+    std::optional<FieldLayout> shared;  // what the layout's buffers lie in where host and device share memory
+    std::array<Batch, batchesInFlight> batches;
     std::mutex mutex;  // guards `batches`
 
-    Data(const Device& device, const LevelSet& levelSet, const OpenclOptions& options);
+    Data(const Device& device, const OpenclOptions& options, std::uint64_t budget);
 
-    void upload(FieldLayout layout, DeviceMemory& memory, OpenclTimes* times);
+    void upload(FieldLayout from, OpenclTimes* times);
     void start(Batch& batch, std::span<const glm::vec3> points, std::span<Sample> samples, Timing& timing);
     void sample(std::span<const glm::vec3> points, std::span<Sample> samples, Timing& timing);
 };
 
-DeviceField::Data::Data(const Device& device, const LevelSet& levelSet, const OpenclOptions& options)
+DeviceField::Data::Data(const Device& device, const OpenclOptions& options, std::uint64_t budget)
     : device(device),
       gpuMapping(wantsGroups(device.impl(), options.mapping)),
+      memory(device.impl(), budget),
       program(buildProgram(device.impl(), field_cl, commonBuildOptions(device.impl()))) {
     const Device::Impl& impl = device.impl();
-    DeviceMemory memory(device.impl(), memoryBudget(impl, options.memoryMiB));
     for (Batch& batch : batches) {
         batch.queue = cl::CommandQueue(impl.context, impl.device, CL_QUEUE_PROFILING_ENABLE);
         if (impl.info.unifiedMemory) continue;
         batch.points = memory.allocate(batchPoints * sizeof(glm::vec3), "a batch of points");
         batch.samples = memory.allocate(batchPoints * sizeof(Sample), "a batch of points");
     }
-    upload(FieldLayout(levelSet), memory, options.times);
-    bytes = memory.peak();
-    if (options.times) options.times->peakBytes = std::max(options.times->peakBytes, bytes);
 }
 
-void DeviceField::Data::upload(FieldLayout layout, DeviceMemory& memory, OpenclTimes* times) {
+void DeviceField::Data::upload(FieldLayout from, OpenclTimes* times) {
     Timing timing(times);
     const Ended ended(device.impl().queue);
     const auto uploaded = [&](const auto* data, std::size_t count) {
         return memory.upload(data, count * sizeof *data, "the field", timing.event(Timing::Of::upload));
     };
-    frame = layout;
-    directory = uploaded(layout.directory.data(), layout.directory.size());
-    parts = uploaded(layout.clearances.data(), layout.clearances.size());
-    values = uploaded(layout.values.get(), layout.stored * FieldLayout::blockFloats);
+    layout = {from, uploaded(from.directory.data(), from.directory.size()),
+              uploaded(from.clearances.data(), from.clearances.size()),
+              uploaded(from.values.get(), from.stored * FieldLayout::blockFloats)};
     device.impl().queue.finish();
     timing.sumUp();
-    if (device.info().unifiedMemory) shared = std::move(layout);
+    if (times) times->peakBytes = std::max(times->peakBytes, memory.peak());
+    if (device.info().unifiedMemory) shared = std::move(from);
 }
 
 // Sends a batch on its way; in place where host and device share memory.
@@ -137,8 +119,8 @@ void DeviceField::Data::start(Batch& batch, std::span<const glm::vec3> points, s
     cl::Kernel kernel(program, "sampleField");
     cl_uint index = 0;
     const auto set = [&](const auto&... arguments) { (kernel.setArg(index++, arguments), ...); };
-    set(KernelFrame(frame), directory, parts, values, batch.points, cl_uint(points.size()), cl_uint(each),
-        batch.samples);
+    set(KernelFrame(layout.frame), layout.directory, layout.parts, layout.values, batch.points, cl_uint(points.size()),
+        cl_uint(each), batch.samples);
     queue.enqueueNDRangeKernel(kernel, cl::NullRange, cl::NDRange(global), cl::NDRange(local), nullptr,
                                timing.event(Timing::Of::kernel));
     cl::Event* const download = timing.event(Timing::Of::download);
@@ -164,8 +146,18 @@ void DeviceField::Data::sample(std::span<const glm::vec3> points, std::span<Samp
     for (Batch& batch : batches) batch.queue.finish();
 }
 
-DeviceField::DeviceField(const Device& device, const LevelSet& levelSet, const OpenclOptions& options) try
-    : data_(std::make_shared<Data>(device, levelSet, options)) {
+DeviceField::DeviceField(const Device& device, const LevelSet& levelSet, const OpenclOptions& options) try {
+    data_ = std::make_shared<Data>(device, options, memoryBudget(device.impl(), options.memoryMiB));
+    data_->upload(FieldLayout(levelSet), options.times);
+} catch (const cl::Error& error) {
+    throw deviceError(error, device.info().name);
+}
+
+DeviceField::DeviceField(const Device& device, const Mesh& mesh, const BuildOptions& build,
+                         const OpenclOptions& options) try {
+    const std::uint64_t budget = memoryBudget(device.impl(), options.memoryMiB);
+    data_ = std::make_shared<Data>(device, options, budget - budget / fillPart);
+    data_->layout = buildResident(device, mesh, build, options, data_->memory);
 } catch (const cl::Error& error) {
     throw deviceError(error, device.info().name);
 }
@@ -182,15 +174,15 @@ void DeviceField::sample(std::span<const glm::vec3> points, std::span<Sample> sa
         throw deviceError(error, data_->device.info().name);
     }
     timing.sumUp();
-    if (times) times->peakBytes = std::max(times->peakBytes, data_->bytes);
+    if (times) times->peakBytes = std::max(times->peakBytes, data_->memory.used());
 }
 
 const Bounds& DeviceField::bounds() const {
-    return data_->frame.bounds;
+    return data_->layout.frame.bounds;
 }
 
 std::size_t DeviceField::memoryBytes() const {
-    return data_->bytes;
+    return data_->memory.used();
 }
 
 }  // namespace bilayer

@@ -8,7 +8,7 @@
 
 #include "cl/device.h"
 #include "cl/filler.h"
-#include "sdf/level_set.h"
+#include "sdf/build.h"
 #include "sdf/sample.h"
 
 namespace bilayer {
@@ -22,6 +22,15 @@ class DeviceField {
     /// Throws what Field's constructor throws, and DeviceError, which says how many MiB are needed where the memory is
     /// too small.
     DeviceField(const Device& device, const LevelSet& levelSet, const OpenclOptions& options = {});
+
+    /// Builds the field of a mesh on the device, where it stays: only the mesh goes up, and only counts come down. It
+    /// answers as that of build(mesh, build, openclFiller(device, options)). At its peak that takes about 2.4 times the
+    /// memory of the field. The nearest triangles are not kept.
+    /// @param options  `times` receives what the build took
+    /// Throws what build() throws, and std::invalid_argument for what needs the processor: a method other than
+    /// Method::exact and Method::doubleLayer, and signs other than from normals, also where those contradict each
+    /// other.
+    DeviceField(const Device& device, const Mesh& mesh, const BuildOptions& build, const OpenclOptions& options = {});
 
     /// Samples all points, as Field::sample() does one: the same values but for the device's rounding of square roots,
     /// which matters out of the band only. Points stream through the device: there is no limit to their number. Any

@@ -68,12 +68,16 @@ struct FillJob {
     FillParameters layers;  ///< of the double layer method
 };
 
-/// Fills all blocks of a job on some device, by the method that its options name. Throws what the device's trouble calls
-/// for; the build then ends with it.
+/// Fills all blocks of a job on some device, by the method that its options name. Throws what the device's trouble
+/// calls for; the build then ends with it.
 struct BlockFiller {
     std::string backend;  ///< "opencl"
     std::string device;   ///< the device's name
     std::function<void(const FillJob&)> fill;
 };
+
+/// Has a filler fill the blocks of a mesh's field as build() has, but makes no level set of them: the filler keeps what
+/// it fills. It is called again, for another way to signs, where it counts conflicts. Throws as build() does.
+void fillOnly(const Mesh& mesh, const BuildOptions& options, const BlockFiller& filler);
 
 }  // namespace bilayer

@@ -129,9 +129,7 @@ void layOut(FieldLayout& field, const FloatTree& tree, const std::vector<Coord>&
 }
 
 void measureClearances(FieldLayout& field) {
-    // a narrower band does not tell where the surface is
-    const bool known = std::min(field.exteriorWidth, field.interiorWidth) >= nearSurface * field.voxelSize;
-    const float far = known ? float(mostParts * mostParts) : 0.f;
+    const float far = field.farthestClearance();
     const glm::ivec3 size = field.parts();
     field.clearances.resize(std::size_t(size.x) * size.y * size.z);
     const auto partsOf = [&](const glm::ivec3& block, auto&& measure) {
@@ -159,6 +157,17 @@ void measureClearances(FieldLayout& field) {
 
 }  // namespace
 
+void FieldFrame::requireSize() const {
+    if (double(blocks.x) * blocks.y * blocks.z > double(mostBlocks))
+        throw std::invalid_argument("field: the bounds hold more than 2^26 blocks of 8^3 voxels: take larger voxels");
+}
+
+float FieldFrame::farthestClearance() const {
+    // a narrower band does not tell where the surface is
+    const bool known = std::min(exteriorWidth, interiorWidth) >= nearSurface * voxelSize;
+    return known ? float(mostParts * mostParts) : 0.f;
+}
+
 FieldLayout::FieldLayout(const LevelSet& levelSet)
     : FieldFrame{.voxel = levelSet.grids().distance->voxelSize()[0],
                  .voxelSize = levelSet.voxelSize(),
@@ -178,8 +187,7 @@ FieldLayout::FieldLayout(const LevelSet& levelSet)
 
     const Coord first = box.min();
     blocks = glm::ivec3((box.max() - first).x(), (box.max() - first).y(), (box.max() - first).z()) / side + 1;
-    if (double(blocks.x) * blocks.y * blocks.z > double(mostBlocks))
-        throw std::invalid_argument("field: the bounds hold more than 2^26 blocks of 8^3 voxels: take larger voxels");
+    requireSize();
     layOut(*this, grid.tree(), origins, first);
     measureClearances(*this);
 

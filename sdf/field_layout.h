@@ -33,6 +33,12 @@ struct FieldFrame {
     std::size_t entryOf(const glm::ivec3& block) const {
         return (std::size_t(block.x) * blocks.y + block.y) * blocks.z + block.z;
     }
+    /// Throws std::invalid_argument if the directory has more than 2^26 entries.
+    void requireSize() const;
+
+    /// What a clearance starts from where the surface does not pass: its squared way at most [parts^2].
+    float farthestClearance() const;
+
     glm::ivec3 parts() const { return side / Clearance::partSide * blocks; }
 };
 
@@ -44,7 +50,7 @@ struct FieldLayout : FieldFrame {
     std::size_t stored = 0;                   ///< blocks in `values`
 
     /// Throws std::invalid_argument if no voxel is in the band, or if the box is so large for its voxels that it holds
-    /// more than 2^26 blocks.
+    /// more than 2^26 blocks of 8^3 voxels.
     explicit FieldLayout(const LevelSet& levelSet);
 };
 

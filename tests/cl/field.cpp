@@ -87,6 +87,27 @@ void checkSameSamples(const LevelSet& levelSet, const OpenclOptions& options, st
     checkSameSamples(field, points, samplesOf(deviceField, points));
 }
 
+BuildOptions optionsFor(const Mesh& mesh, float resolution, Method method) {
+    BuildOptions options;
+    options.method = method;
+    options.voxelSize = voxelSizeFor(mesh, resolution);
+    return options;
+}
+
+// What is built to stay on the device answers as what is built there and comes down.
+void checkResident(const Mesh& mesh, const BuildOptions& build, const OpenclOptions& options = {}) {
+    const Device device = openDevice();
+    const Field field(bilayer::build(mesh, build, openclFiller(device, options)));
+    const DeviceField resident(device, mesh, build, options);
+    CHECK(resident.bounds().lower == field.bounds().lower);
+    CHECK(resident.bounds().upper == field.bounds().upper);
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    Random random(seed);
+    const std::vector<glm::vec3> points = allKindsOfPoints(random, field.bounds(), 100000);
+    checkSameSamples(field, points, samplesOf(resident, points));
+}
+
 }  // namespace
 
 TEST_CASE("device samples in the band are OpenVDB's trilinear interpolation") {
@@ -185,4 +206,60 @@ TEST_CASE("several threads sample one field at once") {
         threads.emplace_back([&, i] { samples[i] = samplesOf(field, points[i]); });
     for (std::thread& thread : threads) thread.join();
     for (std::size_t i = 0; i < points.size(); ++i) checkSameSamples(Field(levelSet), points[i], samples[i]);
+}
+
+TEST_CASE("a field built to stay on the device answers as the same field from there") {
+    const Method method = GENERATE(Method::exact, Method::doubleLayer);
+    const bool forGpu = GENERATE(false, true);
+    const OpenclOptions options{.mapping = forGpu ? KernelMapping::groupPerBlock : KernelMapping::blockPerItem};
+    for (const Mesh& mesh : {shapes::sphere(1.f, 4), shapes::torus(1.f, 0.4f), shapes::box({1.f, 0.6f, 0.3f}),
+                             shapes::torusKnot(2, 3, 1.f, 0.3f)}) {
+        BuildOptions build = optionsFor(mesh, forGpu ? 24 : 90, method);
+        CAPTURE(mesh.triangles.size(), forGpu, method == Method::exact);
+        checkResident(mesh, build, options);
+        build.exteriorWidth = 4.5f;
+        build.interiorWidth = 1.25f;
+        checkResident(mesh, build, options);
+        build.exteriorWidth = 0.7f;
+        checkResident(mesh, build, options);
+    }
+}
+
+TEST_CASE("fields of the corpus stay on the device") {
+    const Method method = GENERATE(Method::exact, Method::doubleLayer);
+    for (const char* name : {"bunny_watertight.obj", "cgal-knot2.off", "TinyTorus.obj"}) {
+        const auto path = corpusMesh(name);
+        if (!path) continue;
+        CAPTURE(name);
+        const Mesh mesh = readMesh(*path);
+        checkResident(mesh, optionsFor(mesh, 100, method));
+    }
+}
+
+TEST_CASE("a field far from the origin stays on the device") {
+    const Mesh mesh =
+        transformed(shapes::sphere(1.f, 3), glm::mat4(1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, -900, 700, -1300, 1));
+    checkResident(mesh, optionsFor(mesh, 40, Method::exact));
+}
+
+TEST_CASE("what needs the processor cannot stay on the device, nor what exceeds its memory") {
+    const Device device = openDevice();
+    const Mesh ball = shapes::sphere(1.f, 4);
+    for (const Method method : {Method::prism, Method::pseudonormal})
+        CHECK_THROWS_AS(DeviceField(device, ball, optionsFor(ball, 40, method)), std::invalid_argument);
+    BuildOptions options = optionsFor(ball, 40, Method::exact);
+    options.sign = Sign::winding;
+    CHECK_THROWS_WITH(DeviceField(device, ball, options), Contains("signs") && Contains("level set"));
+    options = optionsFor(ball, 200, Method::exact);
+    CHECK_THROWS_AS(DeviceField(device, ball, options, {.memoryMiB = 16}), DeviceError);
+    options.progress = [](float) { return false; };
+    CHECK_THROWS_AS(DeviceField(device, ball, options), Cancelled);
+
+    // two balls that meet: inside one, the normals of the other contradict
+    Mesh both = ball;
+    const Mesh other = transformed(ball, glm::mat4(1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0.7f, 0.1f, 0, 1));
+    const auto shift = std::uint32_t(both.points.size());
+    both.points.insert(both.points.end(), other.points.begin(), other.points.end());
+    for (const glm::uvec3& t : other.triangles) both.triangles.push_back(t + shift);
+    CHECK_THROWS_WITH(DeviceField(device, both, optionsFor(both, 40, Method::exact)), Contains("contradict"));
 }
