@@ -27,8 +27,7 @@ BrickGrid gridFor(const FillJob& job, float reach, float margin) {
     for (int axis = 0; axis < 3; ++axis) {
         const auto brick = [&](double coordinate) { return int(std::floor(coordinate)) >> grid.shift; };
         grid.first[axis] = brick(double(job.box.lower[axis]) * grid.voxelsPerUnit - grid.reach);
-        grid.size[axis] =
-            brick(double(job.box.upper[axis]) * grid.voxelsPerUnit + grid.reach) - grid.first[axis] + 1;
+        grid.size[axis] = brick(double(job.box.upper[axis]) * grid.voxelsPerUnit + grid.reach) - grid.first[axis] + 1;
         grid.cells *= cl_uint(grid.size[axis]);
     }
     grid.triangles = cl_uint(job.mesh.mesh.triangles.size());

@@ -12,12 +12,12 @@ namespace bilayer {
 
 /// `Grid` of bins.cl: the bricks along the axes, and how the triangles are shared out.
 struct BrickGrid {
-    double voxelsPerUnit;    ///< [1/m]
-    double reach;            ///< how far from a triangle a voxel may lie [voxels]
-    double margin;           ///< parts of triangles beyond this from a brick do not matter to it [voxels]
-    cl_int first[3];         ///< [bricks]
-    cl_int size[3];          ///< [bricks]
-    cl_int shift;            ///< bricks have 2^shift voxels a side
+    double voxelsPerUnit;  ///< [1/m]
+    double reach;          ///< how far from a triangle a voxel may lie [voxels]
+    double margin;         ///< parts of triangles beyond this from a brick do not matter to it [voxels]
+    cl_int first[3];       ///< [bricks]
+    cl_int size[3];        ///< [bricks]
+    cl_int shift;          ///< bricks have 2^shift voxels a side
     cl_uint triangles, cells, runs;
     struct {
         double epsilon;

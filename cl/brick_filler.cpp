@@ -11,6 +11,7 @@
 #include <span>
 #include <string>
 #include <tuple>
+#include <utility>
 #include <vector>
 
 #include "cl/bins.h"
@@ -36,8 +37,6 @@ constexpr std::size_t bricksForProcessor = 64, bricksForGpu = 512;
 /// Groups for each compute unit that prepare bricks, each with scratch memory of its own.
 constexpr std::size_t groupsPerUnit = 4;
 constexpr std::uint64_t scratchPart = 8;  // of the budget, at most
-/// Bytes of Member in groups.cl.
-constexpr std::uint64_t memberBytes = 32;
 /// Parts that a kernel can number in one batch.
 constexpr std::uint64_t mostParts = 1 << 27;
 /// Cells as small as those that pieces are grouped by, and how far beyond its reach a brick's samples lie [voxels].
@@ -45,11 +44,18 @@ constexpr float smallestCell = 1.1f, aroundBrick = 3;
 
 enum Counter { filledBlocks, openBlocks, conflicts, counters };
 
-// What the kernels of a method keep of a part of a triangle: Piece of pieces.cl or a sample, and columns of a group.
-struct PartSizes {
-    std::uint64_t bytes, columns;
+// Bytes that the kernels of a method keep.
+struct KeptBytes {
+    std::uint64_t part;      // of a part of a triangle: Piece of pieces.cl
+    std::uint64_t unsorted;  // of a part: Member of groups.cl, Sample of samples.cl
+    std::uint64_t sorted;    // of a part: Member again
+    std::uint64_t cell;      // of a part: its cell
+    std::uint64_t columns;   // of a part: numbers in columns, of a group at most as large or of a sample
+    std::uint64_t begin;     // of a part: where a group's members begin
+    std::uint64_t brick;     // of a brick: groups of each slice of blocks, or where the samples of its cells begin
+
+    std::uint64_t perPart() const { return part + unsorted + sorted + cell + columns + begin; }
 };
-constexpr PartSizes pieceSizes{112, 8}, sampleSizes{12, 11};
 
 // `Layers` of double_layer.cl.
 struct KernelLayers {
@@ -66,7 +72,7 @@ struct Load {
 
 struct Batch {
     Load capacity, load;  // of the buffers, and of what is under way
-    cl::Buffer parts, unsorted, members, cells, columns, begins, ranges;
+    cl::Buffer parts, unsorted, sorted, cells, columns, begins, ofBricks;
     cl::Buffer origins, distances, triangles, open, counts;
     std::array<cl_uint, counters> found{};
     cl::Event counted;
@@ -133,7 +139,7 @@ class BrickFill {
     Timing timing_;
     DeviceMemory memory_;
     const bool layered_;  // by the double layer method, else exact
-    const PartSizes sizes_;
+    KeptBytes kept_{};
     cl::Program program_;
     std::optional<DeviceBins> bins_;
     cl::CommandQueue transfers_;
@@ -160,6 +166,14 @@ float reachOf(const FillJob& job) {
     return job.layers.reach * (job.layers.cube > 0 ? std::sqrt(3.f) : 1.f);
 }
 
+// Numbers that tell where the samples of each cell of a brick begin: cellsFor() of samples.cl.
+std::uint64_t sampleCells(const BrickGrid& grid) {
+    constexpr int cellSide = 4;  // [voxels]
+    const int around = 1 + int(std::floor((float(grid.reach) - 0.4f) / float(cellSide)));
+    const auto side = std::uint64_t((1 << grid.shift) / cellSide + 2 * around);
+    return side * side * side + 2;
+}
+
 std::string buildOptions(const Device::Impl& device, bool gpuMapping, bool triangles, bool cube) {
     std::string options = "-cl-std=CL1.2";
     if (device.info.exactSquareRoots) options += " -cl-fp32-correctly-rounded-divide-sqrt";
@@ -178,14 +192,20 @@ BrickFill::BrickFill(Device::Impl& device, const OpenclOptions& options, const F
       timing_(options.times),
       memory_(device, budget(device, options)),
       layered_(job.options.method == Method::doubleLayer),
-      sizes_(layered_ ? sampleSizes : pieceSizes),
       program_(buildProgram(device, layered_ ? double_layer_cl : exact_cl,
                             buildOptions(device, gpuMapping_, job.mesh.triangles, layered_ && job.layers.cube > 0))),
       transfers_(device.context, device.device, CL_QUEUE_PROFILING_ENABLE) {
     const float reach = reachOf(job);
     bins_.emplace(device, program_, memory_, job, reach, layered_ ? reach : reach + 1, gpuMapping_, timing_);
     job.mesh.progress.begin(bins_->bricks());
-    makeScratch();
+    next_ = memory_.allocate(sizeof(cl_uint), "a batch of bricks");
+    if (layered_) {
+        kept_ = {0, 32, 0, 0, 28, 0, sampleCells(bins_->grid()) * sizeof(cl_uint)};
+    } else {
+        kept_ = {112, 32, 32, sizeof(cl_uint), 32, sizeof(cl_uint), slices() * sizeof(cl_uint2)};
+        makeScratch();
+    }
+    share_ = memory_.left() / batchesInFlight;
 }
 
 // Commands in flight use the memory of the batches: they must have ended, whatever else went wrong.
@@ -205,15 +225,12 @@ void BrickFill::makeScratch() {
     const std::size_t wanted = std::max(1u, device_.info.computeUnits) * groupsPerUnit;
     scratchGroups_ = std::clamp<std::size_t>(memory_.left() / scratchPart / bytes, 1, wanted);
     scratch_ = memory_.allocate(scratchGroups_ * bytes, "grouping the triangles of a brick");
-    next_ = memory_.allocate(sizeof(cl_uint), "grouping the triangles of a brick");
-    share_ = memory_.left() / batchesInFlight;
 }
 
 std::uint64_t BrickFill::bytesOf(const Load& load) const {
     const std::uint64_t perBlock = 2 * sizeof(glm::ivec3) + blockVoxels * sizeof(float) * (job_.mesh.triangles ? 2 : 1);
-    return load.parts * (sizes_.bytes + 2 * memberBytes + sizeof(cl_uint)) +
-           (load.parts + lanes) * (sizes_.columns * sizeof(cl_float) + sizeof(cl_uint)) +
-           blocksOf(load) * perBlock + load.bricks * slices() * sizeof(cl_uint2) + counters * sizeof(cl_uint);
+    return (load.parts + lanes) * kept_.perPart() + load.bricks * kept_.brick + blocksOf(load) * perBlock +
+           counters * sizeof(cl_uint);
 }
 
 std::uint64_t BrickFill::blocksOf(const Load& load) const {
@@ -226,7 +243,8 @@ Load BrickFill::loadOf(std::size_t first, std::size_t last) const {
 
 // Whether a batch may be as large as this: its share of the memory, and the largest buffer.
 bool BrickFill::fits(const Load& load) const {
-    const std::uint64_t largest = std::max(blocksOf(load) * blockVoxels * sizeof(float), load.parts * (sizes_.columns + 2) * sizeof(cl_float) * 4);
+    const std::uint64_t largest = std::max(blocksOf(load) * blockVoxels * sizeof(float),
+                                           (load.parts + lanes) * std::max(kept_.part, kept_.columns));
     return load.parts < mostParts && bytesOf(load) <= share_ && largest <= device_.info.maxAllocationBytes;
 }
 
@@ -234,10 +252,12 @@ bool BrickFill::fits(const Load& load) const {
 std::size_t BrickFill::lastFitting(std::size_t first) const {
     if (!fits(loadOf(first, first + 1)))
         memory_.refuse(batchesInFlight * bytesOf(loadOf(first, first + 1)), "a brick of the grid");
-    const std::size_t end = std::min(bins_->bricks(), first + (gpuMapping_ ? bricksForGpu : (getenv("BR")?atoi(getenv("BR")):bricksForProcessor)));
-    const std::size_t mostParts = getenv("PA")?atoi(getenv("PA")):60000;
+    const std::size_t end =
+        std::min(bins_->bricks(),
+                 first + (gpuMapping_ ? bricksForGpu : (getenv("BR") ? atoi(getenv("BR")) : bricksForProcessor)));
+    const std::size_t mostParts = getenv("PA") ? atoi(getenv("PA")) : 60000;
     std::size_t last = first + 1;
-    while (last < end && fits(loadOf(first, last + 1)) && loadOf(first, last + 1).parts<mostParts) ++last;
+    while (last < end && fits(loadOf(first, last + 1)) && loadOf(first, last + 1).parts < mostParts) ++last;
     return last;
 }
 
@@ -250,13 +270,14 @@ void BrickFill::reserve(Batch& batch, const Load& load) {
     batch.capacity = fits(grown) ? grown : load;
     const Load& c = batch.capacity;
     const auto buffer = [&](std::uint64_t bytes) { return memory_.allocate(bytes, "a batch of bricks"); };
-    batch.parts = buffer(c.parts * sizes_.bytes);
-    batch.unsorted = buffer(c.parts * memberBytes);
-    batch.members = buffer(c.parts * memberBytes);
-    batch.cells = buffer(c.parts * sizeof(cl_uint));
-    batch.columns = buffer((c.parts + lanes) * sizes_.columns * sizeof(cl_float));
-    batch.begins = buffer((c.parts + lanes) * sizeof(cl_uint));
-    batch.ranges = buffer(c.bricks * slices() * sizeof(cl_uint2));
+    for (const auto& [part, bytes] : {std::pair{&batch.parts, kept_.part},
+                                      {&batch.unsorted, kept_.unsorted},
+                                      {&batch.sorted, kept_.sorted},
+                                      {&batch.cells, kept_.cell},
+                                      {&batch.columns, kept_.columns},
+                                      {&batch.begins, kept_.begin}})
+        if (bytes > 0) *part = buffer((c.parts + lanes) * bytes);
+    batch.ofBricks = buffer(c.bricks * kept_.brick);
     batch.origins = buffer(blocksOf(c) * sizeof(glm::ivec3));
     batch.open = buffer(blocksOf(c) * sizeof(glm::ivec3));
     batch.distances = buffer(blocksOf(c) * blockVoxels * sizeof(float));
@@ -276,22 +297,21 @@ void BrickFill::start(Batch& batch, std::size_t first, std::size_t last) {
     const FillParameters& p = job_.layers;
     const KernelLayers layers{p.delta, p.reach, p.certain, p.cube};
     const DeviceBins& bins = *bins_;
-    const auto prepare = [&](const auto&... more) {
-        enqueue("prepareBricks", std::min<std::size_t>(scratchGroups_, bricks), bins.points(), bins.triangles(),
-                bins.grid(), bins.cellOfBrick(), bins.triangleOffsets(), bins.partOffsets(), bins.list(), firstBrick,
-                bricks, batch.parts, batch.unsorted, batch.members, batch.cells, batch.columns, batch.begins, stride,
-                scratch_, scratchCells_, batch.ranges, next_, more...);
+    const auto prepare = [&](std::size_t groups, const auto&... more) {
+        enqueue("prepareBricks", std::min<std::size_t>(groups, bricks), bins.points(), bins.triangles(), bins.grid(),
+                bins.cellOfBrick(), bins.triangleOffsets(), bins.partOffsets(), bins.list(), firstBrick, bricks,
+                more...);
     };
     const cl::Buffer& triangles = job_.mesh.triangles ? batch.triangles : batch.origins;
     if (layered_) {
-        prepare(layers);
-        enqueue("fillBlocks", blocksOf(load), bins.grid(), bins.cellOfBrick(), firstBrick, batch.parts, batch.members,
-                batch.columns, batch.begins, stride, batch.ranges, layers, batch.origins, batch.distances, triangles,
-                batch.counts);
+        prepare(bricks, batch.unsorted, batch.columns, batch.ofBricks, stride, next_, layers);
+        enqueue("fillBlocks", blocksOf(load), bins.grid(), bins.cellOfBrick(), bins.partOffsets(), firstBrick,
+                batch.columns, batch.ofBricks, stride, layers, batch.origins, batch.distances, triangles, batch.counts);
     } else {
-        prepare();
+        prepare(scratchGroups_, batch.parts, batch.unsorted, batch.sorted, batch.cells, batch.columns, batch.begins,
+                stride, scratch_, scratchCells_, batch.ofBricks, next_);
         enqueue("fillBlocks", blocksOf(load), bins.points(), bins.triangles(), bins.grid(), bins.cellOfBrick(),
-                firstBrick, batch.parts, batch.members, batch.columns, batch.begins, stride, batch.ranges,
+                firstBrick, batch.parts, batch.sorted, batch.columns, batch.begins, stride, batch.ofBricks,
                 cl_int(job_.mesh.sign), batch.origins, batch.distances, triangles, batch.open, batch.counts);
     }
     device_.queue.enqueueReadBuffer(batch.counts, CL_FALSE, 0, sizeof batch.found, batch.found.data(), nullptr,
@@ -373,6 +393,9 @@ void BrickFill::fillOpen() {
 }  // namespace
 
 void fillByBricks(Device::Impl& device, const OpenclOptions& options, const FillJob& job, const DeviceSink& keep) {
+    if (!device.info.doubles)
+        throw DeviceError(device.info.name +
+                          " cannot compute in double precision, which exact and double-layer need; prism does not");
     BrickFill(device, options, job, keep).run();
 }
 

@@ -99,6 +99,16 @@ uint bitsOf(IntLanes held) {
 #endif
 }
 
+// Lanes whose bit is set.
+IntLanes lanesOf(uint bits) {
+#if LANES == 16
+    const IntLanes lane = (IntLanes)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+#else
+    const IntLanes lane = (IntLanes)(0, 1, 2, 3, 4, 5, 6, 7);
+#endif
+    return ((IntLanes)(bits) & (IntLanes)(1) << lane) != 0;
+}
+
 bool anyLane(IntLanes held) {
 #if LANES == 16
     const ulong2 bytes = as_ulong2(convert_char16(held));

@@ -27,6 +27,7 @@ DeviceInfo describe(const cl::Platform& platform, const cl::Device& device) {
             .gpu = (type & CL_DEVICE_TYPE_GPU) != 0,
             .unifiedMemory = device.getInfo<CL_DEVICE_HOST_UNIFIED_MEMORY>() == CL_TRUE,
             .exactSquareRoots = (floats & CL_FP_CORRECTLY_ROUNDED_DIVIDE_SQRT) != 0,
+            .doubles = device.getInfo<CL_DEVICE_DOUBLE_FP_CONFIG>() != 0,
             .computeUnits = device.getInfo<CL_DEVICE_MAX_COMPUTE_UNITS>(),
             .memoryBytes = device.getInfo<CL_DEVICE_GLOBAL_MEM_SIZE>(),
             .maxAllocationBytes = device.getInfo<CL_DEVICE_MAX_MEM_ALLOC_SIZE>()};

@@ -25,6 +25,7 @@ struct DeviceInfo {
     bool gpu = false;
     bool unifiedMemory = false;     ///< host and device share one memory
     bool exactSquareRoots = false;  ///< can round square roots correctly
+    bool doubles = false;           ///< can compute in double precision
     unsigned computeUnits = 0;
     std::uint64_t memoryBytes = 0;         ///< global memory [bytes]
     std::uint64_t maxAllocationBytes = 0;  ///< largest single buffer [bytes]

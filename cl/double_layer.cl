@@ -11,29 +11,23 @@
 #define PAPER_CUBE 0
 #endif
 
-// What stays in registers: a cube of 4x4x4 voxels, a vector for each slice of one x, or a GPU's row of 8.
+// What an item fills at once stays in registers: a cube of 4x4x4 voxels, a vector for each slice of one x, or a GPU's
+// row of 8. Points are picked for a cube or, by all items of a group, for a block; they are seen from its middle.
 #if ITEMS > 1
 #define SLICES 1
 #define CUBES 1
-typedef float Slices;  // a number for each slice
-#define sliceOf(numbers, i) (numbers)
+#define PICKED_SIDE 8
 #else
 #define SLICES 4
 #define CUBES 8
-typedef float4 Slices;  // a number for each slice
-#define sliceOf(numbers, i) (i == 0 ? numbers.x : i == 1 ? numbers.y : i == 2 ? numbers.z : numbers.w)
+#define PICKED_SIDE 4
 #endif
+#define HALF_SIDE (0.5f * (PICKED_SIDE - 1))
 
+// Points of a layer that are applied in one go.
+#define PAGE 256
 // layerTie of sdf/blocks.h [voxels^2].
 #define LAYER_TIE 1e-5f
-// Groups with fewer runs than this are applied without a look at what they could improve.
-#define RUNS_WORTH_A_LOOK 5
-
-#if defined(FP_FAST_FMAF) || defined(__FMA__)
-#define multiplyAdd fma
-#else
-#define multiplyAdd(a, b, c) ((a) * (b) + (c))
-#endif
 
 // FillParameters of sdf/blocks.h [voxels].
 typedef struct {
@@ -41,339 +35,263 @@ typedef struct {
     int cube;
 } Layers;
 
-// Bricks into runs of samples and groups of them. Work-groups take the bricks one after another, so that few need
-// scratch memory.
+// Bricks into sorted samples. Work-groups take the bricks one after another.
 GROUP_KERNEL void prepareBricks(global const float* points, global const uint* triangles, Grid grid,
                                 global const uint* cellOfBrick, global const uint* triangleOffsets,
                                 global const uint* partOffsets, global const uint* list, uint firstBrick, uint bricks,
-                                global float* samples, global Run* unsorted, global Run* runs,
-                                global uint* cellOfRun, global float* groupColumns, global uint* groupBegins,
-                                uint stride, global uint* scratch, uint scratchCells, global uint2* ranges,
+                                global Sample* unsorted, global float* columns, global uint* begins, uint stride,
                                 global uint* next, Layers layers) {
-    SHARED uint taken, counts[2];
-    SHARED Extent extents[ITEMS];
-    SHARED uint2 sums[ITEMS];
-    const Groups groups = {groupColumns, groupBegins, stride};
-    const int side = 1 << grid.shift, slices = side / BLOCK_SIDE;
-    const float reach = (float)(grid.reach), twiceDelta = 2 * layers.delta;
+    SHARED uint taken, count, sums[ITEMS];
     for (;;) {
         MEET;
         if (ITEM == 0) {
             taken = atomic_inc(next);
-            counts[RUNS] = counts[SAMPLES] = 0;
+            count = 0;
         }
         MEET;
         if (taken >= bricks) return;
         const uint b = firstBrick + taken, first = partOffsets[b] - partOffsets[firstBrick];
         const int3 brick = brickAt(&grid, cellOfBrick[b]);
         const Limits limits = limitsOf(&grid, brick);
-        Cut cut = {samples + 3 * (size_t)(first), unsorted + first,
-                   counts,                        first,
-                   convert_double3(brick * side), -reach,
-                   (float)(side - 1) + reach,     twiceDelta,
-                   noExtent()};
+        const SampleCells cells = cellsFor(&grid);
+        const uint cursors = (uint)(cells.size * cells.size * cells.size + 2);
+        Cut cut = {unsorted + first, begins + (size_t)(taken)*cursors, &count,
+                   convert_double3(brick * (1 << grid.shift)), cells, layers.delta};
+        for (uint i = ITEM; i < cursors; i += ITEMS) cut.cursors[i] = 0;
+        MEET;
         cutTriangles(&cut, &grid, points, triangles, list, triangleOffsets[b], triangleOffsets[b + 1], &limits);
-        extents[ITEM] = cut.extent;
         MEET;
-        const uint found = counts[RUNS];
-        const Extent all = sumExtents(extents);
-        uint groupCount = found;
-        bool gathered = all.sizes < (double)(2 * SMALL_AREA) * found;
-        if (gathered) {
-            const Cells cells = makeCells(&all, CELL_SIZE);
-            gathered = countCells(&cells) <= (float)(scratchCells);
-            if (gathered)
-                groupCount = sortMembers(&groups, first, (global const Member*)(unsorted + first),
-                                         (global Member*)(runs + first), cellOfRun + first, found, &cells,
-                                         scratch + get_group_id(0) * scratchCells, sums);
-        }
-        for (uint g = first + ITEM; g < first + groupCount; g += ITEMS) {
-            if (gathered) {
-                groupRuns(&groups, g, samples, runs);
-            } else {
-                runs[g] = unsorted[g];
-                groups.begins[g] = g;
-                groupRun(&groups, g, samples, runs + g, twiceDelta);
-            }
-        }
-        if (ITEM == 0 && !gathered) groups.begins[first + found] = first + found;
-        MEET;
-        rangeGroups(&groups, first, groupCount, slices, reach, ranges + taken * slices);
+        sortSamples(&cut, count, columns + first, stride, sums);
     }
 }
 
-// What was found for the voxels of a cube: squared distances to both layers less delta^2, and whose samples these are.
+// Where an item's voxels are, from the middle of what points are picked for.
 typedef struct {
-    Lanes inner2[SLICES], outer2[SLICES];
-#if TRIANGLES
-    IntLanes innerOwner[SLICES], outerOwner[SLICES];
-#endif
-} Found;
-
-// Where the voxels of a cube are, in the voxels of the brick.
-typedef struct {
-    Slices x;
     Lanes y, z;
 } Voxels;
 
-// The first voxel of an item's cube, in the block.
-float3 cornerOf(int cube) {
+Voxels ownVoxels(void) {
 #if ITEMS > 1
-    (void)(cube);
-    return (float3)((float)(ITEM / BLOCK_SIDE), (float)(ITEM % BLOCK_SIDE), 0);
-#else
-    return (float)(SLICES) * (float3)((float)(cube / 4), (float)(cube / 2 % 2), (float)(cube % 2));
-#endif
-}
-
-Voxels voxelsOf(float3 first) {
-#if ITEMS > 1
-    const Voxels v = {first.x, first.y, first.z + (Lanes)(0, 1, 2, 3, 4, 5, 6, 7)};
+    const Voxels v = {(Lanes)((float)(ITEM % BLOCK_SIDE) - HALF_SIDE), (Lanes)(0, 1, 2, 3, 4, 5, 6, 7) - HALF_SIDE};
 #else
     const float4 row = (float4)(0, 1, 2, 3), one = 1.0f;
-    const Voxels v = {first.x + row, first.y + (Lanes)(0 * one, one, 2 * one, 3 * one),
-                      first.z + (Lanes)(row, row, row, row)};
+    const Voxels v = {(Lanes)(0 * one, one, 2 * one, 3 * one) - HALF_SIDE, (Lanes)(row, row, row, row) - HALF_SIDE};
 #endif
     return v;
 }
 
-// The lattice point nearest to a sample. Halves go up, whatever the rounding: LayerSamples::nearestLattice().
-float3 nearestLattice(float3 place) {
-    return floor(place + 0.5001f);
-}
-
-// Squared distances from a cube's voxels to a sample: along x for each slice, and across. Infinite outside of the
-// paper's cube, if that is asked for.
-typedef struct {
-    Slices along, along2;
-    Lanes y, z, across2;
-} Measured;
-
-INLINED Measured measure(const Voxels* v, float3 place, int k) {
-    Measured m;
-    m.along = v->x - place.x;
-    m.along2 = m.along * m.along;
-    m.y = v->y - place.y;
-    m.z = v->z - place.z;
-    m.across2 = multiplyAdd(m.y, m.y, m.z * m.z);
-    if (PAPER_CUBE) {
-        const float3 centre = nearestLattice(place);
-        const Lanes away = max(fabs(v->y - centre.y), fabs(v->z - centre.z));
-        m.across2 = select((Lanes)(INFINITY), m.across2, away <= (float)(k));
-        m.along2 = select((Slices)(INFINITY), m.along2, fabs(v->x - centre.x) <= (float)(k));
-    }
-    return m;
-}
-
-INLINED void applyRun(Found* found, const Voxels* v, global const float* samples, global const Run* run, int k) {
-    const float3 normal = vload3(0, run->twiceOffset);
-    const uint count = sampleCount(run);
-    Lanes nearest2[SLICES];
-    const Measured first = measure(v, vload3(0, run->place), k);
-    UNROLLED for (int i = 0; i < SLICES; ++i) nearest2[i] = sliceOf(first.along2, i) + first.across2;
-    for (uint s = 1; s < count; ++s) {
-        const Measured next = measure(v, sampleOf(samples, run, s), k);
-        UNROLLED for (int i = 0; i < SLICES; ++i) nearest2[i] = min(nearest2[i], sliceOf(next.along2, i) + next.across2);
-    }
-    // 2 delta times the height over the plane
-    const Slices along = first.along * normal.x;
-    const Lanes across = multiplyAdd(first.y, (Lanes)(normal.y), first.z * normal.z);
-    UNROLLED for (int i = 0; i < SLICES; ++i) {
-        const Lanes height = sliceOf(along, i) + across;
-        const Lanes inner2 = nearest2[i] + height, outer2 = nearest2[i] - height;
-#if TRIANGLES
-        found->innerOwner[i] = select(found->innerOwner[i], (IntLanes)(run->triangle), inner2 < found->inner2[i]);
-        found->outerOwner[i] = select(found->outerOwner[i], (IntLanes)(run->triangle), outer2 < found->outer2[i]);
+float sliceAt(int slice) {
+#if ITEMS > 1
+    (void)(slice);
+    return (float)(ITEM / BLOCK_SIDE) - HALF_SIDE;
+#else
+    return (float)(slice)-HALF_SIDE;
 #endif
-        found->inner2[i] = min(found->inner2[i], inner2);
-        found->outer2[i] = min(found->outer2[i], outer2);
+}
+
+// The lattice point nearest to a coordinate. Halves go up, whatever the rounding: LayerSamples::nearestLattice().
+#define nearestLattice(coordinate) floor((coordinate) + 0.5001f)
+
+// Points of a layer.
+typedef struct {
+    float x[PAGE], y[PAGE], z[PAGE], halfSquare[PAGE];
+#if TRIANGLES
+    int owner[PAGE];
+#endif
+#if PAPER_CUBE
+    float centre[3][PAGE];  // the lattice point nearest to the sample
+#endif
+    uint count;
+} Points;
+
+// The nearest points of a layer so far. They are those with the greatest p . v - |p|^2 / 2, as
+// |v - p|^2 = |v|^2 - 2 (p . v - |p|^2 / 2): one multiplication a voxel and point.
+typedef struct {
+    Lanes greatest[SLICES];
+#if TRIANGLES
+    IntLanes owner[SLICES];
+#endif
+} Nearest;
+
+INLINED void clear(Nearest* nearest) {
+    UNROLLED for (int i = 0; i < SLICES; ++i) {
+        nearest->greatest[i] = -INFINITY;
+#if TRIANGLES
+        nearest->owner[i] = -1;
+#endif
     }
 }
 
-// Whether a ball may hold a sample nearer to some voxel than what was found: |p - centre| - radius < bound.
-INLINED bool mayImprove(const Voxels* v, float3 centre, float radius, float delta2, const Lanes* bound, const Lanes* best2) {
-    const float rest = delta2 + radius * radius;
-    const Lanes dy = v->y - centre.y, dz = v->z - centre.z, across2 = multiplyAdd(dy, dy, dz * dz);
-    const Slices dx = v->x - centre.x, along2 = dx * dx;
-    IntLanes may = 0;
-    UNROLLED for (int i = 0; i < SLICES; ++i) {
-        const Lanes distance2 = sliceOf(along2, i) + across2;
-        may |= distance2 < multiplyAdd((Lanes)(2 * radius), bound[i], best2[i]) + rest;
+INLINED void applyPoints(SHARED const Points* points, const Voxels* v, int cube, Nearest* nearest) {
+    for (uint p = 0; p < points->count; ++p) {
+        const float along = points->x[p];
+        Lanes across = multiplyAdd(
+            v->z, (Lanes)(points->z[p]), multiplyAdd(v->y, (Lanes)(points->y[p]), (Lanes)(-points->halfSquare[p])));
+#if PAPER_CUBE
+        const Lanes away = max(fabs(v->y - points->centre[1][p]), fabs(v->z - points->centre[2][p]));
+        across = select((Lanes)(-INFINITY), across, away <= (float)(cube));
+#else
+        (void)(cube);
+#endif
+        UNROLLED for (int i = 0; i < SLICES; ++i) {
+#if PAPER_CUBE
+            if (fabs(sliceAt(i) - points->centre[0][p]) > (float)(cube)) continue;
+#endif
+            const Lanes some = multiplyAdd((Lanes)(along), (Lanes)(sliceAt(i)), across);
+#if TRIANGLES
+            nearest->owner[i] =
+                select(nearest->owner[i], (IntLanes)(points->owner[p]), some > nearest->greatest[i]);
+#endif
+            nearest->greatest[i] = max(nearest->greatest[i], some);
+        }
     }
-    return anyLane(may);
+}
+
+Lanes distances2(const Nearest* nearest, const Voxels* v, int slice) {
+    const Lanes square2 =
+        multiplyAdd(v->y, v->y, multiplyAdd(v->z, v->z, (Lanes)(sliceAt(slice) * sliceAt(slice))));
+    return multiplyAdd((Lanes)(-2.0f), nearest->greatest[slice], square2);
+}
+
+Real squareSum(Real a, Real b, Real c) {
+    return multiplyAdd(a, a, multiplyAdd(b, b, c * c));
+}
+
+Real beyondSide(Real at) {
+    return max(fabs(at) - HALF_SIDE, (Real)(0.0f));
+}
+
+// Picks the points of a layer, out of some, that reach the voxels: those nearer than the root of reach2.
+INLINED void pick(SHARED Points* points, uint among, Real3 at, float reach2, const int* owners, const Real3* centre) {
+    const Real away2 = squareSum(beyondSide(at.x), beyondSide(at.y), beyondSide(at.z));
+    uint near = bitsOfReal(away2 < reach2) & among;
+    if (near == 0) return;
+    float numbers[4][BATCH];
+    storeReal(at.x, numbers[0]);
+    storeReal(at.y, numbers[1]);
+    storeReal(at.z, numbers[2]);
+    storeReal(0.5f * squareSum(at.x, at.y, at.z), numbers[3]);
+#if PAPER_CUBE
+    float centres[3][BATCH];
+    storeReal(centre->x, centres[0]);
+    storeReal(centre->y, centres[1]);
+    storeReal(centre->z, centres[2]);
+#else
+    (void)(centre);
+#endif
+#if ITEMS > 1
+    uint to = atomic_add(&points->count, popcount(near));
+#else
+    uint to = points->count;
+    points->count += popcount(near);
+#endif
+    for (; near != 0; near &= near - 1, ++to) {
+        const int lane = lowestBit(near);
+        points->x[to] = numbers[0][lane];
+        points->y[to] = numbers[1][lane];
+        points->z[to] = numbers[2][lane];
+        points->halfSquare[to] = numbers[3][lane];
+#if TRIANGLES
+        points->owner[to] = owners[lane];
+#else
+        (void)(owners);
+#endif
+#if PAPER_CUBE
+        for (int axis = 0; axis < 3; ++axis) points->centre[axis][to] = centres[axis][lane];
+#endif
+    }
 }
 
 // What a block works from.
 typedef struct {
-    Near near;
-    global const float* samples;
-    global const Run* runs;
+    global const float* columns;  // from the first sample of the brick on
+    uint stride;
+    global const uint* begins;  // of the brick's cells
+    SampleCells cells;
     Layers layers;
 } Input;
 
-float3 offsetOf(const Groups* groups, uint g) {
-    global const float* columns = groups->columns + g;
-    return (float3)(columns[OFFSET_X * groups->stride], columns[OFFSET_Y * groups->stride],
-                    columns[OFFSET_Z * groups->stride]);
-}
-
-// Bounds of distances to a layer.
-void boundDistances(const Lanes* best2, float delta2, Lanes* bound) {
-    UNROLLED for (int i = 0; i < SLICES; ++i) bound[i] = sqrt(max(best2[i] + delta2, (Lanes)(0.0f)));
-}
-
-// Applies the listed groups to a cube. Large ones are looked at once the others, and their own first runs, have been
-// applied.
-INLINED void applyGroups(const Input* input, const Voxels* v, const uint* list, uint count, Found* found) {
-    const Groups* groups = &input->near.groups;
-    const int k = input->layers.cube;
-    const float delta2 = square(input->layers.delta);
-    bool large = false;
-    for (uint i = 0; i < count; ++i) {
-        const uint g = list[i], begin = groups->begins[g], end = groups->begins[g + 1];
-        const bool worthALook = end - begin >= RUNS_WORTH_A_LOOK;
-        large = large || worthALook;
-        for (uint r = begin; r < (worthALook ? begin + 1 : end); ++r)
-            applyRun(found, v, input->samples, input->runs + r, k);
-    }
-    if (!large) return;
-    Lanes inner[SLICES], outer[SLICES];
-    boundDistances(found->inner2, delta2, inner);
-    boundDistances(found->outer2, delta2, outer);
-    for (uint i = 0; i < count; ++i) {
-        const uint g = list[i], begin = groups->begins[g], end = groups->begins[g + 1];
-        if (end - begin < RUNS_WORTH_A_LOOK) continue;
-        const float3 place = placeOf(groups, g), offset = offsetOf(groups, g);
-        const float radius = groups->columns[RADIUS * groups->stride + g];
-        if (!mayImprove(v, place - offset, radius, delta2, inner, found->inner2) &&
-            !mayImprove(v, place + offset, radius, delta2, outer, found->outer2))
-            continue;
-        for (uint r = begin + 1; r < end; ++r) applyRun(found, v, input->samples, input->runs + r, k);
-    }
-}
-
-#if ITEMS > 1
-
-// Whether a group reaches the row of this item.
-bool reachesRow(const Input* input, uint g, float3 middle) {
-    const Groups* groups = &input->near.groups;
-    global const float* columns = groups->columns + g;
-    const uint stride = groups->stride;
-    const float slabReach = input->near.reach, ballReach = PAPER_CUBE ? slabReach : input->layers.certain,
-                halfRow = 0.5f * (BLOCK_SIDE - 1);
-    const float3 away = placeOf(groups, g) - middle, offset = PAPER_CUBE ? (float3)(0.0f) : offsetOf(groups, g),
-                 normal = (float3)(columns[NORMAL_X * stride], columns[NORMAL_Y * stride], columns[NORMAL_Z * stride]);
-    const float3 inner = away - offset, outer = away + offset;
-    const float inner2 = square(inner.x) + square(inner.y) + square(max(fabs(inner.z) - halfRow, 0.0f)),
-                outer2 = square(outer.x) + square(outer.y) + square(max(fabs(outer.z) - halfRow, 0.0f));
-    return min(inner2, outer2) < square(columns[RADIUS * stride] + ballReach) &&
-           fabs(dot(away, normal)) < columns[THICKNESS * stride] + slabReach + halfRow * fabs(normal.z);
-}
-
-// Applies all groups that reach the block to the row of this item.
-void applyAll(const Input* input, SHARED uint* page, SHARED uint* count, Found* found) {
-    const float3 first = input->near.inBrick + cornerOf(0);
-    const Voxels voxels = voxelsOf(first);
-    for (uint next = input->near.range.x; next < input->near.range.y;) {
-        next = turnPage(&input->near, next, page, count);
-        uint list[PAGE], listed = 0;
-        for (uint i = 0; i < *count; ++i)
-            if (reachesRow(input, page[i], first + (float3)(0, 0, 0.5f * (BLOCK_SIDE - 1)))) list[listed++] = page[i];
-        applyGroups(input, &voxels, list, listed, found);
-    }
-}
-
-#else
-
-// Distance from the middle of a side to beyond its end, squared.
-Lanes outsideOf(Lanes middle, float halfSide) {
-    return squareLanes(max(fabs(middle) - halfSide, (Lanes)(0.0f)));
-}
-
-// A column of some groups.
-Lanes columnOf(const Groups* groups, int column, const uint* which) {
-    global const float* all = groups->columns + column * groups->stride;
-    float some[LANES];
-    for (int lane = 0; lane < LANES; ++lane) some[lane] = all[which[lane]];
-    return vloadLanes(0, some);
-}
-
-// Which groups of a page reach each cube: the balls around their inner or outer samples must, and their slab. A vector
-// of groups at a time, with what cubes have in common worked out once.
-void listGroups(const Input* input, const uint* page, uint count, uint (*lists)[PAGE], uint* counts) {
-    const Groups* groups = &input->near.groups;
-    const float slabReach = input->near.reach, ballReach = PAPER_CUBE ? slabReach : input->layers.certain;
-    const float halfCube = 0.5f * (SLICES - 1);
-    const float inBrick[3] = {input->near.inBrick.x, input->near.inBrick.y, input->near.inBrick.z};
-    for (int cube = 0; cube < CUBES; ++cube) counts[cube] = 0;
-    for (uint i = 0; i < count; i += LANES) {
-        const uint* which = page + i;
-        const uint some = count - i < LANES ? (1u << (count - i)) - 1 : (1u << LANES) - 1;
-        Lanes toInner2[3][2], toOuter2[3][2], height[3][2];
-        Lanes slab = columnOf(groups, THICKNESS, which) + slabReach;
-        for (int axis = 0; axis < 3; ++axis) {
-            const Lanes place = columnOf(groups, PLACE_X + axis, which) - inBrick[axis],
-                        offset = PAPER_CUBE ? (Lanes)(0.0f) : columnOf(groups, OFFSET_X + axis, which),
-                        normal = columnOf(groups, NORMAL_X + axis, which);
-            for (int side = 0; side < 2; ++side) {
-                const float middle = (float)(side * SLICES) + halfCube;
-                toInner2[axis][side] = outsideOf(middle - (place - offset), halfCube);
-                toOuter2[axis][side] = outsideOf(middle - (place + offset), halfCube);
-                height[axis][side] = (middle - place) * normal;
-            }
-            slab += halfCube * fabs(normal);
-        }
-        const Lanes reach2 = squareLanes(columnOf(groups, RADIUS, which) + ballReach);
-        for (int cube = 0; cube < CUBES; ++cube) {
-            const int a = cube / 4, b = cube / 2 % 2, c = cube % 2;
-            const Lanes inner2 = toInner2[0][a] + toInner2[1][b] + toInner2[2][c],
-                        outer2 = toOuter2[0][a] + toOuter2[1][b] + toOuter2[2][c];
-            const IntLanes reaches =
-                (min(inner2, outer2) < reach2) & (fabs(height[0][a] + height[1][b] + height[2][c]) < slab);
-            uint listed = counts[cube];
-            for (uint bits = bitsOf(reaches) & some; bits != 0; bits &= bits - 1)
-                lists[cube][listed++] = which[lowestBit(bits)];
-            counts[cube] = listed;
-        }
-    }
-}
-
-// Applies all groups that reach the block to its cubes.
-void applyAll(const Input* input, SHARED uint* page, SHARED uint* count, Found* found) {
-    uint lists[CUBES][PAGE], counts[CUBES];
-    for (uint next = input->near.range.x; next < input->near.range.y;) {
-        next = turnPage(&input->near, next, page, count);
-        for (int lane = 0; lane < LANES; ++lane) page[*count + lane] = input->near.range.x;  // any group
-        listGroups(input, page, *count, lists, counts);
-        for (int cube = 0; cube < CUBES; ++cube) {
-            if (counts[cube] == 0) continue;
-            const Voxels voxels = voxelsOf(input->near.inBrick + cornerOf(cube));
-            Found own = found[cube];  // in registers
-            applyGroups(input, &voxels, lists[cube], counts[cube], &own);
-            found[cube] = own;
-        }
-    }
-}
-
+// Picks the points of both layers around samples begin + ITEM * BATCH ..
+INLINED void pickSome(const Input* input, uint begin, uint end, float3 middle, SHARED Points* inner,
+                      SHARED Points* outer) {
+    const uint at = begin + ITEM * BATCH;
+    if (at >= end) return;
+    global const float* columns = input->columns + at;
+    const uint stride = input->stride;
+    uint among = end - at < BATCH ? (1u << (end - at)) - 1 : (1u << BATCH) - 1;
+    const Real3 place = make3(loadReal(columns + PLACE_X * stride), loadReal(columns + PLACE_Y * stride),
+                              loadReal(columns + PLACE_Z * stride)),
+                offset = make3(loadReal(columns + OFFSET_X * stride), loadReal(columns + OFFSET_Y * stride),
+                               loadReal(columns + OFFSET_Z * stride)),
+                seen = make3(place.x - middle.x, place.y - middle.y, place.z - middle.z);
+    Real3 centre = seen;
+#if PAPER_CUBE
+    const float most = (float)(input->layers.cube) + HALF_SIDE;
+    centre = make3(nearestLattice(place.x) - middle.x, nearestLattice(place.y) - middle.y,
+                   nearestLattice(place.z) - middle.z);
+    among &= bitsOfReal((fabs(centre.x) <= most) & (fabs(centre.y) <= most) & (fabs(centre.z) <= most));
 #endif
+    int owners[BATCH];
+#if TRIANGLES
+    for (int lane = 0; lane < BATCH; ++lane) owners[lane] = as_int(columns[OWNER * stride + lane]);
+#endif
+    const float reach2 = square(input->layers.certain);
+    pick(inner, among, sub3(seen, offset), reach2, owners, &centre);
+    pick(outer, among, add3(seen, offset), reach2, owners, &centre);
+}
+
+// The nearest points of both layers for the voxels of a cube; `corner` is its first voxel in the brick.
+INLINED void fillCube(const Input* input, int3 corner, const Voxels* v, SHARED Points* inner, SHARED Points* outer,
+                      Nearest* nearestInner, Nearest* nearestOuter) {
+    const int cube = input->layers.cube, size = input->cells.size,
+              along = PICKED_SIDE / CELL_SIDE + 2 * input->cells.around;
+    const int3 cell = corner / CELL_SIDE;
+    const float3 middle = convert_float3(corner) + HALF_SIDE;
+    clear(nearestInner);
+    clear(nearestOuter);
+    MEET;
+    if (ITEM == 0) inner->count = outer->count = 0;
+    MEET;
+    for (int x = cell.x; x < cell.x + along; ++x)
+        for (int y = cell.y; y < cell.y + along; ++y) {
+            global const uint* row = input->begins + (x * size + y) * size + cell.z;
+            const uint end = row[along];
+            for (uint i = row[0]; i < end; i += ITEMS * BATCH) {
+                pickSome(input, i, end, middle, inner, outer);
+                MEET;
+                if (max(inner->count, outer->count) > PAGE - ITEMS * BATCH) {
+                    applyPoints(inner, v, cube, nearestInner);
+                    applyPoints(outer, v, cube, nearestOuter);
+                    MEET;
+                    if (ITEM == 0) inner->count = outer->count = 0;
+                }
+                MEET;
+            }
+        }
+    applyPoints(inner, v, cube, nearestInner);
+    applyPoints(outer, v, cube, nearestOuter);
+}
 
 // Eq. 3: from both layers to a slice's signed distances. The inside keeps its sign bit where the distance is clamped to
 // zero.
-Lanes combine(const Found* found, int slice, const Layers* layers, IntLanes* known) {
-    const Lanes inner2 = found->inner2[slice], outer2 = found->outer2[slice];
-    const float delta2 = square(layers->delta), certain2 = square(layers->certain) - delta2;
-    const Lanes farther = sqrt(max(max(inner2, outer2) + delta2, (Lanes)(0.0f)));
-    const Lanes clamped = max(farther - layers->delta, (Lanes)(0.0f));
+INLINED Lanes combine(const Nearest* inner, const Nearest* outer, const Voxels* v, int slice, const Layers* layers,
+                      IntLanes* inside, IntLanes* known) {
+    const Lanes certain2 = square(layers->certain), inner2 = min(distances2(inner, v, slice), certain2),
+                outer2 = min(distances2(outer, v, slice), certain2);
+    *inside = inner2 <= outer2 + LAYER_TIE;
     *known = min(inner2, outer2) < certain2;
-    return select((Lanes)(INFINITY), select(clamped, -clamped, inner2 <= outer2 + LAYER_TIE), *known);
+    const Lanes clamped = max(sqrt(max(max(inner2, outer2), (Lanes)(0.0f))) - layers->delta, (Lanes)(0.0f));
+    return select((Lanes)(INFINITY), select(clamped, -clamped, *inside), *known);
 }
 
 // Writes a slice of a cube into its block.
-void putFloats(Lanes values, float3 at, global float* block) {
-    global float* corner = block + (int)((at.x * BLOCK_SIDE + at.y) * BLOCK_SIDE + at.z);
+void putSlice(Lanes values, int slice, int3 inBlock, SHARED float* block) {
 #if ITEMS > 1
-    vstore8(values, 0, corner);
+    (void)(slice);
+    (void)(inBlock);
+    vstore8(values, ITEM, block);
 #else
+    SHARED float* corner = block + ((inBlock.x + slice) * BLOCK_SIDE + inBlock.y) * BLOCK_SIDE + inBlock.z;
     vstore4(values.s0123, 0, corner);
     vstore4(values.s4567, 2, corner);
     vstore4(values.s89ab, 4, corner);
@@ -381,64 +299,66 @@ void putFloats(Lanes values, float3 at, global float* block) {
 #endif
 }
 
+#if LANES == 16
+#define asLanes as_float16
+#else
+#define asLanes as_float8
+#endif
+
 enum { FILLED_BLOCKS };
 
 // A group fills a block of a brick. Blocks that hold distances go to the next places of `origins`, `distances` and
 // `nearestTriangles`.
-GROUP_KERNEL void fillBlocks(Grid grid, global const uint* cellOfBrick, uint firstBrick, global const float* samples,
-                             global const Run* runs, global float* groupColumns, global uint* groupBegins, uint stride,
-                             global const uint2* ranges, Layers layers, global int* origins, global float* distances,
-                             global int* nearestTriangles, global uint* counters) {
-    SHARED uint page[PAGE + LANES], count, slot, anyKnown;
-    const Groups groups = {groupColumns, groupBegins, stride};
-    const Input input = {nearBlock(&grid, &groups, cellOfBrick, firstBrick, ranges), samples, runs, layers};
-    if (input.near.range.x >= input.near.range.y) return;
-
-    Found found[CUBES];
-    const float farthest2 = square(layers.certain) - square(layers.delta);
-    for (int cube = 0; cube < CUBES; ++cube)
+GROUP_KERNEL void fillBlocks(Grid grid, global const uint* cellOfBrick, global const uint* partOffsets,
+                             uint firstBrick, global const float* columns, global const uint* begins, uint stride,
+                             Layers layers, global int* origins, global float* distances, global int* nearestTriangles,
+                             global uint* counters) {
+    SHARED Points inner, outer;
+    SHARED float values[BLOCK_VOXELS], owners[TRIANGLES ? BLOCK_VOXELS : 1];
+    SHARED uint slot, anyKnown;
+    const int side = (1 << grid.shift) / BLOCK_SIDE;
+    const uint perBrick = (uint)(side * side * side), brick = (uint)(get_group_id(0)) / perBrick;
+    const int number = (int)(get_group_id(0) % perBrick);
+    const int3 inBrick = BLOCK_SIDE * (int3)(number / side / side, number / side % side, number % side);
+    const SampleCells cells = cellsFor(&grid);
+    const uint cursors = (uint)(cells.size * cells.size * cells.size + 2);
+    const Input input = {columns + (partOffsets[firstBrick + brick] - partOffsets[firstBrick]), stride,
+                         begins + (size_t)(brick)*cursors, cells, layers};
+    const Voxels v = ownVoxels();
+    uint known = 0;
+    for (int cube = 0; cube < CUBES; ++cube) {
+        const int3 inBlock = CUBES > 1 ? SLICES * (int3)(cube / 4, cube / 2 % 2, cube % 2) : (int3)(0);
+        Nearest nearestInner, nearestOuter;
+        fillCube(&input, inBrick + inBlock, &v, &inner, &outer, &nearestInner, &nearestOuter);
         UNROLLED for (int i = 0; i < SLICES; ++i) {
-            found[cube].inner2[i] = found[cube].outer2[i] = farthest2;
+            IntLanes inside, knownLanes;
+            putSlice(combine(&nearestInner, &nearestOuter, &v, i, &layers, &inside, &knownLanes), i, inBlock, values);
+            known |= (uint)(anyLane(knownLanes));
 #if TRIANGLES
-            found[cube].innerOwner[i] = found[cube].outerOwner[i] = -1;
+            putSlice(asLanes(select(nearestInner.owner[i], nearestOuter.owner[i], inside)), i, inBlock, owners);
+#else
+            (void)(owners);
 #endif
         }
-    applyAll(&input, page, &count, found);
-
+    }
+    MEET;
     if (ITEM == 0) anyKnown = 0;
     MEET;
-    uint known = 0;
-    for (int cube = 0; cube < CUBES; ++cube)
-        UNROLLED for (int i = 0; i < SLICES; ++i) {
-            IntLanes knownLanes;
-            combine(&found[cube], i, &layers, &knownLanes);
-            known |= (uint)(anyLane(knownLanes));
-        }
     if (known) anyKnown = 1;
     MEET;
     if (!anyKnown) return;
     if (ITEM == 0) {
         slot = atomic_inc(counters + FILLED_BLOCKS);
-        vstore3(input.near.block, slot, origins);
+        vstore3(brickAt(&grid, cellOfBrick[firstBrick + brick]) * (1 << grid.shift) + inBrick, slot, origins);
     }
     MEET;
-    for (int cube = 0; cube < CUBES; ++cube)
-        UNROLLED for (int i = 0; i < SLICES; ++i) {
-            const float3 at = cornerOf(cube) + (float3)((float)(i), 0, 0);
-            IntLanes knownLanes;
-            putFloats(combine(&found[cube], i, &layers, &knownLanes), at,
-                      distances + (size_t)(slot)*BLOCK_VOXELS);
+    for (uint i = ITEM; i < BLOCK_VOXELS / LANES; i += ITEMS) {
+        const size_t place = (size_t)(slot) * (BLOCK_VOXELS / LANES) + i;
+        vstoreLanes(vloadLanes(i, values), place, distances);
 #if TRIANGLES
-            const IntLanes inside = found[cube].inner2[i] <= found[cube].outer2[i] + LAYER_TIE;
-#if LANES == 16
-            putFloats(as_float16(select(found[cube].innerOwner[i], found[cube].outerOwner[i], inside)), at,
-                      (global float*)(nearestTriangles) + (size_t)(slot)*BLOCK_VOXELS);
+        vstoreLanes(vloadLanes(i, owners), place, (global float*)(nearestTriangles));
 #else
-            putFloats(as_float8(select(found[cube].innerOwner[i], found[cube].outerOwner[i], inside)), at,
-                      (global float*)(nearestTriangles) + (size_t)(slot)*BLOCK_VOXELS);
+        (void)(nearestTriangles);
 #endif
-#else
-            (void)(nearestTriangles);
-#endif
-        }
+    }
 }

@@ -249,13 +249,15 @@ Lanes beyond(Lanes along, float length) {
 // as floats can tell and say different things.
 void keepNearer(Found* found, int chunk, Lanes distance2, Lanes height, IntLanes overFace, int code) {
     const Lanes old2 = found->nearest2[chunk], nearest2 = min(distance2, old2);
-    const IntLanes old = found->nearest[chunk], sides = (1 << SIDE_BITS) - 1;
+    const IntLanes old = found->nearest[chunk];
     const IntLanes side = select((IntLanes)(code + SIDE_INSIDE), (IntLanes)(code + SIDE_OUTSIDE), height > 0.0f);
     const IntLanes own = select((IntLanes)(code), side, overFace);
     const IntLanes winner = select(old, own, distance2 < old2);
     const IntLanes tied = max(distance2, old2) - nearest2 <= nearest2 * TIE_PART + TIE_SLACK;
     found->nearest2[chunk] = nearest2;
-    found->nearest[chunk] = select(winner, (winner & ~sides) | (own & old & sides), tied);
+    // the number stays, and of the side what both say; put otherwise, LLVM 14 makes wrong code of it for AVX-512
+    const IntLanes kept = (own & old) | ~((1 << SIDE_BITS) - 1) | ~tied;
+    found->nearest[chunk] = winner & kept;
 }
 
 // Lowers the distances in some chunks to those to a piece. Lattice coordinates are exact in floats.
@@ -615,16 +617,6 @@ uint completeSides(const Input* input, SHARED Block* block, View* view) {
             }
     }
     return onBoth;
-}
-
-// Lanes whose bit is set.
-IntLanes lanesOf(uint bits) {
-#if LANES == 16
-    const IntLanes lane = (IntLanes)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
-#else
-    const IntLanes lane = (IntLanes)(0, 1, 2, 3, 4, 5, 6, 7);
-#endif
-    return ((IntLanes)(bits) & (IntLanes)(1) << lane) != 0;
 }
 
 enum { FILLED_BLOCKS, OPEN_BLOCKS, CONFLICTS };

@@ -51,6 +51,12 @@ class Ended {
     const cl::CommandQueue& queue_;
 };
 
+cl::Program samplingProgram(const Device& device) {
+    if (!device.info().doubles)
+        throw DeviceError(device.info().name + " cannot compute in double precision, which samples of fields need");
+    return buildProgram(device.impl(), field_cl, commonBuildOptions(device.impl()));
+}
+
 }  // namespace
 
 struct DeviceField::Data {
@@ -74,7 +80,7 @@ DeviceField::Data::Data(const Device& device, const OpenclOptions& options, std:
     : device(device),
       gpuMapping(wantsGroups(device.impl(), options.mapping)),
       memory(device.impl(), budget),
-      program(buildProgram(device.impl(), field_cl, commonBuildOptions(device.impl()))) {
+      program(samplingProgram(device)) {
     const Device::Impl& impl = device.impl();
     for (Batch& batch : batches) {
         batch.queue = cl::CommandQueue(impl.context, impl.device, CL_QUEUE_PROFILING_ENABLE);

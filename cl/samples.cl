@@ -1,31 +1,54 @@
-// The samples of the double layer method in a brick: triangles cut into tiles, tiles into runs of samples, runs gathered
-// into groups. sdf/tile_cutter.h and sdf/layer_samples.h on a device.
-#include "groups.cl"
+// The samples of the double layer method in a brick: triangles cut into parts, those spread out into samples, the
+// samples sorted by cells of space. sdf/tile_cutter.h and sdf/layer_samples.h on a device.
+#include "bins.cl"
 
 // Algorithm 1 divides the longest edge into as many parts as the others; with parts beyond this many roots of epsilon
 // the triangle counts as a sliver.
 #define SLIVER_STEP 3.0
 // More tiles than wait at once for any triangle of a grid.
 #define MOST_TILES 160
-// Most rows and columns of samples in one run.
-#define MOST_ROWS 4
-// Runs of triangles with a mean area below this are gathered, by cells of this side [voxels^2, voxels].
-#define SMALL_AREA 0.5
-#define CELL_SIZE 1.0f
+// Triangles of up to so many rows are spread a batch at a time; of one with more, samples are a batch of their own.
+#define FEW_ROWS 4
+// Side of the cells that samples are sorted by [voxels].
+#define CELL_SIDE 4
 
-// More columns of a group: mean of its runs' offsets. RADIUS holds all samples around PLACE, and the inner and outer
-// ones around PLACE less and plus the offset: LayerGroup of sdf/layer_samples.h.
-enum { OFFSET_X = COMMON_COLUMNS, OFFSET_Y, OFFSET_Z, ALL_COLUMNS };
+#if defined(FP_FAST_FMAF) || defined(__FMA__)
+#define multiplyAdd fma
+#else
+#define multiplyAdd(a, b, c) ((a) * (b) + (c))
+#endif
 
-// Samples of one part of a triangle, all with the same offset: LayerRun of sdf/layer_samples.h. What Member keeps of
-// other things is this here.
+// A sample, unsorted.
 typedef struct {
-    float place[3];  // the first sample, in the voxels of the brick
+    float place[3];  // in the voxels of the brick
     int triangle;
-    float twiceOffset[3];
-    uint samples;  // their number, and the place of the first one times SAMPLES_AT_MOST
-} Run;
-#define SAMPLES_AT_MOST 32u
+    float offset[3];  // of the outer layer from it, minus that of the inner layer [voxels]
+    uint cell;
+} Sample;
+
+// Sorted samples of all bricks of a batch, a column for each number.
+enum { PLACE_X, PLACE_Y, PLACE_Z, OFFSET_X, OFFSET_Y, OFFSET_Z, OWNER };
+
+// The cells of a brick: SampleCells of sdf/layer_samples.h.
+typedef struct {
+    int around;          // cells beyond the brick, and around a cell that it looks at
+    int size;            // along each axis
+    float firstCorner;   // of all cells, on each axis
+    float lower, upper;  // of all places that can matter
+} SampleCells;
+
+SampleCells cellsFor(const Grid* grid) {
+    const float reach = (float)(grid->reach);
+    const int side = 1 << grid->shift;
+    SampleCells cells;
+    // a cell begins half a voxel before its voxels; a tenth of one is against rounding
+    cells.around = 1 + (int)(floor((reach - 0.4f) / CELL_SIDE));
+    cells.firstCorner = -0.5f - (float)(cells.around * CELL_SIDE);
+    cells.size = side / CELL_SIDE + 2 * cells.around;
+    cells.lower = -reach;
+    cells.upper = (float)(side - 1) + reach;
+    return cells;
+}
 
 // A part of a triangle that is still to be cut or to be sampled.
 typedef struct {
@@ -145,107 +168,91 @@ uint countParts(const Grid* grid, const Corners* t, const Limits* limits) {
     return count;
 }
 
-// The samples of a brick, and how many runs and samples there are so far.
+// The samples of a brick, and how many there are so far.
 typedef struct {
-    global float* samples;
-    global Run* runs;
-    SHARED uint* counts;
-    uint first;       // the number of the brick's first sample
-    double3 origin;   // of the brick
-    float3 lower, upper;  // of all places that can matter
-    float twiceDelta;
-    Extent extent;
+    global Sample* samples;
+    global uint* cursors;  // samples of a cell are counted two places on
+    SHARED uint* count;
+    double3 origin;  // of the brick
+    SampleCells cells;
+    float delta;
 } Cut;
 
-enum { RUNS, SAMPLES };
-
-uint take(SHARED uint* counter, uint count) {
+// Adds the samples of some lanes, without those that stay away from the brick.
+void addSamples(Cut* cut, uint among, Real3 place, Real3 offset, RealInt owner) {
+    const SampleCells* c = &cut->cells;
+    const RealInt within = (place.x >= c->lower) & (place.x <= c->upper) & (place.y >= c->lower) &
+                           (place.y <= c->upper) & (place.z >= c->lower) & (place.z <= c->upper);
+    among &= bitsOfReal(within);
+    if (among == 0) return;
+    const float perCell = 1.0f / CELL_SIDE;
+    const RealInt x = toRealInt((place.x - c->firstCorner) * perCell),
+                  y = toRealInt((place.y - c->firstCorner) * perCell),
+                  z = toRealInt((place.z - c->firstCorner) * perCell);
+    float numbers[6][BATCH];
+    int owners[BATCH], cells[BATCH];
+    storeReal(place.x, numbers[0]);
+    storeReal(place.y, numbers[1]);
+    storeReal(place.z, numbers[2]);
+    storeReal(offset.x, numbers[3]);
+    storeReal(offset.y, numbers[4]);
+    storeReal(offset.z, numbers[5]);
+    storeRealInt(owner, owners);
+    storeRealInt((x * c->size + y) * c->size + z, cells);
 #if ITEMS > 1
-    return atomic_add(counter, count);
+    uint at = atomic_add(cut->count, popcount(among));
 #else
-    const uint before = *counter;
-    *counter = before + count;
-    return before;
+    uint at = *cut->count;
+    *cut->count += popcount(among);
 #endif
-}
-
-void addToExtent(Extent* extent, float3 place, double size) {
-    vstore3(min(vload3(0, extent->lower), place), 0, extent->lower);
-    vstore3(max(vload3(0, extent->upper), place), 0, extent->upper);
-    extent->sizes += size;
-}
-
-void putRun(Cut* cut, uint place, float3 first, uint triangle, float3 twiceOffset, uint samples) {
-    global float* run = cut->runs[place].place;
-    vstore4((float4)(first, as_float(triangle)), 0, run);
-    vstore4((float4)(twiceOffset, as_float(samples)), 1, run);
-}
-
-// The samples that Algorithm 1 puts into rows row .. and columns column .. of a tile, as one run.
-void addRun(Cut* cut, uint triangle, float3 first, float3 down, float3 across, int row, int lastRow, int column,
-            int side, float3 twiceOffset, double size) {
-    float places[SAMPLES_AT_MOST][3];
-    uint count = 0;
-    float3 lower = INFINITY, upper = -INFINITY;
-    for (int i = row; i < lastRow; ++i)
-        for (int j = column; j < min(column + side, i + 1); ++j) {
-            const float3 place = first + (float)(i) * down + (float)(j) * across;
-            vstore3(place, count++, places[0]);
-            lower = min(lower, place);
-            upper = max(upper, place);
-        }
-    if (any(upper < cut->lower) || any(lower > cut->upper)) return;
-    const uint at = take(cut->counts + SAMPLES, count);
-    for (uint i = 0; i < count; ++i) vstore3(vload3(i, places[0]), at + i, cut->samples);
-    const float3 begin = vload3(0, places[0]);
-    putRun(cut, take(cut->counts + RUNS, 1), begin, triangle, twiceOffset, (cut->first + at) * SAMPLES_AT_MOST + count);
-    addToExtent(&cut->extent, begin, size);
-}
-
-// Samples a tile in runs of equal sides.
-void addTile(Cut* cut, uint triangle, const Corners* t, int rows, double3 normal) {
-    const double size = length(normal), step = 1.0 / rows;
-    const float3 twiceOffset = cut->twiceDelta * convert_float3(normal / size);
-    const int parts = (rows + MOST_ROWS - 1) / MOST_ROWS, side = (rows + parts - 1) / parts;
-    const double3 s1 = (t->b - t->a) * step, s2 = (t->c - t->b) * step, s3 = (t->c - t->a) * step;
-    const double3 start = rows == 1 ? (t->a + t->b + t->c) * (1.0 / 3.0) : t->a + (s1 + s3) / 3.0;
-    const float3 first = convert_float3(start - cut->origin), down = convert_float3(s1), across = convert_float3(s2);
-    for (int row = 0; row < rows; row += side) {
-        const int end = min(row + side, rows);
-        // rows that stay away as a whole: a tile may be much larger than a brick
-        const float3 a = first + (float)(row)*down, b = first + (float)(end - 1) * down;
-        const float3 c = a + (float)(row)*across, d = b + (float)(end - 1) * across;
-        if (any(max(max(a, b), max(c, d)) < cut->lower) || any(min(min(a, b), min(c, d)) > cut->upper)) continue;
-        for (int column = 0; column < end; column += side)
-            addRun(cut, triangle, first, down, across, row, end, column, side, twiceOffset, size);
+    for (; among != 0; among &= among - 1, ++at) {
+        const int lane = lowestBit(among);
+        global float* sample = cut->samples[at].place;
+        vstore4((float4)(numbers[0][lane], numbers[1][lane], numbers[2][lane], as_float(owners[lane])), 0, sample);
+        vstore4((float4)(numbers[3][lane], numbers[4][lane], numbers[5][lane], as_float(cells[lane])), 1, sample);
+        takeGlobal(cut->cursors + cells[lane] + 2, 1);
     }
 }
 
-// Triangles of a batch that get one sample each.
-void addSingles(Cut* cut, const Batch* batch, uint lanes, Exact3 normal, Exact size) {
-    const Exact third = 1.0 / 3.0;
-    float places[3][BATCH], offsets[3][BATCH];
-    double sizes[BATCH];
-    const Real x = toReal((batch->a.x + batch->b.x + batch->c.x) * third - cut->origin.x),
-               y = toReal((batch->a.y + batch->b.y + batch->c.y) * third - cut->origin.y),
-               z = toReal((batch->a.z + batch->b.z + batch->c.z) * third - cut->origin.z);
-    const RealInt stays = x >= cut->lower.x && y >= cut->lower.y && z >= cut->lower.z && x <= cut->upper.x &&
-                          y <= cut->upper.y && z <= cut->upper.z;
-    lanes &= bitsOfReal(stays);
-    storeReal(x, places[0]);
-    storeReal(y, places[1]);
-    storeReal(z, places[2]);
-    storeReal(cut->twiceDelta * toReal(normal.x / size), offsets[0]);
-    storeReal(cut->twiceDelta * toReal(normal.y / size), offsets[1]);
-    storeReal(cut->twiceDelta * toReal(normal.z / size), offsets[2]);
-    storeExact(size, sizes);
-    uint place = take(cut->counts + RUNS, popcount(lanes));
-    for (; lanes != 0; lanes &= lanes - 1, ++place) {
-        const int lane = lowestBit(lanes);
-        const float3 sample = (float3)(places[0][lane], places[1][lane], places[2][lane]);
-        putRun(cut, place, sample, batch->triangle[lane],
-               (float3)(offsets[0][lane], offsets[1][lane], offsets[2][lane]), 1);
-        addToExtent(&cut->extent, sample, sizes[lane]);
+// What rows and columns of samples are made of.
+typedef struct {
+    Real3 first, down, across, offset;
+} Spread;
+
+Real3 placeIn(const Spread* s, Real row, Real column) {
+    return make3(multiplyAdd(column, s->across.x, multiplyAdd(row, s->down.x, s->first.x)),
+                 multiplyAdd(column, s->across.y, multiplyAdd(row, s->down.y, s->first.y)),
+                 multiplyAdd(column, s->across.z, multiplyAdd(row, s->down.z, s->first.z)));
+}
+
+// Adds the samples of Algorithm 1, each of all triangles of a batch: row i has i + 1 of them.
+void addFew(Cut* cut, Real rows, const Spread* spread, RealInt owners) {
+    for (int i = 0;; ++i) {
+        const uint among = bitsOfReal(rows > (Real)((float)(i)));
+        if (among == 0) return;
+        for (int j = 0; j <= i; ++j)
+            addSamples(cut, among, placeIn(spread, (Real)((float)(i)), (Real)((float)(j))), spread->offset, owners);
+    }
+}
+
+Real3 same3(double3 v) {
+    return make3((Real)((float)(v.x)), (Real)((float)(v.y)), (Real)((float)(v.z)));
+}
+
+// The same for one part of a triangle, many samples at once.
+void addPart(Cut* cut, const Corners* t, int rows, double3 normal, uint triangle) {
+    const double step = 1.0 / rows;
+    const double3 s1 = (t->b - t->a) * step, s2 = (t->c - t->b) * step, s3 = (t->c - t->a) * step;
+    const Spread spread = {same3(t->a - cut->origin + (s1 + s3) / 3.0), same3(s1), same3(s2),
+                           same3(normal * (cut->delta / length(normal)))};
+    const int count = rows * (rows + 1) / 2;
+    for (int k = 0; k < count; k += BATCH) {
+        // the roots are exact where a row begins, and far enough from it before
+        const Real number = laneNumbers + (float)(k);
+        const Real row = floor((sqrt(multiplyAdd(number, (Real)(8.0f), (Real)(1.0f))) - 1.0f) * 0.5f),
+                   column = number - 0.5f * multiplyAdd(row, row, row);
+        const uint among = count - k < BATCH ? (1u << (count - k)) - 1 : (1u << BATCH) - 1;
+        addSamples(cut, among, placeIn(&spread, row, column), spread.offset, (RealInt)((int)(triangle)));
     }
 }
 
@@ -256,7 +263,45 @@ void cutLarge(Cut* cut, const Grid* grid, uint triangle, const Tile* whole, doub
     tiles.waiting[0] = *whole;
     tiles.count = 1;
     for (int rows; (rows = nextTile(&tiles, &grid->sampling, limits, &tile)) > 0;)
-        addTile(cut, triangle, &tile.corners, rows, normal);
+        addPart(cut, &tile.corners, rows, normal, triangle);
+}
+
+Exact3 fromOrigin(Exact3 corner, double3 origin) {
+    const Exact3 v = {corner.x - origin.x, corner.y - origin.y, corner.z - origin.z};
+    return v;
+}
+
+Exact3 scaleExact(Exact3 a, Exact factor) {
+    const Exact3 v = {a.x * factor, a.y * factor, a.z * factor};
+    return v;
+}
+
+Exact3 addExact(Exact3 a, Exact3 b) {
+    const Exact3 v = {a.x + b.x, a.y + b.y, a.z + b.z};
+    return v;
+}
+
+// Samples those triangles of a batch that have few rows. Returns bits of the others that have an area.
+uint cutFew(Cut* cut, const Grid* grid, const Batch* batch) {
+    const Sampling* sampling = &grid->sampling;
+    const double epsilon = sampling->epsilon, most = sampling->recursive ? 1 : min(FEW_ROWS, sampling->maxSubdivision);
+    const Exact3 ab = subExact(batch->b, batch->a), ac = subExact(batch->c, batch->a),
+                 bc = subExact(batch->c, batch->b), normal = crossExact(ab, ac);
+    const Exact size = sqrt(squareExact(normal));
+    const Exact rows = max((Exact)(1.0), ceil(sqrt(0.5 * size / epsilon))), step = 1.0 / rows;
+    const uint real = bitsOfExact(size > 0.0) & batch->real;
+    const uint few = bitsOfExact((longestEdges2(batch) <= rows * rows * (SLIVER_STEP * SLIVER_STEP * epsilon)) &
+                                 (rows <= most)) &
+                     real;
+    if (few != 0) {
+        const Exact3 s1 = scaleExact(ab, step), start = scaleExact(addExact(s1, scaleExact(ac, step)), 1.0 / 3.0);
+        const Spread spread = {toReal3(addExact(fromOrigin(batch->a, cut->origin), start)), toReal3(s1),
+                               toReal3(scaleExact(bc, step)),
+                               toReal3(scaleExact(normal, (double)(cut->delta) / size))};
+        addFew(cut, select((Real)(0.0f), toReal(rows), lanesOfBits(few)), &spread,
+               loadRealInt((const int*)(batch->triangle)));
+    }
+    return real & ~few;
 }
 
 // Samples the triangles of a list.
@@ -265,96 +310,47 @@ void cutTriangles(Cut* cut, const Grid* grid, global const float* points, global
     for (uint first = begin + ITEM * BATCH; first < end; first += ITEMS * BATCH) {
         Batch batch;
         fetchBatch(&batch, points, triangles, list, first, end, grid->voxelsPerUnit);
-        const Exact3 normal = normals(&batch);
-        const Exact size = sqrt(squareExact(normal));
-        const uint some = bitsOfExact(size > 0.0) & batch.real;
-        const uint singles = singleBits(&grid->sampling, &batch, size) & some;
-        if (singles) addSingles(cut, &batch, singles, normal, size);
-        for (uint rest = some & ~singles; rest != 0; rest &= rest - 1) {
+        for (uint rest = cutFew(cut, grid, &batch); rest != 0; rest &= rest - 1) {
             const uint triangle = batch.triangle[lowestBit(rest)];
             const Corners t = cornersOf(points, triangles, triangle, grid->voxelsPerUnit);
-            const double3 outward = normalOf(&t);
-            const Tile whole = wholeTile(&t, outward);
-            int rows = rowsOf(&grid->sampling, whole.area, whole.longest2);
+            const double3 normal = normalOf(&t);
+            const Tile whole = wholeTile(&t, normal);
+            const int rows = rowsOf(&grid->sampling, whole.area, whole.longest2);
             if (rows > 0)
-                addTile(cut, triangle, &t, rows, outward);
+                addPart(cut, &t, rows, normal, triangle);
             else
-                cutLarge(cut, grid, triangle, &whole, outward, limits);
+                cutLarge(cut, grid, triangle, &whole, normal, limits);
         }
     }
 }
 
-// The s-th sample of a run.
-float3 sampleOf(global const float* samples, global const Run* run, uint s) {
-    const uint begin = run->samples / SAMPLES_AT_MOST;
-    return begin == 0 && run->samples == 1 ? vload3(0, run->place) : vload3(begin + s, samples);
-}
-
-uint sampleCount(global const Run* run) {
-    return run->samples % SAMPLES_AT_MOST;
-}
-
-void putOffset(const Groups* groups, uint index, float3 offset) {
-    global float* column = groups->columns + index;
-    column[OFFSET_X * groups->stride] = offset.x;
-    column[OFFSET_Y * groups->stride] = offset.y;
-    column[OFFSET_Z * groups->stride] = offset.z;
-}
-
-// A group of one run.
-void groupRun(const Groups* groups, uint index, global const float* samples, global const Run* run, float twiceDelta) {
-    const float3 twiceOffset = vload3(0, run->twiceOffset), normal = twiceOffset / twiceDelta;
-    float3 lower = INFINITY, upper = -INFINITY;
-    for (uint s = 0; s < sampleCount(run); ++s) {
-        const float3 place = sampleOf(samples, run, s);
-        lower = min(lower, place);
-        upper = max(upper, place);
+// Sorts the samples of a brick into columns. Afterwards `cursors` holds the first sample of each cell, and the end of
+// the last one.
+void sortSamples(const Cut* cut, uint count, global float* columns, uint stride, SHARED uint* sums) {
+    const uint cells = (uint)(cut->cells.size * cut->cells.size * cut->cells.size);
+    global uint* counts = cut->cursors + 2;
+    const uint begin = cells * ITEM / ITEMS, end = cells * (ITEM + 1) / ITEMS;
+    uint sum = 0;
+    if (ITEMS > 1) {
+        for (uint cell = begin; cell < end; ++cell) sum += counts[cell];
+        sums[ITEM] = sum;
+        MEET;
+        sum = 0;
+        for (uint i = 0; i < ITEM; ++i) sum += sums[i];
     }
-    const float3 middle = 0.5f * (lower + upper);
-    float radius2 = 0;
-    for (uint s = 0; s < sampleCount(run); ++s) {
-        const float3 away = sampleOf(samples, run, s) - middle;
-        radius2 = max(radius2, dot(away, away));
+    // the count of a cell becomes the place of the next one's first sample
+    for (uint cell = begin; cell < end; ++cell) counts[cell] = sum += counts[cell];
+    MEET;
+    for (uint i = ITEM; i < count; i += ITEMS) {
+        const float8 sample = vload8(i, (global const float*)(cut->samples));
+        global float* to = columns + takeGlobal(cut->cursors + as_uint(sample.s7) + 1, 1);
+        to[PLACE_X * stride] = sample.s0;
+        to[PLACE_Y * stride] = sample.s1;
+        to[PLACE_Z * stride] = sample.s2;
+        to[OFFSET_X * stride] = sample.s4;
+        to[OFFSET_Y * stride] = sample.s5;
+        to[OFFSET_Z * stride] = sample.s6;
+        to[OWNER * stride] = sample.s3;
     }
-    const float height = fabs(dot(vload3(0, run->place) - middle, normal));
-    putGroup(groups, index, middle, sqrt(radius2) + GROUP_SLACK, normal, height + GROUP_SLACK);
-    putOffset(groups, index, 0.5f * twiceOffset);
-}
-
-// A group of runs that share a cell. The first one shall be near the middle.
-void groupRuns(const Groups* groups, uint index, global const float* samples, global Run* runs) {
-    const uint begin = groups->begins[index], end = groups->begins[index + 1];
-    float3 middle = 0, offset = 0;
-    float count = 0;
-    for (uint r = begin; r < end; ++r) {
-        const float own = (float)(sampleCount(runs + r));
-        for (uint s = 0; s < sampleCount(runs + r); ++s) middle += sampleOf(samples, runs + r, s);
-        offset += 0.5f * own * vload3(0, runs[r].twiceOffset);
-        count += own;
-    }
-    middle /= count;
-    offset /= count;
-    const float size = length(offset);
-    const float3 normal = size > 0 ? offset / size : (float3)(0, 0, 1);
-    float radius2 = 0, thickness = 0, nearest2 = INFINITY;
-    uint first = begin;
-    for (uint r = begin; r < end; ++r) {
-        const float3 aside = 0.5f * vload3(0, runs[r].twiceOffset) - offset;
-        for (uint s = 0; s < sampleCount(runs + r); ++s) {
-            const float3 away = sampleOf(samples, runs + r, s) - middle;
-            const float away2 = dot(away, away);
-            // |away +- aside| <= its root, and so is |away|
-            radius2 = max(radius2, away2 + 2 * fabs(dot(away, aside)) + dot(aside, aside));
-            thickness = max(thickness, fabs(dot(away, normal)));
-            if (away2 < nearest2) {
-                nearest2 = away2;
-                first = r;
-            }
-        }
-    }
-    const Run swapped = runs[begin];
-    runs[begin] = runs[first];
-    runs[first] = swapped;
-    putGroup(groups, index, middle, sqrt(radius2) + GROUP_SLACK, normal, thickness + GROUP_SLACK);
-    putOffset(groups, index, offset);
+    MEET;
 }

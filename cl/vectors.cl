@@ -17,6 +17,8 @@ typedef double Exact;
 #define bitsOfExact(held) ((uint)((held) != 0))
 #define storeExact(v, p) (*(p) = (v))
 #define storeRealInt(v, p) (*(p) = (v))
+#define laneNumbers 0.0f
+#define lanesOfBits(bits) ((int)(bits))
 #else
 #define BATCH LANES
 typedef Lanes Real;
@@ -33,6 +35,8 @@ typedef double16 Exact;
 #define bitsOfExact(held) bitsOf(convert_int16(held))
 #define storeExact(v, p) vstore16(v, 0, p)
 #define storeRealInt(v, p) vstoreLanes(v, 0, p)
+#define laneNumbers ((Real)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15))
+#define lanesOfBits lanesOf
 #endif
 
 typedef struct {

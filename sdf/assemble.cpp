@@ -10,6 +10,7 @@
 #include <bit>
 #include <cmath>
 #include <functional>
+#include <map>
 #include <type_traits>
 
 #include "sdf/links.h"
@@ -21,6 +22,7 @@ namespace {
 using Leaf = openvdb::FloatTree::LeafNodeType;
 using TriangleLeaf = openvdb::Int32Tree::LeafNodeType;
 using LargeNode = openvdb::FloatTree::RootNodeType::ChildNodeType;
+using SmallNode = LargeNode::ChildNodeType;
 static_assert(Leaf::DIM == blockSide);
 
 std::unique_ptr<TriangleLeaf> triangleLeaf(const std::int32_t* triangles, const Leaf& like) {
@@ -180,13 +182,14 @@ void Assembler::take(const FilledBlocks& blocks) {
         auto leaf = std::make_unique<Leaf>(openvdb::PartialCreate(), openvdb::Coord(o.x, o.y, o.z));
         leaf->buffer().allocate();
         if (!trimToBand(blocks.distances.data() + b * blockVoxels, widths_, leaf->buffer().data(), masks)) continue;
-        if (plain_ == Plain::drop && isPlain(masks)) continue;
+        const bool plain = isPlain(masks);
+        if (plain && plain_ == Plain::drop) continue;
         Leaf::NodeMaskType mask;
         for (openvdb::Index word = 0; word < blockSide; ++word) mask.getWord<std::uint64_t>(word) = masks.active[word];
         leaf->setValueMask(mask);
         if (wantTriangles_ && !mask.isOff())
             triangleLeaves_.local().push_back(triangleLeaf(blocks.triangles.data() + b * blockVoxels, *leaf));
-        leaves.push_back({std::move(leaf), facesOf(masks.inside)});
+        leaves.push_back({std::move(leaf), facesOf(masks.inside), plain});
     }
 }
 
@@ -200,7 +203,7 @@ void Assembler::copy(const Grids& from, const std::function<bool(const openvdb::
         });
     };
     forEachKept(from.distance->tree(), [&](const Leaf& leaf) {
-        leaves_.local().push_back({std::make_unique<Leaf>(leaf), facesOf(insideOf(leaf))});
+        leaves_.local().push_back({std::make_unique<Leaf>(leaf), facesOf(insideOf(leaf)), false});
     });
     if (wantTriangles_)
         forEachKept(from.triangle->tree(), [&](const TriangleLeaf& leaf) {
@@ -208,20 +211,73 @@ void Assembler::copy(const Grids& from, const std::function<bool(const openvdb::
         });
 }
 
+// The leaves below each node of the level above.
+struct Assembler::Branch {
+    std::vector<Collected*> leaves;
+    std::size_t firstFaces = 0;
+    std::unique_ptr<SmallNode> owned{};  // until it is in the tree
+    SmallNode* node = nullptr;
+    std::vector<const Leaf*> plain{};
+};
+
+std::vector<Assembler::Branch> Assembler::branches() {
+    std::vector<Branch> all;
+    std::map<openvdb::Coord, std::size_t> places;
+    std::size_t place = 0;
+    openvdb::Coord last;
+    for (auto& some : leaves_)
+        for (Collected& one : some) {
+            // leaves taken one after the other are mostly below the same node
+            const openvdb::Coord origin = one.leaf->origin() & ~(SmallNode::DIM - 1);
+            if (all.empty() || origin != last) {
+                place = places.try_emplace(origin, all.size()).first->second;
+                if (place == all.size()) all.emplace_back();
+                last = origin;
+            }
+            all[place].leaves.push_back(&one);
+        }
+    for (std::size_t i = 1; i < all.size(); ++i) all[i].firstFaces = all[i - 1].firstFaces + all[i - 1].leaves.size();
+    return all;
+}
+
+void Assembler::grow(Branch& branch, float background) {
+    branch.owned = std::make_unique<SmallNode>(branch.leaves.front()->leaf->origin(), background);
+    branch.node = branch.owned.get();
+    std::size_t faces = branch.firstFaces;
+    for (Collected* one : branch.leaves) {
+        if (one->plain) branch.plain.push_back(one->leaf.get());
+        one->leaf->setTransientData(openvdb::Index32(faces));
+        faces_[faces++] = one->faces;
+        branch.node->addLeaf(one->leaf.release());
+    }
+}
+
 openvdb::FloatGrid::Ptr Assembler::distances() {
     const float exterior = widths_.exterior * widths_.voxelSize, interior = -widths_.interior * widths_.voxelSize;
     auto grid = openvdb::FloatGrid::create(exterior);
-    for (auto& some : leaves_)
-        for (Collected& one : some) {
-            if (faces_.size() % leavesPerPoll == 0) progress_.poll();
-            one.leaf->setTransientData(openvdb::Index32(faces_.size()));
-            faces_.push_back(one.faces);
-            grid->tree().addLeaf(one.leaf.release());
-        }
-    // leaves carry their signs already: only tiles between them are flooded. Leaves that turn out to hold one far
-    // value become tiles too.
+    std::vector<Branch> branches = this->branches();
+    if (!branches.empty()) faces_.resize(branches.back().firstFaces + branches.back().leaves.size());
+    const auto forEachBranch = [&](auto visit) {
+        tbb::parallel_for(std::size_t(0), branches.size(), [&](std::size_t i) {
+            progress_.poll();
+            visit(branches[i]);
+        });
+    };
+    forEachBranch([&](Branch& branch) { grow(branch, exterior); });
+    for (Branch& branch : branches) {
+        const openvdb::Coord origin = branch.node->origin();
+        if (!grid->tree().probeNode<LargeNode>(origin)) grid->tree().root().addChild(new LargeNode(origin, exterior));
+        grid->tree().probeNode<LargeNode>(origin)->addChild(branch.owned.release());
+    }
+    // leaves carry their signs already: only tiles between them are flooded. Leaves of one far value become tiles too.
     openvdb::tools::signedFloodFillWithValues(grid->tree(), exterior, interior, true, 1, 1);
-    openvdb::tools::prune(grid->tree());
+    forEachBranch([](Branch& branch) {
+        for (const Leaf* leaf : branch.plain) {
+            const float value = leaf->getFirstValue();  // the leaf goes before the tile comes
+            branch.node->addTile(1, leaf->origin(), value, false);
+        }
+    });
+    openvdb::tools::pruneTiles(grid->tree());
     grid->setName("distance");
     grid->setGridClass(openvdb::GRID_LEVEL_SET);
     return grid;

@@ -60,9 +60,14 @@ class Assembler {
     struct Collected {
         std::unique_ptr<Leaf> leaf;
         FaceBits faces;
+        bool plain;  // all on one side, and nothing of it in the band
     };
+    struct Branch;
     template <class Item>
     using PerThread = tbb::enumerable_thread_specific<std::vector<Item>>;
+
+    std::vector<Branch> branches();
+    void grow(Branch& branch, float background);
 
     BandWidths widths_;
     bool wantTriangles_;

@@ -47,6 +47,22 @@ void sortVoxels(const float* distances, const BandWidths& widths, BlockMask& unk
     }
 }
 
+// Lets the known signs grow into the unknown voxels, a step at a time; where both arrive at once the outside wins.
+void flood(BlockMask& unknown, BlockMask& outside, BlockMask& inside) {
+    while (any(unknown)) {
+        const BlockMask out = grown(outside), in = grown(inside);
+        std::uint64_t changed = 0;
+        for (std::size_t x = 0; x < blockSide; ++x) {
+            const std::uint64_t newOut = out[x] & unknown[x], newIn = in[x] & unknown[x] & ~newOut;
+            outside[x] |= newOut;
+            inside[x] |= newIn;
+            unknown[x] &= ~(newOut | newIn);
+            changed |= newOut | newIn;
+        }
+        if (changed == 0) return;
+    }
+}
+
 void writeValues(const float* distances, const BandWidths& widths, const BlockMask& inside, const BlockMask& band,
                  float* values) {
     const Tag tag;
@@ -66,40 +82,11 @@ HWY_AFTER_NAMESPACE();
 namespace bilayer {
 namespace {
 
+HWY_EXPORT(flood);
 HWY_EXPORT(sortVoxels);
 HWY_EXPORT(writeValues);
 
-constexpr std::uint64_t lowestZ = 0x0101010101010101ull;  // the voxels with z = 0 of a slice
-constexpr std::uint64_t highestZ = lowestZ << 7;
-
-// Lets the known signs grow into the unknown voxels, a step at a time; where both arrive at once the outside wins.
-void flood(BlockMask unknown, BlockMask& outside, BlockMask& inside) {
-    while (any(unknown)) {
-        const BlockMask out = grown(outside), in = grown(inside);
-        std::uint64_t changed = 0;
-        for (std::size_t x = 0; x < blockSide; ++x) {
-            const std::uint64_t newOut = out[x] & unknown[x], newIn = in[x] & unknown[x] & ~newOut;
-            outside[x] |= newOut;
-            inside[x] |= newIn;
-            unknown[x] &= ~(newOut | newIn);
-            changed |= newOut | newIn;
-        }
-        if (changed == 0) return;
-    }
-}
-
 }  // namespace
-
-BlockMask grown(const BlockMask& mask) {
-    BlockMask result;
-    for (std::size_t x = 0; x < blockSide; ++x) {
-        const std::uint64_t m = mask[x];
-        result[x] = m | ((m & ~highestZ) << 1) | ((m & ~lowestZ) >> 1) | (m << 8) | (m >> 8);
-        if (x > 0) result[x] |= mask[x - 1];
-        if (x + 1 < blockSide) result[x] |= mask[x + 1];
-    }
-    return result;
-}
 
 bool trimToBand(const float* distances, const BandWidths& widths, float* values, BandMasks& masks) {
     BlockMask unknown, inside, band;
@@ -107,8 +94,12 @@ bool trimToBand(const float* distances, const BandWidths& widths, float* values,
     if (any(unknown)) {
         BlockMask outside;
         for (std::size_t x = 0; x < blockSide; ++x) outside[x] = ~(unknown[x] | inside[x]);
-        if (!any(inside) && !any(outside)) return false;
-        flood(unknown, outside, inside);
+        const bool anyInside = any(inside), anyOutside = any(outside);
+        if (!anyInside && !anyOutside) return false;
+        if (anyInside && anyOutside)
+            HWY_DYNAMIC_DISPATCH(flood)(unknown, outside, inside);
+        else if (anyInside)
+            inside.fill(~0ull);
     }
     masks = {band, inside};
     HWY_DYNAMIC_DISPATCH(writeValues)(distances, widths, inside, band, values);

@@ -18,7 +18,19 @@ inline bool any(const BlockMask& mask) {
 }
 
 /// The mask and all voxels that share a face with it inside the block.
-BlockMask grown(const BlockMask& mask);
+inline BlockMask grown(const BlockMask& mask) {
+    constexpr std::uint64_t lowestZ = 0x0101010101010101ull, highestZ = lowestZ << 7;  // of a word's rows
+    BlockMask result;
+    for (std::size_t x = 0; x < blockSide; ++x) {
+        const std::uint64_t m = mask[x];
+        result[x] = m | ((m & ~highestZ) << 1) | ((m & ~lowestZ) >> 1) | (m << 8) | (m >> 8);
+    }
+    for (std::size_t x = 1; x < blockSide; ++x) {
+        result[x] |= mask[x - 1];
+        result[x - 1] |= mask[x];
+    }
+    return result;
+}
 
 struct BandWidths {
     float exterior, interior;  ///< [voxels]

@@ -1,18 +1,18 @@
-// The double layer method, brick by brick: tiles, runs of samples, blocks. Nothing is kept of a mesh but the bins of
+// The double layer method, brick by brick: triangles, samples, blocks. Nothing is kept of a mesh but the bins of
 // its triangles, so that memory stays a fraction of the mesh's own however many samples it has.
 #include "sdf/double_layer.h"
 
 #include <oneapi/tbb/enumerable_thread_specific.h>
 #include <oneapi/tbb/parallel_for.h>
 
+#include <algorithm>
 #include <cmath>
+#include <span>
 #include <vector>
 
-#include "sdf/block_bins.h"
 #include "sdf/layer_block.h"
 #include "sdf/layer_samples.h"
 #include "sdf/progress.h"
-#include "sdf/tile_cutter.h"
 #include "sdf/triangle_bins.h"
 
 namespace bilayer {
@@ -23,7 +23,6 @@ constexpr std::size_t trianglesPerPoll = 1024;  // a tenth of a millisecond
 // What a thread works in; kept from brick to brick.
 struct Scratch {
     LayerSamples samples;
-    BlockBins bins;
     LayerScratch block;
     std::vector<glm::ivec3> origins;
     std::vector<float> distances;
@@ -40,45 +39,32 @@ class BrickFiller {
         const glm::ivec3 origin = bins_.origins[brick];
         sample(brick, origin);
         const int blocks = bins_.side / blockSide;
-        s_.bins.build(s_.samples.groups(), blocks, reach_);
         s_.origins.clear();
-        s_.distances.clear();
-        s_.triangles.clear();
-        std::size_t number = 0;
         for (int x = 0; x < blocks; ++x)
             for (int y = 0; y < blocks; ++y)
-                for (int z = 0; z < blocks; ++z) fillBlock(number++, origin, blockSide * glm::ivec3(x, y, z));
+                for (int z = 0; z < blocks; ++z) fillBlock(origin, blockSide * glm::ivec3(x, y, z));
         if (!s_.origins.empty()) job_.sink({s_.origins, s_.distances, s_.triangles});
     }
 
   private:
     void sample(std::size_t brick, const glm::ivec3& origin) {
-        const double voxelsPerUnit = 1.0 / double(job_.voxelSize);
-        const TriangleLimits limits{glm::dvec3(origin) - double(reach_),
-                                    glm::dvec3(origin + (bins_.side - 1)) + double(reach_)};
-        s_.samples.begin(origin, bins_.side, reach_, parameters_.delta, parameters_.cube > 0);
-        std::uint32_t triangle = 0;
-        TileCutter cutter(options_, &limits, [&](const TilePart& part) { s_.samples.add(part, triangle); });
-        std::size_t cut = 0;
-        forEachTriangle(job_.mesh, bins_.trianglesOf(brick), voxelsPerUnit,
-                        [&](std::uint32_t index, const TriangleCorners& corners) {
-                            if (++cut % trianglesPerPoll == 0) job_.progress.poll();
-                            triangle = index;
-                            cutter.cut(corners);
-                        });
+        s_.samples.begin(SampledBrick{origin, bins_.side, reach_, 1.0 / double(job_.voxelSize), options_});
+        const std::span<const std::uint32_t> triangles = bins_.trianglesOf(brick);
+        for (std::size_t i = 0; i < triangles.size(); i += trianglesPerPoll) {
+            job_.progress.poll();
+            s_.samples.add(job_.mesh, triangles.subspan(i, std::min(trianglesPerPoll, triangles.size() - i)));
+        }
         s_.samples.finish();
     }
 
-    void fillBlock(std::size_t number, const glm::ivec3& origin, const glm::ivec3& inBrick) {
-        const auto reaching = s_.bins.at(number);
-        if (reaching.empty()) return;
+    void fillBlock(const glm::ivec3& origin, const glm::ivec3& inBrick) {
         job_.progress.poll();
-        const std::size_t first = s_.distances.size();
-        s_.origins.push_back(origin + inBrick);
-        s_.distances.resize(first + blockVoxels);
-        if (job_.triangles) s_.triangles.resize(first + blockVoxels);
-        fillLayerBlock({reaching, s_.samples, glm::vec3(inBrick), parameters_}, s_.block, s_.distances.data() + first,
-                       job_.triangles ? s_.triangles.data() + first : nullptr);
+        const std::size_t first = s_.origins.size() * blockVoxels;
+        if (s_.distances.size() == first) s_.distances.resize(first + blockVoxels);
+        if (job_.triangles) s_.triangles.resize(s_.distances.size());
+        if (fillLayerBlock({s_.samples, inBrick, parameters_}, s_.block, s_.distances.data() + first,
+                           job_.triangles ? s_.triangles.data() + first : nullptr))
+            s_.origins.push_back(origin + inBrick);
     }
 
     const MeshJob& job_;

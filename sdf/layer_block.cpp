@@ -19,7 +19,7 @@ HWY_BEFORE_NAMESPACE();
 namespace bilayer::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-constexpr int cubeSide = 4;                       // voxels
+constexpr int cubeSide = LayerSamples::cellSide;  // voxels
 constexpr int sliceVoxels = cubeSide * cubeSide;  // of one x
 constexpr int cubesPerSide = blockSide / cubeSide;
 constexpr int cubesPerBlock = cubesPerSide * cubesPerSide * cubesPerSide;
@@ -31,313 +31,222 @@ using Vec = hn::Vec<Tag>;
 using Mask = hn::Mask<Tag>;
 using IntVec = hn::Vec<IntTag>;
 
-/// Groups with fewer runs than this are applied without a look at what they could improve.
-constexpr std::uint32_t runsWorthALook = 5;
 constexpr float infinite = std::numeric_limits<float>::infinity();
+constexpr float halfCube = 0.5f * float(cubeSide - 1);  // from the middle of a cube to its last voxels
 
-// Places of a slice's voxels in their cube.
+// Places of a slice's voxels, from the middle of their cube.
 struct Lattice {
     alignas(64) float y[sliceVoxels], z[sliceVoxels];
 };
 constexpr Lattice lattice = [] {
     Lattice l{};
     for (int i = 0; i < sliceVoxels; ++i) {
-        l.y[i] = float(i / cubeSide);
-        l.z[i] = float(i % cubeSide);
+        l.y[i] = float(i / cubeSide) - halfCube;
+        l.z[i] = float(i % cubeSide) - halfCube;
     }
     return l;
 }();
 
-// A number for each slice.
-struct Slices {
-    using Tag = hn::CappedTag<float, cubeSide>;
+inline float sliceAt(int x) {
+    return float(x) - halfCube;
+}
 
-    // make(x - centre) of the slices from x = first on
-    template <class Make>
-    HWY_INLINE Slices(float first, float centre, Make make) {
-        const Tag tag;
-        for (std::size_t i = 0; i < std::size_t(cubeSide); i += hn::Lanes(tag))
-            hn::Store(make(hn::Sub(hn::Iota(tag, first + float(i)), hn::Set(tag, centre))), tag, of + i);
-    }
-    alignas(16) float of[cubeSide];
-};
-
-// One vector's part of each slice of a cube: where its voxels are, and what was found for them. Distances are squared
-// and less delta^2.
-template <bool withOwners>
+// One vector's part of each slice of a cube, from the middle of the cube.
 struct Voxels {
-    Voxels(const glm::vec3& first, int part, float farthest2) {
-        const Tag tag;
-        const auto at = std::size_t(part) * hn::Lanes(tag);
-        x = first.x;
-        y = hn::Add(hn::Load(tag, lattice.y + at), hn::Set(tag, first.y));
-        z = hn::Add(hn::Load(tag, lattice.z + at), hn::Set(tag, first.z));
-        for (int i = 0; i < cubeSide; ++i) {
-            inner2[i] = outer2[i] = hn::Set(tag, farthest2);
-            if constexpr (withOwners) innerOwner[i] = outerOwner[i] = hn::Set(IntTag(), -1);
-        }
+    explicit Voxels(int part) {
+        const auto at = std::size_t(part) * hn::Lanes(Tag());
+        y = hn::Load(Tag(), lattice.y + at);
+        z = hn::Load(Tag(), lattice.z + at);
     }
-    float x;
-    Vec y, z, inner2[cubeSide], outer2[cubeSide];
-    IntVec innerOwner[cubeSide], outerOwner[cubeSide];
-};
-
-inline Vec squareOf(Vec v) {
-    return hn::Mul(v, v);
-}
-
-// The paper's neighbourhood: voxels of a cube around the lattice point nearest to the sample.
-struct Neighbourhood {
-    glm::vec3 centre;
-    float half;
-};
-
-// Squared distances to a sample: along x for each slice, and across. Infinite outside of a neighbourhood, if there is
-// one.
-template <bool cube>
-struct Measured {
-    template <class Voxels>
-    HWY_INLINE Measured(const Voxels& v, const glm::vec3& place, const Neighbourhood& near = {})
-        : along2(v.x, place.x, [](auto dx) { return hn::Mul(dx, dx); }) {
-        const Tag tag;
-        const Vec dy = hn::Sub(v.y, hn::Set(tag, place.y)), dz = hn::Sub(v.z, hn::Set(tag, place.z));
-        across2 = hn::MulAdd(dy, dy, squareOf(dz));
-        if constexpr (cube) {
-            const Vec y = hn::Abs(hn::Sub(v.y, hn::Set(tag, near.centre.y))),
-                      z = hn::Abs(hn::Sub(v.z, hn::Set(tag, near.centre.z)));
-            across2 = hn::IfThenElse(hn::Le(hn::Max(y, z), hn::Set(tag, near.half)), across2, hn::Set(tag, infinite));
-            for (int x = 0; x < cubeSide; ++x)
-                if (std::abs(v.x + float(x) - near.centre.x) > near.half) along2.of[x] = infinite;
-        }
+    HWY_INLINE Vec square(int x) const {
+        return hn::MulAdd(y, y, hn::MulAdd(z, z, hn::Set(Tag(), sliceAt(x) * sliceAt(x))));
     }
-    HWY_INLINE Vec at(int x) const { return hn::Add(hn::Set(Tag(), along2.of[x]), across2); }
-
-    Slices along2;
-    Vec across2;
+    Vec y, z;
 };
 
+// The points of a layer around a cube, from its middle.
+struct LayerPoints {
+    LayerPoints(LayerScratch::Layer& memory, std::size_t size) {
+        for (auto& column : memory.columns)
+            if (column.size() < size) column.resize(size);
+        if (memory.picked.size() < size) memory.picked.resize(size);
+        x = memory.columns[0].data();
+        y = memory.columns[1].data();
+        z = memory.columns[2].data();
+        halfSquare = memory.columns[3].data();
+        picked = memory.picked.data();
+    }
+
+    // Places a vector of points, and picks those nearer to the cube's voxels than the root of reach2.
+    HWY_INLINE void put(std::uint32_t first, Vec px, Vec py, Vec pz, Mask among, Vec reach2) {
+        const Tag tag;
+        const auto square = [](Vec a, Vec b, Vec c) { return hn::MulAdd(a, a, hn::MulAdd(b, b, hn::Mul(c, c))); };
+        const auto beyond = [](Vec at) {
+            return hn::Max(hn::Sub(hn::Abs(at), hn::Set(Tag(), halfCube)), hn::Zero(Tag()));
+        };
+        const hn::RebindToUnsigned<Tag> indexTag;
+        const Mask near = hn::And(among, hn::Lt(square(beyond(px), beyond(py), beyond(pz)), reach2));
+        const auto numbers = hn::Add(hn::Iota(indexTag, 0), hn::Set(indexTag, first));
+        hn::StoreU(px, tag, x + first);
+        hn::StoreU(py, tag, y + first);
+        hn::StoreU(pz, tag, z + first);
+        hn::StoreU(hn::Mul(square(px, py, pz), hn::Set(tag, 0.5f)), tag, halfSquare + first);
+        hn::StoreU(hn::Compress(numbers, hn::RebindMask(indexTag, near)), indexTag, picked + count);
+        count += hn::CountTrue(tag, near);
+    }
+
+    float *x, *y, *z, *halfSquare;  // of all points, in the order of the brick's samples
+    std::uint32_t* picked;          // those that reach the cube
+    std::size_t count = 0;          // of those
+};
+
+// The points of a layer that are nearest to voxels. They are those with the greatest p . v - |p|^2 / 2, as
+// |v - p|^2 = |v|^2 - 2 (p . v - |p|^2 / 2): one multiplication a voxel and point.
 template <bool cube, bool withOwners>
-HWY_INLINE void apply(const LayerSamples& samples, const LayerRun& run, float half, Voxels<withOwners>& v) {
-    const Tag tag;
-    const glm::vec3* places = samples.places().data();
-    const glm::vec3* cells = samples.cells().data();
-    const auto measure = [&](std::uint32_t s) {
-        return Measured<cube>(v, places[s], cube ? Neighbourhood{cells[s], half} : Neighbourhood{});
-    };
-    Vec nearest2[cubeSide];
-    {
-        const auto first = measure(run.begin);
-        for (int x = 0; x < cubeSide; ++x) nearest2[x] = first.at(x);
-    }
-    for (std::uint32_t s = run.begin + 1; s < run.end; ++s) {
-        const auto next = measure(s);
-        for (int x = 0; x < cubeSide; ++x) nearest2[x] = hn::Min(nearest2[x], next.at(x));
-    }
-    // 2 delta times the height over the plane
-    const glm::vec3 &place = places[run.begin], &normal = run.twiceOffset;
-    const Slices along(v.x, place.x, [&](auto dx) { return hn::Mul(dx, hn::Set(Slices::Tag(), normal.x)); });
-    const Vec across = hn::MulAdd(hn::Sub(v.y, hn::Set(tag, place.y)), hn::Set(tag, normal.y),
-                                  hn::Mul(hn::Sub(v.z, hn::Set(tag, place.z)), hn::Set(tag, normal.z)));
-    for (int x = 0; x < cubeSide; ++x) {
-        const Vec height = hn::Add(hn::Set(tag, along.of[x]), across);
-        const Vec inner2 = hn::Add(nearest2[x], height), outer2 = hn::Sub(nearest2[x], height);
-        if constexpr (withOwners) {
-            const IntTag intTag;
-            const IntVec owner = hn::Set(intTag, run.triangle);
-            const auto wins = [&](Vec distance2, Vec best2) {
-                return hn::RebindMask(intTag, hn::Lt(distance2, best2));
-            };
-            v.innerOwner[x] = hn::IfThenElse(wins(inner2, v.inner2[x]), owner, v.innerOwner[x]);
-            v.outerOwner[x] = hn::IfThenElse(wins(outer2, v.outer2[x]), owner, v.outerOwner[x]);
-        }
-        v.inner2[x] = hn::Min(v.inner2[x], inner2);
-        v.outer2[x] = hn::Min(v.outer2[x], outer2);
-    }
-}
-
-// Upper bounds of the distances to both layers.
-struct Bounds {
-    template <bool withOwners>
-    Bounds(const Voxels<withOwners>& v, float delta2) {
+struct Nearest {
+    HWY_INLINE Nearest(const LayerBlockInput& input, const LayerPoints& points, const glm::vec3& middle,
+                       const Voxels& v) {
         const Tag tag;
         for (int x = 0; x < cubeSide; ++x) {
-            inner[x] = hn::Sqrt(hn::Max(hn::Add(v.inner2[x], hn::Set(tag, delta2)), hn::Zero(tag)));
-            outer[x] = hn::Sqrt(hn::Max(hn::Add(v.outer2[x], hn::Set(tag, delta2)), hn::Zero(tag)));
+            greatest[x] = hn::Set(tag, -infinite);
+            if constexpr (withOwners) owner[x] = hn::Set(IntTag(), -1);
+        }
+        for (const std::uint32_t p : std::span(points.picked, points.count)) {
+            const Vec along = hn::Set(tag, points.x[p]);
+            Vec across = hn::MulAdd(v.z, hn::Set(tag, points.z[p]),
+                                    hn::MulSub(v.y, hn::Set(tag, points.y[p]), hn::Set(tag, points.halfSquare[p])));
+            glm::vec3 centre(0);
+            if constexpr (cube) {
+                centre = centreOf(input, p) - middle;
+                across = hn::IfThenElse(isNear(input, centre, v), across, hn::Set(tag, -infinite));
+            }
+            for (int x = 0; x < cubeSide; ++x) {
+                if (cube && std::abs(sliceAt(x) - centre.x) > float(input.parameters.cube)) continue;
+                const Vec some = hn::MulAdd(along, hn::Set(tag, sliceAt(x)), across);
+                if constexpr (withOwners)
+                    owner[x] = hn::IfThenElse(hn::RebindMask(IntTag(), hn::Gt(some, greatest[x])),
+                                              hn::Set(IntTag(), input.samples.columns().triangle[p]), owner[x]);
+                greatest[x] = hn::Max(greatest[x], some);
+            }
         }
     }
-    Vec inner[cubeSide], outer[cubeSide];
+
+    HWY_INLINE Vec distance2(const Voxels& v, int x) const {
+        return hn::NegMulAdd(hn::Set(Tag(), 2.f), greatest[x], v.square(x));
+    }
+
+    Vec greatest[cubeSide];
+    IntVec owner[cubeSide];
+
+  private:
+    // The paper's neighbourhood: voxels of a cube around the lattice point nearest to the sample.
+    static glm::vec3 centreOf(const LayerBlockInput& input, std::uint32_t p) {
+        const auto& place = input.samples.columns().place;
+        return LayerSamples::nearestLattice({place[0][p], place[1][p], place[2][p]});
+    }
+    static Mask isNear(const LayerBlockInput& input, const glm::vec3& centre, const Voxels& v) {
+        const Tag tag;
+        const Vec y = hn::Abs(hn::Sub(v.y, hn::Set(tag, centre.y))), z = hn::Abs(hn::Sub(v.z, hn::Set(tag, centre.z)));
+        return hn::Le(hn::Max(y, z), hn::Set(tag, float(input.parameters.cube)));
+    }
 };
-
-// Whether a ball may hold a sample nearer to some voxel than what was found: |p - centre| - radius < bound.
-template <class Voxels>
-HWY_INLINE bool mayImprove(const Voxels& v, const glm::vec3& centre, float radius, float delta2, const Vec* bound,
-                           const Vec* best2) {
-    const Tag tag;
-    const Measured<false> distance2(v, centre);
-    // squared: |p - centre|^2 < bound^2 + 2 radius bound + radius^2
-    const Vec twice = hn::Set(tag, 2 * radius), rest = hn::Set(tag, delta2 + radius * radius);
-    const auto mayAt = [&](int x) {
-        return hn::Lt(distance2.at(x), hn::Add(hn::MulAdd(twice, bound[x], best2[x]), rest));
-    };
-    Mask may = mayAt(0);
-    for (int x = 1; x < cubeSide; ++x) may = hn::Or(may, mayAt(x));
-    return !hn::AllFalse(tag, may);
-}
-
-template <bool cube, bool withOwners>
-HWY_INLINE void applyGroups(const LayerBlockInput& input, std::span<const std::uint32_t> groups,
-                            Voxels<withOwners>& v) {
-    const LayerRun* runs = input.samples.runs().data();
-    const float half = float(input.parameters.cube), delta2 = input.parameters.delta * input.parameters.delta;
-    bool large = false;
-    for (const std::uint32_t index : groups) {
-        const LayerGroup& group = input.samples.groups()[index];
-        const bool worthALook = group.end - group.begin >= runsWorthALook;
-        large |= worthALook;
-        const std::uint32_t end = worthALook ? group.begin + 1 : group.end;
-        for (std::uint32_t r = group.begin; r < end; ++r) apply<cube>(input.samples, runs[r], half, v);
-    }
-    if (!large) return;
-    const Bounds bounds(v, delta2);
-    for (const std::uint32_t index : groups) {
-        const LayerGroup& group = input.samples.groups()[index];
-        if (group.end - group.begin < runsWorthALook) continue;
-        if (!mayImprove(v, group.sample - group.offset, group.radius, delta2, bounds.inner, v.inner2) &&
-            !mayImprove(v, group.sample + group.offset, group.radius, delta2, bounds.outer, v.outer2))
-            continue;
-        for (std::uint32_t r = group.begin + 1; r < group.end; ++r) apply<cube>(input.samples, runs[r], half, v);
-    }
-}
 
 // Writes rows of a part of a slice into the block.
 template <class D, class T>
 HWY_INLINE void putRows(D tag, hn::Vec<D> values, int part, T* corner) {
     alignas(64) T rows[sliceVoxels];
     hn::Store(values, tag, rows);
-    const int first = part * int(hn::Lanes(tag));
-    for (int i = 0; i < int(hn::Lanes(tag)); i += cubeSide)
-        std::memcpy(corner + (first + i) / cubeSide * blockSide, rows + i, cubeSide * sizeof(T));
+    const int lanes = int(hn::Lanes(tag)), inRow = std::min(lanes, cubeSide);
+    for (int i = 0, at = part * lanes; i < lanes; i += inRow, at += inRow)
+        std::memcpy(corner + at / cubeSide * blockSide + at % cubeSide, rows + i, std::size_t(inRow) * sizeof(T));
 }
 
 // Eq. 3: from both layers to signed distances. The inside keeps its sign bit where the distance is clamped to zero.
-template <bool withOwners>
-HWY_INLINE void combine(const Voxels<withOwners>& v, const FillParameters& parameters, int part, float* distances,
-                        std::int32_t* triangles) {
+template <class Nearest>
+HWY_INLINE void combine(const Nearest& inner, const Nearest& outer, const Voxels& v, const FillParameters& parameters,
+                        int part, float* distances, std::int32_t* triangles) {
     const Tag tag;
-    const Vec delta = hn::Set(tag, parameters.delta), delta2 = squareOf(delta);
-    const Vec certain2 = hn::Set(tag, parameters.certain * parameters.certain - parameters.delta * parameters.delta);
+    const Vec delta = hn::Set(tag, parameters.delta), certain2 = hn::Set(tag, parameters.certain * parameters.certain);
     for (int x = 0; x < cubeSide; ++x) {
         const int slice = x * blockSide * blockSide;
-        const auto inside = hn::Le(v.inner2[x], hn::Add(v.outer2[x], hn::Set(tag, layerTie)));
-        const Vec other2 = hn::Max(hn::Add(hn::Max(v.inner2[x], v.outer2[x]), delta2), hn::Zero(tag));
+        const Vec inner2 = hn::Min(inner.distance2(v, x), certain2), outer2 = hn::Min(outer.distance2(v, x), certain2);
+        const auto inside = hn::Le(inner2, hn::Add(outer2, hn::Set(tag, layerTie)));
+        const Vec other2 = hn::Max(hn::Max(inner2, outer2), hn::Zero(tag));
         const Vec clamped = hn::Max(hn::Sub(hn::Sqrt(other2), delta), hn::Zero(tag));
         const Vec phi = hn::IfThenElse(inside, hn::Neg(clamped), clamped);
-        const auto known = hn::Lt(hn::Min(v.inner2[x], v.outer2[x]), certain2);
+        const auto known = hn::Lt(hn::Min(inner2, outer2), certain2);
         putRows(tag, hn::IfThenElse(known, phi, hn::Set(tag, infinite)), part, distances + slice);
-        if constexpr (withOwners)
-            putRows(IntTag(), hn::IfThenElse(hn::RebindMask(IntTag(), inside), v.outerOwner[x], v.innerOwner[x]), part,
+        if (triangles)
+            putRows(IntTag(), hn::IfThenElse(hn::RebindMask(IntTag(), inside), outer.owner[x], inner.owner[x]), part,
                     triangles + slice);
     }
 }
 
-template <bool cube, bool withOwners>
-void fillCube(const LayerBlockInput& input, std::span<const std::uint32_t> groups, const glm::ivec3& inBlock,
-              float* distances, std::int32_t* triangles) {
-    const FillParameters& parameters = input.parameters;
-    const float farthest2 = parameters.certain * parameters.certain - parameters.delta * parameters.delta;
-    const int corner = (inBlock.x * blockSide + inBlock.y) * blockSide + inBlock.z;
-    for (int part = 0; part * int(hn::Lanes(Tag())) < sliceVoxels; ++part) {
-        Voxels<withOwners> voxels(input.inBrick + glm::vec3(inBlock), part, farthest2);
-        applyGroups<cube>(input, groups, voxels);
-        combine(voxels, parameters, part, distances + corner, withOwners ? triangles + corner : nullptr);
-    }
-}
-
-using CubeGroups = std::array<std::span<const std::uint32_t>, cubesPerBlock>;
-
-// The groups that reach each cube: the balls around their inner or outer samples must, and their slab.
-CubeGroups binCubes(const LayerBlockInput& input, LayerScratch& scratch) {
+// Picks the points of both layers that reach a cube: those near enough or, with the paper's cubes, those whose
+// neighbourhood meets it.
+template <bool cube>
+HWY_INLINE void pick(const LayerBlockInput& input, const glm::vec3& middle, std::span<const LayerSamples::Range> ranges,
+                     LayerPoints& inner, LayerPoints& outer) {
     const Tag tag;
-    const std::size_t lanes = hn::Lanes(tag), count = input.reaching.size(),
-                      stride = (count + lanes - 1) / lanes * lanes;
-    enum Row { inner, outer = inner + 3, normal = outer + 3, reach = normal + 3, slab, rows };
-    // columns beyond the last group reach nothing
-    scratch.columns.resize(stride * rows);
-    float* columns = scratch.columns.data();
-    // the paper's cube of (2K + 1)^3 voxels is around the sample itself, and sticks out of the ball
-    const bool cubes = input.parameters.cube > 0;
-    const float slabReach = input.parameters.reach * (cubes ? std::sqrt(3.f) : 1.f),
-                ballReach = cubes ? slabReach : input.parameters.certain;
-    for (std::size_t i = 0; i < count; ++i) {
-        const LayerGroup& group = input.samples.groups()[input.reaching[i]];
-        const glm::vec3 at = group.sample - input.inBrick, offset = cubes ? glm::vec3(0) : group.offset;
-        const auto put = [&](int row, float value) { columns[std::size_t(row) * stride + i] = value; };
-        for (int axis = 0; axis < 3; ++axis) {
-            put(inner + axis, at[axis] - offset[axis]);
-            put(outer + axis, at[axis] + offset[axis]);
-            put(normal + axis, group.normal[axis]);
-        }
-        put(reach, group.radius + ballReach);
-        put(slab, group.thickness + slabReach);
-    }
-    for (std::size_t i = count; i < stride; ++i)
-        for (int row = 0; row < rows; ++row) columns[std::size_t(row) * stride + i] = -1;
-    scratch.groups.resize(count * cubesPerBlock);
-    std::size_t ends[cubesPerBlock];
-    for (int cube = 0; cube < cubesPerBlock; ++cube) ends[cube] = std::size_t(cube) * count;
-    constexpr float half = 0.5f * float(cubeSide - 1);
-    for (std::size_t i = 0; i < count; i += lanes) {
-        const auto row = [&](int r) { return hn::LoadU(tag, columns + std::size_t(r) * stride + i); };
-        Vec toInner2[3][cubesPerSide], toOuter2[3][cubesPerSide], height[3][cubesPerSide];
-        Vec slabWidth = row(slab);
-        for (int axis = 0; axis < 3; ++axis) {
-            const Vec in = row(inner + axis), out = row(outer + axis), up = row(normal + axis);
-            const Vec centre = hn::Mul(hn::Set(tag, 0.5f), hn::Add(in, out));
-            for (int side = 0; side < cubesPerSide; ++side) {
-                const Vec middle = hn::Set(tag, float(side * cubeSide) + half);
-                const auto away2 = [&](Vec from) {
-                    return squareOf(
-                        hn::Max(hn::Sub(hn::Abs(hn::Sub(middle, from)), hn::Set(tag, half)), hn::Zero(tag)));
-                };
-                toInner2[axis][side] = away2(in);
-                toOuter2[axis][side] = away2(out);
-                height[axis][side] = hn::Mul(hn::Sub(middle, centre), up);
+    const SampleColumns& columns = input.samples.columns();
+    const float* places[] = {columns.place[0].data(), columns.place[1].data(), columns.place[2].data()};
+    const float* offsets[] = {columns.offset[0].data(), columns.offset[1].data(), columns.offset[2].data()};
+    const Vec reach2 = hn::Set(tag, input.parameters.certain * input.parameters.certain),
+              half = hn::Set(tag, float(input.parameters.cube) + halfCube),
+              centre[] = {hn::Set(tag, middle.x), hn::Set(tag, middle.y), hn::Set(tag, middle.z)};
+    for (const LayerSamples::Range& range : ranges)
+        for (std::uint32_t i = range.begin; i < range.end; i += std::uint32_t(hn::Lanes(tag))) {
+            Mask among = hn::FirstN(tag, range.end - i);
+            Vec in[3], out[3];
+            for (int axis = 0; axis < 3; ++axis) {
+                const Vec place = hn::LoadU(tag, places[axis] + i), offset = hn::LoadU(tag, offsets[axis] + i),
+                          at = hn::Sub(place, centre[axis]);
+                if constexpr (cube) {
+                    const Vec nearest = hn::Floor(hn::Add(place, hn::Set(tag, 0.5001f)));
+                    among = hn::And(among, hn::Le(hn::Abs(hn::Sub(nearest, centre[axis])), half));
+                }
+                in[axis] = hn::Sub(at, offset);
+                out[axis] = hn::Add(at, offset);
             }
-            slabWidth = hn::MulAdd(hn::Set(tag, half), hn::Abs(up), slabWidth);
+            inner.put(i, in[0], in[1], in[2], among, reach2);
+            outer.put(i, out[0], out[1], out[2], among, reach2);
         }
-        const Vec reaches = row(reach), reach2 = squareOf(reaches);
-        const Mask real = hn::Gt(reaches, hn::Zero(tag));
-        for (int cube = 0; cube < cubesPerBlock; ++cube) {
-            const int a = cube / 4, b = cube / 2 % 2, c = cube % 2;
-            const auto sum = [&](const Vec(&of)[3][cubesPerSide]) {
-                return hn::Add(hn::Add(of[0][a], of[1][b]), of[2][c]);
-            };
-            const Mask ball = hn::Lt(hn::Min(sum(toInner2), sum(toOuter2)), reach2);
-            const Mask plane = hn::Lt(hn::Abs(sum(height)), slabWidth);
-            std::uint8_t bytes[8] = {};
-            hn::StoreMaskBits(tag, hn::And(real, hn::And(ball, plane)), bytes);
-            std::uint64_t bits;
-            std::memcpy(&bits, bytes, sizeof bits);
-            std::uint32_t* to = scratch.groups.data() + ends[cube];
-            ends[cube] += std::size_t(std::popcount(bits));
-            for (; bits != 0; bits &= bits - 1) *to++ = input.reaching[i + std::size_t(std::countr_zero(bits))];
-        }
-    }
-    CubeGroups groups;
-    for (int cube = 0; cube < cubesPerBlock; ++cube)
-        groups[std::size_t(cube)] = {scratch.groups.data() + std::size_t(cube) * count,
-                                     scratch.groups.data() + ends[cube]};
-    return groups;
 }
 
-void fillLayerBlock(const LayerBlockInput& input, LayerScratch& scratch, float* distances, std::int32_t* triangles) {
-    const CubeGroups groups = binCubes(input, scratch);
-    for (int cube = 0; cube < cubesPerBlock; ++cube) {
-        const glm::ivec3 inBlock = cubeSide * glm::ivec3(cube / 4, cube / 2 % 2, cube % 2);
-        const auto fill = input.parameters.cube > 0 ? (triangles ? fillCube<true, true> : fillCube<true, false>)
-                                                    : (triangles ? fillCube<false, true> : fillCube<false, false>);
-        fill(input, groups[std::size_t(cube)], inBlock, distances, triangles);
+template <bool cube, bool withOwners>
+bool fillCube(const LayerBlockInput& input, const glm::ivec3& inBlock, LayerScratch& scratch, LayerPoints inner,
+              LayerPoints outer, float* distances, std::int32_t* triangles) {
+    const glm::ivec3 inBrick = input.inBrick + inBlock;
+    const glm::vec3 middle = glm::vec3(inBrick) + halfCube;
+    pick<cube>(input, middle, input.samples.near(inBrick / cubeSide, 1, scratch.near), inner, outer);
+    const int corner = (inBlock.x * blockSide + inBlock.y) * blockSide + inBlock.z;
+    if (inner.count + outer.count == 0) {
+        for (int x = 0; x < cubeSide; ++x)
+            for (int y = 0; y < cubeSide; ++y)
+                std::fill_n(distances + corner + (x * blockSide + y) * blockSide, cubeSide, infinite);
+        return false;
     }
+    for (int part = 0; part * int(hn::Lanes(Tag())) < sliceVoxels; ++part) {
+        const Voxels voxels(part);
+        const Nearest<cube, withOwners> nearestInner(input, inner, middle, voxels),
+            nearestOuter(input, outer, middle, voxels);
+        combine(nearestInner, nearestOuter, voxels, input.parameters, part, distances + corner,
+                withOwners ? triangles + corner : nullptr);
+    }
+    return true;
+}
+
+bool fillLayerBlock(const LayerBlockInput& input, LayerScratch& scratch, float* distances, std::int32_t* triangles) {
+    const auto fill = input.parameters.cube > 0 ? (triangles ? fillCube<true, true> : fillCube<true, false>)
+                                                : (triangles ? fillCube<false, true> : fillCube<false, false>);
+    bool any = false;
+    if (input.samples.near(input.inBrick / cubeSide, cubesPerSide, scratch.near).empty()) return false;
+    const std::size_t size = input.samples.count() + hn::Lanes(Tag());
+    const LayerPoints inner(scratch.inner, size), outer(scratch.outer, size);
+    for (int cube = 0; cube < cubesPerBlock; ++cube)
+        any |= fill(input, cubeSide * glm::ivec3(cube / 4, cube / 2 % 2, cube % 2), scratch, inner, outer, distances,
+                    triangles);
+    return any;
 }
 
 const char* targetName() {
@@ -353,8 +262,8 @@ namespace bilayer {
 HWY_EXPORT(fillLayerBlock);
 HWY_EXPORT(targetName);
 
-void fillLayerBlock(const LayerBlockInput& input, LayerScratch& scratch, float* distances, std::int32_t* triangles) {
-    HWY_DYNAMIC_DISPATCH(fillLayerBlock)(input, scratch, distances, triangles);
+bool fillLayerBlock(const LayerBlockInput& input, LayerScratch& scratch, float* distances, std::int32_t* triangles) {
+    return HWY_DYNAMIC_DISPATCH(fillLayerBlock)(input, scratch, distances, triangles);
 }
 
 const char* simdName() {

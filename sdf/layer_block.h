@@ -1,13 +1,12 @@
 // Both layers of one 8x8x8 block and the signed distances between them (section 3.2 and Eq. 3 of the paper).
 //
-// The block is taken in cubes of 4x4x4 voxels, whose squared distances to both layers stay in registers while all runs
-// of samples that reach the cube are applied. Large groups of runs are left out where none of their samples can be
-// nearer than what the others gave.
+// The block is taken in cubes of 4x4x4 voxels. The points of both layers that reach a cube are picked from the cells
+// around it, then the voxels' nearest ones are kept in registers while all picked points are applied.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <glm/vec3.hpp>
-#include <span>
 #include <vector>
 
 #include "sdf/blocks.h"
@@ -15,22 +14,26 @@
 
 namespace bilayer {
 
-/// What reaches a block.
+/// What a block is filled from.
 struct LayerBlockInput {
-    std::span<const std::uint32_t> reaching;  ///< indices of groups
     const LayerSamples& samples;
-    glm::vec3 inBrick;  ///< the block's first voxel in the voxels of the brick
+    glm::ivec3 inBrick;  ///< the block's first voxel in the voxels of the brick
     const FillParameters& parameters;
 };
 
-/// Groups of a block in columns, and those of each of its cubes. Memory is used again from block to block.
+/// Both layers around a cube, seen from its middle. Memory is used again from cube to cube.
 struct LayerScratch {
-    std::vector<float> columns;
-    std::vector<std::uint32_t> groups;
+    struct Layer {
+        std::array<std::vector<float>, 4> columns;
+        std::vector<std::uint32_t> picked;
+    };
+    Layer inner, outer;
+    std::vector<LayerSamples::Range> near;
 };
 
-/// Fills a block with signed distances [voxels]; +infinity where unknown.
+/// Fills a block with signed distances [voxels]; +infinity where unknown. Returns whether any sample reaches the block;
+/// else nothing is written.
 /// @param triangles  if not null, receives the owners of the samples that decide
-void fillLayerBlock(const LayerBlockInput& input, LayerScratch& scratch, float* distances, std::int32_t* triangles);
+bool fillLayerBlock(const LayerBlockInput& input, LayerScratch& scratch, float* distances, std::int32_t* triangles);
 
 }  // namespace bilayer

@@ -1,100 +1,109 @@
-// The samples of the double layer method in one brick: parts of triangles spread out into runs, runs gathered into
-// groups that a block can look at or leave out as a whole.
+// The samples of the double layer method in one brick: triangles spread out into samples, sorted by cells of space, in
+// columns that SIMD instructions read many of at once.
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
+#include <glm/common.hpp>
 #include <glm/vec3.hpp>
+#include <optional>
 #include <span>
 #include <vector>
 
-#include "sdf/cell_sort.h"
-#include "sdf/tile_cutter.h"
+#include "sdf/build.h"
 
 namespace bilayer {
 
-/// Samples of one part of a triangle. They lie in a plane, and their inner and outer samples are the same offset away
-/// from all of them. So for a voxel p with squared distance A to the nearest of them and height h over the plane, the
-/// nearest inner and outer samples are at squared distances A + delta^2 + 2 delta h and A + delta^2 - 2 delta h.
-struct LayerRun {
-    glm::vec3 twiceOffset;     ///< 2 delta times the outward normal [voxels]
-    std::int32_t triangle;     ///< owner
-    std::uint32_t begin, end;  ///< its samples, at least one
+/// What samples are made for.
+struct SampledBrick {
+    glm::ivec3 origin;  ///< index coordinates of its first voxel
+    int side;           ///< [voxels]
+    float reach;        ///< samples farther than this from the brick are left out [voxels]
+    double voxelsPerUnit;
+    const DoubleLayerOptions& options;
 };
 
-/// Runs that lie together.
-struct LayerGroup {
-    glm::vec3 sample;  ///< the middle of all samples, in the voxels of the brick
-    /// No sample is farther from the middle, no inner or outer sample from the middle less or plus `offset` [voxels].
-    float radius;
-    glm::vec3 normal;          ///< of a plane through the middle
-    float thickness;           ///< no sample is farther from that plane [voxels]
-    glm::vec3 offset;          ///< mean of the runs' offsets [voxels]
-    std::uint32_t begin, end;  ///< its runs; the first one is near the middle
+/// Samples in columns. As many numbers may be read, and written, beyond the last as a SIMD vector holds.
+struct SampleColumns {
+    std::array<std::vector<float>, 3> place;   ///< in the voxels of the brick
+    std::array<std::vector<float>, 3> offset;  ///< of the outer layer from it, minus that of the inner layer [voxels]
+    std::vector<std::int32_t> triangle;        ///< owner
+
+    /// Makes room for so many; memory only grows.
+    void reserve(std::size_t count);
+};
+
+/// Samples in the order of their triangles.
+struct AddedSamples {
+    SampleColumns columns;
+    std::vector<std::int32_t> cell;
+    std::size_t count = 0;
+
+    /// Makes room for so many.
+    void reserve(std::size_t size) {
+        columns.reserve(size);
+        if (cell.size() < columns.triangle.size()) cell.resize(columns.triangle.size());
+    }
+};
+
+/// The cells of a brick.
+struct SampleCells {
+    int around = 1;                ///< cells beyond the brick, and around a cell that it looks at
+    int size = 1;                  ///< cells along each axis
+    float firstCorner = 0;         ///< of all cells, on each axis
+    glm::vec3 lower{0}, upper{0};  ///< of all places that can matter
 };
 
 /// The samples of a brick. Memory is used again from brick to brick.
 class LayerSamples {
   public:
+    /// Side of a cell [voxels]. Cell (0, 0, 0) is around the first voxels of the brick, half a voxel beyond them.
+    static constexpr int cellSide = 4;
+
     /// The lattice point nearest to a place. Halves go up, whatever the rounding.
     static glm::vec3 nearestLattice(const glm::vec3& place) { return glm::floor(place + 0.5001f); }
 
     /// Begins with a brick.
-    /// @param origin  index coordinates of its first voxel
-    /// @param side    [voxels]
-    /// @param reach   samples farther than this from the brick are left out [voxels]
-    /// @param delta   distance of each layer from the surface [voxels]
-    /// @param cells   whether the lattice point nearest to each sample is asked for
-    void begin(const glm::ivec3& origin, int side, float reach, float delta, bool cells);
+    void begin(const SampledBrick& brick);
 
-    /// Adds the samples of a part of a triangle.
-    [[gnu::always_inline]] void add(const TilePart& part, std::uint32_t triangle) {
-        if (part.rows == 1 && !wantCells_)
-            addOne(part, triangle);
-        else
-            addRows(part, triangle);
-    }
+    /// Adds the samples of triangles.
+    void add(const Mesh& mesh, std::span<const std::uint32_t> triangles);
 
-    /// Gathers runs into groups; call it after the last tile.
+    /// Sorts the samples; call it after the last triangle.
     void finish();
 
-    std::span<const LayerGroup> groups() const { return groups_; }
-    std::span<const LayerRun> runs() const { return runs_; }
-    std::span<const glm::vec3> places() const { return places_; }  ///< of all samples, in the voxels of the brick
-    std::span<const glm::vec3> cells() const { return cells_; }    ///< the lattice points nearest to them, if asked for
+    std::size_t count() const { return added_.count; }
+    const SampleColumns& columns() const { return sorted_; }
+
+    /// Samples `begin` to `end` - 1.
+    struct Range {
+        std::uint32_t begin, end;
+    };
+
+    /// Tells which samples may reach some cells, and perhaps others.
+    /// @param cells   along each axis
+    /// @param memory  that of the result
+    std::span<const Range> near(const glm::ivec3& first, int cells, std::vector<Range>& memory) const {
+        const int along = cells + 2 * cells_.around;
+        if (memory.size() < std::size_t(along * along)) memory.resize(std::size_t(along * along));
+        std::size_t count = 0;
+        for (int x = first.x; x < first.x + along; ++x)
+            for (int y = first.y; y < first.y + along; ++y) {
+                // written in any case and kept if it holds some: a branch would be guessed wrong half of the time
+                const std::uint32_t* row = begins_.data() + (x * cells_.size + y) * cells_.size + first.z;
+                memory[count] = {row[0], row[along]};
+                count += row[0] < row[along];
+            }
+        return {memory.data(), count};
+    }
 
   private:
-    // Most parts of a fine mesh have one sample.
-    [[gnu::always_inline]] void addOne(const TilePart& part, std::uint32_t triangle) {
-        const TriangleCorners& c = part.corners;
-        const glm::vec3 place((c[0] + c[1] + c[2]) * (1.0 / 3.0) - origin_);
-        if (staysAway(place, place)) return;
-        places_.push_back(place);
-        addRun(part, triangle, std::uint32_t(places_.size() - 1));
-    }
-    // A run of all places from `begin` on.
-    [[gnu::always_inline]] void addRun(const TilePart& part, std::uint32_t triangle, std::uint32_t begin) {
-        areas_ += part.length;
-        // divided in double: floats cannot hold the area of a very small triangle
-        const glm::vec3 normal(part.normal / part.length);
-        runs_.push_back({twiceDelta_ * normal, std::int32_t(triangle), begin, std::uint32_t(places_.size())});
-    }
-    void addRows(const TilePart& part, std::uint32_t triangle);
-    bool staysAway(const glm::vec3& lower, const glm::vec3& upper) const {
-        return glm::any(glm::lessThan(upper, lower_)) || glm::any(glm::greaterThan(lower, upper_));
-    }
-    LayerGroup groupOf(std::uint32_t run) const;
-    void gatherRuns();
-    LayerGroup cluster(std::uint32_t begin, std::uint32_t end);
-
-    glm::dvec3 origin_{0};
-    glm::vec3 lower_{0}, upper_{0};  // of all places that can matter
-    float twiceDelta_ = 1;
-    bool wantCells_ = false;
-    double areas_ = 0;  // of all runs' triangles, twice [voxels^2]
-    std::vector<LayerGroup> groups_;
-    std::vector<LayerRun> runs_;
-    CellSort<LayerRun> sort_;
-    std::vector<glm::vec3> places_, cells_;
+    std::optional<SampledBrick> brick_;
+    SampleCells cells_;
+    AddedSamples added_;
+    std::vector<std::uint32_t> begins_;
+    SampleColumns sorted_;
 };
 
 }  // namespace bilayer

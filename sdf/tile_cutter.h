@@ -20,6 +20,15 @@ struct TilePart {
     double length;             ///< of the normal
 };
 
+/// Algorithm 1 divides the longest edge into as many parts as the others. For a triangle of ordinary shape a part is at
+/// most 2 sqrt(epsilon) long (half a square: exactly 2); beyond this factor the triangle counts as a sliver.
+inline constexpr double sliverStep = 3.0;
+
+/// A triangle with an area up to epsilon has one sample if the square of its longest edge is at most this [voxels^2].
+inline double longestOfOneSample2(const DoubleLayerOptions& options) {
+    return sliverStep * sliverStep * double(options.epsilon);
+}
+
 /// Calls emit(const TilePart&) for the parts of one triangle.
 template <class Emit>
 class TileCutter {
@@ -30,11 +39,19 @@ class TileCutter {
 
     /// A triangle without area gives no part.
     void cut(const TriangleCorners& c) {
-        normal_ = glm::cross(c[1] - c[0], c[2] - c[0]);
-        length_ = glm::length(normal_);
-        if (!(length_ > 0)) return;
-        const double area = 0.5 * length_, longest2 = longestEdge2(c);
-        if (area <= epsilon_ && longest2 <= sliverStep * sliverStep * epsilon_) return emit(c, 1);
+        const glm::dvec3 normal = glm::cross(c[1] - c[0], c[2] - c[0]);
+        const double length = glm::length(normal);
+        if (length > 0) cut(c, normal, length, longestEdge2(c));
+    }
+
+    /// The same with what is known already.
+    /// @param normal    outward, of any length above zero
+    /// @param longest2  square of the longest edge
+    void cut(const TriangleCorners& c, const glm::dvec3& normal, double length, double longest2) {
+        normal_ = normal;
+        length_ = length;
+        const double area = 0.5 * length_;
+        if (area <= epsilon_ && longest2 <= longestOfOneSample2(options_)) return emit(c, 1);
         if (options_.subdivision == Subdivision::recursive)
             recurse(c, area, longest2);
         else
@@ -42,10 +59,6 @@ class TileCutter {
     }
 
   private:
-    /// Algorithm 1 divides the longest edge into as many parts as the others. For a triangle of ordinary shape a part
-    /// is at most 2 sqrt(epsilon) long (half a square: exactly 2); beyond this factor the triangle counts as a sliver.
-    static constexpr double sliverStep = 3.0;
-
     using Next = void (TileCutter::*)(const TriangleCorners&, double area, double longest2);
 
     static double longestEdge2(const TriangleCorners& c) {

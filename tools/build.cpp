@@ -28,6 +28,9 @@ const std::map<std::string, Method> methods{{"exact", Method::exact},
 const std::map<std::string, Sign> signs{
     {"auto", Sign::automatic}, {"normals", Sign::normals}, {"winding", Sign::winding}, {"flood", Sign::flood}};
 const std::map<std::string, BandUnit> bandUnits{{"voxels", BandUnit::voxels}, {"world", BandUnit::world}};
+const std::map<std::string, KernelMapping> mappings{{"auto", KernelMapping::automatic},
+                                                    {"block", KernelMapping::blockPerItem},
+                                                    {"group", KernelMapping::groupPerBlock}};
 constexpr double thinnestBand = 1e-3, widestBand = 1e3;  // [voxels]
 
 struct Arguments {
@@ -35,13 +38,13 @@ struct Arguments {
     BuildOptions options;
     float resolution = 0;
     float halfWidth = 3;
-    std::string bandUnit = "voxels", method = "exact", backend = "tbb", sign = "auto", device;
+    std::string bandUnit = "voxels", method = "exact", backend = "tbb", sign = "auto", device, mapping = "auto";
     std::uint64_t deviceMemory = 0;
     VdbOptions stored;
     bool fill = false, json = false;
     CLI::Option *resolutionGiven = nullptr, *halfGiven = nullptr, *exteriorGiven = nullptr, *interiorGiven = nullptr;
     CLI::Option* gapGiven = nullptr;
-    CLI::Option *deviceGiven = nullptr, *memoryGiven = nullptr;
+    CLI::Option *deviceGiven = nullptr, *memoryGiven = nullptr, *mappingGiven = nullptr;
     std::vector<CLI::Option*> layerOptions;  // what only the double layer method understands
 };
 
@@ -54,8 +57,10 @@ struct Outcome {
 };
 
 void requireUsage(const Arguments& a) {
-    if (a.backend != "opencl" && (a.deviceGiven->count() || a.memoryGiven->count()))
-        throw CLI::ValidationError("--device and --device-memory", "need --backend opencl");
+    if (a.backend != "opencl" && (a.deviceGiven->count() || a.memoryGiven->count() || a.mappingGiven->count()))
+        throw CLI::ValidationError("--device, --device-memory and --mapping", "need --backend opencl");
+    if (a.backend == "opencl" && a.method == "pseudonormal")
+        throw CLI::ValidationError("--method pseudonormal", "needs --backend tbb");
     const bool layers = a.method == "double-layer", prism = a.method == "prism";
     if (prism && a.backend != "opencl") throw CLI::ValidationError("--method prism", "needs --backend opencl");
     for (const CLI::Option* option : a.layerOptions)
@@ -89,17 +94,10 @@ void requireBand(const Arguments& a) {
     requireWidth(a.interiorGiven, a.options.interiorWidth, a);
 }
 
-// What this version has not got.
-void requirePresent(const Arguments& a) {
-    if (a.backend == "opencl" && a.method != "double-layer" && a.method != "prism")
-        throw std::runtime_error(
-            fmt::format("--backend opencl: has no method {}, give it --method double-layer", a.method));
-}
-
 // Nothing for the processor.
 std::optional<BlockFiller> makeFiller(const Arguments& a) {
     if (a.backend == "tbb") return std::nullopt;
-    return openclFiller(openDevice(a.device), {.memoryMiB = a.deviceMemory});
+    return openclFiller(openDevice(a.device), {.memoryMiB = a.deviceMemory, .mapping = mappings.at(a.mapping)});
 }
 
 LevelSet timedBuild(const Mesh& mesh, const Arguments& a, Outcome& outcome) {
@@ -164,7 +162,6 @@ void run(Arguments a) {
     a.options.bandUnit = bandUnits.at(a.bandUnit);
     // in the mesh's unit they wait for the voxel size
     if (a.options.bandUnit == BandUnit::voxels || !a.resolutionGiven->count()) requireBand(a);
-    requirePresent(a);
     a.options.method = methods.at(a.method);
     a.options.sign = signs.at(a.sign);
     std::optional<tbb::global_control> threads;
@@ -249,6 +246,10 @@ void addMachine(CLI::App& command, Arguments& a) {
     a.deviceGiven = command.add_option("--device", a.device, "part of an OpenCL device's or platform's name");
     a.memoryGiven = command.add_option("--device-memory", a.deviceMemory, "most memory of the device to use [MiB]")
                         ->check(CLI::Range(std::uint64_t(1), std::uint64_t(1) << 30));
+    a.mappingGiven = command
+                         .add_option("--mapping", a.mapping,
+                                     "how kernels share blocks out: auto (default), block (an item each) or group")
+                         ->check(CLI::IsMember(mappings));
     command.add_option("--threads", a.options.threads, "most threads, default all")->check(CLI::Range(1, 4096));
 }
 

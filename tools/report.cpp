@@ -110,6 +110,7 @@ Json toJson(const DeviceInfo& device) {
             {"driver", device.driver},
             {"gpu", device.gpu},
             {"computeUnits", device.computeUnits},
+            {"doublePrecision", device.doubles},
             {"memoryBytes", device.memoryBytes},
             {"maxAllocationBytes", device.maxAllocationBytes}};
 }
@@ -126,7 +127,8 @@ void runDevices(const Arguments& a) {
         Table table(device.name);
         table.row("platform", fmt::format("{} ({})", device.platform, device.version));
         table.row("driver", device.driver);
-        table.row("kind", fmt::format("{}, {} compute units", device.gpu ? "GPU" : "no GPU", device.computeUnits));
+        table.row("kind", fmt::format("{}, {} compute units, {}", device.gpu ? "GPU" : "no GPU", device.computeUnits,
+                                      device.doubles ? "double precision" : "single precision only: prism alone"));
         table.row("memory",
                   fmt::format("{}, {} in one piece", bytes(device.memoryBytes), bytes(device.maxAllocationBytes)));
         table.print();

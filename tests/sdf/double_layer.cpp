@@ -139,7 +139,7 @@ void compare(const Mesh& mesh, const BuildOptions& options, int k) {
 
 TEST_CASE("in the band, a voxel has the distance that all samples together give it") {
     const Mesh knot = shapes::torusKnot(2, 3, 5, 1, 150, 12), box = shapes::box({6, 4, 2});
-    for (const float width : {0.5f, 1.f, 2.f, 3.f, 7.f}) {
+    for (const float width : {0.5f, 1.f, 2.f, 3.f, 3.499f, 7.f}) {  // 3.499: cells end where samples do
         compare(knot, {.voxelSize = 0.5f, .exteriorWidth = width, .interiorWidth = width}, -1);
         compare(box, {.voxelSize = 0.31f, .exteriorWidth = width, .interiorWidth = width}, -1);
     }
@@ -191,7 +191,7 @@ TEST_CASE("the triangle of a voxel is the owner of the sample that decides its d
 }
 
 TEST_CASE("a triangle whose area floats cannot hold changes nothing but what is at it") {
-    Mesh mesh = shapes::sphere(1, 5);  // several triangles a voxel: runs are gathered
+    Mesh mesh = shapes::sphere(1, 5);  // several triangles a voxel
     const BuildOptions options = layered({.voxelSize = 0.15f});
     const LevelSet before = build(mesh, options);
     const auto first = unsigned(mesh.points.size());

@@ -105,13 +105,6 @@ TEST_CASE("voxel sizes that no machine can serve are refused at once") {
     CHECK_FALSE(std::filesystem::exists(output()));
 }
 
-TEST_CASE("what this version does not have") {
-    requireFault(buildOf(sphereFile(), {"--voxel-size", "0.1", "--backend", "opencl"}), "has no method exact");
-    requireFault(buildOf(sphereFile(), {"--voxel-size", "0.1", "--backend", "opencl", "--method", "pseudonormal"}),
-                 "has no method pseudonormal");
-    CHECK_FALSE(std::filesystem::exists(output()));
-}
-
 TEST_CASE("devices that are not there") {
     requireFault(buildOf(sphereFile(), {"--voxel-size", "0.1", "--method", "double-layer", "--backend", "opencl",
                                         "--device", "no such device"}),
@@ -120,6 +113,11 @@ TEST_CASE("devices that are not there") {
 
 TEST_CASE("wrong usage") {
     const std::string mesh = sphereFile().string();
+    requireUsage({"build", mesh, "-o", output().string(), "--voxel-size", "0.1", "--backend", "opencl", "--method",
+                  "pseudonormal"},
+                 "--method pseudonormal: needs --backend tbb");
+    requireUsage({"build", mesh, "-o", output().string(), "--voxel-size", "0.1", "--mapping", "group"},
+                 "need --backend opencl");
     requireUsage({});
     requireUsage({"unknown"});
     requireUsage({"build"});

@@ -340,12 +340,16 @@ TEST_CASE("build on an OpenCL device gives the same voxels") {
         WARN("skipped: there is no OpenCL device");
         return;
     }
-    const auto tbb = build(scratch("tbb.vdb").string(), {"--voxel-size", "0.05", "--method", "double-layer"});
+    const std::string method = GENERATE("exact", "double-layer"), mapping = GENERATE("auto", "block", "group");
+    CAPTURE(method, mapping);
+    const auto tbb = build(scratch("tbb.vdb").string(), {"--voxel-size", "0.1", "--method", method});
     const auto cl =
-        build(scratch("cl.vdb").string(), {"--voxel-size", "0.05", "--method", "double-layer", "--backend", "opencl",
-                                           "--device", devices[0]["name"], "--device-memory", "512"});
+        build(scratch("cl.vdb").string(), {"--voxel-size", "0.1", "--method", method, "--backend", "opencl", "--device",
+                                           devices[0]["name"], "--device-memory", "512", "--mapping", mapping});
     CHECK(cl["backend"] == "opencl");
     CHECK(cl["device"] == devices[0]["name"]);
+    CHECK(cl["method"] == method);
+    CHECK(cl["sign"] == tbb["sign"]);
     CHECK(cl["activeVoxels"] == tbb["activeVoxels"]);
 }
 
