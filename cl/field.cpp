@@ -64,8 +64,8 @@ struct DeviceField::Data {
     const bool gpuMapping;
     DeviceMemory memory;
     cl::Program program;
-    DeviceLayout layout;
     std::optional<FieldLayout> shared;  // what the layout's buffers lie in where host and device share memory
+    DeviceLayout layout;
     std::array<Batch, batchesInFlight> batches;
     std::mutex mutex;  // guards `batches`
 
