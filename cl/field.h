@@ -24,8 +24,10 @@ class DeviceField {
     DeviceField(const Device& device, const LevelSet& levelSet, const OpenclOptions& options = {});
 
     /// Builds the field of a mesh on the device, where it stays: only the mesh goes up, and only counts come down. It
-    /// answers as that of build(mesh, build, openclFiller(device, options)). At its peak that takes about 2.4 times the
-    /// memory of the field. The nearest triangles are not kept.
+    /// answers as that of build(mesh, build, openclFiller(device, options)); but where the double layer method's signs
+    /// contradict each other, as on a mesh inside out, empty space may be on the other side. At its peak that takes
+    /// about 1.7 times the memory of the field, and a quarter of what the options allow for the fill. The nearest
+    /// triangles are not kept.
     /// @param options  `times` receives what the build took
     /// Throws what build() throws, and std::invalid_argument for what needs the processor: a method other than
     /// Method::exact and Method::doubleLayer, and signs other than from normals, also where those contradict each

@@ -27,8 +27,9 @@ size_t indexOf(int3 at, int3 size) {
     return ((size_t)(at.x) * size.y + at.y) * size.z + at.z;
 }
 
-int3 placeAt(size_t index, int3 size) {
-    return (int3)((int)(index / size.z / size.y), (int)(index / size.z % size.y), (int)(index % size.z));
+int3 placeAt(uint index, int3 size) {
+    const uint row = index / (uint)(size.z), slice = row / (uint)(size.y);
+    return (int3)((int)(slice), (int)(row - slice * size.y), (int)(index - row * size.z));
 }
 
 // Where a voxel of a block is, apron included.

@@ -202,9 +202,9 @@ int3 apronVoxel(int i) {
 
 // Copies the first layers of voxels of the upper neighbours, an entry of the directory for each group.
 GROUP_KERNEL void fillAprons(Frame frame, global const int* directory, global float* values) {
-    const int3 size = vload3(0, frame.blocks), block = placeAt(get_group_id(0), size);
     const int entry = directory[get_group_id(0)];
     if (entry < 0) return;
+    const int3 block = placeAt((uint)(get_group_id(0)), vload3(0, frame.blocks));
     for (int i = (int)(ITEM); i < BLOCK_FLOATS - BLOCK_VOXELS; i += ITEMS) {
         const int3 voxel = apronVoxel(i);
         const int other = entryAt(&frame, directory, block + (voxel >> 3));
@@ -233,7 +233,7 @@ bool conflict(float a, float b, bool empty, float voxelSize) {
 // others of the other side; an entry of the directory for each group.
 GROUP_KERNEL void countConflicts(Frame frame, global const int* directory, global const float* values,
                                  global Summary* summary) {
-    const int3 size = vload3(0, frame.blocks), block = placeAt(get_group_id(0), size);
+    const int3 block = placeAt((uint)(get_group_id(0)), vload3(0, frame.blocks));
     const int entry = directory[get_group_id(0)];
     int found = 0;
     for (int axis = 0; axis < 3; ++axis) {
@@ -255,14 +255,18 @@ GROUP_KERNEL void countConflicts(Frame frame, global const int* directory, globa
     if (found) atomic_add(&summary->conflicts, found);
 }
 
+// The part of space that this work-item is for; some are beyond the last along z.
+int3 ownPart(void) {
+    return (int3)((int)(get_global_id(2)), (int)(get_global_id(1)), (int)(get_global_id(0)));
+}
+
 // The start of the clearances: 0 for parts that meet the surface, `far` for others. A work-item does a part.
 kernel void measureParts(Frame frame, float far, global const int* directory, global const float* values,
                          global float* ways, global Part* parts) {
     const int perBlock = BLOCK_SIDE / PART_SIDE;
-    const int3 size = vload3(0, frame.blocks), partCounts = perBlock * size;
-    const size_t p = get_global_id(0);
-    if (p >= (size_t)(partCounts.x) * partCounts.y * partCounts.z) return;
-    const int3 part = placeAt(p, partCounts), block = part / perBlock;
+    const int3 size = vload3(0, frame.blocks), part = ownPart(), block = part / perBlock;
+    if (part.z >= perBlock * size.z) return;
+    const size_t p = indexOf(part, perBlock * size);
     const int entry = directory[indexOf(block, size)];
     if (entry < 0) {
         ways[p] = far;
@@ -285,9 +289,9 @@ kernel void measureParts(Frame frame, float far, global const int* directory, gl
 // Squared ways along one more axis: transformLine() of sdf/field_layout.cpp. A work-item does a part.
 kernel void spreadParts(Frame frame, int axis, global const float* from, global float* to) {
     const int3 size = BLOCK_SIDE / PART_SIDE * vload3(0, frame.blocks);
-    const size_t p = get_global_id(0), step = axis == 0 ? (size_t)(size.y) * size.z : axis == 1 ? size.z : 1;
-    if (p >= (size_t)(size.x) * size.y * size.z) return;
-    const int3 part = placeAt(p, size);
+    const int3 part = ownPart();
+    if (part.z >= size.z) return;
+    const size_t p = indexOf(part, size), step = axis == 0 ? (size_t)(size.y) * size.z : axis == 1 ? size.z : 1;
     const int i = axis == 0 ? part.x : axis == 1 ? part.y : part.z,
               count = axis == 0 ? size.x : axis == 1 ? size.y : size.z;
     float best = from[p];
@@ -302,7 +306,9 @@ kernel void spreadParts(Frame frame, int axis, global const float* from, global 
 }
 
 // Squared ways to ways, negative where all is inside. A work-item does a part.
-kernel void signParts(ulong count, global const float* ways, global Part* parts) {
-    const size_t p = get_global_id(0);
-    if (p < count) parts[p].centre = copysign(sqrt(ways[p]), parts[p].least);
+kernel void signParts(Frame frame, global const float* ways, global Part* parts) {
+    const int3 size = BLOCK_SIDE / PART_SIDE * vload3(0, frame.blocks), part = ownPart();
+    if (part.z >= size.z) return;
+    const size_t p = indexOf(part, size);
+    parts[p].centre = copysign(sqrt(ways[p]), parts[p].least);
 }

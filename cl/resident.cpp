@@ -21,8 +21,9 @@ extern const char* const resident_cl;  // the text of resident.cl
 
 namespace {
 
-constexpr std::size_t groupItems = 64;  // ITEMS of common.cl
-constexpr cl_int unknownEntry = -3;     // UNKNOWN of resident.cl
+constexpr std::size_t groupItems = 64;       // ITEMS of common.cl
+constexpr std::size_t itemsAlongParts = 32;  // along z: they stand side by side in memory
+constexpr cl_int unknownEntry = -3;          // UNKNOWN of resident.cl
 constexpr const char* field = "the field";
 
 // `Widths` of resident.cl.
@@ -41,6 +42,10 @@ struct Summary {
 
 glm::ivec3 vectorOf(const cl_int (&values)[3]) {
     return {values[0], values[1], values[2]};
+}
+
+std::size_t roundedUp(std::size_t count, std::size_t multiple) {
+    return (count + multiple - 1) / multiple * multiple;
 }
 
 // A batch of blocks, trimmed to the band.
@@ -73,23 +78,25 @@ class ResidentFill {
     std::size_t entries() const { return layout_.frame.entries(); }
 
     template <class... Arguments>
-    void enqueue(const char* name, std::size_t items, std::size_t local, const Arguments&... arguments) {
+    void enqueue(const char* name, const cl::NDRange& global, const cl::NDRange& local, const Arguments&... arguments) {
         cl::Kernel kernel(program_, name);
         cl_uint index = 0;
         (kernel.setArg(index++, arguments), ...);
-        const std::size_t global = (items + local - 1) / local * local;
-        device_.queue.enqueueNDRangeKernel(kernel, cl::NullRange, cl::NDRange(global), cl::NDRange(local), nullptr,
+        device_.queue.enqueueNDRangeKernel(kernel, cl::NullRange, global, local, nullptr,
                                            timing_.event(Timing::Of::kernel));
     }
     // A work-group, or a single item, for each block.
     template <class... Arguments>
-    void enqueueGroups(const char* name, std::size_t groups, const Arguments&... arguments) {
+    void enqueueBlocks(const char* name, std::size_t blocks, const Arguments&... arguments) {
         const std::size_t items = gpuMapping_ ? groupItems : 1;
-        enqueue(name, groups * items, items, arguments...);
+        enqueue(name, cl::NDRange(blocks * items), cl::NDRange(items), arguments...);
     }
+    // A work-item for each part of space that has a clearance.
     template <class... Arguments>
-    void enqueueItems(const char* name, std::size_t items, const Arguments&... arguments) {
-        enqueue(name, items, groupItems, arguments...);
+    void enqueueParts(const char* name, const Arguments&... arguments) {
+        const glm::ivec3 size = layout_.frame.parts();
+        enqueue(name, cl::NDRange(roundedUp(std::size_t(size.z), itemsAlongParts), size.y, size.x),
+                cl::NDRange(itemsAlongParts, 1, 1), arguments...);
     }
 
     Device::Impl& device_;
@@ -151,7 +158,7 @@ void ResidentFill::keep(const cl::Buffer& origins, const cl::Buffer& distances, 
     const auto buffer = [&](std::uint64_t each) { return memory_.allocate(blocks * each, field); };
     const Page page{cl_uint(blocks), buffer(sizeof(glm::ivec3)), buffer(blockVoxels * sizeof(float)),
                     buffer(sizeof(cl_int))};
-    enqueueGroups("trimBlocks", blocks, origins, distances,
+    enqueueBlocks("trimBlocks", blocks, origins, distances,
                   KernelWidths{widths_.exterior, widths_.interior, widths_.voxelSize}, page.origins, page.values,
                   page.sides, summary_);
     device_.queue.flush();
@@ -204,10 +211,12 @@ void ResidentFill::placeBlocks() {
     device_.queue.enqueueFillBuffer(next, cl_uint(0), 0, sizeof(cl_uint));
     device_.queue.enqueueFillBuffer(layout_.directory, unknownEntry, 0, entries() * sizeof(cl_int));
     for (const Page& page : pages_)
-        enqueueGroups("placeBlocks", page.blocks, frame, first, page.origins, page.values, page.sides, next,
+        enqueueBlocks("placeBlocks", page.blocks, frame, first, page.origins, page.values, page.sides, next,
                       layout_.directory, layout_.values);
-    enqueueItems("markEmpty", std::size_t(frame.blocks[0]) * frame.blocks[1], frame, layout_.directory, layout_.values);
-    enqueueGroups("fillAprons", entries(), frame, layout_.directory, layout_.values);
+    const std::size_t columns = std::size_t(frame.blocks[0]) * frame.blocks[1];
+    enqueue("markEmpty", cl::NDRange(roundedUp(columns, groupItems)), cl::NDRange(groupItems), frame, layout_.directory,
+            layout_.values);
+    enqueueBlocks("fillAprons", entries(), frame, layout_.directory, layout_.values);
     device_.queue.finish();
     for (const Page& page : pages_) memory_.free(page.bytes());
     pages_.clear();
@@ -216,7 +225,7 @@ void ResidentFill::placeBlocks() {
 
 void ResidentFill::countConflicts() {
     if (!job_.mesh.conflicts) return;
-    enqueueGroups("countConflicts", entries(), KernelFrame(layout_.frame), layout_.directory, layout_.values, summary_);
+    enqueueBlocks("countConflicts", entries(), KernelFrame(layout_.frame), layout_.directory, layout_.values, summary_);
     *job_.mesh.conflicts += std::size_t(readSummary().conflicts);
 }
 
@@ -228,12 +237,12 @@ void ResidentFill::measureClearances() {
     layout_.parts = memory_.allocate(count * sizeof(Clearance::Part), field);
     std::array<cl::Buffer, 2> ways;
     for (cl::Buffer& some : ways) some = memory_.allocate(count * sizeof(cl_float), field);
-    enqueueItems("measureParts", count, frame, far, layout_.directory, layout_.values, ways[0], layout_.parts);
+    enqueueParts("measureParts", frame, far, layout_.directory, layout_.values, ways[0], layout_.parts);
     for (cl_int axis = 2; axis >= 0; --axis) {
-        enqueueItems("spreadParts", count, frame, axis, ways[0], ways[1]);
+        enqueueParts("spreadParts", frame, axis, ways[0], ways[1]);
         std::swap(ways[0], ways[1]);
     }
-    enqueueItems("signParts", count, cl_ulong(count), ways[0], layout_.parts);
+    enqueueParts("signParts", frame, ways[0], layout_.parts);
     device_.queue.finish();
     memory_.free(ways.size() * count * sizeof(cl_float) + sizeof(Summary));
 }
