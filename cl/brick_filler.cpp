@@ -16,6 +16,7 @@
 
 #include "cl/bins.h"
 #include "cl/memory.h"
+#include "cl/setup.h"
 #include "cl/timing.h"
 #include "sdf/exact.h"
 #include "sdf/progress.h"
@@ -103,7 +104,7 @@ class Mapped {
 
 class BrickFill {
   public:
-    BrickFill(Device::Impl& device, const OpenclOptions& options, const FillJob& job);
+    BrickFill(Device::Impl& device, const OpenclOptions& options, const FillJob& job, const DeviceSink& keep);
     ~BrickFill();
     void run();
 
@@ -118,6 +119,7 @@ class BrickFill {
     void reserve(Batch& batch, const Load& load);
     void start(Batch& batch, std::size_t first, std::size_t last);
     void finish(Batch& batch);
+    void handOver(Batch& batch, std::size_t blocks);
     void fillOpen();
 
     template <class... Arguments>
@@ -132,6 +134,7 @@ class BrickFill {
 
     Device::Impl& device_;
     const FillJob& job_;
+    const DeviceSink& keep_;
     const bool gpuMapping_;
     OpenclTimes* times_;
     Timing timing_;
@@ -148,15 +151,6 @@ class BrickFill {
     std::array<Batch, batchesInFlight> batches_;
     std::vector<glm::ivec3> open_;  // blocks that are left to the host
 };
-
-bool wantsGroups(const Device::Impl& device, KernelMapping mapping) {
-    return mapping == KernelMapping::automatic ? device.info.gpu : mapping == KernelMapping::groupPerBlock;
-}
-
-std::uint64_t budget(const Device::Impl& device, const OpenclOptions& options) {
-    constexpr std::uint64_t mebibyte = 1 << 20;
-    return options.memoryMiB > 0 ? options.memoryMiB * mebibyte : device.info.memoryBytes / 4 * 3;
-}
 
 // How far a voxel may lie from a triangle that matters to it: the paper's cube sticks out of the ball.
 float reachOf(const FillJob& job) {
@@ -185,21 +179,21 @@ const std::array<cl_ulong, 256>& bitOrders() {
 }
 
 std::string buildOptions(const Device::Impl& device, bool gpuMapping, bool triangles, bool cube) {
-    std::string options = "-cl-std=CL1.2";
-    if (device.info.exactSquareRoots) options += " -cl-fp32-correctly-rounded-divide-sqrt";
+    std::string options = commonBuildOptions(device);
     if (gpuMapping) options += " -D GROUP_PER_BLOCK";
     if (triangles) options += " -D TRIANGLES=1";
     if (cube) options += " -D PAPER_CUBE=1";
     return options;
 }
 
-BrickFill::BrickFill(Device::Impl& device, const OpenclOptions& options, const FillJob& job)
+BrickFill::BrickFill(Device::Impl& device, const OpenclOptions& options, const FillJob& job, const DeviceSink& keep)
     : device_(device),
       job_(job),
+      keep_(keep),
       gpuMapping_(wantsGroups(device, options.mapping)),
       times_(options.times),
       timing_(options.times),
-      memory_(device, budget(device, options)),
+      memory_(device, memoryBudget(device, options.memoryMiB)),
       layered_(job.options.method == Method::doubleLayer),
       program_(buildProgram(device, layered_ ? double_layer_cl : exact_cl,
                             buildOptions(device, gpuMapping_, job.mesh.triangles, layered_ && job.layers.cube > 0))),
@@ -330,19 +324,33 @@ void BrickFill::start(Batch& batch, std::size_t first, std::size_t last) {
     device_.queue.flush();
 }
 
-// Waits for a batch, if it is under way, and hands its blocks on.
+// Waits for a batch, if it is under way, and hands its blocks on, on the device or to the host.
 void BrickFill::finish(Batch& batch) {
     if (batch.load.bricks == 0) return;
     batch.counted.wait();
     const std::size_t blocks = batch.found[filledBlocks], open = batch.found[openBlocks];
     if (job_.mesh.conflicts) *job_.mesh.conflicts += batch.found[conflicts];
-    const Mapped<glm::ivec3> openOrigins(transfers_, batch.open, open, timing_);
+    if (open > 0) {
+        const Mapped<glm::ivec3> openOrigins(transfers_, batch.open, open, timing_);
+        transfers_.finish();
+        open_.insert(open_.end(), openOrigins.data(), openOrigins.data() + open);
+    }
+    job_.mesh.progress.poll();
+    if (keep_)
+        keep_(batch.origins, batch.distances, blocks);
+    else
+        handOver(batch, blocks);
+    for (std::size_t brick = 0; brick < batch.load.bricks; ++brick) job_.mesh.progress.advance();
+    batch.load = {};
+}
+
+// Hands blocks to the host.
+void BrickFill::handOver(Batch& batch, std::size_t blocks) {
     const Mapped<glm::ivec3> origins(transfers_, batch.origins, blocks, timing_);
     const Mapped<float> distances(transfers_, batch.distances, blocks * blockVoxels, timing_);
     const Mapped<std::int32_t> triangles(transfers_, batch.triangles, job_.mesh.triangles ? blocks * blockVoxels : 0,
                                          timing_);
     transfers_.finish();
-    open_.insert(open_.end(), openOrigins.data(), openOrigins.data() + open);
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, blocks, blocksPerTask), [&](const auto& range) {
         job_.mesh.progress.poll();
         const auto part = [&](const auto* all, std::size_t each) {
@@ -351,8 +359,6 @@ void BrickFill::finish(Batch& batch) {
         job_.mesh.sink({part(origins.data(), 1), part(distances.data(), blockVoxels),
                         job_.mesh.triangles ? part(triangles.data(), blockVoxels) : std::span<const std::int32_t>()});
     });
-    for (std::size_t brick = 0; brick < batch.load.bricks; ++brick) job_.mesh.progress.advance();
-    batch.load = {};
 }
 
 void BrickFill::run() {
@@ -390,11 +396,11 @@ void BrickFill::fillOpen() {
 
 }  // namespace
 
-void fillByBricks(Device::Impl& device, const OpenclOptions& options, const FillJob& job) {
+void fillByBricks(Device::Impl& device, const OpenclOptions& options, const FillJob& job, const DeviceSink& keep) {
     if (!device.info.doubles)
         throw DeviceError(device.info.name +
                           " cannot compute in double precision, which exact and double-layer need; prism does not");
-    BrickFill(device, options, job).run();
+    BrickFill(device, options, job, keep).run();
 }
 
 }  // namespace bilayer

@@ -2,12 +2,20 @@
 // from those; bricks stream through the device's memory in batches.
 #pragma once
 
+#include <functional>
+
 #include "cl/filler.h"
 #include "cl/program.h"
 
 namespace bilayer {
 
-/// Fills all blocks of a job by Method::exact or Method::doubleLayer. Throws as openclFiller()'s does.
-void fillByBricks(Device::Impl& device, const OpenclOptions& options, const FillJob& job);
+/// Takes filled blocks over on the device, as FilledBlocks has them: commands that read the buffers go into the
+/// device's queue before it returns.
+using DeviceSink = std::function<void(const cl::Buffer& origins, const cl::Buffer& distances, std::size_t blocks)>;
+
+/// Fills all blocks of a job by Method::exact or Method::doubleLayer.
+/// @param keep  gets the blocks that the device filled, if it is not null; the job's sink gets all others
+/// Throws as openclFiller()'s does.
+void fillByBricks(Device::Impl& device, const OpenclOptions& options, const FillJob& job, const DeviceSink& keep = {});
 
 }  // namespace bilayer

@@ -30,6 +30,7 @@ class DeviceMemory {
     /// Throws what allocate() throws for the want of memory.
     [[noreturn]] void refuse(std::uint64_t bytes, const std::string& purpose) const;
 
+    std::uint64_t used() const { return used_; }  ///< bytes
     std::uint64_t left() const { return budget_ - used_; }
     std::uint64_t peak() const { return peak_; }  ///< most bytes that were in use at once
 

@@ -15,6 +15,7 @@
 
 #include "cl/memory.h"
 #include "cl/prism_bins.h"
+#include "cl/setup.h"
 #include "cl/timing.h"
 #include "sdf/progress.h"
 #include "sdf/triangle_bins.h"
@@ -68,18 +69,8 @@ struct Batch {
     Load load() const { return begins.back(); }
 };
 
-std::uint64_t budget(const Device::Impl& device, const OpenclOptions& options) {
-    constexpr std::uint64_t mebibyte = 1 << 20;
-    return options.memoryMiB > 0 ? options.memoryMiB * mebibyte : device.info.memoryBytes / 4 * 3;
-}
-
-bool wantsGroups(const Device::Impl& device, KernelMapping mapping) {
-    return mapping == KernelMapping::automatic ? device.info.gpu : mapping == KernelMapping::groupPerBlock;
-}
-
 std::string buildOptions(const Device::Impl& device, bool groups, bool triangles) {
-    std::string options = "-cl-std=CL1.2";
-    if (device.info.exactSquareRoots) options += " -cl-fp32-correctly-rounded-divide-sqrt";
+    std::string options = commonBuildOptions(device);
     if (groups) options += " -D GROUP_PER_BLOCK";
     if (triangles) options += " -D TRIANGLES=1";
     return options;
@@ -127,7 +118,7 @@ Fill::Fill(Device::Impl& device, const OpenclOptions& options, const PrismJob& j
       groups_(wantsGroups(device, options.mapping)),
       times_(options.times),
       timing_(options.times),
-      memory_(device, budget(device, options)),
+      memory_(device, memoryBudget(device, options.memoryMiB)),
       share_(memory_.left() / batchesInFlight),
       kernel_(buildProgram(device, prism_cl, buildOptions(device, groups_, mesh.triangles)), "fillBlocks"),
       uploads_(device.context, device.device, CL_QUEUE_PROFILING_ENABLE) {}

@@ -1,83 +1,17 @@
 // What a collider samples: distance, gradient, rays. Built from a LevelSet, independent of OpenVDB afterwards.
 #pragma once
 
-#include <algorithm>
-#include <cmath>
 #include <cstddef>
-#include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
 #include <memory>
 #include <optional>
-#include <utility>
 
+#include "sdf/clearance.h"
 #include "sdf/level_set.h"
 #include "sdf/mesh.h"
+#include "sdf/sample.h"
 
 namespace bilayer {
-
-/// The answer to a query at a point.
-struct Sample {
-    /// In the band: the signed distance [m]. Elsewhere: a bound with the right sign, whose magnitude the true distance
-    /// is not below (but for the field's own error), and no distance. A band narrower than sqrt(3) voxels can bound
-    /// nothing just beside it: the magnitude is 0 there. +infinity for a point that is not finite.
-    float distance = 0;
-    /// In the band: the analytic gradient of the same trilinear interpolant (its length is near 1, not exactly 1).
-    /// Elsewhere: zero.
-    glm::vec3 gradient{0};
-    /// All eight voxels around the point are active: sure up to sqrt(3) voxels less than the band's width on either
-    /// side.
-    bool inBand = false;
-};
-
-/// What a Field tells at once of places that are not near its surface: a view of its own data, coarse but small. Space
-/// is divided into parts of 4^3 voxels; coordinates are in parts from Field::origin().
-class Clearance {
-  public:
-    static constexpr int partSide = 4;  ///< [voxels]
-
-    struct Part {
-        float centre;  ///< its centre's distance from the surface, at least, negative inside [parts]
-        float least;   ///< no sample in this part is below [m]
-    };
-
-    /// @param parts  the last axis fastest
-    /// @param size   number of parts along each axis
-    Clearance(const Part* parts, const glm::ivec3& size) : parts_(parts), size_(size), extent_(size) {}
-
-    /// The distance from the surface, at least; not positive where nothing is known [parts].
-    float around(const glm::vec3& point) const noexcept {
-        const glm::ivec3 part = partOf(point);
-        return std::abs(at(part).centre) - glm::distance(point, glm::vec3(part) + 0.5f);
-    }
-
-    /// Whether a sphere surely lies outside of the surface. False for a centre that is not finite.
-    bool isOutside(const glm::vec3& centre, float radius) const noexcept {
-        const glm::vec3 toBox = centre - clamped(centre);
-        if (glm::dot(toBox, toBox) > radius * radius) return true;
-        const glm::ivec3 part = partOf(centre);
-        const glm::vec3 way = centre - (glm::vec3(part) + 0.5f);
-        const float left = at(part).centre - radius;
-        return left > 0 && glm::dot(way, way) < left * left;
-    }
-
-    /// Whether a sample there is surely above `reach` [m], or out of the band.
-    bool isAbove(const glm::vec3& point, float reach) const noexcept { return at(partOf(point)).least > reach; }
-
-  private:
-    // NaN goes to 0
-    glm::vec3 clamped(const glm::vec3& p) const noexcept {
-        return {std::min(std::max(0.f, p.x), extent_.x), std::min(std::max(0.f, p.y), extent_.y),
-                std::min(std::max(0.f, p.z), extent_.z)};
-    }
-    glm::ivec3 partOf(const glm::vec3& point) const noexcept { return glm::min(glm::ivec3(clamped(point)), size_ - 1); }
-    const Part& at(const glm::ivec3& part) const noexcept {
-        return parts_[(std::size_t(part.x) * size_.y + part.y) * size_.z + part.z];
-    }
-
-    const Part* parts_;
-    glm::ivec3 size_;
-    glm::vec3 extent_;
-};
 
 /// Where a ray meets the surface.
 struct RayHit {

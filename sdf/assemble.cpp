@@ -158,11 +158,12 @@ class ConflictCounter {
         return sum;
     }
 
-    // Empty space is a voxel away from the surface at least.
+    // Empty space is a voxel away from the surface at least, or as far as a narrower band is wide.
     std::size_t towards(const Face& face, std::uint64_t inside, const float* a, float tile) const {
+        const float room = voxel_ * (1 + linkSlack) - std::min(std::abs(tile), voxel_);
         std::size_t sum = 0;
         for (std::uint64_t differ = tile < 0 ? ~inside : inside; differ; differ &= differ - 1)
-            sum += std::abs(a[place(face, std::countr_zero(differ))]) > voxel_ * linkSlack;
+            sum += std::abs(a[place(face, std::countr_zero(differ))]) > room;
         return sum;
     }
 

@@ -76,4 +76,8 @@ struct BlockFiller {
     std::function<void(const FillJob&)> fill;
 };
 
+/// Has a filler fill the blocks of a mesh's field as build() has, but makes no level set of them: the filler keeps what
+/// it fills. It is called again, for another way to signs, where it counts conflicts. Throws as build() does.
+void fillOnly(const Mesh& mesh, const BuildOptions& options, const BlockFiller& filler);
+
 }  // namespace bilayer

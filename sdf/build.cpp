@@ -267,6 +267,11 @@ class Build {
     }
 
     LevelSet run() {
+        fillAll();
+        return levelSet();
+    }
+
+    void fillAll() {
         check();
         if (hasOwnSigns(options_.method))
             fillOwnSigns();
@@ -274,7 +279,6 @@ class Build {
             fillChosen();
         else
             fillAsAsked();
-        return levelSet();
     }
 
     LevelSet runFrom(const LevelSet& old, const Mesh& oldMesh, std::span<const std::uint32_t> moved) {
@@ -500,8 +504,13 @@ void refusePrism(const BuildOptions& options) {
         throw std::invalid_argument("the method prism needs an OpenCL device: give build() its filler");
 }
 
+void refuseForDevices(const BuildOptions& options, const BlockFiller& filler) {
+    if (options.method == Method::pseudonormal)
+        throw std::invalid_argument(fmt::format("the {} back end has no method {}", filler.backend, name(options.method)));
+}
+
 template <class Work>
-LevelSet withThreads(int threads, const Work& work) {
+auto withThreads(int threads, const Work& work) {
     if (threads == 0) return work();
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, std::size_t(threads));
     return tbb::task_arena(threads).execute(work);
@@ -512,9 +521,7 @@ LevelSet withThreads(int threads, const Work& work) {
 LevelSet build(const Mesh& mesh, const BuildOptions& given, const BlockFiller* filler, BuildTimes* times) {
     const BuildOptions options = inVoxels(given);
     check(options);
-    if (filler && options.method == Method::pseudonormal)
-        throw std::invalid_argument(
-            fmt::format("the {} back end has no method {}", filler->backend, name(options.method)));
+    if (filler) refuseForDevices(options, *filler);
     if (!filler) refusePrism(options);
     openvdb::initialize();
     BuildTimes ignored;
@@ -534,6 +541,15 @@ LevelSet rebuild(const LevelSet& old, const Mesh& oldMesh, const Mesh& newMesh, 
 
 LevelSet build(const Mesh& mesh, const BuildOptions& options, const BlockFiller& filler, BuildTimes* times) {
     return build(mesh, options, &filler, times);
+}
+
+void fillOnly(const Mesh& mesh, const BuildOptions& given, const BlockFiller& filler) {
+    const BuildOptions options = inVoxels(given);
+    check(options);
+    refuseForDevices(options, filler);
+    openvdb::initialize();
+    BuildTimes ignored;
+    withThreads(options.threads, [&] { Build(mesh, options, &filler, ignored).fillAll(); });
 }
 
 float voxelSizeFor(const Mesh& mesh, float resolution) {

@@ -2,15 +2,13 @@
 
 #include <oneapi/tbb/global_control.h>
 #include <oneapi/tbb/parallel_for.h>
-#include <openvdb/tools/Interpolation.h>
-#include <openvdb/tools/LevelSetSphere.h>
 
 #include <bit>
 #include <catch2/catch.hpp>
 #include <limits>
 
 #include "demos/shared/shapes.h"
-#include "tests/collider/analytic.h"
+#include "tests/support/sampling.h"
 #include "tests/support/support.h"
 
 using namespace bilayer;
@@ -18,108 +16,35 @@ using namespace bilayer::test;
 
 namespace {
 
-constexpr double h = 0.02;                 // of most fields here [m]
-constexpr double rounding = 4e-7 * 3 * h;  // of single precision at the band's width
+constexpr double h = 0.02;  // of most fields here [m]
 constexpr float infinity = std::numeric_limits<float>::infinity();
 constexpr float notANumber = std::numeric_limits<float>::quiet_NaN();
-
-std::vector<Solid> solids() {
-    return {sphereSolid(0.4), boxSolid({0.35, 0.22, 0.3}), torusSolid(0.35, 0.13)};
-}
-
-openvdb::Vec3d toIndex(const LevelSet& levelSet, const glm::vec3& p) {
-    return levelSet.grids().distance->worldToIndex(openvdb::Vec3d(p.x, p.y, p.z));
-}
-
-double trilinear(const LevelSet& levelSet, const openvdb::Vec3d& index) {
-    return openvdb::tools::BoxSampler::sample(levelSet.grids().distance->tree(), index);
-}
-
-bool allEightActive(const LevelSet& levelSet, const openvdb::Vec3d& index) {
-    for (int corner = 0; corner < 8; ++corner)
-        if (!levelSet.grids().distance->tree().isValueOn(
-                openvdb::Coord::floor(index).offsetBy(corner >> 2, corner >> 1 & 1, corner & 1)))
-            return false;
-    return true;
-}
 
 bool sameBits(const Sample& a, const Sample& b) {
     return a.inBand == b.inBand && a.gradient == b.gradient &&
            std::bit_cast<std::uint32_t>(a.distance) == std::bit_cast<std::uint32_t>(b.distance);
 }
 
+Sampler makeField(const LevelSet& levelSet) {
+    return [field = Field(levelSet)](std::span<const glm::vec3> points) {
+        std::vector<Sample> samples;
+        for (const glm::vec3& p : points) samples.push_back(field.sample(p));
+        return samples;
+    };
+}
+
 }  // namespace
 
 TEST_CASE("in the band a sample is OpenVDB's trilinear interpolation, and only there it is in the band") {
-    const unsigned seed = test::seed();
-    CAPTURE(seed);
-    Random random(seed);
-    for (const Solid& solid : solids()) {
-        const LevelSet levelSet = levelSetOf(solid, h, 3, 2);
-        const Field field(levelSet);
-        int inBand = 0;
-        for (int i = 0; i < 40000; ++i) {
-            const glm::vec3 p = random.point(0.6);
-            CAPTURE(p.x, p.y, p.z);
-            const openvdb::Vec3d index = toIndex(levelSet, p);
-            const Sample sample = field.sample(p);
-            REQUIRE(sample.inBand == allEightActive(levelSet, index));
-            REQUIRE(field.distance(p) == sample.distance);
-            if (!sample.inBand) {
-                REQUIRE(sample.gradient == glm::vec3(0));
-                continue;
-            }
-            ++inBand;
-            REQUIRE(std::abs(sample.distance - trilinear(levelSet, index)) <= rounding);
-            // along an axis, within a cell, the interpolant is linear: differences are the derivative itself
-            for (int axis = 0; axis < 3; ++axis) {
-                openvdb::Vec3d low = index, high = index;
-                low[axis] = std::floor(index[axis]);
-                high[axis] = low[axis] + 1;
-                const double slope = (trilinear(levelSet, high) - trilinear(levelSet, low)) / h;
-                REQUIRE(std::abs(sample.gradient[axis] - slope) <= 2 * rounding / h);
-            }
-        }
-        REQUIRE(inBand > 1000);
-    }
+    checkInBand(makeField);
 }
 
 TEST_CASE("voxel centres, cell borders and block borders give the stored values") {
-    const LevelSet levelSet = levelSetOf(sphereSolid(0.4), 0.0625);  // a power of two: points fall on voxels exactly
-    const Field field(levelSet);
-    for (auto value = levelSet.grids().distance->cbeginValueOn(); value; ++value) {
-        const openvdb::Coord c = value.getCoord();
-        const glm::vec3 p = 0.0625f * glm::vec3(c.x(), c.y(), c.z());
-        const Sample sample = field.sample(p);
-        if (sample.inBand) REQUIRE(sample.distance == *value);
-        REQUIRE(std::abs(sample.distance) <= std::abs(*value));
-    }
+    checkVoxelCentres(makeField);
 }
 
 TEST_CASE("out of the band a sample is a bound of the true distance with the right sign") {
-    const unsigned seed = test::seed();
-    CAPTURE(seed);
-    Random random(seed);
-    for (const auto& [exterior, interior] : {std::pair(3.f, 3.f), std::pair(2.f, 4.f), std::pair(6.5f, 2.f)})
-        for (const Solid& solid : solids()) {
-            const LevelSet levelSet = levelSetOf(solid, h, exterior, interior);
-            const Field field(levelSet);
-            for (int i = 0; i < 20000; ++i) {
-                const glm::vec3 p = random.point(i % 2 ? 0.5 : 3);
-                const double truth = solid.distance(glm::dvec3(p));
-                const Sample sample = field.sample(p);
-                CAPTURE(p.x, p.y, p.z, truth, sample.distance, sample.inBand, exterior, interior);
-                if (sample.inBand) {
-                    REQUIRE(std::abs(sample.distance - truth) < 0.5 * h);
-                    continue;
-                }
-                REQUIRE((sample.distance < 0) == (truth < 0));
-                REQUIRE(std::abs(sample.distance) <= std::abs(truth) + 1e-6);
-                const double width = (truth < 0 ? interior : exterior) * h;
-                REQUIRE(std::abs(sample.distance) >= width - 1.7321 * h - 1e-6);
-                if (truth > 2) REQUIRE(sample.distance > 0.5 * truth);
-            }
-        }
+    checkBeyondBand(makeField);
 }
 
 TEST_CASE("what a clearance rules out is ruled out, and little else far from the surface") {
@@ -127,7 +52,7 @@ TEST_CASE("what a clearance rules out is ruled out, and little else far from the
     CAPTURE(seed);
     Random random(seed);
     const float edge = Clearance::partSide * float(h);
-    for (const Solid& solid : solids()) {
+    for (const Solid& solid : smallSolids()) {
         const Field field(levelSetOf(solid, h, 3, 6));
         const Clearance clearance = field.clearance();
         int beside = 0, ruledOut = 0;
@@ -167,64 +92,27 @@ TEST_CASE("a sample within a reach is the sample, its gradient only there") {
         Sample expected = whole;
         if (!(whole.distance <= reach)) expected.gradient = glm::vec3(0);
         REQUIRE(sameBits(field.sampleWithin(p, reach), expected));
+        REQUIRE(field.distance(p) == whole.distance);
     }
 }
 
 TEST_CASE("the bound grows with the number of empty blocks, outside and inside") {
-    const Field field(levelSetOf(sphereSolid(1), h));
-    REQUIRE(field.distance({0, 0, 0}) < -0.3f);  // of 1: blocks are counted by the longest axis, 0.16 each
-    REQUIRE(field.distance({0, 0, 0}) >= -1.f);
-    REQUIRE(field.distance({1, 1, 1}) > 0.2f);  // of 0.73
-    REQUIRE(field.distance({100, 0, 0}) == Approx(99).epsilon(0.01));
+    checkEmptyBlocks(makeField);
 }
 
 TEST_CASE("a band narrower than a cell still tells the sides apart") {
-    const unsigned seed = test::seed();
-    CAPTURE(seed);
-    Random random(seed);
-    const Solid solid = sphereSolid(0.4);
-    const Field field(levelSetOf(solid, h, 1, 1));
-    for (int i = 0; i < 20000; ++i) {
-        const glm::vec3 p = random.point(0.5);
-        const double truth = solid.distance(glm::dvec3(p));
-        if (std::abs(truth) < h) continue;
-        REQUIRE(std::signbit(field.distance(p)) == (truth < 0));
-        if (!field.sample(p).inBand) REQUIRE(std::abs(field.distance(p)) <= std::abs(truth));
-    }
+    checkNarrowBand(makeField);
 }
 
 TEST_CASE("points that are nowhere are far outside") {
-    const Field field(levelSetOf(sphereSolid(0.4), h));
-    for (int axis = 0; axis < 3; ++axis)
-        for (const float bad : {notANumber, infinity, -infinity}) {
-            glm::vec3 p(0);
-            p[axis] = bad;
-            const Sample sample = field.sample(p);
-            REQUIRE(sample.distance == infinity);
-            REQUIRE_FALSE(sample.inBand);
-            REQUIRE(sample.gradient == glm::vec3(0));
-        }
-    for (const float far : {1e9f, 1e20f, 3e38f})
-        for (const float sign : {-1.f, 1.f}) {
-            const Sample sample = field.sample({sign * far, 0, far});
-            REQUIRE_FALSE(sample.inBand);
-            REQUIRE(sample.distance > 0.9f * far);
-        }
+    checkNowhere(makeField);
 }
 
 TEST_CASE("far from the origin a field is as good as near it") {
-    const unsigned seed = test::seed();
-    CAPTURE(seed);
-    Random random(seed);
+    checkFarFromOrigin(makeField);
     const glm::dvec3 centre(1e4, -1e4, 5e3);
-    const Solid solid = sphereSolid(0.3, centre);
-    const Field field(levelSetOf(solid, 0.01));
-    for (int i = 0; i < 20000; ++i) {
-        const glm::vec3 p = glm::vec3(centre) + random.point(0.4);  // rounded to a millimetre, and exact from here on
-        const Sample sample = field.sample(p);
-        if (sample.inBand) REQUIRE(std::abs(sample.distance - solid.distance(glm::dvec3(p))) < 0.02 * 0.01);
-    }
-    const auto hit = field.raycast(glm::vec3(centre) + glm::vec3(2, 0, 0), {-1, 0, 0}, 10);
+    const auto hit = Field(levelSetOf(sphereSolid(0.3, centre), 0.01))
+                         .raycast(glm::vec3(centre) + glm::vec3(2, 0, 0), {-1, 0, 0}, 10);
     REQUIRE(hit);
     REQUIRE(hit->distance == Approx(1.7).margin(2e-4));
 }
@@ -308,7 +196,7 @@ TEST_CASE("rays meet the interpolant where steps of a fiftieth of a voxel do") {
     const unsigned seed = test::seed();
     CAPTURE(seed);
     Random random(seed);
-    for (const Solid& solid : solids()) {
+    for (const Solid& solid : smallSolids()) {
         const Field field(levelSetOf(solid, h));
         for (int i = 0; i < 1000; ++i) {
             const glm::vec3 origin = random.direction();
@@ -422,18 +310,5 @@ TEST_CASE("fields are the same for any number of threads, and so are queries") {
 }
 
 TEST_CASE("a level set of OpenVDB's own and one of the double layer method serve as well") {
-    const auto grid = openvdb::tools::createLevelSetSphere<openvdb::FloatGrid>(0.4f, openvdb::Vec3f(0), float(h), 3.f);
-    auto grids = std::make_shared<Grids>();
-    grids->distance = grid;
-    const Field theirs{LevelSet(grids)};
-    const Field ours(built(shapes::sphere(0.4f, 5), float(h)));
-    const unsigned seed = test::seed();
-    CAPTURE(seed);
-    Random random(seed);
-    for (int i = 0; i < 20000; ++i) {
-        const glm::vec3 p = random.point(0.5);
-        const double truth = glm::length(p) - 0.4;
-        if (theirs.sample(p).inBand) REQUIRE(std::abs(theirs.distance(p) - truth) < 0.05 * h);
-        if (ours.sample(p).inBand) REQUIRE(std::abs(ours.distance(p) - truth) < 0.5 * h);
-    }
+    checkOtherLevelSets(makeField);
 }

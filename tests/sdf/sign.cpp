@@ -186,6 +186,18 @@ TEST_CASE("a clean solid that holds the tree's large tiles has no conflict where
     }
 }
 
+TEST_CASE("a clean solid has no conflict however narrow its band") {
+    for (const float exterior : {0.1f, 0.7f, 1.f})
+        for (const float interior : {0.2f, 0.9f, 2.f})
+            for (const Mesh& mesh : {shapes::box({1.f, 0.6f, 0.3f}), shapes::torus(1.f, 0.4f)}) {
+                CAPTURE(exterior, interior, mesh.triangles.size());
+                const LevelSet field = build(
+                    mesh, {.voxelSize = voxelSizeFor(mesh, 50), .exteriorWidth = exterior, .interiorWidth = interior});
+                CHECK(field.sign() == "normals");
+                CHECK(field.signConflicts() == 0);
+            }
+}
+
 TEST_CASE("after a conflict, surfaces that meet themselves get winding numbers, doubled sheets a flood") {
     struct Case {
         const char* name;

@@ -1,0 +1,194 @@
+// Two batches of points take turns: while the device samples one, another one goes up or comes down.
+#include "cl/field.h"
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <mutex>
+#include <optional>
+#include <stdexcept>
+#include <utility>
+
+#include "cl/memory.h"
+#include "cl/program.h"
+#include "cl/resident.h"
+#include "cl/setup.h"
+#include "cl/timing.h"
+#include "sdf/field_layout.h"
+
+namespace bilayer {
+
+extern const char* const field_cl;  // the text of field.cl
+
+namespace {
+
+constexpr std::size_t batchesInFlight = 2;
+/// Points of a batch: 4 MiB of points and samples, which take a GPU about as long as ten launches.
+constexpr std::size_t batchPoints = 1 << 17;
+/// Work-items of a group on a GPU, and points that an item samples on a processor.
+constexpr std::size_t groupItems = 64, pointsPerProcessorItem = 1024;
+
+// The kernel reads points and writes samples as they lie in the host's memory.
+static_assert(sizeof(glm::vec3) == 3 * sizeof(cl_float));
+static_assert(sizeof(Sample) == 5 * sizeof(cl_float) && offsetof(Sample, gradient) == sizeof(cl_float) &&
+              offsetof(Sample, inBand) == 4 * sizeof(cl_float) && sizeof(bool) == sizeof(cl_uchar));
+
+// A batch of points under way, in a queue of its own.
+struct Batch {
+    cl::CommandQueue queue;
+    cl::Buffer points, samples;
+};
+
+// Commands in flight use the host's memory: they have ended when this goes, whatever else went wrong.
+class Ended {
+  public:
+    explicit Ended(const cl::CommandQueue& queue) : queue_(queue) {}
+    Ended(const Ended&) = delete;
+    Ended& operator=(const Ended&) = delete;
+    ~Ended() { ::clFinish(queue_()); }
+
+  private:
+    const cl::CommandQueue& queue_;
+};
+
+cl::Program samplingProgram(const Device& device) {
+    if (!device.info().doubles)
+        throw DeviceError(device.info().name + " cannot compute in double precision, which samples of fields need");
+    return buildProgram(device.impl(), field_cl, commonBuildOptions(device.impl()));
+}
+
+}  // namespace
+
+struct DeviceField::Data {
+    Device device;
+    const bool gpuMapping;
+    DeviceMemory memory;
+    cl::Program program;
+    std::optional<FieldLayout> shared;  // what the layout's buffers lie in where host and device share memory
+    DeviceLayout layout;
+    std::array<Batch, batchesInFlight> batches;
+    std::mutex mutex;  // guards `batches`
+
+    Data(const Device& device, const OpenclOptions& options, std::uint64_t budget);
+
+    void upload(FieldLayout from, OpenclTimes* times);
+    void start(Batch& batch, std::span<const glm::vec3> points, std::span<Sample> samples, Timing& timing);
+    void sample(std::span<const glm::vec3> points, std::span<Sample> samples, Timing& timing);
+};
+
+DeviceField::Data::Data(const Device& device, const OpenclOptions& options, std::uint64_t budget)
+    : device(device),
+      gpuMapping(wantsGroups(device.impl(), options.mapping)),
+      memory(device.impl(), budget),
+      program(samplingProgram(device)) {
+    const Device::Impl& impl = device.impl();
+    for (Batch& batch : batches) {
+        batch.queue = cl::CommandQueue(impl.context, impl.device, CL_QUEUE_PROFILING_ENABLE);
+        if (impl.info.unifiedMemory) continue;
+        batch.points = memory.allocate(batchPoints * sizeof(glm::vec3), "a batch of points");
+        batch.samples = memory.allocate(batchPoints * sizeof(Sample), "a batch of points");
+    }
+}
+
+void DeviceField::Data::upload(FieldLayout from, OpenclTimes* times) {
+    Timing timing(times);
+    const Ended ended(device.impl().queue);
+    const auto uploaded = [&](const auto* data, std::size_t count) {
+        return memory.upload(data, count * sizeof *data, "the field", timing.event(Timing::Of::upload));
+    };
+    layout = {from, uploaded(from.directory.data(), from.directory.size()),
+              uploaded(from.clearances.data(), from.clearances.size()),
+              uploaded(from.values.get(), from.stored * FieldLayout::blockFloats)};
+    device.impl().queue.finish();
+    timing.sumUp();
+    if (times) times->peakBytes = std::max(times->peakBytes, memory.peak());
+    if (device.info().unifiedMemory) shared = std::move(from);
+}
+
+// Sends a batch on its way; in place where host and device share memory.
+void DeviceField::Data::start(Batch& batch, std::span<const glm::vec3> points, std::span<Sample> samples,
+                              Timing& timing) {
+    const cl::CommandQueue& queue = batch.queue;
+    const bool unified = device.info().unifiedMemory;
+    if (unified) {
+        // OpenCL's signature asks for a pointer to what may change; it is only read
+        batch.points = cl::Buffer(device.impl().context, CL_MEM_READ_ONLY | CL_MEM_USE_HOST_PTR, points.size_bytes(),
+                                  const_cast<glm::vec3*>(points.data()));
+        batch.samples = cl::Buffer(device.impl().context, CL_MEM_WRITE_ONLY | CL_MEM_USE_HOST_PTR, samples.size_bytes(),
+                                   samples.data());
+    } else {
+        queue.enqueueWriteBuffer(batch.points, CL_FALSE, 0, points.size_bytes(), points.data(), nullptr,
+                                 timing.event(Timing::Of::upload));
+    }
+    const std::size_t each = gpuMapping ? 1 : pointsPerProcessorItem, local = gpuMapping ? groupItems : 1;
+    const std::size_t items = (points.size() + each - 1) / each, global = (items + local - 1) / local * local;
+    cl::Kernel kernel(program, "sampleField");
+    cl_uint index = 0;
+    const auto set = [&](const auto&... arguments) { (kernel.setArg(index++, arguments), ...); };
+    set(KernelFrame(layout.frame), layout.directory, layout.parts, layout.values, batch.points, cl_uint(points.size()),
+        cl_uint(each), batch.samples);
+    queue.enqueueNDRangeKernel(kernel, cl::NullRange, cl::NDRange(global), cl::NDRange(local), nullptr,
+                               timing.event(Timing::Of::kernel));
+    cl::Event* const download = timing.event(Timing::Of::download);
+    if (unified) {
+        void* const mapped =
+            queue.enqueueMapBuffer(batch.samples, CL_FALSE, CL_MAP_READ, 0, samples.size_bytes(), nullptr, download);
+        queue.enqueueUnmapMemObject(batch.samples, mapped);
+    } else {
+        queue.enqueueReadBuffer(batch.samples, CL_FALSE, 0, samples.size_bytes(), samples.data(), nullptr, download);
+    }
+    queue.flush();
+}
+
+void DeviceField::Data::sample(std::span<const glm::vec3> points, std::span<Sample> samples, Timing& timing) {
+    const std::array<Ended, batchesInFlight> ended{Ended(batches[0].queue), Ended(batches[1].queue)};
+    std::size_t turn = 0;
+    for (std::size_t first = 0; first < points.size(); first += batchPoints) {
+        Batch& batch = batches[turn++ % batchesInFlight];
+        batch.queue.finish();
+        const std::size_t count = std::min(batchPoints, points.size() - first);
+        start(batch, points.subspan(first, count), samples.subspan(first, count), timing);
+    }
+    for (Batch& batch : batches) batch.queue.finish();
+}
+
+DeviceField::DeviceField(const Device& device, const LevelSet& levelSet, const OpenclOptions& options) try {
+    data_ = std::make_shared<Data>(device, options, memoryBudget(device.impl(), options.memoryMiB));
+    data_->upload(FieldLayout(levelSet), options.times);
+} catch (const cl::Error& error) {
+    throw deviceError(error, device.info().name);
+}
+
+DeviceField::DeviceField(const Device& device, const Mesh& mesh, const BuildOptions& build,
+                         const OpenclOptions& options) try {
+    const std::uint64_t budget = memoryBudget(device.impl(), options.memoryMiB);
+    data_ = std::make_shared<Data>(device, options, budget - budget / fillPart);
+    data_->layout = buildResident(device, mesh, build, options, data_->memory);
+} catch (const cl::Error& error) {
+    throw deviceError(error, device.info().name);
+}
+
+void DeviceField::sample(std::span<const glm::vec3> points, std::span<Sample> samples, OpenclTimes* times) const {
+    if (points.size() != samples.size())
+        throw std::invalid_argument(std::to_string(points.size()) + " points need as many samples, not " +
+                                    std::to_string(samples.size()));
+    const std::lock_guard lock(data_->mutex);
+    Timing timing(times);
+    try {
+        data_->sample(points, samples, timing);
+    } catch (const cl::Error& error) {
+        throw deviceError(error, data_->device.info().name);
+    }
+    timing.sumUp();
+    if (times) times->peakBytes = std::max(times->peakBytes, data_->memory.used());
+}
+
+const Bounds& DeviceField::bounds() const {
+    return data_->layout.frame.bounds;
+}
+
+std::size_t DeviceField::memoryBytes() const {
+    return data_->memory.used();
+}
+
+}  // namespace bilayer

@@ -1,0 +1,38 @@
+// A field laid out on a device, as in sdf/field_layout.h.
+#include "common.cl"
+
+// A block with the apron that completes its last cells.
+#define STRIDE 9
+#define BLOCK_FLOATS 729
+// Entries of the directory that are no numbers of blocks.
+#define EMPTY_OUTSIDE -1
+#define EMPTY_INSIDE -2
+// Of clearances [voxels].
+#define PART_SIDE 4
+
+// FieldFrame of sdf/field_layout.h; metres and voxels as there.
+typedef struct {
+    double origin[3], perMetre;
+    int blocks[3];
+    float voxelSize, exteriorWidth, interiorWidth;
+} Frame;
+
+// Clearance::Part of sdf/clearance.h.
+typedef struct {
+    float centre, least;
+} Part;
+
+// The last axis fastest.
+size_t indexOf(int3 at, int3 size) {
+    return ((size_t)(at.x) * size.y + at.y) * size.z + at.z;
+}
+
+int3 placeAt(uint index, int3 size) {
+    const uint row = index / (uint)(size.z), slice = row / (uint)(size.y);
+    return (int3)((int)(slice), (int)(row - slice * size.y), (int)(index - row * size.z));
+}
+
+// Where a voxel of a block is, apron included.
+size_t voxelOf(int block, int3 inBlock) {
+    return (size_t)(block) * BLOCK_FLOATS + (inBlock.x * STRIDE + inBlock.y) * STRIDE + inBlock.z;
+}

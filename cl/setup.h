@@ -1,0 +1,30 @@
+// What the options of a filler or a field come to on a device.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "cl/filler.h"
+#include "cl/program.h"
+
+namespace bilayer {
+
+/// Most device memory to use [bytes].
+inline std::uint64_t memoryBudget(const Device::Impl& device, std::uint64_t memoryMiB) {
+    constexpr std::uint64_t mebibyte = 1 << 20;
+    return memoryMiB > 0 ? memoryMiB * mebibyte : device.info.memoryBytes / 4 * 3;
+}
+
+/// Whether work-items share the work of a group, as on GPUs.
+inline bool wantsGroups(const Device::Impl& device, KernelMapping mapping) {
+    return mapping == KernelMapping::automatic ? device.info.gpu : mapping == KernelMapping::groupPerBlock;
+}
+
+/// What every program is built with.
+inline std::string commonBuildOptions(const Device::Impl& device) {
+    std::string options = "-cl-std=CL1.2";
+    if (device.info.exactSquareRoots) options += " -cl-fp32-correctly-rounded-divide-sqrt";
+    return options;
+}
+
+}  // namespace bilayer

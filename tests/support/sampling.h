@@ -1,0 +1,33 @@
+// What samples of a field owe, wherever they are taken: one body of checks for the processor and for devices.
+#pragma once
+
+#include <functional>
+#include <glm/vec3.hpp>
+#include <span>
+#include <vector>
+
+#include "sdf/level_set.h"
+#include "sdf/sample.h"
+#include "tests/support/analytic.h"
+
+namespace bilayer::test {
+
+/// Samples some points of one field.
+using Sampler = std::function<std::vector<Sample>(std::span<const glm::vec3>)>;
+/// Makes a level set's.
+using MakeSampler = std::function<Sampler(const LevelSet&)>;
+
+/// A sphere, a box and a torus in the cube of half size 0.5.
+std::vector<Solid> smallSolids();
+
+// Each of these has a test case's name in tests/collider/field.cpp.
+void checkInBand(const MakeSampler& make);
+void checkVoxelCentres(const MakeSampler& make);
+void checkBeyondBand(const MakeSampler& make);
+void checkEmptyBlocks(const MakeSampler& make);
+void checkNarrowBand(const MakeSampler& make);
+void checkNowhere(const MakeSampler& make);
+void checkFarFromOrigin(const MakeSampler& make);
+void checkOtherLevelSets(const MakeSampler& make);
+
+}  // namespace bilayer::test
