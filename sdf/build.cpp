@@ -506,7 +506,8 @@ void refusePrism(const BuildOptions& options) {
 
 void refuseForDevices(const BuildOptions& options, const BlockFiller& filler) {
     if (options.method == Method::pseudonormal)
-        throw std::invalid_argument(fmt::format("the {} back end has no method {}", filler.backend, name(options.method)));
+        throw std::invalid_argument(
+            fmt::format("the {} back end has no method {}", filler.backend, name(options.method)));
 }
 
 template <class Work>
