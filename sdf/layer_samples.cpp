@@ -72,11 +72,11 @@ HWY_INLINE Points<D> pointsAt(D tag, const glm::vec3& place) {
 class Spreader {
   public:
     Spreader(const Mesh& mesh, const SampledBrick& brick, const SampleCells& cells, AddedSamples& to)
-        : mesh_(mesh), brick_(brick), cells_(cells), to_(to) {}
+        : mesh_(mesh), brick_(brick), cells_(cells), origin_(brick.origin), to_(to) {}
 
     void run(std::span<const std::uint32_t> triangles) {
         const std::size_t lanes = hn::Lanes(Wide());
-        const TriangleLimits limits{glm::dvec3(cells_.lower), glm::dvec3(cells_.upper)};
+        const TriangleLimits limits{origin_ + glm::dvec3(cells_.lower), origin_ + glm::dvec3(cells_.upper)};
         std::uint32_t triangle = 0;
         TileCutter cutter(brick_.options, &limits, [&](const TilePart& part) { addRows(part, triangle); });
         for (std::size_t i = 0; i < triangles.size(); i += lanes) {
@@ -112,13 +112,12 @@ class Spreader {
         }
     }
 
-    // In the voxels of the brick.
+    // In voxels.
     Points<Wide> corner(std::size_t k) {
         const Wide wide;
         const auto at = [&](std::size_t axis) {
             const auto world = hn::PromoteTo(wide, hn::Load(Small(), world_[k][axis]));
-            return hn::Sub(hn::Mul(world, hn::Set(wide, brick_.voxelsPerUnit)),
-                           hn::Set(wide, double(brick_.origin[int(axis)])));
+            return hn::Mul(world, hn::Set(wide, brick_.voxelsPerUnit));
         };
         const Points<Wide> corners{at(0), at(1), at(2)};
         keep(corners, known_.corners[k]);
@@ -154,7 +153,8 @@ class Spreader {
         if (!hn::AllFalse(wide, few)) {
             const Points<Wide> down = scaled(ab, step),
                                start = scaled(down + scaled(ac, step), hn::Set(wide, 1.0 / 3.0));
-            addRows(hn::DemoteTo(Small(), hn::IfThenElseZero(few, rows)), narrowed(a + start), narrowed(down),
+            const Points<Wide> origin{hn::Set(wide, origin_.x), hn::Set(wide, origin_.y), hn::Set(wide, origin_.z)};
+            addRows(hn::DemoteTo(Small(), hn::IfThenElseZero(few, rows)), narrowed(a - origin + start), narrowed(down),
                     narrowed(scaled(bc, step)),
                     narrowed(scaled(normal, hn::Div(hn::Set(wide, double(options.delta)), length))));
         }
@@ -197,8 +197,8 @@ class Spreader {
         const TriangleCorners& c = part.corners;
         const double step = 1.0 / double(part.rows);
         const glm::dvec3 s1 = (c[1] - c[0]) * step, s2 = (c[2] - c[1]) * step, s3 = (c[2] - c[0]) * step;
-        const auto first = pointsAt(tag, glm::vec3(c[0] + (s1 + s3) / 3.0)), down = pointsAt(tag, glm::vec3(s1)),
-                   across = pointsAt(tag, glm::vec3(s2));
+        const auto first = pointsAt(tag, glm::vec3(c[0] - origin_ + (s1 + s3) / 3.0)),
+                   down = pointsAt(tag, glm::vec3(s1)), across = pointsAt(tag, glm::vec3(s2));
         // divided in double: floats cannot hold the area of a very small triangle
         const auto offset = pointsAt(tag, glm::vec3(part.normal * (double(brick_.options.delta) / part.length)));
         const auto owner = hn::Set(intTag, std::int32_t(triangle));
@@ -253,6 +253,7 @@ class Spreader {
     const Mesh& mesh_;
     const SampledBrick& brick_;
     const SampleCells& cells_;
+    glm::dvec3 origin_;  // of the brick [index coordinates]
     AddedSamples& to_;
     // rows of a number a triangle
     alignas(64) float world_[3][3][mostLanes];

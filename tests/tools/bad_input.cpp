@@ -113,11 +113,10 @@ TEST_CASE("devices that are not there") {
 
 TEST_CASE("wrong usage") {
     const std::string mesh = sphereFile().string();
-    requireUsage({"build", mesh, "-o", output(), "--voxel-size", "0.1", "--backend", "opencl", "--method",
-                  "pseudonormal"},
-                 "--method pseudonormal: needs --backend tbb");
-    requireUsage({"build", mesh, "-o", output(), "--voxel-size", "0.1", "--mapping", "group"},
-                 "need --backend opencl");
+    requireUsage(
+        {"build", mesh, "-o", output(), "--voxel-size", "0.1", "--backend", "opencl", "--method", "pseudonormal"},
+        "--method pseudonormal: needs --backend tbb");
+    requireUsage({"build", mesh, "-o", output(), "--voxel-size", "0.1", "--mapping", "group"}, "need --backend opencl");
     requireUsage({});
     requireUsage({"unknown"});
     requireUsage({"build"});
