@@ -22,6 +22,17 @@ typedef struct {
     Sampling sampling;
 } Grid;
 
+// The next brick of a batch for this group, with no parts so far: groups take them one after another.
+uint takeBrick(global uint* next, SHARED uint* taken, SHARED uint* parts) {
+    MEET;
+    if (ITEM == 0) {
+        *taken = atomic_inc(next);
+        *parts = 0;
+    }
+    MEET;
+    return *taken;
+}
+
 // The parts of each triangle of a batch, whatever brick asks; 0 where that goes by the brick.
 RealInt partsOfAny(const Grid* grid, const Batch* batch);
 
@@ -98,7 +109,7 @@ void visit(const Bins* bins, const Grid* grid, const Corners* t, uint cell, uint
 // Boxes of bricks are halved, and left out where the triangle stays away. So a needle costs its length, not the box
 // around it.
 #define MOST_BOXES 100  // three times the bits of a coordinate
-void divide(const Bins* bins, const Grid* grid, const Corners* t, int3 lowest, int3 highest) {
+void divide(const Bins* bins, const Grid* grid, const Corners* t, int3 lowest, int3 highest, uint parts) {
     int3 lower[MOST_BOXES], upper[MOST_BOXES];
     int waiting = 1;
     lower[0] = lowest;
@@ -108,7 +119,7 @@ void divide(const Bins* bins, const Grid* grid, const Corners* t, int3 lowest, i
         const int3 low = lower[waiting], high = upper[waiting], size = high - low;
         if (staysAway(grid, t, low, high)) continue;
         if (size.x + size.y + size.z == 0) {
-            visit(bins, grid, t, cellAt(grid, low), 0);
+            visit(bins, grid, t, cellAt(grid, low), parts);
             continue;
         }
         const int3 way = size.x >= size.y && size.x >= size.z ? (int3)(1, 0, 0)
@@ -149,11 +160,12 @@ void bricksAround(const Grid* grid, const Batch* batch, Int3* lowest, Int3* exte
     extent->z = (toRealInt(floor(high.z + grid->reach)) >> grid->shift) - first.z;
 }
 
-void divideTriangle(const Bins* bins, const Grid* grid, global const float* points, global const uint* triangles) {
+void divideTriangle(const Bins* bins, const Grid* grid, global const float* points, global const uint* triangles,
+                    uint parts) {
     const Corners t = cornersOf(points, triangles, bins->triangle, grid->voxelsPerUnit);
     const double3 low = min(t.a, min(t.b, t.c)) - grid->reach, high = max(t.a, max(t.b, t.c)) + grid->reach;
     divide(bins, grid, &t, (convert_int3(floor(low)) >> grid->shift) - toInt3(grid->first),
-           (convert_int3(floor(high)) >> grid->shift) - toInt3(grid->first));
+           (convert_int3(floor(high)) >> grid->shift) - toInt3(grid->first), parts);
 }
 
 // Counts the triangles of a batch in the bricks around them, and gives them their codes.
@@ -177,7 +189,7 @@ void countBatch(Bins* bins, const Grid* grid, const Batch* batch, global const f
             visitFew(bins, grid, &t, (uint)(all[lane]), (uint)(parts[lane]));
         } else {
             codes[bins->triangle] = MANY_BRICKS;
-            divideTriangle(bins, grid, points, triangles);
+            divideTriangle(bins, grid, points, triangles, (uint)(parts[lane]));
         }
     }
 }
@@ -268,6 +280,6 @@ kernel void listTriangles(global const float* points, global const uint* triangl
         if (codes[i] != MANY_BRICKS)
             visitFew(&bins, &grid, 0, codes[i], 1);
         else
-            divideTriangle(&bins, &grid, points, triangles);
+            divideTriangle(&bins, &grid, points, triangles, 1);
     }
 }

@@ -105,7 +105,6 @@ class Mapped {
 class BrickFill {
   public:
     BrickFill(Device::Impl& device, const OpenclOptions& options, const FillJob& job, const DeviceSink& keep);
-    ~BrickFill();
     void run();
 
   private:
@@ -149,7 +148,8 @@ class BrickFill {
     cl_uint scratchCells_ = 0;
     std::uint64_t share_ = 0;  // of the memory, for a batch
     std::array<Batch, batchesInFlight> batches_;
-    std::vector<glm::ivec3> open_;  // blocks that are left to the host
+    std::vector<glm::ivec3> open_;         // blocks that are left to the host
+    Ended kernelsEnded_, transfersEnded_;  // the device's queue, and that of the transfers
 };
 
 // How far a voxel may lie from a triangle that matters to it: the paper's cube sticks out of the ball.
@@ -178,14 +178,6 @@ const std::array<cl_ulong, 256>& bitOrders() {
     return orders;
 }
 
-std::string buildOptions(const Device::Impl& device, bool gpuMapping, bool triangles, bool cube) {
-    std::string options = commonBuildOptions(device);
-    if (gpuMapping) options += " -D GROUP_PER_BLOCK";
-    if (triangles) options += " -D TRIANGLES=1";
-    if (cube) options += " -D PAPER_CUBE=1";
-    return options;
-}
-
 BrickFill::BrickFill(Device::Impl& device, const OpenclOptions& options, const FillJob& job, const DeviceSink& keep)
     : device_(device),
       job_(job),
@@ -196,8 +188,11 @@ BrickFill::BrickFill(Device::Impl& device, const OpenclOptions& options, const F
       memory_(device, memoryBudget(device, options.memoryMiB)),
       layered_(job.options.method == Method::doubleLayer),
       program_(buildProgram(device, layered_ ? double_layer_cl : exact_cl,
-                            buildOptions(device, gpuMapping_, job.mesh.triangles, layered_ && job.layers.cube > 0))),
-      transfers_(device.context, device.device, CL_QUEUE_PROFILING_ENABLE) {
+                            commonBuildOptions(device, gpuMapping_, job.mesh.triangles) +
+                                (layered_ && job.layers.cube > 0 ? " -D PAPER_CUBE=1" : ""))),
+      transfers_(device.context, device.device, CL_QUEUE_PROFILING_ENABLE),
+      kernelsEnded_(device.queue),
+      transfersEnded_(transfers_) {
     const float reach = reachOf(job);
     bins_.emplace(device, program_, memory_, job, reach, layered_ ? reach : reach + 1, gpuMapping_, timing_);
     job.mesh.progress.begin(bins_->bricks());
@@ -211,15 +206,6 @@ BrickFill::BrickFill(Device::Impl& device, const OpenclOptions& options, const F
         makeScratch();
     }
     share_ = memory_.left() / batchesInFlight;
-}
-
-// Commands in flight use the memory of the batches: they must have ended, whatever else went wrong.
-BrickFill::~BrickFill() {
-    try {
-        device_.queue.finish();
-        transfers_.finish();
-    } catch (const cl::Error&) {
-    }
 }
 
 void BrickFill::makeScratch() {

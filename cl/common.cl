@@ -125,11 +125,17 @@ bool anyLane(IntLanes held) {
 #endif
 }
 
-// Adds to a counter that the items of a group, or all groups, share; returns what it was.
+// Adds to a counter that all groups, or the items of a group, share; returns what it was.
 #if ITEMS > 1
 #define takeGlobal(counter, count) atomic_add(counter, count)
+#define takeShared(counter, count) atomic_add(counter, count)
 #else
 uint takeGlobal(global uint* counter, uint count) {
+    const uint before = *counter;
+    *counter = before + count;
+    return before;
+}
+uint takeShared(SHARED uint* counter, uint count) {
     const uint before = *counter;
     *counter = before + count;
     return before;

@@ -42,14 +42,7 @@ GROUP_KERNEL void prepareBricks(global const float* points, global const uint* t
                                 global Sample* unsorted, global float* columns, global uint* begins, uint stride,
                                 global uint* next, Layers layers) {
     SHARED uint taken, count, sums[ITEMS];
-    for (;;) {
-        MEET;
-        if (ITEM == 0) {
-            taken = atomic_inc(next);
-            count = 0;
-        }
-        MEET;
-        if (taken >= bricks) return;
+    while (takeBrick(next, &taken, &count) < bricks) {
         const uint b = firstBrick + taken, first = partOffsets[b] - partOffsets[firstBrick];
         const int3 brick = brickAt(&grid, cellOfBrick[b]);
         const Limits limits = limitsOf(&grid, brick);

@@ -52,14 +52,7 @@ GROUP_KERNEL void prepareBricks(global const float* points, global const uint* t
     SHARED uint2 sums[ITEMS];
     const Groups groups = {groupColumns, groupBegins, stride};
     const int slices = (1 << grid.shift) / BLOCK_SIDE;
-    for (;;) {
-        MEET;
-        if (ITEM == 0) {
-            taken = atomic_inc(next);
-            count = 0;
-        }
-        MEET;
-        if (taken >= bricks) return;
+    while (takeBrick(next, &taken, &count) < bricks) {
         const uint b = firstBrick + taken, first = partOffsets[b] - partOffsets[firstBrick];
         const int3 brick = brickAt(&grid, cellOfBrick[b]);
         const Limits limits = limitsOf(&grid, brick);
@@ -70,10 +63,10 @@ GROUP_KERNEL void prepareBricks(global const float* points, global const uint* t
         MEET;
         const uint found = count;
         const Extent all = sumExtents(extents);
-        const float meanRadius = (float)(all.sizes / found);
+        const float meanRadius = (float)(all.radii / found);
         const Cells cells = makeCells(&all, clamp(CELL_FACTOR * meanRadius, SMALLEST_CELL, LARGEST_CELL));
         uint groupCount = found;
-        if (all.sizes < SMALL_RADIUS * found && countCells(&cells) <= (float)(scratchCells)) {
+        if (all.radii < SMALL_RADIUS * found && countCells(&cells) <= (float)(scratchCells)) {
             groupCount = sortMembers(&groups, first, unsorted + first, members + first, cellOfMember + first, found,
                                      &cells, scratch + get_group_id(0) * scratchCells, sums);
             for (uint g = first + ITEM; g < first + groupCount; g += ITEMS) makeCluster(&groups, g, members);

@@ -39,18 +39,6 @@ struct Batch {
     cl::Buffer points, samples;
 };
 
-// Commands in flight use the host's memory: they have ended when this goes, whatever else went wrong.
-class Ended {
-  public:
-    explicit Ended(const cl::CommandQueue& queue) : queue_(queue) {}
-    Ended(const Ended&) = delete;
-    Ended& operator=(const Ended&) = delete;
-    ~Ended() { ::clFinish(queue_()); }
-
-  private:
-    const cl::CommandQueue& queue_;
-};
-
 cl::Program samplingProgram(const Device& device) {
     if (!device.info().doubles)
         throw DeviceError(device.info().name + " cannot compute in double precision, which samples of fields need");

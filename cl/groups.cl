@@ -2,9 +2,7 @@
 #include "bins.cl"
 
 // Groups near a block that are looked at in one go.
-#ifndef PAGE
 #define PAGE 1024
-#endif
 // Rounding of a group's own numbers, and of where it lies to a block [voxels].
 #define GROUP_SLACK 1e-4f
 #define BIN_SLACK 1e-3f
@@ -19,17 +17,17 @@ typedef struct {
 
 // Groups of members of all bricks of a batch, a column for each number. The members of a group end where those of the
 // next one begin; so do the places of bricks in these columns.
-enum { PLACE_X, PLACE_Y, PLACE_Z, RADIUS, NORMAL_X, NORMAL_Y, NORMAL_Z, THICKNESS, COMMON_COLUMNS };
+enum { PLACE_X, PLACE_Y, PLACE_Z, RADIUS, NORMAL_X, NORMAL_Y, NORMAL_Z, THICKNESS };
 
 // What is known of all members of a brick, or of an item's part of them.
 typedef struct {
-    double sizes;  // their radii or areas, summed up
+    double radii;  // summed up
     float lower[3], upper[3];
 } Extent;
 
 Extent addExtents(const Extent* a, const Extent* b) {
     Extent sum;
-    sum.sizes = a->sizes + b->sizes;
+    sum.radii = a->radii + b->radii;
     for (int axis = 0; axis < 3; ++axis) {
         sum.lower[axis] = min(a->lower[axis], b->lower[axis]);
         sum.upper[axis] = max(a->upper[axis], b->upper[axis]);
@@ -214,11 +212,7 @@ uint turnPage(const Near* near, uint c, SHARED uint* page, SHARED uint* count) {
         if (at < near->range.y && near->range.y - at < LANES) bits &= (1u << (near->range.y - at)) - 1;
         MEET;
         for (; bits != 0; bits &= bits - 1) {
-#if ITEMS > 1
-            const uint place = atomic_inc(count);
-#else
-            const uint place = (*count)++;
-#endif
+            const uint place = takeShared(count, 1);
             page[place] = at + (uint)(lowestBit(bits));
         }
         c += ITEMS * LANES;

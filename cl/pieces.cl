@@ -184,12 +184,7 @@ void makePieces(Cut* cut, uint lanes, Real3 corner, Real3 ab, Real3 ac, int (*ba
                               toRealFromInt(loadRealInt(base[1]) - cut->origin.y),
                               toRealFromInt(loadRealInt(base[2]) - cut->origin.z));
     makeColumns(corner, ab, ac, shift, columns);
-#if ITEMS > 1
-    uint place = atomic_add(cut->count, popcount(lanes));
-#else
-    uint place = *cut->count;
-    *cut->count += popcount(lanes);
-#endif
+    uint place = takeShared(cut->count, popcount(lanes));
     float3 lower = vload3(0, cut->extent.lower), upper = vload3(0, cut->extent.upper);
     float radii = 0;
     for (; lanes != 0; lanes &= lanes - 1, ++place) {
@@ -210,7 +205,7 @@ void makePieces(Cut* cut, uint lanes, Real3 corner, Real3 ab, Real3 ac, int (*ba
     }
     vstore3(lower, 0, cut->extent.lower);
     vstore3(upper, 0, cut->extent.upper);
-    cut->extent.sizes += radii;
+    cut->extent.radii += radii;
 }
 
 // Parts of long triangles that wait until they are a batch: their lattice points, a corner as seen from there, the ways

@@ -69,18 +69,10 @@ struct Batch {
     Load load() const { return begins.back(); }
 };
 
-std::string buildOptions(const Device::Impl& device, bool groups, bool triangles) {
-    std::string options = commonBuildOptions(device);
-    if (groups) options += " -D GROUP_PER_BLOCK";
-    if (triangles) options += " -D TRIANGLES=1";
-    return options;
-}
-
 class Fill {
   public:
     Fill(Device::Impl& device, const OpenclOptions& options, const PrismJob& job, const MeshJob& mesh,
          const TriangleBins& bins);
-    ~Fill();
     void run();
 
   private:
@@ -107,6 +99,7 @@ class Fill {
     std::vector<PrismBlocks> window_;  // the bricks from firstPrepared_ on
     std::size_t firstPrepared_ = 0;
     std::array<Batch, batchesInFlight> batches_;
+    Ended kernelsEnded_, transfersEnded_;  // the device's queue, and that of the uploads
 };
 
 Fill::Fill(Device::Impl& device, const OpenclOptions& options, const PrismJob& job, const MeshJob& mesh,
@@ -120,17 +113,10 @@ Fill::Fill(Device::Impl& device, const OpenclOptions& options, const PrismJob& j
       timing_(options.times),
       memory_(device, memoryBudget(device, options.memoryMiB)),
       share_(memory_.left() / batchesInFlight),
-      kernel_(buildProgram(device, prism_cl, buildOptions(device, groups_, mesh.triangles)), "fillBlocks"),
-      uploads_(device.context, device.device, CL_QUEUE_PROFILING_ENABLE) {}
-
-// Commands in flight use the memory of the batches: they must have ended, whatever else went wrong.
-Fill::~Fill() {
-    try {
-        uploads_.finish();
-        device_.queue.finish();
-    } catch (const cl::Error&) {
-    }
-}
+      kernel_(buildProgram(device, prism_cl, commonBuildOptions(device, groups_, mesh.triangles)), "fillBlocks"),
+      uploads_(device.context, device.device, CL_QUEUE_PROFILING_ENABLE),
+      kernelsEnded_(device.queue),
+      transfersEnded_(uploads_) {}
 
 void Fill::run() {
     std::size_t turn = 0;

@@ -116,10 +116,6 @@ class ResidentFill {
     glm::ivec3 firstVoxel_{0};
 };
 
-std::string buildOptions(const Device::Impl& device, bool gpuMapping) {
-    return commonBuildOptions(device) + (gpuMapping ? " -D GROUP_PER_BLOCK" : "");
-}
-
 ResidentFill::ResidentFill(const Device& device, const OpenclOptions& options, DeviceMemory& memory, const FillJob& job)
     : device_(device.impl()),
       options_(options),
@@ -128,7 +124,7 @@ ResidentFill::ResidentFill(const Device& device, const OpenclOptions& options, D
       gpuMapping_(wantsGroups(device_, options.mapping)),
       widths_{job.options.exteriorWidth, job.options.interiorWidth, job.mesh.voxelSize},
       timing_(options.times),
-      program_(buildProgram(device_, resident_cl, buildOptions(device_, gpuMapping_))),
+      program_(buildProgram(device_, resident_cl, commonBuildOptions(device_, gpuMapping_))),
       summary_(memory.allocate(sizeof(Summary), field)) {}
 
 DeviceLayout ResidentFill::run() {

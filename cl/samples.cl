@@ -130,9 +130,11 @@ int nextTile(Tiles* tiles, const Sampling* sampling, const Limits* limits, Tile*
     return 0;
 }
 
-Tile wholeTile(const Corners* t, double3 normal) {
-    const Tile tile = {*t, 0.5 * length(normal), longestEdge2(t)};
-    return tile;
+// Begins with a whole triangle.
+void beginTiles(Tiles* tiles, const Corners* t, double3 normal) {
+    const Tile whole = {*t, 0.5 * length(normal), longestEdge2(t)};
+    tiles->waiting[0] = whole;
+    tiles->count = 1;
 }
 
 double3 normalOf(const Corners* t) {
@@ -158,15 +160,12 @@ RealInt partsOfAny(const Grid* grid, const Batch* batch) {
 }
 
 uint countParts(const Grid* grid, const Corners* t, const Limits* limits) {
-    const Tile whole = wholeTile(t, normalOf(t));
-    int rows = rowsOf(&grid->sampling, whole.area, whole.longest2);
-    if (rows > 0) return (uint)(rows * (rows + 1) / 2);
     Tiles tiles;
     Tile tile;
-    tiles.waiting[0] = whole;
-    tiles.count = 1;
+    beginTiles(&tiles, t, normalOf(t));
     uint count = 0;
-    while ((rows = nextTile(&tiles, &grid->sampling, limits, &tile)) > 0) count += (uint)(rows * (rows + 1) / 2);
+    for (int rows; (rows = nextTile(&tiles, &grid->sampling, limits, &tile)) > 0;)
+        count += (uint)(rows * (rows + 1) / 2);
     return count;
 }
 
@@ -201,12 +200,7 @@ void addSamples(Cut* cut, uint among, Real3 place, Real3 offset, RealInt owner) 
     storeReal(offset.z, numbers[5]);
     storeRealInt(owner, owners);
     storeRealInt((x * c->size + y) * c->size + z, cells);
-#if ITEMS > 1
-    uint at = atomic_add(cut->count, popcount(among));
-#else
-    uint at = *cut->count;
-    *cut->count += popcount(among);
-#endif
+    uint at = takeShared(cut->count, popcount(among));
     for (; among != 0; among &= among - 1, ++at) {
         const int lane = lowestBit(among);
         global float4* sample = (global float4*)(cut->samples + at);
@@ -259,11 +253,10 @@ void addPart(Cut* cut, const Corners* t, int rows, double3 normal, uint triangle
 }
 
 // Samples a triangle that must be cut.
-void cutLarge(Cut* cut, const Grid* grid, uint triangle, const Tile* whole, double3 normal, const Limits* limits) {
+void cutLarge(Cut* cut, const Grid* grid, uint triangle, const Corners* t, double3 normal, const Limits* limits) {
     Tiles tiles;
     Tile tile;
-    tiles.waiting[0] = *whole;
-    tiles.count = 1;
+    beginTiles(&tiles, t, normal);
     for (int rows; (rows = nextTile(&tiles, &grid->sampling, limits, &tile)) > 0;)
         addPart(cut, &tile.corners, rows, normal, triangle);
 }
@@ -283,11 +276,13 @@ Exact3 addExact(Exact3 a, Exact3 b) {
     return v;
 }
 
-// Samples those triangles of a batch that have few rows. Returns bits of the others that have an area.
-uint cutFew(Cut* cut, const Grid* grid, const Batch* batch) {
+// Samples those triangles of a batch that have few rows. Returns bits of the others that have an area, and the rows of
+// all as they were counted.
+uint cutFew(Cut* cut, const Grid* grid, const Batch* batch, int* rowsOfEach) {
     const Exact3 ab = subExact(batch->b, batch->a), ac = subExact(batch->c, batch->a),
                  bc = subExact(batch->c, batch->b), normal = normals(batch);
     const Exact size = sqrt(squareExact(normal)), rows = rowsOfAny(&grid->sampling, batch, size), step = 1.0 / rows;
+    storeRealInt(toRealInt(rows), rowsOfEach);
     const uint real = bitsOfExact(size > 0.0) & batch->real;
     const uint few = bitsOfExact((rows > 0.0) & (rows <= (double)(FEW_ROWS))) & real;
     if (few != 0) {
@@ -307,16 +302,16 @@ void cutTriangles(Cut* cut, const Grid* grid, global const float* points, global
     for (uint first = begin + ITEM * BATCH; first < end; first += ITEMS * BATCH) {
         Batch batch;
         fetchBatch(&batch, points, triangles, list, first, end, grid->voxelsPerUnit);
-        for (uint rest = cutFew(cut, grid, &batch); rest != 0; rest &= rest - 1) {
-            const uint triangle = batch.triangle[lowestBit(rest)];
+        int rows[BATCH];
+        for (uint rest = cutFew(cut, grid, &batch, rows); rest != 0; rest &= rest - 1) {
+            const int lane = lowestBit(rest);
+            const uint triangle = batch.triangle[lane];
             const Corners t = cornersOf(points, triangles, triangle, grid->voxelsPerUnit);
             const double3 normal = normalOf(&t);
-            const Tile whole = wholeTile(&t, normal);
-            const int rows = rowsOf(&grid->sampling, whole.area, whole.longest2);
-            if (rows > 0)
-                addPart(cut, &t, rows, normal, triangle);
+            if (rows[lane] > 0)
+                addPart(cut, &t, rows[lane], normal, triangle);
             else
-                cutLarge(cut, grid, triangle, &whole, normal, limits);
+                cutLarge(cut, grid, triangle, &t, normal, limits);
         }
     }
 }

@@ -21,10 +21,27 @@ inline bool wantsGroups(const Device::Impl& device, KernelMapping mapping) {
 }
 
 /// What every program is built with.
-inline std::string commonBuildOptions(const Device::Impl& device) {
+/// @param groups     whether work-items share the work of a group
+/// @param triangles  whether the nearest triangles are kept
+inline std::string commonBuildOptions(const Device::Impl& device, bool groups = false, bool triangles = false) {
     std::string options = "-cl-std=CL1.2";
     if (device.info.exactSquareRoots) options += " -cl-fp32-correctly-rounded-divide-sqrt";
+    if (groups) options += " -D GROUP_PER_BLOCK";
+    if (triangles) options += " -D TRIANGLES=1";
     return options;
 }
+
+/// Commands in flight use memory that goes with what this stands in: they have ended when this goes, whatever else went
+/// wrong. As a member it comes last, to go first.
+class Ended {
+  public:
+    explicit Ended(const cl::CommandQueue& queue) : queue_(queue) {}
+    Ended(const Ended&) = delete;
+    Ended& operator=(const Ended&) = delete;
+    ~Ended() { ::clFinish(queue_()); }
+
+  private:
+    const cl::CommandQueue& queue_;
+};
 
 }  // namespace bilayer
