@@ -1,9 +1,12 @@
-// Samples of a field that is laid out as in sdf/field_layout.h: what Field::sample() does in collider/field.cpp,
-// operation by operation.
+// Samples of a field that is laid out as in sdf/field_layout.h: what collider/field_sample.cpp does, operation by
+// operation.
 #include "layout.cl"
 
 // [voxels]
 #define CELL_DIAGONAL 1.7320508f
+// Bits of a place below the voxel, and what leaves a fixed-point number in the lower bits of a double below 2^28.
+#define FRACTION_BITS 23
+#define FIXED_POINT 805306368.0
 
 // Sample of sdf/sample.h.
 typedef struct {
@@ -14,41 +17,29 @@ typedef struct {
 typedef struct {
     Frame frame;
     global const int* directory;
-    global const Part* parts;
+    global const char* centres;
     global const float* values;
 } Field;
 
-// The eight voxels around a point, the last axis fastest, and where the point lies between them.
+// The voxels around a place at its lower and at its upper x: (y, z), (y, z + 1), (y + 1, z), (y + 1, z + 1).
 typedef struct {
-    float values[8];
-    float3 fraction;
+    float4 low, high;
 } Cell;
 
 int3 blocksOf(const Field* field) {
     return vload3(0, field->frame.blocks);
 }
 
-// mix() may round otherwise.
-float between(float a, float b, float t) {
-    return a + t * (b - a);
-}
-
-float interpolate(const Cell* cell) {
-    const float* v = cell->values;
-    const float3 f = cell->fraction;
-    const float low = between(between(v[0], v[1], f.z), between(v[2], v[3], f.z), f.y);
-    const float high = between(between(v[4], v[5], f.z), between(v[6], v[7], f.z), f.y);
-    return between(low, high, f.x);
-}
-
-// The gradient of interpolate() [distance a voxel].
-float3 interpolantGradient(const Cell* cell) {
-    const float* v = cell->values;
-    const float3 f = cell->fraction;
-    const float x0y0 = between(v[0], v[1], f.z), x0y1 = between(v[2], v[3], f.z);
-    const float x1y0 = between(v[4], v[5], f.z), x1y1 = between(v[6], v[7], f.z);
-    return (float3)(between(x1y0, x1y1, f.y) - between(x0y0, x0y1, f.y), between(x0y1 - x0y0, x1y1 - x1y0, f.x),
-                    between(between(v[1] - v[0], v[3] - v[2], f.y), between(v[5] - v[4], v[7] - v[6], f.y), f.x));
+// The distance [m] and its gradient [m a voxel].
+float4 interpolate(const Cell* cell, float3 fraction) {
+    const float4 dx = cell->high - cell->low, at = cell->low + fraction.x * dx;
+    // values at z and z + 1, then how they change along x
+    const float4 y0 = (float4)(at.lo, dx.lo), y1 = (float4)(at.hi, dx.hi);
+    const float4 dy = y1 - y0, along = y0 + fraction.y * dy;
+    // value, along x, along y
+    const float3 z0 = (float3)(along.even, dy.x), z1 = (float3)(along.odd, dy.y);
+    const float3 dz = z1 - z0;
+    return (float4)(z0 + fraction.z * dz, dz.x);
 }
 
 // What the interpolant may be off by [voxels].
@@ -64,7 +55,8 @@ float clearanceAt(const Field* field, double3 place) {
     const int3 part = min(convert_int3(clamp(point, (float3)(0.0f), convert_float3(size))), size - 1);
     const float3 way = point - (convert_float3(part) + 0.5f);
     const float length = sqrt(way.x * way.x + way.y * way.y + way.z * way.z);
-    return (float)(PART_SIDE) * (fabs(field->parts[indexOf(part, size)].centre) - length);
+    const float centre = (float)(field->centres[centreOf(part, blocksOf(field))]) * (1.0f / WAY_STEPS);
+    return (float)(PART_SIDE) * (fabs(centre) - length);
 }
 
 // The bound for points outside of the directory's box, or that are nowhere.
@@ -76,38 +68,34 @@ float boundOutside(const Field* field, double3 place, double3 extent) {
     return max(0.0f, (float)(length - (double)(CELL_DIAGONAL)) * frame->voxelSize + frame->exteriorWidth);
 }
 
-float boundInEmptyBlock(const Field* field, bool inside, double3 place, int3 block) {
+float boundInEmptyBlock(const Field* field, bool inside, double3 place) {
     const Frame* frame = &field->frame;
-    const float3 inBlock = convert_float3(place - convert_double3(BLOCK_SIDE * block));
-    const bool ownCell = max(max(inBlock.x, inBlock.y), inBlock.z) <= (float)(BLOCK_SIDE - 1);
+    const double3 rest = place - (double)(BLOCK_SIDE)*floor(place / (double)(BLOCK_SIDE));
+    const bool ownCell = max(max(rest.x, rest.y), rest.z) <= (double)(BLOCK_SIDE - 1);
     const float width = inside ? frame->interiorWidth : frame->exteriorWidth;
     const float besideBand = width - (ownCell ? 0.5f : 1.0f) * CELL_DIAGONAL * frame->voxelSize;
     const float bound = max(0.0f, max(besideBand, frame->voxelSize * clearanceAt(field, place)));
     return inside ? -bound : bound;
 }
 
-Cell cellAt(const Field* field, int entry, int3 inBlock, float3 fraction) {
+Cell cellAt(const Field* field, int entry, int3 inBlock) {
     global const float* v = field->values + voxelOf(entry, inBlock);
     const int x = STRIDE * STRIDE, y = STRIDE;
-    const Cell cell = {{v[0], v[1], v[y], v[y + 1], v[x], v[x + 1], v[x + y], v[x + y + 1]}, fraction};
+    const Cell cell = {(float4)(v[0], v[1], v[y], v[y + 1]), (float4)(v[x], v[x + 1], v[x + y], v[x + y + 1])};
     return cell;
 }
 
 bool isInBand(const Field* field, const Cell* cell) {
-    float low = cell->values[0], high = low;
-    for (int i = 1; i < 8; ++i) {
-        low = min(low, cell->values[i]);
-        high = max(high, cell->values[i]);
-    }
-    return low > -field->frame.interiorWidth && high < field->frame.exteriorWidth;
+    const float least = -field->frame.interiorWidth, most = field->frame.exteriorWidth;
+    return all(cell->low > least && cell->low < most && cell->high > least && cell->high < most);
 }
 
 // The bound in a cell of which a voxel is beyond the band.
-float boundBesideBand(const Field* field, const Cell* cell, float distance, double3 place) {
+float boundBesideBand(const Field* field, float distance, double3 place) {
     const Frame* frame = &field->frame;
     const float besideBand =
         (distance < 0 ? frame->interiorWidth : frame->exteriorWidth) - CELL_DIAGONAL * frame->voxelSize;
-    const float within = fabs(distance) - frame->voxelSize * interpolationError(cell->fraction);
+    const float within = fabs(distance) - frame->voxelSize * interpolationError(convert_float3(place - floor(place)));
     const float known = max(within, frame->voxelSize * clearanceAt(field, place));
     return copysign(max(0.0f, max(besideBand, known)), distance);
 }
@@ -120,26 +108,31 @@ Sample beyondBand(float distance) {
 Sample sampleAt(const Field* field, float3 point) {
     const Frame* frame = &field->frame;
     const double3 place = (convert_double3(point) - vload3(0, frame->origin)) * frame->perMetre;
-    const double3 extent = (double)(BLOCK_SIDE)*convert_double3(blocksOf(field));
-    // compared before any conversion to integers, so that NaN and huge coordinates end here
-    if (!all(place >= 0.0) || !all(place < extent)) return beyondBand(boundOutside(field, place, extent));
+    // what is negative, huge or no number is not within
+    const long3 fixed = as_long3(place + FIXED_POINT) - as_long(FIXED_POINT);
+    const long3 size = convert_long3(BLOCK_SIDE * blocksOf(field)) << FRACTION_BITS;
+    if (any(fixed < 0) || any(fixed >= size))
+        return beyondBand(boundOutside(field, place, convert_double3(BLOCK_SIDE * blocksOf(field))));
 
-    const int3 voxel = convert_int3(place), block = voxel >> 3;
-    const int entry = field->directory[indexOf(block, blocksOf(field))];
-    if (entry < 0) return beyondBand(boundInEmptyBlock(field, entry == EMPTY_INSIDE, place, block));
+    const int3 voxel = convert_int3(fixed >> FRACTION_BITS);
+    const int entry = field->directory[indexOf(voxel >> 3, blocksOf(field))];
+    if (entry < 0) return beyondBand(boundInEmptyBlock(field, entry == EMPTY_INSIDE, place));
 
-    const Cell cell = cellAt(field, entry, voxel & 7, convert_float3(place - convert_double3(voxel)));
-    const float distance = interpolate(&cell);
-    if (!isInBand(field, &cell)) return beyondBand(boundBesideBand(field, &cell, distance, place));
-    const float3 gradient = interpolantGradient(&cell) * (float)(frame->perMetre);
-    const Sample sample = {distance, {gradient.x, gradient.y, gradient.z}, 1};
+    const int3 bits = convert_int3(fixed & ((1 << FRACTION_BITS) - 1));
+    const float3 fraction = as_float3(bits | as_int(1.0f)) - 1.0f;
+    const Cell cell = cellAt(field, entry, voxel & (BLOCK_SIDE - 1));
+    const float4 found = interpolate(&cell, fraction);
+    if (!isInBand(field, &cell)) return beyondBand(boundBesideBand(field, found.x, place));
+    const float3 gradient = found.yzw * (float)(frame->perMetre);
+    const Sample sample = {found.x, {gradient.x, gradient.y, gradient.z}, 1};
     return sample;
 }
 
 // A work-item samples some points in a row: one on GPUs, whose items stand side by side.
-kernel void sampleField(Frame frame, global const int* directory, global const Part* parts, global const float* values,
-                        global const float* points, uint count, uint pointsPerItem, global Sample* samples) {
-    const Field field = {frame, directory, parts, values};
+kernel void sampleField(Frame frame, global const int* directory, global const char* centres,
+                        global const float* values, global const float* points, uint count, uint pointsPerItem,
+                        global Sample* samples) {
+    const Field field = {frame, directory, centres, values};
     const uint first = (uint)(get_global_id(0)) * pointsPerItem, last = min(count, first + pointsPerItem);
     for (uint i = first; i < last; ++i) samples[i] = sampleAt(&field, vload3(i, points));
 }

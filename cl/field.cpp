@@ -85,8 +85,7 @@ void DeviceField::Data::upload(FieldLayout from, OpenclTimes* times) {
         return memory.upload(data, count * sizeof *data, "the field", timing.event(Timing::Of::upload));
     };
     layout = {from, uploaded(from.directory.data(), from.directory.size()),
-              uploaded(from.clearances.data(), from.clearances.size()),
-              uploaded(from.values.get(), from.stored * FieldLayout::blockFloats)};
+              uploaded(from.centres.data(), from.centres.size()), uploaded(from.values.data(), from.values.size())};
     device.impl().queue.finish();
     timing.sumUp();
     if (times) times->peakBytes = std::max(times->peakBytes, memory.peak());
@@ -113,8 +112,8 @@ void DeviceField::Data::start(Batch& batch, std::span<const glm::vec3> points, s
     cl::Kernel kernel(program, "sampleField");
     cl_uint index = 0;
     const auto set = [&](const auto&... arguments) { (kernel.setArg(index++, arguments), ...); };
-    set(KernelFrame(layout.frame), layout.directory, layout.parts, layout.values, batch.points, cl_uint(points.size()),
-        cl_uint(each), batch.samples);
+    set(KernelFrame(layout.frame), layout.directory, layout.centres, layout.values, batch.points,
+        cl_uint(points.size()), cl_uint(each), batch.samples);
     queue.enqueueNDRangeKernel(kernel, cl::NullRange, cl::NDRange(global), cl::NDRange(local), nullptr,
                                timing.event(Timing::Of::kernel));
     cl::Event* const download = timing.event(Timing::Of::download);

@@ -7,8 +7,10 @@
 // Entries of the directory that are no numbers of blocks.
 #define EMPTY_OUTSIDE -1
 #define EMPTY_INSIDE -2
-// Of clearances [voxels].
+// Of clearances: voxels along a part, parts along a block, and what ways are stored in.
 #define PART_SIDE 4
+#define PARTS_ALONG 2
+#define WAY_STEPS 8
 
 // FieldFrame of sdf/field_layout.h; metres and voxels as there.
 typedef struct {
@@ -16,11 +18,6 @@ typedef struct {
     int blocks[3];
     float voxelSize, exteriorWidth, interiorWidth;
 } Frame;
-
-// Clearance::Part of sdf/clearance.h.
-typedef struct {
-    float centre, least;
-} Part;
 
 // The last axis fastest.
 size_t indexOf(int3 at, int3 size) {
@@ -34,5 +31,12 @@ int3 placeAt(uint index, int3 size) {
 
 // Where a voxel of a block is, apron included.
 size_t voxelOf(int block, int3 inBlock) {
-    return (size_t)(block) * BLOCK_FLOATS + (inBlock.x * STRIDE + inBlock.y) * STRIDE + inBlock.z;
+    return (size_t)(block)*BLOCK_FLOATS + (inBlock.x * STRIDE + inBlock.y) * STRIDE + inBlock.z;
+}
+
+// Where a part's way to the surface is: a block's parts lie together, in the order of the directory.
+size_t centreOf(int3 part, int3 blocks) {
+    const int3 inBlock = part & (PARTS_ALONG - 1);
+    return (indexOf(part / PARTS_ALONG, blocks) * PARTS_ALONG + inBlock.x) * PARTS_ALONG * PARTS_ALONG +
+           inBlock.y * PARTS_ALONG + inBlock.z;
 }

@@ -12,6 +12,8 @@
 #define LINK_SLACK 1e-4f
 // As in sdf/field_layout.cpp.
 #define MOST_PARTS 16
+// Ways are stored no longer than that [WAY_STEPS].
+#define MOST_WAY 127
 #define NEAR_SURFACE (0.5f * 1.7320508f)
 
 // BandWidths of sdf/band.h.
@@ -46,8 +48,8 @@ uint sideBits(SHARED const uchar* sides, int voxel) {
     const int x = voxel / (BLOCK_SIDE * BLOCK_SIDE), y = voxel / BLOCK_SIDE % BLOCK_SIDE, z = voxel % BLOCK_SIDE;
     const int last = BLOCK_SIDE - 1, xStep = BLOCK_SIDE * BLOCK_SIDE, yStep = BLOCK_SIDE;
     return (x > 0 ? sides[voxel - xStep] : 0) | (x < last ? sides[voxel + xStep] : 0) |
-           (y > 0 ? sides[voxel - yStep] : 0) | (y < last ? sides[voxel + yStep] : 0) |
-           (z > 0 ? sides[voxel - 1] : 0) | (z < last ? sides[voxel + 1] : 0);
+           (y > 0 ? sides[voxel - yStep] : 0) | (y < last ? sides[voxel + yStep] : 0) | (z > 0 ? sides[voxel - 1] : 0) |
+           (z < last ? sides[voxel + 1] : 0);
 }
 
 // Lets the known sides grow into the voxels of none, a step at a time; where both arrive at once the outside wins.
@@ -105,8 +107,8 @@ GROUP_KERNEL void trimBlocks(global const int* origins, global const float* dist
         has |= side == NO_SIDE ? OPEN : side;
         if (!isActive(d, &widths)) continue;
         has |= ACTIVE;
-        const int3 place = (int3)((int)(v) / (BLOCK_SIDE * BLOCK_SIDE), (int)(v) / BLOCK_SIDE % BLOCK_SIDE,
-                                  (int)(v) % BLOCK_SIDE);
+        const int3 place =
+            (int3)((int)(v) / (BLOCK_SIDE * BLOCK_SIDE), (int)(v) / BLOCK_SIDE % BLOCK_SIDE, (int)(v) % BLOCK_SIDE);
         low = min(low, place);
         high = max(high, place);
     }
@@ -136,8 +138,7 @@ GROUP_KERNEL void trimBlocks(global const int* origins, global const float* dist
 
 // Copies needed blocks to where they stay and enters all blocks in the directory, a block for each group.
 GROUP_KERNEL void placeBlocks(Frame frame, int4 firstVoxel, global const int* origins, global const float* blocks,
-                              global const int* sides, global uint* next, global int* directory,
-                              global float* values) {
+                              global const int* sides, global uint* next, global int* directory, global float* values) {
     SHARED uint number;
     const size_t b = get_group_id(0);
     const int side = sides[b];
@@ -260,20 +261,20 @@ int3 ownPart(void) {
     return (int3)((int)(get_global_id(2)), (int)(get_global_id(1)), (int)(get_global_id(0)));
 }
 
-// The start of the clearances: 0 for parts that meet the surface, `far` for others. A work-item does a part.
+// The start of the clearances: 0 for parts that meet the surface, `far` for others, and in the centres only their
+// signs. A work-item does a part.
 kernel void measureParts(Frame frame, float far, global const int* directory, global const float* values,
-                         global float* ways, global Part* parts) {
-    const int perBlock = BLOCK_SIDE / PART_SIDE;
-    const int3 size = vload3(0, frame.blocks), part = ownPart(), block = part / perBlock;
-    if (part.z >= perBlock * size.z) return;
-    const size_t p = indexOf(part, perBlock * size);
-    const int entry = directory[indexOf(block, size)];
+                         global float* ways, global char* centres) {
+    const int3 blocks = vload3(0, frame.blocks), part = ownPart(), block = part / PARTS_ALONG;
+    if (part.z >= PARTS_ALONG * blocks.z) return;
+    const size_t p = indexOf(part, PARTS_ALONG * blocks);
+    const int entry = directory[indexOf(block, blocks)];
     if (entry < 0) {
         ways[p] = far;
-        parts[p].least = entry == EMPTY_INSIDE ? -frame.interiorWidth : frame.exteriorWidth;
+        centres[centreOf(part, blocks)] = entry == EMPTY_INSIDE ? -1 : 1;
         return;
     }
-    global const float* corner = values + voxelOf(entry, PART_SIDE * (part - perBlock * block));
+    global const float* corner = values + voxelOf(entry, PART_SIDE * (part - PARTS_ALONG * block));
     float least = INFINITY, nearest = INFINITY;
     for (int x = 0; x <= PART_SIDE; ++x)
         for (int y = 0; y <= PART_SIDE; ++y)
@@ -283,17 +284,21 @@ kernel void measureParts(Frame frame, float far, global const int* directory, gl
                 nearest = min(nearest, fabs(value));
             }
     ways[p] = nearest <= NEAR_SURFACE * frame.voxelSize ? 0 : far;
-    parts[p].least = least;
+    centres[centreOf(part, blocks)] = least < 0 ? -1 : 1;
 }
 
-// Squared ways along one more axis: transformLine() of sdf/field_layout.cpp. A work-item does a part.
+// Squared ways along one more axis: transformRow() of sdf/field_layout.cpp. A work-item does a part.
 kernel void spreadParts(Frame frame, int axis, global const float* from, global float* to) {
-    const int3 size = BLOCK_SIDE / PART_SIDE * vload3(0, frame.blocks);
+    const int3 size = PARTS_ALONG * vload3(0, frame.blocks);
     const int3 part = ownPart();
     if (part.z >= size.z) return;
     const size_t p = indexOf(part, size), step = axis == 0 ? (size_t)(size.y) * size.z : axis == 1 ? size.z : 1;
-    const int i = axis == 0 ? part.x : axis == 1 ? part.y : part.z,
-              count = axis == 0 ? size.x : axis == 1 ? size.y : size.z;
+    const int i = axis == 0   ? part.x
+                  : axis == 1 ? part.y
+                              : part.z,
+              count = axis == 0   ? size.x
+                      : axis == 1 ? size.y
+                                  : size.z;
     float best = from[p];
     const int reach = min(MOST_PARTS, max(i, count - 1 - i));
     for (int d = 1; d <= reach; ++d) {
@@ -305,10 +310,15 @@ kernel void spreadParts(Frame frame, int axis, global const float* from, global 
     to[p] = best;
 }
 
-// Squared ways to ways, negative where all is inside. A work-item does a part.
-kernel void signParts(Frame frame, global const float* ways, global Part* parts) {
-    const int3 size = BLOCK_SIDE / PART_SIDE * vload3(0, frame.blocks), part = ownPart();
-    if (part.z >= size.z) return;
-    const size_t p = indexOf(part, size);
-    parts[p].centre = copysign(sqrt(ways[p]), parts[p].least);
+// Squared ways to ways [WAY_STEPS], rounded down, with the signs that the centres hold. A work-item does a part.
+kernel void storeCentres(Frame frame, global const float* ways, global char* centres) {
+    const int3 blocks = vload3(0, frame.blocks), part = ownPart();
+    if (part.z >= PARTS_ALONG * blocks.z) return;
+    const int squared = (int)(WAY_STEPS * WAY_STEPS * ways[indexOf(part, PARTS_ALONG * blocks)]);
+    int way = (int)(sqrt((float)(squared)));
+    // a device's square root may be rounded either way
+    while (way * way > squared) --way;
+    while ((way + 1) * (way + 1) <= squared) ++way;
+    global char* centre = centres + centreOf(part, blocks);
+    *centre = (char)(*centre * min(way, MOST_WAY));
 }

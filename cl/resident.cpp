@@ -24,6 +24,7 @@ namespace {
 constexpr std::size_t groupItems = 64;       // ITEMS of common.cl
 constexpr std::size_t itemsAlongParts = 32;  // along z: they stand side by side in memory
 constexpr cl_int unknownEntry = -3;          // UNKNOWN of resident.cl
+constexpr cl_float mostParts = 16;           // MOST_PARTS of resident.cl
 constexpr const char* field = "the field";
 
 // `Widths` of resident.cl.
@@ -229,16 +230,16 @@ void ResidentFill::measureClearances() {
     const KernelFrame frame(layout_.frame);
     const glm::ivec3 size = layout_.frame.parts();
     const std::size_t count = std::size_t(size.x) * size.y * size.z;
-    const cl_float far = layout_.frame.farthestClearance();
-    layout_.parts = memory_.allocate(count * sizeof(Clearance::Part), field);
+    const cl_float far = layout_.frame.findsSurface() ? mostParts * mostParts : 0;
+    layout_.centres = memory_.allocate(count * sizeof(cl_char), field);
     std::array<cl::Buffer, 2> ways;
     for (cl::Buffer& some : ways) some = memory_.allocate(count * sizeof(cl_float), field);
-    enqueueParts("measureParts", frame, far, layout_.directory, layout_.values, ways[0], layout_.parts);
+    enqueueParts("measureParts", frame, far, layout_.directory, layout_.values, ways[0], layout_.centres);
     for (cl_int axis = 2; axis >= 0; --axis) {
         enqueueParts("spreadParts", frame, axis, ways[0], ways[1]);
         std::swap(ways[0], ways[1]);
     }
-    enqueueParts("signParts", frame, ways[0], layout_.parts);
+    enqueueParts("storeCentres", frame, ways[0], layout_.centres);
     device_.queue.finish();
     memory_.free(ways.size() * count * sizeof(cl_float) + sizeof(Summary));
 }

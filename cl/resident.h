@@ -26,7 +26,7 @@ struct KernelFrame {
 /// The arrays of a FieldLayout in a device's memory.
 struct DeviceLayout {
     FieldFrame frame;
-    cl::Buffer directory, parts, values;
+    cl::Buffer directory, centres, values;
 };
 
 /// The part of a memory budget that the fill's own work may take.

@@ -1,177 +1,74 @@
-// Samples and rays on a level set laid out for them. cl/field.cl samples in the same way.
+// Rays by sphere tracing. field_sample.cpp has the samples.
 #include "collider/field.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <limits>
 
-#include "sdf/field_layout.h"
+#include "collider/field_data.h"
 
 namespace bilayer {
 namespace {
 
-constexpr float cellDiagonal = 1.7320508f;  // [voxels]; also the Lipschitz bound of the trilinear interpolant
-constexpr double smallestStep = 0.1;        // of a ray [voxels]: bounds the steps of rays that graze the surface
-constexpr double rayTolerance = 1e-5;       // [voxels]
-constexpr float infinity = std::numeric_limits<float>::infinity();
-
-// The eight voxels around a point, the last axis fastest, and where the point lies between them.
-struct Cell {
-    std::array<float, 8> values;
-    glm::vec3 fraction;
-};
-
-float mix(float a, float b, float t) {
-    return a + t * (b - a);
-}
-
-float interpolate(const Cell& cell) {
-    const auto& [v, f] = cell;
-    const float low = mix(mix(v[0], v[1], f.z), mix(v[2], v[3], f.z), f.y);
-    const float high = mix(mix(v[4], v[5], f.z), mix(v[6], v[7], f.z), f.y);
-    return mix(low, high, f.x);
-}
-
-// The gradient of interpolate() [distance a voxel].
-glm::vec3 interpolantGradient(const Cell& cell) {
-    const auto& [v, f] = cell;
-    const float x0y0 = mix(v[0], v[1], f.z), x0y1 = mix(v[2], v[3], f.z);
-    const float x1y0 = mix(v[4], v[5], f.z), x1y1 = mix(v[6], v[7], f.z);
-    return {mix(x1y0, x1y1, f.y) - mix(x0y0, x0y1, f.y), mix(x0y1 - x0y0, x1y1 - x1y0, f.x),
-            mix(mix(v[1] - v[0], v[3] - v[2], f.y), mix(v[5] - v[4], v[7] - v[6], f.y), f.x)};
-}
-
-// What the interpolant of values that go no faster than the distance itself may be off by: the mean way to the eight
-// voxels, by their weights, which is at most the root of its mean square [voxels].
-float interpolationError(const glm::vec3& fraction) {
-    const glm::vec3 spread = fraction * (1.f - fraction);
-    return std::sqrt(spread.x + spread.y + spread.z);
-}
-
-}  // namespace
-
-struct Field::Data : FieldLayout {
-    using FieldLayout::FieldLayout;
-
-    // Points are in voxels from the directory's first one, in double: exact enough however far the mesh is from the
-    // origin.
-    glm::dvec3 toLocal(const glm::vec3& point) const { return (glm::dvec3(point) - origin) * perMetre; }
-    glm::vec3 toWorld(const glm::dvec3& local) const { return glm::vec3(local * voxel + origin); }
-    glm::dvec3 extent() const { return double(side) * glm::dvec3(blocks); }
-
-    Sample sample(const glm::dvec3& local, float gradientReach) const;
-    float distance(const glm::dvec3& local) const { return sample(local, -infinity).distance; }
-    float boundOutside(const glm::dvec3& local) const;
-    float boundInEmptyBlock(bool inside, const glm::dvec3& local, const glm::ivec3& block) const;
-    Clearance clearance() const { return {clearances.data(), parts()}; }
-    // [voxels]
-    float clearanceAt(const glm::dvec3& local) const {
-        return float(Clearance::partSide) * clearance().around(glm::vec3(local) / float(Clearance::partSide));
-    }
-    double crossing(const glm::dvec3& start, const glm::dvec3& direction, double outside, double inside) const;
-    std::optional<double> trace(const glm::dvec3& start, const glm::dvec3& direction, double length) const;
-};
-
-// With the gradient where the distance is no more than some length.
-Sample Field::Data::sample(const glm::dvec3& local, float gradientReach) const {
-    // compared before any conversion to integers, so that NaN and huge coordinates end here
-    const glm::dvec3 size = extent();
-    const bool within =
-        local.x >= 0 && local.y >= 0 && local.z >= 0 && local.x < size.x && local.y < size.y && local.z < size.z;
-    if (!within) return {.distance = boundOutside(local)};
-
-    const glm::ivec3 voxel(local), block = voxel >> 3, inBlock = voxel & 7;
-    const std::int32_t entry = directory[entryOf(block)];
-    if (entry < 0) return {.distance = boundInEmptyBlock(entry == emptyInside, local, block)};
-
-    const float* v =
-        values.get() + std::size_t(entry) * blockFloats + (inBlock.x * stride + inBlock.y) * stride + inBlock.z;
-    constexpr int x = stride * stride, y = stride;
-    const Cell cell{{v[0], v[1], v[y], v[y + 1], v[x], v[x + 1], v[x + y], v[x + y + 1]},
-                    glm::vec3(local - glm::dvec3(voxel))};
-    const float distance = interpolate(cell);
-    float low = cell.values[0], high = low;
-    for (const float value : cell.values) {
-        low = std::min(low, value);
-        high = std::max(high, value);
-    }
-    const bool inBand = low > -interiorWidth && high < exteriorWidth;
-    if (!inBand) {
-        // one of the voxels is beyond the band
-        const float besideBand = (distance < 0 ? interiorWidth : exteriorWidth) - cellDiagonal * voxelSize;
-        const float between = std::abs(distance) - voxelSize * interpolationError(cell.fraction);
-        const float bound = std::max({0.f, besideBand, between, voxelSize * clearanceAt(local)});
-        return {.distance = std::copysign(bound, distance)};
-    }
-    if (!(distance <= gradientReach)) return {.distance = distance, .inBand = true};
-    return {.distance = distance, .gradient = interpolantGradient(cell) * float(perMetre), .inBand = true};
-}
-
-// Who comes from outside the directory's box has that way to go, and is then no more than a cell's diagonal from a
-// voxel beyond the band.
-float Field::Data::boundOutside(const glm::dvec3& local) const {
-    const double way = glm::distance(local, glm::clamp(local, glm::dvec3(0), extent()));
-    if (!std::isfinite(way)) return infinity;
-    return std::max(0.f, float(way - double(cellDiagonal)) * voxelSize + exteriorWidth);
-}
-
-// The nearest voxel of the block itself is beyond the band. It is half a cell's diagonal away, or a whole one where the
-// cell ends in another block.
-float Field::Data::boundInEmptyBlock(bool inside, const glm::dvec3& local, const glm::ivec3& block) const {
-    const glm::vec3 inBlock(local - glm::dvec3(side * block));
-    const bool ownCell = std::max({inBlock.x, inBlock.y, inBlock.z}) <= float(side - 1);
-    const float width = inside ? interiorWidth : exteriorWidth;
-    const float besideBand = width - (ownCell ? 0.5f : 1.f) * cellDiagonal * voxelSize;
-    const float bound = std::max({0.f, besideBand, voxelSize * clearanceAt(local)});
-    return inside ? -bound : bound;
-}
+constexpr double smallestStep = 0.1;   // of a ray [voxels]: bounds the steps of rays that graze the surface
+constexpr double rayTolerance = 1e-5;  // [voxels]
 
 // Where between two lengths along a ray the interpolant changes its sign.
-double Field::Data::crossing(const glm::dvec3& start, const glm::dvec3& direction, double outside,
-                             double inside) const {
+double crossing(const FieldData& field, const glm::dvec3& start, const glm::dvec3& direction, double outside,
+                double inside) {
     while (inside - outside > rayTolerance) {
         const double middle = 0.5 * (outside + inside);
-        (distance(start + middle * direction) < 0 ? inside : outside) = middle;
+        (field.sample(start + middle * direction).distance < 0 ? inside : outside) = middle;
     }
     return inside;
 }
 
 // Sphere tracing along a unit direction [voxels]. In the band the interpolant may be steeper than 1, by sqrt(3) at
 // most.
-std::optional<double> Field::Data::trace(const glm::dvec3& start, const glm::dvec3& direction, double length) const {
+std::optional<double> trace(const FieldData& field, const glm::dvec3& start, const glm::dvec3& direction,
+                            double length) {
     double outside = 0;
     for (double along = 0;;) {
-        const Sample here = sample(start + along * direction, -infinity);
-        if (here.distance < 0) return crossing(start, direction, outside, along);
+        const Sample here = field.sample(start + along * direction);
+        if (here.distance < 0) return crossing(field, start, direction, outside, along);
         if (along >= length) return std::nullopt;
         outside = along;
-        const double way = here.distance / voxel;
-        along = std::min(length, along + std::max(here.inBand ? way / cellDiagonal : way, smallestStep));
+        const double way = here.distance / field.voxel;
+        along = std::min(length, along + std::max(here.inBand ? way / FieldData::cellDiagonal : way, smallestStep));
     }
 }
 
-Field::Field(const LevelSet& levelSet) : data_(std::make_shared<Data>(levelSet)) {}
+}  // namespace
 
-Sample Field::sample(const glm::vec3& point) const noexcept {
-    return data_->sample(data_->toLocal(point), infinity);
+void FieldData::fillLanes() {
+    const int blockStrides[] = {blocks.y * blocks.z, blocks.z, 0, 1}, voxelStrides[] = {stride * stride, stride, 0, 1};
+    for (int lane = 0; lane < 4; ++lane) {
+        const int axis = (lane + 1) / 2;
+        lanes.origin[lane] = origin[axis];
+        lanes.perMetre[lane] = perMetre;
+        lanes.fixedPoint[lane] = 1.5 * (std::uint64_t(1) << (52 - fractionBits));  // of a double's 52 bits
+        lanes.lastPlace[lane] = (std::uint64_t(side * blocks[axis]) << fractionBits) - 1;
+        lanes.blockStrides[lane] = blockStrides[lane];
+        lanes.voxelStrides[lane] = voxelStrides[lane];
+        lanes.inBlock[lane] = side - 1;
+        lanes.fraction[lane] = (1 << fractionBits) - 1;
+        lanes.one[lane] = 1;
+        lanes.least[lane] = -interiorWidth;
+        lanes.most[lane] = exteriorWidth;
+        lanes.scales[lane] = lane == 0 ? 1.f : float(perMetre);
+    }
 }
 
+Field::Field(const LevelSet& levelSet, const FieldOptions& options)
+    : data_(std::make_shared<FieldData>(levelSet, options.storage)) {}
+
 Clearance Field::clearance() const noexcept {
-    return data_->clearance();
+    return data_->coarse;
 }
 
 glm::dvec3 Field::origin() const noexcept {
     return data_->origin;
-}
-
-Sample Field::sampleWithin(const glm::vec3& point, float reach) const noexcept {
-    return data_->sample(data_->toLocal(point), reach);
-}
-
-float Field::distance(const glm::vec3& point) const noexcept {
-    return data_->distance(data_->toLocal(point));
 }
 
 std::optional<RayHit> Field::raycast(const glm::vec3& origin, const glm::vec3& direction,
@@ -195,11 +92,11 @@ std::optional<RayHit> Field::raycast(const glm::vec3& origin, const glm::vec3& d
     }
     if (enter > leave) return std::nullopt;
     const glm::dvec3 start = glm::clamp(from + enter * unit, glm::dvec3(0), size);
-    const auto along = data_->trace(start, unit, std::min(leave - enter, glm::length(size)));
+    const auto along = trace(*data_, start, unit, std::min(leave - enter, glm::length(size)));
     if (!along) return std::nullopt;
 
     const glm::dvec3 hit = start + *along * unit;
-    const glm::vec3 gradient = data_->sample(hit, infinity).gradient;
+    const glm::vec3 gradient = data_->sample(hit, std::numeric_limits<float>::infinity()).gradient;
     const float steepness = glm::length(gradient);
     return RayHit{.distance = float((enter + *along) * data_->voxel),
                   .position = data_->toWorld(hit),
@@ -220,9 +117,7 @@ const Bounds& Field::bounds() const noexcept {
 }
 
 std::size_t Field::memoryBytes() const noexcept {
-    return sizeof(Data) + data_->directory.size() * sizeof(std::int32_t) +
-           data_->clearances.size() * sizeof(Clearance::Part) +
-           data_->stored * FieldLayout::blockFloats * sizeof(float);
+    return data_->memoryBytes();
 }
 
 }  // namespace bilayer

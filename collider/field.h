@@ -5,8 +5,10 @@
 #include <glm/vec3.hpp>
 #include <memory>
 #include <optional>
+#include <span>
 
 #include "sdf/clearance.h"
+#include "sdf/field_layout.h"
 #include "sdf/level_set.h"
 #include "sdf/mesh.h"
 #include "sdf/sample.h"
@@ -20,16 +22,27 @@ struct RayHit {
     glm::vec3 normal{0};    ///< outward, of unit length; against the ray if it starts deeper than the band
 };
 
+struct FieldOptions {
+    Storage storage = Storage::float32;
+};
+
+struct FieldData;
+
 /// A field laid out for queries. Copies share memory. All queries are noexcept, allocate nothing, and may run on any
 /// number of threads at once.
 class Field {
   public:
-    /// Takes about 1.5 times the level set's memory and 68 bytes a block of its box. Throws std::invalid_argument if
-    /// the box is so large for its voxels that it holds more than 2^26 blocks of 8^3 voxels.
-    explicit Field(const LevelSet& levelSet);
+    /// Takes about 1.4 times the level set's memory, or half of that with fixed16, and 12 bytes a block of 8^3 voxels
+    /// of its box. Throws std::invalid_argument if the box is so large for its voxels that it holds more than 2^26
+    /// blocks.
+    explicit Field(const LevelSet& levelSet, const FieldOptions& options = {});
 
     /// Distance and gradient at a point in the field's own coordinates [m].
     Sample sample(const glm::vec3& point) const noexcept;
+
+    /// The same for many points, sorted or not, at a multiple of the speed: the bytes are those of single samples.
+    /// Throws std::invalid_argument if `samples` is not as long as `points`.
+    void sample(std::span<const glm::vec3> points, std::span<Sample> samples) const;
 
     /// The same, but with a gradient only where the distance is no more than `reach` [m], and zero elsewhere: less work
     /// where most points are farther away.
@@ -57,8 +70,7 @@ class Field {
     std::size_t memoryBytes() const noexcept;
 
   private:
-    struct Data;
-    std::shared_ptr<const Data> data_;
+    std::shared_ptr<const FieldData> data_;
 };
 
 }  // namespace bilayer

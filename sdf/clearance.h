@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
@@ -15,20 +16,28 @@ namespace bilayer {
 class Clearance {
   public:
     static constexpr int partSide = 4;  ///< [voxels]
+    static constexpr int perBlock = 2;  ///< parts along a block
+    static constexpr int blockParts = perBlock * perBlock * perBlock;
+    static constexpr int steps = 8;      ///< that a part's edge is divided into, where ways are stored
+    static constexpr int mostWay = 127;  ///< farther from the surface, ways grow no more [steps]
 
-    struct Part {
-        float centre;  ///< its centre's distance from the surface, at least, negative inside [parts]
-        float least;   ///< no sample in this part is below [m]
+    /// The arrays, by block: a block's eight parts lie together, the last axis fastest.
+    struct Data {
+        const std::int32_t* directory;  ///< of FieldLayout
+        const std::int8_t* centres;     ///< each part's centre's way to the surface, at least, negative inside [steps]
+        const std::int8_t* leasts;      ///< by stored block: no sample in the part is below [leastStep]
+        float leastStep;                ///< [m]
+        float besides[2];               ///< the same for parts of empty blocks, outside and inside [m]
+        glm::ivec3 blocks;              ///< along each axis
     };
 
-    /// @param parts  the last axis fastest
-    /// @param size   number of parts along each axis
-    Clearance(const Part* parts, const glm::ivec3& size) : parts_(parts), size_(size), extent_(size) {}
+    explicit Clearance(const Data& data)
+        : data_(data), size_(perBlock * data.blocks), extent_(perBlock * data.blocks) {}
 
     /// The distance from the surface, at least; not positive where nothing is known [parts].
     float around(const glm::vec3& point) const noexcept {
         const glm::ivec3 part = partOf(point);
-        return std::abs(at(part).centre) - glm::distance(point, glm::vec3(part) + 0.5f);
+        return std::abs(centreOf(part)) - glm::distance(point, glm::vec3(part) + 0.5f);
     }
 
     /// Whether a sphere surely lies outside of the surface. False for a centre that is not finite.
@@ -37,12 +46,17 @@ class Clearance {
         if (glm::dot(toBox, toBox) > radius * radius) return true;
         const glm::ivec3 part = partOf(centre);
         const glm::vec3 way = centre - (glm::vec3(part) + 0.5f);
-        const float left = at(part).centre - radius;
+        const float left = centreOf(part) - radius;
         return left > 0 && glm::dot(way, way) < left * left;
     }
 
     /// Whether a sample there is surely above `reach` [m], or out of the band.
-    bool isAbove(const glm::vec3& point, float reach) const noexcept { return at(partOf(point)).least > reach; }
+    bool isAbove(const glm::vec3& point, float reach) const noexcept {
+        const glm::ivec3 part = partOf(point);
+        const std::int32_t block = data_.directory[entryOf(part)];
+        if (block < 0) return data_.besides[-1 - block] > reach;
+        return float(data_.leasts[std::size_t(block) * blockParts + inBlock(part)]) * data_.leastStep > reach;
+    }
 
   private:
     // NaN goes to 0
@@ -51,11 +65,18 @@ class Clearance {
                 std::min(std::max(0.f, p.z), extent_.z)};
     }
     glm::ivec3 partOf(const glm::vec3& point) const noexcept { return glm::min(glm::ivec3(clamped(point)), size_ - 1); }
-    const Part& at(const glm::ivec3& part) const noexcept {
-        return parts_[(std::size_t(part.x) * size_.y + part.y) * size_.z + part.z];
+    std::size_t entryOf(const glm::ivec3& part) const noexcept {
+        const glm::ivec3 block = part >> 1;
+        return (std::size_t(block.x) * data_.blocks.y + block.y) * data_.blocks.z + block.z;
+    }
+    static std::size_t inBlock(const glm::ivec3& part) noexcept {
+        return std::size_t((part.x & 1) << 2 | (part.y & 1) << 1 | (part.z & 1));
+    }
+    float centreOf(const glm::ivec3& part) const noexcept {
+        return float(data_.centres[entryOf(part) * blockParts + inBlock(part)]) * (1.f / steps);
     }
 
-    const Part* parts_;
+    Data data_;
     glm::ivec3 size_;
     glm::vec3 extent_;
 };

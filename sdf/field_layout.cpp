@@ -5,8 +5,8 @@
 #include <openvdb/tree/LeafManager.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <limits>
 #include <stdexcept>
 
 #include "sdf/grids.h"
@@ -19,11 +19,16 @@ using openvdb::FloatTree;
 using Accessor = openvdb::FloatGrid::ConstAccessor;
 
 constexpr int side = FieldLayout::side, stride = FieldLayout::stride;
-constexpr std::int64_t mostBlocks = 1 << 26;  // of the box: 4.3 GiB at 68 bytes each
-constexpr int partSide = Clearance::partSide;
+constexpr std::int64_t mostBlocks = 1 << 26;  // of the box: 0.75 GiB at 12 bytes each
+constexpr int partSide = Clearance::partSide, perBlock = Clearance::perBlock, blockParts = Clearance::blockParts;
 constexpr int mostParts = 16;                     // away from the surface: farther away, bounds grow no more
 constexpr float nearSurface = 0.5f * 1.7320508f;  // some voxel of a cell that the surface meets is as near [voxels]
-constexpr float infinity = std::numeric_limits<float>::infinity();
+constexpr int leastSteps = 126;                   // from 0 to the end of the band, where the least samples are stored
+
+// Of parts: squared ways from their centres to the nearest one that the surface meets. In half parts, so that ways to
+// the faces of parts are whole.
+using Way = std::int16_t;
+constexpr Way farAway = 4 * mostParts * mostParts;
 
 // A leaf needs a block if it has voxels of the band, or lies on both sides of it (where the band is below one voxel).
 bool needsBlock(const FloatTree::LeafNodeType& leaf) {
@@ -51,108 +56,180 @@ void copyBlock(const Accessor& tree, const Coord& origin, float* block) {
     }
 }
 
-// The least value of the voxels around a part's cells, and of their magnitudes.
-std::pair<float, float> leastOf(const float* part) {
-    float least = infinity, nearest = infinity;
-    for (int x = 0; x <= partSide; ++x)
-        for (int y = 0; y <= partSide; ++y)
-            for (int z = 0; z <= partSide; ++z) {
-                const float value = part[(x * stride + y) * stride + z];
-                least = std::min(least, value);
-                nearest = std::min(nearest, std::abs(value));
-            }
-    return {least, nearest};
+// Of the least samples of parts [m].
+float leastStepOf(const FieldFrame& frame) {
+    return std::max(frame.exteriorWidth, frame.interiorWidth) / float(leastSteps);
 }
 
-// Along one line of parts: the least squared way from each one's centre to a part anywhere on it, plus what that part
-// holds already (as P. Felzenszwalb, D. Huttenlocher, "Distance transforms of sampled functions", 2012, but to the
-// faces of parts) [parts^2].
-void transformLine(Clearance::Part* line, std::size_t step, int count, std::vector<float>& before) {
-    before.resize(std::size_t(count));
-    for (int i = 0; i < count; ++i) before[i] = line[i * step].centre;
-    for (int i = 0; i < count; ++i) {
-        float best = before[i];
-        const int reach = std::min(mostParts, std::max(i, count - 1 - i));
-        for (int d = 1; d <= reach; ++d) {
-            const float way = (float(d) - 0.5f) * (float(d) - 0.5f);
-            if (way >= best) break;
-            if (i >= d) best = std::min(best, way + before[i - d]);
-            if (i + d < count) best = std::min(best, way + before[i + d]);
+// What is stored of a block beside its values.
+struct BlockSummary {
+    std::array<float, blockParts> least;        // value of the voxels around a part's cells [m]
+    std::array<bool, blockParts> meetsSurface;  // some voxel is as near to it as the surface passes
+};
+
+BlockSummary summaryOf(const float* block, float voxelSize) {
+    BlockSummary summary;
+    for (int i = 0; i < blockParts; ++i) {
+        const float* part = block + partSide * ((i >> 2) * stride * stride + (i >> 1 & 1) * stride + (i & 1));
+        float least = part[0], nearest = std::abs(least);
+        for (int x = 0; x <= partSide; ++x)
+            for (int y = 0; y <= partSide; ++y)
+                for (int z = 0; z <= partSide; ++z) {
+                    const float value = part[(x * stride + y) * stride + z];
+                    least = std::min(least, value);
+                    nearest = std::min(nearest, std::abs(value));
+                }
+        summary.least[i] = least;
+        summary.meetsSurface[i] = nearest <= nearSurface * voxelSize;
+    }
+    return summary;
+}
+
+// Values in steps, those beyond the band marked.
+void quantize(const float* block, const FieldFrame& frame, float step, std::int16_t* to) {
+    constexpr float most = FieldLayout::beyondBand - 1;
+    for (int i = 0; i < FieldLayout::blockFloats; ++i) {
+        const float value = block[i], steps = std::clamp(std::nearbyint(value / step), -most, most);
+        const bool beyond = value >= frame.exteriorWidth || value <= -frame.interiorWidth;
+        to[i] = beyond ? std::int16_t(std::copysign(float(FieldLayout::beyondBand), value)) : std::int16_t(steps);
+    }
+}
+
+// What a way grows by to the near face of a part `d` places away.
+constexpr Way wayTo(int d) {
+    return Way((2 * d - 1) * (2 * d - 1));
+}
+
+// Lowers some ways to those of others and what it takes to get there; false if all were as low already.
+bool lower(Way* ways, const Way* others, std::size_t count, Way way) {
+    Way most = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+        most = std::max(most, ways[i]);
+        ways[i] = std::min(ways[i], Way(others[i] + way));
+    }
+    return most > way;
+}
+
+// Lowers each way along the last axis to the least of the others plus what it takes to get there (as P. Felzenszwalb,
+// D. Huttenlocher, "Distance transforms of sampled functions", 2012, but to the faces of parts).
+void transformRow(Way* ways, int length, std::vector<Way>& before) {
+    before.assign(ways, ways + length);
+    for (int d = 1; d <= std::min(mostParts, length - 1); ++d) {
+        const std::size_t count = length - d;
+        const bool up = lower(ways + d, before.data(), count, wayTo(d));
+        const bool down = lower(ways, before.data() + d, count, wayTo(d));
+        if (!up && !down) break;
+    }
+}
+
+// The same across rows of `count` ways that are `step` apart.
+void transformRows(Way* ways, std::size_t count, std::size_t step, int length, std::vector<Way>& before) {
+    before.resize(std::size_t(length) * count);
+    for (int i = 0; i < length; ++i) std::copy_n(ways + i * step, count, before.data() + i * count);
+    for (int i = 0; i < length; ++i) {
+        bool more = true;
+        for (int d = 1; more && d <= mostParts; ++d) {
+            more = false;
+            if (i >= d) more |= lower(ways + i * step, before.data() + (i - d) * count, count, wayTo(d));
+            if (i + d < length) more |= lower(ways + i * step, before.data() + (i + d) * count, count, wayTo(d));
         }
-        line[i * step].centre = best;
     }
 }
 
-// From 0 for parts that meet the surface, and much for others, to the ways from their centres to the nearest such part:
-// axis by axis, since a squared way is a sum over the axes. Negative where all is inside.
-void transform(std::vector<Clearance::Part>& parts, const glm::ivec3& size) {
-    const std::size_t step[] = {std::size_t(size.y) * size.z, std::size_t(size.z), 1};
-    for (int axis = 2; axis >= 0; --axis) {
-        const int u = axis == 0 ? 1 : 0, v = axis == 2 ? 1 : 2;
-        tbb::parallel_for(0, size[u], [&](int i) {
-            std::vector<float> before;
-            for (int j = 0; j < size[v]; ++j)
-                transformLine(parts.data() + i * step[u] + j * step[v], step[axis], size[axis], before);
-        });
-    }
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, parts.size()), [&](const auto& range) {
-        for (std::size_t i = range.begin(); i < range.end(); ++i)
-            parts[i].centre = std::copysign(std::sqrt(parts[i].centre), parts[i].least);
+// From 0 for parts that meet the surface, and `farAway` for others, to the ways to the nearest such part: axis by axis,
+// since a squared way is a sum over the axes.
+void transform(std::vector<Way>& ways, const glm::ivec3& size) {
+    const std::size_t row = std::size_t(size.z), plane = size.y * row;
+    tbb::parallel_for(0, size.x, [&](int x) {
+        std::vector<Way> before;
+        for (int y = 0; y < size.y; ++y) transformRow(ways.data() + x * plane + y * row, size.z, before);
+        transformRows(ways.data() + x * plane, row, row, size.y, before);
+    });
+    tbb::parallel_for(0, size.y, [&](int y) {
+        std::vector<Way> before;
+        transformRows(ways.data() + y * row, row, plane, size.x, before);
     });
 }
 
-// Fills the directory and the blocks.
-void layOut(FieldLayout& field, const FloatTree& tree, const std::vector<Coord>& origins, const Coord& first) {
-    const auto entryOf = [&](const Coord& voxel) -> std::int32_t& {
-        const Coord block = (voxel - first) >> 3;
-        return field.directory[field.entryOf({block.x(), block.y(), block.z()})];
-    };
+// The side of space that each entry of the directory lies on, before blocks are entered.
+void enterSides(FieldLayout& field, const FloatTree& tree, const Coord& first) {
     field.directory.resize(field.entries());
     tbb::parallel_for(0, field.blocks.x, [&](int x) {
         const Accessor accessor(tree);
         for (int y = 0; y < field.blocks.y; ++y)
             for (int z = 0; z < field.blocks.z; ++z) {
-                const Coord block = first.offsetBy(side * x, side * y, side * z);
-                entryOf(block) = accessor.getValue(block) < 0 ? FieldLayout::emptyInside : FieldLayout::emptyOutside;
+                const float value = accessor.getValue(first.offsetBy(side * x, side * y, side * z));
+                field.directory[field.entryOf({x, y, z})] =
+                    value < 0 ? FieldLayout::emptyInside : FieldLayout::emptyOutside;
             }
-    });
-
-    field.stored = origins.size();
-    field.values = std::make_unique_for_overwrite<float[]>(field.stored * FieldLayout::blockFloats);
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, field.stored), [&](const auto& range) {
-        const Accessor accessor(tree);
-        for (std::size_t i = range.begin(); i < range.end(); ++i) {
-            entryOf(origins[i]) = std::int32_t(i);
-            copyBlock(accessor, origins[i], field.values.get() + i * FieldLayout::blockFloats);
-        }
     });
 }
 
-void measureClearances(FieldLayout& field) {
-    const float far = field.farthestClearance();
-    const glm::ivec3 size = field.parts();
-    field.clearances.resize(std::size_t(size.x) * size.y * size.z);
-    const auto partsOf = [&](const glm::ivec3& block, auto&& measure) {
-        for (int i = 0; i < 8; ++i) {
-            const glm::ivec3 inBlock(i >> 2, i >> 1 & 1, i & 1), part = 2 * block + inBlock;
-            field.clearances[(std::size_t(part.x) * size.y + part.y) * size.z + part.z] = measure(partSide * inBlock);
+// Fills the blocks and enters them in the directory; true for each of their parts that the surface meets.
+std::vector<std::array<bool, blockParts>> enterBlocks(FieldLayout& field, const FloatTree& tree,
+                                                      const std::vector<Coord>& origins, const Coord& first) {
+    field.stored = origins.size();
+    const std::size_t floats = field.stored * FieldLayout::blockFloats;
+    if (field.storage == Storage::float32)
+        field.values = LargeArray<float>(floats);
+    else
+        field.values16 = LargeArray<std::int16_t>(floats);
+    field.leasts.resize(field.stored * blockParts);
+    std::vector<std::array<bool, blockParts>> meets(field.stored);
+    const float leastStep = leastStepOf(field);
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, field.stored), [&](const auto& range) {
+        const Accessor accessor(tree);
+        std::array<float, FieldLayout::blockFloats> block;
+        for (std::size_t i = range.begin(); i < range.end(); ++i) {
+            const Coord at = (origins[i] - first) >> 3;
+            field.directory[field.entryOf({at.x(), at.y(), at.z()})] = std::int32_t(i);
+            copyBlock(accessor, origins[i], block.data());
+            if (field.storage == Storage::float32)
+                std::copy(block.begin(), block.end(), field.values.data() + i * FieldLayout::blockFloats);
+            else
+                quantize(block.data(), field, field.step, field.values16.data() + i * FieldLayout::blockFloats);
+            const BlockSummary summary = summaryOf(block.data(), field.voxelSize);
+            meets[i] = summary.meetsSurface;
+            for (int k = 0; k < blockParts; ++k)
+                field.leasts[i * blockParts + k] =
+                    std::int8_t(std::clamp(std::floor(summary.least[k] / leastStep), -127.f, 127.f));
         }
-    };
+    });
+    return meets;
+}
+
+// Calls visit(entry, part of the block, part of all) for the parts of the entries of the directory.
+template <class Visit>
+void forEachPart(const FieldLayout& field, const Visit& visit) {
+    const glm::ivec3 size = field.parts();
     tbb::parallel_for(0, field.blocks.x, [&](int x) {
         for (int y = 0; y < field.blocks.y; ++y)
-            for (int z = 0; z < field.blocks.z; ++z) {
-                const std::int32_t entry = field.directory[field.entryOf({x, y, z})];
-                partsOf({x, y, z}, [&](const glm::ivec3& corner) -> Clearance::Part {
-                    if (entry < 0)
-                        return {far, entry == FieldLayout::emptyInside ? -field.interiorWidth : field.exteriorWidth};
-                    const auto [least, nearest] =
-                        leastOf(field.values.get() + std::size_t(entry) * FieldLayout::blockFloats +
-                                (corner.x * stride + corner.y) * stride + corner.z);
-                    return {nearest <= nearSurface * field.voxelSize ? 0 : far, least};
-                });
-            }
+            for (int z = 0; z < field.blocks.z; ++z)
+                for (int k = 0; k < blockParts; ++k) {
+                    const glm::ivec3 part = perBlock * glm::ivec3(x, y, z) + glm::ivec3(k >> 2, k >> 1 & 1, k & 1);
+                    visit(field.entryOf({x, y, z}), k, (std::size_t(part.x) * size.y + part.y) * size.z + part.z);
+                }
     });
-    transform(field.clearances, size);
+}
+
+void measureClearances(FieldLayout& field, const std::vector<std::array<bool, blockParts>>& meets) {
+    field.centres.resize(field.entries() * blockParts);
+    if (!field.findsSurface()) return;
+    const glm::ivec3 size = field.parts();
+    std::vector<Way> ways(std::size_t(size.x) * size.y * size.z);
+    forEachPart(field, [&](std::size_t entry, int k, std::size_t part) {
+        const std::int32_t block = field.directory[entry];
+        ways[part] = block >= 0 && meets[block][k] ? 0 : farAway;
+    });
+    transform(ways, size);
+    forEachPart(field, [&](std::size_t entry, int k, std::size_t part) {
+        const std::int32_t block = field.directory[entry];
+        const bool inside =
+            block < 0 ? block == FieldLayout::emptyInside : field.leasts[std::size_t(block) * blockParts + k] < 0;
+        // rounded down
+        const int way = std::min(Clearance::mostWay, int(0.5f * Clearance::steps * std::sqrt(float(ways[part]))));
+        field.centres[entry * blockParts + k] = std::int8_t(inside ? -way : way);
+    });
 }
 
 }  // namespace
@@ -162,17 +239,17 @@ void FieldFrame::requireSize() const {
         throw std::invalid_argument("field: the bounds hold more than 2^26 blocks of 8^3 voxels: take larger voxels");
 }
 
-float FieldFrame::farthestClearance() const {
-    // a narrower band does not tell where the surface is
-    const bool known = std::min(exteriorWidth, interiorWidth) >= nearSurface * voxelSize;
-    return known ? float(mostParts * mostParts) : 0.f;
+bool FieldFrame::findsSurface() const {
+    return std::min(exteriorWidth, interiorWidth) >= nearSurface * voxelSize;
 }
 
-FieldLayout::FieldLayout(const LevelSet& levelSet)
+FieldLayout::FieldLayout(const LevelSet& levelSet, Storage storage)
     : FieldFrame{.voxel = levelSet.grids().distance->voxelSize()[0],
                  .voxelSize = levelSet.voxelSize(),
                  .exteriorWidth = levelSet.exteriorWidth(),
-                 .interiorWidth = levelSet.interiorWidth()} {
+                 .interiorWidth = levelSet.interiorWidth()},
+      storage(storage),
+      step(std::max(exteriorWidth, interiorWidth) / float(beyondBand - 1)) {
     perMetre = 1 / voxel;
     const openvdb::FloatGrid& grid = *levelSet.grids().distance;
     const openvdb::tree::LeafManager<const FloatTree> leaves(grid.tree());
@@ -188,8 +265,8 @@ FieldLayout::FieldLayout(const LevelSet& levelSet)
     const Coord first = box.min();
     blocks = glm::ivec3((box.max() - first).x(), (box.max() - first).y(), (box.max() - first).z()) / side + 1;
     requireSize();
-    layOut(*this, grid.tree(), origins, first);
-    measureClearances(*this);
+    enterSides(*this, grid.tree(), first);
+    measureClearances(*this, enterBlocks(*this, grid.tree(), origins, first));
 
     const auto world = [&](const Coord& voxel) {
         const openvdb::Vec3d p = grid.indexToWorld(voxel);
@@ -198,6 +275,20 @@ FieldLayout::FieldLayout(const LevelSet& levelSet)
     origin = world(first);
     const openvdb::CoordBBox active = grid.evalActiveVoxelBoundingBox();
     bounds = {glm::vec3(world(active.min())), glm::vec3(world(active.max()))};
+}
+
+Clearance FieldLayout::clearance() const {
+    return Clearance({.directory = directory.data(),
+                      .centres = centres.data(),
+                      .leasts = leasts.data(),
+                      .leastStep = leastStepOf(*this),
+                      .besides = {exteriorWidth, -interiorWidth},
+                      .blocks = blocks});
+}
+
+std::size_t FieldLayout::memoryBytes() const {
+    return sizeof *this + directory.size() * sizeof(std::int32_t) + centres.size() + leasts.size() + values.bytes() +
+           values16.bytes();
 }
 
 }  // namespace bilayer

@@ -1,0 +1,96 @@
+// What a Field holds, and how its queries read it.
+#pragma once
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <glm/common.hpp>
+#include <glm/vec3.hpp>
+#include <limits>
+#include <span>
+
+#include "sdf/field_layout.h"
+#include "sdf/sample.h"
+
+namespace bilayer {
+
+struct FieldData;
+
+/// How samples are taken: for one instruction set and one storage. `gradientReach`: the gradient is found where the
+/// distance is no more than that [m].
+struct SampleKernels {
+    Sample (*sampleAt)(const FieldData&, const glm::dvec3& local, float gradientReach);
+    Sample (*samplePoint)(const FieldData&, const glm::vec3& point, float gradientReach);
+    void (*sampleMany)(const FieldData&, std::span<const glm::vec3> points, Sample*);
+};
+
+/// The best for this processor.
+const SampleKernels& sampleKernels(Storage storage);
+
+struct FieldData : FieldLayout {
+    /// Also the Lipschitz bound of the trilinear interpolant [voxels].
+    static constexpr float cellDiagonal = 1.7320508f;
+
+    explicit FieldData(const LevelSet& levelSet, Storage storage)
+        : FieldLayout(levelSet, storage), kernels(sampleKernels(storage)), coarse(clearance()) {
+        fillLanes();
+    }
+    FieldData(const FieldData&) = delete;
+    FieldData& operator=(const FieldData&) = delete;
+
+    const SampleKernels& kernels;
+    const Clearance coarse;
+
+    /// Bits of a place below the voxel, as many as a float's fraction has, and of a voxel in a block.
+    static constexpr int fractionBits = 23, voxelBits = 3;
+    static_assert(side == 1 << voxelBits);
+
+    /// The frame as vectors, for samples; of places, the axes are x, y, y, z.
+    struct Lanes {
+        alignas(32) double origin[4], perMetre[4];
+        /// Added to a double below 2^28, it leaves a fixed-point number in the lower bits.
+        double fixedPoint[4];
+        std::uint64_t lastPlace[4];    ///< within the directory [2^-23 voxels]
+        std::int32_t blockStrides[4];  ///< of the directory; y counts once
+        std::int32_t voxelStrides[4];  ///< of a block; y counts once
+        std::int32_t inBlock[4];       ///< the bits of a voxel's place in its block
+        std::int32_t fraction[4];      ///< the bits of a place below the voxel
+        float one[4];
+        float least[4], most[4];  ///< values beyond the band are these [m]
+        float scales[4];          ///< from voxels to metres, of a distance and its gradient
+    } lanes;
+
+    // Local places are in voxels from the directory's first one, in double: exact enough however far the mesh is from
+    // the origin.
+    glm::dvec3 toLocal(const glm::vec3& point) const { return (glm::dvec3(point) - origin) * perMetre; }
+    glm::vec3 toWorld(const glm::dvec3& local) const { return glm::vec3(local * voxel + origin); }
+    glm::dvec3 extent() const { return double(side) * glm::dvec3(blocks); }
+
+    /// With the gradient where the distance is no more than `gradientReach` [m].
+    Sample sample(const glm::dvec3& local, float gradientReach) const noexcept {
+        return kernels.sampleAt(*this, local, gradientReach);
+    }
+
+    /// The same without a gradient.
+    Sample sample(const glm::dvec3& local) const noexcept {
+        return sample(local, -std::numeric_limits<float>::infinity());
+    }
+
+    /// The distance from the surface, at least; not positive where nothing is known [voxels].
+    float clearanceAt(const glm::dvec3& local) const {
+        return float(Clearance::partSide) * coarse.around(glm::vec3(local) / float(Clearance::partSide));
+    }
+
+    /// A voxel of a stored block, apron included [m].
+    float valueAt(std::size_t index) const {
+        if (storage == Storage::float32) return values.data()[index];
+        return std::clamp(float(values16.data()[index]) * step, -interiorWidth, exteriorWidth);
+    }
+
+  private:
+    void fillLanes();
+};
+
+}  // namespace bilayer

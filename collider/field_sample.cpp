@@ -1,0 +1,372 @@
+// Samples, single and in batches. cl/field.cl samples in the same way, operation by operation.
+//
+// A place is a fixed-point number along each axis: its upper bits are the voxel, its lower bits the way to the next.
+// The eight voxels around it are interpolated in two vectors of four: along x first, then y, then z, and the gradient
+// falls out on the way. Highway compiles the part between HWY_BEFORE_NAMESPACE and HWY_AFTER_NAMESPACE once for each
+// instruction set; all of them give the same bytes.
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "collider/field_sample.cpp"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
+#include <array>
+#include <bit>
+#include <cstring>
+#include <glm/geometric.hpp>
+#include <stdexcept>
+#include <string>
+
+#include "collider/field.h"
+#include "collider/field_data.h"
+
+#ifndef BILAYER_COLLIDER_FIELD_SAMPLE_ONCE
+#define BILAYER_COLLIDER_FIELD_SAMPLE_ONCE
+
+namespace bilayer {
+namespace {
+
+constexpr float infinity = std::numeric_limits<float>::infinity();
+constexpr float cellDiagonal = FieldData::cellDiagonal;
+
+// Samples are stored as four floats in a row and a bool.
+static_assert(offsetof(Sample, distance) == 0 && offsetof(Sample, gradient) == sizeof(float));
+
+// What the interpolant of values that go no faster than the distance itself may be off by: the mean way to the eight
+// voxels, by their weights, which is at most the root of its mean square [voxels].
+float interpolationError(const glm::vec3& fraction) {
+    const glm::vec3 spread = fraction * (1.f - fraction);
+    return std::sqrt(spread.x + spread.y + spread.z);
+}
+
+// Who comes from outside the directory's box has that way to go, and is then no more than a cell's diagonal from a
+// voxel beyond the band.
+float boundOutside(const FieldData& field, const glm::dvec3& local) {
+    const double way = glm::distance(local, glm::clamp(local, glm::dvec3(0), field.extent()));
+    if (!std::isfinite(way)) return infinity;
+    return std::max(0.f, float(way - double(cellDiagonal)) * field.voxelSize + field.exteriorWidth);
+}
+
+// The nearest voxel of the block itself is beyond the band. It is half a cell's diagonal away, or a whole one where the
+// cell ends in another block.
+float boundInEmptyBlock(const FieldData& field, bool inside, const glm::dvec3& local) {
+    const glm::dvec3 rest = local - double(FieldFrame::side) * glm::floor(local / double(FieldFrame::side));
+    const bool ownCell = std::max({rest.x, rest.y, rest.z}) <= double(FieldFrame::side - 1);
+    const float width = inside ? field.interiorWidth : field.exteriorWidth;
+    const float besideBand = width - (ownCell ? 0.5f : 1.f) * cellDiagonal * field.voxelSize;
+    const float bound = std::max({0.f, besideBand, field.voxelSize * field.clearanceAt(local)});
+    return inside ? -bound : bound;
+}
+
+// One of the cell's voxels is beyond the band.
+float boundBesideBand(const FieldData& field, float distance, const glm::dvec3& local) {
+    const float besideBand =
+        (distance < 0 ? field.interiorWidth : field.exteriorWidth) - cellDiagonal * field.voxelSize;
+    const float between =
+        std::abs(distance) - field.voxelSize * interpolationError(glm::vec3(local - glm::floor(local)));
+    const float bound = std::max({0.f, besideBand, between, field.voxelSize * field.clearanceAt(local)});
+    return std::copysign(bound, distance);
+}
+
+}  // namespace
+}  // namespace bilayer
+
+#endif
+
+HWY_BEFORE_NAMESPACE();
+namespace bilayer::HWY_NAMESPACE {
+
+// Vectors of the compiler's own: Highway has none of fixed size for the plain instruction set.
+using Doubles [[gnu::vector_size(32)]] = double;
+using Bits [[gnu::vector_size(32)]] = std::uint64_t;
+using Floats [[gnu::vector_size(16)]] = float;
+using Ints [[gnu::vector_size(16)]] = std::int32_t;
+using Pairs [[gnu::vector_size(16)]] = double;
+
+constexpr int fractionBits = FieldData::fractionBits, voxelBits = FieldData::voxelBits;
+
+/// Of a place's three axes: where its block is in the directory and where its voxel is in the block.
+struct Address {
+    std::uint32_t entry, inBlock;
+    bool within;  ///< the directory's box
+};
+
+/// Where a cell is, and where a place lies in it.
+struct Place {
+    Address address;
+    Floats fraction;  ///< x, y, y, z
+};
+
+// By reference, since some vectors are wider than those of the plain instruction set.
+template <class Vector, class Element>
+HWY_INLINE void load(const Element* from, Vector& vector) {
+    std::memcpy(&vector, from, sizeof vector);
+}
+
+template <class Vector, class Element>
+HWY_INLINE Vector load(const Element* from) {
+    Vector vector;
+    load(from, vector);
+    return vector;
+}
+
+/// From [x, y, y, z], which two loads of eight bytes give.
+HWY_INLINE void loadPoint(const glm::vec3& point, Doubles& to) {
+    const Pairs halves{load<double>(&point.x), load<double>(&point.y)};
+    const Floats at = reinterpret_cast<Floats>(halves);
+#if HWY_ARCH_X86 && HWY_TARGET <= HWY_AVX2
+    to = __builtin_ia32_cvtps2pd256(at);
+#else
+    to = __builtin_convertvector(at, Doubles);
+#endif
+}
+
+HWY_INLINE bool anyNegative(const Bits& v) {
+#if HWY_ARCH_X86 && HWY_TARGET <= HWY_AVX2
+    return __builtin_ia32_movmskpd256(reinterpret_cast<Doubles>(v)) != 0;
+#else
+    return (v[0] | v[1] | v[3]) >> 63;
+#endif
+}
+
+/// Rounds to 2^-23 voxels. What is negative, huge or no number is not within.
+/// @param local  [x, y, y, z] from the directory's first voxel [voxels]
+HWY_INLINE Place placeOf(const FieldData& field, const Doubles& local) {
+    const FieldData::Lanes& lanes = field.lanes;
+    Doubles fixedPoint;
+    Bits zero, last;
+    load(lanes.fixedPoint, fixedPoint);
+    load(lanes.fixedPoint, zero);
+    load(lanes.lastPlace, last);
+    const Bits fixed = reinterpret_cast<Bits>(local + fixedPoint) - zero;
+    const bool outside = anyNegative(fixed | (last - fixed));
+    const Ints voxel = __builtin_convertvector(fixed >> fractionBits, Ints);
+    const Ints entry = (voxel >> voxelBits) * load<Ints>(lanes.blockStrides);
+    const Ints inBlock = (voxel & load<Ints>(lanes.inBlock)) * load<Ints>(lanes.voxelStrides);
+    // sums over the axes, both at once
+    const Ints half =
+        __builtin_shufflevector(entry, inBlock, 0, 4, 1, 5) + __builtin_shufflevector(entry, inBlock, 2, 6, 3, 7);
+    const Ints sum = half + __builtin_shufflevector(half, half, 2, 3, 0, 1);
+    const Ints fraction = (__builtin_convertvector(fixed, Ints) & load<Ints>(lanes.fraction)) | load<Ints>(lanes.one);
+    return {{std::uint32_t(sum[0]), std::uint32_t(sum[1]), !outside},
+            reinterpret_cast<Floats>(fraction) - load<Floats>(lanes.one)};
+}
+
+/// The same of a point [m].
+HWY_INLINE Place placeOf(const FieldData& field, const glm::vec3& point) {
+    Doubles at, origin, perMetre;
+    loadPoint(point, at);
+    load(field.lanes.origin, origin);
+    load(field.lanes.perMetre, perMetre);
+    return placeOf(field, (at - origin) * perMetre);
+}
+
+HWY_INLINE Place placeOf(const FieldData& field, const glm::dvec3& local) {
+    return placeOf(field, Doubles{local.x, local.y, local.y, local.z});
+}
+
+/// The voxels around a place at its lower and at its upper x: (y, z), (y, z + 1), (y + 1, z), (y + 1, z + 1).
+struct Cell {
+    Floats low, high;
+    bool inBand;
+};
+
+constexpr int xStep = FieldFrame::stride * FieldFrame::stride, yStep = FieldFrame::stride;
+
+HWY_INLINE bool all(const Ints& mask) {
+#if HWY_ARCH_X86
+    return __builtin_ia32_movmskps(reinterpret_cast<Floats>(mask)) == 15;
+#else
+    return mask[0] & mask[1] & mask[2] & mask[3];
+#endif
+}
+
+/// Two neighbours along z, and two beside them.
+HWY_INLINE Floats loadPairs(const float* v) {
+    const Pairs pairs{load<double>(v), load<double>(v + yStep)};
+    return reinterpret_cast<Floats>(pairs);
+}
+
+HWY_INLINE Ints loadPairs(const std::int16_t* v) {
+    using PairsOfSteps [[gnu::vector_size(8)]] = std::int32_t;
+    using Steps [[gnu::vector_size(8)]] = std::int16_t;
+    const PairsOfSteps pairs{load<std::int32_t>(v), load<std::int32_t>(v + yStep)};
+    return __builtin_convertvector(reinterpret_cast<Steps>(pairs), Ints);
+}
+
+HWY_INLINE Cell loadCell(const FieldData& field, const float* v) {
+    const Floats low = loadPairs(v), high = loadPairs(v + xStep);
+    const Floats least = load<Floats>(field.lanes.least), most = load<Floats>(field.lanes.most);
+    return {low, high, all((low > least) & (low < most) & (high > least) & (high < most))};
+}
+
+HWY_INLINE Cell loadCell(const FieldData& field, const std::int16_t* v) {
+    const Ints low = loadPairs(v), high = loadPairs(v + xStep);
+    constexpr std::int32_t beyond = FieldLayout::beyondBand;
+    const bool inBand = all((low > -beyond) & (low < beyond) & (high > -beyond) & (high < beyond));
+    const auto decode = [&](Ints steps) { return __builtin_convertvector(steps, Floats) * field.step; };
+    if (inBand) return {decode(low), decode(high), true};
+    const auto clamped = [&](Floats values) {
+        const Floats least = load<Floats>(field.lanes.least), most = load<Floats>(field.lanes.most);
+        values = values < least ? least : values;
+        return values > most ? most : values;
+    };
+    return {clamped(decode(low)), clamped(decode(high)), false};
+}
+
+/// The distance [m] and its gradient [m a voxel].
+HWY_INLINE Floats interpolate(const Cell& cell, Floats fraction) {
+    const Floats x = __builtin_shufflevector(fraction, fraction, 0, 0, 0, 0),
+                 y = __builtin_shufflevector(fraction, fraction, 1, 1, 1, 1),
+                 z = __builtin_shufflevector(fraction, fraction, 3, 3, 3, 3);
+    const Floats dx = cell.high - cell.low, at = cell.low + x * dx;
+    // values at z and z + 1, then how they change along x
+    const Floats y0 = __builtin_shufflevector(at, dx, 0, 1, 4, 5), y1 = __builtin_shufflevector(at, dx, 2, 3, 6, 7);
+    const Floats dy = y1 - y0, between = y0 + y * dy;
+    // value, along x, along y
+    const Floats z0 = __builtin_shufflevector(between, dy, 0, 2, 4, 6),
+                 z1 = __builtin_shufflevector(between, dy, 1, 3, 5, 7);
+    const Floats dz = z1 - z0, found = z0 + z * dz;
+    return __builtin_shufflevector(found, dz, 0, 1, 2, 4);
+}
+
+template <class Value>
+HWY_INLINE const Value* valuesOf(const FieldData& field) {
+    if constexpr (std::is_same_v<Value, float>)
+        return field.values.data();
+    else
+        return field.values16.data();
+}
+
+/// The first voxel of a cell in a stored block.
+template <class Value>
+HWY_INLINE const Value* cellOf(const FieldData& field, std::int32_t block, const Place& place) {
+    return valuesOf<Value>(field) + std::size_t(block) * FieldFrame::blockFloats + place.address.inBlock;
+}
+
+HWY_INLINE Sample sampleOf(const Floats& distanceAndGradient, bool inBand) {
+    Sample sample;
+    std::memcpy(static_cast<void*>(&sample), &distanceAndGradient, sizeof distanceAndGradient);
+    // with the padding behind it: who reads all of a sample need not wait for a single byte
+    const std::array<bool, 4> padded{inBand};
+    std::memcpy(static_cast<void*>(&sample.inBand), &padded, sizeof padded);
+    return sample;
+}
+
+HWY_INLINE glm::dvec3 localOf(const FieldData& field, const glm::vec3& point) {
+    return field.toLocal(point);
+}
+HWY_INLINE glm::dvec3 localOf(const FieldData&, const glm::dvec3& local) {
+    return local;
+}
+
+/// Samples a cell that is partly beyond the band.
+template <class Point>
+HWY_NOINLINE Sample sampleBesideBand(const FieldData& field, float distance, const Point& point) {
+    return {.distance = boundBesideBand(field, distance, localOf(field, point))};
+}
+
+/// Samples beside all stored blocks.
+template <class Point>
+HWY_NOINLINE Sample sampleEmpty(const FieldData& field, std::int32_t block, bool within, const Point& point) {
+    const glm::dvec3 local = localOf(field, point);
+    return {.distance = within ? boundInEmptyBlock(field, block == FieldFrame::emptyInside, local)
+                               : boundOutside(field, local)};
+}
+
+/// Samples a cell of a stored block.
+template <class Value, class Point>
+HWY_INLINE Sample sampleCell(const FieldData& field, std::int32_t block, const Place& place, const Point& point,
+                             float gradientReach) {
+    const Cell cell = loadCell(field, cellOf<Value>(field, block, place));
+    const Floats found = interpolate(cell, place.fraction);
+    if (HWY_UNLIKELY(!cell.inBand)) return sampleBesideBand(field, found[0], point);
+    if (HWY_UNLIKELY(!(found[0] <= gradientReach))) return sampleOf(Floats{found[0]}, true);
+    return sampleOf(found * load<Floats>(field.lanes.scales), true);
+}
+
+HWY_INLINE std::int32_t blockAt(const FieldData& field, const Address& address) {
+    return HWY_LIKELY(address.within) ? field.directory[address.entry] : FieldFrame::emptyOutside;
+}
+
+/// @param point  glm::vec3 in the field's own coordinates [m], or glm::dvec3 from the directory's first voxel [voxels]
+template <class Value, class Point>
+Sample sampleAt(const FieldData& field, const Point& point, float gradientReach) {
+    const Place place = placeOf(field, point);
+    const std::int32_t block = blockAt(field, place.address);
+    if (HWY_UNLIKELY(block < 0)) return sampleEmpty(field, block, place.address.within, point);
+    return sampleCell<Value>(field, block, place, point, gradientReach);
+}
+
+/// Points of a batch that are under way together: enough to hide the memory's latency, few enough to stay in the
+/// nearest cache.
+constexpr std::size_t together = 32;
+
+/// Samples up to that many points: the first pass asks for their entries of the directory, the second for their voxels.
+template <class Value>
+HWY_INLINE void sampleTogether(const FieldData& field, std::span<const glm::vec3> points, Sample* samples) {
+    Place places[together];
+    std::int32_t blocks[together];
+    for (std::size_t i = 0; i < points.size(); ++i) {
+        places[i] = placeOf(field, points[i]);
+        __builtin_prefetch(field.directory.data() + (places[i].address.within ? places[i].address.entry : 0));
+    }
+    for (std::size_t i = 0; i < points.size(); ++i) {
+        blocks[i] = blockAt(field, places[i].address);
+        const Value* const v = cellOf<Value>(field, std::max(blocks[i], 0), places[i]);
+        __builtin_prefetch(v);
+        __builtin_prefetch(v + yStep + 1);
+        __builtin_prefetch(v + xStep);
+        __builtin_prefetch(v + xStep + yStep + 1);
+    }
+    for (std::size_t i = 0; i < points.size(); ++i) {
+        samples[i] = HWY_LIKELY(blocks[i] >= 0) ? sampleCell<Value>(field, blocks[i], places[i], points[i], infinity)
+                                                : sampleEmpty(field, blocks[i], places[i].address.within, points[i]);
+    }
+}
+
+template <class Value>
+void sampleMany(const FieldData& field, std::span<const glm::vec3> points, Sample* samples) {
+    for (std::size_t i = 0; i < points.size(); i += together)
+        sampleTogether<Value>(field, points.subspan(i, std::min(together, points.size() - i)), samples + i);
+}
+
+template <class Value>
+constexpr SampleKernels kernelsOf{sampleAt<Value, glm::dvec3>, sampleAt<Value, glm::vec3>, sampleMany<Value>};
+
+const SampleKernels& kernels(Storage storage) {
+    return storage == Storage::float32 ? kernelsOf<float> : kernelsOf<std::int16_t>;
+}
+
+}  // namespace bilayer::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace bilayer {
+
+HWY_EXPORT(kernels);
+
+const SampleKernels& sampleKernels(Storage storage) {
+    return HWY_DYNAMIC_DISPATCH(kernels)(storage);
+}
+
+Sample Field::sample(const glm::vec3& point) const noexcept {
+    return data_->kernels.samplePoint(*data_, point, infinity);
+}
+
+Sample Field::sampleWithin(const glm::vec3& point, float reach) const noexcept {
+    return data_->kernels.samplePoint(*data_, point, reach);
+}
+
+float Field::distance(const glm::vec3& point) const noexcept {
+    return sampleWithin(point, -infinity).distance;
+}
+
+void Field::sample(std::span<const glm::vec3> points, std::span<Sample> samples) const {
+    if (points.size() != samples.size())
+        throw std::invalid_argument(std::to_string(points.size()) + " points need as many samples, not " +
+                                    std::to_string(samples.size()));
+    data_->kernels.sampleMany(*data_, points, samples.data());
+}
+
+}  // namespace bilayer
+#endif
