@@ -9,16 +9,16 @@
 #include <stdexcept>
 #include <utility>
 
+#include "collider/moments.h"
+
 namespace bilayer {
 namespace {
 
 constexpr double leastThickness = 1e-7;  // of volume / (area * length): what single precision leaves of a flat sheet
 constexpr int mostSweeps = 32;           // of Jacobi's method, which needs about five
 
-struct Integrals {
-    double volume = 0, area = 0;
-    glm::dvec3 first{0};   // of x
-    glm::dmat3 second{0};  // of x x^T
+struct Integrals : Moments {
+    double area = 0;
 };
 
 // Over the tetrahedra between `centre`, which becomes the origin, and the triangles.
@@ -81,6 +81,22 @@ Eigen eigen(glm::dmat3 matrix) {
 
 }  // namespace
 
+MassProperties massProperties(const Moments& moments, const glm::dvec3& origin) {
+    const glm::dvec3 centre = moments.first / moments.volume;
+    const glm::dmat3 second = moments.second - moments.volume * glm::outerProduct(centre, centre);
+    const glm::dmat3 inertia = glm::dmat3(second[0][0] + second[1][1] + second[2][2]) - second;
+    const Eigen principal = eigen(inertia);
+    const glm::dquat axes = glm::normalize(glm::quat_cast(principal.vectors));
+
+    MassProperties result;
+    result.volume = moments.volume;
+    result.centre = glm::vec3(centre + origin);
+    result.inertia = glm::mat3(inertia);
+    result.principalInertia = glm::vec3(principal.values);
+    result.principalAxes = glm::quat(axes);
+    return result;
+}
+
 MassProperties massProperties(const Mesh& mesh) {
     validate(mesh);
     const Bounds box = bounds(mesh);
@@ -93,20 +109,7 @@ MassProperties massProperties(const Mesh& mesh) {
         sum.first = -sum.first;
         sum.second = -sum.second;
     }
-
-    const glm::dvec3 centre = sum.first / sum.volume;
-    const glm::dmat3 second = sum.second - sum.volume * glm::outerProduct(centre, centre);
-    const glm::dmat3 inertia = glm::dmat3(second[0][0] + second[1][1] + second[2][2]) - second;
-    const Eigen principal = eigen(inertia);
-    const glm::dquat axes = glm::normalize(glm::quat_cast(principal.vectors));
-
-    MassProperties result;
-    result.volume = sum.volume;
-    result.centre = glm::vec3(centre + origin);
-    result.inertia = glm::mat3(inertia);
-    result.principalInertia = glm::vec3(principal.values);
-    result.principalAxes = glm::quat(axes);
-    return result;
+    return massProperties(sum, origin);
 }
 
 }  // namespace bilayer

@@ -55,6 +55,7 @@ void addInspect(CLI::App& app);
 void addInfo(CLI::App& app);
 void addQuery(CLI::App& app);
 void addSurface(CLI::App& app);
+void addExport(CLI::App& app);
 void addSeed(CLI::App& app);
 void addDevices(CLI::App& app);
 

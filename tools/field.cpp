@@ -1,4 +1,4 @@
-// `bilayer query` and `surface`: what a field says, as numbers and as a mesh.
+// `bilayer query`, `surface` and `export`: what a field says, as numbers, as a mesh, and as grids for a GPU.
 #include <fmt/format.h>
 
 #include <charconv>
@@ -7,9 +7,12 @@
 #include <memory>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 #include "collider/field.h"
+#include "sdf/grids.h"
 #include "sdf/mesh_io.h"
+#include "sdf/nanovdb.h"
 #include "sdf/surface.h"
 #include "sdf/vdb_io.h"
 #include "tools/commands.h"
@@ -23,6 +26,7 @@ constexpr const char* blanks = " \t\r";
 struct Arguments {
     std::filesystem::path field, output;
     SurfaceOptions options;
+    bool json = false;
 };
 
 // Three finite numbers and nothing else. Locales and hexadecimal digits have no say.
@@ -71,6 +75,32 @@ void runSurface(const Arguments& a) {
     table.print();
 }
 
+void runExport(const Arguments& a) {
+    requireOther(a.output, a.field);
+    const LevelSet field = readVdb(a.field);
+    requireWritable(a.output);
+    writeNanoVdb(a.output, field);
+    const std::uint64_t size = std::filesystem::file_size(a.output);
+    std::vector<std::string> grids{field.grids().distance->getName()};
+    if (field.grids().triangle) grids.push_back(field.grids().triangle->getName());
+    if (a.json)
+        return print({{"output", a.output.string()},
+                      {"grids", grids},
+                      {"voxelSize", number(field.voxelSize())},
+                      {"activeVoxels", field.activeVoxels()},
+                      {"leaves", field.leaves()},
+                      {"fileBytes", size}});
+    Table table(a.output.string());
+    table.row("grids", fmt::format("{}", fmt::join(grids, ", ")));
+    table.row("active voxels", grouped(field.activeVoxels()));
+    table.row("file", bytes(size));
+    table.print();
+}
+
+std::string requireNanoEnding(const std::string& path) {
+    return std::filesystem::path(path).extension() == ".nvdb" ? "" : "must end in .nvdb";
+}
+
 std::string requireMeshEnding(const std::string& path) {
     const std::string ending = std::filesystem::path(path).extension().string();
     return ending == ".ply" || ending == ".obj" || ending == ".stl" ? "" : "must end in .ply, .obj or .stl";
@@ -98,6 +128,17 @@ void addSurface(CLI::App& app) {
     command->add_option("--adaptivity", a->options.adaptivity, "0 (default): uniform .. 1: fewest triangles")
         ->check(within(0, 1));
     command->callback([a] { runSurface(*a); });
+}
+
+void addExport(CLI::App& app) {
+    auto* command = app.add_subcommand("export", "Write a field as NanoVDB grids, for code on a GPU");
+    const auto a = std::make_shared<Arguments>();
+    command->add_option("field", a->field, "a .vdb file")->required();
+    command->add_option("-o,--output", a->output, "a .nvdb file")
+        ->required()
+        ->check(CLI::Validator(requireNanoEnding, "PATH"));
+    command->add_flag("--json", a->json, "print one JSON object");
+    command->callback([a] { runExport(*a); });
 }
 
 }  // namespace bilayer::tools

@@ -46,6 +46,7 @@ int main(int count, char** arguments) {
     bilayer::tools::addInfo(app);
     bilayer::tools::addQuery(app);
     bilayer::tools::addSurface(app);
+    bilayer::tools::addExport(app);
     bilayer::tools::addSeed(app);
     bilayer::tools::addDevices(app);
     try {

@@ -20,6 +20,14 @@ Json vector(const glm::vec3& v) {
     return Json::array({number(v.x), number(v.y), number(v.z)});
 }
 
+Json matrix(const glm::mat3& m) {
+    return Json::array({vector(m[0]), vector(m[1]), vector(m[2])});
+}
+
+std::string text(const glm::vec3& v) {
+    return fmt::format("{:.6g} {:.6g} {:.6g}", v.x, v.y, v.z);
+}
+
 std::string holes(const MeshReport& report) {
     return fmt::format("{} ({} boundary edges in {} loops, {} non-manifold edges, {} non-manifold vertices)",
                        report.closed() ? "yes" : "no", grouped(report.boundaryEdges), grouped(report.boundaryLoops),
@@ -144,6 +152,27 @@ Json provenance(const LevelSet& levelSet, const VdbOptions& stored) {
             {"signReason", levelSet.signReason()},
             {"signConflicts", levelSet.signConflicts()},
             {"errorBound", number(storedErrorBound(levelSet, stored))}};
+}
+
+Json toJson(const std::optional<MassProperties>& mass) {
+    if (!mass) return {};
+    const glm::quat& q = mass->principalAxes;
+    return {{"volume", mass->volume},
+            {"centre", vector(mass->centre)},
+            {"inertia", matrix(mass->inertia)},
+            {"principalInertia", vector(mass->principalInertia)},
+            {"principalAxes", Json::array({number(q.w), number(q.x), number(q.y), number(q.z)})}};
+}
+
+void addRows(Table& table, const std::optional<MassProperties>& mass) {
+    if (!mass) return;
+    const glm::mat3 &inertia = mass->inertia, axes = glm::mat3_cast(mass->principalAxes);
+    table.row("centre of mass", text(mass->centre) + " m");
+    table.row("inertia", fmt::format("xx yy zz {:.6g} {:.6g} {:.6g}, xy xz yz {:.6g} {:.6g} {:.6g} m^5", inertia[0][0],
+                                     inertia[1][1], inertia[2][2], inertia[0][1], inertia[0][2], inertia[1][2]));
+    for (int i = 0; i < 3; ++i)
+        table.row(fmt::format("principal axis {}", i + 1),
+                  fmt::format("{}: {:.6g} m^5", text(axes[i]), mass->principalInertia[i]));
 }
 
 ProgressBar::ProgressBar(std::string label) : label_(std::move(label)), visible_(::isatty(STDERR_FILENO)) {}

@@ -6,10 +6,12 @@
 #include <filesystem>
 #include <functional>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "collider/mass.h"
 #include "sdf/inspect.h"
 #include "sdf/level_set.h"
 #include "sdf/vdb_io.h"
@@ -50,6 +52,11 @@ void addRows(Table& table, const LevelSet& levelSet, const VdbOptions& stored = 
 
 /// How it got its distances and signs: method, sign, signReason, signConflicts, errorBound [m].
 Json provenance(const LevelSet& levelSet, const VdbOptions& stored = {});
+
+/// Mass properties at density 1 [m]; null for nothing.
+Json toJson(const std::optional<MassProperties>& mass);
+/// All of them but the volume.
+void addRows(Table& table, const std::optional<MassProperties>& mass);
 
 /// Seconds since its construction.
 class Stopwatch {

@@ -5,9 +5,11 @@
 #include <cmath>
 
 #include <memory>
+#include <optional>
 #include <stdexcept>
 
 #include "cl/device.h"
+#include "collider/mass.h"
 #include "sdf/grids.h"
 #include "sdf/mesh_io.h"
 #include "sdf/vdb_io.h"
@@ -29,11 +31,28 @@ std::shared_ptr<Arguments> addArguments(CLI::App& command, const char* name, con
     return arguments;
 }
 
+// Nothing for what encloses no volume.
+template <class Solid>
+std::optional<MassProperties> massOf(const Solid& solid) {
+    try {
+        return massProperties(solid);
+    } catch (const std::invalid_argument&) {
+        return std::nullopt;
+    }
+}
+
 void runInspect(const Arguments& a) {
-    const MeshReport report = inspect(readMesh(a.input));
-    if (a.json) return print(toJson(report, 0));
+    const Mesh mesh = readMesh(a.input);
+    const MeshReport report = inspect(mesh);
+    const std::optional<MassProperties> mass = report.closed() ? massOf(mesh) : std::nullopt;
+    if (a.json) {
+        Json json = toJson(report, 0);
+        json["mass"] = toJson(mass);
+        return print(json);
+    }
     Table table(a.input.string());
     addRows(table, report, 0);
+    addRows(table, mass);
     table.print();
 }
 
@@ -66,7 +85,8 @@ Json gridList(const std::filesystem::path& path) {
     return list;
 }
 
-void printInfo(const Arguments& a, const LevelSet& field, const Json& grids) {
+void printInfo(const Arguments& a, const LevelSet& field, const Json& grids,
+               const std::optional<MassProperties>& mass) {
     Table table(a.input.string());
     for (const Json& grid : grids)
         table.row("grid",
@@ -74,6 +94,8 @@ void printInfo(const Arguments& a, const LevelSet& field, const Json& grids) {
                               grid["class"].get<std::string>(), grid["halfFloat"] ? ", 16 bits" : ""));
     addRows(table, field);
     table.row("bounds", boxText(activeBounds(field)));
+    table.row("volume", mass ? fmt::format("{:.6g} m^3", mass->volume) : "none");
+    addRows(table, mass);
     if (field.meshHash()) table.row("mesh hash", hex(field.meshHash()));
     const std::string text = remark(field);
     table.row("level-set check", text.empty() ? "passed" : text);
@@ -88,7 +110,8 @@ Json inVoxels(float width, const LevelSet& field) {
 void runInfo(const Arguments& a) {
     const LevelSet field = readVdb(a.input);
     const Json grids = gridList(a.input);
-    if (!a.json) return printInfo(a, field, grids);
+    const std::optional<MassProperties> mass = massOf(field);
+    if (!a.json) return printInfo(a, field, grids, mass);
     Json json{{"grids", grids},
               {"voxelSize", number(field.voxelSize())},
               {"exteriorWidth", inVoxels(field.exteriorWidth(), field)},
@@ -96,6 +119,7 @@ void runInfo(const Arguments& a) {
               {"activeVoxels", field.activeVoxels()},
               {"leaves", field.leaves()},
               {"bounds", box(activeBounds(field))},
+              {"mass", toJson(mass)},
               {"meshHash", hex(field.meshHash())},
               {"memoryBytes", field.memoryBytes()},
               {"levelSetCheck", remark(field)}};

@@ -1,14 +1,20 @@
 #include "collider/mass.h"
 
+#include <oneapi/tbb/global_control.h>
+#include <openvdb/tools/Composite.h>
+
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <cstring>
 #include <glm/geometric.hpp>
 #include <glm/gtc/constants.hpp>
 #include <glm/gtc/matrix_transform.hpp>
 #include <stdexcept>
 
 #include "demos/shared/shapes.h"
+#include "sdf/mesh_io.h"
 #include "tests/support/analytic.h"
+#include "tests/support/clean.h"
 #include "tests/support/support.h"
 
 using namespace bilayer;
@@ -36,6 +42,51 @@ void requireDiagonalises(const MassProperties& mass) {
     REQUIRE(glm::length(mass.principalAxes) == Approx(1).epsilon(1e-6));
     REQUIRE(mass.principalInertia.x <= mass.principalInertia.y);
     REQUIRE(mass.principalInertia.y <= mass.principalInertia.z);
+}
+
+// The mass that `formula` says, to a part of itself; `size` is that of the solid [m].
+void requireMass(const MassProperties& mass, const MassProperties& formula, double part, double size) {
+    CAPTURE(mass.volume, formula.volume);
+    REQUIRE(mass.volume == Approx(formula.volume).epsilon(part));
+    requireNear(mass.centre, formula.centre, part * size);
+    requireNear(mass.inertia, formula.inertia, part * double(formula.principalInertia.z));
+    requireNear(mass.principalInertia, formula.principalInertia, part * double(formula.principalInertia.z));
+    requireDiagonalises(mass);
+}
+
+// By formula; the moments are those about x, y and z.
+MassProperties massOf(double volume, const glm::vec3& moments, const glm::vec3& centre = glm::vec3(0)) {
+    MassProperties mass;
+    mass.volume = volume;
+    mass.centre = centre;
+    for (int axis = 0; axis < 3; ++axis) mass.inertia[axis][axis] = moments[axis];
+    mass.principalInertia = moments;
+    std::sort(&mass.principalInertia.x, &mass.principalInertia.x + 3);
+    return mass;
+}
+
+MassProperties ballMass(double radius, const glm::vec3& centre = glm::vec3(0)) {
+    const double volume = 4. / 3 * pi * radius * radius * radius;
+    return massOf(volume, glm::vec3(0.4 * volume * radius * radius), centre);
+}
+
+MassProperties boxMass(const glm::dvec3& half) {
+    const double volume = 8 * half.x * half.y * half.z;
+    const glm::dvec3 squared = half * half;
+    return massOf(volume, volume / 3 * (glm::dvec3(squared.x + squared.y + squared.z) - squared));
+}
+
+MassProperties torusMass(double major, double minor) {
+    const double volume = 2 * pi * pi * major * minor * minor;
+    const double across = volume * (0.5 * major * major + 0.625 * minor * minor);
+    return massOf(volume, glm::dvec3(across, across, volume * (major * major + 0.75 * minor * minor)));
+}
+
+// The field of a copy of the grid, changed.
+LevelSet withGrid(const LevelSet& field, auto change) {
+    const auto grid = field.grids().distance->deepCopy();
+    change(*grid);
+    return LevelSet(std::make_shared<Grids>(Grids{grid, nullptr}));
 }
 
 glm::mat4 randomMotion(Random& random) {
@@ -133,4 +184,134 @@ TEST_CASE("what encloses nothing has no mass") {
     Random random(seed);
     for (int i = 0; i < 20; ++i)
         REQUIRE_THROWS_AS(massProperties(transformed(sheet, randomMotion(random))), std::invalid_argument);
+}
+
+TEST_CASE("a field has the mass of the formula") {
+    const double part = 2e-3;  // 64 voxels along the longest side
+    requireMass(massProperties(levelSetOf(sphereSolid(0.7, {3.1, -2, 0.4}), 1.4 / 64)), ballMass(0.7, {3.1f, -2, 0.4f}),
+                1e-4, 0.7);
+    requireMass(massProperties(levelSetOf(boxSolid({0.97, 0.71, 0.53}), 1.94 / 64)), boxMass({0.97, 0.71, 0.53}), part,
+                1);
+    requireMass(massProperties(levelSetOf(torusSolid(1, 0.3), 2.6 / 64)), torusMass(1, 0.3), 1e-4, 1);
+    const LevelSet far = levelSetOf(sphereSolid(0.7, {4096, -8192, 2048}), 1.4 / 64);
+    requireMass(massProperties(far), ballMass(0.7, {4096, -8192, 2048}), 2e-3,
+                0.7);  // the centre is rounded to a float
+}
+
+TEST_CASE("the mass of a field converges: third order where it is smooth") {
+    const auto error = [](const LevelSet& field, const MassProperties& formula) {
+        const MassProperties mass = massProperties(field);
+        return std::max(std::abs(mass.volume / formula.volume - 1),
+                        std::abs(double(mass.principalInertia.z / formula.principalInertia.z) - 1));
+    };
+    const auto sphere = [&](double voxels) {
+        return error(levelSetOf(sphereSolid(1, {0.1, 0.2, 0.3}), 2 / voxels), ballMass(1));
+    };
+    const auto torus = [&](double voxels) {
+        return error(levelSetOf(torusSolid(1, 0.4), 2.8 / voxels), torusMass(1, 0.4));
+    };
+    const auto box = [&](double voxels) {
+        return error(levelSetOf(boxSolid({0.97, 0.71, 0.53}), 1.94 / voxels), boxMass({0.97, 0.71, 0.53}));
+    };
+    // a bound for each order through 32 voxels: a factor of 8 a step for the smooth ones, of 4 for the box
+    for (const double voxels : {32., 64., 128.}) {
+        const double finer = voxels / 32;
+        CAPTURE(voxels);
+        CHECK(sphere(voxels) < 2e-4 / std::pow(finer, 3));
+        CHECK(torus(voxels) < 8e-4 / std::pow(finer, 3));
+        CHECK(box(voxels) < 1e-2 / std::pow(finer, 2));
+    }
+}
+
+TEST_CASE("mesh and field agree on the mass of clean meshes") {
+    const auto area = [](const Mesh& mesh) {
+        double sum = 0;
+        for (const glm::uvec3& t : mesh.triangles) {
+            const glm::dvec3 a = mesh.points[t.x], b = mesh.points[t.y], c = mesh.points[t.z];
+            sum += 0.5 * glm::length(glm::cross(b - a, c - a));
+        }
+        return sum;
+    };
+    // thinner walls than two voxels are beyond any field; the mean thickness of a solid is twice its volume over its
+    // area
+    const double leastThickness = 3;  // [voxels]
+    int compared = 0;
+    for (const std::string& name : cleanMeshes()) {
+        const auto path = corpusMesh(name);
+        if (!path) continue;
+        const Mesh mesh = readMesh(*path);
+        if (mesh.triangles.size() > 120'000) continue;  // for time
+        const MassProperties exact = massProperties(mesh);
+        const float voxel = voxelSizeFor(mesh, 128);
+        if (2 * exact.volume / area(mesh) < leastThickness * double(voxel)) continue;
+        CAPTURE(name);
+        requireMass(massProperties(build(mesh, {.voxelSize = voxel})), exact, 5e-3, double(bounds(mesh).longestSide()));
+        ++compared;
+    }
+    CHECK((compared == 0 || compared >= 35));
+}
+
+TEST_CASE("the mass of a field knows hollows, tiles, and inactive insides") {
+    // a large box, so that nodes of 8 and more voxels lie inside; the same with nothing but tiles there
+    const LevelSet box = levelSetOf(boxSolid({1, 1.5, 2}), 0.02);
+    const MassProperties mass = massProperties(box);
+    requireMass(mass, boxMass({1, 1.5, 2}), 1e-3, 2);
+    const LevelSet hollow = withGrid(box, [](openvdb::FloatGrid& grid) {
+        const auto hole = levelSetOf(sphereSolid(0.7), 0.02).grids().distance->deepCopy();
+        openvdb::tools::csgDifference(grid, *hole);
+    });
+    const MassProperties solid = boxMass({1, 1.5, 2}), ball = ballMass(0.7);
+    requireMass(massProperties(hollow),
+                massOf(solid.volume - ball.volume,
+                       {solid.inertia[0][0] - ball.inertia[0][0], solid.inertia[1][1] - ball.inertia[1][1],
+                        solid.inertia[2][2] - ball.inertia[2][2]}),
+                1e-3, 2);
+    // the inside is inactive, and what is left of the band tells the surface to half a voxel
+    const LevelSet outer = withGrid(box, [](openvdb::FloatGrid& grid) {
+        for (auto value = grid.beginValueOn(); value; ++value)
+            if (*value < 0) {
+                value.setValue(-grid.background());
+                value.setValueOff();
+            }
+        openvdb::tools::prune(grid.tree());
+    });
+    requireMass(massProperties(outer), boxMass({1, 1.5, 2}), 0.03, 2);
+    // nor does it matter how the inside is stored
+    const LevelSet dense = withGrid(box, [](openvdb::FloatGrid& grid) { grid.tree().voxelizeActiveTiles(); });
+    const LevelSet leaves = withGrid(box, [](openvdb::FloatGrid& grid) {
+        for (int x = -40; x <= 40; x += 8) grid.tree().touchLeaf({x, 0, 0});
+    });
+    REQUIRE(massProperties(dense).volume == mass.volume);
+    REQUIRE(massProperties(leaves).volume == Approx(mass.volume).epsilon(1e-12));
+    requireMass(massProperties(leaves), mass, 1e-6, 2);
+}
+
+TEST_CASE("bands of any width give a mass") {
+    const MassProperties formula = ballMass(0.7);
+    for (const float width : {0.01f, 0.3f, 0.9f, 1.5f, 2.5f, 8.f}) {
+        CAPTURE(width);
+        // below a voxel the surface is known to half a voxel only, but lies in the middle in the mean
+        requireMass(massProperties(levelSetOf(sphereSolid(0.7), 1.4 / 64, width, width)), formula,
+                    width < 2 ? 0.02 : 1e-3, 0.7);
+    }
+}
+
+TEST_CASE("a field without an inside has no mass") {
+    const LevelSet none = withGrid(levelSetOf(sphereSolid(0.7), 0.05), [](openvdb::FloatGrid& grid) {
+        for (auto value = grid.beginValueAll(); value; ++value) value.setValue(std::abs(*value));
+    });
+    REQUIRE_THROWS_AS(massProperties(none), std::invalid_argument);
+}
+
+TEST_CASE("the mass of a field has the same bytes for any number of threads") {
+    const LevelSet field = levelSetOf(torusSolid(1, 0.3), 0.02);
+    const auto with = [&](std::size_t threads) {
+        const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+        return massProperties(field);
+    };
+    const MassProperties one = with(1);
+    for (const std::size_t threads : {2, 4}) {
+        const MassProperties more = with(threads);
+        CHECK(std::memcmp(&one, &more, sizeof one) == 0);
+    }
 }

@@ -5,7 +5,7 @@ function(step)
 endfunction()
 step(${CMAKE_COMMAND} --install ${BUILD} --prefix ${SCRATCH}/prefix)
 # every public header stands where <bilayer/...> finds it, and the command line is there
-foreach(path IN ITEMS bin/bilayer include/bilayer/sdf/build.h include/bilayer/integration/fluid/seed.h)
+foreach(path IN ITEMS bin/bilayer include/bilayer/sdf/build.h include/bilayer/sdf/nanovdb.h include/bilayer/integration/fluid/seed.h)
   if(NOT EXISTS ${SCRATCH}/prefix/${path})
     message(FATAL_ERROR "not installed: ${path}")
   endif()

@@ -76,6 +76,7 @@ TEST_CASE("fields that cannot be read") {
         requireFault({"query", broken}, "cut.vdb");
         requireFault({"surface", broken, "-o", scratch("cut.obj").string()}, "cut.vdb");
         requireFault({"seed", broken, "-o", output()}, "cut.vdb");
+        requireFault({"export", broken, "-o", scratch("cut.nvdb").string()}, "cut.vdb");
     }
     requireFault({"info", scratch("absent.vdb").string()}, "absent.vdb");
     requireFault({"info", textFile("text.vdb", "not a grid").string()}, "text.vdb");
@@ -83,7 +84,10 @@ TEST_CASE("fields that cannot be read") {
     CHECK(half.status == 1);
     CHECK(half.err.find("line 2") != std::string::npos);
     CHECK(half.errorLines() == 1);
+    requireFault({"export", scratch("absent.vdb").string(), "-o", scratch("cut.nvdb").string()}, "absent.vdb");
+    requireFault({"export", field, "-o", scratch("missing/a.nvdb").string()}, "missing/a.nvdb");
     CHECK_FALSE(std::filesystem::exists(scratch("cut.obj")));
+    CHECK_FALSE(std::filesystem::exists(scratch("cut.nvdb")));
     CHECK_FALSE(std::filesystem::exists(output()));
 }
 
@@ -137,6 +141,8 @@ TEST_CASE("wrong usage") {
     }
     requireUsage({"build", mesh, "-o", mesh, "--voxel-size", "0.1"}, "would overwrite " + mesh);
     requireUsage({"surface", "a.vdb", "-o", "a.xyz"});
+    requireUsage({"export", "a.vdb"});
+    requireUsage({"export", "a.vdb", "-o", "a.vdb"}, ".nvdb");
     requireUsage({"seed", mesh, "-o", output()});
     requireUsage({"seed", mesh, "-o", mesh, "--voxel-size", "0.1"}, "would overwrite " + mesh);
     requireUsage({"seed", mesh, "-o", output(), "--voxel-size", "0.1", "--rotate", "0", "0", "0", "1"});
@@ -225,5 +231,9 @@ TEST_CASE("an input is never overwritten") {
     std::filesystem::remove(link);
     std::filesystem::create_symlink(field, link);
     requireUsage({"surface", field, "-o", link.string()}, "would overwrite");
+    const auto nano = scratch("kept.nvdb");
+    std::filesystem::remove(nano);
+    std::filesystem::create_symlink(field, nano);
+    requireUsage({"export", field, "-o", nano.string()}, "would overwrite");
     CHECK(std::filesystem::last_write_time(field) == when);
 }

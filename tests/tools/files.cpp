@@ -67,6 +67,7 @@ TEST_CASE("a full disk leaves what was there") {
     for (const char* name : {"a.ply", "a.obj", "a.stl"})
         requireFault({"surface", field.string(), "-o", (here / name).string()}, full);
     requireFault({"seed", field.string(), "-o", (here / "liquid.vdb").string()}, full);
+    requireFault({"export", field.string(), "-o", (here / "a.nvdb").string()}, full);
     CHECK(names(here) == std::set<std::string>{"a.vdb"});
 }
 

@@ -1,4 +1,5 @@
 // Every command of `bilayer` on input that it must take.
+#include <nanovdb/util/IO.h>
 #include <openvdb/openvdb.h>
 #include <openvdb/tools/LevelSetSphere.h>
 
@@ -46,7 +47,7 @@ nlohmann::json build(const std::string& output, const Words& options) {
 TEST_CASE("help and version") {
     CHECK(run({"--help"}).status == 0);
     CHECK(run({"--version"}).out.rfind("bilayer 0.", 0) == 0);
-    for (const char* command : {"build", "inspect", "info", "query", "surface", "seed", "devices"}) {
+    for (const char* command : {"build", "inspect", "info", "query", "surface", "export", "seed", "devices"}) {
         const Result r = run({command, "--help"});
         CHECK(r.status == 0);
         CHECK_FALSE(r.out.empty());
@@ -248,6 +249,50 @@ TEST_CASE("info tells what is in a file") {
     const Result table = run({"info", fieldFile()});
     CHECK(table.status == 0);
     CHECK_THAT(table.out, Catch::Contains("normals: closed and oriented") && Catch::Contains("0.0001 voxels"));
+}
+
+TEST_CASE("inspect and info tell the mass, each by its own means") {
+    const auto mesh = run({"inspect", sphereFile().string(), "--json"}).json()["mass"];
+    const auto field = run({"info", fieldFile(), "--json"}).json()["mass"];
+    const double ball = 4. / 3 * 3.14159265 * 0.125;
+    CHECK(mesh["volume"].get<double>() == Approx(ball).epsilon(0.02));
+    CHECK(field["volume"].get<double>() == Approx(mesh["volume"].get<double>()).epsilon(5e-3));
+    for (int axis = 0; axis < 3; ++axis) {
+        CHECK(std::abs(field["centre"][axis].get<double>()) < 1e-3);
+        CHECK(field["inertia"][axis][axis].get<double>() ==
+              Approx(mesh["inertia"][axis][axis].get<double>()).epsilon(5e-3));
+        CHECK(field["principalInertia"][axis].get<double>() == Approx(0.1 * ball).epsilon(0.03));
+    }
+    CHECK(field["principalAxes"].size() == 4);
+    for (const Words& words : {Words{"inspect", sphereFile().string()}, Words{"info", fieldFile()}})
+        CHECK_THAT(run(words).out, Catch::Contains("centre of mass") && Catch::Contains("principal axis 1") &&
+                                       Catch::Contains("volume"));
+    Mesh open = shapes::sphere(1, 2);
+    open.triangles.pop_back();
+    writeMesh(scratch("lidless.obj"), open);
+    CHECK(run({"inspect", scratch("lidless.obj").string(), "--json"}).json()["mass"].is_null());
+}
+
+TEST_CASE("export writes what NanoVDB reads") {
+    const std::string path = scratch("triangles.vdb").string(), output = scratch("sphere.nvdb").string();
+    build(path, {"--voxel-size", "0.05", "--triangles"});
+    const Result r = run({"export", path, "-o", output, "--json"});
+    INFO(r.err);
+    REQUIRE(r.status == 0);
+    const LevelSet field = readVdb(path);
+    const auto json = r.json();
+    CHECK(json["output"] == output);
+    CHECK(json["grids"] == nlohmann::json({"distance", "triangle"}));
+    CHECK(json["activeVoxels"] == field.activeVoxels());
+    CHECK(json["fileBytes"] == std::filesystem::file_size(output));
+    const auto grids = nanovdb::io::readGrids(output);
+    REQUIRE(grids.size() == 2);
+    REQUIRE(grids[0].grid<float>());
+    CHECK(grids[0].grid<float>()->tree().getValue(nanovdb::Coord(10, 0, 0)) ==
+          field.grids().distance->tree().getValue(openvdb::Coord(10, 0, 0)));
+    const Result table = run({"export", path, "-o", output});
+    CHECK(table.status == 0);
+    CHECK_THAT(table.out, Catch::Contains("distance, triangle"));
 }
 
 TEST_CASE("info takes fields from elsewhere") {

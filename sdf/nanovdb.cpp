@@ -1,0 +1,77 @@
+#include "sdf/nanovdb.h"
+
+#include <fmt/format.h>
+#include <nanovdb/util/GridHandle.h>
+#include <nanovdb/util/IO.h>
+#include <nanovdb/util/OpenToNanoVDB.h>
+
+#include <fstream>
+#include <new>
+#include <stdexcept>
+#include <vector>
+
+#include "sdf/atomic_file.h"
+#include "sdf/grids.h"
+
+namespace bilayer {
+namespace {
+
+constexpr std::align_val_t alignment{NANOVDB_DATA_ALIGNMENT};
+
+// The memory that NanoVDB builds a grid in, as its GridHandle asks for it.
+class Buffer {
+  public:
+    static Buffer create(std::uint64_t size, const Buffer* = nullptr) {
+        Buffer buffer;
+        buffer.memory_ = {static_cast<std::byte*>(::operator new(size, alignment)),
+                          [](std::byte* memory) { ::operator delete(memory, alignment); }};
+        buffer.size_ = size;
+        return buffer;
+    }
+    std::uint8_t* data() { return reinterpret_cast<std::uint8_t*>(memory_.get()); }
+    const std::uint8_t* data() const { return reinterpret_cast<const std::uint8_t*>(memory_.get()); }
+    std::uint64_t size() const { return size_; }
+    void clear() { *this = Buffer(); }
+    NanoGrid grid() const { return {memory_, size_}; }
+
+  private:
+    std::shared_ptr<std::byte> memory_;
+    std::uint64_t size_ = 0;
+};
+
+using Handle = nanovdb::GridHandle<Buffer>;
+
+// NanoVDB keeps notes in the nodes of the grid that it reads, which other threads may be reading: it gets a copy.
+template <class Grid>
+Handle convert(const Grid& grid) {
+    return nanovdb::openToNanoVDB<Buffer>(*grid.deepCopy());
+}
+
+}  // namespace
+
+NanoGrid toNanoVdb(const LevelSet& levelSet) {
+    return convert(*levelSet.grids().distance).buffer().grid();
+}
+
+std::optional<NanoGrid> trianglesToNanoVdb(const LevelSet& levelSet) {
+    if (!levelSet.grids().triangle) return std::nullopt;
+    return convert(*levelSet.grids().triangle).buffer().grid();
+}
+
+void writeNanoVdb(const std::filesystem::path& path, const LevelSet& levelSet) {
+    AtomicFile file(path);
+    std::vector<Handle> grids;
+    grids.push_back(convert(*levelSet.grids().distance));
+    if (levelSet.grids().triangle) grids.push_back(convert(*levelSet.grids().triangle));
+    try {
+        std::ofstream stream(file.temporary(), std::ios::binary);
+        stream.exceptions(std::ios::failbit | std::ios::badbit);
+        nanovdb::io::writeGrids(stream, grids);
+        stream.close();
+    } catch (const std::exception&) {
+        throw std::runtime_error(fmt::format("{}: cannot be written (is the disk full?)", path.string()));
+    }
+    file.commit();
+}
+
+}  // namespace bilayer
