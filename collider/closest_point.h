@@ -16,8 +16,8 @@ inline constexpr std::uint32_t noTriangle = ~0u;
 struct ClosestPoint {
     float distance = std::numeric_limits<float>::infinity();  ///< negative inside [m]
     glm::vec3 position{0};                                    ///< on the surface [m]
-    /// Outward, of unit length: of the face, or of the edge or vertex the mean over all triangles around it, weighted by
-    /// their angles there.
+    /// Outward, of unit length: of the face, or of the edge or vertex the mean over all triangles around it, weighted
+    /// by their angles there.
     glm::vec3 normal{0};
     std::uint32_t triangle = noTriangle;  ///< of the mesh; `noTriangle` for a field without its mesh
     Feature feature = Feature::face;

@@ -11,9 +11,9 @@
 
 namespace bilayer {
 
-/// Means of the unit normals around edges and vertices, weighted by angles: as long as 1 where the surface is flat, next
-/// to nothing where normals cancel out and tell no side. Zero as well beside triangles without area, which hide from
-/// their neighbours who else is there.
+/// Means of the unit normals around edges and vertices, weighted by angles: as long as 1 where the surface is flat,
+/// next to nothing where normals cancel out and tell no side. Zero as well beside triangles without area, which hide
+/// from their neighbours who else is there.
 class FeatureNormals {
   public:
     /// @param mesh      valid

@@ -67,7 +67,8 @@ Field::Data::Side Field::Data::sideAt(const glm::dvec3& local, const Sample& her
     const std::int32_t entry = directory[entryOf(block)];
     if (entry < 0) return {inside, std::abs(here.distance) > error};
     const glm::ivec3 corner(local + 0.5), inBlock = corner - 8 * block;
-    const float value = values[std::size_t(entry) * blockFloats + (inBlock.x * stride + inBlock.y) * stride + inBlock.z];
+    const float value =
+        values[std::size_t(entry) * blockFloats + (inBlock.x * stride + inBlock.y) * stride + inBlock.z];
     const bool certain = glm::distance(local, glm::dvec3(corner)) * voxel < double(std::abs(value) - error);
     return certain ? Side{value < 0, true} : Side{inside, false};
 }

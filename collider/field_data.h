@@ -23,7 +23,9 @@ struct Field::Data : FieldLayout {
     glm::dvec3 extent() const { return double(side) * glm::dvec3(blocks); }
 
     Sample sample(const glm::dvec3& local, float gradientReach) const;
-    float distance(const glm::dvec3& local) const { return sample(local, -std::numeric_limits<float>::infinity()).distance; }
+    float distance(const glm::dvec3& local) const {
+        return sample(local, -std::numeric_limits<float>::infinity()).distance;
+    }
     float boundOutside(const glm::dvec3& local) const;
     float boundInEmptyBlock(bool inside, const glm::dvec3& local, const glm::ivec3& block) const;
     Clearance clearance() const { return {clearances.data(), parts()}; }

@@ -24,14 +24,14 @@ namespace bilayer::HWY_NAMESPACE {
 /// Eight levels of groups hold 2^27 leaves; of each level seven wait at most.
 constexpr std::size_t mostWaiting = 96;
 /// Points and boxes in the tree's frame are rounded by no more than this part of their size.
-constexpr float placeRounding = 2.4e-7f;
+constexpr float placeRounding = 5e-7f;
 
 // One point's way down the tree.
 class Search {
   public:
-    Search(const WideTree& tree, const glm::dvec3& point, float bound)
-        : tree_(tree), cell_(glm::floor(point)), inCell_(point - glm::floor(point)), point_(point) {
-        const glm::vec3 size = glm::max(glm::abs(point_), glm::vec3(tree.size));
+    Search(const WideTree& tree, const TurnedGroup* groups, const glm::dvec3& point, float bound)
+        : tree_(tree), groups_(groups), cell_(glm::floor(point)), inCell_(point - glm::floor(point)) {
+        const glm::vec3 size = glm::max(glm::abs(cell_), glm::vec3(tree.size));
         slack_ = placeRounding * (size.x + size.y + size.z);
         lower(bound * bound);
     }
@@ -41,7 +41,7 @@ class Search {
         for (;;) {
             if (tree_.isLeaf(node))
                 visit(tree_.leaves[node]);
-            else if (open(tree_.group(node), node))
+            else if (open(groups_[node - tree_.leafCount], node))
                 continue;
             do {
                 if (waiting_ == 0) return triangle_;
@@ -60,14 +60,19 @@ class Search {
     }
 
     // Puts those children aside that may hold something nearer, and goes on to the nearest of them.
-    bool open(const BoxGroup& group, std::uint32_t& node) {
+    bool open(const TurnedGroup& group, std::uint32_t& node) {
         const Tag tag;
         alignas(64) float gaps[treeWidth];
         unsigned near = 0;
+        // whole voxels first, without rounding
+        const glm::vec3 origin(group.origin[0], group.origin[1], group.origin[2]), from = (cell_ - origin) + inCell_;
+        float place[3];
+        for (int k = 0; k < 3; ++k)
+            place[k] = group.axes[k][0] * from.x + group.axes[k][1] * from.y + group.axes[k][2] * from.z;
         for (std::size_t i = 0; i < treeWidth; i += hn::Lanes(tag)) {
             Vec sum = hn::Zero(tag);
             for (int k = 0; k < 3; ++k) {
-                const Vec at = hn::Set(tag, point_[k]);
+                const Vec at = hn::Set(tag, place[k]);
                 const Vec gap = hn::Max(hn::Sub(hn::Load(tag, group.lower[k] + i), at),
                                         hn::Sub(at, hn::Load(tag, group.upper[k] + i)));
                 sum = hn::Add(sum, square(hn::Max(gap, hn::Zero(tag))));
@@ -107,7 +112,8 @@ class Search {
     }
 
     const WideTree& tree_;
-    glm::vec3 cell_, inCell_, point_;
+    const TurnedGroup* groups_;
+    glm::vec3 cell_, inCell_;
     float slack_ = 0, best2_ = 0, limit2_ = 0;
     std::uint32_t triangle_ = noTriangle;
     std::size_t waiting_ = 0;
@@ -115,8 +121,8 @@ class Search {
     std::uint32_t nodes_[mostWaiting];
 };
 
-std::uint32_t searchNearest(const WideTree& tree, const glm::dvec3& point, float bound) {
-    return Search(tree, point, bound).run();
+std::uint32_t searchNearest(const WideTree& tree, const TurnedGroup* groups, const glm::dvec3& point, float bound) {
+    return Search(tree, groups, point, bound).run();
 }
 
 }  // namespace bilayer::HWY_NAMESPACE
@@ -161,6 +167,7 @@ MeshTree::MeshTree(Mesh mesh, float voxelSize)
       voxelSize_(voxelSize),
       perMetre_(1 / double(voxelSize)),
       tree_(makeWideTree(mesh_, voxelSize)),
+      groups_(makeTurnedGroups(tree_)),
       normals_(mesh_, thinnest * double(voxelSize)) {}
 
 std::uint32_t MeshTree::nearest(const glm::dvec3& point, float bound) const noexcept {
@@ -173,7 +180,7 @@ std::uint32_t MeshTree::nearest(const glm::dvec3& point, float bound) const noex
         local = 0.5 * size + (far / away) * (local - 0.5 * size);
         bound = std::numeric_limits<float>::infinity();
     }
-    return HWY_DYNAMIC_DISPATCH(searchNearest)(tree_, local, bound);
+    return HWY_DYNAMIC_DISPATCH(searchNearest)(tree_, groups_.get(), local, bound);
 }
 
 NearestFeature MeshTree::featureOf(std::uint32_t triangle, const glm::dvec3& point) const noexcept {
@@ -207,7 +214,8 @@ NearestFeature MeshTree::featureOf(std::uint32_t triangle, const glm::dvec3& poi
 
 std::size_t MeshTree::memoryBytes() const {
     return mesh_.points.size() * sizeof(glm::vec3) + mesh_.triangles.size() * sizeof(glm::uvec3) +
-           tree_.leafCount * sizeof(WideLeaf) + tree_.groupCount * sizeof(BoxGroup) + normals_.memoryBytes();
+           tree_.leafCount * sizeof(WideLeaf) + tree_.groupCount * (sizeof(BoxGroup) + sizeof(TurnedGroup)) +
+           normals_.memoryBytes();
 }
 
 }  // namespace bilayer

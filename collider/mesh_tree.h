@@ -4,9 +4,11 @@
 #include <cstddef>
 #include <cstdint>
 #include <glm/vec3.hpp>
+#include <memory>
 
 #include "collider/closest_point.h"
 #include "collider/feature_normals.h"
+#include "collider/turned_boxes.h"
 #include "sdf/mesh.h"
 #include "sdf/wide_tree.h"
 
@@ -50,6 +52,7 @@ class MeshTree {
     float voxelSize_;
     double perMetre_;  // voxels
     WideTree tree_;
+    std::unique_ptr<TurnedGroup[]> groups_;
     FeatureNormals normals_;
 };
 
