@@ -166,7 +166,7 @@ MeshTree::MeshTree(Mesh mesh, float voxelSize)
     : mesh_((validate(mesh), std::move(mesh))),
       voxelSize_(voxelSize),
       perMetre_(1 / double(voxelSize)),
-      tree_(makeWideTree(mesh_, voxelSize)),
+      tree_(makeWideTree(mesh_, voxelSize, nullptr, TreeOrder::split)),
       groups_(makeTurnedGroups(tree_)),
       normals_(mesh_, thinnest * double(voxelSize)) {}
 
