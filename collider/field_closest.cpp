@@ -19,8 +19,9 @@ namespace {
 constexpr float infinity = std::numeric_limits<float>::infinity();
 /// What the interpolant seldom exceeds the distance by, so that a second search is seldom needed [voxels].
 constexpr float usualError = 0.1f;
-/// A normal whose height towards the point is below this part of it tells no side.
-constexpr double cancelled = 1e-2;
+/// Mean normals below this have cancelled out, and tell no side where they point aside: above the rounding of floats,
+/// below what needles leave at their tips.
+constexpr double cancelled = 1e-6;
 
 // The mesh as build() understood it.
 Mesh meshOf(const LevelSet& levelSet, Mesh mesh) {
