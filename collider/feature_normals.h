@@ -3,6 +3,8 @@
 // that repeat another count once, and those without area not at all.
 #pragma once
 
+#include <hwy/cache_control.h>
+
 #include <cstdint>
 #include <glm/vec3.hpp>
 #include <vector>
@@ -22,6 +24,8 @@ class FeatureNormals {
 
     /// Of the edge from a corner (0..2) of a triangle to the next.
     const glm::vec3& ofEdge(std::uint32_t triangle, int edge) const { return edges_[3 * std::size_t(triangle) + edge]; }
+    /// Asks for the memory of a triangle's edges ahead of its use.
+    void fetchEdges(std::uint32_t triangle) const { hwy::Prefetch(&edges_[3 * std::size_t(triangle)]); }
     /// Of a point of the mesh.
     const glm::vec3& ofVertex(std::uint32_t point) const { return vertices_[point]; }
     /// Whether a triangle has no normal: it has no area, or another one is its back.

@@ -1,6 +1,7 @@
 // The field finds, triangles decide: the sampled distance bounds the search in the hierarchy over the mesh, so that
 // little of it is looked at, and the feature that is found is measured in double precision.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
@@ -19,6 +20,8 @@ namespace {
 constexpr float infinity = std::numeric_limits<float>::infinity();
 /// What the interpolant seldom exceeds the distance by, so that a second search is seldom needed [voxels].
 constexpr float usualError = 0.1f;
+/// Points that are taken together; what is known of them fits into the first cache.
+constexpr std::size_t batch = 64;
 /// Mean normals below this have cancelled out, and tell no side where they point aside: above the rounding of floats,
 /// below what needles leave at their tips.
 constexpr double cancelled = 1e-6;
@@ -74,14 +77,9 @@ Field::Data::Side Field::Data::sideAt(const glm::dvec3& local, const Sample& her
     return certain ? Side{value < 0, true} : Side{inside, false};
 }
 
-// The triangle that is nearest [m]: it is no farther away than the field says, but for a little.
-std::uint32_t Field::Data::nearestTriangle(const glm::vec3& point, const Sample& here, float maxDistance) const {
-    if (here.inBand) {
-        const float expected = std::abs(here.distance) * float(perMetre) + usualError;
-        const std::uint32_t triangle = mesh->nearest(glm::dvec3(point), expected);
-        if (triangle != noTriangle) return triangle;
-    }
-    return mesh->nearest(glm::dvec3(point), maxDistance * float(perMetre));
+// How far the triangle that is nearest can be by the field [voxels]: often enough.
+float Field::Data::expectedDistance(const Sample& here, float maxDistance) const {
+    return (here.inBand ? std::abs(here.distance) : maxDistance) * float(perMetre) + (here.inBand ? usualError : 0);
 }
 
 // By the normal, where it is the mesh's and tells a side, and no ball of the field knows better.
@@ -92,16 +90,16 @@ bool Field::Data::isInside(const NearestFeature& nearest, const glm::dvec3& loca
     return side.certain || !decided ? side.inside : height < 0;
 }
 
-ClosestPoint Field::Data::closest(const glm::vec3& point, float maxDistance) const {
-    const glm::dvec3 local = toLocal(point);
-    const Sample here = sample(local, -infinity);
-    const std::uint32_t triangle = nearestTriangle(point, here, maxDistance);
+// What is known of a point once the triangle is found that is nearest to it, within the distance that was expected.
+ClosestPoint Field::Data::closestOn(std::uint32_t triangle, const glm::vec3& point, const Sample& here,
+                                    float maxDistance) const {
+    if (triangle == noTriangle && here.inBand)
+        triangle = mesh->nearest(glm::dvec3(point), maxDistance * float(perMetre));
     if (triangle == noTriangle) return {};
     const NearestFeature nearest = mesh->featureOf(triangle, glm::dvec3(point));
     const double distance = glm::length(nearest.way);
     if (!(distance <= double(maxDistance))) return {};
-
-    const bool inside = isInside(nearest, local, here);
+    const bool inside = isInside(nearest, toLocal(point), here);
     return {.distance = float(inside ? -distance : distance),
             .position = glm::vec3(glm::dvec3(point) + nearest.way),
             .normal = outwardNormal(nearest, inside),
@@ -112,12 +110,36 @@ ClosestPoint Field::Data::closest(const glm::vec3& point, float maxDistance) con
 }
 
 ClosestPoint Field::closest(const glm::vec3& point, float maxDistance) const noexcept {
-    return data_->mesh ? data_->closest(point, maxDistance) : ClosestPoint{};
+    if (!data_->mesh) return {};
+    const Sample here = data_->sample(data_->toLocal(point), -infinity);
+    const float bound = data_->expectedDistance(here, maxDistance);
+    return data_->closestOn(data_->mesh->nearest(glm::dvec3(point), bound), point, here, maxDistance);
 }
 
+// Step by step for some points at a time, so that memory is asked for well ahead of its use.
 void Field::closest(std::span<const glm::vec3> points, std::span<ClosestPoint> answers,
                     float maxDistance) const noexcept {
-    for (std::size_t i = 0; i < points.size(); ++i) answers[i] = closest(points[i], maxDistance);
+    if (!data_->mesh) return std::fill(answers.begin(), answers.end(), ClosestPoint{});
+    const MeshTree& mesh = *data_->mesh;
+    std::array<glm::dvec3, batch> places;
+    std::array<Sample, batch> samples;
+    std::array<float, batch> bounds;
+    std::array<std::uint32_t, batch> triangles;
+    for (std::size_t begin = 0; begin < points.size(); begin += batch) {
+        const std::size_t count = std::min(batch, points.size() - begin);
+        for (std::size_t i = 0; i < count; ++i) {
+            places[i] = glm::dvec3(points[begin + i]);
+            samples[i] = data_->sample(data_->toLocal(points[begin + i]), -infinity);
+            bounds[i] = data_->expectedDistance(samples[i], maxDistance);
+        }
+        mesh.nearest({places.data(), count}, {bounds.data(), count}, {triangles.data(), count});
+        for (std::size_t i = 0; i < count; ++i)
+            if (triangles[i] != noTriangle) mesh.fetchTriangle(triangles[i]);
+        for (std::size_t i = 0; i < count; ++i)
+            if (triangles[i] != noTriangle) mesh.fetchCorners(triangles[i]);
+        for (std::size_t i = 0; i < count; ++i)
+            answers[begin + i] = data_->closestOn(triangles[i], points[begin + i], samples[i], maxDistance);
+    }
 }
 
 }  // namespace bilayer

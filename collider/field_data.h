@@ -40,8 +40,8 @@ struct Field::Data : FieldLayout {
     };
     Side sideAt(const glm::dvec3& local, const Sample& here) const;
     bool isInside(const NearestFeature& nearest, const glm::dvec3& local, const Sample& here) const;
-    std::uint32_t nearestTriangle(const glm::vec3& point, const Sample& here, float maxDistance) const;
-    ClosestPoint closest(const glm::vec3& point, float maxDistance) const;
+    float expectedDistance(const Sample& here, float maxDistance) const;
+    ClosestPoint closestOn(std::uint32_t triangle, const glm::vec3& point, const Sample& here, float maxDistance) const;
 
     double crossing(const glm::dvec3& start, const glm::dvec3& direction, double outside, double inside) const;
     std::optional<double> trace(const glm::dvec3& start, const glm::dvec3& direction, double length) const;

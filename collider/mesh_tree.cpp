@@ -4,6 +4,7 @@
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "collider/mesh_tree.cpp"
+#include <hwy/cache_control.h>
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
@@ -23,33 +24,53 @@ namespace bilayer::HWY_NAMESPACE {
 
 /// Eight levels of groups hold 2^27 leaves; of each level seven wait at most.
 constexpr std::size_t mostWaiting = 96;
+/// Points that are looked at in turns: enough to hide what memory takes, and few enough for the first cache.
+constexpr std::size_t together = 8;
+constexpr std::size_t cacheLine = 64;  // [bytes]
 /// Points and boxes in the tree's frame are rounded by no more than this part of their size.
 constexpr float placeRounding = 5e-7f;
 
-// One point's way down the tree.
+// Asks for memory ahead of its use.
+template <class Item>
+inline void fetch(const Item& item) {
+    for (std::size_t line = 0; line < sizeof(Item); line += cacheLine)
+        hwy::Prefetch(reinterpret_cast<const char*>(&item) + line);
+}
+
+// One point's way down the tree, node by node.
 class Search {
   public:
-    Search(const WideTree& tree, const TurnedGroup* groups, const glm::dvec3& point, float bound)
-        : tree_(tree), groups_(groups), cell_(glm::floor(point)), inCell_(point - glm::floor(point)) {
+    void begin(const WideTree& tree, const TurnedGroup* groups, const glm::dvec3& point, float bound) {
+        tree_ = &tree;
+        groups_ = groups;
+        cell_ = glm::floor(point);
+        inCell_ = glm::vec3(point - glm::floor(point));
         const glm::vec3 size = glm::max(glm::abs(cell_), glm::vec3(tree.size));
         slack_ = placeRounding * (size.x + size.y + size.z);
+        triangle_ = noTriangle;
+        waiting_ = 0;
+        node_ = tree.root();
         lower(bound * bound);
     }
 
-    std::uint32_t run() {
-        std::uint32_t node = tree_.root();
-        for (;;) {
-            if (tree_.isLeaf(node))
-                visit(tree_.leaves[node]);
-            else if (open(groups_[node - tree_.leafCount], node))
-                continue;
-            do {
-                if (waiting_ == 0) return triangle_;
-                --waiting_;
-            } while (gaps_[waiting_] > limit2_);
-            node = nodes_[waiting_];
+    // Looks at the next node; false when there is none left.
+    bool step() {
+        if (!tree_->isLeaf(node_)) {
+            if (open(groups_[node_ - tree_->leafCount])) return true;
+        } else {
+            visit(tree_->leaves[node_]);
         }
+        do {
+            if (waiting_ == 0) return false;
+            --waiting_;
+        } while (gaps_[waiting_] > limit2_);
+        node_ = nodes_[waiting_];
+        return true;
     }
+
+    void fetchNext() const { fetchNode(node_); }
+
+    std::uint32_t triangle() const { return triangle_; }
 
   private:
     // Boxes are rounded, triangles are not.
@@ -59,8 +80,15 @@ class Search {
         limit2_ = limit * limit * roundUp;
     }
 
+    void fetchNode(std::uint32_t node) const {
+        if (tree_->isLeaf(node))
+            fetch(tree_->leaves[node]);
+        else
+            fetch(groups_[node - tree_->leafCount]);
+    }
+
     // Puts those children aside that may hold something nearer, and goes on to the nearest of them.
-    bool open(const TurnedGroup& group, std::uint32_t& node) {
+    bool open(const TurnedGroup& group) {
         const Tag tag;
         alignas(64) float gaps[treeWidth];
         unsigned near = 0;
@@ -88,13 +116,14 @@ class Search {
             gaps_[waiting_] = gaps[other];
             nodes_[waiting_++] = group.firstChild + std::uint32_t(other);
         }
-        node = group.firstChild + std::uint32_t(nearest);
+        node_ = group.firstChild + std::uint32_t(nearest);
         return true;
     }
 
     void visit(const WideLeaf& leaf) {
         const Tag tag;
         alignas(64) float distance2[treeWidth];
+        Vec least = hn::Set(tag, best2_);
         for (std::size_t i = 0; i < treeWidth; i += hn::Lanes(tag)) {
             const auto load = [&](const float* from) { return hn::Load(tag, from + i); };
             // whole voxels first, without rounding
@@ -102,27 +131,63 @@ class Search {
                 return hn::Add(hn::Sub(hn::Set(tag, cell_[k]), load(leaf.cell[k])),
                                hn::Sub(hn::Set(tag, inCell_[k]), load(leaf.corner[k])));
             };
-            hn::Store(measureFromCorner(leaf, load, from(0), from(1), from(2)).distance2, tag, distance2 + i);
+            const Vec measured = measureFromCorner(leaf, load, from(0), from(1), from(2)).distance2;
+            hn::Store(measured, tag, distance2 + i);
+            least = hn::Min(least, measured);
         }
-        const auto nearest = std::size_t(std::min_element(distance2, distance2 + treeWidth) - distance2);
-        if (!(distance2[nearest] <= best2_)) return;
-        if (distance2[nearest] == best2_ && triangle_ != noTriangle) return;
-        triangle_ = leaf.triangles[nearest];
-        lower(distance2[nearest]);
+        const float nearest = hn::GetLane(hn::MinOfLanes(tag, least));
+        if (nearest == best2_ && triangle_ != noTriangle) return;
+        unsigned found = 0;
+        for (std::size_t i = 0; i < treeWidth; i += hn::Lanes(tag))
+            found |= bitsOf(hn::Eq(hn::Load(tag, distance2 + i), hn::Set(tag, nearest))) << i;
+        if (found == 0) return;
+        triangle_ = leaf.triangles[std::countr_zero(found)];
+        lower(nearest);
     }
 
-    const WideTree& tree_;
+    const WideTree* tree_;
     const TurnedGroup* groups_;
     glm::vec3 cell_, inCell_;
-    float slack_ = 0, best2_ = 0, limit2_ = 0;
-    std::uint32_t triangle_ = noTriangle;
-    std::size_t waiting_ = 0;
+    float slack_, best2_, limit2_;
+    std::uint32_t triangle_, node_;
+    std::size_t waiting_;
     float gaps_[mostWaiting];
     std::uint32_t nodes_[mostWaiting];
 };
 
 std::uint32_t searchNearest(const WideTree& tree, const TurnedGroup* groups, const glm::dvec3& point, float bound) {
-    return Search(tree, groups, point, bound).run();
+    Search search;
+    search.begin(tree, groups, point, bound);
+    while (search.step()) {
+    }
+    return search.triangle();
+}
+
+// Many points, some at a time: while memory comes for one, another is looked at.
+void searchAll(const WideTree& tree, const TurnedGroup* groups, const glm::dvec3* points, const float* bounds,
+               std::uint32_t* triangles, std::size_t count) {
+    Search searches[together];
+    std::size_t answers[together], running = 0, next = 0;
+    const auto begin = [&](std::size_t slot) {
+        answers[slot] = next;
+        searches[slot].begin(tree, groups, points[next], bounds[next]);
+        ++next;
+    };
+    while (running < together && next < count) begin(running++);
+    while (running > 0)
+        for (std::size_t slot = 0; slot < running;) {
+            if (searches[slot].step()) {
+                searches[slot++].fetchNext();
+                continue;
+            }
+            triangles[answers[slot]] = searches[slot].triangle();
+            if (next < count) {
+                begin(slot++);
+            } else if (slot != --running) {
+                searches[slot] = searches[running];
+                answers[slot] = answers[running];
+            }
+        }
 }
 
 }  // namespace bilayer::HWY_NAMESPACE
@@ -133,6 +198,7 @@ namespace bilayer {
 namespace {
 
 HWY_EXPORT(searchNearest);
+HWY_EXPORT(searchAll);
 
 /// Thinner than this a triangle has no normal to trust [voxels].
 constexpr double thinnest = 1e-7;
@@ -140,6 +206,8 @@ constexpr double thinnest = 1e-7;
 constexpr double flatness = 1e-10;
 /// As many sizes of the mesh away all its triangles are equally far, to a millionth: points beyond may come as near.
 constexpr double farthest = 1e6;
+/// Points that are taken together; their places fit into the first cache.
+constexpr std::size_t batch = 64;
 
 // A place on an edge, seen from the point that is asked for.
 struct OnEdge {
@@ -170,17 +238,54 @@ MeshTree::MeshTree(Mesh mesh, float voxelSize)
       groups_(makeTurnedGroups(tree_)),
       normals_(mesh_, thinnest * double(voxelSize)) {}
 
-std::uint32_t MeshTree::nearest(const glm::dvec3& point, float bound) const noexcept {
-    glm::dvec3 local = point * perMetre_ - glm::dvec3(tree_.base);
+// In the tree's frame; nothing is found for a negative bound.
+void MeshTree::place(const glm::dvec3& point, glm::dvec3& local, float& bound) const noexcept {
+    local = point * perMetre_ - glm::dvec3(tree_.base);
     const glm::dvec3 size(tree_.size);
     const double far = farthest * (size.x + size.y + size.z), away = glm::distance(local, 0.5 * size);
-    if (!std::isfinite(away) || !(bound >= 0)) return noTriangle;
-    if (away > far) {
-        if (double(bound) < away - far) return noTriangle;
+    const bool beyond = away > far;
+    if (!std::isfinite(away) || !(bound >= 0) || (beyond && double(bound) < away - far)) {
+        local = glm::dvec3(0);
+        bound = -1;
+    } else if (beyond) {
         local = 0.5 * size + (far / away) * (local - 0.5 * size);
         bound = std::numeric_limits<float>::infinity();
     }
-    return HWY_DYNAMIC_DISPATCH(searchNearest)(tree_, groups_.get(), local, bound);
+}
+
+std::uint32_t MeshTree::nearest(const glm::dvec3& point, float bound) const noexcept {
+    glm::dvec3 local;
+    place(point, local, bound);
+    return bound < 0 ? noTriangle : HWY_DYNAMIC_DISPATCH(searchNearest)(tree_, groups_.get(), local, bound);
+}
+
+void MeshTree::nearest(std::span<const glm::dvec3> points, std::span<const float> bounds,
+                       std::span<std::uint32_t> triangles) const noexcept {
+    std::array<glm::dvec3, batch> places;
+    std::array<float, batch> limits;
+    std::array<std::uint32_t, batch> found;
+    std::array<std::size_t, batch> numbers;
+    for (std::size_t begin = 0; begin < points.size(); begin += batch) {
+        std::size_t count = 0;
+        for (std::size_t i = begin; i < std::min(points.size(), begin + batch); ++i) {
+            triangles[i] = noTriangle;
+            limits[count] = bounds[i];
+            place(points[i], places[count], limits[count]);
+            numbers[count] = i;
+            count += limits[count] >= 0;
+        }
+        HWY_DYNAMIC_DISPATCH(searchAll)(tree_, groups_.get(), places.data(), limits.data(), found.data(), count);
+        for (std::size_t i = 0; i < count; ++i) triangles[numbers[i]] = found[i];
+    }
+}
+
+void MeshTree::fetchTriangle(std::uint32_t triangle) const noexcept {
+    hwy::Prefetch(&mesh_.triangles[triangle]);
+    normals_.fetchEdges(triangle);
+}
+
+void MeshTree::fetchCorners(std::uint32_t triangle) const noexcept {
+    for (int i = 0; i < 3; ++i) hwy::Prefetch(&mesh_.points[mesh_.triangles[triangle][i]]);
 }
 
 NearestFeature MeshTree::featureOf(std::uint32_t triangle, const glm::dvec3& point) const noexcept {

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <glm/vec3.hpp>
 #include <memory>
+#include <span>
 
 #include "collider/closest_point.h"
 #include "collider/feature_normals.h"
@@ -39,6 +40,14 @@ class MeshTree {
     /// @param bound  [voxels], may be infinite
     std::uint32_t nearest(const glm::dvec3& point, float bound) const noexcept;
 
+    /// The same for many points, in less time: the three are equally long.
+    void nearest(std::span<const glm::dvec3> points, std::span<const float> bounds,
+                 std::span<std::uint32_t> triangles) const noexcept;
+
+    /// Asks for memory that featureOf() will need: first of the triangle, then, when that is there, of its corners.
+    void fetchTriangle(std::uint32_t triangle) const noexcept;
+    void fetchCorners(std::uint32_t triangle) const noexcept;
+
     /// The feature of a triangle that is closest to a point [m], in double precision.
     NearestFeature featureOf(std::uint32_t triangle, const glm::dvec3& point) const noexcept;
 
@@ -48,6 +57,8 @@ class MeshTree {
     std::size_t memoryBytes() const;
 
   private:
+    void place(const glm::dvec3& point, glm::dvec3& local, float& bound) const noexcept;
+
     Mesh mesh_;
     float voxelSize_;
     double perMetre_;  // voxels

@@ -95,9 +95,15 @@ bool isClear(const Corners& c, const glm::dvec3& place, const ClosestPoint& clai
     return true;
 }
 
+bool same(const ClosestPoint& a, const ClosestPoint& b) {
+    return a.found == b.found && a.distance == b.distance && a.position == b.position && a.normal == b.normal &&
+           a.triangle == b.triangle && a.feature == b.feature && a.index == b.index;
+}
+
 struct Tally {
     double worst = 0, worstFar = 0;  // [voxels], of the distance
-    std::size_t points = 0, features = 0, wrongSigns = 0, wrongFeatures = 0, wrongNormals = 0, wrongPlaces = 0;
+    std::size_t points = 0, features = 0, wrongSigns = 0, wrongFeatures = 0, wrongNormals = 0, wrongPlaces = 0,
+                wrongBatch = 0;
     std::array<std::size_t, 3> kinds{};
 };
 
@@ -129,10 +135,13 @@ Tally check(const Mesh& mesh, float resolution, int count, int normals, unsigned
     const Field field(build(mesh, {.voxelSize = voxelSize}), mesh);
     const Truth truth(mesh);
     const std::vector<glm::vec3> points = pointsAround(mesh, h, count, seed);
+    std::vector<ClosestPoint> batch(points.size());
+    field.closest(points, batch);
     Tally tally;
     for (std::size_t i = 0; i < points.size(); ++i) {
         const glm::dvec3 p(points[i]);
         const ClosestPoint closest = field.closest(points[i]);
+        tally.wrongBatch += !same(closest, batch[i]);
         CAPTURE(i, p.x, p.y, p.z);
         REQUIRE(closest.found);
         const double distance = truth.distance(p), off = std::abs(std::abs(double(closest.distance)) - distance);
@@ -166,6 +175,7 @@ void require(const std::string& name, const Tally& tally) {
     CHECK(tally.wrongFeatures == 0);
     CHECK(tally.wrongNormals == 0);
     CHECK(tally.wrongPlaces == 0);
+    CHECK(tally.wrongBatch == 0);
     CHECK(tally.features > 100);
 }
 
