@@ -5,6 +5,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <limits>
+#include <utility>
 
 #include "collider/field_data.h"
 
@@ -63,6 +64,9 @@ void FieldData::fillLanes() {
 Field::Field(const LevelSet& levelSet, const FieldOptions& options)
     : data_(std::make_shared<FieldData>(levelSet, options.storage)) {}
 
+Field::Field(const LevelSet& levelSet, Mesh mesh, const FieldOptions& options)
+    : data_(std::make_shared<FieldData>(levelSet, std::move(mesh), options.storage)) {}
+
 Clearance Field::clearance() const noexcept {
     return data_->coarse;
 }
@@ -115,9 +119,12 @@ float Field::interiorWidth() const noexcept {
 const Bounds& Field::bounds() const noexcept {
     return data_->bounds;
 }
+const Mesh* Field::mesh() const noexcept {
+    return data_->mesh ? &data_->mesh->mesh() : nullptr;
+}
 
 std::size_t Field::memoryBytes() const noexcept {
-    return data_->memoryBytes();
+    return data_->memoryBytes() + (data_->mesh ? data_->mesh->memoryBytes() : 0);
 }
 
 }  // namespace bilayer

@@ -9,12 +9,24 @@
 #include <glm/common.hpp>
 #include <glm/vec3.hpp>
 #include <limits>
+#include <memory>
 #include <span>
+#include <stdexcept>
+#include <string>
 
+#include "collider/closest_point.h"
+#include "collider/mesh_tree.h"
 #include "sdf/field_layout.h"
 #include "sdf/sample.h"
 
 namespace bilayer {
+
+/// Throws std::invalid_argument if a batch has not as many answers as points.
+inline void requireSameLength(std::size_t points, std::size_t answers, const char* name) {
+    if (points != answers)
+        throw std::invalid_argument(std::to_string(points) + " points need as many " + name + ", not " +
+                                    std::to_string(answers));
+}
 
 struct FieldData;
 
@@ -37,11 +49,15 @@ struct FieldData : FieldLayout {
         : FieldLayout(levelSet, storage), kernels(sampleKernels(storage)), coarse(clearance()) {
         fillLanes();
     }
+    FieldData(const LevelSet& levelSet, Mesh mesh, Storage storage);
     FieldData(const FieldData&) = delete;
     FieldData& operator=(const FieldData&) = delete;
 
     const SampleKernels& kernels;
     const Clearance coarse;
+    std::unique_ptr<const MeshTree> mesh;  ///< null: the field has none
+    bool signedByNormals = false;          ///< of this mesh
+    float error = 0;                       ///< of distances in the band [m]; infinite: not known
 
     /// Bits of a place below the voxel, as many as a float's fraction has, and of a voxel in a block.
     static constexpr int fractionBits = 23, voxelBits = 3;
@@ -82,6 +98,15 @@ struct FieldData : FieldLayout {
     float clearanceAt(const glm::dvec3& local) const {
         return float(Clearance::partSide) * coarse.around(glm::vec3(local) / float(Clearance::partSide));
     }
+
+    /// What the field knows of the side that a point lies on.
+    struct Side {
+        bool inside, certain;
+    };
+    Side sideAt(const glm::dvec3& local, const Sample& here) const;
+    bool isInside(const NearestFeature& nearest, const glm::dvec3& local, const Sample& here) const;
+    float expectedDistance(const Sample& here, float maxDistance) const;
+    ClosestPoint closestOn(std::uint32_t triangle, const glm::vec3& point, const Sample& here, float maxDistance) const;
 
     /// A voxel of a stored block, apron included [m].
     float valueAt(std::size_t index) const {

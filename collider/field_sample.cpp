@@ -13,8 +13,6 @@
 #include <bit>
 #include <cstring>
 #include <glm/geometric.hpp>
-#include <stdexcept>
-#include <string>
 
 #include "collider/field.h"
 #include "collider/field_data.h"
@@ -362,9 +360,7 @@ float Field::distance(const glm::vec3& point) const noexcept {
 }
 
 void Field::sample(std::span<const glm::vec3> points, std::span<Sample> samples) const {
-    if (points.size() != samples.size())
-        throw std::invalid_argument(std::to_string(points.size()) + " points need as many samples, not " +
-                                    std::to_string(samples.size()));
+    requireSameLength(points.size(), samples.size(), "samples");
     data_->kernels.sampleMany(*data_, points, samples.data());
 }
 

@@ -5,6 +5,7 @@
 #include <hwy/cache_control.h>
 #include <oneapi/tbb/enumerable_thread_specific.h>
 #include <oneapi/tbb/parallel_for.h>
+#include <oneapi/tbb/parallel_invoke.h>
 
 #include <algorithm>
 #include <array>
@@ -241,6 +242,60 @@ std::vector<std::uint64_t> sortedKeys(Parts& parts, const glm::ivec3& size, Prog
     return keys;
 }
 
+// Puts parts into an order of their own: halves by the middle of the longest side of where they are, those halved
+// again, and so on, each in full groups as the tree has them.
+class Splitter {
+  public:
+    Splitter(const Parts& parts, std::vector<std::uint64_t>& keys, Progress* progress)
+        : keys_(keys), items_(vectorOf<Item>(keys.size(), progress)), progress_(progress) {
+        forAll(keys.size(), progress, [&](std::size_t i) {
+            const Corners c = parts.corners(std::size_t(keys[i] & indexMask));
+            items_[i] = {glm::vec3(c[0] + c[1] + c[2]), std::uint32_t(keys[i] & indexMask)};
+        });
+    }
+
+    void sort() {
+        std::size_t size = treeWidth;  // parts of a child
+        while (size * treeWidth < items_.size()) size *= treeWidth;
+        split(0, items_.size(), size);
+        forAll(keys_.size(), progress_, [&](std::size_t i) { keys_[i] = items_[i].part; });
+    }
+
+  private:
+    struct Item {
+        glm::vec3 place;
+        std::uint32_t part;
+    };
+
+    void split(std::size_t begin, std::size_t end, std::size_t size) {
+        while (end - begin <= size) {
+            if (size == treeWidth) return;
+            size /= treeWidth;
+        }
+        poll(progress_);
+        const std::size_t children = (end - begin + size - 1) / size, middle = begin + (children + 1) / 2 * size;
+        glm::vec3 lower(std::numeric_limits<float>::infinity()), upper(-lower);
+        for (std::size_t i = begin; i < end; ++i)
+            lower = glm::min(lower, items_[i].place), upper = glm::max(upper, items_[i].place);
+        const glm::vec3 sides = upper - lower;
+        const int axis = sides.x >= sides.y && sides.x >= sides.z ? 0 : sides.y >= sides.z ? 1 : 2;
+        const auto at = [&](std::size_t i) { return items_.begin() + std::ptrdiff_t(i); };
+        std::nth_element(at(begin), at(middle), at(end), [axis](const Item& a, const Item& b) {
+            return a.place[axis] < b.place[axis] || (a.place[axis] == b.place[axis] && a.part < b.part);
+        });
+        const auto left = [&] { split(begin, middle, size); };
+        const auto right = [&] { split(middle, end, size); };
+        if (end - begin > runLength)
+            tbb::parallel_invoke(left, right);
+        else
+            left(), right();
+    }
+
+    std::vector<std::uint64_t>& keys_;
+    std::vector<Item> items_;
+    Progress* progress_;
+};
+
 // A unit vector across `direction`.
 glm::dvec3 across(const glm::dvec3& direction) {
     const glm::dvec3 a = glm::abs(direction);
@@ -360,7 +415,7 @@ std::uint32_t groupsOver(std::uint32_t leaves) {
 
 }  // namespace
 
-WideTree makeWideTree(const Mesh& mesh, float voxelSize, Progress* progress) {
+WideTree makeWideTree(const Mesh& mesh, float voxelSize, Progress* progress, TreeOrder order) {
     if (mesh.triangles.size() >= (std::size_t(1) << indexBits))
         throw std::invalid_argument("the mesh has 2^28 triangles or more");
     const Bounds box = bounds(mesh);
@@ -374,7 +429,8 @@ WideTree makeWideTree(const Mesh& mesh, float voxelSize, Progress* progress) {
     tree.size = glm::ivec3(size);
 
     Parts parts(mesh, base, voxelSize);
-    const std::vector<std::uint64_t> keys = sortedKeys(parts, tree.size, progress);
+    std::vector<std::uint64_t> keys = sortedKeys(parts, tree.size, progress);
+    if (order == TreeOrder::split) Splitter(parts, keys, progress).sort();
     tree.leafCount = std::uint32_t((keys.size() + treeWidth - 1) / treeWidth);
     tree.groupCount = groupsOver(tree.leafCount);
     tree.leaves = std::make_unique_for_overwrite<WideLeaf[]>(tree.leafCount);

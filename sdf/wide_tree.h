@@ -51,11 +51,18 @@ struct WideTree {
     std::uint32_t root() const { return leafCount + groupCount - 1; }
 };
 
+/// How triangles are put into an order, from which the hierarchy follows.
+enum class TreeOrder {
+    hilbert,  ///< along Hilbert's curve: quick to make
+    split,    ///< in halves along the longest side, over and over: boxes overlap less
+};
+
 /// Builds the hierarchy of a valid mesh on all cores; the result does not depend on their number.
 /// @param voxelSize  [m]
 /// @param progress   polled, unless null
 /// Throws std::invalid_argument if the mesh is longer than 2^23 voxels or has more than 2^28 triangles and parts of
 /// halved ones.
-WideTree makeWideTree(const Mesh& mesh, float voxelSize, Progress* progress = nullptr);
+WideTree makeWideTree(const Mesh& mesh, float voxelSize, Progress* progress = nullptr,
+                      TreeOrder order = TreeOrder::hilbert);
 
 }  // namespace bilayer

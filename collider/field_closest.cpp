@@ -1,0 +1,147 @@
+// The field finds, triangles decide: the sampled distance bounds the search in the hierarchy over the mesh, so that
+// little of it is looked at, and the feature that is found is measured in double precision.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <limits>
+#include <memory>
+#include <stdexcept>
+#include <utility>
+
+#include "collider/field.h"
+#include "collider/field_data.h"
+#include "sdf/orient.h"
+#include "sdf/sign.h"
+
+namespace bilayer {
+namespace {
+
+constexpr float infinity = std::numeric_limits<float>::infinity();
+/// What the interpolant seldom exceeds the distance by, so that a second search is seldom needed [voxels].
+constexpr float usualError = 0.1f;
+/// Points that are taken together; what is known of them fits into the first cache.
+constexpr std::size_t batch = 64;
+/// Mean normals below this have cancelled out, and tell no side where they point aside: above the rounding of floats,
+/// below what needles leave at their tips.
+constexpr double cancelled = 1e-6;
+
+// The mesh as build() understood it.
+Mesh meshOf(const LevelSet& levelSet, Mesh mesh) {
+    validate(mesh);
+    if (levelSet.meshHash() != 0 && levelSet.meshHash() != hash(mesh))
+        throw std::invalid_argument("field: the level set is of another mesh");
+    const std::string& reason = levelSet.signReason();
+    if (levelSet.sign() != "normals" || reason == closedAndOriented || reason == asAskedFor) return mesh;
+    return orient(mesh).mesh;
+}
+
+// Of a point over the plane that the normal stands on; the normal may be shorter than 1.
+double heightOver(const NearestFeature& nearest) {
+    return -glm::dot(nearest.normal, nearest.way);
+}
+
+// The normal of a feature, turned around where it points to the other side; where there is none, from the surface to
+// the point or the other way.
+glm::vec3 outwardNormal(const NearestFeature& nearest, bool inside) {
+    const double length = glm::length(nearest.normal), distance = glm::length(nearest.way);
+    if (length > cancelled || distance == 0) {
+        const bool turned = inside ? heightOver(nearest) > 0 : heightOver(nearest) < 0;
+        return length > 0 ? glm::vec3(nearest.normal * ((turned ? -1 : 1) / length)) : glm::vec3(0, 0, 1);
+    }
+    return glm::vec3(nearest.way * ((inside ? 1 : -1) / distance));
+}
+
+}  // namespace
+
+FieldData::FieldData(const LevelSet& levelSet, Mesh given, Storage storage) : FieldData(levelSet, storage) {
+    mesh = std::make_unique<MeshTree>(meshOf(levelSet, std::move(given)), levelSet.voxelSize());
+    signedByNormals = levelSet.sign() == "normals";
+    error =
+        levelSet.errorBound() < infinity ? levelSet.errorBound() + (storage == Storage::fixed16 ? step : 0) : infinity;
+}
+
+// A ball around a voxel that the surface does not reach lies on the voxel's side.
+FieldData::Side FieldData::sideAt(const glm::dvec3& local, const Sample& here) const {
+    const bool inside = here.distance < 0;
+    const glm::dvec3 size = extent();
+    const bool within =
+        local.x >= 0 && local.y >= 0 && local.z >= 0 && local.x < size.x && local.y < size.y && local.z < size.z;
+    if (!within) return {inside, here.distance > error};
+    const glm::ivec3 block = glm::ivec3(local) >> 3;
+    const std::int32_t entry = directory[entryOf(block)];
+    if (entry < 0) return {inside, std::abs(here.distance) > error};
+    const glm::ivec3 corner(local + 0.5), inBlock = corner - 8 * block;
+    const float value =
+        valueAt(std::size_t(entry) * blockFloats + (inBlock.x * stride + inBlock.y) * stride + inBlock.z);
+    const bool certain = glm::distance(local, glm::dvec3(corner)) * voxel < double(std::abs(value) - error);
+    return certain ? Side{value < 0, true} : Side{inside, false};
+}
+
+// How far the triangle that is nearest can be by the field [voxels]: often enough.
+float FieldData::expectedDistance(const Sample& here, float maxDistance) const {
+    return (here.inBand ? std::abs(here.distance) : maxDistance) * float(perMetre) + (here.inBand ? usualError : 0);
+}
+
+// By the normal, where it is the mesh's and tells a side, and no ball of the field knows better.
+bool FieldData::isInside(const NearestFeature& nearest, const glm::dvec3& local, const Sample& here) const {
+    const Side side = sideAt(local, here);
+    const double height = heightOver(nearest);
+    const bool decided = signedByNormals && std::abs(height) > cancelled * glm::length(nearest.way);
+    return side.certain || !decided ? side.inside : height < 0;
+}
+
+// What is known of a point once the triangle is found that is nearest to it, within the distance that was expected.
+ClosestPoint FieldData::closestOn(std::uint32_t triangle, const glm::vec3& point, const Sample& here,
+                                  float maxDistance) const {
+    if (triangle == noTriangle && here.inBand)
+        triangle = mesh->nearest(glm::dvec3(point), maxDistance * float(perMetre));
+    if (triangle == noTriangle) return {};
+    const NearestFeature nearest = mesh->featureOf(triangle, glm::dvec3(point));
+    const double distance = glm::length(nearest.way);
+    if (!(distance <= double(maxDistance))) return {};
+    const bool inside = isInside(nearest, toLocal(point), here);
+    return {.distance = float(inside ? -distance : distance),
+            .position = glm::vec3(glm::dvec3(point) + nearest.way),
+            .normal = outwardNormal(nearest, inside),
+            .triangle = triangle,
+            .feature = nearest.feature,
+            .index = nearest.index,
+            .found = true};
+}
+
+ClosestPoint Field::closest(const glm::vec3& point, float maxDistance) const noexcept {
+    if (!data_->mesh) return {};
+    const Sample here = data_->sample(data_->toLocal(point), -infinity);
+    const float bound = data_->expectedDistance(here, maxDistance);
+    return data_->closestOn(data_->mesh->nearest(glm::dvec3(point), bound), point, here, maxDistance);
+}
+
+// Step by step for some points at a time, so that memory is asked for well ahead of its use.
+void Field::closest(std::span<const glm::vec3> points, std::span<ClosestPoint> answers, float maxDistance) const {
+    requireSameLength(points.size(), answers.size(), "answers");
+    if (!data_->mesh) return std::fill(answers.begin(), answers.end(), ClosestPoint{});
+    const MeshTree& mesh = *data_->mesh;
+    std::array<glm::dvec3, batch> places;
+    std::array<Sample, batch> samples;
+    std::array<float, batch> bounds;
+    std::array<std::uint32_t, batch> triangles;
+    for (std::size_t begin = 0; begin < points.size(); begin += batch) {
+        const std::size_t count = std::min(batch, points.size() - begin);
+        data_->kernels.sampleMany(*data_, points.subspan(begin, count), samples.data());
+        for (std::size_t i = 0; i < count; ++i) {
+            places[i] = glm::dvec3(points[begin + i]);
+            bounds[i] = data_->expectedDistance(samples[i], maxDistance);
+        }
+        mesh.nearest({places.data(), count}, {bounds.data(), count}, {triangles.data(), count});
+        for (std::size_t i = 0; i < count; ++i)
+            if (triangles[i] != noTriangle) mesh.fetchTriangle(triangles[i]);
+        for (std::size_t i = 0; i < count; ++i)
+            if (triangles[i] != noTriangle) mesh.fetchCorners(triangles[i]);
+        for (std::size_t i = 0; i < count; ++i)
+            answers[begin + i] = data_->closestOn(triangles[i], points[begin + i], samples[i], maxDistance);
+    }
+}
+
+}  // namespace bilayer

@@ -1,0 +1,214 @@
+// Closest points against all triangles in double precision.
+#include <oneapi/tbb/parallel_for.h>
+
+#include <array>
+#include <atomic>
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <cstring>
+#include <glm/geometric.hpp>
+#include <glm/gtc/constants.hpp>
+#include <glm/gtc/matrix_transform.hpp>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "collider/field.h"
+#include "demos/shared/shapes.h"
+#include "sdf/build.h"
+#include "sdf/mesh_io.h"
+#include "tests/support/analytic.h"
+#include "tests/support/support.h"
+#include "tests/support/truth.h"
+
+using namespace bilayer;
+using namespace bilayer::test;
+
+namespace {
+
+constexpr float infinity = std::numeric_limits<float>::infinity();
+constexpr double tolerance = 1e-5;     // of distances up to ten voxels away [voxels]
+constexpr double farTolerance = 1e-6;  // of distances farther away, of themselves
+constexpr double samePlace = 1e-4;     // triangles so near to a closest point meet it [voxels]
+
+using Corners = std::array<glm::dvec3, 3>;
+
+Corners cornersOf(const Mesh& mesh, std::size_t triangle) {
+    const glm::uvec3 t = mesh.triangles[triangle];
+    return {glm::dvec3(mesh.points[t.x]), glm::dvec3(mesh.points[t.y]), glm::dvec3(mesh.points[t.z])};
+}
+
+glm::dvec3 normalOf(const Corners& c) {
+    return glm::normalize(glm::cross(c[1] - c[0], c[2] - c[0]));
+}
+
+double distanceToSegment(const glm::dvec3& p, const glm::dvec3& a, const glm::dvec3& b) {
+    return std::sqrt(squaredDistance(p, a, b, b));
+}
+
+// The normal at a place on the surface: the mean of those of all triangles that meet it, weighted by the angles under
+// which they do.
+glm::dvec3 normalAt(const Mesh& mesh, const glm::dvec3& place, double room) {
+    glm::dvec3 sum(0);
+    for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
+        const Corners c = cornersOf(mesh, i);
+        if (squaredDistance(place, c[0], c[1], c[2]) > room * room) continue;
+        double angle = glm::two_pi<double>();
+        for (std::size_t k = 0; k < 3; ++k)
+            if (distanceToSegment(place, c[k], c[(k + 1) % 3]) < room) angle = glm::pi<double>();
+        for (std::size_t k = 0; k < 3; ++k)
+            if (glm::distance(place, c[k]) < room)
+                angle =
+                    std::acos(glm::dot(glm::normalize(c[(k + 1) % 3] - c[k]), glm::normalize(c[(k + 2) % 3] - c[k])));
+        sum += angle * normalOf(c);
+    }
+    return glm::normalize(sum);
+}
+
+// Whether a place on a triangle lies on the feature that is claimed, and on no smaller one.
+bool isFeature(const Corners& c, const glm::dvec3& place, const ClosestPoint& claimed, double room) {
+    std::array<bool, 3> onEdge, onCorner;
+    for (std::size_t k = 0; k < 3; ++k) {
+        onEdge[k] = distanceToSegment(place, c[k], c[(k + 1) % 3]) < room;
+        onCorner[k] = glm::distance(place, c[k]) < room;
+    }
+    const auto count = [](const std::array<bool, 3>& on) { return on[0] + on[1] + on[2]; };
+    switch (claimed.feature) {
+        case Feature::face:
+            return true;  // what is near to an edge may still be beside it
+        case Feature::edge:
+            return onEdge[claimed.index];
+        case Feature::vertex:
+            return onCorner[claimed.index] && count(onCorner) == 1;
+    }
+    return false;
+}
+
+// Whether a place is well within the feature: a little beside it the normal would be the same.
+bool isClear(const Corners& c, const glm::dvec3& place, const ClosestPoint& claimed, double room) {
+    if (claimed.feature == Feature::vertex) return true;
+    for (std::size_t k = 0; k < 3; ++k) {
+        if (glm::distance(place, c[k]) < 2 * room) return false;
+        const bool own = claimed.feature == Feature::edge && k == claimed.index;
+        if (!own && distanceToSegment(place, c[k], c[(k + 1) % 3]) < 2 * room) return false;
+    }
+    return true;
+}
+
+bool same(const ClosestPoint& a, const ClosestPoint& b) {
+    return a.found == b.found && a.distance == b.distance && a.position == b.position && a.normal == b.normal &&
+           a.triangle == b.triangle && a.feature == b.feature && a.index == b.index;
+}
+
+struct Tally {
+    double worst = 0, worstFar = 0;  // [voxels], of the distance
+    std::size_t points = 0, features = 0, wrongSigns = 0, wrongFeatures = 0, wrongNormals = 0, wrongPlaces = 0,
+                wrongBatch = 0;
+    std::array<std::size_t, 3> kinds{};
+};
+
+// Random points: in the band and a little beyond, anywhere in the box, and far away.
+std::vector<glm::vec3> pointsAround(const Mesh& mesh, double h, int count, unsigned seed) {
+    Random random(seed);
+    const Bounds box = bounds(mesh);
+    const auto inBox = [&](double room) {
+        glm::vec3 p;
+        for (int k = 0; k < 3; ++k) p[k] = float(random(double(box.lower[k]) - room, double(box.upper[k]) + room));
+        return p;
+    };
+    std::vector<glm::vec3> points;
+    for (int i = 0; i < count; ++i) {
+        const Corners c = cornersOf(mesh, std::size_t(random(0, double(mesh.triangles.size()) - 0.5)));
+        const double u = random(0, 1), v = random(0, 1 - u);
+        points.push_back(glm::vec3(c[0] + u * (c[1] - c[0]) + v * (c[2] - c[0]) +
+                                   random(-5, 5) * h * glm::dvec3(random.direction())));
+        if (i % 4 == 0) points.push_back(inBox(6 * h));
+        if (i % 20 == 0) points.push_back(inBox(double(box.longestSide()) * std::pow(10, random(0, 4))));
+    }
+    return points;
+}
+
+// The features and normals of the first `normals` points are checked too: that takes all triangles once more.
+Tally check(const Mesh& mesh, float resolution, int count, int normals, unsigned seed) {
+    const float voxelSize = voxelSizeFor(mesh, resolution);
+    const double h = double(voxelSize), room = samePlace * h;
+    const Field field(build(mesh, {.voxelSize = voxelSize}), mesh);
+    const Truth truth(mesh);
+    const std::vector<glm::vec3> points = pointsAround(mesh, h, count, seed);
+    std::vector<ClosestPoint> batch(points.size());
+    field.closest(points, batch);
+    Tally tally;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+        const glm::dvec3 p(points[i]);
+        const ClosestPoint closest = field.closest(points[i]);
+        tally.wrongBatch += !same(closest, batch[i]);
+        CAPTURE(i, p.x, p.y, p.z);
+        REQUIRE(closest.found);
+        const double distance = truth.distance(p), off = std::abs(std::abs(double(closest.distance)) - distance);
+        ++tally.points;
+        double& worst = distance < 10 * h ? tally.worst : tally.worstFar;
+        worst = std::max(worst, distance < 10 * h ? off / h : off / distance);
+        tally.wrongSigns += distance > room && (closest.distance < 0) != (truth.winding(p) > 0);
+        const glm::dvec3 place(closest.position);
+        const Corners c = cornersOf(mesh, closest.triangle);
+        const double rounding = 1e-7 * (glm::length(place) + distance);
+        tally.wrongPlaces += std::abs(glm::distance(p, place) - distance) > tolerance * h + 8 * rounding ||
+                             std::sqrt(squaredDistance(place, c[0], c[1], c[2])) > rounding;
+        ++tally.kinds[std::size_t(closest.feature)];
+        if (distance > 10 * h) continue;
+        tally.wrongFeatures += !isFeature(c, place, closest, room);
+        if (int(tally.features) == normals || !isClear(c, place, closest, room)) continue;
+        const glm::dvec3 normal = normalAt(mesh, place, room);
+        if (!(glm::distance(normal, normalAt(mesh, place, room / 8)) < 1e-6)) continue;  // others are almost as near
+        ++tally.features;
+        tally.wrongNormals += !(glm::distance(glm::dvec3(closest.normal), normal) < 1e-3);
+    }
+    return tally;
+}
+
+void require(const std::string& name, const Tally& tally) {
+    INFO(name << ": " << tally.points << " points, worst " << tally.worst << " voxels, far " << tally.worstFar
+              << ", faces, edges, vertices " << tally.kinds[0] << " " << tally.kinds[1] << " " << tally.kinds[2]);
+    CHECK(tally.worst < tolerance);
+    CHECK(tally.worstFar < farTolerance);
+    CHECK(tally.wrongSigns == 0);
+    CHECK(tally.wrongFeatures == 0);
+    CHECK(tally.wrongNormals == 0);
+    CHECK(tally.wrongPlaces == 0);
+    CHECK(tally.wrongBatch == 0);
+    CHECK(tally.features > 100);
+}
+
+// Lies across the axes, so that nothing is exact by chance.
+Mesh tilted(const Mesh& mesh) {
+    return transformed(mesh, glm::rotate(glm::translate(glm::mat4(1), glm::vec3(0.31f, -0.17f, 0.23f)), 0.7f,
+                                         glm::normalize(glm::vec3(1, 2, 3))));
+}
+
+}  // namespace
+
+TEST_CASE("the closest points of generated shapes are those of all triangles") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    const struct {
+        const char* name;
+        Mesh mesh;
+        float resolution;
+    } cases[] = {
+        {"a box with triangles larger than blocks", tilted(shapes::box({1, 0.8f, 0.6f})), 90},
+        {"a box along the axes", shapes::box({1, 0.8f, 0.6f}), 30},
+        {"a torus", tilted(shapes::torus(1, 0.3f, 48, 24)), 40},
+        {"a sphere with triangles much smaller than voxels", shapes::sphere(1, 4), 10},
+        {"a needle", tilted(shapes::cone(0.01f, 2, 24)), 60},
+        {"a wall thinner than a voxel", tilted(shapes::box({1, 1, 0.003f}, 3)), 50},
+        {"a knot", shapes::torusKnot(2, 3, 1, 0.2f, 120, 12), 50},
+    };
+    for (const auto& one : cases) require(one.name, check(one.mesh, one.resolution, 4000, 1000, seed));
+}
+
+TEST_CASE("the closest points of clean public meshes are those of all triangles") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    for (const char* name : {"fandisk.obj", "spot.obj", "screwdriver_7k.off", "rocker-arm.obj", "bunny_watertight.obj"})
+        if (const auto path = corpusMesh(name)) require(name, check(readMesh(*path), 100, 4000, 300, seed));
+}
