@@ -1,0 +1,47 @@
+// Who answers queries in the comparison: OpenVDB, NanoVDB and Embree beside the field.
+//
+// All are asked in the same way, a stretch of questions at a time, in world coordinates. What a peer needs for itself
+// (an accessor, a stencil) it makes anew for each stretch, so that stretches can run on several threads.
+#pragma once
+
+#include <openvdb/openvdb.h>
+
+#include <functional>
+#include <glm/vec3.hpp>
+#include <span>
+#include <string>
+
+#include "collider/field.h"
+
+namespace bilayer::bench {
+
+/// One who answers: as many answers as questions.
+template <class Question, class Answer>
+struct Peer {
+    std::string name;
+    std::function<void(std::span<const Question>, std::span<Answer>)> answer;
+};
+
+/// Value and gradient of the trilinear interpolant at points [m]. Peers leave Sample::inBand alone.
+using Sampler = Peer<glm::vec3, Sample>;
+
+/// openvdb::tools::BoxSampler for the value, openvdb::math::BoxStencil for the gradient: what the library has for each.
+Sampler openvdbSampler(openvdb::FloatGrid::ConstPtr grid);
+
+/// openvdb::math::BoxStencil for both, with one fetch of eight voxels and an accessor that is not registered: the
+/// quickest that OpenVDB offers.
+Sampler openvdbStencil(openvdb::FloatGrid::ConstPtr grid);
+
+/// A grid of NanoVDB with its trilinear sampler, which fetches eight voxels once for value and gradient.
+class Nanovdb {
+  public:
+    explicit Nanovdb(const openvdb::FloatGrid& grid);
+    std::size_t bytes() const;
+    Sampler sampler() const;
+
+  private:
+    struct Grid;
+    std::shared_ptr<const Grid> grid_;
+};
+
+}  // namespace bilayer::bench
