@@ -6,8 +6,9 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <limits>
+#include <utility>
 
-#include "sdf/field_layout.h"
+#include "collider/field_data.h"
 
 namespace bilayer {
 namespace {
@@ -51,28 +52,6 @@ float interpolationError(const glm::vec3& fraction) {
 }
 
 }  // namespace
-
-struct Field::Data : FieldLayout {
-    using FieldLayout::FieldLayout;
-
-    // Points are in voxels from the directory's first one, in double: exact enough however far the mesh is from the
-    // origin.
-    glm::dvec3 toLocal(const glm::vec3& point) const { return (glm::dvec3(point) - origin) * perMetre; }
-    glm::vec3 toWorld(const glm::dvec3& local) const { return glm::vec3(local * voxel + origin); }
-    glm::dvec3 extent() const { return double(side) * glm::dvec3(blocks); }
-
-    Sample sample(const glm::dvec3& local, float gradientReach) const;
-    float distance(const glm::dvec3& local) const { return sample(local, -infinity).distance; }
-    float boundOutside(const glm::dvec3& local) const;
-    float boundInEmptyBlock(bool inside, const glm::dvec3& local, const glm::ivec3& block) const;
-    Clearance clearance() const { return {clearances.data(), parts()}; }
-    // [voxels]
-    float clearanceAt(const glm::dvec3& local) const {
-        return float(Clearance::partSide) * clearance().around(glm::vec3(local) / float(Clearance::partSide));
-    }
-    double crossing(const glm::dvec3& start, const glm::dvec3& direction, double outside, double inside) const;
-    std::optional<double> trace(const glm::dvec3& start, const glm::dvec3& direction, double length) const;
-};
 
 // With the gradient where the distance is no more than some length.
 Sample Field::Data::sample(const glm::dvec3& local, float gradientReach) const {
@@ -154,6 +133,8 @@ std::optional<double> Field::Data::trace(const glm::dvec3& start, const glm::dve
 
 Field::Field(const LevelSet& levelSet) : data_(std::make_shared<Data>(levelSet)) {}
 
+Field::Field(const LevelSet& levelSet, Mesh mesh) : data_(std::make_shared<Data>(levelSet, std::move(mesh))) {}
+
 Sample Field::sample(const glm::vec3& point) const noexcept {
     return data_->sample(data_->toLocal(point), infinity);
 }
@@ -218,11 +199,14 @@ float Field::interiorWidth() const noexcept {
 const Bounds& Field::bounds() const noexcept {
     return data_->bounds;
 }
+const Mesh* Field::mesh() const noexcept {
+    return data_->mesh ? &data_->mesh->mesh() : nullptr;
+}
 
 std::size_t Field::memoryBytes() const noexcept {
     return sizeof(Data) + data_->directory.size() * sizeof(std::int32_t) +
            data_->clearances.size() * sizeof(Clearance::Part) +
-           data_->stored * FieldLayout::blockFloats * sizeof(float);
+           data_->stored * FieldLayout::blockFloats * sizeof(float) + (data_->mesh ? data_->mesh->memoryBytes() : 0);
 }
 
 }  // namespace bilayer

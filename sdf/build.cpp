@@ -46,7 +46,6 @@ constexpr double mostBricks = double(1u << 28);
 constexpr double bytesPerTriangle = 60, bytesPerBlock = 2300;
 /// Of more moved triangles than this part of all, the field is built in full: little would be left to copy.
 constexpr double mostMoved = 0.5;
-constexpr const char* asAskedFor = "as asked for";
 /// What exact methods promise [voxels]; it is ten times what was ever seen.
 constexpr float exactError = 1e-4f;
 /// No point of a triangle is farther from a sample than this times the root of epsilon: samples stand no farther apart.

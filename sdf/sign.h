@@ -26,6 +26,8 @@ struct SignChoice {
 
 /// The reason of a choice that took no more than balanced().
 inline constexpr const char* closedAndOriented = "closed and oriented";
+/// The reason of a way that the user chose.
+inline constexpr const char* asAskedFor = "as asked for";
 
 /// What Sign::automatic picks. `normals` as they stand for a balanced mesh, which is all that it asks first and takes
 /// milliseconds; else the mesh is oriented: `normals` if that closes it, `winding` if winding numbers tell the two

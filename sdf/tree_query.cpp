@@ -13,16 +13,12 @@
 #include <limits>
 
 #include "sdf/blocks.h"
+#include "sdf/leaf_measure.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace bilayer::HWY_NAMESPACE {
-namespace hn = hwy::HWY_NAMESPACE;
-
-using Tag = hn::CappedTag<float, treeWidth>;
 using IndexTag = hn::RebindToUnsigned<Tag>;
 using NumberTag = hn::RebindToSigned<Tag>;
-using Vec = hn::Vec<Tag>;
-using Mask = hn::Mask<Tag>;
 
 /// Triangles whose distances differ by less may share the closest point: more than floats blur [voxels].
 constexpr float tie = 1e-5f;
@@ -37,18 +33,6 @@ constexpr int path[8][3] = {{0, 0, 0}, {0, 0, 1}, {0, 1, 1}, {0, 1, 0}, {1, 1, 0
 /// The eight voxels of a cube are measured together against no more triangles than this: with more it is quicker to let
 /// each choose its own. Cubes with more nodes around them have more.
 constexpr std::size_t mostTogether = 64, mostNodes = 16;
-/// Room for the rounding of a squared distance.
-constexpr float roundUp = 1 + 1e-6f;
-
-inline Vec square(Vec x) {
-    return hn::Mul(x, x);
-}
-
-inline unsigned bitsOf(Mask mask) {
-    std::uint8_t bits[8] = {};
-    hn::StoreMaskBits(Tag(), mask, bits);
-    return bits[0];
-}
 
 // The squared distances of eight boxes, or as many as a vector holds, from a box of voxels.
 inline Vec boxDistance2(const float* const lower[3], const float* const upper[3], std::size_t i,
@@ -123,51 +107,6 @@ void narrowList(const WideTree& tree, const NodeList& from, const VoxelBox& voxe
     const Boxes boxes(from);
     for (std::size_t i = 0; i < from.count; i += hn::Lanes(tag))
         narrowing.take(boxes, i, hn::LoadU(IndexTag(), from.nodes.data() + i), hn::FirstN(tag, from.count - i));
-}
-
-// Adds the square of what a place on an edge's line lies beyond the edge.
-inline Vec beyond2(Vec place, Vec length) {
-    const Vec zero = hn::Zero(Tag());
-    return square(hn::Max(hn::Max(hn::Neg(place), hn::Sub(place, length)), zero));
-}
-
-// Squared distances, and heights over triangles; 0 beside them.
-struct Measured {
-    Vec distance2, height;
-};
-
-// Measures points against triangles, a pair a lane; load() takes a lane's triangle from an array of a leaf. The
-// distance along the plane is the least over the three edges of how far the point lies beside and beyond them; over the
-// triangle itself only the latter counts, which is zero for one edge at least, so that rounding can not take a sliver's
-// line for its inside.
-template <class Load>
-inline Measured measure(const WideLeaf& leaf, Load load, Vec px, Vec py, Vec pz) {
-    const Tag tag;
-    const auto dot = [&](Vec ax, Vec ay, Vec az, Vec bx, Vec by, Vec bz) {
-        return hn::Add(hn::Add(hn::Mul(ax, bx), hn::Mul(ay, by)), hn::Mul(az, bz));
-    };
-    const auto det = [&](Vec a, Vec b, Vec c, Vec d) { return hn::Sub(hn::Mul(a, d), hn::Mul(b, c)); };
-    const Vec qx = hn::Sub(hn::Sub(px, load(leaf.cell[0])), load(leaf.corner[0]));
-    const Vec qy = hn::Sub(hn::Sub(py, load(leaf.cell[1])), load(leaf.corner[1]));
-    const Vec qz = hn::Sub(hn::Sub(pz, load(leaf.cell[2])), load(leaf.corner[2]));
-    const Vec nx = load(leaf.normal[0]), ny = load(leaf.normal[1]), nz = load(leaf.normal[2]);
-    const Vec ax = load(leaf.along[0]), ay = load(leaf.along[1]), az = load(leaf.along[2]);
-    const Vec x = dot(qx, qy, qz, ax, ay, az), z = dot(qx, qy, qz, nx, ny, nz);
-    const Vec y = dot(qx, qy, qz, det(ny, nz, ay, az), det(nz, nx, az, ax), det(nx, ny, ax, ay));
-
-    const Vec ab = load(leaf.lengthAB), fromB = hn::Sub(x, ab);
-    const Vec bcx = load(leaf.directionBC[0]), bcy = load(leaf.directionBC[1]);
-    const Vec acx = load(leaf.directionAC[0]), acy = load(leaf.directionAC[1]);
-    const Vec besideBC = det(bcx, bcy, fromB, y), besideAC = det(x, y, acx, acy);
-    const Vec alongBC = hn::Add(hn::Mul(fromB, bcx), hn::Mul(y, bcy));
-    const Vec alongAC = hn::Add(hn::Mul(x, acx), hn::Mul(y, acy));
-    const Mask over = hn::Gt(hn::Min(y, hn::Min(besideBC, besideAC)), hn::Zero(tag));
-    const auto edge = [&](Vec beside, Vec along, Vec length) {
-        return hn::Add(beyond2(along, length), hn::IfThenZeroElse(over, square(beside)));
-    };
-    const Vec flat2 = hn::Min(edge(y, x, ab), hn::Min(edge(besideBC, alongBC, load(leaf.lengthBC)),
-                                                      edge(besideAC, alongAC, load(leaf.lengthAC))));
-    return {hn::Add(flat2, square(z)), hn::IfThenElseZero(over, z)};
 }
 
 // The range of a voxel's heights over the triangles around its closest point. It lies on a side that all of them agree
