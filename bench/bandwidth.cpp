@@ -2,10 +2,11 @@
 
 #include <sys/mman.h>
 
-#include <bit>
+#include <algorithm>
 #include <cstdint>
 #include <cstdlib>
 #include <cstring>
+#include <glm/vec3.hpp>
 #include <memory>
 #include <new>
 #include <vector>
@@ -76,6 +77,28 @@ double randomLines(std::size_t bytes, int threads) {
         }
         sink = sum;
     });
+}
+
+Touched linesTouched(const FieldLayout& field, std::span<const glm::vec3> points) {
+    constexpr int stride = FieldLayout::stride;
+    std::vector<std::uintptr_t> all;
+    std::size_t each = 0;
+    for (const glm::vec3& point : points) {
+        const glm::ivec3 voxel((glm::dvec3(point) - field.origin) * field.perMetre), inBlock = voxel & 7;
+        const std::int32_t& block = field.directory[field.entryOf(voxel >> 3)];
+        const float* const first = field.values.get() + std::size_t(block) * FieldLayout::blockFloats +
+                                   (inBlock.x * stride + inBlock.y) * stride + inBlock.z;
+        std::vector<std::uintptr_t> lines{reinterpret_cast<std::uintptr_t>(&block) / cacheLine};
+        for (const int row : {0, stride, stride * stride, stride * stride + stride})
+            for (const int z : {0, 1}) lines.push_back(reinterpret_cast<std::uintptr_t>(first + row + z) / cacheLine);
+        std::sort(lines.begin(), lines.end());
+        lines.erase(std::unique(lines.begin(), lines.end()), lines.end());
+        each += lines.size();
+        all.insert(all.end(), lines.begin(), lines.end());
+    }
+    std::sort(all.begin(), all.end());
+    const auto distinct = std::unique(all.begin(), all.end()) - all.begin();
+    return {double(each) / double(points.size()), double(distinct) / double(points.size())};
 }
 
 }  // namespace bilayer::bench

@@ -4,6 +4,7 @@
 #include <nanovdb/util/SampleFromVoxels.h>
 #include <openvdb/math/Stencils.h>
 #include <openvdb/tools/Interpolation.h>
+#include <openvdb/tools/RayIntersector.h>
 
 namespace bilayer::bench {
 namespace {
@@ -45,6 +46,24 @@ Sampler openvdbStencil(openvdb::FloatGrid::ConstPtr grid) {
                     const openvdb::Vec3d at = toVoxels(points[i], perMetre);
                     stencil.moveTo(at);
                     samples[i] = {.distance = stencil.interpolation(at), .gradient = toGlm(stencil.gradient(at))};
+                }
+            }};
+}
+
+RayCaster openvdbRays(openvdb::FloatGrid::ConstPtr grid) {
+    return {"OpenVDB LevelSetRayIntersector", [grid](std::span<const Ray> rays, std::span<RayHit> hits) {
+                using Intersector = openvdb::tools::LevelSetRayIntersector<openvdb::FloatGrid>;
+                const Intersector intersector(*grid);
+                for (std::size_t i = 0; i < rays.size(); ++i) {
+                    const auto& [from, along, length] = rays[i];
+                    const Intersector::RayType ray({from.x, from.y, from.z}, {along.x, along.y, along.z}, 0, length);
+                    openvdb::Vec3d position, normal;
+                    double distance = 0;
+                    const bool hit = intersector.intersectsWS(ray, position, normal, distance);
+                    hits[i] = hit ? RayHit{.distance = float(distance),
+                                           .position = toGlm(openvdb::Vec3s(position)),
+                                           .normal = toGlm(openvdb::Vec3s(normal))}
+                                  : missed;
                 }
             }};
 }

@@ -8,6 +8,8 @@
 
 #include <functional>
 #include <glm/vec3.hpp>
+#include <limits>
+#include <memory>
 #include <span>
 #include <string>
 
@@ -25,12 +27,30 @@ struct Peer {
 /// Value and gradient of the trilinear interpolant at points [m]. Peers leave Sample::inBand alone.
 using Sampler = Peer<glm::vec3, Sample>;
 
+/// Closest points of the surface [m].
+using Closest = Peer<glm::vec3, ClosestPoint>;
+
+/// A ray, its direction of unit length [m].
+struct Ray {
+    glm::vec3 origin, direction;
+    float maxDistance;
+};
+
+/// The answer to a ray that meets nothing.
+inline constexpr RayHit missed{.distance = std::numeric_limits<float>::infinity()};
+
+/// Where rays meet the surface first.
+using RayCaster = Peer<Ray, RayHit>;
+
 /// openvdb::tools::BoxSampler for the value, openvdb::math::BoxStencil for the gradient: what the library has for each.
 Sampler openvdbSampler(openvdb::FloatGrid::ConstPtr grid);
 
 /// openvdb::math::BoxStencil for both, with one fetch of eight voxels and an accessor that is not registered: the
 /// quickest that OpenVDB offers.
 Sampler openvdbStencil(openvdb::FloatGrid::ConstPtr grid);
+
+/// openvdb::tools::LevelSetRayIntersector with position, normal and distance: crossings of the interpolant.
+RayCaster openvdbRays(openvdb::FloatGrid::ConstPtr grid);
 
 /// A grid of NanoVDB with its trilinear sampler, which fetches eight voxels once for value and gradient.
 class Nanovdb {
