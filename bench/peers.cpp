@@ -9,6 +9,8 @@
 namespace bilayer::bench {
 namespace {
 
+using Trilinear = nanovdb::TrilinearSampler<nanovdb::DefaultReadAccessor<float>>;
+
 glm::vec3 toGlm(const openvdb::Vec3s& v) {
     return {v.x(), v.y(), v.z()};
 }
@@ -46,6 +48,24 @@ Sampler openvdbStencil(openvdb::FloatGrid::ConstPtr grid) {
                     const openvdb::Vec3d at = toVoxels(points[i], perMetre);
                     stencil.moveTo(at);
                     samples[i] = {.distance = stencil.interpolation(at), .gradient = toGlm(stencil.gradient(at))};
+                }
+            }};
+}
+
+Sampler openvdbCell(openvdb::FloatGrid::ConstPtr grid) {
+    return {"OpenVDB, eight voxels by hand", [grid](std::span<const glm::vec3> points, std::span<Sample> samples) {
+                const double perMetre = voxelsPerMetre(*grid);
+                const auto accessor = grid->getConstUnsafeAccessor();
+                for (std::size_t i = 0; i < points.size(); ++i) {
+                    const openvdb::Vec3d at = toVoxels(points[i], perMetre);
+                    const openvdb::Coord voxel = openvdb::Coord::floor(at);
+                    float values[2][2][2];
+                    openvdb::tools::BoxSampler::getValues(values, accessor, voxel);
+                    const openvdb::Vec3s in(at - voxel.asVec3d());
+                    const nanovdb::Vec3f place(in.x(), in.y(), in.z());
+                    const nanovdb::Vec3f gradient = Trilinear::gradient(place, values);
+                    samples[i] = {.distance = Trilinear::sample(place, values),
+                                  .gradient = glm::vec3(gradient[0], gradient[1], gradient[2]) * float(perMetre)};
                 }
             }};
 }

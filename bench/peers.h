@@ -45,9 +45,13 @@ using RayCaster = Peer<Ray, RayHit>;
 /// openvdb::tools::BoxSampler for the value, openvdb::math::BoxStencil for the gradient: what the library has for each.
 Sampler openvdbSampler(openvdb::FloatGrid::ConstPtr grid);
 
-/// openvdb::math::BoxStencil for both, with one fetch of eight voxels and an accessor that is not registered: the
-/// quickest that OpenVDB offers.
+/// openvdb::math::BoxStencil for both, with one fetch of eight voxels.
 Sampler openvdbStencil(openvdb::FloatGrid::ConstPtr grid);
+
+/// One fetch of eight voxels by BoxSampler::getValues, and no more than the arithmetic of value and gradient, which is
+/// NanoVDB's: the most that can be made of OpenVDB's tree. BoxStencil's gradient takes a shared pointer to the grid's
+/// map each time, and two threads that do so wait for each other.
+Sampler openvdbCell(openvdb::FloatGrid::ConstPtr grid);
 
 /// openvdb::tools::LevelSetRayIntersector with position, normal and distance: crossings of the interpolant.
 RayCaster openvdbRays(openvdb::FloatGrid::ConstPtr grid);

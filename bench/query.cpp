@@ -209,7 +209,8 @@ nlohmann::json compare(const Source& source, float resolution, const Options& op
     const float voxelSize = levelSet.voxelSize();
     const auto points = pointsInBand(field, levelSet, options.points, options.seed);
     const auto samples = contest<glm::vec3, Sample>(
-        "Value and gradient", {openvdbSampler(grid), openvdbStencil(grid), nanovdb.sampler(), singleSamples(field)},
+        "Value and gradient",
+        {openvdbSampler(grid), openvdbStencil(grid), openvdbCell(grid), nanovdb.sampler(), singleSamples(field)},
         points, voxelSize, options);
     const nlohmann::json floor = floors(levelSet, field.memoryBytes(), points, options);
     const auto nearest = contest<glm::vec3, ClosestPoint>(
