@@ -61,10 +61,10 @@ struct Embree::Scene {
     RTCScene scene = rtcNewScene(device);
     std::vector<Corners> triangles;  // together, for the callback
 
-    explicit Scene(const Mesh& mesh) {
+    Scene(const Mesh& mesh, bool robust) {
         for (const glm::uvec3& t : mesh.triangles)
             triangles.push_back({mesh.points[t.x], mesh.points[t.y], mesh.points[t.z]});
-        rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
+        rtcSetSceneFlags(scene, robust ? RTC_SCENE_FLAG_ROBUST : RTC_SCENE_FLAG_NONE);
         rtcSetSceneBuildQuality(scene, RTC_BUILD_QUALITY_HIGH);
         const RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
         void* const points = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
@@ -89,7 +89,7 @@ struct Embree::Scene {
     }
 };
 
-Embree::Embree(const Mesh& mesh) : scene_(std::make_shared<const Scene>(mesh)) {}
+Embree::Embree(const Mesh& mesh, bool robust) : scene_(std::make_shared<const Scene>(mesh, robust)) {}
 
 Closest Embree::closest(const std::string& name, float radius) const {
     return {name, [radius, scene = scene_](std::span<const glm::vec3> points, std::span<ClosestPoint> answers) {

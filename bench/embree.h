@@ -10,13 +10,14 @@ namespace bilayer::bench {
 
 class Embree {
   public:
-    explicit Embree(const Mesh& mesh);
+    /// @param robust  rays miss no edge between triangles, and take longer
+    Embree(const Mesh& mesh, bool robust);
 
     /// rtcPointQuery: the closest point of the mesh. The distance has no sign, and no normal is told.
     /// @param radius  how far it looks [m], may be infinite
     Closest closest(const std::string& name, float radius) const;
 
-    /// rtcIntersect1 in a robust scene: the first triangle along a ray, from either side.
+    /// rtcIntersect1: the first triangle along a ray, from either side.
     RayCaster rays() const;
 
   private:

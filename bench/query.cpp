@@ -194,7 +194,7 @@ nlohmann::json compare(const Source& source, float resolution, const Options& op
     const Field field(levelSet), withMesh(levelSet, scene.mesh);
     const auto grid = levelSet.grids().distance;
     const Nanovdb nanovdb(*grid);
-    const Embree embree(scene.mesh);
+    const Embree embree(scene.mesh, false), robust(scene.mesh, true);
     const double buildSeconds = medianSeconds(options.rounds, [&] { build(scene.mesh, how); });
     const double layoutSeconds = medianSeconds(options.rounds, [&] { Field again(levelSet); });
     const double meshSeconds = medianSeconds(options.rounds, [&] { Field again(levelSet, scene.mesh); });
@@ -219,7 +219,7 @@ nlohmann::json compare(const Source& source, float resolution, const Options& op
          embree.closest("Embree rtcPointQuery, no farther than the band", options.halfWidth * voxelSize),
          singleClosest(withMesh), batchedClosest(withMesh)},
         pointsInBand(field, levelSet, options.others, options.seed), voxelSize, options);
-    const auto rays = contest<Ray, RayHit>("Rays", {embree.rays(), openvdbRays(grid), singleRays(field)},
+    const auto rays = contest<Ray, RayHit>("Rays", {robust.rays(), openvdbRays(grid), singleRays(field)},
                                            raysOnto(field, options.others, options.seed), voxelSize, options);
     return {{"mesh", scene.name},
             {"resolution", resolution},

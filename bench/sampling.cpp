@@ -96,19 +96,20 @@ glm::dvec3 gradientOf(const Distance& distance, const glm::dvec3& point, double 
 // Evenly over the band less a voxel.
 std::vector<Place> places(const LevelSet& levelSet, const Distance& distance, const Options& options) {
     const openvdb::FloatGrid& grid = *levelSet.grids().distance;
-    std::vector<glm::dvec3> leaves;
+    std::vector<glm::vec3> leaves;
     for (auto leaf = grid.tree().cbeginLeaf(); leaf; ++leaf)
         leaves.emplace_back(leaf->origin().x(), leaf->origin().y(), leaf->origin().z());
     const double voxel = grid.voxelSize()[0], reach = (double(options.halfWidth) - 1) * voxel;
+    // points are made in single precision: GCC 12 leaves out the rounding of a double to a float and back
     std::vector<Place> result(options.points);
     tbb::parallel_for(std::size_t(0), result.size(), [&](std::size_t i) {
         std::seed_seq seeds{options.seed, unsigned(i)};
         std::mt19937 engine(seeds);
         std::uniform_int_distribution<std::size_t> anyLeaf(0, leaves.size() - 1);
-        std::uniform_real_distribution<double> anyPlace(-0.5, 7.5);
+        std::uniform_real_distribution<float> anyPlace(-0.5f, 7.5f);
         do {
-            const double x = anyPlace(engine), y = anyPlace(engine), z = anyPlace(engine);
-            result[i].point = glm::vec3(voxel * (leaves[anyLeaf(engine)] + glm::dvec3(x, y, z)));
+            const float x = anyPlace(engine), y = anyPlace(engine), z = anyPlace(engine);
+            result[i].point = levelSet.voxelSize() * (leaves[anyLeaf(engine)] + glm::vec3(x, y, z));
             result[i].distance = distance(result[i].point);
         } while (std::abs(result[i].distance) >= reach);
         result[i].gradient = gradientOf(distance, result[i].point, differenceStep * voxel);
