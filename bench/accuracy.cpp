@@ -14,6 +14,7 @@
 #include <optional>
 #include <set>
 
+#include "bench/program.h"
 #include "cl/filler.h"
 #include "sdf/build.h"
 #include "sdf/grids.h"
@@ -324,10 +325,5 @@ int run(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
-    try {
-        return run(argc, argv);
-    } catch (const std::exception& error) {
-        fmt::print(stderr, "bench_accuracy: {}\n", error.what());
-        return 1;
-    }
+    return bench::program("accuracy", run, argc, argv);
 }

@@ -12,6 +12,7 @@
 
 #include "bench/builders.h"
 #include "bench/measure.h"
+#include "bench/program.h"
 #include "sdf/double_layer.h"
 
 using namespace bilayer;
@@ -270,10 +271,5 @@ int run(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
-    try {
-        return run(argc, argv);
-    } catch (const std::exception& error) {
-        fmt::print(stderr, "bench build: {}\n", error.what());
-        return 1;
-    }
+    return bench::program("build", run, argc, argv);
 }

@@ -11,6 +11,7 @@
 #include <glm/geometric.hpp>
 #include <nlohmann/json.hpp>
 
+#include "bench/program.h"
 #include "sdf/build.h"
 #include "sdf/grids.h"
 #include "sdf/inspect.h"
@@ -270,10 +271,5 @@ int run(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
-    try {
-        return run(argc, argv);
-    } catch (const std::exception& error) {
-        fmt::print(stderr, "bench_corpus: {}\n", error.what());
-        return 1;
-    }
+    return bench::program("corpus", run, argc, argv);
 }

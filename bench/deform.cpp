@@ -11,6 +11,7 @@
 
 #include "bench/builders.h"
 #include "bench/measure.h"
+#include "bench/program.h"
 #include "demos/shared/shapes.h"
 #include "sdf/build.h"
 
@@ -172,10 +173,5 @@ int run(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
-    try {
-        return run(argc, argv);
-    } catch (const std::exception& error) {
-        fmt::print(stderr, "bench deform: {}\n", error.what());
-        return 1;
-    }
+    return bench::program("deform", run, argc, argv);
 }

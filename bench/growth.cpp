@@ -8,6 +8,7 @@
 #include "bench/builders.h"
 #include "bench/measure.h"
 #include "bench/plot.h"
+#include "bench/program.h"
 #include "demos/shared/shapes.h"
 
 using namespace bilayer;
@@ -118,10 +119,5 @@ int run(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
-    try {
-        return run(argc, argv);
-    } catch (const std::exception& error) {
-        fmt::print(stderr, "bench growth: {}\n", error.what());
-        return 1;
-    }
+    return bench::program("growth", run, argc, argv);
 }

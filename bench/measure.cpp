@@ -11,6 +11,7 @@
 #include <fstream>
 #include <limits>
 #include <stdexcept>
+#include <thread>
 
 #include "sdf/grids.h"
 
@@ -117,6 +118,12 @@ double logSlope(const std::vector<double>& x, const std::vector<double>& y) {
         xy += (std::log(x[i]) - mx) * (std::log(y[i]) - my);
     }
     return xy / xx;
+}
+
+void onThreads(int threads, const std::function<void(int)>& work) {
+    std::vector<std::jthread> others;
+    for (int thread = 1; thread < threads; ++thread) others.emplace_back(work, thread);
+    work(0);
 }
 
 Difference difference(const LevelSet& a, const LevelSet& b) {

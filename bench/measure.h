@@ -37,6 +37,9 @@ double geometricMean(const std::vector<double>& values);
 /// The slope of the line through (log x, log y) that fits best: y grows with x to this power. NaN below two points.
 double logSlope(const std::vector<double>& x, const std::vector<double>& y);
 
+/// Runs work(0) ... work(threads - 1) at once, each on a thread of its own but the first, and waits for all.
+void onThreads(int threads, const std::function<void(int)>& work);
+
 /// How two fields of the same mesh differ.
 struct Difference {
     std::uint64_t voxels = 0;  ///< active in one of them only

@@ -15,6 +15,7 @@
 
 #include "bench/builders.h"
 #include "bench/measure.h"
+#include "bench/program.h"
 #include "cl/filler.h"
 #include "sdf/double_layer.h"
 
@@ -327,10 +328,5 @@ int run(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
-    try {
-        return run(argc, argv);
-    } catch (const std::exception& error) {
-        fmt::print(stderr, "bench opencl: {}\n", error.what());
-        return 1;
-    }
+    return bench::program("opencl", run, argc, argv);
 }

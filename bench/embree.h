@@ -1,0 +1,28 @@
+// Embree on the triangles of a mesh: the exact peer of closest points and rays.
+#pragma once
+
+#include <memory>
+
+#include "bench/peers.h"
+#include "sdf/mesh.h"
+
+namespace bilayer::bench {
+
+class Embree {
+  public:
+    /// @param robust  rays miss no edge between triangles, and take longer
+    Embree(const Mesh& mesh, bool robust);
+
+    /// rtcPointQuery: the closest point of the mesh. The distance has no sign, and no normal is told.
+    /// @param radius  how far it looks [m], may be infinite
+    Closest closest(const std::string& name, float radius) const;
+
+    /// rtcIntersect1: the first triangle along a ray, from either side.
+    RayCaster rays() const;
+
+  private:
+    struct Scene;
+    std::shared_ptr<const Scene> scene_;
+};
+
+}  // namespace bilayer::bench

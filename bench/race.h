@@ -1,0 +1,111 @@
+// Peers that answer the same questions, side by side in time.
+#pragma once
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "bench/measure.h"
+#include "bench/peers.h"
+
+namespace bilayer::bench {
+
+/// Questions in some order, "random" or "coherent".
+template <class Question>
+struct Questions {
+    std::string order;
+    std::vector<Question> all;
+};
+
+/// What a peer took for questions in one order on some threads.
+struct Time {
+    std::string peer, order;
+    int threads;
+    double nanoseconds;  ///< a question, all threads together; the median of all rounds
+};
+
+/// Seconds that a peer takes for all questions, a stretch for each thread.
+template <class Question, class Answer>
+double secondsOf(const Peer<Question, Answer>& peer, std::span<const Question> questions, std::span<Answer> answers,
+                 int threads) {
+    const std::size_t share = (questions.size() + std::size_t(threads) - 1) / std::size_t(threads);
+    const Stopwatch watch;
+    onThreads(threads, [&](int thread) {
+        const std::size_t begin = std::min(questions.size(), share * std::size_t(thread));
+        const std::size_t count = std::min(questions.size() - begin, share);
+        peer.answer(questions.subspan(begin, count), answers.subspan(begin, count));
+    });
+    return watch.seconds();
+}
+
+/// Lets peers take turns, in each order and on each number of threads, so that a slow minute hits all of them alike.
+template <class Question, class Answer>
+std::vector<Time> race(const std::vector<Peer<Question, Answer>>& peers, const std::vector<Questions<Question>>& orders,
+                       const std::vector<int>& threads, int rounds) {
+    std::vector<Time> times;
+    for (const auto& peer : peers)
+        for (const auto& order : orders)
+            for (const int count : threads) times.push_back({peer.name, order.order, count, 0});
+    std::vector<std::vector<double>> seconds(times.size());
+    for (int round = 0; round < rounds; ++round)
+        for (std::size_t order = 0; order < orders.size(); ++order)
+            for (std::size_t t = 0; t < threads.size(); ++t)
+                for (std::size_t peer = 0; peer < peers.size(); ++peer) {
+                    const std::span<const Question> questions = orders[order].all;
+                    std::vector<Answer> answers(questions.size());
+                    seconds[(peer * orders.size() + order) * threads.size() + t].push_back(
+                        secondsOf(peers[peer], questions, std::span(answers), threads[t]) / double(questions.size()));
+                }
+    for (std::size_t i = 0; i < times.size(); ++i) times[i].nanoseconds = 1e9 * median(seconds[i]);
+    return times;
+}
+
+/// A table in Markdown: a line for each peer, a column for each order and number of threads; then, for each of `ours`,
+/// how many times as fast as each other peer it is.
+/// @param ours  what the names of our own peers begin with
+inline std::string table(const std::vector<Time>& times, const std::string& ours) {
+    std::vector<std::string> peers;
+    for (const Time& time : times)
+        if (std::find(peers.begin(), peers.end(), time.peer) == peers.end()) peers.push_back(time.peer);
+    const auto of = [&](const std::string& peer) {
+        std::vector<Time> result;
+        for (const Time& time : times)
+            if (time.peer == peer) result.push_back(time);
+        return result;
+    };
+    std::string text = "| ns |", rule = "|---|";
+    for (const Time& time : of(peers.front())) {
+        text += fmt::format(" {}, {} thread{} |", time.order, time.threads, time.threads > 1 ? "s" : "");
+        rule += "---|";
+    }
+    text += "\n" + rule + "\n";
+    for (const std::string& peer : peers) {
+        text += fmt::format("| {} |", peer);
+        for (const Time& time : of(peer)) text += fmt::format(" {:.1f} |", time.nanoseconds);
+        text += "\n";
+    }
+    for (const std::string& mine : peers)
+        for (const std::string& other : peers) {
+            if (!mine.starts_with(ours) || other.starts_with(ours)) continue;
+            text += fmt::format("| {}: times as fast as {} |", mine, other);
+            const auto one = of(mine), two = of(other);
+            for (std::size_t i = 0; i < one.size(); ++i)
+                text += fmt::format(" {:.1f} |", two[i].nanoseconds / one[i].nanoseconds);
+            text += "\n";
+        }
+    return text;
+}
+
+inline nlohmann::json toJson(const std::vector<Time>& times) {
+    nlohmann::json result = nlohmann::json::array();
+    for (const Time& time : times)
+        result.push_back(
+            {{"peer", time.peer}, {"order", time.order}, {"threads", time.threads}, {"nanoseconds", time.nanoseconds}});
+    return result;
+}
+
+}  // namespace bilayer::bench
