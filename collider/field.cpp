@@ -2,6 +2,7 @@
 #include "collider/field.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <limits>
@@ -49,12 +50,13 @@ void FieldData::fillLanes() {
         lanes.origin[lane] = origin[axis];
         lanes.perMetre[lane] = perMetre;
         lanes.fixedPoint[lane] = 1.5 * (std::uint64_t(1) << (52 - fractionBits));  // of a double's 52 bits
+        lanes.zeroPlace[lane] = std::bit_cast<std::uint64_t>(double(lanes.fixedPoint[lane]));
         lanes.lastPlace[lane] = (std::uint64_t(side * blocks[axis]) << fractionBits) - 1;
         lanes.blockStrides[lane] = blockStrides[lane];
         lanes.voxelStrides[lane] = voxelStrides[lane];
         lanes.inBlock[lane] = side - 1;
         lanes.fraction[lane] = (1 << fractionBits) - 1;
-        lanes.one[lane] = 1;
+        lanes.one[lane] = std::bit_cast<std::int32_t>(1.f);
         lanes.least[lane] = -interiorWidth;
         lanes.most[lane] = exteriorWidth;
         lanes.scales[lane] = lane == 0 ? 1.f : float(perMetre);

@@ -28,6 +28,12 @@ inline void requireSameLength(std::size_t points, std::size_t answers, const cha
                                     std::to_string(answers));
 }
 
+// Vectors of the compiler's own: Highway has none of fixed size for the plain instruction set.
+using Doubles [[gnu::vector_size(32)]] = double;
+using Bits [[gnu::vector_size(32)]] = std::uint64_t;
+using Floats [[gnu::vector_size(16)]] = float;
+using Ints [[gnu::vector_size(16)]] = std::int32_t;
+
 struct FieldData;
 
 /// How samples are taken: for one instruction set and one storage. `gradientReach`: the gradient is found where the
@@ -65,17 +71,17 @@ struct FieldData : FieldLayout {
 
     /// The frame as vectors, for samples; of places, the axes are x, y, y, z.
     struct Lanes {
-        alignas(32) double origin[4], perMetre[4];
+        Doubles origin, perMetre;
         /// Added to a double below 2^28, it leaves a fixed-point number in the lower bits.
-        double fixedPoint[4];
-        std::uint64_t lastPlace[4];    ///< within the directory [2^-23 voxels]
-        std::int32_t blockStrides[4];  ///< of the directory; y counts once
-        std::int32_t voxelStrides[4];  ///< of a block; y counts once
-        std::int32_t inBlock[4];       ///< the bits of a voxel's place in its block
-        std::int32_t fraction[4];      ///< the bits of a place below the voxel
-        float one[4];
-        float least[4], most[4];  ///< values beyond the band are these [m]
-        float scales[4];          ///< from voxels to metres, of a distance and its gradient
+        Doubles fixedPoint;
+        Bits zeroPlace, lastPlace;  ///< bits of the directory's first place, plus the last one's [2^-23 voxels]
+        Ints blockStrides;          ///< of the directory; y counts once
+        Ints voxelStrides;          ///< of a block; y counts once
+        Ints inBlock;               ///< the bits of a voxel's place in its block
+        Ints fraction;              ///< the bits of a place below the voxel
+        Ints one;                   ///< the bits of 1.f
+        Floats least, most;         ///< values beyond the band are these [m]
+        Floats scales;              ///< from voxels to metres, of a distance and its gradient
     } lanes;
 
     // Local places are in voxels from the directory's first one, in double: exact enough however far the mesh is from

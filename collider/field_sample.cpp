@@ -73,11 +73,6 @@ float boundBesideBand(const FieldData& field, float distance, const glm::dvec3& 
 HWY_BEFORE_NAMESPACE();
 namespace bilayer::HWY_NAMESPACE {
 
-// Vectors of the compiler's own: Highway has none of fixed size for the plain instruction set.
-using Doubles [[gnu::vector_size(32)]] = double;
-using Bits [[gnu::vector_size(32)]] = std::uint64_t;
-using Floats [[gnu::vector_size(16)]] = float;
-using Ints [[gnu::vector_size(16)]] = std::int32_t;
 using Pairs [[gnu::vector_size(16)]] = double;
 
 constexpr int fractionBits = FieldData::fractionBits, voxelBits = FieldData::voxelBits;
@@ -94,17 +89,11 @@ struct Place {
     Floats fraction;  ///< x, y, y, z
 };
 
-// By reference, since some vectors are wider than those of the plain instruction set.
-template <class Vector, class Element>
-HWY_INLINE void load(const Element* from, Vector& vector) {
-    std::memcpy(&vector, from, sizeof vector);
-}
-
-template <class Vector, class Element>
-HWY_INLINE Vector load(const Element* from) {
-    Vector vector;
-    load(from, vector);
-    return vector;
+template <class Word, class Element>
+HWY_INLINE Word load(const Element* from) {
+    Word word;
+    std::memcpy(&word, from, sizeof word);
+    return word;
 }
 
 /// From [x, y, y, z], which two loads of eight bytes give.
@@ -130,32 +119,25 @@ HWY_INLINE bool anyNegative(const Bits& v) {
 /// @param local  [x, y, y, z] from the directory's first voxel [voxels]
 HWY_INLINE Place placeOf(const FieldData& field, const Doubles& local) {
     const FieldData::Lanes& lanes = field.lanes;
-    Doubles fixedPoint;
-    Bits zero, last;
-    load(lanes.fixedPoint, fixedPoint);
-    load(lanes.fixedPoint, zero);
-    load(lanes.lastPlace, last);
-    const Bits fixed = reinterpret_cast<Bits>(local + fixedPoint) - zero;
-    const bool outside = anyNegative(fixed | (last - fixed));
+    const Bits fixed = reinterpret_cast<Bits>(local + lanes.fixedPoint) - lanes.zeroPlace;
+    const bool outside = anyNegative(fixed | (lanes.lastPlace - fixed));
     const Ints voxel = __builtin_convertvector(fixed >> fractionBits, Ints);
-    const Ints entry = (voxel >> voxelBits) * load<Ints>(lanes.blockStrides);
-    const Ints inBlock = (voxel & load<Ints>(lanes.inBlock)) * load<Ints>(lanes.voxelStrides);
+    const Ints entry = (voxel >> voxelBits) * lanes.blockStrides;
+    const Ints inBlock = (voxel & lanes.inBlock) * lanes.voxelStrides;
     // sums over the axes, both at once
     const Ints half =
         __builtin_shufflevector(entry, inBlock, 0, 4, 1, 5) + __builtin_shufflevector(entry, inBlock, 2, 6, 3, 7);
     const Ints sum = half + __builtin_shufflevector(half, half, 2, 3, 0, 1);
-    const Ints fraction = (__builtin_convertvector(fixed, Ints) & load<Ints>(lanes.fraction)) | load<Ints>(lanes.one);
+    const Ints fraction = (__builtin_convertvector(fixed, Ints) & lanes.fraction) | lanes.one;
     return {{std::uint32_t(sum[0]), std::uint32_t(sum[1]), !outside},
-            reinterpret_cast<Floats>(fraction) - load<Floats>(lanes.one)};
+            reinterpret_cast<Floats>(fraction) - reinterpret_cast<Floats>(lanes.one)};
 }
 
 /// The same of a point [m].
 HWY_INLINE Place placeOf(const FieldData& field, const glm::vec3& point) {
-    Doubles at, origin, perMetre;
+    Doubles at;
     loadPoint(point, at);
-    load(field.lanes.origin, origin);
-    load(field.lanes.perMetre, perMetre);
-    return placeOf(field, (at - origin) * perMetre);
+    return placeOf(field, (at - field.lanes.origin) * field.lanes.perMetre);
 }
 
 HWY_INLINE Place placeOf(const FieldData& field, const glm::dvec3& local) {
@@ -193,7 +175,7 @@ HWY_INLINE Ints loadPairs(const std::int16_t* v) {
 
 HWY_INLINE Cell loadCell(const FieldData& field, const float* v) {
     const Floats low = loadPairs(v), high = loadPairs(v + xStep);
-    const Floats least = load<Floats>(field.lanes.least), most = load<Floats>(field.lanes.most);
+    const Floats least = field.lanes.least, most = field.lanes.most;
     return {low, high, all((low > least) & (low < most) & (high > least) & (high < most))};
 }
 
@@ -204,7 +186,7 @@ HWY_INLINE Cell loadCell(const FieldData& field, const std::int16_t* v) {
     const auto decode = [&](Ints steps) { return __builtin_convertvector(steps, Floats) * field.step; };
     if (inBand) return {decode(low), decode(high), true};
     const auto clamped = [&](Floats values) {
-        const Floats least = load<Floats>(field.lanes.least), most = load<Floats>(field.lanes.most);
+        const Floats least = field.lanes.least, most = field.lanes.most;
         values = values < least ? least : values;
         return values > most ? most : values;
     };
@@ -279,7 +261,7 @@ HWY_INLINE Sample sampleCell(const FieldData& field, std::int32_t block, const P
     const Floats found = interpolate(cell, place.fraction);
     if (HWY_UNLIKELY(!cell.inBand)) return sampleBesideBand(field, found[0], point);
     if (HWY_UNLIKELY(!(found[0] <= gradientReach))) return sampleOf(Floats{found[0]}, true);
-    return sampleOf(found * load<Floats>(field.lanes.scales), true);
+    return sampleOf(found * field.lanes.scales, true);
 }
 
 HWY_INLINE std::int32_t blockAt(const FieldData& field, const Address& address) {
