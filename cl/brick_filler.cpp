@@ -1,4 +1,5 @@
-// Two batches of bricks take turns: while the device fills one, the host takes the blocks of the other.
+// Two batches of bricks take turns, each in a queue of its own: while the device fills one, the host takes the blocks
+// of the other.
 #include "cl/brick_filler.h"
 
 #include <oneapi/tbb/blocked_range.h>
@@ -35,10 +36,12 @@ constexpr std::size_t blocksPerTask = 16;  // that the host takes at once
 constexpr std::size_t groupItems = 64, lanes = 16;
 /// Bricks of a batch at most: results of a few megabytes stay in a processor's cache, and a GPU has enough to do.
 constexpr std::size_t bricksForProcessor = 64, bricksForGpu = 512;
-/// Groups for each compute unit that prepare bricks, each with scratch memory of its own.
+/// Groups for each compute unit that take bricks one after another, each with memory of its own. PoCL gives the first
+/// unit that asks more than its share of groups, so that one a unit would leave others without any.
 constexpr std::size_t groupsPerUnit = 4;
 constexpr std::uint64_t scratchPart = 8;  // of the budget, at most
-/// Parts that a kernel can number in one batch, and those whose numbers stay in a processor's cache.
+/// Parts that a kernel can number in one batch, and those whose numbers stay in a processor's cache where kernels hand
+/// a batch on.
 constexpr std::uint64_t partsInBatch = 1 << 27, partsForProcessor = 60000;
 /// Cells as small as those that pieces are grouped by, and how far beyond its reach a brick's samples lie [voxels].
 constexpr float smallestCell = 1.1f, aroundBrick = 3;
@@ -67,16 +70,27 @@ struct KernelLayers {
 // What a batch of bricks needs, or what its buffers hold.
 struct Load {
     std::uint64_t bricks = 0, parts = 0;
+    std::uint64_t places = 0;  // for parts: vectors of a brick's last ones may reach beyond them
+    std::uint64_t room = 0;    // of the places, for each group that fills whole bricks
 
-    bool covers(const Load& other) const { return bricks >= other.bricks && parts >= other.parts; }
+    bool covers(const Load& other) const { return bricks >= other.bricks && places >= other.places; }
 };
 
-struct Batch {
-    Load capacity, load;  // of the buffers, and of what is under way
+struct Buffers {
+    Load capacity;
     cl::Buffer parts, unsorted, sorted, cells, columns, begins, ofBricks;
-    cl::Buffer origins, distances, triangles, open, counts;
+    cl::Buffer origins, distances, triangles, open;
+};
+
+// Each has a queue of its own: where the kernels of one come to their end, those of the other take over.
+struct Batch {
+    Load load;  // under way
+    Buffers buffers;
+    cl::Buffer scratch, next, counts;
     std::array<cl_uint, counters> found{};
     cl::Event counted;
+    cl::CommandQueue queue;
+    Ended ended{queue};
 };
 
 // What a buffer holds, as the host sees it from when the queue's commands have ended until this goes.
@@ -113,22 +127,24 @@ class BrickFill {
     std::uint64_t blocksOf(const Load& load) const;
     bool fits(const Load& load) const;
     Load loadOf(std::size_t first, std::size_t last) const;
+    std::size_t groupsFor(const Load& load) const;
     std::size_t lastFitting(std::size_t first) const;
     void makeScratch();
     void reserve(Batch& batch, const Load& load);
     void start(Batch& batch, std::size_t first, std::size_t last);
     void finish(Batch& batch);
+    void keep(Batch& batch, std::size_t blocks);
     void handOver(Batch& batch, std::size_t blocks);
     void fillOpen();
 
     template <class... Arguments>
-    void enqueue(const char* name, std::size_t groups, const Arguments&... arguments) {
+    void enqueue(const cl::CommandQueue& queue, const char* name, std::size_t groups, const Arguments&... arguments) {
         cl::Kernel kernel(program_, name);
         cl_uint index = 0;
         (kernel.setArg(index++, arguments), ...);
         const std::size_t items = gpuMapping_ ? groupItems : 1;
-        device_.queue.enqueueNDRangeKernel(kernel, cl::NullRange, cl::NDRange(groups * items), cl::NDRange(items),
-                                           nullptr, timing_.event(Timing::Of::kernel));
+        queue.enqueueNDRangeKernel(kernel, cl::NullRange, cl::NDRange(groups * items), cl::NDRange(items), nullptr,
+                                   timing_.event(Timing::Of::kernel));
     }
 
     Device::Impl& device_;
@@ -138,18 +154,18 @@ class BrickFill {
     OpenclTimes* times_;
     Timing timing_;
     DeviceMemory memory_;
-    const bool layered_;  // by the double layer method, else exact
+    const bool layered_;      // by the double layer method, else exact
+    const bool fillsBricks_;  // whole bricks at once, else block by block
     KeptBytes kept_{};
     cl::Program program_;
     std::optional<DeviceBins> bins_;
-    cl::CommandQueue transfers_;
-    cl::Buffer scratch_, next_, orders_;
+    cl::Buffer orders_;
     std::size_t scratchGroups_ = 0;
     cl_uint scratchCells_ = 0;
     std::uint64_t share_ = 0;  // of the memory, for a batch
     std::array<Batch, batchesInFlight> batches_;
-    std::vector<glm::ivec3> open_;         // blocks that are left to the host
-    Ended kernelsEnded_, transfersEnded_;  // the device's queue, and that of the transfers
+    std::vector<glm::ivec3> open_;  // blocks that are left to the host
+    Ended ended_;                   // the device's queue
 };
 
 // How far a voxel may lie from a triangle that matters to it: the paper's cube sticks out of the ball.
@@ -187,20 +203,24 @@ BrickFill::BrickFill(Device::Impl& device, const OpenclOptions& options, const F
       timing_(options.times),
       memory_(device, memoryBudget(device, options.memoryMiB)),
       layered_(job.options.method == Method::doubleLayer),
+      fillsBricks_(layered_ && !gpuMapping_),
       program_(buildProgram(device, layered_ ? double_layer_cl : exact_cl,
                             commonBuildOptions(device, gpuMapping_, job.mesh.triangles) +
                                 (layered_ && job.layers.cube > 0 ? " -D PAPER_CUBE=1" : ""))),
-      transfers_(device.context, device.device, CL_QUEUE_PROFILING_ENABLE),
-      kernelsEnded_(device.queue),
-      transfersEnded_(transfers_) {
+      ended_(device.queue) {
     const float reach = reachOf(job);
-    bins_.emplace(device, program_, memory_, job, reach, layered_ ? reach : reach + 1, gpuMapping_, timing_);
-    job.mesh.progress.begin(bins_->bricks());
-    next_ = memory_.allocate(sizeof(cl_uint), "a batch of bricks");
-    if (layered_) {
-        kept_ = {0, 32, 0, 0, 28, 0, sampleCells(bins_->grid()) * sizeof(cl_uint)};
+    if (layered_)
         orders_ = memory_.upload(bitOrders().data(), sizeof bitOrders(), "a batch of bricks",
                                  timing_.event(Timing::Of::upload));
+    bins_.emplace(device, program_, memory_, job, reach, layered_ ? reach : reach + 1, gpuMapping_, timing_);
+    job.mesh.progress.begin(bins_->bricks());
+    for (Batch& batch : batches_) {
+        batch.queue = cl::CommandQueue(device.context, device.device, CL_QUEUE_PROFILING_ENABLE);
+        batch.next = memory_.allocate(sizeof(cl_uint), "a batch of bricks");
+        batch.counts = memory_.allocate(counters * sizeof(cl_uint), "a batch of bricks");
+    }
+    if (layered_) {
+        kept_ = {0, 32, 0, 0, 28, 0, sampleCells(bins_->grid()) * sizeof(cl_uint)};
     } else {
         kept_ = {112, 32, 32, sizeof(cl_uint), 32, sizeof(cl_uint), slices() * sizeof(cl_uint2)};
         makeScratch();
@@ -214,14 +234,14 @@ void BrickFill::makeScratch() {
     scratchCells_ = cl_uint(std::min<std::size_t>(cells * cells * cells, 1 << 20));
     const std::uint64_t bytes = std::uint64_t(scratchCells_) * sizeof(cl_uint);
     const std::size_t wanted = std::max(1u, device_.info.computeUnits) * groupsPerUnit;
-    scratchGroups_ = std::clamp<std::size_t>(memory_.left() / scratchPart / bytes, 1, wanted);
-    scratch_ = memory_.allocate(scratchGroups_ * bytes, "grouping the triangles of a brick");
+    scratchGroups_ = std::clamp<std::size_t>(memory_.left() / batchesInFlight / scratchPart / bytes, 1, wanted);
+    for (Batch& batch : batches_)
+        batch.scratch = memory_.allocate(scratchGroups_ * bytes, "grouping the triangles of a brick");
 }
 
 std::uint64_t BrickFill::bytesOf(const Load& load) const {
     const std::uint64_t perBlock = 2 * sizeof(glm::ivec3) + blockVoxels * sizeof(float) * (job_.mesh.triangles ? 2 : 1);
-    return (load.parts + lanes) * kept_.perPart() + load.bricks * kept_.brick + blocksOf(load) * perBlock +
-           counters * sizeof(cl_uint);
+    return load.places * kept_.perPart() + load.bricks * kept_.brick + blocksOf(load) * perBlock;
 }
 
 std::uint64_t BrickFill::blocksOf(const Load& load) const {
@@ -229,14 +249,26 @@ std::uint64_t BrickFill::blocksOf(const Load& load) const {
 }
 
 Load BrickFill::loadOf(std::size_t first, std::size_t last) const {
-    return {last - first, bins_->firstPart(last) - bins_->firstPart(first)};
+    Load load{last - first, bins_->firstPart(last) - bins_->firstPart(first)};
+    load.places = load.parts + load.bricks * lanes;
+    if (!fillsBricks_) return load;
+    for (std::size_t brick = first; brick < last; ++brick)
+        load.room = std::max(load.room, bins_->firstPart(brick + 1) - bins_->firstPart(brick) + lanes);
+    load.places = load.room * groupsFor(load);
+    return load;
+}
+
+// Groups that take the bricks of a batch one after another.
+std::size_t BrickFill::groupsFor(const Load& load) const {
+    return std::min<std::size_t>(load.bricks, std::max(1u, device_.info.computeUnits) * groupsPerUnit);
 }
 
 // Whether a batch may be as large as this: its share of the memory, and the largest buffer.
 bool BrickFill::fits(const Load& load) const {
-    const std::uint64_t largest = std::max(blocksOf(load) * blockVoxels * sizeof(float),
-                                           (load.parts + lanes) * std::max(kept_.part, kept_.columns));
-    return load.parts < partsInBatch && bytesOf(load) <= share_ && largest <= device_.info.maxAllocationBytes;
+    const std::uint64_t largest =
+        std::max(blocksOf(load) * blockVoxels * sizeof(float), load.places * std::max(kept_.part, kept_.columns));
+    return std::max(load.parts, load.places) < partsInBatch && bytesOf(load) <= share_ &&
+           largest <= device_.info.maxAllocationBytes;
 }
 
 // The end of the run of bricks from `first` on that go into one batch.
@@ -244,7 +276,7 @@ std::size_t BrickFill::lastFitting(std::size_t first) const {
     if (!fits(loadOf(first, first + 1)))
         memory_.refuse(batchesInFlight * bytesOf(loadOf(first, first + 1)), "a brick of the grid");
     const std::size_t end = std::min(bins_->bricks(), first + (gpuMapping_ ? bricksForGpu : bricksForProcessor));
-    const std::uint64_t mostParts = gpuMapping_ ? partsInBatch : partsForProcessor;
+    const std::uint64_t mostParts = gpuMapping_ || fillsBricks_ ? partsInBatch : partsForProcessor;
     std::size_t last = first + 1;
     while (last < end && fits(loadOf(first, last + 1)) && loadOf(first, last + 1).parts < mostParts) ++last;
     return last;
@@ -252,26 +284,27 @@ std::size_t BrickFill::lastFitting(std::size_t first) const {
 
 // Makes the buffers large enough. They grow, but never beyond the batch's share of the memory.
 void BrickFill::reserve(Batch& batch, const Load& load) {
-    if (batch.capacity.covers(load)) return;
-    const Load grown{std::max(load.bricks, batch.capacity.bricks), std::max(load.parts, batch.capacity.parts)};
-    if (batch.capacity.bricks > 0) memory_.free(bytesOf(batch.capacity));
-    batch = Batch{};
-    batch.capacity = fits(grown) ? grown : load;
-    const Load& c = batch.capacity;
+    Buffers& b = batch.buffers;
+    if (b.capacity.covers(load)) return;
+    const Load grown{std::max(load.bricks, b.capacity.bricks), std::max(load.parts, b.capacity.parts),
+                     std::max(load.places, b.capacity.places)};
+    if (b.capacity.bricks > 0) memory_.free(bytesOf(b.capacity));
+    b = Buffers{};
+    b.capacity = fits(grown) ? grown : load;
+    const Load& c = b.capacity;
     const auto buffer = [&](std::uint64_t bytes) { return memory_.allocate(bytes, "a batch of bricks"); };
-    for (const auto& [part, bytes] : {std::pair{&batch.parts, kept_.part},
-                                      {&batch.unsorted, kept_.unsorted},
-                                      {&batch.sorted, kept_.sorted},
-                                      {&batch.cells, kept_.cell},
-                                      {&batch.columns, kept_.columns},
-                                      {&batch.begins, kept_.begin}})
-        if (bytes > 0) *part = buffer((c.parts + lanes) * bytes);
-    batch.ofBricks = buffer(c.bricks * kept_.brick);
-    batch.origins = buffer(blocksOf(c) * sizeof(glm::ivec3));
-    batch.open = buffer(blocksOf(c) * sizeof(glm::ivec3));
-    batch.distances = buffer(blocksOf(c) * blockVoxels * sizeof(float));
-    if (job_.mesh.triangles) batch.triangles = buffer(blocksOf(c) * blockVoxels * sizeof(cl_int));
-    batch.counts = buffer(counters * sizeof(cl_uint));
+    for (const auto& [part, bytes] : {std::pair{&b.parts, kept_.part},
+                                      {&b.unsorted, kept_.unsorted},
+                                      {&b.sorted, kept_.sorted},
+                                      {&b.cells, kept_.cell},
+                                      {&b.columns, kept_.columns},
+                                      {&b.begins, kept_.begin}})
+        if (bytes > 0) *part = buffer(c.places * bytes);
+    b.ofBricks = buffer(c.bricks * kept_.brick);
+    b.origins = buffer(blocksOf(c) * sizeof(glm::ivec3));
+    b.open = buffer(blocksOf(c) * sizeof(glm::ivec3));
+    b.distances = buffer(blocksOf(c) * blockVoxels * sizeof(float));
+    if (job_.mesh.triangles) b.triangles = buffer(blocksOf(c) * blockVoxels * sizeof(cl_int));
 }
 
 // Sends the kernels of a batch on their way, and the number of blocks that come of it.
@@ -279,35 +312,39 @@ void BrickFill::start(Batch& batch, std::size_t first, std::size_t last) {
     const Load load = loadOf(first, last);
     reserve(batch, load);
     batch.load = load;
-    const cl_uint none = 0, stride = cl_uint(batch.capacity.parts + lanes), firstBrick = cl_uint(first),
+    const Buffers& b = batch.buffers;
+    const cl_uint none = 0, stride = cl_uint(b.capacity.places), firstBrick = cl_uint(first),
                   bricks = cl_uint(load.bricks);
-    device_.queue.enqueueFillBuffer(next_, none, 0, sizeof none);
-    device_.queue.enqueueFillBuffer(batch.counts, none, 0, counters * sizeof none);
+    batch.queue.enqueueFillBuffer(batch.next, none, 0, sizeof none);
+    batch.queue.enqueueFillBuffer(batch.counts, none, 0, counters * sizeof none);
     const FillParameters& p = job_.layers;
     const KernelLayers layers{p.delta, p.reach, p.certain, p.cube};
     const DeviceBins& bins = *bins_;
-    const auto prepare = [&](std::size_t groups, const auto&... more) {
-        enqueue("prepareBricks", std::min<std::size_t>(groups, bricks), bins.points(), bins.triangles(), bins.grid(),
+    const auto prepare = [&](const char* name, std::size_t groups, const auto&... more) {
+        enqueue(batch.queue, name, std::min<std::size_t>(groups, bricks), bins.points(), bins.triangles(), bins.grid(),
                 bins.cellOfBrick(), bins.triangleOffsets(), bins.partOffsets(), bins.list(), firstBrick, bricks,
                 more...);
     };
-    const cl::Buffer& triangles = job_.mesh.triangles ? batch.triangles : batch.origins;
-    if (layered_) {
-        prepare(bricks, batch.unsorted, batch.columns, batch.ofBricks, stride, next_, layers);
-        enqueue("fillBlocks", blocksOf(load), bins.grid(), bins.cellOfBrick(), bins.partOffsets(), firstBrick,
-                batch.columns, batch.ofBricks, stride, layers, orders_, batch.origins, batch.distances, triangles,
+    const cl::Buffer& triangles = job_.mesh.triangles ? b.triangles : b.origins;
+    if (fillsBricks_) {
+        prepare("fillBricks", groupsFor(load), b.unsorted, b.columns, b.ofBricks, stride, batch.next, layers,
+                cl_uint(load.room), orders_, b.origins, b.distances, triangles, batch.counts);
+    } else if (layered_) {
+        prepare("prepareBricks", bricks, b.unsorted, b.columns, b.ofBricks, stride, batch.next, layers);
+        enqueue(batch.queue, "fillBlocks", blocksOf(load), bins.grid(), bins.cellOfBrick(), bins.partOffsets(),
+                firstBrick, b.columns, b.ofBricks, stride, layers, orders_, b.origins, b.distances, triangles,
                 batch.counts);
     } else {
-        prepare(scratchGroups_, batch.parts, batch.unsorted, batch.sorted, batch.cells, batch.columns, batch.begins,
-                stride, scratch_, scratchCells_, batch.ofBricks, next_);
-        enqueue("fillBlocks", blocksOf(load), bins.points(), bins.triangles(), bins.grid(), bins.cellOfBrick(),
-                firstBrick, batch.parts, batch.sorted, batch.columns, batch.begins, stride, batch.ofBricks,
-                cl_int(job_.mesh.sign), batch.origins, batch.distances, triangles, batch.open, batch.counts);
+        prepare("prepareBricks", scratchGroups_, b.parts, b.unsorted, b.sorted, b.cells, b.columns, b.begins, stride,
+                batch.scratch, scratchCells_, b.ofBricks, batch.next);
+        enqueue(batch.queue, "fillBlocks", blocksOf(load), bins.points(), bins.triangles(), bins.grid(),
+                bins.cellOfBrick(), firstBrick, b.parts, b.sorted, b.columns, b.begins, stride, b.ofBricks,
+                cl_int(job_.mesh.sign), b.origins, b.distances, triangles, b.open, batch.counts);
     }
-    device_.queue.enqueueReadBuffer(batch.counts, CL_FALSE, 0, sizeof batch.found, batch.found.data(), nullptr,
-                                    &batch.counted);
+    batch.queue.enqueueReadBuffer(batch.counts, CL_FALSE, 0, sizeof batch.found, batch.found.data(), nullptr,
+                                  &batch.counted);
     timing_.keep(Timing::Of::download, batch.counted);
-    device_.queue.flush();
+    batch.queue.flush();
 }
 
 // Waits for a batch, if it is under way, and hands its blocks on, on the device or to the host.
@@ -317,26 +354,36 @@ void BrickFill::finish(Batch& batch) {
     const std::size_t blocks = batch.found[filledBlocks], open = batch.found[openBlocks];
     if (job_.mesh.conflicts) *job_.mesh.conflicts += batch.found[conflicts];
     if (open > 0) {
-        const Mapped<glm::ivec3> openOrigins(transfers_, batch.open, open, timing_);
-        transfers_.finish();
+        const Mapped<glm::ivec3> openOrigins(batch.queue, batch.buffers.open, open, timing_);
+        batch.queue.finish();
         open_.insert(open_.end(), openOrigins.data(), openOrigins.data() + open);
     }
     job_.mesh.progress.poll();
     if (keep_)
-        keep_(batch.origins, batch.distances, blocks);
+        keep(batch, blocks);
     else
         handOver(batch, blocks);
     for (std::size_t brick = 0; brick < batch.load.bricks; ++brick) job_.mesh.progress.advance();
     batch.load = {};
 }
 
+// Leaves blocks on the device: the batch goes on when the commands that take them over have ended.
+void BrickFill::keep(Batch& batch, std::size_t blocks) {
+    keep_(batch.buffers.origins, batch.buffers.distances, blocks);
+    std::vector<cl::Event> kept(1);
+    device_.queue.enqueueMarkerWithWaitList(nullptr, &kept[0]);
+    device_.queue.flush();
+    batch.queue.enqueueBarrierWithWaitList(&kept);
+}
+
 // Hands blocks to the host.
 void BrickFill::handOver(Batch& batch, std::size_t blocks) {
-    const Mapped<glm::ivec3> origins(transfers_, batch.origins, blocks, timing_);
-    const Mapped<float> distances(transfers_, batch.distances, blocks * blockVoxels, timing_);
-    const Mapped<std::int32_t> triangles(transfers_, batch.triangles, job_.mesh.triangles ? blocks * blockVoxels : 0,
+    const Buffers& b = batch.buffers;
+    const Mapped<glm::ivec3> origins(batch.queue, b.origins, blocks, timing_);
+    const Mapped<float> distances(batch.queue, b.distances, blocks * blockVoxels, timing_);
+    const Mapped<std::int32_t> triangles(batch.queue, b.triangles, job_.mesh.triangles ? blocks * blockVoxels : 0,
                                          timing_);
-    transfers_.finish();
+    batch.queue.finish();
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, blocks, blocksPerTask), [&](const auto& range) {
         job_.mesh.progress.poll();
         const auto part = [&](const auto* all, std::size_t each) {
@@ -353,11 +400,9 @@ void BrickFill::run() {
         last = lastFitting(first);
         Batch& batch = batches_[turn++ % batchesInFlight];
         finish(batch);
-        transfers_.finish();  // the host has let go of the batch's buffers
         start(batch, first, last);
     }
     for (std::size_t i = 0; i < batchesInFlight; ++i) finish(batches_[turn++ % batchesInFlight]);
-    device_.queue.finish();
     timing_.sumUp();
     if (times_) times_->peakBytes = std::max(times_->peakBytes, memory_.peak());
     if (!open_.empty()) fillOpen();

@@ -49,6 +49,12 @@ typedef IntLanes LooseIntLanes __attribute__((aligned(4)));
 
 // Loops over what shall stay in registers, and functions that take part in such loops.
 #define UNROLLED _Pragma("unroll")
+// Loops over what lies all over memory: one load after another is faster than what compilers make for vectors of them.
+#ifdef __clang__
+#define ONE_BY_ONE _Pragma("clang loop vectorize(disable) interleave(disable)")
+#else
+#define ONE_BY_ONE
+#endif
 #define INLINED inline __attribute__((always_inline))
 
 // Stands for every distance beyond reach: farAway of sdf/blocks.h.
@@ -90,12 +96,30 @@ Corners cornersOf(global const float* points, global const uint* triangles, uint
     return corners;
 }
 
+#if LANES == 16
+#define laneInts ((IntLanes)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15))
+#else
+#define laneInts ((IntLanes)(0, 1, 2, 3, 4, 5, 6, 7))
+#endif
+
 // The place of the lowest bit.
 int lowestBit(uint bits) {
     return 31 - (int)(clz(bits & -bits));
 }
 
+// Processors with AVX-512 keep a bit for each lane by themselves, and can move the lanes of some bits together. OpenCL C
+// has no words for that, but the compiler that PoCL uses does.
+#if LANES == 16 && defined(__clang__) && defined(__AVX512DQ__)
+#define COMPRESSES 1
+#else
+#define COMPRESSES 0
+#endif
+
 // A bit for each lane whose comparison held.
+#if COMPRESSES
+#define bitsOf(held) ((uint)(__builtin_ia32_cvtd2mask512(held)))
+#define compressInts(values, bits) __builtin_ia32_compresssi512_mask(values, (IntLanes)(0), (ushort)(bits))
+#else
 uint bitsOf(IntLanes held) {
     const ulong gather = 0x0102040810204080ul;
 #if LANES == 16
@@ -105,19 +129,17 @@ uint bitsOf(IntLanes held) {
     return (uint)(as_ulong(convert_uchar8(held & 1)) * gather >> 56);
 #endif
 }
+#endif
 
 // Lanes whose bit is set.
 IntLanes lanesOf(uint bits) {
-#if LANES == 16
-    const IntLanes lane = (IntLanes)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
-#else
-    const IntLanes lane = (IntLanes)(0, 1, 2, 3, 4, 5, 6, 7);
-#endif
-    return ((IntLanes)(bits) & (IntLanes)(1) << lane) != 0;
+    return ((IntLanes)(bits) & (IntLanes)(1) << laneInts) != 0;
 }
 
 bool anyLane(IntLanes held) {
-#if LANES == 16
+#if COMPRESSES
+    return bitsOf(held) != 0;
+#elif LANES == 16
     const ulong2 bytes = as_ulong2(convert_char16(held));
     return (bytes.x | bytes.y) != 0;
 #else

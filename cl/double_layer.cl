@@ -35,68 +35,54 @@ typedef struct {
     int cube;
 } Layers;
 
-// Bricks into sorted samples. Work-groups take the bricks one after another.
-GROUP_KERNEL void prepareBricks(global const float* points, global const uint* triangles, Grid grid,
-                                global const uint* cellOfBrick, global const uint* triangleOffsets,
-                                global const uint* partOffsets, global const uint* list, uint firstBrick, uint bricks,
-                                global Sample* unsorted, global float* columns, global uint* begins, uint stride,
-                                global uint* next, Layers layers) {
-    SHARED uint taken, count, sums[ITEMS];
-    while (takeBrick(next, &taken, &count) < bricks) {
-        const uint b = firstBrick + taken, first = partOffsets[b] - partOffsets[firstBrick];
-        const int3 brick = brickAt(&grid, cellOfBrick[b]);
-        const Limits limits = limitsOf(&grid, brick);
-        const SampleCells cells = cellsFor(&grid);
-        const uint cursors = (uint)(cells.size * cells.size * cells.size + 2);
-        Cut cut = {unsorted + first, begins + (size_t)(taken)*cursors, &count,
-                   convert_double3(brick * (1 << grid.shift)), cells, layers.delta};
-        for (uint i = ITEM; i < cursors; i += ITEMS) cut.cursors[i] = 0;
-        MEET;
-        cutTriangles(&cut, &grid, points, triangles, list, triangleOffsets[b], triangleOffsets[b + 1], &limits);
-        MEET;
-        sortSamples(&cut, count, columns + first, stride, sums);
-    }
-}
-
 // Where an item's voxels are, from the middle of what points are picked for.
 typedef struct {
-    Lanes y, z;
+    Lanes x[SLICES], y, z;
 } Voxels;
 
-Voxels ownVoxels(void) {
+// `first` is the x of the first voxel that points are picked for. Seen from their middle it is always the same, but
+// constants would be loaded anew for every point.
+Voxels ownVoxels(int first) {
+    Voxels v;
+    const float middle = (float)(first) + HALF_SIDE;
 #if ITEMS > 1
-    const Voxels v = {(Lanes)((float)(ITEM % BLOCK_SIDE) - HALF_SIDE), (Lanes)(0, 1, 2, 3, 4, 5, 6, 7) - HALF_SIDE};
+    v.x[0] = (float)(first + (int)(ITEM / BLOCK_SIDE)) - middle;
+    v.y = (float)(ITEM % BLOCK_SIDE) - HALF_SIDE;
+    v.z = (Lanes)(0, 1, 2, 3, 4, 5, 6, 7) - HALF_SIDE;
 #else
     const float4 row = (float4)(0, 1, 2, 3), one = 1.0f;
-    const Voxels v = {(Lanes)(0 * one, one, 2 * one, 3 * one) - HALF_SIDE, (Lanes)(row, row, row, row) - HALF_SIDE};
+    UNROLLED for (int slice = 0; slice < SLICES; ++slice) v.x[slice] = (float)(first + slice) - middle;
+    v.y = (Lanes)(0 * one, one, 2 * one, 3 * one) - HALF_SIDE;
+    v.z = (Lanes)(row, row, row, row) - HALF_SIDE;
 #endif
     return v;
-}
-
-float sliceAt(int slice) {
-#if ITEMS > 1
-    (void)(slice);
-    return (float)(ITEM / BLOCK_SIDE) - HALF_SIDE;
-#else
-    return (float)(slice)-HALF_SIDE;
-#endif
 }
 
 // The lattice point nearest to a coordinate. Halves go up, whatever the rounding: LayerSamples::nearestLattice().
 #define nearestLattice(coordinate) floor((coordinate) + 0.5001f)
 
+#if COMPRESSES
+typedef uint PickedNumber;
+#else
+typedef ushort PickedNumber;
+#endif
+
 // Points of a layer, and those of them that reach the voxels.
 typedef struct {
-    float x[PAGE], y[PAGE], z[PAGE], halfSquare[PAGE];
+    float x[PAGE] __attribute__((aligned(64))), y[PAGE], z[PAGE], halfSquare[PAGE];
 #if TRIANGLES
     int owner[PAGE];
 #endif
 #if PAPER_CUBE
     float centre[3][PAGE];  // the lattice point nearest to the sample
 #endif
-    ushort picked[PAGE + BLOCK_SIDE];  // some more are written
-    uint count;                        // of those picked
+    PickedNumber picked[PAGE + LANES];  // some more are written
 } Points;
+
+typedef struct {
+    SHARED Points* points;
+    SHARED uint* picked;  // how many
+} Layer;
 
 // The nearest points of a layer so far. They are those with the greatest p . v - |p|^2 / 2, as
 // |v - p|^2 = |v|^2 - 2 (p . v - |p|^2 / 2): one multiplication a voxel and point.
@@ -116,8 +102,10 @@ INLINED void clear(Nearest* nearest) {
     }
 }
 
-INLINED void applyPoints(SHARED const Points* points, const Voxels* v, int cube, Nearest* nearest) {
-    for (uint i = 0; i < points->count; ++i) {
+INLINED void applyPoints(Layer layer, const Voxels* v, int cube, Nearest* nearest) {
+    SHARED const Points* points = layer.points;
+    const uint count = *layer.picked;
+    for (uint i = 0; i < count; ++i) {
         const uint p = points->picked[i];
         const float along = points->x[p];
         Lanes across = multiplyAdd(
@@ -130,9 +118,9 @@ INLINED void applyPoints(SHARED const Points* points, const Voxels* v, int cube,
 #endif
         UNROLLED for (int slice = 0; slice < SLICES; ++slice) {
 #if PAPER_CUBE
-            if (fabs(sliceAt(slice) - points->centre[0][p]) > (float)(cube)) continue;
+            if (fabs(v->x[slice].s0 - points->centre[0][p]) > (float)(cube)) continue;
 #endif
-            const Lanes some = multiplyAdd((Lanes)(along), (Lanes)(sliceAt(slice)), across);
+            const Lanes some = multiplyAdd((Lanes)(along), v->x[slice], across);
 #if TRIANGLES
             nearest->owner[slice] =
                 select(nearest->owner[slice], (IntLanes)(points->owner[p]), some > nearest->greatest[slice]);
@@ -143,8 +131,7 @@ INLINED void applyPoints(SHARED const Points* points, const Voxels* v, int cube,
 }
 
 Lanes distances2(const Nearest* nearest, const Voxels* v, int slice) {
-    const Lanes square2 =
-        multiplyAdd(v->y, v->y, multiplyAdd(v->z, v->z, (Lanes)(sliceAt(slice) * sliceAt(slice))));
+    const Lanes square2 = multiplyAdd(v->y, v->y, multiplyAdd(v->z, v->z, v->x[slice] * v->x[slice]));
     return multiplyAdd((Lanes)(-2.0f), nearest->greatest[slice], square2);
 }
 
@@ -160,30 +147,35 @@ typedef ushort8 LooseUshort8 __attribute__((aligned(2)));
 
 // Adds the numbers of some lanes, counted from `first`, to those picked. `orders` has the places of its bits, in
 // ascending order, for each byte: without it there were a branch for each bit, and processors would guess it wrong.
-INLINED void addPicked(SHARED Points* points, uint lanes, uint first, global const ulong* orders) {
+INLINED void addPicked(Layer layer, uint lanes, uint first, global const ulong* orders) {
+    SHARED PickedNumber* picked = layer.points->picked;
 #if ITEMS > 1
     (void)(orders);
-    if (lanes) points->picked[atomic_inc(&points->count)] = (ushort)(first);
+    if (lanes) picked[atomic_inc(layer.picked)] = (PickedNumber)(first);
+#elif COMPRESSES
+    (void)(orders);
+    storeSharedInts(compressInts(laneInts + (int)(first), lanes), 0, (SHARED int*)(picked + *layer.picked));
+    *layer.picked += popcount(lanes);
 #else
-    uint count = points->count;
+    uint count = *layer.picked;
     UNROLLED for (uint i = 0; i < LANES / 8; ++i) {
         const uint byte = lanes >> 8 * i & 255;
-        *(LooseUshort8*)(points->picked + count) = convert_ushort8(as_uchar8(orders[byte])) + (ushort)(first + 8 * i);
+        *(LooseUshort8*)(picked + count) = convert_ushort8(as_uchar8(orders[byte])) + (ushort)(first + 8 * i);
         count += popcount(byte);
     }
-    points->count = count;
+    *layer.picked = count;
 #endif
 }
 
 // Places points of a layer, and picks those that reach the voxels: nearer than the root of reach2.
-INLINED void placePoints(SHARED Points* points, uint first, uint among, Real3 at, float reach2,
-                         global const ulong* orders) {
+INLINED void placePoints(Layer layer, uint first, uint among, Real3 at, float reach2, global const ulong* orders) {
+    SHARED Points* points = layer.points;
     const Real away2 = squareSum(beyondSide(at.x), beyondSide(at.y), beyondSide(at.z));
     storeReal(at.x, points->x + first);
     storeReal(at.y, points->y + first);
     storeReal(at.z, points->z + first);
     storeReal(0.5f * squareSum(at.x, at.y, at.z), points->halfSquare + first);
-    addPicked(points, bitsOfReal(away2 < reach2) & among, first, orders);
+    addPicked(layer, bitsOfReal(away2 < reach2) & among, first, orders);
 }
 
 // What a block works from.
@@ -197,8 +189,8 @@ typedef struct {
 } Input;
 
 // Places the points of both layers around samples begin + ITEM * BATCH .. as those from `first` + ITEM * BATCH on.
-INLINED void placeLayers(const Input* input, uint begin, uint end, float3 middle, uint first, SHARED Points* inner,
-                         SHARED Points* outer) {
+INLINED void placeLayers(const Input* input, uint begin, uint end, float3 middle, uint first, Layer inner,
+                         Layer outer) {
     const uint at = begin + ITEM * BATCH, to = first + ITEM * BATCH;
     if (at >= end) return;
     global const float* columns = input->columns + at;
@@ -214,17 +206,17 @@ INLINED void placeLayers(const Input* input, uint begin, uint end, float3 middle
     const Real3 centre = make3(nearestLattice(place.x) - middle.x, nearestLattice(place.y) - middle.y,
                                nearestLattice(place.z) - middle.z);
     among &= bitsOfReal((fabs(centre.x) <= most) & (fabs(centre.y) <= most) & (fabs(centre.z) <= most));
-    storeReal(centre.x, inner->centre[0] + to);
-    storeReal(centre.y, inner->centre[1] + to);
-    storeReal(centre.z, inner->centre[2] + to);
-    storeReal(centre.x, outer->centre[0] + to);
-    storeReal(centre.y, outer->centre[1] + to);
-    storeReal(centre.z, outer->centre[2] + to);
+    storeReal(centre.x, inner.points->centre[0] + to);
+    storeReal(centre.y, inner.points->centre[1] + to);
+    storeReal(centre.z, inner.points->centre[2] + to);
+    storeReal(centre.x, outer.points->centre[0] + to);
+    storeReal(centre.y, outer.points->centre[1] + to);
+    storeReal(centre.z, outer.points->centre[2] + to);
 #endif
 #if TRIANGLES
     const Real owners = loadReal(columns + OWNER * stride);
-    storeReal(owners, (SHARED float*)(inner->owner) + to);
-    storeReal(owners, (SHARED float*)(outer->owner) + to);
+    storeReal(owners, (SHARED float*)(inner.points->owner) + to);
+    storeReal(owners, (SHARED float*)(outer.points->owner) + to);
 #endif
     const float reach2 = square(input->layers.certain);
     placePoints(inner, to, among, sub3(seen, offset), reach2, input->orders);
@@ -244,7 +236,7 @@ bool hasSamples(const Input* input, int3 corner) {
 }
 
 // The nearest points of both layers for the voxels of a cube; `corner` is its first voxel in the brick.
-INLINED void fillCube(const Input* input, int3 corner, const Voxels* v, SHARED Points* inner, SHARED Points* outer,
+INLINED void fillCube(const Input* input, int3 corner, const Voxels* v, Layer inner, Layer outer,
                       Nearest* nearestInner, Nearest* nearestOuter) {
     const int cube = input->layers.cube, size = input->cells.size,
               along = PICKED_SIDE / CELL_SIDE + 2 * input->cells.around;
@@ -253,7 +245,7 @@ INLINED void fillCube(const Input* input, int3 corner, const Voxels* v, SHARED P
     clear(nearestInner);
     clear(nearestOuter);
     MEET;
-    if (ITEM == 0) inner->count = outer->count = 0;
+    if (ITEM == 0) *inner.picked = *outer.picked = 0;
     MEET;
     uint placed = 0;
     for (int x = cell.x; x < cell.x + along; ++x)
@@ -266,7 +258,7 @@ INLINED void fillCube(const Input* input, int3 corner, const Voxels* v, SHARED P
                     applyPoints(inner, v, cube, nearestInner);
                     applyPoints(outer, v, cube, nearestOuter);
                     MEET;
-                    if (ITEM == 0) inner->count = outer->count = 0;
+                    if (ITEM == 0) *inner.picked = *outer.picked = 0;
                     MEET;
                     placed = 0;
                 }
@@ -312,62 +304,169 @@ void putSlice(Lanes values, int slice, int3 inBlock, SHARED float* block) {
 #define asLanes as_float8
 #endif
 
+// The mesh, and which of its triangles reach the bricks of a batch.
+typedef struct {
+    global const float* points;
+    global const uint* triangles;
+    Grid grid;
+    global const uint *cellOfBrick, *triangleOffsets, *partOffsets, *list;
+    uint firstBrick;
+    Layers layers;
+} Bricks;
+
+// The samples of a brick in columns, unsorted and sorted, and where those of each cell begin.
+typedef struct {
+    global float *unsorted, *sorted;
+    global uint* begins;
+    uint stride;
+} Samples;
+
+// Where blocks that hold distances go: to the next places.
+typedef struct {
+    global int* origins;
+    global float* distances;
+    global int* triangles;
+    global uint* counters;
+} Filled;
+
 enum { FILLED_BLOCKS };
 
-// A group fills a block of a brick. For each byte `orders` has the places of its bits. Blocks that hold distances go to the next places of `origins`, `distances` and
-// `nearestTriangles`.
-GROUP_KERNEL void fillBlocks(Grid grid, global const uint* cellOfBrick, global const uint* partOffsets,
-                             uint firstBrick, global const float* columns, global const uint* begins, uint stride,
-                             Layers layers, global const ulong* orders, global int* origins, global float* distances, global int* nearestTriangles,
-                             global uint* counters) {
-    SHARED Points inner, outer;
-    SHARED float values[BLOCK_VOXELS] __attribute__((aligned(64)));
-    SHARED float owners[TRIANGLES ? BLOCK_VOXELS : 1] __attribute__((aligned(64)));
-    SHARED uint slot, anyKnown;
-    const int side = (1 << grid.shift) / BLOCK_SIDE;
-    const uint perBrick = (uint)(side * side * side), brick = (uint)(get_group_id(0)) / perBrick;
-    const int number = (int)(get_group_id(0) % perBrick);
-    const int3 inBrick = BLOCK_SIDE * (int3)(number / side / side, number / side % side, number % side);
-    const SampleCells cells = cellsFor(&grid);
-    const uint cursors = (uint)(cells.size * cells.size * cells.size + 2);
-    const Input input = {columns + (partOffsets[firstBrick + brick] - partOffsets[firstBrick]), stride,
-                         begins + (size_t)(brick)*cursors, cells, layers, orders};
+// What a group works in.
+typedef struct {
+    Points inner, outer;
+    float values[BLOCK_VOXELS] __attribute__((aligned(64)));
+#if TRIANGLES
+    float owners[BLOCK_VOXELS] __attribute__((aligned(64)));
+#endif
+    uint slot, anyKnown;
+} Workplace;
+
+uint cursorsOf(const Grid* grid) {
+    const SampleCells cells = cellsFor(grid);
+    return (uint)(cells.size * cells.size * cells.size + 2);
+}
+
+// A brick of the batch into sorted samples. `count` is 0 before.
+void prepareBrick(const Bricks* bricks, uint brick, const Samples* samples, SHARED uint* count, SHARED uint* sums) {
+    const uint b = bricks->firstBrick + brick, cursors = cursorsOf(&bricks->grid);
+    const Grid* grid = &bricks->grid;
+    const int3 place = brickAt(grid, bricks->cellOfBrick[b]);
+    const Limits limits = limitsOf(grid, place);
+    const double3 origin = convert_double3(place * (1 << grid->shift));
+    Cut cut = {samples->unsorted, samples->stride, samples->begins, count, origin, cellsFor(grid), bricks->layers.delta};
+    for (uint i = ITEM; i < cursors; i += ITEMS) cut.cursors[i] = 0;
+    MEET;
+    cutTriangles(&cut, grid, bricks->points, bricks->triangles, bricks->list, bricks->triangleOffsets[b],
+                 bricks->triangleOffsets[b + 1], &limits);
+    MEET;
+    sortSamples(&cut, *count, samples->sorted, sums);
+}
+
+// Fills a block of a brick of the batch. For each byte `orders` has the places of its bits.
+INLINED void fillBlock(const Bricks* bricks, uint brick, uint number, const Samples* samples,
+                       global const ulong* orders, const Filled* filled, SHARED Workplace* work,
+                       SHARED uint* innerPicked, SHARED uint* outerPicked) {
+    const Layer inner = {&work->inner, innerPicked}, outer = {&work->outer, outerPicked};
+    const Grid* grid = &bricks->grid;
+    const uint side = (uint)((1 << grid->shift) / BLOCK_SIDE);
+    const int3 inBrick =
+        BLOCK_SIDE * (int3)((int)(number / side / side), (int)(number / side % side), (int)(number % side));
+    const Input input = {samples->sorted, samples->stride, samples->begins, cellsFor(grid), bricks->layers, orders};
     if (!hasSamples(&input, inBrick)) return;
-    const Voxels v = ownVoxels();
     uint known = 0;
     for (int cube = 0; cube < CUBES; ++cube) {
         const int3 inBlock = CUBES > 1 ? SLICES * (int3)(cube / 4, cube / 2 % 2, cube % 2) : (int3)(0);
+        const Voxels v = ownVoxels(inBrick.x + inBlock.x);
         Nearest nearestInner, nearestOuter;
-        fillCube(&input, inBrick + inBlock, &v, &inner, &outer, &nearestInner, &nearestOuter);
+        fillCube(&input, inBrick + inBlock, &v, inner, outer, &nearestInner, &nearestOuter);
         UNROLLED for (int i = 0; i < SLICES; ++i) {
             IntLanes inside, knownLanes;
-            putSlice(combine(&nearestInner, &nearestOuter, &v, i, &layers, &inside, &knownLanes), i, inBlock, values);
+            putSlice(combine(&nearestInner, &nearestOuter, &v, i, &bricks->layers, &inside, &knownLanes), i, inBlock,
+                     work->values);
             known |= (uint)(anyLane(knownLanes));
 #if TRIANGLES
-            putSlice(asLanes(select(nearestInner.owner[i], nearestOuter.owner[i], inside)), i, inBlock, owners);
-#else
-            (void)(owners);
+            putSlice(asLanes(select(nearestInner.owner[i], nearestOuter.owner[i], inside)), i, inBlock, work->owners);
 #endif
         }
     }
     MEET;
-    if (ITEM == 0) anyKnown = 0;
+    if (ITEM == 0) work->anyKnown = 0;
     MEET;
-    if (known) anyKnown = 1;
+    if (known) work->anyKnown = 1;
     MEET;
-    if (!anyKnown) return;
+    if (!work->anyKnown) return;
     if (ITEM == 0) {
-        slot = atomic_inc(counters + FILLED_BLOCKS);
-        vstore3(brickAt(&grid, cellOfBrick[firstBrick + brick]) * (1 << grid.shift) + inBrick, slot, origins);
+        work->slot = atomic_inc(filled->counters + FILLED_BLOCKS);
+        const int3 place = brickAt(grid, bricks->cellOfBrick[bricks->firstBrick + brick]);
+        vstore3(place * (1 << grid->shift) + inBrick, work->slot, filled->origins);
     }
     MEET;
     for (uint i = ITEM; i < BLOCK_VOXELS / LANES; i += ITEMS) {
-        const size_t place = (size_t)(slot) * (BLOCK_VOXELS / LANES) + i;
-        storeGlobalLanes(vloadLanes(i, values), place, distances);
+        const size_t place = (size_t)(work->slot) * (BLOCK_VOXELS / LANES) + i;
+        storeGlobalLanes(vloadLanes(i, work->values), place, filled->distances);
 #if TRIANGLES
-        storeGlobalLanes(vloadLanes(i, owners), place, (global float*)(nearestTriangles));
-#else
-        (void)(nearestTriangles);
+        storeGlobalLanes(vloadLanes(i, work->owners), place, (global float*)(filled->triangles));
 #endif
     }
 }
+
+#if ITEMS > 1
+
+// Bricks into sorted samples. Work-groups take the bricks one after another.
+GROUP_KERNEL void prepareBricks(global const float* points, global const uint* triangles, Grid grid,
+                                global const uint* cellOfBrick, global const uint* triangleOffsets,
+                                global const uint* partOffsets, global const uint* list, uint firstBrick,
+                                uint brickCount, global float* unsorted, global float* sorted, global uint* begins,
+                                uint stride, global uint* next, Layers layers) {
+    SHARED uint taken, count, sums[ITEMS];
+    const Bricks bricks = {points,      triangles, grid,       cellOfBrick, triangleOffsets,
+                           partOffsets, list,      firstBrick, layers};
+    while (takeBrick(next, &taken, &count) < brickCount) {
+        const uint first = firstSample(partOffsets, firstBrick, taken);
+        const Samples samples = {unsorted + first, sorted + first, begins + taken * cursorsOf(&grid), stride};
+        prepareBrick(&bricks, taken, &samples, &count, sums);
+    }
+}
+
+// A group fills a block of a brick.
+GROUP_KERNEL void fillBlocks(Grid grid, global const uint* cellOfBrick, global const uint* partOffsets,
+                             uint firstBrick, global float* sorted, global uint* begins, uint stride, Layers layers,
+                             global const ulong* orders, global int* origins, global float* distances,
+                             global int* nearestTriangles, global uint* counters) {
+    SHARED Workplace work;
+    SHARED uint innerPicked, outerPicked;
+    const uint side = (uint)((1 << grid.shift) / BLOCK_SIDE), perBrick = side * side * side;
+    const uint brick = (uint)(get_group_id(0)) / perBrick, number = (uint)(get_group_id(0)) % perBrick;
+    const Bricks bricks = {0, 0, grid, cellOfBrick, 0, partOffsets, 0, firstBrick, layers};
+    const Samples samples = {0, sorted + firstSample(partOffsets, firstBrick, brick),
+                             begins + brick * cursorsOf(&grid), stride};
+    const Filled filled = {origins, distances, nearestTriangles, counters};
+    fillBlock(&bricks, brick, number, &samples, orders, &filled, &work, &innerPicked, &outerPicked);
+}
+
+#else
+
+// Both in one go. Each group has `room` for the samples of a brick, which stays in the processor's cache.
+GROUP_KERNEL void fillBricks(global const float* points, global const uint* triangles, Grid grid,
+                             global const uint* cellOfBrick, global const uint* triangleOffsets,
+                             global const uint* partOffsets, global const uint* list, uint firstBrick, uint brickCount,
+                             global float* unsorted, global float* sorted, global uint* begins, uint stride,
+                             global uint* next, Layers layers, uint room, global const ulong* orders,
+                             global int* origins, global float* distances, global int* nearestTriangles,
+                             global uint* counters) {
+    uint taken, count, sums[ITEMS], innerPicked, outerPicked;
+    Workplace work;
+    const uint side = (uint)((1 << grid.shift) / BLOCK_SIDE), perBrick = side * side * side;
+    const Bricks bricks = {points,      triangles, grid,       cellOfBrick, triangleOffsets,
+                           partOffsets, list,      firstBrick, layers};
+    const uint group = (uint)(get_group_id(0)), first = group * room;
+    const Samples samples = {unsorted + first, sorted + first, begins + group * cursorsOf(&grid), stride};
+    const Filled filled = {origins, distances, nearestTriangles, counters};
+    while (takeBrick(next, &taken, &count) < brickCount) {
+        prepareBrick(&bricks, taken, &samples, &count, sums);
+        for (uint number = 0; number < perBrick; ++number)
+            fillBlock(&bricks, taken, number, &samples, orders, &filled, &work, &innerPicked, &outerPicked);
+    }
+}
+
+#endif

@@ -18,16 +18,14 @@
 #define multiplyAdd(a, b, c) ((a) * (b) + (c))
 #endif
 
-// A sample, unsorted.
-typedef struct {
-    float place[3];  // in the voxels of the brick
-    int triangle;
-    float offset[3];  // of the outer layer from it, minus that of the inner layer [voxels]
-    uint cell;
-} Sample;
+// Samples of all bricks of a batch, a column for each number: places are in the voxels of the brick, offsets are those of
+// the outer layer from them, minus those of the inner one [voxels]. Only samples that are not sorted yet have a cell.
+enum { PLACE_X, PLACE_Y, PLACE_Z, OFFSET_X, OFFSET_Y, OFFSET_Z, OWNER, CELL };
 
-// Sorted samples of all bricks of a batch, a column for each number.
-enum { PLACE_X, PLACE_Y, PLACE_Z, OFFSET_X, OFFSET_Y, OFFSET_Z, OWNER };
+// Where the samples of a brick of a batch begin: each has room for a vector more.
+uint firstSample(global const uint* partOffsets, uint firstBrick, uint brick) {
+    return partOffsets[firstBrick + brick] - partOffsets[firstBrick] + brick * LANES;
+}
 
 // The cells of a brick: SampleCells of sdf/layer_samples.h.
 typedef struct {
@@ -171,8 +169,9 @@ uint countParts(const Grid* grid, const Corners* t, const Limits* limits) {
 
 // The samples of a brick, and how many there are so far.
 typedef struct {
-    global Sample* samples;
-    global uint* cursors;  // samples of a cell are counted two places on
+    global float* samples;  // the first one's place in the first column
+    uint stride;            // of the columns
+    global uint* cursors;   // of the cells
     SHARED uint* count;
     double3 origin;  // of the brick
     SampleCells cells;
@@ -190,24 +189,16 @@ void addSamples(Cut* cut, uint among, Real3 place, Real3 offset, RealInt owner) 
     const RealInt x = toRealInt((place.x - c->firstCorner) * perCell),
                   y = toRealInt((place.y - c->firstCorner) * perCell),
                   z = toRealInt((place.z - c->firstCorner) * perCell);
-    float numbers[6][BATCH];
-    int owners[BATCH], cells[BATCH];
-    storeReal(place.x, numbers[0]);
-    storeReal(place.y, numbers[1]);
-    storeReal(place.z, numbers[2]);
-    storeReal(offset.x, numbers[3]);
-    storeReal(offset.y, numbers[4]);
-    storeReal(offset.z, numbers[5]);
-    storeRealInt(owner, owners);
-    storeRealInt((x * c->size + y) * c->size + z, cells);
-    uint at = takeShared(cut->count, popcount(among));
-    for (; among != 0; among &= among - 1, ++at) {
-        const int lane = lowestBit(among);
-        global float4* sample = (global float4*)(cut->samples + at);
-        sample[0] = (float4)(numbers[0][lane], numbers[1][lane], numbers[2][lane], as_float(owners[lane]));
-        sample[1] = (float4)(numbers[3][lane], numbers[4][lane], numbers[5][lane], as_float(cells[lane]));
-        takeGlobal(cut->cursors + cells[lane] + 2, 1);
-    }
+    global float* to = cut->samples + takeShared(cut->count, popcount(among));
+    const uint stride = cut->stride;
+    putSome(place.x, among, to + PLACE_X * stride);
+    putSome(place.y, among, to + PLACE_Y * stride);
+    putSome(place.z, among, to + PLACE_Z * stride);
+    putSome(offset.x, among, to + OFFSET_X * stride);
+    putSome(offset.y, among, to + OFFSET_Y * stride);
+    putSome(offset.z, among, to + OFFSET_Z * stride);
+    putSome(asReal(owner), among, to + OWNER * stride);
+    putSome(asReal((x * c->size + y) * c->size + z), among, to + CELL * stride);
 }
 
 // What rows and columns of samples are made of.
@@ -316,11 +307,14 @@ void cutTriangles(Cut* cut, const Grid* grid, global const float* points, global
     }
 }
 
-// Sorts the samples of a brick into columns. Afterwards `cursors` holds the first sample of each cell, and the end of
-// the last one.
-void sortSamples(const Cut* cut, uint count, global float* columns, uint stride, SHARED uint* sums) {
-    const uint cells = (uint)(cut->cells.size * cut->cells.size * cut->cells.size);
+// Sorts the samples of a brick by cell. Afterwards the cursors, which are zero before, hold the first sample of each
+// cell, and the end of the last one.
+void sortSamples(const Cut* cut, uint count, global float* sorted, SHARED uint* sums) {
+    const uint cells = (uint)(cut->cells.size * cut->cells.size * cut->cells.size), stride = cut->stride;
+    global uint* places = (global uint*)(cut->samples + CELL * stride);
     global uint* counts = cut->cursors + 2;
+    ONE_BY_ONE for (uint i = ITEM; i < count; i += ITEMS) takeGlobal(counts + places[i], 1);
+    MEET;
     const uint begin = cells * ITEM / ITEMS, end = cells * (ITEM + 1) / ITEMS;
     uint sum = 0;
     if (ITEMS > 1) {
@@ -333,16 +327,11 @@ void sortSamples(const Cut* cut, uint count, global float* columns, uint stride,
     // the count of a cell becomes the place of the next one's first sample
     for (uint cell = begin; cell < end; ++cell) counts[cell] = sum += counts[cell];
     MEET;
-    for (uint i = ITEM; i < count; i += ITEMS) {
-        const float8 sample = vload8(i, (global const float*)(cut->samples));
-        global float* to = columns + takeGlobal(cut->cursors + as_uint(sample.s7) + 1, 1);
-        to[PLACE_X * stride] = sample.s0;
-        to[PLACE_Y * stride] = sample.s1;
-        to[PLACE_Z * stride] = sample.s2;
-        to[OFFSET_X * stride] = sample.s4;
-        to[OFFSET_Y * stride] = sample.s5;
-        to[OFFSET_Z * stride] = sample.s6;
-        to[OWNER * stride] = sample.s3;
+    ONE_BY_ONE for (uint i = ITEM; i < count; i += ITEMS) places[i] = takeGlobal(cut->cursors + places[i] + 1, 1);
+    for (int column = PLACE_X; column <= OWNER; ++column) {
+        global const float* from = cut->samples + column * stride;
+        global float* to = sorted + column * stride;
+        ONE_BY_ONE for (uint i = ITEM; i < count; i += ITEMS) to[places[i]] = from[i];
     }
     MEET;
 }

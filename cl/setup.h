@@ -38,7 +38,9 @@ class Ended {
     explicit Ended(const cl::CommandQueue& queue) : queue_(queue) {}
     Ended(const Ended&) = delete;
     Ended& operator=(const Ended&) = delete;
-    ~Ended() { ::clFinish(queue_()); }
+    ~Ended() {
+        if (queue_()) ::clFinish(queue_());
+    }
 
   private:
     const cl::CommandQueue& queue_;

@@ -1,6 +1,7 @@
 // What a device took for a build, by the events of its queues.
 #pragma once
 
+#include <algorithm>
 #include <utility>
 #include <vector>
 
@@ -27,16 +28,26 @@ class Timing {
         if (times_) events_.emplace_back(what, event);
     }
 
-    /// Adds up all events so far. Call it when the commands have ended.
+    /// Adds up all events so far; of kernels that ran at the same time, that time once. Call it when the commands have
+    /// ended.
     void sumUp() {
+        std::vector<std::pair<cl_ulong, cl_ulong>> kernels;
         for (const auto& [what, event] : events_) {
             if (!event()) continue;  // nothing was sent: host and device share the memory
             const auto begin = event.getProfilingInfo<CL_PROFILING_COMMAND_START>(),
                        end = event.getProfilingInfo<CL_PROFILING_COMMAND_END>();
-            double& sum = what == Of::kernel ? times_->kernels : what == Of::upload ? times_->upload : times_->download;
-            sum += 1e-9 * double(end - begin);
+            if (what == Of::kernel)
+                kernels.emplace_back(begin, end);
+            else
+                (what == Of::upload ? times_->upload : times_->download) += 1e-9 * double(end - begin);
         }
         events_.clear();
+        std::sort(kernels.begin(), kernels.end());
+        cl_ulong until = 0;
+        for (const auto& [begin, end] : kernels) {
+            if (end > until) times_->kernels += 1e-9 * double(end - std::max(begin, until));
+            until = std::max(until, end);
+        }
     }
 
   private:

@@ -17,6 +17,7 @@ typedef double Exact;
 #define bitsOfExact(held) ((uint)((held) != 0))
 #define storeRealInt(v, p) (*(p) = (v))
 #define laneNumbers 0.0f
+#define asReal as_float
 #define lanesOfBits(bits) ((int)(bits))
 #else
 #define BATCH LANES
@@ -33,8 +34,23 @@ typedef double16 Exact;
 #define bitsOfReal bitsOf
 #define bitsOfExact(held) bitsOf(convert_int16(held))
 #define storeRealInt(v, p) (*(LooseIntLanes*)(p) = (v))
+#define asReal as_float16
 #define laneNumbers ((Real)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15))
 #define lanesOfBits lanesOf
+#endif
+
+// Puts those lanes side by side whose bit is set; some more places are written.
+#if BATCH == 1
+#define putSome(values, bits, to) (*(to) = (values))
+#elif COMPRESSES
+#define putSome(values, bits, to) \
+    storeGlobalLanes(__builtin_ia32_compresssf512_mask(values, (Real)(0), (ushort)(bits)), 0, to)
+#else
+void putSome(Real values, uint bits, global float* to) {
+    float all[BATCH];
+    storeReal(values, all);
+    for (; bits != 0; bits &= bits - 1) *to++ = all[lowestBit(bits)];
+}
 #endif
 
 typedef struct {
@@ -101,20 +117,6 @@ typedef struct {
     Exact3 a, b, c;  // corners [voxels]
 } Batch;
 
-// A corner of each triangle of a batch [voxels].
-Exact3 corners(global const float* points, uint (*indices)[BATCH], int corner, double voxelsPerUnit) {
-    float places[3][BATCH];
-    for (int i = 0; i < BATCH; ++i) {
-        global const float* point = points + 3 * (size_t)(indices[corner][i]);
-        places[0][i] = point[0];
-        places[1][i] = point[1];
-        places[2][i] = point[2];
-    }
-    const Exact3 all = {toExact(loadReal(places[0])) * voxelsPerUnit, toExact(loadReal(places[1])) * voxelsPerUnit,
-                        toExact(loadReal(places[2])) * voxelsPerUnit};
-    return all;
-}
-
 // The longest edges of a batch, squared.
 Exact longestEdges2(const Batch* batch) {
     return max(squareExact(subExact(batch->b, batch->a)),
@@ -126,35 +128,42 @@ Exact longestEdges2(const Batch* batch) {
 #define fetchAhead(pointer) __builtin_prefetch((const void*)(size_t)(pointer))
 
 // Fetches what the next batches of a list will ask for: a processor's item waits for memory where a GPU's others run.
-void prefetchBatches(global const float* points, global const uint* triangles, global const uint* list, uint first,
-                     uint end) {
-    for (uint i = first + 2 * BATCH; i < min(first + 3 * BATCH, end); ++i)
-        fetchAhead(triangles + 3 * (size_t)(list ? list[i] : i));
-    for (uint i = first + BATCH; i < min(first + 2 * BATCH, end); ++i)
-        for (int k = 0; k < 3; ++k) fetchAhead(points + 3 * (size_t)(triangles[3 * (size_t)(list ? list[i] : i) + k]));
+INLINED void prefetchTriangle(global const float* points, global const uint* triangles, global const uint* list,
+                              uint at, uint end) {
+    if (at + 2 * BATCH < end) fetchAhead(triangles + 3 * (size_t)(list ? list[at + 2 * BATCH] : at + 2 * BATCH));
+    if (at + BATCH >= end) return;
+    global const uint* corners = triangles + 3 * (size_t)(list ? list[at + BATCH] : at + BATCH);
+    for (int k = 0; k < 3; ++k) fetchAhead(points + 3 * (size_t)(corners[k]));
 }
 
 #else
-#define prefetchBatches(points, triangles, list, first, end)
+#define prefetchTriangle(points, triangles, list, at, end)
 #endif
 
-// The batch that begins at `first` of a list of triangles, or of all of them if the list is null: all indices are fetched before all corners, so that the processor waits for memory
-// once and not for each triangle.
+// From the numbers of the corners' coordinates [m].
+Exact3 inVoxels(float (*world)[BATCH], double voxelsPerUnit) {
+    const Exact3 corners = {toExact(loadReal(world[0])) * voxelsPerUnit, toExact(loadReal(world[1])) * voxelsPerUnit,
+                            toExact(loadReal(world[2])) * voxelsPerUnit};
+    return corners;
+}
+
+// The batch that begins at `first` of a list of triangles, or of all of them if the list is null.
 void fetchBatch(Batch* batch, global const float* points, global const uint* triangles, global const uint* list,
                 uint first, uint end, double voxelsPerUnit) {
-    prefetchBatches(points, triangles, list, first, end);
-    uint indices[3][BATCH];
+    float world[3][3][BATCH];  // of each corner
     const uint count = min(end - first, (uint)(BATCH));
-    for (uint i = 0; i < BATCH; ++i) {
+    ONE_BY_ONE for (uint i = 0; i < BATCH; ++i) {
         const uint at = first + min(i, count - 1);
+        prefetchTriangle(points, triangles, list, at, end);
         batch->triangle[i] = list ? list[at] : at;
-        const uint3 t = vload3(batch->triangle[i], triangles);
-        indices[0][i] = t.x;
-        indices[1][i] = t.y;
-        indices[2][i] = t.z;
+        global const uint* corners = triangles + 3 * (size_t)(batch->triangle[i]);
+        UNROLLED for (int k = 0; k < 3; ++k) {
+            global const float* point = points + 3 * (size_t)(corners[k]);
+            UNROLLED for (int axis = 0; axis < 3; ++axis) world[k][axis][i] = point[axis];
+        }
     }
     batch->real = (1u << count) - 1;
-    batch->a = corners(points, indices, 0, voxelsPerUnit);
-    batch->b = corners(points, indices, 1, voxelsPerUnit);
-    batch->c = corners(points, indices, 2, voxelsPerUnit);
+    batch->a = inVoxels(world[0], voxelsPerUnit);
+    batch->b = inVoxels(world[1], voxelsPerUnit);
+    batch->c = inVoxels(world[2], voxelsPerUnit);
 }
