@@ -70,10 +70,15 @@ float boundBesideBand(const FieldData& field, float distance, const glm::dvec3& 
 
 #endif
 
+// vectors wider than those of the plain instruction set are passed between functions that are all inlined
+#pragma GCC diagnostic ignored "-Wpsabi"
+
 HWY_BEFORE_NAMESPACE();
 namespace bilayer::HWY_NAMESPACE {
 
 using Pairs [[gnu::vector_size(16)]] = double;
+using TwoFloats [[gnu::vector_size(32)]] = float;  // of two places
+using TwoInts [[gnu::vector_size(32)]] = std::int32_t;
 
 constexpr int fractionBits = FieldData::fractionBits, voxelBits = FieldData::voxelBits;
 
@@ -144,20 +149,72 @@ HWY_INLINE Place placeOf(const FieldData& field, const glm::dvec3& local) {
     return placeOf(field, Doubles{local.x, local.y, local.y, local.z});
 }
 
-/// The voxels around a place at its lower and at its upper x: (y, z), (y, z + 1), (y + 1, z), (y + 1, z + 1).
+/// The voxels around a place at its lower and at its upper x: (y, z), (y, z + 1), (y + 1, z), (y + 1, z + 1). Of two
+/// places, one behind the other.
+template <class Vector>
 struct Cell {
-    Floats low, high;
+    Vector low, high;
     bool inBand;
 };
 
 constexpr int xStep = FieldFrame::stride * FieldFrame::stride, yStep = FieldFrame::stride;
 
-HWY_INLINE bool all(const Ints& mask) {
+HWY_INLINE bool all(Ints mask) {
 #if HWY_ARCH_X86
     return __builtin_ia32_movmskps(reinterpret_cast<Floats>(mask)) == 15;
 #else
     return mask[0] & mask[1] & mask[2] & mask[3];
 #endif
+}
+
+HWY_INLINE bool all(TwoInts mask) {
+#if HWY_ARCH_X86 && HWY_TARGET <= HWY_AVX2
+    return __builtin_ia32_movmskps256(reinterpret_cast<TwoFloats>(mask)) == 255;
+#else
+    return all(__builtin_shufflevector(mask, mask, 0, 1, 2, 3) & __builtin_shufflevector(mask, mask, 4, 5, 6, 7));
+#endif
+}
+
+// Of two vectors, four lanes at a time: their lower or upper halves, their even or odd lanes.
+HWY_INLINE Floats lowerHalves(Floats a, Floats b) {
+    return __builtin_shufflevector(a, b, 0, 1, 4, 5);
+}
+HWY_INLINE Floats upperHalves(Floats a, Floats b) {
+    return __builtin_shufflevector(a, b, 2, 3, 6, 7);
+}
+HWY_INLINE Floats evenLanes(Floats a, Floats b) {
+    return __builtin_shufflevector(a, b, 0, 2, 4, 6);
+}
+HWY_INLINE Floats oddLanes(Floats a, Floats b) {
+    return __builtin_shufflevector(a, b, 1, 3, 5, 7);
+}
+HWY_INLINE TwoFloats lowerHalves(TwoFloats a, TwoFloats b) {
+    return __builtin_shufflevector(a, b, 0, 1, 8, 9, 4, 5, 12, 13);
+}
+HWY_INLINE TwoFloats upperHalves(TwoFloats a, TwoFloats b) {
+    return __builtin_shufflevector(a, b, 2, 3, 10, 11, 6, 7, 14, 15);
+}
+HWY_INLINE TwoFloats evenLanes(TwoFloats a, TwoFloats b) {
+    return __builtin_shufflevector(a, b, 0, 2, 8, 10, 4, 6, 12, 14);
+}
+HWY_INLINE TwoFloats oddLanes(TwoFloats a, TwoFloats b) {
+    return __builtin_shufflevector(a, b, 1, 3, 9, 11, 5, 7, 13, 15);
+}
+// The first three lanes of one, and the first of the other.
+HWY_INLINE Floats withFourth(Floats a, Floats b) {
+    return __builtin_shufflevector(a, b, 0, 1, 2, 4);
+}
+HWY_INLINE TwoFloats withFourth(TwoFloats a, TwoFloats b) {
+    return __builtin_shufflevector(a, b, 0, 1, 2, 8, 4, 5, 6, 12);
+}
+HWY_INLINE TwoFloats both(Floats a, Floats b) {
+    return __builtin_shufflevector(a, b, 0, 1, 2, 3, 4, 5, 6, 7);
+}
+HWY_INLINE TwoInts both(Ints a, Ints b) {
+    return __builtin_shufflevector(a, b, 0, 1, 2, 3, 4, 5, 6, 7);
+}
+HWY_INLINE TwoFloats twice(Floats a) {
+    return both(a, a);
 }
 
 /// Two neighbours along z, and two beside them.
@@ -173,40 +230,67 @@ HWY_INLINE Ints loadPairs(const std::int16_t* v) {
     return __builtin_convertvector(reinterpret_cast<Steps>(pairs), Ints);
 }
 
-HWY_INLINE Cell loadCell(const FieldData& field, const float* v) {
-    const Floats low = loadPairs(v), high = loadPairs(v + xStep);
-    const Floats least = field.lanes.least, most = field.lanes.most;
+template <class Vector>
+HWY_INLINE Cell<Vector> cellOf(Vector low, Vector high, Vector least, Vector most) {
     return {low, high, all((low > least) & (low < most) & (high > least) & (high < most))};
 }
 
-HWY_INLINE Cell loadCell(const FieldData& field, const std::int16_t* v) {
-    const Ints low = loadPairs(v), high = loadPairs(v + xStep);
+/// Values in steps; where some are beyond the band, they are as far as the band is wide.
+template <class Vector, class Steps>
+HWY_INLINE Cell<Vector> decoded(Steps low, Steps high, float step, Vector least, Vector most) {
     constexpr std::int32_t beyond = FieldLayout::beyondBand;
     const bool inBand = all((low > -beyond) & (low < beyond) & (high > -beyond) & (high < beyond));
-    const auto decode = [&](Ints steps) { return __builtin_convertvector(steps, Floats) * field.step; };
-    if (inBand) return {decode(low), decode(high), true};
-    const auto clamped = [&](Floats values) {
-        const Floats least = field.lanes.least, most = field.lanes.most;
+    const Vector lowValues = __builtin_convertvector(low, Vector) * step,
+                 highValues = __builtin_convertvector(high, Vector) * step;
+    if (HWY_LIKELY(inBand)) return {lowValues, highValues, true};
+    const auto clamped = [&](Vector values) {
         values = values < least ? least : values;
         return values > most ? most : values;
     };
-    return {clamped(decode(low)), clamped(decode(high)), false};
+    return {clamped(lowValues), clamped(highValues), false};
 }
 
-/// The distance [m] and its gradient [m a voxel].
-HWY_INLINE Floats interpolate(const Cell& cell, Floats fraction) {
-    const Floats x = __builtin_shufflevector(fraction, fraction, 0, 0, 0, 0),
-                 y = __builtin_shufflevector(fraction, fraction, 1, 1, 1, 1),
-                 z = __builtin_shufflevector(fraction, fraction, 3, 3, 3, 3);
-    const Floats dx = cell.high - cell.low, at = cell.low + x * dx;
+HWY_INLINE Cell<Floats> loadCell(const FieldData& field, const float* v) {
+    return cellOf(loadPairs(v), loadPairs(v + xStep), field.lanes.least, field.lanes.most);
+}
+
+HWY_INLINE Cell<Floats> loadCell(const FieldData& field, const std::int16_t* v) {
+    return decoded(loadPairs(v), loadPairs(v + xStep), field.step, field.lanes.least, field.lanes.most);
+}
+
+HWY_INLINE Cell<TwoFloats> loadCells(const FieldData& field, const float* v, const float* w) {
+    return cellOf(both(loadPairs(v), loadPairs(w)), both(loadPairs(v + xStep), loadPairs(w + xStep)),
+                  twice(field.lanes.least), twice(field.lanes.most));
+}
+
+HWY_INLINE Cell<TwoFloats> loadCells(const FieldData& field, const std::int16_t* v, const std::int16_t* w) {
+    return decoded(both(loadPairs(v), loadPairs(w)), both(loadPairs(v + xStep), loadPairs(w + xStep)), field.step,
+                   twice(field.lanes.least), twice(field.lanes.most));
+}
+
+/// The distance [m] and its gradient [m a voxel], by the fractions of the place, each in all lanes.
+template <class Vector>
+HWY_INLINE Vector interpolate(const Cell<Vector>& cell, Vector x, Vector y, Vector z) {
+    const Vector dx = cell.high - cell.low, at = cell.low + x * dx;
     // values at z and z + 1, then how they change along x
-    const Floats y0 = __builtin_shufflevector(at, dx, 0, 1, 4, 5), y1 = __builtin_shufflevector(at, dx, 2, 3, 6, 7);
-    const Floats dy = y1 - y0, between = y0 + y * dy;
+    const Vector y0 = lowerHalves(at, dx), y1 = upperHalves(at, dx);
+    const Vector dy = y1 - y0, between = y0 + y * dy;
     // value, along x, along y
-    const Floats z0 = __builtin_shufflevector(between, dy, 0, 2, 4, 6),
-                 z1 = __builtin_shufflevector(between, dy, 1, 3, 5, 7);
-    const Floats dz = z1 - z0, found = z0 + z * dz;
-    return __builtin_shufflevector(found, dz, 0, 1, 2, 4);
+    const Vector z0 = evenLanes(between, dy), z1 = oddLanes(between, dy);
+    const Vector dz = z1 - z0, found = z0 + z * dz;
+    return withFourth(found, dz);
+}
+
+HWY_INLINE Floats interpolate(const Cell<Floats>& cell, Floats fraction) {
+    return interpolate(cell, __builtin_shufflevector(fraction, fraction, 0, 0, 0, 0),
+                       __builtin_shufflevector(fraction, fraction, 1, 1, 1, 1),
+                       __builtin_shufflevector(fraction, fraction, 3, 3, 3, 3));
+}
+
+HWY_INLINE TwoFloats interpolate(const Cell<TwoFloats>& cells, TwoFloats fractions) {
+    return interpolate(cells, __builtin_shufflevector(fractions, fractions, 0, 0, 0, 0, 4, 4, 4, 4),
+                       __builtin_shufflevector(fractions, fractions, 1, 1, 1, 1, 5, 5, 5, 5),
+                       __builtin_shufflevector(fractions, fractions, 3, 3, 3, 3, 7, 7, 7, 7));
 }
 
 template <class Value>
@@ -257,7 +341,7 @@ HWY_NOINLINE Sample sampleEmpty(const FieldData& field, std::int32_t block, bool
 template <class Value, class Point>
 HWY_INLINE Sample sampleCell(const FieldData& field, std::int32_t block, const Place& place, const Point& point,
                              float gradientReach) {
-    const Cell cell = loadCell(field, cellOf<Value>(field, block, place));
+    const Cell<Floats> cell = loadCell(field, cellOf<Value>(field, block, place));
     const Floats found = interpolate(cell, place.fraction);
     if (HWY_UNLIKELY(!cell.inBand)) return sampleBesideBand(field, found[0], point);
     if (HWY_UNLIKELY(!(found[0] <= gradientReach))) return sampleOf(Floats{found[0]}, true);
@@ -268,13 +352,31 @@ HWY_INLINE std::int32_t blockAt(const FieldData& field, const Address& address) 
     return HWY_LIKELY(address.within) ? field.directory[address.entry] : FieldFrame::emptyOutside;
 }
 
+template <class Value, class Point>
+HWY_INLINE Sample samplePlace(const FieldData& field, std::int32_t block, const Place& place, const Point& point,
+                              float gradientReach) {
+    if (HWY_UNLIKELY(block < 0)) return sampleEmpty(field, block, place.address.within, point);
+    return sampleCell<Value>(field, block, place, point, gradientReach);
+}
+
+/// Samples two places in stored blocks, if both are in the band.
+template <class Value>
+HWY_INLINE bool sampleTwo(const FieldData& field, const std::int32_t* blocks, const Place* places, Sample* samples) {
+    const auto cells =
+        loadCells(field, cellOf<Value>(field, blocks[0], places[0]), cellOf<Value>(field, blocks[1], places[1]));
+    if (HWY_UNLIKELY(!cells.inBand)) return false;
+    const TwoFloats found =
+        interpolate(cells, both(places[0].fraction, places[1].fraction)) * twice(field.lanes.scales);
+    samples[0] = sampleOf(__builtin_shufflevector(found, found, 0, 1, 2, 3), true);
+    samples[1] = sampleOf(__builtin_shufflevector(found, found, 4, 5, 6, 7), true);
+    return true;
+}
+
 /// @param point  glm::vec3 in the field's own coordinates [m], or glm::dvec3 from the directory's first voxel [voxels]
 template <class Value, class Point>
 Sample sampleAt(const FieldData& field, const Point& point, float gradientReach) {
     const Place place = placeOf(field, point);
-    const std::int32_t block = blockAt(field, place.address);
-    if (HWY_UNLIKELY(block < 0)) return sampleEmpty(field, block, place.address.within, point);
-    return sampleCell<Value>(field, block, place, point, gradientReach);
+    return samplePlace<Value>(field, blockAt(field, place.address), place, point, gradientReach);
 }
 
 /// Points of a batch that are under way together: enough to hide the memory's latency, few enough to stay in the
@@ -298,10 +400,13 @@ HWY_INLINE void sampleTogether(const FieldData& field, std::span<const glm::vec3
         __builtin_prefetch(v + xStep);
         __builtin_prefetch(v + xStep + yStep + 1);
     }
-    for (std::size_t i = 0; i < points.size(); ++i) {
-        samples[i] = HWY_LIKELY(blocks[i] >= 0) ? sampleCell<Value>(field, blocks[i], places[i], points[i], infinity)
-                                                : sampleEmpty(field, blocks[i], places[i].address.within, points[i]);
-    }
+    std::size_t i = 0;
+    for (; i + 1 < points.size(); i += 2)
+        if (HWY_UNLIKELY((blocks[i] | blocks[i + 1]) < 0 ||
+                         !sampleTwo<Value>(field, blocks + i, places + i, samples + i)))
+            for (std::size_t k = i; k < i + 2; ++k)
+                samples[k] = samplePlace<Value>(field, blocks[k], places[k], points[k], infinity);
+    if (i < points.size()) samples[i] = samplePlace<Value>(field, blocks[i], places[i], points[i], infinity);
 }
 
 template <class Value>
