@@ -86,7 +86,7 @@ Touched linesTouched(const FieldLayout& field, std::span<const glm::vec3> points
     for (const glm::vec3& point : points) {
         const glm::ivec3 voxel((glm::dvec3(point) - field.origin) * field.perMetre), inBlock = voxel & 7;
         const std::int32_t& block = field.directory[field.entryOf(voxel >> 3)];
-        const float* const first = field.values.get() + std::size_t(block) * FieldLayout::blockFloats +
+        const float* const first = field.values.data() + std::size_t(block) * FieldLayout::blockFloats +
                                    (inBlock.x * stride + inBlock.y) * stride + inBlock.z;
         std::vector<std::uintptr_t> lines{reinterpret_cast<std::uintptr_t>(&block) / cacheLine};
         for (const int row : {0, stride, stride * stride, stride * stride + stride})

@@ -36,7 +36,7 @@ constexpr double missedAlike = 0.01, hitAlike = 0.5;  // share of rays; median d
 
 struct Options {
     std::string mesh = "bunny", json;
-    std::vector<float> resolutions{172, 922};  // grids of OpenVDB's of about 9 and 150 MB
+    std::vector<float> resolutions{192, 922};  // grids of OpenVDB's of about 9 and 150 MB
     float halfWidth = 3;
     std::size_t points = 1000000, others = 200000;
     std::vector<int> threads{1, 2};
@@ -44,10 +44,15 @@ struct Options {
     unsigned seed = 1;
 };
 
-Sampler singleSamples(const Field& field) {
-    return {ours + " sample", [field](std::span<const glm::vec3> points, std::span<Sample> samples) {
+Sampler singleSamples(const std::string& name, const Field& field) {
+    return {name, [field](std::span<const glm::vec3> points, std::span<Sample> samples) {
                 for (std::size_t i = 0; i < points.size(); ++i) samples[i] = field.sample(points[i]);
             }};
+}
+
+Sampler batchedSamples(const std::string& name, const Field& field) {
+    return {name,
+            [field](std::span<const glm::vec3> points, std::span<Sample> samples) { field.sample(points, samples); }};
 }
 
 Closest singleClosest(const Field& field) {
@@ -191,7 +196,7 @@ nlohmann::json compare(const Source& source, float resolution, const Options& op
                            .interiorWidth = options.halfWidth,
                            .triangles = true};
     const LevelSet levelSet = build(scene.mesh, how);
-    const Field field(levelSet), withMesh(levelSet, scene.mesh);
+    const Field field(levelSet), small(levelSet, {.storage = Storage::fixed16}), withMesh(levelSet, scene.mesh);
     const auto grid = levelSet.grids().distance;
     const Nanovdb nanovdb(*grid);
     const Embree embree(scene.mesh, false), robust(scene.mesh, true);
@@ -199,8 +204,9 @@ nlohmann::json compare(const Source& source, float resolution, const Options& op
     const double layoutSeconds = medianSeconds(options.rounds, [&] { Field again(levelSet); });
     const double meshSeconds = medianSeconds(options.rounds, [&] { Field again(levelSet, scene.mesh); });
     fmt::print("\n## {}, {:g} voxels, half width {:g}\n\n", scene.name, resolution, options.halfWidth);
-    fmt::print("Bytes: OpenVDB {}, NanoVDB {}, bilayer {} ({:.2f} of NanoVDB's)\n", grid->memUsage(), nanovdb.bytes(),
-               field.memoryBytes(), double(field.memoryBytes()) / double(nanovdb.bytes()));
+    const auto part = [&](const Field& some) { return double(some.memoryBytes()) / double(nanovdb.bytes()); };
+    fmt::print("Bytes: OpenVDB {}, NanoVDB {}, bilayer {} ({:.2f} of NanoVDB's), in 16 bits {} ({:.2f})\n",
+               grid->memUsage(), nanovdb.bytes(), field.memoryBytes(), part(field), small.memoryBytes(), part(small));
     fmt::print(
         "Milliseconds: the level set {:.1f}, the field from it {:.1f} ({:.0f} %), with its mesh {:.1f} ({:.0f} %)\n",
         1e3 * buildSeconds, 1e3 * layoutSeconds, 100 * layoutSeconds / buildSeconds, 1e3 * meshSeconds,
@@ -210,7 +216,9 @@ nlohmann::json compare(const Source& source, float resolution, const Options& op
     const auto points = pointsInBand(field, levelSet, options.points, options.seed);
     const auto samples = contest<glm::vec3, Sample>(
         "Value and gradient",
-        {openvdbSampler(grid), openvdbStencil(grid), openvdbCell(grid), nanovdb.sampler(), singleSamples(field)},
+        {openvdbSampler(grid), openvdbStencil(grid), openvdbCell(grid), nanovdb.sampler(),
+         singleSamples(ours + " sample", field), batchedSamples(ours + " sample, batched", field),
+         singleSamples(ours + " sample, 16 bits", small), batchedSamples(ours + " sample, 16 bits, batched", small)},
         points, voxelSize, options);
     const nlohmann::json floor = floors(levelSet, field.memoryBytes(), points, options);
     const auto nearest = contest<glm::vec3, ClosestPoint>(
@@ -223,7 +231,11 @@ nlohmann::json compare(const Source& source, float resolution, const Options& op
                                            raysOnto(field, options.others, options.seed), voxelSize, options);
     return {{"mesh", scene.name},
             {"resolution", resolution},
-            {"bytes", {{"openvdb", grid->memUsage()}, {"nanovdb", nanovdb.bytes()}, {"bilayer", field.memoryBytes()}}},
+            {"bytes",
+             {{"openvdb", grid->memUsage()},
+              {"nanovdb", nanovdb.bytes()},
+              {"bilayer", field.memoryBytes()},
+              {"bilayer16", small.memoryBytes()}}},
             {"seconds", {{"levelSet", buildSeconds}, {"field", layoutSeconds}, {"withMesh", meshSeconds}}},
             {"sample", toJson(samples)},
             {"floor", floor},
