@@ -12,6 +12,7 @@
 
 #include "collider/field.h"
 #include "collider/field_data.h"
+#include "collider/zero_set.h"
 #include "sdf/orient.h"
 #include "sdf/sign.h"
 
@@ -111,17 +112,35 @@ ClosestPoint FieldData::closestOn(std::uint32_t triangle, const glm::vec3& point
             .found = true};
 }
 
+ClosestPoint FieldData::closest(const glm::vec3& point, float maxDistance) const {
+    if (!mesh) return closestZero(point, maxDistance);
+    const Sample here = sample(toLocal(point));
+    return closestOn(mesh->nearest(glm::dvec3(point), expectedDistance(here, maxDistance)), point, here, maxDistance);
+}
+
+ClosestPoint FieldData::closestZero(const glm::vec3& point, float maxDistance) const {
+    const glm::dvec3 local = toLocal(point);
+    if (!std::isfinite(local.x + local.y + local.z) || !(maxDistance >= 0)) return {};
+    const auto nearest = nearestZero(*this, local, double(maxDistance) * perMetre);
+    if (!nearest) return {};
+    const auto distance = float(glm::distance(local, *nearest) * voxel);
+    return {.distance = sample(local).distance < 0 ? -distance : distance,
+            .position = toWorld(*nearest),
+            .normal = glm::vec3(zeroNormal(*this, *nearest)),
+            .found = true};
+}
+
 ClosestPoint Field::closest(const glm::vec3& point, float maxDistance) const noexcept {
-    if (!data_->mesh) return {};
-    const Sample here = data_->sample(data_->toLocal(point), -infinity);
-    const float bound = data_->expectedDistance(here, maxDistance);
-    return data_->closestOn(data_->mesh->nearest(glm::dvec3(point), bound), point, here, maxDistance);
+    return data_->closest(point, maxDistance);
 }
 
 // Step by step for some points at a time, so that memory is asked for well ahead of its use.
 void Field::closest(std::span<const glm::vec3> points, std::span<ClosestPoint> answers, float maxDistance) const {
     requireSameLength(points.size(), answers.size(), "answers");
-    if (!data_->mesh) return std::fill(answers.begin(), answers.end(), ClosestPoint{});
+    if (!data_->mesh) {
+        for (std::size_t i = 0; i < points.size(); ++i) answers[i] = data_->closestZero(points[i], maxDistance);
+        return;
+    }
     const MeshTree& mesh = *data_->mesh;
     std::array<glm::dvec3, batch> places;
     std::array<Sample, batch> samples;

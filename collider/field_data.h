@@ -114,6 +114,12 @@ struct FieldData : FieldLayout {
     float expectedDistance(const Sample& here, float maxDistance) const;
     ClosestPoint closestOn(std::uint32_t triangle, const glm::vec3& point, const Sample& here, float maxDistance) const;
 
+    /// The closest point of the mesh, or of the zero set where there is none.
+    ClosestPoint closest(const glm::vec3& point, float maxDistance) const;
+    ClosestPoint closestZero(const glm::vec3& point, float maxDistance) const;
+
+    bool inside(const glm::vec3& point) const;
+
     /// A voxel of a stored block, apron included [m].
     float valueAt(std::size_t index) const {
         if (storage == Storage::float32) return values.data()[index];

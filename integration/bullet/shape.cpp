@@ -33,7 +33,7 @@ void castRay(const Placed& field, btTriangleRaycastCallback& callback) {
     const glm::vec3 to = field.pose.toBody(toGlm(callback.m_to)) / field.scale;
     const float length = glm::length(to - from);
     if (!(length > 0)) return;
-    const auto hit = field.collider.field().raycast(from, (to - from) / length, length * callback.m_hitFraction);
+    const auto hit = field.collider.field().raycast({from, (to - from) / length, length * callback.m_hitFraction});
     if (!hit) return;
     const float fraction = hit->distance / length;
     if (fraction < callback.m_hitFraction)

@@ -1,0 +1,100 @@
+#include "collider/triangle_tests.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+
+namespace bilayer {
+namespace {
+
+/// A sphere touches what is no farther from it than this [voxels].
+constexpr double touchTolerance = 1e-7;
+/// What is not reached in as many tangents is passed at that tolerance.
+constexpr int mostTangents = 64;
+
+}  // namespace
+
+TriangleRay::TriangleRay(const glm::dvec3& start, const glm::dvec3& direction, double tolerance)
+    : start_(start), tolerance_(tolerance) {
+    const glm::dvec3 size = glm::abs(direction);
+    z_ = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
+    x_ = (z_ + 1) % 3, y_ = (z_ + 2) % 3;
+    perZ_ = 1 / direction[z_];
+    shearX_ = direction[x_] * perZ_, shearY_ = direction[y_] * perZ_;
+}
+
+// Moved and sheared so that the ray becomes the z axis, and z the way along the ray.
+glm::dvec3 TriangleRay::sheared(const glm::dvec3& corner) const {
+    const glm::dvec3 p = corner - start_;
+    return {p[x_] - shearX_ * p[z_], p[y_] - shearY_ * p[z_], perZ_ * p[z_]};
+}
+
+// Whether the axis lies on the inner side of an edge, or hardly beside it.
+bool TriangleRay::within(double area, const glm::dvec3& from, const glm::dvec3& to) const {
+    if (area >= 0) return true;
+    const double x = to.x - from.x, y = to.y - from.y;
+    return area * area <= tolerance_ * tolerance_ * (x * x + y * y);
+}
+
+bool TriangleRay::meets(const Corners& corners, double& along, glm::dvec3& position) const {
+    const glm::dvec3 a = sheared(corners[0]), b = sheared(corners[1]), c = sheared(corners[2]);
+    // twice the areas between the axis and the edges: neighbours get the same number for the edge that they share
+    double u = c.x * b.y - c.y * b.x, v = a.x * c.y - a.y * c.x, w = b.x * a.y - b.y * a.x;
+    const double facing = u + v + w;
+    if (facing == 0) return false;
+    if (facing < 0) u = -u, v = -v, w = -w;
+    if (!(within(u, b, c) && within(v, c, a) && within(w, a, b))) return false;
+    u = std::max(u, 0.0), v = std::max(v, 0.0), w = std::max(w, 0.0);
+    const double all = u + v + w, here = (u * a.z + v * b.z + w * c.z) / all;
+    if (!(here < along)) return false;
+    const bool entering = (facing < 0) == (perZ_ < 0);
+    if (here < (entering ? -tolerance_ : 0)) return false;
+    along = std::max(here, 0.0);
+    position = (u * corners[0] + v * corners[1] + w * corners[2]) / all;
+    return true;
+}
+
+// The distance to a triangle is convex along the way: tangents never lead past the first touch.
+bool touches(const MeshTree& mesh, std::uint32_t triangle, const Path& path, double radius, double& along,
+             glm::dvec3& position) {
+    const double tolerance = touchTolerance * double(mesh.voxelSize());
+    double here = 0;
+    for (int i = 0; i < mostTangents; ++i) {
+        const glm::dvec3 centre = path.at(here), way = mesh.featureOf(triangle, centre).way;
+        const double distance = glm::length(way), left = distance - radius;
+        if (left <= tolerance) {
+            along = here;
+            position = centre + way;
+            return true;
+        }
+        const double approach = glm::dot(way, path.direction) / distance;
+        if (!(approach > 0)) return false;
+        here += left / approach;
+        if (!(here < along)) return false;
+    }
+    return false;
+}
+
+bool overlaps(const TurnedBox& box, const Corners& corners) {
+    const glm::dmat3 toBox = glm::transpose(box.axes);
+    const Corners p{toBox * (corners[0] - box.centre), toBox * (corners[1] - box.centre),
+                    toBox * (corners[2] - box.centre)};
+    const auto separates = [&](const glm::dvec3& axis) {
+        const double reach = glm::dot(glm::abs(axis), box.halfSize);
+        const double a = glm::dot(axis, p[0]), b = glm::dot(axis, p[1]), c = glm::dot(axis, p[2]);
+        return std::min({a, b, c}) > reach || std::max({a, b, c}) < -reach;
+    };
+    for (int k = 0; k < 3; ++k)
+        if (std::min({p[0][k], p[1][k], p[2][k]}) > box.halfSize[k] ||
+            std::max({p[0][k], p[1][k], p[2][k]}) < -box.halfSize[k])
+            return false;
+    const Corners edges{p[1] - p[0], p[2] - p[1], p[0] - p[2]};
+    if (separates(glm::cross(edges[0], edges[1]))) return false;
+    for (const glm::dvec3& e : edges)
+        if (separates({0, -e.z, e.y}) || separates({e.z, 0, -e.x}) || separates({-e.y, e.x, 0})) return false;
+    return true;
+}
+
+}  // namespace bilayer
