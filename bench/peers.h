@@ -30,12 +30,6 @@ using Sampler = Peer<glm::vec3, Sample>;
 /// Closest points of the surface [m].
 using Closest = Peer<glm::vec3, ClosestPoint>;
 
-/// A ray, its direction of unit length [m].
-struct Ray {
-    glm::vec3 origin, direction;
-    float maxDistance;
-};
-
 /// The answer to a ray that meets nothing.
 inline constexpr RayHit missed{.distance = std::numeric_limits<float>::infinity()};
 

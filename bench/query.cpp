@@ -67,10 +67,9 @@ Closest batchedClosest(const Field& field) {
             }};
 }
 
-RayCaster singleRays(const Field& field) {
-    return {ours + " raycast", [field](std::span<const Ray> rays, std::span<RayHit> hits) {
-                for (std::size_t i = 0; i < rays.size(); ++i)
-                    hits[i] = field.raycast(rays[i].origin, rays[i].direction, rays[i].maxDistance).value_or(missed);
+RayCaster singleRays(const std::string& name, const Field& field) {
+    return {name, [field](std::span<const Ray> rays, std::span<RayHit> hits) {
+                for (std::size_t i = 0; i < rays.size(); ++i) hits[i] = field.raycast(rays[i]).value_or(missed);
             }};
 }
 
@@ -227,8 +226,11 @@ nlohmann::json compare(const Source& source, float resolution, const Options& op
          embree.closest("Embree rtcPointQuery, no farther than the band", options.halfWidth * voxelSize),
          singleClosest(withMesh), batchedClosest(withMesh)},
         pointsInBand(field, levelSet, options.others, options.seed), voxelSize, options);
-    const auto rays = contest<Ray, RayHit>("Rays", {robust.rays(), openvdbRays(grid), singleRays(field)},
-                                           raysOnto(field, options.others, options.seed), voxelSize, options);
+    const auto rays =
+        contest<Ray, RayHit>("Rays",
+                             {robust.rays(), openvdbRays(grid), singleRays(ours + " raycast, without the mesh", field),
+                              singleRays(ours + " raycast", withMesh)},
+                             raysOnto(field, options.others, options.seed), voxelSize, options);
     return {{"mesh", scene.name},
             {"resolution", resolution},
             {"bytes",
