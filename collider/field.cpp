@@ -58,7 +58,7 @@ const Mesh* Field::mesh() const noexcept {
 }
 
 std::size_t Field::memoryBytes() const noexcept {
-    return data_->memoryBytes() + (data_->mesh ? data_->mesh->memoryBytes() : 0);
+    return data_->memoryBytes() + data_->entries.memoryBytes() + (data_->mesh ? data_->mesh->memoryBytes() : 0);
 }
 
 }  // namespace bilayer

@@ -58,6 +58,8 @@ glm::vec3 outwardNormal(const NearestFeature& nearest, bool inside) {
 
 FieldData::FieldData(const LevelSet& levelSet, Mesh given, Storage storage) : FieldData(levelSet, storage) {
     mesh = std::make_unique<MeshTree>(meshOf(levelSet, std::move(given)), levelSet.voxelSize());
+    const float reach = std::max(exteriorWidth, interiorWidth) * float(perMetre) + usualError;
+    entries = BlockEntries(*this, mesh->tree(), 1 / double(voxelSize), reach);
     signedByNormals = levelSet.sign() == "normals";
     error =
         levelSet.errorBound() < infinity ? levelSet.errorBound() + (storage == Storage::fixed16 ? step : 0) : infinity;
@@ -80,33 +82,40 @@ FieldData::Side FieldData::sideAt(const glm::dvec3& local, const Sample& here) c
     return certain ? Side{value < 0, true} : Side{inside, false};
 }
 
+// Where the search for a point in the band begins.
+const EntryGroup* FieldData::entryOf(const glm::vec3& point) const {
+    const glm::ivec3 voxel(toLocal(point)), block = voxel >> 3;
+    const std::int32_t number = directory[entryOf(block)];
+    return number < 0 ? nullptr : entries.of(number, voxel & 7);  // rounded into its neighbour
+}
+
 // How far the triangle that is nearest can be by the field [voxels]: often enough.
 float FieldData::expectedDistance(const Sample& here, float maxDistance) const {
     return (here.inBand ? std::abs(here.distance) : maxDistance) * float(perMetre) + (here.inBand ? usualError : 0);
 }
 
-// By the normal, where it is the mesh's and tells a side, and no ball of the field knows better.
+// By the normal, where it is the mesh's and tells a side; else by the field.
 bool FieldData::isInside(const NearestFeature& nearest, const glm::dvec3& local, const Sample& here) const {
-    const Side side = sideAt(local, here);
     const double height = heightOver(nearest);
-    const bool decided = signedByNormals && std::abs(height) > cancelled * glm::length(nearest.way);
-    return side.certain || !decided ? side.inside : height < 0;
+    if (signedByNormals && std::abs(height) > cancelled * glm::length(nearest.way)) return height < 0;
+    return sideAt(local, here).inside;
 }
 
-// What is known of a point once the triangle is found that is nearest to it, within the distance that was expected.
-ClosestPoint FieldData::closestOn(std::uint32_t triangle, const glm::vec3& point, const Sample& here,
+// What is known of a point once the part of the mesh is found that is nearest to it, within the distance that was
+// expected.
+ClosestPoint FieldData::closestOn(std::uint32_t part, const glm::vec3& point, const Sample& here,
                                   float maxDistance) const {
-    if (triangle == noTriangle && here.inBand)
-        triangle = mesh->nearest(glm::dvec3(point), maxDistance * float(perMetre));
-    if (triangle == noTriangle) return {};
-    const NearestFeature nearest = mesh->featureOf(triangle, glm::dvec3(point));
+    if (part == MeshTree::noPart && here.inBand)
+        part = mesh->nearestPart(glm::dvec3(point), maxDistance * float(perMetre));
+    if (part == MeshTree::noPart) return {};
+    const NearestFeature nearest = mesh->featureOfPart(part, glm::dvec3(point));
     const double distance = glm::length(nearest.way);
     if (!(distance <= double(maxDistance))) return {};
     const bool inside = isInside(nearest, toLocal(point), here);
     return {.distance = float(inside ? -distance : distance),
             .position = glm::vec3(glm::dvec3(point) + nearest.way),
             .normal = outwardNormal(nearest, inside),
-            .triangle = triangle,
+            .triangle = nearest.triangle,
             .feature = nearest.feature,
             .index = nearest.index,
             .found = true};
@@ -114,8 +123,10 @@ ClosestPoint FieldData::closestOn(std::uint32_t triangle, const glm::vec3& point
 
 ClosestPoint FieldData::closest(const glm::vec3& point, float maxDistance) const {
     if (!mesh) return closestZero(point, maxDistance);
-    const Sample here = sample(toLocal(point));
-    return closestOn(mesh->nearest(glm::dvec3(point), expectedDistance(here, maxDistance)), point, here, maxDistance);
+    const Sample here = kernels.samplePoint(*this, point, -infinity);
+    const float bound = expectedDistance(here, maxDistance);
+    const EntryGroup* entry = here.inBand ? entryOf(point) : nullptr;
+    return closestOn(mesh->nearestPart(glm::dvec3(point), bound, entry), point, here, maxDistance);
 }
 
 ClosestPoint FieldData::closestZero(const glm::vec3& point, float maxDistance) const {
@@ -145,21 +156,21 @@ void Field::closest(std::span<const glm::vec3> points, std::span<ClosestPoint> a
     std::array<glm::dvec3, batch> places;
     std::array<Sample, batch> samples;
     std::array<float, batch> bounds;
-    std::array<std::uint32_t, batch> triangles;
+    std::array<const EntryGroup*, batch> entries;
+    std::array<std::uint32_t, batch> parts;
     for (std::size_t begin = 0; begin < points.size(); begin += batch) {
         const std::size_t count = std::min(batch, points.size() - begin);
         data_->kernels.sampleMany(*data_, points.subspan(begin, count), samples.data());
         for (std::size_t i = 0; i < count; ++i) {
             places[i] = glm::dvec3(points[begin + i]);
             bounds[i] = data_->expectedDistance(samples[i], maxDistance);
+            entries[i] = samples[i].inBand ? data_->entryOf(points[begin + i]) : nullptr;
+            if (entries[i]) entries[i]->fetch();
         }
-        mesh.nearest({places.data(), count}, {bounds.data(), count}, {triangles.data(), count});
+        mesh.nearestParts({places.data(), count}, {bounds.data(), count}, {entries.data(), count},
+                          {parts.data(), count});
         for (std::size_t i = 0; i < count; ++i)
-            if (triangles[i] != noTriangle) mesh.fetchTriangle(triangles[i]);
-        for (std::size_t i = 0; i < count; ++i)
-            if (triangles[i] != noTriangle) mesh.fetchCorners(triangles[i]);
-        for (std::size_t i = 0; i < count; ++i)
-            answers[begin + i] = data_->closestOn(triangles[i], points[begin + i], samples[i], maxDistance);
+            answers[begin + i] = data_->closestOn(parts[i], points[begin + i], samples[i], maxDistance);
     }
 }
 

@@ -62,6 +62,7 @@ struct FieldData : FieldLayout {
     const SampleKernels& kernels;
     const Clearance coarse;
     std::unique_ptr<const MeshTree> mesh;  ///< null: the field has none
+    BlockEntries entries;                  ///< of searches for points in the band
     bool signedByNormals = false;          ///< of this mesh
     float error = 0;                       ///< of distances in the band [m]; infinite: not known
 
@@ -111,8 +112,10 @@ struct FieldData : FieldLayout {
     };
     Side sideAt(const glm::dvec3& local, const Sample& here) const;
     bool isInside(const NearestFeature& nearest, const glm::dvec3& local, const Sample& here) const;
+    using FieldFrame::entryOf;
+    const EntryGroup* entryOf(const glm::vec3& point) const;
     float expectedDistance(const Sample& here, float maxDistance) const;
-    ClosestPoint closestOn(std::uint32_t triangle, const glm::vec3& point, const Sample& here, float maxDistance) const;
+    ClosestPoint closestOn(std::uint32_t part, const glm::vec3& point, const Sample& here, float maxDistance) const;
 
     /// The closest point of the mesh, or of the zero set where there is none.
     ClosestPoint closest(const glm::vec3& point, float maxDistance) const;

@@ -26,6 +26,7 @@ namespace bilayer::HWY_NAMESPACE {
 constexpr std::size_t mostWaiting = 96;
 /// Points that are looked at in turns: enough to hide what memory takes, and few enough for the first cache.
 constexpr std::size_t together = 8;
+constexpr std::uint32_t noNode = ~0u;
 constexpr std::size_t cacheLine = 64;  // [bytes]
 /// Points and boxes in the tree's frame are rounded by no more than this part of their size.
 constexpr float placeRounding = 5e-7f;
@@ -40,25 +41,28 @@ inline void fetch(const Item& item) {
 // One point's way down the tree, node by node.
 class Search {
   public:
-    void begin(const WideTree& tree, const TurnedGroup* groups, const glm::dvec3& point, float bound) {
+    void begin(const WideTree& tree, const TurnedGroup* groups, const glm::dvec3& point, float bound,
+               const EntryGroup* entry) {
         tree_ = &tree;
         groups_ = groups;
         cell_ = glm::floor(point);
         inCell_ = glm::vec3(point - glm::floor(point));
         const glm::vec3 size = glm::max(glm::abs(cell_), glm::vec3(tree.size));
         slack_ = placeRounding * (size.x + size.y + size.z);
-        triangle_ = noTriangle;
+        part_ = MeshTree::noPart;
         waiting_ = 0;
         node_ = tree.root();
         lower(bound * bound);
+        if (entry && !open(*entry)) node_ = noNode;
     }
 
     // Looks at the next node; false when there is none left.
     bool step() {
+        if (node_ == noNode) return false;
         if (!tree_->isLeaf(node_)) {
             if (open(groups_[node_ - tree_->leafCount])) return true;
         } else {
-            visit(tree_->leaves[node_]);
+            visit(tree_->leaves[node_], node_);
         }
         do {
             if (waiting_ == 0) return false;
@@ -68,9 +72,11 @@ class Search {
         return true;
     }
 
-    void fetchNext() const { fetchNode(node_); }
+    void fetchNext() const {
+        if (node_ != noNode) fetchNode(node_);
+    }
 
-    std::uint32_t triangle() const { return triangle_; }
+    std::uint32_t part() const { return part_; }
 
   private:
     // Boxes are rounded, triangles are not.
@@ -87,16 +93,11 @@ class Search {
             fetch(groups_[node - tree_->leafCount]);
     }
 
-    // Puts those children aside that may hold something nearer, and goes on to the nearest of them.
-    bool open(const TurnedGroup& group) {
+    // The boxes of a group that may hold something nearer, bit by bit, and how far they are.
+    template <class Group>
+    unsigned nearBoxes(const Group& group, const float (&place)[3], float* gaps) const {
         const Tag tag;
-        alignas(64) float gaps[treeWidth];
         unsigned near = 0;
-        // whole voxels first, without rounding
-        const glm::vec3 origin(group.origin[0], group.origin[1], group.origin[2]), from = (cell_ - origin) + inCell_;
-        float place[3];
-        for (int k = 0; k < 3; ++k)
-            place[k] = group.axes[k][0] * from.x + group.axes[k][1] * from.y + group.axes[k][2] * from.z;
         for (std::size_t i = 0; i < treeWidth; i += hn::Lanes(tag)) {
             Vec sum = hn::Zero(tag);
             for (int k = 0; k < 3; ++k) {
@@ -108,19 +109,43 @@ class Search {
             hn::Store(sum, tag, gaps + i);
             near |= bitsOf(hn::Le(sum, hn::Set(tag, limit2_))) << i;
         }
+        return near;
+    }
+
+    // Puts those nodes aside that may hold something nearer, and goes on to the nearest of them.
+    template <class NodeOf>
+    bool choose(unsigned near, const float* gaps, NodeOf nodeOf) {
         if (near == 0) return false;
         auto nearest = std::size_t(std::countr_zero(near));
         for (unsigned bits = near & (near - 1); bits != 0; bits &= bits - 1) {
             auto other = std::size_t(std::countr_zero(bits));
             if (gaps[other] < gaps[nearest]) std::swap(other, nearest);
             gaps_[waiting_] = gaps[other];
-            nodes_[waiting_++] = group.firstChild + std::uint32_t(other);
+            nodes_[waiting_++] = nodeOf(other);
         }
-        node_ = group.firstChild + std::uint32_t(nearest);
+        node_ = nodeOf(nearest);
         return true;
     }
 
-    void visit(const WideLeaf& leaf) {
+    bool open(const TurnedGroup& group) {
+        alignas(64) float gaps[treeWidth];
+        // whole voxels first, without rounding
+        const glm::vec3 origin(group.origin[0], group.origin[1], group.origin[2]), from = (cell_ - origin) + inCell_;
+        float place[3];
+        for (int k = 0; k < 3; ++k)
+            place[k] = group.axes[k][0] * from.x + group.axes[k][1] * from.y + group.axes[k][2] * from.z;
+        const unsigned near = nearBoxes(group, place, gaps);
+        return choose(near, gaps, [&](std::size_t i) { return group.firstChild + std::uint32_t(i); });
+    }
+
+    bool open(const EntryGroup& group) {
+        alignas(64) float gaps[treeWidth];
+        const glm::vec3 from = cell_ + inCell_;
+        const unsigned near = nearBoxes(group, {from.x, from.y, from.z}, gaps);
+        return choose(near, gaps, [&](std::size_t i) { return group.nodes[i]; });
+    }
+
+    void visit(const WideLeaf& leaf, std::uint32_t index) {
         const Tag tag;
         alignas(64) float distance2[treeWidth];
         Vec least = hn::Set(tag, best2_);
@@ -136,12 +161,12 @@ class Search {
             least = hn::Min(least, measured);
         }
         const float nearest = hn::GetLane(hn::MinOfLanes(tag, least));
-        if (nearest == best2_ && triangle_ != noTriangle) return;
+        if (nearest == best2_ && part_ != MeshTree::noPart) return;
         unsigned found = 0;
         for (std::size_t i = 0; i < treeWidth; i += hn::Lanes(tag))
             found |= bitsOf(hn::Eq(hn::Load(tag, distance2 + i), hn::Set(tag, nearest))) << i;
         if (found == 0) return;
-        triangle_ = leaf.triangles[std::countr_zero(found)];
+        part_ = index * treeWidth + std::uint32_t(std::countr_zero(found));
         lower(nearest);
     }
 
@@ -149,28 +174,30 @@ class Search {
     const TurnedGroup* groups_;
     glm::vec3 cell_, inCell_;
     float slack_, best2_, limit2_;
-    std::uint32_t triangle_, node_;
+    std::uint32_t part_, node_;
     std::size_t waiting_;
     float gaps_[mostWaiting];
     std::uint32_t nodes_[mostWaiting];
 };
 
-std::uint32_t searchNearest(const WideTree& tree, const TurnedGroup* groups, const glm::dvec3& point, float bound) {
+std::uint32_t searchNearest(const WideTree& tree, const TurnedGroup* groups, const glm::dvec3& point, float bound,
+                            const EntryGroup* entry) {
     Search search;
-    search.begin(tree, groups, point, bound);
+    search.begin(tree, groups, point, bound, entry);
     while (search.step()) {
     }
-    return search.triangle();
+    return search.part();
 }
 
 // Many points, some at a time: while memory comes for one, another is looked at.
 void searchAll(const WideTree& tree, const TurnedGroup* groups, const glm::dvec3* points, const float* bounds,
-               std::uint32_t* triangles, std::size_t count) {
+               const EntryGroup* const* entries, std::uint32_t* parts, std::size_t count) {
     Search searches[together];
     std::size_t answers[together], running = 0, next = 0;
     const auto begin = [&](std::size_t slot) {
         answers[slot] = next;
-        searches[slot].begin(tree, groups, points[next], bounds[next]);
+        searches[slot].begin(tree, groups, points[next], bounds[next], entries[next]);
+        searches[slot].fetchNext();
         ++next;
     };
     while (running < together && next < count) begin(running++);
@@ -180,7 +207,7 @@ void searchAll(const WideTree& tree, const TurnedGroup* groups, const glm::dvec3
                 searches[slot++].fetchNext();
                 continue;
             }
-            triangles[answers[slot]] = searches[slot].triangle();
+            parts[answers[slot]] = searches[slot].part();
             if (next < count) {
                 begin(slot++);
             } else if (slot != --running) {
@@ -206,6 +233,9 @@ constexpr double thinnest = 1e-7;
 constexpr double flatness = 1e-10;
 /// As many sizes of the mesh away all its triangles are equally far, to a millionth: points beyond may come as near.
 constexpr double farthest = 1e6;
+/// So far from all edges a point lies over a triangle, whatever single precision made of these; and so near it is as
+/// exact by them as by the corners [voxels].
+constexpr double wellInside = 1e-5, near = 16;
 /// Points that are taken together; their places fit into the first cache.
 constexpr std::size_t batch = 64;
 
@@ -238,7 +268,7 @@ MeshTree::MeshTree(Mesh mesh, float voxelSize)
       groups_(makeTurnedGroups(tree_)),
       normals_(mesh_, thinnest * double(voxelSize)) {}
 
-// In the tree's frame; nothing is found for a negative bound.
+// In the tree's frame; noNode is found for a negative bound.
 void MeshTree::place(const glm::dvec3& point, glm::dvec3& local, float& bound) const noexcept {
     local = point * perMetre_ - glm::dvec3(tree_.base);
     const glm::dvec3 size(tree_.size);
@@ -253,39 +283,53 @@ void MeshTree::place(const glm::dvec3& point, glm::dvec3& local, float& bound) c
     }
 }
 
-std::uint32_t MeshTree::nearest(const glm::dvec3& point, float bound) const noexcept {
+std::uint32_t MeshTree::nearestPart(const glm::dvec3& point, float bound, const EntryGroup* entry) const noexcept {
     glm::dvec3 local;
     place(point, local, bound);
-    return bound < 0 ? noTriangle : HWY_DYNAMIC_DISPATCH(searchNearest)(tree_, groups_.get(), local, bound);
+    return bound < 0 ? noPart : HWY_DYNAMIC_DISPATCH(searchNearest)(tree_, groups_.data(), local, bound, entry);
 }
 
-void MeshTree::nearest(std::span<const glm::dvec3> points, std::span<const float> bounds,
-                       std::span<std::uint32_t> triangles) const noexcept {
+std::uint32_t MeshTree::nearest(const glm::dvec3& point, float bound) const noexcept {
+    const std::uint32_t part = nearestPart(point, bound);
+    return part == noPart ? noTriangle : triangleOf(part);
+}
+
+void MeshTree::nearestParts(std::span<const glm::dvec3> points, std::span<const float> bounds,
+                            std::span<const EntryGroup* const> entries, std::span<std::uint32_t> parts) const noexcept {
     std::array<glm::dvec3, batch> places;
     std::array<float, batch> limits;
     std::array<std::uint32_t, batch> found;
     std::array<std::size_t, batch> numbers;
+    std::array<const EntryGroup*, batch> begins;
     for (std::size_t begin = 0; begin < points.size(); begin += batch) {
         std::size_t count = 0;
         for (std::size_t i = begin; i < std::min(points.size(), begin + batch); ++i) {
-            triangles[i] = noTriangle;
+            parts[i] = noPart;
             limits[count] = bounds[i];
             place(points[i], places[count], limits[count]);
             numbers[count] = i;
+            begins[count] = entries[i];
             count += limits[count] >= 0;
         }
-        HWY_DYNAMIC_DISPATCH(searchAll)(tree_, groups_.get(), places.data(), limits.data(), found.data(), count);
-        for (std::size_t i = 0; i < count; ++i) triangles[numbers[i]] = found[i];
+        HWY_DYNAMIC_DISPATCH(searchAll)
+        (tree_, groups_.data(), places.data(), limits.data(), begins.data(), found.data(), count);
+        for (std::size_t i = 0; i < count; ++i) parts[numbers[i]] = found[i];
     }
 }
 
-void MeshTree::fetchTriangle(std::uint32_t triangle) const noexcept {
-    hwy::Prefetch(&mesh_.triangles[triangle]);
-    normals_.fetchEdges(triangle);
-}
-
-void MeshTree::fetchCorners(std::uint32_t triangle) const noexcept {
-    for (int i = 0; i < 3; ++i) hwy::Prefetch(&mesh_.points[mesh_.triangles[triangle][i]]);
+NearestFeature MeshTree::featureOfPart(std::uint32_t part, const glm::dvec3& point) const noexcept {
+    const WideLeaf& leaf = tree_.leaves[part / treeWidth];
+    const std::uint32_t i = part % treeWidth, triangle = leaf.triangles[i];
+    const auto vectorOf = [i](const float(&v)[3][treeWidth]) { return glm::dvec3(v[0][i], v[1][i], v[2][i]); };
+    const glm::dvec3 from = point * perMetre_ - glm::dvec3(tree_.base) - vectorOf(leaf.cell) - vectorOf(leaf.corner);
+    const glm::dvec3 along = vectorOf(leaf.along), normal = vectorOf(leaf.normal);
+    const double x = glm::dot(from, along), y = glm::dot(from, glm::cross(normal, along)), z = glm::dot(from, normal);
+    const double besideBC = double(leaf.directionBC[0][i]) * y -
+                            double(leaf.directionBC[1][i]) * (x - double(leaf.lengthAB[i])),
+                 besideAC = double(leaf.directionAC[1][i]) * x - double(leaf.directionAC[0][i]) * y;
+    const bool over = std::min({y, besideBC, besideAC}) > wellInside && std::abs(z) < near;
+    if (!over || normals_.isFlat(triangle)) return featureOf(triangle, point);
+    return {.triangle = triangle, .way = (-z * double(voxelSize_)) * normal, .normal = normal};
 }
 
 NearestFeature MeshTree::featureOf(std::uint32_t triangle, const glm::dvec3& point) const noexcept {

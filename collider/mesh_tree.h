@@ -4,9 +4,9 @@
 #include <cstddef>
 #include <cstdint>
 #include <glm/vec3.hpp>
-#include <memory>
 #include <span>
 
+#include "collider/block_entries.h"
 #include "collider/closest_point.h"
 #include "collider/feature_normals.h"
 #include "collider/turned_boxes.h"
@@ -40,16 +40,20 @@ class MeshTree {
     /// @param bound  [voxels], may be infinite
     std::uint32_t nearest(const glm::dvec3& point, float bound) const noexcept;
 
-    /// The same for many points, in less time: the three are equally long.
-    void nearest(std::span<const glm::dvec3> points, std::span<const float> bounds,
-                 std::span<std::uint32_t> triangles) const noexcept;
+    /// The same, but tells the place in the tree: of a triangle, or of a part of a long one. `noPart` if there is none.
+    static constexpr std::uint32_t noPart = ~0u;
+    /// @param entry  holds all nodes that may be as near; null: the whole tree
+    std::uint32_t nearestPart(const glm::dvec3& point, float bound, const EntryGroup* entry = nullptr) const noexcept;
 
-    /// Asks for memory that featureOf() will need: first of the triangle, then, when that is there, of its corners.
-    void fetchTriangle(std::uint32_t triangle) const noexcept;
-    void fetchCorners(std::uint32_t triangle) const noexcept;
+    /// The same for many points, in less time: the three are equally long.
+    void nearestParts(std::span<const glm::dvec3> points, std::span<const float> bounds,
+                      std::span<const EntryGroup* const> entries, std::span<std::uint32_t> parts) const noexcept;
 
     /// The feature of a triangle that is closest to a point [m], in double precision.
     NearestFeature featureOf(std::uint32_t triangle, const glm::dvec3& point) const noexcept;
+
+    /// The same for a triangle that nearestPart() has found for the point; quick where the point lies over it.
+    NearestFeature featureOfPart(std::uint32_t part, const glm::dvec3& point) const noexcept;
 
     const Mesh& mesh() const { return mesh_; }
     const WideTree& tree() const { return tree_; }
@@ -58,12 +62,15 @@ class MeshTree {
 
   private:
     void place(const glm::dvec3& point, glm::dvec3& local, float& bound) const noexcept;
+    std::uint32_t triangleOf(std::uint32_t part) const {
+        return tree_.leaves[part / treeWidth].triangles[part % treeWidth];
+    }
 
     Mesh mesh_;
     float voxelSize_;
     double perMetre_;  // voxels
     WideTree tree_;
-    std::unique_ptr<TurnedGroup[]> groups_;
+    LargeArray<TurnedGroup> groups_;
     FeatureNormals normals_;
 };
 

@@ -68,9 +68,9 @@ glm::mat3 eigenvectors(glm::mat3 m) {
 
 class Maker {
   public:
-    explicit Maker(const WideTree& tree) : tree_(tree), groups_(std::make_unique<TurnedGroup[]>(tree.groupCount)) {}
+    explicit Maker(const WideTree& tree) : tree_(tree), groups_(tree.groupCount) {}
 
-    std::unique_ptr<TurnedGroup[]> make() {
+    LargeArray<TurnedGroup> make() {
         std::uint32_t begin = 0, children = tree_.leafCount, leavesInChild = 1;
         for (int level = 0; begin < tree_.groupCount; ++level) {
             const std::uint32_t count = (children + treeWidth - 1) / treeWidth;
@@ -152,12 +152,12 @@ class Maker {
     }
 
     const WideTree& tree_;
-    std::unique_ptr<TurnedGroup[]> groups_;
+    LargeArray<TurnedGroup> groups_;
 };
 
 }  // namespace
 
-std::unique_ptr<TurnedGroup[]> makeTurnedGroups(const WideTree& tree) {
+LargeArray<TurnedGroup> makeTurnedGroups(const WideTree& tree) {
     return Maker(tree).make();
 }
 

@@ -6,8 +6,8 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <memory>
 
+#include "sdf/large_array.h"
 #include "sdf/wide_tree.h"
 
 namespace bilayer {
@@ -24,6 +24,6 @@ struct TurnedGroup {
 static_assert(sizeof(TurnedGroup) == 256, "four cache lines");
 
 /// Groups in the order of the tree's; `groupCount` of them.
-std::unique_ptr<TurnedGroup[]> makeTurnedGroups(const WideTree& tree);
+LargeArray<TurnedGroup> makeTurnedGroups(const WideTree& tree);
 
 }  // namespace bilayer

@@ -34,6 +34,12 @@ class LargeArray {
 #endif
     }
 
+    T& operator[](std::size_t i) {
+        return data_[i];
+    }
+    const T& operator[](std::size_t i) const {
+        return data_[i];
+    }
     T* data() {
         return data_.get();
     }

@@ -433,8 +433,8 @@ WideTree makeWideTree(const Mesh& mesh, float voxelSize, Progress* progress, Tre
     if (order == TreeOrder::split) Splitter(parts, keys, progress).sort();
     tree.leafCount = std::uint32_t((keys.size() + treeWidth - 1) / treeWidth);
     tree.groupCount = groupsOver(tree.leafCount);
-    tree.leaves = std::make_unique_for_overwrite<WideLeaf[]>(tree.leafCount);
-    tree.groups = std::make_unique_for_overwrite<BoxGroup[]>(tree.groupCount);
+    tree.leaves = LargeArray<WideLeaf>(tree.leafCount);
+    tree.groups = LargeArray<BoxGroup>(tree.groupCount);
     forAll(tree.leafCount, progress, [&](std::size_t i) { makeLeaf(parts, keys, i, tree); });
     makeGroups(tree, progress);
     return tree;

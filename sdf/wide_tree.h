@@ -7,9 +7,9 @@
 #include <cstddef>
 #include <cstdint>
 #include <glm/vec3.hpp>
-#include <memory>
 #include <vector>
 
+#include "sdf/large_array.h"
 #include "sdf/mesh.h"
 
 namespace bilayer {
@@ -43,8 +43,8 @@ struct WideTree {
     glm::ivec3 base{0};  ///< index coordinates of the origin of the tree's frame, multiples of 8
     glm::ivec3 size{0};  ///< a box of this size from `base` holds the mesh [voxels]
     std::uint32_t leafCount = 0, groupCount = 0;
-    std::unique_ptr<WideLeaf[]> leaves;
-    std::unique_ptr<BoxGroup[]> groups;
+    LargeArray<WideLeaf> leaves;
+    LargeArray<BoxGroup> groups;
 
     bool isLeaf(std::uint32_t node) const { return node < leafCount; }
     const BoxGroup& group(std::uint32_t node) const { return groups[node - leafCount]; }

@@ -10,6 +10,8 @@
 #include <glm/gtc/constants.hpp>
 #include <glm/gtc/matrix_transform.hpp>
 #include <limits>
+#include <span>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -27,9 +29,10 @@ using namespace bilayer::test;
 namespace {
 
 constexpr float infinity = std::numeric_limits<float>::infinity();
-constexpr double tolerance = 1e-5;     // of distances up to ten voxels away [voxels]
-constexpr double farTolerance = 1e-6;  // of distances farther away, of themselves
-constexpr double samePlace = 1e-4;     // triangles so near to a closest point meet it [voxels]
+constexpr double tolerance = 1e-5;      // of distances up to ten voxels away [voxels]
+constexpr double farTolerance = 1e-6;   // of distances farther away, of themselves
+constexpr double interpolantOff = 0.1;  // of the torus below, at most [voxels]
+constexpr double samePlace = 1e-4;      // triangles so near to a closest point meet it [voxels]
 
 using Corners = std::array<glm::dvec3, 3>;
 
@@ -211,4 +214,79 @@ TEST_CASE("the closest points of clean public meshes are those of all triangles"
     CAPTURE(seed);
     for (const char* name : {"fandisk.obj", "spot.obj", "screwdriver_7k.off", "rocker-arm.obj", "bunny_watertight.obj"})
         if (const auto path = corpusMesh(name)) require(name, check(readMesh(*path), 100, 4000, 300, seed));
+}
+
+TEST_CASE("closest points need a place, a distance that is not exceeded, and the right mesh") {
+    const Mesh sphere = shapes::sphere(1, 4);
+    const LevelSet levelSet = build(sphere, {.voxelSize = 0.05f});
+    const Field field(levelSet, sphere);
+    const float nan = std::numeric_limits<float>::quiet_NaN();
+    for (const glm::vec3& p : {glm::vec3(nan, 0, 0), glm::vec3(0, infinity, 0), glm::vec3(0, 0, -infinity)}) {
+        ClosestPoint batch;
+        field.closest(std::span(&p, 1), std::span(&batch, 1));
+        CHECK_FALSE(field.closest(p).found);
+        CHECK_FALSE(batch.found);
+    }
+    Random random(test::seed());
+    for (int i = 0; i < 1000; ++i) {
+        const glm::vec3 p(random(0.2, 3) * glm::dvec3(random.direction()));
+        const ClosestPoint all = field.closest(p);
+        REQUIRE(all.found);
+        const float way = std::abs(all.distance);
+        CHECK(same(field.closest(p, 1.001f * way), all));
+        CHECK_FALSE(field.closest(p, 0.999f * way).found);
+    }
+    CHECK_FALSE(field.closest({2, 0, 0}, -1).found);
+    CHECK_FALSE(field.closest({2, 0, 0}, nan).found);
+    CHECK_FALSE(Field(levelSet).closest({1, 0, 0}).found);
+    CHECK_THROWS_AS(Field(levelSet, shapes::sphere(1, 3)), std::invalid_argument);
+    ClosestPoint one;
+    CHECK_THROWS_AS(field.closest(std::vector<glm::vec3>(2), std::span(&one, 1)), std::invalid_argument);
+}
+
+TEST_CASE("closest points of meshes that build() has to mend are those of their triangles, with the field's signs") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    const Mesh torus = tilted(shapes::torus(1, 0.3f, 48, 24));
+    Mesh turned = torus, twice = torus, flat = torus;
+    for (std::size_t i = 0; i < turned.triangles.size(); i += 3)
+        std::swap(turned.triangles[i].x, turned.triangles[i].y);
+    twice.triangles.insert(twice.triangles.end(), torus.triangles.begin(), torus.triangles.begin() + 500);
+    for (std::size_t i = 0; i < 100; ++i) {
+        const glm::uvec3 t = torus.triangles[7 * i];
+        flat.triangles.push_back({t.x, t.y, t.x});
+        flat.triangles.push_back({t.y, t.y, t.y});
+    }
+    const struct {
+        const char* name;
+        Mesh mesh;
+        Sign sign;
+        bool byNormals;  // else the field's interpolant tells the side
+    } cases[] = {{"every third triangle turned", turned, Sign::automatic, true},
+                 {"triangles twice", twice, Sign::automatic, false},
+                 {"triangles without area", flat, Sign::automatic, true},
+                 {"winding", torus, Sign::winding, false},
+                 {"flood", torus, Sign::flood, false}};
+    const Truth truth(torus);
+    for (const auto& one : cases) {
+        const Field field(build(one.mesh, {.voxelSize = 0.05f, .sign = one.sign}), one.mesh);
+        double worst = 0;
+        int wrongSigns = 0, wrongNormals = 0;
+        for (const glm::vec3& p : pointsAround(torus, 0.05, 2000, seed)) {
+            const ClosestPoint closest = field.closest(p);
+            REQUIRE(closest.found);
+            const double distance = truth.distance(glm::dvec3(p));
+            if (distance > 0.5) continue;
+            worst = std::max(worst, std::abs(std::abs(double(closest.distance)) - distance) / 0.05);
+            const double unsure = one.byNormals ? samePlace : interpolantOff;
+            if (distance < unsure * 0.05) continue;
+            wrongSigns += (closest.distance < 0) != (truth.winding(glm::dvec3(p)) > 0);
+            // outward: away from the surface outside, towards it inside
+            wrongNormals += glm::dot(closest.normal, p - closest.position) * closest.distance < 0;
+        }
+        INFO(one.name);
+        CHECK(worst < tolerance);
+        CHECK(wrongSigns == 0);
+        CHECK(wrongNormals == 0);
+    }
 }

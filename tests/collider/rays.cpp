@@ -302,7 +302,7 @@ TEST_CASE("without the mesh no chord is too short for a ray") {
         double first = -1, last = -1, lowest = 1;
         const auto probe = [&] {
             first = last = -1, lowest = 1;
-            for (double t = 0.2 - 2 * h; t < 0.2 + 2 * h; t += 2e-3 * h) {
+            for (double t = 0.2 - 2 * h; t < 0.2 + 2 * h; t += 2e-4 * h) {
                 const double distance = field.distance(glm::vec3(glm::dvec3(ray.origin) + t * way));
                 lowest = std::min(lowest, distance);
                 if (distance >= 0) continue;
