@@ -275,15 +275,16 @@ kernel void measureParts(Frame frame, float far, global const int* directory, gl
         return;
     }
     global const float* corner = values + voxelOf(entry, PART_SIDE * (part - PARTS_ALONG * block));
-    float least = INFINITY, nearest = INFINITY;
+    float least = INFINITY, most = -INFINITY, nearest = INFINITY;
     for (int x = 0; x <= PART_SIDE; ++x)
         for (int y = 0; y <= PART_SIDE; ++y)
             for (int z = 0; z <= PART_SIDE; ++z) {
                 const float value = corner[(x * STRIDE + y) * STRIDE + z];
                 least = min(least, value);
+                most = max(most, value);
                 nearest = min(nearest, fabs(value));
             }
-    ways[p] = nearest <= NEAR_SURFACE * frame.voxelSize ? 0 : far;
+    ways[p] = nearest <= NEAR_SURFACE * frame.voxelSize || (least < 0) != (most < 0) ? 0 : far;
     centres[centreOf(part, blocks)] = least < 0 ? -1 : 1;
 }
 

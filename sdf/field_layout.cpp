@@ -64,23 +64,24 @@ float leastStepOf(const FieldFrame& frame) {
 // What is stored of a block beside its values.
 struct BlockSummary {
     std::array<float, blockParts> least;        // value of the voxels around a part's cells [m]
-    std::array<bool, blockParts> meetsSurface;  // some voxel is as near to it as the surface passes
+    std::array<bool, blockParts> meetsSurface;  // a voxel is as near as the surface passes, or they lie on both sides
 };
 
 BlockSummary summaryOf(const float* block, float voxelSize) {
     BlockSummary summary;
     for (int i = 0; i < blockParts; ++i) {
         const float* part = block + partSide * ((i >> 2) * stride * stride + (i >> 1 & 1) * stride + (i & 1));
-        float least = part[0], nearest = std::abs(least);
+        float least = part[0], most = least, nearest = std::abs(least);
         for (int x = 0; x <= partSide; ++x)
             for (int y = 0; y <= partSide; ++y)
                 for (int z = 0; z <= partSide; ++z) {
                     const float value = part[(x * stride + y) * stride + z];
                     least = std::min(least, value);
+                    most = std::max(most, value);
                     nearest = std::min(nearest, std::abs(value));
                 }
         summary.least[i] = least;
-        summary.meetsSurface[i] = nearest <= nearSurface * voxelSize;
+        summary.meetsSurface[i] = nearest <= nearSurface * voxelSize || (least < 0) != (most < 0);
     }
     return summary;
 }
