@@ -30,7 +30,9 @@ namespace {
 
 const std::string ours = "bilayer";
 constexpr float infinity = std::numeric_limits<float>::infinity();
-constexpr double tolerance = 1e-4;  // of distances [voxels] and of gradients
+constexpr double tolerance = 1e-4;  // of distances [voxels]
+// In 16 bits voxels are off by half a step of 9.2e-5 voxels, and differences of two along each axis by a whole one.
+constexpr double gradientTolerance = 2e-4;
 // Rays cross the interpolant, not the triangles: hits may differ where rays graze, and by the interpolant's own error.
 constexpr double missedAlike = 0.01, hitAlike = 0.5;  // share of rays; median difference [voxels]
 
@@ -94,7 +96,7 @@ void requireAlike(const std::vector<Sampler>& peers, const Questions<glm::vec3>&
             value = std::max<double>(value, std::abs(samples[i].distance - truth[i].distance) / voxelSize);
             gradient = std::max<double>(gradient, glm::distance(samples[i].gradient, truth[i].gradient));
         }
-        require(value <= tolerance && gradient <= tolerance, peer.name, peers.front().name);
+        require(value <= tolerance && gradient <= gradientTolerance, peer.name, peers.front().name);
     }
     fmt::print("{} samples agree to {:.1e} voxel, their gradients to {:.1e}\n", questions.order, value, gradient);
 }
