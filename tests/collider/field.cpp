@@ -33,6 +33,22 @@ Sampler makeField(const LevelSet& levelSet) {
     };
 }
 
+Sampler makeBatched(const LevelSet& levelSet) {
+    return [field = Field(levelSet)](std::span<const glm::vec3> points) {
+        std::vector<Sample> samples(points.size());
+        field.sample(points, samples);
+        return samples;
+    };
+}
+
+// Points in and beside a field's box, some of them nowhere.
+std::vector<glm::vec3> pointsAround(Random& random, std::size_t count) {
+    std::vector<glm::vec3> points;
+    for (std::size_t i = 0; i < count; ++i) points.push_back(random.point(i % 4 ? 0.5 : 3));
+    for (std::size_t i = 7; i < count; i += 97) points[i][int(i % 3)] = i % 2 ? notANumber : infinity;
+    return points;
+}
+
 }  // namespace
 
 TEST_CASE("in the band a sample is OpenVDB's trilinear interpolation, and only there it is in the band") {
@@ -93,6 +109,60 @@ TEST_CASE("a sample within a reach is the sample, its gradient only there") {
         if (!(whole.distance <= reach)) expected.gradient = glm::vec3(0);
         REQUIRE(sameBits(field.sampleWithin(p, reach), expected));
         REQUIRE(field.distance(p) == whole.distance);
+    }
+}
+
+TEST_CASE("a batch is its samples, whatever its length") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    Random random(seed);
+    for (const Storage storage : {Storage::float32, Storage::fixed16}) {
+        const Field field(levelSetOf(torusSolid(0.35, 0.13), h), {.storage = storage});
+        for (const std::size_t count : {0, 1, 2, 31, 32, 33, 64, 65, 5000}) {
+            const std::vector<glm::vec3> points = pointsAround(random, count);
+            std::vector<Sample> samples(count, Sample{.distance = 7});
+            field.sample(points, samples);
+            for (std::size_t i = 0; i < count; ++i) {
+                CAPTURE(count, i, points[i].x, points[i].y, points[i].z);
+                REQUIRE(sameBits(samples[i], field.sample(points[i])));
+            }
+        }
+        std::vector<Sample> tooFew(2);
+        REQUIRE_THROWS_AS(field.sample(std::vector<glm::vec3>(3), tooFew), std::invalid_argument);
+    }
+}
+
+TEST_CASE("batches answer as single samples do") {
+    checkInBand(makeBatched);
+    checkVoxelCentres(makeBatched);
+    checkBeyondBand(makeBatched);
+    checkNarrowBand(makeBatched);
+    checkNowhere(makeBatched);
+    checkFarFromOrigin(makeBatched);
+}
+
+TEST_CASE("in 16 bits distances are off by half a step, in half the memory") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    Random random(seed);
+    for (const auto& [outside, inside] : {std::pair(3., 3.), std::pair(2., 6.), std::pair(5., 1.5)}) {
+        const LevelSet levelSet = levelSetOf(torusSolid(0.35, 0.13), h, outside, inside);
+        const Field exact(levelSet), small(levelSet, {.storage = Storage::fixed16});
+        const double step = std::max(outside, inside) * h / 32766;
+        int inBand = 0;
+        for (const glm::vec3& p : pointsAround(random, 20000)) {
+            const Sample a = exact.sample(p), b = small.sample(p);
+            CAPTURE(p.x, p.y, p.z, a.distance, b.distance);
+            REQUIRE(a.inBand == b.inBand);
+            if (!std::isfinite(a.distance)) REQUIRE(b.distance == a.distance);
+            if (std::isfinite(a.distance)) REQUIRE(std::abs(a.distance - b.distance) <= 0.51 * step + 1e-7);
+            if (!a.inBand) REQUIRE((a.distance == 0 || std::signbit(a.distance) == std::signbit(b.distance)));
+            for (int axis = 0; axis < 3; ++axis)
+                REQUIRE(std::abs(a.gradient[axis] - b.gradient[axis]) <= 1.02 * step / h + 1e-5);
+            inBand += a.inBand;
+        }
+        REQUIRE(inBand > 1000);
+        REQUIRE(double(small.memoryBytes()) < 0.6 * double(exact.memoryBytes()));
     }
 }
 
