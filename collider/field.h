@@ -50,7 +50,7 @@ class Field {
     /// where most points are farther away.
     Sample sampleWithin(const glm::vec3& point, float reach) const noexcept;
 
-    /// The distance alone, with the same meaning as Sample::distance, at half the cost.
+    /// The distance alone, with the same meaning as Sample::distance.
     float distance(const glm::vec3& point) const noexcept;
 
     /// The closest point of the surface, wherever the point lies; in the band it takes the least time. With the mesh it
