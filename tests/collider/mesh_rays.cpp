@@ -214,7 +214,10 @@ TEST_CASE("a box meets a triangle where something is left of it in the box") {
             const glm::vec3 axis = random.direction();
             const double angle = i % 5 ? random(0, 3) : 0;
             boxes[i].axes = glm::mat3_cast(glm::angleAxis(angle, glm::normalize(glm::dvec3(axis))));
-            boxes[i].centre = glm::dvec3(bounds(mesh).centre()) + glm::dvec3(random.point(0.6 * scale));
+            // a quarter of them around a corner of the mesh, so that enough of them meet it
+            const std::size_t corner = std::size_t(random(0, double(mesh.points.size()) - 1));
+            boxes[i].centre = i % 4 ? glm::dvec3(bounds(mesh).centre()) + glm::dvec3(random.point(0.6 * scale))
+                                    : glm::dvec3(mesh.points[corner]);
             for (int k = 0; k < 3; ++k) boxes[i].halfSize[k] = scale * std::pow(10, random(-3.5, -0.3));
         }
         std::vector<int> met(boxes.size());
