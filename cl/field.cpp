@@ -156,9 +156,7 @@ DeviceField::DeviceField(const Device& device, const Mesh& mesh, const BuildOpti
 }
 
 void DeviceField::sample(std::span<const glm::vec3> points, std::span<Sample> samples, OpenclTimes* times) const {
-    if (points.size() != samples.size())
-        throw std::invalid_argument(std::to_string(points.size()) + " points need as many samples, not " +
-                                    std::to_string(samples.size()));
+    requireSameLength(points.size(), samples.size(), "samples");
     const std::lock_guard lock(data_->mutex);
     Timing timing(times);
     try {

@@ -7,6 +7,7 @@
 #include "collider/field_data.h"
 
 namespace bilayer {
+
 void FieldData::fillLanes() {
     const int blockStrides[] = {blocks.y * blocks.z, blocks.z, 0, 1}, voxelStrides[] = {stride * stride, stride, 0, 1};
     for (int lane = 0; lane < 4; ++lane) {

@@ -11,8 +11,6 @@
 #include <limits>
 #include <memory>
 #include <span>
-#include <stdexcept>
-#include <string>
 
 #include "collider/closest_point.h"
 #include "collider/mesh_tree.h"
@@ -21,11 +19,8 @@
 
 namespace bilayer {
 
-/// Throws std::invalid_argument if a batch has not as many answers as points.
-inline void requireSameLength(std::size_t points, std::size_t answers, const char* name) {
-    if (points != answers)
-        throw std::invalid_argument(std::to_string(points) + " points need as many " + name + ", not " +
-                                    std::to_string(answers));
+inline bool isFinite(const glm::vec3& v) {
+    return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
 }
 
 // Vectors of the compiler's own: Highway has none of fixed size for the plain instruction set.

@@ -15,10 +15,6 @@
 namespace bilayer {
 namespace {
 
-bool isFinite(const glm::vec3& v) {
-    return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
-}
-
 // A box in double precision, for which it needs a rotation.
 TurnedBox turned(const OrientedBox& box) {
     return {glm::dvec3(box.centre), glm::mat3_cast(glm::normalize(glm::dquat(box.rotation))), glm::dvec3(box.halfSize)};

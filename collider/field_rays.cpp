@@ -22,10 +22,6 @@ constexpr double lookAhead = 4;
 /// What the nearest triangle may be off by [voxels], and as a part of its distance.
 constexpr double nearestSlack = 1e-4, nearestRounding = 2e-6;
 
-bool isFinite(const glm::vec3& v) {
-    return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
-}
-
 bool isRay(const Ray& ray) {
     return isFinite(ray.origin) && isFinite(ray.direction) && ray.direction != glm::vec3(0) && ray.maxDistance >= 0;
 }

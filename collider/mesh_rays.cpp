@@ -59,6 +59,23 @@ inline void pushNear(Waiting& waiting, unsigned bits, const float* keys, std::ui
     }
 }
 
+// Looks at nodes, near ones first, but for those whose keys are skipped; true as soon as a leaf is enough.
+template <class Skip, class Open, class Visit>
+inline bool descend(const WideTree& tree, Skip skip, Open open, Visit visit) {
+    Waiting waiting;
+    waiting.push(0, tree.root());
+    while (waiting.count > 0) {
+        --waiting.count;
+        if (skip(waiting.keys[waiting.count])) continue;
+        const std::uint32_t node = waiting.nodes[waiting.count];
+        if (!tree.isLeaf(node))
+            open(tree.group(node), waiting);
+        else if (visit(tree.leaves[node]))
+            return true;
+    }
+    return false;
+}
+
 // A point in the tree's frame, in whole voxels and the rest, and how far rounding may move boxes from it [voxels].
 struct Place {
     glm::vec3 cell, inCell, point;
@@ -100,17 +117,10 @@ class RaySearch {
     }
 
     std::optional<MeshHit> run() {
-        Waiting waiting;
-        waiting.push(0, tree_.root());
-        while (waiting.count > 0) {
-            --waiting.count;
-            if (waiting.keys[waiting.count] > limit_) continue;
-            const std::uint32_t node = waiting.nodes[waiting.count];
-            if (tree_.isLeaf(node))
-                visit(tree_.leaves[node]);
-            else
-                open(tree_.group(node), waiting);
-        }
+        descend(
+            tree_, [&](float key) { return key > limit_; },
+            [&](const BoxGroup& group, Waiting& waiting) { open(group, waiting); },
+            [&](const WideLeaf& leaf) { return visit(leaf), false; });
         if (triangle_ == noTriangle) return std::nullopt;
         return MeshHit{best_, position_, triangle_};
     }
@@ -222,17 +232,10 @@ class TouchSearch {
     }
 
     std::optional<MeshHit> run() {
-        Waiting waiting;
-        waiting.push(0, tree_.root());
-        while (waiting.count > 0) {
-            --waiting.count;
-            if (waiting.keys[waiting.count] > limit2_) continue;
-            const std::uint32_t node = waiting.nodes[waiting.count];
-            if (tree_.isLeaf(node))
-                visit(tree_.leaves[node]);
-            else
-                open(tree_.group(node), waiting);
-        }
+        descend(
+            tree_, [&](float key) { return key > limit2_; },
+            [&](const BoxGroup& group, Waiting& waiting) { open(group, waiting); },
+            [&](const WideLeaf& leaf) { return visit(leaf), false; });
         if (hit_.triangle == noTriangle) return std::nullopt;
         return hit_;
     }
@@ -301,16 +304,9 @@ class BoxSearch {
     }
 
     bool run() {
-        Waiting waiting;
-        waiting.push(0, tree_.root());
-        while (waiting.count > 0) {
-            const std::uint32_t node = waiting.nodes[--waiting.count];
-            if (!tree_.isLeaf(node))
-                open(tree_.group(node), waiting);
-            else if (visit(tree_.leaves[node]))
-                return true;
-        }
-        return false;
+        return descend(
+            tree_, [](float) { return false; }, [&](const BoxGroup& group, Waiting& waiting) { open(group, waiting); },
+            [&](const WideLeaf& leaf) { return visit(leaf); });
     }
 
   private:

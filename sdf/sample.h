@@ -1,7 +1,10 @@
 // What a field answers at a point, on the processor (collider/field.h) and on a device (cl/field.h).
 #pragma once
 
+#include <cstddef>
 #include <glm/vec3.hpp>
+#include <stdexcept>
+#include <string>
 
 namespace bilayer {
 
@@ -18,5 +21,12 @@ struct Sample {
     /// side.
     bool inBand = false;
 };
+
+/// Throws std::invalid_argument if a batch has not as many answers as points.
+inline void requireSameLength(std::size_t points, std::size_t answers, const char* name) {
+    if (points != answers)
+        throw std::invalid_argument(std::to_string(points) + " points need as many " + name + ", not " +
+                                    std::to_string(answers));
+}
 
 }  // namespace bilayer

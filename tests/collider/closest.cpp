@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "collider/field.h"
+#include "collider/triangle_tests.h"
 #include "demos/shared/shapes.h"
 #include "sdf/build.h"
 #include "sdf/mesh_io.h"
@@ -33,13 +34,6 @@ constexpr double tolerance = 1e-5;      // of distances up to ten voxels away [v
 constexpr double farTolerance = 1e-6;   // of distances farther away, of themselves
 constexpr double interpolantOff = 0.1;  // of the torus below, at most [voxels]
 constexpr double samePlace = 1e-4;      // triangles so near to a closest point meet it [voxels]
-
-using Corners = std::array<glm::dvec3, 3>;
-
-Corners cornersOf(const Mesh& mesh, std::size_t triangle) {
-    const glm::uvec3 t = mesh.triangles[triangle];
-    return {glm::dvec3(mesh.points[t.x]), glm::dvec3(mesh.points[t.y]), glm::dvec3(mesh.points[t.z])};
-}
 
 glm::dvec3 normalOf(const Corners& c) {
     return glm::normalize(glm::cross(c[1] - c[0], c[2] - c[0]));
