@@ -81,13 +81,20 @@ bool isFeature(const Corners& c, const glm::dvec3& place, const ClosestPoint& cl
     return false;
 }
 
-// Whether a place is well within the feature: a little beside it the normal would be the same.
-bool isClear(const Corners& c, const glm::dvec3& place, const ClosestPoint& claimed, double room) {
+// Whether a place can be told from places beside it that have other normals: on the claimed feature it is far from
+// others, and no triangle there meets it with two of its edges, as needles do a long way from their tips.
+bool isClear(const Mesh& mesh, const Corners& own, const glm::dvec3& place, const ClosestPoint& claimed, double room) {
     if (claimed.feature == Feature::vertex) return true;
     for (std::size_t k = 0; k < 3; ++k) {
-        if (glm::distance(place, c[k]) < 2 * room) return false;
-        const bool own = claimed.feature == Feature::edge && k == claimed.index;
-        if (!own && distanceToSegment(place, c[k], c[(k + 1) % 3]) < 2 * room) return false;
+        if (glm::distance(place, own[k]) < 2 * room) return false;
+        const bool on = claimed.feature == Feature::edge && k == claimed.index;
+        if (!on && distanceToSegment(place, own[k], own[(k + 1) % 3]) < 2 * room) return false;
+    }
+    for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
+        const Corners c = cornersOf(mesh, i);
+        int met = 0;
+        for (std::size_t k = 0; k < 3; ++k) met += distanceToSegment(place, c[k], c[(k + 1) % 3]) < 2 * room;
+        if (met > 1) return false;
     }
     return true;
 }
@@ -154,7 +161,7 @@ Tally check(const Mesh& mesh, float resolution, int count, int normals, unsigned
         ++tally.kinds[std::size_t(closest.feature)];
         if (distance > 10 * h) continue;
         tally.wrongFeatures += !isFeature(c, place, closest, room);
-        if (int(tally.features) == normals || !isClear(c, place, closest, room)) continue;
+        if (int(tally.features) == normals || !isClear(mesh, c, place, closest, room)) continue;
         const glm::dvec3 normal = normalAt(mesh, place, room);
         if (!(glm::distance(normal, normalAt(mesh, place, room / 8)) < 1e-6)) continue;  // others are almost as near
         ++tally.features;
