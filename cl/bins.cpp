@@ -59,8 +59,8 @@ DeviceBins::DeviceBins(Device::Impl& device, const cl::Program& program, DeviceM
     const std::uint64_t cursorBytes = std::uint64_t(grid_.runs) * grid_.cells * sizeof(cl_uint),
                         cellBytes = std::uint64_t(grid_.cells) * sizeof(cl_uint);
     const auto bins = [&](std::uint64_t bytes) { return memory.allocate(bytes, "the binning of the mesh"); };
-    const cl::Buffer cursors = bins(cursorBytes), more = bins(cellBytes), total = bins(3 * sizeof(cl_ulong)),
-                     codes = bins(count * sizeof(cl_uint));
+    cl::Buffer cursors = bins(cursorBytes), more = bins(cellBytes), total = bins(3 * sizeof(cl_ulong)),
+               codes = bins(count * sizeof(cl_uint));
     cellOfBrick_ = bins(cellBytes);
     triangleOffsets_ = bins(cellBytes + sizeof(cl_uint));
     partOffsetBuffer_ = bins(cellBytes + sizeof(cl_uint));
@@ -87,7 +87,7 @@ DeviceBins::DeviceBins(Device::Impl& device, const cl::Program& program, DeviceM
     partOffsets_.resize(bricks + 1);
     queue.enqueueReadBuffer(partOffsetBuffer_, CL_TRUE, 0, partOffsets_.size() * sizeof(cl_uint), partOffsets_.data(),
                             nullptr, timing.event(Timing::Of::download));
-    memory.free(cursorBytes + cellBytes + count * sizeof(cl_uint));
+    for (cl::Buffer* buffer : {&cursors, &more, &total, &codes}) memory.free(*buffer);
 }
 
 }  // namespace bilayer

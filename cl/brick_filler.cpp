@@ -80,6 +80,12 @@ struct Buffers {
     Load capacity;
     cl::Buffer parts, unsorted, sorted, cells, columns, begins, ofBricks;
     cl::Buffer origins, distances, triangles, open;
+
+    void freeAll(DeviceMemory& memory) {
+        for (cl::Buffer* buffer : {&parts, &unsorted, &sorted, &cells, &columns, &begins, &ofBricks, &origins,
+                                   &distances, &triangles, &open})
+            memory.free(*buffer);
+    }
 };
 
 // Each has a queue of its own: where the kernels of one come to their end, those of the other take over.
@@ -130,6 +136,7 @@ class BrickFill {
     std::size_t groupsFor(const Load& load) const;
     std::size_t lastFitting(std::size_t first) const;
     void makeScratch();
+    void planBatches();
     void reserve(Batch& batch, const Load& load);
     void start(Batch& batch, std::size_t first, std::size_t last);
     void finish(Batch& batch);
@@ -162,7 +169,9 @@ class BrickFill {
     cl::Buffer orders_;
     std::size_t scratchGroups_ = 0;
     cl_uint scratchCells_ = 0;
-    std::uint64_t share_ = 0;  // of the memory, for a batch
+    std::uint64_t share_ = 0;                                // of the memory, for a batch
+    std::vector<std::pair<std::size_t, std::size_t>> runs_;  // of bricks: a batch each
+    Load most_;                                              // of all batches
     std::array<Batch, batchesInFlight> batches_;
     std::vector<glm::ivec3> open_;  // blocks that are left to the host
     Ended ended_;                   // the device's queue
@@ -226,6 +235,7 @@ BrickFill::BrickFill(Device::Impl& device, const OpenclOptions& options, const F
         makeScratch();
     }
     share_ = memory_.left() / batchesInFlight;
+    planBatches();
 }
 
 void BrickFill::makeScratch() {
@@ -282,15 +292,23 @@ std::size_t BrickFill::lastFitting(std::size_t first) const {
     return last;
 }
 
-// Makes the buffers large enough. They grow, but never beyond the batch's share of the memory.
+void BrickFill::planBatches() {
+    for (std::size_t first = 0, last; first < bins_->bricks(); first = last) {
+        last = lastFitting(first);
+        runs_.emplace_back(first, last);
+        const Load load = loadOf(first, last);
+        most_ = {std::max(most_.bricks, load.bricks), std::max(most_.parts, load.parts),
+                 std::max(most_.places, load.places)};
+    }
+}
+
+// Makes the buffers large enough: for any batch, if the batch's share of the memory allows.
 void BrickFill::reserve(Batch& batch, const Load& load) {
     Buffers& b = batch.buffers;
     if (b.capacity.covers(load)) return;
-    const Load grown{std::max(load.bricks, b.capacity.bricks), std::max(load.parts, b.capacity.parts),
-                     std::max(load.places, b.capacity.places)};
-    if (b.capacity.bricks > 0) memory_.free(bytesOf(b.capacity));
-    b = Buffers{};
-    b.capacity = fits(grown) ? grown : load;
+    batch.queue.finish();
+    b.freeAll(memory_);
+    b.capacity = fits(most_) ? most_ : load;
     const Load& c = b.capacity;
     const auto buffer = [&](std::uint64_t bytes) { return memory_.allocate(bytes, "a batch of bricks"); };
     for (const auto& [part, bytes] : {std::pair{&b.parts, kept_.part},
@@ -386,18 +404,19 @@ void BrickFill::handOver(Batch& batch, std::size_t blocks) {
     batch.queue.finish();
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, blocks, blocksPerTask), [&](const auto& range) {
         job_.mesh.progress.poll();
-        const auto part = [&](const auto* all, std::size_t each) {
-            return std::span(all + range.begin() * each, range.size() * each);
-        };
-        job_.mesh.sink({part(origins.data(), 1), part(distances.data(), blockVoxels),
-                        job_.mesh.triangles ? part(triangles.data(), blockVoxels) : std::span<const std::int32_t>()});
+        for (std::size_t i = range.begin(); i < range.end(); ++i) {
+            if (origins.data()[i].x == noBlock) continue;
+            const auto values = [&](const auto* all) { return std::span(all + i * blockVoxels, blockVoxels); };
+            job_.mesh.sink({{origins.data() + i, 1},
+                            values(distances.data()),
+                            job_.mesh.triangles ? values(triangles.data()) : std::span<const std::int32_t>()});
+        }
     });
 }
 
 void BrickFill::run() {
     std::size_t turn = 0;
-    for (std::size_t first = 0, last; first < bins_->bricks(); first = last) {
-        last = lastFitting(first);
+    for (const auto& [first, last] : runs_) {
         Batch& batch = batches_[turn++ % batchesInFlight];
         finish(batch);
         start(batch, first, last);

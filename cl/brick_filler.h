@@ -3,6 +3,7 @@
 #pragma once
 
 #include <functional>
+#include <limits>
 
 #include "cl/filler.h"
 #include "cl/program.h"
@@ -17,5 +18,8 @@ using DeviceSink = std::function<void(const cl::Buffer& origins, const cl::Buffe
 /// @param keep  gets the blocks that the device filled, if it is not null; the job's sink gets all others
 /// Throws as openclFiller()'s does.
 void fillByBricks(Device::Impl& device, const OpenclOptions& options, const FillJob& job, const DeviceSink& keep = {});
+
+/// The x of a slot's origin where the slot is left empty.
+inline constexpr int noBlock = std::numeric_limits<int>::min();
 
 }  // namespace bilayer

@@ -10,6 +10,7 @@
 #pragma OPENCL EXTENSION cl_khr_fp64 : enable
 
 #define BLOCK_SIDE 8
+#define BLOCK_SHIFT 3
 #define BLOCK_VOXELS 512
 
 #ifdef GROUP_PER_BLOCK
@@ -56,6 +57,9 @@ typedef IntLanes LooseIntLanes __attribute__((aligned(4)));
 #define ONE_BY_ONE
 #endif
 #define INLINED inline __attribute__((always_inline))
+
+// The x of a slot's origin where the slot is left empty: noBlock of cl/brick_filler.h.
+#define NO_BLOCK INT_MIN
 
 // Stands for every distance beyond reach: farAway of sdf/blocks.h.
 #define FAR_AWAY 1e30f

@@ -31,8 +31,8 @@ struct DeviceInfo {
     std::uint64_t maxAllocationBytes = 0;  ///< largest single buffer [bytes]
 };
 
-/// An OpenCL device with its context, queue and compiled programs. Copies share them. Several threads may use it at
-/// once; each build takes device memory of its own.
+/// An OpenCL device with its context, queue and compiled programs, and up to 128 MiB of buffers from the builds before.
+/// Copies share them. Several threads may use it at once; each build takes device memory of its own.
 class Device {
   public:
     struct Impl;

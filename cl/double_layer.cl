@@ -26,6 +26,8 @@
 
 // Points of a layer that are looked at in one go.
 #define PAGE 1024
+// Rows of cells that an item looks at in one go.
+#define MOST_ROWS 64
 // layerTie of sdf/blocks.h [voxels^2].
 #define LAYER_TIE 1e-5f
 
@@ -227,74 +229,132 @@ INLINED void placeLayers(const Input* input, uint begin, uint end, float3 middle
 bool hasSamples(const Input* input, int3 corner) {
     const int size = input->cells.size, along = BLOCK_SIDE / CELL_SIDE + 2 * input->cells.around;
     const int3 cell = corner / CELL_SIDE;
-    for (int x = cell.x; x < cell.x + along; ++x)
-        for (int y = cell.y; y < cell.y + along; ++y) {
-            global const uint* row = input->begins + (x * size + y) * size + cell.z;
+    global const uint* slab = input->begins + (cell.x * size + cell.y) * size + cell.z;
+    for (int x = 0; x < along; ++x, slab += size * size) {
+        global const uint* row = slab;
+        for (int y = 0; y < along; ++y, row += size)
             if (row[along] > row[0]) return true;
-        }
+    }
     return false;
 }
 
-// The nearest points of both layers for the voxels of a cube; `corner` is its first voxel in the brick.
-INLINED void fillCube(const Input* input, int3 corner, const Voxels* v, Layer inner, Layer outer,
-                      Nearest* nearestInner, Nearest* nearestOuter) {
-    const int cube = input->layers.cube, size = input->cells.size,
-              along = PICKED_SIDE / CELL_SIDE + 2 * input->cells.around;
-    const int3 cell = corner / CELL_SIDE;
-    const float3 middle = convert_float3(corner) + HALF_SIDE;
-    clear(nearestInner);
-    clear(nearestOuter);
+// The points of both layers around a cube, and the nearest of those looked at so far.
+typedef struct {
+    const Input* input;
+    const Voxels* voxels;
+    Layer inner, outer;
+    Nearest nearestInner, nearestOuter;
+    float3 middle;
+    uint placed;  // points of each layer that wait
+    bool any;     // point reaches the cube
+} Cube;
+
+// Looks at the points that wait.
+INLINED void applyLayers(Cube* cube) {
     MEET;
-    if (ITEM == 0) *inner.picked = *outer.picked = 0;
+    if (*cube->inner.picked + *cube->outer.picked > 0) {
+        cube->any = true;
+        applyPoints(cube->inner, cube->voxels, cube->input->layers.cube, &cube->nearestInner);
+        applyPoints(cube->outer, cube->voxels, cube->input->layers.cube, &cube->nearestOuter);
+    }
     MEET;
-    uint placed = 0;
-    for (int x = cell.x; x < cell.x + along; ++x)
-        for (int y = cell.y; y < cell.y + along; ++y) {
-            global const uint* row = input->begins + (x * size + y) * size + cell.z;
-            const uint end = row[along];
-            for (uint i = row[0]; i < end; i += ITEMS * BATCH) {
-                if (placed == PAGE) {
-                    MEET;
-                    applyPoints(inner, v, cube, nearestInner);
-                    applyPoints(outer, v, cube, nearestOuter);
-                    MEET;
-                    if (ITEM == 0) *inner.picked = *outer.picked = 0;
-                    MEET;
-                    placed = 0;
-                }
-                placeLayers(input, i, end, middle, placed, inner, outer);
-                placed += ITEMS * BATCH;
-            }
-        }
+    if (ITEM == 0) *cube->inner.picked = *cube->outer.picked = 0;
     MEET;
-    applyPoints(inner, v, cube, nearestInner);
-    applyPoints(outer, v, cube, nearestOuter);
+    cube->placed = 0;
 }
 
-// Eq. 3: from both layers to a slice's signed distances. The inside keeps its sign bit where the distance is clamped to
-// zero.
-INLINED Lanes combine(const Nearest* inner, const Nearest* outer, const Voxels* v, int slice, const Layers* layers,
-                      IntLanes* inside, IntLanes* known) {
-    const Lanes certain2 = square(layers->certain), inner2 = min(distances2(inner, v, slice), certain2),
-                outer2 = min(distances2(outer, v, slice), certain2);
-    *inside = inner2 <= outer2 + LAYER_TIE;
-    *known = min(inner2, outer2) < certain2;
-    const Lanes clamped = max(sqrt(max(max(inner2, outer2), (Lanes)(0.0f))) - layers->delta, (Lanes)(0.0f));
-    return select((Lanes)(INFINITY), select(clamped, -clamped, *inside), *known);
+// Adds the points around samples begin .. end - 1.
+INLINED void placeSamples(Cube* cube, uint begin, uint end) {
+    for (uint i = begin; i < end; i += ITEMS * BATCH) {
+        if (cube->placed == PAGE) applyLayers(cube);
+        placeLayers(cube->input, i, end, cube->middle, cube->placed, cube->inner, cube->outer);
+        cube->placed += ITEMS * BATCH;
+    }
 }
+
+// Adds the points around all samples of the cells around a cube.
+INLINED void placeCells(Cube* cube, int3 cell) {
+    const Input* input = cube->input;
+    const int size = input->cells.size, along = PICKED_SIDE / CELL_SIDE + 2 * input->cells.around;
+#if ITEMS == 1
+    // rows of cells are gathered first, kept where they hold some: a branch for each would be guessed wrong half of the
+    // time
+    uint begins[MOST_ROWS], ends[MOST_ROWS], rows = 0;
+#endif
+    global const uint* slab = input->begins + (cell.x * size + cell.y) * size + cell.z;
+    for (int x = 0; x < along; ++x, slab += size * size) {
+        global const uint* row = slab;
+        for (int y = 0; y < along; ++y, row += size) {
+#if ITEMS > 1
+            placeSamples(cube, row[0], row[along]);
+#else
+            begins[rows] = row[0];
+            ends[rows] = row[along];
+            rows += row[0] < row[along];
+            if (rows < MOST_ROWS) continue;
+            for (uint i = 0; i < rows; ++i) placeSamples(cube, begins[i], ends[i]);
+            rows = 0;
+#endif
+        }
+    }
+#if ITEMS == 1
+    for (uint i = 0; i < rows; ++i) placeSamples(cube, begins[i], ends[i]);
+#endif
+}
+
+// Finds the nearest points of both layers for the voxels of a cube; `corner` is its first voxel in the brick. False if
+// no point reaches it.
+INLINED bool fillCube(Cube* cube, int3 corner) {
+    cube->middle = convert_float3(corner) + HALF_SIDE;
+    cube->placed = 0;
+    cube->any = false;
+    clear(&cube->nearestInner);
+    clear(&cube->nearestOuter);
+    MEET;
+    if (ITEM == 0) *cube->inner.picked = *cube->outer.picked = 0;
+    MEET;
+    placeCells(cube, corner / CELL_SIDE);
+    applyLayers(cube);
+    return cube->any;
+}
+
+// Eq. 3: from both layers to a slice's signed distances, and whose points they are of. The inside keeps its sign bit
+// where the distance is clamped to zero. Returns whether any distance is known.
+INLINED uint combine(const Cube* cube, int slice, const Layers* layers, Lanes* values, IntLanes* owners) {
+    const Nearest *inner = &cube->nearestInner, *outer = &cube->nearestOuter;
+    const Lanes certain2 = square(layers->certain),
+                inner2 = min(distances2(inner, cube->voxels, slice), certain2),
+                outer2 = min(distances2(outer, cube->voxels, slice), certain2);
+    const IntLanes inside = inner2 <= outer2 + LAYER_TIE, known = min(inner2, outer2) < certain2;
+    const Lanes clamped = max(sqrt(max(max(inner2, outer2), (Lanes)(0.0f))) - layers->delta, (Lanes)(0.0f));
+    *values = select((Lanes)(INFINITY), select(clamped, -clamped, inside), known);
+#if TRIANGLES
+    *owners = select(inner->owner[slice], outer->owner[slice], inside);
+#else
+    (void)(owners);
+#endif
+    return (uint)(anyLane(known));
+}
+
+// Where an item writes a block: a group to memory of its own, until it knows that the block is kept.
+#if ITEMS > 1
+#define WRITTEN local
+#else
+#define WRITTEN global
+#endif
 
 // Writes a slice of a cube into its block.
-void putSlice(Lanes values, int slice, int3 inBlock, SHARED float* block) {
+void putSlice(Lanes values, int slice, int3 inBlock, WRITTEN float* block) {
 #if ITEMS > 1
     (void)(slice);
     (void)(inBlock);
     vstore8(values, ITEM, block);
 #else
-    SHARED float* corner = block + ((inBlock.x + slice) * BLOCK_SIDE + inBlock.y) * BLOCK_SIDE + inBlock.z;
-    *(float4*)(corner) = values.s0123;
-    *(float4*)(corner + BLOCK_SIDE) = values.s4567;
-    *(float4*)(corner + 2 * BLOCK_SIDE) = values.s89ab;
-    *(float4*)(corner + 3 * BLOCK_SIDE) = values.scdef;
+    WRITTEN float* corner = block + ((inBlock.x + slice) * BLOCK_SIDE + inBlock.y) * BLOCK_SIDE + inBlock.z;
+    *(WRITTEN float4*)(corner) = values.s0123;
+    *(WRITTEN float4*)(corner + BLOCK_SIDE) = values.s4567;
+    *(WRITTEN float4*)(corner + 2 * BLOCK_SIDE) = values.s89ab;
+    *(WRITTEN float4*)(corner + 3 * BLOCK_SIDE) = values.scdef;
 #endif
 }
 
@@ -321,7 +381,7 @@ typedef struct {
     uint stride;
 } Samples;
 
-// Where blocks that hold distances go: to the next places.
+// Where blocks that hold distances go: to the next slots. The origin of a slot that is left empty is NO_BLOCK.
 typedef struct {
     global int* origins;
     global float* distances;
@@ -334,12 +394,18 @@ enum { FILLED_BLOCKS };
 // What a group works in.
 typedef struct {
     Points inner, outer;
+#if ITEMS > 1
     float values[BLOCK_VOXELS] __attribute__((aligned(64)));
 #if TRIANGLES
     float owners[BLOCK_VOXELS] __attribute__((aligned(64)));
 #endif
     uint slot, anyKnown;
+#endif
 } Workplace;
+
+uint blocksPerBrick(const Grid* grid) {
+    return 1u << 3 * (grid->shift - BLOCK_SHIFT);
+}
 
 uint cursorsOf(const Grid* grid) {
     const SampleCells cells = cellsFor(grid);
@@ -362,52 +428,40 @@ void prepareBrick(const Bricks* bricks, uint brick, const Samples* samples, SHAR
     sortSamples(&cut, *count, samples->sorted, sums);
 }
 
-// Fills a block of a brick of the batch. For each byte `orders` has the places of its bits.
-INLINED void fillBlock(const Bricks* bricks, uint brick, uint number, const Samples* samples,
-                       global const ulong* orders, const Filled* filled, SHARED Workplace* work,
-                       SHARED uint* innerPicked, SHARED uint* outerPicked) {
+// The first voxel of a block in its brick.
+int3 firstVoxel(const Grid* grid, uint block) {
+    const int bits = grid->shift - BLOCK_SHIFT, last = (1 << bits) - 1, n = (int)(block);
+    return BLOCK_SIDE * (int3)(n >> 2 * bits, n >> bits & last, n & last);
+}
+
+// Fills a block of a brick. Returns whether this item knows any of its distances.
+INLINED uint fillBlock(const Input* input, int3 inBrick, SHARED Workplace* work, SHARED uint* innerPicked,
+                       SHARED uint* outerPicked, WRITTEN float* values, WRITTEN float* owners) {
     const Layer inner = {&work->inner, innerPicked}, outer = {&work->outer, outerPicked};
-    const Grid* grid = &bricks->grid;
-    const uint side = (uint)((1 << grid->shift) / BLOCK_SIDE);
-    const int3 inBrick =
-        BLOCK_SIDE * (int3)((int)(number / side / side), (int)(number / side % side), (int)(number % side));
-    const Input input = {samples->sorted, samples->stride, samples->begins, cellsFor(grid), bricks->layers, orders};
-    if (!hasSamples(&input, inBrick)) return;
     uint known = 0;
     for (int cube = 0; cube < CUBES; ++cube) {
         const int3 inBlock = CUBES > 1 ? SLICES * (int3)(cube / 4, cube / 2 % 2, cube % 2) : (int3)(0);
         const Voxels v = ownVoxels(inBrick.x + inBlock.x);
-        Nearest nearestInner, nearestOuter;
-        fillCube(&input, inBrick + inBlock, &v, inner, outer, &nearestInner, &nearestOuter);
+        Cube around = {.input = input, .voxels = &v, .inner = inner, .outer = outer};
+        const bool any = fillCube(&around, inBrick + inBlock);
         UNROLLED for (int i = 0; i < SLICES; ++i) {
-            IntLanes inside, knownLanes;
-            putSlice(combine(&nearestInner, &nearestOuter, &v, i, &bricks->layers, &inside, &knownLanes), i, inBlock,
-                     work->values);
-            known |= (uint)(anyLane(knownLanes));
+            Lanes distances = INFINITY;
+            IntLanes nearest = -1;
+            if (any) known |= combine(&around, i, &input->layers, &distances, &nearest);
+            putSlice(distances, i, inBlock, values);
 #if TRIANGLES
-            putSlice(asLanes(select(nearestInner.owner[i], nearestOuter.owner[i], inside)), i, inBlock, work->owners);
+            putSlice(asLanes(nearest), i, inBlock, owners);
+#else
+            (void)(owners);
 #endif
         }
     }
-    MEET;
-    if (ITEM == 0) work->anyKnown = 0;
-    MEET;
-    if (known) work->anyKnown = 1;
-    MEET;
-    if (!work->anyKnown) return;
-    if (ITEM == 0) {
-        work->slot = atomic_inc(filled->counters + FILLED_BLOCKS);
-        const int3 place = brickAt(grid, bricks->cellOfBrick[bricks->firstBrick + brick]);
-        vstore3(place * (1 << grid->shift) + inBrick, work->slot, filled->origins);
-    }
-    MEET;
-    for (uint i = ITEM; i < BLOCK_VOXELS / LANES; i += ITEMS) {
-        const size_t place = (size_t)(work->slot) * (BLOCK_VOXELS / LANES) + i;
-        storeGlobalLanes(vloadLanes(i, work->values), place, filled->distances);
-#if TRIANGLES
-        storeGlobalLanes(vloadLanes(i, work->owners), place, (global float*)(filled->triangles));
-#endif
-    }
+    return known;
+}
+
+void putOrigin(const Bricks* bricks, uint brick, int3 inBrick, uint slot, global int* origins) {
+    const int3 place = brickAt(&bricks->grid, bricks->cellOfBrick[bricks->firstBrick + brick]);
+    vstore3(place * (1 << bricks->grid.shift) + inBrick, slot, origins);
 }
 
 #if ITEMS > 1
@@ -428,25 +482,74 @@ GROUP_KERNEL void prepareBricks(global const float* points, global const uint* t
     }
 }
 
-// A group fills a block of a brick.
+// A group fills a block of a brick. For each byte `orders` has the places of its bits.
 GROUP_KERNEL void fillBlocks(Grid grid, global const uint* cellOfBrick, global const uint* partOffsets,
                              uint firstBrick, global float* sorted, global uint* begins, uint stride, Layers layers,
                              global const ulong* orders, global int* origins, global float* distances,
                              global int* nearestTriangles, global uint* counters) {
     SHARED Workplace work;
     SHARED uint innerPicked, outerPicked;
-    const uint side = (uint)((1 << grid.shift) / BLOCK_SIDE), perBrick = side * side * side;
-    const uint brick = (uint)(get_group_id(0)) / perBrick, number = (uint)(get_group_id(0)) % perBrick;
+    const uint perBrick = blocksPerBrick(&grid), brick = (uint)(get_group_id(0)) / perBrick;
     const Bricks bricks = {0, 0, grid, cellOfBrick, 0, partOffsets, 0, firstBrick, layers};
-    const Samples samples = {0, sorted + firstSample(partOffsets, firstBrick, brick),
-                             begins + brick * cursorsOf(&grid), stride};
-    const Filled filled = {origins, distances, nearestTriangles, counters};
-    fillBlock(&bricks, brick, number, &samples, orders, &filled, &work, &innerPicked, &outerPicked);
+    const Input input = {sorted + firstSample(partOffsets, firstBrick, brick), stride,
+                         begins + brick * cursorsOf(&grid), cellsFor(&grid), layers, orders};
+    const int3 inBrick = firstVoxel(&grid, (uint)(get_group_id(0)) % perBrick);
+    if (!hasSamples(&input, inBrick)) return;
+#if TRIANGLES
+    local float* const owners = work.owners;
+#else
+    (void)(nearestTriangles);
+    local float* const owners = 0;
+#endif
+    const uint known = fillBlock(&input, inBrick, &work, &innerPicked, &outerPicked, work.values, owners);
+    MEET;
+    if (ITEM == 0) work.anyKnown = 0;
+    MEET;
+    if (known) work.anyKnown = 1;
+    MEET;
+    if (!work.anyKnown) return;
+    if (ITEM == 0) {
+        work.slot = atomic_inc(counters + FILLED_BLOCKS);
+        putOrigin(&bricks, brick, inBrick, work.slot, origins);
+    }
+    MEET;
+    for (uint i = ITEM; i < BLOCK_VOXELS / LANES; i += ITEMS) {
+        const size_t place = (size_t)(work.slot) * (BLOCK_VOXELS / LANES) + i;
+        storeGlobalLanes(vloadLanes(i, work.values), place, distances);
+#if TRIANGLES
+        storeGlobalLanes(vloadLanes(i, owners), place, (global float*)(nearestTriangles));
+#endif
+    }
 }
 
 #else
 
-// Both in one go. Each group has `room` for the samples of a brick, which stays in the processor's cache.
+// Blocks of a brick that take slots together: a bit for each.
+#define TOGETHER 64
+
+// Fills those blocks of a brick that may hold distances, TOGETHER from `first` on, in slots side by side.
+INLINED void fillTogether(const Bricks* bricks, uint brick, uint first, const Input* input, const Filled* filled,
+                          Workplace* work) {
+    const Grid* grid = &bricks->grid;
+    ulong wanted = 0;
+    for (uint i = 0; i < TOGETHER; ++i) wanted |= (ulong)(hasSamples(input, firstVoxel(grid, first + i))) << i;
+    const uint count = (uint)(popcount(wanted));
+    uint slot = atomic_add(filled->counters + FILLED_BLOCKS, count), innerPicked, outerPicked;
+    const uint end = slot + count;
+    for (; wanted != 0; wanted &= wanted - 1) {
+        const int3 inBrick = firstVoxel(grid, first + 63 - (uint)(clz(wanted & -wanted)));
+        const size_t place = (size_t)(slot) * BLOCK_VOXELS;
+        if (!fillBlock(input, inBrick, work, &innerPicked, &outerPicked, filled->distances + place,
+                       (global float*)(filled->triangles) + place))
+            continue;
+        putOrigin(bricks, brick, inBrick, slot, filled->origins);
+        ++slot;
+    }
+    for (; slot < end; ++slot) vstore3((int3)(NO_BLOCK), slot, filled->origins);
+}
+
+// Both in one go. Each group has `room` for the samples of a brick, which stays in the processor's cache. For each byte
+// `orders` has the places of its bits.
 GROUP_KERNEL void fillBricks(global const float* points, global const uint* triangles, Grid grid,
                              global const uint* cellOfBrick, global const uint* triangleOffsets,
                              global const uint* partOffsets, global const uint* list, uint firstBrick, uint brickCount,
@@ -454,18 +557,18 @@ GROUP_KERNEL void fillBricks(global const float* points, global const uint* tria
                              global uint* next, Layers layers, uint room, global const ulong* orders,
                              global int* origins, global float* distances, global int* nearestTriangles,
                              global uint* counters) {
-    uint taken, count, sums[ITEMS], innerPicked, outerPicked;
+    uint taken, count, sums[ITEMS];
     Workplace work;
-    const uint side = (uint)((1 << grid.shift) / BLOCK_SIDE), perBrick = side * side * side;
     const Bricks bricks = {points,      triangles, grid,       cellOfBrick, triangleOffsets,
                            partOffsets, list,      firstBrick, layers};
-    const uint group = (uint)(get_group_id(0)), first = group * room;
+    const uint group = (uint)(get_group_id(0)), first = group * room, perBrick = blocksPerBrick(&grid);
     const Samples samples = {unsorted + first, sorted + first, begins + group * cursorsOf(&grid), stride};
+    const Input input = {samples.sorted, stride, samples.begins, cellsFor(&grid), layers, orders};
     const Filled filled = {origins, distances, nearestTriangles, counters};
     while (takeBrick(next, &taken, &count) < brickCount) {
         prepareBrick(&bricks, taken, &samples, &count, sums);
-        for (uint number = 0; number < perBrick; ++number)
-            fillBlock(&bricks, taken, number, &samples, orders, &filled, &work, &innerPicked, &outerPicked);
+        for (uint block = 0; block < perBrick; block += TOGETHER)
+            fillTogether(&bricks, taken, block, &input, &filled, &work);
     }
 }
 

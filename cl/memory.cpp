@@ -1,11 +1,18 @@
 #include "cl/memory.h"
 
 #include <algorithm>
+#include <exception>
 
 namespace bilayer {
 namespace {
 
 constexpr std::uint64_t mebibyte = 1 << 20;
+/// What a device keeps from one build to the next, at most.
+constexpr std::uint64_t mostSpareBytes = 128 * mebibyte;
+
+std::uint64_t sizeOf(const cl::Buffer& buffer) {
+    return buffer.getInfo<CL_MEM_SIZE>();
+}
 
 std::string mebibytes(std::uint64_t bytes) {
     return std::to_string((bytes + mebibyte - 1) / mebibyte) + " MiB";
@@ -15,7 +22,56 @@ std::string mebibytes(std::uint64_t bytes) {
 
 cl::Buffer DeviceMemory::allocate(std::uint64_t bytes, const std::string& purpose) {
     count(bytes, purpose);
-    return cl::Buffer(device_.context, CL_MEM_READ_WRITE, bytes);
+    cl::Buffer buffer = takeSpare(bytes);
+    if (!buffer()) buffer = cl::Buffer(device_.context, CL_MEM_READ_WRITE, bytes);
+    taken_.push_back(buffer);
+    return buffer;
+}
+
+// Null if there is none of this size. Then those of other sizes make room where the budget would be exceeded.
+cl::Buffer DeviceMemory::takeSpare(std::uint64_t bytes) {
+    const std::lock_guard lock(device_.mutex);
+    const auto found = device_.spares.find(bytes);
+    cl::Buffer buffer;
+    if (found != device_.spares.end()) {
+        buffer = found->second;
+        device_.spareBytes -= bytes;
+        device_.spares.erase(found);
+    } else if (used_ + device_.spareBytes > budget_) {
+        clearSpares();
+    }
+    return buffer;
+}
+
+void DeviceMemory::clearSpares() {
+    device_.spares.clear();
+    device_.spareBytes = 0;
+}
+
+void DeviceMemory::keepSpare(const cl::Buffer& buffer) {
+    const std::uint64_t bytes = sizeOf(buffer);
+    const std::lock_guard lock(device_.mutex);
+    if (device_.spareBytes + bytes > mostSpareBytes) clearSpares();
+    if (bytes > mostSpareBytes) return;
+    device_.spares.emplace(bytes, buffer);
+    device_.spareBytes += bytes;
+}
+
+void DeviceMemory::free(cl::Buffer& buffer) {
+    if (!buffer()) return;
+    used_ -= sizeOf(buffer);
+    const auto taken = std::find(taken_.begin(), taken_.end(), buffer);
+    if (taken != taken_.end()) {
+        keepSpare(buffer);
+        taken_.erase(taken);
+    }
+    buffer = {};
+}
+
+DeviceMemory::~DeviceMemory() try {
+    for (const cl::Buffer& buffer : taken_) keepSpare(buffer);
+} catch (const std::exception&) {
+    // what the device does not keep is freed
 }
 
 cl::Buffer DeviceMemory::upload(const void* data, std::uint64_t bytes, const std::string& purpose, cl::Event* event) {

@@ -183,9 +183,10 @@ void Fill::take(Batch& batch, std::size_t first, std::size_t last) const {
 void Fill::reserve(Batch& batch) {
     const Load load = batch.load(), grown = load.atLeast(batch.capacity);
     if (grown == batch.capacity) return;
-    batch.prismBuffer = batch.placeBuffer = batch.offsetBuffer = batch.reachingBuffer = batch.distanceBuffer =
-        batch.triangleBuffer = cl::Buffer();
-    if (batch.capacity.blocks > 0) memory_.free(batch.capacity.bytes(mesh_.triangles));
+    device_.queue.finish();
+    for (cl::Buffer* buffer : {&batch.prismBuffer, &batch.placeBuffer, &batch.offsetBuffer, &batch.reachingBuffer,
+                               &batch.distanceBuffer, &batch.triangleBuffer})
+        memory_.free(*buffer);
     batch.capacity = fits(grown) ? grown : load;
     const auto buffer = [&](std::uint64_t bytes) { return memory_.allocate(bytes, "a batch of bricks"); };
     batch.prismBuffer = buffer(batch.capacity.prismBytes());

@@ -5,6 +5,7 @@
 #define CL_HPP_TARGET_OPENCL_VERSION 120
 #define CL_HPP_MINIMUM_OPENCL_VERSION 120
 #include <CL/opencl.hpp>
+#include <cstdint>
 #include <filesystem>
 #include <map>
 #include <mutex>
@@ -20,8 +21,10 @@ struct Device::Impl {
     cl::Device device;
     cl::Context context;
     cl::CommandQueue queue;                                               // in order
-    std::mutex mutex;                                                     // guards `programs`
+    std::mutex mutex;                                                     // guards what follows
     std::map<std::pair<std::string, std::string>, cl::Program> programs;  // by source and build options
+    std::multimap<std::uint64_t, cl::Buffer> spares;                      // by size: memory.h
+    std::uint64_t spareBytes = 0;
 };
 
 /// The name of an OpenCL error code, "CL_OUT_OF_RESOURCES"; "code -9999" for one that is not in the standard.

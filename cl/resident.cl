@@ -116,7 +116,8 @@ GROUP_KERNEL void trimBlocks(global const int* origins, global const float* dist
     highest[ITEM] = high;
     has = together(bits, has);
     const int3 origin = vload3(b, origins);
-    const bool known = has & (OUTSIDE | INSIDE), needed = has & ACTIVE || (has & OUTSIDE && has & INSIDE);
+    const bool known = has & (OUTSIDE | INSIDE) && origin.x != NO_BLOCK,
+               needed = known && (has & ACTIVE || (has & OUTSIDE && has & INSIDE));
     if (ITEM == 0) {
         vstore3(origin, b, keptOrigins);
         sides[b] = !known ? UNKNOWN : needed ? NEEDED : has & INSIDE ? EMPTY_INSIDE : EMPTY_OUTSIDE;

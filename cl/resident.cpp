@@ -53,8 +53,6 @@ std::size_t roundedUp(std::size_t count, std::size_t multiple) {
 struct Page {
     cl_uint blocks;
     cl::Buffer origins, values, sides;
-
-    std::uint64_t bytes() const { return blocks * (sizeof(glm::ivec3) + blockVoxels * sizeof(float) + sizeof(cl_int)); }
 };
 
 class ResidentFill {
@@ -115,6 +113,7 @@ class ResidentFill {
     std::vector<float> hostDistances_;     // [voxels]
     DeviceLayout layout_;
     glm::ivec3 firstVoxel_{0};
+    Ended ended_;
 };
 
 ResidentFill::ResidentFill(const Device& device, const OpenclOptions& options, DeviceMemory& memory, const FillJob& job)
@@ -126,7 +125,8 @@ ResidentFill::ResidentFill(const Device& device, const OpenclOptions& options, D
       widths_{job.options.exteriorWidth, job.options.interiorWidth, job.mesh.voxelSize},
       timing_(options.times),
       program_(buildProgram(device_, resident_cl, commonBuildOptions(device_, gpuMapping_))),
-      summary_(memory.allocate(sizeof(Summary), field)) {}
+      summary_(memory.allocate(sizeof(Summary), field)),
+      ended_(device_.queue) {}
 
 DeviceLayout ResidentFill::run() {
     const Summary none;
@@ -167,10 +167,11 @@ void ResidentFill::keepFromHost() {
     const auto uploaded = [&](const auto& data) {
         return memory_.upload(data.data(), data.size() * sizeof data[0], field, timing_.event(Timing::Of::upload));
     };
-    const cl::Buffer origins = uploaded(hostOrigins_), distances = uploaded(hostDistances_);
+    cl::Buffer origins = uploaded(hostOrigins_), distances = uploaded(hostDistances_);
     keep(origins, distances, hostOrigins_.size());
     device_.queue.finish();
-    memory_.free(hostOrigins_.size() * sizeof(glm::ivec3) + hostDistances_.size() * sizeof(float));
+    memory_.free(origins);
+    memory_.free(distances);
 }
 
 Summary ResidentFill::readSummary() {
@@ -203,7 +204,7 @@ void ResidentFill::measureFrame() {
 void ResidentFill::placeBlocks() {
     const KernelFrame frame(layout_.frame);
     const cl_int4 first{{firstVoxel_.x, firstVoxel_.y, firstVoxel_.z, 0}};
-    const cl::Buffer next = memory_.allocate(sizeof(cl_uint), field);
+    cl::Buffer next = memory_.allocate(sizeof(cl_uint), field);
     layout_.directory = memory_.allocate(entries() * sizeof(cl_int), field);
     device_.queue.enqueueFillBuffer(next, cl_uint(0), 0, sizeof(cl_uint));
     device_.queue.enqueueFillBuffer(layout_.directory, unknownEntry, 0, entries() * sizeof(cl_int));
@@ -215,9 +216,10 @@ void ResidentFill::placeBlocks() {
             layout_.values);
     enqueueBlocks("fillAprons", entries(), frame, layout_.directory, layout_.values);
     device_.queue.finish();
-    for (const Page& page : pages_) memory_.free(page.bytes());
+    for (Page& page : pages_)
+        for (cl::Buffer* buffer : {&page.origins, &page.values, &page.sides}) memory_.free(*buffer);
     pages_.clear();
-    memory_.free(sizeof(cl_uint));
+    memory_.free(next);
 }
 
 void ResidentFill::countConflicts() {
@@ -241,7 +243,8 @@ void ResidentFill::measureClearances() {
     }
     enqueueParts("storeCentres", frame, ways[0], layout_.centres);
     device_.queue.finish();
-    memory_.free(ways.size() * count * sizeof(cl_float) + sizeof(Summary));
+    for (cl::Buffer& some : ways) memory_.free(some);
+    memory_.free(summary_);
 }
 
 void checkJob(const FillJob& job) {
@@ -267,14 +270,13 @@ DeviceLayout buildResident(const Device& device, const Mesh& mesh, const BuildOp
     withoutTriangles.triangles = false;
 
     DeviceLayout layout;
-    const std::uint64_t left = memory.left();
-    fillOnly(mesh, withoutTriangles, {"opencl", device.info().name, [&](const FillJob& job) {
-                                          checkJob(job);
-                                          // what came before had signs that contradict each other
-                                          layout = {};
-                                          memory.free(left - memory.left());
-                                          layout = ResidentFill(device, fillOptions, memory, job).run();
-                                      }});
+    fillOnly(mesh, withoutTriangles,
+             {"opencl", device.info().name, [&](const FillJob& job) {
+                  checkJob(job);
+                  // what came before had signs that contradict each other
+                  for (cl::Buffer* buffer : {&layout.directory, &layout.centres, &layout.values}) memory.free(*buffer);
+                  layout = ResidentFill(device, fillOptions, memory, job).run();
+              }});
     if (options.times) {
         options.times->kernels += fillTimes.kernels;
         options.times->upload += fillTimes.upload;

@@ -285,6 +285,27 @@ TEST_CASE("a little device memory means many batches and the same field") {
     CHECK(times.kernels > 0);
 }
 
+TEST_CASE("a device keeps buffers for the next build, which may be of another mesh and have less memory") {
+    const Device device = openDevice();
+    const Mesh ball = shapes::sphere(1.f, 4), ring = shapes::torus(1.f, 0.4f);
+    const BuildOptions ofBall = optionsFor(ball, 100, GENERATE(Method::exact, Method::doubleLayer)),
+                       ofRing = optionsFor(ring, 60, ofBall.method);
+    const LevelSet expected = build(ball, ofBall), other = build(ring, ofRing);
+    std::uint64_t kept = 0;
+    for (int i = 0; i < 3; ++i) {
+        checkSame(expected, build(ball, ofBall, openclFiller(device)));
+        CHECK(device.impl().spareBytes > 0);
+        if (i > 0) CHECK(device.impl().spareBytes == kept);  // they were used again, and none came on top
+        kept = device.impl().spareBytes;
+    }
+    OpenclTimes times;
+    constexpr std::uint64_t memory = 4;
+    checkSame(other, build(ring, ofRing, openclFiller(device, {.memoryMiB = memory, .times = &times})));
+    CHECK(times.peakBytes <= memory << 20);
+    CHECK(device.impl().spareBytes <= memory << 20);
+    checkSame(expected, build(ball, ofBall, openclFiller(device)));
+}
+
 TEST_CASE("a device without double precision is refused by name") {
     Device::Impl& impl = openDevice().impl();
     auto single = std::make_shared<Device::Impl>();
