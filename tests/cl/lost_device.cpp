@@ -1,0 +1,121 @@
+// A device that is lost half-way through a build. The calls that send work to a device are defined here, before the
+// loader's, and fail from some call on, as drivers make them do when a GPU has gone.
+#include <dlfcn.h>
+
+#include <atomic>
+#include <catch2/catch.hpp>
+#include <climits>
+#include <string>
+
+#include "cl/field.h"
+#include "cl/filler.h"
+#include "cl/program.h"
+#include "demos/shared/shapes.h"
+#include "sdf/build.h"
+#include "sdf/grids.h"
+
+using namespace bilayer;
+using Catch::Matchers::Contains;
+
+namespace {
+
+enum Call { kernels, maps, waits };
+
+Call failing;
+std::atomic<int> callsLeft = INT_MAX;
+
+// Counts down the calls of the kind that is to fail.
+bool fails(Call call) {
+    return call == failing && callsLeft != INT_MAX && --callsLeft < 0;
+}
+
+template <class Function>
+Function* loaders(const char* name) {
+    return reinterpret_cast<Function*>(dlsym(RTLD_NEXT, name));
+}
+
+}  // namespace
+
+extern "C" {
+
+cl_int clEnqueueNDRangeKernel(cl_command_queue queue, cl_kernel kernel, cl_uint dimensions, const size_t* offset,
+                              const size_t* global, const size_t* local, cl_uint waits, const cl_event* waitList,
+                              cl_event* event) {
+    if (fails(kernels)) return CL_DEVICE_NOT_AVAILABLE;
+    static const auto call = loaders<decltype(clEnqueueNDRangeKernel)>("clEnqueueNDRangeKernel");
+    return call(queue, kernel, dimensions, offset, global, local, waits, waitList, event);
+}
+
+void* clEnqueueMapBuffer(cl_command_queue queue, cl_mem buffer, cl_bool blocking, cl_map_flags flags, size_t offset,
+                         size_t size, cl_uint waits, const cl_event* waitList, cl_event* event, cl_int* code) {
+    if (fails(maps)) {
+        *code = CL_OUT_OF_RESOURCES;
+        return nullptr;
+    }
+    static const auto call = loaders<decltype(clEnqueueMapBuffer)>("clEnqueueMapBuffer");
+    return call(queue, buffer, blocking, flags, offset, size, waits, waitList, event, code);
+}
+
+cl_int clWaitForEvents(cl_uint count, const cl_event* events) {
+    if (fails(waits)) return CL_EXEC_STATUS_ERROR_FOR_EVENTS_IN_WAIT_LIST;
+    static const auto call = loaders<decltype(clWaitForEvents)>("clWaitForEvents");
+    return call(count, events);
+}
+}
+
+TEST_CASE("a device lost half-way is an error that names call and device, and leaves nothing behind") {
+    const Device device = openDevice();
+    const Mesh mesh = shapes::sphere(1.f, 4);
+    BuildOptions options;
+    options.method = GENERATE(Method::exact, Method::doubleLayer, Method::prism);
+    options.exteriorWidth = options.interiorWidth = 2;
+    options.voxelSize = voxelSizeFor(mesh, 150);
+    const BlockFiller filler = openclFiller(device, {.memoryMiB = 8});
+    const std::size_t voxels = build(mesh, options, filler).activeVoxels();
+    int failures = 0;
+    for (const auto& [call, name] :
+         {std::pair{kernels, "clEnqueueNDRangeKernel"}, {maps, "clEnqueueMapBuffer"}, {waits, "clWaitForEvents"}})
+        for (int before = 0; before < 64; before += 1 + before / 2) {
+            failing = call;
+            callsLeft = before;
+            CAPTURE(name, before);
+            bool complete = false;
+            try {
+                complete = build(mesh, options, filler).activeVoxels() == voxels;
+            } catch (const DeviceError& error) {
+                ++failures;
+                CHECK_THAT(error.what(), Contains(name) && Contains(device.info().name) && Contains("CL_"));
+            }
+            const bool all = callsLeft >= 0;  // there were no more of them
+            callsLeft = INT_MAX;
+            CHECK(complete == all);
+            if (all) break;
+            // what is left on the device harms no other build
+            REQUIRE(build(mesh, options, filler).activeVoxels() == voxels);
+        }
+    CHECK(failures > 6);
+}
+
+TEST_CASE("a device lost while a field stays on it is an error, too") {
+    const Device device = openDevice();
+    const Mesh mesh = shapes::sphere(1.f, 4);
+    BuildOptions options;
+    options.voxelSize = voxelSizeFor(mesh, 60);
+    for (int before = 0;; ++before) {
+        failing = kernels;
+        callsLeft = before;
+        bool complete = false;
+        try {
+            const DeviceField field(device, mesh, options);
+            complete = true;
+        } catch (const DeviceError&) {
+        }
+        const bool all = callsLeft >= 0;
+        callsLeft = INT_MAX;
+        CHECK(complete == all);
+        if (all) {
+            CHECK(before > 5);
+            break;
+        }
+    }
+}
