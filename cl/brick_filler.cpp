@@ -35,7 +35,7 @@ constexpr std::size_t blocksPerTask = 16;  // that the host takes at once
 /// Work-items of a group, lanes of a vector: ITEMS and LANES of common.cl.
 constexpr std::size_t groupItems = 64, lanes = 16;
 /// Bricks of a batch at most: results of a few megabytes stay in a processor's cache, and a GPU has enough to do.
-constexpr std::size_t bricksForProcessor = 64, bricksForGpu = 512;
+constexpr std::size_t bricksForProcessor = 40, bricksForGpu = 512;
 /// Groups for each compute unit that take bricks one after another, each with memory of its own. PoCL gives the first
 /// unit that asks more than its share of groups, so that one a unit would leave others without any.
 constexpr std::size_t groupsPerUnit = 4;

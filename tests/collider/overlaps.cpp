@@ -36,8 +36,8 @@ std::vector<Mesh> closedMeshes() {
     return meshes;
 }
 
-Field withMesh(const Mesh& mesh, int resolution = 48) {
-    return Field(build(mesh, {.voxelSize = voxelSizeFor(mesh, resolution)}), mesh);
+Field withMesh(const Mesh& mesh, const FieldOptions& options = {}, float resolution = 48) {
+    return Field(build(mesh, {.voxelSize = voxelSizeFor(mesh, resolution)}), mesh, options);
 }
 
 // Near the surface, in the band, inside and far away.
@@ -77,11 +77,12 @@ void forPointsIn(const OrientedBox& box, int count, Visit visit) {
 }  // namespace
 
 TEST_CASE("with the mesh, points are inside where its surface winds around them") {
+    const FieldOptions options{GENERATE(Storage::float32, Storage::fixed16)};
     const unsigned seed = test::seed();
     CAPTURE(seed);
     Random random(seed);
     for (const Mesh& mesh : closedMeshes()) {
-        const Field field = withMesh(mesh);
+        const Field field = withMesh(mesh, options);
         const Truth truth(mesh);
         const std::size_t count = 3000;
         std::vector<glm::vec3> points(count);
@@ -122,11 +123,12 @@ TEST_CASE("triangles that are turned the wrong way do not turn the inside out") 
 }
 
 TEST_CASE("with the mesh, spheres overlap where it is near enough") {
+    const FieldOptions options{GENERATE(Storage::float32, Storage::fixed16)};
     const unsigned seed = test::seed();
     CAPTURE(seed);
     Random random(seed);
     for (const Mesh& mesh : closedMeshes()) {
-        const Field field = withMesh(mesh);
+        const Field field = withMesh(mesh, options);
         const Truth truth(mesh);
         const std::size_t count = 2000;
         std::vector<glm::vec3> centres(count);
@@ -155,11 +157,12 @@ TEST_CASE("with the mesh, spheres overlap where it is near enough") {
 }
 
 TEST_CASE("with the mesh, boxes overlap where they hold a point of the solid") {
+    const FieldOptions options{GENERATE(Storage::float32, Storage::fixed16)};
     const unsigned seed = test::seed();
     CAPTURE(seed);
     Random random(seed);
     for (const Mesh& mesh : closedMeshes()) {
-        const Field field = withMesh(mesh);
+        const Field field = withMesh(mesh, options);
         const Truth truth(mesh);
         const double scale = bounds(mesh).longestSide();
         int overlapping = 0;
@@ -185,12 +188,13 @@ TEST_CASE("with the mesh, boxes overlap where they hold a point of the solid") {
 }
 
 TEST_CASE("without the mesh, the closest point is a zero, and there is none nearer") {
+    const FieldOptions options{GENERATE(Storage::float32, Storage::fixed16)};
     const unsigned seed = test::seed();
     CAPTURE(seed);
     Random random(seed);
     for (const Solid& solid : smallSolids())
         for (const float width : {3.f, 1.8f}) {
-            const Field field(levelSetOf(solid, h, width, width));
+            const Field field(levelSetOf(solid, h, width, width), options);
             for (int i = 0; i < 500; ++i) {
                 const glm::vec3 p = i % 3 ? random.point(0.6) : float(std::pow(10, random(0, 5))) * random.direction();
                 const ClosestPoint closest = field.closest(p);
@@ -219,11 +223,12 @@ TEST_CASE("without the mesh, the closest point is a zero, and there is none near
 }
 
 TEST_CASE("without the mesh, boxes overlap where they hold a negative sample") {
+    const FieldOptions options{GENERATE(Storage::float32, Storage::fixed16)};
     const unsigned seed = test::seed();
     CAPTURE(seed);
     Random random(seed);
     for (const Solid& solid : smallSolids()) {
-        const Field field(levelSetOf(solid, h));
+        const Field field(levelSetOf(solid, h), options);
         int overlapping = 0;
         const int count = 500;
         for (int i = 0; i < count; ++i) {
@@ -244,7 +249,7 @@ TEST_CASE("without the mesh, boxes overlap where they hold a negative sample") {
 
 TEST_CASE("boxes flush with a wall are quick and right to a thousandth of a voxel") {
     const Field bare(levelSetOf(boxSolid({0.5, 0.5, 0.1}), 0.01)),
-        exact = withMesh(shapes::box({0.5f, 0.5f, 0.1f}), 100);
+        exact = withMesh(shapes::box({0.5f, 0.5f, 0.1f}), {}, 100);
     for (const Field& field : {bare, exact})
         for (const float gap : {-2e-5f, 2e-5f}) {
             CAPTURE(gap, field.mesh() != nullptr);

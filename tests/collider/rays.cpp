@@ -195,11 +195,12 @@ TEST_CASE("rays meet a sphere and a box where geometry says") {
 }
 
 TEST_CASE("rays meet the interpolant where steps of a fiftieth of a voxel do") {
+    const FieldOptions options{GENERATE(Storage::float32, Storage::fixed16)};
     const unsigned seed = test::seed();
     CAPTURE(seed);
     Random random(seed);
     for (const Solid& solid : smallSolids()) {
-        const Field field(levelSetOf(solid, h));
+        const Field field(levelSetOf(solid, h), options);
         for (int i = 0; i < 1000; ++i) {
             const glm::vec3 origin = random.direction();
             const glm::vec3 towards = glm::normalize(random.point(0.5) - origin);
@@ -288,10 +289,11 @@ TEST_CASE("without the mesh rays that start inside, end early or are no rays") {
 }
 
 TEST_CASE("without the mesh no chord is too short for a ray") {
+    const FieldOptions options{GENERATE(Storage::float32, Storage::fixed16)};
     const unsigned seed = test::seed();
     CAPTURE(seed);
     Random random(seed);
-    const Field field(levelSetOf(sphereSolid(0.4), h));
+    const Field field(levelSetOf(sphereSolid(0.4), h), options);
     int shortOnes = 0, misses = 0;
     for (int i = 0; i < 1000; ++i) {
         // past the surface, but for a ten-thousandth of a voxel
@@ -397,11 +399,12 @@ TEST_CASE("with the mesh, spheres stop where they touch it") {
 }
 
 TEST_CASE("without the mesh, spheres stop where they touch the interpolant's zeros") {
+    const FieldOptions options{GENERATE(Storage::float32, Storage::fixed16)};
     const unsigned seed = test::seed();
     CAPTURE(seed);
     Random random(seed);
     for (const Solid& solid : smallSolids()) {
-        const Field field(levelSetOf(solid, h));
+        const Field field(levelSetOf(solid, h), options);
         int met = 0, missed = 0;
         for (int i = 0; i < 300; ++i) {
             const auto radius = float(h * std::pow(10, random(-1, 2)));
