@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 
+#include "sdf/morton.h"
 #include "sdf/progress.h"
 
 namespace bilayer {
@@ -23,20 +24,6 @@ Offset offset(const openvdb::Coord& voxel, const openvdb::Coord& base) {
             std::uint32_t(voxel.z()) - std::uint32_t(base.z())};
 }
 
-// Morton order, without building its keys: the axis whose coordinates differ in the highest bit decides.
-bool before(const Offset& a, const Offset& b) {
-    std::size_t axis = 0;
-    std::uint32_t most = a[0] ^ b[0];
-    for (std::size_t other = 1; other < 3; ++other) {
-        const std::uint32_t differing = a[other] ^ b[other];
-        if (most < differing && most < (most ^ differing)) {
-            most = differing;
-            axis = other;
-        }
-    }
-    return a[axis] < b[axis];
-}
-
 openvdb::Coord child(const openvdb::Coord& origin, std::int64_t side, int octant) {
     const auto at = [&](int from, int bit) { return std::int32_t(from + ((octant >> bit) & 1) * side); };
     return {at(origin.x(), 2), at(origin.y(), 1), at(origin.z(), 0)};
@@ -51,7 +38,7 @@ Cells::Cells(std::vector<BandLeaf*> leaves, const openvdb::CoordBBox& space, Pro
     const auto reaches = [&](int axis) { return box.max()[axis] - std::int64_t(base_[axis]) < side_; };
     for (side_ = nodeVoxels; !(reaches(0) && reaches(1) && reaches(2));) side_ *= 2;
     const auto less = [this](const BandLeaf* a, const BandLeaf* b) {
-        return before(offset(a->origin(), base_), offset(b->origin(), base_));
+        return beforeInMortonOrder(offset(a->origin(), base_), offset(b->origin(), base_));
     };
     tbb::parallel_sort(leaves.begin(), leaves.end(), polled(less, progress));
     cut(leaves, base_, side_, progress);
@@ -88,7 +75,7 @@ std::size_t Cells::find(const openvdb::Coord& voxel) const {
     }
     const auto next =
         std::upper_bound(cells_.begin(), cells_.end(), voxel, [this](const openvdb::Coord& at, const Cell& cell) {
-            return before(offset(at, base_), offset(cell.origin, base_));
+            return beforeInMortonOrder(offset(at, base_), offset(cell.origin, base_));
         });
     return std::size_t(next - cells_.begin()) - 1;
 }
