@@ -4,9 +4,10 @@
 
 // [voxels]
 #define CELL_DIAGONAL 1.7320508f
-// Bits of a place below the voxel, and what leaves a fixed-point number in the lower bits of a double below 2^28.
-#define FRACTION_BITS 23
-#define FIXED_POINT 805306368.0
+// Bits of a place below the voxel, which leave those of the voxel in its block in the same word, and what leaves a
+// fixed-point number in the lower bits of a double below 2^22.
+#define FRACTION_BITS 29
+#define FIXED_POINT 12582912.0
 
 // Sample of sdf/sample.h.
 typedef struct {
@@ -90,6 +91,12 @@ bool isInBand(const Field* field, const Cell* cell) {
     return all(cell->low > least && cell->low < most && cell->high > least && cell->high < most);
 }
 
+// With the band's widths where a layout of the host has no numbers.
+float4 withWidths(const Frame* frame, float4 values) {
+    const float4 widths = select((float4)(frame->exteriorWidth), (float4)(-frame->interiorWidth), signbit(values));
+    return select(values, widths, isnan(values));
+}
+
 // The bound in a cell of which a voxel is beyond the band.
 float boundBesideBand(const Field* field, float distance, double3 place) {
     const Frame* frame = &field->frame;
@@ -107,22 +114,29 @@ Sample beyondBand(float distance) {
 
 Sample sampleAt(const Field* field, float3 point) {
     const Frame* frame = &field->frame;
-    const double3 place = (convert_double3(point) - vload3(0, frame->origin)) * frame->perMetre;
-    // what is negative, huge or no number is not within
-    const long3 fixed = as_long3(place + FIXED_POINT) - as_long(FIXED_POINT);
-    const long3 size = convert_long3(BLOCK_SIDE * blocksOf(field)) << FRACTION_BITS;
-    if (any(fixed < 0) || any(fixed >= size))
+    const double3 origin = vload3(0, frame->origin);
+    const double3 fixed = convert_double3(point) * frame->perMetre + (FIXED_POINT - origin * frame->perMetre);
+    // the upper words are blocks, the lower ones places there; what is negative, huge or no number is beyond all blocks
+    const ulong3 words = as_ulong3(fixed);
+    const uint3 block = convert_uint3(words >> 32) - (uint)(as_ulong(FIXED_POINT) >> 32);
+    const uint3 inBlock = convert_uint3(words & 0xffffffffUL);
+    const double3 place = (convert_double3(point) - origin) * frame->perMetre;
+    if (any(block >= convert_uint3(blocksOf(field))))
         return beyondBand(boundOutside(field, place, convert_double3(BLOCK_SIDE * blocksOf(field))));
 
-    const int3 voxel = convert_int3(fixed >> FRACTION_BITS);
-    const int entry = field->directory[indexOf(voxel >> 3, blocksOf(field))];
+    const int entry = field->directory[indexOf(convert_int3(block), blocksOf(field))];
     if (entry < 0) return beyondBand(boundInEmptyBlock(field, entry == EMPTY_INSIDE, place));
 
-    const int3 bits = convert_int3(fixed & ((1 << FRACTION_BITS) - 1));
-    const float3 fraction = as_float3(bits | as_int(1.0f)) - 1.0f;
-    const Cell cell = cellAt(field, entry, voxel & (BLOCK_SIDE - 1));
+    const int3 bits = convert_int3(inBlock & ((1u << FRACTION_BITS) - 1));
+    const float3 fraction = convert_float3(bits) * (1.0f / (1 << FRACTION_BITS));
+    Cell cell = cellAt(field, entry, convert_int3(inBlock >> FRACTION_BITS));
+    const bool inBand = isInBand(field, &cell);
+    if (!inBand) {
+        cell.low = withWidths(frame, cell.low);
+        cell.high = withWidths(frame, cell.high);
+    }
     const float4 found = interpolate(&cell, fraction);
-    if (!isInBand(field, &cell)) return beyondBand(boundBesideBand(field, found.x, place));
+    if (!inBand) return beyondBand(boundBesideBand(field, found.x, place));
     const float3 gradient = found.yzw * (float)(frame->perMetre);
     const Sample sample = {found.x, {gradient.x, gradient.y, gradient.z}, 1};
     return sample;

@@ -1,7 +1,6 @@
 // How fields are made, and what they say of themselves. Queries have files of their own.
 #include "collider/field.h"
 
-#include <bit>
 #include <utility>
 
 #include "collider/field_data.h"
@@ -9,30 +8,23 @@
 namespace bilayer {
 
 void FieldData::fillLanes() {
-    const int blockStrides[] = {blocks.y * blocks.z, blocks.z, 0, 1}, voxelStrides[] = {stride * stride, stride, 0, 1};
-    for (int lane = 0; lane < 4; ++lane) {
-        const int axis = (lane + 1) / 2;
-        lanes.origin[lane] = origin[axis];
-        lanes.perMetre[lane] = perMetre;
-        lanes.fixedPoint[lane] = 1.5 * (std::uint64_t(1) << (52 - fractionBits));  // of a double's 52 bits
-        lanes.zeroPlace[lane] = std::bit_cast<std::uint64_t>(double(lanes.fixedPoint[lane]));
-        lanes.lastPlace[lane] = (std::uint64_t(side * blocks[axis]) << fractionBits) - 1;
-        lanes.blockStrides[lane] = blockStrides[lane];
-        lanes.voxelStrides[lane] = voxelStrides[lane];
-        lanes.inBlock[lane] = side - 1;
-        lanes.fraction[lane] = (1 << fractionBits) - 1;
-        lanes.one[lane] = std::bit_cast<std::int32_t>(1.f);
-        lanes.least[lane] = -interiorWidth;
-        lanes.most[lane] = exteriorWidth;
-        lanes.scales[lane] = lane == 0 ? 1.f : float(perMetre);
-    }
+    const glm::dvec3 offset = fixedPoint - origin * perMetre;
+    lanes.perMetre = Doubles{perMetre, perMetre};
+    lanes.offsetXy = Doubles{offset.x, offset.y};
+    lanes.offsetYz = Doubles{offset.y, offset.z};
+    lanes.fraction = Ints{} + ((1 << fractionBits) - 1);
+    lanes.fractionUnit = Floats{} + 1 / float(1 << fractionBits);
+    const float unit = storage == Storage::float32 ? 1.f : step, gradient = unit * float(perMetre);
+    lanes.scales = Floats{unit, gradient, gradient, gradient};
+    lanes.xBlocks = std::uint32_t(blocks.y) * std::uint32_t(blocks.z);
 }
 
 Field::Field(const LevelSet& levelSet, const FieldOptions& options)
-    : data_(std::make_shared<FieldData>(levelSet, options.storage)) {}
+    : data_(std::make_shared<FieldData>(levelSet, options.storage)), sample_(data_->kernels.samplePoint) {}
 
 Field::Field(const LevelSet& levelSet, Mesh mesh, const FieldOptions& options)
-    : data_(std::make_shared<FieldData>(levelSet, std::move(mesh), options.storage)) {}
+    : data_(std::make_shared<FieldData>(levelSet, std::move(mesh), options.storage)),
+      sample_(data_->kernels.samplePoint) {}
 
 Clearance Field::clearance() const noexcept {
     return data_->coarse;

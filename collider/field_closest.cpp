@@ -123,7 +123,7 @@ ClosestPoint FieldData::closestOn(std::uint32_t part, const glm::vec3& point, co
 
 ClosestPoint FieldData::closest(const glm::vec3& point, float maxDistance) const {
     if (!mesh) return closestZero(point, maxDistance);
-    const Sample here = kernels.samplePoint(*this, point, -infinity);
+    const Sample here = kernels.sampleWithin(*this, point, -infinity);
     const float bound = expectedDistance(here, maxDistance);
     const EntryGroup* entry = here.inBand ? entryOf(point) : nullptr;
     return closestOn(mesh->nearestPart(glm::dvec3(point), bound, entry), point, here, maxDistance);

@@ -24,8 +24,7 @@ inline bool isFinite(const glm::vec3& v) {
 }
 
 // Vectors of the compiler's own: Highway has none of fixed size for the plain instruction set.
-using Doubles [[gnu::vector_size(32)]] = double;
-using Bits [[gnu::vector_size(32)]] = std::uint64_t;
+using Doubles [[gnu::vector_size(16)]] = double;
 using Floats [[gnu::vector_size(16)]] = float;
 using Ints [[gnu::vector_size(16)]] = std::int32_t;
 
@@ -34,9 +33,10 @@ struct FieldData;
 /// How samples are taken: for one instruction set and one storage. `gradientReach`: the gradient is found where the
 /// distance is no more than that [m].
 struct SampleKernels {
-    Sample (*sampleAt)(const FieldData&, const glm::dvec3& local, float gradientReach);
-    Sample (*samplePoint)(const FieldData&, const glm::vec3& point, float gradientReach);
-    void (*sampleMany)(const FieldData&, std::span<const glm::vec3> points, Sample*);
+    Sample (*sampleAt)(const FieldData&, const glm::dvec3& local, float gradientReach) noexcept;
+    Sample (*samplePoint)(const FieldData&, const glm::vec3& point) noexcept;
+    Sample (*sampleWithin)(const FieldData&, const glm::vec3& point, float gradientReach) noexcept;
+    void (*sampleMany)(const FieldData&, std::span<const glm::vec3> points, Sample*) noexcept;
 };
 
 /// The best for this processor.
@@ -61,23 +61,21 @@ struct FieldData : FieldLayout {
     bool signedByNormals = false;          ///< of this mesh
     float error = 0;                       ///< of distances in the band [m]; infinite: not known
 
-    /// Bits of a place below the voxel, as many as a float's fraction has, and of a voxel in a block.
-    static constexpr int fractionBits = 23, voxelBits = 3;
-    static_assert(side == 1 << voxelBits);
+    /// Bits of a place below the voxel, which leave those of the voxel in its block in the same word.
+    static constexpr int fractionBits = 29;
+    static_assert(side == 1 << (32 - fractionBits));
+    /// Added to a place, it leaves the fixed-point number in a double's lower bits [voxels].
+    static constexpr double fixedPoint = 1.5 * (std::uint64_t(1) << (52 - fractionBits));
+    static_assert(fixedPoint / 3 == double(side) * mostBlocksAlong);
 
-    /// The frame as vectors, for samples; of places, the axes are x, y, y, z.
+    /// The frame as samples need it, much of it in vectors.
     struct Lanes {
-        Doubles origin, perMetre;
-        /// Added to a double below 2^28, it leaves a fixed-point number in the lower bits.
-        Doubles fixedPoint;
-        Bits zeroPlace, lastPlace;  ///< bits of the directory's first place, plus the last one's [2^-23 voxels]
-        Ints blockStrides;          ///< of the directory; y counts once
-        Ints voxelStrides;          ///< of a block; y counts once
-        Ints inBlock;               ///< the bits of a voxel's place in its block
-        Ints fraction;              ///< the bits of a place below the voxel
-        Ints one;                   ///< the bits of 1.f
-        Floats least, most;         ///< values beyond the band are these [m]
-        Floats scales;              ///< from voxels to metres, of a distance and its gradient
+        Doubles perMetre;
+        Doubles offsetXy, offsetYz;  ///< of a place, with the fixed point [voxels]
+        Ints fraction;               ///< the bits of a place below the voxel
+        Floats fractionUnit;         ///< the lowest of them [voxels]
+        Floats scales;               ///< of a distance and its gradient, from stored values and voxels [m]
+        std::uint32_t xBlocks;       ///< entries of the directory from one block to the next along x
     } lanes;
 
     // Local places are in voxels from the directory's first one, in double: exact enough however far the mesh is from
@@ -120,8 +118,11 @@ struct FieldData : FieldLayout {
 
     /// A voxel of a stored block, apron included [m].
     float valueAt(std::size_t index) const {
-        if (storage == Storage::float32) return values.data()[index];
-        return std::clamp(float(values16.data()[index]) * step, -interiorWidth, exteriorWidth);
+        if (storage == Storage::fixed16)
+            return std::clamp(float(values16.data()[index]) * step, -interiorWidth, exteriorWidth);
+        const float value = values.data()[index];
+        if (!std::isnan(value)) return value;
+        return std::signbit(value) ? -interiorWidth : exteriorWidth;
     }
 
   private:

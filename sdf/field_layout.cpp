@@ -2,14 +2,17 @@
 #include "sdf/field_layout.h"
 
 #include <oneapi/tbb/parallel_for.h>
+#include <oneapi/tbb/parallel_sort.h>
 #include <openvdb/tree/LeafManager.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 
 #include "sdf/grids.h"
+#include "sdf/morton.h"
 
 namespace bilayer {
 namespace {
@@ -35,6 +38,16 @@ bool needsBlock(const FloatTree::LeafNodeType& leaf) {
     if (!leaf.getValueMask().isOff()) return true;
     const auto [low, high] = std::minmax_element(leaf.buffer().data(), leaf.buffer().data() + side * side * side);
     return (*low < 0) != (*high < 0);
+}
+
+// Blocks that are near one another in space are then near one another in memory: walks there run along it.
+void sortForWalks(std::vector<Coord>& origins, const Coord& first) {
+    const auto place = [&](const Coord& origin) -> std::array<std::uint32_t, 3> {
+        const Coord way = origin - first;
+        return {std::uint32_t(way.x()), std::uint32_t(way.y()), std::uint32_t(way.z())};
+    };
+    tbb::parallel_sort(origins.begin(), origins.end(),
+                       [&](const Coord& a, const Coord& b) { return beforeInMortonOrder(place(a), place(b)); });
 }
 
 // Copies a leaf, and the first layer of voxels of its seven upper neighbours.
@@ -86,13 +99,24 @@ BlockSummary summaryOf(const float* block, float voxelSize) {
     return summary;
 }
 
+bool isBeyondBand(float value, const FieldFrame& frame) {
+    return value >= frame.exteriorWidth || value <= -frame.interiorWidth;
+}
+
+// Values as they are, those beyond the band marked.
+void store(const float* block, const FieldFrame& frame, float* to) {
+    constexpr float beyond = std::numeric_limits<float>::quiet_NaN();
+    for (int i = 0; i < FieldLayout::blockFloats; ++i)
+        to[i] = isBeyondBand(block[i], frame) ? std::copysign(beyond, block[i]) : block[i];
+}
+
 // Values in steps, those beyond the band marked.
-void quantize(const float* block, const FieldFrame& frame, float step, std::int16_t* to) {
-    constexpr float most = FieldLayout::beyondBand - 1;
+void store(const float* block, const FieldFrame& frame, float step, std::int16_t* to) {
+    constexpr float most = FieldLayout::beyondOutside - 1;
     for (int i = 0; i < FieldLayout::blockFloats; ++i) {
-        const float value = block[i], steps = std::clamp(std::nearbyint(value / step), -most, most);
-        const bool beyond = value >= frame.exteriorWidth || value <= -frame.interiorWidth;
-        to[i] = beyond ? std::int16_t(std::copysign(float(FieldLayout::beyondBand), value)) : std::int16_t(steps);
+        const auto steps = std::int16_t(std::clamp(std::nearbyint(block[i] / step), -most, most));
+        const std::int16_t beyond = block[i] < 0 ? FieldLayout::beyondInside : FieldLayout::beyondOutside;
+        to[i] = isBeyondBand(block[i], frame) ? beyond : steps;
     }
 }
 
@@ -186,9 +210,9 @@ std::vector<std::array<bool, blockParts>> enterBlocks(FieldLayout& field, const 
             field.directory[field.entryOf({at.x(), at.y(), at.z()})] = std::int32_t(i);
             copyBlock(accessor, origins[i], block.data());
             if (field.storage == Storage::float32)
-                std::copy(block.begin(), block.end(), field.values.data() + i * FieldLayout::blockFloats);
+                store(block.data(), field, field.values.data() + i * FieldLayout::blockFloats);
             else
-                quantize(block.data(), field, field.step, field.values16.data() + i * FieldLayout::blockFloats);
+                store(block.data(), field, field.step, field.values16.data() + i * FieldLayout::blockFloats);
             const BlockSummary summary = summaryOf(block.data(), field.voxelSize);
             meets[i] = summary.meetsSurface;
             for (int k = 0; k < blockParts; ++k)
@@ -238,6 +262,8 @@ void measureClearances(FieldLayout& field, const std::vector<std::array<bool, bl
 void FieldFrame::requireSize() const {
     if (double(blocks.x) * blocks.y * blocks.z > double(mostBlocks))
         throw std::invalid_argument("field: the bounds hold more than 2^26 blocks of 8^3 voxels: take larger voxels");
+    if (std::max({blocks.x, blocks.y, blocks.z}) > mostBlocksAlong)
+        throw std::invalid_argument("field: the bounds are longer than 2^19 blocks of 8^3 voxels: take larger voxels");
 }
 
 bool FieldFrame::findsSurface() const {
@@ -250,7 +276,7 @@ FieldLayout::FieldLayout(const LevelSet& levelSet, Storage storage)
                  .exteriorWidth = levelSet.exteriorWidth(),
                  .interiorWidth = levelSet.interiorWidth()},
       storage(storage),
-      step(std::max(exteriorWidth, interiorWidth) / float(beyondBand - 1)) {
+      step(std::max(exteriorWidth, interiorWidth) / float(beyondOutside - 1)) {
     perMetre = 1 / voxel;
     const openvdb::FloatGrid& grid = *levelSet.grids().distance;
     const openvdb::tree::LeafManager<const FloatTree> leaves(grid.tree());
@@ -264,6 +290,7 @@ FieldLayout::FieldLayout(const LevelSet& levelSet, Storage storage)
     if (origins.empty()) throw std::invalid_argument("field: the level set has no voxel in its band");
 
     const Coord first = box.min();
+    sortForWalks(origins, first);
     blocks = glm::ivec3((box.max() - first).x(), (box.max() - first).y(), (box.max() - first).z()) / side + 1;
     requireSize();
     enterSides(*this, grid.tree(), first);

@@ -33,7 +33,9 @@ struct FieldFrame {
     std::size_t entryOf(const glm::ivec3& block) const {
         return (std::size_t(block.x) * blocks.y + block.y) * blocks.z + block.z;
     }
-    /// Throws std::invalid_argument if the directory has more than 2^26 entries.
+    /// Blocks along each axis are fewer: a point's 24 bits tell no more places apart.
+    static constexpr int mostBlocksAlong = 1 << 19;
+    /// Throws std::invalid_argument if the directory has more than 2^26 entries, or more than 2^19 along an axis.
     void requireSize() const;
 
     /// Whether the band is wide enough to tell where the surface passes.
@@ -52,20 +54,21 @@ enum class Storage {
 
 /// What queries work from, independent of OpenVDB.
 struct FieldLayout : FieldFrame {
-    /// Of fixed16: a voxel beyond the band. No voxel of the band has it.
-    static constexpr std::int16_t beyondBand = 32767;
+    /// Of fixed16: a voxel beyond the band, outside or inside. No voxel of the band has it. Of float32 it is not a
+    /// number, positive or negative.
+    static constexpr std::int16_t beyondOutside = 32767, beyondInside = -32768;
 
     std::vector<std::int32_t> directory;  ///< a block's number in `values`, or the side that it lies on
     std::vector<std::int8_t> centres;     ///< of Clearance::Data
     std::vector<std::int8_t> leasts;      ///< likewise
     Storage storage = Storage::float32;
     LargeArray<float> values;           ///< blockFloats a block, if they are float32 [m]
-    LargeArray<std::int16_t> values16;  ///< likewise, if they are fixed16 [step]; +-beyondBand beyond the band
+    LargeArray<std::int16_t> values16;  ///< likewise, if they are fixed16 [step]
     float step = 0;                     ///< of fixed16 [m]
     std::size_t stored = 0;             ///< blocks in `values`
 
     /// Throws std::invalid_argument if no voxel is in the band, or if the box is so large for its voxels that it holds
-    /// more than 2^26 blocks of 8^3 voxels.
+    /// more than 2^26 blocks of 8^3 voxels, or more than 2^19 along an axis.
     explicit FieldLayout(const LevelSet& levelSet, Storage storage = Storage::float32);
 
     Clearance clearance() const;
