@@ -4,7 +4,6 @@
 #include <cmath>
 #include <functional>
 #include <glm/gtc/constants.hpp>
-#include <limits>
 #include <set>
 #include <stdexcept>
 #include <string>
@@ -13,15 +12,15 @@ namespace bilayer::shapes {
 namespace {
 
 constexpr double pi = glm::pi<double>();
-constexpr double infinity = std::numeric_limits<double>::infinity();
 
 constexpr int segmentStep = 24;  // puts vertices on the corners of hexagons and squares
 constexpr int leastAround = 6;   // vertices of the smallest ring around a pole: its triangles are equilateral
 // Of an edge: how near rows of a thread may come to its end, below which they give way to it.
 constexpr double nearestRow = 0.4;
-constexpr double mouthWidth = 1.05;                     // of a nut [diameters]: ISO 4032 has 1 to 1.08
-constexpr double addendum = 1, dedendum = 1.25;         // ISO 53, profile A [modules]
-const double flankRise = std::sqrt(3.0);                // of a thread's flank, 30 degrees off the radial plane
+constexpr double mouthWidth = 1.05;              // of a nut [diameters]: ISO 4032 has 1 to 1.08
+const double mouthSlope = std::sqrt(3.0);        // of a nut's mouth in the mean: that of a countersink of 120 degrees
+constexpr double addendum = 1, dedendum = 1.25;  // ISO 53, profile A [modules]
+const double flankRise = std::sqrt(3.0);         // of a thread's flank, 30 degrees off the radial plane
 const double threadHeight = 5.0 / 16 * std::sqrt(3.0);  // from crest to root, 5/8 H [pitches]
 
 void require(bool met, const char* what) {
@@ -58,11 +57,12 @@ unsigned addPoint(Mesh& mesh, const glm::vec3& point) {
     return unsigned(mesh.points.size() - 1);
 }
 
-// Triangles between two rows of ascending keys, always on to the lower key; `b` lies to the left of `a`.
+// Triangles between two rows of ascending keys, always on to the lower key; `b` lies to the left of `a`. Of equal keys
+// that of `b` comes first: so the diagonals on the flanks of a thread, which are bent, cut into them and add nothing.
 void zip(Mesh& mesh, const Row& a, const Row& b) {
     std::size_t i = 0, j = 0;
     while (i + 1 < a.size() || j + 1 < b.size())
-        if (j + 1 == b.size() || (i + 1 < a.size() && a[i + 1].key <= b[j + 1].key)) {
+        if (j + 1 == b.size() || (i + 1 < a.size() && a[i + 1].key < b[j + 1].key)) {
             mesh.triangles.push_back({a[i].vertex, a[i + 1].vertex, b[j].vertex});
             ++i;
         } else {
@@ -204,10 +204,18 @@ struct Profile {
 
 // A threaded surface between two circles of as many vertices: radius by phase [pitches] and height. Its rows of
 // vertices run along the thread, so that its edges stay as sharp as the profile's; they begin and end at the circles.
+// There the radius must not change with the phase as far as plainEnd() says: else what joins the last row to the circle
+// would run across grooves.
 struct ThreadedWall {
     double bottom, top, pitch, edge;
     std::vector<double> phases;
     std::function<double(double phase, double height)> radius;
+
+    double plainEnd() const {
+        double widest = phases.front() + 1 - phases.back();
+        for (std::size_t i = 1; i < phases.size(); ++i) widest = std::max(widest, phases[i] - phases[i - 1]);
+        return widest * pitch + nearestRow * edge;
+    }
 
     double height(long row, double turn) const {
         const long size = long(phases.size()), crest = row >= 0 ? row / size : (row + 1) / size - 1;
@@ -218,14 +226,14 @@ struct ThreadedWall {
     Row column(Mesh& mesh, const Link& low, const Link& high) const {
         const long size = long(phases.size());
         const long first = size * long(std::floor(bottom / pitch - 2)), last = size * long(std::ceil(top / pitch + 1));
-        Row column{{low.vertex, -infinity}};
+        Row column{{low.vertex, 0}};  // nothing asks for the first key
         for (long row = first; row < last; ++row) {
             const double z = height(row, low.key), phase = phases[std::size_t((row - first) % size)];
             if (z < bottom + nearestRow * edge || z > top - nearestRow * edge) continue;
             const double r = radius(phase > 0.5 ? phase - 1 : phase, z);
             column.push_back({addPoint(mesh, aroundAxis(r, 2 * pi * low.key, z)), double(row)});
         }
-        column.push_back({high.vertex, infinity});
+        column.push_back({high.vertex, column.back().key + 1});
         return column;
     }
 
@@ -342,8 +350,8 @@ Mesh bolt(const Bolt& part) {
     const Thread& thread = part.thread;
     const Profile profile(thread, thread.clearance);
     const double pitch = thread.pitch, length = part.length, plain = part.plain, depth = profile.crest - profile.root;
-    require(plain >= 0 && length > plain + pitch + depth, "a bolt must be longer than its thread runs out");
-    require(part.headHeight > 0 && part.acrossFlats > thread.diameter, "a bolt's head must be wider than its shank");
+    require(plain >= 0 && part.headHeight > 0 && part.acrossFlats > thread.diameter,
+            "a bolt's head must be wider than its shank");
 
     Mesh mesh;
     const int n = part.segments;
@@ -358,11 +366,14 @@ Mesh bolt(const Bolt& part) {
     const Row tip = lathe.begin({round(profile.root), length, n});
     lathe.to(pole(length));
 
-    const auto radius = [&](double phase, double z) {
-        const double groove = smoothStep(plain, plain + pitch, z) * (profile.crest - profile.radius(phase));
-        return profile.root + smoothStep(0, depth, length - z) * (depth - groove);
+    ThreadedWall wall{0, length, pitch, edge, profile.rows(pitch, edge), {}};
+    const double end = wall.plainEnd(), start = std::max(plain, end);
+    require(length > start + pitch + depth + end, "a bolt must be longer than its thread runs out");
+    wall.radius = [&](double phase, double z) {
+        const double groove = smoothStep(start, start + pitch, z) * (profile.crest - profile.radius(phase));
+        return profile.root + smoothStep(end, end + depth, length - z) * (depth - groove);
     };
-    ThreadedWall{0, length, pitch, edge, profile.rows(pitch, edge), radius}.add(mesh, bearing, tip, false);
+    wall.add(mesh, bearing, tip, false);
     return mesh;
 }
 
@@ -370,8 +381,7 @@ Mesh nut(const Nut& part) {
     requireSegments(part.segments);
     const Thread& thread = part.thread;
     const Profile profile(thread, 0);
-    const double half = double(part.height) / 2, mouth = mouthWidth * thread.diameter / 2, depth = mouth - profile.root;
-    require(half > depth, "a nut must be higher than its mouths are deep");
+    const double half = double(part.height) / 2, mouth = mouthWidth * thread.diameter / 2;
     require(part.acrossFlats / 2 > mouth, "a nut must be wider than its mouths");
 
     Mesh mesh;
@@ -384,12 +394,14 @@ Mesh nut(const Nut& part) {
     lathe.to({hexagon, half, n});
     const Row top = lathe.to({hole, half, n});
 
-    const auto radius = [&](double phase, double z) {
-        const double widened = 1 - smoothStep(0, depth, half - std::abs(z)), r = profile.radius(phase);
+    ThreadedWall wall{-half, half, thread.pitch, edge, profile.rows(thread.pitch, edge), {}};
+    const double end = wall.plainEnd(), depth = (mouth - profile.root) / mouthSlope;
+    require(half > end + depth, "a nut must be higher than its mouths are deep");
+    wall.radius = [&](double phase, double z) {
+        const double widened = 1 - smoothStep(end, end + depth, half - std::abs(z)), r = profile.radius(phase);
         return roundHole(r + widened * (mouth - r), n)(0);
     };
-    ThreadedWall{-half, half, thread.pitch, edge, profile.rows(thread.pitch, edge), radius}.add(mesh, bottom, top,
-                                                                                                true);
+    wall.add(mesh, bottom, top, true);
     return mesh;
 }
 

@@ -19,17 +19,19 @@ struct Thread {
     float pitch = 2e-3f;      ///< the advance of one turn [m]
     /// The distance of bolt and nut where the nut stands in the middle of its play, the same on flanks, crests and
     /// roots [m]. The nut keeps the basic profile and the bolt's is drawn in, as ISO 965-1 has it for H and g. In 6H/6g
-    /// the flanks of M16 are 0.010 to 0.102 mm apart. The play along the axis is twice 1 / cos 30 degrees of it.
+    /// the flanks of M16 are 0.010 to 0.102 mm apart. Along the axis it plays by clearance / cos 30 degrees
+    /// either way.
     float clearance = 50e-6f;
 };
 
 /// A screw with a hexagon head, ISO 4017 M16 x 60 by default. Around z: the head's bearing face lies at 0, the head
-/// below, the shank above. On the axis' +x side a crest lies at multiples of the pitch.
+/// below, the shank above. Above the x axis crests lie at multiples of the pitch.
 struct Bolt {
-    Thread thread;
+    Thread thread{};
     float length = 60e-3f;  ///< from the bearing face to the tip [m]
-    /// Of the shank that carries no thread, next to the head [m]. The thread runs out of it within one pitch more; at
-    /// the tip its crests rise from the root within their own height.
+    /// Of the shank next to the head that carries no thread [m]; the grooves become deep within one pitch more. The tip
+    /// begins with a stub as thin as the root, less than half a pitch long unless `segments` are few, from which the
+    /// crests rise within their own height.
     float plain = 4e-3f;
     float acrossFlats = 24e-3f;  ///< of the head [m]
     float headHeight = 10e-3f;   ///< [m]
@@ -40,7 +42,7 @@ Mesh bolt(const Bolt& part = {});
 /// A hexagon nut, ISO 4032 M16 by default: around z, from -height / 2 to height / 2, the mouths widened to 1.05
 /// diameters.
 struct Nut {
-    Thread thread;
+    Thread thread{};
     float acrossFlats = 24e-3f;  ///< [m]
     float height = 14.8e-3f;     ///< [m]
     int segments = 96;           ///< edges around, a multiple of 24
