@@ -21,8 +21,6 @@
 namespace bilayer {
 namespace {
 
-/// Triangles with a longer edge are halved: floats stay exact to 1e-6 around them [voxels].
-constexpr double longestEdge = 8;
 /// Floats hold all whole numbers up to twice this [voxels].
 constexpr double longestMesh = 1 << 23;
 /// A sort key and the number of a part share 64 bits.
@@ -56,8 +54,8 @@ void forAll(std::size_t count, Progress* progress, Body body) {
 // The parts that the tree is made of: the triangles that are short enough, and the parts of those that are not.
 class Parts {
   public:
-    Parts(const Mesh& mesh, const glm::dvec3& base, double voxelSize)
-        : mesh_(mesh), base_(base), perVoxelSize_(1 / voxelSize) {}
+    Parts(const Mesh& mesh, const glm::dvec3& base, double voxelSize, double longestEdge)
+        : mesh_(mesh), base_(base), perVoxelSize_(1 / voxelSize), longest2_(longestEdge * longestEdge) {}
 
     Corners corners(std::size_t part) const {
         return part < mesh_.triangles.size() ? ofTriangle(part) : halves_[part - mesh_.triangles.size()].corners;
@@ -85,7 +83,7 @@ class Parts {
         const auto edge = std::size_t(std::max_element(all.begin(), all.end()) - all.begin());
         return {edge, all[edge]};
     }
-    static bool isLong(const Corners& c) { return longest(c).second > longestEdge * longestEdge; }
+    bool isLong(const Corners& c) const { return longest(c).second > longest2_; }
 
     void halve(std::uint32_t triangle) { halve(ofTriangle(triangle), triangle); }
 
@@ -103,7 +101,7 @@ class Parts {
 
     void halve(const Corners& c, std::uint32_t triangle) {
         const auto [i, length2] = longest(c);
-        if (length2 <= longestEdge * longestEdge) {
+        if (length2 <= longest2_) {
             if (count() >= (std::size_t(1) << indexBits))
                 throw std::invalid_argument("voxelSize is too small: the mesh has triangles too large for it");
             halves_.push_back({c, triangle});
@@ -117,7 +115,7 @@ class Parts {
 
     const Mesh& mesh_;
     glm::dvec3 base_;
-    double perVoxelSize_;
+    double perVoxelSize_, longest2_;
     std::vector<Half> halves_;
 };
 
@@ -203,7 +201,7 @@ void makeKeys(const Parts& parts, const glm::ivec3& size, std::size_t first, std
         const Corners c = parts.corners(first + i);
         for (int k = 0; k < 3; ++k)
             run.x[k][i] = std::uint32_t(std::clamp((c[0][k] + c[1][k] + c[2][k]) * scale, 0.0, cells - 1));
-        isLong[i] = Parts::isLong(c);
+        isLong[i] = parts.isLong(c);
     }
     transformToHilbert(run);
     for (std::size_t i = 0; i < count; ++i) {
@@ -415,7 +413,7 @@ std::uint32_t groupsOver(std::uint32_t leaves) {
 
 }  // namespace
 
-WideTree makeWideTree(const Mesh& mesh, float voxelSize, Progress* progress, TreeOrder order) {
+WideTree makeWideTree(const Mesh& mesh, float voxelSize, Progress* progress, const TreeShape& shape) {
     if (mesh.triangles.size() >= (std::size_t(1) << indexBits))
         throw std::invalid_argument("the mesh has 2^28 triangles or more");
     const Bounds box = bounds(mesh);
@@ -428,9 +426,9 @@ WideTree makeWideTree(const Mesh& mesh, float voxelSize, Progress* progress, Tre
     tree.base = glm::ivec3(base);
     tree.size = glm::ivec3(size);
 
-    Parts parts(mesh, base, voxelSize);
+    Parts parts(mesh, base, voxelSize, shape.longestEdge);
     std::vector<std::uint64_t> keys = sortedKeys(parts, tree.size, progress);
-    if (order == TreeOrder::split) Splitter(parts, keys, progress).sort();
+    if (shape.order == TreeOrder::split) Splitter(parts, keys, progress).sort();
     tree.leafCount = std::uint32_t((keys.size() + treeWidth - 1) / treeWidth);
     tree.groupCount = groupsOver(tree.leafCount);
     tree.leaves = LargeArray<WideLeaf>(tree.leafCount);
