@@ -7,6 +7,7 @@
 #include <hwy/cache_control.h>
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
+#include <oneapi/tbb/parallel_invoke.h>
 
 #include <algorithm>
 #include <array>
@@ -315,14 +316,15 @@ OnEdge closestOnEdge(const std::array<glm::dvec3, 3>& c, int from) {
 }  // namespace
 
 MeshTree::MeshTree(Mesh mesh, float voxelSize)
-    : mesh_((validate(mesh), std::move(mesh))),
-      voxelSize_(voxelSize),
-      perMetre_(1 / double(voxelSize)),
-      tree_(makeWideTree(mesh_, voxelSize, nullptr, {TreeOrder::split, longestEdge})),
-      groups_(makeTurnedGroups(tree_)),
-      normals_(mesh_, thinnest * double(voxelSize)) {}
+    : mesh_((validate(mesh), std::move(mesh))), voxelSize_(voxelSize), perMetre_(1 / double(voxelSize)) {
+    const auto makeTree = [&] {
+        tree_ = makeWideTree(mesh_, voxelSize_, nullptr, {TreeOrder::split, longestEdge});
+        groups_ = makeTurnedGroups(tree_);
+    };
+    tbb::parallel_invoke(makeTree, [&] { normals_ = FeatureNormals(mesh_, thinnest * double(voxelSize_)); });
+}
 
-// In the tree's frame; noNode is found for a negative bound.
+// In the tree's frame; the bound becomes negative where nothing is to be found.
 void MeshTree::place(const glm::dvec3& point, glm::dvec3& local, float& bound) const noexcept {
     local = toTree(point);
     const glm::dvec3 size(tree_.size);
