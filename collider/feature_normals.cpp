@@ -2,6 +2,7 @@
 
 #include <oneapi/tbb/blocked_range.h>
 #include <oneapi/tbb/parallel_for.h>
+#include <oneapi/tbb/parallel_invoke.h>
 
 #include <algorithm>
 #include <array>
@@ -94,17 +95,20 @@ int cornerOf(const glm::uvec3& triangle, unsigned vertex) {
 
 std::vector<glm::vec3> edgeNormals(const Topology& topology, const Faces& faces) {
     std::vector<glm::vec3> normals(3 * faces.size());
-    topology.forEachEdge([&](std::span<const EdgeUse> uses) {
+    const auto visit = [&](std::span<const EdgeUse> uses) {
         Sum sum;
         for (const EdgeUse& use : uses) {
             if (faces.isThin(use.triangle)) sum.known = false;
             if (faces[use.triangle].counts) sum.add(faces[use.triangle], 1);
         }
+        const glm::vec3 mean = sum.mean();
         for (const EdgeUse& use : uses) {
             const int from = cornerOf(topology.triangles[use.triangle], use.forward ? use.low : use.high);
-            normals[3 * std::size_t(use.triangle) + std::size_t(from)] = sum.mean();
+            normals[3 * std::size_t(use.triangle) + std::size_t(from)] = mean;
         }
-    });
+    };
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, topology.edges.size(), grain),
+                      [&](const auto& range) { topology.forEdges(range.begin(), range.end(), visit); });
     return normals;
 }
 
@@ -127,8 +131,8 @@ std::vector<glm::vec3> vertexNormals(const Mesh& mesh, const Topology& topology,
 FeatureNormals::FeatureNormals(const Mesh& mesh, double thinnest) {
     const Topology topology(mesh);
     const Faces faces(mesh, topology, thinnest);
-    edges_ = edgeNormals(topology, faces);
-    vertices_ = vertexNormals(mesh, topology, faces);
+    tbb::parallel_invoke([&] { edges_ = edgeNormals(topology, faces); },
+                         [&] { vertices_ = vertexNormals(mesh, topology, faces); });
     flat_ = faces.flat();
 }
 

@@ -18,6 +18,8 @@ namespace bilayer {
 /// from their neighbours who else is there.
 class FeatureNormals {
   public:
+    FeatureNormals() = default;
+
     /// @param mesh      valid
     /// @param thinnest  triangles thinner than this have no area [m]
     FeatureNormals(const Mesh& mesh, double thinnest);

@@ -1,5 +1,5 @@
-// The field finds, triangles decide: the sampled distance bounds the search in the hierarchy over the mesh, so that
-// little of it is looked at, and the feature that is found is measured in double precision.
+// The field finds, triangles decide: the block that a point is in tells which nodes of the hierarchy over the mesh to
+// look at, and the feature that is found is measured in double precision.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -20,8 +20,10 @@ namespace bilayer {
 namespace {
 
 constexpr float infinity = std::numeric_limits<float>::infinity();
-/// What the interpolant seldom exceeds the distance by, so that a second search is seldom needed [voxels].
+/// What distances in the band seldom exceed it by, so that a second search is seldom needed [voxels].
 constexpr float usualError = 0.1f;
+/// Room for the rounding of single precision, in the distance that is asked for.
+constexpr float boundRounding = 1 + 1e-5f;
 /// Points that are taken together; what is known of them fits into the first cache.
 constexpr std::size_t batch = 64;
 /// Mean normals below this have cancelled out, and tell no side where they point aside: above the rounding of floats,
@@ -73,45 +75,30 @@ FieldData::Side FieldData::sideAt(const glm::dvec3& local, const Sample& here) c
         local.x >= 0 && local.y >= 0 && local.z >= 0 && local.x < size.x && local.y < size.y && local.z < size.z;
     if (!within) return {inside, here.distance > error};
     const glm::ivec3 block = glm::ivec3(local) >> 3;
-    const std::int32_t entry = directory[entryOf(block)];
-    if (entry < 0) return {inside, std::abs(here.distance) > error};
+    const std::int32_t number = directory[entryOf(block)];
+    if (number < 0) return {inside, std::abs(here.distance) > error};
     const glm::ivec3 corner(local + 0.5), inBlock = corner - 8 * block;
     const float value =
-        valueAt(std::size_t(entry) * blockFloats + (inBlock.x * stride + inBlock.y) * stride + inBlock.z);
+        valueAt(std::size_t(number) * blockFloats + (inBlock.x * stride + inBlock.y) * stride + inBlock.z);
     const bool certain = glm::distance(local, glm::dvec3(corner)) * voxel < double(std::abs(value) - error);
     return certain ? Side{value < 0, true} : Side{inside, false};
 }
 
-// Where the search for a point in the band begins.
-const EntryGroup* FieldData::entryOf(const glm::vec3& point) const {
-    const glm::ivec3 voxel(toLocal(point)), block = voxel >> 3;
-    const std::int32_t number = directory[entryOf(block)];
-    return number < 0 ? nullptr : entries.of(number, voxel & 7);  // rounded into its neighbour
-}
-
-// How far the triangle that is nearest can be by the field [voxels]: often enough.
-float FieldData::expectedDistance(const Sample& here, float maxDistance) const {
-    return (here.inBand ? std::abs(here.distance) : maxDistance) * float(perMetre) + (here.inBand ? usualError : 0);
-}
-
 // By the normal, where it is the mesh's and tells a side; else by the field.
-bool FieldData::isInside(const NearestFeature& nearest, const glm::dvec3& local, const Sample& here) const {
+bool FieldData::isInside(const NearestFeature& nearest, const glm::vec3& point) const {
     const double height = heightOver(nearest);
     if (signedByNormals && std::abs(height) > cancelled * glm::length(nearest.way)) return height < 0;
-    return sideAt(local, here).inside;
+    const glm::dvec3 local = toLocal(point);
+    return sideAt(local, sample(local)).inside;
 }
 
-// What is known of a point once the part of the mesh is found that is nearest to it, within the distance that was
-// expected.
-ClosestPoint FieldData::closestOn(std::uint32_t part, const glm::vec3& point, const Sample& here,
-                                  float maxDistance) const {
-    if (part == MeshTree::noPart && here.inBand)
-        part = mesh->nearestPart(glm::dvec3(point), maxDistance * float(perMetre));
+// What is known of a point once the part of the mesh is found that is nearest to it.
+ClosestPoint FieldData::closestOn(std::uint32_t part, const glm::vec3& point, float maxDistance) const {
     if (part == MeshTree::noPart) return {};
     const NearestFeature nearest = mesh->featureOfPart(part, glm::dvec3(point));
     const double distance = glm::length(nearest.way);
     if (!(distance <= double(maxDistance))) return {};
-    const bool inside = isInside(nearest, toLocal(point), here);
+    const bool inside = isInside(nearest, point);
     return {.distance = float(inside ? -distance : distance),
             .position = glm::vec3(glm::dvec3(point) + nearest.way),
             .normal = outwardNormal(nearest, inside),
@@ -121,12 +108,27 @@ ClosestPoint FieldData::closestOn(std::uint32_t part, const glm::vec3& point, co
             .found = true};
 }
 
+// The distance that is asked for [voxels].
+float FieldData::boundOf(float maxDistance) const {
+    return maxDistance * float(perMetre) * boundRounding;
+}
+
+// Of all the mesh, where the search from an entry has found nothing and others may be as near as asked for.
+std::uint32_t FieldData::orBeyond(std::uint32_t part, const EntryPlace& place, const glm::vec3& point,
+                                  float maxDistance) const {
+    const float bound = boundOf(maxDistance);
+    if (part != MeshTree::noPart || (place.entries && bound <= entries.reach())) return part;
+    return mesh->nearestPart(glm::dvec3(point), bound);
+}
+
 ClosestPoint FieldData::closest(const glm::vec3& point, float maxDistance) const {
     if (!mesh) return closestZero(point, maxDistance);
-    const Sample here = kernels.sampleWithin(*this, point, -infinity);
-    const float bound = expectedDistance(here, maxDistance);
-    const EntryGroup* entry = here.inBand ? entryOf(point) : nullptr;
-    return closestOn(mesh->nearestPart(glm::dvec3(point), bound, entry), point, here, maxDistance);
+    if (!(maxDistance >= 0)) return {};
+    const EntryPlace place = entries.at(toLocal(point));
+    std::uint32_t part = MeshTree::noPart;
+    if (place.entries)
+        part = mesh->nearestPart(glm::dvec3(point), std::min(boundOf(maxDistance), entries.reach()), place);
+    return closestOn(orBeyond(part, place, point, maxDistance), point, maxDistance);
 }
 
 ClosestPoint FieldData::closestZero(const glm::vec3& point, float maxDistance) const {
@@ -148,29 +150,23 @@ ClosestPoint Field::closest(const glm::vec3& point, float maxDistance) const noe
 // Step by step for some points at a time, so that memory is asked for well ahead of its use.
 void Field::closest(std::span<const glm::vec3> points, std::span<ClosestPoint> answers, float maxDistance) const {
     requireSameLength(points.size(), answers.size(), "answers");
-    if (!data_->mesh) {
-        for (std::size_t i = 0; i < points.size(); ++i) answers[i] = data_->closestZero(points[i], maxDistance);
+    if (!data_->mesh || !(maxDistance >= 0)) {
+        for (std::size_t i = 0; i < points.size(); ++i) answers[i] = data_->closest(points[i], maxDistance);
         return;
     }
-    const MeshTree& mesh = *data_->mesh;
-    std::array<glm::dvec3, batch> places;
-    std::array<Sample, batch> samples;
-    std::array<float, batch> bounds;
-    std::array<const EntryGroup*, batch> entries;
+    std::array<EntryPlace, batch> places;
     std::array<std::uint32_t, batch> parts;
+    const float bound = std::min(data_->boundOf(maxDistance), data_->entries.reach());
     for (std::size_t begin = 0; begin < points.size(); begin += batch) {
-        const std::size_t count = std::min(batch, points.size() - begin);
-        data_->kernels.sampleMany(*data_, points.subspan(begin, count), samples.data());
-        for (std::size_t i = 0; i < count; ++i) {
-            places[i] = glm::dvec3(points[begin + i]);
-            bounds[i] = data_->expectedDistance(samples[i], maxDistance);
-            entries[i] = samples[i].inBand ? data_->entryOf(points[begin + i]) : nullptr;
-            if (entries[i]) entries[i]->fetch();
+        const std::span<const glm::vec3> some = points.subspan(begin, std::min(batch, points.size() - begin));
+        for (std::size_t i = 0; i < some.size(); ++i) {
+            places[i] = data_->entries.at(data_->toLocal(some[i]));
+            places[i].fetch();
         }
-        mesh.nearestParts({places.data(), count}, {bounds.data(), count}, {entries.data(), count},
-                          {parts.data(), count});
-        for (std::size_t i = 0; i < count; ++i)
-            answers[begin + i] = data_->closestOn(parts[i], points[begin + i], samples[i], maxDistance);
+        data_->mesh->nearestParts(some, bound, {places.data(), some.size()}, {parts.data(), some.size()});
+        for (std::size_t i = 0; i < some.size(); ++i)
+            answers[begin + i] =
+                data_->closestOn(data_->orBeyond(parts[i], places[i], some[i], maxDistance), some[i], maxDistance);
     }
 }
 

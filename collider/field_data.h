@@ -104,11 +104,11 @@ struct FieldData : FieldLayout {
         bool inside, certain;
     };
     Side sideAt(const glm::dvec3& local, const Sample& here) const;
-    bool isInside(const NearestFeature& nearest, const glm::dvec3& local, const Sample& here) const;
-    using FieldFrame::entryOf;
-    const EntryGroup* entryOf(const glm::vec3& point) const;
-    float expectedDistance(const Sample& here, float maxDistance) const;
-    ClosestPoint closestOn(std::uint32_t part, const glm::vec3& point, const Sample& here, float maxDistance) const;
+    bool isInside(const NearestFeature& nearest, const glm::vec3& point) const;
+    float boundOf(float maxDistance) const;
+    std::uint32_t orBeyond(std::uint32_t part, const EntryPlace& place, const glm::vec3& point,
+                           float maxDistance) const;
+    ClosestPoint closestOn(std::uint32_t part, const glm::vec3& point, float maxDistance) const;
 
     /// The closest point of the mesh, or of the zero set where there is none.
     ClosestPoint closest(const glm::vec3& point, float maxDistance) const;

@@ -7,6 +7,7 @@
 #include <hwy/cache_control.h>
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
+#include <oneapi/tbb/parallel_invoke.h>
 
 #include <algorithm>
 #include <array>
@@ -24,9 +25,10 @@ namespace bilayer::HWY_NAMESPACE {
 
 /// Eight levels of groups hold 2^27 leaves; of each level seven wait at most.
 constexpr std::size_t mostWaiting = 96;
-/// Points that are looked at in turns: enough to hide what memory takes, and few enough for the first cache.
-constexpr std::size_t together = 8;
-constexpr std::uint32_t noNode = ~0u;
+/// Points that are looked at in turns, and how often before what is left: enough to hide what memory takes, and few
+/// enough for the first cache.
+constexpr std::size_t together = 16;
+constexpr int turns = 3;
 constexpr std::size_t cacheLine = 64;  // [bytes]
 /// Points and boxes in the tree's frame are rounded by no more than this part of their size.
 constexpr float placeRounding = 5e-7f;
@@ -38,117 +40,169 @@ inline void fetch(const Item& item) {
         hwy::Prefetch(reinterpret_cast<const char*>(&item) + line);
 }
 
-// One point's way down the tree, node by node.
+// One point's search.
 class Search {
   public:
-    void begin(const WideTree& tree, const TurnedGroup* groups, const glm::dvec3& point, float bound,
-               const EntryGroup* entry) {
+    void begin(const WideTree& tree, const TurnedGroup* groups, const glm::dvec3& point, float bound) {
         tree_ = &tree;
         groups_ = groups;
-        cell_ = glm::floor(point);
-        inCell_ = glm::vec3(point - glm::floor(point));
-        const glm::vec3 size = glm::max(glm::abs(cell_), glm::vec3(tree.size));
-        slack_ = placeRounding * (size.x + size.y + size.z);
+        const glm::dvec3 cell = glm::floor(point);
+        cell_ = cell;
+        inCell_ = glm::vec3(point - cell);
+        best2_ = bound * bound;
         part_ = MeshTree::noPart;
-        waiting_ = 0;
-        node_ = tree.root();
-        lower(bound * bound);
-        if (entry && !open(*entry)) node_ = noNode;
     }
 
-    // Looks at the next node; false when there is none left.
-    bool step() {
-        if (node_ == noNode) return false;
-        if (!tree_->isLeaf(node_)) {
-            if (open(groups_[node_ - tree_->leafCount])) return true;
-        } else {
-            visit(tree_->leaves[node_], node_);
+    // Looks at all that may be nearer below a node.
+    void descend(std::uint32_t from) {
+        const glm::vec3 size = glm::max(glm::abs(cell_), glm::vec3(tree_->size));
+        Waiting waiting;
+        waiting.slack = placeRounding * (size.x + size.y + size.z);
+        for (std::uint32_t node = from;;) {
+            if (tree_->isLeaf(node))
+                visit(node);
+            else
+                open(groups_[node - tree_->leafCount], waiting);
+            const float limit = std::sqrt(best2_) + waiting.slack, limit2 = limit * limit * roundUp;
+            do {
+                if (waiting.count == 0) return;
+                --waiting.count;
+            } while (waiting.gaps[waiting.count] > limit2);
+            node = waiting.nodes[waiting.count];
         }
-        do {
-            if (waiting_ == 0) return false;
-            --waiting_;
-        } while (gaps_[waiting_] > limit2_);
-        node_ = nodes_[waiting_];
-        return true;
     }
 
-    void fetchNext() const {
-        if (node_ != noNode) fetchNode(node_);
+    // Begins at entries: their nodes are told apart by their gaps, with the slot in the lowest bits.
+    void begin(const WideTree& tree, const TurnedGroup* groups, const glm::dvec3& point, float bound,
+               const EntryPlace& place) {
+        begin(tree, groups, point, bound);
+        entries_ = place.entries;
+        places2_ = place.perVoxel * place.perVoxel;
+        vectors_ = std::size_t(place.count) * entryVectors;
+        for (int i = 0; i < place.count; ++i) measure(entries_[i], place, i);
+        key_ = nextKey_ = -1;
+        choose();
+        choose();
+    }
+
+    // The next node of the entry; false if none is left that may hold something nearer.
+    bool chosen() const { return isNear(key_); }
+    void visitChosen() {
+        const std::uint32_t node = nodeOf(key_);
+        if (tree_->isLeaf(node))
+            visit(node);
+        else
+            descend(node);
+        choose();
     }
 
     std::uint32_t part() const { return part_; }
 
   private:
-    // Boxes are rounded, triangles are not.
-    void lower(float distance2) {
-        best2_ = distance2;
-        const float limit = std::sqrt(distance2) + slack_;
-        limit2_ = limit * limit * roundUp;
+    using Ints = hn::CappedTag<std::int32_t, treeWidth>;
+    static constexpr int slotBits = 3, numberBits = 3, keyBits = slotBits + numberBits, placeBits = 3;
+    static constexpr std::int32_t noKey = std::numeric_limits<std::int32_t>::max();
+    static_assert(BlockEntry::slots == treeWidth - 1 && treeWidth == 1 << slotBits &&
+                  BlockEntries::most <= 1 << numberBits && BlockEntries::placesPerUnit == 1 << placeBits);
+    static constexpr std::size_t lanes = hn::MaxLanes(Ints()), entryVectors = treeWidth / lanes;
+
+    // The last lane has no slot; what is loaded there is something else.
+    void measure(const BlockEntry& entry, const EntryPlace& place, int number) {
+        const Ints tag;
+        const auto bytes = [&](const std::uint8_t* from) {
+            return hn::ShiftLeft<placeBits>(hn::PromoteTo(tag, hn::LoadU(hn::Rebind<std::uint8_t, Ints>(), from)));
+        };
+        for (std::size_t i = 0; i < treeWidth; i += lanes) {
+            auto sum = hn::Zero(tag);
+            for (std::size_t k = 0; k < 3; ++k) {
+                const auto at = hn::Set(tag, place.place[k]);
+                const auto gap =
+                    hn::Max(hn::Max(hn::Sub(bytes(entry.lower[k] + i), at), hn::Sub(at, bytes(entry.upper[k] + i))),
+                            hn::Zero(tag));
+                sum = hn::Add(sum, hn::Mul(gap, gap));
+            }
+            const auto slot = hn::Iota(tag, std::int32_t(i)), last = hn::Set(tag, BlockEntry::slots);
+            const auto key = hn::Or(hn::ShiftLeft<keyBits>(sum), hn::Or(slot, hn::Set(tag, number << slotBits)));
+            hn::Store(hn::IfThenElse(hn::Eq(slot, last), hn::Set(tag, noKey), key), tag,
+                      keys_ + std::size_t(number) * treeWidth + i);
+        }
     }
 
-    void fetchNode(std::uint32_t node) const {
+    std::uint32_t nodeOf(std::int32_t key) const {
+        return entries_[key >> slotBits & ((1 << numberBits) - 1)].node(key & ((1 << slotBits) - 1));
+    }
+
+    struct Waiting {
+        float slack;  // boxes are rounded, triangles are not
+        std::size_t count = 0;
+        float gaps[mostWaiting];
+        std::uint32_t nodes[mostWaiting];
+    };
+
+    bool isNear(std::int32_t key) const { return key <= (std::int32_t(best2_ * places2_) + 1) << keyBits; }
+
+    // Takes the least key but for the one that was taken last, and asks for its node's memory: it is visited after
+    // that.
+    void choose() {
+        key_ = nextKey_;
+        const Ints tag;
+        const auto last = hn::Set(tag, nextKey_), none = hn::Set(tag, noKey);
+        auto least = none;
+        for (std::size_t i = 0; i < vectors_; ++i) {
+            const auto keys = hn::Load(tag, keys_ + i * lanes);
+            const auto left = hn::IfThenElse(hn::Eq(keys, last), none, keys);
+            hn::Store(left, tag, keys_ + i * lanes);
+            least = hn::Min(least, left);
+        }
+        nextKey_ = hn::GetLane(hn::MinOfLanes(tag, least));
+        if (!isNear(nextKey_)) return;
+        const std::uint32_t node = nodeOf(nextKey_);
         if (tree_->isLeaf(node))
             fetch(tree_->leaves[node]);
         else
             fetch(groups_[node - tree_->leafCount]);
     }
 
-    // The boxes of a group that may hold something nearer, bit by bit, and how far they are.
-    template <class Group>
-    unsigned nearBoxes(const Group& group, const float (&place)[3], float* gaps) const {
+    // Puts those nodes of a group aside that may hold something nearer, the nearest of them last.
+    void open(const TurnedGroup& group, Waiting& waiting) {
+        alignas(64) float gaps[treeWidth];
+        // whole voxels first, without rounding
+        const glm::vec3 origin(group.origin[0], group.origin[1], group.origin[2]), from = (cell_ - origin) + inCell_;
+        const float limit = std::sqrt(best2_) + waiting.slack, limit2 = limit * limit * roundUp;
         const Tag tag;
         unsigned near = 0;
         for (std::size_t i = 0; i < treeWidth; i += hn::Lanes(tag)) {
             Vec sum = hn::Zero(tag);
             for (int k = 0; k < 3; ++k) {
-                const Vec at = hn::Set(tag, place[k]);
+                const float(&axis)[3] = group.axes[k];
+                const Vec at = hn::Set(tag, axis[0] * from.x + axis[1] * from.y + axis[2] * from.z);
                 const Vec gap = hn::Max(hn::Sub(hn::Load(tag, group.lower[k] + i), at),
                                         hn::Sub(at, hn::Load(tag, group.upper[k] + i)));
                 sum = hn::Add(sum, square(hn::Max(gap, hn::Zero(tag))));
             }
             hn::Store(sum, tag, gaps + i);
-            near |= bitsOf(hn::Le(sum, hn::Set(tag, limit2_))) << i;
+            near |= bitsOf(hn::Le(sum, hn::Set(tag, limit2))) << i;
         }
-        return near;
-    }
-
-    // Puts those nodes aside that may hold something nearer, and goes on to the nearest of them.
-    template <class NodeOf>
-    bool choose(unsigned near, const float* gaps, NodeOf nodeOf) {
-        if (near == 0) return false;
+        if (near == 0) return;
         auto nearest = std::size_t(std::countr_zero(near));
+        const auto put = [&](std::size_t i) {
+            waiting.gaps[waiting.count] = gaps[i];
+            waiting.nodes[waiting.count++] = group.firstChild + std::uint32_t(i);
+        };
         for (unsigned bits = near & (near - 1); bits != 0; bits &= bits - 1) {
             auto other = std::size_t(std::countr_zero(bits));
             if (gaps[other] < gaps[nearest]) std::swap(other, nearest);
-            gaps_[waiting_] = gaps[other];
-            nodes_[waiting_++] = nodeOf(other);
+            put(other);
         }
-        node_ = nodeOf(nearest);
-        return true;
+        put(nearest);
     }
 
-    bool open(const TurnedGroup& group) {
-        alignas(64) float gaps[treeWidth];
-        // whole voxels first, without rounding
-        const glm::vec3 origin(group.origin[0], group.origin[1], group.origin[2]), from = (cell_ - origin) + inCell_;
-        float place[3];
-        for (int k = 0; k < 3; ++k)
-            place[k] = group.axes[k][0] * from.x + group.axes[k][1] * from.y + group.axes[k][2] * from.z;
-        const unsigned near = nearBoxes(group, place, gaps);
-        return choose(near, gaps, [&](std::size_t i) { return group.firstChild + std::uint32_t(i); });
-    }
-
-    bool open(const EntryGroup& group) {
-        alignas(64) float gaps[treeWidth];
-        const glm::vec3 from = cell_ + inCell_;
-        const unsigned near = nearBoxes(group, {from.x, from.y, from.z}, gaps);
-        return choose(near, gaps, [&](std::size_t i) { return group.nodes[i]; });
-    }
-
-    void visit(const WideLeaf& leaf, std::uint32_t index) {
+    // Without branches: which triangles are nearer can not be foretold.
+    void visit(std::uint32_t index) {
+        const WideLeaf& leaf = tree_->leaves[index];
         const Tag tag;
         alignas(64) float distance2[treeWidth];
-        Vec least = hn::Set(tag, best2_);
+        Vec least = hn::Set(tag, std::numeric_limits<float>::infinity());
         for (std::size_t i = 0; i < treeWidth; i += hn::Lanes(tag)) {
             const auto load = [&](const float* from) { return hn::Load(tag, from + i); };
             // whole voxels first, without rounding
@@ -160,61 +214,61 @@ class Search {
             hn::Store(measured, tag, distance2 + i);
             least = hn::Min(least, measured);
         }
-        const float nearest = hn::GetLane(hn::MinOfLanes(tag, least));
-        if (nearest == best2_ && part_ != MeshTree::noPart) return;
+        const Vec nearest = hn::MinOfLanes(tag, least);
         unsigned found = 0;
         for (std::size_t i = 0; i < treeWidth; i += hn::Lanes(tag))
-            found |= bitsOf(hn::Eq(hn::Load(tag, distance2 + i), hn::Set(tag, nearest))) << i;
-        if (found == 0) return;
-        part_ = index * treeWidth + std::uint32_t(std::countr_zero(found));
-        lower(nearest);
+            found |= bitsOf(hn::Eq(hn::Load(tag, distance2 + i), nearest)) << i;
+        const float nearest2 = hn::GetLane(nearest);
+        // the bound counts as well
+        const bool nearer = part_ == MeshTree::noPart ? nearest2 <= best2_ : nearest2 < best2_;
+        part_ = nearer ? index * treeWidth + std::uint32_t(std::countr_zero(found)) : part_;
+        best2_ = nearer ? nearest2 : best2_;
     }
 
     const WideTree* tree_;
     const TurnedGroup* groups_;
+    const BlockEntry* entries_;
+    std::size_t vectors_;  // of keys
     glm::vec3 cell_, inCell_;
-    float slack_, best2_, limit2_;
-    std::uint32_t part_, node_;
-    std::size_t waiting_;
-    float gaps_[mostWaiting];
-    std::uint32_t nodes_[mostWaiting];
+    float best2_, places2_;
+    std::uint32_t part_;
+    std::int32_t key_, nextKey_;
+    alignas(64) std::int32_t keys_[BlockEntries::most * treeWidth];
 };
 
-std::uint32_t searchNearest(const WideTree& tree, const TurnedGroup* groups, const glm::dvec3& point, float bound,
-                            const EntryGroup* entry) {
+std::uint32_t searchAll(const WideTree& tree, const TurnedGroup* groups, const glm::dvec3& point, float bound) {
     Search search;
-    search.begin(tree, groups, point, bound, entry);
-    while (search.step()) {
-    }
+    search.begin(tree, groups, point, bound);
+    search.descend(tree.root());
     return search.part();
 }
 
-// Many points, some at a time: while memory comes for one, another is looked at.
-void searchAll(const WideTree& tree, const TurnedGroup* groups, const glm::dvec3* points, const float* bounds,
-               const EntryGroup* const* entries, std::uint32_t* parts, std::size_t count) {
+std::uint32_t searchEntry(const WideTree& tree, const TurnedGroup* groups, const glm::dvec3& point, float bound,
+                          const EntryPlace& place) {
+    Search search;
+    search.begin(tree, groups, point, bound, place);
+    while (search.chosen()) search.visitChosen();
+    return search.part();
+}
+
+// Step by step for some points at a time, so that memory is asked for well ahead of its use.
+void searchEntries(const WideTree& tree, const TurnedGroup* groups, double perMetre, std::span<const glm::vec3> points,
+                   float bound, std::span<const EntryPlace> places, std::span<std::uint32_t> parts) {
     Search searches[together];
-    std::size_t answers[together], running = 0, next = 0;
-    const auto begin = [&](std::size_t slot) {
-        answers[slot] = next;
-        searches[slot].begin(tree, groups, points[next], bounds[next], entries[next]);
-        searches[slot].fetchNext();
-        ++next;
-    };
-    while (running < together && next < count) begin(running++);
-    while (running > 0)
-        for (std::size_t slot = 0; slot < running;) {
-            if (searches[slot].step()) {
-                searches[slot++].fetchNext();
-                continue;
-            }
-            parts[answers[slot]] = searches[slot].part();
-            if (next < count) {
-                begin(slot++);
-            } else if (slot != --running) {
-                searches[slot] = searches[running];
-                answers[slot] = answers[running];
-            }
+    for (std::size_t first = 0; first < points.size(); first += together) {
+        const std::size_t count = std::min(together, points.size() - first);
+        for (std::size_t i = 0; i < count; ++i) {
+            const glm::dvec3 local = glm::dvec3(points[first + i]) * perMetre - glm::dvec3(tree.base);
+            searches[i].begin(tree, groups, local, bound, places[first + i]);
         }
+        for (int turn = 0; turn < turns; ++turn)
+            for (std::size_t i = 0; i < count; ++i)
+                if (searches[i].chosen()) searches[i].visitChosen();
+        for (std::size_t i = 0; i < count; ++i) {
+            while (searches[i].chosen()) searches[i].visitChosen();
+            parts[first + i] = searches[i].part();
+        }
+    }
 }
 
 }  // namespace bilayer::HWY_NAMESPACE
@@ -224,9 +278,12 @@ HWY_AFTER_NAMESPACE();
 namespace bilayer {
 namespace {
 
-HWY_EXPORT(searchNearest);
 HWY_EXPORT(searchAll);
+HWY_EXPORT(searchEntry);
+HWY_EXPORT(searchEntries);
 
+/// Longer triangles are halved: single precision is exact to 2e-6 around the others [voxels].
+constexpr double longestEdge = 16;
 /// Thinner than this a triangle has no normal to trust [voxels].
 constexpr double thinnest = 1e-7;
 /// A height below this part of the longest edge leaves no foot on the plane that is better than the edges.
@@ -236,8 +293,6 @@ constexpr double farthest = 1e6;
 /// So far from all edges a point lies over a triangle, whatever single precision made of these; and so near it is as
 /// exact by them as by the corners [voxels].
 constexpr double wellInside = 1e-5, near = 16;
-/// Points that are taken together; their places fit into the first cache.
-constexpr std::size_t batch = 64;
 
 // A place on an edge, seen from the point that is asked for.
 struct OnEdge {
@@ -261,16 +316,17 @@ OnEdge closestOnEdge(const std::array<glm::dvec3, 3>& c, int from) {
 }  // namespace
 
 MeshTree::MeshTree(Mesh mesh, float voxelSize)
-    : mesh_((validate(mesh), std::move(mesh))),
-      voxelSize_(voxelSize),
-      perMetre_(1 / double(voxelSize)),
-      tree_(makeWideTree(mesh_, voxelSize, nullptr, TreeOrder::split)),
-      groups_(makeTurnedGroups(tree_)),
-      normals_(mesh_, thinnest * double(voxelSize)) {}
+    : mesh_((validate(mesh), std::move(mesh))), voxelSize_(voxelSize), perMetre_(1 / double(voxelSize)) {
+    const auto makeTree = [&] {
+        tree_ = makeWideTree(mesh_, voxelSize_, nullptr, {TreeOrder::split, longestEdge});
+        groups_ = makeTurnedGroups(tree_);
+    };
+    tbb::parallel_invoke(makeTree, [&] { normals_ = FeatureNormals(mesh_, thinnest * double(voxelSize_)); });
+}
 
-// In the tree's frame; noNode is found for a negative bound.
+// In the tree's frame; the bound becomes negative where nothing is to be found.
 void MeshTree::place(const glm::dvec3& point, glm::dvec3& local, float& bound) const noexcept {
-    local = point * perMetre_ - glm::dvec3(tree_.base);
+    local = toTree(point);
     const glm::dvec3 size(tree_.size);
     const double far = farthest * (size.x + size.y + size.z), away = glm::distance(local, 0.5 * size);
     const bool beyond = away > far;
@@ -283,10 +339,10 @@ void MeshTree::place(const glm::dvec3& point, glm::dvec3& local, float& bound) c
     }
 }
 
-std::uint32_t MeshTree::nearestPart(const glm::dvec3& point, float bound, const EntryGroup* entry) const noexcept {
+std::uint32_t MeshTree::nearestPart(const glm::dvec3& point, float bound) const noexcept {
     glm::dvec3 local;
     place(point, local, bound);
-    return bound < 0 ? noPart : HWY_DYNAMIC_DISPATCH(searchNearest)(tree_, groups_.data(), local, bound, entry);
+    return bound < 0 ? noPart : HWY_DYNAMIC_DISPATCH(searchAll)(tree_, groups_.data(), local, bound);
 }
 
 std::uint32_t MeshTree::nearest(const glm::dvec3& point, float bound) const noexcept {
@@ -294,34 +350,20 @@ std::uint32_t MeshTree::nearest(const glm::dvec3& point, float bound) const noex
     return part == noPart ? noTriangle : triangleOf(part);
 }
 
-void MeshTree::nearestParts(std::span<const glm::dvec3> points, std::span<const float> bounds,
-                            std::span<const EntryGroup* const> entries, std::span<std::uint32_t> parts) const noexcept {
-    std::array<glm::dvec3, batch> places;
-    std::array<float, batch> limits;
-    std::array<std::uint32_t, batch> found;
-    std::array<std::size_t, batch> numbers;
-    std::array<const EntryGroup*, batch> begins;
-    for (std::size_t begin = 0; begin < points.size(); begin += batch) {
-        std::size_t count = 0;
-        for (std::size_t i = begin; i < std::min(points.size(), begin + batch); ++i) {
-            parts[i] = noPart;
-            limits[count] = bounds[i];
-            place(points[i], places[count], limits[count]);
-            numbers[count] = i;
-            begins[count] = entries[i];
-            count += limits[count] >= 0;
-        }
-        HWY_DYNAMIC_DISPATCH(searchAll)
-        (tree_, groups_.data(), places.data(), limits.data(), begins.data(), found.data(), count);
-        for (std::size_t i = 0; i < count; ++i) parts[numbers[i]] = found[i];
-    }
+std::uint32_t MeshTree::nearestPart(const glm::dvec3& point, float bound, const EntryPlace& place) const noexcept {
+    return HWY_DYNAMIC_DISPATCH(searchEntry)(tree_, groups_.data(), toTree(point), bound, place);
+}
+
+void MeshTree::nearestParts(std::span<const glm::vec3> points, float bound, std::span<const EntryPlace> places,
+                            std::span<std::uint32_t> parts) const noexcept {
+    HWY_DYNAMIC_DISPATCH(searchEntries)(tree_, groups_.data(), perMetre_, points, bound, places, parts);
 }
 
 NearestFeature MeshTree::featureOfPart(std::uint32_t part, const glm::dvec3& point) const noexcept {
     const WideLeaf& leaf = tree_.leaves[part / treeWidth];
     const std::uint32_t i = part % treeWidth, triangle = leaf.triangles[i];
     const auto vectorOf = [i](const float(&v)[3][treeWidth]) { return glm::dvec3(v[0][i], v[1][i], v[2][i]); };
-    const glm::dvec3 from = point * perMetre_ - glm::dvec3(tree_.base) - vectorOf(leaf.cell) - vectorOf(leaf.corner);
+    const glm::dvec3 from = toTree(point) - vectorOf(leaf.cell) - vectorOf(leaf.corner);
     const glm::dvec3 along = vectorOf(leaf.along), normal = vectorOf(leaf.normal);
     const double x = glm::dot(from, along), y = glm::dot(from, glm::cross(normal, along)), z = glm::dot(from, normal);
     const double besideBC = double(leaf.directionBC[0][i]) * y -

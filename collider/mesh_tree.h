@@ -42,12 +42,14 @@ class MeshTree {
 
     /// The same, but tells the place in the tree: of a triangle, or of a part of a long one. `noPart` if there is none.
     static constexpr std::uint32_t noPart = ~0u;
-    /// @param entry  holds all nodes that may be as near; null: the whole tree
-    std::uint32_t nearestPart(const glm::dvec3& point, float bound, const EntryGroup* entry = nullptr) const noexcept;
+    std::uint32_t nearestPart(const glm::dvec3& point, float bound) const noexcept;
 
-    /// The same for many points, in less time: the three are equally long.
-    void nearestParts(std::span<const glm::dvec3> points, std::span<const float> bounds,
-                      std::span<const EntryGroup* const> entries, std::span<std::uint32_t> parts) const noexcept;
+    /// The same, beginning at an entry; the bound is no more than the entry's reach.
+    std::uint32_t nearestPart(const glm::dvec3& point, float bound, const EntryPlace& place) const noexcept;
+
+    /// The same for many points, in less time: the spans are equally long. `noPart` where there is no entry.
+    void nearestParts(std::span<const glm::vec3> points, float bound, std::span<const EntryPlace> places,
+                      std::span<std::uint32_t> parts) const noexcept;
 
     /// The feature of a triangle that is closest to a point [m], in double precision.
     NearestFeature featureOf(std::uint32_t triangle, const glm::dvec3& point) const noexcept;
@@ -61,6 +63,7 @@ class MeshTree {
     std::size_t memoryBytes() const;
 
   private:
+    glm::dvec3 toTree(const glm::dvec3& point) const { return point * perMetre_ - glm::dvec3(tree_.base); }
     void place(const glm::dvec3& point, glm::dvec3& local, float& bound) const noexcept;
     std::uint32_t triangleOf(std::uint32_t part) const {
         return tree_.leaves[part / treeWidth].triangles[part % treeWidth];

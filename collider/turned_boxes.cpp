@@ -56,10 +56,12 @@ glm::mat3 eigenvectors(glm::mat3 m) {
         for (int p = 0; p < 3; ++p) {
             const int q = (p + 1) % 3;
             if (m[p][q] == 0) continue;
-            const float angle = 0.5f * std::atan2(2 * m[p][q], m[q][q] - m[p][p]);
+            // the tangent of the lesser of the two angles that clear the pair
+            const float twice = (m[q][q] - m[p][p]) / (2 * m[p][q]);
+            const float tangent = std::copysign(1 / (std::abs(twice) + std::sqrt(twice * twice + 1)), twice);
             glm::mat3 turn(1);
-            turn[p][p] = turn[q][q] = std::cos(angle);
-            turn[q][p] = std::sin(angle), turn[p][q] = -turn[q][p];
+            turn[p][p] = turn[q][q] = 1 / std::sqrt(tangent * tangent + 1);
+            turn[q][p] = tangent * turn[p][p], turn[p][q] = -turn[q][p];
             m = glm::transpose(turn) * m * turn;
             v = v * turn;
         }

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <stdexcept>
 
@@ -57,12 +58,13 @@ void copyBlock(const Accessor& tree, const Coord& origin, float* block) {
         const glm::ivec3 count = glm::min(glm::ivec3(side), stride - first);
         const Coord corner = origin.offsetBy(first.x, first.y, first.z);
         const auto* leaf = tree.probeConstLeaf(corner);
+        const float* values = leaf ? leaf->buffer().data() : nullptr;
         const float tile = leaf ? 0.f : tree.getValue(corner);
         for (int x = 0; x < count.x; ++x)
             for (int y = 0; y < count.y; ++y) {
                 float* row = block + ((first.x + x) * stride + first.y + y) * stride + first.z;
-                if (leaf)
-                    std::copy_n(leaf->buffer().data() + (x * side + y) * side, count.z, row);
+                if (values)
+                    std::copy_n(values + (x * side + y) * side, count.z, row);
                 else
                     std::fill_n(row, count.z, tile);
             }
@@ -80,21 +82,44 @@ struct BlockSummary {
     std::array<bool, blockParts> meetsSurface;  // a voxel is as near as the surface passes, or they lie on both sides
 };
 
+using Floats [[gnu::vector_size(16)]] = float;
+
+// What is least and most in a quarter of a block, its parts one after the other along the last axis.
+struct Quarter {
+    float least[stride], most[stride];
+
+    explicit Quarter(const float* rows) {
+        for (int z = 0; z < stride; z += 4) {
+            // the last four overlap those before
+            const float* from = rows + std::min(z, stride - 4);
+            Floats low, high;
+            std::memcpy(&low, from, sizeof low);
+            high = low;
+            for (int x = 0; x <= partSide; ++x)
+                for (int y = 0; y <= partSide; ++y) {
+                    Floats values;
+                    std::memcpy(&values, from + (x * stride + y) * stride, sizeof values);
+                    low = values < low ? values : low;
+                    high = values > high ? values : high;
+                }
+            std::memcpy(least + std::min(z, stride - 4), &low, sizeof low);
+            std::memcpy(most + std::min(z, stride - 4), &high, sizeof high);
+        }
+    }
+};
+
 BlockSummary summaryOf(const float* block, float voxelSize) {
     BlockSummary summary;
-    for (int i = 0; i < blockParts; ++i) {
-        const float* part = block + partSide * ((i >> 2) * stride * stride + (i >> 1 & 1) * stride + (i & 1));
-        float least = part[0], most = least, nearest = std::abs(least);
-        for (int x = 0; x <= partSide; ++x)
-            for (int y = 0; y <= partSide; ++y)
-                for (int z = 0; z <= partSide; ++z) {
-                    const float value = part[(x * stride + y) * stride + z];
-                    least = std::min(least, value);
-                    most = std::max(most, value);
-                    nearest = std::min(nearest, std::abs(value));
-                }
-        summary.least[i] = least;
-        summary.meetsSurface[i] = nearest <= nearSurface * voxelSize || (least < 0) != (most < 0);
+    for (int i = 0; i < blockParts; i += perBlock) {
+        const Quarter quarter(block + partSide * stride * ((i >> 2) * stride + (i >> 1 & 1)));
+        for (int part = 0; part < perBlock; ++part) {
+            const int first = part * partSide;
+            const float least = *std::min_element(&quarter.least[first], &quarter.least[first] + partSide + 1),
+                        most = *std::max_element(&quarter.most[first], &quarter.most[first] + partSide + 1);
+            summary.least[i + part] = least;
+            summary.meetsSurface[i + part] =
+                std::min(std::abs(least), std::abs(most)) <= nearSurface * voxelSize || (least < 0) != (most < 0);
+        }
     }
     return summary;
 }
@@ -163,7 +188,7 @@ void transformRows(Way* ways, std::size_t count, std::size_t step, int length, s
 
 // From 0 for parts that meet the surface, and `farAway` for others, to the ways to the nearest such part: axis by axis,
 // since a squared way is a sum over the axes.
-void transform(std::vector<Way>& ways, const glm::ivec3& size) {
+void transform(LargeArray<Way>& ways, const glm::ivec3& size) {
     const std::size_t row = std::size_t(size.z), plane = size.y * row;
     tbb::parallel_for(0, size.x, [&](int x) {
         std::vector<Way> before;
@@ -178,7 +203,7 @@ void transform(std::vector<Way>& ways, const glm::ivec3& size) {
 
 // The side of space that each entry of the directory lies on, before blocks are entered.
 void enterSides(FieldLayout& field, const FloatTree& tree, const Coord& first) {
-    field.directory.resize(field.entries());
+    field.directory = LargeArray<std::int32_t>(field.entries());
     tbb::parallel_for(0, field.blocks.x, [&](int x) {
         const Accessor accessor(tree);
         for (int y = 0; y < field.blocks.y; ++y)
@@ -199,7 +224,7 @@ std::vector<std::array<bool, blockParts>> enterBlocks(FieldLayout& field, const 
         field.values = LargeArray<float>(floats);
     else
         field.values16 = LargeArray<std::int16_t>(floats);
-    field.leasts.resize(field.stored * blockParts);
+    field.leasts = LargeArray<std::int8_t>(field.stored * blockParts);
     std::vector<std::array<bool, blockParts>> meets(field.stored);
     const float leastStep = leastStepOf(field);
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, field.stored), [&](const auto& range) {
@@ -223,37 +248,60 @@ std::vector<std::array<bool, blockParts>> enterBlocks(FieldLayout& field, const 
     return meets;
 }
 
-// Calls visit(entry, part of the block, part of all) for the parts of the entries of the directory.
+// Calls visit(entry, part of all) for the entries of the directory, with the first of their parts; the others follow as
+// `nextParts` tells.
 template <class Visit>
-void forEachPart(const FieldLayout& field, const Visit& visit) {
+void forEachEntry(const FieldLayout& field, const Visit& visit) {
     const glm::ivec3 size = field.parts();
     tbb::parallel_for(0, field.blocks.x, [&](int x) {
-        for (int y = 0; y < field.blocks.y; ++y)
-            for (int z = 0; z < field.blocks.z; ++z)
-                for (int k = 0; k < blockParts; ++k) {
-                    const glm::ivec3 part = perBlock * glm::ivec3(x, y, z) + glm::ivec3(k >> 2, k >> 1 & 1, k & 1);
-                    visit(field.entryOf({x, y, z}), k, (std::size_t(part.x) * size.y + part.y) * size.z + part.z);
-                }
+        for (int y = 0; y < field.blocks.y; ++y) {
+            const std::size_t entry = field.entryOf({x, y, 0});
+            const std::size_t part = (std::size_t(perBlock * x) * size.y + std::size_t(perBlock * y)) * size.z;
+            for (int z = 0; z < field.blocks.z; ++z) visit(entry + std::size_t(z), part + std::size_t(perBlock * z));
+        }
     });
 }
 
-void measureClearances(FieldLayout& field, const std::vector<std::array<bool, blockParts>>& meets) {
-    field.centres.resize(field.entries() * blockParts);
-    if (!field.findsSurface()) return;
+std::array<std::size_t, blockParts> nextParts(const FieldLayout& field) {
     const glm::ivec3 size = field.parts();
-    std::vector<Way> ways(std::size_t(size.x) * size.y * size.z);
-    forEachPart(field, [&](std::size_t entry, int k, std::size_t part) {
+    std::array<std::size_t, blockParts> next;
+    for (int k = 0; k < blockParts; ++k)
+        next[k] = (std::size_t(k >> 2) * size.y + std::size_t(k >> 1 & 1)) * size.z + std::size_t(k & 1);
+    return next;
+}
+
+// Ways are few: their roots are taken once, and rounded down [steps].
+std::array<std::int8_t, farAway + 1> rootsOfWays() {
+    std::array<std::int8_t, farAway + 1> roots;
+    for (int way = 0; way <= farAway; ++way)
+        roots[way] = std::int8_t(std::min(Clearance::mostWay, int(0.5f * Clearance::steps * std::sqrt(float(way)))));
+    return roots;
+}
+
+void measureClearances(FieldLayout& field, const std::vector<std::array<bool, blockParts>>& meets) {
+    field.centres = LargeArray<std::int8_t>(field.entries() * blockParts);
+    if (!field.findsSurface()) {
+        std::fill_n(field.centres.data(), field.centres.size(), std::int8_t(0));
+        return;
+    }
+    const glm::ivec3 size = field.parts();
+    LargeArray<Way> ways(std::size_t(size.x) * size.y * size.z);
+    const auto next = nextParts(field);
+    forEachEntry(field, [&](std::size_t entry, std::size_t part) {
         const std::int32_t block = field.directory[entry];
-        ways[part] = block >= 0 && meets[block][k] ? 0 : farAway;
+        for (int k = 0; k < blockParts; ++k) ways[part + next[k]] = block >= 0 && meets[block][k] ? 0 : farAway;
     });
     transform(ways, size);
-    forEachPart(field, [&](std::size_t entry, int k, std::size_t part) {
+    const auto roots = rootsOfWays();
+    forEachEntry(field, [&](std::size_t entry, std::size_t part) {
         const std::int32_t block = field.directory[entry];
-        const bool inside =
-            block < 0 ? block == FieldLayout::emptyInside : field.leasts[std::size_t(block) * blockParts + k] < 0;
-        // rounded down
-        const int way = std::min(Clearance::mostWay, int(0.5f * Clearance::steps * std::sqrt(float(ways[part]))));
-        field.centres[entry * blockParts + k] = std::int8_t(inside ? -way : way);
+        const bool emptyInside = block == FieldLayout::emptyInside;
+        std::int8_t* const centres = field.centres.data() + entry * blockParts;
+        for (int k = 0; k < blockParts; ++k) {
+            const std::int8_t root = roots[ways[part + next[k]]];
+            const bool inside = block < 0 ? emptyInside : field.leasts[std::size_t(block) * blockParts + k] < 0;
+            centres[k] = std::int8_t(inside ? -root : root);
+        }
     });
 }
 
@@ -315,8 +363,7 @@ Clearance FieldLayout::clearance() const {
 }
 
 std::size_t FieldLayout::memoryBytes() const {
-    return sizeof *this + directory.size() * sizeof(std::int32_t) + centres.size() + leasts.size() + values.bytes() +
-           values16.bytes();
+    return sizeof *this + directory.bytes() + centres.bytes() + leasts.bytes() + values.bytes() + values16.bytes();
 }
 
 }  // namespace bilayer

@@ -5,7 +5,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <glm/vec3.hpp>
-#include <vector>
 
 #include "sdf/clearance.h"
 #include "sdf/large_array.h"
@@ -58,9 +57,9 @@ struct FieldLayout : FieldFrame {
     /// number, positive or negative.
     static constexpr std::int16_t beyondOutside = 32767, beyondInside = -32768;
 
-    std::vector<std::int32_t> directory;  ///< a block's number in `values`, or the side that it lies on
-    std::vector<std::int8_t> centres;     ///< of Clearance::Data
-    std::vector<std::int8_t> leasts;      ///< likewise
+    LargeArray<std::int32_t> directory;  ///< a block's number in `values`, or the side that it lies on
+    LargeArray<std::int8_t> centres;     ///< of Clearance::Data
+    LargeArray<std::int8_t> leasts;      ///< likewise
     Storage storage = Storage::float32;
     LargeArray<float> values;           ///< blockFloats a block, if they are float32 [m]
     LargeArray<std::int16_t> values16;  ///< likewise, if they are fixed16 [step]

@@ -24,7 +24,7 @@ class LargeArray {
     /// Throws std::bad_alloc.
     explicit LargeArray(std::size_t size) : size_(size) {
         constexpr std::size_t hugePage = 2 << 20, line = 64;
-        const std::size_t alignment = bytes() >= 2 * hugePage ? hugePage : line;
+        const std::size_t alignment = bytes() >= hugePage ? hugePage : line;
         const std::size_t whole = (bytes() + alignment - 1) / alignment * alignment;
         data_.reset(static_cast<T*>(std::aligned_alloc(alignment, whole)));
         if (whole && !data_) throw std::bad_alloc();

@@ -2,10 +2,8 @@
 
 #include <oneapi/tbb/blocked_range.h>
 #include <oneapi/tbb/parallel_for.h>
-#include <oneapi/tbb/parallel_sort.h>
 
 #include <algorithm>
-#include <array>
 #include <bit>
 #include <tuple>
 
@@ -27,21 +25,22 @@ std::uint64_t bitsOf(float coordinate) {
     return std::bit_cast<std::uint32_t>(coordinate + 0.0f);
 }
 
-// For each vertex, the first vertex with equal coordinates.
+std::uint64_t hashOf(const glm::vec3& p) {
+    return mixed(mixed(bitsOf(p.x) | bitsOf(p.y) << 32) + bitsOf(p.z));
+}
+
+// For each vertex, the first vertex with equal coordinates: by a hash table with open addressing.
 std::vector<unsigned> firstOfEqual(const Mesh& mesh, Progress* progress) {
-    struct Vertex {
-        glm::vec3 point;
-        unsigned number;
-        auto key() const { return std::tie(point.x, point.y, point.z, number); }
-    };
-    auto order = vectorOf<Vertex>(mesh.points.size(), progress);
-    for (const std::size_t i : Polled(order.size(), progress)) order[i] = {mesh.points[i], unsigned(i)};
-    const auto less = [](const Vertex& a, const Vertex& b) { return a.key() < b.key(); };
-    tbb::parallel_sort(order.begin(), order.end(), polled(less, progress));
-    auto first = vectorOf<unsigned>(order.size(), progress);
-    for (const std::size_t i : Polled(order.size(), progress)) {
-        const bool same = i > 0 && order[i].point == order[i - 1].point;
-        first[order[i].number] = same ? first[order[i - 1].number] : order[i].number;
+    constexpr unsigned none = ~0u;
+    auto table = vectorOf<unsigned>(std::bit_ceil(2 * mesh.points.size() + 1), progress);
+    std::fill(table.begin(), table.end(), none);
+    auto first = vectorOf<unsigned>(mesh.points.size(), progress);
+    for (const std::size_t i : Polled(first.size(), progress)) {
+        std::size_t slot = hashOf(mesh.points[i]) & (table.size() - 1);
+        while (table[slot] != none && mesh.points[table[slot]] != mesh.points[i])
+            slot = (slot + 1) & (table.size() - 1);
+        if (table[slot] == none) table[slot] = unsigned(i);
+        first[i] = table[slot];
     }
     return first;
 }
@@ -73,21 +72,20 @@ std::vector<EdgeUse> sortedEdges(const Topology& topology, std::size_t vertices)
     return edges;
 }
 
-std::array<unsigned, 3> corners(glm::uvec3 t) {
-    std::array<unsigned, 3> sorted = {t.x, t.y, t.z};
-    std::sort(sorted.begin(), sorted.end());
-    return sorted;
-}
-
-// Triangles with the same vertices share all edges, so the uses of one edge are enough to find them.
+// Triangles with the same vertices share all edges, so the uses of one edge are enough to find them: by the vertex that
+// is not on it.
 std::vector<unsigned> originals(const Topology& topology) {
     std::vector<unsigned> original(topology.triangles.size());
     std::iota(original.begin(), original.end(), 0u);
-    std::vector<std::pair<std::array<unsigned, 3>, unsigned>> all;
+    const auto opposite = [&](const EdgeUse& use) {
+        const glm::uvec3& t = topology.triangles[use.triangle];
+        return t.x ^ t.y ^ t.z ^ use.low ^ use.high;
+    };
+    std::vector<std::pair<unsigned, unsigned>> all;  // opposite vertices, triangles
     topology.forEachEdge([&](std::span<const EdgeUse> uses) {
-        if (uses.size() < 2) return;
+        if (uses.size() < 2 || (uses.size() == 2 && opposite(uses[0]) != opposite(uses[1]))) return;
         all.clear();
-        for (const EdgeUse& use : uses) all.emplace_back(corners(topology.triangles[use.triangle]), use.triangle);
+        for (const EdgeUse& use : uses) all.emplace_back(opposite(use), use.triangle);
         std::sort(all.begin(), all.end());
         for (std::size_t i = 1; i < all.size(); ++i)
             if (all[i].first == all[i - 1].first) original[all[i].second] = original[all[i - 1].second];
@@ -115,10 +113,7 @@ std::vector<std::uint64_t> hashVertices(const Mesh& mesh, Progress* progress) {
     auto hashes = vectorOf<std::uint64_t>(mesh.points.size(), progress);
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, hashes.size(), grain), [&](const auto& range) {
         poll(progress);
-        for (std::size_t i = range.begin(); i < range.end(); ++i) {
-            const glm::vec3& p = mesh.points[i];
-            hashes[i] = mixed(mixed(bitsOf(p.x) | bitsOf(p.y) << 32) + bitsOf(p.z));
-        }
+        for (std::size_t i = range.begin(); i < range.end(); ++i) hashes[i] = hashOf(mesh.points[i]);
     });
     return hashes;
 }

@@ -36,6 +36,17 @@ struct Topology {
     /// Whether a triangle uses no vertex twice.
     bool proper(std::size_t triangle) const;
 
+    /// Calls visit(std::span<const EdgeUse>) with all uses of each edge that begins in a range of `edges`.
+    template <class Visit>
+    void forEdges(std::size_t begin, std::size_t end, Visit visit) const {
+        while (begin > 0 && begin < end && edges[begin].sameEdge(edges[begin - 1])) ++begin;
+        for (std::size_t next = begin; begin < end; begin = next) {
+            while (++next < edges.size() && edges[next].sameEdge(edges[begin])) {
+            }
+            visit(std::span(&edges[begin], next - begin));
+        }
+    }
+
     /// Calls visit(std::span<const EdgeUse>) with all uses of each edge.
     template <class Visit>
     void forEachEdge(Visit visit) const {

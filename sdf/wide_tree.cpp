@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstring>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <limits>
@@ -21,8 +22,6 @@
 namespace bilayer {
 namespace {
 
-/// Triangles with a longer edge are halved: floats stay exact to 1e-6 around them [voxels].
-constexpr double longestEdge = 8;
 /// Floats hold all whole numbers up to twice this [voxels].
 constexpr double longestMesh = 1 << 23;
 /// A sort key and the number of a part share 64 bits.
@@ -34,6 +33,9 @@ constexpr std::size_t digits = std::size_t(1) << digitBits;
 static_assert(keyBits % digitBits == 0 && keyBits + indexBits == 64);
 constexpr std::size_t runLength = 1 << 15;  // keys that one task sorts at a time: more than digits
 constexpr std::size_t grain = 1024;         // triangles or leaves a task
+/// Selection halves what it looks at, on average, until there is little left; if not, it is done in another way.
+constexpr int mostRounds = 64;
+constexpr std::ptrdiff_t shortRun = 24;
 
 using Corners = std::array<glm::dvec3, 3>;
 
@@ -56,8 +58,8 @@ void forAll(std::size_t count, Progress* progress, Body body) {
 // The parts that the tree is made of: the triangles that are short enough, and the parts of those that are not.
 class Parts {
   public:
-    Parts(const Mesh& mesh, const glm::dvec3& base, double voxelSize)
-        : mesh_(mesh), base_(base), perVoxelSize_(1 / voxelSize) {}
+    Parts(const Mesh& mesh, const glm::dvec3& base, double voxelSize, double longestEdge)
+        : mesh_(mesh), base_(base), perVoxelSize_(1 / voxelSize), longest2_(longestEdge * longestEdge) {}
 
     Corners corners(std::size_t part) const {
         return part < mesh_.triangles.size() ? ofTriangle(part) : halves_[part - mesh_.triangles.size()].corners;
@@ -85,7 +87,7 @@ class Parts {
         const auto edge = std::size_t(std::max_element(all.begin(), all.end()) - all.begin());
         return {edge, all[edge]};
     }
-    static bool isLong(const Corners& c) { return longest(c).second > longestEdge * longestEdge; }
+    bool isLong(const Corners& c) const { return longest(c).second > longest2_; }
 
     void halve(std::uint32_t triangle) { halve(ofTriangle(triangle), triangle); }
 
@@ -103,7 +105,7 @@ class Parts {
 
     void halve(const Corners& c, std::uint32_t triangle) {
         const auto [i, length2] = longest(c);
-        if (length2 <= longestEdge * longestEdge) {
+        if (length2 <= longest2_) {
             if (count() >= (std::size_t(1) << indexBits))
                 throw std::invalid_argument("voxelSize is too small: the mesh has triangles too large for it");
             halves_.push_back({c, triangle});
@@ -117,7 +119,7 @@ class Parts {
 
     const Mesh& mesh_;
     glm::dvec3 base_;
-    double perVoxelSize_;
+    double perVoxelSize_, longest2_;
     std::vector<Half> halves_;
 };
 
@@ -203,7 +205,7 @@ void makeKeys(const Parts& parts, const glm::ivec3& size, std::size_t first, std
         const Corners c = parts.corners(first + i);
         for (int k = 0; k < 3; ++k)
             run.x[k][i] = std::uint32_t(std::clamp((c[0][k] + c[1][k] + c[2][k]) * scale, 0.0, cells - 1));
-        isLong[i] = Parts::isLong(c);
+        isLong[i] = parts.isLong(c);
     }
     transformToHilbert(run);
     for (std::size_t i = 0; i < count; ++i) {
@@ -230,7 +232,8 @@ std::vector<std::uint32_t> addKeys(const Parts& parts, const glm::ivec3& size, s
     return longOnes;
 }
 
-std::vector<std::uint64_t> sortedKeys(Parts& parts, const glm::ivec3& size, Progress* progress) {
+// In no particular order.
+std::vector<std::uint64_t> keysOf(Parts& parts, const glm::ivec3& size, Progress* progress) {
     std::vector<std::uint64_t> keys;
     const std::vector<std::uint32_t> longOnes = addKeys(parts, size, keys, progress);
     if (!longOnes.empty()) {
@@ -238,7 +241,6 @@ std::vector<std::uint64_t> sortedKeys(Parts& parts, const glm::ivec3& size, Prog
         addKeys(parts, size, keys, progress);
         std::erase(keys, unused);
     }
-    sortKeys(keys, progress);
     return keys;
 }
 
@@ -267,6 +269,40 @@ class Splitter {
         std::uint32_t part;
     };
 
+    using Whole [[gnu::vector_size(sizeof(Item))]] = float;
+
+    static Whole wholeOf(const Item* item) {
+        Whole whole;
+        std::memcpy(&whole, item, sizeof whole);
+        return whole;
+    }
+
+    static bool less(const Item& a, const Item& b, int axis) {
+        const float x = a.place[axis], y = b.place[axis];
+        return bool(int(x < y) | (int(x == y) & int(a.part < b.part)));
+    }
+
+    // As std::nth_element, but without branches on what can not be foretold.
+    static void select(Item* begin, Item* middle, Item* end, int axis) {
+        const auto inOrder = [axis](const Item& a, const Item& b) { return less(a, b, axis); };
+        for (int round = 0; round < mostRounds && end - begin > shortRun; ++round) {
+            // all differ: something is less than the second of three
+            std::array<Item, 3> some{*begin, begin[(end - begin) / 2], end[-1]};
+            std::sort(some.begin(), some.end(), inOrder);
+            Item* store = begin;
+            for (Item* i = begin; i < end; ++i) {
+                // as wholes: what is written in pieces can not be read at once soon after
+                const bool before = less(*i, some[1], axis);
+                const Whole here = wholeOf(i), there = wholeOf(store);
+                std::memcpy(i, &there, sizeof there);
+                std::memcpy(store, &here, sizeof here);
+                store += before;
+            }
+            (middle < store ? end : begin) = store;
+        }
+        std::nth_element(begin, middle, end, inOrder);
+    }
+
     void split(std::size_t begin, std::size_t end, std::size_t size) {
         while (end - begin <= size) {
             if (size == treeWidth) return;
@@ -279,10 +315,7 @@ class Splitter {
             lower = glm::min(lower, items_[i].place), upper = glm::max(upper, items_[i].place);
         const glm::vec3 sides = upper - lower;
         const int axis = sides.x >= sides.y && sides.x >= sides.z ? 0 : sides.y >= sides.z ? 1 : 2;
-        const auto at = [&](std::size_t i) { return items_.begin() + std::ptrdiff_t(i); };
-        std::nth_element(at(begin), at(middle), at(end), [axis](const Item& a, const Item& b) {
-            return a.place[axis] < b.place[axis] || (a.place[axis] == b.place[axis] && a.part < b.part);
-        });
+        select(items_.data() + begin, items_.data() + middle, items_.data() + end, axis);
         const auto left = [&] { split(begin, middle, size); };
         const auto right = [&] { split(middle, end, size); };
         if (end - begin > runLength)
@@ -415,7 +448,7 @@ std::uint32_t groupsOver(std::uint32_t leaves) {
 
 }  // namespace
 
-WideTree makeWideTree(const Mesh& mesh, float voxelSize, Progress* progress, TreeOrder order) {
+WideTree makeWideTree(const Mesh& mesh, float voxelSize, Progress* progress, const TreeShape& shape) {
     if (mesh.triangles.size() >= (std::size_t(1) << indexBits))
         throw std::invalid_argument("the mesh has 2^28 triangles or more");
     const Bounds box = bounds(mesh);
@@ -428,9 +461,12 @@ WideTree makeWideTree(const Mesh& mesh, float voxelSize, Progress* progress, Tre
     tree.base = glm::ivec3(base);
     tree.size = glm::ivec3(size);
 
-    Parts parts(mesh, base, voxelSize);
-    std::vector<std::uint64_t> keys = sortedKeys(parts, tree.size, progress);
-    if (order == TreeOrder::split) Splitter(parts, keys, progress).sort();
+    Parts parts(mesh, base, voxelSize, shape.longestEdge);
+    std::vector<std::uint64_t> keys = keysOf(parts, tree.size, progress);
+    if (shape.order == TreeOrder::split)
+        Splitter(parts, keys, progress).sort();
+    else
+        sortKeys(keys, progress);
     tree.leafCount = std::uint32_t((keys.size() + treeWidth - 1) / treeWidth);
     tree.groupCount = groupsOver(tree.leafCount);
     tree.leaves = LargeArray<WideLeaf>(tree.leafCount);

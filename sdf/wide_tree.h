@@ -1,6 +1,6 @@
 // A bounding hierarchy over the triangles of a mesh, made for questions about the nearest triangle: triangles sorted
 // along Hilbert's curve, eight to a leaf, eight boxes to a group, and so on upward, with no pointers and no choices
-// that cost time. Long triangles are halved first until they are as small as a block: their boxes fit well and single
+// that cost time. Long triangles are halved first, until they are as small as a block: their boxes fit well and single
 // precision is enough for all that is measured from a triangle's own cell.
 #pragma once
 
@@ -57,12 +57,18 @@ enum class TreeOrder {
     split,    ///< in halves along the longest side, over and over: boxes overlap less
 };
 
+/// What a hierarchy is made for.
+struct TreeShape {
+    TreeOrder order = TreeOrder::hilbert;
+    /// Triangles with a longer edge are halved: around them, floats are exact to 1.2e-7 of it [voxels].
+    double longestEdge = 8;
+};
+
 /// Builds the hierarchy of a valid mesh on all cores; the result does not depend on their number.
 /// @param voxelSize  [m]
 /// @param progress   polled, unless null
 /// Throws std::invalid_argument if the mesh is longer than 2^23 voxels or has more than 2^28 triangles and parts of
 /// halved ones.
-WideTree makeWideTree(const Mesh& mesh, float voxelSize, Progress* progress = nullptr,
-                      TreeOrder order = TreeOrder::hilbert);
+WideTree makeWideTree(const Mesh& mesh, float voxelSize, Progress* progress = nullptr, const TreeShape& shape = {});
 
 }  // namespace bilayer

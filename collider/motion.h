@@ -1,0 +1,41 @@
+// Where bodies go.
+#pragma once
+
+#include <glm/geometric.hpp>
+
+#include "collider/pose.h"
+
+namespace bilayer {
+
+/// How a body moves until it is looked at again: a point x of it goes way + turn x (x - its pose's position), in the
+/// world. Straight: turns of more than a fraction of a radian bend away from it.
+struct Motion {
+    glm::vec3 way{0};   ///< of the pose's position [m]
+    glm::vec3 turn{0};  ///< about it [rad]
+
+    /// The same motion as told of another point of the body.
+    Motion about(const glm::vec3& from, const glm::vec3& to) const { return {way + glm::cross(turn, to - from), turn}; }
+};
+
+/// The ways of a body's points as another body sees them, in that one's coordinates [m].
+class RelativeWays {
+  public:
+    RelativeWays(const Pose& body, const Motion& motion, const Pose& seenFrom, const Motion& its) {
+        const glm::quat into = glm::conjugate(seenFrom.rotation);
+        way_ = into * (motion.way - its.way + glm::cross(motion.turn, seenFrom.position - body.position));
+        turn_ = into * (motion.turn - its.turn);
+    }
+
+    /// Of the body's point that is at `point` now.
+    glm::vec3 of(const glm::vec3& point) const { return way_ + glm::cross(turn_, point); }
+
+    /// The longest way of a point in a sphere, at most.
+    float longest(const glm::vec3& centre, float radius) const {
+        return glm::length(of(centre)) + radius * glm::length(turn_);
+    }
+
+  private:
+    glm::vec3 way_, turn_;
+};
+
+}  // namespace bilayer
