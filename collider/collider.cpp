@@ -2,8 +2,10 @@
 // descended with the relative pose, so that only points near the other body are sampled.
 #include "collider/collider.h"
 
+#include <algorithm>
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
+#include <optional>
 #include <utility>
 
 namespace bilayer {
@@ -36,33 +38,68 @@ struct Map {
     }
 };
 
-// Calls found(index, point, sample) for the points of one body within `margin` [m] of another's surface or in it.
+// How a field is touched, in its own coordinates.
+struct Touch {
+    float distance;      // of the point from the surface; of one that comes from afar from the plane that it will meet
+    glm::vec3 normal;    // outward; zero where the field tells none
+    float approach = 0;  // Contact::approach
+};
+
+glm::vec3 directionOf(const glm::vec3& gradient) {
+    const float length = glm::length(gradient);
+    return length > flattest ? gradient / length : glm::vec3(0);
+}
+
+// The touch of a point that comes from outside of the field and goes some way.
+std::optional<Touch> touchOnWay(const Field& field, const glm::vec3& point, const glm::vec3& way) {
+    const auto hit = field.segment(point, point + way);
+    if (!hit) return std::nullopt;
+    return Touch{std::max(glm::dot(point - hit->position, hit->normal), 0.f), hit->normal, -glm::dot(way, hit->normal)};
+}
+
+// Calls found(index, point, touch) for the points of one body within `margin` [m] of another's surface, in it, or on
+// their way to it.
 template <class Found>
 void samplePoints(const Placed& body, const Placed& other, float margin, ContactReport& report, Found&& found) {
     const Map map(body, other);
     const Field& field = other.collider.field();
     const float reach = margin / other.scale;
+    const RelativeWays ways(body.pose, body.motion, other.pose, other.motion);
+    const Bounds& bounds = body.collider.bounds();
+    const float most =
+        ways.longest(other.scale * map(bounds.centre()), 0.5f * body.scale * glm::length(bounds.size())) / other.scale;
+    const bool sweeps = most > reach;
     const Clearance clearance = field.clearance();
     const Map coarse = map.inParts(field);
-    const float kept = (reach / field.voxelSize() + fieldError) / float(Clearance::partSide);
+    const float seen = sweeps ? reach + most : reach;
+    const float kept = (seen / field.voxelSize() + fieldError) / float(Clearance::partSide);
     const auto reject = [&](const glm::vec3& centre, float radius) {
         return clearance.isOutside(coarse(centre), radius * coarse.scale + kept);
     };
     body.collider.points().visit(reject, [&](std::uint32_t index, const SurfacePoint& point) {
         const glm::vec3 place = coarse(point.position);
-        if (clearance.isAbove(place, reach) || clearance.isOutside(place, kept)) return;
+        if (clearance.isAbove(place, seen) || clearance.isOutside(place, kept)) return;
         ++report.pointsTested;
-        const Sample sample = field.sampleWithin(map(point.position), reach);
-        if (!(sample.distance <= reach)) return;
-        if (sample.inBand) found(index, point, sample);
-        if (!sample.inBand && sample.distance < 0) ++report.beyondBand;
+        const glm::vec3 at = map(point.position);
+        const Sample sample = field.sampleWithin(at, reach);
+        if (sample.distance <= reach) {
+            if (sample.inBand) {
+                const glm::vec3 normal = directionOf(sample.gradient);
+                const float approach = sweeps ? -glm::dot(ways.of(other.scale * at), normal) / other.scale : 0;
+                found(index, point, Touch{sample.distance, normal, std::max(approach, 0.f)});
+            }
+            if (!sample.inBand && sample.distance < 0) ++report.beyondBand;
+        } else if (sweeps) {
+            const glm::vec3 way = ways.of(other.scale * at) / other.scale;
+            if (sample.distance > glm::length(way)) return;
+            if (const auto touch = touchOnWay(field, at, way)) found(index, point, *touch);
+        }
     });
 }
 
 // Outward of `other`, in the world; where its field tells none, against the surface of the body that touches it.
-glm::vec3 outwardNormal(const Placed& other, const Sample& sample, const Placed& body, const SurfacePoint& point) {
-    const float length = glm::length(sample.gradient);
-    return length > flattest ? other.pose.rotation * (sample.gradient / length) : -(body.pose.rotation * point.normal);
+glm::vec3 outwardNormal(const Placed& other, const Touch& touch, const Placed& body, const SurfacePoint& point) {
+    return touch.normal == glm::vec3(0) ? -(body.pose.rotation * point.normal) : other.pose.rotation * touch.normal;
 }
 
 }  // namespace
@@ -78,20 +115,19 @@ ContactReport collide(const Placed& a, const Placed& b, const ContactOptions& op
     const auto opposes = [&](const glm::vec3& normal, const Placed& body, const SurfacePoint& point) {
         return -glm::dot(normal, body.pose.rotation * point.normal) >= options.leastOpposition;
     };
-    samplePoints(
-        a, b, options.margin, report, [&](std::uint32_t index, const SurfacePoint& point, const Sample& sample) {
-            const glm::vec3 normal = outwardNormal(b, sample, a, point);
-            if (!opposes(normal, a, point)) return;
-            const float distance = sample.distance * b.scale;
-            contacts.push_back({a.pose.toWorld(a.scale * point.position) - distance * normal, normal, distance, index});
-        });
-    samplePoints(
-        b, a, options.margin, report, [&](std::uint32_t index, const SurfacePoint& point, const Sample& sample) {
-            const glm::vec3 normal = outwardNormal(a, sample, b, point);
-            if (!opposes(normal, b, point)) return;
-            contacts.push_back(
-                {b.pose.toWorld(b.scale * point.position), -normal, sample.distance * a.scale, index | featureOfB});
-        });
+    samplePoints(a, b, options.margin, report, [&](std::uint32_t index, const SurfacePoint& point, const Touch& touch) {
+        const glm::vec3 normal = outwardNormal(b, touch, a, point);
+        if (!opposes(normal, a, point)) return;
+        const float distance = touch.distance * b.scale;
+        contacts.push_back({a.pose.toWorld(a.scale * point.position) - distance * normal, normal, distance, index,
+                            touch.approach * b.scale});
+    });
+    samplePoints(b, a, options.margin, report, [&](std::uint32_t index, const SurfacePoint& point, const Touch& touch) {
+        const glm::vec3 normal = outwardNormal(a, touch, b, point);
+        if (!opposes(normal, b, point)) return;
+        contacts.push_back({b.pose.toWorld(b.scale * point.position), -normal, touch.distance * a.scale,
+                            index | featureOfB, touch.approach * a.scale});
+    });
     return report;
 }
 

@@ -6,6 +6,7 @@
 
 #include "collider/field.h"
 #include "collider/mass.h"
+#include "collider/motion.h"
 #include "collider/points.h"
 #include "collider/pose.h"
 
@@ -39,21 +40,28 @@ struct Placed {
     const Collider& collider;
     Pose pose{};
     float scale = 1;  ///< positive; distances grow by it
+    Motion motion{};
 };
 
-/// A point where two bodies touch or nearly do.
+/// A point where two bodies touch, nearly do, or are going to.
 struct Contact {
     glm::vec3 position;     ///< on the surface of B, in the world [m]
     glm::vec3 normal;       ///< from B to A, of unit length
     float distance;         ///< gap between the surfaces, negative when they overlap [m]
     std::uint32_t feature;  ///< index of the surface point; the top bit is set where the point is of B, else it is of A
+    /// What the bodies' motion takes off the distance, where it takes any point farther than the margin [m].
+    float approach = 0;
+
+    /// What the motion leaves of the distance if nothing stops it [m].
+    float remaining() const { return distance - approach; }
 };
 
 inline constexpr std::uint32_t featureOfB = 0x80000000u;
 
 struct ContactOptions {
-    /// Contacts are reported up to this distance [m]. The band must reach sqrt(3) voxels farther for all of them to be
-    /// found, and as much deeper than bodies sink into each other (see Sample::inBand).
+    /// Contacts are reported up to this distance [m], and beyond it where a point's motion meets the other surface. The
+    /// band must reach sqrt(3) voxels farther for all of them to be found, and as much deeper than bodies sink into
+    /// each other (see Sample::inBand).
     float margin = 0;
     /// Least cosine between the point's own normal and the opposite of the surface's that it touches; contacts below
     /// are left out. Points just under the edge of the other body look along the surface that is nearest to them. The

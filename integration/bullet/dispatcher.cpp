@@ -5,12 +5,14 @@
 #include <BulletCollision/CollisionDispatch/btCollisionObjectWrapper.h>
 #include <BulletCollision/CollisionDispatch/btManifoldResult.h>
 #include <BulletCollision/CollisionShapes/btStaticPlaneShape.h>
+#include <BulletDynamics/Dynamics/btRigidBody.h>
 #include <tbb/parallel_for_each.h>
 
 #include <algorithm>
 #include <chrono>
 #include <new>
 #include <optional>
+#include <vector>
 
 #include "integration/bullet/convert.h"
 #include "integration/bullet/manifolds.h"
@@ -34,14 +36,35 @@ bool locks(const btCollisionShape* shape) {
     return shape->getShapeType() == GIMPACT_SHAPE_PROXYTYPE;
 }
 
-/// A shape where it stands in the world; for the child of a compound, the child's own.
+/// What a point that a body carries along does until the next step, the forces on the body included.
+Motion motionOf(const btCollisionObject& object, const btVector3& point, float seconds) {
+    const auto* body = btRigidBody::upcast(&object);
+    if (!body || body->isStaticObject() || !body->isActive()) return {};
+    const btVector3 velocity =
+        body->getLinearVelocity() + seconds * body->getInvMass() * body->getLinearFactor() * body->getTotalForce();
+    const btVector3 turn = seconds * body->getAngularVelocity();
+    return {toGlm(seconds * velocity + turn.cross(point - body->getCenterOfMassPosition())), toGlm(turn)};
+}
+
+/// A shape where it stands in the world, and how it moves; for the child of a compound, the child's own.
 struct Side {
     const btCollisionShape* shape;
     btTransform transform;
+    const btCollisionObject* object;
+    float seconds;  ///< until the next step; 0: contacts are asked for as things are
+
+    Motion motionAt(const glm::vec3& point) const { return motionOf(*object, toBullet(point), seconds); }
+    Motion motion() const { return motionAt(toGlm(transform.getOrigin())); }
+    /// Of a field's.
+    Placed placed() const {
+        Placed body = static_cast<const Shape&>(*shape).placed(transform);
+        if (static_cast<const Shape&>(*shape).sweeps()) body.motion = motionAt(body.pose.position);
+        return body;
+    }
 };
 
-Side sideOf(const btCollisionObjectWrapper& wrap) {
-    return {wrap.getCollisionShape(), wrap.getWorldTransform()};
+Side sideOf(const btCollisionObjectWrapper& wrap, float seconds) {
+    return {wrap.getCollisionShape(), wrap.getWorldTransform(), wrap.getCollisionObject(), seconds};
 }
 
 /// Two overlapping bodies of which B is a field. Collides them without a call that changes anything in Bullet, so that
@@ -56,7 +79,7 @@ class Pair {
         const auto& field = static_cast<const Shape&>(*b.shape);
         margin = std::max(margin, field.getMargin());
         if (isField(a.shape)) margin = std::max(margin, a.shape->getMargin());
-        report_ = find(a, field.placed(b.transform), margin);
+        report_ = find(a, b.placed(), margin, field.sweeps() ? a.motion() : Motion{});
         found_ = static_cast<int>(contacts_.size());
         patches_ = reduce(contacts_, patches_);
         isReady_ = true;
@@ -77,21 +100,22 @@ class Pair {
     const Manifolds& manifolds() const { return manifolds_; }
 
   private:
-    ContactReport find(const Side& a, const Placed& field, float margin) {
-        if (isField(a.shape))
-            return collideFields(static_cast<const Shape&>(*a.shape).placed(a.transform), field, margin, contacts_);
+    ContactReport find(const Side& a, const Placed& field, float margin, const Motion& motion) {
+        if (isField(a.shape)) return collideFields(a.placed(), field, margin, contacts_);
         if (a.shape->getShapeType() == STATIC_PLANE_PROXYTYPE) {
             const auto& plane = static_cast<const btStaticPlaneShape&>(*a.shape);
             const btVector3 normal = a.transform.getBasis() * plane.getPlaneNormal();
             const float offset = plane.getPlaneConstant() + normal.dot(a.transform.getOrigin());
-            return collidePlane(toGlm(normal), offset, field, margin, contacts_);
+            const Motion planeMotion = motion.about(toGlm(a.transform.getOrigin()), glm::vec3(0));
+            return collidePlane(toGlm(normal), offset, planeMotion, field, margin, contacts_);
         }
         if (a.shape->isConvex()) {
             const auto& convex = static_cast<const btConvexShape&>(*a.shape);
             if (!convex_ || !convex_->isOf(convex)) convex_.emplace(convex);
-            return collideConvex(*convex_, toPose(a.transform), field, margin, contacts_);
+            return collideConvex(*convex_, toPose(a.transform), motion, field, margin, contacts_);
         }
-        return collideTriangles(static_cast<const btConcaveShape&>(*a.shape), a.transform, field, margin, contacts_);
+        return collideTriangles(static_cast<const btConcaveShape&>(*a.shape), a.transform, motion, field, margin,
+                                contacts_);
     }
 
     Manifolds manifolds_;
@@ -104,11 +128,18 @@ class Pair {
     bool isReady_ = false;
 };
 
+/// Of the step under way.
+struct StepState {
+    DispatchStatistics running;  ///< contact tests between steps count here too
+    float seconds = 0;           ///< that it takes; 0 between steps
+};
+
 class Algorithm : public btCollisionAlgorithm {
   public:
-    Algorithm(const btCollisionAlgorithmConstructionInfo& info, bool bIsSecond, DispatchStatistics& statistics)
+    Algorithm(const btCollisionAlgorithmConstructionInfo& info, bool bIsSecond, StepState& state)
         : btCollisionAlgorithm(info),
-          pair_(std::make_shared<Pair>(*info.m_dispatcher1, statistics)),
+          pair_(std::make_shared<Pair>(*info.m_dispatcher1, state.running)),
+          state_(state),
           bIsSecond_(bIsSecond) {}
 
     /// Shared, since a callback of the user's may remove the bodies while a batch is under way.
@@ -118,7 +149,9 @@ class Algorithm : public btCollisionAlgorithm {
     void processCollision(const btCollisionObjectWrapper* first, const btCollisionObjectWrapper* second,
                           const btDispatcherInfo&, btManifoldResult* result) override {
         const btCollisionObjectWrapper &a = bIsSecond_ ? *first : *second, &b = bIsSecond_ ? *second : *first;
-        if (!pair_->isReady()) pair_->collide(sideOf(a), sideOf(b), result->m_closestPointDistanceThreshold);
+        if (!pair_->isReady())
+            pair_->collide(sideOf(a, state_.seconds), sideOf(b, state_.seconds),
+                           result->m_closestPointDistanceThreshold);
         const float sameWithin = b.getCollisionShape()->getContactBreakingThreshold(gContactBreakingThreshold);
         pair_->commit(*a.getCollisionObject(), *b.getCollisionObject(), sameWithin, *result);
     }
@@ -135,31 +168,32 @@ class Algorithm : public btCollisionAlgorithm {
 
   private:
     std::shared_ptr<Pair> pair_;
+    const StepState& state_;
     bool bIsSecond_;
 };
 static_assert(sizeof(Algorithm) <= poolElement);
 
 struct CreateFunction : btCollisionAlgorithmCreateFunc {
-    CreateFunction(bool bIsSecond, DispatchStatistics& statistics) : bIsSecond(bIsSecond), statistics(statistics) {}
+    CreateFunction(bool bIsSecond, StepState& state) : bIsSecond(bIsSecond), state(state) {}
 
     btCollisionAlgorithm* CreateCollisionAlgorithm(btCollisionAlgorithmConstructionInfo& info,
                                                    const btCollisionObjectWrapper*,
                                                    const btCollisionObjectWrapper*) override {
         void* memory = info.m_dispatcher1->allocateCollisionAlgorithm(sizeof(Algorithm));
-        return new (memory) Algorithm(info, bIsSecond, statistics);
+        return new (memory) Algorithm(info, bIsSecond, state);
     }
 
     bool bIsSecond;
-    DispatchStatistics& statistics;
+    StepState& state;
 };
 
 }  // namespace
 
 struct Dispatcher::Functions {
-    DispatchStatistics running;  ///< contact tests between steps count here too
+    StepState state;
     DispatchStatistics last;
-    CreateFunction fieldSecond{true, running};
-    CreateFunction fieldFirst{false, running};
+    CreateFunction fieldSecond{true, state};
+    CreateFunction fieldFirst{false, state};
 };
 
 Dispatcher::Dispatcher(btCollisionConfiguration* configuration)
@@ -190,7 +224,7 @@ void Dispatcher::registerFields() {
 void Dispatcher::dispatchAllCollisionPairs(btOverlappingPairCache* cache, const btDispatcherInfo& info,
                                            btDispatcher* dispatcher) {
     const auto start = std::chrono::steady_clock::now();
-    functions_->running = {};
+    functions_->state = {.running = {}, .seconds = info.m_timeStep};
 
     struct Task {
         std::shared_ptr<Pair> pair;
@@ -212,14 +246,16 @@ void Dispatcher::dispatchAllCollisionPairs(btOverlappingPairCache* cache, const 
         const auto* algorithm = dynamic_cast<Algorithm*>(overlap.m_algorithm);
         if (!algorithm || locks(one.getCollisionShape()) || locks(two.getCollisionShape())) continue;
         const bool straight = algorithm->bIsSecond();
-        tasks.push_back({algorithm->pair(), sideOf(straight ? one : two), sideOf(straight ? two : one)});
+        tasks.push_back({algorithm->pair(), sideOf(straight ? one : two, info.m_timeStep),
+                         sideOf(straight ? two : one, info.m_timeStep)});
     }
     tbb::parallel_for_each(tasks, [](Task& task) { task.pair->collide(task.a, task.b, 0); });
 
     btCollisionDispatcher::dispatchAllCollisionPairs(cache, info, dispatcher);
 
     for (const Task& task : tasks) task.pair->forget();
-    functions_->last = functions_->running;
+    functions_->state.seconds = 0;
+    functions_->last = functions_->state.running;
     functions_->last.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 

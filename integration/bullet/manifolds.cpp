@@ -34,7 +34,7 @@ constexpr float flatness = 1e-3f;
 // Four sides of a patch, askew to everything one models: a rectangle's corners are then each alone on their side.
 constexpr glm::vec2 sides[] = {{0.87f, 0.49f}, {-0.49f, 0.87f}, {-0.87f, -0.49f}, {0.49f, -0.87f}};
 
-/// Contacts of one patch, as indices in ascending order of distance.
+/// Contacts of one patch, as indices in ascending order of the distance that remains.
 using Group = std::vector<std::uint32_t>;
 
 /// The contacts of the last step, by feature.
@@ -108,10 +108,10 @@ bool isStill(const std::vector<Contact>& contacts, std::span<const Patch> last) 
     if (contacts.empty() || last.empty()) return false;
     float before = std::numeric_limits<float>::max();
     for (const Patch& patch : last)
-        for (int i = 0; i < patch.count; ++i) before = std::min(before, patch.contacts[i].distance);
+        for (int i = 0; i < patch.count; ++i) before = std::min(before, patch.contacts[i].remaining());
     Group all(contacts.size());
     std::iota(all.begin(), all.end(), 0u);
-    return std::abs(contacts.front().distance - before) <= stillness * extentOf(contacts, all);
+    return std::abs(contacts.front().remaining() - before) <= stillness * extentOf(contacts, all);
 }
 
 /// The contact of the group that lies farthest in a direction, depth and a bonus weighing in.
@@ -121,7 +121,7 @@ std::uint32_t farthest(const std::vector<Contact>& contacts, const Group& group,
     float bestScore = -std::numeric_limits<float>::max();
     for (std::size_t k = 0; k < group.size(); ++k) {
         const Contact& contact = contacts[group[k]];
-        const float score = glm::dot(contact.position, direction) - depthWeight * contact.distance + bonus[k];
+        const float score = glm::dot(contact.position, direction) - depthWeight * contact.remaining() + bonus[k];
         if (score > bestScore) best = group[k], bestScore = score;
     }
     return best;
@@ -150,9 +150,9 @@ Patch spread(const std::vector<Contact>& contacts, const Group& group, const Mem
     float extent = 0, depth = std::numeric_limits<float>::max();
     for (std::uint32_t i : chosen) {
         extent = std::max(extent, glm::distance(place(i), place(chosen.front())));
-        depth = std::min(depth, contacts[i].distance);
+        depth = std::min(depth, contacts[i].remaining());
     }
-    if (depth - contacts[deepest].distance > flatness * extent) {
+    if (depth - contacts[deepest].remaining() > flatness * extent) {
         const auto nearer = [&](std::uint32_t i, std::uint32_t j) {
             return glm::distance(place(i), place(deepest)) < glm::distance(place(j), place(deepest));
         };
@@ -183,7 +183,7 @@ class StartSilenced {
 
 std::vector<Patch> reduce(std::vector<Contact>& contacts, std::span<const Patch> last) {
     std::stable_sort(contacts.begin(), contacts.end(),
-                     [](const Contact& a, const Contact& b) { return a.distance < b.distance; });
+                     [](const Contact& a, const Contact& b) { return a.remaining() < b.remaining(); });
     if (!isStill(contacts, last)) last = {};
     std::vector<Patch> patches;
     const Memory memory(last);
@@ -214,7 +214,7 @@ void Manifolds::write(std::span<const Patch> patches, const btCollisionObject& a
         manifold->setNumContacts(0);
         result.setPersistentManifold(manifold);
         if (m < patches.size())
-            for (int i = 0; i < patches[m].count; ++i) emit(patches[m].contacts[i], aIsFirst, result);
+            for (int i = 0; i < patches[m].count; ++i) emit(patches[m].contacts[i], aIsFirst, sameWithin, result);
         for (int i = 0; i < manifold->getNumContacts(); ++i) inherit(manifold->getContactPoint(i), sameWithin);
         manifold->setContactBreakingThreshold(sameWithin);
         if (touched && manifold->getNumContacts() == 0 && gContactEndedCallback) gContactEndedCallback(manifold);
@@ -225,15 +225,24 @@ void Manifolds::write(std::span<const Patch> patches, const btCollisionObject& a
             gContactDestroyedCallback(point.m_userPersistentData);
 }
 
-void Manifolds::emit(const Contact& contact, bool aIsFirst, btManifoldResult& result) {
+void Manifolds::emit(const Contact& contact, bool aIsFirst, float sameWithin, btManifoldResult& result) {
     const bool ofFirst = aIsFirst != static_cast<bool>(contact.feature & featureOfB);
     const int index = static_cast<int>(contact.feature & ~featureOfB);
     result.setShapeIdentifiersA(0, ofFirst ? index : -1);
     result.setShapeIdentifiersB(0, ofFirst ? -1 : index);
 
-    // Bullet drops points beyond the threshold and merges those within it: open it as far as this point needs.
-    result.getPersistentManifold()->setContactBreakingThreshold(std::max(contact.distance, 0.f));
-    result.addContactPoint(toBullet(contact.normal), toBullet(contact.position), contact.distance);
+    // Bullet drops points beyond the threshold and merges those within it: open it as far as this point needs. One that
+    // comes from afar goes in as if it touched, and is put right afterwards.
+    btPersistentManifold& manifold = *result.getPersistentManifold();
+    const bool fromAfar = contact.approach > 0 && contact.distance > sameWithin;
+    manifold.setContactBreakingThreshold(fromAfar ? 0 : std::max(contact.distance, 0.f));
+    const int before = manifold.getNumContacts();
+    result.addContactPoint(toBullet(contact.normal), toBullet(contact.position), fromAfar ? 0 : contact.distance);
+    if (!fromAfar || manifold.getNumContacts() == before) return;
+    btManifoldPoint& point = manifold.getContactPoint(before);
+    point.m_distance1 = contact.distance;
+    point.m_positionWorldOnA = point.m_positionWorldOnB + contact.distance * point.m_normalWorldOnB;
+    point.m_localPointA = manifold.getBody0()->getWorldTransform().invXform(point.m_positionWorldOnA);
 }
 
 void Manifolds::inherit(btManifoldPoint& point, float sameWithin) {

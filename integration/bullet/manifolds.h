@@ -46,7 +46,7 @@ class Manifolds {
     std::span<btPersistentManifold* const> all() const { return manifolds_; }
 
   private:
-    void emit(const Contact& contact, bool aIsFirst, btManifoldResult& result);
+    void emit(const Contact& contact, bool aIsFirst, float sameWithin, btManifoldResult& result);
     void inherit(btManifoldPoint& point, float sameWithin);
 
     btDispatcher& dispatcher_;

@@ -23,11 +23,26 @@ constexpr float shortestGradient = 0.5f;
 constexpr float leastOpposition = 0.3f;
 // Steps towards the deepest place of a round surface; each divides the error by the ratio of the radii of curvature.
 constexpr int mostRefinements = 6;
+// A way has met a convex body where it is this near to it [margins], or after so many steps of what is clear.
+constexpr float sweepTolerance = 0.1f;
+constexpr int mostSteps = 64;
 
-/// A field in metres of the world and the axes of its body.
+/// A field in metres of the world and the axes of its body, and how another body moves towards it.
 class Local {
   public:
-    explicit Local(const Placed& field) : field_(field.collider.field()), scale_(field.scale), pose_(field.pose) {}
+    Local(const Placed& field, const Pose& other, const Motion& motion)
+        : field_(field.collider.field()),
+          scale_(field.scale),
+          pose_(field.pose),
+          ways_(other, motion, field.pose, field.motion) {
+        const Bounds& bounds = field.collider.bounds();
+        longestWay_ = ways_.longest(scale_ * bounds.centre(), 0.5f * scale_ * glm::length(bounds.size()));
+    }
+
+    /// Of the other body's points as the field sees them.
+    const RelativeWays& ways() const { return ways_; }
+    /// The longest way of any that is in the field's box; those that come from afar may go farther by their turn.
+    float longestWay() const { return longestWay_; }
 
     struct Answer {
         enum { near, outside, inside, unclear } where = unclear;
@@ -50,25 +65,50 @@ class Local {
         ++report.pointsTested;
         const Answer answer = at(point);
         if (answer.where == Answer::inside) ++report.beyondBand;
-        if (answer.where != Answer::near || answer.distance - radius > margin) return std::nullopt;
-        return contact(point - answer.distance * answer.normal, answer.normal, answer.distance - radius, feature);
+        if (answer.distance - radius > margin) return probeOnWay(point, radius, feature, margin, answer.distance);
+        if (answer.where != Answer::near) return std::nullopt;
+        return contact(point - answer.distance * answer.normal, answer.normal, answer.distance - radius, feature,
+                       approach(point, answer.normal, margin));
     }
 
-    Contact contact(const glm::vec3& position, const glm::vec3& normal, float distance, std::uint32_t feature) const {
-        return {pose_.toWorld(position), pose_.rotation * normal, distance, feature};
+    /// Contact::approach of the other body's point.
+    float approach(const glm::vec3& point, const glm::vec3& normal, float margin) const {
+        return longestWay_ > margin ? std::max(-glm::dot(ways_.of(point), normal), 0.f) : 0;
+    }
+
+    Contact contact(const glm::vec3& position, const glm::vec3& normal, float distance, std::uint32_t feature,
+                    float approach = 0) const {
+        return {pose_.toWorld(position), pose_.rotation * normal, distance, feature, approach};
     }
 
   private:
+    /// The same for a point that is farther away: where its way meets the surface.
+    std::optional<Contact> probeOnWay(const glm::vec3& point, float radius, std::uint32_t feature, float margin,
+                                      float distance) const {
+        if (longestWay_ <= margin) return std::nullopt;
+        const glm::vec3 way = ways_.of(point);
+        const float length = glm::length(way);
+        if (distance - radius > length) return std::nullopt;
+        const Ray ray{point / scale_, way, length / scale_};
+        const auto hit = radius > 0 ? field_.sphereCast(ray, radius / scale_) : field_.raycast(ray);
+        if (!hit) return std::nullopt;
+        const float gap = glm::dot(point - scale_ * hit->position, hit->normal);
+        return contact(point - gap * hit->normal, hit->normal, std::max(gap - radius, 0.f), feature,
+                       -glm::dot(way, hit->normal));
+    }
+
     const Field& field_;
     float scale_;
     Pose pose_;
+    RelativeWays ways_;
+    float longestWay_;
 };
 
 /// A convex body in the coordinates of a Local field.
 class Touching {
   public:
-    Touching(const Convex& convex, const Pose& pose, const Placed& field, float margin)
-        : convex_(convex), local_(field), margin_(margin), scale_(field.scale) {
+    Touching(const Convex& convex, const Pose& pose, const Motion& motion, const Placed& field, float margin)
+        : convex_(convex), local_(field, pose, motion), margin_(margin), scale_(field.scale) {
         const Pose inField = relative(field.pose, pose);
         toField_ = glm::mat3(inField.rotation);
         toConvex_ = glm::transpose(toField_);
@@ -76,7 +116,7 @@ class Touching {
     }
 
     bool reject(const glm::vec3& centre, float radius) const {
-        const float reach = scale_ * radius + margin_;
+        const float reach = scale_ * radius + margin_ + local_.longestWay();
         return convex_.nearest(intoConvex(scale_ * centre), reach).distance > reach;
     }
 
@@ -85,21 +125,23 @@ class Touching {
                std::vector<Contact>& contacts) const {
         ++report.pointsTested;
         const glm::vec3 position = scale_ * point.position;
+        const std::uint32_t feature = index | featureOfB;
         const Convex::Near near = convex_.nearest(intoConvex(position), margin_);
-        if (near.distance > margin_) return;
+        if (near.distance > margin_) return visitOnWay(position, point.normal, feature, near.distance, contacts);
         const glm::vec3 normal = -(toField_ * near.normal);
         if (glm::dot(normal, point.normal) < leastOpposition) return;
-        const std::uint32_t feature = index | featureOfB;
         if (convex_.isCurved())
             if (const auto better = refine(near, feature)) {
                 contacts.push_back(*better);
                 return;
             }
-        contacts.push_back(local_.contact(position, normal, near.distance, feature));
+        contacts.push_back(
+            local_.contact(position, normal, near.distance, feature, local_.approach(position, normal, margin_)));
     }
 
     void visitProbes(const Bounds& bounds, float spacing, ContactReport& report, std::vector<Contact>& contacts) const {
-        const float within = 0.5f * glm::length(scale_ * bounds.size()) + convex_.radius() + margin_;
+        const float within =
+            0.5f * glm::length(scale_ * bounds.size()) + convex_.radius() + margin_ + local_.longestWay();
         const auto ask = [&](const glm::vec3& point, std::uint32_t number) {
             if (const auto contact = local_.probe(intoField(point), convex_.radius(), number, margin_, report))
                 contacts.push_back(*contact);
@@ -110,6 +152,28 @@ class Touching {
   private:
     glm::vec3 intoConvex(const glm::vec3& point) const { return toConvex_ * (point - origin_); }
     glm::vec3 intoField(const glm::vec3& point) const { return toField_ * point + origin_; }
+
+    /// The same for a point that is farther away: where its way meets the convex body.
+    void visitOnWay(const glm::vec3& position, const glm::vec3& pointNormal, std::uint32_t feature, float distance,
+                    std::vector<Contact>& contacts) const {
+        if (local_.longestWay() <= margin_) return;
+        const glm::vec3 start = intoConvex(position), way = -(toConvex_ * local_.ways().of(position));
+        const float length = glm::length(way), touch = sweepTolerance * margin_;
+        float gone = 0;
+        for (int i = 0; i < mostSteps; ++i) {
+            gone += distance;
+            if (gone > length) return;
+            const Convex::Near near = convex_.nearest(start + gone / length * way, length);
+            distance = near.distance;
+            if (distance > touch) continue;
+            const glm::vec3 normal = -(toField_ * near.normal);
+            if (glm::dot(normal, pointNormal) < leastOpposition) return;
+            const float gap = -glm::dot(near.normal, gone / length * way);
+            if (gap > 0)
+                contacts.push_back(local_.contact(position, normal, gap, feature, -glm::dot(near.normal, way)));
+            return;
+        }
+    }
 
     /// Follows the field's normal from the place of a round surface under a surface point to the deepest place nearby.
     std::optional<Contact> refine(const Convex::Near& near, std::uint32_t feature) const {
@@ -124,7 +188,8 @@ class Touching {
             here = there;
         }
         if (here.distance > margin_) return std::nullopt;
-        return local_.contact(place - here.distance * here.normal, here.normal, here.distance, feature);
+        return local_.contact(place - here.distance * here.normal, here.normal, here.distance, feature,
+                              local_.approach(place, here.normal, margin_));
     }
 
     const Convex& convex_;
@@ -137,20 +202,23 @@ class Touching {
 /// Triangles as Bullet hands them over, one by one.
 class TriangleProbes : public btTriangleCallback {
   public:
-    TriangleProbes(const btTransform& transform, const Placed& field, float margin, ContactReport& report,
-                   std::vector<Contact>& contacts)
+    TriangleProbes(const btTransform& transform, const Motion& motion, const Placed& field, float margin,
+                   ContactReport& report, std::vector<Contact>& contacts)
         : inField_(relative(field.pose, toPose(transform))),
           field_(field),
-          local_(field),
+          local_(field, toPose(transform), motion),
           margin_(margin),
-          reach_(std::max(margin, field.scale * field.collider.field().interiorWidth())),
+          reach_(std::max(margin, field.scale * field.collider.field().interiorWidth()) + local_.longestWay()),
           spacing_(probeSpacing * field.scale * field.collider.field().voxelSize()),
           report_(report),
           contacts_(contacts) {
         const Bounds& bounds = field.collider.bounds();
         centre_ = field.scale * bounds.centre();
-        within_ = 0.5f * field.scale * glm::length(bounds.size()) + margin;
+        within_ = 0.5f * field.scale * glm::length(bounds.size()) + margin + local_.longestWay();
     }
+
+    /// Triangles farther than this from the field's box are of no interest [m].
+    float room() const { return margin_ + local_.longestWay(); }
 
     void processTriangle(btVector3* triangle, int, int) override {
         const glm::vec3 corners[3] = {inField_.toWorld(toGlm(triangle[0])), inField_.toWorld(toGlm(triangle[1])),
@@ -161,7 +229,7 @@ class TriangleProbes : public btTriangleCallback {
             around = std::max(around, glm::distance(corners[i], middle));
             longest = std::max(longest, glm::distance(corners[i], corners[(i + 1) % 3]));
         }
-        if (local_.at(middle).distance > around + margin_ + spacing_) return;
+        if (local_.at(middle).distance > around + room() + spacing_) return;
         for (int i = 0; i < 3; ++i) {
             probe(corners[i], 0);
             visitAlong(corners[i], corners[(i + 1) % 3], centre_, within_, spacing_,
@@ -206,29 +274,34 @@ ContactReport collideFields(const Placed& a, const Placed& b, float margin, std:
     return collide(a, b, {.margin = margin, .leastOpposition = leastOpposition}, contacts);
 }
 
-ContactReport collidePlane(const glm::vec3& normal, float offset, const Placed& field, float margin,
-                           std::vector<Contact>& contacts) {
+ContactReport collidePlane(const glm::vec3& normal, float offset, const Motion& motion, const Placed& field,
+                           float margin, std::vector<Contact>& contacts) {
     ContactReport report;
     // The plane in the collider's own coordinates.
     const glm::vec3 up = glm::conjugate(field.pose.rotation) * normal;
     const float height = (offset - glm::dot(normal, field.pose.position)) / field.scale;
     const float reach = margin / field.scale;
+    const Local local(field, {}, motion);
     const auto above = [&](const glm::vec3& point) { return glm::dot(up, point) - height; };
-    const auto reject = [&](const glm::vec3& centre, float radius) { return above(centre) - radius > reach; };
+    const auto reject = [&](const glm::vec3& centre, float radius) {
+        return above(centre) - radius > reach + local.longestWay() / field.scale;
+    };
     field.collider.points().visit(reject, [&](std::uint32_t index, const SurfacePoint& point) {
         ++report.pointsTested;
         const float distance = above(point.position);
-        if (distance > reach) return;
+        // the plane's own points come up to this one
+        const float approach = local.approach(field.scale * point.position, -up, margin) / field.scale;
+        if (distance > std::max(reach, approach)) return;
         const glm::vec3 position = field.pose.toWorld(field.scale * point.position);
-        contacts.push_back({position, -normal, field.scale * distance, index | featureOfB});
+        contacts.push_back({position, -normal, field.scale * distance, index | featureOfB, field.scale * approach});
     });
     return report;
 }
 
-ContactReport collideConvex(const Convex& convex, const Pose& pose, const Placed& field, float margin,
-                            std::vector<Contact>& contacts) {
+ContactReport collideConvex(const Convex& convex, const Pose& pose, const Motion& motion, const Placed& field,
+                            float margin, std::vector<Contact>& contacts) {
     ContactReport report;
-    const Touching touching(convex, pose, field, margin);
+    const Touching touching(convex, pose, motion, field, margin);
     field.collider.points().visit(
         [&](const glm::vec3& centre, float radius) { return touching.reject(centre, radius); },
         [&](std::uint32_t index, const SurfacePoint& point) { touching.visit(index, point, report, contacts); });
@@ -237,15 +310,15 @@ ContactReport collideConvex(const Convex& convex, const Pose& pose, const Placed
     return report;
 }
 
-ContactReport collideTriangles(const btConcaveShape& mesh, const btTransform& transform, const Placed& field,
-                               float margin, std::vector<Contact>& contacts) {
+ContactReport collideTriangles(const btConcaveShape& mesh, const btTransform& transform, const Motion& motion,
+                               const Placed& field, float margin, std::vector<Contact>& contacts) {
     ContactReport report;
-    TriangleProbes probes(transform, field, margin, report, contacts);
+    TriangleProbes probes(transform, motion, field, margin, report, contacts);
     const Pose inMesh = relative(toPose(transform), field.pose);
     const Bounds& bounds = field.collider.bounds();
     btVector3 lower, upper;
     const btTransform place(toBullet(inMesh.rotation), toBullet(inMesh.toWorld(field.scale * bounds.centre())));
-    btTransformAabb(toBullet(0.5f * field.scale * bounds.size()), margin, place, lower, upper);
+    btTransformAabb(toBullet(0.5f * field.scale * bounds.size()), probes.room(), place, lower, upper);
     mesh.processAllTriangles(&probes, lower, upper);
     return report;
 }

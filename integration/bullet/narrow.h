@@ -1,4 +1,6 @@
-// Contacts between a field and the shapes that Bullet brings along. Body A is the other shape, body B the field.
+// Contacts between a field and the shapes that Bullet brings along. Body A is the other shape, body B the field. Beyond
+// the margin there are contacts, too, where a point's motion meets the other body. Motions are about the poses'
+// positions; a plane's is about the world's origin.
 #pragma once
 
 #include <BulletCollision/CollisionShapes/btConcaveShape.h>
@@ -16,15 +18,15 @@ ContactReport collideFields(const Placed& a, const Placed& b, float margin, std:
 
 /// Against everything below a plane.
 /// @param normal, offset  in the world: dot(normal, x) <= offset is solid; `normal` of unit length
-ContactReport collidePlane(const glm::vec3& normal, float offset, const Placed& field, float margin,
-                           std::vector<Contact>& contacts);
+ContactReport collidePlane(const glm::vec3& normal, float offset, const Motion& motion, const Placed& field,
+                           float margin, std::vector<Contact>& contacts);
 
 /// Against a convex body: the field's surface points against its formula, then its own points in the field.
-ContactReport collideConvex(const Convex& convex, const Pose& pose, const Placed& field, float margin,
-                            std::vector<Contact>& contacts);
+ContactReport collideConvex(const Convex& convex, const Pose& pose, const Motion& motion, const Placed& field,
+                            float margin, std::vector<Contact>& contacts);
 
 /// Against the triangles of a mesh or a height field, from both sides: a triangle is a sheet.
-ContactReport collideTriangles(const btConcaveShape& mesh, const btTransform& transform, const Placed& field,
-                               float margin, std::vector<Contact>& contacts);
+ContactReport collideTriangles(const btConcaveShape& mesh, const btTransform& transform, const Motion& motion,
+                               const Placed& field, float margin, std::vector<Contact>& contacts);
 
 }  // namespace bilayer::bullet

@@ -94,7 +94,10 @@ class Shape::Triangles {
 };
 
 Shape::Shape(std::shared_ptr<const Collider> collider, const ShapeOptions& options)
-    : collider_(std::move(collider)), frame_(options.frame), triangles_(std::make_unique<Triangles>()) {
+    : collider_(std::move(collider)),
+      frame_(options.frame),
+      sweeps_(options.sweeps),
+      triangles_(std::make_unique<Triangles>()) {
     if (!collider_) throw std::invalid_argument("Shape: no collider");
     if (!std::isfinite(options.margin)) throw std::invalid_argument("Shape: the margin is not finite");
     // Not the type for custom concave shapes: Bullet takes every shape of that type for its own btSdfCollisionShape.

@@ -21,6 +21,10 @@ struct ShapeOptions {
     /// scaling]. It keeps resting contacts alive; bodies still rest surface on surface. Negative: one voxel of the
     /// field.
     float margin = -1;
+    /// Whether bodies that move farther than the margin in a step are followed on their way, so that nothing thin is
+    /// passed through, however fast. Contacts are then made of what a step would meet; the solver lets bodies come that
+    /// far and no farther.
+    bool sweeps = true;
 };
 
 /// The frame in which the body's origin is the mesh's centre of mass and its axes are the principal ones.
@@ -37,6 +41,7 @@ class Shape : public btConcaveShape {
     const Pose& frame() const { return frame_; }
     /// The collider in the world, for a body's transform.
     Placed placed(const btTransform& bodyTransform) const;
+    bool sweeps() const { return sweeps_; }
     /// The voxels' edge after scaling [m].
     float voxelSize() const { return scale() * collider_->field().voxelSize(); }
 
@@ -64,6 +69,7 @@ class Shape : public btConcaveShape {
     class Triangles;
     std::shared_ptr<const Collider> collider_;
     Pose frame_;
+    bool sweeps_;
     btVector3 scaling_{1, 1, 1};
     std::unique_ptr<Triangles> triangles_;
 };
