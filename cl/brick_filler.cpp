@@ -8,6 +8,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
+#include <cstring>
 #include <optional>
 #include <span>
 #include <string>
@@ -76,38 +78,48 @@ struct Load {
     bool covers(const Load& other) const { return bricks >= other.bricks && places >= other.places; }
 };
 
-struct Buffers {
-    Load capacity;
-    cl::Buffer parts, unsorted, sorted, cells, columns, begins, ofBricks;
-    cl::Buffer origins, distances, triangles, open;
+// Where what comes of a batch begins in its buffer of results [bytes]. A part begins where any device lets it.
+struct ResultPlaces {
+    std::uint64_t counts = 0, origins, open, distances, triangles, end;
 
-    void freeAll(DeviceMemory& memory) {
-        for (cl::Buffer* buffer : {&parts, &unsorted, &sorted, &cells, &columns, &begins, &ofBricks, &origins,
-                                   &distances, &triangles, &open})
-            memory.free(*buffer);
+    ResultPlaces(std::uint64_t blocks, bool withTriangles) {
+        constexpr std::uint64_t alignment = 4096;
+        const auto after = [](std::uint64_t begin, std::uint64_t bytes) {
+            return begin + (bytes + alignment - 1) / alignment * alignment;
+        };
+        origins = after(counts, counters * sizeof(cl_uint));
+        open = after(origins, blocks * sizeof(glm::ivec3));
+        distances = after(open, blocks * sizeof(glm::ivec3));
+        triangles = after(distances, blocks * blockVoxels * sizeof(float));
+        end = withTriangles ? after(triangles, blocks * blockVoxels * sizeof(cl_int)) : triangles;
     }
 };
 
-// Each has a queue of its own: where the kernels of one come to their end, those of the other take over.
-struct Batch {
-    Load load;  // under way
-    Buffers buffers;
-    cl::Buffer scratch, next, counts;
-    std::array<cl_uint, counters> found{};
-    cl::Event counted;
-    cl::CommandQueue queue;
-    Ended ended{queue};
+struct Buffers {
+    Load capacity;
+    cl::Buffer parts, unsorted, sorted, cells, columns, begins, ofBricks, results;
+    cl::Buffer counts, origins, open, distances, triangles;  // parts of the results
+
+    void freeAll(DeviceMemory& memory) {
+        for (cl::Buffer* part : {&counts, &origins, &open, &distances, &triangles}) *part = {};
+        for (cl::Buffer* buffer : {&parts, &unsorted, &sorted, &cells, &columns, &begins, &ofBricks, &results})
+            memory.free(*buffer);
+    }
 };
 
 // What a buffer holds, as the host sees it from when the queue's commands have ended until this goes.
 template <class Item>
 class Mapped {
   public:
-    Mapped(const cl::CommandQueue& queue, const cl::Buffer& buffer, std::size_t count, Timing& timing)
+    /// @param mapped  if not null, receives the event of the mapping
+    Mapped(const cl::CommandQueue& queue, const cl::Buffer& buffer, std::size_t count, Timing& timing,
+           cl::Event* mapped = nullptr)
         : queue_(queue), buffer_(buffer) {
-        if (count > 0)
-            data_ = queue.enqueueMapBuffer(buffer, CL_FALSE, CL_MAP_READ, 0, count * sizeof(Item), nullptr,
-                                           timing.event(Timing::Of::download));
+        if (count == 0) return;
+        cl::Event event;
+        data_ = queue.enqueueMapBuffer(buffer, CL_FALSE, CL_MAP_READ, 0, count * sizeof(Item), nullptr, &event);
+        timing.keep(Timing::Of::download, event);
+        if (mapped) *mapped = event;
     }
     Mapped(const Mapped&) = delete;
     Mapped& operator=(const Mapped&) = delete;
@@ -120,6 +132,27 @@ class Mapped {
     const cl::CommandQueue& queue_;
     const cl::Buffer& buffer_;
     void* data_ = nullptr;
+};
+
+// Each has a queue of its own: where the kernels of one come to their end, those of the other take over.
+struct Batch {
+    Load load;  // under way
+    Buffers buffers;
+    cl::Buffer scratch, next;
+    std::array<cl_uint, counters> found{};
+    cl::Event counted;
+    cl::CommandQueue queue;
+    Ended ended{queue};
+    // Of a device that shares the host's memory: a command right behind the kernels. PoCL's threads do one such command
+    // before they turn to the next kernel, and others after it.
+    std::optional<Mapped<std::byte>> results;
+};
+
+// What came of a batch, as the host sees it.
+struct Results {
+    const glm::ivec3* origins;
+    const float* distances;
+    const std::int32_t* triangles;
 };
 
 class BrickFill {
@@ -142,6 +175,7 @@ class BrickFill {
     void finish(Batch& batch);
     void keep(Batch& batch, std::size_t blocks);
     void handOver(Batch& batch, std::size_t blocks);
+    void handOver(const Results& results, std::size_t blocks);
     void fillOpen();
 
     template <class... Arguments>
@@ -226,7 +260,6 @@ BrickFill::BrickFill(Device::Impl& device, const OpenclOptions& options, const F
     for (Batch& batch : batches_) {
         batch.queue = cl::CommandQueue(device.context, device.device, CL_QUEUE_PROFILING_ENABLE);
         batch.next = memory_.allocate(sizeof(cl_uint), "a batch of bricks");
-        batch.counts = memory_.allocate(counters * sizeof(cl_uint), "a batch of bricks");
     }
     if (layered_) {
         kept_ = {0, 32, 0, 0, 28, 0, sampleCells(bins_->grid()) * sizeof(cl_uint)};
@@ -250,8 +283,8 @@ void BrickFill::makeScratch() {
 }
 
 std::uint64_t BrickFill::bytesOf(const Load& load) const {
-    const std::uint64_t perBlock = 2 * sizeof(glm::ivec3) + blockVoxels * sizeof(float) * (job_.mesh.triangles ? 2 : 1);
-    return load.places * kept_.perPart() + load.bricks * kept_.brick + blocksOf(load) * perBlock;
+    return load.places * kept_.perPart() + load.bricks * kept_.brick +
+           ResultPlaces(blocksOf(load), job_.mesh.triangles).end;
 }
 
 std::uint64_t BrickFill::blocksOf(const Load& load) const {
@@ -275,8 +308,8 @@ std::size_t BrickFill::groupsFor(const Load& load) const {
 
 // Whether a batch may be as large as this: its share of the memory, and the largest buffer.
 bool BrickFill::fits(const Load& load) const {
-    const std::uint64_t largest =
-        std::max(blocksOf(load) * blockVoxels * sizeof(float), load.places * std::max(kept_.part, kept_.columns));
+    const std::uint64_t largest = std::max(ResultPlaces(blocksOf(load), job_.mesh.triangles).end,
+                                           load.places * std::max(kept_.part, kept_.columns));
     return std::max(load.parts, load.places) < partsInBatch && bytesOf(load) <= share_ &&
            largest <= device_.info.maxAllocationBytes;
 }
@@ -319,10 +352,17 @@ void BrickFill::reserve(Batch& batch, const Load& load) {
                                       {&b.begins, kept_.begin}})
         if (bytes > 0) *part = buffer(c.places * bytes);
     b.ofBricks = buffer(c.bricks * kept_.brick);
-    b.origins = buffer(blocksOf(c) * sizeof(glm::ivec3));
-    b.open = buffer(blocksOf(c) * sizeof(glm::ivec3));
-    b.distances = buffer(blocksOf(c) * blockVoxels * sizeof(float));
-    if (job_.mesh.triangles) b.triangles = buffer(blocksOf(c) * blockVoxels * sizeof(cl_int));
+    const ResultPlaces places(blocksOf(c), job_.mesh.triangles);
+    b.results = buffer(places.end);
+    const auto part = [&](std::uint64_t begin, std::uint64_t end) {
+        const cl_buffer_region region{std::size_t(begin), std::size_t(end - begin)};
+        return b.results.createSubBuffer(CL_MEM_READ_WRITE, CL_BUFFER_CREATE_TYPE_REGION, &region);
+    };
+    b.counts = part(places.counts, places.origins);
+    b.origins = part(places.origins, places.open);
+    b.open = part(places.open, places.distances);
+    b.distances = part(places.distances, places.triangles);
+    if (job_.mesh.triangles) b.triangles = part(places.triangles, places.end);
 }
 
 // Sends the kernels of a batch on their way, and the number of blocks that come of it.
@@ -334,7 +374,7 @@ void BrickFill::start(Batch& batch, std::size_t first, std::size_t last) {
     const cl_uint none = 0, stride = cl_uint(b.capacity.places), firstBrick = cl_uint(first),
                   bricks = cl_uint(load.bricks);
     batch.queue.enqueueFillBuffer(batch.next, none, 0, sizeof none);
-    batch.queue.enqueueFillBuffer(batch.counts, none, 0, counters * sizeof none);
+    batch.queue.enqueueFillBuffer(b.counts, none, 0, counters * sizeof none);
     const FillParameters& p = job_.layers;
     const KernelLayers layers{p.delta, p.reach, p.certain, p.cube};
     const DeviceBins& bins = *bins_;
@@ -346,22 +386,27 @@ void BrickFill::start(Batch& batch, std::size_t first, std::size_t last) {
     const cl::Buffer& triangles = job_.mesh.triangles ? b.triangles : b.origins;
     if (fillsBricks_) {
         prepare("fillBricks", groupsFor(load), b.unsorted, b.columns, b.ofBricks, stride, batch.next, layers,
-                cl_uint(load.room), orders_, b.origins, b.distances, triangles, batch.counts);
+                cl_uint(load.room), orders_, b.origins, b.distances, triangles, b.counts);
     } else if (layered_) {
         prepare("prepareBricks", bricks, b.unsorted, b.columns, b.ofBricks, stride, batch.next, layers);
         enqueue(batch.queue, "fillBlocks", blocksOf(load), bins.grid(), bins.cellOfBrick(), bins.partOffsets(),
                 firstBrick, b.columns, b.ofBricks, stride, layers, orders_, b.origins, b.distances, triangles,
-                batch.counts);
+                b.counts);
     } else {
         prepare("prepareBricks", scratchGroups_, b.parts, b.unsorted, b.sorted, b.cells, b.columns, b.begins, stride,
                 batch.scratch, scratchCells_, b.ofBricks, batch.next);
         enqueue(batch.queue, "fillBlocks", blocksOf(load), bins.points(), bins.triangles(), bins.grid(),
                 bins.cellOfBrick(), firstBrick, b.parts, b.sorted, b.columns, b.begins, stride, b.ofBricks,
-                cl_int(job_.mesh.sign), b.origins, b.distances, triangles, b.open, batch.counts);
+                cl_int(job_.mesh.sign), b.origins, b.distances, triangles, b.open, b.counts);
     }
-    batch.queue.enqueueReadBuffer(batch.counts, CL_FALSE, 0, sizeof batch.found, batch.found.data(), nullptr,
-                                  &batch.counted);
-    timing_.keep(Timing::Of::download, batch.counted);
+    if (device_.info.unifiedMemory && !keep_) {
+        const ResultPlaces places(blocksOf(b.capacity), job_.mesh.triangles);
+        batch.results.emplace(batch.queue, b.results, places.end, timing_, &batch.counted);
+    } else {
+        batch.queue.enqueueReadBuffer(b.counts, CL_FALSE, 0, sizeof batch.found, batch.found.data(), nullptr,
+                                      &batch.counted);
+        timing_.keep(Timing::Of::download, batch.counted);
+    }
     batch.queue.flush();
 }
 
@@ -369,6 +414,7 @@ void BrickFill::start(Batch& batch, std::size_t first, std::size_t last) {
 void BrickFill::finish(Batch& batch) {
     if (batch.load.bricks == 0) return;
     batch.counted.wait();
+    if (batch.results) std::memcpy(batch.found.data(), batch.results->data(), sizeof batch.found);
     const std::size_t blocks = batch.found[filledBlocks], open = batch.found[openBlocks];
     if (job_.mesh.conflicts) *job_.mesh.conflicts += batch.found[conflicts];
     if (open > 0) {
@@ -397,19 +443,33 @@ void BrickFill::keep(Batch& batch, std::size_t blocks) {
 // Hands blocks to the host.
 void BrickFill::handOver(Batch& batch, std::size_t blocks) {
     const Buffers& b = batch.buffers;
+    if (batch.results) {
+        const ResultPlaces places(blocksOf(b.capacity), job_.mesh.triangles);
+        const std::byte* all = batch.results->data();
+        handOver(Results{reinterpret_cast<const glm::ivec3*>(all + places.origins),
+                         reinterpret_cast<const float*>(all + places.distances),
+                         reinterpret_cast<const std::int32_t*>(all + places.triangles)},
+                 blocks);
+        batch.results.reset();
+        return;
+    }
     const Mapped<glm::ivec3> origins(batch.queue, b.origins, blocks, timing_);
     const Mapped<float> distances(batch.queue, b.distances, blocks * blockVoxels, timing_);
     const Mapped<std::int32_t> triangles(batch.queue, b.triangles, job_.mesh.triangles ? blocks * blockVoxels : 0,
                                          timing_);
     batch.queue.finish();
+    handOver(Results{origins.data(), distances.data(), triangles.data()}, blocks);
+}
+
+void BrickFill::handOver(const Results& results, std::size_t blocks) {
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, blocks, blocksPerTask), [&](const auto& range) {
         job_.mesh.progress.poll();
         for (std::size_t i = range.begin(); i < range.end(); ++i) {
-            if (origins.data()[i].x == noBlock) continue;
+            if (results.origins[i].x == noBlock) continue;
             const auto values = [&](const auto* all) { return std::span(all + i * blockVoxels, blockVoxels); };
-            job_.mesh.sink({{origins.data() + i, 1},
-                            values(distances.data()),
-                            job_.mesh.triangles ? values(triangles.data()) : std::span<const std::int32_t>()});
+            job_.mesh.sink({{results.origins + i, 1},
+                            values(results.distances),
+                            job_.mesh.triangles ? values(results.triangles) : std::span<const std::int32_t>()});
         }
     });
 }
