@@ -80,6 +80,7 @@ Outcome rings(const RingsOptions& options) {
     Stage stage(
         fmt::format("{} rings on {} poles", poles * options.ringsPerPole, poles),
         {.stepsPerSecond = options.stepsPerSecond, .stepsPerFrame = 8, .framesPerMeasuring = framesPerMeasuring});
+    stage.world().bullet().getSolverInfo().m_numIterations = options.iterations;
     const auto ground = makeThing(shapes::box({halfSide, halfSide, halfFloor}), {coarse * options.voxelSize});
     const auto pole = makeThing(shapes::cylinder(poleRadius, top, 48), {options.voxelSize});
     const auto ring = makeThing(shapes::torus(major, minor, 48, 20), {options.voxelSize});

@@ -13,6 +13,7 @@ struct RingsOptions {
     int ringsPerPole = 40;
     float seconds = 20;  ///< at most; it ends when all rings sleep
     float stepsPerSecond = 240;
+    int iterations = 10;       ///< of Bullet's solver
     float voxelSize = 0.006f;  ///< of the rings [m]
     std::uint32_t seed = 7;    ///< of the rings' first poses
 };

@@ -8,9 +8,9 @@ namespace bilayer::demo {
 
 struct SpinOptions {
     float seconds = 60;
-    float spin = 6;           ///< about the middle axis [rad/s]
-    float nudge = 0.05f;      ///< about the other two [rad/s]
-    float voxelSize = 0.01f;  ///< [m]
+    float spin = 6;            ///< about the middle axis [rad/s]
+    float nudge = 0.05f;       ///< about the other two [rad/s]
+    float voxelSize = 0.002f;  ///< [m]
 };
 
 /// Criteria: angular momentum drifts less than 1 % a minute, as a vector; the handle turns over; mass and inertia by

@@ -6,7 +6,10 @@
 #include <cmath>
 #include <fstream>
 #include <limits>
+#include <numeric>
 #include <stdexcept>
+
+#include "sdf/vdb_io.h"
 
 namespace bilayer::demo {
 namespace {
@@ -84,7 +87,8 @@ void print(const Outcome& outcome) {
     fmt::print("{}\n", outcome.title);
     for (const auto& [label, value] : outcome.facts) row(label, value);
     row("bodies that move", std::to_string(outcome.bodies));
-    row("simulated", fmt::format("{:.2f} s in {:.0f} steps", steps / outcome.stepsPerSecond, steps));
+    row("simulated", fmt::format("{:.2f} s in {:.0f} steps, in {:.1f} s", steps / outcome.stepsPerSecond, steps,
+                                 1e-3 * std::accumulate(outcome.stepMs.begin(), outcome.stepMs.end(), 0.0)));
     row("a step", fmt::format("{:.2f} ms, 99 in 100 below {:.2f} ms", outcome.medianStep(), outcome.slowStep()));
     row("contacts a step", fmt::format("{:.0f} found, {:.0f} kept", double(outcome.contactsFound) / steps,
                                        double(outcome.contactsKept) / steps));
@@ -101,10 +105,11 @@ void print(const Outcome& outcome) {
                                         withUnit(criterion.limit, criterion.unit), criterion.met() ? "met" : "MISSED"));
 }
 
-void write(Outcome& outcome, const std::string& name, const std::filesystem::path& folder) {
+void write(const Outcome& outcome, const std::string& name, const std::filesystem::path& folder) {
     std::filesystem::create_directories(folder);
     outcome.recording.write(folder / (name + ".html"));
     writeEnergies(outcome, folder / (name + ".csv"));
+    for (const auto& [field, levelSet] : outcome.fields) writeVdb(folder / (field + ".vdb"), levelSet);
 }
 
 }  // namespace bilayer::demo

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "demos/shared/recording.h"
+#include "sdf/level_set.h"
 
 namespace bilayer::demo {
 
@@ -37,6 +38,8 @@ struct Outcome {
     std::vector<Criterion> criteria{};
     std::vector<std::pair<std::string, std::string>> facts{};  ///< what only this scene tells: label, value
 
+    std::vector<std::pair<std::string, LevelSet>> fields{};  ///< worth a file of their own: name, field
+
     int bodies = 0;  ///< that move
     float stepsPerSecond = 0;
     std::vector<double> stepMs{};                              ///< how long each step took [ms]
@@ -63,7 +66,8 @@ double percentile(std::vector<double> values, double share);
 /// Prints title, figures and criteria to the standard output.
 void print(const Outcome& outcome);
 
-/// Writes NAME.html, the recording, and NAME.csv, the energies over time, into a folder, which is made.
-void write(Outcome& outcome, const std::string& name, const std::filesystem::path& folder);
+/// Writes NAME.html, the recording, NAME.csv, the energies over time, and the fields as .vdb files into a folder, which
+/// is made.
+void write(const Outcome& outcome, const std::string& name, const std::filesystem::path& folder);
 
 }  // namespace bilayer::demo
