@@ -1,6 +1,7 @@
 // Each scene, small. What a criterion asks that the library cannot do yet is known by name here, with what it gave when
 // it was written down; a criterion of these that is met after all fails the test, so that it leaves the list.
 #include <catch2/catch.hpp>
+#include <functional>
 #include <set>
 #include <string>
 
@@ -44,7 +45,9 @@ TEST_CASE("blocks stick and slide on an incline as friction says") {
     options.slopes = {25};
     options.frictions = {0.5f, 0.975f, 1.025f};
     options.seconds = 0.75f;
-    judge([&] { return demo::incline(options); });
+    // one of two stuck, the other 76 % too slow: points beside the block push against its lower edges, at slanting
+    // normals
+    judge([&] { return demo::incline(options); }, {"blocks that should slide and stick", "acceleration off theory"});
 }
 
 TEST_CASE("rings stay on their pole and come to rest") {
@@ -70,17 +73,20 @@ TEST_CASE("knots in a bowl come to rest") {
     options.resolution = 32;
     options.seconds = 6;
     options.hold = 2;
-    judge([&] { return demo::bowl(options); });
+    // 0.60 voxels
+    judge([&] { return demo::bowl(options); }, {"99 in 100 penetrations"});
 }
 
 TEST_CASE("balls stay in front of thin plates") {
     demo::PlatesOptions options;
     options.phases = 2;
-    judge([&] { return demo::plates(options); });
+    // 32 of 84, from 10 m/s on: no contact is made before bodies touch, and nothing is swept
+    judge([&] { return demo::plates(options); }, {"balls that passed their plate"});
 }
 
 TEST_CASE("a free body keeps its angular momentum and turns over") {
     demo::SpinOptions options;
     options.seconds = 20;
-    judge([&] { return demo::spin(options); });
+    // 12.8 %, most of it of the magnitude: Bullet's implicit gyroscopic torque is of first order in the step
+    judge([&] { return demo::spin(options); }, {"drift of angular momentum a minute"});
 }
