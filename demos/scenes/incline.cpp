@@ -96,7 +96,7 @@ Outcome incline(const InclineOptions& options) {
 
     const float middle = width * float(options.slopes.size()) / 2;
     Outcome outcome = stage.finish({.target = {0, middle, 1},
-                                    .distance = 1.6f * middle,
+                                    .distance = 2.6f * middle,
                                     .azimuth = -0.6f,
                                     .elevation = 0.5f,
                                     .groundHeight = -0.3f});

@@ -30,21 +30,22 @@ glm::vec2 placeOf(int pole, int rows) {
     return spacing * (glm::vec2(pole % rows, pole / rows) - 0.5f * float(rows - 1));
 }
 
-// Whether the axis of a pole passes through a ring, or did so above the pole's top.
+// Whether the axis of a pole passes through a ring, or would do so above the pole's top.
 enum class Place { on, over, off };
 
 Place placeOf(const Pose& ring, const glm::vec2& pole, float top) {
-    const glm::vec3 axis = ring.rotation * glm::vec3(0, 0, 1), aside = glm::vec3(pole, 0) - ring.position;
-    // where the pole's axis crosses the ring's plane
-    const float height = std::abs(axis.z) > 1e-6f ? -(aside.x * axis.x + aside.y * axis.y) / axis.z : 1e30f;
-    const float crossing = ring.position.z + height;
-    if (crossing > top) return Place::over;
-    const float within = glm::length(glm::vec3(pole, crossing) - ring.position);
-    return crossing > 0 && within < major ? Place::on : Place::off;
+    const glm::vec3 axis = ring.rotation * glm::vec3(0, 0, 1), aside = glm::vec3(pole, ring.position.z) - ring.position;
+    // where the pole's axis crosses the ring's plane; nowhere if it runs along
+    if (std::abs(axis.z) < 1e-3f) return ring.position.z + major > top ? Place::over : Place::off;
+    const float rise = -glm::dot(aside, axis) / axis.z;
+    const float crossing = ring.position.z + rise;
+    if (crossing > top && ring.position.z + major > top) return Place::over;
+    return crossing > 0 && crossing < top && glm::length(aside + glm::vec3(0, 0, rise)) < major ? Place::on
+                                                                                                : Place::off;
 }
 
 struct Threading {
-    int lost = 0, over = 0;  // rings off their poles below the top; rings that left over it
+    int lost = 0, over = 0;  // rings that came off below the top; rings that left over it
 };
 
 Threading threading(const std::vector<std::vector<Pose>>& frames, std::size_t firstRing, const RingsOptions& options,
@@ -54,8 +55,9 @@ Threading threading(const std::vector<std::vector<Pose>>& frames, std::size_t fi
         const glm::vec2 pole = placeOf(int(i - firstRing) / options.ringsPerPole, options.rows);
         Place place = Place::on;
         for (const auto& poses : frames) {
-            if (place == Place::on) place = placeOf(poses[i], pole, top);
-            if (place == Place::over && placeOf(poses[i], pole, top) == Place::on) place = Place::on;
+            const Place now = placeOf(poses[i], pole, top);
+            if (place == Place::on || now == Place::on) place = now;
+            if (place == Place::off) break;
         }
         result.lost += place == Place::off;
         result.over += place == Place::over;

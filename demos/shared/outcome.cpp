@@ -101,7 +101,7 @@ void print(const Outcome& outcome) {
     row("fingerprint", fmt::format("{:016x}", outcome.fingerprint));
     fmt::print("criteria\n");
     for (const Criterion& criterion : outcome.criteria)
-        row(criterion.name, fmt::format("{:<16}at most {:<14}{}", withUnit(criterion.value, criterion.unit),
+        row(criterion.name, fmt::format("{:<20} at most {:<12} {}", withUnit(criterion.value, criterion.unit),
                                         withUnit(criterion.limit, criterion.unit), criterion.met() ? "met" : "MISSED"));
 }
 

@@ -29,7 +29,6 @@ class Program {
     CLI::Option* flag(const std::string& flag, bool& value, const std::string& help) {
         return app_.add_flag(flag, value, help);
     }
-    const std::string& out() const { return out_; }  ///< folder for files
 
     /// Parses, plays the scene, prints its outcome and writes its files.
     /// @return the exit status: 0, whether criteria are met or not; 1 if the scene throws, 2 for wrong usage

@@ -57,15 +57,13 @@ Stage::Stage(std::string title, const StageOptions& options) : options_(options)
 
 btRigidBody& Stage::add(std::shared_ptr<const Thing> thing, const Matter& matter, const Pose& pose, const Look& look) {
     const double voxel = thing->field.voxelSize();
-    outcome_.voxelSize = things_.empty() ? voxel : std::min(outcome_.voxelSize, voxel);
+    outcome_.voxelSize = bodies_.empty() ? voxel : std::min(outcome_.voxelSize, voxel);
     outcome_.bodies += matter.mass > 0;
     // Bullet turns overlap above this, 4 cm by default, into speed
     world_.bullet().getSolverInfo().m_splitImpulsePenetrationThreshold = -float(outcome_.voxelSize);
 
     btRigidBody& body = world_.add(thing->shape, matter, pose);
-    things_.push_back(std::move(thing));
-    moves_.push_back(matter.mass > 0);
-    looks_.push_back(look);
+    bodies_.push_back({std::move(thing), look, matter.mass > 0});
     return body;
 }
 
@@ -108,15 +106,16 @@ std::vector<double> Stage::penetrationsIn(const std::vector<Pose>& poses) const 
     };
     std::vector<Ball> balls;
     for (std::size_t i = 0; i < poses.size(); ++i) {
-        const Bounds& box = things_[i]->shape->collider().bounds();
+        const Bounds& box = bodies_[i].thing->shape->collider().bounds();
         balls.push_back({poses[i].toWorld(box.centre()), 0.5f * glm::length(box.size())});
     }
     std::vector<double> depths;
     for (std::size_t i = 0; i < poses.size(); ++i)
         for (std::size_t j = 0; j < i; ++j) {
-            if (!moves_[i] && !moves_[j]) continue;
+            if (!bodies_[i].moves && !bodies_[j].moves) continue;
             if (glm::distance(balls[i].centre, balls[j].centre) > balls[i].radius + balls[j].radius) continue;
-            const double depth = penetration(things_[i]->specimen, poses[i], things_[j]->specimen, poses[j]);
+            const double depth =
+                penetration(bodies_[i].thing->specimen, poses[i], bodies_[j].thing->specimen, poses[j]);
             if (depth > 0) depths.push_back(depth);
         }
     return depths;
@@ -128,16 +127,15 @@ Recording Stage::record(const View& view) const {
     recording.note("bodies", std::to_string(outcome_.bodies));
     recording.note("time per step", fmt::format("{:.1f} ms", outcome_.medianStep()));
     std::map<const Thing*, int> meshes;
-    for (std::size_t i = 0; i < things_.size(); ++i) {
-        const Thing* thing = things_[i].get();
-        if (!meshes.contains(thing)) {
-            meshes[thing] = recording.addMesh(thing->mesh);
-            if (moves_[i]) {
+    for (const auto& [thing, look, moves] : bodies_) {
+        if (!meshes.contains(thing.get())) {
+            meshes[thing.get()] = recording.addMesh(thing->mesh);
+            if (moves) {
                 recording.note("triangles", grouped(thing->mesh.triangles.size()) + " each");
                 recording.note("voxels", grouped(thing->field.activeVoxels()) + " each");
             }
         }
-        recording.addBody(meshes[thing], looks_[i]);
+        recording.addBody(meshes[thing.get()], look);
     }
     for (std::size_t i = 0; i < frames_.size(); ++i)
         recording.frame(double(i) * options_.stepsPerFrame / options_.stepsPerSecond, frames_[i]);

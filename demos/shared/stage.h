@@ -61,6 +61,11 @@ class Stage {
     Outcome finish(const View& view);
 
   private:
+    struct Body {
+        std::shared_ptr<const Thing> thing;
+        Look look;
+        bool moves;
+    };
     void keepEnergy();
     std::vector<double> penetrationsIn(const std::vector<Pose>& poses) const;
     Recording record(const View& view) const;
@@ -68,9 +73,7 @@ class Stage {
     StageOptions options_;
     Outcome outcome_;
     World world_;
-    std::vector<std::shared_ptr<const Thing>> things_;  // of each body
-    std::vector<bool> moves_;                           // of each body
-    std::vector<Look> looks_;                           // of each body
+    std::vector<Body> bodies_;
     std::vector<std::vector<Pose>> frames_;
     long steps_ = 0;
 };

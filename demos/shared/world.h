@@ -51,8 +51,6 @@ class World {
 
     /// For constraints, rays and whatever else Bullet offers.
     btDiscreteDynamicsWorld& bullet() { return world_; }
-    /// A body by its place in the order.
-    btRigidBody& body(std::size_t index) { return *bodies_[index].body; }
     const bullet::DispatchStatistics& statistics() const { return dispatcher_.statistics(); }
 
   private:
