@@ -89,8 +89,7 @@ double creep(Stage& stage, const std::vector<btRigidBody*>& bodies, double secon
     for (btRigidBody* body : bodies) body->forceActivationState(DISABLE_DEACTIVATION);
     stage.run(stage.time() + seconds);
     double most = 0;
-    for (std::size_t i = 0; i < bodies.size(); ++i)
-        most = std::max(most, double(glm::distance(before[i], centreOf(*bodies[i]))));
+    for (std::size_t i = 0; i < bodies.size(); ++i) most = worse(most, glm::distance(before[i], centreOf(*bodies[i])));
     return most;
 }
 

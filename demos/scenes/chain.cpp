@@ -99,7 +99,7 @@ Outcome chain(const ChainOptions& options) {
     double longest = 0;
     for (const auto& poses : frames) {
         most = std::max(most, parted(frames.front(), poses));
-        longest = std::max(longest, lengthOf(poses) / lengthOf(frames.front()) - 1);
+        longest = worse(longest, lengthOf(poses) / lengthOf(frames.front()) - 1);
     }
     Outcome outcome = stage.finish({.target = {0, 0, height / 2},
                                     .distance = -1.2f * height + 1,

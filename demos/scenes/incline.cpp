@@ -1,6 +1,5 @@
 #include "demos/scenes/incline.h"
 
-#include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/trigonometric.hpp>
@@ -66,13 +65,13 @@ std::vector<Criterion> judge(const std::vector<Rider>& riders, double time, floa
     int stuck = 0;
     for (const Rider& rider : riders) {
         const double way = glm::distance(positionOf(rider.body), rider.start);
-        if (rider.friction > sticking) creep = std::max(creep, way / voxelSize);
+        if (rider.friction > sticking) creep = worse(creep, way / voxelSize);
         if (rider.friction < sliding) {
             const double expected = rider.acceleration();
             const double measured =
                 (rider.body.getLinearVelocity().length() - rider.speedWhenSettled) / (time - settled);
             stuck += way < 0.5 * (0.5 * expected * time * time);
-            worst = std::max(worst, std::abs(measured / expected - 1));
+            worst = worse(worst, std::abs(measured / expected - 1));
         }
     }
     return {{"blocks that should slide and stick", double(stuck), 0},

@@ -2,7 +2,6 @@
 
 #include <fmt/core.h>
 
-#include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
 
@@ -51,8 +50,7 @@ glm::dvec3 angularMomentum(const btRigidBody& body) {
 // The greatest difference of two solids' mass and moments of inertia, in parts of the second's.
 double difference(const MassProperties& a, const MassProperties& b) {
     double most = std::abs(a.volume / b.volume - 1);
-    for (int i = 0; i < 3; ++i)
-        most = std::max(most, std::abs(double(a.principalInertia[i]) / b.principalInertia[i] - 1));
+    for (int i = 0; i < 3; ++i) most = worse(most, std::abs(double(a.principalInertia[i]) / b.principalInertia[i] - 1));
     return most;
 }
 
@@ -75,7 +73,7 @@ Outcome spin(const SpinOptions& options) {
     int turns = 0;
     float side = 1;
     stage.run(options.seconds, [&] {
-        drift = std::max(drift, glm::distance(angularMomentum(body), start) / glm::length(start));
+        drift = worse(drift, glm::distance(angularMomentum(body), start) / glm::length(start));
         // it has turned over when the middle axis looks the other way
         const float cosine = body.getWorldTransform().getBasis().getColumn(1).dot(middle);
         if (side * cosine < -0.5f) {

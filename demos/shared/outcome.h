@@ -2,6 +2,7 @@
 // same for all scenes, so that programs, tests and benchmarks print and compare them alike.
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <filesystem>
 #include <string>
@@ -59,6 +60,11 @@ struct Outcome {
     bool met() const;                                           ///< all criteria
     const Criterion& criterion(const std::string& name) const;  ///< throws std::out_of_range
 };
+
+/// The greater of two values, or the one that is NaN: std::max would lose it.
+inline double worse(double a, double b) {
+    return a >= b || std::isnan(a) ? a : b;
+}
 
 /// The value below which a share of all values lies (nearest rank); 0 if there are none.
 double percentile(std::vector<double> values, double share);

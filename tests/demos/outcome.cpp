@@ -26,6 +26,14 @@ TEST_CASE("a criterion is met up to its limit, and never by a NaN") {
     CHECK_THROWS_AS(outcome.criterion("three"), std::out_of_range);
 }
 
+TEST_CASE("of two values the worse is the greater, and NaN the worst") {
+    const double nan = std::numeric_limits<double>::quiet_NaN();
+    CHECK(demo::worse(1, 2) == 2);
+    CHECK(demo::worse(2, 1) == 2);
+    CHECK(std::isnan(demo::worse(nan, 1)));
+    CHECK(std::isnan(demo::worse(1, nan)));
+}
+
 TEST_CASE("percentiles are of the nearest rank") {
     CHECK(demo::percentile({}, 0.5) == 0);
     CHECK(demo::percentile({3, 1, 2}, 0.5) == 2);
