@@ -19,6 +19,8 @@ btTransform toTransform(const Pose& pose) {
 
 World::World() {
     world_.setGravity({0, 0, -gravity});
+    // with Bullet's single direction of friction, a stack of rings at rest walks aside until it falls
+    world_.getSolverInfo().m_solverMode |= SOLVER_USE_2_FRICTION_DIRECTIONS;
 }
 
 World::~World() {

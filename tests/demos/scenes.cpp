@@ -45,7 +45,7 @@ TEST_CASE("blocks stick and slide on an incline as friction says") {
     options.slopes = {25};
     options.frictions = {0.5f, 0.975f, 1.025f};
     options.seconds = 0.75f;
-    // one of two stuck, the other 76 % too slow: points beside the block push against its lower edges, at slanting
+    // one of two stuck, the other is 93 % too slow: points beside the block push against its lower edges, at slanting
     // normals
     judge([&] { return demo::incline(options); }, {"blocks that should slide and stick", "acceleration off theory"});
 }
@@ -73,14 +73,13 @@ TEST_CASE("knots in a bowl come to rest") {
     options.resolution = 32;
     options.seconds = 6;
     options.hold = 2;
-    // 0.60 voxels
-    judge([&] { return demo::bowl(options); }, {"99 in 100 penetrations"});
+    judge([&] { return demo::bowl(options); });
 }
 
 TEST_CASE("balls stay in front of thin plates") {
     demo::PlatesOptions options;
     options.phases = 2;
-    // 32 of 84, from 10 m/s on: no contact is made before bodies touch, and nothing is swept
+    // 31 of 84, from 10 m/s on: no contact is made before bodies touch, and nothing is swept
     judge([&] { return demo::plates(options); }, {"balls that passed their plate"});
 }
 
