@@ -10,9 +10,6 @@ constexpr float gravity = 9.81f;  // [m/s^2]
 constexpr float restingSpeed = 0.1f;  // [m/s]
 constexpr float restingSpin = 1;      // [rad/s]
 
-// What air and soft surfaces take: a share of the speed and of the spin a second.
-constexpr float linearDamping = 0.05f, angularDamping = 0.2f;
-
 btTransform toTransform(const Pose& pose) {
     const auto& [p, q] = pose;
     return btTransform(btQuaternion(q.x, q.y, q.z, q.w), btVector3(p.x, p.y, p.z));
@@ -22,6 +19,8 @@ btTransform toTransform(const Pose& pose) {
 
 World::World() {
     world_.setGravity({0, 0, -gravity});
+    // with Bullet's single direction of friction, a stack of rings at rest walks aside until it falls
+    world_.getSolverInfo().m_solverMode |= SOLVER_USE_2_FRICTION_DIRECTIONS;
 }
 
 World::~World() {
@@ -37,8 +36,8 @@ btRigidBody& World::add(std::shared_ptr<bullet::Shape> shape, const Matter& matt
     info.m_friction = matter.friction;
     info.m_rollingFriction = matter.rollingFriction;
     info.m_restitution = matter.restitution;
-    info.m_linearDamping = linearDamping;
-    info.m_angularDamping = angularDamping;
+    info.m_linearDamping = matter.linearDamping;
+    info.m_angularDamping = matter.angularDamping;
     info.m_linearSleepingThreshold = restingSpeed;
     info.m_angularSleepingThreshold = restingSpin;
     bodies_.push_back({std::move(shape), std::make_unique<btRigidBody>(info)});
@@ -66,6 +65,31 @@ int World::asleep() const {
     int count = 0;
     for (const auto& [shape, body] : bodies_) count += !body->isStaticObject() && !body->isActive();
     return count;
+}
+
+double World::kineticEnergy() const {
+    double energy = 0;
+    for (const Body& entry : bodies_) {
+        const btRigidBody& body = *entry.body;
+        if (body.isStaticObject()) continue;
+        const btVector3& v = body.getLinearVelocity();
+        const btVector3 spin = body.getWorldTransform().getBasis().transpose() * body.getAngularVelocity();
+        energy += 0.5 * double(v.length2()) / double(body.getInvMass());
+        for (int axis = 0; axis < 3; ++axis)
+            energy += 0.5 * double(spin[axis]) * spin[axis] / double(body.getInvInertiaDiagLocal()[axis]);
+    }
+    return energy;
+}
+
+double World::potentialEnergy() const {
+    double energy = 0;
+    for (const Body& entry : bodies_) {
+        const btRigidBody& body = *entry.body;
+        if (body.isStaticObject()) continue;
+        const btVector3 &g = body.getGravity(), &at = body.getWorldTransform().getOrigin();
+        for (int axis = 0; axis < 3; ++axis) energy -= double(g[axis]) * at[axis] / double(body.getInvMass());
+    }
+    return energy;
 }
 
 }  // namespace bilayer::demo

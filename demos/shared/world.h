@@ -22,6 +22,8 @@ struct Matter {
     float friction = 0.5f;
     float rollingFriction = 0;  ///< [m]
     float restitution = 0;
+    /// What air and soft surfaces take: a share of the speed and of the spin a second.
+    float linearDamping = 0.05f, angularDamping = 0.2f;
 };
 
 /// Bodies, in the order in which they were added, under gravity along -z.
@@ -42,6 +44,10 @@ class World {
     /// Bodies that move, and those of them that have come to rest.
     int moving() const;
     int asleep() const;
+
+    /// Of all bodies that move, asleep or not; potential energy is 0 at the origin [J].
+    double kineticEnergy() const;
+    double potentialEnergy() const;
 
     /// For constraints, rays and whatever else Bullet offers.
     btDiscreteDynamicsWorld& bullet() { return world_; }

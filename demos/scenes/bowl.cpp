@@ -1,0 +1,165 @@
+#include "demos/scenes/bowl.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <filesystem>
+#include <glm/geometric.hpp>
+#include <glm/gtc/matrix_transform.hpp>
+#include <random>
+#include <stdexcept>
+
+#include "demos/shared/shapes.h"
+#include "demos/shared/stage.h"
+#include "sdf/build.h"
+#include "sdf/inspect.h"
+#include "sdf/mesh_io.h"
+
+namespace bilayer::demo {
+namespace {
+
+constexpr const char* bunnyFile = "/usr/share/glmark2/models/bunny.obj";  // Debian's package glmark2-data
+constexpr float bodySize = 0.2f;                                          // longest side [m]
+
+// The bowl for thirty bodies; larger ones are scaled by the cube root of their number.
+constexpr float usualBodies = 30;
+constexpr float bowlRadius = 0.66f, bowlWall = 0.035f;  // of the sphere that the bowl is cut from [m]
+constexpr float bowlOpening = 1.05f;                    // from the bottom to the rim [rad]
+constexpr float bowlFoot = 0.2f;                        // radius of its foot [m]
+constexpr float bowlVoxels = 3;                         // edge of its voxels [voxels of the bodies]
+
+constexpr float usualBodiesPerLayer = 5;
+constexpr float layerRadius = 0.26f;  // of a layer's ring, in the bowl for thirty [m]
+constexpr float layerHeight = 0.26f;  // between layers at the start: more than any body is long [m]
+constexpr float lastLook = 0.5f;      // how long the recording goes on when all is at rest [s]
+// between surface points; the finest part of a bunny, its ears, is 8 of its voxels thick [voxels of the body's own]
+constexpr float bodySpacing = 4, bowlSpacing = 2;
+// at 6 m/s a bunny moves 16 of its voxels in one step: the bands must still hold it then [voxels]
+constexpr float bodyInteriorWidth = 20, bowlInteriorWidth = 6;
+
+constexpr double mostOverlap = 0.5;  // of 99 in 100 [voxels]
+constexpr double mostRise = 1;       // of energy, in parts of the kinetic energy's peak [%]
+constexpr double mostCreep = 1;      // while held awake [voxels]
+
+constexpr Look bowlLook{.colour = 0x35506b, .roughness = 0.45f, .clearcoat = 0.6f};
+constexpr std::uint32_t colours[] = {0xe07a5f, 0xf2cc8f, 0x81b29a, 0xf4f1de, 0x9db4d6, 0xe8a598, 0xc9b1d9, 0x7fb7be};
+
+std::shared_ptr<const Thing> bodyOf(const Kind& kind, float resolution) {
+    const glm::mat4 toSize = glm::scale(glm::mat4(1), glm::vec3(bodySize / bounds(kind.mesh).longestSide()));
+    return makeThing(transformed(kind.mesh, toSize), {bodySize / resolution, bodyInteriorWidth, bodySpacing});
+}
+
+// Layers above the bowl, each of rings turned against those below, every body turned at random.
+std::vector<Pose> startPoses(const BowlOptions& options, float scale) {
+    std::mt19937 random(options.seed);
+    std::normal_distribution<float> normal;
+    const int perLayer = int(usualBodiesPerLayer * scale * scale);
+    std::vector<Pose> poses;
+    for (int i = 0; i < options.bodies; ++i) {
+        const int layer = i / perLayer;
+        // the outermost ring of a layer first, then as many rings within as it takes
+        int place = i % perLayer;
+        float radius = layerRadius * scale;
+        const auto fits = [&] { return std::max(1, int(usualBodiesPerLayer * radius / layerRadius)); };
+        for (; place >= fits() && radius > layerRadius; radius -= layerRadius) place -= fits();
+        const float turn = 6.2832f * float(place) / float(fits()) + 0.6f * float(layer);
+        const float x = normal(random), y = normal(random), z = normal(random), w = normal(random);
+        poses.push_back({{radius * std::cos(turn), radius * std::sin(turn), layerHeight * float(layer)},
+                         glm::normalize(glm::quat(w, x, y, z))});
+    }
+    return poses;
+}
+
+glm::vec3 centreOf(const btRigidBody& body) {
+    const btVector3& p = body.getWorldTransform().getOrigin();
+    return {p.x(), p.y(), p.z()};
+}
+
+std::vector<glm::vec3> centresOf(const std::vector<btRigidBody*>& bodies) {
+    std::vector<glm::vec3> centres;
+    for (const btRigidBody* body : bodies) centres.push_back(centreOf(*body));
+    return centres;
+}
+
+// Keeps all awake for a time, and returns how far the body that creeps most gets [m].
+double creep(Stage& stage, const std::vector<btRigidBody*>& bodies, double seconds) {
+    const std::vector<glm::vec3> before = centresOf(bodies);
+    for (btRigidBody* body : bodies) body->forceActivationState(DISABLE_DEACTIVATION);
+    stage.run(stage.time() + seconds);
+    double most = 0;
+    for (std::size_t i = 0; i < bodies.size(); ++i) most = worse(most, glm::distance(before[i], centreOf(*bodies[i])));
+    return most;
+}
+
+std::string describe(const Thing& thing) {
+    const MeshReport report = inspect(thing.mesh);
+    return fmt::format("{} triangles, {}; {} voxels of {:.2f} mm, {:.1f} MB", report.triangles,
+                       report.closed() && report.oriented() ? "closed" : "NOT closed", thing.field.activeVoxels(),
+                       1e3 * thing.field.voxelSize(), 1e-6 * double(thing.field.memoryBytes()));
+}
+
+}  // namespace
+
+Kind readKind(const std::string& path) {
+    const glm::mat4 upright = glm::rotate(glm::mat4(1), glm::radians(90.f), glm::vec3(1, 0, 0));
+    return {std::filesystem::path(path).stem().string(), transformed(readMesh(path), upright)};
+}
+
+Kind bunny() {
+    if (!std::filesystem::exists(bunnyFile)) return {"knot", shapes::torusKnot(2, 3, 0.06f, 0.02f)};
+    return readKind(bunnyFile);
+}
+
+Outcome bowl(const BowlOptions& options) {
+    if (options.kinds.empty()) throw std::invalid_argument("a bowl needs a kind of body");
+    const float scale = std::cbrt(std::max(1.f, float(options.bodies) / usualBodies));
+    const auto start = std::chrono::steady_clock::now();
+    std::vector<std::shared_ptr<const Thing>> things;
+    for (const Kind& kind : options.kinds) things.push_back(bodyOf(kind, float(options.resolution)));
+    const float radius = scale * bowlRadius, wall = scale * bowlWall;
+    const auto vessel = makeThing(shapes::bowl(radius, wall, 192, bowlOpening, scale * bowlFoot),
+                                  {bowlVoxels * things[0]->field.voxelSize(), bowlInteriorWidth, bowlSpacing});
+    const std::chrono::duration<double> built = std::chrono::steady_clock::now() - start;
+
+    Stage stage(fmt::format("{} bodies in a bowl", options.bodies), {.framesPerMeasuring = 30});
+    stage.add(vessel, {}, {}, bowlLook);
+    std::vector<btRigidBody*> bodies;
+    for (const Pose& pose : startPoses(options, scale)) {
+        const std::size_t i = bodies.size();
+        const Look look{.colour = colours[i % std::size(colours)], .roughness = 0.55f, .clearcoat = 0.12f};
+        bodies.push_back(&stage.add(things[i % things.size()], {.mass = 1}, pose, look));
+    }
+    stage.run(options.seconds, [&] { return stage.allAsleep(); });
+    const int awake = stage.world().moving() - stage.world().asleep();
+    stage.run(stage.time() + lastLook);
+    const double crept = options.hold > 0 ? creep(stage, bodies, options.hold) : 0;
+    const float rim = radius * std::sin(bowlOpening);
+    const auto left = std::count_if(bodies.begin(), bodies.end(), [&](const btRigidBody* body) {
+        const glm::vec3 at = centreOf(*body);
+        return !(std::hypot(at.x, at.y) < rim && at.z > -radius);
+    });
+
+    Outcome outcome = stage.finish({.target = {0, 0, -0.44f * scale},
+                                    .distance = 2.75f * scale,
+                                    .azimuth = -1.35f,
+                                    .elevation = 0.74f,
+                                    .groundHeight = bounds(vessel->mesh).lower.z});
+    for (std::size_t i = 0; i < things.size(); ++i) {
+        outcome.facts.emplace_back(options.kinds[i].name, describe(*things[i]));
+        outcome.fields.emplace_back(options.kinds[i].name, things[i]->field);
+    }
+    outcome.facts.emplace_back("bowl", describe(*vessel));
+    outcome.facts.emplace_back("build the fields", fmt::format("{:.2f} s", built.count()));
+    const double voxel = outcome.voxelSize;
+    outcome.criteria = {{"bodies still awake", double(awake), 0},
+                        {"bodies that left the bowl", double(left), 0},
+                        {"99 in 100 penetrations", outcome.usuallyBelow() / voxel, mostOverlap, "voxels"},
+                        {"energy rises by", 100 * outcome.energies.rise(), mostRise, "%"}};
+    if (options.hold > 0)
+        outcome.criteria.push_back({fmt::format("creep in {:g} s", options.hold), crept / voxel, mostCreep, "voxels"});
+    return outcome;
+}
+
+}  // namespace bilayer::demo

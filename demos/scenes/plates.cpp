@@ -1,0 +1,116 @@
+#include "demos/scenes/plates.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/trigonometric.hpp>
+#include <map>
+
+#include "demos/shared/shapes.h"
+#include "demos/shared/stage.h"
+
+namespace bilayer::demo {
+namespace {
+
+constexpr float radius = 0.05f, halfPlate = 0.3f;  // of balls and plates [m]
+constexpr float lane = 0.8f;                       // between balls side by side, and between plates' heights [m]
+constexpr float stepsBefore = 4, stepsAfter = 40;  // the impact
+constexpr double rounding = 1e-3;                  // that energy may grow by, in parts
+
+constexpr Look plateLook{.colour = 0x9db4d6, .roughness = 0.3f, .opacity = 0.6f};
+constexpr std::uint32_t colours[] = {0x81b29a, 0xf2cc8f, 0xe07a5f};  // from slow to fast
+
+struct Shot {
+    btRigidBody& ball;
+    glm::vec3 plate, outward;  // a point of the plate's middle, and the side that the ball is shot from
+    float speed, thickness;    // [m/s], [voxels]
+    bool passed = false, lost = false, gained = false;
+};
+
+std::uint32_t colourOf(float speed) {
+    const float decade = std::max(0.f, std::log10(speed));
+    return colours[std::min(std::size_t(decade), std::size(colours) - 1)];
+}
+
+// Balls fall straight down, side by side, and plates are turned; all impacts fall into the same step.
+Shot addLane(Stage& stage, const PlatesOptions& options, const std::shared_ptr<const Thing>& ball,
+             const std::shared_ptr<const Thing>& plate, const glm::vec3& place, float angle, float thickness,
+             float speed, float phase) {
+    const glm::quat tilt = glm::angleAxis(glm::radians(angle), glm::vec3(0, 1, 0));
+    stage.add(plate, {.friction = 0.5f, .restitution = 1}, {place, tilt}, plateLook);
+    const float touching = (radius + 0.5f * thickness * options.voxelSize) / std::cos(glm::radians(angle));
+    const float above = touching + speed * (stepsBefore + phase) / options.stepsPerSecond;
+    const Matter matter{.mass = 1, .restitution = options.restitution, .linearDamping = 0, .angularDamping = 0};
+    btRigidBody& body = stage.add(ball, matter, {place + glm::vec3(0, 0, above)},
+                                  {.colour = colourOf(speed), .roughness = 0.3f, .clearcoat = 0.5f});
+    body.setLinearVelocity({0, 0, -speed});
+    body.setActivationState(DISABLE_DEACTIVATION);
+    return {body, place, tilt * glm::vec3(0, 0, 1), speed, thickness};
+}
+
+void watch(Shot& shot) {
+    const btVector3 &p = shot.ball.getWorldTransform().getOrigin(), &v = shot.ball.getLinearVelocity();
+    const double spin = radius * double(shot.ball.getAngularVelocity().length());
+    const double squares = double(v.length2()) + 0.4 * spin * spin;  // of a ball's energy
+    shot.lost = shot.lost || !std::isfinite(double(p.length2()) + squares);
+    shot.passed = shot.passed || glm::dot(glm::vec3(p.x(), p.y(), p.z()) - shot.plate, shot.outward) < 0;
+    shot.gained = shot.gained || squares > (1 + rounding) * double(shot.speed) * shot.speed;
+}
+
+// How many fail, for each thickness and speed at which some do.
+std::string tell(const std::vector<Shot>& shots, bool Shot::*failed) {
+    std::string text;
+    std::map<std::pair<float, float>, std::pair<int, int>> counts;
+    for (const Shot& shot : shots) {
+        auto& [bad, all] = counts[{shot.thickness, shot.speed}];
+        bad += shot.*failed;
+        ++all;
+    }
+    for (const auto& [what, count] : counts)
+        if (count.first > 0)
+            text += fmt::format("{}{} voxels at {} m/s {}/{}", text.empty() ? "" : ", ", what.first, what.second,
+                                count.first, count.second);
+    return text.empty() ? "none" : text;
+}
+
+}  // namespace
+
+Outcome plates(const PlatesOptions& options) {
+    Stage stage("Balls shot at thin plates", {.stepsPerSecond = options.stepsPerSecond, .stepsPerFrame = 1});
+    stage.world().bullet().setGravity({0, 0, 0});
+    const auto ball = makeThing(shapes::sphere(radius, 4), {options.voxelSize});
+    std::vector<Shot> shots;
+    float row = 0;
+    for (const float thickness : options.thicknesses) {
+        const glm::vec3 half(halfPlate, halfPlate, 0.5f * thickness * options.voxelSize);
+        const auto plate = makeThing(shapes::box(half), {options.voxelSize});
+        for (const float angle : options.angles)
+            for (int phase = 0; phase < options.phases; ++phase, ++row)
+                for (std::size_t i = 0; i < options.speeds.size(); ++i) {
+                    // steps, so that a ball thrown aside meets no other plate
+                    const glm::vec3 place(lane * row, lane * float(i), lane * row);
+                    shots.push_back(addLane(stage, options, ball, plate, place, angle, thickness, options.speeds[i],
+                                            float(phase) / float(options.phases)));
+                }
+    }
+    stage.run((stepsBefore + stepsAfter) / options.stepsPerSecond, [&] {
+        for (Shot& shot : shots) watch(shot);
+        return false;
+    });
+    const auto count = [&](bool Shot::*what) {
+        return double(std::count_if(shots.begin(), shots.end(), [&](const Shot& shot) { return shot.*what; }));
+    };
+    const float middle = lane * row / 2;
+    Outcome outcome = stage.finish({.target = {middle, lane * 3, middle}, .distance = 3 * middle, .groundHeight = -1});
+    outcome.facts = {{"balls", std::to_string(shots.size())},
+                     {"passed", tell(shots, &Shot::passed)},
+                     {"faster than before", tell(shots, &Shot::gained)}};
+    outcome.criteria = {{"balls that passed their plate", count(&Shot::passed), 0},
+                        {"balls with NaN", count(&Shot::lost), 0},
+                        {"balls faster than before", count(&Shot::gained), 0}};
+    return outcome;
+}
+
+}  // namespace bilayer::demo

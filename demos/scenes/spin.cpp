@@ -1,0 +1,95 @@
+#include "demos/scenes/spin.h"
+
+#include <fmt/core.h>
+
+#include <cmath>
+#include <glm/geometric.hpp>
+
+#include "collider/mass.h"
+#include "demos/shared/shapes.h"
+#include "demos/shared/stage.h"
+
+namespace bilayer::demo {
+namespace {
+
+constexpr float size = 0.05f, halfThickness = 0.04f;  // of the handle's squares, and of the handle [m]
+constexpr float mass = 2;                             // [kg]
+
+// A T of squares, three across and four down: its three moments of inertia differ by tens of percents.
+Mesh handle() {
+    constexpr glm::vec2 outline[] = {{-3, 1}, {-1, 1}, {1, 1},   {3, 1},   {3, -1},
+                                     {1, -1}, {1, -9}, {-1, -9}, {-1, -1}, {-3, -1}};
+    constexpr unsigned count = std::size(outline);
+    Mesh mesh;
+    for (const float z : {-halfThickness, halfThickness})
+        for (const glm::vec2& corner : outline) mesh.points.push_back(glm::vec3(size / 2 * corner, z));
+    const auto quad = [&](unsigned a, unsigned b, unsigned c, unsigned d) {
+        mesh.triangles.push_back({a, b, c});
+        mesh.triangles.push_back({a, c, d});
+    };
+    // clockwise seen from above
+    for (unsigned i = 0, next = 1; i < count; ++i, next = (i + 1) % count) quad(i, count + i, count + next, next);
+    constexpr unsigned squares[][4] = {{0, 1, 8, 9}, {1, 2, 5, 8}, {2, 3, 4, 5}, {8, 5, 6, 7}};
+    for (const auto& [a, b, c, d] : squares) {
+        quad(a, b, c, d);
+        quad(count + d, count + c, count + b, count + a);
+    }
+    return mesh;
+}
+
+glm::dvec3 angularMomentum(const btRigidBody& body) {
+    const btMatrix3x3& axes = body.getWorldTransform().getBasis();
+    const btVector3 spin = axes.transpose() * body.getAngularVelocity();
+    glm::dvec3 inBody, inWorld(0);
+    for (int i = 0; i < 3; ++i) inBody[i] = double(spin[i]) / double(body.getInvInertiaDiagLocal()[i]);
+    for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j) inWorld[i] += double(axes[i][j]) * inBody[j];
+    return inWorld;
+}
+
+// The greatest difference of two solids' mass and moments of inertia, in parts of the second's.
+double difference(const MassProperties& a, const MassProperties& b) {
+    double most = std::abs(a.volume / b.volume - 1);
+    for (int i = 0; i < 3; ++i) most = worse(most, std::abs(double(a.principalInertia[i]) / b.principalInertia[i] - 1));
+    return most;
+}
+
+}  // namespace
+
+Outcome spin(const SpinOptions& options) {
+    Stage stage("A free body that spins");
+    stage.world().bullet().setGravity({0, 0, 0});
+    const auto thing = makeThing(handle(), {options.voxelSize});
+    btRigidBody& body = stage.add(thing, {.mass = mass, .linearDamping = 0, .angularDamping = 0}, {},
+                                  {.colour = 0xf2cc8f, .roughness = 0.4f, .clearcoat = 0.4f});
+    // the body's axes are the principal ones, in ascending order of their moments
+    body.setActivationState(DISABLE_DEACTIVATION);
+    const btVector3 middle = body.getWorldTransform().getBasis().getColumn(1);
+    body.setAngularVelocity(body.getWorldTransform().getBasis() *
+                            btVector3(options.nudge, options.spin, options.nudge));
+
+    const glm::dvec3 start = angularMomentum(body);
+    double drift = 0;
+    int turns = 0;
+    float side = 1;
+    stage.run(options.seconds, [&] {
+        drift = worse(drift, glm::distance(angularMomentum(body), start) / glm::length(start));
+        // it has turned over when the middle axis looks the other way
+        const float cosine = body.getWorldTransform().getBasis().getColumn(1).dot(middle);
+        if (side * cosine < -0.5f) {
+            side = -side;
+            ++turns;
+        }
+        return false;
+    });
+
+    Outcome outcome = stage.finish({.distance = 1.2f, .elevation = 0.4f, .groundHeight = -0.5f});
+    outcome.facts.emplace_back("turned over", fmt::format("{} times", turns));
+    outcome.criteria = {{"drift of angular momentum a minute", 100 * drift * 60 / stage.time(), 1, "%"},
+                        {"did not turn over", double(turns == 0), 0},
+                        {"mass and inertia of the field off",
+                         100 * difference(massProperties(thing->field), massProperties(thing->mesh)), 0.5, "%"}};
+    return outcome;
+}
+
+}  // namespace bilayer::demo

@@ -1,0 +1,46 @@
+// The program around a scene: its command line, what it prints, the files that it writes.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <functional>
+#include <string>
+
+#include "demos/shared/outcome.h"
+
+namespace bilayer::demo {
+
+/// Options that all scenes share, such as --out and --threads, and those that the scene adds:
+///
+///     int main(int argc, char** argv) {
+///         InclineOptions options;
+///         Program program("incline", "A block on an incline");
+///         program.option("--seconds", options.seconds, "how long [s]");
+///         return program.run(argc, argv, [&] { return incline(options); });
+///     }
+class Program {
+  public:
+    Program(std::string name, const std::string& description);
+
+    /// An option of the scene's own; its present value is the default that --help tells.
+    template <class Value>
+    CLI::Option* option(const std::string& flag, Value& value, const std::string& help) {
+        return app_.add_option(flag, value, help)->capture_default_str();
+    }
+    CLI::Option* flag(const std::string& flag, bool& value, const std::string& help) {
+        return app_.add_flag(flag, value, help);
+    }
+
+    /// Parses, plays the scene, prints its outcome and writes its files.
+    /// @return the exit status: 0, whether criteria are met or not; 1 if the scene throws, 2 for wrong usage
+    int run(int argc, char** argv, const std::function<Outcome()>& scene);
+
+  private:
+    void play(const std::function<Outcome()>& scene) const;
+
+    std::string name_, out_ = "out";
+    int threads_ = 0;
+    bool compare_ = false;
+    CLI::App app_;
+};
+
+}  // namespace bilayer::demo

@@ -1,0 +1,91 @@
+// Each scene, small. What a criterion asks that the library cannot do yet is known by name here, with what it gave when
+// it was written down; a criterion of these that is met after all fails the test, so that it leaves the list.
+#include <catch2/catch.hpp>
+#include <functional>
+#include <set>
+#include <string>
+
+#include "demos/scenes/bowl.h"
+#include "demos/scenes/chain.h"
+#include "demos/scenes/incline.h"
+#include "demos/scenes/plates.h"
+#include "demos/scenes/rings.h"
+#include "demos/scenes/spin.h"
+#include "demos/shared/shapes.h"
+#include "demos/shared/stage.h"
+
+using namespace bilayer;
+using demo::Outcome;
+
+namespace {
+
+// Checks every criterion but those known to be missed, and that threads change no bit.
+void judge(const std::function<Outcome()>& scene, const std::set<std::string>& missed = {}) {
+    Outcome outcome = scene();
+    outcome.criteria.push_back(demo::sameBits(outcome, scene));
+    std::set<std::string> unmet;
+    for (const demo::Criterion& criterion : outcome.criteria) {
+        CAPTURE(criterion.name, criterion.value, criterion.limit, criterion.unit);
+        if (!missed.contains(criterion.name)) {
+            CHECK(criterion.met());
+        } else if (criterion.met()) {
+            FAIL_CHECK("met by now: it need no longer be known as missed");
+        } else {
+            WARN(outcome.title << ": " << criterion.name << " " << criterion.value << " " << criterion.unit
+                               << ", at most " << criterion.limit);
+        }
+    }
+    for (const std::string& name : missed) CHECK_NOTHROW(outcome.criterion(name));
+}
+
+}  // namespace
+
+TEST_CASE("blocks stick and slide on an incline as friction says") {
+    demo::InclineOptions options;
+    options.slopes = {25};
+    options.frictions = {0.5f, 0.975f, 1.025f};
+    options.seconds = 0.75f;
+    // one of two stuck, the other is 93 % too slow: points beside the block push against its lower edges, at slanting
+    // normals
+    judge([&] { return demo::incline(options); }, {"blocks that should slide and stick", "acceleration off theory"});
+}
+
+TEST_CASE("rings stay on their pole and come to rest") {
+    demo::RingsOptions options;
+    options.rows = 1;
+    options.ringsPerPole = 4;
+    options.seconds = 4;
+    options.voxelSize = 0.01f;
+    judge([&] { return demo::rings(options); });
+}
+
+TEST_CASE("a chain keeps its links and its length") {
+    demo::ChainOptions options;
+    options.links = 6;
+    options.seconds = 1;
+    judge([&] { return demo::chain(options); });
+}
+
+TEST_CASE("knots in a bowl come to rest") {
+    demo::BowlOptions options;
+    options.kinds = {{"knot", shapes::torusKnot(2, 3, 0.06f, 0.02f, 150, 16)}};
+    options.bodies = 4;
+    options.resolution = 32;
+    options.seconds = 6;
+    options.hold = 2;
+    judge([&] { return demo::bowl(options); });
+}
+
+TEST_CASE("balls stay in front of thin plates") {
+    demo::PlatesOptions options;
+    options.phases = 2;
+    // 31 of 84, from 10 m/s on: no contact is made before bodies touch, and nothing is swept
+    judge([&] { return demo::plates(options); }, {"balls that passed their plate"});
+}
+
+TEST_CASE("a free body keeps its angular momentum and turns over") {
+    demo::SpinOptions options;
+    options.seconds = 20;
+    // 12.8 %, most of it of the magnitude: Bullet's implicit gyroscopic torque is of first order in the step
+    judge([&] { return demo::spin(options); }, {"drift of angular momentum a minute"});
+}
