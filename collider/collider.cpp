@@ -112,19 +112,22 @@ Collider::Collider(Mesh mesh, const LevelSet& levelSet, const ColliderOptions& o
 
 ContactReport collide(const Placed& a, const Placed& b, const ContactOptions& options, std::vector<Contact>& contacts) {
     ContactReport report;
-    const auto opposes = [&](const glm::vec3& normal, const Placed& body, const SurfacePoint& point) {
-        return -glm::dot(normal, body.pose.rotation * point.normal) >= options.leastOpposition;
+    const auto opposes = [&](const glm::vec3& normal, const Placed& body, const SurfacePoint& point,
+                             const Touch& touch) {
+        const bool apart = touch.distance > 0 && touch.approach == 0 && !point.isSharp;
+        const float least = apart ? options.leastOppositionApart : options.leastOpposition;
+        return -glm::dot(normal, body.pose.rotation * point.normal) >= least;
     };
     samplePoints(a, b, options.margin, report, [&](std::uint32_t index, const SurfacePoint& point, const Touch& touch) {
         const glm::vec3 normal = outwardNormal(b, touch, a, point);
-        if (!opposes(normal, a, point)) return;
+        if (!opposes(normal, a, point, touch)) return;
         const float distance = touch.distance * b.scale;
         contacts.push_back({a.pose.toWorld(a.scale * point.position) - distance * normal, normal, distance, index,
                             touch.approach * b.scale});
     });
     samplePoints(b, a, options.margin, report, [&](std::uint32_t index, const SurfacePoint& point, const Touch& touch) {
         const glm::vec3 normal = outwardNormal(a, touch, b, point);
-        if (!opposes(normal, b, point)) return;
+        if (!opposes(normal, b, point, touch)) return;
         contacts.push_back({b.pose.toWorld(b.scale * point.position), -normal, touch.distance * a.scale,
                             index | featureOfB, touch.approach * a.scale});
     });

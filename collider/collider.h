@@ -67,6 +67,9 @@ struct ContactOptions {
     /// are left out. Points just under the edge of the other body look along the surface that is nearest to them. The
     /// corners of a cube, whose normals are mixed of three, reach 0.57. Below -1: no contact is left out.
     float leastOpposition = -2;
+    /// The same for points of faces that neither touch yet nor are on their way: a point beside the other body sees its
+    /// edge aslant, and would stop it like a curb.
+    float leastOppositionApart = -2;
 };
 
 /// What collide() saw beside the contacts.

@@ -19,6 +19,7 @@ constexpr double latticePitch = 0.75;    // of candidates on edges and faces [sp
 constexpr double leastGap = 0.7;         // between points on the same side of a surface [spacings]
 constexpr double leastCornerGap = 0.1;   // between convex corners [spacings]: a fraction of a voxel
 constexpr double corner = 0.5;           // convexity from which a point is a corner: a cube's has 0.58
+constexpr double sharp = 0.15;           // and from which it is on an edge at least: a cube's have 0.35
 constexpr std::uint32_t leafPoints = 8;  // most points in a leaf of the tree
 constexpr float rounding = 1.000001f;    // spheres grow by this, so that single precision leaves no point outside
 
@@ -198,7 +199,7 @@ std::vector<SurfacePoint> thin(std::vector<Candidate> candidates, double spacing
         const double gap = candidate.convexity >= corner ? leastCornerGap : leastGap;
         if (grid.near(candidate, gap * spacing)) continue;
         grid.insert(candidate);
-        points.push_back({glm::vec3(candidate.position), glm::vec3(candidate.normal)});
+        points.push_back({glm::vec3(candidate.position), glm::vec3(candidate.normal), candidate.convexity >= sharp});
     }
     return points;
 }

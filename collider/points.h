@@ -13,6 +13,7 @@ namespace bilayer {
 struct SurfacePoint {
     glm::vec3 position;  ///< [m]
     glm::vec3 normal;    ///< outward, of unit length
+    bool isSharp;        ///< on a convex edge or corner, where surfaces of other normals meet
 };
 
 /// A node of the tree: a sphere around some consecutive points. Nodes lie in preorder: the first child of node i is

@@ -131,7 +131,7 @@ TEST_CASE("normals point outward") {
         CAPTURE(name);
         const SurfacePoints points(mesh, spacing);
         for (std::size_t i = 0; i < points.points().size(); i += 7) {
-            const auto& [position, normal] = points.points()[i];
+            const auto& [position, normal, isSharp] = points.points()[i];
             REQUIRE(windingNumber(mesh, glm::dvec3(position + 1e-3f * normal)) < 0.5);
             REQUIRE(windingNumber(mesh, glm::dvec3(position - 1e-3f * normal)) > 0.5);
         }

@@ -45,9 +45,7 @@ TEST_CASE("blocks stick and slide on an incline as friction says") {
     options.slopes = {25};
     options.frictions = {0.5f, 0.975f, 1.025f};
     options.seconds = 0.75f;
-    // one of two stuck, the other is 93 % too slow: points beside the block push against its lower edges, at slanting
-    // normals
-    judge([&] { return demo::incline(options); }, {"blocks that should slide and stick", "acceleration off theory"});
+    judge([&] { return demo::incline(options); });
 }
 
 TEST_CASE("rings stay on their pole and come to rest") {
@@ -79,7 +77,8 @@ TEST_CASE("knots in a bowl come to rest") {
 TEST_CASE("balls stay in front of thin plates") {
     demo::PlatesOptions options;
     options.phases = 2;
-    // 31 of 84, from 10 m/s on: no contact is made before bodies touch, and nothing is swept
+    // 6 of 84, from 100 m/s on: an impact aslant spins them, and they turn by radians in the step that contacts are
+    // made for
     judge([&] { return demo::plates(options); }, {"balls that passed their plate"});
 }
 
