@@ -2,7 +2,7 @@
 # Packs the device tests, the OpenCL benchmark and the command line, as built, with every shared library that they need, so
 # that they run on a machine with an OpenCL driver and no packages: docs/opencl.md.
 set -euo pipefail
-(($# >= 2)) || { echo "usage: bench/pack.sh BUILD DIR [MESH...]" >&2; exit 2; }
+(($# >= 2)) && [[ $2 != -* ]] || { echo "usage: bench/pack.sh BUILD DIR [MESH...]" >&2; exit 2; }
 build=$1 folder=$2
 shift 2
 # What drivers may ask of the C library beside what the programs do: all of it must come from one and the same version.

@@ -48,7 +48,9 @@ void DeviceMemory::clearSpares() {
     device_.spareBytes = 0;
 }
 
+// Not what is still mapped, as after an error.
 void DeviceMemory::keepSpare(const cl::Buffer& buffer) {
+    if (buffer.getInfo<CL_MEM_MAP_COUNT>() > 0) return;
     const std::uint64_t bytes = sizeOf(buffer);
     const std::lock_guard lock(device_.mutex);
     if (device_.spareBytes + bytes > mostSpareBytes) clearSpares();
@@ -68,10 +70,12 @@ void DeviceMemory::free(cl::Buffer& buffer) {
     buffer = {};
 }
 
-DeviceMemory::~DeviceMemory() try {
-    for (const cl::Buffer& buffer : taken_) keepSpare(buffer);
-} catch (const std::exception&) {
-    // what the device does not keep is freed
+DeviceMemory::~DeviceMemory() {
+    try {
+        for (const cl::Buffer& buffer : taken_) keepSpare(buffer);
+    } catch (const std::exception&) {
+        // a device that is lost keeps nothing
+    }
 }
 
 cl::Buffer DeviceMemory::upload(const void* data, std::uint64_t bytes, const std::string& purpose, cl::Event* event) {
@@ -95,7 +99,7 @@ void DeviceMemory::refuse(std::uint64_t bytes, const std::string& purpose) const
     if (bytes > device_.info.maxAllocationBytes)
         throw DeviceError(purpose + " needs a buffer of " + mebibytes(bytes) + ", and the largest of " +
                           device_.info.name + " is " + mebibytes(device_.info.maxAllocationBytes));
-    throw DeviceError(purpose + " needs " + mebibytes(used_ + bytes) + " in all on " + device_.info.name +
+    throw DeviceError(purpose + " needs at least " + mebibytes(used_ + bytes) + " in all on " + device_.info.name +
                       ", which may use " + mebibytes(budget_));
 }
 

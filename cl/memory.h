@@ -21,8 +21,8 @@ class DeviceMemory {
     DeviceMemory(const DeviceMemory&) = delete;
     DeviceMemory& operator=(const DeviceMemory&) = delete;
 
-    /// A buffer. Throws DeviceError that says what it is for and how much that needs in all, if the budget or the
-    /// device's largest buffer are too small.
+    /// A buffer. Throws DeviceError that says what it is for and how much that needs in all at least, if the budget or
+    /// the device's largest buffer are too small.
     /// @param purpose  "the mesh"
     cl::Buffer allocate(std::uint64_t bytes, const std::string& purpose);
 

@@ -60,9 +60,6 @@ class ResidentFill {
     ResidentFill(const Device& device, const OpenclOptions& options, DeviceMemory& memory, const FillJob& job);
     ResidentFill(const ResidentFill&) = delete;
     ResidentFill& operator=(const ResidentFill&) = delete;
-    // commands in flight use the blocks of the host
-    ~ResidentFill() { ::clFinish(device_.queue()); }
-
     DeviceLayout run();
 
   private:
@@ -113,7 +110,7 @@ class ResidentFill {
     std::vector<float> hostDistances_;     // [voxels]
     DeviceLayout layout_;
     glm::ivec3 firstVoxel_{0};
-    Ended ended_;
+    Ended ended_;  // commands in flight use the blocks of the host
 };
 
 ResidentFill::ResidentFill(const Device& device, const OpenclOptions& options, DeviceMemory& memory, const FillJob& job)

@@ -182,7 +182,7 @@ TEST_CASE("a field on a device needs memory, says how much, and what it took") {
     const LevelSet fine = levelSetOf(sphereSolid(0.4), h / 2);
     CHECK_THROWS_AS(DeviceField(device, fine, {.memoryMiB = 1}), DeviceError);
     CHECK_THROWS_WITH(DeviceField(device, fine, {.memoryMiB = 1}),
-                      Contains("field needs") && Contains("MiB") && Contains(device.info().name));
+                      Contains(" needs at least ") && Contains("MiB") && Contains(device.info().name));
 
     std::vector<glm::vec3> points(200000);
     std::vector<Sample> samples(points.size());

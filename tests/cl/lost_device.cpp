@@ -19,7 +19,7 @@ using Catch::Matchers::Contains;
 
 namespace {
 
-enum Call { kernels, maps, waits };
+enum Call { kernels, maps, waits, questions };
 
 Call failing;
 std::atomic<int> callsLeft = INT_MAX;
@@ -54,6 +54,12 @@ void* clEnqueueMapBuffer(cl_command_queue queue, cl_mem buffer, cl_bool blocking
     }
     static const auto call = loaders<decltype(clEnqueueMapBuffer)>("clEnqueueMapBuffer");
     return call(queue, buffer, blocking, flags, offset, size, waits, waitList, event, code);
+}
+
+cl_int clGetMemObjectInfo(cl_mem buffer, cl_mem_info what, size_t room, void* answer, size_t* size) {
+    if (fails(questions)) return CL_OUT_OF_RESOURCES;
+    static const auto call = loaders<decltype(clGetMemObjectInfo)>("clGetMemObjectInfo");
+    return call(buffer, what, room, answer, size);
 }
 
 cl_int clWaitForEvents(cl_uint count, const cl_event* events) {
@@ -94,6 +100,28 @@ TEST_CASE("a device lost half-way is an error that names call and device, and le
             REQUIRE(build(mesh, options, filler).activeVoxels() == voxels);
         }
     CHECK(failures > 6);
+}
+
+TEST_CASE("a device that does not even answer for its buffers is an error, or keeps none of them") {
+    const Device device = openDevice();
+    const Mesh mesh = shapes::sphere(1.f, 4);
+    BuildOptions options;
+    options.method = GENERATE(Method::exact, Method::doubleLayer, Method::prism);
+    options.voxelSize = voxelSizeFor(mesh, 60);
+    const BlockFiller filler = openclFiller(device);
+    const std::size_t voxels = build(mesh, options, filler).activeVoxels();
+    for (int before = 0; before < 24; ++before) {
+        failing = questions;
+        callsLeft = before;
+        try {
+            const std::size_t found = build(mesh, options, filler).activeVoxels();
+            CHECK(found == voxels);
+        } catch (const DeviceError& error) {
+            CHECK_THAT(error.what(), Contains("clGetMemObjectInfo") && Contains(device.info().name));
+        }
+        callsLeft = INT_MAX;
+        CHECK(build(mesh, options, filler).activeVoxels() == voxels);
+    }
 }
 
 TEST_CASE("a device lost while a field stays on it is an error, too") {
