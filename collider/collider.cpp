@@ -115,7 +115,8 @@ ContactReport collide(const Placed& a, const Placed& b, const ContactOptions& op
     const auto opposes = [&](const glm::vec3& normal, const Placed& body, const SurfacePoint& point,
                              const Touch& touch) {
         const bool apart = touch.distance > 0 && touch.approach == 0 && !point.isSharp;
-        const float least = apart ? options.leastOppositionApart : options.leastOpposition;
+        const float least =
+            apart ? std::max(options.leastOppositionApart, options.leastOpposition) : options.leastOpposition;
         return -glm::dot(normal, body.pose.rotation * point.normal) >= least;
     };
     samplePoints(a, b, options.margin, report, [&](std::uint32_t index, const SurfacePoint& point, const Touch& touch) {
