@@ -66,7 +66,9 @@ float boundOutside(const Field* field, double3 place, double3 extent) {
     const double length = sqrt(way.x * way.x + way.y * way.y + way.z * way.z);
     if (!isfinite(length)) return INFINITY;
     const Frame* frame = &field->frame;
-    return max(0.0f, (float)(length - (double)(CELL_DIAGONAL)) * frame->voxelSize + frame->exteriorWidth);
+    const double bound =
+        (length - (double)(CELL_DIAGONAL)) * (double)(frame->voxelSize) + (double)(frame->exteriorWidth);
+    return (float)(clamp(bound, 0.0, (double)(FLT_MAX)));
 }
 
 float boundInEmptyBlock(const Field* field, bool inside, double3 place) {

@@ -34,9 +34,9 @@ class Field {
     explicit Field(const LevelSet& levelSet, const FieldOptions& options = {});
 
     /// The same with its mesh: what is said to be exact below is exact against the triangles. Takes about 140 bytes a
-    /// triangle and 6 a vertex more, and up to 80 a triangle for where searches begin, and throws std::invalid_argument
-    /// as well if the level set is of another mesh, or the mesh is not valid. Triangles that build() turned around are
-    /// turned around in mesh() too.
+    /// triangle and 6 a vertex more, and 64 to 384 a stored block for where searches begin, and throws
+    /// std::invalid_argument as well if the level set is of another mesh, or the mesh is not valid. Triangles that
+    /// build() turned around are turned around in mesh() too.
     Field(const LevelSet& levelSet, Mesh mesh, const FieldOptions& options = {});
 
     /// Distance and gradient at a point in the field's own coordinates [m].

@@ -22,8 +22,8 @@ namespace {
 constexpr float infinity = std::numeric_limits<float>::infinity();
 /// What distances in the band seldom exceed it by, so that a second search is seldom needed [voxels].
 constexpr float usualError = 0.1f;
-/// Room for the rounding of single precision, in the distance that is asked for.
-constexpr float boundRounding = 1 + 1e-5f;
+/// Room for the rounding of single precision, in the distance that is asked for; and in itself [voxels].
+constexpr float boundRounding = 1 + 1e-5f, boundRoom = 1e-5f;
 /// Points that are taken together; what is known of them fits into the first cache.
 constexpr std::size_t batch = 64;
 /// Mean normals below this have cancelled out, and tell no side where they point aside: above the rounding of floats,
@@ -110,7 +110,7 @@ ClosestPoint FieldData::closestOn(std::uint32_t part, const glm::vec3& point, fl
 
 // The distance that is asked for [voxels].
 float FieldData::boundOf(float maxDistance) const {
-    return maxDistance * float(perMetre) * boundRounding;
+    return (maxDistance * float(perMetre) + boundRoom) * boundRounding;
 }
 
 // Of all the mesh, where the search from an entry has found nothing and others may be as near as asked for.

@@ -13,6 +13,8 @@
 namespace bilayer {
 namespace {
 
+/// Segments are this much longer, so that those that end on a face meet it.
+constexpr double endRounding = 1 + 1e-12;
 /// Spheres of a smaller radius are rays [voxels].
 constexpr double leastRadius = 1e-6;
 /// A sphere's way is looked at piece by piece [voxels], and in no more pieces than this.
@@ -111,18 +113,24 @@ std::optional<RayHit> touchZero(const FieldData& field, const Path& path, double
                   .normal = glm::vec3(glm::normalize(local.at(touch->along) - touch->position))};
 }
 
+// From outside or inside.
+std::optional<RayHit> cast(const FieldData& field, const glm::vec3& origin, const Path& path) {
+    if (field.inside(origin)) return hitAtStart(field, origin, path.direction);
+    return field.mesh ? hitMesh(*field.mesh, path) : hitZero(field, path);
+}
+
 }  // namespace
 
 std::optional<RayHit> Field::raycast(const Ray& ray) const noexcept {
     if (!isRay(ray)) return std::nullopt;
-    const Path path = pathOf(ray);
-    if (data_->inside(ray.origin)) return hitAtStart(*data_, ray.origin, path.direction);
-    return data_->mesh ? hitMesh(*data_->mesh, path) : hitZero(*data_, path);
+    return cast(*data_, ray.origin, pathOf(ray));
 }
 
 std::optional<RayHit> Field::segment(const glm::vec3& from, const glm::vec3& to) const noexcept {
+    if (!isFinite(from) || !isFinite(to)) return std::nullopt;
     const glm::dvec3 way = glm::dvec3(to) - glm::dvec3(from);
-    if (way != glm::dvec3(0)) return raycast({from, glm::vec3(glm::normalize(way)), float(glm::length(way))});
+    const double length = glm::length(way);
+    if (length > 0) return cast(*data_, from, {glm::dvec3(from), way / length, length * endRounding});
     if (!data_->inside(from)) return std::nullopt;
     return hitAtStart(*data_, from, {0, 0, -1});
 }

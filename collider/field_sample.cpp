@@ -42,7 +42,8 @@ float interpolationError(const glm::vec3& fraction) {
 float boundOutside(const FieldData& field, const glm::dvec3& local) {
     const double way = glm::distance(local, glm::clamp(local, glm::dvec3(0), field.extent()));
     if (!std::isfinite(way)) return infinity;
-    return std::max(0.f, float(way - double(cellDiagonal)) * field.voxelSize + field.exteriorWidth);
+    const double bound = (way - double(cellDiagonal)) * double(field.voxelSize) + double(field.exteriorWidth);
+    return float(std::clamp(bound, 0., double(std::numeric_limits<float>::max())));
 }
 
 // The nearest voxel of the block itself is beyond the band. It is half a cell's diagonal away, or a whole one where the

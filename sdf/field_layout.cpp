@@ -41,6 +41,10 @@ bool needsBlock(const FloatTree::LeafNodeType& leaf) {
     return (*low < 0) != (*high < 0);
 }
 
+[[noreturn]] void throwTooLong() {
+    throw std::invalid_argument("field: the bounds are longer than 2^19 blocks of 8^3 voxels: take larger voxels");
+}
+
 // Blocks that are near one another in space are then near one another in memory: walks there run along it.
 void sortForWalks(std::vector<Coord>& origins, const Coord& first) {
     const auto place = [&](const Coord& origin) -> std::array<std::uint32_t, 3> {
@@ -310,8 +314,7 @@ void measureClearances(FieldLayout& field, const std::vector<std::array<bool, bl
 void FieldFrame::requireSize() const {
     if (double(blocks.x) * blocks.y * blocks.z > double(mostBlocks))
         throw std::invalid_argument("field: the bounds hold more than 2^26 blocks of 8^3 voxels: take larger voxels");
-    if (std::max({blocks.x, blocks.y, blocks.z}) > mostBlocksAlong)
-        throw std::invalid_argument("field: the bounds are longer than 2^19 blocks of 8^3 voxels: take larger voxels");
+    if (std::max({blocks.x, blocks.y, blocks.z}) > mostBlocksAlong) throwTooLong();
 }
 
 bool FieldFrame::findsSurface() const {
@@ -336,6 +339,10 @@ FieldLayout::FieldLayout(const LevelSet& levelSet, Storage storage)
             box.expand(origins.back());
         }
     if (origins.empty()) throw std::invalid_argument("field: the level set has no voxel in its band");
+
+    // in 64 bits: what a file holds may be farther apart than an int tells
+    for (int axis = 0; axis < 3; ++axis)
+        if (std::int64_t(box.max()[axis]) - box.min()[axis] >= std::int64_t(side) * mostBlocksAlong) throwTooLong();
 
     const Coord first = box.min();
     sortForWalks(origins, first);

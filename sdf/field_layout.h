@@ -32,7 +32,7 @@ struct FieldFrame {
     std::size_t entryOf(const glm::ivec3& block) const {
         return (std::size_t(block.x) * blocks.y + block.y) * blocks.z + block.z;
     }
-    /// Blocks along each axis are fewer: a point's 24 bits tell no more places apart.
+    /// Blocks along an axis at most.
     static constexpr int mostBlocksAlong = 1 << 19;
     /// Throws std::invalid_argument if the directory has more than 2^26 entries, or more than 2^19 along an axis.
     void requireSize() const;

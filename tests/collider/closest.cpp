@@ -230,11 +230,13 @@ TEST_CASE("closest points need a place, a distance that is not exceeded, and the
     }
     Random random(test::seed());
     for (int i = 0; i < 1000; ++i) {
-        const glm::vec3 p(random(0.2, 3) * glm::dvec3(random.direction()));
+        const double radius = i % 2 ? random(0.2, 3) : 1 + 0.05 * std::pow(10, random(-6, 0));
+        const glm::vec3 p(radius * glm::dvec3(random.direction()));
         const ClosestPoint all = field.closest(p);
         REQUIRE(all.found);
         const float way = std::abs(all.distance);
         CHECK(same(field.closest(p, 1.001f * way), all));
+        CHECK(same(field.closest(p, std::nextafter(way, infinity)), all));
         CHECK_FALSE(field.closest(p, 0.999f * way).found);
     }
     CHECK_FALSE(field.closest({2, 0, 0}, -1).found);

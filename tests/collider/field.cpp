@@ -6,8 +6,12 @@
 #include <bit>
 #include <catch2/catch.hpp>
 #include <limits>
+#include <memory>
+#include <stdexcept>
 
 #include "demos/shared/shapes.h"
+#include "sdf/build.h"
+#include "sdf/grids.h"
 #include "tests/support/sampling.h"
 #include "tests/support/support.h"
 
@@ -233,4 +237,21 @@ TEST_CASE("fields are the same for any number of threads, and so are queries") {
 
 TEST_CASE("a level set of OpenVDB's own and one of the double layer method serve as well") {
     checkOtherLevelSets(makeField);
+}
+
+TEST_CASE("bounds of points as far away as floats reach are finite, and so are the boxes of fields") {
+    const Mesh ball = shapes::sphere(1, 3);
+    const Field field(build(ball, {.voxelSize = 0.001f, .exteriorWidth = 2, .interiorWidth = 2}));
+    for (const float away : {1e10f, 1e36f, 3e38f}) {
+        const Sample sample = field.sample({0, away, 0});
+        CHECK_FALSE(sample.inBand);
+        CHECK(sample.distance <= away);
+        CHECK(sample.distance > 0.99f * away);
+    }
+    // two voxels of the band, farther apart than an int tells
+    const auto grid = openvdb::createLevelSet<openvdb::FloatGrid>(1.f, 3.f);
+    for (const int x : {-2147483640, 2147483632}) grid->tree().setValue({x, x, 0}, 0.5f);
+    auto grids = std::make_shared<Grids>();
+    grids->distance = grid;
+    CHECK_THROWS_AS(Field(LevelSet(grids)), std::invalid_argument);
 }

@@ -473,7 +473,10 @@ TEST_CASE("segments are rays that end, and many at once are the same as one by o
             REQUIRE(bool(one) == bool(hits[i]));
             if (!one) continue;
             ++met;
-            REQUIRE(one->distance == ray->distance);
+            // the ray's direction is rounded to floats
+            REQUIRE(std::abs(one->distance - ray->distance) < 1e-4f);
+            const glm::dvec3 beside = glm::cross(glm::dvec3(one->position) - glm::dvec3(from[i]), glm::normalize(way));
+            REQUIRE(glm::length(beside) < 2e-7);
             REQUIRE(one->position == hits[i]->position);
             REQUIRE(double(one->distance) <= glm::length(way) * (1 + 1e-6));
         }
@@ -523,5 +526,26 @@ TEST_CASE("casts of what is no ray or no sphere hit nothing") {
         (void)field.sphereCast({{3, 0, 0}, {-1, 0, 0}, infinity}, 3e38f);
         (void)field.raycast({{1, 0, 0}, {-1e-44f, 0, 0}, infinity});
         REQUIRE(field.raycast({{1, 0, 0}, {-1e-30f, 0, 0}, infinity}));
+    }
+}
+
+TEST_CASE("segments go straight from point to point, however long, and meet the face that they end on") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    Random random(seed);
+    const Mesh box = shapes::box(glm::vec3(0.5f));
+    const LevelSet levelSet = build(box, {.voxelSize = 0.01f});
+    const Field field(levelSet, box);
+    for (const float length : {1.f, 1e2f, 1e4f}) {
+        int missed = 0;
+        for (int i = 0; i < 500; ++i) {
+            const glm::vec3 end(float(random(-0.4, 0.4)), float(random(-0.4, 0.4)), 0.5f);
+            const glm::vec3 start = end + length * glm::vec3(float(random(-1, 1)), float(random(-1, 1)), 1);
+            const auto hit = field.segment(start, end);
+            missed += !hit;
+            if (hit) REQUIRE(glm::distance(hit->position, end) < 1e-6f);
+        }
+        CAPTURE(length);
+        CHECK(missed == 0);
     }
 }
