@@ -115,9 +115,7 @@ ContactReport collide(const Placed& a, const Placed& b, const ContactOptions& op
     const auto opposes = [&](const glm::vec3& normal, const Placed& body, const SurfacePoint& point,
                              const Touch& touch) {
         const bool apart = touch.distance > 0 && touch.approach == 0 && !point.isSharp;
-        const float least =
-            apart ? std::max(options.leastOppositionApart, options.leastOpposition) : options.leastOpposition;
-        return -glm::dot(normal, body.pose.rotation * point.normal) >= least;
+        return options.keeps(-glm::dot(normal, body.pose.rotation * point.normal), apart);
     };
     samplePoints(a, b, options.margin, report, [&](std::uint32_t index, const SurfacePoint& point, const Touch& touch) {
         const glm::vec3 normal = outwardNormal(b, touch, a, point);

@@ -1,6 +1,7 @@
 // A rigid body's shape, and the contacts between two of them.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <vector>
 
@@ -70,6 +71,12 @@ struct ContactOptions {
     /// The same for points of faces that neither touch yet nor are on their way: a point beside the other body sees its
     /// edge aslant, and would stop it like a curb.
     float leastOppositionApart = -2;
+
+    /// Whether a contact is kept that looks against its point's normal by this cosine.
+    /// @param apart  its point is of a face that neither touches yet nor is on its way
+    bool keeps(float opposition, bool apart) const {
+        return opposition >= (apart ? std::max(leastOppositionApart, leastOpposition) : leastOpposition);
+    }
 };
 
 /// What collide() saw beside the contacts.

@@ -20,13 +20,8 @@ constexpr float probeSpacing = 2;
 constexpr float shortestGradient = 0.5f;
 // A surface point touches a face that looks against its own normal, by this cosine at least: the points below the edge
 // of a box must not be pushed out sideways. The corners of a cube, whose normals are mixed of three, reach 0.57.
-constexpr float leastOpposition = 0.3f;
 // Those of faces that do not touch yet: farther aslant is an edge of the other body beside them.
-constexpr float leastOppositionApart = 0.9f;
-
-bool opposes(const glm::vec3& normal, const SurfacePoint& point, float distance) {
-    return glm::dot(normal, point.normal) >= (distance > 0 && !point.isSharp ? leastOppositionApart : leastOpposition);
-}
+constexpr ContactOptions opposition{.leastOpposition = 0.3f, .leastOppositionApart = 0.9f};
 // Steps towards the deepest place of a round surface; each divides the error by the ratio of the radii of curvature.
 constexpr int mostRefinements = 6;
 // A way has met a convex body where it is this near to it [margins], or after so many steps of what is clear.
@@ -135,7 +130,7 @@ class Touching {
         const Convex::Near near = convex_.nearest(intoConvex(position), margin_);
         if (near.distance > margin_) return visitOnWay(position, point, feature, near.distance, contacts);
         const glm::vec3 normal = -(toField_ * near.normal);
-        if (!opposes(normal, point, near.distance)) return;
+        if (!opposition.keeps(glm::dot(normal, point.normal), near.distance > 0 && !point.isSharp)) return;
         if (convex_.isCurved())
             if (const auto better = refine(near, feature)) {
                 contacts.push_back(*better);
@@ -173,7 +168,7 @@ class Touching {
             distance = near.distance;
             if (distance > touch) continue;
             const glm::vec3 normal = -(toField_ * near.normal);
-            if (glm::dot(normal, point.normal) < leastOpposition) return;
+            if (!opposition.keeps(glm::dot(normal, point.normal), false)) return;
             const float gap = -glm::dot(near.normal, gone / length * way);
             if (gap > 0)
                 contacts.push_back(local_.contact(position, normal, gap, feature, -glm::dot(near.normal, way)));
@@ -277,9 +272,9 @@ class TriangleProbes : public btTriangleCallback {
 }  // namespace
 
 ContactReport collideFields(const Placed& a, const Placed& b, float margin, std::vector<Contact>& contacts) {
-    return collide(a, b,
-                   {.margin = margin, .leastOpposition = leastOpposition, .leastOppositionApart = leastOppositionApart},
-                   contacts);
+    ContactOptions options = opposition;
+    options.margin = margin;
+    return collide(a, b, options, contacts);
 }
 
 ContactReport collidePlane(const glm::vec3& normal, float offset, const Motion& motion, const Placed& field,
