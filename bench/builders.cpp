@@ -8,6 +8,8 @@
 #include <algorithm>
 #include <cstdlib>
 #include <filesystem>
+#include <limits>
+#include <sstream>
 #include <stdexcept>
 
 #include "bench/measure.h"
@@ -19,6 +21,14 @@ namespace bilayer::bench {
 namespace {
 
 const Source carvedBox{"carved box", ""};
+const std::string unevenSphere = "uneven sphere ";  // and the deviation of its areas
+
+// NaN or zero for no number, and no sphere has that.
+float deviationIn(const std::string& name) {
+    float deviation = std::numeric_limits<float>::quiet_NaN();
+    std::istringstream(name.substr(unevenSphere.size())) >> deviation;
+    return deviation;
+}
 
 // OpenVDB reads the mesh in place, in voxels: no copy that it would have to pay for.
 class InVoxels {
@@ -112,6 +122,7 @@ std::vector<Source> sources() {
 Source findSource(const std::string& nameOrFile) {
     for (const Source& source : sources())
         if (source.name == nameOrFile) return source;
+    if (nameOrFile.starts_with(unevenSphere)) return {nameOrFile, ""};
     if (!std::filesystem::exists(nameOrFile))
         throw std::invalid_argument(fmt::format("no mesh is called {}, and no file", nameOrFile));
     return {std::filesystem::path(nameOrFile).stem().string(), nameOrFile};
@@ -124,7 +135,12 @@ Scene scene(const std::string& name, Mesh mesh, float resolution) {
 }
 
 Scene scene(const Source& source, float resolution) {
-    return scene(source.name, source.file.empty() ? shapes::carvedBox() : readMesh(source.file), resolution);
+    const auto mesh = [&] {
+        if (!source.file.empty()) return readMesh(source.file);
+        if (!source.name.starts_with(unevenSphere)) return shapes::carvedBox();
+        return shapes::unevenSphere(deviationIn(source.name));
+    };
+    return scene(source.name, mesh(), resolution);
 }
 
 const std::vector<Builder>& builders() {

@@ -20,7 +20,8 @@ struct Source {
 /// variable BILAYER_MESHES names the corpus' folder where it is not where it was at compile time.
 std::vector<Source> sources();
 
-/// A source by its name above, or a mesh file. Throws std::invalid_argument for neither.
+/// A source by its name above, a mesh file, or "uneven sphere D": the sphere of the paper's Table 5, whose triangles'
+/// areas deviate by D. Throws std::invalid_argument for none of them.
 Source findSource(const std::string& nameOrFile);
 
 /// What is built: a mesh at a voxel size.

@@ -53,8 +53,8 @@ void DeviceMemory::keepSpare(const cl::Buffer& buffer) {
     if (buffer.getInfo<CL_MEM_MAP_COUNT>() > 0) return;
     const std::uint64_t bytes = sizeOf(buffer);
     const std::lock_guard lock(device_.mutex);
-    if (device_.spareBytes + bytes > mostSpareBytes) clearSpares();
     if (bytes > mostSpareBytes) return;
+    if (device_.spareBytes + bytes > mostSpareBytes) clearSpares();
     device_.spares.emplace(bytes, buffer);
     device_.spareBytes += bytes;
 }

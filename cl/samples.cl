@@ -5,6 +5,9 @@
 // Algorithm 1 divides the longest edge into as many parts as the others; with parts beyond this many roots of epsilon
 // the triangle counts as a sliver.
 #define SLIVER_STEP 3.0
+// The samples of a thin part are so many roots of epsilon apart along it, and begun anew after so many.
+#define THIN_STEP 2.0
+#define THIN_RUN 16
 // More tiles than wait at once for any triangle of a grid.
 #define MOST_TILES 160
 // Triangles of up to so many rows are spread a batch at a time; of one with more, samples are a batch of their own.
@@ -74,17 +77,19 @@ void wait(Tiles* tiles, const Limits* limits, Corners corners, double area, doub
     tiles->waiting[tiles->count++] = tile;
 }
 
+// The same triangle, its longest edge from a to b.
+Corners turnedToLongest(const Corners* t) {
+    const double ab2 = lengthSquared(t->b - t->a), bc2 = lengthSquared(t->c - t->b), ca2 = lengthSquared(t->a - t->c);
+    if (bc2 > ab2 && bc2 >= ca2) return cornersFrom(t->b, t->c, t->a);
+    if (ca2 > ab2) return cornersFrom(t->c, t->a, t->b);
+    return *t;
+}
+
 // At the middle of the longest edge.
 void halve(Tiles* tiles, const Limits* limits, const Tile* tile) {
-    const Corners* t = &tile->corners;
-    const double ab2 = lengthSquared(t->b - t->a), bc2 = lengthSquared(t->c - t->b), ca2 = lengthSquared(t->a - t->c);
-    Corners turned = *t;
-    if (bc2 > ab2 && bc2 >= ca2)
-        turned = cornersFrom(t->b, t->c, t->a);
-    else if (ca2 > ab2)
-        turned = cornersFrom(t->c, t->a, t->b);
-    const double3 middle = 0.5 * (turned.a + turned.b);
-    const Corners first = cornersFrom(turned.a, middle, turned.c), second = cornersFrom(middle, turned.b, turned.c);
+    const Corners t = turnedToLongest(&tile->corners);
+    const double3 middle = 0.5 * (t.a + t.b);
+    const Corners first = cornersFrom(t.a, middle, t.c), second = cornersFrom(middle, t.b, t.c);
     wait(tiles, limits, second, 0.5 * tile->area, longestEdge2(&second));
     wait(tiles, limits, first, 0.5 * tile->area, longestEdge2(&first));
 }
@@ -99,13 +104,24 @@ void quarter(Tiles* tiles, const Limits* limits, const Tile* tile) {
     wait(tiles, limits, cornersFrom(t->a, ab, ca), area, longest2);
 }
 
-// Rows of samples that Algorithm 1, or Fig. 2 of the paper, gives a part of a triangle; 0 if it must be cut.
-int rowsOf(const Sampling* sampling, double area, double longest2) {
-    const double epsilon = sampling->epsilon, sliver2 = SLIVER_STEP * SLIVER_STEP * epsilon;
-    if (sampling->recursive) return area <= epsilon && !(sampling->fillGaps && longest2 > sliver2) ? 1 : 0;
+// The samples of a part of a triangle: rows of them or, where it is thin, one row along it. None if it must be cut.
+typedef struct {
+    int rows;   // n of Algorithm 1; 1 in Fig. 2 of the paper
+    int along;  // see ThinPart
+} Shape;
+
+Shape shapeOf(const Sampling* sampling, const Tile* tile) {
+    const double epsilon = sampling->epsilon, sliver2 = SLIVER_STEP * SLIVER_STEP * epsilon, area = tile->area,
+                 longest2 = tile->longest2;
+    const Shape cut = {0, 0}, one = {1, 0};
+    if (sampling->recursive) return area <= epsilon && !(sampling->fillGaps && longest2 > sliver2) ? one : cut;
     const double n = max(1.0, ceil(sqrt(area / epsilon))), most = sampling->maxSubdivision;
-    if (sampling->fillGaps && (longest2 > sliver2 * n * n || n > most)) return 0;
-    return (int)(min(n, most));
+    if (sampling->fillGaps && longest2 > sliver2 * n * n) {
+        const Shape thin = {0, (int)(ceil(sqrt(longest2 / (THIN_STEP * THIN_STEP * epsilon))))};
+        return 4 * area * area <= epsilon * longest2 ? thin : cut;
+    }
+    const Shape rows = {(int)(min(n, most)), 0};
+    return sampling->fillGaps && n > most ? cut : rows;
 }
 
 void cutTile(Tiles* tiles, const Sampling* sampling, const Limits* limits, const Tile* tile) {
@@ -117,15 +133,42 @@ void cutTile(Tiles* tiles, const Sampling* sampling, const Limits* limits, const
         quarter(tiles, limits, tile);
 }
 
-// Takes the next tile that is to be sampled, and its rows; 0 if there is none left.
-int nextTile(Tiles* tiles, const Sampling* sampling, const Limits* limits, Tile* tile) {
+// Takes the next tile that is to be sampled. False if there is none left.
+bool nextTile(Tiles* tiles, const Sampling* sampling, const Limits* limits, Tile* tile, Shape* shape) {
     while (tiles->count > 0) {
         *tile = tiles->waiting[--tiles->count];
-        const int rows = rowsOf(sampling, tile->area, tile->longest2);
-        if (rows > 0) return rows;
+        *shape = shapeOf(sampling, tile);
+        if (shape->rows + shape->along > 0) return true;
         cutTile(tiles, sampling, limits, tile);
     }
-    return 0;
+    return false;
+}
+
+// A run of the samples of a thin part: ThinPart of sdf/tile_cutter.h.
+typedef struct {
+    double3 start, startStep, rise;
+    double up, upStep, down, downStep;
+    int count;  // 0 if the run stays away from the limits
+} ThinRun;
+
+ThinRun thinRun(const Corners* turned, int along, int first, const Limits* limits) {
+    const double3 edge = turned->b - turned->a, opposite = turned->c - turned->a, none = 0.0;
+    const double step = 1.0 / along, at = (first + 0.5) * step;
+    const double peak = clamp(dot(opposite, edge) / dot(edge, edge), 1e-6, 1 - 1e-6);
+    ThinRun run = {turned->a + at * edge, step * edge,           0.5 * (opposite - peak * edge), at / peak, step / peak,
+                   (1 - at) / (1 - peak), -step / (1 - peak), min(THIN_RUN, along - first)};
+    const double3 end = run.start + (double)(run.count - 1) * run.startStep;
+    const double3 lower = min(run.start, end) + min(run.rise, none), upper = max(run.start, end) + max(run.rise, none);
+    const Corners box = {lower, upper, lower};
+    if (misses(&box, limits)) run.count = 0;
+    return run;
+}
+
+uint countThin(const Corners* t, int along, const Limits* limits) {
+    const Corners turned = turnedToLongest(t);
+    uint count = 0;
+    for (int first = 0; first < along; first += THIN_RUN) count += (uint)(thinRun(&turned, along, first, limits).count);
+    return count;
 }
 
 // Begins with a whole triangle.
@@ -161,9 +204,11 @@ uint countParts(const Grid* grid, const Corners* t, const Limits* limits) {
     Tiles tiles;
     Tile tile;
     beginTiles(&tiles, t, normalOf(t));
+    Shape shape;
     uint count = 0;
-    for (int rows; (rows = nextTile(&tiles, &grid->sampling, limits, &tile)) > 0;)
-        count += (uint)(rows * (rows + 1) / 2);
+    while (nextTile(&tiles, &grid->sampling, limits, &tile, &shape))
+        count += shape.rows > 0 ? (uint)(shape.rows * (shape.rows + 1) / 2)
+                                : countThin(&tile.corners, shape.along, limits);
     return count;
 }
 
@@ -226,6 +271,11 @@ Real3 same3(double3 v) {
     return make3((Real)((float)(v.x)), (Real)((float)(v.y)), (Real)((float)(v.z)));
 }
 
+// Bits of the first lanes of a batch, all of them at most.
+uint firstLanes(int count) {
+    return count < BATCH ? (1u << count) - 1 : (1u << BATCH) - 1;
+}
+
 // The same for one part of a triangle, many samples at once.
 void addPart(Cut* cut, const Corners* t, int rows, double3 normal, uint triangle) {
     const double step = 1.0 / rows;
@@ -238,8 +288,28 @@ void addPart(Cut* cut, const Corners* t, int rows, double3 normal, uint triangle
         const Real number = laneNumbers + (float)(k);
         const Real row = floor((sqrt(multiplyAdd(number, (Real)(8.0f), (Real)(1.0f))) - 1.0f) * 0.5f),
                    column = number - 0.5f * multiplyAdd(row, row, row);
-        const uint among = count - k < BATCH ? (1u << (count - k)) - 1 : (1u << BATCH) - 1;
-        addSamples(cut, among, placeIn(&spread, row, column), spread.offset, (RealInt)((int)(triangle)));
+        addSamples(cut, firstLanes(count - k), placeIn(&spread, row, column), spread.offset,
+                   (RealInt)((int)(triangle)));
+    }
+}
+
+// The samples of a thin part.
+void addThin(Cut* cut, const Corners* t, int along, double3 normal, uint triangle, const Limits* limits) {
+    const Corners turned = turnedToLongest(t);
+    const Real3 offset = same3(normal * (cut->delta / length(normal)));
+    for (int first = 0; first < along; first += THIN_RUN) {
+        const ThinRun run = thinRun(&turned, along, first, limits);
+        const Real3 start = same3(run.start - cut->origin), step = same3(run.startStep), rise = same3(run.rise);
+        const Real up = (Real)((float)(run.up)), upStep = (Real)((float)(run.upStep)), down = (Real)((float)(run.down)),
+                   downStep = (Real)((float)(run.downStep));
+        for (int k = 0; k < run.count; k += BATCH) {
+            const Real number = laneNumbers + (float)(k);
+            const Real across = min(multiplyAdd(number, upStep, up), multiplyAdd(number, downStep, down));
+            const Real3 place = make3(multiplyAdd(across, rise.x, multiplyAdd(number, step.x, start.x)),
+                                      multiplyAdd(across, rise.y, multiplyAdd(number, step.y, start.y)),
+                                      multiplyAdd(across, rise.z, multiplyAdd(number, step.z, start.z)));
+            addSamples(cut, firstLanes(run.count - k), place, offset, (RealInt)((int)(triangle)));
+        }
     }
 }
 
@@ -248,8 +318,13 @@ void cutLarge(Cut* cut, const Grid* grid, uint triangle, const Corners* t, doubl
     Tiles tiles;
     Tile tile;
     beginTiles(&tiles, t, normal);
-    for (int rows; (rows = nextTile(&tiles, &grid->sampling, limits, &tile)) > 0;)
-        addPart(cut, &tile.corners, rows, normal, triangle);
+    Shape shape;
+    while (nextTile(&tiles, &grid->sampling, limits, &tile, &shape)) {
+        if (shape.rows > 0)
+            addPart(cut, &tile.corners, shape.rows, normal, triangle);
+        else
+            addThin(cut, &tile.corners, shape.along, normal, triangle, limits);
+    }
 }
 
 Exact3 fromOrigin(Exact3 corner, double3 origin) {

@@ -31,8 +31,8 @@ struct DoubleLayerOptions {
     int maxSubdivision = 32;  ///< n_max: most rows of samples in one piece of a triangle, in 1..1024
     Subdivision subdivision = Subdivision::rows;
     /// true: triangles for which Algorithm 1 would leave gaps (too large for n_max rows, or slivers) are first cut into
-    /// pieces, and K grows with the band, so that the band is complete. false: the paper to the letter, n clamped to
-    /// n_max and a cube of (2K + 1)^3 voxels around each sample, gaps included.
+    /// pieces, thin ones sampled along their length, and K grows with the band, so that the band is complete. false:
+    /// the paper to the letter, n clamped to n_max and a cube of (2K + 1)^3 voxels around each sample, gaps included.
     bool fillGaps = true;
 };
 

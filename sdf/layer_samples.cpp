@@ -78,7 +78,12 @@ class Spreader {
         const std::size_t lanes = hn::Lanes(Wide());
         const TriangleLimits limits{origin_ + glm::dvec3(cells_.lower), origin_ + glm::dvec3(cells_.upper)};
         std::uint32_t triangle = 0;
-        TileCutter cutter(brick_.options, &limits, [&](const TilePart& part) { addRows(part, triangle); });
+        TileCutter cutter(brick_.options, &limits, [&](const TilePart& part) {
+            if (part.rows > 0)
+                addRows(part, triangle);
+            else
+                addThin(part, triangle, limits);
+        });
         for (std::size_t i = 0; i < triangles.size(); i += lanes) {
             const std::size_t count = std::min(lanes, triangles.size() - i);
             load(triangles, i, count);
@@ -199,8 +204,7 @@ class Spreader {
         const glm::dvec3 s1 = (c[1] - c[0]) * step, s2 = (c[2] - c[1]) * step, s3 = (c[2] - c[0]) * step;
         const auto first = pointsAt(tag, glm::vec3(c[0] - origin_ + (s1 + s3) / 3.0)),
                    down = pointsAt(tag, glm::vec3(s1)), across = pointsAt(tag, glm::vec3(s2));
-        // divided in double: floats cannot hold the area of a very small triangle
-        const auto offset = pointsAt(tag, glm::vec3(part.normal * (double(brick_.options.delta) / part.length)));
+        const auto offset = offsetOf(part);
         const auto owner = hn::Set(intTag, std::int32_t(triangle));
         const auto half = hn::Set(tag, 0.5f), one = hn::Set(tag, 1.f);
         const int count = part.rows * (part.rows + 1) / 2;
@@ -217,6 +221,38 @@ class Spreader {
                 {place(first.x, down.x, across.x), place(first.y, down.y, across.y), place(first.z, down.z, across.z)},
                 offset, owner);
         }
+    }
+
+    // The samples of a thin part.
+    void addThin(const TilePart& part, std::uint32_t triangle, const TriangleLimits& limits) {
+        const Row tag;
+        const auto offset = offsetOf(part);
+        const auto owner = hn::Set(hn::RebindToSigned<Row>(), std::int32_t(triangle));
+        for (int begin = 0; begin < part.along; begin += ThinPart::run) {
+            const int count = std::min(ThinPart::run, part.along - begin);
+            const ThinPart thin(part, begin);
+            if (misses(thin.boxOf(count), limits)) continue;
+            const auto first = pointsAt(tag, glm::vec3(thin.start - origin_)),
+                       step = pointsAt(tag, glm::vec3(thin.startStep)), rise = pointsAt(tag, glm::vec3(thin.rise));
+            for (int k = 0; k < count; k += int(hn::Lanes(tag))) {
+                const auto number = hn::Iota(tag, float(k));
+                const auto line = [&](double at, double each) {
+                    return hn::MulAdd(number, hn::Set(tag, float(each)), hn::Set(tag, float(at)));
+                };
+                const auto across = hn::Min(line(thin.up, thin.upStep), line(thin.down, thin.downStep));
+                const auto place = [&](auto at, auto each, auto upwards) {
+                    return hn::MulAdd(across, upwards, hn::MulAdd(number, each, at));
+                };
+                put(tag, hn::FirstN(tag, std::size_t(count - k)),
+                    {place(first.x, step.x, rise.x), place(first.y, step.y, rise.y), place(first.z, step.z, rise.z)},
+                    offset, owner);
+            }
+        }
+    }
+
+    // Of the outer layer from the samples. Divided in double: floats cannot hold the area of a very small triangle.
+    Points<Row> offsetOf(const TilePart& part) const {
+        return pointsAt(Row(), glm::vec3(part.normal * (double(brick_.options.delta) / part.length)));
     }
 
     // Adds those `among` some samples, without those that stay away from the brick.

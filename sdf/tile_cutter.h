@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
 
@@ -12,17 +14,69 @@
 
 namespace bilayer {
 
-/// A part of a triangle with the rows of samples that it gets.
+/// A part of a triangle with the samples that it gets: rows of them or, where the part is thin, one row along it.
 struct TilePart {
     TriangleCorners corners;
-    int rows;                  ///< n of Algorithm 1
+    int rows;                  ///< n of Algorithm 1; 0 if the part is thin
+    int along;                 ///< samples of a thin part, see ThinPart
     const glm::dvec3& normal;  ///< of the triangle, outward
     double length;             ///< of the normal
+};
+
+/// Where the samples of a thin part lie: at `(k + 1/2) / along` of its longest edge, and from there half of the way
+/// across. The first one lies at `start + min(up, down) * rise`; from one to the next `start`, `up` and `down` change
+/// by their steps. A run of them is begun anew, so that floats hold what they are from its first one.
+struct ThinPart {
+    static constexpr int run = 16;  ///< samples
+
+    glm::dvec3 start, startStep, rise;  ///< on the edge, and half of the way to the corner opposite [voxels]
+    double up, upStep, down, downStep;
+
+    /// @param first  of the samples of a run
+    ThinPart(const TilePart& part, int first) {
+        const TriangleCorners& c = part.corners;
+        const std::size_t i = longestEdge(c);
+        const glm::dvec3 &from = c[i], edge = c[(i + 1) % 3] - from, opposite = c[(i + 2) % 3] - from;
+        const double step = 1.0 / double(part.along), at = (double(first) + 0.5) * step;
+        // a corner above an end of the edge is one that is almost there
+        const double peak = std::clamp(glm::dot(opposite, edge) / glm::dot(edge, edge), 1e-6, 1 - 1e-6);
+        start = from + at * edge;
+        startStep = step * edge;
+        rise = 0.5 * (opposite - peak * edge);
+        up = at / peak;
+        upStep = step / peak;
+        down = (1 - at) / (1 - peak);
+        downStep = -step / (1 - peak);
+    }
+
+    /// Two corners of a box around so many samples, and the first again.
+    TriangleCorners boxOf(int samples) const {
+        const glm::dvec3 end = start + double(samples - 1) * startStep, none(0);
+        const glm::dvec3 lower = glm::min(start, end) + glm::min(rise, none),
+                         upper = glm::max(start, end) + glm::max(rise, none);
+        return {lower, upper, lower};
+    }
+
+    static std::size_t longestEdge(const TriangleCorners& c) {
+        std::size_t longest = 0;
+        double longest2 = 0;
+        for (std::size_t i = 0; i < 3; ++i) {
+            const glm::dvec3 edge = c[(i + 1) % 3] - c[i];
+            if (const double length2 = glm::dot(edge, edge); length2 > longest2) {
+                longest2 = length2;
+                longest = i;
+            }
+        }
+        return longest;
+    }
 };
 
 /// Algorithm 1 divides the longest edge into as many parts as the others. For a triangle of ordinary shape a part is at
 /// most 2 sqrt(epsilon) long (half a square: exactly 2); beyond this factor the triangle counts as a sliver.
 inline constexpr double sliverStep = 3.0;
+
+/// The samples of a thin part are so many roots of epsilon apart, as along the longest edge of half a square.
+inline constexpr double thinStep = 2.0;
 
 /// A triangle with an area up to epsilon has one sample if the square of its longest edge is at most this [voxels^2].
 inline double longestOfOneSample2(const DoubleLayerOptions& options) {
@@ -51,7 +105,7 @@ class TileCutter {
         normal_ = normal;
         length_ = length;
         const double area = 0.5 * length_;
-        if (area <= epsilon_ && longest2 <= longestOfOneSample2(options_)) return emit(c, 1);
+        if (area <= epsilon_ && longest2 <= longestOfOneSample2(options_)) return emitRows(c, 1);
         if (options_.subdivision == Subdivision::recursive)
             recurse(c, area, longest2);
         else
@@ -66,35 +120,31 @@ class TileCutter {
         return std::max({glm::dot(ab, ab), glm::dot(bc, bc), glm::dot(ca, ca)});
     }
 
-    // Algorithm 1; where it would leave gaps, on halves or quarters of the triangle.
+    // Algorithm 1; where it would leave gaps, on halves or quarters of the triangle, or a row of samples along it.
     void rows(const TriangleCorners& c, double area, double longest2) {
         const double n = std::max(1.0, std::ceil(std::sqrt(area / epsilon_)));
         if (options_.fillGaps) {
-            if (longest2 > sliverStep * sliverStep * n * n * epsilon_) return halve(c, area, &TileCutter::rows);
+            if (longest2 > sliverStep * sliverStep * n * n * epsilon_) {
+                // no higher above its longest edge than rows are apart
+                if (4 * area * area <= epsilon_ * longest2) return emitThin(c, longest2);
+                return halve(c, area, &TileCutter::rows);
+            }
             if (n > options_.maxSubdivision) return quarter(c, area, longest2, &TileCutter::rows);
         }
-        emit(c, int(std::min(n, double(options_.maxSubdivision))));
+        emitRows(c, int(std::min(n, double(options_.maxSubdivision))));
     }
 
     // Fig. 2: barycentres of parts below epsilon.
     void recurse(const TriangleCorners& c, double area, double longest2) {
         if (options_.fillGaps && longest2 > sliverStep * sliverStep * epsilon_ && area <= epsilon_)
             return halve(c, area, &TileCutter::recurse);
-        if (area <= epsilon_) return emit(c, 1);
+        if (area <= epsilon_) return emitRows(c, 1);
         if (area <= 2 * epsilon_) return halve(c, area, &TileCutter::recurse);
         quarter(c, area, longest2, &TileCutter::recurse);
     }
 
     void halve(const TriangleCorners& c, double area, Next next) {
-        std::size_t i = 0;
-        double longest2 = 0;
-        for (std::size_t k = 0; k < 3; ++k) {
-            const glm::dvec3 edge = c[(k + 1) % 3] - c[k];
-            if (const double length2 = glm::dot(edge, edge); length2 > longest2) {
-                longest2 = length2;
-                i = k;
-            }
-        }
+        const std::size_t i = ThinPart::longestEdge(c);
         const std::size_t j = (i + 1) % 3, k = (i + 2) % 3;
         const glm::dvec3 middle = 0.5 * (c[i] + c[j]);
         for (const TriangleCorners& half : {TriangleCorners{c[i], middle, c[k]}, TriangleCorners{middle, c[j], c[k]}})
@@ -112,7 +162,11 @@ class TileCutter {
         if (!limits_ || !misses(c, *limits_)) (this->*next)(c, area, longest2);
     }
 
-    void emit(const TriangleCorners& c, int n) { emit_(TilePart{c, n, normal_, length_}); }
+    void emitRows(const TriangleCorners& c, int n) { emit_(TilePart{c, n, 0, normal_, length_}); }
+
+    void emitThin(const TriangleCorners& c, double longest2) {
+        emit_(TilePart{c, 0, int(std::ceil(std::sqrt(longest2 / (thinStep * thinStep * epsilon_)))), normal_, length_});
+    }
 
     const DoubleLayerOptions& options_;
     double epsilon_;

@@ -110,6 +110,81 @@ void addCap(Mesh& mesh, const CubeGrid& grid, bool top) {
         }
 }
 
+// Triangles between two rings of vertices, the second one the higher: turns on with whichever ring has its next vertex
+// first.
+void addStrip(Mesh& mesh, unsigned low, int lowCount, float lowTurn, unsigned high, int highCount, float highTurn) {
+    const auto angle = [](int i, int count, float turn) { return (float(i) + turn) / float(count); };
+    const auto at = [](unsigned begin, int i, int count) { return begin + unsigned(i % count); };
+    for (int i = 0, j = 0; i < lowCount || j < highCount;) {
+        const bool onLow =
+            j == highCount || (i < lowCount && angle(i + 1, lowCount, lowTurn) <= angle(j + 1, highCount, highTurn));
+        const unsigned a = at(low, i, lowCount), b = at(high, j, highCount);
+        if (onLow)
+            mesh.triangles.push_back({a, at(low, ++i, lowCount), b});
+        else
+            mesh.triangles.push_back({a, at(high, ++j, highCount), b});
+    }
+}
+
+// A unit sphere of rings of vertices, as many on each as keep triangles alike, between two poles.
+Mesh ringedSphere(std::size_t triangles) {
+    const float height = std::sqrt(std::sqrt(3.f) * 4 * pi / float(triangles));  // of an equilateral one
+    const int rings = std::max(3, int(std::lround(pi / height)) - 1);
+    const auto slope = [&](int ring) { return pi * float(ring + 1) / float(rings + 1); };
+    float sines = 0;
+    for (int i = 0; i < rings; ++i) sines += std::sin(slope(i));
+    std::vector<int> counts;
+    int rest = int(triangles / 2);
+    for (int i = 0; i < rings; ++i) {
+        counts.push_back(std::max(3, int(std::lround(float(triangles / 2) * std::sin(slope(i)) / sines))));
+        rest -= counts.back();
+    }
+    counts[std::size_t(rings / 2)] += rest;  // what rounding leaves over, on the longest one
+
+    Mesh mesh{{{0, 0, -1}}, {}};
+    std::vector<unsigned> begins;
+    const auto turn = [](std::size_t ring) { return ring % 2 ? 0.5f : 0.f; };
+    for (std::size_t ring = 0; ring < counts.size(); ++ring) {
+        begins.push_back(unsigned(mesh.points.size()));
+        const float across = std::sin(slope(int(ring))), up = -std::cos(slope(int(ring)));
+        for (int i = 0; i < counts[ring]; ++i) {
+            const float angle = 2 * pi * (float(i) + turn(ring)) / float(counts[ring]);
+            mesh.points.push_back({across * std::cos(angle), across * std::sin(angle), up});
+        }
+    }
+    const auto top = unsigned(mesh.points.size());
+    mesh.points.push_back({0, 0, 1});
+    const auto next = [&](std::size_t ring, int i) { return begins[ring] + unsigned((i + 1) % counts[ring]); };
+    for (int i = 0; i < counts.front(); ++i) mesh.triangles.push_back({0, next(0, i), begins[0] + unsigned(i)});
+    for (std::size_t ring = 0; ring + 1 < counts.size(); ++ring)
+        addStrip(mesh, begins[ring], counts[ring], turn(ring), begins[ring + 1], counts[ring + 1], turn(ring + 1));
+    for (int i = 0; i < counts.back(); ++i)
+        mesh.triangles.push_back({begins.back() + unsigned(i), next(counts.size() - 1, i), top});
+    return mesh;
+}
+
+// The unit sphere onto itself, angles kept: a plane laid on its lowest point, onto which it is projected from its
+// highest one, grows to `scale` times its size.
+Mesh grownBelow(Mesh mesh, float scale) {
+    for (glm::vec3& p : mesh.points) {
+        const float above = scale * scale * (1 + p.z), below = 1 - p.z;
+        p = glm::vec3(2 * scale * p.x, 2 * scale * p.y, above - below) / (above + below);
+    }
+    return mesh;
+}
+
+double deviationOfAreas(const Mesh& mesh) {
+    double sum = 0, squares = 0;
+    for (const glm::uvec3& t : mesh.triangles) {
+        const glm::dvec3 a(mesh.points[t.x]), b(mesh.points[t.y]), c(mesh.points[t.z]);
+        const double area = 0.5 * glm::length(glm::cross(b - a, c - a));
+        sum += area;
+        squares += area * area;
+    }
+    const double count = double(mesh.triangles.size()), mean = sum / count;
+    return std::sqrt(squares / count - mean * mean);
+}
+
 }  // namespace
 
 Mesh box(const glm::vec3& halfExtents, int cells) {
@@ -277,6 +352,20 @@ Mesh carvedBox(std::size_t triangles, float radius) {
         for (int k = 0; k < grid.around(); ++k)
             addQuad(mesh, grid.wall(k, row), grid.wall(k + 1, row), grid.wall(k + 1, row + 1), grid.wall(k, row + 1));
     return mesh;
+}
+
+Mesh unevenSphere(float deviation, std::size_t triangles) {
+    if (triangles < 100 || triangles % 2)
+        throw std::invalid_argument("an uneven sphere has 100 triangles or more, evenly");
+    const Mesh even = ringedSphere(triangles);
+    float low = 1, high = 16;
+    if (!(deviation >= deviationOfAreas(even) && deviation <= deviationOfAreas(grownBelow(even, high))))
+        throw std::invalid_argument("no such sphere has areas of that deviation");
+    for (int i = 0; i < 30; ++i) {
+        const float middle = (low + high) / 2;
+        (deviationOfAreas(grownBelow(even, middle)) < deviation ? low : high) = middle;
+    }
+    return grownBelow(even, low);
 }
 
 Mesh join(const std::vector<Mesh>& meshes) {

@@ -46,6 +46,16 @@ Mesh bowl(float radius, float wall, int segments = 128, float opening = 1.570796
 /// Throws std::invalid_argument for fewer than 100 triangles.
 Mesh carvedBox(std::size_t triangles = paperCircularBox, float radius = 1);
 
+/// Triangles of the sphere of Table 5 in Wu, Man, Xie (2014).
+inline constexpr std::size_t paperSphere = 3210;
+
+/// A unit sphere of triangles of like shape and unlike areas: a sphere of about equal ones under a Moebius map, which
+/// keeps angles, so that they are small around one pole and large around the other.
+/// @param triangles  exactly how many; even, 100 at least
+/// @param deviation  the standard deviation of their areas [m^2]
+/// Throws std::invalid_argument for too few triangles, and for a deviation that no such map reaches.
+Mesh unevenSphere(float deviation, std::size_t triangles = paperSphere);
+
 /// Several meshes as one.
 Mesh join(const std::vector<Mesh>& meshes);
 

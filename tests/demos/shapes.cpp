@@ -1,4 +1,4 @@
-// The carved box, which benchmarks stand on, is the mesh that it claims to be.
+// The carved box and the uneven sphere, which benchmarks stand on, are the meshes that they claim to be.
 #include "demos/shared/shapes.h"
 
 #include <algorithm>
@@ -106,4 +106,29 @@ TEST_CASE("the triangles of a carved box are about equally large") {
         largest = std::max(largest, area);
     }
     CHECK(largest < 20 * smallest);
+}
+
+TEST_CASE("uneven spheres have the areas and the shapes of triangles that they claim to have") {
+    for (const float deviation : {0.0013f, 0.0052f, 0.0098f}) {
+        const Mesh mesh = shapes::unevenSphere(deviation);
+        REQUIRE(mesh.triangles.size() == shapes::paperSphere);
+        CHECK(closedAndOriented(mesh));
+        CHECK(volume(mesh) > 4.0);
+        CHECK(volume(mesh) < 4.1888);
+        double sum = 0, squares = 0, thinnest = 1;
+        for (const auto& t : mesh.triangles) {
+            const auto [a, b, c] = corners(mesh, t);
+            const double area = glm::length(glm::cross(b - a, c - a)) / 2;
+            const double longest = std::max({glm::distance(a, b), glm::distance(b, c), glm::distance(c, a)});
+            sum += area;
+            squares += area * area;
+            thinnest = std::min(thinnest, area / (longest * longest));
+        }
+        const double count = double(mesh.triangles.size());
+        CHECK(std::sqrt(squares / count - sum * sum / (count * count)) == Approx(deviation).epsilon(1e-3));
+        CHECK(thinnest > 0.12);  // an equilateral one: 0.43, half a square: 0.25
+    }
+    CHECK_THROWS_AS(shapes::unevenSphere(0.0052f, 98), std::invalid_argument);
+    CHECK_THROWS_AS(shapes::unevenSphere(0), std::invalid_argument);
+    CHECK_THROWS_AS(shapes::unevenSphere(1), std::invalid_argument);
 }

@@ -17,18 +17,30 @@ namespace {
 /// Triangles that one task cuts: enough to hide what a task costs, few enough to share out.
 constexpr std::size_t grain = 2048;
 
-Tile tileOf(const TilePart& part, float delta) {
-    const TriangleCorners& c = part.corners;
-    const double step = 1.0 / double(part.rows);
-    const glm::dvec3 s1 = (c[1] - c[0]) * step, s2 = (c[2] - c[1]) * step, s3 = (c[2] - c[0]) * step;
-    const glm::dvec3 first = c[0] + (s1 + s3) / 3.0;
+Tile tileOf(const TilePart& part, float delta, const glm::dvec3& first, const glm::dvec3& down,
+            const glm::dvec3& across) {
     const glm::ivec3 base(std::lrint(first.x), std::lrint(first.y), std::lrint(first.z));
     return {base,
             glm::vec3(first - glm::dvec3(base)),
-            glm::vec3(s1),
-            glm::vec3(s2),
+            glm::vec3(down),
+            glm::vec3(across),
             glm::vec3(double(delta) * (part.normal / part.length)),
-            part.rows};
+            std::max(part.rows, 1)};
+}
+
+// A sample of a thin part is a tile of its own.
+template <class Emit>
+void makeTilesOf(const TilePart& part, float delta, Emit emit) {
+    const TriangleCorners& c = part.corners;
+    if (part.rows > 0) {
+        const double step = 1.0 / double(part.rows);
+        const glm::dvec3 s1 = (c[1] - c[0]) * step, s2 = (c[2] - c[1]) * step, s3 = (c[2] - c[0]) * step;
+        return emit(tileOf(part, delta, c[0] + (s1 + s3) / 3.0, s1, s2));
+    }
+    for (int k = 0; k < part.along; ++k) {
+        const ThinPart thin(part, k);
+        emit(tileOf(part, delta, thin.start + std::min(thin.up, thin.down) * thin.rise, {}, {}));
+    }
 }
 
 }  // namespace
@@ -55,7 +67,7 @@ Tiles makeTiles(const Mesh& mesh, const BuildOptions& options) {
     std::vector<std::size_t> begins(runs + 1, 0);
     tbb::parallel_for(std::size_t(0), runs, [&](std::size_t run) {
         std::size_t count = 0;
-        cutRun(run, [&](std::int32_t, const TilePart&) { ++count; });
+        cutRun(run, [&](std::int32_t, const TilePart& part) { count += std::size_t(std::max(part.along, 1)); });
         begins[run + 1] = count;
     });
     std::partial_sum(begins.begin(), begins.end(), begins.begin());
@@ -70,8 +82,10 @@ Tiles makeTiles(const Mesh& mesh, const BuildOptions& options) {
     tbb::parallel_for(std::size_t(0), runs, [&](std::size_t run) {
         std::size_t at = begins[run];
         cutRun(run, [&](std::int32_t triangle, const TilePart& part) {
-            all.tileMemory[at] = tileOf(part, options.doubleLayer.delta);
-            all.triangleMemory[at++] = triangle;
+            makeTilesOf(part, options.doubleLayer.delta, [&](const Tile& tile) {
+                all.tileMemory[at] = tile;
+                all.triangleMemory[at++] = triangle;
+            });
         });
     });
     return all;
