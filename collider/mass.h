@@ -26,8 +26,9 @@ MassProperties massProperties(const Mesh& mesh);
 /// Of what is negative between the voxels. The error is of third order in the voxel size where the surface is smooth
 /// and the band three voxels wide, of second order at edges, of first order where the band is narrower than sqrt(3)
 /// voxels. At 128 voxels it is below 0.5 %, and below 0.05 % in most cases, where walls are three voxels thick in the
-/// mean; those below two voxels are seen in part only. The same bytes for any number of threads. Throws
-/// std::invalid_argument if there is no inside.
+/// mean; those below two voxels are seen in part only. Where sharp edges are long, a field of the double layer method
+/// is off by up to 0.5 % at 128 voxels and 0.3 % at 256: its distances beside them are too large. The same bytes for
+/// any number of threads. Throws std::invalid_argument if there is no inside.
 MassProperties massProperties(const LevelSet& levelSet);
 
 }  // namespace bilayer

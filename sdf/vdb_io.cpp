@@ -1,11 +1,15 @@
 #include "sdf/vdb_io.h"
 
 #include <fmt/format.h>
+#include <oneapi/tbb/parallel_reduce.h>
 #include <openvdb/io/File.h>
 #include <openvdb/io/Stream.h>
+#include <openvdb/tree/LeafManager.h>
 
 #include <algorithm>
+#include <cmath>
 #include <fstream>
+#include <functional>
 #include <stdexcept>
 
 #include "sdf/atomic_file.h"
@@ -22,6 +26,22 @@ typename Grid::ConstPtr first(const openvdb::GridPtrVec& grids, auto accept) {
     for (const auto& base : grids)
         if (auto grid = openvdb::gridPtrCast<Grid>(base); grid && accept(*grid)) return grid;
     return nullptr;
+}
+
+// Throws std::invalid_argument where a voxel holds no number, which rounding, searches and solvers would pass on.
+void requireNumbers(const openvdb::FloatGrid& grid) {
+    const openvdb::tree::LeafManager<const openvdb::FloatTree> leaves(grid.tree());
+    const bool finite = tbb::parallel_reduce(
+        leaves.leafRange(), true,
+        [](const auto& range, bool so) {
+            for (auto leaf = range.begin(); leaf && so; ++leaf)
+                so = std::all_of(leaf->buffer().data(), leaf->buffer().data() + openvdb::FloatTree::LeafNodeType::SIZE,
+                                 [](float value) { return std::isfinite(value); });
+            return so;
+        },
+        std::logical_and<>());
+    if (!finite)
+        throw std::invalid_argument(fmt::format("grid '{}' holds a distance that is no finite number", grid.getName()));
 }
 
 }  // namespace
@@ -75,6 +95,7 @@ LevelSet readVdb(const std::filesystem::path& path) {
     if (!result->distance) throw std::runtime_error(fmt::format("{}: holds no level set", path.string()));
     result->triangle = first<openvdb::Int32Grid>(grids, [](const auto& grid) { return grid.getName() == "triangle"; });
     try {
+        requireNumbers(*result->distance);
         return LevelSet(std::move(result));
     } catch (const std::invalid_argument& error) {
         throw std::runtime_error(fmt::format("{}: {}", path.string(), error.what()));

@@ -128,6 +128,15 @@ TEST_CASE("a file without a level set is refused") {
     CHECK_THROWS_WITH(readVdb(test::scratch("fog.vdb")), Catch::Contains("no level set"));
 }
 
+TEST_CASE("a file with a distance that is no number is refused") {
+    for (const float wrong : {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity()}) {
+        const auto grid = openvdb::ConstPtrCast<openvdb::FloatGrid>(torus().grids().distance)->deepCopy();
+        grid->tree().setValue(grid->evalActiveVoxelBoundingBox().min() + openvdb::Coord(300, 0, 0), wrong);
+        openvdb::io::File(test::scratch("wrong.vdb").string()).write({grid});
+        CHECK_THROWS_WITH(readVdb(test::scratch("wrong.vdb")), Catch::Contains("no finite number"));
+    }
+}
+
 TEST_CASE("a rotated or empty grid is no level set to us") {
     const auto grids = [](auto change) {
         auto grid = openvdb::ConstPtrCast<openvdb::FloatGrid>(torus().grids().distance)->deepCopy();
