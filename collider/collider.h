@@ -8,6 +8,7 @@
 #include "collider/field.h"
 #include "collider/mass.h"
 #include "collider/motion.h"
+#include "collider/near_points.h"
 #include "collider/points.h"
 #include "collider/pose.h"
 
@@ -28,12 +29,14 @@ class Collider {
     const Field& field() const { return field_; }
     const SurfacePoints& points() const { return points_; }
     const Bounds& bounds() const { return bounds_; }  ///< of the mesh [m]
+    std::uint64_t id() const { return id_; }          ///< no other collider of this process has it
 
   private:
     Mesh mesh_;
     Field field_;
     SurfacePoints points_;
     Bounds bounds_;
+    std::uint64_t id_;
 };
 
 /// A collider somewhere in the world, perhaps grown: body coordinates x become pose.toWorld(scale * x).
@@ -87,7 +90,9 @@ struct ContactReport {
 
 /// Appends the contacts between two bodies: surface points of A in B's field, then those of B in A's field, each in
 /// ascending order of feature. Deterministic; safe from any thread. O(points near the other body).
-ContactReport collide(const Placed& a, const Placed& b, const ContactOptions& options, std::vector<Contact>& contacts);
+/// @param near  null, or what was kept of the same two bodies in the last step: the contacts are the same, found sooner
+ContactReport collide(const Placed& a, const Placed& b, const ContactOptions& options, std::vector<Contact>& contacts,
+                      NearPoints* near = nullptr);
 
 /// The same for bodies of their own size.
 inline ContactReport collide(const Collider& a, const Pose& poseA, const Collider& b, const Pose& poseB,
