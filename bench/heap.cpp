@@ -12,6 +12,7 @@
 #include <glm/geometric.hpp>
 
 #include "bench/measure.h"
+#include "demos/shared/world.h"
 
 namespace bilayer::bench {
 namespace {
@@ -70,7 +71,7 @@ class Arena {
     double kineticEnergy() const {
         double sum = 0;
         for (const auto& body : bodies_)
-            if (!body->isStaticObject()) sum += kineticEnergyOf(*body);
+            if (!body->isStaticObject()) sum += demo::kineticEnergyOf(*body);
         return sum;
     }
 
@@ -82,15 +83,6 @@ class Arena {
     }
 
   private:
-    static double kineticEnergyOf(const btRigidBody& body) {
-        const btVector3& speed = body.getLinearVelocity();
-        const btVector3 spin = body.getWorldTransform().getBasis().transpose() * body.getAngularVelocity(),
-                        &inverse = body.getInvInertiaDiagLocal();
-        double sum = 0.5 * double(speed.length2()) / double(body.getInvMass());
-        for (int axis = 0; axis < 3; ++axis) sum += 0.5 * double(spin[axis]) * spin[axis] / double(inverse[axis]);
-        return sum;
-    }
-
     void add(const Member& member) {
         const btVector3 inertia = member.mass > 0 ? inertiaOf(member) : btVector3(0, 0, 0);
         btRigidBody::btRigidBodyConstructionInfo info(member.mass, nullptr, member.form->shape, inertia);
