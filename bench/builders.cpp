@@ -8,7 +8,6 @@
 #include <algorithm>
 #include <cstdlib>
 #include <filesystem>
-#include <limits>
 #include <sstream>
 #include <stdexcept>
 
@@ -23,11 +22,11 @@ namespace {
 const Source carvedBox{"carved box", ""};
 const std::string unevenSphere = "uneven sphere ";  // and the deviation of its areas
 
-// NaN or zero for no number, and no sphere has that.
+// Zero for no number, and no sphere has that.
 float deviationIn(const std::string& name) {
-    float deviation = std::numeric_limits<float>::quiet_NaN();
-    std::istringstream(name.substr(unevenSphere.size())) >> deviation;
-    return deviation;
+    float deviation = 0;
+    std::istringstream text(name.substr(unevenSphere.size()));
+    return text >> deviation && text.eof() ? deviation : 0;
 }
 
 // OpenVDB reads the mesh in place, in voxels: no copy that it would have to pay for.

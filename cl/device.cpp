@@ -68,7 +68,9 @@ Found choose(const std::string& text) {
     const std::vector<Found> found = find();
     if (found.empty())
         throw DeviceError(
-            "there is no OpenCL device on this machine: no driver is installed, or none finds its hardware");
+            "there is no OpenCL device on this machine: no driver is installed, or none finds its hardware (PoCL also "
+            "needs a "
+            "folder that it can write to: $POCL_CACHE_DIR, or ~/.cache)");
     const std::string wanted = lowered(text);
     const auto fits = [&](const Found& f) {
         return lowered(f.info.name).find(wanted) != std::string::npos ||

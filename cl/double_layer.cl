@@ -325,7 +325,8 @@ INLINED uint combine(const Cube* cube, int slice, const Layers* layers, Lanes* v
     const Lanes certain2 = square(layers->certain),
                 inner2 = min(distances2(inner, cube->voxels, slice), certain2),
                 outer2 = min(distances2(outer, cube->voxels, slice), certain2);
-    const IntLanes inside = inner2 <= outer2 + LAYER_TIE, known = min(inner2, outer2) < certain2;
+    // where only the outer layer is near enough to be known, the tie tells nothing
+    const IntLanes inside = (inner2 < certain2) & (inner2 <= outer2 + LAYER_TIE), known = min(inner2, outer2) < certain2;
     const Lanes clamped = max(sqrt(max(max(inner2, outer2), (Lanes)(0.0f))) - layers->delta, (Lanes)(0.0f));
     *values = select((Lanes)(INFINITY), select(clamped, -clamped, inside), known);
 #if TRIANGLES

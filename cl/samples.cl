@@ -6,7 +6,8 @@
 // the triangle counts as a sliver.
 #define SLIVER_STEP 3.0
 // The samples of a thin part are so many roots of epsilon apart along it, and begun anew after so many.
-#define THIN_STEP 2.0
+#define THIN_STEP 1.6
+#define MOST_ALONG (1 << 30)
 #define THIN_RUN 16
 // More tiles than wait at once for any triangle of a grid.
 #define MOST_TILES 160
@@ -117,7 +118,7 @@ Shape shapeOf(const Sampling* sampling, const Tile* tile) {
     if (sampling->recursive) return area <= epsilon && !(sampling->fillGaps && longest2 > sliver2) ? one : cut;
     const double n = max(1.0, ceil(sqrt(area / epsilon))), most = sampling->maxSubdivision;
     if (sampling->fillGaps && longest2 > sliver2 * n * n) {
-        const Shape thin = {0, (int)(ceil(sqrt(longest2 / (THIN_STEP * THIN_STEP * epsilon))))};
+        const Shape thin = {0, (int)(min(ceil(sqrt(longest2 / (THIN_STEP * THIN_STEP * epsilon))), (double)(MOST_ALONG)))};
         return 4 * area * area <= epsilon * longest2 ? thin : cut;
     }
     const Shape rows = {(int)(min(n, most)), 0};
@@ -144,31 +145,60 @@ bool nextTile(Tiles* tiles, const Sampling* sampling, const Limits* limits, Tile
     return false;
 }
 
-// A run of the samples of a thin part: ThinPart of sdf/tile_cutter.h.
+// ThinPart of sdf/tile_cutter.h.
 typedef struct {
-    double3 start, startStep, rise;
+    double3 from, edge, rise;
+    double peak;
+    int along;
+    int begin, end;  // of the runs that may come into the limits
+} Thin;
+
+// A run of its samples.
+typedef struct {
+    double3 start, startStep;
     double up, upStep, down, downStep;
-    int count;  // 0 if the run stays away from the limits
+    int count;
 } ThinRun;
 
-ThinRun thinRun(const Corners* turned, int along, int first, const Limits* limits) {
-    const double3 edge = turned->b - turned->a, opposite = turned->c - turned->a, none = 0.0;
-    const double step = 1.0 / along, at = (first + 0.5) * step;
-    const double peak = clamp(dot(opposite, edge) / dot(edge, edge), 1e-6, 1 - 1e-6);
-    ThinRun run = {turned->a + at * edge, step * edge,           0.5 * (opposite - peak * edge), at / peak, step / peak,
-                   (1 - at) / (1 - peak), -step / (1 - peak), min(THIN_RUN, along - first)};
-    const double3 end = run.start + (double)(run.count - 1) * run.startStep;
-    const double3 lower = min(run.start, end) + min(run.rise, none), upper = max(run.start, end) + max(run.rise, none);
-    const Corners box = {lower, upper, lower};
-    if (misses(&box, limits)) run.count = 0;
+Thin thinWithin(const Corners* t, int along, const Limits* limits) {
+    const Corners turned = turnedToLongest(t);
+    Thin thin = {.from = turned.a, .edge = turned.b - turned.a, .along = along};
+    const double3 opposite = turned.c - turned.a, none = 0.0;
+    thin.peak = clamp(dot(opposite, thin.edge) / dot(thin.edge, thin.edge), 1e-6, 1 - 1e-6);
+    thin.rise = 0.5 * (opposite - thin.peak * thin.edge);
+    const double3 lower = limits->lower - max(thin.rise, none) - thin.from,
+                  upper = limits->upper - min(thin.rise, none) - thin.from;
+    // an axis that the edge does not run along leaves all of it, or nothing
+    const long3 across = thin.edge == 0.0;
+    if (any(across && (lower > 0.0 || upper < 0.0))) return thin;
+    const double3 way = select(thin.edge, (double3)(1.0), across);
+    const double3 a = select(lower / way, none, across), b = select(upper / way, (double3)(1.0), across);
+    const double3 nearer = min(a, b), farther = max(a, b);
+    const double low = max(0.0, max(nearer.x, max(nearer.y, nearer.z))),
+                 high = min(1.0, min(farther.x, min(farther.y, farther.z)));
+    if (low > high) return thin;
+    // a sample more at each end is against rounding
+    thin.begin = max(0, (int)(low * along) - 2) / THIN_RUN * THIN_RUN;
+    thin.end = min(along, (int)(high * along) + 2);
+    return thin;
+}
+
+ThinRun thinRun(const Thin* thin, int first) {
+    const double step = 1.0 / thin->along, at = (first + 1.0 / 3.0) * step, peak = thin->peak;
+    const ThinRun run = {thin->from + at * thin->edge,
+                         step * thin->edge,
+                         at / peak,
+                         step / peak,
+                         (1 - at) / (1 - peak),
+                         -step / (1 - peak),
+                         min(THIN_RUN, thin->along - first)};
     return run;
 }
 
 uint countThin(const Corners* t, int along, const Limits* limits) {
-    const Corners turned = turnedToLongest(t);
-    uint count = 0;
-    for (int first = 0; first < along; first += THIN_RUN) count += (uint)(thinRun(&turned, along, first, limits).count);
-    return count;
+    const Thin thin = thinWithin(t, along, limits);
+    const int end = min(along, (thin.end + THIN_RUN - 1) / THIN_RUN * THIN_RUN);
+    return (uint)(end - thin.begin);
 }
 
 // Begins with a whole triangle.
@@ -295,11 +325,11 @@ void addPart(Cut* cut, const Corners* t, int rows, double3 normal, uint triangle
 
 // The samples of a thin part.
 void addThin(Cut* cut, const Corners* t, int along, double3 normal, uint triangle, const Limits* limits) {
-    const Corners turned = turnedToLongest(t);
-    const Real3 offset = same3(normal * (cut->delta / length(normal)));
-    for (int first = 0; first < along; first += THIN_RUN) {
-        const ThinRun run = thinRun(&turned, along, first, limits);
-        const Real3 start = same3(run.start - cut->origin), step = same3(run.startStep), rise = same3(run.rise);
+    const Thin thin = thinWithin(t, along, limits);
+    const Real3 offset = same3(normal * (cut->delta / length(normal))), rise = same3(thin.rise);
+    for (int first = thin.begin; first < thin.end; first += THIN_RUN) {
+        const ThinRun run = thinRun(&thin, first);
+        const Real3 start = same3(run.start - cut->origin), step = same3(run.startStep);
         const Real up = (Real)((float)(run.up)), upStep = (Real)((float)(run.upStep)), down = (Real)((float)(run.down)),
                    downStep = (Real)((float)(run.downStep));
         for (int k = 0; k < run.count; k += BATCH) {

@@ -48,6 +48,8 @@ constexpr double bytesPerTriangle = 60, bytesPerBlock = 2300;
 constexpr double mostMoved = 0.5;
 /// What exact methods promise [voxels]; it is ten times what was ever seen.
 constexpr float exactError = 1e-4f;
+/// Layers nearer to each other are told apart by rounding [voxels].
+constexpr float leastDelta = 0.1f;
 /// No point of a triangle is farther from a sample than this times the root of epsilon: samples stand no farther apart.
 constexpr float coveringRadius = 3;
 /// Room between the reach of a sample and what the band needs, against rounding [voxels].
@@ -77,7 +79,7 @@ void check(const BuildOptions& options) {
     checkWidth("exteriorWidth", options.exteriorWidth, options.voxelSize);
     checkWidth("interiorWidth", options.interiorWidth, options.voxelSize);
     require(within(options.gap, 0, 100), "gap", "in 0..100 voxels", options.gap);
-    require(layers.delta > 0 && layers.delta <= 4, "delta", "in (0, 4] voxels", layers.delta);
+    require(layers.delta >= leastDelta && layers.delta <= 4, "delta", "in [0.1, 4] voxels", layers.delta);
     require(within(layers.epsilon, 1e-4f, 1e4f), "epsilon", "in 1e-4..1e4 square voxels", layers.epsilon);
     require(within(layers.neighbourhood, 1, 64), "neighbourhood", "in 1..64", layers.neighbourhood);
     require(within(layers.maxSubdivision, 1, 1024), "maxSubdivision", "in 1..1024", layers.maxSubdivision);

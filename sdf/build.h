@@ -25,7 +25,7 @@ enum class Subdivision {
 
 /// The parameters of the double layer method; the defaults are the paper's.
 struct DoubleLayerOptions {
-    float delta = 0.5f;       ///< distance of each layer from the surface [voxels], in (0, 4]
+    float delta = 0.5f;       ///< distance of each layer from the surface [voxels], in [0.1, 4]
     float epsilon = 1.0f;     ///< area that one sample stands for [voxels^2], in [1e-4, 1e4]
     int neighbourhood = 2;    ///< K: a sample reaches at least K + 1/2 voxels, and farther if the band asks, in 1..64
     int maxSubdivision = 32;  ///< n_max: most rows of samples in one piece of a triangle, in 1..1024

@@ -170,7 +170,8 @@ HWY_INLINE void combine(const Nearest& inner, const Nearest& outer, const Voxels
     for (int x = 0; x < cubeSide; ++x) {
         const int slice = x * blockSide * blockSide;
         const Vec inner2 = hn::Min(inner.distance2(v, x), certain2), outer2 = hn::Min(outer.distance2(v, x), certain2);
-        const auto inside = hn::Le(inner2, hn::Add(outer2, hn::Set(tag, layerTie)));
+        // where only the outer layer is near enough to be known, the tie tells nothing
+        const auto inside = hn::And(hn::Lt(inner2, certain2), hn::Le(inner2, hn::Add(outer2, hn::Set(tag, layerTie))));
         const Vec other2 = hn::Max(hn::Max(inner2, outer2), hn::Zero(tag));
         const Vec clamped = hn::Max(hn::Sub(hn::Sqrt(other2), delta), hn::Zero(tag));
         const Vec phi = hn::IfThenElse(inside, hn::Neg(clamped), clamped);

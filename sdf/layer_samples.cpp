@@ -228,22 +228,22 @@ class Spreader {
         const Row tag;
         const auto offset = offsetOf(part);
         const auto owner = hn::Set(hn::RebindToSigned<Row>(), std::int32_t(triangle));
-        for (int begin = 0; begin < part.along; begin += ThinPart::run) {
-            const int count = std::min(ThinPart::run, part.along - begin);
-            const ThinPart thin(part, begin);
-            if (misses(thin.boxOf(count), limits)) continue;
-            const auto first = pointsAt(tag, glm::vec3(thin.start - origin_)),
-                       step = pointsAt(tag, glm::vec3(thin.startStep)), rise = pointsAt(tag, glm::vec3(thin.rise));
-            for (int k = 0; k < count; k += int(hn::Lanes(tag))) {
+        const ThinPart thin(part);
+        const auto [begin, end] = thin.within(limits);
+        for (int i = begin; i < end; i += ThinPart::run) {
+            const ThinPart::Run run = thin.runFrom(i);
+            const auto first = pointsAt(tag, glm::vec3(run.start - origin_)),
+                       step = pointsAt(tag, glm::vec3(run.startStep)), rise = pointsAt(tag, glm::vec3(run.rise));
+            for (int k = 0; k < run.count; k += int(hn::Lanes(tag))) {
                 const auto number = hn::Iota(tag, float(k));
                 const auto line = [&](double at, double each) {
                     return hn::MulAdd(number, hn::Set(tag, float(each)), hn::Set(tag, float(at)));
                 };
-                const auto across = hn::Min(line(thin.up, thin.upStep), line(thin.down, thin.downStep));
+                const auto across = hn::Min(line(run.up, run.upStep), line(run.down, run.downStep));
                 const auto place = [&](auto at, auto each, auto upwards) {
                     return hn::MulAdd(across, upwards, hn::MulAdd(number, each, at));
                 };
-                put(tag, hn::FirstN(tag, std::size_t(count - k)),
+                put(tag, hn::FirstN(tag, std::size_t(run.count - k)),
                     {place(first.x, step.x, rise.x), place(first.y, step.y, rise.y), place(first.z, step.z, rise.z)},
                     offset, owner);
             }

@@ -8,6 +8,7 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
+#include <utility>
 
 #include "sdf/build.h"
 #include "sdf/triangle_limits.h"
@@ -23,38 +24,62 @@ struct TilePart {
     double length;             ///< of the normal
 };
 
-/// Where the samples of a thin part lie: at `(k + 1/2) / along` of its longest edge, and from there half of the way
-/// across. The first one lies at `start + min(up, down) * rise`; from one to the next `start`, `up` and `down` change
-/// by their steps. A run of them is begun anew, so that floats hold what they are from its first one.
-struct ThinPart {
-    static constexpr int run = 16;  ///< samples
+/// Where the samples of a thin part lie: at `(k + 1/3) / along` of its longest edge, and from there half of the way
+/// across. Thirds, because the neighbour that shares the edge runs along it the other way: its samples fall between.
+class ThinPart {
+  public:
+    static constexpr int run = 16;  ///< samples that are found together
 
-    glm::dvec3 start, startStep, rise;  ///< on the edge, and half of the way to the corner opposite [voxels]
-    double up, upStep, down, downStep;
+    /// A run of them. The first one lies at `start + min(up, down) * rise`; from one to the next `start`, `up` and
+    /// `down` change by their steps.
+    struct Run {
+        glm::dvec3 start, startStep, rise;  ///< on the edge, and half of the way to the corner opposite [voxels]
+        double up, upStep, down, downStep;
+        int count;  ///< samples
+    };
 
-    /// @param first  of the samples of a run
-    ThinPart(const TilePart& part, int first) {
+    explicit ThinPart(const TilePart& part) : along_(part.along) {
         const TriangleCorners& c = part.corners;
         const std::size_t i = longestEdge(c);
-        const glm::dvec3 &from = c[i], edge = c[(i + 1) % 3] - from, opposite = c[(i + 2) % 3] - from;
-        const double step = 1.0 / double(part.along), at = (double(first) + 0.5) * step;
+        from_ = c[i];
+        edge_ = c[(i + 1) % 3] - from_;
+        const glm::dvec3 opposite = c[(i + 2) % 3] - from_;
         // a corner above an end of the edge is one that is almost there
-        const double peak = std::clamp(glm::dot(opposite, edge) / glm::dot(edge, edge), 1e-6, 1 - 1e-6);
-        start = from + at * edge;
-        startStep = step * edge;
-        rise = 0.5 * (opposite - peak * edge);
-        up = at / peak;
-        upStep = step / peak;
-        down = (1 - at) / (1 - peak);
-        downStep = -step / (1 - peak);
+        peak_ = std::clamp(glm::dot(opposite, edge_) / glm::dot(edge_, edge_), 1e-6, 1 - 1e-6);
+        rise_ = 0.5 * (opposite - peak_ * edge_);
     }
 
-    /// Two corners of a box around so many samples, and the first again.
-    TriangleCorners boxOf(int samples) const {
-        const glm::dvec3 end = start + double(samples - 1) * startStep, none(0);
-        const glm::dvec3 lower = glm::min(start, end) + glm::min(rise, none),
-                         upper = glm::max(start, end) + glm::max(rise, none);
-        return {lower, upper, lower};
+    /// Each run is found anew, so that floats hold what they are from its first sample.
+    Run runFrom(int first) const {
+        const double step = 1.0 / double(along_), at = (double(first) + 1.0 / 3.0) * step;
+        return {from_ + at * edge_,
+                step * edge_,
+                rise_,
+                at / peak_,
+                step / peak_,
+                (1 - at) / (1 - peak_),
+                -step / (1 - peak_),
+                std::min(run, along_ - first)};
+    }
+
+    /// The runs that may come into a box, by their first samples: from .first until .second, a run apart.
+    std::pair<int, int> within(const TriangleLimits& limits) const {
+        double low = 0, high = 1;  // of the edge
+        for (int axis = 0; axis < 3; ++axis) {
+            const double lower = limits.lower[axis] - std::max(rise_[axis], 0.0) - from_[axis],
+                         upper = limits.upper[axis] - std::min(rise_[axis], 0.0) - from_[axis];
+            if (edge_[axis] == 0) {
+                if (lower > 0 || upper < 0) return {0, 0};
+                continue;
+            }
+            const double a = lower / edge_[axis], b = upper / edge_[axis];
+            low = std::max(low, std::min(a, b));
+            high = std::min(high, std::max(a, b));
+        }
+        if (low > high) return {0, 0};
+        // a sample more at each end is against rounding
+        const int first = std::max(0, int(low * along_) - 2), end = std::min(along_, int(high * along_) + 2);
+        return {first / run * run, end};
     }
 
     static std::size_t longestEdge(const TriangleCorners& c) {
@@ -69,14 +94,22 @@ struct ThinPart {
         }
         return longest;
     }
+
+  private:
+    int along_;
+    glm::dvec3 from_, edge_, rise_;
+    double peak_;  // where the corner opposite is above the edge, in parts of it
 };
 
 /// Algorithm 1 divides the longest edge into as many parts as the others. For a triangle of ordinary shape a part is at
 /// most 2 sqrt(epsilon) long (half a square: exactly 2); beyond this factor the triangle counts as a sliver.
 inline constexpr double sliverStep = 3.0;
 
-/// The samples of a thin part are so many roots of epsilon apart, as along the longest edge of half a square.
-inline constexpr double thinStep = 2.0;
+/// The samples of a thin part are so many roots of epsilon apart, fewer than along the longest edge of half a square:
+/// no other row is beside them.
+inline constexpr double thinStep = 1.6;
+/// Of one part, at most.
+inline constexpr double mostAlong = 1 << 30;
 
 /// A triangle with an area up to epsilon has one sample if the square of its longest edge is at most this [voxels^2].
 inline double longestOfOneSample2(const DoubleLayerOptions& options) {
@@ -165,7 +198,8 @@ class TileCutter {
     void emitRows(const TriangleCorners& c, int n) { emit_(TilePart{c, n, 0, normal_, length_}); }
 
     void emitThin(const TriangleCorners& c, double longest2) {
-        emit_(TilePart{c, 0, int(std::ceil(std::sqrt(longest2 / (thinStep * thinStep * epsilon_)))), normal_, length_});
+        const double along = std::ceil(std::sqrt(longest2 / (thinStep * thinStep * epsilon_)));
+        emit_(TilePart{c, 0, int(std::min(along, mostAlong)), normal_, length_});
     }
 
     const DoubleLayerOptions& options_;

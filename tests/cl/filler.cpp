@@ -203,6 +203,9 @@ TEST_CASE("OpenCL and TBB agree by the paper to the letter, by recursion and wit
     SECTION("recursion") {
         options.doubleLayer.subdivision = Subdivision::recursive;
     }
+    SECTION("layers as near to each other as they may be") {
+        options.doubleLayer.delta = 0.1f;
+    }
     SECTION("fine samples, thick layers, unequal widths") {
         options.doubleLayer.epsilon = 0.3f;
         options.doubleLayer.delta = 0.9f;

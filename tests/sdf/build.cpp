@@ -278,8 +278,10 @@ TEST_CASE("bad options and meshes are refused by name") {
     refused({.voxelSize = 1e-3f, .interiorWidth = 1e-37f}, "interiorWidth");
     refused({.voxelSize = 1, .threads = 4097}, "threads");
     BuildOptions options{.voxelSize = 0.1f};
-    options.doubleLayer.delta = 0;
-    refused(options, "delta");
+    for (const float delta : {0.f, 0.099f, 4.1f}) {
+        options.doubleLayer.delta = delta;
+        refused(options, "delta");
+    }
     options = {.voxelSize = 0.1f};
     options.doubleLayer.delta = NAN;
     refused(options, "delta");

@@ -3,6 +3,7 @@
 
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <glm/gtc/matrix_transform.hpp>
 #include <limits>
 #include <map>
 #include <tuple>
@@ -11,6 +12,8 @@
 #include "demos/shared/shapes.h"
 #include "sdf/grids.h"
 #include "sdf/layer_samples.h"
+#include "sdf/mesh_io.h"
+#include "tests/support/support.h"
 #include "tests/support/tiles.h"
 
 using namespace bilayer;
@@ -188,6 +191,32 @@ TEST_CASE("the triangle of a voxel is the owner of the sample that decides its d
     // samples of two triangles that are equally far up to rounding may swap
     CAPTURE(differ, count);
     CHECK(double(differ) < 1e-3 * double(count));
+}
+
+// Of two layers of which only the outer one is near enough to be known, that one is the nearer, however narrowly.
+TEST_CASE("beyond the band, voxels lie on the side that exact distances give them") {
+    const auto onWrongSide = [](const Mesh& mesh, BuildOptions options) {
+        options.exteriorWidth = options.interiorWidth = 2;
+        const LevelSet layers = build(mesh, layered(options));
+        options.exteriorWidth = options.interiorWidth = 4;
+        const LevelSet exact = build(mesh, options);
+        const auto values = layers.grids().distance->getConstAccessor();
+        std::size_t wrong = 0;
+        for (auto voxel = exact.grids().distance->cbeginValueOn(); voxel; ++voxel)
+            wrong +=
+                std::abs(*voxel) > 2 * options.voxelSize && (*voxel < 0) != (values.getValue(voxel.getCoord()) < 0);
+        return wrong;
+    };
+    const glm::mat4 turn = glm::rotate(glm::mat4(1), 0.7f, glm::vec3(1, 2, 0.5f));
+    const Mesh sphere = transformed(shapes::unevenSphere(0.0013f), turn);
+    BuildOptions options{.voxelSize = voxelSizeFor(sphere, 200)};
+    options.doubleLayer.epsilon = 0.25f;
+    options.doubleLayer.delta = 0.1f;
+    CHECK(onWrongSide(sphere, options) == 0);
+    if (const auto path = test::corpusMesh("bunny_watertight.obj")) {
+        const Mesh bunny = readMesh(*path);
+        CHECK(onWrongSide(bunny, {.voxelSize = voxelSizeFor(bunny, 715)}) == 0);
+    }
 }
 
 TEST_CASE("a triangle whose area floats cannot hold changes nothing but what is at it") {

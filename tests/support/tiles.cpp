@@ -37,9 +37,10 @@ void makeTilesOf(const TilePart& part, float delta, Emit emit) {
         const glm::dvec3 s1 = (c[1] - c[0]) * step, s2 = (c[2] - c[1]) * step, s3 = (c[2] - c[0]) * step;
         return emit(tileOf(part, delta, c[0] + (s1 + s3) / 3.0, s1, s2));
     }
+    const ThinPart thin(part);
     for (int k = 0; k < part.along; ++k) {
-        const ThinPart thin(part, k);
-        emit(tileOf(part, delta, thin.start + std::min(thin.up, thin.down) * thin.rise, {}, {}));
+        const ThinPart::Run run = thin.runFrom(k);
+        emit(tileOf(part, delta, run.start + std::min(run.up, run.down) * run.rise, {}, {}));
     }
 }
 
