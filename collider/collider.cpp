@@ -3,10 +3,14 @@
 #include "collider/collider.h"
 
 #include <algorithm>
+#include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
 #include <optional>
+#include <stdexcept>
 #include <utility>
+
+#include "sdf/surface.h"
 
 namespace bilayer {
 namespace {
@@ -102,13 +106,31 @@ glm::vec3 outwardNormal(const Placed& other, const Touch& touch, const Placed& b
     return touch.normal == glm::vec3(0) ? -(body.pose.rotation * point.normal) : other.pose.rotation * touch.normal;
 }
 
+std::optional<MassProperties> massOf(const Mesh& mesh) {
+    try {
+        return massProperties(mesh);
+    } catch (const std::invalid_argument&) {
+        return std::nullopt;  // an open sheet: it can only be static
+    }
+}
+
 }  // namespace
 
 Collider::Collider(Mesh mesh, const LevelSet& levelSet, const ColliderOptions& options)
-    : mesh_(std::move(mesh)),
-      field_(levelSet),
-      points_(mesh_, options.pointSpacing * field_.voxelSize()),
-      bounds_(bilayer::bounds(mesh_)) {}
+    : mesh_(std::move(mesh)), field_(levelSet) {
+    if (!std::isfinite(options.margin)) throw std::invalid_argument("collider: the margin is not finite");
+    body_.points = SurfacePoints(mesh_, options.pointSpacing * field_.voxelSize());
+    body_.bounds = bilayer::bounds(mesh_);
+    body_.margin = options.margin < 0 ? field_.voxelSize() : options.margin;
+    body_.mass = massOf(mesh_);
+}
+
+Collider::Collider(const LevelSet& levelSet) : mesh_(surface(levelSet)), field_(levelSet), body_(bodyOf(levelSet)) {}
+
+const MassProperties& Collider::mass() const {
+    if (!body_.mass) throw std::invalid_argument("collider: the mesh encloses no volume");
+    return *body_.mass;
+}
 
 ContactReport collide(const Placed& a, const Placed& b, const ContactOptions& options, std::vector<Contact>& contacts) {
     ContactReport report;

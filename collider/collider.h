@@ -5,10 +5,9 @@
 #include <cstdint>
 #include <vector>
 
+#include "collider/body.h"
 #include "collider/field.h"
-#include "collider/mass.h"
 #include "collider/motion.h"
-#include "collider/points.h"
 #include "collider/pose.h"
 
 namespace bilayer {
@@ -16,6 +15,8 @@ namespace bilayer {
 struct ColliderOptions {
     /// Distance between neighbouring surface points [voxels of the field]. Smaller finds finer contacts and costs more.
     float pointSpacing = 2.0f;
+    /// Contacts are made up to this distance between the surfaces [m]. Negative: one voxel of the field.
+    float margin = -1;
 };
 
 /// A field, points on the surface, and what else contacts need. Immutable; share it between bodies and threads.
@@ -24,16 +25,24 @@ class Collider {
     /// `levelSet` must be of `mesh`. Throws std::invalid_argument if the mesh is empty.
     Collider(Mesh mesh, const LevelSet& levelSet, const ColliderOptions& options = {});
 
+    /// Of a level set with a body beside it, as readVdb() gives back what withBody() was written of. Collides as the
+    /// one that it was made of, to the bit; where triangles are asked for, it gives those of the field's zero set.
+    /// Throws std::invalid_argument as bodyOf() does.
+    explicit Collider(const LevelSet& levelSet);
+
     const Mesh& mesh() const { return mesh_; }
     const Field& field() const { return field_; }
-    const SurfacePoints& points() const { return points_; }
-    const Bounds& bounds() const { return bounds_; }  ///< of the mesh [m]
+    const Body& body() const { return body_; }
+    const SurfacePoints& points() const { return body_.points; }
+    const Bounds& bounds() const { return body_.bounds; }  ///< of the mesh [m]
+    float margin() const { return body_.margin; }          ///< as in ColliderOptions, never negative [m]
+    /// Throws std::invalid_argument where the mesh encloses no volume.
+    const MassProperties& mass() const;
 
   private:
     Mesh mesh_;
     Field field_;
-    SurfacePoints points_;
-    Bounds bounds_;
+    Body body_;
 };
 
 /// A collider somewhere in the world, perhaps grown: body coordinates x become pose.toWorld(scale * x).
