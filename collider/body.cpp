@@ -87,8 +87,8 @@ Points::ConstPtr store(const SurfacePoints& surface, double voxel) {
                         [&](std::size_t i) { return toVdb(points[i].normal); });
     addAttribute<std::int32_t>(*grid, *index, attribute::feature, points,
                                [](std::size_t i) { return std::int32_t(i); });
-    addAttribute<std::uint8_t>(*grid, *index, attribute::sharp, points,
-                               [&](std::size_t i) { return points[i].isSharp; });
+    addAttribute<std::int8_t>(*grid, *index, attribute::sharp, points,
+                              [&](std::size_t i) { return points[i].isSharp; });
     grid->setName(contactPoints);
     return grid;
 }
@@ -135,7 +135,7 @@ SurfacePoints load(const Points& grid) {
         const Handle<Vec3s> position(leaf->constAttributeArray(attribute::position));
         const Handle<Vec3s> normal(leaf->constAttributeArray(attribute::normal));
         const Handle<std::int32_t> feature(leaf->constAttributeArray(attribute::feature));
-        const Handle<std::uint8_t> sharp(leaf->constAttributeArray(attribute::sharp));
+        const Handle<std::int8_t> sharp(leaf->constAttributeArray(attribute::sharp));
         for (auto index = leaf->beginIndexOn(); index; ++index) {
             const openvdb::Vec3d place = index.getCoord().asVec3d() + openvdb::Vec3d(position.get(*index));
             collector.add(feature.get(*index),

@@ -175,6 +175,18 @@ void addRows(Table& table, const std::optional<MassProperties>& mass) {
                   fmt::format("{}: {:.6g} m^5", text(axes[i]), mass->principalInertia[i]));
 }
 
+Json toJson(const Body& body) {
+    return {{"points", body.points.points().size()},
+            {"margin", number(body.margin)},
+            {"bounds", box(body.bounds)},
+            {"mass", toJson(body.mass)}};
+}
+
+void addRows(Table& table, const Body& body) {
+    table.row("body", fmt::format("{} surface points, margin {}{}", grouped(body.points.points().size()),
+                                  metres(body.margin), body.mass ? "" : ", without a mass"));
+}
+
 ProgressBar::ProgressBar(std::string label) : label_(std::move(label)), visible_(::isatty(STDERR_FILENO)) {}
 
 ProgressBar::~ProgressBar() {
