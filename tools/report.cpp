@@ -28,7 +28,7 @@ struct Arguments {
 
 struct InspectArguments : Arguments {
     bullet::Scene scene;
-    bool advise = false;
+    CLI::Option* stepGiven = nullptr;
 };
 
 template <class Kind = Arguments>
@@ -80,7 +80,7 @@ void printAdvice(const InspectArguments& a, const bullet::Advice& advice) {
 void runInspect(const InspectArguments& a) {
     const Mesh mesh = readMesh(a.input);
     const MeshReport report = inspect(mesh);
-    const auto advice = a.advise ? std::optional(bullet::advise(report, a.scene)) : std::nullopt;
+    const auto advice = a.stepGiven->count() ? std::optional(bullet::advise(report, a.scene)) : std::nullopt;
     const std::optional<MassProperties> mass = report.closed() ? massOf(mesh) : std::nullopt;
     if (a.json) {
         Json json = toJson(report, 0);
@@ -242,7 +242,7 @@ void addScene(CLI::App& command, InspectArguments& a) {
     also("--voxel-size", scene.voxelSize, "to judge instead of choosing one [m]", positive());
     also("--margin", scene.margin, "likewise [m], default a voxel", nonNegative());
     also("--mass-ratio", scene.massRatio, "of the heaviest to the lightest in contact, default 1", within(1, 1e9));
-    group->callback([&a, step] { a.advise = step->count() > 0; });
+    a.stepGiven = step;
 }
 
 }  // namespace
