@@ -261,7 +261,7 @@ bool hasBody(const LevelSet& levelSet) {
 Body bodyOf(const LevelSet& levelSet) {
     const Entries entries(levelSet);
     const auto kind = entries.find<std::int32_t>(entry::format);
-    if (!kind) throw std::invalid_argument("the field has no body beside it");
+    if (!kind) throw std::invalid_argument("the field has no body beside it (withBody(), or bilayer build --body)");
     if (*kind != format)
         throw std::invalid_argument(fmt::format("the body is of kind {}, which only another version knows", *kind));
     Body body;

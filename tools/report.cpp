@@ -49,7 +49,7 @@ std::optional<MassProperties> massOf(const Solid& solid) {
     }
 }
 
-Json toJson(const bullet::Advice& advice) {
+Json adviceJson(const bullet::Advice& advice) {
     return {{"voxelSize", number(advice.voxelSize)},
             {"margin", number(advice.margin)},
             {"exteriorWidth", advice.exteriorWidth},
@@ -85,7 +85,7 @@ void runInspect(const InspectArguments& a) {
     if (a.json) {
         Json json = toJson(report, 0);
         json["mass"] = toJson(mass);
-        if (advice) json["advice"] = toJson(*advice);
+        if (advice) json["advice"] = adviceJson(*advice);
         return print(json);
     }
     Table table(a.input.string());
