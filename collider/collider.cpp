@@ -2,10 +2,13 @@
 // descended with the relative pose, so that only points near the other body are sampled.
 #include "collider/collider.h"
 
+#include <oneapi/tbb/task_arena.h>
+
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
+#include <mutex>
 #include <optional>
 #include <stdexcept>
 #include <utility>
@@ -116,16 +119,44 @@ std::optional<MassProperties> massOf(const Mesh& mesh) {
 
 }  // namespace
 
+/// A mesh, or the field that it is extracted from when somebody asks: few do, and it takes longer than all else that a
+/// body from a file needs.
+class Collider::Triangles {
+  public:
+    explicit Triangles(Mesh mesh) : mesh_(std::move(mesh)) {}
+    explicit Triangles(const LevelSet& field) : field_(field) {}
+
+    const Mesh& mesh() {
+        std::call_once(once_, [&] {
+            if (!field_) return;
+            // a thread that waits for others here must not take up work that asks for this very mesh
+            tbb::this_task_arena::isolate([&] { mesh_ = surface(*field_); });
+            field_.reset();
+        });
+        return mesh_;
+    }
+
+  private:
+    std::optional<LevelSet> field_;
+    Mesh mesh_;
+    std::once_flag once_;
+};
+
 Collider::Collider(Mesh mesh, const LevelSet& levelSet, const ColliderOptions& options)
-    : mesh_(std::move(mesh)), field_(levelSet) {
+    : triangles_(std::make_shared<Triangles>(std::move(mesh))), field_(levelSet) {
     if (!std::isfinite(options.margin)) throw std::invalid_argument("collider: the margin is not finite");
-    body_.points = SurfacePoints(mesh_, options.pointSpacing * field_.voxelSize());
-    body_.bounds = bilayer::bounds(mesh_);
+    body_.points = SurfacePoints(this->mesh(), options.pointSpacing * field_.voxelSize());
+    body_.bounds = bilayer::bounds(this->mesh());
     body_.margin = options.margin < 0 ? field_.voxelSize() : options.margin;
-    body_.mass = massOf(mesh_);
+    body_.mass = massOf(this->mesh());
 }
 
-Collider::Collider(const LevelSet& levelSet) : mesh_(surface(levelSet)), field_(levelSet), body_(bodyOf(levelSet)) {}
+Collider::Collider(const LevelSet& levelSet)
+    : triangles_(std::make_shared<Triangles>(levelSet)), field_(levelSet), body_(bodyOf(levelSet)) {}
+
+const Mesh& Collider::mesh() const {
+    return triangles_->mesh();
+}
 
 const MassProperties& Collider::mass() const {
     if (!body_.mass) throw std::invalid_argument("collider: the mesh encloses no volume");

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "collider/body.h"
@@ -30,7 +31,8 @@ class Collider {
     /// Throws std::invalid_argument as bodyOf() does.
     explicit Collider(const LevelSet& levelSet);
 
-    const Mesh& mesh() const { return mesh_; }
+    /// Of a body from a file it is extracted when first asked for, once.
+    const Mesh& mesh() const;
     const Field& field() const { return field_; }
     const Body& body() const { return body_; }
     const SurfacePoints& points() const { return body_.points; }
@@ -40,7 +42,8 @@ class Collider {
     const MassProperties& mass() const;
 
   private:
-    Mesh mesh_;
+    class Triangles;
+    std::shared_ptr<Triangles> triangles_;
     Field field_;
     Body body_;
 };

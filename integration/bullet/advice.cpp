@@ -36,9 +36,9 @@ constexpr float mostMassRatio = 10;          // what ten iterations of sequentia
 constexpr double mostMemory = double(1 << 30);
 // Measured at the end of large builds on two cores of an AMD EPYC (Zen 4), 2023 [s].
 constexpr double secondsPerTriangle = 160e-9, secondsPerVoxel = 26e-9;
-// A block of 8^3 voxels as a Field keeps it, with an apron [bytes]; and half of how wide it is, seen from anywhere in
-// the mean [voxels].
-constexpr double blockBytes = 9 * 9 * 9 * 4, blockVoxels = 512, halfBlock = 6;
+// A block of 8^3 voxels as a Field keeps it, with an apron [bytes]; and how wide it is, seen from anywhere in the mean
+// [voxels].
+constexpr double blockBytes = 9 * 9 * 9 * 4, blockVoxels = 512, blockWidth = 12;
 
 void requireSensible(const MeshReport& mesh, const Scene& scene) {
     for (const auto& [name, value, least] :
@@ -66,13 +66,14 @@ float chosenVoxel(const Scene& scene, float longest, float wall) {
     return std::max({voxel, longest / mostResolution, leastVoxel});
 }
 
-// By area and volume: exact to first order in the curvature. A block has half its width beside the band in the mean.
+// By area and volume: exact to first order in the curvature. Blocks are counted on both sides of the surface, so that
+// walls thinner than a block need up to half of the memory only.
 void estimate(const MeshReport& mesh, Advice& advice) {
     const double h = advice.voxelSize, area = mesh.area / (h * h), volume = std::abs(mesh.volume) / (h * h * h);
-    const auto inside = [&](double width) { return mesh.closed() ? std::min(area * width, volume) : area * width; };
-    const double voxels = area * advice.exteriorWidth + inside(advice.interiorWidth);
-    const double blocks =
-        (area * (advice.exteriorWidth + halfBlock) + inside(advice.interiorWidth + halfBlock)) / blockVoxels;
+    double inside = area * advice.interiorWidth;
+    if (mesh.closed()) inside = std::min(inside, volume);
+    const double voxels = area * advice.exteriorWidth + inside;
+    const double blocks = area * (advice.exteriorWidth + advice.interiorWidth + blockWidth) / blockVoxels;
     advice.voxels = std::uint64_t(voxels);
     advice.fieldBytes = std::uint64_t(blocks * blockBytes);
     advice.buildSeconds = secondsPerTriangle * double(mesh.triangles) + secondsPerVoxel * voxels;

@@ -32,7 +32,7 @@ struct Advice {
     float wallVoxels = 0;          ///< thickness of the thinnest wall [voxels]; 0: none is known
     float splitImpulse = 0;        ///< for m_splitImpulsePenetrationThreshold [m]
     std::uint64_t voxels = 0;      ///< active ones, about
-    std::uint64_t fieldBytes = 0;  ///< of the Field laid out, about [bytes]
+    std::uint64_t fieldBytes = 0;  ///< of the Field laid out, about; of thin bodies down to half of it [bytes]
     double buildSeconds = 0;       ///< on two cores of 2023, about [s]
     std::vector<std::string> warnings;
 };

@@ -107,7 +107,9 @@ TEST_CASE("Estimates are near what is built") {
                                         .exteriorWidth = float(advice.exteriorWidth),
                                         .interiorWidth = float(advice.interiorWidth)});
     CHECK(double(advice.voxels) == Approx(double(field.activeVoxels())).epsilon(0.2));
-    CHECK(double(advice.fieldBytes) == Approx(double(Field(field).memoryBytes())).epsilon(0.3));
+    const double bytes = double(Field(field).memoryBytes());
+    CHECK(bytes < 1.3 * double(advice.fieldBytes));
+    CHECK(bytes > 0.5 * double(advice.fieldBytes));
     CHECK(advice.buildSeconds > 0);
 }
 

@@ -68,7 +68,7 @@ TEST_CASE("A shape of a body from a file has its margin, its inertia and its box
     const Shape made(knot.made), loaded(knot.loaded);
     CHECK(made.getMargin() == 0.6f * 0.02f);
     CHECK(loaded.getMargin() == made.getMargin());
-    btVector3 expected, inertia;
+    btVector3 expected(0, 0, 0), inertia(0, 0, 0);
     made.calculateLocalInertia(2, expected);
     loaded.calculateLocalInertia(2, inertia);
     CHECK(inertia == expected);

@@ -1,5 +1,6 @@
 #include "collider/body.h"
 
+#include <oneapi/tbb/parallel_for.h>
 #include <openvdb/points/PointAttribute.h>
 #include <openvdb/points/PointCount.h>
 #include <openvdb/points/PointDataGrid.h>
@@ -11,6 +12,7 @@
 #include <glm/geometric.hpp>
 #include <limits>
 #include <stdexcept>
+#include <vector>
 
 #include "collider/collider.h"
 #include "demos/shared/shapes.h"
@@ -170,6 +172,16 @@ TEST_CASE("the triangles of a body from a file are those of its field") {
     REQUIRE(ball.loaded.mesh().triangles.size() > 1000);
     for (const glm::vec3& point : ball.loaded.mesh().points) REQUIRE(glm::length(point) == Approx(0.4f).margin(1e-3));
     REQUIRE(massProperties(ball.loaded.mesh()).volume == Approx(ball.made.mass().volume).epsilon(5e-3));
+}
+
+TEST_CASE("many threads may ask at once for the triangles of a body from a file") {
+    const Pair ball(shapes::sphere(0.4f, 4), 0.02f);
+    std::vector<const Mesh*> meshes(64);
+    tbb::parallel_for(std::size_t(0), meshes.size(), [&](std::size_t i) { meshes[i] = &ball.loaded.mesh(); });
+    for (const Mesh* mesh : meshes) REQUIRE(mesh == meshes[0]);
+    REQUIRE_FALSE(meshes[0]->triangles.empty());
+    const Collider copy = ball.loaded;
+    REQUIRE(&copy.mesh() == meshes[0]);
 }
 
 TEST_CASE("an open mesh has no mass, in a file neither") {
