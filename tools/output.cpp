@@ -107,6 +107,7 @@ Json toJson(const MeshReport& report, float wall) {
             {"wall", number(wall)},
             {"thinWalls", report.thinWalls},
             {"thinnestWall", number(report.thinnestWall)},
+            {"commonWall", number(report.commonWall)},
             {"area", report.area},
             {"volume", report.volume}};
 }
@@ -122,7 +123,9 @@ void addRows(Table& table, const MeshReport& report, float wall) {
     table.row("self-intersections", fmt::format("{} pairs of triangles", grouped(report.selfIntersections)));
     table.row("degenerate triangles", grouped(report.degenerateTriangles));
     table.row("duplicate triangles", grouped(report.duplicateTriangles));
-    if (report.thinnestWall > 0) table.row("thinnest wall", metres(report.thinnestWall));
+    if (report.thinnestWall > 0)
+        table.row("thinnest wall", fmt::format("{}; behind 99 % of the area {} at least", metres(report.thinnestWall),
+                                               metres(report.commonWall)));
     if (wall > 0)
         table.row("thin walls", fmt::format("{} triangles, below {}", grouped(report.thinWalls), metres(wall)));
     table.row("area", fmt::format("{:.6g} m^2", report.area));

@@ -19,6 +19,7 @@ constexpr float wallVoxels = 3, leastWallVoxels = 2;
 constexpr float gapVoxels = 2;
 // Voxels along the longest side: features of what is not thin, and what memory takes.
 constexpr float leastResolution = 64, mostResolution = 512;
+constexpr float rounding = 1e-3f;    // [voxels] and steps: numbers that are off by less count as whole
 constexpr float leastVoxel = 2e-5f;  // [m] OpenVDB takes none smaller
 // A point is in the band if the eight voxels around it are.
 constexpr float cellDiagonal = 1.7320508f;  // [voxels]
@@ -31,8 +32,7 @@ constexpr float wallPart = 0.5f;
 // Bullet's thresholds are lengths and speeds of their own: gContactBreakingThreshold is 2 cm, bodies sleep below
 // 0.8 m/s. A tenth of a body's size and four of its lengths a second are still harmless [m].
 constexpr float leastSize = 0.2f;
-constexpr float bulletSplitImpulse = 0.04f;  // [m] overlaps up to this become speed
-constexpr float mostMassRatio = 10;          // what ten iterations of sequential impulses settle
+constexpr float mostMassRatio = 10;  // what ten iterations of sequential impulses settle
 constexpr double mostMemory = double(1 << 30);
 // Measured at the end of large builds on two cores of an AMD EPYC (Zen 4), 2023 [s].
 constexpr double secondsPerTriangle = 160e-9, secondsPerVoxel = 26e-9;
@@ -54,8 +54,7 @@ void requireSensible(const MeshReport& mesh, const Scene& scene) {
 }
 
 int wholeFrom(float value) {
-    // what is whole but for rounding stays what it is
-    return int(std::ceil(value - 1e-4f));
+    return int(std::ceil(value - rounding));
 }
 
 float chosenVoxel(const Scene& scene, float longest, float wall) {
@@ -89,13 +88,16 @@ void warnOfMesh(const MeshReport& mesh, std::vector<std::string>& warnings) {
         warnings.push_back(fmt::format("the mesh is not clean: {}", verdict(mesh)));
 }
 
-void warnOfSizes(const Scene& scene, const Advice& advice, std::vector<std::string>& warnings) {
-    if (advice.wallVoxels > 0 && advice.wallVoxels < leastWallVoxels)
+void warnOfSizes(const MeshReport& mesh, const Scene& scene, const Advice& advice, std::vector<std::string>& warnings) {
+    const float tip = mesh.thinnestWall / advice.voxelSize;
+    if (advice.wallVoxels > 0 && advice.wallVoxels < leastWallVoxels - rounding)
+        warnings.push_back(fmt::format(
+            "walls are {:.2g} voxels thick: below {:g}, contacts may come out on the far side and mass is lost",
+            advice.wallVoxels, leastWallVoxels));
+    else if (tip > 0 && tip < leastWallVoxels)
         warnings.push_back(
-            fmt::format("the thinnest wall is {:.2g} voxels thick: below {:g}, contacts may come out on "
-                        "its far side",
-                        advice.wallVoxels, leastWallVoxels));
-    if (const float gap = scene.gap / advice.voxelSize; gap > 0 && gap < gapVoxels * 0.999f)
+            fmt::format("the thinnest place, a tip or a crease, has {:.2g} voxels: contacts there are coarse", tip));
+    if (const float gap = scene.gap / advice.voxelSize; gap > 0 && gap < gapVoxels - rounding)
         warnings.push_back(
             fmt::format("the gap is {:.2g} voxels wide: below {:g}, bodies at rest overlap in it", gap, gapVoxels));
     if (advice.margin > advice.voxelSize * float(mostInterior))
@@ -118,18 +120,13 @@ void warnOfMotion(const Scene& scene, const Advice& advice, float way, std::vect
                         scene.massRatio, mostMassRatio));
 }
 
-void warnOfBullet(float longest, const Advice& advice, std::vector<std::string>& warnings) {
+void warnOfBullet(float longest, std::vector<std::string>& warnings) {
     if (longest < leastSize)
         warnings.push_back(
             fmt::format("a body of {:.3g} m is small to Bullet, which lets it sleep below 0.8 m/s and "
                         "widens its box by 0.02 m: lower setSleepingThresholds() and "
                         "gContactBreakingThreshold, or scale the scene up",
                         longest));
-    if (advice.voxelSize < bulletSplitImpulse)
-        warnings.push_back(
-            fmt::format("Bullet turns overlaps of up to {:g} m into speed: set "
-                        "m_splitImpulsePenetrationThreshold to {:.3g}",
-                        bulletSplitImpulse, advice.splitImpulse));
 }
 
 }  // namespace
@@ -137,7 +134,7 @@ void warnOfBullet(float longest, const Advice& advice, std::vector<std::string>&
 Advice advise(const MeshReport& mesh, const Scene& scene) {
     requireSensible(mesh, scene);
     const float longest = mesh.bounds.longestSide();
-    const float wall = scene.thickness > 0 ? scene.thickness : mesh.thinnestWall;
+    const float wall = scene.thickness > 0 ? scene.thickness : mesh.commonWall;
     Advice advice;
     const float h = advice.voxelSize = chosenVoxel(scene, longest, wall);
     advice.margin = scene.margin < 0 ? h : scene.margin;
@@ -156,9 +153,9 @@ Advice advise(const MeshReport& mesh, const Scene& scene) {
     estimate(mesh, advice);
 
     warnOfMesh(mesh, advice.warnings);
-    warnOfSizes(scene, advice, advice.warnings);
+    warnOfSizes(mesh, scene, advice, advice.warnings);
     warnOfMotion(scene, advice, way, advice.warnings);
-    warnOfBullet(longest, advice, advice.warnings);
+    warnOfBullet(longest, advice.warnings);
     return advice;
 }
 

@@ -29,7 +29,7 @@ struct Advice {
     int interiorWidth = 0;         ///< [voxels]
     int substeps = 1;              ///< of a step, with ShapeOptions::sweeps
     int substepsUnswept = 1;       ///< without
-    float wallVoxels = 0;          ///< thickness of the thinnest wall [voxels]; 0: none is known
+    float wallVoxels = 0;          ///< Scene::thickness, or MeshReport::commonWall [voxels]; 0: none is known
     float splitImpulse = 0;        ///< for m_splitImpulsePenetrationThreshold [m]
     std::uint64_t voxels = 0;      ///< active ones, about
     std::uint64_t fieldBytes = 0;  ///< of the Field laid out, about; of thin bodies down to half of it [bytes]

@@ -302,13 +302,14 @@ TEST_CASE("inspect says what a scene needs") {
     CHECK(advice["exteriorWidth"] == 3);
     CHECK(advice["substepsWithoutSweeps"] == 12);
     CHECK(advice["wallVoxels"].get<double>() == Approx(3));
-    CHECK(advice["warnings"].size() == 2);
+    CHECK(advice["warnings"].size() == 1);
+    CHECK(advice["splitImpulsePenetrationThreshold"].get<double>() == Approx(-0.01));
     CHECK(with({"--thickness", "0.015"})["voxelSize"].get<double>() == Approx(0.005));
     CHECK(with({"--gap", "0.01"})["voxelSize"].get<double>() == Approx(0.005));
     CHECK(with({"--voxel-size", "0.02"})["wallVoxels"].get<double>() == Approx(1.5));
     CHECK(with({"--margin", "0.02"})["exteriorWidth"] == 4);
     CHECK(with({"--spin", "100"})["substeps"] == 4);
-    CHECK(with({"--mass-ratio", "50"})["warnings"].size() == 3);
+    CHECK(with({"--mass-ratio", "50"})["warnings"].size() == 2);
     const std::string text = run(words).out;
     CHECK_THAT(text, Catch::Contains("--voxel-size 0.01 --exterior-width 3 --interior-width 10 --body --margin 0.01") &&
                          Catch::Contains("12 without") && Catch::Contains("warning"));
