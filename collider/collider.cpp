@@ -5,6 +5,7 @@
 #include <oneapi/tbb/task_arena.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
@@ -18,8 +19,12 @@
 namespace bilayer {
 namespace {
 
-constexpr float fieldError = 0.5f;  // [voxels] that a field may overestimate: kept from costing contacts
-constexpr float flattest = 0.1f;    // a gradient shorter than this tells no direction: the point is on a medial axis
+// What a field's interpolant may be below the distance: the mean way to the eight voxels around a point is at most half
+// a cell's diagonal [voxels].
+constexpr float interpolationError = 0.87f;
+// How fast the interpolant may change: by a voxel along each axis at once.
+constexpr float steepest = 1.7321f;
+constexpr float flattest = 0.1f;  // a gradient shorter than this tells no direction: the point is on a medial axis
 
 // The map from the coordinates of one body into those of another.
 struct Map {
@@ -64,49 +69,141 @@ std::optional<Touch> touchOnWay(const Field& field, const glm::vec3& point, cons
     return Touch{std::max(glm::dot(point - hit->position, hit->normal), 0.f), hit->normal, -glm::dot(way, hit->normal)};
 }
 
-// Calls found(index, point, touch) for the points of one body within `margin` [m] of another's surface, in it, or on
-// their way to it.
-template <class Found>
-void samplePoints(const Placed& body, const Placed& other, float margin, ContactReport& report, Found&& found) {
-    const Map map(body, other);
-    const Field& field = other.collider.field();
-    const float reach = margin / other.scale;
-    const RelativeWays ways(body.pose, body.motion, other.pose, other.motion);
-    const Bounds& bounds = body.collider.bounds();
-    const float most =
-        ways.longest(other.scale * map(bounds.centre()), 0.5f * body.scale * glm::length(bounds.size())) / other.scale;
-    const bool sweeps = most > reach;
-    const Clearance clearance = field.clearance();
-    const Map coarse = map.inParts(field);
-    const float seen = sweeps ? reach + most : reach;
-    const float kept = (seen / field.voxelSize() + fieldError) / float(Clearance::partSide);
-    const auto reject = [&](const glm::vec3& centre, float radius) {
-        return clearance.isOutside(coarse(centre), radius * coarse.scale + kept);
-    };
-    body.collider.points().visit(reject, [&](std::uint32_t index, const SurfacePoint& point) {
-        const glm::vec3 place = coarse(point.position);
-        if (clearance.isAbove(place, seen) || clearance.isOutside(place, kept)) return;
+// The surface points of one body in the field of another.
+class PointsInField {
+  public:
+    PointsInField(const Placed& body, const Placed& other, float margin)
+        : body_(body),
+          other_(other),
+          field_(other.collider.field()),
+          map_(body, other),
+          coarse_(map_.inParts(field_)),
+          ways_(body.pose, body.motion, other.pose, other.motion),
+          clearance_(field_.clearance()),
+          reach_(margin / other.scale) {
+        const Bounds& bounds = body.collider.bounds();
+        centre_ = bounds.centre();
+        radius_ = 0.5f * glm::length(bounds.size());
+        const float longest = ways_.longest(other.scale * map_(centre_), body.scale * radius_) / other.scale;
+        sweeps_ = longest > reach_;
+        seen_ = sweeps_ ? reach_ + longest : reach_;
+    }
+
+    /// Calls found(index, point, touch) for the points within reach of the surface, in it, or on their way to it.
+    template <class Found>
+    void visit(NearPoints::List* near, ContactReport& report, Found&& found) {
+        if (!near || sweeps_) return visitAll(report, found);
+        const float voxel = field_.voxelSize();
+        // voxels beyond the band have no numbers: a list must not reach that far
+        const float mostSlack = std::min(voxel, (field_.exteriorWidth() - reach_) / steepest - rounding * voxel);
+        const NearPoints::Place now{body_.collider.id(), other_.collider.id(), reach_, map_.linear, map_.shift};
+        if (near->holds(now, centre_, radius_, voxel, mostSlack))
+            visitListed(*near, report, found);
+        else if (near->slack() > 0)
+            visitAndList(*near, report, found);
+        else
+            visitAll(report, found);
+    }
+
+  private:
+    static constexpr float rounding = 1e-3f;  // [voxels]
+
+    // Farther than this nothing of interest can be [parts].
+    float keptWithin(float distance) const {
+        return (distance / field_.voxelSize() + interpolationError) / float(Clearance::partSide);
+    }
+
+    template <class Visit>
+    void descend(float kept, Visit&& visit) const {
+        const auto reject = [&](const glm::vec3& centre, float radius) {
+            return clearance_.isOutside(coarse_(centre), radius * coarse_.scale + kept);
+        };
+        body_.collider.points().visit(reject, visit);
+    }
+
+    template <class Found>
+    void visitAll(ContactReport& report, Found& found) {
+        const float kept = keptWithin(seen_);
+        descend(kept, [&](std::uint32_t index, const SurfacePoint& point) {
+            const glm::vec3 place = coarse_(point.position);
+            if (clearance_.isAbove(place, seen_) || clearance_.isOutside(place, kept)) return;
+            const glm::vec3 at = map_(point.position);
+            touch(index, point, at, sampleAt(at, report), report, found);
+        });
+    }
+
+    // Points that could touch before the bodies have moved by the slack: the interpolant then changes by the steepest
+    // slope at most, the distance by the slack.
+    template <class Found>
+    void visitAndList(NearPoints::List& near, ContactReport& report, Found& found) {
+        const float slack = near.slack(), above = reach_ + steepest * slack, within = reach_ + slack,
+                    beside = within + interpolationError * field_.voxelSize(), kept = keptWithin(within);
+        descend(kept, [&](std::uint32_t index, const SurfacePoint& point) {
+            const glm::vec3 place = coarse_(point.position);
+            if (clearance_.isAbove(place, above) || clearance_.isOutside(place, kept)) return;
+            const glm::vec3 at = map_(point.position);
+            const Sample sample = sampleAt(at, report);
+            if (sample.distance > (sample.inBand ? above : beside)) return;
+            near.add(index);
+            touch(index, point, at, sample, report, found);
+        });
+    }
+
+    template <class Found>
+    void visitListed(const NearPoints::List& near, ContactReport& report, Found& found) {
+        const auto points = body_.collider.points().points();
+        for (const std::uint32_t index : near.points()) {
+            const SurfacePoint& point = points[index];
+            if (clearance_.isAbove(coarse_(point.position), reach_)) continue;
+            const glm::vec3 at = map_(point.position);
+            touch(index, point, at, sampleAt(at, report), report, found);
+        }
+    }
+
+    Sample sampleAt(const glm::vec3& at, ContactReport& report) const {
         ++report.pointsTested;
-        const glm::vec3 at = map(point.position);
-        const Sample sample = field.sampleWithin(at, reach);
-        if (sample.distance <= reach) {
+        return field_.sampleWithin(at, reach_);
+    }
+
+    template <class Found>
+    void touch(std::uint32_t index, const SurfacePoint& point, const glm::vec3& at, const Sample& sample,
+               ContactReport& report, Found& found) const {
+        if (sample.distance <= reach_) {
             if (sample.inBand) {
                 const glm::vec3 normal = directionOf(sample.gradient);
-                const float approach = sweeps ? -glm::dot(ways.of(other.scale * at), normal) / other.scale : 0;
+                const float approach = sweeps_ ? -glm::dot(wayOf(at), normal) : 0;
                 found(index, point, Touch{sample.distance, normal, std::max(approach, 0.f)});
             }
             if (!sample.inBand && sample.distance < 0) ++report.beyondBand;
-        } else if (sweeps) {
-            const glm::vec3 way = ways.of(other.scale * at) / other.scale;
+        } else if (sweeps_) {
+            const glm::vec3 way = wayOf(at);
             if (sample.distance > glm::length(way)) return;
-            if (const auto touch = touchOnWay(field, at, way)) found(index, point, *touch);
+            if (const auto touched = touchOnWay(field_, at, way)) found(index, point, *touched);
         }
-    });
-}
+    }
+
+    glm::vec3 wayOf(const glm::vec3& at) const { return ways_.of(other_.scale * at) / other_.scale; }
+
+    const Placed &body_, &other_;
+    const Field& field_;
+    Map map_, coarse_;
+    RelativeWays ways_;
+    Clearance clearance_;
+    float reach_;
+    glm::vec3 centre_;  // of a ball around the body
+    float radius_;
+    bool sweeps_;  // whether any point moves farther than the reach
+    float seen_;   // how far away a point can be that comes near
+};
 
 // Outward of `other`, in the world; where its field tells none, against the surface of the body that touches it.
 glm::vec3 outwardNormal(const Placed& other, const Touch& touch, const Placed& body, const SurfacePoint& point) {
     return touch.normal == glm::vec3(0) ? -(body.pose.rotation * point.normal) : other.pose.rotation * touch.normal;
+}
+
+std::uint64_t nextId() {
+    static std::atomic<std::uint64_t> made = 0;
+    return ++made;
 }
 
 std::optional<MassProperties> massOf(const Mesh& mesh) {
@@ -143,7 +240,7 @@ class Collider::Triangles {
 };
 
 Collider::Collider(Mesh mesh, const LevelSet& levelSet, const ColliderOptions& options)
-    : triangles_(std::make_shared<Triangles>(std::move(mesh))), field_(levelSet) {
+    : triangles_(std::make_shared<Triangles>(std::move(mesh))), field_(levelSet), id_(nextId()) {
     if (!std::isfinite(options.margin)) throw std::invalid_argument("collider: the margin is not finite");
     body_.points = SurfacePoints(this->mesh(), options.pointSpacing * field_.voxelSize());
     body_.bounds = bilayer::bounds(this->mesh());
@@ -152,7 +249,7 @@ Collider::Collider(Mesh mesh, const LevelSet& levelSet, const ColliderOptions& o
 }
 
 Collider::Collider(const LevelSet& levelSet)
-    : triangles_(std::make_shared<Triangles>(levelSet)), field_(levelSet), body_(bodyOf(levelSet)) {}
+    : triangles_(std::make_shared<Triangles>(levelSet)), field_(levelSet), body_(bodyOf(levelSet)), id_(nextId()) {}
 
 const Mesh& Collider::mesh() const {
     return triangles_->mesh();
@@ -163,26 +260,29 @@ const MassProperties& Collider::mass() const {
     return *body_.mass;
 }
 
-ContactReport collide(const Placed& a, const Placed& b, const ContactOptions& options, std::vector<Contact>& contacts) {
+ContactReport collide(const Placed& a, const Placed& b, const ContactOptions& options, std::vector<Contact>& contacts,
+                      NearPoints* near) {
     ContactReport report;
     const auto opposes = [&](const glm::vec3& normal, const Placed& body, const SurfacePoint& point,
                              const Touch& touch) {
         const bool apart = touch.distance > 0 && touch.approach == 0 && !point.isSharp;
         return options.keeps(-glm::dot(normal, body.pose.rotation * point.normal), apart);
     };
-    samplePoints(a, b, options.margin, report, [&](std::uint32_t index, const SurfacePoint& point, const Touch& touch) {
+    const auto addOfA = [&](std::uint32_t index, const SurfacePoint& point, const Touch& touch) {
         const glm::vec3 normal = outwardNormal(b, touch, a, point);
         if (!opposes(normal, a, point, touch)) return;
         const float distance = touch.distance * b.scale;
         contacts.push_back({a.pose.toWorld(a.scale * point.position) - distance * normal, normal, distance, index,
                             touch.approach * b.scale});
-    });
-    samplePoints(b, a, options.margin, report, [&](std::uint32_t index, const SurfacePoint& point, const Touch& touch) {
+    };
+    const auto addOfB = [&](std::uint32_t index, const SurfacePoint& point, const Touch& touch) {
         const glm::vec3 normal = outwardNormal(a, touch, b, point);
         if (!opposes(normal, b, point, touch)) return;
         contacts.push_back({b.pose.toWorld(b.scale * point.position), -normal, touch.distance * a.scale,
                             index | featureOfB, touch.approach * a.scale});
-    });
+    };
+    PointsInField(a, b, options.margin).visit(near ? &near->ofA : nullptr, report, addOfA);
+    PointsInField(b, a, options.margin).visit(near ? &near->ofB : nullptr, report, addOfB);
     return report;
 }
 

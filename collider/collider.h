@@ -9,6 +9,7 @@
 #include "collider/body.h"
 #include "collider/field.h"
 #include "collider/motion.h"
+#include "collider/near_points.h"
 #include "collider/pose.h"
 
 namespace bilayer {
@@ -40,12 +41,14 @@ class Collider {
     float margin() const { return body_.margin; }          ///< as in ColliderOptions, never negative [m]
     /// Throws std::invalid_argument where the mesh encloses no volume.
     const MassProperties& mass() const;
+    std::uint64_t id() const { return id_; }  ///< no other collider of this process has it
 
   private:
     class Triangles;
     std::shared_ptr<Triangles> triangles_;
     Field field_;
     Body body_;
+    std::uint64_t id_;
 };
 
 /// A collider somewhere in the world, perhaps grown: body coordinates x become pose.toWorld(scale * x).
@@ -99,7 +102,9 @@ struct ContactReport {
 
 /// Appends the contacts between two bodies: surface points of A in B's field, then those of B in A's field, each in
 /// ascending order of feature. Deterministic; safe from any thread. O(points near the other body).
-ContactReport collide(const Placed& a, const Placed& b, const ContactOptions& options, std::vector<Contact>& contacts);
+/// @param near  null, or what was kept of the same two bodies in the last step: the contacts are the same, found sooner
+ContactReport collide(const Placed& a, const Placed& b, const ContactOptions& options, std::vector<Contact>& contacts,
+                      NearPoints* near = nullptr);
 
 /// The same for bodies of their own size.
 inline ContactReport collide(const Collider& a, const Pose& poseA, const Collider& b, const Pose& poseB,

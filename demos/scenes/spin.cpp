@@ -8,6 +8,7 @@
 #include "collider/mass.h"
 #include "demos/shared/shapes.h"
 #include "demos/shared/stage.h"
+#include "integration/bullet/angular_momentum.h"
 
 namespace bilayer::demo {
 namespace {
@@ -59,6 +60,7 @@ double difference(const MassProperties& a, const MassProperties& b) {
 Outcome spin(const SpinOptions& options) {
     Stage stage("A free body that spins");
     stage.world().bullet().setGravity({0, 0, 0});
+    const bullet::AngularMomentum keeps(stage.world().bullet());
     const auto thing = makeThing(handle(), {options.voxelSize});
     btRigidBody& body = stage.add(thing, {.mass = mass, .linearDamping = 0, .angularDamping = 0}, {},
                                   {.colour = 0xf2cc8f, .roughness = 0.4f, .clearcoat = 0.4f});

@@ -17,6 +17,14 @@ btTransform toTransform(const Pose& pose) {
 
 }  // namespace
 
+double kineticEnergyOf(const btRigidBody& body) {
+    const btVector3 &v = body.getLinearVelocity(), &inverse = body.getInvInertiaDiagLocal();
+    const btVector3 spin = body.getWorldTransform().getBasis().transpose() * body.getAngularVelocity();
+    double energy = 0.5 * double(v.length2()) / double(body.getInvMass());
+    for (int axis = 0; axis < 3; ++axis) energy += 0.5 * double(spin[axis]) * spin[axis] / double(inverse[axis]);
+    return energy;
+}
+
 World::World() {
     world_.setGravity({0, 0, -gravity});
     // with Bullet's single direction of friction, a stack of rings at rest walks aside until it falls
@@ -69,15 +77,8 @@ int World::asleep() const {
 
 double World::kineticEnergy() const {
     double energy = 0;
-    for (const Body& entry : bodies_) {
-        const btRigidBody& body = *entry.body;
-        if (body.isStaticObject()) continue;
-        const btVector3& v = body.getLinearVelocity();
-        const btVector3 spin = body.getWorldTransform().getBasis().transpose() * body.getAngularVelocity();
-        energy += 0.5 * double(v.length2()) / double(body.getInvMass());
-        for (int axis = 0; axis < 3; ++axis)
-            energy += 0.5 * double(spin[axis]) * spin[axis] / double(body.getInvInertiaDiagLocal()[axis]);
-    }
+    for (const Body& entry : bodies_)
+        if (!entry.body->isStaticObject()) energy += kineticEnergyOf(*entry.body);
     return energy;
 }
 

@@ -26,6 +26,9 @@ struct Matter {
     float linearDamping = 0.05f, angularDamping = 0.2f;
 };
 
+/// Of a body that moves, by translation and rotation [J].
+double kineticEnergyOf(const btRigidBody& body);
+
 /// Bodies, in the order in which they were added, under gravity along -z.
 class World {
   public:

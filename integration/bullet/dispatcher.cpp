@@ -101,7 +101,7 @@ class Pair {
 
   private:
     ContactReport find(const Side& a, const Placed& field, float margin, const Motion& motion) {
-        if (isField(a.shape)) return collideFields(a.placed(), field, margin, contacts_);
+        if (isField(a.shape)) return collideFields(a.placed(), field, margin, near_, contacts_);
         if (a.shape->getShapeType() == STATIC_PLANE_PROXYTYPE) {
             const auto& plane = static_cast<const btStaticPlaneShape&>(*a.shape);
             const btVector3 normal = a.transform.getBasis() * plane.getPlaneNormal();
@@ -121,6 +121,7 @@ class Pair {
     Manifolds manifolds_;
     DispatchStatistics& statistics_;
     std::optional<Convex> convex_;  ///< of A
+    NearPoints near_;               ///< of two fields
     std::vector<Contact> contacts_;
     std::vector<Patch> patches_;
     ContactReport report_;

@@ -271,10 +271,11 @@ class TriangleProbes : public btTriangleCallback {
 
 }  // namespace
 
-ContactReport collideFields(const Placed& a, const Placed& b, float margin, std::vector<Contact>& contacts) {
+ContactReport collideFields(const Placed& a, const Placed& b, float margin, NearPoints& near,
+                            std::vector<Contact>& contacts) {
     ContactOptions options = opposition;
     options.margin = margin;
-    return collide(a, b, options, contacts);
+    return collide(a, b, options, contacts, &near);
 }
 
 ContactReport collidePlane(const glm::vec3& normal, float offset, const Motion& motion, const Placed& field,

@@ -14,7 +14,9 @@ namespace bilayer::bullet {
 
 /// Two fields, without the contacts whose normals look along the surface they touch: those of points just under the
 /// edge of the other body.
-ContactReport collideFields(const Placed& a, const Placed& b, float margin, std::vector<Contact>& contacts);
+/// @param near  kept for this pair of bodies from step to step
+ContactReport collideFields(const Placed& a, const Placed& b, float margin, NearPoints& near,
+                            std::vector<Contact>& contacts);
 
 /// Against everything below a plane.
 /// @param normal, offset  in the world: dot(normal, x) <= offset is solid; `normal` of unit length

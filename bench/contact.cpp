@@ -1,0 +1,314 @@
+// Heaps of bodies in Bullet: fields beside what its users take instead, by speed, penetration and rest.
+#include <BulletCollision/CollisionShapes/btBoxShape.h>
+#include <fmt/format.h>
+#include <oneapi/tbb/global_control.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <functional>
+#include <glm/geometric.hpp>
+#include <glm/gtc/quaternion.hpp>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <random>
+
+#include "bench/heap.h"
+#include "bench/measure.h"
+#include "bench/plot.h"
+#include "bench/program.h"
+#include "demos/shared/outcome.h"
+#include "demos/shared/shapes.h"
+
+using namespace bilayer;
+using namespace bilayer::bench;
+
+namespace {
+
+constexpr float knotSize = 0.2f;   // [m]
+constexpr float room = 1;          // between bodies at the start [the diagonal of their box]
+constexpr int smallestHeap = 20;   // bodies for a pen of two knots by two; a larger one grows with its edge
+constexpr float wall = 0.1f;       // half of a wall's thickness [knots]
+constexpr float penHeight = 5;     // [knots], for each along the floor
+constexpr double measured = 0.02;  // between points that penetration is measured at [size of a body]
+constexpr float bowlRadius = 0.5f, bowlWall = 0.05f;  // [m]
+constexpr float bowlVoxels = 128, boxEdge = 0.1f;     // along the bowl; [m]
+constexpr int bowlCells = 32, boxesInBowl = 60;
+
+struct Options {
+    HeapOptions heap;
+    int bodies = 20, hulls = 20;
+    float voxels = 64;
+    std::vector<int> growBodies{10, 30, 100, 300, 1000};
+    std::vector<float> growVoxels{32, 64, 128, 256};
+    double growSeconds = 1.5;
+    std::string plot, json;
+};
+
+// About its centre of mass and along its principal axes, as Bullet wants bodies.
+Mesh centred(Mesh mesh, float size) {
+    const float scale = size / bounds(mesh).longestSide();
+    for (glm::vec3& p : mesh.points) p *= scale;
+    const MassProperties mass = massProperties(mesh);
+    for (glm::vec3& p : mesh.points) p = glm::conjugate(mass.principalAxes) * (p - mass.centre);
+    return mesh;
+}
+
+Mesh knot(int along, int across) {
+    return centred(shapes::torusKnot(2, 3, 1, 0.3f, along, across), knotSize);
+}
+
+glm::quat anyRotation(std::mt19937& random) {
+    std::normal_distribution<float> normal;
+    const float x = normal(random), y = normal(random), z = normal(random), w = normal(random);
+    return glm::normalize(glm::quat(w, x, y, z));
+}
+
+// Layers of `along` by `along` bodies, each of them turned at random.
+void addLayers(std::vector<Member>& members, const Form& form, float mass, int bodies, int along, float lowest) {
+    std::mt19937 random(7);
+    const float step = room * glm::length(form.box.size());
+    for (int i = 0; i < bodies; ++i) {
+        const int layer = i / (along * along), place = i % (along * along);
+        const auto at = [&](int k) { return step * (float(k) - 0.5f * float(along - 1)); };
+        const glm::vec3 position(at(place / along), at(place % along), lowest + step * (float(layer) + 0.6f));
+        members.push_back({&form, mass, {position, anyRotation(random)}});
+    }
+}
+
+// A box that Bullet and the measuring agree on.
+struct BoxForm {
+    explicit BoxForm(const glm::vec3& halfExtents)
+        : shape(btVector3(halfExtents.x, halfExtents.y, halfExtents.z)),
+          form(shapes::box(halfExtents), shape, measured * double(knotSize)) {}
+    btBoxShape shape;
+    Form form;
+};
+
+// Knots in a pen of Bullet's boxes.
+class Knots {
+  public:
+    Knots(const Mesh& mesh, Rival& rival, int bodies) : knot_(mesh, rival.shape(), measured * double(knotSize)) {
+        const int along = std::max(2, int(std::lround(2 * std::cbrt(float(bodies) / smallestHeap))));
+        const float size = mesh.points.empty() ? 0 : knotSize, thick = wall * size, inside = 0.6f * size * float(along),
+                    out = inside + thick, halfHeight = 0.5f * penHeight * size * float(along);
+        addWall({0, 0, -thick}, {out + thick, out + thick, thick});
+        for (const float side : {-1.f, 1.f}) {
+            addWall({side * out, 0, halfHeight}, {thick, out + thick, halfHeight});
+            addWall({0, side * out, halfHeight}, {inside, thick, halfHeight});
+        }
+        addLayers(members, knot_, 1, bodies, along, 0);
+    }
+    std::vector<Member> members;
+
+  private:
+    void addWall(const glm::vec3& centre, const glm::vec3& halfExtents) {
+        walls_.push_back(std::make_unique<BoxForm>(halfExtents));
+        members.push_back({&walls_.back()->form, 0, {centre}});
+    }
+    Form knot_;
+    std::vector<std::unique_ptr<BoxForm>> walls_;
+};
+
+// Bullet's boxes in a bowl that does not move.
+class Boxes {
+  public:
+    Boxes(const Mesh& bowl, Rival& rival)
+        : bowl_(bowl, rival.shape(), measured * double(boxEdge)), box_(glm::vec3(boxEdge / 2)) {
+        members.push_back({&bowl_});
+        addLayers(members, box_.form, 1, boxesInBowl, 4, -0.5f * bowlRadius);
+    }
+    std::vector<Member> members;
+
+  private:
+    Form bowl_;
+    BoxForm box_;
+};
+
+// A line of a table.
+struct Row {
+    std::string name;
+    double made;  // [s]
+    HeapRun run;
+
+    double step() const {
+        return median({run.stepMs.begin() + std::ptrdiff_t(run.stepMs.size() / 2), run.stepMs.end()});
+    }
+    double penetration(double share) const { return 1e3 * demo::percentile(run.penetrations, share); }  // [mm]
+    double restEnergy() const {
+        const auto& all = run.kineticEnergy;
+        return median({all.end() - std::ptrdiff_t((all.size() + 4) / 5), all.end()});
+    }
+};
+
+void printTable(const std::string& title, const std::vector<Row>& rows) {
+    fmt::print("\n## {}\n\n", title);
+    fmt::print(
+        "| collides by | made in [s] | simulated [s] | a step [ms] | as a multiple | 99 % of steps [ms] | "
+        "99 % of penetrations [mm] | deepest [mm] | energy at the end [J] | restless at the end |\n");
+    fmt::print("|---|---|---|---|---|---|---|---|---|---|\n");
+    for (const Row& row : rows)
+        fmt::print("| {} | {:.2f} | {:.1f} | {:.2f} | {:.1f} | {:.1f} | {:.2f} | {:.2f} | {:.1e} | {} |\n", row.name,
+                   row.made, row.run.simulated, row.step(), row.step() / rows.front().step(),
+                   demo::percentile(row.run.stepMs, 0.99), row.penetration(0.99), row.penetration(1), row.restEnergy(),
+                   row.run.restless);
+    std::fflush(stdout);
+}
+
+Row onOneThread(const std::function<Row()>& work) {
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, 1);
+    Row row = work();
+    row.name += ", 1 thread";
+    return row;
+}
+
+Row playKnots(Rival& rival, const Mesh& mesh, int bodies, const HeapOptions& options) {
+    const Knots knots(mesh, rival, bodies);
+    return {rival.name(), rival.seconds, play(rival, knots.members, options)};
+}
+
+std::vector<Row> compareKnots(const Options& options) {
+    const Mesh mesh = knot(180, 16);
+    const float voxel = knotSize / options.voxels;
+    std::vector<Row> rows;
+    const auto field = makeField(mesh, options.voxels);
+    const auto ours = [&] { return playKnots(*field, mesh, options.bodies, options.heap); };
+    rows.push_back(ours());
+    rows.push_back(onOneThread(ours));
+    for (const auto& rival : {makeHulls(knot(90, 8), options.hulls, 0.1f * voxel), makeGImpact(mesh, 0.5f * voxel)})
+        rows.push_back(playKnots(*rival, mesh, options.bodies, options.heap));
+    printTable(fmt::format("{} knots of {} triangles in a pen, {:g} voxels each, {:g} steps a second", options.bodies,
+                           mesh.triangles.size(), options.voxels, options.heap.stepsPerSecond),
+               rows);
+    return rows;
+}
+
+std::vector<Row> compareBoxes(const Options& options) {
+    const Mesh bowl = shapes::bowl(bowlRadius, bowlWall, 96);
+    const float voxel = 2 * bowlRadius / bowlVoxels;
+    std::vector<Row> rows;
+    for (const auto& rival :
+         {makeField(bowl, bowlVoxels), makeTriangles(bowl, 0.5f * voxel), makeBulletSdf(bowl, bowlCells)}) {
+        const Boxes boxes(bowl, *rival);
+        rows.push_back({rival->name(), rival->seconds, play(*rival, boxes.members, options.heap)});
+    }
+    printTable(fmt::format("{} of Bullet's boxes in a bowl of {} triangles", boxesInBowl, bowl.triangles.size()), rows);
+    return rows;
+}
+
+struct Growth {
+    Line bodies{"bilayer", {}, {}}, voxels{"bilayer", {}, {}}, penetration{"bilayer", {}, {}};
+};
+
+Growth grow(const Options& options) {
+    const Mesh mesh = knot(180, 16);
+    HeapOptions heap = options.heap;
+    heap.seconds = options.growSeconds;
+    Growth growth;
+    fmt::print("\n## How the cost grows: {:g} s of knots\n\n", heap.seconds);
+    fmt::print("| bodies | voxels | a step [ms] | a step and body [ms] | 99 % of penetrations [voxels] |\n");
+    fmt::print("|---|---|---|---|---|\n");
+    const auto measure = [&](int bodies, float voxels) {
+        const auto field = makeField(mesh, voxels);
+        HeapOptions how = heap;
+        if (bodies > 100) how.measuredFrames = 4;  // a thousand bodies have thousands of pairs
+        const Row row = playKnots(*field, mesh, bodies, how);
+        const double deep = 1e-3 * row.penetration(0.99) * double(voxels) / double(knotSize);
+        fmt::print("| {} | {:g} | {:.2f} | {:.3f} | {:.3f} |\n", bodies, voxels, row.step(), row.step() / bodies, deep);
+        std::fflush(stdout);
+        return std::pair{row.step(), deep};
+    };
+    for (const int bodies : options.growBodies) {
+        growth.bodies.x.push_back(bodies);
+        growth.bodies.y.push_back(measure(bodies, options.voxels).first);
+    }
+    for (const float voxels : options.growVoxels) {
+        const auto [step, deep] = measure(options.bodies, voxels);
+        growth.voxels.x.push_back(voxels);
+        growth.voxels.y.push_back(step);
+        growth.penetration.x.push_back(voxels);
+        growth.penetration.y.push_back(std::max(1e-3, deep));
+    }
+    return growth;
+}
+
+Line energyOf(const Row& row, double stepsPerSecond) {
+    Line line{row.name, {}, {}};
+    for (std::size_t i = 0; i < row.run.kineticEnergy.size(); i += 4)
+        if (row.run.kineticEnergy[i] > 0) {
+            line.x.push_back(double(i + 1) / stepsPerSecond);
+            line.y.push_back(row.run.kineticEnergy[i]);
+        }
+    return line;
+}
+
+void draw(const std::string& file, const std::vector<Row>& knots, const Growth& growth, const Options& options) {
+    std::vector<Line> energies, depths;
+    for (const Row& row : knots) {
+        energies.push_back(energyOf(row, double(options.heap.stepsPerSecond)));
+        Line depth{row.name, {}, {}};
+        for (const double share : {0.5, 0.75, 0.9, 0.95, 0.99, 1.}) {
+            depth.x.push_back(100 * share);
+            depth.y.push_back(std::max(1e-3, row.penetration(share)));
+        }
+        depths.push_back(depth);
+    }
+    std::vector<double> bodies(options.growBodies.begin(), options.growBodies.end()),
+        voxels(options.growVoxels.begin(), options.growVoxels.end());
+    writeSvg(file, {{"a step, 64 voxels a body", "bodies", "ms", bodies, {growth.bodies}},
+                    {"a step, 20 bodies", "voxels a body", "ms", voxels, {growth.voxels}},
+                    {"kinetic energy", "s", "J", {}, energies},
+                    {"so many of 100 penetrations are below", "of 100", "mm", {50, 75, 100}, depths}});
+}
+
+nlohmann::json jsonOf(const std::vector<Row>& rows) {
+    nlohmann::json all = nlohmann::json::array();
+    for (const Row& row : rows)
+        all.push_back({{"name", row.name},
+                       {"madeSeconds", row.made},
+                       {"simulatedSeconds", row.run.simulated},
+                       {"stepMs", row.run.stepMs},
+                       {"kineticEnergy", row.run.kineticEnergy},
+                       {"penetrations", row.run.penetrations},
+                       {"restless", row.run.restless}});
+    return all;
+}
+
+int run(int argc, char** argv) {
+    CLI::App app(
+        "Heaps of bodies in Bullet: fields beside GImpact, convex hulls, triangles and Bullet's own SDF shape.");
+    Options options;
+    app.add_option("--bodies", options.bodies, "knots in the pen")->capture_default_str()->check(CLI::PositiveNumber);
+    app.add_option("--voxels", options.voxels, "along a knot")->capture_default_str()->check(CLI::Range(8., 1024.));
+    app.add_option("--hulls", options.hulls, "of the convex decomposition")
+        ->capture_default_str()
+        ->check(CLI::PositiveNumber);
+    app.add_option("--seconds", options.heap.seconds, "that a heap is simulated")
+        ->capture_default_str()
+        ->check(CLI::PositiveNumber);
+    app.add_option("--steps-per-second", options.heap.stepsPerSecond, "of the simulation")
+        ->capture_default_str()
+        ->check(CLI::PositiveNumber);
+    app.add_option("--patience", options.heap.patience, "seconds of waiting that end a run")->capture_default_str();
+    app.add_option("--grow-bodies", options.growBodies, "numbers of knots to try; 0: none")->capture_default_str();
+    app.add_option("--grow-voxels", options.growVoxels, "voxels along a knot to try; 0: none")->capture_default_str();
+    app.add_option("--plot", options.plot, "draws speed, energy and penetration into this SVG file");
+    app.add_option("--json", options.json, "also write all numbers to this file");
+    CLI11_PARSE(app, argc, argv);
+    std::erase(options.growBodies, 0);
+    std::erase(options.growVoxels, 0.f);
+
+    const std::vector<Row> knots = compareKnots(options), boxes = compareBoxes(options);
+    const Growth growth = grow(options);
+    if (!options.plot.empty()) draw(options.plot, knots, growth, options);
+    if (!options.json.empty())
+        std::ofstream(options.json) << nlohmann::json{{"knots", jsonOf(knots)}, {"boxes", jsonOf(boxes)}}.dump(1);
+    return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+    return program("contact", run, argc, argv);
+}

@@ -1,0 +1,49 @@
+// What bodies may collide by in Bullet: our fields, and what its users take instead.
+#pragma once
+
+#include <BulletCollision/CollisionDispatch/btCollisionConfiguration.h>
+#include <BulletCollision/CollisionDispatch/btCollisionDispatcher.h>
+#include <BulletCollision/CollisionShapes/btCollisionShape.h>
+
+#include <memory>
+#include <string>
+
+#include "sdf/mesh.h"
+
+namespace bilayer::bench {
+
+/// A collision shape of a mesh, and the dispatcher that knows it.
+class Rival {
+  public:
+    virtual ~Rival() = default;
+    virtual std::string name() const = 0;
+    virtual btCollisionShape& shape() = 0;
+    /// A new one. The configuration must outlive it.
+    virtual std::unique_ptr<btCollisionDispatcher> dispatcher(btCollisionConfiguration& configuration) const;
+
+    double seconds = 0;  ///< that making the shape took
+};
+
+/// Ours.
+/// @param voxels  along the longest side
+std::unique_ptr<Rival> makeField(const Mesh& mesh, float voxels);
+
+/// btGImpactMeshShape.
+/// @param margin  added to the surface [m]
+std::unique_ptr<Rival> makeGImpact(const Mesh& mesh, float margin);
+
+/// A compound of hulls, by the approximate convex decomposition that Debian packages with Bullet: HACD (K. Mamou, F.
+/// Ghorbel, "A simple and efficient approach for 3D mesh approximate convex decomposition", ICIP 2009). Its time grows
+/// with the square of the number of triangles.
+/// @param margin  added to the hulls [m]
+std::unique_ptr<Rival> makeHulls(const Mesh& mesh, int hulls, float margin);
+
+/// btBvhTriangleMeshShape, for bodies that do not move.
+std::unique_ptr<Rival> makeTriangles(const Mesh& mesh, float margin);
+
+/// btSdfCollisionShape, for bodies that do not move; only spheres, boxes and hulls collide with it, by their corners.
+/// Its nodes get exact distances.
+/// @param cells  of 32 nodes each, along the longest side
+std::unique_ptr<Rival> makeBulletSdf(const Mesh& mesh, int cells);
+
+}  // namespace bilayer::bench
