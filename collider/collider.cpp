@@ -2,12 +2,19 @@
 // descended with the relative pose, so that only points near the other body are sampled.
 #include "collider/collider.h"
 
+#include <oneapi/tbb/task_arena.h>
+
 #include <algorithm>
 #include <atomic>
+#include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
+#include <mutex>
 #include <optional>
+#include <stdexcept>
 #include <utility>
+
+#include "sdf/surface.h"
 
 namespace bilayer {
 namespace {
@@ -194,15 +201,63 @@ glm::vec3 outwardNormal(const Placed& other, const Touch& touch, const Placed& b
     return touch.normal == glm::vec3(0) ? -(body.pose.rotation * point.normal) : other.pose.rotation * touch.normal;
 }
 
+std::uint64_t nextId() {
+    static std::atomic<std::uint64_t> made = 0;
+    return ++made;
+}
+
+std::optional<MassProperties> massOf(const Mesh& mesh) {
+    try {
+        return massProperties(mesh);
+    } catch (const std::invalid_argument&) {
+        return std::nullopt;  // an open sheet: it can only be static
+    }
+}
+
 }  // namespace
 
+/// A mesh, or the field that it is extracted from when somebody asks: few do, and it takes longer than all else that a
+/// body from a file needs.
+class Collider::Triangles {
+  public:
+    explicit Triangles(Mesh mesh) : mesh_(std::move(mesh)) {}
+    explicit Triangles(const LevelSet& field) : field_(field) {}
+
+    const Mesh& mesh() {
+        std::call_once(once_, [&] {
+            if (!field_) return;
+            // a thread that waits for others here must not take up work that asks for this very mesh
+            tbb::this_task_arena::isolate([&] { mesh_ = surface(*field_); });
+            field_.reset();
+        });
+        return mesh_;
+    }
+
+  private:
+    std::optional<LevelSet> field_;
+    Mesh mesh_;
+    std::once_flag once_;
+};
+
 Collider::Collider(Mesh mesh, const LevelSet& levelSet, const ColliderOptions& options)
-    : mesh_(std::move(mesh)),
-      field_(levelSet),
-      points_(mesh_, options.pointSpacing * field_.voxelSize()),
-      bounds_(bilayer::bounds(mesh_)) {
-    static std::atomic<std::uint64_t> made = 0;
-    id_ = ++made;
+    : triangles_(std::make_shared<Triangles>(std::move(mesh))), field_(levelSet), id_(nextId()) {
+    if (!std::isfinite(options.margin)) throw std::invalid_argument("collider: the margin is not finite");
+    body_.points = SurfacePoints(this->mesh(), options.pointSpacing * field_.voxelSize());
+    body_.bounds = bilayer::bounds(this->mesh());
+    body_.margin = options.margin < 0 ? field_.voxelSize() : options.margin;
+    body_.mass = massOf(this->mesh());
+}
+
+Collider::Collider(const LevelSet& levelSet)
+    : triangles_(std::make_shared<Triangles>(levelSet)), field_(levelSet), body_(bodyOf(levelSet)), id_(nextId()) {}
+
+const Mesh& Collider::mesh() const {
+    return triangles_->mesh();
+}
+
+const MassProperties& Collider::mass() const {
+    if (!body_.mass) throw std::invalid_argument("collider: the mesh encloses no volume");
+    return *body_.mass;
 }
 
 ContactReport collide(const Placed& a, const Placed& b, const ContactOptions& options, std::vector<Contact>& contacts,

@@ -3,13 +3,13 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <memory>
 #include <vector>
 
+#include "collider/body.h"
 #include "collider/field.h"
-#include "collider/mass.h"
 #include "collider/motion.h"
 #include "collider/near_points.h"
-#include "collider/points.h"
 #include "collider/pose.h"
 
 namespace bilayer {
@@ -17,6 +17,8 @@ namespace bilayer {
 struct ColliderOptions {
     /// Distance between neighbouring surface points [voxels of the field]. Smaller finds finer contacts and costs more.
     float pointSpacing = 2.0f;
+    /// Contacts are made up to this distance between the surfaces [m]. Negative: one voxel of the field.
+    float margin = -1;
 };
 
 /// A field, points on the surface, and what else contacts need. Immutable; share it between bodies and threads.
@@ -25,17 +27,27 @@ class Collider {
     /// `levelSet` must be of `mesh`. Throws std::invalid_argument if the mesh is empty.
     Collider(Mesh mesh, const LevelSet& levelSet, const ColliderOptions& options = {});
 
-    const Mesh& mesh() const { return mesh_; }
+    /// Of a level set with a body beside it, as readVdb() gives back what withBody() was written of. Collides as the
+    /// one that it was made of, to the bit; where triangles are asked for, it gives those of the field's zero set.
+    /// Throws std::invalid_argument as bodyOf() does.
+    explicit Collider(const LevelSet& levelSet);
+
+    /// Of a body from a file it is extracted when first asked for, once.
+    const Mesh& mesh() const;
     const Field& field() const { return field_; }
-    const SurfacePoints& points() const { return points_; }
-    const Bounds& bounds() const { return bounds_; }  ///< of the mesh [m]
-    std::uint64_t id() const { return id_; }          ///< no other collider of this process has it
+    const Body& body() const { return body_; }
+    const SurfacePoints& points() const { return body_.points; }
+    const Bounds& bounds() const { return body_.bounds; }  ///< of the mesh [m]
+    float margin() const { return body_.margin; }          ///< as in ColliderOptions, never negative [m]
+    /// Throws std::invalid_argument where the mesh encloses no volume.
+    const MassProperties& mass() const;
+    std::uint64_t id() const { return id_; }  ///< no other collider of this process has it
 
   private:
-    Mesh mesh_;
+    class Triangles;
+    std::shared_ptr<Triangles> triangles_;
     Field field_;
-    SurfacePoints points_;
-    Bounds bounds_;
+    Body body_;
     std::uint64_t id_;
 };
 

@@ -30,6 +30,13 @@ Clearance Field::clearance() const noexcept {
     return data_->coarse;
 }
 
+glm::ivec3 Field::blocks() const noexcept {
+    return data_->blocks;
+}
+bool Field::keeps(const glm::ivec3& block) const noexcept {
+    return block == glm::clamp(block, glm::ivec3(0), data_->blocks - 1) &&
+           data_->directory.data()[data_->entryOf(block)] >= 0;
+}
 glm::dvec3 Field::origin() const noexcept {
     return data_->origin;
 }

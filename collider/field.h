@@ -115,7 +115,10 @@ class Field {
     float exteriorWidth() const noexcept;   ///< [m]
     float interiorWidth() const noexcept;   ///< [m]
     const Bounds& bounds() const noexcept;  ///< around all points in the band [m]
-    const Mesh* mesh() const noexcept;      ///< null for a field without; valid as long as the field or a copy lives
+    glm::ivec3 blocks() const noexcept;     ///< of 8^3 voxels, from origin() on, in the box around the band
+    /// Whether samples of the band are kept in a block, by its place in that box; false for one beside it.
+    bool keeps(const glm::ivec3& block) const noexcept;
+    const Mesh* mesh() const noexcept;  ///< null for a field without; valid as long as the field or a copy lives
     std::size_t memoryBytes() const noexcept;
 
   private:

@@ -204,23 +204,37 @@ std::vector<SurfacePoint> thin(std::vector<Candidate> candidates, double spacing
     return points;
 }
 
-// Orders the points of [begin, end) by halves along the longest side of their box, and appends their nodes in preorder.
-void addNode(std::vector<SurfacePoint>& points, std::vector<PointNode>& nodes, std::uint32_t begin, std::uint32_t end) {
+Bounds boxOf(const std::vector<SurfacePoint>& points, std::uint32_t begin, std::uint32_t end) {
     Bounds box;
     for (std::uint32_t i = begin; i < end; ++i) box.add(points[i].position);
-    const glm::vec3 centre = box.centre(), size = box.size();
+    return box;
+}
+
+// Orders the points of [begin, end) by halves along the longest side of their box.
+void order(std::vector<SurfacePoint>& points, std::uint32_t begin, std::uint32_t end) {
+    if (end - begin <= leafPoints) return;
+    const glm::vec3 size = boxOf(points, begin, end).size();
+    const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
+    const std::uint32_t middle = begin + (end - begin) / 2;
+    const auto first = points.begin();
+    std::nth_element(first + begin, first + middle, first + end, [axis](const SurfacePoint& a, const SurfacePoint& b) {
+        return a.position[axis] < b.position[axis];
+    });
+    order(points, begin, middle);
+    order(points, middle, end);
+}
+
+// Appends the nodes of ordered points in preorder.
+void addNode(const std::vector<SurfacePoint>& points, std::vector<PointNode>& nodes, std::uint32_t begin,
+             std::uint32_t end) {
+    const glm::vec3 centre = boxOf(points, begin, end).centre();
     float radius = 0;
     for (std::uint32_t i = begin; i < end; ++i) radius = std::max(radius, glm::distance(centre, points[i].position));
     const std::size_t node = nodes.size();
     nodes.push_back({centre, radius * rounding, begin, end, 0});
 
     if (end - begin > leafPoints) {
-        const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
         const std::uint32_t middle = begin + (end - begin) / 2;
-        const auto first = points.begin();
-        std::nth_element(
-            first + begin, first + middle, first + end,
-            [axis](const SurfacePoint& a, const SurfacePoint& b) { return a.position[axis] < b.position[axis]; });
         addNode(points, nodes, begin, middle);
         addNode(points, nodes, middle, end);
     }
@@ -236,6 +250,11 @@ SurfacePoints::SurfacePoints(const Mesh& mesh, float spacing) {
     const Mesh welded = weld(mesh);
     points_ = thin(Candidates(welded, latticePitch * spacing).result, spacing);
     if (points_.empty()) throw std::invalid_argument("surface points: all triangles of the mesh are degenerate");
+    order(points_, 0, std::uint32_t(points_.size()));
+    addNode(points_, nodes_, 0, std::uint32_t(points_.size()));
+}
+
+SurfacePoints::SurfacePoints(std::vector<SurfacePoint> ordered) : points_(std::move(ordered)) {
     addNode(points_, nodes_, 0, std::uint32_t(points_.size()));
 }
 

@@ -34,6 +34,9 @@ class SurfacePoints {
     /// @param spacing  [m], positive and finite; else throws std::invalid_argument, as for an invalid mesh
     SurfacePoints(const Mesh& mesh, float spacing);
 
+    /// The points() of another one, in the same order: has the same nodes, to the bit. At least one.
+    explicit SurfacePoints(std::vector<SurfacePoint> ordered);
+
     std::span<const SurfacePoint> points() const { return points_; }
     std::span<const PointNode> nodes() const { return nodes_; }
 

@@ -14,7 +14,12 @@ struct Grids {
     openvdb::FloatGrid::ConstPtr distance;
     /// Index of the nearest triangle at each active voxel of `distance`; null unless asked for.
     openvdb::Int32Grid::ConstPtr triangle;
+    /// The surface points of a body (collider/body.h); null for a field alone.
+    openvdb::GridBase::ConstPtr points = nullptr;
 };
+
+/// Name of the grid of a body's surface points.
+inline constexpr const char* contactPoints = "contact_points";
 
 /// Names of the metadata that bilayer writes on the distance grid. `inside_width` is there for fields whose interior
 /// width differs from the background.

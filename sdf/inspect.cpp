@@ -2,7 +2,8 @@
 
 #include <fmt/format.h>
 #include <oneapi/tbb/blocked_range.h>
-#include <oneapi/tbb/parallel_reduce.h>
+#include <oneapi/tbb/parallel_for.h>
+#include <oneapi/tbb/parallel_sort.h>
 
 #include <algorithm>
 #include <cmath>
@@ -11,6 +12,8 @@
 #include <limits>
 #include <numeric>
 #include <span>
+#include <tuple>
+#include <vector>
 
 #include "sdf/orient.h"
 #include "sdf/piercing.h"
@@ -25,6 +28,8 @@ constexpr double cellsPerTriangle = 2;
 constexpr int mostCellsAlongSide = 512;
 /// A wall that a ray leaves under a flatter angle than this is an edge, not a wall (cosine).
 constexpr float leastFacing = 0.2f;
+/// Part of the area whose walls are not common: creases and tips, which most meshes have somewhere.
+constexpr double uncommonArea = 0.01;
 
 struct Component {
     double volume = 0;
@@ -226,25 +231,35 @@ class WallFinder {
     std::vector<unsigned> begins_, triangles_;
 };
 
+float finiteOrZero(float thickness) {
+    return std::isfinite(thickness) ? thickness : 0.f;
+}
+
+// The thickness behind triangles that only a part of the area stays below.
+float commonThickness(const Mesh& mesh, const std::vector<float>& thickness, double area) {
+    std::vector<unsigned> order(thickness.size());
+    std::iota(order.begin(), order.end(), 0u);
+    tbb::parallel_sort(order.begin(), order.end(),
+                       [&](unsigned a, unsigned b) { return std::tie(thickness[a], a) < std::tie(thickness[b], b); });
+    double below = 0;
+    for (const unsigned triangle : order) {
+        below += glm::length(areaVector(mesh, mesh.triangles[triangle]));
+        if (below > uncommonArea * area) return finiteOrZero(thickness[triangle]);
+    }
+    return 0;
+}
+
 void findThinWalls(const Mesh& mesh, float wall, MeshReport& report) {
     if (!(report.bounds.longestSide() > 0)) return;
     const WallFinder finder(mesh);
-    using Result = std::pair<float, std::size_t>;
-    const Result result = tbb::parallel_reduce(
-        tbb::blocked_range<std::size_t>(0, mesh.triangles.size(), 1024), Result{WallFinder::infinite, 0},
-        [&](const auto& range, Result part) {
-            for (std::size_t i = range.begin(); i < range.end(); ++i) {
-                const float thickness = finder.thicknessBehind(unsigned(i));
-                part.first = std::min(part.first, thickness);
-                part.second += thickness < wall;
-            }
-            return part;
-        },
-        [](const Result& a, const Result& b) {
-            return Result{std::min(a.first, b.first), a.second + b.second};
-        });
-    report.thinnestWall = std::isfinite(result.first) ? result.first : 0.f;
-    report.thinWalls = result.second;
+    std::vector<float> thickness(mesh.triangles.size());
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, thickness.size(), 1024), [&](const auto& range) {
+        for (std::size_t i = range.begin(); i < range.end(); ++i) thickness[i] = finder.thicknessBehind(unsigned(i));
+    });
+    report.thinnestWall = finiteOrZero(*std::min_element(thickness.begin(), thickness.end()));
+    report.commonWall = commonThickness(mesh, thickness, report.area);
+    report.thinWalls =
+        std::size_t(std::count_if(thickness.begin(), thickness.end(), [&](float t) { return t < wall; }));
 }
 
 }  // namespace

@@ -70,7 +70,10 @@ std::uint64_t LevelSet::leaves() const {
     return grids_->distance->tree().leafCount();
 }
 std::uint64_t LevelSet::memoryBytes() const {
-    return grids_->distance->memUsage() + (grids_->triangle ? grids_->triangle->memUsage() : 0);
+    std::uint64_t bytes = grids_->distance->memUsage();
+    if (grids_->triangle) bytes += grids_->triangle->memUsage();
+    if (grids_->points) bytes += grids_->points->memUsage();
+    return bytes;
 }
 const std::string& LevelSet::method() const {
     return method_;

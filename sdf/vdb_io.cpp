@@ -73,6 +73,7 @@ void writeVdb(const std::filesystem::path& path, const LevelSet& levelSet, const
         distance->insertMeta(metadata::errorBound, openvdb::FloatMetadata(storedErrorBound(levelSet, options)));
     openvdb::GridCPtrVec grids{distance};
     if (levelSet.grids().triangle) grids.push_back(levelSet.grids().triangle);
+    if (levelSet.grids().points) grids.push_back(levelSet.grids().points);
     writeGrids(path, grids);
 }
 
@@ -94,6 +95,8 @@ LevelSet readVdb(const std::filesystem::path& path) {
         grids, [](const auto& grid) { return grid.getGridClass() == openvdb::GRID_LEVEL_SET; });
     if (!result->distance) throw std::runtime_error(fmt::format("{}: holds no level set", path.string()));
     result->triangle = first<openvdb::Int32Grid>(grids, [](const auto& grid) { return grid.getName() == "triangle"; });
+    for (const auto& grid : grids)
+        if (grid->getName() == contactPoints) result->points = grid;
     try {
         requireNumbers(*result->distance);
         return LevelSet(std::move(result));

@@ -6,13 +6,16 @@
 #include <memory>
 #include <optional>
 #include <stdexcept>
+#include <utility>
 
 #include "cl/device.h"
 #include "cl/filler.h"
+#include "collider/collider.h"
 #include "integration/fluid/fill.h"
 #include "sdf/build.h"
 #include "sdf/double_layer.h"
 #include "sdf/mesh_io.h"
+#include "sdf/orient.h"
 #include "sdf/vdb_io.h"
 #include "tools/commands.h"
 #include "tools/output.h"
@@ -41,9 +44,11 @@ struct Arguments {
     std::string bandUnit = "voxels", method = "exact", backend = "tbb", sign = "auto", device, mapping = "auto";
     std::uint64_t deviceMemory = 0;
     VdbOptions stored;
-    bool fill = false, json = false;
+    ColliderOptions collider;
+    bool fill = false, body = false, json = false;
     CLI::Option *resolutionGiven = nullptr, *halfGiven = nullptr, *exteriorGiven = nullptr, *interiorGiven = nullptr;
     CLI::Option* gapGiven = nullptr;
+    CLI::Option *marginGiven = nullptr, *spacingGiven = nullptr;
     CLI::Option *deviceGiven = nullptr, *memoryGiven = nullptr, *mappingGiven = nullptr;
     std::vector<CLI::Option*> layerOptions;  // what only the double layer method understands
 };
@@ -53,7 +58,7 @@ struct Outcome {
     MeshReport report;
     std::string device;
     BuildTimes times;
-    double read = 0, inspect = 0, build = 0, fill = 0, write = 0;
+    double read = 0, inspect = 0, build = 0, fill = 0, body = 0, write = 0;
 };
 
 void requireUsage(const Arguments& a) {
@@ -73,6 +78,8 @@ void requireUsage(const Arguments& a) {
         throw CLI::ValidationError("--gap", "needs --sign flood or auto, and --method exact or pseudonormal");
     if (a.bandUnit == "world" && !a.halfGiven->count() && !a.exteriorGiven->count())
         throw CLI::ValidationError("--band-unit", "world needs --half-width, or --exterior-width and --interior-width");
+    if (!a.body && (a.marginGiven->count() || a.spacingGiven->count()))
+        throw CLI::ValidationError("--margin and --point-spacing", "need --body");
     requireOther(a.output, a.mesh);
 }
 
@@ -118,6 +125,16 @@ LevelSet timedBuild(const Mesh& mesh, const Arguments& a, Outcome& outcome) {
     return field;
 }
 
+// With what bodies need beside the field.
+LevelSet timedBody(const Mesh& mesh, const LevelSet& field, const Arguments& a, Outcome& outcome) {
+    const Stopwatch watch;
+    // as the field was signed; a mesh that is fine keeps its bytes
+    Mesh outward = a.sign == "normals" ? mesh : orient(mesh).mesh;
+    LevelSet body = withBody(field, Collider(std::move(outward), field, a.collider).body());
+    outcome.body = watch.seconds();
+    return body;
+}
+
 void printJson(const Arguments& a, const Outcome& o, const LevelSet& field) {
     Json json{{"mesh", toJson(o.report, o.wall)},
               {"output", a.output.string()},
@@ -137,9 +154,11 @@ void printJson(const Arguments& a, const Outcome& o, const LevelSet& field) {
                 {"build", o.build},
                 {"parts", {{"tiles", o.times.tiles}, {"fill", o.times.fill}, {"assemble", o.times.assemble}}},
                 {"farFill", o.fill},
+                {"body", o.body},
                 {"write", o.write}}},
               {"peakRssBytes", peakMemory()}};
     json.update(provenance(field, a.stored));
+    if (a.body) json["body"] = toJson(bodyOf(field));
     print(json);
 }
 
@@ -149,6 +168,7 @@ void printTable(const Arguments& a, const Outcome& o, const LevelSet& field) {
     mesh.print();
     Table table(a.output.string());
     addRows(table, field, a.stored);
+    if (a.body) addRows(table, bodyOf(field));
     table.row("filled by", fmt::format("{} on {}", a.backend, o.device));
     table.row("build", fmt::format("{:.3f} s: tiles {:.3f}, fill {:.3f}, assemble {:.3f}", o.build, o.times.tiles,
                                    o.times.fill, o.times.assemble));
@@ -185,6 +205,7 @@ void run(Arguments a) {
         field = fluid::fill(field);
         outcome.fill = filling.seconds();
     }
+    if (a.body) field = timedBody(mesh, field, a, outcome);
     const Stopwatch inspecting;
     outcome.wall = a.options.voxelSize;
     outcome.report = inspect(mesh, outcome.wall);
@@ -241,6 +262,18 @@ void addLayers(CLI::App& command, Arguments& a) {
             ->check(CLI::Range(1, 1024))};
 }
 
+void addBody(CLI::App& command, Arguments& a) {
+    auto* group = command.add_option_group("body", "what rigid bodies need beside the field");
+    group->add_flag("--body", a.body, "keep surface points, mass and margin in the file: it collides without the mesh");
+    a.marginGiven = group
+                        ->add_option("--margin", a.collider.margin,
+                                     "bodies touch up to this distance in the mesh's unit, default a voxel")
+                        ->check(positive());
+    a.spacingGiven =
+        group->add_option("--point-spacing", a.collider.pointSpacing, "distance of surface points [voxels], default 2")
+            ->check(within(0.1, 100));
+}
+
 void addMachine(CLI::App& command, Arguments& a) {
     command.add_option("--backend", a.backend, "tbb (default) or opencl")->check(CLI::IsMember({"tbb", "opencl"}));
     a.deviceGiven = command.add_option("--device", a.device, "part of an OpenCL device's or platform's name");
@@ -264,6 +297,7 @@ void addBuild(CLI::App& app) {
     addMethod(*command, *a);
     addLayers(*command, *a);
     addMachine(*command, *a);
+    addBody(*command, *a);
     command->add_flag("--triangles", a->options.triangles, "keep the nearest triangle of each voxel too");
     command->add_flag("--fill", a->fill, "sweep distances into all voxels of the field's box");
     command->add_flag("--half-float", a->stored.halfFloat, "store 16-bit distances");

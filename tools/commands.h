@@ -43,6 +43,12 @@ inline CLI::Validator within(double low, double high) {
     return numbers(good, fmt::format("in {:g}..{:g}", low, high), fmt::format("{:g}..{:g}", low, high));
 }
 
+/// Accepts finite numbers from zero on.
+inline CLI::Validator nonNegative() {
+    const auto good = [](double value) { return value >= 0 && value <= double(std::numeric_limits<float>::max()); };
+    return numbers(good, "a finite number, zero at least", "NONNEGATIVE");
+}
+
 /// Throws CLI::ValidationError if writing the output would overwrite an input.
 inline void requireOther(const std::filesystem::path& output, const std::filesystem::path& input) {
     std::error_code absent;

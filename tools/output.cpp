@@ -107,6 +107,7 @@ Json toJson(const MeshReport& report, float wall) {
             {"wall", number(wall)},
             {"thinWalls", report.thinWalls},
             {"thinnestWall", number(report.thinnestWall)},
+            {"commonWall", number(report.commonWall)},
             {"area", report.area},
             {"volume", report.volume}};
 }
@@ -122,7 +123,9 @@ void addRows(Table& table, const MeshReport& report, float wall) {
     table.row("self-intersections", fmt::format("{} pairs of triangles", grouped(report.selfIntersections)));
     table.row("degenerate triangles", grouped(report.degenerateTriangles));
     table.row("duplicate triangles", grouped(report.duplicateTriangles));
-    if (report.thinnestWall > 0) table.row("thinnest wall", metres(report.thinnestWall));
+    if (report.thinnestWall > 0)
+        table.row("thinnest wall", fmt::format("{}; behind 99 % of the area {} at least", metres(report.thinnestWall),
+                                               metres(report.commonWall)));
     if (wall > 0)
         table.row("thin walls", fmt::format("{} triangles, below {}", grouped(report.thinWalls), metres(wall)));
     table.row("area", fmt::format("{:.6g} m^2", report.area));
@@ -173,6 +176,18 @@ void addRows(Table& table, const std::optional<MassProperties>& mass) {
     for (int i = 0; i < 3; ++i)
         table.row(fmt::format("principal axis {}", i + 1),
                   fmt::format("{}: {:.6g} m^5", text(axes[i]), mass->principalInertia[i]));
+}
+
+Json toJson(const Body& body) {
+    return {{"points", body.points.points().size()},
+            {"margin", number(body.margin)},
+            {"bounds", box(body.bounds)},
+            {"mass", toJson(body.mass)}};
+}
+
+void addRows(Table& table, const Body& body) {
+    table.row("body", fmt::format("{} surface points, margin {}{}", grouped(body.points.points().size()),
+                                  metres(body.margin), body.mass ? "" : ", without a mass"));
 }
 
 ProgressBar::ProgressBar(std::string label) : label_(std::move(label)), visible_(::isatty(STDERR_FILENO)) {}

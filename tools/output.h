@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "collider/body.h"
 #include "collider/mass.h"
 #include "sdf/inspect.h"
 #include "sdf/level_set.h"
@@ -57,6 +58,11 @@ Json provenance(const LevelSet& levelSet, const VdbOptions& stored = {});
 Json toJson(const std::optional<MassProperties>& mass);
 /// All of them but the volume.
 void addRows(Table& table, const std::optional<MassProperties>& mass);
+
+/// What is kept of a body beside its field.
+Json toJson(const Body& body);
+/// All of it but the mass.
+void addRows(Table& table, const Body& body);
 
 /// Seconds since its construction.
 class Stopwatch {

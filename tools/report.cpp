@@ -9,7 +9,9 @@
 #include <stdexcept>
 
 #include "cl/device.h"
+#include "collider/body.h"
 #include "collider/mass.h"
+#include "integration/bullet/advice.h"
 #include "sdf/grids.h"
 #include "sdf/mesh_io.h"
 #include "sdf/vdb_io.h"
@@ -24,8 +26,14 @@ struct Arguments {
     bool json = false;
 };
 
-std::shared_ptr<Arguments> addArguments(CLI::App& command, const char* name, const char* help) {
-    auto arguments = std::make_shared<Arguments>();
+struct InspectArguments : Arguments {
+    bullet::Scene scene;
+    CLI::Option* stepGiven = nullptr;
+};
+
+template <class Kind = Arguments>
+std::shared_ptr<Kind> addArguments(CLI::App& command, const char* name, const char* help) {
+    auto arguments = std::make_shared<Kind>();
     if (name) command.add_option(name, arguments->input, help)->required();
     command.add_flag("--json", arguments->json, "print one JSON object");
     return arguments;
@@ -41,19 +49,51 @@ std::optional<MassProperties> massOf(const Solid& solid) {
     }
 }
 
-void runInspect(const Arguments& a) {
+Json adviceJson(const bullet::Advice& advice) {
+    return {{"voxelSize", number(advice.voxelSize)},
+            {"margin", number(advice.margin)},
+            {"exteriorWidth", advice.exteriorWidth},
+            {"interiorWidth", advice.interiorWidth},
+            {"substeps", advice.substeps},
+            {"substepsWithoutSweeps", advice.substepsUnswept},
+            {"wallVoxels", number(advice.wallVoxels)},
+            {"splitImpulsePenetrationThreshold", number(advice.splitImpulse)},
+            {"activeVoxels", advice.voxels},
+            {"fieldBytes", advice.fieldBytes},
+            {"buildSeconds", advice.buildSeconds},
+            {"warnings", advice.warnings}};
+}
+
+void printAdvice(const InspectArguments& a, const bullet::Advice& advice) {
+    Table table(
+        fmt::format("advice: bodies that meet at up to {:g} m/s, steps of {:.4g} s", a.scene.speed, a.scene.step));
+    table.row("build", fmt::format("--voxel-size {:.4g} --exterior-width {} --interior-width {} --body --margin {:.4g}",
+                                   advice.voxelSize, advice.exteriorWidth, advice.interiorWidth, advice.margin));
+    if (advice.wallVoxels > 0) table.row("walls", fmt::format("{:.3g} voxels", advice.wallVoxels));
+    table.row("substeps", fmt::format("{} with swept contacts, {} without", advice.substeps, advice.substepsUnswept));
+    table.row("field", fmt::format("about {} active voxels, {}, built in {:.1g} s on two cores", grouped(advice.voxels),
+                                   bytes(advice.fieldBytes), advice.buildSeconds));
+    table.row("solver", fmt::format("m_splitImpulsePenetrationThreshold = {:.4g}", advice.splitImpulse));
+    for (const std::string& warning : advice.warnings) table.row("warning", warning);
+    table.print();
+}
+
+void runInspect(const InspectArguments& a) {
     const Mesh mesh = readMesh(a.input);
     const MeshReport report = inspect(mesh);
+    const auto advice = a.stepGiven->count() ? std::optional(bullet::advise(report, a.scene)) : std::nullopt;
     const std::optional<MassProperties> mass = report.closed() ? massOf(mesh) : std::nullopt;
     if (a.json) {
         Json json = toJson(report, 0);
         json["mass"] = toJson(mass);
+        if (advice) json["advice"] = adviceJson(*advice);
         return print(json);
     }
     Table table(a.input.string());
     addRows(table, report, 0);
     addRows(table, mass);
     table.print();
+    if (advice) printAdvice(a, *advice);
 }
 
 // What OpenVDB has to say about the grid as a level set: a remark, since a field may well have widths that differ.
@@ -85,7 +125,17 @@ Json gridList(const std::filesystem::path& path) {
     return list;
 }
 
-void printInfo(const Arguments& a, const LevelSet& field, const Json& grids,
+// Nothing for a field alone.
+std::optional<Body> bodyBeside(const Arguments& a, const LevelSet& field) {
+    if (!hasBody(field)) return std::nullopt;
+    try {
+        return bodyOf(field);
+    } catch (const std::invalid_argument& error) {
+        throw std::runtime_error(fmt::format("{}: {}", a.input.string(), error.what()));
+    }
+}
+
+void printInfo(const Arguments& a, const LevelSet& field, const Json& grids, const std::optional<Body>& body,
                const std::optional<MassProperties>& mass) {
     Table table(a.input.string());
     for (const Json& grid : grids)
@@ -93,6 +143,7 @@ void printInfo(const Arguments& a, const LevelSet& field, const Json& grids,
                   fmt::format("'{}': {}, {}{}", grid["name"].get<std::string>(), grid["type"].get<std::string>(),
                               grid["class"].get<std::string>(), grid["halfFloat"] ? ", 16 bits" : ""));
     addRows(table, field);
+    if (body) addRows(table, *body);
     table.row("bounds", boxText(activeBounds(field)));
     table.row("volume", mass ? fmt::format("{:.6g} m^3", mass->volume) : "none");
     addRows(table, mass);
@@ -110,8 +161,9 @@ Json inVoxels(float width, const LevelSet& field) {
 void runInfo(const Arguments& a) {
     const LevelSet field = readVdb(a.input);
     const Json grids = gridList(a.input);
-    const std::optional<MassProperties> mass = massOf(field);
-    if (!a.json) return printInfo(a, field, grids, mass);
+    const std::optional<Body> body = bodyBeside(a, field);
+    const std::optional<MassProperties> mass = body ? body->mass : massOf(field);
+    if (!a.json) return printInfo(a, field, grids, body, mass);
     Json json{{"grids", grids},
               {"voxelSize", number(field.voxelSize())},
               {"exteriorWidth", inVoxels(field.exteriorWidth(), field)},
@@ -124,6 +176,7 @@ void runInfo(const Arguments& a) {
               {"memoryBytes", field.memoryBytes()},
               {"levelSetCheck", remark(field)}};
     json.update(provenance(field));
+    if (body) json["body"] = toJson(*body);
     print(json);
 }
 
@@ -159,11 +212,46 @@ void runDevices(const Arguments& a) {
     }
 }
 
+// "0.02" or "1/60".
+std::string asSeconds(std::string& word) {
+    const auto slash = word.find('/');
+    if (slash == std::string::npos) return "";
+    double over = 0, under = 0;
+    if (!CLI::detail::lexical_cast(word.substr(0, slash), over) ||
+        !CLI::detail::lexical_cast(word.substr(slash + 1), under))
+        return "must be a number or a fraction";
+    word = fmt::format("{}", over / under);
+    return "";
+}
+
+void addScene(CLI::App& command, InspectArguments& a) {
+    bullet::Scene& scene = a.scene;
+    auto* group = command.add_option_group("scene", "say what a body's field needs, and warn of the rest");
+    auto* step = group->add_option("--dt", scene.step, "step of the simulation [s], as 0.01 or 1/60")
+                     ->check(positive())
+                     ->transform(CLI::Validator(asSeconds, "SECONDS"));
+    auto* speed =
+        group->add_option("--speed", scene.speed, "that bodies meet with at most [m/s]")->check(nonNegative());
+    step->needs(speed);
+    speed->needs(step);
+    const auto also = [&](const char* name, float& value, const char* help, const CLI::Validator& check) {
+        group->add_option(name, value, help)->check(check)->needs(step);
+    };
+    also("--spin", scene.spin, "that bodies turn with at most [rad/s], default what an impact may give", nonNegative());
+    also("--thickness", scene.thickness, "of the thinnest wall [m], default the mesh's own", positive());
+    also("--gap", scene.gap, "narrowest clearance to pass [m]", positive());
+    also("--voxel-size", scene.voxelSize, "to judge instead of choosing one [m]", positive());
+    also("--margin", scene.margin, "likewise [m], default a voxel", nonNegative());
+    also("--mass-ratio", scene.massRatio, "of the heaviest to the lightest in contact, default 1", within(1, 1e9));
+    a.stepGiven = step;
+}
+
 }  // namespace
 
 void addInspect(CLI::App& app) {
     auto* command = app.add_subcommand("inspect", "Count what is wrong with a mesh");
-    const auto a = addArguments(*command, "mesh", "OBJ, PLY, STL, OFF, glTF, ...");
+    const auto a = addArguments<InspectArguments>(*command, "mesh", "OBJ, PLY, STL, OFF, glTF, ...");
+    addScene(*command, *a);
     command->callback([a] { runInspect(*a); });
 }
 

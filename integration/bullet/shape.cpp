@@ -52,7 +52,7 @@ void castSphere(const Placed& field, float radius, btTriangleConvexcastCallback&
 }  // namespace
 
 Pose centreOfMassFrame(const Collider& collider) {
-    const MassProperties mass = massProperties(collider.mesh());
+    const MassProperties& mass = collider.mass();
     const glm::quat rotation = glm::conjugate(mass.principalAxes);
     return {-(rotation * mass.centre), rotation};
 }
@@ -103,7 +103,7 @@ Shape::Shape(std::shared_ptr<const Collider> collider, const ShapeOptions& optio
     // Not the type for custom concave shapes: Bullet takes every shape of that type for its own btSdfCollisionShape.
     // This one is used by nothing else in Bullet.
     m_shapeType = FAST_CONCAVE_MESH_PROXYTYPE;
-    m_collisionMargin = options.margin < 0 ? collider_->field().voxelSize() : options.margin;
+    m_collisionMargin = options.margin < 0 ? collider_->margin() : options.margin;
 }
 
 Shape::~Shape() = default;
@@ -135,7 +135,7 @@ void Shape::getAabb(const btTransform& transform, btVector3& lower, btVector3& u
 }
 
 void Shape::calculateLocalInertia(btScalar mass, btVector3& inertia) const {
-    const MassProperties solid = massProperties(collider_->mesh());
+    const MassProperties& solid = collider_->mass();
     const glm::mat3 axes(frame_.rotation);
     const glm::mat3 turned = axes * solid.inertia * glm::transpose(axes);
     const glm::vec3 centre = frame_.toWorld(solid.centre);

@@ -18,8 +18,7 @@ struct ShapeOptions {
     /// mesh modelled about any other point.
     Pose frame{};
     /// Contacts are made up to this distance between the surfaces, and the bodies' boxes grow by it [m, before
-    /// scaling]. It keeps resting contacts alive; bodies still rest surface on surface. Negative: one voxel of the
-    /// field.
+    /// scaling]. It keeps resting contacts alive; bodies still rest surface on surface. Negative: the collider's own.
     float margin = -1;
     /// Whether bodies that move farther than the margin in a step are followed on their way, so that nothing thin is
     /// passed through, however fast. Contacts are then made of what a step would meet; the solver lets bodies come that

@@ -75,15 +75,32 @@ TEST_CASE("inside-out components are told from cavities") {
     CHECK(inspect(shapes::join({big, moved(flipped(small), {5, 0, 0})})).insideOutComponents == 1);
 }
 
+TEST_CASE("a hundredth of the area does not count as a common wall") {
+    // a cube of area 24 and a small plate whose area is below, or above, a hundredth of that
+    for (const float side : {0.2f, 0.5f}) {
+        Mesh plate = shapes::box({side / 2, side / 2, 0.005f});
+        for (glm::vec3& point : plate.points) point.x += 3;
+        const MeshReport report = inspect(shapes::join({shapes::box({1, 1, 1}), plate}));
+        CHECK(report.thinnestWall == Approx(0.01));
+        CHECK(report.commonWall == Approx(side < 0.3f ? 2 : 0.01));
+    }
+    Mesh sheet;
+    sheet.points = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+    sheet.triangles = {{0, 1, 2}};
+    CHECK(inspect(sheet).commonWall == 0);
+}
+
 TEST_CASE("the thinnest wall is measured through the solid") {
     const MeshReport plate = inspect(shapes::box({1, 1, 0.05f}, 8), 0.2f);
     CHECK(plate.thinnestWall == Approx(0.1));
+    CHECK(plate.commonWall == Approx(0.1));
     CHECK(plate.thinWalls == 2 * 2 * 8 * 8);
     CHECK(inspect(shapes::box({1, 1, 0.05f}, 8), 0.05f).thinWalls == 0);
     CHECK(inspect(shapes::bowl(1, 0.1f, 256)).thinnestWall == Approx(0.1).epsilon(0.05));
     // the gap between two bodies is no wall
     const Mesh pair = shapes::join({shapes::box({1, 1, 1}), moved(shapes::box({1, 1, 1}), {2.01f, 0, 0})});
     CHECK(inspect(pair).thinnestWall == Approx(2));
+    CHECK(inspect(pair).commonWall == Approx(2));
 }
 
 TEST_CASE("the public corpus is reported as it is known to be") {

@@ -2,7 +2,10 @@
 #include <catch2/catch.hpp>
 #include <chrono>
 #include <fstream>
+#include <memory>
 
+#include "sdf/grids.h"
+#include "sdf/vdb_io.h"
 #include "tests/support/support.h"
 #include "tests/tools/program.h"
 
@@ -91,6 +94,18 @@ TEST_CASE("fields that cannot be read") {
     CHECK_FALSE(std::filesystem::exists(output()));
 }
 
+TEST_CASE("bodies that are damaged") {
+    const auto path = scratch("body.vdb"), broken = scratch("broken_body.vdb");
+    REQUIRE(run({"build", sphereFile().string(), "-o", path.string(), "--voxel-size", "0.1", "--body"}).status == 0);
+    auto grids = std::make_shared<bilayer::Grids>(bilayer::readVdb(path).grids());
+    grids->points = nullptr;
+    bilayer::writeVdb(broken, bilayer::LevelSet(grids));
+    requireFault({"info", broken.string()}, "broken_body.vdb: the body is damaged: it has no surface points");
+    requireFault({"info", broken.string(), "--json"}, "broken_body.vdb");
+    // its field is still one
+    CHECK(run({"query", broken.string()}, {.input = "0 0 0\n"}).status == 0);
+}
+
 TEST_CASE("points that cannot be parsed") {
     const std::string field = scratch("points.vdb").string();
     REQUIRE(run({"build", sphereFile().string(), "-o", field, "--voxel-size", "0.1"}).status == 0);
@@ -148,6 +163,26 @@ TEST_CASE("wrong usage") {
     requireUsage({"seed", mesh, "-o", output(), "--voxel-size", "0.1", "--rotate", "0", "0", "0", "1"});
     requireUsage({"seed", mesh, "-o", output(), "--voxel-size", "0.1", "--seed", "1"});
     CHECK_FALSE(std::filesystem::exists(output()));
+}
+
+TEST_CASE("bodies and scenes that are told by halves are wrong usage") {
+    const std::string mesh = sphereFile().string();
+    requireUsage(buildOf(mesh, {"--voxel-size", "0.1", "--margin", "0.1"}), "need --body");
+    requireUsage(buildOf(mesh, {"--voxel-size", "0.1", "--point-spacing", "1"}), "need --body");
+    for (const char* word : {"0", "-1", "nan", "inf", "x"}) {
+        requireUsage(buildOf(mesh, {"--voxel-size", "0.1", "--body", "--margin", word}), "--margin");
+        requireUsage(buildOf(mesh, {"--voxel-size", "0.1", "--body", "--point-spacing", word}), "--point-spacing");
+        for (const char* option : {"--thickness", "--gap", "--voxel-size", "--mass-ratio"})
+            requireUsage({"inspect", mesh, "--dt", "1/60", "--speed", "1", option, word}, option);
+    }
+    for (const char* word : {"-1", "nan", "inf", "x"})
+        for (const char* option : {"--spin", "--margin"})
+            requireUsage({"inspect", mesh, "--dt", "1/60", "--speed", "1", option, word}, option);
+    for (const char* word : {"0", "-1", "nan", "x", "1/", "/60", "1/0", "1/x", "1/60/2", "-1/60"})
+        requireUsage({"inspect", mesh, "--speed", "1", "--dt", word}, "--dt");
+    requireUsage({"inspect", mesh, "--dt", "1/60"}, "--speed");
+    requireUsage({"inspect", mesh, "--speed", "1"}, "--dt");
+    requireUsage({"inspect", mesh, "--gap", "1"}, "--dt");
 }
 
 TEST_CASE("widths in the mesh's unit must come to as many voxels as others") {

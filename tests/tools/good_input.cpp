@@ -9,6 +9,7 @@
 #include <sstream>
 #include <vector>
 
+#include "collider/collider.h"
 #include "demos/shared/shapes.h"
 #include "sdf/grids.h"
 #include "sdf/mesh_io.h"
@@ -249,6 +250,70 @@ TEST_CASE("info tells what is in a file") {
     const Result table = run({"info", fieldFile()});
     CHECK(table.status == 0);
     CHECK_THAT(table.out, Catch::Contains("normals: closed and oriented") && Catch::Contains("0.0001 voxels"));
+}
+
+TEST_CASE("build --body keeps what bodies need, and info tells of it") {
+    const std::string output = scratch("body.vdb").string();
+    const auto plain = build(output, {"--voxel-size", "0.05"});
+    CHECK_FALSE(plain.contains("body"));
+    CHECK_FALSE(run({"info", output, "--json"}).json().contains("body"));
+    const auto json = build(output, {"--voxel-size", "0.05", "--body", "--margin", "0.02"});
+    const Collider body(readVdb(output));
+    CHECK(body.margin() == 0.02f);
+    CHECK(body.mass().volume == Approx(json["mesh"]["volume"].get<double>()));
+    CHECK(json["body"]["points"] == body.points().points().size());
+    const auto info = run({"info", output, "--json"}).json();
+    CHECK(info["body"] == json["body"]);
+    CHECK(info["body"]["margin"] == 0.02);
+    CHECK(info["mass"] == info["body"]["mass"]);
+    CHECK_THAT(run({"info", output}).out, Catch::Contains("surface points, margin 0.02 m"));
+    const auto fine = build(output, {"--voxel-size", "0.05", "--body", "--point-spacing", "1"});
+    CHECK(fine["body"]["points"] > json["body"]["points"]);
+    CHECK(fine["body"]["margin"] == 0.05);
+    build(output, {"--voxel-size", "0.05", "--body", "--half-float", "--triangles", "--fill"});
+    CHECK(Collider(readVdb(output)).points().points().size() == body.points().points().size());
+}
+
+TEST_CASE("a body's points look outward, whichever way its triangles run") {
+    Mesh inside = shapes::sphere(0.5f, 3);
+    for (glm::uvec3& triangle : inside.triangles) std::swap(triangle.x, triangle.y);
+    const auto path = scratch("inside.ply"), output = scratch("inside.vdb");
+    writeMesh(path, inside);
+    REQUIRE(run({"build", path.string(), "-o", output.string(), "--voxel-size", "0.05", "--body"}).status == 0);
+    const Collider body(readVdb(output));
+    for (const SurfacePoint& point : body.points().points()) REQUIRE(glm::dot(point.normal, point.position) > 0.4f);
+}
+
+TEST_CASE("inspect says what a scene needs") {
+    const auto path = scratch("plate.ply");
+    writeMesh(path, shapes::box({0.5f, 0.5f, 0.015f}, 4));
+    const Words words{"inspect", path.string(), "--dt", "1/60", "--speed", "10"};
+    const auto with = [&](Words more) {
+        more.insert(more.begin(), words.begin(), words.end());
+        more.push_back("--json");
+        const Result r = run(more);
+        INFO(r.err);
+        REQUIRE(r.status == 0);
+        return r.json()["advice"];
+    };
+    const auto advice = with({});
+    CHECK(advice["voxelSize"].get<double>() == Approx(0.01));
+    CHECK(advice["margin"].get<double>() == Approx(0.01));
+    CHECK(advice["exteriorWidth"] == 3);
+    CHECK(advice["substepsWithoutSweeps"] == 12);
+    CHECK(advice["wallVoxels"].get<double>() == Approx(3));
+    CHECK(advice["warnings"].size() == 1);
+    CHECK(advice["splitImpulsePenetrationThreshold"].get<double>() == Approx(-0.01));
+    CHECK(with({"--thickness", "0.015"})["voxelSize"].get<double>() == Approx(0.005));
+    CHECK(with({"--gap", "0.01"})["voxelSize"].get<double>() == Approx(0.005));
+    CHECK(with({"--voxel-size", "0.02"})["wallVoxels"].get<double>() == Approx(1.5));
+    CHECK(with({"--margin", "0.02"})["exteriorWidth"] == 4);
+    CHECK(with({"--spin", "100"})["substeps"] == 4);
+    CHECK(with({"--mass-ratio", "50"})["warnings"].size() == 2);
+    const std::string text = run(words).out;
+    CHECK_THAT(text, Catch::Contains("--voxel-size 0.01 --exterior-width 3 --interior-width 10 --body --margin 0.01") &&
+                         Catch::Contains("12 without") && Catch::Contains("warning"));
+    CHECK_FALSE(run({"inspect", path.string(), "--json"}).json().contains("advice"));
 }
 
 TEST_CASE("inspect and info tell the mass, each by its own means") {

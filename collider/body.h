@@ -1,0 +1,33 @@
+// What a rigid body is beside its field. Made from the mesh once, it can stay with the field's grids, and in their .vdb
+// file, ever after: then nobody needs the mesh again.
+#pragma once
+
+#include <optional>
+
+#include "collider/mass.h"
+#include "collider/points.h"
+#include "sdf/level_set.h"
+#include "sdf/mesh.h"
+
+namespace bilayer {
+
+struct Body {
+    SurfacePoints points;
+    Bounds bounds;                       ///< of the mesh [m]
+    float margin = 0;                    ///< contacts are made up to this distance between surfaces [m]
+    std::optional<MassProperties> mass;  ///< nothing where the mesh encloses no volume
+};
+
+/// The level set, to write as a .vdb file, with the body beside it: surface points as a grid of OpenVDB points, the
+/// rest as metadata. Nothing is lost: bodyOf() gives the same bits. The grids of `levelSet` are shared, not copied.
+/// Throws std::invalid_argument if the body has no points.
+LevelSet withBody(const LevelSet& levelSet, const Body& body);
+
+/// Whether some body was put beside a level set.
+bool hasBody(const LevelSet& levelSet);
+
+/// The body beside a level set. Throws std::invalid_argument that says what is missing or damaged if there is none, if
+/// it is of a newer kind, or if it cannot be one of this field.
+Body bodyOf(const LevelSet& levelSet);
+
+}  // namespace bilayer

@@ -1,0 +1,284 @@
+#include "collider/body.h"
+
+#include <oneapi/tbb/parallel_for.h>
+#include <openvdb/points/PointAttribute.h>
+#include <openvdb/points/PointCount.h>
+#include <openvdb/points/PointDataGrid.h>
+
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <functional>
+#include <glm/geometric.hpp>
+#include <limits>
+#include <stdexcept>
+#include <vector>
+
+#include "collider/collider.h"
+#include "demos/shared/shapes.h"
+#include "sdf/build.h"
+#include "sdf/grids.h"
+#include "sdf/vdb_io.h"
+#include "tests/support/analytic.h"
+#include "tests/support/support.h"
+
+using namespace bilayer;
+using namespace bilayer::test;
+
+namespace {
+
+Mesh shifted(Mesh mesh, const glm::vec3& by) {
+    for (glm::vec3& point : mesh.points) point += by;
+    return mesh;
+}
+
+// A collider of a mesh, and the same read from a file.
+struct Pair {
+    explicit Pair(const Mesh& mesh, float voxel, const VdbOptions& options = {}, float margin = -1)
+        : field(build(mesh, {.voxelSize = voxel})), made(mesh, field, {.margin = margin}), loaded(read(options)) {}
+
+    LevelSet field;
+    Collider made, loaded;
+
+  private:
+    Collider read(const VdbOptions& options) const {
+        const auto path = scratch("body.vdb");
+        writeVdb(path, withBody(field, made.body()), options);
+        return Collider(readVdb(path));
+    }
+};
+
+void requireSame(const Body& a, const Body& b) {
+    REQUIRE(a.points.points().size() == b.points.points().size());
+    for (std::size_t i = 0; i < a.points.points().size(); ++i) {
+        const SurfacePoint &p = a.points.points()[i], &q = b.points.points()[i];
+        REQUIRE(p.position == q.position);
+        REQUIRE(p.normal == q.normal);
+        REQUIRE(p.isSharp == q.isSharp);
+    }
+    REQUIRE(std::equal(a.points.nodes().begin(), a.points.nodes().end(), b.points.nodes().begin(),
+                       b.points.nodes().end(), [](const PointNode& m, const PointNode& n) {
+                           return m.centre == n.centre && m.radius == n.radius && m.begin == n.begin &&
+                                  m.end == n.end && m.next == n.next;
+                       }));
+    REQUIRE(a.bounds.lower == b.bounds.lower);
+    REQUIRE(a.bounds.upper == b.bounds.upper);
+    REQUIRE(a.margin == b.margin);
+    REQUIRE(a.mass.has_value() == b.mass.has_value());
+    if (!a.mass) return;
+    REQUIRE(a.mass->volume == b.mass->volume);
+    REQUIRE(a.mass->centre == b.mass->centre);
+    REQUIRE(a.mass->inertia == b.mass->inertia);
+    REQUIRE(a.mass->principalInertia == b.mass->principalInertia);
+    REQUIRE(a.mass->principalAxes == b.mass->principalAxes);
+}
+
+const LevelSet& stored() {
+    static const LevelSet field = [] {
+        const Mesh mesh = shapes::box({0.3f, 0.2f, 0.1f}, 3);
+        const LevelSet plain = build(mesh, {.voxelSize = 0.02f});
+        return withBody(plain, Collider(mesh, plain).body());
+    }();
+    return field;
+}
+
+using Distance = openvdb::FloatGrid;
+using Points = openvdb::points::PointDataGrid;
+
+// The stored body with something changed in copies of its grids.
+LevelSet changed(const std::function<void(Distance&)>& distance, const std::function<void(Points&)>& points = {}) {
+    auto grids = std::make_shared<Grids>(stored().grids());
+    const auto field = grids->distance->deepCopy();
+    if (distance) distance(*field);
+    grids->distance = field;
+    const auto copy = openvdb::gridConstPtrCast<Points>(grids->points)->deepCopy();
+    if (points) points(*copy);
+    grids->points = copy;
+    return LevelSet(grids);
+}
+
+template <class Value>
+std::function<void(Distance&)> setting(const char* name, const Value& value) {
+    return [=](Distance& grid) {
+        grid.removeMeta(name);
+        grid.insertMeta(name, openvdb::TypedMetadata<Value>(value));
+    };
+}
+
+template <class Value>
+std::function<void(Points&)> settingPoint(const char* name, const Value& value) {
+    return [=](Points& grid) {
+        openvdb::points::AttributeWriteHandle<Value> handle(grid.tree().beginLeaf()->attributeArray(name));
+        handle.set(0, value);
+    };
+}
+
+void requireRefusal(const LevelSet& field, const std::string& why) {
+    CAPTURE(why);
+    REQUIRE_THROWS_AS(bodyOf(field), std::invalid_argument);
+    REQUIRE_THROWS_WITH(Collider(field), Catch::Contains(why));
+}
+
+}  // namespace
+
+TEST_CASE("a body comes back from its file bit by bit") {
+    const auto [mesh, voxel] =
+        GENERATE(std::pair(shapes::torusKnot(2, 3, 0.5f, 0.15f, 200, 16), 0.03f),
+                 std::pair(shapes::sphere(0.4f, 4), 1.f / 32), std::pair(shapes::box({0.3f, 0.2f, 0.1f}, 2), 0.0217f),
+                 // coordinates with few digits to spare, and with many
+                 std::pair(shifted(shapes::sphere(0.4f, 3), {1000.3f, -77.77f, 1e-4f}), 0.05f),
+                 std::pair(shapes::torus(0.0035f, 0.0013f), 1e-4f));
+    const bool half = GENERATE(false, true);
+    CAPTURE(voxel, half);
+    const Pair pair(mesh, voxel, {.halfFloat = half}, GENERATE(-1.f, 0.0123f));
+    REQUIRE(pair.made.points().points().size() > 100);
+    requireSame(pair.made.body(), pair.loaded.body());
+    REQUIRE(pair.loaded.field().voxelSize() == pair.made.field().voxelSize());
+}
+
+TEST_CASE("bodies from files touch where those of meshes do, to the bit") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    Random random(seed);
+    const float h = 0.03f;
+    const Pair knot(shapes::torusKnot(2, 3, 0.5f, 0.15f, 200, 16), h), box(shapes::box({0.3f, 0.2f, 0.1f}, 2), h);
+    std::size_t found = 0;
+    for (int i = 0; i < 200; ++i) {
+        const Pose a{random.point(0.5), glm::angleAxis(float(random(0, 6.28)), random.direction())};
+        const Motion motion{random.point(0.1), random.point(0.2)};
+        std::vector<Contact> expected, contacts;
+        const auto collided = [&](const Collider& first, const Collider& second, std::vector<Contact>& list) {
+            return collide(Placed{first, a, 1.5f, motion}, Placed{second}, {.margin = first.margin()}, list);
+        };
+        const ContactReport one = collided(box.made, knot.made, expected);
+        const ContactReport other = collided(box.loaded, knot.loaded, contacts);
+        REQUIRE(one.pointsTested == other.pointsTested);
+        REQUIRE(one.beyondBand == other.beyondBand);
+        REQUIRE(contacts.size() == expected.size());
+        for (std::size_t k = 0; k < contacts.size(); ++k) {
+            REQUIRE(contacts[k].position == expected[k].position);
+            REQUIRE(contacts[k].normal == expected[k].normal);
+            REQUIRE(contacts[k].distance == expected[k].distance);
+            REQUIRE(contacts[k].approach == expected[k].approach);
+            REQUIRE(contacts[k].feature == expected[k].feature);
+        }
+        found += contacts.size();
+    }
+    REQUIRE(found > 100);
+}
+
+TEST_CASE("the triangles of a body from a file are those of its field") {
+    const Pair ball(shapes::sphere(0.4f, 4), 0.02f);
+    REQUIRE(ball.loaded.mesh().triangles.size() > 1000);
+    for (const glm::vec3& point : ball.loaded.mesh().points) REQUIRE(glm::length(point) == Approx(0.4f).margin(1e-3));
+    REQUIRE(massProperties(ball.loaded.mesh()).volume == Approx(ball.made.mass().volume).epsilon(5e-3));
+}
+
+TEST_CASE("many threads may ask at once for the triangles of a body from a file") {
+    const Pair ball(shapes::sphere(0.4f, 4), 0.02f);
+    std::vector<const Mesh*> meshes(64);
+    tbb::parallel_for(std::size_t(0), meshes.size(), [&](std::size_t i) { meshes[i] = &ball.loaded.mesh(); });
+    for (const Mesh* mesh : meshes) REQUIRE(mesh == meshes[0]);
+    REQUIRE_FALSE(meshes[0]->triangles.empty());
+    const Collider copy = ball.loaded;
+    REQUIRE(&copy.mesh() == meshes[0]);
+}
+
+TEST_CASE("an open mesh has no mass, in a file neither") {
+    Mesh sheet;
+    sheet.points = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}};
+    sheet.triangles = {{0, 1, 2}, {2, 1, 3}};
+    const Pair pair(sheet, 0.05f);
+    requireSame(pair.made.body(), pair.loaded.body());
+    REQUIRE_THROWS_WITH(pair.made.mass(), Catch::Contains("no volume"));
+    REQUIRE_THROWS_WITH(pair.loaded.mass(), Catch::Contains("no volume"));
+    // put beside a field that had a body with a mass, it leaves none of that
+    Body body = bodyOf(stored());
+    REQUIRE(body.mass);
+    body.mass.reset();
+    REQUIRE_FALSE(bodyOf(withBody(stored(), body)).mass);
+}
+
+TEST_CASE("a field alone is no body") {
+    const LevelSet plain = levelSetOf(sphereSolid(0.4), 0.05);
+    REQUIRE_FALSE(hasBody(plain));
+    REQUIRE(hasBody(stored()));
+    requireRefusal(plain, "no body");
+    REQUIRE_THROWS_AS(withBody(plain, {}), std::invalid_argument);
+}
+
+TEST_CASE("damaged bodies are refused by what is wrong") {
+    const float nan = std::numeric_limits<float>::quiet_NaN();
+    REQUIRE_NOTHROW(Collider(changed({})));
+    requireRefusal(changed(setting("bilayer:body", std::int32_t(99))), "kind 99");
+    requireRefusal(changed(setting("bilayer:margin", nan)), "bilayer:margin");
+    requireRefusal(changed(setting("bilayer:margin", -1.f)), "bilayer:margin");
+    requireRefusal(changed(setting("bilayer:volume", double(nan))), "bilayer:volume");
+    requireRefusal(changed(setting("bilayer:volume", -1.0)), "bilayer:volume");
+    requireRefusal(changed(setting("bilayer:principal_axes", openvdb::Vec4s(0, 0, 0, 0))), "no rotation");
+    requireRefusal(changed(setting("bilayer:principal_inertia", openvdb::Vec3s(1, 1, -1))),
+                   "bilayer:principal_inertia");
+    for (const char* name : {"bilayer:bounds_lower", "bilayer:bounds_upper", "bilayer:centre_of_mass",
+                             "bilayer:inertia", "bilayer:inertia_products", "bilayer:principal_inertia"}) {
+        requireRefusal(changed(setting(name, openvdb::Vec3s(0, nan, 0))), name);
+        requireRefusal(changed([=](Distance& grid) { grid.removeMeta(name); }), name);
+    }
+    requireRefusal(changed(setting("bilayer:bounds_upper", openvdb::Vec3s(0.3f, 0.2f, 0.05f))),
+                   "outside of its bounds");
+
+    requireRefusal(changed({}, [](Points& grid) { grid.clear(); }), "no surface points");
+    auto grids = std::make_shared<Grids>(stored().grids());
+    grids->points = nullptr;
+    requireRefusal(LevelSet(grids), "no surface points");
+    grids->points = openvdb::FloatGrid::create();
+    requireRefusal(LevelSet(grids), "no surface points");
+
+    requireRefusal(changed({}, settingPoint("N", openvdb::Vec3s(0, 0, 2))), "no place with a normal");
+    requireRefusal(changed({}, settingPoint("P", openvdb::Vec3s(nan, 0, 0))), "no place with a normal");
+    requireRefusal(changed({}, settingPoint("id", std::int32_t(-1))), "number -1");
+    requireRefusal(changed({}, settingPoint("id", std::int32_t(1 << 30))), "number");
+    const std::int32_t taken =
+        openvdb::points::AttributeHandle<std::int32_t>(
+            openvdb::gridConstPtrCast<Points>(stored().grids().points)->tree().cbeginLeaf()->constAttributeArray("id"))
+            .get(1);
+    requireRefusal(changed({}, settingPoint("id", taken)), "number");
+    for (const char* name : {"N", "id", "sharp"})
+        requireRefusal(changed({}, [=](Points& grid) { openvdb::points::dropAttribute(grid.tree(), name); }),
+                       "contact_points");
+}
+
+TEST_CASE("a field that was moved away from its body is told") {
+    requireRefusal(changed([](Distance& grid) { grid.transform().postTranslate(openvdb::Vec3d(0.1, 0, 0)); }),
+                   "another field");
+    requireRefusal(changed([](Distance& grid) { grid.transform().postScale(0.5); }), "another field");
+}
+
+TEST_CASE("a body's file that was cut is refused by name") {
+    const auto whole = scratch("whole_body.vdb"), path = scratch("cut_body.vdb");
+    writeVdb(whole, stored());
+    for (const double part : {0.1, 0.5, 0.8, 0.9, 0.99, 0.999}) {
+        std::filesystem::copy_file(whole, path, std::filesystem::copy_options::overwrite_existing);
+        std::filesystem::resize_file(path, std::uintmax_t(part * double(std::filesystem::file_size(whole))));
+        CAPTURE(part);
+        REQUIRE_THROWS_WITH(readVdb(path), Catch::Contains("cut_body.vdb"));
+    }
+}
+
+TEST_CASE("other programs see a body's points where they are") {
+    const auto grid = openvdb::gridConstPtrCast<Points>(stored().grids().points);
+    const Body body = bodyOf(stored());
+    const auto points = body.points.points();
+    REQUIRE(openvdb::points::pointCount(grid->tree()) == points.size());
+    REQUIRE(grid->getName() == "contact_points");
+    for (auto leaf = grid->tree().cbeginLeaf(); leaf; ++leaf) {
+        const openvdb::points::AttributeHandle<openvdb::Vec3s> place(leaf->constAttributeArray("P"));
+        const openvdb::points::AttributeHandle<std::int32_t> id(leaf->constAttributeArray("id"));
+        for (auto index = leaf->beginIndexOn(); index; ++index) {
+            const openvdb::Vec3s local = place.get(*index);
+            REQUIRE(std::max({std::abs(local.x()), std::abs(local.y()), std::abs(local.z())}) <= 0.5f);
+            const openvdb::Vec3d world = grid->indexToWorld(index.getCoord().asVec3d() + openvdb::Vec3d(local));
+            const glm::vec3 position = points[std::size_t(id.get(*index))].position;
+            REQUIRE(glm::distance(position, glm::vec3(world.x(), world.y(), world.z())) < 1e-6f);
+        }
+    }
+}
