@@ -24,7 +24,8 @@ namespace {
 constexpr float interpolationError = 0.87f;
 // How fast the interpolant may change: by a voxel along each axis at once.
 constexpr float steepest = 1.7321f;
-constexpr float flattest = 0.1f;  // a gradient shorter than this tells no direction: the point is on a medial axis
+constexpr float flattest = 0.1f;       // a gradient shorter than this tells no direction: the point is on a medial axis
+constexpr float nearestAside = 0.01f;  // [voxels] from an edge or corner: nearer, rounding spoils the way's direction
 
 // The map from the coordinates of one body into those of another.
 struct Map {
@@ -60,6 +61,22 @@ struct Touch {
 glm::vec3 directionOf(const glm::vec3& gradient) {
     const float length = glm::length(gradient);
     return length > flattest ? gradient / length : glm::vec3(0);
+}
+
+// Across a face, and away from an edge or a corner.
+glm::vec3 directionOf(const ClosestPoint& closest, const glm::vec3& point, float voxelSize) {
+    const bool isAside = closest.feature != Feature::face && std::abs(closest.distance) > nearestAside * voxelSize;
+    return isAside ? (point - closest.position) / closest.distance : closest.normal;
+}
+
+// The touch of a point in the band: by the triangles where the field has them, else by its sample.
+Touch touchInBand(const Field& field, const glm::vec3& point, const Sample& sample) {
+    if (field.mesh()) {
+        const float most = std::abs(sample.distance) + interpolationError * field.voxelSize();
+        if (const ClosestPoint closest = field.closest(point, most); closest.found)
+            return {closest.distance, directionOf(closest, point, field.voxelSize())};
+    }
+    return {sample.distance, directionOf(sample.gradient)};
 }
 
 // The touch of a point that comes from outside of the field and goes some way.
@@ -170,9 +187,10 @@ class PointsInField {
                ContactReport& report, Found& found) const {
         if (sample.distance <= reach_) {
             if (sample.inBand) {
-                const glm::vec3 normal = directionOf(sample.gradient);
-                const float approach = sweeps_ ? -glm::dot(wayOf(at), normal) : 0;
-                found(index, point, Touch{sample.distance, normal, std::max(approach, 0.f)});
+                Touch touched = touchInBand(field_, at, sample);
+                const float approach = sweeps_ ? -glm::dot(wayOf(at), touched.normal) : 0;
+                touched.approach = std::max(approach, 0.f);
+                if (touched.distance <= reach_) found(index, point, touched);
             }
             if (!sample.inBand && sample.distance < 0) ++report.beyondBand;
         } else if (sweeps_) {
@@ -240,7 +258,9 @@ class Collider::Triangles {
 };
 
 Collider::Collider(Mesh mesh, const LevelSet& levelSet, const ColliderOptions& options)
-    : triangles_(std::make_shared<Triangles>(std::move(mesh))), field_(levelSet), id_(nextId()) {
+    : triangles_(std::make_shared<Triangles>(std::move(mesh))),
+      field_(options.exact ? Field(levelSet, triangles_->mesh()) : Field(levelSet)),
+      id_(nextId()) {
     if (!std::isfinite(options.margin)) throw std::invalid_argument("collider: the margin is not finite");
     body_.points = SurfacePoints(this->mesh(), options.pointSpacing * field_.voxelSize());
     body_.bounds = bilayer::bounds(this->mesh());

@@ -19,6 +19,10 @@ struct ColliderOptions {
     float pointSpacing = 2.0f;
     /// Contacts are made up to this distance between the surfaces [m]. Negative: one voxel of the field.
     float margin = -1;
+    /// Whether contacts are measured against the triangles, where the field has found them: exact at edges and grooves,
+    /// where samples blend what the surface is on either side. Takes memory (see Field), and more time the more
+    /// contacts there are: for parts that fit into each other to a fraction of a voxel.
+    bool exact = false;
 };
 
 /// A field, points on the surface, and what else contacts need. Immutable; share it between bodies and threads.

@@ -8,9 +8,12 @@
 #include <map>
 #include <stdexcept>
 
+#include "demos/shared/machines.h"
 #include "demos/shared/shapes.h"
+#include "sdf/build.h"
 #include "tests/support/analytic.h"
 #include "tests/support/support.h"
+#include "tests/support/truth.h"
 
 using namespace bilayer;
 using namespace bilayer::test;
@@ -321,6 +324,52 @@ TEST_CASE("bodies whose fields the double layer method made touch within its err
         for (const Contact& contact : contacts)
             if (glm::all(glm::lessThan(glm::abs(contact.position), glm::vec3(0.2f, 0.1f, 1))))
                 REQUIRE(contact.normal.z > 0.95f);
+    }
+}
+
+TEST_CASE("exact contacts lie on the triangles, on edges and in grooves of half a voxel's play") {
+    const shapes::Thread thread{};
+    const Mesh meshes[] = {shapes::nut({.thread = thread, .segments = 48}),
+                           shapes::bolt({.thread = thread, .length = 40e-3f, .segments = 48})};
+    const Truth truths[] = {Truth(meshes[0]), Truth(meshes[1])};
+    constexpr float voxel = 0.4e-3f;
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    Random random(seed);
+    // how far distances are off, and how far from the surface contacts lie [voxels]
+    struct Errors {
+        double distance = 0, foot = 0;
+    };
+    const auto errors = [&](bool exact, const Pose& pose) {
+        std::vector<Collider> parts;
+        for (const Mesh& mesh : meshes)
+            parts.emplace_back(mesh, build(mesh, {.voxelSize = voxel}), ColliderOptions{.exact = exact});
+        const Pose poses[] = {pose, {}};
+        std::vector<Contact> contacts;
+        collide(parts[0], pose, parts[1], {}, {.margin = voxel / 2}, contacts);
+        CHECK(contacts.size() > 500);
+        Errors worst;
+        for (const Contact& contact : contacts) {
+            const int other = contact.feature & featureOfB ? 0 : 1;
+            const SurfacePoint& point = parts[std::size_t(1 - other)].points().points()[contact.feature & ~featureOfB];
+            const glm::vec3 from = poses[other].toBody(poses[1 - other].toWorld(point.position));
+            const glm::vec3 outward =
+                glm::conjugate(poses[other].rotation) * (other == 0 ? -contact.normal : contact.normal);
+            worst.distance = std::max(
+                worst.distance, std::abs(double(contact.distance) - truths[other].signedDistance(glm::dvec3(from))));
+            worst.foot = std::max(
+                worst.foot, truths[other].distance(glm::dvec3(from) - double(contact.distance) * glm::dvec3(outward)));
+        }
+        return Errors{worst.distance / voxel, worst.foot / voxel};
+    };
+    for (int i = 0; i < 3; ++i) {
+        Pose pose = shapes::onThread(thread, float(random(16e-3, 24e-3)));
+        pose.position += random.point(50e-6f);
+        const Errors exact = errors(true, pose), sampled = errors(false, pose);
+        CHECK(exact.distance < 1e-4);
+        CHECK(exact.foot < 0.02);  // nearer to an edge its own normal is taken
+        CHECK(sampled.distance > 0.02);
+        CHECK(sampled.foot > 0.05);
     }
 }
 
