@@ -9,6 +9,7 @@
 #include <chrono>
 #include <cstring>
 #include <glm/geometric.hpp>
+#include <set>
 
 #include "sdf/build.h"
 
@@ -42,10 +43,17 @@ std::shared_ptr<const Thing> makeThing(Mesh mesh, const ThingOptions& options) {
     band.voxelSize = options.voxelSize;
     band.interiorWidth = options.interiorWidth;
     LevelSet field = build(mesh, band);
-    auto collider = std::make_shared<Collider>(mesh, field, ColliderOptions{options.pointSpacing});
-    const bullet::ShapeOptions centred{.frame = bullet::centreOfMassFrame(*collider)};
+    auto collider = std::make_shared<Collider>(mesh, field, ColliderOptions{options.pointSpacing, options.exact});
+    const bullet::ShapeOptions centred{
+        .frame = bullet::centreOfMassFrame(*collider), .margin = options.margin, .sweeps = options.sweeps};
     auto shape = std::make_shared<bullet::Shape>(collider, centred);
     Specimen specimen(mesh, specimenSpacing * options.voxelSize);
+    return std::make_shared<Thing>(Thing{std::move(mesh), std::move(field), std::move(shape), std::move(specimen)});
+}
+
+std::shared_ptr<const Thing> makeThing(Mesh mesh, std::shared_ptr<btCollisionShape> shape, float voxelSize) {
+    LevelSet field = build(mesh, {.voxelSize = voxelSize});
+    Specimen specimen(mesh, specimenSpacing * voxelSize);
     return std::make_shared<Thing>(Thing{std::move(mesh), std::move(field), std::move(shape), std::move(specimen)});
 }
 
@@ -106,8 +114,9 @@ std::vector<double> Stage::penetrationsIn(const std::vector<Pose>& poses) const 
     };
     std::vector<Ball> balls;
     for (std::size_t i = 0; i < poses.size(); ++i) {
-        const Bounds& box = bodies_[i].thing->shape->collider().bounds();
-        balls.push_back({poses[i].toWorld(box.centre()), 0.5f * glm::length(box.size())});
+        const ExactDistance& mesh = bodies_[i].thing->specimen.distance();
+        const glm::vec3 centre(0.5 * (mesh.lower() + mesh.upper()));
+        balls.push_back({poses[i].toWorld(centre), float(0.5 * glm::distance(mesh.lower(), mesh.upper()))});
     }
     std::vector<double> depths;
     for (std::size_t i = 0; i < poses.size(); ++i)
@@ -127,16 +136,19 @@ Recording Stage::record(const View& view) const {
     recording.note("bodies", std::to_string(outcome_.bodies));
     recording.note("time per step", fmt::format("{:.1f} ms", outcome_.medianStep()));
     std::map<const Thing*, int> meshes;
+    std::set<const Thing*> kinds;  // that move
+    std::uint64_t triangles = 0, voxels = 0;
     for (const auto& [thing, look, moves] : bodies_) {
-        if (!meshes.contains(thing.get())) {
-            meshes[thing.get()] = recording.addMesh(thing->mesh);
-            if (moves) {
-                recording.note("triangles", grouped(thing->mesh.triangles.size()) + " each");
-                recording.note("voxels", grouped(thing->field.activeVoxels()) + " each");
-            }
+        if (!meshes.contains(thing.get())) meshes[thing.get()] = recording.addMesh(thing->mesh);
+        if (moves && kinds.insert(thing.get()).second) {
+            triangles += thing->mesh.triangles.size();
+            voxels += thing->field.activeVoxels();
         }
         recording.addBody(meshes[thing.get()], look);
     }
+    const std::string of = kinds.size() == 1 ? " each" : fmt::format(" in {} kinds", kinds.size());
+    recording.note("triangles", grouped(triangles) + of);
+    recording.note("voxels", grouped(voxels) + of);
     for (std::size_t i = 0; i < frames_.size(); ++i)
         recording.frame(double(i) * options_.stepsPerFrame / options_.stepsPerSecond, frames_[i]);
     return recording;

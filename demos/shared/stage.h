@@ -20,18 +20,23 @@ struct ThingOptions {
     float voxelSize;          ///< [m]
     float interiorWidth = 6;  ///< of the band: bodies that sink in deeper are lost [voxels]
     float pointSpacing = 2;   ///< between surface points [voxels]
+    float margin = -1;        ///< up to which contacts are made [m]; negative: a voxel
+    bool sweeps = true;       ///< what moves farther is followed (see bullet::ShapeOptions)
+    bool exact = false;       ///< contacts are measured against the triangles (see ColliderOptions)
 };
 
 /// What bodies are made of: what Bullet collides, and what measures whether it did.
 struct Thing {
     Mesh mesh;
     LevelSet field;
-    std::shared_ptr<bullet::Shape> shape;
+    std::shared_ptr<btCollisionShape> shape;
     Specimen specimen;
 };
 
 /// From a mesh to a shape for Bullet. Throws as build() does.
 std::shared_ptr<const Thing> makeThing(Mesh mesh, const ThingOptions& options);
+/// A shape of Bullet's own, and the mesh that it is like: Bullet makes no use of the field. Throws as build() does.
+std::shared_ptr<const Thing> makeThing(Mesh mesh, std::shared_ptr<btCollisionShape> shape, float voxelSize);
 
 struct StageOptions {
     float stepsPerSecond = 240;

@@ -1,5 +1,7 @@
 #include "demos/shared/world.h"
 
+#include "integration/bullet/convert.h"
+
 namespace bilayer::demo {
 namespace {
 
@@ -13,6 +15,12 @@ constexpr float restingSpin = 1;      // [rad/s]
 btTransform toTransform(const Pose& pose) {
     const auto& [p, q] = pose;
     return btTransform(btQuaternion(q.x, q.y, q.z, q.w), btVector3(p.x, p.y, p.z));
+}
+
+// Where a shape's mesh is in its body.
+btTransform frameOf(const btCollisionShape& shape) {
+    const auto* field = dynamic_cast<const bullet::Shape*>(&shape);
+    return field ? toTransform(field->frame()) : btTransform::getIdentity();
 }
 
 }  // namespace
@@ -35,12 +43,12 @@ World::~World() {
     for (const Body& body : bodies_) world_.removeRigidBody(body.body.get());
 }
 
-btRigidBody& World::add(std::shared_ptr<bullet::Shape> shape, const Matter& matter, const Pose& pose) {
+btRigidBody& World::add(std::shared_ptr<btCollisionShape> shape, const Matter& matter, const Pose& pose) {
     btVector3 inertia(0, 0, 0);
     if (matter.mass > 0) shape->calculateLocalInertia(matter.mass, inertia);
     btRigidBody::btRigidBodyConstructionInfo info(matter.mass, nullptr, shape.get(), inertia);
     // a body's origin is its centre of mass, a mesh's is anywhere: the shape's frame lies between the two
-    info.m_startWorldTransform = toTransform(pose) * toTransform(shape->frame()).inverse();
+    info.m_startWorldTransform = toTransform(pose) * frameOf(*shape).inverse();
     info.m_friction = matter.friction;
     info.m_rollingFriction = matter.rollingFriction;
     info.m_restitution = matter.restitution;
@@ -59,26 +67,27 @@ void World::step(float seconds) {
 
 std::vector<Pose> World::poses() const {
     std::vector<Pose> poses;
-    for (const auto& [shape, body] : bodies_) poses.push_back(shape->placed(body->getWorldTransform()).pose);
+    for (const auto& [shape, body] : bodies_)
+        poses.push_back(bullet::toPose(body->getWorldTransform() * frameOf(*shape)));
     return poses;
 }
 
 int World::moving() const {
     int count = 0;
-    for (const auto& [shape, body] : bodies_) count += !body->isStaticObject();
+    for (const auto& [shape, body] : bodies_) count += !body->isStaticOrKinematicObject();
     return count;
 }
 
 int World::asleep() const {
     int count = 0;
-    for (const auto& [shape, body] : bodies_) count += !body->isStaticObject() && !body->isActive();
+    for (const auto& [shape, body] : bodies_) count += !body->isStaticOrKinematicObject() && !body->isActive();
     return count;
 }
 
 double World::kineticEnergy() const {
     double energy = 0;
     for (const Body& entry : bodies_)
-        if (!entry.body->isStaticObject()) energy += kineticEnergyOf(*entry.body);
+        if (!entry.body->isStaticOrKinematicObject()) energy += kineticEnergyOf(*entry.body);
     return energy;
 }
 
@@ -86,7 +95,7 @@ double World::potentialEnergy() const {
     double energy = 0;
     for (const Body& entry : bodies_) {
         const btRigidBody& body = *entry.body;
-        if (body.isStaticObject()) continue;
+        if (body.isStaticOrKinematicObject()) continue;
         const btVector3 &g = body.getGravity(), &at = body.getWorldTransform().getOrigin();
         for (int axis = 0; axis < 3; ++axis) energy -= double(g[axis]) * at[axis] / double(body.getInvMass());
     }

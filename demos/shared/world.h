@@ -35,13 +35,14 @@ class World {
     World();
     ~World();
 
-    /// Adds a body whose collider stands at a pose. Several bodies may share a shape.
-    btRigidBody& add(std::shared_ptr<bullet::Shape> shape, const Matter& matter, const Pose& pose);
+    /// Adds a body whose mesh stands at a pose: a bullet::Shape's where its collider does, any other shape's in the
+    /// shape's own coordinates. Several bodies may share a shape.
+    btRigidBody& add(std::shared_ptr<btCollisionShape> shape, const Matter& matter, const Pose& pose);
 
     /// One step of fixed length [s].
     void step(float seconds);
 
-    /// Where the colliders are, that is, the meshes as they were modelled.
+    /// Where the meshes are, as they were modelled.
     std::vector<Pose> poses() const;
 
     /// Bodies that move, and those of them that have come to rest.
@@ -58,7 +59,7 @@ class World {
 
   private:
     struct Body {
-        std::shared_ptr<bullet::Shape> shape;
+        std::shared_ptr<btCollisionShape> shape;
         std::unique_ptr<btRigidBody> body;
     };
     btDefaultCollisionConfiguration configuration_;

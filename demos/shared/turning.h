@@ -1,0 +1,32 @@
+// How far bodies have turned, all turns counted.
+#pragma once
+
+#include <cmath>
+#include <glm/gtc/constants.hpp>
+#include <glm/gtc/quaternion.hpp>
+
+namespace bilayer::demo {
+
+/// The angle of a body about a world axis through its middle, from step to step: it must turn by less than half a turn
+/// in one, and tilt little.
+class Turning {
+  public:
+    explicit Turning(const glm::quat& start, const glm::dvec3& axis = {0, 0, 1}) : axis_(axis), last_(start) {}
+
+    void follow(const glm::quat& now) {
+        const glm::dquat step = glm::dquat(now) * glm::conjugate(last_);
+        const double turn = 2 * std::atan2(glm::dot(glm::dvec3(step.x, step.y, step.z), axis_), step.w);
+        angle_ += std::remainder(turn, 2 * glm::pi<double>());
+        last_ = glm::dquat(now);
+    }
+
+    double angle() const { return angle_; }  ///< since the start [rad]
+    double turns() const { return angle_ / (2 * glm::pi<double>()); }
+
+  private:
+    glm::dvec3 axis_;
+    glm::dquat last_;
+    double angle_ = 0;
+};
+
+}  // namespace bilayer::demo
