@@ -7,7 +7,11 @@
 
 #include "demos/scenes/bowl.h"
 #include "demos/scenes/chain.h"
+#include "demos/scenes/gears.h"
 #include "demos/scenes/incline.h"
+#include "demos/scenes/nuts.h"
+#include "demos/scenes/pairs.h"
+#include "demos/scenes/pegs.h"
 #include "demos/scenes/plates.h"
 #include "demos/scenes/rings.h"
 #include "demos/scenes/spin.h"
@@ -86,4 +90,39 @@ TEST_CASE("a free body keeps its angular momentum and turns over") {
     demo::SpinOptions options;
     options.seconds = 20;
     judge([&] { return demo::spin(options); });
+}
+
+TEST_CASE("nuts run down their bolts by their pitch, or are held by friction") {
+    demo::NutsOptions options;
+    options.pairs = 2;
+    options.frictions = {0, 0.05f};
+    options.turns = 1;
+    options.stepsPerSecond = 240;
+    options.voxelSize = 0.4e-3f;
+    judge([&] { return demo::nuts(options); });
+}
+
+TEST_CASE("gears keep their ratio") {
+    demo::GearsOptions options;
+    options.teeth = {18, 24};
+    options.turns = 0.5f;
+    options.stepsPerSecond = 240;
+    judge([&] { return demo::gears(options); });
+}
+
+TEST_CASE("pegs find their way into narrow holes") {
+    demo::PegsOptions options;
+    options.clearances = {0.1e-3f};
+    options.seconds = 0.5f;
+    options.voxelSize = 0.4e-3f;
+    judge([&] { return demo::pegs(options); });
+}
+
+TEST_CASE("bodies lie on each other at their height, at any scale") {
+    demo::PairsOptions options;
+    options.scale = GENERATE(0.01f, 100.f);
+    options.every = 41;
+    options.seconds = options.scale > 1 ? 2.f : 0.5f;  // from a fifth of a voxel
+    CAPTURE(options.scale);
+    judge([&] { return demo::pairs(options); });
 }

@@ -1,0 +1,171 @@
+#include "demos/scenes/gears.h"
+
+#include <BulletDynamics/ConstraintSolver/btHingeConstraint.h>
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <glm/gtc/constants.hpp>
+#include <memory>
+#include <numeric>
+
+#include "collider/mass.h"
+#include "demos/shared/machines.h"
+#include "demos/shared/stage.h"
+#include "demos/shared/turning.h"
+
+namespace bilayer::demo {
+namespace {
+
+constexpr float density = 7850;   // of steel [kg/m^3]
+constexpr float friction = 0.3f;  // of dry steel, as the product of both bodies' is 0.1
+constexpr float zigzag = 0.4f;    // of the way from gear to gear [rad]
+// Of contacts, half the backlash: wider, edges of teeth that are about to mesh would stop those that they pass [m].
+constexpr float margin = 50e-6f;
+constexpr float settled = 0.1f;         // by then the backlash is taken up [s]
+constexpr float strongest = 100;        // of the motor [loads]
+constexpr int framesPerMeasuring = 24;  // teeth lie on each other all the time
+constexpr double halfTooth = 0.5;
+
+constexpr std::uint32_t colours[] = {0xe07a5f, 0x9db4d6, 0xf2cc8f, 0x81b29a};
+
+struct Wheel {
+    btRigidBody& body;
+    double ratio;  // of its angle to the first one's, by the teeth
+    Turning turning;
+    double start = 0;  // angle when settled [rad]
+
+    double angle() const { return turning.angle() - start; }
+};
+
+// Holds bodies so that they can only turn about upright lines through their middles, and drives the first. To be gone
+// before their world.
+class Axles {
+  public:
+    explicit Axles(btDiscreteDynamicsWorld& world) : world_(world) {}
+    Axles(const Axles&) = delete;
+    Axles& operator=(const Axles&) = delete;
+    ~Axles() {
+        for (const auto& hinge : hinges_) world_.removeConstraint(hinge.get());
+    }
+
+    void add(btRigidBody& body) {
+        const btVector3 upright = body.getWorldTransform().getBasis().transpose() * btVector3(0, 0, 1);
+        hinges_.push_back(std::make_unique<btHingeConstraint>(body, btVector3(0, 0, 0), upright));
+        world_.addConstraint(hinges_.back().get());
+    }
+
+    /// @param strongest  impulse of a step [N m s]
+    void drive(float speed, float strongest) {
+        hinges_.front()->enableAngularMotor(true, speed, strongest);
+        hinges_.front()->setJointFeedback(&feedback_);
+    }
+    // In the last step [N m].
+    double torque() const { return feedback_.m_appliedTorqueBodyA.z(); }
+
+  private:
+    btDiscreteDynamicsWorld& world_;
+    std::vector<std::unique_ptr<btHingeConstraint>> hinges_;
+    btJointFeedback feedback_{};
+};
+
+// From gear to gear, each in the middle of the backlash.
+std::vector<Wheel> addTrain(Stage& stage, Axles& axles, const GearsOptions& options) {
+    std::vector<Wheel> wheels;
+    shapes::Gear last;
+    glm::vec3 place(0);
+    float angle = 0;
+    for (std::size_t i = 0; i < options.teeth.size(); ++i) {
+        const shapes::Gear part{.teeth = options.teeth[i], .backlash = options.backlash};
+        if (i > 0) {
+            const float direction = i % 2 == 0 ? zigzag : -zigzag;
+            const float distance = (part.pitchDiameter() + last.pitchDiameter()) / 2;
+            place += distance * glm::vec3(std::cos(direction), std::sin(direction), 0);
+            angle = shapes::meshingAngle(part, angle, last, direction);
+        }
+        const auto thing = makeThing(
+            shapes::gear(part), {.voxelSize = options.voxelSize, .margin = margin, .sweeps = false, .exact = true});
+        const float mass = density * float(massProperties(thing->mesh).volume);
+        const Pose pose{place, glm::angleAxis(angle, glm::vec3(0, 0, 1))};
+        const Matter matter{.mass = mass, .friction = friction, .linearDamping = 0, .angularDamping = 0};
+        btRigidBody& body = stage.add(
+            thing, matter, pose, {.colour = colours[i % std::size(colours)], .roughness = 0.35f, .metalness = 0.3f});
+        body.setActivationState(DISABLE_DEACTIVATION);
+        axles.add(body);
+        const double sign = i % 2 == 0 ? 1 : -1;
+        wheels.push_back({body, sign * options.teeth[0] / options.teeth[i], Turning(pose.rotation)});
+        last = part;
+    }
+    return wheels;
+}
+
+double meanOf(const std::vector<double>& values) {
+    return std::accumulate(values.begin(), values.end(), 0.0) / double(values.size());
+}
+
+double deviationOf(const std::vector<double>& values) {
+    const double mean = meanOf(values);
+    double sum = 0;
+    for (const double value : values) sum += (value - mean) * (value - mean);
+    return std::sqrt(sum / double(values.size()));
+}
+
+}  // namespace
+
+Outcome gears(const GearsOptions& options) {
+    Stage stage(fmt::format("A train of {} gears", options.teeth.size()),
+                {.stepsPerSecond = options.stepsPerSecond, .framesPerMeasuring = framesPerMeasuring});
+    stage.world().bullet().getSolverInfo().m_numIterations = options.iterations;
+    Axles axles(stage.world().bullet());
+    std::vector<Wheel> wheels = addTrain(stage, axles, options);
+    axles.drive(options.speed, strongest * options.load / options.stepsPerSecond);
+    const btVector3 brake(0, 0, wheels.back().ratio > 0 ? -options.load : options.load);
+
+    std::vector<double> torques;            // of the motor [N m]
+    double worstAngle = 0, worstTooth = 0;  // off the ratio, at any time: the last gear's [rad], any one's [teeth]
+    const auto step = [&] {
+        wheels.back().body.applyTorque(brake);
+        stage.step();
+        torques.push_back(axles.torque());
+        const std::vector<Pose> poses = stage.world().poses();
+        for (std::size_t i = 0; i < wheels.size(); ++i) wheels[i].turning.follow(poses[i].rotation);
+        const auto off = [&](const Wheel& wheel) {
+            return std::abs(wheel.angle() - wheel.ratio * wheels.front().angle());
+        };
+        for (std::size_t i = 0; i < wheels.size(); ++i)
+            worstTooth = worse(worstTooth, off(wheels[i]) * options.teeth[i] / (2 * glm::pi<double>()));
+        worstAngle = worse(worstAngle, off(wheels.back()));
+    };
+    while (stage.time() < settled) step();
+    for (Wheel& wheel : wheels) wheel.start = wheel.turning.angle();
+    torques.clear();
+    worstAngle = worstTooth = 0;
+    const double angle = 2 * glm::pi<double>() * options.turns, longest = settled + 2 * angle / options.speed;
+    while (wheels.front().angle() < angle && stage.time() < longest) step();
+
+    double ratio = 0;
+    for (const Wheel& wheel : wheels)
+        ratio = worse(ratio, std::abs(wheel.angle() / (wheel.ratio * wheels.front().angle()) - 1));
+    const double made = wheels.front().angle() / (2 * glm::pi<double>());
+    // from the left of the first gear to the right of the last
+    const glm::vec3 end = stage.frames().front().back().position;
+    const float left = -float(options.teeth.front()) * shapes::Gear{}.toothModule / 2;
+    const float right = end.x + float(options.teeth.back()) * shapes::Gear{}.toothModule / 2;
+    Outcome outcome = stage.finish({.target = {(left + right) / 2, end.y / 2, 0},
+                                    .distance = 1.4f * (right - left),
+                                    .elevation = 1.1f,
+                                    .groundHeight = -shapes::Gear{}.faceWidth});
+    outcome.facts = {
+        {"turns of the first gear", fmt::format("{:.2f}", made)},
+        {"last gear off its angle", fmt::format("{:.3f} mrad at most", 1e3 * worstAngle)},
+        {"torque of the motor", fmt::format("{:.4f} N m, without losses {:.4f} N m", meanOf(torques),
+                                            options.load * std::abs(wheels.back().ratio))},
+        {"torque ripple", fmt::format("{:.1f} % (standard deviation)", 100 * deviationOf(torques) / meanOf(torques))}};
+    outcome.criteria = {{"turns that are missing", options.turns - made, 0},
+                        {"ratio off the teeth's", 100 * ratio, 0.5, "%"},
+                        {"a gear off its angle", worstTooth, halfTooth, "teeth"},
+                        {"deepest penetration", outcome.deepest() / options.voxelSize, 0.5, "voxels"}};
+    return outcome;
+}
+
+}  // namespace bilayer::demo
