@@ -32,8 +32,8 @@ class Collider {
     Collider(Mesh mesh, const LevelSet& levelSet, const ColliderOptions& options = {});
 
     /// Of a level set with a body beside it, as readVdb() gives back what withBody() was written of. Collides as the
-    /// one that it was made of, to the bit; where triangles are asked for, it gives those of the field's zero set.
-    /// Throws std::invalid_argument as bodyOf() does.
+    /// one that it was made of, to the bit, unless that one was `exact`; where triangles are asked for, it gives those
+    /// of the field's zero set. Throws std::invalid_argument as bodyOf() does.
     explicit Collider(const LevelSet& levelSet);
 
     /// Of a body from a file it is extracted when first asked for, once.

@@ -24,8 +24,8 @@ struct MeshReport {
     std::size_t selfIntersections = 0;    ///< pairs of triangles that share no edge and where an edge pierces the other
     std::size_t flippedTriangles = 0;     ///< triangles that orient() would turn around
     std::size_t insideOutComponents =
-        0;                      ///< closed components that bound space from the wrong side (nested ones allowed)
-    float thinnestWall = 0;     ///< smallest thickness of the solid behind a triangle [m]; 0: none was found
+        0;                   ///< closed components that bound space from the wrong side (nested ones allowed)
+    float thinnestWall = 0;  ///< smallest thickness of the solid behind a triangle [m]; 0: none was found
     /// The same without the hundredth of the area that has the least solid behind it: creases and tips [m].
     float commonWall = 0;
     std::size_t thinWalls = 0;  ///< triangles with less than `wall` of solid behind them

@@ -14,8 +14,9 @@ struct VdbOptions {
 /// LevelSet::errorBound() of the field that a file with these options gives back: rounding included [m].
 float storedErrorBound(const LevelSet& levelSet, const VdbOptions& options);
 
-/// Writes the grids "distance" and, where present, "triangle" and a body's "contact_points": whole or not at all (a temporary file beside the target
-/// is renamed at the end). Throws std::runtime_error that names the file when it cannot be written.
+/// Writes the grids "distance" and, where present, "triangle" and a body's "contact_points": whole or not at all (a
+/// temporary file beside the target is renamed at the end). Throws std::runtime_error that names the file when it
+/// cannot be written.
 void writeVdb(const std::filesystem::path& path, const LevelSet& levelSet, const VdbOptions& options = {});
 
 /// Reads the first level set of a .vdb file, from bilayer or elsewhere, with its grids of triangles and of a body's
