@@ -21,7 +21,8 @@ struct ColliderOptions {
     float margin = -1;
     /// Whether contacts are measured against the triangles, where the field has found them: exact at edges and grooves,
     /// where samples blend what the surface is on either side. Takes memory (see Field), and more time the more
-    /// contacts there are: for parts that fit into each other to a fraction of a voxel.
+    /// contacts there are: for parts that fit into each other to a fraction of a voxel. A body from a file has no
+    /// triangles, and is sampled.
     bool exact = false;
 };
 
@@ -32,7 +33,7 @@ class Collider {
     Collider(Mesh mesh, const LevelSet& levelSet, const ColliderOptions& options = {});
 
     /// Of a level set with a body beside it, as readVdb() gives back what withBody() was written of. Collides as the
-    /// one that it was made of, to the bit, unless that one was `exact`; where triangles are asked for, it gives those
+    /// one that it was made of, to the bit (see ColliderOptions::exact); where triangles are asked for, it gives those
     /// of the field's zero set. Throws std::invalid_argument as bodyOf() does.
     explicit Collider(const LevelSet& levelSet);
 

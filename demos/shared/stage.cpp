@@ -43,7 +43,8 @@ std::shared_ptr<const Thing> makeThing(Mesh mesh, const ThingOptions& options) {
     band.voxelSize = options.voxelSize;
     band.interiorWidth = options.interiorWidth;
     LevelSet field = build(mesh, band);
-    auto collider = std::make_shared<Collider>(mesh, field, ColliderOptions{options.pointSpacing, options.exact});
+    auto collider = std::make_shared<Collider>(
+        mesh, field, ColliderOptions{.pointSpacing = options.pointSpacing, .exact = options.exact});
     const bullet::ShapeOptions centred{
         .frame = bullet::centreOfMassFrame(*collider), .margin = options.margin, .sweeps = options.sweeps};
     auto shape = std::make_shared<bullet::Shape>(collider, centred);
