@@ -91,8 +91,8 @@ class Knots {
   public:
     Knots(const Mesh& mesh, Rival& rival, int bodies) : knot_(mesh, rival.shape(), measured * double(knotSize)) {
         const int along = std::max(2, int(std::lround(2 * std::cbrt(float(bodies) / smallestHeap))));
-        const float size = mesh.points.empty() ? 0 : knotSize, thick = wall * size, inside = 0.6f * size * float(along),
-                    out = inside + thick, halfHeight = 0.5f * penHeight * size * float(along);
+        const float thick = wall * knotSize, inside = 0.5f * room * glm::length(knot_.box.size()) * float(along),
+                    out = inside + thick, halfHeight = 0.5f * penHeight * knotSize * float(along);
         addWall({0, 0, -thick}, {out + thick, out + thick, thick});
         for (const float side : {-1.f, 1.f}) {
             addWall({side * out, 0, halfHeight}, {thick, out + thick, halfHeight});
