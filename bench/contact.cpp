@@ -11,7 +11,6 @@
 #include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
 #include <nlohmann/json.hpp>
-#include <optional>
 #include <random>
 
 #include "bench/heap.h"
@@ -198,7 +197,7 @@ std::vector<Row> compareBoxes(const Options& options) {
 }
 
 struct Growth {
-    Line bodies{"bilayer", {}, {}}, voxels{"bilayer", {}, {}}, penetration{"bilayer", {}, {}};
+    Line bodies{"bilayer", {}, {}}, voxels{"bilayer", {}, {}};  // milliseconds a step
 };
 
 Growth grow(const Options& options) {
@@ -217,18 +216,15 @@ Growth grow(const Options& options) {
         const double deep = 1e-3 * row.penetration(0.99) * double(voxels) / double(knotSize);
         fmt::print("| {} | {:g} | {:.2f} | {:.3f} | {:.3f} |\n", bodies, voxels, row.step(), row.step() / bodies, deep);
         std::fflush(stdout);
-        return std::pair{row.step(), deep};
+        return row.step();
     };
     for (const int bodies : options.growBodies) {
         growth.bodies.x.push_back(bodies);
-        growth.bodies.y.push_back(measure(bodies, options.voxels).first);
+        growth.bodies.y.push_back(measure(bodies, options.voxels));
     }
     for (const float voxels : options.growVoxels) {
-        const auto [step, deep] = measure(options.bodies, voxels);
         growth.voxels.x.push_back(voxels);
-        growth.voxels.y.push_back(step);
-        growth.penetration.x.push_back(voxels);
-        growth.penetration.y.push_back(std::max(1e-3, deep));
+        growth.voxels.y.push_back(measure(options.bodies, voxels));
     }
     return growth;
 }
@@ -256,10 +252,11 @@ void draw(const std::string& file, const std::vector<Row>& knots, const Growth& 
     }
     std::vector<double> bodies(options.growBodies.begin(), options.growBodies.end()),
         voxels(options.growVoxels.begin(), options.growVoxels.end());
-    writeSvg(file, {{"a step, 64 voxels a body", "bodies", "ms", bodies, {growth.bodies}},
-                    {"a step, 20 bodies", "voxels a body", "ms", voxels, {growth.voxels}},
-                    {"kinetic energy", "s", "J", {}, energies},
-                    {"so many of 100 penetrations are below", "of 100", "mm", {50, 75, 100}, depths}});
+    writeSvg(file,
+             {{fmt::format("a step, {:g} voxels a body", options.voxels), "bodies", "ms", bodies, {growth.bodies}},
+              {fmt::format("a step, {} bodies", options.bodies), "voxels a body", "ms", voxels, {growth.voxels}},
+              {"kinetic energy", "s", "J", {}, energies},
+              {"so many of 100 penetrations are below", "of 100", "mm", {50, 75, 100}, depths}});
 }
 
 nlohmann::json jsonOf(const std::vector<Row>& rows) {

@@ -13,6 +13,7 @@
 
 #include "bench/measure.h"
 #include "demos/shared/world.h"
+#include "integration/bullet/convert.h"
 
 namespace bilayer::bench {
 namespace {
@@ -25,12 +26,6 @@ constexpr float splitAt = 0.01f;  // Bullet turns deeper overlap into speed [par
 btTransform toTransform(const Pose& pose) {
     const auto& [p, q] = pose;
     return btTransform(btQuaternion(q.x, q.y, q.z, q.w), btVector3(p.x, p.y, p.z));
-}
-
-Pose toPose(const btTransform& transform) {
-    const btVector3& p = transform.getOrigin();
-    const btQuaternion q = transform.getRotation();
-    return {{p.x(), p.y(), p.z()}, {q.w(), q.x(), q.y(), q.z()}};
 }
 
 btVector3 inertiaOf(const Member& member) {
@@ -64,7 +59,7 @@ class Arena {
 
     std::vector<Pose> poses() const {
         std::vector<Pose> all;
-        for (const auto& body : bodies_) all.push_back(toPose(body->getWorldTransform()));
+        for (const auto& body : bodies_) all.push_back(bullet::toPose(body->getWorldTransform()));
         return all;
     }
 
