@@ -1,12 +1,12 @@
 // `bilayer seed`: meshes and fields become one liquid level set, with marker particles if asked for.
 #include <fmt/format.h>
-#include <openvdb/points/PointCount.h>
 #include <openvdb/tools/LevelSetMeasure.h>
 
 #include <cmath>
 #include <memory>
-#include <optional>
 #include <stdexcept>
+#include <variant>
+#include <vector>
 
 #include "integration/fluid/particles.h"
 #include "integration/fluid/seed.h"
@@ -20,34 +20,31 @@
 namespace bilayer::tools {
 namespace {
 
-constexpr float spareWidth =
-    2;  // [voxels] a mesh's field beyond the liquid's band, so that a rotated one is sampled whole
-
 struct Arguments {
     std::vector<std::filesystem::path> inputs;
     std::filesystem::path output, into;
     float voxelSize = 0, resolution = 0, halfWidth = 3;
-    std::vector<float> translate{0, 0, 0}, rotate{0, 0, 1, 0};
+    std::vector<float> translate{0, 0, 0}, rotate{0, 0, 1, 0}, scale{1};
     std::string mode = "unite";
     fluid::ParticleOptions particles;
     bool json = false;
     CLI::Option* particlesGiven = nullptr;
 };
 
-struct Input {
-    std::optional<Mesh> mesh;  // built when the liquid's voxel size is known
-    std::optional<LevelSet> field;
-};
+using Input = std::variant<Mesh, LevelSet>;
 
 bool isVdb(const std::filesystem::path& path) {
     return path.extension() == ".vdb";
 }
 
-Pose makePose(const Arguments& a) {
+fluid::Placement makePlacement(const Arguments& a) {
     const glm::vec3 axis(a.rotate[0], a.rotate[1], a.rotate[2]);
     const float length = glm::length(axis);
     if (!(length > 0) || !std::isfinite(length)) throw CLI::ValidationError("--rotate", "the axis has no direction");
-    return {glm::vec3(a.translate[0], a.translate[1], a.translate[2]), glm::angleAxis(a.rotate[3], axis / length)};
+    if (a.scale.size() == 2) throw CLI::ValidationError("--scale", "needs one number or three");
+    const glm::vec3 scale = a.scale.size() == 1 ? glm::vec3(a.scale[0]) : glm::vec3(a.scale[0], a.scale[1], a.scale[2]);
+    return {{glm::vec3(a.translate[0], a.translate[1], a.translate[2]), glm::angleAxis(a.rotate[3], axis / length)},
+            scale};
 }
 
 fluid::SeedMode makeMode(const std::string& word) {
@@ -67,30 +64,21 @@ void requireUsage(const Arguments& a) {
 }
 
 Input read(const std::filesystem::path& path) {
-    if (isVdb(path)) return {std::nullopt, readVdb(path)};
-    return {readMesh(path), std::nullopt};
+    if (isVdb(path)) return readVdb(path);
+    return readMesh(path);
 }
 
 openvdb::FloatGrid::Ptr startingLiquid(const Arguments& a, const Input& first) {
     openvdb::initialize();
     if (!a.into.empty()) return readVdb(a.into).grids().distance->deepCopy();
     float voxelSize = a.voxelSize;
-    if (a.resolution > 0) voxelSize = voxelSizeFor(*first.mesh, a.resolution);
-    if (!(voxelSize > 0)) voxelSize = first.field->voxelSize();
+    if (a.resolution > 0) voxelSize = voxelSizeFor(std::get<Mesh>(first), a.resolution);
+    if (!(voxelSize > 0)) voxelSize = std::get<LevelSet>(first).voxelSize();
     try {
         return openvdb::createLevelSet<openvdb::FloatGrid>(voxelSize, a.halfWidth);
     } catch (const openvdb::ArithmeticError&) {
         throw std::runtime_error(fmt::format("a voxel size of {} is too small for OpenVDB", voxelSize));
     }
-}
-
-void add(openvdb::FloatGrid& liquid, const Input& input, const Arguments& a, const Pose& pose) {
-    const float voxelSize = float(liquid.voxelSize()[0]);
-    const float width = std::ceil(liquid.background() / voxelSize) + spareWidth;
-    const LevelSet field =
-        input.field ? *input.field
-                    : build(*input.mesh, {.voxelSize = voxelSize, .exteriorWidth = width, .interiorWidth = width});
-    fluid::seed(liquid, field, pose, makeMode(a.mode));
 }
 
 void report(const Arguments& a, const openvdb::FloatGrid& liquid, std::uint64_t particles, double seconds) {
@@ -116,7 +104,7 @@ void report(const Arguments& a, const openvdb::FloatGrid& liquid, std::uint64_t 
 
 void run(const Arguments& a) {
     requireUsage(a);
-    const Pose pose = makePose(a);
+    const fluid::Placement placement = makePlacement(a);
     const Stopwatch watch;
     std::vector<Input> inputs;
     for (const auto& path : a.inputs) inputs.push_back(read(path));
@@ -124,13 +112,14 @@ void run(const Arguments& a) {
 
     const openvdb::FloatGrid::Ptr liquid = startingLiquid(a, inputs.front());
     liquid->setName("liquid");
-    for (const Input& input : inputs) add(*liquid, input, a, pose);
+    for (const Input& input : inputs)
+        std::visit([&](const auto& body) { fluid::seed(*liquid, body, placement, makeMode(a.mode)); }, input);
     openvdb::GridCPtrVec grids{liquid};
     std::uint64_t count = 0;
     if (a.particlesGiven->count()) {
-        const auto points = fluid::particleGrid(*liquid, a.particles);
-        count = openvdb::points::pointCount(points->tree());
-        grids.push_back(points);
+        const auto particles = fluid::particles(*liquid, a.particles);
+        count = particles.positions.size();
+        grids.push_back(fluid::particleGrid(particles, liquid->transform()));
     }
     writeGrids(a.output, grids);
     report(a, *liquid, count, watch.seconds());
@@ -159,6 +148,9 @@ void addSeed(CLI::App& app) {
     command->add_option("--rotate", a->rotate, "turns all inputs first: axis x y z and angle [radians]")
         ->expected(4)
         ->check(finite());
+    command->add_option("--scale", a->scale, "stretches all inputs before that: one number, or x y z")
+        ->expected(1, 3)
+        ->check(positive());
     command->add_option("--mode", a->mode, "unite (default), intersect or subtract")
         ->check(CLI::IsMember({"unite", "intersect", "subtract"}));
     a->particlesGiven = command->add_option("--particles", a->particles.perVoxel, "particles in a voxel: a points grid")

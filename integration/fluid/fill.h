@@ -11,4 +11,8 @@ namespace bilayer::fluid {
 /// no distance can begin, and for a box that the machine's memory does not hold.
 LevelSet fill(const LevelSet& levelSet);
 
+/// The same as far as a distance from the surface on either side [m], which is then the field's width; a side of the
+/// band that is as wide already keeps its own. Throws as well for a distance that is not positive or not finite.
+LevelSet fill(const LevelSet& levelSet, float distance);
+
 }  // namespace bilayer::fluid

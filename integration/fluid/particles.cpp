@@ -2,10 +2,14 @@
 // particle, so that neither the order of the voxels nor the number of threads matters.
 #include "integration/fluid/particles.h"
 
+#include <openvdb/points/PointAttribute.h>
 #include <openvdb/points/PointConversion.h>
 #include <openvdb/tools/Interpolation.h>
 #include <tbb/parallel_for.h>
 
+#include <algorithm>
+#include <cmath>
+#include <limits>
 #include <stdexcept>
 
 namespace bilayer::fluid {
@@ -20,6 +24,7 @@ constexpr int blockSide = 8;  // [voxels] a task: a leaf
 constexpr int maxPerVoxel = 1000;
 constexpr double farOutside = 1;  // [voxels] of distance at a centre beyond which no part of the voxel is inside
 constexpr int jitterBits = 21;    // a coordinate: three fit into one hash
+constexpr double mostBlocks = 1 << 28, maxIndex = 1 << 29;  // of a body's box in a solver's voxels
 
 // S. Vigna's splitmix64: every bit of the output depends on every bit of the input.
 std::uint64_t mix(std::uint64_t x) {
@@ -44,11 +49,9 @@ Vec3d jitter(std::uint64_t bits) {
     return {part(0), part(1), part(2)};
 }
 
-void require(const FloatGrid& liquid, const ParticleOptions& options) {
-    if (liquid.getGridClass() != openvdb::GRID_LEVEL_SET)
-        throw std::invalid_argument("particles: the liquid's grid is no level set");
-    if (!liquid.transform().isLinear() || !liquid.hasUniformVoxels())
-        throw std::invalid_argument("particles: the liquid's voxels are no cubes");
+void require(const openvdb::math::Transform& voxels, const ParticleOptions& options) {
+    if (!voxels.isLinear() || !voxels.hasUniformScale())
+        throw std::invalid_argument("particles: the voxels are no cubes");
     if (options.perVoxel < 1 || options.perVoxel > maxPerVoxel)
         throw std::invalid_argument("particles: perVoxel must be in 1..1000");
 }
@@ -69,48 +72,141 @@ std::vector<Coord> blocks(const FloatGrid& liquid) {
     return origins;
 }
 
-void fillVoxel(const FloatGrid& liquid, const FloatGrid::ConstAccessor& values, const Coord& voxel,
-               const ParticleOptions& options, std::vector<glm::vec3>& found) {
+// Calls visit(point) for the places of a voxel's particles, in voxels.
+template <class Visit>
+void visitVoxel(const Coord& voxel, const ParticleOptions& options, Visit&& visit) {
     const std::uint64_t key = voxelKey(options.seed, voxel);
-    for (int i = 0; i < options.perVoxel; ++i) {
-        const Vec3d point = voxel.asVec3d() + jitter(mix(key + std::uint64_t(i)));
-        if (!(openvdb::tools::BoxSampler::sample(values, point) < 0)) continue;
-        const Vec3d world = liquid.indexToWorld(point);
-        found.emplace_back(float(world.x()), float(world.y()), float(world.z()));
-    }
+    for (int i = 0; i < options.perVoxel; ++i) visit(voxel.asVec3d() + jitter(mix(key + std::uint64_t(i))));
 }
 
-void fillBlock(const FloatGrid& liquid, const Coord& origin, const ParticleOptions& options,
-               std::vector<glm::vec3>& found) {
-    const auto values = liquid.getConstAccessor();
-    const double limit = farOutside * liquid.voxelSize()[0];
-    for (const Coord& voxel : CoordBBox::createCube(origin, blockSide))
-        if (values.getValue(voxel) < limit) fillVoxel(liquid, values, voxel, options, found);
+glm::vec3 toWorld(const openvdb::math::Transform& voxels, const Vec3d& point) {
+    const Vec3d world = voxels.indexToWorld(point);
+    return {float(world.x()), float(world.y()), float(world.z())};
 }
 
-}  // namespace
-
-std::vector<glm::vec3> particles(const FloatGrid& liquid, const ParticleOptions& options) {
-    require(liquid, options);
-    const std::vector<Coord> origins = blocks(liquid);
+// What fill(origin, positions) finds in each block, in the order of the blocks.
+template <class Fill>
+Particles gather(const std::vector<Coord>& origins, const ParticleOptions& options, Fill&& fill) {
     std::vector<std::vector<glm::vec3>> parts(origins.size());
-    tbb::parallel_for(std::size_t(0), origins.size(),
-                      [&](std::size_t i) { fillBlock(liquid, origins[i], options, parts[i]); });
+    tbb::parallel_for(std::size_t(0), origins.size(), [&](std::size_t i) { fill(origins[i], parts[i]); });
     std::size_t count = 0;
     for (const auto& part : parts) count += part.size();
-    std::vector<glm::vec3> all;
-    all.reserve(count);
-    for (const auto& part : parts) all.insert(all.end(), part.begin(), part.end());
+    Particles all;
+    all.positions.reserve(count);
+    for (const auto& part : parts) all.positions.insert(all.positions.end(), part.begin(), part.end());
+    if (!options.velocity) return all;
+    all.velocities.resize(count);
+    tbb::parallel_for(std::size_t(0), count,
+                      [&](std::size_t i) { all.velocities[i] = options.velocity(all.positions[i]); });
     return all;
 }
 
-openvdb::points::PointDataGrid::Ptr particleGrid(const FloatGrid& liquid, const ParticleOptions& options) {
+// A body in a solver's voxels.
+class Body {
+  public:
+    Body(const Field& field, const Placement& placement, const openvdb::math::Transform& voxels)
+        : field_(field),
+          placement_(placement),
+          voxels_(voxels),
+          turnedBack_(glm::conjugate(glm::normalize(placement.pose.rotation))),
+          // how far in the body's own coordinates a voxel may reach
+          reach_(0.5f * std::sqrt(3.f) * float(voxels.voxelSize()[0]) /
+                 std::min({placement.scale.x, placement.scale.y, placement.scale.z})) {}
+
+    // The blocks of voxels that meet the body's box.
+    std::vector<Coord> blocks() const {
+        Vec3d lower(std::numeric_limits<double>::max()), upper(-lower);
+        const Bounds& box = field_.bounds();
+        for (int corner = 0; corner < 8; ++corner) {
+            const glm::dvec3 p =
+                placement_.toWorld({corner & 4 ? box.upper.x : box.lower.x, corner & 2 ? box.upper.y : box.lower.y,
+                                    corner & 1 ? box.upper.z : box.lower.z});
+            const Vec3d index = voxels_.worldToIndex({p.x, p.y, p.z});
+            lower = openvdb::math::minComponent(lower, index);
+            upper = openvdb::math::maxComponent(upper, index);
+        }
+        const Vec3d size = (upper - lower) / double(blockSide) + Vec3d(2);
+        if (!(size.x() * size.y() * size.z() <= mostBlocks && std::max(upper.length(), lower.length()) < maxIndex))
+            throw std::invalid_argument("particles: the body is out of range of these voxels");
+        const Coord from = Coord::floor(lower - Vec3d(1)) & ~(blockSide - 1), to = Coord::ceil(upper + Vec3d(1));
+        std::vector<Coord> origins;
+        for (int x = from.x(); x <= to.x(); x += blockSide)
+            for (int y = from.y(); y <= to.y(); y += blockSide)
+                for (int z = from.z(); z <= to.z(); z += blockSide)
+                    if (reaches({x, y, z}, blockSide)) origins.emplace_back(x, y, z);
+        return origins;
+    }
+
+    // Whether a cube of voxels may hold a point of the body.
+    bool reaches(const Coord& origin, int side) const {
+        const Vec3d centre = origin.asVec3d() + Vec3d(0.5 * (side - 1));
+        return field_.sample(toBody(centre)).distance <= float(side) * reach_;
+    }
+
+    bool holds(const Vec3d& point) const { return field_.inside(toBody(point)); }
+
+  private:
+    glm::vec3 toBody(const Vec3d& index) const {
+        const Vec3d world = voxels_.indexToWorld(index);
+        const glm::dvec3 way = glm::dvec3(world.x(), world.y(), world.z()) - glm::dvec3(placement_.pose.position);
+        return glm::vec3((turnedBack_ * way) / glm::dvec3(placement_.scale));
+    }
+
+    const Field& field_;
+    const Placement& placement_;
+    const openvdb::math::Transform& voxels_;
+    glm::dquat turnedBack_;
+    float reach_;
+};
+
+}  // namespace
+
+Particles particles(const FloatGrid& liquid, const ParticleOptions& options) {
+    if (liquid.getGridClass() != openvdb::GRID_LEVEL_SET)
+        throw std::invalid_argument("particles: the liquid's grid is no level set");
+    require(liquid.transform(), options);
+    const double limit = farOutside * liquid.voxelSize()[0];
+    return gather(blocks(liquid), options, [&](const Coord& origin, std::vector<glm::vec3>& found) {
+        const auto values = liquid.getConstAccessor();
+        for (const Coord& voxel : CoordBBox::createCube(origin, blockSide)) {
+            if (!(values.getValue(voxel) < limit)) continue;
+            visitVoxel(voxel, options, [&](const Vec3d& point) {
+                if (openvdb::tools::BoxSampler::sample(values, point) < 0)
+                    found.push_back(toWorld(liquid.transform(), point));
+            });
+        }
+    });
+}
+
+Particles particles(const Field& field, const Placement& placement, const openvdb::math::Transform& voxels,
+                    const ParticleOptions& options) {
+    check(placement);
+    require(voxels, options);
+    const Body body(field, placement, voxels);
+    return gather(body.blocks(), options, [&](const Coord& origin, std::vector<glm::vec3>& found) {
+        for (const Coord& voxel : CoordBBox::createCube(origin, blockSide)) {
+            if (!body.reaches(voxel, 1)) continue;
+            visitVoxel(voxel, options, [&](const Vec3d& point) {
+                if (body.holds(point)) found.push_back(toWorld(voxels, point));
+            });
+        }
+    });
+}
+
+openvdb::points::PointDataGrid::Ptr particleGrid(const Particles& particles, const openvdb::math::Transform& voxels) {
     namespace points = openvdb::points;
     openvdb::initialize();
-    std::vector<openvdb::Vec3f> positions;
-    for (const glm::vec3& p : particles(liquid, options)) positions.emplace_back(p.x, p.y, p.z);
-    const auto grid =
-        points::createPointDataGrid<points::NullCodec, points::PointDataGrid>(positions, liquid.transform());
+    std::vector<openvdb::Vec3f> positions, velocities;
+    for (const glm::vec3& p : particles.positions) positions.emplace_back(p.x, p.y, p.z);
+    for (const glm::vec3& v : particles.velocities) velocities.emplace_back(v.x, v.y, v.z);
+    const points::PointAttributeVector<openvdb::Vec3f> wrapped(positions);
+    const auto index = openvdb::tools::createPointIndexGrid<openvdb::tools::PointIndexGrid>(wrapped, voxels);
+    const auto grid = points::createPointDataGrid<points::NullCodec, points::PointDataGrid>(*index, wrapped, voxels);
+    if (!velocities.empty()) {
+        points::appendAttribute<openvdb::Vec3f>(grid->tree(), "v");
+        points::populateAttribute(grid->tree(), index->tree(), "v",
+                                  points::PointAttributeVector<openvdb::Vec3f>(velocities));
+    }
     grid->setName("particles");
     return grid;
 }

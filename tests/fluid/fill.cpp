@@ -37,6 +37,34 @@ TEST_CASE("fill keeps the band and knows every other voxel of the box") {
     CHECK(std::isnan(filled.errorBound()));
 }
 
+TEST_CASE("fill goes as far as it is asked to") {
+    const float h = 0.04f, distance = 0.3f;
+    const LevelSet band = build(shapes::sphere(0.5f, 5), {.voxelSize = h, .exteriorWidth = 4, .interiorWidth = 2});
+    const LevelSet filled = fluid::fill(band, distance);
+    const openvdb::FloatGrid &before = *band.grids().distance, &after = *filled.grids().distance;
+    CHECK(filled.exteriorWidth() == distance);
+    CHECK(filled.interiorWidth() == distance);
+    double largest = 0;
+    int missing = 0;
+    for (const openvdb::Coord& at : openvdb::CoordBBox::createCube(openvdb::Coord(-24), 49)) {
+        const double truth = at.asVec3d().length() * h - 0.5;
+        float value, old;
+        const bool active = after.tree().probeValue(at, value);
+        if (before.tree().probeValue(at, old)) REQUIRE(value == old);
+        missing += !active && std::abs(truth) < distance - 1.5 * h;
+        if (active)
+            largest = std::max(largest, std::abs(value - truth));
+        else
+            CHECK(value == std::copysign(distance, float(truth)));
+    }
+    CHECK(missing == 0);
+    CHECK(largest / h < 1);
+    CHECK(std::isnan(filled.errorBound()));
+    // what is there already is kept
+    CHECK(fluid::fill(band, h).exteriorWidth() == band.exteriorWidth());
+    CHECK(fluid::fill(band, 3 * h).interiorWidth() == 3 * h);
+}
+
 TEST_CASE("fill refuses what cannot be swept") {
     // a sheet that the flood finds no inside of
     const Mesh sheet{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}};
@@ -46,4 +74,7 @@ TEST_CASE("fill refuses what cannot be swept") {
     for (glm::vec3& p : far.points) p += glm::vec3(4000);
     const LevelSet apart = build(shapes::join({shapes::box({1, 1, 1}), far}), {.voxelSize = 0.1f});
     CHECK_THROWS_WITH(fluid::fill(apart), Catch::Matchers::Contains("GiB"));
+    CHECK_THROWS_AS(fluid::fill(apart, 0), std::invalid_argument);
+    CHECK_THROWS_AS(fluid::fill(apart, std::numeric_limits<float>::quiet_NaN()), std::invalid_argument);
+    CHECK_THROWS_WITH(fluid::fill(apart, 1e30f), Catch::Matchers::Contains("too far"));
 }

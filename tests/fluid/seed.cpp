@@ -53,6 +53,27 @@ double volume(const FloatGrid& liquid) {
     return openvdb::tools::levelSetVolume(liquid);
 }
 
+// Of |gradient| from 1, by central differences within a voxel of the surface, in the mean.
+double meanSlopeError(const FloatGrid& liquid) {
+    const auto values = liquid.getConstAccessor();
+    const double voxel = liquid.voxelSize()[0];
+    double sum = 0;
+    int count = 0;
+    for (auto v = liquid.cbeginValueOn(); v; ++v) {
+        if (!(std::abs(*v) < voxel)) continue;
+        openvdb::Vec3d gradient;
+        for (int axis = 0; axis < 3; ++axis) {
+            openvdb::Coord step(0);
+            step[axis] = 1;
+            gradient[axis] =
+                double(values.getValue(v.getCoord() + step)) - double(values.getValue(v.getCoord() - step));
+        }
+        sum += std::abs(gradient.length() / (2 * voxel) - 1);
+        ++count;
+    }
+    return sum / count;
+}
+
 const double ball = 4.0 / 3.0 * 3.141592653589793 * 0.125;  // of radius 0.5
 
 }  // namespace
@@ -74,6 +95,47 @@ TEST_CASE("a sphere's field of any resolution seeds the sphere under the pose") 
     CHECK(volume(*liquid) == Approx(ball).epsilon(0.06));
     CHECK(liquid->background() == Approx(3 * liquidVoxel));
     CHECK(liquid->voxelSize()[0] == Approx(liquidVoxel));
+}
+
+TEST_CASE("a mesh seeds its exact distances, stretched and turned as it may be") {
+    const Mesh mesh = shapes::torus(0.5f, 0.2f, 60, 30);
+    const fluid::Placement placement(poseOf(0.8f), {1.3f, 0.6f, 0.9f});
+    const auto liquid = emptyLiquid(0.03f, 4);
+    liquid->transform().postTranslate({0.007, 0.011, 0.013});  // whole voxels are nowhere near the origin
+    fluid::seed(*liquid, mesh, placement);
+    requireLevelSet(*liquid);
+    Mesh placed = mesh;
+    for (glm::vec3& p : placed.points) p = glm::vec3(placement.toWorld(p));
+    const test::Truth truth(placed);
+    CHECK(error(*liquid, [&](const glm::dvec3& p) { return truth.signedDistance(p); }) < 1e-3);
+
+    // its field, stretched, has lost what is finer than its voxels
+    const auto ofField = emptyLiquid(0.03f, 4);
+    fluid::seed(*ofField, fieldOf(mesh, 0.02f, 1.5f), placement);
+    requireLevelSet(*ofField);
+    CHECK(error(*ofField, [&](const glm::dvec3& p) { return truth.signedDistance(p); }) < 0.15);
+    CHECK(meanSlopeError(*ofField) < 1e-2);
+}
+
+TEST_CASE("far from the origin a liquid is as fine as near it") {
+    const Mesh mesh = shapes::sphere(0.5f, 4);
+    const auto near = emptyLiquid(0.03125f), far = emptyLiquid(0.03125f);
+    fluid::seed(*near, mesh);
+    const double shift = 1024;  // whole voxels
+    far->transform().postTranslate({-shift, 0, 0});
+    fluid::seed(*far, mesh, Pose{{float(-shift), 0, 0}});
+    REQUIRE(near->activeVoxelCount() == far->activeVoxelCount());
+    // and where the liquid's own coordinates are large
+    const auto away = emptyLiquid(0.03125f);
+    fluid::seed(*away, mesh, Pose{{float(shift), 0, 0}});
+    REQUIRE(near->activeVoxelCount() == away->activeVoxelCount());
+    int differ = 0;
+    for (auto voxel = near->cbeginValueOn(); voxel; ++voxel) {
+        const openvdb::Coord& at = voxel.getCoord();
+        differ += far->tree().getValue(at) != *voxel;
+        differ += away->tree().getValue(at.offsetBy(32768, 0, 0)) != *voxel;
+    }
+    CHECK(differ == 0);
 }
 
 TEST_CASE("the band is complete: every voxel nearer than the half width is active") {
@@ -164,10 +226,10 @@ TEST_CASE("a half width that floats cannot hold is still three voxels") {
 TEST_CASE("bad input throws and changes nothing") {
     const LevelSet field = fieldOf(shapes::sphere(0.5f, 3), 0.05f);
     const float nan = std::numeric_limits<float>::quiet_NaN();
-    const auto refused = [&](const FloatGrid::Ptr& liquid, const Pose& pose = {}) {
+    const auto refused = [&](const FloatGrid::Ptr& liquid, const fluid::Placement& placement = {}) {
         const auto tree = liquid->treePtr();
         const auto before = liquid->deepCopy();
-        CHECK_THROWS_AS(fluid::seed(*liquid, field, pose), std::invalid_argument);
+        CHECK_THROWS_AS(fluid::seed(*liquid, field, placement), std::invalid_argument);
         CHECK(liquid->treePtr() == tree);
         CHECK(liquid->activeVoxelCount() == before->activeVoxelCount());
         for (auto voxel = before->cbeginValueOn(); voxel; ++voxel)
@@ -186,11 +248,20 @@ TEST_CASE("bad input throws and changes nothing") {
     auto poisoned = sphere();
     poisoned->tree().setValueOn(openvdb::Coord(10, 0, 0), nan);
     refused(poisoned);
-    refused(sphere(), {glm::vec3(nan, 0, 0)});
-    refused(sphere(), {glm::vec3(std::numeric_limits<float>::infinity(), 0, 0)});
-    refused(sphere(), {glm::vec3(1e30f, 0, 0)});
-    refused(sphere(), {glm::vec3(0), glm::quat(2, 0, 0, 0)});
-    refused(sphere(), {glm::vec3(0), glm::quat(0, 0, 0, 0)});
-    refused(sphere(), {glm::vec3(0), glm::quat(1, nan, 0, 0)});
-    refused(emptyLiquid(1e-4f));
+    refused(sphere(), Pose{glm::vec3(nan, 0, 0)});
+    refused(sphere(), Pose{glm::vec3(std::numeric_limits<float>::infinity(), 0, 0)});
+    refused(sphere(), Pose{glm::vec3(1e30f, 0, 0)});
+    refused(sphere(), Pose{glm::vec3(0), glm::quat(2, 0, 0, 0)});
+    refused(sphere(), Pose{glm::vec3(0), glm::quat(0, 0, 0, 0)});
+    refused(sphere(), Pose{glm::vec3(0), glm::quat(1, nan, 0, 0)});
+    refused(sphere(), {{}, {1, 0, 1}});
+    refused(sphere(), {{}, {1, -1, 1}});
+    refused(sphere(), {{}, {1, 1, nan}});
+    refused(emptyLiquid(1e-5f));
+    // a field without inside has nothing to seed, unless it is asked for a copy
+    const Mesh sheet{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}};
+    const LevelSet empty = build(sheet, {.voxelSize = 0.1f, .sign = Sign::flood});
+    const auto liquid = sphere();
+    CHECK_THROWS_WITH(fluid::seed(*liquid, empty, poseOf(1)), Catch::Matchers::Contains("no surface"));
+    CHECK_THROWS_AS(fluid::seed(*liquid, Mesh{}), std::invalid_argument);
 }

@@ -1,0 +1,28 @@
+// Bodies in a fluid's own voxels.
+#pragma once
+
+#include <openvdb/openvdb.h>
+
+#include "integration/fluid/placement.h"
+#include "sdf/level_set.h"
+#include "sdf/mesh.h"
+
+namespace bilayer::fluid {
+
+/// The signed distances of a mesh that has been placed in the world, in voxels of another grid: exact ones, as build()
+/// finds them, however the body was stretched and turned. Signs are found as by Sign::automatic.
+/// @param voxels  cubes, of any size and wherever they lie
+/// @param width   of the band to either side [m]
+/// Throws std::invalid_argument for a placement as check() does, one beyond the range of OpenVDB's coordinates, voxels
+/// that are no cubes, a band of more memory than the machine has, and what build() refuses.
+openvdb::FloatGrid::Ptr regrid(const Mesh& mesh, const Placement& placement, const openvdb::math::Transform& voxels,
+                               float width);
+
+/// The same for a field. One that lies in these very voxels already is copied; of another one the zero set is
+/// extracted, which rounds off creases by a part of a voxel of the field, and its distances are exact again: its band
+/// may be as narrow as a voxel. Throws std::invalid_argument as well if the band is narrower than that, or the field
+/// has no surface.
+openvdb::FloatGrid::Ptr regrid(const LevelSet& field, const Placement& placement,
+                               const openvdb::math::Transform& voxels, float width);
+
+}  // namespace bilayer::fluid
