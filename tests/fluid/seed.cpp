@@ -15,6 +15,7 @@
 #include "sdf/grids.h"
 #include "sdf/mesh_io.h"
 #include "tests/support/support.h"
+#include "tests/support/truth.h"
 
 using namespace bilayer;
 using openvdb::FloatGrid;
@@ -179,7 +180,7 @@ TEST_CASE("a mesh of the corpus seeds at any rotation") {
     const auto liquid = emptyLiquid(h);
     for (int i = 0; i < 3; ++i) {
         const glm::quat q(normal(random), normal(random), normal(random), normal(random));
-        fluid::seed(*liquid, field, {glm::vec3(normal(random), normal(random), normal(random)), glm::normalize(q)});
+        fluid::seed(*liquid, field, Pose{glm::vec3(normal(random), normal(random), normal(random)), glm::normalize(q)});
         requireLevelSet(*liquid);
     }
 }
@@ -209,7 +210,7 @@ TEST_CASE("subtract and intersect") {
         CHECK(volume(*liquid) == Approx(lens).epsilon(0.08));
     }
     SECTION("intersect with what is far away leaves nothing") {
-        fluid::seed(*liquid, field, {glm::vec3(9, 0, 0)}, fluid::SeedMode::intersect);
+        fluid::seed(*liquid, field, Pose{glm::vec3(9, 0, 0)}, fluid::SeedMode::intersect);
         CHECK(openvdb::tools::checkLevelSet(*liquid) == "");
         CHECK(liquid->activeVoxelCount() == 0);
     }
@@ -257,7 +258,7 @@ TEST_CASE("bad input throws and changes nothing") {
     refused(sphere(), {{}, {1, 0, 1}});
     refused(sphere(), {{}, {1, -1, 1}});
     refused(sphere(), {{}, {1, 1, nan}});
-    refused(emptyLiquid(1e-5f));
+    refused(emptyLiquid(1e-4f), {{}, glm::vec3(100)});
     // a field without inside has nothing to seed, unless it is asked for a copy
     const Mesh sheet{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}};
     const LevelSet empty = build(sheet, {.voxelSize = 0.1f, .sign = Sign::flood});
