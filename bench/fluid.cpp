@@ -1,0 +1,208 @@
+// Liquids that start from meshes: how long seeding takes beside OpenVDB's meshToLevelSet and what a user must do around
+// it, and how true volume and area of the result are.
+#include <fmt/format.h>
+#include <openvdb/tools/Composite.h>
+#include <openvdb/tools/Diagnostics.h>
+#include <openvdb/tools/GridOperators.h>
+#include <openvdb/tools/LevelSetMeasure.h>
+#include <openvdb/tools/LevelSetTracker.h>
+#include <openvdb/tools/MeshToVolume.h>
+#include <tbb/global_control.h>
+
+#include <CLI/CLI.hpp>
+#include <cmath>
+#include <glm/geometric.hpp>
+
+#include "bench/builders.h"
+#include "bench/measure.h"
+#include "bench/program.h"
+#include "demos/shared/shapes.h"
+#include "integration/fluid/seed.h"
+
+using namespace bilayer;
+using namespace bilayer::bench;
+using openvdb::FloatGrid;
+
+namespace {
+
+constexpr float halfWidth = 3;  // [voxels]
+
+struct Options {
+    std::vector<std::string> meshes{"bunny", "dragon", "sphere"};
+    std::vector<float> resolutions{64, 128, 251, 502};
+    int threads = 2, rounds = 3;
+};
+
+Mesh meshOf(const std::string& name) {
+    return name == "sphere" ? shapes::sphere(0.5f, 7) : scene(findSource(name), 64).mesh;
+}
+
+// Askew to all axes, beside the origin.
+fluid::Placement placementOf(const Mesh& mesh) {
+    const glm::vec3 size = bounds(mesh).size();
+    return {Pose{0.3f * size, glm::angleAxis(0.8f, glm::normalize(glm::vec3(1, -2, 0.5f)))}};
+}
+
+Mesh placed(const Mesh& mesh, const fluid::Placement& placement) {
+    Mesh result = mesh;
+    for (glm::vec3& p : result.points) p = glm::vec3(placement.toWorld(p));
+    return result;
+}
+
+// The lower half of the body's box and the space around it, full of liquid.
+FloatGrid::Ptr pool(const Mesh& body, float voxelSize) {
+    const Bounds box = bounds(body);
+    Mesh water = shapes::box(0.6f * box.size());
+    for (glm::vec3& p : water.points) p += box.centre() - glm::vec3(0, 0, 0.6f * box.size().z);
+    const auto liquid = openvdb::createLevelSet<FloatGrid>(voxelSize, halfWidth);
+    fluid::seed(*liquid, water);
+    return liquid;
+}
+
+// As a user of OpenVDB alone would pour a mesh into a liquid.
+void seedByOpenVdb(FloatGrid& liquid, const Mesh& mesh, const fluid::Placement& placement, bool renormalise) {
+    std::vector<openvdb::Vec3s> points;
+    std::vector<openvdb::Vec3I> triangles;
+    for (const glm::vec3& p : mesh.points) {
+        const glm::dvec3 w = placement.toWorld(p);
+        points.emplace_back(float(w.x), float(w.y), float(w.z));
+    }
+    for (const glm::uvec3& t : mesh.triangles) triangles.emplace_back(t.x, t.y, t.z);
+    const auto body = openvdb::tools::meshToLevelSet<FloatGrid>(liquid.transform(), points, triangles, halfWidth);
+    openvdb::tools::csgUnion(liquid, *body);
+    if (!renormalise) return;
+    openvdb::tools::LevelSetTracker<FloatGrid> tracker(liquid);
+    tracker.normalize();
+    tracker.prune();
+}
+
+openvdb::Index64 brokenVoxels(const FloatGrid& liquid) {
+    openvdb::tools::CheckLevelSet<FloatGrid> check(liquid);
+    check.checkEikonal();
+    return check.failureCount();
+}
+
+struct Way {
+    std::string name;
+    std::function<void(FloatGrid&)> pour;
+    std::vector<double> seconds{};
+    openvdb::Index64 broken = 0;
+};
+
+void raceAt(const std::string& name, const Mesh& mesh, float resolution, const Options& options) {
+    const float voxelSize = voxelSizeFor(mesh, resolution);
+    const fluid::Placement placement = placementOf(mesh);
+    const LevelSet field = build(mesh, {.voxelSize = voxelSize});
+    const FloatGrid::Ptr liquid = pool(placed(mesh, placement), voxelSize);
+    std::vector<Way> ways{
+        {"seed, mesh", [&](FloatGrid& g) { fluid::seed(g, mesh, placement); }},
+        {"seed, field", [&](FloatGrid& g) { fluid::seed(g, field, placement); }},
+        {"meshToLevelSet", [&](FloatGrid& g) { seedByOpenVdb(g, mesh, placement, false); }},
+        {"renormalised", [&](FloatGrid& g) { seedByOpenVdb(g, mesh, placement, true); }},
+    };
+    for (int round = 0; round < options.rounds; ++round)
+        for (Way& way : ways) {
+            const FloatGrid::Ptr poured = liquid->deepCopy();
+            const Stopwatch watch;
+            way.pour(*poured);
+            way.seconds.push_back(watch.seconds());
+            way.broken = brokenVoxels(*poured);
+        }
+    const double ours = median(ways[0].seconds), ofField = median(ways[1].seconds), bare = median(ways[2].seconds),
+                 clean = median(ways[3].seconds);
+    fmt::print("| {} | {:g} | {:.0f} | {:.0f} | {:.0f} | {:.0f} | {:.1f} | {:.1f} | {:.1f} | {} / {} / {} / {} |\n",
+               name, resolution, 1e3 * ours, 1e3 * ofField, 1e3 * bare, 1e3 * clean, bare / ours, clean / ours,
+               clean / ofField, ways[0].broken, ways[1].broken, ways[2].broken, ways[3].broken);
+    std::fflush(stdout);
+}
+
+double areaOf(const Mesh& mesh) {
+    double area = 0;
+    for (const glm::uvec3& t : mesh.triangles) {
+        const glm::dvec3 a = mesh.points[t.x], b = mesh.points[t.y], c = mesh.points[t.z];
+        area += 0.5 * glm::length(glm::cross(b - a, c - a));
+    }
+    return area;
+}
+
+double volumeOf(const Mesh& mesh) {
+    double volume = 0;
+    for (const glm::uvec3& t : mesh.triangles) {
+        const glm::dvec3 a = mesh.points[t.x], b = mesh.points[t.y], c = mesh.points[t.z];
+        volume += glm::dot(a, glm::cross(b, c)) / 6;
+    }
+    return volume;
+}
+
+// Of |gradient| from 1 within a voxel of the surface, in the mean; by central differences.
+double slopeError(const FloatGrid& liquid) {
+    const auto gradient = openvdb::tools::gradient(liquid);
+    const auto slopes = gradient->getConstAccessor();
+    double sum = 0, count = 0;
+    for (auto v = liquid.cbeginValueOn(); v; ++v) {
+        if (!(std::abs(*v) < liquid.voxelSize()[0])) continue;
+        sum += std::abs(double(slopes.getValue(v.getCoord()).length()) - 1);
+        ++count;
+    }
+    return sum / count;
+}
+
+std::string truthOf(const FloatGrid& liquid, const Mesh& mesh) {
+    openvdb::tools::LevelSetMeasure<FloatGrid> measure(liquid);
+    return fmt::format("{:+.4f} | {:+.4f} | {:.4f}", 100 * (measure.volume() / volumeOf(mesh) - 1),
+                       100 * (measure.area() / areaOf(mesh) - 1), slopeError(liquid));
+}
+
+void measureAt(const std::string& name, const Mesh& mesh, float resolution) {
+    const float voxelSize = voxelSizeFor(mesh, resolution);
+    const auto empty = [&] { return openvdb::createLevelSet<FloatGrid>(voxelSize, halfWidth); };
+    const FloatGrid::Ptr ours = empty(), ofField = empty(), theirs = empty();
+    fluid::seed(*ours, mesh);
+    fluid::seed(*ofField, build(mesh, {.voxelSize = voxelSize}), placementOf(mesh));
+    seedByOpenVdb(*theirs, mesh, {}, false);
+    fmt::print("| {} | {:g} | {} | {} | {} |\n", name, resolution, truthOf(*ours, mesh), truthOf(*ofField, mesh),
+               truthOf(*theirs, mesh));
+    std::fflush(stdout);
+}
+
+void fluidBench(const Options& options) {
+    const tbb::global_control control(tbb::global_control::max_allowed_parallelism, std::size_t(options.threads));
+    openvdb::initialize();
+    fmt::print(
+        "A body, turned, poured into a liquid that reaches its middle; ms on {} threads, medians of {} rounds. A user "
+        "of\n"
+        "OpenVDB moves the points, calls meshToLevelSet and csgUnion, and LevelSetTracker::normalize if the solver "
+        "minds.\n"
+        "Broken are voxels that checkLevelSet finds, in the order of the columns.\n\n"
+        "| mesh | voxels | seed, mesh | seed, field | meshToLevelSet | and normalize | times as fast as bare | as "
+        "normalized | field, as normalized | broken |\n|---|---|---|---|---|---|---|---|---|---|\n",
+        options.threads, options.rounds);
+    for (const std::string& name : options.meshes)
+        for (const float resolution : options.resolutions) raceAt(name, meshOf(name), resolution, options);
+    fmt::print(
+        "\nVolume and area by LevelSetMeasure against the mesh's own [%], and how far |gradient| is from 1 within a "
+        "voxel\n"
+        "of the surface, in the mean: of seeds by the mesh, by its field at a pose askew, by meshToLevelSet.\n\n"
+        "| mesh | voxels | volume | area | slope | field: volume | area | slope | OpenVDB: volume | area | slope |\n"
+        "|---|---|---|---|---|---|---|---|---|---|---|\n");
+    for (const std::string& name : options.meshes)
+        for (const float resolution : options.resolutions) measureAt(name, meshOf(name), resolution);
+}
+
+int run(int argc, char** argv) {
+    CLI::App app("Times the seeding of liquids beside OpenVDB's tools, and measures what comes of it.");
+    Options options;
+    app.add_option("--mesh", options.meshes, "names, files, or sphere")->capture_default_str();
+    app.add_option("--resolution", options.resolutions, "voxels along the longest side")->capture_default_str();
+    app.add_option("--threads", options.threads)->check(CLI::PositiveNumber)->capture_default_str();
+    app.add_option("--rounds", options.rounds, "turns of each way")->check(CLI::PositiveNumber)->capture_default_str();
+    CLI11_PARSE(app, argc, argv);
+    fluidBench(options);
+    return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+    return bench::program("fluid", run, argc, argv);
+}
