@@ -64,9 +64,9 @@ bool isOutside(const Field* field, float3 centre, float radius) {
 bool isOfInterest(const Field* field, const Query* query, const Ball* ball) {
     const Frame* frame = &field->frame;
     const float perPart = (float)(frame->perMetre) / (float)(PART_SIDE);
-    const double3 local = convert_double3(mapped(query, vload3(0, ball->centre))) - vload3(0, frame->origin);
+    const double3 place = convert_double3(mapped(query, vload3(0, ball->centre))) - vload3(0, frame->origin);
     const float reach = query->reach * perPart + MOST_INTERPOLATION_ERROR / (float)(PART_SIDE) + BALL_ROUNDING;
-    return !isOutside(field, convert_float3(local) * perPart, ball->radius * query->scale * perPart + reach);
+    return !isOutside(field, convert_float3(place) * perPart, ball->radius * query->scale * perPart + reach);
 }
 
 // A work-item looks at some balls in a row: one on GPUs. Answers beyond the capacity are counted only.
