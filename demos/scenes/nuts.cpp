@@ -57,29 +57,22 @@ struct Theory {
 // What is screwed together.
 struct Parts {
     Mesh bolt, nut;
-    float start;  // of nuts: shapes::onThread() [m]
-    float turns;  // that nuts make
-    float stepsPerSecond;
+    float start;        // of nuts: shapes::onThread() [m]
+    float turns;        // that nuts make
     float bottom, top;  // of the bolt [m]
 
     static Parts byFormula(const shapes::Thread& thread, const NutsOptions& options) {
         const shapes::Bolt bolt{.thread = thread, .length = boltLength, .segments = options.segments};
         const shapes::Nut nut{.thread = thread, .segments = options.segments};
         const float start = boltLength - startBelowTip - nut.height / 2;
-        return {shapes::bolt(bolt),     shapes::nut(nut), start,      options.turns,
-                options.stepsPerSecond, -bolt.headHeight, bolt.length};
+        return {shapes::bolt(bolt), shapes::nut(nut), start, options.turns, -bolt.headHeight, bolt.length};
     }
     // As they are modelled the nut lies on the bolt's head.
     static Parts ofFactory(const NutsOptions& options) {
         Mesh bolt = readMesh(options.factory / factoryBolt), nut = readMesh(options.factory / factoryNut);
         const Bounds box = bounds(bolt);
-        return {std::move(bolt),
-                std::move(nut),
-                factoryStart,
-                std::min(options.turns, factoryTurns),
-                std::max(options.stepsPerSecond, factorySteps),
-                box.lower.z,
-                box.upper.z};
+        return {std::move(bolt), std::move(nut), factoryStart, std::min(options.turns, factoryTurns),
+                box.lower.z,     box.upper.z};
     }
 };
 
@@ -166,7 +159,7 @@ Outcome nuts(const NutsOptions& options) {
     const Theory theory(thread);
     Parts parts = options.factory.empty() ? Parts::byFormula(thread, options) : Parts::ofFactory(options);
     Stage stage(fmt::format("{} nuts on their bolts", options.pairs),
-                {.stepsPerSecond = parts.stepsPerSecond, .framesPerMeasuring = framesPerMeasuring});
+                {.stepsPerSecond = options.stepsPerSecond, .framesPerMeasuring = framesPerMeasuring});
     stage.world().bullet().getSolverInfo().m_numIterations = options.iterations;
     const ThingOptions things{.voxelSize = options.voxelSize, .margin = margin, .sweeps = false, .exact = true};
     const auto bolt = makeThing(std::move(parts.bolt), things);

@@ -16,11 +16,13 @@ struct NutsOptions {
     float seconds = 5;                                    ///< at most
     float clearance = 50e-6f;                             ///< of the threads [m], see shapes::Thread
     int segments = 96;                                    ///< of the threads, a multiple of 24
-    float stepsPerSecond = 480;
+    /// In a step of a 480th, nuts without friction turn by more than a facet of their threads after some turns, and hop
+    /// in their play now and then.
+    float stepsPerSecond = 960;
     int iterations = 100;       ///< of Bullet's solver
     float voxelSize = 0.3e-3f;  ///< [m]
-    /// Where the bolt and the nut of the Factory data set lie, see hasFactoryThread(): they are played instead, and
-    /// make `factoryTurns` at most. Empty: parts by formula.
+    /// Where the bolt and the nut of the Factory data set lie, see hasFactoryThread(): they are played instead.
+    /// They make `factoryTurns` at most. Empty: parts by formula.
     std::filesystem::path factory{};
 };
 
