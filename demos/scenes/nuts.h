@@ -16,9 +16,9 @@ struct NutsOptions {
     float seconds = 5;                                    ///< at most
     float clearance = 50e-6f;                             ///< of the threads [m], see shapes::Thread
     int segments = 96;                                    ///< of the threads, a multiple of 24
-    /// In a step of a 480th, nuts without friction turn by more than a facet of their threads after some turns, and hop
-    /// in their play now and then.
-    float stepsPerSecond = 960;
+    /// At 480, nuts without friction turn by more than a facet of their threads in a step after some turns, and hop in
+    /// their play now and then; those that stay creep by the step, 1e-4 degrees each.
+    float stepsPerSecond = 720;
     int iterations = 100;       ///< of Bullet's solver
     float voxelSize = 0.3e-3f;  ///< [m]
     /// Where the bolt and the nut of the Factory data set lie, see hasFactoryThread(): they are played instead.
