@@ -17,6 +17,7 @@
 #include "bench/measure.h"
 #include "bench/plot.h"
 #include "bench/program.h"
+#include "cl/point_sampler.h"
 #include "demos/shared/outcome.h"
 #include "demos/shared/shapes.h"
 
@@ -43,6 +44,7 @@ struct Options {
     std::vector<float> growVoxels{32, 64, 128, 256};
     double growSeconds = 1.5;
     std::string plot, json;
+    bool onDevice = false;
 };
 
 // About its centre of mass and along its principal axes, as Bullet wants bodies.
@@ -229,6 +231,40 @@ Growth grow(const Options& options) {
     return growth;
 }
 
+// Where the device finds the contacts: the bodies move by the same bits, so that the steps are the same ones.
+void compareDevice(const Options& options) {
+    const Mesh mesh = knot(180, 16);
+    HeapOptions heap = options.heap;
+    heap.seconds = options.growSeconds;
+    heap.measuredFrames = 1;
+    OpenclTimes times;
+    const Device device = openDevice();
+    const auto processor = makeField(mesh, options.voxels);
+    const auto sampled = makeField(mesh, options.voxels, openclPointSampler(device, {.times = &times}));
+    fmt::print("\n## Points sampled by {}: {:g} s of knots, {:g} voxels each\n\n", device.info().name, heap.seconds,
+               options.voxels);
+    fmt::print(
+        "| bodies | a step, processor [ms] | a step, device [ms] | its kernels [ms] | transfers [ms] | energies "
+        "that differ |\n|---|---|---|---|---|---|\n");
+    for (const int bodies : options.growBodies) {
+        const Row ours = playKnots(*processor, mesh, bodies, heap);
+        times = {};
+        const Row theirs = playKnots(*sampled, mesh, bodies, heap);
+        // whose patience ends first has fewer steps
+        const auto steps = std::min(ours.run.kineticEnergy.size(), theirs.run.kineticEnergy.size());
+        const auto usual = [&](const Row& row) {
+            const auto begin = row.run.stepMs.begin();
+            return median({begin + std::ptrdiff_t(steps / 2), begin + std::ptrdiff_t(steps)});
+        };
+        int differing = 0;
+        for (std::size_t i = 0; i < steps; ++i) differing += ours.run.kineticEnergy[i] != theirs.run.kineticEnergy[i];
+        const double each = 1e3 / double(theirs.run.stepMs.size());
+        fmt::print("| {} | {:.2f} | {:.2f} | {:.2f} | {:.2f} | {} |\n", bodies, usual(ours), usual(theirs),
+                   each * times.kernels, each * (times.upload + times.download), differing);
+        std::fflush(stdout);
+    }
+}
+
 Line energyOf(const Row& row, double stepsPerSecond) {
     Line line{row.name, {}, {}};
     for (std::size_t i = 0; i < row.run.kineticEnergy.size(); i += 4)
@@ -290,12 +326,18 @@ int run(int argc, char** argv) {
     app.add_option("--patience", options.heap.patience, "seconds of waiting that end a run")->capture_default_str();
     app.add_option("--grow-bodies", options.growBodies, "numbers of knots to try; 0: none")->capture_default_str();
     app.add_option("--grow-voxels", options.growVoxels, "voxels along a knot to try; 0: none")->capture_default_str();
+    app.add_flag("--on-device", options.onDevice,
+                 "instead of all this: the knots of --grow-bodies beside the same with points sampled by OpenCL");
     app.add_option("--plot", options.plot, "draws speed, energy and penetration into this SVG file");
     app.add_option("--json", options.json, "also write all numbers to this file");
     CLI11_PARSE(app, argc, argv);
     std::erase(options.growBodies, 0);
     std::erase(options.growVoxels, 0.f);
 
+    if (options.onDevice) {
+        compareDevice(options);
+        return 0;
+    }
     const std::vector<Row> knots = compareKnots(options), boxes = compareBoxes(options);
     const Growth growth = grow(options);
     if (!options.plot.empty()) draw(options.plot, knots, growth, options);

@@ -33,18 +33,19 @@ constexpr double anyConcavity = 1e9;  // so many hulls and no more, however conc
 
 class Field : public Rival {
   public:
-    Field(const Mesh& mesh, float voxels) {
+    Field(const Mesh& mesh, float voxels, const PointSampler& sampler) : sampler_(sampler) {
         BuildOptions how{.voxelSize = voxelSizeFor(mesh, voxels)};
         how.interiorWidth = bandInside;
         shape_ = std::make_unique<bullet::Shape>(std::make_shared<Collider>(mesh, build(mesh, how)));
     }
-    std::string name() const override { return "bilayer"; }
+    std::string name() const override { return sampler_.sample ? "bilayer, " + sampler_.device : "bilayer"; }
     btCollisionShape& shape() override { return *shape_; }
     std::unique_ptr<btCollisionDispatcher> dispatcher(btCollisionConfiguration& configuration) const override {
-        return std::make_unique<bullet::Dispatcher>(&configuration);
+        return std::make_unique<bullet::Dispatcher>(&configuration, sampler_);
     }
 
   private:
+    PointSampler sampler_;
     std::unique_ptr<bullet::Shape> shape_;
 };
 
@@ -242,8 +243,8 @@ std::unique_ptr<btCollisionDispatcher> Rival::dispatcher(btCollisionConfiguratio
     return std::make_unique<btCollisionDispatcher>(&configuration);
 }
 
-std::unique_ptr<Rival> makeField(const Mesh& mesh, float voxels) {
-    return timed<Field>(mesh, voxels);
+std::unique_ptr<Rival> makeField(const Mesh& mesh, float voxels, const PointSampler& sampler) {
+    return timed<Field>(mesh, voxels, sampler);
 }
 
 std::unique_ptr<Rival> makeGImpact(const Mesh& mesh, float margin) {

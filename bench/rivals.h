@@ -9,6 +9,7 @@
 #include <string>
 
 #include "sdf/mesh.h"
+#include "sdf/point_sampler.h"
 
 namespace bilayer::bench {
 
@@ -25,8 +26,9 @@ class Rival {
 };
 
 /// Ours.
-/// @param voxels  along the longest side
-std::unique_ptr<Rival> makeField(const Mesh& mesh, float voxels);
+/// @param voxels   along the longest side
+/// @param sampler  samples the contacts' points; none: the processor does, as ever
+std::unique_ptr<Rival> makeField(const Mesh& mesh, float voxels, const PointSampler& sampler = {});
 
 /// btGImpactMeshShape.
 /// @param margin  added to the surface [m]

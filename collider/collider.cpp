@@ -122,6 +122,22 @@ class PointsInField {
             visitAll(report, found);
     }
 
+    /// The same for the points that a sampler has found.
+    template <class Found>
+    void visitFound(std::span<const FoundPoint> points, ContactReport& report, Found&& found) const {
+        for (const auto& [index, sample] : points) {
+            ++report.pointsTested;
+            const SurfacePoint& point = body_.collider.points().points()[index];
+            touch(index, point, map_(point.position), sample, report, found);
+        }
+    }
+
+    /// What a sampler is to find.
+    std::optional<PointQuery> query() const {
+        if (sweeps_) return std::nullopt;
+        return PointQuery{0, 0, map_.linear, map_.shift, map_.scale, reach_};
+    }
+
   private:
     static constexpr float rounding = 1e-3f;  // [voxels]
 
@@ -280,8 +296,12 @@ const MassProperties& Collider::mass() const {
     return *body_.mass;
 }
 
-ContactReport collide(const Placed& a, const Placed& b, const ContactOptions& options, std::vector<Contact>& contacts,
-                      NearPoints* near) {
+namespace {
+
+// The contacts of A's points in B's field, then of B's in A's, of those that the visits find.
+template <class VisitA, class VisitB>
+ContactReport addContacts(const Placed& a, const Placed& b, const ContactOptions& options,
+                          std::vector<Contact>& contacts, VisitA&& visitA, VisitB&& visitB) {
     ContactReport report;
     const auto opposes = [&](const glm::vec3& normal, const Placed& body, const SurfacePoint& point,
                              const Touch& touch) {
@@ -301,9 +321,48 @@ ContactReport collide(const Placed& a, const Placed& b, const ContactOptions& op
         contacts.push_back({b.pose.toWorld(b.scale * point.position), -normal, touch.distance * a.scale,
                             index | featureOfB, touch.approach * a.scale});
     };
-    PointsInField(a, b, options.margin).visit(near ? &near->ofA : nullptr, report, addOfA);
-    PointsInField(b, a, options.margin).visit(near ? &near->ofB : nullptr, report, addOfB);
+    visitA(PointsInField(a, b, options.margin), report, addOfA);
+    visitB(PointsInField(b, a, options.margin), report, addOfB);
     return report;
+}
+
+}  // namespace
+
+ContactReport collide(const Placed& a, const Placed& b, const ContactOptions& options, std::vector<Contact>& contacts,
+                      NearPoints* near) {
+    const auto visit = [](NearPoints::List* list) {
+        return
+            [=](PointsInField points, ContactReport& report, const auto& found) { points.visit(list, report, found); };
+    };
+    return addContacts(a, b, options, contacts, visit(near ? &near->ofA : nullptr), visit(near ? &near->ofB : nullptr));
+}
+
+std::optional<PointQuery> pointQuery(const Placed& body, const Placed& other, float margin) {
+    return PointsInField(body, other, margin).query();
+}
+
+SampledBody sampledBody(const Collider& collider) {
+    const auto ballsOfPoints = [&collider] {
+        BallsOfPoints balls;
+        for (const SurfacePoint& point : collider.points().points()) balls.points.push_back(point.position);
+        const auto nodes = collider.points().nodes();
+        for (std::uint32_t i = 0; i < nodes.size(); ++i)
+            if (nodes[i].next == i + 1)
+                balls.balls.push_back({nodes[i].centre, nodes[i].radius, nodes[i].begin, nodes[i].end});
+        return balls;
+    };
+    return {collider.id(), &collider.field().layout(), ballsOfPoints};
+}
+
+ContactReport collideFound(const Placed& a, const Placed& b, const ContactOptions& options,
+                           std::span<const FoundPoint> ofA, std::span<const FoundPoint> ofB,
+                           std::vector<Contact>& contacts) {
+    const auto visit = [](std::span<const FoundPoint> some) {
+        return [=](const PointsInField& points, ContactReport& report, const auto& found) {
+            points.visitFound(some, report, found);
+        };
+    };
+    return addContacts(a, b, options, contacts, visit(ofA), visit(ofB));
 }
 
 }  // namespace bilayer

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cstdint>
 #include <memory>
+#include <optional>
+#include <span>
 #include <vector>
 
 #include "collider/body.h"
@@ -11,6 +13,7 @@
 #include "collider/motion.h"
 #include "collider/near_points.h"
 #include "collider/pose.h"
+#include "sdf/point_sampler.h"
 
 namespace bilayer {
 
@@ -110,6 +113,20 @@ struct ContactReport {
 /// @param near  null, or what was kept of the same two bodies in the last step: the contacts are the same, found sooner
 ContactReport collide(const Placed& a, const Placed& b, const ContactOptions& options, std::vector<Contact>& contacts,
                       NearPoints* near = nullptr);
+
+/// What a PointSampler is to find of a body in the field of another, for contacts up to a margin [m]; the places among
+/// its bodies are left open. Nothing where motion takes any point farther than the margin: such points are followed on
+/// their ways.
+std::optional<PointQuery> pointQuery(const Placed& body, const Placed& other, float margin);
+
+/// The body as a PointSampler sees it, which the collider must outlive.
+SampledBody sampledBody(const Collider& collider);
+
+/// The same contacts as collide(), of what a sampler has found of A in B's field and of B in A's: to the bit, if its
+/// samples are. The report counts the points found as tested.
+ContactReport collideFound(const Placed& a, const Placed& b, const ContactOptions& options,
+                           std::span<const FoundPoint> ofA, std::span<const FoundPoint> ofB,
+                           std::vector<Contact>& contacts);
 
 /// The same for bodies of their own size.
 inline ContactReport collide(const Collider& a, const Pose& poseA, const Collider& b, const Pose& poseB,

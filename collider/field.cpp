@@ -53,6 +53,9 @@ float Field::interiorWidth() const noexcept {
 const Bounds& Field::bounds() const noexcept {
     return data_->bounds;
 }
+const FieldLayout& Field::layout() const noexcept {
+    return *data_;
+}
 const Mesh* Field::mesh() const noexcept {
     return data_->mesh ? &data_->mesh->mesh() : nullptr;
 }

@@ -118,6 +118,8 @@ class Field {
     glm::ivec3 blocks() const noexcept;     ///< of 8^3 voxels, from origin() on, in the box around the band
     /// Whether samples of the band are kept in a block, by its place in that box; false for one beside it.
     bool keeps(const glm::ivec3& block) const noexcept;
+    /// What all queries work from; valid as long as the field or a copy of it lives.
+    const FieldLayout& layout() const noexcept;
     const Mesh* mesh() const noexcept;  ///< null for a field without; valid as long as the field or a copy lives
     std::size_t memoryBytes() const noexcept;
 

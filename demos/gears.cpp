@@ -1,5 +1,7 @@
 #include "demos/scenes/gears.h"
 
+#include <fmt/core.h>
+
 #include "demos/shared/program.h"
 
 int main(int argc, char** argv) {
@@ -14,5 +16,13 @@ int main(int argc, char** argv) {
     program.option("--steps", options.stepsPerSecond, "a second")->check(CLI::Range(30.0, 10000.0));
     program.option("--iterations", options.iterations, "of Bullet's solver")->check(CLI::Range(1, 10000));
     program.option("--voxel", options.voxelSize, "edge of a voxel [m]")->check(CLI::Range(0.02e-3, 1e-3));
-    return program.run(argc, argv, [&] { return gears(options); });
+    program.option("--factory", options.factory,
+                   "folder with the gear of the Factory data set, to play a pair of instead");
+    return program.run(argc, argv, [&] {
+        if (!options.factory.empty() && !hasFactoryGear(options.factory)) {
+            fmt::print(stderr, "gears: no gear of Factory in {}: gears by formula instead\n", options.factory.string());
+            options.factory.clear();
+        }
+        return gears(options);
+    });
 }

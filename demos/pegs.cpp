@@ -1,5 +1,7 @@
 #include "demos/scenes/pegs.h"
 
+#include <fmt/core.h>
+
 #include "demos/shared/program.h"
 
 int main(int argc, char** argv) {
@@ -14,5 +16,13 @@ int main(int argc, char** argv) {
     program.option("--steps", options.stepsPerSecond, "a second")->check(CLI::Range(30.0, 10000.0));
     program.option("--iterations", options.iterations, "of Bullet's solver")->check(CLI::Range(1, 10000));
     program.option("--voxel", options.voxelSize, "edge of a voxel [m]")->check(CLI::Range(0.02e-3, 1e-3));
-    return program.run(argc, argv, [&] { return pegs(options); });
+    program.option("--factory", options.factory, "folder with peg and hole of the Factory data set, to play too");
+    return program.run(argc, argv, [&] {
+        if (!options.factory.empty() && !hasFactoryPeg(options.factory)) {
+            fmt::print(stderr, "pegs: no peg and hole of Factory in {}: parts by formula alone\n",
+                       options.factory.string());
+            options.factory.clear();
+        }
+        return pegs(options);
+    });
 }

@@ -5,14 +5,20 @@
 
 #include <algorithm>
 #include <cmath>
+#include <complex>
+#include <glm/geometric.hpp>
 #include <glm/gtc/constants.hpp>
+#include <glm/vec2.hpp>
 #include <memory>
 #include <numeric>
+#include <utility>
 
 #include "collider/mass.h"
 #include "demos/shared/machines.h"
 #include "demos/shared/stage.h"
 #include "demos/shared/turning.h"
+#include "integration/bullet/convert.h"
+#include "sdf/mesh_io.h"
 
 namespace bilayer::demo {
 namespace {
@@ -27,6 +33,13 @@ constexpr float strongest = 100;        // of the motor [loads]
 constexpr int framesPerMeasuring = 24;  // teeth lie on each other all the time
 constexpr double halfTooth = 0.5;
 
+constexpr const char* factoryGear = "factory_gear_medium.ply";
+constexpr int factoryTeeth = 40;
+constexpr float factoryModule = 1e-3f;   // [m]
+constexpr float factoryAxis = 20e-3f;    // of its bore, along x [m]
+constexpr float factoryApart = 0.5e-3f;  // how far its data set puts axles apart beyond half the diameters [m]
+constexpr double tips = 0.98;            // of the largest radius: what is farther out is of a tooth's tip
+
 constexpr std::uint32_t colours[] = {0xe07a5f, 0x9db4d6, 0xf2cc8f, 0x81b29a};
 
 struct Wheel {
@@ -38,7 +51,7 @@ struct Wheel {
     double angle() const { return turning.angle() - start; }
 };
 
-// Holds bodies so that they can only turn about upright lines through their middles, and drives the first. To be gone
+// Holds bodies so that they can only turn about upright lines, and drives the first. To be gone
 // before their world.
 class Axles {
   public:
@@ -49,9 +62,11 @@ class Axles {
         for (const auto& hinge : hinges_) world_.removeConstraint(hinge.get());
     }
 
-    void add(btRigidBody& body) {
-        const btVector3 upright = body.getWorldTransform().getBasis().transpose() * btVector3(0, 0, 1);
-        hinges_.push_back(std::make_unique<btHingeConstraint>(body, btVector3(0, 0, 0), upright));
+    /// @param place  on the axle, in the world
+    void add(btRigidBody& body, const glm::vec3& place) {
+        const btTransform& pose = body.getWorldTransform();
+        const btVector3 upright = pose.getBasis().transpose() * btVector3(0, 0, 1);
+        hinges_.push_back(std::make_unique<btHingeConstraint>(body, pose.invXform(bullet::toBullet(place)), upright));
         world_.addConstraint(hinges_.back().get());
     }
 
@@ -69,32 +84,68 @@ class Axles {
     btJointFeedback feedback_{};
 };
 
+// Gears that mesh.
+struct Train {
+    std::vector<shapes::Gear> parts;
+    std::vector<Mesh> meshes;
+    float apart;  // axles, beyond half the diameters [m]
+
+    static Train byFormula(const GearsOptions& options) {
+        Train train{{}, {}, 0};
+        for (const int teeth : options.teeth) {
+            train.parts.push_back({.teeth = teeth, .backlash = options.backlash});
+            train.meshes.push_back(shapes::gear(train.parts.back()));
+        }
+        return train;
+    }
+    static Train ofFactory(const std::filesystem::path& folder);
+};
+
+// As shapes::gear() makes them: around z, with a tooth along +x.
+Train Train::ofFactory(const std::filesystem::path& folder) {
+    Mesh mesh = readMesh(folder / factoryGear);
+    const float middle = (bounds(mesh).lower.z + bounds(mesh).upper.z) / 2;
+    double largest = 0;
+    for (glm::vec3& point : mesh.points) {
+        point -= glm::vec3(factoryAxis, 0, middle);
+        largest = std::max(largest, double(glm::length(glm::vec2(point))));
+    }
+    std::complex<double> sum = 0;  // of the tips, so that all teeth lie on each other
+    for (const glm::vec3& point : mesh.points)
+        if (double(glm::length(glm::vec2(point))) > tips * largest)
+            sum += std::polar(1.0, factoryTeeth * std::atan2(double(point.y), double(point.x)));
+    const glm::quat turn = glm::angleAxis(-float(std::arg(sum) / factoryTeeth), glm::vec3(0, 0, 1));
+    for (glm::vec3& point : mesh.points) point = turn * point;
+    const shapes::Gear part{.teeth = factoryTeeth, .toothModule = factoryModule};
+    return {{part, part}, {mesh, mesh}, factoryApart};
+}
+
 // From gear to gear, each in the middle of the backlash.
-std::vector<Wheel> addTrain(Stage& stage, Axles& axles, const GearsOptions& options) {
+std::vector<Wheel> addTrain(Stage& stage, Axles& axles, Train train, const GearsOptions& options) {
     std::vector<Wheel> wheels;
-    shapes::Gear last;
     glm::vec3 place(0);
     float angle = 0;
-    for (std::size_t i = 0; i < options.teeth.size(); ++i) {
-        const shapes::Gear part{.teeth = options.teeth[i], .backlash = options.backlash};
+    for (std::size_t i = 0; i < train.parts.size(); ++i) {
+        const shapes::Gear& part = train.parts[i];
         if (i > 0) {
+            const shapes::Gear& last = train.parts[i - 1];
             const float direction = i % 2 == 0 ? zigzag : -zigzag;
-            const float distance = (part.pitchDiameter() + last.pitchDiameter()) / 2;
+            const float distance = (part.pitchDiameter() + last.pitchDiameter()) / 2 + train.apart;
             place += distance * glm::vec3(std::cos(direction), std::sin(direction), 0);
             angle = shapes::meshingAngle(part, angle, last, direction);
         }
-        const auto thing = makeThing(
-            shapes::gear(part), {.voxelSize = options.voxelSize, .margin = margin, .sweeps = false, .exact = true});
+        const auto thing =
+            makeThing(std::move(train.meshes[i]),
+                      {.voxelSize = options.voxelSize, .margin = margin, .sweeps = false, .exact = true});
         const float mass = density * float(massProperties(thing->mesh).volume);
         const Pose pose{place, glm::angleAxis(angle, glm::vec3(0, 0, 1))};
         const Matter matter{.mass = mass, .friction = friction, .linearDamping = 0, .angularDamping = 0};
         btRigidBody& body = stage.add(
             thing, matter, pose, {.colour = colours[i % std::size(colours)], .roughness = 0.35f, .metalness = 0.3f});
         body.setActivationState(DISABLE_DEACTIVATION);
-        axles.add(body);
+        axles.add(body, place);
         const double sign = i % 2 == 0 ? 1 : -1;
-        wheels.push_back({body, sign * options.teeth[0] / options.teeth[i], Turning(pose.rotation)});
-        last = part;
+        wheels.push_back({body, sign * train.parts[0].teeth / part.teeth, Turning(pose.rotation)});
     }
     return wheels;
 }
@@ -112,12 +163,18 @@ double deviationOf(const std::vector<double>& values) {
 
 }  // namespace
 
+bool hasFactoryGear(const std::filesystem::path& folder) {
+    return std::filesystem::exists(folder / factoryGear);
+}
+
 Outcome gears(const GearsOptions& options) {
-    Stage stage(fmt::format("A train of {} gears", options.teeth.size()),
+    Train train = options.factory.empty() ? Train::byFormula(options) : Train::ofFactory(options.factory);
+    const std::vector<shapes::Gear> parts = train.parts;
+    Stage stage(fmt::format("A train of {} gears", parts.size()),
                 {.stepsPerSecond = options.stepsPerSecond, .framesPerMeasuring = framesPerMeasuring});
     stage.world().bullet().getSolverInfo().m_numIterations = options.iterations;
     Axles axles(stage.world().bullet());
-    std::vector<Wheel> wheels = addTrain(stage, axles, options);
+    std::vector<Wheel> wheels = addTrain(stage, axles, std::move(train), options);
     axles.drive(options.speed, strongest * options.load / options.stepsPerSecond);
     const btVector3 brake(0, 0, wheels.back().ratio > 0 ? -options.load : options.load);
 
@@ -133,7 +190,7 @@ Outcome gears(const GearsOptions& options) {
             return std::abs(wheel.angle() - wheel.ratio * wheels.front().angle());
         };
         for (std::size_t i = 0; i < wheels.size(); ++i)
-            worstTooth = worse(worstTooth, off(wheels[i]) * options.teeth[i] / (2 * glm::pi<double>()));
+            worstTooth = worse(worstTooth, off(wheels[i]) * parts[i].teeth / (2 * glm::pi<double>()));
         worstAngle = worse(worstAngle, off(wheels.back()));
     };
     while (stage.time() < settled) step();
@@ -149,12 +206,11 @@ Outcome gears(const GearsOptions& options) {
     const double made = wheels.front().angle() / (2 * glm::pi<double>());
     // from the left of the first gear to the right of the last
     const glm::vec3 end = stage.frames().front().back().position;
-    const float left = -float(options.teeth.front()) * shapes::Gear{}.toothModule / 2;
-    const float right = end.x + float(options.teeth.back()) * shapes::Gear{}.toothModule / 2;
+    const float left = -parts.front().pitchDiameter() / 2, right = end.x + parts.back().pitchDiameter() / 2;
     Outcome outcome = stage.finish({.target = {(left + right) / 2, end.y / 2, 0},
                                     .distance = 1.4f * (right - left),
                                     .elevation = 1.1f,
-                                    .groundHeight = -shapes::Gear{}.faceWidth});
+                                    .groundHeight = -parts.front().faceWidth});
     outcome.facts = {
         {"turns of the first gear", fmt::format("{:.2f}", made)},
         {"last gear off its angle", fmt::format("{:.3f} mrad at most", 1e3 * worstAngle)},

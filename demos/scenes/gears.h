@@ -2,6 +2,7 @@
 // ratio that their numbers say.
 #pragma once
 
+#include <filesystem>
 #include <vector>
 
 #include "demos/shared/outcome.h"
@@ -17,10 +18,16 @@ struct GearsOptions {
     float stepsPerSecond = 480;
     int iterations = 100;       ///< of Bullet's solver
     float voxelSize = 0.3e-3f;  ///< [m]
+    /// Where the gear of the Factory data set lies, see hasFactoryGear(): two of it are played instead. Empty: gears by
+    /// formula.
+    std::filesystem::path factory{};
 };
 
+/// Whether a folder holds `factory_gear_medium.ply`: 40 teeth of module 1 mm, on a hub.
+bool hasFactoryGear(const std::filesystem::path& folder);
+
 /// Criteria: over all turns each gear's angle has the ratio to the first one's that their teeth say, within 0.5 %; at
-/// no time is a gear off by half a tooth; no overlap of half a voxel.
+/// no time is a gear off by half a tooth; no overlap of half a voxel. Throws what readMesh() throws.
 Outcome gears(const GearsOptions& options);
 
 }  // namespace bilayer::demo

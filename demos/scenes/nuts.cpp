@@ -11,13 +11,16 @@
 #include "demos/shared/machines.h"
 #include "demos/shared/stage.h"
 #include "demos/shared/turning.h"
+#include "sdf/mesh_io.h"
 
 namespace bilayer::demo {
 namespace {
 
-constexpr float gravity = 9.81f;        // [m/s^2]
-constexpr float density = 7850;         // of steel [kg/m^3]
-constexpr float boltLength = 70e-3f;    // some have run out 17 turns when others have made 10 [m]
+constexpr float gravity = 9.81f;      // [m/s^2]
+constexpr float density = 7850;       // of steel [kg/m^3]
+constexpr float boltLength = 70e-3f;  // some have run out 17 turns when others have made 10 [m]
+constexpr const char *factoryBolt = "factory_bolt_m16_loose.obj", *factoryNut = "factory_nut_m16_loose_subdiv_3x.obj";
+constexpr float factoryStart = 10e-3f;  // above the head, where the thread still carries all of the nut [m]
 constexpr float lane = 40e-3f;          // between bolts [m]
 constexpr float startBelowTip = 1e-3f;  // [m]
 // Contacts are made up to here: more than nuts advance in a step, less than from one flank to the other [m].
@@ -51,6 +54,28 @@ struct Theory {
     }
 };
 
+// What is screwed together.
+struct Parts {
+    Mesh bolt, nut;
+    float start;        // of nuts: shapes::onThread() [m]
+    float turns;        // that nuts make
+    float bottom, top;  // of the bolt [m]
+
+    static Parts byFormula(const shapes::Thread& thread, const NutsOptions& options) {
+        const shapes::Bolt bolt{.thread = thread, .length = boltLength, .segments = options.segments};
+        const shapes::Nut nut{.thread = thread, .segments = options.segments};
+        const float start = boltLength - startBelowTip - nut.height / 2;
+        return {shapes::bolt(bolt), shapes::nut(nut), start, options.turns, -bolt.headHeight, bolt.length};
+    }
+    // As they are modelled the nut lies on the bolt's head.
+    static Parts ofFactory(const NutsOptions& options) {
+        Mesh bolt = readMesh(options.factory / factoryBolt), nut = readMesh(options.factory / factoryNut);
+        const Bounds box = bounds(bolt);
+        return {std::move(bolt), std::move(nut), factoryStart, std::min(options.turns, factoryTurns),
+                box.lower.z,     box.upper.z};
+    }
+};
+
 struct Rider {
     btRigidBody& body;
     float friction;
@@ -58,7 +83,8 @@ struct Rider {
     Turning turning;
     double turns = 0;               // downward, since the nut had settled
     std::vector<double> heights{};  // after each whole turn since, the start included [m]
-    double start = 0, speed = 0;    // angle and angular speed when it had settled [rad], [rad/s]
+    double start = 0, speed = 0;    // turns and angular speed when it had settled [rad/s]
+    double acceleration = 0;        // since then, until it has made its turns [rad/s^2]
 };
 
 double spinOf(const btRigidBody& body) {
@@ -67,18 +93,31 @@ double spinOf(const btRigidBody& body) {
 
 void settle(Rider& rider) {
     rider.start = rider.turning.turns();
+    rider.turns = 0;
     rider.speed = spinOf(rider.body);
     rider.heights = {rider.height};
 }
 
-void follow(Rider& rider, const Pose& pose) {
+// Nobody need see it run into the bolt's head.
+void hold(btRigidBody& body) {
+    for (const auto set : {&btRigidBody::setLinearVelocity, &btRigidBody::setAngularVelocity})
+        (body.*set)(btVector3(0, 0, 0));
+    body.setLinearFactor(btVector3(0, 0, 0));
+    body.setAngularFactor(btVector3(0, 0, 0));
+}
+
+// A nut that has made `most` turns is held there.
+void follow(Rider& rider, const Pose& pose, double time, double most) {
+    if (rider.turns >= most) return;
     rider.turning.follow(pose.rotation);
     const double turns = rider.start - rider.turning.turns(), height = pose.position.z;
     const auto whole = double(rider.heights.size());
     if (!rider.heights.empty() && turns >= whole)
         rider.heights.push_back(glm::mix(rider.height, height, (whole - rider.turns) / (turns - rider.turns)));
+    rider.acceleration = (spinOf(rider.body) - rider.speed) / (time - settled);
     rider.turns = turns;
     rider.height = height;
+    if (turns >= most) hold(rider.body);
 }
 
 // The worst of all turns [%].
@@ -95,44 +134,45 @@ struct Verdict {
     double advance = 0, acceleration = 0;  // off theory [%]
 };
 
-Verdict judge(const std::vector<Rider>& riders, const Theory& theory, const NutsOptions& options, double time) {
+Verdict judge(const std::vector<Rider>& riders, const Theory& theory, double turns) {
     Verdict verdict;
     for (const Rider& rider : riders) {
         if (theory.stays(rider.friction)) verdict.moved = worse(verdict.moved, 360 * std::abs(rider.turns));
         if (!theory.runs(rider.friction)) continue;
         const double inertia = double(rider.body.getInvMass()) / double(rider.body.getInvInertiaTensorWorld()[2][2]);
         const double expected = theory.acceleration(rider.friction, inertia);
-        const double measured = (spinOf(rider.body) - rider.speed) / (time - settled);
-        verdict.stuck += rider.turns < options.turns;
+        verdict.stuck += rider.turns < turns;
         verdict.advance = worse(verdict.advance, advanceOffPitch(rider, theory.pitch));
-        verdict.acceleration = worse(verdict.acceleration, 100 * std::abs(measured / expected - 1));
+        verdict.acceleration = worse(verdict.acceleration, 100 * std::abs(rider.acceleration / expected - 1));
     }
     return verdict;
 }
 
 }  // namespace
 
+bool hasFactoryThread(const std::filesystem::path& folder) {
+    return std::filesystem::exists(folder / factoryBolt) && std::filesystem::exists(folder / factoryNut);
+}
+
 Outcome nuts(const NutsOptions& options) {
-    const shapes::Thread thread{.clearance = options.clearance};
-    const shapes::Bolt boltPart{.thread = thread, .length = boltLength};
-    const shapes::Nut nutPart{.thread = thread};
+    const shapes::Thread thread{.clearance = options.clearance};  // Factory's has this diameter and pitch too
     const Theory theory(thread);
+    Parts parts = options.factory.empty() ? Parts::byFormula(thread, options) : Parts::ofFactory(options);
     Stage stage(fmt::format("{} nuts on their bolts", options.pairs),
                 {.stepsPerSecond = options.stepsPerSecond, .framesPerMeasuring = framesPerMeasuring});
     stage.world().bullet().getSolverInfo().m_numIterations = options.iterations;
     const ThingOptions things{.voxelSize = options.voxelSize, .margin = margin, .sweeps = false, .exact = true};
-    const auto bolt = makeThing(shapes::bolt(boltPart), things);
-    const auto nut = makeThing(shapes::nut(nutPart), things);
+    const auto bolt = makeThing(std::move(parts.bolt), things);
+    const auto nut = makeThing(std::move(parts.nut), things);
     const float mass = density * float(massProperties(nut->mesh).volume);
 
     const int side = int(std::ceil(std::sqrt(float(options.pairs))));
-    const float top = boltPart.length - startBelowTip - nutPart.height / 2;
     std::vector<Rider> riders;
     for (int i = 0; i < options.pairs; ++i) {
         const glm::vec3 place(lane * (glm::vec2(i % side, i / side) - 0.5f * float(side - 1)), 0);
         const float friction = options.frictions[std::size_t(i) % options.frictions.size()];
         // each starts in another part of its first turn
-        Pose pose = shapes::onThread(thread, top - thread.pitch * float(i) / float(options.pairs));
+        Pose pose = shapes::onThread(thread, parts.start - thread.pitch * float(i) / float(options.pairs));
         pose.position += place;
         stage.add(bolt, {.friction = 1}, {place}, boltLook);
         btRigidBody& body = stage.add(
@@ -144,21 +184,22 @@ Outcome nuts(const NutsOptions& options) {
 
     const auto followAll = [&] {
         const std::vector<Pose> poses = stage.world().poses();
-        for (std::size_t i = 0; i < riders.size(); ++i) follow(riders[i], poses[2 * i + 1]);
-        return std::all_of(riders.begin(), riders.end(), [&](const Rider& rider) {
-            return !theory.runs(rider.friction) || rider.turns >= options.turns;
-        });
+        for (std::size_t i = 0; i < riders.size(); ++i) follow(riders[i], poses[2 * i + 1], stage.time(), parts.turns);
+        const auto are = [&](const auto& what) { return std::count_if(riders.begin(), riders.end(), what); };
+        const auto running = are([&](const Rider& rider) { return theory.runs(rider.friction); });
+        const auto there = are([&](const Rider& rider) { return rider.turns >= parts.turns; });
+        return running > 0 && there >= running;
     };
     stage.run(settled, followAll);
     for (Rider& rider : riders) settle(rider);
     stage.run(options.seconds, followAll);
-    const Verdict verdict = judge(riders, theory, options, stage.time());
+    const Verdict verdict = judge(riders, theory, parts.turns);
 
     const float width = lane * float(side);
-    Outcome outcome = stage.finish({.target = {0, 0, 0.4f * boltPart.length},
-                                    .distance = 1.5f * width + 3 * boltPart.length,
+    Outcome outcome = stage.finish({.target = {0, 0, glm::mix(parts.bottom, parts.top, 0.5f)},
+                                    .distance = 1.5f * width + 2.6f * (parts.top - parts.bottom),
                                     .elevation = 0.4f,
-                                    .groundHeight = -boltPart.headHeight});
+                                    .groundHeight = parts.bottom});
     outcome.facts = {{"friction that holds, by theory",
                       fmt::format("{:.4f}", std::tan(theory.lead()) * std::cos(glm::radians(30.0)))},
                      {"acceleration off theory", fmt::format("{:.2f} %", verdict.acceleration)}};

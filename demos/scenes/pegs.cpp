@@ -1,5 +1,6 @@
 #include "demos/scenes/pegs.h"
 
+#include <BulletCollision/CollisionShapes/btBoxShape.h>
 #include <fmt/core.h>
 
 #include <algorithm>
@@ -9,7 +10,9 @@
 
 #include "collider/mass.h"
 #include "demos/shared/machines.h"
+#include "demos/shared/shapes.h"
 #include "demos/shared/stage.h"
+#include "sdf/mesh_io.h"
 
 namespace bilayer::demo {
 namespace {
@@ -21,20 +24,35 @@ constexpr float margin = 0.1e-3f;  // of contacts [m]
 constexpr float down = 0.1f;       // above the floor at most [voxels]
 constexpr int framesPerMeasuring = 4;
 
+constexpr const char *factoryPeg = "factory_round_peg_8mm_tight.obj",
+                     *factoryPlate = "factory_round_hole_8mm_subdiv_3x.obj";
+constexpr float factoryClearance = 0.1e-3f;  // radii of 4.048 mm between the plate's corners, and 3.9975 mm
+// The plate's mouth has no chamfer, and leaves less to chance.
+constexpr float factoryTilt = 0.1f;      // [degrees]
+constexpr float tableThickness = 5e-3f;  // [m]
+
 constexpr Look blockLook{.colour = 0x9db4d6, .roughness = 0.3f, .opacity = 0.5f};
 constexpr Look pegLook{.colour = 0xe07a5f, .roughness = 0.35f, .metalness = 0.3f};
 
 // A peg and the block that it belongs into.
 struct Lane {
+    std::string name;
     float clearance;
     std::shared_ptr<const Thing> block, peg;
-    std::size_t blockIndex, pegIndex;  // in a frame
+    float mouth;                           // of the hole [m]
+    float aside, tilt;                     // at the start, see PegsOptions
+    std::size_t blockIndex{}, pegIndex{};  // in a frame
 };
 
+Mesh moved(Mesh mesh, float up) {
+    for (glm::vec3& point : mesh.points) point.z += up;
+    return mesh;
+}
+
 // With its lower end above the mouth, aside of the hole's axis, and turned about that end.
-Pose startOf(const shapes::Peg& part, float mouth, const PegsOptions& options) {
-    const glm::quat turn = glm::angleAxis(glm::radians(options.tilt), glm::normalize(glm::vec3(1, 2, 0)));
-    const glm::vec3 end(part.clearance / 2 + options.aside, 0, mouth + above);
+Pose startOf(const shapes::Peg& part, float mouth, float aside, float tilt) {
+    const glm::quat turn = glm::angleAxis(glm::radians(tilt), glm::normalize(glm::vec3(1, 2, 0)));
+    const glm::vec3 end(part.clearance / 2 + aside, 0, mouth + above);
     return {end + turn * glm::vec3(0, 0, part.length / 2), turn};
 }
 
@@ -57,6 +75,10 @@ double deepestOf(const Lane& lane, const std::vector<std::vector<Pose>>& frames)
 
 }  // namespace
 
+bool hasFactoryPeg(const std::filesystem::path& folder) {
+    return std::filesystem::exists(folder / factoryPeg) && std::filesystem::exists(folder / factoryPlate);
+}
+
 Outcome pegs(const PegsOptions& options) {
     Stage stage("Pegs in holes", {.stepsPerSecond = options.stepsPerSecond, .framesPerMeasuring = framesPerMeasuring});
     stage.world().bullet().getSolverInfo().m_numIterations = options.iterations;
@@ -66,18 +88,34 @@ Outcome pegs(const PegsOptions& options) {
     const float mouth = blockPart.height / 2, floor = blockPart.floor - mouth;
 
     std::vector<Lane> lanes;
-    for (std::size_t i = 0; i < options.clearances.size(); ++i) {
-        const shapes::Peg part{.clearance = options.clearances[i]};
-        const auto peg = makeThing(shapes::peg(part), things);
-        const glm::vec3 place(lane * (float(i) - 0.5f * float(options.clearances.size() - 1)), 0, 0);
-        Pose pose = startOf(part, mouth, options);
+    for (const float clearance : options.clearances)
+        lanes.push_back({fmt::format("{:g} mm", 1e3f * clearance), clearance, block,
+                         makeThing(shapes::peg({.clearance = clearance}), things), mouth, options.aside, options.tilt});
+    std::shared_ptr<const Thing> table;
+    if (!options.factory.empty()) {
+        const Mesh plate = moved(readMesh(options.factory / factoryPlate), floor);
+        const Mesh peg = moved(readMesh(options.factory / factoryPeg), -shapes::Peg{}.length / 2);
+        lanes.push_back({"Factory", factoryClearance, makeThing(plate, things), makeThing(peg, things),
+                         bounds(plate).upper.z, 0, factoryTilt});
+        const glm::vec3 half(blockPart.width / 2, blockPart.width / 2, tableThickness / 2);
+        table = makeThing(shapes::box(half), std::make_shared<btBoxShape>(btVector3(half.x, half.y, half.z)),
+                          options.voxelSize);
+    }
+    for (std::size_t i = 0; i < lanes.size(); ++i) {
+        Lane& each = lanes[i];
+        const glm::vec3 place(lane * (float(i) - 0.5f * float(lanes.size() - 1)), 0, 0);
+        Pose pose = startOf({.clearance = each.clearance}, each.mouth, each.aside, each.tilt);
         pose.position += place;
-        stage.add(block, {.friction = 1}, {place}, blockLook);
-        const float mass = density * float(massProperties(peg->mesh).volume);
-        btRigidBody& body = stage.add(
-            peg, {.mass = mass, .friction = options.friction, .linearDamping = 0, .angularDamping = 0}, pose, pegLook);
+        each.blockIndex = 2 * i;
+        each.pegIndex = 2 * i + 1;
+        stage.add(each.block, {.friction = 1}, {place}, blockLook);
+        const float mass = density * float(massProperties(each.peg->mesh).volume);
+        btRigidBody& body =
+            stage.add(each.peg, {.mass = mass, .friction = options.friction, .linearDamping = 0, .angularDamping = 0},
+                      pose, pegLook);
         body.setActivationState(DISABLE_DEACTIVATION);
-        lanes.push_back({part.clearance, block, peg, 2 * i, 2 * i + 1});
+        if (i + 1 == lanes.size() && table)
+            stage.add(table, {.friction = 1}, {place + glm::vec3(0, 0, floor - tableThickness / 2)}, blockLook);
     }
     const auto isDown = [&](const Lane& each) {
         return lowestOf(each, stage.world().poses()[each.pegIndex]) < floor + down * options.voxelSize;
@@ -95,9 +133,8 @@ Outcome pegs(const PegsOptions& options) {
     for (std::size_t i = 0; i < lanes.size(); ++i) {
         const double depth = deepestOf(lanes[i], stage.frames());
         deepest = worse(deepest, depth);
-        const float gap = 1e3f * lanes[i].clearance;
-        depths += fmt::format("{}{:.3f} at {:g} mm", i > 0 ? ", " : "", depth, gap);
-        arrivals += fmt::format("{}{:.2f} at {:g} mm", i > 0 ? ", " : "", times[i], gap);
+        depths += fmt::format("{}{:.3f} at {}", i > 0 ? ", " : "", depth, lanes[i].name);
+        arrivals += fmt::format("{}{:.2f} at {}", i > 0 ? ", " : "", times[i], lanes[i].name);
     }
     Outcome outcome = stage.finish({.target = {0, 0, mouth},
                                     .distance = lane * float(lanes.size() + 1),

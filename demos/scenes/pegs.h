@@ -2,6 +2,7 @@
 // its way over the chamfers down to the floor.
 #pragma once
 
+#include <filesystem>
 #include <vector>
 
 #include "demos/shared/outcome.h"
@@ -17,9 +18,17 @@ struct PegsOptions {
     float stepsPerSecond = 480;
     int iterations = 100;       ///< of Bullet's solver
     float voxelSize = 0.2e-3f;  ///< [m]
+    /// Where peg and plate of the Factory data set lie, see hasFactoryPeg(): they are played too, the plate on a table
+    /// which is the hole's floor. Empty: parts by formula alone.
+    std::filesystem::path factory{};
 };
 
-/// Criteria: all pegs come down to the floor; none overlaps its block by half its clearance.
+/// Whether a folder holds `factory_round_peg_8mm_tight.obj` and `factory_round_hole_8mm_subdiv_3x.obj`: a clearance of
+/// 0.1 mm. The plate is open by cracks along its edges, so that winding numbers tell its inside.
+bool hasFactoryPeg(const std::filesystem::path& folder);
+
+/// Criteria: all pegs come down to the floor; none overlaps its block by half its clearance. Throws
+/// what readMesh() throws.
 Outcome pegs(const PegsOptions& options);
 
 }  // namespace bilayer::demo

@@ -12,11 +12,13 @@
 #include <chrono>
 #include <new>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "integration/bullet/convert.h"
 #include "integration/bullet/manifolds.h"
 #include "integration/bullet/narrow.h"
+#include "integration/bullet/sampled_pairs.h"
 #include "integration/bullet/shape.h"
 
 namespace bilayer::bullet {
@@ -67,6 +69,12 @@ Side sideOf(const btCollisionObjectWrapper& wrap, float seconds) {
     return {wrap.getCollisionShape(), wrap.getWorldTransform(), wrap.getCollisionObject(), seconds};
 }
 
+/// Up to where contacts are made, at least `margin`.
+float marginOf(const Side& a, const Side& b, float margin) {
+    margin = std::max(margin, b.shape->getMargin());
+    return isField(a.shape) ? std::max(margin, a.shape->getMargin()) : margin;
+}
+
 /// Two overlapping bodies of which B is a field. Collides them without a call that changes anything in Bullet, so that
 /// many pairs can do it at once, and hands the contacts over later.
 class Pair {
@@ -76,13 +84,18 @@ class Pair {
     /// Finds and reduces contacts up to `margin` at least.
     void collide(const Side& a, const Side& b, float margin) {
         contacts_.clear();
-        const auto& field = static_cast<const Shape&>(*b.shape);
-        margin = std::max(margin, field.getMargin());
-        if (isField(a.shape)) margin = std::max(margin, a.shape->getMargin());
-        report_ = find(a, b.placed(), margin, field.sweeps() ? a.motion() : Motion{});
-        found_ = static_cast<int>(contacts_.size());
-        patches_ = reduce(contacts_, patches_);
-        isReady_ = true;
+        const bool follows = static_cast<const Shape&>(*b.shape).sweeps();
+        report_ = find(a, b.placed(), marginOf(a, b, margin), follows ? a.motion() : Motion{});
+        finish();
+    }
+
+    /// The same for two fields whose points have been sampled, as pair number `index`.
+    void collide(const Side& a, const Side& b, const SampledPairs& sampled, std::size_t index) {
+        contacts_.clear();
+        report_ =
+            collideFields(a.placed(), b.placed(), marginOf(a, b, 0), sampled.ofA(index), sampled.ofB(index), contacts_);
+        finish();
+        ++sampled_;
     }
 
     /// Writes what collide() found into the manifolds; once.
@@ -92,6 +105,7 @@ class Pair {
         statistics_.contactsFound += found_;
         for (const Patch& patch : patches_) statistics_.contactsKept += patch.count;
         statistics_.beyondBand += static_cast<int>(report_.beyondBand);
+        statistics_.sampled += sampled_;
         isReady_ = false;
     }
 
@@ -100,6 +114,13 @@ class Pair {
     const Manifolds& manifolds() const { return manifolds_; }
 
   private:
+    void finish() {
+        found_ = static_cast<int>(contacts_.size());
+        patches_ = reduce(contacts_, patches_);
+        isReady_ = true;
+        sampled_ = 0;
+    }
+
     ContactReport find(const Side& a, const Placed& field, float margin, const Motion& motion) {
         if (isField(a.shape)) return collideFields(a.placed(), field, margin, near_, contacts_);
         if (a.shape->getShapeType() == STATIC_PLANE_PROXYTYPE) {
@@ -125,7 +146,7 @@ class Pair {
     std::vector<Contact> contacts_;
     std::vector<Patch> patches_;
     ContactReport report_;
-    int found_ = 0;
+    int found_ = 0, sampled_ = 0;
     bool isReady_ = false;
 };
 
@@ -191,14 +212,17 @@ struct CreateFunction : btCollisionAlgorithmCreateFunc {
 }  // namespace
 
 struct Dispatcher::Functions {
+    explicit Functions(PointSampler sampler) : sampledPairs(std::move(sampler)) {}
+
+    SampledPairs sampledPairs;
     StepState state;
     DispatchStatistics last;
     CreateFunction fieldSecond{true, state};
     CreateFunction fieldFirst{false, state};
 };
 
-Dispatcher::Dispatcher(btCollisionConfiguration* configuration)
-    : btCollisionDispatcher(configuration), functions_(std::make_unique<Functions>()) {
+Dispatcher::Dispatcher(btCollisionConfiguration* configuration, PointSampler sampler)
+    : btCollisionDispatcher(configuration), functions_(std::make_unique<Functions>(std::move(sampler))) {
     registerFields();
 }
 
@@ -230,6 +254,7 @@ void Dispatcher::dispatchAllCollisionPairs(btOverlappingPairCache* cache, const 
     struct Task {
         std::shared_ptr<Pair> pair;
         Side a, b;
+        std::optional<std::size_t> sampled{};  // its number among these pairs
     };
     std::vector<Task> tasks;
     for (int i = 0; i < cache->getNumOverlappingPairs(); ++i) {
@@ -250,7 +275,19 @@ void Dispatcher::dispatchAllCollisionPairs(btOverlappingPairCache* cache, const 
         tasks.push_back({algorithm->pair(), sideOf(straight ? one : two, info.m_timeStep),
                          sideOf(straight ? two : one, info.m_timeStep)});
     }
-    tbb::parallel_for_each(tasks, [](Task& task) { task.pair->collide(task.a, task.b, 0); });
+    SampledPairs& sampled = functions_->sampledPairs;
+    sampled.clear();
+    if (sampled.works())
+        for (Task& task : tasks)
+            if (isField(task.a.shape))
+                task.sampled = sampled.add(task.a.placed(), task.b.placed(), marginOf(task.a, task.b, 0));
+    const bool areSampled = sampled.sample();
+    tbb::parallel_for_each(tasks, [&](Task& task) {
+        if (areSampled && task.sampled)
+            task.pair->collide(task.a, task.b, sampled, *task.sampled);
+        else
+            task.pair->collide(task.a, task.b, 0);
+    });
 
     btCollisionDispatcher::dispatchAllCollisionPairs(cache, info, dispatcher);
 

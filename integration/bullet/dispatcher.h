@@ -6,6 +6,8 @@
 
 #include <memory>
 
+#include "sdf/point_sampler.h"
+
 namespace bilayer::bullet {
 
 /// What the last step's narrow phase did.
@@ -14,6 +16,7 @@ struct DispatchStatistics {
     int contactsFound = 0;  ///< before reduction
     int contactsKept = 0;   ///< handed to the solver
     int beyondBand = 0;     ///< points too deep for the band (see ContactReport)
+    int sampled = 0;        ///< pairs whose points the sampler has sampled, see Dispatcher
     double seconds = 0;     ///< for all of these pairs, Bullet's own included
 };
 
@@ -24,9 +27,14 @@ struct DispatchStatistics {
 /// order: the same bits for any number of threads. Also set
 /// btCollisionWorld::getDispatchInfo().m_deterministicOverlappingPairs where runs that add and remove bodies in another
 /// order must agree.
+///
+/// With a sampler, `openclPointSampler(device)` for example, the points of all pairs of fields are sampled by it, in
+/// one batch, but for those whose motion is to be followed; the contacts are the same, bit by bit, where the device
+/// computes as IEEE 754 has it. Where the sampler fails, the processor takes over for good, in that very step, and a
+/// line on the standard error output says so: DispatchStatistics::sampled is then 0.
 class Dispatcher : public btCollisionDispatcher {
   public:
-    explicit Dispatcher(btCollisionConfiguration* configuration);
+    explicit Dispatcher(btCollisionConfiguration* configuration, PointSampler sampler = {});
     ~Dispatcher() override;
 
     /// Fills Bullet's tables once more. The constructor has done so; btGImpactCollisionAlgorithm::registerAlgorithm

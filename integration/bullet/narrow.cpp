@@ -278,6 +278,13 @@ ContactReport collideFields(const Placed& a, const Placed& b, float margin, Near
     return collide(a, b, options, contacts, &near);
 }
 
+ContactReport collideFields(const Placed& a, const Placed& b, float margin, std::span<const FoundPoint> ofA,
+                            std::span<const FoundPoint> ofB, std::vector<Contact>& contacts) {
+    ContactOptions options = opposition;
+    options.margin = margin;
+    return collideFound(a, b, options, ofA, ofB, contacts);
+}
+
 ContactReport collidePlane(const glm::vec3& normal, float offset, const Motion& motion, const Placed& field,
                            float margin, std::vector<Contact>& contacts) {
     ContactReport report;

@@ -5,6 +5,7 @@
 
 #include <BulletCollision/CollisionShapes/btConcaveShape.h>
 
+#include <span>
 #include <vector>
 
 #include "collider/collider.h"
@@ -17,6 +18,10 @@ namespace bilayer::bullet {
 /// @param near  kept for this pair of bodies from step to step
 ContactReport collideFields(const Placed& a, const Placed& b, float margin, NearPoints& near,
                             std::vector<Contact>& contacts);
+
+/// The same of the points that a sampler has found of A in B's field, and of B in A's.
+ContactReport collideFields(const Placed& a, const Placed& b, float margin, std::span<const FoundPoint> ofA,
+                            std::span<const FoundPoint> ofB, std::vector<Contact>& contacts);
 
 /// Against everything below a plane.
 /// @param normal, offset  in the world: dot(normal, x) <= offset is solid; `normal` of unit length

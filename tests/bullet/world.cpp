@@ -4,13 +4,14 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/vec2.hpp>
+#include <utility>
 
 #include "demos/shared/shapes.h"
 #include "sdf/grids.h"
 
 namespace bilayer::test {
 
-World::World() {
+World::World(PointSampler sampler) : dispatcher(&configuration, std::move(sampler)) {
     dynamics.setGravity({0, 0, -9.81f});
     dynamics.getDispatchInfo().m_deterministicOverlappingPairs = true;
     // Small parts: overlaps of centimetres are not to be answered with speed.

@@ -17,7 +17,8 @@ namespace bilayer::test {
 /// A world with gravity (0, 0, -9.81) m/s^2 that owns its bodies.
 class World {
   public:
-    World();
+    /// @param sampler  of the dispatcher
+    explicit World(PointSampler sampler = {});
     ~World();
 
     /// mass 0: static. The shape must outlive the world.
@@ -27,7 +28,7 @@ class World {
     void run(float seconds);
 
     btDefaultCollisionConfiguration configuration;
-    bullet::Dispatcher dispatcher{&configuration};
+    bullet::Dispatcher dispatcher;
     btDbvtBroadphase broadphase;
     btSequentialImpulseConstraintSolver solver;
     btDiscreteDynamicsWorld dynamics{&dispatcher, &broadphase, &solver, &configuration};

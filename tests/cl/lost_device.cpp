@@ -9,6 +9,7 @@
 
 #include "cl/field.h"
 #include "cl/filler.h"
+#include "cl/point_sampler.h"
 #include "cl/program.h"
 #include "demos/shared/shapes.h"
 #include "sdf/build.h"
@@ -146,4 +147,27 @@ TEST_CASE("a device lost while a field stays on it is an error, too") {
             break;
         }
     }
+}
+
+TEST_CASE("points are sampled again once a device that was lost is back") {
+    const Mesh mesh = shapes::sphere(1.f, 3);
+    const LevelSet levelSet = build(mesh, {.voxelSize = 0.1f});
+    const FieldLayout layout(levelSet);
+    const auto points = [&] {
+        return BallsOfPoints{mesh.points, {{glm::vec3(0), 1, 0, unsigned(mesh.points.size())}}};
+    };
+    const SampledBody bodies[] = {{1, &layout, points}, {2, &layout, points}};
+    const PointQuery queries[] = {{0, 1, glm::mat3(1), {1.5f, 0, 0}, 1, 0.1f},
+                                  {1, 0, glm::mat3(1), {-1.5f, 0, 0}, 1, 0.1f}};
+    const PointSampler sampler = openclPointSampler(openDevice());
+    FoundPoints expected, found;
+    sampler.sample(bodies, queries, expected);
+    REQUIRE(expected.points.size() > 10);
+    failing = kernels;
+    callsLeft = 0;
+    CHECK_THROWS_WITH(sampler.sample(bodies, queries, found),
+                      Contains("clEnqueueNDRangeKernel") && Contains("CL_DEVICE_NOT_AVAILABLE"));
+    callsLeft = INT_MAX;
+    sampler.sample(bodies, queries, found);
+    CHECK(found.begins == expected.begins);
 }

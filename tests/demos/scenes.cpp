@@ -17,11 +17,20 @@
 #include "demos/scenes/spin.h"
 #include "demos/shared/shapes.h"
 #include "demos/shared/stage.h"
+#include "tests/support/support.h"
 
 using namespace bilayer;
 using demo::Outcome;
 
 namespace {
+
+// Checks every criterion of a scene whose threads and bits others have checked.
+void judgeOnce(const Outcome& outcome) {
+    for (const demo::Criterion& criterion : outcome.criteria) {
+        CAPTURE(outcome.title, criterion.name, criterion.value, criterion.limit, criterion.unit);
+        CHECK(criterion.met());
+    }
+}
 
 // Checks every criterion but those known to be missed, and that threads change no bit.
 void judge(const std::function<Outcome()>& scene, const std::set<std::string>& missed = {}) {
@@ -100,6 +109,41 @@ TEST_CASE("nuts run down their bolts by their pitch, or are held by friction") {
     options.stepsPerSecond = 240;
     options.voxelSize = 0.4e-3f;
     judge([&] { return demo::nuts(options); });
+}
+
+TEST_CASE("the nut of Factory runs down its bolt by its pitch, or is held by friction") {
+    const auto path = test::corpusMesh("factory_bolt_m16_loose.obj");
+    if (!path) return;
+    demo::NutsOptions options;
+    options.pairs = 2;
+    options.frictions = {0, 0.1f};
+    options.turns = 1;
+    options.voxelSize = 0.4e-3f;
+    options.factory = path->parent_path();
+    REQUIRE(demo::hasFactoryThread(options.factory));
+    CHECK(!demo::hasFactoryThread(options.factory / "formats"));
+    judgeOnce(demo::nuts(options));
+}
+
+TEST_CASE("the gears of Factory keep their ratio") {
+    const auto path = test::corpusMesh("factory_gear_medium.ply");
+    if (!path) return;
+    demo::GearsOptions options;
+    options.turns = 0.25f;
+    options.stepsPerSecond = 240;
+    options.voxelSize = 0.4e-3f;
+    options.factory = path->parent_path();
+    judgeOnce(demo::gears(options));
+}
+
+TEST_CASE("the peg of Factory finds its way through its plate") {
+    const auto path = test::corpusMesh("factory_round_peg_8mm_tight.obj");
+    if (!path) return;
+    demo::PegsOptions options;
+    options.clearances = {};
+    options.seconds = 0.5f;
+    options.factory = path->parent_path();
+    judgeOnce(demo::pegs(options));
 }
 
 TEST_CASE("gears keep their ratio") {

@@ -1,0 +1,100 @@
+// Points of bodies in the fields of others: what collider/collider.cpp samples, operation by operation. A ball of
+// points that is surely far from the other body is left out as a whole.
+#include "field.cl"
+
+// What the interpolant may be below the distance [voxels], and what rounding adds, generously: who is not left out is
+// sampled.
+#define MOST_INTERPOLATION_ERROR 0.87f
+#define BALL_ROUNDING 0.01f
+
+// A body in the buffers of all.
+typedef struct {
+    Frame frame;
+    ulong directory, centres, values, points, balls;
+} Body;
+
+typedef struct {
+    float linear[9], shift[3], scale, reach;
+    uint body, other;
+    uint firstBall;  // among those of all queries
+} Query;
+
+typedef struct {
+    float centre[3], radius;
+    uint begin, end;
+} Ball;
+
+typedef struct {
+    uint query, point;
+    float distance, gradient[3];
+    uint inBand;
+} Found;
+
+// The columns of a map, one after the other.
+float3 mapped(const Query* query, float3 p) {
+    const float3 a = vload3(0, query->linear), b = vload3(1, query->linear), c = vload3(2, query->linear);
+    return a * p.x + b * p.y + c * p.z + vload3(0, query->shift);
+}
+
+// The query that a ball of the batch is of.
+uint queryOf(global const Query* queries, uint count, uint ball) {
+    uint low = 0, high = count;
+    while (low + 1 < high) {
+        const uint middle = (low + high) / 2;
+        if (queries[middle].firstBall <= ball)
+            low = middle;
+        else
+            high = middle;
+    }
+    return low;
+}
+
+// Whether a ball surely lies outside, farther than `radius` from the surface: Clearance::isOutside() [parts].
+bool isOutside(const Field* field, float3 centre, float radius) {
+    const int3 size = PARTS_ALONG * blocksOf(field);
+    const float3 inBox = clamp(centre, (float3)(0.0f), convert_float3(size));
+    const float3 toBox = centre - inBox;
+    if (dot(toBox, toBox) > radius * radius) return true;
+    const int3 part = min(convert_int3(inBox), size - 1);
+    const float3 way = centre - (convert_float3(part) + 0.5f);
+    const float left = (float)(field->centres[centreOf(part, blocksOf(field))]) * (1.0f / WAY_STEPS) - radius;
+    return left > 0 && dot(way, way) < left * left;
+}
+
+bool isOfInterest(const Field* field, const Query* query, const Ball* ball) {
+    const Frame* frame = &field->frame;
+    const float perPart = (float)(frame->perMetre) / (float)(PART_SIDE);
+    const double3 place = convert_double3(mapped(query, vload3(0, ball->centre))) - vload3(0, frame->origin);
+    const float reach = query->reach * perPart + MOST_INTERPOLATION_ERROR / (float)(PART_SIDE) + BALL_ROUNDING;
+    return !isOutside(field, convert_float3(place) * perPart, ball->radius * query->scale * perPart + reach);
+}
+
+// A work-item looks at some balls in a row: one on GPUs. Answers beyond the capacity are counted only.
+kernel void samplePoints(global const Body* bodies, global const Query* queries, uint queryCount, uint ballCount,
+                         uint ballsPerItem, global const int* directories, global const char* centres,
+                         global const float* values, global const float* points, global const Ball* balls,
+                         uint capacity, global uint* count, global Found* found) {
+    const uint first = (uint)(get_global_id(0)) * ballsPerItem, last = min(ballCount, first + ballsPerItem);
+    if (first >= last) return;
+    uint at = queryOf(queries, queryCount, first);
+    for (uint i = first; i < last; ++i) {
+        while (at + 1 < queryCount && queries[at + 1].firstBall <= i) ++at;
+        const Query query = queries[at];
+        global const Body* other = bodies + query.other;
+        global const Body* body = bodies + query.body;
+        const Field field = {other->frame, directories + other->directory, centres + other->centres,
+                             values + other->values};
+        const Ball ball = balls[body->balls + (i - query.firstBall)];
+        if (!isOfInterest(&field, &query, &ball)) continue;
+        global const float* own = points + 3 * body->points;
+        for (uint p = ball.begin; p < ball.end; ++p) {
+            const Sample sample = sampleAt(&field, mapped(&query, vload3(p, own)));
+            if (!(sample.distance <= query.reach) || (!sample.inBand && !(sample.distance < 0))) continue;
+            const uint place = atomic_inc(count);
+            if (place >= capacity) continue;
+            const Found answer = {at, p, sample.distance,
+                                  {sample.gradient[0], sample.gradient[1], sample.gradient[2]}, sample.inBand};
+            found[place] = answer;
+        }
+    }
+}

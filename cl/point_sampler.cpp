@@ -1,0 +1,281 @@
+// Buffers that hold the bodies of all queries one behind the other grow as bodies come.
+#include "cl/point_sampler.h"
+
+#include <algorithm>
+#include <cstddef>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <stdexcept>
+#include <utility>
+
+#include "cl/memory.h"
+#include "cl/program.h"
+#include "cl/resident.h"
+#include "cl/setup.h"
+#include "cl/timing.h"
+
+namespace bilayer {
+
+extern const char* const point_sampler_cl;  // the text of point_sampler.cl
+
+namespace {
+
+/// Work-items of a group on a GPU, and balls that an item looks at on a processor.
+constexpr std::size_t groupItems = 64, ballsPerProcessorItem = 64;
+/// Room for answers at first, and how much more than needed is taken when it is too small.
+constexpr std::size_t leastAnswers = 1 << 12, growth = 2;
+constexpr const char* ofBodies = "the batch of contacts";
+
+// `Body` of point_sampler.cl.
+struct KernelBody {
+    KernelFrame frame;
+    cl_ulong directory, centres, values, points, balls;
+};
+static_assert(sizeof(KernelBody) == sizeof(KernelFrame) + 5 * sizeof(cl_ulong));
+
+// `Query`.
+struct KernelQuery {
+    cl_float linear[9], shift[3], scale, reach;
+    cl_uint body, other, firstBall;
+
+    KernelQuery(const PointQuery& query, cl_uint firstBall)
+        : shift{query.shift.x, query.shift.y, query.shift.z},
+          scale(query.scale),
+          reach(query.reach),
+          body(query.body),
+          other(query.other),
+          firstBall(firstBall) {
+        for (int i = 0; i < 9; ++i) linear[i] = query.linear[i / 3][i % 3];
+    }
+};
+
+// The kernel reads balls as they lie in the host's memory, and points.
+static_assert(sizeof(PointBall) == 6 * sizeof(cl_float) && sizeof(glm::vec3) == 3 * sizeof(cl_float));
+
+// `Found`.
+struct KernelFound {
+    cl_uint query, point;
+    cl_float distance, gradient[3];
+    cl_uint inBand;
+};
+
+// A buffer that grows and keeps what it holds.
+class Pool {
+  public:
+    /// @return the place of the first element
+    template <class Element>
+    cl_ulong append(std::span<const Element> data, const cl::CommandQueue& queue, DeviceMemory& memory,
+                    Timing& timing) {
+        const std::uint64_t first = used_, bytes = data.size_bytes();
+        reserve(used_ + bytes, queue, memory);
+        if (bytes > 0)
+            queue.enqueueWriteBuffer(buffer_, CL_FALSE, first, bytes, data.data(), nullptr,
+                                     timing.event(Timing::Of::upload));
+        used_ += bytes;
+        return first / sizeof(Element);
+    }
+
+    /// Room for so many bytes at least.
+    void reserve(std::uint64_t bytes, const cl::CommandQueue& queue, DeviceMemory& memory) {
+        if (bytes <= size_) return;
+        const std::uint64_t size = std::max(bytes, growth * size_);
+        cl::Buffer larger = memory.allocate(size, ofBodies);
+        if (used_ > 0) queue.enqueueCopyBuffer(buffer_, larger, 0, 0, used_);
+        queue.finish();
+        memory.free(buffer_);
+        buffer_ = larger;
+        size_ = size;
+    }
+
+    /// Forgets what it holds.
+    void restart() { used_ = 0; }
+    void clear(DeviceMemory& memory) {
+        memory.free(buffer_);
+        used_ = size_ = 0;
+    }
+
+    const cl::Buffer& buffer() const { return buffer_; }
+
+  private:
+    cl::Buffer buffer_;
+    std::uint64_t used_ = 0, size_ = 0;  // bytes
+};
+
+cl::Program samplerProgram(const Device& device) {
+    if (!device.info().doubles)
+        throw DeviceError(device.info().name + " cannot compute in double precision, which samples of fields need");
+    return buildProgram(device.impl(), point_sampler_cl, commonBuildOptions(device.impl()));
+}
+
+class Sampler {
+  public:
+    Sampler(const Device& device, const OpenclOptions& options)
+        : device_(device),
+          times_(options.times),
+          gpuMapping_(wantsGroups(device.impl(), options.mapping)),
+          memory_(device.impl(), memoryBudget(device.impl(), options.memoryMiB)),
+          program_(samplerProgram(device)),
+          queue_(device.impl().context, device.impl().device, CL_QUEUE_PROFILING_ENABLE) {}
+
+    void sample(std::span<const SampledBody> bodies, std::span<const PointQuery> queries, FoundPoints& answers);
+
+  private:
+    // Where a body is.
+    struct Place {
+        KernelBody body;
+        cl_uint balls;
+    };
+
+    void forget();
+    void add(const SampledBody& body, Timing& timing);
+    void keep(std::span<const SampledBody> bodies, Timing& timing);
+    std::vector<KernelFound> found(std::span<const SampledBody> bodies, std::span<const PointQuery> queries,
+                                   Timing& timing);
+    std::vector<KernelFound> run(const std::vector<KernelBody>& bodies, const std::vector<KernelQuery>& queries,
+                                 cl_uint balls, Timing& timing);
+
+    const Device device_;
+    OpenclTimes* const times_;
+    const bool gpuMapping_;
+    DeviceMemory memory_;
+    cl::Program program_;
+    cl::CommandQueue queue_;
+    std::map<std::uint64_t, Place> places_;
+    Pool directories_, centres_, values_, points_, balls_;  // of the bodies
+    Pool bodies_, queries_, count_, answers_;               // of a batch
+    std::size_t capacity_ = leastAnswers;                   // of answers
+    bool failed_ = false;                                   // in the last batch: nobody knows what the buffers hold
+};
+
+void Sampler::forget() {
+    queue_.finish();
+    places_.clear();
+    for (Pool* pool : {&directories_, &centres_, &values_, &points_, &balls_, &bodies_, &queries_, &count_, &answers_})
+        pool->clear(memory_);
+}
+
+void Sampler::add(const SampledBody& body, Timing& timing) {
+    const FieldLayout& field = *body.field;
+    if (field.storage != Storage::float32) throw std::invalid_argument("points are sampled in fields of float32 only");
+    const BallsOfPoints own = body.points();
+    const auto append = [&](Pool& pool, const auto* data, std::size_t count) {
+        return pool.append(std::span(data, count), queue_, memory_, timing);
+    };
+    const KernelBody placed{KernelFrame(field),
+                            append(directories_, field.directory.data(), field.directory.size()),
+                            append(centres_, field.centres.data(), field.centres.size()),
+                            append(values_, field.values.data(), field.values.size()),
+                            append(points_, own.points.data(), own.points.size()),
+                            append(balls_, own.balls.data(), own.balls.size())};
+    queue_.finish();
+    places_.emplace(body.id, Place{placed, cl_uint(own.balls.size())});
+}
+
+// Adds the bodies that are not there; where they do not fit beside the others, all others go.
+void Sampler::keep(std::span<const SampledBody> bodies, Timing& timing) {
+    const auto addMissing = [&] {
+        for (const SampledBody& body : bodies)
+            if (!places_.contains(body.id)) add(body, timing);
+    };
+    if (places_.empty()) return addMissing();
+    try {
+        addMissing();
+    } catch (const DeviceError&) {
+        forget();
+        addMissing();
+    }
+}
+
+// Runs again with more room where there are more answers than expected.
+std::vector<KernelFound> Sampler::run(const std::vector<KernelBody>& bodies, const std::vector<KernelQuery>& queries,
+                                      cl_uint balls, Timing& timing) {
+    const cl_uint none = 0;
+    cl_uint count = 0;
+    std::vector<KernelFound> found;
+    const Ended ended(queue_);
+    for (Pool* pool : {&bodies_, &queries_}) pool->restart();
+    bodies_.append(std::span(bodies), queue_, memory_, timing);
+    queries_.append(std::span(queries), queue_, memory_, timing);
+    count_.reserve(sizeof none, queue_, memory_);
+
+    const std::size_t each = gpuMapping_ ? 1 : ballsPerProcessorItem, local = gpuMapping_ ? groupItems : 1;
+    const std::size_t items = (balls + each - 1) / each, global = (items + local - 1) / local * local;
+    cl::Kernel kernel(program_, "samplePoints");
+    do {
+        answers_.reserve(capacity_ * sizeof(KernelFound), queue_, memory_);
+        cl_uint index = 0;
+        const auto set = [&](const auto&... arguments) { (kernel.setArg(index++, arguments), ...); };
+        set(bodies_.buffer(), queries_.buffer(), cl_uint(queries.size()), balls, cl_uint(each), directories_.buffer(),
+            centres_.buffer(), values_.buffer(), points_.buffer(), balls_.buffer(), cl_uint(capacity_), count_.buffer(),
+            answers_.buffer());
+        queue_.enqueueFillBuffer(count_.buffer(), none, 0, sizeof none);
+        queue_.enqueueNDRangeKernel(kernel, cl::NullRange, cl::NDRange(global), cl::NDRange(local), nullptr,
+                                    timing.event(Timing::Of::kernel));
+        queue_.enqueueReadBuffer(count_.buffer(), CL_TRUE, 0, sizeof count, &count, nullptr,
+                                 timing.event(Timing::Of::download));
+    } while (count > std::exchange(capacity_, std::max<std::size_t>(capacity_, growth * count)));
+    found.resize(count);
+    if (count > 0)
+        queue_.enqueueReadBuffer(answers_.buffer(), CL_TRUE, 0, count * sizeof(KernelFound), found.data(), nullptr,
+                                 timing.event(Timing::Of::download));
+    return found;
+}
+
+std::vector<KernelFound> Sampler::found(std::span<const SampledBody> bodies, std::span<const PointQuery> queries,
+                                        Timing& timing) {
+    keep(bodies, timing);
+    std::vector<KernelBody> kernelBodies;
+    for (const SampledBody& body : bodies) kernelBodies.push_back(places_.at(body.id).body);
+    std::vector<KernelQuery> kernelQueries;
+    cl_uint balls = 0;
+    for (const PointQuery& query : queries) {
+        kernelQueries.emplace_back(query, balls);
+        balls += places_.at(bodies[query.body].id).balls;
+    }
+    if (balls == 0) return {};
+    return run(kernelBodies, kernelQueries, balls, timing);
+}
+
+// The device answers in any order.
+void Sampler::sample(std::span<const SampledBody> bodies, std::span<const PointQuery> queries, FoundPoints& answers) {
+    std::vector<KernelFound> all;
+    Timing timing(times_);
+    try {
+        if (std::exchange(failed_, true)) forget();
+        all = found(bodies, queries, timing);
+        failed_ = false;
+    } catch (const cl::Error& error) {
+        throw deviceError(error, device_.info().name);
+    }
+    timing.sumUp();
+    if (times_) times_->peakBytes = std::max(times_->peakBytes, memory_.peak());
+
+    std::sort(all.begin(), all.end(), [](const KernelFound& a, const KernelFound& b) {
+        return std::pair(a.query, a.point) < std::pair(b.query, b.point);
+    });
+    answers.points.clear();
+    answers.begins.assign(queries.size() + 1, 0);
+    for (const KernelFound& each : all) {
+        ++answers.begins[each.query + 1];
+        const auto& [x, y, z] = each.gradient;
+        answers.points.push_back({each.point, {each.distance, {x, y, z}, each.inBand != 0}});
+    }
+    for (std::size_t q = 0; q < queries.size(); ++q) answers.begins[q + 1] += answers.begins[q];
+}
+
+}  // namespace
+
+PointSampler openclPointSampler(const Device& device, const OpenclOptions& options) try {
+    const auto sampler = std::make_shared<Sampler>(device, options);
+    const auto mutex = std::make_shared<std::mutex>();
+    return {"opencl", device.info().name,
+            [=](std::span<const SampledBody> bodies, std::span<const PointQuery> queries, FoundPoints& answers) {
+                const std::lock_guard lock(*mutex);
+                sampler->sample(bodies, queries, answers);
+            }};
+} catch (const cl::Error& error) {
+    throw deviceError(error, device.info().name);
+}
+
+}  // namespace bilayer
