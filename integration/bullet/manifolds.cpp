@@ -34,7 +34,8 @@ constexpr float tolerance = 1e-3f, toleranceOfPress = tolerance / 4;
 constexpr float tilts[] = {1.f / 8, 1.f / 32, 1.f / 128};
 constexpr float aside = 1.f / 64;
 constexpr int tiltDirections = 8, shiftDirections = 4;
-constexpr float askew = 0.3f;  // [rad]
+constexpr float askew = 0.3f;             // [rad]
+constexpr float measuredTilt = 1.f / 32;  // by which what is lost is measured [rad]
 // More contacts of a patch cost the solver more than they tell it.
 constexpr std::size_t mostOfPatch = 3 * MANIFOLD_CACHE_SIZE;
 
@@ -122,23 +123,32 @@ bool isStill(const std::vector<Contact>& contacts, std::span<const Patch> last) 
     return std::abs(contacts.front().remaining() - before) <= stillness * extentOf(contacts, all);
 }
 
-/// A small motion of A in the axes of a patch.
+/// A small motion of A in the axes of a patch: turned about one along it, or shifted along it and twisted.
 struct Nudge {
     glm::vec2 tilt{0}, shift{0};
     float twist = 0;
 };
 
+glm::vec2 towards(float share) {
+    const float angle = askew + 2 * SIMD_PI * share;
+    return {std::cos(angle), std::sin(angle)};
+}
+
 /// Those that contacts are kept for, in the order in which they choose: what spans the patch comes first.
-std::vector<Nudge> nudges(float turnedBy) {
-    const auto towards = [&](int k, int directions) {
-        const float angle = askew + 2 * SIMD_PI * (float(k) + turnedBy) / float(directions);
-        return glm::vec2(std::cos(angle), std::sin(angle));
-    };
+std::vector<Nudge> nudges() {
     std::vector<Nudge> all;
     for (const float tilt : tilts)
-        for (int k = 0; k < tiltDirections; ++k) all.push_back({.tilt = tilt * towards(k, tiltDirections)});
-    for (int k = 0; k < shiftDirections; ++k) all.push_back({.shift = aside * towards(k, shiftDirections)});
+        for (int k = 0; k < tiltDirections; ++k) all.push_back({.tilt = tilt * towards(float(k) / tiltDirections)});
+    for (int k = 0; k < shiftDirections; ++k) all.push_back({.shift = aside * towards(float(k) / shiftDirections)});
     for (const float twist : {aside, -aside}) all.push_back({.twist = twist});
+    return all;
+}
+
+/// Those in between, by which what is lost is measured.
+std::vector<Nudge> nudgesBetween() {
+    std::vector<Nudge> all;
+    for (int k = 0; k < tiltDirections; ++k)
+        all.push_back({.tilt = measuredTilt * towards((float(k) + 0.5f) / tiltDirections)});
     return all;
 }
 
@@ -146,7 +156,8 @@ std::vector<Nudge> nudges(float turnedBy) {
 /// the contact's wrench. Of each kind of number a column, padded so that processors take several contacts at once.
 class Gaps {
   public:
-    Gaps(const std::vector<Contact>& contacts, const Group& group) : count_(group.size()), extent_(0) {
+    Gaps(const std::vector<Contact>& contacts, const Group& group)
+        : count_(group.size()), padded_((count_ + lanes - 1) / lanes * lanes), numbers_(columns * padded_, 0.f) {
         glm::vec3 normal(0), centre(0);
         for (const std::uint32_t i : group) normal += contacts[i].normal, centre += contacts[i].position;
         normal = glm::normalize(normal);
@@ -154,35 +165,35 @@ class Gaps {
         extent_ = extentOf(contacts, group);
         btVector3 first, second;
         btPlaneSpace1(toBullet(normal), first, second);
-        const std::size_t padded = (count_ + lanes - 1) / lanes * lanes;
-        for (std::vector<float>& column : columns_) column.resize(padded);
-        now_.resize(padded);
-        std::fill(columns_[gap].begin(), columns_[gap].end(), std::numeric_limits<float>::max());
+        const glm::vec3 x = toGlm(first), y = toGlm(second);
+        std::fill(column(gap) + count_, column(gap) + padded_, std::numeric_limits<float>::max());
         for (std::size_t k = 0; k < count_; ++k) {
             const Contact& contact = contacts[group[k]];
             const glm::vec3 turn = glm::cross(contact.position - centre, contact.normal);
-            columns_[gap][k] = contact.remaining();
-            columns_[tiltX][k] = glm::dot(turn, toGlm(first));
-            columns_[tiltY][k] = glm::dot(turn, toGlm(second));
-            columns_[shiftX][k] = extent_ * glm::dot(contact.normal, toGlm(first));
-            columns_[shiftY][k] = extent_ * glm::dot(contact.normal, toGlm(second));
-            columns_[twist][k] = glm::dot(turn, normal);
+            column(gap)[k] = contact.remaining();
+            column(tiltX)[k] = glm::dot(turn, x);
+            column(tiltY)[k] = glm::dot(turn, y);
+            column(shiftX)[k] = extent_ * glm::dot(contact.normal, x);
+            column(shiftY)[k] = extent_ * glm::dot(contact.normal, y);
+            column(twist)[k] = glm::dot(turn, normal);
         }
     }
 
     /// Moves A. The least gap that there is then.
     float least(const Nudge& nudge) {
-        float found[lanes];
+        const bool tilts = nudge.tilt != glm::vec2(0);
+        const float *gaps = column(gap), *x = column(tilts ? tiltX : shiftX), *y = column(tilts ? tiltY : shiftY),
+                    *turns = column(twist);
+        const glm::vec2 way = tilts ? nudge.tilt : nudge.shift;
+        float *now = column(moved), found[lanes];
         std::fill(found, found + lanes, std::numeric_limits<float>::max());
-        for (std::size_t k = 0; k < now_.size(); k += lanes)
-            for (std::size_t j = 0; j < lanes; ++j) {
-                const std::size_t i = k + j;
-                const float value = columns_[gap][i] + nudge.tilt.x * columns_[tiltX][i] +
-                                    nudge.tilt.y * columns_[tiltY][i] + nudge.shift.x * columns_[shiftX][i] +
-                                    nudge.shift.y * columns_[shiftY][i] + nudge.twist * columns_[twist][i];
-                now_[i] = value;
-                found[j] = value < found[j] ? value : found[j];
-            }
+        for (std::size_t k = 0; k < padded_; k += lanes) {
+            float values[lanes];  // apart from what is read, so that they are computed at once
+            for (std::size_t j = 0; j < lanes; ++j)
+                values[j] = gaps[k + j] + way.x * x[k + j] + way.y * y[k + j] + nudge.twist * turns[k + j];
+            for (std::size_t j = 0; j < lanes; ++j) now[k + j] = values[j];
+            for (std::size_t j = 0; j < lanes; ++j) found[j] = values[j] < found[j] ? values[j] : found[j];
+        }
         return *std::min_element(found, found + lanes);
     }
 
@@ -190,31 +201,33 @@ class Gaps {
     std::pair<float, std::uint32_t> leastOf(const std::vector<std::uint32_t>& some) const {
         std::pair<float, std::uint32_t> best{std::numeric_limits<float>::max(), 0};
         for (const std::uint32_t k : some)
-            if (now_[k] < best.first) best = {now_[k], k};
+            if (const float now = numbers_[moved * padded_ + k]; now < best.first) best = {now, k};
         return best;
     }
 
     /// The first contact whose gap that is after the last motion.
     std::uint32_t with(float gap) const {
-        return std::uint32_t(std::find(now_.begin(), now_.begin() + std::ptrdiff_t(count_), gap) - now_.begin());
+        const float* now = numbers_.data() + moved * padded_;
+        return std::uint32_t(std::find(now, now + count_, gap) - now);
     }
 
     float extent() const { return extent_; }
 
   private:
     static constexpr std::size_t lanes = 8;
-    enum Column { gap, tiltX, tiltY, shiftX, shiftY, twist, columns };
-    std::size_t count_;
-    float extent_;
-    std::array<std::vector<float>, columns> columns_;
-    std::vector<float> now_;
+    enum Column { gap, tiltX, tiltY, shiftX, shiftY, twist, moved, columns };
+    float* column(Column which) { return numbers_.data() + which * padded_; }
+
+    std::size_t count_, padded_;
+    std::vector<float> numbers_;  ///< column by column
+    float extent_ = 0;
 };
 
 /// The contacts of a group that some small motion of the bodies meets first.
 /// @param lost  is raised to what other motions meet before them [m]
 std::vector<std::uint32_t> firstMet(const std::vector<Contact>& contacts, const Group& group, const Memory& memory,
                                     float& lost) {
-    static const std::vector<Nudge> chosenFor = nudges(0), between = nudges(0.5f);
+    static const std::vector<Nudge> chosenFor = nudges(), between = nudgesBetween();
     Gaps gaps(contacts, group);
     std::vector<std::uint32_t> before, kept;
     for (std::uint32_t k = 0; k < group.size(); ++k)

@@ -22,7 +22,7 @@ struct Patch {
 struct Reduced {
     std::vector<Patch> patches;
     /// How deep a contact that was left out could come in a small motion of the bodies before one that was kept is met
-    /// [m]: the worst over motions that lie between those that contacts were chosen for.
+    /// [m]: the worst over tilts of 1/32 rad about axes between those that contacts were chosen for.
     float lost = 0;
 };
 
