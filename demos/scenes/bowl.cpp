@@ -124,6 +124,7 @@ Outcome bowl(const BowlOptions& options) {
     const std::chrono::duration<double> built = std::chrono::steady_clock::now() - start;
 
     Stage stage(fmt::format("{} bodies in a bowl", options.bodies), {.framesPerMeasuring = 30});
+    stage.world().bullet().getSolverInfo().m_numIterations = options.iterations;
     stage.add(vessel, {}, {}, bowlLook);
     const Matter matter{.mass = 1, .restingSpeed = restingSpeed, .restingSpin = restingSpin};
     std::vector<btRigidBody*> bodies;

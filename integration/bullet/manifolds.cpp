@@ -269,7 +269,8 @@ btVector3 driftOf(const btManifoldPoint& point, const btPersistentManifold& mani
     const btVector3 drift = along(manifold.getBody0()->getWorldTransform() * point.m_localPointA -
                                       manifold.getBody1()->getWorldTransform() * point.m_localPointB,
                                   point.m_normalWorldOnB);
-    const float friction = std::hypot(point.m_appliedImpulseLateral1, point.m_appliedImpulseLateral2);
+    // Bullet bounds friction in each of its directions by itself
+    const float friction = std::max(std::abs(point.m_appliedImpulseLateral1), std::abs(point.m_appliedImpulseLateral2));
     if (friction >= held * point.m_combinedFriction * point.m_appliedImpulse) {
         const btVector3 before = point.m_positionWorldOnA - point.m_positionWorldOnB;
         most = std::min(most, float(along(before, point.m_normalWorldOnB).length()));
