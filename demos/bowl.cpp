@@ -12,6 +12,7 @@ int main(int argc, char** argv) {
     program.option("--seconds", options.seconds, "most seconds to simulate")->check(CLI::Range(0.1, 1000.0));
     program.option("--hold", options.hold, "seconds to go on with all kept awake")->check(CLI::Range(0.0, 1000.0));
     program.option("--resolution", options.resolution, "voxels along a body")->check(CLI::Range(16, 1024));
+    program.option("--iterations", options.iterations, "of Bullet's solver")->check(CLI::Range(1, 10000));
     program.option("--seed", options.seed, "of the first poses");
     return program.run(argc, argv, [&] {
         options.kinds.clear();

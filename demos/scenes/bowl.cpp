@@ -34,8 +34,8 @@ constexpr float usualBodiesPerLayer = 5;
 constexpr float layerRadius = 0.26f;  // of a layer's ring, in the bowl for thirty [m]
 constexpr float layerHeight = 0.26f;  // between layers at the start: more than any body is long [m]
 constexpr float lastLook = 0.5f;      // how long the recording goes on when all is at rest [s]
-// between surface points; the finest part of a bunny, its ears, is 8 of its voxels thick [voxels of the body's own]
-constexpr float bodySpacing = 4, bowlSpacing = 2;
+// A heap at rest trembles by far less; what still rolls as slowly as bodies may elsewhere goes on when it is woken.
+constexpr float restingSpeed = 0.02f, restingSpin = 0.2f;  // [m/s], [rad/s]
 // at 6 m/s a bunny moves 16 of its voxels in one step: the bands must still hold it then [voxels]
 constexpr float bodyInteriorWidth = 20, bowlInteriorWidth = 6;
 
@@ -48,7 +48,7 @@ constexpr std::uint32_t colours[] = {0xe07a5f, 0xf2cc8f, 0x81b29a, 0xf4f1de, 0x9
 
 std::shared_ptr<const Thing> bodyOf(const Kind& kind, float resolution) {
     const glm::mat4 toSize = glm::scale(glm::mat4(1), glm::vec3(bodySize / bounds(kind.mesh).longestSide()));
-    return makeThing(transformed(kind.mesh, toSize), {bodySize / resolution, bodyInteriorWidth, bodySpacing});
+    return makeThing(transformed(kind.mesh, toSize), {bodySize / resolution, bodyInteriorWidth});
 }
 
 // Layers above the bowl, each of rings turned against those below, every body turned at random.
@@ -120,16 +120,18 @@ Outcome bowl(const BowlOptions& options) {
     for (const Kind& kind : options.kinds) things.push_back(bodyOf(kind, float(options.resolution)));
     const float radius = scale * bowlRadius, wall = scale * bowlWall;
     const auto vessel = makeThing(shapes::bowl(radius, wall, 192, bowlOpening, scale * bowlFoot),
-                                  {bowlVoxels * things[0]->field.voxelSize(), bowlInteriorWidth, bowlSpacing});
+                                  {bowlVoxels * things[0]->field.voxelSize(), bowlInteriorWidth});
     const std::chrono::duration<double> built = std::chrono::steady_clock::now() - start;
 
     Stage stage(fmt::format("{} bodies in a bowl", options.bodies), {.framesPerMeasuring = 30});
+    stage.world().bullet().getSolverInfo().m_numIterations = options.iterations;
     stage.add(vessel, {}, {}, bowlLook);
+    const Matter matter{.mass = 1, .restingSpeed = restingSpeed, .restingSpin = restingSpin};
     std::vector<btRigidBody*> bodies;
     for (const Pose& pose : startPoses(options, scale)) {
         const std::size_t i = bodies.size();
         const Look look{.colour = colours[i % std::size(colours)], .roughness = 0.55f, .clearcoat = 0.12f};
-        bodies.push_back(&stage.add(things[i % things.size()], {.mass = 1}, pose, look));
+        bodies.push_back(&stage.add(things[i % things.size()], matter, pose, look));
     }
     stage.run(options.seconds, [&] { return stage.allAsleep(); });
     const int awake = stage.world().moving() - stage.world().asleep();

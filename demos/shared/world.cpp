@@ -7,11 +7,6 @@ namespace {
 
 constexpr float gravity = 9.81f;  // [m/s^2]
 
-// Slower than this for two seconds, bodies that touch fall asleep together. Bullet's own thresholds (0.8 m/s, 1 rad/s)
-// are for crates and cars: small things that still roll would freeze.
-constexpr float restingSpeed = 0.1f;  // [m/s]
-constexpr float restingSpin = 1;      // [rad/s]
-
 btTransform toTransform(const Pose& pose) {
     const auto& [p, q] = pose;
     return btTransform(btQuaternion(q.x, q.y, q.z, q.w), btVector3(p.x, p.y, p.z));
@@ -54,8 +49,8 @@ btRigidBody& World::add(std::shared_ptr<btCollisionShape> shape, const Matter& m
     info.m_restitution = matter.restitution;
     info.m_linearDamping = matter.linearDamping;
     info.m_angularDamping = matter.angularDamping;
-    info.m_linearSleepingThreshold = restingSpeed;
-    info.m_angularSleepingThreshold = restingSpin;
+    info.m_linearSleepingThreshold = matter.restingSpeed;
+    info.m_angularSleepingThreshold = matter.restingSpin;
     bodies_.push_back({std::move(shape), std::make_unique<btRigidBody>(info)});
     world_.addRigidBody(bodies_.back().body.get());
     return *bodies_.back().body;

@@ -24,6 +24,9 @@ struct Matter {
     float restitution = 0;
     /// What air and soft surfaces take: a share of the speed and of the spin a second.
     float linearDamping = 0.05f, angularDamping = 0.2f;
+    /// Slower than this for two seconds, bodies that touch fall asleep together [m/s], [rad/s]. Bullet's own thresholds
+    /// (0.8 m/s, 1 rad/s) are for crates and cars: small things that still roll would freeze.
+    float restingSpeed = 0.1f, restingSpin = 1;
 };
 
 /// Of a body that moves, by translation and rotation [J].

@@ -100,10 +100,11 @@ class Pair {
 
     /// Writes what collide() found into the manifolds; once.
     void commit(const btCollisionObject& a, const btCollisionObject& b, float sameWithin, btManifoldResult& result) {
-        manifolds_.write(patches_, a, b, sameWithin, result);
+        manifolds_.write(reduced_.patches, a, b, sameWithin, result);
         ++statistics_.pairs;
         statistics_.contactsFound += found_;
-        for (const Patch& patch : patches_) statistics_.contactsKept += patch.count;
+        for (const Patch& patch : reduced_.patches) statistics_.contactsKept += patch.count;
+        statistics_.lost = std::max(statistics_.lost, reduced_.lost);
         statistics_.beyondBand += static_cast<int>(report_.beyondBand);
         statistics_.sampled += sampled_;
         isReady_ = false;
@@ -116,7 +117,7 @@ class Pair {
   private:
     void finish() {
         found_ = static_cast<int>(contacts_.size());
-        patches_ = reduce(contacts_, patches_);
+        reduced_ = reduce(contacts_, reduced_.patches);
         isReady_ = true;
         sampled_ = 0;
     }
@@ -144,7 +145,7 @@ class Pair {
     std::optional<Convex> convex_;  ///< of A
     NearPoints near_;               ///< of two fields
     std::vector<Contact> contacts_;
-    std::vector<Patch> patches_;
+    Reduced reduced_;
     ContactReport report_;
     int found_ = 0, sampled_ = 0;
     bool isReady_ = false;

@@ -15,9 +15,12 @@ struct DispatchStatistics {
     int pairs = 0;          ///< pairs with a field in them that were awake and whose boxes overlapped
     int contactsFound = 0;  ///< before reduction
     int contactsKept = 0;   ///< handed to the solver
-    int beyondBand = 0;     ///< points too deep for the band (see ContactReport)
-    int sampled = 0;        ///< pairs whose points the sampler has sampled, see Dispatcher
-    double seconds = 0;     ///< for all of these pairs, Bullet's own included
+    /// What that took off the contacts' effect: of all pairs, how deep a contact that was left out could come before
+    /// one that was kept is met [m]
+    float lost = 0;
+    int beyondBand = 0;  ///< points too deep for the band (see ContactReport)
+    int sampled = 0;     ///< pairs whose points the sampler has sampled, see Dispatcher
+    double seconds = 0;  ///< for all of these pairs, Bullet's own included
 };
 
 /// Use it in place of btCollisionDispatcher: fields then collide with every convex shape, planes, triangle meshes,

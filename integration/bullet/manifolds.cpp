@@ -18,21 +18,30 @@ namespace {
 constexpr float sameDirection = 0.9f;
 // More patches than any resting body needs; contacts of further directions join the patch that suits them best.
 constexpr std::size_t mostPatches = 8;
-// Of two contacts, the one that is deeper by d is preferred up to this many times d nearer to the others: overlap that
-// is left out of a patch is not resolved.
-constexpr float depthWeight = 8;
 // A patch of the last step goes on until its normal is within about 15 degrees of another's.
 constexpr float mergedDirection = 0.966f;
-// A contact that was kept in the last step is preferred up to this part of its patch's extent farther in: which of two
-// that are nearly as good is the better one is a matter of rounding, and bodies would tremble with each change.
-constexpr float loyalty = 0.1f;
-// All this holds for bodies about at rest: when the deepest overlap has changed by less than this part of the contacts'
-// extent in one step. In an impact every contact is judged anew.
+// Contacts that were kept in the last step are preferred, and patches keep their places, for bodies about at rest: when
+// the deepest overlap has changed by less than this part of the contacts' extent in one step. In an impact every
+// contact is judged anew.
 constexpr float stillness = 3e-3f;
-// Where a patch is flatter than this part of its extent, the deepest contact is a matter of rounding.
-constexpr float flatness = 1e-3f;
-// Four sides of a patch, askew to everything one models: a rectangle's corners are then each alone on their side.
-constexpr glm::vec2 sides[] = {{0.87f, 0.49f}, {-0.49f, 0.87f}, {-0.87f, -0.49f}, {0.49f, -0.87f}};
+// What is met sooner than the contacts that are kept by less than this need not be kept itself, and what was kept in
+// the last step is kept again [parts of the extent]: which of several is met first is then a matter of rounding, and
+// bodies would tremble with each change. Of a mere press it is less: the deepest overlap is what pushes bodies apart.
+constexpr float tolerance = 1e-3f, toleranceOfPress = tolerance / 4;
+// The small motions that contacts are kept for: tilts from those of a fall to those of rest [rad], shifts aside [parts
+// of the extent] and twists [rad]. Their directions are askew to everything one models: a rectangle's corners are then
+// each met first by themselves.
+constexpr float tilts[] = {1.f / 8, 1.f / 32, 1.f / 128};
+constexpr float aside = 1.f / 64;
+constexpr int tiltDirections = 8, shiftDirections = 4;
+constexpr float askew = 0.3f;             // [rad]
+constexpr float measuredTilt = 1.f / 32;  // by which what is lost is measured [rad]
+// More contacts of a patch cost the solver more than they tell it.
+constexpr std::size_t mostOfPatch = 3 * MANIFOLD_CACHE_SIZE;
+
+// Friction holds below this part of the most that it can bear. What has drifted farther than this along the surface
+// stays where it is [parts of the distance within which contacts are the same].
+constexpr float held = 0.98f, mostDrift = 0.25f;
 
 /// Contacts of one patch, as indices in ascending order of the distance that remains.
 using Group = std::vector<std::uint32_t>;
@@ -114,57 +123,128 @@ bool isStill(const std::vector<Contact>& contacts, std::span<const Patch> last) 
     return std::abs(contacts.front().remaining() - before) <= stillness * extentOf(contacts, all);
 }
 
-/// The contact of the group that lies farthest in a direction, depth and a bonus weighing in.
-std::uint32_t farthest(const std::vector<Contact>& contacts, const Group& group, const std::vector<float>& bonus,
-                       const glm::vec3& direction) {
-    std::uint32_t best = group.front();
-    float bestScore = -std::numeric_limits<float>::max();
-    for (std::size_t k = 0; k < group.size(); ++k) {
-        const Contact& contact = contacts[group[k]];
-        const float score = glm::dot(contact.position, direction) - depthWeight * contact.remaining() + bonus[k];
-        if (score > bestScore) best = group[k], bestScore = score;
-    }
-    return best;
+/// A small motion of A in the axes of a patch: turned about one along it, or shifted along it and twisted.
+struct Nudge {
+    glm::vec2 tilt{0}, shift{0};
+    float twist = 0;
+};
+
+glm::vec2 towards(float share) {
+    const float angle = askew + 2 * SIMD_PI * share;
+    return {std::cos(angle), std::sin(angle)};
 }
 
-/// The contacts farthest to four sides. Of many that are equally deep but for rounding, as under a flat face, these
-/// stay the same from step to step, while the deepest does not; so the deepest only goes in if it is so by more than
-/// that.
-Patch spread(const std::vector<Contact>& contacts, const Group& group, const Memory& memory) {
-    glm::vec3 normal(0);
-    for (std::uint32_t i : group) normal += contacts[i].normal;
-    btVector3 first, second;
-    btPlaneSpace1(toBullet(glm::normalize(normal)), first, second);
+/// Those that contacts are kept for, in the order in which they choose: what spans the patch comes first.
+std::vector<Nudge> nudges() {
+    std::vector<Nudge> all;
+    for (const float tilt : tilts)
+        for (int k = 0; k < tiltDirections; ++k) all.push_back({.tilt = tilt * towards(float(k) / tiltDirections)});
+    for (int k = 0; k < shiftDirections; ++k) all.push_back({.shift = aside * towards(float(k) / shiftDirections)});
+    for (const float twist : {aside, -aside}) all.push_back({.twist = twist});
+    return all;
+}
 
-    const float whole = extentOf(contacts, group);
-    std::vector<float> bonus;
-    for (std::uint32_t i : group) bonus.push_back(memory.kept(contacts[i]) ? loyalty * whole : 0);
+/// Those in between, by which what is lost is measured.
+std::vector<Nudge> nudgesBetween() {
+    std::vector<Nudge> all;
+    for (int k = 0; k < tiltDirections; ++k)
+        all.push_back({.tilt = measuredTilt * towards((float(k) + 0.5f) / tiltDirections)});
+    return all;
+}
 
-    std::vector<std::uint32_t> chosen;
-    for (const glm::vec2& side : sides) {
-        const std::uint32_t i = farthest(contacts, group, bonus, side.x * toGlm(first) + side.y * toGlm(second));
-        if (std::find(chosen.begin(), chosen.end(), i) == chosen.end()) chosen.push_back(i);
-    }
-    const std::uint32_t deepest = group.front();
-    const auto place = [&](std::uint32_t i) { return contacts[i].position; };
-    float extent = 0, depth = std::numeric_limits<float>::max();
-    for (std::uint32_t i : chosen) {
-        extent = std::max(extent, glm::distance(place(i), place(chosen.front())));
-        depth = std::min(depth, contacts[i].remaining());
-    }
-    if (depth - contacts[deepest].remaining() > flatness * extent) {
-        const auto nearer = [&](std::uint32_t i, std::uint32_t j) {
-            return glm::distance(place(i), place(deepest)) < glm::distance(place(j), place(deepest));
-        };
-        if (chosen.size() < MANIFOLD_CACHE_SIZE)
-            chosen.push_back(deepest);
-        else
-            *std::min_element(chosen.begin(), chosen.end(), nearer) = deepest;
+/// How the gaps of a patch's contacts change when A moves: to first order gap + normal . (shift + turn x arm), a row of
+/// the contact's wrench. Of each kind of number a column, padded so that processors take several contacts at once.
+class Gaps {
+  public:
+    Gaps(const std::vector<Contact>& contacts, const Group& group)
+        : count_(group.size()), padded_((count_ + lanes - 1) / lanes * lanes), numbers_(columns * padded_, 0.f) {
+        glm::vec3 normal(0), centre(0);
+        for (const std::uint32_t i : group) normal += contacts[i].normal, centre += contacts[i].position;
+        normal = glm::normalize(normal);
+        centre /= float(count_);
+        extent_ = extentOf(contacts, group);
+        btVector3 first, second;
+        btPlaneSpace1(toBullet(normal), first, second);
+        const glm::vec3 x = toGlm(first), y = toGlm(second);
+        std::fill(column(gap) + count_, column(gap) + padded_, std::numeric_limits<float>::max());
+        for (std::size_t k = 0; k < count_; ++k) {
+            const Contact& contact = contacts[group[k]];
+            const glm::vec3 turn = glm::cross(contact.position - centre, contact.normal);
+            column(gap)[k] = contact.remaining();
+            column(tiltX)[k] = glm::dot(turn, x);
+            column(tiltY)[k] = glm::dot(turn, y);
+            column(shiftX)[k] = extent_ * glm::dot(contact.normal, x);
+            column(shiftY)[k] = extent_ * glm::dot(contact.normal, y);
+            column(twist)[k] = glm::dot(turn, normal);
+        }
     }
 
-    Patch patch;
-    for (std::uint32_t i : chosen) patch.contacts[patch.count++] = contacts[i];
-    return patch;
+    /// Moves A. The least gap that there is then.
+    float least(const Nudge& nudge) {
+        const bool tilts = nudge.tilt != glm::vec2(0);
+        const float *gaps = column(gap), *x = column(tilts ? tiltX : shiftX), *y = column(tilts ? tiltY : shiftY),
+                    *turns = column(twist);
+        const glm::vec2 way = tilts ? nudge.tilt : nudge.shift;
+        float *now = column(moved), found[lanes];
+        std::fill(found, found + lanes, std::numeric_limits<float>::max());
+        for (std::size_t k = 0; k < padded_; k += lanes) {
+            float values[lanes];  // apart from what is read, so that they are computed at once
+            for (std::size_t j = 0; j < lanes; ++j)
+                values[j] = gaps[k + j] + way.x * x[k + j] + way.y * y[k + j] + nudge.twist * turns[k + j];
+            for (std::size_t j = 0; j < lanes; ++j) now[k + j] = values[j];
+            for (std::size_t j = 0; j < lanes; ++j) found[j] = values[j] < found[j] ? values[j] : found[j];
+        }
+        return *std::min_element(found, found + lanes);
+    }
+
+    /// Of some contacts, the least gap after the last motion, and whose it is.
+    std::pair<float, std::uint32_t> leastOf(const std::vector<std::uint32_t>& some) const {
+        std::pair<float, std::uint32_t> best{std::numeric_limits<float>::max(), 0};
+        for (const std::uint32_t k : some)
+            if (const float now = numbers_[moved * padded_ + k]; now < best.first) best = {now, k};
+        return best;
+    }
+
+    /// The first contact whose gap that is after the last motion.
+    std::uint32_t with(float gap) const {
+        const float* now = numbers_.data() + moved * padded_;
+        return std::uint32_t(std::find(now, now + count_, gap) - now);
+    }
+
+    float extent() const { return extent_; }
+
+  private:
+    static constexpr std::size_t lanes = 8;
+    enum Column { gap, tiltX, tiltY, shiftX, shiftY, twist, moved, columns };
+    float* column(Column which) { return numbers_.data() + which * padded_; }
+
+    std::size_t count_, padded_;
+    std::vector<float> numbers_;  ///< column by column
+    float extent_ = 0;
+};
+
+/// The contacts of a group that some small motion of the bodies meets first.
+/// @param lost  is raised to what other motions meet before them [m]
+std::vector<std::uint32_t> firstMet(const std::vector<Contact>& contacts, const Group& group, const Memory& memory,
+                                    float& lost) {
+    static const std::vector<Nudge> chosenFor = nudges(), between = nudgesBetween();
+    Gaps gaps(contacts, group);
+    std::vector<std::uint32_t> before, kept;
+    for (std::uint32_t k = 0; k < group.size(); ++k)
+        if (memory.kept(contacts[group[k]])) before.push_back(k);
+    const auto keep = [&](const Nudge& nudge, float within) {
+        const float least = gaps.least(nudge);
+        if (kept.size() >= mostOfPatch || gaps.leastOf(kept).first <= least + within * gaps.extent()) return;
+        const auto [gap, loyal] = gaps.leastOf(before);
+        kept.push_back(gap <= least + within * gaps.extent() ? loyal : gaps.with(least));
+    };
+    for (const Nudge& nudge : chosenFor) keep(nudge, tolerance);
+    keep({}, toleranceOfPress);
+    for (const Nudge& nudge : between) {
+        const float least = gaps.least(nudge);
+        lost = std::max(lost, gaps.leastOf(kept).first - least);
+    }
+    return kept;
 }
 
 /// Bullet's callbacks for the start of contact would run each time a manifold is filled anew.
@@ -179,17 +259,45 @@ class StartSilenced {
     ContactStartedCallback callback_;
 };
 
+btVector3 along(const btVector3& way, const btVector3& normal) {
+    return way - normal.dot(way) * normal;
+}
+
+/// How far the two places that once touched have moved apart along the surface, as far as friction is to pull them
+/// back. Where it did not hold them, that is no more than before.
+btVector3 driftOf(const btManifoldPoint& point, const btPersistentManifold& manifold, float most) {
+    const btVector3 drift = along(manifold.getBody0()->getWorldTransform() * point.m_localPointA -
+                                      manifold.getBody1()->getWorldTransform() * point.m_localPointB,
+                                  point.m_normalWorldOnB);
+    // Bullet bounds friction in each of its directions by itself
+    const float friction = std::max(std::abs(point.m_appliedImpulseLateral1), std::abs(point.m_appliedImpulseLateral2));
+    if (friction >= held * point.m_combinedFriction * point.m_appliedImpulse) {
+        const btVector3 before = point.m_positionWorldOnA - point.m_positionWorldOnB;
+        most = std::min(most, float(along(before, point.m_normalWorldOnB).length()));
+    }
+    const float length = drift.length();
+    return length > most ? most / length * drift : drift;
+}
+
 }  // namespace
 
-std::vector<Patch> reduce(std::vector<Contact>& contacts, std::span<const Patch> last) {
+Reduced reduce(std::vector<Contact>& contacts, std::span<const Patch> last) {
     std::stable_sort(contacts.begin(), contacts.end(),
                      [](const Contact& a, const Contact& b) { return a.remaining() < b.remaining(); });
     if (!isStill(contacts, last)) last = {};
-    std::vector<Patch> patches;
+    Reduced result;
     const Memory memory(last);
-    for (const Group& group : groupByNormal(contacts, seedsOf(contacts, last)))
-        patches.push_back(spread(contacts, group, memory));
-    return patches;
+    for (const Group& group : groupByNormal(contacts, seedsOf(contacts, last))) {
+        std::vector<std::uint32_t> kept(group.size());
+        std::iota(kept.begin(), kept.end(), 0u);
+        if (group.size() > MANIFOLD_CACHE_SIZE) kept = firstMet(contacts, group, memory, result.lost);
+        for (std::size_t k = 0; k < kept.size(); ++k) {
+            if (k % MANIFOLD_CACHE_SIZE == 0) result.patches.emplace_back();
+            Patch& patch = result.patches.back();
+            patch.contacts[std::size_t(patch.count++)] = contacts[group[kept[k]]];
+        }
+    }
+    return result;
 }
 
 Manifolds::~Manifolds() {
@@ -215,7 +323,7 @@ void Manifolds::write(std::span<const Patch> patches, const btCollisionObject& a
         result.setPersistentManifold(manifold);
         if (m < patches.size())
             for (int i = 0; i < patches[m].count; ++i) emit(patches[m].contacts[i], aIsFirst, sameWithin, result);
-        for (int i = 0; i < manifold->getNumContacts(); ++i) inherit(manifold->getContactPoint(i), sameWithin);
+        for (int i = 0; i < manifold->getNumContacts(); ++i) inherit(*manifold, i, sameWithin);
         manifold->setContactBreakingThreshold(sameWithin);
         if (touched && manifold->getNumContacts() == 0 && gContactEndedCallback) gContactEndedCallback(manifold);
     }
@@ -245,7 +353,9 @@ void Manifolds::emit(const Contact& contact, bool aIsFirst, float sameWithin, bt
     point.m_localPointA = manifold.getBody0()->getWorldTransform().invXform(point.m_positionWorldOnA);
 }
 
-void Manifolds::inherit(btManifoldPoint& point, float sameWithin) {
+void Manifolds::inherit(btPersistentManifold& manifold, int index, float sameWithin) {
+    btManifoldPoint& point = manifold.getContactPoint(index);
+    point.m_contactPointFlags |= BT_CONTACT_FLAG_FRICTION_ANCHOR;
     float nearest = sameWithin * sameWithin;
     auto source = old_.end();
     for (auto it = old_.begin(); it != old_.end(); ++it) {
@@ -261,6 +371,8 @@ void Manifolds::inherit(btManifoldPoint& point, float sameWithin) {
     point.m_prevRHS = source->m_prevRHS;
     point.m_lifeTime = source->m_lifeTime + 1;
     point.m_userPersistentData = source->m_userPersistentData;
+    point.m_positionWorldOnA += along(driftOf(*source, manifold, mostDrift * sameWithin), point.m_normalWorldOnB);
+    point.m_localPointA = manifold.getBody0()->getWorldTransform().invXform(point.m_positionWorldOnA);
     *source = old_.back();
     old_.pop_back();
 }

@@ -12,23 +12,33 @@
 
 namespace bilayer::bullet {
 
-/// Contacts with about the same normal: those farthest to four sides, and the deepest.
+/// Contacts with about the same normal, as many as one manifold holds.
 struct Patch {
     std::array<Contact, MANIFOLD_CACHE_SIZE> contacts;
     int count = 0;
 };
 
-/// Divides contacts into patches by their normals and keeps up to four a patch. Deterministic: depends on the contacts,
-/// their order and `last` only. The patch of the deepest contact of all comes first if there was none in the last step.
-/// `contacts` is left in another order.
-/// @param last  the result for the same pair in the last step, or nothing: while the bodies hardly move, patches keep
-/// their places, and of contacts
-///              that are nearly as good, those that were kept then are kept again
-std::vector<Patch> reduce(std::vector<Contact>& contacts, std::span<const Patch> last = {});
+/// What is left of a pair's contacts.
+struct Reduced {
+    std::vector<Patch> patches;
+    /// How deep a contact that was left out could come in a small motion of the bodies before one that was kept is met
+    /// [m]: the worst over tilts of 1/32 rad about axes between those that contacts were chosen for.
+    float lost = 0;
+};
+
+/// Divides contacts by their normals and keeps of each such patch those that any small motion of the bodies (a press,
+/// tilts about all axes along the patch, shifts and twists) meets first, up to twelve: the gap of a contact changes by
+/// the product of its wrench and the motion, so that these bear the same loads as all of them, but for what `lost`
+/// tells. Deterministic: depends on the contacts, their order and `last` only. The patch of the deepest contact of all
+/// comes first if there was none in the last step. `contacts` is left in another order.
+/// @param last  the patches of the same pair in the last step, or nothing: while the bodies hardly move, patches keep
+///              their places, and of contacts that are nearly as good, those that were kept then are kept again
+Reduced reduce(std::vector<Contact>& contacts, std::span<const Patch> last = {});
 
 /// The manifolds of one pair of bodies, one for each patch. Contacts are written anew each step, since Bullet refreshes
 /// the positions of old ones but not their normals; impulses are handed on to the new contacts nearest the old ones,
-/// and so the solver starts warm.
+/// and so the solver starts warm. Contacts that friction holds are anchored: what they drift along the surface in spite
+/// of it, they are pulled back by btContactSolverInfo::m_frictionERP (0: not at all), so that heaps do not creep.
 class Manifolds {
   public:
     explicit Manifolds(btDispatcher& dispatcher) : dispatcher_(dispatcher) {}
@@ -47,7 +57,7 @@ class Manifolds {
 
   private:
     void emit(const Contact& contact, bool aIsFirst, float sameWithin, btManifoldResult& result);
-    void inherit(btManifoldPoint& point, float sameWithin);
+    void inherit(btPersistentManifold& manifold, int index, float sameWithin);
 
     btDispatcher& dispatcher_;
     std::vector<btPersistentManifold*> manifolds_;
