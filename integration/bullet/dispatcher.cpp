@@ -192,6 +192,7 @@ struct CreateFunction : btCollisionAlgorithmCreateFunc {
 
 struct Dispatcher::Functions {
     StepState state;
+    bool foresees = true;
     DispatchStatistics last;
     CreateFunction fieldSecond{true, state};
     CreateFunction fieldFirst{false, state};
@@ -225,7 +226,8 @@ void Dispatcher::registerFields() {
 void Dispatcher::dispatchAllCollisionPairs(btOverlappingPairCache* cache, const btDispatcherInfo& info,
                                            btDispatcher* dispatcher) {
     const auto start = std::chrono::steady_clock::now();
-    functions_->state = {.running = {}, .seconds = info.m_timeStep};
+    const float seconds = functions_->foresees ? info.m_timeStep : 0;
+    functions_->state = {.running = {}, .seconds = seconds};
 
     struct Task {
         std::shared_ptr<Pair> pair;
@@ -247,8 +249,8 @@ void Dispatcher::dispatchAllCollisionPairs(btOverlappingPairCache* cache, const 
         const auto* algorithm = dynamic_cast<Algorithm*>(overlap.m_algorithm);
         if (!algorithm || locks(one.getCollisionShape()) || locks(two.getCollisionShape())) continue;
         const bool straight = algorithm->bIsSecond();
-        tasks.push_back({algorithm->pair(), sideOf(straight ? one : two, info.m_timeStep),
-                         sideOf(straight ? two : one, info.m_timeStep)});
+        tasks.push_back(
+            {algorithm->pair(), sideOf(straight ? one : two, seconds), sideOf(straight ? two : one, seconds)});
     }
     tbb::parallel_for_each(tasks, [](Task& task) { task.pair->collide(task.a, task.b, 0); });
 
@@ -258,6 +260,10 @@ void Dispatcher::dispatchAllCollisionPairs(btOverlappingPairCache* cache, const 
     functions_->state.seconds = 0;
     functions_->last = functions_->state.running;
     functions_->last.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+void Dispatcher::foresee(bool motions) {
+    functions_->foresees = motions;
 }
 
 const DispatchStatistics& Dispatcher::statistics() const {

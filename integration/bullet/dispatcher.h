@@ -36,6 +36,10 @@ class Dispatcher : public btCollisionDispatcher {
     void dispatchAllCollisionPairs(btOverlappingPairCache* pairs, const btDispatcherInfo& info,
                                    btDispatcher* dispatcher) override;
 
+    /// Whether contacts are made of what the bodies' motions are going to meet (see ShapeOptions::sweeps); so it is
+    /// unless a NoPassing looks after the world.
+    void foresee(bool motions);
+
     const DispatchStatistics& statistics() const;
 
   private:

@@ -392,10 +392,12 @@ float leastMargin(const btCollisionObjectArray& objects) {
 
 NoPassing::NoPassing(btDynamicsWorld& world) : world_(world) {
     world_.addAction(this);
+    if (auto* dispatcher = dynamic_cast<Dispatcher*>(world_.getDispatcher())) dispatcher->foresee(false);
 }
 
 NoPassing::~NoPassing() {
     world_.removeAction(this);
+    if (auto* dispatcher = dynamic_cast<Dispatcher*>(world_.getDispatcher())) dispatcher->foresee(true);
 }
 
 namespace {
