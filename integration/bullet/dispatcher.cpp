@@ -133,6 +133,16 @@ class Pair {
 struct StepState {
     DispatchStatistics running;  ///< contact tests between steps count here too
     float seconds = 0;           ///< that it takes; 0 between steps
+    bool foresees = true;
+
+    /// How far ahead the motion of two bodies is looked at. A NoPassing does not see what the user moves, nor inside of
+    /// what locks.
+    float ahead(const btCollisionObjectWrapper& a, const btCollisionObjectWrapper& b) const {
+        const auto isLeft = [](const btCollisionObjectWrapper& side) {
+            return side.getCollisionObject()->isKinematicObject() || locks(side.getCollisionShape());
+        };
+        return foresees || isLeft(a) || isLeft(b) ? seconds : 0;
+    }
 };
 
 class Algorithm : public btCollisionAlgorithm {
@@ -151,7 +161,7 @@ class Algorithm : public btCollisionAlgorithm {
                           const btDispatcherInfo&, btManifoldResult* result) override {
         const btCollisionObjectWrapper &a = bIsSecond_ ? *first : *second, &b = bIsSecond_ ? *second : *first;
         if (!pair_->isReady())
-            pair_->collide(sideOf(a, state_.seconds), sideOf(b, state_.seconds),
+            pair_->collide(sideOf(a, state_.ahead(a, b)), sideOf(b, state_.ahead(a, b)),
                            result->m_closestPointDistanceThreshold);
         const float sameWithin = b.getCollisionShape()->getContactBreakingThreshold(gContactBreakingThreshold);
         pair_->commit(*a.getCollisionObject(), *b.getCollisionObject(), sameWithin, *result);
@@ -192,7 +202,6 @@ struct CreateFunction : btCollisionAlgorithmCreateFunc {
 
 struct Dispatcher::Functions {
     StepState state;
-    bool foresees = true;
     DispatchStatistics last;
     CreateFunction fieldSecond{true, state};
     CreateFunction fieldFirst{false, state};
@@ -226,8 +235,7 @@ void Dispatcher::registerFields() {
 void Dispatcher::dispatchAllCollisionPairs(btOverlappingPairCache* cache, const btDispatcherInfo& info,
                                            btDispatcher* dispatcher) {
     const auto start = std::chrono::steady_clock::now();
-    const float seconds = functions_->foresees ? info.m_timeStep : 0;
-    functions_->state = {.running = {}, .seconds = seconds};
+    functions_->state = {.running = {}, .seconds = info.m_timeStep, .foresees = functions_->state.foresees};
 
     struct Task {
         std::shared_ptr<Pair> pair;
@@ -249,8 +257,8 @@ void Dispatcher::dispatchAllCollisionPairs(btOverlappingPairCache* cache, const 
         const auto* algorithm = dynamic_cast<Algorithm*>(overlap.m_algorithm);
         if (!algorithm || locks(one.getCollisionShape()) || locks(two.getCollisionShape())) continue;
         const bool straight = algorithm->bIsSecond();
-        tasks.push_back(
-            {algorithm->pair(), sideOf(straight ? one : two, seconds), sideOf(straight ? two : one, seconds)});
+        const float ahead = functions_->state.ahead(one, two);
+        tasks.push_back({algorithm->pair(), sideOf(straight ? one : two, ahead), sideOf(straight ? two : one, ahead)});
     }
     tbb::parallel_for_each(tasks, [](Task& task) { task.pair->collide(task.a, task.b, 0); });
 
@@ -263,7 +271,7 @@ void Dispatcher::dispatchAllCollisionPairs(btOverlappingPairCache* cache, const 
 }
 
 void Dispatcher::foresee(bool motions) {
-    functions_->foresees = motions;
+    functions_->state.foresees = motions;
 }
 
 const DispatchStatistics& Dispatcher::statistics() const {

@@ -4,6 +4,7 @@
 #include <BulletCollision/BroadphaseCollision/btOverlappingPairCache.h>
 #include <BulletCollision/CollisionShapes/btCompoundShape.h>
 #include <BulletCollision/CollisionShapes/btStaticPlaneShape.h>
+#include <BulletCollision/CollisionShapes/btTriangleCallback.h>
 #include <BulletDynamics/Dynamics/btRigidBody.h>
 #include <LinearMath/btAabbUtil2.h>
 #include <LinearMath/btTransformUtil.h>
@@ -15,6 +16,7 @@
 #include <glm/mat3x3.hpp>
 #include <limits>
 #include <optional>
+#include <type_traits>
 #include <unordered_map>
 #include <vector>
 
@@ -34,9 +36,13 @@ constexpr float allowed = 0.1f;
 constexpr float pieceTurn = 0.1f;
 // A way is surely free as long as nothing is nearer than this [voxels].
 constexpr float nearby = 0.5f;
+// Between points along the edges of convex bodies [voxels].
+constexpr float probeSpacing = 2;
 // What an interpolated distance may be above the true one (see collide()) [voxels].
 constexpr float interpolationError = 0.87f;
-constexpr float flattest = 0.1f;  // a gradient shorter than this tells no direction
+constexpr float steepest = 1.7321f;   // how fast the interpolant may change: by a voxel along each axis at once
+constexpr float leastStride = 0.05f;  // through samples [voxels]
+constexpr float flattest = 0.1f;      // a gradient shorter than this tells no direction
 // Of a way along which something is nearby; what takes longer is looked at point by point, or taken as met.
 constexpr int mostSteps = 64;
 // A body that is held back may be met by another one: pairs are looked at again up to so many times.
@@ -56,13 +62,24 @@ class FieldObstacle {
     float bound(const glm::vec3& point) const {
         return field_.distance(point) - interpolationError * field_.voxelSize();
     }
-    std::optional<Entry> entry(const glm::vec3& from, const glm::vec3& to) const {
-        const auto hit = field_.segment(from, to);
+    std::optional<Entry> entry(const glm::vec3& from, const glm::vec3& to, float radius) const {
+        if (from == to) return overlaps(from, radius) ? std::optional(Entry{from, glm::vec3(0)}) : std::nullopt;
+        if (staysOut(from, to, radius)) return std::nullopt;
+        const glm::vec3 way = to - from;
+        const auto hit =
+            radius > 0 ? field_.sphereCast({from, way, glm::length(way)}, radius) : field_.segment(from, to);
         if (!hit) return std::nullopt;
         return Entry{hit->position, hit->normal};
     }
-    /// The way out of it for a point that is in it; none where that is not known.
-    std::optional<glm::vec3> wayOut(const glm::vec3& point) const {
+    /// The way out of it for a ball that is in it; none where that is not known.
+    std::optional<glm::vec3> wayOut(const glm::vec3& point, float radius) const {
+        if (radius > 0) {
+            const ClosestPoint closest = field_.closest(point, radius);
+            const glm::vec3 way = closest.distance < 0 ? closest.position - point : point - closest.position;
+            const float length = glm::length(way);
+            if (!closest.found || !(length > 0)) return std::nullopt;
+            return (radius - closest.distance) / length * way;
+        }
         const Sample sample = field_.sample(point);
         const float length = glm::length(sample.gradient);
         if (!sample.inBand || length < flattest) return std::nullopt;
@@ -70,15 +87,34 @@ class FieldObstacle {
     }
 
   private:
+    /// By strides through the samples; many times as quick as the search for the place of an entry.
+    bool staysOut(const glm::vec3& from, const glm::vec3& to, float radius) const {
+        const float length = glm::distance(from, to), voxel = field_.voxelSize();
+        const float error = field_.mesh() ? interpolationError * voxel : 0;
+        float gone = 0;
+        for (int i = 0; i < mostSteps && gone <= length; ++i) {
+            const Sample sample = field_.sampleWithin(length > 0 ? from + gone / length * (to - from) : from, 0);
+            const float left = sample.inBand && radius == 0 ? (sample.distance - error) / steepest
+                                                            : sample.distance - radius - interpolationError * voxel;
+            if (left < leastStride * voxel) return false;
+            gone += left;
+        }
+        return gone > length;
+    }
+
+    bool overlaps(const glm::vec3& point, float radius) const {
+        return radius > 0 ? field_.overlapsSphere(point, radius) : field_.distance(point) <= 0;
+    }
+
     const Field& field_;
 };
 
 class ConvexObstacle {
   public:
-    ConvexObstacle(const btConvexShape& shape, float tolerance) : convex_(shape), tolerance_(tolerance) {}
+    ConvexObstacle(const Convex& convex, float tolerance) : convex_(convex), tolerance_(tolerance) {}
 
     float bound(const glm::vec3& point) const { return nearest(point).distance; }
-    std::optional<Entry> entry(const glm::vec3& from, const glm::vec3& to) const {
+    std::optional<Entry> entry(const glm::vec3& from, const glm::vec3& to, float) const {
         const glm::vec3 way = to - from;
         const float length = glm::length(way);
         float gone = 0;
@@ -91,7 +127,7 @@ class ConvexObstacle {
         }
         return std::nullopt;
     }
-    std::optional<glm::vec3> wayOut(const glm::vec3& point) const {
+    std::optional<glm::vec3> wayOut(const glm::vec3& point, float) const {
         const Convex::Near near = nearest(point);
         return -near.distance * near.normal;
     }
@@ -101,7 +137,7 @@ class ConvexObstacle {
         return convex_.nearest(point, std::numeric_limits<float>::max());
     }
 
-    Convex convex_;
+    const Convex& convex_;
     float tolerance_;
 };
 
@@ -111,17 +147,62 @@ class PlaneObstacle {
         : normal_(toGlm(shape.getPlaneNormal())), offset_(shape.getPlaneConstant()) {}
 
     float bound(const glm::vec3& point) const { return glm::dot(normal_, point) - offset_; }
-    std::optional<Entry> entry(const glm::vec3& from, const glm::vec3& to) const {
+    std::optional<Entry> entry(const glm::vec3& from, const glm::vec3& to, float) const {
         const float before = bound(from), after = bound(to);
         if (before > 0 && after > 0) return std::nullopt;
         const float part = before > 0 ? before / (before - after) : 0;
         return Entry{from + part * (to - from), normal_};
     }
-    std::optional<glm::vec3> wayOut(const glm::vec3& point) const { return -bound(point) * normal_; }
+    std::optional<glm::vec3> wayOut(const glm::vec3& point, float) const { return -bound(point) * normal_; }
 
   private:
     glm::vec3 normal_;
     float offset_;
+};
+
+/// The triangles of a mesh or a height field: sheets, which nothing is inside of.
+class TriangleObstacle {
+  public:
+    explicit TriangleObstacle(const btConcaveShape& mesh) : mesh_(mesh) {}
+
+    std::optional<Entry> entry(const glm::vec3& from, const glm::vec3& to, float) const {
+        struct First : btTriangleCallback {
+            glm::vec3 from, way;
+            float part = 1;
+            std::optional<Entry> entry;
+
+            void processTriangle(btVector3* corners, int, int) override {
+                const glm::vec3 a = toGlm(corners[0]), one = toGlm(corners[1]) - a, two = toGlm(corners[2]) - a;
+                const glm::vec3 normal = glm::cross(one, two), start = from - a, turned = glm::cross(start, way);
+                const float along = -glm::dot(way, normal);
+                if (along == 0) return;
+                const float s = glm::dot(start, normal) / along, u = -glm::dot(two, turned) / along,
+                            v = glm::dot(one, turned) / along;
+                if (!(s >= 0 && s < part && u >= 0 && v >= 0 && u + v <= 1)) return;
+                part = s;
+                entry = Entry{from + s * way, (along > 0 ? 1.f : -1.f) * glm::normalize(normal)};
+            }
+        } first;
+        first.from = from, first.way = to - from;
+        visit(glm::min(from, to), glm::max(from, to), first);
+        return first.entry;
+    }
+    std::optional<glm::vec3> wayOut(const glm::vec3&, float) const { return std::nullopt; }
+    bool isNear(const glm::vec3& from, const glm::vec3& to, float radius) const {
+        struct Any : btTriangleCallback {
+            bool found = false;
+            void processTriangle(btVector3*, int, int) override { found = true; }
+        } any;
+        visit(glm::min(from, to) - radius, glm::max(from, to) + radius, any);
+        return any.found;
+    }
+
+  private:
+    void visit(const glm::vec3& lower, const glm::vec3& upper, btTriangleCallback& callback) const {
+        mesh_.processAllTriangles(&callback, toBullet(lower), toBullet(upper));
+    }
+
+    const btConcaveShape& mesh_;
 };
 
 /// The way of an object through a step that has come to its end.
@@ -148,7 +229,6 @@ class Course {
 
     const btCollisionObject& object() const { return object_; }
     float turn() const { return turn_; }
-    bool moves() const { return body_; }
 
     /// Where it is after a part of the step [0..1].
     btTransform at(float time) const {
@@ -166,6 +246,10 @@ class Course {
         return centre.length() + radius;
     }
     float longest() const { return way_.length() + radius() * turn_; }
+    /// How far any of its points goes as another object sees it, at most.
+    float longest(const Course& other) const {
+        return (way_ - other.way_).length() + radius() * turn_ + other.radius() * other.turn_;
+    }
     void box(btVector3& lower, btVector3& upper) const {
         const float r = radius();
         lower = upper = start_;
@@ -210,20 +294,18 @@ struct Part {
     }
 };
 
-void partsOf(const btCollisionShape* shape, const btTransform& local, std::vector<Part>& parts) {
-    if (!shape->isCompound()) {
-        parts.push_back({shape, local});
-        return;
-    }
+/// @param found  (const Part&)
+template <class Found>
+void visitParts(const btCollisionShape* shape, const btTransform& local, Found&& found) {
+    if (!shape->isCompound()) return found(Part{shape, local});
     const auto* compound = static_cast<const btCompoundShape*>(shape);
     for (int i = 0; i < compound->getNumChildShapes(); ++i)
-        partsOf(compound->getChildShape(i), local * compound->getChildTransform(i), parts);
+        visitParts(compound->getChildShape(i), local * compound->getChildTransform(i), found);
 }
 
-std::vector<Part> partsOf(const btCollisionObject& object) {
-    std::vector<Part> parts;
-    partsOf(object.getCollisionShape(), btTransform::getIdentity(), parts);
-    return parts;
+template <class Found>
+void visitParts(const btCollisionObject& object, Found&& found) {
+    visitParts(object.getCollisionShape(), btTransform::getIdentity(), found);
 }
 
 /// Takes a field's coordinates into an obstacle's at some time of the step.
@@ -264,66 +346,46 @@ std::vector<Moment> momentsOf(const Part& points, const Course& its, const Part&
     return moments;
 }
 
-/// The surface points of a field on their ways through an obstacle.
+/// Points on their ways through an obstacle.
 template <class Obstacle>
 class Passage {
   public:
     /// @param voxel  in the obstacle's units
-    Passage(const Obstacle& obstacle, const Collider& collider, const std::vector<Moment>& moments, float voxel)
-        : obstacle_(obstacle), collider_(collider), moments_(moments), voxel_(voxel) {
-        scale_ = glm::length(moments.front().linear[0]);
-    }
+    Passage(const Obstacle& obstacle, const std::vector<Moment>& moments, float voxel)
+        : obstacle_(obstacle), moments_(moments), voxel_(voxel), scale_(glm::length(moments.front().linear[0])) {}
 
-    /// When the first point goes too deep; 1 if none does.
-    float first() {
-        first_ = 1;
+    /// The surface points of a field.
+    void follow(const SurfacePoints& points) {
         const auto reject = [&](const glm::vec3& centre, float radius) { return !comesNear(centre, scale_ * radius); };
-        collider_.points().visit(reject, [&](std::uint32_t, const SurfacePoint& point) { follow(point); });
-        return first_;
+        points.visit(reject,
+                     [&](std::uint32_t, const SurfacePoint& point) { follow(point.position, point.normal, 0); });
     }
 
-  private:
-    bool comesNear(const glm::vec3& centre, float radius) const {
-        for (std::size_t i = 0; i + 1 < moments_.size() && moments_[i].time < first_; ++i)
-            if (comesNear(moments_[i](centre), moments_[i + 1](centre), radius)) return true;
-        return false;
-    }
-
-    bool comesNear(const glm::vec3& from, const glm::vec3& to, float radius) const {
-        const float length = glm::distance(from, to), near = nearby * voxel_;
-        float gone = 0;
-        for (int i = 0; i < mostSteps; ++i) {
-            const glm::vec3 at = length > 0 ? from + gone / length * (to - from) : from;
-            const float left = obstacle_.bound(at) - radius;
-            if (left < near) return true;
-            gone += left;
-            if (gone > length) return false;
-        }
-        return true;
-    }
-
-    void follow(const SurfacePoint& point) {
-        const glm::vec3 inner = point.position - sunk * voxel_ / scale_ * point.normal;
+    /// A ball.
+    /// @param outward  of its body, to which the ball belongs
+    void follow(const glm::vec3& point, const glm::vec3& outward, float radius) {
+        const float inward = sunk * voxel_, smaller = std::max(scale_ * radius - inward, 0.f);
+        const glm::vec3 inner = point - (inward - scale_ * radius + smaller) / scale_ * outward;
         glm::vec3 from = moments_.front()(inner), aside(0);
         // what is in there already may go on at its depth
-        if (obstacle_.bound(from) <= 0)
-            if (const auto inside = obstacle_.entry(from, from)) {
-                const auto out = obstacle_.wayOut(from);
-                if (!out) return;
-                aside = *out;
-            }
+        if (obstacle_.entry(from, from, smaller)) {
+            const auto out = obstacle_.wayOut(from, smaller);
+            if (!out) return;
+            aside = *out;
+        }
         from += aside;
         std::optional<Entry> entered;
         for (std::size_t i = 0; i + 1 < moments_.size() && moments_[i].time < first_; ++i) {
             const glm::vec3 to = moments_[i + 1](inner) + aside;
-            if (!entered) entered = obstacle_.entry(from, to);
+            if (!entered) entered = obstacle_.entry(from, to, smaller);
             if (entered) {
-                const float before = glm::dot(entered->position - from, entered->normal);
-                const float after = glm::dot(entered->position - to, entered->normal), deepest = allowed * voxel_;
+                const auto depth = [&](const glm::vec3& at) {
+                    return glm::dot(entered->position - at, entered->normal) + smaller;
+                };
+                const float before = depth(from), after = depth(to), deepest = allowed * voxel_;
                 if (after > deepest) {
                     const float part = std::clamp((deepest - before) / (after - before), 0.f, 1.f);
-                    const float time = moments_[i].time + part * (moments_[i + 1].time - moments_[i].time);
-                    first_ = std::min(first_, time);
+                    first_ = std::min(first_, moments_[i].time + part * (moments_[i + 1].time - moments_[i].time));
                     return;
                 }
                 if (after < 0) entered.reset();
@@ -332,102 +394,156 @@ class Passage {
         }
     }
 
+    /// When the first of them went too deep; 1 if none did.
+    float first() const { return first_; }
+
+  private:
+    bool comesNear(const glm::vec3& centre, float radius) const {
+        for (std::size_t i = 0; i + 1 < moments_.size() && moments_[i].time < first_; ++i)
+            if (isNear(moments_[i](centre), moments_[i + 1](centre), radius)) return true;
+        return false;
+    }
+
+    bool isNear(const glm::vec3& from, const glm::vec3& to, float radius) const {
+        if constexpr (std::is_same_v<Obstacle, TriangleObstacle>) {
+            return obstacle_.isNear(from, to, radius);
+        } else {
+            const float length = glm::distance(from, to), near = nearby * voxel_;
+            float gone = 0;
+            for (int i = 0; i < mostSteps && gone <= length; ++i) {
+                const glm::vec3 at = length > 0 ? from + gone / length * (to - from) : from;
+                const float left = obstacle_.bound(at) - radius;
+                if (left < near) return true;
+                gone += left;
+            }
+            return gone <= length;
+        }
+    }
+
     const Obstacle& obstacle_;
-    const Collider& collider_;
     const std::vector<Moment>& moments_;
     float voxel_, scale_, first_ = 1;
 };
 
-/// When a field's points get through another shape.
-float passage(const Part& points, const Course& its, const Part& obstacle, const Course& others) {
-    const Shape* field = points.field();
-    if (!field) return 1;
-    const std::vector<Moment> moments = momentsOf(points, its, obstacle, others);
-    const Collider& collider = field->collider();
-    if (const Shape* other = obstacle.field()) {
-        const float voxel = std::min(field->voxelSize(), other->voxelSize()) / other->scale();
-        return Passage(FieldObstacle(other->collider().field()), collider, moments, voxel).first();
+template <class Obstacle>
+float passageOf(const Shape& field, const Obstacle& obstacle, const std::vector<Moment>& moments, float voxel) {
+    Passage passage(obstacle, moments, voxel);
+    passage.follow(field.collider().points());
+    return passage.first();
+}
+
+/// The corners and edges of a convex body, and what it is grown by.
+float passageOf(const Convex& convex, const Shape& field, const std::vector<Moment>& moments) {
+    const FieldObstacle obstacle(field.collider().field());
+    Passage passage(obstacle, moments, field.voxelSize() / field.scale());
+    convex.visitProbes(glm::vec3(0), std::numeric_limits<float>::max(), probeSpacing * field.voxelSize(),
+                       [&](const glm::vec3& point, std::uint32_t) {
+                           const float length = glm::length(point);
+                           const glm::vec3 outward = length > 0 ? point / length : glm::vec3(0);
+                           passage.follow(point, outward, convex.radius());
+                       });
+    return passage.first();
+}
+
+/// When a field and another shape get through each other; 1: not in this step.
+float passage(const Part& part, const Course& its, const Part& other, const Course& others) {
+    const Shape& field = *part.field();
+    const std::vector<Moment> moments = momentsOf(part, its, other, others);
+    const float voxel = field.voxelSize();
+    const int type = other.shape->getShapeType();
+    if (const Shape* second = other.field())
+        return passageOf(field, FieldObstacle(second->collider().field()), moments,
+                         std::min(voxel, second->voxelSize()) / second->scale());
+    if (type == STATIC_PLANE_PROXYTYPE)
+        return passageOf(field, PlaneObstacle(static_cast<const btStaticPlaneShape&>(*other.shape)), moments, voxel);
+    if (other.shape->isConvex()) {
+        const Convex convex(static_cast<const btConvexShape&>(*other.shape));
+        return std::min(passageOf(field, ConvexObstacle(convex, 0.1f * allowed * voxel), moments, voxel),
+                        passageOf(convex, field, momentsOf(other, others, part, its)));
     }
-    const float voxel = field->voxelSize();
-    if (obstacle.shape->getShapeType() == STATIC_PLANE_PROXYTYPE) {
-        const PlaneObstacle plane(*static_cast<const btStaticPlaneShape*>(obstacle.shape));
-        return Passage(plane, collider, moments, voxel).first();
-    }
-    if (!obstacle.shape->isConvex()) return 1;
-    const ConvexObstacle convex(*static_cast<const btConvexShape*>(obstacle.shape), 0.1f * allowed * voxel);
-    return Passage(convex, collider, moments, voxel).first();
+    if (!other.shape->isConcave() || type == GIMPACT_SHAPE_PROXYTYPE || type == FAST_CONCAVE_MESH_PROXYTYPE) return 1;
+    return passageOf(field, TriangleObstacle(static_cast<const btConcaveShape&>(*other.shape)), moments, voxel);
 }
 
 struct Meeting {
     Course *a, *b;
-    float time = 1;
-    bool isOpen = true;  ///< to be looked at
+    float time = 1;                ///< of the first passage
+    float heldA = -1, heldB = -1;  ///< their courses' parts when they were looked at
+
+    /// Whether it has not been looked at since one of the two was held.
+    bool isOpen() const { return a->part() != heldA || b->part() != heldB; }
 
     void look() {
         time = 1;
-        for (const Part& partOfA : partsOf(a->object()))
-            for (const Part& partOfB : partsOf(b->object()))
-                time = std::min({time, passage(partOfA, *a, partOfB, *b), passage(partOfB, *b, partOfA, *a)});
+        heldA = a->part(), heldB = b->part();
+        visitParts(a->object(), [&](const Part& one) {
+            visitParts(b->object(), [&](const Part& two) {
+                if (one.field()) time = std::min(time, passage(one, *a, two, *b));
+                if (two.field()) time = std::min(time, passage(two, *b, one, *a));
+            });
+        });
     }
 
     /// Holds what goes farther, and where that is held already, the other one.
     bool hold() {
-        if (time >= 1) return false;
+        if (time >= 1 || isOpen()) return false;
         Course *faster = a, *slower = b;
         if (a->longest() < b->longest()) std::swap(faster, slower);
         return faster->holdAt(time) || slower->holdAt(time);
     }
 };
 
-/// The least margin of the fields in a world; infinite if there are none.
-float leastMargin(const btCollisionObjectArray& objects) {
-    float least = std::numeric_limits<float>::infinity();
-    for (int i = 0; i < objects.size(); ++i)
-        for (const Part& part : partsOf(*objects[i]))
-            if (const Shape* field = part.field()) least = std::min(least, float(field->getMargin()));
-    return least;
+/// Up to which contacts are made with an object; zero without a field.
+float marginOf(const btCollisionObject& object) {
+    float most = 0;
+    visitParts(object, [&](const Part& part) {
+        if (const Shape* field = part.field()) most = std::max(most, float(field->getMargin()));
+    });
+    return most;
 }
 
-}  // namespace
-
-NoPassing::NoPassing(btDynamicsWorld& world) : world_(world) {
-    world_.addAction(this);
-    if (auto* dispatcher = dynamic_cast<Dispatcher*>(world_.getDispatcher())) dispatcher->foresee(false);
-}
-
-NoPassing::~NoPassing() {
-    world_.removeAction(this);
-    if (auto* dispatcher = dynamic_cast<Dispatcher*>(world_.getDispatcher())) dispatcher->foresee(true);
-}
-
-namespace {
-
-/// All that fast bodies may meet.
+/// What fast bodies may have passed through in a step.
 class Meetings {
   public:
     Meetings(btDynamicsWorld& world, float seconds) : world_(world), seconds_(seconds) {
         const btCollisionObjectArray& objects = world.getCollisionObjectArray();
-        const float margin = leastMargin(objects);
-        if (!std::isfinite(margin)) return;
+        float least = std::numeric_limits<float>::infinity();
+        for (int i = 0; i < objects.size(); ++i)
+            if (const float margin = marginOf(*objects[i]); margin > 0) least = std::min(least, margin);
         for (int i = 0; i < objects.size(); ++i) {
-            Course course(*objects[i], seconds);
-            if (course.moves() && course.longest() > margin)
-                courses_.try_emplace(objects[i], course), fast_.push_back(objects[i]);
+            const Course course(*objects[i], seconds);
+            if (course.longest() > least) fast_.push_back(course);
         }
-        for (std::size_t i = 0; i < fast_.size(); ++i) meetOthers(i);
+        for (std::size_t i = 0; i < fast_.size(); ++i) find(i);
     }
 
-    std::vector<Meeting>& all() { return meetings_; }
-    /// In the world's order.
-    int apply() {
+    /// Holds bodies until none passes.
+    void settle() {
+        for (int round = 0; round < mostRounds; ++round) {
+            tbb::parallel_for_each(meetings_, [](Meeting& meeting) {
+                if (meeting.isOpen()) meeting.look();
+            });
+            // the first ones first: what is held may come no farther
+            std::vector<Meeting*> order;
+            for (Meeting& meeting : meetings_)
+                if (meeting.time < 1) order.push_back(&meeting);
+            std::stable_sort(order.begin(), order.end(), [](auto* one, auto* two) { return one->time < two->time; });
+            bool held = false;
+            for (Meeting* meeting : order) held = meeting->hold() || held;
+            if (!held) break;
+        }
+    }
+
+    /// Puts them where they are held.
+    int apply() const {
         int held = 0;
-        for (const btCollisionObject* object : fast_) held += courses_.at(object).apply();
-        for (const btCollisionObject* object : slow_) held += courses_.at(object).apply();
+        for (const Course& course : fast_) held += course.apply();
+        for (const auto& [object, course] : slow_) held += course.apply();
         return held;
     }
 
   private:
-    void meetOthers(std::size_t i) {
+    void find(std::size_t i) {
         struct Found : btBroadphaseAabbCallback {
             std::vector<btCollisionObject*> objects;
             bool process(const btBroadphaseProxy* proxy) override {
@@ -436,50 +552,68 @@ class Meetings {
             }
         } found;
         btVector3 lower, upper;
-        courses_.at(fast_[i]).box(lower, upper);
+        fast_[i].box(lower, upper);
         world_.getBroadphase()->aabbTest(lower, upper, found);
-        for (btCollisionObject* object : found.objects)
-            if (!isFast(object)) meet(fast_[i], object);
+        for (btCollisionObject* object : found.objects) {
+            if (isFast(*object) || !meets(fast_[i].object(), *object)) continue;
+            add(fast_[i], slow_.try_emplace(object, *object, seconds_).first->second);
+        }
+        // those are no longer where the broad phase has them
         for (std::size_t j = 0; j < i; ++j) {
-            btVector3 otherLower, otherUpper;
-            courses_.at(fast_[j]).box(otherLower, otherUpper);
-            if (TestAabbAgainstAabb2(lower, upper, otherLower, otherUpper)) meet(fast_[i], fast_[j]);
+            btVector3 lowerOther, upperOther;
+            fast_[j].box(lowerOther, upperOther);
+            if (TestAabbAgainstAabb2(lower, upper, lowerOther, upperOther) &&
+                meets(fast_[i].object(), fast_[j].object()))
+                add(fast_[i], fast_[j]);
         }
     }
 
-    bool isFast(const btCollisionObject* object) const {
-        const auto it = courses_.find(object);
-        return it != courses_.end() && std::find(slow_.begin(), slow_.end(), object) == slow_.end();
+    bool isFast(const btCollisionObject& object) const {
+        const auto index = [](const Course& course) { return course.object().getWorldArrayIndex(); };
+        const auto at = std::lower_bound(fast_.begin(), fast_.end(), object.getWorldArrayIndex(),
+                                         [&](const Course& course, int other) { return index(course) < other; });
+        return at != fast_.end() && &at->object() == &object;
     }
 
-    void meet(btCollisionObject* a, btCollisionObject* b) {
-        if (a == b) return;
-        auto *one = a->getBroadphaseHandle(), *two = b->getBroadphaseHandle();
-        if (!one || !two || !world_.getPairCache()->needsBroadphaseCollision(one, two)) return;
-        if (!world_.getDispatcher()->needsCollision(a, b) || !world_.getDispatcher()->needsResponse(a, b)) return;
-        if (courses_.try_emplace(b, *b, seconds_).second) slow_.push_back(b);
-        meetings_.push_back({&courses_.at(a), &courses_.at(b)});
+    bool meets(const btCollisionObject& a, const btCollisionObject& b) const {
+        const auto *one = a.getBroadphaseHandle(), *two = b.getBroadphaseHandle();
+        return &a != &b && one && two &&
+               world_.getPairCache()->needsBroadphaseCollision(const_cast<btBroadphaseProxy*>(one),
+                                                               const_cast<btBroadphaseProxy*>(two)) &&
+               world_.getDispatcher()->needsCollision(&a, &b) && world_.getDispatcher()->needsResponse(&a, &b);
+    }
+
+    void add(Course& a, Course& b) {
+        const float margin = std::max(marginOf(a.object()), marginOf(b.object()));
+        if (margin > 0 && a.longest(b) > margin) meetings_.push_back({&a, &b});
     }
 
     btDynamicsWorld& world_;
     float seconds_;
-    std::unordered_map<const btCollisionObject*, Course> courses_;
-    std::vector<btCollisionObject*> fast_, slow_;
+    std::vector<Course> fast_;                                   ///< in the world's order
+    std::unordered_map<const btCollisionObject*, Course> slow_;  ///< that these may meet, and what does not move
     std::vector<Meeting> meetings_;
 };
 
+Dispatcher* fieldsOf(btDynamicsWorld& world) {
+    return dynamic_cast<Dispatcher*>(world.getDispatcher());
+}
+
 }  // namespace
+
+NoPassing::NoPassing(btDynamicsWorld& world) : world_(world) {
+    world_.addAction(this);
+    if (Dispatcher* dispatcher = fieldsOf(world_)) dispatcher->foresee(false);
+}
+
+NoPassing::~NoPassing() {
+    world_.removeAction(this);
+    if (Dispatcher* dispatcher = fieldsOf(world_)) dispatcher->foresee(true);
+}
 
 void NoPassing::updateAction(btCollisionWorld*, btScalar seconds) {
     Meetings meetings(world_, seconds);
-    for (int round = 0; round < mostRounds; ++round) {
-        tbb::parallel_for_each(meetings.all(), [](Meeting& meeting) {
-            if (meeting.isOpen) meeting.look();
-        });
-        bool changed = false;
-        for (Meeting& meeting : meetings.all()) changed = meeting.hold() || changed;
-        if (!changed) break;
-    }
+    meetings.settle();
     held_ = meetings.apply();
 }
 
