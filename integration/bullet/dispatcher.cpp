@@ -46,6 +46,18 @@ Motion motionOf(const btCollisionObject& object, const btVector3& point, float s
     return {toGlm(seconds * velocity + turn.cross(point - body->getCenterOfMassPosition())), toGlm(turn)};
 }
 
+btVector3 velocityOf(const btCollisionObject& object) {
+    const auto* body = btRigidBody::upcast(&object);
+    return body && !body->isStaticObject() ? body->getLinearVelocity() : btVector3(0, 0, 0);
+}
+
+float sizeOf(const btCollisionShape& shape) {
+    btVector3 centre;
+    btScalar radius;
+    shape.getBoundingSphere(centre, radius);
+    return radius;
+}
+
 /// A shape where it stands in the world, and how it moves; for the child of a compound, the child's own.
 struct Side {
     const btCollisionShape* shape;
@@ -133,15 +145,18 @@ class Pair {
 struct StepState {
     DispatchStatistics running;  ///< contact tests between steps count here too
     float seconds = 0;           ///< that it takes; 0 between steps
-    bool foresees = true;
+    bool foreseesAll = true;
 
-    /// How far ahead the motion of two bodies is looked at. A NoPassing does not see what the user moves, nor inside of
-    /// what locks.
+    /// How far ahead the motion of two bodies is looked at. What goes farther than its own size is the business of a
+    /// NoPassing, which does not see what the user moves, nor inside of what locks.
     float ahead(const btCollisionObjectWrapper& a, const btCollisionObjectWrapper& b) const {
         const auto isLeft = [](const btCollisionObjectWrapper& side) {
             return side.getCollisionObject()->isKinematicObject() || locks(side.getCollisionShape());
         };
-        return foresees || isLeft(a) || isLeft(b) ? seconds : 0;
+        if (foreseesAll || isLeft(a) || isLeft(b)) return seconds;
+        const btVector3 way = seconds * (velocityOf(*a.getCollisionObject()) - velocityOf(*b.getCollisionObject()));
+        const float size = std::min(sizeOf(*a.getCollisionShape()), sizeOf(*b.getCollisionShape()));
+        return way.length() <= size ? seconds : 0;
     }
 };
 
@@ -235,7 +250,7 @@ void Dispatcher::registerFields() {
 void Dispatcher::dispatchAllCollisionPairs(btOverlappingPairCache* cache, const btDispatcherInfo& info,
                                            btDispatcher* dispatcher) {
     const auto start = std::chrono::steady_clock::now();
-    functions_->state = {.running = {}, .seconds = info.m_timeStep, .foresees = functions_->state.foresees};
+    functions_->state = {.running = {}, .seconds = info.m_timeStep, .foreseesAll = functions_->state.foreseesAll};
 
     struct Task {
         std::shared_ptr<Pair> pair;
@@ -270,8 +285,8 @@ void Dispatcher::dispatchAllCollisionPairs(btOverlappingPairCache* cache, const 
     functions_->last.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
-void Dispatcher::foresee(bool motions) {
-    functions_->state.foresees = motions;
+void Dispatcher::foreseeAll(bool motions) {
+    functions_->state.foreseesAll = motions;
 }
 
 const DispatchStatistics& Dispatcher::statistics() const {

@@ -384,8 +384,12 @@ class Passage {
                 };
                 const float before = depth(from), after = depth(to), deepest = allowed * voxel_;
                 if (after > deepest) {
-                    const float part = std::clamp((deepest - before) / (after - before), 0.f, 1.f);
-                    first_ = std::min(first_, moments_[i].time + part * (moments_[i + 1].time - moments_[i].time));
+                    // back to where its own surface touched
+                    const glm::vec3 out = moments_[i].linear * outward / scale_;
+                    const float touching = std::min(inward * glm::dot(out, entered->normal), 0.f);
+                    const float part = (touching - before) / (after - before);
+                    const float time = moments_[i].time + part * (moments_[i + 1].time - moments_[i].time);
+                    first_ = std::clamp(time, 0.f, first_);
                     return;
                 }
                 if (after < 0) entered.reset();
@@ -603,12 +607,12 @@ Dispatcher* fieldsOf(btDynamicsWorld& world) {
 
 NoPassing::NoPassing(btDynamicsWorld& world) : world_(world) {
     world_.addAction(this);
-    if (Dispatcher* dispatcher = fieldsOf(world_)) dispatcher->foresee(false);
+    if (Dispatcher* dispatcher = fieldsOf(world_)) dispatcher->foreseeAll(false);
 }
 
 NoPassing::~NoPassing() {
     world_.removeAction(this);
-    if (Dispatcher* dispatcher = fieldsOf(world_)) dispatcher->foresee(true);
+    if (Dispatcher* dispatcher = fieldsOf(world_)) dispatcher->foreseeAll(true);
 }
 
 void NoPassing::updateAction(btCollisionWorld*, btScalar seconds) {

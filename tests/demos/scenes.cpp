@@ -81,9 +81,7 @@ TEST_CASE("knots in a bowl come to rest") {
 TEST_CASE("balls stay in front of thin plates") {
     demo::PlatesOptions options;
     options.phases = 2;
-    // 6 of 84, from 100 m/s on: an impact aslant spins them, and they turn by radians in the step that contacts are
-    // made for
-    judge([&] { return demo::plates(options); }, {"balls that passed their plate"});
+    judge([&] { return demo::plates(options); });
 }
 
 TEST_CASE("a free body keeps its angular momentum and turns over") {
