@@ -176,8 +176,8 @@ class TriangleObstacle {
                 const glm::vec3 normal = glm::cross(one, two), start = from - a, turned = glm::cross(start, way);
                 const float along = -glm::dot(way, normal);
                 if (along == 0) return;
-                const float s = glm::dot(start, normal) / along, u = -glm::dot(two, turned) / along,
-                            v = glm::dot(one, turned) / along;
+                const float s = glm::dot(start, normal) / along, u = glm::dot(two, turned) / along,
+                            v = -glm::dot(one, turned) / along;
                 if (!(s >= 0 && s < part && u >= 0 && v >= 0 && u + v <= 1)) return;
                 part = s;
                 entry = Entry{from + s * way, (along > 0 ? 1.f : -1.f) * glm::normalize(normal)};

@@ -83,6 +83,8 @@ TEST_CASE("However fast and however they turn, no bodies pass through a thin pla
                 body->setLinearVelocity(speed * btVector3(aslant * any(random), aslant * any(random), -1));
                 body->setAngularVelocity(0.3f * speed * btVector3(any(random), any(random), any(random)));
                 body->setActivationState(DISABLE_DEACTIVATION);
+                // Bullet's own adds energy without bound to a body that turns by radians in a step
+                body->setFlags(body->getFlags() & ~BT_ENABLE_GYROSCOPIC_FORCE_IMPLICIT_BODY);
                 const double before = energyOf(*body, false);
                 CAPTURE(one.name, speed, shot);
                 for (int i = 0; i < 2.5f / (speed * step) + 20; ++i) {
