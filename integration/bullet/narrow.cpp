@@ -24,7 +24,7 @@ constexpr float shortestGradient = 0.5f;
 constexpr ContactOptions opposition{.leastOpposition = 0.3f, .leastOppositionApart = 0.9f};
 // Steps towards the deepest place of a round surface; each divides the error by the ratio of the radii of curvature.
 constexpr int mostRefinements = 6;
-// A way has met a convex body where it is this near to it [margins], or after so many steps of what is clear.
+// A way has met a convex body where it is this near to it [voxels]; it is followed for so many steps of what is clear.
 constexpr float sweepTolerance = 0.1f;
 constexpr int mostSteps = 64;
 // By less than this a way only grazes, and goes past [voxels].
@@ -115,7 +115,7 @@ class Touching {
           local_(field, pose, motion),
           margin_(margin),
           scale_(field.scale),
-          grazing_(grazing * field.scale * field.collider.field().voxelSize()) {
+          voxel_(field.scale * field.collider.field().voxelSize()) {
         const Pose inField = relative(field.pose, pose);
         toField_ = glm::mat3(inField.rotation);
         toConvex_ = glm::transpose(toField_);
@@ -170,7 +170,7 @@ class Touching {
 
     /// @param start, way  in the convex body's coordinates
     std::optional<Meeting> meeting(const glm::vec3& start, const glm::vec3& way) const {
-        const float length = glm::length(way), touch = sweepTolerance * margin_;
+        const float length = glm::length(way), touch = sweepTolerance * voxel_;
         float gone = 0;
         for (int i = 0; i < mostSteps; ++i) {
             const Convex::Near near = convex_.nearest(start + gone / length * way, length);
@@ -187,7 +187,7 @@ class Touching {
     bool meets(const glm::vec3& position, const SurfacePoint& point) const {
         const glm::vec3 way = wayIntoConvex(position), normal = toConvex_ * point.normal;
         const glm::vec3 across = normal - glm::dot(normal, way) / glm::dot(way, way) * way;
-        return meeting(intoConvex(position) - grazing_ * across, way).has_value();
+        return meeting(intoConvex(position) - grazing * voxel_ * across, way).has_value();
     }
 
     /// The same as visit() for a point that is farther away.
@@ -222,7 +222,7 @@ class Touching {
 
     const Convex& convex_;
     Local local_;
-    float margin_, scale_, grazing_;
+    float margin_, scale_, voxel_;
     glm::mat3 toField_, toConvex_;
     glm::vec3 origin_;
 };

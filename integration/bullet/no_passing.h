@@ -15,8 +15,9 @@ namespace bilayer::bullet {
 /// stays at the place where it touched, for the rest of this step; it keeps its velocity, and the contacts that it has
 /// there are the next step's. Energy does not rise by that.
 ///
-/// Bodies that go less than a margin in a step cost next to nothing. Shapes with sweeps == false are left alone, as are
-/// pairs without a field. The same bits for any number of threads.
+/// Bodies that go less than a margin in a step cost next to nothing. Left alone are shapes with sweeps == false, pairs
+/// without a field, and pairs that the Dispatcher foresees still: bodies that the user moves (kinematic ones), and
+/// btGImpactMeshShape. The same bits for any number of threads.
 class NoPassing : private btActionInterface {
   public:
     /// Acts at the end of each internal step, as one of the world's actions; the world must outlive this.

@@ -46,9 +46,9 @@ void judge(const std::function<Outcome()>& scene, const std::set<std::string>& m
 
 TEST_CASE("blocks stick and slide on an incline as friction says") {
     demo::InclineOptions options;
-    options.slopes = {25};
-    options.frictions = {0.5f, 0.975f, 1.025f};
-    options.seconds = 0.75f;
+    options.slopes = {40};
+    options.frictions = {0, 0.25f, 0.975f, 1.025f};
+    options.seconds = 1.25f;  // the fastest go farther than a voxel in a step by then
     judge([&] { return demo::incline(options); });
 }
 
