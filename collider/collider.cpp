@@ -26,6 +26,9 @@ constexpr float interpolationError = 0.87f;
 constexpr float steepest = 1.7321f;
 constexpr float flattest = 0.1f;       // a gradient shorter than this tells no direction: the point is on a medial axis
 constexpr float nearestAside = 0.01f;  // [voxels] from an edge or corner: nearer, rounding spoils the way's direction
+// A point that slides along a face ends in the edges beyond it by rounding: what only grazes, by less than this, goes
+// past [voxels].
+constexpr float grazing = 0.25f;
 
 // The map from the coordinates of one body into those of another.
 struct Map {
@@ -204,16 +207,29 @@ class PointsInField {
         if (sample.distance <= reach_) {
             if (sample.inBand) {
                 Touch touched = touchInBand(field_, at, sample);
-                const float approach = sweeps_ ? -glm::dot(wayOf(at), touched.normal) : 0;
-                touched.approach = std::max(approach, 0.f);
+                if (sweeps_) touched.approach = approachOf(point, at, touched);
                 if (touched.distance <= reach_) found(index, point, touched);
             }
             if (!sample.inBand && sample.distance < 0) ++report.beyondBand;
         } else if (sweeps_) {
             const glm::vec3 way = wayOf(at);
-            if (sample.distance > glm::length(way)) return;
+            if (sample.distance > glm::length(way) || !meets(point, at, way)) return;
             if (const auto touched = touchOnWay(field_, at, way)) found(index, point, *touched);
         }
+    }
+
+    float approachOf(const SurfacePoint& point, const glm::vec3& at, const Touch& touched) const {
+        const glm::vec3 way = wayOf(at);
+        const float approach = -glm::dot(way, touched.normal);
+        return approach > 0 && (touched.distance <= 0 || meets(point, at, way)) ? approach : 0;
+    }
+
+    // Whether a point's way into the field does more than graze it: so does that of a point a bit inside of its body.
+    bool meets(const SurfacePoint& point, const glm::vec3& at, const glm::vec3& way) const {
+        const glm::vec3 normal = glm::normalize(map_.linear * point.normal);
+        const glm::vec3 across = normal - glm::dot(normal, way) / glm::dot(way, way) * way;
+        const glm::vec3 inside = at - grazing * field_.voxelSize() * across;
+        return field_.segment(inside, inside + way).has_value();
     }
 
     glm::vec3 wayOf(const glm::vec3& at) const { return ways_.of(other_.scale * at) / other_.scale; }

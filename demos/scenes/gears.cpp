@@ -26,7 +26,7 @@ namespace {
 constexpr float density = 7850;   // of steel [kg/m^3]
 constexpr float friction = 0.3f;  // of dry steel, as the product of both bodies' is 0.1
 constexpr float zigzag = 0.4f;    // of the way from gear to gear [rad]
-// Of contacts, half the backlash: wider, edges of teeth that are about to mesh would stop those that they pass [m].
+// Of contacts, half the backlash; a voxel does as well, with five times the contacts [m].
 constexpr float margin = 50e-6f;
 constexpr float settled = 0.1f;         // by then the backlash is taken up [s]
 constexpr float strongest = 100;        // of the motor [loads]
@@ -135,8 +135,7 @@ std::vector<Wheel> addTrain(Stage& stage, Axles& axles, Train train, const Gears
             angle = shapes::meshingAngle(part, angle, last, direction);
         }
         const auto thing =
-            makeThing(std::move(train.meshes[i]),
-                      {.voxelSize = options.voxelSize, .margin = margin, .sweeps = false, .exact = true});
+            makeThing(std::move(train.meshes[i]), {.voxelSize = options.voxelSize, .margin = margin, .exact = true});
         const float mass = density * float(massProperties(thing->mesh).volume);
         const Pose pose{place, glm::angleAxis(angle, glm::vec3(0, 0, 1))};
         const Matter matter{.mass = mass, .friction = friction, .linearDamping = 0, .angularDamping = 0};

@@ -12,6 +12,7 @@
 
 #include "collider/pose.h"
 #include "integration/bullet/dispatcher.h"
+#include "integration/bullet/no_passing.h"
 #include "integration/bullet/shape.h"
 
 namespace bilayer::demo {
@@ -70,6 +71,7 @@ class World {
     btDbvtBroadphase broadphase_;
     btSequentialImpulseConstraintSolver solver_;
     btDiscreteDynamicsWorld world_{&dispatcher_, &broadphase_, &solver_, &configuration_};
+    bullet::NoPassing noPassing_{world_};
     std::vector<Body> bodies_;
 };
 

@@ -48,6 +48,18 @@ Motion motionOf(const btCollisionObject& object, const btVector3& point, float s
     return {toGlm(seconds * velocity + turn.cross(point - body->getCenterOfMassPosition())), toGlm(turn)};
 }
 
+btVector3 velocityOf(const btCollisionObject& object) {
+    const auto* body = btRigidBody::upcast(&object);
+    return body && !body->isStaticObject() ? body->getLinearVelocity() : btVector3(0, 0, 0);
+}
+
+float sizeOf(const btCollisionShape& shape) {
+    btVector3 centre;
+    btScalar radius;
+    shape.getBoundingSphere(centre, radius);
+    return radius;
+}
+
 /// A shape where it stands in the world, and how it moves; for the child of a compound, the child's own.
 struct Side {
     const btCollisionShape* shape;
@@ -155,6 +167,19 @@ class Pair {
 struct StepState {
     DispatchStatistics running;  ///< contact tests between steps count here too
     float seconds = 0;           ///< that it takes; 0 between steps
+    bool foreseesAll = true;
+
+    /// How far ahead the motion of two bodies is looked at. What goes farther than its own size is the business of a
+    /// NoPassing, which does not see what the user moves, nor inside of what locks.
+    float ahead(const btCollisionObjectWrapper& a, const btCollisionObjectWrapper& b) const {
+        const auto isLeft = [](const btCollisionObjectWrapper& side) {
+            return side.getCollisionObject()->isKinematicObject() || locks(side.getCollisionShape());
+        };
+        if (foreseesAll || isLeft(a) || isLeft(b)) return seconds;
+        const btVector3 way = seconds * (velocityOf(*a.getCollisionObject()) - velocityOf(*b.getCollisionObject()));
+        const float size = std::min(sizeOf(*a.getCollisionShape()), sizeOf(*b.getCollisionShape()));
+        return way.length() <= size ? seconds : 0;
+    }
 };
 
 class Algorithm : public btCollisionAlgorithm {
@@ -173,7 +198,7 @@ class Algorithm : public btCollisionAlgorithm {
                           const btDispatcherInfo&, btManifoldResult* result) override {
         const btCollisionObjectWrapper &a = bIsSecond_ ? *first : *second, &b = bIsSecond_ ? *second : *first;
         if (!pair_->isReady())
-            pair_->collide(sideOf(a, state_.seconds), sideOf(b, state_.seconds),
+            pair_->collide(sideOf(a, state_.ahead(a, b)), sideOf(b, state_.ahead(a, b)),
                            result->m_closestPointDistanceThreshold);
         const float sameWithin = b.getCollisionShape()->getContactBreakingThreshold(gContactBreakingThreshold);
         pair_->commit(*a.getCollisionObject(), *b.getCollisionObject(), sameWithin, *result);
@@ -250,7 +275,7 @@ void Dispatcher::registerFields() {
 void Dispatcher::dispatchAllCollisionPairs(btOverlappingPairCache* cache, const btDispatcherInfo& info,
                                            btDispatcher* dispatcher) {
     const auto start = std::chrono::steady_clock::now();
-    functions_->state = {.running = {}, .seconds = info.m_timeStep};
+    functions_->state = {.running = {}, .seconds = info.m_timeStep, .foreseesAll = functions_->state.foreseesAll};
 
     struct Task {
         std::shared_ptr<Pair> pair;
@@ -273,8 +298,8 @@ void Dispatcher::dispatchAllCollisionPairs(btOverlappingPairCache* cache, const 
         const auto* algorithm = dynamic_cast<Algorithm*>(overlap.m_algorithm);
         if (!algorithm || locks(one.getCollisionShape()) || locks(two.getCollisionShape())) continue;
         const bool straight = algorithm->bIsSecond();
-        tasks.push_back({algorithm->pair(), sideOf(straight ? one : two, info.m_timeStep),
-                         sideOf(straight ? two : one, info.m_timeStep)});
+        const float ahead = functions_->state.ahead(one, two);
+        tasks.push_back({algorithm->pair(), sideOf(straight ? one : two, ahead), sideOf(straight ? two : one, ahead)});
     }
     SampledPairs& sampled = functions_->sampledPairs;
     sampled.clear();
@@ -296,6 +321,10 @@ void Dispatcher::dispatchAllCollisionPairs(btOverlappingPairCache* cache, const 
     functions_->state.seconds = 0;
     functions_->last = functions_->state.running;
     functions_->last.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+void Dispatcher::foreseeAll(bool motions) {
+    functions_->state.foreseesAll = motions;
 }
 
 const DispatchStatistics& Dispatcher::statistics() const {

@@ -24,9 +24,11 @@ constexpr float shortestGradient = 0.5f;
 constexpr ContactOptions opposition{.leastOpposition = 0.3f, .leastOppositionApart = 0.9f};
 // Steps towards the deepest place of a round surface; each divides the error by the ratio of the radii of curvature.
 constexpr int mostRefinements = 6;
-// A way has met a convex body where it is this near to it [margins], or after so many steps of what is clear.
+// A way has met a convex body where it is this near to it [voxels]; it is followed for so many steps of what is clear.
 constexpr float sweepTolerance = 0.1f;
 constexpr int mostSteps = 64;
+// By less than this a way only grazes, and goes past [voxels].
+constexpr float grazing = 0.25f;
 
 /// A field in metres of the world and the axes of its body, and how another body moves towards it.
 class Local {
@@ -109,7 +111,11 @@ class Local {
 class Touching {
   public:
     Touching(const Convex& convex, const Pose& pose, const Motion& motion, const Placed& field, float margin)
-        : convex_(convex), local_(field, pose, motion), margin_(margin), scale_(field.scale) {
+        : convex_(convex),
+          local_(field, pose, motion),
+          margin_(margin),
+          scale_(field.scale),
+          voxel_(field.scale * field.collider.field().voxelSize()) {
         const Pose inField = relative(field.pose, pose);
         toField_ = glm::mat3(inField.rotation);
         toConvex_ = glm::transpose(toField_);
@@ -130,14 +136,16 @@ class Touching {
         const Convex::Near near = convex_.nearest(intoConvex(position), margin_);
         if (near.distance > margin_) return visitOnWay(position, point, feature, near.distance, contacts);
         const glm::vec3 normal = -(toField_ * near.normal);
-        if (!opposition.keeps(glm::dot(normal, point.normal), near.distance > 0 && !point.isSharp)) return;
+        float approach = local_.approach(position, normal, margin_);
+        if (near.distance > 0 && approach > 0 && !meets(position, point)) approach = 0;
+        const bool apart = near.distance > 0 && approach == 0 && !point.isSharp;
+        if (!opposition.keeps(glm::dot(normal, point.normal), apart)) return;
         if (convex_.isCurved())
             if (const auto better = refine(near, feature)) {
                 contacts.push_back(*better);
                 return;
             }
-        contacts.push_back(
-            local_.contact(position, normal, near.distance, feature, local_.approach(position, normal, margin_)));
+        contacts.push_back(local_.contact(position, normal, near.distance, feature, approach));
     }
 
     void visitProbes(const Bounds& bounds, float spacing, ContactReport& report, std::vector<Contact>& contacts) const {
@@ -154,26 +162,45 @@ class Touching {
     glm::vec3 intoConvex(const glm::vec3& point) const { return toConvex_ * (point - origin_); }
     glm::vec3 intoField(const glm::vec3& point) const { return toField_ * point + origin_; }
 
-    /// The same for a point that is farther away: where its way meets the convex body.
+    /// Where a way meets the convex body.
+    struct Meeting {
+        glm::vec3 normal;  ///< of the convex body, in its own coordinates
+        float gap;         ///< from the start to the plane that is met [m]
+    };
+
+    /// @param start, way  in the convex body's coordinates
+    std::optional<Meeting> meeting(const glm::vec3& start, const glm::vec3& way) const {
+        const float length = glm::length(way), touch = sweepTolerance * voxel_;
+        float gone = 0;
+        for (int i = 0; i < mostSteps; ++i) {
+            const Convex::Near near = convex_.nearest(start + gone / length * way, length);
+            if (near.distance <= touch) return Meeting{near.normal, -glm::dot(near.normal, gone / length * way)};
+            gone += near.distance;
+            if (gone > length) break;
+        }
+        return std::nullopt;
+    }
+
+    glm::vec3 wayIntoConvex(const glm::vec3& position) const { return -(toConvex_ * local_.ways().of(position)); }
+
+    /// Whether a surface point's way does more than graze the convex body (see collide()).
+    bool meets(const glm::vec3& position, const SurfacePoint& point) const {
+        const glm::vec3 way = wayIntoConvex(position), normal = toConvex_ * point.normal;
+        const glm::vec3 across = normal - glm::dot(normal, way) / glm::dot(way, way) * way;
+        return meeting(intoConvex(position) - grazing * voxel_ * across, way).has_value();
+    }
+
+    /// The same as visit() for a point that is farther away.
     void visitOnWay(const glm::vec3& position, const SurfacePoint& point, std::uint32_t feature, float distance,
                     std::vector<Contact>& contacts) const {
         if (local_.longestWay() <= margin_) return;
-        const glm::vec3 start = intoConvex(position), way = -(toConvex_ * local_.ways().of(position));
-        const float length = glm::length(way), touch = sweepTolerance * margin_;
-        float gone = 0;
-        for (int i = 0; i < mostSteps; ++i) {
-            gone += distance;
-            if (gone > length) return;
-            const Convex::Near near = convex_.nearest(start + gone / length * way, length);
-            distance = near.distance;
-            if (distance > touch) continue;
-            const glm::vec3 normal = -(toField_ * near.normal);
-            if (!opposition.keeps(glm::dot(normal, point.normal), false)) return;
-            const float gap = -glm::dot(near.normal, gone / length * way);
-            if (gap > 0)
-                contacts.push_back(local_.contact(position, normal, gap, feature, -glm::dot(near.normal, way)));
-            return;
-        }
+        const glm::vec3 way = wayIntoConvex(position);
+        if (distance > glm::length(way) || !meets(position, point)) return;
+        const auto met = meeting(intoConvex(position), way);
+        if (!met || !(met->gap > 0)) return;
+        const glm::vec3 normal = -(toField_ * met->normal);
+        if (opposition.keeps(glm::dot(normal, point.normal), false))
+            contacts.push_back(local_.contact(position, normal, met->gap, feature, -glm::dot(met->normal, way)));
     }
 
     /// Follows the field's normal from the place of a round surface under a surface point to the deepest place nearby.
@@ -195,7 +222,7 @@ class Touching {
 
     const Convex& convex_;
     Local local_;
-    float margin_, scale_;
+    float margin_, scale_, voxel_;
     glm::mat3 toField_, toConvex_;
     glm::vec3 origin_;
 };

@@ -55,9 +55,9 @@ void judge(const std::function<Outcome()>& scene, const std::set<std::string>& m
 
 TEST_CASE("blocks stick and slide on an incline as friction says") {
     demo::InclineOptions options;
-    options.slopes = {25};
-    options.frictions = {0.5f, 0.975f, 1.025f};
-    options.seconds = 0.75f;
+    options.slopes = {40};
+    options.frictions = {0, 0.25f, 0.975f, 1.025f};
+    options.seconds = 1.25f;  // the fastest go farther than a voxel in a step by then
     judge([&] { return demo::incline(options); });
 }
 
@@ -90,9 +90,7 @@ TEST_CASE("knots in a bowl come to rest") {
 TEST_CASE("balls stay in front of thin plates") {
     demo::PlatesOptions options;
     options.phases = 2;
-    // 6 of 84, from 100 m/s on: an impact aslant spins them, and they turn by radians in the step that contacts are
-    // made for
-    judge([&] { return demo::plates(options); }, {"balls that passed their plate"});
+    judge([&] { return demo::plates(options); });
 }
 
 TEST_CASE("a free body keeps its angular momentum and turns over") {

@@ -1,0 +1,164 @@
+// Nothing passes through anything, however fast: after the solver, by the ways that bodies have truly gone.
+#include "integration/bullet/no_passing.h"
+
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <random>
+
+#include "tests/support/support.h"
+#include "world.h"
+
+using namespace bilayer;
+using namespace bilayer::test;
+using bullet::NoPassing;
+using bullet::Shape;
+
+namespace {
+
+constexpr float h = 0.05f;        // voxel [m]
+constexpr float step = 1 / 60.f;  // [s]
+
+/// Bullet keeps a body's spin, not its energy, while it turns: after an impact the least that its spin may be worth.
+double energyOf(const btRigidBody& body, bool atLeast) {
+    const btVector3 spin = body.getWorldTransform().getBasis().transpose() * body.getAngularVelocity();
+    const btVector3& inverse = body.getInvInertiaDiagLocal();
+    const double most = std::max({inverse.x(), inverse.y(), inverse.z()});
+    double energy = 0.5 * double(body.getLinearVelocity().length2()) / body.getInvMass();
+    for (int k = 0; k < 3; ++k) energy += 0.5 * double(spin[k]) * spin[k] / (atLeast ? most : double(inverse[k]));
+    return energy;
+}
+
+/// A plate of two triangles.
+struct Sheet {
+    btTriangleMesh triangles;
+    std::unique_ptr<btBvhTriangleMeshShape> shape;
+
+    explicit Sheet(float half) {
+        const btVector3 a(-half, -half, 0), b(half, -half, 0), c(half, half, 0), d(-half, half, 0);
+        triangles.addTriangle(a, b, c);
+        triangles.addTriangle(a, c, d);
+        shape = std::make_unique<btBvhTriangleMeshShape>(&triangles, true);
+    }
+};
+
+}  // namespace
+
+TEST_CASE("However fast and however they turn, no bodies pass through a thin plate or gain energy") {
+    const float thickness = GENERATE(1.f, 2.f, 4.f);  // of the plate [voxels]
+    const unsigned seed = test::seed();
+    CAPTURE(thickness, seed);
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<float> any(-1, 1);
+    const float half = 1.2f;
+    Shape plate(exactBox({half, half, 0.5f * thickness * h}, h)), ball(exactSphere(0.2f, h)),
+        brick(exactBox({0.2f, 0.1f, 0.15f}, h)), ring(exactTorus(0.25f, 0.08f, h));
+    btSphereShape sphere(0.2f);
+    btCapsuleShape capsule(0.1f, 0.2f);
+    btCylinderShape cylinder({0.15f, 0.1f, 0.15f});
+    btBoxShape box({0.2f, 0.1f, 0.15f}), plateBox({half, half, 0.5f * thickness * h});
+    btStaticPlaneShape ground({0, 0, 1}, 0);
+    Sheet sheet(half);
+    const struct {
+        const char* name;
+        btCollisionShape &moving, &still;
+    } cases[] = {
+        {"ball, plate", ball, plate},     {"brick, plate", brick, plate},      {"ring, plate", ring, plate},
+        {"sphere, plate", sphere, plate}, {"capsule, plate", capsule, plate},  {"cylinder, plate", cylinder, plate},
+        {"box, plate", box, plate},       {"ball, plane", ball, ground},       {"brick, plane", brick, ground},
+        {"brick, box", brick, plateBox},  {"ball, sheet", ball, *sheet.shape}, {"brick, sheet", brick, *sheet.shape},
+        {"ring, box", ring, plateBox}};
+    for (const auto& one : cases)
+        for (float speed = 1; speed <= 1000; speed *= 10)
+            for (int shot = 0; shot < 3; ++shot) {
+                World world;
+                const NoPassing guard(world.dynamics);
+                world.dynamics.setGravity({0, 0, 0});
+                world.add(one.still, 0, {0, 0, 0});
+                const btQuaternion turned(btVector3(any(random), any(random), any(random) + 2).normalized(),
+                                          3 * any(random));
+                btRigidBody* body = world.add(one.moving, 1, {0.1f * any(random), 0.1f * any(random), 1.f}, turned);
+                // aslant by up to about 30 degrees, but so that it meets the plate
+                const float aslant = std::min(0.5f, 0.5f * half);
+                body->setLinearVelocity(speed * btVector3(aslant * any(random), aslant * any(random), -1));
+                body->setAngularVelocity(0.3f * speed * btVector3(any(random), any(random), any(random)));
+                body->setActivationState(DISABLE_DEACTIVATION);
+                // Bullet's own adds energy without bound to a body that turns by radians in a step
+                body->setFlags(body->getFlags() & ~BT_ENABLE_GYROSCOPIC_FORCE_IMPLICIT_BODY);
+                const double before = energyOf(*body, false);
+                CAPTURE(one.name, speed, shot);
+                for (int i = 0; i < 2.5f / (speed * step) + 20; ++i) {
+                    world.dynamics.stepSimulation(step, 0);
+                    const btVector3 at = body->getCenterOfMassPosition();
+                    CAPTURE(i, at.x(), at.y(), at.z());
+                    REQUIRE(std::isfinite(energyOf(*body, true)));
+                    REQUIRE(energyOf(*body, true) <= 1.01 * before);
+                    // beyond the plate's rim it may fall
+                    if (std::max(std::abs(at.x()), std::abs(at.y())) > half - 0.3f) break;
+                    REQUIRE(at.z() > 0);
+                }
+            }
+}
+
+TEST_CASE("Two fast bodies do not pass each other, nor what they meet after a bounce") {
+    Shape ball(exactSphere(0.2f, h)), wall(exactBox({1.f, 1.f, 0.5f * h}, h));
+    World world;
+    const NoPassing guard(world.dynamics);
+    world.dynamics.setGravity({0, 0, 0});
+    btRigidBody *left = world.add(ball, 1, {-5, 0, 0}), *right = world.add(ball, 1, {5.5f, 0, 0});
+    left->setLinearVelocity({800, 0, 0});
+    right->setLinearVelocity({-900, 0, 0});
+    int held = 0;
+    for (int i = 0; i < 10; ++i) {
+        world.dynamics.stepSimulation(step, 0);
+        held += guard.held();
+        CHECK(right->getCenterOfMassPosition().x() - left->getCenterOfMassPosition().x() > 0.4f - 0.5f * h);
+    }
+    CHECK(held >= 2);
+
+    // a ball that bounces off one plate in a step does not leave through the other one
+    World between;
+    const NoPassing other(between.dynamics);
+    between.dynamics.setGravity({0, 0, 0});
+    between.add(wall, 0, {0, 0, 0})->setRestitution(1);
+    between.add(wall, 0, {0, 0, 2})->setRestitution(1);
+    btRigidBody* body = between.add(ball, 1, {0, 0, 1.1f});
+    body->setRestitution(0.9f);
+    body->setLinearVelocity({0, 0, -500});
+    for (int i = 0; i < 30; ++i) {
+        between.dynamics.stepSimulation(step, 0);
+        const btVector3 at = body->getCenterOfMassPosition();
+        CAPTURE(i, at.x(), at.y(), at.z());
+        if (std::max(std::abs(at.x()), std::abs(at.y())) > 0.7f) break;
+        CHECK(at.z() > 0);
+        CHECK(at.z() < 2);
+    }
+}
+
+TEST_CASE("What slides, rolls or rests is not held, and a world is as it was when nobody looks after it") {
+    Shape block(exactBox({0.3f, 0.3f, 0.2f}, h)), floor(exactBox({4, 1, 0.3f}, h)), ball(exactSphere(0.2f, h));
+    World world;
+    {
+        const NoPassing guard(world.dynamics);
+        world.add(floor, 0, {0, 0, -0.3f})->setFriction(0);
+        btRigidBody *sliding = world.add(block, 1, {-3, -0.5f, 0.2f}), *rolling = world.add(ball, 1, {-3, 0.5f, 0.2f});
+        sliding->setLinearVelocity({20, 0, 0});
+        rolling->setLinearVelocity({20, 0, 0});
+        rolling->setAngularVelocity({0, 100, 0});
+        for (int i = 0; i < 60; ++i) {
+            world.dynamics.stepSimulation(1 / 240.f, 0);
+            CAPTURE(i);
+            REQUIRE(guard.held() == 0);
+        }
+        CHECK(sliding->getCenterOfMassPosition().x() == Approx(2).margin(0.01));
+        CHECK(rolling->getCenterOfMassPosition().x() == Approx(2).margin(0.02));
+    }
+    // its contacts foresee motions again
+    World fast;
+    { const NoPassing guard(fast.dynamics); }
+    fast.add(floor, 0, {0, 0, -0.3f});
+    btRigidBody* body = fast.add(ball, 1, {0, 0, 3});
+    body->setLinearVelocity({0, 0, -100});
+    for (int i = 0; i < 2; ++i) fast.dynamics.stepSimulation(step, 0);
+    CHECK(body->getCenterOfMassPosition().z() > 0.19f);
+}
