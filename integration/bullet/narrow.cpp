@@ -4,18 +4,29 @@
 #include <LinearMath/btAabbUtil2.h>
 
 #include <algorithm>
+#include <cmath>
+#include <functional>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
 #include <optional>
 
+#include "collider/edge_search.h"
 #include "integration/bullet/convert.h"
 
 namespace bilayer::bullet {
 
 namespace {
 
-// Distance between probes along an edge [voxels], like that of the surface points.
-constexpr float probeSpacing = 2;
+// Distance between probes along an edge [voxels], like that of the surface points. Farther from the field they get
+// sparser; the interpolant may be below the distance by nearly a voxel.
+constexpr float probeSpacing = 2, interpolationError = 0.87f;
+// Edges get no more parts: numbers beyond are those of the next edge.
+constexpr int partBits = 15;
+constexpr float searchTolerance = 2e-3f;  // of the deepest place between two probes [voxels]
+// Where two edges cross, the normal across both is taken if it looks no farther aside from the field's (cosine).
+constexpr float leastAcross = 0.3f;
+constexpr float crossingWithin = 1.5f;  // of the deepest place that the field shows [voxels]: it rounds edges off
 // On the medial axis the interpolated gradient is short and says nothing of a direction.
 constexpr float shortestGradient = 0.5f;
 // A surface point touches a face that looks against its own normal, by this cosine at least: the points below the edge
@@ -32,14 +43,17 @@ constexpr int mostSteps = 64;
 class Local {
   public:
     Local(const Placed& field, const Pose& other, const Motion& motion)
-        : field_(field.collider.field()),
+        : collider_(field.collider),
+          field_(field.collider.field()),
           scale_(field.scale),
+          voxel_(field.scale * field.collider.field().voxelSize()),
           pose_(field.pose),
           ways_(other, motion, field.pose, field.motion) {
         const Bounds& bounds = field.collider.bounds();
         longestWay_ = ways_.longest(scale_ * bounds.centre(), 0.5f * scale_ * glm::length(bounds.size()));
     }
 
+    const Collider& collider() const { return collider_; }
     /// Of the other body's points as the field sees them.
     const RelativeWays& ways() const { return ways_; }
     /// The longest way of any that is in the field's box; those that come from afar may go farther by their turn.
@@ -49,27 +63,77 @@ class Local {
         enum { near, outside, inside, unclear } where = unclear;
         float distance = 0;   ///< [m]
         glm::vec3 normal{0};  ///< of unit length if near
+        glm::vec3 gradient{0};
+
+        bool isKnown() const { return where == near || where == unclear; }
     };
 
     Answer at(const glm::vec3& point) const {
         const Sample sample = field_.sample(point / scale_);
-        if (!sample.inBand)
-            return {sample.distance > 0 ? Answer::outside : Answer::inside, scale_ * sample.distance, {}};
+        if (!sample.inBand) return {sample.distance > 0 ? Answer::outside : Answer::inside, scale_ * sample.distance};
         const float length = glm::length(sample.gradient);
-        if (length < shortestGradient) return {Answer::unclear, scale_ * sample.distance, {}};
-        return {Answer::near, scale_ * sample.distance, sample.gradient / length};
+        if (length < shortestGradient) return {Answer::unclear, scale_ * sample.distance, {}, sample.gradient};
+        return {Answer::near, scale_ * sample.distance, sample.gradient / length, sample.gradient};
     }
 
     /// The contact of a point of the other body's core, grown by a radius.
-    std::optional<Contact> probe(const glm::vec3& point, float radius, std::uint32_t feature, float margin,
-                                 ContactReport& report) const {
+    std::optional<Contact> probe(const glm::vec3& point, const Answer& answer, float radius, std::uint32_t feature,
+                                 float margin, ContactReport& report) const {
         ++report.pointsTested;
-        const Answer answer = at(point);
         if (answer.where == Answer::inside) ++report.beyondBand;
         if (answer.distance - radius > margin) return probeOnWay(point, radius, feature, margin, answer.distance);
         if (answer.where != Answer::near) return std::nullopt;
         return contact(point - answer.distance * answer.normal, answer.normal, answer.distance - radius, feature,
                        approach(point, answer.normal, margin));
+    }
+
+    /// An edge of the other body, or the middle of one that is round.
+    struct Edge {
+        std::function<glm::vec3(float)> place;  ///< by the part of the way
+        float radius[2];                        ///< by which it is grown at its ends [m]
+        bool isStraight;
+        std::uint32_t feature;  ///< the first of 2^(partBits + 1)
+
+        float radiusAt(float part) const { return radius[0] + part * (radius[1] - radius[0]); }
+        glm::vec3 directionAt(float part) const {
+            const float aside = isStraight ? 0.5f : 1e-3f;
+            return glm::normalize(place(part + aside) - place(part - aside));
+        }
+    };
+
+    /// The contacts along an edge, ends excluded: of places that lie close enough to each other, and where it goes
+    /// deeper between two of them of the deepest one.
+    /// @param first, last  the answers at its ends
+    void probeEdge(const Edge& edge, const Answer& first, const Answer& last, float margin, ContactReport& report,
+                   std::vector<Contact>& contacts) const {
+        const float length = glm::distance(edge.place(0), edge.place(1));
+        if (!(length > 0)) return;
+        const float most = float((1 << partBits) - 1);
+        const int parts = int(std::clamp(std::ceil(length / (probeSpacing * voxel_)), 1.f, most));
+        const float reach =
+            margin + longestWay_ + interpolationError * voxel_ + std::max(edge.radius[0], edge.radius[1]);
+        Answer before = first;
+        for (int i = 0; i < parts;) {
+            // What is clear of everything needs no probes.
+            const float clear = (before.distance - reach) * float(parts) / length;
+            const int next = i + std::max(1, int(std::min(clear, float(parts - i))));
+            const float part = float(next) / float(parts);
+            Answer there = last;
+            if (next < parts) {
+                const glm::vec3 point = edge.place(part);
+                there = at(point);
+                const std::uint32_t feature = edge.feature + 2 * std::uint32_t(next);
+                if (const auto found = probe(point, there, edge.radiusAt(part), feature, margin, report))
+                    contacts.push_back(*found);
+            }
+            if (next == i + 1)
+                if (const auto found = deepestBetween(edge, float(i) / float(parts), before, part, there, margin)) {
+                    contacts.push_back(*found);
+                    contacts.back().feature = edge.feature + 2 * std::uint32_t(i) + 1;
+                }
+            i = next;
+            before = there;
+        }
     }
 
     /// Contact::approach of the other body's point.
@@ -98,8 +162,59 @@ class Local {
                        -glm::dot(way, hit->normal));
     }
 
+    /// Between two places of an edge, if it falls from either.
+    std::optional<Contact> deepestBetween(const Edge& edge, float from, const Answer& atFrom, float to,
+                                          const Answer& atTo, float margin) const {
+        if (!atFrom.isKnown() || !atTo.isKnown()) return std::nullopt;
+        const float length = glm::distance(edge.place(from), edge.place(to));
+        const float growth = (edge.radius[1] - edge.radius[0]) * (to - from) / length;
+        const auto partAt = [&](float way) { return from + way / length * (to - from); };
+        const auto slopeOf = [&](float way, const Answer& answer) {
+            const float part = partAt(way);
+            return Slope{way, answer.distance - edge.radiusAt(part),
+                         glm::dot(answer.gradient, edge.directionAt(part)) - growth};
+        };
+        const Slope first = slopeOf(0, atFrom), last = slopeOf(length, atTo);
+        const bool isNear = std::min(first.value, last.value) - 0.5f * length <= margin;
+        const bool falls = fallsBetween(first, last);
+        if (!isNear || !(falls || mayKinkBetween(first, last))) return std::nullopt;
+        const auto slopeAt = [&](float way) -> std::optional<Slope> {
+            const Answer answer = at(edge.place(partAt(way)));
+            if (!answer.isKnown()) return std::nullopt;
+            return slopeOf(way, answer);
+        };
+        const std::optional<Slope> lowest = falls ? lowestBetween(first, last, searchTolerance * voxel_, slopeAt)
+                                            : first.value < last.value ? first
+                                                                       : last;
+        if (!lowest) return std::nullopt;
+
+        const float part = partAt(lowest->place), radius = edge.radiusAt(part);
+        const glm::vec3 point = edge.place(part);
+        const Answer here = at(point);
+        // On the ridge of an edge the gradient may vanish; beside it, it does not.
+        const glm::vec3 outward = atFrom.gradient + here.gradient + atTo.gradient;
+        if (edge.isStraight && radius <= 0)
+            if (const auto crossing =
+                    collider_.edges().crossing(collider_.points(), edge.place(0) / scale_, edge.place(1) / scale_,
+                                               point / scale_, outward, crossingWithin * voxel_ / scale_)) {
+                if (scale_ * crossing->distance > margin) return std::nullopt;
+                return contact(scale_ * crossing->position, crossing->normal, scale_ * crossing->distance, 0,
+                               approach(point, crossing->normal, margin));
+            }
+        if (!falls || here.where != Answer::near) return std::nullopt;
+        const glm::vec3 along = edge.directionAt(part);
+        const glm::vec3 across = here.normal - glm::dot(outward, along) * along;
+        const float steepness = glm::length(across);
+        if (!(steepness > leastAcross)) return std::nullopt;
+        const float depth = here.distance < 0 ? here.distance / steepness : here.distance;
+        if (depth - radius > margin) return std::nullopt;
+        const glm::vec3 normal = across / steepness;
+        return contact(point - depth * normal, normal, depth - radius, 0, approach(point, normal, margin));
+    }
+
+    const Collider& collider_;
     const Field& field_;
-    float scale_;
+    float scale_, voxel_;
     Pose pose_;
     RelativeWays ways_;
     float longestWay_;
@@ -131,6 +246,7 @@ class Touching {
         if (near.distance > margin_) return visitOnWay(position, point, feature, near.distance, contacts);
         const glm::vec3 normal = -(toField_ * near.normal);
         if (!opposition.keeps(glm::dot(normal, point.normal), near.distance > 0 && !point.isSharp)) return;
+        if (convex_.isCurved() && point.isSharp) followEdges(index, near, contacts);
         if (convex_.isCurved())
             if (const auto better = refine(near, feature)) {
                 contacts.push_back(*better);
@@ -140,14 +256,23 @@ class Touching {
             local_.contact(position, normal, near.distance, feature, local_.approach(position, normal, margin_)));
     }
 
-    void visitProbes(const Bounds& bounds, float spacing, ContactReport& report, std::vector<Contact>& contacts) const {
-        const float within =
-            0.5f * glm::length(scale_ * bounds.size()) + convex_.radius() + margin_ + local_.longestWay();
-        const auto ask = [&](const glm::vec3& point, std::uint32_t number) {
-            if (const auto contact = local_.probe(intoField(point), convex_.radius(), number, margin_, report))
-                contacts.push_back(*contact);
-        };
-        convex_.visitProbes(intoConvex(scale_ * bounds.centre()), within, spacing, ask);
+    /// The convex body's own corners and edges in the field.
+    void visitProbes(ContactReport& report, std::vector<Contact>& contacts) const {
+        const auto corners = convex_.corners();
+        std::vector<Local::Answer> answers;
+        for (std::uint32_t i = 0; i < corners.size(); ++i) {
+            const glm::vec3 point = intoField(corners[i]);
+            answers.push_back(local_.at(point));
+            if (const auto found = local_.probe(point, answers[i], convex_.radius(i), i, margin_, report))
+                contacts.push_back(*found);
+        }
+        auto number = static_cast<std::uint32_t>(corners.size());
+        for (const Convex::Edge& edge : convex_.edges()) {
+            const auto place = [&](float part) { return intoField(convex_.place(edge, part)); };
+            local_.probeEdge({place, {convex_.radius(edge, 0), convex_.radius(edge, 1)}, !(edge.rim > 0), number},
+                             answers[edge.from], answers[edge.to], margin_, report, contacts);
+            number = (number + (2u << partBits)) & ~featureOfB;
+        }
     }
 
   private:
@@ -176,9 +301,46 @@ class Touching {
         }
     }
 
+    /// Where sharp edges of the field go deeper into a round body from a point that touches before they come up again.
+    void followEdges(std::uint32_t index, const Convex::Near& near, std::vector<Contact>& contacts) const {
+        const Collider& collider = local_.collider();
+        const auto points = collider.points().points();
+        const SharpEdges& edges = collider.edges();
+        for (const std::uint32_t e : edges.around(index)) {
+            const SharpEdge& edge = edges.edges()[e];
+            const std::uint32_t next = edge.from == index ? edge.to : edge.from;
+            const glm::vec3 from = intoConvex(scale_ * points[index].position),
+                            to = intoConvex(scale_ * points[next].position);
+            const float length = glm::distance(from, to);
+            const glm::vec3 along = (to - from) / length;
+            const auto nearAt = [&](float way) { return convex_.nearest(from + way * along, margin_); };
+            const auto slopeOf = [&](float way, const Convex::Near& there) {
+                return Slope{way, there.distance, glm::dot(there.normal, along)};
+            };
+            const Convex::Near there = nearAt(length);
+            const Slope first = slopeOf(0, near), last = slopeOf(length, there);
+            // Where both ends touch, one of them is enough.
+            const bool isOther = there.distance <= margin_ && next < index;
+            if (!fallsBetween(first, last) || isOther) continue;
+            const auto lowest =
+                lowestBetween(first, last, searchTolerance * scale_ * collider.field().voxelSize(),
+                              [&](float way) { return std::optional<Slope>(slopeOf(way, nearAt(way))); });
+            const Convex::Near deepest = nearAt(lowest->place);
+            const glm::vec3 across = deepest.normal - glm::dot(deepest.normal, along) * along;
+            const float steepness = glm::length(across);
+            const glm::vec3 normal = -(toField_ * across) / steepness;
+            const float distance = deepest.distance < 0 ? deepest.distance / steepness : deepest.distance;
+            const bool opposes = opposition.keeps(glm::dot(normal, points[index].normal + points[next].normal), false);
+            if (!(steepness > leastAcross) || distance > margin_ || !opposes) continue;
+            const glm::vec3 place = intoField(from + lowest->place * along);
+            contacts.push_back(local_.contact(place, normal, distance, (std::uint32_t(points.size()) + e) | featureOfB,
+                                              local_.approach(place, normal, margin_)));
+        }
+    }
+
     /// Follows the field's normal from the place of a round surface under a surface point to the deepest place nearby.
     std::optional<Contact> refine(const Convex::Near& near, std::uint32_t feature) const {
-        glm::vec3 place = intoField(near.core + convex_.radius() * near.normal);
+        glm::vec3 place = intoField(near.core + near.radius * near.normal);
         Local::Answer here = local_.at(place);
         if (here.where != Local::Answer::near) return std::nullopt;
         for (int i = 0; i < mostRefinements; ++i) {
@@ -212,16 +374,12 @@ class TriangleProbes : public btTriangleCallback {
           reach_(std::max(margin, field.scale * field.collider.field().interiorWidth()) + local_.longestWay()),
           spacing_(probeSpacing * field.scale * field.collider.field().voxelSize()),
           report_(report),
-          contacts_(contacts) {
-        const Bounds& bounds = field.collider.bounds();
-        centre_ = field.scale * bounds.centre();
-        within_ = 0.5f * field.scale * glm::length(bounds.size()) + margin + local_.longestWay();
-    }
+          contacts_(contacts) {}
 
     /// Triangles farther than this from the field's box are of no interest [m].
     float room() const { return margin_ + local_.longestWay(); }
 
-    void processTriangle(btVector3* triangle, int, int) override {
+    void processTriangle(btVector3* triangle, int, int index) override {
         const glm::vec3 corners[3] = {inField_.toWorld(toGlm(triangle[0])), inField_.toWorld(toGlm(triangle[1])),
                                       inField_.toWorld(toGlm(triangle[2]))};
         const glm::vec3 middle = (corners[0] + corners[1] + corners[2]) / 3.f;
@@ -231,17 +389,28 @@ class TriangleProbes : public btTriangleCallback {
             longest = std::max(longest, glm::distance(corners[i], corners[(i + 1) % 3]));
         }
         if (local_.at(middle).distance > around + room() + spacing_) return;
+        Local::Answer answers[3];
         for (int i = 0; i < 3; ++i) {
-            probe(corners[i], 0);
-            visitAlong(corners[i], corners[(i + 1) % 3], centre_, within_, spacing_,
-                       [&](const glm::vec3& point, std::uint32_t) { probe(point, 0); });
+            answers[i] = local_.at(corners[i]);
+            keep(local_.probe(corners[i], answers[i], 0, featureOf(index, 3 + i), margin_, report_));
+        }
+        for (int i = 0; i < 3; ++i) {
+            const int next = (i + 1) % 3;
+            const auto place = [&](float part) { return glm::mix(corners[i], corners[next], part); };
+            local_.probeEdge({place, {0, 0}, true, featureOf(index, i)}, answers[i], answers[next], margin_, report_,
+                             contacts_);
         }
         if (longest > spacing_) visitFace(corners);
     }
 
   private:
-    void probe(const glm::vec3& point, std::uint32_t feature) {
-        if (const auto contact = local_.probe(point, 0, feature, margin_, report_)) contacts_.push_back(*contact);
+    /// Of an edge, or behind those of a corner; the same from step to step.
+    static std::uint32_t featureOf(int triangle, int part) {
+        return ((std::uint32_t(triangle) * 6 + std::uint32_t(part)) << (partBits + 1)) & ~featureOfB;
+    }
+
+    void keep(const std::optional<Contact>& contact) {
+        if (contact) contacts_.push_back(*contact);
     }
 
     /// Asks the field at the feet of its own surface points on the triangle: a bump finds a large face.
@@ -255,7 +424,8 @@ class TriangleProbes : public btTriangleCallback {
         };
         field_.collider.points().visit(reject, [&](std::uint32_t index, const SurfacePoint& point) {
             const glm::vec3 below = foot(point.position);
-            if (glm::distance(below, scale * point.position) <= reach_) probe(below, index | featureOfB);
+            if (glm::distance(below, scale * point.position) <= reach_)
+                keep(local_.probe(below, local_.at(below), 0, index | featureOfB, margin_, report_));
         });
     }
 
@@ -263,8 +433,6 @@ class TriangleProbes : public btTriangleCallback {
     const Placed& field_;
     Local local_;
     float margin_, reach_, spacing_;
-    glm::vec3 centre_;
-    float within_;
     ContactReport& report_;
     std::vector<Contact>& contacts_;
 };
@@ -309,8 +477,7 @@ ContactReport collideConvex(const Convex& convex, const Pose& pose, const Motion
     field.collider.points().visit(
         [&](const glm::vec3& centre, float radius) { return touching.reject(centre, radius); },
         [&](std::uint32_t index, const SurfacePoint& point) { touching.visit(index, point, report, contacts); });
-    const float spacing = probeSpacing * field.scale * field.collider.field().voxelSize();
-    touching.visitProbes(field.collider.bounds(), spacing, report, contacts);
+    touching.visitProbes(report, contacts);
     return report;
 }
 
