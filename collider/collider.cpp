@@ -44,6 +44,7 @@ struct Map {
         shift = pose.position / into.scale;
     }
     glm::vec3 operator()(const glm::vec3& point) const { return linear * point + shift; }
+    glm::vec3 turned(const glm::vec3& direction) const { return linear * direction / scale; }
 
     // The same map, into the parts of a field's clearance.
     Map inParts(const Field& field) const {
@@ -226,7 +227,7 @@ class PointsInField {
             const Slope from{0, here.distance, glm::dot(here.normal, along)},
                 to{length, there.distance, glm::dot(there.normal, along)};
             if (!fallsBetween(from, to) && !mayKinkBetween(from, to)) continue;
-            if (const auto touched = deepestOf(at, end, along, from, to, here.normal + there.normal)) {
+            if (const auto touched = deepestOf(at, end, along, from, to, edge.wings)) {
                 const float part = touched->first / length;
                 const SurfacePoint &a = pointOf(index), &b = pointOf(next);
                 const SurfacePoint between{glm::mix(a.position, b.position, part), glm::normalize(a.normal + b.normal),
@@ -238,8 +239,7 @@ class PointsInField {
 
     // How far along an edge the deepest place is, and how it touches.
     std::optional<std::pair<float, Touch>> deepestOf(const glm::vec3& at, const glm::vec3& end, const glm::vec3& along,
-                                                     const Slope& from, const Slope& to,
-                                                     const glm::vec3& outward) const {
+                                                     const Slope& from, const Slope& to, const Wings& wings) const {
         const auto touchAt = [&](float way) -> std::optional<Touch> {
             const Sample sample = field_.sample(at + way * along);
             if (!sample.inBand) return std::nullopt;
@@ -259,9 +259,9 @@ class PointsInField {
         if (!touched) return std::nullopt;
 
         const glm::vec3 place = at + lowest->place * along;
-        const SharpEdges& its = other_.collider.edges();
-        if (const auto crossing = its.crossing(other_.collider.points(), at, end, place, outward + touched->normal,
-                                               crossingWithin * field_.voxelSize())) {
+        const Wings seen{map_.turned(wings[0]), map_.turned(wings[1])};
+        if (const auto crossing = other_.collider.edges().crossing(other_.collider.points(), at, end, seen, place,
+                                                                   crossingWithin * field_.voxelSize())) {
             if (crossing->distance > reach_) return std::nullopt;
             const glm::vec3 onEdge = crossing->position + crossing->distance * crossing->normal;
             return std::pair(glm::dot(onEdge - at, along), Touch{crossing->distance, crossing->normal});

@@ -24,9 +24,11 @@ constexpr float mostAbove = 0.05f;
 constexpr std::size_t mostNeighbours = 6;
 // Edges that cross at a smaller angle (sine) are parallel: their points tell enough.
 constexpr float leastCrossing = 0.2f;
-// The normal across two edges looks no farther aside from the field's than this (cosine): a right-angled edge's faces
-// have 0.71.
-constexpr float leastAgreement = 0.4f;
+// Faces leave the plane between two edges at this angle (sine) at least: faces that lie on each other touch by their
+// points.
+constexpr float leastLeaving = 0.09f;
+// Faces are looked for so far beside their edge [voxels].
+constexpr float wingSpan = 1.5f;
 // Pieces of an edge end within this of each other, as parts of their length.
 constexpr float gap = 0.02f;
 
@@ -69,6 +71,22 @@ std::vector<Neighbour> neighboursOf(std::uint32_t index, const SurfacePoints& po
     return kept;
 }
 
+/// By the surface beside the middle of an edge.
+Wings wingsOf(const SurfacePoint& a, const SurfacePoint& b, const Field& field) {
+    const glm::vec3 along = glm::normalize(b.position - a.position), middle = 0.5f * (a.position + b.position);
+    const glm::vec3 aside = glm::normalize(glm::cross(along, a.normal + b.normal));
+    const auto wing = [&](float side) {
+        glm::vec3 place = middle + side * wingSpan * field.voxelSize() * aside;
+        for (int i = 0; i < 2; ++i) {
+            const Sample sample = field.sample(place);
+            if (sample.inBand) place -= sample.distance * sample.gradient;
+        }
+        const glm::vec3 way = place - middle;
+        return glm::normalize(way - glm::dot(way, along) * along);
+    };
+    return {wing(-1), wing(1)};
+}
+
 }  // namespace
 
 SharpEdges::SharpEdges(const SurfacePoints& points, const Field& field) {
@@ -82,7 +100,7 @@ SharpEdges::SharpEdges(const SurfacePoints& points, const Field& field) {
             const auto isBack = [&](const Neighbour& n) { return n.index == i; };
             const auto& its = neighbours[next.index];
             if (next.index < i || std::none_of(its.begin(), its.end(), isBack)) continue;
-            edges_.push_back({i, next.index});
+            edges_.push_back({i, next.index, wingsOf(all[i], all[next.index], field)});
             longest_ = std::max(longest_, next.distance);
         }
     first_.assign(all.size() + 1, 0);
@@ -95,8 +113,8 @@ SharpEdges::SharpEdges(const SurfacePoints& points, const Field& field) {
 }
 
 std::optional<SharpEdges::Crossing> SharpEdges::crossing(const SurfacePoints& points, const glm::vec3& from,
-                                                         const glm::vec3& to, const glm::vec3& place,
-                                                         const glm::vec3& outward, float within) const {
+                                                         const glm::vec3& to, const Wings& wings,
+                                                         const glm::vec3& place, float within) const {
     if (edges_.empty()) return std::nullopt;
     const glm::vec3 along = to - from;
     const float reach = within + longest_;
@@ -115,7 +133,9 @@ std::optional<SharpEdges::Crossing> SharpEdges::crossing(const SurfacePoints& po
         const glm::vec3 there = from + onOther * along, here = a.position + onThis * its;
         const float away = glm::distance(there, place);
         const glm::vec3 normal = (glm::dot(across, a.normal + b.normal) < 0 ? -1.f : 1.f) / area * across;
-        if (away > nearest || glm::dot(normal, outward) < leastAgreement * glm::length(outward)) return;
+        if (away > nearest) return;
+        for (int i = 0; i < 2; ++i)
+            if (glm::dot(normal, edge.wings[i]) > -leastLeaving || glm::dot(normal, wings[i]) < leastLeaving) return;
         nearest = away;
         best = Crossing{here, normal, glm::dot(there - here, normal)};
     };

@@ -2,6 +2,7 @@
 // mostly do so between the points.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -12,9 +13,13 @@
 
 namespace bilayer {
 
+/// Directions from an edge into the faces on either side, square to it, of unit length.
+using Wings = std::array<glm::vec3, 2>;
+
 /// Between two sharp surface points, by their indices.
 struct SharpEdge {
     std::uint32_t from, to;
+    Wings wings;
 };
 
 /// Found from the points and the field alone, so that a body from a file has the same. Pieces join each sharp point to
@@ -39,11 +44,12 @@ class SharpEdges {
         glm::vec3 normal;    ///< across both edges, outward
         float distance;      ///< from here to the other edge, negative where they have passed each other [m]
     };
-    /// Where another body's edge crosses one of this body's, nearest to a place on it. All in this body's coordinates.
-    /// @param outward  about where the field looks there, of any length
-    /// @param within   of the place [m]
+    /// Where another body's edge crosses one of this body's, nearest to a place on it, if there is a plane between the
+    /// two that all four faces leave: else faces or corners touch first. All in this body's coordinates.
+    /// @param wings   of the other edge
+    /// @param within  of the place [m]
     std::optional<Crossing> crossing(const SurfacePoints& points, const glm::vec3& from, const glm::vec3& to,
-                                     const glm::vec3& place, const glm::vec3& outward, float within) const;
+                                     const Wings& wings, const glm::vec3& place, float within) const;
 
   private:
     std::vector<SharpEdge> edges_;

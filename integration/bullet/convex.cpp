@@ -16,6 +16,8 @@
 #include <glm/geometric.hpp>
 #include <glm/gtc/constants.hpp>
 #include <glm/vec2.hpp>
+#include <map>
+#include <utility>
 
 #include "integration/bullet/convert.h"
 
@@ -119,8 +121,11 @@ void Convex::makeBox(const glm::vec3& halfExtents) {
     for (std::uint32_t corner = 0; corner < 8; ++corner) {
         const glm::vec3 side(corner & 1 ? 1 : -1, corner & 2 ? 1 : -1, corner & 4 ? 1 : -1);
         faces_.points.push_back(side * halfExtents);
-        for (std::uint32_t axis : {1u, 2u, 4u})
-            if (!(corner & axis)) edges_.push_back({corner, corner | axis, 0});
+        for (int axis = 0; axis < 3; ++axis) {
+            const int next = (axis + 1) % 3, last = (axis + 2) % 3;
+            const Wings wings{-side[next] * direction(next), -side[last] * direction(last)};
+            if (side[axis] < 0) edges_.push_back({corner, corner | 1u << axis, 0, wings});
+        }
     }
 }
 
@@ -155,11 +160,7 @@ void Convex::makeHull(const std::vector<btVector3>& points) {
     btConvexHullComputer hull;
     hull.compute(&points.front().x(), sizeof(btVector3), static_cast<int>(points.size()), 0, 0);
     for (int i = 0; i < hull.vertices.size(); ++i) faces_.points.push_back(toGlm(hull.vertices[i]));
-    for (int i = 0; i < hull.edges.size(); ++i) {
-        const auto from = static_cast<std::uint32_t>(hull.edges[i].getSourceVertex());
-        const auto to = static_cast<std::uint32_t>(hull.edges[i].getTargetVertex());
-        if (from < to) edges_.push_back({from, to, 0});
-    }
+    std::map<std::pair<std::uint32_t, std::uint32_t>, glm::vec3> wings;  // of the face on the left of an edge
     for (int i = 0; i < hull.faces.size(); ++i) {
         const auto* first = &hull.edges[hull.faces[i]];
         const auto apex = static_cast<std::uint32_t>(first->getSourceVertex());
@@ -173,9 +174,24 @@ void Convex::makeHull(const std::vector<btVector3>& points) {
             faces_.triangles.push_back(triangle);
         }
         const float length = glm::length(area);
-        if (length > 0)
-            planes_.push_back(
-                {area / length, glm::dot(area / length, faces_.points[apex]), begin, faces_.triangles.size()});
+        if (!(length > 0)) continue;
+        const glm::vec3 normal = area / length;
+        planes_.push_back({normal, glm::dot(normal, faces_.points[apex]), begin, faces_.triangles.size()});
+        const auto* edge = first;
+        do {
+            const auto from = static_cast<std::uint32_t>(edge->getSourceVertex());
+            const auto to = static_cast<std::uint32_t>(edge->getTargetVertex());
+            wings[{from, to}] = glm::normalize(glm::cross(normal, faces_.points[to] - faces_.points[from]));
+            edge = edge->getNextEdgeOfFace();
+        } while (edge != first);
+    }
+    for (int i = 0; i < hull.edges.size(); ++i) {
+        const auto from = static_cast<std::uint32_t>(hull.edges[i].getSourceVertex());
+        const auto to = static_cast<std::uint32_t>(hull.edges[i].getTargetVertex());
+        if (from > to) continue;
+        edges_.push_back({from, to, 0});
+        const auto left = wings.find({from, to}), right = wings.find({to, from});
+        if (left != wings.end() && right != wings.end()) edges_.back().wings = Wings{left->second, right->second};
     }
 }
 

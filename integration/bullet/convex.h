@@ -4,9 +4,11 @@
 #include <BulletCollision/CollisionShapes/btConvexShape.h>
 #include <BulletCollision/CollisionShapes/btMultiSphereShape.h>
 
+#include <optional>
 #include <span>
 #include <vector>
 
+#include "collider/sharp_edges.h"
 #include "integration/bullet/ball_hull.h"
 #include "sdf/mesh.h"
 
@@ -39,8 +41,9 @@ class Convex {
 
     /// What is asked about in a field, grown by radius(): corners, and places along edges. Their numbers stay the same.
     struct Edge {
-        std::uint32_t from, to;  ///< corners
-        float rim;               ///< the radius of the circle whose chord this is, 0 for a straight edge [m]
+        std::uint32_t from, to;        ///< corners
+        float rim;                     ///< the radius of the circle whose chord this is, 0 for a straight edge [m]
+        std::optional<Wings> wings{};  ///< of a straight edge between two faces
     };
     std::span<const glm::vec3> corners() const { return faces_.points; }
     std::span<const Edge> edges() const { return edges_; }

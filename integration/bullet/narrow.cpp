@@ -4,11 +4,13 @@
 #include <LinearMath/btAabbUtil2.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
+#include <map>
 #include <optional>
 
 #include "collider/edge_search.h"
@@ -35,6 +37,8 @@ constexpr float shortestGradient = 0.5f;
 constexpr ContactOptions opposition{.leastOpposition = 0.3f, .leastOppositionApart = 0.9f};
 // Steps towards the deepest place of a round surface; each divides the error by the ratio of the radii of curvature.
 constexpr int mostRefinements = 6;
+// Triangles whose wings enclose more than 179.9 degrees (cosine) have no edge between them.
+constexpr float flatEdge = -0.9999985f;
 // A way has met a convex body where it is this near to it [margins], or after so many steps of what is clear.
 constexpr float sweepTolerance = 0.1f;
 constexpr int mostSteps = 64;
@@ -92,7 +96,9 @@ class Local {
         std::function<glm::vec3(float)> place;  ///< by the part of the way
         float radius[2];                        ///< by which it is grown at its ends [m]
         bool isStraight;
-        std::uint32_t feature;  ///< the first of 2^(partBits + 1)
+        std::uint32_t feature;       ///< the first of 2^(partBits + 1)
+        std::optional<Wings> wings;  ///< of a sharp edge between two faces
+        bool isSearched = true;      ///< between the probes
 
         float radiusAt(float part) const { return radius[0] + part * (radius[1] - radius[0]); }
         glm::vec3 directionAt(float part) const {
@@ -126,7 +132,7 @@ class Local {
                 if (const auto found = probe(point, there, edge.radiusAt(part), feature, margin, report))
                     contacts.push_back(*found);
             }
-            if (next == i + 1)
+            if (edge.isSearched && next == i + 1)
                 if (const auto found = deepestBetween(edge, float(i) / float(parts), before, part, there, margin)) {
                     contacts.push_back(*found);
                     contacts.back().feature = edge.feature + 2 * std::uint32_t(i) + 1;
@@ -191,19 +197,17 @@ class Local {
         const float part = partAt(lowest->place), radius = edge.radiusAt(part);
         const glm::vec3 point = edge.place(part);
         const Answer here = at(point);
-        // On the ridge of an edge the gradient may vanish; beside it, it does not.
-        const glm::vec3 outward = atFrom.gradient + here.gradient + atTo.gradient;
-        if (edge.isStraight && radius <= 0)
+        if (edge.wings && radius <= 0)
             if (const auto crossing =
                     collider_.edges().crossing(collider_.points(), edge.place(0) / scale_, edge.place(1) / scale_,
-                                               point / scale_, outward, crossingWithin * voxel_ / scale_)) {
+                                               *edge.wings, point / scale_, crossingWithin * voxel_ / scale_)) {
                 if (scale_ * crossing->distance > margin) return std::nullopt;
                 return contact(scale_ * crossing->position, crossing->normal, scale_ * crossing->distance, 0,
                                approach(point, crossing->normal, margin));
             }
         if (!falls || here.where != Answer::near) return std::nullopt;
         const glm::vec3 along = edge.directionAt(part);
-        const glm::vec3 across = here.normal - glm::dot(outward, along) * along;
+        const glm::vec3 across = here.normal - glm::dot(here.normal, along) * along;
         const float steepness = glm::length(across);
         if (!(steepness > leastAcross)) return std::nullopt;
         const float depth = here.distance < 0 ? here.distance / steepness : here.distance;
@@ -268,9 +272,13 @@ class Touching {
         }
         auto number = static_cast<std::uint32_t>(corners.size());
         for (const Convex::Edge& edge : convex_.edges()) {
-            const auto place = [&](float part) { return intoField(convex_.place(edge, part)); };
-            local_.probeEdge({place, {convex_.radius(edge, 0), convex_.radius(edge, 1)}, !(edge.rim > 0), number},
-                             answers[edge.from], answers[edge.to], margin_, report, contacts);
+            Local::Edge seen{[&](float part) { return intoField(convex_.place(edge, part)); },
+                             {convex_.radius(edge, 0), convex_.radius(edge, 1)},
+                             !(edge.rim > 0),
+                             number,
+                             edge.wings};
+            if (edge.wings) seen.wings = Wings{toField_ * (*edge.wings)[0], toField_ * (*edge.wings)[1]};
+            local_.probeEdge(seen, answers[edge.from], answers[edge.to], margin_, report, contacts);
             number = (number + (2u << partBits)) & ~featureOfB;
         }
     }
@@ -362,7 +370,7 @@ class Touching {
     glm::vec3 origin_;
 };
 
-/// Triangles as Bullet hands them over, one by one.
+/// Triangles as Bullet hands them over: what they share is asked about once.
 class TriangleProbes : public btTriangleCallback {
   public:
     TriangleProbes(const btTransform& transform, const Motion& motion, const Placed& field, float margin,
@@ -380,30 +388,77 @@ class TriangleProbes : public btTriangleCallback {
     float room() const { return margin_ + local_.longestWay(); }
 
     void processTriangle(btVector3* triangle, int, int index) override {
-        const glm::vec3 corners[3] = {inField_.toWorld(toGlm(triangle[0])), inField_.toWorld(toGlm(triangle[1])),
-                                      inField_.toWorld(toGlm(triangle[2]))};
+        Face face{{inField_.toWorld(toGlm(triangle[0])), inField_.toWorld(toGlm(triangle[1])),
+                   inField_.toWorld(toGlm(triangle[2]))},
+                  index};
+        const auto& corners = face.corners;
         const glm::vec3 middle = (corners[0] + corners[1] + corners[2]) / 3.f;
-        float around = 0, longest = 0;
-        for (int i = 0; i < 3; ++i) {
-            around = std::max(around, glm::distance(corners[i], middle));
-            longest = std::max(longest, glm::distance(corners[i], corners[(i + 1) % 3]));
-        }
-        if (local_.at(middle).distance > around + room() + spacing_) return;
+        float around = 0;
+        for (int i = 0; i < 3; ++i) around = std::max(around, glm::distance(corners[i], middle));
+        if (local_.at(middle).distance <= around + room() + spacing_) faces_.push_back(face);
+    }
+
+    /// Asks about all triangles that were handed over.
+    void probe() {
+        for (std::uint32_t f = 0; f < faces_.size(); ++f)
+            for (int i = 0; i < 3; ++i) sides_[keyOf(f, i)].push_back({f, i});
+        for (std::uint32_t f = 0; f < faces_.size(); ++f) visit(f);
+    }
+
+  private:
+    struct Face {
+        std::array<glm::vec3, 3> corners;
+        int index;  ///< Bullet's
+    };
+    struct Side {
+        std::uint32_t face;
+        int first;  ///< corner
+    };
+    /// The ends of a side in one order.
+    using Key = std::array<float, 6>;
+
+    Key keyOf(std::uint32_t face, int first) const {
+        const glm::vec3 &a = faces_[face].corners[first], &b = faces_[face].corners[(first + 1) % 3];
+        const Key key{a.x, a.y, a.z, b.x, b.y, b.z}, back{b.x, b.y, b.z, a.x, a.y, a.z};
+        return std::min(key, back);
+    }
+
+    void visit(std::uint32_t f) {
+        const auto& [corners, index] = faces_[f];
         Local::Answer answers[3];
+        float longest = 0;
         for (int i = 0; i < 3; ++i) {
             answers[i] = local_.at(corners[i]);
             keep(local_.probe(corners[i], answers[i], 0, featureOf(index, 3 + i), margin_, report_));
+            longest = std::max(longest, glm::distance(corners[i], corners[(i + 1) % 3]));
         }
         for (int i = 0; i < 3; ++i) {
-            const int next = (i + 1) % 3;
-            const auto place = [&](float part) { return glm::mix(corners[i], corners[next], part); };
-            local_.probeEdge({place, {0, 0}, true, featureOf(index, i)}, answers[i], answers[next], margin_, report_,
-                             contacts_);
+            const auto& sides = sides_.at(keyOf(f, i));
+            if (sides.front().face != f || sides.front().first != i) continue;
+            const glm::vec3 &from = corners[i], &to = corners[(i + 1) % 3];
+            Local::Edge edge{
+                [&](float part) { return glm::mix(from, to, part); }, {0, 0}, true, featureOf(index, i), {}};
+            if (sides.size() == 2) {
+                edge.wings = Wings{wingOf(sides[0]), wingOf(sides[1])};
+                edge.isSearched = glm::dot((*edge.wings)[0], (*edge.wings)[1]) > flatEdge;
+            }
+            local_.probeEdge(edge, answers[i], answers[(i + 1) % 3], margin_, report_, contacts_);
         }
         if (longest > spacing_) visitFace(corners);
     }
 
-  private:
+    /// From a side into its triangle; nowhere for a triangle without area.
+    glm::vec3 wingOf(const Side& side) const {
+        const auto& corners = faces_[side.face].corners;
+        const glm::vec3 &from = corners[side.first], &to = corners[(side.first + 1) % 3],
+                        &opposite = corners[(side.first + 2) % 3];
+        const glm::vec3 along = to - from, way = opposite - from;
+        const float squared = glm::dot(along, along);
+        const glm::vec3 across = squared > 0 ? way - glm::dot(way, along) / squared * along : way;
+        const float length = glm::length(across);
+        return length > 0 ? across / length : glm::vec3(0);
+    }
+
     /// Of an edge, or behind those of a corner; the same from step to step.
     static std::uint32_t featureOf(int triangle, int part) {
         return ((std::uint32_t(triangle) * 6 + std::uint32_t(part)) << (partBits + 1)) & ~featureOfB;
@@ -414,7 +469,7 @@ class TriangleProbes : public btTriangleCallback {
     }
 
     /// Asks the field at the feet of its own surface points on the triangle: a bump finds a large face.
-    void visitFace(const glm::vec3 (&corners)[3]) {
+    void visitFace(const std::array<glm::vec3, 3>& corners) {
         const float scale = field_.scale;
         const auto foot = [&](const glm::vec3& point) {
             return nearestOnTriangle(scale * point, corners[0], corners[1], corners[2]);
@@ -435,6 +490,8 @@ class TriangleProbes : public btTriangleCallback {
     float margin_, reach_, spacing_;
     ContactReport& report_;
     std::vector<Contact>& contacts_;
+    std::vector<Face> faces_;
+    std::map<Key, std::vector<Side>> sides_;
 };
 
 }  // namespace
@@ -491,6 +548,7 @@ ContactReport collideTriangles(const btConcaveShape& mesh, const btTransform& tr
     const btTransform place(toBullet(inMesh.rotation), toBullet(inMesh.toWorld(field.scale * bounds.centre())));
     btTransformAabb(toBullet(0.5f * field.scale * bounds.size()), probes.room(), place, lower, upper);
     mesh.processAllTriangles(&probes, lower, upper);
+    probes.probe();
     return report;
 }
 
