@@ -315,7 +315,9 @@ std::optional<MassProperties> massOf(const Mesh& mesh) {
 class Collider::Triangles {
   public:
     explicit Triangles(Mesh mesh) : mesh_(std::move(mesh)) {}
-    explicit Triangles(const LevelSet& field) : field_(field) {}
+    explicit Triangles(const LevelSet& field) : field_(field), areGiven_(false) {}
+
+    bool areGiven() const { return areGiven_; }
 
     const Mesh& mesh() {
         std::call_once(once_, [&] {
@@ -329,6 +331,7 @@ class Collider::Triangles {
 
   private:
     std::optional<LevelSet> field_;
+    bool areGiven_ = true;
     Mesh mesh_;
     std::once_flag once_;
 };
@@ -354,6 +357,10 @@ Collider::Collider(const LevelSet& levelSet)
 
 const Mesh& Collider::mesh() const {
     return triangles_->mesh();
+}
+
+bool Collider::hasMesh() const {
+    return triangles_->areGiven();
 }
 
 const MassProperties& Collider::mass() const {

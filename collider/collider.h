@@ -40,6 +40,8 @@ class Collider {
 
     /// Of a body from a file it is extracted when first asked for, once.
     const Mesh& mesh() const;
+    /// Whether it was made of a mesh: that of a body from a file is only like it.
+    bool hasMesh() const;
     const Field& field() const { return field_; }
     const Body& body() const { return body_; }
     const SurfacePoints& points() const { return body_.points; }

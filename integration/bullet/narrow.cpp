@@ -25,6 +25,8 @@ namespace {
 constexpr float probeSpacing = 2, interpolationError = 0.87f;
 // Edges get no more parts: numbers beyond are those of the next edge.
 constexpr int partBits = 15;
+// Points farther than this inside the band's border are in it for certain [voxels].
+constexpr float bandBorder = 1.7321f;
 constexpr float searchTolerance = 2e-3f;  // of the deepest place between two probes [voxels]
 // Where two edges cross, the normal across both is taken if it looks no farther aside from the field's (cosine).
 constexpr float leastAcross = 0.3f;
@@ -46,7 +48,8 @@ constexpr int mostSteps = 64;
 /// A field in metres of the world and the axes of its body, and how another body moves towards it.
 class Local {
   public:
-    Local(const Placed& field, const Pose& other, const Motion& motion)
+    /// @param reach  up to which contacts are made [m]
+    Local(const Placed& field, const Pose& other, const Motion& motion, float reach)
         : collider_(field.collider),
           field_(field.collider.field()),
           scale_(field.scale),
@@ -54,6 +57,7 @@ class Local {
           pose_(field.pose),
           ways_(other, motion, field.pose, field.motion) {
         const Bounds& bounds = field.collider.bounds();
+        if (reach > scale_ * field_.exteriorWidth() - bandBorder * voxel_) farReach_ = reach / scale_;
         longestWay_ = ways_.longest(scale_ * bounds.centre(), 0.5f * scale_ * glm::length(bounds.size()));
     }
 
@@ -72,8 +76,10 @@ class Local {
         bool isKnown() const { return where == near || where == unclear; }
     };
 
-    Answer at(const glm::vec3& point) const {
+    /// @param radius  by which the point is grown [m]
+    Answer at(const glm::vec3& point, float radius = 0) const {
         const Sample sample = field_.sample(point / scale_);
+        if (!sample.inBand && sample.distance > 0 && farReach_ > 0) return farAway(point, radius, sample.distance);
         if (!sample.inBand) return {sample.distance > 0 ? Answer::outside : Answer::inside, scale_ * sample.distance};
         const float length = glm::length(sample.gradient);
         if (length < shortestGradient) return {Answer::unclear, scale_ * sample.distance, {}, sample.gradient};
@@ -127,7 +133,7 @@ class Local {
             Answer there = last;
             if (next < parts) {
                 const glm::vec3 point = edge.place(part);
-                there = at(point);
+                there = at(point, edge.radiusAt(part));
                 const std::uint32_t feature = edge.feature + 2 * std::uint32_t(next);
                 if (const auto found = probe(point, there, edge.radiusAt(part), feature, margin, report))
                     contacts.push_back(*found);
@@ -168,6 +174,14 @@ class Local {
                        -glm::dot(way, hit->normal));
     }
 
+    /// Beyond the band, where a contact test asks for more than the band tells.
+    Answer farAway(const glm::vec3& point, float radius, float bound) const {
+        const ClosestPoint closest = field_.closest(point / scale_, farReach_ + radius / scale_);
+        if (!closest.found) return {Answer::outside, std::max(scale_ * bound, scale_ * farReach_ + radius)};
+        const glm::vec3 normal = (point / scale_ - closest.position) / closest.distance;
+        return {Answer::near, scale_ * closest.distance, normal, normal};
+    }
+
     /// Between two places of an edge, if it falls from either.
     std::optional<Contact> deepestBetween(const Edge& edge, float from, const Answer& atFrom, float to,
                                           const Answer& atTo, float margin) const {
@@ -185,7 +199,8 @@ class Local {
         const bool falls = fallsBetween(first, last);
         if (!isNear || !(falls || mayKinkBetween(first, last))) return std::nullopt;
         const auto slopeAt = [&](float way) -> std::optional<Slope> {
-            const Answer answer = at(edge.place(partAt(way)));
+            const float part = partAt(way);
+            const Answer answer = at(edge.place(part), edge.radiusAt(part));
             if (!answer.isKnown()) return std::nullopt;
             return slopeOf(way, answer);
         };
@@ -196,7 +211,7 @@ class Local {
 
         const float part = partAt(lowest->place), radius = edge.radiusAt(part);
         const glm::vec3 point = edge.place(part);
-        const Answer here = at(point);
+        const Answer here = at(point, radius);
         if (edge.wings && radius <= 0)
             if (const auto crossing =
                     collider_.edges().crossing(collider_.points(), edge.place(0) / scale_, edge.place(1) / scale_,
@@ -222,13 +237,14 @@ class Local {
     Pose pose_;
     RelativeWays ways_;
     float longestWay_;
+    float farReach_ = 0;  ///< where contacts are asked for beyond the band; in the field's size
 };
 
 /// A convex body in the coordinates of a Local field.
 class Touching {
   public:
     Touching(const Convex& convex, const Pose& pose, const Motion& motion, const Placed& field, float margin)
-        : convex_(convex), local_(field, pose, motion), margin_(margin), scale_(field.scale) {
+        : convex_(convex), local_(field, pose, motion, margin), margin_(margin), scale_(field.scale) {
         const Pose inField = relative(field.pose, pose);
         toField_ = glm::mat3(inField.rotation);
         toConvex_ = glm::transpose(toField_);
@@ -266,7 +282,7 @@ class Touching {
         std::vector<Local::Answer> answers;
         for (std::uint32_t i = 0; i < corners.size(); ++i) {
             const glm::vec3 point = intoField(corners[i]);
-            answers.push_back(local_.at(point));
+            answers.push_back(local_.at(point, convex_.radius(i)));
             if (const auto found = local_.probe(point, answers[i], convex_.radius(i), i, margin_, report))
                 contacts.push_back(*found);
         }
@@ -377,7 +393,7 @@ class TriangleProbes : public btTriangleCallback {
                    ContactReport& report, std::vector<Contact>& contacts)
         : inField_(relative(field.pose, toPose(transform))),
           field_(field),
-          local_(field, toPose(transform), motion),
+          local_(field, toPose(transform), motion, margin),
           margin_(margin),
           reach_(std::max(margin, field.scale * field.collider.field().interiorWidth()) + local_.longestWay()),
           spacing_(probeSpacing * field.scale * field.collider.field().voxelSize()),
@@ -510,7 +526,7 @@ ContactReport collidePlane(const glm::vec3& normal, float offset, const Motion& 
     const glm::vec3 up = glm::conjugate(field.pose.rotation) * normal;
     const float height = (offset - glm::dot(normal, field.pose.position)) / field.scale;
     const float reach = margin / field.scale;
-    const Local local(field, {}, motion);
+    const Local local(field, {}, motion, margin);
     const auto above = [&](const glm::vec3& point) { return glm::dot(up, point) - height; };
     const auto reject = [&](const glm::vec3& centre, float radius) {
         return above(centre) - radius > reach + local.longestWay() / field.scale;
