@@ -31,6 +31,8 @@ constexpr std::uint32_t rimChords = 32;
 constexpr int supportDirections = 256;
 // A normal that is tilted less than this off the axis belongs to a flat end.
 constexpr float flatEnd = 0.1f;
+// A place on the side is on a rim from this part of the half height on.
+constexpr float beforeRim = 0.999f;
 
 glm::vec3 direction(int axis) {
     glm::vec3 unit(0);
@@ -318,6 +320,28 @@ glm::vec3 Convex::slide(const Near& near, const glm::vec3& towards) const {
         core[axis_] = height;
     }
     return core + near.radius * towards;
+}
+
+bool Convex::isFlat(const Near& near) const {
+    return core_ == Core::box || core_ == Core::hull ||
+           (core_ == Core::revolution && std::abs(near.normal[axis_]) > 1 - flatEnd * flatEnd);
+}
+
+bool Convex::isRound(const Near& near) const {
+    const bool isOnSide = std::abs(near.core[axis_]) < beforeRim * halfHeight_;
+    return core_ == Core::segment || core_ == Core::balls ||
+           (core_ == Core::revolution && isOnSide && std::abs(near.normal[axis_]) < 1 - flatEnd * flatEnd);
+}
+
+std::optional<std::array<glm::vec3, 2>> Convex::sideLine(const Near& near, const glm::vec3& place) const {
+    if (core_ != Core::revolution || std::abs(near.normal[axis_]) > 1 - flatEnd * flatEnd) return std::nullopt;
+    glm::vec3 out = place;
+    out[axis_] = 0;
+    const float length = glm::length(out);
+    if (!(length > 0)) return std::nullopt;
+    out /= length;
+    const glm::vec3 up = halfHeight_ * direction(axis_);
+    return std::array{lowerRadius_ * out - up, upperRadius_ * out + up};
 }
 
 float Convex::radius(const Edge& edge, float part) const {

@@ -4,6 +4,7 @@
 #include <BulletCollision/CollisionShapes/btConvexShape.h>
 #include <BulletCollision/CollisionShapes/btMultiSphereShape.h>
 
+#include <array>
 #include <optional>
 #include <span>
 #include <vector>
@@ -38,6 +39,14 @@ class Convex {
     bool isCurved() const { return core_ != Core::box; }
     /// The point of the surface around `near` that lies farthest in a direction of unit length.
     glm::vec3 slide(const Near& near, const glm::vec3& direction) const;
+
+    /// Whether the surface is flat where a point is near it, or is where its core's is.
+    bool isFlat(const Near& near) const;
+    /// Whether it is round and smooth there.
+    bool isRound(const Near& near) const;
+    /// The ends of the straight line on a solid of revolution's side that runs through a place; nothing on its flat
+    /// ends, and for other shapes.
+    std::optional<std::array<glm::vec3, 2>> sideLine(const Near& near, const glm::vec3& place) const;
 
     /// What is asked about in a field, grown by radius(): corners, and places along edges. Their numbers stay the same.
     struct Edge {

@@ -41,6 +41,8 @@ constexpr ContactOptions opposition{.leastOpposition = 0.3f, .leastOppositionApa
 constexpr int mostRefinements = 6;
 // Triangles whose wings enclose more than 179.9 degrees (cosine) have no edge between them.
 constexpr float flatEdge = -0.9999985f;
+// Faces that fall by less lie on what they touch: the next surface points are as deep to a hundredth of a voxel.
+constexpr float leastDownhill = 0.05f;
 // A way has met a convex body where it is this near to it [margins], or after so many steps of what is clear.
 constexpr float sweepTolerance = 0.1f;
 constexpr int mostSteps = 64;
@@ -158,6 +160,10 @@ class Local {
         return {pose_.toWorld(position), pose_.rotation * normal, distance, feature, approach};
     }
 
+    /// Where an edge between two of its places is deepest, if it falls from either, or crosses a sharp edge.
+    std::optional<Contact> deepestBetween(const Edge& edge, float from, const Answer& atFrom, float to,
+                                          const Answer& atTo, float margin) const;
+
   private:
     /// The same for a point that is farther away: where its way meets the surface.
     std::optional<Contact> probeOnWay(const glm::vec3& point, float radius, std::uint32_t feature, float margin,
@@ -182,55 +188,6 @@ class Local {
         return {Answer::near, scale_ * closest.distance, normal, normal};
     }
 
-    /// Between two places of an edge, if it falls from either.
-    std::optional<Contact> deepestBetween(const Edge& edge, float from, const Answer& atFrom, float to,
-                                          const Answer& atTo, float margin) const {
-        if (!atFrom.isKnown() || !atTo.isKnown()) return std::nullopt;
-        const float length = glm::distance(edge.place(from), edge.place(to));
-        const float growth = (edge.radius[1] - edge.radius[0]) * (to - from) / length;
-        const auto partAt = [&](float way) { return from + way / length * (to - from); };
-        const auto slopeOf = [&](float way, const Answer& answer) {
-            const float part = partAt(way);
-            return Slope{way, answer.distance - edge.radiusAt(part),
-                         glm::dot(answer.gradient, edge.directionAt(part)) - growth};
-        };
-        const Slope first = slopeOf(0, atFrom), last = slopeOf(length, atTo);
-        const bool isNear = std::min(first.value, last.value) - 0.5f * length <= margin;
-        const bool falls = fallsBetween(first, last);
-        if (!isNear || !(falls || mayKinkBetween(first, last))) return std::nullopt;
-        const auto slopeAt = [&](float way) -> std::optional<Slope> {
-            const float part = partAt(way);
-            const Answer answer = at(edge.place(part), edge.radiusAt(part));
-            if (!answer.isKnown()) return std::nullopt;
-            return slopeOf(way, answer);
-        };
-        const std::optional<Slope> lowest = falls ? lowestBetween(first, last, searchTolerance * voxel_, slopeAt)
-                                            : first.value < last.value ? first
-                                                                       : last;
-        if (!lowest) return std::nullopt;
-
-        const float part = partAt(lowest->place), radius = edge.radiusAt(part);
-        const glm::vec3 point = edge.place(part);
-        const Answer here = at(point, radius);
-        if (edge.wings && radius <= 0)
-            if (const auto crossing =
-                    collider_.edges().crossing(collider_.points(), edge.place(0) / scale_, edge.place(1) / scale_,
-                                               *edge.wings, point / scale_, crossingWithin * voxel_ / scale_)) {
-                if (scale_ * crossing->distance > margin) return std::nullopt;
-                return contact(scale_ * crossing->position, crossing->normal, scale_ * crossing->distance, 0,
-                               approach(point, crossing->normal, margin));
-            }
-        if (!falls || here.where != Answer::near) return std::nullopt;
-        const glm::vec3 along = edge.directionAt(part);
-        const glm::vec3 across = here.normal - glm::dot(here.normal, along) * along;
-        const float steepness = glm::length(across);
-        if (!(steepness > leastAcross)) return std::nullopt;
-        const float depth = here.distance < 0 ? here.distance / steepness : here.distance;
-        if (depth - radius > margin) return std::nullopt;
-        const glm::vec3 normal = across / steepness;
-        return contact(point - depth * normal, normal, depth - radius, 0, approach(point, normal, margin));
-    }
-
     const Collider& collider_;
     const Field& field_;
     float scale_, voxel_;
@@ -239,6 +196,54 @@ class Local {
     float longestWay_;
     float farReach_ = 0;  ///< where contacts are asked for beyond the band; in the field's size
 };
+
+std::optional<Contact> Local::deepestBetween(const Edge& edge, float from, const Answer& atFrom, float to,
+                                             const Answer& atTo, float margin) const {
+    if (!atFrom.isKnown() || !atTo.isKnown()) return std::nullopt;
+    const float length = glm::distance(edge.place(from), edge.place(to));
+    const float growth = (edge.radius[1] - edge.radius[0]) * (to - from) / length;
+    const auto partAt = [&](float way) { return from + way / length * (to - from); };
+    const auto slopeOf = [&](float way, const Answer& answer) {
+        const float part = partAt(way);
+        return Slope{way, answer.distance - edge.radiusAt(part),
+                     glm::dot(answer.gradient, edge.directionAt(part)) - growth};
+    };
+    const Slope first = slopeOf(0, atFrom), last = slopeOf(length, atTo);
+    const bool isNear = std::min(first.value, last.value) - 0.5f * length <= margin;
+    const bool falls = fallsBetween(first, last);
+    if (!isNear || !(falls || mayKinkBetween(first, last))) return std::nullopt;
+    const auto slopeAt = [&](float way) -> std::optional<Slope> {
+        const float part = partAt(way);
+        const Answer answer = at(edge.place(part), edge.radiusAt(part));
+        if (!answer.isKnown()) return std::nullopt;
+        return slopeOf(way, answer);
+    };
+    const std::optional<Slope> lowest = falls ? lowestBetween(first, last, searchTolerance * voxel_, slopeAt)
+                                        : first.value < last.value ? first
+                                                                   : last;
+    if (!lowest) return std::nullopt;
+
+    const float part = partAt(lowest->place), radius = edge.radiusAt(part);
+    const glm::vec3 point = edge.place(part);
+    const Answer here = at(point, radius);
+    if (edge.wings && radius <= 0)
+        if (const auto crossing =
+                collider_.edges().crossing(collider_.points(), edge.place(0) / scale_, edge.place(1) / scale_,
+                                           *edge.wings, point / scale_, crossingWithin * voxel_ / scale_)) {
+            if (scale_ * crossing->distance > margin) return std::nullopt;
+            return contact(scale_ * crossing->position, crossing->normal, scale_ * crossing->distance, 0,
+                           approach(point, crossing->normal, margin));
+        }
+    if (!falls || here.where != Answer::near) return std::nullopt;
+    const glm::vec3 along = edge.directionAt(part);
+    const glm::vec3 across = here.normal - glm::dot(here.normal, along) * along;
+    const float steepness = glm::length(across);
+    if (!(steepness > leastAcross)) return std::nullopt;
+    const float depth = here.distance < 0 ? here.distance / steepness : here.distance;
+    if (depth - radius > margin) return std::nullopt;
+    const glm::vec3 normal = across / steepness;
+    return contact(point - depth * normal, normal, depth - radius, 0, approach(point, normal, margin));
+}
 
 /// A convex body in the coordinates of a Local field.
 class Touching {
@@ -265,13 +270,23 @@ class Touching {
         const Convex::Near near = convex_.nearest(intoConvex(position), margin_);
         if (near.distance > margin_) return visitOnWay(position, point, feature, near.distance, contacts);
         const glm::vec3 normal = -(toField_ * near.normal);
-        if (!opposition.keeps(glm::dot(normal, point.normal), near.distance > 0 && !point.isSharp)) return;
+        // What is round has no edge that a point could see aslant.
+        const bool apart = near.distance > 0 && !point.isSharp && !convex_.isRound(near);
+        if (!opposition.keeps(glm::dot(normal, point.normal), apart)) return;
         if (convex_.isCurved() && point.isSharp) followEdges(index, near, contacts);
         if (convex_.isCurved())
             if (const auto better = refine(near, feature)) {
                 contacts.push_back(*better);
                 return;
             }
+        if (!convex_.isCurved() && !point.isSharp) {
+            const glm::vec3 place = intoField(near.core);
+            if (auto deeper = downhill(near, place, local_.at(place))) {
+                deeper->feature = feature;
+                contacts.push_back(*deeper);
+                return;
+            }
+        }
         contacts.push_back(
             local_.contact(position, normal, near.distance, feature, local_.approach(position, normal, margin_)));
     }
@@ -374,9 +389,38 @@ class Touching {
             place = next;
             here = there;
         }
-        if (here.distance > margin_) return std::nullopt;
-        return local_.contact(place - here.distance * here.normal, here.normal, here.distance, feature,
-                              local_.approach(place, here.normal, margin_));
+        std::optional<Contact> found = downhill(near, place, here);
+        if (!found && here.distance <= margin_)
+            found = local_.contact(place - here.distance * here.normal, here.normal, here.distance, feature,
+                                   local_.approach(place, here.normal, margin_));
+        if (found) found->feature = feature;
+        return found;
+    }
+
+    /// Where a face, or the straight line on the side of a cylinder or a cone, goes deeper near a place on it.
+    std::optional<Contact> downhill(const Convex::Near& near, const glm::vec3& place, const Local::Answer& here) const {
+        const float step = probeSpacing * scale_ * local_.collider().field().voxelSize();
+        const glm::vec3 slope = toConvex_ * here.gradient, start = intoConvex(place);
+        glm::vec3 end;
+        if (const auto line = convex_.sideLine(near, start)) {
+            const glm::vec3 from = (*line)[0] + near.radius * near.normal, along = (*line)[1] - (*line)[0];
+            const float length = glm::length(along), steepness = glm::dot(slope, along) / length;
+            if (!(std::abs(steepness) > leastDownhill)) return std::nullopt;
+            const float middle = glm::dot(start - from, along) / (length * length);
+            const float there = std::clamp(middle - std::copysign(step / length, steepness), 0.f, 1.f);
+            end = start + (there - middle) * along;
+        } else {
+            if (!convex_.isFlat(near)) return std::nullopt;
+            const glm::vec3 uphill = slope - glm::dot(slope, near.normal) * near.normal;
+            const float steepness = glm::length(uphill);
+            if (!(steepness > leastDownhill)) return std::nullopt;
+            // no farther than to the border of the face
+            const Convex::Near last = convex_.nearest(start - step / steepness * uphill, step);
+            end = last.core + last.radius * near.normal;
+        }
+        const Local::Edge way{
+            [&, to = intoField(end)](float part) { return glm::mix(place, to, part); }, {0, 0}, true, 0, std::nullopt};
+        return local_.deepestBetween(way, 0, here, 1, local_.at(intoField(end)), margin_);
     }
 
     const Convex& convex_;
