@@ -227,6 +227,8 @@ class Maker {
         for (const btVector3& centre : centres)
             balls.push_back(moved(shapes::sphere(radii[0], 4), {centre.x(), centre.y(), centre.z()}));
         const auto shape = std::make_shared<btMultiSphereShape>(centres, radii, 3);
+        // a field takes the balls as they are, but Bullet's own shapes around would meet its 4 cm at any scale
+        shape->setMargin(0.95f * radii[0]);
         return part("multisphere", shapes::join(balls), shape, 0.25f);
     }
     Mesh capsule() const {

@@ -46,7 +46,7 @@ struct Crossing {
 };
 
 constexpr float halfBar = 0.3f;
-const glm::vec3 bar(0.8f, halfBar, halfBar);
+const glm::vec3 bar(1.4f, halfBar, halfBar);
 
 Crossing crossingOf(std::mt19937& random, float gap) {
     std::uniform_real_distribution<float> part(-1, 1);
