@@ -39,10 +39,13 @@ constexpr float shortestGradient = 0.5f;
 constexpr ContactOptions opposition{.leastOpposition = 0.3f, .leastOppositionApart = 0.9f};
 // Steps towards the deepest place of a round surface; each divides the error by the ratio of the radii of curvature.
 constexpr int mostRefinements = 6;
+// A point lies over a face if its foot there is no farther aside than this [probe spacings]: rounding.
+constexpr float onFace = 1e-4f;
 // Triangles whose wings enclose more than 179.9 degrees (cosine) have no edge between them.
 constexpr float flatEdge = -0.9999985f;
 // Faces that fall by less lie on what they touch: the next surface points are as deep to a hundredth of a voxel.
 constexpr float leastDownhill = 0.05f;
+constexpr float touchingFace = 0.25f;  // [voxels]
 // A way has met a convex body where it is this near to it [margins], or after so many steps of what is clear.
 constexpr float sweepTolerance = 0.1f;
 constexpr int mostSteps = 64;
@@ -410,7 +413,9 @@ class Touching {
             const float there = std::clamp(middle - std::copysign(step / length, steepness), 0.f, 1.f);
             end = start + (there - middle) * along;
         } else {
-            if (!convex_.isFlat(near)) return std::nullopt;
+            // Where faces touch, points are exact, and the interpolant is not.
+            const float apart = touchingFace * scale_ * local_.collider().field().voxelSize();
+            if (!convex_.isFlat(near) || near.distance < apart) return std::nullopt;
             const glm::vec3 uphill = slope - glm::dot(slope, near.normal) * near.normal;
             const float steepness = glm::length(uphill);
             if (!(steepness > leastDownhill)) return std::nullopt;
@@ -502,7 +507,9 @@ class TriangleProbes : public btTriangleCallback {
                 edge.wings = Wings{wingOf(sides[0]), wingOf(sides[1])};
                 edge.isSearched = glm::dot((*edge.wings)[0], (*edge.wings)[1]) > flatEdge;
             }
-            local_.probeEdge(edge, answers[i], answers[(i + 1) % 3], margin_, report_, contacts_);
+            // Within a plane the field's own points tell more.
+            if (edge.isSearched || longest <= spacing_)
+                local_.probeEdge(edge, answers[i], answers[(i + 1) % 3], margin_, report_, contacts_);
         }
         if (longest > spacing_) visitFace(corners);
     }
@@ -537,10 +544,24 @@ class TriangleProbes : public btTriangleCallback {
         const auto reject = [&](const glm::vec3& centre, float radius) {
             return glm::distance(foot(centre), scale * centre) > scale * radius + reach_;
         };
+        const glm::vec3 square = glm::cross(corners[1] - corners[0], corners[2] - corners[0]);
+        const float area = glm::length(square);
         field_.collider.points().visit(reject, [&](std::uint32_t index, const SurfacePoint& point) {
-            const glm::vec3 below = foot(point.position);
-            if (glm::distance(below, scale * point.position) <= reach_)
-                keep(local_.probe(below, local_.at(below), 0, index | featureOfB, margin_, report_));
+            const glm::vec3 place = scale * point.position, below = foot(point.position), way = below - place;
+            const std::uint32_t feature = index | featureOfB;
+            if (glm::length(way) > reach_) return;
+            // A point whose surface lies on the face is exact, and the interpolant need not be asked; one aslant may
+            // have passed an edge of what the sheet belongs to.
+            const float side = glm::dot(square, point.normal) < 0 ? -1.f : 1.f;
+            const glm::vec3 normal = side / area * square;
+            const float height = glm::dot(way, normal);
+            const bool isOver = glm::length(way) - std::abs(height) <= onFace * spacing_;
+            const bool lies = glm::dot(normal, point.normal) >= opposition.leastOppositionApart;
+            if (!(area > 0) || height > margin_ || !isOver || !lies)
+                return keep(local_.probe(below, local_.at(below), 0, feature, margin_, report_));
+            ++report_.pointsTested;
+            contacts_.push_back(
+                local_.contact(place, normal, height, feature, local_.approach(below, normal, margin_)));
         });
     }
 
