@@ -14,6 +14,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "collider/edge_search.h"
 #include "sdf/surface.h"
 
 namespace bilayer {
@@ -24,8 +25,12 @@ namespace {
 constexpr float interpolationError = 0.87f;
 // How fast the interpolant may change: by a voxel along each axis at once.
 constexpr float steepest = 1.7321f;
-constexpr float flattest = 0.1f;       // a gradient shorter than this tells no direction: the point is on a medial axis
-constexpr float nearestAside = 0.01f;  // [voxels] from an edge or corner: nearer, rounding spoils the way's direction
+constexpr float flattest = 0.1f;  // a gradient shorter than this tells no direction: the point is on a medial axis
+constexpr float searchTolerance = 2e-3f;  // of the deepest place on an edge [voxels]
+// Where two edges cross, the normal across both is taken if it looks no farther aside from the other body's (cosine).
+constexpr float leastAcross = 0.3f;
+constexpr float crossingWithin = 1.5f;  // of the deepest place that the field shows [voxels]: it rounds edges off
+constexpr float nearestAside = 0.01f;   // [voxels] from an edge or corner: nearer, rounding spoils the way's direction
 // A point that slides along a face ends in the edges beyond it by rounding: what only grazes, by less than this, goes
 // past [voxels].
 constexpr float grazing = 0.25f;
@@ -42,6 +47,7 @@ struct Map {
         shift = pose.position / into.scale;
     }
     glm::vec3 operator()(const glm::vec3& point) const { return linear * point + shift; }
+    glm::vec3 turned(const glm::vec3& direction) const { return linear * direction / scale; }
 
     // The same map, into the parts of a field's clearance.
     Map inParts(const Field& field) const {
@@ -208,7 +214,10 @@ class PointsInField {
             if (sample.inBand) {
                 Touch touched = touchInBand(field_, at, sample);
                 if (sweeps_) touched.approach = approachOf(point, at, touched);
-                if (touched.distance <= reach_) found(index, point, touched);
+                if (touched.distance <= reach_) {
+                    found(index, point, touched);
+                    if (point.isSharp) followEdges(index, at, touched, found);
+                }
             }
             if (!sample.inBand && sample.distance < 0) ++report.beyondBand;
         } else if (sweeps_) {
@@ -231,6 +240,73 @@ class PointsInField {
         const glm::vec3 inside = at - grazing * field_.voxelSize() * across;
         return field_.segment(inside, inside + way).has_value();
     }
+
+    // Where edges go deeper from a point that touches before they come up to the next one.
+    template <class Found>
+    void followEdges(std::uint32_t index, const glm::vec3& at, const Touch& here, Found& found) const {
+        const SharpEdges& edges = body_.collider.edges();
+        for (const std::uint32_t e : edges.around(index)) {
+            const SharpEdge& edge = edges.edges()[e];
+            const std::uint32_t next = edge.from == index ? edge.to : edge.from;
+            const glm::vec3 end = map_(pointOf(next).position);
+            const float length = glm::distance(at, end);
+            const glm::vec3 along = (end - at) / length;
+            const Sample sample = field_.sample(end);
+            if (!sample.inBand) continue;
+            const Touch there = touchInBand(field_, end, sample);
+            // where both ends touch, one of them is enough
+            if (std::max(sample.distance, there.distance) <= reach_ && next < index) continue;
+            const Slope from{0, here.distance, glm::dot(here.normal, along)},
+                to{length, there.distance, glm::dot(there.normal, along)};
+            if (!fallsBetween(from, to) && !mayKinkBetween(from, to)) continue;
+            if (const auto touched = deepestOf(at, end, along, from, to, edge.wings)) {
+                const float part = touched->first / length;
+                const SurfacePoint &a = pointOf(index), &b = pointOf(next);
+                const SurfacePoint between{glm::mix(a.position, b.position, part), glm::normalize(a.normal + b.normal),
+                                           true};
+                found(std::uint32_t(body_.collider.points().points().size()) + e, between, touched->second);
+            }
+        }
+    }
+
+    // How far along an edge the deepest place is, and how it touches.
+    std::optional<std::pair<float, Touch>> deepestOf(const glm::vec3& at, const glm::vec3& end, const glm::vec3& along,
+                                                     const Slope& from, const Slope& to, const Wings& wings) const {
+        const auto touchAt = [&](float way) -> std::optional<Touch> {
+            const Sample sample = field_.sample(at + way * along);
+            if (!sample.inBand) return std::nullopt;
+            return touchInBand(field_, at + way * along, sample);
+        };
+        const auto slopeAt = [&](float way) -> std::optional<Slope> {
+            const auto touched = touchAt(way);
+            if (!touched) return std::nullopt;
+            return Slope{way, touched->distance, glm::dot(touched->normal, along)};
+        };
+        const bool falls = fallsBetween(from, to);
+        const std::optional<Slope> lowest = falls
+                                                ? lowestBetween(from, to, searchTolerance * field_.voxelSize(), slopeAt)
+                                            : from.value < to.value ? from
+                                                                    : to;
+        const auto touched = lowest ? touchAt(lowest->place) : std::nullopt;
+        if (!touched) return std::nullopt;
+
+        const glm::vec3 place = at + lowest->place * along;
+        const Wings seen{map_.turned(wings[0]), map_.turned(wings[1])};
+        if (const auto crossing = other_.collider.edges().crossing(other_.collider.points(), at, end, seen, place,
+                                                                   crossingWithin * field_.voxelSize())) {
+            if (crossing->distance > reach_) return std::nullopt;
+            const glm::vec3 onEdge = crossing->position + crossing->distance * crossing->normal;
+            return std::pair(glm::dot(onEdge - at, along), Touch{crossing->distance, crossing->normal});
+        }
+        if (!falls) return std::nullopt;
+        const glm::vec3 across = touched->normal - glm::dot(touched->normal, along) * along;
+        const float length = glm::length(across);
+        const float distance = touched->distance < 0 ? touched->distance / length : touched->distance;
+        if (!(length > leastAcross) || distance > reach_) return std::nullopt;
+        return std::pair(lowest->place, Touch{distance, across / length});
+    }
+
+    const SurfacePoint& pointOf(std::uint32_t index) const { return body_.collider.points().points()[index]; }
 
     glm::vec3 wayOf(const glm::vec3& at) const { return ways_.of(other_.scale * at) / other_.scale; }
 
@@ -271,7 +347,9 @@ std::optional<MassProperties> massOf(const Mesh& mesh) {
 class Collider::Triangles {
   public:
     explicit Triangles(Mesh mesh) : mesh_(std::move(mesh)) {}
-    explicit Triangles(const LevelSet& field) : field_(field) {}
+    explicit Triangles(const LevelSet& field) : field_(field), areGiven_(false) {}
+
+    bool areGiven() const { return areGiven_; }
 
     const Mesh& mesh() {
         std::call_once(once_, [&] {
@@ -285,6 +363,7 @@ class Collider::Triangles {
 
   private:
     std::optional<LevelSet> field_;
+    bool areGiven_ = true;
     Mesh mesh_;
     std::once_flag once_;
 };
@@ -298,13 +377,22 @@ Collider::Collider(Mesh mesh, const LevelSet& levelSet, const ColliderOptions& o
     body_.bounds = bilayer::bounds(this->mesh());
     body_.margin = options.margin < 0 ? field_.voxelSize() : options.margin;
     body_.mass = massOf(this->mesh());
+    edges_ = SharpEdges(body_.points, field_);
 }
 
 Collider::Collider(const LevelSet& levelSet)
-    : triangles_(std::make_shared<Triangles>(levelSet)), field_(levelSet), body_(bodyOf(levelSet)), id_(nextId()) {}
+    : triangles_(std::make_shared<Triangles>(levelSet)),
+      field_(levelSet),
+      body_(bodyOf(levelSet)),
+      edges_(body_.points, field_),
+      id_(nextId()) {}
 
 const Mesh& Collider::mesh() const {
     return triangles_->mesh();
+}
+
+bool Collider::hasMesh() const {
+    return triangles_->areGiven();
 }
 
 const MassProperties& Collider::mass() const {

@@ -13,6 +13,7 @@
 #include "collider/motion.h"
 #include "collider/near_points.h"
 #include "collider/pose.h"
+#include "collider/sharp_edges.h"
 #include "sdf/point_sampler.h"
 
 namespace bilayer {
@@ -42,9 +43,12 @@ class Collider {
 
     /// Of a body from a file it is extracted when first asked for, once.
     const Mesh& mesh() const;
+    /// Whether it was made of a mesh: that of a body from a file is only like it.
+    bool hasMesh() const;
     const Field& field() const { return field_; }
     const Body& body() const { return body_; }
     const SurfacePoints& points() const { return body_.points; }
+    const SharpEdges& edges() const { return edges_; }
     const Bounds& bounds() const { return body_.bounds; }  ///< of the mesh [m]
     float margin() const { return body_.margin; }          ///< as in ColliderOptions, never negative [m]
     /// Throws std::invalid_argument where the mesh encloses no volume.
@@ -56,6 +60,7 @@ class Collider {
     std::shared_ptr<Triangles> triangles_;
     Field field_;
     Body body_;
+    SharpEdges edges_;
     std::uint64_t id_;
 };
 
@@ -69,10 +74,12 @@ struct Placed {
 
 /// A point where two bodies touch, nearly do, or are going to.
 struct Contact {
-    glm::vec3 position;     ///< on the surface of B, in the world [m]
-    glm::vec3 normal;       ///< from B to A, of unit length
-    float distance;         ///< gap between the surfaces, negative when they overlap [m]
-    std::uint32_t feature;  ///< index of the surface point; the top bit is set where the point is of B, else it is of A
+    glm::vec3 position;  ///< on the surface of B, in the world [m]
+    glm::vec3 normal;    ///< from B to A, of unit length
+    float distance;      ///< gap between the surfaces, negative when they overlap [m]
+    /// Index of the surface point, or behind those of all points that of the sharp edge that it is on; the top bit is
+    /// set where the point is of B, else it is of A.
+    std::uint32_t feature;
     /// What the bodies' motion takes off the distance, where it takes any point farther than the margin [m].
     float approach = 0;
 
@@ -109,7 +116,8 @@ struct ContactReport {
 };
 
 /// Appends the contacts between two bodies: surface points of A in B's field, then those of B in A's field, each in
-/// ascending order of feature. Deterministic; safe from any thread. O(points near the other body).
+/// ascending order of points; behind a point's, those of the sharp edges that go deeper from there before they come up
+/// to the next point. Deterministic; safe from any thread. O(points near the other body).
 /// @param near  null, or what was kept of the same two bodies in the last step: the contacts are the same, found sooner
 ContactReport collide(const Placed& a, const Placed& b, const ContactOptions& options, std::vector<Contact>& contacts,
                       NearPoints* near = nullptr);

@@ -12,6 +12,7 @@
 #include <BulletCollision/CollisionShapes/btSphereShape.h>
 #include <BulletCollision/CollisionShapes/btStaticPlaneShape.h>
 #include <BulletCollision/CollisionShapes/btTriangleMesh.h>
+#include <BulletCollision/Gimpact/btGImpactShape.h>
 #include <fmt/core.h>
 
 #include <cmath>
@@ -21,6 +22,8 @@
 
 #include "demos/shared/shapes.h"
 #include "demos/shared/stage.h"
+#include "integration/bullet/shape.h"
+#include "sdf/build.h"
 
 namespace bilayer::demo {
 namespace {
@@ -34,7 +37,7 @@ constexpr float fall = 0.2f;                            // from above [voxels]
 constexpr float rolling = 0.02f;                        // friction: balls of triangles would roll off what they lie on
 constexpr float lane = 2;
 constexpr float spacing = 1;  // of surface points: a ball sinks in between them [voxels]
-constexpr int columns = 14;   // of the table
+constexpr int columns = 16;   // of the table
 constexpr int framesPerMeasuring = 30;
 constexpr int samplesAlong = 9;  // of a height field
 constexpr float mass = 2;        // at scale 1: it grows with the scale, since Bullet takes small inverses for zero [kg]
@@ -73,6 +76,15 @@ struct TriangleShape {
     std::unique_ptr<btBvhTriangleMeshShape> shape;
 };
 
+struct ConcaveShape {
+    explicit ConcaveShape(const Mesh& mesh) : mesh(mesh), shape(&this->mesh.triangles) {
+        shape.setMargin(0);
+        shape.updateBound();
+    }
+    TriangleShape mesh;
+    btGImpactMeshShape shape;
+};
+
 struct HeightShape {
     explicit HeightShape(float width)
         : heights(samplesAlong * samplesAlong, 0.f),
@@ -108,7 +120,7 @@ class Maker {
     std::vector<Part> fields() const {
         return {field("field of a box", shapes::box(s_ * halfBox, 4), halfBox.z),
                 field("field of a ball", shapes::sphere(s_ * ball, 5), ball, glm::vec3(0)),
-                field("field of a ring", shapes::torus(s_ * major, s_ * minor), minor)};
+                field("field of a ring", shapes::torus(s_ * major, s_ * minor), minor), scaledField()};
     }
     std::vector<Part> shapesOfBullet() const {
         const glm::quat level = glm::angleAxis(glm::half_pi<float>(), glm::vec3(0, 1, 0));
@@ -129,6 +141,7 @@ class Maker {
                 cone(),
                 hull("hull", halfBox),
                 multisphere(),
+                concave(),
                 part("compound", cubes, {compound, &compound->shape}, 0.2f)};
     }
     // Those with a flat top.
@@ -165,6 +178,23 @@ class Maker {
     }
 
   private:
+    // Of another size than its mesh, by Bullet's own means.
+    Part scaledField() const {
+        constexpr float factor = 2.5f;
+        const Mesh small = shapes::box(s_ / factor * halfBox, 4);
+        const float fine = s_ / factor * voxel;
+        const auto collider = std::make_shared<Collider>(small, build(small, {.voxelSize = fine, .interiorWidth = 6}),
+                                                         ColliderOptions{.pointSpacing = spacing});
+        const auto shape = std::make_shared<bullet::Shape>(collider);
+        shape->setLocalScaling({factor, factor, factor});
+        Part scaled = part("field, scaled,", shapes::box(s_ * halfBox), shape, halfBox.z);
+        scaled.isField = true;
+        return scaled;
+    }
+    Part concave() const {
+        const auto shape = std::make_shared<ConcaveShape>(shapes::box(s_ * halfBox));
+        return part("GImpact", shapes::box(s_ * halfBox), {shape, &shape->shape}, halfBox.z);
+    }
     Part field(const std::string& name, Mesh mesh, float height, const glm::vec3& axis = {0, 0, 1}) const {
         return {name,        makeThing(std::move(mesh), {.voxelSize = s_ * voxel, .pointSpacing = spacing}),
                 s_ * height, s_ * height,
@@ -197,7 +227,7 @@ class Maker {
         for (const btVector3& centre : centres)
             balls.push_back(moved(shapes::sphere(radii[0], 4), {centre.x(), centre.y(), centre.z()}));
         const auto shape = std::make_shared<btMultiSphereShape>(centres, radii, 3);
-        // Bullet's default is 4 cm at any scale; the rest of the radius is what the field sees as a polyhedron
+        // a field takes the balls as they are, but Bullet's own shapes around would meet its 4 cm at any scale
         shape->setMargin(0.95f * radii[0]);
         return part("multisphere", shapes::join(balls), shape, 0.25f);
     }

@@ -1,6 +1,6 @@
-// Every shape of Bullet's and a field, one on the other: fields of a box, a ball and a ring lie on each shape that has
-// a flat top, and each shape lies on a field, whichever of the two was there first and whether the lower one is static,
-// kinematic, or moves itself.
+// Every shape of Bullet's and a field, one on the other: fields of a box, a ball and a ring, and one scaled by Bullet,
+// lie on each shape that has a flat top, and each shape lies on a field, whichever of the two was there first and
+// whether the lower one is static, kinematic, or moves itself.
 #pragma once
 
 #include "demos/shared/outcome.h"
@@ -9,7 +9,7 @@ namespace bilayer::demo {
 
 struct PairsOptions {
     float scale = 1;  ///< of everything: bodies are about a metre wide at 1
-    int every = 1;    ///< only every so many of all 150 pairs are laid
+    int every = 1;    ///< only every so many of all 188 pairs are laid
     float seconds = 2;
     float stepsPerSecond = 240;
 };

@@ -16,6 +16,8 @@
 #include <glm/geometric.hpp>
 #include <glm/gtc/constants.hpp>
 #include <glm/vec2.hpp>
+#include <map>
+#include <utility>
 
 #include "integration/bullet/convert.h"
 
@@ -23,14 +25,14 @@ namespace bilayer::bullet {
 
 namespace {
 
-// An edge gets no more probes than this; a longer one gets them sparser.
-constexpr int mostProbes = 64;
 // Chords of a rim: enough that each lies within 0.5 % of the radius from its arc before it is put onto it.
 constexpr std::uint32_t rimChords = 32;
 // Support points on a shape that has no formula here: directions on a spiral, about 12 degrees apart.
 constexpr int supportDirections = 256;
 // A normal that is tilted less than this off the axis belongs to a flat end.
 constexpr float flatEnd = 0.1f;
+// A place on the side is on a rim from this part of the half height on.
+constexpr float beforeRim = 0.999f;
 
 glm::vec3 direction(int axis) {
     glm::vec3 unit(0);
@@ -55,7 +57,7 @@ std::vector<btVector3> supportPoints(const btConvexShape& shape) {
     return points;
 }
 
-std::vector<btVector3> corners(const btPolyhedralConvexShape& shape) {
+std::vector<btVector3> cornersOf(const btPolyhedralConvexShape& shape) {
     std::vector<btVector3> points(shape.getNumVertices());
     for (int i = 0; i < shape.getNumVertices(); ++i) shape.getVertex(i, points[i]);
     return points;
@@ -97,9 +99,16 @@ Convex::Convex(const btConvexShape& shape) : scaling_(shape.getLocalScaling()), 
             makeRevolution(cone.getConeUpIndex(), 0.5f * cone.getHeight(), cone.getRadius(), 0);
             break;
         }
+        case MULTI_SPHERE_SHAPE_PROXYTYPE:
+            // Scaled by several factors it is no hull of balls, but what its support says.
+            if (scaling_.x() == scaling_.y() && scaling_.x() == scaling_.z()) {
+                makeBalls(static_cast<const btMultiSphereShape&>(shape));
+                break;
+            }
+            [[fallthrough]];
         default:
             radius_ = margin_;
-            makeHull(shape.isPolyhedral() ? corners(static_cast<const btPolyhedralConvexShape&>(shape))
+            makeHull(shape.isPolyhedral() ? cornersOf(static_cast<const btPolyhedralConvexShape&>(shape))
                                           : supportPoints(shape));
     }
 }
@@ -114,8 +123,11 @@ void Convex::makeBox(const glm::vec3& halfExtents) {
     for (std::uint32_t corner = 0; corner < 8; ++corner) {
         const glm::vec3 side(corner & 1 ? 1 : -1, corner & 2 ? 1 : -1, corner & 4 ? 1 : -1);
         faces_.points.push_back(side * halfExtents);
-        for (std::uint32_t axis : {1u, 2u, 4u})
-            if (!(corner & axis)) edges_.push_back({corner, corner | axis, 0});
+        for (int axis = 0; axis < 3; ++axis) {
+            const int next = (axis + 1) % 3, last = (axis + 2) % 3;
+            const Wings wings{-side[next] * direction(next), -side[last] * direction(last)};
+            if (side[axis] < 0) edges_.push_back({corner, corner | 1u << axis, 0, wings});
+        }
     }
 }
 
@@ -150,11 +162,7 @@ void Convex::makeHull(const std::vector<btVector3>& points) {
     btConvexHullComputer hull;
     hull.compute(&points.front().x(), sizeof(btVector3), static_cast<int>(points.size()), 0, 0);
     for (int i = 0; i < hull.vertices.size(); ++i) faces_.points.push_back(toGlm(hull.vertices[i]));
-    for (int i = 0; i < hull.edges.size(); ++i) {
-        const auto from = static_cast<std::uint32_t>(hull.edges[i].getSourceVertex());
-        const auto to = static_cast<std::uint32_t>(hull.edges[i].getTargetVertex());
-        if (from < to) edges_.push_back({from, to, 0});
-    }
+    std::map<std::pair<std::uint32_t, std::uint32_t>, glm::vec3> wings;  // of the face on the left of an edge
     for (int i = 0; i < hull.faces.size(); ++i) {
         const auto* first = &hull.edges[hull.faces[i]];
         const auto apex = static_cast<std::uint32_t>(first->getSourceVertex());
@@ -168,10 +176,39 @@ void Convex::makeHull(const std::vector<btVector3>& points) {
             faces_.triangles.push_back(triangle);
         }
         const float length = glm::length(area);
-        if (length > 0)
-            planes_.push_back(
-                {area / length, glm::dot(area / length, faces_.points[apex]), begin, faces_.triangles.size()});
+        if (!(length > 0)) continue;
+        const glm::vec3 normal = area / length;
+        planes_.push_back({normal, glm::dot(normal, faces_.points[apex]), begin, faces_.triangles.size()});
+        const auto* edge = first;
+        do {
+            const auto from = static_cast<std::uint32_t>(edge->getSourceVertex());
+            const auto to = static_cast<std::uint32_t>(edge->getTargetVertex());
+            wings[{from, to}] = glm::normalize(glm::cross(normal, faces_.points[to] - faces_.points[from]));
+            edge = edge->getNextEdgeOfFace();
+        } while (edge != first);
     }
+    for (int i = 0; i < hull.edges.size(); ++i) {
+        const auto from = static_cast<std::uint32_t>(hull.edges[i].getSourceVertex());
+        const auto to = static_cast<std::uint32_t>(hull.edges[i].getTargetVertex());
+        if (from > to) continue;
+        edges_.push_back({from, to, 0});
+        const auto left = wings.find({from, to}), right = wings.find({to, from});
+        if (left != wings.end() && right != wings.end()) edges_.back().wings = Wings{left->second, right->second};
+    }
+}
+
+void Convex::makeBalls(const btMultiSphereShape& shape) {
+    core_ = Core::balls;
+    std::vector<BallHull::Ball> balls;
+    for (int i = 0; i < shape.getSphereCount(); ++i)
+        balls.push_back({toGlm(scaling_ * shape.getSpherePosition(i)), scaling_.x() * shape.getSphereRadius(i)});
+    balls_ = BallHull(std::move(balls));
+    for (const BallHull::Ball& ball : balls_.balls()) {
+        faces_.points.push_back(ball.centre);
+        radii_.push_back(ball.radius);
+        radius_ = std::max(radius_, ball.radius);
+    }
+    for (const auto& [from, to] : balls_.pairs()) edges_.push_back({from, to, 0});
 }
 
 Convex::Near Convex::nearest(const glm::vec3& point, float reach) const {
@@ -182,6 +219,10 @@ Convex::Near Convex::nearest(const glm::vec3& point, float reach) const {
             return nearestOfBox(point);
         case Core::revolution:
             return nearestOfRevolution(point);
+        case Core::balls: {
+            const auto [distance, normal, ball] = balls_.nearest(point);
+            return {distance, normal, ball.centre, ball.radius};
+        }
         default:
             return nearestOfHull(point, reach);
     }
@@ -191,20 +232,20 @@ Convex::Near Convex::nearestOfSegment(const glm::vec3& point) const {
     const glm::vec3 core = std::clamp(point[axis_], -halfHeight_, halfHeight_) * direction(axis_);
     const float length = glm::distance(point, core);
     const glm::vec3 normal = length > 0 ? (point - core) / length : squareTo(axis_);
-    return {length - radius_, normal, core};
+    return {length - radius_, normal, core, radius_};
 }
 
 Convex::Near Convex::nearestOfBox(const glm::vec3& point) const {
     const glm::vec3 clamped = glm::clamp(point, -halfExtents_, halfExtents_);
     const float length = glm::distance(point, clamped);
-    if (length > 0) return {length, (point - clamped) / length, clamped};
+    if (length > 0) return {length, (point - clamped) / length, clamped, 0};
 
     int axis = 0;
     const glm::vec3 depth = halfExtents_ - glm::abs(point);
     for (int i = 1; i < 3; ++i)
         if (depth[i] < depth[axis]) axis = i;
     const glm::vec3 normal = (point[axis] < 0 ? -1.f : 1.f) * direction(axis);
-    return {-depth[axis], normal, point + depth[axis] * normal};
+    return {-depth[axis], normal, point + depth[axis] * normal, 0};
 }
 
 Convex::Near Convex::nearestOfRevolution(const glm::vec3& point) const {
@@ -231,7 +272,7 @@ Convex::Near Convex::nearestOfRevolution(const glm::vec3& point) const {
     }
     if (!inside && nearest > 0) normal = (p - core) / nearest;
     const auto lift = [&](const glm::vec2& v) { return v.x * out + v.y * direction(axis_); };
-    return {(inside ? -nearest : nearest) - radius_, lift(normal), lift(core)};
+    return {(inside ? -nearest : nearest) - radius_, lift(normal), lift(core), radius_};
 }
 
 Convex::Near Convex::nearestOfHull(const glm::vec3& point, float reach) const {
@@ -241,7 +282,7 @@ Convex::Near Convex::nearestOfHull(const glm::vec3& point, float reach) const {
         if (const float d = glm::dot(plane.normal, point) - plane.offset; d > depth) depth = d, farthest = &plane;
     // Inside, the nearest face decides; far outside, a bound does.
     if (farthest && (depth <= 0 || depth > reach + radius_))
-        return {depth - radius_, farthest->normal, point - depth * farthest->normal};
+        return {depth - radius_, farthest->normal, point - depth * farthest->normal, radius_};
 
     float squared = std::numeric_limits<float>::max();
     glm::vec3 core(0);
@@ -265,7 +306,7 @@ Convex::Near Convex::nearestOfHull(const glm::vec3& point, float reach) const {
     }
     const float distance = std::sqrt(squared);
     const glm::vec3 normal = distance > 0 ? (point - core) / distance : farthest ? farthest->normal : squareTo(1);
-    return {distance - radius_, normal, core};
+    return {distance - radius_, normal, core, radius_};
 }
 
 glm::vec3 Convex::slide(const Near& near, const glm::vec3& towards) const {
@@ -278,49 +319,44 @@ glm::vec3 Convex::slide(const Near& near, const glm::vec3& towards) const {
         if (const float length = glm::length(out); length > flatEnd) core = (glm::length(core) / length) * out;
         core[axis_] = height;
     }
-    return core + radius_ * towards;
+    return core + near.radius * towards;
 }
 
-void Convex::visitProbes(const glm::vec3& centre, float within, float spacing,
-                         const std::function<void(const glm::vec3&, std::uint32_t)>& visit) const {
-    for (std::uint32_t i = 0; i < faces_.points.size(); ++i)
-        if (glm::distance(faces_.points[i], centre) <= within) visit(faces_.points[i], i);
-    auto number = static_cast<std::uint32_t>(faces_.points.size());
-    for (const Edge& edge : edges_) {
-        const auto place = [&](const glm::vec3& onChord, std::uint32_t index) {
-            glm::vec3 point = onChord;
-            if (edge.rim > 0) {
-                point[axis_] = 0;
-                point *= edge.rim / glm::length(point);
-                point[axis_] = onChord[axis_];
-            }
-            visit(point, number + index);
-        };
-        visitAlong(faces_.points[edge.from], faces_.points[edge.to], centre, within, spacing, place);
-        number += 1u << 16;
-    }
+bool Convex::isFlat(const Near& near) const {
+    return core_ == Core::box || core_ == Core::hull ||
+           (core_ == Core::revolution && std::abs(near.normal[axis_]) > 1 - flatEnd * flatEnd);
 }
 
-void visitAlong(const glm::vec3& from, const glm::vec3& to, const glm::vec3& centre, float within, float spacing,
-                const std::function<void(const glm::vec3&, std::uint32_t)>& visit) {
-    const glm::vec3 along = to - from, offset = from - centre;
-    const float squaredLength = glm::dot(along, along);
-    const float length = std::sqrt(squaredLength);
-    if (!(length > spacing)) return;
+bool Convex::isRound(const Near& near) const {
+    const bool isOnSide = std::abs(near.core[axis_]) < beforeRim * halfHeight_;
+    return core_ == Core::segment || core_ == Core::balls ||
+           (core_ == Core::revolution && isOnSide && std::abs(near.normal[axis_]) < 1 - flatEnd * flatEnd);
+}
 
-    // The part t of the edge that lies within the sphere: |offset + t along|^2 <= within^2.
-    const float middle = -glm::dot(offset, along) / squaredLength;
-    const float square = middle * middle - (glm::dot(offset, offset) - within * within) / squaredLength;
-    if (square < 0) return;
-    const float half = std::sqrt(square);
+std::optional<std::array<glm::vec3, 2>> Convex::sideLine(const Near& near, const glm::vec3& place) const {
+    if (core_ != Core::revolution || std::abs(near.normal[axis_]) > 1 - flatEnd * flatEnd) return std::nullopt;
+    glm::vec3 out = place;
+    out[axis_] = 0;
+    const float length = glm::length(out);
+    if (!(length > 0)) return std::nullopt;
+    out /= length;
+    const glm::vec3 up = halfHeight_ * direction(axis_);
+    return std::array{lowerRadius_ * out - up, upperRadius_ * out + up};
+}
 
-    const int parts = static_cast<int>(std::min(std::ceil(length / spacing), 1e6f));
-    const int first = std::max(1, static_cast<int>(std::ceil(std::max(middle - half, 0.f) * parts)));
-    const int last = std::min(parts - 1, static_cast<int>(std::floor(std::min(middle + half, 1.f) * parts)));
-    int stride = 1;
-    while ((last - first) / stride >= mostProbes) stride *= 2;
-    for (int i = (first + stride - 1) / stride * stride; i <= last; i += stride)
-        visit(from + (static_cast<float>(i) / parts) * along, static_cast<std::uint32_t>(i));
+float Convex::radius(const Edge& edge, float part) const {
+    return radii_.empty() ? radius_ : radii_[edge.from] + part * (radii_[edge.to] - radii_[edge.from]);
+}
+
+glm::vec3 Convex::place(const Edge& edge, float part) const {
+    const glm::vec3 &from = faces_.points[edge.from], &to = faces_.points[edge.to];
+    glm::vec3 place = from + part * (to - from);
+    if (!(edge.rim > 0)) return place;
+    // From the chord out to the arc.
+    place[axis_] = 0;
+    place *= edge.rim / glm::length(place);
+    place[axis_] = from[axis_];
+    return place;
 }
 
 glm::vec3 nearestOnTriangle(const glm::vec3& point, const glm::vec3& a, const glm::vec3& b, const glm::vec3& c) {

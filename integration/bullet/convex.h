@@ -2,17 +2,23 @@
 #pragma once
 
 #include <BulletCollision/CollisionShapes/btConvexShape.h>
+#include <BulletCollision/CollisionShapes/btMultiSphereShape.h>
 
-#include <functional>
+#include <array>
+#include <optional>
+#include <span>
 #include <vector>
 
+#include "collider/sharp_edges.h"
+#include "integration/bullet/ball_hull.h"
 #include "sdf/mesh.h"
 
 namespace bilayer::bullet {
 
-/// A convex shape as a core (segment, box, solid of revolution, hull) grown by a radius. In the coordinates of the
-/// btConvexShape, with its scaling and margin, in metres. Spheres, capsules, boxes, cylinders and cones are exact;
-/// hulls and unknown shapes are hulls of their (support) points, grown by Bullet's margin as everywhere in Bullet.
+/// A convex shape as a core (segment, box, solid of revolution, hull of points or balls) grown by a radius. In the
+/// coordinates of the btConvexShape, with its scaling and margin, in metres. Spheres, capsules, boxes, cylinders, cones
+/// and multispheres are exact, whatever the margin; hulls and unknown shapes are hulls of their (support) points, grown
+/// by Bullet's margin as everywhere in Bullet.
 class Convex {
   public:
     explicit Convex(const btConvexShape& shape);
@@ -24,6 +30,7 @@ class Convex {
         float distance;    ///< signed, to the surface [m]
         glm::vec3 normal;  ///< of the surface there, outward, of unit length
         glm::vec3 core;    ///< nearest point of the core's surface
+        float radius;      ///< by which the core is grown there [m]
     };
     /// Outside of a hull and farther than `reach`, only a lower bound of the distance.
     Near nearest(const glm::vec3& point, float reach) const;
@@ -33,19 +40,29 @@ class Convex {
     /// The point of the surface around `near` that lies farthest in a direction of unit length.
     glm::vec3 slide(const Near& near, const glm::vec3& direction) const;
 
-    /// How far the shape reaches beyond its probes in every direction [m].
-    float radius() const { return radius_; }
-    /// Visits corners, and points along the edges that lie within a sphere, at most about `spacing` apart.
-    /// @param visit  (point of the core, a number that stays the same from step to step)
-    void visitProbes(const glm::vec3& centre, float within, float spacing,
-                     const std::function<void(const glm::vec3&, std::uint32_t)>& visit) const;
+    /// Whether the surface is flat where a point is near it, or is where its core's is.
+    bool isFlat(const Near& near) const;
+    /// Whether it is round and smooth there.
+    bool isRound(const Near& near) const;
+    /// The ends of the straight line on a solid of revolution's side that runs through a place; nothing on its flat
+    /// ends, and for other shapes.
+    std::optional<std::array<glm::vec3, 2>> sideLine(const Near& near, const glm::vec3& place) const;
+
+    /// What is asked about in a field, grown by radius(): corners, and places along edges. Their numbers stay the same.
+    struct Edge {
+        std::uint32_t from, to;        ///< corners
+        float rim;                     ///< the radius of the circle whose chord this is, 0 for a straight edge [m]
+        std::optional<Wings> wings{};  ///< of a straight edge between two faces
+    };
+    std::span<const glm::vec3> corners() const { return faces_.points; }
+    std::span<const Edge> edges() const { return edges_; }
+    float radius(std::uint32_t corner) const { return radii_.empty() ? radius_ : radii_[corner]; }
+    /// @param part  of the way along the edge
+    float radius(const Edge& edge, float part) const;
+    glm::vec3 place(const Edge& edge, float part) const;
 
   private:
-    enum class Core { segment, box, revolution, hull };
-    struct Edge {
-        std::uint32_t from, to;  ///< corners
-        float rim;               ///< the radius of the circle whose chord this is, 0 for a straight edge [m]
-    };
+    enum class Core { segment, box, revolution, balls, hull };
     struct Plane {
         glm::vec3 normal;
         float offset;
@@ -56,6 +73,7 @@ class Convex {
     void addRim(float height, float rim);
     void makeBox(const glm::vec3& halfExtents);
     void makeHull(const std::vector<btVector3>& points);
+    void makeBalls(const btMultiSphereShape& shape);
 
     Near nearestOfSegment(const glm::vec3& point) const;
     Near nearestOfBox(const glm::vec3& point) const;
@@ -65,7 +83,7 @@ class Convex {
     btVector3 scaling_;
     float margin_;
     Core core_ = Core::hull;
-    float radius_ = 0;                         ///< by which the core is grown [m]
+    float radius_ = 0;                         ///< by which the core is grown; the largest of balls' [m]
     int axis_ = 1;                             ///< of segments and solids of revolution
     float halfHeight_ = 0;                     ///< of segments and solids of revolution [m]
     glm::vec3 halfExtents_{0};                 ///< of boxes [m]
@@ -73,15 +91,11 @@ class Convex {
     std::vector<Plane> planes_;                ///< of hulls
     Mesh faces_;                               ///< of hulls; `points` are the corners of every core
     std::vector<Edge> edges_;
+    BallHull balls_;
+    std::vector<float> radii_;  ///< of balls: of corners [m]
 };
 
 /// The point of a triangle nearest to a point.
 glm::vec3 nearestOnTriangle(const glm::vec3& point, const glm::vec3& a, const glm::vec3& b, const glm::vec3& c);
-
-/// Visits the points that divide an edge into equal parts of at most `spacing`, ends excluded, as far as they lie
-/// within a sphere; where there are too many, every second, fourth, ... of them.
-/// @param visit  (point, index of the part's end)
-void visitAlong(const glm::vec3& from, const glm::vec3& to, const glm::vec3& centre, float within, float spacing,
-                const std::function<void(const glm::vec3&, std::uint32_t)>& visit);
 
 }  // namespace bilayer::bullet

@@ -4,18 +4,33 @@
 #include <LinearMath/btAabbUtil2.h>
 
 #include <algorithm>
+#include <array>
+#include <cmath>
+#include <functional>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
+#include <map>
 #include <optional>
 
+#include "collider/edge_search.h"
 #include "integration/bullet/convert.h"
 
 namespace bilayer::bullet {
 
 namespace {
 
-// Distance between probes along an edge [voxels], like that of the surface points.
-constexpr float probeSpacing = 2;
+// Distance between probes along an edge [voxels], like that of the surface points. Farther from the field they get
+// sparser; the interpolant may be below the distance by nearly a voxel.
+constexpr float probeSpacing = 2, interpolationError = 0.87f;
+// Edges get no more parts: numbers beyond are those of the next edge.
+constexpr int partBits = 15;
+// Points farther than this inside the band's border are in it for certain [voxels].
+constexpr float bandBorder = 1.7321f;
+constexpr float searchTolerance = 2e-3f;  // of the deepest place between two probes [voxels]
+// Where two edges cross, the normal across both is taken if it looks no farther aside from the field's (cosine).
+constexpr float leastAcross = 0.3f;
+constexpr float crossingWithin = 1.5f;  // of the deepest place that the field shows [voxels]: it rounds edges off
 // On the medial axis the interpolated gradient is short and says nothing of a direction.
 constexpr float shortestGradient = 0.5f;
 // A surface point touches a face that looks against its own normal, by this cosine at least: the points below the edge
@@ -24,6 +39,13 @@ constexpr float shortestGradient = 0.5f;
 constexpr ContactOptions opposition{.leastOpposition = 0.3f, .leastOppositionApart = 0.9f};
 // Steps towards the deepest place of a round surface; each divides the error by the ratio of the radii of curvature.
 constexpr int mostRefinements = 6;
+// A point lies over a face if its foot there is no farther aside than this [probe spacings]: rounding.
+constexpr float onFace = 1e-4f;
+// Triangles whose wings enclose more than 179.9 degrees (cosine) have no edge between them.
+constexpr float flatEdge = -0.9999985f;
+// Faces that fall by less lie on what they touch: the next surface points are as deep to a hundredth of a voxel.
+constexpr float leastDownhill = 0.05f;
+constexpr float touchingFace = 0.25f;  // [voxels]
 // A way has met a convex body where it is this near to it [voxels]; it is followed for so many steps of what is clear.
 constexpr float sweepTolerance = 0.1f;
 constexpr int mostSteps = 64;
@@ -33,15 +55,20 @@ constexpr float grazing = 0.25f;
 /// A field in metres of the world and the axes of its body, and how another body moves towards it.
 class Local {
   public:
-    Local(const Placed& field, const Pose& other, const Motion& motion)
-        : field_(field.collider.field()),
+    /// @param reach  up to which contacts are made [m]
+    Local(const Placed& field, const Pose& other, const Motion& motion, float reach)
+        : collider_(field.collider),
+          field_(field.collider.field()),
           scale_(field.scale),
+          voxel_(field.scale * field.collider.field().voxelSize()),
           pose_(field.pose),
           ways_(other, motion, field.pose, field.motion) {
         const Bounds& bounds = field.collider.bounds();
+        if (reach > scale_ * field_.exteriorWidth() - bandBorder * voxel_) farReach_ = reach / scale_;
         longestWay_ = ways_.longest(scale_ * bounds.centre(), 0.5f * scale_ * glm::length(bounds.size()));
     }
 
+    const Collider& collider() const { return collider_; }
     /// Of the other body's points as the field sees them.
     const RelativeWays& ways() const { return ways_; }
     /// The longest way of any that is in the field's box; those that come from afar may go farther by their turn.
@@ -51,27 +78,81 @@ class Local {
         enum { near, outside, inside, unclear } where = unclear;
         float distance = 0;   ///< [m]
         glm::vec3 normal{0};  ///< of unit length if near
+        glm::vec3 gradient{0};
+
+        bool isKnown() const { return where == near || where == unclear; }
     };
 
-    Answer at(const glm::vec3& point) const {
+    /// @param radius  by which the point is grown [m]
+    Answer at(const glm::vec3& point, float radius = 0) const {
         const Sample sample = field_.sample(point / scale_);
-        if (!sample.inBand)
-            return {sample.distance > 0 ? Answer::outside : Answer::inside, scale_ * sample.distance, {}};
+        if (!sample.inBand && sample.distance > 0 && farReach_ > 0) return farAway(point, radius, sample.distance);
+        if (!sample.inBand) return {sample.distance > 0 ? Answer::outside : Answer::inside, scale_ * sample.distance};
         const float length = glm::length(sample.gradient);
-        if (length < shortestGradient) return {Answer::unclear, scale_ * sample.distance, {}};
-        return {Answer::near, scale_ * sample.distance, sample.gradient / length};
+        if (length < shortestGradient) return {Answer::unclear, scale_ * sample.distance, {}, sample.gradient};
+        return {Answer::near, scale_ * sample.distance, sample.gradient / length, sample.gradient};
     }
 
     /// The contact of a point of the other body's core, grown by a radius.
-    std::optional<Contact> probe(const glm::vec3& point, float radius, std::uint32_t feature, float margin,
-                                 ContactReport& report) const {
+    std::optional<Contact> probe(const glm::vec3& point, const Answer& answer, float radius, std::uint32_t feature,
+                                 float margin, ContactReport& report) const {
         ++report.pointsTested;
-        const Answer answer = at(point);
         if (answer.where == Answer::inside) ++report.beyondBand;
         if (answer.distance - radius > margin) return probeOnWay(point, radius, feature, margin, answer.distance);
         if (answer.where != Answer::near) return std::nullopt;
         return contact(point - answer.distance * answer.normal, answer.normal, answer.distance - radius, feature,
                        approach(point, answer.normal, margin));
+    }
+
+    /// An edge of the other body, or the middle of one that is round.
+    struct Edge {
+        std::function<glm::vec3(float)> place;  ///< by the part of the way
+        float radius[2];                        ///< by which it is grown at its ends [m]
+        bool isStraight;
+        std::uint32_t feature;       ///< the first of 2^(partBits + 1)
+        std::optional<Wings> wings;  ///< of a sharp edge between two faces
+        bool isSearched = true;      ///< between the probes
+
+        float radiusAt(float part) const { return radius[0] + part * (radius[1] - radius[0]); }
+        glm::vec3 directionAt(float part) const {
+            const float aside = isStraight ? 0.5f : 1e-3f;
+            return glm::normalize(place(part + aside) - place(part - aside));
+        }
+    };
+
+    /// The contacts along an edge, ends excluded: of places that lie close enough to each other, and where it goes
+    /// deeper between two of them of the deepest one.
+    /// @param first, last  the answers at its ends
+    void probeEdge(const Edge& edge, const Answer& first, const Answer& last, float margin, ContactReport& report,
+                   std::vector<Contact>& contacts) const {
+        const float length = glm::distance(edge.place(0), edge.place(1));
+        if (!(length > 0)) return;
+        const float most = float((1 << partBits) - 1);
+        const int parts = int(std::clamp(std::ceil(length / (probeSpacing * voxel_)), 1.f, most));
+        const float reach =
+            margin + longestWay_ + interpolationError * voxel_ + std::max(edge.radius[0], edge.radius[1]);
+        Answer before = first;
+        for (int i = 0; i < parts;) {
+            // What is clear of everything needs no probes.
+            const float clear = (before.distance - reach) * float(parts) / length;
+            const int next = i + std::max(1, int(std::min(clear, float(parts - i))));
+            const float part = float(next) / float(parts);
+            Answer there = last;
+            if (next < parts) {
+                const glm::vec3 point = edge.place(part);
+                there = at(point, edge.radiusAt(part));
+                const std::uint32_t feature = edge.feature + 2 * std::uint32_t(next);
+                if (const auto found = probe(point, there, edge.radiusAt(part), feature, margin, report))
+                    contacts.push_back(*found);
+            }
+            if (edge.isSearched && next == i + 1)
+                if (const auto found = deepestBetween(edge, float(i) / float(parts), before, part, there, margin)) {
+                    contacts.push_back(*found);
+                    contacts.back().feature = edge.feature + 2 * std::uint32_t(i) + 1;
+                }
+            i = next;
+            before = there;
+        }
     }
 
     /// Contact::approach of the other body's point.
@@ -83,6 +164,10 @@ class Local {
                     float approach = 0) const {
         return {pose_.toWorld(position), pose_.rotation * normal, distance, feature, approach};
     }
+
+    /// Where an edge between two of its places is deepest, if it falls from either, or crosses a sharp edge.
+    std::optional<Contact> deepestBetween(const Edge& edge, float from, const Answer& atFrom, float to,
+                                          const Answer& atTo, float margin) const;
 
   private:
     /// The same for a point that is farther away: where its way meets the surface.
@@ -100,19 +185,77 @@ class Local {
                        -glm::dot(way, hit->normal));
     }
 
+    /// Beyond the band, where a contact test asks for more than the band tells.
+    Answer farAway(const glm::vec3& point, float radius, float bound) const {
+        const ClosestPoint closest = field_.closest(point / scale_, farReach_ + radius / scale_);
+        if (!closest.found) return {Answer::outside, std::max(scale_ * bound, scale_ * farReach_ + radius)};
+        const glm::vec3 normal = (point / scale_ - closest.position) / closest.distance;
+        return {Answer::near, scale_ * closest.distance, normal, normal};
+    }
+
+    const Collider& collider_;
     const Field& field_;
-    float scale_;
+    float scale_, voxel_;
     Pose pose_;
     RelativeWays ways_;
     float longestWay_;
+    float farReach_ = 0;  ///< where contacts are asked for beyond the band; in the field's size
 };
+
+std::optional<Contact> Local::deepestBetween(const Edge& edge, float from, const Answer& atFrom, float to,
+                                             const Answer& atTo, float margin) const {
+    if (!atFrom.isKnown() || !atTo.isKnown()) return std::nullopt;
+    const float length = glm::distance(edge.place(from), edge.place(to));
+    const float growth = (edge.radius[1] - edge.radius[0]) * (to - from) / length;
+    const auto partAt = [&](float way) { return from + way / length * (to - from); };
+    const auto slopeOf = [&](float way, const Answer& answer) {
+        const float part = partAt(way);
+        return Slope{way, answer.distance - edge.radiusAt(part),
+                     glm::dot(answer.gradient, edge.directionAt(part)) - growth};
+    };
+    const Slope first = slopeOf(0, atFrom), last = slopeOf(length, atTo);
+    const bool isNear = std::min(first.value, last.value) - 0.5f * length <= margin;
+    const bool falls = fallsBetween(first, last);
+    if (!isNear || !(falls || mayKinkBetween(first, last))) return std::nullopt;
+    const auto slopeAt = [&](float way) -> std::optional<Slope> {
+        const float part = partAt(way);
+        const Answer answer = at(edge.place(part), edge.radiusAt(part));
+        if (!answer.isKnown()) return std::nullopt;
+        return slopeOf(way, answer);
+    };
+    const std::optional<Slope> lowest = falls ? lowestBetween(first, last, searchTolerance * voxel_, slopeAt)
+                                        : first.value < last.value ? first
+                                                                   : last;
+    if (!lowest) return std::nullopt;
+
+    const float part = partAt(lowest->place), radius = edge.radiusAt(part);
+    const glm::vec3 point = edge.place(part);
+    const Answer here = at(point, radius);
+    if (edge.wings && radius <= 0)
+        if (const auto crossing =
+                collider_.edges().crossing(collider_.points(), edge.place(0) / scale_, edge.place(1) / scale_,
+                                           *edge.wings, point / scale_, crossingWithin * voxel_ / scale_)) {
+            if (scale_ * crossing->distance > margin) return std::nullopt;
+            return contact(scale_ * crossing->position, crossing->normal, scale_ * crossing->distance, 0,
+                           approach(point, crossing->normal, margin));
+        }
+    if (!falls || here.where != Answer::near) return std::nullopt;
+    const glm::vec3 along = edge.directionAt(part);
+    const glm::vec3 across = here.normal - glm::dot(here.normal, along) * along;
+    const float steepness = glm::length(across);
+    if (!(steepness > leastAcross)) return std::nullopt;
+    const float depth = here.distance < 0 ? here.distance / steepness : here.distance;
+    if (depth - radius > margin) return std::nullopt;
+    const glm::vec3 normal = across / steepness;
+    return contact(point - depth * normal, normal, depth - radius, 0, approach(point, normal, margin));
+}
 
 /// A convex body in the coordinates of a Local field.
 class Touching {
   public:
     Touching(const Convex& convex, const Pose& pose, const Motion& motion, const Placed& field, float margin)
         : convex_(convex),
-          local_(field, pose, motion),
+          local_(field, pose, motion, margin),
           margin_(margin),
           scale_(field.scale),
           voxel_(field.scale * field.collider.field().voxelSize()) {
@@ -138,24 +281,48 @@ class Touching {
         const glm::vec3 normal = -(toField_ * near.normal);
         float approach = local_.approach(position, normal, margin_);
         if (near.distance > 0 && approach > 0 && !meets(position, point)) approach = 0;
-        const bool apart = near.distance > 0 && approach == 0 && !point.isSharp;
+        // What is round has no edge that a point could see aslant.
+        const bool apart = near.distance > 0 && approach == 0 && !point.isSharp && !convex_.isRound(near);
         if (!opposition.keeps(glm::dot(normal, point.normal), apart)) return;
+        if (convex_.isCurved() && point.isSharp) followEdges(index, near, contacts);
         if (convex_.isCurved())
             if (const auto better = refine(near, feature)) {
                 contacts.push_back(*better);
                 return;
             }
-        contacts.push_back(local_.contact(position, normal, near.distance, feature, approach));
+        if (!convex_.isCurved() && !point.isSharp) {
+            const glm::vec3 place = intoField(near.core);
+            if (auto deeper = downhill(near, place, local_.at(place))) {
+                deeper->feature = feature;
+                contacts.push_back(*deeper);
+                return;
+            }
+        }
+        contacts.push_back(
+            local_.contact(position, normal, near.distance, feature, approach));
     }
 
-    void visitProbes(const Bounds& bounds, float spacing, ContactReport& report, std::vector<Contact>& contacts) const {
-        const float within =
-            0.5f * glm::length(scale_ * bounds.size()) + convex_.radius() + margin_ + local_.longestWay();
-        const auto ask = [&](const glm::vec3& point, std::uint32_t number) {
-            if (const auto contact = local_.probe(intoField(point), convex_.radius(), number, margin_, report))
-                contacts.push_back(*contact);
-        };
-        convex_.visitProbes(intoConvex(scale_ * bounds.centre()), within, spacing, ask);
+    /// The convex body's own corners and edges in the field.
+    void visitProbes(ContactReport& report, std::vector<Contact>& contacts) const {
+        const auto corners = convex_.corners();
+        std::vector<Local::Answer> answers;
+        for (std::uint32_t i = 0; i < corners.size(); ++i) {
+            const glm::vec3 point = intoField(corners[i]);
+            answers.push_back(local_.at(point, convex_.radius(i)));
+            if (const auto found = local_.probe(point, answers[i], convex_.radius(i), i, margin_, report))
+                contacts.push_back(*found);
+        }
+        auto number = static_cast<std::uint32_t>(corners.size());
+        for (const Convex::Edge& edge : convex_.edges()) {
+            Local::Edge seen{[&](float part) { return intoField(convex_.place(edge, part)); },
+                             {convex_.radius(edge, 0), convex_.radius(edge, 1)},
+                             !(edge.rim > 0),
+                             number,
+                             edge.wings};
+            if (edge.wings) seen.wings = Wings{toField_ * (*edge.wings)[0], toField_ * (*edge.wings)[1]};
+            local_.probeEdge(seen, answers[edge.from], answers[edge.to], margin_, report, contacts);
+            number = (number + (2u << partBits)) & ~featureOfB;
+        }
     }
 
   private:
@@ -203,9 +370,46 @@ class Touching {
             contacts.push_back(local_.contact(position, normal, met->gap, feature, -glm::dot(met->normal, way)));
     }
 
+    /// Where sharp edges of the field go deeper into a round body from a point that touches before they come up again.
+    void followEdges(std::uint32_t index, const Convex::Near& near, std::vector<Contact>& contacts) const {
+        const Collider& collider = local_.collider();
+        const auto points = collider.points().points();
+        const SharpEdges& edges = collider.edges();
+        for (const std::uint32_t e : edges.around(index)) {
+            const SharpEdge& edge = edges.edges()[e];
+            const std::uint32_t next = edge.from == index ? edge.to : edge.from;
+            const glm::vec3 from = intoConvex(scale_ * points[index].position),
+                            to = intoConvex(scale_ * points[next].position);
+            const float length = glm::distance(from, to);
+            const glm::vec3 along = (to - from) / length;
+            const auto nearAt = [&](float way) { return convex_.nearest(from + way * along, margin_); };
+            const auto slopeOf = [&](float way, const Convex::Near& there) {
+                return Slope{way, there.distance, glm::dot(there.normal, along)};
+            };
+            const Convex::Near there = nearAt(length);
+            const Slope first = slopeOf(0, near), last = slopeOf(length, there);
+            // Where both ends touch, one of them is enough.
+            const bool isOther = there.distance <= margin_ && next < index;
+            if (!fallsBetween(first, last) || isOther) continue;
+            const auto lowest =
+                lowestBetween(first, last, searchTolerance * scale_ * collider.field().voxelSize(),
+                              [&](float way) { return std::optional<Slope>(slopeOf(way, nearAt(way))); });
+            const Convex::Near deepest = nearAt(lowest->place);
+            const glm::vec3 across = deepest.normal - glm::dot(deepest.normal, along) * along;
+            const float steepness = glm::length(across);
+            const glm::vec3 normal = -(toField_ * across) / steepness;
+            const float distance = deepest.distance < 0 ? deepest.distance / steepness : deepest.distance;
+            const bool opposes = opposition.keeps(glm::dot(normal, points[index].normal + points[next].normal), false);
+            if (!(steepness > leastAcross) || distance > margin_ || !opposes) continue;
+            const glm::vec3 place = intoField(from + lowest->place * along);
+            contacts.push_back(local_.contact(place, normal, distance, (std::uint32_t(points.size()) + e) | featureOfB,
+                                              local_.approach(place, normal, margin_)));
+        }
+    }
+
     /// Follows the field's normal from the place of a round surface under a surface point to the deepest place nearby.
     std::optional<Contact> refine(const Convex::Near& near, std::uint32_t feature) const {
-        glm::vec3 place = intoField(near.core + convex_.radius() * near.normal);
+        glm::vec3 place = intoField(near.core + near.radius * near.normal);
         Local::Answer here = local_.at(place);
         if (here.where != Local::Answer::near) return std::nullopt;
         for (int i = 0; i < mostRefinements; ++i) {
@@ -215,9 +419,40 @@ class Touching {
             place = next;
             here = there;
         }
-        if (here.distance > margin_) return std::nullopt;
-        return local_.contact(place - here.distance * here.normal, here.normal, here.distance, feature,
-                              local_.approach(place, here.normal, margin_));
+        std::optional<Contact> found = downhill(near, place, here);
+        if (!found && here.distance <= margin_)
+            found = local_.contact(place - here.distance * here.normal, here.normal, here.distance, feature,
+                                   local_.approach(place, here.normal, margin_));
+        if (found) found->feature = feature;
+        return found;
+    }
+
+    /// Where a face, or the straight line on the side of a cylinder or a cone, goes deeper near a place on it.
+    std::optional<Contact> downhill(const Convex::Near& near, const glm::vec3& place, const Local::Answer& here) const {
+        const float step = probeSpacing * scale_ * local_.collider().field().voxelSize();
+        const glm::vec3 slope = toConvex_ * here.gradient, start = intoConvex(place);
+        glm::vec3 end;
+        if (const auto line = convex_.sideLine(near, start)) {
+            const glm::vec3 from = (*line)[0] + near.radius * near.normal, along = (*line)[1] - (*line)[0];
+            const float length = glm::length(along), steepness = glm::dot(slope, along) / length;
+            if (!(std::abs(steepness) > leastDownhill)) return std::nullopt;
+            const float middle = glm::dot(start - from, along) / (length * length);
+            const float there = std::clamp(middle - std::copysign(step / length, steepness), 0.f, 1.f);
+            end = start + (there - middle) * along;
+        } else {
+            // Where faces touch, points are exact, and the interpolant is not.
+            const float apart = touchingFace * scale_ * local_.collider().field().voxelSize();
+            if (!convex_.isFlat(near) || near.distance < apart) return std::nullopt;
+            const glm::vec3 uphill = slope - glm::dot(slope, near.normal) * near.normal;
+            const float steepness = glm::length(uphill);
+            if (!(steepness > leastDownhill)) return std::nullopt;
+            // no farther than to the border of the face
+            const Convex::Near last = convex_.nearest(start - step / steepness * uphill, step);
+            end = last.core + last.radius * near.normal;
+        }
+        const Local::Edge way{
+            [&, to = intoField(end)](float part) { return glm::mix(place, to, part); }, {0, 0}, true, 0, std::nullopt};
+        return local_.deepestBetween(way, 0, here, 1, local_.at(intoField(end)), margin_);
     }
 
     const Convex& convex_;
@@ -227,52 +462,108 @@ class Touching {
     glm::vec3 origin_;
 };
 
-/// Triangles as Bullet hands them over, one by one.
+/// Triangles as Bullet hands them over: what they share is asked about once.
 class TriangleProbes : public btTriangleCallback {
   public:
     TriangleProbes(const btTransform& transform, const Motion& motion, const Placed& field, float margin,
                    ContactReport& report, std::vector<Contact>& contacts)
         : inField_(relative(field.pose, toPose(transform))),
           field_(field),
-          local_(field, toPose(transform), motion),
+          local_(field, toPose(transform), motion, margin),
           margin_(margin),
           reach_(std::max(margin, field.scale * field.collider.field().interiorWidth()) + local_.longestWay()),
           spacing_(probeSpacing * field.scale * field.collider.field().voxelSize()),
           report_(report),
-          contacts_(contacts) {
-        const Bounds& bounds = field.collider.bounds();
-        centre_ = field.scale * bounds.centre();
-        within_ = 0.5f * field.scale * glm::length(bounds.size()) + margin + local_.longestWay();
-    }
+          contacts_(contacts) {}
 
     /// Triangles farther than this from the field's box are of no interest [m].
     float room() const { return margin_ + local_.longestWay(); }
 
-    void processTriangle(btVector3* triangle, int, int) override {
-        const glm::vec3 corners[3] = {inField_.toWorld(toGlm(triangle[0])), inField_.toWorld(toGlm(triangle[1])),
-                                      inField_.toWorld(toGlm(triangle[2]))};
+    void processTriangle(btVector3* triangle, int, int index) override {
+        Face face{{inField_.toWorld(toGlm(triangle[0])), inField_.toWorld(toGlm(triangle[1])),
+                   inField_.toWorld(toGlm(triangle[2]))},
+                  index};
+        const auto& corners = face.corners;
         const glm::vec3 middle = (corners[0] + corners[1] + corners[2]) / 3.f;
-        float around = 0, longest = 0;
+        float around = 0;
+        for (int i = 0; i < 3; ++i) around = std::max(around, glm::distance(corners[i], middle));
+        if (local_.at(middle).distance <= around + room() + spacing_) faces_.push_back(face);
+    }
+
+    /// Asks about all triangles that were handed over.
+    void probe() {
+        for (std::uint32_t f = 0; f < faces_.size(); ++f)
+            for (int i = 0; i < 3; ++i) sides_[keyOf(f, i)].push_back({f, i});
+        for (std::uint32_t f = 0; f < faces_.size(); ++f) visit(f);
+    }
+
+  private:
+    struct Face {
+        std::array<glm::vec3, 3> corners;
+        int index;  ///< Bullet's
+    };
+    struct Side {
+        std::uint32_t face;
+        int first;  ///< corner
+    };
+    /// The ends of a side in one order.
+    using Key = std::array<float, 6>;
+
+    Key keyOf(std::uint32_t face, int first) const {
+        const glm::vec3 &a = faces_[face].corners[first], &b = faces_[face].corners[(first + 1) % 3];
+        const Key key{a.x, a.y, a.z, b.x, b.y, b.z}, back{b.x, b.y, b.z, a.x, a.y, a.z};
+        return std::min(key, back);
+    }
+
+    void visit(std::uint32_t f) {
+        const auto& [corners, index] = faces_[f];
+        Local::Answer answers[3];
+        float longest = 0;
         for (int i = 0; i < 3; ++i) {
-            around = std::max(around, glm::distance(corners[i], middle));
+            answers[i] = local_.at(corners[i]);
+            keep(local_.probe(corners[i], answers[i], 0, featureOf(index, 3 + i), margin_, report_));
             longest = std::max(longest, glm::distance(corners[i], corners[(i + 1) % 3]));
         }
-        if (local_.at(middle).distance > around + room() + spacing_) return;
         for (int i = 0; i < 3; ++i) {
-            probe(corners[i], 0);
-            visitAlong(corners[i], corners[(i + 1) % 3], centre_, within_, spacing_,
-                       [&](const glm::vec3& point, std::uint32_t) { probe(point, 0); });
+            const auto& sides = sides_.at(keyOf(f, i));
+            if (sides.front().face != f || sides.front().first != i) continue;
+            const glm::vec3 &from = corners[i], &to = corners[(i + 1) % 3];
+            Local::Edge edge{
+                [&](float part) { return glm::mix(from, to, part); }, {0, 0}, true, featureOf(index, i), {}};
+            if (sides.size() == 2) {
+                edge.wings = Wings{wingOf(sides[0]), wingOf(sides[1])};
+                edge.isSearched = glm::dot((*edge.wings)[0], (*edge.wings)[1]) > flatEdge;
+            }
+            // Within a plane the field's own points tell more.
+            if (edge.isSearched || longest <= spacing_)
+                local_.probeEdge(edge, answers[i], answers[(i + 1) % 3], margin_, report_, contacts_);
         }
         if (longest > spacing_) visitFace(corners);
     }
 
-  private:
-    void probe(const glm::vec3& point, std::uint32_t feature) {
-        if (const auto contact = local_.probe(point, 0, feature, margin_, report_)) contacts_.push_back(*contact);
+    /// From a side into its triangle; nowhere for a triangle without area.
+    glm::vec3 wingOf(const Side& side) const {
+        const auto& corners = faces_[side.face].corners;
+        const glm::vec3 &from = corners[side.first], &to = corners[(side.first + 1) % 3],
+                        &opposite = corners[(side.first + 2) % 3];
+        const glm::vec3 along = to - from, way = opposite - from;
+        const float squared = glm::dot(along, along);
+        const glm::vec3 across = squared > 0 ? way - glm::dot(way, along) / squared * along : way;
+        const float length = glm::length(across);
+        return length > 0 ? across / length : glm::vec3(0);
+    }
+
+    /// Of an edge, or behind those of a corner; the same from step to step.
+    static std::uint32_t featureOf(int triangle, int part) {
+        return ((std::uint32_t(triangle) * 6 + std::uint32_t(part)) << (partBits + 1)) & ~featureOfB;
+    }
+
+    void keep(const std::optional<Contact>& contact) {
+        if (contact) contacts_.push_back(*contact);
     }
 
     /// Asks the field at the feet of its own surface points on the triangle: a bump finds a large face.
-    void visitFace(const glm::vec3 (&corners)[3]) {
+    void visitFace(const std::array<glm::vec3, 3>& corners) {
         const float scale = field_.scale;
         const auto foot = [&](const glm::vec3& point) {
             return nearestOnTriangle(scale * point, corners[0], corners[1], corners[2]);
@@ -280,9 +571,24 @@ class TriangleProbes : public btTriangleCallback {
         const auto reject = [&](const glm::vec3& centre, float radius) {
             return glm::distance(foot(centre), scale * centre) > scale * radius + reach_;
         };
+        const glm::vec3 square = glm::cross(corners[1] - corners[0], corners[2] - corners[0]);
+        const float area = glm::length(square);
         field_.collider.points().visit(reject, [&](std::uint32_t index, const SurfacePoint& point) {
-            const glm::vec3 below = foot(point.position);
-            if (glm::distance(below, scale * point.position) <= reach_) probe(below, index | featureOfB);
+            const glm::vec3 place = scale * point.position, below = foot(point.position), way = below - place;
+            const std::uint32_t feature = index | featureOfB;
+            if (glm::length(way) > reach_) return;
+            // A point whose surface lies on the face is exact, and the interpolant need not be asked; one aslant may
+            // have passed an edge of what the sheet belongs to.
+            const float side = glm::dot(square, point.normal) < 0 ? -1.f : 1.f;
+            const glm::vec3 normal = side / area * square;
+            const float height = glm::dot(way, normal);
+            const bool isOver = glm::length(way) - std::abs(height) <= onFace * spacing_;
+            const bool lies = glm::dot(normal, point.normal) >= opposition.leastOppositionApart;
+            if (!(area > 0) || height > margin_ || !isOver || !lies)
+                return keep(local_.probe(below, local_.at(below), 0, feature, margin_, report_));
+            ++report_.pointsTested;
+            contacts_.push_back(
+                local_.contact(place, normal, height, feature, local_.approach(below, normal, margin_)));
         });
     }
 
@@ -290,10 +596,10 @@ class TriangleProbes : public btTriangleCallback {
     const Placed& field_;
     Local local_;
     float margin_, reach_, spacing_;
-    glm::vec3 centre_;
-    float within_;
     ContactReport& report_;
     std::vector<Contact>& contacts_;
+    std::vector<Face> faces_;
+    std::map<Key, std::vector<Side>> sides_;
 };
 
 }  // namespace
@@ -319,7 +625,7 @@ ContactReport collidePlane(const glm::vec3& normal, float offset, const Motion& 
     const glm::vec3 up = glm::conjugate(field.pose.rotation) * normal;
     const float height = (offset - glm::dot(normal, field.pose.position)) / field.scale;
     const float reach = margin / field.scale;
-    const Local local(field, {}, motion);
+    const Local local(field, {}, motion, margin);
     const auto above = [&](const glm::vec3& point) { return glm::dot(up, point) - height; };
     const auto reject = [&](const glm::vec3& centre, float radius) {
         return above(centre) - radius > reach + local.longestWay() / field.scale;
@@ -343,8 +649,7 @@ ContactReport collideConvex(const Convex& convex, const Pose& pose, const Motion
     field.collider.points().visit(
         [&](const glm::vec3& centre, float radius) { return touching.reject(centre, radius); },
         [&](std::uint32_t index, const SurfacePoint& point) { touching.visit(index, point, report, contacts); });
-    const float spacing = probeSpacing * field.scale * field.collider.field().voxelSize();
-    touching.visitProbes(field.collider.bounds(), spacing, report, contacts);
+    touching.visitProbes(report, contacts);
     return report;
 }
 
@@ -358,6 +663,7 @@ ContactReport collideTriangles(const btConcaveShape& mesh, const btTransform& tr
     const btTransform place(toBullet(inMesh.rotation), toBullet(inMesh.toWorld(field.scale * bounds.centre())));
     btTransformAabb(toBullet(0.5f * field.scale * bounds.size()), probes.room(), place, lower, upper);
     mesh.processAllTriangles(&probes, lower, upper);
+    probes.probe();
     return report;
 }
 

@@ -4,8 +4,10 @@
 #include <BulletCollision/CollisionShapes/btScaledBvhTriangleMeshShape.h>
 #include <BulletCollision/CollisionShapes/btSphereShape.h>
 #include <BulletCollision/CollisionShapes/btTriangleIndexVertexArray.h>
+#include <BulletCollision/CollisionShapes/btUniformScalingShape.h>
 #include <BulletCollision/NarrowPhaseCollision/btRaycastCallback.h>
 #include <LinearMath/btAabbUtil2.h>
+#include <tbb/task_arena.h>
 
 #include <cmath>
 #include <glm/geometric.hpp>
@@ -13,6 +15,7 @@
 #include <mutex>
 #include <stdexcept>
 
+#include "collider/mesh_rays.h"
 #include "integration/bullet/convert.h"
 #include "integration/bullet/sweep.h"
 
@@ -23,11 +26,16 @@ namespace {
 // Points of a manifold count as the same from step to step within this distance [voxels]: the spacing of surface
 // points.
 constexpr float breakingVoxels = 2;
+// The voxels' edge where other shapes are swept [m]: Bullet then ends its search a fiftieth of it before they touch.
+constexpr float castVoxel = 0.05f;
+// Where a ray goes on behind a triangle that it sees from behind [voxels].
+constexpr double skippedVoxels = 1e-4;
 
 btVector3 halfSize(const Bounds& bounds) {
     return toBullet(0.5f * bounds.size());
 }
 
+/// From the field of a body that has no mesh.
 void castRay(const Placed& field, btTriangleRaycastCallback& callback) {
     const glm::vec3 from = field.pose.toBody(toGlm(callback.m_from)) / field.scale;
     const glm::vec3 to = field.pose.toBody(toGlm(callback.m_to)) / field.scale;
@@ -40,14 +48,98 @@ void castRay(const Placed& field, btTriangleRaycastCallback& callback) {
         callback.m_hitFraction = callback.reportHit(toBullet(field.pose.rotation * hit->normal), fraction, 0, -1);
 }
 
-void castSphere(const Placed& field, float radius, btTriangleConvexcastCallback& callback) {
-    const glm::vec3 from = toGlm(callback.m_convexShapeFrom.getOrigin());
-    const glm::vec3 to = toGlm(callback.m_convexShapeTo.getOrigin());
-    const auto hit = sweepSphere(field, from, to, radius, callback.m_allowedPenetration);
+/// From the triangles, seen by Bullet's own flags.
+void castRay(const Placed& body, const MeshTree& mesh, btTriangleRaycastCallback& callback) {
+    const glm::dvec3 from(body.pose.toBody(toGlm(callback.m_from)) / body.scale);
+    const glm::dvec3 way = glm::dvec3(body.pose.toBody(toGlm(callback.m_to)) / body.scale) - from;
+    const double length = glm::length(way);
+    if (!(length > 0)) return;
+    const bool oneSided = callback.m_flags & btTriangleRaycastCallback::kF_FilterBackfaces;
+    const bool keepsNormal = callback.m_flags & btTriangleRaycastCallback::kF_KeepUnflippedNormal;
+    double start = 0;
+    for (const double end = length * callback.m_hitFraction; start <= end;) {
+        const auto hit = firstHit(mesh, {from + start * (way / length), way / length, end - start});
+        if (!hit) return;
+        const Corners corners = cornersOf(mesh.mesh(), hit->triangle);
+        const glm::dvec3 normal = glm::normalize(glm::cross(corners[1] - corners[0], corners[2] - corners[0]));
+        const bool isBack = glm::dot(normal, way) > 0;
+        start += hit->along;
+        if (isBack && oneSided) {
+            start += skippedVoxels * mesh.voxelSize();
+            continue;
+        }
+        const float fraction = static_cast<float>(start / length);
+        if (!(fraction < callback.m_hitFraction)) return;
+        const glm::vec3 seen(isBack && !keepsNormal ? -normal : normal);
+        callback.m_hitFraction =
+            callback.reportHit(toBullet(body.pose.rotation * seen), fraction, 0, static_cast<int>(hit->triangle));
+        return;
+    }
+}
+
+void report(const std::optional<SweepHit>& hit, btTriangleConvexcastCallback& callback) {
     if (hit && hit->fraction < callback.m_hitFraction)
         callback.m_hitFraction =
             callback.reportHit(toBullet(hit->normal), toBullet(hit->position), hit->fraction, 0, -1);
 }
+
+/// By the field or, where there is one, the mesh. False where neither can tell.
+bool castSphere(const Placed& body, const MeshTree* mesh, float radius, btTriangleConvexcastCallback& callback) {
+    const glm::vec3 from = toGlm(callback.m_convexShapeFrom.getOrigin());
+    const glm::vec3 to = toGlm(callback.m_convexShapeTo.getOrigin());
+    if (!mesh) {
+        if (!sweepable(body, radius)) return false;
+        report(sweepSphere(body, from, to, radius, callback.m_allowedPenetration), callback);
+        return true;
+    }
+    const float reach = (radius - callback.m_allowedPenetration) / body.scale;
+    const glm::vec3 start = body.pose.toBody(from) / body.scale;
+    // What touches already may leave, or go on to other triangles: Bullet asks one after the other.
+    if (!(reach > 0) || touches(*mesh, start, reach)) return false;
+    auto hit = sweepSphere(*mesh, start, body.pose.toBody(to) / body.scale, reach);
+    if (hit) {
+        hit->position = body.pose.toWorld(body.scale * hit->position);
+        hit->normal = body.pose.rotation * hit->normal;
+    }
+    report(hit, callback);
+    return true;
+}
+
+/// A sweep among bodies of about a metre, whatever their size: Bullet's search ends a millimetre before shapes touch.
+class Enlarged : public btTriangleConvexcastCallback {
+  public:
+    /// @param factor   of the world
+    /// @param scaling  of the triangles that come, before
+    Enlarged(btTriangleConvexcastCallback& sweep, btUniformScalingShape& shape, float factor, float scaling)
+        : btTriangleConvexcastCallback(&shape, enlarged(sweep.m_convexShapeFrom, factor),
+                                       enlarged(sweep.m_convexShapeTo, factor),
+                                       enlarged(sweep.m_triangleToWorld, factor), 0),
+          sweep_(sweep),
+          factor_(factor),
+          scaling_(scaling) {
+        m_hitFraction = sweep.m_hitFraction;
+        m_allowedPenetration = factor * sweep.m_allowedPenetration;
+    }
+
+    void processTriangle(btVector3* triangle, int part, int index) override {
+        btVector3 corners[3];
+        for (int i = 0; i < 3; ++i) corners[i] = factor_ * scaling_ * triangle[i];
+        btTriangleConvexcastCallback::processTriangle(corners, part, index);
+    }
+
+    btScalar reportHit(const btVector3& normal, const btVector3& point, btScalar fraction, int part,
+                       int index) override {
+        return sweep_.reportHit(normal, point / factor_, fraction, part, index);
+    }
+
+  private:
+    static btTransform enlarged(const btTransform& transform, float factor) {
+        return btTransform(transform.getBasis(), factor * transform.getOrigin());
+    }
+
+    btTriangleConvexcastCallback& sweep_;
+    float factor_, scaling_;
+};
 
 }  // namespace
 
@@ -57,13 +149,44 @@ Pose centreOfMassFrame(const Collider& collider) {
     return {-(rotation * mass.centre), rotation};
 }
 
-/// The mesh in body coordinates under Bullet's own bounding hierarchy. Built when first asked for: rays and contacts do
-/// without, and it takes longer to build than the surface points.
+/// The mesh in body coordinates under Bullet's own bounding hierarchy, and under that of rays and spheres. Each is
+/// built when first asked for: contacts do without, and Bullet's takes longer to build than the surface points.
 class Shape::Triangles {
   public:
     const btScaledBvhTriangleMeshShape& of(const Shape& shape) {
         std::call_once(once_, [&] { build(shape); });
         return *scaled_;
+    }
+    /// Hands on those that a shape may meet on its way.
+    void cast(const Shape& shape, btTriangleConvexcastCallback& sweep) {
+        of(shape);
+        const btVector3 scaling = shape.getLocalScaling();
+        const btTransform intoBody = sweep.m_triangleToWorld.inverse();
+        const btTransform from = intoBody * sweep.m_convexShapeFrom, to = intoBody * sweep.m_convexShapeTo;
+        btVector3 lower, upper;
+        sweep.m_convexShape->getAabb(btTransform(to.getBasis()), lower, upper);
+        if (!(from.getBasis() == to.getBasis())) {
+            // Bullet looks at the last rotation only; what turns may need more room on its way.
+            const btScalar around = sweep.m_convexShape->getAngularMotionDisc();
+            lower = btVector3(-around, -around, -around);
+            upper = -lower;
+        }
+        const float factor = castVoxel / shape.voxelSize();
+        btUniformScalingShape caster(const_cast<btConvexShape*>(sweep.m_convexShape), factor);
+        Enlarged enlarged(sweep, caster, factor, shape.scale());
+        mesh_->performConvexcast(&enlarged, from.getOrigin() / scaling, to.getOrigin() / scaling, lower / scaling,
+                                 upper / scaling);
+    }
+    /// Null for a body without a mesh of its own.
+    const MeshTree* tree(const Collider& collider) {
+        std::call_once(treeOnce_, [&] {
+            // a thread that waits for others here must not take up work that asks for this very tree
+            tbb::this_task_arena::isolate([&] {
+                if (collider.hasMesh())
+                    tree_ = std::make_unique<MeshTree>(collider.mesh(), collider.field().voxelSize());
+            });
+        });
+        return tree_.get();
     }
     void setScaling(const btVector3& scaling) {
         if (scaled_) scaled_->setLocalScaling(scaling);
@@ -90,7 +213,8 @@ class Shape::Triangles {
     std::unique_ptr<btTriangleIndexVertexArray> array_;
     std::unique_ptr<btBvhTriangleMeshShape> mesh_;
     std::unique_ptr<btScaledBvhTriangleMeshShape> scaled_;
-    std::once_flag once_;
+    std::unique_ptr<MeshTree> tree_;
+    std::once_flag once_, treeOnce_;
 };
 
 Shape::Shape(std::shared_ptr<const Collider> collider, const ShapeOptions& options)
@@ -147,15 +271,18 @@ void Shape::calculateLocalInertia(btScalar mass, btVector3& inertia) const {
 }
 
 void Shape::processAllTriangles(btTriangleCallback* callback, const btVector3& lower, const btVector3& upper) const {
-    if (auto* ray = dynamic_cast<btTriangleRaycastCallback*>(callback))
-        return castRay(placed(btTransform::getIdentity()), *ray);
-
+    if (auto* ray = dynamic_cast<btTriangleRaycastCallback*>(callback)) {
+        const MeshTree* mesh = triangles_->tree(*collider_);
+        const Placed here = placed(btTransform::getIdentity());
+        return mesh ? castRay(here, *mesh, *ray) : castRay(here, *ray);
+    }
     if (auto* sweep = dynamic_cast<btTriangleConvexcastCallback*>(callback)) {
         // The margin makes contacts early; it is no part of the body.
         sweep->m_triangleCollisionMargin = 0;
         const auto* sphere = dynamic_cast<const btSphereShape*>(sweep->m_convexShape);
         const Placed here = placed(sweep->m_triangleToWorld);
-        if (sphere && sweepable(here, sphere->getRadius())) return castSphere(here, sphere->getRadius(), *sweep);
+        if (sphere && castSphere(here, triangles_->tree(*collider_), sphere->getRadius(), *sweep)) return;
+        return triangles_->cast(*this, *sweep);
     }
 
     // Debug drawing asks for a box of 1e18 m, for which the hierarchy's integers are too short.

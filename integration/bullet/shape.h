@@ -56,8 +56,9 @@ class Shape : public btConcaveShape {
     void getAabb(const btTransform& transform, btVector3& lower, btVector3& upper) const override;
     /// From the mesh, about the body's origin. Throws std::invalid_argument for a mesh without volume.
     void calculateLocalInertia(btScalar mass, btVector3& inertia) const override;
-    /// Serves rays and sphere sweeps within the band from the field itself, everything else (wide spheres, other casts,
-    /// debug drawing, soft bodies) from the triangles of the mesh that meet the box.
+    /// Serves rays, swept spheres and other casts as the mesh would answer, debug drawing and soft bodies with the
+    /// triangles that meet the box. A body from a file has no mesh: its field answers rays, and swept spheres that are
+    /// narrower than the band; all else is served with the triangles of the field's zero set.
     void processAllTriangles(btTriangleCallback* callback, const btVector3& lower,
                              const btVector3& upper) const override;
     /// In voxels, not in parts of the body's size as Bullet's default, which merges contacts on fine features.

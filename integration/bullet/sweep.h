@@ -1,9 +1,10 @@
-// Spheres moved through a field until they touch.
+// Rays and spheres moved through a field or a mesh until they touch.
 #pragma once
 
 #include <optional>
 
 #include "collider/collider.h"
+#include "collider/mesh_tree.h"
 
 namespace bilayer::bullet {
 
@@ -20,5 +21,13 @@ bool sweepable(const Placed& body, float radius);
 /// starts deeper hits at once if it moves inward, as in Bullet. By conservative advancement on the field.
 std::optional<SweepHit> sweepSphere(const Placed& body, const glm::vec3& from, const glm::vec3& to, float radius,
                                     float allowed);
+
+/// The first place on the way of a sphere's centre where the sphere touches a mesh, to 1e-6 voxels. All in the mesh's
+/// coordinates.
+/// @param radius  [m], positive; the sphere touches nothing at the start
+std::optional<SweepHit> sweepSphere(const MeshTree& mesh, const glm::vec3& from, const glm::vec3& to, float radius);
+
+/// Whether a sphere is nearer to a mesh than its radius [m].
+bool touches(const MeshTree& mesh, const glm::vec3& centre, float radius);
 
 }  // namespace bilayer::bullet

@@ -1,0 +1,53 @@
+// The convex hull of balls, which is what Bullet's multispheres are: spheres, cones between two of them, and planes
+// that rest on three.
+#pragma once
+
+#include <glm/vec3.hpp>
+#include <utility>
+#include <vector>
+
+namespace bilayer::bullet {
+
+class BallHull {
+  public:
+    struct Ball {
+        glm::vec3 centre;  ///< [m]
+        float radius;      ///< not negative [m]
+    };
+
+    BallHull() = default;
+    /// At least one ball. Takes O(n^4) for n of them.
+    explicit BallHull(std::vector<Ball> balls);
+
+    struct Near {
+        float distance;    ///< signed, to the surface [m]
+        glm::vec3 normal;  ///< of the surface there, outward, of unit length
+        Ball ball;         ///< one in the hull that touches its surface there
+    };
+    /// Exact but for rounding, outside and inside. Takes O(n^2) outside, O(n^3) inside.
+    Near nearest(const glm::vec3& point) const;
+
+    /// Those that are in no other.
+    const std::vector<Ball>& balls() const { return balls_; }
+    /// Balls between which a cone lies, some of them perhaps inside of the hull.
+    const std::vector<std::pair<std::uint32_t, std::uint32_t>>& pairs() const { return pairs_; }
+
+  private:
+    struct Plane {
+        glm::vec3 normal;
+        float offset;
+        std::uint32_t corners[3];
+    };
+    void addPlanes(std::uint32_t i, std::uint32_t j, std::uint32_t k);
+    Near aroundBall(const Ball& ball, const glm::vec3& point) const;
+    Near aroundPair(const Ball& from, const Ball& to, const glm::vec3& point) const;
+    Near inside(const glm::vec3& point) const;
+    float along(const glm::vec3& direction, const glm::vec3& point) const;
+
+    std::vector<Ball> balls_;
+    std::vector<std::pair<std::uint32_t, std::uint32_t>> pairs_;
+    std::vector<Plane> planes_;
+    float size_ = 0, leastRadius_ = 0;  ///< [m]
+};
+
+}  // namespace bilayer::bullet

@@ -1,0 +1,308 @@
+// What is cast against a field is answered as Bullet's own triangle mesh answers it: rays, shapes on their way, contact
+// tests, and fast bodies that Bullet follows itself.
+#include <BulletCollision/CollisionShapes/btMultiSphereShape.h>
+#include <BulletCollision/CollisionShapes/btTriangleMesh.h>
+#include <BulletCollision/NarrowPhaseCollision/btRaycastCallback.h>
+
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <limits>
+#include <random>
+
+#include "demos/shared/shapes.h"
+#include "integration/bullet/convert.h"
+#include "sdf/build.h"
+#include "tests/support/support.h"
+#include "world.h"
+
+using namespace bilayer;
+using namespace bilayer::test;
+using bullet::Shape;
+using bullet::toBullet;
+
+namespace {
+
+constexpr float voxel = 0.05f;  // at scale 1 [m]
+// Bullet stops a shape this far before it touches, at any scale [m].
+constexpr float stopsBefore = 1e-3f;
+
+struct Triangles {
+    explicit Triangles(const Mesh& mesh) {
+        for (const glm::uvec3& t : mesh.triangles)
+            triangles.addTriangle(toBullet(mesh.points[t.x]), toBullet(mesh.points[t.y]), toBullet(mesh.points[t.z]));
+        shape = std::make_unique<btBvhTriangleMeshShape>(&triangles, true);
+        shape->setMargin(0);
+    }
+    btTriangleMesh triangles;
+    std::unique_ptr<btBvhTriangleMeshShape> shape;
+};
+
+Mesh scaled(Mesh mesh, float scale) {
+    for (glm::vec3& point : mesh.points) point *= scale;
+    return mesh;
+}
+
+// The same body twice, as a field and as triangles, each in a world of its own.
+struct Twins {
+    /// @param scaledByBullet  the field, instead of its mesh
+    /// @param itsScale        of the triangles
+    Twins(const Mesh& mesh, float scale, bool scaledByBullet, float itsScale)
+        : field(std::make_shared<Collider>(scaledByBullet ? mesh : scaled(mesh, scale),
+                                           build(scaledByBullet ? mesh : scaled(mesh, scale),
+                                                 {.voxelSize = scaledByBullet ? voxel : scale * voxel}))),
+          triangles(scaled(mesh, itsScale)) {
+        if (scaledByBullet) field.setLocalScaling({scale, scale, scale});
+        const btVector3 place(0.3f, -0.2f, 0.1f);
+        const btQuaternion turn(btVector3(1, 2, 3).normalized(), 0.8f);
+        ofField.add(field, 0, scale * place, turn);
+        ofTriangles.add(*triangles.shape, 0, itsScale * place, turn);
+    }
+    Shape field;
+    Triangles triangles;
+    World ofField, ofTriangles;
+};
+
+Mesh bodyOf(int kind) {
+    if (kind == 0) return shapes::box({0.5f, 0.4f, 0.3f}, 3);
+    return kind == 1 ? shapes::torusKnot(2, 3, 0.5f, 0.12f, 160, 16) : shapes::torus(0.5f, 0.2f);
+}
+
+class Directions {
+  public:
+    explicit Directions(unsigned seed) : random_(seed) {}
+    float part() { return part_(random_); }
+    btVector3 vector() { return {part(), part(), part()}; }
+    btQuaternion turn() { return btQuaternion(part(), part(), part(), part() + 0.01f).normalized(); }
+    /// From somewhere outside of a ball to a place in it, and beyond.
+    std::pair<btVector3, btVector3> way(float scale) {
+        const btVector3 through = 0.6f * scale * vector(), from = 2 * scale * vector().normalized();
+        return {from, from + 1.8f * (through - from)};
+    }
+
+  private:
+    std::mt19937 random_;
+    std::uniform_real_distribution<float> part_{-1, 1};
+};
+
+std::unique_ptr<btConvexShape> shapeOf(int kind, float s) {
+    switch (kind) {
+        case 0:
+            return std::make_unique<btSphereShape>(0.12f * s);
+        case 1: {
+            // by this Bullet rounds it off
+            auto box = std::make_unique<btBoxShape>(s * btVector3(0.1f, 0.15f, 0.2f));
+            box->setMargin(0.005f * s);
+            return box;
+        }
+        case 2:
+            return std::make_unique<btCapsuleShape>(0.08f * s, 0.3f * s);
+        case 3: {
+            auto cylinder = std::make_unique<btCylinderShape>(s * btVector3(0.1f, 0.2f, 0.1f));
+            cylinder->setMargin(0.005f * s);
+            return cylinder;
+        }
+        case 4: {
+            auto cone = std::make_unique<btConeShape>(0.12f * s, 0.3f * s);
+            cone->setMargin(0.01f * s);
+            return cone;
+        }
+        case 5: {
+            auto hull = std::make_unique<btConvexHullShape>();
+            for (const glm::vec3& point : shapes::sphere(0.15f * s, 1).points) hull->addPoint(toBullet(point));
+            hull->setMargin(0.01f * s);
+            return hull;
+        }
+        default: {
+            const btVector3 centres[] = {{-0.1f * s, 0, 0}, {0.1f * s, 0, 0}};
+            const float radii[] = {0.1f * s, 0.06f * s};
+            auto spheres = std::make_unique<btMultiSphereShape>(centres, radii, 2);
+            spheres->setMargin(0.05f * s);
+            return spheres;
+        }
+    }
+}
+
+// The first touch of a sphere on its way, over all triangles, in double precision, by bisection of a brute-force
+// distance that falls until then.
+double firstTouch(const Mesh& mesh, const glm::dvec3& from, const glm::dvec3& to, double radius) {
+    double along = 0;
+    const double length = glm::distance(from, to);
+    for (int i = 0; i < 100000 && along <= length; ++i) {
+        const double gap = distance(mesh, from + along / length * (to - from)) - radius;
+        if (gap < 1e-9 * length) return along / length;
+        along += gap;
+    }
+    return 2;
+}
+
+}  // namespace
+
+TEST_CASE("Rays meet a field where they meet its triangles") {
+    const int kind = GENERATE(0, 1);
+    const float scale = GENERATE(0.01f, 1.f, 100.f);
+    const bool scaledByBullet = GENERATE(false, true);
+    const unsigned start = seed();
+    CAPTURE(kind, scale, scaledByBullet, start);
+    Twins twins(bodyOf(kind), scale, scaledByBullet, scale);
+    Directions random(start);
+    int hits = 0, turned = 0;
+    for (int i = 0; i < 300; ++i) {
+        const auto [from, to] = random.way(scale);
+        btCollisionWorld::ClosestRayResultCallback ray(from, to), expected(from, to);
+        const bool oneSided = i % 3 == 0;
+        if (oneSided) ray.m_flags = expected.m_flags = btTriangleRaycastCallback::kF_FilterBackfaces;
+        // every fifth starts inside
+        const btVector3 begin = i % 5 ? from : 0.5f * (from + to);
+        twins.ofField.dynamics.rayTest(begin, to, ray);
+        twins.ofTriangles.dynamics.rayTest(begin, to, expected);
+        CAPTURE(i, ray.m_closestHitFraction, expected.m_closestHitFraction);
+        REQUIRE(ray.hasHit() == expected.hasHit());
+        if (!ray.hasHit()) continue;
+        ++hits;
+        CHECK(ray.m_closestHitFraction == Approx(expected.m_closestHitFraction).margin(1e-5));
+        turned += ray.m_hitNormalWorld.dot(expected.m_hitNormalWorld) < 0.999f;
+    }
+    CHECK(hits > 100);
+    // on an edge either triangle may answer
+    CHECK(turned <= hits / 50);
+}
+
+TEST_CASE("Shapes of all kinds on their way meet a field as they meet its triangles") {
+    const int kind = GENERATE(range(0, 7));
+    // powers of two: all that Bullet searches is rounded alike
+    const float scale = GENERATE(1.f / 128, 1.f, 128.f);
+    const bool scaledByBullet = GENERATE(false, true);
+    const unsigned start = seed();
+    CAPTURE(kind, scale, scaledByBullet, start);
+    // Bullet's own search is rough where bodies are small: what it says of a metre holds at any scale
+    Twins twins(bodyOf(kind % 2), scale, scaledByBullet, 1);
+    const auto shape = shapeOf(kind, scale), itsShape = shapeOf(kind, 1);
+    Directions random(start);
+    int hits = 0, turned = 0;
+    for (int i = 0; i < 60; ++i) {
+        const auto [itsFrom, itsTo] = random.way(1);
+        const btVector3 from = scale * itsFrom, to = scale * itsTo;
+        const btTransform turn(random.turn());
+        const auto at = [&](const btVector3& place) { return btTransform(turn.getBasis(), place); };
+        btCollisionWorld::ClosestConvexResultCallback sweep(from, to), expected(itsFrom, itsTo);
+        twins.ofField.dynamics.convexSweepTest(shape.get(), at(from), at(to), sweep);
+        twins.ofTriangles.dynamics.convexSweepTest(itsShape.get(), at(itsFrom), at(itsTo), expected);
+        CAPTURE(i, sweep.m_closestHitFraction, expected.m_closestHitFraction);
+        if (kind == 0) {
+            // spheres are exact: Bullet's own search stops a millimetre before, or where it does not converge
+            const btTransform body = twins.ofField.dynamics.getCollisionObjectArray()[0]->getWorldTransform();
+            const double exact =
+                firstTouch(scaled(bodyOf(kind % 2), scale), glm::dvec3(bullet::toGlm(body.invXform(from))),
+                           glm::dvec3(bullet::toGlm(body.invXform(to))), 0.12 * double(scale));
+            if (std::abs(exact - 1) < 1e-4) continue;
+            REQUIRE(sweep.hasHit() == (exact <= 1));
+            if (!sweep.hasHit()) continue;
+            ++hits;
+            CHECK(sweep.m_closestHitFraction == Approx(exact).margin(1e-4));
+        } else {
+            REQUIRE(sweep.hasHit() == expected.hasHit());
+            if (!sweep.hasHit()) continue;
+            ++hits;
+            // either search ends within a millimetre of where it touches, at the scale of 1
+            const float down = std::max(-expected.m_hitNormalWorld.dot((itsTo - itsFrom).normalized()), 0.05f);
+            const float apart = itsFrom.distance(itsTo) * (sweep.m_closestHitFraction - expected.m_closestHitFraction);
+            CHECK(std::abs(apart) * down < stopsBefore);
+            turned += sweep.m_hitNormalWorld.dot(expected.m_hitNormalWorld) < 0.99f;
+        }
+    }
+    CHECK(hits > 15);
+    // where a shape meets two triangles at once, their order tells which one's normal Bullet gives
+    CHECK(turned <= hits / 20);
+}
+
+TEST_CASE("A shape that turns on its way meets what lies beside its last rotation") {
+    Twins twins(bodyOf(0), 1, false, 1);
+    const btBoxShape plank({0.02f, 0.02f, 0.9f});
+    // upright at the end, level on its way
+    const btVector3 from(0.3f, 0.75f, 1.5f), to(0.3f, 0.75f, -1.5f);
+    const btTransform first(btQuaternion({1, 0, 0}, SIMD_HALF_PI), from), last(btQuaternion({1, 0, 0}, 0), to);
+    btCollisionWorld::ClosestConvexResultCallback sweep(from, to);
+    twins.ofField.dynamics.convexSweepTest(&plank, first, last, sweep);
+    CHECK(sweep.hasHit());
+}
+
+TEST_CASE("Fast bodies that Bullet follows itself stop at a field as at its triangles") {
+    const float speed = GENERATE(20.f, 100.f, 500.f);
+    const bool isBox = GENERATE(false, true);
+    CAPTURE(speed, isBox);
+    const Mesh plate = shapes::box({1, 1, 0.1f});
+    const auto play = [&](bool asField) {
+        Shape field(std::make_shared<Collider>(plate, build(plate, {.voxelSize = voxel})), {.sweeps = false});
+        Triangles triangles(plate);
+        World world;
+        world.add(asField ? static_cast<btCollisionShape&>(field) : *triangles.shape, 0, {0, 0, 0});
+        btSphereShape ball(0.1f);
+        btBoxShape box({0.1f, 0.1f, 0.1f});
+        btRigidBody* body = world.add(isBox ? static_cast<btCollisionShape&>(box) : ball, 1, {0.2f, 0.1f, 2});
+        body->setLinearVelocity({0, 0, -speed});
+        body->setCcdMotionThreshold(0.05f);
+        body->setCcdSweptSphereRadius(0.08f);
+        float lowest = 2;
+        for (int i = 0; i < 60; ++i) {
+            world.dynamics.stepSimulation(1.f / 60, 1, 1.f / 60);
+            lowest = std::min(lowest, float(body->getWorldTransform().getOrigin().z()));
+        }
+        return std::pair(lowest, float(body->getWorldTransform().getOrigin().z()));
+    };
+    const auto [lowest, last] = play(true);
+    const auto [expectedLowest, expectedLast] = play(false);
+    CAPTURE(lowest, last, expectedLowest, expectedLast);
+    CHECK(lowest > 0.1f);
+    CHECK(last == Approx(expectedLast).margin(0.1 * voxel + stopsBefore));
+}
+
+namespace {
+
+struct Nearest : btCollisionWorld::ContactResultCallback {
+    btScalar addSingleResult(btManifoldPoint& point, const btCollisionObjectWrapper*, int, int,
+                             const btCollisionObjectWrapper*, int, int) override {
+        distance = std::min(distance, float(point.getDistance()));
+        return 0;
+    }
+    float distance = std::numeric_limits<float>::max();
+};
+
+}  // namespace
+
+TEST_CASE("Contact tests tell the distance that the triangles have") {
+    const int kind = GENERATE(0, 1, 2, 3, 5, 6);
+    const float scale = GENERATE(0.01f, 1.f, 100.f);
+    const unsigned start = seed();
+    CAPTURE(kind, scale, start);
+    Twins twins(bodyOf(kind % 2 ? 2 : 0), scale, false, 1);
+    // a ring of four voxels' radius: the interpolant of distances from thinner ones is off by a tenth of a voxel
+    const Mesh mesh = bodyOf(kind % 2 ? 2 : 0);
+    const auto shape = shapeOf(kind, scale), itsShape = shapeOf(kind, 1);
+    Directions random(start);
+    btRigidBody* ofField = twins.ofField.add(*shape, 1, {0, 0, 0});
+    btRigidBody* ofTriangles = twins.ofTriangles.add(*itsShape, 1, {0, 0, 0});
+    int found = 0;
+    const float most = 0.1f;
+    for (int i = 0; i < 100; ++i) {
+        const btTransform turn(random.turn());
+        const btVector3 place = 0.9f * random.vector() + btVector3(0.3f, -0.2f, 0.1f);
+        const auto ask = [&](World& world, btRigidBody* body, float factor) {
+            body->setWorldTransform(btTransform(turn.getBasis(), factor * place));
+            Nearest nearest;
+            nearest.m_closestDistanceThreshold = factor * most;
+            world.dynamics.contactPairTest(world.dynamics.getCollisionObjectArray()[0], body, nearest);
+            return nearest.distance / factor;
+        };
+        const float distance = ask(twins.ofField, ofField, scale), expected = ask(twins.ofTriangles, ofTriangles, 1);
+        CAPTURE(i, distance / voxel, expected / voxel);
+        // triangles tell nothing of a solid that they have sunk into
+        const auto body = twins.ofTriangles.dynamics.getCollisionObjectArray()[0]->getWorldTransform();
+        if (windingNumber(mesh, glm::dvec3(bullet::toGlm(body.invXform(place)))) > 0.5) continue;
+        if (expected < 0.1f * voxel || expected > 0.9f * most) continue;
+        ++found;
+        CHECK(distance == Approx(expected).margin(0.1 * double(voxel)));
+    }
+    CHECK(found > 0);
+}

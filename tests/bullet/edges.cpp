@@ -1,0 +1,295 @@
+// Edges that meet between their corners and between the points of a field; the hull of balls; sharp edges of bodies.
+#include <BulletCollision/CollisionShapes/btMultiSphereShape.h>
+#include <BulletCollision/CollisionShapes/btTriangleMesh.h>
+
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <functional>
+#include <glm/geometric.hpp>
+#include <glm/gtc/constants.hpp>
+#include <glm/gtc/quaternion.hpp>
+#include <limits>
+#include <random>
+
+#include "collider/edge_search.h"
+#include "demos/shared/shapes.h"
+#include "integration/bullet/ball_hull.h"
+#include "integration/bullet/convert.h"
+#include "integration/bullet/convex.h"
+#include "integration/bullet/narrow.h"
+#include "sdf/build.h"
+#include "tests/support/support.h"
+#include "world.h"
+
+using namespace bilayer;
+using namespace bilayer::test;
+using bullet::BallHull;
+using bullet::Convex;
+
+namespace {
+
+constexpr float h = 0.05f;             // voxel [m]
+constexpr double tolerance = 0.1 * h;  // of depths
+
+std::shared_ptr<const Collider> colliderOf(const Mesh& mesh, bool exact = false) {
+    return std::make_shared<Collider>(mesh, build(mesh, {.voxelSize = h, .interiorWidth = 6}),
+                                      ColliderOptions{.exact = exact});
+}
+
+// Two long bars of square section, ridge on ridge: the lower one's along y with its ridge up, the upper one's turned
+// by an angle from x with its ridge down, both sheared along and turned together at random.
+struct Crossing {
+    Pose upper, lower;
+    glm::vec3 normal;  // from the lower one to the upper one
+    float gap;
+};
+
+constexpr float halfBar = 0.3f;
+const glm::vec3 bar(1.4f, halfBar, halfBar);
+
+Crossing crossingOf(std::mt19937& random, float gap) {
+    std::uniform_real_distribution<float> part(-1, 1);
+    const glm::quat ridge = glm::angleAxis(glm::quarter_pi<float>(), glm::vec3(1, 0, 0));
+    const glm::quat square = glm::angleAxis(glm::half_pi<float>(), glm::vec3(0, 0, 1));
+    const glm::quat askew = glm::angleAxis(0.6f * part(random), glm::vec3(0, 0, 1));
+    const float height = std::sqrt(2.f) * halfBar;
+    Pose lower{{0.3f * part(random), 0.3f * part(random), -height}, square * ridge};
+    Pose upper{{0.3f * part(random), 0.3f * part(random), height + gap}, askew * ridge};
+    const glm::quat turn = glm::normalize(glm::quat(part(random), part(random), part(random), part(random) + 0.1f));
+    for (Pose* pose : {&lower, &upper}) *pose = {turn * pose->position, glm::normalize(turn * pose->rotation)};
+    return {upper, lower, turn * glm::vec3(0, 0, 1), gap};
+}
+
+const Contact& deepest(const std::vector<Contact>& contacts) {
+    REQUIRE_FALSE(contacts.empty());
+    return *std::min_element(contacts.begin(), contacts.end(),
+                             [](const Contact& a, const Contact& b) { return a.distance < b.distance; });
+}
+
+btTransform transformOf(const Pose& pose) {
+    return btTransform(bullet::toBullet(pose.rotation), bullet::toBullet(pose.position));
+}
+
+// A bar of triangles.
+struct Triangles {
+    explicit Triangles(const Mesh& mesh) {
+        for (const glm::uvec3& t : mesh.triangles)
+            triangles.addTriangle(bullet::toBullet(mesh.points[t.x]), bullet::toBullet(mesh.points[t.y]),
+                                  bullet::toBullet(mesh.points[t.z]));
+        shape = std::make_unique<btBvhTriangleMeshShape>(&triangles, true);
+    }
+    btTriangleMesh triangles;
+    std::unique_ptr<btBvhTriangleMeshShape> shape;
+};
+
+using Collide = std::function<std::vector<Contact>(const Crossing&, float)>;
+
+Collide collideBars(int kind, bool exact) {
+    static const auto fields = std::pair(colliderOf(shapes::box(bar)), colliderOf(shapes::box(bar), true));
+    const auto& field = exact ? fields.second : fields.first;
+    if (kind == 0)
+        return [=](const Crossing& c, float margin) {
+            std::vector<Contact> contacts;
+            NearPoints near;
+            bullet::collideFields({*field, c.upper}, {*field, c.lower}, margin, near, contacts);
+            return contacts;
+        };
+    if (kind == 1 || kind == 2) {
+        std::shared_ptr<btConvexShape> shape = std::make_shared<btBoxShape>(bullet::toBullet(bar));
+        if (kind == 2) {
+            const auto hull = std::make_shared<btConvexHullShape>();
+            for (const glm::vec3& point : shapes::box(bar).points) hull->addPoint(bullet::toBullet(point));
+            hull->setMargin(0);
+            shape = hull;
+        }
+        return [=](const Crossing& c, float margin) {
+            std::vector<Contact> contacts;
+            bullet::collideConvex(Convex(*shape), c.upper, {}, {*field, c.lower}, margin, contacts);
+            return contacts;
+        };
+    }
+    const auto triangles = std::make_shared<Triangles>(shapes::box(bar));
+    return [=](const Crossing& c, float margin) {
+        std::vector<Contact> contacts;
+        bullet::collideTriangles(*triangles->shape, transformOf(c.upper), {}, {*field, c.lower}, margin, contacts);
+        return contacts;
+    };
+}
+
+}  // namespace
+
+TEST_CASE("Edges that cross touch where they cross, however their points lie") {
+    const int kind = GENERATE(0, 1, 2, 3);
+    const bool exact = GENERATE(false, true);
+    const unsigned start = seed();
+    CAPTURE(kind, exact, start);
+    const Collide collide = collideBars(kind, exact);
+    std::mt19937 random(start);
+    std::uniform_real_distribution<float> gaps(-0.6f * h, 0.4f * h);
+    for (int i = 0; i < 200; ++i) {
+        const Crossing crossing = crossingOf(random, gaps(random));
+        const auto contacts = collide(crossing, h);
+        const Contact& contact = deepest(contacts);
+        CAPTURE(i, crossing.gap / h, contact.distance / h);
+        CHECK(contact.distance == Approx(crossing.gap).margin(tolerance));
+        CHECK(glm::dot(contact.normal, crossing.normal) > 0.99f);
+    }
+}
+
+TEST_CASE("A contact on an edge goes as evenly as the edge that slides") {
+    const int kind = GENERATE(0, 1, 2, 3);
+    const unsigned start = seed();
+    CAPTURE(kind, start);
+    const Collide collide = collideBars(kind, false);
+    std::mt19937 random(start);
+    for (int run = 0; run < 10; ++run) {
+        Crossing crossing = crossingOf(random, -0.2f * h);
+        const glm::vec3 along = crossing.upper.rotation * glm::vec3(1, 0, 0);
+        const glm::vec3 its = crossing.lower.rotation * glm::vec3(1, 0, 0);
+        const float step = 0.02f * h;
+        glm::vec3 before(0);
+        for (int i = 0; i < 150; ++i) {
+            // along both edges, aslant
+            crossing.upper.position += step * glm::normalize(along + 0.6f * its);
+            const auto contacts = collide(crossing, h);
+            const glm::vec3 place = deepest(contacts).position;
+            CAPTURE(run, i, glm::distance(place, before) / h);
+            if (i > 0) CHECK(glm::distance(place, before) < 2 * step + 0.05f * h);
+            before = place;
+        }
+    }
+}
+
+TEST_CASE("An edge finds a bump between its probes, and stays on it") {
+    // a small ball of three voxels' radius under the edge of a long box
+    const float radius = 3 * h;
+    static const auto ball = exactSphere(radius, h);
+    const float side = std::sqrt(2.f) * halfBar;
+    const glm::quat ridge = glm::angleAxis(glm::quarter_pi<float>(), glm::vec3(1, 0, 0));
+    const btBoxShape box(bullet::toBullet(bar));
+    const Convex convex(box);
+    float before = 0;
+    for (int i = 0; i < 200; ++i) {
+        const float way = 0.02f * h * float(i), gap = -0.1f * h;
+        std::vector<Contact> contacts;
+        bullet::collideConvex(convex, {{0.3f + way, 0, radius + side + gap}, ridge}, {}, {*ball, {}}, h, contacts);
+        const Contact& contact = deepest(contacts);
+        CAPTURE(i, contact.distance / h);
+        CHECK(contact.distance == Approx(gap).margin(tolerance));
+        // gradients of the interpolant are off by up to h / (2 R) along either tangent
+        CHECK(contact.normal.z > std::cos(h / radius));
+        if (i > 0) CHECK(std::abs(contact.position.x - before) < 0.25f * h);
+        before = contact.position.x;
+    }
+}
+
+TEST_CASE("The lowest place between two is found at kinks and on parabolas") {
+    const float lowest = GENERATE(0.13f, 0.5f, 0.91f);
+    const auto kink = [&](float x) {
+        return x < lowest ? Slope{x, 0.7f * (lowest - x), -0.7f} : Slope{x, x - lowest, 1};
+    };
+    const auto parabola = [&](float x) { return Slope{x, (x - lowest) * (x - lowest), 2 * (x - lowest)}; };
+    int asked = 0;
+    const auto search = [&](auto&& function) {
+        asked = 0;
+        const auto at = [&](float x) { return ++asked, std::optional(function(x)); };
+        return lowestBetween(function(0), function(1), 1e-4f, at);
+    };
+    const auto atKink = search(kink);
+    REQUIRE(atKink);
+    CHECK(atKink->place == Approx(lowest).margin(1e-3));
+    CHECK(asked <= 2);
+    const auto onParabola = search(parabola);
+    REQUIRE(onParabola);
+    CHECK(onParabola->place == Approx(lowest).margin(6e-3));
+    CHECK(asked <= 3);
+    CHECK_FALSE(lowestBetween(kink(0), kink(1), 1e-4f, [](float) { return std::optional<Slope>(); }));
+}
+
+TEST_CASE("Sharp edges are those of the mesh, and none lies across a groove") {
+    const bool grooved = GENERATE(false, true);
+    Mesh mesh = shapes::box({0.5f, 0.4f, 0.3f});
+    // a comb: teeth four voxels apart
+    if (grooved) {
+        std::vector<Mesh> parts{shapes::box({0.5f, 0.4f, 0.1f})};
+        for (int i = 0; i < 3; ++i) {
+            parts.push_back(shapes::box({1.5f * h, 0.4f, 0.2f}));
+            for (glm::vec3& p : parts.back().points) p += glm::vec3(float(i - 1) * 5 * h, 0, 0.15f);
+        }
+        mesh = shapes::join(parts);
+    }
+    const auto collider = colliderOf(mesh);
+    const auto points = collider->points().points();
+    double total = 0;
+    for (const SharpEdge& edge : collider->edges().edges()) {
+        REQUIRE(edge.from < edge.to);
+        const glm::vec3 &a = points[edge.from].position, &b = points[edge.to].position;
+        total += glm::distance(a, b);
+        CHECK(std::abs(signedDistance(mesh, 0.5f * (a + b))) < 0.5 * h);
+    }
+    // all twelve edges are covered once
+    if (!grooved) CHECK(total == Approx(4 * 2 * (0.5 + 0.4 + 0.3)).epsilon(1e-3));
+}
+
+TEST_CASE("The distance from a hull of balls is that of its support function, outside and inside") {
+    const unsigned start = seed();
+    CAPTURE(start);
+    std::mt19937 random(start);
+    std::uniform_real_distribution<float> part(-1, 1);
+    const auto vector = [&] { return glm::vec3(part(random), part(random), part(random)); };
+    for (int run = 0; run < 60; ++run) {
+        std::vector<BallHull::Ball> balls;
+        for (int i = 0; i <= run % 6; ++i) balls.push_back({0.5f * vector(), 0.02f + 0.2f * std::abs(part(random))});
+        if (run % 3 == 0)
+            for (auto& ball : balls) ball.radius = 0.2f;
+        const BallHull hull(balls);
+        for (int i = 0; i < 20; ++i) {
+            const glm::vec3 point = 1.2f * vector();
+            const auto near = hull.nearest(point);
+            const auto along = [&](const glm::vec3& v) {
+                float least = std::numeric_limits<float>::max();
+                for (const auto& ball : balls) least = std::min(least, glm::dot(v, point - ball.centre) - ball.radius);
+                return least;
+            };
+            // uphill from many directions
+            float best = -std::numeric_limits<float>::max();
+            for (int k = 0; k < 40; ++k) {
+                glm::vec3 v = glm::normalize(vector());
+                float value = along(v);
+                for (float step = 0.5f; step > 1e-5f;) {
+                    const glm::vec3 next = glm::normalize(v + step * vector());
+                    if (const float there = along(next); there > value)
+                        v = next, value = there;
+                    else
+                        step *= 0.93f;
+                }
+                best = std::max(best, value);
+            }
+            CAPTURE(run, i, balls.size());
+            // no direction does better, and this one does as well
+            CHECK(best < near.distance + 1e-5f);
+            CHECK(best > near.distance - 1e-2f);
+            CHECK(along(near.normal) == Approx(near.distance).margin(1e-5));
+            // the ball named touches the surface there
+            const glm::vec3 foot = point - near.distance * near.normal;
+            CHECK(glm::distance(foot, near.ball.centre + near.ball.radius * near.normal) < 1e-4f);
+        }
+    }
+}
+
+TEST_CASE("A multisphere is that of its balls, whatever its margin and scale") {
+    const float scale = GENERATE(0.01f, 1.f, 100.f);
+    const btVector3 centres[] = {scale * btVector3(-0.3f, -0.2f, 0), scale * btVector3(0.3f, -0.2f, 0),
+                                 scale * btVector3(0, 0.3f, 0)};
+    const float radii[] = {scale * 0.25f, scale * 0.2f, scale * 0.15f};
+    const btMultiSphereShape spheres(centres, radii, 3);
+    const Convex convex(spheres);
+    for (int i = 0; i < 3; ++i) {
+        const glm::vec3 above = bullet::toGlm(centres[i]) + glm::vec3(0, 0, scale);
+        CHECK(convex.nearest(above, scale).distance <= Approx(scale - radii[i]));
+    }
+    const glm::vec3 beside = scale * glm::vec3(-1, -0.2f, 0);
+    CHECK(convex.nearest(beside, scale).distance == Approx(0.45f * scale));
+    CHECK(convex.nearest(beside, scale).normal.x == Approx(-1));
+}
