@@ -38,6 +38,7 @@ constexpr float pieceTurn = 0.1f;
 constexpr float nearby = 0.5f;
 // Between points along the edges of convex bodies [voxels].
 constexpr float probeSpacing = 2;
+constexpr float mostProbes = 64;  // along an edge
 // What an interpolated distance may be above the true one (see collide()) [voxels].
 constexpr float interpolationError = 0.87f;
 constexpr float steepest = 1.7321f;   // how fast the interpolant may change: by a voxel along each axis at once
@@ -440,12 +441,18 @@ float passageOf(const Shape& field, const Obstacle& obstacle, const std::vector<
 float passageOf(const Convex& convex, const Shape& field, const std::vector<Moment>& moments) {
     const FieldObstacle obstacle(field.collider().field());
     Passage passage(obstacle, moments, field.voxelSize() / field.scale());
-    convex.visitProbes(glm::vec3(0), std::numeric_limits<float>::max(), probeSpacing * field.voxelSize(),
-                       [&](const glm::vec3& point, std::uint32_t) {
-                           const float length = glm::length(point);
-                           const glm::vec3 outward = length > 0 ? point / length : glm::vec3(0);
-                           passage.follow(point, outward, convex.radius());
-                       });
+    const auto follow = [&](const glm::vec3& point, float radius) {
+        const float length = glm::length(point);
+        passage.follow(point, length > 0 ? point / length : glm::vec3(0), radius);
+    };
+    const auto corners = convex.corners();
+    for (std::uint32_t i = 0; i < corners.size(); ++i) follow(corners[i], convex.radius(i));
+    for (const Convex::Edge& edge : convex.edges()) {
+        const float length = glm::distance(corners[edge.from], corners[edge.to]);
+        const float parts = std::min(std::ceil(length / (probeSpacing * field.voxelSize())), mostProbes);
+        for (float part = 1; part < parts; ++part)
+            follow(convex.place(edge, part / parts), convex.radius(edge, part / parts));
+    }
     return passage.first();
 }
 
