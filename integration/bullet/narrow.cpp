@@ -10,6 +10,7 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
+#include <limits>
 #include <map>
 #include <optional>
 
@@ -432,6 +433,7 @@ class Touching {
         const float step = probeSpacing * scale_ * local_.collider().field().voxelSize();
         const glm::vec3 slope = toConvex_ * here.gradient, start = intoConvex(place);
         glm::vec3 end;
+        float least = std::numeric_limits<float>::lowest();
         if (const auto line = convex_.sideLine(near, start)) {
             const glm::vec3 from = (*line)[0] + near.radius * near.normal, along = (*line)[1] - (*line)[0];
             const float length = glm::length(along), steepness = glm::dot(slope, along) / length;
@@ -441,8 +443,8 @@ class Touching {
             end = start + (there - middle) * along;
         } else {
             // Where faces touch, points are exact, and the interpolant is not.
-            const float apart = touchingFace * scale_ * local_.collider().field().voxelSize();
-            if (!convex_.isFlat(near) || near.distance < apart) return std::nullopt;
+            least = touchingFace * scale_ * local_.collider().field().voxelSize();
+            if (!convex_.isFlat(near) || near.distance < least) return std::nullopt;
             const glm::vec3 uphill = slope - glm::dot(slope, near.normal) * near.normal;
             const float steepness = glm::length(uphill);
             if (!(steepness > leastDownhill)) return std::nullopt;
@@ -452,7 +454,8 @@ class Touching {
         }
         const Local::Edge way{
             [&, to = intoField(end)](float part) { return glm::mix(place, to, part); }, {0, 0}, true, 0, std::nullopt};
-        return local_.deepestBetween(way, 0, here, 1, local_.at(intoField(end)), margin_);
+        const auto found = local_.deepestBetween(way, 0, here, 1, local_.at(intoField(end)), margin_);
+        return found && found->distance >= least ? found : std::nullopt;
     }
 
     const Convex& convex_;
