@@ -139,7 +139,8 @@ TEST_CASE("the peg of Factory finds its way through its plate") {
     if (!path) return;
     demo::PegsOptions options;
     options.clearances = {};
-    options.seconds = 0.5f;
+    options.seconds = 0.4f;
+    options.voxelSize = 0.4e-3f;
     options.factory = path->parent_path();
     judgeOnce(demo::pegs(options));
 }
