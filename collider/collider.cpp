@@ -425,8 +425,14 @@ ContactReport addContacts(const Placed& a, const Placed& b, const ContactOptions
         contacts.push_back({b.pose.toWorld(b.scale * point.position), -normal, touch.distance * a.scale,
                             index | featureOfB, touch.approach * a.scale});
     };
+    const std::size_t first = contacts.size();
     visitA(PointsInField(a, b, options.margin), report, addOfA);
+    const std::size_t second = contacts.size();
     visitB(PointsInField(b, a, options.margin), report, addOfB);
+    // edges are found next to their points, and come behind all of these
+    const auto byFeature = [](const Contact& one, const Contact& other) { return one.feature < other.feature; };
+    std::stable_sort(contacts.begin() + std::ptrdiff_t(first), contacts.begin() + std::ptrdiff_t(second), byFeature);
+    std::stable_sort(contacts.begin() + std::ptrdiff_t(second), contacts.end(), byFeature);
     return report;
 }
 

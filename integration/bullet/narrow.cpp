@@ -299,8 +299,7 @@ class Touching {
                 return;
             }
         }
-        contacts.push_back(
-            local_.contact(position, normal, near.distance, feature, approach));
+        contacts.push_back(local_.contact(position, normal, near.distance, feature, approach));
     }
 
     /// The convex body's own corners and edges in the field.
@@ -580,15 +579,18 @@ class TriangleProbes : public btTriangleCallback {
             const glm::vec3 place = scale * point.position, below = foot(point.position), way = below - place;
             const std::uint32_t feature = index | featureOfB;
             if (glm::length(way) > reach_) return;
-            // A point whose surface lies on the face is exact, and the interpolant need not be asked; one aslant may
-            // have passed an edge of what the sheet belongs to.
+            // A point whose surface lies on the face is exact; one aslant may have passed an edge of what the sheet
+            // belongs to, and one that looks away from a sheet that has not reached it is on the other side of its
+            // body.
             const float side = glm::dot(square, point.normal) < 0 ? -1.f : 1.f;
             const glm::vec3 normal = side / area * square;
             const float height = glm::dot(way, normal);
             const bool isOver = glm::length(way) - std::abs(height) <= onFace * spacing_;
             const bool lies = glm::dot(normal, point.normal) >= opposition.leastOppositionApart;
-            if (!(area > 0) || height > margin_ || !isOver || !lies)
-                return keep(local_.probe(below, local_.at(below), 0, feature, margin_, report_));
+            const Local::Answer answer = local_.at(below);
+            const bool isNearest = std::abs(answer.distance - height) <= interpolationError * spacing_ / probeSpacing;
+            if (!(area > 0) || height > margin_ || !isOver || !lies || !isNearest)
+                return keep(local_.probe(below, answer, 0, feature, margin_, report_));
             ++report_.pointsTested;
             contacts_.push_back(
                 local_.contact(place, normal, height, feature, local_.approach(below, normal, margin_)));
