@@ -16,6 +16,7 @@
 #include "bench/builders.h"
 #include "bench/measure.h"
 #include "bench/program.h"
+#include "collider/mass.h"
 #include "demos/shared/shapes.h"
 #include "integration/fluid/seed.h"
 
@@ -125,15 +126,6 @@ double areaOf(const Mesh& mesh) {
     return area;
 }
 
-double volumeOf(const Mesh& mesh) {
-    double volume = 0;
-    for (const glm::uvec3& t : mesh.triangles) {
-        const glm::dvec3 a = mesh.points[t.x], b = mesh.points[t.y], c = mesh.points[t.z];
-        volume += glm::dot(a, glm::cross(b, c)) / 6;
-    }
-    return volume;
-}
-
 // Of |gradient| from 1 within a voxel of the surface, in the mean; by central differences.
 double slopeError(const FloatGrid& liquid) {
     const auto gradient = openvdb::tools::gradient(liquid);
@@ -149,7 +141,7 @@ double slopeError(const FloatGrid& liquid) {
 
 std::string truthOf(const FloatGrid& liquid, const Mesh& mesh) {
     openvdb::tools::LevelSetMeasure<FloatGrid> measure(liquid);
-    return fmt::format("{:+.4f} | {:+.4f} | {:.4f}", 100 * (measure.volume() / volumeOf(mesh) - 1),
+    return fmt::format("{:+.4f} | {:+.4f} | {:.4f}", 100 * (measure.volume() / massProperties(mesh).volume - 1),
                        100 * (measure.area() / areaOf(mesh) - 1), slopeError(liquid));
 }
 

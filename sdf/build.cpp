@@ -5,7 +5,6 @@
 #include <oneapi/tbb/global_control.h>
 #include <oneapi/tbb/parallel_reduce.h>
 #include <oneapi/tbb/task_arena.h>
-#include <unistd.h>
 
 #include <atomic>
 #include <chrono>
@@ -26,6 +25,7 @@
 #include "sdf/grids.h"
 #include "sdf/moved.h"
 #include "sdf/orient.h"
+#include "sdf/physical_memory.h"
 #include "sdf/progress.h"
 #include "sdf/pseudonormal.h"
 #include "sdf/sign.h"
@@ -153,7 +153,7 @@ void checkSize(const Mesh& mesh, const Survey& seen, const BuildOptions& options
     const double block = bytesPerBlock * (options.triangles ? 2 : 1);
     const double bytes =
         double(mesh.triangles.size()) * bytesPerTriangle + countBlocks(box, area, h, double(reach)) * block;
-    const double memory = double(::sysconf(_SC_PHYS_PAGES)) * double(::sysconf(_SC_PAGESIZE));
+    const double memory = physicalMemory();
     if (bytes > memory)
         refuse(fmt::format("with its band it would need about {:.0f} GiB of memory", bytes / double(1 << 30)));
 }

@@ -7,13 +7,13 @@
 #include <openvdb/tools/FastSweeping.h>
 #include <openvdb/tools/Prune.h>
 #include <openvdb/tree/LeafManager.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
 #include "sdf/grids.h"
+#include "sdf/physical_memory.h"
 
 namespace bilayer::fluid {
 
@@ -30,7 +30,7 @@ void check(const openvdb::FloatGrid& band, const openvdb::CoordBBox& box) {
         throw std::invalid_argument("distances grow from where inside meets outside, and this field has no inside");
     const openvdb::Vec3d size = box.extents().asVec3d();
     const double bytes = size.x() * size.y() * size.z() * bytesPerVoxel;
-    const double memory = double(::sysconf(_SC_PHYS_PAGES)) * double(::sysconf(_SC_PAGESIZE));
+    const double memory = physicalMemory();
     if (bytes > memory)
         throw std::invalid_argument(
             fmt::format("to sweep all of the field's box, {} x {} x {} voxels, would need about {:.0f} GiB of memory",

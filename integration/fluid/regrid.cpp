@@ -2,13 +2,11 @@
 // distances at all. So the surface is what is carried over, and distances are found anew: as quick, and exact.
 #include "integration/fluid/regrid.h"
 
-#include <fmt/format.h>
 #include <openvdb/tools/ChangeBackground.h>
 #include <openvdb/tools/Prune.h>
 #include <openvdb/tools/SignedFloodFill.h>
 #include <openvdb/tree/LeafManager.h>
 #include <tbb/parallel_for.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
@@ -32,7 +30,6 @@ using Leaf = FloatTree::LeafNodeType;
 constexpr float unitTolerance = 1e-3f;  // by which a rotation's length may differ from 1: a float product's drift
 constexpr float minFieldWidth = 1;      // [field voxels] either side: less does not tell where the surface is
 constexpr float rounding = 1e-5f;       // of a width that is a whole number of voxels but for its last bits
-constexpr double bytesPerVoxel = 8;     // of a band while it is built
 constexpr double maxIndex = 1 << 29;    // keeps OpenVDB's 32-bit coordinates and sums of two of them in range
 constexpr double sameVoxels = 1e-6;     // two voxel sizes are the same but for this part of them
 
@@ -67,19 +64,6 @@ Placed inVoxels(const Mesh& mesh, const Placement& placement, const Transform& v
     for (const openvdb::Vec3d& p : points)
         placed.mesh.points.emplace_back(float(p.x() - shift.x()), float(p.y() - shift.y()), float(p.z() - shift.z()));
     return placed;
-}
-
-void requireRoom(const Mesh& inVoxels, float widthInVoxels) {
-    double area = 0;
-    for (const glm::uvec3& t : inVoxels.triangles) {
-        const glm::dvec3 a = inVoxels.points[t.x], b = inVoxels.points[t.y], c = inVoxels.points[t.z];
-        area += 0.5 * glm::length(glm::cross(b - a, c - a));
-    }
-    const double bytes = 2 * area * double(widthInVoxels) * bytesPerVoxel;
-    const double memory = double(::sysconf(_SC_PHYS_PAGES)) * double(::sysconf(_SC_PAGESIZE));
-    if (bytes > memory)
-        throw std::invalid_argument(fmt::format("the body's band in these voxels would need about {:.0f} GiB of memory",
-                                                bytes / double(1 << 30)));
 }
 
 // Moves all leaves and multiplies their values; what is not active gets the band's width.
@@ -142,7 +126,6 @@ FloatGrid::Ptr regrid(const Mesh& mesh, const Placement& placement, const Transf
     const double voxel = voxels.voxelSize()[0];
     const float widthInVoxels = float(double(width) / voxel);
     const Placed placed = inVoxels(mesh, placement, voxels);
-    requireRoom(placed.mesh, widthInVoxels);
     const LevelSet field =
         build(placed.mesh, {.voxelSize = 1, .exteriorWidth = widthInVoxels, .interiorWidth = widthInVoxels});
     const auto grid = moved(*field.grids().distance, placed.shift, float(voxel), width);

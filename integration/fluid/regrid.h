@@ -14,7 +14,7 @@ namespace bilayer::fluid {
 /// @param voxels  cubes, of any size and wherever they lie
 /// @param width   of the band to either side [m]
 /// Throws std::invalid_argument for a placement as check() does, one beyond the range of OpenVDB's coordinates, voxels
-/// that are no cubes, a band of more memory than the machine has, and what build() refuses.
+/// that are no cubes, and what build() refuses, a band of more memory than the machine has among it.
 openvdb::FloatGrid::Ptr regrid(const Mesh& mesh, const Placement& placement, const openvdb::math::Transform& voxels,
                                float width);
 
