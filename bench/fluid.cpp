@@ -10,15 +10,21 @@
 #include <tbb/global_control.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <random>
 
 #include "bench/builders.h"
 #include "bench/measure.h"
 #include "bench/program.h"
 #include "collider/mass.h"
 #include "demos/shared/shapes.h"
+#include "integration/fluid/fill.h"
 #include "integration/fluid/seed.h"
+#include "sdf/grids.h"
+#include "tests/support/truth.h"
 
 using namespace bilayer;
 using namespace bilayer::bench;
@@ -26,7 +32,9 @@ using openvdb::FloatGrid;
 
 namespace {
 
-constexpr float halfWidth = 3;  // [voxels]
+constexpr double pi = 3.141592653589793;
+constexpr float halfWidth = 3, farthest = 32;  // [voxels]
+constexpr int samplesPerShell = 20000;
 
 struct Options {
     std::vector<std::string> meshes{"bunny", "dragon", "sphere"};
@@ -126,23 +134,42 @@ double areaOf(const Mesh& mesh) {
     return area;
 }
 
-// Of |gradient| from 1 within a voxel of the surface, in the mean; by central differences.
-double slopeError(const FloatGrid& liquid) {
+// How far |gradient| is from 1 within a voxel of the surface, in the mean, by central differences: everywhere, and
+// where it turns by less than 15 degrees from each neighbour to the next (off creases).
+struct SlopeError {
+    double everywhere = 0, offCreases = 0;
+};
+
+SlopeError slopeError(const FloatGrid& liquid) {
     const auto gradient = openvdb::tools::gradient(liquid);
     const auto slopes = gradient->getConstAccessor();
-    double sum = 0, count = 0;
+    const auto isSmooth = [&](const openvdb::Coord& at, const openvdb::Vec3f& slope) {
+        return std::all_of(std::begin(openvdb::util::COORD_OFFSETS), std::begin(openvdb::util::COORD_OFFSETS) + 6,
+                           [&](const openvdb::Coord& step) {
+                               const openvdb::Vec3f& beside = slopes.getValue(at + step);
+                               return slope.dot(beside) > std::cos(15 * pi / 180) * slope.length() * beside.length();
+                           });
+    };
+    double sum = 0, smoothSum = 0, count = 0, smoothCount = 0;
     for (auto v = liquid.cbeginValueOn(); v; ++v) {
         if (!(std::abs(*v) < liquid.voxelSize()[0])) continue;
-        sum += std::abs(double(slopes.getValue(v.getCoord()).length()) - 1);
+        const openvdb::Vec3f slope = slopes.getValue(v.getCoord());
+        const double error = std::abs(double(slope.length()) - 1);
+        sum += error;
         ++count;
+        if (!isSmooth(v.getCoord(), slope)) continue;
+        smoothSum += error;
+        ++smoothCount;
     }
-    return sum / count;
+    return {sum / count, smoothSum / smoothCount};
 }
 
 std::string truthOf(const FloatGrid& liquid, const Mesh& mesh) {
     openvdb::tools::LevelSetMeasure<FloatGrid> measure(liquid);
-    return fmt::format("{:+.4f} | {:+.4f} | {:.4f}", 100 * (measure.volume() / massProperties(mesh).volume - 1),
-                       100 * (measure.area() / areaOf(mesh) - 1), slopeError(liquid));
+    const SlopeError slope = slopeError(liquid);
+    return fmt::format("{:+.4f} | {:+.4f} | {:.4f} | {:.4f}",
+                       100 * (measure.volume() / massProperties(mesh).volume - 1),
+                       100 * (measure.area() / areaOf(mesh) - 1), slope.everywhere, slope.offCreases);
 }
 
 void measureAt(const std::string& name, const Mesh& mesh, float resolution) {
@@ -154,6 +181,45 @@ void measureAt(const std::string& name, const Mesh& mesh, float resolution) {
     seedByOpenVdb(*theirs, mesh, {}, false);
     fmt::print("| {} | {:g} | {} | {} | {} |\n", name, resolution, truthOf(*ours, mesh), truthOf(*ofField, mesh),
                truthOf(*theirs, mesh));
+    std::fflush(stdout);
+}
+
+// What fill() is off by, by how far from the surface the voxel lies [voxels].
+struct Shell {
+    double from, to;
+    double sum = 0, largest = 0;
+    int count = 0;
+};
+
+void fillAt(const std::string& name, const Mesh& mesh, float resolution) {
+    const float voxelSize = voxelSizeFor(mesh, resolution);
+    const LevelSet band = build(mesh, {.voxelSize = voxelSize});
+    const Stopwatch watch;
+    const LevelSet filled = fluid::fill(band, farthest * voxelSize);
+    const double seconds = watch.seconds();
+    const test::Truth truth(mesh);
+    std::vector<openvdb::Coord> voxels;
+    for (auto v = filled.grids().distance->cbeginValueOn(); v; ++v) voxels.push_back(v.getCoord());
+    std::shuffle(voxels.begin(), voxels.end(), std::mt19937(7));
+    const auto values = filled.grids().distance->getConstAccessor();
+    std::array<Shell, 3> shells{{{3, 8}, {8, 16}, {16, 32}}};
+    int wrong = 0;
+    for (const openvdb::Coord& at : voxels) {
+        if (std::ranges::all_of(shells, [](const Shell& s) { return s.count == samplesPerShell; })) break;
+        const double value = double(values.getValue(at)) / double(voxelSize);
+        const auto shell = std::ranges::find_if(
+            shells, [&](const Shell& s) { return std::abs(value) >= s.from && std::abs(value) < s.to; });
+        if (shell == shells.end() || shell->count == samplesPerShell) continue;
+        const openvdb::Vec3d p = filled.grids().distance->indexToWorld(at);
+        const double exact = truth.signedDistance({p.x(), p.y(), p.z()}) / double(voxelSize);
+        wrong += (exact < 0) != (value < 0);
+        shell->sum += std::abs(value - exact);
+        shell->largest = std::max(shell->largest, std::abs(value - exact));
+        ++shell->count;
+    }
+    fmt::print("| {} | {:g} | {:.0f} |", name, resolution, 1e3 * seconds);
+    for (const Shell& s : shells) fmt::print(" {:.3f} / {:.2f} |", s.count ? s.sum / s.count : 0, s.largest);
+    fmt::print(" {} |\n", wrong);
     std::fflush(stdout);
 }
 
@@ -174,11 +240,22 @@ void fluidBench(const Options& options) {
     fmt::print(
         "\nVolume and area by LevelSetMeasure against the mesh's own [%], and how far |gradient| is from 1 within a "
         "voxel\n"
-        "of the surface, in the mean: of seeds by the mesh, by its field at a pose askew, by meshToLevelSet.\n\n"
-        "| mesh | voxels | volume | area | slope | field: volume | area | slope | OpenVDB: volume | area | slope |\n"
-        "|---|---|---|---|---|---|---|---|---|---|---|\n");
+        "of the surface, in the mean, everywhere and off creases: of seeds by the mesh, by its field at a pose askew, "
+        "by\n"
+        "meshToLevelSet.\n\n"
+        "| mesh | voxels | volume | area | slope | off creases | field: volume | area | slope | off creases | OpenVDB: "
+        "volume | area | slope | off creases |\n"
+        "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n");
     for (const std::string& name : options.meshes)
         for (const float resolution : options.resolutions) measureAt(name, meshOf(name), resolution);
+    fmt::print(
+        "\nDistances beyond the band by fill(), {:g} voxels far, against the mesh's own: errors in voxels, mean / "
+        "largest, of a\n"
+        "sample of {} voxels in each column.\n\n"
+        "| mesh | voxels | ms | 3 to 8 away | 8 to 16 | 16 to 32 | wrong signs |\n|---|---|---|---|---|---|---|\n",
+        farthest, samplesPerShell);
+    for (const std::string& name : options.meshes)
+        for (const float resolution : options.resolutions) fillAt(name, meshOf(name), resolution);
 }
 
 int run(int argc, char** argv) {

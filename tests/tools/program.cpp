@@ -17,11 +17,6 @@
 namespace bilayer::test {
 namespace {
 
-std::string contents(const std::filesystem::path& path) {
-    std::ifstream stream(path, std::ios::binary);
-    return {std::istreambuf_iterator<char>(stream), {}};
-}
-
 void redirect(const std::string& path, int flags, int target) {
     const int file = ::open(path.c_str(), flags, 0600);
     if (file < 0 || ::dup2(file, target) < 0) ::_exit(126);
@@ -49,6 +44,11 @@ pid_t launch(const Words& arguments, const Surroundings& s, const std::string& i
 }
 
 }  // namespace
+
+std::string contents(const std::filesystem::path& path) {
+    std::ifstream stream(path, std::ios::binary);
+    return {std::istreambuf_iterator<char>(stream), {}};
+}
 
 std::size_t Result::errorLines() const {
     return std::size_t(std::count(err.begin(), err.end(), '\n'));

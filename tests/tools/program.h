@@ -39,6 +39,9 @@ int wait(pid_t process);
 /// A sphere of radius 0.5 as a mesh file of its own.
 std::filesystem::path sphereFile(const std::string& name = "sphere.ply", int levels = 3);
 
+/// What a file holds.
+std::string contents(const std::filesystem::path& path);
+
 /// A text file in the scratch folder.
 std::filesystem::path textFile(const std::string& name, const std::string& text);
 
