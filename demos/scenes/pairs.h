@@ -3,14 +3,17 @@
 // whether the lower one is static, kinematic, or moves itself.
 #pragma once
 
+#include <string>
+
 #include "demos/shared/outcome.h"
 
 namespace bilayer::demo {
 
 struct PairsOptions {
-    float scale = 1;  ///< of everything: bodies are about a metre wide at 1
-    int every = 1;    ///< only every so many of all 188 pairs are laid
-    float seconds = 2;
+    float scale = 1;     ///< of everything: bodies are about a metre wide at 1
+    int every = 1;       ///< only every so many of all 188 pairs are laid
+    std::string only{};  ///< and of these only those with this in their name, as in "hull on dynamic"
+    float seconds = 2;   ///< up to scale 1; above, times the root of the scale: that is how much longer a fall takes
     float stepsPerSecond = 240;
 };
 
