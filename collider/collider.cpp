@@ -15,16 +15,12 @@
 #include <utility>
 
 #include "collider/edge_search.h"
+#include "collider/interpolant.h"
 #include "sdf/surface.h"
 
 namespace bilayer {
 namespace {
 
-// What a field's interpolant may be below the distance: the mean way to the eight voxels around a point is at most half
-// a cell's diagonal [voxels].
-constexpr float interpolationError = 0.87f;
-// How fast the interpolant may change: by a voxel along each axis at once.
-constexpr float steepest = 1.7321f;
 constexpr float flattest = 0.1f;  // a gradient shorter than this tells no direction: the point is on a medial axis
 constexpr float searchTolerance = 2e-3f;  // of the deepest place on an edge [voxels]
 // Where two edges cross, the normal across both is taken if it looks no farther aside from the other body's (cosine).
@@ -81,7 +77,7 @@ glm::vec3 directionOf(const ClosestPoint& closest, const glm::vec3& point, float
 // The touch of a point in the band: by the triangles where the field has them, else by its sample.
 Touch touchInBand(const Field& field, const glm::vec3& point, const Sample& sample) {
     if (field.mesh()) {
-        const float most = std::abs(sample.distance) + interpolationError * field.voxelSize();
+        const float most = std::abs(sample.distance) + mostInterpolationError * field.voxelSize();
         if (const ClosestPoint closest = field.closest(point, most); closest.found)
             return {closest.distance, directionOf(closest, point, field.voxelSize())};
     }
@@ -121,7 +117,8 @@ class PointsInField {
         if (!near || sweeps_) return visitAll(report, found);
         const float voxel = field_.voxelSize();
         // voxels beyond the band have no numbers: a list must not reach that far
-        const float mostSlack = std::min(voxel, (field_.exteriorWidth() - reach_) / steepest - rounding * voxel);
+        const float mostSlack =
+            std::min(voxel, (field_.exteriorWidth() - reach_) / steepestInterpolant - rounding * voxel);
         const NearPoints::Place now{body_.collider.id(), other_.collider.id(), reach_, map_.linear, map_.shift};
         if (near->holds(now, centre_, radius_, voxel, mostSlack))
             visitListed(*near, report, found);
@@ -152,7 +149,7 @@ class PointsInField {
 
     // Farther than this nothing of interest can be [parts].
     float keptWithin(float distance) const {
-        return (distance / field_.voxelSize() + interpolationError) / float(Clearance::partSide);
+        return (distance / field_.voxelSize() + mostInterpolationError) / float(Clearance::partSide);
     }
 
     template <class Visit>
@@ -178,8 +175,8 @@ class PointsInField {
     // slope at most, the distance by the slack.
     template <class Found>
     void visitAndList(NearPoints::List& near, ContactReport& report, Found& found) {
-        const float slack = near.slack(), above = reach_ + steepest * slack, within = reach_ + slack,
-                    beside = within + interpolationError * field_.voxelSize(), kept = keptWithin(within);
+        const float slack = near.slack(), above = reach_ + steepestInterpolant * slack, within = reach_ + slack,
+                    beside = within + mostInterpolationError * field_.voxelSize(), kept = keptWithin(within);
         descend(kept, [&](std::uint32_t index, const SurfacePoint& point) {
             const glm::vec3 place = coarse_(point.position);
             if (clearance_.isAbove(place, above) || clearance_.isOutside(place, kept)) return;

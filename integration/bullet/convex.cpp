@@ -380,4 +380,8 @@ glm::vec3 nearestOnTriangle(const glm::vec3& point, const glm::vec3& a, const gl
     return best;
 }
 
+int probeParts(float length, float voxelSize, int most) {
+    return int(std::clamp(std::ceil(length / (probeSpacing * voxelSize)), 1.f, float(most)));
+}
+
 }  // namespace bilayer::bullet

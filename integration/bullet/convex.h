@@ -95,6 +95,12 @@ class Convex {
     std::vector<float> radii_;  ///< of balls: of corners [m]
 };
 
+/// How far apart the places along an edge are that a field is asked about [voxels]: like its own surface points.
+inline constexpr float probeSpacing = 2;
+
+/// Into how many parts such places divide an edge, at least one. Lengths in one unit, whichever.
+int probeParts(float length, float voxelSize, int most);
+
 /// The point of a triangle nearest to a point.
 glm::vec3 nearestOnTriangle(const glm::vec3& point, const glm::vec3& a, const glm::vec3& b, const glm::vec3& c);
 

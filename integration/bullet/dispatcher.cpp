@@ -98,7 +98,7 @@ class Pair {
         contacts_.clear();
         const bool follows = static_cast<const Shape&>(*b.shape).sweeps();
         report_ = find(a, b.placed(), marginOf(a, b, margin), follows ? a.motion() : Motion{});
-        finish();
+        finish(a, b);
     }
 
     /// The same for two fields whose points have been sampled, as pair number `index`.
@@ -106,17 +106,18 @@ class Pair {
         contacts_.clear();
         report_ =
             collideFields(a.placed(), b.placed(), marginOf(a, b, 0), sampled.ofA(index), sampled.ofB(index), contacts_);
-        finish();
+        finish(a, b);
         ++sampled_;
     }
 
     /// Writes what collide() found into the manifolds; once.
     void commit(const btCollisionObject& a, const btCollisionObject& b, float sameWithin, btManifoldResult& result) {
-        manifolds_.write(reduced_.patches, a, b, sameWithin, result);
+        const Reduced& reduced = choice_.reduced();
+        manifolds_.write(reduced.patches, a, b, sameWithin, result);
         ++statistics_.pairs;
         statistics_.contactsFound += found_;
-        for (const Patch& patch : reduced_.patches) statistics_.contactsKept += patch.count;
-        statistics_.lost = std::max(statistics_.lost, reduced_.lost);
+        for (const Patch& patch : reduced.patches) statistics_.contactsKept += patch.count;
+        statistics_.lost = std::max(statistics_.lost, reduced.lost);
         statistics_.beyondBand += static_cast<int>(report_.beyondBand);
         statistics_.sampled += sampled_;
         isReady_ = false;
@@ -127,9 +128,9 @@ class Pair {
     const Manifolds& manifolds() const { return manifolds_; }
 
   private:
-    void finish() {
+    void finish(const Side& a, const Side& b) {
         found_ = static_cast<int>(contacts_.size());
-        reduced_ = reduce(contacts_, reduced_.patches);
+        choice_.update(contacts_, a.transform, b.transform);
         isReady_ = true;
         sampled_ = 0;
     }
@@ -157,7 +158,7 @@ class Pair {
     std::optional<Convex> convex_;  ///< of A
     NearPoints near_;               ///< of two fields
     std::vector<Contact> contacts_;
-    Reduced reduced_;
+    Choice choice_;
     ContactReport report_;
     int found_ = 0, sampled_ = 0;
     bool isReady_ = false;

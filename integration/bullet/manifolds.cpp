@@ -28,6 +28,11 @@ constexpr float stillness = 3e-3f;
 // the last step is kept again [parts of the extent]: which of several is met first is then a matter of rounding, and
 // bodies would tremble with each change. Of a mere press it is less: the deepest overlap is what pushes bodies apart.
 constexpr float tolerance = 1e-3f, toleranceOfPress = tolerance / 4;
+// What was kept in the last step stays as long as some motion meets it first but for so many tolerances: contacts that
+// bear a load must not come and go, or a stack never comes to rest.
+constexpr float loyalty = 3;
+// Contacts are chosen anew when the bodies have moved past each other by this part of the tolerance.
+constexpr float chosenWithin = 0.5f;
 // The small motions that contacts are kept for: tilts from those of a fall to those of rest [rad], shifts aside [parts
 // of the extent] and twists [rad]. Their directions are askew to everything one models: a rectangle's corners are then
 // each met first by themselves.
@@ -50,31 +55,56 @@ using Group = std::vector<std::uint32_t>;
 class Memory {
   public:
     explicit Memory(std::span<const Patch> last) {
-        for (const Patch& patch : last)
-            for (int i = 0; i < patch.count; ++i) features_.push_back(patch.contacts[i].feature);
+        for (const Patch& patch : last) {
+            groups_ += !patch.goesOn;
+            for (int i = 0; i < patch.count; ++i) features_.emplace_back(patch.contacts[i].feature, groups_ - 1);
+        }
         std::sort(features_.begin(), features_.end());
     }
 
-    bool kept(const Contact& contact) const {
-        return std::binary_search(features_.begin(), features_.end(), contact.feature);
+    /// How many groups there were.
+    int groups() const { return groups_; }
+
+    /// The group that a contact was kept of; -1 if it was not.
+    int groupOf(const Contact& contact) const {
+        const auto at = std::lower_bound(features_.begin(), features_.end(), std::pair(contact.feature, 0));
+        return at != features_.end() && at->first == contact.feature ? at->second : -1;
     }
+    bool kept(const Contact& contact) const { return groupOf(contact) >= 0; }
 
   private:
-    std::vector<std::uint32_t> features_;
+    std::vector<std::pair<std::uint32_t, int>> features_;
+    int groups_ = 0;
 };
 
-/// @param seeds  contacts that found groups first, in this order
-std::vector<Group> groupByNormal(const std::vector<Contact>& contacts, const std::vector<std::uint32_t>& seeds) {
-    std::vector<glm::vec3> directions;
+/// Where the groups of the last step look now: by those of their contacts that are still there. If there was none, the
+/// mean direction of all contacts if they differ little from it, or nothing.
+std::vector<glm::vec3> directionsOf(const std::vector<Contact>& contacts, const Memory& memory) {
+    std::vector<glm::vec3> sums(std::size_t(std::max(memory.groups(), 1)), glm::vec3(0)), directions;
+    for (const Contact& contact : contacts)
+        if (const int group = memory.groups() > 0 ? memory.groupOf(contact) : 0; group >= 0)
+            sums[std::size_t(group)] += contact.normal;
+    for (const glm::vec3& sum : sums) {
+        const float length = glm::length(sum);
+        const auto isSame = [&](const glm::vec3& other) { return glm::dot(sum, other) >= mergedDirection * length; };
+        if (length > 0 && std::none_of(directions.begin(), directions.end(), isSame))
+            directions.push_back(sum / length);
+    }
+    const auto fits = [&](const Contact& contact) {
+        return glm::dot(contact.normal, directions.front()) >= sameDirection;
+    };
+    if (memory.groups() == 0 && !directions.empty() && !std::all_of(contacts.begin(), contacts.end(), fits)) return {};
+    return directions;
+}
+
+std::vector<Group> groupByNormal(const std::vector<Contact>& contacts, const Memory& memory) {
+    std::vector<glm::vec3> directions = directionsOf(contacts, memory);
     const auto nearest = [&](const glm::vec3& normal) {
         std::pair<float, std::size_t> best{-2.f, 0};
         for (std::size_t g = 0; g < directions.size(); ++g)
             if (const float cosine = glm::dot(normal, directions[g]); cosine > best.first) best = {cosine, g};
         return best;
     };
-    for (const std::uint32_t seed : seeds)
-        if (nearest(contacts[seed].normal).first < mergedDirection) directions.push_back(contacts[seed].normal);
-
     std::vector<Group> groups(directions.size());
     for (std::uint32_t i = 0; i < contacts.size(); ++i) {
         const auto [cosine, best] = nearest(contacts[i].normal);
@@ -87,20 +117,6 @@ std::vector<Group> groupByNormal(const std::vector<Contact>& contacts, const std
     }
     std::erase_if(groups, [](const Group& group) { return group.empty(); });
     return groups;
-}
-
-/// Of each patch of the last step, the contact that is still there and was named first.
-std::vector<std::uint32_t> seedsOf(const std::vector<Contact>& contacts, std::span<const Patch> last) {
-    std::vector<std::uint32_t> seeds;
-    for (const Patch& patch : last)
-        for (int k = 0; k < patch.count; ++k) {
-            const auto same = [&](const Contact& c) { return c.feature == patch.contacts[k].feature; };
-            const auto found = std::find_if(contacts.begin(), contacts.end(), same);
-            if (found == contacts.end()) continue;
-            seeds.push_back(std::uint32_t(found - contacts.begin()));
-            break;
-        }
-    return seeds;
 }
 
 /// The extent of a group, by the box of its places.
@@ -134,13 +150,15 @@ glm::vec2 towards(float share) {
     return {std::cos(angle), std::sin(angle)};
 }
 
-/// Those that contacts are kept for, in the order in which they choose: what spans the patch comes first.
+/// Those that contacts are kept for, in the order in which they choose: what spans the patch comes first, a mere press
+/// last.
 std::vector<Nudge> nudges() {
     std::vector<Nudge> all;
     for (const float tilt : tilts)
         for (int k = 0; k < tiltDirections; ++k) all.push_back({.tilt = tilt * towards(float(k) / tiltDirections)});
     for (int k = 0; k < shiftDirections; ++k) all.push_back({.shift = aside * towards(float(k) / shiftDirections)});
     for (const float twist : {aside, -aside}) all.push_back({.twist = twist});
+    all.push_back({});
     return all;
 }
 
@@ -197,12 +215,19 @@ class Gaps {
         return *std::min_element(found, found + lanes);
     }
 
-    /// Of some contacts, the least gap after the last motion, and whose it is.
-    std::pair<float, std::uint32_t> leastOf(const std::vector<std::uint32_t>& some) const {
-        std::pair<float, std::uint32_t> best{std::numeric_limits<float>::max(), 0};
-        for (const std::uint32_t k : some)
-            if (const float now = numbers_[moved * padded_ + k]; now < best.first) best = {now, k};
-        return best;
+    /// The gap of one contact when A is moved.
+    float of(std::uint32_t k, const Nudge& nudge) const {
+        const bool tilts = nudge.tilt != glm::vec2(0);
+        const glm::vec2 way = tilts ? nudge.tilt : nudge.shift;
+        const float x = at(tilts ? tiltX : shiftX, k), y = at(tilts ? tiltY : shiftY, k);
+        return at(gap, k) + way.x * x + way.y * y + nudge.twist * at(twist, k);
+    }
+
+    /// Of some contacts, the least gap when A is moved.
+    float leastOf(const std::vector<std::uint32_t>& some, const Nudge& nudge) const {
+        float least = std::numeric_limits<float>::max();
+        for (const std::uint32_t k : some) least = std::min(least, of(k, nudge));
+        return least;
     }
 
     /// The first contact whose gap that is after the last motion.
@@ -217,33 +242,112 @@ class Gaps {
     static constexpr std::size_t lanes = 8;
     enum Column { gap, tiltX, tiltY, shiftX, shiftY, twist, moved, columns };
     float* column(Column which) { return numbers_.data() + which * padded_; }
+    float at(Column which, std::uint32_t k) const { return numbers_[which * padded_ + k]; }
 
     std::size_t count_, padded_;
     std::vector<float> numbers_;  ///< column by column
     float extent_ = 0;
 };
 
-/// The contacts of a group that some small motion of the bodies meets first.
-/// @param lost  is raised to what other motions meet before them [m]
+/// The contacts of a group that some small motion of the bodies meets first. Those of the last step stay as long as
+/// some motion meets them about first: contacts that bear a load must not come and go.
+class FirstMet {
+  public:
+    FirstMet(const std::vector<Contact>& contacts, const Group& group) : gaps_(contacts, group) {
+        static const std::vector<Nudge> all = nudges();
+        nudges_ = all;
+        for (const Nudge& nudge : nudges_) least_.push_back(gaps_.least(nudge));
+    }
+
+    /// @param before  those of the last step
+    std::vector<std::uint32_t> choose(const std::vector<std::uint32_t>& before) {
+        for (const std::uint32_t k : before)
+            if (metBy(k, loyalty) != 0) add(k);
+        for (std::size_t n = 0; n < nudges_.size(); ++n) {
+            if (metByAny() >> n & 1) continue;
+            gaps_.least(nudges_[n]);
+            add(gaps_.with(least_[n]));
+        }
+        for (std::size_t i = kept_.size(); i-- > 0;)
+            if (isSpare(i) && !mayBear(kept_[i])) leaveOut(i);
+        while (kept_.size() > mostOfPatch) leaveOut(leastNeeded());
+        return kept_;
+    }
+
+    /// What other motions meet before those [m].
+    float lost() {
+        static const std::vector<Nudge> between = nudgesBetween();
+        float most = 0;
+        for (const Nudge& nudge : between) {
+            const float least = gaps_.least(nudge);
+            most = std::max(most, gaps_.leastOf(kept_, nudge) - least);
+        }
+        return most;
+    }
+
+  private:
+    using Motions = std::uint64_t;  ///< a bit for each
+
+    /// The motions that meet a contact first, but for so many tolerances.
+    Motions metBy(std::uint32_t k, float tolerances) const {
+        Motions met = 0;
+        for (std::size_t n = 0; n < nudges_.size(); ++n) {
+            const float within = tolerances * (isPress(n) ? toleranceOfPress : tolerance) * gaps_.extent();
+            if (gaps_.of(k, nudges_[n]) <= least_[n] + within) met |= Motions(1) << n;
+        }
+        return met;
+    }
+
+    bool isPress(std::size_t n) const { return n + 1 == nudges_.size(); }
+
+    void add(std::uint32_t k) {
+        kept_.push_back(k);
+        met_.push_back(metBy(k, 1));
+    }
+
+    Motions metByAny(std::size_t but = std::size_t(-1)) const {
+        Motions met = 0;
+        for (std::size_t i = 0; i < met_.size(); ++i)
+            if (i != but) met |= met_[i];
+        return met;
+    }
+
+    /// Whether every motion that meets it first meets others first, too.
+    bool isSpare(std::size_t i) const { return !(met_[i] & ~metByAny(i)); }
+
+    /// Whether a press could have loaded it.
+    bool mayBear(std::uint32_t k) const {
+        return gaps_.of(k, {}) <= least_.back() + loyalty * tolerance * gaps_.extent();
+    }
+
+    /// Of what is spare that which is farthest away, else the last.
+    std::size_t leastNeeded() const {
+        std::size_t which = kept_.size();
+        for (std::size_t i = 0; i < kept_.size(); ++i)
+            if (isSpare(i) && (which == kept_.size() || gaps_.of(kept_[i], {}) > gaps_.of(kept_[which], {}))) which = i;
+        return std::min(which, kept_.size() - 1);
+    }
+
+    void leaveOut(std::size_t i) {
+        kept_.erase(kept_.begin() + std::ptrdiff_t(i));
+        met_.erase(met_.begin() + std::ptrdiff_t(i));
+    }
+
+    Gaps gaps_;
+    std::span<const Nudge> nudges_;
+    std::vector<float> least_;         ///< gap after each motion
+    std::vector<std::uint32_t> kept_;  ///< as indices in the group
+    std::vector<Motions> met_;         ///< by each of these
+};
+
 std::vector<std::uint32_t> firstMet(const std::vector<Contact>& contacts, const Group& group, const Memory& memory,
                                     float& lost) {
-    static const std::vector<Nudge> chosenFor = nudges(), between = nudgesBetween();
-    Gaps gaps(contacts, group);
-    std::vector<std::uint32_t> before, kept;
+    std::vector<std::uint32_t> before;
     for (std::uint32_t k = 0; k < group.size(); ++k)
         if (memory.kept(contacts[group[k]])) before.push_back(k);
-    const auto keep = [&](const Nudge& nudge, float within) {
-        const float least = gaps.least(nudge);
-        if (kept.size() >= mostOfPatch || gaps.leastOf(kept).first <= least + within * gaps.extent()) return;
-        const auto [gap, loyal] = gaps.leastOf(before);
-        kept.push_back(gap <= least + within * gaps.extent() ? loyal : gaps.with(least));
-    };
-    for (const Nudge& nudge : chosenFor) keep(nudge, tolerance);
-    keep({}, toleranceOfPress);
-    for (const Nudge& nudge : between) {
-        const float least = gaps.least(nudge);
-        lost = std::max(lost, gaps.leastOf(kept).first - least);
-    }
+    FirstMet met(contacts, group);
+    std::vector<std::uint32_t> kept = met.choose(before);
+    lost = std::max(lost, met.lost());
     return kept;
 }
 
@@ -287,17 +391,72 @@ Reduced reduce(std::vector<Contact>& contacts, std::span<const Patch> last) {
     if (!isStill(contacts, last)) last = {};
     Reduced result;
     const Memory memory(last);
-    for (const Group& group : groupByNormal(contacts, seedsOf(contacts, last))) {
+    float least = std::numeric_limits<float>::max();
+    for (const Group& group : groupByNormal(contacts, memory)) {
         std::vector<std::uint32_t> kept(group.size());
         std::iota(kept.begin(), kept.end(), 0u);
-        if (group.size() > MANIFOLD_CACHE_SIZE) kept = firstMet(contacts, group, memory, result.lost);
+        if (group.size() > MANIFOLD_CACHE_SIZE) {
+            kept = firstMet(contacts, group, memory, result.lost);
+            least = std::min(least, extentOf(contacts, group));
+            result.slack = chosenWithin * tolerance * least;
+        }
         for (std::size_t k = 0; k < kept.size(); ++k) {
             if (k % MANIFOLD_CACHE_SIZE == 0) result.patches.emplace_back();
             Patch& patch = result.patches.back();
+            patch.goesOn = k >= MANIFOLD_CACHE_SIZE;
             patch.contacts[std::size_t(patch.count++)] = contacts[group[kept[k]]];
         }
     }
     return result;
+}
+
+void Choice::update(std::vector<Contact>& contacts, const btTransform& a, const btTransform& b) {
+    if (holds(a, b) && takeAgain(contacts)) return;
+    reduced_ = reduce(contacts, reduced_.patches);
+    const btTransform intoA = a.inverse(), intoB = b.inverse();
+    kept_.clear();
+    for (const Patch& patch : reduced_.patches)
+        for (int i = 0; i < patch.count; ++i) {
+            const btVector3 place = toBullet(patch.contacts[i].position);
+            kept_.push_back({patch.contacts[i].feature, intoA * place, intoB * place});
+        }
+    byFeature_.resize(kept_.size());
+    std::iota(byFeature_.begin(), byFeature_.end(), 0u);
+    std::stable_sort(byFeature_.begin(), byFeature_.end(),
+                     [&](std::uint32_t i, std::uint32_t j) { return kept_[i].feature < kept_[j].feature; });
+}
+
+/// What was kept spans all contacts: these have moved no farther.
+bool Choice::holds(const btTransform& a, const btTransform& b) const {
+    const auto hasHardlyMoved = [&](const Kept& kept) {
+        return (a * kept.ofA - b * kept.ofB).length2() <= reduced_.slack * reduced_.slack;
+    };
+    return reduced_.slack > 0 && std::all_of(kept_.begin(), kept_.end(), hasHardlyMoved);
+}
+
+/// Whether all that were chosen are there again, none of any is on its way from afar, and none is deeper than what so
+/// little motion makes of those between the chosen ones.
+bool Choice::takeAgain(const std::vector<Contact>& contacts) {
+    std::vector<const Contact*> found(kept_.size(), nullptr);
+    float deepest = std::numeric_limits<float>::max(), deepestFound = deepest;
+    for (const Contact& contact : contacts) {
+        if (contact.approach > 0) return false;
+        deepest = std::min(deepest, contact.distance);
+        auto at = std::lower_bound(byFeature_.begin(), byFeature_.end(), contact.feature,
+                                   [&](std::uint32_t i, std::uint32_t feature) { return kept_[i].feature < feature; });
+        // of several contacts of one feature each has its turn
+        while (at != byFeature_.end() && kept_[*at].feature == contact.feature && found[*at]) ++at;
+        if (at != byFeature_.end() && kept_[*at].feature == contact.feature) found[*at] = &contact;
+    }
+    for (const Contact* contact : found) {
+        if (!contact) return false;
+        deepestFound = std::min(deepestFound, contact->distance);
+    }
+    if (deepest < deepestFound - 2 * reduced_.slack) return false;
+    auto next = found.begin();
+    for (Patch& patch : reduced_.patches)
+        for (int i = 0; i < patch.count; ++i) patch.contacts[i] = **next++;
+    return true;
 }
 
 Manifolds::~Manifolds() {

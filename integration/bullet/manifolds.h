@@ -16,6 +16,7 @@ namespace bilayer::bullet {
 struct Patch {
     std::array<Contact, MANIFOLD_CACHE_SIZE> contacts;
     int count = 0;
+    bool goesOn = false;  ///< with the contacts of the patch before, which was full
 };
 
 /// What is left of a pair's contacts.
@@ -24,6 +25,8 @@ struct Reduced {
     /// How deep a contact that was left out could come in a small motion of the bodies before one that was kept is met
     /// [m]: the worst over tilts of 1/32 rad about axes between those that contacts were chosen for.
     float lost = 0;
+    /// As long as the bodies have moved past each other by no more than this, the same contacts would do [m].
+    float slack = 0;
 };
 
 /// Divides contacts by their normals and keeps of each such patch those that any small motion of the bodies (a press,
@@ -34,6 +37,29 @@ struct Reduced {
 /// @param last  the patches of the same pair in the last step, or nothing: while the bodies hardly move, patches keep
 ///              their places, and of contacts that are nearly as good, those that were kept then are kept again
 Reduced reduce(std::vector<Contact>& contacts, std::span<const Patch> last = {});
+
+/// The reduced contacts of one pair of bodies from step to step: chosen anew only when the bodies have moved past each
+/// other since contacts were chosen last, which bodies at rest do once in many steps.
+class Choice {
+  public:
+    /// Reduces this step's contacts. `contacts` is left in another order.
+    /// @param a, b  where the bodies are
+    void update(std::vector<Contact>& contacts, const btTransform& a, const btTransform& b);
+
+    const Reduced& reduced() const { return reduced_; }
+
+  private:
+    struct Kept {
+        std::uint32_t feature;
+        btVector3 ofA, ofB;  ///< its place when it was chosen, in either body's coordinates
+    };
+    bool holds(const btTransform& a, const btTransform& b) const;
+    bool takeAgain(const std::vector<Contact>& contacts);
+
+    Reduced reduced_;
+    std::vector<Kept> kept_;                ///< of all patches, one after the other
+    std::vector<std::uint32_t> byFeature_;  ///< their indices in ascending order of features
+};
 
 /// The manifolds of one pair of bodies, one for each patch. Contacts are written anew each step, since Bullet refreshes
 /// the positions of old ones but not their normals; impulses are handed on to the new contacts nearest the old ones,

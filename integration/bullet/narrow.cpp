@@ -15,15 +15,14 @@
 #include <optional>
 
 #include "collider/edge_search.h"
+#include "collider/interpolant.h"
+#include "collider/path.h"
 #include "integration/bullet/convert.h"
 
 namespace bilayer::bullet {
 
 namespace {
 
-// Distance between probes along an edge [voxels], like that of the surface points. Farther from the field they get
-// sparser; the interpolant may be below the distance by nearly a voxel.
-constexpr float probeSpacing = 2, interpolationError = 0.87f;
 // Edges get no more parts: numbers beyond are those of the next edge.
 constexpr int partBits = 15;
 // Points farther than this inside the band's border are in it for certain [voxels].
@@ -128,10 +127,11 @@ class Local {
                    std::vector<Contact>& contacts) const {
         const float length = glm::distance(edge.place(0), edge.place(1));
         if (!(length > 0)) return;
-        const float most = float((1 << partBits) - 1);
-        const int parts = int(std::clamp(std::ceil(length / (probeSpacing * voxel_)), 1.f, most));
+        // farther from the field the probes get sparser
+        const int parts = probeParts(length, voxel_, (1 << partBits) - 1);
         const float reach =
-            margin + longestWay_ + interpolationError * voxel_ + std::max(edge.radius[0], edge.radius[1]);
+            margin + longestWay_ + mostInterpolationError * voxel_ + std::max(edge.radius[0], edge.radius[1]);
+        if (edge.isStraight && !comesNear(edge.place(0), edge.place(1), reach)) return;
         Answer before = first;
         for (int i = 0; i < parts;) {
             // What is clear of everything needs no probes.
@@ -171,6 +171,14 @@ class Local {
                                           const Answer& atTo, float margin) const;
 
   private:
+    /// Whether a straight line gets as near as this to the box around the surface.
+    bool comesNear(const glm::vec3& from, const glm::vec3& to, float reach) const {
+        const Bounds& bounds = collider_.bounds();
+        const double length = glm::distance(from, to);
+        const Path path{from, glm::dvec3(to - from) / length, length};
+        return clip(path, scale_ * bounds.lower - reach, scale_ * bounds.upper + reach).has_value();
+    }
+
     /// The same for a point that is farther away: where its way meets the surface.
     std::optional<Contact> probeOnWay(const glm::vec3& point, float radius, std::uint32_t feature, float margin,
                                       float distance) const {
@@ -588,7 +596,8 @@ class TriangleProbes : public btTriangleCallback {
             const bool isOver = glm::length(way) - std::abs(height) <= onFace * spacing_;
             const bool lies = glm::dot(normal, point.normal) >= opposition.leastOppositionApart;
             const Local::Answer answer = local_.at(below);
-            const bool isNearest = std::abs(answer.distance - height) <= interpolationError * spacing_ / probeSpacing;
+            const bool isNearest =
+                std::abs(answer.distance - height) <= mostInterpolationError * spacing_ / probeSpacing;
             if (!(area > 0) || height > margin_ || !isOver || !lies || !isNearest)
                 return keep(local_.probe(below, answer, 0, feature, margin_, report_));
             ++report_.pointsTested;

@@ -20,6 +20,7 @@
 #include <unordered_map>
 #include <vector>
 
+#include "collider/interpolant.h"
 #include "integration/bullet/convert.h"
 #include "integration/bullet/convex.h"
 #include "integration/bullet/shape.h"
@@ -36,12 +37,7 @@ constexpr float allowed = 0.1f;
 constexpr float pieceTurn = 0.1f;
 // A way is surely free as long as nothing is nearer than this [voxels].
 constexpr float nearby = 0.5f;
-// Between points along the edges of convex bodies [voxels].
-constexpr float probeSpacing = 2;
-constexpr float mostProbes = 64;  // along an edge
-// What an interpolated distance may be above the true one (see collide()) [voxels].
-constexpr float interpolationError = 0.87f;
-constexpr float steepest = 1.7321f;   // how fast the interpolant may change: by a voxel along each axis at once
+constexpr int mostProbes = 64;        // along an edge of a convex body
 constexpr float leastStride = 0.05f;  // through samples [voxels]
 constexpr float flattest = 0.1f;      // a gradient shorter than this tells no direction
 // Of a way along which something is nearby; what takes longer is looked at point by point, or taken as met.
@@ -61,7 +57,7 @@ class FieldObstacle {
 
     /// Not more than the distance of its surface.
     float bound(const glm::vec3& point) const {
-        return field_.distance(point) - interpolationError * field_.voxelSize();
+        return field_.distance(point) - mostInterpolationError * field_.voxelSize();
     }
     std::optional<Entry> entry(const glm::vec3& from, const glm::vec3& to, float radius) const {
         if (from == to) return overlaps(from, radius) ? std::optional(Entry{from, glm::vec3(0)}) : std::nullopt;
@@ -91,12 +87,12 @@ class FieldObstacle {
     /// By strides through the samples; many times as quick as the search for the place of an entry.
     bool staysOut(const glm::vec3& from, const glm::vec3& to, float radius) const {
         const float length = glm::distance(from, to), voxel = field_.voxelSize();
-        const float error = field_.mesh() ? interpolationError * voxel : 0;
+        const float error = field_.mesh() ? mostInterpolationError * voxel : 0;
         float gone = 0;
         for (int i = 0; i < mostSteps && gone <= length; ++i) {
             const Sample sample = field_.sampleWithin(length > 0 ? from + gone / length * (to - from) : from, 0);
-            const float left = sample.inBand && radius == 0 ? (sample.distance - error) / steepest
-                                                            : sample.distance - radius - interpolationError * voxel;
+            const float left = sample.inBand && radius == 0 ? (sample.distance - error) / steepestInterpolant
+                                                            : sample.distance - radius - mostInterpolationError * voxel;
             if (left < leastStride * voxel) return false;
             gone += left;
         }
@@ -206,6 +202,12 @@ class TriangleObstacle {
     const btConcaveShape& mesh_;
 };
 
+/// An object as a body that the world moves and that is awake; null for others.
+btRigidBody* goingBody(btCollisionObject& object) {
+    auto* body = btRigidBody::upcast(&object);
+    return body && !body->isStaticOrKinematicObject() && body->isActive() ? body : nullptr;
+}
+
 /// The way of an object through a step that has come to its end.
 class Course {
   public:
@@ -214,12 +216,11 @@ class Course {
           end_(object.getWorldTransform()),
           start_(end_.getOrigin()),
           orientation_(end_.getRotation()) {
-        auto* body = btRigidBody::upcast(&object);
-        if (!body || body->isStaticOrKinematicObject() || !body->isActive()) return;
-        body_ = body;
-        way_ = seconds * body->getLinearVelocity();
+        body_ = goingBody(object);
+        if (!body_) return;
+        way_ = seconds * body_->getLinearVelocity();
         start_ -= way_;
-        const btVector3& spin = body->getAngularVelocity();
+        const btVector3& spin = body_->getAngularVelocity();
         const float angle = seconds * spin.length();
         if (!(angle > 0)) return;
         axis_ = spin.normalized();
@@ -449,9 +450,11 @@ float passageOf(const Convex& convex, const Shape& field, const std::vector<Mome
     for (std::uint32_t i = 0; i < corners.size(); ++i) follow(corners[i], convex.radius(i));
     for (const Convex::Edge& edge : convex.edges()) {
         const float length = glm::distance(corners[edge.from], corners[edge.to]);
-        const float parts = std::min(std::ceil(length / (probeSpacing * field.voxelSize())), mostProbes);
-        for (float part = 1; part < parts; ++part)
-            follow(convex.place(edge, part / parts), convex.radius(edge, part / parts));
+        const int parts = probeParts(length, field.voxelSize(), mostProbes);
+        for (int i = 1; i < parts; ++i) {
+            const float part = float(i) / float(parts);
+            follow(convex.place(edge, part), convex.radius(edge, part));
+        }
     }
     return passage.first();
 }
@@ -522,6 +525,7 @@ class Meetings {
         for (int i = 0; i < objects.size(); ++i)
             if (const float margin = marginOf(*objects[i]); margin > 0) least = std::min(least, margin);
         for (int i = 0; i < objects.size(); ++i) {
+            if (!goingBody(*objects[i])) continue;
             const Course course(*objects[i], seconds);
             if (course.longest() > least) fast_.push_back(course);
         }
