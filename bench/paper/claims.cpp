@@ -209,11 +209,24 @@ std::string textWalls(const json& data) {
            "are such. A wall without thickness has no inside.\n";
 }
 
+std::vector<std::string> behindWalls(const json& data) {
+    std::vector<std::string> found;
+    for (const json& row : data["rows"])
+        for (const char* name : {"layers", "exact"})
+            if (row[name]["outsideWrong"] > row["openvdb"]["outsideWrong"])
+                found.push_back(fmt::format("A wall of {} voxels: `{}` has {} of the outside inside, OpenVDB {}.",
+                                            row["thickness"].get<double>(),
+                                            std::string(name) == "layers" ? "double-layer" : name,
+                                            percent(row[name]["outsideWrong"], row[name]["outside"]),
+                                            percent(row["openvdb"]["outsideWrong"], row["openvdb"]["outside"])));
+    return found;
+}
+
 }  // namespace
 
 std::vector<Part> claimParts() {
     return {{"theorems", "Theorems 1 and 2", measureTheorems, textTheorems},
-            {"walls", "Thin walls", measureWalls, textWalls}};
+            {"walls", "Thin walls", measureWalls, textWalls, behindWalls}};
 }
 
 }  // namespace bilayer::paper

@@ -160,7 +160,7 @@ View headOf(const Mesh& mesh, const glm::dvec3& from, int pixels, int lines) {
     const Bounds box = bounds(mesh);
     Mesh head;
     for (const glm::vec3& p : mesh.points)
-        if (p.z > box.upper.z - 0.14f * box.size().z) head.points.push_back(p);
+        if (p.z > box.upper.z - 0.075f * box.size().z) head.points.push_back(p);
     head.triangles.resize(head.points.size());
     for (unsigned i = 0; i < head.points.size(); ++i) head.triangles[i] = glm::uvec3(i);
     return viewOf(head, from, {0, 0, 1}, pixels, lines);
@@ -172,7 +172,7 @@ json measureFigure11(const Run& run) {
     const Lattice lattice = latticeForTriangles(model->mesh, published::surfaces[2].result * published::thousand);
     const Mesh mesh = fitted(model->mesh, lattice);
     const LevelSet layers = lettered(mesh, lattice), exact = build(mesh, optionsFor(lattice, Method::exact, halfWidth));
-    const View all = viewOf(mesh, {1, 0.2, 0.35}, {0, 0, 1}, 440, 640), head = headOf(mesh, {1, 0.2, 0.2}, 440, 640);
+    const View all = viewOf(mesh, {1, 0.2, 0.35}, {0, 0, 1}, 440, 540), head = headOf(mesh, {1, -0.45, 0.3}, 440, 540);
     std::vector<Picture> pictures;
     for (const View& view : {all, head})
         for (const Picture& one : {picture(mesh, view), picture(layers, view), picture(exact, view)})

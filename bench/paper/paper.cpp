@@ -112,8 +112,20 @@ constexpr const char* opening =
     "[method.md](method.md) tells how the method is done here.\n\nThe paper ran on a Xeon E5-2630 of six cores and a "
     "Tesla C2075, both of 2012. Its grids span a box of side 5; models fill it but for three steps on each side.\n";
 
+// A part of the page; what falls behind goes onto a list.
+std::string textOf(const Part& part, const json& kept, std::string& behind) {
+    const json& data = kept["data"];
+    if (data.contains("skipped")) return fmt::format("Left out: {}.\n", data["skipped"].get<std::string>());
+    std::string text = part.text(data);
+    if (part.behind)
+        for (const std::string& line : part.behind(data)) behind += "- " + line + "\n";
+    return text + fmt::format("\n*`./run paper {}`, {} UTC, {:.0f} s, rounds: {}.*\n", part.name,
+                              kept["when"].get<std::string>(), kept["seconds"].get<double>(),
+                              kept["rounds"].get<int>());
+}
+
 void writePage(const fs::path& page, const fs::path& store) {
-    std::string body;
+    std::string body, behind;
     std::set<std::string> machines;
     for (const Part& part : parts()) {
         body += fmt::format("\n## {}\n\n", part.title);
@@ -124,16 +136,12 @@ void writePage(const fs::path& page, const fs::path& store) {
         }
         const json kept = json::parse(file);
         machines.insert(sentence(kept["machine"]));
-        if (kept["data"].contains("skipped"))
-            body += fmt::format("Left out: {}.\n", kept["data"]["skipped"].get<std::string>());
-        else
-            body += part.text(kept["data"]);
-        body += fmt::format("\n*`./run paper {}`, {} UTC, {:.0f} s, rounds: {}.*\n", part.name,
-                            kept["when"].get<std::string>(), kept["seconds"].get<double>(), kept["rounds"].get<int>());
+        body += textOf(part, kept, behind);
     }
     std::string text = opening;
     for (const std::string& machine : machines) text += "\nMeasured on: " + machine + ".\n";
-    text += body;
+    text += body + "\n## Where bilayer is behind\n\nThe paper, or a peer, by the numbers above:\n\n";
+    text += behind.empty() ? "Nowhere.\n" : behind;
     std::ofstream file(page);
     file << text;
     if (!file.flush()) throw std::runtime_error("cannot write " + page.string());

@@ -23,6 +23,8 @@ struct Part {
     nlohmann::json (*measure)(const Run& run);
     /// Markdown of what measure() gave.
     std::string (*text)(const nlohmann::json& data);
+    /// Sentences: where bilayer falls behind the paper, or behind a peer, in what measure() gave. May be null.
+    std::vector<std::string> (*behind)(const nlohmann::json& data) = nullptr;
 };
 
 /// All, in the order of the page.

@@ -178,7 +178,7 @@ std::string textTable2(const json& data) {
     return fmt::format(
                "Seconds at 251^3, one thread. *Dense*: the paper's program, without and with the rows of section 4.2, "
                "and with the recursive subdivision; *AWPN*: the same kind of program with point-triangle distances "
-               "(`bench/paper/scatter.cpp`). {}.\n\n",
+               "(`bench/paper/scatter.cpp`). Models: {}.\n\n",
                origins) +
            table({"model", "triangles [K], paper / here", "AWPN, paper", "AWPN", "double layer, paper", "dense, plain",
                   "dense", "dense, recursive", "samples, Algorithm 1 / recursive"},
@@ -195,6 +195,28 @@ std::string textTable2(const json& data) {
                "subdivision it takes {:.2f} of its time with Algorithm 1, which rounds the number of rows up and takes "
                "more samples.\n",
                bench::geometricMean(gains), bench::geometricMean(byRows), bench::geometricMean(byRecursion));
+}
+
+// A line where our seconds are more than another's.
+void note(std::vector<std::string>& found, const std::string& where, const char* what, double ours,
+          const std::string& other, double theirs) {
+    if (ours > theirs)
+        found.push_back(fmt::format("{}: {} takes {} s, {} {} s.", where, what, digits(ours), other, digits(theirs)));
+}
+
+std::vector<std::string> behindTable2(const json& data) {
+    std::vector<std::string> found;
+    for (const json& row : data["rows"]) {
+        const std::string model = row["model"], where = "Table 2, " + model;
+        const published::Seconds& paper = published23(model);
+        note(found, where, "`double-layer` on 1 thread", value(row, "layers 1"), "the paper's program there",
+             paper.serial);
+        note(found, where, "`exact` on 1 thread", value(row, "exact 1"), "AWPN there", paper.awpn);
+        note(found, where, "`pseudonormal` on 1 thread", value(row, "pseudonormal 1"), "AWPN there", paper.awpn);
+        for (const char* name : {"layers 2", "exact 2", "pseudonormal 2"})
+            note(found, where, name, value(row, name), "OpenVDB on 2 threads", value(row, "openvdb 2"));
+    }
+    return found;
 }
 
 json measureTable3(const Run& run) {
@@ -249,6 +271,20 @@ std::string textTable3(const json& data) {
                   "prism's kernels over double-layer's / exact's"},
                  rows) +
            "\nThe prism method's whole build is mostly the host's: it needs the neighbours of each triangle.\n";
+}
+
+std::vector<std::string> behindTable3(const json& data) {
+    std::vector<std::string> found;
+    for (const json& row : data["rows"]) {
+        const std::string model = row["model"], where = "Table 3, " + model;
+        const published::Seconds& paper = published23(model);
+        note(found, where, "`double-layer`'s kernels", clocked(row, Builder::doubleLayerOpencl),
+             "the paper's on six cores", paper.opencl);
+        note(found, where, "`exact`'s kernels", clocked(row, Builder::exactOpencl),
+             "the paper's double layer on six cores", paper.opencl);
+        note(found, where, "`prism`'s kernels", clocked(row, Builder::prism), "the paper's on six cores", paper.prism);
+    }
+    return found;
 }
 
 // What can be had without swapping [bytes].
@@ -347,7 +383,8 @@ std::string textTable4(const json& data) {
         cells.push_back(seconds(value(row["seconds"], "exact")));
         for (const json& device : row["devices"]) cells.push_back(seconds(whole(device, Builder::exactOpencl)));
         bytes.push_back(fmt::format("{:.1f}", row["active"].get<double>() / 1e6));
-        most = std::max(most, row["peaks"]["exact"].get<double>() / MiB);
+        for (const char* name : {"double-layer", "exact"})
+            most = std::max(most, row["peaks"][name].get<double>() / MiB);
         times.push_back(cells);
         memory.push_back(bytes);
     }
@@ -379,6 +416,28 @@ std::string textTable4(const json& data) {
                most);
 }
 
+std::vector<std::string> behindTable4(const json& data) {
+    std::vector<std::string> found;
+    for (std::size_t i = 0; i < published::table4.size(); ++i) {
+        const published::Growth& paper = published::table4[i];
+        const json& row = data["rows"][i];
+        const std::string where = fmt::format("Table 4, {}", fmt::join(paper.nodes, "x"));
+        const double serial = value(row["seconds"], "dense");
+        for (const json& device : row["devices"]) {
+            const double kernels = clocked(device, Builder::doubleLayerOpencl), ratio = serial / kernels;
+            note(found, where, "`double-layer`'s kernels", kernels, "the paper's on six cores", paper.opencl);
+            if (paper.tesla)
+                note(found, where, "`double-layer`'s kernels", kernels, "the paper's on a Tesla", *paper.tesla);
+            if (ratio < paper.serial / paper.opencl)
+                found.push_back(
+                    fmt::format("{}: the kernels on {} cores are {:.1f} times as fast as the serial program, the "
+                                "paper's on six {:.1f} times.",
+                                where, threads, ratio, paper.serial / paper.opencl));
+        }
+    }
+    return found;
+}
+
 // Eq. 5.
 double variance(const Mesh& mesh) {
     double sum = 0, squares = 0;
@@ -401,6 +460,8 @@ Mesh unevenSphere(double areaVariance, const Lattice& lattice) {
     for (glm::vec3& p : mesh.points) p = p * float(radius) + centre;
     return mesh;
 }
+
+constexpr double flat = 1.25;  // times the first row's time
 
 json measureTable5(const Run& run) {
     json rows = json::array();
@@ -466,13 +527,25 @@ std::string textTable5(const json& data) {
            "fills a block, and a triangle costs what it touches.\n";
 }
 
+std::vector<std::string> behindTable5(const json& data) {
+    std::vector<std::string> found;
+    for (const char* name : {"layers", "exact"}) {
+        const double growth =
+            value(data["rows"].back()["seconds"], name) / value(data["rows"].front()["seconds"], name);
+        if (growth > flat)
+            found.push_back(fmt::format(
+                "Table 5: {} on TBB takes {:.2f} times as long for the last variance as for the first.", name, growth));
+    }
+    return found;
+}
+
 }  // namespace
 
 std::vector<Part> speedParts() {
-    return {{"table2", "Table 2: one core", measureTable2, textTable2},
-            {"table3", "Table 3: OpenCL", measureTable3, textTable3},
-            {"table4", "Table 4: growing grids", measureTable4, textTable4},
-            {"table5", "Table 5: triangles of unlike areas", measureTable5, textTable5}};
+    return {{"table2", "Table 2: one core", measureTable2, textTable2, behindTable2},
+            {"table3", "Table 3: OpenCL", measureTable3, textTable3, behindTable3},
+            {"table4", "Table 4: growing grids", measureTable4, textTable4, behindTable4},
+            {"table5", "Table 5: triangles of unlike areas", measureTable5, textTable5, behindTable5}};
 }
 
 }  // namespace bilayer::paper
