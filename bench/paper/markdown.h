@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -21,6 +22,22 @@ inline std::string table(const std::vector<std::string>& head, const std::vector
     text += "\n";
     for (const auto& row : rows) text += line(row);
     return text;
+}
+
+/// The same text with lines of paragraphs broken at spaces; tables, headings and pictures stay as they are.
+inline std::string wrapped(const std::string& text, std::size_t width = 128) {
+    std::string result;
+    std::istringstream lines(text);
+    for (std::string line; std::getline(lines, line);) {
+        while (line.size() > width && line[0] != '|' && line[0] != '#' && line[0] != '!') {
+            const std::size_t space = line.rfind(' ', width);
+            if (space == std::string::npos || space < 2) break;
+            result += line.substr(0, space) + "\n";
+            line = (line.starts_with("- ") || line.starts_with("  ") ? "  " : "") + line.substr(space + 1);
+        }
+        result += line + "\n";
+    }
+    return result;
 }
 
 /// Three digits, and no more behind the point than there are before the first of them.

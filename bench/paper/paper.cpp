@@ -52,13 +52,18 @@ std::string procValue(const char* path, const std::string& key) {
     return "unknown";
 }
 
+// Without what PoCL adds after its version.
+std::string shortened(const std::string& version) {
+    return version.substr(0, version.find("  "));
+}
+
 json machine() {
     json devicesHere = json::array();
     for (const DeviceInfo& info : devices())
-        devicesHere.push_back(fmt::format("{} ({})", info.name, info.platformVersion));
+        devicesHere.push_back(fmt::format("{} ({})", info.name, shortened(info.platformVersion)));
     return {{"processor", procValue("/proc/cpuinfo", "model name")},
             {"cores", std::thread::hardware_concurrency()},
-            {"memory", procValue("/proc/meminfo", "MemTotal")},
+            {"memory", std::stod(procValue("/proc/meminfo", "MemTotal")) / (1 << 20)},
             {"simd", simdName()},
             {"compiler", "GCC " __VERSION__},
             {"openvdb", OPENVDB_LIBRARY_VERSION_STRING},
@@ -97,8 +102,8 @@ void measure(const Part& part, const Run& run, const fs::path& store) {
 
 std::string sentence(const json& machine) {
     std::string text = fmt::format(
-        "{}, {} cores, {}; {} {}, OpenVDB {}, TBB {}", machine["processor"].get<std::string>(),
-        machine["cores"].get<int>(), machine["memory"].get<std::string>(), machine["compiler"].get<std::string>(),
+        "{}, {} cores, {:.0f} GiB; {}, {}, OpenVDB {}, TBB {}", machine["processor"].get<std::string>(),
+        machine["cores"].get<int>(), machine["memory"].get<double>(), machine["compiler"].get<std::string>(),
         machine["simd"].get<std::string>(), machine["openvdb"].get<std::string>(), machine["tbb"].get<std::string>());
     for (const json& device : machine["devices"]) text += ", " + device.get<std::string>();
     return text;
@@ -127,6 +132,7 @@ std::string textOf(const Part& part, const json& kept, std::string& behind) {
 void writePage(const fs::path& page, const fs::path& store) {
     std::string body, behind;
     std::set<std::string> machines;
+    double seconds = 0;
     for (const Part& part : parts()) {
         body += fmt::format("\n## {}\n\n", part.title);
         std::ifstream file(keptAt(store, part.name));
@@ -136,14 +142,16 @@ void writePage(const fs::path& page, const fs::path& store) {
         }
         const json kept = json::parse(file);
         machines.insert(sentence(kept["machine"]));
+        seconds += kept["seconds"].get<double>();
         body += textOf(part, kept, behind);
     }
     std::string text = opening;
     for (const std::string& machine : machines) text += "\nMeasured on: " + machine + ".\n";
-    text += body + "\n## Where bilayer is behind\n\nThe paper, or a peer, by the numbers above:\n\n";
+    text += fmt::format("\nAll parts together took {:.0f} minutes.\n", seconds / 60) + body +
+            "\n## Where bilayer is behind\n\nThe paper, or a peer, by the numbers above:\n\n";
     text += behind.empty() ? "Nowhere.\n" : behind;
     std::ofstream file(page);
-    file << text;
+    file << wrapped(text);
     if (!file.flush()) throw std::runtime_error("cannot write " + page.string());
 }
 
