@@ -145,7 +145,8 @@ json measureFigure10(const Run& run) {
     return largeFigure(run, "circular box", "figure10.jpg", {0.1, 0.75, 1}, 820, 700);
 }
 std::string textFigure10(const json& data) {
-    return textLarge(data, published::surfaces[1], "The paper's box is not public; this one is not as tall.");
+    return textLarge(data, published::surfaces[1],
+                     "The paper's box is not public; this one is carved by formula, with relief of like kind.");
 }
 
 // The grid at which the double layer's surface has as many triangles as the paper's.
