@@ -40,13 +40,17 @@ std::uint64_t statusBytes(const std::string& key) {
     return kiB * 1024;
 }
 
-Footprint measure(const Scene& scene, const Job& job, int repetitions, double seconds) {
+std::uint64_t peakOf(const std::function<void()>& work) {
     ::malloc_trim(0);
     const std::uint64_t before = statusBytes("VmRSS:");
     std::ofstream("/proc/self/clear_refs") << resetPeak;
+    work();
+    return statusBytes("VmHWM:") - before;
+}
+
+Footprint measure(const Scene& scene, const Job& job, int repetitions, double seconds) {
     Footprint result;
-    result.outcome = run(scene, job);
-    result.peakBytes = statusBytes("VmHWM:") - before;
+    result.peakBytes = peakOf([&] { result.outcome = run(scene, job); });
     result.triangles = scene.mesh.triangles.size();
     result.inputBytes = scene.mesh.points.size() * sizeof(scene.mesh.points[0]) +
                         scene.mesh.triangles.size() * sizeof(scene.mesh.triangles[0]);
@@ -61,10 +65,10 @@ Footprint measure(const Scene& scene, const Job& job, int repetitions, double se
 }
 
 // The child's whole life: it must not return into what its parent was doing, nor run what its parent runs at exit.
-[[noreturn]] void live(int pipe, const std::function<Scene()>& make, const Job& job, int repetitions, double seconds) {
+[[noreturn]] void live(int pipe, const std::function<Footprint()>& work) {
     Answer answer;
     try {
-        answer.footprint = measure(make(), job, repetitions, seconds);
+        answer.footprint = work();
         answer.ok = true;
     } catch (const std::exception& error) {
         std::string(error.what()).copy(answer.error.data(), answer.error.size() - 1);
@@ -81,6 +85,28 @@ std::size_t threadsOfThisProcess() {
 // Before main() there are only the threads that libraries start as they are loaded (log4cplus, which OpenVDB brings);
 // they wait for log messages, and nobody waits for them.
 const std::size_t threadsAtStart = threadsOfThisProcess();
+
+// What work gives in a child process.
+Footprint answerOfChild(const std::string& name, const std::function<Footprint()>& work) {
+    if (threadsOfThisProcess() != threadsAtStart)
+        throw std::logic_error("a process that runs several threads cannot be forked safely");
+    int ends[2];
+    if (::pipe(ends) != 0) throw std::runtime_error("no pipe to a child process");
+    const pid_t child = ::fork();
+    if (child < 0) throw std::runtime_error("no child process");
+    if (child == 0) {
+        ::close(ends[0]);
+        live(ends[1], work);
+    }
+    ::close(ends[1]);
+    Answer answer;
+    const bool received = ::read(ends[0], &answer, sizeof answer) == ssize_t(sizeof answer);
+    ::close(ends[0]);
+    ::waitpid(child, nullptr, 0);
+    if (!received) throw std::runtime_error(name + ": the child process died");
+    if (!answer.ok) throw std::runtime_error(name + ": " + answer.error.data());
+    return answer.footprint;
+}
 
 }  // namespace
 
@@ -151,24 +177,17 @@ Difference difference(const LevelSet& a, const LevelSet& b) {
 }
 
 Footprint inChild(const std::function<Scene()>& make, const Job& job, int repetitions, double seconds) {
-    if (threadsOfThisProcess() != threadsAtStart)
-        throw std::logic_error("a process that runs several threads cannot be forked safely");
-    int ends[2];
-    if (::pipe(ends) != 0) throw std::runtime_error("no pipe to a child process");
-    const pid_t child = ::fork();
-    if (child < 0) throw std::runtime_error("no child process");
-    if (child == 0) {
-        ::close(ends[0]);
-        live(ends[1], make, job, repetitions, seconds);
-    }
-    ::close(ends[1]);
-    Answer answer;
-    const bool received = ::read(ends[0], &answer, sizeof answer) == ssize_t(sizeof answer);
-    ::close(ends[0]);
-    ::waitpid(child, nullptr, 0);
-    if (!received) throw std::runtime_error(std::string(nameOf(job.builder)) + ": the child process died");
-    if (!answer.ok) throw std::runtime_error(std::string(nameOf(job.builder)) + ": " + answer.error.data());
-    return answer.footprint;
+    return answerOfChild(nameOf(job.builder), [&] { return measure(make(), job, repetitions, seconds); });
+}
+
+std::uint64_t peakInChild(const std::function<void()>& prepare, const std::function<void()>& work) {
+    const auto peak = [&] {
+        prepare();
+        Footprint footprint;
+        footprint.peakBytes = peakOf(work);
+        return footprint;
+    };
+    return answerOfChild("work", peak).peakBytes;
 }
 
 }  // namespace bilayer::bench

@@ -66,4 +66,9 @@ struct Footprint {
 /// waits for them there would wait for ever. Throws std::runtime_error with its text if the child failed.
 Footprint inChild(const std::function<Scene()>& make, const Job& job, int repetitions = 1, double seconds = 0);
 
+/// What work takes at its peak beyond what was resident before it, in a child process of its own [bytes].
+/// @param prepare  runs before, and is not counted
+/// Throws as inChild() does.
+std::uint64_t peakInChild(const std::function<void()>& prepare, const std::function<void()>& work);
+
 }  // namespace bilayer::bench
