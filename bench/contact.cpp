@@ -15,14 +15,16 @@
 
 #include "bench/heap.h"
 #include "bench/measure.h"
-#include "bench/plot.h"
 #include "bench/program.h"
 #include "cl/point_sampler.h"
 #include "demos/shared/outcome.h"
+#include "demos/shared/plot.h"
 #include "demos/shared/shapes.h"
 
 using namespace bilayer;
 using namespace bilayer::bench;
+using demo::Line;
+using demo::writeSvg;
 
 namespace {
 

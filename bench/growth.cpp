@@ -7,12 +7,15 @@
 
 #include "bench/builders.h"
 #include "bench/measure.h"
-#include "bench/plot.h"
 #include "bench/program.h"
+#include "demos/shared/plot.h"
 #include "demos/shared/shapes.h"
 
 using namespace bilayer;
 using namespace bilayer::bench;
+using demo::Line;
+using demo::Panel;
+using demo::writeSvg;
 
 namespace {
 

@@ -1,6 +1,6 @@
 #include "demos/shared/outcome.h"
 
-#include <fmt/core.h>
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
@@ -29,6 +29,29 @@ void writeEnergies(const Outcome& outcome, const std::filesystem::path& path) {
         file << fmt::format("{:.6g},{:.9g},{:.9g}\n", double(i) / outcome.stepsPerSecond, outcome.energies.kinetic[i],
                             outcome.energies.potential[i]);
     if (!file.flush()) throw std::runtime_error(path.string() + ": cannot be written");
+}
+
+void writeTable(const Table& table, const std::filesystem::path& path) {
+    std::ofstream file(path);
+    file << fmt::format("{}\n", fmt::join(table.columns, ","));
+    for (const auto& values : table.rows) file << fmt::format("{:.9g}\n", fmt::join(values, ","));
+    if (!file.flush()) throw std::runtime_error(path.string() + ": cannot be written");
+}
+
+// What only rigid bodies have.
+void printBodies(const Outcome& outcome) {
+    const auto steps = double(outcome.stepMs.size());
+    const auto depth = [&](double d) {
+        return fmt::format("{:.3f} mm = {:.2f} voxels", 1e3 * d, d / outcome.voxelSize);
+    };
+    row("contacts a step", fmt::format("{:.0f} found, {:.0f} kept", double(outcome.contactsFound) / steps,
+                                       double(outcome.contactsKept) / steps));
+    row("points too deep for the band", std::to_string(outcome.beyondBand));
+    row("deepest penetration", depth(outcome.deepest()) + ", by the meshes");
+    row("99 in 100 below", depth(outcome.usuallyBelow()));
+    row("peak of kinetic energy",
+        withUnit(*std::max_element(outcome.energies.kinetic.begin(), outcome.energies.kinetic.end()), "J"));
+    row("energy rises by", fmt::format("{:.2f} % of that", 100 * outcome.energies.rise()));
 }
 
 }  // namespace
@@ -81,23 +104,15 @@ const Criterion& Outcome::criterion(const std::string& name) const {
 
 void print(const Outcome& outcome) {
     const auto steps = double(outcome.stepMs.size());
-    const auto depth = [&](double d) {
-        return fmt::format("{:.3f} mm = {:.2f} voxels", 1e3 * d, d / outcome.voxelSize);
-    };
     fmt::print("{}\n", outcome.title);
     for (const auto& [label, value] : outcome.facts) row(label, value);
-    row("bodies that move", std::to_string(outcome.bodies));
-    row("simulated", fmt::format("{:.2f} s in {:.0f} steps, in {:.1f} s", steps / outcome.stepsPerSecond, steps,
-                                 1e-3 * std::accumulate(outcome.stepMs.begin(), outcome.stepMs.end(), 0.0)));
-    row("a step", fmt::format("{:.2f} ms, 99 in 100 below {:.2f} ms", outcome.medianStep(), outcome.slowStep()));
-    row("contacts a step", fmt::format("{:.0f} found, {:.0f} kept", double(outcome.contactsFound) / steps,
-                                       double(outcome.contactsKept) / steps));
-    row("points too deep for the band", std::to_string(outcome.beyondBand));
-    row("deepest penetration", depth(outcome.deepest()) + ", by the meshes");
-    row("99 in 100 below", depth(outcome.usuallyBelow()));
-    row("peak of kinetic energy",
-        withUnit(*std::max_element(outcome.energies.kinetic.begin(), outcome.energies.kinetic.end()), "J"));
-    row("energy rises by", fmt::format("{:.2f} % of that", 100 * outcome.energies.rise()));
+    if (outcome.bodies > 0) row("bodies that move", std::to_string(outcome.bodies));
+    if (steps > 0) {
+        row("simulated", fmt::format("{:.2f} s in {:.0f} steps, in {:.1f} s", steps / outcome.stepsPerSecond, steps,
+                                     1e-3 * std::accumulate(outcome.stepMs.begin(), outcome.stepMs.end(), 0.0)));
+        row("a step", fmt::format("{:.2f} ms, 99 in 100 below {:.2f} ms", outcome.medianStep(), outcome.slowStep()));
+    }
+    if (outcome.bodies > 0) printBodies(outcome);
     row("fingerprint", fmt::format("{:016x}", outcome.fingerprint));
     fmt::print("criteria\n");
     for (const Criterion& criterion : outcome.criteria)
@@ -108,7 +123,11 @@ void print(const Outcome& outcome) {
 void write(const Outcome& outcome, const std::string& name, const std::filesystem::path& folder) {
     std::filesystem::create_directories(folder);
     outcome.recording.write(folder / (name + ".html"));
-    writeEnergies(outcome, folder / (name + ".csv"));
+    if (outcome.table.columns.empty())
+        writeEnergies(outcome, folder / (name + ".csv"));
+    else
+        writeTable(outcome.table, folder / (name + ".csv"));
+    if (!outcome.plots.empty()) writeSvg(folder / (name + ".svg"), outcome.plots);
     for (const auto& [field, levelSet] : outcome.fields) writeVdb(folder / (field + ".vdb"), levelSet);
 }
 

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "demos/shared/plot.h"
 #include "demos/shared/recording.h"
 #include "sdf/level_set.h"
 
@@ -33,6 +34,12 @@ struct Energies {
     double rise() const;
 };
 
+/// Figures over time, for the .csv file of a scene that is not of rigid bodies.
+struct Table {
+    std::vector<std::string> columns;       ///< with units, as "volume_m3"
+    std::vector<std::vector<double>> rows;  ///< one of each column in each
+};
+
 struct Outcome {
     Recording recording;
     std::string title{};
@@ -41,7 +48,10 @@ struct Outcome {
 
     std::vector<std::pair<std::string, LevelSet>> fields{};  ///< worth a file of their own: name, field
 
-    int bodies = 0;  ///< that move
+    Table table{};               ///< of a scene without rigid bodies
+    std::vector<Panel> plots{};  ///< side by side in a picture
+
+    int bodies = 0;  ///< that move; what tells of contacts, penetrations and energies is of rigid ones only
     float stepsPerSecond = 0;
     std::vector<double> stepMs{};                              ///< how long each step took [ms]
     long contactsFound = 0, contactsKept = 0, beyondBand = 0;  ///< sums over all steps
@@ -72,8 +82,8 @@ double percentile(std::vector<double> values, double share);
 /// Prints title, figures and criteria to the standard output.
 void print(const Outcome& outcome);
 
-/// Writes NAME.html, the recording, NAME.csv, the energies over time, and the fields as .vdb files into a folder, which
-/// is made.
+/// Writes NAME.html, the recording, NAME.csv, the table or, where there is none, the energies over time, NAME.svg, the
+/// plots if there are any, and the fields as .vdb files into a folder, which is made.
 void write(const Outcome& outcome, const std::string& name, const std::filesystem::path& folder);
 
 }  // namespace bilayer::demo

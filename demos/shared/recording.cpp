@@ -25,6 +25,7 @@ namespace {
 constexpr const char* threeFolder = "/usr/share/javascript/three/";  // where Debian's libjs-three puts three.js
 constexpr float steps = 65535;                                       // of a 16-bit coordinate
 constexpr float quaternionSteps = 32767;                             // of a signed 16-bit component
+constexpr float changingSteps = 4095;                                // of a coordinate of a surface that changes
 
 template <class T>
 std::string base64(const std::vector<T>& values) {
@@ -86,6 +87,22 @@ nlohmann::json json(const Mesh& mesh) {
             {"points", base64(points.steps)},
             {"indexBits", small ? 16 : 32},
             {"indices", small ? base64(std::vector<std::uint16_t>(indices.begin(), indices.end())) : base64(indices)}};
+}
+
+nlohmann::json json(const Look& look) {
+    nlohmann::json all = {{"colour", look.colour},
+                          {"roughness", look.roughness},
+                          {"metalness", look.metalness},
+                          {"clearcoat", look.clearcoat},
+                          {"opacity", look.opacity}};
+    if (look.clear) all["clear"] = true;
+    return all;
+}
+
+// A number of any size in as few bytes as it needs, seven bits each, the lowest first.
+void append(std::vector<std::uint8_t>& to, std::uint32_t number) {
+    for (; number > 127; number >>= 7) to.push_back(std::uint8_t(number | 128));
+    to.push_back(std::uint8_t(number));
 }
 
 // The mesh with its vertices doubled along sharp edges, so that normals averaged at each vertex keep them sharp.
@@ -154,13 +171,54 @@ int Recording::addBody(int mesh, const Look& look) {
     return int(bodies_.size()) - 1;
 }
 
-void Recording::frame(double time, std::span<const Pose> poses) {
+int Recording::addChanging(const Look& look) {
+    if (!times_.empty()) throw std::invalid_argument("recording: a body is added after the first frame");
+    changing_.push_back({look, {}});
+    return int(changing_.size()) - 1;
+}
+
+// Points in the order in which triangles use them first. Neighbours are close in both lists, so that differences are
+// small: a coordinate is kept as its step from the last one, a corner as how far back its point stands from the next
+// new one.
+Recording::Packed Recording::pack(const Mesh& mesh) {
+    if (!mesh.triangles.empty()) validate(mesh);
+    Packed packed;
+    packed.box = bounds(mesh);
+    if (packed.box.empty()) packed.box = {glm::vec3(0), glm::vec3(0)};
+    const glm::vec3 size = glm::max(packed.box.size(), glm::vec3(1e-9f));
+    std::vector<std::uint32_t> places(mesh.points.size(), 0);  // 1 and on; 0: not used yet
+    std::uint32_t used = 0;
+    glm::ivec3 last(0);
+    for (const glm::uvec3& triangle : mesh.triangles)
+        for (int i = 0; i < 3; ++i) {
+            std::uint32_t& place = places[triangle[i]];
+            append(packed.triangles, place ? used + 1 - place : 0);
+            if (place) continue;
+            place = ++used;
+            const glm::vec3 part = (mesh.points[triangle[i]] - packed.box.lower) / size;
+            const glm::ivec3 now(glm::round(part * changingSteps));
+            for (int axis = 0; axis < 3; ++axis) {
+                const int step = now[axis] - last[axis];
+                append(packed.points, std::uint32_t(step < 0 ? -2 * step - 1 : 2 * step));
+            }
+            last = now;
+        }
+    return packed;
+}
+
+void Recording::frame(double time, std::span<const Pose> poses, std::span<const Mesh> surfaces) {
     if (poses.size() != bodies_.size())
         throw std::invalid_argument("recording: " + std::to_string(poses.size()) + " poses for " +
                                     std::to_string(bodies_.size()) + " bodies");
+    if (surfaces.size() != changing_.size())
+        throw std::invalid_argument("recording: " + std::to_string(surfaces.size()) + " surfaces for " +
+                                    std::to_string(changing_.size()) + " bodies that change");
     if (!times_.empty() && !(float(time) > times_.back()))
         throw std::invalid_argument("recording: frame " + std::to_string(times_.size()) +
                                     " is not later than the last");
+    std::vector<Packed> packed;
+    for (const Mesh& mesh : surfaces) packed.push_back(pack(mesh));
+    for (std::size_t i = 0; i < packed.size(); ++i) changing_[i].frames.push_back(std::move(packed[i]));
     times_.push_back(float(time));
     poses_.insert(poses_.end(), poses.begin(), poses.end());
 }
@@ -169,13 +227,10 @@ void Recording::frame(double time, std::span<const Pose> poses) {
 std::string Recording::data() const {
     nlohmann::json meshes = nlohmann::json::array(), bodies = meshes, notes = meshes;
     for (const Mesh& mesh : meshes_) meshes.push_back(json(mesh));
-    for (const auto& [mesh, look] : bodies_)
-        bodies.push_back({{"mesh", mesh},
-                          {"colour", look.colour},
-                          {"roughness", look.roughness},
-                          {"metalness", look.metalness},
-                          {"clearcoat", look.clearcoat},
-                          {"opacity", look.opacity}});
+    for (const auto& [mesh, look] : bodies_) {
+        bodies.push_back(json(look));
+        bodies.back()["mesh"] = mesh;
+    }
     for (const auto& [label, value] : notes_) notes.push_back({label, value});
 
     Quantised positions;
@@ -187,21 +242,31 @@ std::string Recording::data() const {
             rotations.push_back(std::int16_t(std::lround(std::clamp(component, -1.f, 1.f) * quaternionSteps)));
     }
 
-    const nlohmann::json all = {{"title", title_},
-                                {"notes", notes},
-                                {"view",
-                                 {{"target", json(view.target)},
-                                  {"distance", view.distance},
-                                  {"azimuth", view.azimuth},
-                                  {"elevation", view.elevation},
-                                  {"ground", view.groundHeight}}},
-                                {"meshes", meshes},
-                                {"bodies", bodies},
-                                {"times", base64(times_)},
-                                {"lower", json(positions.box.lower)},
-                                {"size", json(positions.box.size())},
-                                {"positions", base64(positions.steps)},
-                                {"rotations", base64(rotations)}};
+    nlohmann::json all = {{"title", title_},
+                          {"notes", notes},
+                          {"view",
+                           {{"target", json(view.target)},
+                            {"distance", view.distance},
+                            {"azimuth", view.azimuth},
+                            {"elevation", view.elevation},
+                            {"ground", view.groundHeight}}},
+                          {"meshes", meshes},
+                          {"bodies", bodies},
+                          {"times", base64(times_)},
+                          {"lower", json(positions.box.lower)},
+                          {"size", json(positions.box.size())},
+                          {"positions", base64(positions.steps)},
+                          {"rotations", base64(rotations)}};
+    if (view.moment >= 0) all["view"]["moment"] = view.moment;
+    for (const auto& [look, frames] : changing_) {
+        nlohmann::json body = json(look);
+        for (const Packed& frame : frames)
+            body["frames"].push_back({{"lower", json(frame.box.lower)},
+                                      {"size", json(frame.box.size())},
+                                      {"points", base64(frame.points)},
+                                      {"triangles", base64(frame.triangles)}});
+        all["changing"].push_back(std::move(body));
+    }
     std::string text = all.dump();
     // "</script>" in a title would end the element that holds the data
     for (std::size_t at = 0; (at = text.find("</", at)) != std::string::npos; at += 3) text.insert(at + 1, "\\");

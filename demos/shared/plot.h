@@ -1,22 +1,23 @@
-// A log-log plot as an SVG file: panels side by side, labelled lines, decades with grid lines.
+// A plot as an SVG file: panels side by side with labelled lines, log-log with decades or linear with round steps.
 #pragma once
 
 #include <filesystem>
 #include <string>
 #include <vector>
 
-namespace bilayer::bench {
+namespace bilayer::demo {
 
 /// A line: its points and the text at its end.
 struct Line {
     std::string label;
-    std::vector<double> x, y;  ///< positive
+    std::vector<double> x, y;  ///< positive, unless the panel is linear
 };
 
 struct Panel {
     std::string title, xLabel, yLabel;
     std::vector<double> xTicks;  ///< where x is labelled; empty: at each decade
     std::vector<Line> lines;     ///< at least one, of at least one point
+    bool linear = false;         ///< both axes, y from 0; else logarithmic
 };
 
 /// Draws the panels; lines of the same place in each panel share a colour.
@@ -25,4 +26,4 @@ std::string svg(const std::vector<Panel>& panels);
 /// Throws std::runtime_error that names the file when it cannot be written.
 void writeSvg(const std::filesystem::path& path, const std::vector<Panel>& panels);
 
-}  // namespace bilayer::bench
+}  // namespace bilayer::demo

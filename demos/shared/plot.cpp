@@ -1,4 +1,4 @@
-#include "bench/plot.h"
+#include "demos/shared/plot.h"
 
 #include <fmt/format.h>
 
@@ -9,7 +9,7 @@
 #include <limits>
 #include <stdexcept>
 
-namespace bilayer::bench {
+namespace bilayer::demo {
 namespace {
 
 // [pixels]
@@ -20,12 +20,27 @@ constexpr std::array<const char*, 4> colours{"#1f5fa8", "#c4572b", "#3d8a4f", "#
 // A point this far beyond a decade does not ask for another one [decades].
 constexpr double decadeSlack = 0.02;
 
-// A logarithmic axis from whole decade to whole decade, or from tick to tick, onto pixels.
-struct Axis {
-    double low, high, from, to;
+constexpr std::size_t mostMarks = 30;  // points that a line of a linear panel is marked at: with more it is a curve
+constexpr double steps = 5;            // of a linear axis, about
 
-    double operator()(double value) const { return from + (std::log10(value) - low) / (high - low) * (to - from); }
+// An axis from whole decade to whole decade, or from tick to tick, onto pixels; `low` and `high` are logarithms unless
+// it is linear, in steps of `step`.
+struct Axis {
+    double low, high, from, to, step = 0;
+
+    double operator()(double value) const {
+        return from + ((step > 0 ? value : std::log10(value)) - low) / (high - low) * (to - from);
+    }
 };
+
+// From 0, or from below it, in steps of 1, 2 or 5 with zeros.
+Axis linearAxisOf(const std::vector<double>& values, double from, double to) {
+    const auto [least, most] = std::minmax_element(values.begin(), values.end());
+    const double low = std::min(0.0, *least), high = *most > low ? *most : low + 1;
+    const double rough = (high - low) / steps, decade = std::pow(10, std::floor(std::log10(rough)));
+    const double step = decade * (rough > 5 * decade ? 10 : rough > 2 * decade ? 5 : rough > decade ? 2 : 1);
+    return {step * std::floor(low / step + 1e-9), step * std::ceil(high / step - 1e-9), from, to, step};
+}
 
 Axis axisOf(const std::vector<double>& values, bool wholeDecades, double from, double to) {
     const auto [least, most] = std::minmax_element(values.begin(), values.end());
@@ -38,15 +53,20 @@ Axis axisOf(const std::vector<double>& values, bool wholeDecades, double from, d
     return {low, high, from, to};
 }
 
-std::vector<double> decades(const Axis& axis) {
+std::vector<double> ticksOf(const Axis& axis) {
     std::vector<double> ticks;
+    if (axis.step > 0)
+        for (int i = 0; axis.low + i * axis.step <= axis.high + 1e-9 * axis.step; ++i)
+            ticks.push_back(axis.low + i * axis.step);
+    if (axis.step > 0) return ticks;
     for (double power = std::ceil(axis.low - 1e-9); power <= axis.high + 1e-9; ++power)
         ticks.push_back(std::pow(10, power));
     return ticks;
 }
 
 // 1000 as 10 with a raised 3; what is no power of ten as it is.
-std::string tickText(double value) {
+std::string tickText(const Axis& axis, double value) {
+    if (axis.step > 0) return fmt::format("{:.6g}", std::abs(value) < 1e-9 * axis.step ? 0 : value);
     const double power = std::log10(value);
     if (std::abs(power - std::round(power)) > 1e-9 || (power >= -1 && power <= 2)) return fmt::format("{:g}", value);
     return fmt::format("10<tspan dy=\"-5\" font-size=\"9\">{:g}</tspan>", std::round(power));
@@ -63,16 +83,20 @@ std::string text(double x, double y, const char* attributes, const std::string& 
 
 std::string grid(const Panel& panel, const Axis& x, const Axis& y) {
     std::string out;
-    for (const double tick : decades(y))
-        for (int part = 1; part < 10 && tick * part <= std::pow(10, y.high) * 1.0001; ++part)
+    const auto parts = [](const Axis& axis) { return axis.step > 0 ? 2 : 10; };
+    const auto fits = [](const Axis& axis, double value) {
+        return axis.step > 0 || value <= std::pow(10, axis.high) * 1.0001;
+    };
+    for (const double tick : ticksOf(y))
+        for (int part = 1; part < parts(y) && fits(y, tick * part); ++part)
             out += rule(x.from, y(tick * part), x.to, y(tick * part), part == 1 ? "#c8c8c8" : "#efefef");
     const bool named = !panel.xTicks.empty();
-    for (const double tick : named ? panel.xTicks : decades(x))
-        for (int part = 1; part < (named ? 2 : 10) && tick * part <= std::pow(10, x.high) * 1.0001; ++part)
+    for (const double tick : named ? panel.xTicks : ticksOf(x))
+        for (int part = 1; part < (named ? 2 : parts(x)) && fits(x, tick * part); ++part)
             out += rule(x(tick * part), y.from, x(tick * part), y.to, part == 1 ? "#c8c8c8" : "#efefef");
-    for (const double tick : decades(y)) out += text(x.from - 8, y(tick) + 4, "text-anchor=\"end\"", tickText(tick));
-    for (const double tick : named ? panel.xTicks : decades(x))
-        out += text(x(tick), y.from + 18, "text-anchor=\"middle\"", tickText(tick));
+    for (const double tick : ticksOf(y)) out += text(x.from - 8, y(tick) + 4, "text-anchor=\"end\"", tickText(y, tick));
+    for (const double tick : named ? panel.xTicks : ticksOf(x))
+        out += text(x(tick), y.from + 18, "text-anchor=\"middle\"", tickText(x, tick));
     return out;
 }
 
@@ -89,8 +113,9 @@ std::string lines(const Panel& panel, const Axis& x, const Axis& y) {
         std::string points;
         for (std::size_t k = 0; k < line.x.size(); ++k) {
             points += fmt::format("{:.1f},{:.1f} ", x(line.x[k]), y(line.y[k]));
-            out += fmt::format("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"3\" fill=\"{}\"/>\n", x(line.x[k]),
-                               y(line.y[k]), colour);
+            if (!panel.linear || line.x.size() <= mostMarks)
+                out += fmt::format("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"3\" fill=\"{}\"/>\n", x(line.x[k]),
+                                   y(line.y[k]), colour);
         }
         out +=
             fmt::format("<polyline points=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"1.8\"/>\n", points, colour);
@@ -110,8 +135,10 @@ std::string drawn(const Panel& panel) {
         ys.insert(ys.end(), line.y.begin(), line.y.end());
     }
     if (xs.empty() || ys.empty()) throw std::invalid_argument("a plot needs points");
-    const Axis x = axisOf(xs, panel.xTicks.empty(), left, panelWidth - right);
-    const Axis y = axisOf(ys, true, panelHeight - bottom, top);
+    const Axis x = panel.linear ? linearAxisOf(xs, left, panelWidth - right)
+                                : axisOf(xs, panel.xTicks.empty(), left, panelWidth - right);
+    const Axis y =
+        panel.linear ? linearAxisOf(ys, panelHeight - bottom, top) : axisOf(ys, true, panelHeight - bottom, top);
     const double middle = (x.from + x.to) / 2, centre = (y.from + y.to) / 2;
     std::string out = grid(panel, x, y) + rule(x.from, y.from, x.to, y.from, "#444") +
                       rule(x.from, y.from, x.from, y.to, "#444") + lines(panel, x, y);
@@ -141,4 +168,4 @@ void writeSvg(const std::filesystem::path& path, const std::vector<Panel>& panel
     if (!file.flush()) throw std::runtime_error("cannot write " + path.string());
 }
 
-}  // namespace bilayer::bench
+}  // namespace bilayer::demo

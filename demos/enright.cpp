@@ -1,0 +1,12 @@
+#include "demos/scenes/enright.h"
+
+#include "demos/shared/program.h"
+
+int main(int argc, char** argv) {
+    using namespace bilayer::demo;
+    EnrightOptions options;
+    Program program("enright", "A sphere and a bunny in Enright's swirl");
+    program.option("--resolution", options.resolution, "voxels along the unit cube")->check(CLI::Range(16, 1000));
+    program.option("--frames", options.framesPerSecond, "of the recording, a second")->check(CLI::Range(1, 100));
+    return program.run(argc, argv, [&] { return enright(options); });
+}

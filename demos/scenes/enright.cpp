@@ -1,0 +1,182 @@
+#include "demos/scenes/enright.h"
+
+#include <fmt/format.h>
+#include <openvdb/tools/Diagnostics.h>
+#include <openvdb/tools/LevelSetAdvect.h>
+#include <openvdb/tools/LevelSetMeasure.h>
+#include <openvdb/tools/LevelSetSphere.h>
+#include <openvdb/tools/MeshToVolume.h>
+
+#include <chrono>
+#include <cmath>
+
+#include "demos/scenes/bowl.h"
+#include "demos/shared/shapes.h"
+#include "demos/shared/surface_of.h"
+#include "integration/fluid/seed.h"
+
+namespace bilayer::demo {
+namespace {
+
+using openvdb::FloatGrid;
+
+constexpr float radius = 0.15f;     // of the sphere; half of the bunny's longest side
+constexpr glm::vec3 centre{0.35f};  // of both
+constexpr double period = 3;        // until all should be back [s]
+constexpr double pi = 3.14159265358979;
+constexpr int sphereLevels = 6;      // of triangles: they are finer than the voxels
+constexpr float adaptivity = 0.02f;  // of the surfaces that are recorded
+constexpr float apart = 1.1f;        // between the two cubes that are shown
+constexpr double noise = 0.5;        // between two seeds' losses [% of the volume]
+
+constexpr Look sphereLook{.colour = 0x3d87b8, .roughness = 0.25f, .clearcoat = 0.6f};
+constexpr Look bunnyLook{.colour = 0xe07a5f, .roughness = 0.25f, .clearcoat = 0.6f};
+
+using Field = openvdb::tools::DiscreteField<openvdb::Vec3SGrid>;
+using Advection = openvdb::tools::LevelSetAdvection<FloatGrid, Field>;
+
+// The swirl at its first moment, at each voxel of the unit cube.
+openvdb::Vec3SGrid::Ptr swirl(int resolution) {
+    const auto grid = openvdb::Vec3SGrid::create(openvdb::Vec3f(0));
+    grid->setTransform(openvdb::math::Transform::createLinearTransform(1.0 / resolution));
+    const openvdb::tools::EnrightField<float> field;
+    auto values = grid->getAccessor();
+    for (const openvdb::Coord& at : openvdb::CoordBBox(openvdb::Coord(0), openvdb::Coord(resolution)))
+        values.setValue(at, field(grid->indexToWorld(at), 0.f));
+    return grid;
+}
+
+// Later it is the same but for a factor, the cosine of half a turn in the whole period; so bodies are where the first
+// swirl alone takes them in the integral of that.
+float swirledUntil(double time) {
+    return float(period / pi * std::sin(pi * time / period));
+}
+
+// A seeded body on its way.
+struct Swirled {
+    std::string name;
+    FloatGrid::Ptr grid;
+    std::unique_ptr<Advection> advection{};
+    std::vector<double> volumes{};
+
+    Swirled(std::string name, FloatGrid::Ptr seeded, const openvdb::Vec3SGrid& velocity)
+        : name(std::move(name)), grid(std::move(seeded)) {
+        advection = std::make_unique<Advection>(*grid, Field(velocity));
+        advection->setSpatialScheme(openvdb::math::HJWENO5_BIAS);
+        advection->setTemporalScheme(openvdb::math::TVD_RK3);
+        advection->setTrackerSpatialScheme(openvdb::math::HJWENO5_BIAS);
+        advection->setTrackerTemporalScheme(openvdb::math::TVD_RK3);
+        measure();
+    }
+    void measure() { volumes.push_back(grid->activeVoxelCount() ? openvdb::tools::levelSetVolume(*grid) : 0); }
+    double lost() const { return 100 * (1 - volumes.back() / volumes.front()); }
+};
+
+FloatGrid::Ptr ours(const Mesh& mesh, float voxel) {
+    const FloatGrid::Ptr grid = openvdb::createLevelSet<FloatGrid>(double(voxel));
+    fluid::seed(*grid, mesh);
+    return grid;
+}
+
+FloatGrid::Ptr openVdbs(const Mesh& mesh, float voxel) {
+    std::vector<openvdb::Vec3s> points;
+    std::vector<openvdb::Vec3I> triangles;
+    for (const glm::vec3& p : mesh.points) points.emplace_back(p.x, p.y, p.z);
+    for (const glm::uvec3& t : mesh.triangles) triangles.emplace_back(t.x, t.y, t.z);
+    return openvdb::tools::meshToLevelSet<FloatGrid>(*openvdb::math::Transform::createLinearTransform(double(voxel)),
+                                                     points, triangles);
+}
+
+Mesh moved(Mesh mesh, float scale, const glm::vec3& to) {
+    const glm::vec3 from = bounds(mesh).centre();
+    for (glm::vec3& p : mesh.points) p = scale * (p - from) + to;
+    return mesh;
+}
+
+std::vector<Swirled> seeded(const openvdb::Vec3SGrid& velocity) {
+    const auto voxel = float(velocity.voxelSize()[0]);
+    const Mesh mesh = bunny().mesh, ball = moved(shapes::sphere(radius, sphereLevels), 1, centre),
+               hare = moved(mesh, 2 * radius / bounds(mesh).longestSide(), centre);
+    std::vector<Swirled> bodies;
+    bodies.emplace_back("sphere", ours(ball, voxel), velocity);
+    bodies.emplace_back("sphere by OpenVDB",
+                        openvdb::tools::createLevelSetSphere<FloatGrid>(radius, {centre.x, centre.y, centre.z}, voxel),
+                        velocity);
+    bodies.emplace_back("bunny", ours(hare, voxel), velocity);
+    bodies.emplace_back("bunny by OpenVDB", openVdbs(hare, voxel), velocity);
+    return bodies;
+}
+
+// What checkLevelSet finds, but for the slopes next to the surface.
+bool isLevelSet(const FloatGrid& grid) {
+    openvdb::tools::CheckLevelSet<FloatGrid> check(grid);
+    return grid.getGridClass() == openvdb::GRID_LEVEL_SET &&
+           (check.checkTiles() + check.checkFinite() + check.checkRange() + check.checkInactiveValues()).empty();
+}
+
+void keepFrame(Outcome& outcome, std::vector<Swirled>& bodies, double time) {
+    std::vector<double> row{time};
+    for (Swirled& body : bodies) row.push_back(body.volumes.back());
+    outcome.table.rows.push_back(std::move(row));
+    // both as seeded by us, side by side
+    std::vector<Mesh> surfaces{surfaceOf(*bodies[0].grid, adaptivity), surfaceOf(*bodies[2].grid, adaptivity)};
+    for (glm::vec3& p : surfaces[1].points) p.x += apart;
+    for (const Mesh& surface : surfaces) outcome.fingerprint = outcome.fingerprint * 31 + hash(surface);
+    outcome.recording.frame(time, {}, surfaces);
+}
+
+void judge(Outcome& outcome, const std::vector<Swirled>& bodies) {
+    Panel panel{"volume", "s", "% of the first", {}, {}, true};
+    int broken = 0;
+    for (const Swirled& body : bodies) {
+        Line line{body.name, {}, {}};
+        for (std::size_t i = 0; i < body.volumes.size(); ++i) {
+            line.x.push_back(outcome.table.rows[i][0]);
+            line.y.push_back(100 * body.volumes[i] / body.volumes[0]);
+        }
+        panel.lines.push_back(std::move(line));
+        outcome.facts.emplace_back(
+            body.name, fmt::format("{:.2f} % lost in the end, {} voxels", body.lost(), body.grid->activeVoxelCount()));
+        broken += !isLevelSet(*body.grid);
+    }
+    outcome.plots = {std::move(panel)};
+    outcome.facts.emplace_back("D. Enright et al. 2002, 100 voxels", "80 % by a level set alone, 2.6 % with particles");
+    outcome.criteria = {
+        {"sphere loses more than OpenVDB's", bodies[0].lost() - bodies[1].lost(), noise, "% of the volume"},
+        {"bunny loses more than OpenVDB's", bodies[2].lost() - bodies[3].lost(), noise, "% of the volume"},
+        {"that are no level sets in the end", double(broken), 0}};
+}
+
+}  // namespace
+
+Outcome enright(const EnrightOptions& options) {
+    const openvdb::Vec3SGrid::Ptr velocity = swirl(options.resolution);
+    Outcome outcome{Recording("A sphere and a bunny in Enright's swirl")};
+    outcome.title = "A sphere and a bunny in Enright's swirl";
+    outcome.voxelSize = 1.0 / options.resolution;
+    outcome.table.columns = {"time_s", "sphere", "sphere_by_openvdb", "bunny", "bunny_by_openvdb"};
+    outcome.recording.addChanging(sphereLook);
+    outcome.recording.addChanging(bunnyLook);
+    outcome.recording.view = {.target = {0.5f * (1 + apart), 0.5f, 0.45f}, .distance = 4.2f, .elevation = 0.35f};
+
+    std::vector<Swirled> bodies = seeded(*velocity);
+    keepFrame(outcome, bodies, 0);
+    const int frames = int(std::lround(period * options.framesPerSecond));
+    outcome.stepsPerSecond = float(options.framesPerSecond);
+    for (int frame = 1; frame <= frames; ++frame) {
+        const double before = double(frame - 1) / options.framesPerSecond,
+                     after = double(frame) / options.framesPerSecond;
+        const auto start = std::chrono::steady_clock::now();
+        for (Swirled& body : bodies) {
+            body.advection->advect(swirledUntil(before), swirledUntil(after));
+            body.measure();
+        }
+        const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - start;
+        outcome.stepMs.push_back(took.count());
+        keepFrame(outcome, bodies, after);
+    }
+    judge(outcome, bodies);
+    return outcome;
+}
+
+}  // namespace bilayer::demo

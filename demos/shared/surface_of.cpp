@@ -1,0 +1,17 @@
+#include "demos/shared/surface_of.h"
+
+#include <memory>
+
+#include "sdf/grids.h"
+#include "sdf/surface.h"
+
+namespace bilayer::demo {
+
+Mesh surfaceOf(const openvdb::FloatGrid& grid, float adaptivity) {
+    if (grid.activeVoxelCount() == 0) return {};
+    const auto grids = std::make_shared<Grids>();
+    grids->distance = grid.copy();
+    return surface(LevelSet(grids), {.adaptivity = adaptivity});
+}
+
+}  // namespace bilayer::demo

@@ -1,0 +1,105 @@
+// The small solver for liquids: what can be told of it without a computer.
+#include "demos/shared/water.h"
+
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <random>
+
+#include "collider/mass.h"
+#include "demos/shared/shapes.h"
+#include "demos/shared/surface_of.h"
+#include "integration/fluid/seed.h"
+#include "tests/support/support.h"
+
+using namespace bilayer;
+using openvdb::Coord;
+using openvdb::FloatGrid;
+
+namespace {
+
+constexpr int side = 24;             // cells along the box
+constexpr float voxel = 1.f / side;  // [m]
+
+openvdb::math::Transform::Ptr cells() {
+    return openvdb::math::Transform::createLinearTransform(double(voxel));
+}
+
+// All below a height [m].
+FloatGrid::Ptr pool(float height) {
+    const FloatGrid::Ptr liquid = openvdb::createLevelSet<FloatGrid>(double(voxel));
+    Mesh box = shapes::box({1, 1, 1});
+    for (glm::vec3& p : box.points) p += glm::vec3(0.5f, 0.5f, height - 1);
+    fluid::seed(*liquid, box);
+    return liquid;
+}
+
+fluid::Solid sphereAt(const glm::vec3& centre, const fluid::Velocity& velocity = {}) {
+    return fluid::solid(shapes::sphere(0.2f, 4), Pose{centre}, *cells(), {.velocity = velocity, .halfWidth = 6});
+}
+
+}  // namespace
+
+TEST_CASE("a pool stays at rest, around a body too, wherever its surface is between the cells") {
+    const float height = GENERATE(0.4f, 0.43f);
+    const bool around = GENERATE(false, true);
+    demo::Basin basin(*cells(), Coord(side));
+    if (around) basin.place(sphereAt({0.5f, 0.5f, 0.35f}));
+    demo::Water water(*pool(height), basin, {.restoring = 0});
+    for (int step = 0; step < 10; ++step) {
+        const demo::Projection projection = water.step(basin, 0.02f);
+        CHECK(projection.converged);
+        CHECK(projection.divergence < 1e-3);
+    }
+    CAPTURE(height, around);
+    // 0.2 s of falling would be 2 m/s
+    CHECK(water.fastest() < (around ? 0.05f : 0.002f));
+    CHECK(water.volume() == Approx(water.kept()).epsilon(around ? 2e-3 : 2e-4));
+}
+
+TEST_CASE("a drop falls as gravity says and keeps its volume") {
+    demo::Basin basin(*cells(), Coord(side));
+    const FloatGrid::Ptr drop = openvdb::createLevelSet<FloatGrid>(double(voxel));
+    fluid::seed(*drop, shapes::sphere(0.15f, 5), Pose{{0.5f, 0.5f, 0.7f}});
+    demo::Water water(*drop, basin, {.restoring = 0});
+    for (int step = 0; step < 20; ++step) water.step(basin, 0.01f);
+    const MassProperties mass = massProperties(demo::surfaceOf(water.shape()));
+    // after n steps of velocity first, then way: g dt^2 n (n - 1) / 2
+    CHECK(mass.centre.z == Approx(0.7f - 9.81f * 1e-4f * 190).margin(0.1 * double(voxel)));
+    CHECK(mass.centre.x == Approx(0.5f).margin(0.02 * double(voxel)));
+    CHECK(water.volume() == Approx(water.kept()).epsilon(0.01));
+}
+
+TEST_CASE("a pressure takes all divergence out, and leaves what moves with a body alone") {
+    const std::uint32_t seed = test::seed();
+    CAPTURE(seed);
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<float> speed(-1, 1);
+    const fluid::Velocity moving{{0.3f, -0.2f, 0.1f}, {0, 0, 2}};
+    demo::Basin basin(*cells(), Coord(side));
+    basin.place(sphereAt({0.5f, 0.5f, 0.3f}, moving));
+    demo::FaceVelocity velocity(*cells());
+    for (const auto& axis : velocity.axes) {
+        auto values = axis->getAccessor();
+        for (int x = 0; x <= side; ++x)
+            for (int y = 0; y <= side; ++y)
+                for (int z = 0; z <= side; ++z) values.setValue(Coord(x, y, z), speed(random));
+    }
+    const FloatGrid::Ptr liquid = pool(0.52f);
+    basin.continueBehindWalls(*liquid);
+    const double growth = GENERATE(0.0, 0.2);
+    demo::Pressure pressure;
+    const demo::Projection projection = pressure.project(velocity, *liquid, basin, growth);
+    CHECK(projection.converged);
+    CHECK(projection.divergence < 5e-3);  // of differences up to 6 / voxel = 144 1/s
+    // the whole: what leaves through the faces between liquid and air is what grows, and what the body displaces
+    CHECK(projection.cells > side * side * 8);
+}
+
+TEST_CASE("lost volume comes back in the time asked for") {
+    const demo::Basin basin(*cells(), Coord(side));
+    const double first = demo::Water(*pool(0.4f), basin).volume(), whole = 1.05 * first;
+    demo::Water water(*pool(0.4f), basin, {.restoring = 0.1f, .volume = whole});
+    for (int step = 0; step < 25; ++step) water.step(basin, 0.02f);
+    CHECK(water.volume() == Approx(whole).epsilon(5e-3));
+    CHECK(water.restored() == Approx(whole - first).epsilon(0.1));
+}
