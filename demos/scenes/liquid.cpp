@@ -29,6 +29,7 @@ constexpr float skin = 6;                                                       
 constexpr float mostCells = 2;                                                   // that the liquid moves in a step
 constexpr float glass = 0.012f;                                                  // thickness of the tank's walls [m]
 constexpr float glassGap = 0.002f;  // between the liquid and the walls that are shown [m]
+constexpr float pictured = 0.4f;    // the moment of the picture [s]
 constexpr double turn = 6.283185307;
 
 constexpr double mostOff = 3, mostOffInTheEnd = 1;  // of the volume [%]
@@ -223,7 +224,8 @@ class Scene {
                                    .distance = 2.9f,
                                    .azimuth = -1.15f,
                                    .elevation = 0.42f,
-                                   .groundHeight = tank_.lower().z - glassGap - glass};
+                                   .groundHeight = tank_.lower().z - glassGap - glass,
+                                   .moment = pictured};
         outcome_.recording.note("cells of liquid", std::to_string(cells_));
         outcome_.recording.note("time per step", fmt::format("{:.0f} ms", outcome_.medianStep()));
         return std::move(outcome_);

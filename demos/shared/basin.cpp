@@ -22,7 +22,8 @@ using openvdb::Vec3f;
 using openvdb::Vec3SGrid;
 
 constexpr int behind = 4;           // voxels and faces behind the box's walls that are mirrored
-constexpr float skin = 3.5f;        // of the body that is mirrored [voxels]
+constexpr double outside = 0.5;     // of the body: where its skin reads the level set [voxels]
+constexpr float skin = 3.5f;        // of the body in which the level set goes on [voxels]
 constexpr float halfWidth = 3;      // of the box's level set [voxels]
 constexpr float leastOpen = 0.02f;  // part of a face: through less, pressures find speeds that mean nothing
 constexpr double flat = 1e-3;       // slope of a distance below which it has no direction
@@ -117,7 +118,7 @@ void Basin::place(const fluid::Solid& solid) {
 
 void Basin::continueBehindWalls(FloatGrid& liquid) const {
     const FloatGrid::Ptr before = liquid.deepCopy();
-    mirrorInBody(liquid, *before);
+    continueInBody(liquid, *before);
     const auto known = liquid.getConstAccessor();
     auto values = liquid.getAccessor();
     const CoordBBox whole = withWalls(box_);
@@ -131,8 +132,9 @@ void Basin::continueBehindWalls(FloatGrid& liquid) const {
     }
 }
 
-// In the body's skin a level set gets the value that it has as far outside.
-void Basin::mirrorInBody(FloatGrid& liquid, const FloatGrid& before) const {
+// In the body's skin a level set goes on as it rises or falls outside along the normal, so that it meets the body at
+// any angle.
+void Basin::continueInBody(FloatGrid& liquid, const FloatGrid& before) const {
     const double voxel = liquid.voxelSize()[0];
     const float far = liquid.background();
     const auto known = before.getConstAccessor(), distance = solid_.distance->getConstAccessor();
@@ -141,7 +143,9 @@ void Basin::mirrorInBody(FloatGrid& liquid, const FloatGrid& before) const {
         const double depth = -double(*cell) / voxel;
         if (depth < 0 || depth > skin || !box_.isInside(cell.getCoord())) continue;
         const Vec3d at = cell.getCoord().asVec3d(), normal = normalAt(distance, at, voxel);
-        const float value = openvdb::tools::BoxSampler::sample(known, at + 2 * depth * normal);
+        const double reach = depth + outside;
+        const float value = 2 * openvdb::tools::BoxSampler::sample(known, at + reach * normal) -
+                            openvdb::tools::BoxSampler::sample(known, at + 2 * reach * normal);
         if (std::abs(value) < far)
             values.setValue(cell.getCoord(), value);
         else

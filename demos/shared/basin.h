@@ -23,8 +23,8 @@ class Basin {
     /// Of the body across each face in its band, else 0 [m/s]; staggered.
     const openvdb::Vec3SGrid& bodyVelocity() const { return *solid_.velocity; }
 
-    /// Lets a level set go on behind walls and in the body as if these were mirrors, so that the surface meets them at
-    /// a right angle, and what lies at a wall has no surface there.
+    /// Lets a level set go on behind walls as if these were mirrors, and in the body's skin by its slope outside, so
+    /// that what lies at a wall has no surface there.
     void continueBehindWalls(openvdb::FloatGrid& liquid) const;
     /// The same for its velocity, which then neither enters nor leaves: the part along a normal is turned around behind
     /// the box's walls, and is the body's own in the body.
@@ -34,7 +34,7 @@ class Basin {
     openvdb::FloatGrid::Ptr inside(const openvdb::FloatGrid& liquid) const;
 
   private:
-    void mirrorInBody(openvdb::FloatGrid& liquid, const openvdb::FloatGrid& before) const;
+    void continueInBody(openvdb::FloatGrid& liquid, const openvdb::FloatGrid& before) const;
     void slideAlongBody(FaceVelocity& velocity) const;
 
     openvdb::CoordBBox box_;
