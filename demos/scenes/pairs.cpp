@@ -38,7 +38,7 @@ constexpr float fall = 0.2f;                            // from above [voxels]
 constexpr float rolling = 0.02f;                        // friction: balls of triangles would roll off what they lie on
 constexpr float lane = 2;
 constexpr float spacing = 1;  // of surface points: a ball sinks in between them [voxels]
-constexpr int columns = 16;   // of the table
+constexpr int columns = 16;   // of the board
 constexpr int framesPerMeasuring = 30;
 constexpr int samplesAlong = 9;  // of a height field
 constexpr float mass = 2;        // at scale 1: it grows with the scale, since Bullet takes small inverses for zero [kg]
@@ -164,7 +164,7 @@ class Maker {
                 part("compound", slab, {compound, &compound->shape}, halfThickness),
                 fieldSlab()};
     }
-    // Under all that is on the table.
+    // Under all that is on the board.
     Part ground() const {
         const float half = 0.5f * lane * columns, thin = halfThickness / 4;
         const auto plane = std::make_shared<btStaticPlaneShape>(btVector3(0, 0, 1), -s_ * halfThickness);
@@ -256,9 +256,9 @@ std::string nameOf(State state) {
 }
 
 // Lays parts on others, place by place.
-class Table {
+class Board {
   public:
-    Table(Stage& stage, const PairsOptions& options)
+    Board(Stage& stage, const PairsOptions& options)
         : stage_(stage), scale_(options.scale), every_(options.every), only_(options.only) {}
 
     /// An infinite plane: everything else must lie above.
@@ -326,16 +326,16 @@ struct Parts {
 };
 
 // All pairs whose upper, or lower, part was there first.
-void addAll(Table& table, const Parts& parts, bool upperFirst) {
+void addAll(Board& board, const Parts& parts, bool upperFirst) {
     const auto& [fields, shapes, tops, slab, plane] = parts;
     for (const State state : {State::fixed, State::kinematic}) {
         for (const Part& lower : tops)
-            for (const Part& upper : fields) table.add(upper, lower, state, upperFirst);
-        for (const Part& upper : shapes) table.add(upper, slab, state, upperFirst);
+            for (const Part& upper : fields) board.add(upper, lower, state, upperFirst);
+        for (const Part& upper : shapes) board.add(upper, slab, state, upperFirst);
     }
-    for (const Part& upper : fields) table.add(upper, plane, State::fixed, upperFirst);
+    for (const Part& upper : fields) board.add(upper, plane, State::fixed, upperFirst);
     for (const auto* uppers : {&fields, &shapes})
-        for (const Part& upper : *uppers) table.add(upper, slab, State::moving, upperFirst);
+        for (const Part& upper : *uppers) board.add(upper, slab, State::moving, upperFirst);
 }
 
 // Between an axis of a body that was upright or level at the start, and what it should be [degrees].
@@ -355,17 +355,17 @@ Outcome pairs(const PairsOptions& options) {
                 {.stepsPerSecond = options.stepsPerSecond, .framesPerMeasuring = framesPerMeasuring});
     const Maker maker(scale);
     const Parts parts(maker);
-    Table table(stage, options);
+    Board board(stage, options);
     // a pair's order is that in which bodies were added
-    addAll(table, parts, true);
-    table.addGround(maker.ground());
-    addAll(table, parts, false);
+    addAll(board, parts, true);
+    board.addGround(maker.ground());
+    addAll(board, parts, false);
     stage.run(options.seconds * std::max(1.f, std::sqrt(scale)));
 
     double worstHeight = 0, worstTilt = 0;
     std::vector<std::pair<std::string, std::string>> missed;
     const std::vector<Pose> poses = stage.world().poses();
-    for (const Cell& cell : table.cells()) {
+    for (const Cell& cell : board.cells()) {
         const Pose& pose = poses[cell.upper];
         const double height = (double(pose.position.z) - cell.height) / (scale * voxel), tilt = tiltOf(pose, cell.axis);
         worstHeight = worse(worstHeight, std::abs(height));
@@ -378,7 +378,7 @@ Outcome pairs(const PairsOptions& options) {
                                     .distance = 1.4f * width,
                                     .elevation = 0.7f,
                                     .groundHeight = -scale * halfThickness});
-    outcome.facts = {{"pairs", std::to_string(table.cells().size())}};
+    outcome.facts = {{"pairs", std::to_string(board.cells().size())}};
     outcome.facts.insert(outcome.facts.end(), missed.begin(), missed.end());
     outcome.criteria = {{"height off", worstHeight, mostOff, "voxels"},
                         {"tilt", worstTilt, mostOff, "degrees"},
