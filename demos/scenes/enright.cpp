@@ -28,6 +28,7 @@ constexpr int sphereLevels = 6;      // of triangles: they are finer than the vo
 constexpr float adaptivity = 0.02f;  // of the surfaces that are recorded
 constexpr float apart = 1.1f;        // between the two cubes that are shown
 constexpr double noise = 0.5;        // between two seeds' losses [% of the volume]
+constexpr float pictured = 0.9f;     // the moment of the picture [s]
 
 constexpr Look sphereLook{.colour = 0x3d87b8, .roughness = 0.25f, .clearcoat = 0.6f};
 constexpr Look bunnyLook{.colour = 0xe07a5f, .roughness = 0.25f, .clearcoat = 0.6f};
@@ -157,7 +158,8 @@ Outcome enright(const EnrightOptions& options) {
     outcome.table.columns = {"time_s", "sphere", "sphere_by_openvdb", "bunny", "bunny_by_openvdb"};
     outcome.recording.addChanging(sphereLook);
     outcome.recording.addChanging(bunnyLook);
-    outcome.recording.view = {.target = {0.5f * (1 + apart), 0.5f, 0.45f}, .distance = 4.2f, .elevation = 0.35f};
+    outcome.recording.view = {
+        .target = {0.5f * (1 + apart), 0.5f, 0.45f}, .distance = 3.2f, .elevation = 0.35f, .moment = pictured};
 
     std::vector<Swirled> bodies = seeded(*velocity);
     keepFrame(outcome, bodies, 0);
