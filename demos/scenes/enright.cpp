@@ -142,10 +142,9 @@ void judge(Outcome& outcome, const std::vector<Swirled>& bodies) {
     }
     outcome.plots = {std::move(panel)};
     outcome.facts.emplace_back("D. Enright et al. 2002, 100 voxels", "80 % by a level set alone, 2.6 % with particles");
-    outcome.criteria = {
-        {"sphere loses more than OpenVDB's", bodies[0].lost() - bodies[1].lost(), noise, "% of the volume"},
-        {"bunny loses more than OpenVDB's", bodies[2].lost() - bodies[3].lost(), noise, "% of the volume"},
-        {"that are no level sets in the end", double(broken), 0}};
+    outcome.criteria = {{"sphere loses more than OpenVDB's", bodies[0].lost() - bodies[1].lost(), noise, "%"},
+                        {"bunny loses more than OpenVDB's", bodies[2].lost() - bodies[3].lost(), noise, "%"},
+                        {"that are no level sets in the end", double(broken), 0}};
 }
 
 }  // namespace

@@ -215,7 +215,7 @@ class Scene {
             {"volume off by", off, mostOff, "%"},
             {"volume off in the end", std::abs(100 * (rows.back()[1] / first - 1)), mostOffInTheEnd, "%"},
             {"surface in the knot", faults_.depth / double(tank_.voxel), mostDepth, "voxels"},
-            {"liquid in the knot, over its surface", faults_.within * first / areaOf(knot_.mesh) / double(tank_.voxel),
+            {"liquid in the knot, in the mean", faults_.within * first / areaOf(knot_.mesh) / double(tank_.voxel),
              mostWithin, "voxels"},
             {"surface behind the walls", faults_.beyond / double(tank_.voxel), mostDepth, "voxels"},
             {"divergence left in a step", divergence_, mostDivergence},
