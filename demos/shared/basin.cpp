@@ -100,8 +100,21 @@ Basin::Basin(const openvdb::math::Transform& cells, const Coord& size)
       open_(empty_),
       solid_{openvdb::createLevelSet<FloatGrid>(cells.voxelSize()[0]), Vec3SGrid::create(Vec3f(0)), nullptr, nullptr} {}
 
+// The body's velocity, but for faces in the box's walls, which do not move however near the body is.
+Vec3SGrid::Ptr Basin::besideWalls(const Vec3SGrid& bodyVelocity) const {
+    const Vec3SGrid::Ptr result = bodyVelocity.deepCopy();
+    for (auto face = result->beginValueOn(); face; ++face) {
+        Vec3f speed = *face;
+        for (int axis = 0; axis < 3; ++axis)
+            if (face.getCoord()[axis] <= box_.min()[axis] || face.getCoord()[axis] > box_.max()[axis]) speed[axis] = 0;
+        face.setValue(speed);
+    }
+    return result;
+}
+
 void Basin::place(const fluid::Solid& solid) {
     solid_ = solid;
+    solid_.velocity = besideWalls(*solid.velocity);
     open_ = empty_->deepCopy();
     auto open = open_->getAccessor();
     for (auto faces = solid.openFaces->cbeginValueOn(); faces; ++faces) {

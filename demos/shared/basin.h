@@ -20,7 +20,7 @@ class Basin {
     const openvdb::CoordBBox& box() const { return box_; }
     /// The part of each face that liquid can cross, 0..1; staggered, 0 outside the box.
     const openvdb::Vec3SGrid& open() const { return *open_; }
-    /// Of the body across each face in its band, else 0 [m/s]; staggered.
+    /// Of the body across each face in its band and not in the box's walls, else 0 [m/s]; staggered.
     const openvdb::Vec3SGrid& bodyVelocity() const { return *solid_.velocity; }
 
     /// Lets a level set go on behind walls as if these were mirrors, and in the body's skin by its slope outside, so
@@ -34,6 +34,7 @@ class Basin {
     openvdb::FloatGrid::Ptr inside(const openvdb::FloatGrid& liquid) const;
 
   private:
+    openvdb::Vec3SGrid::Ptr besideWalls(const openvdb::Vec3SGrid& bodyVelocity) const;
     void continueInBody(openvdb::FloatGrid& liquid, const openvdb::FloatGrid& before) const;
     void slideAlongBody(FaceVelocity& velocity) const;
 

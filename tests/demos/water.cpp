@@ -56,6 +56,15 @@ TEST_CASE("a pool stays at rest, around a body too, wherever its surface is betw
     CHECK(water.volume() == Approx(water.kept()).epsilon(around ? 2e-3 : 2e-4));
 }
 
+TEST_CASE("a ball that spins beside a wall leaves a pool at rest") {
+    demo::Basin basin(*cells(), Coord(side));
+    basin.place(sphereAt({0.3f, 0.5f, 0.3f}, {{}, {0, 0, 6}}));  // its distances reach into the wall
+    demo::Water water(*pool(0.4f), basin, {.restoring = 0});
+    for (int step = 0; step < 5; ++step) water.step(basin, 0.02f);
+    CHECK(water.fastest() < 0.4f);  // the ball has 1.2 m/s, and faces that it all but closes follow it
+    CHECK(water.volume() == Approx(water.kept()).epsilon(2e-3));
+}
+
 TEST_CASE("a drop falls as gravity says and keeps its volume") {
     demo::Basin basin(*cells(), Coord(side));
     const FloatGrid::Ptr drop = openvdb::createLevelSet<FloatGrid>(double(voxel));
