@@ -180,7 +180,7 @@ TEST_CASE("a liquid bunny keeps its volume and stays out of the knot") {
     options.framesPerSecond = 10;
     const Outcome outcome = demo::liquid(options);
     judgeOnce(outcome);
-    CHECK(outcome.table.rows.size() == 5);
+    CHECK(outcome.table.rows.size() == 8);
     // without what gives it back, the loss is there to be seen
     options.restoring = 0;
     CHECK_FALSE(demo::liquid(options).criterion("volume off in the end").met());
