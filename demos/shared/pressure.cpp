@@ -8,7 +8,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 #include <utility>
+#include <vector>
 
 namespace bilayer::demo {
 namespace {
@@ -27,6 +29,7 @@ using Matrix = poisson::LaplacianMatrix;
 constexpr double leastDistance = 0.02;  // of the surface from a liquid cell's centre, where it divides [voxels]
 constexpr double tolerance = 1e-5;      // of the divergence, in parts of its largest
 constexpr int mostIterations = 1000;
+constexpr double towardsZero = 1e-6;  // how much pressures are drawn there, where no surface tells them
 
 // All that the equations of a cell read; one for each thread.
 struct Reader {
@@ -87,9 +90,11 @@ Int32Tree::Ptr cellsOf(const FloatGrid& liquid, const Basin& basin) {
     return poisson::createIndexTree(mask->tree());
 }
 
-void fillRow(const Reader& read, const Coord& cell, int index, Matrix& matrix) {
+// Returns whether the cell has a way to the surface by a face of its own.
+bool fillRow(const Reader& read, const Coord& cell, int index, Matrix& matrix) {
     Matrix::RowEditor row = matrix.getRowEditor(pcg::SizeType(index));
     double diagonal = 0;
+    bool atSurface = false;
     for (int axis = 0; axis < 3; ++axis)
         for (const int side : {0, 1}) {
             Coord face = cell, neighbour = cell;
@@ -103,9 +108,51 @@ void fillRow(const Reader& read, const Coord& cell, int index, Matrix& matrix) {
                 diagonal += part;
             } else {
                 diagonal += part / read.surfaceBetween(cell, neighbour);
+                atSurface = true;
             }
         }
     row.setValue(pcg::SizeType(index), diagonal);
+    return atSurface;
+}
+
+// The equations: what the pressures of cells make of their outflow.
+struct System {
+    explicit System(pcg::SizeType cells) : matrix(cells), outflow(cells), wanted(cells), atSurface(cells) {}
+
+    Matrix matrix;
+    Vector outflow, wanted;       // before, and to be [m/s]
+    std::vector<char> atSurface;  // whether a cell has a way to it by a face of its own
+};
+
+// Liquid that is closed in, without a surface, has no room to grow, and pressures that may all be higher by any number:
+// its cells share what they cannot let out, and are drawn a little to the pressure 0.
+void closePockets(System& system) {
+    const auto count = system.matrix.numRows();
+    std::vector<pcg::SizeType> parent(count), cells(count);
+    std::iota(parent.begin(), parent.end(), 0);
+    const auto pocketOf = [&](pcg::SizeType cell) {
+        while (parent[cell] != cell) cell = parent[cell] = parent[parent[cell]];
+        return cell;
+    };
+    for (pcg::SizeType cell = 0; cell < count; ++cell)
+        for (auto value = system.matrix.getConstRow(cell).cbegin(); value; ++value)
+            parent[pocketOf(value.column())] = pocketOf(cell);
+
+    std::vector<char> open(count);
+    std::vector<double> outflow(count);
+    for (pcg::SizeType cell = 0; cell < count; ++cell) {
+        const pcg::SizeType pocket = pocketOf(cell);
+        open[pocket] |= system.atSurface[cell];
+        outflow[pocket] += system.outflow[cell];
+        ++cells[pocket];
+    }
+    for (pcg::SizeType cell = 0; cell < count; ++cell) {
+        const pcg::SizeType pocket = pocketOf(cell);
+        if (open[pocket]) continue;
+        system.wanted[cell] = outflow[pocket] / double(cells[pocket]);
+        const double diagonal = system.matrix.getConstRow(cell).getValue(cell);
+        system.matrix.getRowEditor(cell).setValue(cell, (1 + towardsZero) * diagonal);
+    }
 }
 
 // The faces of the liquid's cells, sped up by the difference of the pressures at either side.
@@ -142,11 +189,11 @@ void accelerate(FaceVelocity& velocity, const FloatGrid& liquid, const Basin& ba
 }
 
 double worstOutflow(const FaceVelocity& velocity, const FloatGrid& liquid, const Basin& basin, const Int32Tree& cells,
-                    double wanted) {
+                    const Vector& wanted) {
     const Reader read(velocity, liquid, basin, cells);
     double worst = 0;
     for (auto cell = cells.cbeginValueOn(); cell; ++cell)
-        worst = std::max(worst, std::abs(read.outflow(cell.getCoord()) - wanted));
+        worst = std::max(worst, std::abs(read.outflow(cell.getCoord()) - wanted[pcg::SizeType(*cell)]));
     return worst;
 }
 
@@ -159,27 +206,31 @@ Projection Pressure::project(FaceVelocity& velocity, const FloatGrid& liquid, co
     if (count == 0) return {};
 
     // pressures are scaled: their differences are changes of speed [m/s]
-    Matrix matrix(count);
-    Vector outflow(count);
+    System system(count);
     openvdb::tree::LeafManager<const Int32Tree> leaves(*cells);
     leaves.foreach ([&](const Int32Tree::LeafNodeType& leaf, std::size_t) {
         const Reader read(velocity, liquid, basin, *cells);
         for (auto cell = leaf.cbeginValueOn(); cell; ++cell) {
-            fillRow(read, cell.getCoord(), *cell, matrix);
-            outflow[pcg::SizeType(*cell)] = growth * voxel - read.outflow(cell.getCoord());
+            const auto index = pcg::SizeType(*cell);
+            system.atSurface[index] = fillRow(read, cell.getCoord(), *cell, system.matrix);
+            system.outflow[index] = read.outflow(cell.getCoord());
+            system.wanted[index] = growth * voxel;
         }
     });
+    closePockets(system);
+    Vector change(count);
+    for (pcg::SizeType i = 0; i < count; ++i) change[i] = system.wanted[i] - system.outflow[i];
 
     pcg::State limits = pcg::terminationDefaults<double>();
     limits.iterations = mostIterations;
     limits.relativeError = tolerance;
-    pcg::IncompleteCholeskyPreconditioner<Matrix> preconditioner(matrix);
+    pcg::IncompleteCholeskyPreconditioner<Matrix> preconditioner(system.matrix);
     const Vector::Ptr pressure = poisson::createVectorFromTree<double>(*last_, *cells);
-    const pcg::State state = pcg::solve(matrix, outflow, *pressure, preconditioner, std::as_const(limits));
+    const pcg::State state = pcg::solve(system.matrix, change, *pressure, preconditioner, std::as_const(limits));
     last_ = poisson::createTreeFromVector<double>(*pressure, *cells, 0.0);
 
     accelerate(velocity, liquid, basin, *cells, *pressure);
-    return {int(count), state.iterations, worstOutflow(velocity, liquid, basin, *cells, growth * voxel) / voxel,
+    return {int(count), state.iterations, worstOutflow(velocity, liquid, basin, *cells, system.wanted) / voxel,
             state.success};
 }
 

@@ -12,9 +12,10 @@
 namespace bilayer::demo {
 
 struct Projection {
-    int cells = 0;          ///< of liquid
-    int iterations = 0;     ///< of the conjugate gradients
-    double divergence = 0;  ///< what remains in the worst cell [1/s]
+    int cells = 0;       ///< of liquid
+    int iterations = 0;  ///< of the conjugate gradients
+    double divergence =
+        0;  ///< what remains in the worst cell, but for what liquid without a surface cannot let out [1/s]
     bool converged = true;
 };
 

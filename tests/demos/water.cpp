@@ -104,6 +104,27 @@ TEST_CASE("a pressure takes all divergence out, and leaves what moves with a bod
     CHECK(projection.cells > side * side * 8);
 }
 
+TEST_CASE("liquid without a surface keeps its volume, whatever growth is asked for") {
+    const std::uint32_t seed = test::seed();
+    CAPTURE(seed);
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<float> speed(-1, 1);
+    const demo::Basin basin(*cells(), Coord(side));
+    demo::FaceVelocity velocity(*cells());
+    for (int axis = 0; axis < 3; ++axis) {
+        auto values = velocity.axes[std::size_t(axis)]->getAccessor();
+        for (auto face = basin.box().begin(); face; ++face) values.setValue(*face, speed(random));
+    }
+    const FloatGrid::Ptr liquid = pool(1.5f);  // over the brim
+    basin.continueBehindWalls(*liquid);
+    demo::Pressure pressure;
+    const demo::Projection projection = pressure.project(velocity, *liquid, basin, 0.2);
+    CHECK(projection.cells == side * side * side);
+    CHECK(projection.converged);
+    CHECK(projection.iterations < 200);
+    CHECK(projection.divergence < 5e-3);
+}
+
 TEST_CASE("lost volume comes back in the time asked for") {
     const demo::Basin basin(*cells(), Coord(side));
     const double first = demo::Water(*pool(0.4f), basin).volume(), whole = 1.05 * first;
