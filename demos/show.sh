@@ -24,7 +24,7 @@ rm -f "$out/$name.png"
 page=$(realpath "$out/$name.html")
 chromium --headless --no-sandbox --use-angle=swiftshader --enable-unsafe-swiftshader --disable-quic --no-first-run \
   --disable-background-networking --disable-component-update --disable-sync --hide-scrollbars --window-size=1600,1000 \
-  --user-data-dir="$profile" --screenshot="$(realpath "$out")/$name.png" "file://$page#still&samples=32" \
+  --user-data-dir="$profile" --screenshot="$(realpath "$out")/$name.png" "file://$page#still&samples=32&width=1600&height=1000" \
   >"$profile/log" 2>&1 || true
 if [[ ! -s $out/$name.png ]]; then
   echo "show.sh: Chromium took no picture of $page; its last words:" >&2
