@@ -16,6 +16,9 @@ namespace {
 
 // Normals within about 25 degrees go into one patch: flat enough for four points to carry it.
 constexpr float sameDirection = 0.9f;
+// Those of a patch that goes on from the last step stay within about 32 degrees: its direction is that of the contacts
+// that were kept, and trembles with them, but which contacts belong together must not.
+constexpr float stillSameDirection = 0.85f;
 // More patches than any resting body needs; contacts of further directions join the patch that suits them best.
 constexpr std::size_t mostPatches = 8;
 // A patch of the last step goes on until its normal is within about 15 degrees of another's.
@@ -99,6 +102,7 @@ std::vector<glm::vec3> directionsOf(const std::vector<Contact>& contacts, const 
 
 std::vector<Group> groupByNormal(const std::vector<Contact>& contacts, const Memory& memory) {
     std::vector<glm::vec3> directions = directionsOf(contacts, memory);
+    const std::size_t goingOn = memory.groups() > 0 ? directions.size() : 0;
     const auto nearest = [&](const glm::vec3& normal) {
         std::pair<float, std::size_t> best{-2.f, 0};
         for (std::size_t g = 0; g < directions.size(); ++g)
@@ -108,7 +112,8 @@ std::vector<Group> groupByNormal(const std::vector<Contact>& contacts, const Mem
     std::vector<Group> groups(directions.size());
     for (std::uint32_t i = 0; i < contacts.size(); ++i) {
         const auto [cosine, best] = nearest(contacts[i].normal);
-        if (cosine < sameDirection && groups.size() < mostPatches) {
+        const float same = best < goingOn ? stillSameDirection : sameDirection;
+        if (cosine < same && groups.size() < mostPatches) {
             directions.push_back(contacts[i].normal);
             groups.push_back({i});
         } else {
