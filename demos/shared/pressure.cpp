@@ -155,6 +155,22 @@ void closePockets(System& system) {
     }
 }
 
+// OpenVDB gives up where the residual has doubled since it was least, as it may for a while with conjugate gradients;
+// they begin anew from there.
+pcg::State solve(const Matrix& matrix, const Vector& change, Vector& pressure) {
+    pcg::IncompleteCholeskyPreconditioner<Matrix> preconditioner(matrix);
+    pcg::State limits = pcg::terminationDefaults<double>(), state;
+    limits.relativeError = tolerance;
+    int iterations = 0;
+    do {
+        limits.iterations = mostIterations - iterations;
+        state = pcg::solve(matrix, change, pressure, preconditioner, std::as_const(limits));
+        iterations += state.iterations;
+    } while (!state.success && iterations < mostIterations);
+    state.iterations = iterations;
+    return state;
+}
+
 // The faces of the liquid's cells, sped up by the difference of the pressures at either side.
 void accelerate(FaceVelocity& velocity, const FloatGrid& liquid, const Basin& basin, const Int32Tree& cells,
                 const Vector& pressure) {
@@ -221,12 +237,8 @@ Projection Pressure::project(FaceVelocity& velocity, const FloatGrid& liquid, co
     Vector change(count);
     for (pcg::SizeType i = 0; i < count; ++i) change[i] = system.wanted[i] - system.outflow[i];
 
-    pcg::State limits = pcg::terminationDefaults<double>();
-    limits.iterations = mostIterations;
-    limits.relativeError = tolerance;
-    pcg::IncompleteCholeskyPreconditioner<Matrix> preconditioner(system.matrix);
     const Vector::Ptr pressure = poisson::createVectorFromTree<double>(*last_, *cells);
-    const pcg::State state = pcg::solve(system.matrix, change, *pressure, preconditioner, std::as_const(limits));
+    const pcg::State state = solve(system.matrix, change, *pressure);
     last_ = poisson::createTreeFromVector<double>(*pressure, *cells, 0.0);
 
     accelerate(velocity, liquid, basin, *cells, *pressure);
