@@ -333,8 +333,8 @@ std::string textTable3(const json& data) {
            (hosts.empty()
                 ? ""
                 : fmt::format("\nThe prism method needs the neighbours of each triangle, which the host finds: "
-                              "most of its whole build of {} is the host's.\n",
-                              fmt::join(hosts, ", ")));
+                              "the larger part of its whole build is the host's where the model is {}.\n",
+                              fmt::join(hosts, " or ")));
 }
 
 std::vector<std::string> behindTable3(const json& data) {
