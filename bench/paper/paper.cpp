@@ -128,8 +128,7 @@ std::string opening() {
         "stand in `bench/paper/published.h`, all others are measured. [method.md](method.md) tells how the method is "
         "done here.\n\nThe paper ran on a {} and a {}. Its grids span a box of side {}: that is deduced from its "
         "steps and numbers of nodes, all but one of which agree. How much of it a model fills is not told: here all "
-        "but "
-        "{} steps on each side.\n",
+        "but {} steps on each side.\n",
         published::processor, published::gpu, boxSide, marginNodes);
 }
 
