@@ -1,7 +1,9 @@
 // What the double layer method's distances are worth: Table 1, and K.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
+#include <glm/geometric.hpp>
 
 #include "bench/measure.h"
 #include "bench/paper/markdown.h"
@@ -60,6 +62,15 @@ Errors errors(const LevelSet& field, const DenseField& truth) {
     return result;
 }
 
+double area(const Mesh& mesh) {
+    double sum = 0;
+    for (const glm::uvec3& t : mesh.triangles) {
+        const glm::dvec3 a(mesh.points[t.x]), b(mesh.points[t.y]), c(mesh.points[t.z]);
+        sum += 0.5 * glm::length(glm::cross(b - a, c - a));
+    }
+    return sum;
+}
+
 Mesh moved(Mesh mesh, float by) {
     for (glm::vec3& p : mesh.points) p += by;
     return mesh;
@@ -77,8 +88,10 @@ json measureTable1(const Run& run) {
     for (const published::Error& paper : published::table1) {
         const Lattice lattice = latticeOf(paper.nodes);
         const Mesh mesh = fitted(bunny->mesh, lattice);
-        json row{{"nodes", paper.nodes}, {"step", lattice.step}};
         const DenseField layers = denseDoubleLayer(mesh, lattice);
+        json row{{"nodes", paper.nodes},
+                 {"step", lattice.step},
+                 {"perEpsilon", double(layers.samples) * double(lattice.step) * double(lattice.step) / area(mesh)}};
         {
             const DenseField truth = scatterPseudonormal(mesh, lattice, reached);
             row["all"] = errors(layers, truth, noLimit).toJson();
@@ -93,23 +106,38 @@ json measureTable1(const Run& run) {
     return {{"rows", rows}, {"triangles", bunny->mesh.triangles.size()}, {"origin", bunny->origin}};
 }
 
-// The power of the step that an error goes with.
-double order(const json& rows, const char* which, const char* norm) {
+// The power of the step that an error goes with; "-" where the error does not fall from grid to grid.
+std::string order(const std::vector<double>& steps, const std::vector<double>& errors) {
+    if (!std::is_sorted(errors.rbegin(), errors.rend())) return "-";
+    return fmt::format("{:.2f}", logSlope(steps, errors));
+}
+
+std::string order(const json& rows, const char* which, const char* norm) {
     std::vector<double> steps, values;
     for (const json& row : rows) {
         steps.push_back(row["step"]);
         values.push_back(double(row[which][norm]) * double(row["step"]));
     }
-    return logSlope(steps, values);
+    return order(steps, values);
 }
 
-double papersOrder(double published::Error::*norm) {
+std::string papersOrder(double published::Error::*norm) {
     std::vector<double> steps, values;
     for (const published::Error& row : published::table1) {
         steps.push_back(row.step);
         values.push_back(row.*norm);
     }
-    return logSlope(steps, values);
+    return order(steps, values);
+}
+
+// "6.9, 2.1, 1.47 and 0.83" of rows; nothing where a row has no such number.
+std::string listed(const json& rows, const char* what) {
+    std::string text;
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+        if (!rows[i].contains(what)) return "";
+        text += (i == 0 ? "" : i + 1 < rows.size() ? ", " : " and ") + digits(rows[i][what], 2);
+    }
+    return text;
 }
 
 std::string textTable1(const json& data) {
@@ -136,17 +164,15 @@ std::string textTable1(const json& data) {
         least = std::min(least, paper.mean / paper.step);
         most = std::max(most, paper.mean / paper.step);
     }
-    metres.push_back({"order", "", fmt::format("{:.2f}", papersOrder(&published::Error::worst)),
-                      fmt::format("{:.2f}", order(data["rows"], "all", "worst")),
-                      fmt::format("{:.2f}", papersOrder(&published::Error::mean)),
-                      fmt::format("{:.2f}", order(data["rows"], "all", "mean")),
-                      fmt::format("{:.2f}", order(data["rows"], "blocks", "worst")),
-                      fmt::format("{:.2f}", order(data["rows"], "blocks", "mean")), "-"});
+    metres.push_back({"order", "", papersOrder(&published::Error::worst), order(data["rows"], "all", "worst"),
+                      papersOrder(&published::Error::mean), order(data["rows"], "all", "mean"),
+                      order(data["rows"], "blocks", "worst"), order(data["rows"], "blocks", "mean"),
+                      order(data["rows"], "exact", "worst")});
     std::string text = fmt::format(
         "The bunny here: {}, {} triangles. Errors by Eq. 4 against angle-weighted pseudonormals, in the mesh's unit. "
         "*Dense*: the paper's serial program (`bench/paper/dense.cpp`), over all nodes that it reaches. *Blocks*: "
         "bilayer's `double-layer`, half width 2; `exact`, half width 3. *Order*: the power of the step that the error "
-        "falls with.\n\n",
+        "falls with; \"-\" where it does not fall from each grid to the next, and so has none.\n\n",
         data["origin"].get<std::string>(), data["triangles"].get<int>());
     text += table({"grid", "step, paper / here", "e_max, paper", "dense", "e_avg, paper", "dense", "blocks, e_max",
                    "blocks, e_avg", "exact, e_max"},
@@ -159,24 +185,37 @@ std::string textTable1(const json& data) {
         return double(data["rows"][i][which][norm]);
     };
     const std::size_t last = published::table1.size() - 1;
-    return text + fmt::format(
-                      "\nThe mean error here is {:.0f} times smaller than the paper's at 72 nodes and {:.1f} times at "
-                      "501. Triangles much smaller than a step are sampled densely, one sample each; the larger they "
-                      "are in steps, the more the nearest sample lies aside, until epsilon divides them. So the error "
-                      "falls more slowly than the step, to the power of {:.2f}, and first order, as in the paper, is "
-                      "what it comes to where all triangles are divided. The worst nodes of *dense* have the wrong "
-                      "sign, or lie at the rim of what it reaches, where a node may know one layer well and the other "
-                      "one hardly. *Blocks* trims such nodes off, and has the paper's errors at worst. `exact` is off "
-                      "where a node lies within 1e-4 steps of the surface, and its sign may be either.\n\nThe paper's "
-                      "means are not explained by its method: {:.2f} to {:.2f} steps, where *dense* has {:.3f} to "
-                      "{:.3f}. A mean of that size, sqrt(3) / 4 = {:.2f} for normals of all directions, comes out "
-                      "where the two fields compared lie half a cell aside along each axis, as values at nodes and at "
-                      "centres of cells do (the column *half a cell aside*). That is a guess. Nor does the step "
-                      "printed for 72 nodes go with the others: 5 / 71 is {:.3f}.\n",
-                      published::table1[0].mean / published::table1[0].step / steps(0, "all", "mean"),
-                      published::table1[last].mean / published::table1[last].step / steps(last, "all", "mean"),
-                      order(data["rows"], "all", "mean"), least, most, steps(0, "all", "mean"),
-                      steps(last, "all", "mean"), std::sqrt(3.0) / 4, 5.0 / 71);
+    const auto smaller = [&](std::size_t i) {  // the mean error in the mesh's unit
+        return published::table1[i].mean / (steps(i, "all", "mean") * double(data["rows"][i]["step"]));
+    };
+    double leastRatio = 1e9, mostRatio = 0;  // of the blocks' worst error to the paper's, in steps
+    for (std::size_t i = 0; i <= last; ++i) {
+        const double ratio = steps(i, "blocks", "worst") / (published::table1[i].worst / published::table1[i].step);
+        leastRatio = std::min(leastRatio, ratio);
+        mostRatio = std::max(mostRatio, ratio);
+    }
+    const std::string perEpsilon = listed(data["rows"], "perEpsilon");
+    return text +
+           fmt::format(
+               "\nThe mean error here, in the mesh's unit, is {:.1f} times smaller than the paper's at {} nodes "
+               "and {:.1f} times at {}. Algorithm 1 rounds the number of rows up: a triangle smaller than "
+               "epsilon has one sample, one hardly larger has three. So the coarser the grid, the denser the "
+               "samples are in steps{}, and the error falls more slowly than the step (order {}). Samples "
+               "come down to 1/2 for an epsilon of surface only where triangles have many rows, and only from "
+               "there on would the error fall as the step does. The worst nodes of *dense* have the wrong sign, "
+               "or lie at the rim of what it reaches, where a node may know one layer well and the other one "
+               "hardly. *Blocks* trims such nodes off: its worst errors, in steps, are {:.2f} to {:.2f} times "
+               "the paper's. `exact` is off where a node lies within 1e-4 steps of the surface, and its sign "
+               "may be either.\n\nThe paper's means are not explained by its method: {:.2f} to {:.2f} steps, "
+               "where *dense* has {:.3f} to {:.3f}. A mean of that size, sqrt(3) / 4 = {:.2f} for normals of "
+               "all directions, comes out where the two fields compared lie half a cell aside along each axis, "
+               "as values at nodes and at centres of cells do (the column *half a cell aside*). That is a "
+               "guess. Nor does the step printed for {} nodes go with the others: {} / {} is {:.3f}.\n",
+               smaller(0), published::table1[0].nodes, smaller(last), published::table1[last].nodes,
+               perEpsilon.empty() ? "" : fmt::format(", {} for an epsilon of surface on these grids", perEpsilon),
+               order(data["rows"], "all", "mean"), leastRatio, mostRatio, least, most, steps(0, "all", "mean"),
+               steps(last, "all", "mean"), std::sqrt(3.0) / 4, published::table1[0].nodes, boxSide,
+               published::table1[0].nodes - 1, boxSide / (published::table1[0].nodes - 1));
 }
 
 // How far the serial program's field and the block-wise one are apart.
@@ -275,7 +314,11 @@ json measureSame(const Run& run) {
 
 std::string textSame(const json& data) {
     std::vector<std::vector<std::string>> rows;
+    std::uint64_t different = 0;
+    bool dragon = false;
     for (const json& row : data["rows"]) {
+        different += row["different"].get<std::uint64_t>();
+        dragon = dragon || row["model"] == "dragon";
         const auto count = [&](const char* what) { return fmt::format("{}", row[what].get<std::uint64_t>()); };
         rows.push_back({row["model"], row["recursive"] ? "recursive (Fig. 2)" : "Algorithm 1", count("reached"),
                         digits(row["worst"], 2), count("halfWay"), count("ties"), count("different"), count("far"),
@@ -283,16 +326,20 @@ std::string textSame(const json& data) {
     }
     return "bilayer fills blocks of 8x8x8 voxels in parallel, from samples sorted by cells, in floats around the "
            "block; the paper's program walks over triangles and keeps dense grids (`bench/paper/dense.cpp`). With "
-           "`DoubleLayerOptions::fillGaps = false` and a half width that trims nothing both give the same field, node "
-           "by node, at 251^3:\n\n" +
+           "`DoubleLayerOptions::fillGaps = false` and a half width that trims nothing " +
+           (different ? fmt::format("their fields differ at {} nodes for no reason named below", different)
+                      : std::string("both give the same field, node by node")) +
+           ", at 251^3:\n\n" +
            table({"model", "subdivision", "nodes reached", "most apart [steps]", "half-way nodes", "ties", "else apart",
                   "far nodes", "of the wrong sign, serial / blocks"},
                  rows) +
            "\nHalf-way nodes lie at the rim of the cube around a sample that is half-way between two nodes, up to "
            "rounding: it may update the cube around either, and the field is that of one of the two. Ties are nodes "
            "that both layers are equally near to, up to rounding, with the other sign. A far node has the sign that a "
-           "scan along z, or OpenVDB's flood, hands on from the nearest known one, right or wrong; the dragon meets "
-           "itself, and its pseudonormals, which judge here, contradict each other there.\n\nBy default bilayer's "
+           "scan along z, or OpenVDB's flood, hands on from the nearest known one, right or wrong" +
+           (dragon ? "; the dragon meets itself, and its pseudonormals, which judge here, contradict each other there"
+                   : "") +
+           ".\n\nBy default bilayer's "
            "field differs on purpose: every sample reaches as far as the band asks and the band is trimmed to its "
            "width; triangles that need more than n_max rows are quartered; long slivers get a row of samples along "
            "them. As in Algorithm 1, only upright parts of a triangle have a sample. [method.md](method.md) says "
@@ -353,6 +400,7 @@ json measureK(const Run& run) {
 std::string textK(const json& data) {
     std::vector<std::vector<std::string>> rows;
     double before = 0;
+    bool cheaper = true;  // every step of K, than Eq. 6 has it
     const double empty = data["empty"];
     for (const json& row : data["rows"]) {
         const int k = row["k"];
@@ -364,6 +412,7 @@ std::string textK(const json& data) {
              fmt::format("{:.2f} / {:.3f}", double(row["all"]["worst"]), double(row["all"]["mean"])),
              fmt::format("{}", row["missing"].get<int>()), fmt::format("{}", row["near"]["signs"].get<int>()),
              fmt::format("{}", row["reached"].get<std::uint64_t>())});
+        cheaper = cheaper && (before <= 0 || time / before < predicted);
         before = time;
     }
     return "The paper takes K = 2, finds K = 1 noisy and K = 3 no better, and gives the cost of a step of K as (2K + "
@@ -371,6 +420,10 @@ std::string textK(const json& data) {
            table({"K", "seconds", "without empty grids", "times K - 1", "Eq. 6", "e_max / e_avg within 1 step",
                   "of all nodes reached", "missing within 1 step", "wrong signs within 1 step", "nodes reached"},
                  rows) +
+           (cheaper ? "\nA step of K costs less than Eq. 6 has it, even without the empty grids: it counts updates of "
+                      "nodes "
+                      "alone, while triangles are read and samples chosen as often with any K.\n"
+                    : "") +
            "\nWhat K changes is how far the field reaches; near the surface it hardly matters. bilayer's "
            "`double-layer` has no K to choose: a sample reaches as far as the band asks.\n";
 }

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 #include <openvdb/tools/MeshToVolume.h>
 
+#include <algorithm>
 #include <glm/gtc/constants.hpp>
 #include <glm/gtc/matrix_transform.hpp>
 #include <random>
@@ -42,6 +43,32 @@ json measureTheorems(const Run&) {
             {"open", toJson(aroundBends(seed, bends, false))}};
 }
 
+constexpr double rounding = 1e-6;
+
+std::string remarkTheorem1(const json& data) {
+    double over = 0, flat = 0, convex = 0, convexDelta = 0;  // the worst; "under" over faces, at convex edges
+    for (const char* which : {"triangles", "reflex", "blunt", "square", "sharp"})
+        over = std::max(over, double(data[which]["over"]));
+    for (const char* which : {"edges", "triangles", "reflex"}) flat = std::max(flat, double(data[which]["under"]));
+    for (const char* which : {"blunt", "square", "sharp"}) {
+        convex = std::max(convex, double(data[which]["under"]));
+        convexDelta = std::max(convexDelta, double(data[which]["underDelta"]));
+    }
+    std::string text;
+    if (over < 2.0 / 3 && double(data["edges"]["over"]) < 0.5)
+        text += " No distance is too large by more than the bound.";
+    if (flat < rounding) text += " Over faces and at reflex edges none is too small.";
+    if (convex > 2.0 / 3)
+        text += fmt::format(
+            " At convex edges the theorem does not hold as it is printed: the proof's case 3 bounds `d_e - d` from "
+            "above "
+            "only. There the points of a face's inner layer come near the other face, or through it, and make "
+            "distances "
+            "too small by up to {:.1f} delta, however fine the mesh.",
+            convexDelta);
+    return text.empty() ? "" : "\n" + text.substr(1) + "\n";
+}
+
 std::string textTheorems(const json& data) {
     const auto distance = [&](const char* which, const char* name, const char* bound) {
         const json& error = data[which];
@@ -66,19 +93,24 @@ std::string textTheorems(const json& data) {
                   distance("reflex", "solid angle 180 degrees and more", "2/3"),
                   distance("blunt", "135 to 180 degrees", "2/3"), distance("square", "90 to 135 degrees", "2/3"),
                   distance("sharp", "below 90 degrees", "2/3")}) +
-           "\nNo distance is too large by more than the bound, and over the faces none is too small. At convex edges "
-           "the theorem does not hold as it is printed: the proof's case 3 bounds `d_e - d` from above only. There "
-           "the points of a face's inner layer come near the other face, or through it, and make distances too small "
-           "by up to 2 delta, however fine the mesh.\n\n**Theorem 2**: an edge of 2 L1 meets a longer one of 2 L2 at "
-           "a bend of 2 theta; F is where the sign error ends, and `OF <= (L2 - L1) / 2` where `L2 tan(theta) <= "
-           "delta`:\n\n" +
+           remarkTheorem1(data) +
+           "\n**Theorem 2**: an edge of 2 L1 meets a longer one of 2 L2 at a bend of 2 theta; F is where the sign "
+           "error "
+           "ends, and `OF <= (L2 - L1) / 2` where `L2 tan(theta) <= delta`. Points are tried within a square of 4 OF "
+           "to each side of O, so that where the region is open, the farthest is that of the square:\n\n" +
            table({"bends with", "most of OF / ((L2 - L1) / 2)", "formula's F off the bisector by", "wrong signs met",
                   "the farthest of them [OF]"},
                  {sign("closed", "delta sin(2 theta) < L2 + L1 cos(2 theta)"), sign("open", "else")}) +
-           "\nThe inequality holds. That F is the farthest point on the wrong side holds on one more condition: the "
-           "region OGF of Fig. 6 is a triangle only where the bisector of P and Q meets the longer edge, `delta sin(2 "
-           "theta) < L2 + L1 cos(2 theta)`; for edges alike and delta = L2 that is a bend below 90 degrees. Otherwise "
-           "the region is open, and wrong signs end only where other samples are nearer.\n";
+           (std::max(double(data["closed"]["bound"]), double(data["open"]["bound"])) < 1 + rounding
+                ? "\nThe inequality holds."
+                : "\nThe inequality does not hold.") +
+           (double(data["closed"]["farthest"]) < 1 + rounding && double(data["open"]["farthest"]) > 1
+                ? " That F is the farthest point on the wrong side holds on one more condition: the region OGF of Fig. "
+                  "6 is a triangle only where the bisector of P and Q meets the longer edge, `delta sin(2 theta) < L2 "
+                  "+ L1 cos(2 theta)`; for edges alike and delta = 2 L2, where the theorem asks for tan(theta) <= 2, "
+                  "that is tan(theta) < 1/2. Otherwise the region is open, and wrong signs end only where other "
+                  "samples are nearer.\n"
+                : "\n");
 }
 
 // A wall of side x side x thickness, whose two faces are cut into triangles that know nothing of each other.
@@ -196,6 +228,9 @@ std::string textWalls(const json& data) {
         }
         rows.push_back(cells);
     }
+    double thickest = 0;  // wall with a wrong sign
+    for (const json& row : data["rows"])
+        if (row["layers"]["outsideWrong"] > 0) thickest = std::max(thickest, row["thickness"].get<double>());
     return fmt::format(
                "Section 5 names the limit: layers that cross. Walls of {} x {} voxels, thinner and thinner, their two "
                "faces cut into triangles independently, {} places and turns each (seed {}); voxels within {} of the "
@@ -205,8 +240,12 @@ std::string textWalls(const json& data) {
                   "OpenVDB: outside called inside", "inside called outside", "exact: outside called inside",
                   "inside called outside"},
                  rows) +
-           "\nTwo layers cannot tell walls apart that are nearer than their own distance: choose `exact` where there "
-           "are such. A wall without thickness has no inside.\n";
+           "\nThe inner layers of two faces cross where a wall is thinner than 2 delta, one voxel." +
+           (thickest >= 1
+                ? fmt::format(" Samples that lie aside bring wrong signs to thicker ones too, here of {} voxels.",
+                              thickest)
+                : "") +
+           " Choose `exact` where there are such walls. A wall without thickness has no inside.\n";
 }
 
 std::vector<std::string> behindWalls(const json& data) {

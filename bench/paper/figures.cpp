@@ -9,13 +9,13 @@
 #include "bench/paper/part.h"
 #include "bench/paper/picture.h"
 #include "bench/paper/published.h"
-#include "demos/shared/shapes.h"
 #include "sdf/surface.h"
 
 namespace bilayer::paper {
 namespace {
 
 using nlohmann::json;
+using published::largeGrid;
 
 constexpr float halfWidth = 2;
 
@@ -63,41 +63,45 @@ const glm::dvec3 upright(0, 1, 0);
 json measureFigure7(const Run& run) {
     const auto bunny = findModel("bunny", run.meshes);
     if (!bunny) return {{"skipped", "no bunny"}};
-    const Lattice finest = latticeOf(251);
+    const Lattice finest = latticeOf(published::figure7.back());
     const Mesh mesh = fitted(bunny->mesh, finest);
     const View view = viewOf(mesh, {0.15, 0.15, 1}, upright, 440, 440);
     std::vector<Picture> pictures{picture(mesh, view)};
-    for (const int nodes : {72, 126, 251}) {
+    for (const int nodes : published::figure7) {
         // the same bunny in all pictures: the grids differ in their steps alone
-        Lattice lattice = latticeOf(nodes);
+        const Lattice lattice = latticeOf(nodes);
         pictures.push_back(picture(lettered(mesh, lattice), view));
     }
     return {{"picture", write(run, "figure7.jpg", pictures, 4)}};
 }
 
 std::string textFigure7(const json& data) {
-    return shown(data, "The bunny: original, and by the double layer at 72^3, 126^3 and 251^3.") +
+    const auto& grids = published::figure7;
+    return shown(data, fmt::format("The bunny: original, and by the double layer at {}^3, {}^3 and {}^3.", grids[0],
+                                   grids[1], grids[2])) +
            "\nWhat is smaller than a step is gone; what the grid resolves is there, with some noise of the samples "
            "under it, as in the paper.\n";
 }
 
+constexpr int coarse = published::figure7.front();  // the paper does not tell its grid
+
 json measureFigure8(const Run& run) {
-    const Lattice lattice = latticeOf(72);
-    const Mesh mesh = fitted(shapes::unevenSphere(0.0013f, 3288), lattice);
+    const Lattice lattice = latticeOf(coarse);
+    const Mesh mesh = unevenSphere(published::table5[0].variance, latticeOf(published::tableNodes));
     const View view = viewOf(mesh, {0.3, 0.4, 1}, upright, 440, 440);
     std::vector<Picture> pictures{picture(mesh, view)};
-    for (const float delta : {0.1f, 0.5f, 1.f}) pictures.push_back(picture(lettered(mesh, lattice, delta), view));
-    return {{"picture", write(run, "figure8.jpg", pictures, 4)}};
+    for (const float delta : published::figure8) pictures.push_back(picture(lettered(mesh, lattice, delta), view));
+    return {{"picture", write(run, "figure8.jpg", pictures, 4)}, {"triangles", mesh.triangles.size()}};
 }
 
 std::string textFigure8(const json& data) {
-    return shown(data, "A sphere: original, and with delta = 0.1, 0.5 and 1.0 steps.") +
+    const auto& deltas = published::figure8;
+    return shown(data, fmt::format("The sphere of Table 5, of variance {}: original, and at {}^3 with delta = {:.1f}, "
+                                   "{:.1f} and {:.1f} steps.",
+                                   published::table5[0].variance, coarse, deltas[0], deltas[1], deltas[2])) +
            "\nThe farther the layers are apart, the less it counts where on them the samples lie: the noise falls with "
            "delta, as in the paper. What speaks against a large one is thin walls.\n";
 }
-
-// The grid of Figs. 9 and 10.
-const glm::ivec3 largeGrid(715, 834, 715);
 
 json largeFigure(const Run& run, const std::string& name, const char* file, const glm::dvec3& from, int pixels,
                  int lines) {
@@ -130,7 +134,9 @@ std::string textLarge(const json& data, const published::Surface& paper, const c
            "\n" + counts(data, paper) +
            fmt::format(
                "\nThe surface is extracted by OpenVDB's `volumeToMesh`, dual contouring, which gives as many triangles "
-               "as marching cubes: two for each lattice edge that the surface crosses. {}\n",
+               "as marching cubes: two for each lattice edge that the surface crosses. Steps are the same along all "
+               "axes, and one scale of the "
+               "model holds for all, other than in Table 4. {}\n",
                remark);
 }
 
@@ -195,7 +201,10 @@ std::string textFigure11(const json& data) {
                                    "in the paper where the blade is thinner than two layers need; by `exact` in the "
                                    "same grid.",
                                    data["nodes"].get<int>())) +
-           "\n" + counts(data, published::surfaces[2]);
+           "\n" + counts(data, published::surfaces[2]) +
+           "\nThe paper does not tell its grid: this one is searched for so that the surfaces' counts agree, which "
+           "says "
+           "nothing of the method.\n";
 }
 
 }  // namespace

@@ -48,6 +48,11 @@ inline std::string digits(double value, int count = 3) {
     return fmt::format("{:.{}f}", value, std::max(0, count - before));
 }
 
+/// A number of the paper's with the two digits behind the point that all its seconds have.
+inline std::string printed(double value) {
+    return fmt::format("{:.2f}", value);
+}
+
 /// Seconds; "-" for none.
 inline std::string seconds(double value) {
     return std::isfinite(value) ? digits(value) : "-";

@@ -1,9 +1,11 @@
 #include "bench/paper/models.h"
 
+#include <cmath>
 #include <cstdlib>
 #include <filesystem>
 #include <glm/common.hpp>
 
+#include "bench/paper/published.h"
 #include "demos/shared/shapes.h"
 #include "sdf/mesh_io.h"
 
@@ -47,7 +49,7 @@ std::optional<Model> findModel(const std::string& name, const std::string& fetch
         return Model{name, "a carved box of as many triangles, made by formula: the paper's is not public",
                      standing(shapes::carvedBox())};
     const char* const elsewhere = std::getenv("BILAYER_MESHES");
-    const std::filesystem::path corpus = elsewhere ? elsewhere : BILAYER_MESHES;
+    const std::filesystem::path corpus = elsewhere && *elsewhere ? elsewhere : BILAYER_MESHES;
     for (const Files& file : files) {
         if (name != file.name) continue;
         if (std::filesystem::exists(corpus / file.corpus))
@@ -70,6 +72,15 @@ Mesh fitted(Mesh mesh, const Lattice& lattice) {
 Mesh stretched(Mesh mesh, const Lattice& lattice) {
     const glm::vec3 scale = room(mesh, lattice);
     return placed(std::move(mesh), lattice, scale);
+}
+
+Mesh unevenSphere(double areaVariance, const Lattice& lattice) {
+    const double radius = 0.5 * lattice.step * (lattice.nodes.x - 1 - 2 * marginNodes);
+    const auto triangles = 2 * std::size_t(std::lround(published::sphereTriangles * published::thousand / 2));
+    Mesh mesh = shapes::unevenSphere(float(std::sqrt(areaVariance) / (radius * radius)), triangles);
+    const glm::vec3 centre(0.5f * lattice.step * float(lattice.nodes.x - 1));
+    for (glm::vec3& p : mesh.points) p = p * float(radius) + centre;
+    return mesh;
 }
 
 BuildOptions optionsFor(const Lattice& lattice, Method method, float halfWidth, int threads) {

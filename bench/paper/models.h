@@ -42,6 +42,10 @@ Mesh fitted(Mesh mesh, const Lattice& lattice);
 /// The same, but stretched along each axis: as a grid of unlike steps over a cube sees it.
 Mesh stretched(Mesh mesh, const Lattice& lattice);
 
+/// The sphere of Table 5, which does not say how large it is: it fills the grid as other models do.
+/// @param areaVariance  Eq. 5 [m^4]
+Mesh unevenSphere(double areaVariance, const Lattice& lattice);
+
 /// What the block-wise builder is asked for: nodes of the lattice are its voxels.
 BuildOptions optionsFor(const Lattice& lattice, Method method, float halfWidth, int threads = 0);
 

@@ -15,7 +15,9 @@
 
 #include "bench/measure.h"
 #include "bench/paper/markdown.h"
+#include "bench/paper/models.h"
 #include "bench/paper/part.h"
+#include "bench/paper/published.h"
 #include "bench/program.h"
 #include "cl/device.h"
 #include "sdf/double_layer.h"
@@ -82,6 +84,16 @@ fs::path keptAt(const fs::path& store, const std::string& name) {
     return store / (name + ".json");
 }
 
+// Under another name first: what was there stays whole until all is written.
+void writeWhole(const fs::path& path, const std::string& text) {
+    const fs::path unfinished = path.string() + ".part";
+    std::ofstream file(unfinished);
+    file << text;
+    file.close();
+    if (!file) throw std::runtime_error("cannot write " + unfinished.string());
+    fs::rename(unfinished, path);
+}
+
 void measure(const Part& part, const Run& run, const fs::path& store) {
     fmt::print(stderr, "== {} ({})\n", part.name, part.title);
     const bench::Stopwatch watch;
@@ -90,9 +102,7 @@ void measure(const Part& part, const Run& run, const fs::path& store) {
     const json kept{
         {"when", now()}, {"seconds", seconds}, {"rounds", run.rounds}, {"machine", machine()}, {"data", data}};
     fs::create_directories(store);
-    std::ofstream file(keptAt(store, part.name));
-    file << kept.dump(1) << "\n";
-    if (!file.flush()) throw std::runtime_error("cannot write " + keptAt(store, part.name).string());
+    writeWhole(keptAt(store, part.name), kept.dump(1) + "\n");
     if (data.contains("skipped"))
         fmt::print("skipped: {}\n\n", data["skipped"].get<std::string>());
     else
@@ -109,70 +119,105 @@ std::string sentence(const json& machine) {
     return text;
 }
 
-constexpr const char* opening =
-    "# The double layer paper, repeated\n\nY. Wu, J. Man and Z. Xie, \"A double layer method for constructing signed "
-    "distance fields from triangle meshes\", *Graphical Models* 76 (2014) 214-223: each of its tables, figures and "
-    "claims, its own figures beside those of this machine. `./run paper` measures all and writes this page, `./run "
-    "paper table2` a part of it. The paper's numbers stand in `bench/paper/published.h`, all others are measured. "
-    "[method.md](method.md) tells how the method is done here.\n\nThe paper ran on a Xeon E5-2630 of six cores and a "
-    "Tesla C2075, both of 2012. Its grids span a box of side 5; models fill it but for three steps on each side.\n";
+std::string opening() {
+    return fmt::format(
+        "# The double layer paper, repeated\n\nY. Wu, J. Man and Z. Xie, \"A double layer method for constructing "
+        "signed distance fields from triangle meshes\", *Graphical Models* 76 (2014) 214-223: each of its tables, "
+        "figures and claims, its own figures beside those of this machine. `./run paper` measures all and writes this "
+        "page, `./run paper table2` a part of it; what was measured lies in `docs/paper/*.json`. The paper's numbers "
+        "stand in `bench/paper/published.h`, all others are measured. [method.md](method.md) tells how the method is "
+        "done here.\n\nThe paper ran on a {} and a {}. Its grids span a box of side {}: that is deduced from its "
+        "steps and numbers of nodes, all but one of which agree. How much of it a model fills is not told: here all "
+        "but {} steps on each side.\n",
+        published::processor, published::gpu, boxSide, marginNodes);
+}
 
-// A part of the page; what falls behind goes onto a list.
-std::string textOf(const Part& part, const json& kept, std::string& behind) {
+// What is known of a part.
+struct Result {
+    Part part;
+    json kept;            // null if there is none
+    std::string problem;  // why there is none
+};
+
+Result read(const Part& part, const fs::path& store) {
+    const fs::path path = keptAt(store, part.name);
+    std::ifstream file(path);
+    if (!file) return {part, {}, fmt::format("Not measured yet: `./run paper {}`.\n", part.name)};
+    try {
+        json kept = json::parse(file);
+        for (const char* key : {"when", "seconds", "rounds", "machine", "data"}) kept.at(key);
+        sentence(kept["machine"]);
+        if (!kept["data"].contains("skipped")) part.text(kept["data"]);  // throws where numbers are not what it needs
+        return {part, kept, ""};
+    } catch (const json::exception& error) {
+        fmt::print(stderr, "{}: {}\n", path.string(), error.what());
+        return {part, {}, fmt::format("`{}` cannot be read: `./run paper {}`.\n", path.string(), part.name)};
+    }
+}
+
+// A part of the page; what falls behind goes onto a list. The machine is named if there are several.
+std::string textOf(const Part& part, const json& kept, bool severalMachines, std::string& behind) {
     const json& data = kept["data"];
     if (data.contains("skipped")) return fmt::format("Left out: {}.\n", data["skipped"].get<std::string>());
     std::string text = part.text(data);
     if (part.behind)
         for (const std::string& line : part.behind(data)) behind += "- " + line + "\n";
-    return text + fmt::format("\n*`./run paper {}`, {} UTC, {:.0f} s, rounds: {}.*\n", part.name,
-                              kept["when"].get<std::string>(), kept["seconds"].get<double>(),
-                              kept["rounds"].get<int>());
+    return text + fmt::format("\n*`./run paper {}`, {} UTC, {:.0f} s, rounds: {}{}.*\n", part.name,
+                              kept["when"].get<std::string>(), kept["seconds"].get<double>(), kept["rounds"].get<int>(),
+                              severalMachines ? ", on " + sentence(kept["machine"]) : "");
 }
 
 void writePage(const fs::path& page, const fs::path& store) {
-    std::string body, behind;
+    std::vector<Result> results;
+    for (const Part& part : parts()) results.push_back(read(part, store));
     std::set<std::string> machines;
     double seconds = 0;
-    for (const Part& part : parts()) {
-        body += fmt::format("\n## {}\n\n", part.title);
-        std::ifstream file(keptAt(store, part.name));
-        if (!file) {
-            body += fmt::format("Not measured yet: `./run paper {}`.\n", part.name);
-            continue;
-        }
-        const json kept = json::parse(file);
-        machines.insert(sentence(kept["machine"]));
-        seconds += kept["seconds"].get<double>();
-        body += textOf(part, kept, behind);
+    std::vector<std::string> missing;
+    for (const Result& result : results) {
+        if (result.kept.is_null() || result.kept["data"].contains("skipped"))
+            missing.push_back(fmt::format("`{}`", result.part.name));
+        if (result.kept.is_null()) continue;
+        machines.insert(sentence(result.kept["machine"]));
+        seconds += result.kept["seconds"].get<double>();
     }
-    std::string text = opening;
+    std::string body, behind;
+    for (const Result& result : results)
+        body +=
+            fmt::format("\n## {}\n\n", result.part.title) +
+            (result.kept.is_null() ? result.problem : textOf(result.part, result.kept, machines.size() > 1, behind));
+    std::string text = opening();
     for (const std::string& machine : machines) text += "\nMeasured on: " + machine + ".\n";
-    text += fmt::format("\nAll parts together took {:.0f} minutes.\n", seconds / 60) + body +
-            "\n## Where bilayer is behind\n\nThe paper, or a peer, by the numbers above:\n\n";
-    text += behind.empty() ? "Nowhere.\n" : behind;
-    std::ofstream file(page);
-    file << wrapped(text);
-    if (!file.flush()) throw std::runtime_error("cannot write " + page.string());
+    const std::string without = fmt::format("Not measured: {}.\n", fmt::join(missing, ", "));
+    text += missing.empty() ? fmt::format("\nAll parts together took {:.0f} minutes.\n", seconds / 60) : "\n" + without;
+    text += body + "\n## Where bilayer is behind\n\nThe paper, or a peer, by the numbers above:\n\n" + behind;
+    if (!missing.empty())
+        text += (behind.empty() ? "" : "\n") + without;
+    else if (behind.empty())
+        text += "Nowhere.\n";
+    writeWhole(page, wrapped(text));
 }
 
 int run(int argc, char** argv) {
     CLI::App app("Repeats the experiments of the double layer paper and writes docs/paper.md.");
     std::vector<std::string> names;
-    std::string store = "build/paper", docs = "docs";
+    std::string store, docs = "docs", meshes = "build/paper/meshes";
     bool page = false, list = false;
     Run run;
     std::vector<std::string> known;
     for (const Part& part : parts()) known.emplace_back(part.name);
     app.add_option("parts", names, "what to measure; others keep their last results")->check(CLI::IsMember(known));
     app.add_option("--rounds", run.rounds, "turns of each builder")->capture_default_str()->check(CLI::Range(1, 99));
-    app.add_option("--store", store, "folder of the results")->capture_default_str();
-    app.add_option("--docs", docs, "folder of the page and its pictures")->capture_default_str();
+    app.add_option("--docs", docs, "folder of the page; its pictures and results are in paper there")
+        ->capture_default_str();
+    app.add_option("--store", store, "another folder of the results");
+    app.add_option("--meshes", meshes, "folder of fetched meshes")->capture_default_str();
     app.add_flag("--list", list, "names of all parts");
     app.add_flag("--page", page, "write the page from the results that there are");
     CLI11_PARSE(app, argc, argv);
     if (list) fmt::print("{}\n", fmt::join(known, "\n"));
-    run.meshes = (fs::path(store) / "meshes").string();
+    run.meshes = meshes;
     run.pictures = (fs::path(docs) / "paper").string();
+    if (store.empty()) store = run.pictures;
     run.picturesOnPage = "paper";
     fs::create_directories(run.pictures);
     for (const Part& part : parts())

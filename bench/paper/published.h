@@ -1,12 +1,16 @@
 // Every number that is taken from the paper, and nothing else. Y. Wu, J. Man, Z. Xie, "A double layer method for
-// constructing signed distance fields from triangle meshes", Graphical Models 76 (2014) 214-223: Xeon E5-2630 and Tesla
-// C2075. K is 1024 triangles there.
+// constructing signed distance fields from triangle meshes", Graphical Models 76 (2014) 214-223. K is 1024 triangles
+// there.
 #pragma once
 
 #include <array>
+#include <glm/vec3.hpp>
 #include <optional>
 
 namespace bilayer::paper::published {
+
+inline constexpr const char* processor = "Xeon E5-2630";
+inline constexpr const char* gpu = "Tesla C2075";
 
 /// Table 1, the bunny against AWPN.
 struct Error {
@@ -19,7 +23,10 @@ inline constexpr std::array<Error, 4> table1{{{72, 0.06, 0.04923, 0.02701},
                                               {251, 0.02, 0.02100, 0.00816},
                                               {501, 0.01, 0.01202, 0.00427}}};
 
-/// Tables 2 and 3, 251 nodes along each side [s].
+/// Tables 2, 3 and 5: nodes along each side.
+inline constexpr int tableNodes = 251;
+
+/// Tables 2 and 3 [s].
 struct Seconds {
     const char* model;
     double triangles;  ///< [K]
@@ -51,6 +58,11 @@ struct Uneven {
 };
 inline constexpr std::array<Uneven, 3> table5{{{0.0013, 0.07}, {0.0052, 0.19}, {0.0098, 0.53}}};
 inline constexpr double sphereTriangles = 3.21;  ///< [K]
+
+/// Grids of Fig. 7, deltas of Fig. 8 [steps], the grid of Figs. 9 and 10.
+inline constexpr std::array<int, 3> figure7{72, 126, 251};
+inline constexpr std::array<float, 3> figure8{0.1f, 0.5f, 1.f};
+inline const glm::ivec3 largeGrid(715, 834, 715);
 
 /// Triangles of originals and of the surfaces extracted from their fields, Figs. 9 to 11 [K].
 struct Surface {

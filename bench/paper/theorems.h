@@ -20,7 +20,7 @@ DistanceError overTriangles(unsigned seed, int trials);
 DistanceError overEdges(unsigned seed, int trials);
 
 /// A wedge: two rows of triangles that meet in an edge, at a random angle of the solid between two [rad]; a point
-/// anywhere outside within 3 of the edge, nearer to it than to the wedge's border. Delta is a half; L_max is from 0.05
+/// anywhere outside within 2 of the edge, nearer to it than to the wedge's border. Delta is a half; L_max is from 0.1
 /// to 2.
 DistanceError aroundWedges(unsigned seed, int trials, double leastAngle, double mostAngle);
 
