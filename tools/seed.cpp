@@ -4,7 +4,9 @@
 
 #include <cmath>
 #include <memory>
+#include <new>
 #include <stdexcept>
+#include <string>
 #include <variant>
 #include <vector>
 
@@ -53,6 +55,7 @@ fluid::SeedMode makeMode(const std::string& word) {
 }
 
 void requireUsage(const Arguments& a) {
+    if (a.into.empty() && a.mode != "unite") throw CLI::ValidationError("--mode " + a.mode, "needs --into");
     for (const auto& input : a.inputs) requireOther(a.output, input);
     if (!a.into.empty() || a.voxelSize > 0 || a.resolution > 0) {
         if (a.resolution > 0 && isVdb(a.inputs.front()))
@@ -68,9 +71,21 @@ Input read(const std::filesystem::path& path) {
     return readMesh(path);
 }
 
+// What the file says of a mesh and a body no longer holds for a liquid that starts from it.
+void dropOrigin(openvdb::FloatGrid& liquid) {
+    std::vector<std::string> names;
+    for (auto entry = liquid.beginMeta(); entry != liquid.endMeta(); ++entry)
+        if (entry->first.starts_with("bilayer:")) names.push_back(entry->first);
+    for (const std::string& name : names) liquid.removeMeta(name);
+}
+
 openvdb::FloatGrid::Ptr startingLiquid(const Arguments& a, const Input& first) {
     openvdb::initialize();
-    if (!a.into.empty()) return readVdb(a.into).grids().distance->deepCopy();
+    if (!a.into.empty()) {
+        const openvdb::FloatGrid::Ptr liquid = readVdb(a.into).grids().distance->deepCopy();
+        dropOrigin(*liquid);
+        return liquid;
+    }
     float voxelSize = a.voxelSize;
     if (a.resolution > 0) voxelSize = voxelSizeFor(std::get<Mesh>(first), a.resolution);
     if (!(voxelSize > 0)) voxelSize = std::get<LevelSet>(first).voxelSize();
@@ -81,8 +96,24 @@ openvdb::FloatGrid::Ptr startingLiquid(const Arguments& a, const Input& first) {
     }
 }
 
+// OpenVDB sums over coordinates, so that far away all digits go: the surface is moved to the origin first.
+double volumeOf(const openvdb::FloatGrid& liquid) {
+    if (liquid.empty()) return 0;
+    using Leaf = openvdb::FloatTree::LeafNodeType;
+    const openvdb::Coord shift = liquid.evalActiveVoxelBoundingBox().getStart() & ~int(Leaf::DIM - 1);
+    const auto near = openvdb::FloatGrid::create(liquid.background());
+    for (auto leaf = liquid.tree().cbeginLeaf(); leaf; ++leaf) {
+        auto copy = std::make_unique<Leaf>(*leaf);
+        copy->setOrigin(leaf->origin() - shift);
+        near->tree().addLeaf(copy.release());
+    }
+    near->setTransform(openvdb::math::Transform::createLinearTransform(liquid.voxelSize()[0]));
+    near->setGridClass(openvdb::GRID_LEVEL_SET);
+    return openvdb::tools::levelSetVolume(*near);
+}
+
 void report(const Arguments& a, const openvdb::FloatGrid& liquid, std::uint64_t particles, double seconds) {
-    const double volume = liquid.empty() ? 0 : openvdb::tools::levelSetVolume(liquid);
+    const double volume = volumeOf(liquid);
     const float voxelSize = float(liquid.voxelSize()[0]);
     if (a.json)
         return print({{"output", a.output.string()},
@@ -102,6 +133,19 @@ void report(const Arguments& a, const openvdb::FloatGrid& liquid, std::uint64_t 
     table.print();
 }
 
+// Errors name the file.
+void seedInput(openvdb::FloatGrid& liquid, const Arguments& a, std::size_t index, const Input& input,
+               const fluid::Placement& placement) {
+    try {
+        std::visit([&](const auto& body) { fluid::seed(liquid, body, placement, makeMode(a.mode)); }, input);
+    } catch (const std::bad_alloc&) {
+        throw;
+    } catch (const std::exception& error) {
+        const std::string into = a.into.empty() ? "" : " into " + a.into.string();
+        throw std::runtime_error(fmt::format("{}{}: {}", a.inputs[index].string(), into, error.what()));
+    }
+}
+
 void run(const Arguments& a) {
     requireUsage(a);
     const fluid::Placement placement = makePlacement(a);
@@ -112,8 +156,7 @@ void run(const Arguments& a) {
 
     const openvdb::FloatGrid::Ptr liquid = startingLiquid(a, inputs.front());
     liquid->setName("liquid");
-    for (const Input& input : inputs)
-        std::visit([&](const auto& body) { fluid::seed(*liquid, body, placement, makeMode(a.mode)); }, input);
+    for (std::size_t i = 0; i < inputs.size(); ++i) seedInput(*liquid, a, i, inputs[i], placement);
     openvdb::GridCPtrVec grids{liquid};
     std::uint64_t count = 0;
     if (a.particlesGiven->count()) {

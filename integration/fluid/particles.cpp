@@ -12,6 +12,8 @@
 #include <limits>
 #include <stdexcept>
 
+#include "collider/interpolant.h"
+
 namespace bilayer::fluid {
 namespace {
 
@@ -111,7 +113,8 @@ class Body {
           turnedBack_(glm::conjugate(glm::normalize(placement.pose.rotation))),
           // how far in the body's own coordinates a voxel may reach
           reach_(0.5f * std::sqrt(3.f) * float(voxels.voxelSize()[0]) /
-                 std::min({placement.scale.x, placement.scale.y, placement.scale.z})) {}
+                 std::min({placement.scale.x, placement.scale.y, placement.scale.z})),
+          error_(mostInterpolationError * field.voxelSize()) {}
 
     // The blocks of voxels that meet the body's box.
     std::vector<Coord> blocks() const {
@@ -140,15 +143,18 @@ class Body {
     // Whether a cube of voxels may hold a point of the body.
     bool reaches(const Coord& origin, int side) const {
         const Vec3d centre = origin.asVec3d() + Vec3d(0.5 * (side - 1));
-        return field_.sample(toBody(centre)).distance <= float(side) * reach_;
+        const Vec3d world = voxels_.indexToWorld(centre);
+        const float distance = field_.distance(toBody({world.x(), world.y(), world.z()}));
+        const float reach = float(side) * reach_;
+        // with a mesh the inside is the mesh's, from which the samples may differ; without one it is the samples' own
+        return distance <= (field_.mesh() ? reach + error_ : steepestInterpolant * reach);
     }
 
-    bool holds(const Vec3d& point) const { return field_.inside(toBody(point)); }
+    bool holds(const glm::vec3& point) const { return field_.inside(toBody(point)); }
 
   private:
-    glm::vec3 toBody(const Vec3d& index) const {
-        const Vec3d world = voxels_.indexToWorld(index);
-        const glm::dvec3 way = glm::dvec3(world.x(), world.y(), world.z()) - glm::dvec3(placement_.pose.position);
+    glm::vec3 toBody(const glm::dvec3& point) const {
+        const glm::dvec3 way = point - glm::dvec3(placement_.pose.position);
         return glm::vec3((turnedBack_ * way) / glm::dvec3(placement_.scale));
     }
 
@@ -156,7 +162,7 @@ class Body {
     const Placement& placement_;
     const openvdb::math::Transform& voxels_;
     glm::dquat turnedBack_;
-    float reach_;
+    float reach_, error_;
 };
 
 }  // namespace
@@ -171,8 +177,10 @@ Particles particles(const FloatGrid& liquid, const ParticleOptions& options) {
         for (const Coord& voxel : CoordBBox::createCube(origin, blockSide)) {
             if (!(values.getValue(voxel) < limit)) continue;
             visitVoxel(voxel, options, [&](const Vec3d& point) {
-                if (openvdb::tools::BoxSampler::sample(values, point) < 0)
-                    found.push_back(toWorld(liquid.transform(), point));
+                // what is written is rounded: that must be inside
+                const glm::vec3 p = toWorld(liquid.transform(), point);
+                if (openvdb::tools::BoxSampler::sample(values, liquid.worldToIndex({p.x, p.y, p.z})) < 0)
+                    found.push_back(p);
             });
         }
     });
@@ -187,7 +195,7 @@ Particles particles(const Field& field, const Placement& placement, const openvd
         for (const Coord& voxel : CoordBBox::createCube(origin, blockSide)) {
             if (!body.reaches(voxel, 1)) continue;
             visitVoxel(voxel, options, [&](const Vec3d& point) {
-                if (body.holds(point)) found.push_back(toWorld(voxels, point));
+                if (const glm::vec3 p = toWorld(voxels, point); body.holds(p)) found.push_back(p);
             });
         }
     });

@@ -9,6 +9,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <stdexcept>
@@ -27,11 +28,14 @@ using openvdb::FloatTree;
 using openvdb::math::Transform;
 using Leaf = FloatTree::LeafNodeType;
 
+constexpr const char* byNormals = "normals";  // LevelSet::sign() of a closed mesh
+
 constexpr float unitTolerance = 1e-3f;  // by which a rotation's length may differ from 1: a float product's drift
 constexpr float minFieldWidth = 1;      // [field voxels] either side: less does not tell where the surface is
 constexpr float rounding = 1e-5f;       // of a width that is a whole number of voxels but for its last bits
 constexpr double maxIndex = 1 << 29;    // keeps OpenVDB's 32-bit coordinates and sums of two of them in range
 constexpr double sameVoxels = 1e-6;     // two voxel sizes are the same but for this part of them
+constexpr float mostBetween = 2;  // [voxels] of distance between neighbours on either side; 1 but for small cracks
 
 bool isFinite(const glm::vec3& v) {
     return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
@@ -103,6 +107,34 @@ bool fits(const LevelSet& field, const Placement& placement, const Transform& vo
 
 void requireCubes(const Transform& voxels) {
     if (!voxels.isLinear() || !voxels.hasUniformScale()) throw std::invalid_argument("the voxels are no cubes");
+    if (!(voxels.baseMap()->determinant() > 0))
+        throw std::invalid_argument("the voxels are mirrored: that would turn the body inside out");
+}
+
+void requireInside(const FloatGrid& grid) {
+    for (auto leaf = grid.tree().cbeginLeaf(); leaf; ++leaf)
+        for (auto voxel = leaf->cbeginValueAll(); voxel; ++voxel)
+            if (*voxel < 0) return;
+    throw std::invalid_argument("the body has no inside in these voxels");
+}
+
+// Whether signs change between neighbours that are both far from the surface, as they do across a wide hole.
+bool leaks(const FloatGrid& grid) {
+    const float farthest = mostBetween * float(grid.voxelSize()[0]);
+    openvdb::tree::LeafManager<const FloatTree> leaves(grid.tree());
+    std::atomic<bool> found = false;
+    leaves.foreach ([&](const Leaf& leaf, std::size_t) {
+        const auto values = grid.getConstAccessor();
+        for (auto voxel = leaf.cbeginValueAll(); voxel && !found; ++voxel)
+            for (int axis = 0; axis < 3; ++axis)
+                for (const int side : {-1, 1}) {
+                    Coord beside = voxel.getCoord();
+                    beside[axis] += side;
+                    const float there = values.getValue(beside);
+                    if ((*voxel < 0) != (there < 0) && std::abs(*voxel - there) > farthest) found = true;
+                }
+    });
+    return found;
 }
 
 }  // namespace
@@ -128,7 +160,10 @@ FloatGrid::Ptr regrid(const Mesh& mesh, const Placement& placement, const Transf
     const Placed placed = inVoxels(mesh, placement, voxels);
     const LevelSet field =
         build(placed.mesh, {.voxelSize = 1, .exteriorWidth = widthInVoxels, .interiorWidth = widthInVoxels});
+    if (field.sign() != byNormals && leaks(*field.grids().distance))
+        throw std::invalid_argument("the mesh is open: a hole is too wide for these voxels");
     const auto grid = moved(*field.grids().distance, placed.shift, float(voxel), width);
+    requireInside(*grid);
     grid->setTransform(voxels.copy());
     return grid;
 }
@@ -140,11 +175,12 @@ FloatGrid::Ptr regrid(const LevelSet& field, const Placement& placement, const T
         throw std::invalid_argument("the field's band is narrower than a voxel");
     if (fits(field, placement, voxels, width)) {
         const auto grid = moved(*field.grids().distance, Coord(0), 1, width);
+        requireInside(*grid);
         grid->setTransform(voxels.copy());
         return grid;
     }
     const Mesh zeroSet = surface(field);
-    if (zeroSet.triangles.empty()) throw std::invalid_argument("the field has no surface");
+    if (zeroSet.triangles.empty()) throw std::invalid_argument("the field has no surface: it has no inside");
     return regrid(zeroSet, placement, voxels, width);
 }
 

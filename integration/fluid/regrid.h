@@ -11,10 +11,12 @@ namespace bilayer::fluid {
 
 /// The signed distances of a mesh that has been placed in the world, in voxels of another grid: exact ones, as build()
 /// finds them, however the body was stretched and turned. Signs are found as by Sign::automatic.
-/// @param voxels  cubes, of any size and wherever they lie
+/// @param voxels  cubes, not mirrored, of any size and wherever they lie
 /// @param width   of the band to either side [m]
 /// Throws std::invalid_argument for a placement as check() does, one beyond the range of OpenVDB's coordinates, voxels
-/// that are no cubes, and what build() refuses, a band of more memory than the machine has among it.
+/// that are no cubes or mirrored, a mesh with a hole of more than two voxels or so, one without
+/// inside in these voxels (an open sheet, or a body between them), and what build() refuses, a band of more memory than
+/// the machine has among it.
 openvdb::FloatGrid::Ptr regrid(const Mesh& mesh, const Placement& placement, const openvdb::math::Transform& voxels,
                                float width);
 

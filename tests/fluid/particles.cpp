@@ -78,6 +78,17 @@ TEST_CASE("particles of a body stay on their side of walls thinner than a voxel"
     CHECK(double(found.positions.size()) == Approx(100 * volume / std::pow(double(wideVoxel), 3)).epsilon(0.03));
 }
 
+TEST_CASE("particles of a film that the field's voxels hardly know") {
+    // three tenths of a voxel thin and between two layers of voxels, in a solver's voxels of a quarter
+    const float h = 0.04f, half = 0.15f * h, solver = h / 4;
+    Mesh film = shapes::box({0.4f, 0.4f, half});
+    for (glm::vec3& p : film.points) p.z += h / 2;
+    const Field body(build(film, {.voxelSize = h}), film);
+    const auto found = fluid::particles(body, {}, *Transform::createLinearTransform(solver), {.perVoxel = 8});
+    const double volume = 0.8 * 0.8 * 2 * double(half);
+    CHECK(double(found.positions.size()) == Approx(8 * volume / std::pow(double(solver), 3)).epsilon(0.03));
+}
+
 TEST_CASE("the same seed gives the same particles for any number of threads") {
     const auto liquid = sphere();
     const Field body = shell();

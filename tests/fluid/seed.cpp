@@ -195,6 +195,21 @@ TEST_CASE("a cavity stays empty") {
     CHECK(volume(*liquid) == Approx(ball * (1 - 0.216)).epsilon(0.05));
 }
 
+TEST_CASE("a wide hole is named") {
+    // a ball without the cap of 30 degrees around z
+    Mesh mesh = shapes::sphere(0.5f, 5);
+    std::erase_if(mesh.triangles, [&](const glm::uvec3& t) {
+        return mesh.points[t.x].z + mesh.points[t.y].z + mesh.points[t.z].z > 3 * 0.433f;
+    });
+    for (const float voxel : {0.04f, 0.02f})
+        for (const float angle : {0.f, 0.8f}) {
+            CAPTURE(voxel, angle);
+            const auto liquid = emptyLiquid(voxel);
+            CHECK_THROWS_WITH(fluid::seed(*liquid, mesh, poseOf(angle)), Catch::Matchers::Contains("the mesh is open"));
+            CHECK(liquid->empty());
+        }
+}
+
 TEST_CASE("subtract and intersect") {
     const LevelSet field = fieldOf(shapes::sphere(0.5f, 5), 0.02f);
     const auto liquid = openvdb::tools::createLevelSetSphere<FloatGrid>(0.5f, openvdb::Vec3f(0.5f, 0, 0), 0.025f, 3);
@@ -259,10 +274,18 @@ TEST_CASE("bad input throws and changes nothing") {
     refused(sphere(), {{}, {1, -1, 1}});
     refused(sphere(), {{}, {1, 1, nan}});
     refused(emptyLiquid(1e-4f), {{}, glm::vec3(100)});
-    // a field without inside has nothing to seed, unless it is asked for a copy
+    auto mirrored = sphere();
+    mirrored->transform().preScale(openvdb::Vec3d(-1, 1, 1));
+    refused(mirrored);
+    CHECK_THROWS_WITH(fluid::seed(*mirrored, shapes::sphere(0.5f, 3)), Catch::Matchers::Contains("mirror"));
+    // what has no inside has nothing to seed, be it a mesh, a field, or a field in the liquid's own voxels
     const Mesh sheet{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}};
     const LevelSet empty = build(sheet, {.voxelSize = 0.1f, .sign = Sign::flood});
     const auto liquid = sphere();
     CHECK_THROWS_WITH(fluid::seed(*liquid, empty, poseOf(1)), Catch::Matchers::Contains("no surface"));
+    const auto own = emptyLiquid(0.1f);
+    CHECK_THROWS_WITH(fluid::seed(*own, empty), Catch::Matchers::Contains("no inside"));
+    CHECK_THROWS_WITH(fluid::seed(*own, sheet), Catch::Matchers::Contains("no inside"));
+    CHECK(own->empty());
     CHECK_THROWS_AS(fluid::seed(*liquid, Mesh{}), std::invalid_argument);
 }

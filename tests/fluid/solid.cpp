@@ -119,4 +119,8 @@ TEST_CASE("bad input is refused") {
     turned->preRotate(0.3);
     CHECK_THROWS_WITH(fluid::solid(mesh, {}, *turned), Catch::Matchers::Contains("axes"));
     CHECK_THROWS_AS(fluid::solid(Mesh{}, {}, *cells), std::invalid_argument);
+    const Mesh sheet{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}};
+    CHECK_THROWS_WITH(fluid::solid(sheet, {}, *cells), Catch::Matchers::Contains("no inside"));
+    const LevelSet empty = build(sheet, {.voxelSize = 0.05f, .sign = Sign::flood});
+    CHECK_THROWS_WITH(fluid::solid(empty, {}, *cells), Catch::Matchers::Contains("no inside"));
 }

@@ -124,6 +124,17 @@ TEST_CASE("voxel sizes that no machine can serve are refused at once") {
     CHECK_FALSE(std::filesystem::exists(output()));
 }
 
+TEST_CASE("what cannot become liquid is named") {
+    const std::string sheet = textFile("sheet.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").string();
+    requireFault({"seed", sheet, "-o", output(), "--voxel-size", "0.05"}, sheet + ": ");
+    requireFault({"seed", sphereFile().string(), sheet, "-o", output(), "--voxel-size", "0.05"}, sheet + ": ");
+    const std::string field = scratch("sheet.vdb").string();
+    REQUIRE(run({"build", sheet, "-o", field, "--voxel-size", "0.1", "--sign", "flood"}).status == 0);
+    requireFault({"seed", field, "-o", output()}, field + ": ");
+    requireFault({"seed", field, "-o", output(), "--voxel-size", "0.05"}, field + ": ");
+    CHECK_FALSE(std::filesystem::exists(output()));
+}
+
 TEST_CASE("devices that are not there") {
     requireFault(buildOf(sphereFile(), {"--voxel-size", "0.1", "--method", "double-layer", "--backend", "opencl",
                                         "--device", "no such device"}),
@@ -162,6 +173,8 @@ TEST_CASE("wrong usage") {
     requireUsage({"seed", mesh, "-o", mesh, "--voxel-size", "0.1"}, "would overwrite " + mesh);
     requireUsage({"seed", mesh, "-o", output(), "--voxel-size", "0.1", "--rotate", "0", "0", "0", "1"});
     requireUsage({"seed", mesh, "-o", output(), "--voxel-size", "0.1", "--seed", "1"});
+    for (const char* mode : {"intersect", "subtract"})
+        requireUsage({"seed", mesh, "-o", output(), "--voxel-size", "0.1", "--mode", mode}, "needs --into");
     CHECK_FALSE(std::filesystem::exists(output()));
 }
 

@@ -436,6 +436,37 @@ TEST_CASE("seed unites inputs, moves them, and adds particles") {
     CHECK(seeded({mesh, "--resolution", "10", "--half-width", "4"})["halfWidth"].get<double>() == Approx(4));
 }
 
+TEST_CASE("a liquid does not say what its body said") {
+    const std::string body = scratch("poured.vdb").string(), output = scratch("poured_liquid.vdb").string();
+    build(body, {"--voxel-size", "0.05", "--body"});
+    const Result r = run({"seed", sphereFile().string(), "-o", output, "--into", body, "--translate", "0.3", "0", "0"});
+    INFO(r.err);
+    REQUIRE(r.status == 0);
+    const LevelSet liquid = readVdb(output);
+    for (auto entry = liquid.grids().distance->beginMeta(); entry != liquid.grids().distance->endMeta(); ++entry)
+        CHECK(entry->first.find("bilayer:") == std::string::npos);
+    const auto before = run({"info", body, "--json"}).json(), after = run({"info", output, "--json"}).json();
+    CHECK(before.contains("body"));
+    CHECK_FALSE(after.contains("body"));
+    CHECK(after["levelSetCheck"] == "");
+    CHECK(liquid.meshHash() == 0);
+    CHECK(liquid.method().empty());
+    CHECK(std::isnan(liquid.errorBound()));
+}
+
+TEST_CASE("a liquid's volume is the same far away") {
+    const std::string output = scratch("far.vdb").string();
+    const auto volumeAt = [&](const char* x) {
+        const Result r = run({"seed", sphereFile("ball.ply", 5).string(), "-o", output, "--voxel-size", "0.01",
+                              "--translate", x, "0", "0", "--json"});
+        INFO(r.err);
+        REQUIRE(r.status == 0);
+        return r.json()["volume"].get<double>();
+    };
+    CHECK(volumeAt("0") == Approx(4.0 / 3.0 * 3.14159265 * 0.125).epsilon(5e-3));
+    CHECK(volumeAt("1e5") == Approx(volumeAt("0")).epsilon(1e-3));
+}
+
 TEST_CASE("devices may be none") {
     CHECK(run({"devices", "--json"}).json()["devices"].is_array());
     CHECK(run({"devices"}).status == 0);
