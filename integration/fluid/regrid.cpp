@@ -111,13 +111,6 @@ void requireCubes(const Transform& voxels) {
         throw std::invalid_argument("the voxels are mirrored: that would turn the body inside out");
 }
 
-void requireInside(const FloatGrid& grid) {
-    for (auto leaf = grid.tree().cbeginLeaf(); leaf; ++leaf)
-        for (auto voxel = leaf->cbeginValueAll(); voxel; ++voxel)
-            if (*voxel < 0) return;
-    throw std::invalid_argument("the body has no inside in these voxels");
-}
-
 // Whether signs change between neighbours that are both far from the surface, as they do across a wide hole.
 bool leaks(const FloatGrid& grid) {
     const float farthest = mostBetween * float(grid.voxelSize()[0]);
@@ -151,6 +144,13 @@ void check(const Placement& placement) {
         throw std::invalid_argument("the scale is not positive: a mirror would turn the body inside out");
 }
 
+void requireInside(const FloatGrid& grid) {
+    for (auto leaf = grid.tree().cbeginLeaf(); leaf; ++leaf)
+        for (auto voxel = leaf->cbeginValueAll(); voxel; ++voxel)
+            if (*voxel < 0) return;
+    throw std::invalid_argument("the body has no inside in these voxels");
+}
+
 FloatGrid::Ptr regrid(const Mesh& mesh, const Placement& placement, const Transform& voxels, float width) {
     check(placement);
     requireCubes(voxels);
@@ -163,7 +163,7 @@ FloatGrid::Ptr regrid(const Mesh& mesh, const Placement& placement, const Transf
     if (field.sign() != byNormals && leaks(*field.grids().distance))
         throw std::invalid_argument("the mesh is open: a hole is too wide for these voxels");
     const auto grid = moved(*field.grids().distance, placed.shift, float(voxel), width);
-    requireInside(*grid);
+    if (field.sign() != byNormals) requireInside(*grid);
     grid->setTransform(voxels.copy());
     return grid;
 }

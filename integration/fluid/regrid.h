@@ -14,9 +14,8 @@ namespace bilayer::fluid {
 /// @param voxels  cubes, not mirrored, of any size and wherever they lie
 /// @param width   of the band to either side [m]
 /// Throws std::invalid_argument for a placement as check() does, one beyond the range of OpenVDB's coordinates, voxels
-/// that are no cubes or mirrored, a mesh with a hole of more than two voxels or so, one without
-/// inside in these voxels (an open sheet, or a body between them), and what build() refuses, a band of more memory than
-/// the machine has among it.
+/// that are no cubes or mirrored, a mesh with a hole of more than two voxels or so, an open one that has no inside, and
+/// what build() refuses, a band of more memory than the machine has among it.
 openvdb::FloatGrid::Ptr regrid(const Mesh& mesh, const Placement& placement, const openvdb::math::Transform& voxels,
                                float width);
 
@@ -26,5 +25,8 @@ openvdb::FloatGrid::Ptr regrid(const Mesh& mesh, const Placement& placement, con
 /// has no surface.
 openvdb::FloatGrid::Ptr regrid(const LevelSet& field, const Placement& placement,
                                const openvdb::math::Transform& voxels, float width);
+
+/// Throws std::invalid_argument if no voxel of a band is inside: its body may be closed and lie between them.
+void requireInside(const openvdb::FloatGrid& band);
 
 }  // namespace bilayer::fluid

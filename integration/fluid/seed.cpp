@@ -90,7 +90,9 @@ template <class Body>
 void seedWith(FloatGrid& liquid, const Body& body, const Placement& placement, SeedMode mode) {
     requireLiquid(liquid);
     const float width = bandWidth(liquid);
-    const FloatGrid::Ptr result = combined(liquid, regrid(body, placement, liquid.transform(), width), mode, width);
+    const FloatGrid::Ptr band = regrid(body, placement, liquid.transform(), width);
+    requireInside(*band);
+    const FloatGrid::Ptr result = combined(liquid, band, mode, width);
     mend(*result);
     liquid.setTree(result->treePtr());
 }
