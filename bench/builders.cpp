@@ -106,7 +106,7 @@ Outcome runOurs(const Scene& scene, const Job& job) {
 
 std::vector<Source> sources() {
     const char* const elsewhere = std::getenv("BILAYER_MESHES");
-    const std::filesystem::path corpus = elsewhere ? elsewhere : BILAYER_MESHES;
+    const std::filesystem::path corpus = elsewhere && *elsewhere ? elsewhere : BILAYER_MESHES;
     std::vector<Source> found;
     for (const auto& [name, file] : {std::pair{"bunny", "bunny_watertight.obj"},
                                      {"dragon", "dragon_vrip_871k.ply"},

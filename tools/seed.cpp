@@ -79,7 +79,13 @@ void dropOrigin(openvdb::FloatGrid& liquid) {
     for (const std::string& name : names) liquid.removeMeta(name);
 }
 
-openvdb::FloatGrid::Ptr startingLiquid(const Arguments& a, const Input& first) {
+// As --scale stretches it.
+float stretchedVoxelSize(Mesh mesh, const glm::vec3& scale, float resolution) {
+    for (glm::vec3& point : mesh.points) point *= scale;
+    return voxelSizeFor(mesh, resolution);
+}
+
+openvdb::FloatGrid::Ptr startingLiquid(const Arguments& a, const Input& first, const glm::vec3& scale) {
     openvdb::initialize();
     if (!a.into.empty()) {
         const openvdb::FloatGrid::Ptr liquid = readVdb(a.into).grids().distance->deepCopy();
@@ -87,7 +93,7 @@ openvdb::FloatGrid::Ptr startingLiquid(const Arguments& a, const Input& first) {
         return liquid;
     }
     float voxelSize = a.voxelSize;
-    if (a.resolution > 0) voxelSize = voxelSizeFor(std::get<Mesh>(first), a.resolution);
+    if (a.resolution > 0) voxelSize = stretchedVoxelSize(std::get<Mesh>(first), scale, a.resolution);
     if (!(voxelSize > 0)) voxelSize = std::get<LevelSet>(first).voxelSize();
     try {
         return openvdb::createLevelSet<openvdb::FloatGrid>(voxelSize, a.halfWidth);
@@ -154,7 +160,7 @@ void run(const Arguments& a) {
     for (const auto& path : a.inputs) inputs.push_back(read(path));
     requireWritable(a.output);
 
-    const openvdb::FloatGrid::Ptr liquid = startingLiquid(a, inputs.front());
+    const openvdb::FloatGrid::Ptr liquid = startingLiquid(a, inputs.front(), placement.scale);
     liquid->setName("liquid");
     for (std::size_t i = 0; i < inputs.size(); ++i) seedInput(*liquid, a, i, inputs[i], placement);
     openvdb::GridCPtrVec grids{liquid};
@@ -180,7 +186,7 @@ void addSeed(CLI::App& app) {
         command->add_option("--voxel-size", a->voxelSize, "edge of the liquid's voxels, default the first field's")
             ->check(positive());
     auto* resolution =
-        command->add_option("--resolution", a->resolution, "voxels along the longest side of the first mesh's bounds")
+        command->add_option("--resolution", a->resolution, "voxels along the longest side of the first mesh, stretched")
             ->check(positive());
     size->excludes(into)->excludes(resolution);
     resolution->excludes(into);

@@ -89,6 +89,25 @@ TEST_CASE("particles of a film that the field's voxels hardly know") {
     CHECK(double(found.positions.size()) == Approx(8 * volume / std::pow(double(solver), 3)).epsilon(0.03));
 }
 
+TEST_CASE("particles are inside as they are rounded") {
+    const double far = 1e5;  // floats are a quarter of a voxel apart
+    const auto liquid = sphere();
+    liquid->transform().postTranslate({far, 0, 0});
+    int outside = 0;
+    for (const glm::vec3& p : fluid::particles(*liquid, {.perVoxel = 2}).positions) {
+        const openvdb::Vec3d index = liquid->worldToIndex({p.x, p.y, p.z});
+        outside += !(openvdb::tools::BoxSampler::sample(liquid->tree(), index) < 0);
+    }
+    CHECK(outside == 0);
+    const Mesh mesh = shapes::sphere(0.5f, 4);
+    const Field body(build(mesh, {.voxelSize = 0.05f}), mesh);
+    const Pose pose{glm::vec3(float(far), 0, 0)};
+    const auto found = fluid::particles(body, pose, liquid->transform(), {.perVoxel = 2}).positions;
+    CHECK(found.size() > 10000);
+    for (const glm::vec3& p : found) outside += !body.inside(p - pose.position);
+    CHECK(outside == 0);
+}
+
 TEST_CASE("the same seed gives the same particles for any number of threads") {
     const auto liquid = sphere();
     const Field body = shell();

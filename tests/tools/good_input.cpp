@@ -433,7 +433,9 @@ TEST_CASE("seed unites inputs, moves them, and adds particles") {
     CHECK(seeded({fieldFile(), "--into", output, "--mode", "subtract", "--translate", "-0.5", "0", "0"})["volume"]
               .get<double>() == Approx(ball * (2 - 5.0 / 16)).epsilon(0.05));
     CHECK(seeded({fieldFile(), mesh})["volume"].get<double>() == Approx(ball).epsilon(0.05));
-    CHECK(seeded({mesh, "--resolution", "10", "--half-width", "4"})["halfWidth"].get<double>() == Approx(4));
+    const auto stretched = seeded({mesh, "--resolution", "10", "--half-width", "4", "--scale", "1", "3", "1"});
+    CHECK(stretched["halfWidth"].get<double>() == Approx(4));
+    CHECK(stretched["voxelSize"].get<double>() == Approx(0.3).epsilon(0.01));
 }
 
 TEST_CASE("a liquid does not say what its body said") {
