@@ -1,6 +1,8 @@
 // Which devices there are, which one is opened, and what is said where there is none.
 #include "cl/device.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <cctype>
@@ -78,7 +80,8 @@ TEST_CASE("the environment names the device where the caller does not") {
 TEST_CASE("without a driver there is no device, and opening one says so") {
     // loaders look for drivers once in a process, so this takes another one; a packed one starts by bench/packed.sh
     const char* const packed = std::getenv("BILAYER_SELF");
-    const std::string self = packed ? packed : "'" + std::filesystem::read_symlink("/proc/self/exe").string() + "'";
+    const std::string self =
+        packed ? packed : fmt::format("'{}'", std::filesystem::read_symlink("/proc/self/exe").string());
     const std::string command = "OCL_ICD_VENDORS=/nonexistent OCL_ICD_FILENAMES= " + self + " '[child]' >/dev/null";
     CHECK(std::system(command.c_str()) == 0);
 }
