@@ -81,7 +81,9 @@ void visitVoxel(const Coord& voxel, const ParticleOptions& options, Visit&& visi
     for (int i = 0; i < options.perVoxel; ++i) visit(voxel.asVec3d() + jitter(mix(key + std::uint64_t(i))));
 }
 
-glm::vec3 toWorld(const openvdb::math::Transform& voxels, const Vec3d& point) {
+// Rounded to what is written. Inlined, GCC 12 leaves the rounding out of what is computed from it (x and y at once, as
+// a vector of two).
+[[gnu::noinline]] glm::vec3 toWorld(const openvdb::math::Transform& voxels, const Vec3d& point) {
     const Vec3d world = voxels.indexToWorld(point);
     return {float(world.x()), float(world.y()), float(world.z())};
 }
@@ -177,7 +179,6 @@ Particles particles(const FloatGrid& liquid, const ParticleOptions& options) {
         for (const Coord& voxel : CoordBBox::createCube(origin, blockSide)) {
             if (!(values.getValue(voxel) < limit)) continue;
             visitVoxel(voxel, options, [&](const Vec3d& point) {
-                // what is written is rounded: that must be inside
                 const glm::vec3 p = toWorld(liquid.transform(), point);
                 if (openvdb::tools::BoxSampler::sample(values, liquid.worldToIndex({p.x, p.y, p.z})) < 0)
                     found.push_back(p);
