@@ -86,14 +86,27 @@ FloatGrid::Ptr combined(const FloatGrid& liquid, const FloatGrid::Ptr& body, See
     return result;
 }
 
+// The voxel that is deepest inside, after requireInside().
+openvdb::Coord deepest(const FloatGrid& body) {
+    openvdb::Coord found;
+    float least = 0;
+    for (auto leaf = body.tree().cbeginLeaf(); leaf; ++leaf)
+        for (auto voxel = leaf->cbeginValueAll(); voxel; ++voxel)
+            if (*voxel < least) least = *voxel, found = voxel.getCoord();
+    return found;
+}
+
 template <class Body>
 void seedWith(FloatGrid& liquid, const Body& body, const Placement& placement, SeedMode mode) {
     requireLiquid(liquid);
     const float width = bandWidth(liquid);
     const FloatGrid::Ptr band = regrid(body, placement, liquid.transform(), width);
     requireInside(*band);
+    const openvdb::Coord core = deepest(*band);
     const FloatGrid::Ptr result = combined(liquid, band, mode, width);
     mend(*result);
+    if (mode == SeedMode::unite && !(result->tree().getValue(core) < 0))
+        refuse("the body is too small for these voxels: nothing of it would be left");
     liquid.setTree(result->treePtr());
 }
 

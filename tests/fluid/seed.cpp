@@ -239,6 +239,30 @@ TEST_CASE("a half width that floats cannot hold is still three voxels") {
     }
 }
 
+TEST_CASE("a body hardly wider than a voxel is there, or is refused") {
+    const Mesh mesh = shapes::sphere(0.5f, 3);
+    int kept = 0, refused = 0;
+    for (const float voxel : {0.2f, 0.4f, 0.6f, 0.8f, 1.f, 1.3f, 1.7f, 2.5f, 4.f, 50.f})
+        for (const float aside : {0.f, 0.3f, 0.5f}) {
+            CAPTURE(voxel, aside);
+            const auto liquid = emptyLiquid(voxel);
+            try {
+                fluid::seed(*liquid, mesh, Pose{glm::vec3(aside * voxel)});
+            } catch (const std::invalid_argument&) {
+                CHECK(liquid->empty());
+                ++refused;
+                continue;
+            }
+            ++kept;
+            requireLevelSet(*liquid);
+            int inside = 0;
+            for (auto value = liquid->cbeginValueAll(); value; ++value) inside += *value < 0;
+            CHECK(inside > 0);
+        }
+    CHECK(kept > 5);
+    CHECK(refused > 5);
+}
+
 TEST_CASE("bad input throws and changes nothing") {
     const LevelSet field = fieldOf(shapes::sphere(0.5f, 3), 0.05f);
     const float nan = std::numeric_limits<float>::quiet_NaN();
