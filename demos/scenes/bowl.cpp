@@ -39,6 +39,10 @@ constexpr float restingSpeed = 0.02f, restingSpin = 0.2f;  // [m/s], [rad/s]
 // at 6 m/s a bunny moves 16 of its voxels in one step: the bands must still hold it then [voxels]
 constexpr float bodyInteriorWidth = 20, bowlInteriorWidth = 6;
 
+// What friction lets slip in a step, anchors pull back by this part of it; and what rests bears more (see
+// bullet::ShapeOptions). By Bullet's 0.2, and with no more, a body here and there slips on that is kept awake.
+constexpr float pulledBack = 0.5f, restingFriction = 1.2f;
+
 constexpr double mostOverlap = 0.5;  // of 99 in 100 [voxels]
 constexpr double mostRise = 1;       // of energy, in parts of the kinetic energy's peak [%]
 constexpr double mostCreep = 1;      // while held awake [voxels]
@@ -48,7 +52,9 @@ constexpr std::uint32_t colours[] = {0xe07a5f, 0xf2cc8f, 0x81b29a, 0xf4f1de, 0x9
 
 std::shared_ptr<const Thing> bodyOf(const Kind& kind, float resolution) {
     const glm::mat4 toSize = glm::scale(glm::mat4(1), glm::vec3(bodySize / bounds(kind.mesh).longestSide()));
-    return makeThing(transformed(kind.mesh, toSize), {bodySize / resolution, bodyInteriorWidth});
+    return makeThing(
+        transformed(kind.mesh, toSize),
+        {.voxelSize = bodySize / resolution, .interiorWidth = bodyInteriorWidth, .restingFriction = restingFriction});
 }
 
 // Layers above the bowl, each of rings turned against those below, every body turned at random.
@@ -125,6 +131,7 @@ Outcome bowl(const BowlOptions& options) {
 
     Stage stage(fmt::format("{} bodies in a bowl", options.bodies), {.framesPerMeasuring = 30});
     stage.world().bullet().getSolverInfo().m_numIterations = options.iterations;
+    stage.world().bullet().getSolverInfo().m_frictionERP = pulledBack;
     stage.add(vessel, {}, {}, bowlLook);
     const Matter matter{.mass = 1, .restingSpeed = restingSpeed, .restingSpin = restingSpin};
     std::vector<btRigidBody*> bodies;

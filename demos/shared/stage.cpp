@@ -45,8 +45,10 @@ std::shared_ptr<const Thing> makeThing(Mesh mesh, const ThingOptions& options) {
     LevelSet field = build(mesh, band);
     auto collider = std::make_shared<Collider>(
         mesh, field, ColliderOptions{.pointSpacing = options.pointSpacing, .exact = options.exact});
-    const bullet::ShapeOptions centred{
-        .frame = bullet::centreOfMassFrame(*collider), .margin = options.margin, .sweeps = options.sweeps};
+    const bullet::ShapeOptions centred{.frame = bullet::centreOfMassFrame(*collider),
+                                       .margin = options.margin,
+                                       .sweeps = options.sweeps,
+                                       .restingFriction = options.restingFriction};
     auto shape = std::make_shared<bullet::Shape>(collider, centred);
     Specimen specimen(mesh, specimenSpacing * options.voxelSize);
     return std::make_shared<Thing>(Thing{std::move(mesh), std::move(field), std::move(shape), std::move(specimen)});

@@ -87,6 +87,15 @@ float marginOf(const Side& a, const Side& b, float margin) {
     return isField(a.shape) ? std::max(margin, a.shape->getMargin()) : margin;
 }
 
+/// Of two bodies of which B is a field.
+Continuity continuityOf(const btCollisionShape& a, const btCollisionShape& b) {
+    const auto restingFriction = [](const btCollisionShape& shape) {
+        return isField(&shape) ? static_cast<const Shape&>(shape).restingFriction() : 1;
+    };
+    return {.sameWithin = b.getContactBreakingThreshold(gContactBreakingThreshold),
+            .restingFriction = std::max(restingFriction(a), restingFriction(b))};
+}
+
 /// Two overlapping bodies of which B is a field. Collides them without a call that changes anything in Bullet, so that
 /// many pairs can do it at once, and hands the contacts over later.
 class Pair {
@@ -111,9 +120,10 @@ class Pair {
     }
 
     /// Writes what collide() found into the manifolds; once.
-    void commit(const btCollisionObject& a, const btCollisionObject& b, float sameWithin, btManifoldResult& result) {
+    void commit(const btCollisionObject& a, const btCollisionObject& b, const Continuity& continuity,
+                btManifoldResult& result) {
         const Reduced& reduced = choice_.reduced();
-        manifolds_.write(reduced.patches, a, b, sameWithin, result);
+        manifolds_.write(reduced.patches, a, b, continuity, result);
         ++statistics_.pairs;
         statistics_.contactsFound += found_;
         for (const Patch& patch : reduced.patches) statistics_.contactsKept += patch.count;
@@ -201,8 +211,8 @@ class Algorithm : public btCollisionAlgorithm {
         if (!pair_->isReady())
             pair_->collide(sideOf(a, state_.ahead(a, b)), sideOf(b, state_.ahead(a, b)),
                            result->m_closestPointDistanceThreshold);
-        const float sameWithin = b.getCollisionShape()->getContactBreakingThreshold(gContactBreakingThreshold);
-        pair_->commit(*a.getCollisionObject(), *b.getCollisionObject(), sameWithin, *result);
+        pair_->commit(*a.getCollisionObject(), *b.getCollisionObject(),
+                      continuityOf(*a.getCollisionShape(), *b.getCollisionShape()), *result);
     }
 
     /// Bullet asks this of pairs in continuous dispatch, which its worlds never use.

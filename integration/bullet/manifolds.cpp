@@ -50,6 +50,9 @@ constexpr std::size_t mostOfPatch = 3 * MANIFOLD_CACHE_SIZE;
 // Friction holds below this part of the most that it can bear. What has drifted farther than this along the surface
 // stays where it is [parts of the distance within which contacts are the same].
 constexpr float held = 0.98f, mostDrift = 0.25f;
+// Contacts rest as long as they slip by less in a step [parts of the distance within which contacts are the same].
+constexpr float slipping = 1e-3f;
+constexpr int stepsOfRest = 120;
 
 /// Contacts of one patch, as indices in ascending order of the distance that remains.
 using Group = std::vector<std::uint32_t>;
@@ -372,20 +375,24 @@ btVector3 along(const btVector3& way, const btVector3& normal) {
     return way - normal.dot(way) * normal;
 }
 
-/// How far the two places that once touched have moved apart along the surface, as far as friction is to pull them
-/// back. Where it did not hold them, that is no more than before.
-btVector3 driftOf(const btManifoldPoint& point, const btPersistentManifold& manifold, float most) {
+/// What has become of a contact's anchor in a step.
+struct Anchor {
+    btVector3 drift;  ///< how far the two places that once touched are to be pulled back along the surface
+    bool slips;
+};
+
+/// Where friction did not hold the two places, they are pulled back no farther than before.
+Anchor anchorOf(const btManifoldPoint& point, const btPersistentManifold& manifold, float sameWithin) {
     const btVector3 drift = along(manifold.getBody0()->getWorldTransform() * point.m_localPointA -
                                       manifold.getBody1()->getWorldTransform() * point.m_localPointB,
                                   point.m_normalWorldOnB);
+    const btVector3 before = along(point.m_positionWorldOnA - point.m_positionWorldOnB, point.m_normalWorldOnB);
     // Bullet bounds friction in each of its directions by itself
     const float friction = std::max(std::abs(point.m_appliedImpulseLateral1), std::abs(point.m_appliedImpulseLateral2));
-    if (friction >= held * point.m_combinedFriction * point.m_appliedImpulse) {
-        const btVector3 before = point.m_positionWorldOnA - point.m_positionWorldOnB;
-        most = std::min(most, float(along(before, point.m_normalWorldOnB).length()));
-    }
+    const bool holds = friction < held * point.m_combinedFriction * point.m_appliedImpulse;
+    const float most = holds ? mostDrift * sameWithin : std::min(mostDrift * sameWithin, float(before.length()));
     const float length = drift.length();
-    return length > most ? most / length * drift : drift;
+    return {length > most ? most / length * drift : drift, !holds && (drift - before).length() > slipping * sameWithin};
 }
 
 }  // namespace
@@ -469,15 +476,17 @@ Manifolds::~Manifolds() {
 }
 
 void Manifolds::write(std::span<const Patch> patches, const btCollisionObject& a, const btCollisionObject& b,
-                      float sameWithin, btManifoldResult& result) {
+                      const Continuity& continuity, btManifoldResult& result) {
     // One manifold at least: users expect a pair that overlaps to have one.
     while (manifolds_.size() < std::max<std::size_t>(patches.size(), 1))
         manifolds_.push_back(dispatcher_.getNewManifold(&a, &b));
+    rested_.resize(manifolds_.size());
 
     const bool aIsFirst = result.getBody0Internal() == &a;
     old_.clear();
-    for (btPersistentManifold* manifold : manifolds_)
-        for (int i = 0; i < manifold->getNumContacts(); ++i) old_.push_back(manifold->getContactPoint(i));
+    for (std::size_t m = 0; m < manifolds_.size(); ++m)
+        for (int i = 0; i < manifolds_[m]->getNumContacts(); ++i)
+            old_.push_back({manifolds_[m]->getContactPoint(i), rested_[m][std::size_t(i)]});
 
     for (std::size_t m = 0; m < manifolds_.size(); ++m) {
         btPersistentManifold* manifold = manifolds_[m];
@@ -486,13 +495,15 @@ void Manifolds::write(std::span<const Patch> patches, const btCollisionObject& a
         manifold->setNumContacts(0);
         result.setPersistentManifold(manifold);
         if (m < patches.size())
-            for (int i = 0; i < patches[m].count; ++i) emit(patches[m].contacts[i], aIsFirst, sameWithin, result);
-        for (int i = 0; i < manifold->getNumContacts(); ++i) inherit(*manifold, i, sameWithin);
-        manifold->setContactBreakingThreshold(sameWithin);
+            for (int i = 0; i < patches[m].count; ++i)
+                emit(patches[m].contacts[i], aIsFirst, continuity.sameWithin, result);
+        for (int i = 0; i < manifold->getNumContacts(); ++i)
+            rested_[m][std::size_t(i)] = inherit(*manifold, i, continuity);
+        manifold->setContactBreakingThreshold(continuity.sameWithin);
         if (touched && manifold->getNumContacts() == 0 && gContactEndedCallback) gContactEndedCallback(manifold);
     }
 
-    for (const btManifoldPoint& point : old_)
+    for (const auto& [point, rested] : old_)
         if (point.m_userPersistentData && gContactDestroyedCallback)
             gContactDestroyedCallback(point.m_userPersistentData);
 }
@@ -517,28 +528,34 @@ void Manifolds::emit(const Contact& contact, bool aIsFirst, float sameWithin, bt
     point.m_localPointA = manifold.getBody0()->getWorldTransform().invXform(point.m_positionWorldOnA);
 }
 
-void Manifolds::inherit(btPersistentManifold& manifold, int index, float sameWithin) {
+int Manifolds::inherit(btPersistentManifold& manifold, int index, const Continuity& continuity) {
+    const float sameWithin = continuity.sameWithin;
     btManifoldPoint& point = manifold.getContactPoint(index);
     point.m_contactPointFlags |= BT_CONTACT_FLAG_FRICTION_ANCHOR;
     float nearest = sameWithin * sameWithin;
     auto source = old_.end();
     for (auto it = old_.begin(); it != old_.end(); ++it) {
-        const float squared = std::min((it->m_localPointA - point.m_localPointA).length2(),
-                                       (it->m_localPointB - point.m_localPointB).length2());
-        if (squared < nearest && it->m_normalWorldOnB.dot(point.m_normalWorldOnB) > sameDirection)
+        const float squared = std::min((it->point.m_localPointA - point.m_localPointA).length2(),
+                                       (it->point.m_localPointB - point.m_localPointB).length2());
+        if (squared < nearest && it->point.m_normalWorldOnB.dot(point.m_normalWorldOnB) > sameDirection)
             nearest = squared, source = it;
     }
-    if (source == old_.end()) return;
-    point.m_appliedImpulse = source->m_appliedImpulse;
-    point.m_appliedImpulseLateral1 = source->m_appliedImpulseLateral1;
-    point.m_appliedImpulseLateral2 = source->m_appliedImpulseLateral2;
-    point.m_prevRHS = source->m_prevRHS;
-    point.m_lifeTime = source->m_lifeTime + 1;
-    point.m_userPersistentData = source->m_userPersistentData;
-    point.m_positionWorldOnA += along(driftOf(*source, manifold, mostDrift * sameWithin), point.m_normalWorldOnB);
+    if (source == old_.end()) return 0;
+    const auto& [old, hasRested] = *source;
+    point.m_appliedImpulse = old.m_appliedImpulse;
+    point.m_appliedImpulseLateral1 = old.m_appliedImpulseLateral1;
+    point.m_appliedImpulseLateral2 = old.m_appliedImpulseLateral2;
+    point.m_prevRHS = old.m_prevRHS;
+    point.m_lifeTime = old.m_lifeTime + 1;
+    point.m_userPersistentData = old.m_userPersistentData;
+    const Anchor anchor = anchorOf(old, manifold, sameWithin);
+    point.m_positionWorldOnA += along(anchor.drift, point.m_normalWorldOnB);
     point.m_localPointA = manifold.getBody0()->getWorldTransform().invXform(point.m_positionWorldOnA);
+    const int rested = anchor.slips ? 0 : std::min(hasRested + 1, stepsOfRest);
+    if (rested == stepsOfRest) point.m_combinedFriction *= continuity.restingFriction;
     *source = old_.back();
     old_.pop_back();
+    return rested;
 }
 
 }  // namespace bilayer::bullet

@@ -61,6 +61,12 @@ class Choice {
     std::vector<std::uint32_t> byFeature_;  ///< their indices in ascending order of features
 };
 
+/// How contacts go on from step to step.
+struct Continuity {
+    float sameWithin;       ///< an old and a new contact nearer than this on either body are the same [m]
+    float restingFriction;  ///< as in ShapeOptions
+};
+
 /// The manifolds of one pair of bodies, one for each patch. Contacts are written anew each step, since Bullet refreshes
 /// the positions of old ones but not their normals; impulses are handed on to the new contacts nearest the old ones,
 /// and so the solver starts warm. Contacts that friction holds are anchored: what they drift along the surface in spite
@@ -75,19 +81,25 @@ class Manifolds {
     /// Replaces all contacts. Goes through btManifoldResult::addContactPoint, so that friction, restitution, callbacks
     /// and contact tests work as for Bullet's own shapes.
     /// @param a, b  the bodies A and B of the patches; `result` may hold them in either order, as within a compound
-    /// @param sameWithin  an old and a new contact nearer than this on either body are the same [m]
-    void write(std::span<const Patch> patches, const btCollisionObject& a, const btCollisionObject& b, float sameWithin,
-               btManifoldResult& result);
+    void write(std::span<const Patch> patches, const btCollisionObject& a, const btCollisionObject& b,
+               const Continuity& continuity, btManifoldResult& result);
 
     std::span<btPersistentManifold* const> all() const { return manifolds_; }
 
   private:
     void emit(const Contact& contact, bool aIsFirst, float sameWithin, btManifoldResult& result);
-    void inherit(btPersistentManifold& manifold, int index, float sameWithin);
+    /// Returns for how many steps the contact has rested.
+    int inherit(btPersistentManifold& manifold, int index, const Continuity& continuity);
 
+    /// A point of the last step.
+    struct Old {
+        btManifoldPoint point;
+        int rested;  ///< steps since it has slipped
+    };
     btDispatcher& dispatcher_;
     std::vector<btPersistentManifold*> manifolds_;
-    std::vector<btManifoldPoint> old_;  ///< points of the last step that no new one has inherited from yet
+    std::vector<std::array<int, MANIFOLD_CACHE_SIZE>> rested_;  ///< of their contacts
+    std::vector<Old> old_;                                      ///< those that no new one has inherited from yet
 };
 
 }  // namespace bilayer::bullet

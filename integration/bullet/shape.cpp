@@ -221,9 +221,12 @@ Shape::Shape(std::shared_ptr<const Collider> collider, const ShapeOptions& optio
     : collider_(std::move(collider)),
       frame_(options.frame),
       sweeps_(options.sweeps),
+      restingFriction_(options.restingFriction),
       triangles_(std::make_unique<Triangles>()) {
     if (!collider_) throw std::invalid_argument("Shape: no collider");
     if (!std::isfinite(options.margin)) throw std::invalid_argument("Shape: the margin is not finite");
+    if (!(restingFriction_ >= 1) || !std::isfinite(restingFriction_))
+        throw std::invalid_argument("Shape: the friction at rest must be 1 or more");
     // Not the type for custom concave shapes: Bullet takes every shape of that type for its own btSdfCollisionShape.
     // This one is used by nothing else in Bullet.
     m_shapeType = FAST_CONCAVE_MESH_PROXYTYPE;

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstring>
 #include <glm/geometric.hpp>
+#include <limits>
 #include <numeric>
 #include <random>
 #include <set>
@@ -344,6 +345,36 @@ TEST_CASE("A ring hangs in another") {
     CHECK(at.z() == Approx(-2 * (0.5f - 0.12f)).margin(0.2 * 0.04));
     CHECK(std::hypot(at.x(), at.y()) < 0.05f);
     CHECK(motion(*body) < 0.05f);
+}
+
+TEST_CASE("What has rested bears as much more friction as it is told to, until it slips") {
+    World world;
+    const bool more = GENERATE(false, true);
+    CAPTURE(more);
+    Shape floor(exactBox({4, 1, 0.1f}, 0.05f));
+    Shape box(exactBox({0.2f, 0.2f, 0.1f}, 0.02f), {.restingFriction = more ? 1.2f : 1});
+    world.add(floor, 0, {0, 0, -0.1f})->setFriction(1);
+    btRigidBody* body = world.add(box, 1, {0, 0, 0.1f});
+    body->setFriction(0.5f);
+    body->setActivationState(DISABLE_DEACTIVATION);
+    // as on a slope: how far it slides in a time
+    const auto slides = [&](float slope, float seconds) {
+        const float before = body->getWorldTransform().getOrigin().x();
+        world.dynamics.setGravity({9.81f * slope, 0, -9.81f});
+        world.run(seconds);
+        return body->getWorldTransform().getOrigin().x() - before;
+    };
+    SECTION("it has rested") {
+        CHECK(slides(0.45f, 1) < 1e-3f);
+        CHECK((slides(0.57f, 0.5f) < 1e-3f) == more);
+        CHECK(slides(0.65f, 0.2f) > 0.02f);
+        CHECK(slides(0.55f, 0.2f) > 0.04f);
+    }
+    SECTION("it has not") {
+        CHECK(slides(0.51f, 1) == Approx(0.5f * 9.81f * 0.01f).epsilon(0.1));
+    }
+    for (const float less : {0.9f, 0.f, std::numeric_limits<float>::quiet_NaN()})
+        CHECK_THROWS_AS(Shape(exactBox({1, 1, 1}, 0.5f), {.restingFriction = less}), std::invalid_argument);
 }
 
 TEST_CASE("A slope holds a body by friction, and lets it slide where it must") {
