@@ -104,9 +104,13 @@ Outcome runOurs(const Scene& scene, const Job& job) {
 
 }  // namespace
 
-std::vector<Source> sources() {
+std::filesystem::path corpusFolder() {
     const char* const elsewhere = std::getenv("BILAYER_MESHES");
-    const std::filesystem::path corpus = elsewhere && *elsewhere ? elsewhere : BILAYER_MESHES;
+    return elsewhere && *elsewhere ? elsewhere : BILAYER_MESHES;
+}
+
+std::vector<Source> sources() {
+    const std::filesystem::path corpus = corpusFolder();
     std::vector<Source> found;
     for (const auto& [name, file] : {std::pair{"bunny", "bunny_watertight.obj"},
                                      {"dragon", "dragon_vrip_871k.ply"},

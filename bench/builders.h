@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -16,8 +17,11 @@ struct Source {
     std::string name, file;
 };
 
-/// The meshes of the comparison that are here: of the corpus those present, and the carved box. The environment
-/// variable BILAYER_MESHES names the corpus' folder where it is not where it was at compile time.
+/// Where the corpus lies; the environment variable BILAYER_MESHES names it where that is not where it was at compile
+/// time.
+std::filesystem::path corpusFolder();
+
+/// The meshes of the comparison that are here: of the corpus those present, and the carved box.
 std::vector<Source> sources();
 
 /// A source by its name above, a mesh file, or "uneven sphere D": the sphere of the paper's Table 5, whose triangles'

@@ -3,6 +3,7 @@
 #include <openvdb/tools/LevelSetMeasure.h>
 
 #include <cmath>
+#include <glm/gtc/matrix_transform.hpp>
 #include <memory>
 #include <new>
 #include <stdexcept>
@@ -79,12 +80,6 @@ void dropOrigin(openvdb::FloatGrid& liquid) {
     for (const std::string& name : names) liquid.removeMeta(name);
 }
 
-// As --scale stretches it.
-float stretchedVoxelSize(Mesh mesh, const glm::vec3& scale, float resolution) {
-    for (glm::vec3& point : mesh.points) point *= scale;
-    return voxelSizeFor(mesh, resolution);
-}
-
 openvdb::FloatGrid::Ptr startingLiquid(const Arguments& a, const Input& first, const glm::vec3& scale) {
     openvdb::initialize();
     if (!a.into.empty()) {
@@ -93,7 +88,8 @@ openvdb::FloatGrid::Ptr startingLiquid(const Arguments& a, const Input& first, c
         return liquid;
     }
     float voxelSize = a.voxelSize;
-    if (a.resolution > 0) voxelSize = stretchedVoxelSize(std::get<Mesh>(first), scale, a.resolution);
+    if (a.resolution > 0)
+        voxelSize = voxelSizeFor(transformed(std::get<Mesh>(first), glm::scale(glm::mat4(1), scale)), a.resolution);
     if (!(voxelSize > 0)) voxelSize = std::get<LevelSet>(first).voxelSize();
     try {
         return openvdb::createLevelSet<openvdb::FloatGrid>(voxelSize, a.halfWidth);

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <glm/geometric.hpp>
 
 #include "bench/measure.h"
 #include "bench/paper/markdown.h"
@@ -12,6 +11,7 @@
 #include "bench/paper/published.h"
 #include "bench/paper/scatter.h"
 #include "sdf/grids.h"
+#include "sdf/inspect.h"
 
 namespace bilayer::paper {
 namespace {
@@ -62,15 +62,6 @@ Errors errors(const LevelSet& field, const DenseField& truth) {
     return result;
 }
 
-double area(const Mesh& mesh) {
-    double sum = 0;
-    for (const glm::uvec3& t : mesh.triangles) {
-        const glm::dvec3 a(mesh.points[t.x]), b(mesh.points[t.y]), c(mesh.points[t.z]);
-        sum += 0.5 * glm::length(glm::cross(b - a, c - a));
-    }
-    return sum;
-}
-
 Mesh moved(Mesh mesh, float by) {
     for (glm::vec3& p : mesh.points) p += by;
     return mesh;
@@ -89,9 +80,10 @@ json measureTable1(const Run& run) {
         const Lattice lattice = latticeOf(paper.nodes);
         const Mesh mesh = fitted(bunny->mesh, lattice);
         const DenseField layers = denseDoubleLayer(mesh, lattice);
-        json row{{"nodes", paper.nodes},
-                 {"step", lattice.step},
-                 {"perEpsilon", double(layers.samples) * double(lattice.step) * double(lattice.step) / area(mesh)}};
+        json row{
+            {"nodes", paper.nodes},
+            {"step", lattice.step},
+            {"perEpsilon", double(layers.samples) * double(lattice.step) * double(lattice.step) / inspect(mesh).area}};
         {
             const DenseField truth = scatterPseudonormal(mesh, lattice, reached);
             row["all"] = errors(layers, truth, noLimit).toJson();

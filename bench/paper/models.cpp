@@ -1,10 +1,10 @@
 #include "bench/paper/models.h"
 
 #include <cmath>
-#include <cstdlib>
 #include <filesystem>
 #include <glm/common.hpp>
 
+#include "bench/builders.h"
 #include "bench/paper/published.h"
 #include "demos/shared/shapes.h"
 #include "sdf/mesh_io.h"
@@ -48,8 +48,7 @@ std::optional<Model> findModel(const std::string& name, const std::string& fetch
     if (name == "circular box")
         return Model{name, "a carved box of as many triangles, made by formula: the paper's is not public",
                      standing(shapes::carvedBox())};
-    const char* const elsewhere = std::getenv("BILAYER_MESHES");
-    const std::filesystem::path corpus = elsewhere && *elsewhere ? elsewhere : BILAYER_MESHES;
+    const std::filesystem::path corpus = bench::corpusFolder();
     for (const Files& file : files) {
         if (name != file.name) continue;
         if (std::filesystem::exists(corpus / file.corpus))

@@ -3,6 +3,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <fstream>
 #include <functional>
@@ -498,6 +499,11 @@ std::string textTable4(const json& data) {
                most, published::processor, threads, gpu ? "" : " No GPU was at hand for the Tesla's column.");
 }
 
+// Ours in Tables 4 and 5.
+constexpr std::array onTbb{std::pair("layers", "`double-layer`"), std::pair("exact", "`exact`")};
+constexpr std::array onDevices{std::pair(Builder::doubleLayerOpencl, "`double-layer`"),
+                               std::pair(Builder::exactOpencl, "`exact`")};
+
 // Grids of Table 4 where one of ours is slower than one of the paper's, or gains less over the serial program.
 struct Lag {
     std::vector<std::string> opencl, tesla, gain;
@@ -533,13 +539,12 @@ std::vector<std::string> behindTable4(const json& data) {
             lag.add(published::table4[i], ours(rows[i]), value(rows[i]["seconds"], "dense"));
         lag.tell(what, found);
     };
-    for (const auto& [key, name] : {std::pair("layers", "`double-layer`"), std::pair("exact", "`exact`")})
+    for (const auto& [key, name] : onTbb)
         compare(fmt::format("{} on TBB, {} threads,", name, threads),
                 [key = key](const json& row) { return value(row["seconds"], key); });
     const json& devices = rows[0]["devices"];
     for (std::size_t k = 0; k < devices.size(); ++k)
-        for (const auto& [builder, name] :
-             {std::pair(Builder::doubleLayerOpencl, "`double-layer`"), std::pair(Builder::exactOpencl, "`exact`")})
+        for (const auto& [builder, name] : onDevices)
             compare(fmt::format("{}'s kernels on {}", name, nameOf(devices[k])),
                     [k, builder = builder](const json& row) { return clocked(row["devices"][k], builder); });
     return found;
@@ -638,13 +643,12 @@ std::vector<std::string> behindTable5(const json& data) {
             found.push_back(
                 fmt::format("Table 5, {}: {:.2f} times as long for the worst variance as for the first.", what, most));
     };
-    for (const auto& [key, name] : {std::pair("layers", "`double-layer`"), std::pair("exact", "`exact`")})
+    for (const auto& [key, name] : onTbb)
         growth(fmt::format("{} on TBB, {} threads", name, threads),
                [key = key](const json& row) { return value(row["seconds"], key); });
     const json& devices = rows[0]["devices"];
     for (std::size_t k = 0; k < devices.size(); ++k)
-        for (const auto& [builder, name] :
-             {std::pair(Builder::doubleLayerOpencl, "`double-layer`"), std::pair(Builder::exactOpencl, "`exact`")}) {
+        for (const auto& [builder, name] : onDevices) {
             const std::string here = " on " + nameOf(devices[k]);
             const auto kernels = [k, builder = builder](const json& row) {
                 return clocked(row["devices"][k], builder);

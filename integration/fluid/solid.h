@@ -33,8 +33,8 @@ struct SolidOptions {
 /// second order (C. Batty, F. Bertails, R. Bridson, "A fast variational framework for accurate solid-fluid coupling",
 /// 2007, weigh faces so; C. Min, F. Gibou, "Geometric integration over arbitrary domains", 2007, cut cells into
 /// tetrahedra). A plate thinner than a cell may lie between corners: there it closes no face. Active are the cells that
-/// are not open altogether. Throws as regrid() does, for cells
-/// that are turned against the world, for a velocity that is not finite, and for a half width out of 3..1000.
+/// are not open altogether. Throws as regrid() does, for cells that are turned against the world, for a velocity that
+/// is not finite, and for a half width out of 3..1000.
 Solid solid(const Mesh& mesh, const Placement& placement, const openvdb::math::Transform& cells,
             const SolidOptions& options = {});
 Solid solid(const LevelSet& field, const Placement& placement, const openvdb::math::Transform& cells,
