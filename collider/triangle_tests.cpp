@@ -5,6 +5,8 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
+#include <glm/vec2.hpp>
+#include <glm/vector_relational.hpp>
 
 namespace bilayer {
 namespace {
@@ -31,29 +33,47 @@ glm::dvec3 TriangleRay::sheared(const glm::dvec3& corner) const {
     return {p[x_] - shearX_ * p[z_], p[y_] - shearY_ * p[z_], perZ_ * p[z_]};
 }
 
-// Whether the axis lies on the inner side of an edge, or hardly beside it.
-bool TriangleRay::within(double area, const glm::dvec3& from, const glm::dvec3& to) const {
-    if (area >= 0) return true;
-    const double x = to.x - from.x, y = to.y - from.y;
-    return area * area <= tolerance_ * tolerance_ * (x * x + y * y);
-}
-
 bool TriangleRay::meets(const Corners& corners, double& along, glm::dvec3& position) const {
-    const glm::dvec3 a = sheared(corners[0]), b = sheared(corners[1]), c = sheared(corners[2]);
+    const Corners seen{sheared(corners[0]), sheared(corners[1]), sheared(corners[2])};
+    const auto& [a, b, c] = seen;
     // twice the areas between the axis and the edges: neighbours get the same number for the edge that they share
-    double u = c.x * b.y - c.y * b.x, v = a.x * c.y - a.y * c.x, w = b.x * a.y - b.y * a.x;
-    const double facing = u + v + w;
+    glm::dvec3 weights{c.x * b.y - c.y * b.x, a.x * c.y - a.y * c.x, b.x * a.y - b.y * a.x};
+    const double facing = weights.x + weights.y + weights.z;
     if (facing == 0) return false;
-    if (facing < 0) u = -u, v = -v, w = -w;
-    if (!(within(u, b, c) && within(v, c, a) && within(w, a, b))) return false;
-    u = std::max(u, 0.0), v = std::max(v, 0.0), w = std::max(w, 0.0);
-    const double all = u + v + w, here = (u * a.z + v * b.z + w * c.z) / all;
+    if (facing < 0) weights = -weights;
+    if (glm::all(glm::greaterThanEqual(weights, glm::dvec3(0))))
+        weights /= std::abs(facing);
+    else if (!besideEdge(seen, weights))
+        return false;
+    const double here = weights.x * a.z + weights.y * b.z + weights.z * c.z;
     if (!(here < along)) return false;
     const bool entering = (facing < 0) == (perZ_ < 0);
     if (here < (entering ? -tolerance_ : 0)) return false;
     along = std::max(here, 0.0);
-    position = (u * corners[0] + v * corners[1] + w * corners[2]) / all;
+    position = weights.x * corners[0] + weights.y * corners[1] + weights.z * corners[2];
     return true;
+}
+
+// Whether the axis, outside of the triangle, passes an edge within the tolerance; the weights become those of the
+// point that it passes.
+bool TriangleRay::besideEdge(const Corners& seen, glm::dvec3& weights) const {
+    double nearest = tolerance_ * tolerance_;
+    bool found = false;
+    const glm::dvec3 areas = weights;
+    for (int k = 0; k < 3; ++k) {
+        if (areas[k] >= 0) continue;
+        const int from = (k + 1) % 3, to = (k + 2) % 3;
+        const glm::dvec2 start(seen[from]), edge = glm::dvec2(seen[to]) - start;
+        const double length2 = glm::dot(edge, edge);
+        if (areas[k] * areas[k] > nearest * length2) continue;
+        const double part = length2 > 0 ? std::clamp(-glm::dot(start, edge) / length2, 0.0, 1.0) : 0;
+        const glm::dvec2 passed = start + part * edge;
+        if (glm::dot(passed, passed) > nearest) continue;
+        nearest = glm::dot(passed, passed);
+        weights = {0, 0, 0}, weights[from] = 1 - part, weights[to] = part;
+        found = true;
+    }
+    return found;
 }
 
 // The distance to a triangle is convex along the way: tangents never lead past the first touch.

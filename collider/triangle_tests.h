@@ -31,7 +31,7 @@ class TriangleRay {
 
   private:
     glm::dvec3 sheared(const glm::dvec3& corner) const;
-    bool within(double area, const glm::dvec3& from, const glm::dvec3& to) const;
+    bool besideEdge(const Corners& seen, glm::dvec3& weights) const;
 
     glm::dvec3 start_;
     double tolerance_;

@@ -534,21 +534,25 @@ class TriangleProbes : public btTriangleCallback {
             keep(local_.probe(corners[i], answers[i], 0, featureOf(index, 3 + i), margin_, report_));
             longest = std::max(longest, glm::distance(corners[i], corners[(i + 1) % 3]));
         }
+        std::array<bool, 3> flat{};
         for (int i = 0; i < 3; ++i) {
             const auto& sides = sides_.at(keyOf(f, i));
-            if (sides.front().face != f || sides.front().first != i) continue;
-            const glm::vec3 &from = corners[i], &to = corners[(i + 1) % 3];
-            Local::Edge edge{
-                [&](float part) { return glm::mix(from, to, part); }, {0, 0}, true, featureOf(index, i), {}};
+            Local::Edge edge{[&, i](float part) { return glm::mix(corners[i], corners[(i + 1) % 3], part); },
+                             {0, 0},
+                             true,
+                             featureOf(index, i),
+                             {}};
             if (sides.size() == 2) {
                 edge.wings = Wings{wingOf(sides[0]), wingOf(sides[1])};
-                edge.isSearched = glm::dot((*edge.wings)[0], (*edge.wings)[1]) > flatEdge;
+                flat[i] = glm::dot((*edge.wings)[0], (*edge.wings)[1]) <= flatEdge;
+                edge.isSearched = !flat[i];
             }
+            if (sides.front().face != f || sides.front().first != i) continue;
             // Within a plane the field's own points tell more.
             if (edge.isSearched || longest <= spacing_)
                 local_.probeEdge(edge, answers[i], answers[(i + 1) % 3], margin_, report_, contacts_);
         }
-        if (longest > spacing_) visitFace(corners);
+        if (longest > spacing_) visitFace(corners, flat);
     }
 
     /// From a side into its triangle; nowhere for a triangle without area.
@@ -573,18 +577,30 @@ class TriangleProbes : public btTriangleCallback {
     }
 
     /// Asks the field at the feet of its own surface points on the triangle: a bump finds a large face.
-    void visitFace(const std::array<glm::vec3, 3>& corners) {
-        const float scale = field_.scale;
+    /// @param flat  the sides beyond which a neighbour goes on in the same plane: what lies there is the neighbour's
+    void visitFace(const std::array<glm::vec3, 3>& corners, const std::array<bool, 3>& flat) {
+        const float scale = field_.scale, rounding = onFace * spacing_;
+        const glm::vec3 square = glm::cross(corners[1] - corners[0], corners[2] - corners[0]);
+        const float area = glm::length(square);
+        std::array<glm::vec3, 3> outwards{};
+        for (int i = 0; i < 3; ++i)
+            if (flat[i]) outwards[i] = glm::normalize(glm::cross(corners[(i + 1) % 3] - corners[i], square));
+        const auto isBeyond = [&](const glm::vec3& place, float by) {
+            for (int i = 0; i < 3; ++i)
+                if (flat[i] && glm::dot(outwards[i], place - corners[i]) > by) return true;
+            return area > 0 && std::abs(glm::dot(square, place - corners[0])) > area * (reach_ + by);
+        };
         const auto foot = [&](const glm::vec3& point) {
             return nearestOnTriangle(scale * point, corners[0], corners[1], corners[2]);
         };
         const auto reject = [&](const glm::vec3& centre, float radius) {
-            return glm::distance(foot(centre), scale * centre) > scale * radius + reach_;
+            return isBeyond(scale * centre, scale * radius + rounding) ||
+                   glm::distance(foot(centre), scale * centre) > scale * radius + reach_;
         };
-        const glm::vec3 square = glm::cross(corners[1] - corners[0], corners[2] - corners[0]);
-        const float area = glm::length(square);
         field_.collider.points().visit(reject, [&](std::uint32_t index, const SurfacePoint& point) {
-            const glm::vec3 place = scale * point.position, below = foot(point.position), way = below - place;
+            const glm::vec3 place = scale * point.position;
+            if (isBeyond(place, rounding)) return;
+            const glm::vec3 below = foot(point.position), way = below - place;
             const std::uint32_t feature = index | featureOfB;
             if (glm::length(way) > reach_) return;
             // A point whose surface lies on the face is exact; one aslant may have passed an edge of what the sheet
@@ -593,7 +609,7 @@ class TriangleProbes : public btTriangleCallback {
             const float side = glm::dot(square, point.normal) < 0 ? -1.f : 1.f;
             const glm::vec3 normal = side / area * square;
             const float height = glm::dot(way, normal);
-            const bool isOver = glm::length(way) - std::abs(height) <= onFace * spacing_;
+            const bool isOver = glm::length(way) - std::abs(height) <= rounding;
             const bool lies = glm::dot(normal, point.normal) >= opposition.leastOppositionApart;
             const Local::Answer answer = local_.at(below);
             const bool isNearest =

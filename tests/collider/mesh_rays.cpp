@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "collider/triangle_tests.h"
 #include "demos/shared/shapes.h"
 #include "sdf/build.h"
 #include "sdf/mesh_io.h"
@@ -132,6 +133,41 @@ TEST_CASE("no ray leaves a closed mesh through an edge or a vertex") {
                 REQUIRE(std::abs(hit->along - glm::distance(from, target)) < 1e-4 * double(tree.voxelSize()));
             }
     }
+}
+
+TEST_CASE("a ray meets what it passes by a hair, seen edge-on too, and nothing beside it") {
+    constexpr double tolerance = 1e-7;
+    const unsigned start = seed();
+    CAPTURE(start);
+    Random random(start);
+    int met = 0, passed = 0;
+    for (int i = 0; i < 100000; ++i) {
+        // slivers along x, about as thin as the tolerance; the ray is the z axis, before both are turned
+        const double width = std::pow(10, random(-10, -6));
+        Corners corners, flat;
+        for (std::size_t k = 0; k < 3; ++k) {
+            corners[k] = {random(-1, 1), width * random(-1, 1), random(1, 2)};
+            flat[k] = {corners[k].x, corners[k].y, 0};
+        }
+        const double beside = std::sqrt(squaredDistance(glm::dvec3(0), flat[0], flat[1], flat[2]));
+        const glm::dquat turn = glm::normalize(glm::dquat(random(-1, 1), random.point(1)));
+        for (glm::dvec3& corner : corners) corner = turn * corner;
+        const glm::dvec3 direction = turn * glm::dvec3(0, 0, 1);
+        double along = 10;
+        glm::dvec3 position;
+        const bool meets = TriangleRay(glm::dvec3(0), direction, tolerance).meets(corners, along, position);
+        CAPTURE(i, width, beside);
+        // the tolerance is one across the longest axis of the direction
+        if (beside < 0.5 * tolerance) REQUIRE(meets);
+        if (beside > 1.001 * tolerance) REQUIRE_FALSE(meets);
+        (meets ? met : passed) += 1;
+        if (!meets) continue;
+        REQUIRE(glm::length(glm::cross(position, direction)) < 1.001 * tolerance);
+        REQUIRE(squaredDistance(position, corners[0], corners[1], corners[2]) < 1e-24);
+        REQUIRE(along == Approx(glm::dot(position, direction)).margin(1e-6));
+    }
+    REQUIRE(met > 1000);
+    REQUIRE(passed > 1000);
 }
 
 TEST_CASE("rays that start on a triangle meet it on the way in only") {
