@@ -528,31 +528,39 @@ class TriangleProbes : public btTriangleCallback {
     void visit(std::uint32_t f) {
         const auto& [corners, index] = faces_[f];
         Local::Answer answers[3];
+        std::array<std::optional<Wings>, 3> wings;
+        std::array<bool, 3> flat;
         float longest = 0;
         for (int i = 0; i < 3; ++i) {
             answers[i] = local_.at(corners[i]);
-            keep(local_.probe(corners[i], answers[i], 0, featureOf(index, 3 + i), margin_, report_));
+            wings[i] = wingsOf(f, i);
+            flat[i] = wings[i] && glm::dot((*wings[i])[0], (*wings[i])[1]) <= flatEdge;
             longest = std::max(longest, glm::distance(corners[i], corners[(i + 1) % 3]));
         }
-        std::array<bool, 3> flat{};
+        // Within a plane of large triangles the field's own points tell more.
+        const bool isLarge = longest > spacing_;
         for (int i = 0; i < 3; ++i) {
-            const auto& sides = sides_.at(keyOf(f, i));
-            Local::Edge edge{[&, i](float part) { return glm::mix(corners[i], corners[(i + 1) % 3], part); },
-                             {0, 0},
-                             true,
-                             featureOf(index, i),
-                             {}};
-            if (sides.size() == 2) {
-                edge.wings = Wings{wingOf(sides[0]), wingOf(sides[1])};
-                flat[i] = glm::dot((*edge.wings)[0], (*edge.wings)[1]) <= flatEdge;
-                edge.isSearched = !flat[i];
-            }
-            if (sides.front().face != f || sides.front().first != i) continue;
-            // Within a plane the field's own points tell more.
-            if (edge.isSearched || longest <= spacing_)
-                local_.probeEdge(edge, answers[i], answers[(i + 1) % 3], margin_, report_, contacts_);
+            if (!isLarge || !flat[i] || !flat[(i + 2) % 3])
+                keep(local_.probe(corners[i], answers[i], 0, featureOf(index, 3 + i), margin_, report_));
+            const Side& first = sides_.at(keyOf(f, i)).front();
+            if (first.face != f || first.first != i || (isLarge && flat[i])) continue;
+            const glm::vec3 &from = corners[i], &to = corners[(i + 1) % 3];
+            const Local::Edge edge{[&](float part) { return glm::mix(from, to, part); },
+                                   {0, 0},
+                                   true,
+                                   featureOf(index, i),
+                                   wings[i],
+                                   !flat[i]};
+            local_.probeEdge(edge, answers[i], answers[(i + 1) % 3], margin_, report_, contacts_);
         }
-        if (longest > spacing_) visitFace(corners, flat);
+        if (isLarge) visitFace(corners, flat);
+    }
+
+    /// Of a side that two triangles share.
+    std::optional<Wings> wingsOf(std::uint32_t face, int first) const {
+        const auto& sides = sides_.at(keyOf(face, first));
+        if (sides.size() != 2) return std::nullopt;
+        return Wings{wingOf(sides[0]), wingOf(sides[1])};
     }
 
     /// From a side into its triangle; nowhere for a triangle without area.

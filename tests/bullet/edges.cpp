@@ -137,6 +137,43 @@ TEST_CASE("Edges that cross touch where they cross, however their points lie") {
     }
 }
 
+TEST_CASE("A plane of many triangles makes the contacts of a plane of two") {
+    const unsigned start = seed();
+    CAPTURE(start);
+    const glm::vec3 halfSlab(1.6f, 1.6f, 0.3f);
+    const Mesh knot = shapes::torusKnot(2, 3, 0.4f, 0.1f, 200, 16);
+    const auto body = colliderOf(knot);
+    const Triangles two(shapes::box(halfSlab)), many(shapes::box(halfSlab, 20));
+    std::mt19937 random(start);
+    std::uniform_real_distribution<float> part(-1, 1);
+    int touching = 0;
+    for (int i = 0; i < 100; ++i) {
+        const bool overMiddle = i % 2;  // else anywhere, over the rim, or beside it
+        const float spread = overMiddle ? 0.4f : 2;
+        Pose pose{{spread * part(random), spread * part(random), 0},
+                  glm::normalize(glm::quat(part(random), part(random), part(random), part(random) + 0.1f))};
+        float lowest = 1;
+        for (const glm::vec3& point : knot.points) lowest = std::min(lowest, pose.toWorld(point).z);
+        pose.position.z = halfSlab.z - lowest + 0.5f * h * part(random);
+        const auto collide = [&](const Triangles& slab) {
+            std::vector<Contact> contacts;
+            bullet::collideTriangles(*slab.shape, btTransform::getIdentity(), {}, {*body, pose}, h, contacts);
+            return contacts;
+        };
+        const auto few = collide(two), others = collide(many);
+        CAPTURE(i, few.size(), others.size());
+        REQUIRE(few.empty() == others.empty());
+        if (few.empty()) continue;
+        ++touching;
+        CHECK(deepest(others).distance == Approx(deepest(few).distance).margin(tolerance));
+        // of the rim each piece is probed by itself
+        if (!overMiddle) continue;
+        CHECK(others.size() <= few.size() + few.size() / 8);
+        CHECK(others.size() >= few.size() - few.size() / 8);
+    }
+    CHECK(touching > 40);
+}
+
 TEST_CASE("A contact on an edge goes as evenly as the edge that slides") {
     const int kind = GENERATE(0, 1, 2, 3);
     const unsigned start = seed();
