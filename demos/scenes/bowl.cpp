@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <glm/geometric.hpp>
 #include <glm/gtc/matrix_transform.hpp>
+#include <glm/vec2.hpp>
 #include <random>
 #include <stdexcept>
 
@@ -57,20 +58,26 @@ std::shared_ptr<const Thing> bodyOf(const Kind& kind, float resolution) {
         {.voxelSize = bodySize / resolution, .interiorWidth = bodyInteriorWidth, .restingFriction = restingFriction});
 }
 
-// Layers above the bowl, each of rings turned against those below, every body turned at random.
+// Places of a layer's bodies: rings, as many as there is room for, none nearer to each other than a body is long.
+std::vector<glm::vec2> layerOf(float scale) {
+    std::vector<glm::vec2> places;  // radius and angle
+    for (float radius = layerRadius * scale; radius > 0; radius -= layerRadius) {
+        const int fits = std::max(1, int(usualBodiesPerLayer * radius / layerRadius));
+        for (int i = 0; i < fits; ++i) places.emplace_back(radius, 6.2832f * float(i) / float(fits));
+    }
+    return places;
+}
+
+// Layers above the bowl, each turned against those below, every body turned at random.
 std::vector<Pose> startPoses(const BowlOptions& options, float scale) {
     std::mt19937 random(options.seed);
     std::normal_distribution<float> normal;
-    const int perLayer = int(usualBodiesPerLayer * scale * scale);
+    const std::vector<glm::vec2> places = layerOf(scale);
     std::vector<Pose> poses;
-    for (int i = 0; i < options.bodies; ++i) {
-        const int layer = i / perLayer;
-        // the outermost ring of a layer first, then as many rings within as it takes
-        int place = i % perLayer;
-        float radius = layerRadius * scale;
-        const auto fits = [&] { return std::max(1, int(usualBodiesPerLayer * radius / layerRadius)); };
-        for (; place >= fits() && radius > layerRadius; radius -= layerRadius) place -= fits();
-        const float turn = 6.2832f * float(place) / float(fits()) + 0.6f * float(layer);
+    for (std::size_t i = 0; i < std::size_t(options.bodies); ++i) {
+        const std::size_t layer = i / places.size();
+        const glm::vec2 place = places[i % places.size()];
+        const float radius = place.x, turn = place.y + 0.6f * float(layer);
         const float x = normal(random), y = normal(random), z = normal(random), w = normal(random);
         poses.push_back({{radius * std::cos(turn), radius * std::sin(turn), layerHeight * float(layer)},
                          glm::normalize(glm::quat(w, x, y, z))});

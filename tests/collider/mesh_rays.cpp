@@ -162,7 +162,8 @@ TEST_CASE("a ray meets what it passes by a hair, seen edge-on too, and nothing b
         if (beside > 1.001 * tolerance) REQUIRE_FALSE(meets);
         (meets ? met : passed) += 1;
         if (!meets) continue;
-        REQUIRE(glm::length(glm::cross(position, direction)) < 1.001 * tolerance);
+        // the corners are rounded, which moves what is seen edge-on along itself
+        REQUIRE(glm::length(glm::cross(position, direction)) < 1.001 * tolerance + 2e-15 / width);
         REQUIRE(squaredDistance(position, corners[0], corners[1], corners[2]) < 1e-24);
         REQUIRE(along == Approx(glm::dot(position, direction)).margin(1e-6));
     }

@@ -89,6 +89,18 @@ TEST_CASE("knots in a bowl come to rest") {
     judge([&] { return demo::bowl(options); });
 }
 
+TEST_CASE("however many bodies fall into a bowl, none starts in another") {
+    demo::BowlOptions options;
+    options.kinds = {{"box", shapes::box(glm::vec3(0.1f, 0.09f, 0.08f))}};
+    options.bodies = GENERATE(30, 50, 200, 500);
+    options.resolution = 16;
+    options.seconds = 0.01f;
+    CAPTURE(options.bodies);
+    const demo::Outcome outcome = demo::bowl(options);
+    CHECK(outcome.bodies == options.bodies);
+    CHECK(outcome.deepest() < outcome.voxelSize);
+}
+
 TEST_CASE("balls stay in front of thin plates") {
     demo::PlatesOptions options;
     options.phases = 2;
