@@ -91,7 +91,7 @@ TEST_CASE("knots in a bowl come to rest") {
 
 TEST_CASE("however many bodies fall into a bowl, none starts in another") {
     demo::BowlOptions options;
-    options.kinds = {{"box", shapes::box(glm::vec3(0.1f, 0.09f, 0.08f))}};
+    options.kinds = {{"knot", shapes::torusKnot(2, 3, 0.06f, 0.02f, 60, 8)}};
     options.bodies = GENERATE(30, 50, 200, 500);
     options.resolution = 16;
     options.seconds = 0.01f;
