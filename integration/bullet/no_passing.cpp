@@ -45,6 +45,9 @@ constexpr int mostSteps = 64;
 // A body that is held back may be met by another one: pairs are looked at again up to so many times.
 constexpr int mostRounds = 8;
 
+// Who is held so early in a step has not moved: its contacts there have not taken its speed away.
+constexpr float atStart = 1e-3f;
+
 /// Where a way from one point to another enters an obstacle.
 struct Entry {
     glm::vec3 position, normal;  ///< outward, of unit length
@@ -261,6 +264,7 @@ class Course {
         upper += btVector3(r, r, r);
     }
 
+    btRigidBody* body() const { return body_; }
     /// The part of the step after which it goes no farther.
     float part() const { return part_; }
     bool holdAt(float part) {
@@ -332,6 +336,24 @@ Frame frameOf(const Part& part, const btTransform& object) {
     return {placed.pose, placed.scale};
 }
 
+/// Where something first goes too deep into an obstacle: when, there, and the normal outward from it.
+struct Touch {
+    float time = 1;  ///< 1: nothing does in this step
+    glm::vec3 place{0}, normal{0};
+
+    Touch turned() const { return {time, place, -normal}; }
+};
+
+Touch earlier(const Touch& one, const Touch& other) {
+    return other.time < one.time ? other : one;
+}
+
+/// @param touch  in the coordinates of the obstacle
+Touch inWorld(const Touch& touch, const Part& obstacle, const Course& its) {
+    const Frame frame = frameOf(obstacle, its.at(touch.time));
+    return {touch.time, frame.pose.toWorld(frame.scale * touch.place), frame.pose.rotation * touch.normal};
+}
+
 /// From start to end, so close together that the ways in between are straight.
 std::vector<Moment> momentsOf(const Part& points, const Course& its, const Part& obstacle, const Course& others) {
     const int pieces = std::max(1, int(std::ceil((its.turn() + others.turn()) / pieceTurn)));
@@ -377,7 +399,7 @@ class Passage {
         }
         from += aside;
         std::optional<Entry> entered;
-        for (std::size_t i = 0; i + 1 < moments_.size() && moments_[i].time < first_; ++i) {
+        for (std::size_t i = 0; i + 1 < moments_.size() && moments_[i].time < first_.time; ++i) {
             const glm::vec3 to = moments_[i + 1](inner) + aside;
             if (!entered) entered = obstacle_.entry(from, to, smaller);
             if (entered) {
@@ -391,7 +413,7 @@ class Passage {
                     const float touching = std::min(inward * glm::dot(out, entered->normal), 0.f);
                     const float part = (touching - before) / (after - before);
                     const float time = moments_[i].time + part * (moments_[i + 1].time - moments_[i].time);
-                    first_ = std::clamp(time, 0.f, first_);
+                    first_ = {std::clamp(time, 0.f, first_.time), entered->position - aside, entered->normal};
                     return;
                 }
                 if (after < 0) entered.reset();
@@ -400,12 +422,12 @@ class Passage {
         }
     }
 
-    /// When the first of them went too deep; 1 if none did.
-    float first() const { return first_; }
+    /// The first of them that goes too deep, in the obstacle's coordinates.
+    const Touch& first() const { return first_; }
 
   private:
     bool comesNear(const glm::vec3& centre, float radius) const {
-        for (std::size_t i = 0; i + 1 < moments_.size() && moments_[i].time < first_; ++i)
+        for (std::size_t i = 0; i + 1 < moments_.size() && moments_[i].time < first_.time; ++i)
             if (isNear(moments_[i](centre), moments_[i + 1](centre), radius)) return true;
         return false;
     }
@@ -428,18 +450,19 @@ class Passage {
 
     const Obstacle& obstacle_;
     const std::vector<Moment>& moments_;
-    float voxel_, scale_, first_ = 1;
+    float voxel_, scale_;
+    Touch first_;
 };
 
 template <class Obstacle>
-float passageOf(const Shape& field, const Obstacle& obstacle, const std::vector<Moment>& moments, float voxel) {
+Touch passageOf(const Shape& field, const Obstacle& obstacle, const std::vector<Moment>& moments, float voxel) {
     Passage passage(obstacle, moments, voxel);
     passage.follow(field.collider().points());
     return passage.first();
 }
 
 /// The corners and edges of a convex body, and what it is grown by.
-float passageOf(const Convex& convex, const Shape& field, const std::vector<Moment>& moments) {
+Touch passageOf(const Convex& convex, const Shape& field, const std::vector<Moment>& moments) {
     const FieldObstacle obstacle(field.collider().field());
     Passage passage(obstacle, moments, field.voxelSize() / field.scale());
     const auto follow = [&](const glm::vec3& point, float radius) {
@@ -459,51 +482,75 @@ float passageOf(const Convex& convex, const Shape& field, const std::vector<Mome
     return passage.first();
 }
 
-/// When a field and another shape get through each other; 1: not in this step.
-float passage(const Part& part, const Course& its, const Part& other, const Course& others) {
+/// Where a field and another shape first get through each other; the normal is that of the other one.
+Touch passage(const Part& part, const Course& its, const Part& other, const Course& others) {
     const Shape& field = *part.field();
     const std::vector<Moment> moments = momentsOf(part, its, other, others);
     const float voxel = field.voxelSize();
     const int type = other.shape->getShapeType();
+    const auto into = [&](const auto& obstacle, float its) {
+        return inWorld(passageOf(field, obstacle, moments, its), other, others);
+    };
     if (const Shape* second = other.field())
-        return passageOf(field, FieldObstacle(second->collider().field()), moments,
-                         std::min(voxel, second->voxelSize()) / second->scale());
+        return into(FieldObstacle(second->collider().field()), std::min(voxel, second->voxelSize()) / second->scale());
     if (type == STATIC_PLANE_PROXYTYPE)
-        return passageOf(field, PlaneObstacle(static_cast<const btStaticPlaneShape&>(*other.shape)), moments, voxel);
+        return into(PlaneObstacle(static_cast<const btStaticPlaneShape&>(*other.shape)), voxel);
     if (other.shape->isConvex()) {
         const Convex convex(static_cast<const btConvexShape&>(*other.shape));
-        return std::min(passageOf(field, ConvexObstacle(convex, 0.1f * allowed * voxel), moments, voxel),
-                        passageOf(convex, field, momentsOf(other, others, part, its)));
+        const Touch touch = passageOf(convex, field, momentsOf(other, others, part, its));
+        return earlier(into(ConvexObstacle(convex, 0.1f * allowed * voxel), voxel),
+                       inWorld(touch, part, its).turned());
     }
-    if (!other.shape->isConcave() || type == GIMPACT_SHAPE_PROXYTYPE || type == FAST_CONCAVE_MESH_PROXYTYPE) return 1;
-    return passageOf(field, TriangleObstacle(static_cast<const btConcaveShape&>(*other.shape)), moments, voxel);
+    if (!other.shape->isConcave() || type == GIMPACT_SHAPE_PROXYTYPE || type == FAST_CONCAVE_MESH_PROXYTYPE) return {};
+    return into(TriangleObstacle(static_cast<const btConcaveShape&>(*other.shape)), voxel);
 }
 
 struct Meeting {
     Course *a, *b;
-    float time = 1;                ///< of the first passage
+    Touch touch{};                 ///< the first; from b to a
     float heldA = -1, heldB = -1;  ///< their courses' parts when they were looked at
+    Touch stops{};                 ///< where one of them was held at the start of the step
 
     /// Whether it has not been looked at since one of the two was held.
     bool isOpen() const { return a->part() != heldA || b->part() != heldB; }
 
     void look() {
-        time = 1;
+        touch = {};
         heldA = a->part(), heldB = b->part();
         visitParts(a->object(), [&](const Part& one) {
             visitParts(b->object(), [&](const Part& two) {
-                if (one.field()) time = std::min(time, passage(one, *a, two, *b));
-                if (two.field()) time = std::min(time, passage(two, *b, one, *a));
+                if (one.field()) touch = earlier(touch, passage(one, *a, two, *b));
+                if (two.field()) touch = earlier(touch, passage(two, *b, one, *a).turned());
             });
         });
     }
 
     /// Holds what goes farther, and where that is held already, the other one.
     bool hold() {
-        if (time >= 1 || isOpen()) return false;
+        if (touch.time >= 1 || isOpen()) return false;
         Course *faster = a, *slower = b;
         if (a->longest() < b->longest()) std::swap(faster, slower);
-        return faster->holdAt(time) || slower->holdAt(time);
+        const bool held = faster->holdAt(touch.time) || slower->holdAt(touch.time);
+        if (held && touch.time <= atStart) stops = touch;
+        return held;
+    }
+
+    /// Takes away the speed at which two that have not come from the spot go for each other, as an impact without
+    /// restitution and friction does. It would grow with each step.
+    void stop() const {
+        if (stops.time > atStart) return;
+        const btVector3 place = toBullet(stops.place), normal = toBullet(stops.normal);
+        float speed = 0, perMass = 0;
+        for (const auto& [course, sign] : {std::pair(a, 1.f), std::pair(b, -1.f)})
+            if (const btRigidBody* body = course->body()) {
+                const btVector3 arm = place - body->getCenterOfMassPosition();
+                speed += sign * body->getVelocityInLocalPoint(arm).dot(normal);
+                perMass += body->computeImpulseDenominator(place, normal);
+            }
+        if (!(speed < 0) || !(perMass > 0)) return;
+        for (const auto& [course, sign] : {std::pair(a, 1.f), std::pair(b, -1.f)})
+            if (btRigidBody* body = course->body())
+                body->applyImpulse(-sign * speed / perMass * normal, place - body->getCenterOfMassPosition());
     }
 };
 
@@ -541,19 +588,21 @@ class Meetings {
             // the first ones first: what is held may come no farther
             std::vector<Meeting*> order;
             for (Meeting& meeting : meetings_)
-                if (meeting.time < 1) order.push_back(&meeting);
-            std::stable_sort(order.begin(), order.end(), [](auto* one, auto* two) { return one->time < two->time; });
+                if (meeting.touch.time < 1) order.push_back(&meeting);
+            std::stable_sort(order.begin(), order.end(),
+                             [](auto* one, auto* two) { return one->touch.time < two->touch.time; });
             bool held = false;
             for (Meeting* meeting : order) held = meeting->hold() || held;
             if (!held) break;
         }
     }
 
-    /// Puts them where they are held.
+    /// Puts them where they are held, and stops what is held where it was.
     int apply() const {
         int held = 0;
         for (const Course& course : fast_) held += course.apply();
         for (const auto& [object, course] : slow_) held += course.apply();
+        for (const Meeting& meeting : meetings_) meeting.stop();
         return held;
     }
 

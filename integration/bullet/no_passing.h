@@ -13,7 +13,8 @@ namespace bilayer::bullet {
 /// way that each fast body has gone in a step is looked at once more, with its turn, against all that it swept over:
 /// every surface point goes along its way through the other's field. Where one would get through the surface, the body
 /// stays at the place where it touched, for the rest of this step; it keeps its velocity, and the contacts that it has
-/// there are the next step's. Energy does not rise by that.
+/// there are the next step's. A body that is held where it was already, since they have not stopped it, loses the speed
+/// at which it goes for the surface there.
 ///
 /// Bodies that go less than a margin in a step cost next to nothing. Left alone are shapes with sweeps == false, pairs
 /// without a field, and pairs that the Dispatcher foresees still: bodies that the user moves (kinematic ones), and
