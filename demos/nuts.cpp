@@ -9,7 +9,7 @@ int main(int argc, char** argv) {
     NutsOptions options;
     Program program("nuts", "Nuts run down their bolts, or are held by friction");
     program.option("--pairs", options.pairs, "of bolt and nut")->check(CLI::Range(1, 1000));
-    program.option("--frictions", options.frictions, "of the pairs in turn");
+    program.option("--frictions", options.frictions, "of the pairs in turn")->check(CLI::Range(0.0, 1000.0));
     program.option("--turns", options.turns, "that nuts make")->check(CLI::Range(1.0, 15.0));
     program.option("--seconds", options.seconds, "most seconds to simulate")->check(CLI::Range(0.2, 1000.0));
     program.option("--clearance", options.clearance, "of the threads [m]")->check(CLI::Range(0.0, 0.15e-3));

@@ -7,8 +7,10 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <cstring>
 #include <glm/geometric.hpp>
+#include <limits>
 #include <set>
 
 #include "sdf/build.h"
@@ -122,6 +124,8 @@ std::vector<double> Stage::penetrationsIn(const std::vector<Pose>& poses) const 
         balls.push_back({poses[i].toWorld(centre), float(0.5 * glm::distance(mesh.lower(), mesh.upper()))});
     }
     std::vector<double> depths;
+    const auto isNowhere = [](const Ball& ball) { return !std::isfinite(glm::length(ball.centre)); };
+    if (std::any_of(balls.begin(), balls.end(), isNowhere)) return {std::numeric_limits<double>::infinity()};
     for (std::size_t i = 0; i < poses.size(); ++i)
         for (std::size_t j = 0; j < i; ++j) {
             if (!bodies_[i].moves && !bodies_[j].moves) continue;

@@ -5,9 +5,11 @@
 #include <BulletCollision/CollisionShapes/btConeShape.h>
 #include <BulletCollision/CollisionShapes/btConvexHullShape.h>
 #include <BulletCollision/CollisionShapes/btConvexPointCloudShape.h>
+#include <BulletCollision/CollisionShapes/btConvexTriangleMeshShape.h>
 #include <BulletCollision/CollisionShapes/btCylinderShape.h>
 #include <BulletCollision/CollisionShapes/btPolyhedralConvexShape.h>
 #include <BulletCollision/CollisionShapes/btSphereShape.h>
+#include <BulletCollision/CollisionShapes/btStridingMeshInterface.h>
 #include <LinearMath/btConvexHullComputer.h>
 
 #include <algorithm>
@@ -57,15 +59,35 @@ std::vector<btVector3> supportPoints(const btConvexShape& shape) {
     return points;
 }
 
+/// Bullet asks such a shape for its support only: it says that it has no vertices.
+std::vector<btVector3> cornersOf(const btConvexTriangleMeshShape& shape) {
+    struct Corners : btInternalTriangleIndexCallback {
+        std::vector<btVector3> points;
+        void internalProcessTriangleIndex(btVector3* triangle, int, int) override {
+            points.insert(points.end(), triangle, triangle + 3);
+        }
+    } corners;
+    const btVector3 all(BT_LARGE_FLOAT, BT_LARGE_FLOAT, BT_LARGE_FLOAT);
+    shape.getMeshInterface()->InternalProcessAllTriangles(&corners, -all, all);
+    return corners.points;
+}
+
 std::vector<btVector3> cornersOf(const btPolyhedralConvexShape& shape) {
+    if (shape.getShapeType() == CONVEX_TRIANGLEMESH_SHAPE_PROXYTYPE)
+        return cornersOf(static_cast<const btConvexTriangleMeshShape&>(shape));
     std::vector<btVector3> points(shape.getNumVertices());
     for (int i = 0; i < shape.getNumVertices(); ++i) shape.getVertex(i, points[i]);
     return points;
 }
 
+int verticesOf(const btConvexShape& shape) {
+    return shape.isPolyhedral() ? static_cast<const btPolyhedralConvexShape&>(shape).getNumVertices() : 0;
+}
+
 }  // namespace
 
-Convex::Convex(const btConvexShape& shape) : scaling_(shape.getLocalScaling()), margin_(shape.getMargin()) {
+Convex::Convex(const btConvexShape& shape)
+    : shape_(&shape), scaling_(shape.getLocalScaling()), margin_(shape.getMargin()), vertices_(verticesOf(shape)) {
     switch (shape.getShapeType()) {
         case SPHERE_SHAPE_PROXYTYPE:
             core_ = Core::segment;
@@ -114,7 +136,8 @@ Convex::Convex(const btConvexShape& shape) : scaling_(shape.getLocalScaling()), 
 }
 
 bool Convex::isOf(const btConvexShape& shape) const {
-    return scaling_ == shape.getLocalScaling() && margin_ == shape.getMargin();
+    return shape_ == &shape && scaling_ == shape.getLocalScaling() && margin_ == shape.getMargin() &&
+           vertices_ == verticesOf(shape);
 }
 
 void Convex::makeBox(const glm::vec3& halfExtents) {

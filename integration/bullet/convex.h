@@ -23,7 +23,7 @@ class Convex {
   public:
     explicit Convex(const btConvexShape& shape);
 
-    /// False once the shape has been scaled or given another margin.
+    /// False for another shape, and once the shape has been scaled or given another margin or more points.
     bool isOf(const btConvexShape& shape) const;
 
     struct Near {
@@ -80,8 +80,10 @@ class Convex {
     Near nearestOfRevolution(const glm::vec3& point) const;
     Near nearestOfHull(const glm::vec3& point, float reach) const;
 
+    const btConvexShape* shape_;  ///< only to tell it from others
     btVector3 scaling_;
     float margin_;
+    int vertices_;
     Core core_ = Core::hull;
     float radius_ = 0;                         ///< by which the core is grown; the largest of balls' [m]
     int axis_ = 1;                             ///< of segments and solids of revolution

@@ -12,6 +12,7 @@
 #include <chrono>
 #include <new>
 #include <optional>
+#include <typeinfo>
 #include <utility>
 #include <vector>
 
@@ -179,17 +180,24 @@ struct StepState {
     DispatchStatistics running;  ///< contact tests between steps count here too
     float seconds = 0;           ///< that it takes; 0 between steps
     bool foreseesAll = true;
+    bool isForeign = false;  ///< the dispatcher is another one, which does not tell its steps
+
+    /// Bullet's contact tests hand over a result of their own kind.
+    float secondsOf(const btDispatcherInfo& info, const btManifoldResult& result) const {
+        if (!isForeign) return seconds;
+        return typeid(result) == typeid(btManifoldResult) ? info.m_timeStep : 0;
+    }
 
     /// How far ahead the motion of two bodies is looked at. What goes farther than its own size is the business of a
     /// NoPassing, which does not see what the user moves, nor inside of what locks.
-    float ahead(const btCollisionObjectWrapper& a, const btCollisionObjectWrapper& b) const {
+    float ahead(const btCollisionObjectWrapper& a, const btCollisionObjectWrapper& b, float step) const {
         const auto isLeft = [](const btCollisionObjectWrapper& side) {
             return side.getCollisionObject()->isKinematicObject() || locks(side.getCollisionShape());
         };
-        if (foreseesAll || isLeft(a) || isLeft(b)) return seconds;
-        const btVector3 way = seconds * (velocityOf(*a.getCollisionObject()) - velocityOf(*b.getCollisionObject()));
+        if (foreseesAll || isLeft(a) || isLeft(b)) return step;
+        const btVector3 way = step * (velocityOf(*a.getCollisionObject()) - velocityOf(*b.getCollisionObject()));
         const float size = std::min(sizeOf(*a.getCollisionShape()), sizeOf(*b.getCollisionShape()));
-        return way.length() <= size ? seconds : 0;
+        return way.length() <= size ? step : 0;
     }
 };
 
@@ -206,11 +214,12 @@ class Algorithm : public btCollisionAlgorithm {
     bool bIsSecond() const { return bIsSecond_; }
 
     void processCollision(const btCollisionObjectWrapper* first, const btCollisionObjectWrapper* second,
-                          const btDispatcherInfo&, btManifoldResult* result) override {
+                          const btDispatcherInfo& info, btManifoldResult* result) override {
         const btCollisionObjectWrapper &a = bIsSecond_ ? *first : *second, &b = bIsSecond_ ? *second : *first;
-        if (!pair_->isReady())
-            pair_->collide(sideOf(a, state_.ahead(a, b)), sideOf(b, state_.ahead(a, b)),
-                           result->m_closestPointDistanceThreshold);
+        if (!pair_->isReady()) {
+            const float ahead = state_.ahead(a, b, state_.secondsOf(info, *result));
+            pair_->collide(sideOf(a, ahead), sideOf(b, ahead), result->m_closestPointDistanceThreshold);
+        }
         pair_->commit(*a.getCollisionObject(), *b.getCollisionObject(),
                       continuityOf(*a.getCollisionShape(), *b.getCollisionShape()), *result);
     }
@@ -246,17 +255,41 @@ struct CreateFunction : btCollisionAlgorithmCreateFunc {
     StepState& state;
 };
 
+/// What a dispatcher's tables point to.
+struct AlgorithmFunctions {
+    StepState state;
+    CreateFunction fieldSecond{true, state};
+    CreateFunction fieldFirst{false, state};
+
+    void registerWith(btCollisionDispatcher& dispatcher) {
+        std::vector<int> others{
+            STATIC_PLANE_PROXYTYPE,  TRIANGLE_MESH_SHAPE_PROXYTYPE, SCALED_TRIANGLE_MESH_SHAPE_PROXYTYPE,
+            TERRAIN_SHAPE_PROXYTYPE, GIMPACT_SHAPE_PROXYTYPE,       MULTIMATERIAL_TRIANGLE_MESH_PROXYTYPE};
+        for (int type = 0; type < CONCAVE_SHAPES_START_HERE; ++type) others.push_back(type);
+        const int field = FAST_CONCAVE_MESH_PROXYTYPE;
+        // Bullet looks contacts and contact tests up in different tables.
+        const auto fill = [&](int first, int second, CreateFunction& function) {
+            dispatcher.registerCollisionCreateFunc(first, second, &function);
+            dispatcher.registerClosestPointsCreateFunc(first, second, &function);
+        };
+        for (int other : others) {
+            fill(other, field, fieldSecond);
+            fill(field, other, fieldFirst);
+        }
+        fill(field, field, fieldSecond);
+    }
+};
+
 }  // namespace
 
-struct Dispatcher::Functions {
+struct Dispatcher::Functions : AlgorithmFunctions {
     explicit Functions(PointSampler sampler) : sampledPairs(std::move(sampler)) {}
 
     SampledPairs sampledPairs;
-    StepState state;
     DispatchStatistics last;
-    CreateFunction fieldSecond{true, state};
-    CreateFunction fieldFirst{false, state};
 };
+
+struct FieldAlgorithms::Functions : AlgorithmFunctions {};
 
 Dispatcher::Dispatcher(btCollisionConfiguration* configuration, PointSampler sampler)
     : btCollisionDispatcher(configuration), functions_(std::make_unique<Functions>(std::move(sampler))) {
@@ -266,21 +299,7 @@ Dispatcher::Dispatcher(btCollisionConfiguration* configuration, PointSampler sam
 Dispatcher::~Dispatcher() = default;
 
 void Dispatcher::registerFields() {
-    std::vector<int> others{
-        STATIC_PLANE_PROXYTYPE,  TRIANGLE_MESH_SHAPE_PROXYTYPE, SCALED_TRIANGLE_MESH_SHAPE_PROXYTYPE,
-        TERRAIN_SHAPE_PROXYTYPE, GIMPACT_SHAPE_PROXYTYPE,       MULTIMATERIAL_TRIANGLE_MESH_PROXYTYPE};
-    for (int type = 0; type < CONCAVE_SHAPES_START_HERE; ++type) others.push_back(type);
-    const int field = FAST_CONCAVE_MESH_PROXYTYPE;
-    // Bullet looks contacts and contact tests up in different tables.
-    const auto fill = [&](int first, int second, CreateFunction& function) {
-        registerCollisionCreateFunc(first, second, &function);
-        registerClosestPointsCreateFunc(first, second, &function);
-    };
-    for (int other : others) {
-        fill(other, field, functions_->fieldSecond);
-        fill(field, other, functions_->fieldFirst);
-    }
-    fill(field, field, functions_->fieldSecond);
+    functions_->registerWith(*this);
 }
 
 void Dispatcher::dispatchAllCollisionPairs(btOverlappingPairCache* cache, const btDispatcherInfo& info,
@@ -309,7 +328,7 @@ void Dispatcher::dispatchAllCollisionPairs(btOverlappingPairCache* cache, const 
         const auto* algorithm = dynamic_cast<Algorithm*>(overlap.m_algorithm);
         if (!algorithm || locks(one.getCollisionShape()) || locks(two.getCollisionShape())) continue;
         const bool straight = algorithm->bIsSecond();
-        const float ahead = functions_->state.ahead(one, two);
+        const float ahead = functions_->state.ahead(one, two, functions_->state.seconds);
         tasks.push_back({algorithm->pair(), sideOf(straight ? one : two, ahead), sideOf(straight ? two : one, ahead)});
     }
     SampledPairs& sampled = functions_->sampledPairs;
@@ -340,6 +359,18 @@ void Dispatcher::foreseeAll(bool motions) {
 
 const DispatchStatistics& Dispatcher::statistics() const {
     return functions_->last;
+}
+
+FieldAlgorithms::FieldAlgorithms(btCollisionDispatcher& dispatcher)
+    : dispatcher_(dispatcher), functions_(std::make_unique<Functions>()) {
+    functions_->state.isForeign = true;
+    registerFields();
+}
+
+FieldAlgorithms::~FieldAlgorithms() = default;
+
+void FieldAlgorithms::registerFields() {
+    functions_->registerWith(dispatcher_);
 }
 
 }  // namespace bilayer::bullet

@@ -59,4 +59,23 @@ class Dispatcher : public btCollisionDispatcher {
     std::unique_ptr<Functions> functions_;
 };
 
+/// Fields for a dispatcher that is Bullet's own, or yours: it then collides them with all that a Dispatcher does, by
+/// the same contacts, but pair after pair on the thread that steps the world. Not for btCollisionDispatcherMt.
+class FieldAlgorithms {
+  public:
+    /// Fills the dispatcher's tables. Must outlive the worlds that the dispatcher serves.
+    explicit FieldAlgorithms(btCollisionDispatcher& dispatcher);
+    ~FieldAlgorithms();
+    FieldAlgorithms(const FieldAlgorithms&) = delete;
+    FieldAlgorithms& operator=(const FieldAlgorithms&) = delete;
+
+    /// Fills them once more, as Dispatcher::registerFields().
+    void registerFields();
+
+  private:
+    struct Functions;
+    btCollisionDispatcher& dispatcher_;
+    std::unique_ptr<Functions> functions_;
+};
+
 }  // namespace bilayer::bullet

@@ -18,6 +18,7 @@
 #include <optional>
 #include <type_traits>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "collider/interpolant.h"
@@ -44,9 +45,6 @@ constexpr float flattest = 0.1f;      // a gradient shorter than this tells no d
 constexpr int mostSteps = 64;
 // A body that is held back may be met by another one: pairs are looked at again up to so many times.
 constexpr int mostRounds = 8;
-
-// Who is held so early in a step has not moved: its contacts there have not taken its speed away.
-constexpr float atStart = 1e-3f;
 
 /// Where a way from one point to another enters an obstacle.
 struct Entry {
@@ -498,18 +496,20 @@ Touch passage(const Part& part, const Course& its, const Part& other, const Cour
     if (other.shape->isConvex()) {
         const Convex convex(static_cast<const btConvexShape&>(*other.shape));
         const Touch touch = passageOf(convex, field, momentsOf(other, others, part, its));
-        return earlier(into(ConvexObstacle(convex, 0.1f * allowed * voxel), voxel),
-                       inWorld(touch, part, its).turned());
+        return earlier(into(ConvexObstacle(convex, 0.1f * allowed * voxel), voxel), inWorld(touch, part, its).turned());
     }
     if (!other.shape->isConcave() || type == GIMPACT_SHAPE_PROXYTYPE || type == FAST_CONCAVE_MESH_PROXYTYPE) return {};
     return into(TriangleObstacle(static_cast<const btConcaveShape&>(*other.shape)), voxel);
 }
 
+/// Two objects of which one was held where it met the other one.
+using HeldPair = std::pair<const btCollisionObject*, const btCollisionObject*>;
+
 struct Meeting {
     Course *a, *b;
     Touch touch{};                 ///< the first; from b to a
     float heldA = -1, heldB = -1;  ///< their courses' parts when they were looked at
-    Touch stops{};                 ///< where one of them was held at the start of the step
+    Touch stops{};                 ///< where one of them was held
 
     /// Whether it has not been looked at since one of the two was held.
     bool isOpen() const { return a->part() != heldA || b->part() != heldB; }
@@ -530,15 +530,16 @@ struct Meeting {
         if (touch.time >= 1 || isOpen()) return false;
         Course *faster = a, *slower = b;
         if (a->longest() < b->longest()) std::swap(faster, slower);
-        const bool held = faster->holdAt(touch.time) || slower->holdAt(touch.time);
-        if (held && touch.time <= atStart) stops = touch;
-        return held;
+        if (!faster->holdAt(touch.time) && !slower->holdAt(touch.time)) return false;
+        stops = touch;
+        return true;
     }
 
-    /// Takes away the speed at which two that have not come from the spot go for each other, as an impact without
-    /// restitution and friction does. It would grow with each step.
+    bool holds() const { return stops.time < 1; }
+    HeldPair pair() const { return std::minmax(&a->object(), &b->object()); }
+
+    /// Takes away the speed at which the two go for each other, as an impact without restitution and friction does.
     void stop() const {
-        if (stops.time > atStart) return;
         const btVector3 place = toBullet(stops.place), normal = toBullet(stops.normal);
         float speed = 0, perMass = 0;
         for (const auto& [course, sign] : {std::pair(a, 1.f), std::pair(b, -1.f)})
@@ -597,12 +598,20 @@ class Meetings {
         }
     }
 
-    /// Puts them where they are held, and stops what is held where it was.
-    int apply() const {
+    /// Puts them where they are held. Two that hold each other in a second step in a row lose the speed that this
+    /// step's contacts have left them: it would grow with each step.
+    /// @param before  the pairs of the last step; becomes those of this one
+    int apply(std::vector<HeldPair>& before) const {
         int held = 0;
         for (const Course& course : fast_) held += course.apply();
         for (const auto& [object, course] : slow_) held += course.apply();
-        for (const Meeting& meeting : meetings_) meeting.stop();
+        std::vector<HeldPair> now;
+        for (const Meeting& meeting : meetings_) {
+            if (!meeting.holds()) continue;
+            now.push_back(meeting.pair());
+            if (std::find(before.begin(), before.end(), meeting.pair()) != before.end()) meeting.stop();
+        }
+        before = std::move(now);
         return held;
     }
 
@@ -678,7 +687,7 @@ NoPassing::~NoPassing() {
 void NoPassing::updateAction(btCollisionWorld*, btScalar seconds) {
     Meetings meetings(world_, seconds);
     meetings.settle();
-    held_ = meetings.apply();
+    held_ = meetings.apply(heldPairs_);
 }
 
 }  // namespace bilayer::bullet

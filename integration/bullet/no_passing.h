@@ -4,6 +4,9 @@
 #include <BulletDynamics/Dynamics/btActionInterface.h>
 #include <BulletDynamics/Dynamics/btDynamicsWorld.h>
 
+#include <utility>
+#include <vector>
+
 namespace bilayer::bullet {
 
 /// Lets no body of a world pass through a field, nor a field through anything, however fast and however thin.
@@ -13,8 +16,8 @@ namespace bilayer::bullet {
 /// way that each fast body has gone in a step is looked at once more, with its turn, against all that it swept over:
 /// every surface point goes along its way through the other's field. Where one would get through the surface, the body
 /// stays at the place where it touched, for the rest of this step; it keeps its velocity, and the contacts that it has
-/// there are the next step's. A body that is held where it was already, since they have not stopped it, loses the speed
-/// at which it goes for the surface there.
+/// there are the next step's. Two bodies that hold each other back once more then, since those have not stopped them,
+/// lose the speed at which they go for each other there.
 ///
 /// Bodies that go less than a margin in a step cost next to nothing. Left alone are shapes with sweeps == false, pairs
 /// without a field, and pairs that the Dispatcher foresees still: bodies that the user moves (kinematic ones), and
@@ -35,6 +38,7 @@ class NoPassing : private btActionInterface {
     void debugDraw(btIDebugDraw*) override {}
 
     btDynamicsWorld& world_;
+    std::vector<std::pair<const btCollisionObject*, const btCollisionObject*>> heldPairs_;  ///< in the last step
     int held_ = 0;
 };
 

@@ -34,8 +34,9 @@ struct ShapeOptions {
 /// The frame in which the body's origin is the mesh's centre of mass and its axes are the principal ones.
 Pose centreOfMassFrame(const Collider& collider);
 
-/// Needs a bilayer::bullet::Dispatcher; with a stock one, Bullet falls back to the triangles of the mesh against convex
-/// bodies, and to nothing against concave ones. Like all shapes, it may serve any number of bodies.
+/// Needs a bilayer::bullet::Dispatcher, or FieldAlgorithms with a dispatcher of Bullet's own: without either, Bullet
+/// falls back to the triangles of the mesh against convex bodies, and to nothing against concave ones. Like all shapes,
+/// it may serve any number of bodies.
 class Shape : public btConcaveShape {
   public:
     explicit Shape(std::shared_ptr<const Collider> collider, const ShapeOptions& options = {});
