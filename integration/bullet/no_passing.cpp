@@ -46,6 +46,9 @@ constexpr int mostSteps = 64;
 // A body that is held back may be met by another one: pairs are looked at again up to so many times.
 constexpr int mostRounds = 8;
 
+// Who is held so early in a step has not moved.
+constexpr float atStart = 1e-3f;
+
 /// Where a way from one point to another enters an obstacle.
 struct Entry {
     glm::vec3 position, normal;  ///< outward, of unit length
@@ -536,7 +539,17 @@ struct Meeting {
     }
 
     bool holds() const { return stops.time < 1; }
+    bool hasNotMoved() const { return stops.time <= atStart; }
     HeldPair pair() const { return std::minmax(&a->object(), &b->object()); }
+
+    /// Leaves no speed to what does not move.
+    void rest() const {
+        for (const Course* course : {a, b})
+            if (btRigidBody* body = course->body(); body && course->part() <= atStart) {
+                body->setLinearVelocity({0, 0, 0});
+                body->setAngularVelocity({0, 0, 0});
+            }
+    }
 
     /// Takes away the speed at which the two go for each other, as an impact without restitution and friction does.
     void stop() const {
@@ -598,8 +611,8 @@ class Meetings {
         }
     }
 
-    /// Puts them where they are held. Two that hold each other in a second step in a row lose the speed that this
-    /// step's contacts have left them: it would grow with each step.
+    /// Puts them where they are held. Two that hold each other in a second step in a row, or that have not moved, lose
+    /// the speed that this step's contacts have left them; where both is true, all of it: it would grow with each step.
     /// @param before  the pairs of the last step; becomes those of this one
     int apply(std::vector<HeldPair>& before) const {
         int held = 0;
@@ -609,7 +622,9 @@ class Meetings {
         for (const Meeting& meeting : meetings_) {
             if (!meeting.holds()) continue;
             now.push_back(meeting.pair());
-            if (std::find(before.begin(), before.end(), meeting.pair()) != before.end()) meeting.stop();
+            const bool again = std::find(before.begin(), before.end(), meeting.pair()) != before.end();
+            if (again || meeting.hasNotMoved()) meeting.stop();
+            if (again && meeting.hasNotMoved()) meeting.rest();
         }
         before = std::move(now);
         return held;

@@ -17,7 +17,7 @@ namespace bilayer::bullet {
 /// every surface point goes along its way through the other's field. Where one would get through the surface, the body
 /// stays at the place where it touched, for the rest of this step; it keeps its velocity, and the contacts that it has
 /// there are the next step's. Two bodies that hold each other back once more then, since those have not stopped them,
-/// lose the speed at which they go for each other there.
+/// lose the speed at which they go for each other there; what cannot move at all comes to rest.
 ///
 /// Bodies that go less than a margin in a step cost next to nothing. Left alone are shapes with sweeps == false, pairs
 /// without a field, and pairs that the Dispatcher foresees still: bodies that the user moves (kinematic ones), and

@@ -1,4 +1,5 @@
 // Every pair of shapes comes to rest where it must, in either order of insertion.
+#include <BulletCollision/CollisionShapes/btConvexTriangleMeshShape.h>
 #include <BulletCollision/CollisionShapes/btHeightfieldTerrainShape.h>
 
 #include <catch2/catch.hpp>
@@ -157,6 +158,43 @@ TEST_CASE("Each convex shape rests on a field") {
         compound.addChildShape(btTransform(btQuaternion::getIdentity(), {-0.3f, 0, 0}), &box);
         compound.addChildShape(btTransform(btQuaternion::getIdentity(), {0.3f, 0, 0}), &box);
         rests(compound, slab, below, {0, 0, 0.2f});
+    }
+}
+
+TEST_CASE("A convex mesh rests on a field, and so does a body whose shape has changed") {
+    Shape slab(exactBox({1, 1, 0.3f}, h));
+    SECTION("a convex mesh of triangles") {
+        Mesh3 cube(shapes::box({0.3f, 0.2f, 0.25f}));
+        btConvexTriangleMeshShape convex(&cube.triangles);
+        convex.setMargin(0);
+        rests(convex, slab, {0, 0, 0}, {0, 0, 0.55f});
+    }
+    SECTION("another box, and a hull that has grown") {
+        btBoxShape low({0.3f, 0.3f, 0.1f}), high({0.3f, 0.3f, 0.3f});
+        btConvexHullShape hull;
+        for (const float x : {-0.3f, 0.3f})
+            for (const float y : {-0.3f, 0.3f})
+                for (const float z : {-0.1f, 0.1f}) hull.addPoint({x, y, z});
+        hull.setMargin(0);
+        World world;
+        world.add(slab, 0, {0, 0, 0});
+        btRigidBody* box = world.add(low, 1, {0.5f, 0, 0.4f});
+        btRigidBody* grows = world.add(hull, 1, {-0.5f, 0, 0.4f});
+        world.run(0.5f);
+        CHECK(box->getWorldTransform().getOrigin().z() == Approx(0.4f).margin(tolerance * h));
+        CHECK(grows->getWorldTransform().getOrigin().z() == Approx(0.4f).margin(tolerance * h));
+        box->setCollisionShape(&high);
+        for (const float x : {-0.3f, 0.3f})
+            for (const float y : {-0.3f, 0.3f}) hull.addPoint({x, y, -0.3f});
+        for (btRigidBody* body : {box, grows}) {
+            btTransform raised = body->getWorldTransform();
+            raised.getOrigin() += btVector3(0, 0, 0.25f);
+            body->setWorldTransform(raised);
+            body->activate(true);
+        }
+        world.run(2);
+        CHECK(box->getWorldTransform().getOrigin().z() == Approx(0.6f).margin(tolerance * h));
+        CHECK(grows->getWorldTransform().getOrigin().z() == Approx(0.6f).margin(tolerance * h));
     }
 }
 

@@ -101,6 +101,18 @@ TEST_CASE("however many bodies fall into a bowl, none starts in another") {
     CHECK(outcome.deepest() < outcome.voxelSize);
 }
 
+TEST_CASE("needles in a bowl gain no energy where nothing but NoPassing holds them") {
+    demo::BowlOptions options;
+    options.kinds = {{"needle", shapes::cone(0.02f, 0.2f, 12)}};
+    options.bodies = 8;
+    options.resolution = 48;
+    options.seconds = 3;
+    options.seed = GENERATE(7u, 8u);
+    const demo::Outcome outcome = demo::bowl(options);
+    CHECK(outcome.energies.rise() < 0.01);
+    CHECK(outcome.criterion("bodies that left the bowl").met());
+}
+
 TEST_CASE("balls stay in front of thin plates") {
     demo::PlatesOptions options;
     options.phases = 2;
