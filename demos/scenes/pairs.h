@@ -18,7 +18,7 @@ struct PairsOptions {
 };
 
 /// Criteria: all rest where formulas say, to a tenth of a voxel in height and of a degree in tilt; none overlaps what
-/// it lies on by a tenth of a voxel; all sleep or are about to.
+/// it lies on by a tenth of a voxel.
 Outcome pairs(const PairsOptions& options);
 
 }  // namespace bilayer::demo
