@@ -162,8 +162,12 @@ TEST_CASE("A plane of many triangles makes the contacts of a plane of two") {
         };
         const auto few = collide(two), others = collide(many);
         CAPTURE(i, few.size(), others.size());
-        REQUIRE(few.empty() == others.empty());
-        if (few.empty()) continue;
+        if (few.empty() || others.empty()) {
+            // at the margin itself either may find a place a bit nearer
+            for (const auto& found : {few, others})
+                if (!found.empty()) REQUIRE(deepest(found).distance > h - tolerance);
+            continue;
+        }
         ++touching;
         CHECK(deepest(others).distance == Approx(deepest(few).distance).margin(tolerance));
         // of the rim each piece is probed by itself
