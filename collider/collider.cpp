@@ -23,7 +23,6 @@ namespace {
 
 constexpr float flattest = 0.1f;  // a gradient shorter than this tells no direction: the point is on a medial axis
 constexpr float searchTolerance = 2e-3f;  // of the deepest place on an edge [voxels]
-constexpr float bandBorder = 1.7321f;     // points farther inside the band's border are in it for certain [voxels]
 // Where two edges cross, the normal across both is taken if it looks no farther aside from the other body's (cosine).
 constexpr float leastAcross = 0.3f;
 constexpr float crossingWithin = 1.5f;  // of the deepest place that the field shows [voxels]: it rounds edges off
@@ -109,7 +108,6 @@ class PointsInField {
         radius_ = 0.5f * glm::length(bounds.size());
         const float longest = ways_.longest(other.scale * map_(centre_), body.scale * radius_) / other.scale;
         sweeps_ = longest > reach_;
-        isBeyondBand_ = reach_ > field_.exteriorWidth() - bandBorder * field_.voxelSize();
         seen_ = sweeps_ ? reach_ + longest : reach_;
     }
 
@@ -142,7 +140,7 @@ class PointsInField {
 
     /// What a sampler is to find.
     std::optional<PointQuery> query() const {
-        if (sweeps_ || isBeyondBand_) return std::nullopt;
+        if (sweeps_) return std::nullopt;
         return PointQuery{0, 0, map_.linear, map_.shift, map_.scale, reach_};
     }
 
@@ -218,20 +216,12 @@ class PointsInField {
                     if (point.isSharp) followEdges(index, at, touched, found);
                 }
             }
-            if (!sample.inBand && sample.distance >= 0 && isBeyondBand_) touchFarAway(index, point, at, found);
             if (!sample.inBand && sample.distance < 0) ++report.beyondBand;
         } else if (sweeps_) {
             const glm::vec3 way = wayOf(at);
             if (sample.distance > glm::length(way) || !meets(point, at, way)) return;
             if (const auto touched = touchOnWay(field_, at, way)) found(index, point, *touched);
         }
-    }
-
-    // Where contacts are asked for beyond the band.
-    template <class Found>
-    void touchFarAway(std::uint32_t index, const SurfacePoint& point, const glm::vec3& at, Found& found) const {
-        const ClosestPoint closest = field_.closest(at, reach_);
-        if (closest.found) found(index, point, Touch{closest.distance, directionOf(closest, at, field_.voxelSize())});
     }
 
     float approachOf(const SurfacePoint& point, const glm::vec3& at, const Touch& touched) const {
@@ -325,9 +315,8 @@ class PointsInField {
     float reach_;
     glm::vec3 centre_;  // of a ball around the body
     float radius_;
-    bool sweeps_;        // whether any point moves farther than the reach
-    bool isBeyondBand_;  // whether contacts are asked for beyond the band
-    float seen_;         // how far away a point can be that comes near
+    bool sweeps_;  // whether any point moves farther than the reach
+    float seen_;   // how far away a point can be that comes near
 };
 
 // Outward of `other`, in the world; where its field tells none, against the surface of the body that touches it.
