@@ -94,7 +94,7 @@ std::optional<Touch> touchOnWay(const Field& field, const glm::vec3& point, cons
 // The surface points of one body in the field of another.
 class PointsInField {
   public:
-    PointsInField(const Placed& body, const Placed& other, float margin)
+    PointsInField(const Placed& body, const Placed& other, const ContactOptions& options)
         : body_(body),
           other_(other),
           field_(other.collider.field()),
@@ -102,7 +102,8 @@ class PointsInField {
           coarse_(map_.inParts(field_)),
           ways_(body.pose, body.motion, other.pose, other.motion),
           clearance_(field_.clearance()),
-          reach_(margin / other.scale) {
+          reach_(options.margin / other.scale),
+          beyondBand_(options.beyondBand) {
         const Bounds& bounds = body.collider.bounds();
         centre_ = bounds.centre();
         radius_ = 0.5f * glm::length(bounds.size());
@@ -217,11 +218,18 @@ class PointsInField {
                 }
             }
             if (!sample.inBand && sample.distance < 0) ++report.beyondBand;
+            if (!sample.inBand && sample.distance >= 0 && beyondBand_) touchFarAway(index, point, at, found);
         } else if (sweeps_) {
             const glm::vec3 way = wayOf(at);
             if (sample.distance > glm::length(way) || !meets(point, at, way)) return;
             if (const auto touched = touchOnWay(field_, at, way)) found(index, point, *touched);
         }
+    }
+
+    template <class Found>
+    void touchFarAway(std::uint32_t index, const SurfacePoint& point, const glm::vec3& at, Found& found) const {
+        const ClosestPoint closest = field_.closest(at, reach_);
+        if (closest.found) found(index, point, Touch{closest.distance, directionOf(closest, at, field_.voxelSize())});
     }
 
     float approachOf(const SurfacePoint& point, const glm::vec3& at, const Touch& touched) const {
@@ -313,6 +321,7 @@ class PointsInField {
     RelativeWays ways_;
     Clearance clearance_;
     float reach_;
+    bool beyondBand_;
     glm::vec3 centre_;  // of a ball around the body
     float radius_;
     bool sweeps_;  // whether any point moves farther than the reach
@@ -423,9 +432,9 @@ ContactReport addContacts(const Placed& a, const Placed& b, const ContactOptions
                             index | featureOfB, touch.approach * a.scale});
     };
     const std::size_t first = contacts.size();
-    visitA(PointsInField(a, b, options.margin), report, addOfA);
+    visitA(PointsInField(a, b, options), report, addOfA);
     const std::size_t second = contacts.size();
-    visitB(PointsInField(b, a, options.margin), report, addOfB);
+    visitB(PointsInField(b, a, options), report, addOfB);
     // edges are found next to their points, and come behind all of these
     const auto byFeature = [](const Contact& one, const Contact& other) { return one.feature < other.feature; };
     std::stable_sort(contacts.begin() + std::ptrdiff_t(first), contacts.begin() + std::ptrdiff_t(second), byFeature);
@@ -445,7 +454,7 @@ ContactReport collide(const Placed& a, const Placed& b, const ContactOptions& op
 }
 
 std::optional<PointQuery> pointQuery(const Placed& body, const Placed& other, float margin) {
-    return PointsInField(body, other, margin).query();
+    return PointsInField(body, other, {.margin = margin}).query();
 }
 
 SampledBody sampledBody(const Collider& collider) {

@@ -16,7 +16,6 @@
 namespace bilayer::demo {
 namespace {
 
-constexpr float gravity = 9.81f;      // [m/s^2]
 constexpr float density = 7850;       // of steel [kg/m^3]
 constexpr float boltLength = 70e-3f;  // some have run out 17 turns when others have made 10 [m]
 constexpr const char *factoryBolt = "factory_bolt_m16_loose.obj", *factoryNut = "factory_nut_m16_loose_subdiv_3x.obj";
@@ -47,10 +46,10 @@ struct Theory {
     double holding(double friction) const { return std::atan(friction / std::cos(glm::radians(30.0))); }
     bool runs(double friction) const { return holding(friction) < (1 - unclear) * lead(); }
     bool stays(double friction) const { return holding(friction) > (1 + unclear) * lead(); }
-    // Of a nut of unit mass and some inertia about its axis [rad/s^2].
-    double acceleration(double friction, double inertia) const {
+    // Of a nut of unit mass, of some inertia about its axis and some weight [rad/s^2].
+    double acceleration(double friction, double inertia, double weight) const {
         const double lever = radius * std::tan(lead() - holding(friction));
-        return gravity * lever / (inertia + lever * pitch / (2 * glm::pi<double>()));
+        return weight * lever / (inertia + lever * pitch / (2 * glm::pi<double>()));
     }
 };
 
@@ -81,10 +80,11 @@ struct Rider {
     float friction;
     double height;  // at the last step [m]
     Turning turning;
-    double turns = 0;               // downward, since the nut had settled
-    std::vector<double> heights{};  // after each whole turn since, the start included [m]
-    double start = 0, speed = 0;    // turns and angular speed when it had settled [rad/s]
-    double acceleration = 0;        // since then, until it has made its turns [rad/s^2]
+    double turns = 0;                  // downward, since the nut had settled
+    std::vector<double> heights{};     // after each whole turn since, the start included [m]
+    double start = 0, speed = 0;       // turns and angular speed when it had settled [rad/s]
+    double acceleration = 0;           // since then, until it has made its turns [rad/s^2]
+    std::vector<glm::dvec2> speeds{};  // time and angular speed, while it makes them [s, rad/s]
 };
 
 double spinOf(const btRigidBody& body) {
@@ -96,6 +96,7 @@ void settle(Rider& rider) {
     rider.turns = 0;
     rider.speed = spinOf(rider.body);
     rider.heights = {rider.height};
+    rider.speeds.clear();
 }
 
 // Nobody need see it run into the bolt's head.
@@ -115,6 +116,7 @@ void follow(Rider& rider, const Pose& pose, double time, double most) {
     if (!rider.heights.empty() && turns >= whole)
         rider.heights.push_back(glm::mix(rider.height, height, (whole - rider.turns) / (turns - rider.turns)));
     rider.acceleration = (spinOf(rider.body) - rider.speed) / (time - settled);
+    rider.speeds.emplace_back(time, spinOf(rider.body));
     rider.turns = turns;
     rider.height = height;
     if (turns >= most) hold(rider.body);
@@ -128,10 +130,23 @@ double advanceOffPitch(const Rider& rider, double pitch) {
     return 100 * worst;
 }
 
+// How far the angular speed strays from that of an even acceleration (standard deviation), in parts of its mean [%].
+double unevenness(const std::vector<glm::dvec2>& speeds) {
+    glm::dvec2 mean(0);
+    for (const glm::dvec2& at : speeds) mean += at / double(speeds.size());
+    double times = 0, both = 0, all = 0;
+    for (const glm::dvec2& at : speeds) {
+        const glm::dvec2 off = at - mean;
+        times += off.x * off.x, both += off.x * off.y, all += off.y * off.y;
+    }
+    return 100 * std::sqrt(std::max(all - both * both / times, 0.0) / double(speeds.size())) / mean.y;
+}
+
 struct Verdict {
     int stuck = 0;                         // that should run
     double moved = 0;                      // by those that should stay [degrees]
     double advance = 0, acceleration = 0;  // off theory [%]
+    double unevenness = 0;                 // of those that run [%]
 };
 
 Verdict judge(const std::vector<Rider>& riders, const Theory& theory, double turns) {
@@ -140,9 +155,11 @@ Verdict judge(const std::vector<Rider>& riders, const Theory& theory, double tur
         if (theory.stays(rider.friction)) verdict.moved = worse(verdict.moved, 360 * std::abs(rider.turns));
         if (!theory.runs(rider.friction)) continue;
         const double inertia = double(rider.body.getInvMass()) / double(rider.body.getInvInertiaTensorWorld()[2][2]);
-        const double expected = theory.acceleration(rider.friction, inertia);
+        const double weight = -double(rider.body.getGravity().z());
+        const double expected = theory.acceleration(rider.friction, inertia, weight);
         verdict.stuck += rider.turns < turns;
         verdict.advance = worse(verdict.advance, advanceOffPitch(rider, theory.pitch));
+        verdict.unevenness = worse(verdict.unevenness, unevenness(rider.speeds));
         verdict.acceleration = worse(verdict.acceleration, 100 * std::abs(rider.acceleration / expected - 1));
     }
     return verdict;
@@ -179,6 +196,7 @@ Outcome nuts(const NutsOptions& options) {
             nut, {.mass = mass, .friction = friction, .linearDamping = 0, .angularDamping = 0}, pose,
             {.colour = theory.stays(friction) ? stayingColour : runningColour, .roughness = 0.3f, .metalness = 0.4f});
         body.setActivationState(DISABLE_DEACTIVATION);
+        body.setGravity(options.weights * body.getGravity());
         riders.push_back({body, friction, pose.position.z, Turning(pose.rotation)});
     }
 
@@ -205,6 +223,7 @@ Outcome nuts(const NutsOptions& options) {
                      {"acceleration off theory", fmt::format("{:.2f} %", verdict.acceleration)}};
     outcome.criteria = {{"advance of a turn off the pitch", verdict.advance, 1, "%"},
                         {"nuts that should run and stuck", double(verdict.stuck), 0},
+                        {"unevenness of angular speed", verdict.unevenness, 10, "%"},
                         {"turn of nuts that should stay", verdict.moved, mostPlay, "degrees"},
                         {"deepest penetration", outcome.deepest() / options.voxelSize, 0.5, "voxels"}};
     return outcome;

@@ -15,6 +15,7 @@ struct NutsOptions {
     float turns = 10;                                     ///< the nuts that run make
     float seconds = 5;                                    ///< at most
     float clearance = 50e-6f;                             ///< of the threads [m], see shapes::Thread
+    float weights = 1;                                    ///< that press each nut down, of its own
     int segments = 96;                                    ///< of the threads, a multiple of 24
     /// At 480, nuts without friction turn by more than a facet of their threads in a step after some turns, and hop in
     /// their play now and then; those that stay creep by the step, 1e-4 degrees each.
@@ -34,7 +35,7 @@ inline constexpr float factoryTurns = 4;
 bool hasFactoryThread(const std::filesystem::path& folder);
 
 /// Criteria: the advance of each turn is the thread's pitch within 1 %; nuts run that friction does not hold in theory,
-/// and those that it holds stay; no overlap of half a voxel. Throws what readMesh() throws.
+/// gaining speed evenly, and those that it holds stay; no overlap of half a voxel. Throws what readMesh() throws.
 Outcome nuts(const NutsOptions& options);
 
 }  // namespace bilayer::demo

@@ -26,6 +26,7 @@ struct Shot {
     btRigidBody& ball;
     glm::vec3 plate, outward;  // a point of the plate's middle, and the side that the ball is shot from
     float speed, thickness;    // [m/s], [voxels]
+    glm::vec3 last;            // of the ball's places
     bool passed = false, lost = false, gained = false;
 };
 
@@ -47,7 +48,16 @@ Shot addLane(Stage& stage, const PlatesOptions& options, const std::shared_ptr<c
                                   {.colour = colourOf(speed), .roughness = 0.3f, .clearcoat = 0.5f});
     body.setLinearVelocity({0, 0, -speed});
     body.setActivationState(DISABLE_DEACTIVATION);
-    return {body, place, tilt * glm::vec3(0, 0, 1), speed, thickness};
+    return {body, place, tilt * glm::vec3(0, 0, 1), speed, thickness, place + glm::vec3(0, 0, above)};
+}
+
+// Whether the ball's middle has gone through its plate, not past its border.
+bool passes(const Shot& shot, const glm::vec3& now) {
+    const float before = glm::dot(shot.last - shot.plate, shot.outward),
+                after = glm::dot(now - shot.plate, shot.outward);
+    if (before < 0 || after >= 0) return false;
+    const glm::vec3 place = glm::mix(shot.last, now, before / (before - after));
+    return glm::distance(place, shot.plate) < std::sqrt(2.f) * halfPlate;
 }
 
 void watch(Shot& shot) {
@@ -55,7 +65,9 @@ void watch(Shot& shot) {
     const double spin = radius * double(shot.ball.getAngularVelocity().length());
     const double squares = double(v.length2()) + 0.4 * spin * spin;  // of a ball's energy
     shot.lost = shot.lost || !std::isfinite(double(p.length2()) + squares);
-    shot.passed = shot.passed || glm::dot(glm::vec3(p.x(), p.y(), p.z()) - shot.plate, shot.outward) < 0;
+    const glm::vec3 now(p.x(), p.y(), p.z());
+    shot.passed = shot.passed || passes(shot, now);
+    shot.last = now;
     shot.gained = shot.gained || squares > (1 + rounding) * double(shot.speed) * shot.speed;
 }
 

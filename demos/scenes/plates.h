@@ -18,7 +18,7 @@ struct PlatesOptions {
     float voxelSize = 0.01f;  ///< [m]
 };
 
-/// Criteria: no ball behind its plate or within it, no ball nowhere (NaN), none faster after the impact than before.
+/// Criteria: no ball goes through its plate, none is nowhere (NaN), none is faster after the impact than before.
 Outcome plates(const PlatesOptions& options);
 
 }  // namespace bilayer::demo

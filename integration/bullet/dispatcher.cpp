@@ -103,11 +103,14 @@ class Pair {
   public:
     Pair(btDispatcher& dispatcher, DispatchStatistics& statistics) : manifolds_(dispatcher), statistics_(statistics) {}
 
-    /// Finds and reduces contacts up to `margin` at least.
-    void collide(const Side& a, const Side& b, float margin) {
+    /// Finds and reduces contacts up to the shapes' margins, or as far as a contact test asks for.
+    /// @param asked  by a contact test [m]; 0 in a step
+    void collide(const Side& a, const Side& b, float asked) {
         contacts_.clear();
+        const float margin = marginOf(a, b, asked);
         const bool follows = static_cast<const Shape&>(*b.shape).sweeps();
-        report_ = find(a, b.placed(), marginOf(a, b, margin), follows ? a.motion() : Motion{});
+        report_ = isField(a.shape) ? collideFields(a.placed(), b.placed(), margin, asked > 0, near_, contacts_)
+                                   : collideOther(a, b.placed(), margin, follows ? a.motion() : Motion{});
         finish(a, b);
     }
 
@@ -146,8 +149,7 @@ class Pair {
         sampled_ = 0;
     }
 
-    ContactReport find(const Side& a, const Placed& field, float margin, const Motion& motion) {
-        if (isField(a.shape)) return collideFields(a.placed(), field, margin, near_, contacts_);
+    ContactReport collideOther(const Side& a, const Placed& field, float margin, const Motion& motion) {
         if (a.shape->getShapeType() == STATIC_PLANE_PROXYTYPE) {
             const auto& plane = static_cast<const btStaticPlaneShape&>(*a.shape);
             const btVector3 normal = a.transform.getBasis() * plane.getPlaneNormal();

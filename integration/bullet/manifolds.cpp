@@ -40,8 +40,8 @@ constexpr float chosenWithin = 0.5f;
 // of the extent] and twists [rad]. Their directions are askew to everything one models: a rectangle's corners are then
 // each met first by themselves.
 constexpr float tilts[] = {1.f / 8, 1.f / 32, 1.f / 128};
-constexpr float aside = 1.f / 64;
-constexpr int tiltDirections = 8, shiftDirections = 4;
+constexpr float aside = 1.f / 16;
+constexpr int tiltDirections = 8, shiftDirections = 8;
 constexpr float askew = 0.3f;             // [rad]
 constexpr float measuredTilt = 1.f / 32;  // by which what is lost is measured [rad]
 // More contacts of a patch cost the solver more than they tell it.

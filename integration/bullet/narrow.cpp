@@ -642,10 +642,11 @@ class TriangleProbes : public btTriangleCallback {
 
 }  // namespace
 
-ContactReport collideFields(const Placed& a, const Placed& b, float margin, NearPoints& near,
+ContactReport collideFields(const Placed& a, const Placed& b, float margin, bool beyondBand, NearPoints& near,
                             std::vector<Contact>& contacts) {
     ContactOptions options = opposition;
     options.margin = margin;
+    options.beyondBand = beyondBand;
     return collide(a, b, options, contacts, &near);
 }
 

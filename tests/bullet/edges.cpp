@@ -92,7 +92,7 @@ Collide collideBars(int kind, bool exact) {
         return [=](const Crossing& c, float margin) {
             std::vector<Contact> contacts;
             NearPoints near;
-            bullet::collideFields({*field, c.upper}, {*field, c.lower}, margin, near, contacts);
+            bullet::collideFields({*field, c.upper}, {*field, c.lower}, margin, false, near, contacts);
             return contacts;
         };
     if (kind == 1 || kind == 2) {

@@ -247,7 +247,6 @@ TEST_CASE("What is kept of many contacts bears what all of them bear, to a few p
     std::uniform_real_distribution<double> part(0, 1);
     const float bend = GENERATE(0.f, 0.15f, 0.3f);  // of normals towards the rim
     CAPTURE(bend);
-    int beyond = 0;
     for (int trial = 0; trial < 20; ++trial) {
         const float length = 0.1f + 0.05f * side(random), width = 0.1f + 0.08f * side(random);
         std::vector<Contact> all;
@@ -268,12 +267,9 @@ TEST_CASE("What is kept of many contacts bears what all of them bear, to a few p
                 const double force = part(random);
                 for (int i = 0; i < 6; ++i) load[i] += force * push[i];
             }
-            const double rest = unborne(after, load);
-            REQUIRE(rest < 0.1);
-            beyond += rest >= 0.05;
+            REQUIRE(unborne(after, load) < 0.05);
         }
     }
-    CHECK(beyond <= 4);  // of 400
 }
 
 TEST_CASE("What is kept of random bodies' contacts is met first, but for as much as is said to be lost") {

@@ -178,6 +178,23 @@ TEST_CASE("Contact tests give the depth and the normal from the second body to t
     CHECK(world.dispatcher.getNumManifolds() == 0);
 }
 
+TEST_CASE("Contact tests of two fields tell how far apart they are, beyond the band too") {
+    Shape one(exactSphere(fieldRadius, h)), two(exactBox({0.4f, 0.3f, 0.2f}, h));
+    const float gap = GENERATE(0.02f, 0.08f, 0.1f, 0.2f, 0.28f);
+    const bool inCompound = GENERATE(false, true);
+    CAPTURE(gap, inCompound);
+    World world;
+    btCompoundShape compound;
+    compound.addChildShape(btTransform::getIdentity(), &one);
+    btRigidBody* ball = world.add(inCompound ? static_cast<btCollisionShape&>(compound) : one, 1, {0, 0, 0});
+    btRigidBody* box = world.add(two, 1, {0.1f, 0, fieldRadius + 0.2f + gap});
+    Contacts found;
+    found.m_closestDistanceThreshold = 0.3f;
+    world.dynamics.contactPairTest(ball, box, found);
+    REQUIRE(found.count > 0);
+    CHECK(found.deepest == Approx(gap).margin(depthError));
+}
+
 TEST_CASE("Points deeper than the band are counted, not guessed") {
     Shape slab(exactBox({1, 1, 1}, h));
     btConvexHullShape needle;

@@ -135,6 +135,17 @@ TEST_CASE("nuts run down their bolts by their pitch, or are held by friction") {
     judge([&] { return demo::nuts(options); });
 }
 
+TEST_CASE("nuts under ten times their weight run and stay as they should") {
+    demo::NutsOptions options;
+    options.pairs = 2;
+    options.frictions = {0.01f, 0.05f};
+    options.turns = 2;
+    options.stepsPerSecond = 600;
+    options.voxelSize = 0.4e-3f;
+    options.weights = 10;
+    judgeOnce(demo::nuts(options));
+}
+
 TEST_CASE("the nut of Factory runs down its bolt by its pitch, or is held by friction") {
     const auto path = test::corpusMesh("factory_bolt_m16_loose.obj");
     if (!path) return;

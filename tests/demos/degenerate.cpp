@@ -1,0 +1,99 @@
+// Bodies whose tips, ridges, cracks and borders meet exactly: after the tests of K. Erleben, "Methodology for assessing
+// mesh-based contact point methods", ACM Transactions on Graphics 37 (3), 2018.
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <glm/gtc/constants.hpp>
+#include <random>
+
+#include "demos/shared/shapes.h"
+#include "demos/shared/stage.h"
+#include "tests/support/support.h"
+
+using namespace bilayer;
+using demo::Thing;
+
+namespace {
+
+constexpr float voxel = 0.04f, half = 0.4f;  // [m]
+constexpr float lane = 4;                    // between pairs [m]
+
+// Along y; the profile, in x and z, runs counter-clockwise and is seen whole from a place within.
+Mesh extruded(const std::vector<glm::vec2>& profile, const glm::vec2& within) {
+    Mesh mesh;
+    const auto count = std::uint32_t(profile.size());
+    for (const float y : {-half, half}) {
+        for (const glm::vec2& p : profile) mesh.points.emplace_back(p.x, y, p.y);
+        mesh.points.emplace_back(within.x, y, within.y);
+    }
+    const std::uint32_t behind = count + 1;
+    for (std::uint32_t i = 0; i < count; ++i) {
+        const std::uint32_t next = (i + 1) % count;
+        mesh.triangles.emplace_back(i, next, count);
+        mesh.triangles.emplace_back(behind + next, behind + i, behind + count);
+        mesh.triangles.emplace_back(i, behind + i, next);
+        mesh.triangles.emplace_back(next, behind + i, behind + next);
+    }
+    return mesh;
+}
+
+Mesh turnedOver(Mesh mesh) {
+    for (glm::vec3& p : mesh.points) p = {-p.x, p.y, -p.z};
+    return mesh;
+}
+
+// With their tips, ridges and mouths upward.
+std::vector<Mesh> degenerates() {
+    const Mesh spike = shapes::cone(half / 2, 2 * half, 4);
+    const Mesh wedge = extruded({{-half / 2, -half}, {half / 2, -half}, {0, half}}, {0, -half / 2});
+    const Mesh crack = extruded(
+        {{-half, -half}, {half, -half}, {half, half}, {voxel, half}, {0, -half / 4}, {-voxel, half}, {-half, half}},
+        {0, -half / 2});
+    return {spike, wedge, crack, shapes::box({half, half, half})};
+}
+
+std::shared_ptr<const Thing> thingOf(const Mesh& mesh) {
+    return demo::makeThing(mesh, {.voxelSize = voxel});
+}
+
+}  // namespace
+
+TEST_CASE("Spikes, wedges, cracks and cliff edges that meet exactly come to rest, not deep in each other") {
+    const unsigned start = test::seed();
+    CAPTURE(start);
+    std::mt19937 random(start);
+    std::uniform_real_distribution<float> any(-1, 1);
+    demo::Stage stage("degenerate bodies");
+    const auto floor = thingOf(shapes::box({1.8f, 1.8f, half}));
+    std::vector<std::shared_ptr<const Thing>> upright, over;
+    for (const Mesh& mesh : degenerates()) {
+        upright.push_back(thingOf(mesh));
+        over.push_back(thingOf(turnedOver(mesh)));
+    }
+    // exactly above each other; half over the edge; and a hair off either
+    const float asides[] = {0, half};
+    int pairs = 0;
+    for (const auto& falling : over)
+        for (const auto& lying : upright)
+            for (const float aside : asides)
+                for (const bool exact : {true, false}) {
+                    const glm::vec3 at(lane * float(pairs % 8), lane * float(pairs / 8), 0);
+                    const float hair = exact ? 0 : 0.1f * voxel;
+                    stage.add(floor, {}, {at - glm::vec3(0, 0, 2 * half)}, {});
+                    stage.add(lying, {}, {at}, {});
+                    const glm::vec3 above(aside + hair * any(random), hair * any(random), 2 * half + 0.1f);
+                    stage.add(falling, {.mass = 1}, {at + above}, {});
+                    ++pairs;
+                }
+    stage.run(20, [&] { return stage.allAsleep(); });
+    const auto poses = stage.frames().back();
+    const bool asleep = stage.allAsleep();
+    const demo::Outcome outcome = stage.finish({});
+    CAPTURE(outcome.deepest() / voxel, outcome.usuallyBelow() / voxel, outcome.energies.rise());
+    CHECK(asleep);
+    CHECK(outcome.deepest() < voxel);
+    CHECK(outcome.energies.rise() < 0.01);
+    for (const Pose& pose : poses) {
+        REQUIRE(std::isfinite(glm::dot(pose.position, pose.position)));
+        CHECK(pose.position.z > -2.01f * half);
+    }
+}
