@@ -70,7 +70,11 @@ void printAdvice(const InspectArguments& a, const bullet::Advice& advice) {
     table.row("build", fmt::format("--voxel-size {:.4g} --exterior-width {} --interior-width {} --body --margin {:.4g}",
                                    advice.voxelSize, advice.exteriorWidth, advice.interiorWidth, advice.margin));
     if (advice.wallVoxels > 0) table.row("walls", fmt::format("{:.3g} voxels", advice.wallVoxels));
-    table.row("substeps", fmt::format("{} with swept contacts, {} without", advice.substeps, advice.substepsUnswept));
+    const auto told = [](int substeps) {
+        return fmt::format("{}{}", substeps, substeps < bullet::mostSubsteps ? "" : " or more");
+    };
+    table.row("substeps",
+              fmt::format("{} with swept contacts, {} without", told(advice.substeps), told(advice.substepsUnswept)));
     table.row("field", fmt::format("about {} active voxels, {}, built in {:.1g} s on two cores", grouped(advice.voxels),
                                    bytes(advice.fieldBytes), advice.buildSeconds));
     table.row("solver", fmt::format("m_splitImpulsePenetrationThreshold = {:.4g}", advice.splitImpulse));

@@ -27,7 +27,6 @@ constexpr float cellDiagonal = 1.7320508f;  // [voxels]
 constexpr int leastInterior = 3, mostInterior = 10;
 // Points are followed along straight ways: off by 3 % of a body's radius where it turns by this in a step [rad].
 constexpr float straightTurn = 0.5f;
-constexpr float mostSteps = 1e6f;  // nobody takes more substeps of a step
 // Deeper than the middle of a wall, a point is pushed out on the far side.
 constexpr float wallPart = 0.5f;
 // Bullet's thresholds are lengths and speeds of their own: gContactBreakingThreshold is 2 cm, bodies sleep below
@@ -55,7 +54,7 @@ void requireSensible(const MeshReport& mesh, const Scene& scene) {
 }
 
 int wholeFrom(float value) {
-    return int(std::min(std::ceil(value - rounding), mostSteps));
+    return int(std::min(std::ceil(value - rounding), float(mostSubsteps)));
 }
 
 float chosenVoxel(const Scene& scene, float longest, float wall) {

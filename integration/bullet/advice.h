@@ -22,12 +22,14 @@ struct Scene {
     float margin = -1;      ///< likewise [m]
 };
 
+inline constexpr int mostSubsteps = 1'000'000;  ///< stands for more as well: nobody takes as many
+
 struct Advice {
     float voxelSize = 0;           ///< [m]
     float margin = 0;              ///< ColliderOptions::margin [m]
     int exteriorWidth = 0;         ///< [voxels]
     int interiorWidth = 0;         ///< [voxels]
-    int substeps = 1;              ///< of a step, with ShapeOptions::sweeps
+    int substeps = 1;              ///< of a step, with ShapeOptions::sweeps; mostSubsteps at most
     int substepsUnswept = 1;       ///< without
     float wallVoxels = 0;          ///< Scene::thickness, or MeshReport::commonWall [voxels]; 0: none is known
     float splitImpulse = 0;        ///< for m_splitImpulsePenetrationThreshold [m]

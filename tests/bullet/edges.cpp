@@ -1,6 +1,5 @@
 // Edges that meet between their corners and between the points of a field; the hull of balls; sharp edges of bodies.
 #include <BulletCollision/CollisionShapes/btMultiSphereShape.h>
-#include <BulletCollision/CollisionShapes/btTriangleMesh.h>
 
 #include <algorithm>
 #include <catch2/catch.hpp>
@@ -72,17 +71,6 @@ btTransform transformOf(const Pose& pose) {
 }
 
 // A bar of triangles.
-struct Triangles {
-    explicit Triangles(const Mesh& mesh) {
-        for (const glm::uvec3& t : mesh.triangles)
-            triangles.addTriangle(bullet::toBullet(mesh.points[t.x]), bullet::toBullet(mesh.points[t.y]),
-                                  bullet::toBullet(mesh.points[t.z]));
-        shape = std::make_unique<btBvhTriangleMeshShape>(&triangles, true);
-    }
-    btTriangleMesh triangles;
-    std::unique_ptr<btBvhTriangleMeshShape> shape;
-};
-
 using Collide = std::function<std::vector<Contact>(const Crossing&, float)>;
 
 Collide collideBars(int kind, bool exact) {

@@ -156,13 +156,10 @@ TEST_CASE("Cloth and soft balls come to rest on a field as on its triangles") {
         return std::tuple_cat(world.heights(), std::tuple(world.speed()));
     };
     Shape field(std::make_shared<Collider>(mesh, build(mesh, {.voxelSize = h})));
-    btTriangleMesh triangles;
-    for (const glm::uvec3& t : mesh.triangles)
-        triangles.addTriangle(toBullet(mesh.points[t.x]), toBullet(mesh.points[t.y]), toBullet(mesh.points[t.z]));
-    btBvhTriangleMeshShape reference(&triangles, true);
-    reference.setMargin(field.getMargin());
+    const Triangles reference(mesh);
+    reference.shape->setMargin(field.getMargin());
     const auto [lowest, highest, speed] = play(field);
-    const auto [itsLowest, itsHighest, itsSpeed] = play(reference);
+    const auto [itsLowest, itsHighest, itsSpeed] = play(*reference.shape);
     CAPTURE(lowest, highest, speed, itsLowest, itsHighest, itsSpeed);
     REQUIRE(std::isfinite(lowest + highest + speed));
     CHECK(lowest == Approx(itsLowest).margin(0.1 * h));

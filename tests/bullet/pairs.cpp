@@ -42,18 +42,6 @@ void rests(btCollisionShape& falling, btCollisionShape& lying, const btVector3& 
     CHECK(world.dispatcher.statistics().beyondBand == 0);
 }
 
-struct Mesh3 {
-    explicit Mesh3(const Mesh& mesh) {
-        for (const glm::uvec3& t : mesh.triangles)
-            triangles.addTriangle(at(mesh.points[t.x]), at(mesh.points[t.y]), at(mesh.points[t.z]));
-        shape = std::make_unique<btBvhTriangleMeshShape>(&triangles, true);
-    }
-    static btVector3 at(const glm::vec3& p) { return {p.x, p.y, p.z}; }
-
-    btTriangleMesh triangles;
-    std::unique_ptr<btBvhTriangleMeshShape> shape;
-};
-
 }  // namespace
 
 TEST_CASE("A field's body rests on each static shape") {
@@ -84,12 +72,12 @@ TEST_CASE("A field's body rests on each static shape") {
         rests(body, flat, {0, 0, -0.5f}, {0, 0, height}, 1, round);
     }
     SECTION("triangle mesh, coarse, scaled") {
-        const Mesh3 mesh(shapes::box({1, 1, 0.5f}));
+        const Triangles mesh(shapes::box({1, 1, 0.5f}));
         btScaledBvhTriangleMeshShape scaled(mesh.shape.get(), {2, 2, 1});
         rests(body, scaled, {0, 0, -0.5f}, {0, 0, height}, 1, round);
     }
     SECTION("triangle mesh, fine") {
-        const Mesh3 mesh(shapes::box({1.2f, 1.2f, 0.5f}, 40));
+        const Triangles mesh(shapes::box({1.2f, 1.2f, 0.5f}, 40));
         rests(body, *mesh.shape, {0, 0, -0.5f}, {0, 0, height}, 1, round);
     }
     SECTION("height field") {
@@ -164,7 +152,7 @@ TEST_CASE("Each convex shape rests on a field") {
 TEST_CASE("A convex mesh rests on a field, and so does a body whose shape has changed") {
     Shape slab(exactBox({1, 1, 0.3f}, h));
     SECTION("a convex mesh of triangles") {
-        Mesh3 cube(shapes::box({0.3f, 0.2f, 0.25f}));
+        Triangles cube(shapes::box({0.3f, 0.2f, 0.25f}));
         btConvexTriangleMeshShape convex(&cube.triangles);
         convex.setMargin(0);
         rests(convex, slab, {0, 0, 0}, {0, 0, 0.55f});

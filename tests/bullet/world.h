@@ -37,6 +37,14 @@ class World {
     std::vector<std::unique_ptr<btRigidBody>> bodies_;
 };
 
+/// A mesh as Bullet collides it.
+struct Triangles {
+    explicit Triangles(const Mesh& mesh);
+
+    btTriangleMesh triangles;
+    std::unique_ptr<btBvhTriangleMeshShape> shape;
+};
+
 /// A field whose distances are those of a formula, not of the mesh's triangles: what is left of an error is the
 /// contacts'.
 std::shared_ptr<const Collider> exactCollider(const Mesh& mesh, const std::function<float(const glm::vec3&)>& distance,
