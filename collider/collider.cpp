@@ -30,6 +30,8 @@ constexpr float nearestAside = 0.01f;   // [voxels] from an edge or corner: near
 // A point that slides along a face ends in the edges beyond it by rounding: what only grazes, by less than this, goes
 // past [voxels].
 constexpr float grazing = 0.25f;
+// A tip that has sunk into another one sees its sides: which way it came is told by where it was so far back [voxels].
+constexpr float lift = 1;
 
 // The map from the coordinates of one body into those of another.
 struct Map {
@@ -102,8 +104,8 @@ class PointsInField {
           coarse_(map_.inParts(field_)),
           ways_(body.pose, body.motion, other.pose, other.motion),
           clearance_(field_.clearance()),
-          reach_(options.margin / other.scale),
-          beyondBand_(options.beyondBand) {
+          options_(options),
+          reach_(options.margin / other.scale) {
         const Bounds& bounds = body.collider.bounds();
         centre_ = bounds.centre();
         radius_ = 0.5f * glm::length(bounds.size());
@@ -211,6 +213,7 @@ class PointsInField {
         if (sample.distance <= reach_) {
             if (sample.inBand) {
                 Touch touched = touchInBand(field_, at, sample);
+                if (point.isSharp && touched.distance <= 0) touched = fromWhereItCame(point, at, touched);
                 if (sweeps_) touched.approach = approachOf(point, at, touched);
                 if (touched.distance <= reach_) {
                     found(index, point, touched);
@@ -218,7 +221,7 @@ class PointsInField {
                 }
             }
             if (!sample.inBand && sample.distance < 0) ++report.beyondBand;
-            if (!sample.inBand && sample.distance >= 0 && beyondBand_) touchFarAway(index, point, at, found);
+            if (!sample.inBand && sample.distance >= 0 && options_.beyondBand) touchFarAway(index, point, at, found);
         } else if (sweeps_) {
             const glm::vec3 way = wayOf(at);
             if (sample.distance > glm::length(way) || !meets(point, at, way)) return;
@@ -230,6 +233,20 @@ class PointsInField {
     void touchFarAway(std::uint32_t index, const SurfacePoint& point, const glm::vec3& at, Found& found) const {
         const ClosestPoint closest = field_.closest(at, reach_);
         if (closest.found) found(index, point, Touch{closest.distance, directionOf(closest, at, field_.voxelSize())});
+    }
+
+    // A tip, ridge or corner within the other body whose surface does not oppose it there, but did just before.
+    Touch fromWhereItCame(const SurfacePoint& point, const glm::vec3& at, const Touch& touched) const {
+        const glm::vec3 normal = map_.turned(point.normal);
+        const auto opposition = [&](const Touch& touch) { return -glm::dot(touch.normal, normal); };
+        if (options_.keeps(opposition(touched), false)) return touched;
+        const float back = lift * field_.voxelSize();
+        const glm::vec3 before = at - back * normal;
+        const Sample sample = field_.sample(before);
+        if (!sample.inBand) return touched;
+        const Touch then = touchInBand(field_, before, sample);
+        if (!(then.distance > 0) || !options_.keeps(opposition(then), false)) return touched;
+        return {std::min(then.distance - back * opposition(then), 0.f), then.normal};
     }
 
     float approachOf(const SurfacePoint& point, const glm::vec3& at, const Touch& touched) const {
@@ -320,8 +337,8 @@ class PointsInField {
     Map map_, coarse_;
     RelativeWays ways_;
     Clearance clearance_;
+    ContactOptions options_;
     float reach_;
-    bool beyondBand_;
     glm::vec3 centre_;  // of a ball around the body
     float radius_;
     bool sweeps_;  // whether any point moves farther than the reach
