@@ -212,12 +212,12 @@ class PointsInField {
                ContactReport& report, Found& found) const {
         if (sample.distance <= reach_) {
             if (sample.inBand) {
-                Touch touched = touchInBand(field_, at, sample);
-                if (point.isSharp && touched.distance <= 0) touched = fromWhereItCame(point, at, touched);
-                if (sweeps_) touched.approach = approachOf(point, at, touched);
-                if (touched.distance <= reach_) {
+                const Touch here = touchInBand(field_, at, sample);
+                if (here.distance <= reach_) {
+                    Touch touched = point.isSharp && here.distance <= 0 ? fromWhereItCame(point, at, here) : here;
+                    if (sweeps_) touched.approach = approachOf(point, at, touched);
                     found(index, point, touched);
-                    if (point.isSharp) followEdges(index, at, touched, found);
+                    if (point.isSharp) followEdges(index, at, here, found);
                 }
             }
             if (!sample.inBand && sample.distance < 0) ++report.beyondBand;

@@ -29,8 +29,9 @@ constexpr float mergedDirection = 0.966f;
 constexpr float stillness = 3e-3f;
 // What is met sooner than the contacts that are kept by less than this need not be kept itself, and what was kept in
 // the last step is kept again [parts of the extent]: which of several is met first is then a matter of rounding, and
-// bodies would tremble with each change. Of a mere press it is less: the deepest overlap is what pushes bodies apart.
-constexpr float tolerance = 1e-3f, toleranceOfPress = tolerance / 4;
+// bodies would tremble with each change. Of a mere press it is less: the deepest overlap is what pushes bodies apart;
+// and of shifts and twists, which change gaps by a fraction of what tilts do.
+constexpr float tolerance = 1e-3f, toleranceUntilted = tolerance / 4;
 // What was kept in the last step stays as long as some motion meets it first but for so many tolerances: contacts that
 // bear a load must not come and go, or a stack never comes to rest.
 constexpr float loyalty = 3;
@@ -40,7 +41,7 @@ constexpr float chosenWithin = 0.5f;
 // of the extent] and twists [rad]. Their directions are askew to everything one models: a rectangle's corners are then
 // each met first by themselves.
 constexpr float tilts[] = {1.f / 8, 1.f / 32, 1.f / 128};
-constexpr float aside = 1.f / 16;
+constexpr float aside = 1.f / 64;
 constexpr int tiltDirections = 8, shiftDirections = 8;
 constexpr float askew = 0.3f;             // [rad]
 constexpr float measuredTilt = 1.f / 32;  // by which what is lost is measured [rad]
@@ -300,13 +301,12 @@ class FirstMet {
     Motions metBy(std::uint32_t k, float tolerances) const {
         Motions met = 0;
         for (std::size_t n = 0; n < nudges_.size(); ++n) {
-            const float within = tolerances * (isPress(n) ? toleranceOfPress : tolerance) * gaps_.extent();
+            const float within =
+                tolerances * (nudges_[n].tilt == glm::vec2(0) ? toleranceUntilted : tolerance) * gaps_.extent();
             if (gaps_.of(k, nudges_[n]) <= least_[n] + within) met |= Motions(1) << n;
         }
         return met;
     }
-
-    bool isPress(std::size_t n) const { return n + 1 == nudges_.size(); }
 
     void add(std::uint32_t k) {
         kept_.push_back(k);

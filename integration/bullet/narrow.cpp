@@ -287,18 +287,21 @@ class Touching {
         const std::uint32_t feature = index | featureOfB;
         const Convex::Near near = convex_.nearest(intoConvex(position), margin_);
         if (near.distance > margin_) return visitOnWay(position, point, feature, near.distance, contacts);
+        if (convex_.isCurved() && point.isSharp) followEdges(index, near, contacts);
         const glm::vec3 normal = -(toField_ * near.normal);
         float approach = local_.approach(position, normal, margin_);
         if (near.distance > 0 && approach > 0 && !meets(position, point)) approach = 0;
         // What is round has no edge that a point could see aslant.
         const bool apart = near.distance > 0 && approach == 0 && !point.isSharp && !convex_.isRound(near);
         if (!opposition.keeps(glm::dot(normal, point.normal), apart)) return;
-        if (convex_.isCurved() && point.isSharp) followEdges(index, near, contacts);
-        if (convex_.isCurved())
-            if (const auto better = refine(near, feature)) {
+        if (convex_.isCurved()) {
+            // corners and edges are exact, and samples next to them are not
+            const auto better = refine(near, feature);
+            if (better && !(point.isSharp && near.distance < better->distance)) {
                 contacts.push_back(*better);
                 return;
             }
+        }
         if (!convex_.isCurved() && !point.isSharp) {
             const glm::vec3 place = intoField(near.core);
             if (auto deeper = downhill(near, place, local_.at(place))) {
