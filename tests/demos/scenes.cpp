@@ -139,7 +139,7 @@ TEST_CASE("nuts under ten times their weight run and stay as they should") {
     demo::NutsOptions options;
     options.pairs = 2;
     options.frictions = {0.01f, 0.05f};
-    options.turns = 2;
+    options.turns = 1;
     options.stepsPerSecond = 600;
     options.voxelSize = 0.4e-3f;
     options.weights = 10;
