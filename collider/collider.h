@@ -97,8 +97,9 @@ struct ContactOptions {
     /// Whether points outside of the band are asked for the closest place, which takes a search for each.
     bool beyondBand = false;
     /// Least cosine between the point's own normal and the opposite of the surface's that it touches; contacts below
-    /// are left out. Points just under the edge of the other body look along the surface that is nearest to them. The
-    /// corners of a cube, whose normals are mixed of three, reach 0.57. Below -1: no contact is left out.
+    /// are left out. Points just under the edge of the other body look along the surface that is nearest to them; sharp
+    /// ones among these touch the surface that they opposed a voxel farther out, if there is one. The corners of a
+    /// cube, whose normals are mixed of three, reach 0.57. Below -1: no contact is left out.
     float leastOpposition = -2;
     /// The same for points of faces that neither touch yet nor are on their way: a point beside the other body sees its
     /// edge aslant, and would stop it like a curb.
