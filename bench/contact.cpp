@@ -37,6 +37,7 @@ constexpr double measured = 0.02;  // between points that penetration is measure
 constexpr float bowlRadius = 0.5f, bowlWall = 0.05f;  // [m]
 constexpr float bowlVoxels = 128, boxEdge = 0.1f;     // along the bowl; [m]
 constexpr int bowlCells = 32, boxesInBowl = 60;
+constexpr const char* oneThread = ", 1 thread";
 
 struct Options {
     HeapOptions heap;
@@ -162,7 +163,7 @@ void printTable(const std::string& title, const std::vector<Row>& rows) {
 Row onOneThread(const std::function<Row()>& work) {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, 1);
     Row row = work();
-    row.name += ", 1 thread";
+    row.name += oneThread;
     return row;
 }
 
@@ -277,9 +278,25 @@ Line energyOf(const Row& row, double stepsPerSecond) {
     return line;
 }
 
+// Medians of a tenth of a second each.
+Line speedOf(const Row& row, double stepsPerSecond) {
+    Line line{row.name, {}, {}};
+    const auto steps = std::ptrdiff_t(stepsPerSecond / 10);
+    const auto& all = row.run.stepMs;
+    for (auto from = all.begin(); from != all.end();) {
+        const auto to = from + std::min(steps, all.end() - from);
+        line.x.push_back(double(to - all.begin()) / stepsPerSecond);
+        line.y.push_back(median({from, to}));
+        from = to;
+    }
+    return line;
+}
+
 void draw(const std::string& file, const std::vector<Row>& knots, const Growth& growth, const Options& options) {
-    std::vector<Line> energies, depths;
+    std::vector<Line> speeds, energies, depths;
     for (const Row& row : knots) {
+        if (row.name.ends_with(oneThread)) continue;  // the same bits as on all of them
+        speeds.push_back(speedOf(row, double(options.heap.stepsPerSecond)));
         energies.push_back(energyOf(row, double(options.heap.stepsPerSecond)));
         Line depth{row.name, {}, {}};
         for (const double share : {0.5, 0.75, 0.9, 0.95, 0.99, 1.}) {
@@ -291,10 +308,11 @@ void draw(const std::string& file, const std::vector<Row>& knots, const Growth& 
     std::vector<double> bodies(options.growBodies.begin(), options.growBodies.end()),
         voxels(options.growVoxels.begin(), options.growVoxels.end());
     writeSvg(file,
-             {{fmt::format("a step, {:g} voxels a body", options.voxels), "bodies", "ms", bodies, {growth.bodies}},
-              {fmt::format("a step, {} bodies", options.bodies), "voxels a body", "ms", voxels, {growth.voxels}},
+             {{"a step", "s", "ms", {}, speeds},
               {"kinetic energy", "s", "J", {}, energies},
-              {"so many of 100 penetrations are below", "of 100", "mm", {50, 75, 100}, depths}});
+              {"so many of 100 penetrations are below", "of 100", "mm", {50, 75, 100}, depths},
+              {fmt::format("a step, {:g} voxels a body", options.voxels), "bodies", "ms", bodies, {growth.bodies}},
+              {fmt::format("a step, {} bodies", options.bodies), "voxels a body", "ms", voxels, {growth.voxels}}});
 }
 
 nlohmann::json jsonOf(const std::vector<Row>& rows) {

@@ -14,7 +14,8 @@ namespace {
 
 // [pixels]
 constexpr double panelWidth = 620, panelHeight = 400, left = 70, right = 200, top = 44, bottom = 54;
-constexpr double labelSpacing = 34;  // of the two lines of text at the ends of lines
+constexpr std::size_t mostInRow = 3;  // panels
+constexpr double labelSpacing = 34;   // of the two lines of text at the ends of lines
 constexpr std::array<const char*, 4> colours{"#1f5fa8", "#c4572b", "#3d8a4f", "#7a4fa0"};
 
 // A point this far beyond a decade does not ask for another one [decades].
@@ -151,14 +152,16 @@ std::string drawn(const Panel& panel) {
 }  // namespace
 
 std::string svg(const std::vector<Panel>& panels) {
-    const double width = panelWidth * double(panels.size());
+    if (panels.empty()) throw std::invalid_argument("a plot needs a panel");
+    const std::size_t inRow = std::min(panels.size(), mostInRow), rows = (panels.size() + inRow - 1) / inRow;
     std::string out = fmt::format(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {0:g} {1:g}\" width=\"{0:g}\" height=\"{1:g}\" "
         "font-family=\"DejaVu Sans, Helvetica, sans-serif\" font-size=\"12\" fill=\"#222\">\n"
         "<rect width=\"{0:g}\" height=\"{1:g}\" fill=\"white\"/>\n",
-        width, panelHeight);
+        panelWidth * double(inRow), panelHeight * double(rows));
     for (std::size_t i = 0; i < panels.size(); ++i)
-        out += fmt::format("<g transform=\"translate({:g} 0)\">\n{}</g>\n", panelWidth * double(i), drawn(panels[i]));
+        out += fmt::format("<g transform=\"translate({:g} {:g})\">\n{}</g>\n", panelWidth * double(i % inRow),
+                           panelHeight * double(i / inRow), drawn(panels[i]));
     return out + "</svg>\n";
 }
 

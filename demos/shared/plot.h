@@ -1,4 +1,5 @@
-// A plot as an SVG file: panels side by side with labelled lines, log-log with decades or linear with round steps.
+// A plot as an SVG file: panels, up to three in a row, with labelled lines, log-log with decades or linear with round
+// steps.
 #pragma once
 
 #include <filesystem>
@@ -20,7 +21,8 @@ struct Panel {
     bool linear = false;         ///< both axes, y from 0; else logarithmic
 };
 
-/// Draws the panels; lines of the same place in each panel share a colour.
+/// Draws the panels; lines of the same place in each panel share a colour. Throws std::invalid_argument where there is
+/// nothing to draw.
 std::string svg(const std::vector<Panel>& panels);
 
 /// Throws std::runtime_error that names the file when it cannot be written.

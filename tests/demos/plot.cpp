@@ -37,6 +37,14 @@ TEST_CASE("equal ratios are equal distances in a plot") {
         CHECK(svg.find(words) != std::string::npos);
 }
 
+TEST_CASE("a fourth panel begins another row") {
+    const demo::Panel panel{"t", "x", "y", {}, {{"a", {1, 10}, {1, 10}}}};
+    CHECK(demo::svg({panel, panel, panel}).find("viewBox=\"0 0 1860 400\"") != std::string::npos);
+    const std::string svg = demo::svg({panel, panel, panel, panel});
+    CHECK(svg.find("viewBox=\"0 0 1860 800\"") != std::string::npos);
+    CHECK(svg.find("translate(0 400)") != std::string::npos);
+}
+
 TEST_CASE("a plot is written to a file, or the file is named") {
     const std::vector<demo::Panel> panels{{"t", "x", "y", {64, 128}, {{"a", {64, 128}, {1, 4}}}}};
     const auto path = test::scratch("plot.svg");
@@ -45,6 +53,7 @@ TEST_CASE("a plot is written to a file, or the file is named") {
     CHECK(std::string(std::istreambuf_iterator<char>(file), {}) == demo::svg(panels));
     CHECK_THROWS_WITH(demo::writeSvg("/nonexistent/plot.svg", panels), Catch::Contains("/nonexistent/plot.svg"));
     CHECK_THROWS_AS(demo::svg({{"t", "x", "y", {}, {}}}), std::invalid_argument);
+    CHECK_THROWS_AS(demo::svg({}), std::invalid_argument);
 }
 
 TEST_CASE("equal differences are equal distances in a linear plot, which starts at 0") {
