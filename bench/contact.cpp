@@ -278,10 +278,10 @@ Line energyOf(const Row& row, double stepsPerSecond) {
     return line;
 }
 
-// Medians of a tenth of a second each.
-Line speedOf(const Row& row, double stepsPerSecond) {
+// How long a step takes: medians of a tenth of a second each.
+Line stepTimeOf(const Row& row, double stepsPerSecond) {
     Line line{row.name, {}, {}};
-    const auto steps = std::ptrdiff_t(stepsPerSecond / 10);
+    const auto steps = std::max<std::ptrdiff_t>(1, std::ptrdiff_t(stepsPerSecond / 10));
     const auto& all = row.run.stepMs;
     for (auto from = all.begin(); from != all.end();) {
         const auto to = from + std::min(steps, all.end() - from);
@@ -293,10 +293,10 @@ Line speedOf(const Row& row, double stepsPerSecond) {
 }
 
 void draw(const std::string& file, const std::vector<Row>& knots, const Growth& growth, const Options& options) {
-    std::vector<Line> speeds, energies, depths;
+    std::vector<Line> steps, energies, depths;
     for (const Row& row : knots) {
-        if (row.name.ends_with(oneThread)) continue;  // the same bits as on all of them
-        speeds.push_back(speedOf(row, double(options.heap.stepsPerSecond)));
+        if (row.name.ends_with(oneThread)) continue;  // energies and penetrations are the same bits
+        steps.push_back(stepTimeOf(row, double(options.heap.stepsPerSecond)));
         energies.push_back(energyOf(row, double(options.heap.stepsPerSecond)));
         Line depth{row.name, {}, {}};
         for (const double share : {0.5, 0.75, 0.9, 0.95, 0.99, 1.}) {
@@ -305,10 +305,13 @@ void draw(const std::string& file, const std::vector<Row>& knots, const Growth& 
         }
         depths.push_back(depth);
     }
+    // last, so that what is of the same name has the same colour everywhere
+    for (const Row& row : knots)
+        if (row.name.ends_with(oneThread)) steps.push_back(stepTimeOf(row, double(options.heap.stepsPerSecond)));
     std::vector<double> bodies(options.growBodies.begin(), options.growBodies.end()),
         voxels(options.growVoxels.begin(), options.growVoxels.end());
     writeSvg(file,
-             {{"a step", "s", "ms", {}, speeds},
+             {{"a step", "s", "ms", {}, steps},
               {"kinetic energy", "s", "J", {}, energies},
               {"so many of 100 penetrations are below", "of 100", "mm", {50, 75, 100}, depths},
               {fmt::format("a step, {:g} voxels a body", options.voxels), "bodies", "ms", bodies, {growth.bodies}},

@@ -30,7 +30,7 @@ constexpr float nearestAside = 0.01f;   // [voxels] from an edge or corner: near
 // A point that slides along a face ends in the edges beyond it by rounding: what only grazes, by less than this, goes
 // past [voxels].
 constexpr float grazing = 0.25f;
-// A tip that has sunk into another one sees its sides: which way it came is told by where it was so far back [voxels].
+// A tip that has sunk into another one sees its sides; what it opposes is seen so far back along its normal [voxels].
 constexpr float lift = 1;
 
 // The map from the coordinates of one body into those of another.
@@ -70,9 +70,10 @@ glm::vec3 directionOf(const glm::vec3& gradient) {
     return length > flattest ? gradient / length : glm::vec3(0);
 }
 
-// Across a face, and away from an edge or a corner.
+// Across a face, and away from an edge or a corner, or from what a field without triangles does not tell apart.
 glm::vec3 directionOf(const ClosestPoint& closest, const glm::vec3& point, float voxelSize) {
-    const bool isAside = closest.feature != Feature::face && std::abs(closest.distance) > nearestAside * voxelSize;
+    const bool mayBeAside = closest.feature != Feature::face || closest.triangle == noTriangle;
+    const bool isAside = mayBeAside && std::abs(closest.distance) > nearestAside * voxelSize;
     return isAside ? (point - closest.position) / closest.distance : closest.normal;
 }
 
@@ -117,7 +118,7 @@ class PointsInField {
     /// Calls found(index, point, touch) for the points within reach of the surface, in it, or on their way to it.
     template <class Found>
     void visit(NearPoints::List* near, ContactReport& report, Found&& found) {
-        if (!near || sweeps_) return visitAll(report, found);
+        if (!near || sweeps_ || options_.farAway) return visitAll(report, found);
         const float voxel = field_.voxelSize();
         // voxels beyond the band have no numbers: a list must not reach that far
         const float mostSlack =
@@ -168,7 +169,8 @@ class PointsInField {
         const float kept = keptWithin(seen_);
         descend(kept, [&](std::uint32_t index, const SurfacePoint& point) {
             const glm::vec3 place = coarse_(point.position);
-            if (clearance_.isAbove(place, seen_) || clearance_.isOutside(place, kept)) return;
+            const bool isAbove = !options_.farAway && clearance_.isAbove(place, seen_);  // or beyond the band
+            if (isAbove || clearance_.isOutside(place, kept)) return;
             const glm::vec3 at = map_(point.position);
             touch(index, point, at, sampleAt(at, report), report, found);
         });
@@ -211,17 +213,14 @@ class PointsInField {
     void touch(std::uint32_t index, const SurfacePoint& point, const glm::vec3& at, const Sample& sample,
                ContactReport& report, Found& found) const {
         if (sample.distance <= reach_) {
-            if (sample.inBand) {
-                const Touch here = touchInBand(field_, at, sample);
-                if (here.distance <= reach_) {
-                    Touch touched = point.isSharp && here.distance <= 0 ? fromWhereItCame(point, at, here) : here;
-                    if (sweeps_) touched.approach = approachOf(point, at, touched);
-                    found(index, point, touched);
-                    if (point.isSharp) followEdges(index, at, here, found);
-                }
+            const auto here = touchAt(at, sample, reach_);
+            if (here && here->distance <= reach_) {
+                Touch touched = point.isSharp && here->distance <= 0 ? opposed(point, at, *here) : *here;
+                if (sweeps_) touched.approach = approachOf(point, at, touched);
+                found(index, point, touched);
+                if (point.isSharp) followEdges(index, at, *here, found);
             }
             if (!sample.inBand && sample.distance < 0) ++report.beyondBand;
-            if (!sample.inBand && sample.distance >= 0 && options_.beyondBand) touchFarAway(index, point, at, found);
         } else if (sweeps_) {
             const glm::vec3 way = wayOf(at);
             if (sample.distance > glm::length(way) || !meets(point, at, way)) return;
@@ -229,24 +228,28 @@ class PointsInField {
         }
     }
 
-    template <class Found>
-    void touchFarAway(std::uint32_t index, const SurfacePoint& point, const glm::vec3& at, Found& found) const {
-        const ClosestPoint closest = field_.closest(at, reach_);
-        if (closest.found) found(index, point, Touch{closest.distance, directionOf(closest, at, field_.voxelSize())});
+    // Beyond the band up to `most`, where that is asked for.
+    std::optional<Touch> touchAt(const glm::vec3& at, const Sample& sample, float most) const {
+        if (sample.inBand) return touchInBand(field_, at, sample);
+        if (!options_.farAway || sample.distance < 0) return std::nullopt;
+        const ClosestPoint closest = field_.closest(at, most);
+        if (!closest.found) return std::nullopt;
+        return Touch{closest.distance, directionOf(closest, at, field_.voxelSize())};
     }
 
-    // A tip, ridge or corner within the other body whose surface does not oppose it there, but did just before.
-    Touch fromWhereItCame(const SurfacePoint& point, const glm::vec3& at, const Touch& touched) const {
+    // A tip, ridge or corner within the other body that opposes no surface there, a medial axis included: the one that
+    // it opposes a bit back along its own normal, if that is outside.
+    Touch opposed(const SurfacePoint& point, const glm::vec3& at, const Touch& here) const {
         const glm::vec3 normal = map_.turned(point.normal);
         const auto opposition = [&](const Touch& touch) { return -glm::dot(touch.normal, normal); };
-        if (options_.keeps(opposition(touched), false)) return touched;
+        if (options_.keeps(opposition(here), false)) return here;
         const float back = lift * field_.voxelSize();
-        const glm::vec3 before = at - back * normal;
-        const Sample sample = field_.sample(before);
-        if (!sample.inBand) return touched;
-        const Touch then = touchInBand(field_, before, sample);
-        if (!(then.distance > 0) || !options_.keeps(opposition(then), false)) return touched;
-        return {std::min(then.distance - back * opposition(then), 0.f), then.normal};
+        const glm::vec3 outside = at - back * normal;
+        const Sample sample = field_.sample(outside);
+        if (!sample.inBand) return here;
+        const Touch there = touchInBand(field_, outside, sample);
+        if (!(there.distance > 0) || !options_.keeps(opposition(there), false)) return here;
+        return {std::min(there.distance - back * opposition(there), 0.f), there.normal};
     }
 
     float approachOf(const SurfacePoint& point, const glm::vec3& at, const Touch& touched) const {
@@ -274,12 +277,12 @@ class PointsInField {
             const float length = glm::distance(at, end);
             const glm::vec3 along = (end - at) / length;
             const Sample sample = field_.sample(end);
-            if (!sample.inBand) continue;
-            const Touch there = touchInBand(field_, end, sample);
+            const auto there = touchAt(end, sample, reach_ + length);
+            if (!there) continue;
             // where both ends touch, one of them is enough
-            if (std::max(sample.distance, there.distance) <= reach_ && next < index) continue;
+            if (std::max(sample.distance, there->distance) <= reach_ && next < index) continue;
             const Slope from{0, here.distance, glm::dot(here.normal, along)},
-                to{length, there.distance, glm::dot(there.normal, along)};
+                to{length, there->distance, glm::dot(there->normal, along)};
             if (!fallsBetween(from, to) && !mayKinkBetween(from, to)) continue;
             if (const auto touched = deepestOf(at, end, along, from, to, edge.wings)) {
                 const float part = touched->first / length;
@@ -294,13 +297,12 @@ class PointsInField {
     // How far along an edge the deepest place is, and how it touches.
     std::optional<std::pair<float, Touch>> deepestOf(const glm::vec3& at, const glm::vec3& end, const glm::vec3& along,
                                                      const Slope& from, const Slope& to, const Wings& wings) const {
-        const auto touchAt = [&](float way) -> std::optional<Touch> {
-            const Sample sample = field_.sample(at + way * along);
-            if (!sample.inBand) return std::nullopt;
-            return touchInBand(field_, at + way * along, sample);
+        const auto touchOn = [&](float way) {
+            const glm::vec3 place = at + way * along;
+            return touchAt(place, field_.sample(place), reach_ + to.place);
         };
         const auto slopeAt = [&](float way) -> std::optional<Slope> {
-            const auto touched = touchAt(way);
+            const auto touched = touchOn(way);
             if (!touched) return std::nullopt;
             return Slope{way, touched->distance, glm::dot(touched->normal, along)};
         };
@@ -309,7 +311,7 @@ class PointsInField {
                                                 ? lowestBetween(from, to, searchTolerance * field_.voxelSize(), slopeAt)
                                             : from.value < to.value ? from
                                                                     : to;
-        const auto touched = lowest ? touchAt(lowest->place) : std::nullopt;
+        const auto touched = lowest ? touchOn(lowest->place) : std::nullopt;
         if (!touched) return std::nullopt;
 
         const glm::vec3 place = at + lowest->place * along;

@@ -92,14 +92,15 @@ inline constexpr std::uint32_t featureOfB = 0x80000000u;
 struct ContactOptions {
     /// Contacts are reported up to this distance [m], and beyond it where a point's motion meets the other surface. The
     /// band must reach sqrt(3) voxels farther for all of them to be found, and as much deeper than bodies sink into
-    /// each other (see Sample::inBand), or `beyondBand` be set.
+    /// each other (see Sample::inBand).
     float margin = 0;
-    /// Whether points outside of the band are asked for the closest place, which takes a search for each.
-    bool beyondBand = false;
+    /// Whether points outside of the other body and of its band are asked for the closest place, which takes a search
+    /// for each; those too deep inside are counted all the same.
+    bool farAway = false;
     /// Least cosine between the point's own normal and the opposite of the surface's that it touches; contacts below
     /// are left out. Points just under the edge of the other body look along the surface that is nearest to them; sharp
-    /// ones among these touch the surface that they opposed a voxel farther out, if there is one. The corners of a
-    /// cube, whose normals are mixed of three, reach 0.57. Below -1: no contact is left out.
+    /// ones among these touch the surface that they oppose a voxel back along their own normal, if there is one. The
+    /// corners of a cube, whose normals are mixed of three, reach 0.57. Below -1: no contact is left out.
     float leastOpposition = -2;
     /// The same for points of faces that neither touch yet nor are on their way: a point beside the other body sees its
     /// edge aslant, and would stop it like a curb.

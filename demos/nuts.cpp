@@ -13,7 +13,8 @@ int main(int argc, char** argv) {
     program.option("--turns", options.turns, "that nuts make")->check(CLI::Range(1.0, 15.0));
     program.option("--seconds", options.seconds, "most seconds to simulate")->check(CLI::Range(0.2, 1000.0));
     program.option("--clearance", options.clearance, "of the threads [m]")->check(CLI::Range(0.0, 0.15e-3));
-    program.option("--weights", options.weights, "of its own that press each nut down")->check(CLI::Range(0.1, 100.0));
+    program.option("--weights", options.weights, "gravity on the nuts, in multiples of their weight")
+        ->check(CLI::Range(0.1, 20.0));
     program.option("--segments", options.segments, "of the threads, a multiple of 24")->check(CLI::Range(24, 1536));
     program.option("--steps", options.stepsPerSecond, "a second")->check(CLI::Range(30.0, 10000.0));
     program.option("--iterations", options.iterations, "of Bullet's solver")->check(CLI::Range(1, 10000));

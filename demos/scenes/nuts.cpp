@@ -109,17 +109,18 @@ void hold(btRigidBody& body) {
 
 // A nut that has made `most` turns is held there.
 void follow(Rider& rider, const Pose& pose, double time, double most) {
-    if (rider.turns >= most) return;
+    const bool hasSettled = !rider.heights.empty();
+    if (hasSettled && rider.turns >= most) return;
     rider.turning.follow(pose.rotation);
     const double turns = rider.start - rider.turning.turns(), height = pose.position.z;
     const auto whole = double(rider.heights.size());
-    if (!rider.heights.empty() && turns >= whole)
+    if (hasSettled && turns >= whole)
         rider.heights.push_back(glm::mix(rider.height, height, (whole - rider.turns) / (turns - rider.turns)));
     rider.acceleration = (spinOf(rider.body) - rider.speed) / (time - settled);
     rider.speeds.emplace_back(time, spinOf(rider.body));
     rider.turns = turns;
     rider.height = height;
-    if (turns >= most) hold(rider.body);
+    if (hasSettled && turns >= most) hold(rider.body);
 }
 
 // The worst of all turns [%].
@@ -139,7 +140,7 @@ double unevenness(const std::vector<glm::dvec2>& speeds) {
         const glm::dvec2 off = at - mean;
         times += off.x * off.x, both += off.x * off.y, all += off.y * off.y;
     }
-    return 100 * std::sqrt(std::max(all - both * both / times, 0.0) / double(speeds.size())) / mean.y;
+    return 100 * std::sqrt(std::max(all - both * both / times, 0.0) / double(speeds.size())) / std::abs(mean.y);
 }
 
 struct Verdict {

@@ -1,5 +1,6 @@
-// Nuts run down their bolts by gravity alone: a turn must take them down by a pitch, and friction that holds the nut in
-// theory must hold it here. After Y. Narang and others, "Factory: fast contact for robotic assembly", RSS 2022.
+// Nuts run down their bolts by gravity, or a multiple of it: a turn must take them down by a pitch, and friction that
+// holds the nut in theory must hold it here. After Y. Narang and others, "Factory: fast contact for robotic assembly",
+// RSS 2022.
 #pragma once
 
 #include <filesystem>
@@ -15,11 +16,11 @@ struct NutsOptions {
     float turns = 10;                                     ///< the nuts that run make
     float seconds = 5;                                    ///< at most
     float clearance = 50e-6f;                             ///< of the threads [m], see shapes::Thread
-    float weights = 1;                                    ///< that press each nut down, of its own
+    float weights = 1;                                    ///< gravity on the nuts, in multiples of their own weight
     int segments = 96;                                    ///< of the threads, a multiple of 24
     /// At 480, nuts without friction turn by more than a facet of their threads in a step after some turns, and hop in
-    /// their play now and then, as those under ten times their weight do at 600: by 1.2 % of the pitch. Those that stay
-    /// creep by the step, 1e-4 degrees each.
+    /// their play now and then. So do nuts under ten times their weight at 600: a turn's advance is off by 1.2 % then.
+    /// Those that stay creep by the step, 1e-4 degrees each.
     float stepsPerSecond = 720;
     int iterations = 100;       ///< of Bullet's solver
     float voxelSize = 0.3e-3f;  ///< [m]

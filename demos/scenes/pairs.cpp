@@ -23,6 +23,7 @@
 
 #include "demos/shared/shapes.h"
 #include "demos/shared/stage.h"
+#include "demos/shared/triangle_shape.h"
 #include "integration/bullet/shape.h"
 #include "sdf/build.h"
 
@@ -67,16 +68,6 @@ btVector3 toBullet(const glm::vec3& v) {
 }
 
 // What keeps pointers to triangles, heights or children, with them.
-struct TriangleShape {
-    explicit TriangleShape(const Mesh& mesh) {
-        for (const glm::uvec3& t : mesh.triangles)
-            triangles.addTriangle(toBullet(mesh.points[t.x]), toBullet(mesh.points[t.y]), toBullet(mesh.points[t.z]));
-        shape = std::make_unique<btBvhTriangleMeshShape>(&triangles, true);
-    }
-    btTriangleMesh triangles;
-    std::unique_ptr<btBvhTriangleMeshShape> shape;
-};
-
 struct ConcaveShape {
     explicit ConcaveShape(const Mesh& mesh) : mesh(mesh), shape(&this->mesh.triangles) {
         shape.setMargin(0);

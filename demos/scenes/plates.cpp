@@ -51,7 +51,7 @@ Shot addLane(Stage& stage, const PlatesOptions& options, const std::shared_ptr<c
     return {body, place, tilt * glm::vec3(0, 0, 1), speed, thickness, place + glm::vec3(0, 0, above)};
 }
 
-// Whether the ball's middle has gone through its plate, not past its border.
+// Whether the ball's middle has gone through the circle around its plate; farther aside it has gone past the border.
 bool passes(const Shot& shot, const glm::vec3& now) {
     const float before = glm::dot(shot.last - shot.plate, shot.outward),
                 after = glm::dot(now - shot.plate, shot.outward);

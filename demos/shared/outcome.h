@@ -49,7 +49,7 @@ struct Outcome {
     std::vector<std::pair<std::string, LevelSet>> fields{};  ///< worth a file of their own: name, field
 
     Table table{};               ///< of a scene without rigid bodies
-    std::vector<Panel> plots{};  ///< side by side in a picture
+    std::vector<Panel> plots{};  ///< in one picture
 
     int bodies = 0;  ///< that move; what tells of contacts, penetrations and energies is of rigid ones only
     float stepsPerSecond = 0;

@@ -9,19 +9,13 @@
 #include "demos/shared/stage.h"
 
 namespace bilayer::demo {
-namespace {
-
-// CLI11 finds NaN in every range.
-void refuseNaN(const CLI::App& app) {
-    for (const CLI::Option* option : app.get_options())
-        for (const std::string& text : option->results()) {
-            double value = 0;
-            if (CLI::detail::lexical_cast(text, value) && std::isnan(value))
-                throw CLI::ValidationError(option->get_name(), "is not a number");
-        }
+CLI::Validator aNumber() {
+    const auto refuseNaN = [](const std::string& text) -> std::string {
+        double value = 0;
+        return CLI::detail::lexical_cast(text, value) && std::isnan(value) ? "NaN is no number" : "";
+    };
+    return {refuseNaN, ""};
 }
-
-}  // namespace
 
 Program::Program(std::string name, const std::string& description) : name_(std::move(name)), app_(description, name_) {
     option("--threads", threads_, "most threads to use; 0: all")->check(CLI::Range(0, 1024));
@@ -32,7 +26,6 @@ Program::Program(std::string name, const std::string& description) : name_(std::
 int Program::run(int argc, char** argv, const std::function<Outcome()>& scene) {
     try {
         app_.parse(argc, argv);
-        refuseNaN(app_);
         play(scene);
     } catch (const CLI::ParseError& error) {
         return app_.exit(error) == 0 ? 0 : 2;

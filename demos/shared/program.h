@@ -4,10 +4,15 @@
 #include <CLI/CLI.hpp>
 #include <functional>
 #include <string>
+#include <type_traits>
+#include <vector>
 
 #include "demos/shared/outcome.h"
 
 namespace bilayer::demo {
+
+/// Accepts all but NaN, which CLI11 finds in every range.
+CLI::Validator aNumber();
 
 /// Options that all scenes share, such as --out and --threads, and those that the scene adds:
 ///
@@ -24,7 +29,10 @@ class Program {
     /// An option of the scene's own; its present value is the default that --help tells.
     template <class Value>
     CLI::Option* option(const std::string& flag, Value& value, const std::string& help) {
-        return app_.add_option(flag, value, help)->capture_default_str();
+        CLI::Option* added = app_.add_option(flag, value, help)->capture_default_str();
+        if constexpr (std::is_same_v<Value, float> || std::is_same_v<Value, std::vector<float>>)
+            added->check(aNumber());
+        return added;
     }
     CLI::Option* flag(const std::string& flag, bool& value, const std::string& help) {
         return app_.add_flag(flag, value, help);

@@ -30,7 +30,7 @@ constexpr float stillness = 3e-3f;
 // What is met sooner than the contacts that are kept by less than this need not be kept itself, and what was kept in
 // the last step is kept again [parts of the extent]: which of several is met first is then a matter of rounding, and
 // bodies would tremble with each change. Of a mere press it is less: the deepest overlap is what pushes bodies apart;
-// and of shifts and twists, which change gaps by a fraction of what tilts do.
+// and of shifts and twists, which change gaps by as little as the least tilts.
 constexpr float tolerance = 1e-3f, toleranceUntilted = tolerance / 4;
 // What was kept in the last step stays as long as some motion meets it first but for so many tolerances: contacts that
 // bear a load must not come and go, or a stack never comes to rest.

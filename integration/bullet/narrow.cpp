@@ -645,11 +645,11 @@ class TriangleProbes : public btTriangleCallback {
 
 }  // namespace
 
-ContactReport collideFields(const Placed& a, const Placed& b, float margin, bool beyondBand, NearPoints& near,
+ContactReport collideFields(const Placed& a, const Placed& b, float margin, bool farAway, NearPoints& near,
                             std::vector<Contact>& contacts) {
     ContactOptions options = opposition;
     options.margin = margin;
-    options.beyondBand = beyondBand;
+    options.farAway = farAway;
     return collide(a, b, options, contacts, &near);
 }
 

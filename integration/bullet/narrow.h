@@ -15,9 +15,9 @@ namespace bilayer::bullet {
 
 /// Two fields, without the contacts whose normals look along the surface they touch: those of points just under the
 /// edge of the other body.
-/// @param beyondBand  as in ContactOptions
-/// @param near        kept for this pair of bodies from step to step
-ContactReport collideFields(const Placed& a, const Placed& b, float margin, bool beyondBand, NearPoints& near,
+/// @param farAway  as in ContactOptions
+/// @param near     kept for this pair of bodies from step to step
+ContactReport collideFields(const Placed& a, const Placed& b, float margin, bool farAway, NearPoints& near,
                             std::vector<Contact>& contacts);
 
 /// The same of the points that a sampler has found of A in B's field, and of B in A's.

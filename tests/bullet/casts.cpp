@@ -52,7 +52,7 @@ struct Twins {
         ofTriangles.add(*triangles.shape, 0, itsScale * place, turn);
     }
     Shape field;
-    Triangles triangles;
+    TriangleShape triangles;
     World ofField, ofTriangles;
 };
 
@@ -278,7 +278,7 @@ TEST_CASE("Fast bodies that Bullet follows itself stop at a field as at its tria
     const Mesh plate = shapes::box({1, 1, 0.1f});
     const auto play = [&](bool asField) {
         Shape field(std::make_shared<Collider>(plate, build(plate, {.voxelSize = voxel})), {.sweeps = false});
-        const Triangles triangles(plate);
+        const TriangleShape triangles(plate);
         triangles.shape->setMargin(0);
         World world;
         world.add(asField ? static_cast<btCollisionShape&>(field) : *triangles.shape, 0, {0, 0, 0});

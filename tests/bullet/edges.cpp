@@ -70,7 +70,6 @@ btTransform transformOf(const Pose& pose) {
     return btTransform(bullet::toBullet(pose.rotation), bullet::toBullet(pose.position));
 }
 
-// A bar of triangles.
 using Collide = std::function<std::vector<Contact>(const Crossing&, float)>;
 
 Collide collideBars(int kind, bool exact) {
@@ -97,7 +96,7 @@ Collide collideBars(int kind, bool exact) {
             return contacts;
         };
     }
-    const auto triangles = std::make_shared<Triangles>(shapes::box(bar));
+    const auto triangles = std::make_shared<TriangleShape>(shapes::box(bar));
     return [=](const Crossing& c, float margin) {
         std::vector<Contact> contacts;
         bullet::collideTriangles(*triangles->shape, transformOf(c.upper), {}, {*field, c.lower}, margin, contacts);
@@ -131,7 +130,7 @@ TEST_CASE("A plane of many triangles makes the contacts of a plane of two") {
     const glm::vec3 halfSlab(1.6f, 1.6f, 0.3f);
     const Mesh knot = shapes::torusKnot(2, 3, 0.4f, 0.1f, 200, 16);
     const auto body = colliderOf(knot);
-    const Triangles two(shapes::box(halfSlab)), many(shapes::box(halfSlab, 20));
+    const TriangleShape two(shapes::box(halfSlab)), many(shapes::box(halfSlab, 20));
     std::mt19937 random(start);
     std::uniform_real_distribution<float> part(-1, 1);
     int touching = 0;
@@ -143,7 +142,7 @@ TEST_CASE("A plane of many triangles makes the contacts of a plane of two") {
         float lowest = 1;
         for (const glm::vec3& point : knot.points) lowest = std::min(lowest, pose.toWorld(point).z);
         pose.position.z = halfSlab.z - lowest + 0.5f * h * part(random);
-        const auto collide = [&](const Triangles& slab) {
+        const auto collide = [&](const TriangleShape& slab) {
             std::vector<Contact> contacts;
             bullet::collideTriangles(*slab.shape, btTransform::getIdentity(), {}, {*body, pose}, h, contacts);
             return contacts;

@@ -156,7 +156,7 @@ TEST_CASE("Cloth and soft balls come to rest on a field as on its triangles") {
         return std::tuple_cat(world.heights(), std::tuple(world.speed()));
     };
     Shape field(std::make_shared<Collider>(mesh, build(mesh, {.voxelSize = h})));
-    const Triangles reference(mesh);
+    const TriangleShape reference(mesh);
     reference.shape->setMargin(field.getMargin());
     const auto [lowest, highest, speed] = play(field);
     const auto [itsLowest, itsHighest, itsSpeed] = play(*reference.shape);

@@ -72,12 +72,12 @@ TEST_CASE("A field's body rests on each static shape") {
         rests(body, flat, {0, 0, -0.5f}, {0, 0, height}, 1, round);
     }
     SECTION("triangle mesh, coarse, scaled") {
-        const Triangles mesh(shapes::box({1, 1, 0.5f}));
+        const TriangleShape mesh(shapes::box({1, 1, 0.5f}));
         btScaledBvhTriangleMeshShape scaled(mesh.shape.get(), {2, 2, 1});
         rests(body, scaled, {0, 0, -0.5f}, {0, 0, height}, 1, round);
     }
     SECTION("triangle mesh, fine") {
-        const Triangles mesh(shapes::box({1.2f, 1.2f, 0.5f}, 40));
+        const TriangleShape mesh(shapes::box({1.2f, 1.2f, 0.5f}, 40));
         rests(body, *mesh.shape, {0, 0, -0.5f}, {0, 0, height}, 1, round);
     }
     SECTION("height field") {
@@ -152,7 +152,7 @@ TEST_CASE("Each convex shape rests on a field") {
 TEST_CASE("A convex mesh rests on a field, and so does a body whose shape has changed") {
     Shape slab(exactBox({1, 1, 0.3f}, h));
     SECTION("a convex mesh of triangles") {
-        Triangles cube(shapes::box({0.3f, 0.2f, 0.25f}));
+        TriangleShape cube(shapes::box({0.3f, 0.2f, 0.25f}));
         btConvexTriangleMeshShape convex(&cube.triangles);
         convex.setMargin(0);
         rests(convex, slab, {0, 0, 0}, {0, 0, 0.55f});

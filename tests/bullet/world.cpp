@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "demos/shared/shapes.h"
-#include "integration/bullet/convert.h"
 #include "sdf/grids.h"
 
 namespace bilayer::test {
@@ -37,13 +36,6 @@ btRigidBody* World::add(btCollisionShape& shape, float mass, const btVector3& po
 void World::run(float seconds) {
     const float step = 1.f / 240;
     for (int i = 0; i < std::lround(seconds / step); ++i) dynamics.stepSimulation(step, 1, step);
-}
-
-Triangles::Triangles(const Mesh& mesh) {
-    using bullet::toBullet;
-    for (const glm::uvec3& t : mesh.triangles)
-        triangles.addTriangle(toBullet(mesh.points[t.x]), toBullet(mesh.points[t.y]), toBullet(mesh.points[t.z]));
-    shape = std::make_unique<btBvhTriangleMeshShape>(&triangles, true);
 }
 
 std::shared_ptr<const Collider> exactCollider(const Mesh& mesh, const std::function<float(const glm::vec3&)>& distance,

@@ -9,10 +9,13 @@
 #include <vector>
 
 #include "collider/collider.h"
+#include "demos/shared/triangle_shape.h"
 #include "integration/bullet/dispatcher.h"
 #include "integration/bullet/shape.h"
 
 namespace bilayer::test {
+
+using demo::TriangleShape;
 
 /// A world with gravity (0, 0, -9.81) m/s^2 that owns its bodies.
 class World {
@@ -35,14 +38,6 @@ class World {
 
   private:
     std::vector<std::unique_ptr<btRigidBody>> bodies_;
-};
-
-/// A mesh as Bullet collides it.
-struct Triangles {
-    explicit Triangles(const Mesh& mesh);
-
-    btTriangleMesh triangles;
-    std::unique_ptr<btBvhTriangleMeshShape> shape;
 };
 
 /// A field whose distances are those of a formula, not of the mesh's triangles: what is left of an error is the

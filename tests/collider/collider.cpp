@@ -330,6 +330,36 @@ TEST_CASE("tips that meet are pushed back the way they came, whatever they see o
     }
 }
 
+TEST_CASE("beyond the band, edges are as far apart as those of the triangles, and look across") {
+    const bool exact = GENERATE(true, false);
+    const float gap = GENERATE(0.03f, 0.05f, 0.06f, 0.1f, 0.25f), beyond = GENERATE(0.001f, 0.02f);
+    const float scale = GENERATE(1.f, 10.f);
+    const bool crosses = GENERATE(false, true);
+    CAPTURE(exact, gap, beyond, scale, crosses);
+    const Mesh mesh = shapes::box({0.3f, 0.2f, 0.1f});
+    const Collider brick(mesh, build(mesh, {.voxelSize = h}), {.exact = exact});
+    const float half = std::sqrt(0.5f), aside = half * gap, quarter = glm::pi<float>() / 4;
+    // an edge beside and above another one, or above and across it
+    Pose upper{{0.6f + aside, 0.01f, 0.2f + aside}}, lower;
+    glm::vec3 across(half, 0, half);
+    if (crosses) {
+        upper = {{0, 0, half * 0.3f + half * 0.4f + gap}, glm::angleAxis(quarter, glm::vec3(1, 0, 0))};
+        lower = {{}, glm::angleAxis(quarter, glm::vec3(0, 1, 0))};
+        across = {0, 0, 1};
+    }
+    upper.position *= scale;
+    std::vector<Contact> found;
+    const ContactOptions options{.margin = scale * (gap + beyond), .farAway = true};
+    collide(Placed{brick, upper, scale}, Placed{brick, lower, scale}, options, found);
+    REQUIRE(!found.empty());
+    const auto nearer = [](const Contact& one, const Contact& other) { return one.distance < other.distance; };
+    const Contact& nearest = *std::min_element(found.begin(), found.end(), nearer);
+    CAPTURE(nearest.distance / scale, nearest.normal.x, nearest.normal.y, nearest.normal.z);
+    // a field rounds edges off
+    CHECK(nearest.distance == Approx(scale * gap).margin((exact ? 1e-3 : 0.3) * scale * h));
+    CHECK(glm::dot(nearest.normal, across) > (exact ? 0.9999f : 0.98f));
+}
+
 TEST_CASE("points too deep for the band are counted") {
     ContactReport report;
     const auto contacts = contactsOf({brick(), {}, 0.5f}, {ball()}, 0, &report);

@@ -1,4 +1,6 @@
 // The demo itself, small: three bodies for a second.
+#include <fmt/core.h>
+
 #include <catch2/catch.hpp>
 #include <cstdlib>
 #include <filesystem>
@@ -22,5 +24,6 @@ TEST_CASE("the bowl demo writes its field and its recording, and prints its tabl
     CHECK(std::filesystem::file_size(out / "bowl.html") > 500'000);
     const bool bunny = std::filesystem::exists(out / "bunny.vdb");
     CHECK(readVdb(out / (bunny ? "bunny.vdb" : "knot.vdb")).activeVoxels() > 1000);
-    CHECK(std::system((std::string(BILAYER_BOWL) + " --bodies 0 2>/dev/null").c_str()) != 0);
+    for (const char* wrong : {"--bodies 0", "--seconds nan"})
+        CHECK(std::system(fmt::format("{} {} 2>/dev/null", BILAYER_BOWL, wrong).c_str()) != 0);
 }

@@ -81,8 +81,8 @@ TEST_CASE("Spikes, wedges, cracks and cliff edges that meet exactly come to rest
                     const float hair = exact ? 0 : 0.1f * voxel;
                     stage.add(floor, {}, {at - glm::vec3(0, 0, 2 * half)}, {});
                     stage.add(lying, {}, {at}, {});
-                    const glm::vec3 above(aside + hair * any(random), hair * any(random), 2 * half + 0.1f);
-                    stage.add(falling, {.mass = 1}, {at + above}, {});
+                    const float x = hair * any(random), y = hair * any(random);
+                    stage.add(falling, {.mass = 1}, {at + glm::vec3(aside + x, y, 2 * half + 0.1f)}, {});
                     ++pairs;
                 }
     stage.run(20, [&] { return stage.allAsleep(); });
@@ -93,8 +93,9 @@ TEST_CASE("Spikes, wedges, cracks and cliff edges that meet exactly come to rest
     CHECK(asleep);
     CHECK(outcome.deepest() < voxel);
     CHECK(outcome.energies.rise() < 0.01);
-    for (const Pose& pose : poses) {
-        REQUIRE(std::isfinite(glm::dot(pose.position, pose.position)));
-        CHECK(pose.position.z > -2.01f * half);
+    for (std::size_t i = 2; i < poses.size(); i += 3) {
+        const glm::vec3 at = poses[i].position;  // of a body that has fallen, on the floor at least
+        REQUIRE(std::isfinite(glm::dot(at, at)));
+        CHECK(at.z > -half);
     }
 }

@@ -142,8 +142,10 @@ TEST_CASE("nuts under ten times their weight run and stay as they should") {
     options.turns = 1;
     options.stepsPerSecond = 600;
     options.voxelSize = 0.4e-3f;
+    const Outcome slow = demo::nuts(options);
     options.weights = 10;
     const Outcome outcome = demo::nuts(options);
+    CHECK(outcome.stepMs.size() < slow.stepMs.size() / 2);
     // they hop in their play: a turn's advance is off by as much
     for (const char* name : {"nuts that should run and stuck", "unevenness of angular speed",
                              "turn of nuts that should stay", "deepest penetration"}) {
