@@ -3,7 +3,7 @@
 
 #include <catch2/catch.hpp>
 
-#include "tests/support/analytic.h"
+#include "tests/support/random.h"
 #include "tests/support/support.h"
 #include "world.h"
 

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <numeric>
-#include <random>
 #include <stdexcept>
 
 #include "cl/point_sampler.h"
@@ -13,6 +12,7 @@
 #include "integration/bullet/narrow.h"
 #include "sdf/build.h"
 #include "tests/bullet/world.h"
+#include "tests/support/random.h"
 #include "tests/support/support.h"
 
 using namespace bilayer;
@@ -31,19 +31,10 @@ std::vector<std::shared_ptr<const Collider>> someColliders() {
             colliderOf(shapes::box({0.1f, 0.06f, 0.03f}), 24, true), colliderOf(shapes::sphere(0.08f, 3), 20)};
 }
 
-class Random {
-  public:
-    explicit Random(unsigned seed) : engine_(seed) {}
-    float in(float low, float high) { return std::uniform_real_distribution<float>(low, high)(engine_); }
-    glm::vec3 vector(float size) { return {in(-size, size), in(-size, size), in(-size, size)}; }
-    Pose pose(float size) {
-        const glm::vec3 v = vector(1);
-        return {vector(size), glm::normalize(glm::quat(in(-1, 1), v.x, v.y, v.z))};
-    }
-
-  private:
-    std::mt19937 engine_;
-};
+Pose somePose(Random& random, double size) {
+    const glm::vec3 v = random.point(1);
+    return {random.point(size), glm::normalize(glm::quat(float(random(-1, 1)), v.x, v.y, v.z))};
+}
 
 bool sameBits(const Contact& a, const Contact& b) {
     return a.position == b.position && a.normal == b.normal && a.distance == b.distance && a.feature == b.feature &&
@@ -57,8 +48,8 @@ struct Crowd {
 
     explicit Crowd(Random& random, int count = 16) {
         for (int i = 0; i < count; ++i)
-            bodies.push_back({*colliders[std::size_t(i) % colliders.size()], random.pose(0.12f),
-                              i % 5 ? 1.f : random.in(0.7f, 1.5f)});
+            bodies.push_back({*colliders[std::size_t(i) % colliders.size()], somePose(random, 0.12),
+                              i % 5 ? 1.f : float(random(0.7, 1.5))});
     }
 };
 
@@ -116,10 +107,10 @@ Played play(PointSampler sampler, unsigned seed) {
     world.add(floor, 0, {0, 0, -0.05f});
     std::vector<const btRigidBody*> bodies;
     for (int i = 0; i < 8; ++i) {
-        const glm::vec3 place = random.vector(0.1f), axis = random.vector(1);
+        const glm::vec3 place = random.point(0.1), axis = random.point(1);
         bodies.push_back(world.add(*shapes[std::size_t(i) % shapes.size()], 1,
                                    {place.x, place.y, 0.15f + 0.1f * float(i)},
-                                   btQuaternion({axis.x, axis.y, axis.z + 2}, random.in(0, 3))));
+                                   btQuaternion({axis.x, axis.y, axis.z + 2}, float(random(0, 3)))));
     }
     Played played;
     for (int step = 0; step < 120; ++step) {
@@ -143,7 +134,7 @@ TEST_CASE("contacts of points sampled on a device are those of the processor, bi
     Random random(seed);
     const OpenclOptions options{.mapping = GENERATE(KernelMapping::blockPerItem, KernelMapping::groupPerBlock)};
     const PointSampler sampler = openclPointSampler(openDevice(), options);
-    for (int i = 0; i < 3; ++i) CHECK(check(sampler, Crowd(random), random.in(0, 0.004f)) > 1000);
+    for (int i = 0; i < 3; ++i) CHECK(check(sampler, Crowd(random), float(random(0, 0.004))) > 1000);
 }
 
 TEST_CASE("bodies that do not fit on the device together take turns") {

@@ -9,6 +9,7 @@
 
 #include "collider/field.h"
 #include "demos/shared/shapes.h"
+#include "tests/support/random.h"
 #include "tests/support/sampling.h"
 #include "tests/support/support.h"
 

@@ -20,6 +20,7 @@
 #include "sdf/grids.h"
 #include "sdf/vdb_io.h"
 #include "tests/support/analytic.h"
+#include "tests/support/random.h"
 #include "tests/support/support.h"
 
 using namespace bilayer;

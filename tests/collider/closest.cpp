@@ -20,7 +20,7 @@
 #include "demos/shared/shapes.h"
 #include "sdf/build.h"
 #include "sdf/mesh_io.h"
-#include "tests/support/analytic.h"
+#include "tests/support/random.h"
 #include "tests/support/support.h"
 #include "tests/support/truth.h"
 

@@ -13,6 +13,7 @@
 #include "demos/shared/shapes.h"
 #include "sdf/build.h"
 #include "tests/support/analytic.h"
+#include "tests/support/random.h"
 #include "tests/support/support.h"
 #include "tests/support/truth.h"
 

@@ -12,6 +12,7 @@
 #include "demos/shared/shapes.h"
 #include "sdf/build.h"
 #include "sdf/grids.h"
+#include "tests/support/random.h"
 #include "tests/support/sampling.h"
 #include "tests/support/support.h"
 

@@ -12,9 +12,12 @@
 #include <stdexcept>
 
 #include "demos/shared/shapes.h"
+#include "sdf/build.h"
+#include "sdf/grids.h"
 #include "sdf/mesh_io.h"
 #include "tests/support/analytic.h"
 #include "tests/support/clean.h"
+#include "tests/support/random.h"
 #include "tests/support/support.h"
 
 using namespace bilayer;

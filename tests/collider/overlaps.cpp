@@ -15,6 +15,7 @@
 #include "sdf/build.h"
 #include "sdf/mesh_io.h"
 #include "tests/support/analytic.h"
+#include "tests/support/random.h"
 #include "tests/support/sampling.h"
 #include "tests/support/support.h"
 #include "tests/support/truth.h"

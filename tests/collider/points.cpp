@@ -8,7 +8,7 @@
 #include <stdexcept>
 
 #include "demos/shared/shapes.h"
-#include "tests/support/analytic.h"
+#include "tests/support/random.h"
 #include "tests/support/support.h"
 
 using namespace bilayer;

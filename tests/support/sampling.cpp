@@ -11,6 +11,7 @@
 
 #include "demos/shared/shapes.h"
 #include "sdf/grids.h"
+#include "tests/support/random.h"
 #include "tests/support/support.h"
 
 namespace bilayer::test {
