@@ -16,17 +16,15 @@
 
 #include "collider/edge_search.h"
 #include "collider/interpolant.h"
+#include "collider/touch.h"
 #include "sdf/surface.h"
 
 namespace bilayer {
 namespace {
 
-constexpr float flattest = 0.1f;  // a gradient shorter than this tells no direction: the point is on a medial axis
 constexpr float searchTolerance = 2e-3f;  // of the deepest place on an edge [voxels]
 // Where two edges cross, the normal across both is taken if it looks no farther aside from the other body's (cosine).
 constexpr float leastAcross = 0.3f;
-constexpr float crossingWithin = 1.5f;  // of the deepest place that the field shows [voxels]: it rounds edges off
-constexpr float nearestAside = 0.01f;   // [voxels] from an edge or corner: nearer, rounding spoils the way's direction
 // A point that slides along a face ends in the edges beyond it by rounding: what only grazes, by less than this, goes
 // past [voxels].
 constexpr float grazing = 0.25f;
@@ -57,35 +55,6 @@ struct Map {
         return map;
     }
 };
-
-// How a field is touched, in its own coordinates.
-struct Touch {
-    float distance;      // of the point from the surface; of one that comes from afar from the plane that it will meet
-    glm::vec3 normal;    // outward; zero where the field tells none
-    float approach = 0;  // Contact::approach
-};
-
-glm::vec3 directionOf(const glm::vec3& gradient) {
-    const float length = glm::length(gradient);
-    return length > flattest ? gradient / length : glm::vec3(0);
-}
-
-// Across a face, and away from an edge or a corner, or from what a field without triangles does not tell apart.
-glm::vec3 directionOf(const ClosestPoint& closest, const glm::vec3& point, float voxelSize) {
-    const bool mayBeAside = closest.feature != Feature::face || closest.triangle == noTriangle;
-    const bool isAside = mayBeAside && std::abs(closest.distance) > nearestAside * voxelSize;
-    return isAside ? (point - closest.position) / closest.distance : closest.normal;
-}
-
-// The touch of a point in the band: by the triangles where the field has them, else by its sample.
-Touch touchInBand(const Field& field, const glm::vec3& point, const Sample& sample) {
-    if (field.mesh()) {
-        const float most = std::abs(sample.distance) + mostInterpolationError * field.voxelSize();
-        if (const ClosestPoint closest = field.closest(point, most); closest.found)
-            return {closest.distance, directionOf(closest, point, field.voxelSize())};
-    }
-    return {sample.distance, directionOf(sample.gradient)};
-}
 
 // The touch of a point that comes from outside of the field and goes some way.
 std::optional<Touch> touchOnWay(const Field& field, const glm::vec3& point, const glm::vec3& way) {
@@ -317,7 +286,7 @@ class PointsInField {
         const glm::vec3 place = at + lowest->place * along;
         const Wings seen{map_.turned(wings[0]), map_.turned(wings[1])};
         if (const auto crossing = other_.collider.edges().crossing(other_.collider.points(), at, end, seen, place,
-                                                                   crossingWithin * field_.voxelSize())) {
+                                                                   touched->distance, field_.voxelSize())) {
             if (crossing->distance > reach_) return std::nullopt;
             const glm::vec3 onEdge = crossing->position + crossing->distance * crossing->normal;
             return std::pair(glm::dot(onEdge - at, along), Touch{crossing->distance, crossing->normal});

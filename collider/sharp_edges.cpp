@@ -24,6 +24,11 @@ constexpr float mostAbove = 0.05f;
 constexpr std::size_t mostNeighbours = 6;
 // Edges that cross at a smaller angle (sine) are parallel: their points tell enough.
 constexpr float leastCrossing = 0.2f;
+// A crossing lies so near to the deepest place that the field shows, which rounds edges off [voxels].
+constexpr float crossingWithin = 1.5f;
+// It is no deeper than so many times what the field shows, across faces instead of both edges, and so much besides
+// [voxels].
+constexpr float deepestAcross = 1.5f, deepestUnseen = 1;
 // Faces leave the plane between two edges at this angle (sine) at least: faces that lie on each other touch by their
 // points.
 constexpr float leastLeaving = 0.09f;
@@ -114,9 +119,12 @@ SharpEdges::SharpEdges(const SurfacePoints& points, const Field& field) {
 
 std::optional<SharpEdges::Crossing> SharpEdges::crossing(const SurfacePoints& points, const glm::vec3& from,
                                                          const glm::vec3& to, const Wings& wings,
-                                                         const glm::vec3& place, float within) const {
+                                                         const glm::vec3& place, float distance,
+                                                         float voxelSize) const {
     if (edges_.empty()) return std::nullopt;
     const glm::vec3 along = to - from;
+    const float within = crossingWithin * voxelSize,
+                least = std::min(distance, deepestAcross * distance) - deepestUnseen * voxelSize;
     const float reach = within + longest_;
     std::optional<Crossing> best;
     float nearest = within;
@@ -136,8 +144,10 @@ std::optional<SharpEdges::Crossing> SharpEdges::crossing(const SurfacePoints& po
         if (away > nearest) return;
         for (int i = 0; i < 2; ++i)
             if (glm::dot(normal, edge.wings[i]) > -leastLeaving || glm::dot(normal, wings[i]) < leastLeaving) return;
+        const float distance = glm::dot(there - here, normal);
+        if (distance < least) return;
         nearest = away;
-        best = Crossing{here, normal, glm::dot(there - here, normal)};
+        best = Crossing{here, normal, distance};
     };
     points.visit([&](const glm::vec3& centre, float radius) { return glm::distance(centre, place) > radius + reach; },
                  [&](std::uint32_t index, const SurfacePoint& point) {

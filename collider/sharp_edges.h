@@ -46,10 +46,11 @@ class SharpEdges {
     };
     /// Where another body's edge crosses one of this body's, nearest to a place on it, if there is a plane between the
     /// two that all four faces leave: else faces or corners touch first. All in this body's coordinates.
-    /// @param wings   of the other edge
-    /// @param within  of the place [m]
+    /// @param wings     of the other edge
+    /// @param place     the deepest on it that the field shows, by the interpolant to within edges that it rounds off
+    /// @param distance  that the field shows there [m]: what is much deeper is no touch, but an edge on another side
     std::optional<Crossing> crossing(const SurfacePoints& points, const glm::vec3& from, const glm::vec3& to,
-                                     const Wings& wings, const glm::vec3& place, float within) const;
+                                     const Wings& wings, const glm::vec3& place, float distance, float voxelSize) const;
 
   private:
     std::vector<SharpEdge> edges_;

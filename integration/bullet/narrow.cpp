@@ -17,6 +17,7 @@
 #include "collider/edge_search.h"
 #include "collider/interpolant.h"
 #include "collider/path.h"
+#include "collider/touch.h"
 #include "integration/bullet/convert.h"
 
 namespace bilayer::bullet {
@@ -25,12 +26,13 @@ namespace {
 
 // Edges get no more parts: numbers beyond are those of the next edge.
 constexpr int partBits = 15;
+// Of what is found of a triangle: three edges, three corners, and from here on what lies over it.
+constexpr std::uint32_t overPoints = 6;
 // Points farther than this inside the band's border are in it for certain [voxels].
 constexpr float bandBorder = 1.7321f;
 constexpr float searchTolerance = 2e-3f;  // of the deepest place between two probes [voxels]
 // Where two edges cross, the normal across both is taken if it looks no farther aside from the field's (cosine).
 constexpr float leastAcross = 0.3f;
-constexpr float crossingWithin = 1.5f;  // of the deepest place that the field shows [voxels]: it rounds edges off
 // On the medial axis the interpolated gradient is short and says nothing of a direction.
 constexpr float shortestGradient = 0.5f;
 // A surface point touches a face that looks against its own normal, by this cosine at least: the points below the edge
@@ -39,7 +41,7 @@ constexpr float shortestGradient = 0.5f;
 constexpr ContactOptions opposition{.leastOpposition = 0.3f, .leastOppositionApart = 0.9f};
 // Steps towards the deepest place of a round surface; each divides the error by the ratio of the radii of curvature.
 constexpr int mostRefinements = 6;
-// A point lies over a face if its foot there is no farther aside than this [probe spacings]: rounding.
+// A point lies over a face if it is no farther beyond its sides than this [probe spacings]: rounding.
 constexpr float onFace = 1e-4f;
 // Triangles whose wings enclose more than 179.9 degrees (cosine) have no edge between them.
 constexpr float flatEdge = -0.9999985f;
@@ -65,6 +67,7 @@ class Local {
           ways_(other, motion, field.pose, field.motion) {
         const Bounds& bounds = field.collider.bounds();
         if (reach > scale_ * field_.exteriorWidth() - bandBorder * voxel_) farReach_ = reach / scale_;
+        exactReach_ = reach + mostInterpolationError * voxel_;
         longestWay_ = ways_.longest(scale_ * bounds.centre(), 0.5f * scale_ * glm::length(bounds.size()));
     }
 
@@ -88,6 +91,7 @@ class Local {
         const Sample sample = field_.sample(point / scale_);
         if (!sample.inBand && sample.distance > 0 && farReach_ > 0) return farAway(point, radius, sample.distance);
         if (!sample.inBand) return {sample.distance > 0 ? Answer::outside : Answer::inside, scale_ * sample.distance};
+        if (field_.mesh() && scale_ * sample.distance - radius <= exactReach_) return exactly(point, sample);
         const float length = glm::length(sample.gradient);
         if (length < shortestGradient) return {Answer::unclear, scale_ * sample.distance, {}, sample.gradient};
         return {Answer::near, scale_ * sample.distance, sample.gradient / length, sample.gradient};
@@ -194,6 +198,13 @@ class Local {
                        -glm::dot(way, hit->normal));
     }
 
+    /// By the triangles, in the band (see ColliderOptions::exact).
+    Answer exactly(const glm::vec3& point, const Sample& sample) const {
+        const Touch touch = touchInBand(field_, point / scale_, sample);
+        if (touch.normal == glm::vec3(0)) return {Answer::unclear, scale_ * touch.distance, {}, sample.gradient};
+        return {Answer::near, scale_ * touch.distance, touch.normal, touch.normal};
+    }
+
     /// Beyond the band, where a contact test asks for more than the band tells.
     Answer farAway(const glm::vec3& point, float radius, float bound) const {
         const ClosestPoint closest = field_.closest(point / scale_, farReach_ + radius / scale_);
@@ -208,6 +219,7 @@ class Local {
     Pose pose_;
     RelativeWays ways_;
     float longestWay_;
+    float exactReach_;    ///< up to which triangles are asked, where the field has any [m]
     float farReach_ = 0;  ///< where contacts are asked for beyond the band; in the field's size
 };
 
@@ -243,7 +255,7 @@ std::optional<Contact> Local::deepestBetween(const Edge& edge, float from, const
     if (edge.wings && radius <= 0)
         if (const auto crossing =
                 collider_.edges().crossing(collider_.points(), edge.place(0) / scale_, edge.place(1) / scale_,
-                                           *edge.wings, point / scale_, crossingWithin * voxel_ / scale_)) {
+                                           *edge.wings, point / scale_, here.distance / scale_, voxel_ / scale_)) {
             if (scale_ * crossing->distance > margin) return std::nullopt;
             return contact(scale_ * crossing->position, crossing->normal, scale_ * crossing->distance, 0,
                            approach(point, crossing->normal, margin));
@@ -492,10 +504,14 @@ class TriangleProbes : public btTriangleCallback {
     /// Triangles farther than this from the field's box are of no interest [m].
     float room() const { return margin_ + local_.longestWay(); }
 
-    void processTriangle(btVector3* triangle, int, int index) override {
+    void processTriangle(btVector3* triangle, int part, int index) override {
+        // The two triangles of a height field's cell come one after the other, and bear the same numbers.
+        const bool isSecond = part == part_ && index == index_;
+        part_ = isSecond ? -1 : part;
+        index_ = index;
         Face face{{inField_.toWorld(toGlm(triangle[0])), inField_.toWorld(toGlm(triangle[1])),
                    inField_.toWorld(toGlm(triangle[2]))},
-                  index};
+                  mixed(mixed(mixed(std::uint64_t(part)) ^ std::uint64_t(index)) ^ std::uint64_t(isSecond))};
         const auto& corners = face.corners;
         const glm::vec3 middle = (corners[0] + corners[1] + corners[2]) / 3.f;
         float around = 0;
@@ -508,16 +524,23 @@ class TriangleProbes : public btTriangleCallback {
         for (std::uint32_t f = 0; f < faces_.size(); ++f)
             for (int i = 0; i < 3; ++i) sides_[keyOf(f, i)].push_back({f, i});
         for (std::uint32_t f = 0; f < faces_.size(); ++f) visit(f);
+        keepOverFaces();
     }
 
   private:
     struct Face {
         std::array<glm::vec3, 3> corners;
-        int index;  ///< Bullet's
+        std::uint64_t id;  ///< of Bullet's numbers
     };
     struct Side {
         std::uint32_t face;
         int first;  ///< corner
+    };
+    /// What a surface point of the field finds on a triangle.
+    struct OverFace {
+        std::uint32_t point;
+        std::uint64_t face;  ///< its id
+        Contact contact;
     };
     /// The ends of a side in one order.
     using Key = std::array<float, 6>;
@@ -529,7 +552,7 @@ class TriangleProbes : public btTriangleCallback {
     }
 
     void visit(std::uint32_t f) {
-        const auto& [corners, index] = faces_[f];
+        const auto& [corners, id] = faces_[f];
         Local::Answer answers[3];
         std::array<std::optional<Wings>, 3> wings;
         std::array<bool, 3> flat;
@@ -544,19 +567,19 @@ class TriangleProbes : public btTriangleCallback {
         const bool isLarge = longest > spacing_;
         for (int i = 0; i < 3; ++i) {
             if (!isLarge || !flat[i] || !flat[(i + 2) % 3])
-                keep(local_.probe(corners[i], answers[i], 0, featureOf(index, 3 + i), margin_, report_));
+                keep(local_.probe(corners[i], answers[i], 0, featureOf(id, 3 + i), margin_, report_));
             const Side& first = sides_.at(keyOf(f, i)).front();
             if (first.face != f || first.first != i || (isLarge && flat[i])) continue;
             const glm::vec3 &from = corners[i], &to = corners[(i + 1) % 3];
             const Local::Edge edge{[&](float part) { return glm::mix(from, to, part); },
                                    {0, 0},
                                    true,
-                                   featureOf(index, i),
+                                   featureOf(id, i),
                                    wings[i],
                                    !flat[i]};
             local_.probeEdge(edge, answers[i], answers[(i + 1) % 3], margin_, report_, contacts_);
         }
-        if (isLarge) visitFace(corners, flat);
+        if (isLarge) visitFace(faces_[f]);
     }
 
     /// Of a side that two triangles share.
@@ -578,58 +601,80 @@ class TriangleProbes : public btTriangleCallback {
         return length > 0 ? across / length : glm::vec3(0);
     }
 
-    /// Of an edge, or behind those of a corner; the same from step to step.
-    static std::uint32_t featureOf(int triangle, int part) {
-        return ((std::uint32_t(triangle) * 6 + std::uint32_t(part)) << (partBits + 1)) & ~featureOfB;
+    /// Scatters numbers over all bits (S. Vigna's SplitMix64).
+    static std::uint64_t mixed(std::uint64_t bits) {
+        bits += 0x9e3779b97f4a7c15u;
+        bits = (bits ^ bits >> 30) * 0xbf58476d1ce4e5b9u;
+        bits = (bits ^ bits >> 27) * 0x94d049bb133111ebu;
+        return bits ^ bits >> 31;
+    }
+
+    /// The first of an edge's, a corner's, or a face's above a surface point: the same from step to step, and no
+    /// other's but for a chance of one in 2^31.
+    static std::uint32_t featureOf(std::uint64_t triangle, std::uint32_t part) {
+        constexpr std::uint32_t count = featureOfB - (2u << partBits);
+        return std::uint32_t(mixed(triangle ^ part) % count);
     }
 
     void keep(const std::optional<Contact>& contact) {
         if (contact) contacts_.push_back(*contact);
     }
 
-    /// Asks the field at the feet of its own surface points on the triangle: a bump finds a large face.
-    /// @param flat  the sides beyond which a neighbour goes on in the same plane: what lies there is the neighbour's
-    void visitFace(const std::array<glm::vec3, 3>& corners, const std::array<bool, 3>& flat) {
-        const float scale = field_.scale, rounding = onFace * spacing_;
+    /// A point over several faces, as in a valley, has a contact with each of them, and a feature for each.
+    void keepOverFaces() {
+        const auto isEarlier = [](const OverFace& a, const OverFace& b) { return a.point < b.point; };
+        std::stable_sort(overFaces_.begin(), overFaces_.end(), isEarlier);
+        for (auto first = overFaces_.begin(); first != overFaces_.end();) {
+            const auto last = std::upper_bound(first, overFaces_.end(), *first, isEarlier);
+            const bool isAlone = last - first == 1;
+            for (; first != last; ++first) {
+                first->contact.feature =
+                    (isAlone ? first->point : featureOf(first->face, overPoints + first->point)) | featureOfB;
+                contacts_.push_back(first->contact);
+            }
+        }
+    }
+
+    /// Asks the field at the feet of its own surface points on the triangle: a bump finds a large face. Points that are
+    /// not over the face are its edges' and its neighbours', and a foot that others are much nearer to is theirs.
+    void visitFace(const Face& face) {
+        const auto& corners = face.corners;
         const glm::vec3 square = glm::cross(corners[1] - corners[0], corners[2] - corners[0]);
-        const float area = glm::length(square);
-        std::array<glm::vec3, 3> outwards{};
-        for (int i = 0; i < 3; ++i)
-            if (flat[i]) outwards[i] = glm::normalize(glm::cross(corners[(i + 1) % 3] - corners[i], square));
-        const auto isBeyond = [&](const glm::vec3& place, float by) {
+        const float area = glm::length(square), scale = field_.scale, rounding = onFace * spacing_;
+        if (!(area > 0)) return;
+        const glm::vec3 up = square / area;
+        std::array<glm::vec3, 3> outwards;
+        for (int i = 0; i < 3; ++i) outwards[i] = glm::normalize(glm::cross(corners[(i + 1) % 3] - corners[i], square));
+        const auto isBeside = [&](const glm::vec3& place, float by) {
             for (int i = 0; i < 3; ++i)
-                if (flat[i] && glm::dot(outwards[i], place - corners[i]) > by) return true;
-            return area > 0 && std::abs(glm::dot(square, place - corners[0])) > area * (reach_ + by);
-        };
-        const auto foot = [&](const glm::vec3& point) {
-            return nearestOnTriangle(scale * point, corners[0], corners[1], corners[2]);
+                if (glm::dot(outwards[i], place - corners[i]) > by) return true;
+            return std::abs(glm::dot(up, place - corners[0])) > reach_ + by;
         };
         const auto reject = [&](const glm::vec3& centre, float radius) {
-            return isBeyond(scale * centre, scale * radius + rounding) ||
-                   glm::distance(foot(centre), scale * centre) > scale * radius + reach_;
+            return isBeside(scale * centre, scale * radius + rounding);
         };
         field_.collider.points().visit(reject, [&](std::uint32_t index, const SurfacePoint& point) {
             const glm::vec3 place = scale * point.position;
-            if (isBeyond(place, rounding)) return;
-            const glm::vec3 below = foot(point.position), way = below - place;
-            const std::uint32_t feature = index | featureOfB;
-            if (glm::length(way) > reach_) return;
+            if (isBeside(place, rounding)) return;
+            const glm::vec3 below = nearestOnTriangle(place, corners[0], corners[1], corners[2]);
+            const glm::vec3 normal = glm::dot(up, point.normal) < 0 ? -up : up;
+            const float height = glm::dot(below - place, normal);
+            const Local::Answer answer = local_.at(below);
+            if (std::abs(height) > std::abs(answer.distance) + spacing_ + local_.longestWay()) return;
             // A point whose surface lies on the face is exact; one aslant may have passed an edge of what the sheet
             // belongs to, and one that looks away from a sheet that has not reached it is on the other side of its
             // body.
-            const float side = glm::dot(square, point.normal) < 0 ? -1.f : 1.f;
-            const glm::vec3 normal = side / area * square;
-            const float height = glm::dot(way, normal);
-            const bool isOver = glm::length(way) - std::abs(height) <= rounding;
             const bool lies = glm::dot(normal, point.normal) >= opposition.leastOppositionApart;
-            const Local::Answer answer = local_.at(below);
             const bool isNearest =
                 std::abs(answer.distance - height) <= mostInterpolationError * spacing_ / probeSpacing;
-            if (!(area > 0) || height > margin_ || !isOver || !lies || !isNearest)
-                return keep(local_.probe(below, answer, 0, feature, margin_, report_));
-            ++report_.pointsTested;
-            contacts_.push_back(
-                local_.contact(place, normal, height, feature, local_.approach(below, normal, margin_)));
+            std::optional<Contact> found;
+            if (lies && isNearest && height <= margin_) {
+                ++report_.pointsTested;
+                found = local_.contact(place, normal, height, 0, local_.approach(below, normal, margin_));
+            } else {
+                found = local_.probe(below, answer, 0, 0, margin_, report_);
+            }
+            if (found) overFaces_.push_back({index, face.id, *found});
         });
     }
 
@@ -640,6 +685,8 @@ class TriangleProbes : public btTriangleCallback {
     ContactReport& report_;
     std::vector<Contact>& contacts_;
     std::vector<Face> faces_;
+    std::vector<OverFace> overFaces_;
+    int part_ = -1, index_ = -1;  ///< of the last triangle that was handed over
     std::map<Key, std::vector<Side>> sides_;
 };
 
