@@ -20,6 +20,8 @@ namespace bilayer {
 
 struct ColliderOptions {
     /// Distance between neighbouring surface points [voxels of the field]. Smaller finds finer contacts and costs more.
+    /// What is round, with a radius of r voxels, sinks in between them by up to 0.23 spacing^2 / r voxels: by a tenth
+    /// of a voxel at a radius of nine with 2, of two and a half with 1.
     float pointSpacing = 2.0f;
     /// Contacts are made up to this distance between the surfaces [m]. Negative: one voxel of the field.
     float margin = -1;

@@ -10,13 +10,13 @@
 namespace bilayer::demo {
 namespace {
 
-constexpr float gravity = 9.81f;                     // [m/s^2]
-constexpr glm::vec3 halfBlock{0.12f, 0.12f, 0.06f};  // low: a slope of 60 degrees would not tip it [m]
-constexpr float lane = 0.36f;                        // between blocks [m]
-constexpr float halfThickness = 0.1f;                // of the inclines [m]
-constexpr float settled = 0.25f;                     // acceleration is measured from then on [s]
-constexpr double mostCreep = 0.1;                    // of blocks that stick, in all the time [voxels]
-constexpr float sliding = 0.98f, sticking = 1.02f;   // friction in parts of the tangent
+constexpr float gravity = 9.81f;                             // [m/s^2]
+constexpr glm::vec3 halfBlock{0.12f, 0.12f, 0.06f};          // low: a slope of 60 degrees would not tip it [m]
+constexpr float lane = 0.36f;                                // between blocks [m]
+constexpr float halfThickness = 0.1f;                        // of the inclines [m]
+constexpr float settled = 0.25f;                             // acceleration is measured from then on [s]
+constexpr double mostCreep = 0.1;                            // of blocks that stick, in all the time [voxels]
+constexpr float mostSliding = 0.98f, leastSticking = 1.02f;  // friction in parts of the tangent
 
 constexpr Look rampLook{.colour = 0x35506b, .roughness = 0.6f};
 constexpr std::uint32_t slidingColour = 0xe07a5f, stickingColour = 0x81b29a;
@@ -62,11 +62,15 @@ void addIncline(Stage& stage, std::vector<Rider>& riders, const InclineOptions& 
 
 std::vector<Criterion> judge(const std::vector<Rider>& riders, double time, float voxelSize) {
     double creep = 0, worst = 0;
-    int stuck = 0;
+    int sticking = 0, sliding = 0, stuck = 0;
     for (const Rider& rider : riders) {
         const double way = glm::distance(positionOf(rider.body), rider.start);
-        if (rider.friction > sticking) creep = worse(creep, way / voxelSize);
-        if (rider.friction < sliding) {
+        if (rider.friction > leastSticking) {
+            ++sticking;
+            creep = worse(creep, way / voxelSize);
+        }
+        if (rider.friction < mostSliding) {
+            ++sliding;
             const double expected = rider.acceleration();
             const double measured =
                 (rider.body.getLinearVelocity().length() - rider.speedWhenSettled) / (time - settled);
@@ -74,9 +78,13 @@ std::vector<Criterion> judge(const std::vector<Rider>& riders, double time, floa
             worst = worse(worst, std::abs(measured / expected - 1));
         }
     }
-    return {{"blocks that should slide and stick", double(stuck), 0},
-            {"creep of blocks that should stick", creep, mostCreep, "voxels"},
-            {"acceleration off theory", 100 * worst, 2, "%"}};
+    std::vector<Criterion> criteria;
+    if (sliding > 0)
+        criteria = {{"blocks that should slide and stick", double(stuck), 0},
+                    {"acceleration off theory", 100 * worst, 2, "%"}};
+    if (sticking > 0) criteria.push_back({"creep of blocks that should stick", creep, mostCreep, "voxels"});
+    if (criteria.empty()) criteria.push_back({"frictions of which theory says nothing, and no other", 1, 0});
+    return criteria;
 }
 
 }  // namespace

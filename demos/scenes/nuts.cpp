@@ -144,8 +144,9 @@ double unevenness(const std::vector<glm::dvec2>& speeds) {
 }
 
 struct Verdict {
+    int running = 0, staying = 0;          // that should
     int stuck = 0;                         // that should run
-    double moved = 0;                      // by those that should stay [degrees]
+    double turned = 0, slipped = 0;        // by those that should stay [degrees, m]
     double advance = 0, acceleration = 0;  // off theory [%]
     double unevenness = 0;                 // of those that run [%]
 };
@@ -153,8 +154,13 @@ struct Verdict {
 Verdict judge(const std::vector<Rider>& riders, const Theory& theory, double turns) {
     Verdict verdict;
     for (const Rider& rider : riders) {
-        if (theory.stays(rider.friction)) verdict.moved = worse(verdict.moved, 360 * std::abs(rider.turns));
+        if (theory.stays(rider.friction)) {
+            ++verdict.staying;
+            verdict.turned = worse(verdict.turned, 360 * std::abs(rider.turns));
+            verdict.slipped = worse(verdict.slipped, std::abs(rider.heights.front() - rider.height));
+        }
         if (!theory.runs(rider.friction)) continue;
+        ++verdict.running;
         const double inertia = double(rider.body.getInvMass()) / double(rider.body.getInvInertiaTensorWorld()[2][2]);
         const double weight = -double(rider.body.getGravity().z());
         const double expected = theory.acceleration(rider.friction, inertia, weight);
@@ -164,6 +170,22 @@ Verdict judge(const std::vector<Rider>& riders, const Theory& theory, double tur
         verdict.acceleration = worse(verdict.acceleration, 100 * std::abs(rider.acceleration / expected - 1));
     }
     return verdict;
+}
+
+// What there is to judge; where there is nothing, that is what is wrong.
+std::vector<Criterion> criteriaOf(const Verdict& verdict, double deepest, double voxelSize) {
+    std::vector<Criterion> criteria;
+    if (verdict.running > 0)
+        criteria = {{"advance of a turn off the pitch", verdict.advance, 1, "%"},
+                    {"nuts that should run and stuck", double(verdict.stuck), 0},
+                    {"unevenness of angular speed", verdict.unevenness, 10, "%"}};
+    if (verdict.staying > 0) {
+        criteria.push_back({"turn of nuts that should stay", verdict.turned, mostPlay, "degrees"});
+        criteria.push_back({"way of nuts that should stay", verdict.slipped / voxelSize, 0.5, "voxels"});
+    }
+    if (criteria.empty()) criteria.push_back({"frictions of which theory says nothing, and no other", 1, 0});
+    criteria.push_back({"deepest penetration", deepest / voxelSize, 0.5, "voxels"});
+    return criteria;
 }
 
 }  // namespace
@@ -222,11 +244,7 @@ Outcome nuts(const NutsOptions& options) {
     outcome.facts = {{"friction that holds, by theory",
                       fmt::format("{:.4f}", std::tan(theory.lead()) * std::cos(glm::radians(30.0)))},
                      {"acceleration off theory", fmt::format("{:.2f} %", verdict.acceleration)}};
-    outcome.criteria = {{"advance of a turn off the pitch", verdict.advance, 1, "%"},
-                        {"nuts that should run and stuck", double(verdict.stuck), 0},
-                        {"unevenness of angular speed", verdict.unevenness, 10, "%"},
-                        {"turn of nuts that should stay", verdict.moved, mostPlay, "degrees"},
-                        {"deepest penetration", outcome.deepest() / options.voxelSize, 0.5, "voxels"}};
+    outcome.criteria = criteriaOf(verdict, outcome.deepest(), options.voxelSize);
     return outcome;
 }
 

@@ -30,25 +30,47 @@ constexpr float breakingVoxels = 2;
 constexpr float castVoxel = 0.05f;
 // Where a ray goes on behind a triangle that it sees from behind [voxels].
 constexpr double skippedVoxels = 1e-4;
+// How far the triangles of a field's zero set lie from its interpolant's zeros at most, or a bit more [voxels].
+constexpr float zeroSetVoxels = 0.1f;
 
 btVector3 halfSize(const Bounds& bounds) {
     return toBullet(0.5f * bounds.size());
 }
 
-/// From the field of a body that has no mesh.
-void castRay(const Placed& field, btTriangleRaycastCallback& callback) {
-    const glm::vec3 from = field.pose.toBody(toGlm(callback.m_from)) / field.scale;
-    const glm::vec3 to = field.pose.toBody(toGlm(callback.m_to)) / field.scale;
-    const float length = glm::length(to - from);
-    if (!(length > 0)) return;
-    const auto hit = field.collider.field().raycast({from, (to - from) / length, length * callback.m_hitFraction});
-    if (!hit) return;
+/// From the field of a body that has no mesh. Where the callback goes on behind the hit, its fraction of the ray.
+std::optional<float> castRay(const Placed& body, btTriangleRaycastCallback& callback) {
+    const Field& field = body.collider.field();
+    const glm::vec3 from = body.pose.toBody(toGlm(callback.m_from)) / body.scale;
+    const glm::vec3 way = body.pose.toBody(toGlm(callback.m_to)) / body.scale - from;
+    const float length = glm::length(way);
+    if (!(length > 0)) return std::nullopt;
+    const auto hit = field.raycast({from, way / length, length * callback.m_hitFraction});
+    if (!hit) return std::nullopt;
     const float fraction = hit->distance / length;
-    if (fraction < callback.m_hitFraction)
-        callback.m_hitFraction = callback.reportHit(toBullet(field.pose.rotation * hit->normal), fraction, 0, -1);
+    if (!(fraction < callback.m_hitFraction)) return std::nullopt;
+    callback.m_hitFraction = callback.reportHit(toBullet(body.pose.rotation * hit->normal), fraction, 0, -1);
+    if (!(callback.m_hitFraction > fraction)) return std::nullopt;
+    return fraction + zeroSetVoxels * field.voxelSize() / length;
 }
 
-/// From the triangles, seen by Bullet's own flags.
+/// The part of a ray behind some fraction of it.
+class Behind : public btTriangleRaycastCallback {
+  public:
+    Behind(btTriangleRaycastCallback& ray, float fraction)
+        : btTriangleRaycastCallback(ray.m_from, ray.m_to, ray.m_flags), ray_(ray), fraction_(fraction) {
+        m_hitFraction = ray.m_hitFraction;
+    }
+    btScalar reportHit(const btVector3& normal, btScalar fraction, int part, int index) override {
+        if (fraction > fraction_) ray_.m_hitFraction = ray_.reportHit(normal, fraction, part, index);
+        return ray_.m_hitFraction;
+    }
+
+  private:
+    btTriangleRaycastCallback& ray_;
+    float fraction_;
+};
+
+/// From the triangles, seen by Bullet's own flags; those behind a hit too, where the callback goes on.
 void castRay(const Placed& body, const MeshTree& mesh, btTriangleRaycastCallback& callback) {
     const glm::dvec3 from(body.pose.toBody(toGlm(callback.m_from)) / body.scale);
     const glm::dvec3 way = glm::dvec3(body.pose.toBody(toGlm(callback.m_to)) / body.scale) - from;
@@ -56,41 +78,39 @@ void castRay(const Placed& body, const MeshTree& mesh, btTriangleRaycastCallback
     if (!(length > 0)) return;
     const bool oneSided = callback.m_flags & btTriangleRaycastCallback::kF_FilterBackfaces;
     const bool keepsNormal = callback.m_flags & btTriangleRaycastCallback::kF_KeepUnflippedNormal;
-    double start = 0;
-    for (const double end = length * callback.m_hitFraction; start <= end;) {
-        const auto hit = firstHit(mesh, {from + start * (way / length), way / length, end - start});
+    for (double start = 0; start <= length * callback.m_hitFraction; start += skippedVoxels * mesh.voxelSize()) {
+        const auto hit =
+            firstHit(mesh, {from + start * (way / length), way / length, length * callback.m_hitFraction - start});
         if (!hit) return;
         const Corners corners = cornersOf(mesh.mesh(), hit->triangle);
         const glm::dvec3 normal = glm::normalize(glm::cross(corners[1] - corners[0], corners[2] - corners[0]));
         const bool isBack = glm::dot(normal, way) > 0;
         start += hit->along;
-        if (isBack && oneSided) {
-            start += skippedVoxels * mesh.voxelSize();
-            continue;
-        }
+        if (isBack && oneSided) continue;
         const float fraction = static_cast<float>(start / length);
         if (!(fraction < callback.m_hitFraction)) return;
         const glm::vec3 seen(isBack && !keepsNormal ? -normal : normal);
         callback.m_hitFraction =
             callback.reportHit(toBullet(body.pose.rotation * seen), fraction, 0, static_cast<int>(hit->triangle));
-        return;
+        if (!(callback.m_hitFraction > fraction)) return;
     }
 }
 
-void report(const std::optional<SweepHit>& hit, btTriangleConvexcastCallback& callback) {
-    if (hit && hit->fraction < callback.m_hitFraction)
-        callback.m_hitFraction =
-            callback.reportHit(toBullet(hit->normal), toBullet(hit->position), hit->fraction, 0, -1);
+/// False where the callback wants what lies behind the hit as well.
+bool report(const std::optional<SweepHit>& hit, btTriangleConvexcastCallback& callback) {
+    if (!hit || !(hit->fraction < callback.m_hitFraction)) return true;
+    callback.m_hitFraction =
+        callback.reportHit(toBullet(hit->normal), toBullet(hit->position), hit->fraction, 0, hit->triangle);
+    return callback.m_hitFraction <= hit->fraction;
 }
 
-/// By the field or, where there is one, the mesh. False where neither can tell.
+/// By the field or, where there is one, the mesh. False where neither can tell, or does not tell all.
 bool castSphere(const Placed& body, const MeshTree* mesh, float radius, btTriangleConvexcastCallback& callback) {
     const glm::vec3 from = toGlm(callback.m_convexShapeFrom.getOrigin());
     const glm::vec3 to = toGlm(callback.m_convexShapeTo.getOrigin());
     if (!mesh) {
         if (!sweepable(body, radius)) return false;
-        report(sweepSphere(body, from, to, radius, callback.m_allowedPenetration), callback);
-        return true;
+        return report(sweepSphere(body, from, to, radius, callback.m_allowedPenetration), callback);
     }
     const float reach = (radius - callback.m_allowedPenetration) / body.scale;
     const glm::vec3 start = body.pose.toBody(from) / body.scale;
@@ -101,8 +121,7 @@ bool castSphere(const Placed& body, const MeshTree* mesh, float radius, btTriang
         hit->position = body.pose.toWorld(body.scale * hit->position);
         hit->normal = body.pose.rotation * hit->normal;
     }
-    report(hit, callback);
-    return true;
+    return report(hit, callback);
 }
 
 /// A sweep among bodies of about a metre, whatever their size: Bullet's search ends a millimetre before shapes touch.
@@ -277,7 +296,12 @@ void Shape::processAllTriangles(btTriangleCallback* callback, const btVector3& l
     if (auto* ray = dynamic_cast<btTriangleRaycastCallback*>(callback)) {
         const MeshTree* mesh = triangles_->tree(*collider_);
         const Placed here = placed(btTransform::getIdentity());
-        return mesh ? castRay(here, *mesh, *ray) : castRay(here, *ray);
+        if (mesh) return castRay(here, *mesh, *ray);
+        if (const auto fraction = castRay(here, *ray)) {
+            Behind behind(*ray, *fraction);
+            triangles_->of(*this).processAllTriangles(&behind, lower, upper);
+        }
+        return;
     }
     if (auto* sweep = dynamic_cast<btTriangleConvexcastCallback*>(callback)) {
         // The margin makes contacts early; it is no part of the body.

@@ -20,9 +20,10 @@ struct ShapeOptions {
     /// Contacts are made up to this distance between the surfaces, and the bodies' boxes grow by it [m, before
     /// scaling]. It keeps resting contacts alive; bodies still rest surface on surface. Negative: the collider's own.
     float margin = -1;
-    /// Whether bodies that move farther than the margin in a step are followed on their way, so that nothing thin is
-    /// passed through, however fast. Contacts are then made of what a step would meet; the solver lets bodies come that
-    /// far and no farther.
+    /// Whether bodies that move farther than the margin in a step are followed on their way: contacts are then made of
+    /// what a step would meet, and the solver lets bodies come that far. Surface points follow straight ways, and the
+    /// solver is iterative: what goes by more than the thickness of a wall in a step may still pass it, unless a
+    /// NoPassing looks after the world.
     bool sweeps = true;
     /// How many times as much friction contacts bear that have not slipped for 120 steps, until they do; 1: no more.
     /// Heaps come to rest with friction at its limit in many contacts, and there any rounding lets a body slip on that

@@ -83,7 +83,8 @@ std::optional<SweepHit> sweepSphere(const MeshTree& mesh, const glm::vec3& from,
         const Path next{path.at(along), path.direction, std::min(piece, length - along)};
         if (const auto hit = firstTouch(mesh, next, radius))
             return SweepHit{static_cast<float>((along + hit->along) / length), glm::vec3(hit->position),
-                            glm::vec3(glm::normalize(next.at(hit->along) - hit->position))};
+                            glm::vec3(glm::normalize(next.at(hit->along) - hit->position)),
+                            static_cast<int>(hit->triangle)};
         along += piece;
     }
     return std::nullopt;

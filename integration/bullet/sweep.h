@@ -12,6 +12,7 @@ struct SweepHit {
     float fraction;      ///< of the way, 0..1
     glm::vec3 position;  ///< where the surfaces touch, in the world [m]
     glm::vec3 normal;    ///< of the field, outward, in the world, of unit length
+    int triangle = -1;   ///< of the mesh, where there is one
 };
 
 /// True if the band is wide enough to tell when a sphere of this radius [m] touches.

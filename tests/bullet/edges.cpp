@@ -12,6 +12,7 @@
 #include <random>
 
 #include "collider/edge_search.h"
+#include "demos/shared/exact_distance.h"
 #include "demos/shared/shapes.h"
 #include "integration/bullet/ball_hull.h"
 #include "integration/bullet/convert.h"
@@ -320,4 +321,83 @@ TEST_CASE("A multisphere is that of its balls, whatever its margin and scale") {
     const glm::vec3 beside = scale * glm::vec3(-1, -0.2f, 0);
     CHECK(convex.nearest(beside, scale).distance == Approx(0.45f * scale));
     CHECK(convex.nearest(beside, scale).normal.x == Approx(-1));
+}
+
+TEST_CASE("No contact is much deeper than the bodies overlap, whichever edges cross") {
+    const bool exact = GENERATE(false, true);
+    const unsigned start = seed();
+    CAPTURE(exact, start);
+    std::mt19937 random(start);
+    std::normal_distribution<float> normal;
+    const std::vector<Mesh> meshes{shapes::box({0.5f, 0.4f, 0.3f}, 3), shapes::cone(0.4f, 0.9f, 48),
+                                   shapes::box({0.9f, 0.1f, 0.1f})};
+    std::vector<std::shared_ptr<const Collider>> colliders;
+    std::vector<demo::Specimen> specimens;
+    for (const Mesh& mesh : meshes) {
+        colliders.push_back(colliderOf(mesh, exact));
+        specimens.emplace_back(mesh, 0.5 * double(h));
+    }
+    // the plank as Bullet's box, too
+    const btBoxShape plank({0.9f, 0.1f, 0.1f});
+    const Convex convex(plank);
+    int overlapping = 0;
+    for (int run = 0; run < 200; ++run) {
+        const std::size_t a = random() % 3, b = random() % 3;
+        const glm::quat turn =
+            glm::normalize(glm::quat(normal(random), normal(random), normal(random), normal(random)));
+        const glm::vec3 way = glm::normalize(glm::vec3(normal(random), normal(random), normal(random)));
+        const auto depthAt = [&](float away) {
+            return float(demo::penetration(specimens[a], {away * way, turn}, specimens[b], {}));
+        };
+        // overlaps of up to half a voxel
+        const float wanted = (0.05f + 0.05f * float(run % 10)) * h;
+        float near = 0, far = 2.5f;
+        for (int i = 0; i < 20; ++i) (depthAt(0.5f * (near + far)) > wanted ? near : far) = 0.5f * (near + far);
+        const float depth = depthAt(near);
+        if (depth > h) continue;
+        ++overlapping;
+        const Pose pose{near * way, turn};
+        const auto check = [&](const std::vector<Contact>& contacts) {
+            float deepest = 0;
+            for (const Contact& contact : contacts) deepest = std::min(deepest, contact.distance);
+            CAPTURE(run, a, b, depth / h, deepest / h);
+            CHECK(-deepest < depth + h);
+        };
+        std::vector<Contact> contacts;
+        NearPoints points;
+        bullet::collideFields({*colliders[a], pose}, {*colliders[b], {}}, h, false, points, contacts);
+        check(contacts);
+        if (a != 2) continue;
+        contacts.clear();
+        bullet::collideConvex(convex, pose, {}, {*colliders[b], {}}, h, contacts);
+        check(contacts);
+    }
+    CHECK(overlapping > 150);
+}
+
+TEST_CASE("What is exact is so against Bullet's shapes too") {
+    // small balls around the edges of a box, whose samples are rounded off there
+    const glm::vec3 half(0.5f, 0.4f, 0.3f);
+    const auto exact = colliderOf(shapes::box(half), true), sampled = colliderOf(shapes::box(half));
+    const float radius = 0.1f * h;
+    btSphereShape ball(radius);
+    const Convex convex(ball);
+    float worstSampled = 0;
+    for (int i = 0; i < 40; ++i) {
+        const float angle = glm::half_pi<float>() * (float(i) + 0.5f) / 40;
+        const glm::vec3 away = 0.4f * h * glm::vec3(std::cos(angle), std::sin(angle), 0);
+        const Pose pose{glm::vec3(half.x, half.y, 0.013f * float(i - 20)) + away, {1, 0, 0, 0}};
+        const auto errorOf = [&](const Collider& collider) {
+            std::vector<Contact> contacts;
+            bullet::collideConvex(convex, pose, {}, {collider, {}}, h, contacts);
+            float error = h;
+            for (const Contact& contact : contacts)
+                error = std::min(error, std::abs(contact.distance - (0.4f * h - radius)));
+            return error;
+        };
+        CAPTURE(i, angle);
+        CHECK(errorOf(*exact) < 1e-3f * h);
+        worstSampled = std::max(worstSampled, errorOf(*sampled));
+    }
+    CHECK(worstSampled > 0.05f * h);
 }

@@ -5,8 +5,11 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <glm/trigonometric.hpp>
+#include <set>
 
 #include "demos/shared/shapes.h"
+#include "integration/bullet/narrow.h"
+#include "sdf/build.h"
 #include "world.h"
 
 using namespace bilayer;
@@ -96,6 +99,72 @@ TEST_CASE("A field's body rests on each static shape") {
         compound.addChildShape(btTransform(btQuaternion::getIdentity(), {0, 0, -1}), &flat);
         rests(body, compound, {0, 0, 0.7f}, {0, 0, height}, 1, round);
     }
+}
+
+namespace {
+
+// A wavy ground of cells three voxels wide, as Bullet's height field and as triangles.
+struct Waves {
+    static constexpr int side = 33;
+    static constexpr float cell = 3 * h;
+
+    Waves() {
+        for (int i = 0; i < side * side; ++i) {
+            const int x = i % side, y = i / side;
+            heights.push_back(0.06f * std::sin(0.9f * float(y)) * std::cos(1.1f * float(x)));
+            mesh.points.push_back(
+                {cell * (float(x) - 0.5f * (side - 1)), cell * (float(y) - 0.5f * (side - 1)), heights[i]});
+            if (x == side - 1 || y == side - 1) continue;
+            const auto a = std::uint32_t(i);
+            mesh.triangles.push_back({a, a + 1, a + 1 + side});
+            mesh.triangles.push_back({a, a + 1 + side, a + side});
+        }
+        terrain =
+            std::make_unique<btHeightfieldTerrainShape>(side, side, heights.data(), 1, -1, 1, 2, PHY_FLOAT, false);
+        terrain->setLocalScaling({cell, cell, 1});
+        terrain->setMargin(0);
+        triangles = std::make_unique<TriangleShape>(mesh);
+        triangles->shape->setMargin(0);
+    }
+    btConcaveShape& shape(bool asTerrain) const {
+        if (asTerrain) return *terrain;
+        return *triangles->shape;
+    }
+
+    std::vector<float> heights;
+    Mesh mesh;
+    std::unique_ptr<btHeightfieldTerrainShape> terrain;
+    std::unique_ptr<TriangleShape> triangles;
+};
+
+}  // namespace
+
+TEST_CASE("A field comes to rest on uneven ground, where each contact has a feature of its own") {
+    const bool asTerrain = GENERATE(false, true);
+    const float interiorWidth = GENERATE(5.f, 20.f);
+    CAPTURE(asTerrain, interiorWidth);
+    const Waves waves;
+    const Mesh box = shapes::box({0.5f, 0.4f, 0.1f}, 3);
+    Shape shape(std::make_shared<Collider>(box, build(box, {.voxelSize = h, .interiorWidth = interiorWidth})));
+    World world;
+    world.dynamics.getSolverInfo().m_solverMode |= SOLVER_USE_2_FRICTION_DIRECTIONS;
+    world.dynamics.getSolverInfo().m_splitImpulsePenetrationThreshold = -h;
+    world.add(waves.shape(asTerrain), 0, {0, 0, 0});
+    btRigidBody* body = world.add(shape, 1, {0.01f, 0.02f, 0.3f});
+    body->setFriction(0.8f);
+    body->setSleepingThresholds(0.02f, 0.02f);
+    world.run(3.5f);
+    CHECK_FALSE(body->isActive());
+
+    std::vector<Contact> contacts;
+    bullet::collideTriangles(waves.shape(asTerrain), btTransform::getIdentity(), {},
+                             shape.placed(body->getWorldTransform()), h, contacts);
+    std::set<std::uint32_t> features;
+    for (const Contact& contact : contacts) features.insert(contact.feature);
+    CHECK(features.size() == contacts.size());
+    CHECK(contacts.size() > 20);
+    // some for each of the ground's 180 triangles below the box, however wide the band
+    CHECK(contacts.size() < 1000);
 }
 
 TEST_CASE("Each convex shape rests on a field") {
