@@ -1,5 +1,6 @@
 #include "integration/bullet/convex.h"
 
+#include <BulletCollision/CollisionShapes/btBox2dShape.h>
 #include <BulletCollision/CollisionShapes/btBoxShape.h>
 #include <BulletCollision/CollisionShapes/btCapsuleShape.h>
 #include <BulletCollision/CollisionShapes/btConeShape.h>
@@ -84,10 +85,20 @@ int verticesOf(const btConvexShape& shape) {
     return shape.isPolyhedral() ? static_cast<const btPolyhedralConvexShape&>(shape).getNumVertices() : 0;
 }
 
+std::array<btVector3, 2> boundsOf(const btConvexShape& shape) {
+    std::array<btVector3, 2> bounds;
+    shape.getAabb(btTransform::getIdentity(), bounds[0], bounds[1]);
+    return bounds;
+}
+
 }  // namespace
 
 Convex::Convex(const btConvexShape& shape)
-    : shape_(&shape), scaling_(shape.getLocalScaling()), margin_(shape.getMargin()), vertices_(verticesOf(shape)) {
+    : shape_(&shape),
+      scaling_(shape.getLocalScaling()),
+      margin_(shape.getMargin()),
+      vertices_(verticesOf(shape)),
+      bounds_(boundsOf(shape)) {
     switch (shape.getShapeType()) {
         case SPHERE_SHAPE_PROXYTYPE:
             core_ = Core::segment;
@@ -106,6 +117,9 @@ Convex::Convex(const btConvexShape& shape)
         }
         case BOX_SHAPE_PROXYTYPE:
             makeBox(toGlm(static_cast<const btBoxShape&>(shape).getHalfExtentsWithMargin()));
+            break;
+        case BOX_2D_SHAPE_PROXYTYPE:
+            makeBox(toGlm(static_cast<const btBox2dShape&>(shape).getHalfExtentsWithMargin()));
             break;
         case CYLINDER_SHAPE_PROXYTYPE: {
             const auto& cylinder = static_cast<const btCylinderShape&>(shape);
@@ -137,7 +151,7 @@ Convex::Convex(const btConvexShape& shape)
 
 bool Convex::isOf(const btConvexShape& shape) const {
     return shape_ == &shape && scaling_ == shape.getLocalScaling() && margin_ == shape.getMargin() &&
-           vertices_ == verticesOf(shape);
+           vertices_ == verticesOf(shape) && bounds_ == boundsOf(shape);
 }
 
 void Convex::makeBox(const glm::vec3& halfExtents) {

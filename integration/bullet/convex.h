@@ -23,7 +23,7 @@ class Convex {
   public:
     explicit Convex(const btConvexShape& shape);
 
-    /// False for another shape, and once the shape has been scaled or given another margin or more points.
+    /// False for another shape, and once the shape has been scaled, resized or given another margin or more points.
     bool isOf(const btConvexShape& shape) const;
 
     struct Near {
@@ -84,6 +84,7 @@ class Convex {
     btVector3 scaling_;
     float margin_;
     int vertices_;
+    std::array<btVector3, 2> bounds_;
     Core core_ = Core::hull;
     float radius_ = 0;                         ///< by which the core is grown; the largest of balls' [m]
     int axis_ = 1;                             ///< of segments and solids of revolution

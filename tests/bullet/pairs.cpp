@@ -1,4 +1,5 @@
 // Every pair of shapes comes to rest where it must, in either order of insertion.
+#include <BulletCollision/CollisionShapes/btBox2dShape.h>
 #include <BulletCollision/CollisionShapes/btConvexTriangleMeshShape.h>
 #include <BulletCollision/CollisionShapes/btHeightfieldTerrainShape.h>
 
@@ -99,6 +100,34 @@ TEST_CASE("A field's body rests on each static shape") {
         compound.addChildShape(btTransform(btQuaternion::getIdentity(), {0, 0, -1}), &flat);
         rests(body, compound, {0, 0, 0.7f}, {0, 0, height}, 1, round);
     }
+}
+
+TEST_CASE("A box that is resized rests by its new size") {
+    static const auto slabCollider = exactBox({1.5f, 1.5f, 0.3f}, h);
+    Shape slab(slabCollider);
+    btBoxShape box({0.3f, 0.3f, 0.1f});
+    World world;
+    world.add(slab, 0, {0, 0, -0.3f});
+    btRigidBody* body = world.add(box, 1, {0, 0, 0.11f});
+    world.run(0.5f);
+    const btVector3 half(0.3f, 0.3f, 0.3f);
+    box.setImplicitShapeDimensions(half - btVector3(1, 1, 1) * box.getMargin());
+    body->setWorldTransform(btTransform(btQuaternion::getIdentity(), {0, 0, 0.35f}));
+    body->activate(true);
+    world.run(1.5f);
+    CHECK(body->getWorldTransform().getOrigin().z() == Approx(0.3).margin(tolerance * h));
+}
+
+TEST_CASE("Bullet's flat box touches where its own margin ends") {
+    static const auto slabCollider = exactBox({1.5f, 1.5f, 0.3f}, h);
+    Shape slab(slabCollider);
+    btBox2dShape box({0.3f, 0.3f, 0});
+    World world;
+    world.add(slab, 0, {0, 0, -0.3f});
+    btRigidBody* body = world.add(box, 1, {0, 0, 0.1f});
+    body->setMassProps(1, {0.03f, 0.03f, 0.06f});
+    world.run(1.5f);
+    CHECK(body->getWorldTransform().getOrigin().z() == Approx(box.getMargin()).margin(tolerance * h));
 }
 
 namespace {
