@@ -284,10 +284,12 @@ class Touching {
         toField_ = glm::mat3(inField.rotation);
         toConvex_ = glm::transpose(toField_);
         origin_ = inField.position;
+        // the deepest place of an edge is no farther than half of it from one of its ends
+        if (convex.isCurved()) edgeReach_ += 0.5f * scale_ * field.collider.edges().longest();
     }
 
     bool reject(const glm::vec3& centre, float radius) const {
-        const float reach = scale_ * radius + margin_ + local_.longestWay();
+        const float reach = scale_ * radius + std::max(edgeReach_, margin_ + local_.longestWay());
         return convex_.nearest(intoConvex(scale_ * centre), reach).distance > reach;
     }
 
@@ -297,9 +299,9 @@ class Touching {
         ++report.pointsTested;
         const glm::vec3 position = scale_ * point.position;
         const std::uint32_t feature = index | featureOfB;
-        const Convex::Near near = convex_.nearest(intoConvex(position), margin_);
+        const Convex::Near near = convex_.nearest(intoConvex(position), edgeReach_);
+        if (convex_.isCurved() && point.isSharp && near.distance <= edgeReach_) followEdges(index, near, contacts);
         if (near.distance > margin_) return visitOnWay(position, point, feature, near.distance, contacts);
-        if (convex_.isCurved() && point.isSharp) followEdges(index, near, contacts);
         const glm::vec3 normal = -(toField_ * near.normal);
         float approach = local_.approach(position, normal, margin_);
         if (near.distance > 0 && approach > 0 && !meets(position, point)) approach = 0;
@@ -405,14 +407,14 @@ class Touching {
                             to = intoConvex(scale_ * points[next].position);
             const float length = glm::distance(from, to);
             const glm::vec3 along = (to - from) / length;
-            const auto nearAt = [&](float way) { return convex_.nearest(from + way * along, margin_); };
+            const auto nearAt = [&](float way) { return convex_.nearest(from + way * along, edgeReach_); };
             const auto slopeOf = [&](float way, const Convex::Near& there) {
                 return Slope{way, there.distance, glm::dot(there.normal, along)};
             };
             const Convex::Near there = nearAt(length);
             const Slope first = slopeOf(0, near), last = slopeOf(length, there);
             // Where both ends touch, one of them is enough.
-            const bool isOther = there.distance <= margin_ && next < index;
+            const bool isOther = there.distance <= edgeReach_ && next < index;
             if (!fallsBetween(first, last) || isOther) continue;
             const auto lowest =
                 lowestBetween(first, last, searchTolerance * scale_ * collider.field().voxelSize(),
@@ -483,6 +485,7 @@ class Touching {
     const Convex& convex_;
     Local local_;
     float margin_, scale_, voxel_;
+    float edgeReach_ = margin_;  ///< within which points of sharp edges are looked at
     glm::mat3 toField_, toConvex_;
     glm::vec3 origin_;
 };
