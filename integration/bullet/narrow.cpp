@@ -413,7 +413,7 @@ class Touching {
             };
             const Convex::Near there = nearAt(length);
             const Slope first = slopeOf(0, near), last = slopeOf(length, there);
-            // Where both ends touch, one of them is enough.
+            // Where both ends are within reach, one of them is enough.
             const bool isOther = there.distance <= edgeReach_ && next < index;
             if (!fallsBetween(first, last) || isOther) continue;
             const auto lowest =
