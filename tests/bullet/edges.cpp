@@ -390,9 +390,11 @@ TEST_CASE("What is exact is so against Bullet's shapes too") {
         const auto errorOf = [&](const Collider& collider) {
             std::vector<Contact> contacts;
             bullet::collideConvex(convex, pose, {}, {collider, {}}, h, contacts);
+            // the ball's own centre in the field, not the box's edge in the ball
             float error = h;
             for (const Contact& contact : contacts)
-                error = std::min(error, std::abs(contact.distance - (0.4f * h - radius)));
+                if (!(contact.feature & featureOfB))
+                    error = std::min(error, std::abs(contact.distance - (0.4f * h - radius)));
             return error;
         };
         CAPTURE(i, angle);
