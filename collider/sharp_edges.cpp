@@ -26,8 +26,9 @@ constexpr std::size_t mostNeighbours = 6;
 constexpr float leastCrossing = 0.2f;
 // A crossing lies so near to the deepest place that the field shows, which rounds edges off [voxels].
 constexpr float crossingWithin = 1.5f;
-// It is no deeper than what the field shows by more than this [voxels].
-constexpr float deepestUnseen = 0.9f;
+// It is no deeper than so many times what the field shows, across faces instead of both edges, and so much besides
+// [voxels].
+constexpr float deepestAcross = 1.5f, deepestUnseen = 1;
 // Faces leave the plane between two edges at this angle (sine) at least: faces that lie on each other touch by their
 // points.
 constexpr float leastLeaving = 0.09f;
@@ -122,7 +123,8 @@ std::optional<SharpEdges::Crossing> SharpEdges::crossing(const SurfacePoints& po
                                                          float voxelSize) const {
     if (edges_.empty()) return std::nullopt;
     const glm::vec3 along = to - from;
-    const float within = crossingWithin * voxelSize, least = distance - deepestUnseen * voxelSize;
+    const float within = crossingWithin * voxelSize,
+                least = std::min(distance, deepestAcross * distance) - deepestUnseen * voxelSize;
     const float reach = within + longest_;
     std::optional<Crossing> best;
     float nearest = within;
