@@ -273,7 +273,7 @@ class FirstMet {
         for (const std::uint32_t k : before)
             if (metBy(k, loyalty) != 0) add(k);
         for (std::size_t n = 0; n < nudges_.size(); ++n) {
-            if (metByAny() >> n & 1) continue;
+            if (metByAny() >> n & 1 || (kept_.size() >= mostOfPatch && isNearlyMet(n))) continue;
             gaps_.least(nudges_[n]);
             add(gaps_.with(least_[n]));
         }
@@ -297,13 +297,15 @@ class FirstMet {
   private:
     using Motions = std::uint64_t;  ///< a bit for each
 
+    float toleranceOf(const Nudge& nudge) const {
+        return (nudge.tilt == glm::vec2(0) ? toleranceUntilted : tolerance) * gaps_.extent();
+    }
+
     /// The motions that meet a contact first, but for so many tolerances.
     Motions metBy(std::uint32_t k, float tolerances) const {
         Motions met = 0;
         for (std::size_t n = 0; n < nudges_.size(); ++n) {
-            const float within =
-                tolerances * (nudges_[n].tilt == glm::vec2(0) ? toleranceUntilted : tolerance) * gaps_.extent();
-            if (gaps_.of(k, nudges_[n]) <= least_[n] + within) met |= Motions(1) << n;
+            if (gaps_.of(k, nudges_[n]) <= least_[n] + tolerances * toleranceOf(nudges_[n])) met |= Motions(1) << n;
         }
         return met;
     }
@@ -318,6 +320,11 @@ class FirstMet {
         for (std::size_t i = 0; i < met_.size(); ++i)
             if (i != but) met |= met_[i];
         return met;
+    }
+
+    /// Whether a motion meets one that is kept not much later than the first.
+    bool isNearlyMet(std::size_t n) const {
+        return gaps_.leastOf(kept_, nudges_[n]) <= least_[n] + loyalty * toleranceOf(nudges_[n]);
     }
 
     /// Whether every motion that meets it first meets others first, too.

@@ -17,8 +17,8 @@ std::optional<std::filesystem::path> corpusMesh(const std::string& name);
 /// A path in an empty folder of this process's own, removed at exit; within BILAYER_SCRATCH, likewise.
 std::filesystem::path scratch(const std::string& name);
 
-/// A random seed: from the environment variable BILAYER_SEED, else from the clock. Printed with every failure by
-/// CAPTURE(seed).
+/// A random seed: from the environment variable BILAYER_SEED, which ./run test sets, else from the clock. Printed with
+/// every failure by CAPTURE(seed).
 unsigned seed();
 
 /// The squared distance from a point to a triangle in double precision, by the regions of the plane that the closest
