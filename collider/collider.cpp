@@ -291,12 +291,27 @@ class PointsInField {
             const glm::vec3 onEdge = crossing->position + crossing->distance * crossing->normal;
             return std::pair(glm::dot(onEdge - at, along), Touch{crossing->distance, crossing->normal});
         }
-        if (!falls) return std::nullopt;
-        const glm::vec3 across = touched->normal - glm::dot(touched->normal, along) * along;
-        const float length = glm::length(across);
-        const float distance = touched->distance < 0 ? touched->distance / length : touched->distance;
-        if (!(length > leastAcross) || distance > reach_) return std::nullopt;
-        return std::pair(lowest->place, Touch{distance, across / length});
+        return falls ? acrossEdge(lowest->place, along, touchOn) : std::nullopt;
+    }
+
+    // How an edge touches at its deepest place, square to itself: faces of the other body may meet there, of which the
+    // one that looks least along the edge holds it.
+    template <class TouchOn>
+    std::optional<std::pair<float, Touch>> acrossEdge(float place, const glm::vec3& along, TouchOn&& touchOn) const {
+        const float aside = 2 * searchTolerance * field_.voxelSize();
+        std::optional<Touch> held;
+        float most = leastAcross;
+        for (const float way : {place, place - aside, place + aside}) {
+            const auto touched = touchOn(way);
+            if (!touched) continue;
+            const glm::vec3 across = touched->normal - glm::dot(touched->normal, along) * along;
+            const float length = glm::length(across);
+            if (length <= most) continue;
+            most = length;
+            held = Touch{touched->distance < 0 ? touched->distance / length : touched->distance, across / length};
+        }
+        if (!held || held->distance > reach_) return std::nullopt;
+        return std::pair(place, *held);
     }
 
     const SurfacePoint& pointOf(std::uint32_t index) const { return body_.collider.points().points()[index]; }

@@ -27,8 +27,8 @@ constexpr float leastCrossing = 0.2f;
 // A crossing lies so near to the deepest place that the field shows, which rounds edges off [voxels].
 constexpr float crossingWithin = 1.5f;
 // It is no deeper than so many times what the field shows, across faces instead of both edges, and so much besides
-// [voxels].
-constexpr float deepestAcross = 1.5f, deepestUnseen = 1;
+// [voxels]: a field by samples rounds edges off.
+constexpr float deepestAcross = 1.5f, deepestUnseen = 1, deepestAcrossExact = 2, deepestUnseenExact = 0.25f;
 // Faces leave the plane between two edges at this angle (sine) at least: faces that lie on each other touch by their
 // points.
 constexpr float leastLeaving = 0.09f;
@@ -94,7 +94,9 @@ Wings wingsOf(const SurfacePoint& a, const SurfacePoint& b, const Field& field) 
 
 }  // namespace
 
-SharpEdges::SharpEdges(const SurfacePoints& points, const Field& field) {
+SharpEdges::SharpEdges(const SurfacePoints& points, const Field& field)
+    : deepestAcross_(field.mesh() ? deepestAcrossExact : deepestAcross),
+      deepestUnseen_(field.mesh() ? deepestUnseenExact : deepestUnseen) {
     const auto all = points.points();
     std::vector<std::vector<Neighbour>> neighbours(all.size());
     tbb::parallel_for(std::uint32_t(0), std::uint32_t(all.size()), [&](std::uint32_t i) {
@@ -124,7 +126,7 @@ std::optional<SharpEdges::Crossing> SharpEdges::crossing(const SurfacePoints& po
     if (edges_.empty()) return std::nullopt;
     const glm::vec3 along = to - from;
     const float within = crossingWithin * voxelSize,
-                least = std::min(distance, deepestAcross * distance) - deepestUnseen * voxelSize;
+                least = std::min(distance, deepestAcross_ * distance) - deepestUnseen_ * voxelSize;
     const float reach = within + longest_;
     std::optional<Crossing> best;
     float nearest = within;

@@ -55,7 +55,7 @@ class SharpEdges {
   private:
     std::vector<SharpEdge> edges_;
     std::vector<std::uint32_t> first_, ofPoints_;
-    float longest_ = 0;
+    float longest_ = 0, deepestAcross_ = 0, deepestUnseen_ = 0;
 };
 
 }  // namespace bilayer

@@ -36,7 +36,7 @@ constexpr glm::vec3 halfBox{0.5f, 0.4f, 0.3f};  // bodies that lie on others
 constexpr float ball = 0.4f, major = 0.5f, minor = 0.2f;
 constexpr float halfSlab = 0.8f, halfThickness = 0.3f;  // what they lie on
 constexpr float fall = 0.2f;                            // from above [voxels]
-constexpr float rolling = 0.02f;                        // friction: balls of triangles would roll off what they lie on
+constexpr float rolling = 0.04f;                        // friction: what is round would roll off what it lies on
 constexpr float lane = 2;
 constexpr float spacing = 1;  // of surface points: a ball sinks in between them [voxels]
 constexpr int columns = 16;   // of the board
@@ -267,7 +267,7 @@ class Board {
         const Pose above{place + glm::vec3(0, 0, rest + scale_ * fall * voxel)};
         if (!upperFirst && lower.thing) addLower(lower, state, {place});
         const std::size_t index = bodies_;
-        addBody(upper, matter(scale_ * mass), above);
+        addBody(upper, matter(scale_ * mass, mayRoll(upper)), above);
         if (upperFirst && lower.thing) addLower(lower, state, {place});
         cells_.push_back({name, index, rest, upper.axis});
     }
@@ -275,12 +275,15 @@ class Board {
     const std::vector<Cell>& cells() const { return cells_; }
 
   private:
+    // What stands upright must not: it could rest aslant, on an edge.
+    static bool mayRoll(const Part& part) { return part.axis.z == 0; }
+
     // Bodies a hundred times as large fall ten times as fast, and turn ten times as slowly. A tenth of the usual: what
     // rocks must not freeze aslant.
-    Matter matter(float bodyMass) const {
+    Matter matter(float bodyMass, bool rolls = false) const {
         const Matter usual;
         return {.mass = bodyMass,
-                .rollingFriction = scale_ * rolling,
+                .rollingFriction = rolls ? scale_ * rolling : 0,
                 .restingSpeed = 0.1f * usual.restingSpeed * std::sqrt(scale_),
                 .restingSpin = 0.1f * usual.restingSpin / std::sqrt(scale_)};
     }

@@ -325,7 +325,8 @@ TEST_CASE("A multisphere is that of its balls, whatever its margin and scale") {
 
 TEST_CASE("No contact is much deeper than the bodies overlap, whichever edges cross") {
     const unsigned start = seed();
-    CAPTURE(start);
+    const bool exact = GENERATE(false, true);
+    CAPTURE(start, exact);
     std::mt19937 random(start);
     std::normal_distribution<float> normal;
     const std::vector<Mesh> meshes{shapes::box({0.5f, 0.4f, 0.3f}, 3), shapes::cone(0.4f, 0.9f, 48),
@@ -333,7 +334,7 @@ TEST_CASE("No contact is much deeper than the bodies overlap, whichever edges cr
     std::vector<std::shared_ptr<const Collider>> colliders;
     std::vector<demo::Specimen> specimens;
     for (const Mesh& mesh : meshes) {
-        colliders.push_back(colliderOf(mesh));
+        colliders.push_back(colliderOf(mesh, exact));
         specimens.emplace_back(mesh, 0.5 * double(h));
     }
     // the plank as Bullet's box, too
