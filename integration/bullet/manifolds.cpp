@@ -453,8 +453,8 @@ bool Choice::holds(const btTransform& a, const btTransform& b) const {
     return reduced_.slack > 0 && std::all_of(kept_.begin(), kept_.end(), hasHardlyMoved);
 }
 
-/// Whether all that were chosen are there again, none of any is on its way from afar, and none is deeper than what so
-/// little motion makes of those between the chosen ones.
+/// Whether all that were chosen are there again, none of any is on its way from afar, and a press meets none by more than
+/// its tolerance before those.
 bool Choice::takeAgain(const std::vector<Contact>& contacts) {
     std::vector<const Contact*> found(kept_.size(), nullptr);
     float deepest = std::numeric_limits<float>::max(), deepestFound = deepest;
@@ -471,7 +471,7 @@ bool Choice::takeAgain(const std::vector<Contact>& contacts) {
         if (!contact) return false;
         deepestFound = std::min(deepestFound, contact->distance);
     }
-    if (deepest < deepestFound - 2 * reduced_.slack) return false;
+    if (deepest < deepestFound - 0.5f * reduced_.slack) return false;
     auto next = found.begin();
     for (Patch& patch : reduced_.patches)
         for (int i = 0; i < patch.count; ++i) patch.contacts[i] = **next++;
