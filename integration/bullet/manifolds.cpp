@@ -453,8 +453,8 @@ bool Choice::holds(const btTransform& a, const btTransform& b) const {
     return reduced_.slack > 0 && std::all_of(kept_.begin(), kept_.end(), hasHardlyMoved);
 }
 
-/// Whether all that were chosen are there again, none of any is on its way from afar, and a press meets none by more than
-/// its tolerance before those.
+/// Whether all that were chosen are there again, none of any is on its way from afar, and a press meets none by more
+/// than its tolerance before those.
 bool Choice::takeAgain(const std::vector<Contact>& contacts) {
     std::vector<const Contact*> found(kept_.size(), nullptr);
     float deepest = std::numeric_limits<float>::max(), deepestFound = deepest;
