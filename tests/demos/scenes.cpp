@@ -254,8 +254,12 @@ TEST_CASE("bodies in Enright's swirl stay as whole as OpenVDB's own") {
     for (const std::size_t body : {1, 3}) {
         const double ours = stretched[body] / start[body], theirs = stretched[body + 1] / start[body + 1];
         CAPTURE(body);
+        CHECK(ours == Approx(theirs).margin(0.03));
+        if (body == 3 && demo::bunny().name != "bunny") {
+            WARN("skipped: the bunny of Debian's package glmark2-data; at 32 voxels nothing is left of a knot");
+            continue;
+        }
         CHECK(ours > 0.15);  // the sphere has 0.80 then, the bunny 0.21
         CHECK(ours < 0.9);
-        CHECK(ours == Approx(theirs).margin(0.03));
     }
 }
