@@ -16,7 +16,8 @@ namespace bilayer {
 namespace {
 
 constexpr double latticePitch = 0.75;    // of candidates on edges and faces [spacings]
-constexpr double leastGap = 0.7;         // between points on the same side of a surface [spacings]
+constexpr double leastGap = 0.7;         // between points that look about the same way [spacings]
+constexpr double likeness = 0.7;         // least cosine between their normals: an edge of a cube and its faces have 0.71
 constexpr double leastCornerGap = 0.1;   // between convex corners [spacings]: a fraction of a voxel
 constexpr double corner = 0.5;           // convexity from which a point is a corner: a cube's has 0.58
 constexpr double sharp = 0.15;           // and from which it is on an edge at least: a cube's have 0.35
@@ -156,14 +157,15 @@ class Grid {
         head = std::uint32_t(entries_.size() - 1);
     }
 
-    // Whether a point lies within `radius`, at most the side of a cell, on the same side of a thin wall.
+    // Whether a point lies within `radius`, at most the side of a cell, that looks about the same way: it is on the
+    // same side of a thin wall, and what touches a tip finer than `radius` is met by a point that looks at it.
     bool near(const Candidate& candidate, double radius) const {
         const glm::i64vec3 cell = cellOf(candidate.position);
         for (int i = 0; i < 27; ++i) {
             const glm::i64vec3 neighbour = cell + glm::i64vec3(i / 9 - 1, i / 3 % 3 - 1, i % 3 - 1);
             for (std::uint32_t e = heads_[slot(neighbour)]; e != none; e = entries_[e].next)
                 if (glm::distance2(entries_[e].position, candidate.position) < radius * radius &&
-                    glm::dot(entries_[e].normal, candidate.normal) > 0)
+                    glm::dot(entries_[e].normal, candidate.normal) > likeness)
                     return true;
         }
         return false;
