@@ -19,4 +19,7 @@ Touch touchInBand(const Field& field, const glm::vec3& point, const Sample& samp
 /// field without triangles does not tell apart.
 glm::vec3 directionOf(const ClosestPoint& closest, const glm::vec3& point, float voxelSize);
 
+/// Where the gradient of a sample points to; zero where it is too short to tell: on a medial axis.
+glm::vec3 directionOf(const Sample& sample, float voxelSize);
+
 }  // namespace bilayer

@@ -33,8 +33,6 @@ constexpr float bandBorder = 1.7321f;
 constexpr float searchTolerance = 2e-3f;  // of the deepest place between two probes [voxels]
 // Where two edges cross, the normal across both is taken if it looks no farther aside from the field's (cosine).
 constexpr float leastAcross = 0.3f;
-// On the medial axis the interpolated gradient is short and says nothing of a direction.
-constexpr float shortestGradient = 0.5f;
 // A surface point touches a face that looks against its own normal, by this cosine at least: the points below the edge
 // of a box must not be pushed out sideways. The corners of a cube, whose normals are mixed of three, reach 0.57.
 // Those of faces that do not touch yet: farther aslant is an edge of the other body beside them.
@@ -92,9 +90,9 @@ class Local {
         if (!sample.inBand && sample.distance > 0 && farReach_ > 0) return farAway(point, radius, sample.distance);
         if (!sample.inBand) return {sample.distance > 0 ? Answer::outside : Answer::inside, scale_ * sample.distance};
         if (field_.mesh() && scale_ * sample.distance - radius <= exactReach_) return exactly(point, sample);
-        const float length = glm::length(sample.gradient);
-        if (length < shortestGradient) return {Answer::unclear, scale_ * sample.distance, {}, sample.gradient};
-        return {Answer::near, scale_ * sample.distance, sample.gradient / length, sample.gradient};
+        const glm::vec3 normal = directionOf(sample, field_.voxelSize());
+        const auto where = normal == glm::vec3(0) ? Answer::unclear : Answer::near;
+        return {where, scale_ * sample.distance, normal, sample.gradient};
     }
 
     /// The contact of a point of the other body's core, grown by a radius.

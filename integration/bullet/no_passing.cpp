@@ -22,6 +22,7 @@
 #include <vector>
 
 #include "collider/interpolant.h"
+#include "collider/touch.h"
 #include "integration/bullet/convert.h"
 #include "integration/bullet/convex.h"
 #include "integration/bullet/shape.h"
@@ -40,7 +41,6 @@ constexpr float pieceTurn = 0.1f;
 constexpr float nearby = 0.5f;
 constexpr int mostProbes = 64;        // along an edge of a convex body
 constexpr float leastStride = 0.05f;  // through samples [voxels]
-constexpr float flattest = 0.1f;      // a gradient shorter than this tells no direction
 // Of a way along which something is nearby; what takes longer is looked at point by point, or taken as met.
 constexpr int mostSteps = 64;
 // A body that is held back may be met by another one: pairs are looked at again up to so many times.
@@ -82,9 +82,9 @@ class FieldObstacle {
             return (radius - closest.distance) / length * way;
         }
         const Sample sample = field_.sample(point);
-        const float length = glm::length(sample.gradient);
-        if (!sample.inBand || length < flattest) return std::nullopt;
-        return -sample.distance / length * sample.gradient;
+        const glm::vec3 normal = directionOf(sample, field_.voxelSize());
+        if (!sample.inBand || normal == glm::vec3(0)) return std::nullopt;
+        return -sample.distance * normal;
     }
 
   private:
