@@ -33,7 +33,7 @@ constexpr float bowlVoxels = 3;                         // edge of its voxels [v
 
 constexpr float usualBodiesPerLayer = 5;
 constexpr float layerRadius = 0.26f;  // of a layer's ring, in the bowl for thirty [m]
-constexpr float layerHeight = 0.26f;  // between layers at the start: more than any body is long [m]
+constexpr float leastApart = 0.26f;   // between the centres of bodies at the start, of neighbouring layers too [m]
 constexpr float lastLook = 0.5f;      // how long the recording goes on when all is at rest [s]
 // A heap at rest trembles by far less; what still rolls as slowly as bodies may elsewhere goes on when it is woken.
 constexpr float restingSpeed = 0.02f, restingSpin = 0.2f;  // [m/s], [rad/s]
@@ -58,29 +58,41 @@ std::shared_ptr<const Thing> bodyOf(const Kind& kind, float resolution) {
         {.voxelSize = bodySize / resolution, .interiorWidth = bodyInteriorWidth, .restingFriction = restingFriction});
 }
 
-// Places of a layer's bodies: rings, as many as there is room for, none nearer to each other than a body is long.
-std::vector<glm::vec2> layerOf(float scale) {
+// How far the surface reaches from the middle of a mesh's box [m].
+float reachOf(const Mesh& mesh) {
+    const glm::vec3 middle = bounds(mesh).centre();
+    float reach = 0;
+    for (const glm::vec3& point : mesh.points) reach = std::max(reach, glm::distance(point, middle));
+    return reach;
+}
+
+// Places of a layer's bodies: rings, as many as there is room for.
+std::vector<glm::vec2> layerOf(float scale, float apart) {
     std::vector<glm::vec2> places;  // radius and angle
-    for (float radius = layerRadius * scale; radius > 0; radius -= layerRadius) {
-        const int fits = std::max(1, int(usualBodiesPerLayer * radius / layerRadius));
+    for (float radius = layerRadius * scale; radius > 0; radius -= apart) {
+        const int fits = std::max(1, int(usualBodiesPerLayer * radius / apart));
         for (int i = 0; i < fits; ++i) places.emplace_back(radius, 6.2832f * float(i) / float(fits));
     }
     return places;
 }
 
-// Layers above the bowl, each turned against those below, every body turned at random.
-std::vector<Pose> startPoses(const BowlOptions& options, float scale) {
+// Layers above the bowl, each turned against those below, every body turned at random about the middle of its box.
+std::vector<Pose> startPoses(const std::vector<std::shared_ptr<const Thing>>& things, const BowlOptions& options,
+                             float scale) {
     std::mt19937 random(options.seed);
     std::normal_distribution<float> normal;
-    const std::vector<glm::vec2> places = layerOf(scale);
+    float apart = leastApart;
+    for (const auto& thing : things) apart = std::max(apart, 2 * reachOf(thing->mesh));
+    const std::vector<glm::vec2> places = layerOf(scale, apart);
     std::vector<Pose> poses;
     for (std::size_t i = 0; i < std::size_t(options.bodies); ++i) {
         const std::size_t layer = i / places.size();
         const glm::vec2 place = places[i % places.size()];
         const float radius = place.x, turn = place.y + 0.6f * float(layer);
         const float x = normal(random), y = normal(random), z = normal(random), w = normal(random);
-        poses.push_back({{radius * std::cos(turn), radius * std::sin(turn), layerHeight * float(layer)},
-                         glm::normalize(glm::quat(w, x, y, z))});
+        const glm::vec3 at(radius * std::cos(turn), radius * std::sin(turn), apart * float(layer));
+        const glm::quat rotation = glm::normalize(glm::quat(w, x, y, z));
+        poses.push_back({at - rotation * bounds(things[i % things.size()]->mesh).centre(), rotation});
     }
     return poses;
 }
@@ -142,7 +154,7 @@ Outcome bowl(const BowlOptions& options) {
     stage.add(vessel, {}, {}, bowlLook);
     const Matter matter{.mass = 1, .restingSpeed = restingSpeed, .restingSpin = restingSpin};
     std::vector<btRigidBody*> bodies;
-    for (const Pose& pose : startPoses(options, scale)) {
+    for (const Pose& pose : startPoses(things, options, scale)) {
         const std::size_t i = bodies.size();
         const Look look{.colour = colours[i % std::size(colours)], .roughness = 0.55f, .clearcoat = 0.12f};
         bodies.push_back(&stage.add(things[i % things.size()], matter, pose, look));

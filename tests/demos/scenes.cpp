@@ -106,7 +106,10 @@ TEST_CASE("knots in a bowl come to rest") {
 
 TEST_CASE("however many bodies fall into a bowl, none starts in another") {
     demo::BowlOptions options;
+    Mesh cube = shapes::box({0.1f, 0.1f, 0.1f});
+    for (glm::vec3& point : cube.points) point.x += 0.3f;  // it turns about its middle, wherever its origin is
     options.kinds = {{"knot", shapes::torusKnot(2, 3, 0.06f, 0.02f, 60, 8)}};
+    if (GENERATE(false, true)) options.kinds.push_back({"cube", cube});
     options.bodies = GENERATE(30, 50, 200, 500);
     options.resolution = 16;
     options.seconds = 0.01f;
