@@ -25,8 +25,8 @@ struct PointNode {
     std::uint32_t next;        ///< index of the node after this one's subtree
 };
 
-/// Points spread over a mesh's surface: every place of the surface has one within about `spacing`, and convex corners
-/// and edges sharper than the surface around them keep theirs. Deterministic.
+/// Points spread over a mesh's surface: every place of the surface has one within about `spacing` that looks about the
+/// same way, and convex corners and edges sharper than the surface around them keep theirs. Deterministic.
 class SurfacePoints {
   public:
     SurfacePoints() = default;

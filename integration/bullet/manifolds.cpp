@@ -43,7 +43,7 @@ constexpr float chosenWithin = 0.5f;
 constexpr float tilts[] = {1.f / 8, 1.f / 32, 1.f / 128};
 constexpr float aside = 1.f / 64;
 constexpr int tiltDirections = 10, shiftDirections = 8;
-constexpr float askew = 0.3f;           // [rad]
+constexpr float askew = 0.3f;            // [rad]
 constexpr std::size_t measuredTilt = 1;  // the size of tilts by which what is lost is measured
 // More contacts of a patch cost the solver more than they tell it.
 constexpr std::size_t mostOfPatch = 3 * MANIFOLD_CACHE_SIZE;
