@@ -39,12 +39,12 @@ constexpr float loyalty = 3;
 constexpr float chosenWithin = 0.5f;
 // The small motions that contacts are kept for: tilts from those of a fall to those of rest [rad], shifts aside [parts
 // of the extent] and twists [rad]. Their directions are askew to everything one models: a rectangle's corners are then
-// each met first by themselves; those of one size of tilts lie between those of the others.
+// each met first by themselves.
 constexpr float tilts[] = {1.f / 8, 1.f / 32, 1.f / 128};
 constexpr float aside = 1.f / 64;
-constexpr int tiltDirections = 10, shiftDirections = 8;
-constexpr float askew = 0.3f;            // [rad]
-constexpr std::size_t measuredTilt = 1;  // the size of tilts by which what is lost is measured
+constexpr int tiltDirections = 8, shiftDirections = 8;
+constexpr float askew = 0.3f;             // [rad]
+constexpr float measuredTilt = 1.f / 32;  // by which what is lost is measured [rad]
 // More contacts of a patch cost the solver more than they tell it.
 constexpr std::size_t mostOfPatch = 3 * MANIFOLD_CACHE_SIZE;
 
@@ -159,18 +159,12 @@ glm::vec2 towards(float share) {
     return {std::cos(angle), std::sin(angle)};
 }
 
-/// A tilt of one of their sizes.
-/// @param k  its direction: whole for those that contacts are kept for, a half more for those in between
-Nudge tiltOf(std::size_t size, float k) {
-    return {.tilt = tilts[size] * towards((k + float(size) / std::size(tilts)) / tiltDirections)};
-}
-
 /// Those that contacts are kept for, in the order in which they choose: what spans the patch comes first, a mere press
 /// last.
 std::vector<Nudge> nudges() {
     std::vector<Nudge> all;
-    for (std::size_t size = 0; size < std::size(tilts); ++size)
-        for (int k = 0; k < tiltDirections; ++k) all.push_back(tiltOf(size, float(k)));
+    for (const float tilt : tilts)
+        for (int k = 0; k < tiltDirections; ++k) all.push_back({.tilt = tilt * towards(float(k) / tiltDirections)});
     for (int k = 0; k < shiftDirections; ++k) all.push_back({.shift = aside * towards(float(k) / shiftDirections)});
     for (const float twist : {aside, -aside}) all.push_back({.twist = twist});
     all.push_back({});
@@ -180,7 +174,8 @@ std::vector<Nudge> nudges() {
 /// Those in between, by which what is lost is measured.
 std::vector<Nudge> nudgesBetween() {
     std::vector<Nudge> all;
-    for (int k = 0; k < tiltDirections; ++k) all.push_back(tiltOf(measuredTilt, float(k) + 0.5f));
+    for (int k = 0; k < tiltDirections; ++k)
+        all.push_back({.tilt = measuredTilt * towards((float(k) + 0.5f) / tiltDirections)});
     return all;
 }
 
