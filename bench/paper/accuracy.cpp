@@ -10,6 +10,7 @@
 #include "bench/paper/part.h"
 #include "bench/paper/published.h"
 #include "bench/paper/scatter.h"
+#include "demos/shared/shapes.h"
 #include "sdf/grids.h"
 #include "sdf/inspect.h"
 
@@ -62,11 +63,6 @@ Errors errors(const LevelSet& field, const DenseField& truth) {
     return result;
 }
 
-Mesh moved(Mesh mesh, float by) {
-    for (glm::vec3& p : mesh.points) p += by;
-    return mesh;
-}
-
 // The corner of a cube of (2K + 1)^3 nodes around a sample is nearer than this to the surface.
 constexpr float reached = 6.1f;
 constexpr float papersBand = 2;  // "about 2 Delta away from the triangle mesh" (section 5.2)
@@ -91,7 +87,7 @@ json measureTable1(const Run& run) {
             row["blocks"] = errors(build(mesh, optionsFor(lattice, Method::doubleLayer, 2)), truth).toJson();
             row["exact"] = errors(build(mesh, optionsFor(lattice, Method::exact, 3)), truth).toJson();
         }
-        const Mesh half = moved(mesh, lattice.step / 2);
+        const Mesh half = shapes::moved(mesh, glm::vec3(lattice.step / 2));
         row["halfCell"] = errors(layers, scatterPseudonormal(half, lattice, reached), noLimit).toJson();
         rows.push_back(row);
     }

@@ -58,11 +58,10 @@ std::shared_ptr<const Thing> bodyOf(const Kind& kind, float resolution) {
         {.voxelSize = bodySize / resolution, .interiorWidth = bodyInteriorWidth, .restingFriction = restingFriction});
 }
 
-// How far the surface reaches from the middle of a mesh's box [m].
-float reachOf(const Mesh& mesh) {
-    const glm::vec3 middle = bounds(mesh).centre();
+// How far the surface reaches from a point [m].
+float reachOf(const Mesh& mesh, const glm::vec3& from) {
     float reach = 0;
-    for (const glm::vec3& point : mesh.points) reach = std::max(reach, glm::distance(point, middle));
+    for (const glm::vec3& point : mesh.points) reach = std::max(reach, glm::distance(point, from));
     return reach;
 }
 
@@ -82,7 +81,11 @@ std::vector<Pose> startPoses(const std::vector<std::shared_ptr<const Thing>>& th
     std::mt19937 random(options.seed);
     std::normal_distribution<float> normal;
     float apart = leastApart;
-    for (const auto& thing : things) apart = std::max(apart, 2 * reachOf(thing->mesh));
+    std::vector<glm::vec3> middles;
+    for (const auto& thing : things) {
+        middles.push_back(bounds(thing->mesh).centre());
+        apart = std::max(apart, 2 * reachOf(thing->mesh, middles.back()));
+    }
     const std::vector<glm::vec2> places = layerOf(scale, apart);
     std::vector<Pose> poses;
     for (std::size_t i = 0; i < std::size_t(options.bodies); ++i) {
@@ -92,7 +95,7 @@ std::vector<Pose> startPoses(const std::vector<std::shared_ptr<const Thing>>& th
         const float x = normal(random), y = normal(random), z = normal(random), w = normal(random);
         const glm::vec3 at(radius * std::cos(turn), radius * std::sin(turn), apart * float(layer));
         const glm::quat rotation = glm::normalize(glm::quat(w, x, y, z));
-        poses.push_back({at - rotation * bounds(things[i % things.size()]->mesh).centre(), rotation});
+        poses.push_back({at - rotation * middles[i % things.size()], rotation});
     }
     return poses;
 }

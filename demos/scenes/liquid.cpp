@@ -15,6 +15,7 @@
 #include "demos/shared/water.h"
 #include "integration/fluid/particles.h"
 #include "integration/fluid/seed.h"
+#include "sdf/inspect.h"
 
 namespace bilayer::demo {
 namespace {
@@ -58,9 +59,7 @@ struct Tank {
 };
 
 Mesh boxBetween(const glm::vec3& lower, const glm::vec3& upper) {
-    Mesh mesh = shapes::box(0.5f * (upper - lower));
-    for (glm::vec3& p : mesh.points) p += 0.5f * (upper + lower);
-    return mesh;
+    return shapes::moved(shapes::box(0.5f * (upper - lower)), 0.5f * (upper + lower));
 }
 
 // Four walls and a floor around the liquid.
@@ -69,15 +68,6 @@ Mesh glassOf(const Tank& tank) {
     return shapes::join({boxBetween({c.x, c.y, c.z}, {d.x, d.y, a.z}), boxBetween({c.x, c.y, a.z}, {a.x, d.y, b.z}),
                          boxBetween({b.x, c.y, a.z}, {d.x, d.y, b.z}), boxBetween({a.x, c.y, a.z}, {b.x, a.y, b.z}),
                          boxBetween({a.x, b.y, a.z}, {b.x, d.y, b.z})});
-}
-
-double areaOf(const Mesh& mesh) {
-    double area = 0;
-    for (const glm::uvec3& t : mesh.triangles) {
-        const glm::vec3 a = mesh.points[t.x];
-        area += 0.5 * double(glm::length(glm::cross(mesh.points[t.y] - a, mesh.points[t.z] - a)));
-    }
-    return area;
 }
 
 FloatGrid::Ptr startOf(const Tank& tank) {
@@ -215,7 +205,7 @@ class Scene {
             {"volume off by", off, mostOff, "%"},
             {"volume off in the end", std::abs(100 * (rows.back()[1] / first - 1)), mostOffInTheEnd, "%"},
             {"surface in the knot", faults_.depth / double(tank_.voxel), mostDepth, "voxels"},
-            {"liquid in the knot, in the mean", faults_.within * first / areaOf(knot_.mesh) / double(tank_.voxel),
+            {"liquid in the knot, in the mean", faults_.within * first / inspect(knot_.mesh).area / double(tank_.voxel),
              mostWithin, "voxels"},
             {"surface behind the walls", faults_.beyond / double(tank_.voxel), mostDepth, "voxels"},
             {"divergence left in a step", divergence_, mostDivergence},

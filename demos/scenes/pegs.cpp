@@ -44,11 +44,6 @@ struct Lane {
     std::size_t blockIndex{}, pegIndex{};  // in a frame
 };
 
-Mesh moved(Mesh mesh, float up) {
-    for (glm::vec3& point : mesh.points) point.z += up;
-    return mesh;
-}
-
 // With its lower end above the mouth, aside of the hole's axis, and turned about that end.
 Pose startOf(const shapes::Peg& part, float mouth, float aside, float tilt) {
     const glm::quat turn = glm::angleAxis(glm::radians(tilt), glm::normalize(glm::vec3(1, 2, 0)));
@@ -93,8 +88,8 @@ Outcome pegs(const PegsOptions& options) {
                          makeThing(shapes::peg({.clearance = clearance}), things), mouth, options.aside, options.tilt});
     std::shared_ptr<const Thing> table;
     if (!options.factory.empty()) {
-        const Mesh plate = moved(readMesh(options.factory / factoryPlate), floor);
-        const Mesh peg = moved(readMesh(options.factory / factoryPeg), -shapes::Peg{}.length / 2);
+        const Mesh plate = shapes::moved(readMesh(options.factory / factoryPlate), {0, 0, floor});
+        const Mesh peg = shapes::moved(readMesh(options.factory / factoryPeg), {0, 0, -shapes::Peg{}.length / 2});
         lanes.push_back({"Factory", factoryClearance, makeThing(plate, things), makeThing(peg, things),
                          bounds(plate).upper.z, 0, factoryTilt});
         const glm::vec3 half(blockPart.width / 2, blockPart.width / 2, tableThickness / 2);

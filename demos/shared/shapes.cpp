@@ -5,6 +5,7 @@
 #include <glm/geometric.hpp>
 #include <glm/gtc/constants.hpp>
 #include <stdexcept>
+#include <utility>
 
 namespace bilayer::shapes {
 namespace {
@@ -366,6 +367,16 @@ Mesh unevenSphere(float deviation, std::size_t triangles) {
         (deviationOfAreas(grownBelow(even, middle)) < deviation ? low : high) = middle;
     }
     return grownBelow(even, low);
+}
+
+Mesh moved(Mesh mesh, const glm::vec3& by) {
+    for (glm::vec3& point : mesh.points) point += by;
+    return mesh;
+}
+
+Mesh flipped(Mesh mesh) {
+    for (glm::uvec3& t : mesh.triangles) std::swap(t.y, t.z);
+    return mesh;
 }
 
 Mesh join(const std::vector<Mesh>& meshes) {

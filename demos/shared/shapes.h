@@ -56,6 +56,10 @@ inline constexpr std::size_t paperSphere = 3210;
 /// Throws std::invalid_argument for too few triangles, and for a deviation that no such map reaches.
 Mesh unevenSphere(float deviation, std::size_t triangles = paperSphere);
 
+/// A mesh moved, and one that faces the other way.
+Mesh moved(Mesh mesh, const glm::vec3& by);
+Mesh flipped(Mesh mesh);
+
 /// Several meshes as one.
 Mesh join(const std::vector<Mesh>& meshes);
 

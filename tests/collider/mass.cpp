@@ -131,8 +131,7 @@ TEST_CASE("mass moves and turns with the mesh, far from the origin too") {
     CAPTURE(seed);
     Random random(seed);
     const Mesh mesh =
-        shapes::join({shapes::box({0.5f, 0.2f, 0.3f}),
-                      transformed(shapes::sphere(0.3f, 3), glm::translate(glm::mat4(1), {0.9f, 0.6f, 0.1f}))});
+        shapes::join({shapes::box({0.5f, 0.2f, 0.3f}), shapes::moved(shapes::sphere(0.3f, 3), {0.9f, 0.6f, 0.1f})});
     const MassProperties still = massProperties(mesh);
     for (int i = 0; i < 50; ++i) {
         const glm::mat4 motion = randomMotion(random);
@@ -145,26 +144,23 @@ TEST_CASE("mass moves and turns with the mesh, far from the origin too") {
         requireDiagonalises(moved);
     }
     // powers of two: the mesh itself is moved without rounding
-    const MassProperties box =
-        massProperties(transformed(shapes::box({0.5f, 1, 1.5f}), glm::translate(glm::mat4(1), {8192, -8192, 4096})));
+    const MassProperties box = massProperties(shapes::moved(shapes::box({0.5f, 1, 1.5f}), {8192, -8192, 4096}));
     REQUIRE(box.volume == Approx(6).epsilon(1e-9));
     requireNear(box.centre, {8192, -8192, 4096}, 0);
     requireNear(box.principalInertia, {2.5f, 5, 6.5f}, 1e-5);
 }
 
 TEST_CASE("an inside-out mesh has the mass of its reverse") {
-    Mesh mesh = shapes::torus(1, 0.3f);
+    const Mesh mesh = shapes::torus(1, 0.3f);
     const MassProperties right = massProperties(mesh);
-    for (glm::uvec3& t : mesh.triangles) std::swap(t.y, t.z);
-    const MassProperties wrong = massProperties(mesh);
+    const MassProperties wrong = massProperties(shapes::flipped(mesh));
     REQUIRE(wrong.volume == Approx(right.volume));
     requireNear(wrong.centre, right.centre, 1e-6);
     requireNear(wrong.inertia, right.inertia, 1e-6);
 }
 
 TEST_CASE("a hollow weighs what its walls weigh") {
-    Mesh hole = shapes::box({0.5f, 0.5f, 0.5f});
-    for (glm::uvec3& t : hole.triangles) std::swap(t.y, t.z);
+    const Mesh hole = shapes::flipped(shapes::box({0.5f, 0.5f, 0.5f}));
     const MassProperties mass = massProperties(shapes::join({shapes::box({1, 1, 1}), hole}));
     REQUIRE(mass.volume == Approx(7));
     REQUIRE(mass.principalInertia.x == Approx(8 * 4 / 6. - 1 * 1 / 6.));

@@ -106,8 +106,8 @@ TEST_CASE("knots in a bowl come to rest") {
 
 TEST_CASE("however many bodies fall into a bowl, none starts in another") {
     demo::BowlOptions options;
-    Mesh cube = shapes::box({0.1f, 0.1f, 0.1f});
-    for (glm::vec3& point : cube.points) point.x += 0.3f;  // it turns about its middle, wherever its origin is
+    // it turns about its middle, wherever its origin is
+    const Mesh cube = shapes::moved(shapes::box({0.1f, 0.1f, 0.1f}), {0.3f, 0, 0});
     options.kinds = {{"knot", shapes::torusKnot(2, 3, 0.06f, 0.02f, 60, 8)}};
     if (GENERATE(false, true)) options.kinds.push_back({"cube", cube});
     options.bodies = GENERATE(30, 50, 200, 500);

@@ -36,9 +36,7 @@ double ball(double radius) {
 constexpr float outer = 0.5f, inner = 0.467f, wideVoxel = 0.1f;
 
 Field shell() {
-    Mesh mesh = shapes::sphere(inner, 5);
-    for (auto& t : mesh.triangles) std::swap(t.y, t.z);
-    mesh = shapes::join({shapes::sphere(outer, 5), mesh});
+    const Mesh mesh = shapes::join({shapes::sphere(outer, 5), shapes::flipped(shapes::sphere(inner, 5))});
     return Field(build(mesh, {.voxelSize = 0.02f}), mesh);
 }
 

@@ -186,8 +186,7 @@ TEST_CASE("a mesh of the corpus seeds at any rotation") {
 }
 
 TEST_CASE("a cavity stays empty") {
-    Mesh inner = shapes::sphere(0.3f, 4);
-    for (auto& t : inner.triangles) std::swap(t.y, t.z);
+    const Mesh inner = shapes::flipped(shapes::sphere(0.3f, 4));
     const LevelSet shell = fieldOf(shapes::join({shapes::sphere(0.5f, 4), inner}), 0.02f);
     const auto liquid = emptyLiquid(0.03f);
     fluid::seed(*liquid, shell, poseOf(1));

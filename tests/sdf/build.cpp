@@ -21,11 +21,6 @@ using namespace bilayer;
 
 namespace {
 
-Mesh flipped(Mesh mesh) {
-    for (auto& t : mesh.triangles) std::swap(t.y, t.z);
-    return mesh;
-}
-
 struct Errors {
     double worst = 0, mean = 0;  // [voxels]
     double wrongSign = 0;        // largest true distance of a voxel of the wrong sign [voxels]
@@ -120,7 +115,7 @@ TEST_CASE("public meshes get the distances that brute force finds") {
 
 TEST_CASE("far voxels have the right sign, in cavities too") {
     const Mesh mesh =
-        shapes::join({shapes::sphere(1, 4), flipped(shapes::sphere(0.6f, 4)), shapes::sphere(0.25f, 4),
+        shapes::join({shapes::sphere(1, 4), shapes::flipped(shapes::sphere(0.6f, 4)), shapes::sphere(0.25f, 4),
                       transformed(shapes::box({0.5f, 0.5f, 0.5f}), glm::translate(glm::mat4(1), {3, 0, 0}))});
     const auto truth = [](const glm::dvec3& p) {
         const double r = glm::length(p);

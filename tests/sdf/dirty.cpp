@@ -5,7 +5,6 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <filesystem>
-#include <glm/gtc/matrix_transform.hpp>
 #include <random>
 
 #include "demos/shared/shapes.h"
@@ -117,15 +116,6 @@ void checkWinding(const Mesh& mesh, const Built& built, const std::vector<openvd
     CHECK(wrong == 0);
 }
 
-Mesh moved(const Mesh& mesh, const glm::vec3& by) {
-    return transformed(mesh, glm::translate(glm::mat4(1), by));
-}
-
-Mesh insideOut(Mesh mesh) {
-    for (auto& t : mesh.triangles) std::swap(t.y, t.z);
-    return mesh;
-}
-
 }  // namespace
 
 TEST_CASE("every public mesh has a sensible field or is refused by name") {
@@ -193,10 +183,10 @@ TEST_CASE("solids that overlap inside one block are noticed") {
     for (int round = 0; round < 50; ++round) {
         // one solid reaches 2.5 voxels out of the other: room for links between voxels over the faces of both
         const Mesh solid = shapes::box({1, 2.4f, 2.4f});
-        const Mesh other = moved(shapes::box({1.75f, any(1.9f, 2.1f), any(1.9f, 2.1f)}), {1.75f, 0, 0});
+        const Mesh other = shapes::moved(shapes::box({1.75f, any(1.9f, 2.1f), any(1.9f, 2.1f)}), {1.75f, 0, 0});
         const glm::vec3 block(8 * int(random() % 9), 8 * int(random() % 9), 8 * int(random() % 9));
         const glm::vec3 middle = block + glm::vec3(any(2.2f, 2.8f), any(3.2f, 3.8f), any(3.2f, 3.8f));
-        const Mesh mesh = moved(shapes::join({solid, other}), middle);
+        const Mesh mesh = shapes::moved(shapes::join({solid, other}), middle);
         for (const Method method : {Method::exact, Method::pseudonormal}) {
             CAPTURE(round, middle.x, middle.y, middle.z, method);
             CHECK(build(mesh, {.voxelSize = 1, .method = method, .sign = Sign::normals}).signConflicts() > 0);
@@ -209,7 +199,7 @@ TEST_CASE("a mesh inside out is turned around, wherever it lies") {
     const Mesh ball = shapes::sphere(1, 3);
     // at the origin its field spreads over eight of the tree's largest nodes, elsewhere over one
     for (const glm::vec3 by : {glm::vec3(0), glm::vec3(5, 6, 7), glm::vec3(0, 40, 0), glm::vec3(-9, 3, -4)}) {
-        const Built built(insideOut(moved(ball, by)));
+        const Built built(shapes::flipped(shapes::moved(ball, by)));
         CAPTURE(by.x, by.y, by.z, built.reason);
         CHECK(built.sign == "normals");
         CHECK(built.at(by) < 0);
@@ -224,7 +214,8 @@ TEST_CASE("one component inside out beside one that is not is turned alone") {
     for (const glm::vec3 axis : {glm::vec3(1, 0, 0), glm::vec3(0, 1, 0), glm::vec3(0, 0, 1)})
         for (const float apart : {1.5f, 8.f}) {
             const glm::vec3 by = apart * axis + glm::vec3(2, 2, 2) * (glm::vec3(1) - axis);
-            const Mesh pair = shapes::join({moved(ball, by), insideOut(moved(ball, by - 2 * apart * axis))});
+            const Mesh pair =
+                shapes::join({shapes::moved(ball, by), shapes::flipped(shapes::moved(ball, by - 2 * apart * axis))});
             const Built built(pair, 100);
             CAPTURE(axis.x, axis.y, axis.z, apart, built.reason);
             CHECK(built.sign == "normals");

@@ -84,15 +84,6 @@ Mesh anyPose(const Mesh& mesh, Random& random) {
     return transformed(mesh, glm::translate(glm::mat4(1), shift) * turn);
 }
 
-Mesh moved(const Mesh& mesh, const glm::vec3& by) {
-    return transformed(mesh, glm::translate(glm::mat4(1), by));
-}
-
-Mesh inverted(Mesh mesh) {
-    for (auto& t : mesh.triangles) std::swap(t.y, t.z);
-    return mesh;
-}
-
 // A wedge whose edge, along y at the origin, is `thickness` wide one metre away.
 Mesh wedge(float thickness) {
     const float z = thickness / 2;
@@ -109,7 +100,7 @@ Mesh star(Random& random) {
 
 // A surface of slivers: a cylinder and a cone whose sides are far narrower than a voxel.
 Mesh slivers() {
-    return shapes::join({shapes::cylinder(0.3f, 2, 800), moved(shapes::cone(0.4f, 2, 500), {1, 0, 0})});
+    return shapes::join({shapes::cylinder(0.3f, 2, 800), shapes::moved(shapes::cone(0.4f, 2, 500), {1, 0, 0})});
 }
 
 // Cuts one edge of some triangles in half on one side only, and closes the crack with a triangle without area.
@@ -160,7 +151,7 @@ TEST_CASE("the truth is what sums over all triangles say, also on edges' and ver
     CAPTURE(seed);
     Random random(seed);
     const Mesh nested =
-        shapes::join({shapes::sphere(1, 2), inverted(shapes::sphere(0.6f, 2)), shapes::sphere(0.3f, 1)});
+        shapes::join({shapes::sphere(1, 2), shapes::flipped(shapes::sphere(0.6f, 2)), shapes::sphere(0.3f, 1)});
     for (const Mesh& mesh : {nested, wedge(1e-4f), star(random), withZeroArea(shapes::box({1, 0.5f, 0.25f}, 2), 3),
                              anyPose(shapes::cylinder(0.5f, 1, 200), random), shapes::box({1, 1, 1}, 4)}) {
         const test::Truth truth(mesh);
@@ -269,10 +260,11 @@ TEST_CASE("exact: walls and gaps thinner than a voxel") {
         const Mesh plate = shapes::box({1, 0.7f, wall / 2});
         checkExact(anyPose(plate, random), h, anyBand(random), seed);
         // two plates a wall apart: four surfaces in a voxel
-        checkExact(anyPose(shapes::join({plate, moved(plate, {0.1f, 0.05f, 2 * wall})}), random), h, {3, 3}, seed);
+        checkExact(anyPose(shapes::join({plate, shapes::moved(plate, {0.1f, 0.05f, 2 * wall})}), random), h, {3, 3},
+                   seed);
         checkExact(anyPose(shapes::bowl(1, std::max(wall, 0.005f), 48), random), h, {3, 3}, seed);
         // a shell whose cavity almost fills it
-        const Mesh inside = inverted(shapes::box(glm::vec3(0.5f, 0.4f, 0.3f) - wall));
+        const Mesh inside = shapes::flipped(shapes::box(glm::vec3(0.5f, 0.4f, 0.3f) - wall));
         checkExact(anyPose(shapes::join({shapes::box({0.5f, 0.4f, 0.3f}), inside}), random), h, {3, 3}, seed);
     }
 }
@@ -280,7 +272,7 @@ TEST_CASE("exact: walls and gaps thinner than a voxel") {
 TEST_CASE("exact: a plate in the plane of voxel centres, and one between them") {
     for (const float offset : {0.f, 0.5f, 0.25f}) {
         CAPTURE(offset);
-        const Mesh plate = moved(shapes::box({1, 1, 1.f / 64}), {0, 0, offset / 32});
+        const Mesh plate = shapes::moved(shapes::box({1, 1, 1.f / 64}), {0, 0, offset / 32});
         checkExact(plate, 1.f / 32, {3, 3}, 1);
     }
 }
@@ -326,27 +318,28 @@ TEST_CASE("exact: nested cavities and components that touch") {
     const float h = 0.05f;
     const Mesh box = shapes::box({0.5f, 0.5f, 0.5f});
     SECTION("four shells, one in another") {
-        const Mesh nested = shapes::join({shapes::sphere(1, 4), inverted(shapes::sphere(0.7f, 3)),
-                                          shapes::sphere(0.5f, 3), inverted(shapes::sphere(0.2f, 2))});
+        const Mesh nested = shapes::join({shapes::sphere(1, 4), shapes::flipped(shapes::sphere(0.7f, 3)),
+                                          shapes::sphere(0.5f, 3), shapes::flipped(shapes::sphere(0.2f, 2))});
         for (int i = 0; i < 3; ++i) checkExact(anyPose(nested, random), h, anyBand(random), seed);
     }
     SECTION("at a vertex") {
-        checkExact(anyPose(shapes::join({box, moved(box, {1, 1, 1})}), random), h, {3, 3}, seed);
+        checkExact(anyPose(shapes::join({box, shapes::moved(box, {1, 1, 1})}), random), h, {3, 3}, seed);
     }
     SECTION("at an edge") {
-        checkExact(anyPose(shapes::join({box, moved(box, {1, 1, 0})}), random), h, {3, 3}, seed);
+        checkExact(anyPose(shapes::join({box, shapes::moved(box, {1, 1, 0})}), random), h, {3, 3}, seed);
     }
     SECTION("at the half of an edge") {
-        checkExact(shapes::join({box, moved(box, {1, 1, 0.5f})}), h, {3, 3}, seed);
+        checkExact(shapes::join({box, shapes::moved(box, {1, 1, 0.5f})}), h, {3, 3}, seed);
     }
     SECTION("with a thousandth of a voxel between two faces") {
-        checkExact(anyPose(shapes::join({box, moved(box, {1 + 1e-3f * h, 0.3f, 0.2f})}), random), h, {3, 3}, seed);
+        checkExact(anyPose(shapes::join({box, shapes::moved(box, {1 + 1e-3f * h, 0.3f, 0.2f})}), random), h, {3, 3},
+                   seed);
     }
     SECTION("in a cavity that touches the hull at a vertex") {
         // a box squeezed towards the diagonal through the hull's corner, so that it keeps clear of the hull's faces
         const glm::vec3 diagonal = glm::normalize(glm::vec3(1));
         const glm::mat3 squeeze = 0.2f * glm::mat3(1) + 0.3f * glm::outerProduct(diagonal, diagonal);
-        Mesh hole = inverted(box);
+        Mesh hole = shapes::flipped(box);
         for (auto& p : hole.points) p = p == glm::vec3(0.5f) ? p : 0.5f + squeeze * (p - 0.5f);
         checkExact(anyPose(shapes::join({box, hole}), random), h, {3, 3}, seed);
     }
@@ -356,9 +349,9 @@ TEST_CASE("exact: far from the origin, and smaller than a voxel") {
     const unsigned seed = test::seed();
     CAPTURE(seed);
     Random random(seed);
-    const Mesh far = weld(moved(shapes::sphere(0.5f, 3), {1e4f, -1e4f, 1e4f}));
+    const Mesh far = weld(shapes::moved(shapes::sphere(0.5f, 3), {1e4f, -1e4f, 1e4f}));
     checkExact(far, 0.01f, {3, 3}, seed);
-    checkExact(weld(moved(shapes::box({0.5f, 0.25f, 0.125f}), {-1e4f, 1e4f, 1e4f})), 0.01f, {5, 2}, seed);
+    checkExact(weld(shapes::moved(shapes::box({0.5f, 0.25f, 0.125f}), {-1e4f, 1e4f, 1e4f})), 0.01f, {5, 2}, seed);
     for (int i = 0; i < 5; ++i) {
         const Mesh tiny = anyPose(shapes::sphere(0.4f * std::pow(0.1f, float(i)), 2), random);
         checkExact(tiny, 1, {double(1 + i), 1}, seed);  // narrower bands may meet no voxel at all
@@ -384,7 +377,7 @@ TEST_CASE("exact: a shift by whole voxels keeps the values") {
     for (const Mesh& mesh : propertyMeshes(random))
         for (const glm::ivec3 shift : {glm::ivec3(1, 0, 0), glm::ivec3(13, -7, 5), glm::ivec3(64, 128, -64)}) {
             const auto here = exactGrid(mesh, 1.f / 32, {3, 2});
-            const auto there = exactGrid(moved(mesh, glm::vec3(shift) / 32.f), 1.f / 32, {3, 2});
+            const auto there = exactGrid(shapes::moved(mesh, glm::vec3(shift) / 32.f), 1.f / 32, {3, 2});
             const auto values = there->getConstAccessor();
             std::size_t differ = here->activeVoxelCount() != there->activeVoxelCount();
             for (auto voxel = here->cbeginValueOn(); voxel; ++voxel)

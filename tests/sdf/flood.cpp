@@ -14,10 +14,6 @@ using namespace bilayer;
 
 namespace {
 
-Mesh moved(const Mesh& mesh, const glm::vec3& by) {
-    return transformed(mesh, glm::translate(glm::mat4(1), by));
-}
-
 Mesh someFlipped(Mesh mesh, unsigned seed) {
     std::mt19937 random(seed);
     for (auto& t : mesh.triangles)
@@ -102,7 +98,7 @@ TEST_CASE("gaps up to the stated width are closed and wide openings stay open") 
                 };
                 quad(-20, -w);
                 quad(w, 20);
-                return moved(mesh, glm::vec3(offset));
+                return shapes::moved(mesh, glm::vec3(offset));
             };
             CAPTURE(gap, offset);
             const openvdb::Coord middle(0, 0, 0), under(0, 0, 15);
@@ -139,7 +135,7 @@ TEST_CASE("sheets without thickness have no inside") {
     for (const Mesh& one : {sheet, transformed(sheet, skew)}) {
         CHECK(wrongSigns(flooded(one, 1, 2), 0, nowhere) == 0);
         // two sheets with less room between than the ball needs, open all around
-        CHECK(wrongSigns(flooded(shapes::join({one, moved(one, {0, 0, 2.3f})}), 1, 4), 0, nowhere) == 0);
+        CHECK(wrongSigns(flooded(shapes::join({one, shapes::moved(one, {0, 0, 2.3f})}), 1, 4), 0, nowhere) == 0);
     }
 }
 

@@ -2,7 +2,6 @@
 
 #include <catch2/catch.hpp>
 #include <glm/gtc/constants.hpp>
-#include <glm/gtc/matrix_transform.hpp>
 
 #include "demos/shared/shapes.h"
 #include "sdf/mesh_io.h"
@@ -10,18 +9,7 @@
 
 using namespace bilayer;
 
-namespace {
-
-Mesh flipped(Mesh mesh) {
-    for (auto& t : mesh.triangles) std::swap(t.y, t.z);
-    return mesh;
-}
-
-Mesh moved(const Mesh& mesh, const glm::vec3& by) {
-    return transformed(mesh, glm::translate(glm::mat4(1), by));
-}
-
-}  // namespace
+namespace {}  // namespace
 
 TEST_CASE("shapes by formula are closed and oriented, and have the volume of the formula") {
     const double pi = glm::pi<double>();
@@ -67,12 +55,12 @@ TEST_CASE("holes, folds and flips are counted") {
 
 TEST_CASE("inside-out components are told from cavities") {
     const Mesh big = shapes::sphere(2, 3), small = shapes::sphere(1, 3), tiny = shapes::sphere(0.5f, 3);
-    CHECK(inspect(flipped(big)).insideOutComponents == 1);
-    CHECK(inspect(shapes::join({big, flipped(small)})).insideOutComponents == 0);
+    CHECK(inspect(shapes::flipped(big)).insideOutComponents == 1);
+    CHECK(inspect(shapes::join({big, shapes::flipped(small)})).insideOutComponents == 0);
     CHECK(inspect(shapes::join({big, small})).insideOutComponents == 1);
-    CHECK(inspect(shapes::join({big, flipped(small), tiny})).insideOutComponents == 0);
-    CHECK(inspect(shapes::join({big, moved(small, {5, 0, 0})})).insideOutComponents == 0);
-    CHECK(inspect(shapes::join({big, moved(flipped(small), {5, 0, 0})})).insideOutComponents == 1);
+    CHECK(inspect(shapes::join({big, shapes::flipped(small), tiny})).insideOutComponents == 0);
+    CHECK(inspect(shapes::join({big, shapes::moved(small, {5, 0, 0})})).insideOutComponents == 0);
+    CHECK(inspect(shapes::join({big, shapes::moved(shapes::flipped(small), {5, 0, 0})})).insideOutComponents == 1);
 }
 
 TEST_CASE("a hundredth of the area does not count as a common wall") {
@@ -98,7 +86,7 @@ TEST_CASE("the thinnest wall is measured through the solid") {
     CHECK(inspect(shapes::box({1, 1, 0.05f}, 8), 0.05f).thinWalls == 0);
     CHECK(inspect(shapes::bowl(1, 0.1f, 256)).thinnestWall == Approx(0.1).epsilon(0.05));
     // the gap between two bodies is no wall
-    const Mesh pair = shapes::join({shapes::box({1, 1, 1}), moved(shapes::box({1, 1, 1}), {2.01f, 0, 0})});
+    const Mesh pair = shapes::join({shapes::box({1, 1, 1}), shapes::moved(shapes::box({1, 1, 1}), {2.01f, 0, 0})});
     CHECK(inspect(pair).thinnestWall == Approx(2));
     CHECK(inspect(pair).commonWall == Approx(2));
 }
@@ -131,8 +119,8 @@ TEST_CASE("pairs of triangles that run through each other are counted") {
     const Mesh box = shapes::box({1, 1, 1});
     CHECK(inspect(box).selfIntersections == 0);
     // touching in a plane, along an edge or at a corner is no piercing
-    CHECK(inspect(shapes::join({box, moved(box, {2, 0.5f, 0.25f})})).selfIntersections == 0);
-    CHECK(inspect(shapes::join({box, moved(box, {2, 2, 2})})).selfIntersections == 0);
+    CHECK(inspect(shapes::join({box, shapes::moved(box, {2, 0.5f, 0.25f})})).selfIntersections == 0);
+    CHECK(inspect(shapes::join({box, shapes::moved(box, {2, 2, 2})})).selfIntersections == 0);
     Mesh needle = box;
     needle.points.insert(needle.points.end(), {{0.25f, 0.5f, -3}, {0.25f, 0.5f, 3}, {9, 0.5f, 3}});
     needle.triangles.push_back({8, 9, 10});
@@ -163,7 +151,7 @@ TEST_CASE("piercings, loops and fans of the public corpus are those of an indepe
 TEST_CASE("the verdict says what is wrong") {
     Mesh mesh = shapes::box({1, 1, 1});
     CHECK(verdict(inspect(mesh)) == "closed and oriented");
-    CHECK(verdict(inspect(flipped(mesh))) ==
+    CHECK(verdict(inspect(shapes::flipped(mesh))) ==
           "closed, but not oriented: 1 component inside out, 12 triangles to be turned");
     mesh.triangles.pop_back();
     CHECK(verdict(inspect(mesh)) == "open: 3 boundary edges in 1 loop");

@@ -1,7 +1,6 @@
 #include "sdf/orient.h"
 
 #include <catch2/catch.hpp>
-#include <glm/gtc/matrix_transform.hpp>
 #include <random>
 
 #include "demos/shared/shapes.h"
@@ -13,15 +12,6 @@
 using namespace bilayer;
 
 namespace {
-
-Mesh flipped(Mesh mesh) {
-    for (auto& t : mesh.triangles) std::swap(t.y, t.z);
-    return mesh;
-}
-
-Mesh moved(const Mesh& mesh, const glm::vec3& by) {
-    return transformed(mesh, glm::translate(glm::mat4(1), by));
-}
 
 Mesh shuffled(Mesh mesh, unsigned seed) {
     std::mt19937 random(seed);
@@ -50,19 +40,20 @@ TEST_CASE("a mesh that is fine keeps its triangles") {
     const Mesh big = shapes::sphere(2, 3), small = shapes::sphere(1, 3), tiny = shapes::sphere(0.5f, 3);
     checkUntouched(big);
     checkUntouched(shapes::torusKnot(2, 3, 1, 0.1f));
-    checkUntouched(shapes::join({big, flipped(small)}));        // a cavity
-    checkUntouched(shapes::join({big, flipped(small), tiny}));  // a solid in a cavity
-    checkUntouched(shapes::join({big, small}));                 // a union
-    checkUntouched(shapes::join({big, moved(big, {1, 0, 0})}));
-    checkUntouched(shapes::join({shapes::box({1, 1, 1}), moved(shapes::box({1, 1, 1}), {2, 2, 0})}));  // share an edge
+    checkUntouched(shapes::join({big, shapes::flipped(small)}));        // a cavity
+    checkUntouched(shapes::join({big, shapes::flipped(small), tiny}));  // a solid in a cavity
+    checkUntouched(shapes::join({big, small}));                         // a union
+    checkUntouched(shapes::join({big, shapes::moved(big, {1, 0, 0})}));
+    checkUntouched(
+        shapes::join({shapes::box({1, 1, 1}), shapes::moved(shapes::box({1, 1, 1}), {2, 2, 0})}));  // share an edge
 }
 
 TEST_CASE("turned triangles and shells are turned back") {
     const unsigned seed = test::seed();
     CAPTURE(seed);
     for (const Mesh& mesh : {shapes::box({1, 2, 3}), shapes::sphere(1, 3), shapes::bowl(1, 0.1f, 64)}) {
-        CHECK(orient(flipped(mesh)).turnedTriangles == mesh.triangles.size());
-        CHECK(orient(flipped(mesh)).turnedComponents == 1);
+        CHECK(orient(shapes::flipped(mesh)).turnedTriangles == mesh.triangles.size());
+        CHECK(orient(shapes::flipped(mesh)).turnedComponents == 1);
         const Orientation mended = orient(shuffled(mesh, seed));
         CHECK(mended.mixedComponents == 1);
         CHECK(balanced(mended.mesh));
@@ -72,7 +63,7 @@ TEST_CASE("turned triangles and shells are turned back") {
 
 TEST_CASE("a shell that touches another along an edge is turned alone") {
     const Mesh box = shapes::box({1, 1, 1});
-    const Orientation mended = orient(shapes::join({box, moved(flipped(box), {2, 2, 0})}));
+    const Orientation mended = orient(shapes::join({box, shapes::moved(shapes::flipped(box), {2, 2, 0})}));
     CHECK(mended.turnedTriangles == box.triangles.size());
     CHECK(inspect(mended.mesh).volume == Approx(16));
 }
@@ -83,24 +74,24 @@ TEST_CASE("cavities are kept, and found where the file is not to be trusted") {
     const unsigned seed = test::seed();
     CAPTURE(seed);
     for (const Mesh& mesh :
-         {shapes::join({big, flipped(small)}), shapes::join({flipped(big), small}),
-          shapes::join({flipped(big), flipped(small)}), shapes::join({shuffled(big, seed), shuffled(small, seed)}),
-          shapes::join({flipped(small), big})}) {
+         {shapes::join({big, shapes::flipped(small)}), shapes::join({shapes::flipped(big), small}),
+          shapes::join({shapes::flipped(big), shapes::flipped(small)}),
+          shapes::join({shuffled(big, seed), shuffled(small, seed)}), shapes::join({shapes::flipped(small), big})}) {
         CHECK(windingAfter(mesh, inCavity) == Approx(0).margin(1e-6));
         CHECK(windingAfter(mesh, inWall) == Approx(1));
     }
     CHECK(windingAfter(shapes::join({big, small}), inCavity) == Approx(2));
     // outside of everything, negative is wrong whatever its neighbours are
-    const Mesh beside = shapes::join({big, moved(flipped(small), {5, 0, 0})});
+    const Mesh beside = shapes::join({big, shapes::moved(shapes::flipped(small), {5, 0, 0})});
     CHECK(windingAfter(beside, glm::dvec3(5, 0.1, 0.2)) == Approx(1));
     CHECK(orient(beside).turnedTriangles == small.triangles.size());
 }
 
 TEST_CASE("open surfaces are oriented by what they would bound") {
-    Mesh open = flipped(shapes::sphere(1, 3));
+    Mesh open = shapes::flipped(shapes::sphere(1, 3));
     open.triangles.resize(open.triangles.size() - 40);
     CHECK(orient(open).turnedTriangles == open.triangles.size());
-    CHECK(orient(flipped(open)).turnedTriangles == 0);
+    CHECK(orient(shapes::flipped(open)).turnedTriangles == 0);
     // a flat sheet has no inside: the orientation of most of it stays
     Mesh sheet = shapes::box({1, 1, 1}, 4);
     std::erase_if(sheet.triangles, [&](const glm::uvec3& t) {
@@ -108,7 +99,7 @@ TEST_CASE("open surfaces are oriented by what they would bound") {
     });
     REQUIRE(sheet.triangles.size() == 32);
     CHECK(orient(sheet).turnedTriangles == 0);
-    CHECK(orient(flipped(sheet)).turnedTriangles == 0);
+    CHECK(orient(shapes::flipped(sheet)).turnedTriangles == 0);
     std::swap(sheet.triangles[7].x, sheet.triangles[7].y);
     CHECK(orient(sheet).turnedTriangles == 1);
 }
@@ -136,7 +127,7 @@ TEST_CASE("a surface with one side is left alone and told of") {
 
 TEST_CASE("degenerate and repeated triangles do not hide a flip") {
     const Mesh box = shapes::box({1, 1, 1}, 3);
-    Mesh mesh = flipped(box);
+    Mesh mesh = shapes::flipped(box);
     mesh.triangles.push_back({0, 0, 1});
     mesh.triangles.push_back({2, 2, 2});
     mesh.triangles.push_back(mesh.triangles[5]);
@@ -151,7 +142,7 @@ TEST_CASE("degenerate and repeated triangles do not hide a flip") {
 TEST_CASE("vertices that only coordinates identify are one") {
     const Mesh box = shapes::box({1, 1, 1}, 2);
     Mesh soup;
-    for (const auto& t : flipped(box).triangles) {
+    for (const auto& t : shapes::flipped(box).triangles) {
         const unsigned first = unsigned(soup.points.size());
         for (int k = 0; k < 3; ++k) {
             glm::vec3 point = box.points[t[k]];

@@ -4,7 +4,6 @@
 
 #include <catch2/catch.hpp>
 #include <glm/geometric.hpp>
-#include <glm/gtc/matrix_transform.hpp>
 #include <random>
 
 #include "demos/shared/shapes.h"
@@ -19,15 +18,6 @@ namespace {
 
 // Below this distance of the winding number from a half rounding may decide [1].
 constexpr double undecided = 1e-9;
-
-Mesh moved(const Mesh& mesh, const glm::vec3& by) {
-    return transformed(mesh, glm::translate(glm::mat4(1), by));
-}
-
-Mesh flipped(Mesh mesh) {
-    for (auto& t : mesh.triangles) std::swap(t.y, t.z);
-    return mesh;
-}
 
 // Without the triangles whose centre `gone` holds for.
 template <class Gone>
@@ -171,14 +161,14 @@ TEST_CASE("closed meshes get the signs of brute force in every voxel") {
     CAPTURE(seed);
     const Mesh ball = shapes::sphere(1, 3);
     // shells in one another count twice inside; a cavity not at all; overlapping boxes count as their union
-    const std::vector<Mesh> meshes{
-        ball,
-        shapes::join({ball, shapes::sphere(0.5f, 3)}),
-        shapes::join({ball, flipped(shapes::sphere(0.5f, 3))}),
-        shapes::join({shapes::box({0.5f, 0.4f, 0.3f}), moved(shapes::box({0.5f, 0.4f, 0.3f}), {0.3f, 0.3f, 0.2f})}),
-        shapes::box({1, 1, 0.013f}),
-        flipped(ball),
-        shapes::torus(1, 0.3f)};
+    const std::vector<Mesh> meshes{ball,
+                                   shapes::join({ball, shapes::sphere(0.5f, 3)}),
+                                   shapes::join({ball, shapes::flipped(shapes::sphere(0.5f, 3))}),
+                                   shapes::join({shapes::box({0.5f, 0.4f, 0.3f}),
+                                                 shapes::moved(shapes::box({0.5f, 0.4f, 0.3f}), {0.3f, 0.3f, 0.2f})}),
+                                   shapes::box({1, 1, 0.013f}),
+                                   shapes::flipped(ball),
+                                   shapes::torus(1, 0.3f)};
     for (std::size_t m = 0; m < meshes.size(); ++m)
         for (const float h : {0.05f, 0.21f}) {
             const Field f = signedField(meshes[m], h, true);
@@ -207,7 +197,7 @@ TEST_CASE("open meshes get the signs of brute force in every voxel of a leaf and
 TEST_CASE("signs change where the number passes a half slowly, amid the voxels of a leaf") {
     // a ball in the opening of a hemisphere brings leaves to where nothing but the opening parts inside from outside
     const Mesh half = without(shapes::sphere(1, 3), [](const glm::vec3& p) { return p.z > 0; });
-    const Mesh mesh = shapes::join({half, moved(shapes::sphere(0.3f, 2), {0.1f, 0, 0})});
+    const Mesh mesh = shapes::join({half, shapes::moved(shapes::sphere(0.3f, 2), {0.1f, 0, 0})});
     const unsigned seed = test::seed();
     CAPTURE(seed);
     const Field f = signedField(mesh, 0.015f, false, 6, 6);
@@ -246,7 +236,7 @@ TEST_CASE("public meshes get the signs of brute force", "[corpus]") {
 
 TEST_CASE("a thin band far apart in a huge box is signed without a walk through the box") {
     const Mesh ball = shapes::sphere(10, 2);
-    const Mesh mesh = shapes::join({ball, moved(ball, {4e5f, -3e5f, 2e5f})});
+    const Mesh mesh = shapes::join({ball, shapes::moved(ball, {4e5f, -3e5f, 2e5f})});
     for (const bool closed : {true, false}) {
         const Field f = signedField(mesh, 1, closed);
         CHECK(f.field->getConstAccessor().getValue({0, 0, 0}) == -2);
