@@ -17,6 +17,7 @@
 #include "collider/edge_search.h"
 #include "collider/interpolant.h"
 #include "collider/touch.h"
+#include "sdf/sign.h"
 #include "sdf/surface.h"
 
 namespace bilayer {
@@ -56,6 +57,11 @@ struct Map {
     }
 };
 
+// What is no farther from the surface than this is in the band [m].
+float surelyInBand(const Field& field) {
+    return field.exteriorWidth() - steepestInterpolant * field.voxelSize();
+}
+
 // The touch of a point that comes from outside of the field and goes some way.
 std::optional<Touch> touchOnWay(const Field& field, const glm::vec3& point, const glm::vec3& way) {
     const auto hit = field.segment(point, point + way);
@@ -80,7 +86,7 @@ class PointsInField {
         centre_ = bounds.centre();
         radius_ = 0.5f * glm::length(bounds.size());
         const float longest = ways_.longest(other.scale * map_(centre_), body.scale * radius_) / other.scale;
-        sweeps_ = longest > reach_;
+        sweeps_ = longest > std::min(reach_, surelyInBand(field_));
         seen_ = sweeps_ ? reach_ + longest : reach_;
     }
 
@@ -181,15 +187,16 @@ class PointsInField {
     template <class Found>
     void touch(std::uint32_t index, const SurfacePoint& point, const glm::vec3& at, const Sample& sample,
                ContactReport& report, Found& found) const {
-        if (sample.distance <= reach_) {
-            const auto here = touchAt(at, sample, reach_);
-            if (here && here->distance <= reach_) {
-                Touch touched = point.isSharp && here->distance <= 0 ? opposed(point, at, *here) : *here;
-                if (sweeps_) touched.approach = approachOf(point, at, touched);
-                found(index, point, touched);
-                if (point.isSharp) followEdges(index, at, *here, found);
-            }
-            if (!sample.inBand && sample.distance < 0) ++report.beyondBand;
+        if (!sample.inBand && sample.distance < 0) {
+            ++report.beyondBand;
+            return;
+        }
+        const auto here = sample.distance <= reach_ ? touchAt(at, sample, reach_) : std::nullopt;
+        if (here && here->distance <= reach_) {
+            Touch touched = point.isSharp && here->distance <= 0 ? opposed(point, at, *here) : *here;
+            if (sweeps_) touched.approach = approachOf(point, at, touched);
+            found(index, point, touched);
+            if (point.isSharp) followEdges(index, at, *here, found);
         } else if (sweeps_) {
             const glm::vec3 way = wayOf(at);
             if (sample.distance > glm::length(way) || !meets(point, at, way)) return;
@@ -327,7 +334,7 @@ class PointsInField {
     float reach_;
     glm::vec3 centre_;  // of a ball around the body
     float radius_;
-    bool sweeps_;  // whether any point moves farther than the reach
+    bool sweeps_;  // whether any point moves farther than contacts are found for sure
     float seen_;   // how far away a point can be that comes near
 };
 
@@ -378,8 +385,8 @@ class Collider::Triangles {
 };
 
 Collider::Collider(Mesh mesh, const LevelSet& levelSet, const ColliderOptions& options)
-    : triangles_(std::make_shared<Triangles>(std::move(mesh))),
-      field_(options.exact ? Field(levelSet, triangles_->mesh()) : Field(levelSet)),
+    : field_(options.exact ? Field(levelSet, mesh) : Field(levelSet)),
+      triangles_(std::make_shared<Triangles>(outwardMesh(levelSet, std::move(mesh)))),
       id_(nextId()) {
     if (!std::isfinite(options.margin)) throw std::invalid_argument("collider: the margin is not finite");
     body_.points = SurfacePoints(this->mesh(), options.pointSpacing * field_.voxelSize());
@@ -390,8 +397,8 @@ Collider::Collider(Mesh mesh, const LevelSet& levelSet, const ColliderOptions& o
 }
 
 Collider::Collider(const LevelSet& levelSet)
-    : triangles_(std::make_shared<Triangles>(levelSet)),
-      field_(levelSet),
+    : field_(levelSet),
+      triangles_(std::make_shared<Triangles>(levelSet)),
       body_(bodyOf(levelSet)),
       edges_(body_.points, field_),
       id_(nextId()) {}

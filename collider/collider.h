@@ -36,7 +36,8 @@ struct ColliderOptions {
 /// A field, points on the surface, and what else contacts need. Immutable; share it between bodies and threads.
 class Collider {
   public:
-    /// `levelSet` must be of `mesh`. Throws std::invalid_argument if the mesh is empty.
+    /// Of a mesh and the level set that was built of it. Triangles that face the wrong way are turned around, as
+    /// build() does. Throws std::invalid_argument as validate() does, and if the level set is of another mesh.
     Collider(Mesh mesh, const LevelSet& levelSet, const ColliderOptions& options = {});
 
     /// Of a level set with a body beside it, as readVdb() gives back what withBody() was written of. Collides as the
@@ -44,7 +45,7 @@ class Collider {
     /// of the field's zero set. Throws std::invalid_argument as bodyOf() does.
     explicit Collider(const LevelSet& levelSet);
 
-    /// Of a body from a file it is extracted when first asked for, once.
+    /// The mesh, all of it facing outward. Of a body from a file it is extracted when first asked for, once.
     const Mesh& mesh() const;
     /// Whether it was made of a mesh: that of a body from a file is only like it.
     bool hasMesh() const;
@@ -60,8 +61,8 @@ class Collider {
 
   private:
     class Triangles;
-    std::shared_ptr<Triangles> triangles_;
     Field field_;
+    std::shared_ptr<Triangles> triangles_;
     Body body_;
     SharpEdges edges_;
     std::uint64_t id_;
@@ -94,8 +95,8 @@ inline constexpr std::uint32_t featureOfB = 0x80000000u;
 
 struct ContactOptions {
     /// Contacts are reported up to this distance [m], and beyond it where a point's motion meets the other surface. The
-    /// band must reach sqrt(3) voxels farther for all of them to be found, and as much deeper than bodies sink into
-    /// each other (see Sample::inBand).
+    /// band must reach sqrt(3) voxels farther for all of them to be found (what moves on from there is met all the
+    /// same), and as much deeper than bodies sink into each other (see Sample::inBand).
     float margin = 0;
     /// Whether points outside of the other body and of its band are asked for the closest place, which takes a search
     /// for each; those too deep inside are counted all the same.

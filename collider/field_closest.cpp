@@ -7,13 +7,11 @@
 #include <glm/geometric.hpp>
 #include <limits>
 #include <memory>
-#include <stdexcept>
 #include <utility>
 
 #include "collider/field.h"
 #include "collider/field_data.h"
 #include "collider/zero_set.h"
-#include "sdf/orient.h"
 #include "sdf/sign.h"
 
 namespace bilayer {
@@ -29,16 +27,6 @@ constexpr std::size_t batch = 64;
 /// Mean normals below this have cancelled out, and tell no side where they point aside: above the rounding of floats,
 /// below what needles leave at their tips.
 constexpr double cancelled = 1e-6;
-
-// The mesh as build() understood it.
-Mesh meshOf(const LevelSet& levelSet, Mesh mesh) {
-    validate(mesh);
-    if (levelSet.meshHash() != 0 && levelSet.meshHash() != hash(mesh))
-        throw std::invalid_argument("field: the level set is of another mesh");
-    const std::string& reason = levelSet.signReason();
-    if (levelSet.sign() != "normals" || reason == closedAndOriented || reason == asAskedFor) return mesh;
-    return orient(mesh).mesh;
-}
 
 // Of a point over the plane that the normal stands on; the normal may be shorter than 1.
 double heightOver(const NearestFeature& nearest) {
@@ -59,7 +47,7 @@ glm::vec3 outwardNormal(const NearestFeature& nearest, bool inside) {
 }  // namespace
 
 FieldData::FieldData(const LevelSet& levelSet, Mesh given, Storage storage) : FieldData(levelSet, storage) {
-    mesh = std::make_unique<MeshTree>(meshOf(levelSet, std::move(given)), levelSet.voxelSize());
+    mesh = std::make_unique<MeshTree>(outwardMesh(levelSet, std::move(given)), levelSet.voxelSize());
     const float reach = std::max(exteriorWidth, interiorWidth) * float(perMetre) + usualError;
     entries = BlockEntries(*this, mesh->tree(), 1 / double(voxelSize), reach);
     signedByNormals = levelSet.sign() == "normals";

@@ -6,6 +6,8 @@
 
 #include <cstdint>
 #include <functional>
+#include <stdexcept>
+#include <utility>
 
 #include "sdf/orient.h"
 #include "sdf/sides.h"
@@ -94,6 +96,16 @@ SignChoice chooseSign(const Mesh& mesh, Progress* progress) {
 
 SignChoice chooseSignAfterConflict(const Mesh& mesh, Progress* progress) {
     return chooseFor(orient(mesh, progress), "closed and oriented, but the surface intersects itself", progress);
+}
+
+Mesh outwardMesh(const LevelSet& levelSet, Mesh mesh) {
+    validate(mesh);
+    if (levelSet.meshHash() != 0 && levelSet.meshHash() != hash(mesh))
+        throw std::invalid_argument("the level set is of another mesh");
+    const std::string& reason = levelSet.signReason();
+    const bool asItStands = reason == closedAndOriented || reason == asAskedFor;
+    if (levelSet.sign() == "normals" && asItStands) return mesh;
+    return orient(mesh).mesh;
 }
 
 }  // namespace bilayer

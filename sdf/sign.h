@@ -38,4 +38,9 @@ SignChoice chooseSign(const Mesh& mesh, Progress* progress = nullptr);
 /// intersects itself. Returns `normals` only together with a mended mesh. Throws as validate() does.
 SignChoice chooseSignAfterConflict(const Mesh& mesh, Progress* progress = nullptr);
 
+/// The mesh of a level set as build() understood it: all of it facing outward. One that needed no mending keeps its
+/// bytes, and one whose normals were taken as they stand keeps them. Throws std::invalid_argument as validate() does,
+/// and if the level set is of another mesh.
+Mesh outwardMesh(const LevelSet& levelSet, Mesh mesh);
+
 }  // namespace bilayer

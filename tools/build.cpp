@@ -15,7 +15,6 @@
 #include "sdf/build.h"
 #include "sdf/double_layer.h"
 #include "sdf/mesh_io.h"
-#include "sdf/orient.h"
 #include "sdf/vdb_io.h"
 #include "tools/commands.h"
 #include "tools/output.h"
@@ -128,9 +127,7 @@ LevelSet timedBuild(const Mesh& mesh, const Arguments& a, Outcome& outcome) {
 // With what bodies need beside the field.
 LevelSet timedBody(const Mesh& mesh, const LevelSet& field, const Arguments& a, Outcome& outcome) {
     const Stopwatch watch;
-    // as the field was signed; a mesh that is fine keeps its bytes
-    Mesh outward = a.sign == "normals" ? mesh : orient(mesh).mesh;
-    LevelSet body = withBody(field, Collider(std::move(outward), field, a.collider).body());
+    LevelSet body = withBody(field, Collider(mesh, field, a.collider).body());
     outcome.body = watch.seconds();
     return body;
 }

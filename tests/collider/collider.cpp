@@ -368,12 +368,8 @@ TEST_CASE("beyond the band, edges are as far apart as those of the triangles, an
 }
 
 TEST_CASE("what lies between two walls is found at any distance, whether the margin ends in the band or not") {
-    const auto moved = [](Mesh mesh, const glm::vec3& by) {
-        for (glm::vec3& point : mesh.points) point += by;
-        return mesh;
-    };
     const Mesh wall = shapes::box({0.1f, 0.5f, 0.5f}), small = shapes::box({0.1f, 0.1f, 0.1f});
-    const Mesh walls = shapes::join({moved(wall, {-0.6f, 0, 0}), moved(wall, {0.6f, 0, 0})});
+    const Mesh walls = shapes::join({shapes::moved(wall, {-0.6f, 0, 0}), shapes::moved(wall, {0.6f, 0, 0})});
     const Collider two(walls, build(walls, {.voxelSize = h}), {.exact = true}),
         body(small, build(small, {.voxelSize = h}));
     for (float gap = 0.02f; gap < 0.2f; gap += 0.003f) {
@@ -488,6 +484,58 @@ TEST_CASE("exact contacts lie on the triangles, on edges and in grooves of half 
         CHECK(sampled.distance > 0.02);
         CHECK(sampled.foot > 0.05);
     }
+}
+
+TEST_CASE("a body of a mesh that faces the wrong way is the body of the right one") {
+    const bool isExact = GENERATE(false, true), isShuffled = GENERATE(false, true);
+    CAPTURE(isExact, isShuffled);
+    const Mesh mesh = shapes::torus(0.35f, 0.13f);
+    Mesh wrong = shapes::flipped(mesh);
+    Random random(test::seed());
+    if (isShuffled)
+        for (glm::uvec3& t : wrong.triangles)
+            if (random(0, 1) < 0.5) std::swap(t.y, t.z);
+    const ColliderOptions options{.exact = isExact};
+    const Collider right(mesh, build(mesh, {.voxelSize = h}), options),
+        mended(wrong, build(wrong, {.voxelSize = h}), options);
+    CHECK(mended.mass().volume == Approx(right.mass().volume));
+    CHECK(mended.edges().edges().empty());
+    REQUIRE(mended.points().points().size() > 100);
+    for (const SurfacePoint& point : mended.points().points())
+        REQUIRE(glm::dot(point.normal, right.field().sample(point.position).gradient) > 0.5f);
+    // crossed: points whose normals looked inward would be left out
+    const Pose across{{0.35f, 0, 0}, glm::angleAxis(glm::half_pi<float>(), glm::vec3(1, 0, 0))};
+    const auto found = [&](const Collider& body) {
+        std::vector<Contact> contacts;
+        collide({body, {{0.1f, 0, 0}}}, {body, across}, {.margin = h, .leastOpposition = 0.3f}, contacts);
+        return contacts;
+    };
+    const auto expected = found(right), contacts = found(mended);
+    REQUIRE(expected.size() > 20);
+    CHECK(contacts.size() > 0.8 * double(expected.size()));
+    CHECK(deepest(contacts) == Approx(deepest(expected)).margin(0.1 * h));
+}
+
+TEST_CASE("what moves on from beyond the band is met, however wide the margin is") {
+    const float margin = GENERATE(1.f, 2.f, 4.f) * h, gap = GENERATE(0.5f, 1.5f, 2.5f, 3.5f, 6.f) * h;
+    const Placed still{slab()}, moving{brick(), {{0, 0, 0.2f + gap}}, 1, {.way = {0, 0, -8 * h}}};
+    std::vector<Contact> contacts;
+    collide(moving, still, {.margin = margin}, contacts);
+    CAPTURE(margin / h, gap / h);
+    int corners = 0;
+    for (const Contact& contact : contacts)
+        if (std::abs(contact.position.x) > 0.29f && std::abs(contact.position.y) > 0.19f &&
+            contact.distance < gap + 0.5f * h && !(contact.feature & featureOfB)) {
+            ++corners;
+            CHECK(contact.distance == Approx(gap).margin(0.05 * h));
+            CHECK(contact.approach == Approx(8 * h).margin(0.05 * h));
+        }
+    CHECK(corners >= 4);
+}
+
+TEST_CASE("a collider refuses the level set of another mesh") {
+    const Mesh mesh = shapes::box({0.3f, 0.2f, 0.1f});
+    REQUIRE_THROWS_AS(Collider(mesh, build(shapes::sphere(0.4f, 4), {.voxelSize = h})), std::invalid_argument);
 }
 
 TEST_CASE("a collider refuses an empty mesh") {
