@@ -3,6 +3,7 @@
 #include <BulletCollision/BroadphaseCollision/btCollisionAlgorithm.h>
 #include <BulletCollision/BroadphaseCollision/btOverlappingPairCache.h>
 #include <BulletCollision/CollisionDispatch/btCollisionObjectWrapper.h>
+#include <BulletCollision/CollisionDispatch/btGhostObject.h>
 #include <BulletCollision/CollisionDispatch/btManifoldResult.h>
 #include <BulletCollision/CollisionShapes/btStaticPlaneShape.h>
 #include <BulletDynamics/Dynamics/btRigidBody.h>
@@ -93,8 +94,9 @@ Continuity continuityOf(const btCollisionShape& a, const btCollisionShape& b) {
     const auto restingFriction = [](const btCollisionShape& shape) {
         return isField(&shape) ? static_cast<const Shape&>(shape).restingFriction() : 1;
     };
-    return {.sameWithin = b.getContactBreakingThreshold(gContactBreakingThreshold),
-            .restingFriction = std::max(restingFriction(a), restingFriction(b))};
+    float sameWithin = b.getContactBreakingThreshold(gContactBreakingThreshold);
+    if (isField(&a)) sameWithin = std::min(sameWithin, a.getContactBreakingThreshold(gContactBreakingThreshold));
+    return {.sameWithin = sameWithin, .restingFriction = std::max(restingFriction(a), restingFriction(b))};
 }
 
 /// Two overlapping bodies of which B is a field. Collides them without a call that changes anything in Bullet, so that
@@ -257,6 +259,17 @@ struct CreateFunction : btCollisionAlgorithmCreateFunc {
     StepState& state;
 };
 
+/// Whether the pairs are a ghost's own, as character controllers dispatch them once more within a step.
+bool isOfGhost(btOverlappingPairCache& cache) {
+    if (cache.getNumOverlappingPairs() == 0) return false;
+    const btBroadphasePair& pair = *cache.getOverlappingPairArrayPtr();
+    const auto owns = [&](const btBroadphaseProxy* proxy) {
+        auto* ghost = dynamic_cast<btPairCachingGhostObject*>(static_cast<btCollisionObject*>(proxy->m_clientObject));
+        return ghost && ghost->getOverlappingPairCache() == &cache;
+    };
+    return owns(pair.m_pProxy0) || owns(pair.m_pProxy1);
+}
+
 /// What a dispatcher's tables point to.
 struct AlgorithmFunctions {
     StepState state;
@@ -307,7 +320,9 @@ void Dispatcher::registerFields() {
 void Dispatcher::dispatchAllCollisionPairs(btOverlappingPairCache* cache, const btDispatcherInfo& info,
                                            btDispatcher* dispatcher) {
     const auto start = std::chrono::steady_clock::now();
-    functions_->state = {.running = {}, .seconds = info.m_timeStep, .foreseesAll = functions_->state.foreseesAll};
+    const bool isStep = !isOfGhost(*cache);
+    functions_->state = {
+        .running = {}, .seconds = isStep ? info.m_timeStep : 0, .foreseesAll = functions_->state.foreseesAll};
 
     struct Task {
         std::shared_ptr<Pair> pair;
@@ -351,6 +366,7 @@ void Dispatcher::dispatchAllCollisionPairs(btOverlappingPairCache* cache, const 
 
     for (const Task& task : tasks) task.pair->forget();
     functions_->state.seconds = 0;
+    if (!isStep) return;
     functions_->last = functions_->state.running;
     functions_->last.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }

@@ -366,17 +366,29 @@ std::vector<std::uint32_t> firstMet(const std::vector<Contact>& contacts, const 
     return kept;
 }
 
-/// Bullet's callbacks for the start of contact would run each time a manifold is filled anew.
-class StartSilenced {
+/// Keeps Bullet from calling one of its callbacks, which would run each time a manifold is filled anew.
+template <class Callback>
+class Silenced {
   public:
-    explicit StartSilenced(bool silence) : callback_(gContactStartedCallback) {
-        if (silence) gContactStartedCallback = nullptr;
+    Silenced(Callback& callback, bool silence) : callback_(callback), kept_(callback) {
+        if (silence) callback_ = nullptr;
     }
-    ~StartSilenced() { gContactStartedCallback = callback_; }
+    ~Silenced() { callback_ = kept_; }
 
   private:
-    ContactStartedCallback callback_;
+    Callback &callback_, kept_;
 };
+
+/// Tells the user of a contact once it is as the solver will see it; what he keeps with it is there again each step.
+void tellAdded(btManifoldPoint& point, const btPersistentManifold& manifold, const btManifoldResult& result) {
+    const btCollisionObjectWrapper *first = result.getBody0Wrap(), *second = result.getBody1Wrap();
+    const auto asks = [](const btCollisionObjectWrapper& side) {
+        return (side.getCollisionObject()->getCollisionFlags() & btCollisionObject::CF_CUSTOM_MATERIAL_CALLBACK) != 0;
+    };
+    if (!gContactAddedCallback || !(asks(*first) || asks(*second))) return;
+    if (manifold.getBody0() != first->getCollisionObject()) std::swap(first, second);
+    gContactAddedCallback(point, first, point.m_partId0, point.m_index0, second, point.m_partId1, point.m_index1);
+}
 
 btVector3 along(const btVector3& way, const btVector3& normal) {
     return way - normal.dot(way) * normal;
@@ -389,11 +401,11 @@ struct Anchor {
 };
 
 /// Where friction did not hold the two places, they are pulled back no farther than before.
-Anchor anchorOf(const btManifoldPoint& point, const btPersistentManifold& manifold, float sameWithin) {
+Anchor anchorOf(const btManifoldPoint& point, const btVector3& before, const btPersistentManifold& manifold,
+                float sameWithin) {
     const btVector3 drift = along(manifold.getBody0()->getWorldTransform() * point.m_localPointA -
                                       manifold.getBody1()->getWorldTransform() * point.m_localPointB,
                                   point.m_normalWorldOnB);
-    const btVector3 before = along(point.m_positionWorldOnA - point.m_positionWorldOnB, point.m_normalWorldOnB);
     // Bullet bounds friction in each of its directions by itself
     const float friction = std::max(std::abs(point.m_appliedImpulseLateral1), std::abs(point.m_appliedImpulseLateral2));
     const bool holds = friction < held * point.m_combinedFriction * point.m_appliedImpulse;
@@ -487,35 +499,41 @@ void Manifolds::write(std::span<const Patch> patches, const btCollisionObject& a
     // One manifold at least: users expect a pair that overlaps to have one.
     while (manifolds_.size() < std::max<std::size_t>(patches.size(), 1))
         manifolds_.push_back(dispatcher_.getNewManifold(&a, &b));
-    rested_.resize(manifolds_.size());
+    written_.resize(manifolds_.size());
 
     const bool aIsFirst = result.getBody0Internal() == &a;
     old_.clear();
     for (std::size_t m = 0; m < manifolds_.size(); ++m)
-        for (int i = 0; i < manifolds_[m]->getNumContacts(); ++i)
-            old_.push_back({manifolds_[m]->getContactPoint(i), rested_[m][std::size_t(i)]});
+        for (int i = 0; i < manifolds_[m]->getNumContacts(); ++i) {
+            btManifoldPoint& point = manifolds_[m]->getContactPoint(i);
+            old_.push_back({point, writtenAs(point, m)});
+            point.m_userPersistentData = nullptr;
+        }
 
     for (std::size_t m = 0; m < manifolds_.size(); ++m) {
         btPersistentManifold* manifold = manifolds_[m];
         const bool touched = manifold->getNumContacts() > 0;
-        const StartSilenced silence(touched);
         manifold->setNumContacts(0);
         result.setPersistentManifold(manifold);
-        if (m < patches.size())
-            for (int i = 0; i < patches[m].count; ++i)
-                emit(patches[m].contacts[i], aIsFirst, continuity.sameWithin, result);
-        for (int i = 0; i < manifold->getNumContacts(); ++i)
-            rested_[m][std::size_t(i)] = inherit(*manifold, i, continuity);
+        if (m < patches.size()) {
+            const Silenced started(gContactStartedCallback, touched);
+            const Silenced added(gContactAddedCallback, true);
+            for (int i = 0; i < patches[m].count; ++i) emit(patches[m].contacts[i], aIsFirst, result);
+        }
+        for (int i = 0; i < manifold->getNumContacts(); ++i) {
+            written_[m][std::size_t(i)] = inherit(*manifold, i, continuity);
+            tellAdded(manifold->getContactPoint(i), *manifold, result);
+        }
         manifold->setContactBreakingThreshold(continuity.sameWithin);
         if (touched && manifold->getNumContacts() == 0 && gContactEndedCallback) gContactEndedCallback(manifold);
     }
 
-    for (const auto& [point, rested] : old_)
+    for (const auto& [point, written] : old_)
         if (point.m_userPersistentData && gContactDestroyedCallback)
             gContactDestroyedCallback(point.m_userPersistentData);
 }
 
-void Manifolds::emit(const Contact& contact, bool aIsFirst, float sameWithin, btManifoldResult& result) {
+void Manifolds::emit(const Contact& contact, bool aIsFirst, btManifoldResult& result) {
     const bool ofFirst = aIsFirst != static_cast<bool>(contact.feature & featureOfB);
     const int index = static_cast<int>(contact.feature & ~featureOfB);
     result.setShapeIdentifiersA(0, ofFirst ? index : -1);
@@ -524,7 +542,7 @@ void Manifolds::emit(const Contact& contact, bool aIsFirst, float sameWithin, bt
     // Bullet drops points beyond the threshold and merges those within it: open it as far as this point needs. One that
     // comes from afar goes in as if it touched, and is put right afterwards.
     btPersistentManifold& manifold = *result.getPersistentManifold();
-    const bool fromAfar = contact.approach > 0 && contact.distance > sameWithin;
+    const bool fromAfar = contact.approach > 0 && contact.distance > 0;
     manifold.setContactBreakingThreshold(fromAfar ? 0 : std::max(contact.distance, 0.f));
     const int before = manifold.getNumContacts();
     result.addContactPoint(toBullet(contact.normal), toBullet(contact.position), fromAfar ? 0 : contact.distance);
@@ -535,7 +553,13 @@ void Manifolds::emit(const Contact& contact, bool aIsFirst, float sameWithin, bt
     point.m_localPointA = manifold.getBody0()->getWorldTransform().invXform(point.m_positionWorldOnA);
 }
 
-int Manifolds::inherit(btPersistentManifold& manifold, int index, const Continuity& continuity) {
+Manifolds::Written Manifolds::writtenAs(const btManifoldPoint& point, std::size_t manifold) const {
+    for (const Written& written : written_[manifold])
+        if (written.ofA == point.m_localPointA && written.ofB == point.m_localPointB) return written;
+    return {};
+}
+
+Manifolds::Written Manifolds::inherit(btPersistentManifold& manifold, int index, const Continuity& continuity) {
     const float sameWithin = continuity.sameWithin;
     btManifoldPoint& point = manifold.getContactPoint(index);
     point.m_contactPointFlags |= BT_CONTACT_FLAG_FRICTION_ANCHOR;
@@ -547,22 +571,23 @@ int Manifolds::inherit(btPersistentManifold& manifold, int index, const Continui
         if (squared < nearest && it->point.m_normalWorldOnB.dot(point.m_normalWorldOnB) > sameDirection)
             nearest = squared, source = it;
     }
-    if (source == old_.end()) return 0;
-    const auto& [old, hasRested] = *source;
+    if (source == old_.end()) return {point.m_localPointA, point.m_localPointB};
+    const auto& [old, written] = *source;
     point.m_appliedImpulse = old.m_appliedImpulse;
     point.m_appliedImpulseLateral1 = old.m_appliedImpulseLateral1;
     point.m_appliedImpulseLateral2 = old.m_appliedImpulseLateral2;
     point.m_prevRHS = old.m_prevRHS;
     point.m_lifeTime = old.m_lifeTime + 1;
     point.m_userPersistentData = old.m_userPersistentData;
-    const Anchor anchor = anchorOf(old, manifold, sameWithin);
+    const Anchor anchor = anchorOf(old, written.drift, manifold, sameWithin);
     point.m_positionWorldOnA += along(anchor.drift, point.m_normalWorldOnB);
     point.m_localPointA = manifold.getBody0()->getWorldTransform().invXform(point.m_positionWorldOnA);
-    const int rested = anchor.slips ? 0 : std::min(hasRested + 1, stepsOfRest);
+    const int rested = anchor.slips ? 0 : std::min(written.rested + 1, stepsOfRest);
     if (rested == stepsOfRest) point.m_combinedFriction *= continuity.restingFriction;
     *source = old_.back();
     old_.pop_back();
-    return rested;
+    const btVector3 drift = along(point.m_positionWorldOnA - point.m_positionWorldOnB, point.m_normalWorldOnB);
+    return {point.m_localPointA, point.m_localPointB, drift, rested};
 }
 
 }  // namespace bilayer::bullet

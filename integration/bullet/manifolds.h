@@ -87,19 +87,25 @@ class Manifolds {
     std::span<btPersistentManifold* const> all() const { return manifolds_; }
 
   private:
-    void emit(const Contact& contact, bool aIsFirst, float sameWithin, btManifoldResult& result);
-    /// Returns for how many steps the contact has rested.
-    int inherit(btPersistentManifold& manifold, int index, const Continuity& continuity);
+    void emit(const Contact& contact, bool aIsFirst, btManifoldResult& result);
+    /// A contact as it went into a manifold: within compounds, Bullet moves contacts on and about before we see them.
+    struct Written {
+        btVector3 ofA{0, 0, 0}, ofB{0, 0, 0};  ///< its place on either body
+        btVector3 drift{0, 0, 0};              ///< along the surface, that it is to be pulled back
+        int rested = 0;                        ///< steps since it has slipped
+    };
+    Written writtenAs(const btManifoldPoint& point, std::size_t manifold) const;
+    Written inherit(btPersistentManifold& manifold, int index, const Continuity& continuity);
 
     /// A point of the last step.
     struct Old {
         btManifoldPoint point;
-        int rested;  ///< steps since it has slipped
+        Written written;
     };
     btDispatcher& dispatcher_;
     std::vector<btPersistentManifold*> manifolds_;
-    std::vector<std::array<int, MANIFOLD_CACHE_SIZE>> rested_;  ///< of their contacts
-    std::vector<Old> old_;                                      ///< those that no new one has inherited from yet
+    std::vector<std::array<Written, MANIFOLD_CACHE_SIZE>> written_;  ///< what they hold
+    std::vector<Old> old_;                                           ///< those that no new one has inherited from yet
 };
 
 }  // namespace bilayer::bullet

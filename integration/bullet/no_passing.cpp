@@ -221,7 +221,8 @@ class Course {
           start_(end_.getOrigin()),
           orientation_(end_.getRotation()) {
         body_ = goingBody(object);
-        if (!body_) return;
+        // Bullet's own CCD leaves a body that it has stopped its velocity, but not the way that it has gone
+        if (!body_ || body_->getHitFraction() < 1) return;
         way_ = seconds * body_->getLinearVelocity();
         start_ -= way_;
         const btVector3& spin = body_->getAngularVelocity();
@@ -568,11 +569,11 @@ struct Meeting {
     }
 };
 
-/// Up to which contacts are made with an object; zero without a field.
-float marginOf(const btCollisionObject& object) {
-    float most = 0;
+/// Up to which contacts are made with an object; nothing without a field.
+std::optional<float> marginOf(const btCollisionObject& object) {
+    std::optional<float> most;
     visitParts(object, [&](const Part& part) {
-        if (const Shape* field = part.field()) most = std::max(most, float(field->getMargin()));
+        if (const Shape* field = part.field()) most = std::max(most.value_or(0), float(field->getMargin()));
     });
     return most;
 }
@@ -584,7 +585,7 @@ class Meetings {
         const btCollisionObjectArray& objects = world.getCollisionObjectArray();
         float least = std::numeric_limits<float>::infinity();
         for (int i = 0; i < objects.size(); ++i)
-            if (const float margin = marginOf(*objects[i]); margin > 0) least = std::min(least, margin);
+            if (const auto margin = marginOf(*objects[i])) least = std::min(least, *margin);
         for (int i = 0; i < objects.size(); ++i) {
             if (!goingBody(*objects[i])) continue;
             const Course course(*objects[i], seconds);
@@ -672,8 +673,8 @@ class Meetings {
     }
 
     void add(Course& a, Course& b) {
-        const float margin = std::max(marginOf(a.object()), marginOf(b.object()));
-        if (margin > 0 && a.longest(b) > margin) meetings_.push_back({&a, &b});
+        const auto margin = std::max(marginOf(a.object()), marginOf(b.object()));  // no field is less than any margin
+        if (margin && a.longest(b) > *margin) meetings_.push_back({&a, &b});
     }
 
     btDynamicsWorld& world_;

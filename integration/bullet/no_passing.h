@@ -20,8 +20,9 @@ namespace bilayer::bullet {
 /// lose the speed at which they go for each other there; what cannot move at all comes to rest.
 ///
 /// Bodies that go less than a margin in a step cost next to nothing. Left alone are shapes with sweeps == false, pairs
-/// without a field, and pairs that the Dispatcher foresees still: bodies that the user moves (kinematic ones), and
-/// btGImpactMeshShape. The same bits for any number of threads.
+/// without a field, pairs that the Dispatcher foresees still: bodies that the user moves (kinematic ones), and
+/// btGImpactMeshShape; and where a body has got to that Bullet's own CCD has stopped in this step. The same bits for
+/// any number of threads.
 class NoPassing : private btActionInterface {
   public:
     /// Acts at the end of each internal step, as one of the world's actions; the world must outlive this.

@@ -30,6 +30,8 @@ constexpr float breakingVoxels = 2;
 constexpr float castVoxel = 0.05f;
 // Where a ray goes on behind a triangle that it sees from behind [voxels].
 constexpr double skippedVoxels = 1e-4;
+// Bullet's quantized hierarchy takes the upper bits of larger indices for the number of a part.
+constexpr std::size_t mostQuantized = std::size_t(1) << (31 - MAX_NUM_PARTS_IN_BITS);
 // How far the triangles of a field's zero set lie from its interpolant's zeros at most, or a bit more [voxels].
 constexpr float zeroSetVoxels = 0.1f;
 
@@ -37,10 +39,12 @@ btVector3 halfSize(const Bounds& bounds) {
     return toBullet(0.5f * bounds.size());
 }
 
-/// From the field of a body that has no mesh. Where the callback goes on behind the hit, its fraction of the ray.
+/// From the field of a body that has no mesh. The fraction of the ray behind which triangles are to be asked: where the
+/// callback goes on behind the hit, or from the start of a ray within the body, which leaves it through a back face.
 std::optional<float> castRay(const Placed& body, btTriangleRaycastCallback& callback) {
     const Field& field = body.collider.field();
     const glm::vec3 from = body.pose.toBody(toGlm(callback.m_from)) / body.scale;
+    if (field.inside(from)) return 0;
     const glm::vec3 way = body.pose.toBody(toGlm(callback.m_to)) / body.scale - from;
     const float length = glm::length(way);
     if (!(length > 0)) return std::nullopt;
@@ -222,7 +226,7 @@ class Shape::Triangles {
         array_ = std::make_unique<btTriangleIndexVertexArray>(
             static_cast<int>(mesh.triangles.size()), indices_.data(), static_cast<int>(3 * sizeof(int)),
             static_cast<int>(points_.size()), &points_.front().x, static_cast<int>(sizeof(glm::vec3)));
-        mesh_.reset(new btBvhTriangleMeshShape(array_.get(), true));
+        mesh_.reset(new btBvhTriangleMeshShape(array_.get(), mesh.triangles.size() <= mostQuantized));
         scaled_.reset(new btScaledBvhTriangleMeshShape(mesh_.get(), shape.getLocalScaling()));
     }
 

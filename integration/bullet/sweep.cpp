@@ -4,6 +4,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
+#include "collider/interpolant.h"
 #include "collider/mesh_rays.h"
 
 namespace bilayer::bullet {
@@ -32,8 +33,10 @@ double gapAt(const MeshTree& mesh, const glm::dvec3& point, double reach) {
 
 bool sweepable(const Placed& body, float radius) {
     const Field& field = body.collider.field();
-    // One voxel is kept for the interpolation at the band's border.
-    return radius < body.scale * (field.exteriorWidth() - field.voxelSize());
+    // Beyond the band a bound is told, which falls to this near it: a sphere that it reaches could touch anywhere
+    // there.
+    const float leastBound = field.exteriorWidth() - (steepestInterpolant + touchVoxels) * field.voxelSize();
+    return radius < body.scale * leastBound;
 }
 
 std::optional<SweepHit> sweepSphere(const Placed& body, const glm::vec3& from, const glm::vec3& to, float radius,

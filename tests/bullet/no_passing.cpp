@@ -135,6 +135,44 @@ TEST_CASE("Two fast bodies do not pass each other, nor what they meet after a bo
     }
 }
 
+TEST_CASE("Fields without a margin are not passed either") {
+    Shape plate(exactBox({1.f, 1.f, 0.5f * h}, h), {.margin = 0}), ball(exactSphere(0.2f, h), {.margin = 0});
+    btSphereShape sphere(0.2f);
+    const bool isField = GENERATE(false, true);
+    CAPTURE(isField);
+    World world;
+    const NoPassing guard(world.dynamics);
+    world.add(plate, 0, {0, 0, 0});
+    btRigidBody* body = world.add(isField ? static_cast<btCollisionShape&>(ball) : sphere, 1, {0.1f, 0.2f, 3});
+    body->setLinearVelocity({0, 0, -300});
+    for (int i = 0; i < 10; ++i) {
+        world.dynamics.stepSimulation(step, 0);
+        CHECK(body->getCenterOfMassPosition().z() > 0);
+    }
+}
+
+TEST_CASE("A body that Bullet's own CCD stops is not set down behind what it came from") {
+    Shape wall(exactBox({0.5f * h, 1.f, 1.f}, h));
+    btSphereShape sphere(0.1f);
+    btBoxShape box({0.05f, 0.05f, 0.05f});
+    World world;
+    const NoPassing guard(world.dynamics);
+    world.dynamics.setGravity({0, 0, 0});
+    world.add(wall, 0, {0, 0, 0});
+    world.add(wall, 0, {0.8f, 0, 0});
+    // struck in this very step: Bullet foresees by the velocity before
+    world.add(box, 1000, {0.149f, 0.1f, 0.2f})->setLinearVelocity({100, 0, 0});
+    btRigidBody* body = world.add(sphere, 1, {0.3f, 0.1f, 0.2f});
+    body->setCcdMotionThreshold(0.05f);
+    body->setCcdSweptSphereRadius(0.08f);
+    for (int i = 0; i < 10; ++i) {
+        world.dynamics.stepSimulation(step, 0);
+        CAPTURE(i, body->getCenterOfMassPosition().x());
+        CHECK(body->getCenterOfMassPosition().x() > 0);
+        CHECK(body->getCenterOfMassPosition().x() < 0.8f);
+    }
+}
+
 TEST_CASE("What slides, rolls or rests is not held, and a world is as it was when nobody looks after it") {
     Shape block(exactBox({0.3f, 0.3f, 0.2f}, h)), floor(exactBox({4, 1, 0.3f}, h)), ball(exactSphere(0.2f, h));
     World world;

@@ -1,5 +1,7 @@
 // What a world is asked between steps: rays, sweeps, contact tests, inertia, bounds, drawing.
 #include <BulletCollision/CollisionDispatch/btCollisionWorld.h>
+#include <BulletCollision/CollisionDispatch/btGhostObject.h>
+#include <BulletCollision/NarrowPhaseCollision/btRaycastCallback.h>
 
 #include <catch2/catch.hpp>
 #include <cmath>
@@ -121,6 +123,98 @@ TEST_CASE("Spheres are swept against the field, or against the mesh where they a
                                        btTransform(btQuaternion::getIdentity(), b), miss);
         CHECK_FALSE(miss.hasHit());
     }
+}
+
+TEST_CASE("Spheres of any radius are swept against a body from a file, from within its band and from beyond its box") {
+    const float scale = GENERATE(1.f, 2.f), radius = GENERATE(0.2f, 1.f, 1.2f, 1.4f, 1.7f, 2.f, 2.5f, 4.f) * scale * h;
+    CAPTURE(scale, radius / (scale * h));
+    const Mesh mesh = shapes::box({0.5f, 0.4f, 0.3f});
+    const LevelSet field = build(mesh, {.voxelSize = h});
+    Shape shape(std::make_shared<Collider>(withBody(field, Collider(mesh, field).body())));
+    shape.setLocalScaling({scale, scale, scale});
+    World world;
+    world.add(shape, 1, {0, 0, 0});
+    const btSphereShape sphere(radius);
+    for (const float height : {0.4f, 0.5f, 0.7f, 2.f}) {
+        const btVector3 from(0.1f, 0.1f, scale * (0.3f + height) + radius), to(0.1f, 0.1f, 0);
+        btCollisionWorld::ClosestConvexResultCallback sweep(from, to);
+        world.dynamics.convexSweepTest(&sphere, btTransform(btQuaternion::getIdentity(), from),
+                                       btTransform(btQuaternion::getIdentity(), to), sweep);
+        CAPTURE(height);
+        REQUIRE(sweep.hasHit());
+        CHECK(sweep.m_closestHitFraction * from.z() == Approx(scale * height).margin(0.02 * scale * h));
+        CHECK(sweep.m_hitNormalWorld.z() == Approx(1).margin(1e-2));
+    }
+}
+
+TEST_CASE("A ray from within a body from a file leaves it as it leaves the body's mesh") {
+    const Mesh mesh = shapes::box({0.5f, 0.4f, 0.3f});
+    const LevelSet field = build(mesh, {.voxelSize = h});
+    const auto made = std::make_shared<Collider>(mesh, field),
+               loaded = std::make_shared<Collider>(withBody(field, made->body()));
+    Shape ofMesh(made), ofFile(loaded);
+    for (Shape* shape : {&ofMesh, &ofFile}) {
+        World world;
+        world.add(*shape, 0, {0, 0, 0});
+        const btVector3 from(0.1f, 0.07f, 0.1f), to(0.1f, 0.07f, 2.1f);
+        btCollisionWorld::ClosestRayResultCallback ray(from, to), oneSided(from, to);
+        world.dynamics.rayTest(from, to, ray);
+        CHECK(ray.hasHit());
+        CHECK(ray.m_closestHitFraction == Approx(0.1).margin(1e-3));
+        CHECK(ray.m_hitNormalWorld.z() == Approx(-1).margin(1e-3));
+        oneSided.m_flags = btTriangleRaycastCallback::kF_FilterBackfaces;
+        world.dynamics.rayTest(from, to, oneSided);
+        CHECK_FALSE(oneSided.hasHit());
+    }
+}
+
+TEST_CASE("Meshes of more triangles than Bullet's quantized hierarchy can number are swept against") {
+    const Mesh mesh = shapes::box({1, 1, 1}, 420);
+    REQUIRE(mesh.triangles.size() > std::size_t(1) << 21);
+    Shape shape(std::make_shared<Collider>(mesh, build(mesh, {.voxelSize = 0.1f}), ColliderOptions{.pointSpacing = 4}));
+    World world;
+    world.add(shape, 0, {0, 0, 0});
+    btBoxShape box({0.1f, 0.1f, 0.1f});
+    // on all sides, in the middle and near the corners: some of these triangles are the last
+    for (int i = 0; i < 6 * 5; ++i) {
+        btVector3 side(0, 0, 0), across(0, 0, 0);
+        side[i / 10] = i / 5 % 2 ? 1 : -1;
+        if (i % 5)
+            across[(i / 10 + 1) % 3] = i % 2 ? 0.85f : -0.85f, across[(i / 10 + 2) % 3] = i % 5 > 2 ? 0.85f : -0.85f;
+        CAPTURE(i);
+        const btTransform from(btQuaternion::getIdentity(), 3 * side + across), to(btQuaternion::getIdentity(), across);
+        btCollisionWorld::ClosestConvexResultCallback sweep(from.getOrigin(), to.getOrigin());
+        world.dynamics.convexSweepTest(&box, from, to, sweep);
+        REQUIRE(sweep.hasHit());
+        CHECK(sweep.m_closestHitFraction == Approx(1.9 / 3).margin(2e-3));
+    }
+}
+
+TEST_CASE("A ghost that dispatches its own pairs is no step") {
+    Shape floor(exactBox({1, 1, 0.1f}, h)), ball(exactSphere(0.2f, h));
+    World world;
+    btGhostPairCallback ghosts;
+    world.broadphase.getOverlappingPairCache()->setInternalGhostPairCallback(&ghosts);
+    world.add(floor, 0, {0, 0, -0.1f});
+    for (int i = 0; i < 3; ++i) world.add(ball, 1, {-0.6f + 0.6f * i, 0.5f, 0.2f});
+    btCapsuleShape capsule(0.1f, 0.3f);
+    btPairCachingGhostObject ghost;
+    ghost.setCollisionShape(&capsule);
+    ghost.setWorldTransform(btTransform(btQuaternion::getIdentity(), {0, -0.5f, 0.09f}));
+    world.dynamics.addCollisionObject(&ghost, btBroadphaseProxy::CharacterFilter, btBroadphaseProxy::AllFilter);
+    world.run(0.1f);
+    const bullet::DispatchStatistics before = world.dispatcher.statistics();
+    CHECK(before.pairs >= 4);
+    REQUIRE(ghost.getNumOverlappingObjects() == 1);
+    btHashedOverlappingPairCache& own = *ghost.getOverlappingPairCache();
+    world.dispatcher.dispatchAllCollisionPairs(&own, world.dynamics.getDispatchInfo(), &world.dispatcher);
+    btManifoldArray manifolds;
+    own.getOverlappingPairArray()[0].m_algorithm->getAllContactManifolds(manifolds);
+    REQUIRE(manifolds.size() > 0);
+    CHECK(manifolds[0]->getNumContacts() > 0);
+    CHECK(world.dispatcher.statistics().pairs == before.pairs);
+    CHECK(world.dispatcher.statistics().contactsKept == before.contactsKept);
+    world.dynamics.removeCollisionObject(&ghost);
 }
 
 namespace {
