@@ -348,11 +348,12 @@ std::uint64_t nextId() {
     return ++made;
 }
 
-std::optional<MassProperties> massOf(const Mesh& mesh) {
+// Of the mesh, where that is closed; else of what the field has inside.
+std::optional<MassProperties> massOf(const Mesh& mesh, const LevelSet& levelSet) {
     try {
-        return massProperties(mesh);
+        return balanced(mesh) ? massProperties(mesh) : massProperties(levelSet);
     } catch (const std::invalid_argument&) {
-        return std::nullopt;  // an open sheet: it can only be static
+        return std::nullopt;  // a sheet: it can only be static
     }
 }
 
@@ -392,7 +393,7 @@ Collider::Collider(Mesh mesh, const LevelSet& levelSet, const ColliderOptions& o
     body_.points = SurfacePoints(this->mesh(), options.pointSpacing * field_.voxelSize());
     body_.bounds = bilayer::bounds(this->mesh());
     body_.margin = options.margin < 0 ? field_.voxelSize() : options.margin;
-    body_.mass = massOf(this->mesh());
+    body_.mass = massOf(this->mesh(), levelSet);
     edges_ = SharpEdges(body_.points, field_);
 }
 
@@ -412,7 +413,7 @@ bool Collider::hasMesh() const {
 }
 
 const MassProperties& Collider::mass() const {
-    if (!body_.mass) throw std::invalid_argument("collider: the mesh encloses no volume");
+    if (!body_.mass) throw std::invalid_argument("collider: the body encloses no volume");
     return *body_.mass;
 }
 

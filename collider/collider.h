@@ -55,7 +55,8 @@ class Collider {
     const SharpEdges& edges() const { return edges_; }
     const Bounds& bounds() const { return body_.bounds; }  ///< of the mesh [m]
     float margin() const { return body_.margin; }          ///< as in ColliderOptions, never negative [m]
-    /// Throws std::invalid_argument where the mesh encloses no volume.
+    /// Of the mesh; where that has holes, of what the field has inside, but for a body from elsewhere. Throws
+    /// std::invalid_argument where there is no volume.
     const MassProperties& mass() const;
     std::uint64_t id() const { return id_; }  ///< no other collider of this process has it
 

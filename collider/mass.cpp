@@ -109,7 +109,10 @@ MassProperties massProperties(const Mesh& mesh) {
         sum.first = -sum.first;
         sum.second = -sum.second;
     }
-    return massProperties(sum, origin);
+    const MassProperties result = massProperties(sum, origin);
+    if (!(result.principalInertia.x > 0))
+        throw std::invalid_argument("mass properties: the mesh does not bound a solid");
+    return result;
 }
 
 }  // namespace bilayer

@@ -20,7 +20,8 @@ struct MassProperties {
 
 /// Exact integrals over the tetrahedra that the triangles span with the centre of the bounds, in double precision
 /// (D. Eberly, "Polyhedral Mass Properties (Revisited)", 2002). The mesh should be closed; an inside-out one gives the
-/// same as its reverse. Throws std::invalid_argument if the volume is zero, as for an open sheet.
+/// same as its reverse. Throws std::invalid_argument if the volume is zero, as for an open sheet, or the inertia not
+/// positive.
 MassProperties massProperties(const Mesh& mesh);
 
 /// Of what is negative between the voxels. The error is of third order in the voxel size where the surface is smooth

@@ -27,7 +27,7 @@ constexpr float bodySize = 0.2f;                                          // lon
 // The bowl for thirty bodies; larger ones are scaled by the cube root of their number.
 constexpr float usualBodies = 30;
 constexpr float bowlRadius = 0.66f, bowlWall = 0.035f;  // of the sphere that the bowl is cut from [m]
-constexpr float bowlOpening = 1.05f;                    // from the bottom to the rim [rad]
+constexpr float bowlOpening = 1.25f;                    // from the bottom to the rim [rad]
 constexpr float bowlFoot = 0.2f;                        // radius of its foot [m]
 constexpr float bowlVoxels = 3;                         // edge of its voxels [voxels of the bodies]
 
@@ -172,10 +172,10 @@ Outcome bowl(const BowlOptions& options) {
         return !(std::hypot(at.x, at.y) < rim && at.z > -radius);
     });
 
-    Outcome outcome = stage.finish({.target = {0, 0, -0.44f * scale},
+    Outcome outcome = stage.finish({.target = {0, 0, -0.42f * scale},
                                     .distance = 2.75f * scale,
                                     .azimuth = -1.35f,
-                                    .elevation = 0.74f,
+                                    .elevation = 0.78f,
                                     .groundHeight = bounds(vessel->mesh).lower.z});
     for (std::size_t i = 0; i < things.size(); ++i) {
         outcome.facts.emplace_back(options.kinds[i].name, describe(*things[i]));

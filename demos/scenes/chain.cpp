@@ -101,9 +101,9 @@ Outcome chain(const ChainOptions& options) {
         most = std::max(most, parted(frames.front(), poses));
         longest = worse(longest, lengthOf(poses) / lengthOf(frames.front()) - 1);
     }
-    Outcome outcome = stage.finish({.target = {0, 0, height / 2},
-                                    .distance = -1.2f * height + 1,
-                                    .elevation = 0.1f,
+    Outcome outcome = stage.finish({.target = {0, 0, height + 3 * major},
+                                    .distance = 26 * major,
+                                    .elevation = -0.14f,
                                     .groundHeight = height - 0.5f});
     outcome.criteria = {{"links that parted", double(most), 0}, {"stretch", 100 * longest, mostStretch, "%"}};
     return outcome;

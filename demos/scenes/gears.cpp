@@ -207,7 +207,7 @@ Outcome gears(const GearsOptions& options) {
     const glm::vec3 end = stage.frames().front().back().position;
     const float left = -parts.front().pitchDiameter() / 2, right = end.x + parts.back().pitchDiameter() / 2;
     Outcome outcome = stage.finish({.target = {(left + right) / 2, end.y / 2, 0},
-                                    .distance = 1.4f * (right - left),
+                                    .distance = 1.55f * (right - left),
                                     .elevation = 1.1f,
                                     .groundHeight = -parts.front().faceWidth});
     outcome.facts = {

@@ -102,8 +102,8 @@ Outcome incline(const InclineOptions& options) {
     stage.run(options.seconds);
 
     const float middle = width * float(options.slopes.size()) / 2;
-    Outcome outcome = stage.finish({.target = {0, middle, 1},
-                                    .distance = 2.6f * middle,
+    Outcome outcome = stage.finish({.target = {0.6f, 1.05f * middle, 1.6f},
+                                    .distance = 3.3f * middle,
                                     .azimuth = -0.6f,
                                     .elevation = 0.5f,
                                     .groundHeight = -0.3f});

@@ -368,8 +368,8 @@ Outcome pairs(const PairsOptions& options) {
             missed.emplace_back(cell.name, fmt::format("{:+.3f} voxels high, {:.3f} degrees", height, tilt));
     }
     const float width = scale * lane * columns;
-    Outcome outcome = stage.finish({.target = {width / 2, width / 4, 0},
-                                    .distance = 1.4f * width,
+    Outcome outcome = stage.finish({.target = {0.46f * width, width / 4, 0},
+                                    .distance = 1.6f * width,
                                     .elevation = 0.7f,
                                     .groundHeight = -scale * halfThickness});
     outcome.facts = {{"pairs", std::to_string(board.cells().size())}};

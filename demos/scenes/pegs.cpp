@@ -132,7 +132,7 @@ Outcome pegs(const PegsOptions& options) {
         arrivals += fmt::format("{}{:.2f} at {}", i > 0 ? ", " : "", times[i], lanes[i].name);
     }
     Outcome outcome = stage.finish({.target = {0, 0, mouth},
-                                    .distance = lane * float(lanes.size() + 1),
+                                    .distance = lane * float(lanes.size() + 2),
                                     .elevation = 0.35f,
                                     .groundHeight = -mouth});
     outcome.facts = {{"down after [s]", arrivals}, {"deepest [half clearances]", depths}};

@@ -19,7 +19,7 @@ constexpr float lane = 0.8f;                       // between balls side by side
 constexpr float stepsBefore = 4, stepsAfter = 40;  // the impact
 constexpr double rounding = 1e-3;                  // that energy may grow by, in parts
 
-constexpr Look plateLook{.colour = 0x9db4d6, .roughness = 0.3f, .opacity = 0.6f};
+constexpr Look plateLook{.colour = 0x35506b, .roughness = 0.3f, .opacity = 0.8f};
 constexpr std::uint32_t colours[] = {0x81b29a, 0xf2cc8f, 0xe07a5f};  // from slow to fast
 
 struct Shot {
@@ -115,7 +115,11 @@ Outcome plates(const PlatesOptions& options) {
         return double(std::count_if(shots.begin(), shots.end(), [&](const Shot& shot) { return shot.*what; }));
     };
     const float middle = lane * row / 2;
-    Outcome outcome = stage.finish({.target = {middle, lane * 3, middle}, .distance = 3 * middle, .groundHeight = -1});
+    Outcome outcome = stage.finish({.target = {middle, lane * 3, 0.95f * middle},
+                                    .distance = 4.2f * middle,
+                                    .azimuth = -1.75f,
+                                    .elevation = 0.75f,
+                                    .groundHeight = -1});
     outcome.facts = {{"balls", std::to_string(shots.size())},
                      {"passed", tell(shots, &Shot::passed)},
                      {"faster than before", tell(shots, &Shot::gained)}};

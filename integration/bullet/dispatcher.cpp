@@ -83,10 +83,9 @@ Side sideOf(const btCollisionObjectWrapper& wrap, float seconds) {
     return {wrap.getCollisionShape(), wrap.getWorldTransform(), wrap.getCollisionObject(), seconds};
 }
 
-/// Up to where contacts are made, at least `margin`.
-float marginOf(const Side& a, const Side& b, float margin) {
-    margin = std::max(margin, b.shape->getMargin());
-    return isField(a.shape) ? std::max(margin, a.shape->getMargin()) : margin;
+/// Up to where contacts are made.
+float marginOf(const Side& a, const Side& b) {
+    return isField(a.shape) ? std::max(a.shape->getMargin(), b.shape->getMargin()) : b.shape->getMargin();
 }
 
 /// Of two bodies of which B is a field.
@@ -105,14 +104,13 @@ class Pair {
   public:
     Pair(btDispatcher& dispatcher, DispatchStatistics& statistics) : manifolds_(dispatcher), statistics_(statistics) {}
 
-    /// Finds and reduces contacts up to the shapes' margins, or as far as a contact test asks for.
+    /// Finds and reduces contacts up to the shapes' margins, or where a contact test asks for more and there are none,
+    /// up to a multiple of that: no farther than twice the distance of the nearest.
     /// @param asked  by a contact test [m]; 0 in a step
     void collide(const Side& a, const Side& b, float asked) {
-        contacts_.clear();
-        const float margin = marginOf(a, b, asked);
-        const bool follows = static_cast<const Shape&>(*b.shape).sweeps();
-        report_ = isField(a.shape) ? collideFields(a.placed(), b.placed(), margin, asked > 0, near_, contacts_)
-                                   : collideOther(a, b.placed(), margin, follows ? a.motion() : Motion{});
+        float margin = std::max(marginOf(a, b), std::min(asked, static_cast<const Shape&>(*b.shape).voxelSize()));
+        find(a, b, margin, asked > 0);
+        while (contacts_.empty() && margin < asked) find(a, b, margin = std::min(2 * margin, asked), true);
         finish(a, b);
     }
 
@@ -120,7 +118,7 @@ class Pair {
     void collide(const Side& a, const Side& b, const SampledPairs& sampled, std::size_t index) {
         contacts_.clear();
         report_ =
-            collideFields(a.placed(), b.placed(), marginOf(a, b, 0), sampled.ofA(index), sampled.ofB(index), contacts_);
+            collideFields(a.placed(), b.placed(), marginOf(a, b), sampled.ofA(index), sampled.ofB(index), contacts_);
         finish(a, b);
         ++sampled_;
     }
@@ -144,6 +142,13 @@ class Pair {
     const Manifolds& manifolds() const { return manifolds_; }
 
   private:
+    void find(const Side& a, const Side& b, float margin, bool farAway) {
+        contacts_.clear();
+        const bool follows = static_cast<const Shape&>(*b.shape).sweeps();
+        report_ = isField(a.shape) ? collideFields(a.placed(), b.placed(), margin, farAway, near_, contacts_)
+                                   : collideOther(a, b.placed(), margin, follows ? a.motion() : Motion{});
+    }
+
     void finish(const Side& a, const Side& b) {
         found_ = static_cast<int>(contacts_.size());
         choice_.update(contacts_, a.transform, b.transform);
@@ -353,7 +358,7 @@ void Dispatcher::dispatchAllCollisionPairs(btOverlappingPairCache* cache, const 
     if (sampled.works())
         for (Task& task : tasks)
             if (isField(task.a.shape))
-                task.sampled = sampled.add(task.a.placed(), task.b.placed(), marginOf(task.a, task.b, 0));
+                task.sampled = sampled.add(task.a.placed(), task.b.placed(), marginOf(task.a, task.b));
     const bool areSampled = sampled.sample();
     tbb::parallel_for_each(tasks, [&](Task& task) {
         if (areSampled && task.sampled)

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <catch2/catch.hpp>
+#include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/gtc/constants.hpp>
 #include <limits>
@@ -9,6 +10,7 @@
 #include <set>
 #include <stdexcept>
 
+#include "collider/mass.h"
 #include "collider/touch.h"
 #include "demos/shared/machines.h"
 #include "demos/shared/shapes.h"
@@ -531,6 +533,33 @@ TEST_CASE("what moves on from beyond the band is met, however wide the margin is
             CHECK(contact.approach == Approx(8 * h).margin(0.05 * h));
         }
     CHECK(corners >= 4);
+}
+
+TEST_CASE("a body whose mesh has holes, or one side only, has the mass of its field, and can be kept beside it") {
+    Mesh open = shapes::box({0.3f, 0.2f, 0.1f}, 8);
+    open.triangles.resize(open.triangles.size() - 40);
+    Mesh strip;  // Moebius'
+    constexpr unsigned around = 96;
+    for (unsigned i = 0; i < around; ++i) {
+        const float angle = 2 * glm::pi<float>() * float(i) / around;
+        const glm::vec3 out(std::cos(angle), std::sin(angle), 0);
+        const glm::vec3 across = std::cos(angle / 2) * out + std::sin(angle / 2) * glm::vec3(0, 0, 1);
+        for (const float side : {-0.1f, 0.1f}) strip.points.push_back(0.4f * out + side * across);
+        const unsigned a = 2 * i, b = a + 1, c = (a + 2) % (2 * around), d = (a + 3) % (2 * around);
+        const bool isLast = i + 1 == around;
+        strip.triangles.emplace_back(a, isLast ? d : c, b);
+        strip.triangles.emplace_back(b, isLast ? d : c, isLast ? c : d);
+    }
+    for (const Mesh& mesh : {open, strip}) {
+        const LevelSet field = build(mesh, {.voxelSize = h});
+        const Collider body(mesh, field);
+        CAPTURE(mesh.triangles.size(), field.sign());
+        if (body.body().mass) CHECK(body.mass().volume == massProperties(field).volume);
+        const Collider kept(withBody(field, body.body()));
+        CHECK(kept.points().points().size() == body.points().points().size());
+    }
+    const Collider box(open, build(open, {.voxelSize = h}));
+    CHECK(box.mass().volume == Approx(0.6 * 0.4 * 0.2).epsilon(0.05));
 }
 
 TEST_CASE("a collider refuses the level set of another mesh") {
