@@ -662,11 +662,10 @@ class TriangleProbes : public btTriangleCallback {
             const float height = glm::dot(below - place, normal);
             const Local::Answer answer = local_.at(below);
             if (std::abs(height) > std::abs(answer.distance) + spacing_ + local_.longestWay()) return;
-            // A point whose surface lies on the face is exact, and so is a corner or an edge; a face aslant may have
-            // passed an edge of what the sheet belongs to, and a point that looks away from a sheet that has not
-            // reached it is on the other side of its body.
-            const float least = point.isSharp ? opposition.leastOpposition : opposition.leastOppositionApart;
-            const bool lies = glm::dot(normal, point.normal) >= least;
+            // A point whose surface lies on the face is exact; one aslant may have passed an edge of what the sheet
+            // belongs to, and one that looks away from a sheet that has not reached it is on the other side of its
+            // body.
+            const bool lies = glm::dot(normal, point.normal) >= opposition.leastOppositionApart;
             const bool isNearest =
                 std::abs(answer.distance - height) <= mostInterpolationError * spacing_ / probeSpacing;
             std::optional<Contact> found;
