@@ -57,11 +57,6 @@ struct Map {
     }
 };
 
-// What is no farther from the surface than this is in the band [m].
-float surelyInBand(const Field& field) {
-    return field.exteriorWidth() - steepestInterpolant * field.voxelSize();
-}
-
 // The touch of a point that comes from outside of the field and goes some way.
 std::optional<Touch> touchOnWay(const Field& field, const glm::vec3& point, const glm::vec3& way) {
     const auto hit = field.segment(point, point + way);
@@ -86,7 +81,7 @@ class PointsInField {
         centre_ = bounds.centre();
         radius_ = 0.5f * glm::length(bounds.size());
         const float longest = ways_.longest(other.scale * map_(centre_), body.scale * radius_) / other.scale;
-        sweeps_ = longest > std::min(reach_, surelyInBand(field_));
+        sweeps_ = longest > std::min(reach_, surelyInBand(field_.exteriorWidth(), field_.voxelSize()));
         seen_ = sweeps_ ? reach_ + longest : reach_;
     }
 
@@ -386,8 +381,8 @@ class Collider::Triangles {
 };
 
 Collider::Collider(Mesh mesh, const LevelSet& levelSet, const ColliderOptions& options)
-    : field_(options.exact ? Field(levelSet, mesh) : Field(levelSet)),
-      triangles_(std::make_shared<Triangles>(outwardMesh(levelSet, std::move(mesh)))),
+    : field_(options.exact ? Field(levelSet, std::move(mesh)) : Field(levelSet)),
+      triangles_(options.exact ? nullptr : std::make_shared<Triangles>(outwardMesh(levelSet, std::move(mesh)))),
       id_(nextId()) {
     if (!std::isfinite(options.margin)) throw std::invalid_argument("collider: the margin is not finite");
     body_.points = SurfacePoints(this->mesh(), options.pointSpacing * field_.voxelSize());
@@ -405,11 +400,11 @@ Collider::Collider(const LevelSet& levelSet)
       id_(nextId()) {}
 
 const Mesh& Collider::mesh() const {
-    return triangles_->mesh();
+    return field_.mesh() ? *field_.mesh() : triangles_->mesh();
 }
 
 bool Collider::hasMesh() const {
-    return triangles_->areGiven();
+    return field_.mesh() || triangles_->areGiven();
 }
 
 const MassProperties& Collider::mass() const {

@@ -63,7 +63,7 @@ class Collider {
   private:
     class Triangles;
     Field field_;
-    std::shared_ptr<Triangles> triangles_;
+    std::shared_ptr<Triangles> triangles_;  ///< unless the field has them
     Body body_;
     SharpEdges edges_;
     std::uint64_t id_;

@@ -32,6 +32,8 @@ constexpr float deepestAcross = 1.5f, deepestUnseen = 1, deepestAcrossExact = 2,
 // Faces leave the plane between two edges at this angle (sine) at least: faces that lie on each other touch by their
 // points.
 constexpr float leastLeaving = 0.09f;
+// What is seen at a smaller angle (sine) than this lies level.
+constexpr float level = 0.09f;
 // Faces are looked for so far beside their edge [voxels].
 constexpr float wingSpan = 1.5f;
 // Pieces of an edge end within this of each other, as parts of their length.
@@ -117,6 +119,18 @@ SharpEdges::SharpEdges(const SurfacePoints& points, const Field& field)
     std::vector<std::uint32_t> next(first_.begin(), first_.end() - 1);
     for (std::uint32_t e = 0; e < edges_.size(); ++e)
         ofPoints_[next[edges_[e].from]++] = e, ofPoints_[next[edges_[e].to]++] = e;
+}
+
+bool SharpEdges::isTip(const SurfacePoints& points, std::uint32_t point, const glm::vec3& direction) const {
+    const auto fallsBack = [&](std::uint32_t e) {
+        const SharpEdge& edge = edges_[e];
+        const std::uint32_t next = edge.from == point ? edge.to : edge.from;
+        const glm::vec3 way = points.points()[next].position - points.points()[point].position;
+        return glm::dot(way, direction) <= level * glm::length(way) && glm::dot(edge.wings[0], direction) <= level &&
+               glm::dot(edge.wings[1], direction) <= level;
+    };
+    const auto its = around(point);
+    return !its.empty() && std::all_of(its.begin(), its.end(), fallsBack);
 }
 
 std::optional<SharpEdges::Crossing> SharpEdges::crossing(const SurfacePoints& points, const glm::vec3& from,

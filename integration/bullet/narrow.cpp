@@ -28,8 +28,6 @@ namespace {
 constexpr int partBits = 15;
 // Of what is found of a triangle: three edges, three corners, and from here on what lies over it.
 constexpr std::uint32_t overPoints = 6;
-// Points farther than this inside the band's border are in it for certain [voxels].
-constexpr float bandBorder = 1.7321f;
 constexpr float searchTolerance = 2e-3f;  // of the deepest place between two probes [voxels]
 // Where two edges cross, the normal across both is taken if it looks no farther aside from the field's (cosine).
 constexpr float leastAcross = 0.3f;
@@ -64,7 +62,7 @@ class Local {
           pose_(field.pose),
           ways_(other, motion, field.pose, field.motion) {
         const Bounds& bounds = field.collider.bounds();
-        if (reach > scale_ * field_.exteriorWidth() - bandBorder * voxel_) farReach_ = reach / scale_;
+        if (reach > surelyInBand(scale_ * field_.exteriorWidth(), voxel_)) farReach_ = reach / scale_;
         exactReach_ = reach + mostInterpolationError * voxel_;
         longestWay_ = ways_.longest(scale_ * bounds.centre(), 0.5f * scale_ * glm::length(bounds.size()));
     }
@@ -654,7 +652,8 @@ class TriangleProbes : public btTriangleCallback {
         const auto reject = [&](const glm::vec3& centre, float radius) {
             return isBeside(scale * centre, scale * radius + rounding);
         };
-        field_.collider.points().visit(reject, [&](std::uint32_t index, const SurfacePoint& point) {
+        const Collider& collider = field_.collider;
+        collider.points().visit(reject, [&](std::uint32_t index, const SurfacePoint& point) {
             const glm::vec3 place = scale * point.position;
             if (isBeside(place, rounding)) return;
             const glm::vec3 below = nearestOnTriangle(place, corners[0], corners[1], corners[2]);
@@ -662,10 +661,11 @@ class TriangleProbes : public btTriangleCallback {
             const float height = glm::dot(below - place, normal);
             const Local::Answer answer = local_.at(below);
             if (std::abs(height) > std::abs(answer.distance) + spacing_ + local_.longestWay()) return;
-            // A point whose surface lies on the face is exact; one aslant may have passed an edge of what the sheet
-            // belongs to, and one that looks away from a sheet that has not reached it is on the other side of its
-            // body.
-            const bool lies = glm::dot(normal, point.normal) >= opposition.leastOppositionApart;
+            // A point whose surface lies on the face is exact, and so is a corner that points to it, or an edge along
+            // it. One aslant may have passed an edge of what the sheet belongs to, and one that looks away from a sheet
+            // that has not reached it is on the other side of its body.
+            const bool lies = opposition.keeps(glm::dot(normal, point.normal), true) ||
+                              (point.isSharp && collider.edges().isTip(collider.points(), index, normal));
             const bool isNearest =
                 std::abs(answer.distance - height) <= mostInterpolationError * spacing_ / probeSpacing;
             std::optional<Contact> found;

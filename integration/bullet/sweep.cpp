@@ -35,7 +35,8 @@ bool sweepable(const Placed& body, float radius) {
     const Field& field = body.collider.field();
     // Beyond the band a bound is told, which falls to this near it: a sphere that it reaches could touch anywhere
     // there.
-    const float leastBound = field.exteriorWidth() - (steepestInterpolant + touchVoxels) * field.voxelSize();
+    const float voxel = field.voxelSize(),
+                leastBound = surelyInBand(field.exteriorWidth(), voxel) - touchVoxels * voxel;
     return radius < body.scale * leastBound;
 }
 

@@ -1,4 +1,5 @@
 // Edges that meet between their corners and between the points of a field; the hull of balls; sharp edges of bodies.
+#include <BulletCollision/CollisionShapes/btHeightfieldTerrainShape.h>
 #include <BulletCollision/CollisionShapes/btMultiSphereShape.h>
 
 #include <algorithm>
@@ -337,6 +338,7 @@ TEST_CASE("No contact is much deeper than the bodies overlap, whichever edges cr
         colliders.push_back(colliderOf(mesh, exact));
         specimens.emplace_back(mesh, 0.5 * double(h));
     }
+    const TriangleShape triangles[] = {TriangleShape(meshes[0]), TriangleShape(meshes[1]), TriangleShape(meshes[2])};
     // the plank as Bullet's box, too
     const btBoxShape plank({0.9f, 0.1f, 0.1f});
     const Convex convex(plank);
@@ -367,12 +369,55 @@ TEST_CASE("No contact is much deeper than the bodies overlap, whichever edges cr
         NearPoints points;
         bullet::collideFields({*colliders[a], pose}, {*colliders[b], {}}, h, false, points, contacts);
         check(contacts);
+        // as triangles: B collides with A
+        contacts.clear();
+        bullet::collideTriangles(*triangles[a].shape,
+                                 btTransform(bullet::toBullet(pose.rotation), bullet::toBullet(pose.position)), {},
+                                 {*colliders[b], {}}, h, contacts);
+        check(contacts);
         if (a != 2) continue;
         contacts.clear();
         bullet::collideConvex(convex, pose, {}, {*colliders[b], {}}, h, contacts);
         check(contacts);
     }
     CHECK(overlapping > 150);
+}
+
+TEST_CASE("A corner is as deep in triangles as below their plane, however the body stands") {
+    const unsigned start = seed();
+    const bool exact = GENERATE(false, true), asTerrain = GENERATE(false, true);
+    const float depth = h * GENERATE(-0.5f, 0.05f, 0.2f, 0.5f);
+    CAPTURE(start, exact, asTerrain, depth / h);
+    std::mt19937 random(start);
+    std::normal_distribution<float> normal;
+    const glm::vec3 half(0.5f, 0.4f, 0.3f);
+    const auto box = colliderOf(shapes::box(half, 3), exact);
+    const float heights[4] = {};
+    btHeightfieldTerrainShape terrain(2, 2, heights, 1, -1, 1, 2, PHY_FLOAT, false);
+    terrain.setLocalScaling({6, 6, 1});
+    btTriangleMesh triangles;
+    triangles.addTriangle({-3, -3, 0}, {3, -3, 0}, {3, 3, 0});
+    triangles.addTriangle({-3, -3, 0}, {3, 3, 0}, {-3, 3, 0});
+    const btBvhTriangleMeshShape mesh(&triangles, true);
+    const btConcaveShape& ground = asTerrain ? static_cast<const btConcaveShape&>(terrain) : mesh;
+    for (int run = 0; run < 50; ++run) {
+        Pose pose{{0.1f, 0.2f, 0},
+                  glm::normalize(glm::quat(normal(random), normal(random), normal(random), normal(random)))};
+        float lowest = 0;
+        for (int i = 0; i < 8; ++i)
+            lowest = std::min(lowest,
+                              (pose.rotation * (half * glm::vec3(i & 1 ? 1 : -1, i & 2 ? 1 : -1, i & 4 ? 1 : -1))).z);
+        pose.position.z = -lowest - depth;
+        std::vector<Contact> contacts;
+        bullet::collideTriangles(ground, btTransform::getIdentity(), {}, {*box, pose}, h, contacts);
+        float deepest = h;
+        glm::vec3 direction(0);
+        for (const Contact& contact : contacts)
+            if (contact.distance < deepest) deepest = contact.distance, direction = contact.normal;
+        CAPTURE(run, deepest / h, direction.z);
+        CHECK(deepest == Approx(-depth).margin(0.02 * h));
+        CHECK(direction.z < -0.99f);
+    }
 }
 
 TEST_CASE("What is exact is so against Bullet's shapes too") {

@@ -9,8 +9,6 @@
 
 using namespace bilayer;
 
-namespace {}  // namespace
-
 TEST_CASE("shapes by formula are closed and oriented, and have the volume of the formula") {
     const double pi = glm::pi<double>();
     const std::vector<std::pair<Mesh, double>> all = {
