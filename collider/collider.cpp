@@ -24,8 +24,6 @@ namespace bilayer {
 namespace {
 
 constexpr float searchTolerance = 2e-3f;  // of the deepest place on an edge [voxels]
-// Where two edges cross, the normal across both is taken if it looks no farther aside from the other body's (cosine).
-constexpr float leastAcross = 0.3f;
 // A point that slides along a face ends in the edges beyond it by rounding: what only grazes, by less than this, goes
 // past [voxels].
 constexpr float grazing = 0.25f;
@@ -293,27 +291,11 @@ class PointsInField {
             const glm::vec3 onEdge = crossing->position + crossing->distance * crossing->normal;
             return std::pair(glm::dot(onEdge - at, along), Touch{crossing->distance, crossing->normal});
         }
-        return falls ? acrossEdge(lowest->place, along, touchOn) : std::nullopt;
-    }
-
-    // How an edge touches at its deepest place, square to itself: faces of the other body may meet there, of which the
-    // one that looks least along the edge holds it.
-    template <class TouchOn>
-    std::optional<std::pair<float, Touch>> acrossEdge(float place, const glm::vec3& along, TouchOn&& touchOn) const {
+        if (!falls) return std::nullopt;
         const float aside = 2 * searchTolerance * field_.voxelSize();
-        std::optional<Touch> held;
-        float most = leastAcross;
-        for (const float way : {place, place - aside, place + aside}) {
-            const auto touched = touchOn(way);
-            if (!touched) continue;
-            const glm::vec3 across = touched->normal - glm::dot(touched->normal, along) * along;
-            const float length = glm::length(across);
-            if (length <= most) continue;
-            most = length;
-            held = Touch{touched->distance < 0 ? touched->distance / length : touched->distance, across / length};
-        }
+        const auto held = acrossEdge(along, *touched, touchOn(lowest->place - aside), touchOn(lowest->place + aside));
         if (!held || held->distance > reach_) return std::nullopt;
-        return std::pair(place, *held);
+        return std::pair(lowest->place, *held);
     }
 
     const SurfacePoint& pointOf(std::uint32_t index) const { return body_.collider.points().points()[index]; }

@@ -1,8 +1,11 @@
-// The lowest place between two, of a function whose slopes are known; internal.
+// Where an edge is deepest in another body between two places, and how it touches there; internal.
 #pragma once
 
 #include <cmath>
+#include <glm/geometric.hpp>
 #include <optional>
+
+#include "collider/touch.h"
 
 namespace bilayer {
 
@@ -52,6 +55,41 @@ std::optional<Slope> lowestBetween(Slope from, Slope to, float tolerance, Functi
         (next->slope < 0 ? from : to) = *next;
     }
     return best;
+}
+
+/// How an edge touches at its deepest place, square to itself. Where two faces meet below it, which it has sunk into
+/// both, by the way out over the ridge between them, but no deeper than by half as much again as it lies there: through
+/// a thin blade there is a shorter way. Else across the face that looks least along the edge. Nothing where all look
+/// along it.
+/// @param along  the edge's direction, of unit length
+/// @param before, after  touches very close to the place on either side, where they are known
+inline std::optional<Touch> acrossEdge(const glm::vec3& along, const Touch& here, const std::optional<Touch>& before,
+                                       const std::optional<Touch>& after) {
+    constexpr float leastAcross = 0.3f;  // cosine between the normal and its part across
+    constexpr float leastRidge = 0.05f;  // sine between two faces that are not one
+    constexpr float mostDeeper = 1.5f;
+    std::optional<Touch> held;
+    float most = leastAcross;
+    for (const auto& touch : {std::optional(here), before, after}) {
+        if (!touch) continue;
+        const glm::vec3 across = touch->normal - glm::dot(touch->normal, along) * along;
+        const float length = glm::length(across);
+        if (length <= most) continue;
+        most = length;
+        held = Touch{touch->distance, across / length};
+    }
+    if (!held || held->distance >= 0 || !before || !after) return held;
+    const glm::vec3 &a = before->normal, &b = after->normal;
+    const float fall = -glm::dot(a, along), rise = glm::dot(b, along);
+    const glm::vec3 ridge = glm::cross(a, b), across = glm::cross(along, ridge);
+    const float length = glm::length(across);
+    if (!(fall > 0 && rise > 0 && glm::length(ridge) > leastRidge && length > 0)) return held;
+    const glm::vec3 normal = (glm::dot(across, a + b) < 0 ? -1.f : 1.f) / length * across;
+    // from where the edge leaves either face, as it moves out along the normal
+    const float gain = glm::dot(a, normal) * rise + glm::dot(b, normal) * fall;
+    if (!(gain > 0)) return held;
+    const float distance = here.distance * (fall + rise) / gain;
+    return Touch{std::fmax(distance, mostDeeper * here.distance), normal};
 }
 
 }  // namespace bilayer

@@ -257,14 +257,17 @@ std::optional<Contact> Local::deepestBetween(const Edge& edge, float from, const
                            approach(point, crossing->normal, margin));
         }
     if (!falls || here.where != Answer::near) return std::nullopt;
-    const glm::vec3 along = edge.directionAt(part);
-    const glm::vec3 across = here.normal - glm::dot(here.normal, along) * along;
-    const float steepness = glm::length(across);
-    if (!(steepness > leastAcross)) return std::nullopt;
-    const float depth = here.distance < 0 ? here.distance / steepness : here.distance;
-    if (depth - radius > margin) return std::nullopt;
-    const glm::vec3 normal = across / steepness;
-    return contact(point - depth * normal, normal, depth - radius, 0, approach(point, normal, margin));
+    const auto touchAt = [&](float way) -> std::optional<Touch> {
+        const Answer answer = at(edge.place(partAt(way)), radius);
+        if (answer.where != Answer::near) return std::nullopt;
+        return Touch{answer.distance, answer.normal};
+    };
+    const float aside = 2 * searchTolerance * voxel_;
+    const auto held = acrossEdge(edge.directionAt(part), Touch{here.distance, here.normal},
+                                 touchAt(lowest->place - aside), touchAt(lowest->place + aside));
+    if (!held || held->distance - radius > margin) return std::nullopt;
+    return contact(point - held->distance * held->normal, held->normal, held->distance - radius, 0,
+                   approach(point, held->normal, margin));
 }
 
 /// A convex body in the coordinates of a Local field.

@@ -324,6 +324,36 @@ TEST_CASE("A multisphere is that of its balls, whatever its margin and scale") {
     CHECK(convex.nearest(beside, scale).normal.x == Approx(-1));
 }
 
+TEST_CASE("An edge that has sunk into two faces is as deep as the least way out over the ridge between them") {
+    const unsigned start = seed();
+    CAPTURE(start);
+    std::mt19937 random(start);
+    std::normal_distribution<float> normal;
+    const auto direction = [&] { return glm::normalize(glm::vec3(normal(random), normal(random), normal(random))); };
+    int tried = 0;
+    while (tried < 1000) {
+        const glm::vec3 along = direction(), before = direction(), after = direction();
+        const float fall = -glm::dot(before, along), rise = glm::dot(after, along);
+        if (fall < 0.1f || rise < 0.1f || fall > 0.9f || rise > 0.9f || glm::dot(before, after) < -0.9f) continue;
+        ++tried;
+        const auto found = acrossEdge(along, {-1, before}, Touch{-1, before}, Touch{-1, after});
+        REQUIRE(found);
+        // ways out are looked for all around the edge: moved so far, its line leaves either face where it meets the
+        // other
+        const glm::vec3 aside = glm::normalize(glm::cross(along, before)), up = glm::cross(aside, along);
+        float least = 100;
+        for (int k = 0; k < 3600; ++k) {
+            const float angle = glm::two_pi<float>() * float(k) / 3600;
+            const glm::vec3 way = std::cos(angle) * up + std::sin(angle) * aside;
+            // before * (s way + t along) = after * (s way + t along) = 1
+            const float s = (fall + rise) / (glm::dot(before, way) * rise + glm::dot(after, way) * fall);
+            if (s > 0) least = std::min(least, s);
+        }
+        CHECK(-found->distance == Approx(std::min(least, 1.5f)).epsilon(1e-4));
+        CHECK(glm::dot(found->normal, along) == Approx(0).margin(1e-5));
+    }
+}
+
 TEST_CASE("No contact is much deeper than the bodies overlap, whichever edges cross") {
     const unsigned start = seed();
     const bool exact = GENERATE(false, true);
@@ -359,26 +389,26 @@ TEST_CASE("No contact is much deeper than the bodies overlap, whichever edges cr
         if (depth > h) continue;
         ++overlapping;
         const Pose pose{near * way, turn};
-        const auto check = [&](const std::vector<Contact>& contacts) {
+        const auto check = [&](const char* as, const std::vector<Contact>& contacts) {
             float deepest = 0;
             for (const Contact& contact : contacts) deepest = std::min(deepest, contact.distance);
-            CAPTURE(run, a, b, depth / h, deepest / h);
+            CAPTURE(run, as, a, b, depth / h, deepest / h);
             CHECK(-deepest < depth + h);
         };
         std::vector<Contact> contacts;
         NearPoints points;
         bullet::collideFields({*colliders[a], pose}, {*colliders[b], {}}, h, false, points, contacts);
-        check(contacts);
+        check("fields", contacts);
         // as triangles: B collides with A
         contacts.clear();
         bullet::collideTriangles(*triangles[a].shape,
                                  btTransform(bullet::toBullet(pose.rotation), bullet::toBullet(pose.position)), {},
                                  {*colliders[b], {}}, h, contacts);
-        check(contacts);
+        check("triangles", contacts);
         if (a != 2) continue;
         contacts.clear();
         bullet::collideConvex(convex, pose, {}, {*colliders[b], {}}, h, contacts);
-        check(contacts);
+        check("convex", contacts);
     }
     CHECK(overlapping > 150);
 }

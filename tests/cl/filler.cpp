@@ -226,8 +226,7 @@ TEST_CASE("OpenCL and TBB agree far from the origin") {
 TEST_CASE("OpenCL and TBB agree on triangles of very different size, however wide the band") {
     // long needles, a fine ball, and a box whose sides are far larger than a brick
     const Mesh mesh = shapes::join(
-        {shapes::cone(0.01f, 2, 24),
-         transformed(shapes::sphere(0.1f, 4), glm::translate(glm::mat4(1), glm::vec3(0.5f, 0, 0))),
+        {shapes::cone(0.01f, 2, 24), shapes::moved(shapes::sphere(0.1f, 4), glm::vec3(0.5f, 0, 0)),
          transformed(shapes::box({0.4f, 0.9f, 0.8f}),
                      glm::rotate(glm::translate(glm::mat4(1), glm::vec3(-1, 0, 0)), 0.3f, glm::vec3(1, 2, 3)))});
     const Way way = GENERATE(blockPerItem, groupPerBlock);
@@ -243,8 +242,7 @@ TEST_CASE("OpenCL and TBB agree on triangles of very different size, however wid
 TEST_CASE("OpenCL and TBB agree on signs that are asked for, and on meshes that are no solids") {
     const Sign sign = GENERATE(Sign::automatic, Sign::normals, Sign::winding, Sign::flood);
     const bool open = GENERATE(false, true);
-    Mesh mesh = shapes::join({shapes::sphere(1.f, 3),
-                              transformed(shapes::sphere(0.5f, 2), glm::translate(glm::mat4(1), glm::vec3(1, 0, 0)))});
+    Mesh mesh = shapes::join({shapes::sphere(1.f, 3), shapes::moved(shapes::sphere(0.5f, 2), glm::vec3(1, 0, 0))});
     if (open) mesh.triangles.resize(mesh.triangles.size() - 40);
     BuildOptions options = optionsFor(mesh, 40, Method::exact);
     options.sign = sign;
@@ -254,9 +252,8 @@ TEST_CASE("OpenCL and TBB agree on signs that are asked for, and on meshes that 
 
 TEST_CASE("blocks whose sides the nearest normals leave open come from the processor") {
     // Two boxes that touch in a corner: at the voxel in that corner's far shadow their normals cancel out.
-    const Mesh mesh =
-        shapes::join({transformed(shapes::box(glm::vec3(0.5f)), glm::translate(glm::mat4(1), glm::vec3(0.5f))),
-                      transformed(shapes::box(glm::vec3(0.5f)), glm::translate(glm::mat4(1), glm::vec3(-0.5f)))});
+    const Mesh mesh = shapes::join({shapes::moved(shapes::box(glm::vec3(0.5f)), glm::vec3(0.5f)),
+                                    shapes::moved(shapes::box(glm::vec3(0.5f)), glm::vec3(-0.5f))});
     BuildOptions options = optionsFor(mesh, 40, Method::exact);
     const Way way = GENERATE(blockPerItem, groupPerBlock);
     checkFillers(mesh, options, {.mapping = way.mapping});

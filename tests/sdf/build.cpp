@@ -8,7 +8,6 @@
 #include <cmath>
 #include <cstring>
 #include <glm/geometric.hpp>
-#include <glm/gtc/matrix_transform.hpp>
 #include <random>
 
 #include "demos/shared/shapes.h"
@@ -116,7 +115,7 @@ TEST_CASE("public meshes get the distances that brute force finds") {
 TEST_CASE("far voxels have the right sign, in cavities too") {
     const Mesh mesh =
         shapes::join({shapes::sphere(1, 4), shapes::flipped(shapes::sphere(0.6f, 4)), shapes::sphere(0.25f, 4),
-                      transformed(shapes::box({0.5f, 0.5f, 0.5f}), glm::translate(glm::mat4(1), {3, 0, 0}))});
+                      shapes::moved(shapes::box({0.5f, 0.5f, 0.5f}), {3, 0, 0})});
     const auto truth = [](const glm::dvec3& p) {
         const double r = glm::length(p);
         const glm::dvec3 q = glm::abs(p - glm::dvec3(3, 0, 0)) - 0.5;
@@ -203,8 +202,7 @@ TEST_CASE("a shift by whole blocks keeps the bytes") {
     for (auto& p : mesh.points) p = glm::round(p * 1024.f) / 1024.f;
     const LevelSet here = build(mesh, {.voxelSize = 1.f / 64});
     const glm::ivec3 shift(64 * 7, -64 * 5, 8 * 3);
-    const LevelSet there =
-        build(transformed(mesh, glm::translate(glm::mat4(1), glm::vec3(shift) / 64.f)), {.voxelSize = 1.f / 64});
+    const LevelSet there = build(shapes::moved(mesh, glm::vec3(shift) / 64.f), {.voxelSize = 1.f / 64});
     CHECK(here.activeVoxels() == there.activeVoxels());
     const auto values = there.grids().distance->getConstAccessor();
     std::size_t differ = 0;
@@ -236,7 +234,7 @@ TEST_CASE("nothing shows where blocks and bricks meet") {
 TEST_CASE("a mesh smaller than a voxel, and one far from the origin, still have a band") {
     const LevelSet tiny = build(shapes::sphere(0.01f, 2), {.voxelSize = 1.f});
     CHECK(tiny.activeVoxels() > 27);
-    const Mesh far = transformed(shapes::sphere(0.5f, 4), glm::translate(glm::mat4(1), {1e4f, -1e4f, 1e4f}));
+    const Mesh far = shapes::moved(shapes::sphere(0.5f, 4), {1e4f, -1e4f, 1e4f});
     const LevelSet field = build(far, {.voxelSize = 0.01f});
     const Errors e =
         errors(field, [](const glm::dvec3& p) { return glm::distance(p, glm::dvec3(1e4, -1e4, 1e4)) - 0.5; });

@@ -244,13 +244,13 @@ TEST_CASE("pseudonormal: small parts far apart keep their precision") {
 TEST_CASE("pseudonormal: far from the origin nothing is lost") {
     // the vertices are rounded there, but what is left is taken as it is
     const glm::vec3 far(1e4f, -1e4f, 5e3f);
-    check(transformed(shapes::sphere(0.08f, 2), glm::translate(glm::mat4(1), far)), 0.01f);
-    check(transformed(shapes::box({0.06f, 0.05f, 0.04f}), glm::translate(glm::mat4(1), far)), 0.01f);
+    check(shapes::moved(shapes::sphere(0.08f, 2), far), 0.01f);
+    check(shapes::moved(shapes::box({0.06f, 0.05f, 0.04f}), far), 0.01f);
 }
 
 TEST_CASE("pseudonormal: a mesh smaller than a voxel") {
-    check(transformed(shapes::sphere(0.2f, 1), glm::translate(glm::mat4(1), glm::vec3(0.4f, 0.3f, 0.2f))), 1.f);
-    check(transformed(shapes::box({1e-3f, 1e-3f, 1e-3f}), glm::translate(glm::mat4(1), glm::vec3(0.01f, 0, 0))), 1.f);
+    check(shapes::moved(shapes::sphere(0.2f, 1), glm::vec3(0.4f, 0.3f, 0.2f)), 1.f);
+    check(shapes::moved(shapes::box({1e-3f, 1e-3f, 1e-3f}), glm::vec3(0.01f, 0, 0)), 1.f);
 }
 
 TEST_CASE("pseudonormal: vertices of their own, duplicate and zero-area faces change nothing") {

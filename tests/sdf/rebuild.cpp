@@ -136,14 +136,12 @@ TEST_CASE("nothing may move, or all, or far away and back") {
     const Mesh still = knot();
     const BuildOptions options{.voxelSize = voxelSizeFor(still, 60), .triangles = true};
     checkFrame(still, still, options);
-    checkFrame(still, transformed(still, glm::translate(glm::mat4(1), {0.3f, 5, -0.1f})), options);
+    checkFrame(still, shapes::moved(still, {0.3f, 5, -0.1f}), options);
 
     // a ball leaves the band, whose voxels are to vanish, and comes back; another one inside a hollow one turns its
     // tiles
     const Mesh ball = shapes::sphere(0.3f, 3);
-    const auto scene = [&](const glm::vec3& at) {
-        return shapes::join({still, transformed(ball, glm::translate(glm::mat4(1), at))});
-    };
+    const auto scene = [&](const glm::vec3& at) { return shapes::join({still, shapes::moved(ball, at)}); };
     checkFrame(scene({3, 0, 0}), scene({12, 7, -40}), options);
     checkFrame(scene({12, 7, -40}), scene({3, 0, 0}), options);
     const auto grown = [&](float radius) {
@@ -155,9 +153,7 @@ TEST_CASE("nothing may move, or all, or far away and back") {
 
 TEST_CASE("a mesh that turns inside out or into itself is built as in full") {
     const Mesh ball = shapes::sphere(1, 4);
-    const auto pair = [&](float apart) {
-        return shapes::join({ball, transformed(ball, glm::translate(glm::mat4(1), {apart, 0, 0}))});
-    };
+    const auto pair = [&](float apart) { return shapes::join({ball, shapes::moved(ball, {apart, 0, 0})}); };
     checkFrame(pair(3), pair(1.5f), {.voxelSize = 0.05f});
     checkFrame(pair(1.5f), pair(3), {.voxelSize = 0.05f});
     Mesh torn = pair(3);
