@@ -24,7 +24,7 @@ struct BowlOptions {
     /// Of Bullet's solver, whose friction starts from nothing in each step: with 10, here and there a body of a heap
     /// that is kept awake slides on by a few voxels.
     int iterations = 40;
-    float seconds = 15;      ///< at most, until all sleep
+    float seconds = 30;      ///< at most, until all sleep
     float hold = 0;          ///< how long they are then kept awake, to see whether the heap creeps [s]
     std::uint32_t seed = 7;  ///< of the first poses
 };

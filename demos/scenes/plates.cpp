@@ -115,8 +115,8 @@ Outcome plates(const PlatesOptions& options) {
         return double(std::count_if(shots.begin(), shots.end(), [&](const Shot& shot) { return shot.*what; }));
     };
     const float middle = lane * row / 2;
-    Outcome outcome = stage.finish({.target = {middle, lane * 3, 0.95f * middle},
-                                    .distance = 4.2f * middle,
+    Outcome outcome = stage.finish({.target = {1.2f * middle, lane * 3, middle},
+                                    .distance = 5.2f * middle,
                                     .azimuth = -1.75f,
                                     .elevation = 0.75f,
                                     .groundHeight = -1});
