@@ -57,10 +57,9 @@ std::optional<Slope> lowestBetween(Slope from, Slope to, float tolerance, Functi
     return best;
 }
 
-/// How an edge touches at its deepest place, square to itself. Where two faces meet below it, which it has sunk into
-/// both, by the way out over the ridge between them, but no deeper than by half as much again as it lies there: through
-/// a thin blade there is a shorter way. Else across the face that looks least along the edge. Nothing where all look
-/// along it.
+/// How an edge touches at its deepest place, square to itself. Where it has sunk into two faces that meet: the way out
+/// over the ridge between them, but no deeper than half as much again as it lies, since through a thin blade there is a
+/// shorter way. Else across the face that looks least along the edge. Nothing where all look along it.
 /// @param along  the edge's direction, of unit length
 /// @param before, after  touches very close to the place on either side, where they are known
 inline std::optional<Touch> acrossEdge(const glm::vec3& along, const Touch& here, const std::optional<Touch>& before,
@@ -81,15 +80,12 @@ inline std::optional<Touch> acrossEdge(const glm::vec3& along, const Touch& here
     if (!held || held->distance >= 0 || !before || !after) return held;
     const glm::vec3 &a = before->normal, &b = after->normal;
     const float fall = -glm::dot(a, along), rise = glm::dot(b, along);
-    const glm::vec3 ridge = glm::cross(a, b), across = glm::cross(along, ridge);
-    const float length = glm::length(across);
-    if (!(fall > 0 && rise > 0 && glm::length(ridge) > leastRidge && length > 0)) return held;
-    const glm::vec3 normal = (glm::dot(across, a + b) < 0 ? -1.f : 1.f) / length * across;
-    // from where the edge leaves either face, as it moves out along the normal
-    const float gain = glm::dot(a, normal) * rise + glm::dot(b, normal) * fall;
-    if (!(gain > 0)) return held;
-    const float distance = here.distance * (fall + rise) / gain;
-    return Touch{std::fmax(distance, mostDeeper * here.distance), normal};
+    if (!(fall > 0 && rise > 0 && glm::length(glm::cross(a, b)) > leastRidge)) return held;
+    // square to the edge and to the ridge
+    const glm::vec3 over = rise * a + fall * b;
+    const float length = glm::length(over);
+    const float distance = here.distance * (fall + rise) / length;
+    return Touch{std::fmax(distance, mostDeeper * here.distance), over / length};
 }
 
 }  // namespace bilayer

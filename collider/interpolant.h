@@ -10,7 +10,7 @@ inline constexpr float mostInterpolationError = 0.87f;
 /// How fast the interpolant may change: by a voxel along each axis at once.
 inline constexpr float steepestInterpolant = 1.7321f;
 
-/// What is no farther outside of the surface than this is in the band. All in metres, or all in voxels' sizes.
+/// What is no farther outside of the surface than this is in the band. Both in one unit.
 inline float surelyInBand(float exteriorWidth, float voxelSize) {
     return exteriorWidth - steepestInterpolant * voxelSize;
 }

@@ -39,9 +39,10 @@ class SharpEdges {
     }
     float longest() const { return longest_; }  ///< [m]
 
-    /// Whether the body falls back from a point on all its edges and their faces, as seen along a direction: what comes
-    /// from there meets this point first. Edges and faces square to the direction, to within about five degrees, are
-    /// met at once. Never true of a point without edges.
+    /// Whether the body falls back from a point on all its edges and their faces: what comes against it meets this
+    /// point first. Edges and faces square to the direction, to within about five degrees, are met at once. Never true
+    /// of a point without edges.
+    /// @param direction  outward, of unit length
     bool isTip(const SurfacePoints& points, std::uint32_t point, const glm::vec3& direction) const;
 
     struct Crossing {

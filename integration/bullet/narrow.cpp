@@ -29,7 +29,8 @@ constexpr int partBits = 15;
 // Of what is found of a triangle: three edges, three corners, and from here on what lies over it.
 constexpr std::uint32_t overPoints = 6;
 constexpr float searchTolerance = 2e-3f;  // of the deepest place between two probes [voxels]
-// Where two edges cross, the normal across both is taken if it looks no farther aside from the field's (cosine).
+// Where a field's edge is deepest in a round body, the normal across it looks no farther aside from the body's
+// (cosine).
 constexpr float leastAcross = 0.3f;
 // A surface point touches a face that looks against its own normal, by this cosine at least: the points below the edge
 // of a box must not be pushed out sideways. The corners of a cube, whose normals are mixed of three, reach 0.57.
