@@ -52,11 +52,15 @@ std::filesystem::path nameBeside(const std::filesystem::path& target) {
 // A name that the signal handler may have to remove. Entries are used again and never freed, so the handler can walk
 // their list while other threads write files.
 struct AtomicFile::Entry {
-    std::atomic<bool> taken{true}, live{false};
+    enum State { idle, written, placed };  // placed: taking its target's place, or there
+
+    std::atomic<bool> taken{true};
+    std::atomic<State> state{idle};
     char path[PATH_MAX];
     Entry* next = nullptr;
 
     static inline std::atomic<Entry*> first{nullptr};
+    static inline std::atomic<bool> isLastPlaced{false};  // of the files that this process has begun
 
     static Entry* take() {
         for (Entry* entry = first; entry; entry = entry->next)
@@ -70,11 +74,12 @@ struct AtomicFile::Entry {
 
     void watch(const std::string& name) {
         std::memcpy(path, name.c_str(), name.size() + 1);
-        live = true;
+        isLastPlaced = false;
+        state = written;
     }
 
     void release() {
-        live = false;
+        state = idle;
         taken = false;
     }
 };
@@ -106,23 +111,36 @@ AtomicFile::~AtomicFile() {
 }
 
 void AtomicFile::commit() {
-    if (::rename(temporary_.c_str(), target_.c_str()) != 0) fail(target_, lastError());
+    // before it is there, so that no signal ends the process as if it were not
+    entry_->state = Entry::placed;
+    Entry::isLastPlaced = true;
+    if (::rename(temporary_.c_str(), target_.c_str()) != 0) {
+        const std::string why = lastError();
+        Entry::isLastPlaced = false;
+        entry_->state = Entry::written;
+        fail(target_, why);
+    }
     entry_->release();
     entry_ = nullptr;
 }
 
-// Runs as a signal handler: atomics, unlink() and raise() are all that it may use.
+// Runs as a signal handler: atomics, unlink(), signal() and raise() are all that it may use.
 void AtomicFile::removeAll(int signal) {
+    static std::atomic<bool> cameLate{false};
+    bool isLate = Entry::isLastPlaced;
     for (const Entry* entry = Entry::first; entry; entry = entry->next)
-        if (entry->live) ::unlink(entry->path);
-    // the handler was removed as it was entered, so this ends the process as the signal would have
+        if (entry->state == Entry::written) isLate = false;
+    if (isLate && !cameLate.exchange(true)) return;
+    for (const Entry* entry = Entry::first; entry; entry = entry->next)
+        if (entry->state != Entry::idle) ::unlink(entry->path);
+    std::signal(signal, SIG_DFL);
     ::raise(signal);
 }
 
 void removeAtomicFilesOnSignal() {
     struct sigaction action = {};
     action.sa_handler = AtomicFile::removeAll;
-    action.sa_flags = int(SA_RESETHAND | SA_NODEFER);
+    action.sa_flags = SA_NODEFER | SA_RESTART;
     for (const int signal : endingSignals) {
         struct sigaction old;
         const bool ignored = ::sigaction(signal, nullptr, &old) == 0 && old.sa_handler == SIG_IGN;

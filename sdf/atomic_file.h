@@ -33,8 +33,10 @@ class AtomicFile {
     Entry* entry_ = nullptr;
 };
 
-/// For programs: SIGINT, SIGTERM and SIGHUP from now on remove the temporary files of this process before they end it,
-/// unless they are ignored. A library must not call this.
+/// For programs that write a file as their last act: SIGINT, SIGTERM and SIGHUP from now on remove the temporary files
+/// of this process before they end it, unless they are ignored. The first that comes when all files have taken their
+/// places comes too late: the program goes on to its end, and its status says that they are there. A library must not
+/// call this.
 void removeAtomicFilesOnSignal();
 
 }  // namespace bilayer

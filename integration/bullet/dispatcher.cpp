@@ -11,6 +11,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <limits>
 #include <new>
 #include <optional>
 #include <typeinfo>
@@ -108,9 +109,19 @@ class Pair {
     /// up to a multiple of that: no farther than twice the distance of the nearest.
     /// @param asked  by a contact test [m]; 0 in a step
     void collide(const Side& a, const Side& b, float asked) {
-        float margin = std::max(marginOf(a, b), std::min(asked, static_cast<const Shape&>(*b.shape).voxelSize()));
+        const auto& field = static_cast<const Shape&>(*b.shape);
+        float margin = std::max(marginOf(a, b), std::min(asked, field.voxelSize()));
+        const float most = std::max(margin, asked);
         find(a, b, margin, asked > 0);
-        while (contacts_.empty() && margin < asked) find(a, b, margin = std::min(2 * margin, asked), true);
+        if (asked > 0) {
+            // a place between surface points is found by those around it, which are farther away
+            const float between = probeSpacing * field.voxelSize();
+            while (contacts_.empty() && margin < asked + between)
+                find(a, b, margin = std::min(2 * margin, asked + between), true);
+            if (const float surely = nearest() + between; !contacts_.empty() && surely > margin)
+                find(a, b, surely, true);
+            std::erase_if(contacts_, [&](const Contact& contact) { return contact.distance > most; });
+        }
         finish(a, b);
     }
 
@@ -142,11 +153,17 @@ class Pair {
     const Manifolds& manifolds() const { return manifolds_; }
 
   private:
-    void find(const Side& a, const Side& b, float margin, bool farAway) {
+    float nearest() const {
+        float least = std::numeric_limits<float>::max();
+        for (const Contact& contact : contacts_) least = std::min(least, contact.distance);
+        return least;
+    }
+
+    void find(const Side& a, const Side& b, float margin, bool asked) {
         contacts_.clear();
         const bool follows = static_cast<const Shape&>(*b.shape).sweeps();
-        report_ = isField(a.shape) ? collideFields(a.placed(), b.placed(), margin, farAway, near_, contacts_)
-                                   : collideOther(a, b.placed(), margin, follows ? a.motion() : Motion{});
+        report_ = isField(a.shape) ? collideFields(a.placed(), b.placed(), margin, asked, near_, contacts_)
+                                   : collideOther(a, b.placed(), margin, asked, follows ? a.motion() : Motion{});
     }
 
     void finish(const Side& a, const Side& b) {
@@ -156,7 +173,7 @@ class Pair {
         sampled_ = 0;
     }
 
-    ContactReport collideOther(const Side& a, const Placed& field, float margin, const Motion& motion) {
+    ContactReport collideOther(const Side& a, const Placed& field, float margin, bool asked, const Motion& motion) {
         if (a.shape->getShapeType() == STATIC_PLANE_PROXYTYPE) {
             const auto& plane = static_cast<const btStaticPlaneShape&>(*a.shape);
             const btVector3 normal = a.transform.getBasis() * plane.getPlaneNormal();
@@ -167,7 +184,7 @@ class Pair {
         if (a.shape->isConvex()) {
             const auto& convex = static_cast<const btConvexShape&>(*a.shape);
             if (!convex_ || !convex_->isOf(convex)) convex_.emplace(convex);
-            return collideConvex(*convex_, toPose(a.transform), motion, field, margin, contacts_);
+            return collideConvex(*convex_, toPose(a.transform), motion, field, margin, asked, contacts_);
         }
         return collideTriangles(static_cast<const btConcaveShape&>(*a.shape), a.transform, motion, field, margin,
                                 contacts_);

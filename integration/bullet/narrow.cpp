@@ -274,10 +274,12 @@ std::optional<Contact> Local::deepestBetween(const Edge& edge, float from, const
 /// A convex body in the coordinates of a Local field.
 class Touching {
   public:
-    Touching(const Convex& convex, const Pose& pose, const Motion& motion, const Placed& field, float margin)
+    Touching(const Convex& convex, const Pose& pose, const Motion& motion, const Placed& field, float margin,
+             bool asked)
         : convex_(convex),
           local_(field, pose, motion, margin),
           margin_(margin),
+          asked_(asked),
           scale_(field.scale),
           voxel_(field.scale * field.collider.field().voxelSize()) {
         const Pose inField = relative(field.pose, pose);
@@ -467,7 +469,7 @@ class Touching {
             end = start + (there - middle) * along;
         } else {
             // Where faces touch, points are exact, and the interpolant is not.
-            least = touchingFace * scale_ * local_.collider().field().voxelSize();
+            if (!asked_) least = touchingFace * scale_ * local_.collider().field().voxelSize();
             if (!convex_.isFlat(near) || near.distance < least) return std::nullopt;
             const glm::vec3 uphill = slope - glm::dot(slope, near.normal) * near.normal;
             const float steepness = glm::length(uphill);
@@ -484,7 +486,9 @@ class Touching {
 
     const Convex& convex_;
     Local local_;
-    float margin_, scale_, voxel_;
+    float margin_;
+    bool asked_;
+    float scale_, voxel_;
     float edgeReach_ = margin_;  ///< within which points of sharp edges are looked at
     glm::mat3 toField_, toConvex_;
     glm::vec3 origin_;
@@ -737,9 +741,9 @@ ContactReport collidePlane(const glm::vec3& normal, float offset, const Motion& 
 }
 
 ContactReport collideConvex(const Convex& convex, const Pose& pose, const Motion& motion, const Placed& field,
-                            float margin, std::vector<Contact>& contacts) {
+                            float margin, bool asked, std::vector<Contact>& contacts) {
     ContactReport report;
-    const Touching touching(convex, pose, motion, field, margin);
+    const Touching touching(convex, pose, motion, field, margin, asked);
     field.collider.points().visit(
         [&](const glm::vec3& centre, float radius) { return touching.reject(centre, radius); },
         [&](std::uint32_t index, const SurfacePoint& point) { touching.visit(index, point, report, contacts); });

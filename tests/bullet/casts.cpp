@@ -364,7 +364,8 @@ double distanceTo(const Mesh& mesh, double ofPoint(const glm::dvec3&)) {
 TEST_CASE("Contact tests tell the distance that the triangles have") {
     const int kind = GENERATE(range(0, 7));
     const float scale = GENERATE(0.01f, 1.f, 100.f);
-    const unsigned start = seed();
+    // of the first two, places are nearest that lie between surface points that are farther than the margin
+    const unsigned start = GENERATE(28u, 116239924u, seed());
     CAPTURE(kind, scale, start);
     Twins twins(bodyOf(kind % 2 ? 2 : 0), scale, false, 1);
     // a ring of four voxels' radius: the interpolant of distances from thinner ones is off by a tenth of a voxel

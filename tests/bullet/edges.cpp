@@ -94,7 +94,7 @@ Collide collideBars(int kind, bool exact) {
         }
         return [=](const Crossing& c, float margin) {
             std::vector<Contact> contacts;
-            bullet::collideConvex(Convex(*shape), c.upper, {}, {*field, c.lower}, margin, contacts);
+            bullet::collideConvex(Convex(*shape), c.upper, {}, {*field, c.lower}, margin, false, contacts);
             return contacts;
         };
     }
@@ -203,7 +203,8 @@ TEST_CASE("An edge finds a bump between its probes, and stays on it") {
     for (int i = 0; i < 200; ++i) {
         const float way = 0.02f * h * float(i), gap = -0.1f * h;
         std::vector<Contact> contacts;
-        bullet::collideConvex(convex, {{0.3f + way, 0, radius + side + gap}, ridge}, {}, {*ball, {}}, h, contacts);
+        bullet::collideConvex(convex, {{0.3f + way, 0, radius + side + gap}, ridge}, {}, {*ball, {}}, h, false,
+                              contacts);
         const Contact& contact = deepest(contacts);
         CAPTURE(i, contact.distance / h);
         CHECK(contact.distance == Approx(gap).margin(tolerance));
@@ -407,7 +408,7 @@ TEST_CASE("No contact is much deeper than the bodies overlap, whichever edges cr
         check("triangles", contacts);
         if (a != 2) continue;
         contacts.clear();
-        bullet::collideConvex(convex, pose, {}, {*colliders[b], {}}, h, contacts);
+        bullet::collideConvex(convex, pose, {}, {*colliders[b], {}}, h, false, contacts);
         check("convex", contacts);
     }
     CHECK(overlapping > 150);
@@ -464,7 +465,7 @@ TEST_CASE("What is exact is so against Bullet's shapes too") {
         const Pose pose{glm::vec3(half.x, half.y, 0.013f * float(i - 20)) + away, {1, 0, 0, 0}};
         const auto errorOf = [&](const Collider& collider) {
             std::vector<Contact> contacts;
-            bullet::collideConvex(convex, pose, {}, {collider, {}}, h, contacts);
+            bullet::collideConvex(convex, pose, {}, {collider, {}}, h, false, contacts);
             // the ball's own centre in the field, not the box's edge in the ball
             float error = h;
             for (const Contact& contact : contacts)

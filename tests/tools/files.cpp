@@ -5,6 +5,7 @@
 #include <catch2/catch.hpp>
 #include <chrono>
 #include <fstream>
+#include <optional>
 #include <set>
 #include <thread>
 
@@ -90,7 +91,7 @@ TEST_CASE("a signal leaves no file") {
             std::filesystem::remove(here / "a.vdb");
         } else {
             CHECK(status == 128 + signal);
-            CHECK(names(here).empty());
+            CHECK(names(here) == std::set<std::string>{});
         }
         return status != 0;
     };
@@ -103,6 +104,28 @@ TEST_CASE("a signal leaves no file") {
         // a wide band takes seconds, nearly all of them for the build
         CHECK(kill({"--method", method, "--resolution", "300", "--half-width", "30"}, signal, 400));
     }
+}
+
+TEST_CASE("a signal that comes when the file has its place is too late, once") {
+    const auto here = folder("late");
+    // the status of a process that gets so many signals after its first file
+    const auto statusAfter = [&](int signals, bool beginsAnother) {
+        const pid_t process = ::fork();
+        if (process == 0) {
+            removeAtomicFilesOnSignal();
+            AtomicFile first(here / "a");
+            first.commit();
+            std::optional<AtomicFile> second;
+            if (beginsAnother) second.emplace(here / "b");
+            for (int i = 0; i < signals; ++i) ::raise(SIGTERM);
+            ::_exit(0);
+        }
+        return wait(process);
+    };
+    CHECK(statusAfter(1, false) == 0);
+    CHECK(statusAfter(2, false) == 128 + SIGTERM);
+    CHECK(statusAfter(1, true) == 128 + SIGTERM);
+    CHECK(names(here) == std::set<std::string>{"a"});
 }
 
 TEST_CASE("an atomic file takes its place only when committed") {
