@@ -73,7 +73,7 @@ inline std::optional<Touch> acrossEdge(const glm::vec3& along, const Touch& here
         if (!touch) continue;
         const glm::vec3 across = touch->normal - glm::dot(touch->normal, along) * along;
         const float length = glm::length(across);
-        if (length <= most) continue;
+        if (!(length > most)) continue;
         most = length;
         held = Touch{touch->distance, across / length};
     }

@@ -224,6 +224,8 @@ std::optional<Contact> Local::deepestBetween(const Edge& edge, float from, const
                                              const Answer& atTo, float margin) const {
     if (!atFrom.isKnown() || !atTo.isKnown()) return std::nullopt;
     const float length = glm::distance(edge.place(from), edge.place(to));
+    // no longer than rounding, it leads nowhere
+    if (!(length > searchTolerance * voxel_)) return std::nullopt;
     const float growth = (edge.radius[1] - edge.radius[0]) * (to - from) / length;
     const auto partAt = [&](float way) { return from + way / length * (to - from); };
     const auto slopeOf = [&](float way, const Answer& answer) {

@@ -511,6 +511,7 @@ using HeldPair = std::pair<const btCollisionObject*, const btCollisionObject*>;
 
 struct Meeting {
     Course *a, *b;
+    float margin;                  ///< what two that are not held come closer by than this is left to contacts [m]
     Touch touch{};                 ///< the first; from b to a
     float heldA = -1, heldB = -1;  ///< their courses' parts when they were looked at
     Touch stops{};                 ///< where one of them was held
@@ -521,6 +522,7 @@ struct Meeting {
     void look() {
         touch = {};
         heldA = a->part(), heldB = b->part();
+        if (std::min(heldA, heldB) >= 1 && a->longest(*b) <= margin) return;
         visitParts(a->object(), [&](const Part& one) {
             visitParts(b->object(), [&](const Part& two) {
                 if (one.field()) touch = earlier(touch, passage(one, *a, two, *b));
@@ -529,12 +531,14 @@ struct Meeting {
         });
     }
 
-    /// Holds what goes farther, and where that is held already, the other one.
+    /// Holds what goes farther, and where that is held already, both: the other one goes on into it.
     bool hold() {
         if (touch.time >= 1 || isOpen()) return false;
         Course *faster = a, *slower = b;
         if (a->longest() < b->longest()) std::swap(faster, slower);
-        if (!faster->holdAt(touch.time) && !slower->holdAt(touch.time)) return false;
+        const bool goesOn = faster->part() < 1, isHeld = faster->holdAt(touch.time);
+        const bool isOtherHeld = (goesOn || !isHeld) && slower->holdAt(touch.time);
+        if (!isHeld && !isOtherHeld) return false;
         stops = touch;
         return true;
     }
@@ -674,7 +678,7 @@ class Meetings {
 
     void add(Course& a, Course& b) {
         const auto margin = std::max(marginOf(a.object()), marginOf(b.object()));  // no field is less than any margin
-        if (margin && a.longest(b) > *margin) meetings_.push_back({&a, &b});
+        if (margin) meetings_.push_back({&a, &b, *margin});
     }
 
     btDynamicsWorld& world_;

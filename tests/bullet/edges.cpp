@@ -215,6 +215,33 @@ TEST_CASE("An edge finds a bump between its probes, and stays on it") {
     }
 }
 
+TEST_CASE("Contacts of solids of revolution are numbers, wherever a line of their sides ends") {
+    const auto plate = exactBox({1.2f, 1.2f, 0.1f}, h);
+    const Convex cylinder(btCylinderShape({0.15f, 0.1f, 0.15f})), cone(btConeShape(0.12f, 0.3f));
+    // one of the places where the lowest point of a rim is that of a side, too
+    const glm::quat aslant(-0.3470952f, -0.3281656f, 0.4082684f, 0.7779134f);
+    const unsigned start = seed();
+    std::mt19937 random(start);
+    std::uniform_real_distribution<float> part(-1, 1);
+    int found = 0;
+    for (int i = 0; i < 4000; ++i) {
+        const bool isPlace = i % 2;
+        const glm::quat any(part(random), part(random), part(random), part(random) + 0.01f);
+        const glm::vec3 at(0.29426688f + 2e-4f * part(random), 0.296223223f,
+                           isPlace ? 0.263574898f : 0.25f + 0.05f * part(random));
+        std::vector<Contact> contacts;
+        bullet::collideConvex(isPlace || i % 4 ? cylinder : cone, {at, isPlace ? aslant : glm::normalize(any)}, {},
+                              {*plate, {}}, h, false, contacts);
+        for (const Contact& contact : contacts) {
+            CAPTURE(start, i, contact.distance, contact.feature);
+            REQUIRE(glm::length(contact.normal) == Approx(1).margin(1e-4));
+            REQUIRE(std::isfinite(glm::length(contact.position) + contact.distance));
+            ++found;
+        }
+    }
+    CHECK(found > 4000);
+}
+
 TEST_CASE("The lowest place between two is found at kinks and on parabolas") {
     const float lowest = GENERATE(0.13f, 0.5f, 0.91f);
     const auto kink = [&](float x) {

@@ -100,6 +100,38 @@ TEST_CASE("However fast and however they turn, no bodies pass through a thin pla
             }
 }
 
+TEST_CASE("What a wall holds is not run over by what follows close behind") {
+    const float radius = 0.2f;
+    Shape ball(exactSphere(radius, h)), wall(exactBox({h, 1, 1}, h));
+    const unsigned seed = test::seed();
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<float> any(0, 1);
+    int held = 0;
+    for (int draw = 0; draw < 40; ++draw) {
+        World world;
+        const NoPassing guard(world.dynamics);
+        world.dynamics.setGravity({0, 0, 0});
+        // nothing but the guard holds them
+        world.dynamics.getSolverInfo().m_numIterations = 0;
+        world.add(wall, 0, {2, 0, 0});
+        const auto add = [&](const btVector3& place, float speed) {
+            btRigidBody* body = world.add(ball, 1, place);
+            body->setLinearVelocity({speed, 0, 0});
+            return body;
+        };
+        const float aside = 0.1f * any(random), apart = 2 * radius + 0.5f * h * any(random);
+        const btRigidBody *first = add({1.3f, 0, 0}, 40 + 20 * any(random)),
+                          *second = add({1.3f - std::sqrt(apart * apart - aside * aside), aside, 0}, 58);
+        for (int i = 0; i < 6; ++i) {
+            world.dynamics.stepSimulation(step, 0);
+            held += guard.held();
+            CAPTURE(seed, draw, i);
+            CHECK(first->getCenterOfMassPosition().distance(second->getCenterOfMassPosition()) > 2 * radius - 0.5f * h);
+        }
+    }
+    CHECK(held > 40);
+}
+
 TEST_CASE("Two fast bodies do not pass each other, nor what they meet after a bounce") {
     Shape ball(exactSphere(0.2f, h)), wall(exactBox({1.f, 1.f, 0.5f * h}, h));
     World world;
