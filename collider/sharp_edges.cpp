@@ -26,7 +26,7 @@ constexpr std::size_t mostNeighbours = 6;
 constexpr float leastCrossing = 0.2f;
 // A crossing lies so near to the deepest place that the field shows, which rounds edges off [voxels].
 constexpr float crossingWithin = 1.5f;
-// It is no deeper than so many times what the field shows, across faces instead of both edges, and so much besides
+// It is no deeper than so many times what the field shows, across faces instead of both edges, or than so much more
 // [voxels]: a field by samples rounds edges off.
 constexpr float deepestAcross = 1.5f, deepestUnseen = 1, deepestAcrossExact = 2, deepestUnseenExact = 0.25f;
 // Faces leave the plane between two edges at this angle (sine) at least: faces that lie on each other touch by their
@@ -140,7 +140,7 @@ std::optional<SharpEdges::Crossing> SharpEdges::crossing(const SurfacePoints& po
     if (edges_.empty()) return std::nullopt;
     const glm::vec3 along = to - from;
     const float within = crossingWithin * voxelSize,
-                least = std::min(distance, deepestAcross_ * distance) - deepestUnseen_ * voxelSize;
+                least = std::min(deepestAcross_ * distance, distance - deepestUnseen_ * voxelSize);
     const float reach = within + longest_;
     std::optional<Crossing> best;
     float nearest = within;

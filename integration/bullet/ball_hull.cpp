@@ -11,9 +11,11 @@ namespace {
 
 // Balls may stand out of a plane by this part of the hull's size: rounding.
 constexpr float rounding = 1e-5f;
+// Of the cosine between a cone and its axis where one ball holds the other but for rounding.
+constexpr double leastSquare = 1e-12;
 
-glm::vec3 squareTo(const glm::vec3& axis) {
-    const glm::vec3 away = std::abs(axis.x) < 0.6f ? glm::vec3(1, 0, 0) : glm::vec3(0, 1, 0);
+glm::dvec3 squareTo(const glm::dvec3& axis) {
+    const glm::dvec3 away = std::abs(axis.x) < 0.6 ? glm::dvec3(1, 0, 0) : glm::dvec3(0, 1, 0);
     return glm::normalize(glm::cross(axis, away));
 }
 
@@ -46,94 +48,100 @@ BallHull::BallHull(std::vector<Ball> balls) {
 
 /// Those of the two planes on three balls that have all others below.
 void BallHull::addPlanes(std::uint32_t i, std::uint32_t j, std::uint32_t k) {
-    const glm::vec3 u = balls_[j].centre - balls_[i].centre, v = balls_[k].centre - balls_[i].centre;
-    const glm::vec3 square = glm::cross(u, v);
-    const float area = glm::length(square);
+    const glm::dvec3 from(balls_[i].centre), u = glm::dvec3(balls_[j].centre) - from,
+                                             v = glm::dvec3(balls_[k].centre) - from;
+    const glm::dvec3 square = glm::cross(u, v);
+    const double area = glm::length(square);
     if (area <= rounding * size_ * size_) return;
     // The normal n goes down by the difference of radii along each side.
-    const float a = balls_[i].radius - balls_[j].radius, b = balls_[i].radius - balls_[k].radius;
-    const glm::vec3 along = (a * glm::cross(v, square) + b * glm::cross(square, u)) / (area * area);
-    const float rest = 1 - glm::dot(along, along);
+    const double a = double(balls_[i].radius) - balls_[j].radius, b = double(balls_[i].radius) - balls_[k].radius;
+    const glm::dvec3 along = (a * glm::cross(v, square) + b * glm::cross(square, u)) / (area * area);
+    const double rest = 1 - glm::dot(along, along);
     if (rest <= 0) return;
-    for (const float side : {-1.f, 1.f}) {
-        const glm::vec3 normal = along + side * std::sqrt(rest) * (square / area);
-        const float offset = glm::dot(normal, balls_[i].centre) + balls_[i].radius;
+    for (const double side : {-1., 1.}) {
+        const glm::dvec3 normal = along + side * std::sqrt(rest) * (square / area);
+        const double offset = glm::dot(normal, from) + balls_[i].radius;
         const auto below = [&](const Ball& ball) {
-            return glm::dot(normal, ball.centre) + ball.radius <= offset + rounding * size_;
+            return glm::dot(normal, glm::dvec3(ball.centre)) + ball.radius <= offset + rounding * size_;
         };
         if (std::all_of(balls_.begin(), balls_.end(), below)) planes_.push_back({normal, offset, {i, j, k}});
     }
 }
 
-BallHull::Near BallHull::aroundBall(const Ball& ball, const glm::vec3& point) const {
-    const float length = glm::distance(point, ball.centre);
-    const glm::vec3 normal = length > 0 ? (point - ball.centre) / length : glm::vec3(0, 0, 1);
-    return {length - ball.radius, normal, ball};
+BallHull::Candidate BallHull::aroundBall(const Ball& ball, const glm::dvec3& point) const {
+    const glm::dvec3 centre(ball.centre);
+    const double length = glm::distance(point, centre);
+    return {length - ball.radius, length > 0 ? (point - centre) / length : glm::dvec3(0, 0, 1), centre, ball.radius};
 }
 
 /// Against all balls between two.
-BallHull::Near BallHull::aroundPair(const Ball& from, const Ball& to, const glm::vec3& point) const {
-    const glm::vec3 between = to.centre - from.centre;
-    const float length = glm::length(between);
-    const glm::vec3 axis = between / length, way = point - from.centre;
-    const float along = glm::dot(way, axis);
-    const glm::vec3 aside = way - along * axis;
-    const float out = glm::length(aside);
+BallHull::Candidate BallHull::aroundPair(const Ball& from, const Ball& to, const glm::dvec3& point) const {
+    const glm::dvec3 start(from.centre), between = glm::dvec3(to.centre) - start;
+    const double length = glm::length(between), growth = double(to.radius) - from.radius;
+    const glm::dvec3 axis = between / length, way = point - start;
+    const double along = glm::dot(way, axis);
+    const glm::dvec3 aside = way - along * axis;
+    const double out = glm::length(aside);
     // The normal leans towards the smaller ball.
-    const float sine = (from.radius - to.radius) / length, cosine = std::sqrt(1 - sine * sine);
-    const float part = std::clamp((along - out * sine / cosine) / length, 0.f, 1.f);
-    const Ball ball{from.centre + part * between, from.radius + part * (to.radius - from.radius)};
-    if (part <= 0 || part >= 1) return aroundBall(ball, point);
-    const glm::vec3 normal = cosine * (out > 0 ? aside / out : squareTo(axis)) + sine * axis;
-    return {glm::dot(point - ball.centre, normal) - ball.radius, normal, ball};
+    const double sine = -growth / length, cosine = std::sqrt(std::max(1 - sine * sine, leastSquare));
+    const double part = (along - out * sine / cosine) / length;
+    if (part <= 0) return aroundBall(from, point);
+    if (part >= 1) return aroundBall(to, point);
+    const glm::dvec3 centre = start + part * between,
+                     normal = cosine * (out > 0 ? aside / out : squareTo(axis)) + sine * axis;
+    const double radius = from.radius + part * growth;
+    return {glm::dot(point - centre, normal) - radius, normal, centre, radius};
 }
 
-BallHull::Near BallHull::nearest(const glm::vec3& point) const {
-    Near best = aroundBall(balls_.front(), point);
-    const auto consider = [&](const Near& near) {
-        if (near.distance < best.distance) best = near;
+BallHull::Near BallHull::nearest(const glm::vec3& place) const {
+    const glm::dvec3 point(place);
+    Candidate best = aroundBall(balls_.front(), point);
+    const auto consider = [&](const Candidate& candidate) {
+        if (candidate.distance < best.distance) best = candidate;
     };
     for (const Ball& ball : balls_) consider(aroundBall(ball, point));
     for (const auto& [i, j] : pairs_) consider(aroundPair(balls_[i], balls_[j], point));
-    if (planes_.empty()) return best;
     for (const Plane& plane : planes_) {
-        const float distance = glm::dot(plane.normal, point) - plane.offset;
+        const double distance = glm::dot(plane.normal, point) - plane.offset;
         if (distance >= best.distance) continue;
         const Ball &a = balls_[plane.corners[0]], &b = balls_[plane.corners[1]], &c = balls_[plane.corners[2]];
-        const glm::vec3 u = b.centre - a.centre, v = c.centre - a.centre, square = glm::cross(u, v);
+        const glm::dvec3 from(a.centre), u = glm::dvec3(b.centre) - from, v = glm::dvec3(c.centre) - from,
+                                         square = glm::cross(u, v);
         // Where the line along the normal meets the plane of the centres: only between them is the plane the hull's.
-        const float way = glm::dot(point - a.centre, square) / glm::dot(plane.normal, square);
-        const glm::vec3 foot = point - way * plane.normal - a.centre;
-        const float area = glm::dot(square, square);
-        const float atB = glm::dot(glm::cross(foot, v), square) / area;
-        const float atC = glm::dot(glm::cross(u, foot), square) / area;
+        const double way = glm::dot(point - from, square) / glm::dot(plane.normal, square);
+        const glm::dvec3 foot = point - way * plane.normal - from;
+        const double area = glm::dot(square, square);
+        const double atB = glm::dot(glm::cross(foot, v), square) / area;
+        const double atC = glm::dot(glm::cross(u, foot), square) / area;
         if (way < 0 || atB < 0 || atC < 0 || atB + atC > 1) continue;
-        const float radius = a.radius + atB * (b.radius - a.radius) + atC * (c.radius - a.radius);
-        best = {distance, plane.normal, {a.centre + foot, radius}};
+        const double radius = a.radius + atB * (b.radius - a.radius) + atC * (c.radius - a.radius);
+        best = {distance, plane.normal, from + foot, radius};
     }
     // Between four balls or more, none of the above is near though the point is inside.
-    return best.distance >= 0 && along(best.normal, point) >= best.distance - rounding * size_ ? best : inside(point);
+    const bool isOutside = best.distance >= 0 && along(best.normal, point) >= best.distance - rounding * size_;
+    if (!isOutside && !planes_.empty()) best = inside(point);
+    return {float(best.distance), glm::vec3(best.normal), {glm::vec3(best.centre), float(best.radius)}};
 }
 
 /// How far the hull lies below a point in a direction.
-float BallHull::along(const glm::vec3& direction, const glm::vec3& point) const {
-    float least = std::numeric_limits<float>::max();
-    for (const Ball& ball : balls_) least = std::min(least, glm::dot(direction, point - ball.centre) - ball.radius);
+double BallHull::along(const glm::dvec3& direction, const glm::dvec3& point) const {
+    double least = std::numeric_limits<double>::max();
+    for (const Ball& ball : balls_)
+        least = std::min(least, glm::dot(direction, point - glm::dvec3(ball.centre)) - ball.radius);
     return least;
 }
 
 /// Of all directions in which the hull may be left, the shortest way out lies along a ball's, a cone's or a plane's.
-BallHull::Near BallHull::inside(const glm::vec3& point) const {
-    Near best{-std::numeric_limits<float>::max(), {0, 0, 1}, balls_.front()};
-    const auto consider = [&](Near near) {
-        near.distance = along(near.normal, point);
-        if (near.distance > best.distance) best = near;
+BallHull::Candidate BallHull::inside(const glm::dvec3& point) const {
+    Candidate best{-std::numeric_limits<double>::max(), {0, 0, 1}, point, leastRadius_};
+    const auto consider = [&](const glm::dvec3& normal) {
+        const double distance = along(normal, point);
+        if (distance > best.distance) best.distance = distance, best.normal = normal;
     };
-    for (const Ball& ball : balls_) consider(aroundBall(ball, point));
-    for (const auto& [i, j] : pairs_) consider(aroundPair(balls_[i], balls_[j], point));
-    for (const Plane& plane : planes_) consider({0, plane.normal, {}});
-    const glm::vec3 surface = point - best.distance * best.normal;
-    best.ball = {surface - leastRadius_ * best.normal, leastRadius_};
+    for (const Ball& ball : balls_) consider(aroundBall(ball, point).normal);
+    for (const auto& [i, j] : pairs_) consider(aroundPair(balls_[i], balls_[j], point).normal);
+    for (const Plane& plane : planes_) consider(plane.normal);
+    best.centre = point - (best.distance + leastRadius_) * best.normal;
     return best;
 }
 

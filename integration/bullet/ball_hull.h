@@ -34,15 +34,21 @@ class BallHull {
 
   private:
     struct Plane {
-        glm::vec3 normal;
-        float offset;
+        glm::dvec3 normal;
+        double offset;
         std::uint32_t corners[3];
     };
+    // In double precision: where a ball and a cone are as near but for rounding, their normals differ by its root.
+    struct Candidate {
+        double distance;
+        glm::dvec3 normal, centre;
+        double radius;
+    };
     void addPlanes(std::uint32_t i, std::uint32_t j, std::uint32_t k);
-    Near aroundBall(const Ball& ball, const glm::vec3& point) const;
-    Near aroundPair(const Ball& from, const Ball& to, const glm::vec3& point) const;
-    Near inside(const glm::vec3& point) const;
-    float along(const glm::vec3& direction, const glm::vec3& point) const;
+    Candidate aroundBall(const Ball& ball, const glm::dvec3& point) const;
+    Candidate aroundPair(const Ball& from, const Ball& to, const glm::dvec3& point) const;
+    Candidate inside(const glm::dvec3& point) const;
+    double along(const glm::dvec3& direction, const glm::dvec3& point) const;
 
     std::vector<Ball> balls_;
     std::vector<std::pair<std::uint32_t, std::uint32_t>> pairs_;

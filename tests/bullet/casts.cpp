@@ -78,21 +78,29 @@ class Directions {
     std::uniform_real_distribution<float> part_{-1, 1};
 };
 
+// Sizes less the margin, which Bullet itself rounds otherwise at each scale.
+void setSize(btConvexInternalShape& shape, float s, const btVector3& halfExtents, float margin) {
+    shape.setMargin(s * margin);
+    shape.setImplicitShapeDimensions(s * (halfExtents - btVector3(margin, margin, margin)));
+}
+
 std::unique_ptr<btConvexShape> shapeOf(int kind, float s) {
     switch (kind) {
         case 0:
             return std::make_unique<btSphereShape>(0.12f * s);
         case 1: {
             // by this Bullet rounds it off
-            auto box = std::make_unique<btBoxShape>(s * btVector3(0.1f, 0.15f, 0.2f));
-            box->setMargin(0.005f * s);
+            const btVector3 halfExtents(0.1f, 0.15f, 0.2f);
+            auto box = std::make_unique<btBoxShape>(s * halfExtents);
+            setSize(*box, s, halfExtents, 0.005f);
             return box;
         }
         case 2:
             return std::make_unique<btCapsuleShape>(0.08f * s, 0.3f * s);
         case 3: {
-            auto cylinder = std::make_unique<btCylinderShape>(s * btVector3(0.1f, 0.2f, 0.1f));
-            cylinder->setMargin(0.005f * s);
+            const btVector3 halfExtents(0.1f, 0.2f, 0.1f);
+            auto cylinder = std::make_unique<btCylinderShape>(s * halfExtents);
+            setSize(*cylinder, s, halfExtents, 0.005f);
             return cylinder;
         }
         case 4: {
