@@ -43,8 +43,9 @@ constexpr float chosenWithin = 0.5f;
 constexpr float tilts[] = {1.f / 8, 1.f / 32, 1.f / 128};
 constexpr float aside = 1.f / 64;
 constexpr int tiltDirections = 8, shiftDirections = 8;
-constexpr float askew = 0.3f;             // [rad]
-constexpr float measuredTilt = 1.f / 32;  // by which what is lost is measured [rad]
+constexpr float askew = 0.3f;  // [rad]
+// The tilts and shifts by which what is lost is measured [rad], [parts of the extent].
+constexpr float measured = 1.f / 32;
 // More contacts of a patch cost the solver more than they tell it.
 constexpr std::size_t mostOfPatch = 3 * MANIFOLD_CACHE_SIZE;
 
@@ -175,7 +176,9 @@ std::vector<Nudge> nudges() {
 std::vector<Nudge> nudgesBetween() {
     std::vector<Nudge> all;
     for (int k = 0; k < tiltDirections; ++k)
-        all.push_back({.tilt = measuredTilt * towards((float(k) + 0.5f) / tiltDirections)});
+        all.push_back({.tilt = measured * towards((float(k) + 0.5f) / tiltDirections)});
+    for (int k = 0; k < shiftDirections; ++k)
+        all.push_back({.shift = measured * towards((float(k) + 0.5f) / shiftDirections)});
     return all;
 }
 

@@ -23,7 +23,8 @@ struct Patch {
 struct Reduced {
     std::vector<Patch> patches;
     /// How deep a contact that was left out could come in a small motion of the bodies before one that was kept is met
-    /// [m]: the worst over tilts of 1/32 rad about axes between those that contacts were chosen for.
+    /// [m]: the worst over tilts of 1/32 rad and shifts of 1/32 of a patch's extent, in directions between those that
+    /// contacts were chosen for.
     float lost = 0;
     /// As long as the bodies have moved past each other by no more than this, the same contacts would do [m].
     float slack = 0;
