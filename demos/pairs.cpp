@@ -11,5 +11,6 @@ int main(int argc, char** argv) {
     program.option("--only", options.only, "those with this in their name");
     program.option("--seconds", options.seconds, "how long [s]")->check(CLI::Range(0.5, 1000.0));
     program.option("--steps", options.stepsPerSecond, "a second")->check(CLI::Range(30.0, 10000.0));
+    program.option("--iterations", options.iterations, "of Bullet's solver")->check(CLI::Range(1, 10000));
     return program.run(argc, argv, [&] { return pairs(options); });
 }

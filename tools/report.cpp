@@ -242,7 +242,7 @@ void addScene(CLI::App& command, InspectArguments& a) {
         group->add_option(name, value, help)->check(check)->needs(step);
     };
     also("--spin", scene.spin, "that bodies turn with at most [rad/s], default what an impact may give", nonNegative());
-    also("--thickness", scene.thickness, "of the thinnest wall [m], default the mesh's own", positive());
+    also("--thickness", scene.thickness, "of the thinnest wall that it meets [m]; its own count besides", positive());
     also("--gap", scene.gap, "narrowest clearance to pass [m]", positive());
     also("--voxel-size", scene.voxelSize, "to judge instead of choosing one [m]", positive());
     also("--margin", scene.margin, "likewise [m], default a voxel", nonNegative());

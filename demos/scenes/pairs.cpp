@@ -347,6 +347,7 @@ Outcome pairs(const PairsOptions& options) {
     const float scale = options.scale;
     Stage stage(fmt::format("Every shape and a field, at scale {:g}", scale),
                 {.stepsPerSecond = options.stepsPerSecond, .framesPerMeasuring = framesPerMeasuring});
+    stage.world().bullet().getSolverInfo().m_numIterations = options.iterations;
     const Maker maker(scale);
     const Parts parts(maker);
     Board board(stage, options);

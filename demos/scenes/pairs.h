@@ -15,6 +15,7 @@ struct PairsOptions {
     std::string only{};  ///< and of these only those with this in their name, as in "hull on dynamic"
     float seconds = 2;   ///< up to scale 1; above, times the root of the scale: that is how much longer a fall takes
     float stepsPerSecond = 240;
+    int iterations = 50;  ///< of Bullet's solver: with 10, what lies on small bodies rocks
 };
 
 /// Criteria: all rest where formulas say, to a tenth of a voxel in height and of a degree in tilt; none overlaps what

@@ -100,6 +100,9 @@ void warnOfSizes(const MeshReport& mesh, const Scene& scene, const Advice& advic
     if (const float gap = scene.gap / advice.voxelSize; gap > 0 && gap < gapVoxels - rounding)
         warnings.push_back(
             fmt::format("the gap is {:.2g} voxels wide: below {:g}, bodies at rest overlap in it", gap, gapVoxels));
+    if (advice.voxelSize < leastVoxel)
+        warnings.push_back(fmt::format("no field has voxels below {:g}: scale the mesh up", leastVoxel));
+    if (advice.margin == 0) warnings.push_back("without a margin, contacts of what rests come and go");
     if (advice.margin > advice.voxelSize * float(mostInterior))
         warnings.push_back(fmt::format("the margin is {:.2g} voxels: the band outside has to reach as far",
                                        advice.margin / advice.voxelSize));
@@ -108,11 +111,12 @@ void warnOfSizes(const MeshReport& mesh, const Scene& scene, const Advice& advic
 }
 
 void warnOfMotion(const Scene& scene, const Advice& advice, float way, std::vector<std::string>& warnings) {
-    if (way > advice.margin)
+    if (advice.substepsUnswept > advice.substeps)
         warnings.push_back(
-            fmt::format("a step goes {:.3g} m, {:.2g} times the margin: without swept contacts "
-                        "(ShapeOptions::sweeps) what is thin needs {} substeps",
-                        way, way / advice.margin, advice.substepsUnswept));
+            fmt::format("a step goes {:.3g} m, farther than half of a wall: impacts throw bodies through what is thin "
+                        "unless a bullet::NoPassing looks after the world; without it and without swept contacts "
+                        "(ShapeOptions::sweeps) that needs {} substeps",
+                        way, advice.substepsUnswept));
     if (scene.massRatio > mostMassRatio)
         warnings.push_back(
             fmt::format("masses of {:.3g} to 1: above {:g} to 1 the solver leaves what lies below "
@@ -134,7 +138,8 @@ void warnOfBullet(float longest, std::vector<std::string>& warnings) {
 Advice advise(const MeshReport& mesh, const Scene& scene) {
     requireSensible(mesh, scene);
     const float longest = mesh.bounds.longestSide();
-    const float wall = scene.thickness > 0 ? scene.thickness : mesh.commonWall;
+    const float wall = scene.thickness > 0 && mesh.commonWall > 0 ? std::min(scene.thickness, mesh.commonWall)
+                                                                  : std::max(scene.thickness, mesh.commonWall);
     Advice advice;
     const float h = advice.voxelSize = chosenVoxel(scene, longest, wall);
     advice.margin = scene.margin < 0 ? h : scene.margin;

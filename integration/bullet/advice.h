@@ -15,7 +15,7 @@ struct Scene {
     float step = 1.f / 60;  ///< of the simulation [s]
     float speed = 0;        ///< that bodies meet with at most [m/s]
     float spin = -1;        ///< that they turn with at most [rad/s]; unknown: what an impact at `speed` may give
-    float thickness = 0;    ///< of the thinnest wall that meets or belongs to it [m]; unknown: the mesh's own
+    float thickness = 0;    ///< of the thinnest wall that it meets [m]; its own count besides
     float gap = 0;          ///< narrowest clearance that it has to pass [m]
     float massRatio = 1;    ///< of the heaviest to the lightest bodies that lie on each other
     float voxelSize = 0;    ///< to be judged instead of chosen [m]
@@ -31,7 +31,7 @@ struct Advice {
     int interiorWidth = 0;         ///< [voxels]
     int substeps = 1;              ///< of a step, with ShapeOptions::sweeps; mostSubsteps at most
     int substepsUnswept = 1;       ///< without
-    float wallVoxels = 0;          ///< Scene::thickness, or MeshReport::commonWall [voxels]; 0: none is known
+    float wallVoxels = 0;          ///< the thinner of Scene::thickness and MeshReport::commonWall [voxels]; 0: unknown
     float splitImpulse = 0;        ///< for m_splitImpulsePenetrationThreshold [m]
     std::uint64_t voxels = 0;      ///< active ones, about
     std::uint64_t fieldBytes = 0;  ///< of the Field laid out, about; of thin bodies down to half of it [bytes]

@@ -470,8 +470,9 @@ class Touching {
             const float there = std::clamp(middle - std::copysign(step / length, steepness), 0.f, 1.f);
             end = start + (there - middle) * along;
         } else {
-            // Where faces touch, points are exact, and the interpolant is not.
-            if (!asked_) least = touchingFace * scale_ * local_.collider().field().voxelSize();
+            // Where faces touch, points are exact, and the interpolant is not beside sharp edges.
+            const bool isSmooth = local_.collider().edges().edges().empty();
+            if (!asked_ && !isSmooth) least = touchingFace * scale_ * local_.collider().field().voxelSize();
             if (!convex_.isFlat(near) || near.distance < least) return std::nullopt;
             const glm::vec3 uphill = slope - glm::dot(slope, near.normal) * near.normal;
             const float steepness = glm::length(uphill);

@@ -73,6 +73,10 @@ TEST_CASE("A ball has no thin wall: its size decides") {
     CHECK(advice.substepsUnswept == 1);
     // unless it meets one, or has to pass a gap
     CHECK(advise(ball(0.5f), {.thickness = 0.03f}).voxelSize == Approx(0.01));
+    // its own wall counts where it is thinner
+    CHECK(advise(plate(0.03f), {.thickness = 0.5f}).voxelSize == Approx(0.01));
+    CHECK(warnsOf(advise(ball(0.5f), {.voxelSize = 1e-6f}), "no field"));
+    CHECK(warnsOf(advise(ball(0.5f), {.margin = 0}), "margin"));
     CHECK(advise(ball(0.5f), {.gap = 0.01f}).voxelSize == Approx(0.005));
     CHECK(warnsOf(advise(ball(0.5f), {.gap = 0.01f, .voxelSize = 0.01f}), "gap"));
     CHECK_FALSE(warnsOf(advise(ball(0.5f), {.gap = 0.01f}), "gap"));
@@ -84,6 +88,7 @@ TEST_CASE("Speed asks for substeps, or for sweeps") {
     CHECK(fast.substepsUnswept == 12);
     CHECK(fast.substeps == 1);
     CHECK(warnsOf(fast, "swept contacts"));
+    CHECK(warnsOf(fast, "NoPassing"));
     CHECK(fast.interiorWidth == 10);
     // below the margin nothing passes
     const Advice slow = advise(plate(0.03f), {.speed = 0.5f});
