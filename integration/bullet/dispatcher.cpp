@@ -105,8 +105,8 @@ class Pair {
   public:
     Pair(btDispatcher& dispatcher, DispatchStatistics& statistics) : manifolds_(dispatcher), statistics_(statistics) {}
 
-    /// Finds and reduces contacts up to the shapes' margins, or where a contact test asks for more and there are none,
-    /// up to a multiple of that: no farther than twice the distance of the nearest.
+    /// Finds and reduces contacts up to the shapes' margins; where a contact test asks for more and there are none, up
+    /// to twice as far in turns, and then once more, as far as it takes to be sure of the nearest.
     /// @param asked  by a contact test [m]; 0 in a step
     void collide(const Side& a, const Side& b, float asked) {
         const auto& field = static_cast<const Shape&>(*b.shape);

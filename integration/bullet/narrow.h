@@ -30,8 +30,8 @@ ContactReport collidePlane(const glm::vec3& normal, float offset, const Motion& 
                            float margin, std::vector<Contact>& contacts);
 
 /// Against a convex body: the field's surface points against its formula, then its own points in the field.
-/// @param asked  by a contact test: the places between surface points count where faces touch as well, which would
-///               shake what rests
+/// @param asked  by a contact test: the places between surface points count where faces touch as well, which beside
+///               sharp edges would shake what rests
 ContactReport collideConvex(const Convex& convex, const Pose& pose, const Motion& motion, const Placed& field,
                             float margin, bool asked, std::vector<Contact>& contacts);
 
