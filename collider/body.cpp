@@ -8,8 +8,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <limits>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -40,6 +42,8 @@ constexpr const char* inertia = "bilayer:inertia";            // xx yy zz, densi
 constexpr const char* products = "bilayer:inertia_products";  // xy xz yz
 constexpr const char* principal = "bilayer:principal_inertia";
 constexpr const char* axes = "bilayer:principal_axes";  // a quaternion, x y z w
+constexpr const char* mesh = "bilayer:mesh";            // bytes: see packed()
+constexpr const char* exact = "bilayer:exact";
 }  // namespace entry
 
 // Names that other programs give such attributes, too.
@@ -224,6 +228,58 @@ void requireWithin(const SurfacePoints& points, const Bounds& bounds) {
             refuse("a surface point lies outside of its bounds");
 }
 
+// Bytes of a type that OpenVDB does not know: other programs hand them on as they are.
+using Bytes = openvdb::UnknownMetadata;
+constexpr const char* meshType = "bilayer_mesh";
+constexpr std::size_t mostMeshBytes = std::size_t(1) << 31;
+
+struct MeshHead {
+    std::uint64_t hash, points, triangles;
+};
+
+std::size_t bytesOf(const MeshHead& head) {
+    const std::size_t most = mostMeshBytes / sizeof(glm::vec3);  // of either: sums of more would overflow
+    if (head.points > most || head.triangles > most) return std::numeric_limits<std::size_t>::max();
+    return sizeof(head) + head.points * sizeof(glm::vec3) + head.triangles * sizeof(glm::uvec3);
+}
+
+// A head, three coordinates of each vertex, three vertices of each triangle.
+openvdb::Metadata::Ptr packed(const Mesh& mesh) {
+    const MeshHead head{hash(mesh), mesh.points.size(), mesh.triangles.size()};
+    if (bytesOf(head) > mostMeshBytes)
+        throw std::invalid_argument("the mesh is too large to keep beside its field: leave it out (Body::mesh)");
+    Bytes::ByteVec bytes(bytesOf(head));
+    const std::size_t pointBytes = head.points * sizeof(glm::vec3);
+    std::memcpy(bytes.data(), &head, sizeof(head));
+    std::memcpy(bytes.data() + sizeof(head), mesh.points.data(), pointBytes);
+    std::memcpy(bytes.data() + sizeof(head) + pointBytes, mesh.triangles.data(), head.triangles * sizeof(glm::uvec3));
+    const auto entry = std::make_shared<Bytes>(meshType);
+    entry->setValue(bytes);
+    return entry;
+}
+
+std::shared_ptr<const Mesh> unpacked(const Bytes::ByteVec& bytes) {
+    MeshHead head{};
+    std::memcpy(&head, bytes.data(), std::min(sizeof(head), bytes.size()));
+    if (bytesOf(head) != bytes.size()) refuse(fmt::format("'{}' is too short or too long", entry::mesh));
+    auto mesh = std::make_shared<Mesh>();
+    mesh->points.resize(head.points);
+    mesh->triangles.resize(head.triangles);
+    const std::size_t pointBytes = head.points * sizeof(glm::vec3);
+    std::memcpy(mesh->points.data(), bytes.data() + sizeof(head), pointBytes);
+    std::memcpy(mesh->triangles.data(), bytes.data() + sizeof(head) + pointBytes, head.triangles * sizeof(glm::uvec3));
+    if (hash(*mesh) != head.hash) refuse(fmt::format("'{}' is not what was written", entry::mesh));
+    return mesh;
+}
+
+std::shared_ptr<const Mesh> meshOf(const LevelSet& levelSet) {
+    const auto entry = (*levelSet.grids().distance)[entry::mesh];
+    if (!entry) return nullptr;
+    const auto bytes = std::dynamic_pointer_cast<const Bytes>(entry);
+    if (!bytes) refuse(fmt::format("'{}' is of type {}", entry::mesh, entry->typeName()));
+    return unpacked(bytes->value());
+}
+
 // A field that was moved or scaled elsewhere leaves its body behind.
 void requireWithin(const Bounds& bounds, const openvdb::FloatGrid& grid) {
     const openvdb::CoordBBox box = grid.evalActiveVoxelBoundingBox();
@@ -238,16 +294,19 @@ void requireWithin(const Bounds& bounds, const openvdb::FloatGrid& grid) {
 
 LevelSet withBody(const LevelSet& levelSet, const Body& body) {
     if (body.points.points().empty()) throw std::invalid_argument("a body has surface points");
+    if (body.exact && !body.mesh) throw std::invalid_argument("a body without a mesh is not exact");
     openvdb::initialize();
     const auto distance = openvdb::ConstPtrCast<openvdb::FloatGrid>(levelSet.grids().distance)->copy();
-    for (const char* stale :
-         {entry::volume, entry::centre, entry::inertia, entry::products, entry::principal, entry::axes})
+    for (const char* stale : {entry::volume, entry::centre, entry::inertia, entry::products, entry::principal,
+                              entry::axes, entry::mesh, entry::exact})
         distance->removeMeta(stale);
     distance->insertMeta(entry::format, openvdb::Int32Metadata(format));
     distance->insertMeta(entry::margin, openvdb::FloatMetadata(body.margin));
     distance->insertMeta(entry::lower, openvdb::Vec3SMetadata(toVdb(body.bounds.lower)));
     distance->insertMeta(entry::upper, openvdb::Vec3SMetadata(toVdb(body.bounds.upper)));
     if (body.mass) storeMass(*distance, *body.mass);
+    if (body.mesh) distance->insertMeta(entry::mesh, *packed(*body.mesh));
+    if (body.exact) distance->insertMeta(entry::exact, openvdb::BoolMetadata(true));
     auto grids = std::make_shared<Grids>(levelSet.grids());
     grids->distance = distance;
     grids->points = store(body.points, pointVoxel(levelSet));
@@ -272,6 +331,9 @@ Body bodyOf(const LevelSet& levelSet) {
     body.bounds.upper = entries.vector(entry::upper);
     body.mass = loadMass(entries);
     body.points = pointsOf(levelSet);
+    body.mesh = meshOf(levelSet);
+    body.exact = entries.find<bool>(entry::exact).value_or(false);
+    if (body.exact && !body.mesh) refuse(fmt::format("'{}' is missing", entry::mesh));
     requireWithin(body.points, body.bounds);
     requireWithin(body.bounds, *levelSet.grids().distance);
     return body;

@@ -1,7 +1,8 @@
 // What a rigid body is beside its field. Made from the mesh once, it can stay with the field's grids, and in their .vdb
-// file, ever after: then nobody needs the mesh again.
+// file, ever after: then nobody needs the mesh's own file again.
 #pragma once
 
+#include <memory>
 #include <optional>
 
 #include "collider/mass.h"
@@ -16,11 +17,15 @@ struct Body {
     Bounds bounds;                       ///< of the mesh [m]
     float margin = 0;                    ///< contacts are made up to this distance between surfaces [m]
     std::optional<MassProperties> mass;  ///< nothing where the mesh encloses no volume
+    /// All of it facing outward. Null for a body that answers by its field alone, which rounds sharp edges: sweeps then
+    /// end up to two voxels late there, and rays up to half a voxel.
+    std::shared_ptr<const Mesh> mesh;
+    bool exact = false;  ///< whether contacts are measured against the mesh (see ColliderOptions)
 };
 
 /// The level set, to write as a .vdb file, with the body beside it: surface points as a grid of OpenVDB points, the
 /// rest as metadata. Nothing is lost: bodyOf() gives the same bits. The grids of `levelSet` are shared, not copied.
-/// Throws std::invalid_argument if the body has no points.
+/// Throws std::invalid_argument if the body has no points, or a mesh of more than 2 GiB.
 LevelSet withBody(const LevelSet& levelSet, const Body& body);
 
 /// Whether some body was put beside a level set.

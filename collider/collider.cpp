@@ -27,6 +27,9 @@ constexpr float searchTolerance = 2e-3f;  // of the deepest place on an edge [vo
 // A point that slides along a face ends in the edges beyond it by rounding: what only grazes, by less than this, goes
 // past [voxels].
 constexpr float grazing = 0.25f;
+// Two places are brought closer in so many turns; the way between them tells a direction from here on [voxels].
+constexpr int settlingTurns = 3;
+constexpr float shortest = 1e-3f;
 // A tip that has sunk into another one sees its sides; what it opposes is seen so far back along its normal [voxels].
 constexpr float lift = 1;
 
@@ -68,7 +71,7 @@ class PointsInField {
     PointsInField(const Placed& body, const Placed& other, const ContactOptions& options)
         : body_(body),
           other_(other),
-          field_(other.collider.field()),
+          field_(options.measured ? other.collider.measured() : other.collider.field()),
           map_(body, other),
           coarse_(map_.inParts(field_)),
           ways_(body.pose, body.motion, other.pose, other.motion),
@@ -86,7 +89,7 @@ class PointsInField {
     /// Calls found(index, point, touch) for the points within reach of the surface, in it, or on their way to it.
     template <class Found>
     void visit(NearPoints::List* near, ContactReport& report, Found&& found) {
-        if (!near || sweeps_ || options_.farAway) return visitAll(report, found);
+        if (!near || sweeps_ || options_.measured) return visitAll(report, found);
         const float voxel = field_.voxelSize();
         // voxels beyond the band have no numbers: a list must not reach that far
         const float mostSlack =
@@ -137,7 +140,7 @@ class PointsInField {
         const float kept = keptWithin(seen_);
         descend(kept, [&](std::uint32_t index, const SurfacePoint& point) {
             const glm::vec3 place = coarse_(point.position);
-            const bool isAbove = !options_.farAway && clearance_.isAbove(place, seen_);  // or beyond the band
+            const bool isAbove = !options_.measured && clearance_.isAbove(place, seen_);  // or beyond the band
             if (isAbove || clearance_.isOutside(place, kept)) return;
             const glm::vec3 at = map_(point.position);
             touch(index, point, at, sampleAt(at, report), report, found);
@@ -200,7 +203,7 @@ class PointsInField {
     // Beyond the band up to `most`, where that is asked for.
     std::optional<Touch> touchAt(const glm::vec3& at, const Sample& sample, float most) const {
         if (sample.inBand) return touchInBand(field_, at, sample);
-        if (!options_.farAway || sample.distance < 0) return std::nullopt;
+        if (!options_.measured || sample.distance < 0) return std::nullopt;
         const ClosestPoint closest = field_.closest(at, most);
         if (!closest.found) return std::nullopt;
         return Touch{closest.distance, directionOf(closest, at, field_.voxelSize())};
@@ -334,59 +337,68 @@ std::optional<MassProperties> massOf(const Mesh& mesh, const LevelSet& levelSet)
     }
 }
 
+Body makeBody(Mesh given, const LevelSet& levelSet, const ColliderOptions& options) {
+    if (!std::isfinite(options.margin)) throw std::invalid_argument("collider: the margin is not finite");
+    const auto mesh = std::make_shared<const Mesh>(outwardMesh(levelSet, std::move(given)));
+    return {.points = SurfacePoints(*mesh, options.pointSpacing * levelSet.voxelSize()),
+            .bounds = bounds(*mesh),
+            .margin = options.margin < 0 ? levelSet.voxelSize() : options.margin,
+            .mass = massOf(*mesh, levelSet),
+            .mesh = mesh,
+            .exact = options.exact};
+}
+
 }  // namespace
 
-/// A mesh, or the field that it is extracted from when somebody asks: few do, and it takes longer than all else that a
-/// body from a file needs.
-class Collider::Triangles {
+/// What few ask for, and takes longer than all else that a body from a file needs: triangles that are extracted from
+/// the field, and the field with the mesh's.
+class Collider::OnDemand {
   public:
-    explicit Triangles(Mesh mesh) : mesh_(std::move(mesh)) {}
-    explicit Triangles(const LevelSet& field) : field_(field), areGiven_(false) {}
+    explicit OnDemand(const LevelSet& field) : levelSet_(field) {}
+    OnDemand() = default;
 
-    bool areGiven() const { return areGiven_; }
-
-    const Mesh& mesh() {
-        std::call_once(once_, [&] {
-            if (!field_) return;
-            // a thread that waits for others here must not take up work that asks for this very mesh
-            tbb::this_task_arena::isolate([&] { mesh_ = surface(*field_); });
-            field_.reset();
+    const Mesh& zeroSet() {
+        once([&] {
+            mesh_ = surface(*levelSet_);
+            levelSet_.reset();
         });
         return mesh_;
     }
 
+    const Field& measured(const Field& samples, const std::shared_ptr<const Mesh>& mesh) {
+        once([&] { measured_.emplace(samples, mesh); });
+        return *measured_;
+    }
+
   private:
-    std::optional<LevelSet> field_;
-    bool areGiven_ = true;
+    template <class Make>
+    void once(const Make& make) {
+        // a thread that waits for others here must not take up work that asks for the very same
+        std::call_once(once_, [&] { tbb::this_task_arena::isolate(make); });
+    }
+
+    std::optional<LevelSet> levelSet_;  // of a body without a mesh
     Mesh mesh_;
+    std::optional<Field> measured_;
     std::once_flag once_;
 };
 
 Collider::Collider(Mesh mesh, const LevelSet& levelSet, const ColliderOptions& options)
-    : field_(options.exact ? Field(levelSet, std::move(mesh)) : Field(levelSet)),
-      triangles_(options.exact ? nullptr : std::make_shared<Triangles>(outwardMesh(levelSet, std::move(mesh)))),
-      id_(nextId()) {
-    if (!std::isfinite(options.margin)) throw std::invalid_argument("collider: the margin is not finite");
-    body_.points = SurfacePoints(this->mesh(), options.pointSpacing * field_.voxelSize());
-    body_.bounds = bilayer::bounds(this->mesh());
-    body_.margin = options.margin < 0 ? field_.voxelSize() : options.margin;
-    body_.mass = massOf(this->mesh(), levelSet);
-    edges_ = SharpEdges(body_.points, field_);
-}
+    : Collider(levelSet, makeBody(std::move(mesh), levelSet, options)) {}
 
-Collider::Collider(const LevelSet& levelSet)
-    : field_(levelSet),
-      triangles_(std::make_shared<Triangles>(levelSet)),
-      body_(bodyOf(levelSet)),
+Collider::Collider(const LevelSet& levelSet, Body body)
+    : body_(std::move(body)),
+      field_(body_.exact ? Field(Field(levelSet), body_.mesh) : Field(levelSet)),
+      onDemand_(body_.mesh ? std::make_shared<OnDemand>() : std::make_shared<OnDemand>(levelSet)),
       edges_(body_.points, field_),
       id_(nextId()) {}
 
 const Mesh& Collider::mesh() const {
-    return field_.mesh() ? *field_.mesh() : triangles_->mesh();
+    return body_.mesh ? *body_.mesh : onDemand_->zeroSet();
 }
 
-bool Collider::hasMesh() const {
-    return field_.mesh() || triangles_->areGiven();
+const Field& Collider::measured() const {
+    return field_.mesh() || !body_.mesh ? field_ : onDemand_->measured(field_, body_.mesh);
 }
 
 const MassProperties& Collider::mass() const {
@@ -430,6 +442,32 @@ ContactReport addContacts(const Placed& a, const Placed& b, const ContactOptions
     return report;
 }
 
+// The place of a body's surface that is closest to one of the world that is outside of it.
+std::optional<glm::vec3> closestOn(const Placed& body, const glm::vec3& place, float most) {
+    const ClosestPoint closest =
+        body.collider.measured().closest(body.pose.toBody(place) / body.scale, most / body.scale);
+    if (!closest.found || closest.distance < 0) return std::nullopt;
+    return body.pose.toWorld(body.scale * closest.position);
+}
+
+// Moves the two places of a contact apart to what is closest to the other, by turns: edges that are made of surface
+// points may cut across what lies between these.
+void settle(Contact& contact, const Placed& a, const Placed& b) {
+    const float room = b.scale * b.collider.field().voxelSize();
+    glm::vec3 onB = contact.position;
+    for (int turn = 0; turn < settlingTurns; ++turn) {
+        const auto onA = closestOn(a, onB, contact.distance + room);
+        if (!onA) return;
+        const auto next = closestOn(b, *onA, contact.distance + room);
+        if (!next) return;
+        onB = *next;
+        const glm::vec3 way = *onA - onB;
+        const float distance = glm::length(way);
+        if (!(distance > shortest * room)) return;
+        contact = {onB, way / distance, distance, contact.feature, contact.approach};
+    }
+}
+
 }  // namespace
 
 ContactReport collide(const Placed& a, const Placed& b, const ContactOptions& options, std::vector<Contact>& contacts,
@@ -438,7 +476,13 @@ ContactReport collide(const Placed& a, const Placed& b, const ContactOptions& op
         return
             [=](PointsInField points, ContactReport& report, const auto& found) { points.visit(list, report, found); };
     };
-    return addContacts(a, b, options, contacts, visit(near ? &near->ofA : nullptr), visit(near ? &near->ofB : nullptr));
+    const std::size_t first = contacts.size();
+    const ContactReport report =
+        addContacts(a, b, options, contacts, visit(near ? &near->ofA : nullptr), visit(near ? &near->ofB : nullptr));
+    if (options.measured)
+        for (std::size_t i = first; i < contacts.size(); ++i)
+            if (contacts[i].distance > 0) settle(contacts[i], a, b);
+    return report;
 }
 
 std::optional<PointQuery> pointQuery(const Placed& body, const Placed& other, float margin) {

@@ -28,8 +28,7 @@ struct ColliderOptions {
     float margin = -1;
     /// Whether contacts are measured against the triangles, where the field has found them: exact at edges and grooves,
     /// where samples blend what the surface is on either side. Takes memory (see Field), and more time the more
-    /// contacts there are: for parts that fit into each other to a fraction of a voxel. A body from a file has no
-    /// triangles, and is sampled.
+    /// contacts there are: for parts that fit into each other to a fraction of a voxel.
     bool exact = false;
 };
 
@@ -40,16 +39,18 @@ class Collider {
     /// build() does. Throws std::invalid_argument as validate() does, and if the level set is of another mesh.
     Collider(Mesh mesh, const LevelSet& levelSet, const ColliderOptions& options = {});
 
-    /// Of a level set with a body beside it, as readVdb() gives back what withBody() was written of. Collides as the
-    /// one that it was made of, to the bit (see ColliderOptions::exact); where triangles are asked for, it gives those
-    /// of the field's zero set. Throws std::invalid_argument as bodyOf() does.
-    explicit Collider(const LevelSet& levelSet);
+    /// Of a level set with a body beside it, as readVdb() gives back what withBody() was written of. It is as the one
+    /// that it was made of, to the bit; but a body without a mesh gives the triangles of the field's zero set where
+    /// triangles are asked for. Throws std::invalid_argument as bodyOf() does.
+    explicit Collider(const LevelSet& levelSet) : Collider(levelSet, bodyOf(levelSet)) {}
 
-    /// The mesh, all of it facing outward. Of a body from a file it is extracted when first asked for, once.
+    /// The mesh, all of it facing outward. Where the body has none, one like it is extracted from the field when first
+    /// asked for, once.
     const Mesh& mesh() const;
-    /// Whether it was made of a mesh: that of a body from a file is only like it.
-    bool hasMesh() const;
     const Field& field() const { return field_; }
+    /// The field that measures by the triangles: field() itself where contacts are exact, or where the body has no
+    /// mesh; else one with the mesh that shares its samples, made when first asked for, once.
+    const Field& measured() const;
     const Body& body() const { return body_; }
     const SurfacePoints& points() const { return body_.points; }
     const SharpEdges& edges() const { return edges_; }
@@ -61,10 +62,12 @@ class Collider {
     std::uint64_t id() const { return id_; }  ///< no other collider of this process has it
 
   private:
-    class Triangles;
-    Field field_;
-    std::shared_ptr<Triangles> triangles_;  ///< unless the field has them
+    class OnDemand;
+    Collider(const LevelSet& levelSet, Body body);
+
     Body body_;
+    Field field_;
+    std::shared_ptr<OnDemand> onDemand_;
     SharpEdges edges_;
     std::uint64_t id_;
 };
@@ -99,9 +102,10 @@ struct ContactOptions {
     /// band must reach sqrt(3) voxels farther for all of them to be found (what moves on from there is met all the
     /// same), and as much deeper than bodies sink into each other (see Sample::inBand).
     float margin = 0;
-    /// Whether points outside of the other body and of its band are asked for the closest place, which takes a search
-    /// for each; those too deep inside are counted all the same.
-    bool farAway = false;
+    /// Whether distances are measured by the triangles, where the bodies have them (Collider::measured()), and points
+    /// outside of the other body and of its band are asked for the closest place, which takes a search for each; those
+    /// too deep inside are counted all the same.
+    bool measured = false;
     /// Least cosine between the point's own normal and the opposite of the surface's that it touches; contacts below
     /// are left out. Points just under the edge of the other body look along the surface that is nearest to them; sharp
     /// ones among these touch the surface that they oppose a voxel back along their own normal, if there is one. The

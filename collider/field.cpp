@@ -4,8 +4,18 @@
 #include <utility>
 
 #include "collider/field_data.h"
+#include "sdf/sign.h"
 
 namespace bilayer {
+
+FieldData::FieldData(const LevelSet& levelSet, Storage storage)
+    : FieldLayout(levelSet, storage),
+      kernels(sampleKernels(storage)),
+      coarse(clearance()),
+      signedByNormals(levelSet.sign() == "normals"),
+      sampleError(levelSet.errorBound() + (storage == Storage::fixed16 ? step : 0)) {
+    fillLanes();
+}
 
 void FieldData::fillLanes() {
     const glm::dvec3 offset = fixedPoint - origin * perMetre;
@@ -23,8 +33,10 @@ Field::Field(const LevelSet& levelSet, const FieldOptions& options)
     : data_(std::make_shared<FieldData>(levelSet, options.storage)), sample_(data_->kernels.samplePoint) {}
 
 Field::Field(const LevelSet& levelSet, Mesh mesh, const FieldOptions& options)
-    : data_(std::make_shared<FieldData>(levelSet, std::move(mesh), options.storage)),
-      sample_(data_->kernels.samplePoint) {}
+    : Field(Field(levelSet, options), std::make_shared<const Mesh>(outwardMesh(levelSet, std::move(mesh)))) {}
+
+Field::Field(const Field& samples, std::shared_ptr<const Mesh> outward)
+    : data_(std::make_shared<FieldData>(*samples.data_, std::move(outward))), sample_(data_->kernels.samplePoint) {}
 
 Clearance Field::clearance() const noexcept {
     return data_->coarse;
@@ -58,6 +70,9 @@ const FieldLayout& Field::layout() const noexcept {
 }
 const Mesh* Field::mesh() const noexcept {
     return data_->mesh ? &data_->mesh->mesh() : nullptr;
+}
+const MeshTree* Field::tree() const noexcept {
+    return data_->mesh.get();
 }
 
 std::size_t Field::memoryBytes() const noexcept {

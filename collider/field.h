@@ -23,6 +23,7 @@ struct FieldOptions {
 };
 
 struct FieldData;
+class MeshTree;
 
 /// A field laid out for queries. Copies share memory. All queries are noexcept, allocate nothing, and may run on any
 /// number of threads at once.
@@ -38,6 +39,9 @@ class Field {
     /// std::invalid_argument as well if the level set is of another mesh, or the mesh is not valid. Triangles that
     /// build() turned around are turned around in mesh() too.
     Field(const LevelSet& levelSet, Mesh mesh, const FieldOptions& options = {});
+
+    /// A field without its mesh, the samples of which are shared, with what outwardMesh() gave back of it.
+    Field(const Field& samples, std::shared_ptr<const Mesh> outward);
 
     /// Distance and gradient at a point in the field's own coordinates [m].
     Sample sample(const glm::vec3& point) const noexcept { return sample_(*data_, point); }
@@ -120,7 +124,8 @@ class Field {
     bool keeps(const glm::ivec3& block) const noexcept;
     /// What all queries work from; valid as long as the field or a copy of it lives.
     const FieldLayout& layout() const noexcept;
-    const Mesh* mesh() const noexcept;  ///< null for a field without; valid as long as the field or a copy lives
+    const Mesh* mesh() const noexcept;      ///< null for a field without; valid as long as the field or a copy lives
+    const MeshTree* tree() const noexcept;  ///< likewise: of the mesh, for what is asked of triangles
     std::size_t memoryBytes() const noexcept;
 
   private:

@@ -12,7 +12,6 @@
 #include "collider/field.h"
 #include "collider/field_data.h"
 #include "collider/zero_set.h"
-#include "sdf/sign.h"
 
 namespace bilayer {
 namespace {
@@ -46,13 +45,17 @@ glm::vec3 outwardNormal(const NearestFeature& nearest, bool inside) {
 
 }  // namespace
 
-FieldData::FieldData(const LevelSet& levelSet, Mesh given, Storage storage) : FieldData(levelSet, storage) {
-    mesh = std::make_unique<MeshTree>(outwardMesh(levelSet, std::move(given)), levelSet.voxelSize());
+FieldData::FieldData(const FieldData& samples, std::shared_ptr<const Mesh> outward)
+    : FieldLayout(samples.shared()),
+      kernels(samples.kernels),
+      coarse(clearance()),
+      mesh(std::make_unique<MeshTree>(std::move(outward), voxelSize)),
+      signedByNormals(samples.signedByNormals),
+      sampleError(samples.sampleError),
+      error(sampleError) {
+    fillLanes();
     const float reach = std::max(exteriorWidth, interiorWidth) * float(perMetre) + usualError;
     entries = BlockEntries(*this, mesh->tree(), 1 / double(voxelSize), reach);
-    signedByNormals = levelSet.sign() == "normals";
-    error =
-        levelSet.errorBound() < infinity ? levelSet.errorBound() + (storage == Storage::fixed16 ? step : 0) : infinity;
 }
 
 // A ball around a voxel that the surface does not reach lies on the voxel's side.

@@ -46,11 +46,9 @@ struct FieldData : FieldLayout {
     /// Also the Lipschitz bound of the trilinear interpolant [voxels].
     static constexpr float cellDiagonal = 1.7320508f;
 
-    explicit FieldData(const LevelSet& levelSet, Storage storage)
-        : FieldLayout(levelSet, storage), kernels(sampleKernels(storage)), coarse(clearance()) {
-        fillLanes();
-    }
-    FieldData(const LevelSet& levelSet, Mesh mesh, Storage storage);
+    FieldData(const LevelSet& levelSet, Storage storage);
+    /// Shares the samples.
+    FieldData(const FieldData& samples, std::shared_ptr<const Mesh> outward);
     FieldData(const FieldData&) = delete;
     FieldData& operator=(const FieldData&) = delete;
 
@@ -58,8 +56,9 @@ struct FieldData : FieldLayout {
     const Clearance coarse;
     std::unique_ptr<const MeshTree> mesh;  ///< null: the field has none
     BlockEntries entries;                  ///< of searches for points in the band
-    bool signedByNormals = false;          ///< of this mesh
-    float error = 0;                       ///< of distances in the band [m]; infinite: not known
+    bool signedByNormals;                  ///< of the mesh
+    float sampleError;                     ///< of distances in the band from the mesh's [m]; infinite: not known
+    float error = 0;                       ///< the same from what queries ask for: the mesh's where there is one [m]
 
     /// Bits of a place below the voxel, which leave those of the voxel in its block in the same word.
     static constexpr int fractionBits = 29;

@@ -315,13 +315,13 @@ OnEdge closestOnEdge(const std::array<glm::dvec3, 3>& c, int from) {
 
 }  // namespace
 
-MeshTree::MeshTree(Mesh mesh, float voxelSize)
-    : mesh_((validate(mesh), std::move(mesh))), voxelSize_(voxelSize), perMetre_(1 / double(voxelSize)) {
+MeshTree::MeshTree(std::shared_ptr<const Mesh> mesh, float voxelSize)
+    : mesh_((validate(*mesh), std::move(mesh))), voxelSize_(voxelSize), perMetre_(1 / double(voxelSize)) {
     const auto makeTree = [&] {
-        tree_ = makeWideTree(mesh_, voxelSize_, nullptr, {TreeOrder::split, longestEdge});
+        tree_ = makeWideTree(*mesh_, voxelSize_, nullptr, {TreeOrder::split, longestEdge});
         groups_ = makeTurnedGroups(tree_);
     };
-    tbb::parallel_invoke(makeTree, [&] { normals_ = FeatureNormals(mesh_, thinnest * double(voxelSize_)); });
+    tbb::parallel_invoke(makeTree, [&] { normals_ = FeatureNormals(*mesh_, thinnest * double(voxelSize_)); });
 }
 
 // In the tree's frame; the bound becomes negative where nothing is to be found.
@@ -375,9 +375,9 @@ NearestFeature MeshTree::featureOfPart(std::uint32_t part, const glm::dvec3& poi
 }
 
 NearestFeature MeshTree::featureOf(std::uint32_t triangle, const glm::dvec3& point) const noexcept {
-    const glm::uvec3& t = mesh_.triangles[triangle];
-    const std::array<glm::dvec3, 3> c{glm::dvec3(mesh_.points[t.x]) - point, glm::dvec3(mesh_.points[t.y]) - point,
-                                      glm::dvec3(mesh_.points[t.z]) - point};
+    const glm::uvec3& t = mesh_->triangles[triangle];
+    const std::array<glm::dvec3, 3> c{glm::dvec3(mesh_->points[t.x]) - point, glm::dvec3(mesh_->points[t.y]) - point,
+                                      glm::dvec3(mesh_->points[t.z]) - point};
     const std::array<glm::dvec3, 3> edges{c[1] - c[0], c[2] - c[1], c[0] - c[2]};
     const glm::dvec3 n = glm::cross(edges[0], edges[1]);
     const double n2 = glm::dot(n, n);
@@ -404,7 +404,7 @@ NearestFeature MeshTree::featureOf(std::uint32_t triangle, const glm::dvec3& poi
 }
 
 std::size_t MeshTree::memoryBytes() const {
-    return mesh_.points.size() * sizeof(glm::vec3) + mesh_.triangles.size() * sizeof(glm::uvec3) +
+    return mesh_->points.size() * sizeof(glm::vec3) + mesh_->triangles.size() * sizeof(glm::uvec3) +
            tree_.leafCount * sizeof(WideLeaf) + tree_.groupCount * (sizeof(BoxGroup) + sizeof(TurnedGroup)) +
            normals_.memoryBytes();
 }

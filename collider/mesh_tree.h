@@ -4,7 +4,9 @@
 #include <cstddef>
 #include <cstdint>
 #include <glm/vec3.hpp>
+#include <memory>
 #include <span>
+#include <utility>
 
 #include "collider/block_entries.h"
 #include "collider/closest_point.h"
@@ -29,10 +31,11 @@ struct NearestFeature {
 /// Immutable; all queries are safe from any thread and allocate nothing.
 class MeshTree {
   public:
-    /// Takes about 140 bytes a triangle and 6 a vertex beside the mesh.
+    /// Takes about 140 bytes a triangle and 6 a vertex beside the mesh, which it shares.
     /// @param voxelSize  of the field that goes with it: lengths in the hierarchy are in voxels [m]
     /// Throws as validate() and makeWideTree() do.
-    MeshTree(Mesh mesh, float voxelSize);
+    MeshTree(std::shared_ptr<const Mesh> mesh, float voxelSize);
+    MeshTree(Mesh mesh, float voxelSize) : MeshTree(std::make_shared<const Mesh>(std::move(mesh)), voxelSize) {}
 
     /// The triangle that is nearest to a point: to within 1e-5 voxels up to ten voxels away, to a millionth of the
     /// distance farther away. `noTriangle` if none is as near as the bound, or the point is not finite.
@@ -57,7 +60,7 @@ class MeshTree {
     /// The same for a triangle that nearestPart() has found for the point; quick where the point lies over it.
     NearestFeature featureOfPart(std::uint32_t part, const glm::dvec3& point) const noexcept;
 
-    const Mesh& mesh() const { return mesh_; }
+    const Mesh& mesh() const { return *mesh_; }
     const WideTree& tree() const { return tree_; }
     float voxelSize() const { return voxelSize_; }  ///< [m]
     std::size_t memoryBytes() const;
@@ -69,7 +72,7 @@ class MeshTree {
         return tree_.leaves[part / treeWidth].triangles[part % treeWidth];
     }
 
-    Mesh mesh_;
+    std::shared_ptr<const Mesh> mesh_;
     float voxelSize_;
     double perMetre_;  // voxels
     WideTree tree_;

@@ -360,6 +360,19 @@ FieldLayout::FieldLayout(const LevelSet& levelSet, Storage storage)
     bounds = {glm::vec3(world(active.min())), glm::vec3(world(active.max()))};
 }
 
+FieldLayout FieldLayout::shared() const {
+    FieldLayout other{FieldFrame(*this)};
+    other.directory = directory.shared();
+    other.centres = centres.shared();
+    other.leasts = leasts.shared();
+    other.storage = storage;
+    other.values = values.shared();
+    other.values16 = values16.shared();
+    other.step = step;
+    other.stored = stored;
+    return other;
+}
+
 Clearance FieldLayout::clearance() const {
     return Clearance({.directory = directory.data(),
                       .centres = centres.data(),

@@ -69,9 +69,16 @@ struct FieldLayout : FieldFrame {
     /// Throws std::invalid_argument if no voxel is in the band, or if the box is so large for its voxels that it holds
     /// more than 2^26 blocks of 8^3 voxels, or more than 2^19 along an axis.
     explicit FieldLayout(const LevelSet& levelSet, Storage storage = Storage::float32);
+    FieldLayout(FieldLayout&&) noexcept = default;
+    FieldLayout& operator=(FieldLayout&&) noexcept = default;
 
+    /// The same layout, whose arrays share memory.
+    FieldLayout shared() const;
     Clearance clearance() const;
     std::size_t memoryBytes() const;
+
+  private:
+    explicit FieldLayout(const FieldFrame& frame) : FieldFrame(frame) {}
 };
 
 }  // namespace bilayer

@@ -44,10 +44,10 @@ struct Arguments {
     std::uint64_t deviceMemory = 0;
     VdbOptions stored;
     ColliderOptions collider;
-    bool fill = false, body = false, json = false;
+    bool fill = false, body = false, noMesh = false, json = false;
     CLI::Option *resolutionGiven = nullptr, *halfGiven = nullptr, *exteriorGiven = nullptr, *interiorGiven = nullptr;
     CLI::Option* gapGiven = nullptr;
-    CLI::Option *marginGiven = nullptr, *spacingGiven = nullptr;
+    std::vector<CLI::Option*> bodyOptions;
     CLI::Option *deviceGiven = nullptr, *memoryGiven = nullptr, *mappingGiven = nullptr;
     std::vector<CLI::Option*> layerOptions;  // what only the double layer method understands
 };
@@ -77,8 +77,8 @@ void requireUsage(const Arguments& a) {
         throw CLI::ValidationError("--gap", "needs --sign flood or auto, and --method exact or pseudonormal");
     if (a.bandUnit == "world" && !a.halfGiven->count() && !a.exteriorGiven->count())
         throw CLI::ValidationError("--band-unit", "world needs --half-width, or --exterior-width and --interior-width");
-    if (!a.body && (a.marginGiven->count() || a.spacingGiven->count()))
-        throw CLI::ValidationError("--margin and --point-spacing", "need --body");
+    for (const CLI::Option* option : a.bodyOptions)
+        if (!a.body && option->count()) throw CLI::ValidationError(option->get_name(), "needs --body");
     requireOther(a.output, a.mesh);
 }
 
@@ -127,9 +127,11 @@ LevelSet timedBuild(const Mesh& mesh, const Arguments& a, Outcome& outcome) {
 // With what bodies need beside the field.
 LevelSet timedBody(const Mesh& mesh, const LevelSet& field, const Arguments& a, Outcome& outcome) {
     const Stopwatch watch;
-    LevelSet body = withBody(field, Collider(mesh, field, a.collider).body());
+    Body body = Collider(mesh, field, a.collider).body();
+    if (a.noMesh) body.mesh.reset();
+    LevelSet stored = withBody(field, body);
     outcome.body = watch.seconds();
-    return body;
+    return stored;
 }
 
 void printJson(const Arguments& a, const Outcome& o, const LevelSet& field) {
@@ -261,14 +263,17 @@ void addLayers(CLI::App& command, Arguments& a) {
 
 void addBody(CLI::App& command, Arguments& a) {
     auto* group = command.add_option_group("body", "what rigid bodies need beside the field");
-    group->add_flag("--body", a.body, "keep surface points, mass and margin in the file: it collides without the mesh");
-    a.marginGiven = group
-                        ->add_option("--margin", a.collider.margin,
-                                     "bodies touch up to this distance in the mesh's unit, default a voxel")
-                        ->check(positive());
-    a.spacingGiven =
+    group->add_flag("--body", a.body, "keep surface points, mass, margin and the mesh: the file is all that collides");
+    auto* exact = group->add_flag("--exact-contacts", a.collider.exact, "measure contacts against the triangles");
+    auto* noMesh = group->add_flag("--no-mesh", a.noMesh, "a smaller file, which rounds sharp edges in casts");
+    a.bodyOptions = {
+        group
+            ->add_option("--margin", a.collider.margin,
+                         "bodies touch up to this distance in the mesh's unit, default a voxel")
+            ->check(positive()),
         group->add_option("--point-spacing", a.collider.pointSpacing, "distance of surface points [voxels], default 2")
-            ->check(within(0.1, 100));
+            ->check(within(0.1, 100)),
+        exact, noMesh->excludes(exact)};
 }
 
 void addMachine(CLI::App& command, Arguments& a) {

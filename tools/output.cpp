@@ -182,12 +182,16 @@ Json toJson(const Body& body) {
     return {{"points", body.points.points().size()},
             {"margin", number(body.margin)},
             {"bounds", box(body.bounds)},
-            {"mass", toJson(body.mass)}};
+            {"mass", toJson(body.mass)},
+            {"triangles", body.mesh ? body.mesh->triangles.size() : 0},
+            {"exactContacts", body.exact}};
 }
 
 void addRows(Table& table, const Body& body) {
-    table.row("body", fmt::format("{} surface points, margin {}{}", grouped(body.points.points().size()),
-                                  metres(body.margin), body.mass ? "" : ", without a mass"));
+    const std::string mesh = body.mesh ? grouped(body.mesh->triangles.size()) + " triangles" : "no mesh";
+    table.row("body", fmt::format("{} surface points, margin {}, {}{}{}", grouped(body.points.points().size()),
+                                  metres(body.margin), mesh, body.exact ? ", exact contacts" : "",
+                                  body.mass ? "" : ", without a mass"));
 }
 
 ProgressBar::ProgressBar(std::string label) : label_(std::move(label)), visible_(::isatty(STDERR_FILENO)) {}

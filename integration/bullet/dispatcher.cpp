@@ -159,11 +159,11 @@ class Pair {
         return least;
     }
 
-    void find(const Side& a, const Side& b, float margin, bool asked) {
+    void find(const Side& a, const Side& b, float margin, bool measured) {
         contacts_.clear();
         const bool follows = static_cast<const Shape&>(*b.shape).sweeps();
-        report_ = isField(a.shape) ? collideFields(a.placed(), b.placed(), margin, asked, near_, contacts_)
-                                   : collideOther(a, b.placed(), margin, asked, follows ? a.motion() : Motion{});
+        report_ = isField(a.shape) ? collideFields(a.placed(), b.placed(), margin, measured, near_, contacts_)
+                                   : collideOther(a, b.placed(), margin, measured, follows ? a.motion() : Motion{});
     }
 
     void finish(const Side& a, const Side& b) {
@@ -173,7 +173,7 @@ class Pair {
         sampled_ = 0;
     }
 
-    ContactReport collideOther(const Side& a, const Placed& field, float margin, bool asked, const Motion& motion) {
+    ContactReport collideOther(const Side& a, const Placed& field, float margin, bool measured, const Motion& motion) {
         if (a.shape->getShapeType() == STATIC_PLANE_PROXYTYPE) {
             const auto& plane = static_cast<const btStaticPlaneShape&>(*a.shape);
             const btVector3 normal = a.transform.getBasis() * plane.getPlaneNormal();
@@ -184,10 +184,10 @@ class Pair {
         if (a.shape->isConvex()) {
             const auto& convex = static_cast<const btConvexShape&>(*a.shape);
             if (!convex_ || !convex_->isOf(convex)) convex_.emplace(convex);
-            return collideConvex(*convex_, toPose(a.transform), motion, field, margin, asked, contacts_);
+            return collideConvex(*convex_, toPose(a.transform), motion, field, margin, measured, contacts_);
         }
         return collideTriangles(static_cast<const btConcaveShape&>(*a.shape), a.transform, motion, field, margin,
-                                contacts_);
+                                measured, contacts_);
     }
 
     Manifolds manifolds_;

@@ -54,10 +54,11 @@ constexpr float grazing = 0.25f;
 /// A field in metres of the world and the axes of its body, and how another body moves towards it.
 class Local {
   public:
-    /// @param reach  up to which contacts are made [m]
-    Local(const Placed& field, const Pose& other, const Motion& motion, float reach)
+    /// @param reach     up to which contacts are made [m]
+    /// @param measured  as in ContactOptions
+    Local(const Placed& field, const Pose& other, const Motion& motion, float reach, bool measured)
         : collider_(field.collider),
-          field_(field.collider.field()),
+          field_(measured ? field.collider.measured() : field.collider.field()),
           scale_(field.scale),
           voxel_(field.scale * field.collider.field().voxelSize()),
           pose_(field.pose),
@@ -277,11 +278,11 @@ std::optional<Contact> Local::deepestBetween(const Edge& edge, float from, const
 class Touching {
   public:
     Touching(const Convex& convex, const Pose& pose, const Motion& motion, const Placed& field, float margin,
-             bool asked)
+             bool measured)
         : convex_(convex),
-          local_(field, pose, motion, margin),
+          local_(field, pose, motion, margin, measured),
           margin_(margin),
-          asked_(asked),
+          measured_(measured),
           scale_(field.scale),
           voxel_(field.scale * field.collider.field().voxelSize()) {
         const Pose inField = relative(field.pose, pose);
@@ -472,7 +473,7 @@ class Touching {
         } else {
             // Where faces touch, points are exact, and the interpolant is not beside sharp edges.
             const bool isSmooth = local_.collider().edges().edges().empty();
-            if (!asked_ && !isSmooth) least = touchingFace * scale_ * local_.collider().field().voxelSize();
+            if (!measured_ && !isSmooth) least = touchingFace * scale_ * local_.collider().field().voxelSize();
             if (!convex_.isFlat(near) || near.distance < least) return std::nullopt;
             const glm::vec3 uphill = slope - glm::dot(slope, near.normal) * near.normal;
             const float steepness = glm::length(uphill);
@@ -490,7 +491,7 @@ class Touching {
     const Convex& convex_;
     Local local_;
     float margin_;
-    bool asked_;
+    bool measured_;
     float scale_, voxel_;
     float edgeReach_ = margin_;  ///< within which points of sharp edges are looked at
     glm::mat3 toField_, toConvex_;
@@ -500,11 +501,11 @@ class Touching {
 /// Triangles as Bullet hands them over: what they share is asked about once.
 class TriangleProbes : public btTriangleCallback {
   public:
-    TriangleProbes(const btTransform& transform, const Motion& motion, const Placed& field, float margin,
+    TriangleProbes(const btTransform& transform, const Motion& motion, const Placed& field, float margin, bool measured,
                    ContactReport& report, std::vector<Contact>& contacts)
         : inField_(relative(field.pose, toPose(transform))),
           field_(field),
-          local_(field, toPose(transform), motion, margin),
+          local_(field, toPose(transform), motion, margin, measured),
           margin_(margin),
           reach_(std::max(margin, field.scale * field.collider.field().interiorWidth()) + local_.longestWay()),
           spacing_(probeSpacing * field.scale * field.collider.field().voxelSize()),
@@ -704,11 +705,11 @@ class TriangleProbes : public btTriangleCallback {
 
 }  // namespace
 
-ContactReport collideFields(const Placed& a, const Placed& b, float margin, bool farAway, NearPoints& near,
+ContactReport collideFields(const Placed& a, const Placed& b, float margin, bool measured, NearPoints& near,
                             std::vector<Contact>& contacts) {
     ContactOptions options = opposition;
     options.margin = margin;
-    options.farAway = farAway;
+    options.measured = measured;
     return collide(a, b, options, contacts, &near);
 }
 
@@ -726,7 +727,7 @@ ContactReport collidePlane(const glm::vec3& normal, float offset, const Motion& 
     const glm::vec3 up = glm::conjugate(field.pose.rotation) * normal;
     const float height = (offset - glm::dot(normal, field.pose.position)) / field.scale;
     const float reach = margin / field.scale;
-    const Local local(field, {}, motion, margin);
+    const Local local(field, {}, motion, margin, false);
     const auto above = [&](const glm::vec3& point) { return glm::dot(up, point) - height; };
     const auto reject = [&](const glm::vec3& centre, float radius) {
         return above(centre) - radius > reach + local.longestWay() / field.scale;
@@ -744,9 +745,9 @@ ContactReport collidePlane(const glm::vec3& normal, float offset, const Motion& 
 }
 
 ContactReport collideConvex(const Convex& convex, const Pose& pose, const Motion& motion, const Placed& field,
-                            float margin, bool asked, std::vector<Contact>& contacts) {
+                            float margin, bool measured, std::vector<Contact>& contacts) {
     ContactReport report;
-    const Touching touching(convex, pose, motion, field, margin, asked);
+    const Touching touching(convex, pose, motion, field, margin, measured);
     field.collider.points().visit(
         [&](const glm::vec3& centre, float radius) { return touching.reject(centre, radius); },
         [&](std::uint32_t index, const SurfacePoint& point) { touching.visit(index, point, report, contacts); });
@@ -755,9 +756,9 @@ ContactReport collideConvex(const Convex& convex, const Pose& pose, const Motion
 }
 
 ContactReport collideTriangles(const btConcaveShape& mesh, const btTransform& transform, const Motion& motion,
-                               const Placed& field, float margin, std::vector<Contact>& contacts) {
+                               const Placed& field, float margin, bool measured, std::vector<Contact>& contacts) {
     ContactReport report;
-    TriangleProbes probes(transform, motion, field, margin, report, contacts);
+    TriangleProbes probes(transform, motion, field, margin, measured, report, contacts);
     const Pose inMesh = relative(toPose(transform), field.pose);
     const Bounds& bounds = field.collider.bounds();
     btVector3 lower, upper;

@@ -15,9 +15,9 @@ namespace bilayer::bullet {
 
 /// Two fields, without the contacts whose normals look along the surface they touch: those of points just under the
 /// edge of the other body.
-/// @param farAway  as in ContactOptions
-/// @param near     kept for this pair of bodies from step to step
-ContactReport collideFields(const Placed& a, const Placed& b, float margin, bool farAway, NearPoints& near,
+/// @param measured  as in ContactOptions
+/// @param near      kept for this pair of bodies from step to step
+ContactReport collideFields(const Placed& a, const Placed& b, float margin, bool measured, NearPoints& near,
                             std::vector<Contact>& contacts);
 
 /// The same of the points that a sampler has found of A in B's field, and of B in A's.
@@ -30,13 +30,14 @@ ContactReport collidePlane(const glm::vec3& normal, float offset, const Motion& 
                            float margin, std::vector<Contact>& contacts);
 
 /// Against a convex body: the field's surface points against its formula, then its own points in the field.
-/// @param asked  by a contact test: the places between surface points count where faces touch as well, which beside
-///               sharp edges would shake what rests
+/// @param measured  as in ContactOptions; the places between surface points count where faces touch as well, which
+///                  beside sharp edges would shake what rests
 ContactReport collideConvex(const Convex& convex, const Pose& pose, const Motion& motion, const Placed& field,
-                            float margin, bool asked, std::vector<Contact>& contacts);
+                            float margin, bool measured, std::vector<Contact>& contacts);
 
 /// Against the triangles of a mesh or a height field, from both sides: a triangle is a sheet.
+/// @param measured  as in ContactOptions
 ContactReport collideTriangles(const btConcaveShape& mesh, const btTransform& transform, const Motion& motion,
-                               const Placed& field, float margin, std::vector<Contact>& contacts);
+                               const Placed& field, float margin, bool measured, std::vector<Contact>& contacts);
 
 }  // namespace bilayer::bullet

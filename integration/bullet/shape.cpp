@@ -7,7 +7,6 @@
 #include <BulletCollision/CollisionShapes/btUniformScalingShape.h>
 #include <BulletCollision/NarrowPhaseCollision/btRaycastCallback.h>
 #include <LinearMath/btAabbUtil2.h>
-#include <tbb/task_arena.h>
 
 #include <cmath>
 #include <glm/geometric.hpp>
@@ -172,8 +171,8 @@ Pose centreOfMassFrame(const Collider& collider) {
     return {-(rotation * mass.centre), rotation};
 }
 
-/// The mesh in body coordinates under Bullet's own bounding hierarchy, and under that of rays and spheres. Each is
-/// built when first asked for: contacts do without, and Bullet's takes longer to build than the surface points.
+/// The mesh in body coordinates under Bullet's own bounding hierarchy. It is built when first asked for: contacts, rays
+/// and spheres do without, and it takes longer to build than the surface points.
 class Shape::Triangles {
   public:
     const btScaledBvhTriangleMeshShape& of(const Shape& shape) {
@@ -200,17 +199,6 @@ class Shape::Triangles {
         mesh_->performConvexcast(&enlarged, from.getOrigin() / scaling, to.getOrigin() / scaling, lower / scaling,
                                  upper / scaling);
     }
-    /// Null for a body without a mesh of its own.
-    const MeshTree* tree(const Collider& collider) {
-        std::call_once(treeOnce_, [&] {
-            // a thread that waits for others here must not take up work that asks for this very tree
-            tbb::this_task_arena::isolate([&] {
-                if (collider.hasMesh())
-                    tree_ = std::make_unique<MeshTree>(collider.mesh(), collider.field().voxelSize());
-            });
-        });
-        return tree_.get();
-    }
     void setScaling(const btVector3& scaling) {
         if (scaled_) scaled_->setLocalScaling(scaling);
     }
@@ -236,8 +224,7 @@ class Shape::Triangles {
     std::unique_ptr<btTriangleIndexVertexArray> array_;
     std::unique_ptr<btBvhTriangleMeshShape> mesh_;
     std::unique_ptr<btScaledBvhTriangleMeshShape> scaled_;
-    std::unique_ptr<MeshTree> tree_;
-    std::once_flag once_, treeOnce_;
+    std::once_flag once_;
 };
 
 Shape::Shape(std::shared_ptr<const Collider> collider, const ShapeOptions& options)
@@ -298,9 +285,8 @@ void Shape::calculateLocalInertia(btScalar mass, btVector3& inertia) const {
 
 void Shape::processAllTriangles(btTriangleCallback* callback, const btVector3& lower, const btVector3& upper) const {
     if (auto* ray = dynamic_cast<btTriangleRaycastCallback*>(callback)) {
-        const MeshTree* mesh = triangles_->tree(*collider_);
         const Placed here = placed(btTransform::getIdentity());
-        if (mesh) return castRay(here, *mesh, *ray);
+        if (const MeshTree* mesh = collider_->measured().tree()) return castRay(here, *mesh, *ray);
         if (const auto fraction = castRay(here, *ray)) {
             Behind behind(*ray, *fraction);
             triangles_->of(*this).processAllTriangles(&behind, lower, upper);
@@ -312,7 +298,7 @@ void Shape::processAllTriangles(btTriangleCallback* callback, const btVector3& l
         sweep->m_triangleCollisionMargin = 0;
         const auto* sphere = dynamic_cast<const btSphereShape*>(sweep->m_convexShape);
         const Placed here = placed(sweep->m_triangleToWorld);
-        if (sphere && castSphere(here, triangles_->tree(*collider_), sphere->getRadius(), *sweep)) return;
+        if (sphere && castSphere(here, collider_->measured().tree(), sphere->getRadius(), *sweep)) return;
         return triangles_->cast(*this, *sweep);
     }
 

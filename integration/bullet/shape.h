@@ -65,9 +65,9 @@ class Shape : public btConcaveShape {
     /// From the mesh, about the body's origin. Throws std::invalid_argument for a mesh without volume.
     void calculateLocalInertia(btScalar mass, btVector3& inertia) const override;
     /// Serves rays, swept spheres and other casts as the mesh would answer, debug drawing and soft bodies with the
-    /// triangles that meet the box. A body from a file has no mesh: its field answers rays from outside, and swept
-    /// spheres that are narrower than the band less sqrt(3) voxels; all else is served with the triangles of the
-    /// field's zero set.
+    /// triangles that meet the box. Of a body without a mesh the field answers rays from outside, and swept spheres
+    /// that are narrower than the band less sqrt(3) voxels; all else is served with the triangles of the field's zero
+    /// set.
     void processAllTriangles(btTriangleCallback* callback, const btVector3& lower,
                              const btVector3& upper) const override;
     /// In voxels, not in parts of the body's size as Bullet's default, which merges contacts on fine features.

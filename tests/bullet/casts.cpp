@@ -4,6 +4,7 @@
 #include <BulletCollision/NarrowPhaseCollision/btRaycastCallback.h>
 
 #include <algorithm>
+#include <array>
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <functional>
@@ -16,6 +17,7 @@
 #include "demos/shared/shapes.h"
 #include "integration/bullet/convert.h"
 #include "sdf/build.h"
+#include "sdf/vdb_io.h"
 #include "tests/support/support.h"
 #include "world.h"
 
@@ -276,6 +278,43 @@ TEST_CASE("Shapes of all kinds on their way meet a field as they meet its triang
     CHECK(turned <= hits / 20);
 }
 
+TEST_CASE("A body from a file answers casts and contact tests as the one of its mesh, to the bit") {
+    const int kind = GENERATE(range(0, 7));
+    const unsigned start = seed();
+    CAPTURE(kind, start);
+    const Mesh mesh = bodyOf(kind % 2);
+    const LevelSet field = build(mesh, {.voxelSize = voxel});
+    const auto path = scratch("casts.vdb");
+    const auto made = std::make_shared<Collider>(mesh, field);
+    writeVdb(path, withBody(field, made->body()));
+    Shape ofMesh(made), ofFile(std::make_shared<Collider>(readVdb(path)));
+    World meshes, files;
+    meshes.add(ofMesh, 0, {0, 0, 0});
+    files.add(ofFile, 0, {0, 0, 0});
+    const auto shape = shapeOf(kind, 1);
+    Directions random(start);
+    int hits = 0, touches = 0;
+    for (int i = 0; i < 60; ++i) {
+        const auto [from, to] = random.way(1);
+        const btTransform begin(random.turn(), from), end(begin.getBasis(), to),
+            near(random.turn(), 0.8f * random.vector());
+        const auto ask = [&, from = from, to = to](World& world) {
+            btCollisionWorld::ClosestRayResultCallback ray(from, to);
+            world.dynamics.rayTest(from, to, ray);
+            btCollisionWorld::ClosestConvexResultCallback sweep(from, to);
+            world.dynamics.convexSweepTest(shape.get(), begin, end, sweep);
+            return std::array{ray.m_closestHitFraction, sweep.m_closestHitFraction, distanceOf(*shape, near, world)};
+        };
+        const auto expected = ask(meshes);
+        CAPTURE(i);
+        REQUIRE(ask(files) == expected);
+        hits += expected[0] < 1 && expected[1] < 1;
+        touches += expected[2] < 1;
+    }
+    CHECK(hits > 10);
+    CHECK(touches > 0);
+}
+
 TEST_CASE("A shape that turns on its way meets what lies beside its last rotation") {
     Twins twins(bodyOf(0), 1, false, 1);
     const btBoxShape plank({0.02f, 0.02f, 0.9f});
@@ -335,6 +374,12 @@ double leastBetween(const glm::dvec3& from, const glm::dvec3& to,
             onRight = at(right = lower + golden * (upper - lower));
         }
     return std::min({at(0), at(1), onLeft, onRight});
+}
+
+// How far a point is from the box of shapeOf(1, 1), whose corners Bullet rounds off.
+double fromBox(const glm::dvec3& p) {
+    const glm::dvec3 beyond = glm::abs(p) - glm::dvec3(0.1, 0.15, 0.2);
+    return glm::length(glm::max(beyond, 0.)) + std::min(std::max({beyond.x, beyond.y, beyond.z}), 0.);
 }
 
 // How far a point is from the cylinder of shapeOf(3, 1).
@@ -400,7 +445,8 @@ TEST_CASE("Contact tests tell the distance that the triangles have") {
         Mesh seen = mesh;
         for (glm::vec3& p : seen.points)
             p = bullet::toGlm(btTransform(turn.getBasis(), place).inverse() * (body * toBullet(p)));
-        const float expected = kind == 3   ? float(distanceTo(seen, fromCylinder))
+        const float expected = kind == 1   ? float(distanceTo(seen, fromBox))
+                               : kind == 3 ? float(distanceTo(seen, fromCylinder))
                                : kind == 4 ? float(distanceTo(seen, fromCone))
                                            : byBullet;
         CAPTURE(i, distance / voxel, expected / voxel, byBullet / voxel);

@@ -101,7 +101,8 @@ Collide collideBars(int kind, bool exact) {
     const auto triangles = std::make_shared<TriangleShape>(shapes::box(bar));
     return [=](const Crossing& c, float margin) {
         std::vector<Contact> contacts;
-        bullet::collideTriangles(*triangles->shape, transformOf(c.upper), {}, {*field, c.lower}, margin, contacts);
+        bullet::collideTriangles(*triangles->shape, transformOf(c.upper), {}, {*field, c.lower}, margin, false,
+                                 contacts);
         return contacts;
     };
 }
@@ -146,7 +147,7 @@ TEST_CASE("A plane of many triangles makes the contacts of a plane of two") {
         pose.position.z = halfSlab.z - lowest + 0.5f * h * part(random);
         const auto collide = [&](const TriangleShape& slab) {
             std::vector<Contact> contacts;
-            bullet::collideTriangles(*slab.shape, btTransform::getIdentity(), {}, {*body, pose}, h, contacts);
+            bullet::collideTriangles(*slab.shape, btTransform::getIdentity(), {}, {*body, pose}, h, false, contacts);
             return contacts;
         };
         const auto few = collide(two), others = collide(many);
@@ -431,7 +432,7 @@ TEST_CASE("No contact is much deeper than the bodies overlap, whichever edges cr
         contacts.clear();
         bullet::collideTriangles(*triangles[a].shape,
                                  btTransform(bullet::toBullet(pose.rotation), bullet::toBullet(pose.position)), {},
-                                 {*colliders[b], {}}, h, contacts);
+                                 {*colliders[b], {}}, h, false, contacts);
         check("triangles", contacts);
         if (a != 2) continue;
         contacts.clear();
@@ -467,7 +468,7 @@ TEST_CASE("A corner is as deep in triangles as below their plane, however the bo
                               (pose.rotation * (half * glm::vec3(i & 1 ? 1 : -1, i & 2 ? 1 : -1, i & 4 ? 1 : -1))).z);
         pose.position.z = -lowest - depth;
         std::vector<Contact> contacts;
-        bullet::collideTriangles(ground, btTransform::getIdentity(), {}, {*box, pose}, h, contacts);
+        bullet::collideTriangles(ground, btTransform::getIdentity(), {}, {*box, pose}, h, false, contacts);
         float deepest = h;
         glm::vec3 direction(0);
         for (const Contact& contact : contacts)

@@ -187,7 +187,7 @@ TEST_CASE("A field comes to rest on uneven ground, where each contact has a feat
 
     std::vector<Contact> contacts;
     bullet::collideTriangles(waves.shape(asTerrain), btTransform::getIdentity(), {},
-                             shape.placed(body->getWorldTransform()), h, contacts);
+                             shape.placed(body->getWorldTransform()), h, false, contacts);
     std::set<std::uint32_t> features;
     for (const Contact& contact : contacts) features.insert(contact.feature);
     CHECK(features.size() == contacts.size());

@@ -125,12 +125,13 @@ TEST_CASE("Spheres are swept against the field, or against the mesh where they a
     }
 }
 
-TEST_CASE("Spheres of any radius are swept against a body from a file, from within its band and from beyond its box") {
+TEST_CASE(
+    "Spheres of any radius are swept against a body without a mesh, from within its band and from beyond its box") {
     const float scale = GENERATE(1.f, 2.f), radius = GENERATE(0.2f, 1.f, 1.2f, 1.4f, 1.7f, 2.f, 2.5f, 4.f) * scale * h;
     CAPTURE(scale, radius / (scale * h));
     const Mesh mesh = shapes::box({0.5f, 0.4f, 0.3f});
     const LevelSet field = build(mesh, {.voxelSize = h});
-    Shape shape(std::make_shared<Collider>(withBody(field, Collider(mesh, field).body())));
+    Shape shape(withoutMesh(mesh, field));
     shape.setLocalScaling({scale, scale, scale});
     World world;
     world.add(shape, 1, {0, 0, 0});
@@ -147,13 +148,11 @@ TEST_CASE("Spheres of any radius are swept against a body from a file, from with
     }
 }
 
-TEST_CASE("A ray from within a body from a file leaves it as it leaves the body's mesh") {
+TEST_CASE("A ray from within a body without a mesh leaves it as it leaves the mesh") {
     const Mesh mesh = shapes::box({0.5f, 0.4f, 0.3f});
     const LevelSet field = build(mesh, {.voxelSize = h});
-    const auto made = std::make_shared<Collider>(mesh, field),
-               loaded = std::make_shared<Collider>(withBody(field, made->body()));
-    Shape ofMesh(made), ofFile(loaded);
-    for (Shape* shape : {&ofMesh, &ofFile}) {
+    Shape ofMesh(std::make_shared<Collider>(mesh, field)), ofField(withoutMesh(mesh, field));
+    for (Shape* shape : {&ofMesh, &ofField}) {
         World world;
         world.add(*shape, 0, {0, 0, 0});
         const btVector3 from(0.1f, 0.07f, 0.1f), to(0.1f, 0.07f, 2.1f);
@@ -232,15 +231,14 @@ struct Refusing : Callback {
 }  // namespace
 
 TEST_CASE("Rays and swept spheres go on behind a hit where their callback does") {
-    const bool isFromFile = GENERATE(false, true);
-    CAPTURE(isFromFile);
+    const bool hasMesh = GENERATE(true, false);
+    CAPTURE(hasMesh);
     const Mesh mesh = shapes::box({0.5f, 0.4f, 0.3f});
     const LevelSet field = build(mesh, {.voxelSize = h});
-    Shape shape(isFromFile ? std::make_shared<Collider>(withBody(field, Collider(mesh, field).body()))
-                           : std::make_shared<Collider>(mesh, field));
+    Shape shape(hasMesh ? std::make_shared<Collider>(mesh, field) : withoutMesh(mesh, field));
     World world;
     world.add(shape, 0, {0, 0, 0});
-    const double error = isFromFile ? 0.02 : 1e-5;
+    const double error = hasMesh ? 1e-5 : 0.02;
 
     const btVector3 above(0.1f, 0.07f, 2), below(0.1f, 0.07f, -2);
     btCollisionWorld::AllHitsRayResultCallback all(above, below);
@@ -263,7 +261,7 @@ TEST_CASE("Rays and swept spheres go on behind a hit where their callback does")
     REQUIRE(sweep.hasHit());
     // the zero set has small triangles, which a sphere that has passed some of the top meets by their sides
     CHECK(sweep.m_closestHitFraction > 0.25 / 0.6 + 0.01);
-    if (!isFromFile) CHECK(sweep.m_closestHitFraction == Approx(1.35 / 1.8).margin(0.002));
+    if (hasMesh) CHECK(sweep.m_closestHitFraction == Approx(1.35 / 1.8).margin(0.002));
 }
 
 TEST_CASE("A box is swept against the triangles of the mesh") {
@@ -390,10 +388,10 @@ TEST_CASE("Drawing shows the mesh where the body is") {
     world.dynamics.setDebugDrawer(nullptr);
 }
 
-TEST_CASE("The surface of a body from a file is drawn without its mesh") {
+TEST_CASE("The surface of a body without a mesh is drawn") {
     const Mesh mesh = shapes::sphere(0.5f, 4);
     const LevelSet field = build(mesh, {.voxelSize = h});
-    Shape shape(std::make_shared<Collider>(withBody(field, Collider(mesh, field).body())));
+    Shape shape(withoutMesh(mesh, field));
     World world;
     btRigidBody* body = world.add(shape, 1, {1, 2, 3});
     CountingDrawer drawer;

@@ -94,6 +94,12 @@ std::shared_ptr<const Collider> exactBowl(float radius, float wall, float voxelS
     return exactCollider(shapes::bowl(radius, wall, 256), distance, voxelSize);
 }
 
+std::shared_ptr<const Collider> withoutMesh(const Mesh& mesh, const LevelSet& field) {
+    Body body = Collider(mesh, field).body();
+    body.mesh.reset();
+    return std::make_shared<Collider>(withBody(field, body));
+}
+
 float motion(const btRigidBody& body) {
     return body.getLinearVelocity().length() + body.getAngularVelocity().length();
 }

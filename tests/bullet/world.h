@@ -51,6 +51,9 @@ std::shared_ptr<const Collider> exactTorus(float major, float minor, float voxel
 /// A shell like shapes::bowl: the lower half of the sphere of `radius`, `wall` thick, with a round rim.
 std::shared_ptr<const Collider> exactBowl(float radius, float wall, float voxelSize);
 
+/// The body of a mesh as it comes back from a file that leaves the mesh out.
+std::shared_ptr<const Collider> withoutMesh(const Mesh& mesh, const LevelSet& field);
+
 /// Speed at which a body at rest may still creep: linear [m/s] and angular [1/s] together.
 float motion(const btRigidBody& body);
 

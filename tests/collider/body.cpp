@@ -35,16 +35,22 @@ Mesh shifted(Mesh mesh, const glm::vec3& by) {
 
 // A collider of a mesh, and the same read from a file.
 struct Pair {
-    explicit Pair(const Mesh& mesh, float voxel, const VdbOptions& options = {}, float margin = -1)
-        : field(build(mesh, {.voxelSize = voxel})), made(mesh, field, {.margin = margin}), loaded(read(options)) {}
+    explicit Pair(const Mesh& mesh, float voxel, const VdbOptions& file = {}, const ColliderOptions& options = {})
+        : field(build(mesh, {.voxelSize = voxel})), made(mesh, field, options), loaded(read(made.body(), file)) {}
+
+    Collider withoutMesh() const {
+        Body body = made.body();
+        body.mesh.reset();
+        return read(body, {});
+    }
 
     LevelSet field;
     Collider made, loaded;
 
   private:
-    Collider read(const VdbOptions& options) const {
+    Collider read(const Body& body, const VdbOptions& options) const {
         const auto path = scratch("body.vdb");
-        writeVdb(path, withBody(field, made.body()), options);
+        writeVdb(path, withBody(field, body), options);
         return Collider(readVdb(path));
     }
 };
@@ -65,6 +71,12 @@ void requireSame(const Body& a, const Body& b) {
     REQUIRE(a.bounds.lower == b.bounds.lower);
     REQUIRE(a.bounds.upper == b.bounds.upper);
     REQUIRE(a.margin == b.margin);
+    REQUIRE(a.exact == b.exact);
+    REQUIRE((a.mesh == nullptr) == (b.mesh == nullptr));
+    if (a.mesh) {
+        REQUIRE(a.mesh->points == b.mesh->points);
+        REQUIRE(a.mesh->triangles == b.mesh->triangles);
+    }
     REQUIRE(a.mass.has_value() == b.mass.has_value());
     if (!a.mass) return;
     REQUIRE(a.mass->volume == b.mass->volume);
@@ -131,8 +143,9 @@ TEST_CASE("a body comes back from its file bit by bit") {
                  std::pair(shapes::torus(0.0035f, 0.0013f), 1e-4f));
     const bool half = GENERATE(false, true);
     CAPTURE(voxel, half);
-    const Pair pair(mesh, voxel, {.halfFloat = half}, GENERATE(-1.f, 0.0123f));
+    const Pair pair(mesh, voxel, {.halfFloat = half}, {.margin = GENERATE(-1.f, 0.0123f), .exact = half});
     REQUIRE(pair.made.points().points().size() > 100);
+    REQUIRE(pair.made.body().mesh);
     requireSame(pair.made.body(), pair.loaded.body());
     REQUIRE(pair.loaded.field().voxelSize() == pair.made.field().voxelSize());
 }
@@ -142,7 +155,10 @@ TEST_CASE("bodies from files touch where those of meshes do, to the bit") {
     CAPTURE(seed);
     Random random(seed);
     const float h = 0.03f;
-    const Pair knot(shapes::torusKnot(2, 3, 0.5f, 0.15f, 200, 16), h), box(shapes::box({0.3f, 0.2f, 0.1f}, 2), h);
+    const bool exact = GENERATE(false, true);
+    const Pair knot(shapes::torusKnot(2, 3, 0.5f, 0.15f, 200, 16), h, {}, {.exact = exact}),
+        box(shapes::box({0.3f, 0.2f, 0.1f}, 2), h, {}, {.exact = exact});
+    CHECK((knot.loaded.field().mesh() != nullptr) == exact);
     std::size_t found = 0;
     for (int i = 0; i < 200; ++i) {
         const Pose a{random.point(0.5), glm::angleAxis(float(random(0, 6.28)), random.direction())};
@@ -168,21 +184,33 @@ TEST_CASE("bodies from files touch where those of meshes do, to the bit") {
     REQUIRE(found > 100);
 }
 
-TEST_CASE("the triangles of a body from a file are those of its field") {
+TEST_CASE("the triangles of a body without a mesh are those of its field") {
     const Pair ball(shapes::sphere(0.4f, 4), 0.02f);
-    REQUIRE(ball.loaded.mesh().triangles.size() > 1000);
-    for (const glm::vec3& point : ball.loaded.mesh().points) REQUIRE(glm::length(point) == Approx(0.4f).margin(1e-3));
-    REQUIRE(massProperties(ball.loaded.mesh()).volume == Approx(ball.made.mass().volume).epsilon(5e-3));
+    const Collider loaded = ball.withoutMesh();
+    REQUIRE_FALSE(loaded.body().mesh);
+    REQUIRE(loaded.mesh().triangles.size() > 1000);
+    for (const glm::vec3& point : loaded.mesh().points) REQUIRE(glm::length(point) == Approx(0.4f).margin(1e-3));
+    REQUIRE(massProperties(loaded.mesh()).volume == Approx(ball.made.mass().volume).epsilon(5e-3));
 }
 
-TEST_CASE("many threads may ask at once for the triangles of a body from a file") {
+TEST_CASE("many threads may ask at once for the triangles of a body without a mesh") {
     const Pair ball(shapes::sphere(0.4f, 4), 0.02f);
+    const Collider loaded = ball.withoutMesh();
     std::vector<const Mesh*> meshes(64);
-    tbb::parallel_for(std::size_t(0), meshes.size(), [&](std::size_t i) { meshes[i] = &ball.loaded.mesh(); });
+    tbb::parallel_for(std::size_t(0), meshes.size(), [&](std::size_t i) { meshes[i] = &loaded.mesh(); });
     for (const Mesh* mesh : meshes) REQUIRE(mesh == meshes[0]);
     REQUIRE_FALSE(meshes[0]->triangles.empty());
-    const Collider copy = ball.loaded;
+    const Collider copy = loaded;
     REQUIRE(&copy.mesh() == meshes[0]);
+}
+
+TEST_CASE("a body keeps a mesh whose triangles were turned as it was turned") {
+    Mesh inside = shapes::torusKnot(2, 3, 0.5f, 0.15f, 200, 16);
+    for (glm::uvec3& triangle : inside.triangles) std::swap(triangle.x, triangle.y);
+    const Pair knot(inside, 0.03f, {}, {.exact = true});
+    const Mesh outward = shapes::torusKnot(2, 3, 0.5f, 0.15f, 200, 16);
+    REQUIRE(massProperties(knot.loaded.mesh()).volume == Approx(massProperties(outward).volume));
+    requireSame(knot.made.body(), knot.loaded.body());
 }
 
 TEST_CASE("an open mesh has no mass, in a file neither") {
@@ -198,6 +226,8 @@ TEST_CASE("an open mesh has no mass, in a file neither") {
     REQUIRE(body.mass);
     body.mass.reset();
     REQUIRE_FALSE(bodyOf(withBody(stored(), body)).mass);
+    body.mesh.reset();
+    REQUIRE_FALSE(bodyOf(withBody(stored(), body)).mesh);
 }
 
 TEST_CASE("a field alone is no body") {
@@ -206,6 +236,11 @@ TEST_CASE("a field alone is no body") {
     REQUIRE(hasBody(stored()));
     requireRefusal(plain, "no body");
     REQUIRE_THROWS_AS(withBody(plain, {}), std::invalid_argument);
+    Body exact = bodyOf(stored());
+    exact.exact = true;
+    REQUIRE_NOTHROW(withBody(plain, exact));
+    exact.mesh.reset();
+    REQUIRE_THROWS_WITH(withBody(plain, exact), Catch::Contains("without a mesh"));
 }
 
 TEST_CASE("damaged bodies are refused by what is wrong") {
@@ -227,6 +262,13 @@ TEST_CASE("damaged bodies are refused by what is wrong") {
     requireRefusal(changed(setting("bilayer:bounds_upper", openvdb::Vec3s(0.3f, 0.2f, 0.05f))),
                    "outside of its bounds");
 
+    requireRefusal(changed([](Distance& grid) {
+                       setting("bilayer:exact", true)(grid);
+                       grid.removeMeta("bilayer:mesh");
+                   }),
+                   "'bilayer:mesh' is missing");
+    requireRefusal(changed(setting("bilayer:mesh", 7.f)), "type float");
+
     requireRefusal(changed({}, [](Points& grid) { grid.clear(); }), "no surface points");
     auto grids = std::make_shared<Grids>(stored().grids());
     grids->points = nullptr;
@@ -246,6 +288,31 @@ TEST_CASE("damaged bodies are refused by what is wrong") {
     for (const char* name : {"N", "id", "sharp"})
         requireRefusal(changed({}, [=](Points& grid) { openvdb::points::dropAttribute(grid.tree(), name); }),
                        "contact_points");
+}
+
+TEST_CASE("a damaged mesh of a body is refused, whichever byte it is") {
+    using Bytes = openvdb::UnknownMetadata;
+    const auto whole = std::dynamic_pointer_cast<const Bytes>((*stored().grids().distance)["bilayer:mesh"]);
+    REQUIRE(whole);
+    const auto withBytes = [](const Bytes::ByteVec& bytes) {
+        return changed([&](Distance& grid) {
+            Bytes entry("bilayer_mesh");
+            entry.setValue(bytes);
+            grid.removeMeta("bilayer:mesh");
+            grid.insertMeta("bilayer:mesh", entry);
+        });
+    };
+    REQUIRE_NOTHROW(Collider(withBytes(whole->value())));
+    for (const double part : {0., 0.01, 0.5, 0.999}) {
+        Bytes::ByteVec bytes = whole->value();
+        bytes.resize(std::size_t(part * double(bytes.size())));
+        requireRefusal(withBytes(bytes), "bilayer:mesh");
+    }
+    for (std::size_t i = 0; i < whole->value().size(); i += i < 24 ? 1 : 41) {
+        Bytes::ByteVec bytes = whole->value();
+        bytes[i] ^= 0x55;
+        requireRefusal(withBytes(bytes), "bilayer:mesh");
+    }
 }
 
 TEST_CASE("a field that was moved away from its body is told") {

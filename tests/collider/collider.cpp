@@ -360,7 +360,7 @@ TEST_CASE("beyond the band, edges are as far apart as those of the triangles, an
     }
     upper.position *= scale;
     std::vector<Contact> found;
-    const ContactOptions options{.margin = scale * (gap + beyond), .farAway = true};
+    const ContactOptions options{.margin = scale * (gap + beyond), .measured = true};
     collide(Placed{brick, upper, scale}, Placed{brick, lower, scale}, options, found);
     REQUIRE(!found.empty());
     const Contact& nearest = nearestOf(found);
@@ -377,7 +377,7 @@ TEST_CASE("what lies between two walls is found at any distance, whether the mar
     for (float gap = 0.02f; gap < 0.2f; gap += 0.003f) {
         CAPTURE(gap);
         std::vector<Contact> found;
-        const ContactOptions options{.margin = gap + 0.001f, .farAway = true};
+        const ContactOptions options{.margin = gap + 0.001f, .measured = true};
         collide(body, {{-0.4f + gap, 0.013f, 0.007f}}, two, {}, options, found);
         REQUIRE(!found.empty());
         const Contact& nearest = nearestOf(found);

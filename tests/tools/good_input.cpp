@@ -266,10 +266,22 @@ TEST_CASE("build --body keeps what bodies need, and info tells of it") {
     CHECK(info["body"] == json["body"]);
     CHECK(info["body"]["margin"] == 0.02);
     CHECK(info["mass"] == info["body"]["mass"]);
-    CHECK_THAT(run({"info", output}).out, Catch::Contains("surface points, margin 0.02 m"));
+    CHECK_THAT(run({"info", output}).out, Catch::Contains("surface points, margin 0.02 m, 1,280 triangles"));
+    CHECK(info["body"]["triangles"] == json["triangles"]);
+    CHECK(info["body"]["exactContacts"] == false);
+    CHECK(body.mesh().triangles == readMesh(sphereFile()).triangles);
+    CHECK_FALSE(body.field().mesh());
+    CHECK(body.measured().mesh());
     const auto fine = build(output, {"--voxel-size", "0.05", "--body", "--point-spacing", "1"});
     CHECK(fine["body"]["points"] > json["body"]["points"]);
     CHECK(fine["body"]["margin"] == 0.05);
+    CHECK(build(output, {"--voxel-size", "0.05", "--body", "--exact-contacts"})["body"]["exactContacts"] == true);
+    CHECK(Collider(readVdb(output)).field().mesh());
+    const auto whole = std::filesystem::file_size(output);
+    CHECK(build(output, {"--voxel-size", "0.05", "--body", "--no-mesh"})["body"]["triangles"] == 0);
+    CHECK_FALSE(Collider(readVdb(output)).body().mesh);
+    CHECK(std::filesystem::file_size(output) + body.mesh().triangles.size() * sizeof(glm::uvec3) < whole);
+    CHECK_THAT(run({"info", output}).out, Catch::Contains("no mesh"));
     build(output, {"--voxel-size", "0.05", "--body", "--half-float", "--triangles", "--fill"});
     CHECK(Collider(readVdb(output)).points().points().size() == body.points().points().size());
 }

@@ -1,0 +1,226 @@
+// Contact tests between a field and what is concave: they tell the distance that two meshes have, in double precision
+// and by brute force.
+#include <BulletCollision/CollisionShapes/btHeightfieldTerrainShape.h>
+
+#include <algorithm>
+#include <array>
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "demos/shared/shapes.h"
+#include "integration/bullet/convert.h"
+#include "sdf/build.h"
+#include "tests/support/random.h"
+#include "tests/support/support.h"
+#include "world.h"
+
+using namespace bilayer;
+using namespace bilayer::test;
+using bullet::Shape;
+
+namespace {
+
+constexpr float voxel = 0.02f;
+constexpr float asked = 5 * voxel;  // of contact tests
+constexpr double error = 0.1 * double(voxel);
+
+struct Triangle {
+    std::array<glm::dvec3, 3> corners;
+    glm::dvec3 middle;
+    double radius;
+
+    explicit Triangle(const std::array<glm::dvec3, 3>& c) : corners(c), middle((c[0] + c[1] + c[2]) / 3.), radius(0) {
+        for (const glm::dvec3& corner : corners) radius = std::max(radius, glm::distance(corner, middle));
+    }
+};
+
+glm::dvec3 toDouble(const btVector3& v) {
+    return {v.x(), v.y(), v.z()};
+}
+
+std::vector<Triangle> trianglesOf(const Mesh& mesh, const btTransform& place) {
+    std::vector<Triangle> triangles;
+    const auto at = [&](unsigned i) { return toDouble(place * bullet::toBullet(mesh.points[i])); };
+    for (const glm::uvec3& t : mesh.triangles) triangles.push_back(Triangle({at(t.x), at(t.y), at(t.z)}));
+    return triangles;
+}
+
+std::vector<Triangle> trianglesOf(const btConcaveShape& shape, const btTransform& place) {
+    struct Collector : btTriangleCallback {
+        void processTriangle(btVector3* t, int, int) override {
+            triangles.push_back(Triangle({toDouble(place * t[0]), toDouble(place * t[1]), toDouble(place * t[2])}));
+        }
+        btTransform place;
+        std::vector<Triangle> triangles;
+    } collector;
+    collector.place = place;
+    const btVector3 all(1e4f, 1e4f, 1e4f);
+    shape.processAllTriangles(&collector, -all, all);
+    return collector.triangles;
+}
+
+// Between two straight lines of some length (C. Ericson, "Real-Time Collision Detection", 2004, 5.1.9).
+double distanceBetween(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c, const glm::dvec3& d) {
+    const glm::dvec3 ab = b - a, cd = d - c, ca = a - c;
+    const double abab = glm::dot(ab, ab), cdcd = glm::dot(cd, cd), abcd = glm::dot(ab, cd), abca = glm::dot(ab, ca),
+                 cdca = glm::dot(cd, ca), square = abab * cdcd - abcd * abcd;
+    const double first = square > 0 ? std::clamp((abcd * cdca - abca * cdcd) / square, 0., 1.) : 0;
+    const double second = std::clamp((abcd * first + cdca) / cdcd, 0., 1.);
+    const double best = std::clamp((abcd * second - abca) / abab, 0., 1.);
+    return glm::distance(a + best * ab, c + second * cd);
+}
+
+double distanceBetween(const Triangle& a, const Triangle& b, double best) {
+    if (glm::distance(a.middle, b.middle) - a.radius - b.radius > best) return best;
+    const auto &p = a.corners, &q = b.corners;
+    for (int i = 0; i < 3; ++i) {
+        best = std::min({best, std::sqrt(squaredDistance(p[i], q[0], q[1], q[2])),
+                         std::sqrt(squaredDistance(q[i], p[0], p[1], p[2]))});
+        for (int k = 0; k < 3; ++k) best = std::min(best, distanceBetween(p[i], p[(i + 1) % 3], q[k], q[(k + 1) % 3]));
+    }
+    return best;
+}
+
+// Whether an edge of A passes through B.
+bool pierces(const Triangle& a, const Triangle& b) {
+    const auto& q = b.corners;
+    const glm::dvec3 normal = glm::cross(q[1] - q[0], q[2] - q[0]);
+    for (int i = 0; i < 3; ++i) {
+        const glm::dvec3 &from = a.corners[i], &to = a.corners[(i + 1) % 3];
+        const double before = glm::dot(normal, from - q[0]), after = glm::dot(normal, to - q[0]);
+        if (before * after >= 0) continue;
+        const glm::dvec3 place = from + before / (before - after) * (to - from);
+        bool isBeside = false;
+        for (int k = 0; k < 3; ++k) isBeside |= glm::dot(glm::cross(q[(k + 1) % 3] - q[k], place - q[k]), normal) < 0;
+        if (!isBeside) return true;
+    }
+    return false;
+}
+
+// Up to a bound; nothing where they pass through each other.
+std::optional<double> distanceBetween(const std::vector<Triangle>& a, const std::vector<Triangle>& b, double bound) {
+    double best = bound;
+    for (const Triangle& one : a)
+        for (const Triangle& other : b) {
+            best = distanceBetween(one, other, best);
+            const bool meet = glm::distance(one.middle, other.middle) < one.radius + other.radius;
+            if (meet && (pierces(one, other) || pierces(other, one))) return std::nullopt;
+        }
+    return best;
+}
+
+Mesh bodyOf(int kind) {
+    switch (kind) {
+        case 0:
+            return shapes::box({0.3f, 0.2f, 0.1f});
+        case 1:
+            return shapes::cone(0.3f, 0.4f, 24);
+        case 2:
+            return shapes::cylinder(0.2f, 0.5f, 24);
+        default:
+            return shapes::bowl(0.35f, 0.1f, 24);
+    }
+}
+
+Mesh ring() {
+    return shapes::torus(0.3f, 0.12f, 16, 10);
+}
+
+std::shared_ptr<const Collider> colliderOf(const Mesh& mesh, bool exact) {
+    return std::make_shared<Collider>(mesh, build(mesh, {.voxelSize = voxel}), ColliderOptions{.exact = exact});
+}
+
+// What a field is asked about, and its triangles.
+class Other {
+  public:
+    Other(int kind, Random& random, bool exact) : triangles_(ring()), field_(colliderOf(ring(), exact)) {
+        for (float& height : heights_) height = float(random(-0.1, 0.1));
+        terrain_ = std::make_unique<btHeightfieldTerrainShape>(side, side, heights_.data(), 1, -0.1f, 0.1f, 2,
+                                                               PHY_FLOAT, false);
+        terrain_->setLocalScaling({0.1f, 0.1f, 1});
+        const btTransform inCompound(btQuaternion({1, 2, 0}, 0.7f), {0.2f, 0.1f, -0.3f});
+        compound_.addChildShape(inCompound, &field_);
+        switch (kind) {
+            case 0:
+                shape = triangles_.shape.get();
+                break;
+            case 1:
+                shape = terrain_.get();
+                break;
+            case 2:
+                shape = &field_;
+                break;
+            default:
+                shape = &compound_;
+                place = inCompound;
+        }
+    }
+
+    std::vector<Triangle> trianglesAt(const btTransform& body) const {
+        if (shape == triangles_.shape.get() || shape == terrain_.get())
+            return trianglesOf(static_cast<const btConcaveShape&>(*shape), body);
+        return trianglesOf(field_.collider().mesh(), body * place);
+    }
+
+    btCollisionShape* shape;
+    btTransform place{btTransform::getIdentity()};  // of the ring, in a compound
+
+  private:
+    static constexpr int side = 17;
+    std::array<float, std::size_t(side* side)> heights_{};
+    TriangleShape triangles_;
+    Shape field_;
+    std::unique_ptr<btHeightfieldTerrainShape> terrain_;
+    btCompoundShape compound_;
+};
+
+struct Nearest : btCollisionWorld::ContactResultCallback {
+    btScalar addSingleResult(btManifoldPoint& point, const btCollisionObjectWrapper*, int, int,
+                             const btCollisionObjectWrapper*, int, int) override {
+        distance = std::min(distance, double(point.getDistance()));
+        return 0;
+    }
+    double distance = std::numeric_limits<double>::infinity();
+};
+
+btTransform anywhere(Random& random, double reach) {
+    const glm::vec3 axis(random.direction()), place(random.point(reach));
+    return btTransform(btQuaternion(bullet::toBullet(axis), float(random(0, 6.28))), bullet::toBullet(place));
+}
+
+}  // namespace
+
+TEST_CASE("Contact tests between concave bodies tell the distance of their meshes") {
+    const int kind = GENERATE(range(0, 4)), other = GENERATE(range(0, 4));
+    const bool exact = GENERATE(false, true);
+    const unsigned start = seed();
+    CAPTURE(kind, other, exact, start);
+    Random random(start);
+    const Mesh mesh = bodyOf(kind);
+    Shape field(colliderOf(mesh, exact));
+    const Other it(other, random, exact);
+    World world;
+    btCollisionObject a, b;
+    a.setCollisionShape(&field);
+    b.setCollisionShape(it.shape);
+    int found = 0;
+    for (int i = 0; i < 60; ++i) {
+        a.setWorldTransform(anywhere(random, 0.6));
+        b.setWorldTransform(anywhere(random, 0.1));
+        const auto expected =
+            distanceBetween(trianglesOf(mesh, a.getWorldTransform()), it.trianglesAt(b.getWorldTransform()), 1);
+        if (!expected || *expected > 0.95 * double(asked)) continue;
+        ++found;
+        Nearest nearest;
+        nearest.m_closestDistanceThreshold = asked;
+        world.dynamics.contactPairTest(i % 2 ? &a : &b, i % 2 ? &b : &a, nearest);
+        CAPTURE(i, nearest.distance / double(voxel), *expected / double(voxel));
+        CHECK(nearest.distance == Approx(*expected).margin(error));
+    }
+    CHECK(found > 0);
+}
