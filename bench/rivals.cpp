@@ -33,12 +33,17 @@ constexpr double anyConcavity = 1e9;  // so many hulls and no more, however conc
 
 class Field : public Rival {
   public:
-    Field(const Mesh& mesh, float voxels, const PointSampler& sampler) : sampler_(sampler) {
+    Field(const Mesh& mesh, float voxels, const PointSampler& sampler, bool exact)
+        : sampler_(sampler),
+          name_(exact            ? "bilayer, exact"
+                : sampler.sample ? "bilayer, " + sampler.device
+                                 : "bilayer") {
         BuildOptions how{.voxelSize = voxelSizeFor(mesh, voxels)};
         how.interiorWidth = bandInside;
-        shape_ = std::make_unique<bullet::Shape>(std::make_shared<Collider>(mesh, build(mesh, how)));
+        const ColliderOptions options{.exact = exact};
+        shape_ = std::make_unique<bullet::Shape>(std::make_shared<Collider>(mesh, build(mesh, how), options));
     }
-    std::string name() const override { return sampler_.sample ? "bilayer, " + sampler_.device : "bilayer"; }
+    std::string name() const override { return name_; }
     btCollisionShape& shape() override { return *shape_; }
     std::unique_ptr<btCollisionDispatcher> dispatcher(btCollisionConfiguration& configuration) const override {
         return std::make_unique<bullet::Dispatcher>(&configuration, sampler_);
@@ -46,6 +51,7 @@ class Field : public Rival {
 
   private:
     PointSampler sampler_;
+    std::string name_;
     std::unique_ptr<bullet::Shape> shape_;
 };
 
@@ -243,8 +249,8 @@ std::unique_ptr<btCollisionDispatcher> Rival::dispatcher(btCollisionConfiguratio
     return std::make_unique<btCollisionDispatcher>(&configuration);
 }
 
-std::unique_ptr<Rival> makeField(const Mesh& mesh, float voxels, const PointSampler& sampler) {
-    return timed<Field>(mesh, voxels, sampler);
+std::unique_ptr<Rival> makeField(const Mesh& mesh, float voxels, const PointSampler& sampler, bool exact) {
+    return timed<Field>(mesh, voxels, sampler, exact);
 }
 
 std::unique_ptr<Rival> makeGImpact(const Mesh& mesh, float margin) {

@@ -28,7 +28,8 @@ class Rival {
 /// Ours.
 /// @param voxels   along the longest side
 /// @param sampler  samples the contacts' points; none: the processor does, as ever
-std::unique_ptr<Rival> makeField(const Mesh& mesh, float voxels, const PointSampler& sampler = {});
+/// @param exact    as in ColliderOptions
+std::unique_ptr<Rival> makeField(const Mesh& mesh, float voxels, const PointSampler& sampler = {}, bool exact = false);
 
 /// btGImpactMeshShape.
 /// @param margin  added to the surface [m]

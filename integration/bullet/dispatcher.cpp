@@ -105,23 +105,26 @@ class Pair {
   public:
     Pair(btDispatcher& dispatcher, DispatchStatistics& statistics) : manifolds_(dispatcher), statistics_(statistics) {}
 
-    /// Finds and reduces contacts up to the shapes' margins; where a contact test asks for more and there are none, up
-    /// to twice as far in turns, and then once more, as far as it takes to be sure of the nearest.
-    /// @param asked  by a contact test [m]; 0 in a step
-    void collide(const Side& a, const Side& b, float asked) {
-        const auto& field = static_cast<const Shape&>(*b.shape);
-        float margin = std::max(marginOf(a, b), std::min(asked, field.voxelSize()));
+    /// In a step: finds and reduces contacts up to the shapes' margins.
+    void collide(const Side& a, const Side& b) {
+        find(a, b, marginOf(a, b), false);
+        finish(a, b);
+    }
+
+    /// In a contact test: up to the margins; where there are none, up to twice as far in turns, and then once more, as
+    /// far as it takes to be sure of the nearest.
+    /// @param asked  contacts up to this distance, or the margin if that is larger [m]
+    void test(const Side& a, const Side& b, float asked) {
+        const float voxel = static_cast<const Shape&>(*b.shape).voxelSize();
+        float margin = std::max(marginOf(a, b), std::min(asked, voxel));
         const float most = std::max(margin, asked);
-        find(a, b, margin, asked > 0);
-        if (asked > 0) {
-            // a place between surface points is found by those around it, which are farther away
-            const float between = probeSpacing * field.voxelSize();
-            while (contacts_.empty() && margin < asked + between)
-                find(a, b, margin = std::min(2 * margin, asked + between), true);
-            if (const float surely = nearest() + between; !contacts_.empty() && surely > margin)
-                find(a, b, surely, true);
-            std::erase_if(contacts_, [&](const Contact& contact) { return contact.distance > most; });
-        }
+        // a place between surface points is found by those around it, which are farther away
+        const float between = probeSpacing * voxel;
+        find(a, b, margin, true);
+        while (contacts_.empty() && margin < most + between)
+            find(a, b, margin = std::min(std::max(2 * margin, voxel), most + between), true);
+        if (const float surely = nearest() + between; !contacts_.empty() && surely > margin) find(a, b, surely, true);
+        std::erase_if(contacts_, [&](const Contact& contact) { return contact.distance > most; });
         finish(a, b);
     }
 
@@ -208,10 +211,9 @@ struct StepState {
     bool foreseesAll = true;
     bool isForeign = false;  ///< the dispatcher is another one, which does not tell its steps
 
-    /// Bullet's contact tests hand over a result of their own kind.
-    float secondsOf(const btDispatcherInfo& info, const btManifoldResult& result) const {
+    float secondsOf(const btDispatcherInfo& info, bool isTest) const {
         if (!isForeign) return seconds;
-        return typeid(result) == typeid(btManifoldResult) ? info.m_timeStep : 0;
+        return isTest ? 0 : info.m_timeStep;
     }
 
     /// How far ahead the motion of two bodies is looked at. What goes farther than its own size is the business of a
@@ -243,8 +245,13 @@ class Algorithm : public btCollisionAlgorithm {
                           const btDispatcherInfo& info, btManifoldResult* result) override {
         const btCollisionObjectWrapper &a = bIsSecond_ ? *first : *second, &b = bIsSecond_ ? *second : *first;
         if (!pair_->isReady()) {
-            const float ahead = state_.ahead(a, b, state_.secondsOf(info, *result));
-            pair_->collide(sideOf(a, ahead), sideOf(b, ahead), result->m_closestPointDistanceThreshold);
+            // contact tests hand over a result of their own kind
+            const bool isTest = typeid(*result) != typeid(btManifoldResult);
+            const float ahead = state_.ahead(a, b, state_.secondsOf(info, isTest));
+            if (isTest)
+                pair_->test(sideOf(a, ahead), sideOf(b, ahead), result->m_closestPointDistanceThreshold);
+            else
+                pair_->collide(sideOf(a, ahead), sideOf(b, ahead));
         }
         pair_->commit(*a.getCollisionObject(), *b.getCollisionObject(),
                       continuityOf(*a.getCollisionShape(), *b.getCollisionShape()), *result);
@@ -381,7 +388,7 @@ void Dispatcher::dispatchAllCollisionPairs(btOverlappingPairCache* cache, const 
         if (areSampled && task.sampled)
             task.pair->collide(task.a, task.b, sampled, *task.sampled);
         else
-            task.pair->collide(task.a, task.b, 0);
+            task.pair->collide(task.a, task.b);
     });
 
     btCollisionDispatcher::dispatchAllCollisionPairs(cache, info, dispatcher);

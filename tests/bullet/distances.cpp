@@ -224,3 +224,31 @@ TEST_CASE("Contact tests between concave bodies tell the distance of their meshe
     }
     CHECK(found > 0);
 }
+
+TEST_CASE("Contact tests that ask for no distance measure the depth by the triangles, in a groove") {
+    const unsigned start = seed();
+    CAPTURE(start);
+    Random random(start);
+    const Mesh pulley = shapes::revolve({{0, -0.3f}, {0.4f, -0.15f}, {0.25f, 0}, {0.4f, 0.15f}, {0, 0.3f}}, 48);
+    Shape field(colliderOf(pulley, false));
+    const float radius = 1.5f * voxel;
+    btSphereShape ball(radius);
+    World world;
+    btCollisionObject a, b;
+    a.setCollisionShape(&field);
+    b.setCollisionShape(&ball);
+    int found = 0;
+    for (int i = 0; i < 200; ++i) {
+        const double angle = random(0, 6.28), around = 0.25 + random(0.5, 2.5) * double(voxel);
+        const glm::dvec3 place(around * std::cos(angle), around * std::sin(angle), random(-0.2, 0.2) * double(voxel));
+        const double expected = distance(pulley, place) - double(radius);
+        if (expected > -0.05 * double(voxel)) continue;
+        ++found;
+        b.setWorldTransform(btTransform(btQuaternion::getIdentity(), bullet::toBullet(glm::vec3(place))));
+        Nearest nearest;
+        world.dynamics.contactPairTest(&a, &b, nearest);
+        CAPTURE(i, nearest.distance / double(voxel), expected / double(voxel));
+        CHECK(nearest.distance == Approx(expected).margin(0.02 * double(voxel)));
+    }
+    CHECK(found > 20);
+}
