@@ -76,6 +76,7 @@ class PointsInField {
           coarse_(map_.inParts(field_)),
           ways_(body.pose, body.motion, other.pose, other.motion),
           clearance_(field_.clearance()),
+          measure_(options.measured ? Measure::triangles : other.collider.body().measure),
           options_(options),
           reach_(options.margin / other.scale) {
         const Bounds& bounds = body.collider.bounds();
@@ -202,7 +203,7 @@ class PointsInField {
 
     // Beyond the band up to `most`, where that is asked for.
     std::optional<Touch> touchAt(const glm::vec3& at, const Sample& sample, float most) const {
-        if (sample.inBand) return touchInBand(field_, at, sample);
+        if (sample.inBand) return touchInBand(field_, at, sample, measure_);
         if (!options_.measured || sample.distance < 0) return std::nullopt;
         const ClosestPoint closest = field_.closest(at, most);
         if (!closest.found) return std::nullopt;
@@ -219,7 +220,7 @@ class PointsInField {
         const glm::vec3 outside = at - back * normal;
         const Sample sample = field_.sample(outside);
         if (!sample.inBand) return here;
-        const Touch there = touchInBand(field_, outside, sample);
+        const Touch there = touchInBand(field_, outside, sample, measure_);
         if (!(there.distance > 0) || !options_.keeps(opposition(there), false)) return here;
         return {std::min(there.distance - back * opposition(there), 0.f), there.normal};
     }
@@ -310,6 +311,7 @@ class PointsInField {
     Map map_, coarse_;
     RelativeWays ways_;
     Clearance clearance_;
+    Measure measure_;
     ContactOptions options_;
     float reach_;
     glm::vec3 centre_;  // of a ball around the body
@@ -345,7 +347,7 @@ Body makeBody(Mesh given, const LevelSet& levelSet, const ColliderOptions& optio
             .margin = options.margin < 0 ? levelSet.voxelSize() : options.margin,
             .mass = massOf(*mesh, levelSet),
             .mesh = mesh,
-            .exact = options.exact};
+            .measure = options.measure};
 }
 
 }  // namespace
@@ -388,7 +390,7 @@ Collider::Collider(Mesh mesh, const LevelSet& levelSet, const ColliderOptions& o
 
 Collider::Collider(const LevelSet& levelSet, Body body)
     : body_(std::move(body)),
-      field_(body_.exact ? Field(Field(levelSet), body_.mesh) : Field(levelSet)),
+      field_(body_.mesh && body_.measure != Measure::samples ? Field(Field(levelSet), body_.mesh) : Field(levelSet)),
       onDemand_(body_.mesh ? std::make_shared<OnDemand>() : std::make_shared<OnDemand>(levelSet)),
       edges_(body_.points, field_),
       id_(nextId()) {}

@@ -41,8 +41,9 @@ constexpr float restingSpeed = 0.02f, restingSpin = 0.2f;  // [m/s], [rad/s]
 constexpr float bodyInteriorWidth = 20, bowlInteriorWidth = 6;
 
 // What friction lets slip in a step, anchors pull back by this part of it; and what rests bears more (see
-// bullet::ShapeOptions). By Bullet's 0.2, and with no more, a body here and there slips on that is kept awake.
-constexpr float pulledBack = 0.5f, restingFriction = 1.2f;
+// bullet::ShapeOptions), as wood on wood does. By Bullet's 0.2, and with no more, a body here and there slips on that
+// is kept awake.
+constexpr float pulledBack = 0.5f, restingFriction = 1.5f;
 
 constexpr double mostOverlap = 0.5;  // of 99 in 100 [voxels]
 constexpr double mostRise = 1;       // of energy, in parts of the kinetic energy's peak [%]

@@ -23,7 +23,7 @@ struct BowlOptions {
     int resolution = 128;     ///< voxels along a body's longest side
     /// Of Bullet's solver, whose friction starts from nothing in each step: with 10, here and there a body of a heap
     /// that is kept awake slides on by a few voxels.
-    int iterations = 100;
+    int iterations = 40;
     float seconds = 30;      ///< at most, until all sleep
     float hold = 0;          ///< how long they are then kept awake, to see whether the heap creeps [s]
     std::uint32_t seed = 7;  ///< of the first poses
