@@ -8,7 +8,6 @@
 #include <BulletCollision/CollisionShapes/btTriangleIndexVertexArray.h>
 #include <BulletCollision/Gimpact/btGImpactCollisionAlgorithm.h>
 #include <BulletCollision/Gimpact/btGImpactShape.h>
-#include <fmt/format.h>
 #include <hacdHACD.h>
 #include <oneapi/tbb/parallel_for.h>
 
@@ -34,14 +33,14 @@ constexpr double anyConcavity = 1e9;  // so many hulls and no more, however conc
 
 class Field : public Rival {
   public:
-    Field(const Mesh& mesh, float voxels, const PointSampler& sampler, Measure measure)
+    Field(const Mesh& mesh, float voxels, const PointSampler& sampler, bool exact)
         : sampler_(sampler),
-          name_(sampler.sample              ? "bilayer, " + sampler.device
-                : measure == Measure::edges ? "bilayer"
-                                            : fmt::format("bilayer, by {}", nameOf(measure))) {
+          name_(exact            ? "bilayer, exact"
+                : sampler.sample ? "bilayer, " + sampler.device
+                                 : "bilayer") {
         BuildOptions how{.voxelSize = voxelSizeFor(mesh, voxels)};
         how.interiorWidth = bandInside;
-        const ColliderOptions options{.measure = measure};
+        const ColliderOptions options{.exact = exact};
         shape_ = std::make_unique<bullet::Shape>(std::make_shared<Collider>(mesh, build(mesh, how), options));
     }
     std::string name() const override { return name_; }
@@ -250,8 +249,8 @@ std::unique_ptr<btCollisionDispatcher> Rival::dispatcher(btCollisionConfiguratio
     return std::make_unique<btCollisionDispatcher>(&configuration);
 }
 
-std::unique_ptr<Rival> makeField(const Mesh& mesh, float voxels, const PointSampler& sampler, Measure measure) {
-    return timed<Field>(mesh, voxels, sampler, measure);
+std::unique_ptr<Rival> makeField(const Mesh& mesh, float voxels, const PointSampler& sampler, bool exact) {
+    return timed<Field>(mesh, voxels, sampler, exact);
 }
 
 std::unique_ptr<Rival> makeGImpact(const Mesh& mesh, float margin) {

@@ -63,6 +63,16 @@ class Nodes {
         }
     }
 
+    // Adds a node of which nothing is known.
+    void add(std::uint32_t node, const Region& region) {
+        reserve(size_);
+        for (int k = 0; k < 3; ++k) {
+            lower_[k][size_] = region.lower[k];
+            upper_[k][size_] = region.upper[k];
+        }
+        nodes_[size_++] = node;
+    }
+
     // Adds those children of a group that come near a region.
     void addNear(const BoxGroup& group, const Region& region) {
         addNear(
@@ -127,7 +137,7 @@ class Maker {
         const glm::vec3 lower = lowerOf(cube);
         const Region region{lower - room_, lower + side_ + room_, reach_ * reach_};
         count_ = 0;
-        next().addNear(tree_.group(tree_.root()), region);
+        next().add(tree_.root(), region);
         while (levels_[count_ - 1].size() > 0 && !tree_.isLeaf(levels_[count_ - 1].node(0))) {
             Nodes& finer = next();
             const Nodes& coarser = levels_[count_ - 2];

@@ -43,7 +43,7 @@ constexpr const char* products = "bilayer:inertia_products";  // xy xz yz
 constexpr const char* principal = "bilayer:principal_inertia";
 constexpr const char* axes = "bilayer:principal_axes";  // a quaternion, x y z w
 constexpr const char* mesh = "bilayer:mesh";            // bytes: see packed()
-constexpr const char* measure = "bilayer:measure";
+constexpr const char* exact = "bilayer:exact";
 }  // namespace entry
 
 // Names that other programs give such attributes, too.
@@ -245,9 +245,11 @@ std::size_t bytesOf(const MeshHead& head) {
 
 // A head, three coordinates of each vertex, three vertices of each triangle.
 openvdb::Metadata::Ptr packed(const Mesh& mesh) {
+    validate(mesh);
     const MeshHead head{hash(mesh), mesh.points.size(), mesh.triangles.size()};
     if (bytesOf(head) > mostMeshBytes)
-        throw std::invalid_argument("the mesh is too large to keep beside its field: leave it out (Body::mesh)");
+        throw std::invalid_argument(
+            "the mesh is too large to keep beside its field: leave it out (Body::mesh, --no-mesh)");
     Bytes::ByteVec bytes(bytesOf(head));
     const std::size_t pointBytes = head.points * sizeof(glm::vec3);
     std::memcpy(bytes.data(), &head, sizeof(head));
@@ -269,6 +271,11 @@ std::shared_ptr<const Mesh> unpacked(const Bytes::ByteVec& bytes) {
     std::memcpy(mesh->points.data(), bytes.data() + sizeof(head), pointBytes);
     std::memcpy(mesh->triangles.data(), bytes.data() + sizeof(head) + pointBytes, head.triangles * sizeof(glm::uvec3));
     if (hash(*mesh) != head.hash) refuse(fmt::format("'{}' is not what was written", entry::mesh));
+    try {
+        validate(*mesh);
+    } catch (const std::invalid_argument& error) {
+        refuse(fmt::format("'{}': {}", entry::mesh, error.what()));
+    }
     return mesh;
 }
 
@@ -280,13 +287,8 @@ std::shared_ptr<const Mesh> meshOf(const LevelSet& levelSet) {
     return unpacked(bytes->value());
 }
 
-constexpr std::pair<Measure, const char*> measures[] = {
-    {Measure::samples, "samples"}, {Measure::edges, "edges"}, {Measure::triangles, "triangles"}};
-
-Measure measureOf(const std::string& name) {
-    for (const auto& [measure, itsName] : measures)
-        if (name == itsName) return measure;
-    refuse(fmt::format("'{}' is {}", entry::measure, name));
+void requireSame(const Bounds& ofMesh, const Bounds& ofBody) {
+    if (ofMesh.lower != ofBody.lower || ofMesh.upper != ofBody.upper) refuse("its mesh is of another body");
 }
 
 // A field that was moved or scaled elsewhere leaves its body behind.
@@ -301,28 +303,21 @@ void requireWithin(const Bounds& bounds, const openvdb::FloatGrid& grid) {
 
 }  // namespace
 
-const char* nameOf(Measure measure) {
-    for (const auto& [one, name] : measures)
-        if (one == measure) return name;
-    throw std::invalid_argument("no such measure");
-}
-
 LevelSet withBody(const LevelSet& levelSet, const Body& body) {
     if (body.points.points().empty()) throw std::invalid_argument("a body has surface points");
+    if (body.exact && !body.mesh) throw std::invalid_argument("a body without a mesh is not exact");
     openvdb::initialize();
     const auto distance = openvdb::ConstPtrCast<openvdb::FloatGrid>(levelSet.grids().distance)->copy();
     for (const char* stale : {entry::volume, entry::centre, entry::inertia, entry::products, entry::principal,
-                              entry::axes, entry::mesh, entry::measure})
+                              entry::axes, entry::mesh, entry::exact})
         distance->removeMeta(stale);
     distance->insertMeta(entry::format, openvdb::Int32Metadata(format));
     distance->insertMeta(entry::margin, openvdb::FloatMetadata(body.margin));
     distance->insertMeta(entry::lower, openvdb::Vec3SMetadata(toVdb(body.bounds.lower)));
     distance->insertMeta(entry::upper, openvdb::Vec3SMetadata(toVdb(body.bounds.upper)));
     if (body.mass) storeMass(*distance, *body.mass);
-    if (body.mesh) {
-        distance->insertMeta(entry::mesh, *packed(*body.mesh));
-        distance->insertMeta(entry::measure, openvdb::StringMetadata(nameOf(body.measure)));
-    }
+    if (body.mesh) distance->insertMeta(entry::mesh, *packed(*body.mesh));
+    if (body.exact) distance->insertMeta(entry::exact, openvdb::BoolMetadata(true));
     auto grids = std::make_shared<Grids>(levelSet.grids());
     grids->distance = distance;
     grids->points = store(body.points, pointVoxel(levelSet));
@@ -348,9 +343,11 @@ Body bodyOf(const LevelSet& levelSet) {
     body.mass = loadMass(entries);
     body.points = pointsOf(levelSet);
     body.mesh = meshOf(levelSet);
-    if (body.mesh) body.measure = measureOf(entries.get<std::string>(entry::measure));
+    body.exact = entries.find<bool>(entry::exact).value_or(false);
+    if (body.exact && !body.mesh) refuse(fmt::format("'{}' is missing", entry::mesh));
     requireWithin(body.points, body.bounds);
     requireWithin(body.bounds, *levelSet.grids().distance);
+    if (body.mesh) requireSame(bounds(*body.mesh), body.bounds);
     return body;
 }
 

@@ -12,30 +12,21 @@
 
 namespace bilayer {
 
-/// What the distances and normals of contacts are taken from, once the field's samples have found them.
-enum class Measure {
-    samples,    ///< nothing else: takes the least memory
-    edges,      ///< the triangles where samples blend what the surface is on either side of an edge, or in a groove
-    triangles,  ///< the triangles everywhere
-};
-
 struct Body {
     SurfacePoints points;
     Bounds bounds;                       ///< of the mesh [m]
     float margin = 0;                    ///< contacts are made up to this distance between surfaces [m]
     std::optional<MassProperties> mass;  ///< nothing where the mesh encloses no volume
     /// All of it facing outward. Null for a body that answers by its field alone, which rounds sharp edges: sweeps then
-    /// end up to two voxels late there, and rays up to half a voxel.
+    /// end a voxel and a half late there at most, and rays half a voxel.
     std::shared_ptr<const Mesh> mesh;
-    Measure measure = Measure::samples;  ///< as in ColliderOptions; samples where there is no mesh
+    bool exact = false;  ///< whether contacts are measured against the mesh (see ColliderOptions)
 };
-
-/// As in files and on the command line: samples, edges or triangles.
-const char* nameOf(Measure measure);
 
 /// The level set, to write as a .vdb file, with the body beside it: surface points as a grid of OpenVDB points, the
 /// rest as metadata. Nothing is lost: bodyOf() gives the same bits. The grids of `levelSet` are shared, not copied.
-/// Throws std::invalid_argument if the body has no points, or a mesh of more than 2 GiB.
+/// Throws std::invalid_argument if the body has no points, or a mesh that is not valid, or of
+/// more than 2 GiB.
 LevelSet withBody(const LevelSet& levelSet, const Body& body);
 
 /// Whether some body was put beside a level set.

@@ -9,6 +9,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
+#include <limits>
 #include <mutex>
 #include <optional>
 #include <stdexcept>
@@ -28,8 +29,9 @@ constexpr float searchTolerance = 2e-3f;  // of the deepest place on an edge [vo
 // past [voxels].
 constexpr float grazing = 0.25f;
 // Two places are brought closer in so many turns; the way between them tells a direction from here on [voxels].
-constexpr int settlingTurns = 3;
-constexpr float shortest = 1e-3f;
+// Turns end where the place goes no farther than this [voxels]; it goes on by no more than so many of its steps.
+constexpr int settlingTurns = 10;
+constexpr float shortest = 1e-3f, settled = 1e-4f, farthestOn = 50;
 // A tip that has sunk into another one sees its sides; what it opposes is seen so far back along its normal [voxels].
 constexpr float lift = 1;
 
@@ -76,7 +78,6 @@ class PointsInField {
           coarse_(map_.inParts(field_)),
           ways_(body.pose, body.motion, other.pose, other.motion),
           clearance_(field_.clearance()),
-          measure_(options.measured ? Measure::triangles : other.collider.body().measure),
           options_(options),
           reach_(options.margin / other.scale) {
         const Bounds& bounds = body.collider.bounds();
@@ -203,7 +204,7 @@ class PointsInField {
 
     // Beyond the band up to `most`, where that is asked for.
     std::optional<Touch> touchAt(const glm::vec3& at, const Sample& sample, float most) const {
-        if (sample.inBand) return touchInBand(field_, at, sample, measure_);
+        if (sample.inBand) return touchInBand(field_, at, sample);
         if (!options_.measured || sample.distance < 0) return std::nullopt;
         const ClosestPoint closest = field_.closest(at, most);
         if (!closest.found) return std::nullopt;
@@ -220,7 +221,7 @@ class PointsInField {
         const glm::vec3 outside = at - back * normal;
         const Sample sample = field_.sample(outside);
         if (!sample.inBand) return here;
-        const Touch there = touchInBand(field_, outside, sample, measure_);
+        const Touch there = touchInBand(field_, outside, sample);
         if (!(there.distance > 0) || !options_.keeps(opposition(there), false)) return here;
         return {std::min(there.distance - back * opposition(there), 0.f), there.normal};
     }
@@ -311,7 +312,6 @@ class PointsInField {
     Map map_, coarse_;
     RelativeWays ways_;
     Clearance clearance_;
-    Measure measure_;
     ContactOptions options_;
     float reach_;
     glm::vec3 centre_;  // of a ball around the body
@@ -347,7 +347,7 @@ Body makeBody(Mesh given, const LevelSet& levelSet, const ColliderOptions& optio
             .margin = options.margin < 0 ? levelSet.voxelSize() : options.margin,
             .mass = massOf(*mesh, levelSet),
             .mesh = mesh,
-            .measure = options.measure};
+            .exact = options.exact};
 }
 
 }  // namespace
@@ -390,7 +390,7 @@ Collider::Collider(Mesh mesh, const LevelSet& levelSet, const ColliderOptions& o
 
 Collider::Collider(const LevelSet& levelSet, Body body)
     : body_(std::move(body)),
-      field_(body_.mesh && body_.measure != Measure::samples ? Field(Field(levelSet), body_.mesh) : Field(levelSet)),
+      field_(body_.exact ? Field(Field(levelSet), body_.mesh) : Field(levelSet)),
       onDemand_(body_.mesh ? std::make_shared<OnDemand>() : std::make_shared<OnDemand>(levelSet)),
       edges_(body_.points, field_),
       id_(nextId()) {}
@@ -453,21 +453,43 @@ std::optional<glm::vec3> closestOn(const Placed& body, const glm::vec3& place, f
 }
 
 // Moves the two places of a contact apart to what is closest to the other, by turns: edges that are made of surface
-// points may cut across what lies between these.
+// points may cut across what lies between these. Where round bodies nearly touch each turn gains little, and the places
+// go on as they went (A. C. Aitken's extrapolation).
 void settle(Contact& contact, const Placed& a, const Placed& b) {
-    const float room = b.scale * b.collider.field().voxelSize();
-    glm::vec3 onB = contact.position;
-    for (int turn = 0; turn < settlingTurns; ++turn) {
-        const auto onA = closestOn(a, onB, contact.distance + room);
-        if (!onA) return;
-        const auto next = closestOn(b, *onA, contact.distance + room);
-        if (!next) return;
-        onB = *next;
-        const glm::vec3 way = *onA - onB;
+    const float voxel = b.scale * b.collider.field().voxelSize();
+    const auto turned = [&](const glm::vec3& place) -> std::optional<Contact> {
+        const auto onA = closestOn(a, place, contact.distance + voxel);
+        const auto onB = onA ? closestOn(b, *onA, contact.distance + voxel) : std::nullopt;
+        if (!onB) return std::nullopt;
+        const glm::vec3 way = *onA - *onB;
         const float distance = glm::length(way);
-        if (!(distance > shortest * room)) return;
-        contact = {onB, way / distance, distance, contact.feature, contact.approach};
+        const glm::vec3 normal = distance > shortest * voxel ? way / distance : contact.normal;
+        return Contact{*onB, normal, distance, contact.feature, contact.approach};
+    };
+    glm::vec3 before(0);  // how far the place went in the last turn
+    for (int turn = 0; turn < settlingTurns; ++turn) {
+        const auto next = turned(contact.position);
+        if (!next) return;
+        const glm::vec3 gone = next->position - contact.position;
+        contact = *next;
+        if (!(glm::length(gone) > settled * voxel)) return;
+        const float ratio = glm::dot(gone, before) / glm::dot(before, before);
+        before = gone;
+        if (!(ratio > 0 && ratio < 1)) continue;
+        const auto beyond = turned(contact.position + std::min(ratio / (1 - ratio), farthestOn) * gone);
+        if (!beyond || beyond->distance >= contact.distance) continue;
+        contact = *beyond;
+        before = glm::vec3(0);
     }
+}
+
+// Those that may be the nearest.
+void settle(std::span<Contact> contacts, const Placed& a, const Placed& b) {
+    float nearest = std::numeric_limits<float>::max();
+    for (const Contact& contact : contacts) nearest = std::min(nearest, contact.distance);
+    for (Contact& contact : contacts)
+        if (contact.distance > 0 && contact.distance < nearest + b.scale * b.collider.field().voxelSize())
+            settle(contact, a, b);
 }
 
 }  // namespace
@@ -481,9 +503,7 @@ ContactReport collide(const Placed& a, const Placed& b, const ContactOptions& op
     const std::size_t first = contacts.size();
     const ContactReport report =
         addContacts(a, b, options, contacts, visit(near ? &near->ofA : nullptr), visit(near ? &near->ofB : nullptr));
-    if (options.measured)
-        for (std::size_t i = first; i < contacts.size(); ++i)
-            if (contacts[i].distance > 0) settle(contacts[i], a, b);
+    if (options.measured) settle(std::span(contacts).subspan(first), a, b);
     return report;
 }
 

@@ -26,10 +26,10 @@ struct ColliderOptions {
     float pointSpacing = 2.0f;
     /// Contacts are made up to this distance between the surfaces [m]. Negative: one voxel of the field.
     float margin = -1;
-    /// Measure::edges costs no more time than samples alone where bodies have more faces than edges; the triangles take
-    /// memory (see Field), and a microsecond each to sort. Measure::triangles costs more time the more contacts there
-    /// are: for parts that fit into each other to a fraction of a voxel.
-    Measure measure = Measure::edges;
+    /// Whether contacts are measured against the triangles, where the field has found them: exact at edges and grooves,
+    /// where samples blend what the surface is on either side. Takes memory (see Field), and more time the more
+    /// contacts there are: for parts that fit into each other to a fraction of a voxel.
+    bool exact = false;
 };
 
 /// A field, points on the surface, and what else contacts need. Immutable; share it between bodies and threads.
@@ -48,8 +48,8 @@ class Collider {
     /// asked for, once.
     const Mesh& mesh() const;
     const Field& field() const { return field_; }
-    /// The field with the mesh, if the body has one: field() itself unless contacts are measured by samples alone, when
-    /// it is made at the first question, once, and shares the samples.
+    /// The field that measures by the triangles: field() itself where contacts are exact, or where the body has no
+    /// mesh; else one with the mesh that shares its samples, made when first asked for, once.
     const Field& measured() const;
     const Body& body() const { return body_; }
     const SurfacePoints& points() const { return body_.points; }

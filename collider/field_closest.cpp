@@ -26,6 +26,10 @@ constexpr std::size_t batch = 64;
 /// Mean normals below this have cancelled out, and tell no side where they point aside: above the rounding of floats,
 /// below what needles leave at their tips.
 constexpr double cancelled = 1e-6;
+/// How far on either side of a wall the field is asked which one is inside [voxels].
+constexpr float aside = 1;
+/// What samples may be off at an edge [voxels].
+constexpr float roundedOff = 0.3f;
 
 // Of a point over the plane that the normal stands on; the normal may be shorter than 1.
 double heightOver(const NearestFeature& nearest) {
@@ -75,12 +79,25 @@ FieldData::Side FieldData::sideAt(const glm::dvec3& local, const Sample& here) c
     return certain ? Side{value < 0, true} : Side{inside, false};
 }
 
-// By the normal, where it is the mesh's and tells a side; else by the field.
+// Whether the field changes sign at a place of the mesh: not where a wall lies within the solid, or is one by itself.
+// Beside an edge the one or the other side is close to another wall.
+bool FieldData::divides(const glm::dvec3& place, const glm::dvec3& normal) const {
+    const glm::dvec3 step = double(aside * voxelSize) * glm::normalize(normal);
+    const auto distanceAt = [&](const glm::dvec3& at) { return sample((at - origin) * perMetre).distance; };
+    const float outer = distanceAt(place + step), inner = distanceAt(place - step);
+    return outer > -roundedOff * voxelSize && inner < roundedOff * voxelSize && outer - inner > aside * voxelSize / 2;
+}
+
+// By the normal, where it tells a side: of a mesh whose normals do, or of a wall that the field confirms. Else by the
+// field alone, whose samples blend what the surface is on either side of an edge.
 bool FieldData::isInside(const NearestFeature& nearest, const glm::vec3& point) const {
     const double height = heightOver(nearest);
-    if (signedByNormals && std::abs(height) > cancelled * glm::length(nearest.way)) return height < 0;
+    const bool tells = std::abs(height) > cancelled * glm::length(nearest.way);
+    if (signedByNormals && tells) return height < 0;
     const glm::dvec3 local = toLocal(point);
-    return sideAt(local, sample(local)).inside;
+    const Side side = sideAt(local, sample(local));
+    if (side.certain || !tells || !divides(glm::dvec3(point) + nearest.way, nearest.normal)) return side.inside;
+    return height < 0;
 }
 
 // What is known of a point once the part of the mesh is found that is nearest to it.

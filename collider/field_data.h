@@ -103,6 +103,7 @@ struct FieldData : FieldLayout {
         bool inside, certain;
     };
     Side sideAt(const glm::dvec3& local, const Sample& here) const;
+    bool divides(const glm::dvec3& place, const glm::dvec3& normal) const;
     bool isInside(const NearestFeature& nearest, const glm::vec3& point) const;
     float boundOf(float maxDistance) const;
     std::uint32_t orBeyond(std::uint32_t part, const EntryPlace& place, const glm::vec3& point,

@@ -12,9 +12,6 @@ namespace {
 // A gradient shorter than this tells no direction. On the surface it does, however short: beside a sharp edge the
 // interpolant of the voxels below rises by no more than what the edge is away in voxels.
 constexpr float flattest = 0.1f, flattestOnSurface = 1e-3f;
-// Where the gradient's length is farther from 1, the voxels around see more than one face: two that meet at more than
-// 28 degrees, in their middle.
-constexpr float blended = 0.03f;
 constexpr float onSurface = 0.01f;     // [voxels]: within the voxels of an edge all gradients shorter than 0.1 are
 constexpr float nearestAside = 0.01f;  // [voxels] from an edge or corner: nearer, rounding spoils the way's direction
 
@@ -32,13 +29,8 @@ glm::vec3 directionOf(const ClosestPoint& closest, const glm::vec3& point, float
     return isAside ? (point - closest.position) / closest.distance : closest.normal;
 }
 
-bool asksTriangles(const Field& field, const Sample& sample, Measure measure) {
-    if (!field.mesh() || measure == Measure::samples) return false;
-    return measure == Measure::triangles || std::abs(glm::length(sample.gradient) - 1) > blended;
-}
-
-Touch touchInBand(const Field& field, const glm::vec3& point, const Sample& sample, Measure measure) {
-    if (asksTriangles(field, sample, measure)) {
+Touch touchInBand(const Field& field, const glm::vec3& point, const Sample& sample) {
+    if (field.mesh()) {
         const float most = std::abs(sample.distance) + mostInterpolationError * field.voxelSize();
         if (const ClosestPoint closest = field.closest(point, most); closest.found)
             return {closest.distance, directionOf(closest, point, field.voxelSize())};

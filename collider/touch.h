@@ -1,7 +1,6 @@
 // How a field is touched by a point; internal.
 #pragma once
 
-#include "collider/body.h"
 #include "collider/field.h"
 
 namespace bilayer {
@@ -13,11 +12,8 @@ struct Touch {
     float approach = 0;  ///< Contact::approach
 };
 
-/// Whether the triangles are asked about a point of the band.
-bool asksTriangles(const Field& field, const Sample& sample, Measure measure);
-
-/// Of a point in the band: by the triangles where these are asked, else by its sample.
-Touch touchInBand(const Field& field, const glm::vec3& point, const Sample& sample, Measure measure);
+/// Of a point in the band: by the triangles where the field has them, else by its sample.
+Touch touchInBand(const Field& field, const glm::vec3& point, const Sample& sample);
 
 /// Which way a point is from what is closest to it: across a face, and away from an edge or a corner, or from what a
 /// field without triangles does not tell apart.

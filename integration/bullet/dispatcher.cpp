@@ -182,7 +182,7 @@ class Pair {
             const btVector3 normal = a.transform.getBasis() * plane.getPlaneNormal();
             const float offset = plane.getPlaneConstant() + normal.dot(a.transform.getOrigin());
             const Motion planeMotion = motion.about(toGlm(a.transform.getOrigin()), glm::vec3(0));
-            return collidePlane(toGlm(normal), offset, planeMotion, field, margin, contacts_);
+            return collidePlane(toGlm(normal), offset, planeMotion, field, margin, measured, contacts_);
         }
         if (a.shape->isConvex()) {
             const auto& convex = static_cast<const btConvexShape&>(*a.shape);
@@ -210,6 +210,12 @@ struct StepState {
     float seconds = 0;           ///< that it takes; 0 between steps
     bool foreseesAll = true;
     bool isForeign = false;  ///< the dispatcher is another one, which does not tell its steps
+
+    /// Contact tests ask for a distance, or hand over a result of their own kind, and not within a step.
+    bool isTest(const btManifoldResult& result) const {
+        if (result.m_closestPointDistanceThreshold > 0) return true;
+        return seconds == 0 && typeid(result) != typeid(btManifoldResult);
+    }
 
     float secondsOf(const btDispatcherInfo& info, bool isTest) const {
         if (!isForeign) return seconds;
@@ -245,8 +251,7 @@ class Algorithm : public btCollisionAlgorithm {
                           const btDispatcherInfo& info, btManifoldResult* result) override {
         const btCollisionObjectWrapper &a = bIsSecond_ ? *first : *second, &b = bIsSecond_ ? *second : *first;
         if (!pair_->isReady()) {
-            // contact tests hand over a result of their own kind
-            const bool isTest = typeid(*result) != typeid(btManifoldResult);
+            const bool isTest = state_.isTest(*result);
             const float ahead = state_.ahead(a, b, state_.secondsOf(info, isTest));
             if (isTest)
                 pair_->test(sideOf(a, ahead), sideOf(b, ahead), result->m_closestPointDistanceThreshold);

@@ -50,6 +50,8 @@ constexpr float sweepTolerance = 0.1f;
 constexpr int mostSteps = 64;
 // By less than this a way only grazes, and goes past [voxels].
 constexpr float grazing = 0.25f;
+// The feature of what is lowest over a plane, for contact tests: no surface point's, no edge's.
+constexpr std::uint32_t lowestVertex = featureOfB - 1;
 
 /// A field in metres of the world and the axes of its body, and how another body moves towards it.
 class Local {
@@ -59,7 +61,6 @@ class Local {
     Local(const Placed& field, const Pose& other, const Motion& motion, float reach, bool measured)
         : collider_(field.collider),
           field_(measured ? field.collider.measured() : field.collider.field()),
-          measure_(measured ? Measure::triangles : field.collider.body().measure),
           scale_(field.scale),
           voxel_(field.scale * field.collider.field().voxelSize()),
           pose_(field.pose),
@@ -90,8 +91,7 @@ class Local {
         const Sample sample = field_.sample(point / scale_);
         if (!sample.inBand && sample.distance > 0 && farReach_ > 0) return farAway(point, radius, sample.distance);
         if (!sample.inBand) return {sample.distance > 0 ? Answer::outside : Answer::inside, scale_ * sample.distance};
-        if (scale_ * sample.distance - radius <= exactReach_ && asksTriangles(field_, sample, measure_))
-            return exactly(point, sample);
+        if (field_.mesh() && scale_ * sample.distance - radius <= exactReach_) return exactly(point, sample);
         const glm::vec3 normal = directionOf(sample, field_.voxelSize());
         const auto where = normal == glm::vec3(0) ? Answer::unclear : Answer::near;
         return {where, scale_ * sample.distance, normal, sample.gradient};
@@ -198,9 +198,9 @@ class Local {
                        -glm::dot(way, hit->normal));
     }
 
-    /// By the triangles, in the band.
+    /// By the triangles, in the band (see ColliderOptions::exact).
     Answer exactly(const glm::vec3& point, const Sample& sample) const {
-        const Touch touch = touchInBand(field_, point / scale_, sample, measure_);
+        const Touch touch = touchInBand(field_, point / scale_, sample);
         if (touch.normal == glm::vec3(0)) return {Answer::unclear, scale_ * touch.distance, {}, sample.gradient};
         return {Answer::near, scale_ * touch.distance, touch.normal, touch.normal};
     }
@@ -215,7 +215,6 @@ class Local {
 
     const Collider& collider_;
     const Field& field_;
-    Measure measure_;
     float scale_, voxel_;
     Pose pose_;
     RelativeWays ways_;
@@ -314,7 +313,7 @@ class Touching {
         float approach = local_.approach(position, normal, margin_);
         if (near.distance > 0 && approach > 0 && !meets(position, point)) approach = 0;
         // What is round has no edge that a point could see aslant.
-        const bool apart = near.distance > 0 && approach == 0 && !point.isSharp && !convex_.isRound(near);
+        const bool apart = near.distance > 0 && approach == 0 && !point.isSharp && !convex_.isRound(near) && !measured_;
         if (!opposition.keeps(glm::dot(normal, point.normal), apart)) return;
         if (convex_.isCurved()) {
             // corners and edges are exact, and samples next to them are not
@@ -713,6 +712,8 @@ ContactReport collideFields(const Placed& a, const Placed& b, float margin, bool
     ContactOptions options = opposition;
     options.margin = margin;
     options.measured = measured;
+    // a test is told how far apart bodies are, whichever way their points look
+    if (measured) options.leastOppositionApart = options.leastOpposition;
     return collide(a, b, options, contacts, &near);
 }
 
@@ -724,7 +725,7 @@ ContactReport collideFields(const Placed& a, const Placed& b, float margin, std:
 }
 
 ContactReport collidePlane(const glm::vec3& normal, float offset, const Motion& motion, const Placed& field,
-                           float margin, std::vector<Contact>& contacts) {
+                           float margin, bool measured, std::vector<Contact>& contacts) {
     ContactReport report;
     // The plane in the collider's own coordinates.
     const glm::vec3 up = glm::conjugate(field.pose.rotation) * normal;
@@ -744,6 +745,13 @@ ContactReport collidePlane(const glm::vec3& normal, float offset, const Motion& 
         const glm::vec3 position = field.pose.toWorld(field.scale * point.position);
         contacts.push_back({position, -normal, field.scale * distance, index | featureOfB, field.scale * approach});
     });
+    if (!measured || !field.collider.body().mesh) return report;
+    const auto& vertices = field.collider.body().mesh->points;
+    const auto isLower = [&](const glm::vec3& a, const glm::vec3& b) { return above(a) < above(b); };
+    const auto lowest = std::min_element(vertices.begin(), vertices.end(), isLower);
+    if (above(*lowest) <= reach)
+        contacts.push_back({field.pose.toWorld(field.scale * *lowest), -normal, field.scale * above(*lowest),
+                            lowestVertex | featureOfB, 0});
     return report;
 }
 

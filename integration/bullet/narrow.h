@@ -26,8 +26,9 @@ ContactReport collideFields(const Placed& a, const Placed& b, float margin, std:
 
 /// Against everything below a plane.
 /// @param normal, offset  in the world: dot(normal, x) <= offset is solid; `normal` of unit length
+/// @param measured        whether the lowest vertex of the mesh makes a contact, too
 ContactReport collidePlane(const glm::vec3& normal, float offset, const Motion& motion, const Placed& field,
-                           float margin, std::vector<Contact>& contacts);
+                           float margin, bool measured, std::vector<Contact>& contacts);
 
 /// Against a convex body: the field's surface points against its formula, then its own points in the field.
 /// @param measured  as in ContactOptions; the places between surface points count where faces touch as well, which

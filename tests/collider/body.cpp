@@ -71,7 +71,7 @@ void requireSame(const Body& a, const Body& b) {
     REQUIRE(a.bounds.lower == b.bounds.lower);
     REQUIRE(a.bounds.upper == b.bounds.upper);
     REQUIRE(a.margin == b.margin);
-    REQUIRE(a.measure == b.measure);
+    REQUIRE(a.exact == b.exact);
     REQUIRE((a.mesh == nullptr) == (b.mesh == nullptr));
     if (a.mesh) {
         REQUIRE(a.mesh->points == b.mesh->points);
@@ -143,8 +143,7 @@ TEST_CASE("a body comes back from its file bit by bit") {
                  std::pair(shapes::torus(0.0035f, 0.0013f), 1e-4f));
     const bool half = GENERATE(false, true);
     CAPTURE(voxel, half);
-    const Pair pair(mesh, voxel, {.halfFloat = half},
-                    {.margin = GENERATE(-1.f, 0.0123f), .measure = half ? Measure::samples : Measure::edges});
+    const Pair pair(mesh, voxel, {.halfFloat = half}, {.margin = GENERATE(-1.f, 0.0123f), .exact = half});
     REQUIRE(pair.made.points().points().size() > 100);
     REQUIRE(pair.made.body().mesh);
     requireSame(pair.made.body(), pair.loaded.body());
@@ -156,10 +155,10 @@ TEST_CASE("bodies from files touch where those of meshes do, to the bit") {
     CAPTURE(seed);
     Random random(seed);
     const float h = 0.03f;
-    const Measure measure = GENERATE(Measure::samples, Measure::edges, Measure::triangles);
-    const Pair knot(shapes::torusKnot(2, 3, 0.5f, 0.15f, 200, 16), h, {}, {.measure = measure}),
-        box(shapes::box({0.3f, 0.2f, 0.1f}, 2), h, {}, {.measure = measure});
-    CHECK((knot.loaded.field().mesh() != nullptr) == (measure != Measure::samples));
+    const bool exact = GENERATE(false, true);
+    const Pair knot(shapes::torusKnot(2, 3, 0.5f, 0.15f, 200, 16), h, {}, {.exact = exact}),
+        box(shapes::box({0.3f, 0.2f, 0.1f}, 2), h, {}, {.exact = exact});
+    CHECK((knot.loaded.field().mesh() != nullptr) == exact);
     std::size_t found = 0;
     for (int i = 0; i < 200; ++i) {
         const Pose a{random.point(0.5), glm::angleAxis(float(random(0, 6.28)), random.direction())};
@@ -208,7 +207,7 @@ TEST_CASE("many threads may ask at once for the triangles of a body without a me
 TEST_CASE("a body keeps a mesh whose triangles were turned as it was turned") {
     Mesh inside = shapes::torusKnot(2, 3, 0.5f, 0.15f, 200, 16);
     for (glm::uvec3& triangle : inside.triangles) std::swap(triangle.x, triangle.y);
-    const Pair knot(inside, 0.03f, {}, {.measure = Measure::triangles});
+    const Pair knot(inside, 0.03f, {}, {.exact = true});
     const Mesh outward = shapes::torusKnot(2, 3, 0.5f, 0.15f, 200, 16);
     REQUIRE(massProperties(knot.loaded.mesh()).volume == Approx(massProperties(outward).volume));
     requireSame(knot.made.body(), knot.loaded.body());
@@ -229,7 +228,6 @@ TEST_CASE("an open mesh has no mass, in a file neither") {
     REQUIRE_FALSE(bodyOf(withBody(stored(), body)).mass);
     body.mesh.reset();
     REQUIRE_FALSE(bodyOf(withBody(stored(), body)).mesh);
-    REQUIRE(bodyOf(withBody(stored(), body)).measure == Measure::samples);
 }
 
 TEST_CASE("a field alone is no body") {
@@ -238,6 +236,11 @@ TEST_CASE("a field alone is no body") {
     REQUIRE(hasBody(stored()));
     requireRefusal(plain, "no body");
     REQUIRE_THROWS_AS(withBody(plain, {}), std::invalid_argument);
+    Body exact = bodyOf(stored());
+    exact.exact = true;
+    REQUIRE_NOTHROW(withBody(plain, exact));
+    exact.mesh.reset();
+    REQUIRE_THROWS_WITH(withBody(plain, exact), Catch::Contains("without a mesh"));
 }
 
 TEST_CASE("damaged bodies are refused by what is wrong") {
@@ -259,8 +262,11 @@ TEST_CASE("damaged bodies are refused by what is wrong") {
     requireRefusal(changed(setting("bilayer:bounds_upper", openvdb::Vec3s(0.3f, 0.2f, 0.05f))),
                    "outside of its bounds");
 
-    requireRefusal(changed(setting("bilayer:measure", std::string("thumb"))), "'bilayer:measure' is thumb");
-    requireRefusal(changed([](Distance& grid) { grid.removeMeta("bilayer:measure"); }), "bilayer:measure");
+    requireRefusal(changed([](Distance& grid) {
+                       setting("bilayer:exact", true)(grid);
+                       grid.removeMeta("bilayer:mesh");
+                   }),
+                   "'bilayer:mesh' is missing");
     requireRefusal(changed(setting("bilayer:mesh", 7.f)), "type float");
 
     requireRefusal(changed({}, [](Points& grid) { grid.clear(); }), "no surface points");
@@ -284,29 +290,44 @@ TEST_CASE("damaged bodies are refused by what is wrong") {
                        "contact_points");
 }
 
+using Bytes = openvdb::UnknownMetadata;
+
+std::shared_ptr<const Bytes> meshBytes(const LevelSet& field) {
+    return std::dynamic_pointer_cast<const Bytes>((*field.grids().distance)["bilayer:mesh"]);
+}
+
+LevelSet withMeshBytes(const Bytes::ByteVec& bytes) {
+    return changed([&](Distance& grid) {
+        Bytes entry("bilayer_mesh");
+        entry.setValue(bytes);
+        grid.removeMeta("bilayer:mesh");
+        grid.insertMeta("bilayer:mesh", entry);
+    });
+}
+
 TEST_CASE("a damaged mesh of a body is refused, whichever byte it is") {
-    using Bytes = openvdb::UnknownMetadata;
-    const auto whole = std::dynamic_pointer_cast<const Bytes>((*stored().grids().distance)["bilayer:mesh"]);
-    REQUIRE(whole);
-    const auto withBytes = [](const Bytes::ByteVec& bytes) {
-        return changed([&](Distance& grid) {
-            Bytes entry("bilayer_mesh");
-            entry.setValue(bytes);
-            grid.removeMeta("bilayer:mesh");
-            grid.insertMeta("bilayer:mesh", entry);
-        });
-    };
-    REQUIRE_NOTHROW(Collider(withBytes(whole->value())));
+    const Bytes::ByteVec whole = meshBytes(stored())->value();
+    REQUIRE_NOTHROW(Collider(withMeshBytes(whole)));
     for (const double part : {0., 0.01, 0.5, 0.999}) {
-        Bytes::ByteVec bytes = whole->value();
+        Bytes::ByteVec bytes = whole;
         bytes.resize(std::size_t(part * double(bytes.size())));
-        requireRefusal(withBytes(bytes), "bilayer:mesh");
+        requireRefusal(withMeshBytes(bytes), "bilayer:mesh");
     }
-    for (std::size_t i = 0; i < whole->value().size(); i += i < 24 ? 1 : 41) {
-        Bytes::ByteVec bytes = whole->value();
+    for (std::size_t i = 0; i < whole.size(); i += i < 24 ? 1 : 41) {
+        Bytes::ByteVec bytes = whole;
         bytes[i] ^= 0x55;
-        requireRefusal(withBytes(bytes), "bilayer:mesh");
+        requireRefusal(withMeshBytes(bytes), "bilayer:mesh");
     }
+}
+
+TEST_CASE("a body with the mesh of another, or with one that is not valid, is refused") {
+    const Pair other(shapes::box({0.3f, 0.2f, 0.11f}, 3), 0.02f);
+    requireRefusal(withMeshBytes(meshBytes(withBody(other.field, other.made.body()))->value()), "of another body");
+    Body body = bodyOf(stored());
+    Mesh bad = *body.mesh;
+    bad.triangles[7].y = 1u << 30;
+    body.mesh = std::make_shared<const Mesh>(bad);
+    REQUIRE_THROWS_AS(withBody(stored(), body), std::invalid_argument);
 }
 
 TEST_CASE("a field that was moved away from its body is told") {

@@ -206,6 +206,7 @@ TEST_CASE("the closest points of generated shapes are those of all triangles") {
         {"a needle", tilted(shapes::cone(0.01f, 2, 24)), 60},
         {"a wall thinner than a voxel", tilted(shapes::box({1, 1, 0.003f}, 3)), 50},
         {"a knot", shapes::torusKnot(2, 3, 1, 0.2f, 120, 12), 50},
+        {"so few triangles that all of them are near", shapes::box({0.3f, 0.2f, 0.1f}, 2), 28},
     };
     for (const auto& one : cases) require(one.name, check(one.mesh, one.resolution, 4000, 1000, seed));
 }
@@ -244,6 +245,30 @@ TEST_CASE("closest points need a place, a distance that is not exceeded, and the
     CHECK_THROWS_AS(Field(levelSet, shapes::sphere(1, 3)), std::invalid_argument);
     ClosestPoint one;
     CHECK_THROWS_AS(field.closest(std::vector<glm::vec3>(2), std::span(&one, 1)), std::invalid_argument);
+}
+
+TEST_CASE("at the edges of a mesh that meets itself closest points are on the right side") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    const float voxel = 0.05f;
+    const Mesh mesh = tilted(shapes::join({shapes::box({1, 0.8f, 0.6f}), shapes::box({0.2f, 0.2f, 1.5f})}));
+    const LevelSet levelSet = build(mesh, {.voxelSize = voxel});
+    CHECK(levelSet.sign() == "winding");
+    const Field field(levelSet, mesh);
+    const Truth truth(mesh);
+    Random random(seed);
+    int near = 0, wrong = 0;
+    for (int i = 0; i < 20000; ++i) {
+        // about an edge of the box that the bar does not reach
+        const glm::vec3 local(random(-0.9, 0.9), 0.8 + random(-0.02, 0.02), 0.6 + random(-0.02, 0.02));
+        const glm::vec3 place = tilted(Mesh{{local}, {}}).points[0];
+        const ClosestPoint closest = field.closest(place);
+        if (std::abs(closest.distance) < samePlace * voxel) continue;
+        ++near;
+        wrong += (closest.distance < 0) != (truth.winding(glm::dvec3(place)) > 0);
+    }
+    CHECK(near > 15000);
+    CHECK(wrong == 0);
 }
 
 TEST_CASE("closest points of meshes that build() has to mend are those of their triangles, with the field's signs") {
