@@ -25,7 +25,7 @@ struct Body {
 
 /// The level set, to write as a .vdb file, with the body beside it: surface points as a grid of OpenVDB points, the
 /// rest as metadata. Nothing is lost: bodyOf() gives the same bits. The grids of `levelSet` are shared, not copied.
-/// Throws std::invalid_argument if the body has no points, or a mesh that is not valid, or of
+/// Throws std::invalid_argument if the body has no points, is exact without a mesh, or has one that is not valid or of
 /// more than 2 GiB.
 LevelSet withBody(const LevelSet& levelSet, const Body& body);
 

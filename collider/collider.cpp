@@ -28,10 +28,14 @@ constexpr float searchTolerance = 2e-3f;  // of the deepest place on an edge [vo
 // A point that slides along a face ends in the edges beyond it by rounding: what only grazes, by less than this, goes
 // past [voxels].
 constexpr float grazing = 0.25f;
-// Two places are brought closer in so many turns; the way between them tells a direction from here on [voxels].
-// Turns end where the place goes no farther than this [voxels]; it goes on by no more than so many of its steps.
+// The two places of a contact are brought closer in so many turns at most, until one goes no farther than this
+// [voxels].
 constexpr int settlingTurns = 10;
-constexpr float shortest = 1e-3f, settled = 1e-4f, farthestOn = 50;
+constexpr float settled = 1e-4f;
+// It goes on by no more than so many of its last steps at once.
+constexpr float farthestOn = 50;
+// Nearer to each other, the way between them tells no direction [voxels].
+constexpr float shortest = 1e-3f;
 // A tip that has sunk into another one sees its sides; what it opposes is seen so far back along its normal [voxels].
 constexpr float lift = 1;
 

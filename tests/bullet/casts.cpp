@@ -157,15 +157,6 @@ double firstHit(const Mesh& mesh, const glm::dvec3& from, const glm::dvec3& to, 
     return first;
 }
 
-struct Nearest : btCollisionWorld::ContactResultCallback {
-    btScalar addSingleResult(btManifoldPoint& point, const btCollisionObjectWrapper*, int, int,
-                             const btCollisionObjectWrapper*, int, int) override {
-        distance = std::min(distance, float(point.getDistance()));
-        return 0;
-    }
-    float distance = std::numeric_limits<float>::max();
-};
-
 // How far a contact test finds a shape from the first body of a world.
 float distanceOf(btCollisionShape& shape, const btTransform& place, World& world) {
     btCollisionObject object;

@@ -179,15 +179,6 @@ class Other {
     btCompoundShape compound_;
 };
 
-struct Nearest : btCollisionWorld::ContactResultCallback {
-    btScalar addSingleResult(btManifoldPoint& point, const btCollisionObjectWrapper*, int, int,
-                             const btCollisionObjectWrapper*, int, int) override {
-        distance = std::min(distance, double(point.getDistance()));
-        return 0;
-    }
-    double distance = std::numeric_limits<double>::infinity();
-};
-
 btTransform anywhere(Random& random, double reach) {
     const glm::vec3 axis(random.direction()), place(random.point(reach));
     return btTransform(btQuaternion(bullet::toBullet(axis), float(random(0, 6.28))), bullet::toBullet(place));

@@ -3,8 +3,10 @@
 
 #include <btBulletDynamicsCommon.h>
 
+#include <algorithm>
 #include <functional>
 #include <glm/vec3.hpp>
+#include <limits>
 #include <memory>
 #include <vector>
 
@@ -53,6 +55,16 @@ std::shared_ptr<const Collider> exactBowl(float radius, float wall, float voxelS
 
 /// The body of a mesh as it comes back from a file that leaves the mesh out.
 std::shared_ptr<const Collider> withoutMesh(const Mesh& mesh, const LevelSet& field);
+
+/// What a contact test finds nearest.
+struct Nearest : btCollisionWorld::ContactResultCallback {
+    btScalar addSingleResult(btManifoldPoint& point, const btCollisionObjectWrapper*, int, int,
+                             const btCollisionObjectWrapper*, int, int) override {
+        distance = std::min(distance, float(point.getDistance()));
+        return 0;
+    }
+    float distance = std::numeric_limits<float>::max();
+};
 
 /// Speed at which a body at rest may still creep: linear [m/s] and angular [1/s] together.
 float motion(const btRigidBody& body);
