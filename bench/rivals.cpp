@@ -8,6 +8,7 @@
 #include <BulletCollision/CollisionShapes/btTriangleIndexVertexArray.h>
 #include <BulletCollision/Gimpact/btGImpactCollisionAlgorithm.h>
 #include <BulletCollision/Gimpact/btGImpactShape.h>
+#include <fmt/format.h>
 #include <hacdHACD.h>
 #include <oneapi/tbb/parallel_for.h>
 
@@ -33,14 +34,14 @@ constexpr double anyConcavity = 1e9;  // so many hulls and no more, however conc
 
 class Field : public Rival {
   public:
-    Field(const Mesh& mesh, float voxels, const PointSampler& sampler, bool exact)
+    Field(const Mesh& mesh, float voxels, const PointSampler& sampler, Measure measure)
         : sampler_(sampler),
-          name_(exact            ? "bilayer, exact"
-                : sampler.sample ? "bilayer, " + sampler.device
-                                 : "bilayer") {
+          name_(sampler.sample              ? "bilayer, " + sampler.device
+                : measure == Measure::edges ? "bilayer"
+                                            : fmt::format("bilayer, by {}", nameOf(measure))) {
         BuildOptions how{.voxelSize = voxelSizeFor(mesh, voxels)};
         how.interiorWidth = bandInside;
-        const ColliderOptions options{.exact = exact};
+        const ColliderOptions options{.measure = measure};
         shape_ = std::make_unique<bullet::Shape>(std::make_shared<Collider>(mesh, build(mesh, how), options));
     }
     std::string name() const override { return name_; }
@@ -249,8 +250,8 @@ std::unique_ptr<btCollisionDispatcher> Rival::dispatcher(btCollisionConfiguratio
     return std::make_unique<btCollisionDispatcher>(&configuration);
 }
 
-std::unique_ptr<Rival> makeField(const Mesh& mesh, float voxels, const PointSampler& sampler, bool exact) {
-    return timed<Field>(mesh, voxels, sampler, exact);
+std::unique_ptr<Rival> makeField(const Mesh& mesh, float voxels, const PointSampler& sampler, Measure measure) {
+    return timed<Field>(mesh, voxels, sampler, measure);
 }
 
 std::unique_ptr<Rival> makeGImpact(const Mesh& mesh, float margin) {

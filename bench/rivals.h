@@ -8,6 +8,7 @@
 #include <memory>
 #include <string>
 
+#include "collider/body.h"
 #include "sdf/mesh.h"
 #include "sdf/point_sampler.h"
 
@@ -28,8 +29,8 @@ class Rival {
 /// Ours.
 /// @param voxels   along the longest side
 /// @param sampler  samples the contacts' points; none: the processor does, as ever
-/// @param exact    as in ColliderOptions
-std::unique_ptr<Rival> makeField(const Mesh& mesh, float voxels, const PointSampler& sampler = {}, bool exact = false);
+std::unique_ptr<Rival> makeField(const Mesh& mesh, float voxels, const PointSampler& sampler = {},
+                                 Measure measure = Measure::edges);
 
 /// btGImpactMeshShape.
 /// @param margin  added to the surface [m]

@@ -43,7 +43,7 @@ constexpr const char* products = "bilayer:inertia_products";  // xy xz yz
 constexpr const char* principal = "bilayer:principal_inertia";
 constexpr const char* axes = "bilayer:principal_axes";  // a quaternion, x y z w
 constexpr const char* mesh = "bilayer:mesh";            // bytes: see packed()
-constexpr const char* exact = "bilayer:exact";
+constexpr const char* measure = "bilayer:measure";
 }  // namespace entry
 
 // Names that other programs give such attributes, too.
@@ -291,6 +291,15 @@ void requireSame(const Bounds& ofMesh, const Bounds& ofBody) {
     if (ofMesh.lower != ofBody.lower || ofMesh.upper != ofBody.upper) refuse("its mesh is of another body");
 }
 
+constexpr std::pair<Measure, const char*> measures[] = {
+    {Measure::samples, "samples"}, {Measure::edges, "edges"}, {Measure::triangles, "triangles"}};
+
+Measure measureOf(const std::string& name) {
+    for (const auto& [measure, itsName] : measures)
+        if (name == itsName) return measure;
+    refuse(fmt::format("'{}' is {}", entry::measure, name));
+}
+
 // A field that was moved or scaled elsewhere leaves its body behind.
 void requireWithin(const Bounds& bounds, const openvdb::FloatGrid& grid) {
     const openvdb::CoordBBox box = grid.evalActiveVoxelBoundingBox();
@@ -303,21 +312,28 @@ void requireWithin(const Bounds& bounds, const openvdb::FloatGrid& grid) {
 
 }  // namespace
 
+const char* nameOf(Measure measure) {
+    for (const auto& [one, name] : measures)
+        if (one == measure) return name;
+    throw std::invalid_argument("no such measure");
+}
+
 LevelSet withBody(const LevelSet& levelSet, const Body& body) {
     if (body.points.points().empty()) throw std::invalid_argument("a body has surface points");
-    if (body.exact && !body.mesh) throw std::invalid_argument("a body without a mesh is not exact");
     openvdb::initialize();
     const auto distance = openvdb::ConstPtrCast<openvdb::FloatGrid>(levelSet.grids().distance)->copy();
     for (const char* stale : {entry::volume, entry::centre, entry::inertia, entry::products, entry::principal,
-                              entry::axes, entry::mesh, entry::exact})
+                              entry::axes, entry::mesh, entry::measure})
         distance->removeMeta(stale);
     distance->insertMeta(entry::format, openvdb::Int32Metadata(format));
     distance->insertMeta(entry::margin, openvdb::FloatMetadata(body.margin));
     distance->insertMeta(entry::lower, openvdb::Vec3SMetadata(toVdb(body.bounds.lower)));
     distance->insertMeta(entry::upper, openvdb::Vec3SMetadata(toVdb(body.bounds.upper)));
     if (body.mass) storeMass(*distance, *body.mass);
-    if (body.mesh) distance->insertMeta(entry::mesh, *packed(*body.mesh));
-    if (body.exact) distance->insertMeta(entry::exact, openvdb::BoolMetadata(true));
+    if (body.mesh) {
+        distance->insertMeta(entry::mesh, *packed(*body.mesh));
+        distance->insertMeta(entry::measure, openvdb::StringMetadata(nameOf(body.measure)));
+    }
     auto grids = std::make_shared<Grids>(levelSet.grids());
     grids->distance = distance;
     grids->points = store(body.points, pointVoxel(levelSet));
@@ -343,8 +359,7 @@ Body bodyOf(const LevelSet& levelSet) {
     body.mass = loadMass(entries);
     body.points = pointsOf(levelSet);
     body.mesh = meshOf(levelSet);
-    body.exact = entries.find<bool>(entry::exact).value_or(false);
-    if (body.exact && !body.mesh) refuse(fmt::format("'{}' is missing", entry::mesh));
+    if (body.mesh) body.measure = measureOf(entries.get<std::string>(entry::measure));
     requireWithin(body.points, body.bounds);
     requireWithin(body.bounds, *levelSet.grids().distance);
     if (body.mesh) requireSame(bounds(*body.mesh), body.bounds);

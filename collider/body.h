@@ -12,6 +12,13 @@
 
 namespace bilayer {
 
+/// What the distances and normals of contacts are taken from, once the field's samples have found them.
+enum class Measure {
+    samples,    ///< nothing else: takes the least memory
+    edges,      ///< the triangles where samples are off: at edges, in grooves, and where the surface bends in a voxel
+    triangles,  ///< the triangles everywhere
+};
+
 struct Body {
     SurfacePoints points;
     Bounds bounds;                       ///< of the mesh [m]
@@ -20,13 +27,15 @@ struct Body {
     /// All of it facing outward. Null for a body that answers by its field alone, which rounds sharp edges: sweeps then
     /// end a voxel and a half late there at most, and rays half a voxel.
     std::shared_ptr<const Mesh> mesh;
-    bool exact = false;  ///< whether contacts are measured against the mesh (see ColliderOptions)
+    Measure measure = Measure::samples;  ///< as in ColliderOptions; samples where there is no mesh
 };
+
+/// As in files and on the command line: samples, edges or triangles.
+const char* nameOf(Measure measure);
 
 /// The level set, to write as a .vdb file, with the body beside it: surface points as a grid of OpenVDB points, the
 /// rest as metadata. Nothing is lost: bodyOf() gives the same bits. The grids of `levelSet` are shared, not copied.
-/// Throws std::invalid_argument if the body has no points, is exact without a mesh, or has one that is not valid or of
-/// more than 2 GiB.
+/// Throws std::invalid_argument if the body has no points, or a mesh that is not valid or of more than 2 GiB.
 LevelSet withBody(const LevelSet& levelSet, const Body& body);
 
 /// Whether some body was put beside a level set.

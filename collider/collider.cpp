@@ -208,7 +208,7 @@ class PointsInField {
 
     // Beyond the band up to `most`, where that is asked for.
     std::optional<Touch> touchAt(const glm::vec3& at, const Sample& sample, float most) const {
-        if (sample.inBand) return touchInBand(field_, at, sample);
+        if (sample.inBand) return touchInBand(field_, at, sample, other_.collider.asksTriangles(at, options_.measured));
         if (!options_.measured || sample.distance < 0) return std::nullopt;
         const ClosestPoint closest = field_.closest(at, most);
         if (!closest.found) return std::nullopt;
@@ -225,7 +225,8 @@ class PointsInField {
         const glm::vec3 outside = at - back * normal;
         const Sample sample = field_.sample(outside);
         if (!sample.inBand) return here;
-        const Touch there = touchInBand(field_, outside, sample);
+        const Touch there =
+            touchInBand(field_, outside, sample, other_.collider.asksTriangles(outside, options_.measured));
         if (!(there.distance > 0) || !options_.keeps(opposition(there), false)) return here;
         return {std::min(there.distance - back * opposition(there), 0.f), there.normal};
     }
@@ -351,7 +352,7 @@ Body makeBody(Mesh given, const LevelSet& levelSet, const ColliderOptions& optio
             .margin = options.margin < 0 ? levelSet.voxelSize() : options.margin,
             .mass = massOf(*mesh, levelSet),
             .mesh = mesh,
-            .exact = options.exact};
+            .measure = options.measure};
 }
 
 }  // namespace
@@ -394,8 +395,9 @@ Collider::Collider(Mesh mesh, const LevelSet& levelSet, const ColliderOptions& o
 
 Collider::Collider(const LevelSet& levelSet, Body body)
     : body_(std::move(body)),
-      field_(body_.exact ? Field(Field(levelSet), body_.mesh) : Field(levelSet)),
+      field_(body_.mesh && body_.measure != Measure::samples ? Field(Field(levelSet), body_.mesh) : Field(levelSet)),
       onDemand_(body_.mesh ? std::make_shared<OnDemand>() : std::make_shared<OnDemand>(levelSet)),
+      strays_(field_.mesh() && body_.measure == Measure::edges ? Strays(field_) : Strays()),
       edges_(body_.points, field_),
       id_(nextId()) {}
 

@@ -14,6 +14,7 @@
 #include "collider/near_points.h"
 #include "collider/pose.h"
 #include "collider/sharp_edges.h"
+#include "collider/strays.h"
 #include "sdf/point_sampler.h"
 
 namespace bilayer {
@@ -26,10 +27,10 @@ struct ColliderOptions {
     float pointSpacing = 2.0f;
     /// Contacts are made up to this distance between the surfaces [m]. Negative: one voxel of the field.
     float margin = -1;
-    /// Whether contacts are measured against the triangles, where the field has found them: exact at edges and grooves,
-    /// where samples blend what the surface is on either side. Takes memory (see Field), and more time the more
-    /// contacts there are: for parts that fit into each other to a fraction of a voxel.
-    bool exact = false;
+    /// Measure::edges asks the triangles where samples are off by more than a tenth of a voxel (see Strays). But
+    /// for samples alone, the mesh takes memory (see Field), and a microsecond a triangle to sort. Measure::triangles
+    /// costs more time the more contacts there are: for parts that fit into each other to a fraction of a voxel.
+    Measure measure = Measure::edges;
 };
 
 /// A field, points on the surface, and what else contacts need. Immutable; share it between bodies and threads.
@@ -48,9 +49,15 @@ class Collider {
     /// asked for, once.
     const Mesh& mesh() const;
     const Field& field() const { return field_; }
-    /// The field that measures by the triangles: field() itself where contacts are exact, or where the body has no
-    /// mesh; else one with the mesh that shares its samples, made when first asked for, once.
+    /// The field with the mesh, if the body has one: field() itself where contacts ask triangles, else made when first
+    /// asked for, once, and sharing the samples.
     const Field& measured() const;
+    /// Whether contacts ask the triangles at a point of the body's coordinates [m], by Body::measure.
+    /// @param measured  as in ContactOptions
+    bool asksTriangles(const glm::vec3& point, bool measured = false) const {
+        if (measured || body_.measure == Measure::triangles) return body_.mesh != nullptr;
+        return strays_.hold(point);
+    }
     const Body& body() const { return body_; }
     const SurfacePoints& points() const { return body_.points; }
     const SharpEdges& edges() const { return edges_; }
@@ -68,6 +75,7 @@ class Collider {
     Body body_;
     Field field_;
     std::shared_ptr<OnDemand> onDemand_;
+    Strays strays_;
     SharpEdges edges_;
     std::uint64_t id_;
 };

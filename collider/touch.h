@@ -12,8 +12,8 @@ struct Touch {
     float approach = 0;  ///< Contact::approach
 };
 
-/// Of a point in the band: by the triangles where the field has them, else by its sample.
-Touch touchInBand(const Field& field, const glm::vec3& point, const Sample& sample);
+/// Of a point in the band: by its sample, or by the triangles.
+Touch touchInBand(const Field& field, const glm::vec3& point, const Sample& sample, bool byTriangles);
 
 /// Which way a point is from what is closest to it: across a face, and away from an edge or a corner, or from what a
 /// field without triangles does not tell apart.

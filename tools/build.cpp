@@ -30,6 +30,8 @@ const std::map<std::string, Method> methods{{"exact", Method::exact},
 const std::map<std::string, Sign> signs{
     {"auto", Sign::automatic}, {"normals", Sign::normals}, {"winding", Sign::winding}, {"flood", Sign::flood}};
 const std::map<std::string, BandUnit> bandUnits{{"voxels", BandUnit::voxels}, {"world", BandUnit::world}};
+const std::map<std::string, Measure> measures{
+    {"samples", Measure::samples}, {"edges", Measure::edges}, {"triangles", Measure::triangles}};
 const std::map<std::string, KernelMapping> mappings{{"auto", KernelMapping::automatic},
                                                     {"block", KernelMapping::blockPerItem},
                                                     {"group", KernelMapping::groupPerBlock}};
@@ -40,7 +42,8 @@ struct Arguments {
     BuildOptions options;
     float resolution = 0;
     float halfWidth = 3;
-    std::string bandUnit = "voxels", method = "exact", backend = "tbb", sign = "auto", device, mapping = "auto";
+    std::string bandUnit = "voxels", method = "exact", backend = "tbb", sign = "auto", device, mapping = "auto",
+                contacts = "edges";
     std::uint64_t deviceMemory = 0;
     VdbOptions stored;
     ColliderOptions collider;
@@ -128,9 +131,9 @@ LevelSet timedBuild(const Mesh& mesh, const Arguments& a, Outcome& outcome) {
 LevelSet timedBody(const Mesh& mesh, const LevelSet& field, const Arguments& a, Outcome& outcome) {
     const Stopwatch watch;
     ColliderOptions options = a.collider;
-    options.exact = false;  // what that needs is made when the file is read
+    options.measure = Measure::samples;  // what that needs is made when the file is read
     Body body = Collider(mesh, field, options).body();
-    body.exact = a.collider.exact;
+    body.measure = a.collider.measure;
     if (a.noMesh) body.mesh.reset();
     LevelSet stored = withBody(field, body);
     outcome.body = watch.seconds();
@@ -186,6 +189,7 @@ void run(Arguments a) {
     if (a.options.bandUnit == BandUnit::voxels || !a.resolutionGiven->count()) requireBand(a);
     a.options.method = methods.at(a.method);
     a.options.sign = signs.at(a.sign);
+    a.collider.measure = a.noMesh ? Measure::samples : measures.at(a.contacts);
     std::optional<tbb::global_control> threads;
     if (a.options.threads > 0)
         threads.emplace(tbb::global_control::max_allowed_parallelism, std::size_t(a.options.threads));
@@ -267,7 +271,10 @@ void addLayers(CLI::App& command, Arguments& a) {
 void addBody(CLI::App& command, Arguments& a) {
     auto* group = command.add_option_group("body", "what rigid bodies need beside the field");
     group->add_flag("--body", a.body, "keep surface points, mass, margin and the mesh: the file is all that collides");
-    auto* exact = group->add_flag("--exact-contacts", a.collider.exact, "measure contacts against the triangles");
+    auto* contacts = group
+                         ->add_option("--contacts", a.contacts,
+                                      "measured by samples alone, by triangles at edges (default) or everywhere")
+                         ->check(CLI::IsMember(measures));
     auto* noMesh = group->add_flag("--no-mesh", a.noMesh, "a smaller file, which rounds sharp edges in casts");
     a.bodyOptions = {
         group
@@ -276,7 +283,7 @@ void addBody(CLI::App& command, Arguments& a) {
             ->check(positive()),
         group->add_option("--point-spacing", a.collider.pointSpacing, "distance of surface points [voxels], default 2")
             ->check(within(0.1, 100)),
-        exact, noMesh->excludes(exact)};
+        contacts, noMesh->excludes(contacts)};
 }
 
 void addMachine(CLI::App& command, Arguments& a) {

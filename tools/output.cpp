@@ -184,14 +184,14 @@ Json toJson(const Body& body) {
             {"bounds", box(body.bounds)},
             {"mass", toJson(body.mass)},
             {"triangles", body.mesh ? body.mesh->triangles.size() : 0},
-            {"exactContacts", body.exact}};
+            {"contacts", nameOf(body.measure)}};
 }
 
 void addRows(Table& table, const Body& body) {
     const std::string mesh = body.mesh ? grouped(body.mesh->triangles.size()) + " triangles" : "no mesh";
-    table.row("body", fmt::format("{} surface points, margin {}, {}{}{}", grouped(body.points.points().size()),
-                                  metres(body.margin), mesh, body.exact ? ", exact contacts" : "",
-                                  body.mass ? "" : ", without a mass"));
+    table.row("body",
+              fmt::format("{} surface points, margin {}, {}, contacts by {}{}", grouped(body.points.points().size()),
+                          metres(body.margin), mesh, nameOf(body.measure), body.mass ? "" : ", without a mass"));
 }
 
 ProgressBar::ProgressBar(std::string label) : label_(std::move(label)), visible_(::isatty(STDERR_FILENO)) {}

@@ -201,7 +201,8 @@ Outcome nuts(const NutsOptions& options) {
     Stage stage(fmt::format("{} nuts on their bolts", options.pairs),
                 {.stepsPerSecond = options.stepsPerSecond, .framesPerMeasuring = framesPerMeasuring});
     stage.world().bullet().getSolverInfo().m_numIterations = options.iterations;
-    const ThingOptions things{.voxelSize = options.voxelSize, .margin = margin, .sweeps = false, .exact = true};
+    const ThingOptions things{
+        .voxelSize = options.voxelSize, .margin = margin, .sweeps = false, .measure = Measure::triangles};
     const auto bolt = makeThing(std::move(parts.bolt), things);
     const auto nut = makeThing(std::move(parts.nut), things);
     const float mass = density * float(massProperties(nut->mesh).volume);

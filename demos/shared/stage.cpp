@@ -46,7 +46,7 @@ std::shared_ptr<const Thing> makeThing(Mesh mesh, const ThingOptions& options) {
     band.interiorWidth = options.interiorWidth;
     LevelSet field = build(mesh, band);
     auto collider = std::make_shared<Collider>(
-        mesh, field, ColliderOptions{.pointSpacing = options.pointSpacing, .exact = options.exact});
+        mesh, field, ColliderOptions{.pointSpacing = options.pointSpacing, .measure = options.measure});
     const bullet::ShapeOptions centred{.frame = bullet::centreOfMassFrame(*collider),
                                        .margin = options.margin,
                                        .sweeps = options.sweeps,

@@ -61,6 +61,7 @@ class Local {
     Local(const Placed& field, const Pose& other, const Motion& motion, float reach, bool measured)
         : collider_(field.collider),
           field_(measured ? field.collider.measured() : field.collider.field()),
+          measured_(measured),
           scale_(field.scale),
           voxel_(field.scale * field.collider.field().voxelSize()),
           pose_(field.pose),
@@ -91,7 +92,8 @@ class Local {
         const Sample sample = field_.sample(point / scale_);
         if (!sample.inBand && sample.distance > 0 && farReach_ > 0) return farAway(point, radius, sample.distance);
         if (!sample.inBand) return {sample.distance > 0 ? Answer::outside : Answer::inside, scale_ * sample.distance};
-        if (field_.mesh() && scale_ * sample.distance - radius <= exactReach_) return exactly(point, sample);
+        if (scale_ * sample.distance - radius <= exactReach_ && collider_.asksTriangles(point / scale_, measured_))
+            return exactly(point, sample);
         const glm::vec3 normal = directionOf(sample, field_.voxelSize());
         const auto where = normal == glm::vec3(0) ? Answer::unclear : Answer::near;
         return {where, scale_ * sample.distance, normal, sample.gradient};
@@ -198,9 +200,9 @@ class Local {
                        -glm::dot(way, hit->normal));
     }
 
-    /// By the triangles, in the band (see ColliderOptions::exact).
+    /// By the triangles, in the band.
     Answer exactly(const glm::vec3& point, const Sample& sample) const {
-        const Touch touch = touchInBand(field_, point / scale_, sample);
+        const Touch touch = touchInBand(field_, point / scale_, sample, true);
         if (touch.normal == glm::vec3(0)) return {Answer::unclear, scale_ * touch.distance, {}, sample.gradient};
         return {Answer::near, scale_ * touch.distance, touch.normal, touch.normal};
     }
@@ -215,6 +217,7 @@ class Local {
 
     const Collider& collider_;
     const Field& field_;
+    bool measured_;
     float scale_, voxel_;
     Pose pose_;
     RelativeWays ways_;

@@ -131,14 +131,14 @@ Mesh ring() {
     return shapes::torus(0.3f, 0.12f, 16, 10);
 }
 
-std::shared_ptr<const Collider> colliderOf(const Mesh& mesh, bool exact) {
-    return std::make_shared<Collider>(mesh, build(mesh, {.voxelSize = voxel}), ColliderOptions{.exact = exact});
+std::shared_ptr<const Collider> colliderOf(const Mesh& mesh, Measure measure) {
+    return std::make_shared<Collider>(mesh, build(mesh, {.voxelSize = voxel}), ColliderOptions{.measure = measure});
 }
 
 // What a field is asked about, and its triangles.
 class Other {
   public:
-    Other(int kind, Random& random, bool exact) : triangles_(ring()), field_(colliderOf(ring(), exact)) {
+    Other(int kind, Random& random, Measure measure) : triangles_(ring()), field_(colliderOf(ring(), measure)) {
         for (float& height : heights_) height = float(random(-0.1, 0.1));
         terrain_ = std::make_unique<btHeightfieldTerrainShape>(side, side, heights_.data(), 1, -0.1f, 0.1f, 2,
                                                                PHY_FLOAT, false);
@@ -188,13 +188,13 @@ btTransform anywhere(Random& random, double reach) {
 
 TEST_CASE("Contact tests between concave bodies tell the distance of their meshes") {
     const int kind = GENERATE(range(0, 4)), other = GENERATE(range(0, 4));
-    const bool exact = GENERATE(false, true);
+    const Measure measure = GENERATE(Measure::samples, Measure::edges, Measure::triangles);
     const unsigned start = seed();
-    CAPTURE(kind, other, exact, start);
+    CAPTURE(kind, other, nameOf(measure), start);
     Random random(start);
     const Mesh mesh = bodyOf(kind);
-    Shape field(colliderOf(mesh, exact));
-    const Other it(other, random, exact);
+    Shape field(colliderOf(mesh, measure));
+    const Other it(other, random, measure);
     World world;
     btCollisionObject a, b;
     a.setCollisionShape(&field);
@@ -221,7 +221,7 @@ TEST_CASE("Contact tests that ask for no distance measure the depth by the trian
     CAPTURE(start);
     Random random(start);
     const Mesh pulley = shapes::revolve({{0, -0.3f}, {0.4f, -0.15f}, {0.25f, 0}, {0.4f, 0.15f}, {0, 0.3f}}, 48);
-    Shape field(colliderOf(pulley, false));
+    Shape field(colliderOf(pulley, Measure::samples));
     const float radius = 0.4f * voxel;  // between surface points
     btSphereShape ball(radius);
     World world;
@@ -247,12 +247,13 @@ TEST_CASE("Contact tests that ask for no distance measure the depth by the trian
 TEST_CASE("Contact tests find how far round bodies are that nearly touch each other or a plane") {
     const float radius = GENERATE(2.f, 3.f, 5.f, 9.f) * voxel;
     const float gap = GENERATE(0.5f, 0.1f, 0.001f) * voxel;
-    const bool overPlane = GENERATE(false, true), exact = GENERATE(false, true);
+    const bool overPlane = GENERATE(false, true);
+    const Measure measure = GENERATE(Measure::samples, Measure::edges, Measure::triangles);
     const unsigned start = seed();
-    CAPTURE(radius / voxel, gap / voxel, overPlane, exact, start);
+    CAPTURE(radius / voxel, gap / voxel, overPlane, nameOf(measure), start);
     Random random(start);
     const Mesh ball = shapes::sphere(radius, 4);
-    Shape field(colliderOf(ball, exact));
+    Shape field(colliderOf(ball, measure));
     btStaticPlaneShape plane({0, 0, 1}, 0);
     World world;
     btCollisionObject a, b;

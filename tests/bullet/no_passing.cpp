@@ -102,6 +102,9 @@ TEST_CASE("However fast and however they turn, no bodies pass through a thin pla
 
 TEST_CASE("What a wall holds is not run over by what follows close behind") {
     const float radius = 0.2f;
+    // points are followed from a quarter of a voxel inside of their body, to a tenth below where they enter; and what
+    // is round sinks in between points (see ColliderOptions::pointSpacing)
+    const float deepest = 0.35f * h + 0.23f * 4 * h * h / radius;
     Shape ball(exactSphere(radius, h)), wall(exactBox({h, 1, 1}, h));
     const unsigned seed = test::seed();
     std::mt19937 random(seed);
@@ -126,7 +129,7 @@ TEST_CASE("What a wall holds is not run over by what follows close behind") {
             world.dynamics.stepSimulation(step, 0);
             held += guard.held();
             CAPTURE(seed, draw, i);
-            CHECK(first->getCenterOfMassPosition().distance(second->getCenterOfMassPosition()) > 2 * radius - 0.5f * h);
+            CHECK(first->getCenterOfMassPosition().distance(second->getCenterOfMassPosition()) > 2 * radius - deepest);
         }
     }
     CHECK(held > 40);

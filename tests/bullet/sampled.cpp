@@ -20,15 +20,17 @@ using namespace bilayer::test;
 
 namespace {
 
-std::shared_ptr<const Collider> colliderOf(const Mesh& mesh, float voxels, bool exact = false) {
+std::shared_ptr<const Collider> colliderOf(const Mesh& mesh, float voxels, Measure measure = Measure::edges) {
     const float voxel = voxelSizeFor(mesh, voxels);
     return std::make_shared<Collider>(mesh, build(mesh, {.voxelSize = voxel, .interiorWidth = 5}),
-                                      ColliderOptions{.exact = exact});
+                                      ColliderOptions{.measure = measure});
 }
 
 std::vector<std::shared_ptr<const Collider>> someColliders() {
-    return {colliderOf(shapes::torusKnot(2, 3, 0.1f, 0.03f, 90, 12), 48), colliderOf(shapes::torus(0.12f, 0.04f), 40),
-            colliderOf(shapes::box({0.1f, 0.06f, 0.03f}), 24, true), colliderOf(shapes::sphere(0.08f, 3), 20)};
+    return {colliderOf(shapes::torusKnot(2, 3, 0.1f, 0.03f, 90, 12), 48),
+            colliderOf(shapes::torus(0.12f, 0.04f), 40, Measure::samples),
+            colliderOf(shapes::box({0.1f, 0.06f, 0.03f}), 24, Measure::triangles),
+            colliderOf(shapes::cone(0.08f, 0.15f, 16), 30), colliderOf(shapes::sphere(0.08f, 3), 20)};
 }
 
 Pose somePose(Random& random, double size) {

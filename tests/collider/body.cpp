@@ -71,7 +71,7 @@ void requireSame(const Body& a, const Body& b) {
     REQUIRE(a.bounds.lower == b.bounds.lower);
     REQUIRE(a.bounds.upper == b.bounds.upper);
     REQUIRE(a.margin == b.margin);
-    REQUIRE(a.exact == b.exact);
+    REQUIRE(a.measure == b.measure);
     REQUIRE((a.mesh == nullptr) == (b.mesh == nullptr));
     if (a.mesh) {
         REQUIRE(a.mesh->points == b.mesh->points);
@@ -143,7 +143,8 @@ TEST_CASE("a body comes back from its file bit by bit") {
                  std::pair(shapes::torus(0.0035f, 0.0013f), 1e-4f));
     const bool half = GENERATE(false, true);
     CAPTURE(voxel, half);
-    const Pair pair(mesh, voxel, {.halfFloat = half}, {.margin = GENERATE(-1.f, 0.0123f), .exact = half});
+    const Pair pair(mesh, voxel, {.halfFloat = half},
+                    {.margin = GENERATE(-1.f, 0.0123f), .measure = half ? Measure::samples : Measure::edges});
     REQUIRE(pair.made.points().points().size() > 100);
     REQUIRE(pair.made.body().mesh);
     requireSame(pair.made.body(), pair.loaded.body());
@@ -155,10 +156,10 @@ TEST_CASE("bodies from files touch where those of meshes do, to the bit") {
     CAPTURE(seed);
     Random random(seed);
     const float h = 0.03f;
-    const bool exact = GENERATE(false, true);
-    const Pair knot(shapes::torusKnot(2, 3, 0.5f, 0.15f, 200, 16), h, {}, {.exact = exact}),
-        box(shapes::box({0.3f, 0.2f, 0.1f}, 2), h, {}, {.exact = exact});
-    CHECK((knot.loaded.field().mesh() != nullptr) == exact);
+    const Measure measure = GENERATE(Measure::samples, Measure::edges, Measure::triangles);
+    const Pair knot(shapes::torusKnot(2, 3, 0.5f, 0.15f, 200, 16), h, {}, {.measure = measure}),
+        box(shapes::box({0.3f, 0.2f, 0.1f}, 2), h, {}, {.measure = measure});
+    CHECK((knot.loaded.field().mesh() != nullptr) == (measure != Measure::samples));
     std::size_t found = 0;
     for (int i = 0; i < 200; ++i) {
         const Pose a{random.point(0.5), glm::angleAxis(float(random(0, 6.28)), random.direction())};
@@ -207,7 +208,7 @@ TEST_CASE("many threads may ask at once for the triangles of a body without a me
 TEST_CASE("a body keeps a mesh whose triangles were turned as it was turned") {
     Mesh inside = shapes::torusKnot(2, 3, 0.5f, 0.15f, 200, 16);
     for (glm::uvec3& triangle : inside.triangles) std::swap(triangle.x, triangle.y);
-    const Pair knot(inside, 0.03f, {}, {.exact = true});
+    const Pair knot(inside, 0.03f, {}, {.measure = Measure::triangles});
     const Mesh outward = shapes::torusKnot(2, 3, 0.5f, 0.15f, 200, 16);
     REQUIRE(massProperties(knot.loaded.mesh()).volume == Approx(massProperties(outward).volume));
     requireSame(knot.made.body(), knot.loaded.body());
@@ -228,6 +229,7 @@ TEST_CASE("an open mesh has no mass, in a file neither") {
     REQUIRE_FALSE(bodyOf(withBody(stored(), body)).mass);
     body.mesh.reset();
     REQUIRE_FALSE(bodyOf(withBody(stored(), body)).mesh);
+    REQUIRE(bodyOf(withBody(stored(), body)).measure == Measure::samples);
 }
 
 TEST_CASE("a field alone is no body") {
@@ -236,11 +238,6 @@ TEST_CASE("a field alone is no body") {
     REQUIRE(hasBody(stored()));
     requireRefusal(plain, "no body");
     REQUIRE_THROWS_AS(withBody(plain, {}), std::invalid_argument);
-    Body exact = bodyOf(stored());
-    exact.exact = true;
-    REQUIRE_NOTHROW(withBody(plain, exact));
-    exact.mesh.reset();
-    REQUIRE_THROWS_WITH(withBody(plain, exact), Catch::Contains("without a mesh"));
 }
 
 TEST_CASE("damaged bodies are refused by what is wrong") {
@@ -262,11 +259,8 @@ TEST_CASE("damaged bodies are refused by what is wrong") {
     requireRefusal(changed(setting("bilayer:bounds_upper", openvdb::Vec3s(0.3f, 0.2f, 0.05f))),
                    "outside of its bounds");
 
-    requireRefusal(changed([](Distance& grid) {
-                       setting("bilayer:exact", true)(grid);
-                       grid.removeMeta("bilayer:mesh");
-                   }),
-                   "'bilayer:mesh' is missing");
+    requireRefusal(changed(setting("bilayer:measure", std::string("thumb"))), "'bilayer:measure' is thumb");
+    requireRefusal(changed([](Distance& grid) { grid.removeMeta("bilayer:measure"); }), "bilayer:measure");
     requireRefusal(changed(setting("bilayer:mesh", 7.f)), "type float");
 
     requireRefusal(changed({}, [](Points& grid) { grid.clear(); }), "no surface points");

@@ -319,8 +319,8 @@ TEST_CASE("contacts that look along the surface of their point are left out wher
 
 TEST_CASE("tips that meet are pushed back the way they came, whatever they see of each other's sides") {
     const Mesh cone = shapes::cone(0.2f, 0.8f, 4);
-    const auto tip =
-        std::make_shared<Collider>(cone, build(cone, {.voxelSize = 0.04f}), ColliderOptions{.exact = true});
+    const auto tip = std::make_shared<Collider>(cone, build(cone, {.voxelSize = 0.04f}),
+                                                ColliderOptions{.measure = Measure::triangles});
     for (float depth = 0.01f; depth < 0.035f; depth += 0.005f) {
         std::vector<Contact> found;
         const Pose above{{0, 0, 0.8f - depth}, glm::angleAxis(glm::pi<float>(), glm::vec3(1, 0, 0))};
@@ -340,15 +340,15 @@ const Contact& nearestOf(const std::vector<Contact>& contacts) {
 }
 
 TEST_CASE("beyond the band, edges are as far apart as those of the triangles, and look across") {
-    const bool exact = GENERATE(true, false);
+    const Measure measure = GENERATE(Measure::samples, Measure::edges, Measure::triangles);
     const float gap = GENERATE(0.03f, 0.05f, 0.06f, 0.1f, 0.25f);
     const float scale = GENERATE(1.f, 10.f);
     const bool crosses = GENERATE(false, true);
-    CAPTURE(exact, gap, scale, crosses);
+    CAPTURE(nameOf(measure), gap, scale, crosses);
     // edges are followed from the points that touch
     const float beyond = crosses ? 0.02f : 0.001f;
     const Mesh mesh = shapes::box({0.3f, 0.2f, 0.1f});
-    const Collider brick(mesh, build(mesh, {.voxelSize = h}), {.exact = exact});
+    const Collider brick(mesh, build(mesh, {.voxelSize = h}), {.measure = measure});
     const float half = std::sqrt(0.5f), aside = half * gap, quarter = glm::pi<float>() / 4;
     // an edge beside and above another one, or above and across it
     Pose upper{{0.6f + aside, 0.01f, 0.2f + aside}}, lower;
@@ -372,7 +372,7 @@ TEST_CASE("beyond the band, edges are as far apart as those of the triangles, an
 TEST_CASE("what lies between two walls is found at any distance, whether the margin ends in the band or not") {
     const Mesh wall = shapes::box({0.1f, 0.5f, 0.5f}), small = shapes::box({0.1f, 0.1f, 0.1f});
     const Mesh walls = shapes::join({shapes::moved(wall, {-0.6f, 0, 0}), shapes::moved(wall, {0.6f, 0, 0})});
-    const Collider two(walls, build(walls, {.voxelSize = h}), {.exact = true}),
+    const Collider two(walls, build(walls, {.voxelSize = h}), {.measure = Measure::triangles}),
         body(small, build(small, {.voxelSize = h}));
     for (float gap = 0.02f; gap < 0.2f; gap += 0.003f) {
         CAPTURE(gap);
@@ -399,7 +399,7 @@ TEST_CASE("what touches a face is told the face's direction, however near it is 
         place[beside] = half[beside] - aside * h;
         place[along] = float(random(-0.8, 0.8)) * half[along];
         CAPTURE(face, depth, aside);
-        const Touch touch = touchInBand(brick().field(), place, brick().field().sample(place));
+        const Touch touch = touchInBand(brick().field(), place, brick().field().sample(place), false);
         REQUIRE(touch.normal[face] > 0.99f);
         REQUIRE(std::abs(touch.distance) < 2e-3f * h);
     }
@@ -451,10 +451,10 @@ TEST_CASE("exact contacts lie on the triangles, on edges and in grooves of half 
     struct Errors {
         double distance = 0, foot = 0;
     };
-    const auto errors = [&](bool exact, const Pose& pose) {
+    const auto errors = [&](Measure measure, const Pose& pose) {
         std::vector<Collider> parts;
         for (const Mesh& mesh : meshes)
-            parts.emplace_back(mesh, build(mesh, {.voxelSize = voxel}), ColliderOptions{.exact = exact});
+            parts.emplace_back(mesh, build(mesh, {.voxelSize = voxel}), ColliderOptions{.measure = measure});
         const Pose poses[] = {pose, {}};
         std::vector<Contact> contacts;
         collide(parts[0], pose, parts[1], {}, {.margin = voxel / 2}, contacts);
@@ -480,24 +480,28 @@ TEST_CASE("exact contacts lie on the triangles, on edges and in grooves of half 
     for (int i = 0; i < 3; ++i) {
         Pose pose = shapes::onThread(thread, float(random(16e-3, 24e-3)));
         pose.position += random.point(50e-6f);
-        const Errors exact = errors(true, pose), sampled = errors(false, pose);
+        const Errors exact = errors(Measure::triangles, pose), mixed = errors(Measure::edges, pose),
+                     sampled = errors(Measure::samples, pose);
         CHECK(exact.distance < 1e-4);
         CHECK(exact.foot < 0.02);  // nearer to an edge its own normal is taken
+        CHECK(mixed.distance < 0.2);
+        CHECK(mixed.foot < 0.2);
         CHECK(sampled.distance > 0.02);
         CHECK(sampled.foot > 0.05);
     }
 }
 
 TEST_CASE("a body of a mesh that faces the wrong way is the body of the right one") {
-    const bool isExact = GENERATE(false, true), isShuffled = GENERATE(false, true);
-    CAPTURE(isExact, isShuffled);
+    const Measure measure = GENERATE(Measure::samples, Measure::edges, Measure::triangles);
+    const bool isShuffled = GENERATE(false, true);
+    CAPTURE(nameOf(measure), isShuffled);
     const Mesh mesh = shapes::torus(0.35f, 0.13f);
     Mesh wrong = shapes::flipped(mesh);
     Random random(test::seed());
     if (isShuffled)
         for (glm::uvec3& t : wrong.triangles)
             if (random(0, 1) < 0.5) std::swap(t.y, t.z);
-    const ColliderOptions options{.exact = isExact};
+    const ColliderOptions options{.measure = measure};
     const Collider right(mesh, build(mesh, {.voxelSize = h}), options),
         mended(wrong, build(wrong, {.voxelSize = h}), options);
     CHECK(mended.mass().volume == Approx(right.mass().volume));

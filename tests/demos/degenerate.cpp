@@ -51,24 +51,24 @@ std::vector<Mesh> degenerates() {
     return {spike, wedge, crack, shapes::box({half, half, half})};
 }
 
-std::shared_ptr<const Thing> thingOf(const Mesh& mesh, bool exact) {
-    return demo::makeThing(mesh, {.voxelSize = voxel, .exact = exact});
+std::shared_ptr<const Thing> thingOf(const Mesh& mesh, Measure measure) {
+    return demo::makeThing(mesh, {.voxelSize = voxel, .measure = measure});
 }
 
 }  // namespace
 
 TEST_CASE("Spikes, wedges, cracks and cliff edges that meet exactly come to rest, not deep in each other") {
-    const bool byTriangles = GENERATE(false, true);
+    const Measure measure = GENERATE(Measure::samples, Measure::edges, Measure::triangles);
     const unsigned start = test::seed();
-    CAPTURE(byTriangles, start);
+    CAPTURE(nameOf(measure), start);
     std::mt19937 random(start);
     std::uniform_real_distribution<float> any(-1, 1);
     demo::Stage stage("degenerate bodies");
-    const auto floor = thingOf(shapes::box({1.8f, 1.8f, half}), byTriangles);
+    const auto floor = thingOf(shapes::box({1.8f, 1.8f, half}), measure);
     std::vector<std::shared_ptr<const Thing>> upright, over;
     for (const Mesh& mesh : degenerates()) {
-        upright.push_back(thingOf(mesh, byTriangles));
-        over.push_back(thingOf(turnedOver(mesh), byTriangles));
+        upright.push_back(thingOf(mesh, measure));
+        over.push_back(thingOf(turnedOver(mesh), measure));
     }
     // exactly above each other; half over the edge; and a hair off either
     const float asides[] = {0, half};

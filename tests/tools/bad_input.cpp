@@ -183,8 +183,9 @@ TEST_CASE("bodies and scenes that are told by halves are wrong usage") {
     requireUsage(buildOf(mesh, {"--voxel-size", "0.1", "--margin", "0.1"}), "--margin: needs --body");
     requireUsage(buildOf(mesh, {"--voxel-size", "0.1", "--point-spacing", "1"}), "--point-spacing: needs --body");
     requireUsage(buildOf(mesh, {"--voxel-size", "0.1", "--no-mesh"}), "--no-mesh: needs --body");
-    requireUsage(buildOf(mesh, {"--voxel-size", "0.1", "--exact-contacts"}), "--exact-contacts: needs --body");
-    requireUsage(buildOf(mesh, {"--voxel-size", "0.1", "--body", "--no-mesh", "--exact-contacts"}), "excludes");
+    requireUsage(buildOf(mesh, {"--voxel-size", "0.1", "--contacts", "edges"}), "--contacts: needs --body");
+    requireUsage(buildOf(mesh, {"--voxel-size", "0.1", "--body", "--no-mesh", "--contacts", "edges"}), "excludes");
+    requireUsage(buildOf(mesh, {"--voxel-size", "0.1", "--body", "--contacts", "thumb"}), "--contacts");
     for (const char* word : {"0", "-1", "nan", "inf", "x"}) {
         requireUsage(buildOf(mesh, {"--voxel-size", "0.1", "--body", "--margin", word}), "--margin");
         requireUsage(buildOf(mesh, {"--voxel-size", "0.1", "--body", "--point-spacing", word}), "--point-spacing");

@@ -268,15 +268,19 @@ TEST_CASE("build --body keeps what bodies need, and info tells of it") {
     CHECK(info["mass"] == info["body"]["mass"]);
     CHECK_THAT(run({"info", output}).out, Catch::Contains("surface points, margin 0.02 m, 1,280 triangles"));
     CHECK(info["body"]["triangles"] == json["triangles"]);
-    CHECK(info["body"]["exactContacts"] == false);
+    CHECK(info["body"]["contacts"] == "edges");
     CHECK(body.mesh().triangles == readMesh(sphereFile()).triangles);
-    CHECK_FALSE(body.field().mesh());
-    CHECK(body.measured().mesh());
+    CHECK(body.field().mesh());
     const auto fine = build(output, {"--voxel-size", "0.05", "--body", "--point-spacing", "1"});
     CHECK(fine["body"]["points"] > json["body"]["points"]);
     CHECK(fine["body"]["margin"] == 0.05);
-    CHECK(build(output, {"--voxel-size", "0.05", "--body", "--exact-contacts"})["body"]["exactContacts"] == true);
-    CHECK(Collider(readVdb(output)).field().mesh());
+    for (const std::string measure : {"triangles", "samples"}) {
+        const auto other = build(output, {"--voxel-size", "0.05", "--body", "--contacts", measure});
+        CHECK(other["body"]["contacts"] == measure);
+        CHECK(nameOf(Collider(readVdb(output)).body().measure) == measure);
+        CHECK((Collider(readVdb(output)).field().mesh() != nullptr) == (measure == "triangles"));
+        CHECK(Collider(readVdb(output)).measured().mesh());
+    }
     const auto whole = std::filesystem::file_size(output);
     CHECK(build(output, {"--voxel-size", "0.05", "--body", "--no-mesh"})["body"]["triangles"] == 0);
     CHECK_FALSE(Collider(readVdb(output)).body().mesh);

@@ -1,0 +1,65 @@
+#include "collider/strays.h"
+
+#include <cmath>
+#include <cstddef>
+
+namespace bilayer {
+namespace {
+
+// What samples may be off by [voxels].
+constexpr float tolerance = 0.1f;
+// Contacts are made, and bodies sink into each other, within this distance from the surface [voxels].
+constexpr float nearSurface = 1;
+// Interpolants are off by less [voxels].
+constexpr float mostOff = 2;
+
+// Two bits for each cell of a block: whether it has been measured, and what came of it.
+constexpr int side = FieldFrame::side, cellsPerWord = 32, wordsPerBlock = side * side * side / cellsPerWord;
+constexpr std::uint64_t isMeasured = 1, isStray = 2;
+
+}  // namespace
+
+Strays::Strays(const Field& field)
+    : field_(std::make_shared<const Field>(field)),
+      known_(new std::atomic<std::uint64_t>[wordsPerBlock * field.layout().stored]()) {}
+
+bool Strays::hold(const glm::vec3& point) const noexcept {
+    if (!field_) return false;
+    const FieldLayout& layout = field_->layout();
+    const glm::dvec3 local = (glm::dvec3(point) - layout.origin) * layout.perMetre;
+    const glm::dvec3 extent = double(side) * glm::dvec3(layout.blocks);
+    if (!(local.x >= 0 && local.y >= 0 && local.z >= 0)) return false;
+    if (!(local.x < extent.x && local.y < extent.y && local.z < extent.z)) return false;
+    const glm::ivec3 cell(local), inBlock = cell % side;
+    const std::int32_t block = layout.directory.data()[layout.entryOf(cell / side)];
+    if (block < 0) return false;
+
+    const int index = (inBlock.x * side + inBlock.y) * side + inBlock.z, shift = 2 * (index % cellsPerWord);
+    std::atomic<std::uint64_t>& word = known_[std::ptrdiff_t(block) * wordsPerBlock + index / cellsPerWord];
+    std::uint64_t bits = word.load(std::memory_order_relaxed) >> shift;
+    if (!(bits & isMeasured)) {
+        bits = areAt(cell) ? isMeasured | isStray : isMeasured;
+        word.fetch_or(bits << shift, std::memory_order_relaxed);  // others may have found the same by now
+    }
+    return bits & isStray;
+}
+
+bool Strays::areAt(const glm::ivec3& cell) const noexcept {
+    if (isOff(glm::dvec3(cell) + 0.5)) return true;
+    for (int corner = 0; corner < 8; ++corner)
+        if (isOff(glm::dvec3(cell) + 0.25 + 0.5 * glm::dvec3(corner >> 2, corner >> 1 & 1, corner & 1))) return true;
+    return false;
+}
+
+// At a place in voxels from the layout's origin.
+bool Strays::isOff(const glm::dvec3& local) const noexcept {
+    const FieldLayout& layout = field_->layout();
+    const float voxel = field_->voxelSize();
+    const glm::vec3 place(local * layout.voxel + layout.origin);
+    const float distance = field_->distance(place);
+    if (!(std::abs(distance) <= nearSurface * voxel)) return false;
+    const ClosestPoint closest = field_->closest(place, (nearSurface + mostOff) * voxel);
+    return !(std::abs(closest.distance - distance) <= tolerance * voxel);
+}
+
+}  // namespace bilayer
