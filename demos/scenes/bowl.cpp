@@ -14,6 +14,7 @@
 
 #include "demos/shared/shapes.h"
 #include "demos/shared/stage.h"
+#include "integration/bullet/stillness.h"
 #include "sdf/build.h"
 #include "sdf/inspect.h"
 #include "sdf/mesh_io.h"
@@ -155,6 +156,7 @@ Outcome bowl(const BowlOptions& options) {
     Stage stage(fmt::format("{} bodies in a bowl", options.bodies), {.framesPerMeasuring = 30});
     stage.world().bullet().getSolverInfo().m_numIterations = options.iterations;
     stage.world().bullet().getSolverInfo().m_frictionERP = pulledBack;
+    const bullet::Stillness still(stage.world().bullet());
     stage.add(vessel, {}, {}, bowlLook);
     const Matter matter{.mass = 1, .restingSpeed = restingSpeed, .restingSpin = restingSpin};
     std::vector<btRigidBody*> bodies;

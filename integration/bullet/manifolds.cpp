@@ -52,9 +52,9 @@ constexpr std::size_t mostOfPatch = 3 * MANIFOLD_CACHE_SIZE;
 // Friction holds below this part of the most that it can bear. What has drifted farther than this along the surface
 // stays where it is [parts of the distance within which contacts are the same].
 constexpr float held = 0.98f, mostDrift = 0.25f;
-// Contacts rest as long as they slip by less in a step [parts of the distance within which contacts are the same].
-constexpr float slipping = 1e-3f;
-constexpr int stepsOfRest = 120;
+// How long a contact takes to come to rest [steps], and the slip that loses it [parts of the distance within which
+// contacts are the same]: by and by, so that others have time to take over what it bore.
+constexpr float stepsOfRest = 120, slipOfRest = 0.05f;
 
 /// Contacts of one patch, as indices in ascending order of the distance that remains.
 using Group = std::vector<std::uint32_t>;
@@ -400,10 +400,11 @@ btVector3 along(const btVector3& way, const btVector3& normal) {
 /// What has become of a contact's anchor in a step.
 struct Anchor {
     btVector3 drift;  ///< how far the two places that once touched are to be pulled back along the surface
-    bool slips;
+    float slip;       ///< how far they have slipped past each other
 };
 
-/// Where friction did not hold the two places, they are pulled back no farther than before.
+/// Where friction did not hold the two places, they are pulled back no farther than before. What is held and far away
+/// all the same has not drifted: the user has put it there.
 Anchor anchorOf(const btManifoldPoint& point, const btVector3& before, const btPersistentManifold& manifold,
                 float sameWithin) {
     const btVector3 drift = along(manifold.getBody0()->getWorldTransform() * point.m_localPointA -
@@ -414,7 +415,8 @@ Anchor anchorOf(const btManifoldPoint& point, const btVector3& before, const btP
     const bool holds = friction < held * point.m_combinedFriction * point.m_appliedImpulse;
     const float most = holds ? mostDrift * sameWithin : std::min(mostDrift * sameWithin, float(before.length()));
     const float length = drift.length();
-    return {length > most ? most / length * drift : drift, !holds && (drift - before).length() > slipping * sameWithin};
+    if (holds && (drift - before).length() > mostDrift * sameWithin) return {btVector3(0, 0, 0), 0};
+    return {length > most ? most / length * drift : drift, holds ? 0 : float((drift - before).length())};
 }
 
 }  // namespace
@@ -585,12 +587,13 @@ Manifolds::Written Manifolds::inherit(btPersistentManifold& manifold, int index,
     const Anchor anchor = anchorOf(old, written.drift, manifold, sameWithin);
     point.m_positionWorldOnA += along(anchor.drift, point.m_normalWorldOnB);
     point.m_localPointA = manifold.getBody0()->getWorldTransform().invXform(point.m_positionWorldOnA);
-    const int rested = anchor.slips ? 0 : std::min(written.rested + 1, stepsOfRest);
-    if (rested == stepsOfRest) point.m_combinedFriction *= continuity.restingFriction;
+    const float gained = anchor.slip > 0 ? -anchor.slip / (slipOfRest * sameWithin) : 1 / stepsOfRest;
+    const float rest = std::clamp(written.rest + gained, 0.f, 1.f);
+    point.m_combinedFriction *= 1 + rest * (continuity.restingFriction - 1);
     *source = old_.back();
     old_.pop_back();
     const btVector3 drift = along(point.m_positionWorldOnA - point.m_positionWorldOnB, point.m_normalWorldOnB);
-    return {point.m_localPointA, point.m_localPointB, drift, rested};
+    return {point.m_localPointA, point.m_localPointB, drift, rest};
 }
 
 }  // namespace bilayer::bullet

@@ -93,7 +93,7 @@ class Manifolds {
     struct Written {
         btVector3 ofA{0, 0, 0}, ofB{0, 0, 0};  ///< its place on either body
         btVector3 drift{0, 0, 0};              ///< along the surface, that it is to be pulled back
-        int rested = 0;                        ///< steps since it has slipped
+        float rest = 0;                        ///< how far it has come to rest: 1 when it bears all that it may
     };
     Written writtenAs(const btManifoldPoint& point, std::size_t manifold) const;
     Written inherit(btPersistentManifold& manifold, int index, const Continuity& continuity);

@@ -25,10 +25,11 @@ struct ShapeOptions {
     /// solver is iterative: what goes by more than the thickness of a wall in a step may still pass it, unless a
     /// NoPassing looks after the world.
     bool sweeps = true;
-    /// How many times as much friction contacts bear that have not slipped for 120 steps, until they do; 1: no more.
-    /// Heaps come to rest with friction at its limit in many contacts, and there any rounding lets a body slip on that
-    /// is kept awake. Of two fields the larger one counts. Real bodies rest more firmly too: J. H. Dieterich,
-    /// "Time-dependent friction in rocks", J. Geophys. Res. 77 (1972) 3690-3697.
+    /// How many times as much friction contacts bear that have not slipped for 120 steps; 1: no more. It comes by and
+    /// by, and goes with the slip: all of it in a tenth of a voxel. Heaps come to rest with friction at its limit in
+    /// many contacts, and there any rounding lets a body slip on that is kept awake. Of two fields the larger one
+    /// counts. Real bodies rest more firmly too: J. H. Dieterich, "Time-dependent friction in rocks", J. Geophys. Res.
+    /// 77 (1972) 3690-3697.
     float restingFriction = 1;
 };
 

@@ -1,0 +1,161 @@
+// What rests stays where it is, and nothing else does.
+#include "integration/bullet/stillness.h"
+
+#include <BulletDynamics/ConstraintSolver/btPoint2PointConstraint.h>
+
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <optional>
+#include <random>
+#include <vector>
+
+#include "tests/support/support.h"
+#include "world.h"
+
+using namespace bilayer;
+using namespace bilayer::test;
+using bullet::Shape;
+using bullet::Stillness;
+
+namespace {
+
+constexpr float h = 0.02f;  // voxel [m]
+
+/// Friction in all directions: with Bullet's single one, what lies on something slow goes on as it likes.
+void useFriction(World& world) {
+    world.dynamics.getSolverInfo().m_solverMode |= SOLVER_USE_2_FRICTION_DIRECTIONS;
+    world.dynamics.getSolverInfo().m_numIterations = 40;
+}
+
+/// Rings that lie in a bowl, across each other.
+struct Heap {
+    Shape bowl{exactBowl(1, 0.1f, 2 * h)};
+    Shape ring{exactTorus(0.2f, 0.07f, h), {.restingFriction = 1.5f}};
+    World world;
+    std::vector<btRigidBody*> rings;
+
+    explicit Heap(unsigned seed) {
+        useFriction(world);
+        world.dynamics.getSolverInfo().m_frictionERP = 0.5f;
+        world.add(bowl, 0, {0, 0, 0});
+        std::mt19937 random(seed);
+        std::uniform_real_distribution<float> any(-1, 1);
+        for (int i = 0; i < 8; ++i) {
+            const btQuaternion turn(any(random), any(random), any(random), any(random));
+            rings.push_back(
+                world.add(ring, 1, {0.2f * any(random), 0.2f * any(random), 0.6f * float(i)}, turn.normalized()));
+            rings.back()->setActivationState(DISABLE_DEACTIVATION);
+        }
+    }
+
+    /// How far the ring goes that goes farthest.
+    float farthest(float seconds) {
+        std::vector<btVector3> before;
+        for (const btRigidBody* body : rings) before.push_back(body->getCenterOfMassPosition());
+        world.run(seconds);
+        float most = 0;
+        for (std::size_t i = 0; i < rings.size(); ++i)
+            most = std::max(most, before[i].distance(rings[i]->getCenterOfMassPosition()));
+        return most;
+    }
+};
+
+}  // namespace
+
+TEST_CASE("A heap that nothing lets sleep stays where it is, and falls when its bowl is taken away") {
+    const unsigned start = seed();
+    CAPTURE(start);
+    Heap heap(start);
+    const Stillness still(heap.world.dynamics);
+    heap.world.run(8);
+    CHECK(heap.farthest(4) < 0.02f * h);
+    CHECK(still.held() + 2 >= int(heap.rings.size()));
+
+    const float before = heap.rings.front()->getCenterOfMassPosition().z();
+    for (int i = 0; i < heap.world.dynamics.getNumCollisionObjects(); ++i) {
+        btCollisionObject* object = heap.world.dynamics.getCollisionObjectArray()[i];
+        if (object->isStaticObject()) object->setWorldTransform(btTransform(btQuaternion(0, 0, 0, 1), {0, 0, -100}));
+    }
+    heap.world.dynamics.updateAabbs();
+    heap.world.run(0.5f);
+    CHECK(before - heap.rings.front()->getCenterOfMassPosition().z() == Approx(0.5f * 9.81f * 0.25f).epsilon(0.05));
+    CHECK(still.held() == 0);
+}
+
+TEST_CASE("What moves for a reason is not held: thrown, without weight, hung up, or put elsewhere") {
+    Shape ball(exactSphere(0.1f, h));
+    World world;
+    const Stillness still(world.dynamics);
+
+    SECTION("at the top of its way a body turns back as ever") {
+        btRigidBody* body = world.add(ball, 1, {0, 0, 0});
+        body->setLinearVelocity({0, 0, 2});
+        world.run(1);
+        CHECK(body->getCenterOfMassPosition().z() == Approx(2 - 0.5f * 9.81f).margin(0.03));
+    }
+    SECTION("without gravity, however slow") {
+        world.dynamics.setGravity({0, 0, 0});
+        btRigidBody* body = world.add(ball, 1, {0, 0, 0});
+        body->setDamping(0, 0);
+        body->setActivationState(DISABLE_DEACTIVATION);
+        body->setLinearVelocity({1e-4f, 0, 0});
+        world.run(10);
+        CHECK(body->getCenterOfMassPosition().x() == Approx(1e-3f).epsilon(1e-3));
+        CHECK(still.held() == 0);
+    }
+    SECTION("what hangs in a constraint") {
+        btRigidBody* body = world.add(ball, 1, {0, 0, 0});
+        btPoint2PointConstraint joint(*body, {0, 0, 0.5f});
+        world.dynamics.addConstraint(&joint);
+        body->setActivationState(DISABLE_DEACTIVATION);
+        world.run(2);
+        CHECK(still.held() == 0);
+        world.dynamics.removeConstraint(&joint);
+    }
+    SECTION("what the user puts elsewhere stays there") {
+        useFriction(world);
+        Shape floor(exactBox({1, 1, 0.1f}, h)), box(exactBox({0.1f, 0.1f, 0.1f}, h));
+        world.add(floor, 0, {0, 0, -0.1f});
+        btRigidBody* body = world.add(box, 1, {0, 0, 0.1f});
+        body->setActivationState(DISABLE_DEACTIVATION);
+        world.run(3);
+        REQUIRE(still.held() == 1);
+        for (const float way : {0.4f, -0.15f}) {
+            btTransform place = body->getWorldTransform();
+            place.getOrigin() += btVector3(way, 0, 0);
+            body->setWorldTransform(place);
+            world.run(0.5f);
+            CHECK(body->getCenterOfMassPosition().x() == Approx(place.getOrigin().x()).margin(2e-3 * h));
+            CHECK(still.held() == 1);
+        }
+    }
+}
+
+TEST_CASE("What a slow lift or a slow belt carries comes along") {
+    const btVector3 way =
+        GENERATE(btVector3(0, 0, 1e-4f), btVector3(1e-4f, 0, 0), btVector3(5e-4f, 5e-4f, 0), btVector3(0, 0, -1e-4f));
+    CAPTURE(way.x(), way.z());
+    Shape box(exactBox({0.1f, 0.1f, 0.1f}, h)), floor(exactBox({1, 1, 0.1f}, h));
+    World world;
+    useFriction(world);
+    std::optional<Stillness> still(world.dynamics);
+    btRigidBody* lift = world.add(floor, 0, {0, 0, -0.1f});
+    lift->setCollisionFlags(lift->getCollisionFlags() | btCollisionObject::CF_KINEMATIC_OBJECT);
+    lift->setActivationState(DISABLE_DEACTIVATION);
+    btRigidBody* body = world.add(box, 1, {0, 0, 0.1f});
+    body->setActivationState(DISABLE_DEACTIVATION);
+    world.run(2);
+    const btVector3 before = body->getCenterOfMassPosition(), from = lift->getWorldTransform().getOrigin();
+    constexpr int steps = 4800;
+    for (int i = 1; i <= steps; ++i) {
+        btTransform place = lift->getWorldTransform();
+        place.setOrigin(from + float(i) / 240 * way);
+        lift->setWorldTransform(place);
+        world.run(1.f / 240);
+    }
+    const btVector3 went = body->getCenterOfMassPosition() - before, expected = float(steps) / 240 * way;
+    CHECK(went.distance(expected) < 1e-3f * h);
+    still.reset();
+    world.run(0.1f);
+}
