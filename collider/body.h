@@ -24,8 +24,9 @@ struct Body {
     Bounds bounds;                       ///< of the mesh [m]
     float margin = 0;                    ///< contacts are made up to this distance between surfaces [m]
     std::optional<MassProperties> mass;  ///< nothing where the mesh encloses no volume
-    /// All of it facing outward. Null for a body that answers by its field alone, which rounds sharp edges: sweeps then
-    /// end a voxel and a half late there at most, and rays half a voxel.
+    /// All of it facing outward. Null for a body that answers by its field alone, which rounds sharp edges: contacts
+    /// are those of Measure::samples, rays are off by half a voxel at most, and sweeps end up to a voxel and a half
+    /// late.
     std::shared_ptr<const Mesh> mesh;
     Measure measure = Measure::samples;  ///< as in ColliderOptions; samples where there is no mesh
 };

@@ -3,15 +3,15 @@
 #include <cmath>
 #include <cstddef>
 
+#include "collider/interpolant.h"
+
 namespace bilayer {
 namespace {
 
 // What samples may be off by [voxels].
 constexpr float tolerance = 0.1f;
-// Contacts are made, and bodies sink into each other, within this distance from the surface [voxels].
-constexpr float nearSurface = 1;
-// Interpolants are off by less [voxels].
-constexpr float mostOff = 2;
+// Along each axis of a cell, so many places are looked at.
+constexpr int places = 3;
 
 // Two bits for each cell of a block: whether it has been measured, and what came of it.
 constexpr int side = FieldFrame::side, cellsPerWord = 32, wordsPerBlock = side * side * side / cellsPerWord;
@@ -45,9 +45,10 @@ bool Strays::hold(const glm::vec3& point) const noexcept {
 }
 
 bool Strays::areAt(const glm::ivec3& cell) const noexcept {
-    if (isOff(glm::dvec3(cell) + 0.5)) return true;
-    for (int corner = 0; corner < 8; ++corner)
-        if (isOff(glm::dvec3(cell) + 0.25 + 0.5 * glm::dvec3(corner >> 2, corner >> 1 & 1, corner & 1))) return true;
+    for (int i = 0; i < places * places * places; ++i) {
+        const glm::ivec3 place(i / (places * places), i / places % places, i % places);
+        if (isOff(glm::dvec3(cell) + (glm::dvec3(place) + 0.5) / double(places))) return true;
+    }
     return false;
 }
 
@@ -56,10 +57,10 @@ bool Strays::isOff(const glm::dvec3& local) const noexcept {
     const FieldLayout& layout = field_->layout();
     const float voxel = field_->voxelSize();
     const glm::vec3 place(local * layout.voxel + layout.origin);
-    const float distance = field_->distance(place);
-    if (!(std::abs(distance) <= nearSurface * voxel)) return false;
-    const ClosestPoint closest = field_->closest(place, (nearSurface + mostOff) * voxel);
-    return !(std::abs(closest.distance - distance) <= tolerance * voxel);
+    const Sample sample = field_->sample(place);
+    if (!sample.inBand) return false;
+    const ClosestPoint closest = field_->closest(place, std::abs(sample.distance) + mostInterpolationError * voxel);
+    return !(std::abs(closest.distance - sample.distance) <= tolerance * voxel);
 }
 
 }  // namespace bilayer

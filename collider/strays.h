@@ -10,10 +10,10 @@
 
 namespace bilayer {
 
-/// The cells of a field, the corners of which are eight neighbouring voxels, where its interpolant is off from the mesh
-/// by more than a tenth of a voxel: in their middles, or halfway from there to a corner, where those are within a voxel
-/// of the surface. A cell is measured when it is first asked for, which takes some microseconds; the answer depends on
-/// nothing but the cell. Copies share what they know. Safe from any thread.
+/// The cells of a field's band, the corners of which are eight neighbouring voxels, where its interpolant is off from
+/// the mesh by more than a tenth of a voxel in one of 27 places: elsewhere it may be off by little more. A cell is
+/// measured when it is first asked for, which takes some microseconds; the answer depends on nothing but the cell.
+/// Copies share what they know. Safe from any thread.
 class Strays {
   public:
     Strays() = default;  ///< none

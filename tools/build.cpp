@@ -275,7 +275,7 @@ void addBody(CLI::App& command, Arguments& a) {
                          ->add_option("--contacts", a.contacts,
                                       "measured by samples alone, by triangles at edges (default) or everywhere")
                          ->check(CLI::IsMember(measures));
-    auto* noMesh = group->add_flag("--no-mesh", a.noMesh, "a smaller file, which rounds sharp edges in casts");
+    auto* noMesh = group->add_flag("--no-mesh", a.noMesh, "a smaller file, which rounds sharp edges");
     a.bodyOptions = {
         group
             ->add_option("--margin", a.collider.margin,

@@ -415,7 +415,7 @@ Anchor anchorOf(const btManifoldPoint& point, const btVector3& before, const btP
     const bool holds = friction < held * point.m_combinedFriction * point.m_appliedImpulse;
     const float most = holds ? mostDrift * sameWithin : std::min(mostDrift * sameWithin, float(before.length()));
     const float length = drift.length();
-    if (holds && (drift - before).length() > mostDrift * sameWithin) return {btVector3(0, 0, 0), 0};
+    if (holds && (drift - before).length() > mostDrift * sameWithin) return {btVector3(0, 0, 0), length};
     return {length > most ? most / length * drift : drift, holds ? 0 : float((drift - before).length())};
 }
 

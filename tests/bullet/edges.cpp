@@ -513,3 +513,35 @@ TEST_CASE("What is exact is so against Bullet's shapes too") {
     }
     CHECK(worstSampled > 0.1f * h);
 }
+
+TEST_CASE("Balls lie in a groove as deep as they do between two faces") {
+    // a groove of a right angle along x, its bottom off the voxels
+    const glm::vec3 bottom(0, 0.37f * h, 0.61f * h);
+    const glm::vec2 section[] = {{-0.3f, -0.2f}, {0.3f, -0.2f}, {0.3f, 0.3f}, {0, 0}, {-0.3f, 0.3f}};
+    Mesh mesh;
+    for (const float x : {-0.5f, 0.5f})
+        for (const glm::vec2& p : section) mesh.points.push_back(bottom + glm::vec3(x, p.x, p.y));
+    for (unsigned i = 0; i < 5; ++i) {
+        const unsigned next = (i + 1) % 5;
+        mesh.triangles.push_back({i, next, 5 + next});
+        mesh.triangles.push_back({i, 5 + next, 5 + i});
+    }
+    for (const glm::uvec3& t : {glm::uvec3(3, 4, 0), glm::uvec3(3, 0, 1), glm::uvec3(3, 1, 2)}) {
+        mesh.triangles.push_back({t.x, t.z, t.y});
+        mesh.triangles.push_back(t + 5u);
+    }
+    const auto deepestWith = [&](Measure measure, float radius) {
+        const auto groove = colliderOf(mesh, measure);
+        btSphereShape ball(radius);
+        std::vector<Contact> contacts;
+        const Pose lying{bottom + glm::vec3(0, 0, std::sqrt(2.f) * radius)};
+        bullet::collideConvex(Convex(ball), lying, {}, {*groove, {}}, h, false, contacts);
+        return deepest(contacts).distance;
+    };
+    for (const float voxels : {0.9f, 1.5f, 2.f}) {
+        CAPTURE(voxels);
+        CHECK(std::abs(deepestWith(Measure::edges, voxels * h)) < 0.01f * h);
+        CHECK(std::abs(deepestWith(Measure::triangles, voxels * h)) < 0.01f * h);
+        CHECK(std::abs(deepestWith(Measure::samples, voxels * h)) > 0.1f * h);
+    }
+}

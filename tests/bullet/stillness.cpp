@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
-#include <optional>
 #include <random>
 #include <vector>
 
@@ -113,7 +112,33 @@ TEST_CASE("What moves for a reason is not held: thrown, without weight, hung up,
         CHECK(still.held() == 0);
         world.dynamics.removeConstraint(&joint);
     }
-    SECTION("what the user puts elsewhere stays there") {
+    SECTION("what a force holds up") {
+        btRigidBody* body = world.add(ball, 1, {0, 0, 0});
+        body->setDamping(0, 0);
+        body->setActivationState(DISABLE_DEACTIVATION);
+        body->setLinearVelocity({3e-4f, 0, 0});
+        for (int i = 0; i < 1200; ++i) {
+            body->applyCentralForce({0, 0, 9.81f});
+            world.run(1.f / 240);
+        }
+        CHECK(body->getCenterOfMassPosition().x() == Approx(1.5e-3f).epsilon(1e-3));
+        CHECK(still.held() == 0);
+    }
+    SECTION("a slow turn about its middle") {
+        useFriction(world);
+        Shape floor(exactBox({1, 1, 0.1f}, h)), box(exactBox({0.1f, 0.1f, 0.1f}, h));
+        world.add(floor, 0, {0, 0, -0.1f});
+        btRigidBody* body = world.add(box, 1, {0, 0, 0.1f});
+        body->setFriction(0);
+        body->setDamping(0, 0);
+        body->setActivationState(DISABLE_DEACTIVATION);
+        world.run(1);
+        body->setAngularVelocity({0, 0, 0.05f});
+        const btVector3 before = body->getWorldTransform().getBasis().getColumn(0);
+        world.run(2);
+        CHECK(body->getWorldTransform().getBasis().getColumn(0).angle(before) == Approx(0.1f).epsilon(0.05));
+    }
+    SECTION("what the user puts elsewhere stays there, and so does what he turns, bit by bit too") {
         useFriction(world);
         Shape floor(exactBox({1, 1, 0.1f}, h)), box(exactBox({0.1f, 0.1f, 0.1f}, h));
         world.add(floor, 0, {0, 0, -0.1f});
@@ -129,33 +154,55 @@ TEST_CASE("What moves for a reason is not held: thrown, without weight, hung up,
             CHECK(body->getCenterOfMassPosition().x() == Approx(place.getOrigin().x()).margin(2e-3 * h));
             CHECK(still.held() == 1);
         }
+        world.dynamics.getSolverInfo().m_frictionERP = 0;  // else friction turns it back
+        const btTransform before = body->getWorldTransform();
+        for (int i = 0; i < 240; ++i) {
+            world.run(1.f / 240);
+            btTransform place = body->getWorldTransform();
+            place.setBasis(btMatrix3x3(btQuaternion({0, 0, 1}, 1e-4f)) * place.getBasis());
+            body->setWorldTransform(place);
+        }
+        const btVector3 axis = body->getWorldTransform().getBasis().getColumn(0);
+        CHECK(axis.angle(before.getBasis().getColumn(0)) > 0.01f);
     }
 }
 
-TEST_CASE("What a slow lift or a slow belt carries comes along") {
+TEST_CASE("What a slow lift or a slow belt carries comes along, and what is stacked on it") {
     const btVector3 way =
         GENERATE(btVector3(0, 0, 1e-4f), btVector3(1e-4f, 0, 0), btVector3(5e-4f, 5e-4f, 0), btVector3(0, 0, -1e-4f));
-    CAPTURE(way.x(), way.z());
-    Shape box(exactBox({0.1f, 0.1f, 0.1f}, h)), floor(exactBox({1, 1, 0.1f}, h));
+    // of friction's anchors; the size of all, and whether it is Bullet's own
+    const float pulledBack = GENERATE(0.f, 0.2f), size = GENERATE(0.1f, 1e-3f);
+    const bool isField = GENERATE(true, false);
+    CAPTURE(way.x(), way.z(), pulledBack, size, isField);
+    const float voxel = 0.2f * size;
+    Shape field(exactBox({size, size, size}, voxel)), fieldFloor(exactBox({10 * size, 10 * size, size}, voxel));
+    btBoxShape box({size, size, size}), boxFloor({10 * size, 10 * size, size});
+    box.setMargin(0.1f * voxel);
     World world;
     useFriction(world);
-    std::optional<Stillness> still(world.dynamics);
-    btRigidBody* lift = world.add(floor, 0, {0, 0, -0.1f});
+    world.dynamics.getSolverInfo().m_frictionERP = pulledBack;
+    const Stillness still(world.dynamics);
+    btRigidBody* lift = world.add(isField ? static_cast<btCollisionShape&>(fieldFloor) : boxFloor, 0, {0, 0, -size});
     lift->setCollisionFlags(lift->getCollisionFlags() | btCollisionObject::CF_KINEMATIC_OBJECT);
     lift->setActivationState(DISABLE_DEACTIVATION);
-    btRigidBody* body = world.add(box, 1, {0, 0, 0.1f});
-    body->setActivationState(DISABLE_DEACTIVATION);
+    std::vector<btRigidBody*> stack;
+    for (int i = 0; i < 2; ++i) {
+        stack.push_back(
+            world.add(isField ? static_cast<btCollisionShape&>(field) : box, 1, {0, 0, float(2 * i + 1) * size}));
+        stack.back()->setActivationState(DISABLE_DEACTIVATION);
+    }
     world.run(2);
-    const btVector3 before = body->getCenterOfMassPosition(), from = lift->getWorldTransform().getOrigin();
-    constexpr int steps = 4800;
+    std::vector<btVector3> before;
+    for (const btRigidBody* body : stack) before.push_back(body->getCenterOfMassPosition());
+    const btVector3 from = lift->getWorldTransform().getOrigin();
+    constexpr int steps = 1200;
     for (int i = 1; i <= steps; ++i) {
         btTransform place = lift->getWorldTransform();
         place.setOrigin(from + float(i) / 240 * way);
         lift->setWorldTransform(place);
         world.run(1.f / 240);
     }
-    const btVector3 went = body->getCenterOfMassPosition() - before, expected = float(steps) / 240 * way;
-    CHECK(went.distance(expected) < 1e-3f * h);
-    still.reset();
-    world.run(0.1f);
+    const btVector3 expected = float(steps) / 240 * way;
+    for (std::size_t i = 0; i < stack.size(); ++i)
+        CHECK((stack[i]->getCenterOfMassPosition() - before[i]).distance(expected) < 0.1f * expected.length());
 }
