@@ -359,7 +359,7 @@ Body bodyOf(const LevelSet& levelSet) {
     body.mass = loadMass(entries);
     body.points = pointsOf(levelSet);
     body.mesh = meshOf(levelSet);
-    if (body.mesh) body.measure = measureOf(entries.find<std::string>(entry::measure).value_or("edges"));
+    if (body.mesh) body.measure = measureOf(entries.get<std::string>(entry::measure));
     requireWithin(body.points, body.bounds);
     requireWithin(body.bounds, *levelSet.grids().distance);
     if (body.mesh) requireSame(bounds(*body.mesh), body.bounds);
