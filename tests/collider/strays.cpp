@@ -74,7 +74,7 @@ TEST_CASE("where no strays are, samples are off by little more than a tenth of a
             const glm::dvec3 cell = glm::floor((glm::dvec3(place) - layout.origin) * layout.perMetre);
             double most = 0;
             for (int i = 0; i < 27; ++i) {
-                const glm::dvec3 inCell = 0.25 + 0.25 * glm::dvec3(i / 9, i / 3 % 3, i % 3);
+                const glm::dvec3 inCell = (glm::dvec3(i / 9, i / 3 % 3, i % 3) + 0.5) / 3.0;
                 most = std::max(most, offAt(glm::vec3((cell + inCell) * layout.voxel + layout.origin)));
             }
             REQUIRE(most > 0.099);
