@@ -30,8 +30,9 @@ const std::map<std::string, Method> methods{{"exact", Method::exact},
 const std::map<std::string, Sign> signs{
     {"auto", Sign::automatic}, {"normals", Sign::normals}, {"winding", Sign::winding}, {"flood", Sign::flood}};
 const std::map<std::string, BandUnit> bandUnits{{"voxels", BandUnit::voxels}, {"world", BandUnit::world}};
-const std::map<std::string, Measure> measures{
-    {"samples", Measure::samples}, {"edges", Measure::edges}, {"triangles", Measure::triangles}};
+const std::map<std::string, Measure> measures{{nameOf(Measure::samples), Measure::samples},
+                                              {nameOf(Measure::edges), Measure::edges},
+                                              {nameOf(Measure::triangles), Measure::triangles}};
 const std::map<std::string, KernelMapping> mappings{{"auto", KernelMapping::automatic},
                                                     {"block", KernelMapping::blockPerItem},
                                                     {"group", KernelMapping::groupPerBlock}};

@@ -11,7 +11,6 @@
 #include <vector>
 
 #include "collider/collider.h"
-#include "demos/shared/machines.h"
 #include "demos/shared/shapes.h"
 #include "sdf/build.h"
 #include "tests/support/random.h"
