@@ -105,13 +105,27 @@ class Filler {
     // Sides over faces are known; links carry them on, beyond the reach too. What they do not reach is asked for.
     void signDistances(const glm::ivec3& block, Scratch& scratch) {
         BlockAnswer& answer = scratch.answer;
-        const std::size_t onBoth =
-            completeSides(findLinks(answer.distances), {&answer.far, &answer.mid, &answer.known}, answer.sides,
-                          [&](int voxel) { return isInside(voxel, block, scratch); });
+        std::size_t onBoth = completeSides(findLinks(answer.distances), {&answer.far, &answer.mid, &answer.known},
+                                           answer.sides, [&](int voxel) { return isInside(voxel, block, scratch); });
+        onBoth += contradictions(block, scratch);
         if (onBoth > 0 && job_.conflicts) *job_.conflicts += onBoth;
         for (std::size_t x = 0; x < answer.sides.inside.size(); ++x)
             for (std::uint64_t inside = answer.sides.inside[x]; inside != 0; inside &= inside - 1)
                 answer.distances[x * 64 + std::size_t(std::countr_zero(inside))] *= -1;
+    }
+
+    // Voxels that links have given another side than their nearest face, and than their pseudonormal.
+    std::size_t contradictions(const glm::ivec3& block, Scratch& scratch) {
+        const BlockSides &sides = scratch.answer.sides, &nearest = scratch.answer.nearest;
+        std::size_t count = 0;
+        for (std::size_t x = 0; x < sides.inside.size(); ++x)
+            for (std::uint64_t odd = (sides.outside[x] & nearest.inside[x]) | (sides.inside[x] & nearest.outside[x]);
+                 odd != 0; odd &= odd - 1) {
+                const int bit = std::countr_zero(odd);
+                const bool inside = (sides.inside[x] >> bit & 1) != 0;
+                count += isInside(int(x) * 64 + bit, block, scratch) != inside;
+            }
+        return count;
     }
 
     // Whether a voxel is inside by the pseudonormal at its closest point.

@@ -113,6 +113,7 @@ void narrowList(const WideTree& tree, const NodeList& from, const VoxelBox& voxe
 // on; 0 stands for a triangle that the closest point is on an edge of.
 struct Heights {
     float lowest = 0, highest = 0;
+    float nearest = 0;  // over the triangle that floats call the nearest
 };
 
 // One voxel's question.
@@ -193,7 +194,7 @@ struct Query {
     }
 
     // The heights over all faces that share the closest point.
-    Heights heights() const {
+    Heights heights(float nearest) const {
         const Tag tag;
         const Vec infinity = hn::Set(tag, std::numeric_limits<float>::infinity());
         Vec lowest = infinity, highest = hn::Neg(infinity);
@@ -204,7 +205,7 @@ struct Query {
                 lowest = hn::Min(lowest, hn::IfThenElse(tied, height, infinity));
                 highest = hn::Max(highest, hn::IfThenElse(tied, height, hn::Neg(infinity)));
             }
-        return {hn::GetLane(hn::MinOfLanes(tag, lowest)), hn::GetLane(hn::MaxOfLanes(tag, highest))};
+        return {hn::GetLane(hn::MinOfLanes(tag, lowest)), hn::GetLane(hn::MaxOfLanes(tag, highest)), nearest};
     }
 };
 
@@ -322,7 +323,7 @@ struct BlockQuery {
         if (answer.visits[visit].distance2[place] != query.best2) return;
         answer.lastWinner = answer.visits[visit].leaf;
         keep(position, query.best2, std::int32_t(tree.leaves[answer.lastWinner].triangles[place]),
-             sign ? query.heights() : Heights{});
+             sign ? query.heights(answer.visits[visit].height[place]) : Heights{});
     }
 
     // Answers the voxels of a cube of side 2 at once, if few triangles matter to any of them: those that are no farther
@@ -343,9 +344,11 @@ struct BlockQuery {
             }
         const Together::Answers found = cube.answers(centre.tieWidth2);
         for (std::size_t i = 0; i < treeWidth; ++i)
-            if (cube.best2[i] <= reach * reach * roundUp)
-                keep({cube.x[i], cube.y[i], cube.z[i]}, cube.best2[i],
-                     cube.candidates[std::size_t(found.winner[i])].triangle, {found.lowest[i], found.highest[i]});
+            if (cube.best2[i] <= reach * reach * roundUp) {
+                const Together::Candidate& nearest = cube.candidates[std::size_t(found.winner[i])];
+                keep({cube.x[i], cube.y[i], cube.z[i]}, cube.best2[i], nearest.triangle,
+                     {found.lowest[i], found.highest[i], nearest.height[i]});
+            }
         return true;
     }
 
@@ -365,13 +368,15 @@ struct BlockQuery {
         // on the surface either side is right, and no link can carry it on
         if (heights.lowest > least || distance < 0.5f * linkSlack) answer.sides.outside[x] |= bit;
         if (heights.highest < -least) answer.sides.inside[x] |= bit;
+        if (heights.nearest > least) answer.nearest.outside[x] |= bit;
+        if (heights.nearest < -least) answer.nearest.inside[x] |= bit;
     }
 };
 
 void answerVoxels(const WideTree& tree, const NodeList& list, const glm::vec3& origin, float reach, bool sign,
                   BlockAnswer& answer) {
     answer.known = answer.far = answer.mid = {};
-    answer.sides = {};
+    answer.sides = answer.nearest = {};
     std::fill_n(answer.distances, blockVoxels, farAway);
     std::fill_n(answer.triangles, blockVoxels, -1);
     BlockQuery{tree, origin, reach, sign, answer}.answerCube(list, origin, 0);

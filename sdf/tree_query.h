@@ -43,6 +43,7 @@ struct BlockAnswer {
     BlockMask known;                      ///< voxels within the reach
     BlockMask far, mid;                   ///< of these, those beyond `farFrom` and `midFrom` (links.h)
     BlockSides sides;                     ///< what faces tell, where they are asked for
+    BlockSides nearest;                   ///< what the nearest one alone tells: a guess where others are as near
 
     /// A leaf that was looked at for the current voxel, and what was found there.
     struct Visit {

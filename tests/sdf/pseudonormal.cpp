@@ -297,22 +297,24 @@ TEST_CASE("pseudonormal: signs are found in the same way and are the same as tho
         const auto path = test::corpusMesh(name);
         if (!path) return;
         const Mesh mesh = readMesh(*path);
-        const auto resolution = float(40 + random() % 100);
-        CAPTURE(seed, name, resolution);
-        const float h = voxelSizeFor(mesh, resolution);
-        const LevelSet field = build(mesh, {.voxelSize = h, .method = Method::pseudonormal});
-        const LevelSet exact = build(mesh, {.voxelSize = h});
-        CHECK(field.sign() == exact.sign());
-        CHECK(field.signReason() == exact.signReason());
-        std::size_t different = 0, met = 0;
-        const auto values = exact.grids().distance->getConstAccessor();
-        for (auto value = field.grids().distance->cbeginValueAll(); value; ++value) {
-            const bool matters = double(std::abs(*value)) > signsMatter * double(h);
-            different += matters && (values.getValue(value.getCoord()) < 0) != (*value < 0);
-            met += matters;
+        // at 52 one voxel alone tells that the cow meets itself, and two triangles are as near as floats can tell there
+        for (const auto resolution : {52.f, float(40 + random() % 100)}) {
+            CAPTURE(seed, name, resolution);
+            const float h = voxelSizeFor(mesh, resolution);
+            const LevelSet field = build(mesh, {.voxelSize = h, .method = Method::pseudonormal});
+            const LevelSet exact = build(mesh, {.voxelSize = h});
+            CHECK(field.sign() == exact.sign());
+            CHECK(field.signReason() == exact.signReason());
+            std::size_t different = 0, met = 0;
+            const auto values = exact.grids().distance->getConstAccessor();
+            for (auto value = field.grids().distance->cbeginValueAll(); value; ++value) {
+                const bool matters = double(std::abs(*value)) > signsMatter * double(h);
+                different += matters && (values.getValue(value.getCoord()) < 0) != (*value < 0);
+                met += matters;
+            }
+            CHECK(met > 1000);
+            CHECK(different == 0);
         }
-        CHECK(met > 1000);
-        CHECK(different == 0);
     }
 }
 
