@@ -43,8 +43,9 @@ constexpr int mostProbes = 64;        // along an edge of a convex body
 constexpr float leastStride = 0.05f;  // through samples [voxels]
 // Of a way along which something is nearby; what takes longer is looked at point by point, or taken as met.
 constexpr int mostSteps = 64;
-// A body that is held back may be met by another one: pairs are looked at again up to so many times.
-constexpr int mostRounds = 8;
+// A body that is held back may be met by another one: pairs are looked at again up to so many times, about once for
+// each body of a column that falls. In longer ones the last overlap for a step.
+constexpr int mostRounds = 256;
 
 // Who is held so early in a step has not moved.
 constexpr float atStart = 1e-3f;

@@ -135,6 +135,36 @@ TEST_CASE("What a wall holds is not run over by what follows close behind") {
     CHECK(held > 40);
 }
 
+TEST_CASE("What a wall holds is not run over by a long column, each held by the one before it") {
+    const float radius = 0.2f;
+    // as above; both are round, and lie on each other as they lie in a row
+    const float deepest = 0.35f * h + 2 * 0.23f * 4 * h * h / radius;
+    Shape ball(exactSphere(radius, h)), wall(exactBox({h, 1, 1}, h));
+    World world;
+    const NoPassing guard(world.dynamics);
+    world.dynamics.setGravity({0, 0, 0});
+    world.add(wall, 0, {2, 0, 0});
+    const unsigned seed = test::seed();
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<float> any(0, 1);
+    std::vector<btRigidBody*> column;
+    for (float x = 1.7f; column.size() < 50; x -= 2 * radius + 0.5f * h * any(random)) {
+        column.push_back(world.add(ball, 1, {x, 0, 0}));
+        column.back()->setLinearVelocity({58, 0, 0});
+    }
+    int held = 0;
+    for (int i = 0; i < 2; ++i) {
+        world.dynamics.stepSimulation(step, 0);
+        held += guard.held();
+        for (std::size_t k = 1; k < column.size(); ++k) {
+            CAPTURE(seed, i, k);
+            CHECK(column[k - 1]->getCenterOfMassPosition().x() - column[k]->getCenterOfMassPosition().x() >
+                  2 * radius - deepest);
+        }
+    }
+    CHECK(held > 40);
+}
+
 TEST_CASE("Two fast bodies do not pass each other, nor what they meet after a bounce") {
     Shape ball(exactSphere(0.2f, h)), wall(exactBox({1.f, 1.f, 0.5f * h}, h));
     World world;
