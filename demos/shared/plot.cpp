@@ -16,7 +16,7 @@ namespace {
 constexpr double panelWidth = 620, panelHeight = 400, left = 70, right = 200, top = 44, bottom = 54;
 constexpr std::size_t mostInRow = 3;  // panels
 constexpr double labelSpacing = 34;   // of the two lines of text at the ends of lines
-constexpr std::array<const char*, 4> colours{"#1f5fa8", "#c4572b", "#3d8a4f", "#7a4fa0"};
+constexpr std::array colours{"#1f5fa8", "#c4572b", "#3d8a4f", "#7a4fa0", "#b8860b", "#1b98a0", "#b0478c", "#5a5a5a"};
 
 // A point this far beyond a decade does not ask for another one [decades].
 constexpr double decadeSlack = 0.02;
