@@ -53,7 +53,8 @@ constexpr std::size_t mostOfPatch = 3 * MANIFOLD_CACHE_SIZE;
 // stays where it is [parts of the distance within which contacts are the same].
 constexpr float held = 0.98f, mostDrift = 0.25f;
 // How long a contact takes to come to rest [steps], and the slip that loses it [parts of the distance within which
-// contacts are the same]: by and by, so that others have time to take over what it bore.
+// contacts are the same]: by and by, so that others have time to take over what it bore. By more in one step friction
+// is not known to slip that holds.
 constexpr float stepsOfRest = 120, slipOfRest = 0.05f;
 
 /// Contacts of one patch, as indices in ascending order of the distance that remains.
@@ -403,8 +404,8 @@ struct Anchor {
     float slip;       ///< how far they have slipped past each other
 };
 
-/// Where friction did not hold the two places, they are pulled back no farther than before. What is held and far away
-/// all the same has not drifted: the user has put it there.
+/// Where friction did not hold the two places, they are pulled back no farther than before. What is held and all the
+/// same gets beside the way that it is pulled back on has been put there by the user, or torn away.
 Anchor anchorOf(const btManifoldPoint& point, const btVector3& before, const btPersistentManifold& manifold,
                 float sameWithin) {
     const btVector3 drift = along(manifold.getBody0()->getWorldTransform() * point.m_localPointA -
@@ -414,9 +415,10 @@ Anchor anchorOf(const btManifoldPoint& point, const btVector3& before, const btP
     const float friction = std::max(std::abs(point.m_appliedImpulseLateral1), std::abs(point.m_appliedImpulseLateral2));
     const bool holds = friction < held * point.m_combinedFriction * point.m_appliedImpulse;
     const float most = holds ? mostDrift * sameWithin : std::min(mostDrift * sameWithin, float(before.length()));
-    const float length = drift.length();
-    if (holds && (drift - before).length() > mostDrift * sameWithin) return {btVector3(0, 0, 0), length};
-    return {length > most ? most / length * drift : drift, holds ? 0 : float((drift - before).length())};
+    const float length = drift.length(), slip = (drift - before).length();
+    const float left = before.isZero() ? 0 : std::clamp(drift.dot(before) / before.length2(), 0.f, 1.f);
+    if (holds && (drift - left * before).length() > slipOfRest * sameWithin) return {btVector3(0, 0, 0), slip};
+    return {length > most ? most / length * drift : drift, holds ? 0 : slip};
 }
 
 }  // namespace

@@ -12,8 +12,11 @@
 namespace bilayer::bullet {
 namespace {
 
-// What is slower has not moved [parts of the speed that gravity gives in a step].
-constexpr float still = 0.01f;
+// What is slower and gets no faster has not moved. Once it is held, it stays until it is faster than goesOn, or
+// something has pushed it: when its speed is another by so much and stays that for some steps, since what the solver
+// leaves over may jump as far from any step to the next [parts of the speed that gravity gives in a step].
+constexpr float still = 0.05f, goesOn = 0.15f, pushed = 0.05f;
+constexpr int pushLasts = 4;
 // Places in single precision are rounded by no more than this part of their size, turns by so much [rad], and forces by
 // this part of the weight.
 constexpr float rounding = 4 * std::numeric_limits<float>::epsilon();
@@ -34,9 +37,20 @@ float radiusOf(const btRigidBody& body) {
     return centre.length() + radius;
 }
 
-bool isStill(const btRigidBody& body, float seconds) {
-    const float speed = body.getLinearVelocity().length() + radiusOf(body) * body.getAngularVelocity().length();
-    return speed < still * seconds * body.getGravity().length();
+Velocities velocitiesOf(const btRigidBody& body) {
+    return {body.getLinearVelocity(), body.getAngularVelocity()};
+}
+
+// Of a body's farthest point, in parts of the speed that gravity gives in a step.
+float speedOf(const btRigidBody& body, const Velocities& velocities, float seconds) {
+    const float speed = velocities.linear.length() + radiusOf(body) * velocities.angular.length();
+    return speed / (seconds * body.getGravity().length());
+}
+
+// How far a body's motion is from what it was, likewise.
+float changeOf(const btRigidBody& body, const Velocities& before, float seconds) {
+    const Velocities now = velocitiesOf(body);
+    return speedOf(body, {now.linear - before.linear, now.angular - before.angular}, seconds);
 }
 
 // Whether a body has come from a place by its speed alone: neither the user has put it where it is, nor has the solver.
@@ -61,6 +75,35 @@ Stillness::~Stillness() {
     world_.removeAction(this);
 }
 
+bool Stillness::stays(Place& place, const btRigidBody& body, float seconds) {
+    if (place.object != &body || !comesFrom(place.transform, body, seconds)) return false;
+    const float speed = speedOf(body, velocitiesOf(body), seconds);
+    if (!place.isHeld) return speed < still && speed <= place.speed;
+    const bool isCalm = changeOf(body, place.calm, seconds) < pushed;
+    const bool isSteady = changeOf(body, place.last, seconds) < pushed;
+    if (isCalm) place.calm = velocitiesOf(body);
+    place.pushes = isCalm || !isSteady ? 0 : place.pushes + 1;
+    return isCalm || (speed < goesOn && place.pushes < pushLasts);
+}
+
+/// Leaves a body where it was. What goes on does so with the speed that it came with, or what swings would get energy
+/// each time it turns.
+void Stillness::hold(Place& place, btRigidBody& body, float seconds) {
+    const Velocities velocities = velocitiesOf(body);
+    const float speed = speedOf(body, velocities, seconds);
+    if (!place.isHeld) {
+        place.calm = velocities;
+        place.pushes = 0;
+        place.speed = speed;
+    }
+    place.isHeld = speed < goesOn;
+    if (!place.isHeld) {
+        body.setLinearVelocity(place.speed / speed * velocities.linear);
+        body.setAngularVelocity(place.speed / speed * velocities.angular);
+    }
+    body.setCenterOfMassTransform(place.transform);
+}
+
 /// What moves for a reason however slowly, and what it carries.
 std::unordered_set<const btCollisionObject*> Stillness::driven() const {
     std::unordered_set<const btCollisionObject*> driven;
@@ -72,7 +115,7 @@ std::unordered_set<const btCollisionObject*> Stillness::driven() const {
     const btCollisionObjectArray& objects = world_.getCollisionObjectArray();
     for (int i = 0; i < objects.size(); ++i) {
         const Place& place = places_[std::size_t(i)];
-        const bool moves = place.body != objects[i] || !(place.transform == objects[i]->getWorldTransform());
+        const bool moves = place.object != objects[i] || !(place.transform == objects[i]->getWorldTransform());
         if (objects[i]->isKinematicObject() ? moves
                                             : isDynamic(*objects[i]) && isPushed(*btRigidBody::upcast(objects[i])))
             driven.insert(objects[i]);
@@ -91,19 +134,22 @@ std::unordered_set<const btCollisionObject*> Stillness::driven() const {
 
 void Stillness::updateAction(btCollisionWorld*, btScalar seconds) {
     const btCollisionObjectArray& objects = world_.getCollisionObjectArray();
-    places_.resize(std::size_t(objects.size()), {nullptr, btTransform::getIdentity()});
+    places_.resize(std::size_t(objects.size()));
     const std::unordered_set<const btCollisionObject*> moving = driven();
     held_ = 0;
     for (int i = 0; i < objects.size(); ++i) {
         Place& place = places_[std::size_t(i)];
         btRigidBody* const body = isDynamic(*objects[i]) ? btRigidBody::upcast(objects[i]) : nullptr;
-        if (body && body->isActive() && place.body == body && !moving.contains(body) && isStill(*body, seconds) &&
-            comesFrom(place.transform, *body, seconds)) {
-            body->setCenterOfMassTransform(place.transform);
+        if (body && body->isActive() && !moving.contains(body) && stays(place, *body, seconds)) {
+            hold(place, *body, seconds);
             ++held_;
         } else {
-            place = {objects[i], objects[i]->getWorldTransform()};
+            place = {.object = objects[i], .transform = objects[i]->getWorldTransform()};
+            // what wakes up is at rest until something pushes it
+            place.isHeld = body && !body->isActive();
+            if (body) place.speed = speedOf(*body, velocitiesOf(*body), seconds);
         }
+        if (body) place.last = velocitiesOf(*body);
     }
 }
 

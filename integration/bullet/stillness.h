@@ -9,16 +9,25 @@
 
 namespace bilayer::bullet {
 
+/// Of a body.
+struct Velocities {
+    btVector3 linear{0, 0, 0}, angular{0, 0, 0};  ///< [m/s], [rad/s]
+};
+
 /// Keeps bodies at rest from wandering. Bullet's solver leaves what lies still some speed in each step, which is
 /// rounding and has no direction, but in minutes it takes a body by a tenth of a voxel; then one is no longer held, and
 /// part of a heap slides.
 ///
-/// What is slower at the end of a step than a hundredth of the speed that gravity gives in one (at its farthest point;
-/// 0.4 mm/s with 240 steps a second) has not moved: it stays at the place where it was, to the bit, and keeps its
-/// speed. Contacts then find the same again, the solver comes to an end from step to step, and what nothing holds up
-/// falls in the next one. Nothing is held that has no weight, that a constraint, a force or the user moves, that
-/// touches such a body or a kinematic one that moves, or is stacked on what does. Only who sets a body's speed in each
-/// step, to less than that, will find that it stays.
+/// What is slower at the end of a step than 5 % of the speed that gravity gives in one (at its farthest point; 2 mm/s
+/// with 240 steps a second, 8 mm/s with 60), and getting no faster, has not moved: it stays at the place where it was,
+/// to the bit, and keeps its speed. Contacts then find the same again, the solver comes to an end from step to step,
+/// and what nothing holds up falls in the next one: what is held goes on when something pushes it by 5 % at once, which
+/// is known when that has lasted for four steps, or when its speed has grown to 15 %; then with as much as it had when
+/// it came to be held, and so what swings gets no energy. What wakes up is held until then, too.
+///
+/// Nothing is held that has no weight, that a constraint or a force moves, that the user puts elsewhere, that touches
+/// such a body or a kinematic one that moves, or is stacked on what does. But what lies still and gets less speed than
+/// that, by the user or by another body, stays for good, even on ice.
 class Stillness : private btActionInterface {
   public:
     /// Acts at the end of each internal step, as one of the world's actions; the world must outlive this.
@@ -35,11 +44,21 @@ class Stillness : private btActionInterface {
     void debugDraw(btIDebugDraw*) override {}
     std::unordered_set<const btCollisionObject*> driven() const;
 
-    /// Where a body was at the end of the last step.
+    /// Where an object was at the end of the last step, and how it went.
     struct Place {
-        const btCollisionObject* body;
-        btTransform transform;
+        const btCollisionObject* object = nullptr;
+        btTransform transform = btTransform::getIdentity();
+        Velocities last{};  ///< of a body, in the last step
+        Velocities calm{};  ///< and before something pushed it, if it is held
+        int pushes = 0;     ///< steps since then
+        /// Of the farthest point, at that time; of what is held, when it came to be [parts of what gravity gives in a
+        /// step].
+        float speed = 0;
+        bool isHeld = false;
     };
+    static bool stays(Place& place, const btRigidBody& body, float seconds);
+    static void hold(Place& place, btRigidBody& body, float seconds);
+
     btDynamicsWorld& world_;
     std::vector<Place> places_;  ///< in the world's order
     int held_ = 0;

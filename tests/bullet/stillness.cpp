@@ -6,7 +6,9 @@
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <optional>
 #include <random>
+#include <utility>
 #include <vector>
 
 #include "tests/support/support.h"
@@ -48,14 +50,23 @@ struct Heap {
         }
     }
 
-    /// How far the ring goes that goes farthest.
+    /// Until nothing rocks any more, which takes some of them half a minute.
+    void settle() {
+        world.run(8);
+        for (int i = 0; i < 60 && farthest(1) > 0.02f * h; ++i) {
+        }
+    }
+
+    /// How far the ring goes that goes farthest, on its way too.
     float farthest(float seconds) {
         std::vector<btVector3> before;
         for (const btRigidBody* body : rings) before.push_back(body->getCenterOfMassPosition());
-        world.run(seconds);
         float most = 0;
-        for (std::size_t i = 0; i < rings.size(); ++i)
-            most = std::max(most, before[i].distance(rings[i]->getCenterOfMassPosition()));
+        for (int part = 0; part < 10; ++part) {
+            world.run(0.1f * seconds);
+            for (std::size_t i = 0; i < rings.size(); ++i)
+                most = std::max(most, before[i].distance(rings[i]->getCenterOfMassPosition()));
+        }
         return most;
     }
 };
@@ -67,7 +78,7 @@ TEST_CASE("A heap that nothing lets sleep stays where it is, and falls when its 
     CAPTURE(start);
     Heap heap(start);
     const Stillness still(heap.world.dynamics);
-    heap.world.run(8);
+    heap.settle();
     CHECK(heap.farthest(4) < 0.02f * h);
     CHECK(still.held() + 2 >= int(heap.rings.size()));
 
@@ -80,6 +91,20 @@ TEST_CASE("A heap that nothing lets sleep stays where it is, and falls when its 
     heap.world.run(0.5f);
     CHECK(before - heap.rings.front()->getCenterOfMassPosition().z() == Approx(0.5f * 9.81f * 0.25f).epsilon(0.05));
     CHECK(still.held() == 0);
+}
+
+TEST_CASE("What slept is where it was when it wakes up") {
+    const unsigned start = seed();
+    CAPTURE(start);
+    Heap heap(start);
+    const Stillness still(heap.world.dynamics);
+    heap.settle();
+    for (btRigidBody* ring : heap.rings) ring->forceActivationState(ISLAND_SLEEPING);
+    heap.world.run(0.5f);
+    for (btRigidBody* ring : heap.rings) ring->forceActivationState(DISABLE_DEACTIVATION);
+    heap.world.run(1 / 240.f);
+    CHECK(still.held() + 2 >= int(heap.rings.size()));
+    CHECK(heap.farthest(2) < 0.02f * h);
 }
 
 TEST_CASE("What moves for a reason is not held: thrown, without weight, hung up, or put elsewhere") {
@@ -138,6 +163,26 @@ TEST_CASE("What moves for a reason is not held: thrown, without weight, hung up,
         world.run(2);
         CHECK(body->getWorldTransform().getBasis().getColumn(0).angle(before) == Approx(0.1f).epsilon(0.05));
     }
+    SECTION("what lay still and is pushed once, on ice") {
+        Shape floor(exactBox({1, 1, 0.1f}, h)), box(exactBox({0.1f, 0.1f, 0.1f}, h));
+        world.add(floor, 0, {0, 0, -0.1f});
+        btRigidBody* body = world.add(box, 1, {0, 0, 0.1f});
+        body->setFriction(0);
+        body->setDamping(0, 0);
+        body->setActivationState(DISABLE_DEACTIVATION);
+        world.run(1);
+        REQUIRE(still.held() == 1);
+        if (const bool slept = GENERATE(false, true); slept) {
+            body->forceActivationState(ISLAND_SLEEPING);
+            world.run(0.1f);
+            body->forceActivationState(DISABLE_DEACTIVATION);
+        }
+        const float before = body->getCenterOfMassPosition().x(), speed = GENERATE(3e-3f, 7e-3f, 0.1f);
+        CAPTURE(speed);
+        body->setLinearVelocity({speed, 0, 0});
+        world.run(2);
+        CHECK(body->getCenterOfMassPosition().x() - before == Approx(2 * speed).epsilon(0.02));
+    }
     SECTION("what the user puts elsewhere stays there, and so does what he turns, bit by bit too") {
         useFriction(world);
         Shape floor(exactBox({1, 1, 0.1f}, h)), box(exactBox({0.1f, 0.1f, 0.1f}, h));
@@ -146,7 +191,7 @@ TEST_CASE("What moves for a reason is not held: thrown, without weight, hung up,
         body->setActivationState(DISABLE_DEACTIVATION);
         world.run(3);
         REQUIRE(still.held() == 1);
-        for (const float way : {0.4f, -0.15f}) {
+        for (const float way : {0.4f, -0.15f, 0.45f * h, -0.25f * h, 0.15f * h, -0.35f * h}) {
             btTransform place = body->getWorldTransform();
             place.getOrigin() += btVector3(way, 0, 0);
             body->setWorldTransform(place);
@@ -165,6 +210,44 @@ TEST_CASE("What moves for a reason is not held: thrown, without weight, hung up,
         const btVector3 axis = body->getWorldTransform().getBasis().getColumn(0);
         CHECK(axis.angle(before.getBasis().getColumn(0)) > 0.01f);
     }
+}
+
+TEST_CASE("What swings gets no energy each time it turns, and comes to rest where it is damped") {
+    const float perSecond = GENERATE(60.f, 240.f), damping = GENERATE(0.f, 0.2f);
+    CAPTURE(perSecond, damping);
+    constexpr float radius = 0.3f, below = 0.12f, tilt = 0.02f;  // a ball whose mass lies below its middle
+    btBoxShape floor({1, 1, 0.1f});
+    btSphereShape sphere(radius);
+    btCompoundShape tumbler;
+    tumbler.addChildShape(btTransform(btQuaternion(0, 0, 0, 1), {0, 0, below}), &sphere);
+    // until then, how fast it is in the last ten seconds, and the steps that it is held in the very last one
+    constexpr float until = 90;
+    const auto swing = [&](bool holds) {
+        World world;
+        useFriction(world);
+        std::optional<Stillness> still;
+        if (holds) still.emplace(world.dynamics);
+        world.add(floor, 0, {0, 0, -0.1f});
+        btRigidBody* body = world.add(tumbler, 1, {-below * std::sin(tilt), 0, radius - below * std::cos(tilt)},
+                                      btQuaternion({0, 1, 0}, tilt));
+        body->setDamping(damping, damping);
+        body->setActivationState(DISABLE_DEACTIVATION);
+        std::vector<float> speeds;
+        int held = 0;
+        for (int i = 0; i < int(until * perSecond); ++i) {
+            world.dynamics.stepSimulation(1 / perSecond, 1, 1 / perSecond);
+            if (float(i) > (until - 10) * perSecond) speeds.push_back(body->getLinearVelocity().length());
+            if (holds && float(i) >= (until - 1) * perSecond) held += still->held();
+        }
+        // the usual ones: a step here and there is off, with and without
+        std::sort(speeds.begin(), speeds.end());
+        return std::pair(speeds[speeds.size() * 9 / 10], held);
+    };
+    const auto [speed, held] = swing(true);
+    if (damping == 0)
+        CHECK(speed == Approx(swing(false).first).epsilon(0.01));
+    else
+        CHECK(held == int(perSecond));
 }
 
 TEST_CASE("What a slow lift or a slow belt carries comes along, and what is stacked on it") {
