@@ -8,6 +8,8 @@
 #include <algorithm>
 #include <cstddef>
 #include <limits>
+#include <unordered_map>
+#include <vector>
 
 namespace bilayer::bullet {
 namespace {
@@ -25,9 +27,15 @@ bool isDynamic(const btCollisionObject& object) {
     return btRigidBody::upcast(&object) && !object.isStaticOrKinematicObject();
 }
 
-bool isPushed(const btRigidBody& body) {
+// By a force other than its weight.
+bool isForced(const btRigidBody& body) {
     const btVector3 weight = body.getGravity() / body.getInvMass() * body.getLinearFactor();
     return body.getTotalForce().distance(weight) > rounding * weight.length() || !body.getTotalTorque().isZero();
+}
+
+// Bullet gives no weight to what it wakes within a step.
+bool isWithoutForce(const btRigidBody& body) {
+    return body.getTotalForce().isZero() && body.getTotalTorque().isZero();
 }
 
 float radiusOf(const btRigidBody& body) {
@@ -35,6 +43,10 @@ float radiusOf(const btRigidBody& body) {
     btScalar radius;
     body.getCollisionShape()->getBoundingSphere(centre, radius);
     return centre.length() + radius;
+}
+
+Velocities operator-(const Velocities& a, const Velocities& b) {
+    return {a.linear - b.linear, a.angular - b.angular};
 }
 
 Velocities velocitiesOf(const btRigidBody& body) {
@@ -49,8 +61,7 @@ float speedOf(const btRigidBody& body, const Velocities& velocities, float secon
 
 // How far a body's motion is from what it was, likewise.
 float changeOf(const btRigidBody& body, const Velocities& before, float seconds) {
-    const Velocities now = velocitiesOf(body);
-    return speedOf(body, {now.linear - before.linear, now.angular - before.angular}, seconds);
+    return speedOf(body, velocitiesOf(body) - before, seconds);
 }
 
 // Whether a body has come from a place by its speed alone: neither the user has put it where it is, nor has the solver.
@@ -81,9 +92,10 @@ bool Stillness::stays(Place& place, const btRigidBody& body, float seconds) {
     if (!place.isHeld) return speed < still && speed <= place.speed;
     const bool isCalm = changeOf(body, place.calm, seconds) < pushed;
     const bool isSteady = changeOf(body, place.last, seconds) < pushed;
+    const bool hasGrown = speed >= goesOn && speedOf(body, place.last - place.calm, seconds) >= pushed;
     if (isCalm) place.calm = velocitiesOf(body);
     place.pushes = isCalm || !isSteady ? 0 : place.pushes + 1;
-    return isCalm || (speed < goesOn && place.pushes < pushLasts);
+    return isCalm || hasGrown || (speed < goesOn && place.pushes < pushLasts);
 }
 
 /// Leaves a body where it was. What goes on does so with the speed that it came with, or what swings would get energy
@@ -104,30 +116,45 @@ void Stillness::hold(Place& place, btRigidBody& body, float seconds) {
     body.setCenterOfMassTransform(place.transform);
 }
 
-/// What moves for a reason however slowly, and what it carries.
+/// Whether an object moves by another reason than its weight, however slowly.
+bool Stillness::isDriven(const Place& place, const btCollisionObject& object) {
+    const bool moves = place.object == &object && !(place.transform == object.getWorldTransform());
+    if (!isDynamic(object)) return moves;
+    const btRigidBody& body = *btRigidBody::upcast(&object);
+    if (body.getGravity().isZero()) return moves;
+    return isForced(body) && !(place.sleeps && isWithoutForce(body));
+}
+
+/// What is driven, and what it carries.
 std::unordered_set<const btCollisionObject*> Stillness::driven() const {
     std::unordered_set<const btCollisionObject*> driven;
+    std::vector<const btCollisionObject*> open;
+    const auto add = [&](const btCollisionObject& object) {
+        if (driven.insert(&object).second) open.push_back(&object);
+    };
     for (int i = 0; i < world_.getNumConstraints(); ++i) {
         const btTypedConstraint* constraint = world_.getConstraint(i);
         for (const btRigidBody* body : {&constraint->getRigidBodyA(), &constraint->getRigidBodyB()})
-            if (isDynamic(*body)) driven.insert(body);
+            if (isDynamic(*body)) add(*body);
     }
     const btCollisionObjectArray& objects = world_.getCollisionObjectArray();
-    for (int i = 0; i < objects.size(); ++i) {
-        const Place& place = places_[std::size_t(i)];
-        const bool moves = place.object != objects[i] || !(place.transform == objects[i]->getWorldTransform());
-        if (objects[i]->isKinematicObject() ? moves
-                                            : isDynamic(*objects[i]) && isPushed(*btRigidBody::upcast(objects[i])))
-            driven.insert(objects[i]);
+    for (int i = 0; i < objects.size(); ++i)
+        if (isDriven(places_[std::size_t(i)], *objects[i])) add(*objects[i]);
+    if (open.empty()) return driven;
+
+    std::unordered_map<const btCollisionObject*, std::vector<const btCollisionObject*>> touching;
+    for (int i = 0; i < world_.getDispatcher()->getNumManifolds(); ++i) {
+        const btPersistentManifold& manifold = *world_.getDispatcher()->getManifoldByIndexInternal(i);
+        const btCollisionObject *a = manifold.getBody0(), *b = manifold.getBody1();
+        if (manifold.getNumContacts() == 0 || !a->hasContactResponse() || !b->hasContactResponse()) continue;
+        touching[a].push_back(b);
+        touching[b].push_back(a);
     }
-    for (std::size_t before = 0; before != driven.size();) {
-        before = driven.size();
-        for (int i = 0; i < world_.getDispatcher()->getNumManifolds(); ++i) {
-            const btPersistentManifold& manifold = *world_.getDispatcher()->getManifoldByIndexInternal(i);
-            const btCollisionObject *a = manifold.getBody0(), *b = manifold.getBody1();
-            if (manifold.getNumContacts() == 0 || driven.contains(a) == driven.contains(b)) continue;
-            if (const auto* other = driven.contains(a) ? b : a; isDynamic(*other)) driven.insert(other);
-        }
+    while (!open.empty()) {
+        const btCollisionObject* carrier = open.back();
+        open.pop_back();
+        for (const btCollisionObject* carried : touching[carrier])
+            if (isDynamic(*carried)) add(*carried);
     }
     return driven;
 }
@@ -140,6 +167,7 @@ void Stillness::updateAction(btCollisionWorld*, btScalar seconds) {
     for (int i = 0; i < objects.size(); ++i) {
         Place& place = places_[std::size_t(i)];
         btRigidBody* const body = isDynamic(*objects[i]) ? btRigidBody::upcast(objects[i]) : nullptr;
+        const bool sleeps = body && (!body->isActive() || (place.sleeps && isWithoutForce(*body)));
         if (body && body->isActive() && !moving.contains(body) && stays(place, *body, seconds)) {
             hold(place, *body, seconds);
             ++held_;
@@ -149,6 +177,7 @@ void Stillness::updateAction(btCollisionWorld*, btScalar seconds) {
             place.isHeld = body && !body->isActive();
             if (body) place.speed = speedOf(*body, velocitiesOf(*body), seconds);
         }
+        place.sleeps = sleeps;
         if (body) place.last = velocitiesOf(*body);
     }
 }

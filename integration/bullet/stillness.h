@@ -25,9 +25,11 @@ struct Velocities {
 /// is known when that has lasted for four steps, or when its speed has grown to 15 %; then with as much as it had when
 /// it came to be held, and so what swings gets no energy. What wakes up is held until then, too.
 ///
-/// Nothing is held that has no weight, that a constraint or a force moves, that the user puts elsewhere, that touches
-/// such a body or a kinematic one that moves, or is stacked on what does. But what lies still and gets less speed than
-/// that, by the user or by another body, stays for good, even on ice.
+/// Nothing is held that has no weight, that a constraint or a force moves, or that touches such a body that moves, a
+/// kinematic one that moves, or what lies on these. What the user puts elsewhere is left there. But what is slower than
+/// that for any other reason stays for good, even on ice: what rolls on ends so, what gets less speed than that by the
+/// user or by another body does not start, and what slides by a little more than friction holds, by a part e of its
+/// weight, waits for 0.15 / e steps.
 class Stillness : private btActionInterface {
   public:
     /// Acts at the end of each internal step, as one of the world's actions; the world must outlive this.
@@ -55,7 +57,9 @@ class Stillness : private btActionInterface {
         /// step].
         float speed = 0;
         bool isHeld = false;
+        bool sleeps = false;  ///< or was woken since Bullet has given weight to bodies
     };
+    static bool isDriven(const Place& place, const btCollisionObject& object);
     static bool stays(Place& place, const btRigidBody& body, float seconds);
     static void hold(Place& place, btRigidBody& body, float seconds);
 
