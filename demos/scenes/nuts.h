@@ -30,7 +30,7 @@ struct NutsOptions {
 };
 
 /// More than these, and a nut comes to the head of Factory's bolt.
-inline constexpr float factoryTurns = 4;
+inline constexpr float factoryTurns = 3;
 
 /// Whether a folder holds `factory_bolt_m16_loose.obj` and `factory_nut_m16_loose_subdiv_3x.obj`: M16, 0.1 mm of play
 /// between flanks. The nut is open by cracks along the edges of its hexagon, so that winding numbers tell its inside.

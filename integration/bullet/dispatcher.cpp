@@ -90,13 +90,15 @@ float marginOf(const Side& a, const Side& b) {
 }
 
 /// Of two bodies of which B is a field.
-Continuity continuityOf(const btCollisionShape& a, const btCollisionShape& b) {
+Continuity continuityOf(const btCollisionShape& a, const btCollisionShape& b, float seconds) {
     const auto restingFriction = [](const btCollisionShape& shape) {
         return isField(&shape) ? static_cast<const Shape&>(shape).restingFriction() : 1;
     };
     float sameWithin = b.getContactBreakingThreshold(gContactBreakingThreshold);
     if (isField(&a)) sameWithin = std::min(sameWithin, a.getContactBreakingThreshold(gContactBreakingThreshold));
-    return {.sameWithin = sameWithin, .restingFriction = std::max(restingFriction(a), restingFriction(b))};
+    return {.sameWithin = sameWithin,
+            .restingFriction = std::max(restingFriction(a), restingFriction(b)),
+            .seconds = seconds};
 }
 
 /// Two overlapping bodies of which B is a field. Collides them without a call that changes anything in Bullet, so that
@@ -250,16 +252,17 @@ class Algorithm : public btCollisionAlgorithm {
     void processCollision(const btCollisionObjectWrapper* first, const btCollisionObjectWrapper* second,
                           const btDispatcherInfo& info, btManifoldResult* result) override {
         const btCollisionObjectWrapper &a = bIsSecond_ ? *first : *second, &b = bIsSecond_ ? *second : *first;
+        const bool isTest = state_.isTest(*result);
+        const float seconds = state_.secondsOf(info, isTest);
         if (!pair_->isReady()) {
-            const bool isTest = state_.isTest(*result);
-            const float ahead = state_.ahead(a, b, state_.secondsOf(info, isTest));
+            const float ahead = state_.ahead(a, b, seconds);
             if (isTest)
                 pair_->test(sideOf(a, ahead), sideOf(b, ahead), result->m_closestPointDistanceThreshold);
             else
                 pair_->collide(sideOf(a, ahead), sideOf(b, ahead));
         }
         pair_->commit(*a.getCollisionObject(), *b.getCollisionObject(),
-                      continuityOf(*a.getCollisionShape(), *b.getCollisionShape()), *result);
+                      continuityOf(*a.getCollisionShape(), *b.getCollisionShape(), seconds), *result);
     }
 
     /// Bullet asks this of pairs in continuous dispatch, which its worlds never use.

@@ -1,5 +1,7 @@
 #include "integration/bullet/manifolds.h"
 
+#include <BulletDynamics/Dynamics/btRigidBody.h>
+
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
@@ -394,8 +396,43 @@ void tellAdded(btManifoldPoint& point, const btPersistentManifold& manifold, con
     gContactAddedCallback(point, first, point.m_partId0, point.m_index0, second, point.m_partId1, point.m_index1);
 }
 
+/// Of what has been there before.
+void tellProcessed(btManifoldPoint& point, const btPersistentManifold& manifold) {
+    if (!gContactProcessedCallback || point.m_lifeTime == 0) return;
+    gContactProcessedCallback(point, const_cast<btCollisionObject*>(manifold.getBody0()),
+                              const_cast<btCollisionObject*>(manifold.getBody1()));
+}
+
 btVector3 along(const btVector3& way, const btVector3& normal) {
     return way - normal.dot(way) * normal;
+}
+
+btVector3 velocityAt(const btCollisionObject& object, const btVector3& position) {
+    const btRigidBody* body = btRigidBody::upcast(&object);
+    if (!body) return {0, 0, 0};
+    return body->getVelocityInLocalPoint(position - body->getCenterOfMassPosition());
+}
+
+btVector3 accelerationOf(const btCollisionObject& object) {
+    const btRigidBody* body = btRigidBody::upcast(&object);
+    return body ? body->getTotalForce() * body->getInvMass() : btVector3(0, 0, 0);
+}
+
+/// The solver takes the gap that is left from the speed of a bounce. So what meets the surface in this step bounces as
+/// if it touched already, and what comes nearer only keeps its speed. What lies there, or comes no faster than its
+/// weight takes it there in two steps, does not bounce.
+void bounce(const btPersistentManifold& manifold, btManifoldPoint& point, float seconds) {
+    if (!(seconds > 0 && point.m_distance1 > 0 && point.m_combinedRestitution > 0) || point.m_appliedImpulse > 0)
+        return;
+    const btCollisionObject &a = *manifold.getBody0(), &b = *manifold.getBody1();
+    const btVector3& normal = point.m_normalWorldOnB;
+    const float speed = normal.dot(velocityAt(b, point.m_positionWorldOnB) - velocityAt(a, point.m_positionWorldOnB));
+    const float gain = seconds * normal.dot(accelerationOf(b) - accelerationOf(a));
+    if (speed <= 2 * std::abs(gain)) return;
+    if (point.m_distance1 <= seconds * (speed + gain))
+        point.m_distance1 = 0;
+    else
+        point.m_combinedRestitution = 0;
 }
 
 /// What has become of a contact's anchor in a step.
@@ -528,8 +565,13 @@ void Manifolds::write(std::span<const Patch> patches, const btCollisionObject& a
             for (int i = 0; i < patches[m].count; ++i) emit(patches[m].contacts[i], aIsFirst, result);
         }
         for (int i = 0; i < manifold->getNumContacts(); ++i) {
-            written_[m][std::size_t(i)] = inherit(*manifold, i, continuity);
-            tellAdded(manifold->getContactPoint(i), *manifold, result);
+            btManifoldPoint& point = manifold->getContactPoint(i);
+            Written& written = written_[m][std::size_t(i)];
+            written = inherit(*manifold, i, continuity);
+            tellAdded(point, *manifold, result);
+            if (point.m_contactMotion1 != 0 || point.m_contactMotion2 != 0) letGo(*manifold, point, written);
+            bounce(*manifold, point, continuity.seconds);
+            tellProcessed(point, *manifold);
         }
         manifold->setContactBreakingThreshold(continuity.sameWithin);
         if (touched && manifold->getNumContacts() == 0 && gContactEndedCallback) gContactEndedCallback(manifold);
@@ -564,6 +606,14 @@ Manifolds::Written Manifolds::writtenAs(const btManifoldPoint& point, std::size_
     for (const Written& written : written_[manifold])
         if (written.ofA == point.m_localPointA && written.ofB == point.m_localPointB) return written;
     return {};
+}
+
+/// The user moves one surface along the other: what touched once drifts apart by right.
+void Manifolds::letGo(const btPersistentManifold& manifold, btManifoldPoint& point, Written& written) {
+    point.m_contactPointFlags &= ~BT_CONTACT_FLAG_FRICTION_ANCHOR;
+    point.m_positionWorldOnA -= written.drift;
+    point.m_localPointA = manifold.getBody0()->getWorldTransform().invXform(point.m_positionWorldOnA);
+    written = {point.m_localPointA, point.m_localPointB};
 }
 
 Manifolds::Written Manifolds::inherit(btPersistentManifold& manifold, int index, const Continuity& continuity) {

@@ -66,6 +66,7 @@ class Choice {
 struct Continuity {
     float sameWithin;       ///< an old and a new contact nearer than this on either body are the same [m]
     float restingFriction;  ///< as in ShapeOptions
+    float seconds;          ///< that the step takes; 0 between steps
 };
 
 /// The manifolds of one pair of bodies, one for each patch. Contacts are written anew each step, since Bullet refreshes
@@ -97,6 +98,7 @@ class Manifolds {
     };
     Written writtenAs(const btManifoldPoint& point, std::size_t manifold) const;
     Written inherit(btPersistentManifold& manifold, int index, const Continuity& continuity);
+    static void letGo(const btPersistentManifold& manifold, btManifoldPoint& point, Written& written);
 
     /// A point of the last step.
     struct Old {

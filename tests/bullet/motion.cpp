@@ -476,6 +476,79 @@ TEST_CASE("What a user keeps with a contact stays with it, and is given back in 
     gContactDestroyedCallback = nullptr;
 }
 
+TEST_CASE("What falls bounces with its restitution, wherever a step takes it") {
+    const float perSecond = GENERATE(60.f, 240.f), restitution = GENERATE(0.5f, 0.9f);
+    const int kind = GENERATE(0, 1, 2);
+    CAPTURE(perSecond, restitution, kind);
+    Shape fieldFloor(exactBox({1, 1, 0.2f}, h)), fieldBox(exactBox({0.1f, 0.1f, 0.1f}, h));
+    btBoxShape boxFloor({1, 1, 0.2f});
+    btSphereShape ball(0.1f);
+    double sum = 0;
+    constexpr int drops = 20;
+    for (int drop = 0; drop < drops; ++drop) {
+        World world;
+        world.add(kind == 2 ? static_cast<btCollisionShape&>(boxFloor) : fieldFloor, 0, {0, 0, -0.2f})
+            ->setRestitution(1);
+        btRigidBody* body = world.add(kind == 0 ? static_cast<btCollisionShape&>(ball) : fieldBox, 1,
+                                      {0, 0, 0.6f + 0.04f * float(drop)});
+        body->setRestitution(restitution);
+        body->setDamping(0, 0);
+        float fastest = 0, rebound = 0;
+        for (int i = 0; i < int(perSecond) && rebound == 0; ++i) {
+            world.dynamics.stepSimulation(1 / perSecond, 1, 1 / perSecond);
+            const float speed = body->getLinearVelocity().z();
+            fastest = std::max(fastest, -speed);
+            rebound = std::max(rebound, speed);
+        }
+        sum += double(rebound / fastest) / drops;
+        // the speed that the weight adds in the step of the bounce is the solver's to take
+        CHECK(rebound / fastest == Approx(restitution).margin(1.1 * 9.81 / double(perSecond * fastest)));
+    }
+    CHECK(sum == Approx(restitution).margin(0.02));
+}
+
+TEST_CASE("A belt takes along what lies on it, by the motion that the user gives its contacts") {
+    constexpr float speed = 0.1f;
+    gContactAddedCallback = [](btManifoldPoint& point, const btCollisionObjectWrapper* first, int, int,
+                               const btCollisionObjectWrapper*, int, int) {
+        const bool beltIsFirst = first->getCollisionObject()->isStaticObject();
+        point.m_lateralFrictionDir1 = {1, 0, 0};
+        point.m_lateralFrictionDir2 = {0, 1, 0};
+        point.m_contactPointFlags |= BT_CONTACT_FLAG_LATERAL_FRICTION_INITIALIZED;
+        point.m_contactMotion1 = beltIsFirst ? -speed : speed;
+        return true;
+    };
+    Shape belt(exactBox({1, 1, 0.1f}, h)), box(exactBox({0.1f, 0.1f, 0.1f}, h));
+    World world;
+    world.dynamics.getSolverInfo().m_solverMode |=
+        SOLVER_ENABLE_FRICTION_DIRECTION_CACHING | SOLVER_USE_2_FRICTION_DIRECTIONS;
+    btRigidBody* moving = world.add(belt, 0, {0, 0, -0.1f});
+    moving->setCollisionFlags(moving->getCollisionFlags() | btCollisionObject::CF_CUSTOM_MATERIAL_CALLBACK);
+    btRigidBody* body = world.add(box, 1, {-0.3f, 0, 0.1f});
+    body->setActivationState(DISABLE_DEACTIVATION);
+    world.run(4);
+    gContactAddedCallback = nullptr;
+    CHECK(body->getCenterOfMassPosition().x() + 0.3f == Approx(4 * speed).epsilon(0.01));
+    CHECK(std::abs(body->getCenterOfMassPosition().y()) < 1e-3f);
+}
+
+TEST_CASE("Users are told of contacts that go on") {
+    static int processed;
+    processed = 0;
+    gContactProcessedCallback = [](btManifoldPoint&, void*, void*) {
+        ++processed;
+        return true;
+    };
+    Shape floor(exactBox({1, 1, 0.2f}, h)), box(exactBox({0.3f, 0.3f, 0.2f}, h));
+    World world;
+    world.add(floor, 0, {0, 0, -0.2f});
+    world.add(box, 2, {0, 0, 0.2f})->setActivationState(DISABLE_DEACTIVATION);
+    world.run(0.5f);
+    gContactProcessedCallback = nullptr;
+    CHECK(processed >= 4 * 110);
+    CHECK(processed <= 12 * 120);
+}
+
 TEST_CASE("What is about to land is met by all of its corners, finer than the floor or not") {
     const bool fineFirst = GENERATE(false, true);
     CAPTURE(fineFirst);
