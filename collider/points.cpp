@@ -18,6 +18,7 @@ namespace {
 constexpr double latticePitch = 0.75;   // of candidates on edges and faces [spacings]
 constexpr double leastGap = 0.7;        // between points that look about the same way [spacings]
 constexpr double likeness = 0.7;        // least cosine between their normals: an edge of a cube and its faces have 0.71
+constexpr double leastProtrusion = 0.035;  // over the tangent plane's height of such a point that needs none [spacings]
 constexpr double leastCornerGap = 0.1;  // between convex corners [spacings]: a fraction of a voxel
 constexpr double corner = 0.5;          // convexity from which a point is a corner: a cube's has 0.58
 constexpr double sharp = 0.15;          // and from which it is on an edge at least: a cube's have 0.35
@@ -159,13 +160,14 @@ class Grid {
 
     // Whether a point lies within `radius`, at most the side of a cell, that looks about the same way: it is on the
     // same side of a thin wall, and what touches a tip finer than `radius` is met by a point that looks at it.
-    bool near(const Candidate& candidate, double radius) const {
+    bool near(const Candidate& candidate, double radius, double protrusion) const {
         const glm::i64vec3 cell = cellOf(candidate.position);
         for (int i = 0; i < 27; ++i) {
             const glm::i64vec3 neighbour = cell + glm::i64vec3(i / 9 - 1, i / 3 % 3 - 1, i % 3 - 1);
             for (std::uint32_t e = heads_[slot(neighbour)]; e != none; e = entries_[e].next)
                 if (glm::distance2(entries_[e].position, candidate.position) < radius * radius &&
-                    glm::dot(entries_[e].normal, candidate.normal) > likeness)
+                    glm::dot(entries_[e].normal, candidate.normal) > likeness &&
+                    glm::dot(candidate.position - entries_[e].position, candidate.normal) < protrusion)
                     return true;
         }
         return false;
@@ -199,7 +201,7 @@ std::vector<SurfacePoint> thin(std::vector<Candidate> candidates, double spacing
     std::vector<SurfacePoint> points;
     for (const Candidate& candidate : candidates) {
         const double gap = candidate.convexity >= corner ? leastCornerGap : leastGap;
-        if (grid.near(candidate, gap * spacing)) continue;
+        if (grid.near(candidate, gap * spacing, leastProtrusion * spacing)) continue;
         grid.insert(candidate);
         points.push_back({glm::vec3(candidate.position), glm::vec3(candidate.normal), candidate.convexity >= sharp});
     }

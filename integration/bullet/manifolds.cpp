@@ -1,7 +1,5 @@
 #include "integration/bullet/manifolds.h"
 
-#include <BulletDynamics/Dynamics/btRigidBody.h>
-
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
@@ -11,6 +9,7 @@
 #include <utility>
 
 #include "integration/bullet/convert.h"
+#include "integration/bullet/velocity.h"
 
 namespace bilayer::bullet {
 
@@ -407,32 +406,45 @@ btVector3 along(const btVector3& way, const btVector3& normal) {
     return way - normal.dot(way) * normal;
 }
 
-btVector3 velocityAt(const btCollisionObject& object, const btVector3& position) {
-    const btRigidBody* body = btRigidBody::upcast(&object);
-    if (!body) return {0, 0, 0};
-    return body->getVelocityInLocalPoint(position - body->getCenterOfMassPosition());
-}
+/// The bodies of a manifold in the step that follows.
+struct Step {
+    float seconds;
+    Velocity a, b;
+    btVector3 gain;  ///< of speed by the forces on the bodies, of B as A sees it [m/s]
 
-btVector3 accelerationOf(const btCollisionObject& object) {
-    const btRigidBody* body = btRigidBody::upcast(&object);
-    return body ? body->getTotalForce() * body->getInvMass() : btVector3(0, 0, 0);
-}
+    Step(const btCollisionObject& a, const btCollisionObject& b, float seconds)
+        : seconds(seconds),
+          a(velocityOf(a)),
+          b(velocityOf(b)),
+          gain(seconds * (accelerationOf(b) - accelerationOf(a))) {}
+};
 
 /// The solver takes the gap that is left from the speed of a bounce. So what meets the surface in this step bounces as
 /// if it touched already, and what comes nearer only keeps its speed. What lies there, or comes no faster than its
 /// weight takes it there in two steps, does not bounce.
-void bounce(const btPersistentManifold& manifold, btManifoldPoint& point, float seconds) {
-    if (!(seconds > 0 && point.m_distance1 > 0 && point.m_combinedRestitution > 0) || point.m_appliedImpulse > 0)
-        return;
-    const btCollisionObject &a = *manifold.getBody0(), &b = *manifold.getBody1();
+/// @return whether it bounces in this step
+bool bounce(btManifoldPoint& point, const Step& step) {
+    if (!(step.seconds > 0 && point.m_distance1 > 0 && point.m_combinedRestitution > 0) || point.m_appliedImpulse > 0)
+        return false;
     const btVector3& normal = point.m_normalWorldOnB;
-    const float speed = normal.dot(velocityAt(b, point.m_positionWorldOnB) - velocityAt(a, point.m_positionWorldOnB));
-    const float gain = seconds * normal.dot(accelerationOf(b) - accelerationOf(a));
-    if (speed <= 2 * std::abs(gain)) return;
-    if (point.m_distance1 <= seconds * (speed + gain))
+    const float speed = normal.dot(step.b.at(point.m_positionWorldOnB) - step.a.at(point.m_positionWorldOnB));
+    const float gain = normal.dot(step.gain);
+    if (speed <= 2 * std::abs(gain)) return false;
+    const bool meets = point.m_distance1 <= step.seconds * (speed + gain);
+    if (meets)
         point.m_distance1 = 0;
     else
         point.m_combinedRestitution = 0;
+    return meets;
+}
+
+/// A contact that turns in the step goes where it is going to be. What it drifts meanwhile is no slip.
+void put(btManifoldPoint& point, const Ahead& ahead) {
+    point.m_positionWorldOnA = ahead.onA;
+    point.m_positionWorldOnB = ahead.onB;
+    point.m_normalWorldOnB = ahead.normal;
+    point.m_distance1 = ahead.distance;
+    point.m_contactPointFlags &= ~BT_CONTACT_FLAG_FRICTION_ANCHOR;
 }
 
 /// What has become of a contact's anchor in a step.
@@ -538,7 +550,8 @@ Manifolds::~Manifolds() {
     for (btPersistentManifold* manifold : manifolds_) dispatcher_.releaseManifold(manifold);
 }
 
-void Manifolds::write(std::span<const Patch> patches, const btCollisionObject& a, const btCollisionObject& b,
+void Manifolds::write(std::span<const Patch> patches, std::span<const std::optional<Ahead>> ahead,
+                      const btCollisionObject& a, const btCollisionObject& b, float seconds,
                       const Continuity& continuity, btManifoldResult& result) {
     // One manifold at least: users expect a pair that overlaps to have one.
     while (manifolds_.size() < std::max<std::size_t>(patches.size(), 1))
@@ -554,6 +567,8 @@ void Manifolds::write(std::span<const Patch> patches, const btCollisionObject& a
             point.m_userPersistentData = nullptr;
         }
 
+    const Step step(a, b, seconds);
+    std::size_t at = 0;  // among the contacts
     for (std::size_t m = 0; m < manifolds_.size(); ++m) {
         btPersistentManifold* manifold = manifolds_[m];
         const bool touched = manifold->getNumContacts() > 0;
@@ -564,13 +579,15 @@ void Manifolds::write(std::span<const Patch> patches, const btCollisionObject& a
             const Silenced added(gContactAddedCallback, true);
             for (int i = 0; i < patches[m].count; ++i) emit(patches[m].contacts[i], aIsFirst, result);
         }
+        const std::size_t first = at;
+        if (m < patches.size()) at += std::size_t(patches[m].count);
         for (int i = 0; i < manifold->getNumContacts(); ++i) {
             btManifoldPoint& point = manifold->getContactPoint(i);
             Written& written = written_[m][std::size_t(i)];
             written = inherit(*manifold, i, continuity);
             tellAdded(point, *manifold, result);
             if (point.m_contactMotion1 != 0 || point.m_contactMotion2 != 0) letGo(*manifold, point, written);
-            bounce(*manifold, point, continuity.seconds);
+            if (const auto& there = ahead[first + std::size_t(i)]; !bounce(point, step) && there) put(point, *there);
             tellProcessed(point, *manifold);
         }
         manifold->setContactBreakingThreshold(continuity.sameWithin);

@@ -5,6 +5,7 @@
 #include <BulletCollision/CollisionDispatch/btManifoldResult.h>
 
 #include <array>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -62,11 +63,19 @@ class Choice {
     std::vector<std::uint32_t> byFeature_;  ///< their indices in ascending order of features
 };
 
+/// A contact of bodies that turn as it is going to be at the end of the step, in the coordinates of a world that goes
+/// along with either body's centre, and what is left of the gap but for the ways that the solver sees (turnAhead()).
+struct Ahead {
+    btVector3 onA, onB;  ///< its places on the bodies [m]
+    btVector3 normal;    ///< from B to A
+    float distance;      ///< [m]
+};
+
 /// How contacts go on from step to step.
 struct Continuity {
-    float sameWithin;       ///< an old and a new contact nearer than this on either body are the same [m]
-    float restingFriction;  ///< as in ShapeOptions
-    float seconds;          ///< that the step takes; 0 between steps
+    float sameWithin = 0;       ///< an old and a new contact nearer than this on either body are the same [m]
+    float restingFriction = 1;  ///< as in ShapeOptions
+    bool isSwept = false;       ///< there are contacts with all that is met in the step, not only with what is near now
 };
 
 /// The manifolds of one pair of bodies, one for each patch. Contacts are written anew each step, since Bullet refreshes
@@ -82,9 +91,11 @@ class Manifolds {
 
     /// Replaces all contacts. Goes through btManifoldResult::addContactPoint, so that friction, restitution, callbacks
     /// and contact tests work as for Bullet's own shapes.
-    /// @param a, b  the bodies A and B of the patches; `result` may hold them in either order, as within a compound
-    void write(std::span<const Patch> patches, const btCollisionObject& a, const btCollisionObject& b,
-               const Continuity& continuity, btManifoldResult& result);
+    /// @param ahead    one for each contact of the patches, of those that turn
+    /// @param a, b     the bodies A and B of the patches; `result` may hold them in either order, as within a compound
+    /// @param seconds  that the step takes; 0 between steps
+    void write(std::span<const Patch> patches, std::span<const std::optional<Ahead>> ahead, const btCollisionObject& a,
+               const btCollisionObject& b, float seconds, const Continuity& continuity, btManifoldResult& result);
 
     std::span<btPersistentManifold* const> all() const { return manifolds_; }
 

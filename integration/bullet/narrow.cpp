@@ -330,11 +330,13 @@ class Touching {
             const glm::vec3 place = intoField(near.core);
             if (auto deeper = downhill(near, place, local_.at(place))) {
                 deeper->feature = feature;
+                deeper->turns = true;
                 contacts.push_back(*deeper);
                 return;
             }
         }
         contacts.push_back(local_.contact(position, normal, near.distance, feature, approach));
+        contacts.back().turns = true;
     }
 
     /// The convex body's own corners and edges in the field.
@@ -344,8 +346,10 @@ class Touching {
         for (std::uint32_t i = 0; i < corners.size(); ++i) {
             const glm::vec3 point = intoField(corners[i]);
             answers.push_back(local_.at(point, convex_.radius(i)));
-            if (const auto found = local_.probe(point, answers[i], convex_.radius(i), i, margin_, report))
+            if (auto found = local_.probe(point, answers[i], convex_.radius(i), i, margin_, report)) {
+                found->turns = convex_.radius(i) == 0;
                 contacts.push_back(*found);
+            }
         }
         auto number = static_cast<std::uint32_t>(corners.size());
         for (const Convex::Edge& edge : convex_.edges()) {
@@ -401,8 +405,9 @@ class Touching {
         const auto met = meeting(intoConvex(position), way);
         if (!met || !(met->gap > 0)) return;
         const glm::vec3 normal = -(toField_ * met->normal);
-        if (opposition.keeps(glm::dot(normal, point.normal), false))
-            contacts.push_back(local_.contact(position, normal, met->gap, feature, -glm::dot(met->normal, way)));
+        if (!opposition.keeps(glm::dot(normal, point.normal), false)) return;
+        contacts.push_back(local_.contact(position, normal, met->gap, feature, -glm::dot(met->normal, way)));
+        contacts.back().turns = true;
     }
 
     /// Where sharp edges of the field go deeper into a round body from a point that touches before they come up again.
@@ -689,6 +694,7 @@ class TriangleProbes : public btTriangleCallback {
             if (lies && isNearest && height <= margin_) {
                 ++report_.pointsTested;
                 found = local_.contact(place, normal, height, 0, local_.approach(below, normal, margin_));
+                found->turns = true;
             } else {
                 found = local_.probe(below, answer, 0, 0, margin_, report_);
             }
@@ -746,7 +752,8 @@ ContactReport collidePlane(const glm::vec3& normal, float offset, const Motion& 
         const float approach = local.approach(field.scale * point.position, -up, margin) / field.scale;
         if (distance > std::max(reach, approach)) return;
         const glm::vec3 position = field.pose.toWorld(field.scale * point.position);
-        contacts.push_back({position, -normal, field.scale * distance, index | featureOfB, field.scale * approach});
+        contacts.push_back(
+            {position, -normal, field.scale * distance, index | featureOfB, field.scale * approach, true});
     });
     if (!measured || !field.collider.body().mesh) return report;
     const auto& vertices = field.collider.body().mesh->points;

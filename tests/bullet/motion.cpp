@@ -39,12 +39,15 @@ std::vector<float> heap(int threads) {
         Shape torusShape(torus), boxShape(box), bowlShape(bowl);
         btSphereShape ball(0.2f);
         btCapsuleShape capsule(0.15f, 0.4f);
-        btCollisionShape* const kinds[] = {&torusShape, &boxShape, &ball, &capsule};
+        btCompoundShape compound;
+        compound.addChildShape(btTransform(btQuaternion::getIdentity(), {-0.2f, 0, 0}), &boxShape);
+        compound.addChildShape(btTransform(btQuaternion::getIdentity(), {0.3f, 0, 0}), &ball);
+        btCollisionShape* const kinds[] = {&torusShape, &boxShape, &ball, &capsule, &compound};
         World world;
         world.add(bowlShape, 0, {0, 0, 0});
         std::vector<btRigidBody*> bodies;
         for (int i = 0; i < 12; ++i)
-            bodies.push_back(world.add(*kinds[i % 4], 1, {0.3f * (i % 3) - 0.3f, 0.1f * i - 0.6f, -1.f + 0.3f * i},
+            bodies.push_back(world.add(*kinds[i % 5], 1, {0.3f * (i % 3) - 0.3f, 0.1f * i - 0.6f, -1.f + 0.3f * i},
                                        btQuaternion(btVector3(1, 0.3f * i, 2).normalized(), 0.7f * i)));
         world.run(1.25f);
         for (const btRigidBody* body : bodies) {

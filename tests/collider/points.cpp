@@ -7,8 +7,11 @@
 #include <glm/gtc/quaternion.hpp>
 #include <limits>
 #include <stdexcept>
+#include <string>
+#include <vector>
 
 #include "demos/shared/shapes.h"
+#include "sdf/mesh_io.h"
 #include "tests/support/random.h"
 #include "tests/support/support.h"
 
@@ -86,11 +89,53 @@ TEST_CASE("points lie on the mesh, cover it at the spacing, and are not many mor
     }
 }
 
-TEST_CASE("no two points on one side of a surface are closer than the spacing allows, but for corners") {
-    const SurfacePoints points(shapes::sphere(1, 5), 0.2f);
+TEST_CASE("points closer than the spacing allows stand out over each other's tangent planes, or are corners") {
+    const float radius = GENERATE(1.f, 3.f, 12.f), spacing = 1;  // small balls want points closer to each other
+    CAPTURE(radius);
+    const SurfacePoints points(shapes::sphere(radius, 5), spacing);
+    const auto standsOut = [&](const SurfacePoint& p, const SurfacePoint& over) {
+        return glm::dot(p.position - over.position, p.normal) > 0.0349f * spacing;
+    };
     for (const SurfacePoint& p : points.points())
         for (const SurfacePoint& q : points.points())
-            if (&p != &q) REQUIRE(glm::distance(p.position, q.position) > 0.69f * 0.2f);
+            if (&p != &q && glm::distance(p.position, q.position) < 0.69f * spacing)
+                REQUIRE((standsOut(p, q) || standsOut(q, p)));
+}
+
+TEST_CASE("planes that touch a mesh find a point a small part of the spacing behind them") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    Random random(seed);
+    struct Named {
+        std::string name;
+        Mesh mesh;
+        float spacing;
+        double most;  // [spacings]
+    };
+    std::vector<Named> all;
+    for (const float radius : {1.5f, 2.f, 4.f, 16.f}) all.push_back({"sphere", shapes::sphere(radius, 5), 1, 0.06});
+    for (const float minor : {1.5f, 4.f}) all.push_back({"torus", shapes::torus(8, minor), 1, 0.06});
+    all.push_back({"cylinder", shapes::cylinder(3, 5), 1, 0.06});
+    all.push_back({"cone", shapes::cone(3, 5), 1, 0.06});
+    for (const char* name : {"bunny_watertight.obj", "armadillo_100k.ply", "cow.obj"})
+        if (const auto path = corpusMesh(name)) {
+            Mesh mesh = readMesh(*path);
+            Bounds box;
+            for (const glm::vec3& point : mesh.points) box.add(point);
+            for (const float parts : {16.f, 48.f}) all.push_back({name, mesh, glm::length(box.size()) / parts, 0.12});
+        }
+    for (const auto& [name, mesh, spacing, most] : all) {
+        CAPTURE(name, spacing);
+        const SurfacePoints points(mesh, spacing);
+        for (int i = 0; i < 200; ++i) {
+            const glm::vec3 direction = random.direction();
+            float surface = -1e9f, found = surface;
+            for (const glm::vec3& point : mesh.points) surface = std::max(surface, glm::dot(direction, point));
+            for (const SurfacePoint& point : points.points())
+                found = std::max(found, glm::dot(direction, point.position));
+            REQUIRE((surface - found) / spacing < most);
+        }
+    }
 }
 
 TEST_CASE("convex corners stay, whatever the spacing") {

@@ -1,0 +1,194 @@
+#include "integration/bullet/algorithms.h"
+
+#include <BulletCollision/CollisionDispatch/btCollisionConfiguration.h>
+#include <BulletCollision/CollisionDispatch/btEmptyCollisionAlgorithm.h>
+
+#include <algorithm>
+#include <new>
+#include <typeinfo>
+#include <utility>
+
+#include "integration/bullet/compound.h"
+#include "integration/bullet/velocity.h"
+
+namespace bilayer::bullet {
+
+namespace {
+
+// Bullet's pool hands out elements of this size, that of its own largest algorithm, whatever it is asked for [bytes].
+constexpr std::size_t poolElement = 184;
+
+template <class Algorithm, class... Arguments>
+btCollisionAlgorithm* make(const btCollisionAlgorithmConstructionInfo& info, Arguments&&... arguments) {
+    static_assert(sizeof(Algorithm) <= poolElement);
+    void* memory = info.m_dispatcher1->allocateCollisionAlgorithm(sizeof(Algorithm));
+    return new (memory) Algorithm(info, std::forward<Arguments>(arguments)...);
+}
+
+/// A field and a shape that is no compound.
+class PairAlgorithm : public FieldAlgorithm {
+  public:
+    PairAlgorithm(const btCollisionAlgorithmConstructionInfo& info, bool bIsSecond, StepState& state)
+        : FieldAlgorithm(info),
+          pair_(std::make_shared<Pair>(*info.m_dispatcher1, state.running)),
+          state_(state),
+          bIsSecond_(bIsSecond) {}
+
+    void gather(const btCollisionObjectWrapper& first, const btCollisionObjectWrapper& second, float seconds,
+                std::vector<Task>& tasks) override {
+        if (locks(*first.getCollisionShape()) || locks(*second.getCollisionShape())) return;
+        tasks.push_back(taskOf(first, second, seconds));
+    }
+
+    void processCollision(const btCollisionObjectWrapper* first, const btCollisionObjectWrapper* second,
+                          const btDispatcherInfo& info, btManifoldResult* result) override {
+        const bool isTest = state_.isTest(*result);
+        const float seconds = state_.secondsOf(info, isTest);
+        const Task task = taskOf(*first, *second, seconds);
+        if (!pair_->isReady()) {
+            if (isTest)
+                pair_->test(task.a, task.b, result->m_closestPointDistanceThreshold);
+            else
+                pair_->collide(task.a, task.b);
+        }
+        pair_->commit(*task.a.object, *task.b.object, seconds, *result);
+    }
+
+    void getAllContactManifolds(btManifoldArray& manifolds) override {
+        for (btPersistentManifold* manifold : pair_->manifolds().all()) manifolds.push_back(manifold);
+    }
+
+  private:
+    Task taskOf(const btCollisionObjectWrapper& first, const btCollisionObjectWrapper& second, float seconds) const {
+        Side a(bIsSecond_ ? first : second, seconds), b(bIsSecond_ ? second : first, seconds);
+        a.seconds = b.seconds = state_.ahead(a, b, seconds);
+        return {pair_, a, b};
+    }
+
+    std::shared_ptr<Pair> pair_;
+    const StepState& state_;
+    bool bIsSecond_;
+};
+
+struct CreatePair : btCollisionAlgorithmCreateFunc {
+    CreatePair(bool bIsSecond, StepState& state) : bIsSecond(bIsSecond), state(state) {}
+
+    btCollisionAlgorithm* CreateCollisionAlgorithm(btCollisionAlgorithmConstructionInfo& info,
+                                                   const btCollisionObjectWrapper*,
+                                                   const btCollisionObjectWrapper*) override {
+        if (state.leavesFields) return make<btEmptyAlgorithm>(info);
+        return make<PairAlgorithm>(info, bIsSecond, state);
+    }
+
+    bool bIsSecond;
+    StepState& state;
+};
+
+/// Of a pair that has a compound on one side or both. Where no field is in it, the pair is Bullet's alone.
+struct CreateCompound : btCollisionAlgorithmCreateFunc {
+    CreateCompound(btCollisionAlgorithmCreateFunc& ofBullet, StepState& state) : ofBullet(ofBullet), state(state) {}
+
+    btCollisionAlgorithm* CreateCollisionAlgorithm(btCollisionAlgorithmConstructionInfo& info,
+                                                   const btCollisionObjectWrapper* first,
+                                                   const btCollisionObjectWrapper* second) override {
+        btCollisionAlgorithm* rest = ofBullet.CreateCollisionAlgorithm(info, first, second);
+        // one within another compound has been gone through from there
+        if (state.leavesFields || !(holdsField(*first->getCollisionShape()) || holdsField(*second->getCollisionShape())))
+            return rest;
+        return make<CompoundAlgorithm>(info, rest, state);
+    }
+
+    btCollisionAlgorithmCreateFunc& ofBullet;
+    StepState& state;
+};
+
+/// Of shapes that are neither fields nor compounds.
+std::vector<int> rigidTypes() {
+    std::vector<int> types{STATIC_PLANE_PROXYTYPE,  TRIANGLE_MESH_SHAPE_PROXYTYPE, SCALED_TRIANGLE_MESH_SHAPE_PROXYTYPE,
+                           TERRAIN_SHAPE_PROXYTYPE, GIMPACT_SHAPE_PROXYTYPE,       MULTIMATERIAL_TRIANGLE_MESH_PROXYTYPE};
+    for (int type = 0; type < CONCAVE_SHAPES_START_HERE; ++type) types.push_back(type);
+    return types;
+}
+
+}  // namespace
+
+bool StepState::isTest(const btManifoldResult& result) const {
+    if (result.m_closestPointDistanceThreshold > 0) return true;
+    return seconds == 0 && typeid(result) != typeid(btManifoldResult);
+}
+
+float StepState::secondsOf(const btDispatcherInfo& info, bool isTest) const {
+    if (!isForeign) return seconds;
+    return isTest ? 0 : info.m_timeStep;
+}
+
+float StepState::ahead(const Side& a, const Side& b, float step) const {
+    const auto isLeft = [](const Side& side) { return side.object->isKinematicObject() || locks(*side.shape); };
+    if (foreseesAll || isLeft(a) || isLeft(b)) return step;
+    const auto sizeOf = [](const Side& side) {
+        btVector3 centre;
+        btScalar radius;
+        side.shape->getBoundingSphere(centre, radius);
+        return radius;
+    };
+    const btVector3 way = step * (velocityOf(*a.object).linear - velocityOf(*b.object).linear);
+    return way.length() <= std::min(sizeOf(a), sizeOf(b)) ? step : 0;
+}
+
+struct FieldAlgorithmFunctions::Functions {
+    /// A function and the place that it has in the dispatcher's tables, of contacts or of contact tests.
+    struct Compound {
+        int first, second;
+        bool isOfTests;
+        CreateCompound function;
+    };
+
+    Functions(btCollisionConfiguration& configuration, StepState& state)
+        : fieldSecond(true, state), fieldFirst(false, state) {
+        const auto add = [&](int first, int second) {
+            compounds.push_back(
+                {first, second, false, {*configuration.getCollisionAlgorithmCreateFunc(first, second), state}});
+            compounds.push_back(
+                {first, second, true, {*configuration.getClosestPointsAlgorithmCreateFunc(first, second), state}});
+        };
+        const int compound = COMPOUND_SHAPE_PROXYTYPE;
+        for (const int other : rigidTypes()) {
+            if (other == GIMPACT_SHAPE_PROXYTYPE) continue;
+            add(compound, other);
+            add(other, compound);
+        }
+        add(compound, FAST_CONCAVE_MESH_PROXYTYPE);
+        add(FAST_CONCAVE_MESH_PROXYTYPE, compound);
+        add(compound, compound);
+    }
+
+    CreatePair fieldSecond, fieldFirst;
+    std::vector<Compound> compounds;
+};
+
+FieldAlgorithmFunctions::FieldAlgorithmFunctions(btCollisionConfiguration& configuration)
+    : functions_(std::make_unique<Functions>(configuration, state)) {}
+
+FieldAlgorithmFunctions::~FieldAlgorithmFunctions() = default;
+
+void FieldAlgorithmFunctions::registerWith(btCollisionDispatcher& dispatcher) {
+    const int field = FAST_CONCAVE_MESH_PROXYTYPE;
+    // Bullet looks contacts and contact tests up in different tables.
+    const auto fill = [&](int first, int second, CreatePair& function) {
+        dispatcher.registerCollisionCreateFunc(first, second, &function);
+        dispatcher.registerClosestPointsCreateFunc(first, second, &function);
+    };
+    for (const int other : rigidTypes()) {
+        fill(other, field, functions_->fieldSecond);
+        fill(field, other, functions_->fieldFirst);
+    }
+    fill(field, field, functions_->fieldSecond);
+    for (Functions::Compound& compound : functions_->compounds) {
+        if (compound.isOfTests)
+            dispatcher.registerClosestPointsCreateFunc(compound.first, compound.second, &compound.function);
+        else
+            dispatcher.registerCollisionCreateFunc(compound.first, compound.second, &compound.function);
+    }
+}
+
+}  // namespace bilayer::bullet

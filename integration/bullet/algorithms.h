@@ -1,0 +1,71 @@
+// What Bullet's tables of algorithms hold for pairs with a field in them.
+#pragma once
+
+#include <BulletCollision/BroadphaseCollision/btCollisionAlgorithm.h>
+#include <BulletCollision/CollisionDispatch/btCollisionDispatcher.h>
+
+#include <memory>
+#include <vector>
+
+#include "integration/bullet/dispatcher.h"
+#include "integration/bullet/pair.h"
+
+namespace bilayer::bullet {
+
+/// Of the step under way.
+struct StepState {
+    DispatchStatistics running{};  ///< contact tests between steps count here too
+    float seconds = 0;             ///< that it takes; 0 between steps
+    bool foreseesAll = true;
+    bool isForeign = false;     ///< the dispatcher is another one, which does not tell its steps
+    bool leavesFields = false;  ///< Bullet goes through a compound, whose fields are not its business
+
+    /// Contact tests ask for a distance, or hand over a result of their own kind, and not within a step.
+    bool isTest(const btManifoldResult& result) const;
+    float secondsOf(const btDispatcherInfo& info, bool isTest) const;
+
+    /// How far ahead the motion of two shapes is looked at. What goes farther than its own size is the business of a
+    /// NoPassing, which does not see what the user moves, nor inside of what locks.
+    float ahead(const Side& a, const Side& b, float step) const;
+};
+
+/// Two shapes to be collided, the second of which is a field.
+struct Task {
+    std::shared_ptr<Pair> pair;  ///< shared, since a callback of the user's may remove the bodies in the meantime
+    Side a, b;
+};
+
+/// An algorithm whose pairs can be collided before Bullet asks it to process them: then it only hands contacts over.
+class FieldAlgorithm : public btCollisionAlgorithm {
+  public:
+    using btCollisionAlgorithm::btCollisionAlgorithm;
+
+    /// Appends what can be collided at once with others'.
+    /// @param seconds  that the step takes
+    virtual void gather(const btCollisionObjectWrapper& first, const btCollisionObjectWrapper& second, float seconds,
+                        std::vector<Task>& tasks) = 0;
+
+    /// Bullet asks this of pairs in continuous dispatch, which its worlds never use.
+    btScalar calculateTimeOfImpact(btCollisionObject*, btCollisionObject*, const btDispatcherInfo&,
+                                   btManifoldResult*) override {
+        return 1;
+    }
+};
+
+/// What makes such algorithms for a dispatcher's tables, which point to it.
+class FieldAlgorithmFunctions {
+  public:
+    explicit FieldAlgorithmFunctions(btCollisionConfiguration& configuration);
+    ~FieldAlgorithmFunctions();
+
+    /// Fills the rows and columns of fields and of compounds.
+    void registerWith(btCollisionDispatcher& dispatcher);
+
+    StepState state;
+
+  private:
+    struct Functions;
+    std::unique_ptr<Functions> functions_;
+};
+
+}  // namespace bilayer::bullet

@@ -1,0 +1,93 @@
+#include "integration/bullet/turning.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+
+#include "collider/touch.h"
+#include "integration/bullet/convert.h"
+#include "integration/bullet/shape.h"
+#include "integration/bullet/velocity.h"
+
+namespace bilayer::bullet {
+
+namespace {
+
+// What goes no farther than this by its body's turn is left where it is [parts of the distance within which contacts
+// are the same].
+constexpr float hardlyTurned = 0.05f;
+// Bodies are looked at after a turn of this at most [rad]. Where they are not swept, the points that take over are
+// known only up to a margin: a turn then takes none off the surface by more than this [parts of that distance].
+constexpr float mostTurn = 0.5f, turnsOff = 0.25f;
+// Where a field's samples look another way than a contact by more than this cosine tells, they say nothing about it: it
+// is one of an edge.
+constexpr float sameNormal = 0.95f;
+
+btVector3 turned(const btVector3& arm, const btVector3& spin, float seconds) {
+    const float speed = spin.length();
+    return speed * seconds != 0 ? arm.rotate(spin / speed, speed * seconds) : arm;
+}
+
+/// The surface of a body at a place near it.
+struct Surface {
+    btVector3 normal;
+    float distance;
+};
+
+/// That of a contact at some place, seen from another one nearby: by the field's samples, or as a plane.
+std::optional<Surface> surfaceAt(const Side& side, const Surface& contact, const btVector3& place,
+                                 const btVector3& nearby) {
+    const Surface plane{contact.normal, contact.distance + contact.normal.dot(nearby - place)};
+    if (!isField(*side.shape)) return plane;
+    const Placed body = side.placed();
+    const Field& field = body.collider.field();
+    const auto sampleAt = [&](const btVector3& point) { return field.sample(body.pose.toBody(toGlm(point)) / body.scale); };
+    const Sample here = sampleAt(place), there = sampleAt(nearby);
+    if (!here.inBand || !there.inBand) return std::nullopt;
+    const auto normalOf = [&](const Sample& sample) {
+        return toBullet(body.pose.rotation * directionOf(sample, field.voxelSize()));
+    };
+    if (!(normalOf(here).dot(contact.normal) > sameNormal)) return plane;
+    const btVector3 normal = normalOf(there);
+    if (normal.isZero()) return std::nullopt;
+    return Surface{normal, contact.distance + body.scale * (there.distance - here.distance)};
+}
+
+}  // namespace
+
+std::optional<Ahead> turnAhead(const Contact& contact, const Side& a, const Side& b, const Continuity& continuity) {
+    if (!contact.turns) return std::nullopt;
+    const bool isOfB = contact.feature & featureOfB;
+    const Side &own = isOfB ? b : a, &other = isOfB ? a : b;
+    const Velocity velocity = velocityOf(*own.object), its = velocityOf(*other.object);
+    const btVector3 fromB = toBullet(contact.normal), outward = isOfB ? -fromB : fromB;
+    const btVector3 onB = toBullet(contact.position), place = isOfB ? onB : onB + contact.distance * fromB;
+    const btVector3 arm = place - velocity.centre, itsArm = place - its.centre;
+
+    const auto mostSeconds = [&](const btVector3& spin, const btVector3& arm) {
+        const float most =
+            continuity.isSwept ? mostTurn : std::sqrt(2 * turnsOff * continuity.sameWithin / arm.length());
+        return most / spin.length();  // infinite where nothing turns
+    };
+    const float seconds = std::min({own.seconds, mostSeconds(velocity.angular, arm), mostSeconds(its.angular, itsArm)});
+    const float way = seconds * std::max(velocity.angular.cross(arm).length(), its.angular.cross(itsArm).length());
+    if (!(way > hardlyTurned * continuity.sameWithin)) return std::nullopt;
+
+    // From the other body's centre the place goes along its surface; towards it, that is the solver's business.
+    const btVector3 armThen = turned(arm, velocity.angular, seconds), passing = velocity.linear - its.linear;
+    const float leaving = outward.dot(passing);
+    const btVector3 itsArmThen = itsArm + armThen - arm + seconds * (passing - leaving * outward);
+    const auto surface = surfaceAt(other, {outward, contact.distance}, place,
+                                   its.centre + turned(itsArmThen, its.angular, -seconds));
+    if (!surface) return std::nullopt;
+    const btVector3 normal = turned(surface->normal, its.angular, seconds);
+    const btVector3 ownThen = velocity.centre + armThen,
+                    otherThen = its.centre + itsArmThen - surface->distance * normal;
+    const float seen = seconds * normal.dot(velocity.at(ownThen) - its.at(otherThen)),
+                left = surface->distance + seconds * leaving - seen;
+    const float distance = std::max(left, std::min(contact.distance, 0.f));
+    if (isOfB) return Ahead{otherThen, ownThen, -normal, distance};
+    return Ahead{ownThen, otherThen, normal, distance};
+}
+
+}  // namespace bilayer::bullet

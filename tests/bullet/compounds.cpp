@@ -1,0 +1,123 @@
+// Fields as children of compounds.
+#include <BulletCollision/CollisionDispatch/btCompoundCollisionAlgorithm.h>
+
+#include <catch2/catch.hpp>
+#include <cmath>
+
+#include "world.h"
+
+using namespace bilayer;
+using namespace bilayer::test;
+using bullet::Shape;
+
+namespace {
+
+constexpr float h = 0.05f;  // voxel [m]
+
+btTransform at(const btVector3& place) {
+    return btTransform(btQuaternion::getIdentity(), place);
+}
+
+}  // namespace
+
+TEST_CASE("However fast, no child passes a plate, be it a compound's or one's in a compound's") {
+    const auto plate = exactBox({1.f, 1.f, h}, h), ball = exactSphere(0.2f, h);
+    Shape plateShape(plate), ballShape(ball);
+    btSphereShape sphere(0.2f);
+    btStaticPlaneShape ground({0, 0, 1}, 0);
+    btCompoundShape plates, inner, balls, spheres(false);
+    plates.addChildShape(at({0, 0, -3}), &plateShape);
+    plates.addChildShape(at({0, 0, 0}), &plateShape);
+    inner.addChildShape(at({0, 0, 0.5f}), &ballShape);
+    balls.addChildShape(at({0, 0, -0.5f}), &inner);
+    spheres.addChildShape(at({0, 0, 0}), &sphere);
+    const struct {
+        const char* name;
+        btCollisionShape &moving, &still;
+    } cases[] = {{"a ball at a compound's plate", ballShape, plates},
+                 {"a compound's ball at a plate", balls, plateShape},
+                 {"a compound's ball at a compound's plate", balls, plates},
+                 {"a compound's ball at the ground", balls, ground},
+                 {"Bullet's own sphere at a compound's plate", sphere, plates},
+                 {"Bullet's own sphere in a compound at a plate", spheres, plateShape}};
+    for (const auto& one : cases)
+        for (float speed = 1; speed <= 1000; speed *= 10) {
+            CAPTURE(one.name, speed);
+            World world;
+            world.dynamics.setGravity({0, 0, 0});
+            world.add(one.still, 0, {0, 0, 0});
+            btRigidBody* body = world.add(one.moving, 1, {0.05f, 0.03f, 1.f});
+            body->setLinearVelocity({0.1f * speed, 0, -speed});
+            body->setActivationState(DISABLE_DEACTIVATION);
+            for (float time = 0; time < 1.5f; time += 1 / 60.f) {
+                world.dynamics.stepSimulation(1 / 60.f, 0);
+                const btVector3 place = body->getCenterOfMassPosition();
+                REQUIRE(std::isfinite(place.length2()));
+                if (std::abs(place.x()) < 0.7f) REQUIRE(place.z() > 0);
+            }
+        }
+}
+
+TEST_CASE("A compound lies on its fields and on its other children alike, until a child is taken away") {
+    // two feet far from the middle, and a weight between them that touches nothing
+    Shape foot(exactBox({0.1f, 0.3f, 0.2f}, h)), slab(exactBox({2, 1, 0.3f}, h));
+    btBoxShape own({0.1f, 0.3f, 0.2f}), weight({0.3f, 0.1f, 0.05f});
+    btStaticPlaneShape plane({0, 0, 1}, 0);
+    btBoxShape box({2, 1, 0.3f});
+    const struct {
+        const char* name;
+        btCollisionShape& shape;
+        float top;
+    } grounds[] = {{"plane", plane, 0}, {"box", box, 0.3f}, {"field", slab, 0.3f}};
+    for (const auto& ground : grounds) {
+        CAPTURE(ground.name);
+        btCompoundShape compound;
+        compound.addChildShape(at({-0.5f, 0, 0}), &foot);
+        compound.addChildShape(at({0.5f, 0, 0}), &own);
+        compound.addChildShape(at({0, 0, 0.05f}), &weight);
+        World world;
+        world.add(ground.shape, 0, {0, 0, -ground.top});
+        btRigidBody* body = world.add(compound, 2, {0, 0, 0.2f + 0.5f * h});
+        world.run(2);
+        // Bullet's own box may keep a margin off Bullet's own ground
+        CHECK(body->getWorldTransform().getOrigin().z() == Approx(0.2f).margin(0.1 * h));
+        CHECK(body->getWorldTransform().getBasis()[2][2] > std::cos(0.01f));
+
+        compound.removeChildShape(&foot);
+        body->activate(true);
+        world.run(1);
+        CHECK(body->getWorldTransform().getBasis()[2][2] < std::cos(0.1f));
+        world.dynamics.removeRigidBody(body);
+    }
+}
+
+TEST_CASE("Children that the user leaves out do not collide") {
+    Shape ball(exactSphere(0.2f, h)), slab(exactBox({1, 1, 0.3f}, h));
+    btCompoundShape compound;
+    compound.addChildShape(at({0, 0, 0}), &ball);
+    World world;
+    world.add(slab, 0, {0, 0, -0.3f});
+    btRigidBody* body = world.add(compound, 1, {0, 0, 0.25f});
+    gCompoundChildShapePairCallback = [](const btCollisionShape*, const btCollisionShape*) { return false; };
+    world.run(0.5f);
+    gCompoundChildShapePairCallback = nullptr;
+    CHECK(body->getCenterOfMassPosition().z() < -0.5f);
+}
+
+TEST_CASE("A compound's children are collided in one batch with all other pairs") {
+    Shape ball(exactSphere(0.2f, h)), slab(exactBox({3, 3, 0.3f}, h));
+    btCompoundShape compound;
+    for (int i = 0; i < 100; ++i) compound.addChildShape(at({0.45f * (i % 10) - 2, 0.45f * (i / 10) - 2, 0}), &ball);
+    World world;
+    world.add(slab, 0, {0, 0, -0.3f});
+    btRigidBody* body = world.add(compound, 10, {0, 0, 0.21f});
+    world.run(1);
+    CHECK(world.dispatcher.statistics().pairs == 100);
+    CHECK(world.dispatcher.statistics().contactsKept >= 100);
+    CHECK(body->getCenterOfMassPosition().z() == Approx(0.2f).margin(0.1 * h));
+    // what is far away costs nothing
+    body->setCenterOfMassTransform(at({4.5f, 4.5f, 0.2f}));
+    body->activate(true);
+    world.run(1 / 240.f);
+    CHECK(world.dispatcher.statistics().pairs < 60);
+}
