@@ -2,6 +2,7 @@
 // descended with the relative pose, so that only points near the other body are sampled.
 #include "collider/collider.h"
 
+#include <fmt/core.h>
 #include <oneapi/tbb/task_arena.h>
 
 #include <algorithm>
@@ -36,6 +37,8 @@ constexpr float settled = 1e-4f;
 constexpr float farthestOn = 50;
 // Nearer to each other, the way between them tells no direction [voxels].
 constexpr float shortest = 1e-3f;
+// Wider margins are a mistake of units [voxels].
+constexpr float mostMargin = 1000;
 // A tip that has sunk into another one sees its sides; what it opposes is seen so far back along its normal [voxels].
 constexpr float lift = 1;
 
@@ -346,6 +349,9 @@ std::optional<MassProperties> massOf(const Mesh& mesh, const LevelSet& levelSet)
 
 Body makeBody(Mesh given, const LevelSet& levelSet, const ColliderOptions& options) {
     if (!std::isfinite(options.margin)) throw std::invalid_argument("collider: the margin is not finite");
+    if (options.margin > mostMargin * levelSet.voxelSize())
+        throw std::invalid_argument(
+            fmt::format("collider: a margin of {:g} m is wider than {} voxels", options.margin, mostMargin));
     const auto mesh = std::make_shared<const Mesh>(outwardMesh(levelSet, std::move(given)));
     return {.points = SurfacePoints(*mesh, options.pointSpacing * levelSet.voxelSize()),
             .bounds = bounds(*mesh),

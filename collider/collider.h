@@ -21,11 +21,10 @@ namespace bilayer {
 
 struct ColliderOptions {
     /// Distance between neighbouring surface points [voxels of the field]. Smaller finds finer contacts and costs more.
-    /// What is round, with a radius of r voxels, sinks in between them by up to 0.23 spacing^2 / r voxels: by a tenth
-    /// of a voxel at a radius of nine with 2, of two and a half with 1. Tips finer than the spacing sink by 0.3 r at
-    /// most: points there look in directions no more than 45 degrees apart.
+    /// What is round has points closer to each other, so that it sinks in between them by 0.05 spacings at most.
     float pointSpacing = 2.0f;
-    /// Contacts are made up to this distance between the surfaces [m]. Negative: one voxel of the field.
+    /// Contacts are made up to this distance between the surfaces [m], 1000 voxels at most. Negative: one voxel of the
+    /// field.
     float margin = -1;
     /// Measure::edges asks the triangles where samples are off by more than a tenth of a voxel (see Strays). But
     /// for samples alone, the mesh takes memory (see Field), and a microsecond a triangle to sort. Measure::triangles
@@ -37,7 +36,8 @@ struct ColliderOptions {
 class Collider {
   public:
     /// Of a mesh and the level set that was built of it. Triangles that face the wrong way are turned around, as
-    /// build() does. Throws std::invalid_argument as validate() does, and if the level set is of another mesh.
+    /// build() does. Throws std::invalid_argument as validate() does, for options of no sense, and if the level set is
+    /// of another mesh.
     Collider(Mesh mesh, const LevelSet& levelSet, const ColliderOptions& options = {});
 
     /// Of a level set with a body beside it, as readVdb() gives back what withBody() was written of. It is as the one

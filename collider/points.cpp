@@ -15,15 +15,15 @@
 namespace bilayer {
 namespace {
 
-constexpr double latticePitch = 0.75;   // of candidates on edges and faces [spacings]
-constexpr double leastGap = 0.7;        // between points that look about the same way [spacings]
-constexpr double likeness = 0.7;        // least cosine between their normals: an edge of a cube and its faces have 0.71
+constexpr double latticePitch = 0.75;  // of candidates on edges and faces [spacings]
+constexpr double leastGap = 0.7;       // between points that look about the same way [spacings]
+constexpr double likeness = 0.7;       // least cosine between their normals: an edge of a cube and its faces have 0.71
 constexpr double leastProtrusion = 0.035;  // over the tangent plane's height of such a point that needs none [spacings]
-constexpr double leastCornerGap = 0.1;  // between convex corners [spacings]: a fraction of a voxel
-constexpr double corner = 0.5;          // convexity from which a point is a corner: a cube's has 0.58
-constexpr double sharp = 0.15;          // and from which it is on an edge at least: a cube's have 0.35
-constexpr std::uint32_t leafPoints = 8;  // most points in a leaf of the tree
-constexpr float rounding = 1.000001f;    // spheres grow by this, so that single precision leaves no point outside
+constexpr double leastCornerGap = 0.1;     // between convex corners [spacings]: a fraction of a voxel
+constexpr double corner = 0.5;             // convexity from which a point is a corner: a cube's has 0.58
+constexpr double sharp = 0.15;             // and from which it is on an edge at least: a cube's have 0.35
+constexpr std::uint32_t leafPoints = 8;    // most points in a leaf of the tree
+constexpr float rounding = 1.000001f;      // spheres grow by this, so that single precision leaves no point outside
 
 struct Candidate {
     glm::dvec3 position;

@@ -38,8 +38,7 @@ constexpr float halfSlab = 0.8f, halfThickness = 0.3f;  // what they lie on
 constexpr float fall = 0.2f;                            // from above [voxels]
 constexpr float rolling = 0.04f;                        // friction: what is round would roll off what it lies on
 constexpr float lane = 2;
-constexpr float spacing = 1;  // of surface points: a ball sinks in between them [voxels]
-constexpr int columns = 16;   // of the board
+constexpr int columns = 16;  // of the board
 constexpr int framesPerMeasuring = 30;
 constexpr int samplesAlong = 9;  // of a height field
 constexpr float mass = 2;        // at scale 1: it grows with the scale, since Bullet takes small inverses for zero [kg]
@@ -175,8 +174,7 @@ class Maker {
         constexpr float factor = 2.5f;
         const Mesh small = shapes::box(s_ / factor * halfBox, 4);
         const float fine = s_ / factor * voxel;
-        const auto collider = std::make_shared<Collider>(small, build(small, {.voxelSize = fine, .interiorWidth = 6}),
-                                                         ColliderOptions{.pointSpacing = spacing});
+        const auto collider = std::make_shared<Collider>(small, build(small, {.voxelSize = fine, .interiorWidth = 6}));
         const auto shape = std::make_shared<bullet::Shape>(collider);
         shape->setLocalScaling({factor, factor, factor});
         Part scaled = part("field, scaled,", shapes::box(s_ * halfBox), shape, halfBox.z);
@@ -188,9 +186,7 @@ class Maker {
         return part("GImpact", shapes::box(s_ * halfBox), {shape, &shape->shape}, halfBox.z);
     }
     Part field(const std::string& name, Mesh mesh, float height, const glm::vec3& axis = {0, 0, 1}) const {
-        return {name,        makeThing(std::move(mesh), {.voxelSize = s_ * voxel, .pointSpacing = spacing}),
-                s_ * height, s_ * height,
-                axis,        true};
+        return {name, makeThing(std::move(mesh), {.voxelSize = s_ * voxel}), s_ * height, s_ * height, axis, true};
     }
     Part part(const std::string& name, Mesh mesh, std::shared_ptr<btCollisionShape> shape, float height,
               const glm::vec3& axis = {0, 0, 1}) const {

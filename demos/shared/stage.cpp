@@ -45,8 +45,7 @@ std::shared_ptr<const Thing> makeThing(Mesh mesh, const ThingOptions& options) {
     band.voxelSize = options.voxelSize;
     band.interiorWidth = options.interiorWidth;
     LevelSet field = build(mesh, band);
-    auto collider = std::make_shared<Collider>(
-        mesh, field, ColliderOptions{.pointSpacing = options.pointSpacing, .measure = options.measure});
+    auto collider = std::make_shared<Collider>(mesh, field, ColliderOptions{.measure = options.measure});
     const bullet::ShapeOptions centred{.frame = bullet::centreOfMassFrame(*collider),
                                        .margin = options.margin,
                                        .sweeps = options.sweeps,

@@ -19,7 +19,6 @@ namespace bilayer::demo {
 struct ThingOptions {
     float voxelSize;                   ///< [m]
     float interiorWidth = 6;           ///< of the band: bodies that sink in deeper are lost [voxels]
-    float pointSpacing = 2;            ///< between surface points [voxels]
     float margin = -1;                 ///< up to which contacts are made [m]; negative: a voxel
     bool sweeps = true;                ///< what moves farther is followed (see bullet::ShapeOptions)
     Measure measure = Measure::edges;  ///< of contacts

@@ -48,7 +48,8 @@ void requireSensible(const MeshReport& mesh, const Scene& scene) {
           std::tuple("spin", std::max(scene.spin, -1.f), -1.f),
           std::tuple("margin", std::max(scene.margin, -1.f), -1.f)})
         if (!(value >= least && std::isfinite(value)))
-            throw std::invalid_argument(fmt::format("advice: a {} of {}", name, value));
+            throw std::invalid_argument(
+                fmt::format("advice: a {} of {}; it must be finite, and {} at least", name, value, least));
     if (mesh.triangles == 0 || !(mesh.bounds.longestSide() > 0))
         throw std::invalid_argument("advice: the mesh has no extent");
 }

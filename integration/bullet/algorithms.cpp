@@ -93,7 +93,8 @@ struct CreateCompound : btCollisionAlgorithmCreateFunc {
                                                    const btCollisionObjectWrapper* second) override {
         btCollisionAlgorithm* rest = ofBullet.CreateCollisionAlgorithm(info, first, second);
         // one within another compound has been gone through from there
-        if (state.leavesFields || !(holdsField(*first->getCollisionShape()) || holdsField(*second->getCollisionShape())))
+        if (state.leavesFields ||
+            !(holdsField(*first->getCollisionShape()) || holdsField(*second->getCollisionShape())))
             return rest;
         return make<CompoundAlgorithm>(info, rest, state);
     }
@@ -104,8 +105,9 @@ struct CreateCompound : btCollisionAlgorithmCreateFunc {
 
 /// Of shapes that are neither fields nor compounds.
 std::vector<int> rigidTypes() {
-    std::vector<int> types{STATIC_PLANE_PROXYTYPE,  TRIANGLE_MESH_SHAPE_PROXYTYPE, SCALED_TRIANGLE_MESH_SHAPE_PROXYTYPE,
-                           TERRAIN_SHAPE_PROXYTYPE, GIMPACT_SHAPE_PROXYTYPE,       MULTIMATERIAL_TRIANGLE_MESH_PROXYTYPE};
+    std::vector<int> types{
+        STATIC_PLANE_PROXYTYPE,  TRIANGLE_MESH_SHAPE_PROXYTYPE, SCALED_TRIANGLE_MESH_SHAPE_PROXYTYPE,
+        TERRAIN_SHAPE_PROXYTYPE, GIMPACT_SHAPE_PROXYTYPE,       MULTIMATERIAL_TRIANGLE_MESH_PROXYTYPE};
     for (int type = 0; type < CONCAVE_SHAPES_START_HERE; ++type) types.push_back(type);
     return types;
 }

@@ -26,8 +26,8 @@ struct DispatchStatistics {
 /// Use it in place of btCollisionDispatcher: fields then collide with every convex shape, planes, triangle meshes,
 /// height fields and fields, also inside compounds, in contact tests, and in either order.
 ///
-/// All pairs of a step that hold a field are collided as one TBB batch, and their contacts are handed to Bullet in
-/// order: the same bits for any number of threads. Also set
+/// All pairs of a step that hold a field, children of compounds included, are collided as one TBB batch, and their
+/// contacts are handed to Bullet in order: the same bits for any number of threads. Also set
 /// btCollisionWorld::getDispatchInfo().m_deterministicOverlappingPairs where runs that add and remove bodies in another
 /// order must agree.
 ///

@@ -22,7 +22,7 @@ Continuity continuityOf(const Side& a, const Side& b) {
     };
     const auto sameWithin = [](const btCollisionShape& shape) {
         return isField(shape) ? shape.getContactBreakingThreshold(gContactBreakingThreshold)
-                               : std::numeric_limits<float>::max();
+                              : std::numeric_limits<float>::max();
     };
     const auto isSwept = [](const Side& side) {
         return side.seconds > 0 && (!isField(*side.shape) || static_cast<const Shape&>(*side.shape).sweeps());
@@ -59,8 +59,7 @@ void Pair::collide(const Side& a, const Side& b) {
 
 void Pair::collide(const Side& a, const Side& b, const SampledPairs& sampled, std::size_t index) {
     contacts_.clear();
-    report_ =
-        collideFields(a.placed(), b.placed(), marginOf(a, b), sampled.ofA(index), sampled.ofB(index), contacts_);
+    report_ = collideFields(a.placed(), b.placed(), marginOf(a, b), sampled.ofA(index), sampled.ofB(index), contacts_);
     finish(a, b);
     ++sampled_;
 }
@@ -101,7 +100,7 @@ void Pair::find(const Side& a, const Side& b, float margin, bool measured) {
     contacts_.clear();
     const bool follows = static_cast<const Shape&>(*b.shape).sweeps();
     report_ = isField(*a.shape) ? collideFields(a.placed(), b.placed(), margin, measured, near_, contacts_)
-                               : collideOther(a, b.placed(), margin, measured, follows ? a.motion() : Motion{});
+                                : collideOther(a, b.placed(), margin, measured, follows ? a.motion() : Motion{});
 }
 
 void Pair::finish(const Side& a, const Side& b) {
@@ -129,8 +128,8 @@ ContactReport Pair::collideOther(const Side& a, const Placed& field, float margi
         if (!convex_ || !convex_->isOf(convex)) convex_.emplace(convex);
         return collideConvex(*convex_, toPose(a.transform), motion, field, margin, measured, contacts_);
     }
-    return collideTriangles(static_cast<const btConcaveShape&>(*a.shape), a.transform, motion, field, margin,
-                            measured, contacts_);
+    return collideTriangles(static_cast<const btConcaveShape&>(*a.shape), a.transform, motion, field, margin, measured,
+                            contacts_);
 }
 
 }  // namespace bilayer::bullet

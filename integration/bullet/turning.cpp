@@ -19,8 +19,8 @@ constexpr float hardlyTurned = 0.05f;
 // Bodies are looked at after a turn of this at most [rad]. Where they are not swept, the points that take over are
 // known only up to a margin: a turn then takes none off the surface by more than this [parts of that distance].
 constexpr float mostTurn = 0.5f, turnsOff = 0.25f;
-// Where a field's samples look another way than a contact by more than this cosine tells, they say nothing about it: it
-// is one of an edge.
+// Where a field looks another way than a contact by more than this cosine tells, it says nothing about it: that is one
+// of an edge.
 constexpr float sameNormal = 0.95f;
 
 btVector3 turned(const btVector3& arm, const btVector3& spin, float seconds) {
@@ -41,16 +41,17 @@ std::optional<Surface> surfaceAt(const Side& side, const Surface& contact, const
     if (!isField(*side.shape)) return plane;
     const Placed body = side.placed();
     const Field& field = body.collider.field();
-    const auto sampleAt = [&](const btVector3& point) { return field.sample(body.pose.toBody(toGlm(point)) / body.scale); };
-    const Sample here = sampleAt(place), there = sampleAt(nearby);
-    if (!here.inBand || !there.inBand) return std::nullopt;
-    const auto normalOf = [&](const Sample& sample) {
-        return toBullet(body.pose.rotation * directionOf(sample, field.voxelSize()));
+    const auto touchAt = [&](const btVector3& point) -> std::optional<Touch> {
+        const glm::vec3 at = body.pose.toBody(toGlm(point)) / body.scale;
+        const Sample sample = field.sample(at);
+        if (!sample.inBand) return std::nullopt;
+        return touchInBand(field, at, sample, body.collider.asksTriangles(at));
     };
-    if (!(normalOf(here).dot(contact.normal) > sameNormal)) return plane;
-    const btVector3 normal = normalOf(there);
-    if (normal.isZero()) return std::nullopt;
-    return Surface{normal, contact.distance + body.scale * (there.distance - here.distance)};
+    const auto here = touchAt(place), there = touchAt(nearby);
+    if (!here || !there || there->normal == glm::vec3(0)) return std::nullopt;
+    const auto inWorld = [&](const glm::vec3& normal) { return toBullet(body.pose.rotation * normal); };
+    if (!(inWorld(here->normal).dot(contact.normal) > sameNormal)) return plane;
+    return Surface{inWorld(there->normal), contact.distance + body.scale * (there->distance - here->distance)};
 }
 
 }  // namespace
@@ -77,8 +78,8 @@ std::optional<Ahead> turnAhead(const Contact& contact, const Side& a, const Side
     const btVector3 armThen = turned(arm, velocity.angular, seconds), passing = velocity.linear - its.linear;
     const float leaving = outward.dot(passing);
     const btVector3 itsArmThen = itsArm + armThen - arm + seconds * (passing - leaving * outward);
-    const auto surface = surfaceAt(other, {outward, contact.distance}, place,
-                                   its.centre + turned(itsArmThen, its.angular, -seconds));
+    const auto surface =
+        surfaceAt(other, {outward, contact.distance}, place, its.centre + turned(itsArmThen, its.angular, -seconds));
     if (!surface) return std::nullopt;
     const btVector3 normal = turned(surface->normal, its.angular, seconds);
     const btVector3 ownThen = velocity.centre + armThen,

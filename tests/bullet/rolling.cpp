@@ -67,14 +67,15 @@ TEST_CASE("Balls of a few voxels lie as high as their triangles do, on all that 
         const char* name;
         btCollisionShape& shape;
         float top;
-    } grounds[] = {{"plane", plane, 0}, {"box", box, 0.5f}, {"triangles", *triangles.shape, 0.5f}, {"field", slab, 0.1f}};
+    } grounds[] = {
+        {"plane", plane, 0}, {"box", box, 0.5f}, {"triangles", *triangles.shape, 0.5f}, {"field", slab, 0.1f}};
     for (const auto& ground : grounds) {
         CAPTURE(ground.name);
         World world;
         world.add(ground.shape, 0, {0, 0, -ground.top});
         const glm::vec3 axis = random.direction();
-        btRigidBody* body = world.add(shape, 1, {0, 0, radius + 0.2f * h},
-                                      btQuaternion(bullet::toBullet(axis), float(random(0, 3))));
+        btRigidBody* body =
+            world.add(shape, 1, {0, 0, radius + 0.2f * h}, btQuaternion(bullet::toBullet(axis), float(random(0, 3))));
         world.run(3);
         CHECK(lowest(collider->mesh(), body->getWorldTransform()) / h == Approx(0).margin(0.1));
     }

@@ -283,6 +283,14 @@ TEST_CASE("bodies apart have no contact and cost next to nothing") {
     REQUIRE(report.beyondBand == 0);
 }
 
+TEST_CASE("a margin that is no number, or no length for a body of this size, is refused") {
+    const Mesh mesh = shapes::box({1, 1, 1});
+    const LevelSet field = build(mesh, {.voxelSize = 0.25f});
+    for (const float margin : {std::numeric_limits<float>::quiet_NaN(), 251.f, 1e30f})
+        CHECK_THROWS_AS(Collider(mesh, field, {.margin = margin}), std::invalid_argument);
+    CHECK(Collider(mesh, field, {.margin = 249}).margin() == 249);
+}
+
 TEST_CASE("contacts that look along the surface of their point are left out where asked") {
     const unsigned seed = test::seed();
     CAPTURE(seed);
