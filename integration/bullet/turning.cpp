@@ -86,7 +86,10 @@ std::optional<Ahead> turnAhead(const Contact& contact, const Side& a, const Side
                     otherThen = its.centre + itsArmThen - surface->distance * normal;
     const float seen = seconds * normal.dot(velocity.at(ownThen) - its.at(otherThen)),
                 left = surface->distance + seconds * leaving - seen;
-    const float distance = std::max(left, std::min(contact.distance, 0.f));
+    // what touches and goes on to do so would be let down where something else ends the turn
+    const bool touches = contact.distance <= 0;
+    if (touches && seen <= 0) return std::nullopt;
+    const float distance = std::max(left, touches ? contact.distance : 0);
     if (isOfB) return Ahead{otherThen, ownThen, -normal, distance};
     return Ahead{ownThen, otherThen, normal, distance};
 }
