@@ -432,21 +432,22 @@ ContactReport addContacts(const Placed& a, const Placed& b, const ContactOptions
         const bool apart = touch.distance > 0 && touch.approach == 0 && !point.isSharp;
         return options.keeps(-glm::dot(normal, body.pose.rotation * point.normal), apart);
     };
-    const auto isPointOf = [](const Placed& body, std::uint32_t feature) {
-        return feature < body.collider.points().points().size();
+    // of points, not of places between them
+    const auto turningRadiusOf = [](const Placed& body, std::uint32_t feature) {
+        return feature < body.collider.points().points().size() ? 0.f : -1.f;
     };
     const auto addOfA = [&](std::uint32_t index, const SurfacePoint& point, const Touch& touch) {
         const glm::vec3 normal = outwardNormal(b, touch, a, point);
         if (!opposes(normal, a, point, touch)) return;
         const float distance = touch.distance * b.scale;
         contacts.push_back({a.pose.toWorld(a.scale * point.position) - distance * normal, normal, distance, index,
-                            touch.approach * b.scale, isPointOf(a, index)});
+                            touch.approach * b.scale, turningRadiusOf(a, index)});
     };
     const auto addOfB = [&](std::uint32_t index, const SurfacePoint& point, const Touch& touch) {
         const glm::vec3 normal = outwardNormal(a, touch, b, point);
         if (!opposes(normal, b, point, touch)) return;
         contacts.push_back({b.pose.toWorld(b.scale * point.position), -normal, touch.distance * a.scale,
-                            index | featureOfB, touch.approach * a.scale, isPointOf(b, index)});
+                            index | featureOfB, touch.approach * a.scale, turningRadiusOf(b, index)});
     };
     const std::size_t first = contacts.size();
     visitA(PointsInField(a, b, options), report, addOfA);
@@ -479,7 +480,7 @@ void settle(Contact& contact, const Placed& a, const Placed& b) {
         const glm::vec3 way = *onA - *onB;
         const float distance = glm::length(way);
         const glm::vec3 normal = distance > shortest * voxel ? way / distance : contact.normal;
-        return Contact{*onB, normal, distance, contact.feature, contact.approach, contact.turns};
+        return Contact{*onB, normal, distance, contact.feature, contact.approach, contact.turningRadius};
     };
     glm::vec3 before(0);  // how far the place went in the last turn
     for (int turn = 0; turn < settlingTurns; ++turn) {

@@ -98,9 +98,9 @@ struct Contact {
     std::uint32_t feature;
     /// What the bodies' motion takes off the distance, where it takes any point farther than the margin [m].
     float approach = 0;
-    /// Whether its place turns with the body that the feature is of; else it is where two surfaces are nearest to each
-    /// other, and stays so while they roll.
-    bool turns = false;
+    /// Where its place turns with the body that the feature is of: 0, or what a corner or edge that turns so is rounded
+    /// by [m]. Else, where two surfaces are nearest to each other, and stay so while they roll: negative.
+    float turningRadius = -1;
 
     /// What the motion leaves of the distance if nothing stops it [m].
     float remaining() const { return distance - approach; }

@@ -106,8 +106,9 @@ class Local {
         if (answer.where == Answer::inside) ++report.beyondBand;
         if (answer.distance - radius > margin) return probeOnWay(point, radius, feature, margin, answer.distance);
         if (answer.where != Answer::near) return std::nullopt;
-        return contact(point - answer.distance * answer.normal, answer.normal, answer.distance - radius, feature,
-                       approach(point, answer.normal, margin));
+        return turning(contact(point - answer.distance * answer.normal, answer.normal, answer.distance - radius,
+                               feature, approach(point, answer.normal, margin)),
+                       radius);
     }
 
     /// An edge of the other body, or the middle of one that is round.
@@ -177,6 +178,11 @@ class Local {
                                           const Answer& atTo, float margin) const;
 
   private:
+    static Contact turning(Contact contact, float radius) {
+        contact.turningRadius = radius;
+        return contact;
+    }
+
     /// Whether a straight line gets as near as this to the box around the surface.
     bool comesNear(const glm::vec3& from, const glm::vec3& to, float reach) const {
         const Bounds& bounds = collider_.bounds();
@@ -196,8 +202,9 @@ class Local {
         const auto hit = radius > 0 ? field_.sphereCast(ray, radius / scale_) : field_.raycast(ray);
         if (!hit) return std::nullopt;
         const float gap = glm::dot(point - scale_ * hit->position, hit->normal);
-        return contact(point - gap * hit->normal, hit->normal, std::max(gap - radius, 0.f), feature,
-                       -glm::dot(way, hit->normal));
+        return turning(contact(point - gap * hit->normal, hit->normal, std::max(gap - radius, 0.f), feature,
+                               -glm::dot(way, hit->normal)),
+                       radius);
     }
 
     /// By the triangles, in the band.
@@ -330,13 +337,13 @@ class Touching {
             const glm::vec3 place = intoField(near.core);
             if (auto deeper = downhill(near, place, local_.at(place))) {
                 deeper->feature = feature;
-                deeper->turns = true;
+                deeper->turningRadius = 0;
                 contacts.push_back(*deeper);
                 return;
             }
         }
         contacts.push_back(local_.contact(position, normal, near.distance, feature, approach));
-        contacts.back().turns = true;
+        contacts.back().turningRadius = 0;
     }
 
     /// The convex body's own corners and edges in the field.
@@ -346,10 +353,8 @@ class Touching {
         for (std::uint32_t i = 0; i < corners.size(); ++i) {
             const glm::vec3 point = intoField(corners[i]);
             answers.push_back(local_.at(point, convex_.radius(i)));
-            if (auto found = local_.probe(point, answers[i], convex_.radius(i), i, margin_, report)) {
-                found->turns = convex_.radius(i) == 0;
+            if (const auto found = local_.probe(point, answers[i], convex_.radius(i), i, margin_, report))
                 contacts.push_back(*found);
-            }
         }
         auto number = static_cast<std::uint32_t>(corners.size());
         for (const Convex::Edge& edge : convex_.edges()) {
@@ -407,7 +412,7 @@ class Touching {
         const glm::vec3 normal = -(toField_ * met->normal);
         if (!opposition.keeps(glm::dot(normal, point.normal), false)) return;
         contacts.push_back(local_.contact(position, normal, met->gap, feature, -glm::dot(met->normal, way)));
-        contacts.back().turns = true;
+        contacts.back().turningRadius = 0;
     }
 
     /// Where sharp edges of the field go deeper into a round body from a point that touches before they come up again.
@@ -694,9 +699,10 @@ class TriangleProbes : public btTriangleCallback {
             if (lies && isNearest && height <= margin_) {
                 ++report_.pointsTested;
                 found = local_.contact(place, normal, height, 0, local_.approach(below, normal, margin_));
-                found->turns = true;
+                found->turningRadius = 0;
             } else {
                 found = local_.probe(below, answer, 0, 0, margin_, report_);
+                if (found) found->turningRadius = -1;  // it stays below the point
             }
             if (found) overFaces_.push_back({index, face.id, *found});
         });
@@ -752,8 +758,7 @@ ContactReport collidePlane(const glm::vec3& normal, float offset, const Motion& 
         const float approach = local.approach(field.scale * point.position, -up, margin) / field.scale;
         if (distance > std::max(reach, approach)) return;
         const glm::vec3 position = field.pose.toWorld(field.scale * point.position);
-        contacts.push_back(
-            {position, -normal, field.scale * distance, index | featureOfB, field.scale * approach, true});
+        contacts.push_back({position, -normal, field.scale * distance, index | featureOfB, field.scale * approach, 0});
     });
     if (!measured || !field.collider.body().mesh) return report;
     const auto& vertices = field.collider.body().mesh->points;

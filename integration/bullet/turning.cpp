@@ -57,13 +57,15 @@ std::optional<Surface> surfaceAt(const Side& side, const Surface& contact, const
 }  // namespace
 
 std::optional<Ahead> turnAhead(const Contact& contact, const Side& a, const Side& b, const Continuity& continuity) {
-    if (!contact.turns) return std::nullopt;
+    if (contact.turningRadius < 0) return std::nullopt;
     const bool isOfB = contact.feature & featureOfB;
     const Side &own = isOfB ? b : a, &other = isOfB ? a : b;
     const Velocity velocity = velocityOf(*own.object), its = velocityOf(*other.object);
     const btVector3 fromB = toBullet(contact.normal), outward = isOfB ? -fromB : fromB;
-    const btVector3 onB = toBullet(contact.position), place = isOfB ? onB : onB + contact.distance * fromB;
-    const btVector3 arm = place - velocity.centre, itsArm = place - its.centre;
+    // what turns is the middle of the ball that a corner is rounded by
+    const float radius = contact.turningRadius, height = contact.distance + radius;
+    const btVector3 onB = toBullet(contact.position), middle = onB + (isOfB ? radius : height) * outward;
+    const btVector3 arm = middle - velocity.centre, itsArm = middle - its.centre;
 
     const auto mostSeconds = [&](const btVector3& spin, const btVector3& arm) {
         const float most =
@@ -74,18 +76,18 @@ std::optional<Ahead> turnAhead(const Contact& contact, const Side& a, const Side
     const float way = seconds * std::max(velocity.angular.cross(arm).length(), its.angular.cross(itsArm).length());
     if (!(way > hardlyTurned * continuity.sameWithin)) return std::nullopt;
 
-    // From the other body's centre the place goes along its surface; towards it, that is the solver's business.
+    // From the other body's centre it goes along that one's surface; towards it, that is the solver's business.
     const btVector3 armThen = turned(arm, velocity.angular, seconds), passing = velocity.linear - its.linear;
     const float leaving = outward.dot(passing);
     const btVector3 itsArmThen = itsArm + armThen - arm + seconds * (passing - leaving * outward);
     const auto surface =
-        surfaceAt(other, {outward, contact.distance}, place, its.centre + turned(itsArmThen, its.angular, -seconds));
+        surfaceAt(other, {outward, height}, middle, its.centre + turned(itsArmThen, its.angular, -seconds));
     if (!surface) return std::nullopt;
     const btVector3 normal = turned(surface->normal, its.angular, seconds);
-    const btVector3 ownThen = velocity.centre + armThen,
+    const btVector3 ownThen = velocity.centre + armThen - radius * normal,
                     otherThen = its.centre + itsArmThen - surface->distance * normal;
     const float seen = seconds * normal.dot(velocity.at(ownThen) - its.at(otherThen)),
-                left = surface->distance + seconds * leaving - seen;
+                left = surface->distance - radius + seconds * leaving - seen;
     // what touches and goes on to do so would be let down where something else ends the turn
     const bool touches = contact.distance <= 0;
     if (touches && seen <= 0) return std::nullopt;
