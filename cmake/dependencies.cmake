@@ -14,6 +14,7 @@ find_package(glm REQUIRED)
 find_package(OpenVDB REQUIRED)
 find_package(assimp REQUIRED)
 find_package(hwy REQUIRED)
+find_package(ZLIB REQUIRED)
 find_package(fmt REQUIRED)
 find_package(OpenCL REQUIRED)
 

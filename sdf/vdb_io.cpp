@@ -5,12 +5,15 @@
 #include <openvdb/io/File.h>
 #include <openvdb/io/Stream.h>
 #include <openvdb/tree/LeafManager.h>
+#include <zlib.h>
 
 #include <algorithm>
 #include <cmath>
 #include <fstream>
 #include <functional>
 #include <stdexcept>
+#include <string>
+#include <vector>
 
 #include "sdf/atomic_file.h"
 #include "sdf/grids.h"
@@ -44,6 +47,51 @@ void requireNumbers(const openvdb::FloatGrid& grid) {
         throw std::invalid_argument(fmt::format("grid '{}' holds a distance that is no finite number", grid.getName()));
 }
 
+/// What our files end with, behind all that OpenVDB reads: damage is found before it gets to see it, since its decoder
+/// of Blosc blocks trusts them.
+constexpr std::string_view sealName = "bilayer crc32 ";
+constexpr std::size_t sealSize = sealName.size() + 9;  // eight digits and a line feed
+
+std::string sealOf(std::istream& stream, std::uintmax_t size) {
+    std::vector<char> piece(std::size_t(1) << 20);
+    uLong sum = crc32(0, nullptr, 0);
+    while (size > 0) {
+        const auto count = std::size_t(std::min<std::uintmax_t>(size, piece.size()));
+        stream.read(piece.data(), std::streamsize(count));
+        sum = crc32(sum, reinterpret_cast<const Bytef*>(piece.data()), uInt(count));
+        size -= count;
+    }
+    return fmt::format("{}{:08x}\n", sealName, sum);
+}
+
+std::ifstream opened(const std::filesystem::path& path) {
+    std::ifstream stream(path, std::ios::binary);
+    stream.exceptions(std::ios::failbit | std::ios::badbit);
+    return stream;
+}
+
+void seal(const std::filesystem::path& path) {
+    std::ifstream written = opened(path);
+    const std::string end = sealOf(written, std::filesystem::file_size(path));
+    std::ofstream stream(path, std::ios::binary | std::ios::app);
+    stream.exceptions(std::ios::failbit | std::ios::badbit);
+    stream << end;
+    stream.close();
+}
+
+/// Files of others have no seal. Throws std::runtime_error where there is one that does not hold.
+void requireSeal(const std::filesystem::path& path) {
+    const std::uintmax_t size = std::filesystem::file_size(path);
+    if (size < sealSize) return;
+    std::ifstream stream = opened(path);
+    std::string end(sealSize, ' ');
+    stream.seekg(std::streamoff(size - sealSize));
+    stream.read(end.data(), std::streamsize(sealSize));
+    if (!end.starts_with(sealName)) return;
+    stream.seekg(0);
+    if (sealOf(stream, size - sealSize) != end) throw std::runtime_error("it is not as it was written");
+}
+
 }  // namespace
 
 void writeGrids(const std::filesystem::path& path, const openvdb::GridCPtrVec& grids) {
@@ -53,6 +101,7 @@ void writeGrids(const std::filesystem::path& path, const openvdb::GridCPtrVec& g
         stream.exceptions(std::ios::failbit | std::ios::badbit);
         openvdb::io::Stream(stream).write(grids);
         stream.close();
+        seal(file.temporary());
     } catch (const std::exception&) {
         throw std::runtime_error(fmt::format("{}: cannot be written (is the disk full?)", path.string()));
     }
@@ -83,8 +132,8 @@ LevelSet readVdb(const std::filesystem::path& path) {
         throw std::runtime_error(fmt::format("{}: no such file", path.string()));
     openvdb::GridPtrVec grids;
     try {
-        std::ifstream stream(path, std::ios::binary);
-        stream.exceptions(std::ios::failbit | std::ios::badbit);
+        requireSeal(path);
+        std::ifstream stream = opened(path);
         // delayed loading would leave the values, and any damage to them, in the file
         grids = *openvdb::io::Stream(stream, /*delayLoad=*/false).getGrids();
     } catch (const std::exception& error) {

@@ -15,13 +15,14 @@ struct VdbOptions {
 float storedErrorBound(const LevelSet& levelSet, const VdbOptions& options);
 
 /// Writes the grids "distance" and, where present, "triangle" and a body's "contact_points": whole or not at all (a
-/// temporary file beside the target is renamed at the end). Throws std::runtime_error that names the file when it
-/// cannot be written.
+/// temporary file beside the target is renamed at the end), and a checksum behind them, which OpenVDB passes over.
+/// Throws std::runtime_error that names the file when it cannot be written.
 void writeVdb(const std::filesystem::path& path, const LevelSet& levelSet, const VdbOptions& options = {});
 
 /// Reads the first level set of a .vdb file, from bilayer or elsewhere, with its grids of triangles and of a body's
 /// points if it has them.
-/// Throws std::runtime_error that names the file when it cannot be read, is truncated, or holds no level set.
+/// Throws std::runtime_error that names the file when it cannot be read, is truncated, is not what its checksum says
+/// that was written, or holds no level set.
 LevelSet readVdb(const std::filesystem::path& path);
 
 }  // namespace bilayer

@@ -25,6 +25,11 @@ btCollisionAlgorithm* make(const btCollisionAlgorithmConstructionInfo& info, Arg
     return new (memory) Algorithm(info, std::forward<Arguments>(arguments)...);
 }
 
+/// Whether Bullet asks on its way through a compound that we look after; else it is a user, in a callback.
+bool isLeftOut(const StepState& state, const btCollisionObjectWrapper& first, const btCollisionObjectWrapper& second) {
+    return state.leavesFields && (first.m_parent || second.m_parent);
+}
+
 /// A field and a shape that is no compound.
 class PairAlgorithm : public FieldAlgorithm {
   public:
@@ -74,9 +79,9 @@ struct CreatePair : btCollisionAlgorithmCreateFunc {
     CreatePair(bool bIsSecond, StepState& state) : bIsSecond(bIsSecond), state(state) {}
 
     btCollisionAlgorithm* CreateCollisionAlgorithm(btCollisionAlgorithmConstructionInfo& info,
-                                                   const btCollisionObjectWrapper*,
-                                                   const btCollisionObjectWrapper*) override {
-        if (state.leavesFields) return make<btEmptyAlgorithm>(info);
+                                                   const btCollisionObjectWrapper* first,
+                                                   const btCollisionObjectWrapper* second) override {
+        if (isLeftOut(state, *first, *second)) return make<btEmptyAlgorithm>(info);
         return make<PairAlgorithm>(info, bIsSecond, state);
     }
 
@@ -91,11 +96,11 @@ struct CreateCompound : btCollisionAlgorithmCreateFunc {
     btCollisionAlgorithm* CreateCollisionAlgorithm(btCollisionAlgorithmConstructionInfo& info,
                                                    const btCollisionObjectWrapper* first,
                                                    const btCollisionObjectWrapper* second) override {
+        const bool ours = !isLeftOut(state, *first, *second) &&
+                          (holdsField(*first->getCollisionShape()) || holdsField(*second->getCollisionShape()));
+        if (!ours) return ofBullet.CreateCollisionAlgorithm(info, first, second);
+        const LeftToBullet left(state);  // it makes some of its children's at once
         btCollisionAlgorithm* rest = ofBullet.CreateCollisionAlgorithm(info, first, second);
-        // one within another compound has been gone through from there
-        if (state.leavesFields ||
-            !(holdsField(*first->getCollisionShape()) || holdsField(*second->getCollisionShape())))
-            return rest;
         return make<CompoundAlgorithm>(info, rest, state);
     }
 

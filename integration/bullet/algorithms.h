@@ -5,6 +5,7 @@
 #include <BulletCollision/CollisionDispatch/btCollisionDispatcher.h>
 
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "integration/bullet/dispatcher.h"
@@ -18,7 +19,7 @@ struct StepState {
     float seconds = 0;             ///< that it takes; 0 between steps
     bool foreseesAll = true;
     bool isForeign = false;     ///< the dispatcher is another one, which does not tell its steps
-    bool leavesFields = false;  ///< Bullet goes through a compound, whose fields are not its business
+    bool leavesFields = false;  ///< Bullet goes through a compound whose fields are our business
 
     /// Contact tests ask for a distance, or hand over a result of their own kind, and not within a step.
     bool isTest(const btManifoldResult& result) const;
@@ -27,6 +28,19 @@ struct StepState {
     /// How far ahead the motion of two shapes is looked at. What goes farther than its own size is the business of a
     /// NoPassing, which does not see what the user moves, nor inside of what locks.
     float ahead(const Side& a, const Side& b, float step) const;
+};
+
+/// Lets Bullet go through a compound, and leaves its fields out as long as this lives.
+class LeftToBullet {
+  public:
+    explicit LeftToBullet(StepState& state) : state_(state), before_(std::exchange(state.leavesFields, true)) {}
+    ~LeftToBullet() { state_.leavesFields = before_; }
+    LeftToBullet(const LeftToBullet&) = delete;
+    LeftToBullet& operator=(const LeftToBullet&) = delete;
+
+  private:
+    StepState& state_;
+    bool before_;
 };
 
 /// Two shapes to be collided, the second of which is a field.

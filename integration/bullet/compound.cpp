@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <glm/geometric.hpp>
+#include <span>
 #include <utility>
 
 #include "integration/bullet/convert.h"
@@ -86,7 +87,8 @@ class Descent {
 
     /// In the order of their indices.
     std::vector<Children> operator()(const Side& first, const Side& second) {
-        descend(first, second);
+        areCompounds_ = first.shape->isCompound() && second.shape->isCompound();
+        descend({first, holdsField(*first.shape)}, {second, holdsField(*second.shape)});
         std::sort(found_.begin(), found_.end(), [](const Children& a, const Children& b) {
             return std::tie(a.firstPath, a.secondPath) < std::tie(b.firstPath, b.secondPath);
         });
@@ -94,38 +96,48 @@ class Descent {
     }
 
   private:
-    void descend(const Side& first, const Side& second) {
-        if (!holdsField(*first.shape) && !holdsField(*second.shape)) return;
-        if (first.shape->isCompound())
-            visit(first, second, firstPath_, [&](const Side& child) { descend(child, second); });
-        else if (second.shape->isCompound())
-            visit(second, first, secondPath_, [&](const Side& child) { descend(first, child); });
-        else
-            found_.push_back({firstPath_, secondPath_, first, second});
+    struct Part {
+        Side side;
+        bool holdsField;
+    };
+
+    void descend(const Part& first, const Part& second) {
+        if (!first.holdsField && !second.holdsField) return;
+        if (first.side.shape->isCompound())
+            visit(first, second, firstPath_, [&](const Part& child) { descend(child, second); });
+        else if (second.side.shape->isCompound())
+            visit(second, first, secondPath_, [&](const Part& child) { descend(first, child); });
+        else if (!isRefused(*first.side.shape, *second.side.shape))
+            found_.push_back({firstPath_, secondPath_, first.side, second.side});
     }
 
     template <class Visit>
-    void visit(const Side& compound, const Side& other, CompoundAlgorithm::Path& path, Visit&& visit) {
-        Box around = sweptBoxOf(other);
+    void visit(const Part& compound, const Part& other, CompoundAlgorithm::Path& path, Visit&& visit) {
+        Box around = sweptBoxOf(other.side);
         around.grow(within_);
         Box from = around;  // where children are that come to it
-        from.grow(glm::length(compound.motion().way) + turningOf(compound, boxOf(compound)));
-        visitChildren(compound, from, [&](int index) {
-            const Side child = childOf(compound, index);
-            if (!sweptBoxOf(child).meets(around) || isRefused(*child.shape, *other.shape)) return;
+        from.grow(glm::length(compound.side.motion().way) + turningOf(compound.side, boxOf(compound.side)));
+        visitChildren(compound.side, from, [&](int index) {
+            const Side child = childOf(compound.side, index);
+            const bool holds = compound.holdsField && holdsField(*child.shape);
+            if (!(holds || other.holdsField) || !sweptBoxOf(child).meets(around)) return;
             path.push_back(index);
-            visit(child);
+            visit({child, holds});
             path.pop_back();
         });
     }
 
-    /// By the callback that Bullet asks about children.
-    static bool isRefused(const btCollisionShape& child, const btCollisionShape& other) {
-        if (other.isCompound()) return false;  // before it has come to that one's children
-        return gCompoundChildShapePairCallback && !gCompoundChildShapePairCallback(&other, &child);
+    /// By the callbacks that Bullet asks about children: another one, in another order, where both are compounds.
+    bool isRefused(const btCollisionShape& first, const btCollisionShape& second) const {
+        if (areCompounds_)
+            return gCompoundCompoundChildShapePairCallback && !gCompoundCompoundChildShapePairCallback(&first, &second);
+        if (!gCompoundChildShapePairCallback) return false;
+        return firstPath_.empty() ? !gCompoundChildShapePairCallback(&first, &second)
+                                  : !gCompoundChildShapePairCallback(&second, &first);
     }
 
     float within_;
+    bool areCompounds_ = false;
     CompoundAlgorithm::Path firstPath_, secondPath_;
     std::vector<Children> found_;
 };
@@ -151,9 +163,15 @@ class Unwrapped {
     const btCollisionObjectWrapper* before_[2];
 };
 
-btCollisionObjectWrapper wrapOf(const Side& child, const btCollisionObjectWrapper& parent,
-                                const CompoundAlgorithm::Path& path) {
-    return {&parent, child.shape, child.object, child.transform, parent.m_partId, path.empty() ? -1 : path.back()};
+/// Calls used(wrapper) with the wrapper of a child, whose parents are those of the compounds around it.
+template <class Used>
+void withWrapper(const btCollisionObjectWrapper& parent, std::span<const int> path, Used&& used) {
+    if (path.empty()) return used(parent);
+    const auto& compound = static_cast<const btCompoundShape&>(*parent.getCollisionShape());
+    const btTransform place = parent.getWorldTransform() * compound.getChildTransform(path.front());
+    const btCollisionObjectWrapper child(&parent, compound.getChildShape(path.front()), parent.getCollisionObject(),
+                                         place, -1, path.front());
+    withWrapper(child, path.subspan(1), used);
 }
 
 }  // namespace
@@ -175,11 +193,15 @@ CompoundAlgorithm::~CompoundAlgorithm() {
     m_dispatcher->freeCollisionAlgorithm(rest_);
 }
 
+CompoundAlgorithm::Key CompoundAlgorithm::keyOf(const Children& children) {
+    return {children.firstPath, children.secondPath, isField(*children.second.shape)};
+}
+
 Task CompoundAlgorithm::taskOf(const Children& children) {
     const bool bIsSecond = isField(*children.second.shape);
     Side a = bIsSecond ? children.first : children.second, b = bIsSecond ? children.second : children.first;
     a.seconds = b.seconds = state_.ahead(a, b, a.seconds);
-    std::shared_ptr<Pair>& pair = pairs_[{children.firstPath, children.secondPath, bIsSecond}];
+    std::shared_ptr<Pair>& pair = (*pairs_)[keyOf(children)];
     if (!pair) pair = std::make_shared<Pair>(*m_dispatcher, state_.running);
     return {pair, a, b};
 }
@@ -192,33 +214,37 @@ void CompoundAlgorithm::gather(const btCollisionObjectWrapper& first, const btCo
 
 void CompoundAlgorithm::processCollision(const btCollisionObjectWrapper* first, const btCollisionObjectWrapper* second,
                                          const btDispatcherInfo& info, btManifoldResult* result) {
-    state_.leavesFields = true;
-    rest_->processCollision(first, second, info, result);
-    state_.leavesFields = false;
-
+    {
+        const LeftToBullet left(state_);
+        rest_->processCollision(first, second, info, result);
+    }
     const bool isTest = state_.isTest(*result);
     const float seconds = state_.secondsOf(info, isTest), within = result->m_closestPointDistanceThreshold;
-    std::map<Key, std::shared_ptr<Pair>> met;
+    Pairs met;
+    const std::shared_ptr<Pairs> pairs = pairs_;  // a callback of the user's may end this algorithm
     for (const Children& children : Descent(within)(Side(*first, seconds), Side(*second, seconds))) {
-        const auto& [pair, a, b] = taskOf(children);
-        if (!pair->isReady()) {
+        const Task task = taskOf(children);
+        if (!task.pair->isReady()) {
             if (isTest)
-                pair->test(a, b, within);
+                task.pair->test(task.a, task.b, within);
             else
-                pair->collide(a, b);
+                task.pair->collide(task.a, task.b);
         }
-        const btCollisionObjectWrapper one = wrapOf(children.first, *first, children.firstPath),
-                                       two = wrapOf(children.second, *second, children.secondPath);
-        const Unwrapped unwrapped(*result, one, two);
-        pair->commit(*a.object, *b.object, seconds, *result);
-        met[{children.firstPath, children.secondPath, isField(*children.second.shape)}] = pair;
+        withWrapper(*first, children.firstPath, [&](const btCollisionObjectWrapper& one) {
+            withWrapper(*second, children.secondPath, [&](const btCollisionObjectWrapper& two) {
+                const Unwrapped unwrapped(*result, one, two);
+                task.pair->commit(*task.a.object, *task.b.object, seconds, *result);
+            });
+        });
+        if (pairs.use_count() == 1) return;
+        met.emplace(keyOf(children), task.pair);
     }
-    pairs_ = std::move(met);
+    *pairs_ = std::move(met);
 }
 
 void CompoundAlgorithm::getAllContactManifolds(btManifoldArray& manifolds) {
     rest_->getAllContactManifolds(manifolds);
-    for (const auto& [key, pair] : pairs_)
+    for (const auto& [key, pair] : *pairs_)
         for (btPersistentManifold* manifold : pair->manifolds().all()) manifolds.push_back(manifold);
 }
 

@@ -46,11 +46,14 @@ class CompoundAlgorithm : public FieldAlgorithm {
     /// Of two children, and whether the second one is the field that the other is collided with.
     using Key = std::tuple<Path, Path, bool>;
 
+    using Pairs = std::map<Key, std::shared_ptr<Pair>>;
+
+    static Key keyOf(const Children& children);
     Task taskOf(const Children& children);
 
     btCollisionAlgorithm* rest_;
     StepState& state_;
-    std::map<Key, std::shared_ptr<Pair>> pairs_;
+    std::shared_ptr<Pairs> pairs_ = std::make_shared<Pairs>();
 };
 
 }  // namespace bilayer::bullet

@@ -422,20 +422,17 @@ struct Step {
 /// The solver takes the gap that is left from the speed of a bounce. So what meets the surface in this step bounces as
 /// if it touched already, and what comes nearer only keeps its speed. What lies there, or comes no faster than its
 /// weight takes it there in two steps, does not bounce.
-/// @return whether it bounces in this step
-bool bounce(btManifoldPoint& point, const Step& step) {
+void bounce(btManifoldPoint& point, const Step& step) {
     if (!(step.seconds > 0 && point.m_distance1 > 0 && point.m_combinedRestitution > 0) || point.m_appliedImpulse > 0)
-        return false;
+        return;
     const btVector3& normal = point.m_normalWorldOnB;
-    const float speed = normal.dot(step.b.at(point.m_positionWorldOnB) - step.a.at(point.m_positionWorldOnB));
+    const float speed = normal.dot(step.b.at(point.m_positionWorldOnB) - step.a.at(point.m_positionWorldOnA));
     const float gain = normal.dot(step.gain);
-    if (speed <= 2 * std::abs(gain)) return false;
-    const bool meets = point.m_distance1 <= step.seconds * (speed + gain);
-    if (meets)
+    if (speed <= 2 * std::abs(gain)) return;
+    if (point.m_distance1 <= step.seconds * (speed + gain))
         point.m_distance1 = 0;
     else
         point.m_combinedRestitution = 0;
-    return meets;
 }
 
 /// A contact that turns in the step goes where it is going to be. What it drifts meanwhile is no slip.
@@ -587,7 +584,8 @@ void Manifolds::write(std::span<const Patch> patches, std::span<const std::optio
             written = inherit(*manifold, i, continuity);
             tellAdded(point, *manifold, result);
             if (point.m_contactMotion1 != 0 || point.m_contactMotion2 != 0) letGo(*manifold, point, written);
-            if (const auto& there = ahead[first + std::size_t(i)]; !bounce(point, step) && there) put(point, *there);
+            if (const auto& there = ahead[first + std::size_t(i)]) put(point, *there);
+            bounce(point, step);
             tellProcessed(point, *manifold);
         }
         manifold->setContactBreakingThreshold(continuity.sameWithin);

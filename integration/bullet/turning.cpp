@@ -22,6 +22,8 @@ constexpr float mostTurn = 0.5f, turnsOff = 0.25f;
 // Where a field looks another way than a contact by more than this cosine tells, it says nothing about it: that is one
 // of an edge.
 constexpr float sameNormal = 0.95f;
+// and where it looks another way there by more than this, that is another face.
+constexpr float likeNormal = 0.8f;
 
 btVector3 turned(const btVector3& arm, const btVector3& spin, float seconds) {
     const float speed = spin.length();
@@ -47,17 +49,23 @@ std::optional<Surface> surfaceAt(const Side& side, const Surface& contact, const
         if (!sample.inBand) return std::nullopt;
         return touchInBand(field, at, sample, body.collider.asksTriangles(at));
     };
-    const auto here = touchAt(place), there = touchAt(nearby);
-    if (!here || !there || there->normal == glm::vec3(0)) return std::nullopt;
+    // as high as the contact, since deeper down thin walls have another side
+    const float rise = contact.normal.dot(nearby - place);
+    const auto here = touchAt(place), there = touchAt(nearby - rise * contact.normal);
+    if (!here || !there) return std::nullopt;
     const auto inWorld = [&](const glm::vec3& normal) { return toBullet(body.pose.rotation * normal); };
     if (!(inWorld(here->normal).dot(contact.normal) > sameNormal)) return plane;
-    return Surface{inWorld(there->normal), contact.distance + body.scale * (there->distance - here->distance)};
+    const btVector3 normal = inWorld(there->normal);
+    const float alike = normal.dot(contact.normal);
+    if (!(alike > likeNormal)) return std::nullopt;
+    return Surface{normal, contact.distance + body.scale * (there->distance - here->distance) + alike * rise};
 }
 
 }  // namespace
 
 std::optional<Ahead> turnAhead(const Contact& contact, const Side& a, const Side& b, const Continuity& continuity) {
-    if (contact.turningRadius < 0) return std::nullopt;
+    // what touches is where it is: put behind a wheel, it would push it on
+    if (contact.turningRadius < 0 || contact.distance <= 0) return std::nullopt;
     const bool isOfB = contact.feature & featureOfB;
     const Side &own = isOfB ? b : a, &other = isOfB ? a : b;
     const Velocity velocity = velocityOf(*own.object), its = velocityOf(*other.object);
@@ -88,10 +96,7 @@ std::optional<Ahead> turnAhead(const Contact& contact, const Side& a, const Side
                     otherThen = its.centre + itsArmThen - surface->distance * normal;
     const float seen = seconds * normal.dot(velocity.at(ownThen) - its.at(otherThen)),
                 left = surface->distance - radius + seconds * leaving - seen;
-    // what touches and goes on to do so would be let down where something else ends the turn
-    const bool touches = contact.distance <= 0;
-    if (touches && seen <= 0) return std::nullopt;
-    const float distance = std::max(left, touches ? contact.distance : 0);
+    const float distance = std::max(left, 0.f);
     if (isOfB) return Ahead{otherThen, ownThen, -normal, distance};
     return Ahead{ownThen, otherThen, normal, distance};
 }

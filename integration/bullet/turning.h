@@ -13,7 +13,7 @@ namespace bilayer::bullet {
 /// bear its weight and brake it: at 60 steps a second a ball of 0.1 m that rolls at 0.3 m/s loses half of its
 /// speed in a second. So the contact of a point that turns with its body is handed over as it is going to be at the
 /// step's end.
-/// @return nothing where a contact does not turn, or by next to nothing, or touches and does not come off in the step
+/// @return nothing where a contact touches already, or does not turn, or by next to nothing
 std::optional<Ahead> turnAhead(const Contact& contact, const Side& a, const Side& b, const Continuity& continuity);
 
 }  // namespace bilayer::bullet

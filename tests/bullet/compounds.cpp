@@ -1,8 +1,9 @@
 // Fields as children of compounds.
-#include <BulletCollision/CollisionDispatch/btCompoundCollisionAlgorithm.h>
+#include <BulletCollision/CollisionDispatch/btCompoundCompoundCollisionAlgorithm.h>
 
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <vector>
 
 #include "world.h"
 
@@ -93,15 +94,86 @@ TEST_CASE("A compound lies on its fields and on its other children alike, until 
 
 TEST_CASE("Children that the user leaves out do not collide") {
     Shape ball(exactSphere(0.2f, h)), slab(exactBox({1, 1, 0.3f}, h));
-    btCompoundShape compound;
+    btCompoundShape compound, ground;
     compound.addChildShape(at({0, 0, 0}), &ball);
+    ground.addChildShape(at({0, 0, 0}), &slab);
+    const bool both = GENERATE(false, true), ofCompounds = GENERATE(false, true);
+    CAPTURE(both, ofCompounds);
+    World world;
+    world.add(both ? static_cast<btCollisionShape&>(ground) : slab, 0, {0, 0, -0.3f});
+    btRigidBody* body = world.add(compound, 1, {0, 0, 0.25f});
+    // Bullet asks another callback where both are compounds
+    (ofCompounds ? gCompoundCompoundChildShapePairCallback : gCompoundChildShapePairCallback) =
+        [](const btCollisionShape*, const btCollisionShape*) { return false; };
+    world.run(0.5f);
+    gCompoundChildShapePairCallback = gCompoundCompoundChildShapePairCallback = nullptr;
+    CHECK((body->getCenterOfMassPosition().z() < -0.5f) == (both == ofCompounds));
+}
+
+TEST_CASE("Each child makes its contacts once, with a tree of boxes or without") {
+    Shape box(exactBox({0.2f, 0.2f, 0.2f}, h)), slab(exactBox({1, 1, 0.3f}, h));
+    btStaticPlaneShape plane({0, 0, 1}, 0);
+    const bool hasTree = GENERATE(false, true), onField = GENERATE(false, true);
+    CAPTURE(hasTree, onField);
+    btCompoundShape compound(hasTree), ground(hasTree);
+    compound.addChildShape(at({0, 0, 0}), &box);
+    ground.addChildShape(at({0, 0, -0.3f}), &slab);
+    World world;
+    world.add(onField ? static_cast<btCollisionShape&>(ground) : plane, 0, {0, 0, 0});
+    world.add(compound, 1, {0, 0, 0.2f});
+    world.run(0.5f);
+    CHECK(world.dispatcher.statistics().pairs == 1);
+    CHECK(world.dispatcher.getNumManifolds() == 1);
+}
+
+namespace {
+
+/// What a callback sees of a contact, and does.
+struct Seen {
+    std::vector<int> indices;  ///< of the child and of the compounds around it
+    btDynamicsWorld* removesFrom = nullptr;
+} seen;
+
+bool look(btManifoldPoint&, const btCollisionObjectWrapper* first, int, int, const btCollisionObjectWrapper* second,
+          int, int) {
+    for (const btCollisionObjectWrapper* wrap : {first, second}) {
+        if (wrap->getCollisionObject()->isStaticObject()) continue;
+        seen.indices.clear();
+        for (; wrap->m_parent; wrap = wrap->m_parent) {
+            seen.indices.push_back(wrap->m_index);
+            const auto* compound = static_cast<const btCompoundShape*>(wrap->m_parent->getCollisionShape());
+            CHECK(compound->getChildShape(wrap->m_index) == wrap->getCollisionShape());
+        }
+        auto* body = const_cast<btRigidBody*>(btRigidBody::upcast(wrap->getCollisionObject()));
+        if (seen.removesFrom) seen.removesFrom->removeRigidBody(body);
+        seen.removesFrom = nullptr;
+    }
+    return true;
+}
+
+}  // namespace
+
+TEST_CASE("Users see which child touches, and may take its body away") {
+    Shape ball(exactSphere(0.2f, h)), slab(exactBox({1, 1, 0.3f}, h));
+    btSphereShape small(0.05f);
+    btCompoundShape inner, outer;
+    inner.addChildShape(at({0, 0, 0.3f}), &small);
+    inner.addChildShape(at({0, 0, 0}), &ball);
+    outer.addChildShape(at({0.3f, 0, 0.3f}), &small);
+    outer.addChildShape(at({-0.3f, 0, 0.3f}), &small);
+    outer.addChildShape(at({0, 0, 0}), &inner);
     World world;
     world.add(slab, 0, {0, 0, -0.3f});
-    btRigidBody* body = world.add(compound, 1, {0, 0, 0.25f});
-    gCompoundChildShapePairCallback = [](const btCollisionShape*, const btCollisionShape*) { return false; };
-    world.run(0.5f);
-    gCompoundChildShapePairCallback = nullptr;
-    CHECK(body->getCenterOfMassPosition().z() < -0.5f);
+    btRigidBody* body = world.add(outer, 1, {0, 0, 0.2f});
+    body->setCollisionFlags(body->getCollisionFlags() | btCollisionObject::CF_CUSTOM_MATERIAL_CALLBACK);
+    const bool removes = GENERATE(false, true);
+    CAPTURE(removes);
+    seen = {.indices = {}, .removesFrom = removes ? &world.dynamics : nullptr};
+    gContactAddedCallback = look;
+    world.run(0.1f);
+    gContactAddedCallback = nullptr;
+    CHECK(seen.indices == std::vector<int>{1, 2});
+    CHECK(world.dynamics.getNumCollisionObjects() == (removes ? 1 : 2));
 }
 
 TEST_CASE("A compound's children are collided in one batch with all other pairs") {

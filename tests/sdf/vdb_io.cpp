@@ -10,6 +10,7 @@
 #include "demos/shared/shapes.h"
 #include "sdf/build.h"
 #include "sdf/grids.h"
+#include "tests/support/random.h"
 #include "tests/support/support.h"
 
 using namespace bilayer;
@@ -117,6 +118,29 @@ TEST_CASE("truncated and foreign files are refused by name, wherever they are cu
     CHECK_THROWS_WITH(readVdb(test::scratch("text.vdb")), Catch::Contains("text.vdb"));
     CHECK_THROWS_WITH(readVdb("/nonexistent.vdb"), Catch::Contains("/nonexistent.vdb"));
     CHECK_THROWS_WITH(writeVdb("/nonexistent/a.vdb", torus()), Catch::Contains("/nonexistent/a.vdb"));
+}
+
+TEST_CASE("a file of ours with one wrong byte is refused, whichever it is, before OpenVDB reads it") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    test::Random random(seed);
+    writeVdb(test::scratch("whole.vdb"), torus());
+    const std::string whole = bytes(test::scratch("whole.vdb"));
+    const auto path = test::scratch("wrong_byte.vdb");
+    for (int i = 0; i < 500; ++i) {
+        const auto at = std::size_t(random(0, double(whole.size() - 23)));  // the checksum's line is 23 bytes long
+        std::string wrong = whole;
+        wrong[at] = char(wrong[at] ^ (1 << int(random(0, 8))));
+        std::ofstream(path, std::ios::binary) << wrong;
+        CAPTURE(at);
+        REQUIRE_THROWS_WITH(readVdb(path), Catch::Contains("wrong_byte.vdb") && Catch::Contains("damaged"));
+    }
+    // other programs need not care: OpenVDB reads the file, and what it writes has no checksum
+    openvdb::io::File file(test::scratch("whole.vdb").string());
+    file.open();
+    openvdb::io::File(test::scratch("again.vdb").string()).write(*file.getGrids());
+    CHECK(readVdb(test::scratch("again.vdb")).grids().distance->activeVoxelCount() ==
+          torus().grids().distance->activeVoxelCount());
 }
 
 TEST_CASE("a file without a level set is refused") {
