@@ -26,8 +26,8 @@ struct PointNode {
 };
 
 /// Points spread over a mesh's surface: every place of the surface has one within about `spacing` that looks about the
-/// same way, and where the surface is round lies no lower than about 0.05 `spacing`; convex corners and edges sharper than
-/// the surface around them keep theirs. Deterministic.
+/// same way, and where the surface is round lies no lower than about 0.05 `spacing`; convex corners and edges sharper
+/// than the surface around them keep theirs. Deterministic.
 class SurfacePoints {
   public:
     SurfacePoints() = default;

@@ -41,7 +41,6 @@ class PairAlgorithm : public FieldAlgorithm {
 
     void gather(const btCollisionObjectWrapper& first, const btCollisionObjectWrapper& second, float seconds,
                 std::vector<Task>& tasks) override {
-        if (locks(*first.getCollisionShape()) || locks(*second.getCollisionShape())) return;
         tasks.push_back(taskOf(first, second, seconds));
     }
 

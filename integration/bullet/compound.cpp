@@ -209,7 +209,7 @@ Task CompoundAlgorithm::taskOf(const Children& children) {
 void CompoundAlgorithm::gather(const btCollisionObjectWrapper& first, const btCollisionObjectWrapper& second,
                                float seconds, std::vector<Task>& tasks) {
     for (const Children& children : Descent(0)(Side(first, seconds), Side(second, seconds)))
-        if (const Task task = taskOf(children); !locks(*task.a.shape)) tasks.push_back(task);
+        tasks.push_back(taskOf(children));
 }
 
 void CompoundAlgorithm::processCollision(const btCollisionObjectWrapper* first, const btCollisionObjectWrapper* second,

@@ -13,8 +13,7 @@ namespace bilayer::bullet {
 /// Whether a shape is a field or a compound that holds one, at any depth.
 bool holdsField(const btCollisionShape& shape);
 
-/// GImpact counts locks while its triangles are read, without atomics: such pairs wait for their turn in Bullet's
-/// order.
+/// GImpact counts locks while its triangles are read, without atomics: such pairs are collided one after the other.
 bool locks(const btCollisionShape& shape);
 
 /// A compound and another shape, which may be one, too. Bullet's own algorithm collides the children of other kinds.

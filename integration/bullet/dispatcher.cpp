@@ -2,8 +2,10 @@
 
 #include <BulletCollision/BroadphaseCollision/btOverlappingPairCache.h>
 #include <BulletCollision/CollisionDispatch/btGhostObject.h>
-#include <tbb/parallel_for.h>
+#include <tbb/parallel_for_each.h>
+#include <tbb/parallel_invoke.h>
 
+#include <algorithm>
 #include <chrono>
 #include <optional>
 #include <utility>
@@ -85,13 +87,17 @@ void Dispatcher::dispatchAllCollisionPairs(btOverlappingPairCache* cache, const 
             if (const auto& [pair, a, b] = tasks[i]; isField(*a.shape))
                 numbers[i] = sampled.add(a.placed(), b.placed(), marginOf(a, b));
     const bool areSampled = sampled.sample();
-    tbb::parallel_for(std::size_t(0), tasks.size(), [&](std::size_t i) {
+    const auto collide = [&](std::size_t i) {
         const auto& [pair, a, b] = tasks[i];
         if (areSampled && numbers[i])
             pair->collide(a, b, sampled, *numbers[i]);
         else
             pair->collide(a, b);
-    });
+    };
+    std::vector<std::size_t> free, locking;
+    for (std::size_t i = 0; i < tasks.size(); ++i) (locks(*tasks[i].a.shape) ? locking : free).push_back(i);
+    tbb::parallel_invoke([&] { std::for_each(locking.begin(), locking.end(), collide); },
+                         [&] { tbb::parallel_for_each(free, collide); });
 
     btCollisionDispatcher::dispatchAllCollisionPairs(cache, info, dispatcher);
 

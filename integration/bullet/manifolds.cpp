@@ -584,7 +584,8 @@ void Manifolds::write(std::span<const Patch> patches, std::span<const std::optio
             written = inherit(*manifold, i, continuity);
             tellAdded(point, *manifold, result);
             if (point.m_contactMotion1 != 0 || point.m_contactMotion2 != 0) letGo(*manifold, point, written);
-            if (const auto& there = ahead[first + std::size_t(i)]) put(point, *there);
+            const bool isAsFound = point.m_normalWorldOnB == toBullet(patches[m].contacts[std::size_t(i)].normal);
+            if (const auto& there = ahead[first + std::size_t(i)]; there && isAsFound) put(point, *there);
             bounce(point, step);
             tellProcessed(point, *manifold);
         }
