@@ -195,14 +195,19 @@ class Gaps {
         normal = glm::normalize(normal);
         centre /= float(count_);
         extent_ = extentOf(contacts, group);
-        btVector3 first, second;
-        btPlaneSpace1(toBullet(normal), first, second);
-        const glm::vec3 x = toGlm(first), y = toGlm(second);
+        btVector3 along, across;
+        btPlaneSpace1(toBullet(normal), along, across);
+        const glm::vec3 x = toGlm(along), y = toGlm(across);
         std::fill(column(gap) + count_, column(gap) + padded_, std::numeric_limits<float>::max());
+        // What is on its way is stopped where it touches: it gets no deeper than what touches already, which must bear
+        // its part of a body that comes down aslant.
+        float first = 0;
+        for (const std::uint32_t i : group)
+            if (contacts[i].distance > 0) first = std::min(first, contacts[i].remaining());
         for (std::size_t k = 0; k < count_; ++k) {
             const Contact& contact = contacts[group[k]];
             const glm::vec3 turn = glm::cross(contact.position - centre, contact.normal);
-            column(gap)[k] = contact.remaining();
+            column(gap)[k] = contact.distance > 0 ? contact.remaining() - first : contact.distance;
             column(tiltX)[k] = glm::dot(turn, x);
             column(tiltY)[k] = glm::dot(turn, y);
             column(shiftX)[k] = extent_ * glm::dot(contact.normal, x);

@@ -15,8 +15,10 @@
 #include <span>
 
 #include "demos/shared/shapes.h"
+#include "integration/bullet/convert.h"
 #include "integration/bullet/manifolds.h"
 #include "sdf/build.h"
+#include "tests/support/random.h"
 #include "tests/support/support.h"
 #include "world.h"
 
@@ -573,6 +575,25 @@ TEST_CASE("What is about to land is met by all of its corners, finer than the fl
     for (int m = 0; m < world.dispatcher.getNumManifolds(); ++m)
         contacts += world.dispatcher.getManifoldByIndexInternal(m)->getNumContacts();
     CHECK(contacts == world.dispatcher.statistics().contactsKept);
+}
+
+TEST_CASE("What is small and falls by voxels in a step is borne on all sides, and comes to rest") {
+    const unsigned seed = test::seed();
+    const float size = GENERATE(0.01f, 0.03f), steps = GENERATE(60.f, 120.f);
+    CAPTURE(seed, size, steps);
+    Random random(seed);
+    const float voxel = size / 32, minor = 0.15f * size;
+    Shape ring(exactTorus(0.35f * size, minor, voxel));
+    btStaticPlaneShape plane({0, 0, 1}, 0);
+    for (int i = 0; i < 6; ++i) {
+        const glm::vec3 axis = random.direction();
+        World world;
+        world.add(plane, 0, {0, 0, 0});
+        btRigidBody* body =
+            world.add(ring, 0.1f, {0, 0, 0.8f * size}, btQuaternion(bullet::toBullet(axis), float(random(0.05, 0.45))));
+        for (float time = 0; time < 4; time += 1 / steps) world.dynamics.stepSimulation(1 / steps, 0);
+        CHECK(body->getWorldTransform().getOrigin().z() > minor - 0.5f * voxel);
+    }
 }
 
 TEST_CASE("However fast, nothing round passes a plate or gains energy, and nothing edged as long as it turns little") {
