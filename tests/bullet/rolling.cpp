@@ -98,10 +98,11 @@ TEST_CASE("A ball rolls on") {
         highest = std::max(highest, float(roller.body->getWorldTransform().getOrigin().z()) - radius);
     }
     // what its facets take, each of which it comes down on: those between points 1.4 voxels apart, at 0.3 m/s about a
-    // tenth in a second; and it does not hop
+    // tenth in a second; and it is not thrown up: at 3 m/s, which turns it by half a radian in a step, it lifts by 2
+    // mm, where straight ways would throw it up by 20
     CHECK(roller.body->getLinearVelocity().x() > 0.75f * speed);
     CHECK(roller.body->getLinearVelocity().x() < 1.02f * speed);
-    CHECK(highest < 0.3f * radius / 32);
+    CHECK(highest < 0.03f * radius);
 }
 
 TEST_CASE("Hulls roll over fields") {
