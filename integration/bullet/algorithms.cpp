@@ -66,6 +66,7 @@ class PairAlgorithm : public FieldAlgorithm {
     Task taskOf(const btCollisionObjectWrapper& first, const btCollisionObjectWrapper& second, float seconds) const {
         Side a(bIsSecond_ ? first : second, seconds), b(bIsSecond_ ? second : first, seconds);
         a.seconds = b.seconds = state_.ahead(a, b, seconds);
+        a.turnsAhead = b.turnsAhead = state_.foreseesAll;
         return {pair_, a, b};
     }
 

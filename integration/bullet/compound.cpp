@@ -201,6 +201,7 @@ Task CompoundAlgorithm::taskOf(const Children& children) {
     const bool bIsSecond = isField(*children.second.shape);
     Side a = bIsSecond ? children.first : children.second, b = bIsSecond ? children.second : children.first;
     a.seconds = b.seconds = state_.ahead(a, b, a.seconds);
+    a.turnsAhead = b.turnsAhead = state_.foreseesAll;
     std::shared_ptr<Pair>& pair = (*pairs_)[keyOf(children)];
     if (!pair) pair = std::make_shared<Pair>(*m_dispatcher, state_.running);
     return {pair, a, b};

@@ -65,7 +65,7 @@ std::optional<Surface> surfaceAt(const Side& side, const Surface& contact, const
 
 std::optional<Ahead> turnAhead(const Contact& contact, const Side& a, const Side& b, const Continuity& continuity) {
     // what touches is where it is: put behind a wheel, it would push it on
-    if (contact.turningRadius < 0 || contact.distance <= 0) return std::nullopt;
+    if (contact.turningRadius < 0 || contact.distance <= 0 || !a.turnsAhead) return std::nullopt;
     const bool isOfB = contact.feature & featureOfB;
     const Side &own = isOfB ? b : a, &other = isOfB ? a : b;
     const Velocity velocity = velocityOf(*own.object), its = velocityOf(*other.object);
