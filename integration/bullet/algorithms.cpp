@@ -49,12 +49,7 @@ class PairAlgorithm : public FieldAlgorithm {
         const bool isTest = state_.isTest(*result);
         const float seconds = state_.secondsOf(info, isTest);
         const Task task = taskOf(*first, *second, seconds);
-        if (!pair_->isReady()) {
-            if (isTest)
-                pair_->test(task.a, task.b, result->m_closestPointDistanceThreshold);
-            else
-                pair_->collide(task.a, task.b);
-        }
+        task.collide(*result, isTest);
         pair_->commit(*task.a.object, *task.b.object, seconds, *result);
     }
 
@@ -64,10 +59,8 @@ class PairAlgorithm : public FieldAlgorithm {
 
   private:
     Task taskOf(const btCollisionObjectWrapper& first, const btCollisionObjectWrapper& second, float seconds) const {
-        Side a(bIsSecond_ ? first : second, seconds), b(bIsSecond_ ? second : first, seconds);
-        a.seconds = b.seconds = state_.ahead(a, b, seconds);
-        a.turnsAhead = b.turnsAhead = state_.foreseesAll;
-        return {pair_, a, b};
+        return state_.taskOf(pair_, Side(bIsSecond_ ? first : second, seconds),
+                             Side(bIsSecond_ ? second : first, seconds));
     }
 
     std::shared_ptr<Pair> pair_;
@@ -117,7 +110,27 @@ std::vector<int> rigidTypes() {
     return types;
 }
 
+/// Whether a step takes two shapes farther than the size of either.
+bool goPastEachOther(const Side& a, const Side& b) {
+    const auto sizeOf = [](const Side& side) {
+        btVector3 centre;
+        btScalar radius;
+        side.shape->getBoundingSphere(centre, radius);
+        return radius;
+    };
+    const btVector3 way = a.seconds * (velocityOf(*a.object).linear - velocityOf(*b.object).linear);
+    return way.length() > std::min(sizeOf(a), sizeOf(b));
+}
+
 }  // namespace
+
+void Task::collide(const btManifoldResult& result, bool isTest) const {
+    if (pair->isReady()) return;
+    if (isTest)
+        pair->test(a, b, result.m_closestPointDistanceThreshold);
+    else
+        pair->collide(a, b);
+}
 
 bool StepState::isTest(const btManifoldResult& result) const {
     if (result.m_closestPointDistanceThreshold > 0) return true;
@@ -129,17 +142,10 @@ float StepState::secondsOf(const btDispatcherInfo& info, bool isTest) const {
     return isTest ? 0 : info.m_timeStep;
 }
 
-float StepState::ahead(const Side& a, const Side& b, float step) const {
+Task StepState::taskOf(std::shared_ptr<Pair> pair, Side a, Side b) const {
     const auto isLeft = [](const Side& side) { return side.object->isKinematicObject() || locks(*side.shape); };
-    if (foreseesAll || isLeft(a) || isLeft(b)) return step;
-    const auto sizeOf = [](const Side& side) {
-        btVector3 centre;
-        btScalar radius;
-        side.shape->getBoundingSphere(centre, radius);
-        return radius;
-    };
-    const btVector3 way = step * (velocityOf(*a.object).linear - velocityOf(*b.object).linear);
-    return way.length() <= std::min(sizeOf(a), sizeOf(b)) ? step : 0;
+    if (!foreseesAll && !isLeft(a) && !isLeft(b) && goPastEachOther(a, b)) a.seconds = b.seconds = 0;
+    return {std::move(pair), a, b};
 }
 
 struct FieldAlgorithmFunctions::Functions {

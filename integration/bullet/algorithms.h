@@ -13,6 +13,15 @@
 
 namespace bilayer::bullet {
 
+/// Two shapes to be collided, the second of which is a field.
+struct Task {
+    std::shared_ptr<Pair> pair;  ///< shared, since a callback of the user's may remove the bodies in the meantime
+    Side a, b;
+
+    /// For a result of Bullet's, unless that has been done with others' before.
+    void collide(const btManifoldResult& result, bool isTest) const;
+};
+
 /// Of the step under way.
 struct StepState {
     DispatchStatistics running{};  ///< contact tests between steps count here too
@@ -25,9 +34,9 @@ struct StepState {
     bool isTest(const btManifoldResult& result) const;
     float secondsOf(const btDispatcherInfo& info, bool isTest) const;
 
-    /// How far ahead the motion of two shapes is looked at. What goes farther than its own size is the business of a
-    /// NoPassing, which does not see what the user moves, nor inside of what locks.
-    float ahead(const Side& a, const Side& b, float step) const;
+    /// Of two shapes for the seconds that a step takes. The ways of what goes farther than its own size are the
+    /// business of a NoPassing, which does not see what the user moves, nor inside of what locks.
+    Task taskOf(std::shared_ptr<Pair> pair, Side a, Side b) const;
 };
 
 /// Lets Bullet go through a compound, and leaves its fields out as long as this lives.
@@ -41,12 +50,6 @@ class LeftToBullet {
   private:
     StepState& state_;
     bool before_;
-};
-
-/// Two shapes to be collided, the second of which is a field.
-struct Task {
-    std::shared_ptr<Pair> pair;  ///< shared, since a callback of the user's may remove the bodies in the meantime
-    Side a, b;
 };
 
 /// An algorithm whose pairs can be collided before Bullet asks it to process them: then it only hands contacts over.

@@ -32,19 +32,20 @@ Box boxOf(const Side& side) {
     return box;
 }
 
-/// How far a shape's turn takes any of its points in the step, at most.
-float turningOf(const Side& side, const Box& box) {
+/// How far a turn takes any point of a shape, at most.
+float turningOf(const Motion& motion, const Side& side, const Box& box) {
     const btVector3 &origin = side.transform.getOrigin(), ofLower = (box.lower - origin).absolute();
     btVector3 farthest = (box.upper - origin).absolute();
     farthest.setMax(ofLower);
-    return glm::length(side.motion().turn) * farthest.length();
+    return glm::length(motion.turn) * farthest.length();
 }
 
 /// Around all places where a shape's points are in the step.
 Box sweptBoxOf(const Side& side) {
     Box box = boxOf(side);
-    const float turning = turningOf(side, box);
-    const btVector3 way = toBullet(side.motion().way), lower = box.lower + way, upper = box.upper + way;
+    const Motion motion = side.motion();
+    const float turning = turningOf(motion, side, box);
+    const btVector3 way = toBullet(motion.way), lower = box.lower + way, upper = box.upper + way;
     box.lower.setMin(lower);
     box.upper.setMax(upper);
     box.grow(turning);
@@ -116,7 +117,8 @@ class Descent {
         Box around = sweptBoxOf(other.side);
         around.grow(within_);
         Box from = around;  // where children are that come to it
-        from.grow(glm::length(compound.side.motion().way) + turningOf(compound.side, boxOf(compound.side)));
+        const Motion motion = compound.side.motion();
+        from.grow(glm::length(motion.way) + turningOf(motion, compound.side, boxOf(compound.side)));
         visitChildren(compound.side, from, [&](int index) {
             const Side child = childOf(compound.side, index);
             const bool holds = compound.holdsField && holdsField(*child.shape);
@@ -199,12 +201,10 @@ CompoundAlgorithm::Key CompoundAlgorithm::keyOf(const Children& children) {
 
 Task CompoundAlgorithm::taskOf(const Children& children) {
     const bool bIsSecond = isField(*children.second.shape);
-    Side a = bIsSecond ? children.first : children.second, b = bIsSecond ? children.second : children.first;
-    a.seconds = b.seconds = state_.ahead(a, b, a.seconds);
-    a.turnsAhead = b.turnsAhead = state_.foreseesAll;
     std::shared_ptr<Pair>& pair = (*pairs_)[keyOf(children)];
     if (!pair) pair = std::make_shared<Pair>(*m_dispatcher, state_.running);
-    return {pair, a, b};
+    return state_.taskOf(pair, bIsSecond ? children.first : children.second,
+                         bIsSecond ? children.second : children.first);
 }
 
 void CompoundAlgorithm::gather(const btCollisionObjectWrapper& first, const btCollisionObjectWrapper& second,
@@ -220,17 +220,13 @@ void CompoundAlgorithm::processCollision(const btCollisionObjectWrapper* first, 
         rest_->processCollision(first, second, info, result);
     }
     const bool isTest = state_.isTest(*result);
-    const float seconds = state_.secondsOf(info, isTest), within = result->m_closestPointDistanceThreshold;
+    const float seconds = state_.secondsOf(info, isTest);
     Pairs met;
     const std::shared_ptr<Pairs> pairs = pairs_;  // a callback of the user's may end this algorithm
-    for (const Children& children : Descent(within)(Side(*first, seconds), Side(*second, seconds))) {
+    for (const Children& children :
+         Descent(result->m_closestPointDistanceThreshold)(Side(*first, seconds), Side(*second, seconds))) {
         const Task task = taskOf(children);
-        if (!task.pair->isReady()) {
-            if (isTest)
-                task.pair->test(task.a, task.b, within);
-            else
-                task.pair->collide(task.a, task.b);
-        }
+        task.collide(*result, isTest);
         withWrapper(*first, children.firstPath, [&](const btCollisionObjectWrapper& one) {
             withWrapper(*second, children.secondPath, [&](const btCollisionObjectWrapper& two) {
                 const Unwrapped unwrapped(*result, one, two);

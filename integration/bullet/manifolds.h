@@ -64,7 +64,7 @@ class Choice {
 };
 
 /// A contact of bodies that turn as it is going to be at the end of the step, in the coordinates of a world that goes
-/// along with either body's centre, and what is left of the gap but for the ways that the solver sees (turnAhead()).
+/// along with either body's centre, and what is left of the gap but for the ways that the solver sees (Turning).
 struct Ahead {
     btVector3 onA, onB;  ///< its places on the bodies [m]
     btVector3 normal;    ///< from B to A

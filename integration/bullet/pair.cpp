@@ -108,8 +108,9 @@ void Pair::finish(const Side& a, const Side& b) {
     choice_.update(contacts_, a.transform, b.transform);
     continuity_ = continuityOf(a, b);
     ahead_.clear();
+    const Turning turning(a, b, continuity_);
     for (const Patch& patch : choice_.reduced().patches)
-        for (int i = 0; i < patch.count; ++i) ahead_.push_back(turnAhead(patch.contacts[i], a, b, continuity_));
+        for (int i = 0; i < patch.count; ++i) ahead_.push_back(turning.ahead(patch.contacts[i]));
     isReady_ = true;
     sampled_ = 0;
 }

@@ -24,8 +24,7 @@ struct Side {
     const btCollisionShape* shape;
     btTransform transform;
     const btCollisionObject* object;
-    float seconds;           ///< until the next step; 0: contacts are asked for as things are
-    bool turnsAhead = true;  ///< contacts may be put where it turns (turnAhead()); not where a NoPassing looks at ways
+    float seconds;  ///< until the next step; 0: contacts are asked for as things are
 
     Side(const btCollisionObjectWrapper& wrap, float seconds)
         : Side(*wrap.getCollisionShape(), wrap.getWorldTransform(), *wrap.getCollisionObject(), seconds) {}

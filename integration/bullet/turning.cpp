@@ -7,7 +7,6 @@
 #include "collider/touch.h"
 #include "integration/bullet/convert.h"
 #include "integration/bullet/shape.h"
-#include "integration/bullet/velocity.h"
 
 namespace bilayer::bullet {
 
@@ -63,33 +62,38 @@ std::optional<Surface> surfaceAt(const Side& side, const Surface& contact, const
 
 }  // namespace
 
-std::optional<Ahead> turnAhead(const Contact& contact, const Side& a, const Side& b, const Continuity& continuity) {
+Turning::Turning(const Side& a, const Side& b, const Continuity& continuity)
+    : a_{a, velocityOf(*a.object)}, b_{b, velocityOf(*b.object)}, continuity_(continuity) {}
+
+/// In which a body turns a place by no more than is known of what comes after.
+float Turning::mostSeconds(const Body& body, const btVector3& place) const {
+    const float arm = (place - body.velocity.centre).length();
+    const float most = continuity_.isSwept ? mostTurn : std::sqrt(2 * turnsOff * continuity_.sameWithin / arm);
+    return most / body.velocity.angular.length();  // infinite where nothing turns
+}
+
+std::optional<Ahead> Turning::ahead(const Contact& contact) const {
     // what touches is where it is: put behind a wheel, it would push it on
-    if (contact.turningRadius < 0 || contact.distance <= 0 || !a.turnsAhead) return std::nullopt;
+    if (contact.turningRadius < 0 || contact.distance <= 0) return std::nullopt;
     const bool isOfB = contact.feature & featureOfB;
-    const Side &own = isOfB ? b : a, &other = isOfB ? a : b;
-    const Velocity velocity = velocityOf(*own.object), its = velocityOf(*other.object);
+    const Body &own = isOfB ? b_ : a_, &other = isOfB ? a_ : b_;
+    const Velocity &velocity = own.velocity, &its = other.velocity;
     const btVector3 fromB = toBullet(contact.normal), outward = isOfB ? -fromB : fromB;
     // what turns is the middle of the ball that a corner is rounded by
     const float radius = contact.turningRadius, height = contact.distance + radius;
     const btVector3 onB = toBullet(contact.position), middle = onB + (isOfB ? radius : height) * outward;
     const btVector3 arm = middle - velocity.centre, itsArm = middle - its.centre;
 
-    const auto mostSeconds = [&](const btVector3& spin, const btVector3& arm) {
-        const float most =
-            continuity.isSwept ? mostTurn : std::sqrt(2 * turnsOff * continuity.sameWithin / arm.length());
-        return most / spin.length();  // infinite where nothing turns
-    };
-    const float seconds = std::min({own.seconds, mostSeconds(velocity.angular, arm), mostSeconds(its.angular, itsArm)});
+    const float seconds = std::min({own.side.seconds, mostSeconds(own, middle), mostSeconds(other, middle)});
     const float way = seconds * std::max(velocity.angular.cross(arm).length(), its.angular.cross(itsArm).length());
-    if (!(way > hardlyTurned * continuity.sameWithin)) return std::nullopt;
+    if (!(way > hardlyTurned * continuity_.sameWithin)) return std::nullopt;
 
     // From the other body's centre it goes along that one's surface; towards it, that is the solver's business.
     const btVector3 armThen = turned(arm, velocity.angular, seconds), passing = velocity.linear - its.linear;
     const float leaving = outward.dot(passing);
     const btVector3 itsArmThen = itsArm + armThen - arm + seconds * (passing - leaving * outward);
     const auto surface =
-        surfaceAt(other, {outward, height}, middle, its.centre + turned(itsArmThen, its.angular, -seconds));
+        surfaceAt(other.side, {outward, height}, middle, its.centre + turned(itsArmThen, its.angular, -seconds));
     if (!surface) return std::nullopt;
     const btVector3 normal = turned(surface->normal, its.angular, seconds);
     const btVector3 ownThen = velocity.centre + armThen - radius * normal,

@@ -5,6 +5,7 @@
 
 #include "integration/bullet/manifolds.h"
 #include "integration/bullet/pair.h"
+#include "integration/bullet/velocity.h"
 
 namespace bilayer::bullet {
 
@@ -13,7 +14,23 @@ namespace bilayer::bullet {
 /// bear its weight and brake it: at 60 steps a second a ball of 0.1 m that rolls at 0.3 m/s loses half of its
 /// speed in a second. So the contact of a point that turns with its body is handed over as it is going to be at the
 /// step's end.
-/// @return nothing where a contact touches already, or does not turn, or by next to nothing
-std::optional<Ahead> turnAhead(const Contact& contact, const Side& a, const Side& b, const Continuity& continuity);
+class Turning {
+  public:
+    /// Of two bodies, which must outlive it.
+    Turning(const Side& a, const Side& b, const Continuity& continuity);
+
+    /// Nothing where a contact touches already, or does not turn, or by next to nothing.
+    std::optional<Ahead> ahead(const Contact& contact) const;
+
+  private:
+    struct Body {
+        const Side& side;
+        Velocity velocity;
+    };
+    float mostSeconds(const Body& body, const btVector3& place) const;
+
+    Body a_, b_;
+    const Continuity& continuity_;
+};
 
 }  // namespace bilayer::bullet

@@ -156,11 +156,13 @@ TEST_CASE("What a wall holds is not run over by a long column, each held by the 
     for (int i = 0; i < 2; ++i) {
         world.dynamics.stepSimulation(step, 0);
         held += guard.held();
-        for (std::size_t k = 1; k < column.size(); ++k) {
-            CAPTURE(seed, i, k);
-            CHECK(column[k - 1]->getCenterOfMassPosition().x() - column[k]->getCenterOfMassPosition().x() >
-                  2 * radius - deepest);
-        }
+        // some are pushed aside
+        for (std::size_t k = 0; k < column.size(); ++k)
+            for (std::size_t other = 0; other < k; ++other) {
+                CAPTURE(seed, i, k, other);
+                CHECK(column[other]->getCenterOfMassPosition().distance(column[k]->getCenterOfMassPosition()) >
+                      2 * radius - deepest);
+            }
     }
     CHECK(held > 40);
 }

@@ -3,9 +3,11 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include "demos/shared/shapes.h"
 #include "integration/bullet/convert.h"
+#include "integration/bullet/no_passing.h"
 #include "sdf/build.h"
 #include "tests/support/random.h"
 #include "tests/support/support.h"
@@ -92,6 +94,8 @@ TEST_CASE("A ball rolls on") {
     CAPTURE(onBox);
     btCollisionShape& ground = onBox ? static_cast<btCollisionShape&>(box) : plane;
     Roller roller(shape, ground, {0, 0, onBox ? -0.1f : 0.f}, speed, false);
+    std::optional<bullet::NoPassing> guard;
+    if (const bool isGuarded = GENERATE(false, true); isGuarded) guard.emplace(roller.world.dynamics);
     float highest = 0;
     for (int i = 0; i < 60; ++i) {
         roller.world.dynamics.stepSimulation(1 / 60.f, 0);

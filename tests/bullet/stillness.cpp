@@ -71,6 +71,21 @@ struct Heap {
     }
 };
 
+/// A box on level ground that friction does not hold and nothing lets sleep, after a second.
+struct BoxOnIce {
+    Shape floor{exactBox({1, 1, 0.1f}, h)}, box{exactBox({0.1f, 0.1f, 0.1f}, h)};
+    btRigidBody* body;
+
+    explicit BoxOnIce(World& world) {
+        world.add(floor, 0, {0, 0, -0.1f});
+        body = world.add(box, 1, {0, 0, 0.1f});
+        body->setFriction(0);
+        body->setDamping(0, 0);
+        body->setActivationState(DISABLE_DEACTIVATION);
+        world.run(1);
+    }
+};
+
 }  // namespace
 
 TEST_CASE("A heap that nothing lets sleep stays where it is, and falls when its bowl is taken away") {
@@ -157,26 +172,16 @@ TEST_CASE("What moves for a reason is not held: thrown, without weight, hung up,
     }
     SECTION("a slow turn about its middle") {
         useFriction(world);
-        Shape floor(exactBox({1, 1, 0.1f}, h)), box(exactBox({0.1f, 0.1f, 0.1f}, h));
-        world.add(floor, 0, {0, 0, -0.1f});
-        btRigidBody* body = world.add(box, 1, {0, 0, 0.1f});
-        body->setFriction(0);
-        body->setDamping(0, 0);
-        body->setActivationState(DISABLE_DEACTIVATION);
-        world.run(1);
+        const BoxOnIce ice(world);
+        btRigidBody* body = ice.body;
         body->setAngularVelocity({0, 0, 0.05f});
         const btVector3 before = body->getWorldTransform().getBasis().getColumn(0);
         world.run(2);
         CHECK(body->getWorldTransform().getBasis().getColumn(0).angle(before) == Approx(0.1f).epsilon(0.05));
     }
     SECTION("what lay still and is pushed once, on ice") {
-        Shape floor(exactBox({1, 1, 0.1f}, h)), box(exactBox({0.1f, 0.1f, 0.1f}, h));
-        world.add(floor, 0, {0, 0, -0.1f});
-        btRigidBody* body = world.add(box, 1, {0, 0, 0.1f});
-        body->setFriction(0);
-        body->setDamping(0, 0);
-        body->setActivationState(DISABLE_DEACTIVATION);
-        world.run(1);
+        const BoxOnIce ice(world);
+        btRigidBody* body = ice.body;
         REQUIRE(still.held() == 1);
         if (const bool slept = GENERATE(false, true); slept) {
             body->forceActivationState(ISLAND_SLEEPING);

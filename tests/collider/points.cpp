@@ -120,9 +120,8 @@ TEST_CASE("planes that touch a mesh find a point a small part of the spacing beh
     for (const char* name : {"bunny_watertight.obj", "armadillo_100k.ply", "cow.obj"})
         if (const auto path = corpusMesh(name)) {
             Mesh mesh = readMesh(*path);
-            Bounds box;
-            for (const glm::vec3& point : mesh.points) box.add(point);
-            for (const float parts : {16.f, 48.f}) all.push_back({name, mesh, glm::length(box.size()) / parts, 0.12});
+            const float size = glm::length(bounds(mesh).size());
+            for (const float parts : {16.f, 48.f}) all.push_back({name, mesh, size / parts, 0.12});
         }
     for (const auto& [name, mesh, spacing, most] : all) {
         CAPTURE(name, spacing);

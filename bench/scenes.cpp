@@ -1,0 +1,112 @@
+// The ten scenes of the demos, in sizes that take minutes: how long their steps take on one thread and on all, and
+// whether they still do what they must.
+#include <fmt/format.h>
+#include <oneapi/tbb/global_control.h>
+#include <oneapi/tbb/info.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <functional>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "bench/measure.h"
+#include "bench/program.h"
+#include "demos/scenes/bowl.h"
+#include "demos/scenes/chain.h"
+#include "demos/scenes/gears.h"
+#include "demos/scenes/incline.h"
+#include "demos/scenes/nuts.h"
+#include "demos/scenes/pairs.h"
+#include "demos/scenes/pegs.h"
+#include "demos/scenes/plates.h"
+#include "demos/scenes/rings.h"
+#include "demos/scenes/spin.h"
+#include "demos/shared/outcome.h"
+
+using namespace bilayer;
+using namespace bilayer::bench;
+
+namespace {
+
+struct NamedScene {
+    std::string name;
+    std::function<demo::Outcome()> play;
+};
+
+std::vector<NamedScene> scenes() {
+    return {{"pairs", [] { return demo::pairs({}); }},
+            {"incline", [] { return demo::incline({}); }},
+            {"nuts", [] { return demo::nuts({.turns = 1}); }},
+            {"rings", [] { return demo::rings({.rows = 2}); }},
+            {"chain", [] { return demo::chain({.seconds = 3}); }},
+            {"gears", [] { return demo::gears({.turns = 1}); }},
+            {"bowl", [] { return demo::bowl({.kinds = {demo::bunny()}}); }},
+            {"plates", [] { return demo::plates({}); }},
+            {"pegs", [] { return demo::pegs({}); }},
+            {"spin", [] { return demo::spin({.seconds = 10}); }}};
+}
+
+// A scene on so many threads.
+struct Played {
+    double step, slowStep;  // the median, and what 99 in 100 stay below [ms]
+    demo::Outcome outcome;
+};
+
+Played play(const NamedScene& scene, int threads) {
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, std::size_t(threads));
+    demo::Outcome outcome = scene.play();
+    return {outcome.medianStep(), outcome.slowStep(), std::move(outcome)};
+}
+
+// Throws std::runtime_error where another number of threads has led elsewhere.
+void compare(const NamedScene& scene, int threads, int repetitions) {
+    std::vector<double> one, all, slow;
+    std::optional<demo::Outcome> outcome;
+    for (int i = 0; i < repetitions; ++i) {
+        const Played alone = play(scene, 1);
+        Played together = play(scene, threads);
+        if (alone.outcome.fingerprint != together.outcome.fingerprint)
+            throw std::runtime_error(scene.name + ": other bits on one thread than on several");
+        one.push_back(alone.step);
+        all.push_back(together.step);
+        slow.push_back(together.slowStep);
+        outcome = std::move(together.outcome);
+    }
+    const auto missed = std::count_if(outcome->criteria.begin(), outcome->criteria.end(),
+                                      [](const demo::Criterion& criterion) { return !criterion.met(); });
+    fmt::print("| {} | {} | {:.0f} | {:.2f} | {:.2f} | {:.2f} | {:.2f} | {:.3f} | {} |\n", scene.name, outcome->bodies,
+               double(outcome->contactsKept) / double(outcome->stepMs.size()), median(one), median(all), median(slow),
+               median(one) / median(all), outcome->usuallyBelow() / outcome->voxelSize, missed);
+    std::fflush(stdout);
+}
+
+int run(int argc, char** argv) {
+    CLI::App app("Plays the ten scenes of ./run demo, smaller: time of a step on one thread and on several.");
+    std::vector<std::string> names, chosen;
+    for (const NamedScene& scene : scenes()) names.push_back(scene.name);
+    int threads = tbb::info::default_concurrency(), repetitions = 1;
+    app.add_option("--scenes", chosen, "only these")->check(CLI::IsMember(names));
+    app.add_option("--threads", threads, "beside one")->capture_default_str()->check(CLI::Range(1, 1024));
+    app.add_option("--repetitions", repetitions, "of which medians are taken")
+        ->capture_default_str()
+        ->check(CLI::Range(1, 100));
+    CLI11_PARSE(app, argc, argv);
+    fmt::print(
+        "| scene | bodies | contacts a step | a step [ms], 1 thread | {} threads | 99 % of steps | times as fast | 99 "
+        "% of "
+        "penetrations [voxels] | criteria missed |\n|---|---|---|---|---|---|---|---|---|\n",
+        threads);
+    for (const NamedScene& scene : scenes())
+        if (chosen.empty() || std::find(chosen.begin(), chosen.end(), scene.name) != chosen.end())
+            compare(scene, threads, repetitions);
+    return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+    return bench::program("scenes", run, argc, argv);
+}
