@@ -90,9 +90,8 @@ class PointsInField {
         const Bounds& bounds = body.collider.bounds();
         centre_ = bounds.centre();
         radius_ = 0.5f * glm::length(bounds.size());
-        const float longest = ways_.longest(other.scale * map_(centre_), body.scale * radius_) / other.scale;
-        sweeps_ = longest > std::min(reach_, surelyInBand(field_.exteriorWidth(), field_.voxelSize()));
-        seen_ = sweeps_ ? reach_ + longest : reach_;
+        sweeps_ =
+            longestWay(centre_, radius_) > std::min(reach_, surelyInBand(field_.exteriorWidth(), field_.voxelSize()));
     }
 
     /// Calls found(index, point, touch) for the points within reach of the surface, in it, or on their way to it.
@@ -131,26 +130,38 @@ class PointsInField {
   private:
     static constexpr float rounding = 1e-3f;  // [voxels]
 
+    // Of the points of the body in a ball, at most; in the other one's units.
+    float longestWay(const glm::vec3& centre, float radius) const {
+        return ways_.longest(other_.scale * map_(centre), body_.scale * radius) / other_.scale;
+    }
+
+    // How far away such points can be that come near.
+    float seenFrom(const glm::vec3& centre, float radius) const {
+        return sweeps_ ? reach_ + longestWay(centre, radius) : reach_;
+    }
+
     // Farther than this nothing of interest can be [parts].
     float keptWithin(float distance) const {
         return (distance / field_.voxelSize() + mostInterpolationError) / float(Clearance::partSide);
     }
 
-    template <class Visit>
-    void descend(float kept, Visit&& visit) const {
+    // @param within  float (centre, radius): how far away points in a ball may be
+    template <class Within, class Visit>
+    void descend(Within&& within, Visit&& visit) const {
         const auto reject = [&](const glm::vec3& centre, float radius) {
-            return clearance_.isOutside(coarse_(centre), radius * coarse_.scale + kept);
+            return clearance_.isOutside(coarse_(centre), radius * coarse_.scale + keptWithin(within(centre, radius)));
         };
         body_.collider.points().visit(reject, visit);
     }
 
     template <class Found>
     void visitAll(ContactReport& report, Found& found) {
-        const float kept = keptWithin(seen_);
-        descend(kept, [&](std::uint32_t index, const SurfacePoint& point) {
+        const auto within = [&](const glm::vec3& centre, float radius) { return seenFrom(centre, radius); };
+        descend(within, [&](std::uint32_t index, const SurfacePoint& point) {
             const glm::vec3 place = coarse_(point.position);
-            const bool isAbove = !options_.measured && clearance_.isAbove(place, seen_);  // or beyond the band
-            if (isAbove || clearance_.isOutside(place, kept)) return;
+            const float seen = seenFrom(point.position, 0);
+            const bool isAbove = !options_.measured && clearance_.isAbove(place, seen);  // or beyond the band
+            if (isAbove || clearance_.isOutside(place, keptWithin(seen))) return;
             const glm::vec3 at = map_(point.position);
             touch(index, point, at, sampleAt(at, report), report, found);
         });
@@ -162,7 +173,8 @@ class PointsInField {
     void visitAndList(NearPoints::List& near, ContactReport& report, Found& found) {
         const float slack = near.slack(), above = reach_ + steepestInterpolant * slack, within = reach_ + slack,
                     beside = within + mostInterpolationError * field_.voxelSize(), kept = keptWithin(within);
-        descend(kept, [&](std::uint32_t index, const SurfacePoint& point) {
+        const auto all = [&](const glm::vec3&, float) { return within; };
+        descend(all, [&](std::uint32_t index, const SurfacePoint& point) {
             const glm::vec3 place = coarse_(point.position);
             if (clearance_.isAbove(place, above) || clearance_.isOutside(place, kept)) return;
             const glm::vec3 at = map_(point.position);
@@ -325,7 +337,6 @@ class PointsInField {
     glm::vec3 centre_;  // of a ball around the body
     float radius_;
     bool sweeps_;  // whether any point moves farther than contacts are found for sure
-    float seen_;   // how far away a point can be that comes near
 };
 
 // Outward of `other`, in the world; where its field tells none, against the surface of the body that touches it.
@@ -422,15 +433,29 @@ const MassProperties& Collider::mass() const {
 
 namespace {
 
+// Of the surface near a place of the world, outward; zero where the field tells none.
+glm::vec3 normalNear(const Placed& body, const glm::vec3& place) {
+    const glm::vec3 at = body.pose.toBody(place) / body.scale;
+    const Field& field = body.collider.field();
+    const Sample sample = field.sample(at);
+    if (!sample.inBand) return glm::vec3(0);
+    return body.pose.rotation * touchInBand(field, at, sample, body.collider.asksTriangles(at)).normal;
+}
+
 // The contacts of A's points in B's field, then of B's in A's, of those that the visits find.
 template <class VisitA, class VisitB>
 ContactReport addContacts(const Placed& a, const Placed& b, const ContactOptions& options,
                           std::vector<Contact>& contacts, VisitA&& visitA, VisitB&& visitB) {
     ContactReport report;
-    const auto opposes = [&](const glm::vec3& normal, const Placed& body, const SurfacePoint& point,
-                             const Touch& touch) {
+    const auto opposes = [&](const glm::vec3& normal, const Placed& body, const Placed& other,
+                             const SurfacePoint& point, const Touch& touch) {
         const bool apart = touch.distance > 0 && touch.approach == 0 && !point.isSharp;
-        return options.keeps(-glm::dot(normal, body.pose.rotation * point.normal), apart);
+        const glm::vec3 own = body.pose.rotation * point.normal;
+        if (!options.keeps(-glm::dot(normal, own), apart)) return false;
+        const bool leavesEdges = apart && options.leastOppositionApart > options.leastOpposition;
+        return !leavesEdges ||
+               !looksAtEdge(body.pose.toWorld(body.scale * point.position), own, touch.distance * other.scale, normal,
+                            [&](const glm::vec3& place) { return normalNear(other, place); });
     };
     // of points, not of places between them
     const auto turningRadiusOf = [](const Placed& body, std::uint32_t feature) {
@@ -438,14 +463,14 @@ ContactReport addContacts(const Placed& a, const Placed& b, const ContactOptions
     };
     const auto addOfA = [&](std::uint32_t index, const SurfacePoint& point, const Touch& touch) {
         const glm::vec3 normal = outwardNormal(b, touch, a, point);
-        if (!opposes(normal, a, point, touch)) return;
+        if (!opposes(normal, a, b, point, touch)) return;
         const float distance = touch.distance * b.scale;
         contacts.push_back({a.pose.toWorld(a.scale * point.position) - distance * normal, normal, distance, index,
                             touch.approach * b.scale, turningRadiusOf(a, index)});
     };
     const auto addOfB = [&](std::uint32_t index, const SurfacePoint& point, const Touch& touch) {
         const glm::vec3 normal = outwardNormal(a, touch, b, point);
-        if (!opposes(normal, b, point, touch)) return;
+        if (!opposes(normal, b, a, point, touch)) return;
         contacts.push_back({b.pose.toWorld(b.scale * point.position), -normal, touch.distance * a.scale,
                             index | featureOfB, touch.approach * a.scale, turningRadiusOf(b, index)});
     };

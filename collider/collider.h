@@ -123,7 +123,8 @@ struct ContactOptions {
     /// corners of a cube, whose normals are mixed of three, reach 0.57. Below -1: no contact is left out.
     float leastOpposition = -2;
     /// The same for points of faces that neither touch yet nor are on their way: a point beside the other body sees its
-    /// edge aslant, and would stop it like a curb.
+    /// edge aslant, and would stop it like a curb. If greater than leastOpposition, edges that they see by more than
+    /// half a degree aslant are left out, too, which the other body's own points meet.
     float leastOppositionApart = -2;
 
     /// Whether a contact is kept that looks against its point's normal by this cosine.

@@ -20,6 +20,7 @@
 #include <glm/gtc/constants.hpp>
 #include <glm/vec2.hpp>
 #include <map>
+#include <numeric>
 #include <utility>
 
 #include "integration/bullet/convert.h"
@@ -34,6 +35,8 @@ constexpr std::uint32_t rimChords = 32;
 constexpr int supportDirections = 256;
 // A normal that is tilted less than this off the axis belongs to a flat end.
 constexpr float flatEnd = 0.1f;
+// Of a search for the place where a way enters; what takes more only grazes it.
+constexpr int mostSteps = 64;
 // A place on the side is on a rim from this part of the half height on.
 constexpr float beforeRim = 0.999f;
 
@@ -232,6 +235,22 @@ void Convex::makeHull(const std::vector<btVector3>& points) {
         const auto left = wings.find({from, to}), right = wings.find({to, from});
         if (left != wings.end() && right != wings.end()) edges_.back().wings = Wings{left->second, right->second};
     }
+    joinPlanes();
+}
+
+void Convex::joinPlanes() {
+    std::vector<std::pair<std::uint32_t, std::uint32_t>> around;  // corner, plane
+    for (std::uint32_t p = 0; p < planes_.size(); ++p)
+        for (std::size_t i = planes_[p].begin; i < planes_[p].end; ++i)
+            for (int k = 0; k < 3; ++k) around.emplace_back(faces_.triangles[i][k], p);
+    std::sort(around.begin(), around.end());
+    around.erase(std::unique(around.begin(), around.end()), around.end());
+    firstAround_.assign(faces_.points.size() + 1, 0);
+    for (const auto& [corner, plane] : around) {
+        ++firstAround_[corner + 1];
+        planesAround_.push_back(plane);
+    }
+    std::partial_sum(firstAround_.begin(), firstAround_.end(), firstAround_.begin());
 }
 
 void Convex::makeBalls(const btMultiSphereShape& shape) {
@@ -263,6 +282,21 @@ Convex::Near Convex::nearest(const glm::vec3& point, float reach) const {
         default:
             return nearestOfHull(point, reach);
     }
+}
+
+/// By Newton's steps, which do not lead too far: distance is convex along a way, and so is the bound of a hull's. Once
+/// it grows, it grows for ever.
+std::optional<Convex::Entry> Convex::enter(const glm::vec3& start, const glm::vec3& way, float tolerance) const {
+    const float length = glm::length(way);
+    float part = 0;
+    for (int i = 0; i < mostSteps; ++i) {
+        const Near near = nearest(start + part * way, length);
+        if (near.distance <= tolerance) return Entry{part, near};
+        const float approach = -glm::dot(near.normal, way);
+        if (!(approach > 0) || part >= 1) break;
+        part = std::min(part + near.distance / approach, 1.f);
+    }
+    return std::nullopt;
 }
 
 Convex::Near Convex::nearestOfSegment(const glm::vec3& point) const {
@@ -316,7 +350,7 @@ Convex::Near Convex::nearestOfHull(const glm::vec3& point, float reach) const {
     const Plane* farthest = nullptr;
     float depth = -std::numeric_limits<float>::max();
     for (const Plane& plane : planes_)
-        if (const float d = glm::dot(plane.normal, point) - plane.offset; d > depth) depth = d, farthest = &plane;
+        if (const float height = plane.height(point); height > depth) depth = height, farthest = &plane;
     // Inside, the nearest face decides; far outside, a bound does.
     if (farthest && (depth <= 0 || depth > reach + radius_))
         return {depth - radius_, farthest->normal, point - depth * farthest->normal, radius_};
@@ -325,15 +359,31 @@ Convex::Near Convex::nearestOfHull(const glm::vec3& point, float reach) const {
     glm::vec3 core(0);
     const auto consider = [&](const glm::vec3& q) {
         const glm::vec3 way = point - q;
-        if (const float s = glm::dot(way, way); s < squared) squared = s, core = q;
+        const float s = glm::dot(way, way);
+        if (!(s < squared)) return false;
+        squared = s, core = q;
+        return true;
     };
-    // Only faces that the point sees can be nearest.
-    for (const Plane& plane : planes_)
-        if (glm::dot(plane.normal, point) > plane.offset)
-            for (std::size_t i = plane.begin; i < plane.end; ++i) {
-                const glm::uvec3& t = faces_.triangles[i];
-                consider(nearestOnTriangle(point, faces_.points[t.x], faces_.points[t.y], faces_.points[t.z]));
-            }
+    // Only faces that the point sees can be nearest; and of these that one is which is nearer than all around it, since
+    // a distance from what is convex has no other minimum.
+    const Plane* plane = nullptr;
+    std::size_t triangle = 0;
+    const auto considerFace = [&](const Plane& face) {
+        for (std::size_t i = face.begin; i < face.end; ++i) {
+            const glm::uvec3& t = faces_.triangles[i];
+            if (consider(nearestOnTriangle(point, faces_.points[t.x], faces_.points[t.y], faces_.points[t.z])))
+                plane = &face, triangle = i;
+        }
+    };
+    if (farthest) considerFace(*farthest);
+    for (const Plane* before = nullptr; plane != before && squared > depth * depth;) {
+        before = plane;
+        const glm::uvec3 corners = faces_.triangles[triangle];
+        for (int i = 0; i < 3; ++i)
+            for (std::uint32_t k = firstAround_[corners[i]]; k < firstAround_[corners[i] + 1]; ++k)
+                if (const Plane& next = planes_[planesAround_[k]]; &next != before && next.height(point) > 0)
+                    considerFace(next);
+    }
     // A hull without faces is flat, a line or a point.
     if (!farthest) {
         for (const Edge& edge : edges_)

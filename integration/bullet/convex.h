@@ -5,6 +5,7 @@
 #include <BulletCollision/CollisionShapes/btMultiSphereShape.h>
 
 #include <array>
+#include <glm/geometric.hpp>
 #include <optional>
 #include <span>
 #include <vector>
@@ -34,6 +35,14 @@ class Convex {
     };
     /// Outside of a hull and farther than `reach`, only a lower bound of the distance.
     Near nearest(const glm::vec3& point, float reach) const;
+
+    struct Entry {
+        float part;  ///< of the way, at which it comes within the tolerance
+        Near near;   ///< there
+    };
+    /// Where a straight way comes to the body; where it begins if that is inside.
+    /// @param tolerance  how near counts [m]
+    std::optional<Entry> enter(const glm::vec3& start, const glm::vec3& way, float tolerance) const;
 
     /// True where surface points of a field alone would miss the deepest place of the round surface between them.
     bool isCurved() const { return core_ != Core::box; }
@@ -67,12 +76,15 @@ class Convex {
         glm::vec3 normal;
         float offset;
         std::size_t begin, end;  ///< triangles of `faces_` that lie in it
+
+        float height(const glm::vec3& point) const { return glm::dot(normal, point) - offset; }
     };
 
     void makeRevolution(int axis, float halfHeight, float lowerRadius, float upperRadius);
     void addRim(float height, float rim);
     void makeBox(const glm::vec3& halfExtents);
     void makeHull(const std::vector<btVector3>& points);
+    void joinPlanes();
     void makeBalls(const btMultiSphereShape& shape);
 
     Near nearestOfSegment(const glm::vec3& point) const;
@@ -93,6 +105,8 @@ class Convex {
     float lowerRadius_ = 0, upperRadius_ = 0;  ///< of solids of revolution at either end [m]
     std::vector<Plane> planes_;                ///< of hulls
     Mesh faces_;                               ///< of hulls; `points` are the corners of every core
+    /// The planes around corner i of a hull are planesAround_[j] with firstAround_[i] <= j < firstAround_[i + 1].
+    std::vector<std::uint32_t> firstAround_, planesAround_;
     std::vector<Edge> edges_;
     BallHull balls_;
     std::vector<float> radii_;  ///< of balls: of corners [m]

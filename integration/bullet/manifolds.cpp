@@ -41,7 +41,7 @@ constexpr float chosenWithin = 0.5f;
 // The small motions that contacts are kept for: tilts from those of a fall to those of rest [rad], shifts aside [parts
 // of the extent] and twists [rad]. Their directions are askew to everything one models: a rectangle's corners are then
 // each met first by themselves.
-constexpr float tilts[] = {1.f / 8, 1.f / 32, 1.f / 128};
+constexpr float tilts[] = {1.f / 8, 1.f / 32, 1.f / 128}, mostTurn = 1;
 constexpr float aside = 1.f / 64;
 constexpr int tiltDirections = 8, shiftDirections = 8;
 constexpr float askew = 0.3f;  // [rad]
@@ -201,9 +201,13 @@ class Gaps {
         std::fill(column(gap) + count_, column(gap) + padded_, std::numeric_limits<float>::max());
         // What is on its way is stopped where it touches: it gets no deeper than what touches already, which must bear
         // its part of a body that comes down aslant.
-        float first = 0;
+        float first = 0, approach = 0;
         for (const std::uint32_t i : group)
-            if (contacts[i].distance > 0) first = std::min(first, contacts[i].remaining());
+            if (contacts[i].distance > 0) {
+                first = std::min(first, contacts[i].remaining());
+                approach = std::max(approach, contacts[i].approach);
+            }
+        turn_ = extent_ > 0 ? std::min(approach / extent_, mostTurn) : 0;
         for (std::size_t k = 0; k < count_; ++k) {
             const Contact& contact = contacts[group[k]];
             const glm::vec3 turn = glm::cross(contact.position - centre, contact.normal);
@@ -256,6 +260,8 @@ class Gaps {
     }
 
     float extent() const { return extent_; }
+    /// By what a body is turned in the step whose one side is stopped while the other one goes on [rad].
+    float turn() const { return turn_; }
 
   private:
     static constexpr std::size_t lanes = 8;
@@ -265,7 +271,7 @@ class Gaps {
 
     std::size_t count_, padded_;
     std::vector<float> numbers_;  ///< column by column
-    float extent_ = 0;
+    float extent_ = 0, turn_ = 0;
 };
 
 /// The contacts of a group that some small motion of the bodies meets first. Those of the last step stay as long as
@@ -274,7 +280,9 @@ class FirstMet {
   public:
     FirstMet(const std::vector<Contact>& contacts, const Group& group) : gaps_(contacts, group) {
         static const std::vector<Nudge> all = nudges();
-        nudges_ = all;
+        if (const float turn = gaps_.turn(); turn > tilts[0])
+            for (int k = 0; k < tiltDirections; ++k) nudges_.push_back({.tilt = turn * towards(float(k) / tiltDirections)});
+        nudges_.insert(nudges_.end(), all.begin(), all.end());
         for (const Nudge& nudge : nudges_) least_.push_back(gaps_.least(nudge));
     }
 
@@ -359,7 +367,7 @@ class FirstMet {
     }
 
     Gaps gaps_;
-    std::span<const Nudge> nudges_;
+    std::vector<Nudge> nudges_;
     std::vector<float> least_;         ///< gap after each motion
     std::vector<std::uint32_t> kept_;  ///< as indices in the group
     std::vector<Motions> met_;         ///< by each of these

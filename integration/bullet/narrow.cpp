@@ -45,9 +45,8 @@ constexpr float flatEdge = -0.9999985f;
 // Faces that fall by less lie on what they touch: the next surface points are as deep to a hundredth of a voxel.
 constexpr float leastDownhill = 0.05f;
 constexpr float touchingFace = 0.25f;  // [voxels]
-// A way has met a convex body where it is this near to it [voxels]; it is followed for so many steps of what is clear.
-constexpr float sweepTolerance = 0.1f;
-constexpr int mostSteps = 64;
+// A way has met a convex body where it is this near to it [voxels]: by more, it would meet edges that it goes past.
+constexpr float sweepTolerance = 1e-3f;
 // By less than this a way only grazes, and goes past [voxels].
 constexpr float grazing = 0.25f;
 // The feature of what is lowest over a plane, for contact tests: no surface point's, no edge's.
@@ -136,8 +135,8 @@ class Local {
         if (!(length > 0)) return;
         // farther from the field the probes get sparser
         const int parts = probeParts(length, voxel_, (1 << partBits) - 1);
-        const float reach =
-            margin + longestWay_ + mostInterpolationError * voxel_ + std::max(edge.radius[0], edge.radius[1]);
+        const float way = ways_.longest(edge.place(0.5f), length);
+        const float reach = margin + way + mostInterpolationError * voxel_ + std::max(edge.radius[0], edge.radius[1]);
         if (edge.isStraight && !comesNear(edge.place(0), edge.place(1), reach)) return;
         Answer before = first;
         for (int i = 0; i < parts;) {
@@ -306,7 +305,8 @@ class Touching {
     }
 
     bool reject(const glm::vec3& centre, float radius) const {
-        const float reach = scale_ * radius + std::max(edgeReach_, margin_ + local_.longestWay());
+        const float way = local_.ways().longest(scale_ * centre, scale_ * radius);
+        const float reach = scale_ * radius + std::max(edgeReach_, margin_ + way);
         return convex_.nearest(intoConvex(scale_ * centre), reach).distance > reach;
     }
 
@@ -325,6 +325,9 @@ class Touching {
         // What is round has no edge that a point could see aslant.
         const bool apart = near.distance > 0 && approach == 0 && !point.isSharp && !convex_.isRound(near) && !measured_;
         if (!opposition.keeps(glm::dot(normal, point.normal), apart)) return;
+        if (apart && looksAtEdge(intoConvex(position), toConvex_ * point.normal, near.distance, near.normal,
+                                 [&](const glm::vec3& place) { return convex_.nearest(place, edgeReach_).normal; }))
+            return;
         if (convex_.isCurved()) {
             // corners and edges are exact, and samples next to them are not
             const auto better = refine(near, feature);
@@ -381,15 +384,9 @@ class Touching {
 
     /// @param start, way  in the convex body's coordinates
     std::optional<Meeting> meeting(const glm::vec3& start, const glm::vec3& way) const {
-        const float length = glm::length(way), touch = sweepTolerance * voxel_;
-        float gone = 0;
-        for (int i = 0; i < mostSteps; ++i) {
-            const Convex::Near near = convex_.nearest(start + gone / length * way, length);
-            if (near.distance <= touch) return Meeting{near.normal, -glm::dot(near.normal, gone / length * way)};
-            gone += near.distance;
-            if (gone > length) break;
-        }
-        return std::nullopt;
+        const auto met = convex_.enter(start, way, sweepTolerance * voxel_);
+        if (!met) return std::nullopt;
+        return Meeting{met->near.normal, -glm::dot(met->near.normal, met->part * way)};
     }
 
     glm::vec3 wayIntoConvex(const glm::vec3& position) const { return -(toConvex_ * local_.ways().of(position)); }

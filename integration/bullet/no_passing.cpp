@@ -117,17 +117,10 @@ class ConvexObstacle {
 
     float bound(const glm::vec3& point) const { return nearest(point).distance; }
     std::optional<Entry> entry(const glm::vec3& from, const glm::vec3& to, float) const {
-        const glm::vec3 way = to - from;
-        const float length = glm::length(way);
-        float gone = 0;
-        for (int i = 0; i < mostSteps; ++i) {
-            const glm::vec3 at = length > 0 ? from + gone / length * way : from;
-            const Convex::Near near = nearest(at);
-            if (near.distance <= tolerance_) return Entry{at - near.distance * near.normal, near.normal};
-            gone += near.distance;
-            if (gone > length) break;
-        }
-        return std::nullopt;
+        const auto entry = convex_.enter(from, to - from, tolerance_);
+        if (!entry) return std::nullopt;
+        const glm::vec3 at = from + entry->part * (to - from);
+        return Entry{at - entry->near.distance * entry->near.normal, entry->near.normal};
     }
     std::optional<glm::vec3> wayOut(const glm::vec3& point, float) const {
         const Convex::Near near = nearest(point);

@@ -18,6 +18,9 @@ constexpr float hardlyTurned = 0.05f;
 // Bodies are looked at after a turn of this at most [rad]. Where they are not swept, the points that take over are
 // known only up to a margin: a turn then takes none off the surface by more than this [parts of that distance].
 constexpr float mostTurn = 0.5f, turnsOff = 0.25f;
+// It is met a bit too early: else the points around the lowest one of a wheel get in by what a step is off, and throw
+// it up when they touch [parts of the bend of their ways], at most [parts of that distance].
+constexpr float earlier = 0.1f, mostEarly = 0.05f;
 // Where a field looks another way than a contact by more than this cosine tells, it says nothing about it: that is one
 // of an edge.
 constexpr float sameNormal = 0.95f;
@@ -85,8 +88,9 @@ std::optional<Ahead> Turning::ahead(const Contact& contact) const {
     const btVector3 arm = middle - velocity.centre, itsArm = middle - its.centre;
 
     const float seconds = std::min({own.side.seconds, mostSeconds(own, middle), mostSeconds(other, middle)});
-    const float way = seconds * std::max(velocity.angular.cross(arm).length(), its.angular.cross(itsArm).length());
-    if (!(way > hardlyTurned * continuity_.sameWithin)) return std::nullopt;
+    const float way = seconds * velocity.angular.cross(arm).length(),
+                itsWay = seconds * its.angular.cross(itsArm).length();
+    if (!(std::max(way, itsWay) > hardlyTurned * continuity_.sameWithin)) return std::nullopt;
 
     // From the other body's centre it goes along that one's surface; towards it, that is the solver's business.
     const btVector3 armThen = turned(arm, velocity.angular, seconds), passing = velocity.linear - its.linear;
@@ -100,7 +104,9 @@ std::optional<Ahead> Turning::ahead(const Contact& contact) const {
                     otherThen = its.centre + itsArmThen - surface->distance * normal;
     const float seen = seconds * normal.dot(velocity.at(ownThen) - its.at(otherThen)),
                 left = surface->distance - radius + seconds * leaving - seen;
-    const float distance = std::max(left, 0.f);
+    const float bend = seconds * velocity.angular.length() * way,
+                early = std::min(mostEarly * continuity_.sameWithin, earlier * bend);
+    const float distance = std::max(left - early, 0.f);
     if (isOfB) return Ahead{otherThen, ownThen, -normal, distance};
     return Ahead{ownThen, otherThen, normal, distance};
 }

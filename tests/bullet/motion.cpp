@@ -577,6 +577,37 @@ TEST_CASE("What is about to land is met by all of its corners, finer than the fl
     CHECK(contacts == world.dispatcher.statistics().contactsKept);
 }
 
+TEST_CASE("What falls flat without friction goes nowhere else") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    Random random(seed);
+    Shape slab(exactBox({1, 1, 0.1f}, 0.4f * h)), cube(exactBox({0.1f, 0.1f, 0.1f}, 0.4f * h));
+    btBoxShape box({0.1f, 0.1f, 0.1f}), ground({1, 1, 0.1f});
+    btCylinderShapeZ cylinder({0.1f, 0.1f, 0.1f});
+    const struct {
+        const char* name;
+        btCollisionShape &falling, &ground;
+    } pairs[] = {{"box on field", box, slab},
+                 {"cylinder on field", cylinder, slab},
+                 {"field on field", cube, slab},
+                 {"field on box", cube, ground}};
+    for (const auto& pair : pairs)
+        for (int i = 0; i < 20; ++i) {
+            CAPTURE(pair.name, i);
+            World world;
+            world.add(pair.ground, 0, {0, 0, 0});
+            const btVector3 place(float(random(-0.5, 0.5)), float(random(-0.5, 0.5)), 0.2f + float(random(0, 0.6)));
+            btRigidBody* body =
+                world.add(pair.falling, 1, place, btQuaternion(btVector3(0, 0, 1), float(random(0, 3))));
+            body->setFriction(0);
+            body->setActivationState(DISABLE_DEACTIVATION);
+            for (int step = 0; step < 60; ++step) world.dynamics.stepSimulation(1 / 60.f, 0);
+            const btVector3 velocity = body->getLinearVelocity(), at = body->getCenterOfMassPosition();
+            CHECK(std::hypot(velocity.x(), velocity.y()) < 1e-3f);
+            CHECK(std::hypot(at.x() - place.x(), at.y() - place.y()) < 1e-3f);
+        }
+}
+
 TEST_CASE("What is small and falls by voxels in a step is borne on all sides, and comes to rest") {
     const unsigned seed = test::seed();
     const float size = GENERATE(0.01f, 0.03f), steps = GENERATE(60.f, 120.f);

@@ -38,9 +38,10 @@ struct Roller {
     World world;
     btRigidBody* body;
 
-    Roller(btCollisionShape& shape, btCollisionShape& ground, const btVector3& groundAt, float speed, bool slides) {
+    Roller(btCollisionShape& shape, btCollisionShape& ground, const btVector3& groundAt, float speed, bool slides,
+           const btQuaternion& turned = btQuaternion(btVector3(1, 2, 0).normalized(), 0.3f)) {
         world.add(ground, 0, groundAt);
-        body = world.add(shape, 1, {0, 0, radius}, btQuaternion(btVector3(1, 2, 0).normalized(), 0.3f));
+        body = world.add(shape, 1, {0, 0, radius}, turned);
         const float moment = 0.4f * radius * radius;
         body->setMassProps(1, {moment, moment, moment});
         body->updateInertiaTensor();
@@ -83,29 +84,36 @@ TEST_CASE("Balls of a few voxels lie as high as their triangles do, on all that 
     }
 }
 
-TEST_CASE("A ball rolls on") {
+TEST_CASE("Balls roll on") {
     const float speed = GENERATE(0.3f, 1.f, 3.f);
-    CAPTURE(speed);
+    const bool onBox = GENERATE(false, true), isGuarded = GENERATE(false, true);
+    const unsigned seed = test::seed();
+    CAPTURE(speed, onBox, isGuarded, seed);
+    Random random(seed);
     const auto collider = ball(32);
     Shape shape(collider);
     btStaticPlaneShape plane({0, 0, 1}, 0);
     btBoxShape box({10, 1, 0.1f});
-    const bool onBox = GENERATE(false, true);
-    CAPTURE(onBox);
     btCollisionShape& ground = onBox ? static_cast<btCollisionShape&>(box) : plane;
-    Roller roller(shape, ground, {0, 0, onBox ? -0.1f : 0.f}, speed, false);
-    std::optional<bullet::NoPassing> guard;
-    if (const bool isGuarded = GENERATE(false, true); isGuarded) guard.emplace(roller.world.dynamics);
-    float highest = 0;
-    for (int i = 0; i < 60; ++i) {
-        roller.world.dynamics.stepSimulation(1 / 60.f, 0);
-        highest = std::max(highest, float(roller.body->getWorldTransform().getOrigin().z()) - radius);
+    float kept = 0, highest = 0;
+    constexpr int balls = 8;
+    for (int i = 0; i < balls; ++i) {
+        const btQuaternion turned(bullet::toBullet(random.direction()), float(random(0, 3)));
+        Roller roller(shape, ground, {0, 0, onBox ? -0.1f : 0.f}, speed, false, turned);
+        std::optional<bullet::NoPassing> guard;
+        if (isGuarded) guard.emplace(roller.world.dynamics);
+        for (int step = 0; step < 60; ++step) {
+            roller.world.dynamics.stepSimulation(1 / 60.f, 0);
+            highest = std::max(highest, float(roller.body->getWorldTransform().getOrigin().z()) - radius);
+        }
+        const float left = roller.body->getLinearVelocity().x() / speed;
+        CHECK(left < 1.02f);
+        kept += left / balls;
     }
     // what its facets take, each of which it comes down on: those between points 1.4 voxels apart, at 0.3 m/s about a
-    // tenth in a second; and it is not thrown up: at 3 m/s, which turns it by half a radian in a step, it lifts by 2
-    // mm, where straight ways would throw it up by 20
-    CHECK(roller.body->getLinearVelocity().x() > 0.75f * speed);
-    CHECK(roller.body->getLinearVelocity().x() < 1.02f * speed);
+    // sixth in a second; and it is not thrown up: at 3 m/s, which turns it by half a radian in a step, it lifts by 1 to
+    // 2 mm, where straight ways would throw it up by 20
+    CHECK(kept > 0.75f);
     CHECK(highest < 0.03f * radius);
 }
 

@@ -1,0 +1,128 @@
+// Bullet's convex shapes by formula.
+#include "integration/bullet/convex.h"
+
+#include <LinearMath/btConvexHullComputer.h>
+#include <btBulletCollisionCommon.h>
+
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <initializer_list>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "demos/shared/shapes.h"
+#include "integration/bullet/convert.h"
+#include "tests/support/random.h"
+#include "tests/support/support.h"
+
+using namespace bilayer;
+using namespace bilayer::test;
+using bullet::Convex;
+
+namespace {
+
+std::vector<glm::vec3> cloud(std::size_t count, const glm::vec3& size, Random& random) {
+    std::vector<glm::vec3> points;
+    for (std::size_t i = 0; i < count; ++i)
+        points.push_back(size * glm::vec3(random(-1, 1), random(-1, 1), random(-1, 1)));
+    return points;
+}
+
+/// The triangles of a hull, each face as a fan.
+Mesh hullOf(const std::vector<glm::vec3>& points) {
+    std::vector<btVector3> all;
+    for (const glm::vec3& point : points) all.push_back(bullet::toBullet(point));
+    btConvexHullComputer hull;
+    hull.compute(&all.front().x(), sizeof(btVector3), int(all.size()), 0, 0);
+    Mesh mesh;
+    for (int i = 0; i < hull.vertices.size(); ++i) mesh.points.push_back(bullet::toGlm(hull.vertices[i]));
+    for (int i = 0; i < hull.faces.size(); ++i) {
+        const auto* first = &hull.edges[hull.faces[i]];
+        const unsigned apex = unsigned(first->getSourceVertex());
+        for (const auto* edge = first->getNextEdgeOfFace(); edge != first; edge = edge->getNextEdgeOfFace())
+            if (unsigned(edge->getTargetVertex()) != apex)
+                mesh.triangles.push_back({apex, edge->getSourceVertex(), edge->getTargetVertex()});
+    }
+    return mesh;
+}
+
+}  // namespace
+
+TEST_CASE("Points near hulls are as far away as from the nearest of all their faces") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    Random random(seed);
+    const struct {
+        std::string name;
+        std::vector<glm::vec3> points;
+    } hulls[] = {{"tetrahedron", cloud(4, glm::vec3(1), random)},
+                 {"cloud of 12", cloud(12, glm::vec3(1), random)},
+                 {"cloud of 300", cloud(300, {1, 0.6f, 0.3f}, random)},
+                 {"plate", cloud(60, {1, 1, 0.01f}, random)},
+                 {"needle", cloud(60, {1, 0.01f, 0.02f}, random)},
+                 {"sphere", shapes::sphere(1, 3).points},
+                 {"box with points all over its faces", shapes::box({1, 0.6f, 0.4f}, 6).points},
+                 {"cylinder", shapes::cylinder(0.5f, 1).points},
+                 {"cone", shapes::cone(0.5f, 1).points}};
+    for (const auto& hull : hulls) {
+        CAPTURE(hull.name);
+        btConvexHullShape shape;
+        for (const glm::vec3& point : hull.points) shape.addPoint(bullet::toBullet(point), false);
+        shape.recalcLocalAabb();
+        shape.setMargin(0);
+        const Convex convex(shape);
+        const Mesh faces = hullOf(hull.points);
+        for (int i = 0; i < 3000; ++i) {
+            const glm::vec3 point = float(random(0.01, 3)) * random.direction();
+            const Convex::Near near = convex.nearest(point, std::numeric_limits<float>::max());
+            CAPTURE(i, point.x, point.y, point.z);
+            REQUIRE(std::abs(near.distance) == Approx(test::distance(faces, glm::dvec3(point))).margin(2e-6));
+            REQUIRE(glm::distance(near.core + near.distance * near.normal, point) < 4e-6f);
+            REQUIRE(test::distance(faces, glm::dvec3(near.core)) < 2e-6);
+        }
+    }
+}
+
+TEST_CASE("Straight ways enter convex shapes where distance says, and only then") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    Random random(seed);
+    btConvexHullShape hull;
+    for (const glm::vec3& point : cloud(100, {1, 0.6f, 0.3f}, random)) hull.addPoint(bullet::toBullet(point), false);
+    hull.recalcLocalAabb();
+    hull.setMargin(0.05f);
+    btBoxShape box({0.9f, 0.5f, 0.2f});
+    btSphereShape ball(0.7f);
+    btCapsuleShape capsule(0.3f, 1);
+    btCylinderShape cylinder({0.5f, 0.8f, 0.5f});
+    btConeShape cone(0.6f, 1.5f);
+    btVector3 centres[]{{-0.5f, 0, 0}, {0.5f, 0.2f, 0}, {0, 0, 0.6f}};
+    btScalar radii[]{0.3f, 0.5f, 0.1f};
+    btMultiSphereShape balls(centres, radii, 3);
+    const float tolerance = 1e-3f;
+    int entries = 0;
+    for (const btConvexShape* shape :
+         std::initializer_list<btConvexShape*>{&hull, &box, &ball, &capsule, &cylinder, &cone, &balls}) {
+        CAPTURE(shape->getName());
+        const Convex convex(*shape);
+        for (int i = 0; i < 1000; ++i) {
+            const glm::vec3 start = float(random(0, 2.5)) * random.direction(),
+                            way = float(random(0, 4)) * random.direction();
+            CAPTURE(i);
+            const auto entry = convex.enter(start, way, tolerance);
+            // until then it is outside, and without an entry all the way
+            const float until = entry ? entry->part : 1;
+            for (float part = 0; part < until; part += 2e-3f)
+                REQUIRE(convex.nearest(start + part * way, 10).distance > -1e-4f);
+            if (!entry) continue;
+            ++entries;
+            REQUIRE(convex.nearest(start + entry->part * way, 10).distance ==
+                    Approx(entry->near.distance).margin(1e-5));
+            REQUIRE(entry->near.distance <= tolerance);
+        }
+    }
+    CHECK(entries > 1500);
+}
