@@ -41,7 +41,9 @@ constexpr float chosenWithin = 0.5f;
 // The small motions that contacts are kept for: tilts from those of a fall to those of rest [rad], shifts aside [parts
 // of the extent] and twists [rad]. Their directions are askew to everything one models: a rectangle's corners are then
 // each met first by themselves.
-constexpr float tilts[] = {1.f / 8, 1.f / 32, 1.f / 128}, mostTurn = 1;
+constexpr float tilts[] = {1.f / 8, 1.f / 32, 1.f / 128};
+// and, where a step takes a body farther than that, the turn of one whose other side is stopped, at most [rad].
+constexpr float mostTurn = 1;
 constexpr float aside = 1.f / 64;
 constexpr int tiltDirections = 8, shiftDirections = 8;
 constexpr float askew = 0.3f;  // [rad]
@@ -281,7 +283,8 @@ class FirstMet {
     FirstMet(const std::vector<Contact>& contacts, const Group& group) : gaps_(contacts, group) {
         static const std::vector<Nudge> all = nudges();
         if (const float turn = gaps_.turn(); turn > tilts[0])
-            for (int k = 0; k < tiltDirections; ++k) nudges_.push_back({.tilt = turn * towards(float(k) / tiltDirections)});
+            for (int k = 0; k < tiltDirections; ++k)
+                nudges_.push_back({.tilt = turn * towards(float(k) / tiltDirections)});
         nudges_.insert(nudges_.end(), all.begin(), all.end());
         for (const Nudge& nudge : nudges_) least_.push_back(gaps_.least(nudge));
     }
