@@ -4,8 +4,14 @@
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <limits>
+#include <memory>
 #include <random>
 
+#include "demos/shared/shapes.h"
+#include "integration/bullet/convert.h"
+#include "sdf/build.h"
+#include "tests/support/random.h"
 #include "tests/support/support.h"
 #include "world.h"
 
@@ -165,6 +171,46 @@ TEST_CASE("What a wall holds is not run over by a long column, each held by the 
             }
     }
     CHECK(held > 40);
+}
+
+TEST_CASE("What is small and thin sinks nowhere, though an impact turns it by half its size in a step") {
+    const float size = GENERATE(0.01f, 0.03f), voxel = size / 32;
+    const unsigned seed = test::seed();
+    CAPTURE(size, seed);
+    Random random(seed);
+    const struct {
+        const char* name;
+        Mesh mesh;
+    } kinds[] = {{"ring", shapes::torus(0.35f * size, 0.15f * size)},
+                 {"disc", shapes::cylinder(0.5f * size, 0.1f * size)},
+                 {"rod", shapes::cylinder(0.07f * size, size)},
+                 {"plate", shapes::box({0.5f * size, 0.4f * size, 0.06f * size})},
+                 {"cone", shapes::cone(0.4f * size, size)}};
+    btStaticPlaneShape plane({0, 0, 1}, 0);
+    btBoxShape box({5 * size, 5 * size, size});
+    Shape slab(exactBox({2 * size, 2 * size, size}, voxel));
+    const struct {
+        const char* name;
+        btCollisionShape& shape;
+        float top;
+    } grounds[] = {{"plane", plane, 0}, {"box", box, size}, {"field", slab, size}};
+    for (const auto& kind : kinds) {
+        Shape shape(std::make_shared<Collider>(kind.mesh, build(kind.mesh, {.voxelSize = voxel})));
+        for (const auto& ground : grounds)
+            for (int i = 0; i < 6; ++i) {
+                CAPTURE(kind.name, ground.name, i);
+                World world;
+                const NoPassing guard(world.dynamics);
+                world.add(ground.shape, 0, {0, 0, -ground.top});
+                const btVector3 axis = bullet::toBullet(random.direction());
+                btRigidBody* body = world.add(shape, 0.1f, {0, 0, size}, btQuaternion(axis, float(random(0, 3))));
+                for (int k = 0; k < 120; ++k) world.dynamics.stepSimulation(step, 0);
+                float lowest = std::numeric_limits<float>::max();
+                for (const glm::vec3& point : kind.mesh.points)
+                    lowest = std::min(lowest, float((body->getWorldTransform() * bullet::toBullet(point)).z()));
+                CHECK(lowest > -0.6f * voxel);
+            }
+    }
 }
 
 TEST_CASE("Two fast bodies do not pass each other, nor what they meet after a bounce") {
