@@ -449,10 +449,11 @@ ContactReport addContacts(const Placed& a, const Placed& b, const ContactOptions
     ContactReport report;
     const auto opposes = [&](const glm::vec3& normal, const Placed& body, const Placed& other,
                              const SurfacePoint& point, const Touch& touch) {
-        const bool apart = touch.distance > 0 && touch.approach == 0 && !point.isSharp;
+        const bool apart = touch.distance > 0 && !point.isSharp;
         const glm::vec3 own = body.pose.rotation * point.normal;
-        if (!options.keeps(-glm::dot(normal, own), apart)) return false;
-        const bool leavesEdges = apart && options.leastOppositionApart > options.leastOpposition;
+        if (!options.keeps(normal, own, body.motion.turn - other.motion.turn, apart)) return false;
+        const bool leavesEdges =
+            apart && touch.approach == 0 && options.leastOppositionApart > options.leastOpposition;
         return !leavesEdges ||
                !looksAtEdge(body.pose.toWorld(body.scale * point.position), own, touch.distance * other.scale, normal,
                             [&](const glm::vec3& place) { return normalNear(other, place); });

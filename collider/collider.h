@@ -122,15 +122,24 @@ struct ContactOptions {
     /// ones among these touch the surface that they oppose a voxel back along their own normal, if there is one. The
     /// corners of a cube, whose normals are mixed of three, reach 0.57. Below -1: no contact is left out.
     float leastOpposition = -2;
-    /// The same for points of faces that neither touch yet nor are on their way: a point beside the other body sees its
-    /// edge aslant, and would stop it like a curb. If greater than leastOpposition, edges that they see by more than
-    /// half a degree aslant are left out, too, which the other body's own points meet.
+    /// The same for points of faces that do not touch yet: a point beside the other body sees its edge aslant, or meets
+    /// its side, and would stop it like a curb. If greater than leastOpposition, edges that they see by more than half
+    /// a degree aslant are left out, too, which the other body's own points meet.
     float leastOppositionApart = -2;
 
     /// Whether a contact is kept that looks against its point's normal by this cosine.
-    /// @param apart  its point is of a face that neither touches yet nor is on its way
+    /// @param apart  its point is of a face that does not touch yet
     bool keeps(float opposition, bool apart) const {
         return opposition >= (apart ? std::max(leastOppositionApart, leastOpposition) : leastOpposition);
+    }
+    /// The same where the point turns with its body, and looks against the surface now, later or in between.
+    /// @param seen, normal  of the surface, outward, and of the point
+    /// @param turn          in the step, as the surface sees it [rad]
+    bool keeps(const glm::vec3& seen, const glm::vec3& normal, const glm::vec3& turn, bool apart) const {
+        const auto isKept = [&](float part) {
+            return keeps(-glm::dot(seen, glm::normalize(normal + part * glm::cross(turn, normal))), apart);
+        };
+        return isKept(0) || (turn != glm::vec3(0) && (isKept(0.5f) || isKept(1)));
     }
 };
 

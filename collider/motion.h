@@ -29,6 +29,9 @@ class RelativeWays {
     /// Of the body's point that is at `point` now.
     glm::vec3 of(const glm::vec3& point) const { return way_ + glm::cross(turn_, point); }
 
+    /// Of the body, as the other one sees it [rad].
+    const glm::vec3& turn() const { return turn_; }
+
     /// The longest way of a point in a sphere, at most.
     float longest(const glm::vec3& centre, float radius) const {
         return glm::length(of(centre)) + radius * glm::length(turn_);

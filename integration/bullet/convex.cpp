@@ -33,6 +33,8 @@ namespace {
 constexpr std::uint32_t rimChords = 32;
 // Support points on a shape that has no formula here: directions on a spiral, about 12 degrees apart.
 constexpr int supportDirections = 256;
+// What is thinner than this has no inside [parts of the size]: rounding.
+constexpr float flatness = 1e-6f;
 // A normal that is tilted less than this off the axis belongs to a flat end.
 constexpr float flatEnd = 0.1f;
 // Of a search for the place where a way enters; what takes more only grazes it.
@@ -236,6 +238,9 @@ void Convex::makeHull(const std::vector<btVector3>& points) {
         if (left != wings.end() && right != wings.end()) edges_.back().wings = Wings{left->second, right->second};
     }
     joinPlanes();
+    isFlat_ = !planes_.empty() && std::all_of(faces_.points.begin(), faces_.points.end(), [&](const glm::vec3& point) {
+        return std::abs(planes_.front().height(point)) <= flatness * bounds_[0].distance(bounds_[1]);
+    });
 }
 
 void Convex::joinPlanes() {
@@ -352,7 +357,8 @@ Convex::Near Convex::nearestOfHull(const glm::vec3& point, float reach) const {
     for (const Plane& plane : planes_)
         if (const float height = plane.height(point); height > depth) depth = height, farthest = &plane;
     // Inside, the nearest face decides; far outside, a bound does.
-    if (farthest && (depth <= 0 || depth > reach + radius_))
+    const bool isInside = depth <= 0 && !isFlat_;
+    if (farthest && (isInside || depth > reach + radius_))
         return {depth - radius_, farthest->normal, point - depth * farthest->normal, radius_};
 
     float squared = std::numeric_limits<float>::max();
@@ -375,8 +381,11 @@ Convex::Near Convex::nearestOfHull(const glm::vec3& point, float reach) const {
                 plane = &face, triangle = i;
         }
     };
-    if (farthest) considerFace(*farthest);
-    for (const Plane* before = nullptr; plane != before && squared > depth * depth;) {
+    if (isFlat_)
+        for (const Plane& side : planes_) considerFace(side);
+    else if (farthest)
+        considerFace(*farthest);
+    for (const Plane* before = nullptr; !isFlat_ && plane != before && squared > depth * depth;) {
         before = plane;
         const glm::uvec3 corners = faces_.triangles[triangle];
         for (int i = 0; i < 3; ++i)

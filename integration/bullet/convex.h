@@ -104,6 +104,7 @@ class Convex {
     glm::vec3 halfExtents_{0};                 ///< of boxes [m]
     float lowerRadius_ = 0, upperRadius_ = 0;  ///< of solids of revolution at either end [m]
     std::vector<Plane> planes_;                ///< of hulls
+    bool isFlat_ = false;                      ///< a hull of points in one plane, which nothing is inside of
     Mesh faces_;                               ///< of hulls; `points` are the corners of every core
     /// The planes around corner i of a hull are planesAround_[j] with firstAround_[i] <= j < firstAround_[i + 1].
     std::vector<std::uint32_t> firstAround_, planesAround_;

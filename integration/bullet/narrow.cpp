@@ -323,9 +323,10 @@ class Touching {
         float approach = local_.approach(position, normal, margin_);
         if (near.distance > 0 && approach > 0 && !meets(position, point)) approach = 0;
         // What is round has no edge that a point could see aslant.
-        const bool apart = near.distance > 0 && approach == 0 && !point.isSharp && !convex_.isRound(near) && !measured_;
-        if (!opposition.keeps(glm::dot(normal, point.normal), apart)) return;
-        if (apart && looksAtEdge(intoConvex(position), toConvex_ * point.normal, near.distance, near.normal,
+        const bool apart = near.distance > 0 && !point.isSharp && !convex_.isRound(near) && !measured_;
+        if (!opposition.keeps(-normal, point.normal, -local_.ways().turn(), apart)) return;
+        if (apart && approach == 0 &&
+            looksAtEdge(intoConvex(position), toConvex_ * point.normal, near.distance, near.normal,
                                  [&](const glm::vec3& place) { return convex_.nearest(place, edgeReach_).normal; }))
             return;
         if (convex_.isCurved()) {
@@ -378,15 +379,15 @@ class Touching {
 
     /// Where a way meets the convex body.
     struct Meeting {
-        glm::vec3 normal;  ///< of the convex body, in its own coordinates
-        float gap;         ///< from the start to the plane that is met [m]
+        Convex::Near near;  ///< of the convex body, in its own coordinates
+        float gap;          ///< from the start to the plane that is met [m]
     };
 
     /// @param start, way  in the convex body's coordinates
     std::optional<Meeting> meeting(const glm::vec3& start, const glm::vec3& way) const {
         const auto met = convex_.enter(start, way, sweepTolerance * voxel_);
         if (!met) return std::nullopt;
-        return Meeting{met->near.normal, -glm::dot(met->near.normal, met->part * way)};
+        return Meeting{met->near, -glm::dot(met->near.normal, met->part * way)};
     }
 
     glm::vec3 wayIntoConvex(const glm::vec3& position) const { return -(toConvex_ * local_.ways().of(position)); }
@@ -406,9 +407,10 @@ class Touching {
         if (distance > glm::length(way) || !meets(position, point)) return;
         const auto met = meeting(intoConvex(position), way);
         if (!met || !(met->gap > 0)) return;
-        const glm::vec3 normal = -(toField_ * met->normal);
-        if (!opposition.keeps(glm::dot(normal, point.normal), false)) return;
-        contacts.push_back(local_.contact(position, normal, met->gap, feature, -glm::dot(met->normal, way)));
+        const glm::vec3 normal = -(toField_ * met->near.normal);
+        const bool apart = !point.isSharp && !convex_.isRound(met->near);
+        if (!opposition.keeps(-normal, point.normal, -local_.ways().turn(), apart)) return;
+        contacts.push_back(local_.contact(position, normal, met->gap, feature, -glm::dot(met->near.normal, way)));
         contacts.back().turningRadius = 0;
     }
 
@@ -699,6 +701,10 @@ class TriangleProbes : public btTriangleCallback {
                 found->turningRadius = 0;
             } else {
                 found = local_.probe(below, answer, 0, 0, margin_, report_);
+                // what the middle of a face sees aslant is beside it
+                const glm::quat& inWorld = field_.pose.rotation;
+                if (found && !opposition.keeps(found->normal, -(inWorld * normal), inWorld * local_.ways().turn(), true))
+                    return;
                 if (found) found->turningRadius = -1;  // it stays below the point
             }
             if (found) overFaces_.push_back({index, face.id, *found});
