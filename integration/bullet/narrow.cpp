@@ -45,6 +45,8 @@ constexpr float flatEdge = -0.9999985f;
 // Faces that fall by less lie on what they touch: the next surface points are as deep to a hundredth of a voxel.
 constexpr float leastDownhill = 0.05f;
 constexpr float touchingFace = 0.25f;  // [voxels]
+// Normals that enclose less than a degree are those of one face (cosine).
+constexpr float straight = 0.99985f;
 // A way has met a convex body where it is this near to it [voxels]: by more, it would meet edges that it goes past.
 constexpr float sweepTolerance = 1e-3f;
 // By less than this a way only grazes, and goes past [voxels].
@@ -477,6 +479,7 @@ class Touching {
         const glm::vec3 slope = toConvex_ * here.gradient, start = intoConvex(place);
         glm::vec3 end;
         float least = std::numeric_limits<float>::lowest();
+        bool isWithinFace = false;
         if (const auto line = convex_.sideLine(near, start)) {
             const glm::vec3 from = (*line)[0] + near.radius * near.normal, along = (*line)[1] - (*line)[0];
             const float length = glm::length(along), steepness = glm::dot(slope, along) / length;
@@ -495,11 +498,18 @@ class Touching {
             // no farther than to the border of the face
             const Convex::Near last = convex_.nearest(start - step / steepness * uphill, step);
             end = last.core + last.radius * near.normal;
+            isWithinFace = glm::dot(last.normal, near.normal) > straight;
         }
         const Local::Edge way{
             [&, to = intoField(end)](float part) { return glm::mix(place, to, part); }, {0, 0}, true, 0, std::nullopt};
-        const auto found = local_.deepestBetween(way, 0, here, 1, local_.at(intoField(end)), margin_);
-        return found && found->distance >= least ? found : std::nullopt;
+        auto found = local_.deepestBetween(way, 0, here, 1, local_.at(intoField(end)), margin_);
+        if (!found || found->distance < least) return std::nullopt;
+        // within a face it is the face's normal that counts, on its border the field's
+        const Contact border = local_.contact(intoField(end), -(toField_ * near.normal), 0, 0);
+        const glm::vec3 onFace = found->position + found->distance * found->normal;
+        if (isWithinFace && glm::distance(onFace, border.position) > 2 * searchTolerance * voxel_)
+            found->normal = border.normal;
+        return found;
     }
 
     const Convex& convex_;
