@@ -452,8 +452,7 @@ ContactReport addContacts(const Placed& a, const Placed& b, const ContactOptions
         const bool apart = touch.distance > 0 && !point.isSharp;
         const glm::vec3 own = body.pose.rotation * point.normal;
         if (!options.keeps(normal, own, body.motion.turn - other.motion.turn, apart)) return false;
-        const bool leavesEdges =
-            apart && touch.approach == 0 && options.leastOppositionApart > options.leastOpposition;
+        const bool leavesEdges = apart && touch.approach == 0 && options.leastOppositionApart > options.leastOpposition;
         return !leavesEdges ||
                !looksAtEdge(body.pose.toWorld(body.scale * point.position), own, touch.distance * other.scale, normal,
                             [&](const glm::vec3& place) { return normalNear(other, place); });

@@ -329,7 +329,7 @@ class Touching {
         if (!opposition.keeps(-normal, point.normal, -local_.ways().turn(), apart)) return;
         if (apart && approach == 0 &&
             looksAtEdge(intoConvex(position), toConvex_ * point.normal, near.distance, near.normal,
-                                 [&](const glm::vec3& place) { return convex_.nearest(place, edgeReach_).normal; }))
+                        [&](const glm::vec3& place) { return convex_.nearest(place, edgeReach_).normal; }))
             return;
         if (convex_.isCurved()) {
             // corners and edges are exact, and samples next to them are not
@@ -713,7 +713,8 @@ class TriangleProbes : public btTriangleCallback {
                 found = local_.probe(below, answer, 0, 0, margin_, report_);
                 // what the middle of a face sees aslant is beside it
                 const glm::quat& inWorld = field_.pose.rotation;
-                if (found && !opposition.keeps(found->normal, -(inWorld * normal), inWorld * local_.ways().turn(), true))
+                if (found &&
+                    !opposition.keeps(found->normal, -(inWorld * normal), inWorld * local_.ways().turn(), true))
                     return;
                 if (found) found->turningRadius = -1;  // it stays below the point
             }

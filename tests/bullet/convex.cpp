@@ -126,3 +126,28 @@ TEST_CASE("Straight ways enter convex shapes where distance says, and only then"
     }
     CHECK(entries > 1500);
 }
+
+TEST_CASE("Nothing is inside of a flat hull, and ways beside it do not enter it") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    Random random(seed);
+    const glm::vec3 corners[] = {{-1, -0.5f, 0}, {1, -0.5f, 0}, {0.8f, 0.7f, 0}, {-0.5f, 1, 0}};
+    btConvexHullShape shape;
+    Mesh quad;
+    for (const glm::vec3& corner : corners) {
+        shape.addPoint(bullet::toBullet(corner), false);
+        quad.points.push_back(corner);
+    }
+    quad.triangles = {{0, 1, 2}, {0, 2, 3}};
+    shape.recalcLocalAabb();
+    shape.setMargin(0);
+    const Convex convex(shape);  // whose corners Bullet rounds to a ten-thousandth of its size
+    for (int i = 0; i < 2000; ++i) {
+        const glm::vec3 point(float(random(-3, 3)), float(random(-3, 3)), i % 2 ? 0.f : float(random(-1, 1)));
+        CAPTURE(i, point.x, point.y, point.z);
+        REQUIRE(convex.nearest(point, 10).distance == Approx(test::distance(quad, glm::dvec3(point))).margin(3e-4));
+        const glm::vec3 way(float(random(-1, 1)), float(random(-1, 1)), float(random(-3, 3)));
+        if (const auto entry = convex.enter(point, way, 1e-3f))
+            REQUIRE(test::distance(quad, glm::dvec3(point + entry->part * way)) < 1.4e-3);
+    }
+}

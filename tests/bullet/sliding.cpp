@@ -1,0 +1,117 @@
+// Bodies slide as friction says, on whatever they lie.
+#include <BulletCollision/CollisionShapes/btHeightfieldTerrainShape.h>
+
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <vector>
+
+#include "demos/shared/shapes.h"
+#include "tests/support/random.h"
+#include "tests/support/support.h"
+#include "world.h"
+
+using namespace bilayer;
+using namespace bilayer::test;
+using bullet::Shape;
+
+namespace {
+
+constexpr float half = 4;  // of all grounds, whose tops are at 0 [m]
+
+/// Grounds of all kinds.
+struct Grounds {
+    btStaticPlaneShape plane{{0, 0, 1}, 0};
+    btBoxShape box{{half, half, 0.2f}};
+    TriangleShape twoTriangles{shapes::box({half, half, 0.2f})}, manyTriangles{shapes::box({half, half, 0.2f}, 40)};
+    std::vector<float> heights = std::vector<float>(33 * 33, 0.f);
+    btHeightfieldTerrainShape heightfield{33, 33, heights.data(), 1, -1, 1, 2, PHY_FLOAT, false};
+    Shape field{exactBox({half, half, 0.2f}, 0.04f)};
+
+    struct Ground {
+        const char* name;
+        btCollisionShape& shape;
+        float top;  ///< above the shape's origin [m]
+    };
+    std::vector<Ground> all() {
+        heightfield.setLocalScaling({0.25f, 0.25f, 1});
+        return {{"plane", plane, 0},
+                {"box", box, 0.2f},
+                {"large triangles", *twoTriangles.shape, 0.2f},
+                {"small triangles", *manyTriangles.shape, 0.2f},
+                {"height field", heightfield, 0},
+                {"field", field, 0.2f}};
+    }
+};
+
+}  // namespace
+
+TEST_CASE("What is flat below slides to a stop where friction says, on all that is flat") {
+    const float steps = GENERATE(60.f, 240.f), voxel = GENERATE(0.01f, 0.004f);
+    const unsigned seed = test::seed();
+    CAPTURE(seed, steps, voxel);
+    Random random(seed);
+    const float edge = 0.1f;  // half of the bodies' [m]
+    Shape cube(exactBox(glm::vec3(edge), voxel));
+    btBoxShape box(btVector3(edge, edge, edge));
+    const struct {
+        const char* name;
+        btCollisionShape& shape;
+    } bodies[] = {{"cube", cube}, {"Bullet's box", box}};
+    Grounds grounds;
+    for (const auto& kind : bodies)
+        for (const auto& ground : grounds.all()) {
+            if (&kind.shape == &box && &ground.shape != &grounds.field) continue;
+            CAPTURE(kind.name, ground.name);
+            World world;
+            world.add(ground.shape, 0, {0, 0, -ground.top});
+            const float start = float(random(-2, 0));
+            btRigidBody* body = world.add(kind.shape, 1, {start, float(random(-1, 1)), edge},
+                                          btQuaternion(btVector3(0, 0, 1), float(random(0, 3))));
+            // Bullet multiplies the coefficients of two bodies, 0.5 for the ground
+            body->setFriction(0.5f);
+            body->setDamping(0, 0);
+            const float speed = float(random(1, 3));
+            body->setLinearVelocity({speed, 0, 0});
+            float highest = 0;
+            for (float time = 0; time < 2; time += 1 / steps) {
+                world.dynamics.stepSimulation(1 / steps, 0);
+                highest = std::max(highest, float(body->getWorldTransform().getOrigin().z()) - edge);
+            }
+            // each step's friction acts before the step's way
+            const float deceleration = 0.25f * 9.81f, way = speed * speed / (2 * deceleration) - speed / (2 * steps);
+            CHECK(body->getWorldTransform().getOrigin().x() - start == Approx(way).epsilon(0.02).margin(0.01));
+            CHECK(highest < 0.1f * voxel);
+        }
+}
+
+TEST_CASE("What is round below keeps its speed without friction") {
+    const float steps = GENERATE(60.f, 240.f);
+    const unsigned seed = test::seed();
+    CAPTURE(seed, steps);
+    Random random(seed);
+    Shape ball(exactSphere(0.1f, 0.01f)), ring(exactTorus(0.1f, 0.04f, 0.01f));
+    const struct {
+        const char* name;
+        btCollisionShape& shape;
+        float height;
+    } bodies[] = {{"ball", ball, 0.1f}, {"ring", ring, 0.04f}};
+    Grounds grounds;
+    for (const auto& kind : bodies)
+        for (const auto& ground : grounds.all()) {
+            // curved ways over points that touch soon are taken for straight ones there
+            if (&ground.shape == &grounds.field) continue;
+            if (steps < 100 && &ground.shape != &grounds.plane && &ground.shape != &grounds.box) continue;
+            CAPTURE(kind.name, ground.name);
+            World world;
+            world.add(ground.shape, 0, {0, 0, -ground.top});
+            btRigidBody* body = world.add(kind.shape, 1, {-2, float(random(-1, 1)), kind.height},
+                                          btQuaternion(btVector3(0, 0, 1), float(random(0, 3))));
+            body->setFriction(0);
+            body->setDamping(0, 0);
+            body->setLinearVelocity({2, 0, 0});
+            for (float time = 0; time < 1; time += 1 / steps) world.dynamics.stepSimulation(1 / steps, 0);
+            CHECK(body->getLinearVelocity().x() == Approx(2).epsilon(0.03));  // of a ball, 2 % on a box
+            CHECK(body->getWorldTransform().getOrigin().z() == Approx(kind.height).margin(0.002));
+        }
+}
