@@ -49,16 +49,9 @@ std::vector<NamedScene> scenes() {
             {"spin", [] { return demo::spin({.seconds = 10}); }}};
 }
 
-// A scene on so many threads.
-struct Played {
-    double step, slowStep;  // the median, and what 99 in 100 stay below [ms]
-    demo::Outcome outcome;
-};
-
-Played play(const NamedScene& scene, int threads) {
+demo::Outcome play(const NamedScene& scene, int threads) {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, std::size_t(threads));
-    demo::Outcome outcome = scene.play();
-    return {outcome.medianStep(), outcome.slowStep(), std::move(outcome)};
+    return scene.play();
 }
 
 // Throws std::runtime_error where another number of threads has led elsewhere.
@@ -66,14 +59,13 @@ void compare(const NamedScene& scene, int threads, int repetitions) {
     std::vector<double> one, all, slow;
     std::optional<demo::Outcome> outcome;
     for (int i = 0; i < repetitions; ++i) {
-        const Played alone = play(scene, 1);
-        Played together = play(scene, threads);
-        if (alone.outcome.fingerprint != together.outcome.fingerprint)
+        const demo::Outcome alone = play(scene, 1);
+        outcome.emplace(play(scene, threads));
+        if (alone.fingerprint != outcome->fingerprint)
             throw std::runtime_error(scene.name + ": other bits on one thread than on several");
-        one.push_back(alone.step);
-        all.push_back(together.step);
-        slow.push_back(together.slowStep);
-        outcome = std::move(together.outcome);
+        one.push_back(alone.medianStep());
+        all.push_back(outcome->medianStep());
+        slow.push_back(outcome->slowStep());
     }
     const auto missed = std::count_if(outcome->criteria.begin(), outcome->criteria.end(),
                                       [](const demo::Criterion& criterion) { return !criterion.met(); });
@@ -95,9 +87,8 @@ int run(int argc, char** argv) {
         ->check(CLI::Range(1, 100));
     CLI11_PARSE(app, argc, argv);
     fmt::print(
-        "| scene | bodies | contacts a step | a step [ms], 1 thread | {} threads | 99 % of steps | times as fast | 99 "
-        "% of "
-        "penetrations [voxels] | criteria missed |\n|---|---|---|---|---|---|---|---|---|\n",
+        "| scene | bodies | contacts a step | a step [ms], 1 thread | {} threads | 99 % of steps | times as fast | "
+        "99 % of penetrations [voxels] | criteria missed |\n|---|---|---|---|---|---|---|---|---|\n",
         threads);
     for (const NamedScene& scene : scenes())
         if (chosen.empty() || std::find(chosen.begin(), chosen.end(), scene.name) != chosen.end())

@@ -145,19 +145,19 @@ class PointsInField {
         return (distance / field_.voxelSize() + mostInterpolationError) / float(Clearance::partSide);
     }
 
-    // @param within  float (centre, radius): how far away points in a ball may be
-    template <class Within, class Visit>
-    void descend(Within&& within, Visit&& visit) const {
+    // @param kept  float (centre, radius): how far away points in a ball may be [parts]
+    template <class Kept, class Visit>
+    void descend(Kept&& kept, Visit&& visit) const {
         const auto reject = [&](const glm::vec3& centre, float radius) {
-            return clearance_.isOutside(coarse_(centre), radius * coarse_.scale + keptWithin(within(centre, radius)));
+            return clearance_.isOutside(coarse_(centre), radius * coarse_.scale + kept(centre, radius));
         };
         body_.collider.points().visit(reject, visit);
     }
 
     template <class Found>
     void visitAll(ContactReport& report, Found& found) {
-        const auto within = [&](const glm::vec3& centre, float radius) { return seenFrom(centre, radius); };
-        descend(within, [&](std::uint32_t index, const SurfacePoint& point) {
+        const auto kept = [&](const glm::vec3& centre, float radius) { return keptWithin(seenFrom(centre, radius)); };
+        descend(kept, [&](std::uint32_t index, const SurfacePoint& point) {
             const glm::vec3 place = coarse_(point.position);
             const float seen = seenFrom(point.position, 0);
             const bool isAbove = !options_.measured && clearance_.isAbove(place, seen);  // or beyond the band
@@ -173,16 +173,16 @@ class PointsInField {
     void visitAndList(NearPoints::List& near, ContactReport& report, Found& found) {
         const float slack = near.slack(), above = reach_ + steepestInterpolant * slack, within = reach_ + slack,
                     beside = within + mostInterpolationError * field_.voxelSize(), kept = keptWithin(within);
-        const auto all = [&](const glm::vec3&, float) { return within; };
-        descend(all, [&](std::uint32_t index, const SurfacePoint& point) {
-            const glm::vec3 place = coarse_(point.position);
-            if (clearance_.isAbove(place, above) || clearance_.isOutside(place, kept)) return;
-            const glm::vec3 at = map_(point.position);
-            const Sample sample = sampleAt(at, report);
-            if (sample.distance > (sample.inBand ? above : beside)) return;
-            near.add(index);
-            touch(index, point, at, sample, report, found);
-        });
+        descend([&](const glm::vec3&, float) { return kept; },
+                [&](std::uint32_t index, const SurfacePoint& point) {
+                    const glm::vec3 place = coarse_(point.position);
+                    if (clearance_.isAbove(place, above) || clearance_.isOutside(place, kept)) return;
+                    const glm::vec3 at = map_(point.position);
+                    const Sample sample = sampleAt(at, report);
+                    if (sample.distance > (sample.inBand ? above : beside)) return;
+                    near.add(index);
+                    touch(index, point, at, sample, report, found);
+                });
     }
 
     template <class Found>
@@ -452,9 +452,8 @@ ContactReport addContacts(const Placed& a, const Placed& b, const ContactOptions
         const bool apart = touch.distance > 0 && !point.isSharp;
         const glm::vec3 own = body.pose.rotation * point.normal;
         if (!options.keeps(normal, own, body.motion.turn - other.motion.turn, apart)) return false;
-        const bool leavesEdges = apart && touch.approach == 0 && options.leastOppositionApart > options.leastOpposition;
-        return !leavesEdges ||
-               !looksAtEdge(body.pose.toWorld(body.scale * point.position), own, touch.distance * other.scale, normal,
+        if (options.keepsEdgesAslant || !apart || touch.approach > 0) return true;
+        return !looksAtEdge(body.pose.toWorld(body.scale * point.position), own, touch.distance * other.scale, normal,
                             [&](const glm::vec3& place) { return normalNear(other, place); });
     };
     // of points, not of places between them

@@ -123,9 +123,11 @@ struct ContactOptions {
     /// corners of a cube, whose normals are mixed of three, reach 0.57. Below -1: no contact is left out.
     float leastOpposition = -2;
     /// The same for points of faces that do not touch yet: a point beside the other body sees its edge aslant, or meets
-    /// its side, and would stop it like a curb. If greater than leastOpposition, edges that they see by more than half
-    /// a degree aslant are left out, too, which the other body's own points meet.
+    /// its side, and would stop it like a curb.
     float leastOppositionApart = -2;
+    /// Whether points of faces that neither touch yet nor are on their way touch edges that they see by more than half
+    /// a degree aslant: the edges' own points meet the faces straight.
+    bool keepsEdgesAslant = true;
 
     /// Whether a contact is kept that looks against its point's normal by this cosine.
     /// @param apart  its point is of a face that does not touch yet

@@ -381,17 +381,18 @@ Convex::Near Convex::nearestOfHull(const glm::vec3& point, float reach) const {
                 plane = &face, triangle = i;
         }
     };
-    if (isFlat_)
+    if (isFlat_) {
         for (const Plane& side : planes_) considerFace(side);
-    else if (farthest)
+    } else if (farthest) {
         considerFace(*farthest);
-    for (const Plane* before = nullptr; !isFlat_ && plane != before && squared > depth * depth;) {
-        before = plane;
-        const glm::uvec3 corners = faces_.triangles[triangle];
-        for (int i = 0; i < 3; ++i)
-            for (std::uint32_t k = firstAround_[corners[i]]; k < firstAround_[corners[i] + 1]; ++k)
-                if (const Plane& next = planes_[planesAround_[k]]; &next != before && next.height(point) > 0)
-                    considerFace(next);
+        for (const Plane* before = nullptr; plane != before && squared > depth * depth;) {
+            before = plane;
+            const glm::uvec3 corners = faces_.triangles[triangle];
+            for (int i = 0; i < 3; ++i)
+                for (std::uint32_t k = firstAround_[corners[i]]; k < firstAround_[corners[i] + 1]; ++k)
+                    if (const Plane& next = planes_[planesAround_[k]]; &next != before && next.height(point) > 0)
+                        considerFace(next);
+        }
     }
     // A hull without faces is flat, a line or a point.
     if (!farthest) {

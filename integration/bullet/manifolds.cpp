@@ -164,12 +164,15 @@ glm::vec2 towards(float share) {
     return {std::cos(angle), std::sin(angle)};
 }
 
+void addTilts(float tilt, std::vector<Nudge>& all) {
+    for (int k = 0; k < tiltDirections; ++k) all.push_back({.tilt = tilt * towards(float(k) / tiltDirections)});
+}
+
 /// Those that contacts are kept for, in the order in which they choose: what spans the patch comes first, a mere press
 /// last.
 std::vector<Nudge> nudges() {
     std::vector<Nudge> all;
-    for (const float tilt : tilts)
-        for (int k = 0; k < tiltDirections; ++k) all.push_back({.tilt = tilt * towards(float(k) / tiltDirections)});
+    for (const float tilt : tilts) addTilts(tilt, all);
     for (int k = 0; k < shiftDirections; ++k) all.push_back({.shift = aside * towards(float(k) / shiftDirections)});
     for (const float twist : {aside, -aside}) all.push_back({.twist = twist});
     all.push_back({});
@@ -282,10 +285,12 @@ class FirstMet {
   public:
     FirstMet(const std::vector<Contact>& contacts, const Group& group) : gaps_(contacts, group) {
         static const std::vector<Nudge> all = nudges();
-        if (const float turn = gaps_.turn(); turn > tilts[0])
-            for (int k = 0; k < tiltDirections; ++k)
-                nudges_.push_back({.tilt = turn * towards(float(k) / tiltDirections)});
-        nudges_.insert(nudges_.end(), all.begin(), all.end());
+        nudges_ = all;
+        if (gaps_.turn() > tilts[0]) {
+            addTilts(gaps_.turn(), turned_);
+            turned_.insert(turned_.end(), all.begin(), all.end());
+            nudges_ = turned_;
+        }
         for (const Nudge& nudge : nudges_) least_.push_back(gaps_.least(nudge));
     }
 
@@ -370,7 +375,8 @@ class FirstMet {
     }
 
     Gaps gaps_;
-    std::vector<Nudge> nudges_;
+    std::vector<Nudge> turned_;  ///< with those of a body that is turned in the step
+    std::span<const Nudge> nudges_;
     std::vector<float> least_;         ///< gap after each motion
     std::vector<std::uint32_t> kept_;  ///< as indices in the group
     std::vector<Motions> met_;         ///< by each of these

@@ -35,7 +35,7 @@ constexpr float leastAcross = 0.3f;
 // A surface point touches a face that looks against its own normal, by this cosine at least: the points below the edge
 // of a box must not be pushed out sideways. The corners of a cube, whose normals are mixed of three, reach 0.57.
 // Those of faces that do not touch yet: farther aslant is an edge of the other body beside them.
-constexpr ContactOptions opposition{.leastOpposition = 0.3f, .leastOppositionApart = 0.9f};
+constexpr ContactOptions opposition{.leastOpposition = 0.3f, .leastOppositionApart = 0.9f, .keepsEdgesAslant = false};
 // Steps towards the deepest place of a round surface; each divides the error by the ratio of the radii of curvature.
 constexpr int mostRefinements = 6;
 // A point lies over a face if it is no farther beyond its sides than this [probe spacings]: rounding.
@@ -379,17 +379,9 @@ class Touching {
     glm::vec3 intoConvex(const glm::vec3& point) const { return toConvex_ * (point - origin_); }
     glm::vec3 intoField(const glm::vec3& point) const { return toField_ * point + origin_; }
 
-    /// Where a way meets the convex body.
-    struct Meeting {
-        Convex::Near near;  ///< of the convex body, in its own coordinates
-        float gap;          ///< from the start to the plane that is met [m]
-    };
-
-    /// @param start, way  in the convex body's coordinates
-    std::optional<Meeting> meeting(const glm::vec3& start, const glm::vec3& way) const {
-        const auto met = convex_.enter(start, way, sweepTolerance * voxel_);
-        if (!met) return std::nullopt;
-        return Meeting{met->near, -glm::dot(met->near.normal, met->part * way)};
+    /// Where a way meets the convex body, both in that one's coordinates.
+    std::optional<Convex::Entry> meeting(const glm::vec3& start, const glm::vec3& way) const {
+        return convex_.enter(start, way, sweepTolerance * voxel_);
     }
 
     glm::vec3 wayIntoConvex(const glm::vec3& position) const { return -(toConvex_ * local_.ways().of(position)); }
@@ -408,11 +400,13 @@ class Touching {
         const glm::vec3 way = wayIntoConvex(position);
         if (distance > glm::length(way) || !meets(position, point)) return;
         const auto met = meeting(intoConvex(position), way);
-        if (!met || !(met->gap > 0)) return;
+        if (!met) return;
+        const float gap = -glm::dot(met->near.normal, met->part * way);  // to the plane that is met
+        if (!(gap > 0)) return;
         const glm::vec3 normal = -(toField_ * met->near.normal);
         const bool apart = !point.isSharp && !convex_.isRound(met->near);
         if (!opposition.keeps(-normal, point.normal, -local_.ways().turn(), apart)) return;
-        contacts.push_back(local_.contact(position, normal, met->gap, feature, -glm::dot(met->near.normal, way)));
+        contacts.push_back(local_.contact(position, normal, gap, feature, -glm::dot(met->near.normal, way)));
         contacts.back().turningRadius = 0;
     }
 
@@ -711,14 +705,13 @@ class TriangleProbes : public btTriangleCallback {
                 found->turningRadius = 0;
             } else {
                 found = local_.probe(below, answer, 0, 0, margin_, report_);
+                if (!found) return;
                 // what the middle of a face sees aslant is beside it
                 const glm::quat& inWorld = field_.pose.rotation;
-                if (found &&
-                    !opposition.keeps(found->normal, -(inWorld * normal), inWorld * local_.ways().turn(), true))
-                    return;
-                if (found) found->turningRadius = -1;  // it stays below the point
+                if (!opposition.keeps(found->normal, -(inWorld * normal), inWorld * local_.ways().turn(), true)) return;
+                found->turningRadius = -1;  // it stays below the point
             }
-            if (found) overFaces_.push_back({index, face.id, *found});
+            overFaces_.push_back({index, face.id, *found});
         });
     }
 
@@ -742,7 +735,10 @@ ContactReport collideFields(const Placed& a, const Placed& b, float margin, bool
     options.margin = margin;
     options.measured = measured;
     // a test is told how far apart bodies are, whichever way their points look
-    if (measured) options.leastOppositionApart = options.leastOpposition;
+    if (measured) {
+        options.leastOppositionApart = options.leastOpposition;
+        options.keepsEdgesAslant = true;
+    }
     return collide(a, b, options, contacts, &near);
 }
 

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
-#include <limits>
 #include <memory>
 #include <random>
 
@@ -205,10 +204,7 @@ TEST_CASE("What is small and thin sinks nowhere, though an impact turns it by ha
                 const btVector3 axis = bullet::toBullet(random.direction());
                 btRigidBody* body = world.add(shape, 0.1f, {0, 0, size}, btQuaternion(axis, float(random(0, 3))));
                 for (int k = 0; k < 120; ++k) world.dynamics.stepSimulation(step, 0);
-                float lowest = std::numeric_limits<float>::max();
-                for (const glm::vec3& point : kind.mesh.points)
-                    lowest = std::min(lowest, float((body->getWorldTransform() * bullet::toBullet(point)).z()));
-                CHECK(lowest > -0.6f * voxel);
+                CHECK(lowest(kind.mesh, body->getWorldTransform()) > -0.6f * voxel);
             }
     }
 }

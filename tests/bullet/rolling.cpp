@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
-#include <limits>
 #include <optional>
 
 #include "demos/shared/shapes.h"
@@ -24,13 +23,6 @@ constexpr float radius = 0.1f;  // of all balls [m]
 std::shared_ptr<const Collider> ball(float voxels) {
     const Mesh mesh = shapes::sphere(radius, 5);
     return std::make_shared<Collider>(mesh, build(mesh, {.voxelSize = radius / voxels}));
-}
-
-/// The height of the lowest vertex [m].
-float lowest(const Mesh& mesh, const btTransform& at) {
-    float least = std::numeric_limits<float>::max();
-    for (const glm::vec3& point : mesh.points) least = std::min(least, float((at * bullet::toBullet(point)).z()));
-    return least;
 }
 
 /// A ball that rolls on level ground or, without friction, spins in place, steadily at the start.
@@ -112,9 +104,9 @@ TEST_CASE("Balls roll on") {
     }
     // what its facets take, each of which it comes down on: those between points 1.4 voxels apart, at 0.3 m/s about a
     // sixth in a second; and it is not thrown up: at 3 m/s, which turns it by half a radian in a step, it lifts by 1 to
-    // 2 mm, where straight ways would throw it up by 20
+    // 2 mm, where straight ways would throw it up by 20; slower it does not hop
     CHECK(kept > 0.75f);
-    CHECK(highest < 0.03f * radius);
+    CHECK(highest < (speed < 2 ? 0.3f / 32 : 0.03f) * radius);
 }
 
 TEST_CASE("Hulls roll over fields") {

@@ -57,7 +57,8 @@ struct Crowd {
 
 // Every pair's contacts by the sampler against those of the processor. Returns their number.
 std::size_t check(const PointSampler& sampler, const Crowd& crowd, float margin) {
-    const ContactOptions options{.margin = margin, .leastOpposition = 0.3f, .leastOppositionApart = 0.9f};
+    const ContactOptions options{
+        .margin = margin, .leastOpposition = 0.3f, .leastOppositionApart = 0.9f, .keepsEdgesAslant = false};
     std::vector<SampledBody> bodies;
     std::vector<PointQuery> queries;
     for (const Placed& body : crowd.bodies) bodies.push_back(sampledBody(body.collider));

@@ -4,9 +4,11 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/vec2.hpp>
+#include <limits>
 #include <utility>
 
 #include "demos/shared/shapes.h"
+#include "integration/bullet/convert.h"
 #include "sdf/grids.h"
 
 namespace bilayer::test {
@@ -92,6 +94,12 @@ std::shared_ptr<const Collider> exactBowl(float radius, float wall, float voxelS
         return toArc - 0.5f * wall;
     };
     return exactCollider(shapes::bowl(radius, wall, 256), distance, voxelSize);
+}
+
+float lowest(const Mesh& mesh, const btTransform& at) {
+    float least = std::numeric_limits<float>::max();
+    for (const glm::vec3& point : mesh.points) least = std::min(least, float((at * bullet::toBullet(point)).z()));
+    return least;
 }
 
 std::shared_ptr<const Collider> withoutMesh(const Mesh& mesh, const LevelSet& field) {

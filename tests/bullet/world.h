@@ -53,6 +53,9 @@ std::shared_ptr<const Collider> exactTorus(float major, float minor, float voxel
 /// A shell like shapes::bowl: the lower half of the sphere of `radius`, `wall` thick, with a round rim.
 std::shared_ptr<const Collider> exactBowl(float radius, float wall, float voxelSize);
 
+/// The height of the lowest vertex [m].
+float lowest(const Mesh& mesh, const btTransform& at);
+
 /// The body of a mesh as it comes back from a file that leaves the mesh out.
 std::shared_ptr<const Collider> withoutMesh(const Mesh& mesh, const LevelSet& field);
 

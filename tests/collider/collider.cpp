@@ -295,7 +295,7 @@ TEST_CASE("contacts that look along the surface of their point are left out wher
     const unsigned seed = test::seed();
     CAPTURE(seed);
     Random random(seed);
-    std::size_t all = 0, kept = 0, back = 0;
+    std::size_t all = 0, kept = 0, back = 0, aslant = 0;
     const float apart = GENERATE(-2.f, 0.9f);  // of points of faces that do not touch yet
     for (const auto& [a, b] : touchingPairs(random)) {
         std::vector<Contact> expected, found;
@@ -320,7 +320,23 @@ TEST_CASE("contacts that look along the surface of their point are left out wher
         REQUIRE(found.size() == expected.size());
         for (std::size_t i = 0; i < found.size(); ++i) REQUIRE(found[i].feature == expected[i].feature);
         kept += found.size();
+
+        std::vector<Contact> straight;
+        collide(a, b, {.margin = h, .leastOpposition = 0.3f, .leastOppositionApart = apart, .keepsEdgesAslant = false},
+                straight);
+        std::set<std::uint32_t> left;
+        for (const Contact& contact : straight) left.insert(contact.feature);
+        for (const Contact& contact : found) {
+            if (left.contains(contact.feature)) continue;
+            const bool ofB = contact.feature & featureOfB;
+            const SurfacePoint point = pointOf((ofB ? b : a).collider, contact.feature & ~featureOfB);
+            REQUIRE(contact.distance > 0);
+            REQUIRE_FALSE(point.isSharp);
+            REQUIRE(std::abs(glm::dot((ofB ? b : a).pose.rotation * point.normal, contact.normal)) < 0.99997f);
+            ++aslant;
+        }
     }
+    CHECK(aslant < kept);
     REQUIRE(kept > 0);
     REQUIRE(kept + back < all);
 }
