@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Plays a scene, then takes its picture with headless Chromium: show.sh NAME [OPTIONS of the program].
+# Plays a scene, then takes its picture with headless Chromium: show.sh NAME [OPTIONS of the program]. It exits with 3 if
+# a criterion is missed, as the program does.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
@@ -18,7 +19,9 @@ done
 start=$(mktemp)
 profile=$(mktemp -d) # of its own, so that the browser starts beside one that is open already
 trap 'rm -rf "$profile" "$start"' EXIT
-"$program" "$@"
+status=0
+"$program" "$@" || status=$?
+((status == 0 || status == 3)) || exit "$status"
 
 rm -f "$out/$name.png"
 page=$(realpath "$out/$name.html")
@@ -34,3 +37,4 @@ fi
 
 echo "files"
 find "$out" -maxdepth 1 -type f -newer "$start" | sort | sed 's/^/  /'
+exit "$status"

@@ -26,23 +26,23 @@ Program::Program(std::string name, const std::string& description) : name_(std::
 int Program::run(int argc, char** argv, const std::function<Outcome()>& scene) {
     try {
         app_.parse(argc, argv);
-        play(scene);
+        return play(scene).met() ? 0 : 3;
     } catch (const CLI::ParseError& error) {
         return app_.exit(error) == 0 ? 0 : 2;
     } catch (const std::exception& error) {
         fmt::print(stderr, "{}: {}\n", name_, error.what());
         return 1;
     }
-    return 0;
 }
 
-void Program::play(const std::function<Outcome()>& scene) const {
+Outcome Program::play(const std::function<Outcome()>& scene) const {
     std::optional<tbb::global_control> limit;
     if (threads_ > 0) limit.emplace(tbb::global_control::max_allowed_parallelism, std::size_t(threads_));
     Outcome outcome = scene();
     if (compare_) outcome.criteria.push_back(sameBits(outcome, scene));
     write(outcome, name_, out_);
     print(outcome);
+    return outcome;
 }
 
 }  // namespace bilayer::demo

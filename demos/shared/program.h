@@ -39,11 +39,11 @@ class Program {
     }
 
     /// Parses, plays the scene, prints its outcome and writes its files.
-    /// @return the exit status: 0, whether criteria are met or not; 1 if the scene throws, 2 for wrong usage
+    /// @return the exit status: 0; 1 if the scene throws, 2 for wrong usage, 3 if a criterion is missed
     int run(int argc, char** argv, const std::function<Outcome()>& scene);
 
   private:
-    void play(const std::function<Outcome()>& scene) const;
+    Outcome play(const std::function<Outcome()>& scene) const;
 
     std::string name_, out_ = "out";
     int threads_ = 0;

@@ -33,7 +33,8 @@ namespace {
 constexpr std::uint32_t rimChords = 32;
 // Support points on a shape that has no formula here: directions on a spiral, about 12 degrees apart.
 constexpr int supportDirections = 256;
-// What is thinner than this has no inside [parts of the size]: rounding.
+// What is thinner than this has no inside, and what is no farther than this beyond a face is over it [parts of the
+// size]: rounding.
 constexpr float flatness = 1e-6f;
 // A normal that is tilted less than this off the axis belongs to a flat end.
 constexpr float flatEnd = 0.1f;
@@ -239,7 +240,7 @@ void Convex::makeHull(const std::vector<btVector3>& points) {
     }
     joinPlanes();
     isFlat_ = !planes_.empty() && std::all_of(faces_.points.begin(), faces_.points.end(), [&](const glm::vec3& point) {
-        return std::abs(planes_.front().height(point)) <= flatness * bounds_[0].distance(bounds_[1]);
+        return std::abs(planes_.front().height(point)) <= flatness * size();
     });
 }
 
@@ -334,19 +335,24 @@ Convex::Near Convex::nearestOfRevolution(const glm::vec3& point) const {
     const std::array<glm::vec2, 4> profile{
         {{0, -halfHeight_}, {lowerRadius_, -halfHeight_}, {upperRadius_, halfHeight_}, {0, halfHeight_}}};
 
+    const float rounding = flatness * size();
     bool inside = true;
-    float nearest = std::numeric_limits<float>::max();
+    float nearest = std::numeric_limits<float>::max(), height = std::numeric_limits<float>::lowest();
     glm::vec2 core(0), normal(0);
     for (int i = 0; i < 3; ++i) {
         const glm::vec2 a = profile[i], along = profile[i + 1] - a;
-        const float squaredLength = glm::dot(along, along);
-        if (!(squaredLength > 0)) continue;
-        const glm::vec2 outward = glm::vec2(along.y, -along.x) / std::sqrt(squaredLength);
-        inside &= glm::dot(p - a, outward) <= 0;
-        const glm::vec2 q = a + std::clamp(glm::dot(p - a, along) / squaredLength, 0.f, 1.f) * along;
-        if (const float d = glm::distance(p, q); d < nearest) nearest = d, core = q, normal = outward;
+        const float length = glm::length(along);
+        if (!(length > 0)) continue;
+        const glm::vec2 outward = glm::vec2(along.y, -along.x) / length;
+        const float above = glm::dot(p - a, outward), way = glm::dot(p - a, along) / length;
+        inside &= above <= 0;
+        const glm::vec2 q = a + std::clamp(way / length, 0.f, 1.f) * along;
+        if (const float d = glm::distance(p, q); d < nearest) nearest = d, core = q;
+        const bool isOver = way >= -rounding && way <= length + rounding;
+        if (isOver && above > height) height = above, normal = outward;
     }
-    if (!inside && nearest > 0) normal = (p - core) / nearest;
+    // The difference of places that nearly touch has no direction but that of rounding.
+    if (!inside && !(height > 0)) normal = (p - core) / nearest;
     const auto lift = [&](const glm::vec2& v) { return v.x * out + v.y * direction(axis_); };
     return {(inside ? -nearest : nearest) - radius_, lift(normal), lift(core), radius_};
 }
@@ -402,6 +408,9 @@ Convex::Near Convex::nearestOfHull(const glm::vec3& point, float reach) const {
         for (const glm::vec3& corner : faces_.points) consider(corner);
     }
     const float distance = std::sqrt(squared);
+    // The difference of places that nearly touch has no direction but that of rounding.
+    if (farthest && glm::distance(point - core, depth * farthest->normal) <= flatness * size())
+        return {distance - radius_, farthest->normal, core, radius_};
     const glm::vec3 normal = distance > 0 ? (point - core) / distance : farthest ? farthest->normal : squareTo(1);
     return {distance - radius_, normal, core, radius_};
 }

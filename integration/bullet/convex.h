@@ -80,6 +80,8 @@ class Convex {
         float height(const glm::vec3& point) const { return glm::dot(normal, point) - offset; }
     };
 
+    float size() const { return bounds_[0].distance(bounds_[1]); }
+
     void makeRevolution(int axis, float halfHeight, float lowerRadius, float upperRadius);
     void addRim(float height, float rim);
     void makeBox(const glm::vec3& halfExtents);

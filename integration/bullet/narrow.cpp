@@ -331,7 +331,7 @@ class Touching {
             looksAtEdge(intoConvex(position), toConvex_ * point.normal, near.distance, near.normal,
                         [&](const glm::vec3& place) { return convex_.nearest(place, edgeReach_).normal; }))
             return;
-        if (convex_.isCurved()) {
+        if (!convex_.isFlat(near)) {
             // corners and edges are exact, and samples next to them are not
             const auto better = refine(near, feature);
             if (better && !(point.isSharp && near.distance < better->distance)) {
@@ -339,8 +339,8 @@ class Touching {
                 return;
             }
         }
-        if (!convex_.isCurved() && !point.isSharp) {
-            const glm::vec3 place = intoField(near.core);
+        if (convex_.isFlat(near) && !point.isSharp) {
+            const glm::vec3 place = intoField(near.core + near.radius * near.normal);
             if (auto deeper = downhill(near, place, local_.at(place))) {
                 deeper->feature = feature;
                 deeper->turningRadius = 0;

@@ -86,6 +86,54 @@ TEST_CASE("Points near hulls are as far away as from the nearest of all their fa
     }
 }
 
+TEST_CASE("What lies on a face meets it along its normal, however near it is") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    Random random(seed);
+    const auto check = [&](const Convex& convex, const glm::vec3& place, const glm::vec3& normal,
+                           bool isOnRim = false) {
+        for (const float height : {1e-9f, 1e-8f, 1e-7f, 1e-6f, 1e-5f, 1e-3f}) {
+            const Convex::Near near = convex.nearest(place + height * normal, 1);
+            CAPTURE(height, place.x, place.y, place.z, near.normal.x, near.normal.y, near.normal.z);
+            REQUIRE(near.distance == Approx(height).margin(1e-6));
+            // on a rim what is nearer than rounding lies on the side as well
+            if (height > 1e-6f || !isOnRim) REQUIRE(glm::dot(near.normal, normal) > 0.9999f);
+        }
+    };
+    btConvexHullShape hull;
+    for (const glm::vec3& point : cloud(100, {1, 0.6f, 0.3f}, random)) hull.addPoint(bullet::toBullet(point), false);
+    hull.recalcLocalAabb();
+    hull.setMargin(0);
+    const Convex ofPoints(hull);
+    const btVector3* corners = hull.getUnscaledPoints();
+    std::vector<glm::vec3> points;
+    for (int i = 0; i < hull.getNumPoints(); ++i) points.push_back(bullet::toGlm(corners[i]));
+    const Mesh faces = hullOf(points);
+    for (const glm::uvec3& t : faces.triangles) {
+        const glm::vec3 &p = faces.points[t.x], &q = faces.points[t.y], &r = faces.points[t.z];
+        const auto u = float(random(0.1, 0.5)), v = float(random(0.1, 0.4));
+        const glm::vec3 square = glm::cross(q - p, r - p);
+        if (glm::length(square) < 1e-3f) continue;  // whose direction is rounded
+        const glm::vec3 place = p + u * (q - p) + v * (r - p);
+        check(ofPoints, place, std::copysign(1.f, glm::dot(square, place)) * glm::normalize(square));
+    }
+    const float radius = 0.5f, half = 0.8f;
+    btCylinderShape cylinder({radius, half, radius});
+    btConeShape cone(radius, 2 * half);
+    cone.setMargin(0);
+    const Convex round(cylinder), pointed(cone);
+    for (int i = 0; i < 1000; ++i) {
+        const float angle = float(random(0, 6.2831)), way = i % 4 ? radius * float(random(0, 1)) : radius;
+        const glm::vec3 out(std::cos(angle), 0, std::sin(angle));
+        const float at = float(random(-0.99, 0.99)) * half;
+        check(round, way * out + glm::vec3(0, half, 0), {0, 1, 0}, way == radius);
+        check(round, radius * out + glm::vec3(0, at, 0), out);
+        check(pointed, way * out - glm::vec3(0, half, 0), {0, -1, 0}, way == radius);
+        check(pointed, radius * (half - at) / (2 * half) * out + glm::vec3(0, at, 0),
+              glm::normalize(2 * half * out + glm::vec3(0, radius, 0)));
+    }
+}
+
 TEST_CASE("Straight ways enter convex shapes where distance says, and only then") {
     const unsigned seed = test::seed();
     CAPTURE(seed);

@@ -23,6 +23,8 @@ constexpr float half = 4;  // of all grounds, whose tops are at 0 [m]
 struct Grounds {
     btStaticPlaneShape plane{{0, 0, 1}, 0};
     btBoxShape box{{half, half, 0.2f}};
+    btCylinderShapeZ cylinder{{1.5f * half, 1.5f * half, 0.2f}};
+    btConvexHullShape hull;
     TriangleShape twoTriangles{shapes::box({half, half, 0.2f})}, manyTriangles{shapes::box({half, half, 0.2f}, 40)};
     std::vector<float> heights = std::vector<float>(33 * 33, 0.f);
     btHeightfieldTerrainShape heightfield{33, 33, heights.data(), 1, -1, 1, 2, PHY_FLOAT, false};
@@ -35,8 +37,12 @@ struct Grounds {
     };
     std::vector<Ground> all() {
         heightfield.setLocalScaling({0.25f, 0.25f, 1});
+        for (const glm::vec3& point : shapes::box({half, half, 0.2f}, 4).points) hull.addPoint(bullet::toBullet(point));
+        hull.setMargin(0);
         return {{"plane", plane, 0},
                 {"box", box, 0.2f},
+                {"cylinder", cylinder, 0.2f},
+                {"hull", hull, 0.2f},
                 {"large triangles", *twoTriangles.shape, 0.2f},
                 {"small triangles", *manyTriangles.shape, 0.2f},
                 {"height field", heightfield, 0},
