@@ -59,8 +59,8 @@ Mesh centred(Mesh mesh, float size) {
     return mesh;
 }
 
-Mesh knot(int along, int across) {
-    return centred(shapes::torusKnot(2, 3, 1, 0.3f, along, across), knotSize);
+Mesh knot() {
+    return centred(shapes::torusKnot(2, 3, 1, 0.3f, 180, 16), knotSize);
 }
 
 glm::quat anyRotation(std::mt19937& random) {
@@ -173,7 +173,7 @@ Row playKnots(Rival& rival, const Mesh& mesh, int bodies, const HeapOptions& opt
 }
 
 std::vector<Row> compareKnots(const Options& options) {
-    const Mesh mesh = knot(180, 16);
+    const Mesh mesh = knot();
     const float voxel = knotSize / options.voxels;
     std::vector<Row> rows;
     const auto field = makeField(mesh, options.voxels);
@@ -182,7 +182,7 @@ std::vector<Row> compareKnots(const Options& options) {
     rows.push_back(onOneThread(ours));
     for (const auto& rival : {makeField(mesh, options.voxels, {}, Measure::samples),
                               makeField(mesh, options.voxels, {}, Measure::triangles),
-                              makeHulls(knot(90, 8), options.hulls, 0.1f * voxel), makeGImpact(mesh, 0.5f * voxel)})
+                              makeHulls(mesh, options.hulls, 0.1f * voxel), makeGImpact(mesh, 0.5f * voxel)})
         rows.push_back(playKnots(*rival, mesh, options.bodies, options.heap));
     printTable(fmt::format("{} knots of {} triangles in a pen, {:g} voxels each, {:g} steps a second", options.bodies,
                            mesh.triangles.size(), options.voxels, options.heap.stepsPerSecond),
@@ -209,7 +209,7 @@ struct Growth {
 };
 
 Growth grow(const Options& options) {
-    const Mesh mesh = knot(180, 16);
+    const Mesh mesh = knot();
     HeapOptions heap = options.heap;
     heap.seconds = options.growSeconds;
     Growth growth;
@@ -239,7 +239,7 @@ Growth grow(const Options& options) {
 
 // Where the device finds the contacts: the bodies move by the same bits, so that the steps are the same ones.
 void compareDevice(const Options& options) {
-    const Mesh mesh = knot(180, 16);
+    const Mesh mesh = knot();
     HeapOptions heap = options.heap;
     heap.seconds = options.growSeconds;
     heap.measuredFrames = 1;

@@ -45,6 +45,7 @@ constexpr float flatEdge = -0.9999985f;
 // Faces that fall by less lie on what they touch: the next surface points are as deep to a hundredth of a voxel.
 constexpr float leastDownhill = 0.05f;
 constexpr float touchingFace = 0.25f;  // [voxels]
+constexpr float touching = 0.05f;      // [voxels]
 // Normals that enclose less than a degree are those of one face (cosine).
 constexpr float straight = 0.99985f;
 // A way has met a convex body where it is this near to it [voxels]: by more, it would meet edges that it goes past.
@@ -706,9 +707,18 @@ class TriangleProbes : public btTriangleCallback {
             } else {
                 found = local_.probe(below, answer, 0, 0, margin_, report_);
                 if (!found) return;
-                // what the middle of a face sees aslant is beside it
+                // What the middle of a face sees aslant is beside it, but where it touches: there an edge or a corner
+                // has no direction of its own.
+                const bool touches = std::abs(answer.distance) <= touching * spacing_ / probeSpacing;
                 const glm::quat& inWorld = field_.pose.rotation;
-                if (!opposition.keeps(found->normal, -(inWorld * normal), inWorld * local_.ways().turn(), true)) return;
+                if (!opposition.keeps(found->normal, -(inWorld * normal), inWorld * local_.ways().turn(), !touches))
+                    return;
+                if (touches)
+                    found->normal = inWorld * normal;
+                else if (answer.distance > 0 &&
+                         looksAtEdge(below, -normal, answer.distance, answer.normal,
+                                     [&](const glm::vec3& there) { return local_.at(there).normal; }))
+                    return;
                 found->turningRadius = -1;  // it stays below the point
             }
             overFaces_.push_back({index, face.id, *found});

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "demos/shared/shapes.h"
+#include "sdf/build.h"
 #include "tests/support/random.h"
 #include "tests/support/support.h"
 #include "world.h"
@@ -16,6 +17,27 @@ using namespace bilayer::test;
 using bullet::Shape;
 
 namespace {
+
+/// An upright prism whose outline is a cross: at its inner corners edges meet that look every way.
+Mesh crossPrism(float arm, float halfHeight) {
+    const glm::vec2 quarter[] = {{1, -0.4f}, {1, 0.4f}, {0.4f, 0.4f}};
+    Mesh mesh;
+    for (const float z : {-halfHeight, halfHeight}) {
+        mesh.points.emplace_back(0, 0, z);
+        for (int turn = 0; turn < 4; ++turn)
+            for (const glm::vec2& p : quarter) {
+                const glm::vec2 turned[] = {p, {-p.y, p.x}, -p, {p.y, -p.x}};
+                mesh.points.emplace_back(arm * turned[turn], z);
+            }
+    }
+    for (unsigned i = 1, next = 2; i <= 12; ++i, next = i % 12 + 1) {
+        mesh.triangles.push_back({0, next, i});
+        mesh.triangles.push_back({13, 13 + i, 13 + next});
+        mesh.triangles.push_back({i, next, 13 + next});
+        mesh.triangles.push_back({i, 13 + next, 13 + i});
+    }
+    return mesh;
+}
 
 constexpr float half = 4;  // of all grounds, whose tops are at 0 [m]
 
@@ -59,11 +81,13 @@ TEST_CASE("What is flat below slides to a stop where friction says, on all that 
     Random random(seed);
     const float edge = 0.1f;  // half of the bodies' [m]
     Shape cube(exactBox(glm::vec3(edge), voxel));
+    const Mesh mesh = crossPrism(2 * edge, edge);
+    Shape cross(std::make_shared<Collider>(mesh, build(mesh, {.voxelSize = voxel, .interiorWidth = 6})));
     btBoxShape box(btVector3(edge, edge, edge));
     const struct {
         const char* name;
         btCollisionShape& shape;
-    } bodies[] = {{"cube", cube}, {"Bullet's box", box}};
+    } bodies[] = {{"cube", cube}, {"cross", cross}, {"Bullet's box", box}};
     Grounds grounds;
     for (const auto& kind : bodies)
         for (const auto& ground : grounds.all()) {
@@ -89,6 +113,43 @@ TEST_CASE("What is flat below slides to a stop where friction says, on all that 
             CHECK(body->getWorldTransform().getOrigin().x() - start == Approx(way).epsilon(0.02).margin(0.01));
             CHECK(highest < 0.1f * voxel);
         }
+}
+
+TEST_CASE("What touches what is flat, a little aslant or not, does so along its normal") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    Random random(seed);
+    const float voxel = 0.01f, edge = 0.1f;
+    const Mesh mesh = crossPrism(2 * edge, edge);
+    Shape cross(std::make_shared<Collider>(mesh, build(mesh, {.voxelSize = voxel, .interiorWidth = 6})));
+    Grounds grounds;
+    for (const auto& ground : grounds.all()) {
+        CAPTURE(ground.name);
+        World world;
+        world.dynamics.setGravity({0, 0, 0});
+        world.add(ground.shape, 0, {0, 0, -ground.top});
+        btRigidBody* body = world.add(cross, 1, {0, 0, 1});
+        int contacts = 0;
+        for (int i = 0; i < 100; ++i) {
+            CAPTURE(i);
+            const btVector3 aside(float(random(-1, 1)), float(random(-1, 1)), 0);
+            btTransform at(btQuaternion(aside.normalized(), i % 2 ? float(random(0, 0.006)) : 0) *
+                           btQuaternion(btVector3(0, 0, 1), float(random(0, 3))));
+            const float height = voxel * std::pow(10.f, -float(random(2, 6)));
+            at.setOrigin({float(random(-1, 1)), float(random(-1, 1)), height - lowest(mesh, at)});
+            body->setWorldTransform(at);
+            body->setInterpolationWorldTransform(at);
+            body->setLinearVelocity(2 * aside.normalized());
+            body->setAngularVelocity({0, 0, 0});
+            world.dynamics.stepSimulation(1 / 60.f, 0);
+            for (int m = 0; m < world.dispatcher.getNumManifolds(); ++m) {
+                const btPersistentManifold& manifold = *world.dispatcher.getManifoldByIndexInternal(m);
+                for (int k = 0; k < manifold.getNumContacts(); ++k, ++contacts)
+                    REQUIRE(std::abs(manifold.getContactPoint(k).m_normalWorldOnB.z()) > 0.9998f);
+            }
+        }
+        CHECK(contacts > 100);
+    }
 }
 
 TEST_CASE("What is round below keeps its speed without friction") {

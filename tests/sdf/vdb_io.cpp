@@ -120,7 +120,7 @@ TEST_CASE("truncated and foreign files are refused by name, wherever they are cu
     CHECK_THROWS_WITH(writeVdb("/nonexistent/a.vdb", torus()), Catch::Contains("/nonexistent/a.vdb"));
 }
 
-TEST_CASE("a file of ours with one wrong byte is refused, whichever it is, before OpenVDB reads it") {
+TEST_CASE("a file of ours with one wrong byte, or one too few or too many, is refused before OpenVDB reads it") {
     const unsigned seed = test::seed();
     CAPTURE(seed);
     test::Random random(seed);
@@ -135,6 +135,13 @@ TEST_CASE("a file of ours with one wrong byte is refused, whichever it is, befor
         CAPTURE(at);
         REQUIRE_THROWS_WITH(readVdb(path), Catch::Contains("wrong_byte.vdb") && Catch::Contains("damaged"));
     }
+    for (std::size_t missing = 1; missing <= 19; ++missing) {
+        std::ofstream(path, std::ios::binary) << whole.substr(0, whole.size() - missing);
+        CAPTURE(missing);
+        REQUIRE_THROWS_WITH(readVdb(path), Catch::Contains("wrong_byte.vdb") && Catch::Contains("damaged"));
+    }
+    std::ofstream(path, std::ios::binary) << whole << "\n\n";
+    CHECK_THROWS_WITH(readVdb(path), Catch::Contains("damaged"));
     // other programs need not care: OpenVDB reads the file, and what it writes has no checksum
     openvdb::io::File file(test::scratch("whole.vdb").string());
     file.open();
