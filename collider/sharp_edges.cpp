@@ -15,11 +15,8 @@ namespace {
 constexpr float farthestNeighbour = 4.5f;
 // Of two neighbours in about the same direction the nearer one counts: cosine of 60 degrees.
 constexpr float sameDirection = 0.5f;
-// Edges meet in a tip at a smaller angle: cosine of 18 degrees.
-constexpr float sameAtTip = 0.95f;
-// An edge runs square to the normals at its ends, but for corners: a cube's have 0.58 (cosine), and to a tip it may run
-// along the normal there, but is square to its own at the other end.
-constexpr float leastSquare = 0.7f, square = 0.1f;
+// An edge runs square to the normals at its ends, but for corners: a cube's have 0.58.
+constexpr float leastSquare = 0.7f;
 // The interpolant rounds sharp edges off by up to this much [voxels]; farther away there is a groove between the two.
 constexpr float onSurface = 0.45f;
 // A piece may lie above the edge between its ends, as around a hole, by no more than this [voxels].
@@ -46,7 +43,6 @@ struct Neighbour {
     std::uint32_t index;
     glm::vec3 direction;
     float distance;
-    bool endsInTip;  ///< the piece, on one side
 };
 
 std::vector<Neighbour> neighboursOf(std::uint32_t index, const SurfacePoints& points, const Field& field) {
@@ -61,22 +57,19 @@ std::vector<Neighbour> neighboursOf(std::uint32_t index, const SurfacePoints& po
             const float distance = glm::length(way);
             if (!(distance > 0) || distance > reach) return;
             const glm::vec3 direction = way / distance;
-            const auto [least, most] =
-                std::minmax({std::abs(glm::dot(direction, point.normal)), std::abs(glm::dot(direction, there.normal))});
+            const float aslant =
+                std::max(std::abs(glm::dot(direction, point.normal)), std::abs(glm::dot(direction, there.normal)));
             // how far an arc with these normals lies below the piece: a quarter of its ends' heights over each other
             const float above = 0.125f * (glm::dot(way, point.normal) - glm::dot(way, there.normal));
-            const bool endsInTip = most >= leastSquare;
-            if (!(endsInTip && least >= square) && above <= mostAbove * field.voxelSize())
-                near.push_back({other, direction, distance, endsInTip});
+            if (aslant < leastSquare && above <= mostAbove * field.voxelSize())
+                near.push_back({other, direction, distance});
         });
     std::sort(near.begin(), near.end(), [](const Neighbour& a, const Neighbour& b) {
         return a.distance < b.distance || (a.distance == b.distance && a.index < b.index);
     });
     std::vector<Neighbour> kept;
     for (const Neighbour& next : near) {
-        const auto hides = [&](const Neighbour& k) {
-            return glm::dot(k.direction, next.direction) > (k.endsInTip && next.endsInTip ? sameAtTip : sameDirection);
-        };
+        const auto hides = [&](const Neighbour& k) { return glm::dot(k.direction, next.direction) > sameDirection; };
         if (kept.size() == mostNeighbours) break;
         if (std::any_of(kept.begin(), kept.end(), hides)) continue;
         const glm::vec3 middle = 0.5f * (point.position + points.points()[next.index].position);
@@ -129,17 +122,14 @@ SharpEdges::SharpEdges(const SurfacePoints& points, const Field& field)
 }
 
 bool SharpEdges::isTip(const SurfacePoints& points, std::uint32_t point, const glm::vec3& direction) const {
-    const auto its = around(point);
-    const bool isCorner = its.size() >= 3;  // whose edges bound its faces
     const auto fallsBack = [&](std::uint32_t e) {
         const SharpEdge& edge = edges_[e];
         const std::uint32_t next = edge.from == point ? edge.to : edge.from;
         const glm::vec3 way = points.points()[next].position - points.points()[point].position;
-        const auto facesFallBack = [&] {
-            return glm::dot(edge.wings[0], direction) <= level && glm::dot(edge.wings[1], direction) <= level;
-        };
-        return glm::dot(way, direction) <= level * glm::length(way) && (isCorner || facesFallBack());
+        return glm::dot(way, direction) <= level * glm::length(way) && glm::dot(edge.wings[0], direction) <= level &&
+               glm::dot(edge.wings[1], direction) <= level;
     };
+    const auto its = around(point);
     return !its.empty() && std::all_of(its.begin(), its.end(), fallsBack);
 }
 
