@@ -86,6 +86,7 @@ void seal(const std::filesystem::path& path) {
 void requireSeal(const std::filesystem::path& path) {
     const std::uintmax_t size = std::filesystem::file_size(path);
     std::ifstream stream = opened(path);
+    // more than the seal: bytes may have come behind it
     std::string end(std::size_t(std::min<std::uintmax_t>(size, 4 * sealSize)), ' ');
     stream.seekg(std::streamoff(size - end.size()));
     stream.read(end.data(), std::streamsize(end.size()));

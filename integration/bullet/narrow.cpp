@@ -45,7 +45,9 @@ constexpr float flatEdge = -0.9999985f;
 // Faces that fall by less lie on what they touch: the next surface points are as deep to a hundredth of a voxel.
 constexpr float leastDownhill = 0.05f;
 constexpr float touchingFace = 0.25f;  // [voxels]
-constexpr float touching = 0.05f;      // [voxels]
+// What a face's place sees of a body nearer than this touches the face [voxels]: beside an edge or a corner, normals
+// are mixed there.
+constexpr float touchingFoot = 0.05f;
 // Normals that enclose less than a degree are those of one face (cosine).
 constexpr float straight = 0.99985f;
 // A way has met a convex body where it is this near to it [voxels]: by more, it would meet edges that it goes past.
@@ -339,8 +341,7 @@ class Touching {
                 contacts.push_back(*better);
                 return;
             }
-        }
-        if (convex_.isFlat(near) && !point.isSharp) {
+        } else if (!point.isSharp) {
             const glm::vec3 place = intoField(near.core + near.radius * near.normal);
             if (auto deeper = downhill(near, place, local_.at(place))) {
                 deeper->feature = feature;
@@ -709,7 +710,7 @@ class TriangleProbes : public btTriangleCallback {
                 if (!found) return;
                 // What the middle of a face sees aslant is beside it, but where it touches: there an edge or a corner
                 // has no direction of its own.
-                const bool touches = std::abs(answer.distance) <= touching * spacing_ / probeSpacing;
+                const bool touches = std::abs(answer.distance) <= touchingFoot * spacing_ / probeSpacing;
                 const glm::quat& inWorld = field_.pose.rotation;
                 if (!opposition.keeps(found->normal, -(inWorld * normal), inWorld * local_.ways().turn(), !touches))
                     return;

@@ -101,13 +101,11 @@ TEST_CASE("What lies on a face meets it along its normal, however near it is") {
         }
     };
     btConvexHullShape hull;
-    for (const glm::vec3& point : cloud(100, {1, 0.6f, 0.3f}, random)) hull.addPoint(bullet::toBullet(point), false);
+    const std::vector<glm::vec3> points = cloud(100, {1, 0.6f, 0.3f}, random);
+    for (const glm::vec3& point : points) hull.addPoint(bullet::toBullet(point), false);
     hull.recalcLocalAabb();
     hull.setMargin(0);
     const Convex ofPoints(hull);
-    const btVector3* corners = hull.getUnscaledPoints();
-    std::vector<glm::vec3> points;
-    for (int i = 0; i < hull.getNumPoints(); ++i) points.push_back(bullet::toGlm(corners[i]));
     const Mesh faces = hullOf(points);
     for (const glm::uvec3& t : faces.triangles) {
         const glm::vec3 &p = faces.points[t.x], &q = faces.points[t.y], &r = faces.points[t.z];

@@ -52,15 +52,18 @@ struct Grounds {
     btHeightfieldTerrainShape heightfield{33, 33, heights.data(), 1, -1, 1, 2, PHY_FLOAT, false};
     Shape field{exactBox({half, half, 0.2f}, 0.04f)};
 
+    Grounds() {
+        heightfield.setLocalScaling({0.25f, 0.25f, 1});
+        for (const glm::vec3& point : shapes::box({half, half, 0.2f}, 4).points) hull.addPoint(bullet::toBullet(point));
+        hull.setMargin(0);
+    }
+
     struct Ground {
         const char* name;
         btCollisionShape& shape;
         float top;  ///< above the shape's origin [m]
     };
     std::vector<Ground> all() {
-        heightfield.setLocalScaling({0.25f, 0.25f, 1});
-        for (const glm::vec3& point : shapes::box({half, half, 0.2f}, 4).points) hull.addPoint(bullet::toBullet(point));
-        hull.setMargin(0);
         return {{"plane", plane, 0},
                 {"box", box, 0.2f},
                 {"cylinder", cylinder, 0.2f},
