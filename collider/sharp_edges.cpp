@@ -38,6 +38,8 @@ constexpr float level = 0.09f;
 constexpr float wingSpan = 1.5f;
 // Pieces of an edge end within this of each other, as parts of their length.
 constexpr float gap = 0.02f;
+// Fewer points than these, as near as neighbours, do not go around one.
+constexpr int leastAround = 3;
 
 struct Neighbour {
     std::uint32_t index;
@@ -98,7 +100,8 @@ Wings wingsOf(const SurfacePoint& a, const SurfacePoint& b, const Field& field) 
 
 SharpEdges::SharpEdges(const SurfacePoints& points, const Field& field)
     : deepestAcross_(field.mesh() ? deepestAcrossExact : deepestAcross),
-      deepestUnseen_(field.mesh() ? deepestUnseenExact : deepestUnseen) {
+      deepestUnseen_(field.mesh() ? deepestUnseenExact : deepestUnseen),
+      nearby_(farthestNeighbour * field.voxelSize()) {
     const auto all = points.points();
     std::vector<std::vector<Neighbour>> neighbours(all.size());
     tbb::parallel_for(std::uint32_t(0), std::uint32_t(all.size()), [&](std::uint32_t i) {
@@ -122,6 +125,10 @@ SharpEdges::SharpEdges(const SurfacePoints& points, const Field& field)
 }
 
 bool SharpEdges::isTip(const SurfacePoints& points, std::uint32_t point, const glm::vec3& direction) const {
+    return pointsFallBack(points, point, direction) || edgesFallBack(points, point, direction);
+}
+
+bool SharpEdges::edgesFallBack(const SurfacePoints& points, std::uint32_t point, const glm::vec3& direction) const {
     const auto fallsBack = [&](std::uint32_t e) {
         const SharpEdge& edge = edges_[e];
         const std::uint32_t next = edge.from == point ? edge.to : edge.from;
@@ -131,6 +138,22 @@ bool SharpEdges::isTip(const SurfacePoints& points, std::uint32_t point, const g
     };
     const auto its = around(point);
     return !its.empty() && std::all_of(its.begin(), its.end(), fallsBack);
+}
+
+bool SharpEdges::pointsFallBack(const SurfacePoints& points, std::uint32_t point, const glm::vec3& direction) const {
+    const glm::vec3 tip = points.points()[point].position;
+    int found = 0;
+    bool fallBack = true;
+    points.visit([&](const glm::vec3& centre,
+                     float radius) { return !fallBack || glm::distance(centre, tip) > radius + nearby_; },
+                 [&](std::uint32_t other, const SurfacePoint& there) {
+                     const glm::vec3 way = there.position - tip;
+                     const float distance = glm::length(way);
+                     if (other == point || distance > nearby_) return;
+                     ++found;
+                     fallBack = fallBack && glm::dot(way, direction) <= level * distance;
+                 });
+    return fallBack && found >= leastAround;
 }
 
 std::optional<SharpEdges::Crossing> SharpEdges::crossing(const SurfacePoints& points, const glm::vec3& from,

@@ -39,9 +39,9 @@ class SharpEdges {
     }
     float longest() const { return longest_; }  ///< [m]
 
-    /// Whether the body falls back from a point on all its edges and their faces: what comes against it meets this
-    /// point first. Edges and faces square to the direction, to within about five degrees, are met at once. Never true
-    /// of a point without edges.
+    /// Whether the body falls back from a sharp point on all sides, or on all edges that end in it and their faces:
+    /// what comes against it meets this point first. What is square to the direction, to within about five degrees, is
+    /// met at once.
     /// @param direction  outward, of unit length
     bool isTip(const SurfacePoints& points, std::uint32_t point, const glm::vec3& direction) const;
 
@@ -59,9 +59,13 @@ class SharpEdges {
                                      const Wings& wings, const glm::vec3& place, float distance, float voxelSize) const;
 
   private:
+    bool edgesFallBack(const SurfacePoints& points, std::uint32_t point, const glm::vec3& direction) const;
+    /// Where edges meet at sharp angles, and on a round body's tip, no edges end.
+    bool pointsFallBack(const SurfacePoints& points, std::uint32_t point, const glm::vec3& direction) const;
+
     std::vector<SharpEdge> edges_;
     std::vector<std::uint32_t> first_, ofPoints_;
-    float longest_ = 0, deepestAcross_ = 0, deepestUnseen_ = 0;
+    float longest_ = 0, deepestAcross_ = 0, deepestUnseen_ = 0, nearby_ = 0;
 };
 
 }  // namespace bilayer

@@ -6,6 +6,7 @@
 #include <glm/vec2.hpp>
 #include <limits>
 #include <numeric>
+#include <typeinfo>
 #include <utility>
 
 #include "integration/bullet/convert.h"
@@ -626,14 +627,14 @@ void Manifolds::emit(const Contact& contact, bool aIsFirst, btManifoldResult& re
     result.setShapeIdentifiersA(0, ofFirst ? index : -1);
     result.setShapeIdentifiersB(0, ofFirst ? -1 : index);
 
-    // Bullet drops points beyond the threshold and merges those within it: open it as far as this point needs. One that
-    // comes from afar goes in as if it touched, and is put right afterwards.
+    // Bullet drops points beyond the threshold and merges those within it: each goes in as if it touched, beside all
+    // others, and is put right afterwards. A user's own result, as of a contact test, is told the distance.
     btPersistentManifold& manifold = *result.getPersistentManifold();
-    const bool fromAfar = contact.approach > 0 && contact.distance > 0;
-    manifold.setContactBreakingThreshold(fromAfar ? 0 : std::max(contact.distance, 0.f));
+    const float told = typeid(result) == typeid(btManifoldResult) ? std::min(contact.distance, 0.f) : contact.distance;
+    manifold.setContactBreakingThreshold(std::max(told, 0.f));
     const int before = manifold.getNumContacts();
-    result.addContactPoint(toBullet(contact.normal), toBullet(contact.position), fromAfar ? 0 : contact.distance);
-    if (!fromAfar || manifold.getNumContacts() == before) return;
+    result.addContactPoint(toBullet(contact.normal), toBullet(contact.position), told);
+    if (told == contact.distance || manifold.getNumContacts() == before) return;
     btManifoldPoint& point = manifold.getContactPoint(before);
     point.m_distance1 = contact.distance;
     point.m_positionWorldOnA = point.m_positionWorldOnB + contact.distance * point.m_normalWorldOnB;

@@ -48,6 +48,8 @@ constexpr float touchingFace = 0.25f;  // [voxels]
 // What a face's place sees of a body nearer than this touches the face [voxels]: beside an edge or a corner, normals
 // are mixed there.
 constexpr float touchingFoot = 0.05f;
+// A tip is followed back into its body along its normal, from a face that this looks at by this cosine at least.
+constexpr float leastFacing = 0.1f;
 // Normals that enclose less than a degree are those of one face (cosine).
 constexpr float straight = 0.99985f;
 // A way has met a convex body where it is this near to it [voxels]: by more, it would meet edges that it goes past.
@@ -695,11 +697,20 @@ class TriangleProbes : public btTriangleCallback {
             if (std::abs(height) > std::abs(answer.distance) + spacing_ + local_.longestWay()) return;
             // A point whose surface lies on the face is exact, and so is a corner that points to it, or an edge along
             // it. One aslant may have passed an edge of what the sheet belongs to, and one that looks away from a sheet
-            // that has not reached it is on the other side of its body.
-            const bool lies = opposition.keeps(glm::dot(normal, point.normal), true) ||
-                              (point.isSharp && collider.edges().isTip(collider.points(), index, normal));
+            // that has not reached it is on the other side of its body. The sides of a tip that has sunk in by less
+            // than a voxel are nearer to the face than the tip, but then its body goes on behind.
+            const auto isTip = [&] {
+                return point.isSharp && collider.edges().isTip(collider.points(), index, normal);
+            };
+            const float cosine = glm::dot(normal, point.normal), voxel = spacing_ / probeSpacing,
+                        unsure = mostInterpolationError * voxel;
+            const auto goesOnBehind = [&] {
+                const float way = height / std::max(cosine, leastFacing) - unsure;
+                return local_.at(place + way * point.normal).distance < 0;
+            };
+            const bool lies = opposition.keeps(cosine, true) || isTip(), hasSunk = height < 0 && height > -voxel;
             const bool isNearest =
-                std::abs(answer.distance - height) <= mostInterpolationError * spacing_ / probeSpacing;
+                std::abs(answer.distance - height) <= unsure || (lies && hasSunk && isTip() && goesOnBehind());
             std::optional<Contact> found;
             if (lies && isNearest && height <= margin_) {
                 ++report_.pointsTested;
@@ -710,7 +721,7 @@ class TriangleProbes : public btTriangleCallback {
                 if (!found) return;
                 // What the middle of a face sees aslant is beside it, but where it touches: there an edge or a corner
                 // has no direction of its own.
-                const bool touches = std::abs(answer.distance) <= touchingFoot * spacing_ / probeSpacing;
+                const bool touches = std::abs(answer.distance) <= touchingFoot * voxel;
                 const glm::quat& inWorld = field_.pose.rotation;
                 if (!opposition.keeps(found->normal, -(inWorld * normal), inWorld * local_.ways().turn(), !touches))
                     return;

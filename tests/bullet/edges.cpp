@@ -27,6 +27,7 @@ using namespace bilayer;
 using namespace bilayer::test;
 using bullet::BallHull;
 using bullet::Convex;
+using bullet::Shape;
 
 namespace {
 
@@ -289,6 +290,54 @@ TEST_CASE("Sharp edges are those of the mesh, and none lies across a groove") {
     }
     // all twelve edges are covered once
     if (!grooved) CHECK(total == Approx(4 * 2 * (0.5 + 0.4 + 0.3)).epsilon(1e-3));
+}
+
+TEST_CASE("Tips that have sunk into faces are told how deep, and each contact that is kept gets to the solver") {
+    const int kind = GENERATE(0, 1, 2, 3, 4);
+    const unsigned start = seed();
+    CAPTURE(kind, start);
+    const glm::vec3 half(1.6f, 1.6f, 0.3f);
+    const Mesh slab = shapes::box(half), needle = shapes::cone(0.25f, 0.6f);
+    Mesh pyramid;
+    pyramid.points = {{-0.5f, -0.4f, -0.2f}, {0.6f, -0.3f, -0.2f}, {0.05f, 0.6f, -0.2f}, {0.05f, 0, 0.5f}};
+    pyramid.triangles = {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {2, 0, 3}};
+    Shape fields[] = {Shape(colliderOf(pyramid)), Shape(colliderOf(needle))}, field(colliderOf(slab));
+    btBoxShape box(bullet::toBullet(half));
+    btConvexHullShape hull;
+    for (const glm::vec3& point : slab.points) hull.addPoint(bullet::toBullet(point));
+    hull.setMargin(0);
+    TriangleShape few(slab), many(shapes::box(half, 20));
+    btCollisionShape* grounds[] = {&field, &box, &hull, few.shape.get(), many.shape.get()};
+    std::mt19937 random(start);
+    std::uniform_real_distribution<float> part(-1, 1), depths(0.05f, 0.8f);
+    for (int i = 0, tested = 0; tested < 100; ++i) {
+        const Mesh& mesh = i % 2 ? needle : pyramid;
+        Pose pose{{0.6f * part(random), 0.6f * part(random), 0},
+                  glm::normalize(glm::quat(part(random), part(random), part(random), part(random) + 0.01f))};
+        std::vector<float> heights;
+        for (const glm::vec3& point : mesh.points) heights.push_back(pose.toWorld(point).z);
+        std::sort(heights.begin(), heights.end());
+        const float depth = depths(random) * h;
+        if (heights[1] - heights[0] < 0.06f) continue;  // an edge lies on the face
+        pose.position.z = half.z - heights[0] - depth;
+        ++tested;
+
+        World world;
+        world.add(*grounds[kind], 0, {0, 0, 0});
+        world.add(fields[i % 2], 1, {0, 0, 0})->setWorldTransform(transformOf(pose));
+        world.dynamics.performDiscreteCollisionDetection();
+        int contacts = 0;
+        float deepest = 1;
+        for (int m = 0; m < world.dispatcher.getNumManifolds(); ++m) {
+            const btPersistentManifold& manifold = *world.dispatcher.getManifoldByIndexInternal(m);
+            contacts += manifold.getNumContacts();
+            for (int k = 0; k < manifold.getNumContacts(); ++k)
+                deepest = std::min(deepest, float(manifold.getContactPoint(k).getDistance()));
+        }
+        CAPTURE(i, depth / h, deepest / h);
+        CHECK(contacts == world.dispatcher.statistics().contactsKept);
+        CHECK(deepest == Approx(-depth).margin(tolerance));
+    }
 }
 
 TEST_CASE("The distance from a hull of balls is that of its support function, outside and inside") {
