@@ -24,9 +24,9 @@ constexpr std::uint32_t colours[] = {0x81b29a, 0xf2cc8f, 0xe07a5f};  // from slo
 
 struct Shot {
     btRigidBody& ball;
-    glm::vec3 plate, outward;  // a point of the plate's middle, and the side that the ball is shot from
-    float speed, thickness;    // [m/s], [voxels]
-    glm::vec3 last;            // of the ball's places
+    Pose plate;              // its z points to where the ball is shot from
+    float speed, thickness;  // [m/s], [voxels]
+    glm::vec3 last;          // of the ball's places
     bool passed = false, lost = false, gained = false;
 };
 
@@ -48,16 +48,15 @@ Shot addLane(Stage& stage, const PlatesOptions& options, const std::shared_ptr<c
                                   {.colour = colourOf(speed), .roughness = 0.3f, .clearcoat = 0.5f});
     body.setLinearVelocity({0, 0, -speed});
     body.setActivationState(DISABLE_DEACTIVATION);
-    return {body, place, tilt * glm::vec3(0, 0, 1), speed, thickness, place + glm::vec3(0, 0, above)};
+    return {body, {place, tilt}, speed, thickness, place + glm::vec3(0, 0, above)};
 }
 
-// Whether the ball's middle has gone through the circle around its plate; farther aside it has gone past the border.
+// Whether the ball's middle has gone through its plate; farther aside it has gone past the border.
 bool passes(const Shot& shot, const glm::vec3& now) {
-    const float before = glm::dot(shot.last - shot.plate, shot.outward),
-                after = glm::dot(now - shot.plate, shot.outward);
-    if (before < 0 || after >= 0) return false;
-    const glm::vec3 place = glm::mix(shot.last, now, before / (before - after));
-    return glm::distance(place, shot.plate) < std::sqrt(2.f) * halfPlate;
+    const glm::vec3 before = shot.plate.toBody(shot.last), after = shot.plate.toBody(now);
+    if (before.z < 0 || after.z >= 0) return false;
+    const glm::vec3 place = glm::mix(before, after, before.z / (before.z - after.z));
+    return std::max(std::abs(place.x), std::abs(place.y)) < halfPlate;
 }
 
 void watch(Shot& shot) {

@@ -21,6 +21,7 @@ constexpr float gapVoxels = 2;
 constexpr float leastResolution = 64, mostResolution = 512;
 constexpr float rounding = 1e-3f;    // [voxels] and steps: numbers that are off by less count as whole
 constexpr float leastVoxel = 2e-5f;  // [m] OpenVDB takes none smaller
+constexpr float mostIndex = 1e9f;    // and no field's coordinates are larger [voxels]
 // A point is in the band if the eight voxels around it are.
 constexpr float cellDiagonal = 1.7320508f;  // [voxels]
 // Bands inside [voxels]: what shallow overlaps need, and where sweeps or shorter steps are cheaper than more voxels.
@@ -50,6 +51,13 @@ void requireSensible(const MeshReport& mesh, const Scene& scene) {
         if (!(value >= least && std::isfinite(value)))
             throw std::invalid_argument(
                 fmt::format("advice: a {} of {}; it must be finite, and {} at least", name, value, least));
+    if (scene.voxelSize > 0 && scene.voxelSize < leastVoxel)
+        throw std::invalid_argument(
+            fmt::format("advice: a voxel size of {}; no field has voxels below {:g}: scale the mesh up",
+                        scene.voxelSize, leastVoxel));
+    if (scene.voxelSize > 0 && mesh.bounds.longestSide() / scene.voxelSize > mostIndex)
+        throw std::invalid_argument(fmt::format(
+            "advice: a voxel size of {}; no field has more than {:g} voxels in a row", scene.voxelSize, mostIndex));
     if (mesh.triangles == 0 || !(mesh.bounds.longestSide() > 0))
         throw std::invalid_argument("advice: the mesh has no extent");
 }
@@ -101,8 +109,6 @@ void warnOfSizes(const MeshReport& mesh, const Scene& scene, const Advice& advic
     if (const float gap = scene.gap / advice.voxelSize; gap > 0 && gap < gapVoxels - rounding)
         warnings.push_back(
             fmt::format("the gap is {:.2g} voxels wide: below {:g}, bodies at rest overlap in it", gap, gapVoxels));
-    if (advice.voxelSize < leastVoxel)
-        warnings.push_back(fmt::format("no field has voxels below {:g}: scale the mesh up", leastVoxel));
     if (advice.margin == 0) warnings.push_back("without a margin, contacts of what rests come and go");
     if (advice.margin > advice.voxelSize * float(mostInterior))
         warnings.push_back(fmt::format("the margin is {:.2g} voxels: the band outside has to reach as far",
@@ -112,12 +118,12 @@ void warnOfSizes(const MeshReport& mesh, const Scene& scene, const Advice& advic
 }
 
 void warnOfMotion(const Scene& scene, const Advice& advice, float way, std::vector<std::string>& warnings) {
-    if (advice.substepsUnswept > advice.substeps)
+    if (advice.substepsUnswept > advice.substeps || advice.substeps == mostSubsteps)
         warnings.push_back(
             fmt::format("a step goes {:.3g} m, farther than half of a wall: impacts throw bodies through what is thin "
                         "unless a bullet::NoPassing looks after the world; without it and without swept contacts "
-                        "(ShapeOptions::sweeps) that needs {} substeps",
-                        way, advice.substepsUnswept));
+                        "(ShapeOptions::sweeps) that needs {} substeps{}",
+                        way, advice.substepsUnswept, advice.substepsUnswept < mostSubsteps ? "" : " or more"));
     if (scene.massRatio > mostMassRatio)
         warnings.push_back(
             fmt::format("masses of {:.3g} to 1: above {:g} to 1 the solver leaves what lies below "

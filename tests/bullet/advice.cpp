@@ -100,7 +100,9 @@ TEST_CASE("Speed asks for substeps, or for sweeps") {
     CHECK(advise(plate(0.03f), {.step = 1.f / 240, .speed = 1, .spin = 100}).substeps == 1);
     CHECK(advise(plate(0.03f), {.speed = 100, .spin = 0}).substeps == 1);
     CHECK(advise(plate(0.03f), {.speed = 100}).substeps == 7);
-    CHECK(advise(plate(0.03f), {.speed = 1e30f}).substeps == 1000000);
+    const Advice absurd = advise(plate(0.03f), {.step = 1e30f, .speed = 1e30f});
+    CHECK(absurd.substeps == 1000000);
+    CHECK(warnsOf(absurd, "1000000 substeps or more"));
 }
 
 TEST_CASE("What Bullet and its solver ask for is warned of") {
@@ -140,5 +142,8 @@ TEST_CASE("Scenes of no sense are refused by name") {
     CHECK_THROWS_WITH(advise(mesh, {.gap = -1}), Catch::Contains("gap"));
     CHECK_THROWS_WITH(advise(mesh, {.massRatio = 0.5f}), Catch::Contains("mass ratio"));
     CHECK_THROWS_WITH(advise(mesh, {.margin = nan}), Catch::Contains("margin"));
+    CHECK_THROWS_WITH(advise(mesh, {.voxelSize = 1e-9f}), Catch::Contains("voxel size") && Catch::Contains("2e-05"));
+    CHECK_THROWS_WITH(advise(ball(1e5f), {.voxelSize = 2e-5f}),
+                      Catch::Contains("voxel size") && Catch::Contains("1e+09"));
     CHECK_THROWS_AS(advise(MeshReport{}, {}), std::invalid_argument);
 }
