@@ -398,9 +398,7 @@ std::vector<std::uint32_t> firstMet(const std::vector<Contact>& contacts, const 
 template <class Callback>
 class Silenced {
   public:
-    Silenced(Callback& callback, bool silence) : callback_(callback), kept_(callback) {
-        if (silence) callback_ = nullptr;
-    }
+    explicit Silenced(Callback& callback) : callback_(callback), kept_(std::exchange(callback, nullptr)) {}
     ~Silenced() { callback_ = kept_; }
 
   private:
@@ -595,8 +593,8 @@ void Manifolds::write(std::span<const Patch> patches, std::span<const std::optio
         manifold->setNumContacts(0);
         result.setPersistentManifold(manifold);
         if (m < patches.size()) {
-            const Silenced started(gContactStartedCallback, touched);
-            const Silenced added(gContactAddedCallback, true);
+            const Silenced started(gContactStartedCallback);
+            const Silenced added(gContactAddedCallback);
             for (int i = 0; i < patches[m].count; ++i) emit(patches[m].contacts[i], aIsFirst, result);
         }
         const std::size_t first = at;
@@ -613,6 +611,7 @@ void Manifolds::write(std::span<const Patch> patches, std::span<const std::optio
             tellProcessed(point, *manifold);
         }
         manifold->setContactBreakingThreshold(continuity.sameWithin);
+        if (!touched && manifold->getNumContacts() > 0 && gContactStartedCallback) gContactStartedCallback(manifold);
         if (touched && manifold->getNumContacts() == 0 && gContactEndedCallback) gContactEndedCallback(manifold);
     }
 

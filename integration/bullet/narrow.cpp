@@ -48,7 +48,7 @@ constexpr float touchingFace = 0.25f;  // [voxels]
 // What a face's place sees of a body nearer than this touches the face [voxels]: beside an edge or a corner, normals
 // are mixed there.
 constexpr float touchingFoot = 0.05f;
-// A tip is followed back into its body along its normal, from a face that this looks at by this cosine at least.
+// What looks at a face by less (cosine) does not tell on which side of it its body is.
 constexpr float leastFacing = 0.1f;
 // Normals that enclose less than a degree are those of one face (cosine).
 constexpr float straight = 0.99985f;
@@ -530,7 +530,8 @@ class TriangleProbes : public btTriangleCallback {
           local_(field, toPose(transform), motion, margin, measured),
           margin_(margin),
           reach_(std::max(margin, field.scale * field.collider.field().interiorWidth()) + local_.longestWay()),
-          spacing_(probeSpacing * field.scale * field.collider.field().voxelSize()),
+          voxel_(field.scale * field.collider.field().voxelSize()),
+          spacing_(probeSpacing * voxel_),
           report_(report),
           contacts_(contacts) {}
 
@@ -653,6 +654,33 @@ class TriangleProbes : public btTriangleCallback {
         if (contact) contacts_.push_back(*contact);
     }
 
+    /// Whether a surface point is as far from a face as its height tells. One whose surface lies on the face is, and so
+    /// is a corner that points to it, or an edge along it. One aslant may have passed an edge of what the sheet belongs
+    /// to; and to the foot of one that looks away from a sheet that has not reached it, on the far side of what is
+    /// thin, the near side is nearer. So are the sides of a tip that has sunk in by less than a voxel, but then its
+    /// body goes on behind the face.
+    /// @param normal  of the face, on the side that the point looks at
+    /// @param height  over the point
+    /// @param foot    what is nearest to the foot
+    bool isExact(std::uint32_t index, const glm::vec3& normal, float height, const Local::Answer& foot) const {
+        const Collider& collider = field_.collider;
+        const SurfacePoint& point = collider.points().points()[index];
+        const float cosine = glm::dot(normal, point.normal), unsure = mostInterpolationError * voxel_;
+        // where the foot lies in the middle of its body, that side counts which a point of a face looks to
+        const bool isUnclear = foot.where == Local::Answer::unclear && !point.isSharp;
+        const float facing = glm::dot(foot.normal, normal), least = point.isSharp ? leastFacing : 0;
+        const bool isNearSide = height >= 0 || isUnclear || (foot.where == Local::Answer::near && facing >= least);
+        const bool isNearest = std::abs(foot.distance - height) <= unsure && isNearSide;
+        if (isNearest && opposition.keeps(cosine, true)) return true;
+        const bool hasSunk = height < 0 && height > -voxel_;
+        if (!(isNearest || hasSunk) || !point.isSharp || !collider.edges().isTip(collider.points(), index, normal))
+            return false;
+        if (isNearest) return true;
+        const glm::vec3 inside = field_.scale * point.position + height / std::max(cosine, leastFacing) * point.normal;
+        const auto goesOn = [&](float parts) { return local_.at(inside - parts * unsure * point.normal).distance < 0; };
+        return goesOn(1) || goesOn(2) || goesOn(3);
+    }
+
     /// A point over several faces, as in a valley, has a contact with each of them, and a feature for each.
     void keepOverFaces() {
         const auto isEarlier = [](const OverFace& a, const OverFace& b) { return a.point < b.point; };
@@ -695,24 +723,8 @@ class TriangleProbes : public btTriangleCallback {
             const float height = glm::dot(below - place, normal);
             const Local::Answer answer = local_.at(below);
             if (std::abs(height) > std::abs(answer.distance) + spacing_ + local_.longestWay()) return;
-            // A point whose surface lies on the face is exact, and so is a corner that points to it, or an edge along
-            // it. One aslant may have passed an edge of what the sheet belongs to, and one that looks away from a sheet
-            // that has not reached it is on the other side of its body. The sides of a tip that has sunk in by less
-            // than a voxel are nearer to the face than the tip, but then its body goes on behind.
-            const auto isTip = [&] {
-                return point.isSharp && collider.edges().isTip(collider.points(), index, normal);
-            };
-            const float cosine = glm::dot(normal, point.normal), voxel = spacing_ / probeSpacing,
-                        unsure = mostInterpolationError * voxel;
-            const auto goesOnBehind = [&] {
-                const float way = height / std::max(cosine, leastFacing) - unsure;
-                return local_.at(place + way * point.normal).distance < 0;
-            };
-            const bool lies = opposition.keeps(cosine, true) || isTip(), hasSunk = height < 0 && height > -voxel;
-            const bool isNearest =
-                std::abs(answer.distance - height) <= unsure || (lies && hasSunk && isTip() && goesOnBehind());
             std::optional<Contact> found;
-            if (lies && isNearest && height <= margin_) {
+            if (height <= margin_ && isExact(index, normal, height, answer)) {
                 ++report_.pointsTested;
                 found = local_.contact(place, normal, height, 0, local_.approach(below, normal, margin_));
                 found->turningRadius = 0;
@@ -721,7 +733,7 @@ class TriangleProbes : public btTriangleCallback {
                 if (!found) return;
                 // What the middle of a face sees aslant is beside it, but where it touches: there an edge or a corner
                 // has no direction of its own.
-                const bool touches = std::abs(answer.distance) <= touchingFoot * voxel;
+                const bool touches = std::abs(answer.distance) <= touchingFoot * voxel_;
                 const glm::quat& inWorld = field_.pose.rotation;
                 if (!opposition.keeps(found->normal, -(inWorld * normal), inWorld * local_.ways().turn(), !touches))
                     return;
@@ -740,7 +752,7 @@ class TriangleProbes : public btTriangleCallback {
     Pose inField_;  ///< of the mesh
     const Placed& field_;
     Local local_;
-    float margin_, reach_, spacing_;
+    float margin_, reach_, voxel_, spacing_;
     ContactReport& report_;
     std::vector<Contact>& contacts_;
     std::vector<Face> faces_;

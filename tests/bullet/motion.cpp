@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstring>
 #include <glm/geometric.hpp>
+#include <glm/trigonometric.hpp>
 #include <limits>
 #include <numeric>
 #include <random>
@@ -575,6 +576,60 @@ TEST_CASE("What is about to land is met by all of its corners, finer than the fl
     for (int m = 0; m < world.dispatcher.getNumManifolds(); ++m)
         contacts += world.dispatcher.getManifoldByIndexInternal(m)->getNumContacts();
     CHECK(contacts == world.dispatcher.statistics().contactsKept);
+}
+
+TEST_CASE("A contact that starts is told as the solver sees it") {
+    static float distance, apart;
+    gContactStartedCallback = [](btPersistentManifold* const& manifold) {
+        const btManifoldPoint& point = manifold->getContactPoint(0);
+        distance = point.getDistance();
+        apart = (point.getPositionWorldOnA() - point.getPositionWorldOnB()).dot(point.m_normalWorldOnB);
+    };
+    Shape floor(exactBox({1, 1, 0.2f}, h)), box(exactBox({0.3f, 0.3f, 0.2f}, h));
+    World world;
+    world.dynamics.setGravity({0, 0, 0});
+    world.add(floor, 0, {0, 0, -0.2f});
+    const float gap = GENERATE(0.5f, 3.f) * h;
+    world.add(box, 2, {0, 0, 0.2f + gap})->setLinearVelocity({0, 0, -50});
+    distance = apart = -1;
+    world.dynamics.stepSimulation(1 / 240.f, 0);
+    gContactStartedCallback = nullptr;
+    CHECK(distance == Approx(gap).margin(0.01 * h));
+    CHECK(apart == Approx(gap).margin(0.01 * h));
+}
+
+TEST_CASE("What is thin lies on triangles, and its far side does not pull it through them") {
+    const float degrees = GENERATE(5.f, 10.f, 20.f), voxel = GENERATE(0.02f, 0.01f);
+    const Measure measure = GENERATE(Measure::edges, Measure::triangles);
+    const unsigned seed = test::seed();
+    CAPTURE(degrees, voxel, nameOf(measure), seed);
+    Random random(seed);
+    const float half = glm::radians(0.5f * degrees), y = 0.3f, z = y * std::tan(half);
+    Mesh wedge;
+    wedge.points = {{-0.4f, 0, 0}, {0.4f, 0, 0}, {0.4f, y, z}, {-0.4f, y, z}, {0.4f, y, -z}, {-0.4f, y, -z}};
+    wedge.triangles = {{0, 3, 2}, {0, 2, 1}, {0, 1, 4}, {0, 4, 5}, {3, 5, 4}, {3, 4, 2}, {0, 5, 3}, {1, 2, 4}};
+    const auto collider =
+        std::make_shared<Collider>(wedge, build(wedge, {.voxelSize = voxel}), ColliderOptions{.measure = measure});
+    const Pose frame = bullet::centreOfMassFrame(*collider);
+    Shape shape(collider, {.frame = frame});
+    Mesh sheet;
+    sheet.points = {{-2, -2, 0}, {2, -2, 0}, {2, 2, 0}, {-2, 2, 0}};
+    sheet.triangles = {{0, 1, 2}, {0, 2, 3}};
+    TriangleShape ground(sheet);
+    for (int i = 0; i < 4; ++i) {
+        World world;
+        world.add(*ground.shape, 0, {0, 0, 0});
+        const btTransform ofMesh(bullet::toBullet(frame.rotation), bullet::toBullet(frame.position));
+        btTransform pose(btQuaternion({0, 0, 1}, float(random(0, 6))) *
+                         btQuaternion({1, 0, 0}, half + float(random(0, 0.03))));
+        pose.getOrigin().setZ(0.1f * voxel - lowest(wedge, pose));
+        btRigidBody* body = world.add(shape, 1, {0, 0, 0});
+        body->setWorldTransform(pose * ofMesh.inverse());
+        body->setInterpolationWorldTransform(body->getWorldTransform());
+        body->setActivationState(DISABLE_DEACTIVATION);
+        world.run(0.5f);
+        CHECK(lowest(wedge, body->getWorldTransform() * ofMesh) > -0.1f * voxel);
+    }
 }
 
 TEST_CASE("What falls flat without friction goes nowhere else") {
