@@ -50,6 +50,8 @@ constexpr float touchingFace = 0.25f;  // [voxels]
 constexpr float touchingFoot = 0.05f;
 // What looks at a face by less (cosine) does not tell on which side of it its body is.
 constexpr float leastFacing = 0.1f;
+// A side that looks the other way by this (cosine) is the far one of what is thin.
+constexpr float farSide = -0.8f;
 // Normals that enclose less than a degree are those of one face (cosine).
 constexpr float straight = 0.99985f;
 // A way has met a convex body where it is this near to it [voxels]: by more, it would meet edges that it goes past.
@@ -657,8 +659,9 @@ class TriangleProbes : public btTriangleCallback {
     /// Whether a surface point is as far from a face as its height tells. One whose surface lies on the face is, and so
     /// is a corner that points to it, or an edge along it. One aslant may have passed an edge of what the sheet belongs
     /// to; and to the foot of one that looks away from a sheet that has not reached it, on the far side of what is
-    /// thin, the near side is nearer. So are the sides of a tip that has sunk in by less than a voxel, but then its
-    /// body goes on behind the face.
+    /// thin, the near side is nearer. So are the sides of a tip that has sunk in, but then its body goes on behind the
+    /// face, and if that is by more than a voxel, no far side is near, it goes through the face, and no other one is
+    /// nearer to the tip.
     /// @param normal  of the face, on the side that the point looks at
     /// @param height  over the point
     /// @param foot    what is nearest to the foot
@@ -672,13 +675,28 @@ class TriangleProbes : public btTriangleCallback {
         const bool isNearSide = height >= 0 || isUnclear || (foot.where == Local::Answer::near && facing >= least);
         const bool isNearest = std::abs(foot.distance - height) <= unsure && isNearSide;
         if (isNearest && opposition.keeps(cosine, true)) return true;
-        const bool hasSunk = height < 0 && height > -voxel_;
-        if (!(isNearest || hasSunk) || !point.isSharp || !collider.edges().isTip(collider.points(), index, normal))
+        if (!(isNearest || height < 0) || !point.isSharp || !collider.edges().isTip(collider.points(), index, normal))
             return false;
         if (isNearest) return true;
-        const glm::vec3 inside = field_.scale * point.position + height / std::max(cosine, leastFacing) * point.normal;
-        const auto goesOn = [&](float parts) { return local_.at(inside - parts * unsure * point.normal).distance < 0; };
-        return goesOn(1) || goesOn(2) || goesOn(3);
+        const glm::vec3 place = field_.scale * point.position;
+        const glm::vec3 through = place + height / std::max(cosine, leastFacing) * point.normal;
+        const auto goesOn = [&](float parts) {
+            return local_.at(through - parts * unsure * point.normal).distance < 0;
+        };
+        if (!goesOn(1) && !goesOn(2) && !goesOn(3)) return false;
+        if (-height < voxel_) return true;
+        return glm::dot(local_.at(through).normal, normal) > farSide && distanceFrom(through) < touchingFoot * voxel_ &&
+               distanceFrom(place) > (onFace - 1) * height;
+    }
+
+    /// How far a place is from the triangles.
+    float distanceFrom(const glm::vec3& place) const {
+        float least = std::numeric_limits<float>::max();
+        for (const auto& [corners, id] : faces_) {
+            const glm::vec3 nearest = nearestOnTriangle(place, corners[0], corners[1], corners[2]);
+            least = std::min(least, glm::distance(nearest, place));
+        }
+        return least;
     }
 
     /// A point over several faces, as in a valley, has a contact with each of them, and a feature for each.
@@ -722,7 +740,8 @@ class TriangleProbes : public btTriangleCallback {
             const glm::vec3 normal = glm::dot(up, point.normal) < 0 ? -up : up;
             const float height = glm::dot(below - place, normal);
             const Local::Answer answer = local_.at(below);
-            if (std::abs(height) > std::abs(answer.distance) + spacing_ + local_.longestWay()) return;
+            const bool mayBeTip = point.isSharp && height < 0;
+            if (!mayBeTip && std::abs(height) > std::abs(answer.distance) + spacing_ + local_.longestWay()) return;
             std::optional<Contact> found;
             if (height <= margin_ && isExact(index, normal, height, answer)) {
                 ++report_.pointsTested;
