@@ -740,13 +740,15 @@ class TriangleProbes : public btTriangleCallback {
             const glm::vec3 normal = glm::dot(up, point.normal) < 0 ? -up : up;
             const float height = glm::dot(below - place, normal);
             const Local::Answer answer = local_.at(below);
-            const bool mayBeTip = point.isSharp && height < 0;
-            if (!mayBeTip && std::abs(height) > std::abs(answer.distance) + spacing_ + local_.longestWay()) return;
+            const bool isFar = std::abs(height) > std::abs(answer.distance) + spacing_ + local_.longestWay();
+            if (isFar && !(point.isSharp && height < 0)) return;
             std::optional<Contact> found;
             if (height <= margin_ && isExact(index, normal, height, answer)) {
                 ++report_.pointsTested;
                 found = local_.contact(place, normal, height, 0, local_.approach(below, normal, margin_));
                 found->turningRadius = 0;
+            } else if (isFar) {
+                return;
             } else {
                 found = local_.probe(below, answer, 0, 0, margin_, report_);
                 if (!found) return;
