@@ -1,0 +1,336 @@
+#include <BulletCollision/CollisionShapes/btTriangleCallback.h>
+#include <LinearMath/btAabbUtil2.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <limits>
+#include <map>
+#include <optional>
+
+#include "collider/interpolant.h"
+#include "collider/touch.h"
+#include "integration/bullet/convert.h"
+#include "integration/bullet/local_field.h"
+#include "integration/bullet/narrow.h"
+
+namespace bilayer::bullet {
+
+namespace {
+
+// Of what is found of a triangle: three edges, three corners, and from here on what lies over it.
+constexpr std::uint32_t overPoints = 6;
+// A point lies over a face if it is no farther beyond its sides than this [probe spacings]: rounding.
+constexpr float onFace = 1e-4f;
+// Triangles whose wings enclose more than 179.9 degrees (cosine) have no edge between them.
+constexpr float flatEdge = -0.9999985f;
+// What a face's place sees of a body nearer than this touches the face [voxels]: beside an edge or a corner, normals
+// are mixed there.
+constexpr float touchingFoot = 0.05f;
+// What looks at a face by less (cosine) does not tell on which side of it its body is.
+constexpr float leastFacing = 0.1f;
+// A side that looks the other way by this (cosine) is the far one of what is thin.
+constexpr float farSide = -0.8f;
+
+/// Triangles as Bullet hands them over: what they share is asked about once.
+class TriangleProbes : public btTriangleCallback {
+  public:
+    TriangleProbes(const btTransform& transform, const Motion& motion, const Placed& field, float margin, bool measured,
+                   ContactReport& report, std::vector<Contact>& contacts)
+        : inField_(relative(field.pose, toPose(transform))),
+          field_(field),
+          local_(field, toPose(transform), motion, margin, measured),
+          margin_(margin),
+          reach_(std::max(margin, field.scale * field.collider.field().interiorWidth()) + local_.longestWay()),
+          voxel_(field.scale * field.collider.field().voxelSize()),
+          spacing_(probeSpacing * voxel_),
+          report_(report),
+          contacts_(contacts) {}
+
+    /// Triangles farther than this from the field's box are of no interest [m].
+    float room() const { return margin_ + local_.longestWay(); }
+
+    void processTriangle(btVector3* triangle, int part, int index) override {
+        // The two triangles of a height field's cell come one after the other, and bear the same numbers.
+        const bool isSecond = part == part_ && index == index_;
+        part_ = isSecond ? -1 : part;
+        index_ = index;
+        Face face{{inField_.toWorld(toGlm(triangle[0])), inField_.toWorld(toGlm(triangle[1])),
+                   inField_.toWorld(toGlm(triangle[2]))},
+                  mixed(mixed(mixed(std::uint64_t(part)) ^ std::uint64_t(index)) ^ std::uint64_t(isSecond))};
+        const auto& corners = face.corners;
+        const glm::vec3 middle = (corners[0] + corners[1] + corners[2]) / 3.f;
+        float around = 0;
+        for (int i = 0; i < 3; ++i) around = std::max(around, glm::distance(corners[i], middle));
+        if (local_.at(middle).distance <= around + room() + spacing_) faces_.push_back(face);
+    }
+
+    /// Asks about all triangles that were handed over.
+    void probe() {
+        for (std::uint32_t f = 0; f < faces_.size(); ++f)
+            for (int i = 0; i < 3; ++i) sides_[keyOf(f, i)].push_back({f, i});
+        for (std::uint32_t f = 0; f < faces_.size(); ++f) visit(f);
+        keepOverFaces();
+    }
+
+  private:
+    struct Face {
+        std::array<glm::vec3, 3> corners;
+        std::uint64_t id;  ///< of Bullet's numbers
+    };
+    struct Side {
+        std::uint32_t face;
+        int first;  ///< corner
+    };
+    /// What a surface point of the field finds on a triangle.
+    struct OverFace {
+        std::uint32_t point;
+        std::uint64_t face;  ///< its id
+        Contact contact;
+    };
+    /// The ends of a side in one order.
+    using Key = std::array<float, 6>;
+
+    Key keyOf(std::uint32_t face, int first) const {
+        const glm::vec3 &a = faces_[face].corners[first], &b = faces_[face].corners[(first + 1) % 3];
+        const Key key{a.x, a.y, a.z, b.x, b.y, b.z}, back{b.x, b.y, b.z, a.x, a.y, a.z};
+        return std::min(key, back);
+    }
+
+    void visit(std::uint32_t f) {
+        const auto& [corners, id] = faces_[f];
+        LocalField::Answer answers[3];
+        std::array<std::optional<Wings>, 3> wings;
+        std::array<bool, 3> flat;
+        float longest = 0;
+        for (int i = 0; i < 3; ++i) {
+            answers[i] = local_.at(corners[i]);
+            wings[i] = wingsOf(f, i);
+            flat[i] = wings[i] && glm::dot((*wings[i])[0], (*wings[i])[1]) <= flatEdge;
+            longest = std::max(longest, glm::distance(corners[i], corners[(i + 1) % 3]));
+        }
+        // Within a plane of large triangles the field's own points tell more.
+        const bool isLarge = longest > spacing_;
+        for (int i = 0; i < 3; ++i) {
+            if (!isLarge || !flat[i] || !flat[(i + 2) % 3])
+                keep(local_.probe(corners[i], answers[i], 0, featureOf(id, 3 + i), margin_, report_));
+            const Side& first = sides_.at(keyOf(f, i)).front();
+            if (first.face != f || first.first != i || (isLarge && flat[i])) continue;
+            const glm::vec3 &from = corners[i], &to = corners[(i + 1) % 3];
+            const LocalField::Edge edge{[&](float part) { return glm::mix(from, to, part); },
+                                        {0, 0},
+                                        true,
+                                        featureOf(id, i),
+                                        wings[i],
+                                        !flat[i]};
+            local_.probeEdge(edge, answers[i], answers[(i + 1) % 3], margin_, report_, contacts_);
+        }
+        if (isLarge) visitFace(faces_[f]);
+    }
+
+    /// Of a side that two triangles share.
+    std::optional<Wings> wingsOf(std::uint32_t face, int first) const {
+        const auto& sides = sides_.at(keyOf(face, first));
+        if (sides.size() != 2) return std::nullopt;
+        return Wings{wingOf(sides[0]), wingOf(sides[1])};
+    }
+
+    /// From a side into its triangle; nowhere for a triangle without area.
+    glm::vec3 wingOf(const Side& side) const {
+        const auto& corners = faces_[side.face].corners;
+        const glm::vec3 &from = corners[side.first], &to = corners[(side.first + 1) % 3],
+                        &opposite = corners[(side.first + 2) % 3];
+        const glm::vec3 along = to - from, way = opposite - from;
+        const float squared = glm::dot(along, along);
+        const glm::vec3 across = squared > 0 ? way - glm::dot(way, along) / squared * along : way;
+        const float length = glm::length(across);
+        return length > 0 ? across / length : glm::vec3(0);
+    }
+
+    /// Scatters numbers over all bits (S. Vigna's SplitMix64).
+    static std::uint64_t mixed(std::uint64_t bits) {
+        bits += 0x9e3779b97f4a7c15u;
+        bits = (bits ^ bits >> 30) * 0xbf58476d1ce4e5b9u;
+        bits = (bits ^ bits >> 27) * 0x94d049bb133111ebu;
+        return bits ^ bits >> 31;
+    }
+
+    /// The first of an edge's, a corner's, or a face's above a surface point: the same from step to step, and no
+    /// other's but for a chance of one in 2^31.
+    static std::uint32_t featureOf(std::uint64_t triangle, std::uint32_t part) {
+        constexpr std::uint32_t count = featureOfB - (2u << partBits);
+        return std::uint32_t(mixed(triangle ^ part) % count);
+    }
+
+    void keep(const std::optional<Contact>& contact) {
+        if (contact) contacts_.push_back(*contact);
+    }
+
+    /// Whether a surface point is as far from a face as its height tells. One whose surface lies on the face is, and so
+    /// is a corner that points to it, or an edge along it. One aslant may have passed an edge of what the sheet belongs
+    /// to; and to the foot of one that looks away from a sheet that has not reached it, on the far side of what is
+    /// thin, the near side is nearer. So are the sides of a tip that has sunk in.
+    /// @param normal  of the face, on the side that the point looks at
+    /// @param height  over the point
+    /// @param foot    what is nearest to the foot
+    bool isExact(std::uint32_t index, const glm::vec3& normal, float height, const LocalField::Answer& foot) const {
+        const Collider& collider = field_.collider;
+        const SurfacePoint& point = collider.points().points()[index];
+        // where the foot lies in the middle of its body, that side counts which a point of a face looks to
+        const bool isUnclear = foot.where == LocalField::Answer::unclear && !point.isSharp;
+        const float facing = glm::dot(foot.normal, normal), least = point.isSharp ? leastFacing : 0;
+        const bool isNearSide = height >= 0 || isUnclear || (foot.where == LocalField::Answer::near && facing >= least);
+        const bool isNearest = std::abs(foot.distance - height) <= mostInterpolationError * voxel_ && isNearSide;
+        if (isNearest && opposition.keeps(glm::dot(normal, point.normal), true)) return true;
+        if (!(isNearest || height < 0) || !point.isSharp || !collider.edges().isTip(collider.points(), index, normal))
+            return false;
+        return isNearest || hasSunk(point, normal, height);
+    }
+
+    /// Whether a tip under a face has gone through it: its body goes on behind the face, and if the tip is deeper than
+    /// a voxel, no far side of the body is near, its axis meets the triangles, and no other one is nearer to it.
+    bool hasSunk(const SurfacePoint& tip, const glm::vec3& normal, float height) const {
+        const glm::vec3 place = field_.scale * tip.position;
+        const float cosine = std::max(glm::dot(normal, tip.normal), leastFacing);
+        const glm::vec3 through = place + height / cosine * tip.normal;
+        const auto goesOn = [&](float parts) {
+            return local_.at(through - parts * mostInterpolationError * voxel_ * tip.normal).distance < 0;
+        };
+        if (!goesOn(1) && !goesOn(2) && !goesOn(3)) return false;
+        if (-height < voxel_) return true;
+        return glm::dot(local_.at(through).normal, normal) > farSide && distanceFrom(through) < touchingFoot * voxel_ &&
+               distanceFrom(place) > (onFace - 1) * height;
+    }
+
+    /// How far a place is from the triangles.
+    float distanceFrom(const glm::vec3& place) const {
+        float least = std::numeric_limits<float>::max();
+        for (const auto& [corners, id] : faces_) {
+            const glm::vec3 nearest = nearestOnTriangle(place, corners[0], corners[1], corners[2]);
+            least = std::min(least, glm::distance(nearest, place));
+        }
+        return least;
+    }
+
+    /// A point over several faces, as in a valley, has a contact with each of them, and a feature for each.
+    void keepOverFaces() {
+        const auto isEarlier = [](const OverFace& a, const OverFace& b) { return a.point < b.point; };
+        std::stable_sort(overFaces_.begin(), overFaces_.end(), isEarlier);
+        for (auto first = overFaces_.begin(); first != overFaces_.end();) {
+            const auto last = std::upper_bound(first, overFaces_.end(), *first, isEarlier);
+            const bool isAlone = last - first == 1;
+            for (; first != last; ++first) {
+                first->contact.feature =
+                    (isAlone ? first->point : featureOf(first->face, overPoints + first->point)) | featureOfB;
+                contacts_.push_back(first->contact);
+            }
+        }
+    }
+
+    /// The plane of a triangle and its borders.
+    struct Plane {
+        std::array<glm::vec3, 3> corners, outwards;
+        glm::vec3 up;
+
+        /// Whether a place is farther than this beyond the sides or, by as much more, from the plane [m].
+        bool isBeside(const glm::vec3& place, float by, float height) const {
+            for (int i = 0; i < 3; ++i)
+                if (glm::dot(outwards[i], place - corners[i]) > by) return true;
+            return std::abs(glm::dot(up, place - corners[0])) > height + by;
+        }
+    };
+
+    /// Nothing for a triangle without area.
+    static std::optional<Plane> planeOf(const std::array<glm::vec3, 3>& corners) {
+        const glm::vec3 square = glm::cross(corners[1] - corners[0], corners[2] - corners[0]);
+        const float area = glm::length(square);
+        if (!(area > 0)) return std::nullopt;
+        Plane plane{corners, {}, square / area};
+        for (int i = 0; i < 3; ++i)
+            plane.outwards[i] = glm::normalize(glm::cross(corners[(i + 1) % 3] - corners[i], square));
+        return plane;
+    }
+
+    /// Asks the field at the feet of its own surface points on the triangle: a bump finds a large face. Points that are
+    /// not over the face are its edges' and its neighbours'.
+    void visitFace(const Face& face) {
+        const std::optional<Plane> plane = planeOf(face.corners);
+        if (!plane) return;
+        const float scale = field_.scale, rounding = onFace * spacing_;
+        const auto reject = [&](const glm::vec3& centre, float radius) {
+            return plane->isBeside(scale * centre, scale * radius + rounding, reach_);
+        };
+        field_.collider.points().visit(reject, [&](std::uint32_t index, const SurfacePoint& point) {
+            if (plane->isBeside(scale * point.position, rounding, reach_)) return;
+            if (const auto found = overFace(*plane, index, point)) overFaces_.push_back({index, face.id, *found});
+        });
+    }
+
+    /// The contact of a surface point with the face under it. A foot that others are much nearer to is theirs.
+    std::optional<Contact> overFace(const Plane& plane, std::uint32_t index, const SurfacePoint& point) {
+        const glm::vec3 place = field_.scale * point.position;
+        const glm::vec3 foot = nearestOnTriangle(place, plane.corners[0], plane.corners[1], plane.corners[2]);
+        const glm::vec3 normal = glm::dot(plane.up, point.normal) < 0 ? -plane.up : plane.up;
+        const float height = glm::dot(foot - place, normal);
+        const LocalField::Answer there = local_.at(foot);
+        const bool isFar = std::abs(height) > std::abs(there.distance) + spacing_ + local_.longestWay();
+        if (isFar && !(point.isSharp && height < 0)) return std::nullopt;
+        if (height <= margin_ && isExact(index, normal, height, there)) {
+            ++report_.pointsTested;
+            Contact found = local_.contact(place, normal, height, 0, local_.approach(foot, normal, margin_));
+            found.turningRadius = 0;
+            return found;
+        }
+        if (isFar) return std::nullopt;
+        return atFoot(foot, normal, there);
+    }
+
+    /// As the field sees the face. What its middle sees aslant is beside it, but where it touches: there an edge or a
+    /// corner has no direction of its own.
+    std::optional<Contact> atFoot(const glm::vec3& foot, const glm::vec3& normal, const LocalField::Answer& there) {
+        std::optional<Contact> found = local_.probe(foot, there, 0, 0, margin_, report_);
+        if (!found) return std::nullopt;
+        const bool touches = std::abs(there.distance) <= touchingFoot * voxel_;
+        const glm::quat& inWorld = field_.pose.rotation;
+        if (!opposition.keeps(found->normal, -(inWorld * normal), inWorld * local_.ways().turn(), !touches))
+            return std::nullopt;
+        const auto normalAt = [&](const glm::vec3& place) { return local_.at(place).normal; };
+        if (touches)
+            found->normal = inWorld * normal;
+        else if (there.distance > 0 && looksAtEdge(foot, -normal, there.distance, there.normal, normalAt))
+            return std::nullopt;
+        found->turningRadius = -1;  // it stays below the point
+        return found;
+    }
+
+    Pose inField_;  ///< of the mesh
+    const Placed& field_;
+    LocalField local_;
+    float margin_, reach_, voxel_, spacing_;
+    ContactReport& report_;
+    std::vector<Contact>& contacts_;
+    std::vector<Face> faces_;
+    std::vector<OverFace> overFaces_;
+    int part_ = -1, index_ = -1;  ///< of the last triangle that was handed over
+    std::map<Key, std::vector<Side>> sides_;
+};
+
+}  // namespace
+
+ContactReport collideTriangles(const btConcaveShape& mesh, const btTransform& transform, const Motion& motion,
+                               const Placed& field, float margin, bool measured, std::vector<Contact>& contacts) {
+    ContactReport report;
+    TriangleProbes probes(transform, motion, field, margin, measured, report, contacts);
+    const Pose inMesh = relative(toPose(transform), field.pose);
+    const Bounds& bounds = field.collider.bounds();
+    btVector3 lower, upper;
+    const btTransform place(toBullet(inMesh.rotation), toBullet(inMesh.toWorld(field.scale * bounds.centre())));
+    btTransformAabb(toBullet(0.5f * field.scale * bounds.size()), probes.room(), place, lower, upper);
+    mesh.processAllTriangles(&probes, lower, upper);
+    probes.probe();
+    return report;
+}
+
+}  // namespace bilayer::bullet
