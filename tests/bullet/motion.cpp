@@ -17,7 +17,7 @@
 
 #include "demos/shared/shapes.h"
 #include "integration/bullet/convert.h"
-#include "integration/bullet/manifolds.h"
+#include "integration/bullet/reduce.h"
 #include "sdf/build.h"
 #include "tests/support/random.h"
 #include "tests/support/support.h"
