@@ -1,0 +1,212 @@
+#include "integration/bullet/passage.h"
+
+#include <BulletCollision/CollisionShapes/btStaticPlaneShape.h>
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/mat3x3.hpp>
+#include <optional>
+#include <type_traits>
+#include <vector>
+
+#include "integration/bullet/convert.h"
+#include "integration/bullet/convex.h"
+#include "integration/bullet/obstacles.h"
+
+namespace bilayer::bullet {
+
+namespace {
+
+// What gets through is told by points that lie so far inside of their own body: contacts see to what overlaps less, and
+// a body that slides along another one is not held [voxels].
+constexpr float sunk = 0.25f;
+// How deep such a point may go below the plane of the place where it enters, or deeper than it has been [voxels].
+constexpr float allowed = 0.1f;
+// Arcs are looked at as chords, which are off by the square of this over eight, in parts of the radius [rad].
+constexpr float pieceTurn = 0.1f;
+// A way is surely free as long as nothing is nearer than this [voxels].
+constexpr float nearby = 0.5f;
+constexpr int mostProbes = 64;   // along an edge of a convex body
+constexpr int mostStrides = 64;  // of a way along which something is nearby; what takes more is taken as met
+
+/// Takes a field's coordinates into an obstacle's at some time of the step.
+struct Moment {
+    float time;
+    glm::mat3 linear;
+    glm::vec3 shift;
+
+    glm::vec3 operator()(const glm::vec3& point) const { return linear * point + shift; }
+};
+
+/// A field's coordinates, or those of another shape.
+struct Frame {
+    Pose pose;
+    float scale;
+};
+
+Frame frameOf(const Part& part, const btTransform& object) {
+    const btTransform here = object * part.local;
+    if (part.shape->getShapeType() != FAST_CONCAVE_MESH_PROXYTYPE) return {toPose(here), 1};
+    const Placed placed = static_cast<const Shape*>(part.shape)->placed(here);
+    return {placed.pose, placed.scale};
+}
+
+/// @param touch  in the coordinates of the obstacle
+Passing inWorld(const Passing& touch, const Part& obstacle, const Course& its) {
+    const Frame frame = frameOf(obstacle, its.at(touch.time));
+    return {touch.time, frame.pose.toWorld(frame.scale * touch.place), frame.pose.rotation * touch.normal};
+}
+
+/// From start to end, so close together that the ways in between are straight.
+std::vector<Moment> momentsOf(const Part& points, const Course& its, const Part& obstacle, const Course& others) {
+    const int pieces = std::max(1, int(std::ceil((its.turn() + others.turn()) / pieceTurn)));
+    std::vector<float> times{its.part(), others.part()};
+    for (int i = 0; i <= pieces; ++i) times.push_back(float(i) / float(pieces));
+    std::sort(times.begin(), times.end());
+    times.erase(std::unique(times.begin(), times.end()), times.end());
+    std::vector<Moment> moments;
+    for (const float time : times) {
+        const Frame from = frameOf(points, its.at(time)), into = frameOf(obstacle, others.at(time));
+        const Pose pose = relative(into.pose, from.pose);
+        moments.push_back({time, from.scale / into.scale * glm::mat3_cast(pose.rotation), pose.position / into.scale});
+    }
+    return moments;
+}
+
+/// Points on their ways through an obstacle.
+template <class Obstacle>
+class Passage {
+  public:
+    /// @param voxel  in the obstacle's units
+    Passage(const Obstacle& obstacle, const std::vector<Moment>& moments, float voxel)
+        : obstacle_(obstacle), moments_(moments), voxel_(voxel), scale_(glm::length(moments.front().linear[0])) {}
+
+    /// The surface points of a field.
+    void follow(const SurfacePoints& points) {
+        const auto reject = [&](const glm::vec3& centre, float radius) { return !comesNear(centre, scale_ * radius); };
+        points.visit(reject,
+                     [&](std::uint32_t, const SurfacePoint& point) { follow(point.position, point.normal, 0); });
+    }
+
+    /// A ball.
+    /// @param outward  of its body, to which the ball belongs
+    void follow(const glm::vec3& point, const glm::vec3& outward, float radius) {
+        const float inward = sunk * voxel_, smaller = std::max(scale_ * radius - inward, 0.f);
+        const glm::vec3 inner = point - (inward - scale_ * radius + smaller) / scale_ * outward;
+        glm::vec3 from = moments_.front()(inner), aside(0);
+        // what is in there already may go on at its depth
+        if (obstacle_.entry(from, from, smaller)) {
+            const auto out = obstacle_.wayOut(from, smaller);
+            if (!out) return;
+            aside = *out;
+        }
+        from += aside;
+        std::optional<Entry> entered;
+        for (std::size_t i = 0; i + 1 < moments_.size() && moments_[i].time < first_.time; ++i) {
+            const glm::vec3 to = moments_[i + 1](inner) + aside;
+            if (!entered) entered = obstacle_.entry(from, to, smaller);
+            if (entered) {
+                const auto depth = [&](const glm::vec3& at) {
+                    return glm::dot(entered->position - at, entered->normal) + smaller;
+                };
+                const float before = depth(from), after = depth(to), deepest = allowed * voxel_;
+                if (after > deepest) {
+                    // back to where its own surface touched
+                    const glm::vec3 out = moments_[i].linear * outward / scale_;
+                    const float touching = std::min(inward * glm::dot(out, entered->normal), 0.f);
+                    const float part = (touching - before) / (after - before);
+                    const float time = moments_[i].time + part * (moments_[i + 1].time - moments_[i].time);
+                    first_ = {std::clamp(time, 0.f, first_.time), entered->position - aside, entered->normal};
+                    return;
+                }
+                if (after < 0) entered.reset();
+            }
+            from = to;
+        }
+    }
+
+    /// The first of them that goes too deep, in the obstacle's coordinates.
+    const Passing& first() const { return first_; }
+
+  private:
+    bool comesNear(const glm::vec3& centre, float radius) const {
+        for (std::size_t i = 0; i + 1 < moments_.size() && moments_[i].time < first_.time; ++i)
+            if (isNear(moments_[i](centre), moments_[i + 1](centre), radius)) return true;
+        return false;
+    }
+
+    bool isNear(const glm::vec3& from, const glm::vec3& to, float radius) const {
+        if constexpr (std::is_same_v<Obstacle, TriangleObstacle>) {
+            return obstacle_.isNear(from, to, radius);
+        } else {
+            const float length = glm::distance(from, to), near = nearby * voxel_;
+            float gone = 0;
+            for (int i = 0; i < mostStrides && gone <= length; ++i) {
+                const glm::vec3 at = length > 0 ? from + gone / length * (to - from) : from;
+                const float left = obstacle_.bound(at) - radius;
+                if (left < near) return true;
+                gone += left;
+            }
+            return gone <= length;
+        }
+    }
+
+    const Obstacle& obstacle_;
+    const std::vector<Moment>& moments_;
+    float voxel_, scale_;
+    Passing first_;
+};
+
+template <class Obstacle>
+Passing passageOf(const Shape& field, const Obstacle& obstacle, const std::vector<Moment>& moments, float voxel) {
+    Passage passage(obstacle, moments, voxel);
+    passage.follow(field.collider().points());
+    return passage.first();
+}
+
+/// The corners and edges of a convex body, and what it is grown by.
+Passing passageOf(const Convex& convex, const Shape& field, const std::vector<Moment>& moments) {
+    const FieldObstacle obstacle(field.collider().field());
+    Passage passage(obstacle, moments, field.voxelSize() / field.scale());
+    const auto follow = [&](const glm::vec3& point, float radius) {
+        const float length = glm::length(point);
+        passage.follow(point, length > 0 ? point / length : glm::vec3(0), radius);
+    };
+    const auto corners = convex.corners();
+    for (std::uint32_t i = 0; i < corners.size(); ++i) follow(corners[i], convex.radius(i));
+    for (const Convex::Edge& edge : convex.edges()) {
+        const float length = glm::distance(corners[edge.from], corners[edge.to]);
+        const int parts = probeParts(length, field.voxelSize(), mostProbes);
+        for (int i = 1; i < parts; ++i) {
+            const float part = float(i) / float(parts);
+            follow(convex.place(edge, part), convex.radius(edge, part));
+        }
+    }
+    return passage.first();
+}
+
+}  // namespace
+
+Passing passage(const Part& part, const Course& its, const Part& other, const Course& others) {
+    const Shape& field = *part.field();
+    const std::vector<Moment> moments = momentsOf(part, its, other, others);
+    const float voxel = field.voxelSize();
+    const int type = other.shape->getShapeType();
+    const auto into = [&](const auto& obstacle, float its) {
+        return inWorld(passageOf(field, obstacle, moments, its), other, others);
+    };
+    if (const Shape* second = other.field())
+        return into(FieldObstacle(second->collider().field()), std::min(voxel, second->voxelSize()) / second->scale());
+    if (type == STATIC_PLANE_PROXYTYPE)
+        return into(PlaneObstacle(static_cast<const btStaticPlaneShape&>(*other.shape)), voxel);
+    if (other.shape->isConvex()) {
+        const Convex convex(static_cast<const btConvexShape&>(*other.shape));
+        const Passing touch = passageOf(convex, field, momentsOf(other, others, part, its));
+        return earlier(into(ConvexObstacle(convex, 0.1f * allowed * voxel), voxel), inWorld(touch, part, its).turned());
+    }
+    if (!other.shape->isConcave() || type == GIMPACT_SHAPE_PROXYTYPE || type == FAST_CONCAVE_MESH_PROXYTYPE) return {};
+    return into(TriangleObstacle(static_cast<const btConcaveShape&>(*other.shape)), voxel);
+}
+
+}  // namespace bilayer::bullet
