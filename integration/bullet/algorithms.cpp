@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <new>
-#include <typeinfo>
 #include <utility>
 
 #include "integration/bullet/compound.h"
@@ -134,7 +133,7 @@ void Task::collide(const btManifoldResult& result, bool isTest) const {
 
 bool StepState::isTest(const btManifoldResult& result) const {
     if (result.m_closestPointDistanceThreshold > 0) return true;
-    return seconds == 0 && typeid(result) != typeid(btManifoldResult);
+    return seconds == 0 && isOfUser(result);
 }
 
 float StepState::secondsOf(const btDispatcherInfo& info, bool isTest) const {

@@ -22,16 +22,35 @@ constexpr float held = 0.98f, mostDrift = 0.25f;
 // is not known to slip that holds.
 constexpr float stepsOfRest = 120, slipOfRest = 0.05f;
 
-/// Keeps Bullet from calling one of its callbacks, which would run each time a manifold is filled anew.
-template <class Callback>
-class Silenced {
-  public:
-    explicit Silenced(Callback& callback) : callback_(callback), kept_(std::exchange(callback, nullptr)) {}
-    ~Silenced() { callback_ = kept_; }
+/// What no solver has seen yet, as Bullet makes it in btManifoldResult::addContactPoint(), but beside all others,
+/// however far away it is, and without a word to the user.
+/// @param isOfA  whether the feature is
+btManifoldPoint pointOf(const Contact& contact, bool isOfA, const btPersistentManifold& manifold,
+                        const btManifoldResult& result) {
+    const btVector3 onB = toBullet(contact.position), normal = toBullet(contact.normal);
+    const btVector3 onA = onB + contact.distance * normal;
+    btManifoldPoint point(manifold.getBody0()->getWorldTransform().invXform(onA),
+                          manifold.getBody1()->getWorldTransform().invXform(onB), normal, contact.distance);
+    point.m_positionWorldOnA = onA;
+    point.m_positionWorldOnB = onB;
+    btPlaneSpace1(normal, point.m_lateralFrictionDir1, point.m_lateralFrictionDir2);
+    point.m_partId0 = point.m_partId1 = 0;
+    point.m_index0 = isOfA ? static_cast<int>(contact.feature & ~featureOfB) : -1;
+    point.m_index1 = isOfA ? -1 : static_cast<int>(contact.feature & ~featureOfB);
 
-  private:
-    Callback &callback_, kept_;
-};
+    const btCollisionObject *first = result.getBody0Internal(), *second = result.getBody1Internal();
+    point.m_combinedFriction = gCalculateCombinedFrictionCallback(first, second);
+    point.m_combinedRestitution = gCalculateCombinedRestitutionCallback(first, second);
+    point.m_combinedRollingFriction = gCalculateCombinedRollingFrictionCallback(first, second);
+    point.m_combinedSpinningFriction = gCalculateCombinedSpinningFrictionCallback(first, second);
+    if ((first->getCollisionFlags() | second->getCollisionFlags()) &
+        btCollisionObject::CF_HAS_CONTACT_STIFFNESS_DAMPING) {
+        point.m_combinedContactDamping1 = gCalculateCombinedContactDampingCallback(first, second);
+        point.m_combinedContactStiffness1 = gCalculateCombinedContactStiffnessCallback(first, second);
+        point.m_contactPointFlags |= BT_CONTACT_FLAG_CONTACT_STIFFNESS_DAMPING;
+    }
+    return point;
+}
 
 /// Tells the user of a contact once it is as the solver will see it; what he keeps with it is there again each step.
 void tellAdded(btManifoldPoint& point, const btPersistentManifold& manifold, const btManifoldResult& result) {
@@ -88,6 +107,10 @@ Anchor anchorOf(const btManifoldPoint& point, const btVector3& before, const btP
 }
 
 }  // namespace
+
+bool isOfUser(const btManifoldResult& result) {
+    return typeid(result) != typeid(btManifoldResult);
+}
 
 struct Manifolds::Step {
     float seconds;
@@ -165,17 +188,14 @@ void Manifolds::fill(std::size_t m, std::span<const Contact> contacts, std::span
     const bool touched = manifold->getNumContacts() > 0;
     manifold->setNumContacts(0);
     step.result.setPersistentManifold(manifold);
-    {
-        const Silenced started(gContactStartedCallback);
-        const Silenced added(gContactAddedCallback);
-        for (const Contact& contact : contacts) emit(contact, step.aIsFirst, step.result);
-    }
+    for (const Contact& contact : contacts) emit(contact, step.aIsFirst, step.result);
+    const bool isTold = !isOfUser(step.result);
     for (int i = 0; i < manifold->getNumContacts(); ++i) {
         const auto n = std::size_t(i);
         btManifoldPoint& point = manifold->getContactPoint(i);
         Written& written = written_[m][n];
         written = inherit(*manifold, i, step.continuity);
-        tellAdded(point, *manifold, step.result);
+        if (isTold) tellAdded(point, *manifold, step.result);
         if (point.m_contactMotion1 != 0 || point.m_contactMotion2 != 0) letGo(*manifold, point, written);
         const bool isAsFound = point.m_normalWorldOnB == toBullet(contacts[n].normal);
         if (ahead[n] && isAsFound) put(point, *ahead[n]);
@@ -184,28 +204,22 @@ void Manifolds::fill(std::size_t m, std::span<const Contact> contacts, std::span
     }
     manifold->setContactBreakingThreshold(step.continuity.sameWithin);
     const bool touches = manifold->getNumContacts() > 0;
-    if (!touched && touches && gContactStartedCallback) gContactStartedCallback(manifold);
+    if (isTold && !touched && touches && gContactStartedCallback) gContactStartedCallback(manifold);
     if (touched && !touches && gContactEndedCallback) gContactEndedCallback(manifold);
 }
 
 void Manifolds::emit(const Contact& contact, bool aIsFirst, btManifoldResult& result) {
-    const bool ofFirst = aIsFirst != static_cast<bool>(contact.feature & featureOfB);
-    const int index = static_cast<int>(contact.feature & ~featureOfB);
-    result.setShapeIdentifiersA(0, ofFirst ? index : -1);
-    result.setShapeIdentifiersB(0, ofFirst ? -1 : index);
-
-    // Bullet drops points beyond the threshold and merges those within it: each goes in as if it touched, beside all
-    // others, and is put right afterwards. A user's own result, as of a contact test, is told the distance.
+    const bool isOfA = !(contact.feature & featureOfB);
     btPersistentManifold& manifold = *result.getPersistentManifold();
-    const float told = typeid(result) == typeid(btManifoldResult) ? std::min(contact.distance, 0.f) : contact.distance;
-    manifold.setContactBreakingThreshold(std::max(told, 0.f));
-    const int before = manifold.getNumContacts();
-    result.addContactPoint(toBullet(contact.normal), toBullet(contact.position), told);
-    if (told == contact.distance || manifold.getNumContacts() == before) return;
-    btManifoldPoint& point = manifold.getContactPoint(before);
-    point.m_distance1 = contact.distance;
-    point.m_positionWorldOnA = point.m_positionWorldOnB + contact.distance * point.m_normalWorldOnB;
-    point.m_localPointA = manifold.getBody0()->getWorldTransform().invXform(point.m_positionWorldOnA);
+    manifold.setContactBreakingThreshold(std::max(contact.distance, 0.f));
+    if (!isOfUser(result)) {
+        manifold.addManifoldPoint(pointOf(contact, isOfA, manifold, result));
+        return;
+    }
+    const int index = static_cast<int>(contact.feature & ~featureOfB);
+    result.setShapeIdentifiersA(0, isOfA == aIsFirst ? index : -1);
+    result.setShapeIdentifiersB(0, isOfA == aIsFirst ? -1 : index);
+    result.addContactPoint(toBullet(contact.normal), toBullet(contact.position), contact.distance);
 }
 
 Manifolds::Written Manifolds::writtenAs(const btManifoldPoint& point, std::size_t manifold) const {

@@ -28,6 +28,9 @@ struct Continuity {
     bool isSwept = false;       ///< there are contacts with all that is met in the step, not only with what is near now
 };
 
+/// Whether a user has made the result, as contact tests do: he takes contacts as he likes.
+bool isOfUser(const btManifoldResult& result);
+
 /// The manifolds of one pair of bodies, one for each patch. Contacts are written anew each step, since Bullet refreshes
 /// the positions of old ones but not their normals; impulses are handed on to the new contacts nearest the old ones,
 /// and so the solver starts warm. Contacts that friction holds are anchored: what they drift along the surface in spite
@@ -39,8 +42,8 @@ class Manifolds {
     Manifolds(const Manifolds&) = delete;
     Manifolds& operator=(const Manifolds&) = delete;
 
-    /// Replaces all contacts. Goes through btManifoldResult::addContactPoint, so that friction, restitution, callbacks
-    /// and contact tests work as for Bullet's own shapes.
+    /// Replaces all contacts. Friction, restitution and callbacks are those of Bullet's own shapes; a user's result
+    /// gets each contact by btManifoldResult::addContactPoint().
     /// @param ahead    one for each contact of the patches, of those that turn
     /// @param a, b     the bodies A and B of the patches; `result` may hold them in either order, as within a compound
     /// @param seconds  that the step takes; 0 between steps

@@ -15,6 +15,7 @@
 #include "integration/bullet/convert.h"
 #include "integration/bullet/local_field.h"
 #include "integration/bullet/narrow.h"
+#include "integration/bullet/sheet.h"
 
 namespace bilayer::bullet {
 
@@ -70,14 +71,14 @@ class TriangleProbes : public btTriangleCallback {
     /// Asks about all triangles that were handed over.
     void probe() {
         for (std::uint32_t f = 0; f < faces_.size(); ++f)
-            for (int i = 0; i < 3; ++i) sides_[keyOf(f, i)].push_back({f, i});
+            for (int i = 0; i < 3; ++i) sides_[keyOf(faces_[f].corners, i)].push_back({f, i});
         for (std::uint32_t f = 0; f < faces_.size(); ++f) visit(f);
         keepOverFaces();
     }
 
   private:
     struct Face {
-        std::array<glm::vec3, 3> corners;
+        Triangle corners;
         std::uint64_t id;  ///< of Bullet's numbers
     };
     struct Side {
@@ -90,15 +91,6 @@ class TriangleProbes : public btTriangleCallback {
         std::uint64_t face;  ///< its id
         Contact contact;
     };
-    /// The ends of a side in one order.
-    using Key = std::array<float, 6>;
-
-    Key keyOf(std::uint32_t face, int first) const {
-        const glm::vec3 &a = faces_[face].corners[first], &b = faces_[face].corners[(first + 1) % 3];
-        const Key key{a.x, a.y, a.z, b.x, b.y, b.z}, back{b.x, b.y, b.z, a.x, a.y, a.z};
-        return std::min(key, back);
-    }
-
     void visit(std::uint32_t f) {
         const auto& [corners, id] = faces_[f];
         LocalField::Answer answers[3];
@@ -116,7 +108,7 @@ class TriangleProbes : public btTriangleCallback {
         for (int i = 0; i < 3; ++i) {
             if (!isLarge || !flat[i] || !flat[(i + 2) % 3])
                 keep(local_.probe(corners[i], answers[i], 0, featureOf(id, 3 + i), margin_, report_));
-            const Side& first = sides_.at(keyOf(f, i)).front();
+            const Side& first = sides_.at(keyOf(corners, i)).front();
             if (first.face != f || first.first != i || (isLarge && flat[i])) continue;
             const glm::vec3 &from = corners[i], &to = corners[(i + 1) % 3];
             const LocalField::Edge edge{[&](float part) { return glm::mix(from, to, part); },
@@ -132,21 +124,10 @@ class TriangleProbes : public btTriangleCallback {
 
     /// Of a side that two triangles share.
     std::optional<Wings> wingsOf(std::uint32_t face, int first) const {
-        const auto& sides = sides_.at(keyOf(face, first));
+        const auto& sides = sides_.at(keyOf(faces_[face].corners, first));
         if (sides.size() != 2) return std::nullopt;
-        return Wings{wingOf(sides[0]), wingOf(sides[1])};
-    }
-
-    /// From a side into its triangle; nowhere for a triangle without area.
-    glm::vec3 wingOf(const Side& side) const {
-        const auto& corners = faces_[side.face].corners;
-        const glm::vec3 &from = corners[side.first], &to = corners[(side.first + 1) % 3],
-                        &opposite = corners[(side.first + 2) % 3];
-        const glm::vec3 along = to - from, way = opposite - from;
-        const float squared = glm::dot(along, along);
-        const glm::vec3 across = squared > 0 ? way - glm::dot(way, along) / squared * along : way;
-        const float length = glm::length(across);
-        return length > 0 ? across / length : glm::vec3(0);
+        const auto wing = [&](const Side& side) { return wingOf(faces_[side.face].corners, side.first); };
+        return Wings{wing(sides[0]), wing(sides[1])};
     }
 
     /// Scatters numbers over all bits (S. Vigna's SplitMix64).
@@ -314,7 +295,7 @@ class TriangleProbes : public btTriangleCallback {
     std::vector<Face> faces_;
     std::vector<OverFace> overFaces_;
     int part_ = -1, index_ = -1;  ///< of the last triangle that was handed over
-    std::map<Key, std::vector<Side>> sides_;
+    std::map<SideKey, std::vector<Side>> sides_;
 };
 
 }  // namespace

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
 #include <optional>
@@ -13,6 +14,7 @@
 #include "integration/bullet/convert.h"
 #include "integration/bullet/convex.h"
 #include "integration/bullet/obstacles.h"
+#include "integration/bullet/sheet.h"
 
 namespace bilayer::bullet {
 
@@ -27,8 +29,9 @@ constexpr float allowed = 0.1f;
 constexpr float pieceTurn = 0.1f;
 // A way is surely free as long as nothing is nearer than this [voxels].
 constexpr float nearby = 0.5f;
-constexpr int mostProbes = 64;   // along an edge of a convex body
-constexpr int mostStrides = 64;  // of a way along which something is nearby; what takes more is taken as met
+constexpr int mostProbes = 1 << 20;  // along an edge: those of what is far away are not looked at
+constexpr float bent = 1.12f;        // the way along a rim, in parts of the straight one, up to a quarter of it
+constexpr int mostStrides = 64;      // of a way along which something is nearby; what takes more is taken as met
 
 /// Takes a field's coordinates into an obstacle's at some time of the step.
 struct Moment {
@@ -74,6 +77,13 @@ std::vector<Moment> momentsOf(const Part& points, const Course& its, const Part&
     return moments;
 }
 
+/// A point of a body, grown by a radius.
+struct Ball {
+    glm::vec3 place;
+    glm::vec3 outward;  ///< of the body, of unit length; or zero
+    float radius = 0;
+};
+
 /// Points on their ways through an obstacle.
 template <class Obstacle>
 class Passage {
@@ -85,13 +95,11 @@ class Passage {
     /// The surface points of a field.
     void follow(const SurfacePoints& points) {
         const auto reject = [&](const glm::vec3& centre, float radius) { return !comesNear(centre, scale_ * radius); };
-        points.visit(reject,
-                     [&](std::uint32_t, const SurfacePoint& point) { follow(point.position, point.normal, 0); });
+        points.visit(reject, [&](std::uint32_t, const SurfacePoint& point) { follow({point.position, point.normal}); });
     }
 
-    /// A ball.
-    /// @param outward  of its body, to which the ball belongs
-    void follow(const glm::vec3& point, const glm::vec3& outward, float radius) {
+    void follow(const Ball& ball) {
+        const auto& [point, outward, radius] = ball;
         const float inward = sunk * voxel_, smaller = std::max(scale_ * radius - inward, 0.f);
         const glm::vec3 inner = point - (inward - scale_ * radius + smaller) / scale_ * outward;
         glm::vec3 from = moments_.front()(inner), aside(0);
@@ -126,10 +134,35 @@ class Passage {
         }
     }
 
+    /// Along an edge, its ends excluded.
+    /// @param ballAt   (float part) -> Ball
+    /// @param length   between its ends
+    /// @param spacing  of the field that is met, in the same units
+    template <class BallAt>
+    void followEdge(float length, float spacing, const BallAt& ballAt) {
+        const int parts = probeParts(length, spacing, mostProbes);
+        const float radius = std::max(ballAt(0.f).radius, ballAt(1.f).radius);
+        followBetween(0, parts, bent * length / float(parts), radius,
+                      [&](int i) { return ballAt(float(i) / float(parts)); });
+    }
+
     /// The first of them that goes too deep, in the obstacle's coordinates.
     const Passing& first() const { return first_; }
 
   private:
+    /// Those with numbers in between, if any of them may come near.
+    /// @param length, radius  from one to the next, and of the largest
+    template <class BallAt>
+    void followBetween(int from, int to, float length, float radius, const BallAt& ballAt) {
+        if (to - from < 2) return;
+        const int middle = from + (to - from) / 2;
+        const Ball ball = ballAt(middle);
+        if (!comesNear(ball.place, scale_ * (float(to - middle) * length + radius))) return;
+        follow(ball);
+        followBetween(from, middle, length, radius, ballAt);
+        followBetween(middle, to, length, radius, ballAt);
+    }
+
     bool comesNear(const glm::vec3& centre, float radius) const {
         for (std::size_t i = 0; i + 1 < moments_.size() && moments_[i].time < first_.time; ++i)
             if (isNear(moments_[i](centre), moments_[i + 1](centre), radius)) return true;
@@ -169,20 +202,34 @@ Passing passageOf(const Shape& field, const Obstacle& obstacle, const std::vecto
 Passing passageOf(const Convex& convex, const Shape& field, const std::vector<Moment>& moments) {
     const FieldObstacle obstacle(field.collider().field());
     Passage passage(obstacle, moments, field.voxelSize() / field.scale());
-    const auto follow = [&](const glm::vec3& point, float radius) {
+    const auto ballAt = [](const glm::vec3& point, float radius) {
         const float length = glm::length(point);
-        passage.follow(point, length > 0 ? point / length : glm::vec3(0), radius);
+        return Ball{point, length > 0 ? point / length : glm::vec3(0), radius};
     };
     const auto corners = convex.corners();
-    for (std::uint32_t i = 0; i < corners.size(); ++i) follow(corners[i], convex.radius(i));
-    for (const Convex::Edge& edge : convex.edges()) {
-        const float length = glm::distance(corners[edge.from], corners[edge.to]);
-        const int parts = probeParts(length, field.voxelSize(), mostProbes);
-        for (int i = 1; i < parts; ++i) {
-            const float part = float(i) / float(parts);
-            follow(convex.place(edge, part), convex.radius(edge, part));
-        }
-    }
+    for (std::uint32_t i = 0; i < corners.size(); ++i) passage.follow(ballAt(corners[i], convex.radius(i)));
+    for (const Convex::Edge& edge : convex.edges())
+        passage.followEdge(glm::distance(corners[edge.from], corners[edge.to]), field.voxelSize(),
+                           [&](float part) { return ballAt(convex.place(edge, part), convex.radius(edge, part)); });
+    return passage.first();
+}
+
+/// What is sharp of the triangles that a field goes along.
+/// @param ways, moments  of the field into the mesh, and of the mesh into the field
+Passing passageOf(const btConcaveShape& mesh, const Shape& field, const std::vector<Moment>& ways,
+                  const std::vector<Moment>& moments) {
+    const Bounds& bounds = field.collider().bounds();
+    std::vector<glm::vec3> way;
+    for (const Moment& moment : ways) way.push_back(moment(bounds.centre()));
+    const float radius = 0.5f * field.scale() * glm::length(bounds.size());
+    const SharpSheet sharp = sharpOf(trianglesAlong(mesh, way, radius));
+    const FieldObstacle obstacle(field.collider().field());
+    Passage passage(obstacle, moments, field.voxelSize() / field.scale());
+    for (const SharpSheet::Corner& corner : sharp.corners) passage.follow({corner.place, corner.outward});
+    for (const SharpSheet::Side& side : sharp.sides)
+        passage.followEdge(glm::distance(side.from, side.to), field.voxelSize(), [&](float part) {
+            return Ball{glm::mix(side.from, side.to, part), side.outward};
+        });
     return passage.first();
 }
 
@@ -206,7 +253,9 @@ Passing passage(const Part& part, const Course& its, const Part& other, const Co
         return earlier(into(ConvexObstacle(convex, 0.1f * allowed * voxel), voxel), inWorld(touch, part, its).turned());
     }
     if (!other.shape->isConcave() || type == GIMPACT_SHAPE_PROXYTYPE || type == FAST_CONCAVE_MESH_PROXYTYPE) return {};
-    return into(TriangleObstacle(static_cast<const btConcaveShape&>(*other.shape)), voxel);
+    const auto& mesh = static_cast<const btConcaveShape&>(*other.shape);
+    const Passing touch = passageOf(mesh, field, moments, momentsOf(other, others, part, its));
+    return earlier(into(TriangleObstacle(mesh), voxel), inWorld(touch, part, its).turned());
 }
 
 }  // namespace bilayer::bullet
