@@ -119,7 +119,7 @@ class TriangleProbes : public btTriangleCallback {
                                         !flat[i]};
             local_.probeEdge(edge, answers[i], answers[(i + 1) % 3], margin_, report_, contacts_);
         }
-        if (isLarge) visitFace(faces_[f]);
+        if (isLarge) visitFace(f);
     }
 
     /// Of a side that two triangles share.
@@ -128,6 +128,14 @@ class TriangleProbes : public btTriangleCallback {
         if (sides.size() != 2) return std::nullopt;
         const auto wing = [&](const Side& side) { return wingOf(faces_[side.face].corners, side.first); };
         return Wings{wing(sides[0]), wing(sides[1])};
+    }
+
+    /// From a side that two triangles share into the other one.
+    std::optional<glm::vec3> neighbourOf(std::uint32_t face, int first) const {
+        const auto& sides = sides_.at(keyOf(faces_[face].corners, first));
+        if (sides.size() != 2) return std::nullopt;
+        const Side& other = sides[0].face == face ? sides[1] : sides[0];
+        return wingOf(faces_[other.face].corners, other.first);
     }
 
     /// Scatters numbers over all bits (S. Vigna's SplitMix64).
@@ -212,40 +220,62 @@ class TriangleProbes : public btTriangleCallback {
 
     /// The plane of a triangle and its borders.
     struct Plane {
-        std::array<glm::vec3, 3> corners, outwards;
+        Triangle corners;
+        std::array<glm::vec3, 3> outwards;
+        std::array<std::optional<glm::vec3>, 3> neighbours;  ///< from a side outward of the triangle beyond it
         glm::vec3 up;
 
-        /// Whether a place is farther than this beyond the sides or, by as much more, from the plane [m].
-        bool isBeside(const glm::vec3& place, float by, float height) const {
+        /// Whether a place is farther than this beyond the sides.
+        bool isBeside(const glm::vec3& place, float by) const {
             for (int i = 0; i < 3; ++i)
                 if (glm::dot(outwards[i], place - corners[i]) > by) return true;
-            return std::abs(glm::dot(up, place - corners[0])) > height + by;
+            return false;
         }
+        /// The same, but what is below a crease, over neither of the two triangles, has passed them both.
+        bool isBesideAll(const glm::vec3& place, float by) const {
+            for (int i = 0; i < 3; ++i) {
+                const glm::vec3 way = place - corners[i];
+                if (glm::dot(outwards[i], way) > by && !(neighbours[i] && isBelow(i, way, by))) return true;
+            }
+            return false;
+        }
+        bool isBelow(int i, const glm::vec3& way, float by) const {
+            const float rise = -glm::dot(*neighbours[i], up);
+            return glm::dot(*neighbours[i], way) > -by && std::copysign(1.f, rise) * glm::dot(up, way) < by;
+        }
+        float heightOf(const glm::vec3& place) const { return std::abs(glm::dot(up, place - corners[0])); }
     };
 
     /// Nothing for a triangle without area.
-    static std::optional<Plane> planeOf(const std::array<glm::vec3, 3>& corners) {
+    std::optional<Plane> planeOf(std::uint32_t f) const {
+        const auto& corners = faces_[f].corners;
         const glm::vec3 square = glm::cross(corners[1] - corners[0], corners[2] - corners[0]);
         const float area = glm::length(square);
         if (!(area > 0)) return std::nullopt;
-        Plane plane{corners, {}, square / area};
-        for (int i = 0; i < 3; ++i)
+        Plane plane{corners, {}, {}, square / area};
+        for (int i = 0; i < 3; ++i) {
             plane.outwards[i] = glm::normalize(glm::cross(corners[(i + 1) % 3] - corners[i], square));
+            const auto neighbour = neighbourOf(f, i);
+            if (neighbour && glm::dot(*neighbour, plane.outwards[i]) < -flatEdge) plane.neighbours[i] = -*neighbour;
+        }
         return plane;
     }
 
     /// Asks the field at the feet of its own surface points on the triangle: a bump finds a large face. Points that are
     /// not over the face are its edges' and its neighbours'.
-    void visitFace(const Face& face) {
-        const std::optional<Plane> plane = planeOf(face.corners);
+    void visitFace(std::uint32_t f) {
+        const std::optional<Plane> plane = planeOf(f);
         if (!plane) return;
         const float scale = field_.scale, rounding = onFace * spacing_;
+        const auto isBeside = [&](const glm::vec3& place, float by) {
+            return plane->isBesideAll(place, by) || plane->heightOf(place) > reach_ + by;
+        };
         const auto reject = [&](const glm::vec3& centre, float radius) {
-            return plane->isBeside(scale * centre, scale * radius + rounding, reach_);
+            return isBeside(scale * centre, scale * radius + rounding);
         };
         field_.collider.points().visit(reject, [&](std::uint32_t index, const SurfacePoint& point) {
-            if (plane->isBeside(scale * point.position, rounding, reach_)) return;
-            if (const auto found = overFace(*plane, index, point)) overFaces_.push_back({index, face.id, *found});
+            if (isBeside(scale * point.position, rounding)) return;
+            if (const auto found = overFace(*plane, index, point)) overFaces_.push_back({index, faces_[f].id, *found});
         });
     }
 
@@ -255,6 +285,8 @@ class TriangleProbes : public btTriangleCallback {
         const glm::vec3 foot = nearestOnTriangle(place, plane.corners[0], plane.corners[1], plane.corners[2]);
         const glm::vec3 normal = glm::dot(plane.up, point.normal) < 0 ? -plane.up : plane.up;
         const float height = glm::dot(foot - place, normal);
+        const bool isBelowCrease = plane.isBeside(place, onFace * spacing_);
+        if (isBelowCrease && height >= 0) return std::nullopt;
         const LocalField::Answer there = local_.at(foot);
         const bool isFar = std::abs(height) > std::abs(there.distance) + spacing_ + local_.longestWay();
         if (isFar && !(point.isSharp && height < 0)) return std::nullopt;
@@ -264,7 +296,7 @@ class TriangleProbes : public btTriangleCallback {
             found.turningRadius = 0;
             return found;
         }
-        if (isFar) return std::nullopt;
+        if (isFar || isBelowCrease) return std::nullopt;
         return atFoot(foot, normal, there);
     }
 
