@@ -119,7 +119,7 @@ class TriangleProbes : public btTriangleCallback {
                                         !flat[i]};
             local_.probeEdge(edge, answers[i], answers[(i + 1) % 3], margin_, report_, contacts_);
         }
-        if (isLarge) visitFace(f);
+        visitFace(f, isLarge);
     }
 
     /// Of a side that two triangles share.
@@ -261,9 +261,9 @@ class TriangleProbes : public btTriangleCallback {
         return plane;
     }
 
-    /// Asks the field at the feet of its own surface points on the triangle: a bump finds a large face. Points that are
-    /// not over the face are its edges' and its neighbours'.
-    void visitFace(std::uint32_t f) {
+    /// Asks the field at the feet of its own surface points on the triangle: a bump finds a large face, and what is
+    /// sharp any. Points that are not over the face are its edges' and its neighbours'.
+    void visitFace(std::uint32_t f, bool isLarge) {
         const std::optional<Plane> plane = planeOf(f);
         if (!plane) return;
         const float scale = field_.scale, rounding = onFace * spacing_;
@@ -274,7 +274,7 @@ class TriangleProbes : public btTriangleCallback {
             return isBeside(scale * centre, scale * radius + rounding);
         };
         field_.collider.points().visit(reject, [&](std::uint32_t index, const SurfacePoint& point) {
-            if (isBeside(scale * point.position, rounding)) return;
+            if (!(isLarge || point.isSharp) || isBeside(scale * point.position, rounding)) return;
             if (const auto found = overFace(*plane, index, point)) overFaces_.push_back({index, faces_[f].id, *found});
         });
     }
