@@ -529,6 +529,35 @@ TEST_CASE("A corner is as deep in triangles as below their plane, however the bo
     }
 }
 
+TEST_CASE("A tip below a crease of triangles is as deep as below both of its faces") {
+    const unsigned start = seed();
+    const Measure measure = GENERATE(Measure::samples, Measure::edges, Measure::triangles);
+    const float cell = GENERATE(0.7f, 20.f);  // [voxels]
+    CAPTURE(start, nameOf(measure), cell);
+    std::mt19937 random(start);
+    std::uniform_real_distribution<float> any(-1, 1);
+    const float height = 1, slope = 0.6f;
+    const auto cone = colliderOf(shapes::cone(0.3f, height, 12), measure);
+    const TriangleShape groove(grooveOf(slope, cell * h, cell > 1 ? 2 : 20));
+    const glm::vec3 left = glm::normalize(glm::vec3(slope, 0, 1)), right = glm::normalize(glm::vec3(-slope, 0, 1));
+    for (int run = 0; run < 50; ++run) {
+        const float below = (0.5f + 0.4f * any(random)) * h;
+        const glm::vec3 tip(0.9f * slope * below * any(random), 3 * h * any(random), -below);
+        const glm::vec3 axis = glm::normalize(glm::vec3(0.3f * any(random), 0.3f * any(random), -1));
+        const glm::quat turn = glm::angleAxis(std::acos(axis.z), glm::normalize(glm::vec3(-axis.y, axis.x, 0)));
+        std::vector<Contact> contacts;
+        bullet::collideTriangles(*groove.shape, btTransform::getIdentity(), {},
+                                 {*cone, {tip - 0.5f * height * axis, turn}}, h, false, contacts);
+        for (const glm::vec3& up : {left, right}) {
+            float deepest = h;
+            for (const Contact& contact : contacts)
+                if (glm::dot(contact.normal, up) < -0.99f) deepest = std::min(deepest, contact.distance);
+            CAPTURE(run, tip.x / h, tip.z / h, up.x, deepest / h);
+            CHECK(deepest == Approx(glm::dot(up, tip)).margin(0.03f * h));
+        }
+    }
+}
+
 TEST_CASE("What is exact is so against Bullet's shapes too") {
     // small balls around the edges of a box, whose samples are rounded off there
     const glm::vec3 half(0.5f, 0.4f, 0.3f);

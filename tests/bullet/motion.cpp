@@ -598,6 +598,58 @@ TEST_CASE("A contact that starts is told as the solver sees it") {
     CHECK(apart == Approx(gap).margin(0.01 * h));
 }
 
+TEST_CASE("Worlds in several threads keep their callbacks: none is taken away while contacts are made") {
+    static int asked, missing;
+    asked = missing = 0;
+    gContactAddedCallback = [](btManifoldPoint&, const btCollisionObjectWrapper*, int, int,
+                               const btCollisionObjectWrapper*, int, int) { return false; };
+    gContactStartedCallback = [](btPersistentManifold* const&) {};
+    const CalculateCombinedCallback friction = gCalculateCombinedFrictionCallback;
+    gCalculateCombinedFrictionCallback = [](const btCollisionObject*, const btCollisionObject*) {
+        ++asked;
+        missing += !gContactAddedCallback || !gContactStartedCallback;
+        return btScalar(0.5f);
+    };
+    Shape floor(exactBox({1, 1, 0.2f}, h)), box(exactBox({0.3f, 0.3f, 0.2f}, h));
+    World world;
+    world.add(floor, 0, {0, 0, -0.2f});
+    world.add(box, 2, {0, 0, 0.2f});
+    world.run(0.1f);
+    gCalculateCombinedFrictionCallback = friction;
+    gContactAddedCallback = nullptr;
+    gContactStartedCallback = nullptr;
+    CHECK(asked > 0);
+    CHECK(missing == 0);
+}
+
+TEST_CASE("What has tips and edges comes to rest in a groove of triangles, however fine they are") {
+    const unsigned seed = test::seed();
+    const float cell = GENERATE(0.9f, 12.f);  // [voxels]
+    const bool hasTips = GENERATE(true, false);
+    CAPTURE(seed, cell, hasTips);
+    Random random(seed);
+    const float voxel = 0.02f, slope = 0.6f, length = 0.3f;
+    const Mesh mesh = hasTips
+                          ? shapes::revolve({{0, -0.15f}, {0.03f, -0.03f}, {0.15f, 0}, {0.03f, 0.03f}, {0, 0.15f}}, 12)
+                          : shapes::box({0.09f, 0.09f, 0.09f});
+    Shape shape(std::make_shared<Collider>(mesh, build(mesh, {.voxelSize = voxel})));
+    TriangleShape groove(grooveOf(slope, cell * voxel, cell > 1 ? 3 : 30));
+    for (int i = 0; i < 3; ++i) {
+        World world;
+        world.add(*groove.shape, 0, {0, 0, 0});
+        btRigidBody* body = world.add(shape, 1, {float(random(-0.1, 0.1)), float(random(-0.1, 0.1)), 1.2f * length},
+                                      btQuaternion(bullet::toBullet(random.direction()), float(random(0, 6))));
+        body->setDamping(0.05f, 0.2f);
+        world.run(3);
+        float least = 0;
+        for (const glm::vec3& point : mesh.points) {
+            const btVector3 place = body->getWorldTransform() * bullet::toBullet(point);
+            least = std::min(least, (place.z() - slope * std::abs(place.x())) / std::sqrt(1 + slope * slope));
+        }
+        CHECK(least > -0.1f * voxel);
+    }
+}
+
 TEST_CASE("What is thin lies on triangles, and its far side does not pull it through them") {
     const float degrees = GENERATE(5.f, 10.f, 20.f), voxel = GENERATE(0.02f, 0.01f);
     const Measure measure = GENERATE(Measure::edges, Measure::triangles);

@@ -244,6 +244,56 @@ TEST_CASE("Two fast bodies do not pass each other, nor what they meet after a bo
     }
 }
 
+TEST_CASE("Edges and tips of what does not move stop fields as well, however thin they are") {
+    const float speed = GENERATE(14.f, 30.f, 60.f);
+    const int kind = GENERATE(0, 1, 2);
+    const unsigned seed = test::seed();
+    CAPTURE(speed, kind, seed);
+    Random random(seed);
+    const float half = 0.1f, voxel = 0.2f / 32, apart = 0.083f;
+    // upright sheets with their upper edges at height 0, a needle of triangles, or a long blade
+    Mesh sheets;
+    for (int i = -20; i <= 20; ++i) {
+        const auto first = unsigned(sheets.points.size());
+        const float y = apart * float(i);
+        for (const glm::vec3& p : {glm::vec3(-2, y, -0.5f), {2, y, -0.5f}, {2, y, 0}, {-2, y, 0}})
+            sheets.points.push_back(p);
+        sheets.triangles.push_back(first + glm::uvec3(0, 1, 2));
+        sheets.triangles.push_back(first + glm::uvec3(0, 2, 3));
+    }
+    Mesh needle = shapes::cone(0.006f, 0.5f, 12);
+    for (glm::vec3& point : needle.points) point.z -= 0.25f;
+    TriangleShape triangles(kind == 0 ? sheets : needle);
+    btBoxShape blade({3, 3e-4f, 0.25f});
+    Shape cube(exactBox({half, half, half}, voxel));
+    for (int i = 0; i < 4; ++i) {
+        World world;
+        const NoPassing guard(world.dynamics);
+        if (kind == 2)
+            world.add(blade, 0, {0, 0, -0.25f});
+        else
+            world.add(*triangles.shape, 0, {0, 0, 0});
+        btRigidBody* body = world.add(cube, 1, {float(random(-0.05, 0.05)), float(random(-0.05, 0.05)), 0.5f},
+                                      btQuaternion({1, 0, 0}, float(random(-0.05, 0.05))));
+        body->setLinearVelocity({0, 0, -speed});
+        float deepest = 0;
+        for (int n = 0; n < 30; ++n) {
+            world.dynamics.stepSimulation(step, 0);
+            const btTransform into = body->getWorldTransform().inverse();
+            const auto look = [&](float x, float y) {
+                const btVector3 place = (into * btVector3(x, y, 0)).absolute();
+                deepest = std::min(deepest, std::max({place.x(), place.y(), place.z()}) - half);
+            };
+            const float middle = kind == 1 ? 0 : body->getWorldTransform().getOrigin().x();
+            if (kind == 1) look(0, 0);
+            for (float x = -0.2f; kind != 1 && x <= 0.2f; x += 0.01f)
+                for (int k = kind == 0 ? -20 : 0; k <= (kind == 0 ? 20 : 0); ++k)
+                    look(std::clamp(middle + x, -2.f, 2.f), apart * float(k));
+        }
+        CHECK(deepest > -0.5f * voxel);
+    }
+}
+
 TEST_CASE("Fields without a margin are not passed either") {
     Shape plate(exactBox({1.f, 1.f, 0.5f * h}, h), {.margin = 0}), ball(exactSphere(0.2f, h), {.margin = 0});
     btSphereShape sphere(0.2f);

@@ -112,4 +112,21 @@ float motion(const btRigidBody& body) {
     return body.getLinearVelocity().length() + body.getAngularVelocity().length();
 }
 
+Mesh grooveOf(float slope, float cell, int cells) {
+    Mesh groove;
+    for (int j = -cells; j <= cells; ++j)
+        for (int i = -cells; i <= cells; ++i) {
+            const float x = cell * float(i);
+            groove.points.push_back({x, cell * float(j), slope * std::abs(x)});
+        }
+    const unsigned row = 2 * unsigned(cells) + 1;
+    for (unsigned j = 0; j + 1 < row; ++j)
+        for (unsigned i = 0; i + 1 < row; ++i) {
+            const unsigned k = j * row + i;
+            groove.triangles.push_back({k, k + 1, k + row + 1});
+            groove.triangles.push_back({k, k + row + 1, k + row});
+        }
+    return groove;
+}
+
 }  // namespace bilayer::test

@@ -72,4 +72,7 @@ struct Nearest : btCollisionWorld::ContactResultCallback {
 /// Speed at which a body at rest may still creep: linear [m/s] and angular [1/s] together.
 float motion(const btRigidBody& body);
 
+/// A groove along y of two slopes, in squares of two triangles each.
+Mesh grooveOf(float slope, float cell, int cells);
+
 }  // namespace bilayer::test
