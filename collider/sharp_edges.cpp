@@ -33,6 +33,8 @@ constexpr float deepestAcross = 1.5f, deepestUnseen = 1, deepestAcrossExact = 2,
 // points.
 constexpr float leastLeaving = 0.09f;
 // What is seen at a smaller angle (sine) than this lies level.
+// The mean way along the edges around a point: longer where they are bent by more than 30 degrees.
+constexpr float leastBend = 0.26f;
 constexpr float level = 0.09f;
 // Faces are looked for so far beside their edge [voxels].
 constexpr float wingSpan = 1.5f;
@@ -126,6 +128,15 @@ SharpEdges::SharpEdges(const SurfacePoints& points, const Field& field)
 
 bool SharpEdges::isTip(const SurfacePoints& points, std::uint32_t point, const glm::vec3& direction) const {
     return pointsFallBack(points, point, direction) || edgesFallBack(points, point, direction);
+}
+
+bool SharpEdges::isWithinEdge(const SurfacePoints& points, std::uint32_t point) const {
+    glm::vec3 sum(0);
+    for (const std::uint32_t e : around(point)) {
+        const std::uint32_t next = edges_[e].from == point ? edges_[e].to : edges_[e].from;
+        sum += glm::normalize(points.points()[next].position - points.points()[point].position);
+    }
+    return !around(point).empty() && glm::length(sum) <= leastBend * float(around(point).size());
 }
 
 bool SharpEdges::edgesFallBack(const SurfacePoints& points, std::uint32_t point, const glm::vec3& direction) const {

@@ -45,6 +45,9 @@ class SharpEdges {
     /// @param direction  outward, of unit length
     bool isTip(const SurfacePoints& points, std::uint32_t point, const glm::vec3& direction) const;
 
+    /// Whether a sharp point lies within an edge: the edges that end in it go about opposite ways.
+    bool isWithinEdge(const SurfacePoints& points, std::uint32_t point) const;
+
     struct Crossing {
         glm::vec3 position;  ///< on the edge of this body
         glm::vec3 normal;    ///< across both edges, outward

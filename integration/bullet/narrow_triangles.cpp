@@ -6,6 +6,7 @@
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <glm/vector_relational.hpp>
 #include <limits>
 #include <map>
 #include <optional>
@@ -27,6 +28,8 @@ constexpr std::uint32_t overPoints = 6;
 constexpr float onFace = 1e-4f;
 // Triangles whose wings enclose more than 179.9 degrees (cosine) have no edge between them.
 constexpr float flatEdge = -0.9999985f;
+// Small triangles whose planes enclose less than 108 degrees have no crease that a tip could lie below (tangent).
+constexpr float steepestCrease = 3;
 // What a face's place sees of a body nearer than this touches the face [voxels]: beside an edge or a corner, normals
 // are mixed there.
 constexpr float touchingFoot = 0.05f;
@@ -73,6 +76,7 @@ class TriangleProbes : public btTriangleCallback {
         for (std::uint32_t f = 0; f < faces_.size(); ++f)
             for (int i = 0; i < 3; ++i) sides_[keyOf(faces_[f].corners, i)].push_back({f, i});
         for (std::uint32_t f = 0; f < faces_.size(); ++f) visit(f);
+        visitSmallFaces();
         keepOverFaces();
     }
 
@@ -84,6 +88,11 @@ class TriangleProbes : public btTriangleCallback {
     struct Side {
         std::uint32_t face;
         int first;  ///< corner
+    };
+    /// A sharp surface point of the field.
+    struct Sharp {
+        glm::vec3 place;
+        std::uint32_t index;
     };
     /// What a surface point of the field finds on a triangle.
     struct OverFace {
@@ -119,7 +128,10 @@ class TriangleProbes : public btTriangleCallback {
                                         !flat[i]};
             local_.probeEdge(edge, answers[i], answers[(i + 1) % 3], margin_, report_, contacts_);
         }
-        visitFace(f, isLarge);
+        if (isLarge)
+            visitFace(f);
+        else
+            small_.push_back(f);
     }
 
     /// Of a side that two triangles share.
@@ -253,19 +265,24 @@ class TriangleProbes : public btTriangleCallback {
         const float area = glm::length(square);
         if (!(area > 0)) return std::nullopt;
         Plane plane{corners, {}, {}, square / area};
-        for (int i = 0; i < 3; ++i) {
+        for (int i = 0; i < 3; ++i)
             plane.outwards[i] = glm::normalize(glm::cross(corners[(i + 1) % 3] - corners[i], square));
-            const auto neighbour = neighbourOf(f, i);
-            if (neighbour && glm::dot(*neighbour, plane.outwards[i]) < -flatEdge) plane.neighbours[i] = -*neighbour;
-        }
         return plane;
     }
 
-    /// Asks the field at the feet of its own surface points on the triangle: a bump finds a large face, and what is
-    /// sharp any. Points that are not over the face are its edges' and its neighbours'.
-    void visitFace(std::uint32_t f, bool isLarge) {
-        const std::optional<Plane> plane = planeOf(f);
+    void findNeighbours(std::uint32_t f, Plane& plane) const {
+        for (int i = 0; i < 3; ++i) {
+            const auto neighbour = neighbourOf(f, i);
+            if (neighbour && glm::dot(*neighbour, plane.outwards[i]) < -flatEdge) plane.neighbours[i] = -*neighbour;
+        }
+    }
+
+    /// Asks the field at the feet of its own surface points on the triangle: a bump finds a large face. Points that are
+    /// not over the face are its edges' and its neighbours'.
+    void visitFace(std::uint32_t f) {
+        std::optional<Plane> plane = planeOf(f);
         if (!plane) return;
+        findNeighbours(f, *plane);
         const float scale = field_.scale, rounding = onFace * spacing_;
         const auto isBeside = [&](const glm::vec3& place, float by) {
             return plane->isBesideAll(place, by) || plane->heightOf(place) > reach_ + by;
@@ -274,9 +291,64 @@ class TriangleProbes : public btTriangleCallback {
             return isBeside(scale * centre, scale * radius + rounding);
         };
         field_.collider.points().visit(reject, [&](std::uint32_t index, const SurfacePoint& point) {
-            if (!(isLarge || point.isSharp) || isBeside(scale * point.position, rounding)) return;
+            if (isBeside(scale * point.position, rounding)) return;
             if (const auto found = overFace(*plane, index, point)) overFaces_.push_back({index, faces_[f].id, *found});
         });
+    }
+
+    /// Of small triangles the corners and edges tell enough, but of a tip between them.
+    void visitSmallFaces() {
+        if (small_.empty()) return;
+        const std::vector<Sharp> sharp = sharpNear();
+        const auto isBefore = [](const Sharp& one, float x) { return one.place.x < x; };
+        for (const std::uint32_t f : small_) {
+            const auto& corners = faces_[f].corners;
+            const float around = reach_ + spacing_;
+            std::optional<Plane> plane;
+            auto at = std::lower_bound(sharp.begin(), sharp.end(), corners[0].x - around, isBefore);
+            for (; at != sharp.end() && at->place.x <= corners[0].x + around; ++at) {
+                if (glm::distance(at->place, corners[0]) > around) continue;
+                if (!plane) plane = planeOf(f);
+                if (!plane) break;
+                visitSmallFace(f, *plane, *at);
+            }
+        }
+    }
+
+    void visitSmallFace(std::uint32_t f, Plane& plane, const Sharp& sharp) {
+        const float height = plane.heightOf(sharp.place), rounding = onFace * spacing_;
+        if (height > reach_ || plane.isBeside(sharp.place, rounding + steepestCrease * height)) return;
+        if (plane.isBeside(sharp.place, rounding)) {
+            findNeighbours(f, plane);
+            if (plane.isBesideAll(sharp.place, rounding)) return;
+        }
+        const SurfacePoint& point = field_.collider.points().points()[sharp.index];
+        const glm::vec3 normal = glm::dot(plane.up, point.normal) < 0 ? -plane.up : plane.up;
+        if (!field_.collider.edges().isTip(field_.collider.points(), sharp.index, normal)) return;
+        const auto found = overFace(plane, sharp.index, point);
+        if (found && found->turningRadius == 0) overFaces_.push_back({sharp.index, faces_[f].id, *found});
+    }
+
+    /// The sharp corners and tips of the field that are near small triangles, by x.
+    std::vector<Sharp> sharpNear() const {
+        glm::vec3 lower = faces_[small_.front()].corners[0], upper = lower;
+        for (const std::uint32_t f : small_) {
+            lower = glm::min(lower, faces_[f].corners[0]);
+            upper = glm::max(upper, faces_[f].corners[0]);
+        }
+        const glm::vec3 middle = 0.5f * (lower + upper), half = 0.5f * (upper - lower) + reach_ + spacing_;
+        const auto reject = [&](const glm::vec3& centre, float radius) {
+            return glm::any(glm::greaterThan(glm::abs(field_.scale * centre - middle), half + field_.scale * radius));
+        };
+        std::vector<Sharp> sharp;
+        field_.collider.points().visit(reject, [&](std::uint32_t index, const SurfacePoint& point) {
+            if (point.isSharp && !field_.collider.edges().isWithinEdge(field_.collider.points(), index))
+                sharp.push_back({field_.scale * point.position, index});
+        });
+        std::sort(sharp.begin(), sharp.end(), [](const Sharp& a, const Sharp& b) {
+            return a.place.x < b.place.x || (a.place.x == b.place.x && a.index < b.index);
+        });
+        return sharp;
     }
 
     /// The contact of a surface point with the face under it. A foot that others are much nearer to is theirs.
@@ -325,6 +397,7 @@ class TriangleProbes : public btTriangleCallback {
     ContactReport& report_;
     std::vector<Contact>& contacts_;
     std::vector<Face> faces_;
+    std::vector<std::uint32_t> small_;  ///< of the faces
     std::vector<OverFace> overFaces_;
     int part_ = -1, index_ = -1;  ///< of the last triangle that was handed over
     std::map<SideKey, std::vector<Side>> sides_;
