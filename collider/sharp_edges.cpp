@@ -33,8 +33,8 @@ constexpr float deepestAcross = 1.5f, deepestUnseen = 1, deepestAcrossExact = 2,
 // points.
 constexpr float leastLeaving = 0.09f;
 // What is seen at a smaller angle (sine) than this lies level.
-// The mean way along the edges around a point: longer where they are bent by more than 30 degrees.
-constexpr float leastBend = 0.26f;
+// The mean way along the edges around a point: longer where they are bent by more than ten degrees.
+constexpr float leastBend = 0.0872f;
 constexpr float level = 0.09f;
 // Faces are looked for so far beside their edge [voxels].
 constexpr float wingSpan = 1.5f;

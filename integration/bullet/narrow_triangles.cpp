@@ -316,14 +316,15 @@ class TriangleProbes : public btTriangleCallback {
     }
 
     void visitSmallFace(std::uint32_t f, Plane& plane, const Sharp& sharp) {
+        const SurfacePoint& point = field_.collider.points().points()[sharp.index];
+        const glm::vec3 normal = glm::dot(plane.up, point.normal) < 0 ? -plane.up : plane.up;
+        if (glm::dot(normal, plane.corners[0] - sharp.place) > margin_) return;
         const float height = plane.heightOf(sharp.place), rounding = onFace * spacing_;
         if (height > reach_ || plane.isBeside(sharp.place, rounding + steepestCrease * height)) return;
         if (plane.isBeside(sharp.place, rounding)) {
             findNeighbours(f, plane);
             if (plane.isBesideAll(sharp.place, rounding)) return;
         }
-        const SurfacePoint& point = field_.collider.points().points()[sharp.index];
-        const glm::vec3 normal = glm::dot(plane.up, point.normal) < 0 ? -plane.up : plane.up;
         if (!field_.collider.edges().isTip(field_.collider.points(), sharp.index, normal)) return;
         const auto found = overFace(plane, sharp.index, point);
         if (found && found->turningRadius == 0) overFaces_.push_back({sharp.index, faces_[f].id, *found});
