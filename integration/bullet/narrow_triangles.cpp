@@ -100,6 +100,7 @@ class TriangleProbes : public btTriangleCallback {
         std::uint64_t face;  ///< its id
         Contact contact;
     };
+
     void visit(std::uint32_t f) {
         const auto& [corners, id] = faces_[f];
         LocalField::Answer answers[3];
