@@ -186,17 +186,25 @@ class TriangleProbes : public btTriangleCallback {
         const bool isNearSide = height >= 0 || isUnclear || (foot.where == LocalField::Answer::near && facing >= least);
         const bool isNearest = std::abs(foot.distance - height) <= mostInterpolationError * voxel_ && isNearSide;
         if (isNearest && opposition.keeps(glm::dot(normal, point.normal), true)) return true;
-        if (!(isNearest || height < 0) || !point.isSharp || !collider.edges().isTip(collider.points(), index, normal))
-            return false;
-        return isNearest || hasSunk(point, normal, height);
+        if (!(isNearest || height < 0) || !isTip(index, normal)) return false;
+        return isNearest || hasSunk(point, normal, height, wayThrough(point, normal, height));
+    }
+
+    bool isTip(std::uint32_t index, const glm::vec3& normal) const {
+        const Collider& collider = field_.collider;
+        return collider.points().points()[index].isSharp && collider.edges().isTip(collider.points(), index, normal);
+    }
+
+    /// From a tip back along its axis to the plane of a face that it is below.
+    static float wayThrough(const SurfacePoint& tip, const glm::vec3& normal, float height) {
+        return -height / std::max(glm::dot(normal, tip.normal), leastFacing);
     }
 
     /// Whether a tip under a face has gone through it: its body goes on behind the face, and if the tip is deeper than
     /// a voxel, no far side of the body is near, its axis meets the triangles, and no other one is nearer to it.
-    bool hasSunk(const SurfacePoint& tip, const glm::vec3& normal, float height) const {
-        const glm::vec3 place = field_.scale * tip.position;
-        const float cosine = std::max(glm::dot(normal, tip.normal), leastFacing);
-        const glm::vec3 through = place + height / cosine * tip.normal;
+    /// @param way  along its axis to the triangles
+    bool hasSunk(const SurfacePoint& tip, const glm::vec3& normal, float height, float way) const {
+        const glm::vec3 place = field_.scale * tip.position, through = place - way * tip.normal;
         const auto goesOn = [&](float parts) {
             return local_.at(through - parts * mostInterpolationError * voxel_ * tip.normal).distance < 0;
         };
@@ -252,6 +260,7 @@ class TriangleProbes : public btTriangleCallback {
             }
             return false;
         }
+        /// Whether that is so beyond a side.
         bool isBelow(int i, const glm::vec3& way, float by) const {
             const float rise = -glm::dot(*neighbours[i], up);
             return glm::dot(*neighbours[i], way) > -by && std::copysign(1.f, rise) * glm::dot(up, way) < by;
@@ -326,7 +335,7 @@ class TriangleProbes : public btTriangleCallback {
             findNeighbours(f, plane);
             if (plane.isBesideAll(sharp.place, rounding)) return;
         }
-        if (!field_.collider.edges().isTip(field_.collider.points(), sharp.index, normal)) return;
+        if (!isTip(sharp.index, normal)) return;
         const auto found = overFace(plane, sharp.index, point);
         if (found && found->turningRadius == 0) overFaces_.push_back({sharp.index, faces_[f].id, *found});
     }
@@ -359,19 +368,41 @@ class TriangleProbes : public btTriangleCallback {
         const glm::vec3 foot = nearestOnTriangle(place, plane.corners[0], plane.corners[1], plane.corners[2]);
         const glm::vec3 normal = glm::dot(plane.up, point.normal) < 0 ? -plane.up : plane.up;
         const float height = glm::dot(foot - place, normal);
-        const bool isBelowCrease = plane.isBeside(place, onFace * spacing_);
-        if (isBelowCrease && height >= 0) return std::nullopt;
+        if (plane.isBeside(place, onFace * spacing_)) return belowCrease(plane, index, normal, height);
         const LocalField::Answer there = local_.at(foot);
         const bool isFar = std::abs(height) > std::abs(there.distance) + spacing_ + local_.longestWay();
         if (isFar && !(point.isSharp && height < 0)) return std::nullopt;
-        if (height <= margin_ && isExact(index, normal, height, there)) {
-            ++report_.pointsTested;
-            Contact found = local_.contact(place, normal, height, 0, local_.approach(foot, normal, margin_));
-            found.turningRadius = 0;
-            return found;
-        }
-        if (isFar || isBelowCrease) return std::nullopt;
+        if (height <= margin_ && isExact(index, normal, height, there)) return touching(place, normal, height);
+        if (isFar) return std::nullopt;
         return atFoot(foot, normal, there);
+    }
+
+    /// Of a tip that has gone through a sheet beside a crease, where it is over neither triangle: it has come from
+    /// above both.
+    std::optional<Contact> belowCrease(const Plane& plane, std::uint32_t index, const glm::vec3& normal, float height) {
+        const SurfacePoint& point = field_.collider.points().points()[index];
+        if (height >= 0 || !isTip(index, normal)) return std::nullopt;
+        const glm::vec3 place = field_.scale * point.position;
+        float way = wayThrough(point, normal, height);
+        for (int i = 0; i < 3; ++i) {
+            const glm::vec3 from = place - plane.corners[i];
+            if (!(glm::dot(plane.outwards[i], from) > onFace * spacing_)) continue;
+            const glm::vec3 along = plane.corners[(i + 1) % 3] - plane.corners[i];
+            const glm::vec3 across = glm::normalize(glm::cross(along, *plane.neighbours[i]));
+            const glm::vec3 other = glm::dot(across, point.normal) < 0 ? -across : across;
+            way = std::max(way, wayThrough(point, other, -glm::dot(from, other)));
+        }
+        if (!hasSunk(point, normal, height, way)) return std::nullopt;
+        return touching(place, normal, height);
+    }
+
+    /// The contact of a surface point with a plane.
+    Contact touching(const glm::vec3& place, const glm::vec3& normal, float height) {
+        ++report_.pointsTested;
+        const glm::vec3 foot = place + height * normal;
+        Contact found = local_.contact(place, normal, height, 0, local_.approach(foot, normal, margin_));
+        found.turningRadius = 0;
+        return found;
     }
 
     /// As the field sees the face. What its middle sees aslant is beside it, but where it touches: there an edge or a
