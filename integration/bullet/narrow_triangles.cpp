@@ -383,16 +383,19 @@ class TriangleProbes : public btTriangleCallback {
         const SurfacePoint& point = field_.collider.points().points()[index];
         if (height >= 0 || !isTip(index, normal)) return std::nullopt;
         const glm::vec3 place = field_.scale * point.position;
-        float way = wayThrough(point, normal, height);
+        float way = wayThrough(point, normal, height), deepest = height;
         for (int i = 0; i < 3; ++i) {
             const glm::vec3 from = place - plane.corners[i];
             if (!(glm::dot(plane.outwards[i], from) > onFace * spacing_)) continue;
             const glm::vec3 along = plane.corners[(i + 1) % 3] - plane.corners[i];
             const glm::vec3 across = glm::normalize(glm::cross(along, *plane.neighbours[i]));
             const glm::vec3 other = glm::dot(across, point.normal) < 0 ? -across : across;
-            way = std::max(way, wayThrough(point, other, -glm::dot(from, other)));
+            const float below = -glm::dot(from, other);
+            if (below >= 0) return std::nullopt;
+            way = std::max(way, wayThrough(point, other, below));
+            deepest = std::min(deepest, below);
         }
-        if (!hasSunk(point, normal, height, way)) return std::nullopt;
+        if (!hasSunk(point, normal, deepest, way)) return std::nullopt;
         return touching(place, normal, height);
     }
 
