@@ -33,9 +33,9 @@ constexpr float deepestAcross = 1.5f, deepestUnseen = 1, deepestAcrossExact = 2,
 // points.
 constexpr float leastLeaving = 0.09f;
 // What is seen at a smaller angle (sine) than this lies level.
+constexpr float level = 0.09f;
 // The mean way along the edges around a point: longer where they are bent by more than ten degrees.
 constexpr float leastBend = 0.0872f;
-constexpr float level = 0.09f;
 // Faces are looked for so far beside their edge [voxels].
 constexpr float wingSpan = 1.5f;
 // Pieces of an edge end within this of each other, as parts of their length.

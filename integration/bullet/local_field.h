@@ -31,7 +31,6 @@ class LocalField {
     LocalField(const Placed& field, const Pose& other, const Motion& motion, float reach, bool measured);
 
     const Collider& collider() const { return collider_; }
-    float voxel() const { return voxel_; }  ///< [m]
     /// Of the other body's points as the field sees them.
     const RelativeWays& ways() const { return ways_; }
     /// The longest way of any that is in the field's box; those that come from afar may go farther by their turn.

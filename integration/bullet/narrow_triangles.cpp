@@ -265,6 +265,8 @@ class TriangleProbes : public btTriangleCallback {
             const float rise = -glm::dot(*neighbours[i], up);
             return glm::dot(*neighbours[i], way) > -by && std::copysign(1.f, rise) * glm::dot(up, way) < by;
         }
+        /// On the side that a surface point looks at.
+        glm::vec3 normalFacing(const SurfacePoint& point) const { return glm::dot(up, point.normal) < 0 ? -up : up; }
         float heightOf(const glm::vec3& place) const { return std::abs(glm::dot(up, place - corners[0])); }
     };
 
@@ -302,7 +304,8 @@ class TriangleProbes : public btTriangleCallback {
         };
         field_.collider.points().visit(reject, [&](std::uint32_t index, const SurfacePoint& point) {
             if (isBeside(scale * point.position, rounding)) return;
-            if (const auto found = overFace(*plane, index, point)) overFaces_.push_back({index, faces_[f].id, *found});
+            if (const auto found = overFace(*plane, true, index, point))
+                overFaces_.push_back({index, faces_[f].id, *found});
         });
     }
 
@@ -327,7 +330,7 @@ class TriangleProbes : public btTriangleCallback {
 
     void visitSmallFace(std::uint32_t f, Plane& plane, const Sharp& sharp) {
         const SurfacePoint& point = field_.collider.points().points()[sharp.index];
-        const glm::vec3 normal = glm::dot(plane.up, point.normal) < 0 ? -plane.up : plane.up;
+        const glm::vec3 normal = plane.normalFacing(point);
         if (glm::dot(normal, plane.corners[0] - sharp.place) > margin_) return;
         const float height = plane.heightOf(sharp.place), rounding = onFace * spacing_;
         if (height > reach_ || plane.isBeside(sharp.place, rounding + steepestCrease * height)) return;
@@ -336,8 +339,8 @@ class TriangleProbes : public btTriangleCallback {
             if (plane.isBesideAll(sharp.place, rounding)) return;
         }
         if (!isTip(sharp.index, normal)) return;
-        const auto found = overFace(plane, sharp.index, point);
-        if (found && found->turningRadius == 0) overFaces_.push_back({sharp.index, faces_[f].id, *found});
+        if (const auto found = overFace(plane, false, sharp.index, point))
+            overFaces_.push_back({sharp.index, faces_[f].id, *found});
     }
 
     /// The sharp corners and tips of the field that are near small triangles, by x.
@@ -363,17 +366,18 @@ class TriangleProbes : public btTriangleCallback {
     }
 
     /// The contact of a surface point with the face under it. A foot that others are much nearer to is theirs.
-    std::optional<Contact> overFace(const Plane& plane, std::uint32_t index, const SurfacePoint& point) {
+    /// @param asksFoot  whether the field is asked at the foot where the height does not tell
+    std::optional<Contact> overFace(const Plane& plane, bool asksFoot, std::uint32_t index, const SurfacePoint& point) {
         const glm::vec3 place = field_.scale * point.position;
         const glm::vec3 foot = nearestOnTriangle(place, plane.corners[0], plane.corners[1], plane.corners[2]);
-        const glm::vec3 normal = glm::dot(plane.up, point.normal) < 0 ? -plane.up : plane.up;
+        const glm::vec3 normal = plane.normalFacing(point);
         const float height = glm::dot(foot - place, normal);
         if (plane.isBeside(place, onFace * spacing_)) return belowCrease(plane, index, normal, height);
         const LocalField::Answer there = local_.at(foot);
         const bool isFar = std::abs(height) > std::abs(there.distance) + spacing_ + local_.longestWay();
         if (isFar && !(point.isSharp && height < 0)) return std::nullopt;
         if (height <= margin_ && isExact(index, normal, height, there)) return touching(place, normal, height);
-        if (isFar) return std::nullopt;
+        if (isFar || !asksFoot) return std::nullopt;
         return atFoot(foot, normal, there);
     }
 
