@@ -8,7 +8,6 @@
 #include <glm/geometric.hpp>
 #include <glm/vector_relational.hpp>
 #include <limits>
-#include <map>
 #include <optional>
 
 #include "collider/interpolant.h"
@@ -28,6 +27,10 @@ constexpr std::uint32_t overPoints = 6;
 constexpr float onFace = 1e-4f;
 // Triangles whose wings enclose more than 179.9 degrees (cosine) have no edge between them.
 constexpr float flatEdge = -0.9999985f;
+// A corner or an edge of the triangles touches what looks at it along one of its own normals, to within this cosine.
+constexpr float leastAlike = 0.9f;
+// So does a face what looks against it to within 5 degrees (cosine and sine).
+constexpr float straight = 0.9962f, mostLean = 0.0872f;
 // Small triangles whose planes enclose less than 108 degrees have no crease that a tip could lie below (tangent).
 constexpr float steepestCrease = 3;
 // What a face's place sees of a body nearer than this touches the face [voxels]: beside an edge or a corner, normals
@@ -61,34 +64,25 @@ class TriangleProbes : public btTriangleCallback {
         const bool isSecond = part == part_ && index == index_;
         part_ = isSecond ? -1 : part;
         index_ = index;
-        Face face{{inField_.toWorld(toGlm(triangle[0])), inField_.toWorld(toGlm(triangle[1])),
-                   inField_.toWorld(toGlm(triangle[2]))},
-                  mixed(mixed(mixed(std::uint64_t(part)) ^ std::uint64_t(index)) ^ std::uint64_t(isSecond))};
-        const auto& corners = face.corners;
+        const Triangle corners{inField_.toWorld(toGlm(triangle[0])), inField_.toWorld(toGlm(triangle[1])),
+                               inField_.toWorld(toGlm(triangle[2]))};
         const glm::vec3 middle = (corners[0] + corners[1] + corners[2]) / 3.f;
         float around = 0;
         for (int i = 0; i < 3; ++i) around = std::max(around, glm::distance(corners[i], middle));
-        if (local_.at(middle).distance <= around + room() + spacing_) faces_.push_back(face);
+        if (local_.at(middle).distance > around + room() + spacing_) return;
+        triangles_.push_back(corners);
+        ids_.push_back(mixed(mixed(mixed(std::uint64_t(part)) ^ std::uint64_t(index)) ^ std::uint64_t(isSecond)));
     }
 
     /// Asks about all triangles that were handed over.
     void probe() {
-        for (std::uint32_t f = 0; f < faces_.size(); ++f)
-            for (int i = 0; i < 3; ++i) sides_[keyOf(faces_[f].corners, i)].push_back({f, i});
-        for (std::uint32_t f = 0; f < faces_.size(); ++f) visit(f);
+        adjacency_.emplace(triangles_);
+        for (std::uint32_t f = 0; f < triangles_.size(); ++f) visit(f);
         visitSmallFaces();
         keepOverFaces();
     }
 
   private:
-    struct Face {
-        Triangle corners;
-        std::uint64_t id;  ///< of Bullet's numbers
-    };
-    struct Side {
-        std::uint32_t face;
-        int first;  ///< corner
-    };
     /// A sharp surface point of the field.
     struct Sharp {
         glm::vec3 place;
@@ -102,32 +96,37 @@ class TriangleProbes : public btTriangleCallback {
     };
 
     void visit(std::uint32_t f) {
-        const auto& [corners, id] = faces_[f];
+        const Triangle& corners = triangles_[f];
         LocalField::Answer answers[3];
         std::array<std::optional<Wings>, 3> wings;
         std::array<bool, 3> flat;
         float longest = 0;
         for (int i = 0; i < 3; ++i) {
             answers[i] = local_.at(corners[i]);
-            wings[i] = wingsOf(f, i);
+            wings[i] = adjacency_->wingsOf(f, i);
             flat[i] = wings[i] && glm::dot((*wings[i])[0], (*wings[i])[1]) <= flatEdge;
             longest = std::max(longest, glm::distance(corners[i], corners[(i + 1) % 3]));
         }
         // Within a plane of large triangles the field's own points tell more.
         const bool isLarge = longest > spacing_;
         for (int i = 0; i < 3; ++i) {
-            if (!isLarge || !flat[i] || !flat[(i + 2) % 3])
-                keep(local_.probe(corners[i], answers[i], 0, featureOf(id, 3 + i), margin_, report_));
-            const Side& first = sides_.at(keyOf(corners, i)).front();
-            if (first.face != f || first.first != i || (isLarge && flat[i])) continue;
+            if (!isLarge || !flat[i] || !flat[(i + 2) % 3]) visitCorner(f, i, answers[i]);
+            const Adjacency::Member& first = adjacency_->atEdge(f, i).front();
+            if (first.triangle != f || first.index != i || (isLarge && flat[i])) continue;
             const glm::vec3 &from = corners[i], &to = corners[(i + 1) % 3];
             const LocalField::Edge edge{[&](float part) { return glm::mix(from, to, part); },
                                         {0, 0},
                                         true,
-                                        featureOf(id, i),
+                                        featureOf(ids_[f], std::uint32_t(i)),
                                         wings[i],
                                         !flat[i]};
+            const std::size_t before = contacts_.size();
             local_.probeEdge(edge, answers[i], answers[(i + 1) % 3], margin_, report_, contacts_);
+            const auto normalOf = [&](const glm::vec3& towards) { return adjacency_->edgeNormal(f, i, towards); };
+            std::size_t kept = before;
+            for (std::size_t k = before; k < contacts_.size(); ++k)
+                if (const auto contact = withNormal(contacts_[k], normalOf)) contacts_[kept++] = *contact;
+            contacts_.resize(kept);
         }
         if (isLarge)
             visitFace(f);
@@ -135,20 +134,32 @@ class TriangleProbes : public btTriangleCallback {
             small_.push_back(f);
     }
 
-    /// Of a side that two triangles share.
-    std::optional<Wings> wingsOf(std::uint32_t face, int first) const {
-        const auto& sides = sides_.at(keyOf(faces_[face].corners, first));
-        if (sides.size() != 2) return std::nullopt;
-        const auto wing = [&](const Side& side) { return wingOf(faces_[side.face].corners, side.first); };
-        return Wings{wing(sides[0]), wing(sides[1])};
+    void visitCorner(std::uint32_t f, int i, const LocalField::Answer& answer) {
+        const std::uint32_t feature = featureOf(ids_[f], std::uint32_t(3 + i));
+        const auto found = local_.probe(triangles_[f][i], answer, 0, feature, margin_, report_);
+        if (!found) return;
+        const auto normalOf = [&](const glm::vec3& towards) { return adjacency_->cornerNormal(f, i, towards); };
+        if (const auto contact = withNormal(*found, normalOf)) contacts_.push_back(*contact);
     }
 
-    /// From a side that two triangles share into the other one.
-    std::optional<glm::vec3> neighbourOf(std::uint32_t face, int first) const {
-        const auto& sides = sides_.at(keyOf(faces_[face].corners, first));
-        if (sides.size() != 2) return std::nullopt;
-        const Side& other = sides[0].face == face ? sides[1] : sides[0];
-        return wingOf(faces_[other.face].corners, other.first);
+    /// The contact of an edge or a corner along the nearest normal that this has; nothing where it is far from the
+    /// field's: then something else of the triangles is nearer to the field's surface there.
+    /// @param normalOf  of a direction towards the field, in its axes
+    template <class NormalOf>
+    std::optional<Contact> withNormal(Contact contact, NormalOf&& normalOf) const {
+        const glm::vec3 towards = -(glm::conjugate(field_.pose.rotation) * contact.normal);
+        const auto normal = normalOf(towards);
+        if (!normal || glm::dot(*normal, towards) < leastAlike) return std::nullopt;
+        turn(contact, -*normal);
+        contact.turningRadius = -1;
+        return contact;
+    }
+
+    /// Gives a contact of a place of the triangles another normal, in the field's axes.
+    void turn(Contact& contact, const glm::vec3& normal) const {
+        const glm::vec3 place = contact.position + contact.distance * contact.normal;
+        contact.normal = field_.pose.rotation * normal;
+        contact.position = place - contact.distance * contact.normal;
     }
 
     /// Scatters numbers over all bits (S. Vigna's SplitMix64).
@@ -166,10 +177,6 @@ class TriangleProbes : public btTriangleCallback {
         return std::uint32_t(mixed(triangle ^ part) % count);
     }
 
-    void keep(const std::optional<Contact>& contact) {
-        if (contact) contacts_.push_back(*contact);
-    }
-
     /// Whether a surface point is as far from a face as its height tells. One whose surface lies on the face is, and so
     /// is a corner that points to it, or an edge along it. One aslant may have passed an edge of what the sheet belongs
     /// to; and to the foot of one that looks away from a sheet that has not reached it, on the far side of what is
@@ -185,9 +192,30 @@ class TriangleProbes : public btTriangleCallback {
         const float facing = glm::dot(foot.normal, normal), least = point.isSharp ? leastFacing : 0;
         const bool isNearSide = height >= 0 || isUnclear || (foot.where == LocalField::Answer::near && facing >= least);
         const bool isNearest = std::abs(foot.distance - height) <= mostInterpolationError * voxel_ && isNearSide;
-        if (isNearest && opposition.keeps(glm::dot(normal, point.normal), true)) return true;
+        const bool isKept = opposition.keeps(glm::dot(normal, point.normal), true);
+        if (isNearest && isKept && (point.isSharp || turnsTo(field_.scale * point.position, point.normal, normal)))
+            return true;
         if (!(isNearest || height < 0) || !isTip(index, normal)) return false;
         return isNearest || hasSunk(point, normal, height, wayThrough(point, normal, height));
+    }
+
+    /// Whether the field's surface, seen along one normal from a place, turns to another one within the distance of its
+    /// points, now or while its body turns in the step. Where it does not, it goes on deeper, and touches elsewhere:
+    /// where it turns, or where the face ends.
+    bool turnsTo(const glm::vec3& place, const glm::vec3& seen, const glm::vec3& normal) const {
+        const glm::vec3 turn = local_.ways().turn();
+        const auto isMet = [&](float part) {
+            return turnsNowTo(place, seen, glm::normalize(normal + part * glm::cross(turn, normal)));
+        };
+        return isMet(0) || (turn != glm::vec3(0) && (isMet(0.5f) || isMet(1)));
+    }
+
+    bool turnsNowTo(const glm::vec3& place, const glm::vec3& seen, const glm::vec3& normal) const {
+        const float cosine = glm::dot(seen, normal);
+        if (cosine >= straight) return true;
+        const glm::vec3 deeper = glm::normalize(normal - cosine * seen), lean = glm::normalize(seen - cosine * normal);
+        const LocalField::Answer there = local_.at(place + spacing_ * deeper);
+        return there.where == LocalField::Answer::near && glm::dot(there.normal, lean) <= mostLean;
     }
 
     bool isTip(std::uint32_t index, const glm::vec3& normal) const {
@@ -217,7 +245,7 @@ class TriangleProbes : public btTriangleCallback {
     /// How far a place is from the triangles.
     float distanceFrom(const glm::vec3& place) const {
         float least = std::numeric_limits<float>::max();
-        for (const auto& [corners, id] : faces_) {
+        for (const Triangle& corners : triangles_) {
             const glm::vec3 nearest = nearestOnTriangle(place, corners[0], corners[1], corners[2]);
             least = std::min(least, glm::distance(nearest, place));
         }
@@ -272,7 +300,7 @@ class TriangleProbes : public btTriangleCallback {
 
     /// Nothing for a triangle without area.
     std::optional<Plane> planeOf(std::uint32_t f) const {
-        const auto& corners = faces_[f].corners;
+        const Triangle& corners = triangles_[f];
         const glm::vec3 square = glm::cross(corners[1] - corners[0], corners[2] - corners[0]);
         const float area = glm::length(square);
         if (!(area > 0)) return std::nullopt;
@@ -284,7 +312,7 @@ class TriangleProbes : public btTriangleCallback {
 
     void findNeighbours(std::uint32_t f, Plane& plane) const {
         for (int i = 0; i < 3; ++i) {
-            const auto neighbour = neighbourOf(f, i);
+            const auto neighbour = adjacency_->neighbourOf(f, i);
             if (neighbour && glm::dot(*neighbour, plane.outwards[i]) < -flatEdge) plane.neighbours[i] = -*neighbour;
         }
     }
@@ -304,8 +332,7 @@ class TriangleProbes : public btTriangleCallback {
         };
         field_.collider.points().visit(reject, [&](std::uint32_t index, const SurfacePoint& point) {
             if (isBeside(scale * point.position, rounding)) return;
-            if (const auto found = overFace(*plane, true, index, point))
-                overFaces_.push_back({index, faces_[f].id, *found});
+            if (const auto found = overFace(*plane, true, index, point)) overFaces_.push_back({index, ids_[f], *found});
         });
     }
 
@@ -315,7 +342,7 @@ class TriangleProbes : public btTriangleCallback {
         const std::vector<Sharp> sharp = sharpNear();
         const auto isBefore = [](const Sharp& one, float x) { return one.place.x < x; };
         for (const std::uint32_t f : small_) {
-            const auto& corners = faces_[f].corners;
+            const Triangle& corners = triangles_[f];
             const float around = reach_ + spacing_;
             std::optional<Plane> plane;
             auto at = std::lower_bound(sharp.begin(), sharp.end(), corners[0].x - around, isBefore);
@@ -340,15 +367,15 @@ class TriangleProbes : public btTriangleCallback {
         }
         if (!isTip(sharp.index, normal)) return;
         if (const auto found = overFace(plane, false, sharp.index, point))
-            overFaces_.push_back({sharp.index, faces_[f].id, *found});
+            overFaces_.push_back({sharp.index, ids_[f], *found});
     }
 
     /// The sharp corners and tips of the field that are near small triangles, by x.
     std::vector<Sharp> sharpNear() const {
-        glm::vec3 lower = faces_[small_.front()].corners[0], upper = lower;
+        glm::vec3 lower = triangles_[small_.front()][0], upper = lower;
         for (const std::uint32_t f : small_) {
-            lower = glm::min(lower, faces_[f].corners[0]);
-            upper = glm::max(upper, faces_[f].corners[0]);
+            lower = glm::min(lower, triangles_[f][0]);
+            upper = glm::max(upper, triangles_[f][0]);
         }
         const glm::vec3 middle = 0.5f * (lower + upper), half = 0.5f * (upper - lower) + reach_ + spacing_;
         const auto reject = [&](const glm::vec3& centre, float radius) {
@@ -378,6 +405,7 @@ class TriangleProbes : public btTriangleCallback {
         if (isFar && !(point.isSharp && height < 0)) return std::nullopt;
         if (height <= margin_ && isExact(index, normal, height, there)) return touching(place, normal, height);
         if (isFar || !asksFoot) return std::nullopt;
+        if (!turnsTo(foot, there.normal, normal)) return std::nullopt;
         return atFoot(foot, normal, there);
     }
 
@@ -422,10 +450,9 @@ class TriangleProbes : public btTriangleCallback {
         if (!opposition.keeps(found->normal, -(inWorld * normal), inWorld * local_.ways().turn(), !touches))
             return std::nullopt;
         const auto normalAt = [&](const glm::vec3& place) { return local_.at(place).normal; };
-        if (touches)
-            found->normal = inWorld * normal;
-        else if (there.distance > 0 && looksAtEdge(foot, -normal, there.distance, there.normal, normalAt))
+        if (!touches && there.distance > 0 && looksAtEdge(foot, -normal, there.distance, there.normal, normalAt))
             return std::nullopt;
+        turn(*found, normal);
         found->turningRadius = -1;  // it stays below the point
         return found;
     }
@@ -436,11 +463,12 @@ class TriangleProbes : public btTriangleCallback {
     float margin_, reach_, voxel_, spacing_;
     ContactReport& report_;
     std::vector<Contact>& contacts_;
-    std::vector<Face> faces_;
-    std::vector<std::uint32_t> small_;  ///< of the faces
+    std::vector<Triangle> triangles_;
+    std::vector<std::uint64_t> ids_;  ///< of Bullet's numbers
+    std::optional<Adjacency> adjacency_;
+    std::vector<std::uint32_t> small_;  ///< of the triangles
     std::vector<OverFace> overFaces_;
     int part_ = -1, index_ = -1;  ///< of the last triangle that was handed over
-    std::map<SideKey, std::vector<Side>> sides_;
 };
 
 }  // namespace
