@@ -2,9 +2,11 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/trigonometric.hpp>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -114,6 +116,10 @@ std::vector<Rider> addRiders(Stage& stage, const Waves& waves, const TerrainOpti
     return riders;
 }
 
+glm::dvec3 toGlm(const btVector3& v) {
+    return {v.x(), v.y(), v.z()};
+}
+
 // Contacts that leave the normals of the ground.
 int ghostsIn(btDispatcher& dispatcher, const btCollisionObject& ground, const Waves& waves, double around) {
     int ghosts = 0;
@@ -123,10 +129,14 @@ int ghostsIn(btDispatcher& dispatcher, const btCollisionObject& ground, const Wa
         if (!isFirst && manifold.getBody1() != &ground) continue;
         for (int i = 0; i < manifold.getNumContacts(); ++i) {
             const btManifoldPoint& point = manifold.getContactPoint(i);
-            const btVector3 place = isFirst ? point.getPositionWorldOnA() : point.getPositionWorldOnB(),
-                            normal = isFirst ? -point.m_normalWorldOnB : point.m_normalWorldOnB;
-            const double angle =
-                waves.angleToNormals({place.x(), place.y(), place.z()}, {normal.x(), normal.y(), normal.z()}, around);
+            const btVector3 onB = point.getPositionWorldOnB(), normalOnB = point.m_normalWorldOnB;
+            // friction holds one of the two places of a contact, and what turns is told where it is going to be
+            const btVector3 places[] = {isFirst ? point.getPositionWorldOnA() : onB,
+                                        isFirst ? onB + point.getDistance() * normalOnB : point.getPositionWorldOnA()};
+            double angle = std::numeric_limits<double>::infinity();
+            for (const btVector3& place : places)
+                angle = std::min(angle,
+                                 waves.angleToNormals(toGlm(place), (isFirst ? -1.0 : 1.0) * toGlm(normalOnB), around));
             ghosts += !(glm::degrees(angle) <= maxAngle);
         }
     }

@@ -405,7 +405,7 @@ class TriangleProbes : public btTriangleCallback {
         if (isFar && !(point.isSharp && height < 0)) return std::nullopt;
         if (height <= margin_ && isExact(index, normal, height, there)) return touching(place, normal, height);
         if (isFar || !asksFoot) return std::nullopt;
-        if (!turnsTo(foot, there.normal, normal)) return std::nullopt;
+        if (glm::dot(point.normal, normal) < leastFacing || !turnsTo(foot, there.normal, normal)) return std::nullopt;
         return atFoot(foot, normal, there);
     }
 
