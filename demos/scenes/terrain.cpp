@@ -111,6 +111,7 @@ std::vector<Rider> addRiders(Stage& stage, const Waves& waves, const TerrainOpti
         btRigidBody& body = stage.add(thing, matter, {{startX, y, z}}, {.colour = all[i].colour});
         body.setActivationState(DISABLE_DEACTIVATION);
         body.setLinearVelocity({options.speed, 0, 0});
+        body.setLinearFactor({1, 0, 1});  // as between rails without friction: slopes would take it into other lanes
         riders.push_back({all[i].name, body});
     }
     return riders;

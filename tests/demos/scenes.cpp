@@ -17,6 +17,7 @@
 #include "demos/scenes/plates.h"
 #include "demos/scenes/rings.h"
 #include "demos/scenes/spin.h"
+#include "demos/scenes/terrain.h"
 #include "demos/shared/shapes.h"
 #include "demos/shared/stage.h"
 #include "tests/support/support.h"
@@ -76,6 +77,27 @@ TEST_CASE("blocks and nuts of which theory says nothing meet no criterion") {
     pair.stepsPerSecond = 240;
     pair.voxelSize = 0.4e-3f;
     CHECK_FALSE(demo::nuts(pair).criteria.front().met());
+}
+
+TEST_CASE("bodies keep their speed over waves of triangles") {
+    demo::TerrainOptions options;
+    options.seconds = 1.5f;
+    options.heightField = GENERATE(false, true);
+    SECTION("low waves, where edges are least seen") {
+        options.height = GENERATE(0.003f, 0.01f);
+        options.stepsPerSecond = GENERATE(60.f, 240.f);
+        judgeOnce(demo::terrain(options));
+    }
+    SECTION("high waves of small triangles") {
+        options.height = 0.03f;
+        options.cell = 0.1f;
+        judgeOnce(demo::terrain(options));
+    }
+    SECTION("large triangles") {
+        options.height = 0.02f;
+        options.cell = 2.4f;
+        judge([&] { return demo::terrain(options); });
+    }
 }
 
 TEST_CASE("rings stay on their pole and come to rest") {
