@@ -27,12 +27,18 @@ struct Identifiers {
     TriangleId a, b;
 };
 
-/// Of the triangle of A, or of the children that the result's wrappers stand for.
 /// @param aIsFirst  of the bodies that the result names
-Identifiers identifiersOf(const std::optional<TriangleId>& triangle, bool aIsFirst, const btManifoldResult& result) {
+Identifiers identifiersOf(const Contact& contact, const std::optional<TriangleId>& triangle, bool aIsFirst,
+                          const btManifoldResult& result) {
     const btCollisionObjectWrapper *a = result.getBody0Wrap(), *b = result.getBody1Wrap();
     if (!aIsFirst) std::swap(a, b);
-    return {triangle.value_or(TriangleId{a->m_partId, a->m_index}), {b->m_partId, b->m_index}};
+    const int feature = static_cast<int>(contact.feature & ~featureOfB);
+    const bool isOfB = (contact.feature & featureOfB) != 0;
+    // a wrapper of what is part of something bigger names it
+    const auto name = [](const btCollisionObjectWrapper& wrap, int feature) {
+        return wrap.m_index >= 0 ? TriangleId{wrap.m_partId, wrap.m_index} : TriangleId{0, feature};
+    };
+    return {triangle ? *triangle : name(*a, isOfB ? -1 : feature), name(*b, isOfB ? feature : -1)};
 }
 
 /// What no solver has seen yet, as Bullet makes it in btManifoldResult::addContactPoint(), but beside all others,
@@ -216,7 +222,7 @@ void Manifolds::fill(std::size_t m, std::span<const Contact> contacts, std::span
     manifold->setNumContacts(0);
     step.result.setPersistentManifold(manifold);
     for (std::size_t n = 0; n < contacts.size(); ++n) {
-        const Identifiers of = identifiersOf(details[n].triangle, step.aIsFirst, step.result);
+        const Identifiers of = identifiersOf(contacts[n], details[n].triangle, step.aIsFirst, step.result);
         emit(contacts[n], of, step.aIsFirst, step.result);
     }
     const bool isTold = !isOfUser(step.result);

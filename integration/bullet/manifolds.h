@@ -49,9 +49,10 @@ class Manifolds {
     Manifolds(const Manifolds&) = delete;
     Manifolds& operator=(const Manifolds&) = delete;
 
-    /// Replaces all contacts. Friction, restitution, callbacks and identifiers are those of Bullet's own shapes: part
-    /// and index name the triangle of a mesh, else the child of a compound with part -1, else nothing with -1 and -1. A
-    /// user's result gets each contact by btManifoldResult::addContactPoint().
+    /// Replaces all contacts. Friction, restitution and callbacks are those of Bullet's own shapes, and so are
+    /// identifiers: part and index name the triangle of a mesh, else the child of a compound with part -1. For all else
+    /// the part is 0, and the index is the contact's feature, or -1 where that is the other body's. A user's result
+    /// gets each contact by btManifoldResult::addContactPoint().
     /// @param details  one for each contact of the patches
     /// @param a, b     the bodies A and B of the patches; `result` may hold them in either order, as within a compound
     /// @param seconds  that the step takes; 0 between steps
