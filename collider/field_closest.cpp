@@ -5,7 +5,6 @@
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
-#include <limits>
 #include <memory>
 #include <utility>
 
@@ -16,7 +15,6 @@
 namespace bilayer {
 namespace {
 
-constexpr float infinity = std::numeric_limits<float>::infinity();
 /// What distances in the band seldom exceed it by, so that a second search is seldom needed [voxels].
 constexpr float usualError = 0.1f;
 /// Room for the rounding of single precision, in the distance that is asked for; and in itself [voxels].

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <assimp/DefaultIOSystem.h>
 #include <assimp/config.h>
 #include <assimp/postprocess.h>
 #include <assimp/scene.h>
@@ -13,8 +14,10 @@
 #include <memory>
 #include <stdexcept>
 #include <string>
+#include <system_error>
 
 #include "sdf/atomic_file.h"
+#include "sdf/input_file.h"
 #include "sdf/mesh_guard.h"
 
 namespace bilayer {
@@ -26,6 +29,19 @@ constexpr unsigned unwanted = aiComponent_NORMALS | aiComponent_TANGENTS_AND_BIT
 
 constexpr unsigned steps =
     aiProcess_RemoveComponent | aiProcess_Triangulate | aiProcess_SortByPType | aiProcess_PreTransformVertices;
+
+/// Of the files that a mesh refers to, materials for example, only regular ones are there for Assimp: others may never
+/// end.
+class RegularFiles : public Assimp::DefaultIOSystem {
+  public:
+    bool Exists(const char* file) const override {
+        std::error_code absent;
+        return std::filesystem::is_regular_file(file, absent);
+    }
+    Assimp::IOStream* Open(const char* file, const char* mode) override {
+        return Exists(file) ? DefaultIOSystem::Open(file, mode) : nullptr;
+    }
+};
 
 std::string lowerEnding(const std::filesystem::path& path) {
     std::string ending = path.extension().string();
@@ -100,10 +116,10 @@ std::unique_ptr<aiScene> toScene(const Mesh& mesh) {
 
 Mesh readMesh(const std::filesystem::path& path) {
     Assimp::Importer importer;
+    importer.SetIOHandler(new RegularFiles);  // the importer's own from here on
     importer.SetPropertyInteger(AI_CONFIG_PP_RVC_FLAGS, int(unwanted));
     importer.SetPropertyInteger(AI_CONFIG_PP_SBP_REMOVE, aiPrimitiveType_POINT | aiPrimitiveType_LINE);
-    if (!std::filesystem::is_regular_file(path))
-        throw std::runtime_error(fmt::format("{}: no such file", path.string()));
+    requireInputFile(path);
     const aiScene* scene = readScene(importer, path);
     if (scene) {
         checkFaces(*scene, path);

@@ -17,6 +17,7 @@
 
 #include "sdf/atomic_file.h"
 #include "sdf/grids.h"
+#include "sdf/input_file.h"
 
 namespace bilayer {
 namespace {
@@ -135,8 +136,7 @@ void writeVdb(const std::filesystem::path& path, const LevelSet& levelSet, const
 
 LevelSet readVdb(const std::filesystem::path& path) {
     openvdb::initialize();
-    if (!std::filesystem::is_regular_file(path))
-        throw std::runtime_error(fmt::format("{}: no such file", path.string()));
+    requireInputFile(path);
     openvdb::GridPtrVec grids;
     try {
         requireSeal(path);

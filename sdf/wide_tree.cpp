@@ -140,7 +140,7 @@ struct Cells {
 // From cells to their places along Hilbert's curve, by Skilling's transformation without branches; the place of a cell
 // is in the bits of the three numbers taken in turn.
 void transformToHilbert(Cells& cells) {
-    auto& [x, y, z] = cells.x;
+    auto &x = cells.x[0], &y = cells.x[1], &z = cells.x[2];
     const auto undo = [&](int bit, std::uint32_t* v) {
         for (std::size_t i = 0; i < Cells::most; ++i) {
             const std::uint32_t inverts = 0u - (v[i] >> bit & 1), low = (1u << bit) - 1;

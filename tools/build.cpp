@@ -258,7 +258,7 @@ void addLayers(CLI::App& command, Arguments& a) {
     auto* group = command.add_option_group("layers", "only for --method double-layer");
     a.layerOptions = {
         group->add_option("--delta", layers.delta, "distance of each layer from the surface [voxels], default 0.5")
-            ->check(within(1e-3, 4)),
+            ->check(within(0.1, 4)),
         group->add_option("--epsilon", layers.epsilon, "area that one sample stands for [voxels^2], default 1")
             ->check(within(1e-4, 1e4)),
         group->add_option("--neighbourhood", layers.neighbourhood, "voxels that a sample reaches at least, default 2")

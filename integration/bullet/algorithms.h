@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "integration/bullet/dispatcher.h"
+#include "integration/bullet/missing_dispatcher.h"
 #include "integration/bullet/pair.h"
 
 namespace bilayer::bullet {
@@ -83,6 +84,7 @@ class FieldAlgorithmFunctions {
   private:
     struct Functions;
     std::unique_ptr<Functions> functions_;
+    KnowsFields knows_;
 };
 
 }  // namespace bilayer::bullet

@@ -22,10 +22,28 @@ constexpr float held = 0.98f, mostDrift = 0.25f;
 // is not known to slip that holds.
 constexpr float stepsOfRest = 120, slipOfRest = 0.05f;
 
+/// What a contact is with, as manifold points name it.
+struct Identifiers {
+    TriangleId a, b;
+};
+
+/// @param aIsFirst  of the bodies that the result names
+Identifiers identifiersOf(const Contact& contact, const std::optional<TriangleId>& triangle, bool aIsFirst,
+                          const btManifoldResult& result) {
+    const btCollisionObjectWrapper *a = result.getBody0Wrap(), *b = result.getBody1Wrap();
+    if (!aIsFirst) std::swap(a, b);
+    const int feature = static_cast<int>(contact.feature & ~featureOfB);
+    const bool isOfB = (contact.feature & featureOfB) != 0;
+    // a wrapper of what is part of something bigger names it
+    const auto name = [](const btCollisionObjectWrapper& wrap, int feature) {
+        return wrap.m_index >= 0 ? TriangleId{wrap.m_partId, wrap.m_index} : TriangleId{0, feature};
+    };
+    return {triangle ? *triangle : name(*a, isOfB ? -1 : feature), name(*b, isOfB ? feature : -1)};
+}
+
 /// What no solver has seen yet, as Bullet makes it in btManifoldResult::addContactPoint(), but beside all others,
 /// however far away it is, and without a word to the user.
-/// @param isOfA  whether the feature is
-btManifoldPoint pointOf(const Contact& contact, bool isOfA, const btPersistentManifold& manifold,
+btManifoldPoint pointOf(const Contact& contact, const Identifiers& of, const btPersistentManifold& manifold,
                         const btManifoldResult& result) {
     const btVector3 onB = toBullet(contact.position), normal = toBullet(contact.normal);
     const btVector3 onA = onB + contact.distance * normal;
@@ -34,9 +52,10 @@ btManifoldPoint pointOf(const Contact& contact, bool isOfA, const btPersistentMa
     point.m_positionWorldOnA = onA;
     point.m_positionWorldOnB = onB;
     btPlaneSpace1(normal, point.m_lateralFrictionDir1, point.m_lateralFrictionDir2);
-    point.m_partId0 = point.m_partId1 = 0;
-    point.m_index0 = isOfA ? static_cast<int>(contact.feature & ~featureOfB) : -1;
-    point.m_index1 = isOfA ? -1 : static_cast<int>(contact.feature & ~featureOfB);
+    point.m_partId0 = of.a.part;
+    point.m_index0 = of.a.index;
+    point.m_partId1 = of.b.part;
+    point.m_index1 = of.b.index;
 
     const btCollisionObject *first = result.getBody0Internal(), *second = result.getBody1Internal();
     point.m_combinedFriction = gCalculateCombinedFrictionCallback(first, second);
@@ -50,6 +69,20 @@ btManifoldPoint pointOf(const Contact& contact, bool isOfA, const btPersistentMa
         point.m_contactPointFlags |= BT_CONTACT_FLAG_CONTACT_STIFFNESS_DAMPING;
     }
     return point;
+}
+
+/// Adds a contact to the manifold that the result holds.
+void emit(const Contact& contact, const Identifiers& of, bool aIsFirst, btManifoldResult& result) {
+    btPersistentManifold& manifold = *result.getPersistentManifold();
+    manifold.setContactBreakingThreshold(std::max(contact.distance, 0.f));
+    if (!isOfUser(result)) {
+        manifold.addManifoldPoint(pointOf(contact, of, manifold, result));
+        return;
+    }
+    const TriangleId &first = aIsFirst ? of.a : of.b, &second = aIsFirst ? of.b : of.a;
+    result.setShapeIdentifiersA(first.part, first.index);
+    result.setShapeIdentifiersB(second.part, second.index);
+    result.addContactPoint(toBullet(contact.normal), toBullet(contact.position), contact.distance);
 }
 
 /// Tells the user of a contact once it is as the solver will see it; what he keeps with it is there again each step.
@@ -151,7 +184,7 @@ Manifolds::~Manifolds() {
     for (btPersistentManifold* manifold : manifolds_) dispatcher_.releaseManifold(manifold);
 }
 
-void Manifolds::write(std::span<const Patch> patches, std::span<const std::optional<Ahead>> ahead,
+void Manifolds::write(std::span<const Patch> patches, std::span<const ContactDetails> details,
                       const btCollisionObject& a, const btCollisionObject& b, float seconds,
                       const Continuity& continuity, btManifoldResult& result) {
     // One manifold at least: users expect a pair that overlaps to have one.
@@ -164,7 +197,7 @@ void Manifolds::write(std::span<const Patch> patches, std::span<const std::optio
     for (std::size_t m = 0, at = 0; m < manifolds_.size(); ++m) {
         std::span<const Contact> contacts;
         if (m < patches.size()) contacts = std::span(patches[m].contacts).first(std::size_t(patches[m].count));
-        fill(m, contacts, ahead.subspan(at, contacts.size()), step);
+        fill(m, contacts, details.subspan(at, contacts.size()), step);
         at += contacts.size();
     }
     for (const auto& [point, written] : old_)
@@ -182,13 +215,16 @@ void Manifolds::takeOld() {
         }
 }
 
-void Manifolds::fill(std::size_t m, std::span<const Contact> contacts, std::span<const std::optional<Ahead>> ahead,
+void Manifolds::fill(std::size_t m, std::span<const Contact> contacts, std::span<const ContactDetails> details,
                      const Step& step) {
     btPersistentManifold* manifold = manifolds_[m];
     const bool touched = manifold->getNumContacts() > 0;
     manifold->setNumContacts(0);
     step.result.setPersistentManifold(manifold);
-    for (const Contact& contact : contacts) emit(contact, step.aIsFirst, step.result);
+    for (std::size_t n = 0; n < contacts.size(); ++n) {
+        const Identifiers of = identifiersOf(contacts[n], details[n].triangle, step.aIsFirst, step.result);
+        emit(contacts[n], of, step.aIsFirst, step.result);
+    }
     const bool isTold = !isOfUser(step.result);
     for (int i = 0; i < manifold->getNumContacts(); ++i) {
         const auto n = std::size_t(i);
@@ -198,7 +234,7 @@ void Manifolds::fill(std::size_t m, std::span<const Contact> contacts, std::span
         if (isTold) tellAdded(point, *manifold, step.result);
         if (point.m_contactMotion1 != 0 || point.m_contactMotion2 != 0) letGo(*manifold, point, written);
         const bool isAsFound = point.m_normalWorldOnB == toBullet(contacts[n].normal);
-        if (ahead[n] && isAsFound) put(point, *ahead[n]);
+        if (details[n].ahead && isAsFound) put(point, *details[n].ahead);
         step.bounce(point);
         tellProcessed(point, *manifold);
     }
@@ -206,20 +242,6 @@ void Manifolds::fill(std::size_t m, std::span<const Contact> contacts, std::span
     const bool touches = manifold->getNumContacts() > 0;
     if (isTold && !touched && touches && gContactStartedCallback) gContactStartedCallback(manifold);
     if (touched && !touches && gContactEndedCallback) gContactEndedCallback(manifold);
-}
-
-void Manifolds::emit(const Contact& contact, bool aIsFirst, btManifoldResult& result) {
-    const bool isOfA = !(contact.feature & featureOfB);
-    btPersistentManifold& manifold = *result.getPersistentManifold();
-    manifold.setContactBreakingThreshold(std::max(contact.distance, 0.f));
-    if (!isOfUser(result)) {
-        manifold.addManifoldPoint(pointOf(contact, isOfA, manifold, result));
-        return;
-    }
-    const int index = static_cast<int>(contact.feature & ~featureOfB);
-    result.setShapeIdentifiersA(0, isOfA == aIsFirst ? index : -1);
-    result.setShapeIdentifiersB(0, isOfA == aIsFirst ? -1 : index);
-    result.addContactPoint(toBullet(contact.normal), toBullet(contact.position), contact.distance);
 }
 
 Manifolds::Written Manifolds::writtenAs(const btManifoldPoint& point, std::size_t manifold) const {

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "integration/bullet/reduce.h"
+#include "integration/bullet/triangle_ids.h"
 
 namespace bilayer::bullet {
 
@@ -19,6 +20,12 @@ struct Ahead {
     btVector3 onA, onB;  ///< its places on the bodies [m]
     btVector3 normal;    ///< from B to A
     float distance;      ///< [m]
+};
+
+/// What goes into a manifold besides a contact itself.
+struct ContactDetails {
+    std::optional<Ahead> ahead;          ///< of one that turns
+    std::optional<TriangleId> triangle;  ///< of A
 };
 
 /// How contacts go on from step to step.
@@ -42,12 +49,14 @@ class Manifolds {
     Manifolds(const Manifolds&) = delete;
     Manifolds& operator=(const Manifolds&) = delete;
 
-    /// Replaces all contacts. Friction, restitution and callbacks are those of Bullet's own shapes; a user's result
+    /// Replaces all contacts. Friction, restitution and callbacks are those of Bullet's own shapes, and so are
+    /// identifiers: part and index name the triangle of a mesh, else the child of a compound with part -1. For all else
+    /// the part is 0, and the index is the contact's feature, or -1 where that is the other body's. A user's result
     /// gets each contact by btManifoldResult::addContactPoint().
-    /// @param ahead    one for each contact of the patches, of those that turn
+    /// @param details  one for each contact of the patches
     /// @param a, b     the bodies A and B of the patches; `result` may hold them in either order, as within a compound
     /// @param seconds  that the step takes; 0 between steps
-    void write(std::span<const Patch> patches, std::span<const std::optional<Ahead>> ahead, const btCollisionObject& a,
+    void write(std::span<const Patch> patches, std::span<const ContactDetails> details, const btCollisionObject& a,
                const btCollisionObject& b, float seconds, const Continuity& continuity, btManifoldResult& result);
 
     std::span<btPersistentManifold* const> all() const { return manifolds_; }
@@ -57,9 +66,8 @@ class Manifolds {
     struct Step;
     void takeOld();
     /// Writes manifold m.
-    void fill(std::size_t m, std::span<const Contact> contacts, std::span<const std::optional<Ahead>> ahead,
+    void fill(std::size_t m, std::span<const Contact> contacts, std::span<const ContactDetails> details,
               const Step& step);
-    static void emit(const Contact& contact, bool aIsFirst, btManifoldResult& result);
     /// A contact as it went into a manifold: within compounds, Bullet moves contacts on and about before we see them.
     struct Written {
         btVector3 ofA{0, 0, 0}, ofB{0, 0, 0};  ///< its place on either body

@@ -15,6 +15,13 @@ namespace bilayer::bullet {
 
 namespace {
 
+// Triangles whose distances from a contact differ by less are as near to it [voxels].
+constexpr float sameDistance = 1e-3f;
+
+bool hasTriangles(const btCollisionShape& shape) {
+    return shape.isConcave() && !isField(shape) && shape.getShapeType() != STATIC_PLANE_PROXYTYPE;
+}
+
 /// Of two bodies of which B is a field, until the next step.
 Continuity continuityOf(const Side& a, const Side& b) {
     const auto restingFriction = [](const btCollisionShape& shape) {
@@ -80,7 +87,7 @@ void Pair::test(const Side& a, const Side& b, float asked) {
 
 void Pair::commit(const btCollisionObject& a, const btCollisionObject& b, float seconds, btManifoldResult& result) {
     const Reduced& reduced = choice_.reduced();
-    manifolds_.write(reduced.patches, ahead_, a, b, seconds, continuity_, result);
+    manifolds_.write(reduced.patches, details_, a, b, seconds, continuity_, result);
     ++statistics_.pairs;
     statistics_.contactsFound += found_;
     for (const Patch& patch : reduced.patches) statistics_.contactsKept += patch.count;
@@ -107,12 +114,27 @@ void Pair::finish(const Side& a, const Side& b) {
     found_ = static_cast<int>(contacts_.size());
     choice_.update(contacts_, a.transform, b.transform);
     continuity_ = continuityOf(a, b);
-    ahead_.clear();
+    details_.clear();
     const Turning turning(a, b, continuity_);
     for (const Patch& patch : choice_.reduced().patches)
-        for (int i = 0; i < patch.count; ++i) ahead_.push_back(turning.ahead(patch.contacts[i]));
+        for (int i = 0; i < patch.count; ++i) details_.push_back({turning.ahead(patch.contacts[i]), std::nullopt});
+    if (hasTriangles(*a.shape)) nameTriangles(static_cast<const btConcaveShape&>(*a.shape), a.transform, b.placed());
     isReady_ = true;
     sampled_ = 0;
+}
+
+void Pair::nameTriangles(const btConcaveShape& mesh, const btTransform& transform, const Placed& field) {
+    std::vector<MeshPlace> places;
+    for (const Patch& patch : choice_.reduced().patches)
+        for (int i = 0; i < patch.count; ++i) {
+            const Contact& contact = patch.contacts[i];
+            places.push_back(
+                {toBullet(contact.position + contact.distance * contact.normal), toBullet(contact.normal)});
+        }
+    const Field& of = field.collider.field();
+    const float voxel = field.scale * of.voxelSize(), reach = voxel + field.scale * of.interiorWidth();
+    const auto triangles = trianglesAt(mesh, transform, places, reach, sameDistance * voxel);
+    for (std::size_t i = 0; i < details_.size(); ++i) details_[i].triangle = triangles[i];
 }
 
 ContactReport Pair::collideOther(const Side& a, const Placed& field, float margin, bool measured,

@@ -71,6 +71,7 @@ class Pair {
     void find(const Side& a, const Side& b, float margin, bool measured);
     ContactReport collideOther(const Side& a, const Placed& field, float margin, bool measured, const Motion& motion);
     void finish(const Side& a, const Side& b);
+    void nameTriangles(const btConcaveShape& mesh, const btTransform& transform, const Placed& field);
 
     Manifolds manifolds_;
     DispatchStatistics& statistics_;
@@ -79,7 +80,7 @@ class Pair {
     std::vector<Contact> contacts_;
     Choice choice_;
     Continuity continuity_;
-    std::vector<std::optional<Ahead>> ahead_;  ///< one for each contact that is kept
+    std::vector<ContactDetails> details_;  ///< one for each contact that is kept
     ContactReport report_;
     int found_ = 0, sampled_ = 0;
     bool isReady_ = false;

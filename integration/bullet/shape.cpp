@@ -16,6 +16,7 @@
 
 #include "collider/mesh_rays.h"
 #include "integration/bullet/convert.h"
+#include "integration/bullet/missing_dispatcher.h"
 #include "integration/bullet/sweep.h"
 
 namespace bilayer::bullet {
@@ -243,7 +244,9 @@ Shape::Shape(std::shared_ptr<const Collider> collider, const ShapeOptions& optio
     m_collisionMargin = options.margin < 0 ? collider_->margin() : options.margin;
 }
 
-Shape::~Shape() = default;
+Shape::~Shape() {
+    forgetBoxes(this);
+}
 
 Placed Shape::placed(const btTransform& bodyTransform) const {
     const Pose body = toPose(bodyTransform);
@@ -265,6 +268,11 @@ void Shape::setMargin(btScalar margin) {
 }
 
 void Shape::getAabb(const btTransform& transform, btVector3& lower, btVector3& upper) const {
+    boxOf(transform, lower, upper);
+    noteBox(this, transform, lower, upper);
+}
+
+void Shape::boxOf(const btTransform& transform, btVector3& lower, btVector3& upper) const {
     const Placed here = placed(transform);
     const Bounds& bounds = collider_->bounds();
     const btTransform frame(toBullet(here.pose.rotation), toBullet(here.pose.toWorld(scale() * bounds.centre())));
@@ -304,7 +312,7 @@ void Shape::processAllTriangles(btTriangleCallback* callback, const btVector3& l
 
     // Debug drawing asks for a box of 1e18 m, for which the hierarchy's integers are too short.
     btVector3 ownLower, ownUpper;
-    getAabb(btTransform::getIdentity(), ownLower, ownUpper);
+    boxOf(btTransform::getIdentity(), ownLower, ownUpper);
     ownLower.setMax(lower);
     ownUpper.setMin(upper);
     if (ownLower.x() > ownUpper.x() || ownLower.y() > ownUpper.y() || ownLower.z() > ownUpper.z()) return;

@@ -37,8 +37,13 @@ struct ShapeOptions {
 Pose centreOfMassFrame(const Collider& collider);
 
 /// Needs a bilayer::bullet::Dispatcher, or FieldAlgorithms with a dispatcher of Bullet's own: without either, Bullet
-/// falls back to the triangles of the mesh against convex bodies, and to nothing against concave ones. Like all shapes,
-/// it may serve any number of bodies.
+/// falls back to the triangles of the mesh against convex bodies, and to nothing against concave ones (other fields,
+/// planes, triangle meshes, height fields), which it passes through. Bullet never calls the shapes of such a pair, so
+/// this is warned of only where boxes tell: once in a process, on the standard error output, when the box of a dynamic
+/// body of a field meets another field's while the process has no Dispatcher and no FieldAlgorithms at all. Not seen
+/// are dynamic compounds, worlds without getDispatchInfo().m_useContinuous, and all worlds of a process that has a
+/// Dispatcher for one of them. The warning is wrong where collision filters keep the two fields apart.
+/// Like all shapes, it may serve any number of bodies.
 class Shape : public btConcaveShape {
   public:
     explicit Shape(std::shared_ptr<const Collider> collider, const ShapeOptions& options = {});
@@ -77,6 +82,8 @@ class Shape : public btConcaveShape {
 
   private:
     class Triangles;
+    void boxOf(const btTransform& transform, btVector3& lower, btVector3& upper) const;
+
     std::shared_ptr<const Collider> collider_;
     Pose frame_;
     bool sweeps_;

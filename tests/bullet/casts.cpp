@@ -192,7 +192,7 @@ TEST_CASE("Rays meet a field where they meet its triangles") {
         CAPTURE(i, ray.m_closestHitFraction, expected.m_closestHitFraction);
         // what passes the outline of the mesh by no more than rounding may hit it or not; Bullet grows its triangles
         const btTransform body = twins.ofField.dynamics.getCollisionObjectArray()[0]->getWorldTransform();
-        const auto exact = [&](double grown) {
+        const auto exact = [&, to = to](double grown) {
             return firstHit(mesh, glm::dvec3(bullet::toGlm(body.invXform(begin))),
                             glm::dvec3(bullet::toGlm(body.invXform(to))), oneSided, grown);
         };
@@ -255,7 +255,7 @@ TEST_CASE("Shapes of all kinds on their way meet a field as they meet its triang
                 const float down = -expected.m_hitNormalWorld.dot((itsTo - itsFrom).normalized());
                 if (std::abs(apart) * std::max(down, 0.05f) < stopsBefore) continue;
             }
-            const auto gapAt = [&](float fraction) {
+            const auto gapAt = [&, itsFrom = itsFrom, itsTo = itsTo](float fraction) {
                 return distanceOf(*itsShape, at(itsFrom.lerp(itsTo, fraction)), twins.ofTriangles);
             };
             if (sweep.hasHit()) CHECK(gapAt(ours) < stopsBefore);

@@ -1,7 +1,12 @@
 // Fields on a dispatcher that is Bullet's own.
+#include <unistd.h>
+
 #include <algorithm>
 #include <catch2/catch.hpp>
+#include <cstdio>
+#include <functional>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "world.h"
@@ -101,4 +106,115 @@ TEST_CASE("Fast fields do not pass a plate on a dispatcher of Bullet's own") {
     CHECK(moving.getWorldTransform().getOrigin().z() > 0.2f);
     world.removeRigidBody(&still);
     world.removeRigidBody(&moving);
+}
+
+namespace {
+
+/// What is written to the standard error output meanwhile.
+std::string errorsOf(const std::function<void()>& work) {
+    std::fflush(stderr);
+    std::FILE* file = std::tmpfile();
+    REQUIRE(file);
+    const int before = dup(STDERR_FILENO);
+    dup2(fileno(file), STDERR_FILENO);
+    work();
+    std::fflush(stderr);
+    dup2(before, STDERR_FILENO);
+    close(before);
+    std::rewind(file);
+    std::string text(4096, ' ');
+    text.resize(std::fread(text.data(), 1, text.size(), file));
+    std::fclose(file);
+    return text;
+}
+
+/// A world of Bullet's own, which knows no fields unless somebody else has told its dispatcher.
+struct StockWorld {
+    StockWorld() { world.setGravity({0, 0, -9.81f}); }
+    ~StockWorld() {
+        for (const auto& body : bodies) world.removeRigidBody(body.get());
+    }
+    btRigidBody* add(btCollisionShape& shape, float mass, const btVector3& place) {
+        bodies.push_back(std::make_unique<btRigidBody>(mass, nullptr, &shape, btVector3(0.1f, 0.1f, 0.1f)));
+        bodies.back()->setWorldTransform(btTransform(btQuaternion::getIdentity(), place));
+        world.addRigidBody(bodies.back().get());
+        return bodies.back().get();
+    }
+    void run(int steps) {
+        for (int i = 0; i < steps; ++i) world.stepSimulation(1.f / 60, 1, 1.f / 60);
+    }
+
+    btDefaultCollisionConfiguration configuration;
+    btCollisionDispatcher dispatcher{&configuration};
+    btDbvtBroadphase broadphase;
+    btSequentialImpulseConstraintSolver solver;
+    btDiscreteDynamicsWorld world{&dispatcher, &broadphase, &solver, &configuration};
+    std::vector<std::unique_ptr<btRigidBody>> bodies;
+};
+
+}  // namespace
+
+TEST_CASE("A dispatcher that knows no fields is warned of when the first two fall through each other, once") {
+    const auto slab = exactBox({1, 1, 0.3f}, h), ball = exactSphere(0.3f, h);
+    const auto fall = [&](const std::function<void(StockWorld&)>& setUp, const btVector3& from) {
+        return errorsOf([&] {
+            Shape ground(slab), body(ball);
+            StockWorld stock;
+            setUp(stock);
+            stock.add(ground, 0, {0, 0, 0});
+            stock.add(body, 1, from);
+            stock.run(60);
+        });
+    };
+    const auto nothing = [](StockWorld&) {};
+    // not of a field that meets only what Bullet collides with its triangles, and is drawn from a copy of its transform
+    CHECK(errorsOf([&] {
+              Shape body(ball);
+              btBoxShape box({1, 1, 0.3f});
+              StockWorld stock;
+              stock.add(box, 0, {0, 0, 0});
+              const btRigidBody* falling = stock.add(body, 1, {0, 0, 1});
+              for (int i = 0; i < 60; ++i) {
+                  stock.run(1);
+                  const btTransform copy = falling->getWorldTransform();
+                  btVector3 lower, upper;
+                  body.getAabb(copy, lower, upper);
+              }
+          }).empty());
+    // nor of fields that stand still where they meet
+    CHECK(errorsOf([&] {
+              Shape ground(slab), body(ball);
+              StockWorld stock;
+              stock.add(ground, 0, {0, 0, 0});
+              stock.add(body, 0, {0, 0, 0.3f});
+              stock.run(60);
+          }).empty());
+    // nor of compounds that are made of fields that meet
+    CHECK(errorsOf([&] {
+              Shape body(ball);
+              btCompoundShape compound;
+              btBoxShape box({1, 1, 0.3f});
+              for (int i = 0; i < 4; ++i)
+                  compound.addChildShape(btTransform(btQuaternion::getIdentity(), {0.2f * float(i), 0, 0}), &body);
+              StockWorld stock;
+              stock.add(box, 0, {0, 0, 0});
+              stock.add(compound, 1, {0, 0, 1});
+              stock.run(60);
+          }).empty());
+    CHECK(fall(nothing, {0, 3, 1}).empty());  // passes by
+    {
+        btDefaultCollisionConfiguration configuration;
+        const bullet::Dispatcher elsewhere(&configuration);
+        CHECK(fall(nothing, {0, 0, 1}).empty());
+    }
+    std::unique_ptr<bullet::FieldAlgorithms> fields;
+    CHECK(fall([&](StockWorld& stock) { fields = std::make_unique<bullet::FieldAlgorithms>(stock.dispatcher); },
+               {0, 0, 1})
+              .empty());
+    fields.reset();
+    const std::string warning = fall(nothing, {0, 0, 1});
+    CAPTURE(warning);
+    CHECK(warning.find("FieldAlgorithms") != std::string::npos);
+    CHECK(std::count(warning.begin(), warning.end(), '\n') == 1);
+    CHECK(fall(nothing, {0, 0, 1}).empty());
 }

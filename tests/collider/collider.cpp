@@ -299,7 +299,7 @@ TEST_CASE("contacts that look along the surface of their point are left out wher
     const float apart = GENERATE(-2.f, 0.9f);  // of points of faces that do not touch yet
     for (const auto& [a, b] : touchingPairs(random)) {
         std::vector<Contact> expected, found;
-        const auto opposes = [&](const Contact& contact) {
+        const auto opposes = [&, &a = a, &b = b](const Contact& contact) {
             const bool ofB = contact.feature & featureOfB;
             const SurfacePoint point = pointOf((ofB ? b : a).collider, contact.feature & ~featureOfB);
             const float cosine = glm::dot((ofB ? b : a).pose.rotation * point.normal, contact.normal);

@@ -65,6 +65,7 @@ TEST_CASE("OFF files may hold comments and empty lines anywhere") {
 TEST_CASE("unreadable files give an error that names them") {
     CHECK_THROWS_WITH(readMesh("/nonexistent.obj"),
                       Catch::Contains("/nonexistent.obj") && Catch::Contains("no such file"));
+    CHECK_THROWS_WITH(readMesh("/dev"), Catch::Contains("/dev: not a regular file"));
     for (const auto& [name, text] : {std::pair("empty.obj", ""), std::pair("noise.ply", "ply\nnot a ply"),
                                      std::pair("points.obj", "v 0 0 0\nv 1 0 0\n"), std::pair("text.stl", "hello"),
                                      std::pair("flat.obj", "v 0 0 0\nv 1 0 0\nv 0 0 0\nf 1 2 3\n")}) {

@@ -1,4 +1,7 @@
 // `bilayer` on input that it must refuse: status 1 and one line that names the culprit, or status 2.
+#include <fmt/format.h>
+#include <sys/stat.h>
+
 #include <catch2/catch.hpp>
 #include <chrono>
 #include <fstream>
@@ -91,6 +94,46 @@ TEST_CASE("fields that cannot be read") {
     requireFault({"export", field, "-o", scratch("missing/a.nvdb").string()}, "missing/a.nvdb");
     CHECK_FALSE(std::filesystem::exists(scratch("cut.obj")));
     CHECK_FALSE(std::filesystem::exists(scratch("cut.nvdb")));
+    CHECK_FALSE(std::filesystem::exists(output()));
+}
+
+TEST_CASE("what is there, but no file, is told from what is not there") {
+    const std::filesystem::path here = scratch("odd");
+    std::filesystem::create_directories(here);
+    const std::string field = (here / "field.vdb").string();
+    REQUIRE(run({"build", sphereFile().string(), "-o", field, "--voxel-size", "0.1"}).status == 0);
+    for (const std::string ending : {".obj", ".ply", ".stl", ".off", ".gltf", ".vdb"}) {
+        const std::filesystem::path fifo = here / ("fifo" + ending), folder = here / ("folder" + ending),
+                                    device = here / ("device" + ending), dangling = here / ("dangling" + ending),
+                                    toFifo = here / ("link" + ending);
+        REQUIRE(mkfifo(fifo.c_str(), 0600) == 0);
+        std::filesystem::create_directory(folder);
+        std::filesystem::create_symlink("/dev/zero", device);
+        std::filesystem::create_symlink(here / "absent", dangling);
+        std::filesystem::create_symlink(fifo, toFifo);
+        const bool isField = ending == ".vdb";
+        const auto refusesAll = [&](const std::string& path, const std::string& why) {
+            const std::string culprit = path + ": " + why;
+            requireFault({"seed", path, "-o", output(), "--voxel-size", "0.1"}, culprit);
+            if (isField) {
+                for (const char* command : {"info", "query"}) requireFault({command, path}, culprit);
+                requireFault({"surface", path, "-o", scratch("a.obj").string()}, culprit);
+                requireFault({"export", path, "-o", scratch("a.nvdb").string()}, culprit);
+                requireFault({"seed", field, "-o", output(), "--into", path}, culprit);
+            } else {
+                requireFault(buildOf(path), culprit);
+                requireFault({"inspect", path}, culprit);
+            }
+        };
+        for (const auto& odd : {fifo, folder, device, toFifo}) refusesAll(odd.string(), "not a regular file");
+        refusesAll(dangling.string(), "no such file");
+        refusesAll((here / ("absent" + ending)).string(), "no such file");
+        refusesAll((here / "field.vdb" / ("inside" + ending)).string(), "no such file");
+    }
+    // nor is such a thing opened that a mesh refers to
+    REQUIRE(mkfifo((here / "fifo.mtl").c_str(), 0600) == 0);
+    std::ofstream(here / "material.obj") << "mtllib fifo.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+    CHECK(run({"inspect", (here / "material.obj").string()}).status == 0);
     CHECK_FALSE(std::filesystem::exists(output()));
 }
 
@@ -248,6 +291,38 @@ TEST_CASE("options that belong to other methods are wrong usage") {
     requireUsage(prism({"--delta", "0.5"}), "--delta: needs --method double-layer");
     for (const char* sign : {"normals", "winding"}) requireUsage(with({"--sign", sign, "--gap", "2"}), "--gap: needs");
     CHECK_FALSE(std::filesystem::exists(output()));
+}
+
+TEST_CASE("ranges in the help are those that are taken") {
+    const Result help = run({"build", "--help"});
+    REQUIRE(help.status == 0);
+    const struct {
+        const char *option, *low, *high, *below, *above;
+    } ranges[] = {{"--delta", "0.1", "4", "0.0999", "4.001"},
+                  {"--epsilon", "0.0001", "10000", "0.000099", "10001"},
+                  {"--neighbourhood", "1", "64", "0", "65"},
+                  {"--max-subdivision", "1", "1024", "0", "1025"},
+                  {"--gap", "0", "100", "-0.001", "100.1"}};
+    for (const auto& range : ranges) {
+        CAPTURE(range.option);
+        const std::size_t at = help.out.find(range.option);
+        REQUIRE(at != std::string::npos);
+        const std::string line = help.out.substr(at, help.out.find('\n', at) - at);
+        CAPTURE(line);
+        CHECK((line.find(fmt::format("{}..{}", range.low, range.high)) != std::string::npos ||
+               line.find(fmt::format("[{} - {}]", range.low, range.high)) != std::string::npos));
+        const auto with = [&](const std::string& value) {
+            const Words method =
+                range.option == std::string("--gap") ? Words{"--sign", "flood"} : Words{"--method", "double-layer"};
+            return buildOf(sphereFile(), {"--voxel-size", "0.2", method[0], method[1], range.option, value});
+        };
+        for (const char* value : {range.low, range.high}) {
+            CAPTURE(value);
+            CHECK(run(with(value)).status == 0);
+        }
+        for (const char* value : {range.below, range.above}) requireUsage(with(value), range.option);
+    }
+    std::filesystem::remove(output());
 }
 
 TEST_CASE("what is no number is wrong usage wherever a number is expected") {

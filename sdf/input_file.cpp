@@ -1,0 +1,24 @@
+#include "sdf/input_file.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <stdexcept>
+#include <system_error>
+
+namespace bilayer {
+
+void requireInputFile(const std::filesystem::path& path) {
+    const auto require = [&](bool holds, const std::string& why) {
+        if (!holds) throw std::runtime_error(fmt::format("{}: {}", path.string(), why));
+    };
+    std::error_code error;
+    const std::filesystem::file_status status = std::filesystem::status(path, error);
+    require(status.type() != std::filesystem::file_type::not_found, "no such file");
+    require(status.type() != std::filesystem::file_type::none, error.message());
+    require(std::filesystem::is_regular_file(status), "not a regular file");
+    require(::access(path.c_str(), R_OK) == 0, std::generic_category().message(errno));
+}
+
+}  // namespace bilayer
