@@ -29,7 +29,7 @@ constexpr float fall = 0.1f;      // to the top of the ground [m]
 constexpr float height = 0.03f;   // of the waves in the ground [m]
 constexpr float cell = 0.25f;     // of meshes and height fields [m]
 constexpr int cells = 20;         // along each of their sides
-constexpr double maxGain = 0.01;  // of the energy that a drop sets free
+constexpr double maxGain = 0.01;  // of the energy of the fall, m g h
 
 float wave(float x, float y) {
     return height * std::sin(2.1f * x + 1) * std::cos(1.3f * y);
@@ -97,7 +97,7 @@ double energyOf(const btRigidBody& body) {
 }
 
 struct Drop {
-    double gain = 0;  // over the least energy before, in parts of what the drop sets free
+    double gain = 0;  // over the least energy before, in parts of that of the fall to the ground
     int aside = 0;    // contacts that look sideways or down
     bool sleeps = false;
 };
@@ -116,8 +116,7 @@ Drop drop(const std::shared_ptr<const Collider>& collider, btCollisionShape& gro
     btTransform at = mesh * inMesh.inverse();
     at.getOrigin().setZ(at.getOrigin().z() + height + fall - lowest(collider->mesh(), mesh));
     btRigidBody& body = *world.add(shape, 1, at.getOrigin(), at.getRotation());
-    const double first = energyOf(body);
-    double least = first, gain = 0;
+    double least = energyOf(body), gain = 0;
     Drop result;
     for (int step = 0; step < int(240 * seconds); ++step) {
         world.dynamics.stepSimulation(1.f / 240, 1, 1.f / 240);
@@ -131,7 +130,7 @@ Drop drop(const std::shared_ptr<const Collider>& collider, btCollisionShape& gro
                 result.aside += side * manifold.getContactPoint(k).m_normalWorldOnB.z() < 0.5f;
         }
     }
-    result.gain = gain / (first - least);
+    result.gain = gain / (9.81 * double(fall));  // of 1 kg
     result.sleeps = !body.isActive();
     return result;
 }
