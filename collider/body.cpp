@@ -318,9 +318,10 @@ const char* nameOf(Measure measure) {
     throw std::invalid_argument("no such measure");
 }
 
-LevelSet withBody(const LevelSet& levelSet, const Body& body) {
+LevelSet withBody(const LevelSet& given, const Body& body) {
     if (body.points.points().empty()) throw std::invalid_argument("a body has surface points");
     openvdb::initialize();
+    const LevelSet& levelSet = body.filled ? *body.filled : given;
     const auto distance = openvdb::ConstPtrCast<openvdb::FloatGrid>(levelSet.grids().distance)->copy();
     for (const char* stale : {entry::volume, entry::centre, entry::inertia, entry::products, entry::principal,
                               entry::axes, entry::mesh, entry::measure})

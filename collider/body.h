@@ -29,14 +29,17 @@ struct Body {
     /// late.
     std::shared_ptr<const Mesh> mesh;
     Measure measure = Measure::samples;  ///< as in ColliderOptions; samples where there is no mesh
+    /// The level set to collide by instead of the mesh's own, whose holes have been filled; nothing: its own.
+    std::optional<LevelSet> filled;
 };
 
 /// As in files and on the command line: samples, edges or triangles.
 const char* nameOf(Measure measure);
 
 /// The level set, to write as a .vdb file, with the body beside it: surface points as a grid of OpenVDB points, the
-/// rest as metadata. Nothing is lost: bodyOf() gives the same bits. The grids of `levelSet` are shared, not copied.
-/// Throws std::invalid_argument if the body has no points, or a mesh that is not valid or of more than 2 GiB.
+/// rest as metadata. Nothing is lost: bodyOf() gives the same bits, but that a body with Body::filled is put beside
+/// that level set instead of the given one. The grids are shared, not copied. Throws std::invalid_argument if the body
+/// has no points, or a mesh that is not valid or of more than 2 GiB.
 LevelSet withBody(const LevelSet& levelSet, const Body& body);
 
 /// Whether some body was put beside a level set.

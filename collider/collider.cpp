@@ -19,6 +19,8 @@
 #include "collider/edge_search.h"
 #include "collider/interpolant.h"
 #include "collider/touch.h"
+#include "sdf/build.h"
+#include "sdf/fill_holes.h"
 #include "sdf/sign.h"
 #include "sdf/surface.h"
 
@@ -39,6 +41,8 @@ constexpr float farthestOn = 50;
 constexpr float shortest = 1e-3f;
 // Wider margins are a mistake of units [voxels].
 constexpr float mostMargin = 1000;
+// Holes no wider than this are cracks, whose rims lie on each other [voxels].
+constexpr float crackWidth = 0.01f;
 // A tip that has sunk into another one sees its sides; what it opposes is seen so far back along its normal [voxels].
 constexpr float lift = 1;
 
@@ -358,18 +362,45 @@ std::optional<MassProperties> massOf(const Mesh& mesh, const LevelSet& levelSet)
     }
 }
 
+struct Filled {
+    Mesh mesh;
+    std::optional<LevelSet> levelSet;  // where holes were filled
+};
+
+// What winding numbers take for the surface becomes one, with distances and normals of its own.
+Filled filledMesh(Mesh outward, const LevelSet& levelSet) {
+    if (levelSet.sign() != "winding" || levelSet.meshHash() == 0) return {std::move(outward), std::nullopt};
+    FilledMesh filled = fillHoles(std::move(outward), double(crackWidth * levelSet.voxelSize()));
+    if (!filled.changed) return {std::move(filled.mesh), std::nullopt};
+    LevelSet closed = build(filled.mesh, {.voxelSize = levelSet.voxelSize(),
+                                          .exteriorWidth = levelSet.exteriorWidth(),
+                                          .interiorWidth = levelSet.interiorWidth(),
+                                          .bandUnit = BandUnit::world});
+    filled.mesh = outwardMesh(closed, std::move(filled.mesh));
+    return {std::move(filled.mesh), std::move(closed)};
+}
+
 Body makeBody(Mesh given, const LevelSet& levelSet, const ColliderOptions& options) {
     if (!std::isfinite(options.margin)) throw std::invalid_argument("collider: the margin is not finite");
     if (options.margin > mostMargin * levelSet.voxelSize())
         throw std::invalid_argument(
             fmt::format("collider: a margin of {:g} m is wider than {} voxels", options.margin, mostMargin));
-    const auto mesh = std::make_shared<const Mesh>(outwardMesh(levelSet, std::move(given)));
+    Mesh outward = outwardMesh(levelSet, std::move(given));
+    auto mass = massOf(outward, levelSet);
+    Filled filled = filledMesh(std::move(outward), levelSet);
+    const auto mesh = std::make_shared<const Mesh>(std::move(filled.mesh));
     return {.points = SurfacePoints(*mesh, options.pointSpacing * levelSet.voxelSize()),
             .bounds = bounds(*mesh),
             .margin = options.margin < 0 ? levelSet.voxelSize() : options.margin,
-            .mass = massOf(*mesh, levelSet),
+            .mass = std::move(mass),
             .mesh = mesh,
-            .measure = options.measure};
+            .measure = options.measure,
+            .filled = std::move(filled.levelSet)};
+}
+
+Field fieldOf(const LevelSet& levelSet, const Body& body) {
+    Field samples(levelSet);
+    return body.mesh && body.measure != Measure::samples ? Field(samples, body.mesh) : samples;
 }
 
 }  // namespace
@@ -410,10 +441,10 @@ class Collider::OnDemand {
 Collider::Collider(Mesh mesh, const LevelSet& levelSet, const ColliderOptions& options)
     : Collider(levelSet, makeBody(std::move(mesh), levelSet, options)) {}
 
-Collider::Collider(const LevelSet& levelSet, Body body)
+Collider::Collider(const LevelSet& given, Body body)
     : body_(std::move(body)),
-      field_(body_.mesh && body_.measure != Measure::samples ? Field(Field(levelSet), body_.mesh) : Field(levelSet)),
-      onDemand_(body_.mesh ? std::make_shared<OnDemand>() : std::make_shared<OnDemand>(levelSet)),
+      field_(fieldOf(body_.filled ? *body_.filled : given, body_)),
+      onDemand_(body_.mesh ? std::make_shared<OnDemand>() : std::make_shared<OnDemand>(given)),
       strays_(field_.mesh() && body_.measure == Measure::edges ? Strays(field_) : Strays()),
       edges_(body_.points, field_),
       id_(nextId()) {}

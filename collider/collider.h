@@ -36,8 +36,10 @@ struct ColliderOptions {
 class Collider {
   public:
     /// Of a mesh and the level set that was built of it. Triangles that face the wrong way are turned around, as
-    /// build() does. Throws std::invalid_argument as validate() does, for options of no sense, and if the level set is
-    /// of another mesh.
+    /// build() does. Where the signs are of winding numbers, the holes that these close are filled with triangles and
+    /// cracks of up to a hundredth of a voxel are closed (see fillHoles()): a level set is then built of the closed
+    /// mesh, with the same voxels and widths, and the body has its distances and normals there too. Throws
+    /// std::invalid_argument as validate() does, for options of no sense, and if the level set is of another mesh.
     Collider(Mesh mesh, const LevelSet& levelSet, const ColliderOptions& options = {});
 
     /// Of a level set with a body beside it, as readVdb() gives back what withBody() was written of. It is as the one
@@ -45,8 +47,8 @@ class Collider {
     /// triangles are asked for. Throws std::invalid_argument as bodyOf() does.
     explicit Collider(const LevelSet& levelSet) : Collider(levelSet, bodyOf(levelSet)) {}
 
-    /// The mesh, all of it facing outward. Where the body has none, one like it is extracted from the field when first
-    /// asked for, once.
+    /// The mesh, all of it facing outward, the triangles over its holes last. Where the body has none, one like it is
+    /// extracted from the field when first asked for, once.
     const Mesh& mesh() const;
     const Field& field() const { return field_; }
     /// The field with the mesh, if the body has one: field() itself where contacts ask triangles, else made when first
