@@ -30,6 +30,7 @@
 #include "sdf/pseudonormal.h"
 #include "sdf/sign.h"
 #include "sdf/triangle_bins.h"
+#include "sdf/unite.h"
 #include "sdf/winding.h"
 
 namespace bilayer {
@@ -66,6 +67,10 @@ void checkWidth(const char* option, float voxels, float voxelSize) {
     require(std::isnormal(width), option, "a width that floats can hold", width);
 }
 
+bool hasOwnSigns(Method method) {
+    return method == Method::doubleLayer || method == Method::prism;
+}
+
 void check(const BuildOptions& options) {
     // false for NaN, and in floats: 1e-4f is no less than itself
     const auto within = [](auto value, decltype(value) low, decltype(value) high) {
@@ -84,6 +89,9 @@ void check(const BuildOptions& options) {
     require(within(layers.neighbourhood, 1, 64), "neighbourhood", "in 1..64", layers.neighbourhood);
     require(within(layers.maxSubdivision, 1, 1024), "maxSubdivision", "in 1..1024", layers.maxSubdivision);
     require(within(options.threads, 0, 4096), "threads", "in 0..4096", options.threads);
+    if (options.unite && (hasOwnSigns(options.method) || options.sign == Sign::flood))
+        throw std::invalid_argument(
+            "unite needs the method exact or pseudonormal and a sign by normals or winding numbers");
 }
 
 // The same options with the widths in voxels.
@@ -225,10 +233,6 @@ float errorBound(const BuildOptions& options) {
     return std::max(2 * layers.delta, coveringRadius * std::sqrt(layers.epsilon));
 }
 
-bool hasOwnSigns(Method method) {
-    return method == Method::doubleLayer || method == Method::prism;
-}
-
 const char* name(Method method) {
     switch (method) {
         case Method::exact:
@@ -341,7 +345,8 @@ class Build {
 
     // Whether blocks of the old field are what a full build would make of triangles that have not moved.
     bool canCopy(const LevelSet& old) {
-        if (options_.method != Method::exact || plain(Sign::normals) == Assembler::Plain::keep) return false;
+        if (options_.method != Method::exact || options_.unite) return false;
+        if (plain(Sign::normals) == Assembler::Plain::keep) return false;
         if (options_.sign == Sign::automatic && !balanced(mesh_, &progress_)) return false;
         if (options_.sign != Sign::automatic && options_.sign != Sign::normals) return false;
         const openvdb::FloatGrid& grid = *old.grids().distance;
@@ -375,7 +380,7 @@ class Build {
         const TouchedCells touched(oldMesh, mesh_, moved, voxelsPerUnit, reach, side);
         times_.tiles += part.lap();
         const std::string reason = options_.sign == Sign::automatic ? closedAndOriented : asAskedFor;
-        fill(mesh_, Sign::normals, reason, [&](MeshJob& job, Assembler& assembler) {
+        fillFrom(mesh_, mesh_, Sign::normals, reason, [&](MeshJob& job, Assembler& assembler) {
             job.wanted = [&](const glm::ivec3& first, int cube) { return touched.any(first, cube); };
             assembler.copy(old.grids(), [&](const openvdb::Coord& block) {
                 return !touched.any({block.x(), block.y(), block.z()}, blockSide);
@@ -442,9 +447,27 @@ class Build {
         return sign == Sign::normals && wide ? Assembler::Plain::drop : Assembler::Plain::keep;
     }
 
-    // `adapt` may change the job, and add leaves that are known already.
-    void fill(const Mesh& mesh, Sign sign, const std::string& reason,
-              const std::function<void(MeshJob&, Assembler&)>& adapt = {}) {
+    void fill(const Mesh& mesh, Sign sign, const std::string& reason) {
+        if (!options_.unite || sign == Sign::flood || !fillUnion(mesh)) fillFrom(mesh, mesh, sign, reason);
+    }
+
+    // False if no wall is inside of the union, so that nothing was filled. What is filled is the union of what orient()
+    // makes of the mesh, as outwardMesh() says.
+    bool fillUnion(const Mesh& mesh) {
+        Stopwatch part;
+        United united = unite(mesh, &progress_);
+        if (!united.changed()) return false;
+        const Orientation solids = orient(mesh, &progress_);
+        if (solids.turnedTriangles > 0) united = unite(solids.mesh, &progress_);
+        times_.tiles += part.lap();
+        fillFrom(united.mesh, solids.mesh, Sign::winding, unionReason(united));
+        return true;
+    }
+
+    // Distances are to `mesh`, winding numbers are those of `solids`. `adapt` may change the job, and add leaves that
+    // are known already.
+    void fillFrom(const Mesh& mesh, const Mesh& solids, Sign sign, const std::string& reason,
+                  const std::function<void(MeshJob&, Assembler&)>& adapt = {}) {
         Stopwatch part;
         const bool byNormals = sign == Sign::normals;
         const float reach = reachOf(options_, sign);
@@ -468,7 +491,7 @@ class Build {
         times_.fill += part.lap();
         finish(assembler);
         progress_.poll();
-        if (sign == Sign::winding) signByWinding(*distance_, mesh, widths, balanced(mesh, &progress_), &progress_);
+        if (sign == Sign::winding) signByWinding(*distance_, solids, widths, balanced(solids, &progress_), &progress_);
         if (sign == Sign::flood) signByFlood(*distance_, mesh, options_.gap, widths, &progress_);
         if (byNormals) conflicts += assembler.conflicts(*distance_);
         signs_ = {name(sign), reason, conflicts, undecided};

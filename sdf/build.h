@@ -67,6 +67,10 @@ struct BuildOptions {
     Method method = Method::exact;
     Sign sign = Sign::automatic;
     float gap = 2;  ///< Sign::flood closes gaps up to this wide [voxels], in [0, 100]
+    /// true: solids that overlap are one: walls inside of their union are no surface, distances inside are to its outer
+    /// surface (unite.h), and winding numbers tell the signs. Triangles are numbered as outwardMesh() (sign.h) has them
+    /// then. For Method::exact and pseudonormal; a mesh that needs Sign::flood keeps all walls.
+    bool unite = false;
     DoubleLayerOptions doubleLayer{};
     bool triangles = false;  ///< also keep the nearest triangle of each active voxel
     int threads = 0;         ///< most threads to use; 0: all
@@ -106,8 +110,8 @@ LevelSet build(const Mesh& mesh, const BuildOptions& options, const BlockFiller&
 /// build(newMesh, options).
 ///
 /// That needs Method::exact, Sign::normals (or automatic, where it comes to normals), widths of more than a voxel, and
-/// a field as it was built (not swept or rounded since) in which nothing contradicted itself. For all else, and where
-/// most triangles have moved, it builds in full.
+/// a field as it was built (not swept or rounded since) in which nothing contradicted itself. For all else, for unions
+/// (BuildOptions::unite), and where most triangles have moved, it builds in full.
 /// @param old      the field of `oldMesh`, built with the same options
 /// @param newMesh  as many triangles as `oldMesh`
 /// @param moved    indices of all triangles with a corner that moved, in any order; more do no harm

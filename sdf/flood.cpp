@@ -12,7 +12,7 @@
 
 #include "sdf/cells.h"
 #include "sdf/progress.h"
-#include "sdf/winding.h"
+#include "sdf/winding_number.h"
 
 namespace bilayer {
 namespace {

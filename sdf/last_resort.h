@@ -6,7 +6,7 @@
 #include <optional>
 
 #include "sdf/blocks.h"
-#include "sdf/winding.h"
+#include "sdf/winding_number.h"
 
 namespace bilayer {
 

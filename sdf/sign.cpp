@@ -12,6 +12,7 @@
 #include "sdf/orient.h"
 #include "sdf/sides.h"
 #include "sdf/topology.h"
+#include "sdf/unite.h"
 
 namespace bilayer {
 namespace {
@@ -20,6 +21,8 @@ namespace {
 /// that stay open or broken after orienting, 24 have less than a tenth of it; the others (soups, sheets, furniture of
 /// single walls) have a fifth or more.
 constexpr double mostNothing = 0.15;
+
+constexpr const char* unionOfSolids = "union of overlapping solids";
 
 std::string holes(const Mesh& mesh, Progress* progress) {
     std::size_t boundary = 0, odd = 0, misoriented = 0;
@@ -70,6 +73,11 @@ SignChoice chooseFor(Orientation orientation, std::string trouble, Progress* pro
 
 }  // namespace
 
+std::string unionReason(const United& united) {
+    return fmt::format("{}: {} triangles are buried, {} in part", unionOfSolids, united.buriedTriangles,
+                       united.cutTriangles);
+}
+
 bool balanced(const Mesh& mesh, Progress* progress) {
     const std::vector<std::uint64_t> vertices = hashVertices(mesh, progress);
     // sums modulo 2^64 do not depend on their order
@@ -94,6 +102,12 @@ SignChoice chooseSign(const Mesh& mesh, Progress* progress) {
     return chooseFor(orient(mesh, progress), holes(mesh, progress), progress);
 }
 
+SignChoice chooseSignOfSolid(const Mesh& mesh, Progress* progress) {
+    const SignChoice choice = chooseSign(mesh, progress);
+    if (choice.sign != Sign::normals || choice.mended || bounding(mesh, progress).nothing <= mostNothing) return choice;
+    return chooseFor(orient(mesh, progress), "closed and oriented, but of sheets", progress);
+}
+
 SignChoice chooseSignAfterConflict(const Mesh& mesh, Progress* progress) {
     return chooseFor(orient(mesh, progress), "closed and oriented, but the surface intersects itself", progress);
 }
@@ -105,7 +119,8 @@ Mesh outwardMesh(const LevelSet& levelSet, Mesh mesh) {
     const std::string& reason = levelSet.signReason();
     const bool asItStands = reason == closedAndOriented || reason == asAskedFor;
     if (levelSet.sign() == "normals" && asItStands) return mesh;
-    return orient(mesh).mesh;
+    Mesh outward = orient(mesh).mesh;
+    return reason.starts_with(unionOfSolids) ? unite(outward).mesh : outward;
 }
 
 }  // namespace bilayer

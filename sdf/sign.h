@@ -10,6 +10,7 @@
 namespace bilayer {
 
 class Progress;
+struct United;
 
 /// Whether every edge is run equally often both ways, where vertices count as one if their coordinates are equal. Never
 /// false for a mesh that is; true for one that is not with a probability of about 2^-63. O(n), on all threads, and
@@ -29,17 +30,25 @@ inline constexpr const char* closedAndOriented = "closed and oriented";
 /// The reason of a way that the user chose.
 inline constexpr const char* asAskedFor = "as asked for";
 
+/// The reason of signs of a union, by which outwardMesh() knows that walls were taken away.
+std::string unionReason(const United& united);
+
 /// What Sign::automatic picks. `normals` as they stand for a balanced mesh, which is all that it asks first and takes
 /// milliseconds; else the mesh is oriented: `normals` if that closes it, `winding` if winding numbers tell the two
 /// sides of most of the surface apart, `flood` where they do not. Throws as validate() does.
 SignChoice chooseSign(const Mesh& mesh, Progress* progress = nullptr);
 
+/// The same where a solid is needed: `flood` also for a balanced mesh of which much bounds nothing by winding numbers,
+/// such as double sheets. Never depends on where voxels lie. Throws as validate() does.
+SignChoice chooseSignOfSolid(const Mesh& mesh, Progress* progress = nullptr);
+
 /// What to do where the normals of a balanced mesh contradict each other: it is inside out (then it is mended), or
 /// intersects itself. Returns `normals` only together with a mended mesh. Throws as validate() does.
 SignChoice chooseSignAfterConflict(const Mesh& mesh, Progress* progress = nullptr);
 
-/// The mesh of a level set as build() understood it: all of it facing outward. One that needed no mending keeps its
-/// bytes, and one whose normals were taken as they stand keeps them. Throws std::invalid_argument as validate() does,
+/// The mesh of a level set as build() understood it: all of it facing outward, without the walls inside of a union that
+/// BuildOptions::unite has taken away. One that needed no mending keeps its bytes, and one whose normals were taken as
+/// they stand keeps them. Throws std::invalid_argument as validate() does,
 /// and if the level set is of another mesh.
 Mesh outwardMesh(const LevelSet& levelSet, Mesh mesh);
 

@@ -362,42 +362,7 @@ bool WindingNumber::meets(const glm::dvec3& from, const glm::dvec3& to) const {
     return false;
 }
 
-namespace {
-
-// How fast the winding number can change. Away from the surface its gradient is the field that a current along the
-// boundary of the mesh would have (Biot and Savart): edges that their triangles run both ways equally often count not.
-class Slope {
-  public:
-    Slope(const Mesh& mesh, Progress* progress);
-
-    // No less than the gradient's length anywhere in a ball, links of which do not cross the surface [1/m].
-    double operator()(const glm::dvec3& centre, double radius) const {
-        return nodes_.empty() ? 0 : bound(0, centre, radius) / (4 * glm::pi<double>());
-    }
-
-  private:
-    struct Edge {
-        glm::dvec3 from, to;
-        double times;  // how often the edge is run more one way than the other
-        glm::vec3 at;  // the middle
-        std::uint32_t index;
-    };
-    struct Node {
-        glm::dvec3 centre;
-        double radius, length;
-        std::size_t begin, end, right;
-    };
-    static constexpr std::size_t leafEdges = 4;
-
-    void build(std::size_t at, std::size_t begin, std::size_t end, Progress* progress);
-    double bound(std::size_t at, const glm::dvec3& centre, double radius) const;
-    static double ofEdge(const Edge& edge, const glm::dvec3& centre, double radius);
-
-    std::vector<Edge> edges_;
-    std::vector<Node> nodes_;
-};
-
-Slope::Slope(const Mesh& mesh, Progress* progress) {
+WindingSlope::WindingSlope(const Mesh& mesh, Progress* progress) {
     Topology(mesh, progress).forEachEdge([&](std::span<const EdgeUse> uses) {
         int times = 0;
         for (const EdgeUse& use : uses) times += use.direction();
@@ -410,7 +375,11 @@ Slope::Slope(const Mesh& mesh, Progress* progress) {
     build(0, 0, edges_.size(), progress);
 }
 
-void Slope::build(std::size_t at, std::size_t begin, std::size_t end, Progress* progress) {
+double WindingSlope::operator()(const glm::dvec3& centre, double radius) const {
+    return nodes_.empty() ? 0 : bound(0, centre, radius) / (4 * glm::pi<double>());
+}
+
+void WindingSlope::build(std::size_t at, std::size_t begin, std::size_t end, Progress* progress) {
     Node& node = nodes_[at];
     node = {glm::dvec3(edges_[begin].at), 0, 0, begin, end, 0};
     for (std::size_t i = begin; i < end; ++i) {
@@ -426,7 +395,7 @@ void Slope::build(std::size_t at, std::size_t begin, std::size_t end, Progress* 
         [&] { build(node.right, middle, end, progress); });
 }
 
-double Slope::bound(std::size_t at, const glm::dvec3& centre, double radius) const {
+double WindingSlope::bound(std::size_t at, const glm::dvec3& centre, double radius) const {
     const Node& node = nodes_[at];
     const double gap = glm::length(node.centre - centre) - node.radius - radius;
     if (gap > 2 * node.radius) return node.length / (gap * gap);
@@ -436,7 +405,7 @@ double Slope::bound(std::size_t at, const glm::dvec3& centre, double radius) con
     return sum;
 }
 
-double Slope::ofEdge(const Edge& edge, const glm::dvec3& centre, double radius) {
+double WindingSlope::ofEdge(const Edge& edge, const glm::dvec3& centre, double radius) {
     const glm::dvec3 way = edge.to - edge.from;
     const double squared = glm::dot(way, way);
     const double along = squared > 0 ? std::clamp(glm::dot(centre - edge.from, way) / squared, 0.0, 1.0) : 0.0;
@@ -446,10 +415,12 @@ double Slope::ofEdge(const Edge& edge, const glm::dvec3& centre, double radius) 
     return edge.times * std::min(std::sqrt(squared) / (gap * gap), 2 / gap);
 }
 
+namespace {
+
 // Everything that the signs of one brick need.
 struct Question {
     const WindingNumber& winding;
-    const Slope* slope;  // null: the number changes only across the surface
+    const WindingSlope* slope;  // null: the number changes only across the surface
     double voxelSize;
     Progress* progress;
 
@@ -755,7 +726,7 @@ openvdb::CoordBBox spaceOf(const std::vector<BandLeaf*>& leaves, const Question&
 void signByWinding(openvdb::FloatGrid& grid, const Mesh& mesh, const BandWidths& widths, bool closed,
                    Progress* progress) {
     const WindingNumber winding(mesh, progress);
-    std::optional<Slope> slope;
+    std::optional<WindingSlope> slope;
     if (!closed) slope.emplace(mesh, progress);
     const Question question{winding, slope ? &*slope : nullptr, double(widths.voxelSize), progress};
     const std::vector<BandLeaf*> leaves = leavesOf(grid);

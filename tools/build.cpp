@@ -79,6 +79,8 @@ void requireUsage(const Arguments& a) {
         throw CLI::ValidationError("--sign", "is not for --method prism: the triangles tell the signs");
     if (a.gapGiven->count() && (layers || prism || (a.sign != "auto" && a.sign != "flood")))
         throw CLI::ValidationError("--gap", "needs --sign flood or auto, and --method exact or pseudonormal");
+    if (a.options.unite && (layers || prism || a.sign == "flood"))
+        throw CLI::ValidationError("--union", "needs --method exact or pseudonormal, and no --sign flood");
     if (a.bandUnit == "world" && !a.halfGiven->count() && !a.exteriorGiven->count())
         throw CLI::ValidationError("--band-unit", "world needs --half-width, or --exterior-width and --interior-width");
     for (const CLI::Option* option : a.bodyOptions)
@@ -249,6 +251,7 @@ void addMethod(CLI::App& command, Arguments& a) {
                     "exact (default), double-layer, pseudonormal or prism (with --backend opencl)")
         ->check(CLI::IsMember(methods));
     command.add_option("--sign", a.sign, "auto (default), normals, winding or flood")->check(CLI::IsMember(signs));
+    command.add_flag("--union", a.options.unite, "solids that overlap are one: walls inside of their union go");
     a.gapGiven = command.add_option("--gap", a.options.gap, "gaps that --sign flood closes [voxels], default 2")
                      ->check(within(0, 100));
 }

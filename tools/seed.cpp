@@ -29,6 +29,7 @@ struct Arguments {
     float voxelSize = 0, resolution = 0, halfWidth = 3;
     std::vector<float> translate{0, 0, 0}, rotate{0, 0, 1, 0}, scale{1};
     std::string mode = "unite";
+    bool uniteSolids = true;
     fluid::ParticleOptions particles;
     bool json = false;
     CLI::Option* particlesGiven = nullptr;
@@ -114,7 +115,17 @@ double volumeOf(const openvdb::FloatGrid& liquid) {
     return openvdb::tools::levelSetVolume(*near);
 }
 
-void report(const Arguments& a, const openvdb::FloatGrid& liquid, std::uint64_t particles, double seconds) {
+// Of one seed after another.
+void add(fluid::SeedReport& all, const fluid::SeedReport& next) {
+    if (next.largestChange > all.largestChange) {
+        all.largestChange = next.largestChange;
+        all.where = next.where;
+    }
+    all.changedVoxels += next.changedVoxels;
+}
+
+void report(const Arguments& a, const openvdb::FloatGrid& liquid, const fluid::SeedReport& changes,
+            std::uint64_t particles, double seconds) {
     const double volume = volumeOf(liquid);
     const float voxelSize = float(liquid.voxelSize()[0]);
     if (a.json)
@@ -124,22 +135,31 @@ void report(const Arguments& a, const openvdb::FloatGrid& liquid, std::uint64_t 
                       {"activeVoxels", liquid.activeVoxelCount()},
                       {"leaves", liquid.tree().leafCount()},
                       {"volume", volume},
+                      {"changes",
+                       {{"voxels", changes.changedVoxels},
+                        {"largest", number(changes.largestChange)},
+                        {"where", {number(changes.where.x), number(changes.where.y), number(changes.where.z)}}}},
                       {"particles", particles},
                       {"seconds", seconds}});
     Table table(a.output.string());
     table.row("voxel size", metres(voxelSize));
     table.row("active voxels", grouped(liquid.activeVoxelCount()));
     table.row("volume", fmt::format("{:.6g} m^3", volume));
+    if (changes.changedVoxels)
+        table.row("changed", fmt::format("{} voxels by more than 0.1 voxel, at most {:.2f} at {:g} {:g} {:g}",
+                                         grouped(changes.changedVoxels), changes.largestChange, changes.where.x,
+                                         changes.where.y, changes.where.z));
     if (a.particlesGiven->count()) table.row("particles", grouped(particles));
     table.row("time", fmt::format("{:.3f} s", seconds));
     table.print();
 }
 
 // Errors name the file.
-void seedInput(openvdb::FloatGrid& liquid, const Arguments& a, std::size_t index, const Input& input,
-               const fluid::Placement& placement) {
+fluid::SeedReport seedInput(openvdb::FloatGrid& liquid, const Arguments& a, std::size_t index, const Input& input,
+                            const fluid::Placement& placement) {
     try {
-        std::visit([&](const auto& body) { fluid::seed(liquid, body, placement, makeMode(a.mode)); }, input);
+        const fluid::SeedOptions options(makeMode(a.mode), a.uniteSolids);
+        return std::visit([&](const auto& body) { return fluid::seed(liquid, body, placement, options); }, input);
     } catch (const std::bad_alloc&) {
         throw;
     } catch (const std::exception& error) {
@@ -158,7 +178,8 @@ void run(const Arguments& a) {
 
     const openvdb::FloatGrid::Ptr liquid = startingLiquid(a, inputs.front(), placement.scale);
     liquid->setName("liquid");
-    for (std::size_t i = 0; i < inputs.size(); ++i) seedInput(*liquid, a, i, inputs[i], placement);
+    fluid::SeedReport changes;
+    for (std::size_t i = 0; i < inputs.size(); ++i) add(changes, seedInput(*liquid, a, i, inputs[i], placement));
     openvdb::GridCPtrVec grids{liquid};
     std::uint64_t count = 0;
     if (a.particlesGiven->count()) {
@@ -167,7 +188,7 @@ void run(const Arguments& a) {
         grids.push_back(fluid::particleGrid(particles, liquid->transform()));
     }
     writeGrids(a.output, grids);
-    report(a, *liquid, count, watch.seconds());
+    report(a, *liquid, changes, count, watch.seconds());
 }
 
 }  // namespace
@@ -198,6 +219,8 @@ void addSeed(CLI::App& app) {
         ->check(positive());
     command->add_option("--mode", a->mode, "unite (default), intersect or subtract")
         ->check(CLI::IsMember({"unite", "intersect", "subtract"}));
+    command->add_flag("--union,!--no-union", a->uniteSolids,
+                      "solids of a mesh that overlap are one (default): walls inside of their union go");
     a->particlesGiven = command->add_option("--particles", a->particles.perVoxel, "particles in a voxel: a points grid")
                             ->check(CLI::Range(1, 1000));
     command->add_option("--seed", a->particles.seed, "other particles for another number")->needs(a->particlesGiven);

@@ -1,7 +1,8 @@
 // OpenVDB calls a grid a level set only if |gradient|^2, by WENO differences and Godunov's upwinding, lies in
-// [0.5, 1.5] at all voxels next to the surface. Creases, walls below a voxel and noise break that. Where much is
-// broken, the equation |gradient| = 1 is iterated everywhere; what remains is mended voxel by voxel, by descent on the
-// sum of all violations.
+// [0.5, 1.5] at all voxels next to the surface. Creases, walls below a voxel and noise break that. Each broken voxel is
+// a constraint on its own value and those of its neighbours, and these are moved by the least change that would satisfy
+// it if it were linear (S. Kaczmarz, 1937), over and over. Where that fails, the equation |gradient| = 1 is iterated
+// everywhere if much is broken; what remains is mended by descent on the sum of all violations.
 #include "integration/fluid/mend.h"
 
 #include <openvdb/math/Stencils.h>
@@ -12,7 +13,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
+#include <utility>
 #include <vector>
 
 namespace bilayer::fluid {
@@ -27,9 +30,21 @@ constexpr float lowest = 0.501f, highest = 1.499f;
 constexpr std::size_t manyBroken = 20;  // one broken voxel in so many next to the surface is noise, not creases
 // Where single voxels cannot be mended, the surface is smoothed around them, farther each time [voxels].
 constexpr int maxSmoothings = 12, firstRadius = 2;
-constexpr int maxRounds = 60;  // of descent; six or so do for what real meshes give
-constexpr int patience = 3;    // rounds without a gain before the surroundings are smoothed
-constexpr int reach = 3;       // [voxels] of the WENO stencil along the axes
+// Distances nearer to 0 than exact ones are known to [voxels].
+constexpr float rounding = 1e-4f;
+// What a constraint's value is moved to lies this far within the range, so that rounds end.
+constexpr float margin = 0.02f;
+constexpr float mostMoved = 0.25f;   // by one constraint [voxels]: what is linear about it ends there
+constexpr float almostOn = 0.15f;    // a face [voxels]
+constexpr float atSurface = 1e-3f;   // [voxels]
+constexpr float difference = 1e-2f;  // for derivatives [voxels]
+constexpr float leastSlope = 0.05f;  // of a constraint [1/voxel]; a flatter one cannot be satisfied by its voxels
+constexpr int maxProjections = 100;  // rounds over all constraints
+constexpr int idleProjections = 30;  // rounds without a gain before other means are taken
+constexpr int maxRounds = 60;        // of descent; six or so do for what real meshes give
+constexpr int patience = 3;          // rounds without a gain before the surroundings are smoothed
+constexpr float notable = 0.1f;      // a change that is told [voxels]
+constexpr int reach = 3;             // [voxels] of the WENO stencil along the axes
 // Changes that are tried at a voxel [voxels], either way.
 constexpr std::array<float, 6> steps{0.02f, 0.05f, 0.1f, 0.2f, 0.4f, 0.8f};
 constexpr float stepCost = 1e-3f;   // prefers small changes among equally good ones
@@ -49,14 +64,25 @@ float violation(const Stencil& stencil) {
 // Whether the surface passes between a voxel and one beside it: what WenoStencil::zeroCrossing tells, but only one
 // voxel in five has it, and a stencil of nineteen values is not needed for the others.
 bool isCrossed(const FloatGrid::ConstAccessor& values, const Coord& voxel, float value) {
-    const bool inside = value < 0;
     for (int axis = 0; axis < 3; ++axis)
         for (const int side : {-1, 1}) {
             Coord beside = voxel;
             beside[axis] += side;
-            if ((values.getValue(beside) < 0) != inside) return true;
+            const float there = values.getValue(beside);
+            if (value > 0 ? there < 0 : there > 0) return true;
         }
     return false;
+}
+
+// Where a flat face passes through voxels, rounding would tell the sides of its edges: what is on it has a distance of
+// 0.
+void tidy(FloatGrid& grid) {
+    const float onSurface = rounding * float(grid.voxelSize()[0]);
+    openvdb::tree::LeafManager<openvdb::FloatTree> leaves(grid.tree());
+    leaves.foreach ([onSurface](openvdb::FloatTree::LeafNodeType& leaf, std::size_t) {
+        for (auto voxel = leaf.beginValueOn(); voxel; ++voxel)
+            if (std::abs(*voxel) <= onSurface) voxel.setValue(0);
+    });
 }
 
 Survey survey(const FloatGrid& grid) {
@@ -99,7 +125,21 @@ class Mender {
     explicit Mender(FloatGrid& grid)
         : grid_(grid), values_(grid.getAccessor()), stencil_(grid), voxel_(float(grid.voxelSize()[0])) {}
 
-    // One pass over the broken voxels; returns those that are broken now.
+    // One pass over the constraints of broken voxels; returns those that are broken now.
+    std::vector<Coord> project(const std::vector<Coord>& broken) {
+        std::vector<Coord> touched;
+        for (const Coord& voxel : broken) {
+            touched.push_back(voxel);
+            if (violationAt(voxel) == 0) continue;
+            if (!changeSide(voxel)) satisfy(voxel);
+            alongAxes(voxel, 1, [&](const Coord& changed) {
+                alongAxes(changed, reach, [&](const Coord& near) { touched.push_back(near); });
+            });
+        }
+        return stillBroken(touched);
+    }
+
+    // The same by the best change of single values.
     std::vector<Coord> descend(const std::vector<Coord>& broken) {
         std::vector<Coord> touched;
         for (const Coord& voxel : broken) {
@@ -150,6 +190,67 @@ class Mender {
         return sum / 7;
     }
 
+    // A voxel on one side of a face, and beside an edge of it, may see no slope where one on the other side does: one
+    // that is almost on the face can be put there.
+    bool changeSide(const Coord& voxel) {
+        const float old = values_.getValue(voxel), before = violationAround(voxel);
+        if (std::abs(old) > almostOn * voxel_) return false;
+        values_.setValueOnly(voxel, old > 0 ? 0 : std::numeric_limits<float>::min());
+        if (violationAround(voxel) < before - leastGain) return true;
+        values_.setValueOnly(voxel, old);
+        return false;
+    }
+
+    // Moves the values of a voxel and its neighbours by the least change that brings the squared gradient into its
+    // range, were that linear. None changes its side.
+    void satisfy(const Coord& voxel) {
+        const float q = squaredGradient(voxel);
+        const float wanted = q < lowest ? lowest + margin - q : highest - margin - q;
+        std::array<Coord, 7> around;
+        std::array<float, 7> slopes;
+        std::size_t count = 0;
+        float sum = 0;
+        alongAxes(voxel, 1, [&](const Coord& near) {
+            if (!values_.isValueOn(near)) return;
+            const float by = slope(voxel, near);
+            if (!canMove(values_.getValue(near), wanted * by)) return;
+            around[count] = near;
+            slopes[count++] = by;
+            sum += by * by;
+        });
+        if (sum < leastSlope * leastSlope) return;
+        for (std::size_t i = 0; i < count; ++i)
+            move(around[i], std::clamp(wanted * slopes[i] / sum, -mostMoved, mostMoved) * voxel_);
+    }
+
+    // Whether a value may go that way: what is on the surface stays on it, lest its neighbours see it pass.
+    bool canMove(float value, float change) const {
+        return value != 0 && (std::abs(value) > atSurface * voxel_ || (value > 0) == (change > 0));
+    }
+
+    // The derivative of the squared gradient at a voxel by the value of another [1/voxel].
+    float slope(const Coord& voxel, const Coord& by) {
+        const float old = values_.getValue(by), step = difference * voxel_;
+        values_.setValueOnly(by, old + step);
+        const float above = squaredGradient(voxel);
+        values_.setValueOnly(by, old - step);
+        const float below = squaredGradient(voxel);
+        values_.setValueOnly(by, old);
+        return (above - below) / (2 * difference);
+    }
+
+    float squaredGradient(const Coord& voxel) {
+        stencil_.moveTo(voxel);
+        return stencil_.normSqGrad();
+    }
+
+    void move(const Coord& voxel, float change) {
+        constexpr float least = std::numeric_limits<float>::min();
+        const float old = values_.getValue(voxel), most = std::nextafter(grid_.background(), 0.f);
+        values_.setValueOnly(voxel,
+                             old > 0 ? std::clamp(old + change, least, most) : std::clamp(old + change, -most, -least));
+    }
+
     // Makes the change of the voxel or one of its neighbours that lessens the violations most.
     bool improve(const Coord& voxel, Coord& changed) {
         float best = -leastGain, bestValue = 0;
@@ -187,6 +288,19 @@ class Mender {
     float voxel_;
 };
 
+// Repeats rounds until nothing is broken, or for some while nothing has been gained.
+std::vector<Coord> project(FloatGrid& grid) {
+    Mender mender(grid);
+    std::vector<Coord> broken = survey(grid).broken;
+    std::size_t fewest = broken.size();
+    for (int round = 0, idle = 0; round < maxProjections && idle < idleProjections && !broken.empty(); ++round) {
+        broken = mender.project(broken);
+        idle = broken.size() < fewest ? 0 : idle + 1;
+        fewest = std::min(fewest, broken.size());
+    }
+    return broken;
+}
+
 // Mends what single voxels can mend; returns those still broken.
 std::vector<Coord> descend(FloatGrid& grid) {
     Survey found = survey(grid);
@@ -217,16 +331,34 @@ void smoothAround(FloatGrid& grid, const std::vector<Coord>& broken, int radius)
     filter.prune();
 }
 
+// Of voxels that are in both bands.
+Changes changes(const FloatGrid& before, const FloatGrid& after) {
+    Changes found;
+    const float voxel = float(after.voxelSize()[0]);
+    const auto old = before.getConstAccessor();
+    for (auto value = after.cbeginValueOn(); value; ++value) {
+        const Coord at = value.getCoord();
+        if (!old.isValueOn(at)) continue;
+        const float change = std::abs(*value - old.getValue(at)) / voxel;
+        found.voxels += change > notable;
+        if (change > found.largest) found.largest = change, found.where = at;
+    }
+    return found;
+}
+
 }  // namespace
 
-void mend(FloatGrid& grid) {
-    for (int smoothing = 0;; ++smoothing) {
-        const std::vector<Coord> broken = descend(grid);
-        if (broken.empty()) return;
-        if (smoothing == maxSmoothings)
+Changes mend(FloatGrid& grid) {
+    const FloatGrid::ConstPtr before = grid.deepCopy();
+    tidy(grid);
+    std::vector<Coord> broken = project(grid);
+    for (int smoothing = 0; !broken.empty(); ++smoothing) {
+        if (smoothing > 0) smoothAround(grid, broken, firstRadius + smoothing);
+        if (smoothing > maxSmoothings)
             throw std::runtime_error("seed: the surface cannot be made a level set at this voxel size");
-        smoothAround(grid, broken, firstRadius + smoothing);
+        broken = descend(grid);
     }
+    return changes(*before, grid);
 }
 
 }  // namespace bilayer::fluid

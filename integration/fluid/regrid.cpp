@@ -2,21 +2,23 @@
 // distances at all. So the surface is what is carried over, and distances are found anew: as quick, and exact.
 #include "integration/fluid/regrid.h"
 
-#include <openvdb/tools/ChangeBackground.h>
+#include <fmt/format.h>
 #include <openvdb/tools/Prune.h>
 #include <openvdb/tools/SignedFloodFill.h>
 #include <openvdb/tree/LeafManager.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <stdexcept>
+#include <string>
 #include <vector>
 
 #include "sdf/build.h"
 #include "sdf/grids.h"
+#include "sdf/opening.h"
+#include "sdf/sign.h"
 #include "sdf/surface.h"
 
 namespace bilayer::fluid {
@@ -28,14 +30,14 @@ using openvdb::FloatTree;
 using openvdb::math::Transform;
 using Leaf = FloatTree::LeafNodeType;
 
-constexpr const char* byNormals = "normals";  // LevelSet::sign() of a closed mesh
+constexpr const char* byFlood = "flood";  // LevelSet::sign() of a mesh whose winding numbers tell nothing
 
 constexpr float unitTolerance = 1e-3f;  // by which a rotation's length may differ from 1: a float product's drift
 constexpr float minFieldWidth = 1;      // [field voxels] either side: less does not tell where the surface is
 constexpr float rounding = 1e-5f;       // of a width that is a whole number of voxels but for its last bits
 constexpr double maxIndex = 1 << 29;    // keeps OpenVDB's 32-bit coordinates and sums of two of them in range
 constexpr double sameVoxels = 1e-6;     // two voxel sizes are the same but for this part of them
-constexpr float mostBetween = 2;  // [voxels] of distance between neighbours on either side; 1 but for small cracks
+constexpr double widestHole = 2;        // [voxels]; wider ones are not closed
 
 bool isFinite(const glm::vec3& v) {
     return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
@@ -111,23 +113,29 @@ void requireCubes(const Transform& voxels) {
         throw std::invalid_argument("the voxels are mirrored: that would turn the body inside out");
 }
 
-// Whether signs change between neighbours that are both far from the surface, as they do across a wide hole.
-bool leaks(const FloatGrid& grid) {
-    const float farthest = mostBetween * float(grid.voxelSize()[0]);
-    openvdb::tree::LeafManager<const FloatTree> leaves(grid.tree());
-    std::atomic<bool> found = false;
-    leaves.foreach ([&](const Leaf& leaf, std::size_t) {
-        const auto values = grid.getConstAccessor();
-        for (auto voxel = leaf.cbeginValueAll(); voxel && !found; ++voxel)
-            for (int axis = 0; axis < 3; ++axis)
-                for (const int side : {-1, 1}) {
-                    Coord beside = voxel.getCoord();
-                    beside[axis] += side;
-                    const float there = values.getValue(beside);
-                    if ((*voxel < 0) != (there < 0) && std::abs(*voxel - there) > farthest) found = true;
-                }
-    });
-    return found;
+std::string text(const openvdb::Vec3d& v) {
+    return fmt::format("({:g}, {:g}, {:g})", v.x(), v.y(), v.z());
+}
+
+[[noreturn]] void refuseWithoutInside(const std::string& why) {
+    throw std::invalid_argument("the mesh has no inside: " + why);
+}
+
+// Refuses a mesh that bounds nothing, or has a hole that is too wide for the voxels. The mesh alone decides, not where
+// the voxels lie.
+void requireSolid(const Placed& body, const Transform& voxels) {
+    const SignChoice choice = chooseSignOfSolid(body.mesh);
+    if (choice.sign == Sign::flood) refuseWithoutInside(choice.reason);
+    if (choice.sign != Sign::winding) return;
+    const Opening hole = widestOpening(choice.mended ? *choice.mended : body.mesh, widestHole);
+    if (hole.width == 0) return;
+    const double voxel = voxels.voxelSize()[0];
+    const openvdb::Vec3d centre(hole.centre.x, hole.centre.y, hole.centre.z);
+    throw std::invalid_argument(fmt::format(
+        "the mesh is open: its widest hole, around {}, is {:.3g} wide; {:g} voxels of {:g} are closed: close it in the "
+        "mesh, or take voxels of {:.3g} or more",
+        text(voxels.indexToWorld(centre + body.shift.asVec3d())), hole.width * voxel, widestHole, voxel,
+        hole.width * voxel / widestHole));
 }
 
 }  // namespace
@@ -151,19 +159,20 @@ void requireInside(const FloatGrid& grid) {
     throw std::invalid_argument("the body has no inside in these voxels");
 }
 
-FloatGrid::Ptr regrid(const Mesh& mesh, const Placement& placement, const Transform& voxels, float width) {
+FloatGrid::Ptr regrid(const Mesh& mesh, const Placement& placement, const Transform& voxels, float width,
+                      bool uniteSolids) {
     check(placement);
     requireCubes(voxels);
     validate(mesh);
     const double voxel = voxels.voxelSize()[0];
     const float widthInVoxels = float(double(width) / voxel);
     const Placed placed = inVoxels(mesh, placement, voxels);
+    requireSolid(placed, voxels);
     const LevelSet field =
-        build(placed.mesh, {.voxelSize = 1, .exteriorWidth = widthInVoxels, .interiorWidth = widthInVoxels});
-    if (field.sign() != byNormals && leaks(*field.grids().distance))
-        throw std::invalid_argument("the mesh is open: a hole is too wide for these voxels");
+        build(placed.mesh,
+              {.voxelSize = 1, .exteriorWidth = widthInVoxels, .interiorWidth = widthInVoxels, .unite = uniteSolids});
+    if (field.sign() == byFlood) refuseWithoutInside(field.signReason());
     const auto grid = moved(*field.grids().distance, placed.shift, float(voxel), width);
-    if (field.sign() != byNormals) requireInside(*grid);
     grid->setTransform(voxels.copy());
     return grid;
 }
@@ -181,7 +190,7 @@ FloatGrid::Ptr regrid(const LevelSet& field, const Placement& placement, const T
     }
     const Mesh zeroSet = surface(field);
     if (zeroSet.triangles.empty()) throw std::invalid_argument("the field has no surface: it has no inside");
-    return regrid(zeroSet, placement, voxels, width);
+    return regrid(zeroSet, placement, voxels, width, false);
 }
 
 }  // namespace bilayer::fluid

@@ -3,14 +3,10 @@
 // work is done on a copy.
 #include "integration/fluid/seed.h"
 
-#include <openvdb/tools/ChangeBackground.h>
 #include <openvdb/tools/Composite.h>
 #include <openvdb/tools/Diagnostics.h>
-#include <openvdb/tools/Prune.h>
-#include <openvdb/tree/LeafManager.h>
 
 #include <cmath>
-#include <limits>
 #include <stdexcept>
 #include <string>
 
@@ -36,7 +32,7 @@ void requireLiquid(const FloatGrid& liquid) {
     if (!(liquid.background() >= minHalfWidth * liquid.voxelSize()[0] * (1 - rounding)))
         refuse("the liquid's band is narrower than 3 voxels");
     if (!std::isfinite(liquid.background())) refuse("the liquid's background is not finite");
-    // all of OpenVDB's checks but that of the gradient, which is mended, and of the width, which may lack its last bits
+    // all of OpenVDB's checks but that of the gradient, which is mended, and of the width, which may lack its last bit
     openvdb::tools::CheckLevelSet<FloatGrid> check(liquid);
     std::string fault = check.checkTiles();
     if (fault.empty()) fault = check.checkFinite();
@@ -45,33 +41,9 @@ void requireLiquid(const FloatGrid& liquid) {
     if (!fault.empty()) refuse("the liquid's grid is no level set: " + fault.substr(0, fault.find('\n')));
 }
 
-// The half width that the result has: the caller's, or its last bits more where rounding left it below 3 voxels.
-float bandWidth(const FloatGrid& liquid) {
-    float width = liquid.background();
-    while (width / liquid.voxelSize()[0] < minHalfWidth)
-        width = std::nextafter(width, std::numeric_limits<float>::max());
-    return width;
-}
-
-// The liquid with the band's very width: what is off has plus or minus that.
-FloatGrid::Ptr copyOf(const FloatGrid& liquid, float width) {
-    const FloatGrid::Ptr copy = liquid.deepCopy();
-    openvdb::tree::LeafManager<FloatTree> leaves(copy->tree());
-    leaves.foreach ([width](FloatTree::LeafNodeType& leaf, std::size_t) {
-        for (auto voxel = leaf.beginValueOn(); voxel; ++voxel) {
-            if (std::abs(*voxel) < width) continue;
-            voxel.setValue(std::copysign(width, *voxel));
-            voxel.setValueOff();
-        }
-    });
-    openvdb::tools::changeLevelSetBackground(leaves, width);
-    openvdb::tools::pruneLevelSet(copy->tree());
-    return copy;
-}
-
-FloatGrid::Ptr combined(const FloatGrid& liquid, const FloatGrid::Ptr& body, SeedMode mode, float width) {
+FloatGrid::Ptr combined(const FloatGrid& liquid, const FloatGrid::Ptr& body, SeedMode mode) {
     if (liquid.tree().empty() && mode == SeedMode::unite) return body;
-    const FloatGrid::Ptr result = copyOf(liquid, width);
+    const FloatGrid::Ptr result = liquid.deepCopy();
     switch (mode) {
         case SeedMode::unite:
             openvdb::tools::csgUnion(*result, *body);
@@ -96,28 +68,30 @@ openvdb::Coord deepest(const FloatGrid& body) {
     return found;
 }
 
-template <class Body>
-void seedWith(FloatGrid& liquid, const Body& body, const Placement& placement, SeedMode mode) {
-    requireLiquid(liquid);
-    const float width = bandWidth(liquid);
-    const FloatGrid::Ptr band = regrid(body, placement, liquid.transform(), width);
+// Combines the liquid with a body's distances in its own voxels, of its own width.
+SeedReport seedWith(FloatGrid& liquid, const FloatGrid::Ptr& band, SeedMode mode) {
     requireInside(*band);
     const openvdb::Coord core = deepest(*band);
-    const FloatGrid::Ptr result = combined(liquid, band, mode, width);
-    mend(*result);
+    const FloatGrid::Ptr result = combined(liquid, band, mode);
+    const Changes changes = mend(*result);
     if (mode == SeedMode::unite && !(result->tree().getValue(core) < 0))
         refuse("the body is too small for these voxels: nothing of it would be left");
     liquid.setTree(result->treePtr());
+    const openvdb::Vec3d where = liquid.indexToWorld(changes.where);
+    return {changes.largest, {where.x(), where.y(), where.z()}, changes.voxels};
 }
 
 }  // namespace
 
-void seed(FloatGrid& liquid, const Mesh& mesh, const Placement& placement, SeedMode mode) {
-    seedWith(liquid, mesh, placement, mode);
+SeedReport seed(FloatGrid& liquid, const Mesh& mesh, const Placement& placement, const SeedOptions& options) {
+    requireLiquid(liquid);
+    return seedWith(liquid, regrid(mesh, placement, liquid.transform(), liquid.background(), options.uniteSolids),
+                    options.mode);
 }
 
-void seed(FloatGrid& liquid, const LevelSet& field, const Placement& placement, SeedMode mode) {
-    seedWith(liquid, field, placement, mode);
+SeedReport seed(FloatGrid& liquid, const LevelSet& field, const Placement& placement, const SeedOptions& options) {
+    requireLiquid(liquid);
+    return seedWith(liquid, regrid(field, placement, liquid.transform(), liquid.background()), options.mode);
 }
 
 }  // namespace bilayer::fluid

@@ -1,0 +1,387 @@
+// Unions: what unite() leaves is the outer surface, by the truth about boxes and spheres; fields of unions are exact.
+#include "sdf/unite.h"
+
+#include <openvdb/openvdb.h>
+
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/gtc/quaternion.hpp>
+#include <limits>
+#include <random>
+
+#include "demos/shared/shapes.h"
+#include "sdf/build.h"
+#include "sdf/grids.h"
+#include "sdf/inspect.h"
+#include "sdf/mesh_io.h"
+#include "sdf/sign.h"
+#include "tests/support/cells.h"
+#include "tests/support/support.h"
+#include "tests/support/truth.h"
+
+using namespace bilayer;
+
+namespace {
+
+struct Box {
+    glm::vec3 lower, upper;
+
+    Mesh mesh() const {
+        return test::solidOf({{{lower.x, upper.x}, {lower.y, upper.y}, {lower.z, upper.z}}},
+                             [](const glm::ivec3&) { return true; });
+    }
+};
+
+// The surface of the union, by the cells between all planes of all boxes.
+Mesh truthOf(const std::vector<Box>& boxes) {
+    test::Planes planes;
+    for (int axis = 0; axis < 3; ++axis) {
+        std::vector<float>& along = planes[std::size_t(axis)];
+        for (const Box& box : boxes) along.insert(along.end(), {box.lower[axis], box.upper[axis]});
+        std::sort(along.begin(), along.end());
+        along.erase(std::unique(along.begin(), along.end()), along.end());
+    }
+    return test::solidOf(planes, [&](const glm::ivec3& cell) {
+        return std::any_of(boxes.begin(), boxes.end(), [&](const Box& box) {
+            for (int axis = 0; axis < 3; ++axis) {
+                const auto& along = planes[std::size_t(axis)];
+                const auto at = std::size_t(cell[axis]);
+                if (along[at] < box.lower[axis] || along[at + 1] > box.upper[axis]) return false;
+            }
+            return true;
+        });
+    });
+}
+
+// Boxes whose planes often are the same, so that they touch and lie flush.
+std::vector<Box> randomBoxes(std::mt19937& random, int count) {
+    std::uniform_real_distribution<float> anywhere(-1, 1);
+    std::uniform_int_distribution<int> coarse(-4, 4);
+    const bool flush = random() % 2 == 0;
+    std::vector<Box> boxes;
+    for (int i = 0; i < count; ++i) {
+        Box box;
+        for (int axis = 0; axis < 3; ++axis) {
+            float a = 0, b = 0;
+            while (a == b) {
+                a = flush ? 0.25f * float(coarse(random)) : anywhere(random);
+                b = flush ? 0.25f * float(coarse(random)) : anywhere(random);
+            }
+            box.lower[axis] = std::min(a, b);
+            box.upper[axis] = std::max(a, b);
+        }
+        boxes.push_back(box);
+    }
+    return boxes;
+}
+
+Mesh joined(const std::vector<Box>& boxes) {
+    std::vector<Mesh> meshes;
+    for (const Box& box : boxes) meshes.push_back(box.mesh());
+    return shapes::join(meshes);
+}
+
+Mesh turned(Mesh mesh, const glm::dquat& rotation) {
+    for (glm::vec3& p : mesh.points) p = glm::vec3(rotation * glm::dvec3(p));
+    return mesh;
+}
+
+std::vector<glm::dvec3> randomPoints(std::mt19937& random, int count, double reach = 1.3) {
+    std::uniform_real_distribution<double> anywhere(-reach, reach);
+    std::vector<glm::dvec3> points;
+    for (int i = 0; i < count; ++i) points.emplace_back(anywhere(random), anywhere(random), anywhere(random));
+    return points;
+}
+
+// The largest difference of distances to two surfaces.
+double difference(const Mesh& a, const Mesh& b, const std::vector<glm::dvec3>& points) {
+    const test::Truth first(a), second(b);
+    double largest = 0;
+    for (const glm::dvec3& p : points) largest = std::max(largest, std::abs(first.distance(p) - second.distance(p)));
+    return largest;
+}
+
+// A box that is turned: a convex solid of six half-spaces.
+struct TurnedBox {
+    glm::dvec3 centre, half;
+    glm::dquat rotation;
+
+    glm::dvec3 toLocal(const glm::dvec3& p) const { return glm::inverse(rotation) * (p - centre); }
+    glm::dvec3 toWorld(const glm::dvec3& p) const { return rotation * p + centre; }
+    Mesh mesh() const {
+        Mesh box = shapes::box(glm::vec3(half));
+        for (glm::vec3& p : box.points) p = glm::vec3(toWorld(glm::dvec3(p)));
+        return box;
+    }
+    // The part of a segment within the box, as an interval; empty if first > last.
+    std::pair<double, double> within(const glm::dvec3& from, const glm::dvec3& to) const {
+        const glm::dvec3 a = toLocal(from), b = toLocal(to);
+        double first = 0, last = 1;
+        for (int axis = 0; axis < 3; ++axis)
+            for (const double side : {-1.0, 1.0}) {
+                const double atA = side * a[axis] - half[axis], atB = side * b[axis] - half[axis];
+                if (atA > 0 && atB > 0) return {1, 0};
+                if (atA > 0) first = std::max(first, atA / (atA - atB));
+                if (atB > 0) last = std::min(last, atA / (atA - atB));
+            }
+        return {first, last};
+    }
+    std::vector<std::vector<glm::dvec3>> faces() const {
+        std::vector<std::vector<glm::dvec3>> found;
+        for (int axis = 0; axis < 3; ++axis)
+            for (const double side : {-1.0, 1.0}) {
+                std::vector<glm::dvec3> face;
+                for (const auto& [u, v] : {std::pair(-1, -1), std::pair(1, -1), std::pair(1, 1), std::pair(-1, 1)}) {
+                    glm::dvec3 p = half;
+                    p[axis] *= side;
+                    p[(axis + 1) % 3] *= u;
+                    p[(axis + 2) % 3] *= v;
+                    face.push_back(toWorld(p));
+                }
+                found.push_back(face);
+            }
+        return found;
+    }
+    // What a convex polygon has within the box.
+    std::vector<glm::dvec3> clipped(std::vector<glm::dvec3> polygon) const {
+        for (int axis = 0; axis < 3; ++axis)
+            for (const double side : {-1.0, 1.0}) {
+                std::vector<glm::dvec3> next;
+                for (std::size_t i = 0; i < polygon.size(); ++i) {
+                    const glm::dvec3 &p = polygon[i], &q = polygon[(i + 1) % polygon.size()];
+                    const double atP = side * toLocal(p)[axis] - half[axis], atQ = side * toLocal(q)[axis] - half[axis];
+                    if (atP <= 0) next.push_back(p);
+                    if (atP * atQ < 0) next.push_back(p + atP / (atP - atQ) * (q - p));
+                }
+                polygon = next;
+            }
+        return polygon;
+    }
+    bool holds(const glm::dvec3& p) const {
+        const glm::dvec3 q = glm::abs(toLocal(p)) - half;
+        return q.x < 0 && q.y < 0 && q.z < 0;
+    }
+};
+
+double toSegment(const glm::dvec3& p, const glm::dvec3& a, const glm::dvec3& b) {
+    const glm::dvec3 way = b - a;
+    const double t = glm::dot(way, way) > 0 ? std::clamp(glm::dot(p - a, way) / glm::dot(way, way), 0.0, 1.0) : 0.0;
+    return glm::length(p - a - t * way);
+}
+
+// The distance to one box's surface outside of another: to a face where its foot is free, else to the borders of what
+// is free of it.
+double toFree(const glm::dvec3& p, const TurnedBox& box, const TurnedBox& other) {
+    double least = std::numeric_limits<double>::infinity();
+    for (const auto& face : box.faces()) {
+        const glm::dvec3 normal = glm::normalize(glm::cross(face[1] - face[0], face[2] - face[0]));
+        const glm::dvec3 foot = p - glm::dot(normal, p - face[0]) * normal;
+        const glm::dvec3 local = glm::abs(box.toLocal(foot)) - box.half;
+        if (std::max({local.x, local.y, local.z}) < 1e-12 && !other.holds(foot))
+            least = std::min(least, glm::length(p - foot));
+        for (std::size_t i = 0; i < 4; ++i) {
+            const glm::dvec3 &a = face[i], &b = face[(i + 1) % 4];
+            const auto [first, last] = other.within(a, b);
+            if (first > last) {
+                least = std::min(least, toSegment(p, a, b));
+                continue;
+            }
+            if (first > 0) least = std::min(least, toSegment(p, a, a + first * (b - a)));
+            if (last < 1) least = std::min(least, toSegment(p, a + last * (b - a), b));
+        }
+        // the other box's surface on the face; where it is the face's own border, that has been asked
+        const auto hole = other.clipped(face);
+        for (std::size_t i = 0; i < hole.size(); ++i) {
+            const glm::dvec3 &a = hole[i], &b = hole[(i + 1) % hole.size()];
+            const glm::dvec3 middle = glm::abs(other.toLocal(0.5 * (a + b))) - other.half;
+            if (std::abs(std::max({middle.x, middle.y, middle.z})) < 1e-9) least = std::min(least, toSegment(p, a, b));
+        }
+    }
+    return least;
+}
+
+// The signed distance of two balls whose surfaces cross.
+double toBalls(const glm::dvec3& p, const glm::dvec3& c1, double r1, const glm::dvec3& c2, double r2) {
+    const double d1 = glm::length(p - c1) - r1, d2 = glm::length(p - c2) - r2;
+    if (d1 > 0 && d2 > 0) return std::min(d1, d2);
+    const glm::dvec3 axis = glm::normalize(c2 - c1);
+    const double apart = glm::length(c2 - c1), along = 0.5 * (apart + (r1 * r1 - r2 * r2) / apart);
+    const double ring = std::sqrt(r1 * r1 - along * along);
+    const glm::dvec3 q = p - c1 - along * axis, radial = q - glm::dot(q, axis) * axis;
+    double least = std::hypot(glm::dot(q, axis), glm::length(radial) - ring);
+    const auto addCap = [&](const glm::dvec3& c, double r, const glm::dvec3& other, double otherRadius) {
+        const glm::dvec3 foot = c + r * glm::normalize(p - c);
+        if (glm::length(foot - other) > otherRadius) least = std::min(least, glm::length(p - foot));
+    };
+    addCap(c1, r1, c2, r2);
+    addCap(c2, r2, c1, r1);
+    return -least;
+}
+
+}  // namespace
+
+TEST_CASE("a mesh without buried walls keeps its bytes") {
+    std::vector<Mesh> meshes{shapes::sphere(0.5f, 4), shapes::torus(0.5f, 0.2f), shapes::box({0.4f, 0.3f, 0.2f}, 3),
+                             shapes::bowl(0.5f, 0.05f)};
+    meshes.push_back(shapes::join({shapes::sphere(0.5f, 3), shapes::flipped(shapes::sphere(0.3f, 3))}));
+    meshes.push_back(shapes::join({shapes::sphere(0.5f, 3), shapes::moved(shapes::sphere(0.5f, 3), {2, 0, 0})}));
+    for (const char* name : {"bunny_watertight.obj", "spot.obj", "fandisk.obj", "bunny_5k_open.obj"})
+        if (const auto path = test::corpusMesh(name)) meshes.push_back(readMesh(*path));
+    for (const Mesh& mesh : meshes) {
+        CAPTURE(mesh.triangles.size());
+        const United united = unite(mesh);
+        CHECK(united.buriedTriangles == 0);
+        CHECK(united.cutTriangles == 0);
+        CHECK(hash(united.mesh) == hash(mesh));
+    }
+}
+
+TEST_CASE("the union of boxes has their outer surface, also where they touch and lie flush") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    std::mt19937 random(seed);
+    std::normal_distribution<double> normal;
+    int changed = 0;
+    for (int i = 0; i < 200; ++i) {
+        const auto boxes = randomBoxes(random, 2 + i % 5);
+        CAPTURE(i, boxes.size());
+        const glm::dquat rotation =
+            i % 2 ? glm::normalize(glm::dquat(normal(random), normal(random), normal(random), normal(random)))
+                  : glm::dquat(1, 0, 0, 0);
+        const United united = unite(turned(joined(boxes), rotation));
+        changed += united.changed();
+        CHECK(difference(united.mesh, turned(truthOf(boxes), rotation), randomPoints(random, 200)) < 1e-6);
+    }
+    CHECK(changed > 120);
+}
+
+TEST_CASE("the union of two boxes at any angle has their outer surface") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    std::mt19937 random(seed);
+    std::normal_distribution<double> normal;
+    std::uniform_real_distribution<double> size(0.2, 0.7), place(-0.3, 0.3);
+    for (int i = 0; i < 200; ++i) {
+        CAPTURE(i);
+        std::array<TurnedBox, 2> boxes;
+        for (TurnedBox& box : boxes)
+            box = {{place(random), place(random), place(random)},
+                   {size(random), size(random), size(random)},
+                   glm::normalize(glm::dquat(normal(random), normal(random), normal(random), normal(random)))};
+        const test::Truth united(unite(shapes::join({boxes[0].mesh(), boxes[1].mesh()})).mesh);
+        for (const glm::dvec3& p : randomPoints(random, 100))
+            REQUIRE(united.distance(p) ==
+                    Approx(std::min(toFree(p, boxes[0], boxes[1]), toFree(p, boxes[1], boxes[0]))).margin(2e-6));
+    }
+}
+
+TEST_CASE("the union of balls is that of their formula but for what their facets cut off") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<float> anywhere(-0.2f, 0.2f);
+    for (int i = 0; i < 5; ++i) {
+        const float r1 = 0.5f, r2 = 0.4f + anywhere(random);
+        const glm::vec3 c2(0.45f + anywhere(random), anywhere(random), anywhere(random));
+        const United united = unite(shapes::join({shapes::sphere(r1, 5), shapes::moved(shapes::sphere(r2, 5), c2)}));
+        if (std::abs(r1 - r2) > 0.8f * glm::length(c2)) continue;  // the circle where they meet would not be told well
+        CHECK(united.buriedTriangles > 100);
+        CHECK(united.cutTriangles > 50);
+        const test::Truth truth(united.mesh);
+        // sagitta of edges of a length of a 1/26 radius, larger where the surfaces meet at an angle
+        for (const glm::dvec3& p : randomPoints(random, 500))
+            REQUIRE(truth.distance(p) ==
+                    Approx(std::abs(toBalls(p, glm::dvec3(0), double(r1), glm::dvec3(c2), double(r2)))).margin(2e-3));
+    }
+}
+
+TEST_CASE("solids within solids, copies and neighbours") {
+    const Mesh outer = shapes::sphere(0.5f, 3);
+    SECTION("a solid within a solid goes, a cavity within that stays") {
+        const Mesh cavity = shapes::flipped(shapes::sphere(0.1f, 2));
+        const United united = unite(shapes::join({outer, shapes::sphere(0.3f, 3)}));
+        CHECK(united.buriedTriangles == shapes::sphere(0.3f, 3).triangles.size());
+        CHECK(united.cutTriangles == 0);
+        CHECK(
+            unite(shapes::join({outer, shapes::flipped(shapes::sphere(0.3f, 3)), shapes::sphere(0.2f, 3)})).changed() ==
+            false);
+        CHECK(unite(shapes::join({outer, cavity})).changed() == false);
+    }
+    SECTION("a copy stays") {
+        CHECK_FALSE(unite(shapes::join({outer, outer})).changed());
+    }
+    SECTION("a cavity that another solid fills goes") {
+        const Mesh filled =
+            shapes::join({shapes::sphere(0.5f, 3), shapes::flipped(shapes::sphere(0.3f, 3)), shapes::sphere(0.3f, 3)});
+        const United united = unite(filled);
+        CHECK(united.mesh.triangles.size() == outer.triangles.size());
+    }
+    SECTION("the wall between neighbours goes") {
+        const Box left{{-1, -1, -1}, {0, 1, 1}}, right{{0, -1, -1}, {1, 1, 1}};
+        const United united = unite(joined({left, right}));
+        CHECK(united.buriedTriangles == 4);
+        CHECK(united.cutTriangles == 0);
+        CHECK(inspect(united.mesh).area == Approx(24));
+        CHECK(inspect(united.mesh).volume == Approx(8));
+    }
+}
+
+TEST_CASE("fields of unions have exact distances and the right sides") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    std::mt19937 random(seed);
+    const Method method = GENERATE(Method::exact, Method::pseudonormal);
+    for (int i = 0; i < 6; ++i) {
+        CAPTURE(i);
+        const auto boxes = randomBoxes(random, 4);
+        const Mesh mesh = joined(boxes);
+        const test::Truth truth(truthOf(boxes));
+        const LevelSet field = build(mesh, {.voxelSize = 0.04f, .method = method, .unite = true, .triangles = true});
+        const auto& grids = field.grids();
+        const Mesh outward = outwardMesh(field, mesh);
+        int wrong = 0, other = 0, missing = 0;
+        for (auto voxel = grids.distance->cbeginValueOn(); voxel; ++voxel) {
+            const openvdb::Vec3d at = grids.distance->indexToWorld(voxel.getCoord());
+            const glm::dvec3 p(at.x(), at.y(), at.z());
+            const double distance = truth.distance(p);
+            wrong += std::abs(std::abs(double(*voxel)) - distance) > 1e-4 * 0.04;
+            if (distance > 1e-5) wrong += (truth.winding(p) > 0) != (*voxel < 0);
+            const auto& t = outward.triangles[std::size_t(grids.triangle->tree().getValue(voxel.getCoord()))];
+            other += std::abs(std::sqrt(test::squaredDistance(p, outward.points[t.x], outward.points[t.y],
+                                                              outward.points[t.z])) -
+                              distance) > 1e-4 * 0.04;
+        }
+        for (const glm::dvec3& p : randomPoints(random, 2000)) {
+            const auto voxel = openvdb::Coord::round(grids.distance->worldToIndex({p.x, p.y, p.z}));
+            const openvdb::Vec3d at = grids.distance->indexToWorld(voxel);
+            const double d = truth.signedDistance({at.x(), at.y(), at.z()});
+            if (std::abs(d) < 1e-5) continue;
+            missing +=
+                grids.distance->tree().isValueOn(voxel) != (std::abs(d) < 0.12) && std::abs(std::abs(d) - 0.12) > 1e-5;
+            missing += (grids.distance->tree().getValue(voxel) < 0) != (d < 0);
+        }
+        CHECK(wrong == 0);
+        CHECK(other == 0);
+        CHECK(missing == 0);
+    }
+}
+
+TEST_CASE("a union that is inside out is turned around") {
+    const Box first{{-0.5f, -0.5f, -0.5f}, {0.2f, 0.2f, 0.2f}}, second{{-0.1f, -0.1f, -0.1f}, {0.6f, 0.6f, 0.6f}};
+    const Mesh mesh = joined({first, second});
+    const LevelSet right = build(mesh, {.voxelSize = 0.05f, .unite = true});
+    const LevelSet wrong = build(shapes::flipped(mesh), {.voxelSize = 0.05f, .unite = true});
+    CHECK(right.activeVoxels() == wrong.activeVoxels());
+    CHECK(right.signReason().find("union") == 0);
+    CHECK(wrong.grids().distance->tree().getValue({1, 1, 1}) < 0);
+    CHECK(outwardMesh(right, mesh).triangles.size() == unite(mesh).mesh.triangles.size());
+}
+
+TEST_CASE("what no union can be made of is refused") {
+    const Mesh mesh = shapes::sphere(0.5f, 2);
+    CHECK_THROWS_AS(build(mesh, {.voxelSize = 0.1f, .method = Method::doubleLayer, .unite = true}),
+                    std::invalid_argument);
+    CHECK_THROWS_AS(build(mesh, {.voxelSize = 0.1f, .sign = Sign::flood, .unite = true}), std::invalid_argument);
+}
