@@ -191,6 +191,8 @@ LevelSet fieldOf(const Scene& scene, const Job& job) {
     options.voxelSize = scene.voxelSize;
     options.exteriorWidth = options.interiorWidth = job.halfWidth;
     options.method = methodOf(job.builder);
+    // the signs of the method itself: the automatic choice would take those of the exact one
+    if (options.method == Method::pseudonormal) options.sign = Sign::normals;
     options.threads = job.threads;
     if (!isOpencl(job.builder)) return build(scene.mesh, options);
     return build(scene.mesh, options, job.filler ? *job.filler : openclOnce());

@@ -17,8 +17,7 @@
 
 // See sdf/exact_block.cpp for these: rounding [voxels, voxels^2 or parts].
 #define BOUND_SLACK 1e-4f
-#define TIE_PART 1e-5f
-#define TIE_SLACK 1e-8f
+#define TIE 1e-5f
 #define RAISED_PART 1e-3f
 #define RAISED_BY 5e-7f
 #define HEIGHT_SLACK 1e-3f
@@ -246,7 +245,7 @@ void keepNearer(Found* found, int chunk, Lanes distance2, Lanes height, IntLanes
     const IntLanes side = select((IntLanes)(code + SIDE_INSIDE), (IntLanes)(code + SIDE_OUTSIDE), height > 0.0f);
     const IntLanes own = select((IntLanes)(code), side, overFace);
     const IntLanes winner = select(old, own, distance2 < old2);
-    const IntLanes tied = max(distance2, old2) - nearest2 <= nearest2 * TIE_PART + TIE_SLACK;
+    const IntLanes tied = max(distance2, old2) - nearest2 <= nearest2 * TIE + TIE;
     found->nearest2[chunk] = nearest2;
     // the number stays, and of the side what both say; put otherwise, LLVM 14 makes wrong code of it for AVX-512
     const IntLanes kept = (own & old) | ~((1 << SIDE_BITS) - 1) | ~tied;

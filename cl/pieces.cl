@@ -6,10 +6,11 @@
 #define LONGEST_PIECE_EDGE 16.0
 // More halvings than any triangle of a grid needs.
 #define MOST_HALVINGS 80
-// Rounding of a sample's place and of the radius around it; a height below which a piece is as good as its longest edge
-// [voxels].
+// Rounding of a sample's place and of the radius around it [voxels].
 #define RADIUS_SLACK 1e-5f
-#define FLAT_HEIGHT 1e-9f
+// Shorter edges are points, and lower pieces are as good as their longest edge: floats hold the squares of all that is
+// longer [voxels].
+#define SHORTEST 1e-9f
 // Pieces with a mean radius below this are grouped, by cells as large as their mean radius times a factor, within limits
 // [voxels].
 #define SMALL_RADIUS 1.6
@@ -93,9 +94,9 @@ uint countParts(const Grid* grid, const Corners* t, const Limits* limits) {
     return count;
 }
 
-// One over a length; zero for none.
+// One over a length; zero for what is none.
 Real inverse(Real length) {
-    return select((Real)(0.0f), 1.0f / length, length > 0.0f);
+    return select((Real)(0.0f), 1.0f / length, length > SHORTEST);
 }
 
 // A unit vector across a unit vector: for pieces without a height.
@@ -119,7 +120,7 @@ void put3(float (*columns)[BATCH], int row, Real3 value) {
 // The unit vector and the length of an edge in (u, w).
 void putEdge(float (*columns)[BATCH], int row, Real x, Real y) {
     const Real size = sqrt(x * x + y * y), part = inverse(size);
-    put3(columns, row, make3(select((Real)(1.0f), x * part, size > 0.0f), y * part, size));
+    put3(columns, row, make3(select((Real)(1.0f), x * part, size > SHORTEST), y * part, size));
 }
 
 // The frames of pieces, by a corner as seen from a lattice point and the ways from there to the next corners.
@@ -135,14 +136,14 @@ void makeColumns(Real3 corner, Real3 ab, Real3 ac, Real3 shift, float (*columns)
     const Real3 third = select3(select3(sub3(ab, ac), sub3(none, ab), isSecond), ac, isFirst);
 
     const Real size = sqrt(dot3(edge, edge));
-    const Real3 u = select3(make3(one, zero, zero), scale3(inverse(size), edge), size > 0.0f);
+    const Real3 u = select3(make3(one, zero, zero), scale3(inverse(size), edge), size > SHORTEST);
     const Real along = min(max(dot3(third, u), zero), size);
     const Real3 rest = sub3(third, scale3(along, u));
     Real height = sqrt(dot3(rest, rest));
     // once more across u, because the rest of a flat piece is mostly rounding; if nothing remains then, all of it was
     const Real3 rough = scale3(inverse(height), rest), way = sub3(rough, scale3(dot3(rough, u), u));
     const Real wayLength = sqrt(dot3(way, way));
-    const RealInt flat = height <= FLAT_HEIGHT || wayLength < 0.5f;
+    const RealInt flat = height <= SHORTEST || wayLength < 0.5f;
     const Real3 w = select3(scale3(inverse(wayLength), way), across(u), flat);
     height = select(height, zero, flat);
     put3(columns, ORIGIN, begin);

@@ -58,12 +58,15 @@ class Field {
     float distance(const glm::vec3& point) const noexcept;
 
     /// The closest point of the surface, wherever the point lies; in the band it takes the least time. With the mesh it
-    /// is exact: to 1e-5 voxels up to ten voxels away, to a millionth of the distance farther away. The side is that of
-    /// the normal at the closest feature, or that of the field where normals cancel out. Where the field is not signed
-    /// by normals, it tells as well whether a wall divides inside from outside: else the side is the field's. Of
-    /// features that are equally near to within that, any one. Without the mesh it is the closest zero of the
-    /// interpolant to 1e-3 voxels, found a hundred times as slowly; in a band narrower than sqrt(3) voxels some zeros
-    /// may be unknown. Nothing is found for a point that is not finite, nor for a distance that is negative or NaN.
+    /// is exact: to 1e-5 voxels up to ten voxels away, to a millionth of the distance farther away. The side is the
+    /// field's wherever that is certain, which is what inside() and the sign of sample() have there: farther than a
+    /// voxel's diagonal from the surface, and mostly nearer. Else it is that of the normal at the closest feature, or
+    /// of the sample where normals cancel out, or where the field is not signed by normals and does not confirm that
+    /// the wall divides inside from outside. Of features that are equally near to within that, any one; but at an edge
+    /// or a corner itself, to 1e-5 voxels or the rounding of the point, the edge or the corner. Without the mesh it is
+    /// the closest zero of the interpolant to 1e-3 voxels, found a hundred times as slowly; in a band narrower than
+    /// sqrt(3) voxels some zeros may be unknown. Nothing is found for a point that is not finite, nor for a distance
+    /// that is negative or NaN.
     /// @param maxDistance  nothing is found beyond [m]
     ClosestPoint closest(const glm::vec3& point,
                          float maxDistance = std::numeric_limits<float>::infinity()) const noexcept;

@@ -1,5 +1,7 @@
 // The field finds, triangles decide: the block that a point is in tells which nodes of the hierarchy over the mesh to
 // look at, and the feature that is found is measured in double precision.
+#include <hwy/cache_control.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -35,11 +37,11 @@ double heightOver(const NearestFeature& nearest) {
 }
 
 // The normal of a feature, turned around where it points to the other side; where there is none, from the surface to
-// the point or the other way.
+// the point or the other way. A point on the surface itself has no side.
 glm::vec3 outwardNormal(const NearestFeature& nearest, bool inside) {
     const double length = glm::length(nearest.normal), distance = glm::length(nearest.way);
-    if (length > cancelled || distance == 0) {
-        const bool turned = inside ? heightOver(nearest) > 0 : heightOver(nearest) < 0;
+    if (length > cancelled || nearest.isOnSurface) {
+        const bool turned = !nearest.isOnSurface && (inside ? heightOver(nearest) > 0 : heightOver(nearest) < 0);
         return length > 0 ? glm::vec3(nearest.normal * ((turned ? -1 : 1) / length)) : glm::vec3(0, 0, 1);
     }
     return glm::vec3(nearest.way * ((inside ? 1 : -1) / distance));
@@ -60,21 +62,41 @@ FieldData::FieldData(const FieldData& samples, std::shared_ptr<const Mesh> outwa
     entries = BlockEntries(*this, mesh->tree(), 1 / double(voxelSize), reach);
 }
 
-// A ball around a voxel that the surface does not reach lies on the voxel's side.
-FieldData::Side FieldData::sideAt(const glm::dvec3& local, const Sample& here) const {
-    const bool inside = here.distance < 0;
+// Where the value of the voxel nearest to a place stands; negative where the place lies in no stored block.
+std::ptrdiff_t FieldData::nearestVoxel(const glm::dvec3& local) const {
     const glm::dvec3 size = extent();
     const bool within =
         local.x >= 0 && local.y >= 0 && local.z >= 0 && local.x < size.x && local.y < size.y && local.z < size.z;
-    if (!within) return {inside, here.distance > error};
+    if (!within) return emptyOutside;
     const glm::ivec3 block = glm::ivec3(local) >> 3;
     const std::int32_t number = directory[entryOf(block)];
-    if (number < 0) return {inside, std::abs(here.distance) > error};
-    const glm::ivec3 corner(local + 0.5), inBlock = corner - 8 * block;
-    const float value =
-        valueAt(std::size_t(number) * blockFloats + (inBlock.x * stride + inBlock.y) * stride + inBlock.z);
-    const bool certain = glm::distance(local, glm::dvec3(corner)) * voxel < double(std::abs(value) - error);
-    return certain ? Side{value < 0, true} : Side{inside, false};
+    if (number < 0) return number;
+    const glm::ivec3 inBlock = glm::ivec3(local + 0.5) - 8 * block;
+    return std::ptrdiff_t(number) * blockFloats + (inBlock.x * stride + inBlock.y) * stride + inBlock.z;
+}
+
+// Asks for the memory that sideAt() reads, ahead of its use.
+void FieldData::fetchSide(const glm::dvec3& local) const {
+    const std::ptrdiff_t index = nearestVoxel(local);
+    if (index < 0) return;
+    if (storage == Storage::fixed16)
+        hwy::Prefetch(values16.data() + index);
+    else
+        hwy::Prefetch(values.data() + index);
+}
+
+// A ball around a voxel that the surface does not reach lies on the voxel's side.
+FieldData::Side FieldData::sideAt(const glm::dvec3& local) const {
+    const std::ptrdiff_t index = nearestVoxel(local);
+    if (index < 0) {
+        const float bound = sample(local).distance;
+        const bool certain = std::abs(bound) > error;
+        return {bound < 0, certain};
+    }
+    const float value = valueAt(std::size_t(index));
+    const double away = glm::distance(local, glm::floor(local + 0.5)) * voxel;
+    const bool certain = away < double(std::abs(value) - error);
+    return {(certain ? value : sample(local).distance) < 0, certain};
 }
 
 // Whether the field changes sign at a place of the mesh: not where a wall lies within the solid, or is one by itself.
@@ -86,16 +108,16 @@ bool FieldData::divides(const glm::dvec3& place, const glm::dvec3& normal) const
     return outer > -roundedOff * voxelSize && inner < roundedOff * voxelSize && outer - inner > aside * voxelSize / 2;
 }
 
-// By the normal, where it tells a side: of a mesh whose normals do, or of a wall that the field confirms. Else by the
-// field alone, whose samples blend what the surface is on either side of an edge.
+// By the field where it is certain, so that all queries agree. Else by the normal, where it tells a side: of a mesh
+// whose normals do, or of a wall that the field confirms. Else by the field alone, whose samples blend what the surface
+// is on either side of an edge.
 bool FieldData::isInside(const NearestFeature& nearest, const glm::vec3& point) const {
+    const Side side = sideAt(toLocal(point));
     const double height = heightOver(nearest);
     const bool tells = std::abs(height) > cancelled * glm::length(nearest.way);
-    if (signedByNormals && tells) return height < 0;
-    const glm::dvec3 local = toLocal(point);
-    const Side side = sideAt(local, sample(local));
-    if (side.certain || !tells || !divides(glm::dvec3(point) + nearest.way, nearest.normal)) return side.inside;
-    return height < 0;
+    if (side.certain || !tells) return side.inside;
+    const bool byNormal = signedByNormals || divides(glm::dvec3(point) + nearest.way, nearest.normal);
+    return byNormal ? height < 0 : side.inside;
 }
 
 // What is known of a point once the part of the mesh is found that is nearest to it.
@@ -130,7 +152,9 @@ std::uint32_t FieldData::orBeyond(std::uint32_t part, const EntryPlace& place, c
 ClosestPoint FieldData::closest(const glm::vec3& point, float maxDistance) const {
     if (!mesh) return closestZero(point, maxDistance);
     if (!(maxDistance >= 0)) return {};
-    const EntryPlace place = entries.at(toLocal(point));
+    const glm::dvec3 local = toLocal(point);
+    fetchSide(local);
+    const EntryPlace place = entries.at(local);
     std::uint32_t part = MeshTree::noPart;
     if (place.entries)
         part = mesh->nearestPart(glm::dvec3(point), std::min(boundOf(maxDistance), entries.reach()), place);
@@ -166,8 +190,10 @@ void Field::closest(std::span<const glm::vec3> points, std::span<ClosestPoint> a
     for (std::size_t begin = 0; begin < points.size(); begin += batch) {
         const std::span<const glm::vec3> some = points.subspan(begin, std::min(batch, points.size() - begin));
         for (std::size_t i = 0; i < some.size(); ++i) {
-            places[i] = data_->entries.at(data_->toLocal(some[i]));
+            const glm::dvec3 local = data_->toLocal(some[i]);
+            places[i] = data_->entries.at(local);
             places[i].fetch();
+            data_->fetchSide(local);
         }
         data_->mesh->nearestParts(some, bound, {places.data(), some.size()}, {parts.data(), some.size()});
         for (std::size_t i = 0; i < some.size(); ++i)

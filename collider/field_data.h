@@ -102,7 +102,9 @@ struct FieldData : FieldLayout {
     struct Side {
         bool inside, certain;
     };
-    Side sideAt(const glm::dvec3& local, const Sample& here) const;
+    std::ptrdiff_t nearestVoxel(const glm::dvec3& local) const;
+    void fetchSide(const glm::dvec3& local) const;
+    Side sideAt(const glm::dvec3& local) const;
     bool divides(const glm::dvec3& place, const glm::dvec3& normal) const;
     bool isInside(const NearestFeature& nearest, const glm::vec3& point) const;
     float boundOf(float maxDistance) const;

@@ -50,9 +50,8 @@ bool meetsSurface(const FieldData& field, const OrientedBox& box) {
 
 bool FieldData::inside(const glm::vec3& point) const {
     const glm::dvec3 local = toLocal(point);
-    const Sample here = sample(local);
-    if (!mesh) return here.distance < 0;
-    const Side side = sideAt(local, here);
+    if (!mesh) return sample(local).distance < 0;
+    const Side side = sideAt(local);
     return side.certain ? side.inside : closest(point, std::numeric_limits<float>::infinity()).distance < 0;
 }
 

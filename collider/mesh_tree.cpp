@@ -290,9 +290,15 @@ constexpr double thinnest = 1e-7;
 constexpr double flatness = 1e-10;
 /// As many sizes of the mesh away all its triangles are equally far, to a millionth: points beyond may come as near.
 constexpr double farthest = 1e6;
-/// So far from all edges a point lies over a triangle, whatever single precision made of these; and so near it is as
-/// exact by them as by the corners [voxels].
-constexpr double wellInside = 1e-5, near = 16;
+/// What distances are exact to: places no farther from each other than this are one. So far from all edges a point lies
+/// over a triangle, whatever single precision made of these [voxels].
+constexpr double samePlace = 1e-5;
+/// So near a point is as exact by single precision as by the corners [voxels].
+constexpr double near = 16;
+/// A point in floats is no farther than this part of its largest coordinate from the place that was meant.
+constexpr double pointRounding = 1.2e-7;
+/// A shorter mean of normals has cancelled out, or is not known.
+constexpr double leastMean = 1e-6;
 
 // A place on an edge, seen from the point that is asked for.
 struct OnEdge {
@@ -369,9 +375,36 @@ NearestFeature MeshTree::featureOfPart(std::uint32_t part, const glm::dvec3& poi
     const double besideBC = double(leaf.directionBC[0][i]) * y -
                             double(leaf.directionBC[1][i]) * (x - double(leaf.lengthAB[i])),
                  besideAC = double(leaf.directionAC[1][i]) * x - double(leaf.directionAC[0][i]) * y;
-    const bool over = std::min({y, besideBC, besideAC}) > wellInside && std::abs(z) < near;
+    const double room = roomAt(point) * perMetre_;
+    const bool over = std::min({y, besideBC, besideAC}) > room && std::abs(z) < near;
     if (!over || normals_.isFlat(triangle)) return featureOf(triangle, point);
-    return {.triangle = triangle, .way = (-z * double(voxelSize_)) * normal, .normal = normal};
+    return {.triangle = triangle,
+            .way = (-z * double(voxelSize_)) * normal,
+            .normal = normal,
+            .isOnSurface = std::abs(z) <= room};
+}
+
+// How far from a feature a point may be said to lie on it [m].
+double MeshTree::roomAt(const glm::dvec3& point) const noexcept {
+    const double largest = std::max({std::abs(point.x), std::abs(point.y), std::abs(point.z)});
+    return std::max(samePlace * double(voxelSize_), pointRounding * largest);
+}
+
+// The corner or edge of a triangle that a point on its surface lies on, if any; the normal stays where that of the
+// feature is not known.
+void MeshTree::toSmallest(NearestFeature& found, const std::array<glm::dvec3, 3>& c, double room) const noexcept {
+    const auto set = [&](Feature feature, std::size_t index, const glm::dvec3& normal) {
+        found.feature = feature;
+        found.index = std::uint8_t(index);
+        if (glm::length(normal) > leastMean) found.normal = normal;
+    };
+    const glm::uvec3& t = mesh_->triangles[found.triangle];
+    for (int k = 0; k < 3; ++k)
+        if (glm::length(c[std::size_t(k)]) <= room)
+            return set(Feature::vertex, std::size_t(k), normals_.ofVertex(t[k]));
+    for (int k = 0; k < 3; ++k)
+        if (closestOnEdge(c, k).way2 <= room * room)
+            return set(Feature::edge, std::size_t(k), normals_.ofEdge(found.triangle, k));
 }
 
 NearestFeature MeshTree::featureOf(std::uint32_t triangle, const glm::dvec3& point) const noexcept {
@@ -388,8 +421,17 @@ NearestFeature MeshTree::featureOf(std::uint32_t triangle, const glm::dvec3& poi
     if (n2 > flatness * flatness * longest2 * longest2 && inside(0) && inside(1) && inside(2)) {
         found.way = (glm::dot(c[0], n) / n2) * n;
         if (!normals_.isFlat(triangle)) found.normal = n / std::sqrt(n2);
-        return found;
+    } else {
+        toEdge(found, c);
     }
+    const double room = roomAt(point);
+    found.isOnSurface = glm::length(found.way) <= room;
+    if (found.isOnSurface) toSmallest(found, c, room);
+    return found;
+}
+
+// The closest edge or corner of a triangle.
+void MeshTree::toEdge(NearestFeature& found, const std::array<glm::dvec3, 3>& c) const noexcept {
     OnEdge best = closestOnEdge(c, 0);
     int edge = 0;
     for (int i = 1; i < 3; ++i) {
@@ -399,8 +441,8 @@ NearestFeature MeshTree::featureOf(std::uint32_t triangle, const glm::dvec3& poi
     found.way = best.way;
     found.feature = best.corner < 0 ? Feature::edge : Feature::vertex;
     found.index = std::uint8_t(best.corner < 0 ? edge : best.corner);
-    found.normal = best.corner < 0 ? normals_.ofEdge(triangle, edge) : normals_.ofVertex(t[best.corner]);
-    return found;
+    found.normal = best.corner < 0 ? normals_.ofEdge(found.triangle, edge)
+                                   : normals_.ofVertex(mesh_->triangles[found.triangle][best.corner]);
 }
 
 std::size_t MeshTree::memoryBytes() const {

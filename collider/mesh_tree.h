@@ -1,6 +1,7 @@
 // A mesh with a bounding hierarchy over its triangles, for questions that only triangles can decide.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <glm/vec3.hpp>
@@ -26,6 +27,7 @@ struct NearestFeature {
     /// The mean of unit normals around the feature, weighted by angles (FeatureNormals): where it is short it tells no
     /// side.
     glm::dvec3 normal{0};
+    bool isOnSurface = false;  ///< the point is no farther from the feature than the tree or floats can tell
 };
 
 /// Immutable; all queries are safe from any thread and allocate nothing.
@@ -54,7 +56,8 @@ class MeshTree {
     void nearestParts(std::span<const glm::vec3> points, float bound, std::span<const EntryPlace> places,
                       std::span<std::uint32_t> parts) const noexcept;
 
-    /// The feature of a triangle that is closest to a point [m], in double precision.
+    /// The feature of a triangle that is closest to a point [m], in double precision. Of a point on the surface itself
+    /// it is the smallest one: a corner before an edge, an edge before a face.
     NearestFeature featureOf(std::uint32_t triangle, const glm::dvec3& point) const noexcept;
 
     /// The same for a triangle that nearestPart() has found for the point; quick where the point lies over it.
@@ -66,6 +69,9 @@ class MeshTree {
     std::size_t memoryBytes() const;
 
   private:
+    double roomAt(const glm::dvec3& point) const noexcept;
+    void toEdge(NearestFeature& found, const std::array<glm::dvec3, 3>& corners) const noexcept;
+    void toSmallest(NearestFeature& found, const std::array<glm::dvec3, 3>& corners, double room) const noexcept;
     glm::dvec3 toTree(const glm::dvec3& point) const { return point * perMetre_ - glm::dvec3(tree_.base); }
     void place(const glm::dvec3& point, glm::dvec3& local, float& bound) const noexcept;
     std::uint32_t triangleOf(std::uint32_t part) const {

@@ -15,6 +15,7 @@
 #include <limits>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "sdf/assemble.h"
 #include "sdf/band.h"
@@ -40,6 +41,8 @@ namespace {
 constexpr double farthestIndex = 1e9;
 /// OpenVDB takes a transform for singular below a determinant of 3e-15.
 constexpr float smallestVoxel = 2e-5f;
+/// What a mesh with smaller voxels is scaled by, once or more often: metres become millimetres.
+constexpr double unitStep = 1000;
 /// Bricks of this side that a box may have; a cube of 40,000 voxels a side.
 constexpr int brickSide = 64;  // [voxels]
 constexpr double mostBricks = double(1u << 28);
@@ -71,6 +74,17 @@ bool hasOwnSigns(Method method) {
     return method == Method::doubleLayer || method == Method::prism;
 }
 
+void checkVoxelSize(float voxelSize) {
+    if (voxelSize >= smallestVoxel) return;
+    double scale = unitStep;
+    while (scale * double(voxelSize) < double(smallestVoxel)) scale *= unitStep;
+    throw std::invalid_argument(
+        fmt::format("voxelSize {:g} is below {:g}, the smallest that OpenVDB takes: scale the mesh by {:g}{}, so that "
+                    "voxels are {:g}",
+                    voxelSize, smallestVoxel, scale, scale == unitStep ? " (from metres to millimetres)" : "",
+                    scale * double(voxelSize)));
+}
+
 void check(const BuildOptions& options) {
     // false for NaN, and in floats: 1e-4f is no less than itself
     const auto within = [](auto value, decltype(value) low, decltype(value) high) {
@@ -79,8 +93,7 @@ void check(const BuildOptions& options) {
     const DoubleLayerOptions& layers = options.doubleLayer;
     require(options.voxelSize > 0 && std::isnormal(options.voxelSize), "voxelSize", "a positive length",
             options.voxelSize);
-    require(options.voxelSize >= smallestVoxel, "voxelSize", "at least 2e-5 (OpenVDB takes no smaller: scale the mesh)",
-            options.voxelSize);
+    checkVoxelSize(options.voxelSize);
     checkWidth("exteriorWidth", options.exteriorWidth, options.voxelSize);
     checkWidth("interiorWidth", options.interiorWidth, options.voxelSize);
     require(within(options.gap, 0, 100), "gap", "in 0..100 voxels", options.gap);
@@ -233,6 +246,19 @@ float errorBound(const BuildOptions& options) {
     return std::max(2 * layers.delta, coveringRadius * std::sqrt(layers.epsilon));
 }
 
+// Distances of blocks, negative where a field of the same surface is.
+std::vector<float> withSides(const openvdb::FloatGrid& sides, const FilledBlocks& blocks) {
+    std::vector<float> distances(blocks.distances.begin(), blocks.distances.end());
+    const auto values = sides.getConstAccessor();
+    for (std::size_t i = 0; i < distances.size(); ++i) {
+        const glm::ivec3& block = blocks.origins[i / blockVoxels];
+        const int voxel = int(i % blockVoxels);
+        const openvdb::Coord at(block.x + voxel / 64, block.y + voxel / 8 % 8, block.z + voxel % 8);
+        if (values.getValue(at) < 0) distances[i] = -distances[i];
+    }
+    return distances;
+}
+
 const char* name(Method method) {
     switch (method) {
         case Method::exact:
@@ -380,7 +406,7 @@ class Build {
         const TouchedCells touched(oldMesh, mesh_, moved, voxelsPerUnit, reach, side);
         times_.tiles += part.lap();
         const std::string reason = options_.sign == Sign::automatic ? closedAndOriented : asAskedFor;
-        fillFrom(mesh_, mesh_, Sign::normals, reason, [&](MeshJob& job, Assembler& assembler) {
+        fillFrom(mesh_, mesh_, Sign::normals, reason, options_.method, [&](MeshJob& job, Assembler& assembler) {
             job.wanted = [&](const glm::ivec3& first, int cube) { return touched.any(first, cube); };
             assembler.copy(old.grids(), [&](const openvdb::Coord& block) {
                 return !touched.any({block.x(), block.y(), block.z()}, blockSide);
@@ -415,7 +441,9 @@ class Build {
         times_.assemble += part.lap();
     }
 
-    // Picks a way, and another one where the first contradicts itself.
+    // Picks a way, and another one where the first contradicts itself. By normals the pseudonormal method takes the
+    // sides that the exact one finds: each rounds in its own way which triangles are equally near, and would count its
+    // own conflicts.
     void fillChosen() {
         Stopwatch part;
         SignChoice choice = chooseSign(mesh_, &progress_);
@@ -424,21 +452,37 @@ class Build {
             // kept over the next choice, which may be made from it
             const std::optional<Mesh> mended = std::move(choice.mended);
             const Mesh& mesh = mended ? *mended : mesh_;
-            fill(mesh, choice.sign, choice.reason);
-            if (choice.sign != Sign::normals || signs_.conflicts == 0) return;
+            const bool borrows = choice.sign == Sign::normals && options_.method == Method::pseudonormal;
+            const Sign sign = fill(mesh, choice.sign, choice.reason, borrows ? Method::exact : options_.method);
+            if (sign != Sign::normals || signs_.conflicts == 0) {
+                if (borrows && sign == Sign::normals) fillWithSides(distance_, mesh, choice.reason);
+                return;
+            }
             choice = chooseSignAfterConflict(mesh, &progress_);
             if (!choice.mended && mended) choice.mended = *mended;
         }
     }
 
+    // Fills by the method asked for, with the sides of another field of the mesh.
+    void fillWithSides(const openvdb::FloatGrid::ConstPtr& sides, const Mesh& mesh, const std::string& reason) {
+        fillFrom(mesh, mesh, Sign::normals, reason, options_.method, [&](MeshJob& job, Assembler& assembler) {
+            job.sign = false;
+            job.sink = [this, &sides, &assembler](const FilledBlocks& blocks) {
+                const std::vector<float> distances = withSides(*sides, blocks);
+                take(assembler, {blocks.origins, distances, blocks.triangles});
+            };
+        });
+    }
+
     // Normals are taken from a mesh that is mended, should it be inside out.
     void fillAsAsked() {
-        fill(mesh_, options_.sign, asAskedFor);
+        fill(mesh_, options_.sign, asAskedFor, options_.method);
         if (options_.sign != Sign::normals || signs_.conflicts == 0) return;
         const Orientation orientation = orient(mesh_, &progress_);
         if (orientation.turnedTriangles > 0)
             fill(orientation.mesh, Sign::normals,
-                 fmt::format("as asked for, with {} triangles turned around", orientation.turnedTriangles));
+                 fmt::format("as asked for, with {} triangles turned around", orientation.turnedTriangles),
+                 options_.method);
     }
 
     // Bands wider than a voxel surround the surface: where it passes between two voxels, both are in the band.
@@ -447,8 +491,11 @@ class Build {
         return sign == Sign::normals && wide ? Assembler::Plain::drop : Assembler::Plain::keep;
     }
 
-    void fill(const Mesh& mesh, Sign sign, const std::string& reason) {
-        if (!options_.unite || sign == Sign::flood || !fillUnion(mesh)) fillFrom(mesh, mesh, sign, reason);
+    // Returns by which sign.
+    Sign fill(const Mesh& mesh, Sign sign, const std::string& reason, Method method) {
+        if (options_.unite && sign != Sign::flood && fillUnion(mesh)) return Sign::winding;
+        fillFrom(mesh, mesh, sign, reason, method);
+        return sign;
     }
 
     // False if no wall is inside of the union, so that nothing was filled. What is filled is the union of what orient()
@@ -460,13 +507,13 @@ class Build {
         const Orientation solids = orient(mesh, &progress_);
         if (solids.turnedTriangles > 0) united = unite(solids.mesh, &progress_);
         times_.tiles += part.lap();
-        fillFrom(united.mesh, solids.mesh, Sign::winding, unionReason(united));
+        fillFrom(united.mesh, solids.mesh, Sign::winding, unionReason(united), options_.method);
         return true;
     }
 
     // Distances are to `mesh`, winding numbers are those of `solids`. `adapt` may change the job, and add leaves that
     // are known already.
-    void fillFrom(const Mesh& mesh, const Mesh& solids, Sign sign, const std::string& reason,
+    void fillFrom(const Mesh& mesh, const Mesh& solids, Sign sign, const std::string& reason, Method method,
                   const std::function<void(MeshJob&, Assembler&)>& adapt = {}) {
         Stopwatch part;
         const bool byNormals = sign == Sign::normals;
@@ -484,7 +531,7 @@ class Build {
         // triangles turned around, in a mended mesh, have the same box
         if (filler_)
             filler_->fill({job, options_, survey_.box, {}});
-        else if (options_.method == Method::exact)
+        else if (method == Method::exact)
             fillExact(job, survey_.box);
         else
             fillPseudonormal(job);

@@ -59,7 +59,9 @@ enum class BandUnit {
 };
 
 struct BuildOptions {
-    float voxelSize = 0;  ///< edge of a voxel [m]; must be given, at least 2e-5
+    /// Edge of a voxel [m]; must be given, at least 2e-5: a mesh in metres of a part of a millimetre is to be scaled
+    /// first, by 1000 to millimetres.
+    float voxelSize = 0;
     // a band of w voxels costs time with the cube of w: hundreds take minutes
     float exteriorWidth = 3;  ///< every voxel with 0 <= distance < this is active [bandUnit], in (0, 1000] voxels
     float interiorWidth = 3;  ///< every voxel with -this < distance < 0 is active [bandUnit], in (0, 1000] voxels

@@ -24,8 +24,9 @@ using Mask = hn::Mask<Tag>;
 /// What a distance computed in floats may be off by, with room to spare: pieces this much too far are still asked, so
 /// that which distance wins never depends on the order [voxels].
 constexpr float boundSlack = 1e-4f;
-/// Squared distances that differ by less than this part, or by less than this, may be equal [voxels^2].
-constexpr float tiePart = 1e-5f, tieSlack = 1e-8f;
+/// Distances d that differ by less than this may be equal: floats blur the heights over two pieces by as much, however
+/// low they are. Squared ones then differ by less than tie * (1 + d^2), since 2 d <= 1 + d^2 [voxels].
+constexpr float tie = 1e-5f;
 /// Bounds by samples are raised by this part and this much, so that a piece's own distance wins over its sample's
 /// although the two are rounded differently: by 2e-5 voxels at least.
 constexpr float raisedPart = 1e-3f, raisedBy = 5e-7f;  // [voxels^2]
@@ -262,7 +263,7 @@ class SeenPiece {
         const auto code = hn::IfThenElse(hn::RebindMask(intTag, overFace), side, hn::Set(intTag, code_));
         const auto winner = hn::IfThenElse(hn::RebindMask(intTag, hn::Lt(distance2, old2)), code, old);
         const Vec difference = hn::Sub(hn::Max(distance2, old2), nearest2);
-        const Mask tied = hn::Le(difference, hn::Add(hn::Mul(nearest2, hn::Set(tag, tiePart)), hn::Set(tag, tieSlack)));
+        const Mask tied = hn::Le(difference, hn::Add(hn::Mul(nearest2, hn::Set(tag, tie)), hn::Set(tag, tie)));
         const auto agreed = hn::Or(hn::AndNot(sides, winner), hn::And(hn::And(code, old), sides));
         hn::Store(nearest2, tag, block.nearest2 + voxel);
         hn::Store(hn::IfThenElse(hn::RebindMask(intTag, tied), agreed, winner), intTag, block.nearest + voxel);

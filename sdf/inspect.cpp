@@ -288,7 +288,7 @@ MeshReport inspect(const Mesh& input, float wall) {
     }
     report.duplicateTriangles = countDuplicates(topology);
     report.insideOutComponents = countInsideOut(mesh, tree, of, all);
-    report.selfIntersections = countPiercingPairs(mesh, tree);
+    report.selfIntersections = countPiercingPairs(mesh, topology, tree);
     report.flippedTriangles = orient(mesh).turnedTriangles;
     findThinWalls(mesh, wall, report);
     return report;

@@ -21,7 +21,7 @@ struct MeshReport {
     std::size_t duplicateTriangles = 0;   ///< triangles whose three vertices another one has already
     std::size_t boundaryLoops = 0;        ///< sets of boundary edges that share vertices: holes
     std::size_t nonManifoldVertices = 0;  ///< vertices whose triangles form more than one fan
-    std::size_t selfIntersections = 0;    ///< pairs of triangles that share no edge and where an edge pierces the other
+    std::size_t selfIntersections = 0;    ///< pairs of triangles that share no edge and run through each other
     std::size_t flippedTriangles = 0;     ///< triangles that orient() would turn around
     std::size_t insideOutComponents =
         0;                   ///< closed components that bound space from the wrong side (nested ones allowed)

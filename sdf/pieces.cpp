@@ -21,8 +21,9 @@ using Mask = hn::Mask<Tag>;
 
 /// Rounding of a sample's place and of the radius around it [voxels].
 constexpr float radiusSlack = 1e-5f;
-/// Below this height a piece is as good as its longest edge [voxels].
-constexpr float flatHeight = 1e-9f;
+/// Shorter edges are points, and lower pieces are as good as their longest edge: floats hold the squares of all that is
+/// longer [voxels].
+constexpr float shortest = 1e-9f;
 
 struct Vec3 {
     Vec x, y, z;
@@ -52,10 +53,14 @@ inline Vec3 load(const float (&from)[3][PieceCutter::batch], std::size_t i) {
     return {hn::Load(tag, from[0] + i), hn::Load(tag, from[1] + i), hn::Load(tag, from[2] + i)};
 }
 
-// One over a length; zero for none.
+// Whether a length gives a direction.
+inline Mask isLength(Vec length) {
+    return hn::Gt(length, hn::Set(Tag(), shortest));
+}
+
+// One over a length; zero for what is none.
 inline Vec inverse(Vec length) {
-    const Tag tag;
-    return hn::IfThenElseZero(hn::Gt(length, hn::Zero(tag)), hn::Div(hn::Set(tag, 1.f), length));
+    return hn::IfThenElseZero(isLength(length), hn::Div(hn::Set(Tag(), 1.f), length));
 }
 
 // A unit vector across a unit vector: for pieces without a height.
@@ -84,7 +89,7 @@ enum Row { origin = 0, axisU = 3, axisW = 6, axisN = 9, length = 12, left = 13, 
 inline void putEdge(Columns& columns, int row, std::size_t i, Vec x, Vec y) {
     const Tag tag;
     const Vec size = hn::Sqrt(hn::Add(hn::Mul(x, x), hn::Mul(y, y))), part = inverse(size);
-    columns.put(row, i, hn::IfThenElse(hn::Gt(size, hn::Zero(tag)), hn::Mul(x, part), hn::Set(tag, 1.f)));
+    columns.put(row, i, hn::IfThenElse(isLength(size), hn::Mul(x, part), hn::Set(tag, 1.f)));
     columns.put(row + 1, i, hn::Mul(y, part));
     columns.put(row + 2, i, size);
 }
@@ -101,15 +106,14 @@ inline void makeColumns(const PieceCutter::Waiting& waiting, std::size_t i, Colu
     const Vec3 third = select(first, ac, select(second, none - ab, ab - ac));
 
     const Vec size = hn::Sqrt(dot(edge, edge));
-    const Vec3 u =
-        select(hn::Gt(size, hn::Zero(tag)), inverse(size) * edge, {hn::Set(tag, 1.f), hn::Zero(tag), hn::Zero(tag)});
+    const Vec3 u = select(isLength(size), inverse(size) * edge, {hn::Set(tag, 1.f), hn::Zero(tag), hn::Zero(tag)});
     const Vec along = hn::Min(hn::Max(dot(third, u), hn::Zero(tag)), size);
     const Vec3 rest = third - along * u;
     Vec height = hn::Sqrt(dot(rest, rest));
     // once more across u, because the rest of a flat piece is mostly rounding; if nothing remains then, all of it was
     const Vec3 rough = inverse(height) * rest, way = rough - dot(rough, u) * u;
     const Vec wayLength = hn::Sqrt(dot(way, way));
-    const Mask flat = hn::Or(hn::Le(height, hn::Set(tag, flatHeight)), hn::Lt(wayLength, hn::Set(tag, 0.5f)));
+    const Mask flat = hn::Or(hn::Not(isLength(height)), hn::Lt(wayLength, hn::Set(tag, 0.5f)));
     const Vec3 w = select(flat, across(u), inverse(wayLength) * way);
     height = hn::IfThenZeroElse(flat, height);
     columns.put(Row::origin, i, begin);

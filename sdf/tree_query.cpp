@@ -20,7 +20,8 @@ namespace bilayer::HWY_NAMESPACE {
 using IndexTag = hn::RebindToUnsigned<Tag>;
 using NumberTag = hn::RebindToSigned<Tag>;
 
-/// Triangles whose distances differ by less may share the closest point: more than floats blur [voxels].
+/// Triangles whose distances d differ by less may share the closest point: more than floats blur. Squared distances
+/// then differ by less than tie * (1 + d^2), since 2 d <= 1 + d^2; so it is in exact_block.cpp [voxels].
 constexpr float tie = 1e-5f;
 /// Nearer to a face than this its side is left to a closer look [voxels].
 constexpr float leastHeight = 1e-3f;
@@ -121,14 +122,14 @@ struct Query {
     const WideTree& tree;
     const NodeList& list;
     BlockAnswer& answer;
-    float tieWidth2;  // at least the difference of the squares of distances that are `tie` apart
+    float tieWidth;  // distances less than this apart are equal
     VoxelBox voxel;
     float best2, limit2;  // boxes farther away than the latter do not matter
     std::size_t repeats;  // so many of the visits may come up again: the first one was a guess
 
     void lower(float distance2) {
         best2 = distance2;
-        limit2 = best2 * roundUp + tieWidth2;
+        limit2 = best2 * (roundUp + tieWidth) + tieWidth;
     }
 
     // From now on nothing is nearest: all leaves whose boxes are nearer than this are visited that were not yet.
@@ -253,12 +254,12 @@ struct Together {
     float farthest() const { return std::sqrt(*std::max_element(best2, best2 + treeWidth)); }
 
     // The first of the nearest triangles, and the heights over all that share the closest point.
-    Answers answers(float tieWidth2) const {
+    Answers answers(float tieWidth) const {
         const Tag tag;
         Answers found;
         for (std::size_t i = 0; i < treeWidth; i += hn::Lanes(tag)) {
             const Vec best = hn::Load(tag, best2 + i), infinity = hn::Set(tag, std::numeric_limits<float>::infinity());
-            const Vec limit = hn::Add(hn::Mul(best, hn::Set(tag, roundUp)), hn::Set(tag, tieWidth2));
+            const Vec limit = hn::Add(hn::Mul(best, hn::Set(tag, roundUp + tieWidth)), hn::Set(tag, tieWidth));
             Vec lowest = infinity, highest = hn::Neg(infinity), winner = hn::Zero(tag);
             for (std::size_t c = count; c-- > 0;) {
                 const Vec distance2 = hn::Load(tag, candidates[c].distance2 + i);
@@ -286,7 +287,7 @@ struct BlockQuery {
 
     // Asks for what is nearer than `bound`.
     Query ask(const NodeList& list, const glm::vec3& position, float bound) const {
-        const float ties = sign ? 2 * tie * std::max(1.f, reach / usualReach) * (reach + 1) : 0.f;
+        const float ties = sign ? tie * std::max(1.f, reach / usualReach) : 0.f;
         Query query{tree, list, answer, ties, {position, position}, 0, 0, 1};
         query.lower(bound * bound * roundUp);
         answer.visits.clear();
@@ -342,7 +343,7 @@ struct BlockQuery {
                 if (cube.count == mostTogether) return false;
                 cube.ask(v.leaf, i);
             }
-        const Together::Answers found = cube.answers(centre.tieWidth2);
+        const Together::Answers found = cube.answers(centre.tieWidth);
         for (std::size_t i = 0; i < treeWidth; ++i)
             if (cube.best2[i] <= reach * reach * roundUp) {
                 const Together::Candidate& nearest = cube.candidates[std::size_t(found.winner[i])];

@@ -317,3 +317,119 @@ TEST_CASE("closest points of meshes that build() has to mend are those of their 
         CHECK(wrongNormals == 0);
     }
 }
+
+namespace {
+
+// A closed, oriented surface that runs through itself in places, a little or much.
+Mesh crumpled(Random& random) {
+    const float noise = std::pow(10.f, float(random(-2.5, -0.5)));
+    Mesh mesh = random(0, 1) < 0.5 ? shapes::torus(1, 0.3f, 24, 12) : shapes::sphere(1, 3);
+    for (glm::vec3& p : mesh.points) p += noise * random.point(1);
+    return tilted(mesh);
+}
+
+// How often queries contradict each other at points of the band, of the box, and far away.
+struct Contradictions {
+    std::size_t points = 0, inside = 0, sample = 0, batch = 0;
+};
+
+Contradictions contradictions(const Field& field, std::span<const glm::vec3> points) {
+    std::vector<ClosestPoint> batch(points.size());
+    field.closest(points, batch);
+    Contradictions found;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+        const ClosestPoint closest = field.closest(points[i]);
+        const Sample sample = field.sample(points[i]);
+        const bool inside = closest.distance < 0;
+        ++found.points;
+        found.inside += field.inside(points[i]) != inside;
+        // then all voxels around the point lie on its side
+        const bool known = std::abs(closest.distance) > std::sqrt(3.f) * field.voxelSize();
+        found.sample += known && (sample.distance < 0) != inside;
+        found.batch += !same(closest, batch[i]);
+    }
+    return found;
+}
+
+void requireNone(const Contradictions& found) {
+    CAPTURE(found.points);
+    CHECK(found.inside == 0);
+    CHECK(found.sample == 0);
+    CHECK(found.batch == 0);
+}
+
+}  // namespace
+
+TEST_CASE("closest, inside and sample agree on the side where the surface runs through itself by rounding") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    const auto path = corpusMesh("../cases/sliver110.obj");
+    if (!path) return;
+    const Mesh mesh = readMesh(*path);
+    const Field field(build(mesh, {.voxelSize = voxelSizeFor(mesh, 64)}), mesh);
+    const glm::vec3 given(5329.89f, -20239.19f, 1423.04f);
+    CHECK(field.closest(given).distance > 0);
+    CHECK_FALSE(field.inside(given));
+    CHECK(field.sample(given).distance > 0);
+    Random random(seed);
+    const Bounds box = bounds(mesh);
+    std::vector<glm::vec3> points = pointsAround(mesh, double(field.voxelSize()), 5000, seed);
+    for (int i = 0; i < 20000; ++i) points.push_back(box.centre() + random.point(1000 * double(box.longestSide())));
+    requireNone(contradictions(field, points));
+}
+
+TEST_CASE("closest, inside and sample agree on the side of whatever mesh, however it was signed") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    Random random(seed);
+    for (int round = 0; round < 24; ++round) {
+        const Mesh mesh = crumpled(random);
+        const float voxelSize = voxelSizeFor(mesh, float(random(10, 60)));
+        for (const Sign sign : {Sign::automatic, Sign::normals, Sign::flood}) {
+            CAPTURE(round, voxelSize, sign);
+            const LevelSet levelSet = build(mesh, {.voxelSize = voxelSize, .sign = sign});
+            const std::vector<glm::vec3> points = pointsAround(mesh, double(voxelSize), 1500, seed + unsigned(round));
+            Contradictions found = contradictions(Field(levelSet, mesh), points);
+            // voxels that contradict each other make no interpolant, and a flood closes gaps half-way between walls
+            if (levelSet.signConflicts() > 0 || sign == Sign::flood) found.sample = 0;
+            requireNone(found);
+        }
+    }
+}
+
+TEST_CASE("a point on an edge or a corner is told the edge or the corner, and the mean of its normals") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    Random random(seed);
+    const glm::mat4 away = glm::translate(glm::mat4(1), glm::vec3(40, -70, 90));
+    for (const Mesh& mesh :
+         {shapes::box({1, 0.8f, 0.6f}), shapes::box({1, 0.8f, 0.6f}, 3), tilted(shapes::torus(1, 0.3f, 24, 12)),
+          shapes::cone(0.5f, 2, 7), transformed(tilted(shapes::box({1, 0.5f, 0.7f}, 2)), away)}) {
+        const float voxelSize = voxelSizeFor(mesh, 40);
+        const Field field(build(mesh, {.voxelSize = voxelSize}), mesh);
+        const double room = samePlace * double(voxelSize);
+        std::size_t wrongFeatures = 0, wrongNormals = 0, wrongBatch = 0;
+        const auto ask = [&](const glm::vec3& place, Feature feature) {
+            const ClosestPoint closest = field.closest(place);
+            ClosestPoint batch;
+            field.closest(std::span(&place, 1), std::span(&batch, 1));
+            wrongBatch += !same(closest, batch);
+            wrongFeatures += closest.feature != feature || !isFeature(cornersOf(mesh, closest.triangle),
+                                                                      glm::dvec3(closest.position), closest, 10 * room);
+            wrongNormals +=
+                !(glm::distance(glm::dvec3(closest.normal), normalAt(mesh, glm::dvec3(place), 10 * room)) < 1e-3);
+        };
+        for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
+            const Corners c = cornersOf(mesh, i);
+            for (std::size_t k = 0; k < 3; ++k) {
+                ask(glm::vec3(c[k]), Feature::vertex);
+                ask(glm::vec3(glm::mix(c[k], c[(k + 1) % 3], random(0.1, 0.9))), Feature::edge);
+            }
+            ask(glm::vec3((c[0] + c[1] + c[2]) / 3.0), Feature::face);
+        }
+        CAPTURE(mesh.triangles.size(), voxelSize);
+        CHECK(wrongFeatures == 0);
+        CHECK(wrongNormals == 0);
+        CHECK(wrongBatch == 0);
+    }
+}

@@ -358,6 +358,31 @@ TEST_CASE("exact: far from the origin, and smaller than a voxel") {
     }
 }
 
+TEST_CASE("exact: triangles and edges so short that floats do not hold their squares") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    Random random(seed);
+    const auto any = [&] { return glm::vec3(uniform(random, -1, 1), uniform(random, -1, 1), uniform(random, -1, 1)); };
+    for (int round = 0; round < 300; ++round) {
+        const float leg = std::pow(10.f, uniform(random, -36, -4)), other = std::pow(10.f, uniform(random, -36, 1));
+        // a point, a segment or a triangle, as seen by a voxel, at the origin: only there floats tell its corners apart
+        const Mesh mesh{{{0, 0, 0}, leg * any(), other * any()}, {{0, 1, 2}}};
+        if (!(glm::length(glm::cross(glm::dvec3(mesh.points[1]), glm::dvec3(mesh.points[2]))) > 0)) continue;
+        for (const Method method : {Method::exact, Method::pseudonormal}) {
+            const auto field = build(mesh, {.voxelSize = 1, .method = method, .sign = Sign::winding});
+            double worst = 0;
+            for (auto voxel = field.grids().distance->cbeginValueOn(); voxel; ++voxel) {
+                const openvdb::Coord at = voxel.getCoord();
+                const double distance = test::distance(mesh, glm::dvec3(at.x(), at.y(), at.z()));
+                worst = std::max(worst, std::abs(std::abs(double(*voxel)) - distance));
+            }
+            CAPTURE(round, leg, other, method);
+            CHECK(field.activeVoxels() > 80);
+            CHECK(worst < test::exactness);
+        }
+    }
+}
+
 TEST_CASE("exact: bytes do not depend on the order of triangles or the number of threads") {
     const unsigned seed = test::seed();
     CAPTURE(seed);
