@@ -31,12 +31,16 @@ struct Body {
     Measure measure = Measure::samples;  ///< as in ColliderOptions; samples where there is no mesh
 };
 
+/// Wider margins are a mistake of units [voxels].
+inline constexpr float mostMargin = 1000;
+
 /// As in files and on the command line: samples, edges or triangles.
 const char* nameOf(Measure measure);
 
 /// The level set, to write as a .vdb file, with the body beside it: surface points as a grid of OpenVDB points, the
 /// rest as metadata. Nothing is lost: bodyOf() gives the same bits. The grids of `levelSet` are shared, not copied.
-/// Throws std::invalid_argument if the body has no points, or a mesh that is not valid or of more than 2 GiB.
+/// Throws std::invalid_argument if the body has no points, a mesh that is not valid or of more than 2 GiB, or if it is
+/// one that bodyOf() would refuse.
 LevelSet withBody(const LevelSet& levelSet, const Body& body);
 
 /// Whether some body was put beside a level set.
