@@ -4,6 +4,7 @@
 
 // [voxels]
 #define CELL_DIAGONAL 1.7320508f
+#define BOUND_DOWNWARD (1 - 0x1p-22)
 // Bits of a place below the voxel, which leave those of the voxel in its block in the same word, and what leaves a
 // fixed-point number in the lower bits of a double below 2^22.
 #define FRACTION_BITS 29
@@ -51,11 +52,11 @@ float interpolationError(float3 fraction) {
 
 // Clearance::around() [voxels].
 float clearanceAt(const Field* field, double3 place) {
-    const float3 point = convert_float3(place) / (float)(PART_SIDE);
+    const double3 point = place / (double)(PART_SIDE);
     const int3 size = BLOCK_SIDE / PART_SIDE * blocksOf(field);
-    const int3 part = min(convert_int3(clamp(point, (float3)(0.0f), convert_float3(size))), size - 1);
-    const float3 way = point - (convert_float3(part) + 0.5f);
-    const float length = sqrt(way.x * way.x + way.y * way.y + way.z * way.z);
+    const int3 part = min(convert_int3(clamp(convert_float3(point), (float3)(0.0f), convert_float3(size))), size - 1);
+    const double3 way = point - (convert_double3(part) + 0.5);
+    const float length = (float)(sqrt(way.x * way.x + way.y * way.y + way.z * way.z));
     const float centre = (float)(field->centres[centreOf(part, blocksOf(field))]) * (1.0f / WAY_STEPS);
     return (float)(PART_SIDE) * (fabs(centre) - length);
 }
@@ -68,7 +69,7 @@ float boundOutside(const Field* field, double3 place, double3 extent) {
     const Frame* frame = &field->frame;
     const double bound =
         (length - (double)(CELL_DIAGONAL)) * (double)(frame->voxelSize) + (double)(frame->exteriorWidth);
-    return (float)(clamp(bound, 0.0, (double)(FLT_MAX)));
+    return (float)(clamp(BOUND_DOWNWARD * bound, 0.0, (double)(FLT_MAX)));
 }
 
 float boundInEmptyBlock(const Field* field, bool inside, double3 place) {

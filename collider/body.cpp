@@ -28,7 +28,9 @@ using Points = openvdb::points::PointDataGrid;
 constexpr std::int32_t format = 1;       // grows when an older reader would get it wrong
 constexpr double pointCell = 4;          // edge of a voxel of points, at least [voxels of the field]: holds a few
 constexpr float unitError = 1e-4f;       // of what ought to have unit length; single precision leaves 1e-7
+constexpr float massError = 1e-3f;       // of moments of inertia, in parts of the largest
 constexpr float boundsError = 1e-5f;     // of points outside of the bounds, in parts of their size
+constexpr double fieldBeyondBand = 4;    // what of a field may lie beyond its mesh and band [voxels]
 constexpr double fieldBesideMesh = 1.5;  // what of a mesh may lie outside of its field's box [voxels]
 
 namespace entry {
@@ -105,6 +107,10 @@ bool isFinite(const glm::vec3& v) {
     return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
 }
 
+std::string text(const glm::vec3& v) {
+    return fmt::format("({:g}, {:g}, {:g})", v.x, v.y, v.z);
+}
+
 bool isUnit(float length) {
     return std::abs(length - 1) < unitError;
 }
@@ -112,30 +118,38 @@ bool isUnit(float length) {
 // Puts points into the order of their features.
 class Collector {
   public:
-    explicit Collector(std::size_t count) : points_(count), seen_(count, false) {}
-
     void add(std::int32_t feature, const SurfacePoint& point) {
-        if (feature < 0 || std::size_t(feature) >= points_.size() || seen_[feature])
-            refuse(fmt::format("a surface point has the number {} of another, or none", feature));
         if (!isFinite(point.position) || !isUnit(glm::length(point.normal)))
             refuse(fmt::format("surface point {} is no place with a normal", feature));
-        seen_[feature] = true;
-        points_[feature] = point;
+        points_.emplace_back(feature, point);
     }
 
-    std::vector<SurfacePoint> take() { return std::move(points_); }
+    std::vector<SurfacePoint> take() {
+        std::stable_sort(points_.begin(), points_.end(),
+                         [](const auto& a, const auto& b) { return a.first < b.first; });
+        std::vector<SurfacePoint> ordered;
+        for (const auto& [feature, point] : points_) {
+            if (feature != std::int64_t(ordered.size()))
+                refuse(fmt::format("a surface point has the number {} of another, or none", feature));
+            ordered.push_back(point);
+        }
+        return ordered;
+    }
 
   private:
-    std::vector<SurfacePoint> points_;
-    std::vector<bool> seen_;
+    std::vector<std::pair<std::int32_t, SurfacePoint>> points_;
 };
 
 template <class Value>
 using Handle = openvdb::points::AttributeHandle<Value>;
 
 SurfacePoints load(const Points& grid) {
-    Collector collector(openvdb::points::pointCount(grid.tree()));
+    Collector collector;
     for (auto leaf = grid.tree().cbeginLeaf(); leaf; ++leaf) {
+        leaf->validateOffsets();
+        // as many as are said to be equal take no room in a file
+        if (leaf->pointCount() > 1 && leaf->constAttributeArray(attribute::feature).isUniform())
+            refuse("surface points have the same number");
         const Handle<Vec3s> position(leaf->constAttributeArray(attribute::position));
         const Handle<Vec3s> normal(leaf->constAttributeArray(attribute::normal));
         const Handle<std::int32_t> feature(leaf->constAttributeArray(attribute::feature));
@@ -199,26 +213,43 @@ void storeMass(openvdb::FloatGrid& grid, const MassProperties& mass) {
     grid.insertMeta(entry::axes, openvdb::Vec4SMetadata({q.x, q.y, q.z, q.w}));
 }
 
-void requirePositive(const glm::vec3& moments, const char* name) {
-    if (!(std::min({moments.x, moments.y, moments.z}) > 0)) refuse(fmt::format("'{}' is not positive", name));
-}
-
 std::optional<MassProperties> loadMass(const Entries& entries) {
     if (!entries.find<double>(entry::volume)) return std::nullopt;
     MassProperties mass;
     mass.volume = entries.get<double>(entry::volume);
-    if (!(mass.volume > 0 && std::isfinite(mass.volume))) refuse(fmt::format("'{}' is {}", entry::volume, mass.volume));
     mass.centre = entries.vector(entry::centre);
     const glm::vec3 diagonal = entries.vector(entry::inertia), products = entries.vector(entry::products);
-    requirePositive(diagonal, entry::inertia);
     mass.inertia = {diagonal.x, products.x, products.y, products.x, diagonal.y,
                     products.z, products.y, products.z, diagonal.z};
     mass.principalInertia = entries.vector(entry::principal);
-    requirePositive(mass.principalInertia, entry::principal);
     const auto q = entries.get<openvdb::Vec4s>(entry::axes);
     mass.principalAxes = glm::quat(q.w(), q.x(), q.y(), q.z());
-    if (!isUnit(glm::length(mass.principalAxes))) refuse(fmt::format("'{}' is no rotation", entry::axes));
     return mass;
+}
+
+// Of a solid within a box; from a field, it may be a voxel wider than its mesh.
+void check(const MassProperties& mass, const Bounds& bounds, float room) {
+    const auto require = [](bool holds, const char* name, const auto& value, const char* range) {
+        if (!holds) refuse(fmt::format("'{}' is {}, and must be {}", name, value, range));
+    };
+    const Bounds box{bounds.lower - room, bounds.upper + room};
+    const glm::dvec3 size(box.size());
+    require(mass.volume > 0 && mass.volume <= size.x * size.y * size.z, entry::volume, mass.volume,
+            "above 0 and no more than that of the bounds");
+    const glm::vec3 &centre = mass.centre, p = mass.principalInertia;
+    require(centre == glm::clamp(centre, box.lower, box.upper), entry::centre, text(centre), "within the bounds");
+    require(p.x > 0 && p.x <= p.y && p.y <= p.z && p.z <= (1 + massError) * (p.x + p.y), entry::principal, text(p),
+            "positive, ascending, and the last no more than the sum of the others");
+    require(double(p.z) <= mass.volume * glm::dot(size, size), entry::principal, text(p),
+            "no more than the bounds allow");
+    require(isUnit(glm::length(mass.principalAxes)), entry::axes, "no rotation", "of unit length");
+    const glm::mat3 axes = glm::mat3_cast(mass.principalAxes);
+    const glm::mat3 turned =
+        axes * glm::mat3(p.x, 0, 0, 0, p.y, 0, 0, 0, p.z) * glm::transpose(axes) / p.z - mass.inertia / p.z;
+    for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j)
+            require(std::abs(turned[i][j]) <= massError, i == j ? entry::inertia : entry::products, mass.inertia[i][j],
+                    "what the principal moments make it");
 }
 
 void requireWithin(const SurfacePoints& points, const Bounds& bounds) {
@@ -245,7 +276,6 @@ std::size_t bytesOf(const MeshHead& head) {
 
 // A head, three coordinates of each vertex, three vertices of each triangle.
 openvdb::Metadata::Ptr packed(const Mesh& mesh) {
-    validate(mesh);
     const MeshHead head{hash(mesh), mesh.points.size(), mesh.triangles.size()};
     if (bytesOf(head) > mostMeshBytes)
         throw std::invalid_argument(
@@ -305,9 +335,25 @@ void requireWithin(const Bounds& bounds, const openvdb::FloatGrid& grid) {
     const openvdb::CoordBBox box = grid.evalActiveVoxelBoundingBox();
     const openvdb::Vec3d lower = grid.indexToWorld(box.min().asVec3d() - openvdb::Vec3d(fieldBesideMesh)),
                          upper = grid.indexToWorld(box.max().asVec3d() + openvdb::Vec3d(fieldBesideMesh));
-    for (int axis = 0; axis < 3; ++axis)
-        if (!(double(bounds.lower[axis]) >= lower[axis] && double(bounds.upper[axis]) <= upper[axis]))
+    const double band = double(grid.background()) + fieldBeyondBand * grid.voxelSize()[0];
+    for (int axis = 0; axis < 3; ++axis) {
+        const double low = double(bounds.lower[axis]) - lower[axis], high = upper[axis] - double(bounds.upper[axis]);
+        if (!(low >= 0 && high >= 0))
             throw std::invalid_argument("the body is of another field: its surface lies outside of the voxels");
+        if (!(low <= band && high <= band))
+            throw std::invalid_argument("the body is of another field: voxels of the band lie far from its surface");
+    }
+}
+
+// Whether it can be one of this field.
+void check(const Body& body, const openvdb::FloatGrid& grid) {
+    const auto voxel = float(grid.voxelSize()[0]);
+    if (!(body.margin >= 0 && body.margin <= mostMargin * voxel))
+        refuse(fmt::format("'{}' is {}, and must be 0 to {} voxels", entry::margin, body.margin, mostMargin));
+    if (body.mass) check(*body.mass, body.bounds, voxel);
+    requireWithin(body.points, body.bounds);
+    requireWithin(body.bounds, grid);
+    if (body.mesh) requireSame(bounds(*body.mesh), body.bounds);
 }
 
 }  // namespace
@@ -320,8 +366,10 @@ const char* nameOf(Measure measure) {
 
 LevelSet withBody(const LevelSet& given, const Body& body) {
     if (body.points.points().empty()) throw std::invalid_argument("a body has surface points");
-    openvdb::initialize();
+    if (body.mesh) validate(*body.mesh);
     const LevelSet& levelSet = body.filled ? *body.filled : given;
+    check(body, *levelSet.grids().distance);
+    openvdb::initialize();
     const auto distance = openvdb::ConstPtrCast<openvdb::FloatGrid>(levelSet.grids().distance)->copy();
     for (const char* stale : {entry::volume, entry::centre, entry::inertia, entry::products, entry::principal,
                               entry::axes, entry::mesh, entry::measure})
@@ -353,17 +401,13 @@ Body bodyOf(const LevelSet& levelSet) {
         throw std::invalid_argument(fmt::format("the body is of kind {}, which only another version knows", *kind));
     Body body;
     body.margin = entries.get<float>(entry::margin);
-    if (!(body.margin >= 0 && std::isfinite(body.margin)))
-        refuse(fmt::format("'{}' is {}", entry::margin, body.margin));
     body.bounds.lower = entries.vector(entry::lower);
     body.bounds.upper = entries.vector(entry::upper);
     body.mass = loadMass(entries);
     body.points = pointsOf(levelSet);
     body.mesh = meshOf(levelSet);
     if (body.mesh) body.measure = measureOf(entries.get<std::string>(entry::measure));
-    requireWithin(body.points, body.bounds);
-    requireWithin(body.bounds, *levelSet.grids().distance);
-    if (body.mesh) requireSame(bounds(*body.mesh), body.bounds);
+    check(body, *levelSet.grids().distance);
     return body;
 }
 

@@ -33,13 +33,16 @@ struct Body {
     std::optional<LevelSet> filled;
 };
 
+/// Wider margins are a mistake of units [voxels].
+inline constexpr float mostMargin = 1000;
+
 /// As in files and on the command line: samples, edges or triangles.
 const char* nameOf(Measure measure);
 
 /// The level set, to write as a .vdb file, with the body beside it: surface points as a grid of OpenVDB points, the
 /// rest as metadata. Nothing is lost: bodyOf() gives the same bits, but that a body with Body::filled is put beside
 /// that level set instead of the given one. The grids are shared, not copied. Throws std::invalid_argument if the body
-/// has no points, or a mesh that is not valid or of more than 2 GiB.
+/// has no points, a mesh that is not valid or of more than 2 GiB, or if it is one that bodyOf() would refuse.
 LevelSet withBody(const LevelSet& levelSet, const Body& body);
 
 /// Whether some body was put beside a level set.

@@ -39,8 +39,6 @@ constexpr float settled = 1e-4f;
 constexpr float farthestOn = 50;
 // Nearer to each other, the way between them tells no direction [voxels].
 constexpr float shortest = 1e-3f;
-// Wider margins are a mistake of units [voxels].
-constexpr float mostMargin = 1000;
 // Holes no wider than this are cracks, whose rims lie on each other [voxels].
 constexpr float crackWidth = 0.01f;
 // A tip that has sunk into another one sees its sides; what it opposes is seen so far back along its normal [voxels].
@@ -458,7 +456,8 @@ const Field& Collider::measured() const {
 }
 
 const MassProperties& Collider::mass() const {
-    if (!body_.mass) throw std::invalid_argument("collider: the body encloses no volume");
+    if (!body_.mass)
+        throw std::invalid_argument("collider: the body encloses no volume, or its inertia is beyond single precision");
     return *body_.mass;
 }
 

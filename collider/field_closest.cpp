@@ -7,11 +7,13 @@
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <limits>
 #include <memory>
 #include <utility>
 
 #include "collider/field.h"
 #include "collider/field_data.h"
+#include "collider/path.h"
 #include "collider/zero_set.h"
 
 namespace bilayer {
@@ -112,6 +114,7 @@ bool FieldData::divides(const glm::dvec3& place, const glm::dvec3& normal) const
 // whose normals do, or of a wall that the field confirms. Else by the field alone, whose samples blend what the surface
 // is on either side of an edge.
 bool FieldData::isInside(const NearestFeature& nearest, const glm::vec3& point) const {
+    if (!mesh->mayEnclose(glm::dvec3(point))) return false;
     const Side side = sideAt(toLocal(point));
     const double height = heightOver(nearest);
     const bool tells = std::abs(height) > cancelled * glm::length(nearest.way);
@@ -123,12 +126,13 @@ bool FieldData::isInside(const NearestFeature& nearest, const glm::vec3& point) 
 // What is known of a point once the part of the mesh is found that is nearest to it.
 ClosestPoint FieldData::closestOn(std::uint32_t part, const glm::vec3& point, float maxDistance) const {
     if (part == MeshTree::noPart) return {};
-    const NearestFeature nearest = mesh->featureOfPart(part, glm::dvec3(point));
-    const double distance = glm::length(nearest.way);
+    const glm::dvec3 from = mesh->approached(glm::dvec3(point));
+    const NearestFeature nearest = mesh->featureOfPart(part, from);
+    const double distance = glm::length(nearest.way + (from - glm::dvec3(point)));
     if (!(distance <= double(maxDistance))) return {};
     const bool inside = isInside(nearest, point);
-    return {.distance = float(inside ? -distance : distance),
-            .position = glm::vec3(glm::dvec3(point) + nearest.way),
+    return {.distance = inside ? -toFloat(distance) : toFloat(distance),
+            .position = glm::vec3(from + nearest.way),
             .normal = outwardNormal(nearest, inside),
             .triangle = nearest.triangle,
             .feature = nearest.feature,
@@ -161,12 +165,20 @@ ClosestPoint FieldData::closest(const glm::vec3& point, float maxDistance) const
     return closestOn(orBeyond(part, place, point, maxDistance), point, maxDistance);
 }
 
+// What is far away is as near to the zeros as it is from there, to a millionth of the field's size.
+glm::dvec3 FieldData::whereZerosTell(const glm::dvec3& local) const {
+    constexpr double sizes = 1e6;
+    return approached(local, glm::dvec3(0), extent(), sizes, sizes);
+}
+
 ClosestPoint FieldData::closestZero(const glm::vec3& point, float maxDistance) const {
     const glm::dvec3 local = toLocal(point);
     if (!std::isfinite(local.x + local.y + local.z) || !(maxDistance >= 0)) return {};
-    const auto nearest = nearestZero(*this, local, double(maxDistance) * perMetre);
-    if (!nearest) return {};
-    const auto distance = float(glm::distance(local, *nearest) * voxel);
+    const glm::dvec3 from = whereZerosTell(local);
+    const double reach = double(maxDistance) * perMetre;
+    const auto nearest = nearestZero(*this, from, from == local ? reach : std::numeric_limits<double>::infinity());
+    if (!nearest || glm::distance(local, *nearest) > reach) return {};
+    const float distance = toFloat(glm::distance(local, *nearest) * voxel);
     return {.distance = sample(local).distance < 0 ? -distance : distance,
             .position = toWorld(*nearest),
             .normal = glm::vec3(zeroNormal(*this, *nearest)),

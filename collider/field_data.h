@@ -23,6 +23,11 @@ inline bool isFinite(const glm::vec3& v) {
     return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
 }
 
+/// A length as a float; never infinite, as points and directions are not.
+inline float toFloat(double length) {
+    return float(std::min(length, double(std::numeric_limits<float>::max())));
+}
+
 // Vectors of the compiler's own: Highway has none of fixed size for the plain instruction set.
 using Doubles [[gnu::vector_size(16)]] = double;
 using Floats [[gnu::vector_size(16)]] = float;
@@ -95,7 +100,7 @@ struct FieldData : FieldLayout {
 
     /// The distance from the surface, at least; not positive where nothing is known [voxels].
     float clearanceAt(const glm::dvec3& local) const {
-        return float(Clearance::partSide) * coarse.around(glm::vec3(local) / float(Clearance::partSide));
+        return float(Clearance::partSide) * coarse.around(local / double(Clearance::partSide));
     }
 
     /// What the field knows of the side that a point lies on.
@@ -114,6 +119,7 @@ struct FieldData : FieldLayout {
 
     /// The closest point of the mesh, or of the zero set where there is none.
     ClosestPoint closest(const glm::vec3& point, float maxDistance) const;
+    glm::dvec3 whereZerosTell(const glm::dvec3& local) const;
     ClosestPoint closestZero(const glm::vec3& point, float maxDistance) const;
 
     bool inside(const glm::vec3& point) const;

@@ -8,6 +8,7 @@
 #include "collider/field.h"
 #include "collider/field_data.h"
 #include "collider/mesh_rays.h"
+#include "collider/sphere_tracing.h"
 #include "collider/zero_set.h"
 
 namespace bilayer {
@@ -17,12 +18,6 @@ namespace {
 constexpr double endRounding = 1 + 1e-12;
 /// Spheres of a smaller radius are rays [voxels].
 constexpr double leastRadius = 1e-6;
-/// A sphere's way is looked at piece by piece [voxels], and in no more pieces than this.
-constexpr double pieceLength = 2, mostPieces = 4096;
-/// A sphere is looked for its nearest triangle no farther than this away from it [pieces].
-constexpr double lookAhead = 4;
-/// What the nearest triangle may be off by [voxels], and as a part of its distance.
-constexpr double nearestSlack = 1e-4, nearestRounding = 2e-6;
 
 bool isRay(const Ray& ray) {
     return isFinite(ray.origin) && isFinite(ray.direction) && ray.direction != glm::vec3(0) && ray.maxDistance >= 0;
@@ -54,63 +49,42 @@ Path toLocal(const FieldData& field, const Path& path) {
 std::optional<RayHit> hitMesh(const MeshTree& mesh, const Path& path) {
     const auto hit = firstHit(mesh, path);
     if (!hit) return std::nullopt;
-    return RayHit{float(hit->along), glm::vec3(hit->position), normalOf(mesh.mesh(), *hit, path), hit->triangle};
+    return RayHit{toFloat(hit->along), glm::vec3(hit->position), normalOf(mesh.mesh(), *hit, path), hit->triangle};
 }
 
 std::optional<RayHit> hitZero(const FieldData& field, const Path& path) {
-    const Path local = toLocal(field, path);
-    const auto along = firstInside(field, local);
+    const auto part = partIn(toLocal(field, path), glm::dvec3(0), field.extent());
+    if (!part) return std::nullopt;
+    const auto along = firstInside(field, part->path);
     if (!along) return std::nullopt;
-    const glm::dvec3 normal = zeroNormal(field, local.at(*along));
-    return RayHit{.distance = float(*along * field.voxel),
-                  .position = field.toWorld(local.at(*along)),
+    const glm::dvec3 position = part->path.at(*along), normal = zeroNormal(field, position);
+    return RayHit{.distance = toFloat((part->from + *along) * field.voxel),
+                  .position = field.toWorld(position),
                   .normal = glm::vec3(normal != glm::dvec3(0) ? normal : -path.direction)};
 }
 
-// What a sphere may go on along a path before it touches the mesh; no more is asked for than `reach` [m].
-double wayLeft(const FieldData& field, const glm::dvec3& centre, double radius, double reach) {
-    const double slack = nearestSlack * field.voxel;
-    const Sample here = field.sample((centre - field.origin) * field.perMetre);
-    const double bound = here.inBand ? 0 : double(here.distance) - double(field.error) - radius - slack;
-    if (bound >= reach) return bound;
-    const std::uint32_t triangle = field.mesh->nearest(centre, float((radius + reach) * field.perMetre));
-    const double way =
-        triangle == noTriangle ? radius + reach : glm::length(field.mesh->featureOf(triangle, centre).way);
-    return way * (1 - nearestRounding) - radius - slack;
-}
-
-// Through what is empty in strides, as J. C. Hart, "Sphere tracing", The Visual Computer 12 (1996) 527-545; what may be
-// touched within the next piece is looked at triangle by triangle, so that a sphere that grazes the surface takes no
-// more steps than there are pieces.
 std::optional<RayHit> touchMesh(const FieldData& field, const Path& path, double radius) {
-    const auto part = clip(path, glm::dvec3(field.bounds.lower) - radius, glm::dvec3(field.bounds.upper) + radius);
-    if (!part) return std::nullopt;
-    const auto [from, to] = *part;
-    const double piece = std::max(pieceLength * field.voxel, (to - from) / mostPieces);
-    for (double along = from; along <= to;) {
-        const double left = wayLeft(field, path.at(along), radius, lookAhead * piece);
-        if (left > piece) {
-            along += left;
-            continue;
-        }
-        const Path next{path.at(along), path.direction, std::min(piece, to - along)};
-        if (const auto hit = firstTouch(*field.mesh, next, radius))
-            return RayHit{.distance = float(along + hit->along),
-                          .position = glm::vec3(hit->position),
-                          .normal = glm::vec3(glm::normalize(next.at(hit->along) - hit->position)),
-                          .triangle = hit->triangle};
-        along += piece;
-    }
-    return std::nullopt;
+    const auto clearanceAt = [&](const glm::dvec3& centre) {
+        const Sample here = field.sample((centre - field.origin) * field.perMetre);
+        return here.inBand ? 0 : double(here.distance) - double(field.error);
+    };
+    const auto touch = firstTouchOnWay(*field.mesh, path, radius, clearanceAt);
+    if (!touch) return std::nullopt;
+    return RayHit{toFloat(touch->along), glm::vec3(touch->position), glm::vec3(touch->normal), touch->triangle};
 }
 
 std::optional<RayHit> touchZero(const FieldData& field, const Path& path, double radius) {
-    const Path local = toLocal(field, path);
-    const auto touch = firstZeroTouch(field, local, radius * field.perMetre);
+    const double reach = radius * field.perMetre;
+    const auto part = partIn(toLocal(field, path), glm::dvec3(-reach), field.extent() + reach);
+    if (!part) return std::nullopt;
+    auto touch = firstZeroTouch(field, part->path, reach);
     if (!touch) return std::nullopt;
-    return RayHit{.distance = float(touch->along * field.voxel),
+    const glm::dvec3 centre = part->path.at(touch->along), from = field.whereZerosTell(centre);
+    // of zeros that are equally near to a centre so far away, the nearest
+    if (from != centre) touch->position = nearestZero(field, from, std::numeric_limits<double>::infinity()).value();
+    return RayHit{.distance = toFloat((part->from + touch->along) * field.voxel),
                   .position = field.toWorld(touch->position),
-                  .normal = glm::vec3(glm::normalize(local.at(touch->along) - touch->position))};
+                  .normal = glm::vec3(glm::normalize(centre - touch->position))};
 }
 
 // From outside or inside.

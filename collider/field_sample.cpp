@@ -37,13 +37,16 @@ float interpolationError(const glm::vec3& fraction) {
     return std::sqrt(spread.x + spread.y + spread.z);
 }
 
+// Bounds are rounded down: room for what single precision makes of a voxel's size and of the bound itself.
+constexpr double downward = 1 - 0x1p-22;
+
 // Who comes from outside the directory's box has that way to go, and is then no more than a cell's diagonal from a
 // voxel beyond the band.
 float boundOutside(const FieldData& field, const glm::dvec3& local) {
     const double way = glm::distance(local, glm::clamp(local, glm::dvec3(0), field.extent()));
     if (!std::isfinite(way)) return infinity;
     const double bound = (way - double(cellDiagonal)) * double(field.voxelSize) + double(field.exteriorWidth);
-    return float(std::clamp(bound, 0., double(std::numeric_limits<float>::max())));
+    return float(std::clamp(downward * bound, 0., double(std::numeric_limits<float>::max())));
 }
 
 // The nearest voxel of the block itself is beyond the band. It is half a cell's diagonal away, or a whole one where the

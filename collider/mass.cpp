@@ -6,6 +6,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/gtc/matrix_access.hpp>
+#include <limits>
 #include <stdexcept>
 #include <utility>
 
@@ -94,6 +95,10 @@ MassProperties massProperties(const Moments& moments, const glm::dvec3& origin) 
     result.inertia = glm::mat3(inertia);
     result.principalInertia = glm::vec3(principal.values);
     result.principalAxes = glm::quat(axes);
+    const double least = principal.values[0], most = principal.values[2];
+    if (least > 0 && !(least >= std::numeric_limits<float>::min() && most <= std::numeric_limits<float>::max()))
+        throw std::invalid_argument(
+            "mass properties: the moments of inertia are beyond single precision: scale the mesh");
     return result;
 }
 

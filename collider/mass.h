@@ -21,7 +21,7 @@ struct MassProperties {
 /// Exact integrals over the tetrahedra that the triangles span with the centre of the bounds, in double precision
 /// (D. Eberly, "Polyhedral Mass Properties (Revisited)", 2002). The mesh should be closed; an inside-out one gives the
 /// same as its reverse. Throws std::invalid_argument if the volume is zero, as for an open sheet, or the inertia not
-/// positive.
+/// positive, or beyond single precision: that of a body of 1e8 m.
 MassProperties massProperties(const Mesh& mesh);
 
 /// Of what is negative between the voxels. The error is of third order in the voxel size where the surface is smooth
@@ -29,7 +29,7 @@ MassProperties massProperties(const Mesh& mesh);
 /// voxels. At 128 voxels it is below 0.5 %, and below 0.05 % in most cases, where walls are three voxels thick in the
 /// mean; those below two voxels are seen in part only. Where sharp edges are long, a field of the double layer method
 /// is off by up to 0.5 % at 128 voxels and 0.3 % at 256: its distances beside them are too large. The same bytes for
-/// any number of threads. Throws std::invalid_argument if there is no inside.
+/// any number of threads. Throws std::invalid_argument if there is no inside, or the inertia beyond single precision.
 MassProperties massProperties(const LevelSet& levelSet);
 
 }  // namespace bilayer

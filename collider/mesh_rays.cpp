@@ -76,12 +76,23 @@ inline bool descend(const WideTree& tree, Skip skip, Open open, Visit visit) {
     return false;
 }
 
+// Moved towards the tree's corner where it is too far away: all that lies in the tree comes nearer by that, but for the
+// slack of a Place.
+inline glm::dvec3 withinReach(const glm::dvec3& p) {
+    const double away = std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)});
+    return away > double(farthestPlace) ? p * (double(farthestPlace) / away) : p;
+}
+
 // A point in the tree's frame, in whole voxels and the rest, and how far rounding may move boxes from it [voxels].
 struct Place {
     glm::vec3 cell, inCell, point;
     float slack;
 
-    Place(const WideTree& tree, const glm::dvec3& p) : cell(glm::floor(p)), inCell(p - glm::floor(p)), point(p) {
+    Place(const WideTree& tree, const glm::dvec3& at) {
+        const glm::dvec3 p = withinReach(at);
+        cell = glm::floor(p);
+        inCell = p - glm::floor(p);
+        point = p;
         const glm::vec3 size = glm::max(glm::abs(point), glm::vec3(tree.size));
         slack = placeRounding * (size.x + size.y + size.z);
     }
@@ -244,7 +255,7 @@ class TouchSearch {
     // Only what is no farther from the start can be touched before the best.
     void limit() {
         const double reach = (radius_ + hit_.along) / double(mesh_.voxelSize());
-        const float rounded = float(reach) * (1 + passRounding) + passTolerance + place_.slack;
+        const float rounded = std::min(float(reach) * (1 + passRounding) + passTolerance + place_.slack, longestReach);
         limit2_ = rounded * rounded * roundUp;
     }
 
@@ -294,7 +305,7 @@ class BoxSearch {
         const double perMetre = 1 / double(mesh.voxelSize());
         const glm::dvec3 half = box.halfSize * perMetre;
         const float room = passTolerance + place_.slack;
-        const float radius = float(glm::length(half)) * (1 + passRounding) + room;
+        const float radius = std::min(float(glm::length(half)) * (1 + passRounding) + room, longestReach);
         limit2_ = radius * radius * roundUp;
         for (int k = 0; k < 3; ++k) {
             axes_[k] = glm::vec3(box.axes[k]);
@@ -390,14 +401,11 @@ glm::dvec3 toTree(const MeshTree& mesh, const glm::dvec3& point) {
 
 std::optional<MeshHit> firstHit(const MeshTree& mesh, const Path& path) noexcept {
     // from where it comes near the mesh, so that single precision is enough
-    const double voxel = mesh.voxelSize();
-    const auto part = clip({toTree(mesh, path.origin), path.direction, path.length / voxel}, glm::dvec3(-1),
-                           glm::dvec3(mesh.tree().size) + 1.0);
+    const auto [lower, upper] = mesh.box();
+    const auto part = partIn(path, lower, upper);
     if (!part) return std::nullopt;
-    const auto [enter, leave] = *part;
-    const Path near{path.at(enter * voxel), path.direction, (leave - enter) * voxel};
-    auto hit = HWY_DYNAMIC_DISPATCH(searchRay)(mesh, toTree(mesh, near.origin), near);
-    if (hit) hit->along += enter * voxel;
+    auto hit = HWY_DYNAMIC_DISPATCH(searchRay)(mesh, toTree(mesh, part->path.origin), part->path);
+    if (hit) hit->along += part->from;
     return hit;
 }
 

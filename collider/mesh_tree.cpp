@@ -18,6 +18,7 @@
 #include <limits>
 #include <utility>
 
+#include "collider/path.h"
 #include "sdf/leaf_measure.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -49,7 +50,8 @@ class Search {
         const glm::dvec3 cell = glm::floor(point);
         cell_ = cell;
         inCell_ = glm::vec3(point - cell);
-        best2_ = bound * bound;
+        const float reach = std::min(bound, longestReach);
+        best2_ = reach * reach;
         part_ = MeshTree::noPart;
     }
 
@@ -288,8 +290,10 @@ constexpr double longestEdge = 16;
 constexpr double thinnest = 1e-7;
 /// A height below this part of the longest edge leaves no foot on the plane that is better than the edges.
 constexpr double flatness = 1e-10;
-/// As many sizes of the mesh away all its triangles are equally far, to a millionth: points beyond may come as near.
-constexpr double farthest = 1e6;
+/// Points that are farther from the mesh than the one are seen from the other instead [sizes of the mesh]. There,
+/// single precision is off by a thousandth of a size, and the other direction of what lies aside by half as much: less
+/// than a millionth of the way of points that are farther.
+constexpr double farthest = 4000, farEnough = 1000;
 /// What distances are exact to: places no farther from each other than this are one. So far from all edges a point lies
 /// over a triangle, whatever single precision made of these [voxels].
 constexpr double samePlace = 1e-5;
@@ -330,25 +334,28 @@ MeshTree::MeshTree(std::shared_ptr<const Mesh> mesh, float voxelSize)
     tbb::parallel_invoke(makeTree, [&] { normals_ = FeatureNormals(*mesh_, thinnest * double(voxelSize_)); });
 }
 
-// In the tree's frame; the bound becomes negative where nothing is to be found.
-void MeshTree::place(const glm::dvec3& point, glm::dvec3& local, float& bound) const noexcept {
-    local = toTree(point);
-    const glm::dvec3 size(tree_.size);
-    const double far = farthest * (size.x + size.y + size.z), away = glm::distance(local, 0.5 * size);
-    const bool beyond = away > far;
-    if (!std::isfinite(away) || !(bound >= 0) || (beyond && double(bound) < away - far)) {
-        local = glm::dvec3(0);
-        bound = -1;
-    } else if (beyond) {
-        local = 0.5 * size + (far / away) * (local - 0.5 * size);
-        bound = std::numeric_limits<float>::infinity();
-    }
+std::pair<glm::dvec3, glm::dvec3> MeshTree::box() const noexcept {
+    const double voxel = voxelSize_;
+    const glm::dvec3 base(tree_.base), size(tree_.size);
+    return {(base - 1.0) * voxel, (base + size + 1.0) * voxel};
+}
+
+bool MeshTree::mayEnclose(const glm::dvec3& point) const noexcept {
+    const auto [lower, upper] = box();
+    return point == glm::clamp(point, lower, upper);
+}
+
+glm::dvec3 MeshTree::approached(const glm::dvec3& point) const noexcept {
+    const auto [lower, upper] = box();
+    return bilayer::approached(point, lower, upper, farthest, farEnough);
 }
 
 std::uint32_t MeshTree::nearestPart(const glm::dvec3& point, float bound) const noexcept {
-    glm::dvec3 local;
-    place(point, local, bound);
-    return bound < 0 ? noPart : HWY_DYNAMIC_DISPATCH(searchAll)(tree_, groups_.data(), local, bound);
+    const glm::dvec3 from = approached(point);
+    const double closer = glm::distance(point, from);
+    if (!std::isfinite(closer) || !(double(bound) >= closer * perMetre_)) return noPart;
+    const float left = from == point ? bound : std::numeric_limits<float>::infinity();
+    return HWY_DYNAMIC_DISPATCH(searchAll)(tree_, groups_.data(), toTree(from), left);
 }
 
 std::uint32_t MeshTree::nearest(const glm::dvec3& point, float bound) const noexcept {

@@ -39,6 +39,17 @@ class MeshTree {
     MeshTree(std::shared_ptr<const Mesh> mesh, float voxelSize);
     MeshTree(Mesh mesh, float voxelSize) : MeshTree(std::make_shared<const Mesh>(std::move(mesh)), voxelSize) {}
 
+    /// A box around the mesh, a voxel away from it at least [m].
+    std::pair<glm::dvec3, glm::dvec3> box() const noexcept;
+
+    /// False for a point that is outside of that box: what the mesh encloses is not.
+    bool mayEnclose(const glm::dvec3& point) const noexcept;
+
+    /// Where a point is looked for what is nearest to it: the point itself, or where it is thousands of sizes of the
+    /// mesh away, one between it and the mesh. What is nearest to the one is as near to the other, to a millionth of
+    /// the distance, and places on the mesh can be told from it.
+    glm::dvec3 approached(const glm::dvec3& point) const noexcept;
+
     /// The triangle that is nearest to a point: to within 1e-5 voxels up to ten voxels away, to a millionth of the
     /// distance farther away. `noTriangle` if none is as near as the bound, or the point is not finite.
     /// @param point  [m]
@@ -73,7 +84,6 @@ class MeshTree {
     void toEdge(NearestFeature& found, const std::array<glm::dvec3, 3>& corners) const noexcept;
     void toSmallest(NearestFeature& found, const std::array<glm::dvec3, 3>& corners, double room) const noexcept;
     glm::dvec3 toTree(const glm::dvec3& point) const { return point * perMetre_ - glm::dvec3(tree_.base); }
-    void place(const glm::dvec3& point, glm::dvec3& local, float& bound) const noexcept;
     std::uint32_t triangleOf(std::uint32_t part) const {
         return tree_.leaves[part / treeWidth].triangles[part % treeWidth];
     }

@@ -82,11 +82,12 @@ bool touches(const MeshTree& mesh, std::uint32_t triangle, const Path& path, dou
     const double tolerance = touchTolerance * double(mesh.voxelSize());
     double here = 0;
     for (int i = 0; i < mostTangents; ++i) {
-        const glm::dvec3 centre = path.at(here), way = mesh.featureOf(triangle, centre).way;
+        const glm::dvec3 centre = path.at(here), from = mesh.approached(centre);
+        const glm::dvec3 fromThere = mesh.featureOf(triangle, from).way, way = fromThere + (from - centre);
         const double distance = glm::length(way), left = distance - radius;
         if (left <= tolerance) {
             along = here;
-            position = centre + way;
+            position = from + fromThere;
             return true;
         }
         const double approach = glm::dot(way, path.direction) / distance;

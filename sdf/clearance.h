@@ -35,9 +35,9 @@ class Clearance {
         : data_(data), size_(perBlock * data.blocks), extent_(perBlock * data.blocks) {}
 
     /// The distance from the surface, at least; not positive where nothing is known [parts].
-    float around(const glm::vec3& point) const noexcept {
-        const glm::ivec3 part = partOf(point);
-        return std::abs(centreOf(part)) - glm::distance(point, glm::vec3(part) + 0.5f);
+    float around(const glm::dvec3& point) const noexcept {
+        const glm::ivec3 part = partOf(glm::vec3(point));
+        return std::abs(centreOf(part)) - float(glm::distance(point, glm::dvec3(part) + 0.5));
     }
 
     /// Whether a sphere surely lies outside of the surface. False for a centre that is not finite.

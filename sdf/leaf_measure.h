@@ -24,6 +24,9 @@ using Mask = hn::Mask<Tag>;
 
 /// Room for the rounding of a squared distance.
 constexpr float roundUp = 1 + 1e-6f;
+/// Searches place nothing farther away than this, and reach no farther than this: the squares are finite, so that boxes
+/// that are left over, which are infinitely far away, stay out of reach [voxels].
+constexpr float farthestPlace = 1e18f, longestReach = 4e18f;
 
 inline Vec square(Vec x) {
     return hn::Mul(x, x);

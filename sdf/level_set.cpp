@@ -1,19 +1,55 @@
 #include "sdf/level_set.h"
 
 #include <fmt/format.h>
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
+#include <string_view>
 
 #include "sdf/grids.h"
 
 namespace bilayer {
 namespace {
 
+/// Of voxels [m]: the squares of lengths from a thousandth of a voxel to thousands of them are floats.
+constexpr double smallestVoxel = 1e-15, largestVoxel = 1e15;
+/// Of the voxel (0, 0, 0) [voxels]: farther away, floats tell no voxels apart.
+constexpr double farthestOrigin = double(std::uint64_t(1) << 40);
+/// Wider than the longest field a band tells nothing, and is taken for damage [voxels].
+constexpr float widestBand = 1 << 23;
+/// Nothing for fields from elsewhere.
+constexpr std::string_view methods[] = {"", "exact", "double-layer", "pseudonormal", "prism"};
+constexpr std::string_view signs[] = {"", "normals", "winding", "flood", "layers"};
+
 template <class Value>
 Value meta(const openvdb::GridBase& grid, const char* name, const Value& fallback) {
-    const auto entry = grid.getMetadata<openvdb::TypedMetadata<Value>>(name);
-    return entry ? entry->value() : fallback;
+    const auto entry = grid[name];
+    if (!entry) return fallback;
+    const auto typed = openvdb::DynamicPtrCast<const openvdb::TypedMetadata<Value>>(entry);
+    if (!typed)
+        throw std::invalid_argument(fmt::format("grid '{}': '{}' is of type {}, not {}", grid.getName(), name,
+                                                entry->typeName(), openvdb::typeNameAsString<Value>()));
+    return typed->value();
+}
+
+void require(bool holds, const openvdb::GridBase& grid, const char* entry, const auto& value, const char* range) {
+    if (!holds)
+        throw std::invalid_argument(
+            fmt::format("grid '{}': {} is {}, and must be {}", grid.getName(), entry, value, range));
+}
+
+void requireWidth(const openvdb::GridBase& grid, const char* entry, float width) {
+    require(width > 0 && std::isnormal(width) && double(width) <= double(widestBand) * grid.voxelSize()[0], grid, entry,
+            width, "above 0 and at most 2^23 voxels");
+}
+
+std::string requireName(const openvdb::GridBase& grid, const char* entry, const auto& names) {
+    const auto name = meta<std::string>(grid, entry, "");
+    if (std::find(std::begin(names), std::end(names), name) == std::end(names))
+        throw std::invalid_argument(
+            fmt::format("grid '{}': '{}' is none of {}", grid.getName(), entry, fmt::join(names, ", ")));
+    return name;
 }
 
 void requireLevelSet(const Grids& grids) {
@@ -23,19 +59,21 @@ void requireLevelSet(const Grids& grids) {
         throw std::invalid_argument(fmt::format("grid '{}' is no level set", grid.getName()));
     if (!grid.hasUniformVoxels() || !grid.transform().isLinear())
         throw std::invalid_argument(fmt::format("grid '{}' has voxels that are no cubes", grid.getName()));
-    if (!(grid.background() > 0) || !std::isfinite(grid.background()))
-        throw std::invalid_argument(fmt::format("grid '{}' has a background that is no distance", grid.getName()));
+    const double h = grid.voxelSize()[0];
+    require(h >= smallestVoxel && h <= largestVoxel, grid, "the edge of a voxel", h, "from 1e-15 to 1e15");
+    requireWidth(grid, "the background", grid.background());
     if (grid.activeVoxelCount() == 0) throw std::invalid_argument(fmt::format("grid '{}' is empty", grid.getName()));
     // whole voxels along the axes: queries work in index space and must not need a rotation
-    const double h = grid.voxelSize()[0];
     const openvdb::Vec3d origin = grid.indexToWorld(openvdb::Vec3d(0)) / h;
     for (int axis = 0; axis < 3; ++axis) {
         openvdb::Vec3d unit(0);
         unit[axis] = 1;
-        const openvdb::Vec3d step = grid.indexToWorld(unit) / h - origin;
-        if (!step.eq(unit, 1e-5) || std::abs(origin[axis] - std::round(origin[axis])) > 1e-3)
+        const openvdb::Vec3d world = grid.indexToWorld(unit), step = world / h - origin;
+        if (!step.eq(unit, 1e-5) || !(std::abs(origin[axis] - std::round(origin[axis])) <= 1e-3) ||
+            !grid.worldToIndex(world).eq(unit, 1e-3))
             throw std::invalid_argument(
                 fmt::format("grid '{}' is rotated, mirrored or shifted by parts of a voxel", grid.getName()));
+        require(std::abs(origin[axis]) <= farthestOrigin, grid, "the shift", origin[axis], "at most 2^40 voxels");
     }
 }
 
@@ -46,10 +84,16 @@ LevelSet::LevelSet(std::shared_ptr<const Grids> grids) : grids_(std::move(grids)
     const openvdb::FloatGrid& grid = *grids_->distance;
     exteriorWidth_ = grid.background();
     interiorWidth_ = meta<float>(grid, metadata::interiorWidth, exteriorWidth_);
+    requireWidth(grid, metadata::interiorWidth, interiorWidth_);
     errorBound_ = meta<float>(grid, metadata::errorBound, std::numeric_limits<float>::quiet_NaN());
-    method_ = meta<std::string>(grid, metadata::method, "");
-    sign_ = meta<std::string>(grid, metadata::sign, "");
+    require(!(errorBound_ < 0), grid, metadata::errorBound, errorBound_, "0 or above");
+    method_ = requireName(grid, metadata::method, methods);
+    sign_ = requireName(grid, metadata::sign, signs);
     signReason_ = meta<std::string>(grid, metadata::signReason, "");
+    for (const char* count : {metadata::signConflicts, metadata::signUndecided}) {
+        const auto value = meta<std::int64_t>(grid, count, 0);
+        require(value >= 0, grid, count, value, "0 or above");
+    }
     signConflicts_ = std::uint64_t(meta<std::int64_t>(grid, metadata::signConflicts, 0));
     meshHash_ = std::uint64_t(meta<std::int64_t>(grid, metadata::meshHash, 0));
 }

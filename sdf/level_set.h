@@ -14,7 +14,9 @@ struct Grids;
 class LevelSet {
   public:
     /// Takes over grids that are complete and no longer change. Throws std::invalid_argument if they are no level set:
-    /// another grid class, a transform that is more than a uniform scale and whole voxels of shift, or no active voxel.
+    /// another grid class, a transform that is more than a uniform scale and whole voxels of shift, voxels below 1e-15
+    /// or above 1e15 m, no active voxel; or if an entry of theirs is not what it can be: a width that is not positive
+    /// or wider than 2^23 voxels, an error or a count below 0, a method or a way of signs that is not known.
     explicit LevelSet(std::shared_ptr<const Grids> grids);
 
     float voxelSize() const;             ///< [m]

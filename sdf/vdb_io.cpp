@@ -1,7 +1,7 @@
 #include "sdf/vdb_io.h"
 
 #include <fmt/format.h>
-#include <oneapi/tbb/parallel_reduce.h>
+#include <oneapi/tbb/parallel_for.h>
 #include <openvdb/io/File.h>
 #include <openvdb/io/Stream.h>
 #include <openvdb/tree/LeafManager.h>
@@ -10,7 +10,6 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
-#include <functional>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -18,6 +17,7 @@
 #include "sdf/atomic_file.h"
 #include "sdf/grids.h"
 #include "sdf/input_file.h"
+#include "sdf/vdb_lengths.h"
 
 namespace bilayer {
 namespace {
@@ -32,21 +32,58 @@ typename Grid::ConstPtr first(const openvdb::GridPtrVec& grids, auto accept) {
     return nullptr;
 }
 
-// Throws std::invalid_argument where a voxel holds no number, which rounding, searches and solvers would pass on.
-void requireNumbers(const openvdb::FloatGrid& grid) {
-    const openvdb::tree::LeafManager<const openvdb::FloatTree> leaves(grid.tree());
-    const bool finite = tbb::parallel_reduce(
-        leaves.leafRange(), true,
-        [](const auto& range, bool so) {
-            for (auto leaf = range.begin(); leaf && so; ++leaf)
-                so = std::all_of(leaf->buffer().data(), leaf->buffer().data() + openvdb::FloatTree::LeafNodeType::SIZE,
-                                 [](float value) { return std::isfinite(value); });
-            return so;
-        },
-        std::logical_and<>());
-    if (!finite)
-        throw std::invalid_argument(fmt::format("grid '{}' holds a distance that is no finite number", grid.getName()));
-}
+/// Voxels lie no farther from the origin: sums of a few of their coordinates are ints.
+constexpr std::int32_t farthestVoxel = 1 << 30;
+
+/// Looks at all distances of a file. Throws std::invalid_argument where one is no number, which rounding, searches and
+/// solvers would pass on, where a tile is active, which solvers would fill with voxels, or where what is told of the
+/// band does not hold.
+class DistanceCheck {
+  public:
+    explicit DistanceCheck(const LevelSet& levelSet)
+        : grid_(*levelSet.grids().distance),
+          interior_(grid_[metadata::interiorWidth] ? (1 - halfRounding) * levelSet.interiorWidth() : 0) {}
+
+    void run() const {
+        checkTiles();
+        checkPlaces();
+        const openvdb::tree::LeafManager<const openvdb::FloatTree> leaves(grid_.tree());
+        tbb::parallel_for(leaves.leafRange(), [&](const auto& range) {
+            for (auto leaf = range.begin(); leaf; ++leaf)
+                for (auto voxel = leaf->cbeginValueAll(); voxel; ++voxel) check(*voxel, voxel.isValueOn());
+        });
+    }
+
+  private:
+    [[noreturn]] void refuse(const char* why) const {
+        throw std::invalid_argument(fmt::format("grid '{}' {}", grid_.getName(), why));
+    }
+
+    void check(float distance, bool active) const {
+        if (!std::isfinite(distance)) refuse("holds a distance that is no finite number");
+        if (!active && distance < 0 && distance > -interior_)
+            refuse("holds a distance beside its band that 'bilayer:interior_width' counts to it");
+    }
+
+    void checkTiles() const {
+        auto tile = grid_.tree().cbeginValueAll();
+        tile.setMaxDepth(openvdb::FloatTree::ValueAllCIter::LEAF_DEPTH - 1);
+        for (; tile; ++tile) {
+            if (tile.isValueOn()) refuse("has an active tile: a band is active voxel by voxel");
+            check(*tile, false);
+        }
+    }
+
+    void checkPlaces() const {
+        const openvdb::CoordBBox box = grid_.evalActiveVoxelBoundingBox();
+        for (int axis = 0; axis < 3; ++axis)
+            if (box.min()[axis] < -farthestVoxel || box.max()[axis] > farthestVoxel)
+                refuse("has voxels farther than 2^30 voxels from its origin");
+    }
+
+    const openvdb::FloatGrid& grid_;
+    float interior_;  // no inactive voxel inside is nearer to the surface [m]
+};
 
 /// What our files end with, behind all that OpenVDB reads: damage is found before it gets to see it, since its decoder
 /// of Blosc blocks trusts them.
@@ -141,6 +178,8 @@ LevelSet readVdb(const std::filesystem::path& path) {
     try {
         requireSeal(path);
         std::ifstream stream = opened(path);
+        requireLengths(stream, std::filesystem::file_size(path));
+        stream.seekg(0);
         // delayed loading would leave the values, and any damage to them, in the file
         grids = *openvdb::io::Stream(stream, /*delayLoad=*/false).getGrids();
     } catch (const std::exception& error) {
@@ -154,8 +193,9 @@ LevelSet readVdb(const std::filesystem::path& path) {
     for (const auto& grid : grids)
         if (grid->getName() == contactPoints) result->points = grid;
     try {
-        requireNumbers(*result->distance);
-        return LevelSet(std::move(result));
+        const LevelSet levelSet(std::move(result));
+        DistanceCheck(levelSet).run();
+        return levelSet;
     } catch (const std::invalid_argument& error) {
         throw std::runtime_error(fmt::format("{}: {}", path.string(), error.what()));
     }

@@ -5,7 +5,7 @@
 #include <glm/geometric.hpp>
 
 #include "collider/interpolant.h"
-#include "collider/mesh_rays.h"
+#include "collider/sphere_tracing.h"
 
 namespace bilayer::bullet {
 
@@ -17,18 +17,6 @@ constexpr float touchVoxels = 1e-3f;
 constexpr float caution = 0.8f;
 // Steps are at least touchVoxels / 2 long, so that this only ends ways that graze the surface for thousands of voxels.
 constexpr int mostSteps = 100000;
-// Against triangles, a way is looked at piece by piece, and the nearest triangle looked for a few pieces ahead
-// [voxels].
-constexpr double pieceVoxels = 2, aheadVoxels = 8;
-// What the nearest triangle may be off by [voxels], and as a part of its distance.
-constexpr double slackVoxels = 1e-4, nearestRounding = 2e-6;
-
-/// How far a point is from the mesh, looked for no farther than `reach`, both in metres.
-double gapAt(const MeshTree& mesh, const glm::dvec3& point, double reach) {
-    const std::uint32_t triangle = mesh.nearest(point, static_cast<float>(reach / mesh.voxelSize()));
-    return triangle == noTriangle ? reach : glm::length(mesh.featureOf(triangle, point).way);
-}
-
 }  // namespace
 
 bool sweepable(const Placed& body, float radius) {
@@ -72,30 +60,19 @@ std::optional<SweepHit> sweepSphere(const Placed& body, const glm::vec3& from, c
 
 std::optional<SweepHit> sweepSphere(const MeshTree& mesh, const glm::vec3& from, const glm::vec3& to, float radius) {
     const glm::dvec3 way = glm::dvec3(to) - glm::dvec3(from);
-    const double length = glm::length(way), voxel = mesh.voxelSize();
+    const double length = glm::length(way);
     if (!(length > 0)) return std::nullopt;
     const Path path{glm::dvec3(from), way / length, length};
-    const double piece = pieceVoxels * voxel;
-    // In strides through what is empty (J. C. Hart, "Sphere tracing", 1996), triangle by triangle where it is not.
-    for (double along = 0; along <= length;) {
-        const double gap = gapAt(mesh, path.at(along), radius + aheadVoxels * voxel);
-        const double clear = gap * (1 - nearestRounding) - slackVoxels * voxel - radius;
-        if (clear > piece) {
-            along += clear;
-            continue;
-        }
-        const Path next{path.at(along), path.direction, std::min(piece, length - along)};
-        if (const auto hit = firstTouch(mesh, next, radius))
-            return SweepHit{static_cast<float>((along + hit->along) / length), glm::vec3(hit->position),
-                            glm::vec3(glm::normalize(next.at(hit->along) - hit->position)),
-                            static_cast<int>(hit->triangle)};
-        along += piece;
-    }
-    return std::nullopt;
+    const auto touch = firstTouchOnWay(mesh, path, radius, [](const glm::dvec3&) { return 0.; });
+    if (!touch) return std::nullopt;
+    return SweepHit{static_cast<float>(touch->along / length), glm::vec3(touch->position), glm::vec3(touch->normal),
+                    static_cast<int>(touch->triangle)};
 }
 
 bool touches(const MeshTree& mesh, const glm::vec3& centre, float radius) {
-    return gapAt(mesh, glm::dvec3(centre), 2. * radius) < radius;
+    const glm::dvec3 point(centre);
+    const std::uint32_t triangle = mesh.nearest(point, 2 * radius / mesh.voxelSize());
+    return triangle != noTriangle && glm::length(mesh.featureOf(triangle, point).way) < static_cast<double>(radius);
 }
 
 }  // namespace bilayer::bullet

@@ -137,6 +137,32 @@ TEST_CASE("what is there, but no file, is told from what is not there") {
     CHECK_FALSE(std::filesystem::exists(output()));
 }
 
+TEST_CASE("a small file that tells of gigabytes takes no memory for them") {
+    const auto path = corpusMesh("../cases/small-file-gigabytes.vdb");
+    if (!path) return;
+    for (const char* command : {"info", "query"}) {
+        const Result r = run({command, path->string()});
+        INFO(r.err);
+        CHECK(r.status == 1);
+        CHECK(r.errorLines() == 1);
+        CHECK(r.err.find("a name of") != std::string::npos);
+        CHECK(r.peakMemory < std::size_t(100) << 20);
+    }
+}
+
+TEST_CASE("what is built of a body of any size can be read") {
+    const std::string field = scratch("size.vdb").string();
+    for (const std::string size : {"1e-3", "1", "1e7", "1e10"}) {
+        const auto mesh = textFile("size.obj", "v 0 0 0\nv " + size + " 0 0\nv 0 " + size + " 0\nv 0 0 " + size +
+                                                   "\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n");
+        CAPTURE(size);
+        REQUIRE(run({"build", mesh.string(), "-o", field, "--resolution", "16", "--body"}).status == 0);
+        const Result read = run({"info", field});
+        INFO(read.err);
+        CHECK(read.status == 0);
+    }
+}
+
 TEST_CASE("bodies that are damaged") {
     const auto path = scratch("body.vdb"), broken = scratch("broken_body.vdb");
     REQUIRE(run({"build", sphereFile().string(), "-o", path.string(), "--voxel-size", "0.1", "--body"}).status == 0);

@@ -43,6 +43,10 @@ pid_t launch(const Words& arguments, const Surroundings& s, const std::string& i
     ::_exit(127);
 }
 
+int statusOf(int waited) {
+    return WIFSIGNALED(waited) ? 128 + WTERMSIG(waited) : WEXITSTATUS(waited);
+}
+
 }  // namespace
 
 std::string contents(const std::filesystem::path& path) {
@@ -59,7 +63,11 @@ Result run(const Words& arguments, const Surroundings& surroundings) {
     const std::string out = surroundings.output.empty() ? scratch("stdout").string() : surroundings.output;
     const std::string err = scratch("stderr").string();
     Result result;
-    result.status = wait(launch(arguments, surroundings, in, out, err));
+    rusage usage{};
+    int status = 0;
+    ::wait4(launch(arguments, surroundings, in, out, err), &status, 0, &usage);
+    result.status = statusOf(status);
+    result.peakMemory = std::size_t(usage.ru_maxrss) * 1024;
     if (surroundings.output.empty()) result.out = contents(out);
     result.err = contents(err);
     return result;
@@ -72,7 +80,7 @@ pid_t start(const Words& arguments) {
 int wait(pid_t process) {
     int status = 0;
     ::waitpid(process, &status, 0);
-    return WIFSIGNALED(status) ? 128 + WTERMSIG(status) : WEXITSTATUS(status);
+    return statusOf(status);
 }
 
 std::filesystem::path sphereFile(const std::string& name, int levels) {

@@ -13,6 +13,7 @@ namespace bilayer::test {
 struct Result {
     int status = -1;  ///< exit status, or 128 plus the signal
     std::string out, err;
+    std::size_t peakMemory = 0;  ///< that it took [bytes]
 
     nlohmann::json json() const { return nlohmann::json::parse(out); }
     std::size_t errorLines() const;

@@ -1,0 +1,287 @@
+// Files whose entries hold what they must not: they are refused, or what is read of them can be asked anything.
+#include <sys/resource.h>
+
+#include <openvdb/points/PointDataGrid.h>
+
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <cstring>
+#include <fstream>
+#include <iterator>
+#include <limits>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "collider/body.h"
+#include "collider/collider.h"
+#include "collider/mass.h"
+#include "demos/shared/shapes.h"
+#include "sdf/build.h"
+#include "sdf/grids.h"
+#include "sdf/surface.h"
+#include "sdf/vdb_io.h"
+#include "tests/support/random.h"
+#include "tests/support/support.h"
+
+using namespace bilayer;
+using namespace bilayer::test;
+
+namespace {
+
+using openvdb::Metadata;
+
+const glm::vec3 half{0.4f, 0.3f, 0.2f};
+
+LevelSet stored(bool withMesh = true) {
+    const Mesh mesh = shapes::box(half, 2);
+    const LevelSet plain = build(mesh, {.voxelSize = 0.1f});
+    Body body = Collider(mesh, plain).body();
+    if (!withMesh) body.mesh.reset();
+    return withBody(plain, body);
+}
+
+std::vector<Contact> contacts(const Collider& a, const Collider& b) {
+    std::vector<Contact> found;
+    collide(a, {}, b, {{0.1f, 0.59f, 0.05f}, {1, 0, 0, 0}}, {.margin = 0.05f}, found);
+    return found;
+}
+
+std::string bytesOf(const std::filesystem::path& path) {
+    std::ifstream file(path, std::ios::binary);
+    return {std::istreambuf_iterator<char>(file), {}};
+}
+
+// What a file that is accepted must be good for.
+void askAll(const std::filesystem::path& path, std::optional<std::size_t> expected) {
+    const LevelSet field = readVdb(path);
+    const Body body = bodyOf(field);
+    const Collider collider(field);
+    const float least = std::min(half.y, field.voxelSize());
+    for (const Field* asked : {&collider.field(), &collider.measured()}) {
+        REQUIRE(asked->inside({0, 0, 0}));
+        REQUIRE_FALSE(asked->inside({0, 2, 0}));
+        REQUIRE(asked->closest({0.1f, 0.5f, 0}).distance == Approx(0.2).margin(least));
+        REQUIRE(asked->raycast({{0.1f, 5, 0}, {0, -1, 0}}));
+        REQUIRE(asked->sphereCast({{0.1f, 5, 0}, {0, -1, 0}}, 0.1f));
+        REQUIRE(asked->overlapsSphere({0, 0.5f, 0}, 0.35f));
+        REQUIRE(asked->overlapsBox({{0, 0.5f, 0}, glm::vec3(0.35f)}));
+    }
+    const std::size_t count = contacts(collider, collider).size();
+    if (expected) REQUIRE(count == *expected);
+    REQUIRE_FALSE(collider.mesh().triangles.empty());
+    REQUIRE_FALSE(surface(field, {}).triangles.empty());
+    REQUIRE(massProperties(field).volume > 0);
+}
+
+// Numbers that an entry must not be, and some that it may.
+std::vector<double> extremes() {
+    std::vector<double> values{std::numeric_limits<double>::quiet_NaN()};
+    for (const double value : {0., 1e-45, 1e-10, 0.1, 3., 1e15, 3.5e37, 1e300, std::numeric_limits<double>::infinity()})
+        values.insert(values.end(), {value, -value});
+    return values;
+}
+
+template <class Vector>
+void addVectors(const openvdb::TypedMetadata<Vector>& entry, std::vector<Metadata::Ptr>& changed) {
+    for (const double value : extremes())
+        for (int axis = 0; axis <= Vector::size; ++axis) {
+            Vector vector = entry.value();
+            for (int k = 0; k < Vector::size; ++k)
+                if (axis == k || axis == Vector::size) vector[k] = typename Vector::value_type(value);
+            changed.push_back(std::make_shared<openvdb::TypedMetadata<Vector>>(vector));
+        }
+}
+
+template <class Value>
+void addNumbers(std::vector<Metadata::Ptr>& changed) {
+    for (const double value : extremes())
+        changed.push_back(std::make_shared<openvdb::TypedMetadata<Value>>(Value(value)));
+}
+
+template <class Value>
+void addIntegers(std::vector<Metadata::Ptr>& changed) {
+    using Limits = std::numeric_limits<Value>;
+    for (const Value value : {Limits::min(), Limits::max(), Value(-1), Value(0), Value(2)})
+        changed.push_back(std::make_shared<openvdb::TypedMetadata<Value>>(value));
+}
+
+// The same entry with other values, of its own type and of another.
+std::vector<Metadata::Ptr> changedEntries(const Metadata& entry) {
+    std::vector<Metadata::Ptr> changed{std::make_shared<openvdb::StringMetadata>("none")};
+    const std::string type = entry.typeName();
+    if (type == "float") addNumbers<float>(changed);
+    if (type == "double") addNumbers<double>(changed);
+    if (type == "int32") addIntegers<std::int32_t>(changed);
+    if (type == "int64") addIntegers<std::int64_t>(changed);
+    if (type == "vec3s") addVectors(static_cast<const openvdb::Vec3SMetadata&>(entry), changed);
+    if (type == "vec4s") addVectors(static_cast<const openvdb::Vec4SMetadata&>(entry), changed);
+    changed.push_back(std::make_shared<openvdb::FloatMetadata>(0.5f));
+    return changed;
+}
+
+/// The most memory that this process has taken [bytes].
+std::size_t peakMemory() {
+    rusage usage{};
+    ::getrusage(RUSAGE_SELF, &usage);
+    return std::size_t(usage.ru_maxrss) * 1024;
+}
+
+void writeChanged(const std::filesystem::path& path, const Grids& grids,
+                  const std::function<void(openvdb::FloatGrid&)>& change) {
+    const auto distance = openvdb::ConstPtrCast<openvdb::FloatGrid>(grids.distance)->copy();
+    change(*distance);
+    writeGrids(path, {distance, grids.points});
+}
+
+}  // namespace
+
+TEST_CASE("whatever an entry of a file holds, it is refused or the file is as good as before") {
+    const auto path = scratch("entry.vdb");
+    for (const bool withMesh : {true, false}) {
+        const LevelSet field = stored(withMesh);
+        writeVdb(path, field);
+        const std::size_t expected = contacts(Collider(field), Collider(field)).size();
+        REQUIRE(expected > 3);
+        askAll(path, expected);
+        int refused = 0, accepted = 0;
+        const openvdb::FloatGrid& grid = *field.grids().distance;
+        for (auto entry = grid.beginMeta(); entry != grid.endMeta(); ++entry) {
+            // what OpenVDB writes and reads for itself; names are told
+            if (!entry->first.starts_with("bilayer:")) continue;
+            if (!withMesh && entry->first != metadata::interiorWidth) continue;
+            for (const Metadata::Ptr& changed : changedEntries(*entry->second)) {
+                INFO(entry->first << " = " << changed->str().substr(0, 60));
+                writeChanged(path, field.grids(), [&](openvdb::FloatGrid& copy) {
+                    copy.removeMeta(entry->first);
+                    copy.insertMeta(entry->first, *changed);
+                });
+                std::string why;
+                try {
+                    bodyOf(readVdb(path));
+                } catch (const std::exception& error) {
+                    why = error.what();
+                }
+                why.empty() ? ++accepted : ++refused;
+                // a narrower band finds fewer contacts
+                const bool band = entry->first == metadata::interiorWidth;
+                if (why.empty())
+                    askAll(path, band ? std::nullopt : std::optional(expected));
+                else
+                    REQUIRE(why.size() > 20);
+            }
+        }
+        CAPTURE(refused, accepted);
+        REQUIRE(refused > (withMesh ? 200 : 5));
+        REQUIRE(accepted > 1);
+    }
+}
+
+TEST_CASE("whatever a field's widths, voxels and shift are, they are refused or the file is as good as before") {
+    const auto path = scratch("grid.vdb");
+    const LevelSet field = stored();
+    const auto check = [&](const std::function<void(openvdb::FloatGrid&)>& change) {
+        try {
+            writeChanged(path, field.grids(), change);
+            bodyOf(readVdb(path));
+        } catch (const std::exception&) {
+            return;
+        }
+        askAll(path, std::nullopt);
+    };
+    using openvdb::math::Transform;
+    for (const double value : extremes()) {
+        CAPTURE(value);
+        check([&](openvdb::FloatGrid& grid) {
+            const auto copy = grid.tree().copy();
+            static_cast<openvdb::FloatTree&>(*copy).root().setBackground(float(value), false);
+            grid.setTree(copy);
+        });
+        check([&](openvdb::FloatGrid& grid) {
+            openvdb::math::Mat4d scale = openvdb::math::Mat4d::identity();
+            for (int axis = 0; axis < 3; ++axis) scale[axis][axis] = value;
+            grid.setTransform(Transform::createLinearTransform(scale));
+        });
+        check([&](openvdb::FloatGrid& grid) {
+            const auto transform = grid.transform().copy();
+            transform->postTranslate(openvdb::Vec3d(value, 0, 0));
+            grid.setTransform(transform);
+        });
+        check([&](openvdb::FloatGrid& grid) {
+            const auto copy = grid.deepCopy();
+            copy->tree().beginLeaf()->setValueOn(7, float(value));
+            if (std::abs(value) < 0.05 || std::abs(value) > 0.25) grid.setTree(copy->treePtr());
+        });
+        check([&](openvdb::FloatGrid& grid) {
+            const auto copy = grid.deepCopy();
+            copy->tree().addTile(2, openvdb::Coord(128), float(value), true);
+            grid.setTree(copy->treePtr());
+        });
+    }
+    for (const int far : {std::numeric_limits<int>::max(), std::numeric_limits<int>::min(), 1 << 20})
+        check([&](openvdb::FloatGrid& grid) {
+            const auto copy = grid.deepCopy();
+            copy->tree().setValue(openvdb::Coord(far, 0, 0), 0.05f);
+            grid.setTree(copy->treePtr());
+        });
+}
+
+TEST_CASE("lengths in a file take no more memory than the file explains, whatever they are") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    Random random(seed);
+    const auto path = scratch("lengths.vdb");
+    writeVdb(path, stored());
+    constexpr std::size_t sealSize = 23, headSize = 3000;
+    std::string whole = bytesOf(path);
+    whole.resize(whole.size() - sealSize);  // as files of others
+    std::ofstream(path, std::ios::binary) << whole;
+    askAll(path, contacts(Collider(stored()), Collider(stored())).size());
+    const std::size_t before = peakMemory();
+    int accepted = 0;
+    const auto write = [&](std::size_t at, std::uint64_t value, std::size_t size) {
+        std::string wrong = whole;
+        std::memcpy(wrong.data() + at, &value, std::min(size, wrong.size() - at));
+        std::ofstream(path, std::ios::binary) << wrong;
+        CAPTURE(at, value, size);
+        try {
+            Collider collider(readVdb(path));
+            ++accepted;
+        } catch (const std::exception& error) {
+            REQUIRE(std::strlen(error.what()) > 0);
+        }
+        REQUIRE(peakMemory() < before + (std::size_t(200) << 20));
+    };
+    for (std::size_t at = 0; at < std::min(headSize, whole.size()); at += 7) {
+        write(at, 0xffff0019u, 4);
+        write(at, 0x7fffffffu, 4);
+    }
+    for (int i = 0; i < 500; ++i) {
+        const auto at = std::size_t(random(0, double(whole.size())));
+        const std::uint64_t values[] = {0xffffffffu, 0x7fffffff, 0x80000000u, 0xfffffff0u, 0x10000000u,
+                                        0xffff,      1,          0,           255};
+        write(at, values[std::size_t(random(0, 8.999))], i % 3 ? 4 : 8);
+    }
+    REQUIRE(accepted > 0);
+}
+
+TEST_CASE("what is written can be read, whatever the size of the body") {
+    const auto path = scratch("size.vdb");
+    for (const float size : {3e-4f, 1e-2f, 1.f, 1e4f, 1e7f, 1e10f, 1e13f}) {
+        CAPTURE(size);
+        const Mesh mesh{{{0, 0, 0}, {size, 0, 0}, {0, size, 0}, {0, 0, size}},
+                        {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}}};
+        const LevelSet plain = build(mesh, {.voxelSize = size / 12});
+        const Collider made(mesh, plain);
+        writeVdb(path, withBody(plain, made.body()));
+        const Collider read(readVdb(path));
+        REQUIRE(read.body().mass.has_value() == made.body().mass.has_value());
+        REQUIRE(made.body().mass.has_value() == (size < 1e8f));
+        if (made.body().mass) REQUIRE(read.mass().volume == made.mass().volume);
+        if (!made.body().mass) REQUIRE_THROWS_WITH(made.mass(), Catch::Contains("single precision"));
+    }
+    const LevelSet field = stored();
+    Body body = bodyOf(field);
+    body.mass->inertia[0][0] = std::numeric_limits<float>::infinity();
+    REQUIRE_THROWS_AS(withBody(field, body), std::invalid_argument);
+}
