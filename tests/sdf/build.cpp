@@ -242,6 +242,18 @@ TEST_CASE("a mesh smaller than a voxel, and one far from the origin, still have 
     CHECK(e.worst < 0.8);  // coordinates of 1e4 are themselves known to 0.05 voxels only
 }
 
+TEST_CASE("voxels too small for OpenVDB are refused with the scale to use") {
+    // a part of 0.3 mm in metres, and one of a micrometre
+    for (const auto& [size, scale] : {std::pair(3e-4f, "scale the mesh by 1000 (from metres to millimetres)"),
+                                      std::pair(1e-6f, "scale the mesh by 1e+06,")}) {
+        const Mesh part = shapes::box(glm::vec3(size));
+        CHECK_THROWS_WITH(build(part, {.voxelSize = voxelSizeFor(part, 128)}),
+                          Catch::Contains("2e-05") && Catch::Contains(scale));
+    }
+    const Mesh scaled = shapes::box(glm::vec3(3e-4f * 1000));
+    CHECK(build(scaled, {.voxelSize = voxelSizeFor(scaled, 128)}).activeVoxels() > 0);
+}
+
 TEST_CASE("bad options and meshes are refused by name") {
     const Mesh mesh = shapes::sphere(1, 2);
     const auto refused = [&](BuildOptions options, const std::string& name) {
