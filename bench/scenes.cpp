@@ -1,4 +1,4 @@
-// The ten scenes of the demos, in sizes that take minutes: how long their steps take on one thread and on all, and
+// The scenes of rigid bodies of the demos, in sizes that take minutes: how long their steps take on one thread and on all, and
 // whether they still do what they must.
 #include <fmt/format.h>
 #include <oneapi/tbb/global_control.h>
@@ -24,6 +24,7 @@
 #include "demos/scenes/plates.h"
 #include "demos/scenes/rings.h"
 #include "demos/scenes/spin.h"
+#include "demos/scenes/terrain.h"
 #include "demos/shared/outcome.h"
 
 using namespace bilayer;
@@ -39,6 +40,7 @@ struct NamedScene {
 std::vector<NamedScene> scenes() {
     return {{"pairs", [] { return demo::pairs({}); }},
             {"incline", [] { return demo::incline({}); }},
+            {"terrain", [] { return demo::terrain({}); }},
             {"nuts", [] { return demo::nuts({.turns = 1}); }},
             {"rings", [] { return demo::rings({.rows = 2}); }},
             {"chain", [] { return demo::chain({.seconds = 3}); }},
@@ -76,7 +78,7 @@ void compare(const NamedScene& scene, int threads, int repetitions) {
 }
 
 int run(int argc, char** argv) {
-    CLI::App app("Plays the ten scenes of ./run demo, smaller: time of a step on one thread and on several.");
+    CLI::App app("Plays the scenes of rigid bodies of ./run demo, smaller: time of a step on one thread and on several.");
     std::vector<std::string> names, chosen;
     for (const NamedScene& scene : scenes()) names.push_back(scene.name);
     int threads = tbb::info::default_concurrency(), repetitions = 1;

@@ -114,11 +114,12 @@ bool FieldData::divides(const glm::dvec3& place, const glm::dvec3& normal) const
 // whose normals do, or of a wall that the field confirms. Else by the field alone, whose samples blend what the surface
 // is on either side of an edge.
 bool FieldData::isInside(const NearestFeature& nearest, const glm::vec3& point) const {
-    if (!mesh->mayEnclose(glm::dvec3(point))) return false;
     const Side side = sideAt(toLocal(point));
+    if (side.certain) return side.inside;
+    if (!mesh->mayEnclose(glm::dvec3(point))) return false;
     const double height = heightOver(nearest);
     const bool tells = std::abs(height) > cancelled * glm::length(nearest.way);
-    if (side.certain || !tells) return side.inside;
+    if (!tells) return side.inside;
     const bool byNormal = signedByNormals || divides(glm::dvec3(point) + nearest.way, nearest.normal);
     return byNormal ? height < 0 : side.inside;
 }
