@@ -164,7 +164,7 @@ class Tree {
     Tree(Stream& in, const Values& values) : in_(in), values_(values) {}
 
     void skipTopology() {
-        in_.read<std::int32_t>();  // buffers
+        if (in_.read<std::int32_t>() != 1) throw std::runtime_error("a tree with more than one buffer");
         in_.skip(values_.size, "a background");
         const auto tiles = in_.read<std::uint32_t>(), children = in_.read<std::uint32_t>();
         in_.skip(tiles * (3 * sizeof(std::int32_t) + values_.size + 1), "tiles");
