@@ -20,7 +20,7 @@ constexpr double farthestOrigin = double(std::uint64_t(1) << 40);
 constexpr float widestBand = 1 << 23;
 /// Nothing for fields from elsewhere.
 constexpr std::string_view methods[] = {"", "exact", "double-layer", "pseudonormal", "prism"};
-constexpr std::string_view signs[] = {"", "normals", "winding", "flood", "layers"};
+constexpr std::string_view signs[] = {"", "normals", "winding", "flood", "layers", "prisms"};
 
 template <class Value>
 Value meta(const openvdb::GridBase& grid, const char* name, const Value& fallback) {
@@ -47,8 +47,8 @@ void requireWidth(const openvdb::GridBase& grid, const char* entry, float width)
 std::string requireName(const openvdb::GridBase& grid, const char* entry, const auto& names) {
     const auto name = meta<std::string>(grid, entry, "");
     if (std::find(std::begin(names), std::end(names), name) == std::end(names))
-        throw std::invalid_argument(
-            fmt::format("grid '{}': '{}' is none of {}", grid.getName(), entry, fmt::join(names, ", ")));
+        throw std::invalid_argument(fmt::format("grid '{}': '{}' is none of {}", grid.getName(), entry,
+                                                fmt::join(std::begin(names) + 1, std::end(names), ", ")));
     return name;
 }
 

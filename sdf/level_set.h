@@ -26,7 +26,8 @@ class LevelSet {
     std::uint64_t leaves() const;        ///< count of 8x8x8 blocks
     std::uint64_t memoryBytes() const;   ///< of all grids [bytes]
     const std::string& method() const;   ///< "exact", ..., or "" for a field from elsewhere
-    /// What told inside from outside: "normals", "winding", "flood" or "layers"; "" for a field from elsewhere.
+    /// What told inside from outside: "normals", "winding", "flood", "layers" or "prisms"; "" for a field from
+    /// elsewhere.
     const std::string& sign() const;
     const std::string& signReason() const;  ///< why it was taken, without a full stop: "closed and oriented"
     std::uint64_t signConflicts() const;    ///< voxels and pairs of neighbours whose normals contradict each other

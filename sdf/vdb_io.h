@@ -22,7 +22,8 @@ void writeVdb(const std::filesystem::path& path, const LevelSet& levelSet, const
 /// Reads the first level set of a .vdb file, from bilayer or elsewhere, with its grids of triangles and of a body's
 /// points if it has them.
 /// Throws std::runtime_error that names the file when it cannot be read, is truncated, is not what its checksum says
-/// that was written, or holds no level set.
+/// that was written, or holds no level set, or one with an entry or a distance beyond its range. It takes no more
+/// memory than the file's size explains: lengths in it are checked before they are used.
 LevelSet readVdb(const std::filesystem::path& path);
 
 }  // namespace bilayer

@@ -9,6 +9,7 @@
 #include <array>
 #include <bit>
 #include <cstring>
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -158,27 +159,48 @@ struct Values {
     std::uint64_t halfSize;  ///< [bytes]
 };
 
+/// Which voxels of a leaf are active.
+using LeafMask = std::array<std::uint64_t, cube(leaf) / 64>;
+
+std::uint64_t bitsOf(std::span<const std::uint64_t> words) {
+    std::uint64_t bits = 0;
+    for (const std::uint64_t word : words) bits += std::uint64_t(std::popcount(word));
+    return bits;
+}
+
+// Masks are stored twice, and OpenVDB takes the one or the other.
+void readLeafMask(Stream& in, const LeafMask& expected) {
+    if (in.read<LeafMask>() != expected) throw std::runtime_error("a leaf with two masks");
+}
+
 /// Walks over one tree.
 class Tree {
   public:
     Tree(Stream& in, const Values& values) : in_(in), values_(values) {}
 
     void skipTopology() {
-        in_.read<std::int32_t>();  // buffers
+        if (in_.read<std::int32_t>() != 1) throw std::runtime_error("a tree with more than one buffer");
         in_.skip(values_.size, "a background");
         const auto tiles = in_.read<std::uint32_t>(), children = in_.read<std::uint32_t>();
         in_.skip(tiles * (3 * sizeof(std::int32_t) + values_.size + 1), "tiles");
+        Place last;
         for (std::uint32_t i = 0; i < children; ++i) {
-            in_.skip(3 * sizeof(std::int32_t), "a node");
+            const auto place = in_.read<Place>();
+            // leaves are read again in this order; of two nodes at a place, one is lost
+            if (i > 0 && !(last < place)) throw std::runtime_error("nodes of a tree that are not in order");
+            last = place;
             skipNode(coarse);
         }
     }
 
     void skipBuffers() {
-        for (std::uint64_t i = 0; i < leaves_; ++i) skipValues(cube(leaf), readMask(leaf));
+        for (const LeafMask& expected : leaves_) {
+            readLeafMask(in_, expected);
+            skipValues(cube(leaf), bitsOf(expected));
+        }
     }
 
-    std::uint64_t leaves() const { return leaves_; }
+    const std::vector<LeafMask>& leaves() const { return leaves_; }
 
   private:
     void skipNode(int log2) {
@@ -188,9 +210,8 @@ class Tree {
             if (log2 == coarse)
                 skipNode(fine);
             else
-                skipMask(leaf);
+                leaves_.push_back(in_.read<LeafMask>());
         }
-        if (log2 == fine) leaves_ += children;
     }
 
     // The bits that are set.
@@ -198,11 +219,8 @@ class Tree {
         std::array<std::uint64_t, cube(coarse) / 64> words;
         const std::uint64_t count = cube(log2) / 64;
         in_.read(words.data(), count * sizeof(std::uint64_t));
-        std::uint64_t bits = 0;
-        for (std::uint64_t i = 0; i < count; ++i) bits += std::uint64_t(std::popcount(words[i]));
-        return bits;
+        return bitsOf(std::span(words).first(count));
     }
-    void skipMask(int log2) { in_.skip(cube(log2) / 8, "a mask"); }
 
     void skipValues(std::uint64_t count, std::uint64_t active) {
         // what is told of inactive values: whether all are stored, and if not, what they are
@@ -225,25 +243,27 @@ class Tree {
         in_.skip(std::uint64_t(std::abs(length)), "values");
     }
 
+    using Place = std::array<std::int32_t, 3>;
+
     Stream& in_;
     Values values_;
-    std::uint64_t leaves_ = 0;
+    std::vector<LeafMask> leaves_;
 };
 
 /// Walks over the attributes of a tree's points, which are stored in passes over all leaves.
 class Points {
   public:
-    Points(Stream& in, std::uint64_t leaves) : in_(in), leaves_(leaves) {}
+    Points(Stream& in, const std::vector<LeafMask>& leaves) : in_(in), leaves_(leaves) {}
 
     void skip() {
         constexpr unsigned others = 4;  // passes that are not of one attribute
         const auto passes = in_.read<std::uint16_t>();
         if (passes < others || passes % 2 != 0) throw std::runtime_error("points in a wrong number of passes");
-        in_.skip(leaves_ * sizeof(std::uint16_t), "sizes of leaves");
+        in_.skip(leaves_.size() * sizeof(std::uint16_t), "sizes of leaves");
         readArrays();
         if (attributes() != (passes - others) / 2u) throw std::runtime_error("points in a wrong number of passes");
         for (unsigned i = 0; i < attributes(); ++i) readPages(i);
-        for (std::uint64_t i = 0; i < leaves_; ++i) skipOffsets();
+        for (const LeafMask& mask : leaves_) skipOffsets(mask);
         for (unsigned i = 0; i < attributes(); ++i) skipData(i);
     }
 
@@ -263,7 +283,7 @@ class Points {
 
     void readArrays() {
         bool shared = false;
-        for (std::uint64_t i = 0; i < leaves_; ++i) {
+        for (std::size_t i = 0; i < leaves_.size(); ++i) {
             if (!shared) {
                 const auto flags = in_.read<std::uint8_t>();
                 readDescriptor();
@@ -272,7 +292,7 @@ class Points {
             }
             for (const std::uint64_t size : valueSizes_) arrays_.push_back(readArray(size));
         }
-        if (arrays_.size() != leaves_ * attributes()) throw std::runtime_error("points of different attributes");
+        if (arrays_.size() != leaves_.size() * attributes()) throw std::runtime_error("points of different attributes");
     }
 
     void readDescriptor() {
@@ -338,9 +358,9 @@ class Points {
         });
     }
 
-    void skipOffsets() {
+    void skipOffsets(const LeafMask& mask) {
         constexpr std::uint64_t bytes = cube(leaf) * sizeof(std::uint32_t), uncompressed = 0xffff;
-        in_.skip(cube(leaf) / 8, "a mask");
+        readLeafMask(in_, mask);
         const auto stored = in_.read<std::uint16_t>();
         stored == uncompressed ? in_.skip(bytes, "voxels of points") : in_.skipBlosc(stored, bytes);
     }
@@ -366,7 +386,7 @@ class Points {
     }
 
     Stream& in_;
-    std::uint64_t leaves_;
+    const std::vector<LeafMask>& leaves_;
     std::vector<std::uint64_t> valueSizes_;  // [bytes]
     std::vector<Array> arrays_;              // all attributes of a leaf, then those of the next
     std::vector<std::vector<Page>> pages_;   // by attribute

@@ -247,7 +247,8 @@ TEST_CASE("the closest point of what is far away is on the near side, and bounds
             REQUIRE(double(sample.distance) >= (1 - 1e-6) * truth - 0.3);
             const ClosestPoint closest = field.closest(point);
             REQUIRE(closest.found);
-            REQUIRE(closest.distance == Approx(truth).epsilon(1e-6).margin(0.01));
+            // the interpolant rounds corners off, by less than a voxel
+            REQUIRE(closest.distance == Approx(truth).epsilon(1e-6).margin(field.mesh() ? 1e-3 : 0.02));
             // the corner, or what is as near to a thousandth of the size
             const double reach = glm::dot(glm::dvec3(closest.position), glm::dvec3(direction));
             REQUIRE(reach > glm::dot(glm::dvec3(half), glm::abs(glm::dvec3(direction))) - 0.02 - 1 / away);

@@ -245,7 +245,7 @@ TEST_CASE("lengths in a file take no more memory than the file explains, whateve
         std::ofstream(path, std::ios::binary) << wrong;
         CAPTURE(at, value, size);
         try {
-            Collider collider(readVdb(path));
+            (void)bodyOf(readVdb(path));  // fields take memory for their boxes
             ++accepted;
         } catch (const std::exception& error) {
             REQUIRE(std::strlen(error.what()) > 0);
