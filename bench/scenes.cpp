@@ -1,5 +1,5 @@
-// The scenes of rigid bodies of the demos, in sizes that take minutes: how long their steps take on one thread and on all, and
-// whether they still do what they must.
+// The scenes of rigid bodies of the demos, in sizes that take minutes: how long their steps take on one thread and on
+// all, and whether they still do what they must.
 #include <fmt/format.h>
 #include <oneapi/tbb/global_control.h>
 #include <oneapi/tbb/info.h>
@@ -78,7 +78,8 @@ void compare(const NamedScene& scene, int threads, int repetitions) {
 }
 
 int run(int argc, char** argv) {
-    CLI::App app("Plays the scenes of rigid bodies of ./run demo, smaller: time of a step on one thread and on several.");
+    CLI::App app(
+        "Plays the scenes of rigid bodies of ./run demo, smaller: time of a step on one thread and on several.");
     std::vector<std::string> names, chosen;
     for (const NamedScene& scene : scenes()) names.push_back(scene.name);
     int threads = tbb::info::default_concurrency(), repetitions = 1;
