@@ -28,9 +28,9 @@ constexpr float onFace = 1e-4f;
 // Triangles whose wings enclose more than 179.9 degrees (cosine) have no edge between them.
 constexpr float flatEdge = -0.9999985f;
 // A corner or an edge of the triangles touches what looks at it along one of its own normals, to within this cosine.
-constexpr float leastAlike = 0.9f;
+constexpr float minNormalCosine = 0.9f;
 // So does a face what looks against it to within 5 degrees (cosine and sine).
-constexpr float straight = 0.9962f, mostLean = 0.0872f;
+constexpr float straight = 0.9962f, maxLean = 0.0872f;
 // Small triangles whose planes enclose less than 108 degrees have no crease that a tip could lie below (tangent).
 constexpr float steepestCrease = 3;
 // What a face's place sees of a body nearer than this touches the face [voxels]: beside an edge or a corner, normals
@@ -69,7 +69,7 @@ class TriangleProbes : public btTriangleCallback {
         const glm::vec3 middle = (corners[0] + corners[1] + corners[2]) / 3.f;
         float around = 0;
         for (int i = 0; i < 3; ++i) around = std::max(around, glm::distance(corners[i], middle));
-        if (local_.at(middle).distance > around + room() + spacing_) return;
+        if (!(local_.at(middle).distance <= around + room() + spacing_)) return;
         triangles_.push_back(corners);
         ids_.push_back(mixed(mixed(mixed(std::uint64_t(part)) ^ std::uint64_t(index)) ^ std::uint64_t(isSecond)));
     }
@@ -149,7 +149,7 @@ class TriangleProbes : public btTriangleCallback {
     std::optional<Contact> withNormal(Contact contact, NormalOf&& normalOf) const {
         const glm::vec3 towards = -(glm::conjugate(field_.pose.rotation) * contact.normal);
         const auto normal = normalOf(towards);
-        if (!normal || glm::dot(*normal, towards) < leastAlike) return std::nullopt;
+        if (!normal || glm::dot(*normal, towards) < minNormalCosine) return std::nullopt;
         turn(contact, -*normal);
         contact.turningRadius = -1;
         return contact;
@@ -215,7 +215,7 @@ class TriangleProbes : public btTriangleCallback {
         if (cosine >= straight) return true;
         const glm::vec3 deeper = glm::normalize(normal - cosine * seen), lean = glm::normalize(seen - cosine * normal);
         const LocalField::Answer there = local_.at(place + spacing_ * deeper);
-        return there.where == LocalField::Answer::near && glm::dot(there.normal, lean) <= mostLean;
+        return there.where == LocalField::Answer::near && glm::dot(there.normal, lean) <= maxLean;
     }
 
     bool isTip(std::uint32_t index, const glm::vec3& normal) const {
