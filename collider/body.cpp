@@ -290,7 +290,7 @@ openvdb::Metadata::Ptr packed(const Mesh& mesh) {
     return entry;
 }
 
-std::shared_ptr<const Mesh> unpacked(const Bytes::ByteVec& bytes) {
+std::shared_ptr<Mesh> unpacked(const Bytes::ByteVec& bytes) {
     MeshHead head{};
     std::memcpy(&head, bytes.data(), std::min(sizeof(head), bytes.size()));
     if (bytesOf(head) != bytes.size()) refuse(fmt::format("'{}' is too short or too long", entry::mesh));
@@ -314,7 +314,9 @@ std::shared_ptr<const Mesh> meshOf(const LevelSet& levelSet) {
     if (!entry) return nullptr;
     const auto bytes = std::dynamic_pointer_cast<const Bytes>(entry);
     if (!bytes) refuse(fmt::format("'{}' is of type {}", entry::mesh, entry->typeName()));
-    return unpacked(bytes->value());
+    const std::shared_ptr<Mesh> mesh = unpacked(bytes->value());
+    mesh->origin = levelSet.origin();
+    return mesh;
 }
 
 void requireSame(const Bounds& ofMesh, const Bounds& ofBody) {

@@ -57,8 +57,8 @@ std::optional<Slope> lowestBetween(Slope from, Slope to, float tolerance, Functi
     return best;
 }
 
-/// How an edge touches at its deepest place, square to itself. Where it has sunk into two faces that meet: the way out
-/// over the ridge between them, but no deeper than half as much again as it lies, since through a thin blade there is a
+/// How an edge touches at its deepest place, square to itself. Where it crosses the ridge between two faces: the way
+/// over the ridge, but no deeper than half as much again as it has sunk in, since through a thin blade there is a
 /// shorter way. Else across the face that looks least along the edge. Nothing where all look along it.
 /// @param along  the edge's direction, of unit length
 /// @param before, after  touches very close to the place on either side, where they are known
@@ -77,15 +77,15 @@ inline std::optional<Touch> acrossEdge(const glm::vec3& along, const Touch& here
         most = length;
         held = Touch{touch->distance, across / length};
     }
-    if (!held || held->distance >= 0 || !before || !after) return held;
+    if (!held || !before || !after) return held;
     const glm::vec3 &a = before->normal, &b = after->normal;
     const float fall = -glm::dot(a, along), rise = glm::dot(b, along);
     if (!(fall > 0 && rise > 0 && glm::length(glm::cross(a, b)) > leastRidge)) return held;
     // square to the edge and to the ridge
     const glm::vec3 over = rise * a + fall * b;
     const float length = glm::length(over);
-    const float distance = here.distance * (fall + rise) / length;
-    return Touch{std::fmax(distance, mostDeeper * here.distance), over / length};
+    const float deeper = std::fmin((fall + rise) / length, mostDeeper);
+    return Touch{here.distance < 0 ? deeper * here.distance : here.distance, over / length};
 }
 
 }  // namespace bilayer

@@ -287,6 +287,9 @@ void describe(openvdb::FloatGrid& grid, const Mesh& mesh, const BuildOptions& op
     grid.insertMeta(metadata::errorBound, openvdb::FloatMetadata(errorBound(options) * options.voxelSize));
     grid.insertMeta(metadata::meshHash, openvdb::Int64Metadata(std::int64_t(hash(mesh))));
     grid.insertMeta(metadata::interiorWidth, openvdb::FloatMetadata(options.interiorWidth * options.voxelSize));
+    const glm::dvec3& origin = mesh.origin;
+    if (origin != glm::dvec3(0))
+        grid.insertMeta(metadata::origin, openvdb::Vec3DMetadata({origin.x, origin.y, origin.z}));
 }
 
 // A build under way: what it works from, and what it has found.

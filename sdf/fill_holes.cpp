@@ -105,7 +105,7 @@ Mesh withJoinedRims(const Mesh& mesh, std::vector<unsigned> rim, double crack) {
         for (std::size_t k = i + 1; k < rim.size() && at(rim[k]).x - at(rim[i]).x <= crack; ++k)
             if (first[rim[i]] == rim[i] && first[rim[k]] == rim[k] && glm::distance(at(rim[i]), at(rim[k])) <= crack)
                 first[rim[k]] = rim[i];
-    Mesh joined{mesh.points, Topology(mesh).triangles};
+    Mesh joined{mesh.points, Topology(mesh).triangles, mesh.origin};
     for (const glm::uvec3& t : joined.triangles)
         for (int i = 0; i < 3; ++i)
             if (const unsigned a = t[i], b = t[(i + 1) % 3]; a != b && first[a] == first[b]) first[a] = a, first[b] = b;

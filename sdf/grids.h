@@ -32,8 +32,13 @@ inline constexpr const char* signUndecided = "bilayer:sign_undecided";
 inline constexpr const char* errorBound = "bilayer:error_bound";
 inline constexpr const char* meshHash = "bilayer:mesh_hash";
 inline constexpr const char* interiorWidth = "bilayer:interior_width";
+/// Mesh::origin, where it is not zero: the transforms of grids in files have it as their shift, those in memory do not.
+inline constexpr const char* origin = "bilayer:origin";
 inline constexpr const char* version = "bilayer:version";
 }  // namespace metadata
+
+/// A grid of a level set with its origin in its transform, as files hold it. The tree is shared.
+openvdb::GridBase::Ptr inWorld(const openvdb::GridBase::ConstPtr& grid, const LevelSet& levelSet);
 
 /// Writes any grids to a .vdb file, whole or not at all. Throws std::runtime_error that names the file when it cannot
 /// be written. writeVdb() in vdb_io.h does so for a LevelSet.

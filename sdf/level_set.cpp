@@ -96,10 +96,17 @@ LevelSet::LevelSet(std::shared_ptr<const Grids> grids) : grids_(std::move(grids)
     }
     signConflicts_ = std::uint64_t(meta<std::int64_t>(grid, metadata::signConflicts, 0));
     meshHash_ = std::uint64_t(meta<std::int64_t>(grid, metadata::meshHash, 0));
+    const auto origin = meta<openvdb::Vec3d>(grid, metadata::origin, openvdb::Vec3d(0));
+    origin_ = {origin.x(), origin.y(), origin.z()};
+    for (int axis = 0; axis < 3; ++axis)
+        require(std::isfinite(origin_[axis]), grid, metadata::origin, origin_[axis], "finite");
 }
 
 float LevelSet::voxelSize() const {
     return float(grids_->distance->voxelSize()[0]);
+}
+glm::dvec3 LevelSet::origin() const {
+    return origin_;
 }
 float LevelSet::exteriorWidth() const {
     return exteriorWidth_;

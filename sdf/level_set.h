@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <glm/vec3.hpp>
 #include <memory>
 #include <string>
 
@@ -20,6 +21,7 @@ class LevelSet {
     explicit LevelSet(std::shared_ptr<const Grids> grids);
 
     float voxelSize() const;             ///< [m]
+    glm::dvec3 origin() const;           ///< Mesh::origin: distances are asked for relative to it [m]
     float exteriorWidth() const;         ///< every voxel with 0 <= distance < this is active [m]
     float interiorWidth() const;         ///< every voxel with -this < distance < 0 is active [m]
     std::uint64_t activeVoxels() const;  ///< count
@@ -41,6 +43,7 @@ class LevelSet {
     float exteriorWidth_, interiorWidth_, errorBound_;
     std::uint64_t meshHash_, signConflicts_;
     std::string method_, sign_, signReason_;
+    glm::dvec3 origin_;
 };
 
 }  // namespace bilayer

@@ -114,7 +114,10 @@ Mesh weld(const Mesh& mesh) {
 
 Mesh transformed(const Mesh& mesh, const glm::mat4& map) {
     Mesh result = mesh;
-    for (auto& point : result.points) point = glm::vec3(map * glm::vec4(point, 1.f));
+    const bool isFar = mesh.origin != glm::dvec3(0);
+    const glm::mat4 near = isFar ? glm::mat4(glm::mat3(map)) : map;
+    for (auto& point : result.points) point = glm::vec3(near * glm::vec4(point, 1.f));
+    if (isFar) result.origin = glm::dvec3(glm::dmat4(map) * glm::dvec4(mesh.origin, 1));
     if (glm::determinant(glm::mat3(map)) < 0)
         for (auto& triangle : result.triangles) std::swap(triangle.y, triangle.z);
     return result;

@@ -14,6 +14,9 @@ namespace bilayer {
 struct Mesh {
     std::vector<glm::vec3> points;      ///< vertex positions [m]
     std::vector<glm::uvec3> triangles;  ///< three indices into `points` a triangle
+    /// Added to `points` it gives world coordinates [m]. Zero, but for a mesh that is so far away that floats would
+    /// round it (readMesh()); fields and queries of such a mesh are relative to it too.
+    glm::dvec3 origin{0};
 };
 
 /// An axis-aligned box [m]; empty (lower > upper) by default.
@@ -42,7 +45,8 @@ void validate(const Mesh& mesh);
 /// vertices that no triangle uses. Keeps the order of what remains.
 Mesh weld(const Mesh& mesh);
 
-/// The mesh under an affine map; triangles are turned around when the map mirrors, so that normals stay outward.
+/// The mesh under an affine map; triangles are turned around when the map mirrors, so that normals stay outward. An
+/// origin that is not zero moves with the map.
 Mesh transformed(const Mesh& mesh, const glm::mat4& map);
 
 /// 64 bits that change with any vertex or triangle; the same for any number of threads.

@@ -6,19 +6,16 @@
 #include <assimp/config.h>
 #include <assimp/postprocess.h>
 #include <assimp/scene.h>
-#include <assimp/Exporter.hpp>
 #include <assimp/Importer.hpp>
 
 #include <cctype>
-#include <fstream>
-#include <memory>
 #include <stdexcept>
 #include <string>
 #include <system_error>
 
-#include "sdf/atomic_file.h"
 #include "sdf/input_file.h"
-#include "sdf/mesh_guard.h"
+#include "sdf/mesh_readers.h"
+#include "sdf/polygons.h"
 
 namespace bilayer {
 namespace {
@@ -49,18 +46,6 @@ std::string lowerEnding(const std::filesystem::path& path) {
     return ending;
 }
 
-const aiScene* readScene(Assimp::Importer& importer, const std::filesystem::path& path) {
-    constexpr unsigned none = 0;
-    const std::string ending = lowerEnding(path);
-    if (ending == ".off") {
-        const std::string text = guardedOff(path);
-        return importer.ReadFileFromMemory(text.data(), text.size(), none, "off");
-    }
-    if (ending == ".ply") guardPly(path);
-    if (ending == ".stl") guardStl(path);
-    return importer.ReadFile(path.string(), none);
-}
-
 // Assimp's later steps take it for granted that faces have corners, which are vertices that exist.
 void checkFaces(const aiScene& scene, const std::filesystem::path& path) {
     for (unsigned m = 0; m < scene.mNumMeshes; ++m)
@@ -76,89 +61,43 @@ void checkFaces(const aiScene& scene, const std::filesystem::path& path) {
         }
 }
 
-void add(Mesh& mesh, const aiMesh& part) {
-    const auto base = unsigned(mesh.points.size());
-    for (unsigned i = 0; i < part.mNumVertices; ++i)
-        mesh.points.push_back({part.mVertices[i].x, part.mVertices[i].y, part.mVertices[i].z});
-    for (unsigned i = 0; i < part.mNumFaces; ++i) {
-        const aiFace& face = part.mFaces[i];
-        if (face.mNumIndices == 3)
-            mesh.triangles.push_back({base + face.mIndices[0], base + face.mIndices[1], base + face.mIndices[2]});
-    }
-}
-
-// The one mesh as an Assimp scene, which owns it.
-std::unique_ptr<aiScene> toScene(const Mesh& mesh) {
-    auto scene = std::make_unique<aiScene>();
-    scene->mMaterials = new aiMaterial* [1] { new aiMaterial };
-    scene->mNumMaterials = 1;
-    auto* part = new aiMesh;
-    scene->mMeshes = new aiMesh* [1] { part };
-    scene->mNumMeshes = 1;
-    scene->mRootNode = new aiNode;
-    scene->mRootNode->mMeshes = new unsigned[1]{0};
-    scene->mRootNode->mNumMeshes = 1;
-    part->mPrimitiveTypes = aiPrimitiveType_TRIANGLE;
-    part->mNumVertices = unsigned(mesh.points.size());
-    part->mVertices = new aiVector3D[mesh.points.size()];
-    for (std::size_t i = 0; i < mesh.points.size(); ++i)
-        part->mVertices[i] = {mesh.points[i].x, mesh.points[i].y, mesh.points[i].z};
-    part->mNumFaces = unsigned(mesh.triangles.size());
-    part->mFaces = new aiFace[mesh.triangles.size()];
-    for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
-        part->mFaces[i].mNumIndices = 3;
-        part->mFaces[i].mIndices = new unsigned[3]{mesh.triangles[i].x, mesh.triangles[i].y, mesh.triangles[i].z};
-    }
-    return scene;
-}
-
-}  // namespace
-
-Mesh readMesh(const std::filesystem::path& path) {
+Polygons readScene(const std::filesystem::path& path) {
     Assimp::Importer importer;
     importer.SetIOHandler(new RegularFiles);  // the importer's own from here on
     importer.SetPropertyInteger(AI_CONFIG_PP_RVC_FLAGS, int(unwanted));
     importer.SetPropertyInteger(AI_CONFIG_PP_SBP_REMOVE, aiPrimitiveType_POINT | aiPrimitiveType_LINE);
     requireInputFile(path);
-    const aiScene* scene = readScene(importer, path);
+    const aiScene* scene = importer.ReadFile(path.string(), 0);
     if (scene) {
         checkFaces(*scene, path);
         scene = importer.ApplyPostProcessing(steps);
     }
     if (!scene) throw std::runtime_error(fmt::format("{}: {}", path.string(), importer.GetErrorString()));
-    Mesh mesh;
-    for (unsigned i = 0; i < scene->mNumMeshes; ++i) add(mesh, *scene->mMeshes[i]);
-    if (mesh.triangles.empty()) throw std::runtime_error(fmt::format("{}: holds no triangle", path.string()));
-    try {
-        validate(mesh);
-    } catch (const std::invalid_argument& error) {
-        throw std::invalid_argument(fmt::format("{}: {}", path.string(), error.what()));
+    Polygons polygons;
+    for (unsigned m = 0; m < scene->mNumMeshes; ++m) {
+        const aiMesh& part = *scene->mMeshes[m];
+        const auto base = unsigned(polygons.points.size());
+        for (unsigned i = 0; i < part.mNumVertices; ++i)
+            polygons.points.push_back({part.mVertices[i].x, part.mVertices[i].y, part.mVertices[i].z});
+        for (unsigned i = 0; i < part.mNumFaces; ++i)
+            if (part.mFaces[i].mNumIndices == 3)
+                for (unsigned k = 0; k < 3; ++k) polygons.corners.push_back(base + part.mFaces[i].mIndices[k]);
     }
-    mesh = weld(mesh);
-    if (mesh.triangles.empty())
-        throw std::runtime_error(fmt::format("{}: holds no triangle with three different corners", path.string()));
-    return mesh;
+    return polygons;
 }
 
-void writeMesh(const std::filesystem::path& path, const Mesh& mesh) {
+}  // namespace
+
+Mesh readMesh(const std::filesystem::path& path, ReadReport* report) {
+    ReadReport ignored;
+    ReadReport& told = report ? *report : ignored;
+    told = {};
     const std::string ending = lowerEnding(path);
-    const char* format = ending == ".obj"   ? "objnomtl"
-                         : ending == ".ply" ? "plyb"
-                         : ending == ".stl" ? "stlb"
-                                            : nullptr;
-    if (!format)
-        throw std::invalid_argument(fmt::format("{}: meshes are written as .obj, .ply or .stl", path.string()));
-    validate(mesh);
-    const std::unique_ptr<aiScene> scene = toScene(mesh);
-    Assimp::Exporter exporter;
-    const aiExportDataBlob* blob = exporter.ExportToBlob(scene.get(), format);
-    if (!blob) throw std::runtime_error(fmt::format("{}: {}", path.string(), exporter.GetErrorString()));
-    AtomicFile file(path);
-    std::ofstream stream(file.temporary(), std::ios::binary);
-    stream.write(static_cast<const char*>(blob->data), std::streamsize(blob->size));
-    stream.close();
-    if (!stream) throw std::runtime_error(fmt::format("{}: cannot be written (is the disk full?)", path.string()));
-    file.commit();
+    if (ending == ".obj") return readObj(path, told);
+    if (ending == ".ply") return readPly(path, told);
+    if (ending == ".stl") return readStl(path, told);
+    if (ending == ".off") return readOff(path, told);
+    return assembled(readScene(path), path, told);
 }
 
 }  // namespace bilayer

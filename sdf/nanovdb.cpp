@@ -47,6 +47,12 @@ Handle convert(const Grid& grid) {
     return nanovdb::openToNanoVDB<Buffer>(*grid.deepCopy());
 }
 
+// The same as files hold it.
+template <class Grid>
+Handle convertInWorld(const std::shared_ptr<const Grid>& grid, const LevelSet& levelSet) {
+    return convert(*openvdb::gridPtrCast<Grid>(inWorld(grid, levelSet)));
+}
+
 }  // namespace
 
 NanoGrid toNanoVdb(const LevelSet& levelSet) {
@@ -61,8 +67,8 @@ std::optional<NanoGrid> trianglesToNanoVdb(const LevelSet& levelSet) {
 void writeNanoVdb(const std::filesystem::path& path, const LevelSet& levelSet) {
     AtomicFile file(path);
     std::vector<Handle> grids;
-    grids.push_back(convert(*levelSet.grids().distance));
-    if (levelSet.grids().triangle) grids.push_back(convert(*levelSet.grids().triangle));
+    grids.push_back(convertInWorld(levelSet.grids().distance, levelSet));
+    if (levelSet.grids().triangle) grids.push_back(convertInWorld(levelSet.grids().triangle, levelSet));
     try {
         std::ofstream stream(file.temporary(), std::ios::binary);
         stream.exceptions(std::ios::failbit | std::ios::badbit);

@@ -280,6 +280,7 @@ class Orienter {
     Orientation result() const {
         Orientation orientation;
         orientation.mesh.points = mesh_.points;
+        orientation.mesh.origin = mesh_.origin;
         poll(progress_);
         orientation.mesh.triangles = mesh_.triangles;
         for (const unsigned i : eachTriangle()) {

@@ -1,17 +1,54 @@
 // What a mesh file holds: polygons, before they are cut into triangles and their vertices welded; internal.
 #pragma once
 
+#include <cstddef>
+#include <filesystem>
 #include <glm/vec3.hpp>
 #include <string>
 #include <vector>
 
 namespace bilayer {
 
-struct Polygons {
-    std::vector<glm::dvec3> points;  ///< vertex positions, as the file has them or under its node transforms
-    std::vector<unsigned> corners;   ///< indices into `points`, of one face after the other
-    std::vector<unsigned> sizes;     ///< corners of each face, in the same order; empty: each has three
-    std::vector<std::string> notes;  ///< what of the file was left out and why, a sentence each
+struct Mesh;
+struct ReadReport;
+
+/// @tparam Scalar  float where the file holds no better
+template <class Scalar>
+struct PolygonsOf {
+    std::vector<glm::vec<3, Scalar>> points;  ///< vertex positions, as the file has them or under its node transforms
+    std::vector<unsigned> corners;            ///< indices into `points`, of one face after the other
+    std::vector<unsigned> sizes;              ///< corners of each face, in the same order; empty: each has three
+    std::vector<std::string> notes;           ///< what of the file was left out and why, a sentence each
 };
+using Polygons = PolygonsOf<double>;
+
+/// Faces of a part of a file.
+struct Faces {
+    std::vector<unsigned> corners, sizes;
+    bool isOfTriangles = true;
+    std::size_t small = 0;  ///< left out, since they have fewer than three corners
+
+    /// The corners from `first` on are a face.
+    void close(std::size_t first) {
+        const std::size_t size = corners.size() - first;
+        if (size < 3) {
+            corners.resize(first);
+            ++small;
+            return;
+        }
+        isOfTriangles &= size == 3;
+        sizes.push_back(unsigned(size));
+    }
+};
+
+/// The faces of all parts, in their order, as those of the polygons. Tells in their notes of those that were left out.
+template <class Scalar>
+void setFaces(PolygonsOf<Scalar>& polygons, const std::vector<Faces>& parts);
+
+/// Cuts polygons into triangles, moves a mesh that is far away to an origin of its own, welds it, and tells what became
+/// of the file's contents. Throws std::runtime_error that names the file if no triangle is left, or if a face uses a
+/// vertex that is not there, and std::invalid_argument if a coordinate that a face uses is not finite.
+template <class Scalar>
+Mesh assembled(PolygonsOf<Scalar> polygons, const std::filesystem::path& path, ReadReport& report);
 
 }  // namespace bilayer

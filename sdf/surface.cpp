@@ -21,6 +21,7 @@ Mesh surface(const LevelSet& levelSet, const SurfaceOptions& options) {
     openvdb::tools::volumeToMesh(*levelSet.grids().distance, points, triangles, quads, double(options.isovalue),
                                  double(options.adaptivity));
     Mesh mesh;
+    mesh.origin = levelSet.origin();
     mesh.points.reserve(points.size());
     for (const auto& p : points) mesh.points.push_back({p.x(), p.y(), p.z()});
     // OpenVDB's faces are clockwise seen from outside

@@ -137,7 +137,30 @@ void requireSeal(const std::filesystem::path& path) {
         throw std::runtime_error("it is not as it was written");
 }
 
+void shift(openvdb::GridBase& grid, const glm::dvec3& by) {
+    if (by == glm::dvec3(0)) return;
+    const openvdb::math::Transform::Ptr shifted = grid.transform().copy();
+    shifted->postTranslate({by.x, by.y, by.z});
+    grid.setTransform(shifted);
+}
+
+/// The origin of the mesh that a field in a file is of.
+glm::dvec3 originOf(const openvdb::GridPtrVec& grids) {
+    for (const auto& grid : grids)
+        if (const auto entry = grid->getMetadata<openvdb::Vec3DMetadata>(metadata::origin)) {
+            const openvdb::Vec3d& origin = entry->value();
+            return {origin.x(), origin.y(), origin.z()};
+        }
+    return glm::dvec3(0);
+}
+
 }  // namespace
+
+openvdb::GridBase::Ptr inWorld(const openvdb::GridBase::ConstPtr& grid, const LevelSet& levelSet) {
+    const openvdb::GridBase::Ptr copy = openvdb::ConstPtrCast<openvdb::GridBase>(grid)->copyGrid();
+    shift(*copy, levelSet.origin());
+    return copy;
+}
 
 void writeGrids(const std::filesystem::path& path, const openvdb::GridCPtrVec& grids) {
     AtomicFile file(path);
@@ -160,14 +183,14 @@ float storedErrorBound(const LevelSet& levelSet, const VdbOptions& options) {
 
 void writeVdb(const std::filesystem::path& path, const LevelSet& levelSet, const VdbOptions& options) {
     openvdb::initialize();
-    // a shallow copy, since how distances are stored is a property of the grid
-    const auto distance = openvdb::ConstPtrCast<openvdb::FloatGrid>(levelSet.grids().distance)->copy();
+    // a copy, since how distances are stored is a property of the grid
+    const openvdb::GridBase::Ptr distance = inWorld(levelSet.grids().distance, levelSet);
     distance->setSaveFloatAsHalf(options.halfFloat);
     if (options.halfFloat && distance->getMetadata<openvdb::FloatMetadata>(metadata::errorBound))
         distance->insertMeta(metadata::errorBound, openvdb::FloatMetadata(storedErrorBound(levelSet, options)));
     openvdb::GridCPtrVec grids{distance};
-    if (levelSet.grids().triangle) grids.push_back(levelSet.grids().triangle);
-    if (levelSet.grids().points) grids.push_back(levelSet.grids().points);
+    if (levelSet.grids().triangle) grids.push_back(inWorld(levelSet.grids().triangle, levelSet));
+    if (levelSet.grids().points) grids.push_back(inWorld(levelSet.grids().points, levelSet));
     writeGrids(path, grids);
 }
 
@@ -185,6 +208,8 @@ LevelSet readVdb(const std::filesystem::path& path) {
     } catch (const std::exception& error) {
         throw std::runtime_error(fmt::format("{}: is no .vdb file or is damaged ({})", path.string(), error.what()));
     }
+    const glm::dvec3 origin = originOf(grids);
+    for (const auto& grid : grids) shift(*grid, -origin);
     auto result = std::make_shared<Grids>();
     result->distance = first<openvdb::FloatGrid>(
         grids, [](const auto& grid) { return grid.getGridClass() == openvdb::GRID_LEVEL_SET; });

@@ -15,9 +15,6 @@ namespace bilayer::bullet {
 
 namespace {
 
-// Where a field's edge is deepest in a round body, the normal across it looks no farther aside from the body's
-// (cosine).
-constexpr float leastAcross = 0.3f;
 // Steps towards the deepest place of a round surface; each divides the error by the ratio of the radii of curvature.
 constexpr int mostRefinements = 6;
 // Faces that fall by less lie on what they touch: the next surface points are as deep to a hundredth of a voxel.
@@ -174,17 +171,21 @@ class Touching {
             const bool isOther = there.distance <= edgeReach_ && next < index;
             if (!fallsBetween(first, last) || isOther) continue;
             const auto lowest =
-                lowestBetween(first, last, searchTolerance * scale_ * collider.field().voxelSize(),
+                lowestBetween(first, last, searchTolerance * voxel_,
                               [&](float way) { return std::optional<Slope>(slopeOf(way, nearAt(way))); });
-            const Convex::Near deepest = nearAt(lowest->place);
-            const glm::vec3 across = deepest.normal - glm::dot(deepest.normal, along) * along;
-            const float steepness = glm::length(across);
-            const glm::vec3 normal = -(toField_ * across) / steepness;
-            const float distance = deepest.distance < 0 ? deepest.distance / steepness : deepest.distance;
-            const bool opposes = opposition.keeps(glm::dot(normal, points[index].normal + points[next].normal), false);
-            if (!(steepness > leastAcross) || distance > margin_ || !opposes) continue;
+            const auto touchAt = [&](float way) -> Touch {
+                const Convex::Near near = nearAt(way);
+                return {near.distance, near.normal};
+            };
+            const float aside = 2 * searchTolerance * voxel_;
+            const auto touch = acrossEdge(along, touchAt(lowest->place), touchAt(lowest->place - aside),
+                                          touchAt(lowest->place + aside));
+            if (!touch || touch->distance > margin_) continue;
+            const glm::vec3 normal = -(toField_ * touch->normal);
+            if (!opposition.keeps(glm::dot(normal, points[index].normal + points[next].normal), false)) continue;
             const glm::vec3 place = intoField(from + lowest->place * along);
-            contacts.push_back(local_.contact(place, normal, distance, (std::uint32_t(points.size()) + e) | featureOfB,
+            contacts.push_back(local_.contact(place, normal, touch->distance,
+                                              (std::uint32_t(points.size()) + e) | featureOfB,
                                               local_.approach(place, normal, margin_)));
         }
     }

@@ -15,8 +15,8 @@ struct Placement {
     Placement() = default;
     Placement(const Pose& placed, const glm::vec3& stretch = glm::vec3(1)) : pose(placed), scale(stretch) {}
 
-    glm::dvec3 toWorld(const glm::vec3& point) const {
-        return glm::dquat(pose.rotation) * (glm::dvec3(scale) * glm::dvec3(point)) + glm::dvec3(pose.position);
+    glm::dvec3 toWorld(const glm::dvec3& point) const {
+        return glm::dquat(pose.rotation) * (glm::dvec3(scale) * point) + glm::dvec3(pose.position);
     }
 };
 

@@ -52,7 +52,7 @@ struct Placed {
 Placed inVoxels(const Mesh& mesh, const Placement& placement, const Transform& voxels) {
     std::vector<openvdb::Vec3d> points(mesh.points.size());
     tbb::parallel_for(std::size_t(0), points.size(), [&](std::size_t i) {
-        const glm::dvec3 p = placement.toWorld(mesh.points[i]);
+        const glm::dvec3 p = placement.toWorld(mesh.origin + glm::dvec3(mesh.points[i]));
         points[i] = voxels.worldToIndex({p.x, p.y, p.z});
     });
     openvdb::Vec3d lower(std::numeric_limits<double>::max()), upper(-lower);
@@ -64,7 +64,7 @@ Placed inVoxels(const Mesh& mesh, const Placement& placement, const Transform& v
         if (!(lower[axis] > -maxIndex && upper[axis] < maxIndex))
             throw std::invalid_argument(
                 "the body is out of range of these voxels: they are too small or it is too far");
-    Placed placed{{{}, mesh.triangles}, Coord::floor(0.5 * (lower + upper)) & ~int(Leaf::DIM - 1)};
+    Placed placed{{{}, mesh.triangles, {}}, Coord::floor(0.5 * (lower + upper)) & ~int(Leaf::DIM - 1)};
     placed.mesh.points.reserve(points.size());
     const openvdb::Vec3d shift = placed.shift.asVec3d();
     for (const openvdb::Vec3d& p : points)
@@ -100,7 +100,7 @@ bool fits(const LevelSet& field, const Placement& placement, const Transform& vo
     const Transform& own = field.grids().distance->transform();
     const auto near = [&](const openvdb::Vec3d& index) {
         const openvdb::Vec3d there = own.indexToWorld(index);
-        const glm::dvec3 moved = placement.toWorld({float(there.x()), float(there.y()), float(there.z())});
+        const glm::dvec3 moved = placement.toWorld(field.origin() + glm::dvec3(there.x(), there.y(), there.z()));
         return (voxels.worldToIndex({moved.x, moved.y, moved.z}) - index).length() <= sameVoxels;
     };
     return placement.scale == glm::vec3(1) && near({0, 0, 0}) && near({1, 0, 0}) && near({0, 1, 0}) &&
