@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <glm/common.hpp>
 #include <glm/mat3x3.hpp>
@@ -12,28 +13,66 @@
 #include <limits>
 #include <span>
 #include <stdexcept>
-#include <tuple>
+#include <vector>
+
+#include "sdf/equal_points.h"
+#include "sdf/large_array.h"
 
 namespace bilayer {
 namespace {
 
-constexpr unsigned unseen = std::numeric_limits<unsigned>::max();
+/// Vertices or triangles that are worth a task.
+constexpr std::size_t grain = 1 << 13;
 
 bool finite(const glm::vec3& p) {
     return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z);
 }
 
-// For each vertex, the first vertex with equal coordinates.
-std::vector<unsigned> firstOfEqual(const std::vector<glm::vec3>& points) {
-    std::vector<unsigned> order(points.size()), first(points.size());
-    for (std::size_t i = 0; i < points.size(); ++i) order[i] = unsigned(i);
-    const auto key = [&](unsigned i) { return std::tuple(points[i].x, points[i].y, points[i].z, i); };
-    std::sort(order.begin(), order.end(), [&](unsigned a, unsigned b) { return key(a) < key(b); });
-    for (std::size_t i = 0; i < order.size(); ++i) {
-        const bool same = i > 0 && points[order[i]] == points[order[i - 1]];
-        first[order[i]] = same ? first[order[i - 1]] : order[i];
+// Calls body(run, begin, end) for runs of the numbers below n, side by side.
+template <class Body>
+void forEachRun(std::size_t n, Body body) {
+    tbb::parallel_for(std::size_t(0), (n + grain - 1) / grain,
+                      [&](std::size_t run) { body(run, run * grain, std::min(n, (run + 1) * grain)); });
+}
+
+// Keeps the items that keeps(index) is true for, in their order; returns where those of each run went. keeps() is asked
+// once for each item, and may change that item.
+template <class Item, class Keeps>
+std::vector<std::size_t> keepWhere(std::vector<Item>& items, Keeps keeps) {
+    std::vector<std::size_t> places((items.size() + grain - 1) / grain + 1, 0);
+    forEachRun(items.size(), [&](std::size_t run, std::size_t begin, std::size_t end) {
+        std::size_t kept = begin;
+        for (std::size_t i = begin; i < end; ++i)
+            if (keeps(i)) items[kept++] = items[i];
+        places[run + 1] = kept - begin;
+    });
+    for (std::size_t run = 0; run + 1 < places.size(); ++run) {
+        const auto from = items.begin() + std::ptrdiff_t(run * grain);
+        const auto to = items.begin() + std::ptrdiff_t(places[run]);
+        if (from != to) std::copy_n(from, places[run + 1], to);
+        places[run + 1] += places[run];
     }
-    return first;
+    items.resize(places.back());
+    return places;
+}
+
+// Sets a flag that other threads may set at the same time.
+void mark(std::uint8_t& flag) {
+    const std::atomic_ref<std::uint8_t> shared(flag);
+    if (!shared.load(std::memory_order_relaxed)) shared.store(1, std::memory_order_relaxed);
+}
+
+// The first number below n that `holds` is true for; n if there is none.
+template <class Holds>
+std::size_t firstWhere(std::size_t n, Holds holds) {
+    return tbb::parallel_reduce(
+        tbb::blocked_range<std::size_t>(0, n, grain), n,
+        [&](const auto& range, std::size_t found) {
+            std::size_t i = range.begin();
+            while (i < range.end() && !holds(i)) ++i;
+            return i < range.end() ? std::min(found, i) : found;
+        },
+        [](std::size_t a, std::size_t b) { return std::min(a, b); });
 }
 
 // Mixes a word into a hash: FNV-1a's step on 64 bits at once, with the high bits folded down.
@@ -76,40 +115,53 @@ Bounds bounds(const Mesh& mesh) {
 }
 
 void validate(const Mesh& mesh) {
-    if (mesh.triangles.empty()) throw std::invalid_argument("the mesh has no triangle");
-    if (mesh.points.size() >= unseen || mesh.triangles.size() >= std::size_t(std::numeric_limits<int>::max()))
-        throw std::invalid_argument(fmt::format("the mesh is too large: {} vertices, {} triangles; at most 2^31 - 2",
-                                                mesh.points.size(), mesh.triangles.size()));
-    for (std::size_t i = 0; i < mesh.points.size(); ++i)
-        if (!finite(mesh.points[i]))
-            throw std::invalid_argument(fmt::format("vertex {} is not finite: ({}, {}, {})", i, mesh.points[i].x,
-                                                    mesh.points[i].y, mesh.points[i].z));
-    for (std::size_t i = 0; i < mesh.triangles.size(); ++i)
-        for (int k = 0; k < 3; ++k)
-            if (mesh.triangles[i][k] >= mesh.points.size())
-                throw std::invalid_argument(fmt::format("triangle {} uses vertex {}, but there are only {} vertices", i,
-                                                        mesh.triangles[i][k], mesh.points.size()));
+    const std::size_t points = mesh.points.size(), triangles = mesh.triangles.size();
+    if (triangles == 0) throw std::invalid_argument("the mesh has no triangle");
+    if (points >= std::numeric_limits<unsigned>::max() || triangles >= std::size_t(std::numeric_limits<int>::max()))
+        throw std::invalid_argument(
+            fmt::format("the mesh is too large: {} vertices, {} triangles; at most 2^31 - 2", points, triangles));
+    const std::size_t p = firstWhere(points, [&](std::size_t i) { return !finite(mesh.points[i]); });
+    if (p < points)
+        throw std::invalid_argument(fmt::format("vertex {} is not finite: ({}, {}, {})", p, mesh.points[p].x,
+                                                mesh.points[p].y, mesh.points[p].z));
+    const auto outside = [&](unsigned vertex) { return vertex >= points; };
+    const std::size_t t = firstWhere(triangles, [&](std::size_t i) {
+        const glm::uvec3& triangle = mesh.triangles[i];
+        return outside(triangle.x) || outside(triangle.y) || outside(triangle.z);
+    });
+    if (t == triangles) return;
+    const glm::uvec3& triangle = mesh.triangles[t];
+    const unsigned vertex = outside(triangle.x) ? triangle.x : outside(triangle.y) ? triangle.y : triangle.z;
+    throw std::invalid_argument(
+        fmt::format("triangle {} uses vertex {}, but there are only {} vertices", t, vertex, points));
 }
 
-Mesh weld(const Mesh& mesh) {
-    const std::vector<unsigned> first = firstOfEqual(mesh.points);
-    std::vector<unsigned> number(mesh.points.size(), unseen);
-    std::vector<bool> used(mesh.points.size(), false);
-    Mesh welded;
-    welded.triangles.reserve(mesh.triangles.size());
-    for (const auto& triangle : mesh.triangles) {
-        const glm::uvec3 t{first[triangle.x], first[triangle.y], first[triangle.z]};
-        if (t.x == t.y || t.y == t.z || t.z == t.x) continue;
-        used[t.x] = used[t.y] = used[t.z] = true;
-        welded.triangles.push_back(t);
-    }
-    for (std::size_t i = 0; i < mesh.points.size(); ++i)
-        if (used[i]) {
-            number[i] = unsigned(welded.points.size());
-            welded.points.push_back(mesh.points[i]);
+Mesh weld(Mesh mesh) {
+    LargeArray<unsigned> number = firstOfEqual(mesh.points);  // of each vertex
+    const std::size_t pointsBefore = mesh.points.size();
+    std::vector<std::uint8_t> used(pointsBefore, 0);
+    keepWhere(mesh.triangles, [&](std::size_t i) {
+        glm::uvec3& t = mesh.triangles[i];
+        t = {number[t.x], number[t.y], number[t.z]};
+        if (t.x == t.y || t.y == t.z || t.z == t.x) return false;
+        for (int k = 0; k < 3; ++k) mark(used[t[k]]);
+        return true;
+    });
+    const std::vector<std::size_t> places = keepWhere(mesh.points, [&](std::size_t i) { return used[i] != 0; });
+    if (mesh.points.size() == pointsBefore) return mesh;
+    forEachRun(pointsBefore, [&](std::size_t run, std::size_t begin, std::size_t end) {
+        std::size_t place = places[run];
+        for (std::size_t i = begin; i < end; ++i)
+            if (used[i]) number[i] = unsigned(place++);
+    });
+    forEachRun(mesh.triangles.size(), [&](std::size_t, std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) {
+            glm::uvec3& t = mesh.triangles[i];
+            t = {number[t.x], number[t.y], number[t.z]};
         }
-    for (auto& t : welded.triangles) t = {number[t.x], number[t.y], number[t.z]};
-    return welded;
+    });
+    mesh.points.shrink_to_fit();
+    return mesh;
 }
 
 Mesh transformed(const Mesh& mesh, const glm::mat4& map) {

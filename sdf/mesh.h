@@ -42,8 +42,9 @@ Bounds bounds(const Mesh& mesh);
 void validate(const Mesh& mesh);
 
 /// Merges vertices with equal coordinates (0 and -0 are equal), drops triangles that use a vertex twice, and drops
-/// vertices that no triangle uses. Keeps the order of what remains.
-Mesh weld(const Mesh& mesh);
+/// vertices that no triangle uses. Keeps the order of what remains. O(n), on all threads; a mesh that is moved in is
+/// welded in its own memory. No index may be out of range.
+Mesh weld(Mesh mesh);
 
 /// The mesh under an affine map; triangles are turned around when the map mirrors, so that normals stay outward. An
 /// origin that is not zero moves with the map.

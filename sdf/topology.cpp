@@ -7,6 +7,8 @@
 #include <bit>
 #include <tuple>
 
+#include "sdf/equal_points.h"
+
 namespace bilayer {
 namespace {
 
@@ -27,22 +29,6 @@ std::uint64_t bitsOf(float coordinate) {
 
 std::uint64_t hashOf(const glm::vec3& p) {
     return mixed(mixed(bitsOf(p.x) | bitsOf(p.y) << 32) + bitsOf(p.z));
-}
-
-// For each vertex, the first vertex with equal coordinates: by a hash table with open addressing.
-std::vector<unsigned> firstOfEqual(const Mesh& mesh, Progress* progress) {
-    constexpr unsigned none = ~0u;
-    auto table = vectorOf<unsigned>(std::bit_ceil(2 * mesh.points.size() + 1), progress);
-    std::fill(table.begin(), table.end(), none);
-    auto first = vectorOf<unsigned>(mesh.points.size(), progress);
-    for (const std::size_t i : Polled(first.size(), progress)) {
-        std::size_t slot = hashOf(mesh.points[i]) & (table.size() - 1);
-        while (table[slot] != none && mesh.points[table[slot]] != mesh.points[i])
-            slot = (slot + 1) & (table.size() - 1);
-        if (table[slot] == none) table[slot] = unsigned(i);
-        first[i] = table[slot];
-    }
-    return first;
 }
 
 // Buckets by the lower vertex, then a small sort in each: linear, where a sort of all edges is not.
@@ -97,7 +83,7 @@ std::vector<unsigned> originals(const Topology& topology) {
 
 Topology::Topology(const Mesh& mesh, Progress* asked)
     : triangles(vectorOf<glm::uvec3>(mesh.triangles.size(), asked)), progress(asked) {
-    const std::vector<unsigned> first = firstOfEqual(mesh, progress);
+    const LargeArray<unsigned> first = firstOfEqual(mesh.points, progress);
     for (const std::size_t i : Polled(triangles.size(), progress))
         for (int k = 0; k < 3; ++k) triangles[i][k] = first[mesh.triangles[i][k]];
     edges = sortedEdges(*this, mesh.points.size());
