@@ -19,6 +19,7 @@
 #include "sdf/atomic_file.h"
 #include "sdf/input_file.h"
 #include "sdf/mesh_guard.h"
+#include "sdf/scene_io.h"
 
 namespace bilayer {
 namespace {
@@ -87,6 +88,36 @@ void add(Mesh& mesh, const aiMesh& part) {
     }
 }
 
+// Faces cut into fans.
+Mesh fanned(const Polygons& polygons) {
+    Mesh mesh;
+    for (const glm::dvec3& p : polygons.points) mesh.points.push_back(glm::vec3(p));
+    std::size_t first = 0;
+    for (std::size_t face = 0; first < polygons.corners.size(); ++face) {
+        const std::size_t size = polygons.sizes.empty() ? 3 : polygons.sizes[face];
+        const unsigned* corners = polygons.corners.data() + first;
+        for (std::size_t k = 2; k < size; ++k) mesh.triangles.push_back({corners[0], corners[k - 1], corners[k]});
+        first += size;
+    }
+    return mesh;
+}
+
+Mesh readByAssimp(const std::filesystem::path& path) {
+    Assimp::Importer importer;
+    importer.SetIOHandler(new RegularFiles);  // the importer's own from here on
+    importer.SetPropertyInteger(AI_CONFIG_PP_RVC_FLAGS, int(unwanted));
+    importer.SetPropertyInteger(AI_CONFIG_PP_SBP_REMOVE, aiPrimitiveType_POINT | aiPrimitiveType_LINE);
+    const aiScene* scene = readScene(importer, path);
+    if (scene) {
+        checkFaces(*scene, path);
+        scene = importer.ApplyPostProcessing(steps);
+    }
+    if (!scene) throw std::runtime_error(fmt::format("{}: {}", path.string(), importer.GetErrorString()));
+    Mesh mesh;
+    for (unsigned i = 0; i < scene->mNumMeshes; ++i) add(mesh, *scene->mMeshes[i]);
+    return mesh;
+}
+
 // The one mesh as an Assimp scene, which owns it.
 std::unique_ptr<aiScene> toScene(const Mesh& mesh) {
     auto scene = std::make_unique<aiScene>();
@@ -115,19 +146,10 @@ std::unique_ptr<aiScene> toScene(const Mesh& mesh) {
 }  // namespace
 
 Mesh readMesh(const std::filesystem::path& path) {
-    Assimp::Importer importer;
-    importer.SetIOHandler(new RegularFiles);  // the importer's own from here on
-    importer.SetPropertyInteger(AI_CONFIG_PP_RVC_FLAGS, int(unwanted));
-    importer.SetPropertyInteger(AI_CONFIG_PP_SBP_REMOVE, aiPrimitiveType_POINT | aiPrimitiveType_LINE);
     requireInputFile(path);
-    const aiScene* scene = readScene(importer, path);
-    if (scene) {
-        checkFaces(*scene, path);
-        scene = importer.ApplyPostProcessing(steps);
-    }
-    if (!scene) throw std::runtime_error(fmt::format("{}: {}", path.string(), importer.GetErrorString()));
-    Mesh mesh;
-    for (unsigned i = 0; i < scene->mNumMeshes; ++i) add(mesh, *scene->mMeshes[i]);
+    const std::string ending = lowerEnding(path);
+    const bool byAssimp = ending == ".obj" || ending == ".ply" || ending == ".stl" || ending == ".off";
+    Mesh mesh = byAssimp ? readByAssimp(path) : fanned(readScene(path));
     if (mesh.triangles.empty()) throw std::runtime_error(fmt::format("{}: holds no triangle", path.string()));
     try {
         validate(mesh);
