@@ -93,7 +93,8 @@ class AssimpScene {
 }  // namespace
 
 Polygons readByAssimp(const std::filesystem::path& path) {
-    Assimp::Importer importer;
+    // Left to the end of the process: Assimp frees some scenes wrongly, those of 3MF files with thumbnails for one.
+    Assimp::Importer& importer = *new Assimp::Importer;
     const std::string ending = path.extension().string();
     if (!importer.IsExtensionSupported(ending.c_str()))
         throw std::runtime_error(

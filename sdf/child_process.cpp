@@ -19,9 +19,9 @@
 namespace bilayer {
 namespace {
 
-constexpr int answerPipe = 3;           // its number in the child: the first after the standard streams
-constexpr int pipeCapacity = 1 << 20;   // [bytes]: fewer changes between the two processes than the usual 64 kB need
-constexpr int diedBeforeAnswer = 127;   // exit status
+constexpr int answerPipe = 3;          // its number in the child: the first after the standard streams
+constexpr int pipeCapacity = 1 << 20;  // [bytes]: fewer changes between the two processes than the usual 64 kB need
+constexpr int diedBeforeAnswer = 127;  // exit status
 
 // No signal reaches the child before it has let go of the caller's handlers.
 class SignalsBlocked {
@@ -140,12 +140,13 @@ void ChildProcess::receive(void* bytes, std::size_t count) {
 
 void ChildProcess::waitForBytes() {
     for (;;) {
-        const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(
-            deadline_ - std::chrono::steady_clock::now());
+        const auto left =
+            std::chrono::duration_cast<std::chrono::milliseconds>(deadline_ - std::chrono::steady_clock::now());
         pollfd end{pipe_, POLLIN, 0};
         const int ready = ::poll(&end, 1, int(std::clamp<long long>(left.count(), 0, INT_MAX)));
         if (ready > 0) return;
-        if (ready == 0 && left.count() <= 0) throw ChildFailure(fmt::format("took longer than {} s", time_.count() / 1000.0));
+        if (ready == 0 && left.count() <= 0)
+            throw ChildFailure(fmt::format("took longer than {} s", time_.count() / 1000.0));
         if (ready < 0 && errno != EINTR) throw std::system_error(errno, std::generic_category(), "poll");
     }
 }

@@ -26,20 +26,29 @@ T read(const unsigned char* bytes) {
 double number(const unsigned char* bytes, int componentType, bool normalized) {
     const auto scaled = [&](double value, double one) { return normalized ? std::max(value / one, -1.0) : value; };
     switch (componentType) {
-        case TINYGLTF_COMPONENT_TYPE_BYTE: return scaled(read<std::int8_t>(bytes), 127);
-        case TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE: return scaled(read<std::uint8_t>(bytes), 255);
-        case TINYGLTF_COMPONENT_TYPE_SHORT: return scaled(read<std::int16_t>(bytes), 32767);
-        case TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT: return scaled(read<std::uint16_t>(bytes), 65535);
-        case TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT: return scaled(read<std::uint32_t>(bytes), 4294967295.0);
-        default: return double(read<float>(bytes));
+        case TINYGLTF_COMPONENT_TYPE_BYTE:
+            return scaled(read<std::int8_t>(bytes), 127);
+        case TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE:
+            return scaled(read<std::uint8_t>(bytes), 255);
+        case TINYGLTF_COMPONENT_TYPE_SHORT:
+            return scaled(read<std::int16_t>(bytes), 32767);
+        case TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT:
+            return scaled(read<std::uint16_t>(bytes), 65535);
+        case TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT:
+            return scaled(read<std::uint32_t>(bytes), 4294967295.0);
+        default:
+            return double(read<float>(bytes));
     }
 }
 
 unsigned unsignedInteger(const unsigned char* bytes, int componentType) {
     switch (componentType) {
-        case TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE: return read<std::uint8_t>(bytes);
-        case TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT: return read<std::uint16_t>(bytes);
-        default: return read<std::uint32_t>(bytes);
+        case TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE:
+            return read<std::uint8_t>(bytes);
+        case TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT:
+            return read<std::uint16_t>(bytes);
+        default:
+            return read<std::uint32_t>(bytes);
     }
 }
 
@@ -64,12 +73,18 @@ std::size_t componentsOf(int type) {
 
 const char* nameOf(int type) {
     switch (type) {
-        case TINYGLTF_TYPE_SCALAR: return "SCALAR";
-        case TINYGLTF_TYPE_VEC2: return "VEC2";
-        case TINYGLTF_TYPE_VEC3: return "VEC3";
-        case TINYGLTF_TYPE_VEC4: return "VEC4";
-        case TINYGLTF_TYPE_MAT4: return "MAT4";
-        default: return "MAT2 or MAT3";
+        case TINYGLTF_TYPE_SCALAR:
+            return "SCALAR";
+        case TINYGLTF_TYPE_VEC2:
+            return "VEC2";
+        case TINYGLTF_TYPE_VEC3:
+            return "VEC3";
+        case TINYGLTF_TYPE_VEC4:
+            return "VEC4";
+        case TINYGLTF_TYPE_MAT4:
+            return "MAT4";
+        default:
+            return "MAT2 or MAT3";
     }
 }
 
@@ -155,8 +170,9 @@ void GltfNumbers::replaceSparse(std::vector<double>& values, const tinygltf::Acc
 
 std::vector<unsigned> GltfNumbers::unsignedIntegers(int index, const std::string& use) const {
     const tinygltf::Accessor& a = accessor(index, TINYGLTF_TYPE_SCALAR, use);
-    require(isUnsignedType(a.componentType), "accessor {}, used as {}, has componentType {}; it must be 5121, 5123 or 5125",
-            index, use, a.componentType);
+    require(isUnsignedType(a.componentType),
+            "accessor {}, used as {}, has componentType {}; it must be 5121, 5123 or 5125", index, use,
+            a.componentType);
     require(!a.normalized, "accessor {}, used as {}, is normalized; integers are not", index, use);
     // a double holds every 32-bit integer exactly
     const std::vector<double> values = numbers(index, TINYGLTF_TYPE_SCALAR, use);

@@ -24,8 +24,8 @@ using Bytes = std::vector<unsigned char>;
 // Extensions that change the shape of what is read, and are understood.
 constexpr std::string_view understood[] = {"KHR_mesh_quantization", "EXT_mesh_gpu_instancing"};
 // Beginnings of the names of those that only say how things look or sound, and who made them.
-constexpr std::string_view looks[] = {"KHR_materials_",    "KHR_texture_",        "EXT_texture_", "MSFT_texture_",
-                                      "KHR_lights_",       "EXT_lights_",         "KHR_xmp",      "KHR_audio",
+constexpr std::string_view looks[] = {"KHR_materials_",      "KHR_texture_",        "EXT_texture_", "MSFT_texture_",
+                                      "KHR_lights_",         "EXT_lights_",         "KHR_xmp",      "KHR_audio",
                                       "KHR_environment_map", "KHR_techniques_webgl"};
 // Those that hold the geometry itself, even if they are only said to be used.
 constexpr std::string_view compressions[] = {"KHR_draco_mesh_compression", "EXT_meshopt_compression",
@@ -182,10 +182,9 @@ tinygltf::Model loadGltf(const fs::path& path) {
     tinygltf::Model model;
     std::string error, warning;
     const auto size = unsigned(bytes.size());
-    const bool loaded =
-        isBinary(bytes)
-            ? loader.LoadBinaryFromMemory(&model, &error, &warning, bytes.data(), size, folder.string())
-            : loader.LoadASCIIFromString(&model, &error, &warning, json.data(), size, folder.string());
+    const bool loaded = isBinary(bytes)
+                            ? loader.LoadBinaryFromMemory(&model, &error, &warning, bytes.data(), size, folder.string())
+                            : loader.LoadASCIIFromString(&model, &error, &warning, json.data(), size, folder.string());
     checkRequired(model);
     // it tells of primitives that it leaves out, too
     if (!loaded || !error.empty()) throw std::runtime_error(complaint(model, error));

@@ -159,8 +159,8 @@ std::vector<glm::dmat4> GltfScene::instances(const tinygltf::Node& node, std::si
     const auto extension = node.extensions.find("EXT_mesh_gpu_instancing");
     if (extension == node.extensions.end()) return {world_[index]};
     const std::string by = fmt::format("the instances of node {}", index);
-    const tinygltf::Value& attributes = extension->second.Has("attributes") ? extension->second.Get("attributes")
-                                                                            : extension->second;
+    const tinygltf::Value& attributes =
+        extension->second.Has("attributes") ? extension->second.Get("attributes") : extension->second;
     const auto accessor = [&](const char* name) {
         return attributes.Has(name) && attributes.Get(name).IsInt() ? attributes.Get(name).GetNumberAsInt() : -1;
     };

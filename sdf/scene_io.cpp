@@ -16,7 +16,8 @@ namespace bilayer {
 namespace {
 
 constexpr std::chrono::seconds baseTime{60}, timePerMegabyte{10};
-constexpr std::size_t baseMemory = std::size_t(2) << 30;  // [bytes]: compressed and text formats grow when they are read
+constexpr std::size_t baseMemory = std::size_t(2)
+                                   << 30;  // [bytes]: compressed and text formats grow when they are read
 constexpr std::size_t memoryPerByte = 100;
 constexpr std::size_t longestError = 300;  // [bytes]: importers quote what stands in the file
 
@@ -64,8 +65,7 @@ Polygons readScene(const std::filesystem::path& path, const ChildLimits& limits)
     requireInputFile(path);
     const std::string format = formatOf(path);
     try {
-        ChildProcess child(limits,
-                           [&](const ChildProcess::Send& send) { readInChild(path, limits.memory, send); });
+        ChildProcess child(limits, [&](const ChildProcess::Send& send) { readInChild(path, limits.memory, send); });
         return receivePolygons(child, limits.memory);
     } catch (const ChildFailure& failure) {
         throw std::runtime_error(fmt::format("{}: the importer for {} files {}; convert it to OBJ, PLY or STL{}",
