@@ -13,7 +13,10 @@
 #include <algorithm>
 #include <cerrno>
 #include <climits>
+#include <cstdlib>
+#include <exception>
 #include <fstream>
+#include <new>
 #include <system_error>
 
 namespace bilayer {
@@ -44,6 +47,13 @@ std::size_t addressSpace() {
     std::size_t pages = 0;
     std::ifstream("/proc/self/statm") >> pages;
     return pages * std::size_t(::sysconf(_SC_PAGESIZE));
+}
+
+// Whatever ends the child by itself ends it at once, without what the caller has prepared for its own end.
+void takeDefaultEnds() {
+    std::atexit([] { ::_exit(diedBeforeAnswer); });  // called before the handlers that were there earlier
+    std::set_terminate(std::abort);
+    std::set_new_handler(nullptr);
 }
 
 void takeDefaultSignals() {
@@ -83,6 +93,7 @@ void send(const void* bytes, std::size_t count) {
 [[noreturn]] void live(int pipe, std::size_t addressLimit, const ChildProcess::Work& work) noexcept {
     ::prctl(PR_SET_PDEATHSIG, SIGKILL);
     ::prctl(PR_SET_DUMPABLE, 0);
+    takeDefaultEnds();
     takeDefaultSignals();
     const rlimit memory{addressLimit, addressLimit};
     ::setrlimit(RLIMIT_AS, &memory);
