@@ -17,6 +17,7 @@
 
 #include "sdf/orient.h"
 #include "sdf/piercing.h"
+#include "sdf/sign.h"
 #include "sdf/topology.h"
 #include "sdf/triangle_tree.h"
 
@@ -264,6 +265,18 @@ void findThinWalls(const Mesh& mesh, float wall, MeshReport& report) {
 
 }  // namespace
 
+MeshGlance glance(const Mesh& mesh) {
+    validate(mesh);
+    if (balanced(mesh)) return {true, true};
+    MeshGlance seen{true, true};
+    Topology(mesh).forEachEdge([&](std::span<const EdgeUse> uses) {
+        const int net = netRuns(uses);
+        seen.closed &= uses.size() > 1 && (uses.size() == 2 || net == 0);
+        seen.oriented &= uses.size() == 1 || net == 0;
+    });
+    return seen;
+}
+
 MeshReport inspect(const Mesh& input, float wall) {
     validate(input);
     MeshReport report;
@@ -273,6 +286,7 @@ MeshReport inspect(const Mesh& input, float wall) {
     report.degenerateTriangles = input.triangles.size() - mesh.triangles.size();
     if (mesh.triangles.empty()) return report;
     report.bounds = bounds(mesh);
+    report.origin = mesh.origin;
     const Topology topology(mesh);
     const TriangleTree tree(mesh);
     const std::vector<unsigned> of = components(mesh, report.components);

@@ -13,7 +13,8 @@ struct MeshReport {
     std::size_t points = 0;
     std::size_t triangles = 0;
     std::size_t components = 0;           ///< sets of triangles that share vertices
-    Bounds bounds;                        ///< [m]
+    Bounds bounds;                        ///< relative to the origin [m]
+    glm::dvec3 origin{0};                 ///< Mesh::origin [m]
     std::size_t boundaryEdges = 0;        ///< edges of one triangle
     std::size_t nonManifoldEdges = 0;     ///< edges of three triangles or more
     std::size_t misorientedEdges = 0;     ///< edges that their triangles do not run both ways equally often
@@ -42,6 +43,16 @@ struct MeshReport {
 /// @param wall  thickness below which a wall counts as thin [m], often one voxel; 0 counts none
 /// Throws as validate() does.
 MeshReport inspect(const Mesh& mesh, float wall = 0);
+
+/// What a mesh is at a glance.
+struct MeshGlance {
+    bool closed =
+        false;  ///< no edge has one triangle, and where it has three or more, they run it both ways equally often
+    bool oriented = false;  ///< no edge is run twice in one direction
+};
+
+/// Looks at the edges of a mesh alone: a hundredth of the time of inspect() where both hold. Throws as validate() does.
+MeshGlance glance(const Mesh& mesh);
 
 /// The report in one sentence without a full stop: "closed and oriented", or what is wrong, the worst first.
 std::string verdict(const MeshReport& report);

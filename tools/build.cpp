@@ -48,7 +48,7 @@ struct Arguments {
     std::uint64_t deviceMemory = 0;
     VdbOptions stored;
     ColliderOptions collider;
-    bool fill = false, body = false, noMesh = false, json = false;
+    bool fill = false, body = false, noMesh = false, report = false, json = false;
     CLI::Option *resolutionGiven = nullptr, *halfGiven = nullptr, *exteriorGiven = nullptr, *interiorGiven = nullptr;
     CLI::Option* gapGiven = nullptr;
     std::vector<CLI::Option*> bodyOptions;
@@ -57,8 +57,9 @@ struct Arguments {
 };
 
 struct Outcome {
-    float wall = 0;
-    MeshReport report;
+    ReadReport file;
+    MeshGlance glance;
+    std::optional<MeshReport> report;
     std::string device;
     BuildTimes times;
     double read = 0, inspect = 0, build = 0, fill = 0, body = 0, write = 0;
@@ -143,10 +144,11 @@ LevelSet timedBody(const Mesh& mesh, const LevelSet& field, const Arguments& a, 
     return stored;
 }
 
-void printJson(const Arguments& a, const Outcome& o, const LevelSet& field) {
-    Json json{{"mesh", toJson(o.report, o.wall)},
+void printJson(const Arguments& a, const Outcome& o, const Mesh& mesh, const LevelSet& field) {
+    Json json{{"file", toJson(o.file)},
+              {"mesh", o.report ? toJson(*o.report, a.options.voxelSize) : toJson(mesh, o.glance)},
               {"output", a.output.string()},
-              {"triangles", o.report.triangles},
+              {"triangles", mesh.triangles.size()},
               {"voxelSize", number(field.voxelSize())},
               {"bandUnit", a.bandUnit},
               {"exteriorWidth", number(a.options.exteriorWidth)},
@@ -166,14 +168,18 @@ void printJson(const Arguments& a, const Outcome& o, const LevelSet& field) {
                 {"write", o.write}}},
               {"peakRssBytes", peakMemory()}};
     json.update(provenance(field, a.stored));
-    if (a.body) json["body"] = toJson(bodyOf(field));
+    if (a.body) json["body"] = toJson(bodyOf(field), field.origin());
     print(json);
 }
 
-void printTable(const Arguments& a, const Outcome& o, const LevelSet& field) {
-    Table mesh(a.mesh.string());
-    addRows(mesh, o.report, o.wall);
-    mesh.print();
+void printTable(const Arguments& a, const Outcome& o, const Mesh& mesh, const LevelSet& field) {
+    Table input(a.mesh.string());
+    addRows(input, o.file);
+    if (o.report)
+        addRows(input, *o.report, a.options.voxelSize);
+    else
+        addRows(input, mesh, o.glance);
+    input.print();
     Table table(a.output.string());
     addRows(table, field, a.stored);
     if (a.body) addRows(table, bodyOf(field));
@@ -199,7 +205,7 @@ void run(Arguments a) {
 
     Outcome outcome;
     const Stopwatch reading;
-    const Mesh mesh = readMesh(a.mesh);
+    const Mesh mesh = readMesh(a.mesh, &outcome.file);
     outcome.read = reading.seconds();
     requireWritable(a.output);
     if (a.resolutionGiven->count()) {
@@ -216,13 +222,15 @@ void run(Arguments a) {
     }
     if (a.body) field = timedBody(mesh, field, a, outcome);
     const Stopwatch inspecting;
-    outcome.wall = a.options.voxelSize;
-    outcome.report = inspect(mesh, outcome.wall);
+    if (a.report)
+        outcome.report = inspect(mesh, a.options.voxelSize);
+    else
+        outcome.glance = glance(mesh);
     outcome.inspect = inspecting.seconds();
     const Stopwatch writing;
     writeVdb(a.output, field, a.stored);
     outcome.write = writing.seconds();
-    a.json ? printJson(a, outcome, field) : printTable(a, outcome, field);
+    a.json ? printJson(a, outcome, mesh, field) : printTable(a, outcome, mesh, field);
 }
 
 void addBand(CLI::App& command, Arguments& a) {
@@ -317,6 +325,8 @@ void addBuild(CLI::App& app) {
     command->add_flag("--triangles", a->options.triangles, "keep the nearest triangle of each voxel too");
     command->add_flag("--fill", a->fill, "sweep distances into all voxels of the field's box");
     command->add_flag("--half-float", a->stored.halfFloat, "store 16-bit distances");
+    command->add_flag("--report", a->report,
+                      "inspect the mesh too, as the command inspect does, with walls below a voxel");
     command->add_flag("--json", a->json, "print one JSON object");
     command->callback([a] { run(*a); });
 }

@@ -30,7 +30,7 @@ struct Arguments {
 };
 
 // Three finite numbers and nothing else. Locales and hexadecimal digits have no say.
-bool parsePoint(const std::string& line, glm::vec3& point) {
+bool parsePoint(const std::string& line, glm::dvec3& point) {
     std::size_t at = 0;
     for (int axis = 0; axis < 3; ++axis) {
         at = line.find_first_not_of(blanks, at);
@@ -38,24 +38,26 @@ bool parsePoint(const std::string& line, glm::vec3& point) {
         at += line[at] == '+';
         const char* end = line.data() + std::min(line.find_first_of(blanks, at), line.size());
         const auto [stop, error] = std::from_chars(line.data() + at, end, point[axis]);
-        if (error != std::errc() || stop != end || !std::isfinite(point[axis])) return false;
+        if (error != std::errc() || stop != end || !std::isfinite(float(point[axis]))) return false;
         at = std::size_t(end - line.data());
     }
     return line.find_first_not_of(blanks, at) == std::string::npos;
 }
 
 void runQuery(const Arguments& a) {
-    const Field field(readVdb(a.field));
+    const LevelSet levelSet = readVdb(a.field);
+    const Field field(levelSet);
+    const glm::dvec3 origin = levelSet.origin();
     std::ios::sync_with_stdio(false);
     std::string line;
     for (std::size_t count = 1;; ++count) {
         // a program that asks and waits for the answer gets it; a long list is not slowed down by that
         if (std::cin.rdbuf()->in_avail() <= 0) std::fflush(stdout);
         if (!std::getline(std::cin, line)) break;
-        glm::vec3 point;
+        glm::dvec3 point;
         if (!parsePoint(line, point))
             throw std::runtime_error(fmt::format("standard input, line {}: expected three numbers x y z", count));
-        const Sample s = field.sample(point);
+        const Sample s = field.sample(glm::vec3(point - origin));
         fmt::print("{:.9g} {:.9g} {:.9g} {:.9g} {}\n", s.distance, s.gradient.x, s.gradient.y, s.gradient.z,
                    int(s.inBand));
     }

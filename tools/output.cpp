@@ -28,6 +28,23 @@ std::string text(const glm::vec3& v) {
     return fmt::format("{:.6g} {:.6g} {:.6g}", v.x, v.y, v.z);
 }
 
+// A place in the world, of one relative to an origin.
+Json place(const glm::vec3& v, const glm::dvec3& origin) {
+    return origin == glm::dvec3(0) ? vector(v) : vector(origin + glm::dvec3(v));
+}
+
+std::string placeText(const glm::vec3& v, const glm::dvec3& origin) {
+    if (origin == glm::dvec3(0)) return text(v);
+    const glm::dvec3 p = origin + glm::dvec3(v);
+    return fmt::format("{:.10g} {:.10g} {:.10g}", p.x, p.y, p.z);
+}
+
+void addOrigin(Table& table, const glm::dvec3& origin) {
+    if (origin != glm::dvec3(0))
+        table.row("origin",
+                  fmt::format("{} {} {} m: coordinates are kept relative to it", origin.x, origin.y, origin.z));
+}
+
 std::string holes(const MeshReport& report) {
     return fmt::format("{} ({} boundary edges in {} loops, {} non-manifold edges, {} non-manifold vertices)",
                        report.closed() ? "yes" : "no", grouped(report.boundaryEdges), grouped(report.boundaryLoops),
@@ -77,13 +94,16 @@ Json number(float value) {
     return std::isfinite(value) ? Json(std::stod(fmt::format("{}", value))) : Json();
 }
 
-Json box(const Bounds& bounds) {
-    return {{"lower", vector(bounds.lower)}, {"upper", vector(bounds.upper)}};
+Json vector(const glm::dvec3& v) {
+    return Json::array({v.x, v.y, v.z});
 }
 
-std::string boxText(const Bounds& bounds) {
-    const glm::vec3 &a = bounds.lower, &b = bounds.upper;
-    return fmt::format("{:.6g} {:.6g} {:.6g} .. {:.6g} {:.6g} {:.6g} m", a.x, a.y, a.z, b.x, b.y, b.z);
+Json box(const Bounds& bounds, const glm::dvec3& origin) {
+    return {{"lower", place(bounds.lower, origin)}, {"upper", place(bounds.upper, origin)}};
+}
+
+std::string boxText(const Bounds& bounds, const glm::dvec3& origin) {
+    return fmt::format("{} .. {} m", placeText(bounds.lower, origin), placeText(bounds.upper, origin));
 }
 
 Json toJson(const MeshReport& report, float wall) {
@@ -91,7 +111,8 @@ Json toJson(const MeshReport& report, float wall) {
             {"points", report.points},
             {"triangles", report.triangles},
             {"components", report.components},
-            {"bounds", box(report.bounds)},
+            {"bounds", box(report.bounds, report.origin)},
+            {"origin", vector(report.origin)},
             {"closed", report.closed()},
             {"oriented", report.oriented()},
             {"boundaryEdges", report.boundaryEdges},
@@ -117,7 +138,8 @@ void addRows(Table& table, const MeshReport& report, float wall) {
     table.row("points", grouped(report.points));
     table.row("triangles", grouped(report.triangles));
     table.row("components", grouped(report.components));
-    table.row("bounds", boxText(report.bounds));
+    table.row("bounds", boxText(report.bounds, report.origin));
+    addOrigin(table, report.origin);
     table.row("closed", holes(report));
     table.row("oriented", orientation(report));
     table.row("self-intersections", fmt::format("{} pairs of triangles", grouped(report.selfIntersections)));
@@ -130,6 +152,45 @@ void addRows(Table& table, const MeshReport& report, float wall) {
         table.row("thin walls", fmt::format("{} triangles, below {}", grouped(report.thinWalls), metres(wall)));
     table.row("area", fmt::format("{:.6g} m^2", report.area));
     if (report.closed()) table.row("volume", fmt::format("{:.6g} m^3", report.volume));
+}
+
+Json toJson(const Mesh& mesh, const MeshGlance& seen) {
+    return {{"points", mesh.points.size()},
+            {"triangles", mesh.triangles.size()},
+            {"bounds", box(bounds(mesh), mesh.origin)},
+            {"origin", vector(mesh.origin)},
+            {"closed", seen.closed},
+            {"oriented", seen.oriented}};
+}
+
+void addRows(Table& table, const Mesh& mesh, const MeshGlance& seen) {
+    table.row("points", grouped(mesh.points.size()));
+    table.row("triangles", grouped(mesh.triangles.size()));
+    table.row("bounds", boxText(bounds(mesh), mesh.origin));
+    addOrigin(table, mesh.origin);
+    table.row("closed", seen.closed ? "yes" : "no");
+    table.row("oriented", seen.oriented ? "yes" : "no");
+}
+
+Json toJson(const ReadReport& read) {
+    return {{"vertices", read.vertices},
+            {"faces", read.faces},
+            {"mergedVertices", read.mergedVertices},
+            {"unusedVertices", read.unusedVertices},
+            {"collapsedTriangles", read.collapsedTriangles},
+            {"notes", read.notes}};
+}
+
+void addRows(Table& table, const ReadReport& read) {
+    table.row("file", fmt::format("{} vertices, {} faces", grouped(read.vertices), grouped(read.faces)));
+    if (read.mergedVertices)
+        table.row("merged", fmt::format("{} vertices at the places of others", grouped(read.mergedVertices)));
+    if (read.unusedVertices)
+        table.row("left out", fmt::format("{} vertices that no face uses", grouped(read.unusedVertices)));
+    if (read.collapsedTriangles)
+        table.row("left out",
+                  fmt::format("{} triangles with two corners in one place", grouped(read.collapsedTriangles)));
+    for (const std::string& note : read.notes) table.row("note", note);
 }
 
 void addRows(Table& table, const LevelSet& levelSet, const VdbOptions& stored) {
@@ -157,20 +218,20 @@ Json provenance(const LevelSet& levelSet, const VdbOptions& stored) {
             {"errorBound", number(storedErrorBound(levelSet, stored))}};
 }
 
-Json toJson(const std::optional<MassProperties>& mass) {
+Json toJson(const std::optional<MassProperties>& mass, const glm::dvec3& origin) {
     if (!mass) return {};
     const glm::quat& q = mass->principalAxes;
     return {{"volume", mass->volume},
-            {"centre", vector(mass->centre)},
+            {"centre", place(mass->centre, origin)},
             {"inertia", matrix(mass->inertia)},
             {"principalInertia", vector(mass->principalInertia)},
             {"principalAxes", Json::array({number(q.w), number(q.x), number(q.y), number(q.z)})}};
 }
 
-void addRows(Table& table, const std::optional<MassProperties>& mass) {
+void addRows(Table& table, const std::optional<MassProperties>& mass, const glm::dvec3& origin) {
     if (!mass) return;
     const glm::mat3 &inertia = mass->inertia, axes = glm::mat3_cast(mass->principalAxes);
-    table.row("centre of mass", text(mass->centre) + " m");
+    table.row("centre of mass", placeText(mass->centre, origin) + " m");
     table.row("inertia", fmt::format("xx yy zz {:.6g} {:.6g} {:.6g}, xy xz yz {:.6g} {:.6g} {:.6g} m^5", inertia[0][0],
                                      inertia[1][1], inertia[2][2], inertia[0][1], inertia[0][2], inertia[1][2]));
     for (int i = 0; i < 3; ++i)
@@ -178,11 +239,11 @@ void addRows(Table& table, const std::optional<MassProperties>& mass) {
                   fmt::format("{}: {:.6g} m^5", text(axes[i]), mass->principalInertia[i]));
 }
 
-Json toJson(const Body& body) {
+Json toJson(const Body& body, const glm::dvec3& origin) {
     return {{"points", body.points.points().size()},
             {"margin", number(body.margin)},
-            {"bounds", box(body.bounds)},
-            {"mass", toJson(body.mass)},
+            {"bounds", box(body.bounds, origin)},
+            {"mass", toJson(body.mass, origin)},
             {"triangles", body.mesh ? body.mesh->triangles.size() : 0},
             {"contacts", nameOf(body.measure)}};
 }

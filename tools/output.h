@@ -15,6 +15,7 @@
 #include "collider/mass.h"
 #include "sdf/inspect.h"
 #include "sdf/level_set.h"
+#include "sdf/mesh_io.h"
 #include "sdf/vdb_io.h"
 
 namespace bilayer::tools {
@@ -36,17 +37,27 @@ class Table {
 /// Prints one JSON object as the only thing on stdout.
 void print(const Json& json);
 
-std::string grouped(std::uint64_t count);   ///< 1234567 as "1,234,567"
-std::string metres(double length);          ///< six digits and the unit
-std::string bytes(std::uint64_t count);     ///< in KiB, MiB or GiB
-std::string hex(std::uint64_t hash);        ///< 16 digits
-Json number(float value);                   ///< with the digits that the float has, not those of its double
-Json box(const Bounds& bounds);             ///< {"lower": [x, y, z], "upper": [x, y, z]}
-std::string boxText(const Bounds& bounds);  ///< "x y z .. x y z m"
+std::string grouped(std::uint64_t count);  ///< 1234567 as "1,234,567"
+std::string metres(double length);         ///< six digits and the unit
+std::string bytes(std::uint64_t count);    ///< in KiB, MiB or GiB
+std::string hex(std::uint64_t hash);       ///< 16 digits
+Json number(float value);                  ///< with the digits that the float has, not those of its double
+Json vector(const glm::dvec3& v);          ///< [x, y, z]
+/// {"lower": [x, y, z], "upper": [x, y, z]} in the world, of bounds relative to an origin.
+Json box(const Bounds& bounds, const glm::dvec3& origin);
+std::string boxText(const Bounds& bounds, const glm::dvec3& origin);  ///< "x y z .. x y z m", likewise
 
 /// A mesh's report. `wall` is the thickness that counted as thin [m]; 0: none did.
 Json toJson(const MeshReport& report, float wall);
 void addRows(Table& table, const MeshReport& report, float wall);
+
+/// The same at a glance.
+Json toJson(const Mesh& mesh, const MeshGlance& seen);
+void addRows(Table& table, const Mesh& mesh, const MeshGlance& seen);
+
+/// What a mesh file held, and what of it was left out.
+Json toJson(const ReadReport& read);
+void addRows(Table& table, const ReadReport& read);
 
 /// Size, widths, method and signs of a field that comes from a file, or goes into one with these options.
 void addRows(Table& table, const LevelSet& levelSet, const VdbOptions& stored = {});
@@ -55,12 +66,13 @@ void addRows(Table& table, const LevelSet& levelSet, const VdbOptions& stored = 
 Json provenance(const LevelSet& levelSet, const VdbOptions& stored = {});
 
 /// Mass properties at density 1 [m]; null for nothing.
-Json toJson(const std::optional<MassProperties>& mass);
+/// @param origin  that the centre is relative to; it is told in the world
+Json toJson(const std::optional<MassProperties>& mass, const glm::dvec3& origin);
 /// All of them but the volume.
-void addRows(Table& table, const std::optional<MassProperties>& mass);
+void addRows(Table& table, const std::optional<MassProperties>& mass, const glm::dvec3& origin);
 
 /// What is kept of a body beside its field.
-Json toJson(const Body& body);
+Json toJson(const Body& body, const glm::dvec3& origin);
 /// All of it but the mass.
 void addRows(Table& table, const Body& body);
 

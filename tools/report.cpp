@@ -83,19 +83,22 @@ void printAdvice(const InspectArguments& a, const bullet::Advice& advice) {
 }
 
 void runInspect(const InspectArguments& a) {
-    const Mesh mesh = readMesh(a.input);
+    ReadReport read;
+    const Mesh mesh = readMesh(a.input, &read);
     const MeshReport report = inspect(mesh);
     const auto advice = a.stepGiven->count() ? std::optional(bullet::advise(report, a.scene)) : std::nullopt;
     const std::optional<MassProperties> mass = report.closed() ? massOf(mesh) : std::nullopt;
     if (a.json) {
         Json json = toJson(report, 0);
-        json["mass"] = toJson(mass);
+        json["file"] = toJson(read);
+        json["mass"] = toJson(mass, mesh.origin);
         if (advice) json["advice"] = adviceJson(*advice);
         return print(json);
     }
     Table table(a.input.string());
+    addRows(table, read);
     addRows(table, report, 0);
-    addRows(table, mass);
+    addRows(table, mass, mesh.origin);
     table.print();
     if (advice) printAdvice(a, *advice);
 }
@@ -148,9 +151,9 @@ void printInfo(const Arguments& a, const LevelSet& field, const Json& grids, con
                               grid["class"].get<std::string>(), grid["halfFloat"] ? ", 16 bits" : ""));
     addRows(table, field);
     if (body) addRows(table, *body);
-    table.row("bounds", boxText(activeBounds(field)));
+    table.row("bounds", boxText(activeBounds(field), field.origin()));
     table.row("volume", mass ? fmt::format("{:.6g} m^3", mass->volume) : "none");
-    addRows(table, mass);
+    addRows(table, mass, field.origin());
     if (field.meshHash()) table.row("mesh hash", hex(field.meshHash()));
     const std::string text = remark(field);
     table.row("level-set check", text.empty() ? "passed" : text);
@@ -174,13 +177,14 @@ void runInfo(const Arguments& a) {
               {"interiorWidth", inVoxels(field.interiorWidth(), field)},
               {"activeVoxels", field.activeVoxels()},
               {"leaves", field.leaves()},
-              {"bounds", box(activeBounds(field))},
-              {"mass", toJson(mass)},
+              {"bounds", box(activeBounds(field), field.origin())},
+              {"origin", vector(field.origin())},
+              {"mass", toJson(mass, field.origin())},
               {"meshHash", hex(field.meshHash())},
               {"memoryBytes", field.memoryBytes()},
               {"levelSetCheck", remark(field)}};
     json.update(provenance(field));
-    if (body) json["body"] = toJson(*body);
+    if (body) json["body"] = toJson(*body, field.origin());
     print(json);
 }
 

@@ -3,8 +3,10 @@
 #include <openvdb/openvdb.h>
 #include <openvdb/tools/LevelSetSphere.h>
 
+#include <fmt/format.h>
 #include <catch2/catch.hpp>
 #include <cmath>
+#include <fstream>
 #include <glm/geometric.hpp>
 #include <sstream>
 #include <vector>
@@ -73,10 +75,101 @@ TEST_CASE("build reports what the file then holds") {
     for (const char* part : {"read", "build", "write"}) CHECK(json["seconds"][part].get<double>() >= 0);
     CHECK(json["seconds"]["parts"].is_object());
     CHECK(json["mesh"]["closed"] == true);
-    CHECK(json["mesh"]["wall"] == 0.05);
+    CHECK(json["mesh"]["oriented"] == true);
+    CHECK(json["mesh"]["points"] == 642);
+    CHECK(json["file"]["vertices"] == 642);
+    CHECK(json["file"]["notes"].empty());
     CHECK(json["peakRssBytes"].get<std::uint64_t>() > 1'000'000);
     CHECK(field.voxelSize() == 0.05f);
     CHECK(field.exteriorWidth() == Approx(0.15f));
+}
+
+TEST_CASE("build inspects a mesh only where a report is asked for") {
+    Mesh open = shapes::sphere(1, 2);
+    open.triangles.pop_back();
+    const auto path = scratch("unclosed.obj"), output = scratch("unclosed.vdb");
+    writeMesh(path, open);
+    const Words words{"build", path.string(), "-o", output.string(), "--voxel-size", "0.1"};
+    const auto with = [&](Words more) {
+        more.insert(more.begin(), words.begin(), words.end());
+        const Result r = run(more);
+        INFO(r.err);
+        REQUIRE(r.status == 0);
+        return r;
+    };
+    const auto glance = with({"--json"}).json()["mesh"];
+    CHECK(glance["closed"] == false);
+    CHECK(glance["oriented"] == true);
+    CHECK(glance["triangles"] == 319);
+    CHECK_FALSE(glance.contains("boundaryEdges"));
+    const auto report = with({"--json", "--report"}).json()["mesh"];
+    CHECK(report["boundaryEdges"] == 3);
+    CHECK(report["wall"] == 0.1);
+    CHECK_THAT(with({}).out,
+               Catch::Contains("closed") && !Catch::Contains("boundary loops") && !Catch::Contains("thin walls"));
+    CHECK_THAT(with({"--report"}).out, Catch::Contains("thin walls"));
+}
+
+TEST_CASE("what a mesh file holds beside its mesh is told") {
+    const auto path = scratch("more.obj");
+    std::ofstream(path) << "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nv 5 5 5\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\nf 1 2\n";
+    const Words build{"build", path.string(), "-o", scratch("more.vdb").string(), "--resolution", "8"};
+    for (const Words& words : {Words{"inspect", path.string()}, build})
+        CHECK_THAT(run(words).out, Catch::Contains("5 vertices, 4 faces") &&
+                                       Catch::Contains("1 vertices that no face uses") &&
+                                       Catch::Contains("1 faces have fewer than three corners"));
+    const auto json = run({"inspect", path.string(), "--json"}).json();
+    CHECK(json["file"]["unusedVertices"] == 1);
+    CHECK(json["file"]["notes"].size() == 1);
+}
+
+TEST_CASE("a mesh far from the zero point keeps its shape from file to file") {
+    // a cube of 0.8 m at coordinates of a map
+    const glm::dvec3 corner(512344.7230, 5403209.7230, 249.7230);
+    const auto path = scratch("far.obj"), output = scratch("far.vdb"), again = scratch("far.ply");
+    {
+        std::ofstream file(path);
+        const Mesh cube = shapes::box(glm::vec3(0.4f));
+        for (const glm::vec3& p : cube.points)
+            file << fmt::format("v {:.10f} {:.10f} {:.10f}\n", corner.x + p.x + 0.4, corner.y + p.y + 0.4,
+                                corner.z + p.z + 0.4);
+        for (const glm::uvec3& t : cube.triangles) file << fmt::format("f {} {} {}\n", t.x + 1, t.y + 1, t.z + 1);
+    }
+    const auto near = [](const nlohmann::json& place, const glm::dvec3& expected, double by) {
+        return glm::distance(glm::dvec3(place[0], place[1], place[2]), expected) < by;
+    };
+    const auto report = run({"inspect", path.string(), "--json"}).json();
+    CHECK(report["volume"].get<double>() == Approx(0.512).epsilon(1e-6));
+    CHECK(near(report["bounds"]["lower"], corner, 1e-6));
+    CHECK(near(report["mass"]["centre"], corner + 0.4, 1e-6));
+    CHECK_FALSE(near(report["origin"], glm::dvec3(0), 1));
+    REQUIRE(
+        run({"build", path.string(), "-o", output.string(), "--voxel-size", "0.02", "--body", "--triangles"}).status ==
+        0);
+    // the transform of the file's grids says where they are
+    openvdb::io::File file(output.string());
+    file.open();
+    const auto grids = file.getGrids();
+    for (const auto& grid : *grids) {
+        CAPTURE(grid->getName());
+        const openvdb::Vec3d centre = grid->transform().indexToWorld(grid->evalActiveVoxelBoundingBox().getCenter());
+        CHECK((centre - openvdb::Vec3d(corner.x + 0.4, corner.y + 0.4, corner.z + 0.4)).length() < 0.05);
+    }
+    const auto info = run({"info", output.string(), "--json"}).json();
+    CHECK(near(info["mass"]["centre"], corner + 0.4, 1e-3));
+    CHECK(info["origin"] == report["origin"]);
+    const auto at = [&](double x, double y, double z) {
+        const std::string point = fmt::format("{:.10f} {:.10f} {:.10f}\n", corner.x + x, corner.y + y, corner.z + z);
+        return std::stod(run({"query", output.string()}, {.input = point}).out);
+    };
+    CHECK(at(0.4, 0.4, 0.83) == Approx(0.03).margin(1e-4));
+    CHECK(at(0.76, 0.4, 0.4) == Approx(-0.04).margin(1e-4));
+    REQUIRE(run({"surface", output.string(), "-o", again.string()}).status == 0);
+    CHECK(near(run({"inspect", again.string(), "--json"}).json()["bounds"]["lower"], corner, 0.01));
+    const auto liquid = scratch("far-liquid.vdb");
+    CHECK(run({"seed", path.string(), "-o", liquid.string(), "--voxel-size", "0.05", "--json"})
+              .json()["volume"]
+              .get<double>() == Approx(0.512).epsilon(0.02));
 }
 
 TEST_CASE("build --resolution counts voxels along the longest side") {
