@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 #include <oneapi/tbb/parallel_for.h>
+#include <oneapi/tbb/parallel_reduce.h>
 #include <openvdb/io/File.h>
 #include <openvdb/io/Stream.h>
 #include <openvdb/tree/LeafManager.h>
@@ -10,13 +11,16 @@
 #include <algorithm>
 #include <cmath>
 #include <fstream>
+#include <sstream>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "sdf/atomic_file.h"
 #include "sdf/grids.h"
 #include "sdf/input_file.h"
+#include "sdf/mapped_file.h"
 #include "sdf/vdb_lengths.h"
 
 namespace bilayer {
@@ -92,16 +96,23 @@ constexpr std::size_t sealSize = sealName.size() + 9;  // eight digits and a lin
 // So many of its letters are no chance. Of a file that ends with fewer nothing else is missing.
 constexpr std::size_t leastOfSeal = 4;
 
-std::string sealOf(std::istream& stream, std::uintmax_t size) {
-    std::vector<char> piece(std::size_t(1) << 20);
-    uLong sum = crc32(0, nullptr, 0);
-    while (size > 0) {
-        const auto count = std::size_t(std::min<std::uintmax_t>(size, piece.size()));
-        stream.read(piece.data(), std::streamsize(count));
-        sum = crc32(sum, reinterpret_cast<const Bytef*>(piece.data()), uInt(count));
-        size -= count;
-    }
-    return fmt::format("{}{:08x}\n", sealName, sum);
+/// On all threads: sums of parts combine.
+std::string sealOf(std::string_view bytes) {
+    struct Sum {
+        uLong value = crc32(0, nullptr, 0);
+        std::size_t size = 0;
+    };
+    constexpr std::size_t grain = 1 << 18;
+    const auto add = [&](const tbb::blocked_range<std::size_t>& range, Sum sum) {
+        sum.value = crc32_z(sum.value, reinterpret_cast<const Bytef*>(bytes.data()) + range.begin(), range.size());
+        sum.size += range.size();
+        return sum;
+    };
+    const auto join = [](const Sum& a, const Sum& b) {
+        return Sum{crc32_combine(a.value, b.value, z_off_t(b.size)), a.size + b.size};
+    };
+    const Sum sum = tbb::parallel_reduce(tbb::blocked_range<std::size_t>(0, bytes.size(), grain), Sum{}, add, join);
+    return fmt::format("{}{:08x}\n", sealName, sum.value);
 }
 
 std::ifstream opened(const std::filesystem::path& path) {
@@ -110,31 +121,49 @@ std::ifstream opened(const std::filesystem::path& path) {
     return stream;
 }
 
-void seal(const std::filesystem::path& path) {
-    std::ifstream written = opened(path);
-    const std::string end = sealOf(written, std::filesystem::file_size(path));
-    std::ofstream stream(path, std::ios::binary | std::ios::app);
-    stream.exceptions(std::ios::failbit | std::ios::badbit);
-    stream << end;
-    stream.close();
-}
-
 /// Files of others have no seal. Throws std::runtime_error where there is one, or the beginning of one, that does not
 /// hold or is not the end.
-void requireSeal(const std::filesystem::path& path) {
-    const std::uintmax_t size = std::filesystem::file_size(path);
-    std::ifstream stream = opened(path);
+void requireSeal(std::string_view bytes) {
     // more than the seal: bytes may have come behind it
-    std::string end(std::size_t(std::min<std::uintmax_t>(size, 4 * sealSize)), ' ');
-    stream.seekg(std::streamoff(size - end.size()));
-    stream.read(end.data(), std::streamsize(end.size()));
+    const std::string_view end = bytes.substr(bytes.size() - std::min(bytes.size(), 4 * sealSize));
     for (std::size_t kept = sealName.size() - 1; kept >= leastOfSeal; --kept)
         if (end.ends_with(sealName.substr(0, kept))) throw std::runtime_error("its end is missing");
     const std::size_t at = end.rfind(sealName);
-    if (at == std::string::npos) return;
-    stream.seekg(0);
-    if (sealOf(stream, size - end.size() + at) != end.substr(at))
+    if (at == std::string_view::npos) return;
+    if (sealOf(bytes.substr(0, bytes.size() - end.size() + at)) != end.substr(at))
         throw std::runtime_error("it is not as it was written");
+}
+
+/// A grid that compresses its leaves on all threads. OpenVDB's own does so one after the other; the bytes are the same.
+template <class Grid>
+class ParallelGrid : public Grid {
+  public:
+    explicit ParallelGrid(Grid& grid) : Grid(grid, openvdb::ShallowCopy()) {}
+
+    void writeBuffers(std::ostream& out) const override {
+        std::vector<const typename Grid::TreeType::LeafNodeType*> leaves;
+        this->tree().getNodes(leaves);
+        constexpr std::size_t run = 256;
+        std::vector<std::string> runs((leaves.size() + run - 1) / run);
+        const openvdb::io::StreamMetadata::Ptr how = openvdb::io::getStreamMetadataPtr(out);
+        tbb::parallel_for(std::size_t(0), runs.size(), [&](std::size_t i) {
+            openvdb::io::StreamMetadata::Ptr shared = how;
+            std::ostringstream part;
+            openvdb::io::setStreamMetadataPtr(part, shared);
+            for (std::size_t k = i * run; k < std::min((i + 1) * run, leaves.size()); ++k)
+                leaves[k]->writeBuffers(part, this->saveFloatAsHalf());
+            openvdb::io::clearStreamMetadataPtr(part);
+            runs[i] = std::move(part).str();
+        });
+        for (const std::string& bytes : runs) out.write(bytes.data(), std::streamsize(bytes.size()));
+    }
+};
+
+template <class Grid>
+openvdb::GridBase::ConstPtr inParallel(const openvdb::GridBase::ConstPtr& grid) {
+    const auto typed = openvdb::gridPtrCast<Grid>(openvdb::ConstPtrCast<openvdb::GridBase>(grid));
+    if (typed) return std::make_shared<ParallelGrid<Grid>>(*typed);
+    return grid;
 }
 
 void shift(openvdb::GridBase& grid, const glm::dvec3& by) {
@@ -164,12 +193,18 @@ openvdb::GridBase::Ptr inWorld(const openvdb::GridBase::ConstPtr& grid, const Le
 
 void writeGrids(const std::filesystem::path& path, const openvdb::GridCPtrVec& grids) {
     AtomicFile file(path);
+    openvdb::GridCPtrVec written;
+    for (const auto& grid : grids)
+        written.push_back(inParallel<openvdb::FloatGrid>(inParallel<openvdb::Int32Grid>(grid)));
     try {
+        std::ostringstream memory;
+        memory.exceptions(std::ios::failbit | std::ios::badbit);
+        openvdb::io::Stream(memory).write(written);
         std::ofstream stream(file.temporary(), std::ios::binary);
         stream.exceptions(std::ios::failbit | std::ios::badbit);
-        openvdb::io::Stream(stream).write(grids);
+        const std::string_view bytes = memory.view();
+        stream << bytes << sealOf(bytes);
         stream.close();
-        seal(file.temporary());
     } catch (const std::exception&) {
         throw std::runtime_error(fmt::format("{}: cannot be written (is the disk full?)", path.string()));
     }
@@ -199,7 +234,7 @@ LevelSet readVdb(const std::filesystem::path& path) {
     requireInputFile(path);
     openvdb::GridPtrVec grids;
     try {
-        requireSeal(path);
+        requireSeal(MappedFile(path).bytes());
         std::ifstream stream = opened(path);
         requireLengths(stream, std::filesystem::file_size(path));
         stream.seekg(0);
