@@ -130,6 +130,9 @@ Polygons read(const TextSource& source, const Header& header, Layout vertices, L
                  }
                  return read;
              }));
+    // vertices with colours, read as words, leave something over
+    if (vertices == Layout::words && OffWords(source, at).next() != source.end())
+        source.failExpected(at.at, "the end of the file");
     return polygons;
 }
 

@@ -16,10 +16,6 @@ namespace {
 constexpr int barColumns = 40;  // characters of a full bar: fits a narrow terminal with its label
 constexpr const char* clearLine = "\r\033[K";
 
-Json vector(const glm::vec3& v) {
-    return Json::array({number(v.x), number(v.y), number(v.z)});
-}
-
 Json matrix(const glm::mat3& m) {
     return Json::array({vector(m[0]), vector(m[1]), vector(m[2])});
 }
@@ -92,6 +88,10 @@ std::string hex(std::uint64_t hash) {
 
 Json number(float value) {
     return std::isfinite(value) ? Json(std::stod(fmt::format("{}", value))) : Json();
+}
+
+Json vector(const glm::vec3& v) {
+    return Json::array({number(v.x), number(v.y), number(v.z)});
 }
 
 Json vector(const glm::dvec3& v) {

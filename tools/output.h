@@ -42,7 +42,8 @@ std::string metres(double length);         ///< six digits and the unit
 std::string bytes(std::uint64_t count);    ///< in KiB, MiB or GiB
 std::string hex(std::uint64_t hash);       ///< 16 digits
 Json number(float value);                  ///< with the digits that the float has, not those of its double
-Json vector(const glm::dvec3& v);          ///< [x, y, z]
+Json vector(const glm::vec3& v);           ///< [x, y, z]
+Json vector(const glm::dvec3& v);          ///< likewise
 /// {"lower": [x, y, z], "upper": [x, y, z]} in the world, of bounds relative to an origin.
 Json box(const Bounds& bounds, const glm::dvec3& origin);
 std::string boxText(const Bounds& bounds, const glm::dvec3& origin);  ///< "x y z .. x y z m", likewise

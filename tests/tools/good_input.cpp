@@ -147,6 +147,7 @@ TEST_CASE("a mesh far from the zero point keeps its shape from file to file") {
         run({"build", path.string(), "-o", output.string(), "--voxel-size", "0.02", "--body", "--triangles"}).status ==
         0);
     // the transform of the file's grids says where they are
+    openvdb::initialize();
     openvdb::io::File file(output.string());
     file.open();
     const auto grids = file.getGrids();
