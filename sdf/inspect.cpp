@@ -2,45 +2,65 @@
 
 #include <fmt/format.h>
 #include <oneapi/tbb/blocked_range.h>
-#include <oneapi/tbb/parallel_for.h>
-#include <oneapi/tbb/parallel_sort.h>
+#include <oneapi/tbb/parallel_reduce.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
-#include <glm/common.hpp>
+#include <cstdint>
+#include <functional>
 #include <glm/geometric.hpp>
-#include <limits>
-#include <numeric>
 #include <span>
-#include <tuple>
 #include <vector>
 
 #include "sdf/orient.h"
 #include "sdf/piercing.h"
+#include "sdf/polled_loop.h"
 #include "sdf/sign.h"
 #include "sdf/topology.h"
 #include "sdf/triangle_tree.h"
+#include "sdf/walls.h"
 
 namespace bilayer {
 namespace {
 
-/// Cells of the grid that walls are searched in, a triangle. Rays then pass a few triangles a cell.
-constexpr double cellsPerTriangle = 2;
-constexpr int mostCellsAlongSide = 512;
-/// A wall that a ray leaves under a flatter angle than this is an edge, not a wall (cosine).
-constexpr float leastFacing = 0.2f;
 /// Part of the area whose walls are not common: creases and tips, which most meshes have somewhere.
 constexpr double uncommonArea = 0.01;
+/// A volume that is not rounding, in parts of that of a cube with the area, about.
+constexpr double clearVolume = 1e-6;
+
+/// Triangles, uses of edges or vertices that are worth a task.
+constexpr std::size_t grain = 4096;
 
 struct Component {
     double volume = 0;
     bool closed = true;
 };
 
-glm::dvec3 areaVector(const Mesh& mesh, const glm::uvec3& t) {
-    const glm::dvec3 a(mesh.points[t.x]), b(mesh.points[t.y]), c(mesh.points[t.z]);
-    return 0.5 * glm::cross(b - a, c - a);
+template <class Body>
+void forAll(std::size_t count, Body body) {
+    forAllPolled(count, grain, nullptr, body);
 }
+
+// Calls visit(uses, sum) for all edges; returns all sums, joined.
+template <class Sum, class Visit>
+Sum overEdges(const Topology& topology, Visit visit) {
+    return tbb::parallel_reduce(
+        tbb::blocked_range<std::size_t>(0, topology.edges.size(), grain), Sum{},
+        [&](const auto& range, Sum sum) {
+            topology.forEdges(range.begin(), range.end(), [&](std::span<const EdgeUse> uses) { visit(uses, sum); });
+            return sum;
+        },
+        std::plus<>());
+}
+
+struct EdgeCounts {
+    std::size_t boundary = 0, nonManifold = 0, misoriented = 0;
+
+    EdgeCounts operator+(const EdgeCounts& o) const {
+        return {boundary + o.boundary, nonManifold + o.nonManifold, misoriented + o.misoriented};
+    }
+};
 
 int netRuns(std::span<const EdgeUse> uses) {
     int net = 0;
@@ -48,28 +68,31 @@ int netRuns(std::span<const EdgeUse> uses) {
     return net;
 }
 
-void countEdges(const Topology& topology, const std::vector<unsigned>& componentOf, std::vector<Component>& components,
-                MeshReport& report) {
-    topology.forEachEdge([&](std::span<const EdgeUse> uses) {
-        if (uses.size() == 1) {
-            ++report.boundaryEdges;
-            components[componentOf[uses[0].triangle]].closed = false;
-        }
-        report.nonManifoldEdges += uses.size() > 2;
-        report.misorientedEdges += uses.size() > 1 && netRuns(uses) != 0;
+void countEdges(const Topology& topology, MeshReport& report) {
+    const auto counts = overEdges<EdgeCounts>(topology, [](std::span<const EdgeUse> uses, EdgeCounts& sum) {
+        sum.boundary += uses.size() == 1;
+        sum.nonManifold += uses.size() > 2;
+        sum.misoriented += uses.size() > 1 && netRuns(uses) != 0;
     });
+    report.boundaryEdges = counts.boundary;
+    report.nonManifoldEdges = counts.nonManifold;
+    report.misorientedEdges = counts.misoriented;
+}
+
+std::vector<EdgeUse> boundary(const Topology& topology) {
+    std::vector<EdgeUse> edges;
+    topology.forEachEdge([&](std::span<const EdgeUse> uses) {
+        if (uses.size() == 1) edges.push_back(uses[0]);
+    });
+    return edges;
 }
 
 // Holes: sets of boundary edges that share vertices.
-std::size_t countLoops(const Topology& topology, std::size_t vertices) {
+std::size_t countLoops(const std::vector<EdgeUse>& boundary, std::size_t vertices) {
     Sets sets(vertices);
     std::vector<unsigned> ends;
-    topology.forEachEdge([&](std::span<const EdgeUse> uses) {
-        if (uses.size() != 1) return;
-        sets.join(uses[0].low, uses[0].high);
-        ends.push_back(uses[0].low);
-    });
-    for (unsigned& end : ends) end = sets.root(end);
+    for (const EdgeUse& edge : boundary) sets.join(edge.low, edge.high);
+    for (const EdgeUse& edge : boundary) ends.push_back(sets.root(edge.low));
     std::sort(ends.begin(), ends.end());
     return std::size_t(std::unique(ends.begin(), ends.end()) - ends.begin());
 }
@@ -80,17 +103,21 @@ std::size_t countNonManifoldVertices(const Topology& topology, std::size_t verti
         const glm::uvec3& t = topology.triangles[triangle];
         return 3 * triangle + (t.x == vertex ? 0 : t.y == vertex ? 1 : 2);
     };
-    Sets fans(3 * topology.triangles.size());
-    topology.forEachEdge([&](std::span<const EdgeUse> uses) {
-        for (const EdgeUse& use : uses.subspan(1)) {
-            fans.join(corner(uses[0].triangle, use.low), corner(use.triangle, use.low));
-            fans.join(corner(uses[0].triangle, use.high), corner(use.triangle, use.high));
-        }
+    SharedSets fans(3 * topology.triangles.size());
+    // each joining that two sets become one by leaves one fan less
+    const std::size_t joined = overEdges<std::size_t>(topology, [&](std::span<const EdgeUse> uses, std::size_t& sum) {
+        for (const EdgeUse& use : uses.subspan(1))
+            for (const unsigned end : {use.low, use.high})
+                sum += fans.join(corner(uses[0].triangle, end), corner(use.triangle, end));
     });
-    std::vector<unsigned> count(vertices, 0);
+    if (3 * topology.triangles.size() - joined == vertices) return 0;
+    std::vector<std::uint8_t> count(vertices, 0);  // 2 stands for more, too
     for (unsigned i = 0; i < topology.triangles.size(); ++i)
-        for (unsigned k = 0; k < 3; ++k) count[topology.triangles[i][k]] += fans.root(3 * i + k) == 3 * i + k;
-    return std::size_t(std::count_if(count.begin(), count.end(), [](unsigned n) { return n > 1; }));
+        for (unsigned k = 0; k < 3; ++k) {
+            std::uint8_t& at = count[topology.triangles[i][k]];
+            if (at < 2) at = std::uint8_t(at + (fans.root(3 * i + k) == 3 * i + k));
+        }
+    return std::size_t(std::count(count.begin(), count.end(), 2));
 }
 
 std::size_t countDuplicates(const Topology& topology) {
@@ -101,35 +128,43 @@ std::size_t countDuplicates(const Topology& topology) {
 
 // Sets of triangles that share vertices; gives each triangle the number of its set.
 std::vector<unsigned> components(const Mesh& mesh, std::size_t& count) {
-    Sets sets(mesh.points.size());
-    for (const auto& t : mesh.triangles) {
-        sets.join(t.x, t.y);
-        sets.join(t.x, t.z);
-    }
+    SharedSets sets(mesh.points.size());
+    forAll(mesh.triangles.size(), [&](std::size_t i) {
+        sets.join(mesh.triangles[i].x, mesh.triangles[i].y);
+        sets.join(mesh.triangles[i].x, mesh.triangles[i].z);
+    });
     std::vector<unsigned> number(mesh.points.size(), noPart), of(mesh.triangles.size());
+    forAll(of.size(), [&](std::size_t i) { of[i] = sets.root(mesh.triangles[i].x); });
     count = 0;
-    for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
-        unsigned& n = number[sets.root(mesh.triangles[i].x)];
+    for (unsigned& component : of) {
+        unsigned& n = number[component];
         if (n == noPart) n = unsigned(count++);
-        of[i] = n;
+        component = n;
     }
     return of;
 }
 
-std::vector<Component> gather(const Mesh& mesh, const std::vector<unsigned>& of, std::size_t count) {
-    std::vector<Component> all(count);
-    const glm::dvec3 origin(bounds(mesh).centre());
-    for (std::size_t i = 0; i < of.size(); ++i) {
-        const auto& t = mesh.triangles[i];
-        all[of[i]].volume += glm::dot(areaVector(mesh, t), glm::dvec3(mesh.points[t.x]) - origin) / 3;
+// What each triangle adds to the sums over all.
+struct Measures {
+    std::vector<double> areas, volumes;
+
+    Measures(const Mesh& mesh, const Bounds& box) : areas(mesh.triangles.size()), volumes(mesh.triangles.size()) {
+        const glm::dvec3 origin(box.centre());
+        forAll(areas.size(), [&](std::size_t i) {
+            const glm::uvec3& t = mesh.triangles[i];
+            const glm::dvec3 a(mesh.points[t.x]), b(mesh.points[t.y]), c(mesh.points[t.z]);
+            const glm::dvec3 area = 0.5 * glm::cross(b - a, c - a);
+            areas[i] = glm::length(area);
+            volumes[i] = glm::dot(area, a - origin) / 3;
+        });
     }
-    return all;
-}
+};
 
 // A component within an even number of others should have positive volume, a cavity within an odd number negative
 // volume.
 std::size_t countInsideOut(const Mesh& mesh, const TriangleTree& tree, std::vector<unsigned> of,
                            const std::vector<Component>& all) {
+    if (all.size() == 1) return all[0].closed && all[0].volume < 0;
     for (unsigned& component : of)
         if (!all[component].closed) component = noPart;
     const auto enclosing = enclosingParts(mesh, tree, of, all.size());
@@ -139,126 +174,47 @@ std::size_t countInsideOut(const Mesh& mesh, const TriangleTree& tree, std::vect
     return wrong;
 }
 
-// A uniform grid over the triangles, for rays that look for the far side of a wall.
-class WallFinder {
-  public:
-    explicit WallFinder(const Mesh& mesh) : mesh_(mesh), box_(bounds(mesh)) {
-        const double count = cellsPerTriangle * double(mesh.triangles.size());
-        const glm::dvec3 size = glm::max(glm::dvec3(box_.size()), 1e-6 * double(box_.longestSide()));
-        cell_ = float(
-            std::max(std::cbrt(size.x * size.y * size.z / count), double(box_.longestSide()) / mostCellsAlongSide));
-        cells_ = glm::ivec3(glm::vec3(size) / cell_) + 1;
-        std::vector<unsigned> counts(std::size_t(cells_.x) * cells_.y * cells_.z + 1, 0);
-        forEachPlace([&](std::size_t cell, unsigned) { ++counts[cell + 1]; });
-        std::partial_sum(counts.begin(), counts.end(), counts.begin());
-        begins_ = counts;
-        triangles_.resize(counts.back());
-        forEachPlace([&](std::size_t cell, unsigned triangle) { triangles_[counts[cell]++] = triangle; });
-    }
-
-    // The thickness of the solid behind a triangle, from its centre against its normal; infinite where nothing ends it.
-    float thicknessBehind(unsigned triangle) const {
-        const auto& t = mesh_.triangles[triangle];
-        const glm::vec3 normal = glm::vec3(areaVector(mesh_, t));
-        const float length = glm::length(normal);
-        if (!(length > 0)) return infinite;
-        const glm::vec3 origin = (mesh_.points[t.x] + mesh_.points[t.y] + mesh_.points[t.z]) / 3.f;
-        return firstExit(origin, -normal / length, triangle);
-    }
-
-    static constexpr float infinite = std::numeric_limits<float>::infinity();
-
-  private:
-    template <class Visit>
-    void forEachPlace(Visit visit) const {
-        for (std::size_t i = 0; i < mesh_.triangles.size(); ++i) {
-            Bounds box;
-            for (int k = 0; k < 3; ++k) box.add(mesh_.points[mesh_.triangles[i][k]]);
-            const glm::ivec3 low = cellAt(box.lower), high = cellAt(box.upper);
-            for (int x = low.x; x <= high.x; ++x)
-                for (int y = low.y; y <= high.y; ++y)
-                    for (int z = low.z; z <= high.z; ++z) visit(index({x, y, z}), unsigned(i));
-        }
-    }
-
-    glm::ivec3 cellAt(const glm::vec3& p) const {
-        return glm::clamp(glm::ivec3((p - box_.lower) / cell_), glm::ivec3(0), cells_ - 1);
-    }
-    std::size_t index(const glm::ivec3& c) const { return (std::size_t(c.x) * cells_.y + c.y) * cells_.z + c.z; }
-
-    // Walks the cells along the ray (J. Amanatides, A. Woo, "A Fast Voxel Traversal Algorithm", 1987).
-    float firstExit(const glm::vec3& origin, const glm::vec3& direction, unsigned self) const {
-        glm::ivec3 cell = cellAt(origin), step;
-        glm::vec3 next, delta;
-        for (int axis = 0; axis < 3; ++axis) {
-            step[axis] = direction[axis] < 0 ? -1 : 1;
-            const float border = box_.lower[axis] + cell_ * float(cell[axis] + (step[axis] > 0));
-            const bool moves = std::abs(direction[axis]) > 1e-12f;
-            next[axis] = moves ? (border - origin[axis]) / direction[axis] : infinite;
-            delta[axis] = moves ? cell_ / std::abs(direction[axis]) : infinite;
-        }
-        float nearest = infinite;
-        for (;;) {
-            for (unsigned i = begins_[index(cell)]; i < begins_[index(cell) + 1]; ++i)
-                if (triangles_[i] != self) nearest = std::min(nearest, exit(origin, direction, triangles_[i]));
-            const int axis = next.x < next.y ? (next.x < next.z ? 0 : 2) : (next.y < next.z ? 1 : 2);
-            if (nearest <= next[axis]) return nearest;
-            cell[axis] += step[axis];
-            if (cell[axis] < 0 || cell[axis] >= cells_[axis]) return nearest;
-            next[axis] += delta[axis];
-        }
-    }
-
-    // Where the ray leaves through the front of a triangle (T. Moeller, B. Trumbore, 1997); infinite if it does not.
-    float exit(const glm::vec3& origin, const glm::vec3& direction, unsigned triangle) const {
-        const auto& t = mesh_.triangles[triangle];
-        const glm::dvec3 a(mesh_.points[t.x]), ab = glm::dvec3(mesh_.points[t.y]) - a,
-                                               ac = glm::dvec3(mesh_.points[t.z]) - a, d(direction),
-                                               from = glm::dvec3(origin) - a;
-        const glm::dvec3 normal = glm::cross(ab, ac);
-        const double facing = glm::dot(normal, d);
-        if (facing <= double(leastFacing) * glm::length(normal)) return infinite;
-        const glm::dvec3 side = glm::cross(d, from);
-        const double u = glm::dot(ac, side) / facing, v = -glm::dot(ab, side) / facing;
-        if (u < 0 || v < 0 || u + v > 1) return infinite;
-        const double along = -glm::dot(normal, from) / facing;
-        return along > 0 ? float(along) : infinite;
-    }
-
-    const Mesh& mesh_;
-    Bounds box_;
-    float cell_;
-    glm::ivec3 cells_;
-    std::vector<unsigned> begins_, triangles_;
-};
+// Where edges have two triangles each that run them both ways, vertices one fan, and all components clearly positive
+// volume, orient() has nothing to turn: a piece of negative volume is needed first.
+bool needsNoTurning(const MeshReport& report, const std::vector<Component>& all) {
+    return report.closed() && report.misorientedEdges == 0 && report.nonManifoldVertices == 0 &&
+           std::all_of(all.begin(), all.end(), [&](const Component& component) {
+               return component.volume > clearVolume * std::pow(report.area, 1.5);
+           });
+}
 
 float finiteOrZero(float thickness) {
     return std::isfinite(thickness) ? thickness : 0.f;
 }
 
 // The thickness behind triangles that only a part of the area stays below.
-float commonThickness(const Mesh& mesh, const std::vector<float>& thickness, double area) {
-    std::vector<unsigned> order(thickness.size());
-    std::iota(order.begin(), order.end(), 0u);
-    tbb::parallel_sort(order.begin(), order.end(),
-                       [&](unsigned a, unsigned b) { return std::tie(thickness[a], a) < std::tie(thickness[b], b); });
+float commonThickness(const std::vector<float>& thickness, const Measures& measures, double area) {
+    // by thickness, then number: the bits of positive floats are in their order
+    std::vector<std::uint64_t> order(thickness.size());
+    forAll(order.size(),
+           [&](std::size_t i) { order[i] = std::uint64_t(std::bit_cast<std::uint32_t>(thickness[i])) << 32 | i; });
     double below = 0;
-    for (const unsigned triangle : order) {
-        below += glm::length(areaVector(mesh, mesh.triangles[triangle]));
+    // what is looked at is mostly the first of many
+    std::size_t sorted = 0;
+    for (std::size_t i = 0; i < order.size(); ++i) {
+        if (i == sorted) {
+            sorted = std::min(order.size(), 2 * sorted + order.size() / 32 + 1);
+            const auto from = order.begin() + std::ptrdiff_t(i), to = order.begin() + std::ptrdiff_t(sorted);
+            std::nth_element(from, to - 1, order.end());
+            std::sort(from, to);
+        }
+        const auto triangle = std::uint32_t(order[i]);
+        below += measures.areas[triangle];
         if (below > uncommonArea * area) return finiteOrZero(thickness[triangle]);
     }
     return 0;
 }
 
-void findThinWalls(const Mesh& mesh, float wall, MeshReport& report) {
+void findThinWalls(const TriangleTree& tree, const Measures& measures, float wall, MeshReport& report) {
     if (!(report.bounds.longestSide() > 0)) return;
-    const WallFinder finder(mesh);
-    std::vector<float> thickness(mesh.triangles.size());
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, thickness.size(), 1024), [&](const auto& range) {
-        for (std::size_t i = range.begin(); i < range.end(); ++i) thickness[i] = finder.thicknessBehind(unsigned(i));
-    });
+    const std::vector<float> thickness = wallThickness(tree);
     report.thinnestWall = finiteOrZero(*std::min_element(thickness.begin(), thickness.end()));
-    report.commonWall = commonThickness(mesh, thickness, report.area);
+    report.commonWall = commonThickness(thickness, measures, report.area);
     report.thinWalls =
         std::size_t(std::count_if(thickness.begin(), thickness.end(), [&](float t) { return t < wall; }));
 }
@@ -287,24 +243,30 @@ MeshReport inspect(const Mesh& input, float wall) {
     if (mesh.triangles.empty()) return report;
     report.bounds = bounds(mesh);
     report.origin = mesh.origin;
-    const Topology topology(mesh);
+    const Topology topology = Topology::ofWelded(mesh);
     const TriangleTree tree(mesh);
     const std::vector<unsigned> of = components(mesh, report.components);
-    std::vector<Component> all = gather(mesh, of, report.components);
-    countEdges(topology, of, all, report);
-    report.boundaryLoops = countLoops(topology, mesh.points.size());
-    report.nonManifoldVertices = countNonManifoldVertices(topology, mesh.points.size());
-    for (const Component& component : all) report.volume += component.volume;
-    for (const auto& t : mesh.triangles) {
-        const double area = glm::length(areaVector(mesh, t));
-        report.area += area;
-        report.degenerateTriangles += !(area > 0);
+    std::vector<Component> all(report.components);
+    countEdges(topology, report);
+    if (report.boundaryEdges > 0) {
+        const std::vector<EdgeUse> edges = boundary(topology);
+        for (const EdgeUse& edge : edges) all[of[edge.triangle]].closed = false;
+        report.boundaryLoops = countLoops(edges, mesh.points.size());
     }
+    report.nonManifoldVertices = countNonManifoldVertices(topology, mesh.points.size());
+    // sums in the order of triangles, whatever the number of threads
+    const Measures measures(mesh, report.bounds);
+    for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
+        all[of[i]].volume += measures.volumes[i];
+        report.area += measures.areas[i];
+        report.degenerateTriangles += !(measures.areas[i] > 0);
+    }
+    for (const Component& component : all) report.volume += component.volume;
     report.duplicateTriangles = countDuplicates(topology);
     report.insideOutComponents = countInsideOut(mesh, tree, of, all);
     report.selfIntersections = countPiercingPairs(mesh, topology, tree);
-    report.flippedTriangles = orient(mesh).turnedTriangles;
-    findThinWalls(mesh, wall, report);
+    if (!needsNoTurning(report, all)) report.flippedTriangles = orient(mesh).turnedTriangles;
+    findThinWalls(tree, measures, wall, report);
     return report;
 }
 

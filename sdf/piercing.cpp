@@ -6,11 +6,16 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <cstdlib>
 #include <functional>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <span>
 #include <utility>
+#include <vector>
+
+#include "sdf/close_pairs.h"
 
 namespace bilayer {
 namespace {
@@ -18,34 +23,6 @@ namespace {
 /// Rounding of a volume computed in double precision, relative to the sum of the sizes of its products: a generous
 /// bound (J. R. Shewchuk, "Adaptive Precision Floating-Point Arithmetic", 1997, has 7.8e-16 for exact differences).
 constexpr double roundingOfVolume = 2e-15;
-
-/// Room around a plane against rounding in double precision, relative to the largest coordinate; generous.
-constexpr double roundingOfPlane = 1e-12;
-
-// Which boxes a triangle may reach: those that meet its own box and its plane. The plane rules out most of what lies in
-// the box of a long slanted triangle.
-struct Reach {
-    Bounds box;
-    glm::dvec3 point, normal;
-    double slack;
-
-    Reach(const Mesh& mesh, const glm::uvec3& t, const Bounds& own) : box(own), point(mesh.points[t.x]) {
-        normal = glm::cross(glm::dvec3(mesh.points[t.y]) - point, glm::dvec3(mesh.points[t.z]) - point);
-        const double length = glm::length(normal);
-        // without a normal, the plane is everywhere
-        normal = length > 0 ? normal / length : glm::dvec3(0);
-        slack = roundingOfPlane * (glm::length(glm::dvec3(box.lower)) + glm::length(glm::dvec3(box.upper)));
-    }
-
-    bool operator()(const Bounds& other) const {
-        if (!(box.lower.x <= other.upper.x && other.lower.x <= box.upper.x && box.lower.y <= other.upper.y &&
-              other.lower.y <= box.upper.y && box.lower.z <= other.upper.z && other.lower.z <= box.upper.z))
-            return false;
-        const glm::dvec3 lower = glm::dvec3(other.lower) - point, upper = glm::dvec3(other.upper) - point;
-        const double distance = 0.5 * std::abs(glm::dot(normal, lower + upper));
-        return distance <= 0.5 * glm::dot(glm::abs(normal), upper - lower) + slack;
-    }
-};
 
 // A sum without rounding: J. R. Shewchuk (1997), growing an expansion by one number at a time.
 class ExactSum {
@@ -156,7 +133,7 @@ class Pairs {
         const auto before = [](const EdgeUse& use, const std::pair<unsigned, unsigned>& edge) {
             return std::pair(use.low, use.high) < edge;
         };
-        const auto& edges = topology_.edges;
+        const std::span<const EdgeUse> edges(topology_.edges.data(), topology_.edges.size());
         for (auto use = std::lower_bound(edges.begin(), edges.end(), std::pair(low, high), before);
              use != edges.end() && use->low == low && use->high == high; ++use) {
             const glm::uvec3& other = mesh_.triangles[use->triangle];
@@ -186,11 +163,13 @@ class Pairs {
 std::size_t countPiercingPairs(const Mesh& welded, const Topology& topology, const TriangleTree& tree) {
     const Pairs pairs(welded, topology);
     return tbb::parallel_reduce(
-        tbb::blocked_range<unsigned>(0, unsigned(welded.triangles.size()), 256), std::size_t(0),
+        tbb::blocked_range<std::uint32_t>(0, tree.boxes().leafCount, 64), std::size_t(0),
         [&](const auto& range, std::size_t count) {
-            for (unsigned i = range.begin(); i < range.end(); ++i)
-                tree.descend(Reach(welded, welded.triangles[i], tree.boxOf(i)),
-                             [&](unsigned other) { count += other > i && pairs.pierce(i, other); });
+            std::vector<std::pair<unsigned, unsigned>> close;
+            for (std::uint32_t leaf = range.begin(); leaf < range.end(); ++leaf) {
+                findClosePairs(welded, tree, leaf, close);
+                for (const auto& [a, b] : close) count += pairs.pierce(std::min(a, b), std::max(a, b));
+            }
             return count;
         },
         std::plus<>());

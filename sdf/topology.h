@@ -2,12 +2,15 @@
 // and sets that grow together. Triangles keep their numbers. All that takes long polls a Progress, unless it is null.
 #pragma once
 
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <numeric>
 #include <span>
+#include <utility>
 #include <vector>
 
+#include "sdf/large_array.h"
 #include "sdf/mesh.h"
 #include "sdf/progress.h"
 
@@ -27,9 +30,11 @@ struct EdgeUse {
 struct Topology {
     /// @param progress  kept, for forEachEdge() to poll too
     explicit Topology(const Mesh& mesh, Progress* progress = nullptr);
+    /// The same for a mesh that is welded already.
+    static Topology ofWelded(const Mesh& mesh);
 
     std::vector<glm::uvec3> triangles;  ///< as in the mesh, each vertex replaced by the first of equal coordinates
-    std::vector<EdgeUse> edges;         ///< by (low, high, triangle); none of triangles that use a vertex twice
+    LargeArray<EdgeUse> edges;          ///< by (low, high, triangle); none of triangles that use a vertex twice
     std::vector<unsigned> original;     ///< a triangle's first triangle with the same three vertices, often itself
     Progress* progress;
 
@@ -57,6 +62,10 @@ struct Topology {
             visit(std::span(&edges[i], next - i));
         }
     }
+
+  private:
+    // `first`: of each vertex, the first one of equal coordinates; none: itself
+    Topology(const Mesh& mesh, const LargeArray<unsigned>& first, Progress* progress);
 };
 
 /// 64 bits for each vertex that are equal where coordinates are.
@@ -115,6 +124,42 @@ class Sets {
 
     std::vector<unsigned> parent_;
     std::vector<std::uint8_t> opposite_;  // to the parent; a root is not opposite to itself
+};
+
+/// Disjoint sets of the numbers below n that all threads may join at the same time (R. J. Anderson, H. Woll, "Wait-free
+/// parallel algorithms for the union-find problem", STOC 1991). A root is the smallest number of its set, whatever the
+/// order of joining.
+class SharedSets {
+  public:
+    explicit SharedSets(std::size_t n) : parent_(n) { std::iota(parent_.begin(), parent_.end(), 0u); }
+
+    unsigned root(unsigned i) {
+        for (;;) {
+            const unsigned parent = at(i).load(std::memory_order_relaxed);
+            if (parent == i) return i;
+            const unsigned next = at(parent).load(std::memory_order_relaxed);
+            // halve the path on the way; whoever else does so leaves an ancestor, too
+            if (next != parent) at(i).store(next, std::memory_order_relaxed);
+            i = next;
+        }
+    }
+
+    /// False if a and b are in one set already.
+    bool join(unsigned a, unsigned b) {
+        for (;;) {
+            a = root(a);
+            b = root(b);
+            if (a == b) return false;
+            if (a < b) std::swap(a, b);
+            unsigned expected = a;
+            if (at(a).compare_exchange_strong(expected, b, std::memory_order_relaxed)) return true;
+        }
+    }
+
+  private:
+    std::atomic_ref<unsigned> at(unsigned i) { return std::atomic_ref<unsigned>(parent_[i]); }
+
+    std::vector<unsigned> parent_;
 };
 
 }  // namespace bilayer

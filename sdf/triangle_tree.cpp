@@ -1,7 +1,6 @@
 #include "sdf/triangle_tree.h"
 
 #include <oneapi/tbb/parallel_for.h>
-#include <oneapi/tbb/parallel_sort.h>
 
 #include <algorithm>
 #include <cmath>
@@ -11,39 +10,26 @@
 #include <glm/vector_relational.hpp>
 #include <limits>
 
-#include "sdf/progress.h"
+#include "sdf/polled_loop.h"
 
 namespace bilayer {
 namespace {
 
-constexpr int mortonBits = 21;  // a coordinate: three fill a word
+constexpr std::size_t grain = 1024;  // leaves or triangles a task
 /// A box test's rounding in double precision, relative to the largest coordinate; generous.
 constexpr double roundingOfBoxes = 1e-12;
 /// Lines that vote on whether a part lies within another: odd, and more than one against lines along edges.
 constexpr std::size_t votes = 3;
-constexpr std::size_t boxesPerPoll = 4096;
 
-// Two zero bits before each of the lowest 21 (S. E. Anderson, "Bit Twiddling Hacks").
-std::uint64_t spread(std::uint64_t x) {
-    x = (x | x << 32) & 0x1f00000000ffffu;
-    x = (x | x << 16) & 0x1f0000ff0000ffu;
-    x = (x | x << 8) & 0x100f00f00f00f00fu;
-    x = (x | x << 4) & 0x10c30c30c30c30c3u;
-    return (x | x << 2) & 0x1249249249249249u;
-}
-
-std::uint64_t mortonCode(const glm::dvec3& unit) {
-    const glm::dvec3 cell = glm::clamp(unit * double(1 << mortonBits), 0.0, double((1 << mortonBits) - 1));
-    return spread(std::uint64_t(cell.x)) | spread(std::uint64_t(cell.y)) << 1 | spread(std::uint64_t(cell.z)) << 2;
-}
-
-Bounds around(std::span<const Bounds> boxes) {
-    Bounds all = boxes[0];
-    for (const Bounds& box : boxes) {
-        all.lower = glm::min(all.lower, box.lower);
-        all.upper = glm::max(all.upper, box.upper);
-    }
-    return all;
+// The triangles in the order of the tree.
+std::vector<TreeItem> sortedTriangles(const Mesh& mesh, Progress* progress) {
+    auto items = vectorOf<TreeItem>(mesh.triangles.size(), progress);
+    forAllPolled(items.size(), grain, progress, [&](std::size_t i) {
+        const glm::uvec3& t = mesh.triangles[i];
+        items[i] = {mesh.points[t.x] + mesh.points[t.y] + mesh.points[t.z], unsigned(i)};
+    });
+    sortBySplitting(items, progress);
+    return items;
 }
 
 bool holds(const Bounds& outer, const Bounds& inner) {
@@ -117,43 +103,39 @@ std::vector<unsigned> common(const std::vector<unsigned>& a, const std::vector<u
 
 }  // namespace
 
-TriangleTree::TriangleTree(const Mesh& mesh, Progress* progress)
-    : mesh_(mesh), boxes_(vectorOf<Bounds>(mesh.triangles.size(), progress)) {
-    const Bounds all = bounds(mesh);
-    slack_ = roundingOfBoxes * double(std::max(glm::length(all.lower), glm::length(all.upper)));
-    auto codes = vectorOf<std::pair<std::uint64_t, unsigned>>(boxes_.size(), progress);
-    const double scale = 1 / std::max(double(all.longestSide()), std::numeric_limits<double>::min());
-    tbb::parallel_for(std::size_t(0), boxes_.size(), [&](std::size_t i) {
-        if (i % boxesPerPoll == 0) poll(progress);
-        for (int k = 0; k < 3; ++k) boxes_[i].add(mesh.points[mesh.triangles[i][k]]);
-        codes[i] = {mortonCode((glm::dvec3(boxes_[i].centre()) - glm::dvec3(all.lower)) * scale), unsigned(i)};
-    });
-    tbb::parallel_sort(codes.begin(), codes.end(), polled(std::less<>(), progress));
-    order_.reserve(codes.size());
-    std::vector<Bounds> sorted;
-    sorted.reserve(codes.size());
-    for (const std::size_t i : Polled(codes.size(), progress)) {
-        order_.push_back(codes[i].second);
-        sorted.push_back(boxes_[codes[i].second]);
-    }
-    std::span<const Bounds> below = sorted;
-    while (!below.empty() && (levels_.empty() || below.size() > 1)) {
-        std::vector<Bounds> level;
-        level.reserve((below.size() + fanOut - 1) / fanOut);
-        for (const std::size_t node : Polled((below.size() + fanOut - 1) / fanOut, progress)) {
-            const std::size_t first = fanOut * node;
-            level.push_back(around(below.subspan(first, std::min(fanOut, below.size() - first))));
+TriangleTree::TriangleTree(const Mesh& mesh, Progress* progress) : mesh_(mesh) {
+    if (mesh.triangles.empty()) return;
+    const std::vector<TreeItem> order = sortedTriangles(mesh, progress);
+    boxes_.makeRoom((order.size() + treeWidth - 1) / treeWidth);
+    leaves_ = LargeArray<TriangleLeaf>(boxes_.leafCount);
+    forAllPolled(leaves_.size(), grain, progress, [&](std::size_t index) {
+        TriangleLeaf& leaf = leaves_[index];
+        Bounds box;
+        for (std::size_t i = 0; i < treeWidth; ++i) {
+            const std::uint32_t triangle = order[std::min(index * treeWidth + i, order.size() - 1)].index;
+            leaf.triangles[i] = triangle;
+            for (int corner = 0; corner < 3; ++corner) {
+                const glm::vec3& p = mesh.points[mesh.triangles[triangle][corner]];
+                for (int k = 0; k < 3; ++k) leaf.corners[corner][k][i] = p[k];
+                box.add(p);
+            }
         }
-        levels_.push_back(std::move(level));
-        below = levels_.back();
-    }
+        boxes_.setLeafBox(index, box.lower, box.upper);
+    });
+    boxes_.joinBoxes(progress);
+    const BoxGroup& root = boxes_.group(boxes_.root());
+    for (int k = 0; k < 3; ++k)
+        for (int i = 0; i < treeWidth; ++i)
+            if (root.lower[k][i] <= root.upper[k][i])
+                largest_ = std::max({largest_, std::abs(root.lower[k][i]), std::abs(root.upper[k][i])});
 }
 
 void TriangleTree::crossings(const glm::dvec3& origin, const glm::dvec3& direction,
                              std::vector<Crossing>& found) const {
     const Line line(origin, direction);
+    const double slack = roundingOfBoxes * double(largest_);
     found.clear();
-    descend([&](const Bounds& box) { return line.meets(box, slack_); },
+    descend([&](const Bounds& box) { return line.meets(box, slack); },
             [&](unsigned i) {
                 const glm::uvec3& t = mesh_.triangles[i];
                 Crossing crossing{i, 0, 0};

@@ -1,12 +1,15 @@
 // A tree of boxes over the triangles of a mesh: which triangles meet a box or a line, and which parts of the mesh lie
-// within which others. The boxes of each level stand in an array of their own, over triangles in Morton order.
+// within which others. Boxes and corners are those of the mesh, without rounding.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <glm/common.hpp>
 #include <span>
 #include <vector>
 
+#include "sdf/box_tree.h"
+#include "sdf/large_array.h"
 #include "sdf/mesh.h"
 
 namespace bilayer {
@@ -20,8 +23,15 @@ struct Crossing {
     int sign;      ///< +1: the line leaves through the front of the triangle; -1: it enters there
 };
 
+/// Eight triangles. Places that are left over repeat the last one.
+struct TriangleLeaf {
+    alignas(64) float corners[3][3][treeWidth];  ///< by corner, then axis [m]
+    std::uint32_t triangles[treeWidth];          ///< indices into Mesh::triangles
+};
+
 class TriangleTree {
   public:
+    /// Keeps a reference to the mesh, which must be valid.
     /// @param progress  polled, unless null
     explicit TriangleTree(const Mesh& mesh, Progress* progress = nullptr);
 
@@ -29,34 +39,49 @@ class TriangleTree {
     /// such a box.
     template <class Meets, class Visit>
     void descend(const Meets& meets, const Visit& visit) const {
-        if (!levels_.empty() && meets(levels_.back()[0])) descend(levels_.size() - 1, 0, meets, visit);
+        if (boxes_.leafCount > 0) descend(boxes_.root(), meets, visit);
     }
 
     /// All triangles that a line meets, both ways, in no order. An edge that two triangles share is met once, but for
     /// lines that hit it exactly.
     void crossings(const glm::dvec3& origin, const glm::dvec3& direction, std::vector<Crossing>& found) const;
 
-    const Bounds& boxOf(unsigned triangle) const { return boxes_[triangle]; }
+    Bounds boxOf(unsigned triangle) const {
+        Bounds box;
+        for (int k = 0; k < 3; ++k) box.add(mesh_.points[mesh_.triangles[triangle][k]]);
+        return box;
+    }
+
+    const BoxTree& boxes() const { return boxes_; }
+    std::size_t triangleCount() const { return mesh_.triangles.size(); }
+    const TriangleLeaf& leaf(std::size_t index) const { return leaves_[index]; }
+    /// The number of triangles in a leaf; only the last one may have places that are left over.
+    std::size_t leafSize(std::size_t index) const {
+        return index + 1 < leaves_.size() ? std::size_t(treeWidth) : mesh_.triangles.size() - index * treeWidth;
+    }
+    /// The largest coordinate, in size [m].
+    float largestCoordinate() const { return largest_; }
 
   private:
-    static constexpr std::size_t fanOut = 4;  // children of a box, and triangles of the lowest ones
-
     template <class Meets, class Visit>
-    void descend(std::size_t level, std::size_t node, const Meets& meets, const Visit& visit) const {
-        const std::size_t count = level ? levels_[level - 1].size() : order_.size();
-        const std::size_t begin = fanOut * node, end = begin + fanOut < count ? begin + fanOut : count;
-        for (std::size_t i = begin; i < end; ++i)
-            if (level) {
-                if (meets(levels_[level - 1][i])) descend(level - 1, i, meets, visit);
-            } else if (meets(boxes_[order_[i]]))
-                visit(order_[i]);
+    void descend(std::uint32_t node, const Meets& meets, const Visit& visit) const {
+        if (boxes_.isLeaf(node)) {
+            for (std::size_t i = 0; i < leafSize(node); ++i)
+                if (const unsigned triangle = leaves_[node].triangles[i]; meets(boxOf(triangle))) visit(triangle);
+            return;
+        }
+        const BoxGroup& group = boxes_.group(node);
+        for (int i = 0; i < treeWidth; ++i) {
+            const Bounds box{{group.lower[0][i], group.lower[1][i], group.lower[2][i]},
+                             {group.upper[0][i], group.upper[1][i], group.upper[2][i]}};
+            if (!box.empty() && meets(box)) descend(group.firstChild + std::uint32_t(i), meets, visit);
+        }
     }
 
     const Mesh& mesh_;
-    double slack_;                             // widens boxes against rounding [m]
-    std::vector<Bounds> boxes_;                // of each triangle
-    std::vector<unsigned> order_;              // triangles in Morton order
-    std::vector<std::vector<Bounds>> levels_;  // the lowest first
+    float largest_ = 0;  // coordinate [m]
+    BoxTree boxes_;
+    LargeArray<TriangleLeaf> leaves_;
 };
 
 /// Directions spread evenly over half the sphere (a Fibonacci lattice), none along an axis.

@@ -1,41 +1,26 @@
-// Sorting: J. Skilling, "Programming the Hilbert curve", AIP Conference Proceedings 707 (2004) 381-387. The layout is
-// that of packed R-trees: I. Kamel, C. Faloutsos, "On packing R-trees", CIKM 1993, 490-499.
 #include "sdf/wide_tree.h"
 
 #include <hwy/cache_control.h>
 #include <oneapi/tbb/enumerable_thread_specific.h>
 #include <oneapi/tbb/parallel_for.h>
-#include <oneapi/tbb/parallel_invoke.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstring>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <limits>
 #include <stdexcept>
 #include <utility>
 
-#include "sdf/progress.h"
+#include "sdf/polled_loop.h"
 
 namespace bilayer {
 namespace {
 
 /// Floats hold all whole numbers up to twice this [voxels].
 constexpr double longestMesh = 1 << 23;
-/// A sort key and the number of a part share 64 bits.
-constexpr int bitsPerAxis = 12, indexBits = 28, keyBits = 3 * bitsPerAxis;
-constexpr std::uint64_t indexMask = (std::uint64_t(1) << indexBits) - 1;
-/// A pass of the radix sort; three passes sort a key.
-constexpr int digitBits = 12;
-constexpr std::size_t digits = std::size_t(1) << digitBits;
-static_assert(keyBits % digitBits == 0 && keyBits + indexBits == 64);
-constexpr std::size_t runLength = 1 << 15;  // keys that one task sorts at a time: more than digits
-constexpr std::size_t grain = 1024;         // triangles or leaves a task
-/// Selection halves what it looks at, on average, until there is little left; if not, it is done in another way.
-constexpr int mostRounds = 64;
-constexpr std::ptrdiff_t shortRun = 24;
+constexpr std::size_t grain = 1024;  // triangles or leaves a task
 
 using Corners = std::array<glm::dvec3, 3>;
 
@@ -47,12 +32,7 @@ struct Box {
 
 template <class Body>
 void forAll(std::size_t count, Progress* progress, Body body) {
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, grain), [&](const auto& range) {
-        for (std::size_t i = range.begin(); i < range.end(); ++i) {
-            if (i % grain == 0) poll(progress);
-            body(i);
-        }
-    });
+    forAllPolled(count, grain, progress, body);
 }
 
 // The parts that the tree is made of: the triangles that are short enough, and the parts of those that are not.
@@ -106,7 +86,7 @@ class Parts {
     void halve(const Corners& c, std::uint32_t triangle) {
         const auto [i, length2] = longest(c);
         if (length2 <= longest2_) {
-            if (count() >= (std::size_t(1) << indexBits))
+            if (count() >= mostOnCurve)
                 throw std::invalid_argument("voxelSize is too small: the mesh has triangles too large for it");
             halves_.push_back({c, triangle});
             return;
@@ -123,94 +103,25 @@ class Parts {
     std::vector<Half> halves_;
 };
 
-// Spreads 12 bits to every third bit.
-std::uint64_t spread(std::uint64_t x) {
-    x = (x | x << 16) & 0xff0000ff;
-    x = (x | x << 8) & 0xf00f00f;
-    x = (x | x << 4) & 0xc30c30c3;
-    return (x | x << 2) & 0x249249249;
-}
-
-// Cells in runs, so that the compiler can use vectors.
-struct Cells {
-    static constexpr std::size_t most = 64;
-    std::uint32_t x[3][most];
-};
-
-// From cells to their places along Hilbert's curve, by Skilling's transformation without branches; the place of a cell
-// is in the bits of the three numbers taken in turn.
-void transformToHilbert(Cells& cells) {
-    auto &x = cells.x[0], &y = cells.x[1], &z = cells.x[2];
-    const auto undo = [&](int bit, std::uint32_t* v) {
-        for (std::size_t i = 0; i < Cells::most; ++i) {
-            const std::uint32_t inverts = 0u - (v[i] >> bit & 1), low = (1u << bit) - 1;
-            const std::uint32_t swapped = (x[i] ^ v[i]) & low & ~inverts;
-            x[i] ^= (low & inverts) | swapped;
-            v[i] ^= swapped;
-        }
-    };
-    for (int bit = bitsPerAxis - 1; bit > 0; --bit) {
-        for (std::size_t i = 0; i < Cells::most; ++i) x[i] ^= (0u - (x[i] >> bit & 1)) & ((1u << bit) - 1);
-        undo(bit, y);
-        undo(bit, z);
-    }
-    for (std::size_t i = 0; i < Cells::most; ++i) {
-        y[i] ^= x[i];
-        z[i] ^= y[i];
-        std::uint32_t parity = z[i] >> 1;  // bit b: of the bits of z above b
-        for (int shift = 1; shift < bitsPerAxis; shift *= 2) parity ^= parity >> shift;
-        x[i] ^= parity;
-        y[i] ^= parity;
-        z[i] ^= parity;
-    }
-}
-
-// Sorts keys by their upper bits, stably: radix sort, runs side by side.
-void sortKeys(std::vector<std::uint64_t>& keys, Progress* progress) {
-    const std::size_t runs = (keys.size() + runLength - 1) / runLength;
-    auto other = vectorOf<std::uint64_t>(keys.size(), progress);
-    std::vector<std::uint32_t> places(runs * digits);
-    for (int shift = indexBits; shift < 64; shift += digitBits) {
-        const auto forRun = [&](std::size_t run, auto body) {
-            poll(progress);
-            std::uint32_t* counts = places.data() + run * digits;
-            for (std::size_t i = run * runLength; i < std::min(keys.size(), (run + 1) * runLength); ++i)
-                body(keys[i], counts[keys[i] >> shift & (digits - 1)]);
-        };
-        tbb::parallel_for(std::size_t(0), runs, [&](std::size_t run) {
-            std::fill_n(places.data() + run * digits, digits, 0u);
-            forRun(run, [](std::uint64_t, std::uint32_t& count) { ++count; });
-        });
-        std::uint32_t sum = 0;
-        for (std::size_t digit = 0; digit < digits; ++digit)
-            for (std::size_t run = 0; run < runs; ++run) sum += std::exchange(places[run * digits + digit], sum);
-        tbb::parallel_for(std::size_t(0), runs, [&](std::size_t run) {
-            forRun(run, [&](std::uint64_t key, std::uint32_t& place) { other[place++] = key; });
-        });
-        keys.swap(other);
-    }
-}
-
 /// The key of a part that is not used.
 constexpr std::uint64_t unused = ~std::uint64_t(0);
 
 // Keys of parts first .. first + count - 1; long triangles have none and are noted.
 void makeKeys(const Parts& parts, const glm::ivec3& size, std::size_t first, std::size_t count, std::uint64_t* keys,
               std::vector<std::uint32_t>& longOnes) {
-    constexpr double cells = 1 << bitsPerAxis;
+    constexpr double cells = curveCells;
     const double scale = cells / (3.0 * std::max({size.x, size.y, size.z}));
-    Cells run{};
-    std::array<bool, Cells::most> isLong{};
+    CurveCells run{};
+    std::array<bool, CurveCells::most> isLong{};
     for (std::size_t i = 0; i < count; ++i) {
         const Corners c = parts.corners(first + i);
         for (int k = 0; k < 3; ++k)
             run.x[k][i] = std::uint32_t(std::clamp((c[0][k] + c[1][k] + c[2][k]) * scale, 0.0, cells - 1));
         isLong[i] = parts.isLong(c);
     }
-    transformToHilbert(run);
+    makeCurveKeys(run, first, count, keys);
     for (std::size_t i = 0; i < count; ++i) {
-        const std::uint64_t place = spread(run.x[0][i]) << 2 | spread(run.x[1][i]) << 1 | spread(run.x[2][i]);
-        keys[i] = isLong[i] ? unused : place << indexBits | (first + i);
+        if (isLong[i]) keys[i] = unused;
         if (isLong[i]) longOnes.push_back(std::uint32_t(first + i));
     }
 }
@@ -221,9 +132,10 @@ std::vector<std::uint32_t> addKeys(const Parts& parts, const glm::ivec3& size, s
     const std::size_t begin = keys.size();
     keys.resize(parts.count());
     tbb::enumerable_thread_specific<std::vector<std::uint32_t>> found;
-    const std::size_t runs = (keys.size() - begin + Cells::most - 1) / Cells::most;
+    const std::size_t runs = (keys.size() - begin + CurveCells::most - 1) / CurveCells::most;
     forAll(runs, progress, [&](std::size_t run) {
-        const std::size_t first = begin + run * Cells::most, count = std::min(Cells::most, keys.size() - first);
+        const std::size_t first = begin + run * CurveCells::most,
+                          count = std::min(CurveCells::most, keys.size() - first);
         makeKeys(parts, size, first, count, keys.data() + first, found.local());
     });
     std::vector<std::uint32_t> longOnes;
@@ -244,90 +156,16 @@ std::vector<std::uint64_t> keysOf(Parts& parts, const glm::ivec3& size, Progress
     return keys;
 }
 
-// Puts parts into an order of their own: halves by the middle of the longest side of where they are, those halved
-// again, and so on, each in full groups as the tree has them.
-class Splitter {
-  public:
-    Splitter(const Parts& parts, std::vector<std::uint64_t>& keys, Progress* progress)
-        : keys_(keys), items_(vectorOf<Item>(keys.size(), progress)), progress_(progress) {
-        forAll(keys.size(), progress, [&](std::size_t i) {
-            const Corners c = parts.corners(std::size_t(keys[i] & indexMask));
-            items_[i] = {glm::vec3(c[0] + c[1] + c[2]), std::uint32_t(keys[i] & indexMask)};
-        });
-    }
-
-    void sort() {
-        std::size_t size = treeWidth;  // parts of a child
-        while (size * treeWidth < items_.size()) size *= treeWidth;
-        split(0, items_.size(), size);
-        forAll(keys_.size(), progress_, [&](std::size_t i) { keys_[i] = items_[i].part; });
-    }
-
-  private:
-    struct Item {
-        glm::vec3 place;
-        std::uint32_t part;
-    };
-
-    using Whole [[gnu::vector_size(sizeof(Item))]] = float;
-
-    static Whole wholeOf(const Item* item) {
-        Whole whole;
-        std::memcpy(&whole, item, sizeof whole);
-        return whole;
-    }
-
-    static bool less(const Item& a, const Item& b, int axis) {
-        const float x = a.place[axis], y = b.place[axis];
-        return bool(int(x < y) | (int(x == y) & int(a.part < b.part)));
-    }
-
-    // As std::nth_element, but without branches on what can not be foretold.
-    static void select(Item* begin, Item* middle, Item* end, int axis) {
-        const auto inOrder = [axis](const Item& a, const Item& b) { return less(a, b, axis); };
-        for (int round = 0; round < mostRounds && end - begin > shortRun; ++round) {
-            // all differ: something is less than the second of three
-            std::array<Item, 3> some{*begin, begin[(end - begin) / 2], end[-1]};
-            std::sort(some.begin(), some.end(), inOrder);
-            Item* store = begin;
-            for (Item* i = begin; i < end; ++i) {
-                // as wholes: what is written in pieces can not be read at once soon after
-                const bool before = less(*i, some[1], axis);
-                const Whole here = wholeOf(i), there = wholeOf(store);
-                std::memcpy(i, &there, sizeof there);
-                std::memcpy(store, &here, sizeof here);
-                store += before;
-            }
-            (middle < store ? end : begin) = store;
-        }
-        std::nth_element(begin, middle, end, inOrder);
-    }
-
-    void split(std::size_t begin, std::size_t end, std::size_t size) {
-        while (end - begin <= size) {
-            if (size == treeWidth) return;
-            size /= treeWidth;
-        }
-        poll(progress_);
-        const std::size_t children = (end - begin + size - 1) / size, middle = begin + (children + 1) / 2 * size;
-        glm::vec3 lower(std::numeric_limits<float>::infinity()), upper(-lower);
-        for (std::size_t i = begin; i < end; ++i)
-            lower = glm::min(lower, items_[i].place), upper = glm::max(upper, items_[i].place);
-        const glm::vec3 sides = upper - lower;
-        const int axis = sides.x >= sides.y && sides.x >= sides.z ? 0 : sides.y >= sides.z ? 1 : 2;
-        select(items_.data() + begin, items_.data() + middle, items_.data() + end, axis);
-        const auto left = [&] { split(begin, middle, size); };
-        const auto right = [&] { split(middle, end, size); };
-        if (end - begin > runLength)
-            tbb::parallel_invoke(left, right);
-        else
-            left(), right();
-    }
-
-    std::vector<std::uint64_t>& keys_;
-    std::vector<Item> items_;
-    Progress* progress_;
-};
+// In the order that splitting makes, instead of that along the curve.
+void split(const Parts& parts, std::vector<std::uint64_t>& keys, Progress* progress) {
+    auto items = vectorOf<TreeItem>(keys.size(), progress);
+    forAll(keys.size(), progress, [&](std::size_t i) {
+        const Corners c = parts.corners(std::size_t(keys[i] & curveIndexMask));
+        items[i] = {glm::vec3(c[0] + c[1] + c[2]), std::uint32_t(keys[i] & curveIndexMask)};
+    });
+    sortBySplitting(items, progress);
+    forAll(keys.size(), progress, [&](std::size_t i) { keys[i] = items[i].index; });
+}
 
 // A unit vector across `direction`.
 glm::dvec3 across(const glm::dvec3& direction) {
@@ -372,13 +210,6 @@ void writeTriangle(WideLeaf& leaf, std::size_t place, const Corners& corners) {
     leaf.lengthAC[place] = float(glm::length(flatC));
 }
 
-void setBox(BoxGroup& group, std::size_t place, const glm::vec3& lower, const glm::vec3& upper) {
-    for (int i = 0; i < 3; ++i) {
-        group.lower[i][place] = lower[i];
-        group.upper[i][place] = upper[i];
-    }
-}
-
 float below(double x) {
     const float f = float(x);
     return double(f) > x ? std::nextafter(f, -std::numeric_limits<float>::infinity()) : f;
@@ -386,7 +217,7 @@ float below(double x) {
 
 void makeLeaf(const Parts& parts, const std::vector<std::uint64_t>& keys, std::size_t index, WideTree& tree) {
     const std::size_t begin = index * treeWidth, count = std::min<std::size_t>(treeWidth, keys.size() - begin);
-    const auto partAt = [&](std::size_t i) { return std::size_t(keys[std::min(i, keys.size() - 1)] & indexMask); };
+    const auto partAt = [&](std::size_t i) { return std::size_t(keys[std::min(i, keys.size() - 1)] & curveIndexMask); };
     for (std::size_t i = begin; i < begin + treeWidth; ++i) {
         parts.fetchIndices(partAt(i + 4 * treeWidth));
         parts.fetchCorners(partAt(i + 2 * treeWidth));
@@ -401,56 +232,14 @@ void makeLeaf(const Parts& parts, const std::vector<std::uint64_t>& keys, std::s
         for (const glm::dvec3& corner : corners[i]) box.add(corner);
     }
     for (std::size_t i = 0; i < treeWidth; ++i) writeTriangle(leaf, i, corners[i]);
-    setBox(tree.groups[index / treeWidth], index % treeWidth,
-           {below(box.lower.x), below(box.lower.y), below(box.lower.z)},
-           {-below(-box.upper.x), -below(-box.upper.y), -below(-box.upper.z)});
-}
-
-// The box around the boxes of a group becomes one box of its parent.
-void joinBoxes(const BoxGroup& group, BoxGroup& parent, std::size_t place) {
-    glm::vec3 lower, upper;
-    for (int i = 0; i < 3; ++i) {
-        lower[i] = *std::min_element(group.lower[i], group.lower[i] + treeWidth);
-        upper[i] = *std::max_element(group.upper[i], group.upper[i] + treeWidth);
-    }
-    setBox(parent, place, lower, upper);
-}
-
-void emptyBoxes(BoxGroup& group, std::size_t from) {
-    constexpr float infinity = std::numeric_limits<float>::infinity();
-    for (std::size_t i = from; i < treeWidth; ++i) setBox(group, i, glm::vec3(infinity), glm::vec3(-infinity));
-}
-
-void makeGroups(WideTree& tree, Progress* progress) {
-    std::uint32_t begin = 0, children = tree.leafCount, firstChild = 0;  // of the level below
-    for (;;) {
-        const std::uint32_t count = (children + treeWidth - 1) / treeWidth;
-        for (std::uint32_t i = 0; i < count; ++i) tree.groups[begin + i].firstChild = firstChild + i * treeWidth;
-        emptyBoxes(tree.groups[begin + count - 1], children - (count - 1) * treeWidth);
-        if (count == 1) return;
-        forAll(count, progress, [&](std::size_t i) {
-            joinBoxes(tree.groups[begin + i], tree.groups[begin + count + i / treeWidth], i % treeWidth);
-        });
-        firstChild = tree.leafCount + begin;
-        begin += count;
-        children = count;
-    }
-}
-
-std::uint32_t groupsOver(std::uint32_t leaves) {
-    std::uint32_t total = 0;
-    do {
-        leaves = (leaves + treeWidth - 1) / treeWidth;
-        total += leaves;
-    } while (leaves > 1);
-    return total;
+    tree.setLeafBox(index, {below(box.lower.x), below(box.lower.y), below(box.lower.z)},
+                    {-below(-box.upper.x), -below(-box.upper.y), -below(-box.upper.z)});
 }
 
 }  // namespace
 
 WideTree makeWideTree(const Mesh& mesh, float voxelSize, Progress* progress, const TreeShape& shape) {
-    if (mesh.triangles.size() >= (std::size_t(1) << indexBits))
-        throw std::invalid_argument("the mesh has 2^28 triangles or more");
+    if (mesh.triangles.size() >= mostOnCurve) throw std::invalid_argument("the mesh has 2^28 triangles or more");
     const Bounds box = bounds(mesh);
     const glm::dvec3 lower = glm::dvec3(box.lower) / double(voxelSize),
                      upper = glm::dvec3(box.upper) / double(voxelSize);
@@ -464,15 +253,13 @@ WideTree makeWideTree(const Mesh& mesh, float voxelSize, Progress* progress, con
     Parts parts(mesh, base, voxelSize, shape.longestEdge);
     std::vector<std::uint64_t> keys = keysOf(parts, tree.size, progress);
     if (shape.order == TreeOrder::split)
-        Splitter(parts, keys, progress).sort();
+        split(parts, keys, progress);
     else
-        sortKeys(keys, progress);
-    tree.leafCount = std::uint32_t((keys.size() + treeWidth - 1) / treeWidth);
-    tree.groupCount = groupsOver(tree.leafCount);
+        sortCurveKeys(keys, progress);
+    tree.makeRoom((keys.size() + treeWidth - 1) / treeWidth);
     tree.leaves = LargeArray<WideLeaf>(tree.leafCount);
-    tree.groups = LargeArray<BoxGroup>(tree.groupCount);
     forAll(tree.leafCount, progress, [&](std::size_t i) { makeLeaf(parts, keys, i, tree); });
-    makeGroups(tree, progress);
+    tree.joinBoxes(progress);
     return tree;
 }
 

@@ -9,14 +9,13 @@
 #include <glm/vec3.hpp>
 #include <vector>
 
+#include "sdf/box_tree.h"
 #include "sdf/large_array.h"
 #include "sdf/mesh.h"
 
 namespace bilayer {
 
 class Progress;
-
-inline constexpr int treeWidth = 8;  ///< triangles a leaf and boxes a group: a vector of floats
 
 /// Eight triangles, each in a frame of its own: corner A is its origin, x runs from A to B, z along the normal, and
 /// C = (c.x, c.y) has y >= 0. Lengths in voxels. Places that are left over repeat a triangle.
@@ -31,24 +30,11 @@ struct WideLeaf {
     std::uint32_t triangles[treeWidth];  ///< indices into Mesh::triangles
 };
 
-/// The boxes of eight leaves or of eight groups [voxels]; a box that is left over is empty: infinitely far away.
-struct BoxGroup {
-    alignas(64) float lower[3][treeWidth];
-    float upper[3][treeWidth];
-    std::uint32_t firstChild;  ///< the node of the first box; the others follow
-};
-
-/// Nodes are numbered: first the leaves, then the groups from the finest to the coarsest; the last one is the root.
-struct WideTree {
+/// The triangles of a mesh under a tree of boxes [voxels].
+struct WideTree : BoxTree {
     glm::ivec3 base{0};  ///< index coordinates of the origin of the tree's frame, multiples of 8
     glm::ivec3 size{0};  ///< a box of this size from `base` holds the mesh [voxels]
-    std::uint32_t leafCount = 0, groupCount = 0;
     LargeArray<WideLeaf> leaves;
-    LargeArray<BoxGroup> groups;
-
-    bool isLeaf(std::uint32_t node) const { return node < leafCount; }
-    const BoxGroup& group(std::uint32_t node) const { return groups[node - leafCount]; }
-    std::uint32_t root() const { return leafCount + groupCount - 1; }
 };
 
 /// How triangles are put into an order, from which the hierarchy follows.

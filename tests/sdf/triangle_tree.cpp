@@ -1,0 +1,182 @@
+#include "sdf/triangle_tree.h"
+
+#include <oneapi/tbb/parallel_for.h>
+
+#include <algorithm>
+#include <atomic>
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <limits>
+#include <set>
+#include <utility>
+
+#include "demos/shared/shapes.h"
+#include "sdf/close_pairs.h"
+#include "sdf/topology.h"
+#include "sdf/walls.h"
+#include "tests/support/random.h"
+#include "tests/support/support.h"
+
+using namespace bilayer;
+
+namespace {
+
+// Triangles of all sizes, some of which share vertices.
+Mesh soup(std::size_t triangles, float offset, test::Random& random) {
+    Mesh mesh;
+    for (std::size_t i = 0; i < triangles; ++i) {
+        const glm::vec3 centre = random.point(1);
+        const float size = float(std::exp2(random(-8, 0)));
+        const unsigned first = unsigned(mesh.points.size());
+        for (int k = 0; k < 3; ++k) mesh.points.push_back(offset + centre + random.point(size));
+        mesh.triangles.emplace_back(first, first + 1, i % 3 ? first + 2 : unsigned(first / 2));
+    }
+    return weld(mesh);
+}
+
+bool meet(const Bounds& a, const Bounds& b) {
+    bool all = true;
+    for (int k = 0; k < 3; ++k) all &= a.lower[k] <= b.upper[k] && b.lower[k] <= a.upper[k];
+    return all;
+}
+
+int shared(const glm::uvec3& a, const glm::uvec3& b) {
+    int count = 0;
+    for (int i = 0; i < 3; ++i)
+        for (int k = 0; k < 3; ++k) count += a[i] == b[k];
+    return count;
+}
+
+using Wide = glm::vec<3, long double>;
+
+// Whether a triangle lies on one side of another's plane, but for vertices that they share.
+bool onOneSide(const Mesh& mesh, const glm::uvec3& plane, const glm::uvec3& t) {
+    const Wide a(mesh.points[plane.x]), u = Wide(mesh.points[plane.y]) - a, v = Wide(mesh.points[plane.z]) - a;
+    int above = 0, below = 0, on = 0;
+    for (int k = 0; k < 3; ++k) {
+        const long double volume = glm::dot(glm::cross(u, v), Wide(mesh.points[t[k]]) - a);
+        if (t[k] == plane.x || t[k] == plane.y || t[k] == plane.z)
+            ++on;
+        else
+            ++(volume > 0 ? above : below);
+    }
+    return above + on == 3 || below + on == 3;
+}
+
+// As wallThickness(), over all triangles and in double precision.
+std::vector<float> wallsByBruteForce(const Mesh& mesh) {
+    std::vector<float> all;
+    for (const glm::uvec3& t : mesh.triangles) {
+        const glm::vec3 a = mesh.points[t.x], b = mesh.points[t.y], c = mesh.points[t.z];
+        const glm::vec3 normal(0.5 * glm::cross(glm::dvec3(b) - glm::dvec3(a), glm::dvec3(c) - glm::dvec3(a)));
+        const glm::dvec3 origin((a + b + c) / 3.f), direction(-normal / glm::length(normal));
+        double nearest = std::numeric_limits<double>::infinity();
+        for (const glm::uvec3& o : mesh.triangles) {
+            const glm::dvec3 p(mesh.points[o.x]), u = glm::dvec3(mesh.points[o.y]) - p,
+                                                  v = glm::dvec3(mesh.points[o.z]) - p;
+            const glm::dvec3 n = glm::cross(u, v);
+            const double facing = glm::dot(n, direction);
+            if (facing <= double(0.2f) * glm::length(n)) continue;
+            const glm::dvec3 side = glm::cross(direction, origin - p);
+            const double x = glm::dot(v, side) / facing, y = -glm::dot(u, side) / facing;
+            const double along = -glm::dot(n, origin - p) / facing;
+            if (x >= 0 && y >= 0 && x + y <= 1 && along > 0) nearest = std::min(nearest, along);
+        }
+        all.push_back(float(nearest));
+    }
+    return all;
+}
+
+}  // namespace
+
+TEST_CASE("a triangle tree finds the triangles whose boxes meet a box") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    test::Random random(seed);
+    for (const std::size_t triangles : {1, 7, 8, 9, 600}) {
+        const Mesh mesh = soup(triangles, 0, random);
+        const TriangleTree tree(mesh);
+        for (int trial = 0; trial < 50; ++trial) {
+            Bounds box;
+            box.add(random.point(1.5f));
+            box.add(random.point(1.5f));
+            std::multiset<unsigned> found, expected;
+            tree.descend([&](const Bounds& other) { return meet(box, other); }, [&](unsigned i) { found.insert(i); });
+            for (unsigned i = 0; i < mesh.triangles.size(); ++i)
+                if (meet(box, tree.boxOf(i))) expected.insert(i);
+            CHECK(found == expected);
+        }
+    }
+    const Mesh none;
+    TriangleTree(none).descend([](const Bounds&) { return true; }, [](unsigned i) { FAIL(i); });
+}
+
+TEST_CASE("pairs of triangles that are left out can not run through each other") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    test::Random random(seed);
+    for (const float offset : {0.f, 1000.f}) {
+        const Mesh mesh = soup(700, offset, random);
+        const TriangleTree tree(mesh);
+        std::set<std::pair<unsigned, unsigned>> close;
+        std::vector<std::pair<unsigned, unsigned>> pairs;
+        for (std::uint32_t leaf = 0; leaf < tree.boxes().leafCount; ++leaf) {
+            findClosePairs(mesh, tree, leaf, pairs);
+            for (const auto& [a, b] : pairs) CHECK(close.insert(std::minmax(a, b)).second);
+        }
+        std::size_t apart = 0;
+        for (unsigned a = 0; a < mesh.triangles.size(); ++a)
+            for (unsigned b = a + 1; b < mesh.triangles.size(); ++b) {
+                const glm::uvec3 &s = mesh.triangles[a], &t = mesh.triangles[b];
+                if (close.count({a, b}) || !meet(tree.boxOf(a), tree.boxOf(b)) || shared(s, t) > 1) continue;
+                ++apart;
+                if (!onOneSide(mesh, s, t) && !onOneSide(mesh, t, s)) FAIL_CHECK("triangles " << a << " and " << b);
+            }
+        // the quick look is worth it
+        CHECK(apart > close.size());
+    }
+}
+
+TEST_CASE("walls are as thick as by brute force") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    test::Random random(seed);
+    // rays along axes, through edges and corners, in and beside the planes of boxes
+    const Mesh box = shapes::box({0.5f, 0.25f, 0.125f}, 5);
+    const std::vector<Mesh> meshes{box,
+                                   weld(shapes::moved(box, {100, -200, 300})),
+                                   shapes::sphere(1, 3),
+                                   shapes::torus(2, 0.5, 20, 10),
+                                   soup(500, 0, random),
+                                   soup(500, 1000, random)};
+    for (std::size_t i = 0; i < meshes.size(); ++i) {
+        CAPTURE(i);
+        CHECK(wallThickness(TriangleTree(meshes[i])) == wallsByBruteForce(meshes[i]));
+    }
+}
+
+TEST_CASE("sets that threads share are those of one thread") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    test::Random random(seed);
+    constexpr unsigned count = 100'000;
+    const auto number = [&] { return std::min(unsigned(random(0, count)), count - 1); };
+    for (const std::size_t joins : {1000, 50'000, 300'000}) {
+        std::vector<std::pair<unsigned, unsigned>> pairs;
+        for (std::size_t i = 0; i < joins; ++i) pairs.emplace_back(number(), number());
+        Sets sets(count);
+        for (const auto& [a, b] : pairs) sets.join(a, b);
+        SharedSets shared(count);
+        std::atomic<std::size_t> joined = 0;
+        tbb::parallel_for(std::size_t(0), joins,
+                          [&](std::size_t i) { joined += shared.join(pairs[i].first, pairs[i].second); });
+        std::size_t roots = 0, different = 0;
+        for (unsigned i = 0; i < count; ++i) {
+            different += shared.root(i) != sets.root(i);
+            roots += shared.root(i) == i;
+        }
+        CHECK(different == 0);
+        CHECK(roots == count - joined);
+    }
+}
