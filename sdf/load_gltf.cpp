@@ -129,6 +129,7 @@ std::size_t countPrimitives(const tinygltf::Model& model) {
 
 std::string complaint(const json& file, std::string error) {
     error = error.substr(0, error.find_first_of("\n\r"));
+    if (error.empty()) error = "its meshes hold something that is no primitive";
     if (error.size() > longestComplaint) error = error.substr(0, longestComplaint) + " ...";
     for (const std::string& name : names(file, "extensionsUsed"))
         if (contains(compressions, name)) error += fmt::format(" (it uses {}, which is not read)", name);

@@ -221,9 +221,13 @@ TEST_CASE("polygons arrive as they were sent, or not at all") {
     CHECK(received.sizes == sent.sizes);
     CHECK(received.notes == sent.notes);
     CHECK(throughPipe({}).corners.empty());
-    for (const auto& [corners, sizes] :
-         {std::pair(std::vector<unsigned>{0, 1, 4}, std::vector<unsigned>{}), {{0, 1}, {}}, {{0, 1}, {2}}, {{0, 1, 2}, {4}},
-          {{0, 1, 2, 3}, {3}}, {{0, 1, 2}, {3, 0}}, {{0, 1, 2, 0, 1, 2}, {3, 4294967295u, 4}}}) {
+    for (const auto& [corners, sizes] : {std::pair(std::vector<unsigned>{0, 1, 4}, std::vector<unsigned>{}),
+                                         {{0, 1}, {}},
+                                         {{0, 1}, {2}},
+                                         {{0, 1, 2}, {4}},
+                                         {{0, 1, 2, 3}, {3}},
+                                         {{0, 1, 2}, {3, 0}},
+                                         {{0, 1, 2, 0, 1, 2}, {3, 4294967295u, 4}}}) {
         sent.corners = corners;
         sent.sizes = sizes;
         CHECK_THROWS_AS(throughPipe(sent), ChildFailure);
