@@ -29,6 +29,14 @@ using namespace std::chrono_literals;
 
 namespace {
 
+// Address sanitizer has a malloc of its own, which does not put its locks into order at a fork and ends the process
+// where memory is refused; thread sanitizer ends it too.
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+constexpr bool usualMalloc = false;
+#else
+constexpr bool usualMalloc = true;
+#endif
+
 constexpr ChildLimits ample{60s, std::size_t(1) << 30};
 
 // What the caller is told of work that goes wrong
@@ -104,6 +112,14 @@ TEST_CASE("a child process that fails is an error") {
     ChildProcess child({300ms, 0}, drips);
     std::string much(1000000, ' ');
     CHECK_THROWS_WITH(child.receive(much.data(), much.size()), "took longer than 0.3 s");
+    {
+        const ChildProcess abandoned(ample, [](const auto&) { ::pause(); });
+    }
+    CHECK(openFiles() == files + 1);  // that of `child`
+}
+
+TEST_CASE("a child process has no more memory than it is given") {
+    if (!usualMalloc) return;
     const auto grows = [](const ChildProcess::Send& send) {
         std::vector<std::string> kept;
         try {
@@ -119,10 +135,6 @@ TEST_CASE("a child process that fails is an error") {
     greedy.receive(&megabytes, sizeof megabytes);
     CHECK(megabytes <= 100);
     CHECK(megabytes >= 50);
-    {
-        const ChildProcess abandoned(ample, [](const auto&) { ::pause(); });
-    }
-    CHECK(openFiles() == files + 2);  // those of `child` and `greedy`
 }
 
 TEST_CASE("a child process leaves nothing behind and takes nothing with it") {
@@ -193,6 +205,7 @@ TEST_CASE("a child process answers where the caller has no standard streams") {
 }
 
 TEST_CASE("child processes start while other threads are busy") {
+    if (!usualMalloc) return;
     test::Gltf gltf = test::Gltf::cube();
     const auto path = gltf.write("busy.gltf");
     std::atomic<bool> stop = false;

@@ -102,7 +102,7 @@ std::size_t rounds(std::size_t usual) {
 
 // What is wrong with how a file was read, or nothing
 std::string complaint(const SceneFile& file) {
-    constexpr ChildLimits limits{std::chrono::seconds(5), std::size_t(1) << 30};
+    constexpr ChildLimits limits{std::chrono::seconds(1), std::size_t(1) << 30};
     const auto path = test::scratch(file.name);
     std::ofstream(path, std::ios::binary) << file.bytes;
     try {
