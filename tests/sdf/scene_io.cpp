@@ -106,11 +106,13 @@ TEST_CASE("an importer that takes too long, too much, or crashes is an error tha
     CHECK_THROWS_WITH(readScene(path, {0ms, std::size_t(1) << 30}),
                       Catch::Contains("slow.gltf: the importer for GLTF files took longer than 0 s; convert it to "
                                       "OBJ, PLY or STL"));
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)  // they end a process that asks for too much
     gltf.file["accessors"][0]["count"] = std::uint64_t(1) << 40;
     gltf.file["accessors"][0].erase("bufferView");
     gltf.file["accessors"][0]["sparse"] = {
         {"count", 0}, {"indices", {{"bufferView", 1}, {"componentType", 5123}}}, {"values", {{"bufferView", 0}}}};
     CHECK_THROWS_WITH(readScene(gltf.write("large.gltf")), Catch::Contains("large.gltf: reading it needs more than"));
+#endif
     // this Assimp does not survive a texture without a name; others may
     const std::string text = collada("Z_UP", "1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1");
     const std::size_t at = text.find("<library_geometries>");
