@@ -150,14 +150,13 @@ void ChildProcess::receive(void* bytes, std::size_t count) {
 }
 
 void ChildProcess::waitForBytes() {
+    using std::chrono::milliseconds;
     for (;;) {
-        const auto left =
-            std::chrono::duration_cast<std::chrono::milliseconds>(deadline_ - std::chrono::steady_clock::now());
+        const auto left = std::chrono::ceil<milliseconds>(deadline_ - std::chrono::steady_clock::now()).count();
+        if (left <= 0) throw ChildFailure(fmt::format("took longer than {} s", double(time_.count()) / 1000));
         pollfd end{pipe_, POLLIN, 0};
-        const int ready = ::poll(&end, 1, int(std::clamp<long long>(left.count(), 0, INT_MAX)));
+        const int ready = ::poll(&end, 1, int(std::min<long long>(left, INT_MAX)));
         if (ready > 0) return;
-        if (ready == 0 && left.count() <= 0)
-            throw ChildFailure(fmt::format("took longer than {} s", time_.count() / 1000.0));
         if (ready < 0 && errno != EINTR) throw std::system_error(errno, std::generic_category(), "poll");
     }
 }

@@ -24,9 +24,10 @@ class ChildFailure : public std::runtime_error {
 /// A fork of the calling process that does `work` and answers through a pipe; the destructor ends it.
 ///
 /// Why a fork and no helper program: a library that is linked statically, packed or moved cannot know where a helper of
-/// its own stands, and a fork is always there. Only the calling thread goes on in the child. Since the C library puts
-/// its own locks (malloc, stdio, the loader) into order at a fork, `work` may allocate and throw; it must not start
-/// threads or use TBB, nor anything else that may hold a lock of its own in another thread of the caller.
+/// its own stands, and a fork is always there. Only the calling thread goes on in the child. glibc puts its own locks
+/// (malloc, stdio, the loader) into order at a fork, so that `work` may allocate and throw; a malloc that replaces
+/// glibc's must do so too, as jemalloc and tcmalloc do. `work` must not start threads or use TBB, nor anything else
+/// that may hold a lock of its own in another thread of the caller: it would wait for it until its time is over.
 ///
 /// The child has no signal handlers, no files but its pipe and /dev/null, never writes core files, and dies with the
 /// thread that made it. It leaves without exit handlers and without flushing the caller's streams. A caller that

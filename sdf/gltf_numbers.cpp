@@ -1,19 +1,11 @@
 #include "sdf/gltf_numbers.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cstdint>
 #include <cstring>
-#include <stdexcept>
 
 namespace bilayer {
 namespace {
-
-template <class... Values>
-void require(bool holds, fmt::format_string<Values...> text, Values&&... values) {
-    if (!holds) throw std::runtime_error(fmt::format(text, std::forward<Values>(values)...));
-}
 
 template <class T>
 T read(const unsigned char* bytes) {

@@ -1,16 +1,26 @@
 // Numbers out of the buffers of a glTF file, each range checked before it is read; internal.
 #pragma once
 
+#include <fmt/format.h>
+
 #include <cstddef>
 #include <glm/mat4x4.hpp>
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
+#include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "sdf/tinygltf.h"
 
 namespace bilayer {
+
+/// Throws std::runtime_error of a formatted text unless something holds.
+template <class... Values>
+void require(bool holds, fmt::format_string<Values...> text, Values&&... values) {
+    if (!holds) throw std::runtime_error(fmt::format(text, std::forward<Values>(values)...));
+}
 
 /// Reads accessors. Every member throws std::runtime_error that names the accessor or buffer view at fault, and says
 /// what would be right. Normalised integers become what they stand for.

@@ -3,65 +3,45 @@
 
 #include <fmt/format.h>
 
-#include <cstdint>
-#include <cstring>
-#include <fstream>
+#include <algorithm>
 #include <iterator>
-#include <limits>
 #include <stdexcept>
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include "sdf/input_file.h"
+#include "sdf/gltf_buffers.h"
 
 namespace bilayer {
 namespace {
 
-namespace fs = std::filesystem;
-using Bytes = std::vector<unsigned char>;
+using nlohmann::json;
 
-// Extensions that change the shape of what is read, and are understood.
+// The members of a glTF file that make its shape
+constexpr std::string_view members[] = {"asset", "buffers", "bufferViews",    "accessors",          "meshes", "nodes",
+                                        "scene", "scenes",  "extensionsUsed", "extensionsRequired", "skins"};
+// Extensions that change the shape, and are understood
 constexpr std::string_view understood[] = {"KHR_mesh_quantization", "EXT_mesh_gpu_instancing"};
-// Beginnings of the names of those that only say how things look or sound, and who made them.
-constexpr std::string_view looks[] = {"KHR_materials_",      "KHR_texture_",        "EXT_texture_", "MSFT_texture_",
-                                      "KHR_lights_",         "EXT_lights_",         "KHR_xmp",      "KHR_audio",
-                                      "KHR_environment_map", "KHR_techniques_webgl"};
-// Those that hold the geometry itself, even if they are only said to be used.
+// Beginnings of the names of those that only say how things look or sound, and who made them
+constexpr std::string_view looks[] = {"KHR_materials_", "KHR_texture_", "EXT_texture_", "MSFT_texture_", "KHR_lights_",
+                                      "EXT_lights_",    "KHR_xmp",      "KHR_audio",    "KHR_technique"};
+// Those that hold the geometry itself, even if they are only said to be used
 constexpr std::string_view compressions[] = {"KHR_draco_mesh_compression", "EXT_meshopt_compression",
                                              "KHR_meshopt_compression"};
 
-constexpr std::size_t glbHeader = 20;  // [bytes]: before the JSON of a binary file, whose length is the number at 12
-constexpr int maxNesting = 200;        // of objects and arrays; tinygltf calls itself once for each
+constexpr int maxNesting = 200;                // of objects and arrays; tinygltf calls itself once for each
+constexpr std::size_t longestComplaint = 120;  // [bytes]
 
-Bytes readBytes(const fs::path& path) {
-    requireInputFile(path);
-    std::ifstream stream(path, std::ios::binary);
-    Bytes bytes(fs::file_size(path));
-    stream.read(reinterpret_cast<char*>(bytes.data()), std::streamsize(bytes.size()));
-    if (!stream) throw std::runtime_error("cannot be read to its end");
-    return bytes;
+template <class Names>
+bool contains(const Names& names, std::string_view name) {
+    return std::find(std::begin(names), std::end(names), name) != std::end(names);
 }
 
-bool isBinary(const Bytes& bytes) {
-    return bytes.size() >= glbHeader && std::memcmp(bytes.data(), "glTF", 4) == 0;
-}
-
-std::string_view jsonOf(const Bytes& bytes) {
-    const std::string_view all(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-    if (!isBinary(bytes)) return all;
-    std::uint32_t version = 0, length = 0;
-    std::memcpy(&version, bytes.data() + 4, sizeof version);
-    std::memcpy(&length, bytes.data() + 12, sizeof length);
-    if (version != 2) throw std::runtime_error(fmt::format("is binary glTF {}; only glTF 2 is read", version));
-    return all.substr(glbHeader, length);
-}
-
-void checkNesting(std::string_view json) {
+void checkNesting(std::string_view text) {
     int depth = 0;
     bool inString = false;
-    for (std::size_t i = 0; i < json.size(); ++i) {
-        const char c = json[i];
+    for (std::size_t i = 0; i < text.size(); ++i) {
+        const char c = text[i];
         if (inString && c == '\\') {
             ++i;
         } else if (c == '"') {
@@ -74,69 +54,28 @@ void checkNesting(std::string_view json) {
     }
 }
 
-// Files of buffers for tinygltf: regular files in the folder of the scene. A file may be longer than its buffer, as
-// glTF allows; tinygltf wants it of the very length, so that it is cut to that.
-class BufferFiles {
-  public:
-    BufferFiles(fs::path folder, std::string_view json) : folder_(std::move(folder)) {
-        const auto onlyBuffers = [](int depth, nlohmann::json::parse_event_t event, nlohmann::json& parsed) {
-            return depth != 1 || event != nlohmann::json::parse_event_t::key || parsed == "buffers";
-        };
-        const nlohmann::json file = nlohmann::json::parse(json.begin(), json.end(), onlyBuffers, false);
-        if (!file.is_object() || !file.contains("buffers") || !file["buffers"].is_array()) return;
-        for (const nlohmann::json& buffer : file["buffers"])
-            if (buffer.is_object() && buffer.contains("uri") && buffer["uri"].is_string() &&
-                buffer.contains("byteLength") && buffer["byteLength"].is_number_unsigned())
-                add(buffer["uri"], buffer["byteLength"]);
-    }
-
-    tinygltf::FsCallbacks callbacks() { return {exists, expand, readWhole, nullptr, this}; }
-
-  private:
-    struct Declared {
-        fs::path name;  // what tinygltf will ask for
-        fs::path file;
-        std::size_t length;
+json parse(std::string_view text) {
+    checkNesting(text);
+    const auto wanted = [](int depth, json::parse_event_t event, json& parsed) {
+        return depth != 1 || event != json::parse_event_t::key ||
+               contains(members, parsed.get_ref<const std::string&>());
     };
+    try {
+        json file = json::parse(text.begin(), text.end(), wanted);
+        if (file.is_object()) return file;
+    } catch (const json::exception& error) {
+        throw std::runtime_error(
+            fmt::format("its JSON is damaged: {}", std::string(error.what()).substr(0, longestComplaint)));
+    }
+    throw std::runtime_error("its JSON is no object, as glTF's is");
+}
 
-    void add(const std::string& uri, std::size_t length) {
-        if (tinygltf::IsDataURI(uri)) return;
-        const fs::path decoded = folder_ / tinygltf::dlib::urldecode(uri), literal = folder_ / uri;
-        declared_.push_back({decoded, isFile(literal) ? literal : decoded, length});
-    }
-    static bool isFile(const fs::path& path) {
-        std::error_code absent;
-        return fs::is_regular_file(path, absent);
-    }
-    static const Declared* find(const fs::path& name, void* self) {
-        for (const Declared& d : static_cast<BufferFiles*>(self)->declared_)
-            if (d.name == name) return &d;
-        return nullptr;
-    }
-
-    static bool exists(const std::string& name, void* self) {
-        const Declared* declared = find(name, self);
-        return declared && isFile(declared->file);
-    }
-    static std::string expand(const std::string& file, void*) { return file; }
-    static bool readWhole(Bytes* bytes, std::string* error, const std::string& name, void* self) try {
-        const Declared* declared = find(name, self);
-        if (!declared) return false;
-        *bytes = readBytes(declared->file);
-        if (bytes->size() > declared->length) bytes->resize(declared->length);
-        return true;
-    } catch (const std::runtime_error& e) {
-        *error = e.what();
-        return false;
-    }
-
-    fs::path folder_;
-    std::vector<Declared> declared_;
-};
-
-template <class Names>
-bool contains(const Names& names, std::string_view name) {
-    return std::find(std::begin(names), std::end(names), name) != std::end(names);
+std::vector<std::string> names(const json& file, const char* member) {
+    std::vector<std::string> names;
+    if (const auto found = file.find(member); found != file.end() && found->is_array())
+        for (const json& name : *found)
+            if (name.is_string()) names.push_back(name);
+    return names;
 }
 
 bool isUnderstood(std::string_view name) {
@@ -145,49 +84,75 @@ bool isUnderstood(std::string_view name) {
                        [&](std::string_view beginning) { return name.substr(0, beginning.size()) == beginning; });
 }
 
-void checkRequired(const tinygltf::Model& model) {
-    for (const std::string& name : model.extensionsRequired)
+void checkRequired(const json& file) {
+    for (const std::string& name : names(file, "extensionsRequired"))
         if (!isUnderstood(name))
-            throw std::runtime_error(
-                fmt::format("requires the glTF extension {}, which is not read; export it without", name));
+            throw std::runtime_error(fmt::format("requires the glTF extension {}, which is not read; export it without",
+                                                 name.substr(0, longestComplaint)));
 }
 
-bool ignoreImage(tinygltf::Image*, int, std::string*, std::string*, int, int, const unsigned char*, int, void*) {
-    return true;
+// Takes the buffers out of the file and names each by its index instead, by which tinygltf asks for them.
+std::vector<Bytes> takeBuffers(json& file, const GltfFile& source) {
+    std::vector<Bytes> buffers;
+    const auto declared = file.find("buffers");
+    if (declared == file.end() || !declared->is_array()) return buffers;
+    for (std::size_t i = 0; i < declared->size(); ++i) {
+        buffers.push_back(source.buffer(*declared, i));
+        (*declared)[i] = {{"byteLength", buffers.back().size()}, {"uri", fmt::format("{}", i)}};
+    }
+    return buffers;
 }
 
-// tinygltf's own words, of which one sentence may quote a whole buffer
-std::string complaint(const tinygltf::Model& model, std::string error) {
-    constexpr std::size_t longest = 120;  // [bytes]
-    error = error.substr(0, error.find_last_not_of(" \n\r") + 1);
-    if (error.size() > longest) error = error.substr(0, longest) + " ...";
-    for (const std::string& name : model.extensionsUsed)
+tinygltf::FsCallbacks filesOf(std::vector<Bytes>& buffers) {
+    const auto exists = [](const std::string&, void*) { return true; };
+    const auto expand = [](const std::string& name, void*) { return name; };
+    const auto read = [](Bytes* bytes, std::string*, const std::string& name, void* all) {
+        *bytes = std::move(static_cast<std::vector<Bytes>*>(all)->at(std::stoul(name)));
+        return true;
+    };
+    return {exists, expand, read, nullptr, &buffers};
+}
+
+std::size_t countPrimitives(const json& file) {
+    std::size_t count = 0;
+    if (const auto meshes = file.find("meshes"); meshes != file.end())
+        for (const json& mesh : *meshes)
+            if (mesh.is_object() && mesh.contains("primitives")) count += mesh["primitives"].size();
+    return count;
+}
+
+std::size_t countPrimitives(const tinygltf::Model& model) {
+    std::size_t count = 0;
+    for (const tinygltf::Mesh& mesh : model.meshes) count += mesh.primitives.size();
+    return count;
+}
+
+std::string complaint(const json& file, std::string error) {
+    error = error.substr(0, error.find_first_of("\n\r"));
+    if (error.empty()) error = "its meshes hold something that is no primitive";
+    if (error.size() > longestComplaint) error = error.substr(0, longestComplaint) + " ...";
+    for (const std::string& name : names(file, "extensionsUsed"))
         if (contains(compressions, name)) error += fmt::format(" (it uses {}, which is not read)", name);
     return "is not valid glTF 2: " + error;
 }
 
 }  // namespace
 
-tinygltf::Model loadGltf(const fs::path& path) {
-    const Bytes bytes = readBytes(path);
-    if (bytes.size() > std::numeric_limits<std::uint32_t>::max())
-        throw std::runtime_error("has 4 GiB or more; glTF files are smaller");
-    const std::string_view json = jsonOf(bytes);
-    checkNesting(json);
-    const fs::path folder = fs::absolute(path).parent_path();
-    BufferFiles files(folder, json);
+tinygltf::Model loadGltf(const std::filesystem::path& path) {
+    const GltfFile source(path);
+    json file = parse(source.json());
+    checkRequired(file);
+    std::vector<Bytes> buffers = takeBuffers(file, source);
+    const std::string text = file.dump();
     tinygltf::TinyGLTF loader;
-    loader.SetFsCallbacks(files.callbacks());
-    loader.SetImageLoader(ignoreImage, nullptr);
+    loader.SetFsCallbacks(filesOf(buffers));
     tinygltf::Model model;
     std::string error, warning;
-    const auto size = unsigned(bytes.size());
-    const bool loaded = isBinary(bytes)
-                            ? loader.LoadBinaryFromMemory(&model, &error, &warning, bytes.data(), size, folder.string())
-                            : loader.LoadASCIIFromString(&model, &error, &warning, json.data(), size, folder.string());
-    checkRequired(model);
-    // it tells of primitives that it leaves out, too
-    if (!loaded || !error.empty()) throw std::runtime_error(complaint(model, error));
+    const std::string noFolder;
+    const bool loaded =
+        loader.LoadASCIIFromString(&model, &error, &warning, text.data(), unsigned(text.size()), noFolder);
+    // it leaves out primitives that it cannot read
+    if (!loaded || countPrimitives(model) != countPrimitives(file)) throw std::runtime_error(complaint(file, error));
     if (model.asset.version.substr(0, 2) != "2.")
         throw std::runtime_error(fmt::format("is glTF {}; only glTF 2 is read", model.asset.version.substr(0, 40)));
     return model;

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <glm/gtc/quaternion.hpp>
-#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
@@ -15,11 +14,6 @@
 
 namespace bilayer {
 namespace {
-
-template <class... Values>
-void require(bool holds, fmt::format_string<Values...> text, Values&&... values) {
-    if (!holds) throw std::runtime_error(fmt::format(text, std::forward<Values>(values)...));
-}
 
 template <class Items>
 void requireIndex(int index, const Items& items, const char* what, const std::string& by) {

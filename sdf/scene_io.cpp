@@ -68,8 +68,9 @@ Polygons readScene(const std::filesystem::path& path, const ChildLimits& limits)
         ChildProcess child(limits, [&](const ChildProcess::Send& send) { readInChild(path, limits.memory, send); });
         return receivePolygons(child, limits.memory);
     } catch (const ChildFailure& failure) {
-        throw std::runtime_error(fmt::format("{}: the importer for {} files {}; convert it to OBJ, PLY or STL{}",
-                                             path.string(), format, failure.what(), isGltf(format) ? "" : " or glTF"));
+        throw std::runtime_error(fmt::format("{}: the importer for {} files {}; convert it to {}", path.string(),
+                                             format, failure.what(),
+                                             isGltf(format) ? "OBJ, PLY or STL" : "OBJ, PLY, STL or glTF"));
     } catch (const std::bad_alloc&) {
         throw;
     } catch (const std::exception& error) {

@@ -3,6 +3,7 @@
 #include <fcntl.h>
 #include <signal.h>
 #include <stdlib.h>
+#include <sys/mman.h>
 #include <sys/wait.h>
 #include <tbb/parallel_for.h>
 #include <unistd.h>
@@ -28,6 +29,13 @@ using namespace bilayer;
 using namespace std::chrono_literals;
 
 namespace {
+
+// The sanitizers have a malloc of their own, which does not put its locks into order at a fork.
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+constexpr bool usualMalloc = false;
+#else
+constexpr bool usualMalloc = true;
+#endif
 
 constexpr ChildLimits ample{60s, std::size_t(1) << 30};
 
@@ -104,25 +112,23 @@ TEST_CASE("a child process that fails is an error") {
     ChildProcess child({300ms, 0}, drips);
     std::string much(1000000, ' ');
     CHECK_THROWS_WITH(child.receive(much.data(), much.size()), "took longer than 0.3 s");
-    const auto grows = [](const ChildProcess::Send& send) {
-        std::vector<std::string> kept;
-        try {
-            for (;;) kept.emplace_back(std::size_t(1) << 20, 'x');
-        } catch (const std::bad_alloc&) {
-            const std::size_t count = kept.size();
-            kept.clear();
-            send(&count, sizeof count);
-        }
-    };
-    ChildProcess greedy({60s, std::size_t(100) << 20}, grows);
-    std::size_t megabytes = 0;
-    greedy.receive(&megabytes, sizeof megabytes);
-    CHECK(megabytes <= 100);
-    CHECK(megabytes >= 50);
     {
         const ChildProcess abandoned(ample, [](const auto&) { ::pause(); });
     }
-    CHECK(openFiles() == files + 2);  // those of `child` and `greedy`
+    CHECK(openFiles() == files + 1);  // that of `child`
+}
+
+TEST_CASE("a child process has no more memory than it is given") {
+    constexpr std::size_t megabyte = 1 << 20, limit = 100;
+    ChildProcess greedy({60s, limit * megabyte}, [](const ChildProcess::Send& send) {
+        std::size_t count = 0;
+        while (::mmap(nullptr, megabyte, PROT_READ, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0) != MAP_FAILED) ++count;
+        send(&count, sizeof count);
+    });
+    std::size_t megabytes = 0;
+    greedy.receive(&megabytes, sizeof megabytes);
+    CHECK(megabytes <= limit);
+    CHECK(megabytes >= limit / 2);
 }
 
 TEST_CASE("a child process leaves nothing behind and takes nothing with it") {
@@ -193,6 +199,7 @@ TEST_CASE("a child process answers where the caller has no standard streams") {
 }
 
 TEST_CASE("child processes start while other threads are busy") {
+    if (!usualMalloc) return;
     test::Gltf gltf = test::Gltf::cube();
     const auto path = gltf.write("busy.gltf");
     std::atomic<bool> stop = false;
@@ -221,9 +228,13 @@ TEST_CASE("polygons arrive as they were sent, or not at all") {
     CHECK(received.sizes == sent.sizes);
     CHECK(received.notes == sent.notes);
     CHECK(throughPipe({}).corners.empty());
-    for (const auto& [corners, sizes] :
-         {std::pair(std::vector<unsigned>{0, 1, 4}, std::vector<unsigned>{}), {{0, 1}, {}}, {{0, 1}, {2}}, {{0, 1, 2}, {4}},
-          {{0, 1, 2, 3}, {3}}, {{0, 1, 2}, {3, 0}}, {{0, 1, 2, 0, 1, 2}, {3, 4294967295u, 4}}}) {
+    for (const auto& [corners, sizes] : {std::pair(std::vector<unsigned>{0, 1, 4}, std::vector<unsigned>{}),
+                                         {{0, 1}, {}},
+                                         {{0, 1}, {2}},
+                                         {{0, 1, 2}, {4}},
+                                         {{0, 1, 2, 3}, {3}},
+                                         {{0, 1, 2}, {3, 0}},
+                                         {{0, 1, 2, 0, 1, 2}, {3, 4294967295u, 4}}}) {
         sent.corners = corners;
         sent.sizes = sizes;
         CHECK_THROWS_AS(throughPipe(sent), ChildFailure);

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <fstream>
 #include <functional>
+#include <iterator>
 #include <string>
 
 #include "sdf/scene_io.h"
@@ -231,7 +232,9 @@ TEST_CASE("glTF: trees of nodes may be deep, and must be trees") {
     for (int i = 0; i < depth; ++i) nodes.push_back({{"translation", {1, 0, 0}}, {"children", {i + 1}}});
     nodes.push_back({{"mesh", 0}});
     CHECK(upper(read(gltf)).x == depth + 1);
-    nodes[depth]["children"] = {7};
+    nodes = json::array();
+    for (int i = 0; i < 10; ++i) nodes.push_back({{"children", {i + 1}}});
+    nodes.push_back({{"mesh", 0}, {"children", {7}}});
     refuses(gltf, {"node 7 is reached twice"});
     nodes = json::array({{{"mesh", 0}, {"children", {0}}}});
     refuses(gltf, {"node 0 is reached twice"});
@@ -280,6 +283,7 @@ TEST_CASE("glTF: images are never loaded") {
                            {{"bufferView", 0}, {"mimeType", "image/png"}}};
     gltf.file["textures"] = {{{"source", 0}}};
     gltf.file["materials"] = {{{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 0}}}}}}};
+    gltf.file["materials"].push_back({{"normalTexture", json::object()}});
     primitive(gltf)["material"] = 0;
     CHECK(volume(read(gltf)) == 8);
 }
@@ -343,5 +347,33 @@ TEST_CASE("glTF: buffers are regular files in the folder of the scene") {
     gltf.writeApart("apart.gltf", "short.bin", "short.bin");
     gltf.bin += std::string(100, ' ');
     const auto path = gltf.writeApart("apart.gltf", "short.bin", "");
-    CHECK_THROWS_WITH(readScene(path), Catch::Contains("short.bin"));
+    CHECK_THROWS_WITH(readScene(path), Catch::Contains("buffer 0: its byteLength is 268, but it has 175 bytes"));
+    const auto data = [](const std::string& uri) {
+        Gltf cube = Gltf::cube();
+        return readScene(cube.writeApart("data.gltf", uri, ""));
+    };
+    CHECK_THROWS_WITH(data("data:application/octet-stream;base64,AAAA"), Catch::Contains("it has 3 bytes"));
+    CHECK_THROWS_WITH(data("data:application/octet-stream;base64,A*AA"), Catch::Contains("'*'"));
+    CHECK_THROWS_WITH(data("data:application/octet-stream,hello"), Catch::Contains("base64"));
+    CHECK_THROWS_WITH(data("data:"), Catch::Contains("buffer 0"));
+    std::string zeros = "data:;base64,";
+    for (int i = 0; i < 100; ++i) zeros += "AAAA";
+    CHECK(test::faceCount(data(zeros)) == 12);
+}
+
+TEST_CASE("glTF: binary files that end early, or are damaged, are refused") {
+    Gltf gltf = Gltf::cube();
+    const auto path = gltf.writeBinary("whole.glb");
+    std::ifstream stream(path, std::ios::binary);
+    const std::string whole{std::istreambuf_iterator<char>(stream), {}};
+    const auto cut = test::scratch("cut.glb");
+    for (std::size_t size = 0; size < whole.size(); size += size < 40 ? 1 : 7) {
+        std::ofstream(cut, std::ios::binary) << whole.substr(0, size);
+        CAPTURE(size);
+        CHECK_THROWS_WITH(readScene(cut), Catch::Contains("cut.glb: "));
+    }
+    std::string other = whole;
+    other[4] = 1;
+    std::ofstream(cut, std::ios::binary) << other;
+    CHECK_THROWS_WITH(readScene(cut), Catch::Contains("binary glTF 1; only glTF 2"));
 }

@@ -73,6 +73,20 @@ TEST_CASE("meshes that cannot be read") {
     CHECK_FALSE(std::filesystem::exists(output()));
 }
 
+TEST_CASE("scenes that cannot be read") {
+    using namespace std::string_literals;
+    requireFault(buildOf(textFile("noise.3mf", "PK\3\4 and no archive")), "noise.3mf: ");
+    requireFault(buildOf(textFile("noise.glb", "glTF\2\0\0\0"s)), "noise.glb: ");
+    requireFault({"inspect", textFile("new.gltf", R"({"asset":{"version":"2.0"},"extensionsRequired":["NEW_shape"]})")},
+                 "new.gltf: requires the glTF extension NEW_shape");
+    // an importer that crashes in Assimp 5.2
+    requireFault({"inspect", textFile("nameless.dae",
+                                      "<COLLADA version=\"1.4.1\"><library_images><image id=\"i\">"
+                                      "<init_from/></image></library_images></COLLADA>")},
+                 "nameless.dae: ");
+    CHECK_FALSE(std::filesystem::exists(output()));
+}
+
 TEST_CASE("fields that cannot be read") {
     const std::string field = scratch("whole.vdb").string();
     REQUIRE(run({"build", sphereFile().string(), "-o", field, "--voxel-size", "0.1"}).status == 0);
