@@ -15,6 +15,7 @@
 #include <random>
 #include <stdexcept>
 
+#include "collider/collider.h"
 #include "demos/shared/shapes.h"
 #include "sdf/build.h"
 #include "sdf/grids.h"
@@ -345,6 +346,13 @@ TEST_CASE("the field of a union has the volume of the union") {
         }
         check(boxes, 0.02f);
     }
+}
+
+TEST_CASE("a body whose every face is there twice, back to back, weighs what one half of them holds") {
+    const Mesh box = shapes::box({0.5f, 0.4f, 0.3f}, 2);
+    const Mesh mesh = shapes::join({box, shapes::flipped(box)});
+    const LevelSet field = build(mesh, {.voxelSize = 0.03f});
+    CHECK(Collider(mesh, field).mass().volume == Approx(0.48).epsilon(1e-3));
 }
 
 TEST_CASE("a field without an inside has no mass") {
