@@ -23,6 +23,7 @@
 #include "sdf/fill_holes.h"
 #include "sdf/sign.h"
 #include "sdf/surface.h"
+#include "sdf/topology.h"
 
 namespace bilayer {
 namespace {
@@ -351,10 +352,23 @@ std::uint64_t nextId() {
     return ++made;
 }
 
-// Of the mesh, where that is closed; else of what the field has inside.
+Mesh withoutCopies(Mesh mesh) {
+    const Topology topology(mesh);
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < mesh.triangles.size(); ++i)
+        if (topology.original[i] == i) mesh.triangles[kept++] = mesh.triangles[i];
+    mesh.triangles.resize(kept);
+    return mesh;
+}
+
+// Of the mesh, where that is closed; else of what the field has inside. A solid whose every face was there back to back
+// has its volume twice in a mesh that faces outward.
 std::optional<MassProperties> massOf(const Mesh& mesh, const LevelSet& levelSet) {
     try {
-        return balanced(mesh) ? massProperties(mesh) : massProperties(levelSet);
+        if (!balanced(mesh)) return massProperties(levelSet);
+        if (levelSet.sign() == "normals" && levelSet.signReason() != closedAndOriented)
+            if (const Mesh once = withoutCopies(mesh); balanced(once)) return massProperties(once);
+        return massProperties(mesh);
     } catch (const std::invalid_argument&) {
         return std::nullopt;  // a sheet: it can only be static
     }

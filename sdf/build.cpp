@@ -30,6 +30,7 @@
 #include "sdf/progress.h"
 #include "sdf/pseudonormal.h"
 #include "sdf/sign.h"
+#include "sdf/sign_repair.h"
 #include "sdf/triangle_bins.h"
 #include "sdf/unite.h"
 #include "sdf/winding.h"
@@ -415,7 +416,7 @@ class Build {
                 return !touched.any({block.x(), block.y(), block.z()}, blockSide);
             });
         });
-        return signs_.conflicts == 0;
+        return signs_.conflicts == 0 && signs_.name == name(Sign::normals);
     }
 
     void fillOwnSigns() {
@@ -457,13 +458,18 @@ class Build {
             const Mesh& mesh = mended ? *mended : mesh_;
             const bool borrows = choice.sign == Sign::normals && options_.method == Method::pseudonormal;
             const Sign sign = fill(mesh, choice.sign, choice.reason, borrows ? Method::exact : options_.method);
-            if (sign != Sign::normals || signs_.conflicts == 0) {
+            if (sign != Sign::normals || !contradictory(mesh)) {
                 if (borrows && sign == Sign::normals) fillWithSides(distance_, mesh, choice.reason);
                 return;
             }
             choice = chooseSignAfterConflict(mesh, &progress_);
             if (!choice.mended && mended) choice.mended = *mended;
         }
+    }
+
+    // Whether normals do not tell the sides: they contradict each other, or cancel out on faces back to back.
+    bool contradictory(const Mesh& mesh) {
+        return signs_.conflicts > 0 || (signs_.undecided > 0 && hasFacesBackToBack(mesh, &progress_));
     }
 
     // Fills by the method asked for, with the sides of another field of the mesh.
@@ -545,7 +551,21 @@ class Build {
         if (sign == Sign::flood) signByFlood(*distance_, mesh, options_.gap, widths, &progress_);
         if (byNormals) conflicts += assembler.conflicts(*distance_);
         signs_ = {name(sign), reason, conflicts, undecided};
+        if (byNormals && options_.sign == Sign::automatic && conflicts == 0) repair(mesh);
         times_.assemble += part.lap();
+    }
+
+    // Normals of a balanced mesh that intersects itself may be wrong without a conflict: where the voxels between two
+    // walls are all near both. Those nearer than a voxel are repaired. Farther ones may go on beyond the band.
+    void repair(const Mesh& mesh) {
+        const float limit = plain(Sign::normals) == Assembler::Plain::drop ? options_.voxelSize : 0;
+        const SignRepair repair = repairSigns(*distance_, mesh, limit, &progress_);
+        signs_.conflicts += repair.refused;
+        if (repair.repaired == 0) return;
+        signs_.name = name(Sign::winding);
+        signs_.reason =
+            fmt::format("{}, but the surface intersects itself; {} voxels have the side of their winding number",
+                        signs_.reason, repair.repaired);
     }
 
     // Safe from any thread.

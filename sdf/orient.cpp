@@ -35,6 +35,7 @@ struct Piece {
     bool oneSided = false;
     bool mixed = false;   // some, not all, of its triangles were turned to agree
     bool turned = false;  // turned as a whole
+    bool sheet = false;   // of faces back to back that close nothing; left alone
 
     bool closed() const { return edgeSum == 0; }
     // Where volumes are measured from.
@@ -43,7 +44,7 @@ struct Piece {
     }
     double roundness() const { return 6 * std::sqrt(glm::pi<double>()) * std::abs(volume) / std::pow(area, 1.5); }
     bool bounding() const {
-        return !oneSided && area > 0 && roundness() > (closed() ? leastRoundnessClosed : leastRoundnessOpen);
+        return !oneSided && !sheet && area > 0 && roundness() > (closed() ? leastRoundnessClosed : leastRoundnessOpen);
     }
 };
 
@@ -54,6 +55,7 @@ class Orienter {
 
     Orientation run() {
         findSound();
+        findDoubled();
         joinNeighbours();
         joinPatches();
         gatherPieces();
@@ -86,6 +88,35 @@ class Orienter {
         }
     }
 
+    // A sound body may have each of its faces twice, back to back. It bounds nothing, but may do so with half of them.
+    void findDoubled() {
+        excess_.assign(mesh_.triangles.size(), 0);
+        auto copies = vectorOf<unsigned>(mesh_.triangles.size(), progress_);
+        for (const unsigned i : eachTriangle()) {
+            excess_[topology_.original[i]] += opposite(i) ? -1 : 1;
+            ++copies[topology_.original[i]];
+        }
+        std::vector<bool> doubled = sound_;
+        for (const unsigned i : eachTriangle())
+            if (topology_.original[i] == i && topology_.proper(i) && (excess_[i] != 0 || copies[i] != 2))
+                doubled[body_[i]] = false;
+        doubled_.resize(mesh_.triangles.size());
+        for (const unsigned i : eachTriangle()) {
+            doubled_[i] = doubled[body_[i]];
+            if (doubled_[i]) sound_[i] = false;
+        }
+    }
+
+    // Copies that face the same way are one wall; as many that face the other way leave none.
+    bool encloses(unsigned triangle) const {
+        return topology_.original[triangle] == triangle && (!sound_[triangle] || excess_[triangle] != 0);
+    }
+
+    bool opposite(unsigned triangle) const {
+        const unsigned original = topology_.original[triangle];
+        return original != triangle && topology_.facesOpposite(triangle, original);
+    }
+
     std::vector<EdgeUse> countingUses(std::span<const EdgeUse> uses) const {
         std::vector<EdgeUse> some;
         for (const EdgeUse& use : uses)
@@ -102,7 +133,7 @@ class Orienter {
             if (!sets_.join(uses[0].triangle, uses[1].triangle, !agree)) contradictions_.push_back(uses[0].triangle);
         });
         for (const unsigned i : eachTriangle())
-            if (!counts(i)) sets_.join(topology_.original[i], i);
+            if (!counts(i)) sets_.join(topology_.original[i], i, doubled_[i] && opposite(i));
     }
 
     // Patches that meet at an edge of more than two triangles go together where they run it the same number of times.
@@ -181,6 +212,10 @@ class Orienter {
             pieces_[pieceOf_[i]].triangles.push_back(i);
         }
         for (const unsigned triangle : contradictions_) pieces_[pieceOf_[triangle]].oneSided = true;
+        for (const unsigned i : eachTriangle()) {
+            Piece& piece = pieces_[pieceOf_[i]];
+            piece.sheet = doubled_[i] && (piece.oneSided || !piece.closed());
+        }
     }
 
     glm::dvec3 point(unsigned triangle, int k) const { return mesh_.points[mesh_.triangles[triangle][k]]; }
@@ -199,7 +234,7 @@ class Orienter {
             for (int k = 0; k < 3; ++k) piece.bounds.add(mesh_.points[mesh_.triangles[i][k]]);
         }
         for (Piece& piece : pieces_) {
-            if (piece.oneSided) {
+            if (piece.oneSided || piece.sheet) {
                 for (const unsigned i : piece.triangles) turned_[i] = false;
                 piece.mixed = false;
             } else if (piece.turnedArea > 0.5 * piece.area)
@@ -250,7 +285,7 @@ class Orienter {
         });
         for (const unsigned p : bounding)
             for (const unsigned i : pieces_[p].triangles)
-                if (counts(i)) partOf[i] = p;
+                if (encloses(i)) partOf[i] = p;
         if (bounding.empty()) return;
         const TriangleTree tree(mesh_, progress_);
         const auto enclosing = enclosingParts(mesh_, tree, partOf, pieces_.size(), progress_);
@@ -291,7 +326,7 @@ class Orienter {
         for (const Piece& piece : pieces_) {
             orientation.mixedComponents += piece.mixed;
             orientation.turnedComponents += piece.turned && !piece.mixed;
-            if (piece.oneSided) orientation.oneSidedTriangles += piece.triangles.size();
+            if (piece.oneSided && !piece.sheet) orientation.oneSidedTriangles += piece.triangles.size();
         }
         return orientation;
     }
@@ -302,6 +337,8 @@ class Orienter {
     Sets sets_;                             // triangles; opposites: exactly one of the two must be turned
     std::vector<unsigned> body_;            // of each triangle: the first one that it hangs together with by edges
     std::vector<bool> sound_;               // of each triangle: its body runs all edges both ways equally often
+    std::vector<int> excess_;               // of each original: how many more of its copies face as it does
+    std::vector<bool> doubled_;             // of each triangle: its body has each face twice, back to back
     std::vector<unsigned> contradictions_;  // triangles at edges where a surface comes back with its other side
     std::vector<Piece> pieces_;
     std::vector<unsigned> pieceOf_;  // of each triangle

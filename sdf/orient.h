@@ -28,7 +28,8 @@ struct Orientation {
 /// zero). Within others it may have either: negative is a cavity, positive is a solid in a solid, whose union winding
 /// numbers understand. Only if one of the pieces around it was turned or mixed, so that the file is not to be trusted,
 /// it becomes a cavity. Pieces that bound next to no volume keep the orientation of most of their area. A repeated
-/// triangle goes with the one that it repeats. A mesh that is fine keeps its bytes.
+/// triangle goes with the one that it repeats; where all faces of a closed surface are there twice, back to back, both
+/// are made to face outward. A mesh that is fine keeps its bytes.
 /// @param progress  polled, unless null
 /// Throws as validate() does.
 Orientation orient(const Mesh& mesh, Progress* progress = nullptr);

@@ -96,6 +96,13 @@ bool balanced(const Mesh& mesh, Progress* progress) {
     return sum == 0;
 }
 
+bool hasFacesBackToBack(const Mesh& mesh, Progress* progress) {
+    const Topology topology(mesh, progress);
+    for (const unsigned i : Polled(mesh.triangles.size(), progress))
+        if (topology.proper(i) && topology.facesOpposite(i, topology.original[i])) return true;
+    return false;
+}
+
 SignChoice chooseSign(const Mesh& mesh, Progress* progress) {
     validate(mesh);
     if (balanced(mesh, progress)) return {Sign::normals, closedAndOriented, {}};
@@ -109,7 +116,9 @@ SignChoice chooseSignOfSolid(const Mesh& mesh, Progress* progress) {
 }
 
 SignChoice chooseSignAfterConflict(const Mesh& mesh, Progress* progress) {
-    return chooseFor(orient(mesh, progress), "closed and oriented, but the surface intersects itself", progress);
+    const char* trouble =
+        hasFacesBackToBack(mesh, progress) ? "faces lie back to back" : "the surface intersects itself";
+    return chooseFor(orient(mesh, progress), fmt::format("closed and oriented, but {}", trouble), progress);
 }
 
 Mesh outwardMesh(const LevelSet& levelSet, Mesh mesh) {

@@ -18,6 +18,9 @@ struct United;
 /// @param progress  polled, unless null, here and below
 bool balanced(const Mesh& mesh, Progress* progress = nullptr);
 
+/// Whether some triangle is there twice, the two facing opposite ways. O(n log n). The mesh must be valid.
+bool hasFacesBackToBack(const Mesh& mesh, Progress* progress = nullptr);
+
 /// How signs are to be found.
 struct SignChoice {
     Sign sign = Sign::normals;   ///< never `automatic`
@@ -42,8 +45,9 @@ SignChoice chooseSign(const Mesh& mesh, Progress* progress = nullptr);
 /// such as double sheets. Never depends on where voxels lie. Throws as validate() does.
 SignChoice chooseSignOfSolid(const Mesh& mesh, Progress* progress = nullptr);
 
-/// What to do where the normals of a balanced mesh contradict each other: it is inside out (then it is mended), or
-/// intersects itself. Returns `normals` only together with a mended mesh. Throws as validate() does.
+/// What to do where the normals of a balanced mesh contradict each other: it is inside out or has every face twice,
+/// back to back (then it is mended), or intersects itself. Returns `normals` only together with a mended mesh. Throws
+/// as validate() does.
 SignChoice chooseSignAfterConflict(const Mesh& mesh, Progress* progress = nullptr);
 
 /// The mesh of a level set as build() understood it: all of it facing outward, without the walls inside of a union that

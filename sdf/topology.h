@@ -41,6 +41,13 @@ struct Topology {
     /// Whether a triangle uses no vertex twice.
     bool proper(std::size_t triangle) const;
 
+    /// Whether one of two triangles with the same three vertices runs them the other way.
+    bool facesOpposite(std::size_t triangle, std::size_t other) const {
+        const glm::uvec3 &s = triangles[triangle], &t = triangles[other];
+        const int at = t.x == s.x ? 0 : t.y == s.x ? 1 : 2;
+        return t[(at + 1) % 3] != s.y;
+    }
+
     /// Calls visit(std::span<const EdgeUse>) with all uses of each edge that begins in a range of `edges`.
     template <class Visit>
     void forEdges(std::size_t begin, std::size_t end, Visit visit) const {

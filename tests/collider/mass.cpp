@@ -3,14 +3,19 @@
 #include <oneapi/tbb/global_control.h>
 #include <openvdb/tools/Composite.h>
 
+#include <algorithm>
+#include <array>
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <cstring>
 #include <glm/geometric.hpp>
 #include <glm/gtc/constants.hpp>
 #include <glm/gtc/matrix_transform.hpp>
+#include <glm/vector_relational.hpp>
+#include <random>
 #include <stdexcept>
 
+#include "collider/collider.h"
 #include "demos/shared/shapes.h"
 #include "sdf/build.h"
 #include "sdf/grids.h"
@@ -95,6 +100,29 @@ LevelSet withGrid(const LevelSet& field, auto change) {
 glm::mat4 randomMotion(Random& random) {
     const glm::quat turn = glm::angleAxis(float(random(0, 6.28)), random.direction());
     return glm::translate(glm::mat4(1), random.point(3)) * glm::mat4_cast(turn);
+}
+
+// Of boxes, by all the cells that their faces cut space into.
+double volumeOfUnion(const std::vector<Bounds>& boxes) {
+    std::array<std::vector<float>, 3> cuts;
+    for (const Bounds& box : boxes)
+        for (int axis = 0; axis < 3; ++axis)
+            for (const float cut : {box.lower[axis], box.upper[axis]}) cuts[std::size_t(axis)].push_back(cut);
+    for (auto& some : cuts) std::sort(some.begin(), some.end());
+    double sum = 0;
+    for (std::size_t i = 1; i < cuts[0].size(); ++i)
+        for (std::size_t j = 1; j < cuts[1].size(); ++j)
+            for (std::size_t k = 1; k < cuts[2].size(); ++k) {
+                const glm::dvec3 lower(cuts[0][i - 1], cuts[1][j - 1], cuts[2][k - 1]);
+                const glm::dvec3 size = glm::dvec3(cuts[0][i], cuts[1][j], cuts[2][k]) - lower;
+                const glm::dvec3 middle = lower + 0.5 * size;
+                const bool filled = std::any_of(boxes.begin(), boxes.end(), [&](const Bounds& box) {
+                    return glm::all(glm::greaterThan(middle, glm::dvec3(box.lower))) &&
+                           glm::all(glm::lessThan(middle, glm::dvec3(box.upper)));
+                });
+                if (filled) sum += size.x * size.y * size.z;
+            }
+    return sum;
 }
 
 }  // namespace
@@ -293,6 +321,38 @@ TEST_CASE("bands of any width give a mass") {
         requireMass(massProperties(levelSetOf(sphereSolid(0.7), 1.4 / 64, width, width)), formula,
                     width < 2 ? 0.02 : 1e-3, 0.7);
     }
+}
+
+TEST_CASE("the field of a union has the volume of the union") {
+    const unsigned randomSeed = seed();
+    CAPTURE(randomSeed);
+    std::mt19937 random(randomSeed);
+    const auto check = [](const std::vector<Bounds>& boxes, float voxelSize) {
+        std::vector<Mesh> parts;
+        for (const Bounds& box : boxes) parts.push_back(shapes::moved(shapes::box(0.5f * box.size()), box.centre()));
+        const LevelSet field = build(shapes::join(parts), {.voxelSize = voxelSize, .unite = true});
+        CAPTURE(voxelSize, field.signReason());
+        CHECK(massProperties(field).volume == Approx(volumeOfUnion(boxes)).epsilon(1e-3));
+    };
+    for (const float voxelSize : {0.039f, 0.0195f, 0.0125f})
+        check({{glm::vec3(-0.5f), glm::vec3(0.5f)}, {glm::vec3(-0.25f), glm::vec3(0.75f)}}, voxelSize);
+    std::uniform_real_distribution<float> place(-0.5f, 0.5f), size(0.4f, 1);
+    for (int i = 0; i < 20; ++i) {
+        CAPTURE(i);
+        std::vector<Bounds> boxes;
+        for (int k = 2 + i % 3; k > 0; --k) {
+            const glm::vec3 lower(place(random), place(random), place(random));
+            boxes.push_back({lower, lower + glm::vec3(size(random), size(random), size(random))});
+        }
+        check(boxes, 0.02f);
+    }
+}
+
+TEST_CASE("a body whose every face is there twice, back to back, weighs what one half of them holds") {
+    const Mesh box = shapes::box({0.5f, 0.4f, 0.3f}, 2);
+    const Mesh mesh = shapes::join({box, shapes::flipped(box)});
+    const LevelSet field = build(mesh, {.voxelSize = 0.03f});
+    CHECK(Collider(mesh, field).mass().volume == Approx(0.48).epsilon(1e-3));
 }
 
 TEST_CASE("a field without an inside has no mass") {
