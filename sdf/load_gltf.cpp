@@ -56,13 +56,13 @@ void checkNesting(std::string_view text) {
 
 json parse(std::string_view text) {
     checkNesting(text);
-    const auto wanted = [](int depth, json::parse_event_t event, json& parsed) {
-        return depth != 1 || event != json::parse_event_t::key ||
-               contains(members, parsed.get_ref<const std::string&>());
-    };
     try {
-        json file = json::parse(text.begin(), text.end(), wanted);
-        if (file.is_object()) return file;
+        json file = json::parse(text.begin(), text.end());
+        if (file.is_object()) {
+            for (auto member = file.begin(); member != file.end();)
+                member = contains(members, member.key()) ? std::next(member) : file.erase(member);
+            return file;
+        }
     } catch (const json::exception& error) {
         throw std::runtime_error(
             fmt::format("its JSON is damaged: {}", std::string(error.what()).substr(0, longestComplaint)));
