@@ -212,10 +212,16 @@ class Orienter {
             pieces_[pieceOf_[i]].triangles.push_back(i);
         }
         for (const unsigned triangle : contradictions_) pieces_[pieceOf_[triangle]].oneSided = true;
-        for (const unsigned i : eachTriangle()) {
-            Piece& piece = pieces_[pieceOf_[i]];
-            piece.sheet = doubled_[i] && (piece.oneSided || !piece.closed());
-        }
+        findSheets();
+    }
+
+    // Of a doubled body all pieces must close for it to be a solid.
+    void findSheets() {
+        std::vector<bool> open(mesh_.triangles.size());
+        const auto pieceOf = [&](unsigned i) -> Piece& { return pieces_[pieceOf_[i]]; };
+        for (const unsigned i : eachTriangle())
+            if (pieceOf(i).oneSided || !pieceOf(i).closed()) open[body_[i]] = true;
+        for (const unsigned i : eachTriangle()) pieceOf(i).sheet = doubled_[i] && open[body_[i]];
     }
 
     glm::dvec3 point(unsigned triangle, int k) const { return mesh_.points[mesh_.triangles[triangle][k]]; }

@@ -202,15 +202,16 @@ TEST_CASE("after a conflict, surfaces that meet themselves get winding numbers, 
     struct Case {
         const char* name;
         Sign sign;
+        bool mended = false;  // five closed parts of the plane have every face twice, back to back
     };
     for (const Case& c : {Case{"cgal-bones.off", Sign::winding}, Case{"self_intersectA.obj", Sign::winding},
                           Case{"counter.unitsmm.STL", Sign::winding}, Case{"cow.obj", Sign::winding},
-                          Case{"mesh2sdf_plane.obj", Sign::flood}, Case{"degenerated.obj", Sign::flood}}) {
+                          Case{"mesh2sdf_plane.obj", Sign::flood, true}, Case{"degenerated.obj", Sign::flood}}) {
         const auto mesh = corpus(c.name);
         if (!mesh) return;
         const SignChoice choice = chooseSignAfterConflict(*mesh);
         CAPTURE(c.name, choice.reason);
         CHECK(choice.sign == c.sign);
-        CHECK_FALSE(choice.mended);
+        CHECK(choice.mended.has_value() == c.mended);
     }
 }
