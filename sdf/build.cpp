@@ -24,6 +24,7 @@
 #include "sdf/exact.h"
 #include "sdf/flood.h"
 #include "sdf/grids.h"
+#include "sdf/inspect.h"
 #include "sdf/moved.h"
 #include "sdf/orient.h"
 #include "sdf/physical_memory.h"
@@ -451,6 +452,8 @@ class Build {
     void fillChosen() {
         Stopwatch part;
         SignChoice choice = chooseSign(mesh_, &progress_);
+        if (choice.sign == Sign::normals && !choice.mended && isKnownToIntersectItself())
+            choice = chooseSignAfterConflict(mesh_, &progress_);
         times_.tiles += part.lap();
         for (;;) {
             // kept over the next choice, which may be made from it
@@ -466,6 +469,8 @@ class Build {
             if (!choice.mended && mended) choice.mended = *mended;
         }
     }
+
+    bool isKnownToIntersectItself() const { return options_.inspected && options_.inspected->selfIntersections > 0; }
 
     // Whether normals do not tell the sides: they contradict each other, or cancel out on faces back to back.
     bool contradictory(const Mesh& mesh) {
@@ -551,7 +556,8 @@ class Build {
         if (sign == Sign::flood) signByFlood(*distance_, mesh, options_.gap, widths, &progress_);
         if (byNormals) conflicts += assembler.conflicts(*distance_);
         signs_ = {name(sign), reason, conflicts, undecided};
-        if (byNormals && options_.sign == Sign::automatic && conflicts == 0) repair(mesh);
+        const bool isKnownToBeClean = options_.inspected && options_.inspected->selfIntersections == 0;
+        if (byNormals && options_.sign == Sign::automatic && conflicts == 0 && !isKnownToBeClean) repair(mesh);
         times_.assemble += part.lap();
     }
 

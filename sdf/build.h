@@ -17,6 +17,8 @@
 
 namespace bilayer {
 
+struct MeshReport;
+
 /// How a triangle is divided into the parts whose barycentres are sampled.
 enum class Subdivision {
     rows,       ///< Algorithm 1 of the paper: n rows, n (n + 1) / 2 samples
@@ -73,6 +75,9 @@ struct BuildOptions {
     /// surface (unite.h), and winding numbers tell the signs. Triangles are numbered as outwardMesh() (sign.h) has them
     /// then. For Method::exact and pseudonormal; a mesh that needs Sign::flood keeps all walls.
     bool unite = false;
+    /// What inspect() said of this very mesh, where that is known. Sign::automatic then takes winding numbers at once for
+    /// a closed mesh that intersects itself, and need not compare signs where it does not. Null: not known.
+    const MeshReport* inspected = nullptr;
     DoubleLayerOptions doubleLayer{};
     bool triangles = false;  ///< also keep the nearest triangle of each active voxel
     int threads = 0;         ///< most threads to use; 0: all

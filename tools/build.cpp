@@ -214,6 +214,13 @@ void run(Arguments a) {
     }
     if (!a.exteriorGiven->count()) a.options.exteriorWidth = a.options.interiorWidth = a.halfWidth;
 
+    const Stopwatch inspecting;
+    if (a.report)
+        outcome.report = inspect(mesh, a.options.voxelSize);
+    else
+        outcome.glance = glance(mesh);
+    outcome.inspect = inspecting.seconds();
+    a.options.inspected = outcome.report ? &*outcome.report : nullptr;
     LevelSet field = timedBuild(mesh, a, outcome);
     if (a.fill) {
         const Stopwatch filling;
@@ -221,12 +228,6 @@ void run(Arguments a) {
         outcome.fill = filling.seconds();
     }
     if (a.body) field = timedBody(mesh, field, a, outcome);
-    const Stopwatch inspecting;
-    if (a.report)
-        outcome.report = inspect(mesh, a.options.voxelSize);
-    else
-        outcome.glance = glance(mesh);
-    outcome.inspect = inspecting.seconds();
     const Stopwatch writing;
     writeVdb(a.output, field, a.stored);
     outcome.write = writing.seconds();

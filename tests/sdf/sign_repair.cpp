@@ -8,6 +8,7 @@
 #include "demos/shared/shapes.h"
 #include "sdf/build.h"
 #include "sdf/grids.h"
+#include "sdf/inspect.h"
 #include "sdf/orient.h"
 #include "sdf/sign.h"
 #include "tests/support/support.h"
@@ -255,4 +256,29 @@ TEST_CASE("double sheets stay as they are and hold nothing") {
     CHECK_FALSE(hasFacesBackToBack(shapes::box({1, 1, 1})));
     const Mesh box = shapes::box({1, 1, 1});
     CHECK_FALSE(hasFacesBackToBack(shapes::join({box, box})));
+}
+
+TEST_CASE("a report that has been made tells whether normals will do") {
+    const unsigned start = test::seed();
+    CAPTURE(start);
+    Random random(start);
+    for (int i = 0; i < 20; ++i) {
+        const Mesh mesh = overlapping(random);
+        const MeshReport report = inspect(mesh);
+        CAPTURE(i, report.selfIntersections);
+        BuildOptions options{.voxelSize = 0.05f};
+        const LevelSet unasked = build(mesh, options);
+        options.inspected = &report;
+        const LevelSet asked = build(mesh, options);
+        CHECK(wrongSigns(asked, test::Truth(mesh)) == 0);
+        CHECK(asked.sign() == (report.selfIntersections > 0 ? "winding" : unasked.sign()));
+    }
+    const Mesh clean = shapes::sphere(0.5f, 4);
+    const MeshReport report = inspect(clean);
+    const LevelSet field = build(clean, {.voxelSize = 0.05f, .inspected = &report});
+    CHECK(field.sign() == "normals");
+    const LevelSet unasked = build(clean, {.voxelSize = 0.05f});
+    CHECK(field.activeVoxels() == unasked.activeVoxels());
+    for (auto voxel = field.grids().distance->cbeginValueOn(); voxel; ++voxel)
+        REQUIRE(*voxel == unasked.grids().distance->tree().getValue(voxel.getCoord()));
 }
