@@ -462,7 +462,11 @@ class Build {
             const bool borrows = choice.sign == Sign::normals && options_.method == Method::pseudonormal;
             const Sign sign = fill(mesh, choice.sign, choice.reason, borrows ? Method::exact : options_.method);
             if (sign != Sign::normals || !contradictory(mesh)) {
-                if (borrows && sign == Sign::normals) fillWithSides(distance_, mesh, choice.reason);
+                if (borrows && sign == Sign::normals) {
+                    const Signs found = signs_;
+                    fillWithSides(distance_, mesh, choice.reason);
+                    signs_ = found;
+                }
                 return;
             }
             choice = chooseSignAfterConflict(mesh, &progress_);

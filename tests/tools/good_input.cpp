@@ -351,7 +351,7 @@ TEST_CASE("build --body keeps what bodies need, and info tells of it") {
     const auto plain = build(output, {"--voxel-size", "0.05"});
     CHECK_FALSE(plain.contains("body"));
     CHECK_FALSE(run({"info", output, "--json"}).json().contains("body"));
-    const auto json = build(output, {"--voxel-size", "0.05", "--body", "--margin", "0.02"});
+    const auto json = build(output, {"--voxel-size", "0.05", "--body", "--margin", "0.02", "--report"});
     const Collider body(readVdb(output));
     CHECK(body.margin() == 0.02f);
     CHECK(body.mass().volume == Approx(json["mesh"]["volume"].get<double>()));
