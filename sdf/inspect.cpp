@@ -16,7 +16,6 @@
 #include "sdf/orient.h"
 #include "sdf/piercing.h"
 #include "sdf/polled_loop.h"
-#include "sdf/sign.h"
 #include "sdf/topology.h"
 #include "sdf/triangle_tree.h"
 #include "sdf/walls.h"
@@ -220,18 +219,6 @@ void findThinWalls(const TriangleTree& tree, const Measures& measures, float wal
 }
 
 }  // namespace
-
-MeshGlance glance(const Mesh& mesh) {
-    validate(mesh);
-    if (balanced(mesh)) return {true, true};
-    MeshGlance seen{true, true};
-    Topology(mesh).forEachEdge([&](std::span<const EdgeUse> uses) {
-        const int net = netRuns(uses);
-        seen.closed &= uses.size() > 1 && (uses.size() == 2 || net == 0);
-        seen.oriented &= uses.size() == 1 || net == 0;
-    });
-    return seen;
-}
 
 MeshReport inspect(const Mesh& input, float wall) {
     validate(input);

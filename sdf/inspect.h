@@ -44,16 +44,6 @@ struct MeshReport {
 /// Throws as validate() does.
 MeshReport inspect(const Mesh& mesh, float wall = 0);
 
-/// What a mesh is at a glance.
-struct MeshGlance {
-    bool closed =
-        false;  ///< no edge has one triangle, and where it has three or more, they run it both ways equally often
-    bool oriented = false;  ///< no edge is run twice in one direction
-};
-
-/// Looks at the edges of a mesh alone: a hundredth of the time of inspect() where both hold. Throws as validate() does.
-MeshGlance glance(const Mesh& mesh);
-
 /// The report in one sentence without a full stop: "closed and oriented", or what is wrong, the worst first.
 std::string verdict(const MeshReport& report);
 

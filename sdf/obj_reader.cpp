@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstring>
 #include <limits>
 #include <optional>
@@ -24,9 +23,13 @@ constexpr std::size_t partBytes = 1 << 20;  // of the text that one task reads
 
 /// What of a file is left out, by its reason.
 enum Left { pointsAndLines, freeForm, unknown, leftKinds };
-constexpr std::array<const char*, leftKinds> reasons{"elements are points or lines",
-                                                     "statements describe free-form curves or surfaces",
-                                                     "lines begin with a word that is not known"};
+struct Reason {
+    const char *one, *many;
+};
+constexpr std::array<Reason, leftKinds> reasons{
+    {{"element that is points or lines", "elements that are points or lines"},
+     {"statement of a free-form curve or surface", "statements of free-form curves or surfaces"},
+     {"line that begins with a word that is not known", "lines that begin with a word that is not known"}}};
 
 struct Skipped {
     std::size_t count = 0;
@@ -113,8 +116,7 @@ class PartReader {
             skipBlanks();
             const char* begin = at_.at;
             if (!at_.number(point[axis]) || !atWordEnd()) source_.failExpected(begin, "a coordinate");
-            if (!std::isfinite(point[axis]))
-                source_.fail(begin, fmt::format("the coordinate {} is not finite", source_.quoted(begin)));
+            source_.checkCoordinate(begin, point[axis]);
         }
         part_.points.push_back(point);
         skipRest();
@@ -193,7 +195,8 @@ std::vector<std::string> notes(const TextSource& source, const std::vector<Part>
             all.count += skipped.count;
         }
         if (all.count > 0)
-            notes.push_back(fmt::format("left out: {} {}; the first is {} on line {}", all.count, reasons[reason],
+            notes.push_back(fmt::format("left out: {}; the first is {} on line {}",
+                                        counted(all.count, reasons[reason].one, reasons[reason].many),
                                         source.quoted(all.first), source.lineOf(all.first)));
     }
     return notes;

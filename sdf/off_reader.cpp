@@ -1,6 +1,5 @@
 #include <fmt/format.h>
 
-#include <cmath>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -33,8 +32,7 @@ class OffWords {
         double value = 0;
         const char* begin = next();
         if (!at_.number(value) || !isAtWordEnd()) source_.failExpected(begin, "a coordinate");
-        if (!std::isfinite(value))
-            source_.fail(begin, fmt::format("the coordinate {} is not finite", source_.quoted(begin)));
+        source_.checkCoordinate(begin, value);
         return value;
     }
 
@@ -130,9 +128,13 @@ Polygons read(const TextSource& source, const Header& header, Layout vertices, L
                  }
                  return read;
              }));
+    const char* rest = OffWords(source, at).next();
+    if (rest == source.end()) return polygons;
     // vertices with colours, read as words, leave something over
-    if (vertices == Layout::words && OffWords(source, at).next() != source.end())
-        source.failExpected(at.at, "the end of the file");
+    if (vertices == Layout::words) source.failExpected(rest, "the end of the file");
+    polygons.notes.push_back(
+        fmt::format("left out: what follows the last of the {} that the file announces, from line {} on",
+                    counted(header.faces, "face", "faces"), source.lineOf(rest)));
     return polygons;
 }
 

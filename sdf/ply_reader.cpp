@@ -233,6 +233,8 @@ class BinaryValues {
         at_ += count * sizeOf(type);
     }
 
+    void endRecord() const {}
+
     [[noreturn]] void fail(const std::string& why) const { refuse(path_, why); }
 
     const char* at() const { return at_; }
@@ -275,6 +277,12 @@ class TextValues {
         }
     }
 
+    /// An element has its lines for itself.
+    void endRecord() {
+        at_.skipBlanks();
+        if (!at_.atEnd() && !isLineEnd(*at_.at)) source_.failExpected(at_.at, "the end of the line");
+    }
+
     [[noreturn]] void fail(const std::string& why) const { source_.fail(at_.at, why); }
 
   private:
@@ -296,7 +304,8 @@ class ElementReader {
 
     std::uint64_t readCount(Values& values, const Property& list, std::size_t index) const {
         const long long count = values.integer(*list.countType);
-        if (count < 0) values.fail(fmt::format("{}: its list '{}' has {} items", name(index), list.name, count));
+        if (count < 0)
+            values.fail(fmt::format("{}: its list {} has {} items", name(index), quotedWord(list.name), count));
         return std::uint64_t(count);
     }
 
@@ -306,6 +315,7 @@ class ElementReader {
 
     void skip(Values& values, std::size_t index) const {
         for (const Property& property : element_.properties) skip(values, property, index);
+        values.endRecord();
     }
 
     /// @param axes  the properties that are coordinates
@@ -316,8 +326,9 @@ class ElementReader {
             if (axis == axes.end())
                 skip(values, element_.properties[i], index);
             else
-                point[int(axis - axes.begin())] = values.real(element_.properties[i].type);
+                point[int(axis - axes.begin())] = readCoordinate(values, element_.properties[i], index);
         }
+        values.endRecord();
         return point;
     }
 
@@ -334,6 +345,7 @@ class ElementReader {
             for (std::uint64_t k = 0; k < count; ++k) readCorner(values, property.type, index, faces);
         }
         faces.close(first);
+        values.endRecord();
     }
 
     /// Triangles that share an edge with the one before and turn round in turns; -1 begins again.
@@ -361,10 +373,18 @@ class ElementReader {
                 faces.sizes.push_back(3);
             }
         }
+        values.endRecord();
     }
 
   private:
     std::string name(std::size_t index) const { return fmt::format("{} {}", element_.name, index); }
+
+    double readCoordinate(Values& values, const Property& property, std::size_t index) const {
+        const double value = values.real(property.type);
+        if (!std::isfinite(float(value)))
+            values.fail(fmt::format("{}: its {} is {}, which is no finite float", name(index), property.name, value));
+        return value;
+    }
 
     unsigned checked(Values& values, long long corner, std::size_t index) const {
         if (corner < 0 || std::uint64_t(corner) >= vertices_)
@@ -405,6 +425,10 @@ class PlyReader {
             });
             add(element, std::move(parts));
         }
+        text.skipSpace();
+        if (!text.atEnd())
+            polygons_.notes.push_back(fmt::format(
+                "left out: what follows all that the header announces, from line {} on", source.lineOf(text.at)));
         return finished();
     }
 
@@ -423,6 +447,9 @@ class PlyReader {
             });
             add(element, std::move(parts));
         }
+        if (values.size() > 0)
+            polygons_.notes.push_back(fmt::format("left out: {} after all that the header announces",
+                                                  counted(values.size(), "byte", "bytes")));
         return finished();
     }
 
@@ -490,13 +517,15 @@ class PlyReader {
     std::size_t corners(const Element& element) const {
         const auto found = element.find({"vertex_indices", "vertex_index"});
         if (!found || !element.properties[*found].countType || !isInteger(element.properties[*found].type))
-            refuse(path_, fmt::format("its element '{}' has no list 'vertex_indices' of integers", element.name));
+            refuse(path_,
+                   fmt::format("its element {} has no list 'vertex_indices' of integers", quotedWord(element.name)));
         return *found;
     }
 
     void add(const Element& element, std::vector<Faces> parts) {
         if (kindOf(element) == Kind::other && element.count > 0)
-            polygons_.notes.push_back(fmt::format("left out: {} elements '{}'", element.count, element.name));
+            polygons_.notes.push_back(fmt::format("left out: {} {}", counted(element.count, "element", "elements"),
+                                                  quotedWord(element.name)));
         std::move(parts.begin(), parts.end(), std::back_inserter(faces_));
     }
 

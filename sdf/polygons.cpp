@@ -16,6 +16,7 @@
 #include "sdf/mesh.h"
 #include "sdf/mesh_io.h"
 #include "sdf/parallel_parts.h"
+#include "sdf/text_source.h"
 #include "sdf/triangulate.h"
 
 namespace bilayer {
@@ -116,10 +117,10 @@ class FaceCutter {
             all.uncovered += cut.uncovered;
         }
         if (all.uncovered > 0)
-            notes.push_back(
-                fmt::format("{} faces have outlines that cross themselves or enclose nothing, so that their "
-                            "triangles do not cover them; the first is face {}, counted from 0",
-                            all.uncovered, all.firstUncovered));
+            notes.push_back(fmt::format(
+                "the triangles of {} do not cover its outline, which crosses itself or encloses nothing; the "
+                "first is face {}, counted from 0",
+                counted(all.uncovered, "face", "faces"), all.firstUncovered));
         all.triangles.resize(begins.back());
         inOrder(cuts.size(), [&](std::size_t i) {
             std::copy(cuts[i].triangles.begin(), cuts[i].triangles.end(),
@@ -173,7 +174,9 @@ Mesh meshOf(PolygonsOf<Scalar> polygons, ReadReport& report) {
     report.vertices = polygons.points.size();
     report.faces = polygons.sizes.empty() ? polygons.corners.size() / 3 : polygons.sizes.size();
     report.notes = std::move(polygons.notes);
-    if (report.faces == 0) throw std::runtime_error("holds no triangle");
+    if (report.faces == 0)
+        throw std::runtime_error(
+            fmt::format("holds no triangle{}{}", report.notes.empty() ? "" : "; ", fmt::join(report.notes, "; ")));
     const Box box = boxOf(polygons.points, usedVertices(polygons.corners, polygons.points.size()));
     report.unusedVertices = report.vertices - box.vertices;
     Mesh mesh;
@@ -210,7 +213,9 @@ void setFaces(PolygonsOf<Scalar>& polygons, const std::vector<Faces>& parts) {
         if (!isOfTriangles)
             std::copy(parts[i].sizes.begin(), parts[i].sizes.end(), polygons.sizes.begin() + std::ptrdiff_t(sizes[i]));
     });
-    if (small > 0) polygons.notes.push_back(fmt::format("left out: {} faces have fewer than three corners", small));
+    if (small > 0)
+        polygons.notes.push_back(
+            fmt::format("left out: {} with fewer than three corners", counted(small, "face", "faces")));
 }
 
 template <class Scalar>

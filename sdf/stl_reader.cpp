@@ -1,6 +1,4 @@
 #include <fmt/format.h>
-#include <oneapi/tbb/blocked_range.h>
-#include <oneapi/tbb/parallel_for.h>
 
 #include <algorithm>
 #include <bit>
@@ -36,18 +34,23 @@ std::uint64_t binarySize(std::uint64_t facets) {
     return headerBytes + sizeof(std::uint32_t) + facetBytes * facets;
 }
 
-/// A size that fits the count says binary. So do bytes that are not of a text; headers do not: some begin with "solid".
+/// A size that fits the count says binary, and so do bytes that are not of a text. Headers say nothing: those of some
+/// binary files begin with "solid".
 bool isText(std::string_view bytes, std::string_view text) {
     if (bytes.size() >= binarySize(0) && bytes.size() == binarySize(loadCount(bytes))) return false;
-    Cursor at{text.data(), text.data() + text.size()};
-    at.skipSpace();
-    const std::string_view word = at.word();
-    if (!sameWord(word, "solid") && !sameWord(word, "facet")) return false;
     constexpr std::size_t sample = 1024;
     const std::string_view begin = text.substr(0, sample);
-    return std::none_of(begin.begin(), begin.end(),
-                        [](char c) { return static_cast<unsigned char>(c) < ' ' && !isSpace(c); }) &&
-           begin.find('\0') == std::string_view::npos;
+    const auto isOfText = [](char c) { return c != '\0' && (static_cast<unsigned char>(c) >= ' ' || isSpace(c)); };
+    return !text.empty() && std::all_of(begin.begin(), begin.end(), isOfText);
+}
+
+void requireFinite(const glm::vec3* corners, std::size_t triangle, const std::filesystem::path& path) {
+    for (int k = 0; k < 3; ++k)
+        for (int axis = 0; axis < 3; ++axis)
+            if (!std::isfinite(corners[k][axis]))
+                throw std::runtime_error(
+                    fmt::format("{}: triangle {}, counted from 0, has the coordinate {}, which is not finite",
+                                path.string(), triangle, corners[k][axis]));
 }
 
 Mesh readBinary(std::string_view bytes, const std::filesystem::path& path, ReadReport& report) {
@@ -55,20 +58,25 @@ Mesh readBinary(std::string_view bytes, const std::filesystem::path& path, ReadR
     const std::uint32_t count = loadCount(bytes);
     if (bytes.size() < binarySize(0))
         throw std::runtime_error(
-            fmt::format("{}: is neither a text STL file, which begins with 'solid', nor a binary one, "
-                        "which has {} bytes at least",
-                        path.string(), binarySize(0)));
+            fmt::format("{}: has {}; a binary STL file has {} bytes at least, and a text one begins with 'solid'",
+                        path.string(), counted(bytes.size(), "byte", "bytes"), binarySize(0)));
     if (bytes.size() < binarySize(count))
         throw std::runtime_error(fmt::format("{}: ends early: of the {} triangles that it announces there are {}",
                                              path.string(), count, (bytes.size() - binarySize(0)) / facetBytes));
     PolygonsOf<float> polygons;
     if (const std::uint64_t more = bytes.size() - binarySize(count))
-        polygons.notes.push_back(fmt::format("left out: {} bytes after the last triangle", more));
+        polygons.notes.push_back(fmt::format("left out: {} after the last triangle", counted(more, "byte", "bytes")));
     polygons.points.resize(std::size_t(3) * count);
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, 4096), [&](const auto& range) {
+    constexpr std::size_t partFacets = 1 << 14;
+    inOrder((count + partFacets - 1) / partFacets, [&](std::size_t part) {
         const char* facets = bytes.data() + binarySize(0) + normalBytes;
-        for (std::size_t i = range.begin(); i < range.end(); ++i)
-            std::memcpy(&polygons.points[3 * i], facets + facetBytes * i, 3 * sizeof(glm::vec3));
+        for (std::size_t i = part * partFacets; i < std::min<std::size_t>((part + 1) * partFacets, count); ++i) {
+            glm::vec3* corners = &polygons.points[3 * i];
+            std::memcpy(corners, facets + facetBytes * i, 3 * sizeof(glm::vec3));
+            const glm::vec3 sum = corners[0] + corners[1] + corners[2];
+            // infinite where the sum of finite ones is too large: rare, and then looked at more closely
+            if (!std::isfinite(sum.x + sum.y + sum.z)) requireFinite(corners, i, path);
+        }
     });
     polygons.corners.resize(polygons.points.size());
     std::iota(polygons.corners.begin(), polygons.corners.end(), 0u);
@@ -96,7 +104,7 @@ class TextReader {
             const bool ends = sameWord(word, "endsolid");
             if (sameWord(word, "facet")) {
                 readFacet(begin);
-            } else if (ends || sameWord(word, "solid")) {
+            } else if (ends || sameWord(word, "solid") || word.front() == '#') {
                 at_.skipLine();
             } else if (part_.endsSolid) {
                 at_.skipLine();
@@ -105,7 +113,7 @@ class TextReader {
             } else {
                 source_.failExpected(begin, "'facet', 'solid' or 'endsolid'");
             }
-            part_.endsSolid = ends;
+            if (word.front() != '#') part_.endsSolid = ends;
         }
     }
 
@@ -136,8 +144,7 @@ class TextReader {
             const char* begin = at_.at;
             if (!at_.number(point[axis]) || !(at_.atEnd() || isSpace(*at_.at)))
                 source_.failExpected(begin, "a coordinate");
-            if (!std::isfinite(point[axis]))
-                source_.fail(begin, fmt::format("the coordinate {} is not finite", source_.quoted(begin)));
+            source_.checkCoordinate(begin, point[axis]);
         }
         part_.points.push_back(point);
     }
@@ -178,9 +185,9 @@ Mesh readText(const TextSource& source, const std::filesystem::path& path, ReadR
     });
     for (const Part& part : parts)
         if (part.linesLeft > 0)
-            polygons.notes.push_back(fmt::format("left out: {} lines after 'endsolid'; the first is {} on line {}",
-                                                 part.linesLeft, source.quoted(part.firstLeft),
-                                                 source.lineOf(part.firstLeft)));
+            polygons.notes.push_back(fmt::format("left out: {} after 'endsolid'; the first is {} on line {}",
+                                                 counted(part.linesLeft, "line", "lines"),
+                                                 source.quoted(part.firstLeft), source.lineOf(part.firstLeft)));
     std::vector<Faces> faces;
     for (Part& part : parts) faces.push_back(std::move(part.faces));
     setFaces(polygons, faces);

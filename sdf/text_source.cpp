@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cctype>
 #include <charconv>
+#include <cmath>
 #include <cstdint>
 #include <stdexcept>
 #include <utility>
@@ -62,10 +63,13 @@ std::size_t TextSource::lineOf(const char* at) const {
 std::string TextSource::quoted(const char* at) const {
     if (at == end()) return "the end of the file";
     if (isLineEnd(*at)) return "the end of the line";
-    std::string word;
-    for (; at != end() && !isSpace(*at) && word.size() < maxQuoted; ++at)
-        word.push_back(std::isprint(static_cast<unsigned char>(*at)) ? *at : '?');
-    return fmt::format("'{}{}'", word, at != end() && !isSpace(*at) ? "..." : "");
+    return quotedWord(Cursor{at, end()}.word());
+}
+
+void TextSource::checkCoordinate(const char* at, double value) const {
+    if (std::isfinite(float(value))) return;
+    fail(at, fmt::format("the coordinate {} is {}", quoted(at),
+                         std::isfinite(value) ? "too large for a float" : "not finite"));
 }
 
 void TextSource::fail(const char* at, const std::string& why) const {
@@ -91,6 +95,17 @@ bool Cursor::integer(long long& value) {
     if (error != std::errc() || (from != at && from != end && *from == '-')) return false;
     at = next;
     return true;
+}
+
+std::string quotedWord(std::string_view word) {
+    std::string shown(word.substr(0, maxQuoted));
+    for (char& c : shown)
+        if (!std::isprint(static_cast<unsigned char>(c))) c = '?';
+    return fmt::format("'{}{}'", shown, word.size() > maxQuoted ? "..." : "");
+}
+
+std::string counted(std::size_t count, std::string_view one, std::string_view many) {
+    return fmt::format("{} {}", count, count == 1 ? one : many);
 }
 
 bool sameWord(std::string_view a, std::string_view b) {

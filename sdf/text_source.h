@@ -26,6 +26,9 @@ class TextSource {
     /// The word that begins at a place, in quotation marks and cut after 40 characters, or what else stands there.
     std::string quoted(const char* at) const;
 
+    /// Throws std::runtime_error if the coordinate that was read at a place is no number or too large for a float.
+    void checkCoordinate(const char* at, double value) const;
+
     /// Throws std::runtime_error: file, line, and what is wrong.
     [[noreturn]] void fail(const char* at, const std::string& why) const;
 
@@ -79,6 +82,12 @@ struct Cursor {
     /// The same for an integer in decimal digits.
     bool integer(long long& value);
 };
+
+/// A word of a file in quotation marks, cut after 40 characters; what cannot be printed is a question mark.
+std::string quotedWord(std::string_view word);
+
+/// "1 face", "2 faces".
+std::string counted(std::size_t count, std::string_view one, std::string_view many);
 
 /// Whether two words are the same but for upper and lower case of ASCII letters.
 bool sameWord(std::string_view a, std::string_view b);

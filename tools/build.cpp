@@ -15,6 +15,7 @@
 #include "sdf/build.h"
 #include "sdf/double_layer.h"
 #include "sdf/mesh_io.h"
+#include "sdf/sign.h"
 #include "sdf/vdb_io.h"
 #include "tools/commands.h"
 #include "tools/output.h"
@@ -58,7 +59,7 @@ struct Arguments {
 
 struct Outcome {
     ReadReport file;
-    MeshGlance glance;
+    bool balanced = false;
     std::optional<MeshReport> report;
     std::string device;
     BuildTimes times;
@@ -146,7 +147,7 @@ LevelSet timedBody(const Mesh& mesh, const LevelSet& field, const Arguments& a, 
 
 void printJson(const Arguments& a, const Outcome& o, const Mesh& mesh, const LevelSet& field) {
     Json json{{"file", toJson(o.file)},
-              {"mesh", o.report ? toJson(*o.report, a.options.voxelSize) : toJson(mesh, o.glance)},
+              {"mesh", o.report ? toJson(*o.report, a.options.voxelSize) : toJson(mesh, o.balanced)},
               {"output", a.output.string()},
               {"triangles", mesh.triangles.size()},
               {"voxelSize", number(field.voxelSize())},
@@ -178,7 +179,7 @@ void printTable(const Arguments& a, const Outcome& o, const Mesh& mesh, const Le
     if (o.report)
         addRows(input, *o.report, a.options.voxelSize);
     else
-        addRows(input, mesh, o.glance);
+        addRows(input, mesh, o.balanced);
     input.print();
     Table table(a.output.string());
     addRows(table, field, a.stored);
@@ -218,7 +219,7 @@ void run(Arguments a) {
     if (a.report)
         outcome.report = inspect(mesh, a.options.voxelSize);
     else
-        outcome.glance = glance(mesh);
+        outcome.balanced = balanced(mesh);
     outcome.inspect = inspecting.seconds();
     a.options.inspected = outcome.report ? &*outcome.report : nullptr;
     LevelSet field = timedBuild(mesh, a, outcome);

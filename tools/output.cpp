@@ -154,22 +154,21 @@ void addRows(Table& table, const MeshReport& report, float wall) {
     if (report.closed()) table.row("volume", fmt::format("{:.6g} m^3", report.volume));
 }
 
-Json toJson(const Mesh& mesh, const MeshGlance& seen) {
+Json toJson(const Mesh& mesh, bool balanced) {
     return {{"points", mesh.points.size()},
             {"triangles", mesh.triangles.size()},
             {"bounds", box(bounds(mesh), mesh.origin)},
             {"origin", vector(mesh.origin)},
-            {"closed", seen.closed},
-            {"oriented", seen.oriented}};
+            {"closedAndOriented", balanced}};
 }
 
-void addRows(Table& table, const Mesh& mesh, const MeshGlance& seen) {
+void addRows(Table& table, const Mesh& mesh, bool balanced) {
     table.row("points", grouped(mesh.points.size()));
     table.row("triangles", grouped(mesh.triangles.size()));
     table.row("bounds", boxText(bounds(mesh), mesh.origin));
     addOrigin(table, mesh.origin);
-    table.row("closed", seen.closed ? "yes" : "no");
-    table.row("oriented", seen.oriented ? "yes" : "no");
+    table.row("closed, oriented",
+              balanced ? "yes: every edge is run both ways equally often" : "no (--report tells why)");
 }
 
 Json toJson(const ReadReport& read) {

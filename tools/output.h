@@ -52,9 +52,10 @@ std::string boxText(const Bounds& bounds, const glm::dvec3& origin);  ///< "x y 
 Json toJson(const MeshReport& report, float wall);
 void addRows(Table& table, const MeshReport& report, float wall);
 
-/// The same at a glance.
-Json toJson(const Mesh& mesh, const MeshGlance& seen);
-void addRows(Table& table, const Mesh& mesh, const MeshGlance& seen);
+/// What is known of a mesh without inspecting it.
+/// @param balanced  whether every edge is run both ways equally often: balanced() in sign.h
+Json toJson(const Mesh& mesh, bool balanced);
+void addRows(Table& table, const Mesh& mesh, bool balanced);
 
 /// What a mesh file held, and what of it was left out.
 Json toJson(const ReadReport& read);

@@ -27,7 +27,8 @@ struct Arguments {
     std::vector<std::filesystem::path> inputs;
     std::filesystem::path output, into;
     float voxelSize = 0, resolution = 0, halfWidth = 3;
-    std::vector<float> translate{0, 0, 0}, rotate{0, 0, 1, 0}, scale{1};
+    std::vector<double> translate{0, 0, 0};
+    std::vector<float> rotate{0, 0, 1, 0}, scale{1};
     std::string mode = "unite";
     bool uniteSolids = true;
     fluid::ParticleOptions particles;
@@ -36,6 +37,11 @@ struct Arguments {
 };
 
 using Input = std::variant<Mesh, LevelSet>;
+
+glm::dvec3 originOf(const Input& input) {
+    if (const auto* mesh = std::get_if<Mesh>(&input)) return mesh->origin;
+    return std::get<LevelSet>(input).origin();
+}
 
 bool isVdb(const std::filesystem::path& path) {
     return path.extension() == ".vdb";
@@ -47,7 +53,8 @@ fluid::Placement makePlacement(const Arguments& a) {
     if (!(length > 0) || !std::isfinite(length)) throw CLI::ValidationError("--rotate", "the axis has no direction");
     if (a.scale.size() == 2) throw CLI::ValidationError("--scale", "needs one number or three");
     const glm::vec3 scale = a.scale.size() == 1 ? glm::vec3(a.scale[0]) : glm::vec3(a.scale[0], a.scale[1], a.scale[2]);
-    return {{glm::vec3(a.translate[0], a.translate[1], a.translate[2]), glm::angleAxis(a.rotate[3], axis / length)},
+    return {{glm::vec3(glm::dvec3(a.translate[0], a.translate[1], a.translate[2])),
+             glm::angleAxis(a.rotate[3], axis / length)},
             scale};
 }
 
@@ -68,32 +75,54 @@ void requireUsage(const Arguments& a) {
         throw CLI::ValidationError("seed", "a mesh needs one of --voxel-size, --resolution and --into");
 }
 
-Input read(const std::filesystem::path& path) {
-    if (isVdb(path)) return readVdb(path);
-    return readMesh(path);
+// What a placement in floats leaves of a far translation, far meshes take over: before they are stretched and turned.
+glm::dvec3 remainder(const Arguments& a, const fluid::Placement& placement) {
+    const glm::dvec3 left =
+        glm::dvec3(a.translate[0], a.translate[1], a.translate[2]) - glm::dvec3(placement.pose.position);
+    return glm::inverse(glm::dquat(placement.pose.rotation)) * left / glm::dvec3(placement.scale);
 }
 
-// What the file says of a mesh and a body no longer holds for a liquid that starts from it.
-void dropOrigin(openvdb::FloatGrid& liquid) {
+Input read(const std::filesystem::path& path, const glm::dvec3& moved, ReadReport& file) {
+    if (isVdb(path)) return readVdb(path);
+    Mesh mesh = readMesh(path, &file);
+    if (mesh.origin != glm::dvec3(0)) mesh.origin += moved;
+    return mesh;
+}
+
+// What the file says of a mesh and a body no longer holds for a liquid that starts from it; where it stands does.
+void dropHistory(openvdb::FloatGrid& liquid) {
     std::vector<std::string> names;
     for (auto entry = liquid.beginMeta(); entry != liquid.endMeta(); ++entry)
-        if (entry->first.starts_with("bilayer:")) names.push_back(entry->first);
+        if (entry->first.starts_with("bilayer:") && entry->first != metadata::origin) names.push_back(entry->first);
     for (const std::string& name : names) liquid.removeMeta(name);
 }
 
-openvdb::FloatGrid::Ptr startingLiquid(const Arguments& a, const Input& first, const glm::vec3& scale) {
+// Whole voxels near to a place: the origin of a liquid there.
+glm::dvec3 wholeVoxels(const glm::dvec3& place, double voxelSize) {
+    return voxelSize * glm::round(place / voxelSize);
+}
+
+// Relative to its origin, which its metadata tell where it is not zero.
+openvdb::FloatGrid::Ptr startingLiquid(const Arguments& a, const Input& first, const fluid::Placement& placement) {
     openvdb::initialize();
     if (!a.into.empty()) {
         const openvdb::FloatGrid::Ptr liquid = readVdb(a.into).grids().distance->deepCopy();
-        dropOrigin(*liquid);
+        dropHistory(*liquid);
         return liquid;
     }
     float voxelSize = a.voxelSize;
     if (a.resolution > 0)
-        voxelSize = voxelSizeFor(transformed(std::get<Mesh>(first), glm::scale(glm::mat4(1), scale)), a.resolution);
+        voxelSize =
+            voxelSizeFor(transformed(std::get<Mesh>(first), glm::scale(glm::mat4(1), placement.scale)), a.resolution);
     if (!(voxelSize > 0)) voxelSize = std::get<LevelSet>(first).voxelSize();
     try {
-        return openvdb::createLevelSet<openvdb::FloatGrid>(voxelSize, a.halfWidth);
+        const auto liquid = openvdb::createLevelSet<openvdb::FloatGrid>(voxelSize, a.halfWidth);
+        const glm::dvec3 far = originOf(first);
+        if (far != glm::dvec3(0)) {
+            const glm::dvec3 origin = wholeVoxels(placement.toWorld(far), liquid->voxelSize()[0]);
+            liquid->insertMeta(metadata::origin, openvdb::Vec3DMetadata({origin.x, origin.y, origin.z}));
+        }
+        return liquid;
     } catch (const openvdb::ArithmeticError&) {
         throw std::runtime_error(fmt::format("a voxel size of {} is too small for OpenVDB", voxelSize));
     }
@@ -121,12 +150,15 @@ void add(fluid::SeedReport& all, const fluid::SeedReport& next) {
     all.changedVoxels += next.changedVoxels;
 }
 
-void report(const Arguments& a, const openvdb::FloatGrid& liquid, const fluid::SeedReport& changes,
-            std::uint64_t particles, double seconds) {
+void report(const Arguments& a, const openvdb::FloatGrid& liquid, const std::vector<ReadReport>& files,
+            const fluid::SeedReport& changes, std::uint64_t particles, double seconds) {
     const double volume = volumeOf(liquid.deepCopy());
     const float voxelSize = float(liquid.voxelSize()[0]);
+    Json read = Json::array();
+    for (const ReadReport& file : files) read.push_back(toJson(file));
     if (a.json)
         return print({{"output", a.output.string()},
+                      {"files", read},
                       {"voxelSize", number(voxelSize)},
                       {"halfWidth", number(liquid.background() / voxelSize)},
                       {"activeVoxels", liquid.activeVoxelCount()},
@@ -135,15 +167,17 @@ void report(const Arguments& a, const openvdb::FloatGrid& liquid, const fluid::S
                       {"changes",
                        {{"voxels", changes.changedVoxels},
                         {"largest", number(changes.largestChange)},
-                        {"where", {number(changes.where.x), number(changes.where.y), number(changes.where.z)}}}},
+                        {"where", vector(changes.where)}}},
                       {"particles", particles},
                       {"seconds", seconds}});
     Table table(a.output.string());
+    for (std::size_t i = 0; i < files.size(); ++i)
+        if (!isVdb(a.inputs[i])) addRows(table, files[i]);
     table.row("voxel size", metres(voxelSize));
     table.row("active voxels", grouped(liquid.activeVoxelCount()));
     table.row("volume", fmt::format("{:.6g} m^3", volume));
     if (changes.changedVoxels)
-        table.row("changed", fmt::format("{} voxels by more than 0.1 voxel, at most {:.2f} at {:g} {:g} {:g}",
+        table.row("changed", fmt::format("{} voxels by more than 0.1 voxel, at most {:.2f} at {:.10g} {:.10g} {:.10g}",
                                          grouped(changes.changedVoxels), changes.largestChange, changes.where.x,
                                          changes.where.y, changes.where.z));
     if (a.particlesGiven->count()) table.row("particles", grouped(particles));
@@ -170,22 +204,32 @@ void run(const Arguments& a) {
     const fluid::Placement placement = makePlacement(a);
     const Stopwatch watch;
     std::vector<Input> inputs;
-    for (const auto& path : a.inputs) inputs.push_back(read(path));
+    std::vector<ReadReport> files(a.inputs.size());
+    for (std::size_t i = 0; i < files.size(); ++i)
+        inputs.push_back(read(a.inputs[i], remainder(a, placement), files[i]));
     requireWritable(a.output);
 
-    const openvdb::FloatGrid::Ptr liquid = startingLiquid(a, inputs.front(), placement.scale);
+    const openvdb::FloatGrid::Ptr liquid = startingLiquid(a, inputs.front(), placement);
     liquid->setName("liquid");
+    // bodies are placed in the world; all else is relative to the origin, near which floats are finest
+    const auto entry = liquid->getMetadata<openvdb::Vec3DMetadata>(metadata::origin);
+    const openvdb::math::Transform::Ptr near = liquid->transformPtr(), world = near->copy();
+    world->postTranslate(entry ? entry->value() : openvdb::Vec3d(0));
+    liquid->setTransform(world);
     fluid::SeedReport changes;
     for (std::size_t i = 0; i < inputs.size(); ++i) add(changes, seedInput(*liquid, a, i, inputs[i], placement));
-    openvdb::GridCPtrVec grids{liquid};
+    liquid->setTransform(near);
+    openvdb::GridPtrVec grids{liquid};
     std::uint64_t count = 0;
     if (a.particlesGiven->count()) {
         const auto particles = fluid::particles(*liquid, a.particles);
         count = particles.positions.size();
-        grids.push_back(fluid::particleGrid(particles, liquid->transform()));
+        grids.push_back(fluid::particleGrid(particles, *near));
     }
-    writeGrids(a.output, grids);
-    report(a, *liquid, changes, count, watch.seconds());
+    for (const auto& grid : grids) grid->setTransform(world);
+    writeGrids(a.output, {grids.begin(), grids.end()});
+    liquid->setTransform(near);
+    report(a, *liquid, files, changes, count, watch.seconds());
 }
 
 }  // namespace

@@ -3,7 +3,7 @@
 #include <catch2/catch.hpp>
 #include <cstring>
 #include <fstream>
-#include <functional>
+#include <limits>
 #include <random>
 
 #include "demos/shared/shapes.h"
@@ -254,18 +254,30 @@ TEST_CASE("What of a file is left out is told") {
     CHECK(report.unusedVertices == 1);
     CHECK(report.collapsedTriangles == 1);
     const std::string notes = fmt::format("{}", fmt::join(report.notes, "\n"));
-    CHECK_THAT(notes, Contains("2 faces have fewer than three corners") && Contains("2 elements are points or lines") &&
-                          Contains("2 statements describe free-form") &&
-                          Contains("2 lines begin with a word that is not known; the first is 'hello' on line 23"));
+    CHECK_THAT(notes,
+               Contains("2 faces with fewer than three corners") && Contains("2 elements that are points or lines") &&
+                   Contains("2 statements of free-form") &&
+                   Contains("2 lines that begin with a word that is not known; the first is 'hello' on line 23"));
     readMesh(write("more.ply", plyOfBox({.more = true})), &report);
-    CHECK_THAT(fmt::format("{}", fmt::join(report.notes, "\n")), Contains("1 elements 'camera'"));
+    CHECK_THAT(fmt::format("{}", fmt::join(report.notes, "\n")), Contains("1 element 'camera'"));
     readMesh(write("more.stl", binaryStlOfBox("") + "xyz"), &report);
     CHECK(report.mergedVertices == 28);
     CHECK_THAT(fmt::format("{}", fmt::join(report.notes, "\n")), Contains("3 bytes after the last triangle"));
+    // more than is announced
+    const std::string off = offOfBox("OFF", "", "");
+    for (const auto& [name, text] :
+         {std::pair("more.off", replaced(off, "8 6 12", "8 5 12")), std::pair("more.off", off + "4 0 1 2 3\n"),
+          std::pair("more.off", replaced(offOfBox("OFF", " 255 0 0", ""), "8 6 12", "8 5 12")),
+          std::pair("more.ply", replaced(plyOfBox({}), "face 6", "face 5")),
+          std::pair("more.ply", replaced(plyOfBox({.format = "binary_big_endian"}), "face 6", "face 5")),
+          std::pair("more.ply", plyOfBox({.format = "binary_little_endian"}) + "x")}) {
+        CAPTURE(name, text);
+        readMesh(write(name, text), &report);
+        CHECK_THAT(fmt::format("{}", fmt::join(report.notes, "\n")), Contains("left out") && Contains("announce"));
+    }
     // a bow tie
     readMesh(write("tie.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nf 1 2 3 4\n"), &report);
-    CHECK_THAT(fmt::format("{}", fmt::join(report.notes, "\n")),
-               Contains("1 faces have outlines that cross themselves"));
+    CHECK_THAT(fmt::format("{}", fmt::join(report.notes, "\n")), Contains("the triangles of 1 face do not cover"));
 }
 
 TEST_CASE("PLY: any format, types, order of elements, line ends, and data between") {
@@ -416,6 +428,9 @@ TEST_CASE("Errors of readers name the file, the place, what stands there, and wh
     fails("e.obj", obj + "v 1 2\n", "line 15: the end of the line stands where a coordinate should");
     fails("f.obj", obj + "v 1 2 3.4.5\n", "line 15: '3.4.5' stands where a coordinate should");
     fails("g.obj", obj + "v 1 2 inf\n", "line 15: the coordinate 'inf' is not finite");
+    fails("k.obj", obj + "v 1 2 1e39\n", "line 15: the coordinate '1e39' is too large for a float");
+    fails("l.obj", "V 0 0 0\nF 1 2 3\n",
+          "holds no triangle; left out: 2 lines that begin with a word that is not known");
     fails("h.obj", obj + "v 1 2 " + std::string(100, 'y') + "\n", "'" + std::string(40, 'y') + "...'");
     fails("i.obj", replaced(obj, "\n", "\r\n") + "f 1 2 99\n", "line 15:");
     fails("j.obj", "v 0 0 0\n", "holds no triangle");
@@ -431,6 +446,10 @@ TEST_CASE("Errors of readers name the file, the place, what stands there, and wh
     fails("d.ply", replaced(plyOfBox({}), "\n4 0 3 2 1", "\n4 0 3 2 11"), "face 0 refers to vertex 11");
     fails("e.ply", replaced(plyOfBox({}), "\n4 0 3 2 1", "\n4 0 3 2 x"), "'x' stands where an integer should");
     fails("f.ply", replaced(plyOfBox({}), "element vertex 8", "element vertex 888888888888"), "ends before all");
+    fails("h.ply", replaced(plyOfBox({}), "\n1 2 3 \n", "\n1 2 3 7 \n"), "'7' stands where the end of the line should");
+    fails("i.ply", replaced(plyOfBox({}), "\n1 2 3 \n", "\n1 nan 3 \n"),
+          "vertex 6: its y is nan, which is no finite float");
+    fails("j.ply", replaced(plyOfBox({}), "element face", "element " + std::string(99, 'z')), "holds no triangle");
     fails("g.ply", replaced(plyOfBox({}), "vertex_indices", "corners"), "no list 'vertex_indices'");
     fails("a.stl", "solid\n" + replaced(stlOfBox(), "vertex 1 2 3", "vertex 1 2 z"),
           "'z' stands where a coordinate should");
@@ -439,7 +458,13 @@ TEST_CASE("Errors of readers name the file, the place, what stands there, and wh
           "solid\n" + stlOfBox() + "facet normal 0 0 0\nouter loop\nvertex 0 0 0\nendloop\nendfacet\nendsolid\n",
           "a facet has 1 vertices");
     fails("d.stl", binaryStlOfBox("").substr(0, 300), "of the 12 triangles that it announces there are 4");
-    fails("e.stl", "hello", "neither a text STL file");
+    std::string infinite = binaryStlOfBox("");
+    const float inf = std::numeric_limits<float>::infinity();
+    std::memcpy(&infinite[84 + 7 * 50 + 12 + 20], &inf, sizeof inf);
+    fails("f.stl", infinite, "triangle 7, counted from 0, has the coordinate inf, which is not finite");
+    fails("g.stl", "", "has 0 bytes");
+    checkBox(write("comment.stl", "# drawn by hand\nsolid\n# facets\n" + stlOfBox() + "endsolid\n# end\n"));
+    fails("e.stl", "hello", "'hello' stands where 'facet'");
 }
 
 TEST_CASE("The parts that a file is read in make no difference to errors") {
