@@ -181,14 +181,19 @@ Json toJson(const ReadReport& read) {
 }
 
 void addRows(Table& table, const ReadReport& read) {
-    table.row("file", fmt::format("{} vertices, {} faces", grouped(read.vertices), grouped(read.faces)));
+    const auto counted = [](std::size_t count, const char* one, const char* many) {
+        return fmt::format("{} {}", grouped(count), count == 1 ? one : many);
+    };
+    table.row("file", fmt::format("{}, {}", counted(read.vertices, "vertex", "vertices"),
+                                  counted(read.faces, "face", "faces")));
     if (read.mergedVertices)
-        table.row("merged", fmt::format("{} vertices at the places of others", grouped(read.mergedVertices)));
+        table.row("merged",
+                  counted(read.mergedVertices, "vertex at the place of another", "vertices at the places of others"));
     if (read.unusedVertices)
-        table.row("left out", fmt::format("{} vertices that no face uses", grouped(read.unusedVertices)));
+        table.row("left out", counted(read.unusedVertices, "vertex that no face uses", "vertices that no face uses"));
     if (read.collapsedTriangles)
-        table.row("left out",
-                  fmt::format("{} triangles with two corners in one place", grouped(read.collapsedTriangles)));
+        table.row("left out", counted(read.collapsedTriangles, "triangle with two corners in one place",
+                                      "triangles with two corners in one place"));
     for (const std::string& note : read.notes) table.row("note", note);
 }
 

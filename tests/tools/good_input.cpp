@@ -113,7 +113,7 @@ TEST_CASE("what a mesh file holds beside its mesh is told") {
     const Words build{"build", path.string(), "-o", scratch("more.vdb").string(), "--resolution", "8"};
     for (const Words& words : {Words{"inspect", path.string()}, build})
         CHECK_THAT(run(words).out, Catch::Contains("5 vertices, 4 faces") &&
-                                       Catch::Contains("1 vertices that no face uses") &&
+                                       Catch::Contains("1 vertex that no face uses") &&
                                        Catch::Contains("1 face with fewer than three corners"));
     const auto json = run({"inspect", path.string(), "--json"}).json();
     CHECK(json["file"]["unusedVertices"] == 1);
