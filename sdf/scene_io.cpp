@@ -46,7 +46,8 @@ std::string oneLine(std::string text) {
 void readInChild(const std::filesystem::path& path, std::size_t memory, const ChildProcess::Send& send) {
     const auto tooLarge = [&] {
         sendError(send,
-                  fmt::format("reading it needs more than the {} MiB of memory that importers get", memory >> 20));
+                  fmt::format("reading it needs more than the {} MiB of memory that importers get; it may be damaged",
+                              memory >> 20));
     };
     Polygons polygons;
     try {
