@@ -8,6 +8,7 @@
 #include <stdexcept>
 #include <system_error>
 
+#include "sdf/gltf_json.h"
 #include "sdf/input_file.h"
 
 namespace bilayer {
@@ -18,7 +19,6 @@ namespace fs = std::filesystem;
 constexpr std::string_view magic = "glTF";
 constexpr std::uint32_t jsonType = 0x4E4F534A, binType = 0x004E4942;  // of chunks
 constexpr std::size_t fileHeader = 12, chunkHeader = 8;               // [bytes]
-constexpr std::size_t longestQuote = 40;                              // [bytes]
 
 Bytes readBytes(const fs::path& path) {
     requireInputFile(path);
@@ -37,10 +37,6 @@ std::uint32_t numberAt(std::string_view bytes, std::size_t at) {
 
 std::string_view view(const Bytes& bytes) {
     return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
-}
-
-std::string quote(const std::string& text) {
-    return text.size() > longestQuote ? text.substr(0, longestQuote) + " ..." : text;
 }
 
 int hexDigit(char c) {
@@ -97,8 +93,20 @@ Bytes dataOf(const std::string& uri) {
     if (comma == std::string::npos || comma < marker.size() ||
         uri.compare(comma - marker.size(), marker.size(), marker) != 0)
         throw std::runtime_error(
-            fmt::format("its uri is {}; it must be data:application/octet-stream;base64,...", quote(uri)));
+            fmt::format("its uri is {}; it must be data:application/octet-stream;base64,...", excerpt(uri)));
     return base64Decoded(std::string_view(uri).substr(comma + 1));
+}
+
+// Of a data URI, or of a file in a folder
+Bytes bytesOf(const fs::path& folder, const std::string& uri) {
+    if (uri.rfind("data:", 0) == 0) return dataOf(uri);
+    const fs::path path = fileOf(folder, uri);
+    try {
+        return readBytes(path);
+    } catch (const std::runtime_error& error) {
+        const std::string reason = std::string(error.what()).substr(path.string().size());
+        throw std::runtime_error(fmt::format("its uri is {}{}", excerpt(uri), reason));
+    }
 }
 
 }  // namespace
@@ -135,23 +143,19 @@ void GltfFile::splitChunks() {
 
 Bytes GltfFile::buffer(const nlohmann::json& buffers, std::size_t index) const try {
     const nlohmann::json& buffer = buffers.at(index);
-    const auto length = buffer.is_object() ? buffer.find("byteLength") : buffer.end();
-    if (length == buffer.end() || !length->is_number_unsigned())
-        throw std::runtime_error("it has no byteLength that is a positive integer");
+    const std::size_t length = buffer.at("byteLength");
+    if (length == 0) throw std::runtime_error("its byteLength is 0; it must be at least 1");
     const auto uri = buffer.find("uri");
     Bytes bytes;
-    if (uri == buffer.end() && isBinary_ && index == 0)
+    if (uri != buffer.end())
+        bytes = bytesOf(folder_, uri->get_ref<const std::string&>());
+    else if (isBinary_ && index == 0)
         bytes.assign(chunk_.begin(), chunk_.end());
-    else if (uri == buffer.end() || !uri->is_string())
-        throw std::runtime_error("it has no uri");
-    else if (const auto& text = uri->get_ref<const std::string&>(); text.rfind("data:", 0) == 0)
-        bytes = dataOf(text);
     else
-        bytes = readBytes(fileOf(folder_, text));
-    if (bytes.size() < length->get<std::size_t>())
-        throw std::runtime_error(
-            fmt::format("its byteLength is {}, but it has {} bytes", length->get<std::size_t>(), bytes.size()));
-    bytes.resize(length->get<std::size_t>());
+        throw std::runtime_error("it has no uri");
+    if (bytes.size() < length)
+        throw std::runtime_error(fmt::format("its byteLength is {}, but it has {} bytes", length, bytes.size()));
+    bytes.resize(length);
     return bytes;
 } catch (const std::runtime_error& error) {
     throw std::runtime_error(fmt::format("buffer {}: {}", index, error.what()));

@@ -21,7 +21,8 @@ class GltfFile {
     std::string_view json() const { return json_; }
 
     /// What a member of the JSON's array "buffers" holds: its chunk of a binary file, its data URI, or a regular file
-    /// in the folder of the scene; cut to its byteLength. Throws likewise, and names the buffer.
+    /// in the folder of the scene; cut to its byteLength. The JSON is that of parseGltf(). Throws likewise, and names
+    /// the buffer.
     Bytes buffer(const nlohmann::json& buffers, std::size_t index) const;
 
   private:

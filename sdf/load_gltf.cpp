@@ -11,15 +11,13 @@
 #include <vector>
 
 #include "sdf/gltf_buffers.h"
+#include "sdf/gltf_json.h"
 
 namespace bilayer {
 namespace {
 
 using nlohmann::json;
 
-// The members of a glTF file that make its shape
-constexpr std::string_view members[] = {"asset", "buffers", "bufferViews",    "accessors",          "meshes", "nodes",
-                                        "scene", "scenes",  "extensionsUsed", "extensionsRequired", "skins"};
 // Extensions that change the shape, and are understood
 constexpr std::string_view understood[] = {"KHR_mesh_quantization", "EXT_mesh_gpu_instancing"};
 // Beginnings of the names of those that only say how things look or sound, and who made them
@@ -29,53 +27,13 @@ constexpr std::string_view looks[] = {"KHR_materials_", "KHR_texture_", "EXT_tex
 constexpr std::string_view compressions[] = {"KHR_draco_mesh_compression", "EXT_meshopt_compression",
                                              "KHR_meshopt_compression"};
 
-constexpr int maxNesting = 200;                // of objects and arrays; tinygltf calls itself once for each
-constexpr std::size_t longestComplaint = 120;  // [bytes]
-
 template <class Names>
 bool contains(const Names& names, std::string_view name) {
     return std::find(std::begin(names), std::end(names), name) != std::end(names);
 }
 
-void checkNesting(std::string_view text) {
-    int depth = 0;
-    bool inString = false;
-    for (std::size_t i = 0; i < text.size(); ++i) {
-        const char c = text[i];
-        if (inString && c == '\\') {
-            ++i;
-        } else if (c == '"') {
-            inString = !inString;
-        } else if (!inString) {
-            depth += (c == '{' || c == '[') - (c == '}' || c == ']');
-            if (depth > maxNesting)
-                throw std::runtime_error(fmt::format("byte {} of its JSON is nested more than {} deep", i, maxNesting));
-        }
-    }
-}
-
-json parse(std::string_view text) {
-    checkNesting(text);
-    try {
-        json file = json::parse(text.begin(), text.end());
-        if (file.is_object()) {
-            for (auto member = file.begin(); member != file.end();)
-                member = contains(members, member.key()) ? std::next(member) : file.erase(member);
-            return file;
-        }
-    } catch (const json::exception& error) {
-        throw std::runtime_error(
-            fmt::format("its JSON is damaged: {}", std::string(error.what()).substr(0, longestComplaint)));
-    }
-    throw std::runtime_error("its JSON is no object, as glTF's is");
-}
-
 std::vector<std::string> names(const json& file, const char* member) {
-    std::vector<std::string> names;
-    if (const auto found = file.find(member); found != file.end() && found->is_array())
-        for (const json& name : *found)
-            if (name.is_string()) names.push_back(name);
-    return names;
+    return file.value(member, std::vector<std::string>());
 }
 
 bool isUnderstood(std::string_view name) {
@@ -87,15 +45,15 @@ bool isUnderstood(std::string_view name) {
 void checkRequired(const json& file) {
     for (const std::string& name : names(file, "extensionsRequired"))
         if (!isUnderstood(name))
-            throw std::runtime_error(fmt::format("requires the glTF extension {}, which is not read; export it without",
-                                                 name.substr(0, longestComplaint)));
+            throw std::runtime_error(
+                fmt::format("requires the glTF extension {}, which is not read; export it without", excerpt(name)));
 }
 
 // Takes the buffers out of the file and names each by its index instead, by which tinygltf asks for them.
 std::vector<Bytes> takeBuffers(json& file, const GltfFile& source) {
     std::vector<Bytes> buffers;
     const auto declared = file.find("buffers");
-    if (declared == file.end() || !declared->is_array()) return buffers;
+    if (declared == file.end()) return buffers;
     for (std::size_t i = 0; i < declared->size(); ++i) {
         buffers.push_back(source.buffer(*declared, i));
         (*declared)[i] = {{"byteLength", buffers.back().size()}, {"uri", fmt::format("{}", i)}};
@@ -116,8 +74,7 @@ tinygltf::FsCallbacks filesOf(std::vector<Bytes>& buffers) {
 std::size_t countPrimitives(const json& file) {
     std::size_t count = 0;
     if (const auto meshes = file.find("meshes"); meshes != file.end())
-        for (const json& mesh : *meshes)
-            if (mesh.is_object() && mesh.contains("primitives")) count += mesh["primitives"].size();
+        for (const json& mesh : *meshes) count += mesh["primitives"].size();
     return count;
 }
 
@@ -130,7 +87,6 @@ std::size_t countPrimitives(const tinygltf::Model& model) {
 std::string complaint(const json& file, std::string error) {
     error = error.substr(0, error.find_first_of("\n\r"));
     if (error.empty()) error = "its meshes hold something that is no primitive";
-    if (error.size() > longestComplaint) error = error.substr(0, longestComplaint) + " ...";
     for (const std::string& name : names(file, "extensionsUsed"))
         if (contains(compressions, name)) error += fmt::format(" (it uses {}, which is not read)", name);
     return "is not valid glTF 2: " + error;
@@ -140,7 +96,7 @@ std::string complaint(const json& file, std::string error) {
 
 tinygltf::Model loadGltf(const std::filesystem::path& path) {
     const GltfFile source(path);
-    json file = parse(source.json());
+    json file = parseGltf(source.json());
     checkRequired(file);
     std::vector<Bytes> buffers = takeBuffers(file, source);
     const std::string text = file.dump();
@@ -154,7 +110,7 @@ tinygltf::Model loadGltf(const std::filesystem::path& path) {
     // it leaves out primitives that it cannot read
     if (!loaded || countPrimitives(model) != countPrimitives(file)) throw std::runtime_error(complaint(file, error));
     if (model.asset.version.substr(0, 2) != "2.")
-        throw std::runtime_error(fmt::format("is glTF {}; only glTF 2 is read", model.asset.version.substr(0, 40)));
+        throw std::runtime_error(fmt::format("is glTF {}; only glTF 2 is read", excerpt(model.asset.version)));
     return model;
 }
 

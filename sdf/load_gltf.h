@@ -7,9 +7,9 @@
 
 namespace bilayer {
 
-/// The parts of a glTF file that make its shape: no materials, images, animations, cameras. Throws std::runtime_error,
-/// which does not name the file, if it is not as glTF 2 says, asks for an extension that is not understood, or lacks a
-/// buffer. Indices are not checked yet.
+/// The parts of a glTF file that make its shape (see parseGltf()). Throws std::runtime_error, which does not name the
+/// file, if it is not as glTF 2 says, asks for an extension that is not understood, or lacks a buffer. Indices are not
+/// checked yet.
 tinygltf::Model loadGltf(const std::filesystem::path& path);
 
 }  // namespace bilayer

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <glm/gtc/quaternion.hpp>
 #include <string>
 #include <utility>
@@ -21,29 +22,51 @@ void requireIndex(int index, const Items& items, const char* what, const std::st
             items.size());
 }
 
-glm::dmat4 transformOf(const glm::dvec3& translation, const glm::dvec4& rotation, const glm::dvec3& scale) {
-    glm::dmat4 m = glm::mat4_cast(glm::dquat(rotation.w, rotation.x, rotation.y, rotation.z));
+// Of the bottom row of a matrix: what exporters leave that round to floats
+constexpr double bottomRowTolerance = 1e-6;
+
+// The transform of a matrix must be affine: its bottom row is 0 0 0 1.
+void requireAffine(const glm::dmat4& m, const std::string& name) {
+    const double row[] = {m[0][3], m[1][3], m[2][3], m[3][3]};
+    for (int k = 0; k < 4; ++k)
+        require(std::abs(row[k] - (k == 3)) <= bottomRowTolerance,
+                "the bottom row of {} is {} {} {} {}; it must be 0 0 0 1, without perspective", name, row[0], row[1],
+                row[2], row[3]);
+}
+
+// Exporters round, and some do not normalise.
+glm::dquat rotationOf(const glm::dvec4& r, const std::string& name) {
+    const double largest = std::max(
+        {std::abs(r.x), std::abs(r.y), std::abs(r.z), std::abs(r.w)});  // against overflow and underflow of the squares
+    const glm::dvec4 unit = glm::normalize(r / largest);
+    require(largest > 0 && std::isfinite(unit.x + unit.y + unit.z + unit.w),
+            "the {} is {} {} {} {}; it must be a quaternion of length 1", name, r.x, r.y, r.z, r.w);
+    return {unit.w, unit.x, unit.y, unit.z};
+}
+
+glm::dmat4 transformOf(const glm::dvec3& translation, const glm::dquat& rotation, const glm::dvec3& scale) {
+    glm::dmat4 m = glm::mat4_cast(rotation);
     for (int k = 0; k < 3; ++k) m[k] *= scale[k];
     m[3] = glm::dvec4(translation, 1);
     return m;
 }
 
-// A node's own transform, or an instance's: what is not given changes nothing.
+glm::dmat4 matrixOf(const std::vector<double>& numbers, const std::string& name) {
+    glm::dmat4 matrix;
+    for (int i = 0; i < 16; ++i) matrix[i / 4][i % 4] = numbers[std::size_t(i)];
+    requireAffine(matrix, name);
+    return matrix;
+}
+
+// A node's own transform: what is not given changes nothing. The lengths are right: see parseGltf().
 glm::dmat4 transformOf(const tinygltf::Node& node, std::size_t index) {
-    const auto hasSize = [&](const std::vector<double>& v, std::size_t size, const char* name) {
-        require(v.empty() || v.size() == size, "the {} of node {} has {} numbers; it must have {}", name, index,
-                v.size(), size);
-        return !v.empty();
-    };
-    const auto &t = node.translation, &r = node.rotation, &s = node.scale, &m = node.matrix;
-    if (hasSize(m, 16, "matrix")) {
-        glm::dmat4 matrix;
-        for (int i = 0; i < 16; ++i) matrix[i / 4][i % 4] = m[std::size_t(i)];
-        return matrix;
-    }
-    return transformOf(hasSize(t, 3, "translation") ? glm::dvec3(t[0], t[1], t[2]) : glm::dvec3(0),
-                       hasSize(r, 4, "rotation") ? glm::dvec4(r[0], r[1], r[2], r[3]) : glm::dvec4(0, 0, 0, 1),
-                       hasSize(s, 3, "scale") ? glm::dvec3(s[0], s[1], s[2]) : glm::dvec3(1));
+    const auto &t = node.translation, &r = node.rotation, &s = node.scale;
+    if (!node.matrix.empty()) return matrixOf(node.matrix, fmt::format("the matrix of node {}", index));
+    const glm::dquat rotation = r.empty()
+                                    ? glm::dquat(1, 0, 0, 0)
+                                    : rotationOf({r[0], r[1], r[2], r[3]}, fmt::format("rotation of node {}", index));
+    return transformOf(t.empty() ? glm::dvec3(0) : glm::dvec3(t[0], t[1], t[2]), rotation,
+                       s.empty() ? glm::dvec3(1) : glm::dvec3(s[0], s[1], s[2]));
 }
 
 // The corners of triangles out of the vertices of a strip or a fan: section 3.7.2.1 of the glTF 2.0 specification.
@@ -156,7 +179,11 @@ std::vector<glm::dmat4> GltfScene::instances(const tinygltf::Node& node, std::si
     const tinygltf::Value& attributes =
         extension->second.Has("attributes") ? extension->second.Get("attributes") : extension->second;
     const auto accessor = [&](const char* name) {
-        return attributes.Has(name) && attributes.Get(name).IsInt() ? attributes.Get(name).GetNumberAsInt() : -1;
+        if (!attributes.Has(name)) return -1;
+        const tinygltf::Value& value = attributes.Get(name);
+        require(value.IsInt() && value.GetNumberAsInt() >= 0, "{} have a {} that is not the index of an accessor", by,
+                name);
+        return value.GetNumberAsInt();
     };
     const int t = accessor("TRANSLATION"), r = accessor("ROTATION"), s = accessor("SCALE");
     require(t >= 0 || r >= 0 || s >= 0, "{} have no TRANSLATION, ROTATION or SCALE", by);
@@ -170,9 +197,12 @@ std::vector<glm::dmat4> GltfScene::instances(const tinygltf::Node& node, std::si
             rotations.size(), scales.size());
     std::vector<glm::dmat4> transforms;
     for (std::size_t i = 0; i < count; ++i)
-        transforms.push_back(world_[index] * transformOf(t < 0 ? glm::dvec3(0) : translations[i],
-                                                         r < 0 ? glm::dvec4(0, 0, 0, 1) : rotations[i],
-                                                         s < 0 ? glm::dvec3(1) : scales[i]));
+        transforms.push_back(
+            world_[index] *
+            transformOf(t < 0 ? glm::dvec3(0) : translations[i],
+                        r < 0 ? glm::dquat(1, 0, 0, 0)
+                              : rotationOf(rotations[i], fmt::format("rotation of instance {} of node {}", i, index)),
+                        s < 0 ? glm::dvec3(1) : scales[i]));
     return transforms;
 }
 
@@ -217,6 +247,7 @@ void GltfScene::applySkin(ScenePart& part, const tinygltf::Primitive& primitive,
             skin.joints.size(), joints.size());
     for (std::size_t i = 0; i < skin.joints.size(); ++i) {
         requireIndex(skin.joints[i], model_.nodes, "node", fmt::format("skin {}", index));
+        requireAffine(joints[i], fmt::format("inverse bind matrix {} of skin {}", i, index));
         joints[i] = world_[std::size_t(skin.joints[i])] * joints[i];
     }
     std::vector<glm::dvec3> placed(part.points.size(), glm::dvec3(0));
@@ -252,10 +283,18 @@ void GltfScene::tell() {
     note(left_.morphed, "primitives have morph targets, which were not applied");
     note(left_.cornersOfNone, "indices at the ends of primitives make no whole triangle and were left out");
     std::vector<char> used(model_.meshes.size(), 0);
-    for (std::size_t i = 0; i < model_.nodes.size(); ++i)
-        if (reached_[i] && model_.nodes[i].mesh >= 0) used[std::size_t(model_.nodes[i].mesh)] = 1;
+    std::size_t shown = 0, outside = 0;  // nodes with a mesh
+    for (std::size_t i = 0; i < model_.nodes.size(); ++i) {
+        if (model_.nodes[i].mesh < 0) continue;
+        ++(reached_[i] ? shown : outside);
+        if (reached_[i]) used[std::size_t(model_.nodes[i].mesh)] = 1;
+    }
     note(std::size_t(std::count(used.begin(), used.end(), 0)),
          "meshes were left out, since no node of the scene shows them");
+    note(outside, "nodes with a mesh are outside of the scene and were left out");
+    if (scene_.corners.empty())
+        scene_.notes.push_back(fmt::format("the scene shows {} meshes; the file has {} meshes and {} nodes", shown,
+                                           model_.meshes.size(), model_.nodes.size()));
     if (std::any_of(model_.nodes.begin(), model_.nodes.end(), [](const auto& node) { return node.skin >= 0; }))
         scene_.notes.push_back("skins were applied in the pose of the file's nodes, without animation");
 }

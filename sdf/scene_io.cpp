@@ -39,18 +39,27 @@ std::string oneLine(std::string text) {
         if (std::iscntrl(static_cast<unsigned char>(c)) || static_cast<unsigned char>(c) >= 0x80) c = ' ';
     const std::size_t end = text.find_last_not_of(' ');
     text.erase(end == std::string::npos ? 0 : end + 1);
-    if (text.size() > longestError) text = text.substr(0, longestError) + " ...";
+    if (text.size() > longestError) text = text.substr(0, text.rfind(' ', longestError)) + " ...";
     return text.empty() ? "cannot be read" : text;
 }
 
 void readInChild(const std::filesystem::path& path, std::size_t memory, const ChildProcess::Send& send) {
+    const auto tooLarge = [&] {
+        sendError(send,
+                  fmt::format("reading it needs more than the {} MiB of memory that importers get; it may be damaged",
+                              memory >> 20));
+    };
     Polygons polygons;
     try {
         polygons = isGltf(formatOf(path)) ? readGltf(path) : readByAssimp(path);
     } catch (const std::bad_alloc&) {
-        return sendError(send, fmt::format("reading it needs more than {} MiB", memory >> 20));
-    } catch (const std::exception& error) {
+        return tooLarge();
+    } catch (const std::length_error&) {  // of a container of more items than memory has addresses
+        return tooLarge();
+    } catch (const std::runtime_error& error) {
         return sendError(send, oneLine(error.what()));
+    } catch (const std::exception&) {  // a failed check within a library, whose text says nothing of the file
+        return sendError(send, "the importer cannot make sense of it; it may be damaged");
     }
     sendPolygons(send, polygons);
 }

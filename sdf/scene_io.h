@@ -12,7 +12,7 @@ namespace bilayer {
 ///
 /// It is read in a child process (see ChildProcess), since its library may crash, hang or ask for any amount of memory
 /// on damaged input. Throws std::runtime_error, in one line that names the file: it cannot be read, or reading ended by
-/// a signal or beyond `limits`.
+/// a signal or beyond `limits`. An exception of the C++ library, as std::bad_alloc, is told in plain words.
 Polygons readScene(const std::filesystem::path& path, const ChildLimits& limits);
 
 /// By the limits that the file's size asks for (see sceneLimits()).

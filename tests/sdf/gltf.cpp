@@ -179,6 +179,36 @@ TEST_CASE("glTF: nodes place meshes in double precision, and mirrors keep outsid
     refuses(gltf, {"translation of node 0 has 2 numbers", "3"});
 }
 
+TEST_CASE("glTF: rotations are normalised, and matrices are affine") {
+    Gltf gltf = Gltf::cube();
+    json& node = gltf.file["nodes"][0];
+    for (const double scale : {1e-300, 1e-3, 0.7, 1.0, 3.0, 1e300})
+        for (const json& rotation : {json{0, 0, scale, scale}, json{scale, -2 * scale, 3 * scale, 4 * scale}}) {
+            CAPTURE(rotation.dump());
+            node["rotation"] = rotation;
+            CHECK(volume(read(gltf)) == Approx(8).epsilon(1e-12));
+        }
+    node["rotation"] = {0, 0, 0, 0};
+    refuses(gltf, {"rotation of node 0 is 0 0 0 0", "length 1"});
+    node.erase("rotation");
+    node["matrix"] = {1, 0, 0, 0.5, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
+    refuses(gltf, {"bottom row of the matrix of node 0 is 0.5 0 0 1", "0 0 0 1"});
+    node["matrix"] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 2};
+    refuses(gltf, {"bottom row of the matrix of node 0 is 0 0 0 2"});
+    node["matrix"] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0.99999994};  // rounded to floats
+    CHECK(volume(read(gltf)) == 8);
+    node.erase("matrix");
+    json& attributes = node["extensions"]["EXT_mesh_gpu_instancing"]["attributes"];
+    attributes = {{"ROTATION", gltf.accessor({0, 0, 0, 1, 0, 0, 0.7, 0.7}, Gltf::Float, "VEC4")}};
+    CHECK(volume(read(gltf)) == Approx(16).epsilon(1e-12));
+    for (const double bad : {0.0, std::nan(""), double(INFINITY)}) {
+        attributes["ROTATION"] = gltf.accessor({0, 0, 0, 1, 0, 0, 0, bad}, Gltf::Float, "VEC4");
+        refuses(gltf, {"rotation of instance 1 of node 0"});
+    }
+    attributes["ROTATION"] = "abc";
+    refuses(gltf, {"instances of node 0", "ROTATION"});
+}
+
 TEST_CASE("glTF: every instance of EXT_mesh_gpu_instancing is there") {
     Gltf gltf = Gltf::cube();
     const int t = gltf.points({{0, 0, 0}, {5, 0, 0}, {0, 5, 0}});
@@ -222,6 +252,26 @@ TEST_CASE("glTF: the scene that is shown is read") {
     CHECK(volume(read(gltf)) == 16);
     gltf.add("meshes", gltf.file["meshes"][0]);
     CHECK(tells(read(gltf), "1 meshes were left out"));
+}
+
+TEST_CASE("glTF: what the scene does not show is told") {
+    Gltf gltf = Gltf::cube();
+    gltf.add("nodes", {{"mesh", 0}, {"translation", {10, 0, 0}}});
+    gltf.add("nodes", {{"children", {1}}});
+    const Polygons shared = read(gltf);
+    CHECK(volume(shared) == 8);
+    CHECK(tells(shared, "1 nodes with a mesh are outside of the scene"));
+    gltf.file["scenes"][0]["nodes"] = {0, 2};
+    CHECK(read(gltf).notes.empty());
+    gltf.file["scenes"][0]["nodes"] = json::array();
+    CHECK(tells(read(gltf), "the scene shows 0 meshes; the file has 1 meshes and 3 nodes"));
+    CHECK(tells(read(gltf), "2 nodes with a mesh are outside of the scene"));
+    Gltf empty;
+    empty.view({0}, Gltf::Byte);
+    CHECK(tells(read(empty), "the file has 0 meshes and 0 nodes"));
+    Gltf points = Gltf::cube();
+    primitive(points)["mode"] = 0;
+    CHECK(tells(read(points), "1 primitives of points or lines"));
 }
 
 TEST_CASE("glTF: trees of nodes may be deep, and must be trees") {
@@ -335,6 +385,100 @@ TEST_CASE("glTF: what is damaged is refused by its name") {
     Gltf gltf = Gltf::cube();
     primitive(gltf)["indices"] = gltf.indices({0, 1, 8});
     refuses(gltf, {"index 2", "is 8", "8 vertices"});
+}
+
+TEST_CASE("glTF: members of a wrong type or length are refused by what stands there") {
+    const auto wrong = [](const std::string& at, const json& value, const Strings& words) {
+        Gltf gltf = Gltf::cube();
+        gltf.file["skins"] = {{{"joints", {0}}}};
+        gltf.file[json::json_pointer(at)] = value;
+        refuses(gltf, words);
+    };
+    for (const auto& [name, count] :
+         {std::pair("translation", 3), std::pair("scale", 3), std::pair("rotation", 4), std::pair("matrix", 16)}) {
+        const std::string of = std::string("the ") + name + " of node 0 ", at = std::string("/nodes/0/") + name;
+        const std::string right = std::to_string(count);
+        wrong(at, "abc", {of + "is \"abc\"; it must be an array of " + right + " numbers"});
+        wrong(at, 7, {of + "is 7;"});
+        wrong(at, nullptr, {of + "is null;"});
+        wrong(at, {{"x", 1}}, {of + "is {\"x\":1};"});
+        wrong(at, {1, "2", 3}, {of + "is [1,\"2\",3];"});
+        wrong(at, json::array(), {of + "has 0 numbers; it must have " + right});
+        wrong(at, std::vector<int>(std::size_t(count) + 1), {"must have " + right});
+    }
+    wrong("/accessors/0/byteOffset", -8, {"the byteOffset of accessor 0 is -8", "not negative"});
+    wrong("/accessors/0/byteOffset", 0.5, {"the byteOffset of accessor 0 is 0.5"});
+    wrong("/accessors/0/bufferView", "x", {"the bufferView of accessor 0 is \"x\""});
+    wrong("/accessors/0/normalized", 1, {"the normalized of accessor 0 is 1", "true or false"});
+    wrong("/accessors/0/count", -1, {"the count of accessor 0 is -1"});
+    wrong("/accessors/0/type", "VECTOR", {"the type of accessor 0 is \"VECTOR\"", "VEC3"});
+    wrong("/accessors/0/type", std::string(500, 'V'), {std::string(39, 'V') + " ...;"});
+    wrong("/accessors/0/sparse", {{"count", 1}}, {"the sparse of accessor 0 has no indices"});
+    wrong("/accessors/0", 5, {"the accessors of the file is [5,", "array of objects"});
+    wrong("/bufferViews/1/byteOffset", -8, {"the byteOffset of buffer view 1 is -8"});
+    wrong("/bufferViews/1/byteStride", "4", {"the byteStride of buffer view 1 is \"4\""});
+    wrong("/nodes", {{"mesh", 0}}, {"the nodes of the file"});
+    wrong("/nodes/0/mesh", -1, {"the mesh of node 0 is -1"});
+    wrong("/nodes/0/mesh", std::uint64_t(1) << 32, {"the mesh of node 0 is 4294967296"});
+    wrong("/nodes/0/children", {0, "1"}, {"the children of node 0"});
+    wrong("/scene", "main", {"the scene of the file is \"main\""});
+    wrong("/scenes/0/nodes", 0, {"the nodes of scene 0 is 0"});
+    wrong("/skins/0/joints", "hip", {"the joints of skin 0"});
+    wrong("/meshes/0/primitives", 3, {"the primitives of mesh 0 is 3"});
+    wrong("/meshes/0/primitives/0/mode", "4", {"the mode of primitive 0 of mesh 0 is \"4\""});
+    wrong("/meshes/0/primitives/0/indices", -1, {"the indices of primitive 0 of mesh 0 is -1"});
+    wrong("/meshes/0/primitives/0/attributes", {{"POSITION", "0"}}, {"the attributes of primitive 0 of mesh 0"});
+    wrong("/extensionsRequired", "KHR_draco_mesh_compression", {"the extensionsRequired of the file"});
+    wrong("/asset/version", 2, {"the version of the asset of the file is 2"});
+    Gltf gltf = Gltf::cube();
+    gltf.file["nodes"][0]["mesh"] = 0.0;
+    gltf.file["accessors"][0]["count"] = 8.0;
+    CHECK(volume(read(gltf)) == 8);
+    gltf.file["accessors"][0].erase("count");
+    refuses(gltf, {"accessor 0 has no count"});
+}
+
+TEST_CASE("glTF: what stands in the file is quoted to 40 bytes") {
+    const std::string longName = std::string(38, 'X') + "\xc3\xa4\xc3\xa4" + std::string(200, 'X');
+    Gltf gltf = Gltf::cube();
+    gltf.file["extensionsRequired"] = {longName};
+    refuses(gltf, {"extension " + std::string(38, 'X') + "   ..."});  // the letter's two bytes are blanked
+    gltf.file.erase("extensionsRequired");
+    gltf.file["asset"]["version"] = std::string(300, '1');
+    refuses(gltf, {"is glTF " + std::string(40, '1') + " ...;"});
+    for (const std::size_t size : {100, 5000})
+        CHECK_THROWS_WITH(readScene(gltf.writeApart("apart.gltf", std::string(size, 'b'), "")),
+                          Catch::Contains("buffer 0: its uri is " + std::string(40, 'b') + " ...: "));
+}
+
+TEST_CASE("glTF: damaged JSON is refused by line and column, or by what stands there") {
+    const auto path = test::scratch("damaged.gltf");
+    const auto damaged = [&](const std::string& text, const std::string& words) {
+        std::ofstream(path, std::ios::binary) << text;
+        CAPTURE(text.substr(0, 100));
+        try {
+            readScene(path);
+            FAIL_CHECK("was read");
+        } catch (const std::runtime_error& error) {
+            CHECK(std::string(error.what()) == path.string() + ": " + words);
+        }
+    };
+    damaged("", "line 1, column 1: its JSON is damaged: unexpected end of input; expected a value");
+    damaged("{\n \"a\":", "line 2, column 6: its JSON is damaged: unexpected end of input; expected a value");
+    damaged("{\"a\" 1}", "line 1, column 6: its JSON is damaged: unexpected number literal; expected ':', at 1}");
+    damaged("{\n\"a\":\"x", "line 2, column 7: its JSON is damaged: invalid string: missing closing quote");
+    damaged("{'a':1}", "line 1, column 2: its JSON is damaged: invalid literal; expected string literal, at 'a':1}");
+    damaged("{\"a\":\n1e999}", "line 2, column 1: the number 1e999 is too large");
+    damaged("{\"a\":" + std::string(5000, '9') + "}",
+            "line 1, column 6: the number " + std::string(40, '9') + " ... is too large");
+    damaged("{\"a\":[1,]}", "line 1, column 9: its JSON is damaged: unexpected ']'; expected a value, at ]}");
+    damaged("{\"a\":\"" + std::string(5000, 'x'),
+            "line 1, column 5007: its JSON is damaged: invalid string: missing closing quote");
+    damaged(R"({"asset":{"version":"2.0"},"buffers":[{"byteLength":-1}]})",
+            "the byteLength of buffer 0 is -1; it must be an integer that is not negative");
+    damaged(R"({"asset":{"version":"2.0"},"buffers":[{"byteLength":0,"uri":"data:;base64,"}]})",
+            "buffer 0: its byteLength is 0; it must be at least 1");
+    damaged("[]", "its JSON is no object, as glTF's is");
 }
 
 TEST_CASE("glTF: buffers are regular files in the folder of the scene") {

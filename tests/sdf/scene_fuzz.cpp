@@ -114,6 +114,8 @@ std::string complaint(const SceneFile& file) {
         if (text.find('\n') != std::string::npos) return "more than a line: " + text;
         if (text.size() > path.string().size() + 500) return "too long: " + text;
         if (text.find("damaged answer") != std::string::npos) return text;
+        for (const char* jargon : {"std::", "::_M_", "basic_string", "stoi", "stol", "json.exception", "exception"})
+            if (text.find(jargon) != std::string::npos) return "not in plain words: " + text;
     }
     return {};
 }
