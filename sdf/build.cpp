@@ -476,9 +476,12 @@ class Build {
 
     bool isKnownToIntersectItself() const { return options_.inspected && options_.inspected->selfIntersections > 0; }
 
-    // Whether normals do not tell the sides: they contradict each other, or cancel out on faces back to back.
+    // Whether normals do not tell the sides: they contradict each other, or cancel out on faces back to back. Those of
+    // other diagonals have no triangle in common, but winding numbers find nothing between them.
     bool contradictory(const Mesh& mesh) {
-        return signs_.conflicts > 0 || (signs_.undecided > 0 && hasFacesBackToBack(mesh, &progress_));
+        if (signs_.conflicts > 0) return true;
+        return signs_.undecided > 0 &&
+               (hasFacesBackToBack(mesh, &progress_) || chooseSignOfSolid(mesh, &progress_).sign == Sign::flood);
     }
 
     // Fills by the method asked for, with the sides of another field of the mesh.

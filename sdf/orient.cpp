@@ -295,7 +295,7 @@ class Orienter {
         if (bounding.empty()) return;
         const TriangleTree tree(mesh_, progress_);
         const auto enclosing = enclosingParts(mesh_, tree, partOf, pieces_.size(), progress_);
-        const Sides sides(mesh_, tree, topology_, progress_);
+        const Sides sides(mesh_, tree, progress_);
         for (const unsigned p : bounding)
             if (wrong(pieces_[p], enclosing[p]) && !standsRight(pieces_[p], sides)) {
                 flip(pieces_[p]);

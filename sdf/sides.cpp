@@ -6,7 +6,10 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <limits>
 #include <numeric>
+
+#include "sdf/progress.h"
 
 namespace bilayer {
 namespace {
@@ -17,14 +20,17 @@ constexpr std::size_t samplesOfMesh = 512;
 constexpr std::size_t linesPerSample = 32;
 /// Nearer than this to a half, a winding number tells neither inside nor outside: three times its error.
 constexpr double unclear = 0.15;
+/// How far apart surfaces lie that are one but for the rounding of coordinates, relative to the largest of them: half a
+/// unit in the last place, on each axis of both.
+constexpr double roundingApart = 2.0 * std::numeric_limits<float>::epsilon();
 
 }  // namespace
 
-Sides::Sides(const Mesh& mesh, const TriangleTree& tree, const Topology& topology, Progress* progress)
+Sides::Sides(const Mesh& mesh, const TriangleTree& tree, Progress* progress)
     : mesh_(mesh),
       tree_(tree),
-      topology_(topology),
       progress_(progress),
+      samePlace_(roundingApart * double(tree.largestCoordinate())),
       directions_(spreadDirections(linesPerSample)) {}
 
 double Sides::area(unsigned triangle) const {
@@ -55,8 +61,8 @@ Bounding Sides::measure(std::span<const unsigned> triangles, std::size_t samples
     return {counts.solid / all, counts.buried / all, counts.reversed / all, counts.nothing / all};
 }
 
-// The copies of a triangle add half of their number to the winding number on either side, all others the mean of their
-// crossings.
+// Triangles that lie in the same place, copies or parts of another triangulation, add half of their number to the
+// winding number on either side, all others the mean of their crossings.
 void Sides::add(unsigned triangle, std::size_t sample, Bounding& sum) const {
     // a large triangle gets many samples: points of R. Kronecker's sequence, the first of them off the edges
     double u = std::fmod(0.25 + 0.7548776662466927 * double(sample), 1);
@@ -67,22 +73,23 @@ void Sides::add(unsigned triangle, std::size_t sample, Bounding& sum) const {
     }
     const glm::uvec3& t = mesh_.triangles[triangle];
     const glm::dvec3 a = mesh_.points[t.x], b = mesh_.points[t.y], c = mesh_.points[t.z];
-    const glm::dvec3 point = a + u * (b - a) + v * (c - a), normal = glm::cross(b - a, c - a);
+    const glm::dvec3 point = a + u * (b - a) + v * (c - a), normal = glm::normalize(glm::cross(b - a, c - a));
     std::vector<Crossing> found;
-    double others = 0, copies = 0;
+    double others = 0, here = 0;
     for (const glm::dvec3& direction : directions_) {
         poll(progress_);
         tree_.crossings(point, direction, found);
-        const int facing = glm::dot(normal, direction) > 0 ? 1 : -1;
+        const double cosine = glm::dot(normal, direction);
+        const int facing = cosine > 0 ? 1 : -1;
         for (const Crossing& crossing : found) {
-            if (topology_.original[crossing.triangle] == topology_.original[triangle])
-                copies += crossing.sign * facing;
+            if (std::abs(crossing.along * cosine) <= samePlace_)
+                here += crossing.sign * facing;
             else
                 others += crossing.along > 0 ? crossing.sign : -crossing.sign;
         }
     }
     const double middle = others / double(2 * directions_.size());
-    const double half = 0.5 * std::round(copies / double(directions_.size()));
+    const double half = 0.5 * std::round(here / double(directions_.size()));
     const double before = middle - half, behind = middle + half;
     const auto inside = [](double winding) { return winding > 0.5 + unclear; };
     const auto outside = [](double winding) { return winding < 0.5 - unclear; };
@@ -98,10 +105,9 @@ void Sides::add(unsigned triangle, std::size_t sample, Bounding& sum) const {
 
 Bounding bounding(const Mesh& mesh, Progress* progress) {
     const TriangleTree tree(mesh, progress);
-    const Topology topology(mesh, progress);
     std::vector<unsigned> all(mesh.triangles.size());
     std::iota(all.begin(), all.end(), 0u);
-    return Sides(mesh, tree, topology, progress).measure(all, samplesOfMesh);
+    return Sides(mesh, tree, progress).measure(all, samplesOfMesh);
 }
 
 }  // namespace bilayer

@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "sdf/mesh.h"
-#include "sdf/topology.h"
 #include "sdf/triangle_tree.h"
 
 namespace bilayer {
@@ -27,7 +26,7 @@ struct Bounding {
 class Sides {
   public:
     /// @param progress  polled, unless null
-    Sides(const Mesh& mesh, const TriangleTree& tree, const Topology& topology, Progress* progress = nullptr);
+    Sides(const Mesh& mesh, const TriangleTree& tree, Progress* progress = nullptr);
 
     /// What some of the triangles bound, at `samples` points of equal shares of their area. Deterministic.
     Bounding measure(std::span<const unsigned> triangles, std::size_t samples) const;
@@ -38,8 +37,8 @@ class Sides {
 
     const Mesh& mesh_;
     const TriangleTree& tree_;
-    const Topology& topology_;
     Progress* progress_;
+    double samePlace_;  // surfaces no farther apart are one [m]
     std::vector<glm::dvec3> directions_;
 };
 

@@ -104,6 +104,14 @@ TEST_CASE("what a surface bounds is told by area") {
     Mesh doubled = shapes::sphere(1, 2);
     doubled.triangles.insert(doubled.triangles.end(), doubled.triangles.begin(), doubled.triangles.end());
     CHECK(bounding(doubled).solid == 1);
+    // coplanar sides in part: the wall between two boxes is buried
+    for (const float offset : {0.f, 0.1f, 0.25f}) {
+        const Mesh box = shapes::box({0.5f, 0.5f, 0.5f}, 3);
+        const Bounding stack = bounding(shapes::join({box, shapes::moved(box, {1, offset, 0})}));
+        CAPTURE(offset);
+        CHECK(stack.nothing == 0);
+        CHECK(stack.buried == Approx((1 - offset) / 6).margin(0.02));
+    }
 }
 
 TEST_CASE("closed and oriented public meshes keep their normals") {

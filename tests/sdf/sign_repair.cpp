@@ -79,6 +79,20 @@ Mesh doubled(const Mesh& mesh, Random& random) {
     return both;
 }
 
+// Pairs of triangles are quadrilaterals (a, b, c), (a, c, d); each again, the other way around, at random by the other
+// diagonal.
+Mesh withBacksOfQuads(const Mesh& mesh, Random& random) {
+    Mesh both = mesh;
+    for (std::size_t i = 0; i < mesh.triangles.size(); i += 2) {
+        const glm::uvec3 &first = mesh.triangles[i], &second = mesh.triangles[i + 1];
+        const unsigned a = first.x, b = first.y, c = first.z, d = second.z;
+        const bool other = random() % 4 > 0;
+        both.triangles.push_back(other ? glm::uvec3(b, a, d) : glm::uvec3(c, b, a));
+        both.triangles.push_back(other ? glm::uvec3(d, c, b) : glm::uvec3(d, c, a));
+    }
+    return both;
+}
+
 Mesh openBox() {
     Mesh box = shapes::box({1, 0.8f, 0.6f}, 2);
     box.triangles.resize(box.triangles.size() - 8);
@@ -234,6 +248,27 @@ TEST_CASE("a solid whose every face is there twice, back to back, is not empty")
         }
 }
 
+TEST_CASE("a solid whose back faces have other diagonals than its front faces is not empty") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    Random random(seed);
+    const Mesh box = shapes::box({1, 0.7f, 0.5f});
+    const Mesh apart = shapes::join({box, shapes::moved(shapes::box({0.5f, 0.5f, 0.5f}, 2), {2, 0, 0})});
+    for (const Mesh& solid : {shapes::box({1, 1, 1}), box, shapes::box({1, 0.8f, 0.6f}, 3), apart})
+        for (const bool turns : {false, true})
+            for (const float resolution : {8.f, 20.f, 32.f}) {
+                const glm::dquat rotation = turns ? anyRotation(random) : glm::dquat(1, 0, 0, 0);
+                const Mesh outward = turned(solid, rotation, anyPoint(random, 1));
+                const Mesh mesh = withBacksOfQuads(outward, random);
+                CHECK(balanced(mesh));
+                for (const bool unite : {false, true}) {
+                    const LevelSet field = build(mesh, {.voxelSize = voxelSizeFor(mesh, resolution), .unite = unite});
+                    CAPTURE(solid.triangles.size(), turns, resolution, unite, field.sign(), field.signReason());
+                    CHECK(wrongSigns(field, test::Truth(outward)) == 0);
+                }
+            }
+}
+
 TEST_CASE("double sheets stay as they are and hold nothing") {
     const unsigned seed = test::seed();
     CAPTURE(seed);
@@ -253,6 +288,11 @@ TEST_CASE("double sheets stay as they are and hold nothing") {
             inside += *voxel < -float(onSurface) * field.voxelSize();
         CHECK(inside == 0);
     }
+    Mesh square = shapes::box({1, 1, 1});
+    square.triangles.resize(2);
+    const LevelSet field = build(withBacksOfQuads(square, random), {.voxelSize = voxelSizeFor(square, 30)});
+    for (auto voxel = field.grids().distance->cbeginValueOn(); voxel; ++voxel)
+        REQUIRE(*voxel >= -float(onSurface) * field.voxelSize());
     CHECK_FALSE(hasFacesBackToBack(shapes::box({1, 1, 1})));
     const Mesh box = shapes::box({1, 1, 1});
     CHECK_FALSE(hasFacesBackToBack(shapes::join({box, box})));
