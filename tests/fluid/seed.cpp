@@ -387,6 +387,38 @@ TEST_CASE("the volume of the two boxes of the cases") {
     CHECK(inspect(surfaceOfIt).nonManifoldEdges == 0);
 }
 
+TEST_CASE("boxes stacked face on face seed as one, wherever voxels lie") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    std::mt19937 random(seed);
+    std::normal_distribution<float> normal;
+    const Mesh half = shapes::box({0.5f, 0.5f, 0.5f}), whole = shapes::box({1, 0.5f, 0.5f});
+    // mirrored in y, so that the other box's share of the wall has the other diagonal
+    Mesh mirrored = shapes::flipped(half);
+    for (glm::vec3& p : mirrored.points) p.y = -p.y;
+    const auto stackOf = [&](const Mesh& other) {
+        return shapes::join({shapes::moved(half, {-0.5f, 0, 0}), shapes::moved(other, {0.5f, 0, 0})});
+    };
+    for (const float resolution : {16.f, 20.f, 32.f, 50.f, 63.f, 64.f, 65.f, 100.f})
+        for (const bool turns : {false, true}) {
+            Pose pose;
+            if (turns) {
+                pose.position = {normal(random), normal(random), normal(random)};
+                pose.rotation =
+                    glm::normalize(glm::quat(normal(random), normal(random), normal(random), normal(random)));
+            }
+            const auto one = emptyLiquid(2 / resolution);
+            fluid::seed(*one, whole, pose);
+            for (const Mesh& other : {half, mirrored}) {
+                const auto stacked = emptyLiquid(2 / resolution);
+                CAPTURE(resolution, turns);
+                fluid::seed(*stacked, stackOf(other), pose);
+                requireLevelSet(*stacked);
+                CHECK(volume(*stacked) == Approx(volume(*one)).epsilon(1e-3));
+            }
+        }
+}
+
 TEST_CASE("whether an open mesh is taken depends on the mesh and the voxels' size, not on their place") {
     const unsigned seed = test::seed();
     CAPTURE(seed);
