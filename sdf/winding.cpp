@@ -42,6 +42,10 @@ constexpr float slack = 1e-3f;
 constexpr double calmSlope = 0.02;
 /// Kept back of the distance to a half for voxels near the surface: two links, each at most sqrt(3) voxels.
 constexpr double reserve = 2 * 1.7320508075688772 * calmSlope;
+/// Where a closed mesh is asked about a voxel that no surface is near [voxels]: beside it, as walls that cancel out,
+/// those within a union, often pass through voxels. Shorter than the half voxel that is free, and along no simple
+/// plane.
+const glm::dvec3 beside(0.113, 0.071, 0.167);
 const double halfDiagonal = std::sqrt(3.0) / 2;  // of a cube of side 1
 
 // The median split of items by the longest side of the box around them; returns the middle.
@@ -431,6 +435,7 @@ struct Question {
     Progress* progress;
 
     glm::dvec3 at(const openvdb::Coord& voxel) const { return glm::dvec3(voxel.x(), voxel.y(), voxel.z()) * voxelSize; }
+    glm::dvec3 clearOfWalls(const glm::dvec3& point) const { return slope ? point : point + voxelSize * beside; }
     glm::dvec3 centre(const openvdb::Coord& origin, std::int32_t side) const {
         return (glm::dvec3(origin.x(), origin.y(), origin.z()) + 0.5 * (side - 1)) * voxelSize;
     }
@@ -552,7 +557,8 @@ void BrickSigns::signEmpty() {
 // From the centre of a cell to those of its neighbours, as long as it is certain that the number stays on its side.
 void BrickSigns::spreadEmpty(std::size_t seed) {
     const auto halfWay = [](const Empty& e) { return halfDiagonal * e.cell.side * e.slope; };
-    const Answer answer = ask(question_, question_.centre(empties_[seed].cell.origin, empties_[seed].cell.side));
+    const glm::dvec3 centre = question_.centre(empties_[seed].cell.origin, empties_[seed].cell.side);
+    const Answer answer = ask(question_, question_.clearOfWalls(centre));
     empties_[seed].margin = answer.margin;
     empties_[seed].inside = answer.inside;
     if (empties_.size() == 1) return;
@@ -595,7 +601,8 @@ void BrickSigns::settle(const openvdb::Coord& origin, std::int32_t side, const A
 }
 
 Answer BrickSigns::decide(State& state, unsigned voxel) {
-    const Answer answer = ask(question_, question_.at(state.leaf->offsetToGlobalCoord(voxel)));
+    const glm::dvec3 point = question_.at(state.leaf->offsetToGlobalCoord(voxel));
+    const Answer answer = ask(question_, test(state.open, voxel) ? question_.clearOfWalls(point) : point);
     set(state.known, voxel);
     if (answer.inside) set(state.inside, voxel);
     return answer;
