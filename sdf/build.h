@@ -75,8 +75,8 @@ struct BuildOptions {
     /// surface (unite.h), and winding numbers tell the signs. Triangles are numbered as outwardMesh() (sign.h) has them
     /// then. For Method::exact and pseudonormal; a mesh that needs Sign::flood keeps all walls.
     bool unite = false;
-    /// What inspect() said of this very mesh, where that is known. Sign::automatic then takes winding numbers at once for
-    /// a closed mesh that intersects itself, and need not compare signs where it does not. Null: not known.
+    /// What inspect() said of this very mesh, where that is known. Sign::automatic then takes winding numbers at once
+    /// for a closed mesh that intersects itself, and need not compare signs where it does not. Null: not known.
     const MeshReport* inspected = nullptr;
     DoubleLayerOptions doubleLayer{};
     bool triangles = false;  ///< also keep the nearest triangle of each active voxel

@@ -170,9 +170,9 @@ class Touching {
             // Where both ends are within reach, one of them is enough.
             const bool isOther = there.distance <= edgeReach_ && next < index;
             if (!fallsBetween(first, last) || isOther) continue;
-            const auto lowest =
-                lowestBetween(first, last, searchTolerance * voxel_,
-                              [&](float way) { return std::optional<Slope>(slopeOf(way, nearAt(way))); });
+            const auto lowest = lowestBetween(first, last, searchTolerance * voxel_, [&](float way) {
+                return std::optional<Slope>(slopeOf(way, nearAt(way)));
+            });
             const auto touchAt = [&](float way) -> Touch {
                 const Convex::Near near = nearAt(way);
                 return {near.distance, near.normal};
