@@ -480,8 +480,8 @@ class Build {
     // other diagonals have no triangle in common, but winding numbers find nothing between them.
     bool contradictory(const Mesh& mesh) {
         if (signs_.conflicts > 0) return true;
-        return signs_.undecided > 0 &&
-               (hasFacesBackToBack(mesh, &progress_) || chooseSignOfSolid(mesh, &progress_).sign == Sign::flood);
+        if (signs_.undecided == 0 || foldsBack(mesh, &progress_)) return false;
+        return hasFacesBackToBack(mesh, &progress_) || chooseSignOfSolid(mesh, &progress_).sign == Sign::flood;
     }
 
     // Fills by the method asked for, with the sides of another field of the mesh.

@@ -6,6 +6,8 @@
 
 #include <cstdint>
 #include <functional>
+#include <glm/geometric.hpp>
+#include <span>
 #include <stdexcept>
 #include <utility>
 
@@ -101,6 +103,21 @@ bool hasFacesBackToBack(const Mesh& mesh, Progress* progress) {
     for (const unsigned i : Polled(mesh.triangles.size(), progress))
         if (topology.proper(i) && topology.facesOpposite(i, topology.original[i])) return true;
     return false;
+}
+
+bool foldsBack(const Mesh& mesh, Progress* progress) {
+    constexpr double straightBack = -1 + 1e-6;  // cosine between two normals
+    const auto areaOf = [&](const glm::uvec3& t) {
+        const glm::dvec3 a(mesh.points[t.x]), b(mesh.points[t.y]), c(mesh.points[t.z]);
+        return glm::cross(b - a, c - a);
+    };
+    bool found = false;
+    Topology(mesh, progress).forEachEdge([&](std::span<const EdgeUse> uses) {
+        if (uses.size() != 2 || uses[0].forward == uses[1].forward) return;
+        const glm::dvec3 a = areaOf(mesh.triangles[uses[0].triangle]), b = areaOf(mesh.triangles[uses[1].triangle]);
+        found |= glm::dot(a, b) < straightBack * glm::length(a) * glm::length(b);
+    });
+    return found;
 }
 
 SignChoice chooseSign(const Mesh& mesh, Progress* progress) {

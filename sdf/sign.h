@@ -21,6 +21,10 @@ bool balanced(const Mesh& mesh, Progress* progress = nullptr);
 /// Whether some triangle is there twice, the two facing opposite ways. O(n log n). The mesh must be valid.
 bool hasFacesBackToBack(const Mesh& mesh, Progress* progress = nullptr);
 
+/// Whether two triangles lie on each other along an edge of theirs, facing opposite ways: as a sheet and its back do at
+/// the sheet's rim, and the walls of a solid do not. O(n log n). The mesh must be valid.
+bool foldsBack(const Mesh& mesh, Progress* progress = nullptr);
+
 /// How signs are to be found.
 struct SignChoice {
     Sign sign = Sign::normals;   ///< never `automatic`

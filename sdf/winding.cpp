@@ -34,8 +34,6 @@ constexpr double uselessError = 10;
 constexpr double handOn = 0.5;
 /// Room for rounding where nothing but the side of a half is asked for [1].
 constexpr double onlySide = 0.999;
-/// The rounding of a determinant, relative to the lengths of its columns.
-constexpr double roundingOfHeights = 4 * std::numeric_limits<double>::epsilon();
 /// Room for the rounding of floats in distances that are added up [voxels].
 constexpr float slack = 1e-3f;
 /// Where the winding number may change by more than this from voxel to voxel it is asked for in smaller regions.
@@ -104,14 +102,10 @@ double determinant(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c
     return glm::dot(a, glm::cross(b, c));
 }
 
-// None in the triangle's plane, the mean of both sides: two walls in the same place then cancel out, whatever their
-// triangles.
 double solidAngle(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c) {
     const double la = glm::length(a), lb = glm::length(b), lc = glm::length(c);
-    const double height = determinant(a, b, c);
-    if (std::abs(height) <= roundingOfHeights * la * lb * lc) return 0;
     const double below = la * lb * lc + glm::dot(a, b) * lc + glm::dot(b, c) * la + glm::dot(c, a) * lb;
-    return 2 * std::atan2(height, below);
+    return 2 * std::atan2(determinant(a, b, c), below);
 }
 
 // The symmetric part of a b^T: xx, yy, zz, xy, yz, zx.
