@@ -1,12 +1,11 @@
-// From a mesh file to a field file: whole commands in cold processes, beside OpenVDB's own ways; and reading alone,
-// beside Assimp.
+// From a mesh file to a field file: whole commands in cold processes, compared with OpenVDB's own ways;
+// and reading alone, compared with Assimp.
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <openvdb/io/File.h>
 #include <openvdb/openvdb.h>
 #include <openvdb/tools/MeshToVolume.h>
 #include <spawn.h>
-#include <sys/resource.h>
 #include <sys/wait.h>
 #include <tbb/global_control.h>
 #include <unistd.h>
@@ -56,7 +55,6 @@ using Words = std::vector<std::string>;
 /// What a command took.
 struct Run {
     double seconds = 0;
-    std::uint64_t peakBytes = 0;
     std::string out;
     bool done = false;  // with status 0
 };
@@ -82,11 +80,10 @@ Run timed(const Words& words, const fs::path& scratch) {
     posix_spawn_file_actions_destroy(&files);
     if (error) throw std::system_error(error, std::generic_category(), words[0]);
     int status = 0;
-    rusage usage{};
-    while (::wait4(process, &status, 0, &usage) < 0)
-        if (errno != EINTR) throw std::system_error(errno, std::generic_category(), "wait4");
+    while (::waitpid(process, &status, 0) < 0)
+        if (errno != EINTR) throw std::system_error(errno, std::generic_category(), "waitpid");
     const double seconds = watch.seconds();
-    return {seconds, std::uint64_t(usage.ru_maxrss) * 1024, slurp(out), WIFEXITED(status) && WEXITSTATUS(status) == 0};
+    return {seconds, slurp(out), WIFEXITED(status) && WEXITSTATUS(status) == 0};
 }
 
 // PLY as text, which the project itself does not write.
@@ -164,7 +161,6 @@ void readOnly(const Options& options, bool byAssimp) {
 /// The ways from file to file and of reading, and what each took.
 struct Contest {
     std::map<std::string, std::vector<double>> seconds;
-    std::map<std::string, std::uint64_t> peakBytes;
     std::map<std::string, std::vector<double>> parts;  // of ours
 };
 
@@ -191,7 +187,6 @@ Contest contest(const Options& options, const fs::path& mesh, const fs::path& sc
             if (!run.done) continue;
             const bool isRead = name.starts_with("read");
             result.seconds[name].push_back(isRead ? std::stod(run.out) : run.seconds);
-            result.peakBytes[name] = std::max(result.peakBytes[name], run.peakBytes);
             if (name != "bilayer") continue;
             const auto json = nlohmann::json::parse(run.out);
             double rest = run.seconds;
@@ -235,10 +230,10 @@ void measure(const Options& options, const fs::path& scratch) {
         "side.\n\n",
         options.rounds, options.threads, options.resolution);
     fmt::print(
-        "| mesh | format | MB | bilayer build [s] | read | build | glance | write | rest [%] | peak [MB] | vdb_tool "
+        "| mesh | format | MB | bilayer build [s] | read | build | glance | write | rest [%] | vdb_tool "
         "[s] | ratio "
         "| Assimp + OpenVDB [s] | ratio | read [ms] | Assimp [ms] | ratio |\n"
-        "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n");
+        "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n");
     for (const std::string& name : options.meshes) {
         const Mesh mesh = scene(findSource(name), float(options.resolution)).mesh;
         for (const std::string& format : options.formats) {
@@ -252,9 +247,7 @@ void measure(const Options& options, const fs::path& scratch) {
                                         ? "fails"
                                         : fmt::format("{:.0f}", 100 * median(found->second) / whole));
             }
-            const auto peak = c.peakBytes.find("bilayer");
-            fmt::print(" {:.0f} | {} | {} | {} | {} | {} | {} | {} |\n",
-                       peak == c.peakBytes.end() ? 0. : double(peak->second) / 1e6, cell(medianOf(c, "vdb_tool"), 3),
+            fmt::print(" {} | {} | {} | {} | {} | {} | {} |\n", cell(medianOf(c, "vdb_tool"), 3),
                        cell(ratio(c, "vdb_tool", "bilayer"), 1), cell(medianOf(c, "Assimp + OpenVDB"), 3),
                        cell(ratio(c, "Assimp + OpenVDB", "bilayer"), 1), cell(1e3 * medianOf(c, "read, bilayer"), 1),
                        cell(1e3 * medianOf(c, "read, Assimp"), 1), cell(ratio(c, "read, Assimp", "read, bilayer"), 1));
@@ -268,14 +261,14 @@ void measure(const Options& options, const fs::path& scratch) {
     fmt::print("\nGeometric means of the ratios: vdb_tool {:.1f}, Assimp with OpenVDB {:.1f}",
                geometricMean(means.vdbTool), geometricMean(means.assimpVdb));
     for (const auto& [format, ratios] : means.reading)
-        fmt::print(", reading {} beside Assimp {:.1f}", format, geometricMean(ratios));
+        fmt::print(", reading {} compared with Assimp {:.1f}", format, geometricMean(ratios));
     fmt::print("\n");
 }
 
 int run(int argc, char** argv) {
     Options options;
     options.bilayer = fs::read_symlink("/proc/self/exe").parent_path() / "bilayer";
-    CLI::App app("From mesh file to field file, beside vdb_tool, Assimp with OpenVDB, and Assimp alone.",
+    CLI::App app("From mesh file to field file, compared with vdb_tool, Assimp with OpenVDB, and Assimp alone.",
                  "bench_files");
     app.add_option("--meshes", options.meshes, "names or files");
     app.add_option("--formats", options.formats, "ply, ascii-ply, obj, stl")
@@ -285,7 +278,7 @@ int run(int argc, char** argv) {
     app.add_option("--threads", options.threads, "default 2; vdb_tool takes all that there are")
         ->check(CLI::Range(1, 1024));
     app.add_option("--rounds", options.rounds, "runs of each command, default 5")->check(CLI::Range(1, 1000));
-    app.add_option("--bilayer", options.bilayer, "the command line, default beside this program")
+    app.add_option("--bilayer", options.bilayer, "the command line, default in this program's folder")
         ->check(CLI::ExistingFile);
     auto* work = app.add_option("--work", options.work, "used by this program itself: build, read or read-assimp")
                      ->check(CLI::IsMember({"build", "read", "read-assimp"}));

@@ -9,32 +9,18 @@
 
 #include <bit>
 
+#include "sdf/tree_lanes.h"
+
 HWY_BEFORE_NAMESPACE();
 namespace bilayer::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-using Tag = hn::CappedTag<float, treeWidth>;
-using Vec = hn::Vec<Tag>;
-using Mask = hn::Mask<Tag>;
 using IndexTag = hn::RebindToUnsigned<Tag>;
 
 /// Rounding of a volume in floats, relative to the sum of the sizes of its products: eight roundings and some room.
 constexpr float roundingOfVolume = 1e-6f;
 /// More than what products lose where they are too small for a float.
 constexpr float leastProduct = 1e-30f, leastVolume = 1e-37f;
-
-inline unsigned bitsOf(Mask mask) {
-    std::uint8_t bits[8] = {};
-    hn::StoreMaskBits(Tag(), mask, bits);
-    return bits[0];
-}
-
-// Points, a lane each.
-struct Points {
-    Vec x, y, z;
-
-    Points operator-(const Points& o) const { return {hn::Sub(x, o.x), hn::Sub(y, o.y), hn::Sub(z, o.z)}; }
-};
 
 inline Points pointsAt(const float (&p)[3][treeWidth], std::size_t lane) {
     const Tag tag;

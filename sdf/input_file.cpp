@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <cctype>
 #include <cerrno>
 #include <stdexcept>
 #include <system_error>
@@ -19,6 +20,12 @@ void requireInputFile(const std::filesystem::path& path) {
     require(status.type() != std::filesystem::file_type::none, error.message());
     require(std::filesystem::is_regular_file(status), "not a regular file");
     require(::access(path.c_str(), R_OK) == 0, std::generic_category().message(errno));
+}
+
+std::string lowerEnding(const std::filesystem::path& path) {
+    std::string ending = path.extension().string();
+    for (char& c : ending) c = char(std::tolower(static_cast<unsigned char>(c)));
+    return ending;
 }
 
 }  // namespace bilayer

@@ -10,17 +10,12 @@
 
 #include <hwy/highway.h>
 
-#include <cstdint>
-
+#include "sdf/tree_lanes.h"
 #include "sdf/wide_tree.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace bilayer::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
-
-using Tag = hn::CappedTag<float, treeWidth>;
-using Vec = hn::Vec<Tag>;
-using Mask = hn::Mask<Tag>;
 
 /// Room for the rounding of a squared distance.
 constexpr float roundUp = 1 + 1e-6f;
@@ -30,12 +25,6 @@ constexpr float farthestPlace = 1e18f, longestReach = 4e18f;
 
 inline Vec square(Vec x) {
     return hn::Mul(x, x);
-}
-
-inline unsigned bitsOf(Mask mask) {
-    std::uint8_t bits[8] = {};
-    hn::StoreMaskBits(Tag(), mask, bits);
-    return bits[0];
 }
 
 // Adds the square of what a place on an edge's line lies beyond the edge.

@@ -1,6 +1,5 @@
 #include "sdf/mesh_io.h"
 
-#include <cctype>
 #include <string>
 
 #include "sdf/input_file.h"
@@ -12,8 +11,7 @@ namespace bilayer {
 namespace {
 
 Mesh readByEnding(const std::filesystem::path& path, ReadReport& report) {
-    std::string ending = path.extension().string();
-    for (char& c : ending) c = char(std::tolower(static_cast<unsigned char>(c)));
+    const std::string ending = lowerEnding(path);
     if (ending == ".obj") return readObj(path, report);
     if (ending == ".ply") return readPly(path, report);
     if (ending == ".stl") return readStl(path, report);

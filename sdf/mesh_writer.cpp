@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <cstring>
 #include <fstream>
 #include <glm/geometric.hpp>
@@ -12,6 +11,7 @@
 #include <vector>
 
 #include "sdf/atomic_file.h"
+#include "sdf/input_file.h"
 #include "sdf/mesh_io.h"
 #include "sdf/parallel_parts.h"
 
@@ -101,8 +101,7 @@ std::vector<Runs> stlOf(const Mesh& mesh) {
 }
 
 std::vector<Runs> contentsOf(const Mesh& mesh, const std::filesystem::path& path) {
-    std::string ending = path.extension().string();
-    for (char& c : ending) c = char(std::tolower(static_cast<unsigned char>(c)));
+    const std::string ending = lowerEnding(path);
     if (ending == ".obj") return objOf(mesh);
     if (ending == ".ply") return plyOf(mesh);
     if (ending == ".stl") return stlOf(mesh);

@@ -204,11 +204,9 @@ std::vector<std::string> notes(const TextSource& source, const std::vector<Part>
 
 /// The parts as one.
 Polygons joined(const TextSource& source, std::vector<Part>& parts) {
-    std::vector<std::size_t> begins{0};
-    for (const Part& part : parts) begins.push_back(begins.back() + part.points.size());
-    const std::size_t vertices = begins.back();
     Polygons all;
-    all.points.resize(vertices);
+    const std::vector<std::size_t> begins = setPoints(all, parts);
+    const std::size_t vertices = all.points.size();
     inOrder(parts.size(), [&](std::size_t i) {
         Part& part = parts[i];
         std::vector<unsigned>& corners = part.faces.corners;
@@ -217,7 +215,6 @@ Polygons joined(const TextSource& source, std::vector<Part>& parts) {
             Part again{part.text, {}, {}, {}, {}};
             PartReader(source, again, PartReader::Vertices{vertices, begins[i]}).run();
         }
-        std::copy(part.points.begin(), part.points.end(), all.points.begin() + std::ptrdiff_t(begins[i]));
     });
     std::vector<Faces> faces;
     for (Part& part : parts) faces.push_back(std::move(part.faces));

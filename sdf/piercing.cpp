@@ -4,7 +4,6 @@
 #include <oneapi/tbb/parallel_reduce.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>
@@ -16,6 +15,7 @@
 #include <vector>
 
 #include "sdf/close_pairs.h"
+#include "sdf/exact_sum.h"
 
 namespace bilayer {
 namespace {
@@ -24,33 +24,10 @@ namespace {
 /// bound (J. R. Shewchuk, "Adaptive Precision Floating-Point Arithmetic", 1997, has 7.8e-16 for exact differences).
 constexpr double roundingOfVolume = 2e-15;
 
-// A sum without rounding: J. R. Shewchuk (1997), growing an expansion by one number at a time.
-class ExactSum {
-  public:
-    void add(double value) {
-        std::size_t kept = 0;
-        for (std::size_t i = 0; i < count_; ++i) {
-            const double sum = value + parts_[i], other = sum - value;
-            const double rest = (value - (sum - other)) + (parts_[i] - other);
-            if (rest != 0) parts_[kept++] = rest;
-            value = sum;
-        }
-        if (value != 0) parts_[kept++] = value;
-        count_ = kept;
-    }
-
-    // The largest part comes last, and outweighs all others.
-    int sign() const { return count_ == 0 ? 0 : parts_[count_ - 1] > 0 ? 1 : -1; }
-
-  private:
-    std::array<double, 64> parts_{};
-    std::size_t count_ = 0;
-};
-
 // The sign of the volume of four points, for any floats: that of 24 products of three, each the exact sum of two
 // doubles.
 int exactSide(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c, const glm::dvec3& d) {
-    ExactSum sum;
+    ExactSum<64> sum;
     const auto add = [&](const glm::dvec3& p, const glm::dvec3& q, const glm::dvec3& r, double sign) {
         for (int i = 0; i < 3; ++i) {
             const int k = (i + 1) % 3, l = (i + 2) % 3;

@@ -1,11 +1,14 @@
 // What a mesh file holds: polygons, before they are cut into triangles and their vertices welded; internal.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <filesystem>
 #include <glm/vec3.hpp>
 #include <string>
 #include <vector>
+
+#include "sdf/parallel_parts.h"
 
 namespace bilayer {
 
@@ -44,6 +47,20 @@ struct Faces {
 /// The faces of all parts, in their order, as those of the polygons. Tells in their notes of those that were left out.
 template <class Scalar>
 void setFaces(PolygonsOf<Scalar>& polygons, const std::vector<Faces>& parts);
+
+/// The points of all parts, in their order, as those of the polygons.
+/// @tparam Part  has `points`, a vector of glm::dvec3
+/// @return where those of each part begin, and how many there are at the end
+template <class Part>
+std::vector<std::size_t> setPoints(Polygons& polygons, const std::vector<Part>& parts) {
+    std::vector<std::size_t> begins{0};
+    for (const Part& part : parts) begins.push_back(begins.back() + part.points.size());
+    polygons.points.resize(begins.back());
+    inOrder(parts.size(), [&](std::size_t i) {
+        std::copy(parts[i].points.begin(), parts[i].points.end(), polygons.points.begin() + std::ptrdiff_t(begins[i]));
+    });
+    return begins;
+}
 
 /// Cuts polygons into triangles, moves a mesh that is far away to an origin of its own, welds it, and tells what became
 /// of the file's contents. Throws std::runtime_error that names the file if no triangle is left, or if a face uses a

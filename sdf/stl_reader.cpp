@@ -175,13 +175,10 @@ Mesh readText(const TextSource& source, const std::filesystem::path& path, ReadR
     }
     inOrder(parts.size(), [&](std::size_t i) { TextReader(source, parts[i]).run(); });
     if (!parts.back().endsSolid) source.fail(source.end(), "the file ends before its 'endsolid'");
-    std::vector<std::size_t> begins{0};
-    for (const Part& part : parts) begins.push_back(begins.back() + part.points.size());
     Polygons polygons;
-    polygons.points.resize(begins.back());
+    const std::vector<std::size_t> begins = setPoints(polygons, parts);
     inOrder(parts.size(), [&](std::size_t i) {
         for (unsigned& corner : parts[i].faces.corners) corner += unsigned(begins[i]);
-        std::copy(parts[i].points.begin(), parts[i].points.end(), polygons.points.begin() + std::ptrdiff_t(begins[i]));
     });
     for (const Part& part : parts)
         if (part.linesLeft > 0)

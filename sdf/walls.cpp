@@ -17,6 +17,8 @@
 #include <glm/geometric.hpp>
 #include <limits>
 
+#include "sdf/tree_lanes.h"
+
 #ifndef BILAYER_SDF_WALLS_ONCE
 #define BILAYER_SDF_WALLS_ONCE
 namespace bilayer {
@@ -64,26 +66,10 @@ HWY_BEFORE_NAMESPACE();
 namespace bilayer::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-using Tag = hn::CappedTag<float, treeWidth>;
-using Vec = hn::Vec<Tag>;
-using Mask = hn::Mask<Tag>;
-
 /// Rounding of products in floats, relative to the sizes of their factors; generous.
 constexpr float rounding = 2e-6f;
 /// Directions are bent where they run along an axis, so that all can be divided by.
 constexpr float leastDirection = 1e-20f;
-
-inline unsigned bitsOf(Mask mask) {
-    std::uint8_t bits[8] = {};
-    hn::StoreMaskBits(Tag(), mask, bits);
-    return bits[0];
-}
-
-struct Points {
-    Vec x, y, z;
-
-    Points operator-(const Points& o) const { return {hn::Sub(x, o.x), hn::Sub(y, o.y), hn::Sub(z, o.z)}; }
-};
 
 inline Vec dot(const Points& a, const Points& b) {
     return hn::Add(hn::Add(hn::Mul(a.x, b.x), hn::Mul(a.y, b.y)), hn::Mul(a.z, b.z));

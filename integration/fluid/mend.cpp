@@ -43,8 +43,8 @@ constexpr int maxProjections = 100;  // rounds over all constraints
 constexpr int idleProjections = 30;  // rounds without a gain before other means are taken
 constexpr int maxRounds = 60;        // of descent; six or so do for what real meshes give
 constexpr int patience = 3;          // rounds without a gain before the surroundings are smoothed
-constexpr float notable = 0.1f;      // a change that is told [voxels]
-constexpr int reach = 3;             // [voxels] of the WENO stencil along the axes
+constexpr float notable = 0.1f - rounding;  // a change that is told [voxels]
+constexpr int reach = 3;                    // [voxels] of the WENO stencil along the axes
 // Changes that are tried at a voxel [voxels], either way.
 constexpr std::array<float, 6> steps{0.02f, 0.05f, 0.1f, 0.2f, 0.4f, 0.8f};
 constexpr float stepCost = 1e-3f;   // prefers small changes among equally good ones

@@ -320,6 +320,7 @@ TEST_CASE("shapes of right angles are level sets at any size and place") {
             const test::Truth truth(placed);
             const double off = error(*liquid, [&](const glm::dvec3& p) { return truth.signedDistance(p); });
             CHECK(off <= double(report.largestChange) + 1e-3);
+            CAPTURE(off, report.largestChange);
             CHECK((off < 0.1 || report.changedVoxels > 0));
         }
     }
