@@ -77,6 +77,11 @@ void compare(const NamedScene& scene, int threads, int repetitions) {
     std::fflush(stdout);
 }
 
+void printFingerprint(const NamedScene& scene) {
+    fmt::print("{} {:016x}\n", scene.name, scene.play().fingerprint);
+    std::fflush(stdout);
+}
+
 int run(int argc, char** argv) {
     CLI::App app(
         "Plays the scenes of rigid bodies of ./run demo, smaller: time of a step on one thread and on several.");
@@ -88,14 +93,23 @@ int run(int argc, char** argv) {
     app.add_option("--repetitions", repetitions, "of which medians are taken")
         ->capture_default_str()
         ->check(CLI::Range(1, 100));
+    bool fingerprints = false;
+    app.add_flag("--fingerprints", fingerprints, "only print a hash of all poses of each scene");
     CLI11_PARSE(app, argc, argv);
+    const auto isChosen = [&](const NamedScene& scene) {
+        return chosen.empty() || std::find(chosen.begin(), chosen.end(), scene.name) != chosen.end();
+    };
+    if (fingerprints) {
+        for (const NamedScene& scene : scenes())
+            if (isChosen(scene)) printFingerprint(scene);
+        return 0;
+    }
     fmt::print(
         "| scene | bodies | contacts a step | a step [ms], 1 thread | {} threads | 99 % of steps | times as fast | "
         "99 % of penetrations [voxels] | criteria missed |\n|---|---|---|---|---|---|---|---|---|\n",
         threads);
     for (const NamedScene& scene : scenes())
-        if (chosen.empty() || std::find(chosen.begin(), chosen.end(), scene.name) != chosen.end())
-            compare(scene, threads, repetitions);
+        if (isChosen(scene)) compare(scene, threads, repetitions);
     return 0;
 }
 
