@@ -14,11 +14,11 @@
 #include <optional>
 #include <set>
 
+#include <bilayer/cl/filler.h>
+#include <bilayer/sdf/build.h>
+#include <bilayer/sdf/grids.h>
+#include <bilayer/sdf/mesh_io.h>
 #include "bench/program.h"
-#include "cl/filler.h"
-#include "sdf/build.h"
-#include "sdf/grids.h"
-#include "sdf/mesh_io.h"
 #include "tests/support/clean.h"
 #include "tests/support/truth.h"
 #include "tests/support/verdict.h"

@@ -5,9 +5,11 @@
 #include <glm/vec3.hpp>
 #include <span>
 
-#include "sdf/field_layout.h"
+#include "collider/field/field_layout.h"
 
 namespace bilayer::bench {
+
+using namespace bilayer::detail;
 
 inline constexpr std::size_t cacheLine = 64;  // [bytes]
 

@@ -13,9 +13,10 @@
 #include "bench/builders.h"
 #include "bench/measure.h"
 #include "bench/program.h"
-#include "sdf/double_layer.h"
+#include "sdf/fill/double_layer.h"
 
 using namespace bilayer;
+using namespace bilayer::detail;
 using namespace bilayer::bench;
 
 namespace {

@@ -11,10 +11,11 @@
 #include <sstream>
 #include <stdexcept>
 
+#include <bilayer/cl/filler.h>
+#include <bilayer/sdf/build.h>
+#include <bilayer/sdf/mesh_io.h>
 #include "bench/measure.h"
-#include "cl/filler.h"
 #include "demos/shared/shapes.h"
-#include "sdf/build.h"
 
 namespace bilayer::bench {
 namespace {

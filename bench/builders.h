@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "sdf/build.h"
+#include <bilayer/sdf/build.h>
 
 namespace bilayer::bench {
 

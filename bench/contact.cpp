@@ -13,10 +13,10 @@
 #include <nlohmann/json.hpp>
 #include <random>
 
+#include <bilayer/cl/point_sampler.h>
 #include "bench/heap.h"
 #include "bench/measure.h"
 #include "bench/program.h"
-#include "cl/point_sampler.h"
 #include "demos/shared/outcome.h"
 #include "demos/shared/plot.h"
 #include "demos/shared/shapes.h"

@@ -11,14 +11,16 @@
 #include <glm/geometric.hpp>
 #include <nlohmann/json.hpp>
 
+#include <bilayer/sdf/build.h>
+#include <bilayer/sdf/grids.h>
+#include <bilayer/sdf/inspect.h>
+#include <bilayer/sdf/mesh_io.h>
+#include <bilayer/sdf/surface.h>
 #include "bench/program.h"
-#include "sdf/build.h"
-#include "sdf/grids.h"
-#include "sdf/inspect.h"
-#include "sdf/sign.h"
-#include "sdf/surface.h"
+#include "sdf/sign/sign_choice.h"
 
 using namespace bilayer;
+using namespace bilayer::detail;
 
 namespace {
 

@@ -9,11 +9,11 @@
 #include <glm/geometric.hpp>
 #include <glm/gtc/constants.hpp>
 
+#include <bilayer/sdf/build.h>
 #include "bench/builders.h"
 #include "bench/measure.h"
 #include "bench/program.h"
 #include "demos/shared/shapes.h"
-#include "sdf/build.h"
 
 using namespace bilayer;
 using namespace bilayer::bench;

@@ -3,8 +3,8 @@
 
 #include <memory>
 
+#include <bilayer/sdf/mesh.h>
 #include "bench/peers.h"
-#include "sdf/mesh.h"
 
 namespace bilayer::bench {
 

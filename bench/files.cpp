@@ -27,10 +27,10 @@
 #include <system_error>
 #include <vector>
 
+#include <bilayer/sdf/mesh_io.h>
 #include "bench/builders.h"
 #include "bench/measure.h"
 #include "bench/program.h"
-#include "sdf/mesh_io.h"
 
 extern char** environ;
 

@@ -16,14 +16,14 @@
 #include <glm/geometric.hpp>
 #include <random>
 
+#include <bilayer/collider/mass.h>
+#include <bilayer/integration/fluid/extend.h>
+#include <bilayer/integration/fluid/seed.h>
+#include <bilayer/sdf/grids.h>
 #include "bench/builders.h"
 #include "bench/measure.h"
 #include "bench/program.h"
-#include "collider/mass.h"
 #include "demos/shared/shapes.h"
-#include "integration/fluid/fill.h"
-#include "integration/fluid/seed.h"
-#include "sdf/grids.h"
 #include "tests/support/truth.h"
 
 using namespace bilayer;

@@ -12,10 +12,11 @@
 #include <string>
 #include <vector>
 
+#include <bilayer/sdf/build.h>
+#include <bilayer/sdf/grids.h>
+#include <bilayer/sdf/mesh_io.h>
 #include "bench/builders.h"
 #include "bench/program.h"
-#include "sdf/build.h"
-#include "sdf/grids.h"
 
 using namespace bilayer;
 

@@ -13,9 +13,12 @@
 
 #include "bench/measure.h"
 #include "demos/shared/world.h"
-#include "integration/bullet/convert.h"
+#include "integration/bullet/detail/convert.h"
 
 namespace bilayer::bench {
+
+using namespace bilayer::detail;
+using namespace bilayer::bullet::detail;
 namespace {
 
 constexpr float gravity = 9.81f;  // [m/s^2]
@@ -59,7 +62,7 @@ class Arena {
 
     std::vector<Pose> poses() const {
         std::vector<Pose> all;
-        for (const auto& body : bodies_) all.push_back(bullet::toPose(body->getWorldTransform()));
+        for (const auto& body : bodies_) all.push_back(bullet::detail::toPose(body->getWorldTransform()));
         return all;
     }
 

@@ -4,9 +4,10 @@
 #include <memory>
 #include <vector>
 
+#include <bilayer/collider/contact.h>
+#include <bilayer/collider/mass.h>
+#include <bilayer/collider/pose.h>
 #include "bench/rivals.h"
-#include "collider/mass.h"
-#include "collider/pose.h"
 #include "demos/shared/exact_distance.h"
 
 namespace bilayer::bench {

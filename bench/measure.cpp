@@ -13,7 +13,7 @@
 #include <stdexcept>
 #include <thread>
 
-#include "sdf/grids.h"
+#include <bilayer/sdf/grids.h>
 
 namespace bilayer::bench {
 namespace {

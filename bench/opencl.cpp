@@ -13,13 +13,14 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
+#include <bilayer/cl/filler.h>
 #include "bench/builders.h"
 #include "bench/measure.h"
 #include "bench/program.h"
-#include "cl/filler.h"
-#include "sdf/double_layer.h"
+#include "sdf/fill/double_layer.h"
 
 using namespace bilayer;
+using namespace bilayer::detail;
 using namespace bilayer::bench;
 
 namespace {

@@ -13,7 +13,7 @@
 #include <span>
 #include <string>
 
-#include "collider/field.h"
+#include <bilayer/collider/field.h>
 
 namespace bilayer::bench {
 

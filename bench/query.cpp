@@ -11,6 +11,8 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
+#include <bilayer/sdf/build.h>
+#include <bilayer/sdf/grids.h>
 #include "bench/bandwidth.h"
 #include "bench/builders.h"
 #include "bench/embree.h"
@@ -19,11 +21,10 @@
 #include "bench/program.h"
 #include "bench/questions.h"
 #include "bench/race.h"
-#include "sdf/build.h"
-#include "sdf/field_layout.h"
-#include "sdf/grids.h"
+#include "collider/field/field_layout.h"
 
 using namespace bilayer;
+using namespace bilayer::detail;
 using namespace bilayer::bench;
 
 namespace {

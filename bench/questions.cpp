@@ -6,7 +6,7 @@
 #include <glm/geometric.hpp>
 #include <random>
 
-#include "sdf/grids.h"
+#include <bilayer/sdf/grids.h>
 
 namespace bilayer::bench {
 namespace {

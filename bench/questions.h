@@ -4,9 +4,9 @@
 #include <cstddef>
 #include <vector>
 
+#include <bilayer/sdf/level_set.h>
 #include "bench/peers.h"
 #include "bench/race.h"
-#include "sdf/level_set.h"
 
 namespace bilayer::bench {
 

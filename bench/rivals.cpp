@@ -19,11 +19,12 @@
 #include <stdexcept>
 #include <vector>
 
+#include <bilayer/collider/contact.h>
+#include <bilayer/integration/bullet/dispatcher.h>
+#include <bilayer/integration/bullet/shape.h>
+#include <bilayer/sdf/build.h>
 #include "bench/measure.h"
 #include "demos/shared/exact_distance.h"
-#include "integration/bullet/dispatcher.h"
-#include "integration/bullet/shape.h"
-#include "sdf/build.h"
 
 namespace bilayer::bench {
 namespace {

@@ -8,11 +8,14 @@
 #include <memory>
 #include <string>
 
-#include "collider/body.h"
-#include "sdf/mesh.h"
-#include "sdf/point_sampler.h"
+#include <bilayer/collider/contact.h>
+#include <bilayer/sdf/mesh.h>
+#include "collider/contact/body.h"
+#include "collider/contact/sampled_points.h"
 
 namespace bilayer::bench {
+
+using namespace bilayer::detail;
 
 /// A collision shape of a mesh, and the dispatcher that knows it.
 class Rival {

@@ -17,11 +17,12 @@
 #include <optional>
 #include <random>
 
+#include <bilayer/collider/field.h>
+#include <bilayer/sdf/grids.h>
+#include <bilayer/sdf/mesh_io.h>
 #include "bench/builders.h"
 #include "bench/program.h"
-#include "collider/field.h"
 #include "demos/shared/shapes.h"
-#include "sdf/grids.h"
 #include "tests/support/analytic.h"
 #include "tests/support/truth.h"
 

@@ -1,12 +1,15 @@
-#include "cl/device.h"
+#include <bilayer/cl/device.h>
 
 #include <algorithm>
 #include <cctype>
 #include <cstdlib>
 
-#include "cl/program.h"
+#include "cl/detail/program.h"
 
 namespace bilayer {
+
+using namespace detail;
+
 namespace {
 
 constexpr cl_int noPlatform = -1001;  // CL_PLATFORM_NOT_FOUND_KHR, of the loader's extension cl_khr_icd
@@ -97,7 +100,7 @@ std::vector<DeviceInfo> devices() {
 Device openDevice(const std::string& text) {
     const char* fallback = std::getenv("BILAYER_DEVICE");
     const Found found = choose(text.empty() && fallback ? fallback : text);
-    auto impl = std::make_shared<Device::Impl>();
+    auto impl = std::make_shared<DeviceImpl>();
     impl->info = found.info;
     impl->device = found.device;
     try {

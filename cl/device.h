@@ -10,6 +10,10 @@
 
 namespace bilayer {
 
+namespace detail {
+struct DeviceImpl;
+}
+
 /// Trouble with a device: the text names the call, the code and the device, and holds the build log where a kernel
 /// failed to build.
 struct DeviceError : std::runtime_error {
@@ -35,13 +39,12 @@ struct DeviceInfo {
 /// Copies share them. Several threads may use it at once; each build takes device memory of its own.
 class Device {
   public:
-    struct Impl;
-    explicit Device(std::shared_ptr<Impl> impl) : impl_(std::move(impl)) {}
+    explicit Device(std::shared_ptr<detail::DeviceImpl> impl) : impl_(std::move(impl)) {}
     const DeviceInfo& info() const;
-    Impl& impl() const { return *impl_; }
+    detail::DeviceImpl& impl() const { return *impl_; }
 
   private:
-    std::shared_ptr<Impl> impl_;
+    std::shared_ptr<detail::DeviceImpl> impl_;
 };
 
 /// All devices of all platforms that can compile kernels, GPUs first. Empty where there is none, or no platform.

@@ -1,5 +1,5 @@
 // Two batches of points take turns: while the device samples one, another one goes up or comes down.
-#include "cl/field.h"
+#include <bilayer/cl/field.h>
 
 #include <algorithm>
 #include <array>
@@ -9,16 +9,21 @@
 #include <stdexcept>
 #include <utility>
 
-#include "cl/memory.h"
-#include "cl/program.h"
-#include "cl/resident.h"
-#include "cl/setup.h"
-#include "cl/timing.h"
-#include "sdf/field_layout.h"
+#include "cl/detail/kernel_options.h"
+#include "cl/detail/memory.h"
+#include "cl/detail/program.h"
+#include "cl/detail/resident_field.h"
+#include "cl/detail/timing.h"
+#include "collider/field/batch.h"
+#include "collider/field/field_layout.h"
 
 namespace bilayer {
 
+using namespace detail;
+
+namespace detail {
 extern const char* const field_cl;  // the text of field.cl
+}
 
 namespace {
 
@@ -69,7 +74,7 @@ DeviceField::Data::Data(const Device& device, const OpenclOptions& options, std:
       gpuMapping(wantsGroups(device.impl(), options.mapping)),
       memory(device.impl(), budget),
       program(samplingProgram(device)) {
-    const Device::Impl& impl = device.impl();
+    const DeviceImpl& impl = device.impl();
     for (Batch& batch : batches) {
         batch.queue = cl::CommandQueue(impl.context, impl.device, CL_QUEUE_PROFILING_ENABLE);
         if (impl.info.unifiedMemory) continue;

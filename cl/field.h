@@ -6,10 +6,10 @@
 #include <memory>
 #include <span>
 
-#include "cl/device.h"
-#include "cl/filler.h"
-#include "sdf/build.h"
-#include "sdf/sample.h"
+#include <bilayer/cl/device.h>
+#include <bilayer/cl/filler.h>
+#include <bilayer/collider/query.h>
+#include <bilayer/sdf/build.h>
 
 namespace bilayer {
 

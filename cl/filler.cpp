@@ -1,10 +1,12 @@
-#include "cl/filler.h"
+#include <bilayer/cl/filler.h>
 
-#include "cl/brick_filler.h"
-#include "cl/prism.h"
-#include "cl/program.h"
+#include "cl/detail/brick_filler.h"
+#include "cl/detail/prism.h"
+#include "cl/detail/program.h"
 
 namespace bilayer {
+
+using namespace detail;
 
 BlockFiller openclFiller(const Device& device, const OpenclOptions& options) {
     return {"opencl", device.info().name, [device, options](const FillJob& job) {

@@ -3,8 +3,8 @@
 
 #include <cstdint>
 
-#include "cl/device.h"
-#include "sdf/blocks.h"
+#include <bilayer/cl/device.h>
+#include <bilayer/sdf/build.h>
 
 namespace bilayer {
 

@@ -1,5 +1,6 @@
 // Buffers that hold the bodies of all queries one behind the other grow as bodies come.
-#include "cl/point_sampler.h"
+#include <bilayer/cl/point_sampler.h>
+#include <bilayer/collider/contact.h>
 
 #include <algorithm>
 #include <cstddef>
@@ -9,15 +10,20 @@
 #include <stdexcept>
 #include <utility>
 
-#include "cl/memory.h"
-#include "cl/program.h"
-#include "cl/resident.h"
-#include "cl/setup.h"
-#include "cl/timing.h"
+#include "cl/detail/kernel_options.h"
+#include "cl/detail/memory.h"
+#include "cl/detail/program.h"
+#include "cl/detail/resident_field.h"
+#include "cl/detail/timing.h"
+#include "collider/contact/sampled_points.h"
 
 namespace bilayer {
 
+using namespace detail;
+
+namespace detail {
 extern const char* const point_sampler_cl;  // the text of point_sampler.cl
+}
 
 namespace {
 

@@ -2,9 +2,9 @@
 // point_sampler.cl.
 #pragma once
 
-#include "cl/device.h"
-#include "cl/filler.h"
-#include "sdf/point_sampler.h"
+#include <bilayer/cl/device.h>
+#include <bilayer/cl/filler.h>
+#include <bilayer/collider/contact.h>
 
 namespace bilayer {
 

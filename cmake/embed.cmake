@@ -17,16 +17,16 @@ function(bilayer_included_text file seen result)
   set(${result} "${text}" PARENT_SCOPE)
 endfunction()
 
-# bilayer_embed(TARGET FILE): the text of FILE becomes `const char* const bilayer::NAME_cl` inside TARGET, character by
+# bilayer_embed(TARGET FILE): the text of FILE becomes `const char* const bilayer::detail::NAME_cl` inside TARGET, character by
 # character: C++ promises no string literal longer than 65,536.
 function(bilayer_embed target file)
   get_filename_component(name ${file} NAME)
   string(MAKE_C_IDENTIFIER ${name} symbol)
-  set(output ${CMAKE_BINARY_DIR}/embedded/${symbol}.cpp)
+  set(output ${PROJECT_BINARY_DIR}/embedded/${symbol}.cpp)
   bilayer_included_text(${file} "" text)
   string(HEX "${text}" text)
   string(REGEX REPLACE "(..)" "'\\\\x\\1'," text "${text}")
   file(CONFIGURE OUTPUT ${output} @ONLY
-    CONTENT "namespace bilayer {\nnamespace {\nconstexpr char text[] = {@text@0};\n}\nextern const char* const @symbol@;\nconst char* const @symbol@ = text;\n}\n")
+    CONTENT "namespace bilayer::detail {\nnamespace {\nconstexpr char text[] = {@text@0};\n}\nextern const char* const @symbol@;\nconst char* const @symbol@ = text;\n}\n")
   target_sources(${target} PRIVATE ${output})
 endfunction()

@@ -1,351 +1,28 @@
-// Contacts between two bodies: the surface points of either in the field of the other. The trees of points are
-// descended with the relative pose, so that only points near the other body are sampled.
-#include "collider/collider.h"
-
+// Colliders from meshes and from files.
+#include <bilayer/collider/collider.h>
+#include <bilayer/sdf/build.h>
+#include <bilayer/sdf/surface.h>
 #include <fmt/core.h>
 #include <oneapi/tbb/task_arena.h>
 
-#include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <glm/geometric.hpp>
-#include <glm/mat3x3.hpp>
-#include <limits>
-#include <mutex>
+#include <memory>
 #include <optional>
 #include <stdexcept>
 #include <utility>
 
-#include "collider/edge_search.h"
-#include "collider/interpolant.h"
-#include "collider/touch.h"
-#include "sdf/build.h"
-#include "sdf/fill_holes.h"
-#include "sdf/sign.h"
-#include "sdf/surface.h"
-#include "sdf/topology.h"
+#include "collider/contact/collider_data.h"
+#include "collider/field/field_data.h"
+#include "sdf/mesh/topology.h"
+#include "sdf/sign/fill_holes.h"
+#include "sdf/sign/sign_choice.h"
 
-namespace bilayer {
+namespace bilayer::detail {
 namespace {
 
-constexpr float searchTolerance = 2e-3f;  // of the deepest place on an edge [voxels]
-// A point that slides along a face ends in the edges beyond it by rounding: what only grazes, by less than this, goes
-// past [voxels].
-constexpr float grazing = 0.25f;
-// The two places of a contact are brought closer in so many turns at most, until one goes no farther than this
-// [voxels].
-constexpr int settlingTurns = 10;
-constexpr float settled = 1e-4f;
-// It goes on by no more than so many of its last steps at once.
-constexpr float farthestOn = 50;
-// Nearer to each other, the way between them tells no direction [voxels].
-constexpr float shortest = 1e-3f;
 // Holes no wider than this are cracks, whose rims lie on each other [voxels].
 constexpr float crackWidth = 0.01f;
-// A tip that has sunk into another one sees its sides; what it opposes is seen so far back along its normal [voxels].
-constexpr float lift = 1;
-
-// The map from the coordinates of one body into those of another.
-struct Map {
-    glm::mat3 linear;
-    glm::vec3 shift;
-    float scale;
-
-    Map(const Placed& from, const Placed& into) : scale(from.scale / into.scale) {
-        const Pose pose = relative(into.pose, from.pose);
-        linear = scale * glm::mat3_cast(pose.rotation);
-        shift = pose.position / into.scale;
-    }
-    glm::vec3 operator()(const glm::vec3& point) const { return linear * point + shift; }
-    glm::vec3 turned(const glm::vec3& direction) const { return linear * direction / scale; }
-
-    // The same map, into the parts of a field's clearance.
-    Map inParts(const Field& field) const {
-        const float edge = float(Clearance::partSide) * field.voxelSize();
-        Map map = *this;
-        map.scale /= edge;
-        map.linear *= 1 / edge;
-        map.shift = glm::vec3((glm::dvec3(shift) - field.origin()) / double(edge));
-        return map;
-    }
-};
-
-// The touch of a point that comes from outside of the field and goes some way.
-std::optional<Touch> touchOnWay(const Field& field, const glm::vec3& point, const glm::vec3& way) {
-    const auto hit = field.segment(point, point + way);
-    if (!hit) return std::nullopt;
-    return Touch{std::max(glm::dot(point - hit->position, hit->normal), 0.f), hit->normal, -glm::dot(way, hit->normal)};
-}
-
-// The surface points of one body in the field of another.
-class PointsInField {
-  public:
-    PointsInField(const Placed& body, const Placed& other, const ContactOptions& options)
-        : body_(body),
-          other_(other),
-          field_(options.measured ? other.collider.measured() : other.collider.field()),
-          map_(body, other),
-          coarse_(map_.inParts(field_)),
-          ways_(body.pose, body.motion, other.pose, other.motion),
-          clearance_(field_.clearance()),
-          options_(options),
-          reach_(options.margin / other.scale) {
-        const Bounds& bounds = body.collider.bounds();
-        centre_ = bounds.centre();
-        radius_ = 0.5f * glm::length(bounds.size());
-        sweeps_ =
-            longestWay(centre_, radius_) > std::min(reach_, surelyInBand(field_.exteriorWidth(), field_.voxelSize()));
-    }
-
-    /// Calls found(index, point, touch) for the points within reach of the surface, in it, or on their way to it.
-    template <class Found>
-    void visit(NearPoints::List* near, ContactReport& report, Found&& found) {
-        if (!near || sweeps_ || options_.measured) return visitAll(report, found);
-        const float voxel = field_.voxelSize();
-        // voxels beyond the band have no numbers: a list must not reach that far
-        const float mostSlack =
-            std::min(voxel, (field_.exteriorWidth() - reach_) / steepestInterpolant - rounding * voxel);
-        const NearPoints::Place now{body_.collider.id(), other_.collider.id(), reach_, map_.linear, map_.shift};
-        if (near->holds(now, centre_, radius_, voxel, mostSlack))
-            visitListed(*near, report, found);
-        else if (near->slack() > 0)
-            visitAndList(*near, report, found);
-        else
-            visitAll(report, found);
-    }
-
-    /// The same for the points that a sampler has found.
-    template <class Found>
-    void visitFound(std::span<const FoundPoint> points, ContactReport& report, Found&& found) const {
-        for (const auto& [index, sample] : points) {
-            ++report.pointsTested;
-            const SurfacePoint& point = body_.collider.points().points()[index];
-            touch(index, point, map_(point.position), sample, report, found);
-        }
-    }
-
-    /// What a sampler is to find.
-    std::optional<PointQuery> query() const {
-        if (sweeps_) return std::nullopt;
-        return PointQuery{0, 0, map_.linear, map_.shift, map_.scale, reach_};
-    }
-
-  private:
-    static constexpr float rounding = 1e-3f;  // [voxels]
-
-    // Of the points of the body in a ball, at most; in the other one's units.
-    float longestWay(const glm::vec3& centre, float radius) const {
-        return ways_.longest(other_.scale * map_(centre), body_.scale * radius) / other_.scale;
-    }
-
-    // How far away such points can be that come near.
-    float seenFrom(const glm::vec3& centre, float radius) const {
-        return sweeps_ ? reach_ + longestWay(centre, radius) : reach_;
-    }
-
-    // Farther than this nothing of interest can be [parts].
-    float keptWithin(float distance) const {
-        return (distance / field_.voxelSize() + mostInterpolationError) / float(Clearance::partSide);
-    }
-
-    // @param kept  float (centre, radius): how far away points in a ball may be [parts]
-    template <class Kept, class Visit>
-    void descend(Kept&& kept, Visit&& visit) const {
-        const auto reject = [&](const glm::vec3& centre, float radius) {
-            return clearance_.isOutside(coarse_(centre), radius * coarse_.scale + kept(centre, radius));
-        };
-        body_.collider.points().visit(reject, visit);
-    }
-
-    template <class Found>
-    void visitAll(ContactReport& report, Found& found) {
-        const auto kept = [&](const glm::vec3& centre, float radius) { return keptWithin(seenFrom(centre, radius)); };
-        descend(kept, [&](std::uint32_t index, const SurfacePoint& point) {
-            const glm::vec3 place = coarse_(point.position);
-            const float seen = seenFrom(point.position, 0);
-            const bool isAbove = !options_.measured && clearance_.isAbove(place, seen);  // or beyond the band
-            if (isAbove || clearance_.isOutside(place, keptWithin(seen))) return;
-            const glm::vec3 at = map_(point.position);
-            touch(index, point, at, sampleAt(at, report), report, found);
-        });
-    }
-
-    // Points that could touch before the bodies have moved by the slack: the interpolant then changes by the steepest
-    // slope at most, the distance by the slack.
-    template <class Found>
-    void visitAndList(NearPoints::List& near, ContactReport& report, Found& found) {
-        const float slack = near.slack(), above = reach_ + steepestInterpolant * slack, within = reach_ + slack,
-                    beside = within + mostInterpolationError * field_.voxelSize(), kept = keptWithin(within);
-        descend([&](const glm::vec3&, float) { return kept; },
-                [&](std::uint32_t index, const SurfacePoint& point) {
-                    const glm::vec3 place = coarse_(point.position);
-                    if (clearance_.isAbove(place, above) || clearance_.isOutside(place, kept)) return;
-                    const glm::vec3 at = map_(point.position);
-                    const Sample sample = sampleAt(at, report);
-                    if (sample.distance > (sample.inBand ? above : beside)) return;
-                    near.add(index);
-                    touch(index, point, at, sample, report, found);
-                });
-    }
-
-    template <class Found>
-    void visitListed(const NearPoints::List& near, ContactReport& report, Found& found) {
-        const auto points = body_.collider.points().points();
-        for (const std::uint32_t index : near.points()) {
-            const SurfacePoint& point = points[index];
-            if (clearance_.isAbove(coarse_(point.position), reach_)) continue;
-            const glm::vec3 at = map_(point.position);
-            touch(index, point, at, sampleAt(at, report), report, found);
-        }
-    }
-
-    Sample sampleAt(const glm::vec3& at, ContactReport& report) const {
-        ++report.pointsTested;
-        return field_.sampleWithin(at, reach_);
-    }
-
-    template <class Found>
-    void touch(std::uint32_t index, const SurfacePoint& point, const glm::vec3& at, const Sample& sample,
-               ContactReport& report, Found& found) const {
-        if (!sample.inBand && sample.distance < 0) {
-            ++report.beyondBand;
-            return;
-        }
-        const auto here = sample.distance <= reach_ ? touchAt(at, sample, reach_) : std::nullopt;
-        if (here && here->distance <= reach_) {
-            Touch touched = point.isSharp && here->distance <= 0 ? opposed(point, at, *here) : *here;
-            if (sweeps_) touched.approach = approachOf(point, at, touched);
-            found(index, point, touched);
-            if (point.isSharp) followEdges(index, at, *here, found);
-        } else if (sweeps_) {
-            const glm::vec3 way = wayOf(at);
-            if (sample.distance > glm::length(way) || !meets(point, at, way)) return;
-            if (const auto touched = touchOnWay(field_, at, way)) found(index, point, *touched);
-        }
-    }
-
-    // Beyond the band up to `most`, where that is asked for.
-    std::optional<Touch> touchAt(const glm::vec3& at, const Sample& sample, float most) const {
-        if (sample.inBand) return touchInBand(field_, at, sample, other_.collider.asksTriangles(at, options_.measured));
-        if (!options_.measured || sample.distance < 0) return std::nullopt;
-        const ClosestPoint closest = field_.closest(at, most);
-        if (!closest.found) return std::nullopt;
-        return Touch{closest.distance, directionOf(closest, at, field_.voxelSize())};
-    }
-
-    // A tip, ridge or corner within the other body that opposes no surface there, a medial axis included: the one that
-    // it opposes a bit back along its own normal, if that is outside.
-    Touch opposed(const SurfacePoint& point, const glm::vec3& at, const Touch& here) const {
-        const glm::vec3 normal = map_.turned(point.normal);
-        const auto opposition = [&](const Touch& touch) { return -glm::dot(touch.normal, normal); };
-        if (options_.keeps(opposition(here), false)) return here;
-        const float back = lift * field_.voxelSize();
-        const glm::vec3 outside = at - back * normal;
-        const Sample sample = field_.sample(outside);
-        if (!sample.inBand) return here;
-        const Touch there =
-            touchInBand(field_, outside, sample, other_.collider.asksTriangles(outside, options_.measured));
-        if (!(there.distance > 0) || !options_.keeps(opposition(there), false)) return here;
-        return {std::min(there.distance - back * opposition(there), 0.f), there.normal};
-    }
-
-    float approachOf(const SurfacePoint& point, const glm::vec3& at, const Touch& touched) const {
-        const glm::vec3 way = wayOf(at);
-        const float approach = -glm::dot(way, touched.normal);
-        return approach > 0 && (touched.distance <= 0 || meets(point, at, way)) ? approach : 0;
-    }
-
-    // Whether a point's way into the field does more than graze it: so does that of a point a bit inside of its body.
-    bool meets(const SurfacePoint& point, const glm::vec3& at, const glm::vec3& way) const {
-        const glm::vec3 normal = glm::normalize(map_.linear * point.normal);
-        const glm::vec3 across = normal - glm::dot(normal, way) / glm::dot(way, way) * way;
-        const glm::vec3 inside = at - grazing * field_.voxelSize() * across;
-        return field_.segment(inside, inside + way).has_value();
-    }
-
-    // Where edges go deeper from a point that touches before they come up to the next one.
-    template <class Found>
-    void followEdges(std::uint32_t index, const glm::vec3& at, const Touch& here, Found& found) const {
-        const SharpEdges& edges = body_.collider.edges();
-        for (const std::uint32_t e : edges.around(index)) {
-            const SharpEdge& edge = edges.edges()[e];
-            const std::uint32_t next = edge.from == index ? edge.to : edge.from;
-            const glm::vec3 end = map_(pointOf(next).position);
-            const float length = glm::distance(at, end);
-            const glm::vec3 along = (end - at) / length;
-            const Sample sample = field_.sample(end);
-            const auto there = touchAt(end, sample, reach_ + length);
-            if (!there) continue;
-            // where both ends touch, one of them is enough
-            if (std::max(sample.distance, there->distance) <= reach_ && next < index) continue;
-            const Slope from{0, here.distance, glm::dot(here.normal, along)},
-                to{length, there->distance, glm::dot(there->normal, along)};
-            if (!fallsBetween(from, to) && !mayKinkBetween(from, to)) continue;
-            if (const auto touched = deepestOf(at, end, along, from, to, edge.wings)) {
-                const float part = touched->first / length;
-                const SurfacePoint &a = pointOf(index), &b = pointOf(next);
-                const SurfacePoint between{glm::mix(a.position, b.position, part), glm::normalize(a.normal + b.normal),
-                                           true};
-                found(std::uint32_t(body_.collider.points().points().size()) + e, between, touched->second);
-            }
-        }
-    }
-
-    // How far along an edge the deepest place is, and how it touches.
-    std::optional<std::pair<float, Touch>> deepestOf(const glm::vec3& at, const glm::vec3& end, const glm::vec3& along,
-                                                     const Slope& from, const Slope& to, const Wings& wings) const {
-        const auto touchOn = [&](float way) {
-            const glm::vec3 place = at + way * along;
-            return touchAt(place, field_.sample(place), reach_ + to.place);
-        };
-        const auto slopeAt = [&](float way) -> std::optional<Slope> {
-            const auto touched = touchOn(way);
-            if (!touched) return std::nullopt;
-            return Slope{way, touched->distance, glm::dot(touched->normal, along)};
-        };
-        const bool falls = fallsBetween(from, to);
-        const std::optional<Slope> lowest = falls
-                                                ? lowestBetween(from, to, searchTolerance * field_.voxelSize(), slopeAt)
-                                            : from.value < to.value ? from
-                                                                    : to;
-        const auto touched = lowest ? touchOn(lowest->place) : std::nullopt;
-        if (!touched) return std::nullopt;
-
-        const glm::vec3 place = at + lowest->place * along;
-        const Wings seen{map_.turned(wings[0]), map_.turned(wings[1])};
-        if (const auto crossing = other_.collider.edges().crossing(other_.collider.points(), at, end, seen, place,
-                                                                   touched->distance, field_.voxelSize())) {
-            if (crossing->distance > reach_) return std::nullopt;
-            const glm::vec3 onEdge = crossing->position + crossing->distance * crossing->normal;
-            return std::pair(glm::dot(onEdge - at, along), Touch{crossing->distance, crossing->normal});
-        }
-        if (!falls) return std::nullopt;
-        const float aside = 2 * searchTolerance * field_.voxelSize();
-        const auto held = acrossEdge(along, *touched, touchOn(lowest->place - aside), touchOn(lowest->place + aside));
-        if (!held || held->distance > reach_) return std::nullopt;
-        return std::pair(lowest->place, *held);
-    }
-
-    const SurfacePoint& pointOf(std::uint32_t index) const { return body_.collider.points().points()[index]; }
-
-    glm::vec3 wayOf(const glm::vec3& at) const { return ways_.of(other_.scale * at) / other_.scale; }
-
-    const Placed &body_, &other_;
-    const Field& field_;
-    Map map_, coarse_;
-    RelativeWays ways_;
-    Clearance clearance_;
-    ContactOptions options_;
-    float reach_;
-    glm::vec3 centre_;  // of a ball around the body
-    float radius_;
-    bool sweeps_;  // whether any point moves farther than contacts are found for sure
-};
-
-// Outward of `other`, in the world; where its field tells none, against the surface of the body that touches it.
-glm::vec3 outwardNormal(const Placed& other, const Touch& touch, const Placed& body, const SurfacePoint& point) {
-    return touch.normal == glm::vec3(0) ? -(body.pose.rotation * point.normal) : other.pose.rotation * touch.normal;
-}
 
 std::uint64_t nextId() {
     static std::atomic<std::uint64_t> made = 0;
@@ -392,6 +69,17 @@ Filled filledMesh(Mesh outward, const LevelSet& levelSet) {
     return {std::move(filled.mesh), std::move(closed)};
 }
 
+Field withMesh(const Field& samples, std::shared_ptr<const Mesh> mesh) {
+    return Field(std::make_shared<const FieldData>(samples.data(), std::move(mesh)));
+}
+
+Field fieldOf(const LevelSet& levelSet, const Body& body) {
+    Field samples(levelSet);
+    return body.mesh && body.measure != Measure::samples ? withMesh(samples, body.mesh) : samples;
+}
+
+}  // namespace
+
 Body makeBody(Mesh given, const LevelSet& levelSet, const ColliderOptions& options) {
     if (!std::isfinite(options.margin)) throw std::invalid_argument("collider: the margin is not finite");
     if (options.margin > mostMargin * levelSet.voxelSize())
@@ -410,213 +98,77 @@ Body makeBody(Mesh given, const LevelSet& levelSet, const ColliderOptions& optio
             .filled = std::move(filled.levelSet)};
 }
 
-Field fieldOf(const LevelSet& levelSet, const Body& body) {
-    Field samples(levelSet);
-    return body.mesh && body.measure != Measure::samples ? Field(samples, body.mesh) : samples;
+ColliderData::ColliderData(const LevelSet& given, Body made)
+    : body(std::move(made)),
+      field(fieldOf(body.filled ? *body.filled : given, body)),
+      strays(field.mesh() && body.measure == Measure::edges ? Strays(field) : Strays()),
+      sharpEdges(body.points, field),
+      id(nextId()) {
+    if (!body.mesh) levelSet_ = given;
 }
 
-}  // namespace
+template <class Make>
+void ColliderData::once(const Make& make) const {
+    // a thread that waits for others here must not take up work that asks for the very same
+    std::call_once(once_, [&] { tbb::this_task_arena::isolate(make); });
+}
 
-/// What few ask for, and takes longer than all else that a body from a file needs: triangles that are extracted from
-/// the field, and the field with the mesh's.
-class Collider::OnDemand {
-  public:
-    explicit OnDemand(const LevelSet& field) : levelSet_(field) {}
-    OnDemand() = default;
+const Mesh& ColliderData::mesh() const {
+    if (body.mesh) return *body.mesh;
+    once([&] {
+        zeroSet_ = surface(*levelSet_);
+        levelSet_.reset();
+    });
+    return zeroSet_;
+}
 
-    const Mesh& zeroSet() {
-        once([&] {
-            mesh_ = surface(*levelSet_);
-            levelSet_.reset();
-        });
-        return mesh_;
-    }
+const Field& ColliderData::exactField() const {
+    if (field.mesh() || !body.mesh) return field;
+    once([&] { exact_ = withMesh(field, body.mesh); });
+    return *exact_;
+}
 
-    const Field& measured(const Field& samples, const std::shared_ptr<const Mesh>& mesh) {
-        once([&] { measured_.emplace(samples, mesh); });
-        return *measured_;
-    }
+}  // namespace bilayer::detail
 
-  private:
-    template <class Make>
-    void once(const Make& make) {
-        // a thread that waits for others here must not take up work that asks for the very same
-        std::call_once(once_, [&] { tbb::this_task_arena::isolate(make); });
-    }
+namespace bilayer {
 
-    std::optional<LevelSet> levelSet_;  // of a body without a mesh
-    Mesh mesh_;
-    std::optional<Field> measured_;
-    std::once_flag once_;
-};
+using namespace detail;
 
 Collider::Collider(Mesh mesh, const LevelSet& levelSet, const ColliderOptions& options)
-    : Collider(levelSet, makeBody(std::move(mesh), levelSet, options)) {}
+    : data_(std::make_shared<const ColliderData>(levelSet, makeBody(std::move(mesh), levelSet, options))) {}
 
-Collider::Collider(const LevelSet& given, Body body)
-    : body_(std::move(body)),
-      field_(fieldOf(body_.filled ? *body_.filled : given, body_)),
-      onDemand_(body_.mesh ? std::make_shared<OnDemand>() : std::make_shared<OnDemand>(given)),
-      strays_(field_.mesh() && body_.measure == Measure::edges ? Strays(field_) : Strays()),
-      edges_(body_.points, field_),
-      id_(nextId()) {}
+Collider::Collider(const LevelSet& levelSet)
+    : data_(std::make_shared<const ColliderData>(levelSet, bodyOf(levelSet))) {}
 
 const Mesh& Collider::mesh() const {
-    return body_.mesh ? *body_.mesh : onDemand_->zeroSet();
+    return data_->mesh();
 }
-
-const Field& Collider::measured() const {
-    return field_.mesh() || !body_.mesh ? field_ : onDemand_->measured(field_, body_.mesh);
+const Field& Collider::field() const {
+    return data_->field;
+}
+const Field& Collider::exactField() const {
+    return data_->exactField();
+}
+const Bounds& Collider::bounds() const {
+    return data_->body.bounds;
+}
+float Collider::margin() const {
+    return data_->body.margin;
+}
+std::uint64_t Collider::id() const {
+    return data_->id;
 }
 
 const MassProperties& Collider::mass() const {
-    if (!body_.mass)
+    if (!data_->body.mass)
         throw std::invalid_argument("collider: the body encloses no volume, or its inertia is beyond single precision");
-    return *body_.mass;
+    return *data_->body.mass;
 }
 
-namespace {
-
-// Of the surface near a place of the world, outward; zero where the field tells none.
-glm::vec3 normalNear(const Placed& body, const glm::vec3& place) {
-    const glm::vec3 at = body.pose.toBody(place) / body.scale;
-    const Field& field = body.collider.field();
-    const Sample sample = field.sample(at);
-    if (!sample.inBand) return glm::vec3(0);
-    return body.pose.rotation * touchInBand(field, at, sample, body.collider.asksTriangles(at)).normal;
-}
-
-// The contacts of A's points in B's field, then of B's in A's, of those that the visits find.
-template <class VisitA, class VisitB>
-ContactReport addContacts(const Placed& a, const Placed& b, const ContactOptions& options,
-                          std::vector<Contact>& contacts, VisitA&& visitA, VisitB&& visitB) {
-    ContactReport report;
-    const auto opposes = [&](const glm::vec3& normal, const Placed& body, const Placed& other,
-                             const SurfacePoint& point, const Touch& touch) {
-        const bool apart = touch.distance > 0 && !point.isSharp;
-        const glm::vec3 own = body.pose.rotation * point.normal;
-        if (!options.keeps(normal, own, body.motion.turn - other.motion.turn, apart)) return false;
-        if (options.keepsEdgesAslant || !apart || touch.approach > 0) return true;
-        return !looksAtEdge(body.pose.toWorld(body.scale * point.position), own, touch.distance * other.scale, normal,
-                            [&](const glm::vec3& place) { return normalNear(other, place); });
-    };
-    // of points, not of places between them
-    const auto turningRadiusOf = [](const Placed& body, std::uint32_t feature) {
-        return feature < body.collider.points().points().size() ? 0.f : -1.f;
-    };
-    const auto addOfA = [&](std::uint32_t index, const SurfacePoint& point, const Touch& touch) {
-        const glm::vec3 normal = outwardNormal(b, touch, a, point);
-        if (!opposes(normal, a, b, point, touch)) return;
-        const float distance = touch.distance * b.scale;
-        contacts.push_back({a.pose.toWorld(a.scale * point.position) - distance * normal, normal, distance, index,
-                            touch.approach * b.scale, turningRadiusOf(a, index)});
-    };
-    const auto addOfB = [&](std::uint32_t index, const SurfacePoint& point, const Touch& touch) {
-        const glm::vec3 normal = outwardNormal(a, touch, b, point);
-        if (!opposes(normal, b, a, point, touch)) return;
-        contacts.push_back({b.pose.toWorld(b.scale * point.position), -normal, touch.distance * a.scale,
-                            index | featureOfB, touch.approach * a.scale, turningRadiusOf(b, index)});
-    };
-    const std::size_t first = contacts.size();
-    visitA(PointsInField(a, b, options), report, addOfA);
-    const std::size_t second = contacts.size();
-    visitB(PointsInField(b, a, options), report, addOfB);
-    // edges are found next to their points, and come behind all of these
-    const auto byFeature = [](const Contact& one, const Contact& other) { return one.feature < other.feature; };
-    std::stable_sort(contacts.begin() + std::ptrdiff_t(first), contacts.begin() + std::ptrdiff_t(second), byFeature);
-    std::stable_sort(contacts.begin() + std::ptrdiff_t(second), contacts.end(), byFeature);
-    return report;
-}
-
-// The place of a body's surface that is closest to one of the world that is outside of it.
-std::optional<glm::vec3> closestOn(const Placed& body, const glm::vec3& place, float most) {
-    const ClosestPoint closest =
-        body.collider.measured().closest(body.pose.toBody(place) / body.scale, most / body.scale);
-    if (!closest.found || closest.distance < 0) return std::nullopt;
-    return body.pose.toWorld(body.scale * closest.position);
-}
-
-// Moves the two places of a contact apart to what is closest to the other, by turns: edges that are made of surface
-// points may cut across what lies between these. Where round bodies nearly touch each turn gains little, and the places
-// go on as they went (A. C. Aitken's extrapolation).
-void settle(Contact& contact, const Placed& a, const Placed& b) {
-    const float voxel = b.scale * b.collider.field().voxelSize();
-    const auto turned = [&](const glm::vec3& place) -> std::optional<Contact> {
-        const auto onA = closestOn(a, place, contact.distance + voxel);
-        const auto onB = onA ? closestOn(b, *onA, contact.distance + voxel) : std::nullopt;
-        if (!onB) return std::nullopt;
-        const glm::vec3 way = *onA - *onB;
-        const float distance = glm::length(way);
-        const glm::vec3 normal = distance > shortest * voxel ? way / distance : contact.normal;
-        return Contact{*onB, normal, distance, contact.feature, contact.approach, contact.turningRadius};
-    };
-    glm::vec3 before(0);  // how far the place went in the last turn
-    for (int turn = 0; turn < settlingTurns; ++turn) {
-        const auto next = turned(contact.position);
-        if (!next) return;
-        const glm::vec3 gone = next->position - contact.position;
-        contact = *next;
-        if (!(glm::length(gone) > settled * voxel)) return;
-        const float ratio = glm::dot(gone, before) / glm::dot(before, before);
-        before = gone;
-        if (!(ratio > 0 && ratio < 1)) continue;
-        const auto beyond = turned(contact.position + std::min(ratio / (1 - ratio), farthestOn) * gone);
-        if (!beyond || beyond->distance >= contact.distance) continue;
-        contact = *beyond;
-        before = glm::vec3(0);
-    }
-}
-
-// Those that may be the nearest.
-void settle(std::span<Contact> contacts, const Placed& a, const Placed& b) {
-    float nearest = std::numeric_limits<float>::max();
-    for (const Contact& contact : contacts) nearest = std::min(nearest, contact.distance);
-    for (Contact& contact : contacts)
-        if (contact.distance > 0 && contact.distance < nearest + b.scale * b.collider.field().voxelSize())
-            settle(contact, a, b);
-}
-
-}  // namespace
-
-ContactReport collide(const Placed& a, const Placed& b, const ContactOptions& options, std::vector<Contact>& contacts,
-                      NearPoints* near) {
-    const auto visit = [](NearPoints::List* list) {
-        return
-            [=](PointsInField points, ContactReport& report, const auto& found) { points.visit(list, report, found); };
-    };
-    const std::size_t first = contacts.size();
-    const ContactReport report =
-        addContacts(a, b, options, contacts, visit(near ? &near->ofA : nullptr), visit(near ? &near->ofB : nullptr));
-    if (options.measured) settle(std::span(contacts).subspan(first), a, b);
-    return report;
-}
-
-std::optional<PointQuery> pointQuery(const Placed& body, const Placed& other, float margin) {
-    return PointsInField(body, other, {.margin = margin}).query();
-}
-
-SampledBody sampledBody(const Collider& collider) {
-    const auto ballsOfPoints = [&collider] {
-        BallsOfPoints balls;
-        for (const SurfacePoint& point : collider.points().points()) balls.points.push_back(point.position);
-        const auto nodes = collider.points().nodes();
-        for (std::uint32_t i = 0; i < nodes.size(); ++i)
-            if (nodes[i].next == i + 1)
-                balls.balls.push_back({nodes[i].centre, nodes[i].radius, nodes[i].begin, nodes[i].end});
-        return balls;
-    };
-    return {collider.id(), &collider.field().layout(), ballsOfPoints};
-}
-
-ContactReport collideFound(const Placed& a, const Placed& b, const ContactOptions& options,
-                           std::span<const FoundPoint> ofA, std::span<const FoundPoint> ofB,
-                           std::vector<Contact>& contacts) {
-    const auto visit = [](std::span<const FoundPoint> some) {
-        return [=](const PointsInField& points, ContactReport& report, const auto& found) {
-            points.visitFound(some, report, found);
-        };
-    };
-    return addContacts(a, b, options, contacts, visit(ofA), visit(ofB));
+LevelSet withBody(const LevelSet& levelSet, Mesh mesh, const ColliderOptions& options, bool keepMesh) {
+    Body body = makeBody(std::move(mesh), levelSet, options);
+    if (!keepMesh) body.mesh.reset();
+    return withBody(levelSet, body);
 }
 
 }  // namespace bilayer

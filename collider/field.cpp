@@ -1,12 +1,14 @@
 // How fields are made, and what they say of themselves. Queries have files of their own.
-#include "collider/field.h"
+#include <bilayer/collider/field.h>
 
 #include <utility>
 
-#include "collider/field_data.h"
-#include "sdf/sign.h"
+#include "collider/field/field_data.h"
+#include "sdf/sign/sign_choice.h"
 
 namespace bilayer {
+
+using namespace detail;
 
 FieldData::FieldData(const LevelSet& levelSet, Storage storage)
     : FieldLayout(levelSet, storage),
@@ -30,25 +32,14 @@ void FieldData::fillLanes() {
 }
 
 Field::Field(const LevelSet& levelSet, const FieldOptions& options)
-    : data_(std::make_shared<FieldData>(levelSet, options.storage)), sample_(data_->kernels.samplePoint) {}
+    : Field(std::make_shared<const FieldData>(levelSet, options.storage)) {}
 
 Field::Field(const LevelSet& levelSet, Mesh mesh, const FieldOptions& options)
-    : Field(Field(levelSet, options), std::make_shared<const Mesh>(outwardMesh(levelSet, std::move(mesh)))) {}
+    : Field(std::make_shared<const FieldData>(FieldData(levelSet, options.storage),
+                                              std::make_shared<const Mesh>(outwardMesh(levelSet, std::move(mesh))))) {}
 
-Field::Field(const Field& samples, std::shared_ptr<const Mesh> outward)
-    : data_(std::make_shared<FieldData>(*samples.data_, std::move(outward))), sample_(data_->kernels.samplePoint) {}
+Field::Field(std::shared_ptr<const FieldData> data) : data_(std::move(data)), sample_(data_->kernels.samplePoint) {}
 
-Clearance Field::clearance() const noexcept {
-    return data_->coarse;
-}
-
-glm::ivec3 Field::blocks() const noexcept {
-    return data_->blocks;
-}
-bool Field::keeps(const glm::ivec3& block) const noexcept {
-    return block == glm::clamp(block, glm::ivec3(0), data_->blocks - 1) &&
-           data_->directory.data()[data_->entryOf(block)] >= 0;
-}
 glm::dvec3 Field::origin() const noexcept {
     return data_->origin;
 }
@@ -65,16 +56,9 @@ float Field::interiorWidth() const noexcept {
 const Bounds& Field::bounds() const noexcept {
     return data_->bounds;
 }
-const FieldLayout& Field::layout() const noexcept {
-    return *data_;
-}
 const Mesh* Field::mesh() const noexcept {
     return data_->mesh ? &data_->mesh->mesh() : nullptr;
 }
-const MeshTree* Field::tree() const noexcept {
-    return data_->mesh.get();
-}
-
 std::size_t Field::memoryBytes() const noexcept {
     return data_->memoryBytes() + data_->entries.memoryBytes() + (data_->mesh ? data_->mesh->memoryBytes() : 0);
 }

@@ -8,22 +8,27 @@
 #include <optional>
 #include <span>
 
-#include "collider/closest_point.h"
-#include "collider/ray.h"
-#include "sdf/clearance.h"
-#include "sdf/field_layout.h"
-#include "sdf/level_set.h"
-#include "sdf/mesh.h"
-#include "sdf/sample.h"
+#include <bilayer/collider/query.h>
+#include <bilayer/sdf/level_set.h>
+#include <bilayer/sdf/mesh.h>
 
 namespace bilayer {
+
+namespace detail {
+struct FieldData;
+}
+
+/// How a layout keeps its distances.
+enum class Storage {
+    float32,
+    /// In steps of the wider half of the band over 32,766: distances are off by half a step, 4.6e-5 voxels for a half
+    /// width of 3, in half the memory.
+    fixed16,
+};
 
 struct FieldOptions {
     Storage storage = Storage::float32;
 };
-
-struct FieldData;
-class MeshTree;
 
 /// A field laid out for queries. Copies share memory. All queries are noexcept, allocate nothing, and may run on any
 /// number of threads at once.
@@ -40,8 +45,8 @@ class Field {
     /// build() turned around are turned around in mesh() too.
     Field(const LevelSet& levelSet, Mesh mesh, const FieldOptions& options = {});
 
-    /// A field without its mesh, the samples of which are shared, with what outwardMesh() gave back of it: never null.
-    Field(const Field& samples, std::shared_ptr<const Mesh> outward);
+    /// Of data that the library shares.
+    explicit Field(std::shared_ptr<const detail::FieldData> data);
 
     /// Distance and gradient at a point in the field's own coordinates [m].
     Sample sample(const glm::vec3& point) const noexcept { return sample_(*data_, point); }
@@ -114,26 +119,20 @@ class Field {
                         std::span<bool> answers) const;
     void overlapsBox(std::span<const OrientedBox> boxes, std::span<bool> answers) const;
 
-    /// Valid as long as the field or a copy of it lives.
-    Clearance clearance() const noexcept;
-    glm::dvec3 origin() const noexcept;  ///< [m]
-
+    glm::dvec3 origin() const noexcept;     ///< of the box around the band [m]
     float voxelSize() const noexcept;       ///< [m]
     float exteriorWidth() const noexcept;   ///< [m]
     float interiorWidth() const noexcept;   ///< [m]
     const Bounds& bounds() const noexcept;  ///< around all points in the band [m]
-    glm::ivec3 blocks() const noexcept;     ///< of 8^3 voxels, from origin() on, in the box around the band
-    /// Whether samples of the band are kept in a block, by its place in that box; false for one beside it.
-    bool keeps(const glm::ivec3& block) const noexcept;
-    /// What all queries work from; valid as long as the field or a copy of it lives.
-    const FieldLayout& layout() const noexcept;
-    const Mesh* mesh() const noexcept;      ///< null for a field without; valid as long as the field or a copy lives
-    const MeshTree* tree() const noexcept;  ///< likewise: of the mesh, for what is asked of triangles
+    /// Null for a field without; valid as long as the field or a copy lives.
+    const Mesh* mesh() const noexcept;
+    /// What all queries work from, for the library itself; valid as long as the field or a copy of it lives.
+    const detail::FieldData& data() const noexcept { return *data_; }
     std::size_t memoryBytes() const noexcept;
 
   private:
-    std::shared_ptr<const FieldData> data_;
-    Sample (*sample_)(const FieldData&, const glm::vec3&) noexcept;  // the best for this processor
+    std::shared_ptr<const detail::FieldData> data_;
+    Sample (*sample_)(const detail::FieldData&, const glm::vec3&) noexcept;  // the best for this processor
 };
 
 }  // namespace bilayer

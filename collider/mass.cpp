@@ -1,5 +1,5 @@
 // Volume, centre and inertia as sums over tetrahedra, and the principal axes by Jacobi's rotations.
-#include "collider/mass.h"
+#include <bilayer/collider/mass.h>
 
 #include <algorithm>
 #include <array>
@@ -10,9 +10,12 @@
 #include <stdexcept>
 #include <utility>
 
-#include "collider/moments.h"
+#include "collider/field/moments.h"
 
 namespace bilayer {
+
+using namespace detail;
+
 namespace {
 
 constexpr double leastThickness = 1e-7;  // of volume / (area * length): what single precision leaves of a flat sheet
@@ -82,7 +85,7 @@ Eigen eigen(glm::dmat3 matrix) {
 
 }  // namespace
 
-MassProperties massProperties(const Moments& moments, const glm::dvec3& origin) {
+MassProperties detail::massProperties(const Moments& moments, const glm::dvec3& origin) {
     const glm::dvec3 centre = moments.first / moments.volume;
     const glm::dmat3 second = moments.second - moments.volume * glm::outerProduct(centre, centre);
     const glm::dmat3 inertia = glm::dmat3(second[0][0] + second[1][1] + second[2][2]) - second;

@@ -1,5 +1,5 @@
 // The build: tiles, bricks, blocks filled by some device, leaves into the tree, far signs.
-#include "sdf/build.h"
+#include <bilayer/sdf/build.h>
 
 #include <fmt/format.h>
 #include <oneapi/tbb/global_control.h>
@@ -17,26 +17,29 @@
 #include <string>
 #include <vector>
 
-#include "sdf/assemble.h"
-#include "sdf/band.h"
-#include "sdf/blocks.h"
-#include "sdf/double_layer.h"
-#include "sdf/exact.h"
-#include "sdf/flood.h"
-#include "sdf/grids.h"
-#include "sdf/inspect.h"
-#include "sdf/moved.h"
-#include "sdf/orient.h"
-#include "sdf/physical_memory.h"
-#include "sdf/progress.h"
-#include "sdf/pseudonormal.h"
-#include "sdf/sign.h"
-#include "sdf/sign_repair.h"
-#include "sdf/triangle_bins.h"
-#include "sdf/unite.h"
-#include "sdf/winding.h"
+#include <bilayer/sdf/grids.h>
+#include <bilayer/sdf/inspect.h>
+#include "sdf/base/physical_memory.h"
+#include "sdf/base/progress.h"
+#include "sdf/fill/double_layer.h"
+#include "sdf/fill/exact.h"
+#include "sdf/fill/pseudonormal.h"
+#include "sdf/fill/triangle_bins.h"
+#include "sdf/grid/assemble.h"
+#include "sdf/grid/dirty_region.h"
+#include "sdf/leaf/band.h"
+#include "sdf/leaf/blocks.h"
+#include "sdf/mesh/orient.h"
+#include "sdf/mesh/unite.h"
+#include "sdf/sign/flood.h"
+#include "sdf/sign/sign_choice.h"
+#include "sdf/sign/sign_repair.h"
+#include "sdf/sign/winding.h"
 
 namespace bilayer {
+
+using namespace detail;
+
 namespace {
 
 /// Index coordinates stay well inside 32 bits, with room for the band around them.
@@ -651,7 +654,7 @@ LevelSet build(const Mesh& mesh, const BuildOptions& options, const BlockFiller&
     return build(mesh, options, &filler, times);
 }
 
-void fillOnly(const Mesh& mesh, const BuildOptions& given, const BlockFiller& filler) {
+void detail::fillOnly(const Mesh& mesh, const BuildOptions& given, const BlockFiller& filler) {
     const BuildOptions options = inVoxels(given);
     check(options);
     refuseForDevices(options, filler);

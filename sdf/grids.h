@@ -5,7 +5,7 @@
 
 #include <filesystem>
 
-#include "sdf/level_set.h"
+#include <bilayer/sdf/level_set.h>
 
 namespace bilayer {
 

@@ -1,4 +1,4 @@
-#include "sdf/inspect.h"
+#include <bilayer/sdf/inspect.h>
 
 #include <fmt/format.h>
 #include <oneapi/tbb/blocked_range.h>
@@ -13,14 +13,17 @@
 #include <span>
 #include <vector>
 
-#include "sdf/orient.h"
-#include "sdf/piercing.h"
-#include "sdf/polled_loop.h"
-#include "sdf/topology.h"
-#include "sdf/triangle_tree.h"
-#include "sdf/walls.h"
+#include "sdf/base/polled_loop.h"
+#include "sdf/bvh/triangle_tree.h"
+#include "sdf/mesh/orient.h"
+#include "sdf/mesh/self_intersection.h"
+#include "sdf/mesh/topology.h"
+#include "sdf/mesh/wall_thickness.h"
 
 namespace bilayer {
+
+using namespace detail;
+
 namespace {
 
 /// Part of the area whose walls are not common: creases and tips, which most meshes have somewhere.

@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <string>
 
-#include "sdf/mesh.h"
+#include <bilayer/sdf/mesh.h>
 
 namespace bilayer {
 

@@ -1,4 +1,4 @@
-#include "sdf/level_set.h"
+#include <bilayer/sdf/level_set.h>
 
 #include <fmt/format.h>
 #include <algorithm>
@@ -7,7 +7,7 @@
 #include <stdexcept>
 #include <string_view>
 
-#include "sdf/grids.h"
+#include <bilayer/sdf/grids.h>
 
 namespace bilayer {
 namespace {

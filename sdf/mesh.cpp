@@ -1,4 +1,4 @@
-#include "sdf/mesh.h"
+#include <bilayer/sdf/mesh.h>
 
 #include <oneapi/tbb/parallel_for.h>
 #include <oneapi/tbb/parallel_reduce.h>
@@ -15,10 +15,13 @@
 #include <stdexcept>
 #include <vector>
 
-#include "sdf/equal_points.h"
-#include "sdf/large_array.h"
+#include "sdf/base/large_array.h"
+#include "sdf/mesh/equal_points.h"
 
 namespace bilayer {
+
+using namespace detail;
+
 namespace {
 
 /// Vertices or triangles that are worth a task.

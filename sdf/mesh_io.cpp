@@ -1,13 +1,16 @@
-#include "sdf/mesh_io.h"
+#include <bilayer/sdf/mesh_io.h>
 
 #include <string>
 
-#include "sdf/input_file.h"
-#include "sdf/mesh_readers.h"
-#include "sdf/polygons.h"
-#include "sdf/scene_io.h"
+#include "sdf/io/input_file.h"
+#include "sdf/io/mesh_readers.h"
+#include "sdf/io/polygons.h"
+#include "sdf/io/scene_io.h"
 
 namespace bilayer {
+
+using namespace detail;
+
 namespace {
 
 Mesh readByEnding(const std::filesystem::path& path, ReadReport& report) {

@@ -1,4 +1,4 @@
-#include "sdf/nanovdb.h"
+#include <bilayer/sdf/nanovdb.h>
 
 #include <fmt/format.h>
 #include <nanovdb/util/GridHandle.h>
@@ -10,10 +10,13 @@
 #include <stdexcept>
 #include <vector>
 
-#include "sdf/atomic_file.h"
-#include "sdf/grids.h"
+#include <bilayer/sdf/grids.h>
+#include "sdf/io/atomic_file.h"
 
 namespace bilayer {
+
+using namespace detail;
+
 namespace {
 
 constexpr std::align_val_t alignment{NANOVDB_DATA_ALIGNMENT};

@@ -8,7 +8,7 @@
 #include <span>
 #include <utility>
 
-#include "sdf/level_set.h"
+#include <bilayer/sdf/level_set.h>
 
 namespace bilayer {
 

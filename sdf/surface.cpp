@@ -1,11 +1,11 @@
-#include "sdf/surface.h"
+#include <bilayer/sdf/surface.h>
 
 #include <fmt/format.h>
 #include <openvdb/tools/VolumeToMesh.h>
 
 #include <stdexcept>
 
-#include "sdf/grids.h"
+#include <bilayer/sdf/grids.h>
 
 namespace bilayer {
 

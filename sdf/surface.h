@@ -1,8 +1,8 @@
 // The mesh of an isosurface, by OpenVDB.
 #pragma once
 
-#include "sdf/level_set.h"
-#include "sdf/mesh.h"
+#include <bilayer/sdf/level_set.h>
+#include <bilayer/sdf/mesh.h>
 
 namespace bilayer {
 

@@ -1,4 +1,4 @@
-#include "sdf/vdb_io.h"
+#include <bilayer/sdf/vdb_io.h>
 
 #include <fmt/format.h>
 #include <oneapi/tbb/parallel_for.h>
@@ -17,13 +17,16 @@
 #include <string_view>
 #include <vector>
 
-#include "sdf/atomic_file.h"
-#include "sdf/grids.h"
-#include "sdf/input_file.h"
-#include "sdf/mapped_file.h"
-#include "sdf/vdb_lengths.h"
+#include <bilayer/sdf/grids.h>
+#include "sdf/io/atomic_file.h"
+#include "sdf/io/input_file.h"
+#include "sdf/io/mapped_file.h"
+#include "sdf/io/vdb_lengths.h"
 
 namespace bilayer {
+
+using namespace detail;
+
 namespace {
 
 /// 16-bit floats have 11 binary digits: rounding is off by this part of a number at most.

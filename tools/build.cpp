@@ -8,19 +8,21 @@
 #include <stdexcept>
 #include <utility>
 
-#include "cl/device.h"
-#include "cl/filler.h"
-#include "collider/collider.h"
-#include "integration/fluid/fill.h"
-#include "sdf/build.h"
-#include "sdf/double_layer.h"
-#include "sdf/mesh_io.h"
-#include "sdf/sign.h"
-#include "sdf/vdb_io.h"
+#include <bilayer/cl/device.h>
+#include <bilayer/cl/filler.h>
+#include <bilayer/collider/collider.h>
+#include <bilayer/integration/fluid/extend.h>
+#include <bilayer/sdf/build.h>
+#include <bilayer/sdf/mesh_io.h>
+#include <bilayer/sdf/vdb_io.h>
+#include "sdf/fill/double_layer.h"
+#include "sdf/sign/sign_choice.h"
 #include "tools/commands.h"
 #include "tools/output.h"
 
 namespace bilayer::tools {
+
+using namespace bilayer::detail;
 namespace {
 
 // Words of the contract.
@@ -135,12 +137,7 @@ LevelSet timedBuild(const Mesh& mesh, const Arguments& a, Outcome& outcome) {
 // With what bodies need beside the field.
 LevelSet timedBody(const Mesh& mesh, const LevelSet& field, const Arguments& a, Outcome& outcome) {
     const Stopwatch watch;
-    ColliderOptions options = a.collider;
-    options.measure = Measure::samples;  // what that needs is made when the file is read
-    Body body = Collider(mesh, field, options).body();
-    body.measure = a.collider.measure;
-    if (a.noMesh) body.mesh.reset();
-    LevelSet stored = withBody(field, body);
+    LevelSet stored = withBody(field, mesh, a.collider, !a.noMesh);
     outcome.body = watch.seconds();
     return stored;
 }

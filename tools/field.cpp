@@ -9,12 +9,12 @@
 #include <string>
 #include <vector>
 
-#include "collider/field.h"
-#include "sdf/grids.h"
-#include "sdf/mesh_io.h"
-#include "sdf/nanovdb.h"
-#include "sdf/surface.h"
-#include "sdf/vdb_io.h"
+#include <bilayer/collider/field.h>
+#include <bilayer/sdf/grids.h>
+#include <bilayer/sdf/mesh_io.h>
+#include <bilayer/sdf/nanovdb.h>
+#include <bilayer/sdf/surface.h>
+#include <bilayer/sdf/vdb_io.h>
 #include "tools/commands.h"
 #include "tools/output.h"
 

@@ -8,7 +8,7 @@
 #include <string>
 #include <system_error>
 
-#include "sdf/atomic_file.h"
+#include "sdf/io/atomic_file.h"
 #include "tools/commands.h"
 
 namespace {
@@ -16,7 +16,7 @@ namespace {
 enum Status { done = 0, fault = 1, usage = 2 };
 
 void setSignals() {
-    bilayer::removeAtomicFilesOnSignal();
+    bilayer::detail::removeAtomicFilesOnSignal();
     // a reader that closes the pipe ends the command quietly, and a file above the size limit is an error like any
     // other
     std::signal(SIGPIPE, SIG_DFL);

@@ -1,4 +1,6 @@
 #include "tools/output.h"
+#include <bilayer/sdf/mesh_io.h>
+#include <bilayer/sdf/vdb_io.h>
 
 #include <fmt/format.h>
 #include <sys/resource.h>
@@ -8,9 +10,11 @@
 #include <cmath>
 #include <cstdio>
 
-#include "sdf/atomic_file.h"
+#include "sdf/io/atomic_file.h"
 
 namespace bilayer::tools {
+
+using namespace bilayer::detail;
 namespace {
 
 constexpr int barColumns = 40;  // characters of a full bar: fits a narrow terminal with its label

@@ -11,14 +11,16 @@
 #include <utility>
 #include <vector>
 
-#include "collider/body.h"
-#include "collider/mass.h"
-#include "sdf/inspect.h"
-#include "sdf/level_set.h"
-#include "sdf/mesh_io.h"
-#include "sdf/vdb_io.h"
+#include <bilayer/collider/mass.h>
+#include <bilayer/sdf/inspect.h>
+#include <bilayer/sdf/level_set.h>
+#include <bilayer/sdf/mesh_io.h>
+#include <bilayer/sdf/vdb_io.h>
+#include "collider/contact/body.h"
 
 namespace bilayer::tools {
+
+using namespace bilayer::detail;
 
 using Json = nlohmann::ordered_json;
 

@@ -8,17 +8,19 @@
 #include <optional>
 #include <stdexcept>
 
-#include "cl/device.h"
-#include "collider/body.h"
-#include "collider/mass.h"
-#include "integration/bullet/advice.h"
-#include "sdf/grids.h"
-#include "sdf/mesh_io.h"
-#include "sdf/vdb_io.h"
+#include <bilayer/cl/device.h>
+#include <bilayer/collider/mass.h>
+#include <bilayer/integration/bullet/settings.h>
+#include <bilayer/sdf/grids.h>
+#include <bilayer/sdf/mesh_io.h>
+#include <bilayer/sdf/vdb_io.h>
+#include "collider/contact/body.h"
 #include "tools/commands.h"
 #include "tools/output.h"
 
 namespace bilayer::tools {
+
+using namespace bilayer::detail;
 namespace {
 
 struct Arguments {

@@ -10,13 +10,13 @@
 #include <variant>
 #include <vector>
 
-#include "collider/mass.h"
-#include "integration/fluid/particles.h"
-#include "integration/fluid/seed.h"
-#include "sdf/build.h"
-#include "sdf/grids.h"
-#include "sdf/mesh_io.h"
-#include "sdf/vdb_io.h"
+#include <bilayer/collider/mass.h>
+#include <bilayer/integration/fluid/particles.h>
+#include <bilayer/integration/fluid/seed.h>
+#include <bilayer/sdf/build.h>
+#include <bilayer/sdf/grids.h>
+#include <bilayer/sdf/mesh_io.h>
+#include <bilayer/sdf/vdb_io.h>
 #include "tools/commands.h"
 #include "tools/output.h"
 

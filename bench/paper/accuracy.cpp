@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include <bilayer/sdf/grids.h>
+#include <bilayer/sdf/inspect.h>
 #include "bench/measure.h"
 #include "bench/paper/markdown.h"
 #include "bench/paper/models.h"
@@ -11,8 +13,6 @@
 #include "bench/paper/published.h"
 #include "bench/paper/scatter.h"
 #include "demos/shared/shapes.h"
-#include "sdf/grids.h"
-#include "sdf/inspect.h"
 
 namespace bilayer::paper {
 namespace {

@@ -7,11 +7,11 @@
 #include <glm/gtc/matrix_transform.hpp>
 #include <random>
 
+#include <bilayer/sdf/build.h>
+#include <bilayer/sdf/grids.h>
 #include "bench/paper/markdown.h"
 #include "bench/paper/part.h"
 #include "bench/paper/theorems.h"
-#include "sdf/build.h"
-#include "sdf/grids.h"
 #include "tests/support/truth.h"
 
 namespace bilayer::paper {

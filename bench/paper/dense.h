@@ -9,7 +9,7 @@
 #include <glm/vec3.hpp>
 #include <vector>
 
-#include "sdf/build.h"
+#include <bilayer/sdf/build.h>
 
 namespace bilayer::paper {
 

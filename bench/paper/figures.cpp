@@ -4,12 +4,12 @@
 #include <algorithm>
 #include <glm/geometric.hpp>
 
+#include <bilayer/sdf/surface.h>
 #include "bench/paper/markdown.h"
 #include "bench/paper/models.h"
 #include "bench/paper/part.h"
 #include "bench/paper/picture.h"
 #include "bench/paper/published.h"
-#include "sdf/surface.h"
 
 namespace bilayer::paper {
 namespace {

@@ -4,10 +4,10 @@
 #include <filesystem>
 #include <glm/common.hpp>
 
+#include <bilayer/sdf/mesh_io.h>
 #include "bench/builders.h"
 #include "bench/paper/published.h"
 #include "demos/shared/shapes.h"
-#include "sdf/mesh_io.h"
 
 namespace bilayer::paper {
 namespace {

@@ -13,16 +13,18 @@
 #include <set>
 #include <thread>
 
+#include <bilayer/cl/device.h>
 #include "bench/measure.h"
 #include "bench/paper/markdown.h"
 #include "bench/paper/models.h"
 #include "bench/paper/part.h"
 #include "bench/paper/published.h"
 #include "bench/program.h"
-#include "cl/device.h"
-#include "sdf/double_layer.h"
+#include "sdf/fill/double_layer.h"
 
 namespace bilayer::paper {
+
+using namespace bilayer::detail;
 
 std::vector<Part> parts() {
     std::vector<Part> all;

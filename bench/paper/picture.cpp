@@ -12,10 +12,12 @@
 #include <memory>
 #include <stdexcept>
 
-#include "collider/mesh_rays.h"
-#include "sdf/grids.h"
+#include <bilayer/sdf/grids.h>
+#include "collider/field/mesh_rays.h"
 
 namespace bilayer::paper {
+
+using namespace bilayer::detail;
 namespace {
 
 using openvdb::Vec3d;

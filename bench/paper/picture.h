@@ -7,8 +7,8 @@
 #include <glm/vec3.hpp>
 #include <vector>
 
-#include "sdf/level_set.h"
-#include "sdf/mesh.h"
+#include <bilayer/sdf/level_set.h>
+#include <bilayer/sdf/mesh.h>
 
 namespace bilayer::paper {
 

@@ -11,6 +11,7 @@
 #include <memory>
 #include <stdexcept>
 
+#include <bilayer/cl/filler.h>
 #include "bench/builders.h"
 #include "bench/measure.h"
 #include "bench/paper/markdown.h"
@@ -18,7 +19,6 @@
 #include "bench/paper/part.h"
 #include "bench/paper/published.h"
 #include "bench/paper/scatter.h"
-#include "cl/filler.h"
 
 namespace bilayer::paper {
 namespace {

@@ -12,14 +12,16 @@
 #include <random>
 #include <stdexcept>
 
+#include <bilayer/integration/bullet/extensions.h>
+#include <bilayer/sdf/build.h>
+#include <bilayer/sdf/inspect.h>
+#include <bilayer/sdf/mesh_io.h>
 #include "demos/shared/shapes.h"
 #include "demos/shared/stage.h"
-#include "integration/bullet/stillness.h"
-#include "sdf/build.h"
-#include "sdf/inspect.h"
-#include "sdf/mesh_io.h"
 
 namespace bilayer::demo {
+
+using namespace bilayer::detail;
 namespace {
 
 constexpr const char* bunnyFile = "/usr/share/glmark2/models/bunny.obj";  // Debian's package glmark2-data
@@ -156,7 +158,8 @@ Outcome bowl(const BowlOptions& options) {
     Stage stage(fmt::format("{} bodies in a bowl", options.bodies), {.framesPerMeasuring = 30});
     stage.world().bullet().getSolverInfo().m_numIterations = options.iterations;
     stage.world().bullet().getSolverInfo().m_frictionERP = pulledBack;
-    const bullet::Stillness still(stage.world().bullet());
+    const bullet::WorldExtensions still(stage.world().bullet(),
+                                        {.continuousCollision = false, .restStabilisation = true});
     stage.add(vessel, {}, {}, bowlLook);
     const Matter matter{.mass = 1, .restingSpeed = restingSpeed, .restingSpin = restingSpin};
     std::vector<btRigidBody*> bodies;

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
+#include <bilayer/sdf/mesh.h>
 #include "demos/shared/outcome.h"
-#include "sdf/mesh.h"
 
 namespace bilayer::demo {
 

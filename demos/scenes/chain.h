@@ -3,7 +3,7 @@
 // TOG 40 (2021).
 #pragma once
 
-#include "collider/pose.h"
+#include <bilayer/collider/pose.h>
 #include "demos/shared/outcome.h"
 
 namespace bilayer::demo {

@@ -10,10 +10,10 @@
 #include <chrono>
 #include <cmath>
 
+#include <bilayer/integration/fluid/seed.h>
 #include "demos/scenes/bowl.h"
 #include "demos/shared/shapes.h"
 #include "demos/shared/surface_of.h"
-#include "integration/fluid/seed.h"
 
 namespace bilayer::demo {
 namespace {

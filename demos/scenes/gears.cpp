@@ -13,14 +13,17 @@
 #include <numeric>
 #include <utility>
 
-#include "collider/mass.h"
+#include <bilayer/collider/mass.h>
+#include <bilayer/sdf/mesh_io.h>
 #include "demos/shared/machines.h"
 #include "demos/shared/stage.h"
 #include "demos/shared/turning.h"
-#include "integration/bullet/convert.h"
-#include "sdf/mesh_io.h"
+#include "integration/bullet/detail/convert.h"
 
 namespace bilayer::demo {
+
+using namespace bilayer::detail;
+using namespace bilayer::bullet::detail;
 namespace {
 
 constexpr float density = 7850;   // of steel [kg/m^3]
@@ -66,7 +69,8 @@ class Axles {
     void add(btRigidBody& body, const glm::vec3& place) {
         const btTransform& pose = body.getWorldTransform();
         const btVector3 upright = pose.getBasis().transpose() * btVector3(0, 0, 1);
-        hinges_.push_back(std::make_unique<btHingeConstraint>(body, pose.invXform(bullet::toBullet(place)), upright));
+        hinges_.push_back(
+            std::make_unique<btHingeConstraint>(body, pose.invXform(bullet::detail::toBullet(place)), upright));
         world_.addConstraint(hinges_.back().get());
     }
 

@@ -2,6 +2,7 @@
 // ratio that their numbers say.
 #pragma once
 
+#include <bilayer/sdf/mesh_io.h>
 #include <filesystem>
 #include <vector>
 

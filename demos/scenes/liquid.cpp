@@ -8,14 +8,14 @@
 #include <glm/geometric.hpp>
 #include <optional>
 
+#include <bilayer/integration/fluid/particles.h>
+#include <bilayer/integration/fluid/seed.h>
+#include <bilayer/sdf/inspect.h>
 #include "demos/scenes/bowl.h"
 #include "demos/shared/exact_distance.h"
 #include "demos/shared/shapes.h"
 #include "demos/shared/surface_of.h"
 #include "demos/shared/water.h"
-#include "integration/fluid/particles.h"
-#include "integration/fluid/seed.h"
-#include "sdf/inspect.h"
 
 namespace bilayer::demo {
 namespace {

@@ -7,11 +7,11 @@
 #include <glm/gtc/constants.hpp>
 #include <glm/trigonometric.hpp>
 
-#include "collider/mass.h"
+#include <bilayer/collider/mass.h>
+#include <bilayer/sdf/mesh_io.h>
 #include "demos/shared/machines.h"
 #include "demos/shared/stage.h"
 #include "demos/shared/turning.h"
-#include "sdf/mesh_io.h"
 
 namespace bilayer::demo {
 namespace {

@@ -3,6 +3,7 @@
 // RSS 2022.
 #pragma once
 
+#include <bilayer/sdf/mesh_io.h>
 #include <filesystem>
 #include <vector>
 

@@ -21,11 +21,11 @@
 #include <glm/gtc/constants.hpp>
 #include <glm/trigonometric.hpp>
 
+#include <bilayer/integration/bullet/shape.h>
+#include <bilayer/sdf/build.h>
 #include "demos/shared/shapes.h"
 #include "demos/shared/stage.h"
 #include "demos/shared/triangle_shape.h"
-#include "integration/bullet/shape.h"
-#include "sdf/build.h"
 
 namespace bilayer::demo {
 namespace {

@@ -8,11 +8,11 @@
 #include <glm/trigonometric.hpp>
 #include <limits>
 
-#include "collider/mass.h"
+#include <bilayer/collider/mass.h>
+#include <bilayer/sdf/mesh_io.h>
 #include "demos/shared/machines.h"
 #include "demos/shared/shapes.h"
 #include "demos/shared/stage.h"
-#include "sdf/mesh_io.h"
 
 namespace bilayer::demo {
 namespace {

@@ -2,6 +2,7 @@
 // its way over the chamfers down to the floor.
 #pragma once
 
+#include <bilayer/sdf/mesh_io.h>
 #include <filesystem>
 #include <vector>
 

@@ -5,12 +5,14 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
-#include "collider/mass.h"
+#include <bilayer/collider/mass.h>
+#include <bilayer/integration/bullet/extensions.h>
 #include "demos/shared/shapes.h"
 #include "demos/shared/stage.h"
-#include "integration/bullet/angular_momentum.h"
 
 namespace bilayer::demo {
+
+using namespace bilayer::detail;
 namespace {
 
 constexpr float size = 0.05f, halfThickness = 0.04f;  // of the handle's squares, and of the handle [m]
@@ -60,7 +62,8 @@ double difference(const MassProperties& a, const MassProperties& b) {
 Outcome spin(const SpinOptions& options) {
     Stage stage("A free body that spins");
     stage.world().bullet().setGravity({0, 0, 0});
-    const bullet::AngularMomentum keeps(stage.world().bullet());
+    const bullet::WorldExtensions keeps(stage.world().bullet(),
+                                        {.continuousCollision = false, .gyroscopicIntegration = true});
     const auto thing = makeThing(handle(), {options.voxelSize});
     btRigidBody& body = stage.add(thing, {.mass = mass, .linearDamping = 0, .angularDamping = 0}, {},
                                   {.colour = 0xf2cc8f, .roughness = 0.4f, .clearcoat = 0.4f});

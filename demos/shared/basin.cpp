@@ -8,9 +8,10 @@
 #include <glm/gtc/matrix_transform.hpp>
 
 #include "demos/shared/shapes.h"
-#include "integration/fluid/regrid.h"
+#include "integration/fluid/detail/regrid.h"
 
 namespace bilayer::demo {
+
 namespace {
 
 using openvdb::Coord;
@@ -46,8 +47,8 @@ Vec3SGrid::Ptr openFacesOf(const CoordBBox& box, const openvdb::math::Transform&
 FloatGrid::Ptr levelSetOf(const CoordBBox& box, const openvdb::math::Transform& cells) {
     const double voxel = cells.voxelSize()[0];
     const Vec3d half = 0.5 * voxel * box.extents().asVec3d(), centre = cells.indexToWorld(box.getCenter());
-    return fluid::regrid(shapes::box({half.x(), half.y(), half.z()}), Pose{{centre.x(), centre.y(), centre.z()}}, cells,
-                         float(halfWidth * voxel));
+    return fluid::detail::regrid(shapes::box({half.x(), half.y(), half.z()}),
+                                 Pose{{centre.x(), centre.y(), centre.z()}}, cells, float(halfWidth * voxel));
 }
 
 // The cell in the box that a mirror in the walls shows in place of one behind them.

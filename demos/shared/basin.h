@@ -3,8 +3,8 @@
 
 #include <openvdb/openvdb.h>
 
+#include <bilayer/integration/fluid/obstacle.h>
 #include "demos/shared/face_velocity.h"
-#include "integration/fluid/solid.h"
 
 namespace bilayer::demo {
 

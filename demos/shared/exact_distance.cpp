@@ -1,4 +1,5 @@
 #include "demos/shared/exact_distance.h"
+#include <bilayer/collider/contact.h>
 
 #include <algorithm>
 #include <cmath>

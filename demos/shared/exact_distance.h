@@ -8,8 +8,8 @@
 #include <span>
 #include <vector>
 
-#include "collider/pose.h"
-#include "sdf/mesh.h"
+#include <bilayer/collider/pose.h>
+#include <bilayer/sdf/mesh.h>
 
 namespace bilayer::demo {
 

@@ -6,8 +6,8 @@
 
 #include <vector>
 
-#include "collider/pose.h"
-#include "sdf/mesh.h"
+#include <bilayer/collider/pose.h>
+#include <bilayer/sdf/mesh.h>
 
 namespace bilayer::shapes {
 

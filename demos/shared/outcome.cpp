@@ -9,7 +9,7 @@
 #include <numeric>
 #include <stdexcept>
 
-#include "sdf/vdb_io.h"
+#include <bilayer/sdf/vdb_io.h>
 
 namespace bilayer::demo {
 namespace {

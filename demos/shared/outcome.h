@@ -9,9 +9,9 @@
 #include <utility>
 #include <vector>
 
+#include <bilayer/sdf/level_set.h>
 #include "demos/shared/plot.h"
 #include "demos/shared/recording.h"
-#include "sdf/level_set.h"
 
 namespace bilayer::demo {
 

@@ -13,11 +13,15 @@
 #include <string_view>
 #include <tuple>
 
-#include "sdf/atomic_file.h"
+#include "sdf/io/atomic_file.h"
 
 namespace bilayer {
+
+using namespace bilayer::detail;
+namespace detail {
 extern const char* const player_html;  // player.html, embedded by the build
 }
+}  // namespace bilayer
 
 namespace bilayer::demo {
 namespace {
@@ -275,7 +279,7 @@ std::string Recording::data() const {
 
 void Recording::write(const std::filesystem::path& path) const {
     if (times_.empty()) throw std::invalid_argument("recording: no frame to write");
-    std::string page = player_html;
+    std::string page = detail::player_html;
     replace(page, "/*THREE*/", readText(std::string(threeFolder) + "three.min.js"));
     replace(page, "/*CONTROLS*/", readText(std::string(threeFolder) + "examples/js/controls/OrbitControls.js"));
     replace(page, "/*DATA*/", data());

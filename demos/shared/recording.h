@@ -10,8 +10,8 @@
 #include <utility>
 #include <vector>
 
-#include "collider/pose.h"
-#include "sdf/mesh.h"
+#include <bilayer/collider/pose.h>
+#include <bilayer/sdf/mesh.h>
 
 namespace bilayer::demo {
 

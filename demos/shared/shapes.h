@@ -5,7 +5,7 @@
 #include <glm/vec2.hpp>
 #include <vector>
 
-#include "sdf/mesh.h"
+#include <bilayer/sdf/mesh.h>
 
 namespace bilayer::shapes {
 

@@ -13,7 +13,7 @@
 #include <limits>
 #include <set>
 
-#include "sdf/build.h"
+#include <bilayer/sdf/build.h>
 
 namespace bilayer::demo {
 namespace {

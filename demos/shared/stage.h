@@ -8,11 +8,11 @@
 #include <string>
 #include <vector>
 
+#include <bilayer/sdf/level_set.h>
 #include "demos/shared/exact_distance.h"
 #include "demos/shared/outcome.h"
 #include "demos/shared/recording.h"
 #include "demos/shared/world.h"
-#include "sdf/level_set.h"
 
 namespace bilayer::demo {
 

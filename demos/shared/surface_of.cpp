@@ -2,8 +2,8 @@
 
 #include <memory>
 
-#include "sdf/grids.h"
-#include "sdf/surface.h"
+#include <bilayer/sdf/grids.h>
+#include <bilayer/sdf/surface.h>
 
 namespace bilayer::demo {
 

@@ -3,7 +3,7 @@
 
 #include <openvdb/openvdb.h>
 
-#include "sdf/mesh.h"
+#include <bilayer/sdf/mesh.h>
 
 namespace bilayer::demo {
 

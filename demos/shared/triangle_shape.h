@@ -5,14 +5,16 @@
 
 #include <memory>
 
-#include "integration/bullet/convert.h"
-#include "sdf/mesh.h"
+#include <bilayer/sdf/mesh.h>
+#include "integration/bullet/detail/convert.h"
 
 namespace bilayer::demo {
 
+using namespace bilayer::bullet::detail;
+
 struct TriangleShape {
     explicit TriangleShape(const Mesh& mesh) {
-        using bullet::toBullet;
+        using bullet::detail::toBullet;
         for (const glm::uvec3& t : mesh.triangles)
             triangles.addTriangle(toBullet(mesh.points[t.x]), toBullet(mesh.points[t.y]), toBullet(mesh.points[t.z]));
         shape = std::make_unique<btBvhTriangleMeshShape>(&triangles, true);

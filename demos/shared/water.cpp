@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "collider/mass.h"
+#include <bilayer/collider/mass.h>
 #include "demos/shared/surface_of.h"
 
 namespace bilayer::demo {

@@ -6,7 +6,7 @@
 #include <glm/vec3.hpp>
 #include <memory>
 
-#include "sdf/mesh.h"
+#include <bilayer/sdf/mesh.h>
 
 namespace bilayer::demo {
 

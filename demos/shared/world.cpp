@@ -1,8 +1,11 @@
 #include "demos/shared/world.h"
 
-#include "integration/bullet/convert.h"
+#include "integration/bullet/detail/convert.h"
 
 namespace bilayer::demo {
+
+using namespace bilayer::detail;
+using namespace bilayer::bullet::detail;
 namespace {
 
 constexpr float gravity = 9.81f;  // [m/s^2]
@@ -63,7 +66,7 @@ void World::step(float seconds) {
 std::vector<Pose> World::poses() const {
     std::vector<Pose> poses;
     for (const auto& [shape, body] : bodies_)
-        poses.push_back(bullet::toPose(body->getWorldTransform() * frameOf(*shape)));
+        poses.push_back(bullet::detail::toPose(body->getWorldTransform() * frameOf(*shape)));
     return poses;
 }
 

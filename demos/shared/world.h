@@ -10,12 +10,15 @@
 #include <memory>
 #include <vector>
 
-#include "collider/pose.h"
-#include "integration/bullet/dispatcher.h"
-#include "integration/bullet/no_passing.h"
-#include "integration/bullet/shape.h"
+#include <bilayer/collider/contact.h>
+#include <bilayer/collider/pose.h>
+#include <bilayer/integration/bullet/dispatcher.h>
+#include <bilayer/integration/bullet/extensions.h>
+#include <bilayer/integration/bullet/shape.h>
 
 namespace bilayer::demo {
+
+using namespace bilayer::detail;
 
 /// What bodies are made of.
 struct Matter {
@@ -71,7 +74,7 @@ class World {
     btDbvtBroadphase broadphase_;
     btSequentialImpulseConstraintSolver solver_;
     btDiscreteDynamicsWorld world_{&dispatcher_, &broadphase_, &solver_, &configuration_};
-    bullet::NoPassing noPassing_{world_};
+    bullet::WorldExtensions extensions_{world_};
     std::vector<Body> bodies_;
 };
 

@@ -1,4 +1,5 @@
-#include "integration/bullet/dispatcher.h"
+#include <bilayer/collider/contact.h>
+#include <bilayer/integration/bullet/dispatcher.h>
 
 #include <BulletCollision/BroadphaseCollision/btOverlappingPairCache.h>
 #include <BulletCollision/CollisionDispatch/btGhostObject.h>
@@ -11,11 +12,15 @@
 #include <utility>
 #include <vector>
 
-#include "integration/bullet/algorithms.h"
-#include "integration/bullet/compound.h"
-#include "integration/bullet/sampled_pairs.h"
+#include "integration/bullet/detail/algorithms.h"
+#include "integration/bullet/detail/compound.h"
+#include "integration/bullet/detail/continuous_collision.h"
+#include "integration/bullet/detail/sampled_pairs.h"
 
 namespace bilayer::bullet {
+
+using namespace detail;
+using namespace bilayer::detail;
 
 namespace {
 
@@ -61,7 +66,7 @@ void Dispatcher::dispatchAllCollisionPairs(btOverlappingPairCache* cache, const 
     const auto start = std::chrono::steady_clock::now();
     const bool isStep = !isOfGhost(*cache);
     functions_->state = {
-        .running = {}, .seconds = isStep ? info.m_timeStep : 0, .foreseesAll = functions_->state.foreseesAll};
+        .running = {}, .seconds = isStep ? info.m_timeStep : 0, .foreseesAll = !ContinuousCollision::serves(*this)};
 
     std::vector<Task> tasks;
     for (int i = 0; i < cache->getNumOverlappingPairs(); ++i) {
@@ -106,10 +111,6 @@ void Dispatcher::dispatchAllCollisionPairs(btOverlappingPairCache* cache, const 
     if (!isStep) return;
     functions_->last = functions_->state.running;
     functions_->last.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
-
-void Dispatcher::foreseeAll(bool motions) {
-    functions_->state.foreseesAll = motions;
 }
 
 const DispatchStatistics& Dispatcher::statistics() const {

@@ -3,10 +3,11 @@
 
 #include <BulletCollision/CollisionDispatch/btCollisionDispatcher.h>
 #include <BulletCollision/CollisionDispatch/btDefaultCollisionConfiguration.h>
+#include <bilayer/collider/contact.h>
 
 #include <memory>
 
-#include "sdf/point_sampler.h"
+#include <bilayer/collider/contact.h>
 
 namespace bilayer::bullet {
 
@@ -46,11 +47,6 @@ class Dispatcher : public btCollisionDispatcher {
 
     void dispatchAllCollisionPairs(btOverlappingPairCache* pairs, const btDispatcherInfo& info,
                                    btDispatcher* dispatcher) override;
-
-    /// Whether contacts are made of all that bodies are going to meet in a step (see ShapeOptions::sweeps); else only
-    /// of what bodies meet that go no farther than their own size. A NoPassing asks for that: a contact that is
-    /// foreseen bends a body's way instead of ending it, and what is fast may then miss what it would have hit.
-    void foreseeAll(bool motions);
 
     const DispatchStatistics& statistics() const;
 

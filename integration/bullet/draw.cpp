@@ -1,13 +1,20 @@
-#include "integration/bullet/draw.h"
+#include <bilayer/collider/contact.h>
+#include <bilayer/integration/bullet/draw.h>
+
+#include "collider/contact/collider_data.h"
+#include "collider/field/field_data.h"
 
 #include <BulletCollision/CollisionDispatch/btCollisionObject.h>
 #include <BulletCollision/CollisionShapes/btCompoundShape.h>
 
 #include <glm/vec3.hpp>
 
-#include "integration/bullet/convert.h"
+#include "integration/bullet/detail/convert.h"
 
 namespace bilayer::bullet {
+
+using namespace detail;
+using namespace bilayer::detail;
 
 namespace {
 
@@ -23,7 +30,7 @@ bool isOutline(bool here, bool besideU, bool besideV, bool besideBoth) {
 // Calls line(from, to) for the edges along one axis [blocks], those in a row as one.
 template <class Line>
 void visitOutline(const Field& field, int axis, Line&& line) {
-    const glm::ivec3 size = field.blocks();
+    const glm::ivec3 size = field.data().blocks;
     const int u = (axis + 1) % 3, v = (axis + 2) % 3;
     glm::ivec3 at(0), beyondU(0), beyondV(0);
     beyondU[u] = beyondV[v] = 1;
@@ -31,8 +38,9 @@ void visitOutline(const Field& field, int axis, Line&& line) {
         for (at[v] = 0; at[v] <= size[v]; ++at[v]) {
             glm::ivec3 start(-1);
             for (at[axis] = 0; at[axis] <= size[axis]; ++at[axis]) {
-                const bool outlined = isOutline(field.keeps(at), field.keeps(at - beyondU), field.keeps(at - beyondV),
-                                                field.keeps(at - beyondU - beyondV));
+                const bool outlined =
+                    isOutline(field.data().keeps(at), field.data().keeps(at - beyondU),
+                              field.data().keeps(at - beyondV), field.data().keeps(at - beyondU - beyondV));
                 if (outlined && start[axis] < 0) start = at;
                 if (outlined || start[axis] < 0) continue;
                 line(start, at);
@@ -55,7 +63,7 @@ void drawBand(const Shape& shape, const Placed& here, btIDebugDraw& drawer, cons
 }
 
 void drawPoints(const Shape& shape, const Placed& here, btIDebugDraw& drawer, const DrawOptions& options) {
-    for (const SurfacePoint& point : shape.collider().points().points()) {
+    for (const SurfacePoint& point : shape.collider().data().points().points()) {
         const glm::vec3 from = here.pose.toWorld(here.scale * point.position);
         const glm::vec3 to = from + normalVoxels * shape.voxelSize() * (here.pose.rotation * point.normal);
         drawer.drawLine(toBullet(from), toBullet(to), point.isSharp ? options.sharpColour : options.pointColour);

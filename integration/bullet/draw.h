@@ -5,7 +5,7 @@
 #include <BulletCollision/CollisionDispatch/btCollisionWorld.h>
 #include <LinearMath/btIDebugDraw.h>
 
-#include "integration/bullet/shape.h"
+#include <bilayer/integration/bullet/shape.h>
 
 namespace bilayer::bullet {
 

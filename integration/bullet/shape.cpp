@@ -1,4 +1,5 @@
-#include "integration/bullet/shape.h"
+#include <bilayer/collider/contact.h>
+#include <bilayer/integration/bullet/shape.h>
 
 #include <BulletCollision/CollisionShapes/btBvhTriangleMeshShape.h>
 #include <BulletCollision/CollisionShapes/btScaledBvhTriangleMeshShape.h>
@@ -14,12 +15,17 @@
 #include <mutex>
 #include <stdexcept>
 
-#include "collider/mesh_rays.h"
-#include "integration/bullet/convert.h"
-#include "integration/bullet/missing_dispatcher.h"
-#include "integration/bullet/sweep.h"
+#include "collider/contact/collider_data.h"
+#include "collider/field/field_data.h"
+#include "collider/field/mesh_rays.h"
+#include "integration/bullet/detail/casts.h"
+#include "integration/bullet/detail/convert.h"
+#include "integration/bullet/detail/missing_dispatcher.h"
 
 namespace bilayer::bullet {
+
+using namespace detail;
+using namespace bilayer::detail;
 
 namespace {
 
@@ -294,7 +300,7 @@ void Shape::calculateLocalInertia(btScalar mass, btVector3& inertia) const {
 void Shape::processAllTriangles(btTriangleCallback* callback, const btVector3& lower, const btVector3& upper) const {
     if (auto* ray = dynamic_cast<btTriangleRaycastCallback*>(callback)) {
         const Placed here = placed(btTransform::getIdentity());
-        if (const MeshTree* mesh = collider_->measured().tree()) return castRay(here, *mesh, *ray);
+        if (const MeshTree* mesh = collider_->exactField().data().mesh.get()) return castRay(here, *mesh, *ray);
         if (const auto fraction = castRay(here, *ray)) {
             Behind behind(*ray, *fraction);
             triangles_->of(*this).processAllTriangles(&behind, lower, upper);
@@ -306,7 +312,7 @@ void Shape::processAllTriangles(btTriangleCallback* callback, const btVector3& l
         sweep->m_triangleCollisionMargin = 0;
         const auto* sphere = dynamic_cast<const btSphereShape*>(sweep->m_convexShape);
         const Placed here = placed(sweep->m_triangleToWorld);
-        if (sphere && castSphere(here, collider_->measured().tree(), sphere->getRadius(), *sweep)) return;
+        if (sphere && castSphere(here, collider_->exactField().data().mesh.get(), sphere->getRadius(), *sweep)) return;
         return triangles_->cast(*this, *sweep);
     }
 

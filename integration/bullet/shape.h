@@ -7,8 +7,9 @@
 
 #include <memory>
 
-#include "collider/collider.h"
-#include "integration/bullet/dispatcher.h"
+#include <bilayer/collider/collider.h>
+#include <bilayer/collider/contact.h>
+#include <bilayer/integration/bullet/dispatcher.h>
 
 namespace bilayer::bullet {
 
@@ -22,8 +23,8 @@ struct ShapeOptions {
     float margin = -1;
     /// Whether bodies that move farther than the margin in a step are followed on their way: contacts are then made of
     /// what a step would meet, and the solver lets bodies come that far. Surface points follow straight ways, and the
-    /// solver is iterative: what goes by more than the thickness of a wall in a step may still pass it, unless a
-    /// NoPassing looks after the world.
+    /// solver is iterative: what goes by more than the thickness of a wall in a step may still pass it, unless
+    /// continuous collision (extensions.h) looks after the world.
     bool sweeps = true;
     /// How many times as much friction contacts bear that have not slipped for 120 steps; 1: no more. It comes by and
     /// by, and goes with the slip: all of it in a tenth of a voxel. Heaps come to rest with friction at its limit in

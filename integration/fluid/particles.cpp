@@ -1,6 +1,6 @@
 // Jittered sampling: each voxel draws its positions from a counter-based generator keyed by the seed, the voxel and the
 // particle, so that neither the order of the voxels nor the number of threads matters.
-#include "integration/fluid/particles.h"
+#include <bilayer/integration/fluid/particles.h>
 
 #include <openvdb/points/PointAttribute.h>
 #include <openvdb/points/PointConversion.h>
@@ -12,9 +12,13 @@
 #include <limits>
 #include <stdexcept>
 
-#include "collider/interpolant.h"
+#include "collider/field/interpolant.h"
 
 namespace bilayer::fluid {
+
+using namespace detail;
+using namespace bilayer::detail;
+
 namespace {
 
 using openvdb::Coord;

@@ -9,8 +9,8 @@
 #include <glm/vec3.hpp>
 #include <vector>
 
-#include "collider/field.h"
-#include "integration/fluid/placement.h"
+#include <bilayer/collider/field.h>
+#include <bilayer/integration/fluid/placement.h>
 
 namespace bilayer::fluid {
 

@@ -3,7 +3,7 @@
 
 #include <glm/vec3.hpp>
 
-#include "collider/pose.h"
+#include <bilayer/collider/pose.h>
 
 namespace bilayer::fluid {
 

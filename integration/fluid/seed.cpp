@@ -1,7 +1,7 @@
 // Seeding in three steps: the body's distances are found at the liquid's voxels, the two level sets are combined by
 // OpenVDB's CSG, and the result is mended until it is a level set in the sense of openvdb::tools::checkLevelSet. All
 // work is done on a copy.
-#include "integration/fluid/seed.h"
+#include <bilayer/integration/fluid/seed.h>
 
 #include <openvdb/tools/Composite.h>
 #include <openvdb/tools/Diagnostics.h>
@@ -10,10 +10,13 @@
 #include <stdexcept>
 #include <string>
 
-#include "integration/fluid/mend.h"
-#include "integration/fluid/regrid.h"
+#include "integration/fluid/detail/regrid.h"
+#include "integration/fluid/detail/repair.h"
 
 namespace bilayer::fluid {
+
+using namespace detail;
+
 namespace {
 
 using openvdb::FloatGrid;

@@ -6,9 +6,9 @@
 #include <cstddef>
 #include <glm/vec3.hpp>
 
-#include "integration/fluid/placement.h"
-#include "sdf/level_set.h"
-#include "sdf/mesh.h"
+#include <bilayer/integration/fluid/placement.h>
+#include <bilayer/sdf/level_set.h>
+#include <bilayer/sdf/mesh.h>
 
 namespace bilayer::fluid {
 

@@ -5,10 +5,10 @@
 #include <cmath>
 #include <random>
 
+#include <bilayer/sdf/grids.h>
+#include <bilayer/sdf/mesh_io.h>
 #include "bench/paper/scatter.h"
 #include "demos/shared/shapes.h"
-#include "sdf/grids.h"
-#include "sdf/mesh_io.h"
 #include "tests/support/support.h"
 
 using namespace bilayer;

@@ -1,5 +1,6 @@
 // Bodies from files in a world.
-#include "collider/body.h"
+#include "collider/contact/body.h"
+#include "collider/contact/collider_data.h"
 
 #include <algorithm>
 #include <catch2/catch.hpp>
@@ -7,13 +8,14 @@
 #include <cstring>
 #include <vector>
 
+#include <bilayer/sdf/build.h>
+#include <bilayer/sdf/vdb_io.h>
 #include "demos/shared/shapes.h"
-#include "sdf/build.h"
-#include "sdf/vdb_io.h"
 #include "tests/support/support.h"
 #include "world.h"
 
 using namespace bilayer;
+using namespace bilayer::detail;
 using namespace bilayer::test;
 using bullet::Shape;
 
@@ -27,7 +29,7 @@ Pair bodyOf(const Mesh& mesh, float voxelSize) {
     const LevelSet field = build(mesh, {.voxelSize = voxelSize});
     const auto path = scratch("body.vdb");
     const auto made = std::make_shared<Collider>(mesh, field, ColliderOptions{.margin = 0.6f * voxelSize});
-    writeVdb(path, withBody(field, made->body()));
+    writeVdb(path, withBody(field, made->data().body));
     return {made, std::make_shared<Collider>(readVdb(path))};
 }
 

@@ -14,17 +14,21 @@
 #include <limits>
 #include <random>
 
+#include <bilayer/collider/contact.h>
+#include <bilayer/sdf/build.h>
+#include <bilayer/sdf/vdb_io.h>
+#include "collider/contact/collider_data.h"
 #include "demos/shared/shapes.h"
-#include "integration/bullet/convert.h"
-#include "sdf/build.h"
-#include "sdf/vdb_io.h"
+#include "integration/bullet/detail/convert.h"
 #include "tests/support/support.h"
 #include "world.h"
 
 using namespace bilayer;
+using namespace bilayer::detail;
+using namespace bilayer::bullet::detail;
 using namespace bilayer::test;
 using bullet::Shape;
-using bullet::toBullet;
+using bullet::detail::toBullet;
 
 namespace {
 
@@ -193,8 +197,8 @@ TEST_CASE("Rays meet a field where they meet its triangles") {
         // what passes the outline of the mesh by no more than rounding may hit it or not; Bullet grows its triangles
         const btTransform body = twins.ofField.dynamics.getCollisionObjectArray()[0]->getWorldTransform();
         const auto exact = [&, to = to](double grown) {
-            return firstHit(mesh, glm::dvec3(bullet::toGlm(body.invXform(begin))),
-                            glm::dvec3(bullet::toGlm(body.invXform(to))), oneSided, grown);
+            return firstHit(mesh, glm::dvec3(bullet::detail::toGlm(body.invXform(begin))),
+                            glm::dvec3(bullet::detail::toGlm(body.invXform(to))), oneSided, grown);
         };
         CHECK(ray.m_closestHitFraction > exact(1e-5) - 1e-5);
         CHECK(ray.m_closestHitFraction < exact(-1e-5) + 1e-5);
@@ -234,8 +238,8 @@ TEST_CASE("Shapes of all kinds on their way meet a field as they meet its triang
             // spheres are exact: Bullet's own search stops a millimetre before, or where it does not converge
             const btTransform body = twins.ofField.dynamics.getCollisionObjectArray()[0]->getWorldTransform();
             const double exact =
-                firstTouch(scaled(bodyOf(kind % 2), scale), glm::dvec3(bullet::toGlm(body.invXform(from))),
-                           glm::dvec3(bullet::toGlm(body.invXform(to))), 0.12 * double(scale));
+                firstTouch(scaled(bodyOf(kind % 2), scale), glm::dvec3(bullet::detail::toGlm(body.invXform(from))),
+                           glm::dvec3(bullet::detail::toGlm(body.invXform(to))), 0.12 * double(scale));
             if (std::abs(exact - 1) < 1e-4) continue;
             REQUIRE(sweep.hasHit() == (exact <= 1));
             if (!sweep.hasHit()) continue;
@@ -277,7 +281,7 @@ TEST_CASE("A body from a file answers casts and contact tests as the one of its 
     const LevelSet field = build(mesh, {.voxelSize = voxel});
     const auto path = scratch("casts.vdb");
     const auto made = std::make_shared<Collider>(mesh, field);
-    writeVdb(path, withBody(field, made->body()));
+    writeVdb(path, withBody(field, made->data().body));
     Shape ofMesh(made), ofFile(std::make_shared<Collider>(readVdb(path)));
     World meshes, files;
     meshes.add(ofMesh, 0, {0, 0, 0});
@@ -435,13 +439,13 @@ TEST_CASE("Contact tests tell the distance that the triangles have") {
         const float distance = ask(twins.ofField, ofField, scale), byBullet = ask(twins.ofTriangles, ofTriangles, 1);
         Mesh seen = mesh;
         for (glm::vec3& p : seen.points)
-            p = bullet::toGlm(btTransform(turn.getBasis(), place).inverse() * (body * toBullet(p)));
+            p = bullet::detail::toGlm(btTransform(turn.getBasis(), place).inverse() * (body * toBullet(p)));
         const float expected = kind == 1   ? float(distanceTo(seen, fromBox))
                                : kind == 3 ? float(distanceTo(seen, fromCylinder))
                                : kind == 4 ? float(distanceTo(seen, fromCone))
                                            : byBullet;
         CAPTURE(i, distance / voxel, expected / voxel, byBullet / voxel);
-        if (windingNumber(mesh, glm::dvec3(bullet::toGlm(body.invXform(place)))) > 0.5) continue;
+        if (windingNumber(mesh, glm::dvec3(bullet::detail::toGlm(body.invXform(place)))) > 0.5) continue;
         if (expected < 0.1f * voxel || expected > 0.9f * most) continue;
         ++found;
         CHECK(distance == Approx(expected).margin(0.1 * double(voxel)));

@@ -1,5 +1,6 @@
 // Fields as children of compounds.
 #include <BulletCollision/CollisionDispatch/btCompoundCompoundCollisionAlgorithm.h>
+#include <bilayer/collider/contact.h>
 
 #include <catch2/catch.hpp>
 #include <cmath>

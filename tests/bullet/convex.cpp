@@ -1,5 +1,5 @@
 // Bullet's convex shapes by formula.
-#include "integration/bullet/convex.h"
+#include "integration/bullet/detail/convex.h"
 
 #include <LinearMath/btConvexHullComputer.h>
 #include <btBulletCollisionCommon.h>
@@ -14,13 +14,15 @@
 #include <vector>
 
 #include "demos/shared/shapes.h"
-#include "integration/bullet/convert.h"
+#include "integration/bullet/detail/convert.h"
 #include "tests/support/random.h"
 #include "tests/support/support.h"
 
 using namespace bilayer;
+using namespace bilayer::detail;
+using namespace bilayer::bullet::detail;
 using namespace bilayer::test;
-using bullet::Convex;
+using bullet::detail::Convex;
 
 namespace {
 
@@ -34,11 +36,11 @@ std::vector<glm::vec3> cloud(std::size_t count, const glm::vec3& size, Random& r
 /// The triangles of a hull, each face as a fan.
 Mesh hullOf(const std::vector<glm::vec3>& points) {
     std::vector<btVector3> all;
-    for (const glm::vec3& point : points) all.push_back(bullet::toBullet(point));
+    for (const glm::vec3& point : points) all.push_back(bullet::detail::toBullet(point));
     btConvexHullComputer hull;
     hull.compute(&all.front().x(), sizeof(btVector3), int(all.size()), 0, 0);
     Mesh mesh;
-    for (int i = 0; i < hull.vertices.size(); ++i) mesh.points.push_back(bullet::toGlm(hull.vertices[i]));
+    for (int i = 0; i < hull.vertices.size(); ++i) mesh.points.push_back(bullet::detail::toGlm(hull.vertices[i]));
     for (int i = 0; i < hull.faces.size(); ++i) {
         const auto* first = &hull.edges[hull.faces[i]];
         const unsigned apex = unsigned(first->getSourceVertex());
@@ -70,7 +72,7 @@ TEST_CASE("Points near hulls are as far away as from the nearest of all their fa
     for (const auto& hull : hulls) {
         CAPTURE(hull.name);
         btConvexHullShape shape;
-        for (const glm::vec3& point : hull.points) shape.addPoint(bullet::toBullet(point), false);
+        for (const glm::vec3& point : hull.points) shape.addPoint(bullet::detail::toBullet(point), false);
         shape.recalcLocalAabb();
         shape.setMargin(0);
         const Convex convex(shape);
@@ -102,7 +104,7 @@ TEST_CASE("What lies on a face meets it along its normal, however near it is") {
     };
     btConvexHullShape hull;
     const std::vector<glm::vec3> points = cloud(100, {1, 0.6f, 0.3f}, random);
-    for (const glm::vec3& point : points) hull.addPoint(bullet::toBullet(point), false);
+    for (const glm::vec3& point : points) hull.addPoint(bullet::detail::toBullet(point), false);
     hull.recalcLocalAabb();
     hull.setMargin(0);
     const Convex ofPoints(hull);
@@ -137,7 +139,8 @@ TEST_CASE("Straight ways enter convex shapes where distance says, and only then"
     CAPTURE(seed);
     Random random(seed);
     btConvexHullShape hull;
-    for (const glm::vec3& point : cloud(100, {1, 0.6f, 0.3f}, random)) hull.addPoint(bullet::toBullet(point), false);
+    for (const glm::vec3& point : cloud(100, {1, 0.6f, 0.3f}, random))
+        hull.addPoint(bullet::detail::toBullet(point), false);
     hull.recalcLocalAabb();
     hull.setMargin(0.05f);
     btBoxShape box({0.9f, 0.5f, 0.2f});
@@ -181,7 +184,7 @@ TEST_CASE("Nothing is inside of a flat hull, and ways beside it do not enter it"
     btConvexHullShape shape;
     Mesh quad;
     for (const glm::vec3& corner : corners) {
-        shape.addPoint(bullet::toBullet(corner), false);
+        shape.addPoint(bullet::detail::toBullet(corner), false);
         quad.points.push_back(corner);
     }
     quad.triangles = {{0, 1, 2}, {0, 2, 3}};

@@ -12,14 +12,17 @@
 #include <optional>
 #include <vector>
 
+#include <bilayer/collider/contact.h>
+#include <bilayer/sdf/build.h>
 #include "demos/shared/shapes.h"
-#include "integration/bullet/convert.h"
-#include "sdf/build.h"
+#include "integration/bullet/detail/convert.h"
 #include "tests/support/random.h"
 #include "tests/support/support.h"
 #include "world.h"
 
 using namespace bilayer;
+using namespace bilayer::detail;
+using namespace bilayer::bullet::detail;
 using namespace bilayer::test;
 using bullet::Shape;
 
@@ -45,7 +48,7 @@ glm::dvec3 toDouble(const btVector3& v) {
 
 std::vector<Triangle> trianglesOf(const Mesh& mesh, const btTransform& place) {
     std::vector<Triangle> triangles;
-    const auto at = [&](unsigned i) { return toDouble(place * bullet::toBullet(mesh.points[i])); };
+    const auto at = [&](unsigned i) { return toDouble(place * bullet::detail::toBullet(mesh.points[i])); };
     for (const glm::uvec3& t : mesh.triangles) triangles.push_back(Triangle({at(t.x), at(t.y), at(t.z)}));
     return triangles;
 }
@@ -181,7 +184,8 @@ class Other {
 
 btTransform anywhere(Random& random, double reach) {
     const glm::vec3 axis(random.direction()), place(random.point(reach));
-    return btTransform(btQuaternion(bullet::toBullet(axis), float(random(0, 6.28))), bullet::toBullet(place));
+    return btTransform(btQuaternion(bullet::detail::toBullet(axis), float(random(0, 6.28))),
+                       bullet::detail::toBullet(place));
 }
 
 }  // namespace
@@ -235,7 +239,7 @@ TEST_CASE("Contact tests that ask for no distance measure the depth by the trian
         const double expected = distance(pulley, place) - double(radius);
         if (expected > -0.05 * double(voxel)) continue;
         ++found;
-        b.setWorldTransform(btTransform(btQuaternion::getIdentity(), bullet::toBullet(glm::vec3(place))));
+        b.setWorldTransform(btTransform(btQuaternion::getIdentity(), bullet::detail::toBullet(glm::vec3(place))));
         Nearest nearest;
         world.dynamics.contactPairTest(&a, &b, nearest);
         CAPTURE(i, nearest.distance / double(voxel), expected / double(voxel));
@@ -263,7 +267,7 @@ TEST_CASE("Contact tests find how far round bodies are that nearly touch each ot
         const glm::vec3 way = overPlane ? glm::vec3(0, 0, 1) : random.direction();
         a.setWorldTransform(anywhere(random, 0));
         if (!overPlane) b.setWorldTransform(anywhere(random, 0));
-        a.getWorldTransform().setOrigin(bullet::toBullet((gap + (overPlane ? radius : 2 * radius)) * way));
+        a.getWorldTransform().setOrigin(bullet::detail::toBullet((gap + (overPlane ? radius : 2 * radius)) * way));
         Nearest nearest;
         nearest.m_closestDistanceThreshold = 3 * voxel;
         world.dynamics.contactPairTest(&a, &b, nearest);

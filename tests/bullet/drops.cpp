@@ -12,14 +12,17 @@
 #include <string>
 #include <vector>
 
+#include <bilayer/sdf/build.h>
+#include <bilayer/sdf/mesh_io.h>
 #include "demos/shared/shapes.h"
-#include "integration/bullet/convert.h"
-#include "sdf/build.h"
+#include "integration/bullet/detail/convert.h"
 #include "tests/support/random.h"
 #include "tests/support/support.h"
 #include "world.h"
 
 using namespace bilayer;
+using namespace bilayer::detail;
+using namespace bilayer::bullet::detail;
 using namespace bilayer::test;
 
 namespace {
@@ -111,7 +114,7 @@ Drop drop(const std::shared_ptr<const Collider>& collider, btCollisionShape& gro
     world.dynamics.getSolverInfo().m_splitImpulsePenetrationThreshold = -shape.voxelSize();
     world.add(ground, 0, {0, 0, 0});
     const Pose& frame = shape.frame();
-    const btTransform inMesh(bullet::toBullet(frame.rotation), bullet::toBullet(frame.position));
+    const btTransform inMesh(bullet::detail::toBullet(frame.rotation), bullet::detail::toBullet(frame.position));
     const btTransform mesh(btQuaternion(btVector3(0, 0, 1), turn), btVector3(place.x, place.y, 0));
     btTransform at = mesh * inMesh.inverse();
     at.getOrigin().setZ(at.getOrigin().z() + height + fall - lowest(collider->mesh(), mesh));

@@ -12,22 +12,26 @@
 #include <limits>
 #include <random>
 
-#include "collider/edge_search.h"
+#include <bilayer/collider/contact.h>
+#include <bilayer/sdf/build.h>
+#include "collider/contact/collider_data.h"
+#include "collider/contact/edge_search.h"
 #include "demos/shared/exact_distance.h"
 #include "demos/shared/shapes.h"
-#include "integration/bullet/ball_hull.h"
-#include "integration/bullet/convert.h"
-#include "integration/bullet/convex.h"
-#include "integration/bullet/narrow.h"
-#include "sdf/build.h"
+#include "integration/bullet/detail/convert.h"
+#include "integration/bullet/detail/convex.h"
+#include "integration/bullet/detail/multisphere.h"
+#include "integration/bullet/detail/narrow_phase.h"
 #include "tests/support/support.h"
 #include "world.h"
 
 using namespace bilayer;
+using namespace bilayer::detail;
+using namespace bilayer::bullet::detail;
 using namespace bilayer::test;
-using bullet::BallHull;
-using bullet::Convex;
 using bullet::Shape;
+using bullet::detail::BallHull;
+using bullet::detail::Convex;
 
 namespace {
 
@@ -70,7 +74,7 @@ const Contact& deepest(const std::vector<Contact>& contacts) {
 }
 
 btTransform transformOf(const Pose& pose) {
-    return btTransform(bullet::toBullet(pose.rotation), bullet::toBullet(pose.position));
+    return btTransform(bullet::detail::toBullet(pose.rotation), bullet::detail::toBullet(pose.position));
 }
 
 using Collide = std::function<std::vector<Contact>(const Crossing&, float)>;
@@ -80,29 +84,29 @@ Collide collideBars(int kind, Measure measure) {
     if (kind == 0)
         return [=](const Crossing& c, float margin) {
             std::vector<Contact> contacts;
-            NearPoints near;
-            bullet::collideFields({*field, c.upper}, {*field, c.lower}, margin, false, near, contacts);
+            ContactCache near;
+            bullet::detail::collideFields({*field, c.upper}, {*field, c.lower}, margin, false, near, contacts);
             return contacts;
         };
     if (kind == 1 || kind == 2) {
-        std::shared_ptr<btConvexShape> shape = std::make_shared<btBoxShape>(bullet::toBullet(bar));
+        std::shared_ptr<btConvexShape> shape = std::make_shared<btBoxShape>(bullet::detail::toBullet(bar));
         if (kind == 2) {
             const auto hull = std::make_shared<btConvexHullShape>();
-            for (const glm::vec3& point : shapes::box(bar).points) hull->addPoint(bullet::toBullet(point));
+            for (const glm::vec3& point : shapes::box(bar).points) hull->addPoint(bullet::detail::toBullet(point));
             hull->setMargin(0);
             shape = hull;
         }
         return [=](const Crossing& c, float margin) {
             std::vector<Contact> contacts;
-            bullet::collideConvex(Convex(*shape), c.upper, {}, {*field, c.lower}, margin, false, contacts);
+            bullet::detail::collideConvex(Convex(*shape), c.upper, {}, {*field, c.lower}, margin, false, contacts);
             return contacts;
         };
     }
     const auto triangles = std::make_shared<TriangleShape>(shapes::box(bar));
     return [=](const Crossing& c, float margin) {
         std::vector<Contact> contacts;
-        bullet::collideTriangles(*triangles->shape, transformOf(c.upper), {}, {*field, c.lower}, margin, false,
-                                 contacts);
+        bullet::detail::collideTriangles(*triangles->shape, transformOf(c.upper), {}, {*field, c.lower}, margin, false,
+                                         contacts);
         return contacts;
     };
 }
@@ -147,7 +151,8 @@ TEST_CASE("A plane of many triangles makes the contacts of a plane of two") {
         pose.position.z = halfSlab.z - lowest + 0.5f * h * part(random);
         const auto collide = [&](const TriangleShape& slab) {
             std::vector<Contact> contacts;
-            bullet::collideTriangles(*slab.shape, btTransform::getIdentity(), {}, {*body, pose}, h, false, contacts);
+            bullet::detail::collideTriangles(*slab.shape, btTransform::getIdentity(), {}, {*body, pose}, h, false,
+                                             contacts);
             return contacts;
         };
         const auto few = collide(two), others = collide(many);
@@ -199,14 +204,14 @@ TEST_CASE("An edge finds a bump between its probes, and stays on it") {
     static const auto ball = exactSphere(radius, h);
     const float side = std::sqrt(2.f) * halfBar;
     const glm::quat ridge = glm::angleAxis(glm::quarter_pi<float>(), glm::vec3(1, 0, 0));
-    const btBoxShape box(bullet::toBullet(bar));
+    const btBoxShape box(bullet::detail::toBullet(bar));
     const Convex convex(box);
     float before = 0;
     for (int i = 0; i < 200; ++i) {
         const float way = 0.02f * h * float(i), gap = -0.1f * h;
         std::vector<Contact> contacts;
-        bullet::collideConvex(convex, {{0.3f + way, 0, radius + side + gap}, ridge}, {}, {*ball, {}}, h, false,
-                              contacts);
+        bullet::detail::collideConvex(convex, {{0.3f + way, 0, radius + side + gap}, ridge}, {}, {*ball, {}}, h, false,
+                                      contacts);
         const Contact& contact = deepest(contacts);
         CAPTURE(i, contact.distance / h);
         CHECK(contact.distance == Approx(gap).margin(tolerance));
@@ -232,8 +237,8 @@ TEST_CASE("Contacts of solids of revolution are numbers, wherever a line of thei
         const glm::vec3 at(0.29426688f + 2e-4f * part(random), 0.296223223f,
                            isPlace ? 0.263574898f : 0.25f + 0.05f * part(random));
         std::vector<Contact> contacts;
-        bullet::collideConvex(isPlace || i % 4 ? cylinder : cone, {at, isPlace ? aslant : glm::normalize(any)}, {},
-                              {*plate, {}}, h, false, contacts);
+        bullet::detail::collideConvex(isPlace || i % 4 ? cylinder : cone, {at, isPlace ? aslant : glm::normalize(any)},
+                                      {}, {*plate, {}}, h, false, contacts);
         for (const Contact& contact : contacts) {
             CAPTURE(start, i, contact.distance, contact.feature);
             REQUIRE(glm::length(contact.normal) == Approx(1).margin(1e-4));
@@ -280,9 +285,9 @@ TEST_CASE("Sharp edges are those of the mesh, and none lies across a groove") {
         mesh = shapes::join(parts);
     }
     const auto collider = colliderOf(mesh);
-    const auto points = collider->points().points();
+    const auto points = collider->data().points().points();
     double total = 0;
-    for (const SharpEdge& edge : collider->edges().edges()) {
+    for (const SharpEdge& edge : collider->data().edges().edges()) {
         REQUIRE(edge.from < edge.to);
         const glm::vec3 &a = points[edge.from].position, &b = points[edge.to].position;
         total += glm::distance(a, b);
@@ -302,9 +307,9 @@ TEST_CASE("Tips that have sunk into faces are told how deep, and each contact th
     pyramid.points = {{-0.5f, -0.4f, -0.2f}, {0.6f, -0.3f, -0.2f}, {0.05f, 0.6f, -0.2f}, {0.05f, 0, 0.5f}};
     pyramid.triangles = {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {2, 0, 3}};
     Shape fields[] = {Shape(colliderOf(pyramid)), Shape(colliderOf(needle))}, field(colliderOf(slab));
-    btBoxShape box(bullet::toBullet(half));
+    btBoxShape box(bullet::detail::toBullet(half));
     btConvexHullShape hull;
-    for (const glm::vec3& point : slab.points) hull.addPoint(bullet::toBullet(point));
+    for (const glm::vec3& point : slab.points) hull.addPoint(bullet::detail::toBullet(point));
     hull.setMargin(0);
     TriangleShape few(slab), many(shapes::box(half, 20));
     btCollisionShape* grounds[] = {&field, &box, &hull, few.shape.get(), many.shape.get()};
@@ -394,7 +399,7 @@ TEST_CASE("A multisphere is that of its balls, whatever its margin and scale") {
     const btMultiSphereShape spheres(centres, radii, 3);
     const Convex convex(spheres);
     for (int i = 0; i < 3; ++i) {
-        const glm::vec3 above = bullet::toGlm(centres[i]) + glm::vec3(0, 0, scale);
+        const glm::vec3 above = bullet::detail::toGlm(centres[i]) + glm::vec3(0, 0, scale);
         CHECK(convex.nearest(above, scale).distance <= Approx(scale - radii[i]));
     }
     const glm::vec3 beside = scale * glm::vec3(-1, -0.2f, 0);
@@ -474,18 +479,19 @@ TEST_CASE("No contact is much deeper than the bodies overlap, whichever edges cr
             CHECK(-deepest < depth + h);
         };
         std::vector<Contact> contacts;
-        NearPoints points;
-        bullet::collideFields({*colliders[a], pose}, {*colliders[b], {}}, h, false, points, contacts);
+        ContactCache points;
+        bullet::detail::collideFields({*colliders[a], pose}, {*colliders[b], {}}, h, false, points, contacts);
         check("fields", contacts);
         // as triangles: B collides with A
         contacts.clear();
-        bullet::collideTriangles(*triangles[a].shape,
-                                 btTransform(bullet::toBullet(pose.rotation), bullet::toBullet(pose.position)), {},
-                                 {*colliders[b], {}}, h, false, contacts);
+        bullet::detail::collideTriangles(
+            *triangles[a].shape,
+            btTransform(bullet::detail::toBullet(pose.rotation), bullet::detail::toBullet(pose.position)), {},
+            {*colliders[b], {}}, h, false, contacts);
         check("triangles", contacts);
         if (a != 2) continue;
         contacts.clear();
-        bullet::collideConvex(convex, pose, {}, {*colliders[b], {}}, h, false, contacts);
+        bullet::detail::collideConvex(convex, pose, {}, {*colliders[b], {}}, h, false, contacts);
         check("convex", contacts);
     }
     CHECK(overlapping > 150);
@@ -518,7 +524,7 @@ TEST_CASE("A corner is as deep in triangles as below their plane, however the bo
                               (pose.rotation * (half * glm::vec3(i & 1 ? 1 : -1, i & 2 ? 1 : -1, i & 4 ? 1 : -1))).z);
         pose.position.z = -lowest - depth;
         std::vector<Contact> contacts;
-        bullet::collideTriangles(ground, btTransform::getIdentity(), {}, {*box, pose}, h, false, contacts);
+        bullet::detail::collideTriangles(ground, btTransform::getIdentity(), {}, {*box, pose}, h, false, contacts);
         float deepest = h;
         glm::vec3 direction(0);
         for (const Contact& contact : contacts)
@@ -546,8 +552,8 @@ TEST_CASE("A tip below a crease of triangles is as deep as below both of its fac
         const glm::vec3 axis = glm::normalize(glm::vec3(0.3f * any(random), 0.3f * any(random), -1));
         const glm::quat turn = glm::angleAxis(std::acos(axis.z), glm::normalize(glm::vec3(-axis.y, axis.x, 0)));
         std::vector<Contact> contacts;
-        bullet::collideTriangles(*groove.shape, btTransform::getIdentity(), {},
-                                 {*cone, {tip - 0.5f * height * axis, turn}}, h, false, contacts);
+        bullet::detail::collideTriangles(*groove.shape, btTransform::getIdentity(), {},
+                                         {*cone, {tip - 0.5f * height * axis, turn}}, h, false, contacts);
         for (const glm::vec3& up : {left, right}) {
             float deepest = h;
             for (const Contact& contact : contacts)
@@ -574,7 +580,7 @@ TEST_CASE("What is exact is so against Bullet's shapes too") {
         const Pose pose{glm::vec3(half.x, half.y, 0.013f * float(i - 20)) + away, {1, 0, 0, 0}};
         const auto errorOf = [&](const Collider& collider) {
             std::vector<Contact> contacts;
-            bullet::collideConvex(convex, pose, {}, {collider, {}}, h, false, contacts);
+            bullet::detail::collideConvex(convex, pose, {}, {collider, {}}, h, false, contacts);
             // the ball's own centre in the field, not the box's edge in the ball
             float error = h;
             for (const Contact& contact : contacts)
@@ -611,7 +617,7 @@ TEST_CASE("Balls lie in a groove as deep as they do between two faces") {
         btSphereShape ball(radius);
         std::vector<Contact> contacts;
         const Pose lying{bottom + glm::vec3(0, 0, std::sqrt(2.f) * radius)};
-        bullet::collideConvex(Convex(ball), lying, {}, {*groove, {}}, h, false, contacts);
+        bullet::detail::collideConvex(Convex(ball), lying, {}, {*groove, {}}, h, false, contacts);
         return deepest(contacts).distance;
     };
     for (const float voxels : {0.9f, 1.5f, 2.f}) {

@@ -13,15 +13,17 @@
 #include <utility>
 #include <vector>
 
-#include "integration/bullet/convert.h"
+#include "integration/bullet/detail/convert.h"
 #include "tests/support/random.h"
 #include "tests/support/support.h"
 #include "world.h"
 
 using namespace bilayer;
+using namespace bilayer::detail;
+using namespace bilayer::bullet::detail;
 using namespace bilayer::test;
 using bullet::Shape;
-using bullet::toGlm;
+using bullet::detail::toGlm;
 
 namespace {
 
@@ -204,7 +206,7 @@ TEST_CASE("Contacts with a mesh or a height field name their triangle, as those 
             std::map<int, int> parts;
             for (int round = 0; round < 40; ++round) {
                 CAPTURE(ground.name, body.name, groundIsFirst, round);
-                const btQuaternion rotation(bullet::toBullet(random.direction()), float(random(0, 6.28)));
+                const btQuaternion rotation(bullet::detail::toBullet(random.direction()), float(random(0, 6.28)));
                 const btVector3 place(float(random(-1, 1)), float(random(-1, 1)), float(random(0.1, 0.45)));
                 const btTransform groundPlace(btQuaternion({0, 0, 1}, 0.3f), {0.1f, 0.2f, 0.05f});
                 World world;
@@ -314,8 +316,8 @@ TEST_CASE("A small box names the triangle and the children that Bullet's own box
             glm::dvec3 up = glm::normalize(glm::cross(triangle[1] - triangle[0], triangle[2] - triangle[0]));
             if (up.z < 0) up = -up;
             const glm::vec3 middle((triangle[0] + triangle[1] + triangle[2]) / 3. + (double(half) - 0.002) * up);
-            const btTransform place(shortestArcQuat({0, 0, 1}, bullet::toBullet(glm::vec3(up))),
-                                    bullet::toBullet(middle));
+            const btTransform place(shortestArcQuat({0, 0, 1}, bullet::detail::toBullet(glm::vec3(up))),
+                                    bullet::detail::toBullet(middle));
             btCollisionShape &theirs = boxInCompound ? static_cast<btCollisionShape&>(ofBullet) : bulletBox,
                              &ours = boxInCompound ? static_cast<btCollisionShape&>(ofField) : box;
             const Small expected = namesUnder(under, theirs, place, groundIsFirst),

@@ -15,15 +15,18 @@
 #include <set>
 #include <span>
 
+#include <bilayer/collider/contact.h>
+#include <bilayer/sdf/build.h>
 #include "demos/shared/shapes.h"
-#include "integration/bullet/convert.h"
-#include "integration/bullet/reduce.h"
-#include "sdf/build.h"
+#include "integration/bullet/detail/contact_reduction.h"
+#include "integration/bullet/detail/convert.h"
 #include "tests/support/random.h"
 #include "tests/support/support.h"
 #include "world.h"
 
 using namespace bilayer;
+using namespace bilayer::detail;
+using namespace bilayer::bullet::detail;
 using namespace bilayer::test;
 using bullet::Shape;
 
@@ -76,9 +79,9 @@ TEST_CASE("Three hundred steps give the same bits on 1, 2 and 8 threads") {
 
 namespace {
 
-std::set<std::uint32_t> featuresOf(std::span<const bullet::Patch> patches) {
+std::set<std::uint32_t> featuresOf(std::span<const bullet::detail::Patch> patches) {
     std::set<std::uint32_t> found;
-    for (const bullet::Patch& patch : patches)
+    for (const bullet::detail::Patch& patch : patches)
         for (int i = 0; i < patch.count; ++i) found.insert(patch.contacts[i].feature);
     return found;
 }
@@ -99,23 +102,23 @@ TEST_CASE("Of contacts that tremble by rounding the same are kept, of those that
     std::mt19937 random(5);
     std::uniform_real_distribution<float> tremble(-2e-5f, 2e-5f);
     const std::vector<Contact> flat = circle();
-    std::vector<bullet::Patch> last;
+    std::vector<bullet::detail::Patch> last;
     std::set<std::uint32_t> first;
     for (int step = 0; step < 50; ++step) {
         std::vector<Contact> contacts = flat;
         for (Contact& contact : contacts) contact.distance += tremble(random);
-        last = bullet::reduce(contacts, last).patches;
+        last = bullet::detail::reduce(contacts, last).patches;
         if (step == 0) first = featuresOf(last);
         REQUIRE(first.size() < 12);
         REQUIRE(featuresOf(last) == first);
     }
     std::vector<Contact> tilted = flat;
     for (Contact& contact : tilted) contact.distance -= 0.05f * contact.position.x;
-    const std::vector<bullet::Patch> anew = bullet::reduce(tilted, last).patches;
+    const std::vector<bullet::detail::Patch> anew = bullet::detail::reduce(tilted, last).patches;
     CHECK(featuresOf(anew).contains(0u));
     tilted = flat;
     for (Contact& contact : tilted) contact.distance -= 0.05f * contact.position.x;
-    CHECK(featuresOf(bullet::reduce(tilted).patches) == featuresOf(anew));
+    CHECK(featuresOf(bullet::detail::reduce(tilted).patches) == featuresOf(anew));
 }
 
 TEST_CASE("Contacts that may bear a load stay while a body rocks on them") {
@@ -130,14 +133,14 @@ TEST_CASE("Contacts that may bear a load stay while a body rocks on them") {
         const float x = side(random), y = side(random);
         flat.push_back({{0.1f * x, 0.1f * y, 0}, glm::normalize(glm::vec3(bend * x, bend * y, 1)), rough(random), i});
     }
-    std::vector<bullet::Patch> last;
+    std::vector<bullet::detail::Patch> last;
     std::set<std::uint32_t> before;
     int gone = 0, kept = 0;
     for (int step = 0; step < 200; ++step) {
         std::vector<Contact> contacts = flat;
         const float x = tilt(random), y = tilt(random);
         for (Contact& contact : contacts) contact.distance += x * contact.position.x + y * contact.position.y;
-        last = bullet::reduce(contacts, last).patches;
+        last = bullet::detail::reduce(contacts, last).patches;
         const std::set<std::uint32_t> now = featuresOf(last);
         REQUIRE(now.size() <= 12);
         for (const std::uint32_t feature : before) gone += !now.contains(feature);
@@ -149,7 +152,7 @@ TEST_CASE("Contacts that may bear a load stay while a body rocks on them") {
 
 TEST_CASE("The same contacts are kept until the bodies have moved, and are where they are now") {
     std::vector<Contact> contacts = circle();
-    bullet::Choice choice;
+    bullet::detail::Choice choice;
     const btTransform here = btTransform::getIdentity();
     choice.update(contacts, here, here);
     const std::set<std::uint32_t> first = featuresOf(choice.reduced().patches);
@@ -168,13 +171,13 @@ TEST_CASE("The same contacts are kept until the bodies have moved, and are where
         return all;
     };
     const auto after = [&](std::vector<Contact> all, const btTransform& a, const btTransform& b) {
-        bullet::Choice next = choice;
+        bullet::detail::Choice next = choice;
         next.update(all, a, b);
         return next.reduced().patches;
     };
     const btTransform hardly(btQuaternion::getIdentity(), {0, 0.9f * slack, 0}),
         farther(btQuaternion::getIdentity(), {0, 1.1f * slack, 0}), away(btQuaternion(0.3f, 0.2f, 0.1f), {5, 6, 7});
-    for (const bullet::Patch& patch : after(changed(), hardly, here))
+    for (const bullet::detail::Patch& patch : after(changed(), hardly, here))
         for (int i = 0; i < patch.count; ++i) CHECK(patch.contacts[i].distance == -1e-4f - 1e-6f);
     CHECK(featuresOf(after(changed(), hardly, here)) == first);
     CHECK(featuresOf(after(changed(), away * hardly, away)) == first);
@@ -192,9 +195,9 @@ TEST_CASE("The same contacts are kept until the bodies have moved, and are where
 
 namespace {
 
-std::vector<Contact> keptOf(const bullet::Reduced& reduced) {
+std::vector<Contact> keptOf(const bullet::detail::Reduced& reduced) {
     std::vector<Contact> kept;
-    for (const bullet::Patch& patch : reduced.patches)
+    for (const bullet::detail::Patch& patch : reduced.patches)
         kept.insert(kept.end(), patch.contacts.begin(), patch.contacts.begin() + patch.count);
     return kept;
 }
@@ -264,7 +267,7 @@ TEST_CASE("What is kept of many contacts bears what all of them bear, to two par
         }
         const double extent = 2 * std::hypot(length, width);
         const std::vector<Wrench> before = wrenchesOf(all, extent);
-        const bullet::Reduced reduced = bullet::reduce(all);
+        const bullet::detail::Reduced reduced = bullet::detail::reduce(all);
         const std::vector<Contact> kept = keptOf(reduced);
         REQUIRE(kept.size() <= 24);
         const std::vector<Wrench> after = wrenchesOf(kept, extent);
@@ -302,7 +305,7 @@ TEST_CASE("What is kept of random bodies' contacts is met first, but for as much
         collide(*knot, a, *knot, b, {.margin = 0.003f, .leastOpposition = 0.3f}, contacts);
         if (contacts.size() < 40) continue;
         ++tried;
-        const bullet::Reduced reduced = bullet::reduce(contacts);
+        const bullet::detail::Reduced reduced = bullet::detail::reduce(contacts);
         const std::vector<Contact> kept = keptOf(reduced);
         CHECK(kept.size() < contacts.size());
         glm::dvec3 centre(0);
@@ -638,12 +641,12 @@ TEST_CASE("What has tips and edges comes to rest in a groove of triangles, howev
         World world;
         world.add(*groove.shape, 0, {0, 0, 0});
         btRigidBody* body = world.add(shape, 1, {float(random(-0.1, 0.1)), float(random(-0.1, 0.1)), 1.2f * length},
-                                      btQuaternion(bullet::toBullet(random.direction()), float(random(0, 6))));
+                                      btQuaternion(bullet::detail::toBullet(random.direction()), float(random(0, 6))));
         body->setDamping(0.05f, 0.2f);
         world.run(3);
         float least = 0;
         for (const glm::vec3& point : mesh.points) {
-            const btVector3 place = body->getWorldTransform() * bullet::toBullet(point);
+            const btVector3 place = body->getWorldTransform() * bullet::detail::toBullet(point);
             least = std::min(least, (place.z() - slope * std::abs(place.x())) / std::sqrt(1 + slope * slope));
         }
         CHECK(least > -0.1f * voxel);
@@ -671,7 +674,7 @@ TEST_CASE("What is thin lies on triangles, and its far side does not pull it thr
     for (int i = 0; i < 4; ++i) {
         World world;
         world.add(*ground.shape, 0, {0, 0, 0});
-        const btTransform ofMesh(bullet::toBullet(frame.rotation), bullet::toBullet(frame.position));
+        const btTransform ofMesh(bullet::detail::toBullet(frame.rotation), bullet::detail::toBullet(frame.position));
         btTransform pose(btQuaternion({0, 0, 1}, float(random(0, 6))) *
                          btQuaternion({1, 0, 0}, half + float(random(0, 0.03))));
         pose.getOrigin().setZ(0.1f * voxel - lowest(wedge, pose));
@@ -727,8 +730,8 @@ TEST_CASE("What is small and falls by voxels in a step is borne on all sides, an
         const glm::vec3 axis = random.direction();
         World world;
         world.add(plane, 0, {0, 0, 0});
-        btRigidBody* body =
-            world.add(ring, 0.1f, {0, 0, 0.8f * size}, btQuaternion(bullet::toBullet(axis), float(random(0.05, 0.45))));
+        btRigidBody* body = world.add(ring, 0.1f, {0, 0, 0.8f * size},
+                                      btQuaternion(bullet::detail::toBullet(axis), float(random(0.05, 0.45))));
         for (float time = 0; time < 4; time += 1 / steps) world.dynamics.stepSimulation(1 / steps, 0);
         CHECK(body->getWorldTransform().getOrigin().z() > minor - 0.5f * voxel);
     }

@@ -8,15 +8,17 @@
 #include <cmath>
 #include <limits>
 
+#include <bilayer/sdf/build.h>
 #include "demos/shared/shapes.h"
-#include "integration/bullet/convert.h"
-#include "sdf/build.h"
+#include "integration/bullet/detail/convert.h"
 #include "world.h"
 
 using namespace bilayer;
+using namespace bilayer::detail;
+using namespace bilayer::bullet::detail;
 using namespace bilayer::test;
 using bullet::Shape;
-using bullet::toBullet;
+using bullet::detail::toBullet;
 
 namespace {
 

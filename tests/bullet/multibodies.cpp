@@ -7,12 +7,14 @@
 #include <memory>
 #include <vector>
 
-#include "integration/bullet/velocity.h"
+#include "integration/bullet/detail/velocity.h"
 #include "tests/support/random.h"
 #include "tests/support/support.h"
 #include "world.h"
 
 using namespace bilayer;
+using namespace bilayer::detail;
+using namespace bilayer::bullet::detail;
 using namespace bilayer::test;
 using bullet::Shape;
 
@@ -78,10 +80,10 @@ TEST_CASE("Links move as their places from step to step say") {
         }
     robot.body.stepPositionsMultiDof(0.2f);  // to some other place
     robot.update();
-    std::vector<bullet::Velocity> velocities;
+    std::vector<bullet::detail::Velocity> velocities;
     std::vector<btTransform> before;
     for (const auto& collider : robot.colliders) {
-        velocities.push_back(bullet::velocityOf(*collider));
+        velocities.push_back(bullet::detail::velocityOf(*collider));
         before.push_back(collider->getWorldTransform());
     }
     const float dt = 1e-3f;

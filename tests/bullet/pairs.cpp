@@ -8,12 +8,15 @@
 #include <glm/trigonometric.hpp>
 #include <set>
 
+#include <bilayer/collider/contact.h>
+#include <bilayer/sdf/build.h>
 #include "demos/shared/shapes.h"
-#include "integration/bullet/narrow.h"
-#include "sdf/build.h"
+#include "integration/bullet/detail/narrow_phase.h"
 #include "world.h"
 
 using namespace bilayer;
+using namespace bilayer::detail;
+using namespace bilayer::bullet::detail;
 using namespace bilayer::test;
 using bullet::Shape;
 
@@ -186,8 +189,8 @@ TEST_CASE("A field comes to rest on uneven ground, where each contact has a feat
     CHECK_FALSE(body->isActive());
 
     std::vector<Contact> contacts;
-    bullet::collideTriangles(waves.shape(asTerrain), btTransform::getIdentity(), {},
-                             shape.placed(body->getWorldTransform()), h, false, contacts);
+    bullet::detail::collideTriangles(waves.shape(asTerrain), btTransform::getIdentity(), {},
+                                     shape.placed(body->getWorldTransform()), h, false, contacts);
     std::set<std::uint32_t> features;
     for (const Contact& contact : contacts) features.insert(contact.feature);
     CHECK(features.size() == contacts.size());

@@ -11,9 +11,11 @@
 #include <utility>
 #include <vector>
 
+#include <bilayer/collider/contact.h>
+#include <bilayer/integration/bullet/draw.h>
+#include <bilayer/sdf/build.h>
+#include "collider/contact/collider_data.h"
 #include "demos/shared/shapes.h"
-#include "integration/bullet/draw.h"
-#include "sdf/build.h"
 #include "world.h"
 
 using namespace bilayer;
@@ -456,7 +458,7 @@ TEST_CASE("A band is outlined by the blocks that it lies in") {
     CHECK((again.lower - drawer.lower).length() < 1e-5f);
     CountingDrawer points;
     bullet::drawFields(world.dynamics, points, {.band = false, .points = true});
-    CHECK(points.lines == static_cast<int>(shape.collider().points().points().size()));
+    CHECK(points.lines == static_cast<int>(shape.collider().data().points().points().size()));
 }
 
 TEST_CASE("Bad input is refused by name") {

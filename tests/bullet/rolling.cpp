@@ -4,15 +4,17 @@
 #include <cmath>
 #include <optional>
 
+#include <bilayer/integration/bullet/extensions.h>
+#include <bilayer/sdf/build.h>
 #include "demos/shared/shapes.h"
-#include "integration/bullet/convert.h"
-#include "integration/bullet/no_passing.h"
-#include "sdf/build.h"
+#include "integration/bullet/detail/convert.h"
 #include "tests/support/random.h"
 #include "tests/support/support.h"
 #include "world.h"
 
 using namespace bilayer;
+using namespace bilayer::detail;
+using namespace bilayer::bullet::detail;
 using namespace bilayer::test;
 using bullet::Shape;
 
@@ -69,8 +71,8 @@ TEST_CASE("Balls of a few voxels lie as high as their triangles do, on all that 
         World world;
         world.add(ground.shape, 0, {0, 0, -ground.top});
         const glm::vec3 axis = random.direction();
-        btRigidBody* body =
-            world.add(shape, 1, {0, 0, radius + 0.2f * h}, btQuaternion(bullet::toBullet(axis), float(random(0, 3))));
+        btRigidBody* body = world.add(shape, 1, {0, 0, radius + 0.2f * h},
+                                      btQuaternion(bullet::detail::toBullet(axis), float(random(0, 3))));
         world.run(3);
         CHECK(lowest(collider->mesh(), body->getWorldTransform()) / h == Approx(0).margin(0.1));
     }
@@ -90,9 +92,9 @@ TEST_CASE("Balls roll on") {
     float kept = 0, highest = 0;
     constexpr int balls = 8;
     for (int i = 0; i < balls; ++i) {
-        const btQuaternion turned(bullet::toBullet(random.direction()), float(random(0, 3)));
+        const btQuaternion turned(bullet::detail::toBullet(random.direction()), float(random(0, 3)));
         Roller roller(shape, ground, {0, 0, onBox ? -0.1f : 0.f}, speed, false, turned);
-        std::optional<bullet::NoPassing> guard;
+        std::optional<bullet::WorldExtensions> guard;
         if (isGuarded) guard.emplace(roller.world.dynamics);
         for (int step = 0; step < 60; ++step) {
             roller.world.dynamics.stepSimulation(1 / 60.f, 0);
@@ -114,7 +116,7 @@ TEST_CASE("Hulls roll over fields") {
     CAPTURE(speed, margin);
     btConvexHullShape hull;
     for (const glm::vec3& point : shapes::sphere(radius - margin, 3).points)
-        hull.addPoint(bullet::toBullet(point), false);
+        hull.addPoint(bullet::detail::toBullet(point), false);
     hull.recalcLocalAabb();
     hull.setMargin(margin);
     Shape slab(exactBox({4, 0.5f, 0.1f}, 0.02f));

@@ -7,15 +7,19 @@
 #include <numeric>
 #include <stdexcept>
 
-#include "cl/point_sampler.h"
+#include <bilayer/cl/point_sampler.h>
+#include <bilayer/collider/contact.h>
+#include <bilayer/sdf/build.h>
+#include "collider/contact/sampled_contacts.h"
 #include "demos/shared/shapes.h"
-#include "integration/bullet/narrow.h"
-#include "sdf/build.h"
+#include "integration/bullet/detail/narrow_phase.h"
 #include "tests/bullet/world.h"
 #include "tests/support/random.h"
 #include "tests/support/support.h"
 
 using namespace bilayer;
+using namespace bilayer::detail;
+using namespace bilayer::bullet::detail;
 using namespace bilayer::test;
 
 namespace {

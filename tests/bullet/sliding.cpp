@@ -6,8 +6,8 @@
 #include <cmath>
 #include <vector>
 
+#include <bilayer/sdf/build.h>
 #include "demos/shared/shapes.h"
-#include "sdf/build.h"
 #include "tests/support/random.h"
 #include "tests/support/support.h"
 #include "world.h"
@@ -54,7 +54,8 @@ struct Grounds {
 
     Grounds() {
         heightfield.setLocalScaling({0.25f, 0.25f, 1});
-        for (const glm::vec3& point : shapes::box({half, half, 0.2f}, 4).points) hull.addPoint(bullet::toBullet(point));
+        for (const glm::vec3& point : shapes::box({half, half, 0.2f}, 4).points)
+            hull.addPoint(bullet::detail::toBullet(point));
         hull.setMargin(0);
     }
 

@@ -1,4 +1,5 @@
 // Fields on a dispatcher that is Bullet's own.
+#include <bilayer/collider/contact.h>
 #include <unistd.h>
 
 #include <algorithm>

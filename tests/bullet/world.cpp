@@ -1,4 +1,5 @@
 #include "world.h"
+#include "collider/contact/collider_data.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,11 +8,15 @@
 #include <limits>
 #include <utility>
 
+#include <bilayer/collider/contact.h>
+#include <bilayer/sdf/grids.h>
 #include "demos/shared/shapes.h"
-#include "integration/bullet/convert.h"
-#include "sdf/grids.h"
+#include "integration/bullet/detail/convert.h"
 
 namespace bilayer::test {
+
+using namespace bilayer::detail;
+using namespace bilayer::bullet::detail;
 
 World::World(PointSampler sampler) : dispatcher(&configuration, std::move(sampler)) {
     dynamics.setGravity({0, 0, -9.81f});
@@ -98,12 +103,13 @@ std::shared_ptr<const Collider> exactBowl(float radius, float wall, float voxelS
 
 float lowest(const Mesh& mesh, const btTransform& at) {
     float least = std::numeric_limits<float>::max();
-    for (const glm::vec3& point : mesh.points) least = std::min(least, float((at * bullet::toBullet(point)).z()));
+    for (const glm::vec3& point : mesh.points)
+        least = std::min(least, float((at * bullet::detail::toBullet(point)).z()));
     return least;
 }
 
 std::shared_ptr<const Collider> withoutMesh(const Mesh& mesh, const LevelSet& field) {
-    Body body = Collider(mesh, field).body();
+    Body body = makeBody(mesh, field, {});
     body.mesh.reset();
     return std::make_shared<Collider>(withBody(field, body));
 }

@@ -10,10 +10,11 @@
 #include <memory>
 #include <vector>
 
-#include "collider/collider.h"
+#include <bilayer/collider/collider.h>
+#include <bilayer/collider/contact.h>
+#include <bilayer/integration/bullet/dispatcher.h>
+#include <bilayer/integration/bullet/shape.h>
 #include "demos/shared/triangle_shape.h"
-#include "integration/bullet/dispatcher.h"
-#include "integration/bullet/shape.h"
 
 namespace bilayer::test {
 

@@ -1,5 +1,5 @@
 // Which devices there are, which one is opened, and what is said where there is none.
-#include "cl/device.h"
+#include <bilayer/cl/device.h>
 
 #include <fmt/core.h>
 

@@ -2,11 +2,11 @@
 #include <openvdb/openvdb.h>
 #include <catch2/catch.hpp>
 
-#include "cl/filler.h"
+#include <bilayer/cl/filler.h>
+#include <bilayer/sdf/build.h>
+#include <bilayer/sdf/grids.h>
+#include <bilayer/sdf/mesh_io.h>
 #include "demos/shared/shapes.h"
-#include "sdf/build.h"
-#include "sdf/grids.h"
-#include "sdf/mesh_io.h"
 #include "tests/support/clean.h"
 #include "tests/support/support.h"
 #include "tests/support/truth.h"

@@ -1,5 +1,6 @@
 // Samples on a device: the checks that the processor's pass too, and both side by side.
-#include "cl/field.h"
+#include <bilayer/cl/field.h>
+#include <bilayer/sdf/mesh_io.h>
 
 #include <algorithm>
 #include <catch2/catch.hpp>
@@ -7,7 +8,7 @@
 #include <limits>
 #include <thread>
 
-#include "collider/field.h"
+#include <bilayer/collider/field.h>
 #include "demos/shared/shapes.h"
 #include "tests/support/random.h"
 #include "tests/support/sampling.h"

@@ -1,6 +1,6 @@
 // Fields that an OpenCL device builds against those of the processor, by both methods and in both mappings; budgets of
 // device memory; what goes wrong. The exact method is judged by the truth in exact.cpp.
-#include "cl/filler.h"
+#include <bilayer/cl/filler.h>
 
 #include <algorithm>
 #include <catch2/catch.hpp>
@@ -14,14 +14,16 @@
 #include <thread>
 #include <utility>
 
-#include "cl/program.h"
+#include <bilayer/sdf/grids.h>
+#include <bilayer/sdf/mesh_io.h>
+#include "cl/detail/program.h"
 #include "demos/shared/shapes.h"
-#include "sdf/grids.h"
-#include "sdf/mesh_io.h"
+#include "sdf/leaf/blocks.h"
 #include "tests/support/support.h"
 #include "tests/support/tiles.h"
 
 using namespace bilayer;
+using namespace bilayer::detail;
 using Catch::Matchers::Contains;
 
 namespace {
@@ -306,8 +308,8 @@ TEST_CASE("a device keeps buffers for the next build, which may be of another me
 }
 
 TEST_CASE("a device without double precision is refused by name") {
-    Device::Impl& impl = openDevice().impl();
-    auto single = std::make_shared<Device::Impl>();
+    DeviceImpl& impl = openDevice().impl();
+    auto single = std::make_shared<DeviceImpl>();
     single->info = impl.info;
     single->info.name = "Single";
     single->info.doubles = false;

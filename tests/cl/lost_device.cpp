@@ -7,15 +7,18 @@
 #include <climits>
 #include <string>
 
-#include "cl/field.h"
-#include "cl/filler.h"
-#include "cl/point_sampler.h"
-#include "cl/program.h"
+#include <bilayer/cl/field.h>
+#include <bilayer/cl/filler.h>
+#include <bilayer/cl/point_sampler.h>
+#include <bilayer/collider/contact.h>
+#include <bilayer/sdf/build.h>
+#include <bilayer/sdf/grids.h>
+#include "cl/detail/program.h"
+#include "collider/contact/sampled_contacts.h"
 #include "demos/shared/shapes.h"
-#include "sdf/build.h"
-#include "sdf/grids.h"
 
 using namespace bilayer;
+using namespace bilayer::detail;
 using Catch::Matchers::Contains;
 
 namespace {

@@ -1,6 +1,6 @@
 // The prism method against a program that asks every triangle at every voxel in double precision, against true
 // distances where the method promises them, and against itself: mappings, batches of memory.
-#include "cl/prism.h"
+#include "cl/detail/prism.h"
 
 #include <algorithm>
 #include <array>
@@ -12,13 +12,14 @@
 #include <map>
 #include <vector>
 
+#include <bilayer/sdf/build.h>
+#include <bilayer/sdf/grids.h>
+#include <bilayer/sdf/mesh_io.h>
 #include "demos/shared/shapes.h"
-#include "sdf/build.h"
-#include "sdf/grids.h"
-#include "sdf/mesh_io.h"
 #include "tests/support/support.h"
 
 using namespace bilayer;
+using namespace bilayer::detail;
 using Catch::Matchers::Contains;
 
 namespace {

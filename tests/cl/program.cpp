@@ -1,5 +1,5 @@
 // Compiled programs: build logs, the cache on disk, the names of error codes.
-#include "cl/program.h"
+#include "cl/detail/program.h"
 
 #include <catch2/catch.hpp>
 #include <cstdlib>
@@ -9,6 +9,7 @@
 #include "tests/support/support.h"
 
 using namespace bilayer;
+using namespace bilayer::detail;
 using Catch::Matchers::Contains;
 
 namespace {
@@ -17,7 +18,7 @@ const std::string source = "kernel void answer(global int* out) { out[get_global
 const std::string options = "-D ANSWER=42";
 
 // What the kernel writes.
-int answer(Device::Impl& device, const cl::Program& program) {
+int answer(DeviceImpl& device, const cl::Program& program) {
     cl::Kernel kernel(program, "answer");
     const cl::Buffer out(device.context, CL_MEM_WRITE_ONLY, sizeof(cl_int));
     kernel.setArg(0, out);

@@ -1,4 +1,5 @@
-#include "collider/body.h"
+#include "collider/contact/body.h"
+#include "collider/contact/collider_data.h"
 
 #include <oneapi/tbb/parallel_for.h>
 #include <openvdb/points/PointAttribute.h>
@@ -14,16 +15,18 @@
 #include <stdexcept>
 #include <vector>
 
-#include "collider/collider.h"
+#include <bilayer/collider/collider.h>
+#include <bilayer/collider/contact.h>
+#include <bilayer/sdf/build.h>
+#include <bilayer/sdf/grids.h>
+#include <bilayer/sdf/vdb_io.h>
 #include "demos/shared/shapes.h"
-#include "sdf/build.h"
-#include "sdf/grids.h"
-#include "sdf/vdb_io.h"
 #include "tests/support/analytic.h"
 #include "tests/support/random.h"
 #include "tests/support/support.h"
 
 using namespace bilayer;
+using namespace bilayer::detail;
 using namespace bilayer::test;
 
 namespace {
@@ -36,10 +39,10 @@ Mesh shifted(Mesh mesh, const glm::vec3& by) {
 // A collider of a mesh, and the same read from a file.
 struct Pair {
     explicit Pair(const Mesh& mesh, float voxel, const VdbOptions& file = {}, const ColliderOptions& options = {})
-        : field(build(mesh, {.voxelSize = voxel})), made(mesh, field, options), loaded(read(made.body(), file)) {}
+        : field(build(mesh, {.voxelSize = voxel})), made(mesh, field, options), loaded(read(made.data().body, file)) {}
 
     Collider withoutMesh() const {
-        Body body = made.body();
+        Body body = made.data().body;
         body.mesh.reset();
         return read(body, {});
     }
@@ -90,7 +93,7 @@ const LevelSet& stored() {
     static const LevelSet field = [] {
         const Mesh mesh = shapes::box({0.3f, 0.2f, 0.1f}, 3);
         const LevelSet plain = build(mesh, {.voxelSize = 0.02f});
-        return withBody(plain, Collider(mesh, plain).body());
+        return withBody(plain, mesh);
     }();
     return field;
 }
@@ -145,9 +148,9 @@ TEST_CASE("a body comes back from its file bit by bit") {
     CAPTURE(voxel, half);
     const Pair pair(mesh, voxel, {.halfFloat = half},
                     {.margin = GENERATE(-1.f, 0.0123f), .measure = half ? Measure::samples : Measure::edges});
-    REQUIRE(pair.made.points().points().size() > 100);
-    REQUIRE(pair.made.body().mesh);
-    requireSame(pair.made.body(), pair.loaded.body());
+    REQUIRE(pair.made.data().points().points().size() > 100);
+    REQUIRE(pair.made.data().body.mesh);
+    requireSame(pair.made.data().body, pair.loaded.data().body);
     REQUIRE(pair.loaded.field().voxelSize() == pair.made.field().voxelSize());
 }
 
@@ -188,7 +191,7 @@ TEST_CASE("bodies from files touch where those of meshes do, to the bit") {
 TEST_CASE("the triangles of a body without a mesh are those of its field") {
     const Pair ball(shapes::sphere(0.4f, 4), 0.02f);
     const Collider loaded = ball.withoutMesh();
-    REQUIRE_FALSE(loaded.body().mesh);
+    REQUIRE_FALSE(loaded.data().body.mesh);
     REQUIRE(loaded.mesh().triangles.size() > 1000);
     for (const glm::vec3& point : loaded.mesh().points) REQUIRE(glm::length(point) == Approx(0.4f).margin(1e-3));
     REQUIRE(massProperties(loaded.mesh()).volume == Approx(ball.made.mass().volume).epsilon(5e-3));
@@ -211,7 +214,7 @@ TEST_CASE("a body keeps a mesh whose triangles were turned as it was turned") {
     const Pair knot(inside, 0.03f, {}, {.measure = Measure::triangles});
     const Mesh outward = shapes::torusKnot(2, 3, 0.5f, 0.15f, 200, 16);
     REQUIRE(massProperties(knot.loaded.mesh()).volume == Approx(massProperties(outward).volume));
-    requireSame(knot.made.body(), knot.loaded.body());
+    requireSame(knot.made.data().body, knot.loaded.data().body);
 }
 
 TEST_CASE("an open mesh has no mass, in a file neither") {
@@ -219,7 +222,7 @@ TEST_CASE("an open mesh has no mass, in a file neither") {
     sheet.points = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}};
     sheet.triangles = {{0, 1, 2}, {2, 1, 3}};
     const Pair pair(sheet, 0.05f);
-    requireSame(pair.made.body(), pair.loaded.body());
+    requireSame(pair.made.data().body, pair.loaded.data().body);
     REQUIRE_THROWS_WITH(pair.made.mass(), Catch::Contains("no volume"));
     REQUIRE_THROWS_WITH(pair.loaded.mass(), Catch::Contains("no volume"));
     // put beside a field that had a body with a mass, it leaves none of that
@@ -237,7 +240,7 @@ TEST_CASE("a field alone is no body") {
     REQUIRE_FALSE(hasBody(plain));
     REQUIRE(hasBody(stored()));
     requireRefusal(plain, "no body");
-    REQUIRE_THROWS_AS(withBody(plain, {}), std::invalid_argument);
+    REQUIRE_THROWS_AS(withBody(plain, Body{}), std::invalid_argument);
 }
 
 TEST_CASE("damaged bodies are refused by what is wrong") {
@@ -316,7 +319,7 @@ TEST_CASE("a damaged mesh of a body is refused, whichever byte it is") {
 
 TEST_CASE("a body with the mesh of another, or with one that is not valid, is refused") {
     const Pair other(shapes::box({0.3f, 0.2f, 0.11f}, 3), 0.02f);
-    requireRefusal(withMeshBytes(meshBytes(withBody(other.field, other.made.body()))->value()), "of another body");
+    requireRefusal(withMeshBytes(meshBytes(withBody(other.field, other.made.data().body))->value()), "of another body");
     Body body = bodyOf(stored());
     Mesh bad = *body.mesh;
     bad.triangles[7].y = 1u << 30;

@@ -15,16 +15,17 @@
 #include <string>
 #include <vector>
 
-#include "collider/field.h"
-#include "collider/triangle_tests.h"
+#include <bilayer/collider/field.h>
+#include <bilayer/sdf/build.h>
+#include <bilayer/sdf/mesh_io.h>
+#include "collider/field/triangle_tests.h"
 #include "demos/shared/shapes.h"
-#include "sdf/build.h"
-#include "sdf/mesh_io.h"
 #include "tests/support/random.h"
 #include "tests/support/support.h"
 #include "tests/support/truth.h"
 
 using namespace bilayer;
+using namespace bilayer::detail;
 using namespace bilayer::test;
 
 namespace {

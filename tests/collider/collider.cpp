@@ -1,4 +1,5 @@
-#include "collider/collider.h"
+#include <bilayer/collider/collider.h>
+#include <bilayer/collider/contact.h>
 
 #include <algorithm>
 #include <catch2/catch.hpp>
@@ -10,17 +11,19 @@
 #include <set>
 #include <stdexcept>
 
-#include "collider/mass.h"
-#include "collider/touch.h"
+#include <bilayer/collider/mass.h>
+#include <bilayer/sdf/build.h>
+#include "collider/contact/collider_data.h"
+#include "collider/contact/surface_query.h"
 #include "demos/shared/machines.h"
 #include "demos/shared/shapes.h"
-#include "sdf/build.h"
 #include "tests/support/analytic.h"
 #include "tests/support/random.h"
 #include "tests/support/support.h"
 #include "tests/support/truth.h"
 
 using namespace bilayer;
+using namespace bilayer::detail;
 using namespace bilayer::test;
 
 namespace {
@@ -96,7 +99,7 @@ TEST_CASE("two balls touch where the line of their centres goes through") {
         CAPTURE(gap, contacts.size());
         REQUIRE(contacts.size() > 2);
         REQUIRE(report.beyondBand == 0);
-        REQUIRE(report.pointsTested < ball().points().points().size());
+        REQUIRE(report.pointsTested < ball().data().points().points().size());
         // points are 2 voxels apart, so the nearest may miss the line by 1.25 spacings: 0.05 on a radius of 0.4
         REQUIRE(deepest(contacts) == Approx(gap).margin(0.0063));
         REQUIRE(deepest(contacts) >= gap - 0.02f * h);
@@ -235,9 +238,9 @@ TEST_CASE("contacts of scaled bodies are the contacts scaled") {
 
 // What touches by a feature: a surface point, or a place on a sharp edge between two of them.
 SurfacePoint pointOf(const Collider& collider, std::uint32_t feature) {
-    const auto points = collider.points().points();
+    const auto points = collider.data().points().points();
     if (feature < points.size()) return points[feature];
-    const SharpEdge& edge = collider.edges().edges()[feature - points.size()];
+    const SharpEdge& edge = collider.data().edges().edges()[feature - points.size()];
     const SurfacePoint &from = points[edge.from], &to = points[edge.to];
     return {0.5f * (from.position + to.position), glm::normalize(from.normal + to.normal), true};
 }
@@ -252,8 +255,8 @@ TEST_CASE("the tree leaves no contact out") {
         const auto contacts = contactsOf(a, b, h, &report);
         std::vector<std::uint32_t> all;
         const auto test = [&](const Placed& body, const Placed& other, std::uint32_t flag) {
-            for (std::uint32_t i = 0; i < body.collider.points().points().size(); ++i) {
-                const glm::vec3 world = body.pose.toWorld(body.collider.points().points()[i].position);
+            for (std::uint32_t i = 0; i < body.collider.data().points().points().size(); ++i) {
+                const glm::vec3 world = body.pose.toWorld(body.collider.data().points().points()[i].position);
                 const Sample sample = other.collider.field().sample(other.pose.toBody(world));
                 if (sample.inBand && sample.distance < h - 1e-5f) all.push_back(i | flag);
             }
@@ -265,7 +268,7 @@ TEST_CASE("the tree leaves no contact out") {
         REQUIRE(std::is_sorted(found.begin(), found.end()));
         REQUIRE(std::includes(found.begin(), found.end(), all.begin(), all.end()));
         tested += report.pointsTested;
-        total += a.collider.points().points().size() + b.collider.points().points().size();
+        total += a.collider.data().points().points().size() + b.collider.data().points().points().size();
     }
     REQUIRE(tested < total);  // a ball in a ring may need them all, the pairs together do not
 }
@@ -277,7 +280,8 @@ TEST_CASE("bodies apart have no contact and cost next to nothing") {
     REQUIRE(contactsOf({ball(), {{1e30f, 0, 0}}}, {ring()}, h, &report).empty());
     // a small ball in the hole of a ring: their boxes overlap, they do not
     REQUIRE(contactsOf({ball(), {}, 0.3f}, {ring()}, h, &report).empty());
-    REQUIRE(report.pointsTested < (ball().points().points().size() + ring().points().points().size()) / 4);
+    REQUIRE(report.pointsTested <
+            (ball().data().points().points().size() + ring().data().points().points().size()) / 4);
     const float nan = std::numeric_limits<float>::quiet_NaN();
     REQUIRE(contactsOf({ball(), {{nan, 0, 0}}}, {ball()}, h, &report).empty());
     REQUIRE(report.beyondBand == 0);
@@ -432,7 +436,7 @@ TEST_CASE("what touches a face is told the face's direction, however near it is 
 TEST_CASE("points too deep for the band are counted") {
     ContactReport report;
     const auto contacts = contactsOf({brick(), {}, 0.5f}, {ball()}, 0, &report);
-    REQUIRE(report.beyondBand == brick().points().points().size());
+    REQUIRE(report.beyondBand == brick().data().points().points().size());
     REQUIRE(contacts.empty());
 }
 
@@ -486,7 +490,7 @@ TEST_CASE("exact contacts lie on the triangles, on edges and in grooves of half 
         Errors worst;
         for (const Contact& contact : contacts) {
             const int other = contact.feature & featureOfB ? 0 : 1;
-            const auto points = parts[std::size_t(1 - other)].points().points();
+            const auto points = parts[std::size_t(1 - other)].data().points().points();
             const std::uint32_t index = contact.feature & ~featureOfB;
             // where edges cross, the distance is not that of a point
             if (index >= points.size()) continue;
@@ -529,9 +533,9 @@ TEST_CASE("a body of a mesh that faces the wrong way is the body of the right on
     const Collider right(mesh, build(mesh, {.voxelSize = h}), options),
         mended(wrong, build(wrong, {.voxelSize = h}), options);
     CHECK(mended.mass().volume == Approx(right.mass().volume));
-    CHECK(mended.edges().edges().empty());
-    REQUIRE(mended.points().points().size() > 100);
-    for (const SurfacePoint& point : mended.points().points())
+    CHECK(mended.data().edges().edges().empty());
+    REQUIRE(mended.data().points().points().size() > 100);
+    for (const SurfacePoint& point : mended.data().points().points())
         REQUIRE(glm::dot(point.normal, right.field().sample(point.position).gradient) > 0.5f);
     // crossed: points whose normals looked inward would be left out
     const Pose across{{0.35f, 0, 0}, glm::angleAxis(glm::half_pi<float>(), glm::vec3(1, 0, 0))};
@@ -582,9 +586,9 @@ TEST_CASE("a body whose mesh has holes, or one side only, has the mass of its fi
         const LevelSet field = build(mesh, {.voxelSize = h});
         const Collider body(mesh, field);
         CAPTURE(mesh.triangles.size(), field.sign());
-        if (body.body().mass) CHECK(body.mass().volume == massProperties(field).volume);
-        const Collider kept(withBody(field, body.body()));
-        CHECK(kept.points().points().size() == body.points().points().size());
+        if (body.data().body.mass) CHECK(body.mass().volume == massProperties(field).volume);
+        const Collider kept(withBody(field, body.data().body));
+        CHECK(kept.data().points().points().size() == body.data().points().points().size());
     }
     const Collider box(open, build(open, {.voxelSize = h}));
     CHECK(box.mass().volume == Approx(0.6 * 0.4 * 0.2).epsilon(0.05));

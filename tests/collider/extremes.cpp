@@ -7,10 +7,11 @@
 #include <limits>
 #include <vector>
 
-#include "collider/collider.h"
-#include "collider/field.h"
+#include <bilayer/collider/collider.h>
+#include <bilayer/collider/contact.h>
+#include <bilayer/collider/field.h>
+#include <bilayer/sdf/build.h>
 #include "demos/shared/shapes.h"
-#include "sdf/build.h"
 #include "tests/support/analytic.h"
 #include "tests/support/random.h"
 #include "tests/support/support.h"
@@ -275,7 +276,7 @@ TEST_CASE("bodies anywhere, of any size, on any way, collide or do not") {
         };
         const Placed a = placed(), b = placed();
         contacts.clear();
-        NearPoints near;
+        ContactCache near;
         const ContactOptions options{.margin = i % 4 ? voxel : extreme.number(), .measured = i % 11 == 0};
         collide(a, b, options, contacts, i % 2 ? &near : nullptr);
         collide(a, b, options, contacts, i % 2 ? &near : nullptr);

@@ -1,4 +1,4 @@
-#include "collider/field.h"
+#include <bilayer/collider/field.h>
 
 #include <oneapi/tbb/global_control.h>
 #include <oneapi/tbb/parallel_for.h>
@@ -9,14 +9,17 @@
 #include <memory>
 #include <stdexcept>
 
+#include <bilayer/sdf/build.h>
+#include <bilayer/sdf/grids.h>
+#include "collider/contact/collider_data.h"
+#include "collider/field/field_data.h"
 #include "demos/shared/shapes.h"
-#include "sdf/build.h"
-#include "sdf/grids.h"
 #include "tests/support/random.h"
 #include "tests/support/sampling.h"
 #include "tests/support/support.h"
 
 using namespace bilayer;
+using namespace bilayer::detail;
 using namespace bilayer::test;
 
 namespace {
@@ -75,7 +78,7 @@ TEST_CASE("what a clearance rules out is ruled out, and little else far from the
     const float edge = Clearance::partSide * float(h);
     for (const Solid& solid : smallSolids()) {
         const Field field(levelSetOf(solid, h, 3, 6));
-        const Clearance clearance = field.clearance();
+        const Clearance clearance = field.data().coarse;
         int beside = 0, ruledOut = 0;
         for (int i = 0; i < 20000; ++i) {
             const glm::vec3 p = random.point(i % 4 ? 0.6 : 3);
@@ -97,8 +100,8 @@ TEST_CASE("what a clearance rules out is ruled out, and little else far from the
     }
     const Field field(levelSetOf(sphereSolid(0.4), h));
     for (const glm::vec3& p : {glm::vec3(notANumber, 0, 0), glm::vec3(0, notANumber, 0)})
-        REQUIRE_FALSE(field.clearance().isOutside(p, 1));
-    for (const float far : {1e9f, 1e30f, infinity, -infinity}) REQUIRE(field.clearance().isOutside({0, far, 0}, 1));
+        REQUIRE_FALSE(field.data().coarse.isOutside(p, 1));
+    for (const float far : {1e9f, 1e30f, infinity, -infinity}) REQUIRE(field.data().coarse.isOutside({0, far, 0}, 1));
 }
 
 TEST_CASE("a sample within a reach is the sample, its gradient only there") {

@@ -13,18 +13,21 @@
 #include <string>
 #include <vector>
 
-#include "collider/body.h"
-#include "collider/collider.h"
-#include "collider/mass.h"
+#include <bilayer/collider/collider.h>
+#include <bilayer/collider/contact.h>
+#include <bilayer/collider/mass.h>
+#include <bilayer/sdf/build.h>
+#include <bilayer/sdf/grids.h>
+#include <bilayer/sdf/surface.h>
+#include <bilayer/sdf/vdb_io.h>
+#include "collider/contact/body.h"
+#include "collider/contact/collider_data.h"
 #include "demos/shared/shapes.h"
-#include "sdf/build.h"
-#include "sdf/grids.h"
-#include "sdf/surface.h"
-#include "sdf/vdb_io.h"
 #include "tests/support/random.h"
 #include "tests/support/support.h"
 
 using namespace bilayer;
+using namespace bilayer::detail;
 using namespace bilayer::test;
 
 namespace {
@@ -36,7 +39,7 @@ const glm::vec3 half{0.4f, 0.3f, 0.2f};
 LevelSet stored(bool withMesh = true) {
     const Mesh mesh = shapes::box(half, 2);
     const LevelSet plain = build(mesh, {.voxelSize = 0.1f});
-    Body body = Collider(mesh, plain).body();
+    Body body = makeBody(mesh, plain, {});
     if (!withMesh) body.mesh.reset();
     return withBody(plain, body);
 }
@@ -58,7 +61,7 @@ void askAll(const std::filesystem::path& path, std::optional<std::size_t> expect
     const Body body = bodyOf(field);
     const Collider collider(field);
     const float least = std::min(half.y, field.voxelSize());
-    for (const Field* asked : {&collider.field(), &collider.measured()}) {
+    for (const Field* asked : {&collider.field(), &collider.exactField()}) {
         REQUIRE(asked->inside({0, 0, 0}));
         REQUIRE_FALSE(asked->inside({0, 2, 0}));
         REQUIRE(asked->closest({0.1f, 0.5f, 0}).distance == Approx(0.2).margin(least));
@@ -273,12 +276,12 @@ TEST_CASE("what is written can be read, whatever the size of the body") {
                         {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}}};
         const LevelSet plain = build(mesh, {.voxelSize = size / 12});
         const Collider made(mesh, plain);
-        writeVdb(path, withBody(plain, made.body()));
+        writeVdb(path, withBody(plain, made.data().body));
         const Collider read(readVdb(path));
-        REQUIRE(read.body().mass.has_value() == made.body().mass.has_value());
-        REQUIRE(made.body().mass.has_value() == (size < 1e8f));
-        if (made.body().mass) REQUIRE(read.mass().volume == made.mass().volume);
-        if (!made.body().mass) REQUIRE_THROWS_WITH(made.mass(), Catch::Contains("single precision"));
+        REQUIRE(read.data().body.mass.has_value() == made.data().body.mass.has_value());
+        REQUIRE(made.data().body.mass.has_value() == (size < 1e8f));
+        if (made.data().body.mass) REQUIRE(read.mass().volume == made.mass().volume);
+        if (!made.data().body.mass) REQUIRE_THROWS_WITH(made.mass(), Catch::Contains("single precision"));
     }
     const LevelSet field = stored();
     Body body = bodyOf(field);

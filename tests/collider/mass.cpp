@@ -1,4 +1,4 @@
-#include "collider/mass.h"
+#include <bilayer/collider/mass.h>
 
 #include <oneapi/tbb/global_control.h>
 #include <openvdb/tools/Composite.h>
@@ -15,11 +15,11 @@
 #include <random>
 #include <stdexcept>
 
-#include "collider/collider.h"
+#include <bilayer/collider/collider.h>
+#include <bilayer/sdf/build.h>
+#include <bilayer/sdf/grids.h>
+#include <bilayer/sdf/mesh_io.h>
 #include "demos/shared/shapes.h"
-#include "sdf/build.h"
-#include "sdf/grids.h"
-#include "sdf/mesh_io.h"
 #include "tests/support/analytic.h"
 #include "tests/support/cells.h"
 #include "tests/support/clean.h"

@@ -1,5 +1,5 @@
 // The searches among triangles against all triangles in double precision, by other formulas.
-#include "collider/mesh_rays.h"
+#include "collider/field/mesh_rays.h"
 
 #include <oneapi/tbb/parallel_for.h>
 
@@ -11,15 +11,16 @@
 #include <string>
 #include <vector>
 
-#include "collider/triangle_tests.h"
+#include <bilayer/sdf/build.h>
+#include <bilayer/sdf/mesh_io.h>
+#include "collider/field/triangle_tests.h"
 #include "demos/shared/shapes.h"
-#include "sdf/build.h"
-#include "sdf/mesh_io.h"
 #include "tests/support/random.h"
 #include "tests/support/support.h"
 #include "tests/support/truth.h"
 
 using namespace bilayer;
+using namespace bilayer::detail;
 using namespace bilayer::test;
 
 namespace {

@@ -1,17 +1,19 @@
 // What is kept of the last steps changes how soon contacts are found, never which.
-#include "collider/near_points.h"
+#include "collider/contact/contact_cache.h"
 
 #include <catch2/catch.hpp>
 #include <cstring>
 #include <glm/geometric.hpp>
 
-#include "collider/collider.h"
+#include <bilayer/collider/collider.h>
+#include <bilayer/collider/contact.h>
+#include <bilayer/sdf/build.h>
 #include "demos/shared/shapes.h"
-#include "sdf/build.h"
 #include "tests/support/random.h"
 #include "tests/support/support.h"
 
 using namespace bilayer;
+using namespace bilayer::detail;
 using test::Random;
 
 namespace {
@@ -62,7 +64,7 @@ TEST_CASE("contacts are the same with what was kept of the steps before, however
         Placed a{walk % 2 ? knot() : brick(), randomPose(random), walk % 3 ? 1.f : 1.7f},
             b{walk % 4 < 2 ? knot() : brick(), randomPose(random), walk % 5 ? 1.f : 0.6f};
         const ContactOptions options{.margin = h * float(walk % 4) / 2};
-        NearPoints near;
+        ContactCache near;
         for (int step = 0; step < 40; ++step) {
             // at rest, slowly, fast, and from rest to fast
             const float size = h * (step % 10 < 3 ? 0.f : step % 10 < 8 ? 0.02f : step % 10 == 8 ? 0.3f : 2.f);
@@ -84,7 +86,7 @@ TEST_CASE("contacts are the same with what was kept of the steps before, however
 TEST_CASE("bodies that rest beside each other cost little, those that touch little more than their contacts") {
     const Placed a{knot()};
     const auto testedAtRest = [&](const Placed& b, std::vector<Contact>& contacts) {
-        NearPoints near;
+        ContactCache near;
         ContactReport report;
         // the first step does not know how fast they are, the second makes the list
         for (int i = 0; i < 3; ++i) {
@@ -109,7 +111,7 @@ TEST_CASE("bodies that rest beside each other cost little, those that touch litt
 }
 
 TEST_CASE("what was kept of other bodies, or for another margin, is not used") {
-    NearPoints near;
+    ContactCache near;
     const Placed a{knot()};
     for (const Placed& b : {Placed{brick(), {{0, 0, 0.2f}}}, Placed{knot(), {{0, 0, 0.2f}}}, Placed{brick()}})
         for (const float margin : {0.f, h, 2 * h})

@@ -10,10 +10,10 @@
 #include <memory>
 #include <vector>
 
-#include "collider/field.h"
+#include <bilayer/collider/field.h>
+#include <bilayer/sdf/build.h>
+#include <bilayer/sdf/mesh_io.h>
 #include "demos/shared/shapes.h"
-#include "sdf/build.h"
-#include "sdf/mesh_io.h"
 #include "tests/support/analytic.h"
 #include "tests/support/random.h"
 #include "tests/support/sampling.h"

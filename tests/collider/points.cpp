@@ -1,4 +1,4 @@
-#include "collider/points.h"
+#include "collider/contact/surface_points.h"
 
 #include <catch2/catch.hpp>
 #include <cmath>
@@ -10,12 +10,13 @@
 #include <string>
 #include <vector>
 
+#include <bilayer/sdf/mesh_io.h>
 #include "demos/shared/shapes.h"
-#include "sdf/mesh_io.h"
 #include "tests/support/random.h"
 #include "tests/support/support.h"
 
 using namespace bilayer;
+using namespace bilayer::detail;
 using namespace bilayer::test;
 
 namespace {

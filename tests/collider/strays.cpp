@@ -1,5 +1,7 @@
 // Which cells' samples are off from the mesh, against distances by brute force.
-#include "collider/strays.h"
+#include "collider/contact/collider_data.h"
+#include "collider/contact/interpolation_error.h"
+#include "collider/field/field_data.h"
 
 #include <oneapi/tbb/parallel_for.h>
 
@@ -10,14 +12,15 @@
 #include <limits>
 #include <vector>
 
-#include "collider/collider.h"
+#include <bilayer/collider/collider.h>
+#include <bilayer/sdf/build.h>
 #include "demos/shared/shapes.h"
-#include "sdf/build.h"
 #include "tests/support/random.h"
 #include "tests/support/support.h"
 #include "tests/support/truth.h"
 
 using namespace bilayer;
+using namespace bilayer::detail;
 using namespace bilayer::test;
 
 namespace {
@@ -57,7 +60,7 @@ TEST_CASE("where no strays are, samples are off by little more than a tenth of a
         const Field field = fieldOf(mesh);
         const Strays strays(field);
         const Truth truth(mesh);
-        const FieldLayout& layout = field.layout();
+        const FieldLayout& layout = field.data();
         const auto offAt = [&](const glm::vec3& place) {
             return std::abs(double(field.distance(place)) - truth.signedDistance(glm::dvec3(place))) / voxel;
         };
@@ -118,6 +121,6 @@ TEST_CASE("edges hold strays, faces and gentle bends do not, and there are none 
 
     const Mesh ring = shapes::torus(0.3f, 0.1f);
     const Collider smooth(ring, build(ring, {.voxelSize = voxel}));
-    CHECK_FALSE(smooth.asksTriangles({0.4f, 0, 0}));
-    CHECK(smooth.asksTriangles({0.4f, 0, 0}, true));
+    CHECK_FALSE(smooth.data().asksTriangles({0.4f, 0, 0}));
+    CHECK(smooth.data().asksTriangles({0.4f, 0, 0}, true));
 }

@@ -7,7 +7,7 @@
 #include <fstream>
 #include <iterator>
 
-#include "sdf/vdb_io.h"
+#include <bilayer/sdf/vdb_io.h>
 #include "tests/support/support.h"
 
 using namespace bilayer;

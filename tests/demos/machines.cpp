@@ -9,9 +9,9 @@
 #include <random>
 #include <string>
 
+#include <bilayer/sdf/inspect.h>
 #include "demos/shared/exact_distance.h"
 #include "demos/shared/shapes.h"
-#include "sdf/inspect.h"
 #include "tests/support/support.h"
 
 using namespace bilayer;

@@ -5,10 +5,10 @@
 #include <cmath>
 #include <random>
 
-#include "collider/mass.h"
+#include <bilayer/collider/mass.h>
+#include <bilayer/integration/fluid/seed.h>
 #include "demos/shared/shapes.h"
 #include "demos/shared/surface_of.h"
-#include "integration/fluid/seed.h"
 #include "tests/support/support.h"
 
 using namespace bilayer;

@@ -1,11 +1,11 @@
-#include "integration/fluid/fill.h"
+#include <bilayer/integration/fluid/extend.h>
 
 #include <catch2/catch.hpp>
 #include <cmath>
 
+#include <bilayer/sdf/build.h>
+#include <bilayer/sdf/grids.h>
 #include "demos/shared/shapes.h"
-#include "sdf/build.h"
-#include "sdf/grids.h"
 
 using namespace bilayer;
 

@@ -1,4 +1,4 @@
-#include "integration/fluid/particles.h"
+#include <bilayer/integration/fluid/particles.h>
 
 #include <openvdb/points/AttributeArray.h>
 #include <openvdb/points/PointCount.h>
@@ -12,8 +12,8 @@
 #include <limits>
 #include <set>
 
+#include <bilayer/sdf/build.h>
 #include "demos/shared/shapes.h"
-#include "sdf/build.h"
 
 using namespace bilayer;
 using openvdb::FloatGrid;

@@ -1,5 +1,5 @@
 // Seeding: the result passes OpenVDB's own check, has the distances it should have, and bad input changes nothing.
-#include "integration/fluid/seed.h"
+#include <bilayer/integration/fluid/seed.h>
 
 #include <openvdb/tools/Diagnostics.h>
 #include <openvdb/tools/LevelSetMeasure.h>
@@ -12,13 +12,13 @@
 #include <string>
 #include <vector>
 
+#include <bilayer/integration/fluid/obstacle.h>
+#include <bilayer/sdf/build.h>
+#include <bilayer/sdf/grids.h>
+#include <bilayer/sdf/inspect.h>
+#include <bilayer/sdf/mesh_io.h>
+#include <bilayer/sdf/surface.h>
 #include "demos/shared/shapes.h"
-#include "integration/fluid/solid.h"
-#include "sdf/build.h"
-#include "sdf/grids.h"
-#include "sdf/inspect.h"
-#include "sdf/mesh_io.h"
-#include "sdf/surface.h"
 #include "tests/support/cells.h"
 #include "tests/support/support.h"
 #include "tests/support/truth.h"

@@ -1,4 +1,4 @@
-#include "integration/fluid/solid.h"
+#include <bilayer/integration/fluid/obstacle.h>
 
 #include <openvdb/tools/Diagnostics.h>
 
@@ -8,8 +8,8 @@
 #include <glm/gtc/constants.hpp>
 #include <limits>
 
+#include <bilayer/sdf/build.h>
 #include "demos/shared/shapes.h"
-#include "sdf/build.h"
 
 using namespace bilayer;
 using openvdb::Coord;

@@ -7,9 +7,9 @@
 #include <catch2/catch.hpp>
 #include <cmath>
 
-#include "collider/mass.h"
+#include <bilayer/collider/mass.h>
+#include <bilayer/integration/fluid/seed.h>
 #include "demos/shared/shapes.h"
-#include "integration/fluid/seed.h"
 #include "tests/support/truth.h"
 
 using namespace bilayer;

@@ -1,10 +1,12 @@
 // The order of the house: who may include whom, and what must not stand in its files.
+#include <algorithm>
 #include <catch2/catch.hpp>
 #include <filesystem>
 #include <fstream>
 #include <map>
 #include <regex>
 #include <set>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -12,16 +14,25 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// A folder may include itself and these, and nothing of the house beside.
+// The libraries, and the programs on top of them: each may include itself and these.
 const std::map<std::string, std::set<std::string>> allowed{
     {"sdf", {}},
-    {"cl", {"sdf"}},
     {"collider", {"sdf"}},
+    {"cl", {"collider", "sdf"}},
     {"integration/bullet", {"collider", "sdf"}},
     {"integration/fluid", {"collider", "sdf"}},
     {"tools", {"integration/bullet", "integration/fluid", "collider", "cl", "sdf"}},
     {"demos", {"integration/bullet", "integration/fluid", "collider", "cl", "sdf"}},
     {"bench", {"demos", "integration/bullet", "integration/fluid", "collider", "cl", "sdf"}},
+};
+
+// The private folders of a library from the bottom up: none includes one above it.
+const std::map<std::string, std::vector<std::string>> floors{
+    {"sdf", {"base", "leaf", "bvh", "io", "mesh", "sign", "fill", "grid"}},
+    {"collider", {"field", "contact"}},
+    {"cl", {"detail"}},
+    {"integration/bullet", {"detail"}},
+    {"integration/fluid", {"detail"}},
 };
 
 const std::vector<std::string> folders{"sdf", "cl", "collider", "integration", "tools", "demos", "bench", "tests"};
@@ -53,19 +64,47 @@ void eachLine(Visit visit) {
     }
 }
 
+// The folder of a file within its library; empty for what stands directly in it.
+std::string folderIn(const std::string& library, const std::string& path) {
+    const std::string rest = path.substr(library.size() + 1);
+    const std::size_t end = rest.find('/');
+    return end == std::string::npos ? "" : rest.substr(0, end);
+}
+
+// How high a folder stands in its library; throws for one that no floor is known of.
+std::size_t floorOf(const std::string& library, const std::string& folder) {
+    const std::vector<std::string>& all = floors.at(library);
+    const auto found = std::find(all.begin(), all.end(), folder);
+    if (found == all.end()) throw std::invalid_argument(library + " has no floor " + folder);
+    return std::size_t(found - all.begin());
+}
+
+bool isPublicHeader(const std::string& path) {
+    const std::string library = room(path);
+    return floors.count(library) && folderIn(library, path).empty() && path.ends_with(".h");
+}
+
 // What is wrong with an include line, or nothing.
 std::string complaint(const std::string& file, const std::string& line) {
-    static const std::regex pattern(R"re(^\s*#\s*include\s*["<](?:bilayer/)?([^">]+)[">])re");
+    static const std::regex pattern(R"re(^\s*#\s*include\s*(["<])(bilayer/)?([^">]+)[">])re");
     std::smatch match;
     if (!std::regex_search(line, match, pattern)) return {};
-    const std::string from = room(file), to = room(match[1].str());
-    if (match[1].str().find("../") != std::string::npos) return "includes by a relative path";
+    const std::string included = match[3].str(), from = room(file), to = room(included);
+    if (included.find("../") != std::string::npos) return "includes by a relative path";
+    if (isPublicHeader(included) != (match[2].matched && match[1] == "<") && (match[2].matched || !to.empty()))
+        return "includes " + included + " otherwise than public headers as <bilayer/...> and others as \"...\"";
     if (from.empty()) return {};
     // the truth that tests go by is also what the benchmark of accuracy measures against
-    if (from == "bench" && match[1].str().rfind("tests/support/", 0) == 0) return {};
-    if (match[1].str().rfind("tests/", 0) == 0) return "includes tests";
-    if (to.empty() || to == from || allowed.at(from).count(to)) return {};
-    return "includes " + to + " from " + from;
+    if (from == "bench" && included.rfind("tests/support/", 0) == 0) return {};
+    if (included.rfind("tests/", 0) == 0) return "includes tests";
+    if (to.empty()) return {};
+    if (to != from && !allowed.at(from).count(to)) return "includes " + to + " from " + from;
+    if (isPublicHeader(file) && !isPublicHeader(included)) return "a public header includes a private one";
+    if (to != from || !floors.count(from)) return {};
+    const std::string folder = folderIn(from, file), other = folderIn(from, included);
+    if (folder.empty() || other.empty() || file.ends_with(".cl")) return {};
+    if (floorOf(from, other) > floorOf(from, folder)) return "includes " + other + " from " + folder + " below it";
+    return {};
 }
 
 }  // namespace
@@ -83,16 +122,45 @@ TEST_CASE("no include runs upward") {
 }
 
 TEST_CASE("the rule itself finds what it should") {
-    CHECK(complaint("sdf/a.h", "#include \"cl/device.h\"") != "");
+    CHECK(complaint("sdf/a.h", "#include <bilayer/cl/device.h>") != "");
     CHECK(complaint("sdf/a.h", "#include <bilayer/collider/field.h>") != "");
-    CHECK(complaint("collider/a.cpp", "  # include \"integration/fluid/seed.h\"") != "");
-    CHECK(complaint("integration/fluid/a.cpp", "#include \"integration/bullet/shape.h\"") != "");
-    CHECK(complaint("cl/a.cpp", "#include \"collider/field.h\"") != "");
-    CHECK(complaint("cl/a.cpp", "#include \"sdf/build.h\"") == "");
-    CHECK(complaint("tools/a.cpp", "#include \"integration/fluid/seed.h\"") == "");
+    CHECK(complaint("sdf/a.h", "#include \"sdf/mesh/topology.h\"") != "");
+    CHECK(complaint("sdf/a.h", "#include \"sdf/mesh.h\"") != "");
+    CHECK(complaint("sdf/a.cpp", "#include <bilayer/sdf/mesh/topology.h>") != "");
+    CHECK(complaint("sdf/mesh/a.cpp", "#include \"sdf/sign/winding.h\"") != "");
+    CHECK(complaint("collider/field/a.h", "#include \"collider/contact/body.h\"") != "");
+    CHECK(complaint("collider/a.cpp", "  # include <bilayer/integration/fluid/seed.h>") != "");
+    CHECK(complaint("integration/fluid/a.cpp", "#include <bilayer/integration/bullet/shape.h>") != "");
+    CHECK(complaint("collider/a.cpp", "#include <bilayer/cl/field.h>") != "");
     CHECK(complaint("sdf/a.cpp", "#include \"demos/shared/shapes.h\"") != "");
-    CHECK(complaint("sdf/a.cpp", "#include <vector>") == "");
     CHECK(complaint("sdf/a.cpp", "#include \"tests/support/support.h\"") != "");
+    CHECK(complaint("cl/a.cpp", "#include <bilayer/sdf/build.h>") == "");
+    CHECK(complaint("cl/a.cpp", "#include \"sdf/sign/winding.h\"") == "");
+    CHECK(complaint("sdf/sign/a.cpp", "#include \"sdf/mesh/topology.h\"") == "");
+    CHECK(complaint("sdf/a.cpp", "#include \"sdf/grid/assemble.h\"") == "");
+    CHECK(complaint("sdf/a.h", "#include <bilayer/sdf/mesh.h>") == "");
+    CHECK(complaint("tools/a.cpp", "#include <bilayer/integration/fluid/seed.h>") == "");
+    CHECK(complaint("sdf/a.cpp", "#include <vector>") == "");
+    CHECK_THROWS_AS(complaint("sdf/attic/a.cpp", "#include \"sdf/mesh/topology.h\""), std::invalid_argument);
+}
+
+TEST_CASE("public headers are few, the options stand at the bottom, and building reads no files") {
+    const auto includesOf = [](const std::string& header) {
+        std::set<std::string> all;
+        std::ifstream stream(fs::path(BILAYER_SOURCES) / header);
+        static const std::regex pattern(R"re(^#include <bilayer/([^>]+)>)re");
+        std::smatch match;
+        for (std::string line; std::getline(stream, line);)
+            if (std::regex_search(line, match, pattern)) all.insert(match[1].str());
+        return all;
+    };
+    std::size_t headers = 0;
+    for (const auto& [library, ignored] : floors)
+        for (const auto& entry : fs::directory_iterator(fs::path(BILAYER_SOURCES) / library))
+            headers += entry.path().extension() == ".h";
+    CHECK(headers <= 30);
+    CHECK(includesOf("sdf/options.h").empty());
+    CHECK(includesOf("sdf/build.h") == std::set<std::string>{"sdf/level_set.h", "sdf/mesh.h", "sdf/options.h"});
 }
 
 TEST_CASE("nothing is left to do, and no path of somebody's machine stands in the code") {

@@ -1,4 +1,4 @@
-#include "sdf/band.h"
+#include "sdf/leaf/band.h"
 
 #include <bitset>
 #include <catch2/catch.hpp>
@@ -7,6 +7,7 @@
 #include <vector>
 
 using namespace bilayer;
+using namespace bilayer::detail;
 
 namespace {
 

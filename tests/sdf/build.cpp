@@ -1,4 +1,4 @@
-#include "sdf/build.h"
+#include <bilayer/sdf/build.h>
 
 #include <oneapi/tbb/parallel_for.h>
 #include <openvdb/tools/Diagnostics.h>
@@ -10,13 +10,14 @@
 #include <glm/geometric.hpp>
 #include <random>
 
+#include <bilayer/sdf/grids.h>
+#include <bilayer/sdf/mesh_io.h>
 #include "demos/shared/shapes.h"
-#include "sdf/blocks.h"
-#include "sdf/grids.h"
-#include "sdf/mesh_io.h"
+#include "sdf/leaf/blocks.h"
 #include "tests/support/support.h"
 
 using namespace bilayer;
+using namespace bilayer::detail;
 
 namespace {
 

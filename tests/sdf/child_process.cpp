@@ -1,4 +1,4 @@
-#include "sdf/child_process.h"
+#include "sdf/io/child_process.h"
 
 #include <fcntl.h>
 #include <signal.h>
@@ -19,13 +19,14 @@
 #include <thread>
 #include <vector>
 
-#include "sdf/polygon_record.h"
-#include "sdf/scene_io.h"
+#include "sdf/io/polygon_record.h"
+#include "sdf/io/scene_io.h"
 #include "tests/support/gltf.h"
 #include "tests/support/polygons.h"
 #include "tests/support/support.h"
 
 using namespace bilayer;
+using namespace bilayer::detail;
 using namespace std::chrono_literals;
 
 namespace {

@@ -1,5 +1,5 @@
 // The block-wise method against the paper's program: a dense grid, sample by sample, in plain loops.
-#include "sdf/double_layer.h"
+#include "sdf/fill/double_layer.h"
 
 #include <catch2/catch.hpp>
 #include <cmath>
@@ -9,14 +9,15 @@
 #include <tuple>
 #include <vector>
 
+#include <bilayer/sdf/grids.h>
+#include <bilayer/sdf/mesh_io.h>
 #include "demos/shared/shapes.h"
-#include "sdf/grids.h"
-#include "sdf/layer_samples.h"
-#include "sdf/mesh_io.h"
+#include "sdf/fill/layer_samples.h"
 #include "tests/support/support.h"
 #include "tests/support/tiles.h"
 
 using namespace bilayer;
+using namespace bilayer::detail;
 
 namespace {
 

@@ -1,4 +1,4 @@
-#include "sdf/fill_holes.h"
+#include "sdf/sign/fill_holes.h"
 
 #include <algorithm>
 #include <catch2/catch.hpp>
@@ -6,13 +6,14 @@
 #include <glm/geometric.hpp>
 #include <vector>
 
+#include <bilayer/sdf/inspect.h>
 #include "demos/shared/shapes.h"
-#include "sdf/inspect.h"
-#include "sdf/sign.h"
+#include "sdf/sign/sign_choice.h"
 #include "tests/support/random.h"
 #include "tests/support/support.h"
 
 using namespace bilayer;
+using namespace bilayer::detail;
 using namespace bilayer::test;
 
 namespace {

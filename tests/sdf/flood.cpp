@@ -1,16 +1,18 @@
-#include "sdf/flood.h"
+#include "sdf/sign/flood.h"
 
 #include <catch2/catch.hpp>
 #include <glm/geometric.hpp>
 #include <glm/gtc/matrix_transform.hpp>
 #include <random>
 
+#include <bilayer/sdf/build.h>
+#include <bilayer/sdf/mesh_io.h>
 #include "demos/shared/shapes.h"
-#include "sdf/build.h"
 #include "tests/sdf/unsigned_band.h"
 #include "tests/support/support.h"
 
 using namespace bilayer;
+using namespace bilayer::detail;
 
 namespace {
 

@@ -8,12 +8,13 @@
 #include <iterator>
 #include <string>
 
-#include "sdf/scene_io.h"
+#include "sdf/io/scene_io.h"
 #include "tests/support/gltf.h"
 #include "tests/support/polygons.h"
 #include "tests/support/support.h"
 
 using namespace bilayer;
+using namespace bilayer::detail;
 using bilayer::test::Gltf;
 using bilayer::test::lower;
 using bilayer::test::tells;

@@ -1,4 +1,4 @@
-#include "sdf/inspect.h"
+#include <bilayer/sdf/inspect.h>
 
 #include <algorithm>
 #include <array>
@@ -7,8 +7,8 @@
 #include <glm/geometric.hpp>
 #include <glm/gtc/constants.hpp>
 
+#include <bilayer/sdf/mesh_io.h>
 #include "demos/shared/shapes.h"
-#include "sdf/mesh_io.h"
 #include "tests/support/random.h"
 #include "tests/support/support.h"
 

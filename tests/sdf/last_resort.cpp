@@ -1,14 +1,15 @@
 // The last resort for the side of a point, against solid angles summed up in double precision.
-#include "sdf/last_resort.h"
+#include "sdf/sign/fallback_sign.h"
 
 #include <catch2/catch.hpp>
 #include <random>
 
 #include "demos/shared/shapes.h"
-#include "sdf/progress.h"
+#include "sdf/base/progress.h"
 #include "tests/support/support.h"
 
 using namespace bilayer;
+using namespace bilayer::detail;
 
 namespace {
 

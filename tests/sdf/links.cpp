@@ -1,4 +1,4 @@
-#include "sdf/links.h"
+#include "sdf/leaf/sign_propagation.h"
 
 #include <catch2/catch.hpp>
 #include <random>
@@ -7,6 +7,7 @@
 #include "tests/support/support.h"
 
 using namespace bilayer;
+using namespace bilayer::detail;
 
 namespace {
 

@@ -1,4 +1,4 @@
-#include "sdf/mesh.h"
+#include <bilayer/sdf/mesh.h>
 
 #include <array>
 #include <catch2/catch.hpp>

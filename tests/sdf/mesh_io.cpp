@@ -1,12 +1,12 @@
-#include "sdf/mesh_io.h"
+#include <bilayer/sdf/mesh_io.h>
 
 #include <fmt/format.h>
 #include <catch2/catch.hpp>
 #include <fstream>
 #include <iterator>
 
+#include <bilayer/sdf/inspect.h>
 #include "demos/shared/shapes.h"
-#include "sdf/inspect.h"
 #include "tests/support/support.h"
 
 using namespace bilayer;

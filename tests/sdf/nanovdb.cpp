@@ -1,4 +1,4 @@
-#include "sdf/nanovdb.h"
+#include <bilayer/sdf/nanovdb.h>
 
 #include <nanovdb/util/GridHandle.h>
 #include <nanovdb/util/IO.h>
@@ -15,10 +15,10 @@
 #include <string>
 #include <thread>
 
+#include <bilayer/sdf/build.h>
+#include <bilayer/sdf/grids.h>
+#include <bilayer/sdf/vdb_io.h>
 #include "demos/shared/shapes.h"
-#include "sdf/build.h"
-#include "sdf/grids.h"
-#include "sdf/vdb_io.h"
 #include "tests/support/support.h"
 
 using namespace bilayer;

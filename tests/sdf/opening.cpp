@@ -1,5 +1,5 @@
 // Widths of holes: those of round ones by formula, the same however the mesh lies, none in what is closed.
-#include "sdf/opening.h"
+#include "sdf/sign/hole_width.h"
 
 #include <algorithm>
 #include <catch2/catch.hpp>
@@ -8,12 +8,13 @@
 #include <glm/gtc/quaternion.hpp>
 #include <random>
 
+#include <bilayer/sdf/mesh_io.h>
 #include "demos/shared/shapes.h"
-#include "sdf/mesh_io.h"
-#include "sdf/orient.h"
+#include "sdf/mesh/orient.h"
 #include "tests/support/support.h"
 
 using namespace bilayer;
+using namespace bilayer::detail;
 
 namespace {
 

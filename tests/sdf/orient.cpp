@@ -1,15 +1,16 @@
-#include "sdf/orient.h"
+#include "sdf/mesh/orient.h"
 
 #include <catch2/catch.hpp>
 #include <random>
 
+#include <bilayer/sdf/inspect.h>
+#include <bilayer/sdf/mesh_io.h>
 #include "demos/shared/shapes.h"
-#include "sdf/inspect.h"
-#include "sdf/mesh_io.h"
-#include "sdf/sign.h"
+#include "sdf/sign/sign_choice.h"
 #include "tests/support/support.h"
 
 using namespace bilayer;
+using namespace bilayer::detail;
 
 namespace {
 

@@ -1,4 +1,4 @@
-#include "sdf/progress.h"
+#include "sdf/base/progress.h"
 
 #include <oneapi/tbb/global_control.h>
 
@@ -7,18 +7,19 @@
 #include <random>
 
 #include "demos/shared/shapes.h"
-#include "sdf/flood.h"
-#include "sdf/orient.h"
-#include "sdf/sides.h"
-#include "sdf/sign.h"
-#include "sdf/topology.h"
-#include "sdf/triangle_tree.h"
-#include "sdf/wide_tree.h"
-#include "sdf/winding.h"
+#include "sdf/bvh/triangle_tree.h"
+#include "sdf/bvh/wide_tree.h"
+#include "sdf/mesh/orient.h"
+#include "sdf/mesh/side_classification.h"
+#include "sdf/mesh/topology.h"
+#include "sdf/sign/flood.h"
+#include "sdf/sign/sign_choice.h"
+#include "sdf/sign/winding.h"
 #include "tests/sdf/unsigned_band.h"
 #include "tests/support/support.h"
 
 using namespace bilayer;
+using namespace bilayer::detail;
 
 namespace {
 

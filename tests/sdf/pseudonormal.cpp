@@ -1,4 +1,4 @@
-#include "sdf/pseudonormal.h"
+#include "sdf/fill/pseudonormal.h"
 
 #include <oneapi/tbb/global_control.h>
 
@@ -11,14 +11,15 @@
 #include <random>
 #include <tuple>
 
+#include <bilayer/sdf/build.h>
+#include <bilayer/sdf/grids.h>
+#include <bilayer/sdf/mesh_io.h>
 #include "demos/shared/shapes.h"
-#include "sdf/build.h"
-#include "sdf/grids.h"
-#include "sdf/mesh_io.h"
-#include "sdf/progress.h"
+#include "sdf/base/progress.h"
 #include "tests/support/support.h"
 
 using namespace bilayer;
+using namespace bilayer::detail;
 
 namespace {
 

@@ -6,9 +6,9 @@
 #include <limits>
 #include <random>
 
+#include <bilayer/sdf/inspect.h>
+#include <bilayer/sdf/mesh_io.h>
 #include "demos/shared/shapes.h"
-#include "sdf/inspect.h"
-#include "sdf/mesh_io.h"
 #include "tests/support/support.h"
 
 using namespace bilayer;

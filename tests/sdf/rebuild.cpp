@@ -1,4 +1,6 @@
-#include "sdf/build.h"
+#include <bilayer/sdf/build.h>
+#include <bilayer/sdf/mesh_io.h>
+#include <bilayer/sdf/vdb_io.h>
 
 #include <catch2/catch.hpp>
 #include <cmath>
@@ -8,8 +10,8 @@
 #include <numeric>
 #include <random>
 
+#include <bilayer/sdf/grids.h>
 #include "demos/shared/shapes.h"
-#include "sdf/grids.h"
 #include "tests/support/support.h"
 
 using namespace bilayer;

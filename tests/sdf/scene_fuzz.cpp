@@ -7,13 +7,14 @@
 #include <stdexcept>
 #include <string>
 
-#include "sdf/mesh_io.h"
-#include "sdf/scene_io.h"
+#include <bilayer/sdf/mesh_io.h>
+#include "sdf/io/scene_io.h"
 #include "tests/support/gltf.h"
 #include "tests/support/scene_files.h"
 #include "tests/support/support.h"
 
 using namespace bilayer;
+using namespace bilayer::detail;
 using bilayer::test::SceneFile;
 
 namespace {

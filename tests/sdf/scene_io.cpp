@@ -1,4 +1,4 @@
-#include "sdf/scene_io.h"
+#include "sdf/io/scene_io.h"
 
 #include <unistd.h>
 
@@ -6,14 +6,15 @@
 #include <fstream>
 #include <string>
 
-#include "sdf/inspect.h"
-#include "sdf/mesh_io.h"
+#include <bilayer/sdf/inspect.h>
+#include <bilayer/sdf/mesh_io.h>
 #include "tests/support/gltf.h"
 #include "tests/support/polygons.h"
 #include "tests/support/scene_files.h"
 #include "tests/support/support.h"
 
 using namespace bilayer;
+using namespace bilayer::detail;
 using bilayer::test::SceneFile;
 
 namespace {

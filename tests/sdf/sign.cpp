@@ -1,16 +1,17 @@
-#include "sdf/sign.h"
+#include "sdf/sign/sign_choice.h"
 
 #include <catch2/catch.hpp>
 #include <random>
 
+#include <bilayer/sdf/build.h>
+#include <bilayer/sdf/inspect.h>
+#include <bilayer/sdf/mesh_io.h>
 #include "demos/shared/shapes.h"
-#include "sdf/build.h"
-#include "sdf/inspect.h"
-#include "sdf/mesh_io.h"
-#include "sdf/sides.h"
+#include "sdf/mesh/side_classification.h"
 #include "tests/support/support.h"
 
 using namespace bilayer;
+using namespace bilayer::detail;
 
 namespace {
 

@@ -1,20 +1,21 @@
-#include "sdf/sign_repair.h"
+#include "sdf/sign/sign_repair.h"
 
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <glm/gtc/quaternion.hpp>
 #include <random>
 
+#include <bilayer/sdf/build.h>
+#include <bilayer/sdf/grids.h>
+#include <bilayer/sdf/inspect.h>
 #include "demos/shared/shapes.h"
-#include "sdf/build.h"
-#include "sdf/grids.h"
-#include "sdf/inspect.h"
-#include "sdf/orient.h"
-#include "sdf/sign.h"
+#include "sdf/mesh/orient.h"
+#include "sdf/sign/sign_choice.h"
 #include "tests/support/support.h"
 #include "tests/support/truth.h"
 
 using namespace bilayer;
+using namespace bilayer::detail;
 
 namespace {
 

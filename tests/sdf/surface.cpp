@@ -1,12 +1,12 @@
-#include "sdf/surface.h"
+#include <bilayer/sdf/surface.h>
 
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <glm/geometric.hpp>
 
+#include <bilayer/sdf/build.h>
+#include <bilayer/sdf/inspect.h>
 #include "demos/shared/shapes.h"
-#include "sdf/build.h"
-#include "sdf/inspect.h"
 
 using namespace bilayer;
 

@@ -1,4 +1,4 @@
-#include "sdf/triangle_tree.h"
+#include "sdf/bvh/triangle_tree.h"
 
 #include <oneapi/tbb/parallel_for.h>
 
@@ -12,13 +12,14 @@
 #include <utility>
 
 #include "demos/shared/shapes.h"
-#include "sdf/close_pairs.h"
-#include "sdf/topology.h"
-#include "sdf/walls.h"
+#include "sdf/bvh/close_pairs.h"
+#include "sdf/mesh/topology.h"
+#include "sdf/mesh/wall_thickness.h"
 #include "tests/support/random.h"
 #include "tests/support/support.h"
 
 using namespace bilayer;
+using namespace bilayer::detail;
 
 namespace {
 

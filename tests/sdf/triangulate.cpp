@@ -1,4 +1,4 @@
-#include "sdf/triangulate.h"
+#include "sdf/io/triangulate.h"
 
 #include <algorithm>
 #include <array>
@@ -12,11 +12,12 @@
 #include <span>
 #include <utility>
 
-#include "sdf/inspect.h"
-#include "sdf/sign.h"
+#include <bilayer/sdf/inspect.h>
+#include "sdf/sign/sign_choice.h"
 #include "tests/support/support.h"
 
 using namespace bilayer;
+using namespace bilayer::detail;
 
 namespace {
 

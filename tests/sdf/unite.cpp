@@ -1,5 +1,5 @@
 // Unions: what unite() leaves is the outer surface, by the truth about boxes and spheres; fields of unions are exact.
-#include "sdf/unite.h"
+#include "sdf/mesh/unite.h"
 
 #include <openvdb/openvdb.h>
 
@@ -11,17 +11,18 @@
 #include <limits>
 #include <random>
 
+#include <bilayer/sdf/build.h>
+#include <bilayer/sdf/grids.h>
+#include <bilayer/sdf/inspect.h>
+#include <bilayer/sdf/mesh_io.h>
 #include "demos/shared/shapes.h"
-#include "sdf/build.h"
-#include "sdf/grids.h"
-#include "sdf/inspect.h"
-#include "sdf/mesh_io.h"
-#include "sdf/sign.h"
+#include "sdf/sign/sign_choice.h"
 #include "tests/support/cells.h"
 #include "tests/support/support.h"
 #include "tests/support/truth.h"
 
 using namespace bilayer;
+using namespace bilayer::detail;
 
 namespace {
 

@@ -9,11 +9,13 @@
 #include <cstring>
 #include <string>
 
-#include "sdf/band.h"
-#include "sdf/mesh.h"
+#include <bilayer/sdf/mesh.h>
+#include "sdf/leaf/band.h"
 #include "tests/support/support.h"
 
 namespace bilayer::test {
+
+using namespace bilayer::detail;
 
 /// The distances of all voxels nearer to the mesh than `reach` [voxels], in world units.
 inline openvdb::FloatGrid::Ptr unsignedBand(const Mesh& mesh, float voxelSize, float reach) {

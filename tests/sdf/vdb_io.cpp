@@ -1,4 +1,4 @@
-#include "sdf/vdb_io.h"
+#include <bilayer/sdf/vdb_io.h>
 
 #include <openvdb/io/File.h>
 
@@ -7,9 +7,9 @@
 #include <fstream>
 #include <iterator>
 
+#include <bilayer/sdf/build.h>
+#include <bilayer/sdf/grids.h>
 #include "demos/shared/shapes.h"
-#include "sdf/build.h"
-#include "sdf/grids.h"
 #include "tests/support/random.h"
 #include "tests/support/support.h"
 

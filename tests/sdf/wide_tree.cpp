@@ -1,4 +1,4 @@
-#include "sdf/wide_tree.h"
+#include "sdf/bvh/wide_tree.h"
 
 #include <oneapi/tbb/global_control.h>
 
@@ -8,10 +8,11 @@
 #include <set>
 
 #include "demos/shared/shapes.h"
-#include "sdf/tree_query.h"
+#include "sdf/bvh/tree_query.h"
 #include "tests/support/support.h"
 
 using namespace bilayer;
+using namespace bilayer::detail;
 
 namespace {
 

@@ -1,4 +1,4 @@
-#include "sdf/winding.h"
+#include "sdf/sign/winding.h"
 
 #include <oneapi/tbb/parallel_for.h>
 
@@ -6,13 +6,15 @@
 #include <glm/geometric.hpp>
 #include <random>
 
+#include <bilayer/sdf/build.h>
+#include <bilayer/sdf/inspect.h>
+#include <bilayer/sdf/mesh_io.h>
 #include "demos/shared/shapes.h"
-#include "sdf/build.h"
-#include "sdf/inspect.h"
 #include "tests/sdf/unsigned_band.h"
 #include "tests/support/support.h"
 
 using namespace bilayer;
+using namespace bilayer::detail;
 
 namespace {
 

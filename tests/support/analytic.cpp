@@ -10,8 +10,8 @@
 #include <glm/vec2.hpp>
 #include <memory>
 
-#include "sdf/build.h"
-#include "sdf/grids.h"
+#include <bilayer/sdf/build.h>
+#include <bilayer/sdf/grids.h>
 
 namespace bilayer::test {
 

@@ -4,8 +4,8 @@
 #include <functional>
 #include <glm/vec3.hpp>
 
-#include "sdf/level_set.h"
-#include "sdf/mesh.h"
+#include <bilayer/sdf/level_set.h>
+#include <bilayer/sdf/mesh.h>
 
 namespace bilayer::test {
 

@@ -6,9 +6,11 @@
 #include <glm/geometric.hpp>
 #include <string>
 
-#include "sdf/polygons.h"
+#include "sdf/io/polygons.h"
 
 namespace bilayer::test {
+
+using namespace bilayer::detail;
 
 inline std::size_t faceCount(const Polygons& p) {
     return p.sizes.empty() ? p.corners.size() / 3 : p.sizes.size();

@@ -9,8 +9,8 @@
 #include <limits>
 #include <utility>
 
+#include <bilayer/sdf/grids.h>
 #include "demos/shared/shapes.h"
-#include "sdf/grids.h"
 #include "tests/support/random.h"
 #include "tests/support/support.h"
 

@@ -6,8 +6,8 @@
 #include <span>
 #include <vector>
 
-#include "sdf/level_set.h"
-#include "sdf/sample.h"
+#include <bilayer/collider/query.h>
+#include <bilayer/sdf/level_set.h>
 #include "tests/support/analytic.h"
 
 namespace bilayer::test {

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "sdf/mesh.h"
+#include <bilayer/sdf/mesh.h>
 
 namespace bilayer::test {
 

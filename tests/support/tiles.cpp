@@ -9,9 +9,11 @@
 #include <numeric>
 #include <vector>
 
-#include "sdf/tile_cutter.h"
+#include "sdf/fill/tile_cutter.h"
 
 namespace bilayer {
+
+using namespace bilayer::detail;
 namespace {
 
 /// Triangles that one task cuts: enough to hide what a task costs, few enough to share out.

@@ -6,7 +6,7 @@
 #include <memory>
 #include <span>
 
-#include "sdf/build.h"
+#include <bilayer/sdf/build.h>
 
 namespace bilayer {
 

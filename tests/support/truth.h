@@ -11,7 +11,7 @@
 #include <glm/vec3.hpp>
 #include <vector>
 
-#include "sdf/mesh.h"
+#include <bilayer/sdf/mesh.h>
 
 namespace bilayer::test {
 

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "sdf/mesh.h"
+#include <bilayer/sdf/mesh.h>
 #include "tests/support/truth.h"
 
 namespace bilayer::test {

@@ -7,8 +7,8 @@
 #include <fstream>
 #include <memory>
 
-#include "sdf/grids.h"
-#include "sdf/vdb_io.h"
+#include <bilayer/sdf/grids.h>
+#include <bilayer/sdf/vdb_io.h>
 #include "tests/support/support.h"
 #include "tests/tools/program.h"
 

@@ -9,12 +9,13 @@
 #include <set>
 #include <thread>
 
-#include "sdf/atomic_file.h"
-#include "sdf/vdb_io.h"
+#include <bilayer/sdf/vdb_io.h>
+#include "sdf/io/atomic_file.h"
 #include "tests/support/support.h"
 #include "tests/tools/program.h"
 
 using namespace bilayer;
+using namespace bilayer::detail;
 using namespace bilayer::test;
 
 namespace {

@@ -11,15 +11,17 @@
 #include <sstream>
 #include <vector>
 
-#include "collider/collider.h"
+#include <bilayer/collider/collider.h>
+#include <bilayer/sdf/grids.h>
+#include <bilayer/sdf/mesh_io.h>
+#include <bilayer/sdf/vdb_io.h>
+#include "collider/contact/collider_data.h"
 #include "demos/shared/shapes.h"
-#include "sdf/grids.h"
-#include "sdf/mesh_io.h"
-#include "sdf/vdb_io.h"
 #include "tests/support/support.h"
 #include "tests/tools/program.h"
 
 using namespace bilayer;
+using namespace bilayer::detail;
 using namespace bilayer::test;
 
 namespace {
@@ -371,7 +373,7 @@ TEST_CASE("build --body keeps what bodies need, and info tells of it") {
     const Collider body(readVdb(output));
     CHECK(body.margin() == 0.02f);
     CHECK(body.mass().volume == Approx(json["mesh"]["volume"].get<double>()));
-    CHECK(json["body"]["points"] == body.points().points().size());
+    CHECK(json["body"]["points"] == body.data().points().points().size());
     const auto info = run({"info", output, "--json"}).json();
     CHECK(info["body"] == json["body"]);
     CHECK(info["body"]["margin"] == 0.02);
@@ -387,17 +389,17 @@ TEST_CASE("build --body keeps what bodies need, and info tells of it") {
     for (const std::string measure : {"triangles", "samples"}) {
         const auto other = build(output, {"--voxel-size", "0.05", "--body", "--contacts", measure});
         CHECK(other["body"]["contacts"] == measure);
-        CHECK(nameOf(Collider(readVdb(output)).body().measure) == measure);
+        CHECK(nameOf(Collider(readVdb(output)).data().body.measure) == measure);
         CHECK((Collider(readVdb(output)).field().mesh() != nullptr) == (measure == "triangles"));
-        CHECK(Collider(readVdb(output)).measured().mesh());
+        CHECK(Collider(readVdb(output)).exactField().mesh());
     }
     const auto whole = std::filesystem::file_size(output);
     CHECK(build(output, {"--voxel-size", "0.05", "--body", "--no-mesh"})["body"]["triangles"] == 0);
-    CHECK_FALSE(Collider(readVdb(output)).body().mesh);
+    CHECK_FALSE(Collider(readVdb(output)).data().body.mesh);
     CHECK(std::filesystem::file_size(output) + body.mesh().triangles.size() * sizeof(glm::uvec3) < whole);
     CHECK_THAT(run({"info", output}).out, Catch::Contains("no mesh"));
     build(output, {"--voxel-size", "0.05", "--body", "--half-float", "--triangles", "--fill"});
-    CHECK(Collider(readVdb(output)).points().points().size() == body.points().points().size());
+    CHECK(Collider(readVdb(output)).data().points().points().size() == body.data().points().points().size());
 }
 
 TEST_CASE("a body's points look outward, whichever way its triangles run") {
@@ -407,7 +409,8 @@ TEST_CASE("a body's points look outward, whichever way its triangles run") {
     writeMesh(path, inside);
     REQUIRE(run({"build", path.string(), "-o", output.string(), "--voxel-size", "0.05", "--body"}).status == 0);
     const Collider body(readVdb(output));
-    for (const SurfacePoint& point : body.points().points()) REQUIRE(glm::dot(point.normal, point.position) > 0.4f);
+    for (const SurfacePoint& point : body.data().points().points())
+        REQUIRE(glm::dot(point.normal, point.position) > 0.4f);
 }
 
 TEST_CASE("inspect says what a scene needs") {

@@ -10,8 +10,8 @@
 #include <iterator>
 #include <stdexcept>
 
+#include <bilayer/sdf/mesh_io.h>
 #include "demos/shared/shapes.h"
-#include "sdf/mesh_io.h"
 #include "tests/support/support.h"
 
 namespace bilayer::test {

@@ -1,8 +1,9 @@
 // What a user writes, against the installed headers and all five libraries.
 #include <BulletCollision/CollisionDispatch/btDefaultCollisionConfiguration.h>
 #include <bilayer/cl/device.h>
-#include <bilayer/collider/collider.h>
+#include <bilayer/collider/contact.h>
 #include <bilayer/integration/bullet/dispatcher.h>
+#include <bilayer/integration/bullet/extensions.h>
 #include <bilayer/integration/bullet/shape.h>
 #include <bilayer/integration/fluid/seed.h>
 #include <bilayer/sdf/build.h>

@@ -1,0 +1,286 @@
+// Each batch of blocks that the fill leaves on the device is trimmed to the band at once, into a page of its own. When
+// all have come, and their number is known, pages are copied into the layout.
+#include "cl/detail/resident_field.h"
+
+#include <algorithm>
+#include <array>
+#include <limits>
+#include <mutex>
+#include <stdexcept>
+#include <utility>
+#include <vector>
+
+#include "cl/detail/brick_filler.h"
+#include "cl/detail/kernel_options.h"
+#include "sdf/leaf/band.h"
+#include "sdf/leaf/blocks.h"
+
+namespace bilayer::detail {
+
+extern const char* const resident_cl;  // the text of resident.cl
+
+namespace {
+
+constexpr std::size_t groupItems = 64;       // ITEMS of common.cl
+constexpr std::size_t itemsAlongParts = 32;  // along z: they stand side by side in memory
+constexpr cl_int unknownEntry = -3;          // UNKNOWN of resident.cl
+constexpr cl_float mostParts = 16;           // MOST_PARTS of resident.cl
+constexpr const char* field = "the field";
+
+// `Widths` of resident.cl.
+struct KernelWidths {
+    cl_float exterior, interior, voxelSize;
+};
+
+// `Summary` of resident.cl.
+struct Summary {
+    static constexpr cl_int low = std::numeric_limits<cl_int>::min(), high = std::numeric_limits<cl_int>::max();
+
+    cl_int needed = 0, conflicts = 0;
+    cl_int blockLower[3]{high, high, high}, blockUpper[3]{low, low, low};
+    cl_int activeLower[3]{high, high, high}, activeUpper[3]{low, low, low};
+};
+
+glm::ivec3 vectorOf(const cl_int (&values)[3]) {
+    return {values[0], values[1], values[2]};
+}
+
+std::size_t roundedUp(std::size_t count, std::size_t multiple) {
+    return (count + multiple - 1) / multiple * multiple;
+}
+
+// A batch of blocks, trimmed to the band.
+struct Page {
+    cl_uint blocks;
+    cl::Buffer origins, values, sides;
+};
+
+class ResidentFill {
+  public:
+    ResidentFill(const Device& device, const OpenclOptions& options, DeviceMemory& memory, const FillJob& job);
+    ResidentFill(const ResidentFill&) = delete;
+    ResidentFill& operator=(const ResidentFill&) = delete;
+    DeviceLayout run();
+
+  private:
+    void keep(const cl::Buffer& origins, const cl::Buffer& distances, std::size_t blocks);
+    void keepFromHost();
+    void measureFrame();
+    void placeBlocks();
+    void measureClearances();
+    void countConflicts();
+    Summary readSummary();
+
+    std::size_t entries() const { return layout_.frame.entries(); }
+
+    template <class... Arguments>
+    void enqueue(const char* name, const cl::NDRange& global, const cl::NDRange& local, const Arguments&... arguments) {
+        cl::Kernel kernel(program_, name);
+        cl_uint index = 0;
+        (kernel.setArg(index++, arguments), ...);
+        device_.queue.enqueueNDRangeKernel(kernel, cl::NullRange, global, local, nullptr,
+                                           timing_.event(Timing::Of::kernel));
+    }
+    // A work-group, or a single item, for each block.
+    template <class... Arguments>
+    void enqueueBlocks(const char* name, std::size_t blocks, const Arguments&... arguments) {
+        const std::size_t items = gpuMapping_ ? groupItems : 1;
+        enqueue(name, cl::NDRange(blocks * items), cl::NDRange(items), arguments...);
+    }
+    // A work-item for each part of space that has a clearance.
+    template <class... Arguments>
+    void enqueueParts(const char* name, const Arguments&... arguments) {
+        const glm::ivec3 size = layout_.frame.parts();
+        enqueue(name, cl::NDRange(roundedUp(std::size_t(size.z), itemsAlongParts), size.y, size.x),
+                cl::NDRange(itemsAlongParts, 1, 1), arguments...);
+    }
+
+    DeviceImpl& device_;
+    const OpenclOptions& options_;
+    DeviceMemory& memory_;
+    const FillJob& job_;
+    const bool gpuMapping_;
+    const BandWidths widths_;
+    Timing timing_;
+    cl::Program program_;
+    cl::Buffer summary_;
+    std::vector<Page> pages_;
+    std::mutex mutex_;                     // guards what comes from the host
+    std::vector<glm::ivec3> hostOrigins_;  // of blocks that the host filled
+    std::vector<float> hostDistances_;     // [voxels]
+    DeviceLayout layout_;
+    glm::ivec3 firstVoxel_{0};
+    Ended ended_;  // commands in flight use the blocks of the host
+};
+
+ResidentFill::ResidentFill(const Device& device, const OpenclOptions& options, DeviceMemory& memory, const FillJob& job)
+    : device_(device.impl()),
+      options_(options),
+      memory_(memory),
+      job_(job),
+      gpuMapping_(wantsGroups(device_, options.mapping)),
+      widths_{job.options.exteriorWidth, job.options.interiorWidth, job.mesh.voxelSize},
+      timing_(options.times),
+      program_(buildProgram(device_, resident_cl, commonBuildOptions(device_, gpuMapping_))),
+      summary_(memory.allocate(sizeof(Summary), field)),
+      ended_(device_.queue) {}
+
+DeviceLayout ResidentFill::run() {
+    const Summary none;
+    device_.queue.enqueueWriteBuffer(summary_, CL_TRUE, 0, sizeof none, &none);
+    MeshJob mesh = job_.mesh;
+    mesh.sink = [&](const FilledBlocks& blocks) {
+        const std::lock_guard lock(mutex_);
+        hostOrigins_.insert(hostOrigins_.end(), blocks.origins.begin(), blocks.origins.end());
+        hostDistances_.insert(hostDistances_.end(), blocks.distances.begin(), blocks.distances.end());
+    };
+    fillByBricks(device_, options_, {mesh, job_.options, job_.box, job_.layers},
+                 [&](const cl::Buffer& origins, const cl::Buffer& distances, std::size_t blocks) {
+                     keep(origins, distances, blocks);
+                 });
+    keepFromHost();
+    measureFrame();
+    placeBlocks();
+    countConflicts();
+    measureClearances();
+    timing_.sumUp();
+    return std::move(layout_);
+}
+
+void ResidentFill::keep(const cl::Buffer& origins, const cl::Buffer& distances, std::size_t blocks) {
+    if (blocks == 0) return;
+    const auto buffer = [&](std::uint64_t each) { return memory_.allocate(blocks * each, field); };
+    const Page page{cl_uint(blocks), buffer(sizeof(glm::ivec3)), buffer(blockVoxels * sizeof(float)),
+                    buffer(sizeof(cl_int))};
+    enqueueBlocks("trimBlocks", blocks, origins, distances,
+                  KernelWidths{widths_.exterior, widths_.interior, widths_.voxelSize}, page.origins, page.values,
+                  page.sides, summary_);
+    device_.queue.flush();
+    pages_.push_back(page);
+}
+
+void ResidentFill::keepFromHost() {
+    if (hostOrigins_.empty()) return;
+    const auto uploaded = [&](const auto& data) {
+        return memory_.upload(data.data(), data.size() * sizeof data[0], field, timing_.event(Timing::Of::upload));
+    };
+    cl::Buffer origins = uploaded(hostOrigins_), distances = uploaded(hostDistances_);
+    keep(origins, distances, hostOrigins_.size());
+    device_.queue.finish();
+    memory_.free(origins);
+    memory_.free(distances);
+}
+
+Summary ResidentFill::readSummary() {
+    Summary summary;
+    device_.queue.enqueueReadBuffer(summary_, CL_TRUE, 0, sizeof summary, &summary, nullptr,
+                                    timing_.event(Timing::Of::download));
+    return summary;
+}
+
+// As FieldLayout's constructor and LevelSet have it.
+void ResidentFill::measureFrame() {
+    const Summary summary = readSummary();
+    if (summary.activeLower[0] > summary.activeUpper[0])
+        throw std::invalid_argument("no voxel lies within the band: the widths are too small for this voxel size");
+    FieldFrame& frame = layout_.frame;
+    firstVoxel_ = vectorOf(summary.blockLower);
+    frame.blocks = (vectorOf(summary.blockUpper) - firstVoxel_) / blockSide + 1;
+    frame.requireSize();
+    frame.voxelSize = widths_.voxelSize;
+    frame.voxel = double(widths_.voxelSize);
+    frame.perMetre = 1 / frame.voxel;
+    frame.exteriorWidth = widths_.exterior * widths_.voxelSize;
+    frame.interiorWidth = widths_.interior * widths_.voxelSize;
+    frame.origin = glm::dvec3(firstVoxel_) * frame.voxel;
+    frame.bounds = {glm::vec3(glm::dvec3(vectorOf(summary.activeLower)) * frame.voxel),
+                    glm::vec3(glm::dvec3(vectorOf(summary.activeUpper)) * frame.voxel)};
+    layout_.values = memory_.allocate(std::uint64_t(summary.needed) * FieldFrame::blockFloats * sizeof(float), field);
+}
+
+void ResidentFill::placeBlocks() {
+    const KernelFrame frame(layout_.frame);
+    const cl_int4 first{{firstVoxel_.x, firstVoxel_.y, firstVoxel_.z, 0}};
+    cl::Buffer next = memory_.allocate(sizeof(cl_uint), field);
+    layout_.directory = memory_.allocate(entries() * sizeof(cl_int), field);
+    device_.queue.enqueueFillBuffer(next, cl_uint(0), 0, sizeof(cl_uint));
+    device_.queue.enqueueFillBuffer(layout_.directory, unknownEntry, 0, entries() * sizeof(cl_int));
+    for (const Page& page : pages_)
+        enqueueBlocks("placeBlocks", page.blocks, frame, first, page.origins, page.values, page.sides, next,
+                      layout_.directory, layout_.values);
+    const std::size_t columns = std::size_t(frame.blocks[0]) * frame.blocks[1];
+    enqueue("markEmpty", cl::NDRange(roundedUp(columns, groupItems)), cl::NDRange(groupItems), frame, layout_.directory,
+            layout_.values);
+    enqueueBlocks("fillAprons", entries(), frame, layout_.directory, layout_.values);
+    device_.queue.finish();
+    for (Page& page : pages_)
+        for (cl::Buffer* buffer : {&page.origins, &page.values, &page.sides}) memory_.free(*buffer);
+    pages_.clear();
+    memory_.free(next);
+}
+
+void ResidentFill::countConflicts() {
+    if (!job_.mesh.conflicts) return;
+    enqueueBlocks("countConflicts", entries(), KernelFrame(layout_.frame), layout_.directory, layout_.values, summary_);
+    *job_.mesh.conflicts += std::size_t(readSummary().conflicts);
+}
+
+void ResidentFill::measureClearances() {
+    const KernelFrame frame(layout_.frame);
+    const glm::ivec3 size = layout_.frame.parts();
+    const std::size_t count = std::size_t(size.x) * size.y * size.z;
+    const cl_float far = layout_.frame.findsSurface() ? mostParts * mostParts : 0;
+    layout_.centres = memory_.allocate(count * sizeof(cl_char), field);
+    std::array<cl::Buffer, 2> ways;
+    for (cl::Buffer& some : ways) some = memory_.allocate(count * sizeof(cl_float), field);
+    enqueueParts("measureParts", frame, far, layout_.directory, layout_.values, ways[0], layout_.centres);
+    for (cl_int axis = 2; axis >= 0; --axis) {
+        enqueueParts("spreadParts", frame, axis, ways[0], ways[1]);
+        std::swap(ways[0], ways[1]);
+    }
+    enqueueParts("storeCentres", frame, ways[0], layout_.centres);
+    device_.queue.finish();
+    for (cl::Buffer& some : ways) memory_.free(some);
+    memory_.free(summary_);
+}
+
+void checkJob(const FillJob& job) {
+    if (job.options.method == Method::prism)
+        throw std::invalid_argument("a field of the method prism cannot stay on the device: upload its level set");
+    if (!job.mesh.sign)
+        throw std::invalid_argument(
+            "a field that stays on the device takes its signs from normals; those of this mesh contradict each other, "
+            "or other signs were asked for: build a level set and upload that");
+}
+
+}  // namespace
+
+DeviceLayout buildResident(const Device& device, const Mesh& mesh, const BuildOptions& build,
+                           const OpenclOptions& options, DeviceMemory& memory) {
+    constexpr std::uint64_t mebibyte = 1 << 20;
+    OpenclTimes fillTimes;
+    OpenclOptions fillOptions = options;
+    fillOptions.memoryMiB =
+        std::max<std::uint64_t>(1, memoryBudget(device.impl(), options.memoryMiB) / fillPart / mebibyte);
+    fillOptions.times = options.times ? &fillTimes : nullptr;
+    BuildOptions withoutTriangles = build;
+    withoutTriangles.triangles = false;
+
+    DeviceLayout layout;
+    fillOnly(mesh, withoutTriangles,
+             {"opencl", device.info().name, [&](const FillJob& job) {
+                  checkJob(job);
+                  // what came before had signs that contradict each other
+                  for (cl::Buffer* buffer : {&layout.directory, &layout.centres, &layout.values}) memory.free(*buffer);
+                  layout = ResidentFill(device, fillOptions, memory, job).run();
+              }});
+    if (options.times) {
+        options.times->kernels += fillTimes.kernels;
+        options.times->upload += fillTimes.upload;
+        options.times->download += fillTimes.download;
+        options.times->peakBytes = std::max(options.times->peakBytes, fillTimes.peakBytes + memory.peak());
+    }
+    return layout;
+}
+
+}  // namespace bilayer::detail

@@ -1,0 +1,42 @@
+// A field that is built on a device and stays there; kernels in resident.cl.
+#pragma once
+
+#include <bilayer/sdf/build.h>
+#include "cl/detail/memory.h"
+#include "cl/detail/timing.h"
+#include "collider/field/field_layout.h"
+
+namespace bilayer::detail {
+
+/// `Frame` of layout.cl.
+struct KernelFrame {
+    cl_double origin[3], perMetre;
+    cl_int blocks[3];
+    cl_float voxelSize, exteriorWidth, interiorWidth;
+
+    explicit KernelFrame(const FieldFrame& f)
+        : origin{f.origin.x, f.origin.y, f.origin.z},
+          perMetre(f.perMetre),
+          blocks{f.blocks.x, f.blocks.y, f.blocks.z},
+          voxelSize(f.voxelSize),
+          exteriorWidth(f.exteriorWidth),
+          interiorWidth(f.interiorWidth) {}
+};
+
+/// The arrays of a FieldLayout in a device's memory.
+struct DeviceLayout {
+    FieldFrame frame;
+    cl::Buffer directory, centres, values;
+};
+
+/// The part of a memory budget that the fill's own work may take.
+inline constexpr std::uint64_t fillPart = 4;
+
+/// Builds the field of a mesh on a device: only the mesh goes up, and only counts come down. The layout's buffers come
+/// from `memory`, whose budget is that of the options less the fill's part.
+/// Throws what build() throws, cl::Error, DeviceError, and std::invalid_argument where the method or the way to signs
+/// needs the processor.
+DeviceLayout buildResident(const Device& device, const Mesh& mesh, const BuildOptions& build,
+                           const OpenclOptions& options, DeviceMemory& memory);
+
+}  // namespace bilayer::detail

@@ -1,0 +1,58 @@
+// What a device took for a build, by the events of its queues.
+#pragma once
+
+#include <algorithm>
+#include <utility>
+#include <vector>
+
+#include <bilayer/cl/filler.h>
+#include "cl/detail/program.h"
+
+namespace bilayer::detail {
+
+/// Collects the events of one build.
+class Timing {
+  public:
+    enum class Of { kernel, upload, download };
+
+    /// @param times  where the sums go; null: nobody asks, and no event is kept
+    explicit Timing(OpenclTimes* times) : times_(times) {}
+
+    /// Where a command's event shall go; null if nobody asks.
+    cl::Event* event(Of what) {
+        if (!times_) return nullptr;
+        events_.emplace_back(what, cl::Event());
+        return &events_.back().second;
+    }
+    void keep(Of what, const cl::Event& event) {
+        if (times_) events_.emplace_back(what, event);
+    }
+
+    /// Adds up all events so far; of kernels that ran at the same time, that time once. Call it when the commands have
+    /// ended.
+    void sumUp() {
+        std::vector<std::pair<cl_ulong, cl_ulong>> kernels;
+        for (const auto& [what, event] : events_) {
+            if (!event()) continue;  // nothing was sent: host and device share the memory
+            const auto begin = event.getProfilingInfo<CL_PROFILING_COMMAND_START>(),
+                       end = event.getProfilingInfo<CL_PROFILING_COMMAND_END>();
+            if (what == Of::kernel)
+                kernels.emplace_back(begin, end);
+            else
+                (what == Of::upload ? times_->upload : times_->download) += 1e-9 * double(end - begin);
+        }
+        events_.clear();
+        std::sort(kernels.begin(), kernels.end());
+        cl_ulong until = 0;
+        for (const auto& [begin, end] : kernels) {
+            if (end > until) times_->kernels += 1e-9 * double(end - std::max(begin, until));
+            until = std::max(until, end);
+        }
+    }
+
+  private:
+    OpenclTimes* times_;
+    std::vector<std::pair<Of, cl::Event>> events_;
+};
+
+}  // namespace bilayer::detail

@@ -1,0 +1,68 @@
+# How the libraries of bilayer are built, included and installed.
+include(GNUInstallDirs)
+include(CMakePackageConfigHelpers)
+
+option(BUILD_SHARED_LIBS "Build shared libraries" OFF)
+set(bilayer_components ${BILAYER_COMPONENTS})
+set(CMAKE_FIND_PACKAGE_NAME bilayer)
+set(bilayer_FIND_REQUIRED TRUE)
+include(${CMAKE_CURRENT_LIST_DIR}/dependencies.cmake)
+unset(CMAKE_FIND_PACKAGE_NAME)
+# A parent project links what the libraries link.
+get_property(imported DIRECTORY PROPERTY IMPORTED_TARGETS)
+set_target_properties(${imported} PROPERTIES IMPORTED_GLOBAL TRUE)
+
+# What all targets of the project are compiled with.
+# The same bytes on every machine and for every number of threads need products and sums that are never fused.
+function(bilayer_flags target)
+  target_compile_options(${target} PRIVATE -ffp-contract=off -fno-math-errno -Wall -Wextra -Wpedantic $<$<BOOL:${BILAYER_WERROR}>:-Werror>
+    # GCC 12 sees overlaps and overflows in std::string that are none (GCC bug 105329 and its like)
+    $<$<CXX_COMPILER_ID:GNU>:-Wno-restrict> $<$<CXX_COMPILER_ID:GNU>:-Wno-stringop-overflow>)
+  target_include_directories(${target} PRIVATE ${PROJECT_SOURCE_DIR})
+endfunction()
+
+# bilayer_library(NAME FOLDER LINKS...): a library of all source files of a folder, unless BILAYER_COMPONENTS lacks it.
+# Headers that stand directly in the folder are public: they are included as <bilayer/FOLDER/...> and installed.
+function(bilayer_library name folder)
+  if(NOT name IN_LIST BILAYER_COMPONENTS)
+    return()
+  endif()
+  cmake_parse_arguments(ARG "" "" "LINKS" ${ARGN})
+  file(GLOB_RECURSE sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/${folder}/*.cpp)
+  file(GLOB headers CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/${folder}/*.h)
+  add_library(bilayer_${name} ${sources})
+  add_library(bilayer::${name} ALIAS bilayer_${name})
+  set_target_properties(bilayer_${name} PROPERTIES EXPORT_NAME ${name} POSITION_INDEPENDENT_CODE ON
+    VERSION ${PROJECT_VERSION} SOVERSION ${PROJECT_VERSION_MAJOR}.${PROJECT_VERSION_MINOR})
+  target_compile_features(bilayer_${name} PUBLIC cxx_std_20)
+  bilayer_flags(bilayer_${name})
+  # links to the public headers alone, as an installed package has them
+  set(include ${PROJECT_BINARY_DIR}/include)
+  file(REMOVE_RECURSE ${include}/bilayer/${folder})
+  file(MAKE_DIRECTORY ${include}/bilayer/${folder})
+  foreach(header IN LISTS headers)
+    get_filename_component(file ${header} NAME)
+    file(CREATE_LINK ${header} ${include}/bilayer/${folder}/${file} SYMBOLIC)
+  endforeach()
+  target_include_directories(bilayer_${name}
+    PUBLIC $<BUILD_INTERFACE:${include}> $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>)
+  target_link_libraries(bilayer_${name} ${ARG_LINKS})
+  if(BILAYER_INSTALL)
+    install(TARGETS bilayer_${name} EXPORT bilayer-${name} COMPONENT ${name})
+    install(FILES ${headers} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/bilayer/${folder} COMPONENT ${name})
+  endif()
+endfunction()
+
+# find_package(bilayer COMPONENTS ...) for users.
+function(bilayer_install_package)
+  set(folder ${CMAKE_INSTALL_LIBDIR}/cmake/bilayer)
+  foreach(component IN LISTS BILAYER_COMPONENTS)
+    install(EXPORT bilayer-${component} NAMESPACE bilayer:: DESTINATION ${folder} COMPONENT ${component})
+  endforeach()
+  set(cmake ${PROJECT_SOURCE_DIR}/cmake)
+  configure_package_config_file(${cmake}/bilayer-config.cmake.in ${PROJECT_BINARY_DIR}/bilayer-config.cmake
+    INSTALL_DESTINATION ${folder})
+  write_basic_package_version_file(${PROJECT_BINARY_DIR}/bilayer-config-version.cmake COMPATIBILITY SameMinorVersion)
+  install(FILES ${PROJECT_BINARY_DIR}/bilayer-config.cmake ${PROJECT_BINARY_DIR}/bilayer-config-version.cmake
+    ${cmake}/dependencies.cmake DESTINATION ${folder} COMPONENT sdf)
+endfunction()

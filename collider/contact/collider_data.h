@@ -1,0 +1,52 @@
+// What a Collider holds.
+#pragma once
+
+#include <bilayer/collider/collider.h>
+
+#include <cstdint>
+#include <mutex>
+#include <optional>
+
+#include "collider/contact/body.h"
+#include "collider/contact/interpolation_error.h"
+#include "collider/contact/sharp_edges.h"
+#include "collider/contact/surface_points.h"
+
+namespace bilayer::detail {
+
+/// The body of a mesh and its level set: as Collider's constructor.
+Body makeBody(Mesh mesh, const LevelSet& levelSet, const ColliderOptions& options);
+
+struct ColliderData {
+    ColliderData(const LevelSet& levelSet, Body body);
+
+    const SurfacePoints& points() const { return body.points; }
+    const Mesh& mesh() const;
+    const Field& exactField() const;
+    /// Whether contacts ask the triangles at a point of the body's coordinates [m], by Body::measure.
+    /// @param measured  as in ContactOptions
+    bool asksTriangles(const glm::vec3& point, bool measured = false) const {
+        if (measured || body.measure == Measure::triangles) return body.mesh != nullptr;
+        return strays.hold(point);
+    }
+    const SharpEdges& edges() const { return sharpEdges; }
+
+    const Body body;
+    const Field field;
+    const Strays strays;
+    const SharpEdges sharpEdges;
+    const std::uint64_t id;
+
+  private:
+    template <class Make>
+    void once(const Make& make) const;
+
+    // what few ask for, and takes longer than all else that a body from a file needs: the triangles of the field's zero
+    // set for a body without a mesh, and the field with the mesh's
+    mutable std::once_flag once_;
+    mutable std::optional<LevelSet> levelSet_;
+    mutable Mesh zeroSet_;
+    mutable std::optional<Field> exact_;
+};
+
+}  // namespace bilayer::detail

@@ -1,0 +1,68 @@
+#include "collider/contact/interpolation_error.h"
+
+#include "collider/field/field_data.h"
+
+#include <cmath>
+#include <cstddef>
+
+#include "collider/field/interpolant.h"
+
+namespace bilayer::detail {
+namespace {
+
+// What samples may be off by [voxels].
+constexpr float tolerance = 0.1f;
+// Along each axis of a cell, so many places are looked at.
+constexpr int places = 3;
+
+// Two bits for each cell of a block: whether it has been measured, and what came of it.
+constexpr int side = FieldFrame::side, cellsPerWord = 32, wordsPerBlock = side * side * side / cellsPerWord;
+constexpr std::uint64_t isMeasured = 1, isStray = 2;
+
+}  // namespace
+
+Strays::Strays(const Field& field)
+    : field_(std::make_shared<const Field>(field)),
+      known_(new std::atomic<std::uint64_t>[wordsPerBlock * field.data().stored]()) {}
+
+bool Strays::hold(const glm::vec3& point) const noexcept {
+    if (!field_) return false;
+    const FieldLayout& layout = field_->data();
+    const glm::dvec3 local = (glm::dvec3(point) - layout.origin) * layout.perMetre;
+    const glm::dvec3 extent = double(side) * glm::dvec3(layout.blocks);
+    if (!(local.x >= 0 && local.y >= 0 && local.z >= 0)) return false;
+    if (!(local.x < extent.x && local.y < extent.y && local.z < extent.z)) return false;
+    const glm::ivec3 cell(local), inBlock = cell % side;
+    const std::int32_t block = layout.directory.data()[layout.entryOf(cell / side)];
+    if (block < 0) return false;
+
+    const int index = (inBlock.x * side + inBlock.y) * side + inBlock.z, shift = 2 * (index % cellsPerWord);
+    std::atomic<std::uint64_t>& word = known_[std::ptrdiff_t(block) * wordsPerBlock + index / cellsPerWord];
+    std::uint64_t bits = word.load(std::memory_order_relaxed) >> shift;
+    if (!(bits & isMeasured)) {
+        bits = areAt(cell) ? isMeasured | isStray : isMeasured;
+        word.fetch_or(bits << shift, std::memory_order_relaxed);  // others may have found the same by now
+    }
+    return bits & isStray;
+}
+
+bool Strays::areAt(const glm::ivec3& cell) const noexcept {
+    for (int i = 0; i < places * places * places; ++i) {
+        const glm::ivec3 place(i / (places * places), i / places % places, i % places);
+        if (isOff(glm::dvec3(cell) + (glm::dvec3(place) + 0.5) / double(places))) return true;
+    }
+    return false;
+}
+
+// At a place in voxels from the layout's origin.
+bool Strays::isOff(const glm::dvec3& local) const noexcept {
+    const FieldLayout& layout = field_->data();
+    const float voxel = field_->voxelSize();
+    const glm::vec3 place(local * layout.voxel + layout.origin);
+    const Sample sample = field_->sample(place);
+    if (!sample.inBand) return false;
+    const ClosestPoint closest = field_->closest(place, std::abs(sample.distance) + mostInterpolationError * voxel);
+    return !(std::abs(closest.distance - sample.distance) <= tolerance * voxel);
+}
+
+}  // namespace bilayer::detail

@@ -1,0 +1,211 @@
+#include "collider/contact/sharp_edges.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <glm/geometric.hpp>
+
+namespace bilayer::detail {
+namespace {
+
+// Neighbours on an edge are no farther apart than this [voxels]: of candidates 1.4 voxels apart at least, every second
+// or third is left where points lie two voxels apart.
+constexpr float farthestNeighbour = 4.5f;
+// Of two neighbours in about the same direction the nearer one counts: cosine of 60 degrees.
+constexpr float sameDirection = 0.5f;
+// An edge runs square to the normals at its ends, but for corners: a cube's have 0.58.
+constexpr float leastSquare = 0.7f;
+// The interpolant rounds sharp edges off by up to this much [voxels]; farther away there is a groove between the two.
+constexpr float onSurface = 0.45f;
+// A piece may lie above the edge between its ends, as around a hole, by no more than this [voxels].
+constexpr float mostAbove = 0.05f;
+constexpr std::size_t mostNeighbours = 6;
+// Edges that cross at a smaller angle (sine) are parallel: their points tell enough.
+constexpr float leastCrossing = 0.2f;
+// A crossing lies so near to the deepest place that the field shows, which rounds edges off [voxels].
+constexpr float crossingWithin = 1.5f;
+// It is no deeper than so many times what the field shows, across faces instead of both edges, or than so much more
+// [voxels]: a field by samples rounds edges off.
+constexpr float deepestAcross = 1.5f, deepestUnseen = 1, deepestAcrossExact = 2, deepestUnseenExact = 0.25f;
+// Faces leave the plane between two edges at this angle (sine) at least: faces that lie on each other touch by their
+// points.
+constexpr float leastLeaving = 0.09f;
+// What is seen at a smaller angle (sine) than this lies level.
+constexpr float level = 0.09f;
+// The mean way along the edges around a point: longer where they are bent by more than ten degrees.
+constexpr float leastBend = 0.0872f;
+// Faces are looked for so far beside their edge [voxels].
+constexpr float wingSpan = 1.5f;
+// Pieces of an edge end within this of each other, as parts of their length.
+constexpr float gap = 0.02f;
+// Fewer points than these, as near as neighbours, do not go around one.
+constexpr int leastAround = 3;
+
+struct Neighbour {
+    std::uint32_t index;
+    glm::vec3 direction;
+    float distance;
+};
+
+std::vector<Neighbour> neighboursOf(std::uint32_t index, const SurfacePoints& points, const Field& field) {
+    const SurfacePoint& point = points.points()[index];
+    const float reach = farthestNeighbour * field.voxelSize();
+    std::vector<Neighbour> near;
+    points.visit(
+        [&](const glm::vec3& centre, float radius) { return glm::distance(centre, point.position) > radius + reach; },
+        [&](std::uint32_t other, const SurfacePoint& there) {
+            if (!there.isSharp || other == index) return;
+            const glm::vec3 way = there.position - point.position;
+            const float distance = glm::length(way);
+            if (!(distance > 0) || distance > reach) return;
+            const glm::vec3 direction = way / distance;
+            const float aslant =
+                std::max(std::abs(glm::dot(direction, point.normal)), std::abs(glm::dot(direction, there.normal)));
+            // how far an arc with these normals lies below the piece: a quarter of its ends' heights over each other
+            const float above = 0.125f * (glm::dot(way, point.normal) - glm::dot(way, there.normal));
+            if (aslant < leastSquare && above <= mostAbove * field.voxelSize())
+                near.push_back({other, direction, distance});
+        });
+    std::sort(near.begin(), near.end(), [](const Neighbour& a, const Neighbour& b) {
+        return a.distance < b.distance || (a.distance == b.distance && a.index < b.index);
+    });
+    std::vector<Neighbour> kept;
+    for (const Neighbour& next : near) {
+        const auto hides = [&](const Neighbour& k) { return glm::dot(k.direction, next.direction) > sameDirection; };
+        if (kept.size() == mostNeighbours) break;
+        if (std::any_of(kept.begin(), kept.end(), hides)) continue;
+        const glm::vec3 middle = 0.5f * (point.position + points.points()[next.index].position);
+        if (std::abs(field.sample(middle).distance) <= onSurface * field.voxelSize()) kept.push_back(next);
+    }
+    return kept;
+}
+
+/// By the surface beside the middle of an edge.
+Wings wingsOf(const SurfacePoint& a, const SurfacePoint& b, const Field& field) {
+    const glm::vec3 along = glm::normalize(b.position - a.position), middle = 0.5f * (a.position + b.position);
+    const glm::vec3 aside = glm::normalize(glm::cross(along, a.normal + b.normal));
+    const auto wing = [&](float side) {
+        glm::vec3 place = middle + side * wingSpan * field.voxelSize() * aside;
+        for (int i = 0; i < 2; ++i) {
+            const Sample sample = field.sample(place);
+            if (sample.inBand) place -= sample.distance * sample.gradient;
+        }
+        const glm::vec3 way = place - middle;
+        return glm::normalize(way - glm::dot(way, along) * along);
+    };
+    return {wing(-1), wing(1)};
+}
+
+}  // namespace
+
+SharpEdges::SharpEdges(const SurfacePoints& points, const Field& field)
+    : deepestAcross_(field.mesh() ? deepestAcrossExact : deepestAcross),
+      deepestUnseen_(field.mesh() ? deepestUnseenExact : deepestUnseen),
+      nearby_(farthestNeighbour * field.voxelSize()) {
+    const auto all = points.points();
+    std::vector<std::vector<Neighbour>> neighbours(all.size());
+    tbb::parallel_for(std::uint32_t(0), std::uint32_t(all.size()), [&](std::uint32_t i) {
+        if (all[i].isSharp) neighbours[i] = neighboursOf(i, points, field);
+    });
+    for (std::uint32_t i = 0; i < all.size(); ++i)
+        for (const Neighbour& next : neighbours[i]) {
+            const auto isBack = [&](const Neighbour& n) { return n.index == i; };
+            const auto& its = neighbours[next.index];
+            if (next.index < i || std::none_of(its.begin(), its.end(), isBack)) continue;
+            edges_.push_back({i, next.index, wingsOf(all[i], all[next.index], field)});
+            longest_ = std::max(longest_, next.distance);
+        }
+    first_.assign(all.size() + 1, 0);
+    for (const SharpEdge& edge : edges_) ++first_[edge.from + 1], ++first_[edge.to + 1];
+    for (std::size_t i = 0; i < all.size(); ++i) first_[i + 1] += first_[i];
+    ofPoints_.resize(2 * edges_.size());
+    std::vector<std::uint32_t> next(first_.begin(), first_.end() - 1);
+    for (std::uint32_t e = 0; e < edges_.size(); ++e)
+        ofPoints_[next[edges_[e].from]++] = e, ofPoints_[next[edges_[e].to]++] = e;
+}
+
+bool SharpEdges::isTip(const SurfacePoints& points, std::uint32_t point, const glm::vec3& direction) const {
+    return pointsFallBack(points, point, direction) || edgesFallBack(points, point, direction);
+}
+
+bool SharpEdges::isWithinEdge(const SurfacePoints& points, std::uint32_t point) const {
+    glm::vec3 sum(0);
+    for (const std::uint32_t e : around(point)) {
+        const std::uint32_t next = edges_[e].from == point ? edges_[e].to : edges_[e].from;
+        sum += glm::normalize(points.points()[next].position - points.points()[point].position);
+    }
+    return !around(point).empty() && glm::length(sum) <= leastBend * float(around(point).size());
+}
+
+bool SharpEdges::edgesFallBack(const SurfacePoints& points, std::uint32_t point, const glm::vec3& direction) const {
+    const auto fallsBack = [&](std::uint32_t e) {
+        const SharpEdge& edge = edges_[e];
+        const std::uint32_t next = edge.from == point ? edge.to : edge.from;
+        const glm::vec3 way = points.points()[next].position - points.points()[point].position;
+        return glm::dot(way, direction) <= level * glm::length(way) && glm::dot(edge.wings[0], direction) <= level &&
+               glm::dot(edge.wings[1], direction) <= level;
+    };
+    const auto its = around(point);
+    return !its.empty() && std::all_of(its.begin(), its.end(), fallsBack);
+}
+
+bool SharpEdges::pointsFallBack(const SurfacePoints& points, std::uint32_t point, const glm::vec3& direction) const {
+    const glm::vec3 tip = points.points()[point].position;
+    int found = 0;
+    bool fallBack = true;
+    points.visit([&](const glm::vec3& centre,
+                     float radius) { return !fallBack || glm::distance(centre, tip) > radius + nearby_; },
+                 [&](std::uint32_t other, const SurfacePoint& there) {
+                     const glm::vec3 way = there.position - tip;
+                     const float distance = glm::length(way);
+                     if (other == point || distance > nearby_) return;
+                     ++found;
+                     fallBack = fallBack && glm::dot(way, direction) <= level * distance;
+                 });
+    return fallBack && found >= leastAround;
+}
+
+std::optional<SharpEdges::Crossing> SharpEdges::crossing(const SurfacePoints& points, const glm::vec3& from,
+                                                         const glm::vec3& to, const Wings& wings,
+                                                         const glm::vec3& place, float distance,
+                                                         float voxelSize) const {
+    if (edges_.empty()) return std::nullopt;
+    const glm::vec3 along = to - from;
+    const float within = crossingWithin * voxelSize,
+                least = std::min(deepestAcross_ * distance, distance - deepestUnseen_ * voxelSize);
+    const float reach = within + longest_;
+    std::optional<Crossing> best;
+    float nearest = within;
+    const auto consider = [&](const SharpEdge& edge) {
+        const SurfacePoint &a = points.points()[edge.from], &b = points.points()[edge.to];
+        const glm::vec3 its = b.position - a.position, across = glm::cross(along, its);
+        const float area = glm::length(across);
+        if (area < leastCrossing * glm::length(along) * glm::length(its)) return;
+        // Where either line passes the other one.
+        const glm::vec3 offset = a.position - from;
+        const float onOther = glm::dot(glm::cross(offset, its), across) / (area * area);
+        const float onThis = glm::dot(glm::cross(offset, along), across) / (area * area);
+        if (onOther < 0 || onOther > 1 || onThis < -gap || onThis > 1 + gap) return;
+        const glm::vec3 there = from + onOther * along, here = a.position + onThis * its;
+        const float away = glm::distance(there, place);
+        const glm::vec3 normal = (glm::dot(across, a.normal + b.normal) < 0 ? -1.f : 1.f) / area * across;
+        if (away > nearest) return;
+        for (int i = 0; i < 2; ++i)
+            if (glm::dot(normal, edge.wings[i]) > -leastLeaving || glm::dot(normal, wings[i]) < leastLeaving) return;
+        const float distance = glm::dot(there - here, normal);
+        if (distance < least) return;
+        nearest = away;
+        best = Crossing{here, normal, distance};
+    };
+    points.visit([&](const glm::vec3& centre, float radius) { return glm::distance(centre, place) > radius + reach; },
+                 [&](std::uint32_t index, const SurfacePoint& point) {
+                     if (!point.isSharp) return;
+                     for (const std::uint32_t e : around(index))
+                         if (edges_[e].from == index) consider(edges_[e]);
+                 });
+    return best;
+}
+
+}  // namespace bilayer::detail

@@ -1,0 +1,265 @@
+// Points on a mesh: its vertices, and a lattice on edges and faces that are larger than the spacing, thinned out from
+// the most convex to the least so that what touches first is what stays.
+#include "collider/contact/surface_points.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/gtx/norm.hpp>
+#include <numeric>
+#include <stdexcept>
+#include <tuple>
+
+namespace bilayer::detail {
+namespace {
+
+constexpr double latticePitch = 0.75;  // of candidates on edges and faces [spacings]
+constexpr double leastGap = 0.7;       // between points that look about the same way [spacings]
+constexpr double likeness = 0.7;       // least cosine between their normals: an edge of a cube and its faces have 0.71
+constexpr double leastProtrusion = 0.035;  // over the tangent plane's height of such a point that needs none [spacings]
+constexpr double leastCornerGap = 0.1;     // between convex corners [spacings]: a fraction of a voxel
+constexpr double corner = 0.5;             // convexity from which a point is a corner: a cube's has 0.58
+constexpr double sharp = 0.15;             // and from which it is on an edge at least: a cube's have 0.35
+constexpr std::uint32_t leafPoints = 8;    // most points in a leaf of the tree
+constexpr float rounding = 1.000001f;      // spheres grow by this, so that single precision leaves no point outside
+
+struct Candidate {
+    glm::dvec3 position;
+    glm::dvec3 normal;
+    double convexity;  // mean sine by which the surface falls off around the point; 0 on a plane, negative in a dent
+};
+
+struct Edge {
+    std::uint32_t low, high;  // vertices
+    std::uint32_t triangle;
+
+    bool sameAs(const Edge& other) const { return low == other.low && high == other.high; }
+};
+
+double angleBetween(const glm::dvec3& a, const glm::dvec3& b) {
+    return std::atan2(glm::length(glm::cross(a, b)), glm::dot(a, b));
+}
+
+// The candidates of one mesh, in a fixed order.
+class Candidates {
+  public:
+    Candidates(const Mesh& mesh, double pitch) : mesh_(mesh), pitch_(pitch) {
+        for (const glm::uvec3& t : mesh.triangles) {
+            const glm::dvec3 normal = glm::cross(at(t.y) - at(t.x), at(t.z) - at(t.x));
+            const double length = glm::length(normal);
+            normals_.push_back(length > 0 ? normal / length : glm::dvec3(0));
+        }
+        addVertices();
+        addEdges();
+        for (std::size_t i = 0; i < mesh.triangles.size(); ++i) addFace(mesh.triangles[i], normals_[i]);
+    }
+
+    std::vector<Candidate> result;
+
+  private:
+    glm::dvec3 at(std::uint32_t vertex) const { return glm::dvec3(mesh_.points[vertex]); }
+
+    // Nothing comes of places where all triangles are degenerate: they have no outside.
+    void add(const glm::dvec3& position, const glm::dvec3& direction, double convexity) {
+        const double length = glm::length(direction);
+        if (length > 0) result.push_back({position, direction / length, convexity});
+    }
+
+    void addVertices() {
+        std::vector<glm::dvec3> directions(mesh_.points.size(), glm::dvec3(0)), neighbours = directions;
+        std::vector<int> counts(mesh_.points.size(), 0);
+        for (std::size_t i = 0; i < mesh_.triangles.size(); ++i)
+            for (int k = 0; k < 3; ++k) {
+                const glm::uvec3& t = mesh_.triangles[i];
+                const glm::dvec3 ab = at(t[(k + 1) % 3]) - at(t[k]), ac = at(t[(k + 2) % 3]) - at(t[k]);
+                directions[t[k]] += angleBetween(ab, ac) * normals_[i];
+                neighbours[t[k]] += glm::normalize(ab) + glm::normalize(ac);
+                counts[t[k]] += 2;
+            }
+        for (std::uint32_t v = 0; v < mesh_.points.size(); ++v) {
+            const double length = glm::length(directions[v]);
+            if (length > 0) add(at(v), directions[v], -glm::dot(neighbours[v], directions[v]) / (length * counts[v]));
+        }
+    }
+
+    void addEdges() {
+        std::vector<Edge> edges;
+        for (std::uint32_t i = 0; i < mesh_.triangles.size(); ++i)
+            for (int k = 0; k < 3; ++k) {
+                const auto [low, high] = std::minmax(mesh_.triangles[i][k], mesh_.triangles[i][(k + 1) % 3]);
+                if (glm::distance(at(low), at(high)) > pitch_) edges.push_back({low, high, i});
+            }
+        std::sort(edges.begin(), edges.end(), [](const Edge& a, const Edge& b) {
+            return std::tie(a.low, a.high, a.triangle) < std::tie(b.low, b.high, b.triangle);
+        });
+        for (auto edge = edges.begin(); edge != edges.end();) {
+            const auto last = std::find_if(edge, edges.end(), [&](const Edge& e) { return !e.sameAs(*edge); });
+            addEdge(edge, last);
+            edge = last;
+        }
+    }
+
+    // The candidates on the edge that some triangles share, without its ends.
+    void addEdge(std::vector<Edge>::const_iterator first, std::vector<Edge>::const_iterator last) {
+        const glm::dvec3 a = at(first->low), along = at(first->high) - a;
+        glm::dvec3 direction(0);
+        for (auto e = first; e != last; ++e) direction += normals_[e->triangle];
+        double fall = 0;
+        for (auto e = first; e != last; ++e) fall -= glm::dot(inward(*e), direction);
+        const double length = glm::length(direction);
+        // half of the way around the edge is along it, where nothing falls off
+        const double convexity = length > 0 ? 0.5 * fall / (length * double(last - first)) : 0;
+        const int parts = int(std::ceil(glm::length(along) / pitch_));
+        for (int i = 1; i < parts; ++i) add(a + double(i) / parts * along, direction, convexity);
+    }
+
+    // From an edge into its triangle, at a right angle.
+    glm::dvec3 inward(const Edge& edge) const {
+        const glm::uvec3& t = mesh_.triangles[edge.triangle];
+        const std::uint32_t opposite = t.x ^ t.y ^ t.z ^ edge.low ^ edge.high;
+        const glm::dvec3 along = glm::normalize(at(edge.high) - at(edge.low)), to = at(opposite) - at(edge.low);
+        const glm::dvec3 across = to - glm::dot(to, along) * along;
+        const double length = glm::length(across);
+        return length > 0 ? across / length : glm::dvec3(0);
+    }
+
+    // Rows parallel to the longest edge, so that slivers get no more than their area needs.
+    void addFace(const glm::uvec3& t, const glm::dvec3& normal) {
+        std::array<glm::dvec3, 3> p{at(t.x), at(t.y), at(t.z)};
+        const auto length = [&](int i) { return glm::distance(p[i], p[(i + 1) % 3]); };
+        const int longest = length(0) >= length(1) && length(0) >= length(2) ? 0 : length(1) >= length(2) ? 1 : 2;
+        std::rotate(p.begin(), p.begin() + longest, p.end());
+        const double base = glm::distance(p[0], p[1]);
+        const double height = glm::length(glm::cross(p[1] - p[0], p[2] - p[0])) / base;
+        const int rows = int(std::ceil(height / pitch_));
+        for (int row = 1; row < rows; ++row) {
+            const double up = double(row) / rows;
+            const glm::dvec3 left = glm::mix(p[0], p[2], up), right = glm::mix(p[1], p[2], up);
+            const int parts = int(std::ceil(base * (1 - up) / pitch_));
+            for (int i = 1; i < parts; ++i) add(glm::mix(left, right, double(i) / parts), normal, 0);
+        }
+    }
+
+    const Mesh& mesh_;
+    double pitch_;
+    std::vector<glm::dvec3> normals_;  // of triangles; 0 if degenerate
+};
+
+// Points in a hashed grid, for looking up those within the side of a cell.
+class Grid {
+  public:
+    Grid(double cell, std::size_t most) : cell_(cell), heads_(std::bit_ceil(most + 1), none) {}
+
+    void insert(const Candidate& candidate) {
+        std::uint32_t& head = heads_[slot(cellOf(candidate.position))];
+        entries_.push_back({candidate.position, candidate.normal, head});
+        head = std::uint32_t(entries_.size() - 1);
+    }
+
+    // Whether a point lies within `radius`, at most the side of a cell, that looks about the same way: it is on the
+    // same side of a thin wall, and what touches a tip finer than `radius` is met by a point that looks at it.
+    bool near(const Candidate& candidate, double radius, double protrusion) const {
+        const glm::i64vec3 cell = cellOf(candidate.position);
+        for (int i = 0; i < 27; ++i) {
+            const glm::i64vec3 neighbour = cell + glm::i64vec3(i / 9 - 1, i / 3 % 3 - 1, i % 3 - 1);
+            for (std::uint32_t e = heads_[slot(neighbour)]; e != none; e = entries_[e].next)
+                if (glm::distance2(entries_[e].position, candidate.position) < radius * radius &&
+                    glm::dot(entries_[e].normal, candidate.normal) > likeness &&
+                    glm::dot(candidate.position - entries_[e].position, candidate.normal) < protrusion)
+                    return true;
+        }
+        return false;
+    }
+
+  private:
+    static constexpr std::uint32_t none = ~0u;
+    struct Entry {
+        glm::dvec3 position, normal;
+        std::uint32_t next;
+    };
+
+    glm::i64vec3 cellOf(const glm::dvec3& position) const { return glm::i64vec3(glm::floor(position / cell_)); }
+    // M. Teschner et al., "Optimized Spatial Hashing for Collision Detection of Deformable Objects", 2003
+    std::size_t slot(const glm::i64vec3& c) const {
+        const auto hash =
+            std::uint64_t(c.x) * 73856093u ^ std::uint64_t(c.y) * 19349663u ^ std::uint64_t(c.z) * 83492791u;
+        return hash & (heads_.size() - 1);
+    }
+
+    double cell_;
+    std::vector<std::uint32_t> heads_;
+    std::vector<Entry> entries_;
+};
+
+// Takes candidates from the most convex to the least, but none close to one that was taken.
+std::vector<SurfacePoint> thin(std::vector<Candidate> candidates, double spacing) {
+    std::stable_sort(candidates.begin(), candidates.end(),
+                     [](const Candidate& a, const Candidate& b) { return a.convexity > b.convexity; });
+    Grid grid(leastGap * spacing, candidates.size());
+    std::vector<SurfacePoint> points;
+    for (const Candidate& candidate : candidates) {
+        const double gap = candidate.convexity >= corner ? leastCornerGap : leastGap;
+        if (grid.near(candidate, gap * spacing, leastProtrusion * spacing)) continue;
+        grid.insert(candidate);
+        points.push_back({glm::vec3(candidate.position), glm::vec3(candidate.normal), candidate.convexity >= sharp});
+    }
+    return points;
+}
+
+Bounds boxOf(const std::vector<SurfacePoint>& points, std::uint32_t begin, std::uint32_t end) {
+    Bounds box;
+    for (std::uint32_t i = begin; i < end; ++i) box.add(points[i].position);
+    return box;
+}
+
+// Orders the points of [begin, end) by halves along the longest side of their box.
+void order(std::vector<SurfacePoint>& points, std::uint32_t begin, std::uint32_t end) {
+    if (end - begin <= leafPoints) return;
+    const glm::vec3 size = boxOf(points, begin, end).size();
+    const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
+    const std::uint32_t middle = begin + (end - begin) / 2;
+    const auto first = points.begin();
+    std::nth_element(first + begin, first + middle, first + end, [axis](const SurfacePoint& a, const SurfacePoint& b) {
+        return a.position[axis] < b.position[axis];
+    });
+    order(points, begin, middle);
+    order(points, middle, end);
+}
+
+// Appends the nodes of ordered points in preorder.
+void addNode(const std::vector<SurfacePoint>& points, std::vector<PointNode>& nodes, std::uint32_t begin,
+             std::uint32_t end) {
+    const glm::vec3 centre = boxOf(points, begin, end).centre();
+    float radius = 0;
+    for (std::uint32_t i = begin; i < end; ++i) radius = std::max(radius, glm::distance(centre, points[i].position));
+    const std::size_t node = nodes.size();
+    nodes.push_back({centre, radius * rounding, begin, end, 0});
+
+    if (end - begin > leafPoints) {
+        const std::uint32_t middle = begin + (end - begin) / 2;
+        addNode(points, nodes, begin, middle);
+        addNode(points, nodes, middle, end);
+    }
+    nodes[node].next = std::uint32_t(nodes.size());
+}
+
+}  // namespace
+
+SurfacePoints::SurfacePoints(const Mesh& mesh, float spacing) {
+    if (!(spacing > 0 && std::isfinite(spacing)))
+        throw std::invalid_argument("surface points: the spacing must be positive and finite");
+    validate(mesh);
+    const Mesh welded = weld(mesh);
+    points_ = thin(Candidates(welded, latticePitch * spacing).result, spacing);
+    if (points_.empty()) throw std::invalid_argument("surface points: all triangles of the mesh are degenerate");
+    order(points_, 0, std::uint32_t(points_.size()));
+    addNode(points_, nodes_, 0, std::uint32_t(points_.size()));
+}
+
+SurfacePoints::SurfacePoints(std::vector<SurfacePoint> ordered) : points_(std::move(ordered)) {
+    addNode(points_, nodes_, 0, std::uint32_t(points_.size()));
+}
+
+}  // namespace bilayer::detail

@@ -1,0 +1,41 @@
+#include "collider/contact/surface_query.h"
+
+#include <cmath>
+#include <glm/geometric.hpp>
+
+#include "collider/field/interpolant.h"
+
+namespace bilayer::detail {
+
+namespace {
+
+// A gradient shorter than this tells no direction. On the surface it does, however short: beside a sharp edge the
+// interpolant of the voxels below rises by no more than what the edge is away in voxels.
+constexpr float flattest = 0.1f, flattestOnSurface = 1e-3f;
+constexpr float onSurface = 0.01f;     // [voxels]: within the voxels of an edge all gradients shorter than 0.1 are
+constexpr float nearestAside = 0.01f;  // [voxels] from an edge or corner: nearer, rounding spoils the way's direction
+
+}  // namespace
+
+glm::vec3 directionOf(const Sample& sample, float voxelSize) {
+    const float length = glm::length(sample.gradient);
+    const bool isOnSurface = std::abs(sample.distance) <= onSurface * voxelSize;
+    return length > (isOnSurface ? flattestOnSurface : flattest) ? sample.gradient / length : glm::vec3(0);
+}
+
+glm::vec3 directionOf(const ClosestPoint& closest, const glm::vec3& point, float voxelSize) {
+    const bool mayBeAside = closest.feature != Feature::face || closest.triangle == noTriangle;
+    const bool isAside = mayBeAside && std::abs(closest.distance) > nearestAside * voxelSize;
+    return isAside ? (point - closest.position) / closest.distance : closest.normal;
+}
+
+Touch touchInBand(const Field& field, const glm::vec3& point, const Sample& sample, bool byTriangles) {
+    if (byTriangles) {
+        const float most = std::abs(sample.distance) + mostInterpolationError * field.voxelSize();
+        if (const ClosestPoint closest = field.closest(point, most); closest.found)
+            return {closest.distance, directionOf(closest, point, field.voxelSize())};
+    }
+    return {sample.distance, directionOf(sample, field.voxelSize())};
+}
+
+}  // namespace bilayer::detail

@@ -1,0 +1,259 @@
+#include "collider/field/block_entries.h"
+
+#include <oneapi/tbb/blocked_range.h>
+#include <oneapi/tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <utility>
+#include <vector>
+
+namespace bilayer::detail {
+namespace {
+
+/// What the frames of field and tree may differ by [voxels], and floats in the latter from what they stand for, as a
+/// part of its size.
+constexpr float frameRounding = 1e-2f, placeRounding = 3e-7f;
+/// As many nodes fit into a cube's entries.
+constexpr std::size_t mostNodes = BlockEntries::most * BlockEntry::slots;
+/// Entries have room for the nodes of this part of the cubes; others make do with a coarser level. So many cubes are
+/// looked at to tell.
+constexpr double usual = 0.9;
+constexpr std::size_t samples = 512;
+constexpr std::uint32_t mostTreeNodes = 1 << 24;
+constexpr std::size_t grain = 256;  // cubes a task
+/// A cube is one block, or larger if so few entries hold the leaves near it: these are read as quickly as one, and all
+/// of them stay in a cache that those of single blocks do not fit into.
+constexpr int blockShift = 3, largestShift = 5, fewEntries = 2;
+static_assert(FieldFrame::side == 1 << blockShift);
+
+struct Region {
+    glm::vec3 lower, upper;
+    float reach2;
+};
+
+// Nodes of one level with their boxes, in the tree's frame.
+class Nodes {
+  public:
+    void clear() { size_ = 0; }
+    std::size_t size() const { return size_; }
+    std::uint32_t node(std::size_t i) const { return nodes_[i]; }
+    float lower(int k, std::size_t i) const { return lower_[k][i]; }
+    float upper(int k, std::size_t i) const { return upper_[k][i]; }
+
+    // Adds those of eight boxes that come near a region.
+    template <class NodeOf>
+    void addNear(const float* const (&lower)[3], const float* const (&upper)[3], int count, NodeOf nodeOf,
+                 const Region& region) {
+        float sums[treeWidth] = {};
+        for (int k = 0; k < 3; ++k)
+            for (int i = 0; i < treeWidth; ++i) {
+                const float gap = std::max(std::max(0.f, lower[k][i] - region.upper[k]), region.lower[k] - upper[k][i]);
+                sums[i] += gap * gap;
+            }
+        reserve(size_ + treeWidth);
+        for (int i = 0; i < count; ++i) {
+            for (int k = 0; k < 3; ++k) {
+                lower_[k][size_] = lower[k][i];
+                upper_[k][size_] = upper[k][i];
+            }
+            nodes_[size_] = nodeOf(i);
+            size_ += sums[i] <= region.reach2;
+        }
+    }
+
+    // Adds a node of which nothing is known.
+    void add(std::uint32_t node, const Region& region) {
+        reserve(size_);
+        for (int k = 0; k < 3; ++k) {
+            lower_[k][size_] = region.lower[k];
+            upper_[k][size_] = region.upper[k];
+        }
+        nodes_[size_++] = node;
+    }
+
+    // Adds those children of a group that come near a region.
+    void addNear(const BoxGroup& group, const Region& region) {
+        addNear(
+            {group.lower[0], group.lower[1], group.lower[2]}, {group.upper[0], group.upper[1], group.upper[2]},
+            treeWidth, [&](int i) { return group.firstChild + std::uint32_t(i); }, region);
+    }
+
+    // Takes over those nodes that come near a region.
+    void addNear(const Nodes& from, const Region& region) {
+        for (std::size_t i = 0; i < from.size_; i += treeWidth)
+            addNear(
+                {&from.lower_[0][i], &from.lower_[1][i], &from.lower_[2][i]},
+                {&from.upper_[0][i], &from.upper_[1][i], &from.upper_[2][i]},
+                int(std::min<std::size_t>(treeWidth, from.size_ - i)),
+                [&](int k) { return from.nodes_[i + std::size_t(k)]; }, region);
+    }
+
+  private:
+    // Whole vectors may be read and written.
+    void reserve(std::size_t size) {
+        if (size + treeWidth <= nodes_.size()) return;
+        const std::size_t room = 2 * (size + treeWidth);
+        for (int k = 0; k < 3; ++k) lower_[k].resize(room), upper_[k].resize(room);
+        nodes_.resize(room);
+    }
+
+    std::size_t size_ = 0;
+    std::vector<float> lower_[3], upper_[3];
+    std::vector<std::uint32_t> nodes_;
+};
+
+// Makes the entries of one cube after another.
+class Maker {
+  public:
+    Maker(const FieldLayout& field, const WideTree& tree, double perMetre, float reach, int shift)
+        : tree_(tree),
+          origin_(field.origin * perMetre - glm::dvec3(tree.base)),
+          side_(float(1 << shift)),
+          step_(double(side_) * field.voxel * perMetre),
+          reach_(reach),
+          room_(frameRounding + placeRounding * float(std::max({tree.size.x, tree.size.y, tree.size.z}))) {}
+
+    // How many nodes of the finest level that can have room in entries come near a cube, and whether they are leaves.
+    std::pair<std::size_t, bool> count(const glm::ivec3& cube) {
+        descend(cube);
+        const Nodes& finest = levels_[count_ - 1];
+        return {finest.size(), finest.size() == 0 || tree_.isLeaf(finest.node(0))};
+    }
+
+    void make(const glm::ivec3& cube, BlockEntry* to, int each) {
+        descend(cube);
+        std::size_t level = count_ - 1;
+        while (levels_[level].size() > std::size_t(each * BlockEntry::slots)) --level;
+        write(levels_[level], lowerOf(cube) - reach_, to, each);
+    }
+
+  private:
+    glm::vec3 lowerOf(const glm::ivec3& cube) const { return glm::vec3(origin_ + step_ * glm::dvec3(cube)); }
+
+    // The nodes near a cube, level by level from the root, as far as they are not too many.
+    void descend(const glm::ivec3& cube) {
+        const glm::vec3 lower = lowerOf(cube);
+        const Region region{lower - room_, lower + side_ + room_, reach_ * reach_};
+        count_ = 0;
+        next().add(tree_.root(), region);
+        while (levels_[count_ - 1].size() > 0 && !tree_.isLeaf(levels_[count_ - 1].node(0))) {
+            Nodes& finer = next();
+            const Nodes& coarser = levels_[count_ - 2];
+            for (std::size_t i = 0; i < coarser.size() && finer.size() <= mostNodes; ++i)
+                finer.addNear(tree_.group(coarser.node(i)), region);
+            if (finer.size() <= mostNodes) continue;
+            --count_;
+            return;
+        }
+    }
+    Nodes& next() {
+        if (count_ == levels_.size()) levels_.emplace_back();
+        levels_[count_].clear();
+        return levels_[count_++];
+    }
+
+    void write(const Nodes& nodes, const glm::vec3& corner, BlockEntry* entries, int each) const {
+        constexpr float most = BlockEntries::regionUnits;
+        const float perVoxel = most / (side_ + 2 * reach_), room = room_ * perVoxel + 1.f / BlockEntries::placesPerUnit;
+        for (int i = 0; i < each; ++i) {
+            std::memset(&entries[i], 0, sizeof(BlockEntry));
+            std::memset(entries[i].lower, BlockEntries::regionUnits, sizeof entries[i].lower);
+        }
+        for (std::size_t i = 0; i < nodes.size(); ++i) {
+            BlockEntry& entry = entries[i / BlockEntry::slots];
+            const std::size_t slot = i % BlockEntry::slots;
+            for (int k = 0; k < 3; ++k) {
+                const float low = (nodes.lower(k, i) - corner[k]) * perVoxel - room;
+                const float high = (nodes.upper(k, i) - corner[k]) * perVoxel + room;
+                entry.lower[k][slot] = std::uint8_t(std::clamp(low, 0.f, most));
+                entry.upper[k][slot] = std::uint8_t(std::clamp(high + 1, 0.f, most));
+                entry.nodes[slot][k] = std::uint8_t(nodes.node(i) >> 8 * k);
+            }
+        }
+    }
+
+    const WideTree& tree_;
+    glm::dvec3 origin_;  // of the field in the tree's frame [voxels]
+    float side_;         // of a cube [voxels]
+    double step_;        // the same in the tree's frame
+    float reach_, room_;
+    std::vector<Nodes> levels_;
+    std::size_t count_ = 0;  // of levels that are filled
+};
+
+// Entries that are enough for most cubes, and whether these then have leaves in them.
+struct Need {
+    int entries;
+    bool leaves;
+};
+
+Need needOf(Maker maker, const std::vector<glm::ivec3>& cubes) {
+    std::vector<std::size_t> counts;
+    std::size_t withLeaves = 0;
+    for (std::size_t i = 0; i < cubes.size(); i += 1 + cubes.size() / samples) {
+        const auto [count, leaves] = maker.count(cubes[i]);
+        counts.push_back(count);
+        withLeaves += leaves;
+    }
+    const auto place = counts.begin() + std::ptrdiff_t(usual * double(counts.size() - 1));
+    std::nth_element(counts.begin(), place, counts.end());
+    return {std::clamp(int((*place + BlockEntry::slots - 1) / BlockEntry::slots), 1, BlockEntries::most),
+            double(withLeaves) >= usual * double(counts.size())};
+}
+
+}  // namespace
+
+// Numbers the cubes with stored blocks tile by tile.
+std::vector<glm::ivec3> BlockEntries::number(const FieldLayout& field) {
+    const int blocksShift = shift_ - blockShift;
+    const glm::ivec3 counts = (field.blocks + ((1 << blocksShift) - 1)) >> blocksShift;
+    tileCounts_ = (counts + 3) >> 2;
+    tiles_.assign(std::size_t(tileCounts_.x) * tileCounts_.y * tileCounts_.z, Tile());
+    glm::ivec3 block;
+    for (block.x = 0; block.x < field.blocks.x; ++block.x)
+        for (block.y = 0; block.y < field.blocks.y; ++block.y)
+            for (block.z = 0; block.z < field.blocks.z; ++block.z) {
+                if (field.directory[field.entryOf(block)] < 0) continue;
+                const glm::ivec3 cube = block >> blocksShift;
+                tiles_[tileOf(cube)].stored |= bitOf(cube);
+            }
+    std::vector<glm::ivec3> cubes;
+    glm::ivec3 tile;
+    for (tile.x = 0; tile.x < tileCounts_.x; ++tile.x)
+        for (tile.y = 0; tile.y < tileCounts_.y; ++tile.y)
+            for (tile.z = 0; tile.z < tileCounts_.z; ++tile.z) {
+                Tile& here = tiles_[tileOf(4 * tile)];
+                here.first = std::uint32_t(cubes.size());
+                for (std::uint64_t bits = here.stored; bits != 0; bits &= bits - 1) {
+                    const int i = std::countr_zero(bits);
+                    cubes.push_back(4 * tile + glm::ivec3(i >> 4, i >> 2 & 3, i & 3));
+                }
+            }
+    return cubes;
+}
+
+BlockEntries::BlockEntries(const FieldLayout& field, const WideTree& tree, double perMetre, float reach)
+    : reach_(reach) {
+    if (tree.leafCount + tree.groupCount > mostTreeNodes) return;
+    extent_ = glm::dvec3(FieldFrame::side * field.blocks);
+    std::vector<glm::ivec3> cubes;
+    const auto makerOf = [&] { return Maker(field, tree, perMetre, reach, shift_); };
+    for (shift_ = largestShift;; --shift_) {
+        cubes = number(field);
+        const Need need = needOf(makerOf(), cubes);
+        each_ = need.entries;
+        if ((each_ <= fewEntries && need.leaves) || shift_ == blockShift) break;
+    }
+    placesPerVoxel_ = float(placesPerUnit * regionUnits) / (float(1 << shift_) + 2 * reach);
+    entries_ = LargeArray<BlockEntry>(cubes.size() * std::size_t(each_));
+    const Maker maker = makerOf();
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, cubes.size(), grain), [&](const auto& range) {
+        Maker own(maker);
+        for (std::size_t i = range.begin(); i < range.end(); ++i)
+            own.make(cubes[i], entries_.data() + i * std::size_t(each_), each_);
+    });
+}
+
+}  // namespace bilayer::detail

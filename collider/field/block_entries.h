@@ -1,0 +1,106 @@
+// Where searches for what is nearest to a point in the band begin: for each stored block, or for a cube of blocks where
+// triangles are large beside voxels, the nodes of the hierarchy that come within the band's reach of it, leaves where
+// they are few enough. The levels above them are never looked at, and neither are the field's distances.
+#pragma once
+
+#include <hwy/cache_control.h>
+
+#include <array>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <glm/common.hpp>
+#include <glm/vec3.hpp>
+#include <vector>
+
+#include "collider/field/field_layout.h"
+#include "sdf/base/large_array.h"
+#include "sdf/bvh/wide_tree.h"
+
+namespace bilayer::detail {
+
+/// Seven nodes of a tree with their boxes, in 1/255 of the cube's region: the cube and what is within reach of it. A
+/// box that is left over is empty, and out of reach. One cache line: it is the misses that searches wait for.
+struct BlockEntry {
+    static constexpr int slots = 7;
+
+    alignas(64) std::uint8_t lower[3][slots];
+    std::uint8_t upper[3][slots];
+    std::uint8_t nodes[slots][3];  ///< least byte first
+
+    std::uint32_t node(int slot) const {
+        return nodes[slot][0] | std::uint32_t(nodes[slot][1]) << 8 | std::uint32_t(nodes[slot][2]) << 16;
+    }
+};
+static_assert(sizeof(BlockEntry) == 64, "a cache line");
+
+/// A point in the region of a cube.
+struct EntryPlace {
+    const BlockEntry* entries = nullptr;         ///< of the cube; null: the point is in no cube of stored blocks
+    int count = 0;                               ///< of entries
+    std::array<std::int32_t, 3> place{0, 0, 0};  ///< from the region's lower corner [1/8 of the boxes' unit]
+    float perVoxel = 0;                          ///< that unit
+
+    /// Asks for the entries' memory ahead of its use.
+    void fetch() const {
+        for (int i = 0; i < count; ++i) hwy::Prefetch(&entries[i]);
+    }
+};
+
+/// Entries for all cubes with stored blocks, as many for each. None at all for a tree of more than 2^24 nodes.
+class BlockEntries {
+  public:
+    static constexpr int placesPerUnit = 8, regionUnits = 255;
+    static constexpr int most = 6;  ///< entries for a cube
+
+    BlockEntries() = default;
+
+    /// @param perMetre  voxels, of the tree
+    /// @param reach     of the searches that begin here [voxels]
+    BlockEntries(const FieldLayout& field, const WideTree& tree, double perMetre, float reach);
+
+    /// Of a point in the field's frame [voxels].
+    EntryPlace at(const glm::dvec3& local) const {
+        const glm::dvec3& size = extent_;
+        const bool within =
+            local.x >= 0 && local.y >= 0 && local.z >= 0 && local.x < size.x && local.y < size.y && local.z < size.z;
+        if (!within) return {};
+        const glm::ivec3 cube = glm::ivec3(local) >> shift_;
+        const Tile& tile = tiles_[tileOf(cube)];
+        const std::uint64_t bit = bitOf(cube);
+        if (!(tile.stored & bit)) return {};
+        const std::size_t index = tile.first + std::size_t(std::popcount(tile.stored & (bit - 1)));
+        const glm::ivec3 place((glm::vec3(local - glm::dvec3(cube << shift_)) + reach_) * placesPerVoxel_ + 0.5f);
+        return {&entries_[index * each_], each_, {place.x, place.y, place.z}, placesPerVoxel_};
+    }
+
+    float reach() const { return reach_; }  ///< [voxels]
+    std::size_t memoryBytes() const { return entries_.bytes() + tiles_.size() * sizeof(Tile); }
+
+  private:
+    /// Of 4^3 cubes: which have stored blocks, and how many do before the first of them. It is small where the field's
+    /// directory is not.
+    struct Tile {
+        std::uint64_t stored = 0;
+        std::uint32_t first = 0;
+    };
+
+    std::size_t tileOf(const glm::ivec3& cube) const {
+        const glm::ivec3 tile = cube >> 2;
+        return (std::size_t(tile.x) * tileCounts_.y + tile.y) * tileCounts_.z + tile.z;
+    }
+    static std::uint64_t bitOf(const glm::ivec3& cube) {
+        return std::uint64_t(1) << ((cube.x & 3) << 4 | (cube.y & 3) << 2 | (cube.z & 3));
+    }
+    std::vector<glm::ivec3> number(const FieldLayout& field);
+
+    int each_ = 1;
+    int shift_ = 0;  ///< log2 of a cube's side [voxels]
+    float reach_ = 0, placesPerVoxel_ = 0;
+    glm::dvec3 extent_{0};  ///< of the field [voxels]
+    glm::ivec3 tileCounts_{0};
+    std::vector<Tile> tiles_;
+    LargeArray<BlockEntry> entries_;
+};
+
+}  // namespace bilayer::detail

@@ -1,0 +1,84 @@
+// What a field knows of places that are not near its surface.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <glm/vec3.hpp>
+
+namespace bilayer::detail {
+
+/// What a Field tells at once of places that are not near its surface: a view of its own data, coarse but small. Space
+/// is divided into parts of 4^3 voxels; coordinates are in parts from the field's origin.
+class Clearance {
+  public:
+    static constexpr int partSide = 4;  ///< [voxels]
+    static constexpr int perBlock = 2;  ///< parts along a block
+    static constexpr int blockParts = perBlock * perBlock * perBlock;
+    static constexpr int steps = 8;      ///< that a part's edge is divided into, where ways are stored
+    static constexpr int mostWay = 127;  ///< farther from the surface, ways grow no more [steps]
+
+    /// The arrays, by block: a block's eight parts lie together, the last axis fastest.
+    struct Data {
+        const std::int32_t* directory;  ///< of FieldLayout
+        const std::int8_t* centres;     ///< each part's centre's way to the surface, at least, negative inside [steps]
+        const std::int8_t* leasts;      ///< by stored block: no sample in the part is below [leastStep]
+        float leastStep;                ///< [m]
+        float besides[2];               ///< the same for parts of empty blocks, outside and inside [m]
+        glm::ivec3 blocks;              ///< along each axis
+    };
+
+    explicit Clearance(const Data& data)
+        : data_(data), size_(perBlock * data.blocks), extent_(perBlock * data.blocks) {}
+
+    /// The distance from the surface, at least; not positive where nothing is known [parts].
+    float around(const glm::dvec3& point) const noexcept {
+        const glm::ivec3 part = partOf(glm::vec3(point));
+        return std::abs(centreOf(part)) - float(glm::distance(point, glm::dvec3(part) + 0.5));
+    }
+
+    /// Whether a sphere surely lies outside of the surface. False for a centre that is not finite.
+    bool isOutside(const glm::vec3& centre, float radius) const noexcept {
+        const glm::vec3 toBox = centre - clamped(centre);
+        if (glm::dot(toBox, toBox) > radius * radius) return true;
+        const glm::ivec3 part = partOf(centre);
+        const glm::vec3 way = centre - (glm::vec3(part) + 0.5f);
+        const float left = centreOf(part) - radius;
+        return left > 0 && glm::dot(way, way) < left * left;
+    }
+
+    /// Whether a sample there is surely above `reach` [m], or out of the band.
+    bool isAbove(const glm::vec3& point, float reach) const noexcept {
+        const glm::ivec3 part = partOf(point);
+        const std::int32_t block = data_.directory[entryOf(part)];
+        if (block < 0) return data_.besides[-1 - block] > reach;
+        return float(data_.leasts[std::size_t(block) * blockParts + inBlock(part)]) * data_.leastStep > reach;
+    }
+
+  private:
+    // NaN goes to 0
+    glm::vec3 clamped(const glm::vec3& p) const noexcept {
+        return {std::min(std::max(0.f, p.x), extent_.x), std::min(std::max(0.f, p.y), extent_.y),
+                std::min(std::max(0.f, p.z), extent_.z)};
+    }
+    glm::ivec3 partOf(const glm::vec3& point) const noexcept { return glm::min(glm::ivec3(clamped(point)), size_ - 1); }
+    std::size_t entryOf(const glm::ivec3& part) const noexcept {
+        const glm::ivec3 block = part >> 1;
+        return (std::size_t(block.x) * data_.blocks.y + block.y) * data_.blocks.z + block.z;
+    }
+    static std::size_t inBlock(const glm::ivec3& part) noexcept {
+        return std::size_t((part.x & 1) << 2 | (part.y & 1) << 1 | (part.z & 1));
+    }
+    float centreOf(const glm::ivec3& part) const noexcept {
+        return float(data_.centres[entryOf(part) * blockParts + inBlock(part)]) * (1.f / steps);
+    }
+
+    Data data_;
+    glm::ivec3 size_;
+    glm::vec3 extent_;
+};
+
+}  // namespace bilayer::detail

@@ -1,0 +1,222 @@
+// The field finds, triangles decide: the block that a point is in tells which nodes of the hierarchy over the mesh to
+// look at, and the feature that is found is measured in double precision.
+#include <hwy/cache_control.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <limits>
+#include <memory>
+#include <utility>
+
+#include <bilayer/collider/field.h>
+#include "collider/field/batch.h"
+#include "collider/field/field_data.h"
+#include "collider/field/path.h"
+#include "collider/field/zero_set.h"
+
+namespace bilayer {
+
+using namespace detail;
+
+namespace {
+
+/// What distances in the band seldom exceed it by, so that a second search is seldom needed [voxels].
+constexpr float usualError = 0.1f;
+/// Room for the rounding of single precision, in the distance that is asked for; and in itself [voxels].
+constexpr float boundRounding = 1 + 1e-5f, boundRoom = 1e-5f;
+/// Points that are taken together; what is known of them fits into the first cache.
+constexpr std::size_t batch = 64;
+/// Mean normals below this have cancelled out, and tell no side where they point aside: above the rounding of floats,
+/// below what needles leave at their tips.
+constexpr double cancelled = 1e-6;
+/// How far on either side of a wall the field is asked which one is inside [voxels].
+constexpr float aside = 1;
+/// What samples may be off at an edge [voxels].
+constexpr float roundedOff = 0.3f;
+
+// Of a point over the plane that the normal stands on; the normal may be shorter than 1.
+double heightOver(const NearestFeature& nearest) {
+    return -glm::dot(nearest.normal, nearest.way);
+}
+
+// The normal of a feature, turned around where it points to the other side; where there is none, from the surface to
+// the point or the other way. A point on the surface itself has no side.
+glm::vec3 outwardNormal(const NearestFeature& nearest, bool inside) {
+    const double length = glm::length(nearest.normal), distance = glm::length(nearest.way);
+    if (length > cancelled || nearest.isOnSurface) {
+        const bool turned = !nearest.isOnSurface && (inside ? heightOver(nearest) > 0 : heightOver(nearest) < 0);
+        return length > 0 ? glm::vec3(nearest.normal * ((turned ? -1 : 1) / length)) : glm::vec3(0, 0, 1);
+    }
+    return glm::vec3(nearest.way * ((inside ? 1 : -1) / distance));
+}
+
+}  // namespace
+
+FieldData::FieldData(const FieldData& samples, std::shared_ptr<const Mesh> outward)
+    : FieldLayout(samples.shared()),
+      kernels(samples.kernels),
+      coarse(clearance()),
+      mesh(std::make_unique<MeshTree>(std::move(outward), voxelSize)),
+      signedByNormals(samples.signedByNormals),
+      sampleError(samples.sampleError),
+      error(sampleError) {
+    fillLanes();
+    const float reach = std::max(exteriorWidth, interiorWidth) * float(perMetre) + usualError;
+    entries = BlockEntries(*this, mesh->tree(), 1 / double(voxelSize), reach);
+}
+
+// Where the value of the voxel nearest to a place stands; negative where the place lies in no stored block.
+std::ptrdiff_t FieldData::nearestVoxel(const glm::dvec3& local) const {
+    const glm::dvec3 size = extent();
+    const bool within =
+        local.x >= 0 && local.y >= 0 && local.z >= 0 && local.x < size.x && local.y < size.y && local.z < size.z;
+    if (!within) return emptyOutside;
+    const glm::ivec3 block = glm::ivec3(local) >> 3;
+    const std::int32_t number = directory[entryOf(block)];
+    if (number < 0) return number;
+    const glm::ivec3 inBlock = glm::ivec3(local + 0.5) - 8 * block;
+    return std::ptrdiff_t(number) * blockFloats + (inBlock.x * stride + inBlock.y) * stride + inBlock.z;
+}
+
+// Asks for the memory that sideAt() reads, ahead of its use.
+void FieldData::fetchSide(const glm::dvec3& local) const {
+    const std::ptrdiff_t index = nearestVoxel(local);
+    if (index < 0) return;
+    if (storage == Storage::fixed16)
+        hwy::Prefetch(values16.data() + index);
+    else
+        hwy::Prefetch(values.data() + index);
+}
+
+// A ball around a voxel that the surface does not reach lies on the voxel's side.
+FieldData::Side FieldData::sideAt(const glm::dvec3& local) const {
+    const std::ptrdiff_t index = nearestVoxel(local);
+    if (index < 0) {
+        const float bound = sample(local).distance;
+        const bool certain = std::abs(bound) > error;
+        return {bound < 0, certain};
+    }
+    const float value = valueAt(std::size_t(index));
+    const double away = glm::distance(local, glm::floor(local + 0.5)) * voxel;
+    const bool certain = away < double(std::abs(value) - error);
+    return {(certain ? value : sample(local).distance) < 0, certain};
+}
+
+// Whether the field changes sign at a place of the mesh: not where a wall lies within the solid, or is one by itself.
+// Beside an edge the one or the other side is close to another wall.
+bool FieldData::divides(const glm::dvec3& place, const glm::dvec3& normal) const {
+    const glm::dvec3 step = double(aside * voxelSize) * glm::normalize(normal);
+    const auto distanceAt = [&](const glm::dvec3& at) { return sample((at - origin) * perMetre).distance; };
+    const float outer = distanceAt(place + step), inner = distanceAt(place - step);
+    return outer > -roundedOff * voxelSize && inner < roundedOff * voxelSize && outer - inner > aside * voxelSize / 2;
+}
+
+// By the field where it is certain, so that all queries agree. Else by the normal, where it tells a side: of a mesh
+// whose normals do, or of a wall that the field confirms. Else by the field alone, whose samples blend what the surface
+// is on either side of an edge.
+bool FieldData::isInside(const NearestFeature& nearest, const glm::vec3& point) const {
+    const Side side = sideAt(toLocal(point));
+    if (side.certain) return side.inside;
+    if (!mesh->mayEnclose(glm::dvec3(point))) return false;
+    const double height = heightOver(nearest);
+    const bool tells = std::abs(height) > cancelled * glm::length(nearest.way);
+    if (!tells) return side.inside;
+    const bool byNormal = signedByNormals || divides(glm::dvec3(point) + nearest.way, nearest.normal);
+    return byNormal ? height < 0 : side.inside;
+}
+
+// What is known of a point once the part of the mesh is found that is nearest to it.
+ClosestPoint FieldData::closestOn(std::uint32_t part, const glm::vec3& point, float maxDistance) const {
+    if (part == MeshTree::noPart) return {};
+    const glm::dvec3 from = mesh->approached(glm::dvec3(point));
+    const NearestFeature nearest = mesh->featureOfPart(part, from);
+    const double distance = glm::length(nearest.way + (from - glm::dvec3(point)));
+    if (!(distance <= double(maxDistance))) return {};
+    const bool inside = isInside(nearest, point);
+    return {.distance = inside ? -toFloat(distance) : toFloat(distance),
+            .position = glm::vec3(from + nearest.way),
+            .normal = outwardNormal(nearest, inside),
+            .triangle = nearest.triangle,
+            .feature = nearest.feature,
+            .index = nearest.index,
+            .found = true};
+}
+
+// The distance that is asked for [voxels].
+float FieldData::boundOf(float maxDistance) const {
+    return (maxDistance * float(perMetre) + boundRoom) * boundRounding;
+}
+
+// Of all the mesh, where the search from an entry has found nothing and others may be as near as asked for.
+std::uint32_t FieldData::orBeyond(std::uint32_t part, const EntryPlace& place, const glm::vec3& point,
+                                  float maxDistance) const {
+    const float bound = boundOf(maxDistance);
+    if (part != MeshTree::noPart || (place.entries && bound <= entries.reach())) return part;
+    return mesh->nearestPart(glm::dvec3(point), bound);
+}
+
+ClosestPoint FieldData::closest(const glm::vec3& point, float maxDistance) const {
+    if (!mesh) return closestZero(point, maxDistance);
+    if (!(maxDistance >= 0)) return {};
+    const glm::dvec3 local = toLocal(point);
+    fetchSide(local);
+    const EntryPlace place = entries.at(local);
+    std::uint32_t part = MeshTree::noPart;
+    if (place.entries)
+        part = mesh->nearestPart(glm::dvec3(point), std::min(boundOf(maxDistance), entries.reach()), place);
+    return closestOn(orBeyond(part, place, point, maxDistance), point, maxDistance);
+}
+
+// What is far away is as near to the zeros as it is from there, to a millionth of the field's size.
+glm::dvec3 FieldData::whereZerosTell(const glm::dvec3& local) const {
+    constexpr double sizes = 1e6;
+    return approached(local, glm::dvec3(0), extent(), sizes, sizes);
+}
+
+ClosestPoint FieldData::closestZero(const glm::vec3& point, float maxDistance) const {
+    const glm::dvec3 local = toLocal(point);
+    if (!std::isfinite(local.x + local.y + local.z) || !(maxDistance >= 0)) return {};
+    const glm::dvec3 from = whereZerosTell(local);
+    const double reach = double(maxDistance) * perMetre;
+    const auto nearest = nearestZero(*this, from, from == local ? reach : std::numeric_limits<double>::infinity());
+    if (!nearest || glm::distance(local, *nearest) > reach) return {};
+    const float distance = toFloat(glm::distance(local, *nearest) * voxel);
+    return {.distance = sample(local).distance < 0 ? -distance : distance,
+            .position = toWorld(*nearest),
+            .normal = glm::vec3(zeroNormal(*this, *nearest)),
+            .found = true};
+}
+
+ClosestPoint Field::closest(const glm::vec3& point, float maxDistance) const noexcept {
+    return data_->closest(point, maxDistance);
+}
+
+// Step by step for some points at a time, so that memory is asked for well ahead of its use.
+void Field::closest(std::span<const glm::vec3> points, std::span<ClosestPoint> answers, float maxDistance) const {
+    requireSameLength(points.size(), answers.size(), "answers");
+    if (!data_->mesh || !(maxDistance >= 0)) {
+        for (std::size_t i = 0; i < points.size(); ++i) answers[i] = data_->closest(points[i], maxDistance);
+        return;
+    }
+    std::array<EntryPlace, batch> places;
+    std::array<std::uint32_t, batch> parts;
+    const float bound = std::min(data_->boundOf(maxDistance), data_->entries.reach());
+    for (std::size_t begin = 0; begin < points.size(); begin += batch) {
+        const std::span<const glm::vec3> some = points.subspan(begin, std::min(batch, points.size() - begin));
+        for (std::size_t i = 0; i < some.size(); ++i) {
+            const glm::dvec3 local = data_->toLocal(some[i]);
+            places[i] = data_->entries.at(local);
+            places[i].fetch();
+            data_->fetchSide(local);
+        }
+        data_->mesh->nearestParts(some, bound, {places.data(), some.size()}, {parts.data(), some.size()});
+        for (std::size_t i = 0; i < some.size(); ++i)
+            answers[begin + i] =
+                data_->closestOn(data_->orBeyond(parts[i], places[i], some[i], maxDistance), some[i], maxDistance);
+    }
+}
+
+}  // namespace bilayer

@@ -1,0 +1,126 @@
+// Rays and spheres on their way: with the mesh its triangles decide, else the zero set of the interpolant.
+#include <algorithm>
+#include <cmath>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <limits>
+
+#include <bilayer/collider/field.h>
+#include "collider/field/field_data.h"
+#include "collider/field/mesh_rays.h"
+#include "collider/field/sphere_tracing.h"
+#include "collider/field/zero_set.h"
+
+namespace bilayer {
+
+using namespace detail;
+
+namespace {
+
+/// Segments are this much longer, so that those that end on a face meet it.
+constexpr double endRounding = 1 + 1e-12;
+/// Spheres of a smaller radius are rays [voxels].
+constexpr double leastRadius = 1e-6;
+
+bool isRay(const Ray& ray) {
+    return isFinite(ray.origin) && isFinite(ray.direction) && ray.direction != glm::vec3(0) && ray.maxDistance >= 0;
+}
+
+Path pathOf(const Ray& ray) {
+    return {glm::dvec3(ray.origin), glm::normalize(glm::dvec3(ray.direction)), double(ray.maxDistance)};
+}
+
+// Of a face, against the path.
+glm::vec3 normalOf(const Mesh& mesh, const MeshHit& hit, const Path& path) {
+    const Corners c = cornersOf(mesh, hit.triangle);
+    const glm::dvec3 n = glm::normalize(glm::cross(c[1] - c[0], c[2] - c[0]));
+    return glm::vec3(glm::dot(n, path.direction) > 0 ? -n : n);
+}
+
+// Where a ray starts inside.
+RayHit hitAtStart(const FieldData& field, const glm::vec3& origin, const glm::dvec3& direction) {
+    const glm::vec3 gradient = field.sample(field.toLocal(origin), std::numeric_limits<float>::infinity()).gradient;
+    const float steepness = glm::length(gradient);
+    return {.distance = 0, .position = origin, .normal = steepness > 0 ? gradient / steepness : glm::vec3(-direction)};
+}
+
+// In voxels from the directory's first one.
+Path toLocal(const FieldData& field, const Path& path) {
+    return {(path.origin - field.origin) * field.perMetre, path.direction, path.length * field.perMetre};
+}
+
+std::optional<RayHit> hitMesh(const MeshTree& mesh, const Path& path) {
+    const auto hit = firstHit(mesh, path);
+    if (!hit) return std::nullopt;
+    return RayHit{toFloat(hit->along), glm::vec3(hit->position), normalOf(mesh.mesh(), *hit, path), hit->triangle};
+}
+
+std::optional<RayHit> hitZero(const FieldData& field, const Path& path) {
+    const auto part = partIn(toLocal(field, path), glm::dvec3(0), field.extent());
+    if (!part) return std::nullopt;
+    const auto along = firstInside(field, part->path);
+    if (!along) return std::nullopt;
+    const glm::dvec3 position = part->path.at(*along), normal = zeroNormal(field, position);
+    return RayHit{.distance = toFloat((part->from + *along) * field.voxel),
+                  .position = field.toWorld(position),
+                  .normal = glm::vec3(normal != glm::dvec3(0) ? normal : -path.direction)};
+}
+
+std::optional<RayHit> touchMesh(const FieldData& field, const Path& path, double radius) {
+    const auto clearanceAt = [&](const glm::dvec3& centre) {
+        const Sample here = field.sample((centre - field.origin) * field.perMetre);
+        return here.inBand ? 0 : double(here.distance) - double(field.error);
+    };
+    const auto touch = firstTouchOnWay(*field.mesh, path, radius, clearanceAt);
+    if (!touch) return std::nullopt;
+    return RayHit{toFloat(touch->along), glm::vec3(touch->position), glm::vec3(touch->normal), touch->triangle};
+}
+
+std::optional<RayHit> touchZero(const FieldData& field, const Path& path, double radius) {
+    const double reach = radius * field.perMetre;
+    const auto part = partIn(toLocal(field, path), glm::dvec3(-reach), field.extent() + reach);
+    if (!part) return std::nullopt;
+    auto touch = firstZeroTouch(field, part->path, reach);
+    if (!touch) return std::nullopt;
+    const glm::dvec3 centre = part->path.at(touch->along), from = field.whereZerosTell(centre);
+    // of zeros that are equally near to a centre so far away, the nearest
+    if (from != centre) touch->position = nearestZero(field, from, std::numeric_limits<double>::infinity()).value();
+    return RayHit{.distance = toFloat((part->from + touch->along) * field.voxel),
+                  .position = field.toWorld(touch->position),
+                  .normal = glm::vec3(glm::normalize(centre - touch->position))};
+}
+
+// From outside or inside.
+std::optional<RayHit> cast(const FieldData& field, const glm::vec3& origin, const Path& path) {
+    if (field.inside(origin)) return hitAtStart(field, origin, path.direction);
+    return field.mesh ? hitMesh(*field.mesh, path) : hitZero(field, path);
+}
+
+}  // namespace
+
+std::optional<RayHit> Field::raycast(const Ray& ray) const noexcept {
+    if (!isRay(ray)) return std::nullopt;
+    return cast(*data_, ray.origin, pathOf(ray));
+}
+
+std::optional<RayHit> Field::segment(const glm::vec3& from, const glm::vec3& to) const noexcept {
+    if (!isFinite(from) || !isFinite(to)) return std::nullopt;
+    const glm::dvec3 way = glm::dvec3(to) - glm::dvec3(from);
+    const double length = glm::length(way);
+    if (length > 0) return cast(*data_, from, {glm::dvec3(from), way / length, length * endRounding});
+    if (!data_->inside(from)) return std::nullopt;
+    return hitAtStart(*data_, from, {0, 0, -1});
+}
+
+std::optional<RayHit> Field::sphereCast(const Ray& ray, float radius) const noexcept {
+    if (!isRay(ray) || !(radius >= 0) || !std::isfinite(radius)) return std::nullopt;
+    if (double(radius) * data_->perMetre < leastRadius) return raycast(ray);
+    const ClosestPoint start = data_->closest(ray.origin, radius);
+    if (start.found)
+        return RayHit{.distance = 0, .position = start.position, .normal = start.normal, .triangle = start.triangle};
+    const Path path = pathOf(ray);
+    if (data_->inside(ray.origin)) return hitAtStart(*data_, ray.origin, path.direction);
+    return data_->mesh ? touchMesh(*data_, path, double(radius)) : touchZero(*data_, path, double(radius));
+}
+
+}  // namespace bilayer

@@ -1,0 +1,166 @@
+#include "collider/field/oriented_boxes.h"
+
+#include <oneapi/tbb/blocked_range.h>
+#include <oneapi/tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <glm/mat3x3.hpp>
+#include <limits>
+#include <utility>
+
+namespace bilayer::detail {
+namespace {
+
+/// Levels of groups that are turned; what lies in larger ones is hardly flat.
+constexpr int turnedLevels = 3;
+/// Room around boxes for what floats make of corners [voxels].
+constexpr float roundingRoom = 1e-5f;
+/// Turns of an axis pair that make a matrix of 3 x 3 diagonal: each pass nearly squares what is left beside it.
+constexpr int jacobiPasses = 6;
+constexpr std::size_t grain = 16;  // groups a task
+constexpr float infinity = std::numeric_limits<float>::infinity();
+
+struct Box {
+    glm::vec3 lower{infinity}, upper{-infinity};
+
+    void add(const glm::vec3& p) { lower = glm::min(lower, p), upper = glm::max(upper, p); }
+    float halfArea() const {
+        const glm::vec3 s = upper - lower;
+        return s.x * s.y + s.y * s.z + s.z * s.x;
+    }
+};
+
+glm::vec3 vectorOf(const float (&from)[3][treeWidth], int i) {
+    return {from[0][i], from[1][i], from[2][i]};
+}
+
+// Calls visit(corner a, b, c, normal) for the triangles of a leaf, as seen from an origin.
+template <class Visit>
+void forTriangles(const WideLeaf& leaf, const glm::vec3& origin, Visit visit) {
+    for (int i = 0; i < treeWidth; ++i) {
+        const glm::vec3 a = vectorOf(leaf.cell, i) - origin + vectorOf(leaf.corner, i);
+        const glm::vec3 x = vectorOf(leaf.along, i), z = vectorOf(leaf.normal, i), y = glm::cross(z, x);
+        const float ac = leaf.lengthAC[i];
+        visit(a, a + leaf.lengthAB[i] * x, a + ac * (leaf.directionAC[0][i] * x + leaf.directionAC[1][i] * y), z);
+    }
+}
+
+// The eigenvectors of a symmetric matrix, as columns, by C. G. J. Jacobi's method.
+glm::mat3 eigenvectors(glm::mat3 m) {
+    glm::mat3 v(1);
+    for (int pass = 0; pass < jacobiPasses; ++pass)
+        for (int p = 0; p < 3; ++p) {
+            const int q = (p + 1) % 3;
+            if (m[p][q] == 0) continue;
+            // the tangent of the lesser of the two angles that clear the pair
+            const float twice = (m[q][q] - m[p][p]) / (2 * m[p][q]);
+            const float tangent = std::copysign(1 / (std::abs(twice) + std::sqrt(twice * twice + 1)), twice);
+            glm::mat3 turn(1);
+            turn[p][p] = turn[q][q] = 1 / std::sqrt(tangent * tangent + 1);
+            turn[q][p] = tangent * turn[p][p], turn[p][q] = -turn[q][p];
+            m = glm::transpose(turn) * m * turn;
+            v = v * turn;
+        }
+    return v;
+}
+
+class Maker {
+  public:
+    explicit Maker(const WideTree& tree) : tree_(tree), groups_(tree.groupCount) {}
+
+    LargeArray<TurnedGroup> make() {
+        std::uint32_t begin = 0, children = tree_.leafCount, leavesInChild = 1;
+        for (int level = 0; begin < tree_.groupCount; ++level) {
+            const std::uint32_t count = (children + treeWidth - 1) / treeWidth;
+            tbb::parallel_for(tbb::blocked_range<std::uint32_t>(0, count, grain), [&](const auto& range) {
+                for (std::uint32_t i = range.begin(); i < range.end(); ++i)
+                    makeGroup(begin + i, i * treeWidth, leavesInChild, level < turnedLevels);
+            });
+            begin += count;
+            children = count;
+            leavesInChild *= treeWidth;
+        }
+        return std::move(groups_);
+    }
+
+  private:
+    using Boxes = std::array<Box, treeWidth>;
+
+    // Of the children's leaves, which follow one another.
+    struct Leaves {
+        std::uint32_t first, each, end;
+    };
+
+    void makeGroup(std::uint32_t index, std::uint32_t firstChild, std::uint32_t leavesInChild, bool turned) {
+        const BoxGroup& straight = tree_.groups[index];
+        TurnedGroup& group = groups_[index];
+        group.firstChild = straight.firstChild;
+        glm::vec3 origin(0);
+        glm::mat3 frame(1);
+        Boxes boxes;
+        for (int i = 0; i < treeWidth; ++i)
+            boxes[std::size_t(i)] = {vectorOf(straight.lower, i), vectorOf(straight.upper, i)};
+        if (turned) {
+            origin = glm::floor(boxes[0].lower);
+            const Leaves leaves{firstChild * leavesInChild, leavesInChild,
+                                std::min(tree_.leafCount, (firstChild + treeWidth) * leavesInChild)};
+            frame = frameOf(leaves, origin);
+            boxes = boxesOf(leaves, origin, frame);
+            const Boxes others = boxesOf(leaves, origin, glm::mat3(1));
+            if (halfArea(others) <= halfArea(boxes)) boxes = others, frame = glm::mat3(1);
+        }
+        for (int k = 0; k < 3; ++k) {
+            group.origin[k] = origin[k];
+            for (int j = 0; j < 3; ++j) group.axes[k][j] = frame[k][j];
+            for (int i = 0; i < treeWidth; ++i) {
+                const Box& box = boxes[std::size_t(i)];
+                group.lower[k][i] = box.lower[k] - roundingRoom;
+                group.upper[k][i] = box.upper[k] + roundingRoom;
+            }
+        }
+    }
+
+    static float halfArea(const Boxes& boxes) {
+        float sum = 0;
+        for (const Box& box : boxes)
+            if (box.lower.x <= box.upper.x) sum += box.halfArea();
+        return sum;
+    }
+
+    // Axes along and across most of the normals.
+    glm::mat3 frameOf(const Leaves& leaves, const glm::vec3& origin) const {
+        glm::mat3 spread(0);
+        for (std::uint32_t leaf = leaves.first; leaf < leaves.end; ++leaf)
+            forTriangles(tree_.leaves[leaf], origin, [&](const auto& a, const auto& b, const auto& c, const auto& n) {
+                const float area = glm::length(glm::cross(b - a, c - a));
+                for (int k = 0; k < 3; ++k) spread[k] += area * n[k] * n;
+            });
+        return eigenvectors(spread);
+    }
+
+    Boxes boxesOf(const Leaves& leaves, const glm::vec3& origin, const glm::mat3& frame) const {
+        Boxes boxes;
+        for (std::uint32_t leaf = leaves.first; leaf < leaves.end; ++leaf) {
+            Box& box = boxes[(leaf - leaves.first) / leaves.each];
+            forTriangles(tree_.leaves[leaf], origin, [&](const auto& a, const auto& b, const auto& c, const auto&) {
+                for (const glm::vec3* p : {&a, &b, &c}) box.add(*p * frame);
+            });
+        }
+        return boxes;
+    }
+
+    const WideTree& tree_;
+    LargeArray<TurnedGroup> groups_;
+};
+
+}  // namespace
+
+LargeArray<TurnedGroup> makeTurnedGroups(const WideTree& tree) {
+    return Maker(tree).make();
+}
+
+}  // namespace bilayer::detail

@@ -1,0 +1,81 @@
+#include "integration/bullet/detail/casts.h"
+#include <bilayer/collider/contact.h>
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+
+#include "collider/field/interpolant.h"
+#include "collider/field/sphere_tracing.h"
+
+namespace bilayer::bullet::detail {
+
+using namespace bilayer::detail;
+
+namespace {
+
+// Far below what a field knows of its surface [voxels].
+constexpr float touchVoxels = 1e-3f;
+// Steps in the band are shortened by this, since an interpolated distance may change by more than the way moved.
+constexpr float caution = 0.8f;
+// Steps are at least touchVoxels / 2 long, so that this only ends ways that graze the surface for thousands of voxels.
+constexpr int mostSteps = 100000;
+}  // namespace
+
+bool sweepable(const Placed& body, float radius) {
+    const Field& field = body.collider.field();
+    // Beyond the band a bound is told, which falls to this near it: a sphere that it reaches could touch anywhere
+    // there.
+    const float voxel = field.voxelSize(),
+                leastBound = surelyInBand(field.exteriorWidth(), voxel) - touchVoxels * voxel;
+    return radius < body.scale * leastBound;
+}
+
+std::optional<SweepHit> sweepSphere(const Placed& body, const glm::vec3& from, const glm::vec3& to, float radius,
+                                    float allowed) {
+    const Field& field = body.collider.field();
+    const glm::vec3 start = body.pose.toBody(from) / body.scale, end = body.pose.toBody(to) / body.scale;
+    const float length = glm::length(end - start);
+    if (!(length > 0)) return std::nullopt;
+    const glm::vec3 direction = (end - start) / length;
+    const float gapAtHit = (radius - allowed) / body.scale;
+    const float touch = touchVoxels * field.voxelSize();
+
+    float way = 0;
+    for (int i = 0; i < mostSteps && way <= length; ++i) {
+        const glm::vec3 centre = start + way * direction;
+        const Sample sample = field.sample(centre);
+        const float gap = sample.distance - gapAtHit;
+        if (gap <= touch) {
+            const bool inward = glm::dot(sample.gradient, direction) < 0;
+            if (inward) {
+                const glm::vec3 normal = glm::normalize(sample.gradient);
+                const glm::vec3 point = centre - sample.distance * normal;
+                return SweepHit{way / length, body.pose.toWorld(body.scale * point), body.pose.rotation * normal};
+            }
+            if (!sample.inBand) return std::nullopt;
+        }
+        const float step = sample.inBand ? caution * std::abs(gap) : std::abs(gap);
+        way += std::max(step, 0.5f * touch);
+    }
+    return std::nullopt;
+}
+
+std::optional<SweepHit> sweepSphere(const MeshTree& mesh, const glm::vec3& from, const glm::vec3& to, float radius) {
+    const glm::dvec3 way = glm::dvec3(to) - glm::dvec3(from);
+    const double length = glm::length(way);
+    if (!(length > 0)) return std::nullopt;
+    const Path path{glm::dvec3(from), way / length, length};
+    const auto touch = firstTouchOnWay(mesh, path, radius, [](const glm::dvec3&) { return 0.; });
+    if (!touch) return std::nullopt;
+    return SweepHit{static_cast<float>(touch->along / length), glm::vec3(touch->position), glm::vec3(touch->normal),
+                    static_cast<int>(touch->triangle)};
+}
+
+bool touches(const MeshTree& mesh, const glm::vec3& centre, float radius) {
+    const glm::dvec3 point(centre);
+    const std::uint32_t triangle = mesh.nearest(point, 2 * radius / mesh.voxelSize());
+    return triangle != noTriangle && glm::length(mesh.featureOf(triangle, point).way) < static_cast<double>(radius);
+}
+
+}  // namespace bilayer::bullet::detail

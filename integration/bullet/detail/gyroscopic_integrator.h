@@ -1,0 +1,32 @@
+// Bodies that spin as Euler's equations say.
+#pragma once
+
+#include <BulletDynamics/Dynamics/btDynamicsWorld.h>
+#include <BulletDynamics/Dynamics/btRigidBody.h>
+
+#include <vector>
+
+namespace bilayer::bullet::detail {
+
+/// Keeps angular momentum: ExtensionOptions::gyroscopicIntegration.
+class GyroscopicIntegrator {
+  public:
+    explicit GyroscopicIntegrator(btDynamicsWorld& world) : world_(world) {}
+
+    void beforeStep(float seconds);
+    void afterStep();
+
+  private:
+    struct Turning {
+        int index;  // in the world's array of objects
+        btRigidBody* body;
+        btMatrix3x3 axes;    // before the step
+        btVector3 momentum;  // before the step [kg m^2 / s]
+        btVector3 midway;    // angular velocity in the middle of the step, if nothing acts [rad/s]
+    };
+
+    btDynamicsWorld& world_;
+    std::vector<Turning> turning_;
+};
+
+}  // namespace bilayer::bullet::detail

@@ -1,0 +1,296 @@
+#include "integration/bullet/detail/manifolds.h"
+#include <bilayer/collider/contact.h>
+
+#include <algorithm>
+#include <cmath>
+#include <typeinfo>
+#include <utility>
+
+#include "integration/bullet/detail/convert.h"
+#include "integration/bullet/detail/velocity.h"
+
+namespace bilayer::bullet::detail {
+
+using namespace bilayer::detail;
+
+namespace {
+
+// A new contact goes on from an old one whose normal is within about 25 degrees of its own.
+constexpr float sameDirection = 0.9f;
+// Friction holds below this part of the most that it can bear. What has drifted farther than this along the surface
+// stays where it is [parts of the distance within which contacts are the same].
+constexpr float held = 0.98f, mostDrift = 0.25f;
+// How long a contact takes to come to rest [steps], and the slip that loses it [parts of the distance within which
+// contacts are the same]: by and by, so that others have time to take over what it bore. By more in one step friction
+// is not known to slip that holds.
+constexpr float stepsOfRest = 120, slipOfRest = 0.05f;
+
+/// What a contact is with, as manifold points name it.
+struct Identifiers {
+    TriangleId a, b;
+};
+
+/// @param aIsFirst  of the bodies that the result names
+Identifiers identifiersOf(const Contact& contact, const std::optional<TriangleId>& triangle, bool aIsFirst,
+                          const btManifoldResult& result) {
+    const btCollisionObjectWrapper *a = result.getBody0Wrap(), *b = result.getBody1Wrap();
+    if (!aIsFirst) std::swap(a, b);
+    const int feature = static_cast<int>(contact.feature & ~featureOfB);
+    const bool isOfB = (contact.feature & featureOfB) != 0;
+    // a wrapper of what is part of something bigger names it
+    const auto name = [](const btCollisionObjectWrapper& wrap, int feature) {
+        return wrap.m_index >= 0 ? TriangleId{wrap.m_partId, wrap.m_index} : TriangleId{0, feature};
+    };
+    return {triangle ? *triangle : name(*a, isOfB ? -1 : feature), name(*b, isOfB ? feature : -1)};
+}
+
+/// What no solver has seen yet, as Bullet makes it in btManifoldResult::addContactPoint(), but beside all others,
+/// however far away it is, and without a word to the user.
+btManifoldPoint pointOf(const Contact& contact, const Identifiers& of, const btPersistentManifold& manifold,
+                        const btManifoldResult& result) {
+    const btVector3 onB = toBullet(contact.position), normal = toBullet(contact.normal);
+    const btVector3 onA = onB + contact.distance * normal;
+    btManifoldPoint point(manifold.getBody0()->getWorldTransform().invXform(onA),
+                          manifold.getBody1()->getWorldTransform().invXform(onB), normal, contact.distance);
+    point.m_positionWorldOnA = onA;
+    point.m_positionWorldOnB = onB;
+    btPlaneSpace1(normal, point.m_lateralFrictionDir1, point.m_lateralFrictionDir2);
+    point.m_partId0 = of.a.part;
+    point.m_index0 = of.a.index;
+    point.m_partId1 = of.b.part;
+    point.m_index1 = of.b.index;
+
+    const btCollisionObject *first = result.getBody0Internal(), *second = result.getBody1Internal();
+    point.m_combinedFriction = gCalculateCombinedFrictionCallback(first, second);
+    point.m_combinedRestitution = gCalculateCombinedRestitutionCallback(first, second);
+    point.m_combinedRollingFriction = gCalculateCombinedRollingFrictionCallback(first, second);
+    point.m_combinedSpinningFriction = gCalculateCombinedSpinningFrictionCallback(first, second);
+    if ((first->getCollisionFlags() | second->getCollisionFlags()) &
+        btCollisionObject::CF_HAS_CONTACT_STIFFNESS_DAMPING) {
+        point.m_combinedContactDamping1 = gCalculateCombinedContactDampingCallback(first, second);
+        point.m_combinedContactStiffness1 = gCalculateCombinedContactStiffnessCallback(first, second);
+        point.m_contactPointFlags |= BT_CONTACT_FLAG_CONTACT_STIFFNESS_DAMPING;
+    }
+    return point;
+}
+
+/// Adds a contact to the manifold that the result holds.
+void emit(const Contact& contact, const Identifiers& of, bool aIsFirst, btManifoldResult& result) {
+    btPersistentManifold& manifold = *result.getPersistentManifold();
+    manifold.setContactBreakingThreshold(std::max(contact.distance, 0.f));
+    if (!isOfUser(result)) {
+        manifold.addManifoldPoint(pointOf(contact, of, manifold, result));
+        return;
+    }
+    const TriangleId &first = aIsFirst ? of.a : of.b, &second = aIsFirst ? of.b : of.a;
+    result.setShapeIdentifiersA(first.part, first.index);
+    result.setShapeIdentifiersB(second.part, second.index);
+    result.addContactPoint(toBullet(contact.normal), toBullet(contact.position), contact.distance);
+}
+
+/// Tells the user of a contact once it is as the solver will see it; what he keeps with it is there again each step.
+void tellAdded(btManifoldPoint& point, const btPersistentManifold& manifold, const btManifoldResult& result) {
+    const btCollisionObjectWrapper *first = result.getBody0Wrap(), *second = result.getBody1Wrap();
+    const auto asks = [](const btCollisionObjectWrapper& side) {
+        return (side.getCollisionObject()->getCollisionFlags() & btCollisionObject::CF_CUSTOM_MATERIAL_CALLBACK) != 0;
+    };
+    if (!gContactAddedCallback || !(asks(*first) || asks(*second))) return;
+    if (manifold.getBody0() != first->getCollisionObject()) std::swap(first, second);
+    gContactAddedCallback(point, first, point.m_partId0, point.m_index0, second, point.m_partId1, point.m_index1);
+}
+
+/// Of what has been there before.
+void tellProcessed(btManifoldPoint& point, const btPersistentManifold& manifold) {
+    if (!gContactProcessedCallback || point.m_lifeTime == 0) return;
+    gContactProcessedCallback(point, const_cast<btCollisionObject*>(manifold.getBody0()),
+                              const_cast<btCollisionObject*>(manifold.getBody1()));
+}
+
+btVector3 along(const btVector3& way, const btVector3& normal) {
+    return way - normal.dot(way) * normal;
+}
+
+/// A contact that turns in the step goes where it is going to be. What it drifts meanwhile is no slip.
+void put(btManifoldPoint& point, const Ahead& ahead) {
+    point.m_positionWorldOnA = ahead.onA;
+    point.m_positionWorldOnB = ahead.onB;
+    point.m_normalWorldOnB = ahead.normal;
+    point.m_distance1 = ahead.distance;
+    point.m_contactPointFlags &= ~BT_CONTACT_FLAG_FRICTION_ANCHOR;
+}
+
+/// What has become of a contact's anchor in a step.
+struct Anchor {
+    btVector3 drift;  ///< how far the two places that once touched are to be pulled back along the surface
+    float slip;       ///< how far they have slipped past each other
+};
+
+/// Where friction did not hold the two places, they are pulled back no farther than before. What is held and all the
+/// same gets beside the way that it is pulled back on has been put there by the user, or torn away.
+Anchor anchorOf(const btManifoldPoint& point, const btVector3& before, const btPersistentManifold& manifold,
+                float sameWithin) {
+    const btVector3 drift = along(manifold.getBody0()->getWorldTransform() * point.m_localPointA -
+                                      manifold.getBody1()->getWorldTransform() * point.m_localPointB,
+                                  point.m_normalWorldOnB);
+    // Bullet bounds friction in each of its directions by itself
+    const float friction = std::max(std::abs(point.m_appliedImpulseLateral1), std::abs(point.m_appliedImpulseLateral2));
+    const bool holds = friction < held * point.m_combinedFriction * point.m_appliedImpulse;
+    const float most = holds ? mostDrift * sameWithin : std::min(mostDrift * sameWithin, float(before.length()));
+    const float length = drift.length(), slip = (drift - before).length();
+    const float left = before.isZero() ? 0 : std::clamp(drift.dot(before) / before.length2(), 0.f, 1.f);
+    if (holds && (drift - left * before).length() > slipOfRest * sameWithin) return {btVector3(0, 0, 0), slip};
+    return {length > most ? most / length * drift : drift, holds ? 0 : slip};
+}
+
+}  // namespace
+
+bool isOfUser(const btManifoldResult& result) {
+    return typeid(result) != typeid(btManifoldResult);
+}
+
+struct Manifolds::Step {
+    float seconds;
+    Velocity a, b;
+    btVector3 gain;  ///< of speed by the forces on the bodies, of B as A sees it [m/s]
+    bool aIsFirst;   ///< of the bodies that the result names
+    const Continuity& continuity;
+    btManifoldResult& result;
+
+    Step(const btCollisionObject& a, const btCollisionObject& b, float seconds, const Continuity& continuity,
+         btManifoldResult& result)
+        : seconds(seconds),
+          a(velocityOf(a)),
+          b(velocityOf(b)),
+          gain(seconds * (accelerationOf(b) - accelerationOf(a))),
+          aIsFirst(result.getBody0Internal() == &a),
+          continuity(continuity),
+          result(result) {}
+
+    /// The solver takes the gap that is left from the speed of a bounce. So what meets the surface in this step bounces
+    /// as if it touched already, and what comes nearer only keeps its speed. What lies there, or comes no faster than
+    /// its weight takes it there in two steps, does not bounce.
+    void bounce(btManifoldPoint& point) const {
+        if (!(seconds > 0 && point.m_distance1 > 0 && point.m_combinedRestitution > 0) || point.m_appliedImpulse > 0)
+            return;
+        const btVector3& normal = point.m_normalWorldOnB;
+        const float speed = normal.dot(b.at(point.m_positionWorldOnB) - a.at(point.m_positionWorldOnA));
+        const float gained = normal.dot(gain);
+        if (speed <= 2 * std::abs(gained)) return;
+        if (point.m_distance1 <= seconds * (speed + gained))
+            point.m_distance1 = 0;
+        else
+            point.m_combinedRestitution = 0;
+    }
+};
+
+Manifolds::~Manifolds() {
+    for (btPersistentManifold* manifold : manifolds_) dispatcher_.releaseManifold(manifold);
+}
+
+void Manifolds::write(std::span<const Patch> patches, std::span<const ContactDetails> details,
+                      const btCollisionObject& a, const btCollisionObject& b, float seconds,
+                      const Continuity& continuity, btManifoldResult& result) {
+    // One manifold at least: users expect a pair that overlaps to have one.
+    while (manifolds_.size() < std::max<std::size_t>(patches.size(), 1))
+        manifolds_.push_back(dispatcher_.getNewManifold(&a, &b));
+    written_.resize(manifolds_.size());
+
+    takeOld();
+    const Step step(a, b, seconds, continuity, result);
+    for (std::size_t m = 0, at = 0; m < manifolds_.size(); ++m) {
+        std::span<const Contact> contacts;
+        if (m < patches.size()) contacts = std::span(patches[m].contacts).first(std::size_t(patches[m].count));
+        fill(m, contacts, details.subspan(at, contacts.size()), step);
+        at += contacts.size();
+    }
+    for (const auto& [point, written] : old_)
+        if (point.m_userPersistentData && gContactDestroyedCallback)
+            gContactDestroyedCallback(point.m_userPersistentData);
+}
+
+void Manifolds::takeOld() {
+    old_.clear();
+    for (std::size_t m = 0; m < manifolds_.size(); ++m)
+        for (int i = 0; i < manifolds_[m]->getNumContacts(); ++i) {
+            btManifoldPoint& point = manifolds_[m]->getContactPoint(i);
+            old_.push_back({point, writtenAs(point, m)});
+            point.m_userPersistentData = nullptr;
+        }
+}
+
+void Manifolds::fill(std::size_t m, std::span<const Contact> contacts, std::span<const ContactDetails> details,
+                     const Step& step) {
+    btPersistentManifold* manifold = manifolds_[m];
+    const bool touched = manifold->getNumContacts() > 0;
+    manifold->setNumContacts(0);
+    step.result.setPersistentManifold(manifold);
+    for (std::size_t n = 0; n < contacts.size(); ++n) {
+        const Identifiers of = identifiersOf(contacts[n], details[n].triangle, step.aIsFirst, step.result);
+        emit(contacts[n], of, step.aIsFirst, step.result);
+    }
+    const bool isTold = !isOfUser(step.result);
+    for (int i = 0; i < manifold->getNumContacts(); ++i) {
+        const auto n = std::size_t(i);
+        btManifoldPoint& point = manifold->getContactPoint(i);
+        Written& written = written_[m][n];
+        written = inherit(*manifold, i, step.continuity);
+        if (isTold) tellAdded(point, *manifold, step.result);
+        if (point.m_contactMotion1 != 0 || point.m_contactMotion2 != 0) letGo(*manifold, point, written);
+        const bool isAsFound = point.m_normalWorldOnB == toBullet(contacts[n].normal);
+        if (details[n].ahead && isAsFound) put(point, *details[n].ahead);
+        step.bounce(point);
+        tellProcessed(point, *manifold);
+    }
+    manifold->setContactBreakingThreshold(step.continuity.sameWithin);
+    const bool touches = manifold->getNumContacts() > 0;
+    if (isTold && !touched && touches && gContactStartedCallback) gContactStartedCallback(manifold);
+    if (touched && !touches && gContactEndedCallback) gContactEndedCallback(manifold);
+}
+
+Manifolds::Written Manifolds::writtenAs(const btManifoldPoint& point, std::size_t manifold) const {
+    for (const Written& written : written_[manifold])
+        if (written.ofA == point.m_localPointA && written.ofB == point.m_localPointB) return written;
+    return {};
+}
+
+/// The user moves one surface along the other: what touched once drifts apart by right.
+void Manifolds::letGo(const btPersistentManifold& manifold, btManifoldPoint& point, Written& written) {
+    point.m_contactPointFlags &= ~BT_CONTACT_FLAG_FRICTION_ANCHOR;
+    point.m_positionWorldOnA -= written.drift;
+    point.m_localPointA = manifold.getBody0()->getWorldTransform().invXform(point.m_positionWorldOnA);
+    written = {point.m_localPointA, point.m_localPointB};
+}
+
+Manifolds::Written Manifolds::inherit(btPersistentManifold& manifold, int index, const Continuity& continuity) {
+    const float sameWithin = continuity.sameWithin;
+    btManifoldPoint& point = manifold.getContactPoint(index);
+    point.m_contactPointFlags |= BT_CONTACT_FLAG_FRICTION_ANCHOR;
+    float nearest = sameWithin * sameWithin;
+    auto source = old_.end();
+    for (auto it = old_.begin(); it != old_.end(); ++it) {
+        const float squared = std::min((it->point.m_localPointA - point.m_localPointA).length2(),
+                                       (it->point.m_localPointB - point.m_localPointB).length2());
+        if (squared < nearest && it->point.m_normalWorldOnB.dot(point.m_normalWorldOnB) > sameDirection)
+            nearest = squared, source = it;
+    }
+    if (source == old_.end()) return {point.m_localPointA, point.m_localPointB};
+    const auto& [old, written] = *source;
+    point.m_appliedImpulse = old.m_appliedImpulse;
+    point.m_appliedImpulseLateral1 = old.m_appliedImpulseLateral1;
+    point.m_appliedImpulseLateral2 = old.m_appliedImpulseLateral2;
+    point.m_prevRHS = old.m_prevRHS;
+    point.m_lifeTime = old.m_lifeTime + 1;
+    point.m_userPersistentData = old.m_userPersistentData;
+    const Anchor anchor = anchorOf(old, written.drift, manifold, sameWithin);
+    point.m_positionWorldOnA += along(anchor.drift, point.m_normalWorldOnB);
+    point.m_localPointA = manifold.getBody0()->getWorldTransform().invXform(point.m_positionWorldOnA);
+    const float gained = anchor.slip > 0 ? -anchor.slip / (slipOfRest * sameWithin) : 1 / stepsOfRest;
+    const float rest = std::clamp(written.rest + gained, 0.f, 1.f);
+    point.m_combinedFriction *= 1 + rest * (continuity.restingFriction - 1);
+    *source = old_.back();
+    old_.pop_back();
+    const btVector3 drift = along(point.m_positionWorldOnA - point.m_positionWorldOnB, point.m_normalWorldOnB);
+    return {point.m_localPointA, point.m_localPointB, drift, rest};
+}
+
+}  // namespace bilayer::bullet::detail

@@ -1,0 +1,227 @@
+#include "integration/bullet/detail/open_surface.h"
+
+#include <BulletCollision/CollisionShapes/btTriangleCallback.h>
+
+#include <algorithm>
+#include <cmath>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <map>
+#include <optional>
+#include <set>
+#include <utility>
+
+#include "integration/bullet/detail/convert.h"
+
+namespace bilayer::bullet::detail {
+
+using namespace bilayer::detail;
+
+namespace {
+
+// Of the directions from a side or a corner into its triangles the mean is no shorter where these are folded by more
+// than 30 degrees (a side's), or leave as sharp a corner.
+constexpr float leastMean = 0.26f;
+// A normal may leave its cone by this (sine). What has not reached the cone after so many projections, or is farther
+// from the direction than 60 degrees (cosine), is none.
+constexpr float coneTolerance = 1e-3f, minConeCosine = 0.5f;
+constexpr int maxProjections = 20;
+constexpr int mostPieces = 64;  // that a way is divided into
+
+/// The ends of a side in one order.
+using SideKey = std::array<float, 6>;
+SideKey keyOf(const Triangle& triangle, int side) {
+    const glm::vec3 &a = triangle[side], &b = triangle[(side + 1) % 3];
+    const SideKey key{a.x, a.y, a.z, b.x, b.y, b.z}, back{b.x, b.y, b.z, a.x, a.y, a.z};
+    return std::min(key, back);
+}
+
+glm::vec3 normalized(const glm::vec3& way) {
+    const float length = glm::length(way);
+    return length > 0 ? way / length : glm::vec3(0);
+}
+
+/// The steepest of the ways along triangles away from one place of theirs, as seen along a direction.
+class Ascent {
+  public:
+    explicit Ascent(const glm::vec3& direction) : direction_(direction) {}
+
+    /// @param way  of unit length
+    void along(const glm::vec3& way) {
+        if (const float rise = glm::dot(way, direction_); rise > rise_) rise_ = rise, part_ = rise * way;
+    }
+    /// All ways into a triangle from its corner.
+    /// @param one, other  along its two edges there, of unit length
+    /// @param wing        square to the first edge, into the triangle
+    void between(const glm::vec3& one, const glm::vec3& other, const glm::vec3& wing) {
+        along(one);
+        along(other);
+        const float ahead = glm::dot(one, direction_), aside = glm::dot(wing, direction_);
+        const bool isWithin = aside >= 0 && ahead * glm::dot(other, wing) >= aside * glm::dot(other, one);
+        if (const float rise = std::hypot(ahead, aside); isWithin && rise > rise_)
+            rise_ = rise, part_ = ahead * one + aside * wing;
+    }
+
+    float rise() const { return rise_; }             ///< sine
+    const glm::vec3& part() const { return part_; }  ///< of the direction, along the steepest way
+
+  private:
+    glm::vec3 direction_, part_{0};
+    float rise_ = 0;
+};
+
+/// The unit vector nearest to a direction from which no way along triangles rises: its steepest part is taken away
+/// until none is left (projections onto half-spaces in turns: L. M. Bregman, Dokl. Akad. Nauk SSSR 162 (1965) 487-490).
+/// @param visit  hands the ways over to an Ascent
+template <class Visit>
+std::optional<glm::vec3> inNormalCone(const glm::vec3& direction, Visit&& visit) {
+    glm::vec3 normal = direction;
+    for (int i = 0; i < maxProjections; ++i) {
+        Ascent ascent(normal);
+        visit(ascent);
+        if (ascent.rise() <= coneTolerance) return normal;
+        normal = normalized(normal - ascent.part());
+        if (!(glm::dot(normal, direction) > minConeCosine)) return std::nullopt;
+    }
+    return std::nullopt;
+}
+
+/// Away from all of these together, if they do not surround the place.
+class Away {
+  public:
+    void add(const glm::vec3& direction, float weight) {
+        sum_ += weight * direction;
+        weight_ += weight;
+    }
+    std::optional<glm::vec3> outward() const {
+        const float length = glm::length(sum_);
+        if (!(length > leastMean * weight_)) return std::nullopt;
+        return -sum_ / length;
+    }
+
+  private:
+    glm::vec3 sum_{0};
+    float weight_ = 0;
+};
+
+}  // namespace
+
+glm::vec3 wingOf(const Triangle& triangle, int side) {
+    const glm::vec3 &from = triangle[side], &to = triangle[(side + 1) % 3], &opposite = triangle[(side + 2) % 3];
+    const glm::vec3 along = to - from, way = opposite - from;
+    const float squared = glm::dot(along, along);
+    const glm::vec3 across = squared > 0 ? way - glm::dot(way, along) / squared * along : way;
+    const float length = glm::length(across);
+    return length > 0 ? across / length : glm::vec3(0);
+}
+
+Adjacency::Adjacency(std::span<const Triangle> triangles) : triangles_(triangles) {
+    edges_ = groupBy([](const Triangle& triangle, int i) { return keyOf(triangle, i); });
+    corners_ = groupBy([](const Triangle& triangle, int i) {
+        return std::array{triangle[i].x, triangle[i].y, triangle[i].z};
+    });
+}
+
+template <class KeyOf>
+Adjacency::Groups Adjacency::groupBy(KeyOf&& keyOf) const {
+    using Key = decltype(keyOf(triangles_.front(), 0));
+    std::vector<std::pair<Key, std::uint32_t>> keys;
+    keys.reserve(3 * triangles_.size());
+    for (std::uint32_t t = 0; t < triangles_.size(); ++t)
+        for (int i = 0; i < 3; ++i) keys.emplace_back(keyOf(triangles_[t], i), 3 * t + std::uint32_t(i));
+    std::sort(keys.begin(), keys.end());
+    Groups groups;
+    groups.first.resize(keys.size());
+    groups.end.resize(keys.size());
+    for (std::uint32_t first = 0, end = 0; first < keys.size(); first = end) {
+        while (end < keys.size() && keys[end].first == keys[first].first) ++end;
+        for (std::uint32_t k = first; k < end; ++k) {
+            const std::uint32_t at = keys[k].second;
+            groups.members.push_back({at / 3, int(at % 3)});
+            groups.first[at] = first;
+            groups.end[at] = end;
+        }
+    }
+    return groups;
+}
+
+std::optional<Wings> Adjacency::wingsOf(std::uint32_t triangle, int edge) const {
+    const auto both = atEdge(triangle, edge);
+    if (both.size() != 2) return std::nullopt;
+    const auto wing = [&](const Member& one) { return wingOf(triangles_[one.triangle], one.index); };
+    return Wings{wing(both[0]), wing(both[1])};
+}
+
+std::optional<glm::vec3> Adjacency::neighbourOf(std::uint32_t triangle, int edge) const {
+    const auto both = atEdge(triangle, edge);
+    if (both.size() != 2) return std::nullopt;
+    const Member& other = both[0].triangle == triangle ? both[1] : both[0];
+    return wingOf(triangles_[other.triangle], other.index);
+}
+
+std::optional<glm::vec3> Adjacency::edgeNormal(std::uint32_t triangle, int edge, const glm::vec3& direction) const {
+    const Triangle& corners = triangles_[triangle];
+    const glm::vec3 along = normalized(corners[(edge + 1) % 3] - corners[edge]);
+    return inNormalCone(direction, [&](Ascent& ascent) {
+        ascent.along(along);
+        ascent.along(-along);
+        for (const Member& one : atEdge(triangle, edge)) ascent.along(wingOf(triangles_[one.triangle], one.index));
+    });
+}
+
+std::optional<glm::vec3> Adjacency::cornerNormal(std::uint32_t triangle, int corner, const glm::vec3& direction) const {
+    return inNormalCone(direction, [&](Ascent& ascent) {
+        for (const auto& [other, i] : groupOf(corners_, triangle, corner)) {
+            const Triangle& corners = triangles_[other];
+            ascent.between(normalized(corners[(i + 1) % 3] - corners[i]), normalized(corners[(i + 2) % 3] - corners[i]),
+                           wingOf(corners, i));
+        }
+    });
+}
+
+SharpSheet sharpOf(std::span<const Triangle> triangles) {
+    std::map<SideKey, Away> sides;
+    std::map<std::array<float, 3>, Away> corners;
+    for (const Triangle& triangle : triangles)
+        for (int i = 0; i < 3; ++i) {
+            if (const glm::vec3 wing = wingOf(triangle, i); wing != glm::vec3(0))
+                sides[keyOf(triangle, i)].add(wing, 1);
+            const glm::vec3 &here = triangle[i], one = triangle[(i + 1) % 3] - here, two = triangle[(i + 2) % 3] - here;
+            if (!(glm::dot(one, one) > 0 && glm::dot(two, two) > 0)) continue;
+            const glm::vec3 sum = glm::normalize(one) + glm::normalize(two);
+            const float angle = 2 * std::acos(std::min(0.5f * glm::length(sum), 1.f));
+            if (angle > 0 && glm::length(sum) > 0) corners[{here.x, here.y, here.z}].add(glm::normalize(sum), angle);
+        }
+    SharpSheet sharp;
+    for (const auto& [key, away] : sides)
+        if (const auto outward = away.outward())
+            sharp.sides.push_back({{key[0], key[1], key[2]}, {key[3], key[4], key[5]}, *outward});
+    for (const auto& [place, away] : corners)
+        if (const auto outward = away.outward()) sharp.corners.push_back({{place[0], place[1], place[2]}, *outward});
+    return sharp;
+}
+
+std::vector<Triangle> trianglesAlong(const btConcaveShape& mesh, std::span<const glm::vec3> way, float radius) {
+    struct All : btTriangleCallback {
+        std::set<std::array<float, 9>> seen;
+        std::vector<Triangle> triangles;
+
+        void processTriangle(btVector3* corners, int, int) override {
+            const glm::vec3 a = toGlm(corners[0]), b = toGlm(corners[1]), c = toGlm(corners[2]);
+            if (seen.insert({a.x, a.y, a.z, b.x, b.y, b.z, c.x, c.y, c.z}).second) triangles.push_back({a, b, c});
+        }
+    } all;
+    for (std::size_t i = 0; i + 1 < way.size(); ++i) {
+        const float pieces =
+            std::clamp(std::ceil(glm::distance(way[i], way[i + 1]) / (2 * radius)), 1.f, float(mostPieces));
+        for (float k = 0; k < pieces; ++k) {
+            const glm::vec3 from = glm::mix(way[i], way[i + 1], k / pieces),
+                            to = glm::mix(way[i], way[i + 1], (k + 1) / pieces);
+            mesh.processAllTriangles(&all, toBullet(glm::min(from, to) - radius),
+                                     toBullet(glm::max(from, to) + radius));
+        }
+    }
+    return all.triangles;
+}
+
+}  // namespace bilayer::bullet::detail

@@ -1,0 +1,161 @@
+#include "integration/bullet/detail/pair_contacts.h"
+
+#include <BulletCollision/CollisionShapes/btStaticPlaneShape.h>
+
+#include <algorithm>
+#include <limits>
+
+#include <bilayer/collider/contact.h>
+#include <bilayer/integration/bullet/shape.h>
+#include "integration/bullet/detail/convert.h"
+#include "integration/bullet/detail/narrow_phase.h"
+#include "integration/bullet/detail/predicted_contacts.h"
+#include "integration/bullet/detail/velocity.h"
+
+namespace bilayer::bullet::detail {
+
+using namespace bilayer::detail;
+
+namespace {
+
+// Triangles whose distances from a contact differ by less are as near to it [voxels].
+constexpr float sameDistance = 1e-3f;
+
+bool hasTriangles(const btCollisionShape& shape) {
+    return shape.isConcave() && !isField(shape) && shape.getShapeType() != STATIC_PLANE_PROXYTYPE;
+}
+
+/// Of two bodies of which B is a field, until the next step.
+Continuity continuityOf(const Side& a, const Side& b) {
+    const auto restingFriction = [](const btCollisionShape& shape) {
+        return isField(shape) ? static_cast<const Shape&>(shape).restingFriction() : 1;
+    };
+    const auto sameWithin = [](const btCollisionShape& shape) {
+        return isField(shape) ? shape.getContactBreakingThreshold(gContactBreakingThreshold)
+                              : std::numeric_limits<float>::max();
+    };
+    const auto isSwept = [](const Side& side) {
+        return side.seconds > 0 && (!isField(*side.shape) || static_cast<const Shape&>(*side.shape).sweeps());
+    };
+    return {.sameWithin = std::min(sameWithin(*a.shape), sameWithin(*b.shape)),
+            .restingFriction = std::max(restingFriction(*a.shape), restingFriction(*b.shape)),
+            .isSwept = isSwept(a) && isSwept(b)};
+}
+
+}  // namespace
+
+Motion Side::motionAt(const btVector3& point) const {
+    if (!(seconds > 0) || !object->isActive()) return {};
+    const Velocity velocity = velocityOf(*object);
+    const btVector3 way = seconds * (velocity.at(point) + seconds * accelerationOf(*object));
+    return {toGlm(way), toGlm(seconds * velocity.angular)};
+}
+
+Placed Side::placed() const {
+    const auto& field = static_cast<const Shape&>(*shape);
+    Placed body = field.placed(transform);
+    if (field.sweeps()) body.motion = motionAt(toBullet(body.pose.position));
+    return body;
+}
+
+float marginOf(const Side& a, const Side& b) {
+    return isField(*a.shape) ? std::max(a.shape->getMargin(), b.shape->getMargin()) : b.shape->getMargin();
+}
+
+void Pair::collide(const Side& a, const Side& b) {
+    find(a, b, marginOf(a, b), false);
+    finish(a, b);
+}
+
+void Pair::collide(const Side& a, const Side& b, const SampledPairs& sampled, std::size_t index) {
+    contacts_.clear();
+    report_ = collideFields(a.placed(), b.placed(), marginOf(a, b), sampled.ofA(index), sampled.ofB(index), contacts_);
+    finish(a, b);
+    ++sampled_;
+}
+
+void Pair::test(const Side& a, const Side& b, float asked) {
+    const float voxel = static_cast<const Shape&>(*b.shape).voxelSize();
+    float margin = std::max(marginOf(a, b), std::min(asked, voxel));
+    const float most = std::max(margin, asked);
+    // a place between surface points is found by those around it, which are farther away
+    const float between = probeSpacing * voxel;
+    find(a, b, margin, true);
+    while (contacts_.empty() && margin < most + between)
+        find(a, b, margin = std::min(std::max(2 * margin, voxel), most + between), true);
+    if (const float surely = nearest() + between; !contacts_.empty() && surely > margin) find(a, b, surely, true);
+    std::erase_if(contacts_, [&](const Contact& contact) { return contact.distance > most; });
+    finish(a, b);
+}
+
+void Pair::commit(const btCollisionObject& a, const btCollisionObject& b, float seconds, btManifoldResult& result) {
+    const Reduced& reduced = choice_.reduced();
+    manifolds_.write(reduced.patches, details_, a, b, seconds, continuity_, result);
+    ++statistics_.pairs;
+    statistics_.contactsFound += found_;
+    for (const Patch& patch : reduced.patches) statistics_.contactsKept += patch.count;
+    statistics_.lost = std::max(statistics_.lost, reduced.lost);
+    statistics_.beyondBand += static_cast<int>(report_.beyondBand);
+    statistics_.sampled += sampled_;
+    isReady_ = false;
+}
+
+float Pair::nearest() const {
+    float least = std::numeric_limits<float>::max();
+    for (const Contact& contact : contacts_) least = std::min(least, contact.distance);
+    return least;
+}
+
+void Pair::find(const Side& a, const Side& b, float margin, bool measured) {
+    contacts_.clear();
+    const bool follows = static_cast<const Shape&>(*b.shape).sweeps();
+    report_ = isField(*a.shape) ? collideFields(a.placed(), b.placed(), margin, measured, cache_, contacts_)
+                                : collideOther(a, b.placed(), margin, measured, follows ? a.motion() : Motion{});
+}
+
+void Pair::finish(const Side& a, const Side& b) {
+    found_ = static_cast<int>(contacts_.size());
+    choice_.update(contacts_, a.transform, b.transform);
+    continuity_ = continuityOf(a, b);
+    details_.clear();
+    const Turning turning(a, b, continuity_);
+    for (const Patch& patch : choice_.reduced().patches)
+        for (int i = 0; i < patch.count; ++i) details_.push_back({turning.ahead(patch.contacts[i]), std::nullopt});
+    if (hasTriangles(*a.shape)) nameTriangles(static_cast<const btConcaveShape&>(*a.shape), a.transform, b.placed());
+    isReady_ = true;
+    sampled_ = 0;
+}
+
+void Pair::nameTriangles(const btConcaveShape& mesh, const btTransform& transform, const Placed& field) {
+    std::vector<MeshPlace> places;
+    for (const Patch& patch : choice_.reduced().patches)
+        for (int i = 0; i < patch.count; ++i) {
+            const Contact& contact = patch.contacts[i];
+            places.push_back(
+                {toBullet(contact.position + contact.distance * contact.normal), toBullet(contact.normal)});
+        }
+    const Field& of = field.collider.field();
+    const float voxel = field.scale * of.voxelSize(), reach = voxel + field.scale * of.interiorWidth();
+    const auto triangles = trianglesAt(mesh, transform, places, reach, sameDistance * voxel);
+    for (std::size_t i = 0; i < details_.size(); ++i) details_[i].triangle = triangles[i];
+}
+
+ContactReport Pair::collideOther(const Side& a, const Placed& field, float margin, bool measured,
+                                 const Motion& motion) {
+    if (a.shape->getShapeType() == STATIC_PLANE_PROXYTYPE) {
+        const auto& plane = static_cast<const btStaticPlaneShape&>(*a.shape);
+        const btVector3 normal = a.transform.getBasis() * plane.getPlaneNormal();
+        const float offset = plane.getPlaneConstant() + normal.dot(a.transform.getOrigin());
+        const Motion planeMotion = motion.about(toGlm(a.transform.getOrigin()), glm::vec3(0));
+        return collidePlane(toGlm(normal), offset, planeMotion, field, margin, measured, contacts_);
+    }
+    if (a.shape->isConvex()) {
+        const auto& convex = static_cast<const btConvexShape&>(*a.shape);
+        if (!convex_ || !convex_->isOf(convex)) convex_.emplace(convex);
+        return collideConvex(*convex_, toPose(a.transform), motion, field, margin, measured, contacts_);
+    }
+    return collideTriangles(static_cast<const btConcaveShape&>(*a.shape), a.transform, motion, field, margin, measured,
+                            contacts_);
+}
+
+}  // namespace bilayer::bullet::detail

@@ -1,0 +1,178 @@
+#include "integration/bullet/detail/rest_stabilisation.h"
+
+#include <BulletCollision/CollisionShapes/btCollisionShape.h>
+#include <BulletDynamics/ConstraintSolver/btTypedConstraint.h>
+#include <BulletDynamics/Dynamics/btRigidBody.h>
+#include <LinearMath/btTransformUtil.h>
+
+#include <algorithm>
+#include <cstddef>
+#include <limits>
+#include <unordered_map>
+#include <vector>
+
+namespace bilayer::bullet::detail {
+
+namespace {
+
+// What is slower and gets no faster has not moved. Once it is held, it stays until it is faster than goesOn, or
+// something has pushed it: when its speed is another by so much and stays that for some steps, since what the solver
+// leaves over may jump as far from any step to the next [parts of the speed that gravity gives in a step].
+constexpr float still = 0.05f, goesOn = 0.15f, pushed = 0.05f;
+constexpr int pushLasts = 4;
+// Places in single precision are rounded by no more than this part of their size, turns by so much [rad], and forces by
+// this part of the weight.
+constexpr float rounding = 4 * std::numeric_limits<float>::epsilon();
+
+bool isDynamic(const btCollisionObject& object) {
+    return btRigidBody::upcast(&object) && !object.isStaticOrKinematicObject();
+}
+
+// By a force other than its weight.
+bool isForced(const btRigidBody& body) {
+    const btVector3 weight = body.getGravity() / body.getInvMass() * body.getLinearFactor();
+    return body.getTotalForce().distance(weight) > rounding * weight.length() || !body.getTotalTorque().isZero();
+}
+
+// Bullet gives no weight to what it wakes within a step.
+bool isWithoutForce(const btRigidBody& body) {
+    return body.getTotalForce().isZero() && body.getTotalTorque().isZero();
+}
+
+float radiusOf(const btRigidBody& body) {
+    btVector3 centre;
+    btScalar radius;
+    body.getCollisionShape()->getBoundingSphere(centre, radius);
+    return centre.length() + radius;
+}
+
+Velocities operator-(const Velocities& a, const Velocities& b) {
+    return {a.linear - b.linear, a.angular - b.angular};
+}
+
+Velocities velocitiesOf(const btRigidBody& body) {
+    return {body.getLinearVelocity(), body.getAngularVelocity()};
+}
+
+// Of a body's farthest point, in parts of the speed that gravity gives in a step.
+float speedOf(const btRigidBody& body, const Velocities& velocities, float seconds) {
+    const float speed = velocities.linear.length() + radiusOf(body) * velocities.angular.length();
+    return speed / (seconds * body.getGravity().length());
+}
+
+// How far a body's motion is from what it was, likewise.
+float changeOf(const btRigidBody& body, const Velocities& before, float seconds) {
+    return speedOf(body, velocitiesOf(body) - before, seconds);
+}
+
+// Whether a body has come from a place by its speed alone: neither the user has put it where it is, nor has the solver.
+bool comesFrom(const btTransform& place, const btRigidBody& body, float seconds) {
+    btTransform expected;
+    btTransformUtil::integrateTransform(place, body.getLinearVelocity(), body.getAngularVelocity(), seconds, expected);
+    const btTransform& now = body.getWorldTransform();
+    const float size = std::max(now.getOrigin().length(), expected.getOrigin().length());
+    if (!(now.getOrigin().distance(expected.getOrigin()) <= rounding * size)) return false;
+    for (int axis = 0; axis < 3; ++axis)
+        if (!(now.getBasis().getColumn(axis).distance(expected.getBasis().getColumn(axis)) <= rounding)) return false;
+    return true;
+}
+
+}  // namespace
+
+bool RestStabilisation::stays(Place& place, const btRigidBody& body, float seconds) {
+    if (place.object != &body || !comesFrom(place.transform, body, seconds)) return false;
+    const float speed = speedOf(body, velocitiesOf(body), seconds);
+    if (!place.isHeld) return speed < still && speed <= place.speed;
+    const bool isCalm = changeOf(body, place.calm, seconds) < pushed;
+    const bool isSteady = changeOf(body, place.last, seconds) < pushed;
+    const bool hasGrown = speed >= goesOn && speedOf(body, place.last - place.calm, seconds) >= pushed;
+    if (isCalm) place.calm = velocitiesOf(body);
+    place.pushes = isCalm || !isSteady ? 0 : place.pushes + 1;
+    return isCalm || hasGrown || (speed < goesOn && place.pushes < pushLasts);
+}
+
+/// Leaves a body where it was. What goes on does so with the speed that it came with, or what swings would get energy
+/// each time it turns.
+void RestStabilisation::hold(Place& place, btRigidBody& body, float seconds) {
+    const Velocities velocities = velocitiesOf(body);
+    const float speed = speedOf(body, velocities, seconds);
+    if (!place.isHeld) {
+        place.calm = velocities;
+        place.pushes = 0;
+        place.speed = speed;
+    }
+    place.isHeld = speed < goesOn;
+    if (!place.isHeld) {
+        body.setLinearVelocity(place.speed / speed * velocities.linear);
+        body.setAngularVelocity(place.speed / speed * velocities.angular);
+    }
+    body.setCenterOfMassTransform(place.transform);
+}
+
+/// Whether an object moves by another reason than its weight, however slowly.
+bool RestStabilisation::isDriven(const Place& place, const btCollisionObject& object) {
+    const bool moves = place.object == &object && !(place.transform == object.getWorldTransform());
+    if (!isDynamic(object)) return moves;
+    const btRigidBody& body = *btRigidBody::upcast(&object);
+    if (body.getGravity().isZero()) return moves;
+    return isForced(body) && !(place.sleeps && isWithoutForce(body));
+}
+
+/// What is driven, and what it carries.
+std::unordered_set<const btCollisionObject*> RestStabilisation::driven() const {
+    std::unordered_set<const btCollisionObject*> driven;
+    std::vector<const btCollisionObject*> open;
+    const auto add = [&](const btCollisionObject& object) {
+        if (driven.insert(&object).second) open.push_back(&object);
+    };
+    for (int i = 0; i < world_.getNumConstraints(); ++i) {
+        const btTypedConstraint* constraint = world_.getConstraint(i);
+        for (const btRigidBody* body : {&constraint->getRigidBodyA(), &constraint->getRigidBodyB()})
+            if (isDynamic(*body)) add(*body);
+    }
+    const btCollisionObjectArray& objects = world_.getCollisionObjectArray();
+    for (int i = 0; i < objects.size(); ++i)
+        if (isDriven(places_[std::size_t(i)], *objects[i])) add(*objects[i]);
+    if (open.empty()) return driven;
+
+    std::unordered_map<const btCollisionObject*, std::vector<const btCollisionObject*>> touching;
+    for (int i = 0; i < world_.getDispatcher()->getNumManifolds(); ++i) {
+        const btPersistentManifold& manifold = *world_.getDispatcher()->getManifoldByIndexInternal(i);
+        const btCollisionObject *a = manifold.getBody0(), *b = manifold.getBody1();
+        if (manifold.getNumContacts() == 0 || !a->hasContactResponse() || !b->hasContactResponse()) continue;
+        touching[a].push_back(b);
+        touching[b].push_back(a);
+    }
+    while (!open.empty()) {
+        const btCollisionObject* carrier = open.back();
+        open.pop_back();
+        for (const btCollisionObject* carried : touching[carrier])
+            if (isDynamic(*carried)) add(*carried);
+    }
+    return driven;
+}
+
+void RestStabilisation::afterStep(float seconds) {
+    const btCollisionObjectArray& objects = world_.getCollisionObjectArray();
+    places_.resize(std::size_t(objects.size()));
+    const std::unordered_set<const btCollisionObject*> moving = driven();
+    held_ = 0;
+    for (int i = 0; i < objects.size(); ++i) {
+        Place& place = places_[std::size_t(i)];
+        btRigidBody* const body = isDynamic(*objects[i]) ? btRigidBody::upcast(objects[i]) : nullptr;
+        const bool sleeps = body && (!body->isActive() || (place.sleeps && isWithoutForce(*body)));
+        if (body && body->isActive() && !moving.contains(body) && stays(place, *body, seconds)) {
+            hold(place, *body, seconds);
+            ++held_;
+        } else {
+            place = {.object = objects[i], .transform = objects[i]->getWorldTransform()};
+            // what wakes up is at rest until something pushes it
+            place.isHeld = body && !body->isActive();
+            if (body) place.speed = speedOf(*body, velocitiesOf(*body), seconds);
+        }
+        place.sleeps = sleeps;
+        if (body) place.last = velocitiesOf(*body);
+    }
+}
+
+}  // namespace bilayer::bullet::detail

@@ -1,0 +1,141 @@
+#include "integration/bullet/detail/surfaces.h"
+
+#include <BulletCollision/CollisionShapes/btTriangleCallback.h>
+
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <limits>
+
+#include "collider/contact/surface_query.h"
+#include "collider/field/interpolant.h"
+#include "integration/bullet/detail/convert.h"
+
+namespace bilayer::bullet::detail {
+
+using namespace bilayer::detail;
+
+namespace {
+
+constexpr float leastStride = 0.05f;  // through samples [voxels]
+constexpr int mostStrides = 64;       // what takes more is looked at point by point
+constexpr float everywhere = std::numeric_limits<float>::max();
+
+}  // namespace
+
+float FieldObstacle::bound(const glm::vec3& point) const {
+    return field_.distance(point) - mostInterpolationError * field_.voxelSize();
+}
+
+std::optional<Entry> FieldObstacle::entry(const glm::vec3& from, const glm::vec3& to, float radius) const {
+    if (from == to) return overlaps(from, radius) ? std::optional(Entry{from, glm::vec3(0)}) : std::nullopt;
+    if (staysOut(from, to, radius)) return std::nullopt;
+    const glm::vec3 way = to - from;
+    const auto hit = radius > 0 ? field_.sphereCast({from, way, glm::length(way)}, radius) : field_.segment(from, to);
+    if (!hit) return std::nullopt;
+    return Entry{hit->position, hit->normal};
+}
+
+std::optional<glm::vec3> FieldObstacle::wayOut(const glm::vec3& point, float radius) const {
+    if (radius > 0) {
+        const ClosestPoint closest = field_.closest(point, radius);
+        const glm::vec3 way = closest.distance < 0 ? closest.position - point : point - closest.position;
+        const float length = glm::length(way);
+        if (!closest.found || !(length > 0)) return std::nullopt;
+        return (radius - closest.distance) / length * way;
+    }
+    const Sample sample = field_.sample(point);
+    const glm::vec3 normal = directionOf(sample, field_.voxelSize());
+    if (!sample.inBand || normal == glm::vec3(0)) return std::nullopt;
+    return -sample.distance * normal;
+}
+
+// By strides through the samples; many times as quick as the search for the place of an entry.
+bool FieldObstacle::staysOut(const glm::vec3& from, const glm::vec3& to, float radius) const {
+    const float length = glm::distance(from, to), voxel = field_.voxelSize();
+    const float error = field_.mesh() ? mostInterpolationError * voxel : 0;
+    float gone = 0;
+    for (int i = 0; i < mostStrides && gone <= length; ++i) {
+        const Sample sample = field_.sampleWithin(length > 0 ? from + gone / length * (to - from) : from, 0);
+        const float left = sample.inBand && radius == 0 ? (sample.distance - error) / steepestInterpolant
+                                                        : sample.distance - radius - mostInterpolationError * voxel;
+        if (left < leastStride * voxel) return false;
+        gone += left;
+    }
+    return gone > length;
+}
+
+bool FieldObstacle::overlaps(const glm::vec3& point, float radius) const {
+    return radius > 0 ? field_.overlapsSphere(point, radius) : field_.distance(point) <= 0;
+}
+
+float ConvexObstacle::bound(const glm::vec3& point) const {
+    return convex_.nearest(point, everywhere).distance;
+}
+
+std::optional<Entry> ConvexObstacle::entry(const glm::vec3& from, const glm::vec3& to, float) const {
+    const auto entry = convex_.enter(from, to - from, tolerance_);
+    if (!entry) return std::nullopt;
+    const glm::vec3 at = from + entry->part * (to - from);
+    return Entry{at - entry->near.distance * entry->near.normal, entry->near.normal};
+}
+
+std::optional<glm::vec3> ConvexObstacle::wayOut(const glm::vec3& point, float) const {
+    const Convex::Near near = convex_.nearest(point, everywhere);
+    return -near.distance * near.normal;
+}
+
+PlaneObstacle::PlaneObstacle(const btStaticPlaneShape& shape)
+    : normal_(toGlm(shape.getPlaneNormal())), offset_(shape.getPlaneConstant()) {}
+
+float PlaneObstacle::bound(const glm::vec3& point) const {
+    return glm::dot(normal_, point) - offset_;
+}
+
+std::optional<Entry> PlaneObstacle::entry(const glm::vec3& from, const glm::vec3& to, float) const {
+    const float before = bound(from), after = bound(to);
+    if (before > 0 && after > 0) return std::nullopt;
+    const float part = before > 0 ? before / (before - after) : 0;
+    return Entry{from + part * (to - from), normal_};
+}
+
+std::optional<glm::vec3> PlaneObstacle::wayOut(const glm::vec3& point, float) const {
+    return -bound(point) * normal_;
+}
+
+std::optional<Entry> TriangleObstacle::entry(const glm::vec3& from, const glm::vec3& to, float) const {
+    struct First : btTriangleCallback {
+        glm::vec3 from, way;
+        float part = 1;
+        std::optional<Entry> entry;
+
+        void processTriangle(btVector3* corners, int, int) override {
+            const glm::vec3 a = toGlm(corners[0]), one = toGlm(corners[1]) - a, two = toGlm(corners[2]) - a;
+            const glm::vec3 normal = glm::cross(one, two), start = from - a, turned = glm::cross(start, way);
+            const float along = -glm::dot(way, normal);
+            if (along == 0) return;
+            const float s = glm::dot(start, normal) / along, u = glm::dot(two, turned) / along,
+                        v = -glm::dot(one, turned) / along;
+            if (!(s >= 0 && s < part && u >= 0 && v >= 0 && u + v <= 1)) return;
+            part = s;
+            entry = Entry{from + s * way, (along > 0 ? 1.f : -1.f) * glm::normalize(normal)};
+        }
+    } first;
+    first.from = from, first.way = to - from;
+    visit(glm::min(from, to), glm::max(from, to), first);
+    return first.entry;
+}
+
+bool TriangleObstacle::isNear(const glm::vec3& from, const glm::vec3& to, float radius) const {
+    struct Any : btTriangleCallback {
+        bool found = false;
+        void processTriangle(btVector3*, int, int) override { found = true; }
+    } any;
+    visit(glm::min(from, to) - radius, glm::max(from, to) + radius, any);
+    return any.found;
+}
+
+void TriangleObstacle::visit(const glm::vec3& lower, const glm::vec3& upper, btTriangleCallback& callback) const {
+    mesh_.processAllTriangles(&callback, toBullet(lower), toBullet(upper));
+}
+
+}  // namespace bilayer::bullet::detail

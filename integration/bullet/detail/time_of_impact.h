@@ -1,0 +1,56 @@
+// Where shapes get through each other in a step; internal.
+#pragma once
+
+#include <BulletCollision/CollisionShapes/btCompoundShape.h>
+
+#include <glm/vec3.hpp>
+
+#include <bilayer/integration/bullet/shape.h>
+#include "integration/bullet/detail/body_sweep.h"
+
+namespace bilayer::bullet::detail {
+
+using namespace bilayer::detail;
+
+/// A shape that is no compound, and where its object has it.
+struct Part {
+    const btCollisionShape* shape;
+    btTransform local;
+
+    const Shape* field() const {
+        if (shape->getShapeType() != FAST_CONCAVE_MESH_PROXYTYPE) return nullptr;
+        const auto* field = static_cast<const Shape*>(shape);
+        return field->sweeps() ? field : nullptr;
+    }
+};
+
+/// @param found  (const Part&)
+template <class Found>
+void visitParts(const btCollisionShape* shape, const btTransform& local, Found&& found) {
+    if (!shape->isCompound()) return found(Part{shape, local});
+    const auto* compound = static_cast<const btCompoundShape*>(shape);
+    for (int i = 0; i < compound->getNumChildShapes(); ++i)
+        visitParts(compound->getChildShape(i), local * compound->getChildTransform(i), found);
+}
+
+template <class Found>
+void visitParts(const btCollisionObject& object, Found&& found) {
+    visitParts(object.getCollisionShape(), btTransform::getIdentity(), found);
+}
+
+/// Where something first goes too deep into an obstacle: when, there, and the normal outward from it.
+struct Passing {
+    float time = 1;  ///< 1: nothing does in this step
+    glm::vec3 place{0}, normal{0};
+
+    Passing turned() const { return {time, place, -normal}; }
+};
+
+inline Passing earlier(const Passing& one, const Passing& other) {
+    return other.time < one.time ? other : one;
+}
+
+/// Where a field and another shape first get through each other; the normal is that of the other one.
+Passing passage(const Part& part, const Course& its, const Part& other, const Course& others);
+
+}  // namespace bilayer::bullet::detail

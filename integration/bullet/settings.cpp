@@ -1,0 +1,174 @@
+// Rules of thumb, each with its reason. They hold for bodies of any scale: lengths are compared with voxels and with
+// each other, and with metres only where Bullet does so.
+#include <bilayer/integration/bullet/settings.h>
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <tuple>
+
+namespace bilayer::bullet {
+
+namespace {
+
+// Walls [voxels]: from three on, mass and inertia are good to 0.5 %; below two, sides are told apart by luck.
+constexpr float wallVoxels = 3, leastWallVoxels = 2;
+// Narrowest passage [voxels]: overlaps at rest are below half a voxel, on either side.
+constexpr float gapVoxels = 2;
+// Voxels along the longest side: features of what is not thin, and what memory takes.
+constexpr float leastResolution = 64, mostResolution = 512;
+constexpr float rounding = 1e-3f;    // [voxels] and steps: numbers that are off by less count as whole
+constexpr float leastVoxel = 2e-5f;  // [m] OpenVDB takes none smaller
+constexpr float mostIndex = 1e9f;    // and no field's coordinates are larger [voxels]
+// A point is in the band if the eight voxels around it are.
+constexpr float cellDiagonal = 1.7320508f;  // [voxels]
+// Bands inside [voxels]: what shallow overlaps need, and where sweeps or shorter steps are cheaper than more voxels.
+constexpr int leastInterior = 3, mostInterior = 10;
+// Points are followed along straight ways: off by 3 % of a body's radius where it turns by this in a step [rad].
+constexpr float straightTurn = 0.5f;
+// Deeper than the middle of a wall, a point is pushed out on the far side.
+constexpr float wallPart = 0.5f;
+// Bullet's thresholds are lengths and speeds of their own: gContactBreakingThreshold is 2 cm, bodies sleep below
+// 0.8 m/s. A tenth of a body's size and four of its lengths a second are still harmless [m].
+constexpr float leastSize = 0.2f;
+constexpr float mostMassRatio = 10;  // what ten iterations of sequential impulses settle
+constexpr double mostMemory = double(1 << 30);
+// Measured at the end of large builds on two cores of an AMD EPYC (Zen 4), 2023 [s].
+constexpr double secondsPerTriangle = 160e-9, secondsPerVoxel = 26e-9;
+// A block of 8^3 voxels as a Field keeps it, with an apron [bytes]; and how wide it is, seen from anywhere in the mean
+// [voxels].
+constexpr double blockBytes = 9 * 9 * 9 * 4, blockVoxels = 512, blockWidth = 12;
+
+void requireSensible(const MeshReport& mesh, const Scene& scene) {
+    for (const auto& [name, value, least] :
+         {std::tuple("step", scene.step, 1e-9f), std::tuple("speed", scene.speed, 0.f),
+          std::tuple("thickness", scene.thickness, 0.f), std::tuple("gap", scene.gap, 0.f),
+          std::tuple("mass ratio", scene.massRatio, 1.f), std::tuple("voxel size", scene.voxelSize, 0.f),
+          std::tuple("spin", std::max(scene.spin, -1.f), -1.f),
+          std::tuple("margin", std::max(scene.margin, -1.f), -1.f)})
+        if (!(value >= least && std::isfinite(value)))
+            throw std::invalid_argument(
+                fmt::format("advice: a {} of {}; it must be finite, and {} at least", name, value, least));
+    if (scene.voxelSize > 0 && scene.voxelSize < leastVoxel)
+        throw std::invalid_argument(
+            fmt::format("advice: a voxel size of {}; no field has voxels below {:g}: scale the mesh up",
+                        scene.voxelSize, leastVoxel));
+    if (scene.voxelSize > 0 && mesh.bounds.longestSide() / scene.voxelSize > mostIndex)
+        throw std::invalid_argument(fmt::format(
+            "advice: a voxel size of {}; no field has more than {:g} voxels in a row", scene.voxelSize, mostIndex));
+    if (mesh.triangles == 0 || !(mesh.bounds.longestSide() > 0))
+        throw std::invalid_argument("advice: the mesh has no extent");
+}
+
+int wholeFrom(float value) {
+    return int(std::min(std::ceil(value - rounding), float(mostSubsteps)));
+}
+
+float chosenVoxel(const Scene& scene, float longest, float wall) {
+    if (scene.voxelSize > 0) return scene.voxelSize;
+    float voxel = longest / leastResolution;
+    if (wall > 0) voxel = std::min(voxel, wall / wallVoxels);
+    if (scene.gap > 0) voxel = std::min(voxel, scene.gap / gapVoxels);
+    return std::max({voxel, longest / mostResolution, leastVoxel});
+}
+
+// By area and volume: exact to first order in the curvature. Blocks are counted on both sides of the surface, so that
+// walls thinner than a block need up to half of the memory only.
+void estimate(const MeshReport& mesh, Advice& advice) {
+    const double h = advice.voxelSize, area = mesh.area / (h * h), volume = std::abs(mesh.volume) / (h * h * h);
+    double inside = area * advice.interiorWidth;
+    if (mesh.closed()) inside = std::min(inside, volume);
+    const double voxels = area * advice.exteriorWidth + inside;
+    const double blocks = area * (advice.exteriorWidth + advice.interiorWidth + blockWidth) / blockVoxels;
+    advice.voxels = std::uint64_t(voxels);
+    advice.fieldBytes = std::uint64_t(blocks * blockBytes);
+    advice.buildSeconds = secondsPerTriangle * double(mesh.triangles) + secondsPerVoxel * voxels;
+}
+
+void warnOfMesh(const MeshReport& mesh, std::vector<std::string>& warnings) {
+    if (!mesh.closed())
+        warnings.push_back(
+            fmt::format("the mesh is not closed ({}): signs are a guess, and only a static body needs no "
+                        "mass",
+                        verdict(mesh)));
+    else if (!mesh.oriented() || mesh.selfIntersections > 0)
+        warnings.push_back(fmt::format("the mesh is not clean: {}", verdict(mesh)));
+}
+
+void warnOfSizes(const MeshReport& mesh, const Scene& scene, const Advice& advice, std::vector<std::string>& warnings) {
+    const float tip = mesh.thinnestWall / advice.voxelSize;
+    if (advice.wallVoxels > 0 && advice.wallVoxels < leastWallVoxels - rounding)
+        warnings.push_back(fmt::format(
+            "walls are {:.2g} voxels thick: below {:g}, contacts may come out on the far side and mass is lost",
+            advice.wallVoxels, leastWallVoxels));
+    else if (tip > 0 && tip < leastWallVoxels)
+        warnings.push_back(
+            fmt::format("the thinnest place, a tip or a crease, has {:.2g} voxels: contacts there are coarse", tip));
+    if (const float gap = scene.gap / advice.voxelSize; gap > 0 && gap < gapVoxels - rounding)
+        warnings.push_back(
+            fmt::format("the gap is {:.2g} voxels wide: below {:g}, bodies at rest overlap in it", gap, gapVoxels));
+    if (advice.margin == 0) warnings.push_back("without a margin, contacts of what rests come and go");
+    if (advice.margin > advice.voxelSize * float(mostInterior))
+        warnings.push_back(fmt::format("the margin is {:.2g} voxels: the band outside has to reach as far",
+                                       advice.margin / advice.voxelSize));
+    if (double(advice.fieldBytes) > mostMemory)
+        warnings.push_back(fmt::format("the field takes about {:.1f} GiB", double(advice.fieldBytes) / mostMemory));
+}
+
+void warnOfMotion(const Scene& scene, const Advice& advice, float way, std::vector<std::string>& warnings) {
+    if (advice.substepsUnswept > advice.substeps || advice.substeps == mostSubsteps)
+        warnings.push_back(
+            fmt::format("a step goes {:.3g} m, farther than half of a wall: impacts throw bodies through what is thin "
+                        "unless a bullet::WorldExtensions looks after the world; without it and without swept contacts "
+                        "(ShapeOptions::sweeps) that needs {} substeps{}",
+                        way, advice.substepsUnswept, advice.substepsUnswept < mostSubsteps ? "" : " or more"));
+    if (scene.massRatio > mostMassRatio)
+        warnings.push_back(
+            fmt::format("masses of {:.3g} to 1: above {:g} to 1 the solver leaves what lies below "
+                        "squeezed; take more substeps, not more iterations",
+                        scene.massRatio, mostMassRatio));
+}
+
+void warnOfBullet(float longest, std::vector<std::string>& warnings) {
+    if (longest < leastSize)
+        warnings.push_back(
+            fmt::format("a body of {:.3g} m is small to Bullet, which lets it sleep below 0.8 m/s and "
+                        "widens its box by 0.02 m: lower setSleepingThresholds() and "
+                        "gContactBreakingThreshold, or scale the scene up",
+                        longest));
+}
+
+}  // namespace
+
+Advice advise(const MeshReport& mesh, const Scene& scene) {
+    requireSensible(mesh, scene);
+    const float longest = mesh.bounds.longestSide();
+    const float wall = scene.thickness > 0 && mesh.commonWall > 0 ? std::min(scene.thickness, mesh.commonWall)
+                                                                  : std::max(scene.thickness, mesh.commonWall);
+    Advice advice;
+    const float h = advice.voxelSize = chosenVoxel(scene, longest, wall);
+    advice.margin = scene.margin < 0 ? h : scene.margin;
+    advice.wallVoxels = wall / h;
+    advice.splitImpulse = -h;
+
+    const float way = scene.speed * scene.step;
+    // an impact at one end stops that end: what was speed becomes spin about it
+    const float spin = scene.spin < 0 ? 2 * scene.speed / longest : scene.spin;
+    advice.substeps = std::max(1, wholeFrom(spin * scene.step / straightTurn));
+    const float deepest = wallPart * (wall > 0 ? wall : longest);
+    advice.substepsUnswept = std::max(advice.substeps, wholeFrom(way / deepest));
+    advice.exteriorWidth = std::max(1, wholeFrom(advice.margin / h + cellDiagonal));
+    advice.interiorWidth =
+        std::clamp(wholeFrom(way / (float(advice.substeps) * h) + cellDiagonal), leastInterior, mostInterior);
+    estimate(mesh, advice);
+
+    warnOfMesh(mesh, advice.warnings);
+    warnOfSizes(mesh, scene, advice, advice.warnings);
+    warnOfMotion(scene, advice, way, advice.warnings);
+    warnOfBullet(longest, advice.warnings);
+    return advice;
+}
+
+}  // namespace bilayer::bullet

@@ -1,0 +1,181 @@
+// Sampling a field at other voxels would blend distances on either side of medial axes, and stretching it leaves no
+// distances at all. So the surface is what is carried over, and distances are found anew: as quick, and exact.
+#include "integration/fluid/detail/regrid.h"
+
+#include <fmt/format.h>
+#include <openvdb/tools/Prune.h>
+#include <openvdb/tools/SignedFloodFill.h>
+#include <openvdb/tree/LeafManager.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include <bilayer/sdf/build.h>
+#include <bilayer/sdf/grids.h>
+#include <bilayer/sdf/surface.h>
+#include "sdf/sign/hole_width.h"
+#include "sdf/sign/sign_choice.h"
+
+namespace bilayer::fluid::detail {
+
+using namespace bilayer::detail;
+namespace {
+
+using openvdb::Coord;
+using openvdb::FloatGrid;
+using openvdb::FloatTree;
+using openvdb::math::Transform;
+using Leaf = FloatTree::LeafNodeType;
+
+constexpr const char* byFlood = "flood";  // LevelSet::sign() of a mesh whose winding numbers tell nothing
+
+constexpr float minFieldWidth = 1;    // [field voxels] either side: less does not tell where the surface is
+constexpr float rounding = 1e-5f;     // of a width that is a whole number of voxels but for its last bits
+constexpr double maxIndex = 1 << 29;  // keeps OpenVDB's 32-bit coordinates and sums of two of them in range
+constexpr double sameVoxels = 1e-6;   // two voxel sizes are the same but for this part of them
+constexpr double widestHole = 2;      // [voxels]; wider ones are not closed
+
+// A mesh in voxels, near the origin, where floats are finest; and whole leaves from there to its place.
+struct Placed {
+    Mesh mesh;
+    Coord shift;
+};
+
+Placed inVoxels(const Mesh& mesh, const Placement& placement, const Transform& voxels) {
+    std::vector<openvdb::Vec3d> points(mesh.points.size());
+    tbb::parallel_for(std::size_t(0), points.size(), [&](std::size_t i) {
+        const glm::dvec3 p = placement.toWorld(mesh.origin + glm::dvec3(mesh.points[i]));
+        points[i] = voxels.worldToIndex({p.x, p.y, p.z});
+    });
+    openvdb::Vec3d lower(std::numeric_limits<double>::max()), upper(-lower);
+    for (const openvdb::Vec3d& p : points) {
+        lower = openvdb::math::minComponent(lower, p);
+        upper = openvdb::math::maxComponent(upper, p);
+    }
+    for (int axis = 0; axis < 3; ++axis)
+        if (!(lower[axis] > -maxIndex && upper[axis] < maxIndex))
+            throw std::invalid_argument(
+                "the body is out of range of these voxels: they are too small or it is too far");
+    Placed placed{{{}, mesh.triangles, {}}, Coord::floor(0.5 * (lower + upper)) & ~int(Leaf::DIM - 1)};
+    placed.mesh.points.reserve(points.size());
+    const openvdb::Vec3d shift = placed.shift.asVec3d();
+    for (const openvdb::Vec3d& p : points)
+        placed.mesh.points.emplace_back(float(p.x() - shift.x()), float(p.y() - shift.y()), float(p.z() - shift.z()));
+    return placed;
+}
+
+// Moves all leaves and multiplies their values; what is not active gets the band's width.
+FloatGrid::Ptr moved(const FloatGrid& source, const Coord& shift, float factor, float width) {
+    const auto result = FloatGrid::create(width);
+    const FloatGrid::Ptr copy = source.deepCopy();
+    std::vector<Leaf*> leaves;
+    copy->tree().stealNodes(leaves, copy->background(), false);
+    tbb::parallel_for(std::size_t(0), leaves.size(), [&](std::size_t i) {
+        Leaf& leaf = *leaves[i];
+        leaf.setOrigin(leaf.origin() + shift);
+        for (auto voxel = leaf.beginValueAll(); voxel; ++voxel) {
+            const float value = *voxel * factor;
+            const bool inBand = voxel.isValueOn() && std::abs(value) < width;
+            voxel.setValue(inBand ? value : std::copysign(width, value));
+            if (!inBand) voxel.setValueOff();
+        }
+    });
+    for (Leaf* leaf : leaves) result->tree().addLeaf(leaf);
+    openvdb::tools::signedFloodFill(result->tree());
+    openvdb::tools::pruneLevelSet(result->tree());
+    result->setGridClass(openvdb::GRID_LEVEL_SET);
+    return result;
+}
+
+// Whether a field lies in these very voxels, and its band reaches as far.
+bool fits(const LevelSet& field, const Placement& placement, const Transform& voxels, float width) {
+    const Transform& own = field.grids().distance->transform();
+    const auto near = [&](const openvdb::Vec3d& index) {
+        const openvdb::Vec3d there = own.indexToWorld(index);
+        const glm::dvec3 moved = placement.toWorld(field.origin() + glm::dvec3(there.x(), there.y(), there.z()));
+        return (voxels.worldToIndex({moved.x, moved.y, moved.z}) - index).length() <= sameVoxels;
+    };
+    return placement.scale == glm::vec3(1) && near({0, 0, 0}) && near({1, 0, 0}) && near({0, 1, 0}) &&
+           near({0, 0, 1}) && std::min(field.exteriorWidth(), field.interiorWidth()) >= width * (1 - rounding);
+}
+
+void requireCubes(const Transform& voxels) {
+    if (!voxels.isLinear() || !voxels.hasUniformScale()) throw std::invalid_argument("the voxels are no cubes");
+    if (!(voxels.baseMap()->determinant() > 0))
+        throw std::invalid_argument("the voxels are mirrored: that would turn the body inside out");
+}
+
+std::string text(const openvdb::Vec3d& v) {
+    return fmt::format("({:g}, {:g}, {:g})", v.x(), v.y(), v.z());
+}
+
+[[noreturn]] void refuseWithoutInside(const std::string& why) {
+    throw std::invalid_argument("the mesh has no inside: " + why);
+}
+
+// Refuses a mesh that bounds nothing, or has a hole that is too wide for the voxels. The mesh alone decides, not where
+// the voxels lie.
+void requireSolid(const Placed& body, const Transform& voxels) {
+    const SignChoice choice = chooseSignOfSolid(body.mesh);
+    if (choice.sign == Sign::flood) refuseWithoutInside(choice.reason);
+    if (choice.sign != Sign::winding) return;
+    const Opening hole = widestOpening(choice.mended ? *choice.mended : body.mesh, widestHole);
+    if (hole.width == 0) return;
+    const double voxel = voxels.voxelSize()[0];
+    const openvdb::Vec3d centre(hole.centre.x, hole.centre.y, hole.centre.z);
+    throw std::invalid_argument(fmt::format(
+        "the mesh is open: its widest hole, around {}, is {:.3g} wide; {:g} voxels of {:g} are closed: close it in the "
+        "mesh, or take voxels of {:.3g} or more",
+        text(voxels.indexToWorld(centre + body.shift.asVec3d())), hole.width * voxel, widestHole, voxel,
+        hole.width * voxel / widestHole));
+}
+
+}  // namespace
+
+void requireInside(const FloatGrid& grid) {
+    for (auto leaf = grid.tree().cbeginLeaf(); leaf; ++leaf)
+        for (auto voxel = leaf->cbeginValueAll(); voxel; ++voxel)
+            if (*voxel < 0) return;
+    throw std::invalid_argument("the body has no inside in these voxels");
+}
+
+FloatGrid::Ptr regrid(const Mesh& mesh, const Placement& placement, const Transform& voxels, float width,
+                      bool uniteSolids) {
+    check(placement);
+    requireCubes(voxels);
+    validate(mesh);
+    const double voxel = voxels.voxelSize()[0];
+    const float widthInVoxels = float(double(width) / voxel);
+    const Placed placed = inVoxels(mesh, placement, voxels);
+    requireSolid(placed, voxels);
+    const LevelSet field =
+        build(placed.mesh,
+              {.voxelSize = 1, .exteriorWidth = widthInVoxels, .interiorWidth = widthInVoxels, .unite = uniteSolids});
+    if (field.sign() == byFlood) refuseWithoutInside(field.signReason());
+    const auto grid = moved(*field.grids().distance, placed.shift, float(voxel), width);
+    grid->setTransform(voxels.copy());
+    return grid;
+}
+
+FloatGrid::Ptr regrid(const LevelSet& field, const Placement& placement, const Transform& voxels, float width) {
+    check(placement);
+    requireCubes(voxels);
+    if (std::min(field.exteriorWidth(), field.interiorWidth()) < minFieldWidth * field.voxelSize() * (1 - rounding))
+        throw std::invalid_argument("the field's band is narrower than a voxel");
+    if (fits(field, placement, voxels, width)) {
+        const auto grid = moved(*field.grids().distance, Coord(0), 1, width);
+        requireInside(*grid);
+        grid->setTransform(voxels.copy());
+        return grid;
+    }
+    const Mesh zeroSet = surface(field);
+    if (zeroSet.triangles.empty()) throw std::invalid_argument("the field has no surface: it has no inside");
+    return regrid(zeroSet, placement, voxels, width, false);
+}
+
+}  // namespace bilayer::fluid::detail

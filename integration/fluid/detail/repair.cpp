@@ -1,0 +1,365 @@
+// OpenVDB calls a grid a level set only if |gradient|^2, by WENO differences and Godunov's upwinding, lies in
+// [0.5, 1.5] at all voxels next to the surface. Creases, walls below a voxel and noise break that. Each broken voxel is
+// a constraint on its own value and those of its neighbours, and these are moved by the least change that would satisfy
+// it if it were linear (S. Kaczmarz, 1937), over and over. Where that fails, the equation |gradient| = 1 is iterated
+// everywhere if much is broken; what remains is mended by descent on the sum of all violations.
+#include "integration/fluid/detail/repair.h"
+
+#include <openvdb/math/Stencils.h>
+#include <openvdb/tools/LevelSetFilter.h>
+#include <openvdb/tools/LevelSetTracker.h>
+#include <openvdb/tree/LeafManager.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+#include <utility>
+#include <vector>
+
+namespace bilayer::fluid::detail {
+
+namespace {
+
+using openvdb::Coord;
+using openvdb::FloatGrid;
+using Stencil = openvdb::math::WenoStencil<FloatGrid>;
+
+// The range of checkLevelSet, less what rounding may take.
+constexpr float lowest = 0.501f, highest = 1.499f;
+constexpr std::size_t manyBroken = 20;  // one broken voxel in so many next to the surface is noise, not creases
+// Where single voxels cannot be mended, the surface is smoothed around them, farther each time [voxels].
+constexpr int maxSmoothings = 12, firstRadius = 2;
+// Distances nearer to 0 than exact ones are known to [voxels].
+constexpr float rounding = 1e-4f;
+// What a constraint's value is moved to lies this far within the range, so that rounds end.
+constexpr float margin = 0.02f;
+constexpr float mostMoved = 0.25f;   // by one constraint [voxels]: what is linear about it ends there
+constexpr float almostOn = 0.15f;    // a face [voxels]
+constexpr float atSurface = 1e-3f;   // [voxels]
+constexpr float difference = 1e-2f;  // for derivatives [voxels]
+constexpr float leastSlope = 0.05f;  // of a constraint [1/voxel]; a flatter one cannot be satisfied by its voxels
+constexpr int maxProjections = 100;  // rounds over all constraints
+constexpr int idleProjections = 30;  // rounds without a gain before other means are taken
+constexpr int maxRounds = 60;        // of descent; six or so do for what real meshes give
+constexpr int patience = 3;          // rounds without a gain before the surroundings are smoothed
+constexpr float notable = 0.1f - rounding;  // a change that is told [voxels]
+constexpr int reach = 3;                    // [voxels] of the WENO stencil along the axes
+// Changes that are tried at a voxel [voxels], either way.
+constexpr std::array<float, 6> steps{0.02f, 0.05f, 0.1f, 0.2f, 0.4f, 0.8f};
+constexpr float stepCost = 1e-3f;   // prefers small changes among equally good ones
+constexpr float leastGain = 1e-4f;  // of a change, so that descent ends
+
+struct Survey {
+    std::vector<Coord> broken;  // in the order of the leaves
+    std::size_t crossed = 0;    // voxels next to the surface
+};
+
+float violation(const Stencil& stencil) {
+    if (!stencil.zeroCrossing()) return 0;
+    const float q = stencil.normSqGrad();
+    return std::max({0.0f, lowest - q, q - highest});
+}
+
+// Whether the surface passes between a voxel and one beside it: what WenoStencil::zeroCrossing tells, but only one
+// voxel in five has it, and a stencil of nineteen values is not needed for the others.
+bool isCrossed(const FloatGrid::ConstAccessor& values, const Coord& voxel, float value) {
+    for (int axis = 0; axis < 3; ++axis)
+        for (const int side : {-1, 1}) {
+            Coord beside = voxel;
+            beside[axis] += side;
+            const float there = values.getValue(beside);
+            if (value > 0 ? there < 0 : there > 0) return true;
+        }
+    return false;
+}
+
+// Where a flat face passes through voxels, rounding would tell the sides of its edges: what is on it has a distance of
+// 0.
+void tidy(FloatGrid& grid) {
+    const float onSurface = rounding * float(grid.voxelSize()[0]);
+    openvdb::tree::LeafManager<openvdb::FloatTree> leaves(grid.tree());
+    leaves.foreach ([onSurface](openvdb::FloatTree::LeafNodeType& leaf, std::size_t) {
+        for (auto voxel = leaf.beginValueOn(); voxel; ++voxel)
+            if (std::abs(*voxel) <= onSurface) voxel.setValue(0);
+    });
+}
+
+Survey survey(const FloatGrid& grid) {
+    openvdb::tree::LeafManager<const openvdb::FloatTree> leaves(grid.tree());
+    std::vector<Survey> parts(leaves.leafCount());
+    leaves.foreach ([&](const openvdb::FloatTree::LeafNodeType& leaf, std::size_t index) {
+        Stencil stencil(grid);
+        const auto values = grid.getConstAccessor();
+        for (auto voxel = leaf.cbeginValueOn(); voxel; ++voxel) {
+            if (!isCrossed(values, voxel.getCoord(), *voxel)) continue;
+            stencil.moveTo(voxel.getCoord());
+            parts[index].crossed += stencil.zeroCrossing();
+            if (violation(stencil) > 0) parts[index].broken.push_back(voxel.getCoord());
+        }
+    });
+    Survey whole;
+    for (const Survey& part : parts) {
+        whole.broken.insert(whole.broken.end(), part.broken.begin(), part.broken.end());
+        whole.crossed += part.crossed;
+    }
+    return whole;
+}
+
+// A voxel and those on its axes up to `distance` away.
+template <class Visit>
+void alongAxes(const Coord& centre, int distance, Visit visit) {
+    visit(centre);
+    for (int axis = 0; axis < 3; ++axis)
+        for (int step = 1; step <= distance; ++step) {
+            Coord ahead = centre, behind = centre;
+            ahead[axis] += step;
+            behind[axis] -= step;
+            visit(ahead);
+            visit(behind);
+        }
+}
+
+class Mender {
+  public:
+    explicit Mender(FloatGrid& grid)
+        : grid_(grid), values_(grid.getAccessor()), stencil_(grid), voxel_(float(grid.voxelSize()[0])) {}
+
+    // One pass over the constraints of broken voxels; returns those that are broken now.
+    std::vector<Coord> project(const std::vector<Coord>& broken) {
+        std::vector<Coord> touched;
+        for (const Coord& voxel : broken) {
+            touched.push_back(voxel);
+            if (violationAt(voxel) == 0) continue;
+            if (!changeSide(voxel)) satisfy(voxel);
+            alongAxes(voxel, 1, [&](const Coord& changed) {
+                alongAxes(changed, reach, [&](const Coord& near) { touched.push_back(near); });
+            });
+        }
+        return stillBroken(touched);
+    }
+
+    // The same by the best change of single values.
+    std::vector<Coord> descend(const std::vector<Coord>& broken) {
+        std::vector<Coord> touched;
+        for (const Coord& voxel : broken) {
+            touched.push_back(voxel);
+            if (violationAt(voxel) == 0) continue;
+            if (Coord changed; improve(voxel, changed))
+                alongAxes(changed, reach, [&](const Coord& near) { touched.push_back(near); });
+        }
+        return stillBroken(touched);
+    }
+
+    // Means over the neighbours around what resists, so that features below a voxel go.
+    std::vector<Coord> smooth(const std::vector<Coord>& broken) {
+        std::vector<Coord> around, touched;
+        for (const Coord& voxel : broken) alongAxes(voxel, 1, [&](const Coord& near) { around.push_back(near); });
+        sortUnique(around);
+        std::vector<float> means;
+        for (const Coord& voxel : around) means.push_back(mean(voxel));
+        for (std::size_t i = 0; i < around.size(); ++i) {
+            if (values_.isValueOn(around[i])) values_.setValueOnly(around[i], means[i]);
+            alongAxes(around[i], reach, [&](const Coord& near) { touched.push_back(near); });
+        }
+        return stillBroken(touched);
+    }
+
+  private:
+    static void sortUnique(std::vector<Coord>& voxels) {
+        std::sort(voxels.begin(), voxels.end());
+        voxels.erase(std::unique(voxels.begin(), voxels.end()), voxels.end());
+    }
+
+    float violationAt(const Coord& voxel) {
+        if (!values_.isValueOn(voxel)) return 0;
+        stencil_.moveTo(voxel);
+        return violation(stencil_);
+    }
+
+    // Of all voxels whose stencils read this one.
+    float violationAround(const Coord& voxel) {
+        float sum = 0;
+        alongAxes(voxel, reach, [&](const Coord& near) { sum += violationAt(near); });
+        return sum;
+    }
+
+    float mean(const Coord& voxel) {
+        float sum = 0;
+        alongAxes(voxel, 1, [&](const Coord& near) { sum += values_.getValue(near); });
+        return sum / 7;
+    }
+
+    // A voxel on one side of a face, and beside an edge of it, may see no slope where one on the other side does: one
+    // that is almost on the face can be put there.
+    bool changeSide(const Coord& voxel) {
+        const float old = values_.getValue(voxel), before = violationAround(voxel);
+        if (std::abs(old) > almostOn * voxel_) return false;
+        values_.setValueOnly(voxel, old > 0 ? 0 : std::numeric_limits<float>::min());
+        if (violationAround(voxel) < before - leastGain) return true;
+        values_.setValueOnly(voxel, old);
+        return false;
+    }
+
+    // Moves the values of a voxel and its neighbours by the least change that brings the squared gradient into its
+    // range, were that linear. None changes its side.
+    void satisfy(const Coord& voxel) {
+        const float q = squaredGradient(voxel);
+        const float wanted = q < lowest ? lowest + margin - q : highest - margin - q;
+        std::array<Coord, 7> around;
+        std::array<float, 7> slopes;
+        std::size_t count = 0;
+        float sum = 0;
+        alongAxes(voxel, 1, [&](const Coord& near) {
+            if (!values_.isValueOn(near)) return;
+            const float by = slope(voxel, near);
+            if (!canMove(values_.getValue(near), wanted * by)) return;
+            around[count] = near;
+            slopes[count++] = by;
+            sum += by * by;
+        });
+        if (sum < leastSlope * leastSlope) return;
+        for (std::size_t i = 0; i < count; ++i)
+            move(around[i], std::clamp(wanted * slopes[i] / sum, -mostMoved, mostMoved) * voxel_);
+    }
+
+    // Whether a value may go that way: what is on the surface stays on it, lest its neighbours see it pass.
+    bool canMove(float value, float change) const {
+        return value != 0 && (std::abs(value) > atSurface * voxel_ || (value > 0) == (change > 0));
+    }
+
+    // The derivative of the squared gradient at a voxel by the value of another [1/voxel].
+    float slope(const Coord& voxel, const Coord& by) {
+        const float old = values_.getValue(by), step = difference * voxel_;
+        values_.setValueOnly(by, old + step);
+        const float above = squaredGradient(voxel);
+        values_.setValueOnly(by, old - step);
+        const float below = squaredGradient(voxel);
+        values_.setValueOnly(by, old);
+        return (above - below) / (2 * difference);
+    }
+
+    float squaredGradient(const Coord& voxel) {
+        stencil_.moveTo(voxel);
+        return stencil_.normSqGrad();
+    }
+
+    void move(const Coord& voxel, float change) {
+        constexpr float least = std::numeric_limits<float>::min();
+        const float old = values_.getValue(voxel), most = std::nextafter(grid_.background(), 0.f);
+        values_.setValueOnly(voxel,
+                             old > 0 ? std::clamp(old + change, least, most) : std::clamp(old + change, -most, -least));
+    }
+
+    // Makes the change of the voxel or one of its neighbours that lessens the violations most.
+    bool improve(const Coord& voxel, Coord& changed) {
+        float best = -leastGain, bestValue = 0;
+        bool found = false;
+        alongAxes(voxel, 1, [&](const Coord& candidate) {
+            if (!values_.isValueOn(candidate)) return;
+            const float old = values_.getValue(candidate), before = violationAround(candidate);
+            for (const float step : steps)
+                for (const float change : {step, -step}) {
+                    const float value = old + change * voxel_;
+                    if (std::abs(value) >= grid_.background()) continue;
+                    values_.setValueOnly(candidate, value);
+                    const float gain = violationAround(candidate) - before + stepCost * step;
+                    if (gain >= best) continue;
+                    best = gain;
+                    bestValue = value;
+                    changed = candidate;
+                    found = true;
+                }
+            values_.setValueOnly(candidate, old);
+        });
+        if (found) values_.setValueOnly(changed, bestValue);
+        return found;
+    }
+
+    std::vector<Coord> stillBroken(std::vector<Coord>& touched) {
+        sortUnique(touched);
+        std::erase_if(touched, [&](const Coord& voxel) { return violationAt(voxel) == 0; });
+        return std::move(touched);
+    }
+
+    FloatGrid& grid_;
+    FloatGrid::Accessor values_;
+    Stencil stencil_;
+    float voxel_;
+};
+
+// Repeats rounds until nothing is broken, or for some while nothing has been gained.
+std::vector<Coord> project(FloatGrid& grid) {
+    Mender mender(grid);
+    std::vector<Coord> broken = survey(grid).broken;
+    std::size_t fewest = broken.size();
+    for (int round = 0, idle = 0; round < maxProjections && idle < idleProjections && !broken.empty(); ++round) {
+        broken = mender.project(broken);
+        idle = broken.size() < fewest ? 0 : idle + 1;
+        fewest = std::min(fewest, broken.size());
+    }
+    return broken;
+}
+
+// Mends what single voxels can mend; returns those still broken.
+std::vector<Coord> descend(FloatGrid& grid) {
+    Survey found = survey(grid);
+    if (found.broken.size() > found.crossed / manyBroken) {
+        openvdb::tools::LevelSetTracker<FloatGrid> tracker(grid);
+        tracker.normalize();
+        tracker.prune();
+        found = survey(grid);
+    }
+    Mender mender(grid);
+    std::vector<Coord> broken = std::move(found.broken);
+    std::size_t fewest = broken.size();
+    for (int round = 0, idle = 0; round < maxRounds && !broken.empty(); ++round) {
+        broken = idle < patience ? mender.descend(broken) : mender.smooth(broken);
+        idle = broken.size() < fewest || idle == patience ? 0 : idle + 1;
+        fewest = std::min(fewest, broken.size());
+    }
+    return broken;
+}
+
+// Smooths the surface within some voxels of the broken ones: features thinner than a voxel are more than it can hold.
+void smoothAround(FloatGrid& grid, const std::vector<Coord>& broken, int radius) {
+    FloatGrid mask(0);
+    mask.setTransform(grid.transformPtr());
+    for (const Coord& voxel : broken) mask.fill({voxel.offsetBy(-radius), voxel.offsetBy(radius)}, 1.f);
+    openvdb::tools::LevelSetFilter<FloatGrid> filter(grid);
+    filter.gaussian(1, &mask);
+    filter.prune();
+}
+
+// Of voxels that are in both bands.
+Changes changes(const FloatGrid& before, const FloatGrid& after) {
+    Changes found;
+    const float voxel = float(after.voxelSize()[0]);
+    const auto old = before.getConstAccessor();
+    for (auto value = after.cbeginValueOn(); value; ++value) {
+        const Coord at = value.getCoord();
+        if (!old.isValueOn(at)) continue;
+        const float change = std::abs(*value - old.getValue(at)) / voxel;
+        found.voxels += change > notable;
+        if (change > found.largest) found.largest = change, found.where = at;
+    }
+    return found;
+}
+
+}  // namespace
+
+Changes mend(FloatGrid& grid) {
+    const FloatGrid::ConstPtr before = grid.deepCopy();
+    tidy(grid);
+    std::vector<Coord> broken = project(grid);
+    for (int smoothing = 0; !broken.empty(); ++smoothing) {
+        if (smoothing > 0) smoothAround(grid, broken, firstRadius + smoothing);
+        if (smoothing > maxSmoothings)
+            throw std::runtime_error("seed: the surface cannot be made a level set at this voxel size");
+        broken = descend(grid);
+    }
+    return changes(*before, grid);
+}
+
+}  // namespace bilayer::fluid::detail

@@ -1,0 +1,35 @@
+// Sums without rounding; internal.
+#pragma once
+
+#include <array>
+#include <cstddef>
+
+namespace bilayer::detail {
+
+/// The exact sum of at most `Capacity` doubles, for its sign: J. R. Shewchuk, "Adaptive Precision Floating-Point
+/// Arithmetic and Fast Robust Geometric Predicates" (1997), growing an expansion by one number at a time. Exact as long
+/// as nothing overflows.
+template <std::size_t Capacity>
+class ExactSum {
+  public:
+    void add(double value) {
+        std::size_t kept = 0;
+        for (std::size_t i = 0; i < count_; ++i) {
+            const double sum = value + parts_[i], other = sum - value;
+            const double rest = (value - (sum - other)) + (parts_[i] - other);
+            if (rest != 0) parts_[kept++] = rest;
+            value = sum;
+        }
+        if (value != 0) parts_[kept++] = value;
+        count_ = kept;
+    }
+
+    // The largest part comes last, and outweighs all others.
+    int sign() const { return count_ == 0 ? 0 : parts_[count_ - 1] > 0 ? 1 : -1; }
+
+  private:
+    std::array<double, Capacity> parts_{};
+    std::size_t count_ = 0;
+};
+
+}  // namespace bilayer::detail

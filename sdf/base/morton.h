@@ -1,0 +1,25 @@
+// Morton order: places that are near one another in space are mostly near one another in it.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+namespace bilayer::detail {
+
+/// Whether one place comes before another: the axis whose coordinates differ in the highest bit decides, and of those
+/// that differ alike the first. Keys need not be built.
+inline bool beforeInMortonOrder(const std::array<std::uint32_t, 3>& a, const std::array<std::uint32_t, 3>& b) {
+    std::size_t axis = 0;
+    std::uint32_t most = a[0] ^ b[0];
+    for (std::size_t other = 1; other < 3; ++other) {
+        const std::uint32_t differing = a[other] ^ b[other];
+        if (most < differing && most < (most ^ differing)) {
+            most = differing;
+            axis = other;
+        }
+    }
+    return a[axis] < b[axis];
+}
+
+}  // namespace bilayer::detail

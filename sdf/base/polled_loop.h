@@ -1,0 +1,24 @@
+// A loop on all threads that can be cancelled.
+#pragma once
+
+#include <oneapi/tbb/blocked_range.h>
+#include <oneapi/tbb/parallel_for.h>
+
+#include <cstddef>
+
+#include "sdf/base/progress.h"
+
+namespace bilayer::detail {
+
+/// Calls body(i) for the numbers below `count`, `grain` of them at a time, on all threads. Throws Cancelled.
+template <class Body>
+void forAllPolled(std::size_t count, std::size_t grain, Progress* progress, const Body& body) {
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, grain), [&](const auto& range) {
+        for (std::size_t i = range.begin(); i < range.end(); ++i) {
+            if (i % grain == 0) poll(progress);
+            body(i);
+        }
+    });
+}
+
+}  // namespace bilayer::detail

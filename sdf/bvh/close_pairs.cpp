@@ -1,0 +1,243 @@
+// Highway compiles the part between HWY_BEFORE_NAMESPACE and HWY_AFTER_NAMESPACE once for each instruction set. What is
+// left out is left out for sure, so all of them lead to the same counts.
+#include "sdf/bvh/close_pairs.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "sdf/bvh/close_pairs.cpp"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
+#include <bit>
+
+#include "sdf/bvh/tree_lanes.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace bilayer::detail::HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+using IndexTag = hn::RebindToUnsigned<Tag>;
+
+/// Rounding of a volume in floats, relative to the sum of the sizes of its products: eight roundings and some room.
+constexpr float roundingOfVolume = 1e-6f;
+/// More than what products lose where they are too small for a float.
+constexpr float leastProduct = 1e-30f, leastVolume = 1e-37f;
+
+inline Points pointsAt(const float (&p)[3][treeWidth], std::size_t lane) {
+    const Tag tag;
+    return {hn::Load(tag, p[0] + lane), hn::Load(tag, p[1] + lane), hn::Load(tag, p[2] + lane)};
+}
+
+// One point in all lanes.
+inline Points pointAt(const float (&p)[3][treeWidth], std::size_t i) {
+    const Tag tag;
+    return {hn::Set(tag, p[0][i]), hn::Set(tag, p[1][i]), hn::Set(tag, p[2][i])};
+}
+
+struct Boxes {
+    Points lower, upper;
+
+    explicit Boxes(const Points* c)
+        : lower{least(c[0].x, c[1].x, c[2].x), least(c[0].y, c[1].y, c[2].y), least(c[0].z, c[1].z, c[2].z)},
+          upper{most(c[0].x, c[1].x, c[2].x), most(c[0].y, c[1].y, c[2].y), most(c[0].z, c[1].z, c[2].z)} {}
+    Boxes(const Points& lower, const Points& upper) : lower(lower), upper(upper) {}
+
+    Mask meet(const Boxes& o) const {
+        const Mask x = hn::And(hn::Le(lower.x, o.upper.x), hn::Le(o.lower.x, upper.x));
+        const Mask y = hn::And(hn::Le(lower.y, o.upper.y), hn::Le(o.lower.y, upper.y));
+        const Mask z = hn::And(hn::Le(lower.z, o.upper.z), hn::Le(o.lower.z, upper.z));
+        return hn::And(x, hn::And(y, z));
+    }
+
+    static Vec least(Vec a, Vec b, Vec c) { return hn::Min(a, hn::Min(b, c)); }
+    static Vec most(Vec a, Vec b, Vec c) { return hn::Max(a, hn::Max(b, c)); }
+};
+
+// The planes of triangles, and on which side of them points lie for sure.
+struct Planes {
+    Points origin, normal, sizes;  // the latter: of the products that the normal is made of
+
+    explicit Planes(const Points* c) : origin(c[0]) {
+        const Points u = c[1] - c[0], v = c[2] - c[0];
+        const auto products = [](Vec a, Vec b, Vec c, Vec d, Vec& difference, Vec& size) {
+            const Vec first = hn::Mul(a, b), second = hn::Mul(c, d);
+            difference = hn::Sub(first, second);
+            size = hn::Add(hn::Add(hn::Abs(first), hn::Abs(second)), hn::Set(Tag(), leastProduct));
+        };
+        products(u.y, v.z, u.z, v.y, normal.x, sizes.x);
+        products(u.z, v.x, u.x, v.z, normal.y, sizes.y);
+        products(u.x, v.y, u.y, v.x, normal.z, sizes.z);
+    }
+
+    void sides(const Points& p, Mask& above, Mask& below) const {
+        const Points d = p - origin;
+        const auto sum = [](Vec a, Vec b, Vec c) { return hn::Add(hn::Add(a, b), c); };
+        const Vec volume = sum(hn::Mul(normal.x, d.x), hn::Mul(normal.y, d.y), hn::Mul(normal.z, d.z));
+        const Vec size =
+            sum(hn::Mul(sizes.x, hn::Abs(d.x)), hn::Mul(sizes.y, hn::Abs(d.y)), hn::Mul(sizes.z, hn::Abs(d.z)));
+        const Vec room = hn::Add(hn::Mul(size, hn::Set(Tag(), roundingOfVolume)), hn::Set(Tag(), leastVolume));
+        above = hn::Gt(volume, room);
+        below = hn::Lt(volume, hn::Neg(room));
+    }
+
+    // Whether a triangle lies on one side, but for corners that it shares.
+    Mask apart(const Points* corners, const Mask* shared) const {
+        Mask above[3], below[3];
+        for (int k = 0; k < 3; ++k) {
+            sides(corners[k], above[k], below[k]);
+            above[k] = hn::Or(above[k], shared[k]);
+            below[k] = hn::Or(below[k], shared[k]);
+        }
+        return hn::Or(hn::And(above[0], hn::And(above[1], above[2])), hn::And(below[0], hn::And(below[1], below[2])));
+    }
+};
+
+// The triangles of a leaf, or as many as a vector holds.
+struct Lanes {
+    Points corners[3];
+    Boxes boxes;
+
+    Lanes(const TriangleLeaf& leaf, std::size_t lane)
+        : corners{pointsAt(leaf.corners[0], lane), pointsAt(leaf.corners[1], lane), pointsAt(leaf.corners[2], lane)},
+          boxes(corners) {}
+};
+
+// The same, with what it takes to look at pairs.
+struct Others {
+    const Lanes& lanes;
+    hn::Vec<IndexTag> vertices[3];
+    Planes planes;
+
+    Others(const Mesh& mesh, const TriangleLeaf& leaf, std::size_t lane, const Lanes& lanes)
+        : lanes(lanes), planes(lanes.corners) {
+        alignas(64) std::uint32_t numbers[3][treeWidth];
+        for (std::size_t i = lane; i < lane + hn::Lanes(Tag()); ++i)
+            for (int k = 0; k < 3; ++k) numbers[k][i] = mesh.triangles[leaf.triangles[i]][k];
+        for (int k = 0; k < 3; ++k) vertices[k] = hn::Load(IndexTag(), numbers[k] + lane);
+    }
+
+    // Of those in the mask, the ones that a triangle may run through.
+    Mask close(const Points* other, const glm::uvec3& t, Mask mask) const {
+        // which corners of each lane, and which of the other, are shared
+        Mask mine[3], its[3];
+        for (int k = 0; k < 3; ++k) mine[k] = its[k] = hn::FirstN(Tag(), 0);
+        for (int i = 0; i < 3; ++i)
+            for (int k = 0; k < 3; ++k) {
+                const Mask same = hn::RebindMask(Tag(), hn::Eq(vertices[i], hn::Set(IndexTag(), t[k])));
+                mine[i] = hn::Or(mine[i], same);
+                its[k] = hn::Or(its[k], same);
+            }
+        const Mask edge = hn::Or(hn::And(mine[0], hn::Or(mine[1], mine[2])), hn::And(mine[1], mine[2]));
+        mask = hn::AndNot(hn::Or(edge, Planes(other).apart(lanes.corners, mine)), mask);
+        if (hn::AllFalse(Tag(), mask)) return mask;
+        return hn::AndNot(planes.apart(other, its), mask);
+    }
+};
+
+class LeafPairs {
+  public:
+    LeafPairs(const Mesh& mesh, const TriangleTree& tree, std::uint32_t leaf,
+              std::vector<std::pair<unsigned, unsigned>>& pairs)
+        : mesh_(mesh), tree_(tree), index_(leaf), leaf_(tree.leaf(leaf)), pairs_(pairs) {
+        for (std::size_t lane = 0; lane < treeWidth; lane += hn::Lanes(Tag())) {
+            const Boxes boxes = Lanes(leaf_, lane).boxes;
+            store(boxes.lower, lower_, lane);
+            store(boxes.upper, upper_, lane);
+        }
+    }
+
+    void find() {
+        const Boxes own = boxAt(tree_.boxes().groups[index_ / treeWidth], index_ % treeWidth);
+        descend(tree_.boxes().root(), own);
+    }
+
+  private:
+    static Boxes boxAt(const BoxGroup& group, std::size_t place) {
+        return {pointAt(group.lower, place), pointAt(group.upper, place)};
+    }
+
+    void descend(std::uint32_t node, const Boxes& own) {
+        const BoxGroup& group = tree_.boxes().group(node);
+        for (std::size_t lane = 0; lane < treeWidth; lane += hn::Lanes(Tag())) {
+            const Boxes boxes(pointsAt(group.lower, lane), pointsAt(group.upper, lane));
+            for (unsigned bits = bitsOf(boxes.meet(own)); bits != 0; bits &= bits - 1) {
+                const std::size_t place = lane + std::size_t(std::countr_zero(bits));
+                const std::uint32_t child = group.firstChild + std::uint32_t(place);
+                if (!tree_.boxes().isLeaf(child))
+                    descend(child, own);
+                else if (child >= index_)
+                    meet(child, boxAt(group, place), own);
+            }
+        }
+    }
+
+    static void store(const Points& points, float (&to)[3][treeWidth], std::size_t lane) {
+        hn::Store(points.x, Tag(), to[0] + lane);
+        hn::Store(points.y, Tag(), to[1] + lane);
+        hn::Store(points.z, Tag(), to[2] + lane);
+    }
+
+    // Which triangles of the leaf meet a box.
+    unsigned inBox(const Boxes& box) const {
+        unsigned all = 0;
+        for (std::size_t lane = 0; lane < treeWidth; lane += hn::Lanes(Tag()))
+            all |= bitsOf(Boxes(pointsAt(lower_, lane), pointsAt(upper_, lane)).meet(box)) << lane;
+        return all & ((1u << tree_.leafSize(index_)) - 1);
+    }
+
+    void meet(std::uint32_t other, const Boxes& box, const Boxes& own) {
+        const unsigned mine = inBox(box);
+        if (mine == 0) return;
+        const TriangleLeaf& leaf = tree_.leaf(other);
+        const Tag tag;
+        const std::size_t count = tree_.leafSize(other);
+        for (std::size_t lane = 0; lane < count; lane += hn::Lanes(tag)) {
+            const Lanes lanes(leaf, lane);
+            const Mask near = hn::And(hn::FirstN(tag, count - lane), lanes.boxes.meet(own));
+            if (hn::AllFalse(tag, near)) continue;
+            const Others others(mesh_, leaf, lane, lanes);
+            for (unsigned bits = mine; bits != 0; bits &= bits - 1)
+                take(others, leaf, lane, std::size_t(std::countr_zero(bits)), near, other == index_);
+        }
+    }
+
+    void take(const Others& others, const TriangleLeaf& leaf, std::size_t lane, std::size_t i, Mask near, bool same) {
+        Mask mask = hn::And(near, others.lanes.boxes.meet({pointAt(lower_, i), pointAt(upper_, i)}));
+        if (hn::AllFalse(Tag(), mask)) return;
+        const Points corners[3] = {pointAt(leaf_.corners[0], i), pointAt(leaf_.corners[1], i),
+                                   pointAt(leaf_.corners[2], i)};
+        mask = others.close(corners, mesh_.triangles[leaf_.triangles[i]], mask);
+        for (unsigned bits = bitsOf(mask); bits != 0; bits &= bits - 1) {
+            const std::size_t k = lane + std::size_t(std::countr_zero(bits));
+            // in its own leaf, a triangle is paired with later ones
+            if (!same || k > i) pairs_.emplace_back(leaf_.triangles[i], leaf.triangles[k]);
+        }
+    }
+
+    const Mesh& mesh_;
+    const TriangleTree& tree_;
+    const std::uint32_t index_;
+    const TriangleLeaf& leaf_;
+    alignas(64) float lower_[3][treeWidth], upper_[3][treeWidth];  // boxes of its triangles
+    std::vector<std::pair<unsigned, unsigned>>& pairs_;
+};
+
+void findPairs(const Mesh& mesh, const TriangleTree& tree, std::uint32_t leaf,
+               std::vector<std::pair<unsigned, unsigned>>& pairs) {
+    LeafPairs(mesh, tree, leaf, pairs).find();
+}
+
+}  // namespace bilayer::detail::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace bilayer::detail {
+HWY_EXPORT(findPairs);
+
+void findClosePairs(const Mesh& welded, const TriangleTree& tree, std::uint32_t leaf,
+                    std::vector<std::pair<unsigned, unsigned>>& pairs) {
+    pairs.clear();
+    HWY_DYNAMIC_DISPATCH(findPairs)(welded, tree, leaf, pairs);
+}
+
+}  // namespace bilayer::detail
+#endif  // HWY_ONCE

@@ -1,0 +1,40 @@
+// A group or a leaf of a tree as SIMD sees it: a box or a triangle a lane. Highway includes this file once for each
+// instruction set: only between HWY_BEFORE_NAMESPACE's headers and its own, after hwy/highway.h.
+#if defined(BILAYER_SDF_TREE_LANES_H) == defined(HWY_TARGET_TOGGLE)
+#ifdef BILAYER_SDF_TREE_LANES_H
+#undef BILAYER_SDF_TREE_LANES_H
+#else
+#define BILAYER_SDF_TREE_LANES_H
+#endif
+
+#include <hwy/highway.h>
+
+#include <cstdint>
+
+#include "sdf/bvh/box_tree.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace bilayer::detail::HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+using Tag = hn::CappedTag<float, treeWidth>;
+using Vec = hn::Vec<Tag>;
+using Mask = hn::Mask<Tag>;
+
+inline unsigned bitsOf(Mask mask) {
+    std::uint8_t bits[8] = {};
+    hn::StoreMaskBits(Tag(), mask, bits);
+    return bits[0];
+}
+
+// Points, a lane each.
+struct Points {
+    Vec x, y, z;
+
+    Points operator-(const Points& o) const { return {hn::Sub(x, o.x), hn::Sub(y, o.y), hn::Sub(z, o.z)}; }
+};
+
+}  // namespace bilayer::detail::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#endif

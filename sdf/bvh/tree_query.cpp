@@ -1,0 +1,422 @@
+// Highway compiles the part between HWY_BEFORE_NAMESPACE and HWY_AFTER_NAMESPACE once for each instruction set. Lanes
+// never add up, so all of them give the same bytes.
+#include "sdf/bvh/tree_query.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "sdf/bvh/tree_query.cpp"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <limits>
+
+#include "sdf/bvh/leaf_measure.h"
+#include "sdf/leaf/blocks.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace bilayer::detail::HWY_NAMESPACE {
+using IndexTag = hn::RebindToUnsigned<Tag>;
+using NumberTag = hn::RebindToSigned<Tag>;
+
+/// Triangles whose distances d differ by less may share the closest point: more than floats blur. Squared distances
+/// then differ by less than tie * (1 + d^2), since 2 d <= 1 + d^2; so it is in exact_block.cpp [voxels].
+constexpr float tie = 1e-5f;
+/// Nearer to a face than this its side is left to a closer look [voxels].
+constexpr float leastHeight = 1e-3f;
+/// Up to this reach the two above hold; they grow with it beyond, as the rounding of distances does [voxels].
+constexpr float usualReach = 16;
+/// Room for the rounding of distances, and for ties, when a bound is taken from one place to another [voxels].
+constexpr float slack = 1e-3f;
+/// The eight corners of a cube, each beside the one before.
+constexpr int path[8][3] = {{0, 0, 0}, {0, 0, 1}, {0, 1, 1}, {0, 1, 0}, {1, 1, 0}, {1, 1, 1}, {1, 0, 1}, {1, 0, 0}};
+/// The eight voxels of a cube are measured together against no more triangles than this: with more it is quicker to let
+/// each choose its own. Cubes with more nodes around them have more.
+constexpr std::size_t mostTogether = 64, mostNodes = 16;
+
+// The squared distances of eight boxes, or as many as a vector holds, from a box of voxels.
+inline Vec boxDistance2(const float* const lower[3], const float* const upper[3], std::size_t i,
+                        const VoxelBox& voxels) {
+    const Tag tag;
+    Vec sum = hn::Zero(tag);
+    for (int k = 0; k < 3; ++k) {
+        const Vec gap = hn::Max(hn::Sub(hn::LoadU(tag, lower[k] + i), hn::Set(tag, voxels.upper[k])),
+                                hn::Sub(hn::Set(tag, voxels.lower[k]), hn::LoadU(tag, upper[k] + i)));
+        sum = hn::Add(sum, square(hn::Max(gap, hn::Zero(tag))));
+    }
+    return sum;
+}
+
+// Where boxes are stored: in a list or in a group.
+struct Boxes {
+    const float *lower[3], *upper[3];
+
+    explicit Boxes(const NodeList& list) {
+        for (int k = 0; k < 3; ++k) lower[k] = list.lower[k].data(), upper[k] = list.upper[k].data();
+    }
+    explicit Boxes(const BoxGroup& group) {
+        for (int k = 0; k < 3; ++k) lower[k] = group.lower[k], upper[k] = group.upper[k];
+    }
+};
+
+struct Narrowing {
+    const WideTree& tree;
+    const VoxelBox& voxels;
+    float reach2, largest;
+    NodeList& to;
+
+    void take(const Boxes& boxes, std::size_t i, hn::Vec<IndexTag> nodes, Mask valid) {
+        const Tag tag;
+        Vec side = hn::Zero(tag);
+        for (int k = 0; k < 3; ++k)
+            side = hn::Max(side, hn::Sub(hn::LoadU(tag, boxes.upper[k] + i), hn::LoadU(tag, boxes.lower[k] + i)));
+        const Mask near =
+            hn::And(valid, hn::Le(boxDistance2(boxes.lower, boxes.upper, i, voxels), hn::Set(tag, reach2)));
+        const Mask isGroup = hn::RebindMask(
+            tag, hn::Gt(hn::BitCast(NumberTag(), nodes), hn::Set(NumberTag(), std::int32_t(tree.leafCount) - 1)));
+        const Mask open = hn::And(near, hn::And(isGroup, hn::Gt(side, hn::Set(tag, largest))));
+        keep(boxes, i, nodes, hn::AndNot(open, near));
+        HWY_ALIGN std::uint32_t numbers[treeWidth];
+        hn::Store(nodes, IndexTag(), numbers);
+        for (unsigned bits = bitsOf(open); bits != 0; bits &= bits - 1)
+            takeGroup(tree.group(numbers[std::countr_zero(bits)]));
+    }
+
+    void takeGroup(const BoxGroup& group) {
+        const Boxes boxes(group);
+        for (std::size_t i = 0; i < treeWidth; i += hn::Lanes(Tag()))
+            take(boxes, i, hn::Iota(IndexTag(), group.firstChild + std::uint32_t(i)), hn::FirstN(Tag(), treeWidth));
+    }
+
+    void keep(const Boxes& boxes, std::size_t i, hn::Vec<IndexTag> nodes, Mask mask) {
+        const Tag tag;
+        to.makeRoom(treeWidth);
+        for (int k = 0; k < 3; ++k) {
+            hn::CompressStore(hn::LoadU(tag, boxes.lower[k] + i), mask, tag, to.lower[k].data() + to.count);
+            hn::CompressStore(hn::LoadU(tag, boxes.upper[k] + i), mask, tag, to.upper[k].data() + to.count);
+        }
+        to.count += hn::CompressStore(nodes, hn::RebindMask(IndexTag(), mask), IndexTag(), to.nodes.data() + to.count);
+    }
+};
+
+void narrowList(const WideTree& tree, const NodeList& from, const VoxelBox& voxels, float reach, float largest,
+                NodeList& to) {
+    const Tag tag;
+    to.count = 0;
+    Narrowing narrowing{tree, voxels, reach * reach * roundUp, largest, to};
+    const Boxes boxes(from);
+    for (std::size_t i = 0; i < from.count; i += hn::Lanes(tag))
+        narrowing.take(boxes, i, hn::LoadU(IndexTag(), from.nodes.data() + i), hn::FirstN(tag, from.count - i));
+}
+
+// The range of a voxel's heights over the triangles around its closest point. It lies on a side that all of them agree
+// on; 0 stands for a triangle that the closest point is on an edge of.
+struct Heights {
+    float lowest = 0, highest = 0;
+    float nearest = 0;  // over the triangle that floats call the nearest
+};
+
+// One voxel's question.
+struct Query {
+    const WideTree& tree;
+    const NodeList& list;
+    BlockAnswer& answer;
+    float tieWidth;  // distances less than this apart are equal
+    VoxelBox voxel;
+    float best2, limit2;  // boxes farther away than the latter do not matter
+    std::size_t repeats;  // so many of the visits may come up again: the first one was a guess
+
+    void lower(float distance2) {
+        best2 = distance2;
+        limit2 = best2 * (roundUp + tieWidth) + tieWidth;
+    }
+
+    // From now on nothing is nearest: all leaves whose boxes are nearer than this are visited that were not yet.
+    void widen(float distance) {
+        best2 = 0;
+        limit2 = distance * distance * roundUp;
+        repeats = answer.visits.size();
+    }
+
+    bool met(std::uint32_t leaf) const {
+        for (std::size_t v = 0; v < repeats; ++v)
+            if (answer.visits[v].leaf == leaf) return true;
+        return false;
+    }
+
+    // The squared distances to the triangles of a leaf.
+    void visit(std::uint32_t index) {
+        const Tag tag;
+        const WideLeaf& leaf = tree.leaves[index];
+        answer.visits.emplace_back();
+        BlockAnswer::Visit& found = answer.visits.back();
+        found.leaf = index;
+        const glm::vec3 p = voxel.lower;
+        float nearest = best2;
+        for (std::size_t i = 0; i < treeWidth; i += hn::Lanes(tag)) {
+            const auto load = [&](const float* from) { return hn::Load(tag, from + i); };
+            const Measured m = measure(leaf, load, hn::Set(tag, p.x), hn::Set(tag, p.y), hn::Set(tag, p.z));
+            hn::Store(m.distance2, tag, found.distance2 + i);
+            hn::Store(m.height, tag, found.height + i);
+            nearest = std::min(nearest, hn::GetLane(hn::MinOfLanes(tag, m.distance2)));
+        }
+        if (nearest < best2) lower(nearest);
+    }
+
+    void look(const Boxes& boxes, std::size_t begin, std::size_t count, const std::uint32_t* nodes,
+              std::uint32_t firstNode) {
+        const Tag tag;
+        for (std::size_t i = begin; i < begin + count; i += hn::Lanes(tag)) {
+            const Vec distance2 = boxDistance2(boxes.lower, boxes.upper, i, voxel);
+            unsigned bits = bitsOf(hn::Le(distance2, hn::Set(tag, limit2)));
+            if (begin + count - i < hn::Lanes(tag)) bits &= (1u << (begin + count - i)) - 1;
+            if (bits == 0) continue;
+            HWY_ALIGN float gaps[treeWidth];
+            hn::Store(distance2, tag, gaps);
+            for (; bits != 0; bits &= bits - 1) {
+                const auto lane = std::size_t(std::countr_zero(bits));
+                if (gaps[lane] > limit2) continue;  // something nearer was found meanwhile
+                const std::uint32_t node = nodes ? nodes[i + lane] : firstNode + std::uint32_t(i + lane);
+                if (!tree.isLeaf(node))
+                    look(Boxes(tree.group(node)), 0, treeWidth, nullptr, tree.group(node).firstChild);
+                else if (!met(node))
+                    visit(node);
+            }
+        }
+    }
+
+    // Where the nearest triangle's leaf stands in the visits, and its place there.
+    std::pair<std::size_t, std::size_t> winner() const {
+        for (std::size_t v = 0; v < answer.visits.size(); ++v)
+            for (std::size_t i = 0; i < treeWidth; ++i)
+                if (answer.visits[v].distance2[i] == best2) return {v, i};
+        return {0, 0};
+    }
+
+    // The heights over all faces that share the closest point.
+    Heights heights(float nearest) const {
+        const Tag tag;
+        const Vec infinity = hn::Set(tag, std::numeric_limits<float>::infinity());
+        Vec lowest = infinity, highest = hn::Neg(infinity);
+        for (const auto& v : answer.visits)
+            for (std::size_t i = 0; i < treeWidth; i += hn::Lanes(tag)) {
+                const Mask tied = hn::Le(hn::Load(tag, v.distance2 + i), hn::Set(tag, limit2));
+                const Vec height = hn::Load(tag, v.height + i);
+                lowest = hn::Min(lowest, hn::IfThenElse(tied, height, infinity));
+                highest = hn::Max(highest, hn::IfThenElse(tied, height, hn::Neg(infinity)));
+            }
+        return {hn::GetLane(hn::MinOfLanes(tag, lowest)), hn::GetLane(hn::MaxOfLanes(tag, highest)), nearest};
+    }
+};
+
+// The eight voxels of a cube of side 2, a lane each, and the triangles that they were measured against.
+struct Together {
+    struct Candidate {
+        alignas(64) float distance2[treeWidth];
+        float height[treeWidth];
+        std::int32_t triangle;
+    };
+    // What a voxel's nearest triangles say.
+    struct Answers {
+        alignas(64) float lowest[treeWidth], highest[treeWidth], winner[treeWidth];
+    };
+
+    const WideTree& tree;
+    alignas(64) float x[treeWidth], y[treeWidth], z[treeWidth], best2[treeWidth];
+    std::size_t count = 0;
+    Candidate candidates[mostTogether];
+
+    Together(const WideTree& whole, const glm::vec3& lower) : tree(whole) {
+        for (int i = 0; i < treeWidth; ++i) {
+            x[i] = lower.x + float(path[i][0]);
+            y[i] = lower.y + float(path[i][1]);
+            z[i] = lower.z + float(path[i][2]);
+            best2[i] = std::numeric_limits<float>::max();
+        }
+    }
+
+    void ask(std::uint32_t leafIndex, std::size_t place) {
+        const Tag tag;
+        const WideLeaf& leaf = tree.leaves[leafIndex];
+        Candidate& candidate = candidates[count++];
+        candidate.triangle = std::int32_t(leaf.triangles[place]);
+        const auto load = [&](const float* from) { return hn::Set(tag, from[place]); };
+        for (std::size_t i = 0; i < treeWidth; i += hn::Lanes(tag)) {
+            const Measured m = measure(leaf, load, hn::Load(tag, x + i), hn::Load(tag, y + i), hn::Load(tag, z + i));
+            hn::Store(m.distance2, tag, candidate.distance2 + i);
+            hn::Store(m.height, tag, candidate.height + i);
+            hn::Store(hn::Min(m.distance2, hn::Load(tag, best2 + i)), tag, best2 + i);
+        }
+    }
+
+    // The distance that no voxel's nearest triangle exceeds.
+    float farthest() const { return std::sqrt(*std::max_element(best2, best2 + treeWidth)); }
+
+    // The first of the nearest triangles, and the heights over all that share the closest point.
+    Answers answers(float tieWidth) const {
+        const Tag tag;
+        Answers found;
+        for (std::size_t i = 0; i < treeWidth; i += hn::Lanes(tag)) {
+            const Vec best = hn::Load(tag, best2 + i), infinity = hn::Set(tag, std::numeric_limits<float>::infinity());
+            const Vec limit = hn::Add(hn::Mul(best, hn::Set(tag, roundUp + tieWidth)), hn::Set(tag, tieWidth));
+            Vec lowest = infinity, highest = hn::Neg(infinity), winner = hn::Zero(tag);
+            for (std::size_t c = count; c-- > 0;) {
+                const Vec distance2 = hn::Load(tag, candidates[c].distance2 + i);
+                const Vec height = hn::Load(tag, candidates[c].height + i);
+                const Mask tied = hn::Le(distance2, limit);
+                lowest = hn::Min(lowest, hn::IfThenElse(tied, height, infinity));
+                highest = hn::Max(highest, hn::IfThenElse(tied, height, hn::Neg(infinity)));
+                winner = hn::IfThenElse(hn::Eq(distance2, best), hn::Set(tag, float(c)), winner);
+            }
+            hn::Store(lowest, tag, found.lowest + i);
+            hn::Store(highest, tag, found.highest + i);
+            hn::Store(winner, tag, found.winner + i);
+        }
+        return found;
+    }
+};
+
+// What all voxels of a block share.
+struct BlockQuery {
+    const WideTree& tree;
+    const glm::vec3& origin;
+    float reach;
+    bool sign;
+    BlockAnswer& answer;
+
+    // Asks for what is nearer than `bound`.
+    Query ask(const NodeList& list, const glm::vec3& position, float bound) const {
+        const float ties = sign ? tie * std::max(1.f, reach / usualReach) : 0.f;
+        Query query{tree, list, answer, ties, {position, position}, 0, 0, 1};
+        query.lower(bound * bound * roundUp);
+        answer.visits.clear();
+        query.visit(answer.lastWinner);
+        query.look(Boxes(list), 0, list.count, list.nodes.data(), 0);
+        return query;
+    }
+
+    // The voxels of a cube, which are no farther than `radius` from its centre: what is known of the centre rules
+    // out most of the list, if not all voxels.
+    void answerCube(const NodeList& from, const glm::vec3& lower, int level) {
+        const float side = float(blockSide >> level), radius = 0.5f * (side - 1) * std::sqrt(3.f) + slack;
+        const float bound = reach + radius;
+        Query centre = ask(from, lower + 0.5f * (side - 1), bound);
+        if (!(centre.best2 < bound * bound)) return;
+        answer.lastWinner = answer.visits[centre.winner().first].leaf;
+        NodeList& list = answer.lists[level];
+        const float atMost = std::min(reach, std::sqrt(centre.best2) + radius);
+        narrowList(tree, from, {lower, lower + (side - 1)}, atMost + slack, 2 * side, list);
+        if (level == 2 && answerTogether(centre, list, lower, atMost, radius)) return;
+        for (const auto& step : path) {
+            const glm::vec3 part = lower + 0.5f * side * glm::vec3(step[0], step[1], step[2]);
+            if (level < 2)
+                answerCube(list, part, level + 1);
+            else
+                answerVoxel(list, part, atMost);
+        }
+    }
+
+    void answerVoxel(const NodeList& list, const glm::vec3& position, float atMost) {
+        const Query query = ask(list, position, std::min(reach, atMost + slack));
+        if (query.best2 > reach * reach * roundUp || answer.visits.empty()) return;
+        const auto [visit, place] = query.winner();
+        if (answer.visits[visit].distance2[place] != query.best2) return;
+        answer.lastWinner = answer.visits[visit].leaf;
+        keep(position, query.best2, std::int32_t(tree.leaves[answer.lastWinner].triangles[place]),
+             sign ? query.heights(answer.visits[visit].height[place]) : Heights{});
+    }
+
+    // Answers the voxels of a cube of side 2 at once, if few triangles matter to any of them: those that are no farther
+    // from the centre, where all are measured first, than the nearest one of some voxel may be.
+    bool answerTogether(Query& centre, const NodeList& list, const glm::vec3& lower, float atMost, float radius) {
+        if (list.count > mostNodes) return false;
+        Together cube(tree, lower);
+        const auto [visit, place] = centre.winner();
+        const std::uint32_t winner = answer.visits[visit].leaf;
+        cube.ask(winner, place);
+        centre.widen(std::min(atMost, cube.farthest()) + radius + slack);
+        centre.look(Boxes(list), 0, list.count, list.nodes.data(), 0);
+        for (const auto& v : answer.visits)
+            for (std::size_t i = 0; i < treeWidth; ++i) {
+                if (v.distance2[i] > centre.limit2 || (v.leaf == winner && i == place)) continue;
+                if (cube.count == mostTogether) return false;
+                cube.ask(v.leaf, i);
+            }
+        const Together::Answers found = cube.answers(centre.tieWidth);
+        for (std::size_t i = 0; i < treeWidth; ++i)
+            if (cube.best2[i] <= reach * reach * roundUp) {
+                const Together::Candidate& nearest = cube.candidates[std::size_t(found.winner[i])];
+                keep({cube.x[i], cube.y[i], cube.z[i]}, cube.best2[i], nearest.triangle,
+                     {found.lowest[i], found.highest[i], nearest.height[i]});
+            }
+        return true;
+    }
+
+    void keep(const glm::vec3& position, float best2, std::int32_t triangle, const Heights& heights) {
+        const glm::ivec3 p(position - origin);
+        const int voxel = (p.x * blockSide + p.y) * blockSide + p.z;
+        const auto x = std::size_t(p.x);
+        const std::uint64_t bit = std::uint64_t(1) << (p.y * blockSide + p.z);
+        const float distance = std::sqrt(best2);
+        answer.distances[voxel] = distance;
+        answer.triangles[voxel] = triangle;
+        answer.known[x] |= bit;
+        if (!sign) return;
+        if (distance > farFrom) answer.far[x] |= bit;
+        if (distance > midFrom) answer.mid[x] |= bit;
+        const float least = leastHeight * std::max(1.f, reach / usualReach);
+        // on the surface either side is right, and no link can carry it on
+        if (heights.lowest > least || distance < 0.5f * linkSlack) answer.sides.outside[x] |= bit;
+        if (heights.highest < -least) answer.sides.inside[x] |= bit;
+        if (heights.nearest > least) answer.nearest.outside[x] |= bit;
+        if (heights.nearest < -least) answer.nearest.inside[x] |= bit;
+    }
+};
+
+void answerVoxels(const WideTree& tree, const NodeList& list, const glm::vec3& origin, float reach, bool sign,
+                  BlockAnswer& answer) {
+    answer.known = answer.far = answer.mid = {};
+    answer.sides = answer.nearest = {};
+    std::fill_n(answer.distances, blockVoxels, farAway);
+    std::fill_n(answer.triangles, blockVoxels, -1);
+    BlockQuery{tree, origin, reach, sign, answer}.answerCube(list, origin, 0);
+}
+
+}  // namespace bilayer::detail::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace bilayer::detail {
+
+HWY_EXPORT(narrowList);
+HWY_EXPORT(answerVoxels);
+
+void NodeList::makeRoom(std::size_t more) {
+    if (count + 2 * more <= nodes.size()) return;
+    const std::size_t size = 2 * (count + 2 * more);
+    for (int k = 0; k < 3; ++k) lower[k].resize(size), upper[k].resize(size);
+    nodes.resize(size);
+}
+
+NodeList wholeTree(const WideTree& tree) {
+    NodeList list;
+    list.makeRoom(treeWidth);
+    for (int k = 0; k < 3; ++k) list.lower[k][0] = -1, list.upper[k][0] = float(tree.size[k] + 1);
+    list.nodes[0] = tree.root();
+    list.count = 1;
+    return list;
+}
+
+void narrow(const WideTree& tree, const NodeList& from, const VoxelBox& voxels, float reach, float largest,
+            NodeList& to) {
+    HWY_DYNAMIC_DISPATCH(narrowList)(tree, from, voxels, reach, largest, to);
+}
+
+void answerBlock(const WideTree& tree, const NodeList& list, const glm::vec3& origin, float reach, bool sign,
+                 BlockAnswer& answer) {
+    HWY_DYNAMIC_DISPATCH(answerVoxels)(tree, list, origin, reach, sign, answer);
+}
+
+}  // namespace bilayer::detail
+#endif  // HWY_ONCE

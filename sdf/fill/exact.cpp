@@ -1,0 +1,234 @@
+// The exact method, brick by brick: pieces, clusters, blocks, sides.
+#include "sdf/fill/exact.h"
+
+#include <oneapi/tbb/enumerable_thread_specific.h>
+#include <oneapi/tbb/parallel_for.h>
+
+#include <algorithm>
+#include <bit>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <glm/vector_relational.hpp>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "sdf/base/progress.h"
+#include "sdf/fill/block_bins.h"
+#include "sdf/fill/clusters.h"
+#include "sdf/fill/triangle_bins.h"
+#include "sdf/sign/closest_side.h"
+#include "sdf/sign/fallback_sign.h"
+
+namespace bilayer::detail {
+namespace {
+
+/// Longer edges are halved, so that a piece stays near the blocks that ask for it and floats hold its frame [voxels].
+constexpr double longestPieceEdge = 16;
+/// A triangle must come this much nearer than a sample's piece might to be left out of a closer look [voxels].
+constexpr float sideSlack = 1e-3f;
+/// Ways that are tried before the winding number of the whole mesh.
+constexpr int mostWays = 16;
+constexpr std::size_t trianglesPerPoll = 1024;  // a tenth of a millisecond
+
+// What a thread works in; kept from brick to brick.
+struct Scratch {
+    std::vector<Piece> pieces;
+    Clusters clusters;
+    BlockBins bins;
+    std::vector<glm::ivec3> origins;
+    std::vector<float> distances;
+    std::vector<std::int32_t> triangles;
+};
+
+class BrickFiller {
+  public:
+    BrickFiller(const MeshJob& job, const TriangleBins& bins, double voxelsPerUnit, LastResort& lastResort,
+                Scratch& scratch)
+        : job_(job),
+          bins_(bins),
+          voxelsPerUnit_(voxelsPerUnit),
+          lastResort_(lastResort),
+          s_(scratch),
+          side_(job.mesh, voxelsPerUnit) {}
+
+    void fill(std::size_t brick) {
+        origin_ = bins_.origins[brick];
+        if (!wanted(origin_, bins_.side)) return;
+        blocks_ = bins_.side / blockSide;
+        cut(brick);
+        s_.clusters.build(s_.pieces, origin_);
+        s_.bins.build(s_.clusters.clusters(), blocks_, job_.reach);
+        s_.origins.clear();
+        s_.distances.clear();
+        s_.triangles.clear();
+        std::size_t number = 0;
+        forEachBlockOfBrick([&](const glm::ivec3& inBrick) { fillBlock(number++, inBrick); });
+        if (!s_.origins.empty()) job_.sink({s_.origins, s_.distances, s_.triangles});
+    }
+
+  private:
+    bool wanted(const glm::ivec3& first, int side) const { return !job_.wanted || job_.wanted(first, side); }
+
+    // Pieces beyond these reach none of the wanted blocks.
+    TriangleLimits limitsOfWanted() const {
+        glm::ivec3 lower = origin_, upper = origin_ + (bins_.side - blockSide);
+        if (job_.wanted) {
+            std::swap(lower, upper);
+            forEachBlockOfBrick([&](const glm::ivec3& inBrick) {
+                const glm::ivec3 block = origin_ + inBrick;
+                if (!job_.wanted(block, blockSide)) return;
+                lower = glm::min(lower, block);
+                upper = glm::max(upper, block);
+            });
+        }
+        const double margin = double(job_.reach) + 1.0;
+        return {glm::dvec3(lower) - margin, glm::dvec3(upper + (blockSide - 1)) + margin};
+    }
+
+    template <class Visit>
+    void forEachBlockOfBrick(Visit visit) const {
+        for (int x = 0; x < blocks_; ++x)
+            for (int y = 0; y < blocks_; ++y)
+                for (int z = 0; z < blocks_; ++z) visit(blockSide * glm::ivec3(x, y, z));
+    }
+
+    void cut(std::size_t brick) {
+        s_.pieces.clear();
+        const TriangleLimits limits = limitsOfWanted();
+        PieceCutter cutter(longestPieceEdge, s_.pieces);
+        detail::forEachTriangle(job_.mesh, bins_.trianglesOf(brick), voxelsPerUnit_,
+                                [&](std::uint32_t triangle, const TriangleCorners& corners) {
+                                    if (++cut_ % trianglesPerPoll == 0) job_.progress.poll();
+                                    if (!job_.wanted || !misses(corners, limits)) cutter.cut(corners, triangle, limits);
+                                });
+        cutter.finish();
+    }
+
+    void fillBlock(std::size_t number, const glm::ivec3& inBrick) {
+        reaching_ = s_.bins.at(number);
+        block_ = origin_ + inBrick;
+        if (reaching_.empty() || !wanted(block_, blockSide)) return;
+        job_.progress.poll();
+        inBrick_ = inBrick;
+        if (!measureBlock({reaching_, s_.clusters.clusters().data(), s_.clusters.members().data(), s_.pieces.data(),
+                           block_, glm::vec3(inBrick), job_.reach},
+                          found_))
+            return;
+        const std::size_t first = s_.distances.size();
+        s_.origins.push_back(block_);
+        s_.distances.resize(first + blockVoxels);
+        signDistances(found_, job_.sign ? insideVoxels() : BlockMask{}, s_.distances.data() + first);
+        if (!job_.triangles) return;
+        for (const std::int32_t nearest : found_.nearest)
+            s_.triangles.push_back(nearest < 0 ? -1
+                                               : std::int32_t(s_.pieces[std::size_t(nearest >> sideBits)].triangle));
+    }
+
+    // Sides over faces are known; links carry them on. What they do not reach is asked for, a voxel a component, those
+    // far from the surface first.
+    BlockMask insideVoxels() {
+        BlockSides sides{found_.outside, found_.inside};
+        const std::size_t onBoth =
+            completeSides(findLinks(found_.distance), {&found_.far, &found_.mid, &found_.known}, sides,
+                          [&](int voxel) { return isInside(voxel, sides.outside, sides.inside); });
+        if (onBoth > 0 && job_.conflicts) *job_.conflicts += onBoth;
+        return sides.inside;
+    }
+
+    // Asks the closest feature; where its normals cancel out, the way to a voxel whose side is known; at last the
+    // winding number.
+    bool isInside(int voxel, const BlockMask& outside, const BlockMask& inside) {
+        const glm::ivec3 local = inBlock(voxel);
+        const auto nearest = std::size_t(found_.nearest[voxel] >> sideBits);
+        const glm::dvec3 point(block_ + local);
+        side_.begin(point);
+        side_.offer(s_.pieces[nearest].triangle);
+        const float distance = float(side_.distance()) + sideSlack;
+        forEachNear(
+            [&](const glm::vec3& sample, float radius) {
+                const glm::vec3 away = glm::vec3(local + inBrick_) - sample;
+                return glm::dot(away, away) <= (distance + radius) * (distance + radius);
+            },
+            [&](std::uint32_t triangle) { side_.offer(triangle); });
+        if (const Side side = side_.side(); side != Side::undecided) return side == Side::inside;
+        if (const auto known = insideByWays(local, outside, inside)) return *known;
+        return lastResort_.isInside(point / voxelsPerUnit_);
+    }
+
+    static glm::ivec3 inBlock(int voxel) { return {voxel / 64, voxel / 8 % 8, voxel % 8}; }
+
+    // Visits the triangles of all pieces near enough, some of them more than once.
+    template <class Near, class Visit>
+    void forEachNear(Near near, Visit visit) const {
+        for (const std::uint32_t c : reaching_) {
+            const Cluster& cluster = s_.clusters.clusters()[c];
+            if (!near(cluster.sample, cluster.radius)) continue;
+            for (std::uint32_t m = cluster.begin; m < cluster.end; ++m) {
+                const Member& member = s_.clusters.members()[m];
+                if (near(member.sample, member.radius)) visit(s_.pieces[member.piece].triangle);
+            }
+        }
+    }
+
+    // Tries the ways to a few voxels well away from the surface whose side is known.
+    std::optional<bool> insideByWays(const glm::ivec3& from, const BlockMask& outside, const BlockMask& inside) {
+        int tries = 0;
+        for (std::size_t x = 0; x < inside.size(); ++x)
+            for (std::uint64_t targets = found_.far[x] & (outside[x] | inside[x]); targets != 0;
+                 targets &= targets - 1) {
+                const int bit = std::countr_zero(targets);
+                const bool knownInside = (inside[x] >> bit) & 1;
+                const auto winding = windingAfter(inBlock(int(x) * 64 + bit) - from, knownInside ? 1 : 0);
+                if (winding && (*winding == 0 || *winding == 1)) return *winding == 1;
+                if (++tries == mostWays) return std::nullopt;
+            }
+        return std::nullopt;
+    }
+
+    // The winding number at the beginning of a way from the point in question, by that at its end. The way lies in the
+    // block, so all that it passes reaches the block.
+    std::optional<int> windingAfter(const glm::ivec3& way, int atEnd) {
+        passed_.clear();
+        forEachNear([](const glm::vec3&, float) { return true; },
+                    [&](std::uint32_t triangle) { passed_.push_back(triangle); });
+        std::sort(passed_.begin(), passed_.end());
+        passed_.erase(std::unique(passed_.begin(), passed_.end()), passed_.end());
+        int winding = atEnd;
+        for (const std::uint32_t triangle : passed_) {
+            const std::optional<int> turn = passing(side_.cornersOf(triangle), glm::dvec3(way));
+            if (!turn) return std::nullopt;
+            winding += *turn;
+        }
+        return winding;
+    }
+
+    const MeshJob& job_;
+    const TriangleBins& bins_;
+    double voxelsPerUnit_;
+    LastResort& lastResort_;
+    Scratch& s_;
+    std::size_t cut_ = 0;
+    ClosestSide side_;
+    BlockDistances found_;
+    std::vector<std::uint32_t> passed_;
+    std::span<const std::uint32_t> reaching_;  // clusters of the current block
+    glm::ivec3 origin_{0}, block_{0}, inBrick_{0};
+    int blocks_ = 0;
+};
+
+}  // namespace
+
+void fillExact(const MeshJob& job, const Bounds& box) {
+    const double voxelsPerUnit = 1.0 / double(job.voxelSize);
+    const TriangleBins bins = binTriangles(job.mesh, box, voxelsPerUnit, job.reach, &job.progress);
+    job.progress.begin(bins.count());
+    LastResort lastResort(job);
+    tbb::enumerable_thread_specific<Scratch> scratch;
+    tbb::parallel_for(std::size_t(0), bins.count(), [&](std::size_t brick) {
+        BrickFiller(job, bins, voxelsPerUnit, lastResort, scratch.local()).fill(brick);
+        job.progress.advance();
+    });
+}
+
+}  // namespace bilayer::detail

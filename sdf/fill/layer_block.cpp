@@ -1,0 +1,275 @@
+// Highway compiles the part between HWY_BEFORE_NAMESPACE and HWY_AFTER_NAMESPACE once for each instruction set.
+#include "sdf/fill/layer_block.h"
+
+#include "sdf/fill/double_layer.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "sdf/fill/layer_block.cpp"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <limits>
+
+HWY_BEFORE_NAMESPACE();
+namespace bilayer::detail::HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+constexpr int cubeSide = LayerSamples::cellSide;  // voxels
+constexpr int sliceVoxels = cubeSide * cubeSide;  // of one x
+constexpr int cubesPerSide = blockSide / cubeSide;
+constexpr int cubesPerBlock = cubesPerSide * cubesPerSide * cubesPerSide;
+
+/// As many voxels of a slice at once as there are lanes: rows along z.
+using Tag = hn::CappedTag<float, sliceVoxels>;
+using IntTag = hn::RebindToSigned<Tag>;
+using Vec = hn::Vec<Tag>;
+using Mask = hn::Mask<Tag>;
+using IntVec = hn::Vec<IntTag>;
+
+constexpr float infinite = std::numeric_limits<float>::infinity();
+constexpr float halfCube = 0.5f * float(cubeSide - 1);  // from the middle of a cube to its last voxels
+
+// Places of a slice's voxels, from the middle of their cube.
+struct Lattice {
+    alignas(64) float y[sliceVoxels], z[sliceVoxels];
+};
+constexpr Lattice lattice = [] {
+    Lattice l{};
+    for (int i = 0; i < sliceVoxels; ++i) {
+        l.y[i] = float(i / cubeSide) - halfCube;
+        l.z[i] = float(i % cubeSide) - halfCube;
+    }
+    return l;
+}();
+
+inline float sliceAt(int x) {
+    return float(x) - halfCube;
+}
+
+// One vector's part of each slice of a cube, from the middle of the cube.
+struct Voxels {
+    explicit Voxels(int part) {
+        const auto at = std::size_t(part) * hn::Lanes(Tag());
+        y = hn::Load(Tag(), lattice.y + at);
+        z = hn::Load(Tag(), lattice.z + at);
+    }
+    HWY_INLINE Vec square(int x) const {
+        return hn::MulAdd(y, y, hn::MulAdd(z, z, hn::Set(Tag(), sliceAt(x) * sliceAt(x))));
+    }
+    Vec y, z;
+};
+
+// The points of a layer around a cube, from its middle.
+struct LayerPoints {
+    LayerPoints(LayerScratch::Layer& memory, std::size_t size) {
+        for (auto& column : memory.columns)
+            if (column.size() < size) column.resize(size);
+        if (memory.picked.size() < size) memory.picked.resize(size);
+        x = memory.columns[0].data();
+        y = memory.columns[1].data();
+        z = memory.columns[2].data();
+        halfSquare = memory.columns[3].data();
+        picked = memory.picked.data();
+    }
+
+    // Places a vector of points, and picks those nearer to the cube's voxels than the root of reach2.
+    HWY_INLINE void put(std::uint32_t first, Vec px, Vec py, Vec pz, Mask among, Vec reach2) {
+        const Tag tag;
+        const auto square = [](Vec a, Vec b, Vec c) { return hn::MulAdd(a, a, hn::MulAdd(b, b, hn::Mul(c, c))); };
+        const auto beyond = [](Vec at) {
+            return hn::Max(hn::Sub(hn::Abs(at), hn::Set(Tag(), halfCube)), hn::Zero(Tag()));
+        };
+        const hn::RebindToUnsigned<Tag> indexTag;
+        const Mask near = hn::And(among, hn::Lt(square(beyond(px), beyond(py), beyond(pz)), reach2));
+        const auto numbers = hn::Add(hn::Iota(indexTag, 0), hn::Set(indexTag, first));
+        hn::StoreU(px, tag, x + first);
+        hn::StoreU(py, tag, y + first);
+        hn::StoreU(pz, tag, z + first);
+        hn::StoreU(hn::Mul(square(px, py, pz), hn::Set(tag, 0.5f)), tag, halfSquare + first);
+        hn::StoreU(hn::Compress(numbers, hn::RebindMask(indexTag, near)), indexTag, picked + count);
+        count += hn::CountTrue(tag, near);
+    }
+
+    float *x, *y, *z, *halfSquare;  // of all points, in the order of the brick's samples
+    std::uint32_t* picked;          // those that reach the cube
+    std::size_t count = 0;          // of those
+};
+
+// The points of a layer that are nearest to voxels. They are those with the greatest p . v - |p|^2 / 2, as
+// |v - p|^2 = |v|^2 - 2 (p . v - |p|^2 / 2): one multiplication a voxel and point.
+template <bool cube, bool withOwners>
+struct Nearest {
+    HWY_INLINE Nearest(const LayerBlockInput& input, const LayerPoints& points, const glm::vec3& middle,
+                       const Voxels& v) {
+        const Tag tag;
+        for (int x = 0; x < cubeSide; ++x) {
+            greatest[x] = hn::Set(tag, -infinite);
+            if constexpr (withOwners) owner[x] = hn::Set(IntTag(), -1);
+        }
+        for (const std::uint32_t p : std::span(points.picked, points.count)) {
+            const Vec along = hn::Set(tag, points.x[p]);
+            Vec across = hn::MulAdd(v.z, hn::Set(tag, points.z[p]),
+                                    hn::MulSub(v.y, hn::Set(tag, points.y[p]), hn::Set(tag, points.halfSquare[p])));
+            glm::vec3 centre(0);
+            if constexpr (cube) {
+                centre = centreOf(input, p) - middle;
+                across = hn::IfThenElse(isNear(input, centre, v), across, hn::Set(tag, -infinite));
+            }
+            for (int x = 0; x < cubeSide; ++x) {
+                if (cube && std::abs(sliceAt(x) - centre.x) > float(input.parameters.cube)) continue;
+                const Vec some = hn::MulAdd(along, hn::Set(tag, sliceAt(x)), across);
+                if constexpr (withOwners)
+                    owner[x] = hn::IfThenElse(hn::RebindMask(IntTag(), hn::Gt(some, greatest[x])),
+                                              hn::Set(IntTag(), input.samples.columns().triangle[p]), owner[x]);
+                greatest[x] = hn::Max(greatest[x], some);
+            }
+        }
+    }
+
+    HWY_INLINE Vec distance2(const Voxels& v, int x) const {
+        return hn::NegMulAdd(hn::Set(Tag(), 2.f), greatest[x], v.square(x));
+    }
+
+    Vec greatest[cubeSide];
+    IntVec owner[cubeSide];
+
+  private:
+    // The paper's neighbourhood: voxels of a cube around the lattice point nearest to the sample.
+    static glm::vec3 centreOf(const LayerBlockInput& input, std::uint32_t p) {
+        const auto& place = input.samples.columns().place;
+        return LayerSamples::nearestLattice({place[0][p], place[1][p], place[2][p]});
+    }
+    static Mask isNear(const LayerBlockInput& input, const glm::vec3& centre, const Voxels& v) {
+        const Tag tag;
+        const Vec y = hn::Abs(hn::Sub(v.y, hn::Set(tag, centre.y))), z = hn::Abs(hn::Sub(v.z, hn::Set(tag, centre.z)));
+        return hn::Le(hn::Max(y, z), hn::Set(tag, float(input.parameters.cube)));
+    }
+};
+
+// Writes rows of a part of a slice into the block.
+template <class D, class T>
+HWY_INLINE void putRows(D tag, hn::Vec<D> values, int part, T* corner) {
+    alignas(64) T rows[sliceVoxels];
+    hn::Store(values, tag, rows);
+    const int lanes = int(hn::Lanes(tag)), inRow = std::min(lanes, cubeSide);
+    for (int i = 0, at = part * lanes; i < lanes; i += inRow, at += inRow)
+        std::memcpy(corner + at / cubeSide * blockSide + at % cubeSide, rows + i, std::size_t(inRow) * sizeof(T));
+}
+
+// Eq. 3: from both layers to signed distances. The inside keeps its sign bit where the distance is clamped to zero.
+template <class Nearest>
+HWY_INLINE void combine(const Nearest& inner, const Nearest& outer, const Voxels& v, const FillParameters& parameters,
+                        int part, float* distances, std::int32_t* triangles) {
+    const Tag tag;
+    const Vec delta = hn::Set(tag, parameters.delta), certain2 = hn::Set(tag, parameters.certain * parameters.certain);
+    for (int x = 0; x < cubeSide; ++x) {
+        const int slice = x * blockSide * blockSide;
+        const Vec inner2 = hn::Min(inner.distance2(v, x), certain2), outer2 = hn::Min(outer.distance2(v, x), certain2);
+        // where only the outer layer is near enough to be known, the tie tells nothing
+        const auto inside = hn::And(hn::Lt(inner2, certain2), hn::Le(inner2, hn::Add(outer2, hn::Set(tag, layerTie))));
+        const Vec other2 = hn::Max(hn::Max(inner2, outer2), hn::Zero(tag));
+        const Vec clamped = hn::Max(hn::Sub(hn::Sqrt(other2), delta), hn::Zero(tag));
+        const Vec phi = hn::IfThenElse(inside, hn::Neg(clamped), clamped);
+        const auto known = hn::Lt(hn::Min(inner2, outer2), certain2);
+        putRows(tag, hn::IfThenElse(known, phi, hn::Set(tag, infinite)), part, distances + slice);
+        if (triangles)
+            putRows(IntTag(), hn::IfThenElse(hn::RebindMask(IntTag(), inside), outer.owner[x], inner.owner[x]), part,
+                    triangles + slice);
+    }
+}
+
+// Picks the points of both layers that reach a cube: those near enough or, with the paper's cubes, those whose
+// neighbourhood meets it.
+template <bool cube>
+HWY_INLINE void pick(const LayerBlockInput& input, const glm::vec3& middle, std::span<const LayerSamples::Range> ranges,
+                     LayerPoints& inner, LayerPoints& outer) {
+    const Tag tag;
+    const SampleColumns& columns = input.samples.columns();
+    const float* places[] = {columns.place[0].data(), columns.place[1].data(), columns.place[2].data()};
+    const float* offsets[] = {columns.offset[0].data(), columns.offset[1].data(), columns.offset[2].data()};
+    const Vec reach2 = hn::Set(tag, input.parameters.certain * input.parameters.certain),
+              half = hn::Set(tag, float(input.parameters.cube) + halfCube),
+              centre[] = {hn::Set(tag, middle.x), hn::Set(tag, middle.y), hn::Set(tag, middle.z)};
+    for (const LayerSamples::Range& range : ranges)
+        for (std::uint32_t i = range.begin; i < range.end; i += std::uint32_t(hn::Lanes(tag))) {
+            Mask among = hn::FirstN(tag, range.end - i);
+            Vec in[3], out[3];
+            for (int axis = 0; axis < 3; ++axis) {
+                const Vec place = hn::LoadU(tag, places[axis] + i), offset = hn::LoadU(tag, offsets[axis] + i),
+                          at = hn::Sub(place, centre[axis]);
+                if constexpr (cube) {
+                    const Vec nearest = hn::Floor(hn::Add(place, hn::Set(tag, 0.5001f)));
+                    among = hn::And(among, hn::Le(hn::Abs(hn::Sub(nearest, centre[axis])), half));
+                }
+                in[axis] = hn::Sub(at, offset);
+                out[axis] = hn::Add(at, offset);
+            }
+            inner.put(i, in[0], in[1], in[2], among, reach2);
+            outer.put(i, out[0], out[1], out[2], among, reach2);
+        }
+}
+
+template <bool cube, bool withOwners>
+bool fillCube(const LayerBlockInput& input, const glm::ivec3& inBlock, LayerScratch& scratch, LayerPoints inner,
+              LayerPoints outer, float* distances, std::int32_t* triangles) {
+    const glm::ivec3 inBrick = input.inBrick + inBlock;
+    const glm::vec3 middle = glm::vec3(inBrick) + halfCube;
+    pick<cube>(input, middle, input.samples.near(inBrick / cubeSide, 1, scratch.near), inner, outer);
+    const int corner = (inBlock.x * blockSide + inBlock.y) * blockSide + inBlock.z;
+    if (inner.count + outer.count == 0) {
+        for (int x = 0; x < cubeSide; ++x)
+            for (int y = 0; y < cubeSide; ++y)
+                std::fill_n(distances + corner + (x * blockSide + y) * blockSide, cubeSide, infinite);
+        return false;
+    }
+    for (int part = 0; part * int(hn::Lanes(Tag())) < sliceVoxels; ++part) {
+        const Voxels voxels(part);
+        const Nearest<cube, withOwners> nearestInner(input, inner, middle, voxels),
+            nearestOuter(input, outer, middle, voxels);
+        combine(nearestInner, nearestOuter, voxels, input.parameters, part, distances + corner,
+                withOwners ? triangles + corner : nullptr);
+    }
+    return true;
+}
+
+bool fillLayerBlock(const LayerBlockInput& input, LayerScratch& scratch, float* distances, std::int32_t* triangles) {
+    const auto fill = input.parameters.cube > 0 ? (triangles ? fillCube<true, true> : fillCube<true, false>)
+                                                : (triangles ? fillCube<false, true> : fillCube<false, false>);
+    bool any = false;
+    if (input.samples.near(input.inBrick / cubeSide, cubesPerSide, scratch.near).empty()) return false;
+    const std::size_t size = input.samples.count() + hn::Lanes(Tag());
+    const LayerPoints inner(scratch.inner, size), outer(scratch.outer, size);
+    for (int cube = 0; cube < cubesPerBlock; ++cube)
+        any |= fill(input, cubeSide * glm::ivec3(cube / 4, cube / 2 % 2, cube % 2), scratch, inner, outer, distances,
+                    triangles);
+    return any;
+}
+
+const char* targetName() {
+    return hwy::TargetName(HWY_TARGET);
+}
+
+}  // namespace bilayer::detail::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace bilayer::detail {
+
+HWY_EXPORT(fillLayerBlock);
+HWY_EXPORT(targetName);
+
+bool fillLayerBlock(const LayerBlockInput& input, LayerScratch& scratch, float* distances, std::int32_t* triangles) {
+    return HWY_DYNAMIC_DISPATCH(fillLayerBlock)(input, scratch, distances, triangles);
+}
+
+const char* simdName() {
+    return HWY_DYNAMIC_DISPATCH(targetName)();
+}
+
+}  // namespace bilayer::detail
+#endif  // HWY_ONCE

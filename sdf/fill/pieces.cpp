@@ -1,0 +1,187 @@
+// Highway compiles the part between HWY_BEFORE_NAMESPACE and HWY_AFTER_NAMESPACE once for each instruction set.
+#include "sdf/fill/pieces.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "sdf/fill/pieces.cpp"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
+#include <algorithm>
+#include <cmath>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+
+HWY_BEFORE_NAMESPACE();
+namespace bilayer::detail::HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+using Tag = hn::CappedTag<float, PieceCutter::batch>;
+using Vec = hn::Vec<Tag>;
+using Mask = hn::Mask<Tag>;
+
+/// Rounding of a sample's place and of the radius around it [voxels].
+constexpr float radiusSlack = 1e-5f;
+/// Shorter edges are points, and lower pieces are as good as their longest edge: floats hold the squares of all that is
+/// longer [voxels].
+constexpr float shortest = 1e-9f;
+
+struct Vec3 {
+    Vec x, y, z;
+};
+
+inline Vec3 operator+(Vec3 a, Vec3 b) {
+    return {hn::Add(a.x, b.x), hn::Add(a.y, b.y), hn::Add(a.z, b.z)};
+}
+inline Vec3 operator-(Vec3 a, Vec3 b) {
+    return {hn::Sub(a.x, b.x), hn::Sub(a.y, b.y), hn::Sub(a.z, b.z)};
+}
+inline Vec3 operator*(Vec s, Vec3 a) {
+    return {hn::Mul(s, a.x), hn::Mul(s, a.y), hn::Mul(s, a.z)};
+}
+inline Vec dot(Vec3 a, Vec3 b) {
+    return hn::Add(hn::Add(hn::Mul(a.x, b.x), hn::Mul(a.y, b.y)), hn::Mul(a.z, b.z));
+}
+inline Vec3 cross(Vec3 a, Vec3 b) {
+    return {hn::Sub(hn::Mul(a.y, b.z), hn::Mul(a.z, b.y)), hn::Sub(hn::Mul(a.z, b.x), hn::Mul(a.x, b.z)),
+            hn::Sub(hn::Mul(a.x, b.y), hn::Mul(a.y, b.x))};
+}
+inline Vec3 select(Mask mask, Vec3 yes, Vec3 no) {
+    return {hn::IfThenElse(mask, yes.x, no.x), hn::IfThenElse(mask, yes.y, no.y), hn::IfThenElse(mask, yes.z, no.z)};
+}
+inline Vec3 load(const float (&from)[3][PieceCutter::batch], std::size_t i) {
+    const Tag tag;
+    return {hn::Load(tag, from[0] + i), hn::Load(tag, from[1] + i), hn::Load(tag, from[2] + i)};
+}
+
+// Whether a length gives a direction.
+inline Mask isLength(Vec length) {
+    return hn::Gt(length, hn::Set(Tag(), shortest));
+}
+
+// One over a length; zero for what is none.
+inline Vec inverse(Vec length) {
+    return hn::IfThenElseZero(isLength(length), hn::Div(hn::Set(Tag(), 1.f), length));
+}
+
+// A unit vector across a unit vector: for pieces without a height.
+inline Vec3 across(Vec3 u) {
+    const Tag tag;
+    const Mask useX = hn::Lt(hn::Abs(u.x), hn::Set(tag, 0.6f));
+    const Vec one = hn::Set(tag, 1.f), zero = hn::Zero(tag);
+    const Vec3 way = cross(u, select(useX, {one, zero, zero}, {zero, one, zero}));
+    return inverse(hn::Sqrt(dot(way, way))) * way;
+}
+
+// The numbers of a batch of pieces, a column each.
+struct Columns {
+    void put(int row, std::size_t i, Vec value) { hn::Store(value, Tag(), values[row] + i); }
+    void put(int row, std::size_t i, Vec3 value) {
+        put(row, i, value.x);
+        put(row + 1, i, value.y);
+        put(row + 2, i, value.z);
+    }
+    glm::vec3 vec3(int row, std::size_t i) const { return {values[row][i], values[row + 1][i], values[row + 2][i]}; }
+    alignas(64) float values[24][PieceCutter::batch];
+};
+enum Row { origin = 0, axisU = 3, axisW = 6, axisN = 9, length = 12, left = 13, right = 16, sample = 19, radius = 22 };
+
+// The unit vector and the length of an edge in (u, w).
+inline void putEdge(Columns& columns, int row, std::size_t i, Vec x, Vec y) {
+    const Tag tag;
+    const Vec size = hn::Sqrt(hn::Add(hn::Mul(x, x), hn::Mul(y, y))), part = inverse(size);
+    columns.put(row, i, hn::IfThenElse(isLength(size), hn::Mul(x, part), hn::Set(tag, 1.f)));
+    columns.put(row + 1, i, hn::Mul(y, part));
+    columns.put(row + 2, i, size);
+}
+
+inline void makeColumns(const PieceCutter::Waiting& waiting, std::size_t i, Columns& columns) {
+    const Tag tag;
+    const Vec3 corner = load(waiting.corner, i), ab = load(waiting.ab, i), ac = load(waiting.ac, i), bc = ac - ab;
+    // turned so that the longest edge comes first
+    const Vec ab2 = dot(ab, ab), bc2 = dot(bc, bc), ca2 = dot(ac, ac);
+    const Mask first = hn::And(hn::Ge(ab2, bc2), hn::Ge(ab2, ca2)), second = hn::Ge(bc2, ca2);
+    const Vec3 none{hn::Zero(tag), hn::Zero(tag), hn::Zero(tag)};
+    const Vec3 begin = select(first, corner, select(second, corner + ab, corner + ac));
+    const Vec3 edge = select(first, ab, select(second, bc, none - ac));
+    const Vec3 third = select(first, ac, select(second, none - ab, ab - ac));
+
+    const Vec size = hn::Sqrt(dot(edge, edge));
+    const Vec3 u = select(isLength(size), inverse(size) * edge, {hn::Set(tag, 1.f), hn::Zero(tag), hn::Zero(tag)});
+    const Vec along = hn::Min(hn::Max(dot(third, u), hn::Zero(tag)), size);
+    const Vec3 rest = third - along * u;
+    Vec height = hn::Sqrt(dot(rest, rest));
+    // once more across u, because the rest of a flat piece is mostly rounding; if nothing remains then, all of it was
+    const Vec3 rough = inverse(height) * rest, way = rough - dot(rough, u) * u;
+    const Vec wayLength = hn::Sqrt(dot(way, way));
+    const Mask flat = hn::Or(hn::Not(isLength(height)), hn::Lt(wayLength, hn::Set(tag, 0.5f)));
+    const Vec3 w = select(flat, across(u), inverse(wayLength) * way);
+    height = hn::IfThenZeroElse(flat, height);
+    columns.put(Row::origin, i, begin);
+    columns.put(Row::axisU, i, u);
+    columns.put(Row::axisW, i, w);
+    columns.put(Row::axisN, i, cross(u, w));
+    columns.put(Row::length, i, size);
+    putEdge(columns, Row::left, i, along, height);
+    putEdge(columns, Row::right, i, hn::Sub(along, size), height);
+    // the centre of the smallest circle around the piece: of its corners', or the middle of the longest edge
+    const Vec half = hn::Mul(hn::Set(tag, 0.5f), size);
+    const Vec lift = hn::Div(hn::Sub(hn::Add(hn::Mul(along, along), hn::Mul(height, height)), hn::Mul(along, size)),
+                             hn::Add(height, height));
+    const Vec up = hn::IfThenZeroElse(flat, hn::Max(lift, hn::Zero(tag)));
+    columns.put(Row::sample, i, begin + half * u + up * w);
+    columns.put(Row::radius, i,
+                hn::Add(hn::Sqrt(hn::Add(hn::Mul(half, half), hn::Mul(up, up))), hn::Set(tag, radiusSlack)));
+}
+
+void makePieces(const PieceCutter::Waiting& waiting, std::size_t count, Piece* pieces) {
+    Columns columns;
+    for (std::size_t i = 0; i < count; i += hn::Lanes(Tag())) makeColumns(waiting, i, columns);
+    const auto& v = columns.values;
+    for (std::size_t i = 0; i < count; ++i)
+        pieces[i] = {waiting.base[i],
+                     columns.vec3(Row::origin, i),
+                     columns.vec3(Row::axisU, i),
+                     columns.vec3(Row::axisW, i),
+                     columns.vec3(Row::axisN, i),
+                     v[Row::length][i],
+                     v[Row::left][i],
+                     v[Row::left + 1][i],
+                     v[Row::left + 2][i],
+                     v[Row::right][i],
+                     v[Row::right + 1][i],
+                     v[Row::right + 2][i],
+                     columns.vec3(Row::sample, i),
+                     v[Row::radius][i],
+                     waiting.triangle[i]};
+}
+
+}  // namespace bilayer::detail::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace bilayer::detail {
+namespace {
+
+HWY_EXPORT(makePieces);
+
+}  // namespace
+
+void PieceCutter::halve(const TriangleCorners& c, std::uint32_t triangle, const TriangleLimits& limits) {
+    const glm::dvec3 ab = c[1] - c[0], bc = c[2] - c[1], ca = c[0] - c[2];
+    const std::array<double, 3> lengths2{glm::dot(ab, ab), glm::dot(bc, bc), glm::dot(ca, ca)};
+    const auto longest = std::max_element(lengths2.begin(), lengths2.end());
+    const auto i = std::size_t(longest - lengths2.begin()), j = (i + 1) % 3, k = (i + 2) % 3;
+    const glm::dvec3 middle = 0.5 * (c[i] + c[j]);
+    for (const TriangleCorners& half : {TriangleCorners{c[i], middle, c[k]}, TriangleCorners{middle, c[j], c[k]}})
+        if (!misses(half, limits)) cut(half, triangle, limits);
+}
+
+void PieceCutter::finish() {
+    const std::size_t before = pieces_.size();
+    pieces_.resize(before + std::size_t(count_));
+    HWY_DYNAMIC_DISPATCH(makePieces)(waiting_, std::size_t(count_), pieces_.data() + before);
+    count_ = 0;
+}
+
+}  // namespace bilayer::detail
+#endif  // HWY_ONCE

@@ -1,0 +1,60 @@
+// Which triangles reach which brick of space: the first, coarse step of the exact and the double layer
+// method. Bins hold indices only, so
+// that memory stays a fraction of the mesh's own.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <span>
+#include <vector>
+
+#include <bilayer/sdf/mesh.h>
+
+namespace bilayer::detail {
+
+class Progress;
+
+/// The bricks that some triangle reaches, each with its triangles in ascending order.
+struct TriangleBins {
+    int side = 0;                          ///< of a brick [voxels], a power of two, at least 32
+    std::vector<glm::ivec3> origins;       ///< index coordinates of each brick's first voxel, multiples of `side`
+    std::vector<std::uint64_t> offsets;    ///< triangles of brick b: triangles[offsets[b]] .. triangles[offsets[b + 1]]
+    std::vector<std::uint32_t> triangles;  ///< indices into Mesh::triangles
+
+    std::size_t count() const { return origins.size(); }
+    std::span<const std::uint32_t> trianglesOf(std::size_t brick) const {
+        return {triangles.data() + offsets[brick], triangles.data() + offsets[brick + 1]};
+    }
+};
+
+/// Bins triangles into bricks. `reach` is how far from a triangle a voxel may lie [voxels]. A brick may hold triangles
+/// that reach none of its voxels. Throws Cancelled.
+/// @param box       of the mesh
+/// @param progress  polled, unless null
+TriangleBins binTriangles(const Mesh& mesh, const Bounds& box, double voxelsPerUnit, float reach,
+                          Progress* progress = nullptr);
+
+/// Calls visit(triangle, corners) for the triangles of a brick, with their corners in voxels. Those to come are fetched
+/// ahead, since they are all over memory.
+template <class Visit>
+void forEachTriangle(const Mesh& mesh, std::span<const std::uint32_t> triangles, double voxelsPerUnit, Visit visit) {
+    // as far ahead as memory takes to answer: first the indices, then the corners
+    constexpr std::size_t indicesAhead = 16, cornersAhead = 8;
+    for (std::size_t i = 0; i < triangles.size(); ++i) {
+        if (i + indicesAhead < triangles.size()) __builtin_prefetch(&mesh.triangles[triangles[i + indicesAhead]]);
+        if (i + cornersAhead < triangles.size()) {
+            const glm::uvec3& ahead = mesh.triangles[triangles[i + cornersAhead]];
+            for (int k = 0; k < 3; ++k) __builtin_prefetch(&mesh.points[ahead[k]]);
+        }
+        const glm::uvec3& t = mesh.triangles[triangles[i]];
+        const auto corner = [&](unsigned k) { return glm::dvec3(mesh.points[k]) * voxelsPerUnit; };
+        visit(triangles[i], std::array<glm::dvec3, 3>{corner(t.x), corner(t.y), corner(t.z)});
+    }
+}
+
+/// The side of the bricks that binTriangles() would make [voxels].
+int brickSideFor(const Bounds& box, double voxelsPerUnit, float reach);
+
+}  // namespace bilayer::detail

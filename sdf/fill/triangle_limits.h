@@ -1,0 +1,25 @@
+// A triangle in voxels, and the box that it must come near to matter.
+#pragma once
+
+#include <array>
+#include <glm/common.hpp>
+#include <glm/vec3.hpp>
+#include <glm/vector_relational.hpp>
+
+namespace bilayer::detail {
+
+/// Corners of a triangle or of a part of one [voxels].
+using TriangleCorners = std::array<glm::dvec3, 3>;
+
+/// A box in index coordinates [voxels].
+struct TriangleLimits {
+    glm::dvec3 lower, upper;
+};
+
+/// Whether the box around a triangle misses the limits.
+inline bool misses(const TriangleCorners& c, const TriangleLimits& limits) {
+    const glm::dvec3 lower = glm::min(c[0], glm::min(c[1], c[2])), upper = glm::max(c[0], glm::max(c[1], c[2]));
+    return glm::any(glm::greaterThan(lower, limits.upper)) || glm::any(glm::lessThan(upper, limits.lower));
+}
+
+}  // namespace bilayer::detail

@@ -1,0 +1,175 @@
+#include "sdf/io/child_process.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <poll.h>
+#include <signal.h>
+#include <string.h>
+#include <sys/prctl.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <climits>
+#include <cstdlib>
+#include <exception>
+#include <fstream>
+#include <new>
+#include <system_error>
+
+namespace bilayer::detail {
+namespace {
+
+constexpr int answerPipe = 3;          // its number in the child: the first after the standard streams
+constexpr int pipeCapacity = 1 << 20;  // [bytes]: fewer changes between the two processes than the usual 64 kB need
+constexpr int diedBeforeAnswer = 127;  // exit status
+
+// No signal reaches the child before it has let go of the caller's handlers.
+class SignalsBlocked {
+  public:
+    SignalsBlocked() {
+        sigset_t all;
+        sigfillset(&all);
+        pthread_sigmask(SIG_SETMASK, &all, &before_);
+    }
+    ~SignalsBlocked() { pthread_sigmask(SIG_SETMASK, &before_, nullptr); }
+    SignalsBlocked(const SignalsBlocked&) = delete;
+    SignalsBlocked& operator=(const SignalsBlocked&) = delete;
+
+  private:
+    sigset_t before_;
+};
+
+// Address space of this process [bytes]
+std::size_t addressSpace() {
+    std::size_t pages = 0;
+    std::ifstream("/proc/self/statm") >> pages;
+    return pages * std::size_t(::sysconf(_SC_PAGESIZE));
+}
+
+// Whatever ends the child by itself ends it at once, without what the caller has prepared for its own end.
+void takeDefaultEnds() {
+    std::atexit([] { ::_exit(diedBeforeAnswer); });  // called before the handlers that were there earlier
+    std::set_terminate(std::abort);
+    std::set_new_handler(nullptr);
+}
+
+void takeDefaultSignals() {
+    struct sigaction byDefault {};
+    byDefault.sa_handler = SIG_DFL;
+    for (int signal = 1; signal < NSIG; ++signal) ::sigaction(signal, &byDefault, nullptr);
+    sigset_t none;
+    sigemptyset(&none);
+    pthread_sigmask(SIG_SETMASK, &none, nullptr);
+}
+
+// Leaves the pipe, as `answerPipe`, and /dev/null as the standard streams. The pipe may have had any number.
+bool keepOnly(int pipe) {
+    const int aside = ::fcntl(pipe, F_DUPFD, answerPipe + 1);
+    const int null = ::open("/dev/null", O_RDWR);
+    if (aside < 0 || null < 0) return false;
+    for (int stream = 0; stream < answerPipe; ++stream)
+        if (::dup2(null, stream) < 0) return false;
+    if (::dup2(aside, answerPipe) < 0) return false;
+    if (::close_range(answerPipe + 1, UINT_MAX, 0) == 0) return true;
+    const long last = ::sysconf(_SC_OPEN_MAX);  // kernels before 5.9
+    for (int file = answerPipe + 1; file < last; ++file) ::close(file);
+    return true;
+}
+
+void send(const void* bytes, std::size_t count) {
+    const char* from = static_cast<const char*>(bytes);
+    while (count > 0) {
+        const ssize_t sent = ::write(answerPipe, from, count);
+        if (sent < 0 && errno == EINTR) continue;
+        if (sent <= 0) ::_exit(diedBeforeAnswer);
+        from += sent;
+        count -= std::size_t(sent);
+    }
+}
+
+[[noreturn]] void live(int pipe, std::size_t addressLimit, const ChildProcess::Work& work) noexcept {
+    ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+    ::prctl(PR_SET_DUMPABLE, 0);
+    takeDefaultEnds();
+    takeDefaultSignals();
+    const rlimit memory{addressLimit, addressLimit};
+    ::setrlimit(RLIMIT_AS, &memory);
+    if (keepOnly(pipe)) try {
+            work(send);
+            ::_exit(0);
+        } catch (...) {
+        }
+    ::_exit(diedBeforeAnswer);
+}
+
+}  // namespace
+
+ChildProcess::ChildProcess(const ChildLimits& limits, const Work& work) : time_(limits.time) {
+    int ends[2];
+    if (::pipe2(ends, O_CLOEXEC) != 0) throw std::system_error(errno, std::generic_category(), "no pipe");
+    ::fcntl(ends[1], F_SETPIPE_SZ, pipeCapacity);  // best effort: the system may allow less
+    const std::size_t addressLimit = addressSpace() + limits.memory;
+    int error = 0;
+    {
+        const SignalsBlocked blocked;
+        process_ = ::fork();
+        error = errno;
+        if (process_ == 0) live(ends[1], addressLimit, work);
+    }
+    ::close(ends[1]);
+    pipe_ = ends[0];
+    deadline_ = std::chrono::steady_clock::now() + limits.time;
+    if (process_ > 0) return;
+    ::close(pipe_);
+    throw std::system_error(error, std::generic_category(), "no child process");
+}
+
+ChildProcess::~ChildProcess() {
+    ::close(pipe_);
+    if (process_ <= 0) return;
+    // As long as it was not collected, here or by the caller's own handler, the number is still its own.
+    if (::waitpid(process_, nullptr, WNOHANG) != 0) return;
+    ::kill(process_, SIGKILL);
+    while (::waitpid(process_, nullptr, 0) < 0 && errno == EINTR) {
+    }
+}
+
+void ChildProcess::receive(void* bytes, std::size_t count) {
+    char* to = static_cast<char*>(bytes);
+    while (count > 0) {
+        waitForBytes();
+        const ssize_t got = ::read(pipe_, to, count);
+        if (got < 0 && errno == EINTR) continue;
+        if (got <= 0) throwEnd();
+        to += got;
+        count -= std::size_t(got);
+    }
+}
+
+void ChildProcess::waitForBytes() {
+    using std::chrono::milliseconds;
+    for (;;) {
+        const auto left = std::chrono::ceil<milliseconds>(deadline_ - std::chrono::steady_clock::now()).count();
+        if (left <= 0) throw ChildFailure(fmt::format("took longer than {} s", double(time_.count()) / 1000));
+        pollfd end{pipe_, POLLIN, 0};
+        const int ready = ::poll(&end, 1, int(std::min<long long>(left, INT_MAX)));
+        if (ready > 0) return;
+        if (ready < 0 && errno != EINTR) throw std::system_error(errno, std::generic_category(), "poll");
+    }
+}
+
+void ChildProcess::throwEnd() {
+    int status = 0;
+    pid_t ended = 0;
+    while ((ended = ::waitpid(process_, &status, 0)) < 0 && errno == EINTR) {
+    }
+    process_ = -1;
+    if (ended > 0 && WIFSIGNALED(status))
+        throw ChildFailure(fmt::format("ended by signal {} ({})", WTERMSIG(status), ::strsignal(WTERMSIG(status))));
+    throw ChildFailure("ended without an answer");
+}
+
+}  // namespace bilayer::detail

@@ -1,0 +1,37 @@
+// The bytes of a glTF file: its JSON, and what its buffers hold; internal.
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace bilayer::detail {
+
+using Bytes = std::vector<unsigned char>;
+
+/// A .gltf or .glb file, told by its first bytes. Throws std::runtime_error, which does not name the file, if it is
+/// damaged, is not of glTF 2, or cannot be read.
+class GltfFile {
+  public:
+    explicit GltfFile(const std::filesystem::path& path);
+
+    std::string_view json() const { return json_; }
+
+    /// What a member of the JSON's array "buffers" holds: its chunk of a binary file, its data URI, or a regular file
+    /// in the folder of the scene; cut to its byteLength. The JSON is that of parseGltf(). Throws likewise, and names
+    /// the buffer.
+    Bytes buffer(const nlohmann::json& buffers, std::size_t index) const;
+
+  private:
+    void splitChunks();
+
+    std::filesystem::path folder_;
+    Bytes bytes_;
+    std::string_view json_, chunk_;
+    bool isBinary_ = false;
+};
+
+}  // namespace bilayer::detail

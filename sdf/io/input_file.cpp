@@ -1,0 +1,31 @@
+#include "sdf/io/input_file.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <cctype>
+#include <cerrno>
+#include <stdexcept>
+#include <system_error>
+
+namespace bilayer::detail {
+
+void requireInputFile(const std::filesystem::path& path) {
+    const auto require = [&](bool holds, const std::string& why) {
+        if (!holds) throw std::runtime_error(fmt::format("{}: {}", path.string(), why));
+    };
+    std::error_code error;
+    const std::filesystem::file_status status = std::filesystem::status(path, error);
+    require(status.type() != std::filesystem::file_type::not_found, "no such file");
+    require(status.type() != std::filesystem::file_type::none, error.message());
+    require(std::filesystem::is_regular_file(status), "not a regular file");
+    require(::access(path.c_str(), R_OK) == 0, std::generic_category().message(errno));
+}
+
+std::string lowerEnding(const std::filesystem::path& path) {
+    std::string ending = path.extension().string();
+    for (char& c : ending) c = char(std::tolower(static_cast<unsigned char>(c)));
+    return ending;
+}
+
+}  // namespace bilayer::detail

@@ -1,0 +1,84 @@
+#include "sdf/io/polygon_record.h"
+
+#include <algorithm>
+#include <cstdint>
+#include <numeric>
+
+namespace bilayer::detail {
+namespace {
+
+constexpr std::uint64_t maxNotes = 1000;       // a file is not told about at greater length
+constexpr std::uint64_t maxTextBytes = 10000;  // of a note, of an error
+
+struct Header {
+    std::uint64_t isError, points, corners, sizes, notes;
+};
+
+void sendText(const ChildProcess::Send& send, const std::string& text) {
+    const std::uint64_t count = std::min<std::uint64_t>(text.size(), maxTextBytes);
+    send(&count, sizeof count);
+    send(text.data(), count);
+}
+
+std::string receiveText(ChildProcess& child) {
+    std::uint64_t count = 0;
+    child.receive(&count, sizeof count);
+    if (count > maxTextBytes) throw ChildFailure("gave a damaged answer");
+    std::string text(count, ' ');
+    child.receive(text.data(), count);
+    return text;
+}
+
+template <class T>
+void receiveAll(ChildProcess& child, std::vector<T>& items, std::uint64_t count) {
+    items.resize(count);
+    child.receive(items.data(), count * sizeof(T));
+}
+
+bool fits(const Header& header, std::size_t byteLimit) {
+    return header.notes <= maxNotes && header.points <= byteLimit / sizeof(glm::dvec3) &&
+           header.corners <= byteLimit / sizeof(unsigned) && header.sizes <= byteLimit / sizeof(unsigned);
+}
+
+bool consistent(const Polygons& p) {
+    const auto isPoint = [&](unsigned corner) { return corner < p.points.size(); };
+    if (!std::all_of(p.corners.begin(), p.corners.end(), isPoint)) return false;
+    if (p.sizes.empty()) return p.corners.size() % 3 == 0;
+    const auto isFace = [](unsigned size) { return size >= 3; };
+    return std::all_of(p.sizes.begin(), p.sizes.end(), isFace) &&
+           std::accumulate(p.sizes.begin(), p.sizes.end(), std::uint64_t(0)) == p.corners.size();
+}
+
+}  // namespace
+
+void sendPolygons(const ChildProcess::Send& send, const Polygons& p) {
+    const Header header{0, p.points.size(), p.corners.size(), p.sizes.size(),
+                        std::min<std::uint64_t>(p.notes.size(), maxNotes)};
+    send(&header, sizeof header);
+    send(p.points.data(), p.points.size() * sizeof(glm::dvec3));
+    send(p.corners.data(), p.corners.size() * sizeof(unsigned));
+    send(p.sizes.data(), p.sizes.size() * sizeof(unsigned));
+    for (std::size_t i = 0; i < header.notes; ++i) sendText(send, p.notes[i]);
+}
+
+void sendError(const ChildProcess::Send& send, const std::string& text) {
+    const Header header{1, 0, 0, 0, 0};
+    send(&header, sizeof header);
+    sendText(send, text);
+}
+
+Polygons receivePolygons(ChildProcess& child, std::size_t byteLimit) {
+    Header header{};
+    child.receive(&header, sizeof header);
+    if (header.isError == 1) throw std::runtime_error(receiveText(child));
+    if (header.isError != 0 || !fits(header, byteLimit)) throw ChildFailure("gave a damaged answer");
+    Polygons polygons;
+    receiveAll(child, polygons.points, header.points);
+    receiveAll(child, polygons.corners, header.corners);
+    receiveAll(child, polygons.sizes, header.sizes);
+    for (std::uint64_t i = 0; i < header.notes; ++i) polygons.notes.push_back(receiveText(child));
+    if (!consistent(polygons)) throw ChildFailure("gave a damaged answer");
+    return polygons;
+}
+
+}  // namespace bilayer::detail

@@ -1,0 +1,237 @@
+#include "sdf/io/polygons.h"
+
+#include <fmt/format.h>
+#include <oneapi/tbb/blocked_range.h>
+#include <oneapi/tbb/parallel_for.h>
+#include <oneapi/tbb/parallel_reduce.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <stdexcept>
+#include <utility>
+
+#include <bilayer/sdf/mesh.h>
+#include <bilayer/sdf/mesh_io.h>
+#include "sdf/base/parallel_parts.h"
+#include "sdf/io/text_source.h"
+#include "sdf/io/triangulate.h"
+
+namespace bilayer::detail {
+namespace {
+
+constexpr std::size_t grain = 1 << 14;  // vertices or faces that are worth a task
+/// Farther from the zero point than so many times its size, a mesh gets an origin of its own: floats would round its
+/// coordinates by up to 6e-5 of its size.
+constexpr double farSizes = 1000;
+
+using Range = tbb::blocked_range<std::size_t>;
+
+/// A byte for each vertex: whether a face uses it. Throws for a corner without a vertex.
+std::vector<std::uint8_t> usedVertices(const std::vector<unsigned>& corners, std::size_t vertices) {
+    std::vector<std::uint8_t> used(vertices, 0);
+    inOrder((corners.size() + grain - 1) / grain, [&](std::size_t part) {
+        const std::size_t end = std::min((part + 1) * grain, corners.size());
+        for (std::size_t i = part * grain; i < end; ++i) {
+            if (corners[i] >= vertices)
+                throw std::runtime_error(
+                    fmt::format("a face refers to vertex {}, but there are {}, counted from 0", corners[i], vertices));
+            std::atomic_ref(used[corners[i]]).store(1, std::memory_order_relaxed);
+        }
+    });
+    return used;
+}
+
+struct Box {
+    glm::dvec3 lower{std::numeric_limits<double>::infinity()}, upper{-std::numeric_limits<double>::infinity()};
+    std::size_t vertices = 0;  // in it
+};
+
+/// Around the vertices that are used.
+template <class Scalar>
+Box boxOf(const std::vector<glm::vec<3, Scalar>>& points, const std::vector<std::uint8_t>& used) {
+    return tbb::parallel_reduce(
+        Range(0, points.size(), grain), Box{},
+        [&](const Range& range, Box box) {
+            for (std::size_t i = range.begin(); i < range.end(); ++i) {
+                if (!used[i]) continue;
+                box.lower = glm::min(box.lower, glm::dvec3(points[i]));
+                box.upper = glm::max(box.upper, glm::dvec3(points[i]));
+                ++box.vertices;
+            }
+            return box;
+        },
+        [](const Box& a, const Box& b) {
+            return Box{glm::min(a.lower, b.lower), glm::max(a.upper, b.upper), a.vertices + b.vertices};
+        });
+}
+
+/// Its middle, in digits so few that differences to coordinates near it are exact; zero for a mesh that is near.
+glm::dvec3 originOf(const Box& box) {
+    const glm::dvec3 size = box.upper - box.lower, far = glm::max(glm::abs(box.lower), glm::abs(box.upper));
+    const double side = std::max({size.x, size.y, size.z}), farthest = std::max({far.x, far.y, far.z});
+    if (!(side > 0) || !(farthest > farSizes * side) || !std::isfinite(farthest)) return glm::dvec3(0);
+    const double step = std::exp2(std::ceil(std::log2(side)));
+    return step * glm::round(0.5 * (box.lower + box.upper) / step);
+}
+
+template <class Scalar>
+std::vector<glm::vec3> relativeTo(const glm::dvec3& origin, std::vector<glm::vec<3, Scalar>> points) {
+    if constexpr (std::is_same_v<Scalar, float>)
+        if (origin == glm::dvec3(0)) return points;
+    std::vector<glm::vec3> moved(points.size());
+    tbb::parallel_for(Range(0, points.size(), grain), [&](const Range& range) {
+        for (std::size_t i = range.begin(); i < range.end(); ++i) moved[i] = glm::vec3(glm::dvec3(points[i]) - origin);
+    });
+    return moved;
+}
+
+/// Triangles of some faces.
+struct Cut {
+    std::vector<glm::uvec3> triangles;
+    std::size_t uncovered = 0;  // faces whose triangles do not cover what their outline encloses
+    std::size_t firstUncovered = 0;
+};
+
+/// Cuts faces of any number of corners.
+template <class Scalar>
+class FaceCutter {
+  public:
+    explicit FaceCutter(const PolygonsOf<Scalar>& polygons) : polygons_(polygons) {
+        begins_.reserve(parts() + 1);
+        std::size_t corner = 0;
+        for (std::size_t face = 0; face < polygons.sizes.size(); corner += polygons.sizes[face++])
+            if (face % grain == 0) begins_.push_back(corner);
+    }
+
+    std::vector<glm::uvec3> run(std::vector<std::string>& notes) const {
+        std::vector<Cut> cuts(parts());
+        inOrder(parts(), [&](std::size_t i) { cuts[i] = cut(i); });
+        std::vector<std::size_t> begins{0};
+        Cut all;
+        for (const Cut& cut : cuts) {
+            begins.push_back(begins.back() + cut.triangles.size());
+            if (all.uncovered == 0) all.firstUncovered = cut.firstUncovered;
+            all.uncovered += cut.uncovered;
+        }
+        if (all.uncovered > 0)
+            notes.push_back(fmt::format(
+                "the triangles of {} do not cover its outline, which crosses itself or encloses nothing; the "
+                "first is face {}, counted from 0",
+                counted(all.uncovered, "face", "faces"), all.firstUncovered));
+        all.triangles.resize(begins.back());
+        inOrder(cuts.size(), [&](std::size_t i) {
+            std::copy(cuts[i].triangles.begin(), cuts[i].triangles.end(),
+                      all.triangles.begin() + std::ptrdiff_t(begins[i]));
+        });
+        return std::move(all.triangles);
+    }
+
+  private:
+    std::size_t parts() const { return (polygons_.sizes.size() + grain - 1) / grain; }
+
+    Cut cut(std::size_t part) const {
+        Cut cut;
+        std::size_t corner = begins_[part];
+        std::vector<glm::dvec3> outline;
+        const std::size_t end = std::min((part + 1) * grain, polygons_.sizes.size());
+        for (std::size_t face = part * grain; face < end; corner += polygons_.sizes[face++]) {
+            const unsigned* corners = &polygons_.corners[corner];
+            if (polygons_.sizes[face] == 3) {
+                cut.triangles.push_back({corners[0], corners[1], corners[2]});
+                continue;
+            }
+            outline.clear();
+            for (unsigned k = 0; k < polygons_.sizes[face]; ++k)
+                outline.push_back(glm::dvec3(polygons_.points[corners[k]]));
+            const std::size_t first = cut.triangles.size();
+            if (!triangulate(outline, cut.triangles) && cut.uncovered++ == 0) cut.firstUncovered = face;
+            for (std::size_t i = first; i < cut.triangles.size(); ++i) {
+                glm::uvec3& t = cut.triangles[i];
+                t = {corners[t.x], corners[t.y], corners[t.z]};
+            }
+        }
+        return cut;
+    }
+
+    const PolygonsOf<Scalar>& polygons_;
+    std::vector<std::size_t> begins_;  // corners of each part's first face
+};
+
+std::vector<glm::uvec3> asTriangles(const std::vector<unsigned>& corners) {
+    std::vector<glm::uvec3> triangles(corners.size() / 3);
+    tbb::parallel_for(Range(0, triangles.size(), grain), [&](const Range& range) {
+        for (std::size_t i = range.begin(); i < range.end(); ++i)
+            triangles[i] = {corners[3 * i], corners[3 * i + 1], corners[3 * i + 2]};
+    });
+    return triangles;
+}
+
+template <class Scalar>
+Mesh meshOf(PolygonsOf<Scalar> polygons, ReadReport& report) {
+    report.vertices = polygons.points.size();
+    report.faces = polygons.sizes.empty() ? polygons.corners.size() / 3 : polygons.sizes.size();
+    report.notes = std::move(polygons.notes);
+    if (report.faces == 0)
+        throw std::runtime_error(
+            fmt::format("holds no triangle{}{}", report.notes.empty() ? "" : "; ", fmt::join(report.notes, "; ")));
+    const Box box = boxOf(polygons.points, usedVertices(polygons.corners, polygons.points.size()));
+    report.unusedVertices = report.vertices - box.vertices;
+    Mesh mesh;
+    mesh.origin = originOf(box);
+    mesh.triangles = polygons.sizes.empty() ? asTriangles(polygons.corners) : FaceCutter(polygons).run(report.notes);
+    mesh.points = relativeTo(mesh.origin, std::move(polygons.points));
+    validate(mesh);
+    const std::size_t triangles = mesh.triangles.size();
+    mesh = weld(std::move(mesh));
+    report.mergedVertices = box.vertices - mesh.points.size();
+    report.collapsedTriangles = triangles - mesh.triangles.size();
+    if (mesh.triangles.empty()) throw std::runtime_error("holds no triangle with three different corners");
+    return mesh;
+}
+
+}  // namespace
+
+template <class Scalar>
+void setFaces(PolygonsOf<Scalar>& polygons, const std::vector<Faces>& parts) {
+    std::vector<std::size_t> corners{0}, sizes{0};
+    bool isOfTriangles = true;
+    std::size_t small = 0;
+    for (const Faces& part : parts) {
+        corners.push_back(corners.back() + part.corners.size());
+        sizes.push_back(sizes.back() + part.sizes.size());
+        isOfTriangles &= part.isOfTriangles;
+        small += part.small;
+    }
+    polygons.corners.resize(corners.back());
+    if (!isOfTriangles) polygons.sizes.resize(sizes.back());
+    inOrder(parts.size(), [&](std::size_t i) {
+        std::copy(parts[i].corners.begin(), parts[i].corners.end(),
+                  polygons.corners.begin() + std::ptrdiff_t(corners[i]));
+        if (!isOfTriangles)
+            std::copy(parts[i].sizes.begin(), parts[i].sizes.end(), polygons.sizes.begin() + std::ptrdiff_t(sizes[i]));
+    });
+    if (small > 0)
+        polygons.notes.push_back(
+            fmt::format("left out: {} with fewer than three corners", counted(small, "face", "faces")));
+}
+
+template <class Scalar>
+Mesh assembled(PolygonsOf<Scalar> polygons, const std::filesystem::path& path, ReadReport& report) {
+    try {
+        return meshOf(std::move(polygons), report);
+    } catch (const std::invalid_argument& error) {
+        throw std::invalid_argument(fmt::format("{}: {}", path.string(), error.what()));
+    } catch (const std::runtime_error& error) {
+        throw std::runtime_error(fmt::format("{}: {}", path.string(), error.what()));
+    }
+}
+
+template void setFaces(PolygonsOf<float>&, const std::vector<Faces>&);
+template void setFaces(PolygonsOf<double>&, const std::vector<Faces>&);
+template Mesh assembled(PolygonsOf<float>, const std::filesystem::path&, ReadReport&);
+template Mesh assembled(PolygonsOf<double>, const std::filesystem::path&, ReadReport&);
+
+}  // namespace bilayer::detail

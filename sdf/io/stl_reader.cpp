@@ -1,0 +1,203 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <numeric>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "sdf/base/parallel_parts.h"
+#include "sdf/io/mapped_file.h"
+#include "sdf/io/mesh_readers.h"
+#include "sdf/io/polygons.h"
+#include "sdf/io/text_source.h"
+
+namespace bilayer::detail {
+namespace {
+
+constexpr std::size_t headerBytes = 80, facetBytes = 50, normalBytes = 12;
+constexpr std::size_t partBytes = 1 << 20;  // of the text that one task reads
+
+std::uint32_t loadCount(std::string_view bytes) {
+    std::uint32_t count = 0;
+    if (bytes.size() >= headerBytes + sizeof count) std::memcpy(&count, bytes.data() + headerBytes, sizeof count);
+    return count;
+}
+
+/// The size of a binary file of so many facets.
+std::uint64_t binarySize(std::uint64_t facets) {
+    return headerBytes + sizeof(std::uint32_t) + facetBytes * facets;
+}
+
+/// A size that fits the count says binary, and so do bytes that are not of a text. Headers say nothing: those of some
+/// binary files begin with "solid".
+bool isText(std::string_view bytes, std::string_view text) {
+    if (bytes.size() >= binarySize(0) && bytes.size() == binarySize(loadCount(bytes))) return false;
+    constexpr std::size_t sample = 1024;
+    const std::string_view begin = text.substr(0, sample);
+    const auto isOfText = [](char c) { return c != '\0' && (static_cast<unsigned char>(c) >= ' ' || isSpace(c)); };
+    return !text.empty() && std::all_of(begin.begin(), begin.end(), isOfText);
+}
+
+void requireFinite(const glm::vec3* corners, std::size_t triangle, const std::filesystem::path& path) {
+    for (int k = 0; k < 3; ++k)
+        for (int axis = 0; axis < 3; ++axis)
+            if (!std::isfinite(corners[k][axis]))
+                throw std::runtime_error(
+                    fmt::format("{}: triangle {}, counted from 0, has the coordinate {}, which is not finite",
+                                path.string(), triangle, corners[k][axis]));
+}
+
+Mesh readBinary(std::string_view bytes, const std::filesystem::path& path, ReadReport& report) {
+    static_assert(std::endian::native == std::endian::little, "STL files are little-endian");
+    const std::uint32_t count = loadCount(bytes);
+    if (bytes.size() < binarySize(0))
+        throw std::runtime_error(
+            fmt::format("{}: has {}; a binary STL file has {} bytes at least, and a text one begins with 'solid'",
+                        path.string(), counted(bytes.size(), "byte", "bytes"), binarySize(0)));
+    if (bytes.size() < binarySize(count))
+        throw std::runtime_error(fmt::format("{}: ends early: of the {} triangles that it announces there are {}",
+                                             path.string(), count, (bytes.size() - binarySize(0)) / facetBytes));
+    PolygonsOf<float> polygons;
+    if (const std::uint64_t more = bytes.size() - binarySize(count))
+        polygons.notes.push_back(fmt::format("left out: {} after the last triangle", counted(more, "byte", "bytes")));
+    polygons.points.resize(std::size_t(3) * count);
+    constexpr std::size_t partFacets = 1 << 14;
+    inOrder((count + partFacets - 1) / partFacets, [&](std::size_t part) {
+        const char* facets = bytes.data() + binarySize(0) + normalBytes;
+        for (std::size_t i = part * partFacets; i < std::min<std::size_t>((part + 1) * partFacets, count); ++i) {
+            glm::vec3* corners = &polygons.points[3 * i];
+            std::memcpy(corners, facets + facetBytes * i, 3 * sizeof(glm::vec3));
+            const glm::vec3 sum = corners[0] + corners[1] + corners[2];
+            // infinite where the sum of finite ones is too large: rare, and then looked at more closely
+            if (!std::isfinite(sum.x + sum.y + sum.z)) requireFinite(corners, i, path);
+        }
+    });
+    polygons.corners.resize(polygons.points.size());
+    std::iota(polygons.corners.begin(), polygons.corners.end(), 0u);
+    return assembled(std::move(polygons), path, report);
+}
+
+struct Part {
+    Cursor text;
+    std::vector<glm::dvec3> points{};  // of the corners of its faces, one after the other
+    Faces faces{};
+    bool endsSolid = false;     // the last keyword was `endsolid`
+    std::size_t linesLeft = 0;  // behind an `endsolid`, of something else
+    const char* firstLeft = nullptr;
+};
+
+/// Reads facets. Keywords may be of upper or lower case; a name goes to the end of its line, whatever it says.
+class TextReader {
+  public:
+    TextReader(const TextSource& source, Part& part) : source_(source), part_(part), at_(part.text) {}
+
+    void run() {
+        for (at_.skipSpace(); !at_.atEnd(); at_.skipSpace()) {
+            const char* begin = at_.at;
+            const std::string_view word = at_.word();
+            const bool ends = sameWord(word, "endsolid");
+            if (sameWord(word, "facet")) {
+                readFacet(begin);
+            } else if (ends || sameWord(word, "solid") || word.front() == '#') {
+                at_.skipLine();
+            } else if (part_.endsSolid) {
+                at_.skipLine();
+                if (part_.linesLeft++ == 0) part_.firstLeft = begin;
+                continue;
+            } else {
+                source_.failExpected(begin, "'facet', 'solid' or 'endsolid'");
+            }
+            if (word.front() != '#') part_.endsSolid = ends;
+        }
+    }
+
+  private:
+    // The normal is not looked at: those that are no numbers say nothing about the triangle.
+    void readFacet(const char* begin) {
+        const std::size_t first = part_.points.size();
+        for (;;) {
+            at_.skipSpace();
+            const char* here = at_.at;
+            const std::string_view word = at_.word();
+            if (word.empty()) source_.fail(begin, "the file ends within this facet");
+            if (sameWord(word, "vertex")) readVertex();
+            if (sameWord(word, "endfacet")) break;
+            if (sameWord(word, "facet") || sameWord(word, "endsolid")) source_.failExpected(here, "'endfacet'");
+        }
+        for (std::size_t i = first; i < part_.points.size(); ++i) part_.faces.corners.push_back(unsigned(i));
+        if (part_.points.size() - first < 3)
+            source_.fail(begin,
+                         fmt::format("a facet has {} vertices; it must have three", part_.points.size() - first));
+        part_.faces.close(first);
+    }
+
+    void readVertex() {
+        glm::dvec3 point;
+        for (int axis = 0; axis < 3; ++axis) {
+            at_.skipSpace();
+            const char* begin = at_.at;
+            if (!at_.number(point[axis]) || !(at_.atEnd() || isSpace(*at_.at)))
+                source_.failExpected(begin, "a coordinate");
+            source_.checkCoordinate(begin, point[axis]);
+        }
+        part_.points.push_back(point);
+    }
+
+    const TextSource& source_;
+    Part& part_;
+    Cursor at_;
+};
+
+/// The next line from a place on that begins with `facet`, or the end. Names and vertices do not stand on such a line.
+const char* nextFacet(const char* at, const char* end) {
+    Cursor cursor{at, end};
+    for (cursor.skipLine(); !cursor.atEnd(); cursor.skipLine()) {
+        cursor.skipSpace();
+        Cursor word = cursor;
+        if (sameWord(word.word(), "facet")) return cursor.at;
+    }
+    return end;
+}
+
+Mesh readText(const TextSource& source, const std::filesystem::path& path, ReadReport& report) {
+    std::vector<Part> parts;
+    for (const char* begin = source.begin(); begin != source.end();) {
+        const std::size_t size = std::min(partBytes, std::size_t(source.end() - begin));
+        const char* end = nextFacet(begin + size, source.end());
+        parts.push_back({{begin, end}});
+        begin = end;
+    }
+    inOrder(parts.size(), [&](std::size_t i) { TextReader(source, parts[i]).run(); });
+    if (!parts.back().endsSolid) source.fail(source.end(), "the file ends before its 'endsolid'");
+    Polygons polygons;
+    const std::vector<std::size_t> begins = setPoints(polygons, parts);
+    inOrder(parts.size(), [&](std::size_t i) {
+        for (unsigned& corner : parts[i].faces.corners) corner += unsigned(begins[i]);
+    });
+    for (const Part& part : parts)
+        if (part.linesLeft > 0)
+            polygons.notes.push_back(fmt::format("left out: {} after 'endsolid'; the first is {} on line {}",
+                                                 counted(part.linesLeft, "line", "lines"),
+                                                 source.quoted(part.firstLeft), source.lineOf(part.firstLeft)));
+    std::vector<Faces> faces;
+    for (Part& part : parts) faces.push_back(std::move(part.faces));
+    setFaces(polygons, faces);
+    return assembled(std::move(polygons), path, report);
+}
+
+}  // namespace
+
+Mesh readStl(const std::filesystem::path& path, ReadReport& report) {
+    const MappedFile file(path);
+    const TextSource source(path, file.bytes());
+    if (isText(file.bytes(), source.text())) return readText(source, path, report);
+    return readBinary(file.bytes(), path, report);
+}
+
+}  // namespace bilayer::detail

@@ -1,0 +1,174 @@
+// Two rounds of hash tables that fit into a core's cache. The first looks at runs of points as they come, since equal
+// ones mostly stand near each other; the second at what is left of all runs, partitioned by hash.
+#include "sdf/mesh/equal_points.h"
+
+#include <oneapi/tbb/parallel_for.h>
+
+#include <algorithm>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <glm/common.hpp>
+#include <utility>
+#include <vector>
+
+#include "sdf/base/progress.h"
+
+namespace bilayer::detail {
+namespace {
+
+constexpr std::size_t runLength = 1 << 15;           // points
+constexpr std::size_t pointsPerPartition = 1 << 13;  // about
+constexpr std::size_t mostPartitions = 1 << 10;
+
+// Coordinates as words that are the same exactly where coordinates are equal.
+struct Bits {
+    std::uint32_t x, y, z;
+
+    // adding zero makes -0 into 0
+    explicit Bits(const glm::vec3& p)
+        : x(std::bit_cast<std::uint32_t>(p.x + 0.0f)),
+          y(std::bit_cast<std::uint32_t>(p.y + 0.0f)),
+          z(std::bit_cast<std::uint32_t>(p.z + 0.0f)) {}
+
+    bool operator==(const Bits&) const = default;
+
+    // Both halves of a 128-bit product, folded.
+    std::uint64_t hash() const {
+        __extension__ using Wide = unsigned __int128;
+        const std::uint64_t xy = x | std::uint64_t(y) << 32;
+        const Wide product = Wide(xy ^ 0x9e3779b97f4a7c15u) * ((z * 0xbf58476d1ce4e5b9u) ^ 0xd1b54a32d192ed03u);
+        return std::uint64_t(product) ^ std::uint64_t(product >> 64);
+    }
+};
+
+// Finds the place of a key among those before it: open addressing, at most half full.
+template <class Index>
+class Table {
+  public:
+    void clear(std::size_t keys) { slots_.assign(std::bit_ceil(2 * keys), none); }
+
+    // The index that `index` is equal to: one that was added before, else itself, which is then added.
+    template <class Equal>
+    Index add(std::uint64_t hash, Index index, Equal equal) {
+        const std::size_t mask = slots_.size() - 1;
+        std::size_t slot = hash & mask;
+        while (slots_[slot] != none && !equal(slots_[slot])) slot = (slot + 1) & mask;
+        if (slots_[slot] == none) slots_[slot] = index;
+        return slots_[slot];
+    }
+
+  private:
+    static constexpr Index none = Index(~Index(0));
+    std::vector<Index> slots_;
+};
+
+class EqualPoints {
+  public:
+    EqualPoints(std::span<const glm::vec3> points, Progress* progress)
+        : points_(points),
+          progress_(progress),
+          first_(points.size()),
+          runs_((points.size() + runLength - 1) / runLength),
+          partitions_(std::min(mostPartitions, std::bit_ceil(points.size() / pointsPerPartition + 1))) {}
+
+    LargeArray<unsigned> find() && {
+        places_.resize(runs_ * partitions_);
+        forEach(runs_, [&](std::size_t run) { searchRun(run); });
+        if (runs_ > 1) {
+            const std::vector<std::size_t> begins = makePlaces();
+            rest_ = LargeArray<Item>(begins.back());
+            forEach(runs_, [&](std::size_t run) { scatter(run); });
+            forEach(partitions_, [&](std::size_t i) { searchPartition(begins[i], begins[i + 1]); });
+            forEach(runs_, [&](std::size_t run) { follow(run); });
+        }
+        return std::move(first_);
+    }
+
+  private:
+    struct Item {
+        glm::vec3 point;
+        unsigned index;
+    };
+
+    template <class Body>
+    void forEach(std::size_t count, Body body) {
+        tbb::parallel_for(std::size_t(0), count, [&](std::size_t i) {
+            poll(progress_);
+            body(i);
+        });
+    }
+
+    std::size_t beginOf(std::size_t run) const { return run * runLength; }
+    std::size_t endOf(std::size_t run) const { return std::min(points_.size(), beginOf(run) + runLength); }
+    // The upper bits, since tables take the lower ones.
+    std::size_t partitionOf(std::uint64_t hash) const { return (hash >> 32) & (partitions_ - 1); }
+
+    // The first of equal points within a run, and how many remain for each partition.
+    void searchRun(std::size_t run) {
+        thread_local Table<std::uint16_t> table;
+        const std::size_t begin = beginOf(run), count = endOf(run) - begin;
+        table.clear(count);
+        std::size_t* counts = places_.data() + run * partitions_;
+        for (std::size_t i = 0; i < count; ++i) {
+            const Bits bits(points_[begin + i]);
+            const std::uint64_t hash = bits.hash();
+            const std::uint16_t first = table.add(
+                hash, std::uint16_t(i), [&](std::uint16_t other) { return Bits(points_[begin + other]) == bits; });
+            first_[begin + i] = unsigned(begin + first);
+            counts[partitionOf(hash)] += first == i;
+        }
+    }
+
+    // Turns counts into places, partition by partition and within each by run; returns where partitions begin.
+    std::vector<std::size_t> makePlaces() {
+        std::vector<std::size_t> begins(partitions_ + 1);
+        std::size_t sum = 0;
+        for (std::size_t i = 0; i < partitions_; ++i) {
+            begins[i] = sum;
+            for (std::size_t run = 0; run < runs_; ++run) sum += std::exchange(places_[run * partitions_ + i], sum);
+        }
+        begins.back() = sum;
+        return begins;
+    }
+
+    void scatter(std::size_t run) {
+        std::size_t* places = places_.data() + run * partitions_;
+        for (std::size_t i = beginOf(run); i < endOf(run); ++i)
+            if (first_[i] == i) rest_[places[partitionOf(Bits(points_[i]).hash())]++] = {points_[i], unsigned(i)};
+    }
+
+    // Items stand in the order of their indices, so what is found is the first.
+    void searchPartition(std::size_t begin, std::size_t end) {
+        thread_local Table<std::uint32_t> table;
+        table.clear(end - begin);
+        const Item* items = rest_.data() + begin;
+        for (std::size_t i = 0; i < end - begin; ++i) {
+            const Bits bits(items[i].point);
+            const std::uint32_t first = table.add(
+                bits.hash(), std::uint32_t(i), [&](std::uint32_t other) { return Bits(items[other].point) == bits; });
+            if (first != i) first_[items[i].index] = items[first].index;
+        }
+    }
+
+    // From the first in a run to the first of all.
+    void follow(std::size_t run) {
+        for (std::size_t i = beginOf(run); i < endOf(run); ++i)
+            if (first_[i] >= beginOf(run)) first_[i] = first_[first_[i]];
+    }
+
+    std::span<const glm::vec3> points_;
+    Progress* progress_;
+    LargeArray<unsigned> first_;
+    std::size_t runs_, partitions_;
+    std::vector<std::size_t> places_;  // of each run in each partition: first counts, then where its next item goes
+    LargeArray<Item> rest_;            // the first points of each run, by partition
+};
+
+}  // namespace
+
+LargeArray<unsigned> firstOfEqual(std::span<const glm::vec3> points, Progress* progress) {
+    return EqualPoints(points, progress).find();
+}
+
+}  // namespace bilayer::detail

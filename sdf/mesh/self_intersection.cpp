@@ -1,0 +1,155 @@
+#include "sdf/mesh/self_intersection.h"
+
+#include <oneapi/tbb/blocked_range.h>
+#include <oneapi/tbb/parallel_reduce.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <cstdlib>
+#include <functional>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "sdf/base/exact_sum.h"
+#include "sdf/bvh/close_pairs.h"
+
+namespace bilayer::detail {
+namespace {
+
+/// Rounding of a volume computed in double precision, relative to the sum of the sizes of its products: a generous
+/// bound (J. R. Shewchuk, "Adaptive Precision Floating-Point Arithmetic", 1997, has 7.8e-16 for exact differences).
+constexpr double roundingOfVolume = 2e-15;
+
+// The sign of the volume of four points, for any floats: that of 24 products of three, each the exact sum of two
+// doubles.
+int exactSide(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c, const glm::dvec3& d) {
+    ExactSum<64> sum;
+    const auto add = [&](const glm::dvec3& p, const glm::dvec3& q, const glm::dvec3& r, double sign) {
+        for (int i = 0; i < 3; ++i) {
+            const int k = (i + 1) % 3, l = (i + 2) % 3;
+            for (const double two : {sign * q[k] * r[l], -sign * q[l] * r[k]}) {
+                const double product = p[i] * two;
+                sum.add(std::fma(p[i], two, -product));
+                sum.add(product);
+            }
+        }
+    };
+    add(b, c, d, 1);
+    add(a, c, d, -1);
+    add(a, b, d, 1);
+    add(a, b, c, -1);
+    return sum.sign();
+}
+
+// How a triangle lies to the plane of another: what it has in common with the plane is at most a point or all of it, an
+// edge, or a segment at whose sides it continues.
+enum class Cut { none, edge, through };
+
+// The triangles that run through each other, by the signs of volumes of their corners: P. Guigue, O. Devillers, "Fast
+// and robust triangle-triangle overlap test using orientation predicates", Journal of Graphics Tools 8 (2003) 25-42.
+class Pairs {
+  public:
+    Pairs(const Mesh& mesh, const Topology& topology) : mesh_(mesh), topology_(topology) {}
+
+    bool pierce(unsigned first, unsigned second) const {
+        const glm::uvec3 &a = mesh_.triangles[first], &b = mesh_.triangles[second];
+        if (shared(a, b) > 1) return false;
+        const glm::ivec3 aSides = sides(b, a);
+        const Cut aCut = cutOf(aSides);
+        if (aCut == Cut::none) return false;
+        const glm::ivec3 bSides = sides(a, b);
+        const Cut bCut = cutOf(bSides);
+        if (bCut == Cut::none || (aCut == Cut::edge && bCut == Cut::edge) || !overlap(a, aSides, b, bSides))
+            return false;
+        return (aCut == Cut::through || continues(a, aSides, b)) && (bCut == Cut::through || continues(b, bSides, a));
+    }
+
+  private:
+    static int shared(const glm::uvec3& a, const glm::uvec3& b) {
+        int count = 0;
+        for (int i = 0; i < 3; ++i)
+            for (int k = 0; k < 3; ++k) count += a[i] == b[k];
+        return count;
+    }
+
+    static Cut cutOf(const glm::ivec3& s) {
+        if (std::min({s.x, s.y, s.z}) < 0 && std::max({s.x, s.y, s.z}) > 0) return Cut::through;
+        return std::abs(s.x) + std::abs(s.y) + std::abs(s.z) == 1 ? Cut::edge : Cut::none;
+    }
+
+    // On which side of the plane of a triangle another's vertices lie.
+    glm::ivec3 sides(const glm::uvec3& plane, const glm::uvec3& t) const {
+        return {side(plane, t.x), side(plane, t.y), side(plane, t.z)};
+    }
+    int side(const glm::uvec3& plane, unsigned vertex) const { return side(plane.x, plane.y, plane.z, vertex); }
+
+    // The corner that alone lies on its side of a plane; others may lie in the plane.
+    static int alone(const glm::ivec3& s) {
+        int k = 0;
+        while (s[k] == 0 || s[k] * s[(k + 1) % 3] > 0 || s[k] * s[(k + 2) % 3] > 0) ++k;
+        return k;
+    }
+
+    // Whether the segments that two triangles have in common with each other's planes have more than a point in common.
+    bool overlap(const glm::uvec3& a, const glm::ivec3& aSides, const glm::uvec3& b, const glm::ivec3& bSides) const {
+        const int i = alone(aSides), k = alone(bSides);
+        unsigned a1 = a[(i + 1) % 3], a2 = a[(i + 2) % 3], b1 = b[(k + 1) % 3], b2 = b[(k + 2) % 3];
+        if (aSides[i] < 0) std::swap(b1, b2);
+        if (bSides[k] < 0) std::swap(a1, a2);
+        return side(a[i], a1, b[k], b1) < 0 && side(a[i], a2, b2, b[k]) < 0;
+    }
+
+    // Whether the surface continues beyond a plane across the edge of a triangle that lies in it.
+    bool continues(const glm::uvec3& t, const glm::ivec3& sides, const glm::uvec3& plane) const {
+        const int off = alone(sides);
+        const auto [low, high] = std::minmax({t[(off + 1) % 3], t[(off + 2) % 3]});
+        const auto before = [](const EdgeUse& use, const std::pair<unsigned, unsigned>& edge) {
+            return std::pair(use.low, use.high) < edge;
+        };
+        const std::span<const EdgeUse> edges(topology_.edges.data(), topology_.edges.size());
+        for (auto use = std::lower_bound(edges.begin(), edges.end(), std::pair(low, high), before);
+             use != edges.end() && use->low == low && use->high == high; ++use) {
+            const glm::uvec3& other = mesh_.triangles[use->triangle];
+            if (side(plane, other.x ^ other.y ^ other.z ^ low ^ high) == -sides[off]) return true;
+        }
+        return false;
+    }
+
+    // The sign of the volume of four vertices; 0 where one comes twice.
+    int side(unsigned a, unsigned b, unsigned c, unsigned d) const {
+        if (a == c || b == c || d == a || d == b || d == c) return 0;
+        const glm::dvec3 origin = mesh_.points[a], u = glm::dvec3(mesh_.points[b]) - origin,
+                         v = glm::dvec3(mesh_.points[c]) - origin, w = glm::dvec3(mesh_.points[d]) - origin;
+        const double volume = glm::dot(glm::cross(u, v), w);
+        const glm::dvec3 products(std::abs(u.y * v.z) + std::abs(u.z * v.y), std::abs(u.z * v.x) + std::abs(u.x * v.z),
+                                  std::abs(u.x * v.y) + std::abs(u.y * v.x));
+        if (std::abs(volume) > roundingOfVolume * glm::dot(products, glm::abs(w))) return volume > 0 ? 1 : -1;
+        return exactSide(mesh_.points[a], mesh_.points[b], mesh_.points[c], mesh_.points[d]);
+    }
+
+    const Mesh& mesh_;
+    const Topology& topology_;
+};
+
+}  // namespace
+
+std::size_t countPiercingPairs(const Mesh& welded, const Topology& topology, const TriangleTree& tree) {
+    const Pairs pairs(welded, topology);
+    return tbb::parallel_reduce(
+        tbb::blocked_range<std::uint32_t>(0, tree.boxes().leafCount, 64), std::size_t(0),
+        [&](const auto& range, std::size_t count) {
+            std::vector<std::pair<unsigned, unsigned>> close;
+            for (std::uint32_t leaf = range.begin(); leaf < range.end(); ++leaf) {
+                findClosePairs(welded, tree, leaf, close);
+                for (const auto& [a, b] : close) count += pairs.pierce(std::min(a, b), std::max(a, b));
+            }
+            return count;
+        },
+        std::plus<>());
+}
+
+}  // namespace bilayer::detail

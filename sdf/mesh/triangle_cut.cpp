@@ -1,0 +1,196 @@
+#include "sdf/mesh/triangle_cut.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <iterator>
+#include <utility>
+
+namespace bilayer::detail {
+namespace {
+
+/// More segments than this are first shared out by lines across the polygon: segments in convex position would be split
+/// off one by one.
+constexpr std::size_t fewSegments = 8;
+/// Such a line is of use if no side has more than this part of the segments.
+constexpr double usefulPart = 0.75;
+
+/// A line in the polygon's plane, told by a point and the direction across it.
+struct Line {
+    glm::dvec3 point, across;
+
+    double height(const glm::dvec3& p) const { return glm::dot(across, p - point); }
+};
+
+glm::dvec3 crossing(const glm::dvec3& a, double atA, const glm::dvec3& b, double atB) {
+    return a + atA / (atA - atB) * (b - a);
+}
+
+/// What lies on the two sides of a line: 0 where heights are negative, 1 where they are positive.
+template <class Item>
+using Halves = std::array<Item, 2>;
+
+Halves<Polygon> split(const Polygon& polygon, const Line& line) {
+    Halves<Polygon> halves;
+    for (std::size_t i = 0; i < polygon.size(); ++i) {
+        const glm::dvec3 &a = polygon[i], &b = polygon[(i + 1) % polygon.size()];
+        const double atA = line.height(a), atB = line.height(b);
+        if (atA <= 0) halves[0].push_back(a);
+        if (atA >= 0) halves[1].push_back(a);
+        if (atA * atB >= 0) continue;
+        const glm::dvec3 between = crossing(a, atA, b, atB);
+        for (Polygon& half : halves) half.push_back(between);
+    }
+    return halves;
+}
+
+/// Segments along the line, and what is shorter than the slack, are on neither side.
+Halves<std::vector<Segment>> split(const std::vector<Segment>& segments, const Line& line, double slack) {
+    Halves<std::vector<Segment>> halves;
+    for (const Segment& s : segments) {
+        const double from = line.height(s.from), to = line.height(s.to);
+        for (const int side : {0, 1}) {
+            const double a = side ? from : -from, b = side ? to : -to;
+            if (std::max(a, b) <= slack) continue;
+            Segment part = s;
+            if (a < 0) part.from = crossing(s.from, a, s.to, b);
+            if (b < 0) part.to = crossing(s.from, a, s.to, b);
+            if (glm::length(part.to - part.from) > slack) halves[std::size_t(side)].push_back(part);
+        }
+    }
+    return halves;
+}
+
+bool isThin(const Polygon& polygon, const Line& line, double slack) {
+    return std::none_of(polygon.begin(), polygon.end(),
+                        [&](const glm::dvec3& p) { return std::abs(line.height(p)) > slack; });
+}
+
+glm::dvec3 centroid(const Polygon& polygon) {
+    glm::dvec3 weighted(0);
+    double total = 0;
+    for (std::size_t i = 2; i < polygon.size(); ++i) {
+        const double area = glm::length(glm::cross(polygon[i - 1] - polygon[0], polygon[i] - polygon[0]));
+        weighted += area / 3 * (polygon[0] + polygon[i - 1] + polygon[i]);
+        total += area;
+    }
+    return total > 0 ? weighted / total : polygon[0];
+}
+
+class Cutter {
+  public:
+    Cutter(const glm::dvec3& normal, double slack, const std::function<bool(const glm::dvec3&)>& keeps)
+        : normal_(normal), slack_(slack), keeps_(keeps) {}
+
+    /// What is kept of a polygon; nothing is known of what is thinner than the slack.
+    struct Part {
+        bool anyKept = false, anyDropped = false;
+        std::vector<Polygon> pieces;
+    };
+
+    Part divide(Polygon polygon, std::vector<Segment> segments) const {
+        while (!segments.empty()) {
+            Split halves = splitAcross(polygon, segments);
+            if (!isUseful(halves, segments.size())) {
+                const Segment along = segments.back();
+                segments.pop_back();
+                halves = splitBy({along.from, glm::normalize(glm::cross(normal_, along.to - along.from))}, polygon,
+                                 segments);
+            }
+            // a segment along the border divides nothing
+            if (halves.thin) continue;
+            return joined(std::move(polygon), divide(std::move(halves.polygons[0]), std::move(halves.segments[0])),
+                          divide(std::move(halves.polygons[1]), std::move(halves.segments[1])));
+        }
+        return judged(std::move(polygon));
+    }
+
+  private:
+    struct Split {
+        Halves<Polygon> polygons;
+        Halves<std::vector<Segment>> segments;
+        bool thin = true;  // one half has no more than the slack
+    };
+
+    Split splitBy(const Line& line, const Polygon& polygon, const std::vector<Segment>& segments) const {
+        Split halves{split(polygon, line), split(segments, line, slack_), false};
+        halves.thin = isThin(halves.polygons[0], line, slack_) || isThin(halves.polygons[1], line, slack_);
+        return halves;
+    }
+
+    Split splitAcross(const Polygon& polygon, const std::vector<Segment>& segments) const {
+        return segments.size() > fewSegments ? splitBy(middle(segments), polygon, segments) : Split{};
+    }
+
+    static bool isUseful(const Split& halves, std::size_t segments) {
+        const std::size_t more = std::max(halves.segments[0].size(), halves.segments[1].size());
+        return !halves.thin && double(more) <= usefulPart * double(segments);
+    }
+
+    /// Across the longer side of the box around the segments, with half of their middles on each side.
+    Line middle(const std::vector<Segment>& segments) const {
+        std::vector<glm::dvec3> middles;
+        for (const Segment& s : segments) middles.push_back(0.5 * (s.from + s.to));
+        glm::dvec3 lower = middles[0], upper = middles[0];
+        for (const glm::dvec3& p : middles) lower = glm::min(lower, p), upper = glm::max(upper, p);
+        const glm::dvec3 size = upper - lower;
+        const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
+        const auto half = middles.begin() + std::ptrdiff_t(middles.size() / 2);
+        std::nth_element(middles.begin(), half, middles.end(),
+                         [axis](const glm::dvec3& a, const glm::dvec3& b) { return a[axis] < b[axis]; });
+        glm::dvec3 unit(0);
+        unit[axis] = 1;
+        const glm::dvec3 inPlane = unit - glm::dot(unit, normal_) * normal_;
+        const double length = glm::length(inPlane);
+        return {*half, length > 0 ? inPlane / length : unit};
+    }
+
+    Part judged(Polygon polygon) const {
+        if (polygon.size() < 3) return {};
+        const bool kept = keeps_(centroid(polygon));
+        Part part{kept, !kept, {}};
+        if (kept) part.pieces.push_back(std::move(polygon));
+        return part;
+    }
+
+    static Part joined(Polygon whole, Part a, Part b) {
+        Part part{a.anyKept || b.anyKept, a.anyDropped || b.anyDropped, {}};
+        if (!part.anyKept) return part;
+        if (!part.anyDropped)
+            part.pieces.push_back(std::move(whole));
+        else {
+            part.pieces = std::move(a.pieces);
+            std::move(b.pieces.begin(), b.pieces.end(), std::back_inserter(part.pieces));
+        }
+        return part;
+    }
+
+    const glm::dvec3 normal_;
+    const double slack_;
+    const std::function<bool(const glm::dvec3&)>& keeps_;
+};
+
+}  // namespace
+
+bool clip(Segment& segment, const Polygon& polygon, const glm::dvec3& normal, double slack) {
+    for (std::size_t i = 0; i < polygon.size(); ++i) {
+        const glm::dvec3 &a = polygon[i], &b = polygon[(i + 1) % polygon.size()];
+        const glm::dvec3 inward = glm::normalize(glm::cross(normal, b - a));
+        const double from = glm::dot(inward, segment.from - a) + slack, to = glm::dot(inward, segment.to - a) + slack;
+        if (from < 0 && to < 0) return false;
+        const Segment whole = segment;
+        if (from < 0) segment.from = crossing(whole.from, from, whole.to, to);
+        if (to < 0) segment.to = crossing(whole.from, from, whole.to, to);
+    }
+    return true;
+}
+
+std::vector<Polygon> cut(const Polygon& polygon, const glm::dvec3& normal, std::vector<Segment> segments, double slack,
+                         const std::function<bool(const glm::dvec3& inside)>& keeps) {
+    return Cutter(normal, slack, keeps).divide(polygon, std::move(segments)).pieces;
+}
+
+}  // namespace bilayer::detail

@@ -1,0 +1,226 @@
+// Highway compiles the part between HWY_BEFORE_NAMESPACE and HWY_AFTER_NAMESPACE once for each instruction set. It
+// finds the triangles that a ray may leave through, in floats and with room for their rounding; those are then measured
+// in double precision, so all instruction sets give the same.
+#include "sdf/mesh/wall_thickness.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "sdf/mesh/wall_thickness.cpp"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+#include <oneapi/tbb/blocked_range.h>
+#include <oneapi/tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <limits>
+
+#include "sdf/bvh/tree_lanes.h"
+
+#ifndef BILAYER_SDF_WALLS_ONCE
+#define BILAYER_SDF_WALLS_ONCE
+namespace bilayer::detail {
+namespace {
+
+/// A wall that a ray leaves under a flatter angle than this is an edge, not a wall (cosine).
+constexpr float leastFacing = 0.2f;
+constexpr float infinite = std::numeric_limits<float>::infinity();
+
+struct Ray {
+    glm::vec3 origin, direction;
+};
+
+struct Triangle {
+    glm::vec3 a, b, c;
+
+    Triangle(const TriangleLeaf& leaf, std::size_t i)
+        : a(corner(leaf, 0, i)), b(corner(leaf, 1, i)), c(corner(leaf, 2, i)) {}
+
+    static glm::vec3 corner(const TriangleLeaf& leaf, int corner, std::size_t i) {
+        const auto& p = leaf.corners[corner];
+        return {p[0][i], p[1][i], p[2][i]};
+    }
+};
+
+// Where a ray leaves through the front of a triangle (T. Moeller, B. Trumbore, 1997); infinite if it does not.
+float exitThrough(const Ray& ray, const Triangle& t) {
+    const glm::dvec3 a(t.a), ab = glm::dvec3(t.b) - a, ac = glm::dvec3(t.c) - a, d(ray.direction),
+                             from = glm::dvec3(ray.origin) - a;
+    const glm::dvec3 normal = glm::cross(ab, ac);
+    const double facing = glm::dot(normal, d);
+    if (facing <= double(leastFacing) * glm::length(normal)) return infinite;
+    const glm::dvec3 side = glm::cross(d, from);
+    const double u = glm::dot(ac, side) / facing, v = -glm::dot(ab, side) / facing;
+    if (u < 0 || v < 0 || u + v > 1) return infinite;
+    const double along = -glm::dot(normal, from) / facing;
+    return along > 0 ? float(along) : infinite;
+}
+
+}  // namespace
+}  // namespace bilayer::detail
+#endif
+
+HWY_BEFORE_NAMESPACE();
+namespace bilayer::detail::HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+/// Rounding of products in floats, relative to the sizes of their factors; generous.
+constexpr float rounding = 2e-6f;
+/// Directions are bent where they run along an axis, so that all can be divided by.
+constexpr float leastDirection = 1e-20f;
+
+inline Vec dot(const Points& a, const Points& b) {
+    return hn::Add(hn::Add(hn::Mul(a.x, b.x), hn::Mul(a.y, b.y)), hn::Mul(a.z, b.z));
+}
+
+inline Points cross(const Points& a, const Points& b) {
+    const auto det = [](Vec a, Vec b, Vec c, Vec d) { return hn::Sub(hn::Mul(a, b), hn::Mul(c, d)); };
+    return {det(a.y, b.z, a.z, b.y), det(a.z, b.x, a.x, b.z), det(a.x, b.y, a.y, b.x)};
+}
+
+// Nodes to look at, the nearest last.
+struct Waiting {
+    static constexpr std::size_t most = 256;  // of seven for each of ten levels, and one
+    std::array<float, most> entries;
+    std::array<std::uint32_t, most> nodes;
+    std::size_t count = 0;
+
+    // Puts a node among those that stand from `first` on.
+    void insert(std::size_t first, float entry, std::uint32_t node) {
+        std::size_t place = count++;
+        for (; place > first && entries[place - 1] < entry; --place) {
+            entries[place] = entries[place - 1];
+            nodes[place] = nodes[place - 1];
+        }
+        entries[place] = entry;
+        nodes[place] = node;
+    }
+};
+
+// One ray's search for its nearest exit.
+class Search {
+  public:
+    Search(const TriangleTree& tree, const Ray& ray) : tree_(tree), ray_(ray) {
+        // around boxes, against rounding [m]
+        const float room = rounding * tree.largestCoordinate();
+        for (int k = 0; k < 3; ++k) {
+            const float d = ray.direction[k];
+            inverse_[k] = 1 / (std::abs(d) < leastDirection ? std::copysign(leastDirection, d) : d);
+            forward_[k] = inverse_[k] > 0;
+            enter_[k] = -(ray.origin[k] + (forward_[k] ? room : -room)) * inverse_[k];
+            leave_[k] = -(ray.origin[k] - (forward_[k] ? room : -room)) * inverse_[k];
+        }
+    }
+
+    float run() {
+        Waiting waiting;
+        waiting.insert(0, 0, tree_.boxes().root());
+        while (waiting.count > 0) {
+            --waiting.count;
+            if (waiting.entries[waiting.count] > nearest_) continue;
+            const std::uint32_t node = waiting.nodes[waiting.count];
+            if (tree_.boxes().isLeaf(node))
+                visit(tree_.leaf(node));
+            else
+                open(tree_.boxes().group(node), waiting);
+        }
+        return nearest_;
+    }
+
+  private:
+    void open(const BoxGroup& group, Waiting& waiting) const {
+        const Tag tag;
+        const std::size_t first = waiting.count;
+        for (std::size_t lane = 0; lane < treeWidth; lane += hn::Lanes(tag)) {
+            Vec enter = hn::Zero(tag), leave = hn::Set(tag, nearest_);
+            for (int k = 0; k < 3; ++k) {
+                const Vec inverse = hn::Set(tag, inverse_[k]);
+                const auto* near = forward_[k] ? group.lower[k] : group.upper[k];
+                const auto* far = forward_[k] ? group.upper[k] : group.lower[k];
+                enter = hn::Max(enter, hn::MulAdd(hn::Load(tag, near + lane), inverse, hn::Set(tag, enter_[k])));
+                leave = hn::Min(leave, hn::MulAdd(hn::Load(tag, far + lane), inverse, hn::Set(tag, leave_[k])));
+            }
+            alignas(32) float entries[treeWidth];
+            hn::Store(enter, tag, entries);
+            for (unsigned bits = bitsOf(hn::Le(enter, leave)); bits != 0; bits &= bits - 1) {
+                const auto i = std::size_t(std::countr_zero(bits));
+                waiting.insert(first, entries[i], group.firstChild + std::uint32_t(lane + i));
+            }
+        }
+    }
+
+    void visit(const TriangleLeaf& leaf) {
+        const Tag tag;
+        const Points d = all(ray_.direction);
+        for (std::size_t lane = 0; lane < treeWidth; lane += hn::Lanes(tag)) {
+            const auto corner = [&](int i) {
+                const auto& c = leaf.corners[i];
+                return Points{hn::Load(tag, c[0] + lane), hn::Load(tag, c[1] + lane), hn::Load(tag, c[2] + lane)};
+            };
+            const Points a = corner(0), ab = corner(1) - a, ac = corner(2) - a;
+            const Vec ab2 = dot(ab, ab), ac2 = dot(ac, ac), room = hn::Set(tag, rounding);
+            const Vec facing = dot(cross(ab, ac), d);
+            const Vec facingRoom = hn::Mul(room, hn::Sqrt(hn::Mul(ab2, ac2)));
+            const Mask faces = hn::Gt(hn::Add(facing, facingRoom), hn::Zero(tag));
+            if (hn::AllFalse(tag, faces)) continue;
+            const Points from = all(ray_.origin) - a, side = cross(d, from);
+            const Vec away = hn::Mul(room, hn::Sqrt(dot(from, from)));
+            const Vec uRoom = hn::Mul(away, hn::Sqrt(ac2)), vRoom = hn::Mul(away, hn::Sqrt(ab2));
+            const Vec u = hn::Add(dot(ac, side), uRoom), v = hn::Sub(vRoom, dot(ab, side));
+            // both sides of this have the room of u and v
+            const Vec most = hn::Add(hn::Add(facing, facingRoom), hn::Mul(hn::Set(tag, 2.0f), hn::Add(uRoom, vRoom)));
+            const Mask within = hn::And(hn::Ge(hn::Min(u, v), hn::Zero(tag)), hn::Le(hn::Add(u, v), most));
+            for (unsigned bits = bitsOf(hn::And(faces, within)); bits != 0; bits &= bits - 1)
+                nearest_ =
+                    std::min(nearest_, exitThrough(ray_, Triangle(leaf, lane + std::size_t(std::countr_zero(bits)))));
+        }
+    }
+
+    static Points all(const glm::vec3& p) {
+        const Tag tag;
+        return {hn::Set(tag, p.x), hn::Set(tag, p.y), hn::Set(tag, p.z)};
+    }
+
+    const TriangleTree& tree_;
+    const Ray& ray_;
+    float nearest_ = infinite;
+    bool forward_[3];                         // along an axis
+    float inverse_[3], enter_[3], leave_[3];  // a plane x is met at x * inverse + enter, or leave
+};
+
+float nearestExit(const TriangleTree& tree, const Ray& ray) {
+    return Search(tree, ray).run();
+}
+
+}  // namespace bilayer::detail::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace bilayer::detail {
+namespace {
+HWY_EXPORT(nearestExit);
+
+float thicknessBehind(const TriangleTree& tree, const Triangle& t) {
+    const glm::dvec3 a(t.a), b(t.b), c(t.c);
+    const glm::vec3 normal(0.5 * glm::cross(b - a, c - a));
+    const float length = glm::length(normal);
+    if (!(length > 0)) return infinite;
+    return HWY_DYNAMIC_DISPATCH(nearestExit)(tree, {(t.a + t.b + t.c) / 3.f, -normal / length});
+}
+
+}  // namespace
+
+std::vector<float> wallThickness(const TriangleTree& tree) {
+    std::vector<float> thickness(tree.triangleCount());
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, tree.boxes().leafCount, 64), [&](const auto& range) {
+        for (std::size_t leaf = range.begin(); leaf < range.end(); ++leaf)
+            for (std::size_t i = 0; i < tree.leafSize(leaf); ++i)
+                thickness[tree.leaf(leaf).triangles[i]] = thicknessBehind(tree, Triangle(tree.leaf(leaf), i));
+    });
+    return thickness;
+}
+
+}  // namespace bilayer::detail
+#endif  // HWY_ONCE

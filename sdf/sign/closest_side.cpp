@@ -1,0 +1,138 @@
+#include "sdf/sign/closest_side.h"
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/gtc/constants.hpp>
+#include <limits>
+
+namespace bilayer::detail {
+namespace {
+
+/// Points this close together are one: far above the rounding of doubles at 1e6 voxels from the origin, far below what
+/// the field resolves [voxels].
+constexpr double samePlace = 1e-7;
+/// A height below this part of the longest edge leaves no foot on the plane that is better than the edges.
+constexpr double flatness = 1e-10;
+/// Sums of unit normals below this part of their weights have nearly cancelled out.
+constexpr double cancelled = 1e-2;
+/// Solid angles below this, of sides about a voxel long, are too flat to tell on which side of an edge a way passes.
+constexpr double tooClose = 1e-9;
+constexpr double wholeTurn = 2 * glm::pi<double>();
+
+glm::dvec3 closestOnSegment(const glm::dvec3& a, const glm::dvec3& b) {
+    const glm::dvec3 ab = b - a;
+    const double length2 = glm::dot(ab, ab);
+    const double t = length2 > 0 ? std::clamp(-glm::dot(a, ab) / length2, 0.0, 1.0) : 0.0;
+    // from the nearer end, so that both triangles of an edge find the same point whichever way they run it
+    return t <= 0.5 ? a + t * ab : b - (1 - t) * ab;
+}
+
+double longestEdge2(const std::array<glm::dvec3, 3>& c) {
+    const glm::dvec3 ab = c[1] - c[0], bc = c[2] - c[1], ca = c[0] - c[2];
+    return std::max({glm::dot(ab, ab), glm::dot(bc, bc), glm::dot(ca, ca)});
+}
+
+// The angle under which a triangle is seen from one of its points: all round from within, half from an edge.
+double angleAt(const std::array<glm::dvec3, 3>& c, const glm::dvec3& p) {
+    for (std::size_t i = 0; i < 3; ++i)
+        if (glm::distance(c[i], p) <= samePlace) {
+            const glm::dvec3 a = c[(i + 1) % 3] - c[i], b = c[(i + 2) % 3] - c[i];
+            return std::atan2(glm::length(glm::cross(a, b)), glm::dot(a, b));
+        }
+    for (std::size_t i = 0; i < 3; ++i) {
+        const glm::dvec3 edge = c[(i + 1) % 3] - c[i];
+        if (glm::length(glm::cross(edge, p - c[i])) <= samePlace * glm::length(edge)) return glm::pi<double>();
+    }
+    return wholeTurn;
+}
+
+// Thinner than a place, a triangle has no normal to trust; its far side's neighbour meets the closest point as well and
+// speaks for it.
+bool hasNormal(const std::array<glm::dvec3, 3>& c) {
+    return glm::length(glm::cross(c[1] - c[0], c[2] - c[0])) > samePlace * std::sqrt(longestEdge2(c));
+}
+
+bool sameCorners(const std::array<glm::dvec3, 3>& a, const std::array<glm::dvec3, 3>& b) {
+    for (std::size_t turn = 0; turn < 3; ++turn)
+        if (a[0] == b[turn] && a[1] == b[(turn + 1) % 3] && a[2] == b[(turn + 2) % 3]) return true;
+    return false;
+}
+
+}  // namespace
+
+glm::dvec3 closestToOrigin(const std::array<glm::dvec3, 3>& c) {
+    const glm::dvec3 ab = c[1] - c[0], ac = c[2] - c[0], n = glm::cross(ab, ac);
+    const double n2 = glm::dot(n, n), longest2 = longestEdge2(c);
+    if (n2 > flatness * flatness * longest2 * longest2) {
+        // inside all three edges: the foot on the plane
+        const auto inner = [&](const glm::dvec3& p, const glm::dvec3& q) {
+            return glm::dot(glm::cross(q - p, -p), n) >= 0;
+        };
+        if (inner(c[0], c[1]) && inner(c[1], c[2]) && inner(c[2], c[0])) return (glm::dot(c[0], n) / n2) * n;
+    }
+    glm::dvec3 best = closestOnSegment(c[0], c[1]);
+    for (std::size_t i = 1; i < 3; ++i) {
+        const glm::dvec3 other = closestOnSegment(c[i], c[(i + 1) % 3]);
+        if (glm::dot(other, other) < glm::dot(best, best)) best = other;
+    }
+    return best;
+}
+
+std::optional<int> passing(const std::array<glm::dvec3, 3>& c, const glm::dvec3& way) {
+    const glm::dvec3 n = glm::cross(c[1] - c[0], c[2] - c[0]);
+    int positive = 0, negative = 0;
+    for (std::size_t i = 0; i < 3; ++i) {
+        const glm::dvec3 &a = c[(i + 1) % 3], &b = c[(i + 2) % 3];
+        const double volume = glm::dot(way, glm::cross(a, b));
+        const double scale = glm::length(way) * glm::length(a) * glm::length(b);
+        if (std::abs(volume) > tooClose * scale) ++(volume > 0 ? positive : negative);
+    }
+    if (positive > 0 && negative > 0) return 0;
+    const double from = -glm::dot(c[0], n), to = glm::dot(way, n) + from, flat = tooClose * glm::length(n);
+    if ((from > flat && to > flat) || (from < -flat && to < -flat)) return 0;
+    if (positive + negative < 3 || std::abs(from) <= flat || std::abs(to) <= flat) return std::nullopt;
+    return to > from ? 1 : -1;
+}
+
+std::array<glm::dvec3, 3> ClosestSide::cornersOf(std::uint32_t triangle) const {
+    const glm::uvec3 t = mesh_.triangles[triangle];
+    const auto corner = [&](unsigned i) { return glm::dvec3(mesh_.points[i]) * voxelsPerUnit_ - point_; };
+    return {corner(t.x), corner(t.y), corner(t.z)};
+}
+
+void ClosestSide::begin(const glm::dvec3& point) {
+    point_ = point;
+    distance_ = std::numeric_limits<double>::infinity();
+    faces_.clear();
+}
+
+void ClosestSide::offer(std::uint32_t triangle) {
+    const auto same = [&](const Face& face) { return face.triangle == triangle; };
+    if (std::any_of(faces_.begin(), faces_.end(), same)) return;
+    Face face{triangle, cornersOf(triangle), {}, 0};
+    face.closest = closestToOrigin(face.corners);
+    face.distance = glm::length(face.closest);
+    if (face.distance > distance_ + samePlace) return;
+    distance_ = std::min(distance_, face.distance);
+    faces_.push_back(face);
+}
+
+Side ClosestSide::side() const {
+    const auto nearer = [](const Face& a, const Face& b) { return a.distance < b.distance; };
+    const glm::dvec3 closest = std::min_element(faces_.begin(), faces_.end(), nearer)->closest;
+    double sum = 0, weights = 0;
+    for (auto face = faces_.begin(); face != faces_.end(); ++face) {
+        if (glm::distance(face->closest, closest) > samePlace || !hasNormal(face->corners)) continue;
+        const auto duplicate = [&](const Face& other) { return sameCorners(other.corners, face->corners); };
+        if (std::any_of(faces_.begin(), face, duplicate)) continue;
+        const auto& c = face->corners;
+        const double angle = angleAt(c, closest);
+        sum -= angle * glm::dot(glm::normalize(glm::cross(c[1] - c[0], c[2] - c[0])), closest);
+        weights += angle;
+    }
+    if (std::abs(sum) <= cancelled * weights * distance_) return Side::undecided;
+    return sum < 0 ? Side::inside : Side::outside;
+}
+
+}  // namespace bilayer::detail

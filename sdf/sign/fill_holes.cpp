@@ -1,0 +1,297 @@
+#include "sdf/sign/fill_holes.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <cstdlib>
+#include <glm/geometric.hpp>
+#include <limits>
+#include <numeric>
+#include <optional>
+#include <span>
+#include <unordered_map>
+#include <utility>
+#include <vector>
+
+#include "sdf/mesh/topology.h"
+#include "sdf/sign/winding.h"
+
+namespace bilayer::detail {
+namespace {
+
+// The triangulation of longer loops takes seconds.
+constexpr std::size_t maxEdges = 1000;
+// Winding numbers on a lid lie this close to a half: they are a half more than outside and a half less than inside, but
+// for what other holes let in or out.
+constexpr double maxDeviation = 0.25;
+// They are looked at on both sides of a lid's triangle, so far away [edges of a square of its area].
+constexpr double aside = 1e-3;
+
+using Loop = std::vector<unsigned>;  // vertices
+using Lid = std::vector<glm::uvec3>;
+
+// Edges that have no opposite edge yet, run the way that the triangles to be added have to run them.
+class MissingEdges {
+  public:
+    explicit MissingEdges(const Mesh& mesh) : mesh_(mesh), next_(mesh.points.size()) {
+        Topology(mesh).forEachEdge([&](std::span<const EdgeUse> uses) {
+            int excess = 0;
+            for (const EdgeUse& use : uses) excess += use.direction();
+            const unsigned from = excess > 0 ? uses[0].high : uses[0].low, to = excess > 0 ? uses[0].low : uses[0].high;
+            next_[from].insert(next_[from].end(), std::size_t(std::abs(excess)), to);
+        });
+    }
+
+    std::vector<unsigned> vertices() const {
+        std::vector<unsigned> vertices;
+        for (unsigned v = 0; v < next_.size(); ++v)
+            if (!next_[v].empty()) vertices.push_back(v);
+        return vertices;
+    }
+
+    // At every vertex as many of them end as begin, so that they make up closed loops; a path that comes back to one of
+    // its own vertices has run around one.
+    std::vector<Loop> takeLoops() {
+        std::vector<Loop> loops;
+        std::vector<std::size_t> places(next_.size(), none);  // of vertices on the path
+        Loop path;
+        for (unsigned start = 0; start < next_.size(); ++start)
+            for (unsigned vertex = start; !next_[vertex].empty() || !path.empty(); vertex = take(path)) {
+                if (places[vertex] != none) {
+                    loops.emplace_back(path.begin() + std::ptrdiff_t(places[vertex]), path.end());
+                    for (const unsigned v : loops.back()) places[v] = none;
+                    path.resize(path.size() - loops.back().size());
+                    if (next_[vertex].empty()) break;
+                }
+                places[vertex] = path.size();
+                path.push_back(vertex);
+            }
+        return loops;
+    }
+
+  private:
+    static constexpr std::size_t none = std::numeric_limits<std::size_t>::max();
+
+    glm::dvec3 directionOf(unsigned from, unsigned to) const {
+        return glm::normalize(glm::dvec3(mesh_.points[to]) - glm::dvec3(mesh_.points[from]));
+    }
+
+    // Takes the edge on from the end of a path that turns back the most: to the other rim of a crack.
+    unsigned take(const Loop& path) {
+        auto& out = next_[path.back()];
+        auto best = out.begin();
+        if (path.size() > 1 && out.size() > 1) {
+            const glm::dvec3 back = directionOf(path.back(), path[path.size() - 2]);
+            const auto turn = [&](unsigned to) { return glm::dot(directionOf(path.back(), to), back); };
+            best = std::max_element(out.begin(), out.end(), [&](unsigned a, unsigned b) { return turn(a) < turn(b); });
+        }
+        const unsigned to = *best;
+        out.erase(best);
+        return to;
+    }
+
+    const Mesh& mesh_;
+    std::vector<std::vector<unsigned>> next_;
+};
+
+// The mesh by the first of vertices with equal coordinates, and of those of rims that are no farther apart than a crack
+// is wide; but the vertices of a triangle stay apart.
+Mesh withJoinedRims(const Mesh& mesh, std::vector<unsigned> rim, double crack) {
+    std::vector<unsigned> first(mesh.points.size());
+    std::iota(first.begin(), first.end(), 0u);
+    const auto at = [&](unsigned v) { return glm::dvec3(mesh.points[v]); };
+    std::stable_sort(rim.begin(), rim.end(), [&](unsigned a, unsigned b) { return at(a).x < at(b).x; });
+    for (std::size_t i = 0; i < rim.size(); ++i)
+        for (std::size_t k = i + 1; k < rim.size() && at(rim[k]).x - at(rim[i]).x <= crack; ++k)
+            if (first[rim[i]] == rim[i] && first[rim[k]] == rim[k] && glm::distance(at(rim[i]), at(rim[k])) <= crack)
+                first[rim[k]] = rim[i];
+    Mesh joined{mesh.points, Topology(mesh).triangles, mesh.origin};
+    for (const glm::uvec3& t : joined.triangles)
+        for (int i = 0; i < 3; ++i)
+            if (const unsigned a = t[i], b = t[(i + 1) % 3]; a != b && first[a] == first[b]) first[a] = a, first[b] = b;
+    for (glm::uvec3& t : joined.triangles) t = {first[t.x], first[t.y], first[t.z]};
+    return joined;
+}
+
+glm::dvec3 areaOf(const Mesh& mesh, const glm::uvec3& t) {
+    const glm::dvec3 a(mesh.points[t.x]), b(mesh.points[t.y]), c(mesh.points[t.z]);
+    return 0.5 * glm::cross(b - a, c - a);
+}
+
+// The triangulation of a loop that has the least area.
+class LeastArea {
+  public:
+    LeastArea(const Mesh& mesh, const Loop& loop)
+        : loop_(loop), size_(loop.size()), areas_(size_ * size_, 0), middles_(size_ * size_, 0) {
+        for (std::size_t span = 2; span < size_; ++span)
+            for (std::size_t first = 0; first + span < size_; ++first) {
+                double& least = areas_[first * size_ + first + span];
+                least = std::numeric_limits<double>::max();
+                for (std::size_t middle = first + 1; middle < first + span; ++middle) {
+                    const double area = areas_[first * size_ + middle] + areas_[middle * size_ + first + span] +
+                                        glm::length(areaOf(mesh, triangle(first, middle, first + span)));
+                    if (!(area < least)) continue;
+                    least = area;
+                    middles_[first * size_ + first + span] = unsigned(middle);
+                }
+            }
+        add(0, size_ - 1);
+    }
+
+    double area() const { return areas_[size_ - 1]; }
+    const Lid& lid() const { return lid_; }
+
+  private:
+    glm::uvec3 triangle(std::size_t a, std::size_t b, std::size_t c) const { return {loop_[a], loop_[b], loop_[c]}; }
+
+    void add(std::size_t first, std::size_t last) {
+        std::vector<std::pair<std::size_t, std::size_t>> open{{first, last}};
+        while (!open.empty()) {
+            const auto [from, to] = open.back();
+            open.pop_back();
+            if (to - from < 2) continue;
+            const std::size_t middle = middles_[from * size_ + to];
+            lid_.push_back(triangle(from, middle, to));
+            open.emplace_back(from, middle);
+            open.emplace_back(middle, to);
+        }
+    }
+
+    const Loop& loop_;
+    std::size_t size_;
+    std::vector<double> areas_;  // of the part of the loop between two of its vertices
+    std::vector<unsigned> middles_;
+    Lid lid_;
+};
+
+double lengthOf(const Mesh& mesh, const Loop& loop) {
+    double length = 0;
+    for (std::size_t i = 0; i < loop.size(); ++i)
+        length += glm::distance(glm::dvec3(mesh.points[loop[i]]), glm::dvec3(mesh.points[loop[(i + 1) % loop.size()]]));
+    return length;
+}
+
+// Whether most of a lid lies between inside and outside, and no triangle of the mesh lies there already: numbers would
+// jump across it.
+bool isBorder(const Mesh& mesh, const Lid& lid, const WindingNumber& winding) {
+    double area = 0, border = 0;
+    for (const glm::uvec3& t : lid) {
+        const glm::dvec3 middle =
+            (glm::dvec3(mesh.points[t.x]) + glm::dvec3(mesh.points[t.y]) + glm::dvec3(mesh.points[t.z])) / 3.0;
+        const glm::dvec3 vector = areaOf(mesh, t);
+        const double its = glm::length(vector);
+        if (!(its > 0)) continue;
+        const glm::dvec3 step = aside / std::sqrt(its) * vector;
+        const auto isHalf = [&](const glm::dvec3& place) {
+            return std::abs(winding.estimate(place, 0.1).value - 0.5) < maxDeviation;
+        };
+        area += its;
+        if (isHalf(middle + step) && isHalf(middle - step)) border += its;
+    }
+    return 2 * border > area;
+}
+
+// A crack changes no winding number.
+std::optional<Lid> lidOf(const Mesh& mesh, const Loop& loop, double crack, const WindingNumber& winding) {
+    if (loop.size() < 3 || loop.size() > maxEdges) return std::nullopt;
+    const LeastArea least(mesh, loop);
+    const bool isCrack = 2 * least.area() <= crack * lengthOf(mesh, loop);
+    if (!isCrack && !isBorder(mesh, least.lid(), winding)) return std::nullopt;
+    return least.lid();
+}
+
+// Gets rid of triangles of lids that are next to no area, as between an edge and the vertices on it across a crack: the
+// longest edge of such a triangle and its neighbour is exchanged for the other diagonal of the two.
+class CapRemoval {
+  public:
+    /// @param first   of the triangles that may be removed
+    /// @param crack   the height of such triangles at most [m]
+    CapRemoval(Mesh& mesh, std::size_t first, double crack) : mesh_(mesh), first_(unsigned(first)), crack_(crack) {
+        for (unsigned t = 0; t < mesh.triangles.size(); ++t) enter(t);
+    }
+
+    // The longest edges of caps get shorter by each exchange between two of them.
+    void run() {
+        std::vector<unsigned> caps;
+        for (unsigned t = first_; t < mesh_.triangles.size(); ++t) caps.push_back(t);
+        const std::size_t rounds = caps.size();  // a row of caps loses one in each at least
+        for (std::size_t round = 0; round < rounds && !caps.empty(); ++round) {
+            for (const unsigned t : caps) exchange(t);
+            std::erase_if(caps, [&](unsigned t) { return longestOfCap(t) < 0; });
+        }
+    }
+
+  private:
+    static std::uint64_t keyOf(unsigned from, unsigned to) { return std::uint64_t(from) << 32 | to; }
+    glm::dvec3 at(unsigned vertex) const { return glm::dvec3(mesh_.points[vertex]); }
+
+    void enter(unsigned t) {
+        const glm::uvec3& v = mesh_.triangles[t];
+        for (int i = 0; i < 3; ++i) triangles_[keyOf(v[i], v[(i + 1) % 3])] = t;
+    }
+
+    // The first corner of the longest edge if the third one is next to it, between its ends; else -1.
+    int longestOfCap(unsigned t) const {
+        const glm::uvec3& v = mesh_.triangles[t];
+        const auto length = [&](int i) { return glm::distance(at(v[i]), at(v[(i + 1) % 3])); };
+        const int i = length(0) >= length(1) && length(0) >= length(2) ? 0 : length(1) >= length(2) ? 1 : 2;
+        const glm::dvec3 along = at(v[(i + 1) % 3]) - at(v[i]), to = at(v[(i + 2) % 3]) - at(v[i]);
+        const double base = glm::length(along), place = glm::dot(to, along) / base;
+        const bool isCap =
+            glm::length(glm::cross(along, to)) <= crack_ * base && place > crack_ && place < base - crack_;
+        return isCap ? i : -1;
+    }
+
+    // Another cap across the edge has to agree that it is its longest.
+    void exchange(unsigned cap) {
+        const int i = longestOfCap(cap);
+        if (i < 0) return;
+        const glm::uvec3 v = mesh_.triangles[cap];
+        const unsigned from = v[i], to = v[(i + 1) % 3], on = v[(i + 2) % 3];
+        const auto found = triangles_.find(keyOf(to, from));
+        if (found == triangles_.end()) return;
+        const unsigned other = found->second;
+        const glm::uvec3& o = mesh_.triangles[other];
+        const int its = longestOfCap(other);
+        if (its >= 0 && o[its] != to) return;
+        const unsigned opposite = o.x ^ o.y ^ o.z ^ from ^ to;
+        if (opposite == on) return;
+        triangles_.erase(found);
+        triangles_.erase(keyOf(from, to));
+        mesh_.triangles[cap] = {on, from, opposite};
+        mesh_.triangles[other] = {on, opposite, to};
+        enter(cap);
+        enter(other);
+    }
+
+    Mesh& mesh_;
+    unsigned first_;
+    double crack_;
+    std::unordered_map<std::uint64_t, unsigned> triangles_;  // by the edges that they run
+};
+
+}  // namespace
+
+FilledMesh fillHoles(Mesh mesh, double crack) {
+    const std::vector<unsigned> rim = MissingEdges(mesh).vertices();
+    if (rim.empty()) return {std::move(mesh)};
+    Mesh joined = withJoinedRims(mesh, rim, crack);
+    const std::vector<Loop> loops = MissingEdges(joined).takeLoops();
+    const WindingNumber winding(joined);
+    const std::size_t given = joined.triangles.size();
+    FilledMesh filled;
+    Lid lids;
+    for (const Loop& loop : loops)
+        if (const auto lid = lidOf(joined, loop, crack, winding))
+            lids.insert(lids.end(), lid->begin(), lid->end());
+        else
+            ++filled.openLoops;
+    filled.loops = loops.size() - filled.openLoops;
+    joined.triangles.insert(joined.triangles.end(), lids.begin(), lids.end());
+    CapRemoval(joined, given, crack).run();
+    filled.changed = filled.loops > 0 || MissingEdges(joined).vertices().size() < rim.size();
+    filled.mesh = filled.changed ? std::move(joined) : std::move(mesh);
+    return filled;
+}
+
+}  // namespace bilayer::detail

@@ -1,0 +1,316 @@
+#include "sdf/sign/flood.h"
+
+#include <fmt/format.h>
+#include <oneapi/tbb/enumerable_thread_specific.h>
+#include <oneapi/tbb/parallel_for.h>
+
+#include <atomic>
+#include <cmath>
+#include <numeric>
+#include <span>
+#include <stdexcept>
+
+#include "sdf/base/progress.h"
+#include "sdf/bvh/winding_number.h"
+#include "sdf/sign/octree_cells.h"
+
+namespace bilayer::detail {
+namespace {
+
+/// Room for the rounding of floats in distances that are added up [voxels].
+constexpr float slack = 1e-3f;
+/// Voxels nearer than this count as on the surface, on neither side of it [voxels].
+constexpr float onSurface = 1e-4f;
+constexpr std::uint32_t infinity = 0;  // the part that holds what lies beyond all cells
+
+// Parts of space that are joined one by one.
+class Parts {
+  public:
+    explicit Parts(std::size_t count) : parent_(count) { std::iota(parent_.begin(), parent_.end(), 0u); }
+    std::uint32_t root(std::uint32_t part) {
+        while (parent_[part] != part) part = parent_[part] = parent_[parent_[part]];
+        return part;
+    }
+    void join(std::uint32_t a, std::uint32_t b) {
+        a = root(a);
+        b = root(b);
+        parent_[std::max(a, b)] = std::min(a, b);
+    }
+
+  private:
+    std::vector<std::uint32_t> parent_;
+};
+
+// The connected parts of a mask.
+std::vector<BlockMask> components(BlockMask mask) {
+    std::vector<BlockMask> parts;
+    for (unsigned voxel = 0; voxel < blockVoxels; ++voxel) {
+        if (!test(mask, voxel)) continue;
+        BlockMask part{}, next{};
+        set(next, voxel);
+        while (next != part) {
+            part = next;
+            next = grown(part);
+            for (std::size_t x = 0; x < blockSide; ++x) next[x] &= mask[x];
+        }
+        for (std::size_t x = 0; x < blockSide; ++x) mask[x] &= ~part[x];
+        parts.push_back(part);
+    }
+    return parts;
+}
+
+bool meet(const BlockMask& a, const BlockMask& b) {
+    std::uint64_t bits = 0;
+    for (std::size_t x = 0; x < blockSide; ++x) bits |= a[x] & b[x];
+    return bits != 0;
+}
+
+enum class Side : std::uint8_t { unknown, outside, inside };
+
+class Flood {
+  public:
+    Flood(const Cells& cells, const Mesh& mesh, float gap, float background, double voxelSize, Progress* progress)
+        : cells_(cells),
+          winding_(mesh, progress),
+          gap_(gap),
+          background_(background),
+          h_(voxelSize),
+          progress_(progress),
+          states_(vectorOf<State>(cells.all().size(), progress)) {}
+
+    // The sides of all voxels of all leaves, and of the cells between them.
+    void run();
+    const BlockMask& inside(std::size_t cell) const { return states_[cell].inside; }
+    bool cellInside(std::size_t cell) const { return test(states_[cell].inside, 0); }
+
+  private:
+    struct State {
+        std::vector<BlockMask> parts;  // of voxels where the ball's centre can be
+        std::uint32_t first = 0;       // the number of the first part
+        BlockMask known{}, inside{};
+        BlockMask fresh{};  // known since the last step
+        BlockMask outsideNext{}, insideNext{};
+        std::array<std::uint32_t, 27> around{};  // cells of the blocks around a leaf, beyond() where there is none
+    };
+    struct Neighbour {
+        Side side;
+        bool fresh;      // since the last step
+        float distance;  // [m]
+    };
+
+    void findParts();
+    void joinParts();
+    template <class Join>
+    void joinAcross(std::size_t cell, int face, const Join& join) const;
+    void sidesOfParts(Parts& parts);
+    template <class Passes>
+    bool step(const Passes& passes);
+    template <class Passes>
+    void stepIn(std::size_t cell, const Passes& passes);
+    Neighbour neighbour(const State& state, const openvdb::Coord& local) const;
+    void settleRest();
+    std::uint32_t beyond() const { return std::uint32_t(states_.size()); }
+
+    const Cells& cells_;
+    const WindingNumber winding_;
+    float gap_, background_;
+    double h_;
+    Progress* progress_;
+    std::vector<State> states_;
+};
+
+void Flood::run() {
+    findParts();
+    joinParts();
+    const auto certain = [this](std::size_t, unsigned, const openvdb::Coord& link, float a, float b) {
+        const double length =
+            std::sqrt(double(link.x() * link.x() + link.y() * link.y() + link.z() * link.z())) + double(slack);
+        return double(a) + double(b) > length * h_;
+    };
+    while (step(certain)) {
+    }
+    // what is left lies very near: there the triangles themselves are asked
+    for (State& state : states_) state.fresh = state.known;
+    const auto clear = [this](std::size_t cell, unsigned voxel, const openvdb::Coord& link, float a, float b) {
+        if (!(std::min(a, b) > onSurface * float(h_))) return false;
+        poll(progress_);
+        const openvdb::Coord at = cells_.all()[cell].leaf->offsetToGlobalCoord(voxel), to = at + link;
+        return !winding_.meets(glm::dvec3(at.x(), at.y(), at.z()) * h_, glm::dvec3(to.x(), to.y(), to.z()) * h_);
+    };
+    while (step(clear)) {
+    }
+    settleRest();
+}
+
+void Flood::findParts() {
+    // links between two voxels farther than this keep gap / 2 all the way
+    const float free = (0.5f * gap_ + 0.5f + slack) * float(h_);
+    tbb::parallel_for(std::size_t(0), states_.size(), [&](std::size_t c) {
+        const Cell& cell = cells_.all()[c];
+        State& state = states_[c];
+        if (!cell.leaf) return;
+        poll(progress_);
+        state.parts = components(farther(*cell.leaf, free));
+        for (int i = 0; i < 27; ++i) {
+            const openvdb::Coord shift((i / 9 - 1) * blockSide, (i / 3 % 3 - 1) * blockSide, (i % 3 - 1) * blockSide);
+            const std::size_t found = cells_.find(cell.origin + shift);
+            state.around[std::size_t(i)] = found == Cells::none ? beyond() : std::uint32_t(found);
+        }
+    });
+}
+
+// Hands pairs of parts that touch across a face of a cell to `join`.
+template <class Join>
+void Flood::joinAcross(std::size_t cell, int face, const Join& join) const {
+    const Cell& self = cells_.all()[cell];
+    openvdb::Coord next = self.origin;
+    next[face / 2] += face % 2 ? self.side : -1;
+    const std::size_t found = cells_.find(next);
+    const auto each = [&](std::size_t c, int axis, int side, const auto& use) {
+        const State& s = states_[c];
+        const BlockMask all{~0ull, ~0ull, ~0ull, ~0ull, ~0ull, ~0ull, ~0ull, ~0ull};
+        if (!cells_.all()[c].leaf) return use(s.first, across(all, axis, side));
+        for (std::uint32_t p = 0; p < s.parts.size(); ++p) {
+            const BlockMask touching = across(s.parts[p], axis, side);
+            if (any(touching)) use(s.first + p, touching);
+        }
+    };
+    if (found == Cells::none)
+        return each(cell, face / 2, face % 2, [&](std::uint32_t part, const BlockMask&) { join(infinity, part); });
+    // the smaller of two cells sees the whole of its neighbour's side; of equals the lower
+    const std::int32_t side = cells_.all()[found].side;
+    if (side < self.side || (side == self.side && face % 2 == 0)) return;
+    each(cell, face / 2, face % 2, [&](std::uint32_t a, const BlockMask& maskA) {
+        if (!cells_.all()[found].leaf) return join(a, states_[found].first);
+        for (std::uint32_t p = 0; p < states_[found].parts.size(); ++p)
+            if (meet(maskA, states_[found].parts[p])) join(a, states_[found].first + p);
+    });
+}
+
+void Flood::joinParts() {
+    std::uint32_t count = infinity + 1;
+    for (const std::size_t c : Polled(states_.size(), progress_)) {
+        states_[c].first = count;
+        count += cells_.all()[c].leaf ? std::uint32_t(states_[c].parts.size()) : 1;
+    }
+    tbb::enumerable_thread_specific<std::vector<std::pair<std::uint32_t, std::uint32_t>>> pairs;
+    tbb::parallel_for(std::size_t(0), states_.size(), [&](std::size_t c) {
+        poll(progress_);
+        auto& mine = pairs.local();
+        for (int face = 0; face < 6; ++face)
+            joinAcross(c, face, [&](std::uint32_t a, std::uint32_t b) { mine.emplace_back(a, b); });
+    });
+    Parts parts(count);
+    for (const auto& some : pairs)
+        for (const std::size_t i : Polled(some.size(), progress_)) parts.join(some[i].first, some[i].second);
+    sidesOfParts(parts);
+}
+
+void Flood::sidesOfParts(Parts& parts) {
+    for (const std::size_t c : Polled(states_.size(), progress_)) {
+        State& state = states_[c];
+        if (!cells_.all()[c].leaf) {
+            state.known.fill(~0ull);
+            if (parts.root(state.first) != infinity) state.inside.fill(~0ull);
+        }
+        for (std::uint32_t p = 0; p < state.parts.size(); ++p)
+            for (std::size_t x = 0; x < blockSide; ++x) {
+                state.known[x] |= state.parts[p][x];
+                if (parts.root(state.first + p) != infinity) state.inside[x] |= state.parts[p][x];
+            }
+        state.fresh = state.known;
+    }
+}
+
+// A voxel next to or in a leaf, by coordinates from the leaf's first voxel.
+Flood::Neighbour Flood::neighbour(const State& state, const openvdb::Coord& local) const {
+    const int block = ((local.x() + blockSide) / blockSide * 3 + (local.y() + blockSide) / blockSide) * 3 +
+                      (local.z() + blockSide) / blockSide;
+    const std::uint32_t cell = state.around[std::size_t(block)];
+    if (cell == beyond()) return {Side::outside, true, background_};
+    const State& other = states_[cell];
+    const BandLeaf* leaf = cells_.all()[cell].leaf;
+    const unsigned at = BandLeaf::coordToOffset(local);
+    if (!leaf) return {test(other.inside, 0) ? Side::inside : Side::outside, test(other.fresh, 0), background_};
+    if (!test(other.known, at)) return {Side::unknown, false, 0};
+    return {test(other.inside, at) ? Side::inside : Side::outside, test(other.fresh, at), leaf->buffer().data()[at]};
+}
+
+// One step of growth over the links that `passes` lets through, from the voxels that the last step reached.
+template <class Passes>
+bool Flood::step(const Passes& passes) {
+    tbb::parallel_for(std::size_t(0), states_.size(), [&](std::size_t c) {
+        if (!cells_.all()[c].leaf) return;
+        poll(progress_);
+        stepIn(c, passes);
+    });
+    std::atomic<bool> grew = false;
+    tbb::parallel_for(std::size_t(0), states_.size(), [&](std::size_t c) {
+        State& state = states_[c];
+        for (std::size_t x = 0; x < blockSide; ++x) {
+            state.fresh[x] = state.outsideNext[x] | state.insideNext[x];
+            state.known[x] |= state.fresh[x];
+            state.inside[x] |= state.insideNext[x];
+        }
+        if (any(state.fresh)) grew = true;
+    });
+    return grew;
+}
+
+template <class Passes>
+void Flood::stepIn(std::size_t cell, const Passes& passes) {
+    State& state = states_[cell];
+    state.outsideNext = state.insideNext = {};
+    const float* distances = cells_.all()[cell].leaf->buffer().data();
+    for (unsigned voxel = 0; voxel < blockVoxels; ++voxel) {
+        if (test(state.known, voxel)) continue;
+        const openvdb::Coord local(int(voxel / 64), int(voxel / 8 % 8), int(voxel % 8));
+        Side found = Side::unknown;
+        for (int i = 0; i < 27 && found != Side::outside; ++i) {
+            const openvdb::Coord link(i / 9 - 1, i / 3 % 3 - 1, i % 3 - 1);
+            const Neighbour next = i == 13 ? Neighbour{Side::unknown, false, 0} : neighbour(state, local + link);
+            if (next.side == Side::unknown || !next.fresh || next.side == found) continue;
+            if (passes(cell, voxel, link, distances[voxel], next.distance)) found = next.side;
+        }
+        if (found == Side::outside) set(state.outsideNext, voxel);
+        if (found == Side::inside) set(state.insideNext, voxel);
+    }
+}
+
+// What no side reached is shut in, unless it lies on the surface.
+void Flood::settleRest() {
+    tbb::parallel_for(std::size_t(0), states_.size(), [&](std::size_t c) {
+        if (!cells_.all()[c].leaf) return;
+        const BlockMask off = farther(*cells_.all()[c].leaf, onSurface * float(h_));
+        for (std::size_t x = 0; x < blockSide; ++x) states_[c].inside[x] |= off[x] & ~states_[c].known[x];
+    });
+}
+
+}  // namespace
+
+void signByFlood(openvdb::FloatGrid& grid, const Mesh& mesh, float gap, const BandWidths& widths, Progress* progress) {
+    const float reach = 0.5f * gap + 1;
+    if (!(gap >= 0)) throw std::invalid_argument(fmt::format("gap must be at least 0 voxels, not {}", gap));
+    if (grid.background() < (reach - slack) * widths.voxelSize)
+        throw std::invalid_argument(fmt::format("a gap of {} voxels needs distances up to {} voxels", gap, reach));
+    validate(mesh);
+    const float background = grid.background();
+    const std::vector<BandLeaf*> leaves = leavesOf(grid);
+    std::vector<openvdb::CoordBBox> inside;
+    if (!leaves.empty()) {
+        const Cells cells(leaves, {}, progress);
+        Flood flood(cells, mesh, gap, background, double(widths.voxelSize), progress);
+        flood.run();
+        tbb::parallel_for(std::size_t(0), cells.all().size(), [&](std::size_t c) {
+            if (BandLeaf* leaf = cells.all()[c].leaf) signLeaf(*leaf, flood.inside(c), widths);
+        });
+        for (std::size_t c = 0; c < cells.all().size(); ++c) {
+            const Cell& cell = cells.all()[c];
+            if (!cell.leaf && flood.cellInside(c))
+                inside.push_back(openvdb::CoordBBox::createCube(cell.origin, cell.side));
+        }
+    }
+    assemble(grid, inside, widths, progress);
+}
+
+}  // namespace bilayer::detail

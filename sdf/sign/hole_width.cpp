@@ -1,0 +1,148 @@
+// Space is divided into cubes, those first that can hold the widest hole, until one is small enough. Cubes are given up
+// where no winding number can be a half: it is so by a bound of its slope, whatever surface passes, or, in a ball that
+// no surface enters, by Harnack's inequality, for it is harmonic there.
+#include "sdf/sign/hole_width.h"
+
+#include <oneapi/tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <glm/gtc/constants.hpp>
+#include <limits>
+#include <queue>
+#include <vector>
+
+#include "sdf/base/progress.h"
+#include "sdf/bvh/triangle_tree.h"
+#include "sdf/bvh/winding_number.h"
+#include "sdf/sign/closest_side.h"
+
+namespace bilayer::detail {
+namespace {
+
+/// Of the hole's radius: half the side of the cubes that are no further divided.
+constexpr double tolerance = 0.05;
+/// The error of winding numbers, of the way to a half.
+constexpr double share = 0.1;
+/// Cubes that are divided at once.
+constexpr std::size_t batchSize = 64;
+const double halfDiagonal = std::sqrt(3.0);  // of a cube, by half its side
+
+struct Cube {
+    glm::dvec3 centre;
+    double half;      // of a side [m]
+    double distance;  // of the centre to the mesh [m]
+
+    double radius() const { return halfDiagonal * half; }
+    double mostDistance() const { return distance + radius(); }
+    bool operator<(const Cube& other) const { return mostDistance() < other.mostDistance(); }
+};
+
+class Search {
+  public:
+    Search(const Mesh& mesh, double least, Progress* progress)
+        : mesh_(mesh),
+          leastRadius_(0.5 * least),
+          progress_(progress),
+          tree_(mesh, progress),
+          winding_(mesh, progress),
+          slope_(mesh, progress) {}
+
+    Opening run() const {
+        std::priority_queue<Cube> cubes;
+        cubes.push(whole());
+        while (!cubes.empty()) {
+            std::vector<Cube> batch;
+            for (; batch.size() < batchSize && !cubes.empty(); cubes.pop()) batch.push_back(cubes.top());
+            std::vector<std::vector<Cube>> parts(batch.size());
+            tbb::parallel_for(std::size_t(0), batch.size(), [&](std::size_t i) { parts[i] = divided(batch[i]); });
+            Cube widest{};
+            for (const std::vector<Cube>& some : parts)
+                for (const Cube& cube : some) {
+                    if (!isSmall(cube))
+                        cubes.push(cube);
+                    else if (cube.distance > widest.distance)
+                        widest = cube;
+                }
+            if (widest.distance > 0) return {2 * widest.distance, widest.centre};
+        }
+        return {};
+    }
+
+  private:
+    // The winding number is below a half beyond a distance R with area / (4 pi R^2) = 1/2.
+    Cube whole() const {
+        const Bounds box = bounds(mesh_);
+        const double reach = std::sqrt(winding_.area() / (2 * glm::pi<double>()));
+        const glm::dvec3 centre(box.centre());
+        return {centre, 0.5 * double(box.longestSide()) + reach,
+                distance(centre, std::numeric_limits<double>::infinity())};
+    }
+
+    static bool isSmall(const Cube& cube) { return cube.half <= tolerance * cube.distance; }
+
+    /// The octants that may hold a hole that is wide enough.
+    std::vector<Cube> divided(const Cube& cube) const {
+        poll(progress_);
+        std::vector<Cube> parts;
+        for (int octant = 0; octant < 8; ++octant) {
+            const Cube part = child(cube, octant);
+            if (part.mostDistance() >= leastRadius_ && mayHoldClosing(part)) parts.push_back(part);
+        }
+        return parts;
+    }
+
+    Cube child(const Cube& cube, int octant) const {
+        const double half = 0.5 * cube.half;
+        const glm::dvec3 step(octant & 1 ? half : -half, octant & 2 ? half : -half, octant & 4 ? half : -half);
+        return {cube.centre + step, half, distance(cube.centre + step, cube.distance + glm::length(step))};
+    }
+
+    /// To the nearest triangle, which is no farther than `bound`.
+    double distance(const glm::dvec3& point, double bound) const {
+        tree_.descend(
+            [&](const Bounds& box) {
+                const glm::dvec3 beside =
+                    glm::max(glm::max(glm::dvec3(box.lower) - point, point - glm::dvec3(box.upper)), glm::dvec3(0));
+                return glm::length(beside) <= bound;
+            },
+            [&](unsigned triangle) {
+                const glm::uvec3& t = mesh_.triangles[triangle];
+                const std::array<glm::dvec3, 3> corners{glm::dvec3(mesh_.points[t.x]) - point,
+                                                        glm::dvec3(mesh_.points[t.y]) - point,
+                                                        glm::dvec3(mesh_.points[t.z]) - point};
+                bound = std::min(bound, glm::length(closestToOrigin(corners)));
+            });
+        return bound;
+    }
+
+    /// Whether the winding number may be a half somewhere in a cube, and that not across a surface only.
+    bool mayHoldClosing(const Cube& cube) const {
+        const WindingNumber::Estimate number = winding_.estimate(cube.centre, share);
+        // across closed surfaces it changes by whole numbers
+        const double off = std::abs(number.value - std::round(number.value)) + number.error;
+        if (off < 0.5 && (slope_(cube.centre, cube.radius()) * cube.radius() < 0.5 - off)) return false;
+        const double t = cube.radius() / cube.distance;
+        if (!(t < 1)) return true;
+        if (off * (1 + t) < 0.5 * (1 - t) * (1 - t)) return false;
+        return std::abs(number.value - 0.5) - number.error < 0.5;
+    }
+
+    const Mesh& mesh_;
+    const double leastRadius_;
+    Progress* progress_;
+    const TriangleTree tree_;
+    const WindingNumber winding_;
+    const WindingSlope slope_;
+};
+
+}  // namespace
+
+Opening widestOpening(const Mesh& mesh, double least, Progress* progress) {
+    return Search(mesh, least, progress).run();
+}
+
+}  // namespace bilayer::detail

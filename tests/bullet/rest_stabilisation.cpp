@@ -1,0 +1,335 @@
+// What rests stays where it is, and nothing else does.
+#include <bilayer/integration/bullet/extensions.h>
+
+#include <BulletDynamics/ConstraintSolver/btPoint2PointConstraint.h>
+
+#include <algorithm>
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <optional>
+#include <random>
+#include <utility>
+#include <vector>
+
+#include "tests/support/support.h"
+#include "world.h"
+
+using namespace bilayer;
+using namespace bilayer::detail;
+using namespace bilayer::bullet::detail;
+using namespace bilayer::test;
+using bullet::Shape;
+using bullet::WorldExtensions;
+
+namespace {
+
+constexpr bullet::ExtensionOptions resting{.continuousCollision = false, .restStabilisation = true};
+
+constexpr float h = 0.02f;  // voxel [m]
+
+/// Friction in all directions: with Bullet's single one, what lies on something slow goes on as it likes.
+void useFriction(World& world) {
+    world.dynamics.getSolverInfo().m_solverMode |= SOLVER_USE_2_FRICTION_DIRECTIONS;
+    world.dynamics.getSolverInfo().m_numIterations = 40;
+}
+
+/// Rings that lie in a bowl, across each other.
+struct Heap {
+    Shape bowl{exactBowl(1, 0.1f, 2 * h)};
+    Shape ring{exactTorus(0.2f, 0.07f, h), {.restingFriction = 1.5f}};
+    World world;
+    std::vector<btRigidBody*> rings;
+
+    explicit Heap(unsigned seed) {
+        useFriction(world);
+        world.dynamics.getSolverInfo().m_frictionERP = 0.5f;
+        world.add(bowl, 0, {0, 0, 0});
+        std::mt19937 random(seed);
+        std::uniform_real_distribution<float> any(-1, 1);
+        for (int i = 0; i < 8; ++i) {
+            const btQuaternion turn(any(random), any(random), any(random), any(random));
+            rings.push_back(
+                world.add(ring, 1, {0.2f * any(random), 0.2f * any(random), 0.6f * float(i)}, turn.normalized()));
+            rings.back()->setActivationState(DISABLE_DEACTIVATION);
+        }
+    }
+
+    /// Until nothing rocks any more, which takes some of them half a minute.
+    void settle() {
+        world.run(8);
+        for (int i = 0; i < 60 && farthest(1) > 0.02f * h; ++i) {
+        }
+    }
+
+    /// How far the ring goes that goes farthest, on its way too.
+    float farthest(float seconds) {
+        std::vector<btVector3> before;
+        for (const btRigidBody* body : rings) before.push_back(body->getCenterOfMassPosition());
+        float most = 0;
+        for (int part = 0; part < 10; ++part) {
+            world.run(0.1f * seconds);
+            for (std::size_t i = 0; i < rings.size(); ++i)
+                most = std::max(most, before[i].distance(rings[i]->getCenterOfMassPosition()));
+        }
+        return most;
+    }
+};
+
+/// A box on level ground that friction does not hold and nothing lets sleep, after a second.
+struct BoxOnIce {
+    Shape floor{exactBox({1, 1, 0.1f}, h)}, box{exactBox({0.1f, 0.1f, 0.1f}, h)};
+    btRigidBody* body;
+
+    explicit BoxOnIce(World& world) {
+        world.add(floor, 0, {0, 0, -0.1f});
+        body = world.add(box, 1, {0, 0, 0.1f});
+        body->setFriction(0);
+        body->setDamping(0, 0);
+        body->setActivationState(DISABLE_DEACTIVATION);
+        world.run(1);
+    }
+};
+
+}  // namespace
+
+TEST_CASE("A heap that nothing lets sleep stays where it is, and falls when its bowl is taken away") {
+    const unsigned start = seed();
+    CAPTURE(start);
+    Heap heap(start);
+    const WorldExtensions still(heap.world.dynamics, resting);
+    heap.settle();
+    CHECK(heap.farthest(4) < 0.02f * h);
+    CHECK(still.restingBodies() + 2 >= int(heap.rings.size()));
+
+    const float before = heap.rings.front()->getCenterOfMassPosition().z();
+    for (int i = 0; i < heap.world.dynamics.getNumCollisionObjects(); ++i) {
+        btCollisionObject* object = heap.world.dynamics.getCollisionObjectArray()[i];
+        if (object->isStaticObject()) object->setWorldTransform(btTransform(btQuaternion(0, 0, 0, 1), {0, 0, -100}));
+    }
+    heap.world.dynamics.updateAabbs();
+    heap.world.run(0.5f);
+    CHECK(before - heap.rings.front()->getCenterOfMassPosition().z() == Approx(0.5f * 9.81f * 0.25f).epsilon(0.05));
+    CHECK(still.restingBodies() == 0);
+}
+
+TEST_CASE("What slept is where it was when it wakes up") {
+    const unsigned start = seed();
+    const bool byIsland = GENERATE(false, true);  // Bullet wakes the others then, in the middle of a step
+    CAPTURE(start, byIsland);
+    Heap heap(start);
+    const WorldExtensions still(heap.world.dynamics, resting);
+    heap.settle();
+    for (btRigidBody* ring : heap.rings) ring->forceActivationState(ISLAND_SLEEPING);
+    heap.world.run(0.5f);
+    if (byIsland) {
+        heap.rings[0]->forceActivationState(DISABLE_DEACTIVATION);
+        heap.world.run(1 / 240.f);
+        REQUIRE(std::count_if(heap.rings.begin(), heap.rings.end(), [](auto* ring) { return ring->isActive(); }) > 1);
+    }
+    for (btRigidBody* ring : heap.rings) ring->forceActivationState(DISABLE_DEACTIVATION);
+    heap.world.run(1 / 240.f);
+    CHECK(still.restingBodies() + 2 >= int(heap.rings.size()));
+    CHECK(heap.farthest(2) < 0.02f * h);
+}
+
+TEST_CASE("What moves for a reason is not held: thrown, without weight, hung up, or put elsewhere") {
+    Shape ball(exactSphere(0.1f, h));
+    World world;
+    const WorldExtensions still(world.dynamics, resting);
+
+    SECTION("at the top of its way a body turns back as ever") {
+        btRigidBody* body = world.add(ball, 1, {0, 0, 0});
+        body->setLinearVelocity({0, 0, 2});
+        world.run(1);
+        CHECK(body->getCenterOfMassPosition().z() == Approx(2 - 0.5f * 9.81f).margin(0.03));
+    }
+    SECTION("without gravity, however slow") {
+        world.dynamics.setGravity({0, 0, 0});
+        btRigidBody* body = world.add(ball, 1, {0, 0, 0});
+        body->setDamping(0, 0);
+        body->setActivationState(DISABLE_DEACTIVATION);
+        body->setLinearVelocity({1e-4f, 0, 0});
+        world.run(10);
+        CHECK(body->getCenterOfMassPosition().x() == Approx(1e-3f).epsilon(1e-3));
+        CHECK(still.restingBodies() == 0);
+    }
+    SECTION("what hangs in a constraint") {
+        btRigidBody* body = world.add(ball, 1, {0, 0, 0});
+        btPoint2PointConstraint joint(*body, {0, 0, 0.5f});
+        world.dynamics.addConstraint(&joint);
+        body->setActivationState(DISABLE_DEACTIVATION);
+        world.run(2);
+        CHECK(still.restingBodies() == 0);
+        world.dynamics.removeConstraint(&joint);
+    }
+    SECTION("what a force holds up") {
+        btRigidBody* body = world.add(ball, 1, {0, 0, 0});
+        body->setDamping(0, 0);
+        body->setActivationState(DISABLE_DEACTIVATION);
+        body->setLinearVelocity({3e-4f, 0, 0});
+        for (int i = 0; i < 1200; ++i) {
+            body->applyCentralForce({0, 0, 9.81f});
+            world.run(1.f / 240);
+        }
+        CHECK(body->getCenterOfMassPosition().x() == Approx(1.5e-3f).epsilon(1e-3));
+        CHECK(still.restingBodies() == 0);
+    }
+    SECTION("a slow turn about its middle") {
+        useFriction(world);
+        const BoxOnIce ice(world);
+        btRigidBody* body = ice.body;
+        body->setAngularVelocity({0, 0, 0.05f});
+        const btVector3 before = body->getWorldTransform().getBasis().getColumn(0);
+        world.run(2);
+        CHECK(body->getWorldTransform().getBasis().getColumn(0).angle(before) == Approx(0.1f).epsilon(0.05));
+    }
+    SECTION("what lay still and is pushed once, on ice") {
+        const BoxOnIce ice(world);
+        btRigidBody* body = ice.body;
+        REQUIRE(still.restingBodies() == 1);
+        if (const bool slept = GENERATE(false, true); slept) {
+            body->forceActivationState(ISLAND_SLEEPING);
+            world.run(0.1f);
+            body->forceActivationState(DISABLE_DEACTIVATION);
+        }
+        const float before = body->getCenterOfMassPosition().x(), speed = GENERATE(3e-3f, 7e-3f, 0.1f);
+        CAPTURE(speed);
+        body->setLinearVelocity({speed, 0, 0});
+        world.run(2);
+        CHECK(body->getCenterOfMassPosition().x() - before == Approx(2 * speed).epsilon(0.02));
+    }
+    SECTION("what the user puts elsewhere stays there, and so does what he turns, bit by bit too") {
+        useFriction(world);
+        Shape floor(exactBox({1, 1, 0.1f}, h)), box(exactBox({0.1f, 0.1f, 0.1f}, h));
+        world.add(floor, 0, {0, 0, -0.1f});
+        btRigidBody* body = world.add(box, 1, {0, 0, 0.1f});
+        body->setActivationState(DISABLE_DEACTIVATION);
+        world.run(3);
+        REQUIRE(still.restingBodies() == 1);
+        for (const float way : {0.4f, -0.15f, 0.45f * h, -0.25f * h, 0.15f * h, -0.35f * h}) {
+            btTransform place = body->getWorldTransform();
+            place.getOrigin() += btVector3(way, 0, 0);
+            body->setWorldTransform(place);
+            world.run(0.5f);
+            CHECK(body->getCenterOfMassPosition().x() == Approx(place.getOrigin().x()).margin(2e-3 * h));
+            CHECK(still.restingBodies() == 1);
+        }
+        world.dynamics.getSolverInfo().m_frictionERP = 0;  // else friction turns it back
+        const btTransform before = body->getWorldTransform();
+        for (int i = 0; i < 240; ++i) {
+            world.run(1.f / 240);
+            btTransform place = body->getWorldTransform();
+            place.setBasis(btMatrix3x3(btQuaternion({0, 0, 1}, 1e-4f)) * place.getBasis());
+            body->setWorldTransform(place);
+        }
+        const btVector3 axis = body->getWorldTransform().getBasis().getColumn(0);
+        CHECK(axis.angle(before.getBasis().getColumn(0)) > 0.01f);
+    }
+}
+
+TEST_CASE("What swings gets no energy each time it turns, and comes to rest where it is damped") {
+    // a tilt of 0.05 changes the speed where it turns by as much in each step as something that pushes would
+    const float perSecond = GENERATE(60.f, 240.f), damping = GENERATE(0.f, 0.2f), tilt = GENERATE(0.02f, 0.05f, 0.13f);
+    CAPTURE(perSecond, damping, tilt);
+    constexpr float radius = 0.3f, below = 0.12f;  // a ball whose mass lies below its middle
+    btBoxShape floor({1, 1, 0.1f});
+    btSphereShape sphere(radius);
+    btCompoundShape tumbler;
+    tumbler.addChildShape(btTransform(btQuaternion(0, 0, 0, 1), {0, 0, below}), &sphere);
+    // until then, how fast it is in the last ten seconds, and the steps that it is held in the very last one
+    constexpr float until = 90;
+    const auto swing = [&](bool holds) {
+        World world;
+        useFriction(world);
+        std::optional<WorldExtensions> still;
+        if (holds) still.emplace(world.dynamics, resting);
+        world.add(floor, 0, {0, 0, -0.1f});
+        btRigidBody* body = world.add(tumbler, 1, {-below * std::sin(tilt), 0, radius - below * std::cos(tilt)},
+                                      btQuaternion({0, 1, 0}, tilt));
+        body->setDamping(damping, damping);
+        body->setActivationState(DISABLE_DEACTIVATION);
+        std::vector<float> speeds;
+        int held = 0;
+        for (int i = 0; i < int(until * perSecond); ++i) {
+            world.dynamics.stepSimulation(1 / perSecond, 1, 1 / perSecond);
+            if (float(i) > (until - 10) * perSecond) speeds.push_back(body->getLinearVelocity().length());
+            if (holds && float(i) >= (until - 1) * perSecond) held += still->restingBodies();
+        }
+        // the usual ones: a step here and there is off, with and without
+        std::sort(speeds.begin(), speeds.end());
+        return std::pair(speeds[speeds.size() * 9 / 10], held);
+    };
+    const auto [speed, held] = swing(true);
+    if (damping == 0)
+        CHECK(speed == Approx(swing(false).first).epsilon(0.01));
+    else
+        CHECK(held == int(perSecond));
+}
+
+TEST_CASE("What a platform without weight carries comes along, however slowly, and a sensor carries nothing") {
+    const bool isSensor = GENERATE(false, true);
+    CAPTURE(isSensor);
+    Shape platform(exactBox({1, 1, 0.1f}, h)), box(exactBox({0.1f, 0.1f, 0.1f}, h));
+    World world;
+    useFriction(world);
+    const WorldExtensions still(world.dynamics, resting);
+    if (isSensor) world.add(platform, 0, {0, 0, -0.1f});
+    btRigidBody* moving = world.add(platform, 1, {0, 0, isSensor ? 0 : -0.1f});
+    moving->setGravity({0, 0, 0});
+    if (isSensor) moving->setCollisionFlags(moving->getCollisionFlags() | btCollisionObject::CF_NO_CONTACT_RESPONSE);
+    btRigidBody* body = world.add(box, 1, {0, 0, 0.1f});
+    for (btRigidBody* one : {moving, body}) one->setActivationState(DISABLE_DEACTIVATION);
+    constexpr float speed = 5e-4f;
+    const float before = body->getCenterOfMassPosition().x();
+    for (int i = 0; i < 5 * 240; ++i) {
+        moving->setLinearVelocity({speed, 0, 0});
+        moving->setAngularVelocity({0, 0, 0});
+        world.run(1 / 240.f);
+    }
+    const float gone = body->getCenterOfMassPosition().x() - before;
+    if (isSensor)
+        CHECK(std::abs(gone) < 1e-6f);
+    else
+        CHECK(gone == Approx(5 * speed).epsilon(0.02));
+    CHECK(still.restingBodies() == (isSensor ? 1 : 0));
+}
+
+TEST_CASE("What a slow lift or a slow belt carries comes along, and what is stacked on it") {
+    const btVector3 way =
+        GENERATE(btVector3(0, 0, 1e-4f), btVector3(1e-4f, 0, 0), btVector3(5e-4f, 5e-4f, 0), btVector3(0, 0, -1e-4f));
+    // of friction's anchors; the size of all, and whether it is Bullet's own
+    const float pulledBack = GENERATE(0.f, 0.2f), size = GENERATE(0.1f, 1e-3f);
+    const bool isField = GENERATE(true, false);
+    CAPTURE(way.x(), way.z(), pulledBack, size, isField);
+    const float voxel = 0.2f * size;
+    Shape field(exactBox({size, size, size}, voxel)), fieldFloor(exactBox({10 * size, 10 * size, size}, voxel));
+    btBoxShape box({size, size, size}), boxFloor({10 * size, 10 * size, size});
+    box.setMargin(0.1f * voxel);
+    World world;
+    useFriction(world);
+    world.dynamics.getSolverInfo().m_frictionERP = pulledBack;
+    const WorldExtensions still(world.dynamics, resting);
+    btRigidBody* lift = world.add(isField ? static_cast<btCollisionShape&>(fieldFloor) : boxFloor, 0, {0, 0, -size});
+    lift->setCollisionFlags(lift->getCollisionFlags() | btCollisionObject::CF_KINEMATIC_OBJECT);
+    lift->setActivationState(DISABLE_DEACTIVATION);
+    std::vector<btRigidBody*> stack;
+    for (int i = 0; i < 2; ++i) {
+        stack.push_back(
+            world.add(isField ? static_cast<btCollisionShape&>(field) : box, 1, {0, 0, float(2 * i + 1) * size}));
+        stack.back()->setActivationState(DISABLE_DEACTIVATION);
+    }
+    world.run(2);
+    std::vector<btVector3> before;
+    for (const btRigidBody* body : stack) before.push_back(body->getCenterOfMassPosition());
+    const btVector3 from = lift->getWorldTransform().getOrigin();
+    constexpr int steps = 1200;
+    for (int i = 1; i <= steps; ++i) {
+        btTransform place = lift->getWorldTransform();
+        place.setOrigin(from + float(i) / 240 * way);
+        lift->setWorldTransform(place);
+        world.run(1.f / 240);
+    }
+    const btVector3 expected = float(steps) / 240 * way;
+    for (std::size_t i = 0; i < stack.size(); ++i)
+        CHECK((stack[i]->getCenterOfMassPosition() - before[i]).distance(expected) < 0.1f * expected.length());
+}

@@ -1,0 +1,148 @@
+#include <bilayer/integration/bullet/settings.h>
+
+#include <catch2/catch.hpp>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+#include <bilayer/collider/field.h>
+#include <bilayer/sdf/build.h>
+#include "demos/shared/shapes.h"
+
+using namespace bilayer;
+using bullet::Advice;
+using bullet::advise;
+using bullet::Scene;
+
+namespace {
+
+// A plate of 1 x 1 m.
+MeshReport plate(float thickness) {
+    return inspect(shapes::box({0.5f, 0.5f, 0.5f * thickness}, 8));
+}
+
+MeshReport ball(float radius) {
+    return inspect(shapes::sphere(radius, 4));
+}
+
+bool warnsOf(const Advice& advice, const std::string& what) {
+    for (const std::string& warning : advice.warnings)
+        if (warning.find(what) != std::string::npos) return true;
+    return false;
+}
+
+}  // namespace
+
+TEST_CASE("A plate gets three voxels of its thickness") {
+    const Advice advice = advise(plate(0.03f), {.speed = 1});
+    CHECK(advice.voxelSize == Approx(0.01));
+    CHECK(advice.wallVoxels == Approx(3));
+    CHECK(advice.margin == advice.voxelSize);
+    // one voxel of margin and a cell's diagonal
+    CHECK(advice.exteriorWidth == 3);
+    CHECK(advice.splitImpulse == -advice.voxelSize);
+    CHECK_FALSE(warnsOf(advice, "voxels thick"));
+}
+
+TEST_CASE("A plate too thin for any affordable field is warned of") {
+    const Advice advice = advise(plate(1e-3f), {.speed = 1});
+    CHECK(advice.voxelSize == Approx(1.f / 512));
+    CHECK(warnsOf(advice, "voxels thick"));
+    // a voxel size of the user's is judged by the same rule
+    CHECK(warnsOf(advise(plate(0.03f), {.voxelSize = 0.016f}), "voxels thick"));
+    CHECK_FALSE(warnsOf(advise(plate(0.03f), {.voxelSize = 0.015f}), "voxels thick"));
+}
+
+TEST_CASE("A thin tip does not rule the voxel size, but is warned of") {
+    // a ball with a sheet of a hundred thousandth of its area on top
+    Mesh tip = shapes::box({5e-3f, 5e-3f, 1e-4f});
+    for (glm::vec3& point : tip.points) point.z += 0.6f;
+    const MeshReport mesh = inspect(shapes::join({shapes::sphere(0.5f, 4), tip}));
+    CHECK(mesh.thinnestWall == Approx(2e-4).margin(2e-7));  // coordinates near 0.6 are rounded by 6e-8
+    CHECK(mesh.commonWall > 0.9f);
+    const Advice advice = advise(mesh, {});
+    CHECK(advice.voxelSize == Approx(mesh.bounds.longestSide() / 64));
+    CHECK(warnsOf(advice, "tip"));
+    CHECK_FALSE(warnsOf(advice, "voxels thick"));
+}
+
+TEST_CASE("A ball has no thin wall: its size decides") {
+    const Advice advice = advise(ball(0.5f), {});
+    CHECK(advice.voxelSize == Approx(1.f / 64));
+    CHECK(advice.substeps == 1);
+    CHECK(advice.substepsUnswept == 1);
+    // unless it meets one, or has to pass a gap
+    CHECK(advise(ball(0.5f), {.thickness = 0.03f}).voxelSize == Approx(0.01));
+    // its own wall counts where it is thinner
+    CHECK(advise(plate(0.03f), {.thickness = 0.5f}).voxelSize == Approx(0.01));
+    CHECK(warnsOf(advise(ball(0.5f), {.margin = 0}), "margin"));
+    CHECK(advise(ball(0.5f), {.gap = 0.01f}).voxelSize == Approx(0.005));
+    CHECK(warnsOf(advise(ball(0.5f), {.gap = 0.01f, .voxelSize = 0.01f}), "gap"));
+    CHECK_FALSE(warnsOf(advise(ball(0.5f), {.gap = 0.01f}), "gap"));
+}
+
+TEST_CASE("Speed asks for substeps, or for sweeps") {
+    // 10 m/s at 1/60 s go 16.7 cm; half of the plate is 1.5 cm: 11.1 steps. It may turn by 20 rad/s then, 0.33 a step.
+    const Advice fast = advise(plate(0.03f), {.speed = 10});
+    CHECK(fast.substepsUnswept == 12);
+    CHECK(fast.substeps == 1);
+    CHECK(warnsOf(fast, "swept contacts"));
+    CHECK(warnsOf(fast, "WorldExtensions"));
+    CHECK(fast.interiorWidth == 10);
+    // below the margin nothing passes
+    const Advice slow = advise(plate(0.03f), {.speed = 0.5f});
+    CHECK(slow.substepsUnswept == 1);
+    CHECK_FALSE(warnsOf(slow, "swept contacts"));
+    CHECK(slow.interiorWidth == 3);
+    // turns bend ways: half a radian a step at most
+    CHECK(advise(plate(0.03f), {.speed = 1, .spin = 100}).substeps == 4);
+    CHECK(advise(plate(0.03f), {.step = 1.f / 240, .speed = 1, .spin = 100}).substeps == 1);
+    CHECK(advise(plate(0.03f), {.speed = 100, .spin = 0}).substeps == 1);
+    CHECK(advise(plate(0.03f), {.speed = 100}).substeps == 7);
+    const Advice absurd = advise(plate(0.03f), {.step = 1e30f, .speed = 1e30f});
+    CHECK(absurd.substeps == 1000000);
+    CHECK(warnsOf(absurd, "1000000 substeps or more"));
+}
+
+TEST_CASE("What Bullet and its solver ask for is warned of") {
+    CHECK(warnsOf(advise(ball(0.05f), {}), "setSleepingThresholds"));
+    CHECK_FALSE(warnsOf(advise(ball(0.15f), {}), "setSleepingThresholds"));
+    CHECK(warnsOf(advise(ball(5), {.massRatio = 11}), "masses"));
+    CHECK_FALSE(warnsOf(advise(ball(5), {.massRatio = 10}), "masses"));
+    CHECK(advise(ball(5), {}).warnings.empty());
+    Mesh open = shapes::sphere(5, 3);
+    open.triangles.pop_back();
+    CHECK(warnsOf(advise(inspect(open), {}), "not closed"));
+    Mesh inside = shapes::sphere(5, 3);
+    for (glm::uvec3& triangle : inside.triangles) std::swap(triangle.x, triangle.y);
+    CHECK(warnsOf(advise(inspect(inside), {}), "not clean"));
+}
+
+TEST_CASE("Estimates are near what is built") {
+    const Mesh mesh = GENERATE(shapes::sphere(0.5f, 5), shapes::torus(0.4f, 0.1f), shapes::box({0.5f, 0.5f, 0.05f}, 8));
+    const Advice advice = advise(inspect(mesh), {.speed = 1});
+    const LevelSet field = build(mesh, {.voxelSize = advice.voxelSize,
+                                        .exteriorWidth = float(advice.exteriorWidth),
+                                        .interiorWidth = float(advice.interiorWidth)});
+    CHECK(double(advice.voxels) == Approx(double(field.activeVoxels())).epsilon(0.2));
+    const double bytes = double(Field(field).memoryBytes());
+    CHECK(bytes < 1.3 * double(advice.fieldBytes));
+    CHECK(bytes > 0.5 * double(advice.fieldBytes));
+    CHECK(advice.buildSeconds > 0);
+}
+
+TEST_CASE("Scenes of no sense are refused by name") {
+    const MeshReport mesh = ball(0.5f);
+    const float nan = std::numeric_limits<float>::quiet_NaN();
+    CHECK_THROWS_WITH(advise(mesh, {.step = 0}), Catch::Contains("step"));
+    CHECK_THROWS_WITH(advise(mesh, {.speed = -1}), Catch::Contains("speed"));
+    CHECK_THROWS_WITH(advise(mesh, {.spin = nan}), Catch::Contains("spin"));
+    CHECK_THROWS_WITH(advise(mesh, {.thickness = nan}), Catch::Contains("thickness"));
+    CHECK_THROWS_WITH(advise(mesh, {.gap = -1}), Catch::Contains("gap"));
+    CHECK_THROWS_WITH(advise(mesh, {.massRatio = 0.5f}), Catch::Contains("mass ratio"));
+    CHECK_THROWS_WITH(advise(mesh, {.margin = nan}), Catch::Contains("margin"));
+    CHECK_THROWS_WITH(advise(mesh, {.voxelSize = 1e-9f}), Catch::Contains("voxel size") && Catch::Contains("2e-05"));
+    CHECK_THROWS_WITH(advise(ball(1e5f), {.voxelSize = 2e-5f}),
+                      Catch::Contains("voxel size") && Catch::Contains("1e+09"));
+    CHECK_THROWS_AS(advise(MeshReport{}, {}), std::invalid_argument);
+}
