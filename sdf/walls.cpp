@@ -100,9 +100,9 @@ struct Waiting {
 };
 
 // One ray's search for its nearest exit.
-class Search {
+class ExitSearch {
   public:
-    Search(const TriangleTree& tree, const Ray& ray) : tree_(tree), ray_(ray) {
+    ExitSearch(const TriangleTree& tree, const Ray& ray) : tree_(tree), ray_(ray) {
         // around boxes, against rounding [m]
         const float room = rounding * tree.largestCoordinate();
         for (int k = 0; k < 3; ++k) {
@@ -191,7 +191,7 @@ class Search {
 };
 
 float nearestExit(const TriangleTree& tree, const Ray& ray) {
-    return Search(tree, ray).run();
+    return ExitSearch(tree, ray).run();
 }
 
 }  // namespace bilayer::HWY_NAMESPACE
