@@ -10,15 +10,18 @@
 #include <cstdint>
 #include <functional>
 #include <glm/geometric.hpp>
+#include <optional>
 #include <span>
 #include <vector>
 
+#include "sdf/large_array.h"
 #include "sdf/orient.h"
 #include "sdf/piercing.h"
 #include "sdf/polled_loop.h"
 #include "sdf/topology.h"
 #include "sdf/triangle_tree.h"
 #include "sdf/walls.h"
+#include "sdf/welding.h"
 
 namespace bilayer {
 namespace {
@@ -145,7 +148,7 @@ std::vector<unsigned> components(const Mesh& mesh, std::size_t& count) {
 
 // What each triangle adds to the sums over all.
 struct Measures {
-    std::vector<double> areas, volumes;
+    LargeArray<double> areas, volumes;
 
     Measures(const Mesh& mesh, const Bounds& box) : areas(mesh.triangles.size()), volumes(mesh.triangles.size()) {
         const glm::dvec3 origin(box.centre());
@@ -189,7 +192,7 @@ float finiteOrZero(float thickness) {
 // The thickness behind triangles that only a part of the area stays below.
 float commonThickness(const std::vector<float>& thickness, const Measures& measures, double area) {
     // by thickness, then number: the bits of positive floats are in their order
-    std::vector<std::uint64_t> order(thickness.size());
+    LargeArray<std::uint64_t> order(thickness.size());
     forAll(order.size(),
            [&](std::size_t i) { order[i] = std::uint64_t(std::bit_cast<std::uint32_t>(thickness[i])) << 32 | i; });
     double below = 0;
@@ -198,8 +201,8 @@ float commonThickness(const std::vector<float>& thickness, const Measures& measu
     for (std::size_t i = 0; i < order.size(); ++i) {
         if (i == sorted) {
             sorted = std::min(order.size(), 2 * sorted + order.size() / 32 + 1);
-            const auto from = order.begin() + std::ptrdiff_t(i), to = order.begin() + std::ptrdiff_t(sorted);
-            std::nth_element(from, to - 1, order.end());
+            std::uint64_t *from = order.data() + i, *to = order.data() + sorted;
+            std::nth_element(from, to - 1, order.data() + order.size());
             std::sort(from, to);
         }
         const auto triangle = std::uint32_t(order[i]);
@@ -223,7 +226,8 @@ void findThinWalls(const TriangleTree& tree, const Measures& measures, float wal
 MeshReport inspect(const Mesh& input, float wall) {
     validate(input);
     MeshReport report;
-    const Mesh mesh = weld(input);
+    const std::optional<Mesh> welded = weldUnlessDone(input);
+    const Mesh& mesh = welded ? *welded : input;
     report.points = mesh.points.size();
     report.triangles = input.triangles.size();
     report.degenerateTriangles = input.triangles.size() - mesh.triangles.size();

@@ -18,9 +18,9 @@ namespace bilayer {
 
 /// One triangle's use of an edge.
 struct EdgeUse {
-    unsigned low, high;  ///< the edge's vertices
-    unsigned triangle;
-    bool forward;  ///< the triangle runs it from low to high
+    unsigned low, high;      ///< the edge's vertices
+    unsigned triangle : 31;  ///< validate() lets no more pass
+    bool forward : 1;        ///< the triangle runs it from low to high
 
     bool sameEdge(const EdgeUse& other) const { return low == other.low && high == other.high; }
     int direction() const { return forward ? 1 : -1; }
@@ -138,7 +138,7 @@ class Sets {
 /// order of joining.
 class SharedSets {
   public:
-    explicit SharedSets(std::size_t n) : parent_(n) { std::iota(parent_.begin(), parent_.end(), 0u); }
+    explicit SharedSets(std::size_t n);
 
     unsigned root(unsigned i) {
         for (;;) {
@@ -166,7 +166,7 @@ class SharedSets {
   private:
     std::atomic_ref<unsigned> at(unsigned i) { return std::atomic_ref<unsigned>(parent_[i]); }
 
-    std::vector<unsigned> parent_;
+    LargeArray<unsigned> parent_;
 };
 
 }  // namespace bilayer
