@@ -180,8 +180,8 @@ std::vector<Row> compareKnots(const Options& options) {
     const auto ours = [&] { return playKnots(*field, mesh, options.bodies, options.heap); };
     rows.push_back(ours());
     rows.push_back(onOneThread(ours));
-    for (const auto& rival : {makeField(mesh, options.voxels, {}, Measure::samples),
-                              makeField(mesh, options.voxels, {}, Measure::triangles),
+    for (const auto& rival : {makeField(mesh, options.voxels, {}, ContactAccuracy::samples),
+                              makeField(mesh, options.voxels, {}, ContactAccuracy::exact),
                               makeHulls(mesh, options.hulls, 0.1f * voxel), makeGImpact(mesh, 0.5f * voxel)})
         rows.push_back(playKnots(*rival, mesh, options.bodies, options.heap));
     printTable(fmt::format("{} knots of {} triangles in a pen, {:g} voxels each, {:g} steps a second", options.bodies,
@@ -194,9 +194,9 @@ std::vector<Row> compareBoxes(const Options& options) {
     const Mesh bowl = shapes::bowl(bowlRadius, bowlWall, 96);
     const float voxel = 2 * bowlRadius / bowlVoxels;
     std::vector<Row> rows;
-    for (const auto& rival : {makeField(bowl, bowlVoxels), makeField(bowl, bowlVoxels, {}, Measure::samples),
-                              makeField(bowl, bowlVoxels, {}, Measure::triangles), makeTriangles(bowl, 0.5f * voxel),
-                              makeBulletSdf(bowl, bowlCells)}) {
+    for (const auto& rival : {makeField(bowl, bowlVoxels), makeField(bowl, bowlVoxels, {}, ContactAccuracy::samples),
+                              makeField(bowl, bowlVoxels, {}, ContactAccuracy::exact),
+                              makeTriangles(bowl, 0.5f * voxel), makeBulletSdf(bowl, bowlCells)}) {
         const Boxes boxes(bowl, *rival);
         rows.push_back({rival->name(), rival->seconds, play(*rival, boxes.members, options.heap)});
     }

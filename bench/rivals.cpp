@@ -30,19 +30,19 @@ namespace bilayer::bench {
 namespace {
 
 constexpr float bandInside = 6;       // of our fields [voxels]
-constexpr int mostHullPoints = 64;    // of a hull
+constexpr int maxHullPoints = 64;     // of a hull
 constexpr double anyConcavity = 1e9;  // so many hulls and no more, however concave they are
 
 class Field : public Rival {
   public:
-    Field(const Mesh& mesh, float voxels, const PointSampler& sampler, Measure measure)
+    Field(const Mesh& mesh, float voxels, const PointSampler& sampler, ContactAccuracy measure)
         : sampler_(sampler),
-          name_(sampler.sample              ? "bilayer, " + sampler.device
-                : measure == Measure::edges ? "bilayer"
-                                            : fmt::format("bilayer, by {}", nameOf(measure))) {
+          name_(sampler.sample                                  ? "bilayer, " + sampler.device
+                : measure == ContactAccuracy::exactNearFeatures ? "bilayer"
+                                                                : fmt::format("bilayer, by {}", nameOf(measure))) {
         BuildOptions how{.voxelSize = voxelSizeFor(mesh, voxels)};
         how.interiorWidth = bandInside;
-        const ColliderOptions options{.measure = measure};
+        const ColliderOptions options{.accuracy = measure};
         shape_ = std::make_unique<bullet::Shape>(std::make_shared<Collider>(mesh, build(mesh, how), options));
     }
     std::string name() const override { return name_; }
@@ -123,7 +123,7 @@ class Hulls : public Rival {
         division.SetNTriangles(triangles.size());
         division.SetNClusters(std::size_t(hulls));
         division.SetConcavity(anyConcavity);
-        division.SetNVerticesPerCH(mostHullPoints);
+        division.SetNVerticesPerCH(maxHullPoints);
         division.Compute();
         for (std::size_t i = 0; i < division.GetNClusters(); ++i) add(division, i, margin);
         if (hulls_.empty()) throw std::runtime_error("HACD found no hull");
@@ -251,7 +251,7 @@ std::unique_ptr<btCollisionDispatcher> Rival::dispatcher(btCollisionConfiguratio
     return std::make_unique<btCollisionDispatcher>(&configuration);
 }
 
-std::unique_ptr<Rival> makeField(const Mesh& mesh, float voxels, const PointSampler& sampler, Measure measure) {
+std::unique_ptr<Rival> makeField(const Mesh& mesh, float voxels, const PointSampler& sampler, ContactAccuracy measure) {
     return timed<Field>(mesh, voxels, sampler, measure);
 }
 

@@ -33,7 +33,7 @@ class Rival {
 /// @param voxels   along the longest side
 /// @param sampler  samples the contacts' points; none: the processor does, as ever
 std::unique_ptr<Rival> makeField(const Mesh& mesh, float voxels, const PointSampler& sampler = {},
-                                 Measure measure = Measure::edges);
+                                 ContactAccuracy measure = ContactAccuracy::exactNearFeatures);
 
 /// btGImpactMeshShape.
 /// @param margin  added to the surface [m]

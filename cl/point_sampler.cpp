@@ -30,7 +30,7 @@ namespace {
 /// Work-items of a group on a GPU, and balls that an item looks at on a processor.
 constexpr std::size_t groupItems = 64, ballsPerProcessorItem = 64;
 /// Room for answers at first, and how much more than needed is taken when it is too small.
-constexpr std::size_t leastAnswers = 1 << 12, growth = 2;
+constexpr std::size_t minAnswers = 1 << 12, growth = 2;
 constexpr const char* ofBodies = "the batch of contacts";
 
 // `Body` of point_sampler.cl.
@@ -150,7 +150,7 @@ class Sampler {
     std::map<std::uint64_t, Place> places_;
     Pool directories_, centres_, values_, points_, balls_;  // of the bodies
     Pool bodies_, queries_, count_, answers_;               // of a batch
-    std::size_t capacity_ = leastAnswers;                   // of answers
+    std::size_t capacity_ = minAnswers;                     // of answers
     bool failed_ = false;                                   // in the last batch: nobody knows what the buffers hold
 };
 

@@ -75,16 +75,16 @@ Field withMesh(const Field& samples, std::shared_ptr<const Mesh> mesh) {
 
 Field fieldOf(const LevelSet& levelSet, const Body& body) {
     Field samples(levelSet);
-    return body.mesh && body.measure != Measure::samples ? withMesh(samples, body.mesh) : samples;
+    return body.mesh && body.accuracy != ContactAccuracy::samples ? withMesh(samples, body.mesh) : samples;
 }
 
 }  // namespace
 
 Body makeBody(Mesh given, const LevelSet& levelSet, const ColliderOptions& options) {
     if (!std::isfinite(options.margin)) throw std::invalid_argument("collider: the margin is not finite");
-    if (options.margin > mostMargin * levelSet.voxelSize())
+    if (options.margin > maxMargin * levelSet.voxelSize())
         throw std::invalid_argument(
-            fmt::format("collider: a margin of {:g} m is wider than {} voxels", options.margin, mostMargin));
+            fmt::format("collider: a margin of {:g} m is wider than {} voxels", options.margin, maxMargin));
     Mesh outward = outwardMesh(levelSet, std::move(given));
     auto mass = massOf(outward, levelSet);
     Filled filled = filledMesh(std::move(outward), levelSet);
@@ -94,14 +94,15 @@ Body makeBody(Mesh given, const LevelSet& levelSet, const ColliderOptions& optio
             .margin = options.margin < 0 ? levelSet.voxelSize() : options.margin,
             .mass = std::move(mass),
             .mesh = mesh,
-            .measure = options.measure,
+            .accuracy = options.accuracy,
             .filled = std::move(filled.levelSet)};
 }
 
 ColliderData::ColliderData(const LevelSet& given, Body made)
     : body(std::move(made)),
       field(fieldOf(body.filled ? *body.filled : given, body)),
-      strays(field.mesh() && body.measure == Measure::edges ? Strays(field) : Strays()),
+      errorMask(field.mesh() && body.accuracy == ContactAccuracy::exactNearFeatures ? InterpolationErrorMask(field)
+                                                                                    : InterpolationErrorMask()),
       sharpEdges(body.points, field),
       id(nextId()) {
     if (!body.mesh) levelSet_ = given;

@@ -16,14 +16,15 @@ struct ColliderData;
 }
 
 /// What the distances and normals of contacts are taken from, once the field's samples have found them.
-enum class Measure {
-    samples,    ///< nothing else: takes the least memory
-    edges,      ///< the triangles where samples are off: at edges, in grooves, and where the surface bends in a voxel
-    triangles,  ///< the triangles everywhere
+enum class ContactAccuracy {
+    samples,            ///< nothing else: takes the least memory
+    exactNearFeatures,  ///< the triangles where samples are off: at edges, in grooves, and where the surface bends in a
+                        ///< voxel
+    exact,              ///< the triangles everywhere
 };
 
 /// As in files and on the command line: samples, edges or triangles.
-const char* nameOf(Measure measure);
+const char* nameOf(ContactAccuracy accuracy);
 
 struct ColliderOptions {
     /// Distance between neighbouring surface points [voxels of the field]. Smaller finds finer contacts and costs more.
@@ -32,10 +33,11 @@ struct ColliderOptions {
     /// Contacts are made up to this distance between the surfaces [m], 1000 voxels at most. Negative: one voxel of the
     /// field.
     float margin = -1;
-    /// Measure::edges asks the triangles where samples are off by more than a tenth of a voxel (see Strays). But
-    /// for samples alone, the mesh takes memory (see Field), and a microsecond a triangle to sort. Measure::triangles
-    /// costs more time the more contacts there are: for parts that fit into each other to a fraction of a voxel.
-    Measure measure = Measure::edges;
+    /// ContactAccuracy::exactNearFeatures asks the triangles where samples are off by more than a tenth of a voxel (see
+    /// InterpolationErrorMask). But for samples alone, the mesh takes memory (see Field), and a microsecond a triangle
+    /// to sort. ContactAccuracy::exact costs more time the more contacts there are: for parts that fit into each other
+    /// to a fraction of a voxel.
+    ContactAccuracy accuracy = ContactAccuracy::exactNearFeatures;
 };
 
 /// A field, points on the surface, and what else contacts need. Immutable; share it between bodies and threads.
@@ -80,8 +82,8 @@ class Collider {
 /// The grids are shared, not copied.
 /// @param keepMesh  false: without the mesh. The body answers by its field alone, which rounds sharp edges: contacts
 /// are
-///                  those of Measure::samples, rays are off by half a voxel at most, and sweeps end up to a voxel and a
-///                  half late.
+///                  those of ContactAccuracy::samples, rays are off by half a voxel at most, and sweeps end up to a
+///                  voxel and a half late.
 /// Throws as Collider's constructor, and std::invalid_argument for a mesh of more than 2 GiB.
 LevelSet withBody(const LevelSet& levelSet, Mesh mesh, const ColliderOptions& options = {}, bool keepMesh = true);
 

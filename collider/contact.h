@@ -15,7 +15,7 @@
 namespace bilayer {
 
 namespace detail {
-struct NearPoints;
+struct CandidateLists;
 struct SampledBody;
 struct PointQuery;
 class FoundPoints;
@@ -24,11 +24,13 @@ class FoundPoints;
 /// How a body moves until it is looked at again: a point x of it goes way + turn x (x - its pose's position), in the
 /// world. Straight: turns of more than a fraction of a radian bend away from it.
 struct Motion {
-    glm::vec3 way{0};   ///< of the pose's position [m]
-    glm::vec3 turn{0};  ///< about it [rad]
+    glm::vec3 displacement{0};  ///< of the pose's position [m]
+    glm::vec3 rotation{0};      ///< about it [rad]
 
     /// The same motion as told of another point of the body.
-    Motion about(const glm::vec3& from, const glm::vec3& to) const { return {way + glm::cross(turn, to - from), turn}; }
+    Motion about(const glm::vec3& from, const glm::vec3& to) const {
+        return {displacement + glm::cross(rotation, to - from), rotation};
+    }
 };
 
 /// A collider somewhere in the world, perhaps grown: body coordinates x become pose.toWorld(scale * x).
@@ -67,18 +69,18 @@ struct ContactOptions {
     /// Whether distances are measured by the triangles, where the bodies have them (Collider::measured()), and points
     /// outside of the other body and of its band are asked for the closest place, which takes a search for each; those
     /// too deep inside are counted all the same.
-    bool measured = false;
+    bool exact = false;
     /// Least cosine between the point's own normal and the opposite of the surface's that it touches; contacts below
     /// are left out. Points just under the edge of the other body look along the surface that is nearest to them; sharp
     /// ones among these touch the surface that they oppose a voxel back along their own normal, if there is one. The
     /// corners of a cube, whose normals are mixed of three, reach 0.57. Below -1: no contact is left out.
-    float leastOpposition = -2;
+    float minNormalCosine = -2;
     /// The same for points of faces that do not touch yet: a point beside the other body sees its edge aslant, or meets
     /// its side, and would stop it like a curb.
-    float leastOppositionApart = -2;
+    float minNormalCosineApart = -2;
     /// Whether points of faces that neither touch yet nor are on their way touch edges that they see by more than half
     /// a degree aslant: the edges' own points meet the faces straight.
-    bool keepsEdgesAslant = true;
+    bool keepsObliqueEdges = true;
 };
 
 /// What collide() saw beside the contacts.
@@ -96,10 +98,10 @@ class ContactCache {
     ContactCache(ContactCache&&) noexcept;
     ContactCache& operator=(ContactCache&&) noexcept;
 
-    detail::NearPoints& data() { return *data_; }
+    detail::CandidateLists& data() { return *data_; }
 
   private:
-    std::unique_ptr<detail::NearPoints> data_;
+    std::unique_ptr<detail::CandidateLists> data_;
 };
 
 /// Appends the contacts between two bodies: surface points of A in B's field, then those of B in A's field, each in

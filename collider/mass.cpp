@@ -18,8 +18,8 @@ using namespace detail;
 
 namespace {
 
-constexpr double leastThickness = 1e-7;  // of volume / (area * length): what single precision leaves of a flat sheet
-constexpr int mostSweeps = 32;           // of Jacobi's method, which needs about five
+constexpr double minThickness = 1e-7;  // of volume / (area * length): what single precision leaves of a flat sheet
+constexpr int maxSweeps = 32;          // of Jacobi's method, which needs about five
 
 struct Integrals : Moments {
     double area = 0;
@@ -65,7 +65,7 @@ void rotate(glm::dmat3& matrix, glm::dmat3& vectors, int p, int q) {
 Eigen eigen(glm::dmat3 matrix) {
     glm::dmat3 vectors(1);
     const double negligible = 1e-30 * glm::dot(matrix[0] + matrix[1] + matrix[2], matrix[0] + matrix[1] + matrix[2]);
-    for (int sweep = 0; sweep < mostSweeps; ++sweep) {
+    for (int sweep = 0; sweep < maxSweeps; ++sweep) {
         const glm::dvec3 off(matrix[0][1], matrix[0][2], matrix[1][2]);
         if (glm::dot(off, off) <= negligible) break;
         rotate(matrix, vectors, 0, 1);
@@ -110,7 +110,7 @@ MassProperties massProperties(const Mesh& mesh) {
     const Bounds box = bounds(mesh);
     const glm::dvec3 origin = 0.5 * (glm::dvec3(box.lower) + glm::dvec3(box.upper));
     Integrals sum = integrate(mesh, origin);
-    if (!(std::abs(sum.volume) > leastThickness * sum.area * double(box.longestSide())))
+    if (!(std::abs(sum.volume) > minThickness * sum.area * double(box.longestSide())))
         throw std::invalid_argument("mass properties: the mesh encloses no volume");
     if (sum.volume < 0) {
         sum.volume = -sum.volume;

@@ -50,15 +50,15 @@ constexpr float smallestVoxel = 2e-5f;
 constexpr double unitStep = 1000;
 /// Bricks of this side that a box may have; a cube of 40,000 voxels a side.
 constexpr int brickSide = 64;  // [voxels]
-constexpr double mostBricks = double(1u << 28);
+constexpr double maxBricks = double(1u << 28);
 /// Bytes that the build needs for a triangle (bins or hierarchy) and for a block, roughly.
 constexpr double bytesPerTriangle = 60, bytesPerBlock = 2300;
 /// Of more moved triangles than this part of all, the field is built in full: little would be left to copy.
-constexpr double mostMoved = 0.5;
+constexpr double maxMoved = 0.5;
 /// What exact methods promise [voxels]; it is ten times what was ever seen.
 constexpr float exactError = 1e-4f;
 /// Layers nearer to each other are told apart by rounding [voxels].
-constexpr float leastDelta = 0.1f;
+constexpr float minDelta = 0.1f;
 /// No point of a triangle is farther from a sample than this times the root of epsilon: samples stand no farther apart.
 constexpr float coveringRadius = 3;
 /// Room between the reach of a sample and what the band needs, against rounding [voxels].
@@ -102,7 +102,7 @@ void check(const BuildOptions& options) {
     checkWidth("exteriorWidth", options.exteriorWidth, options.voxelSize);
     checkWidth("interiorWidth", options.interiorWidth, options.voxelSize);
     require(within(options.gap, 0, 100), "gap", "in 0..100 voxels", options.gap);
-    require(layers.delta >= leastDelta && layers.delta <= 4, "delta", "in [0.1, 4] voxels", layers.delta);
+    require(layers.delta >= minDelta && layers.delta <= 4, "delta", "in [0.1, 4] voxels", layers.delta);
     require(within(layers.epsilon, 1e-4f, 1e4f), "epsilon", "in 1e-4..1e4 square voxels", layers.epsilon);
     require(within(layers.neighbourhood, 1, 64), "neighbourhood", "in 1..64", layers.neighbourhood);
     require(within(layers.maxSubdivision, 1, 1024), "maxSubdivision", "in 1..1024", layers.maxSubdivision);
@@ -173,7 +173,7 @@ void checkSize(const Mesh& mesh, const Survey& seen, const BuildOptions& options
             refuse("index coordinates would leave 32 bits");
         bricks *= (high - low + 2 * double(reach)) / brickSide + 2;
     }
-    if (bricks > mostBricks) refuse("its box would have more than 2^28 bricks of 64^3 voxels");
+    if (bricks > maxBricks) refuse("its box would have more than 2^28 bricks of 64^3 voxels");
     const double area = seen.area / (h * h);
     if (!(area > 0)) throw std::invalid_argument("the mesh has no triangle with an area");
     const double block = bytesPerBlock * (options.triangles ? 2 : 1);
@@ -325,7 +325,7 @@ class Build {
         validate(oldMesh);
         checkOld(old, oldMesh);
         checkMoved(oldMesh, mesh_, moved);
-        if (double(moved.size()) > mostMoved * double(mesh_.triangles.size()) || !canCopy(old) ||
+        if (double(moved.size()) > maxMoved * double(mesh_.triangles.size()) || !canCopy(old) ||
             !fillMoved(old, oldMesh, moved))
             return run();
         return levelSet();
@@ -411,7 +411,7 @@ class Build {
             side = brickSideFor(survey_.box, voxelsPerUnit, reach);
             if (side != brickSideFor(bounds(oldMesh), voxelsPerUnit, reach)) return false;
         }
-        const TouchedCells touched(oldMesh, mesh_, moved, voxelsPerUnit, reach, side);
+        const DirtyRegion touched(oldMesh, mesh_, moved, voxelsPerUnit, reach, side);
         times_.tiles += part.lap();
         const std::string reason = options_.sign == Sign::automatic ? closedAndOriented : asAskedFor;
         fillFrom(mesh_, mesh_, Sign::normals, reason, options_.method, [&](MeshJob& job, Assembler& assembler) {
@@ -455,13 +455,13 @@ class Build {
     void fillChosen() {
         Stopwatch part;
         SignChoice choice = chooseSign(mesh_, &progress_);
-        if (choice.sign == Sign::normals && !choice.mended && isKnownToIntersectItself())
+        if (choice.sign == Sign::normals && !choice.repaired && isKnownToIntersectItself())
             choice = chooseSignAfterConflict(mesh_, &progress_);
         times_.tiles += part.lap();
         for (;;) {
             // kept over the next choice, which may be made from it
-            const std::optional<Mesh> mended = std::move(choice.mended);
-            const Mesh& mesh = mended ? *mended : mesh_;
+            const std::optional<Mesh> repaired = std::move(choice.repaired);
+            const Mesh& mesh = repaired ? *repaired : mesh_;
             const bool borrows = choice.sign == Sign::normals && options_.method == Method::pseudonormal;
             const Sign sign = fill(mesh, choice.sign, choice.reason, borrows ? Method::exact : options_.method);
             if (sign != Sign::normals || !contradictory(mesh)) {
@@ -473,7 +473,7 @@ class Build {
                 return;
             }
             choice = chooseSignAfterConflict(mesh, &progress_);
-            if (!choice.mended && mended) choice.mended = *mended;
+            if (!choice.repaired && repaired) choice.repaired = *repaired;
         }
     }
 
@@ -498,7 +498,7 @@ class Build {
         });
     }
 
-    // Normals are taken from a mesh that is mended, should it be inside out.
+    // Normals are taken from a mesh that is repaired, should it be inside out.
     void fillAsAsked() {
         fill(mesh_, options_.sign, asAskedFor, options_.method);
         if (options_.sign != Sign::normals || signs_.conflicts == 0) return;
@@ -526,7 +526,7 @@ class Build {
     // makes of the mesh, as outwardMesh() says.
     bool fillUnion(const Mesh& mesh) {
         Stopwatch part;
-        United united = unite(mesh, &progress_);
+        UnionSurface united = unite(mesh, &progress_);
         if (!united.changed()) return false;
         const Orientation solids = orient(mesh, &progress_);
         if (solids.turnedTriangles > 0) united = unite(solids.mesh, &progress_);
@@ -552,7 +552,7 @@ class Build {
                     progress_,  {},
                     &undecided, &conflicts};
         if (adapt) adapt(job, assembler);
-        // triangles turned around, in a mended mesh, have the same box
+        // triangles turned around, in a repaired mesh, have the same box
         if (filler_)
             filler_->fill({job, options_, survey_.box, {}});
         else if (method == Method::exact)

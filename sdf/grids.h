@@ -40,8 +40,8 @@ inline constexpr const char* version = "bilayer:version";
 /// A grid of a level set with its origin in its transform, as files hold it. The tree is shared.
 openvdb::GridBase::Ptr inWorld(const openvdb::GridBase::ConstPtr& grid, const LevelSet& levelSet);
 
-/// Writes any grids to a .vdb file, whole or not at all. Throws std::runtime_error that names the file when it cannot
-/// be written. writeVdb() in vdb_io.h does so for a LevelSet.
+/// Writes any grids to a .vdb file, whole or not at all; their names differ. Throws std::runtime_error that names the
+/// file when it cannot be written. writeVdb() in vdb_io.h does so for a LevelSet.
 void writeGrids(const std::filesystem::path& path, const openvdb::GridCPtrVec& grids);
 
 }  // namespace bilayer

@@ -10,10 +10,13 @@
 #include <cstdint>
 #include <functional>
 #include <glm/geometric.hpp>
+#include <optional>
 #include <span>
 #include <vector>
 
+#include "sdf/base/large_array.h"
 #include "sdf/base/polled_loop.h"
+#include "sdf/base/welding.h"
 #include "sdf/bvh/triangle_tree.h"
 #include "sdf/mesh/orient.h"
 #include "sdf/mesh/self_intersection.h"
@@ -91,7 +94,7 @@ std::vector<EdgeUse> boundary(const Topology& topology) {
 
 // Holes: sets of boundary edges that share vertices.
 std::size_t countLoops(const std::vector<EdgeUse>& boundary, std::size_t vertices) {
-    Sets sets(vertices);
+    DisjointSets sets(vertices);
     std::vector<unsigned> ends;
     for (const EdgeUse& edge : boundary) sets.join(edge.low, edge.high);
     for (const EdgeUse& edge : boundary) ends.push_back(sets.root(edge.low));
@@ -105,7 +108,7 @@ std::size_t countNonManifoldVertices(const Topology& topology, std::size_t verti
         const glm::uvec3& t = topology.triangles[triangle];
         return 3 * triangle + (t.x == vertex ? 0 : t.y == vertex ? 1 : 2);
     };
-    SharedSets fans(3 * topology.triangles.size());
+    ConcurrentDisjointSets fans(3 * topology.triangles.size());
     // each joining that two sets become one by leaves one fan less
     const std::size_t joined = overEdges<std::size_t>(topology, [&](std::span<const EdgeUse> uses, std::size_t& sum) {
         for (const EdgeUse& use : uses.subspan(1))
@@ -128,9 +131,9 @@ std::size_t countDuplicates(const Topology& topology) {
     return duplicates;
 }
 
-// Sets of triangles that share vertices; gives each triangle the number of its set.
+// DisjointSets of triangles that share vertices; gives each triangle the number of its set.
 std::vector<unsigned> components(const Mesh& mesh, std::size_t& count) {
-    SharedSets sets(mesh.points.size());
+    ConcurrentDisjointSets sets(mesh.points.size());
     forAll(mesh.triangles.size(), [&](std::size_t i) {
         sets.join(mesh.triangles[i].x, mesh.triangles[i].y);
         sets.join(mesh.triangles[i].x, mesh.triangles[i].z);
@@ -148,7 +151,7 @@ std::vector<unsigned> components(const Mesh& mesh, std::size_t& count) {
 
 // What each triangle adds to the sums over all.
 struct Measures {
-    std::vector<double> areas, volumes;
+    LargeArray<double> areas, volumes;
 
     Measures(const Mesh& mesh, const Bounds& box) : areas(mesh.triangles.size()), volumes(mesh.triangles.size()) {
         const glm::dvec3 origin(box.centre());
@@ -192,7 +195,7 @@ float finiteOrZero(float thickness) {
 // The thickness behind triangles that only a part of the area stays below.
 float commonThickness(const std::vector<float>& thickness, const Measures& measures, double area) {
     // by thickness, then number: the bits of positive floats are in their order
-    std::vector<std::uint64_t> order(thickness.size());
+    LargeArray<std::uint64_t> order(thickness.size());
     forAll(order.size(),
            [&](std::size_t i) { order[i] = std::uint64_t(std::bit_cast<std::uint32_t>(thickness[i])) << 32 | i; });
     double below = 0;
@@ -201,8 +204,8 @@ float commonThickness(const std::vector<float>& thickness, const Measures& measu
     for (std::size_t i = 0; i < order.size(); ++i) {
         if (i == sorted) {
             sorted = std::min(order.size(), 2 * sorted + order.size() / 32 + 1);
-            const auto from = order.begin() + std::ptrdiff_t(i), to = order.begin() + std::ptrdiff_t(sorted);
-            std::nth_element(from, to - 1, order.end());
+            std::uint64_t *from = order.data() + i, *to = order.data() + sorted;
+            std::nth_element(from, to - 1, order.data() + order.size());
             std::sort(from, to);
         }
         const auto triangle = std::uint32_t(order[i]);
@@ -226,7 +229,8 @@ void findThinWalls(const TriangleTree& tree, const Measures& measures, float wal
 MeshReport inspect(const Mesh& input, float wall) {
     validate(input);
     MeshReport report;
-    const Mesh mesh = weld(input);
+    const std::optional<Mesh> welded = weldUnlessDone(input);
+    const Mesh& mesh = welded ? *welded : input;
     report.points = mesh.points.size();
     report.triangles = input.triangles.size();
     report.degenerateTriangles = input.triangles.size() - mesh.triangles.size();

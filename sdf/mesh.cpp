@@ -7,15 +7,19 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <cstring>
 #include <glm/common.hpp>
 #include <glm/mat3x3.hpp>
 #include <glm/matrix.hpp>
 #include <limits>
 #include <span>
 #include <stdexcept>
+#include <utility>
 #include <vector>
 
 #include "sdf/base/large_array.h"
+#include "sdf/base/parallel_parts.h"
+#include "sdf/base/welding.h"
 #include "sdf/mesh/equal_points.h"
 
 namespace bilayer {
@@ -25,7 +29,7 @@ using namespace detail;
 namespace {
 
 /// Vertices or triangles that are worth a task.
-constexpr std::size_t grain = 1 << 13;
+constexpr std::size_t grain = 1 << 14;
 
 bool finite(const glm::vec3& p) {
     return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z);
@@ -34,8 +38,7 @@ bool finite(const glm::vec3& p) {
 // Calls body(run, begin, end) for runs of the numbers below n, side by side.
 template <class Body>
 void forEachRun(std::size_t n, Body body) {
-    tbb::parallel_for(std::size_t(0), (n + grain - 1) / grain,
-                      [&](std::size_t run) { body(run, run * grain, std::min(n, (run + 1) * grain)); });
+    inOrder((n + grain - 1) / grain, [&](std::size_t run) { body(run, run * grain, std::min(n, (run + 1) * grain)); });
 }
 
 // Keeps the items that keeps(index) is true for, in their order; returns where those of each run went. keeps() is asked
@@ -59,10 +62,51 @@ std::vector<std::size_t> keepWhere(std::vector<Item>& items, Keeps keeps) {
     return places;
 }
 
-// Sets a flag that other threads may set at the same time.
+// DisjointSets a flag that other threads may set at the same time.
 void mark(std::uint8_t& flag) {
     const std::atomic_ref<std::uint8_t> shared(flag);
     if (!shared.load(std::memory_order_relaxed)) shared.store(1, std::memory_order_relaxed);
+}
+
+bool areAllSet(const std::vector<std::uint8_t>& flags) {
+    return flags.empty() || !std::memchr(flags.data(), 0, flags.size());
+}
+
+bool isCollapsed(const glm::uvec3& t) {
+    return t.x == t.y || t.y == t.z || t.z == t.x;
+}
+
+// Drops triangles that use a vertex twice, after each vertex was replaced by the first of equal ones; `first` is empty
+// where none are equal. Returns a byte for each vertex: whether a triangle uses it.
+std::vector<std::uint8_t> keepProper(Mesh& mesh, const LargeArray<unsigned>& first) {
+    std::vector<std::uint8_t> used(mesh.points.size(), 0);
+    keepWhere(mesh.triangles, [&](std::size_t i) {
+        glm::uvec3& t = mesh.triangles[i];
+        if (first.size() > 0) t = {first[t.x], first[t.y], first[t.z]};
+        if (isCollapsed(t)) return false;
+        for (int k = 0; k < 3; ++k) mark(used[t[k]]);
+        return true;
+    });
+    return used;
+}
+
+// Drops vertices that are not used, and numbers the others anew.
+void keepUsed(Mesh& mesh, const std::vector<std::uint8_t>& used) {
+    if (areAllSet(used)) return;
+    LargeArray<unsigned> number(mesh.points.size());
+    const std::vector<std::size_t> places = keepWhere(mesh.points, [&](std::size_t i) { return used[i] != 0; });
+    forEachRun(used.size(), [&](std::size_t run, std::size_t begin, std::size_t end) {
+        std::size_t place = places[run];
+        for (std::size_t i = begin; i < end; ++i)
+            if (used[i]) number[i] = unsigned(place++);
+    });
+    forEachRun(mesh.triangles.size(), [&](std::size_t, std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) {
+            glm::uvec3& t = mesh.triangles[i];
+            t = {number[t.x], number[t.y], number[t.z]};
+        }
+    });
+    mesh.points.shrink_to_fit();
 }
 
 // The first number below n that `holds` is true for; n if there is none.
@@ -139,32 +183,50 @@ void validate(const Mesh& mesh) {
         fmt::format("triangle {} uses vertex {}, but there are only {} vertices", t, vertex, points));
 }
 
-Mesh weld(Mesh mesh) {
-    LargeArray<unsigned> number = firstOfEqual(mesh.points);  // of each vertex
-    const std::size_t pointsBefore = mesh.points.size();
-    std::vector<std::uint8_t> used(pointsBefore, 0);
-    keepWhere(mesh.triangles, [&](std::size_t i) {
-        glm::uvec3& t = mesh.triangles[i];
-        t = {number[t.x], number[t.y], number[t.z]};
-        if (t.x == t.y || t.y == t.z || t.z == t.x) return false;
-        for (int k = 0; k < 3; ++k) mark(used[t[k]]);
-        return true;
-    });
-    const std::vector<std::size_t> places = keepWhere(mesh.points, [&](std::size_t i) { return used[i] != 0; });
-    if (mesh.points.size() == pointsBefore) return mesh;
-    forEachRun(pointsBefore, [&](std::size_t run, std::size_t begin, std::size_t end) {
-        std::size_t place = places[run];
-        for (std::size_t i = begin; i < end; ++i)
-            if (used[i]) number[i] = unsigned(place++);
-    });
-    forEachRun(mesh.triangles.size(), [&](std::size_t, std::size_t begin, std::size_t end) {
+VertexUse detail::vertexUse(const std::vector<glm::uvec3>& triangles, std::size_t vertices) {
+    VertexUse use{std::vector<std::uint8_t>(vertices, 0)};
+    std::atomic<bool> repeats = false;
+    forEachRun(triangles.size(), [&](std::size_t, std::size_t begin, std::size_t end) {
+        bool repeatsHere = false;
         for (std::size_t i = begin; i < end; ++i) {
-            glm::uvec3& t = mesh.triangles[i];
-            t = {number[t.x], number[t.y], number[t.z]};
+            const glm::uvec3& t = triangles[i];
+            for (int k = 0; k < 3; ++k) {
+                if (t[k] >= vertices)
+                    throw std::runtime_error(
+                        fmt::format("a face refers to vertex {}, but there are {}, counted from 0", t[k], vertices));
+                mark(use.used[t[k]]);
+            }
+            repeatsHere |= isCollapsed(t);
         }
+        if (repeatsHere) repeats.store(true, std::memory_order_relaxed);
     });
-    mesh.points.shrink_to_fit();
+    use.repeats = repeats;
+    return use;
+}
+
+Mesh weld(Mesh mesh) {
+    keepUsed(mesh, keepProper(mesh, firstOfEqual(mesh.points)));
     return mesh;
+}
+
+Mesh detail::weld(Mesh mesh, const VertexUse& use) {
+    const LargeArray<unsigned> first = firstOfEqual(mesh.points);
+    if (first.size() > 0 || use.repeats)
+        keepUsed(mesh, keepProper(mesh, first));
+    else
+        keepUsed(mesh, use.used);
+    return mesh;
+}
+
+std::optional<Mesh> detail::weldUnlessDone(const Mesh& mesh) {
+    const LargeArray<unsigned> first = firstOfEqual(mesh.points);
+    if (first.size() == 0) {
+        const VertexUse use = vertexUse(mesh.triangles, mesh.points.size());
+        if (!use.repeats && areAllSet(use.used)) return std::nullopt;
+    }
+    Mesh welded = mesh;
+    keepUsed(welded, keepProper(welded, first));
+    return welded;
 }
 
 Mesh transformed(const Mesh& mesh, const glm::mat4& map) {

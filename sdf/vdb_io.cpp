@@ -3,21 +3,28 @@
 #include <fmt/format.h>
 #include <oneapi/tbb/parallel_for.h>
 #include <oneapi/tbb/parallel_reduce.h>
-#include <openvdb/io/File.h>
+#include <openvdb/io/Archive.h>
+#include <openvdb/io/Compression.h>
+#include <openvdb/io/DelayedLoadMetadata.h>
+#include <openvdb/io/GridDescriptor.h>
 #include <openvdb/io/Stream.h>
 #include <openvdb/tree/LeafManager.h>
 #include <zlib.h>
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <fstream>
+#include <memory>
 #include <sstream>
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include <bilayer/sdf/grids.h>
+#include "sdf/base/large_array.h"
 #include "sdf/io/atomic_file.h"
 #include "sdf/io/input_file.h"
 #include "sdf/io/mapped_file.h"
@@ -97,7 +104,7 @@ class DistanceCheck {
 constexpr std::string_view sealName = "bilayer crc32 ";
 constexpr std::size_t sealSize = sealName.size() + 9;  // eight digits and a line feed
 // So many of its letters are no chance. Of a file that ends with fewer nothing else is missing.
-constexpr std::size_t leastOfSeal = 4;
+constexpr std::size_t minOfSeal = 4;
 
 /// On all threads: sums of parts combine.
 std::string sealOf(std::string_view bytes) {
@@ -129,7 +136,7 @@ std::ifstream opened(const std::filesystem::path& path) {
 void requireSeal(std::string_view bytes) {
     // more than the seal: bytes may have come behind it
     const std::string_view end = bytes.substr(bytes.size() - std::min(bytes.size(), 4 * sealSize));
-    for (std::size_t kept = sealName.size() - 1; kept >= leastOfSeal; --kept)
+    for (std::size_t kept = sealName.size() - 1; kept >= minOfSeal; --kept)
         if (end.ends_with(sealName.substr(0, kept))) throw std::runtime_error("its end is missing");
     const std::size_t at = end.rfind(sealName);
     if (at == std::string_view::npos) return;
@@ -137,37 +144,117 @@ void requireSeal(std::string_view bytes) {
         throw std::runtime_error("it is not as it was written");
 }
 
-/// A grid that compresses its leaves on all threads. OpenVDB's own does so one after the other; the bytes are the same.
-template <class Grid>
-class ParallelGrid : public Grid {
+/// Writes grids that have all of their metadata, without regard to grids that share a name or a tree. OpenVDB's own
+/// archives would compress all leaves once more, for the sizes that readers with delayed loading ask for.
+class FieldArchive : public openvdb::io::Archive {
   public:
-    explicit ParallelGrid(Grid& grid) : Grid(grid, openvdb::ShallowCopy()) {}
+    /// How the values of a grid are compressed.
+    std::uint32_t compressionOf(const openvdb::GridBase& grid) const {
+        std::ostringstream tagged;
+        setGridCompression(tagged, grid);
+        return openvdb::io::getDataCompression(tagged);
+    }
 
-    void writeBuffers(std::ostream& out) const override {
-        std::vector<const typename Grid::TreeType::LeafNodeType*> leaves;
-        this->tree().getNodes(leaves);
-        constexpr std::size_t run = 256;
-        std::vector<std::string> runs((leaves.size() + run - 1) / run);
-        const openvdb::io::StreamMetadata::Ptr how = openvdb::io::getStreamMetadataPtr(out);
-        tbb::parallel_for(std::size_t(0), runs.size(), [&](std::size_t i) {
-            openvdb::io::StreamMetadata::Ptr shared = how;
-            std::ostringstream part;
-            openvdb::io::setStreamMetadataPtr(part, shared);
-            for (std::size_t k = i * run; k < std::min((i + 1) * run, leaves.size()); ++k)
-                leaves[k]->writeBuffers(part, this->saveFloatAsHalf());
-            openvdb::io::clearStreamMetadataPtr(part);
-            runs[i] = std::move(part).str();
-        });
-        for (const std::string& bytes : runs) out.write(bytes.data(), std::streamsize(bytes.size()));
+    void writeTo(std::ostream& out, const openvdb::GridCPtrVec& grids) const {
+        writeHeader(out, /*seekable=*/false);
+        openvdb::MetaMap().writeMeta(out);
+        const auto count = std::int32_t(grids.size());
+        out.write(reinterpret_cast<const char*>(&count), sizeof count);
+        for (const auto& grid : grids) writeTo(out, *grid);
+    }
+
+  private:
+    void writeTo(std::ostream& out, const openvdb::GridBase& grid) const {
+        auto how = std::make_shared<openvdb::io::StreamMetadata>();
+        how->setHalfFloat(grid.saveFloatAsHalf());
+        openvdb::io::setStreamMetadataPtr(out, how);
+        const openvdb::io::GridDescriptor descriptor(grid.getName(), grid.type(), grid.saveFloatAsHalf());
+        descriptor.writeHeader(out);
+        descriptor.writeStreamPos(out);
+        setGridCompression(out, grid);
+        grid.writeMeta(out);
+        grid.writeTransform(out);
+        grid.writeTopology(out);
+        grid.writeBuffers(out);
+        openvdb::io::clearStreamMetadataPtr(out);
     }
 };
 
-template <class Grid>
-openvdb::GridBase::ConstPtr inParallel(const openvdb::GridBase::ConstPtr& grid) {
-    const auto typed = openvdb::gridPtrCast<Grid>(openvdb::ConstPtrCast<openvdb::GridBase>(grid));
-    if (typed) return std::make_shared<ParallelGrid<Grid>>(*typed);
-    return grid;
+/// Where the values of a leaf begin behind its mask and what stands for its inactive values.
+template <class Leaf>
+std::size_t valuesBegin(std::string_view leaf) {
+    using namespace openvdb::io;
+    constexpr std::size_t mask = sizeof(typename Leaf::NodeMaskType);
+    const auto kind = static_cast<unsigned char>(leaf[mask]);
+    std::size_t begin = mask + 1;
+    if (kind == NO_MASK_AND_ONE_INACTIVE_VAL || kind == MASK_AND_ONE_INACTIVE_VAL)
+        begin += sizeof(typename Leaf::ValueType);
+    if (kind == MASK_AND_TWO_INACTIVE_VALS) begin += 2 * sizeof(typename Leaf::ValueType);
+    if (kind == MASK_AND_NO_INACTIVE_VALS || kind == MASK_AND_ONE_INACTIVE_VAL || kind == MASK_AND_TWO_INACTIVE_VALS)
+        begin += mask;
+    return begin;
 }
+
+/// A grid whose leaves are compressed on all threads before it is written. It tells readers with delayed loading their
+/// sizes, as OpenVDB does; the bytes are the same.
+template <class Grid>
+class CompressedGrid : public Grid {
+  public:
+    using Leaf = typename Grid::TreeType::LeafNodeType;
+
+    explicit CompressedGrid(Grid& grid) : Grid(grid, openvdb::ShallowCopy()) {
+        using namespace openvdb;
+        const Sizes sizes = compress(FieldArchive().compressionOf(*this));
+        if (!sizes.empty()) this->insertMeta(GridBase::META_FILE_DELAYED_LOAD, sizes);
+    }
+
+    std::size_t bytes() const {
+        std::size_t sum = 0;
+        for (const std::string& run : runs_) sum += run.size();
+        return sum;
+    }
+
+    /// To be called once: memory is given back as it is written.
+    void writeBuffers(std::ostream& out) const override {
+        for (std::string& run : runs_) {
+            out.write(run.data(), std::streamsize(run.size()));
+            run = {};
+        }
+    }
+
+  private:
+    using Sizes = openvdb::io::DelayedLoadMetadata;
+
+    Sizes compress(std::uint32_t compression) {
+        std::vector<const Leaf*> leaves;
+        this->tree().getNodes(leaves);
+        Sizes sizes;
+        sizes.resizeMask(leaves.size());
+        sizes.resizeCompressedSize(leaves.size());
+        constexpr std::size_t run = 256;
+        runs_.resize((leaves.size() + run - 1) / run);
+        tbb::parallel_for(std::size_t(0), runs_.size(), [&](std::size_t i) {
+            auto how = std::make_shared<openvdb::io::StreamMetadata>();
+            how->setCompression(compression);
+            how->setBackgroundPtr(&this->tree().background());
+            std::ostringstream part;
+            openvdb::io::setStreamMetadataPtr(part, how);
+            for (std::size_t k = i * run; k < std::min((i + 1) * run, leaves.size()); ++k) {
+                const std::size_t begin = part.view().size();
+                leaves[k]->writeBuffers(part, this->saveFloatAsHalf());
+                const std::string_view bytes = part.view().substr(begin);
+                sizes.setMask(k,
+                              openvdb::io::DelayedLoadMetadata::MaskType(bytes[sizeof(typename Leaf::NodeMaskType)]));
+                sizes.setCompressedSize(k, std::int64_t(bytes.size() - valuesBegin<Leaf>(bytes)));
+            }
+            openvdb::io::clearStreamMetadataPtr(part);
+            runs_[i] = std::move(part).str();
+        });
+        return sizes;
+    }
+
+    mutable std::vector<std::string> runs_;
+};
 
 void shift(openvdb::GridBase& grid, const glm::dvec3& by) {
     if (by == glm::dvec3(0)) return;
@@ -194,18 +281,59 @@ openvdb::GridBase::Ptr inWorld(const openvdb::GridBase::ConstPtr& grid, const Le
     return copy;
 }
 
+namespace {
+
+/// Grids as an archive shall write them.
+class PreparedGrids {
+  public:
+    explicit PreparedGrids(const openvdb::GridCPtrVec& grids) {
+        for (const auto& grid : grids)
+            if (!add<openvdb::FloatGrid>(grid) && !add<openvdb::Int32Grid>(grid))
+                add(openvdb::ConstPtrCast<openvdb::GridBase>(grid)->copyGrid());
+    }
+
+    /// What an archive writes.
+    std::string bytes() const {
+        std::string room;
+        room.reserve(bytes_);
+        adviseHugePages(room.data(), bytes_);
+        std::ostringstream memory(std::move(room));
+        memory.exceptions(std::ios::failbit | std::ios::badbit);
+        FieldArchive().writeTo(memory, grids_);
+        return std::move(memory).str();
+    }
+
+  private:
+    template <class Grid>
+    bool add(const openvdb::GridBase::ConstPtr& grid) {
+        const auto typed = openvdb::gridPtrCast<Grid>(openvdb::ConstPtrCast<openvdb::GridBase>(grid));
+        if (!typed) return false;
+        const auto compressed = std::make_shared<CompressedGrid<Grid>>(*typed);
+        bytes_ += compressed->bytes() + compressed->bytes() / topologyPart;
+        add(compressed);
+        return true;
+    }
+
+    void add(const openvdb::GridBase::Ptr& grid) {
+        const std::string compression = openvdb::io::compressionToString(FieldArchive().compressionOf(*grid));
+        grid->addStatsMetadata();
+        grid->insertMeta(openvdb::GridBase::META_FILE_COMPRESSION, openvdb::StringMetadata(compression));
+        grids_.push_back(grid);
+    }
+
+    static constexpr std::size_t topologyPart = 4;  // masks and tiles are about this part of a grid's leaves
+    openvdb::GridCPtrVec grids_;
+    std::size_t bytes_ = 1 << 20;  // about, of the file
+};
+
+}  // namespace
+
 void writeGrids(const std::filesystem::path& path, const openvdb::GridCPtrVec& grids) {
     AtomicFile file(path);
-    openvdb::GridCPtrVec written;
-    for (const auto& grid : grids)
-        written.push_back(inParallel<openvdb::FloatGrid>(inParallel<openvdb::Int32Grid>(grid)));
     try {
-        std::ostringstream memory;
-        memory.exceptions(std::ios::failbit | std::ios::badbit);
-        openvdb::io::Stream(memory).write(written);
+        const std::string bytes = PreparedGrids(grids).bytes();
         std::ofstream stream(file.temporary(), std::ios::binary);
         stream.exceptions(std::ios::failbit | std::ios::badbit);
-        const std::string_view bytes = memory.view();
         stream << bytes << sealOf(bytes);
         stream.close();
     } catch (const std::exception&) {

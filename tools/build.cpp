@@ -33,9 +33,10 @@ const std::map<std::string, Method> methods{{"exact", Method::exact},
 const std::map<std::string, Sign> signs{
     {"auto", Sign::automatic}, {"normals", Sign::normals}, {"winding", Sign::winding}, {"flood", Sign::flood}};
 const std::map<std::string, BandUnit> bandUnits{{"voxels", BandUnit::voxels}, {"world", BandUnit::world}};
-const std::map<std::string, Measure> measures{{nameOf(Measure::samples), Measure::samples},
-                                              {nameOf(Measure::edges), Measure::edges},
-                                              {nameOf(Measure::triangles), Measure::triangles}};
+const std::map<std::string, ContactAccuracy> measures{
+    {nameOf(ContactAccuracy::samples), ContactAccuracy::samples},
+    {nameOf(ContactAccuracy::exactNearFeatures), ContactAccuracy::exactNearFeatures},
+    {nameOf(ContactAccuracy::exact), ContactAccuracy::exact}};
 const std::map<std::string, KernelMapping> mappings{{"auto", KernelMapping::automatic},
                                                     {"block", KernelMapping::blockPerItem},
                                                     {"group", KernelMapping::groupPerBlock}};
@@ -196,7 +197,7 @@ void run(Arguments a) {
     if (a.options.bandUnit == BandUnit::voxels || !a.resolutionGiven->count()) requireBand(a);
     a.options.method = methods.at(a.method);
     a.options.sign = signs.at(a.sign);
-    a.collider.measure = a.noMesh ? Measure::samples : measures.at(a.contacts);
+    a.collider.accuracy = a.noMesh ? ContactAccuracy::samples : measures.at(a.contacts);
     std::optional<tbb::global_control> threads;
     if (a.options.threads > 0)
         threads.emplace(tbb::global_control::max_allowed_parallelism, std::size_t(a.options.threads));

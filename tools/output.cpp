@@ -253,14 +253,14 @@ Json toJson(const Body& body, const glm::dvec3& origin) {
             {"bounds", box(body.bounds, origin)},
             {"mass", toJson(body.mass, origin)},
             {"triangles", body.mesh ? body.mesh->triangles.size() : 0},
-            {"contacts", nameOf(body.measure)}};
+            {"contacts", nameOf(body.accuracy)}};
 }
 
 void addRows(Table& table, const Body& body) {
     const std::string mesh = body.mesh ? grouped(body.mesh->triangles.size()) + " triangles" : "no mesh";
     table.row("body",
               fmt::format("{} surface points, margin {}, {}, contacts by {}{}", grouped(body.points.points().size()),
-                          metres(body.margin), mesh, nameOf(body.measure), body.mass ? "" : ", without a mass"));
+                          metres(body.margin), mesh, nameOf(body.accuracy), body.mass ? "" : ", without a mass"));
 }
 
 ProgressBar::ProgressBar(std::string label) : label_(std::move(label)), visible_(::isatty(STDERR_FILENO)) {}

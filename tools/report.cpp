@@ -29,7 +29,7 @@ struct Arguments {
 };
 
 struct InspectArguments : Arguments {
-    bullet::Scene scene;
+    bullet::SceneRequirements scene;
     CLI::Option* stepGiven = nullptr;
 };
 
@@ -51,13 +51,13 @@ std::optional<MassProperties> massOf(const Solid& solid) {
     }
 }
 
-Json adviceJson(const bullet::Advice& advice) {
+Json adviceJson(const bullet::Settings& advice) {
     return {{"voxelSize", number(advice.voxelSize)},
             {"margin", number(advice.margin)},
             {"exteriorWidth", advice.exteriorWidth},
             {"interiorWidth", advice.interiorWidth},
             {"substeps", advice.substeps},
-            {"substepsWithoutSweeps", advice.substepsUnswept},
+            {"substepsWithoutSweeps", advice.substepsWithoutSpeculation},
             {"wallVoxels", number(advice.wallVoxels)},
             {"splitImpulsePenetrationThreshold", number(advice.splitImpulse)},
             {"activeVoxels", advice.voxels},
@@ -66,17 +66,17 @@ Json adviceJson(const bullet::Advice& advice) {
             {"warnings", advice.warnings}};
 }
 
-void printAdvice(const InspectArguments& a, const bullet::Advice& advice) {
+void printAdvice(const InspectArguments& a, const bullet::Settings& advice) {
     Table table(
         fmt::format("advice: bodies that meet at up to {:g} m/s, steps of {:.4g} s", a.scene.speed, a.scene.step));
     table.row("build", fmt::format("--voxel-size {:.4g} --exterior-width {} --interior-width {} --body --margin {:.4g}",
                                    advice.voxelSize, advice.exteriorWidth, advice.interiorWidth, advice.margin));
     if (advice.wallVoxels > 0) table.row("walls", fmt::format("{:.3g} voxels", advice.wallVoxels));
     const auto told = [](int substeps) {
-        return fmt::format("{}{}", substeps, substeps < bullet::mostSubsteps ? "" : " or more");
+        return fmt::format("{}{}", substeps, substeps < bullet::maxSubsteps ? "" : " or more");
     };
-    table.row("substeps",
-              fmt::format("{} with swept contacts, {} without", told(advice.substeps), told(advice.substepsUnswept)));
+    table.row("substeps", fmt::format("{} with swept contacts, {} without", told(advice.substeps),
+                                      told(advice.substepsWithoutSpeculation)));
     table.row("field", fmt::format("about {} active voxels, {}, built in {:.1g} s on two cores", grouped(advice.voxels),
                                    bytes(advice.fieldBytes), advice.buildSeconds));
     table.row("solver", fmt::format("m_splitImpulsePenetrationThreshold = {:.4g}", advice.splitImpulse));
@@ -88,7 +88,7 @@ void runInspect(const InspectArguments& a) {
     ReadReport read;
     const Mesh mesh = readMesh(a.input, &read);
     const MeshReport report = inspect(mesh);
-    const auto advice = a.stepGiven->count() ? std::optional(bullet::advise(report, a.scene)) : std::nullopt;
+    const auto advice = a.stepGiven->count() ? std::optional(bullet::recommendSettings(report, a.scene)) : std::nullopt;
     const std::optional<MassProperties> mass = report.closed() ? massOf(mesh) : std::nullopt;
     if (a.json) {
         Json json = toJson(report, 0);
@@ -235,7 +235,7 @@ std::string asSeconds(std::string& word) {
 }
 
 void addScene(CLI::App& command, InspectArguments& a) {
-    bullet::Scene& scene = a.scene;
+    bullet::SceneRequirements& scene = a.scene;
     auto* group = command.add_option_group("scene", "say what a body's field needs, and warn of the rest");
     auto* step = group->add_option("--dt", scene.step, "step of the simulation [s], as 0.01 or 1/60")
                      ->check(positive())

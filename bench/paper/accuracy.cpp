@@ -176,11 +176,11 @@ std::string textTable1(const json& data) {
     const auto smaller = [&](std::size_t i) {  // the mean error in the mesh's unit
         return published::table1[i].mean / (steps(i, "all", "mean") * double(data["rows"][i]["step"]));
     };
-    double leastRatio = 1e9, mostRatio = 0;  // of the blocks' worst error to the paper's, in steps
+    double minRatio = 1e9, maxRatio = 0;  // of the blocks' worst error to the paper's, in steps
     for (std::size_t i = 0; i <= last; ++i) {
         const double ratio = steps(i, "blocks", "worst") / (published::table1[i].worst / published::table1[i].step);
-        leastRatio = std::min(leastRatio, ratio);
-        mostRatio = std::max(mostRatio, ratio);
+        minRatio = std::min(minRatio, ratio);
+        maxRatio = std::max(maxRatio, ratio);
     }
     const std::string perEpsilon = listed(data["rows"], "perEpsilon");
     return text +
@@ -203,7 +203,7 @@ std::string textTable1(const json& data) {
                "guess. Nor does the step printed for {} nodes go with the others: {} / {} is {:.3f}.\n",
                smaller(0), published::table1[0].nodes, smaller(last), published::table1[last].nodes,
                perEpsilon.empty() ? "" : fmt::format(", {} for an epsilon of surface on these grids", perEpsilon),
-               order(data["rows"], "all", "mean"), leastRatio, mostRatio, least, most, steps(0, "all", "mean"),
+               order(data["rows"], "all", "mean"), minRatio, maxRatio, least, most, steps(0, "all", "mean"),
                steps(last, "all", "mean"), std::sqrt(3.0) / 4, published::table1[0].nodes, boxSide,
                published::table1[0].nodes - 1, boxSide / (published::table1[0].nodes - 1));
 }

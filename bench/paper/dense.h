@@ -40,9 +40,9 @@ struct DenseOptions {
 /// A signed distance field on a dense lattice.
 struct DenseField {
     Lattice lattice;
-    std::vector<float> phi;       ///< [m]; +-farAway where no sample reaches
-    std::size_t samples = 0;      ///< of all triangles
-    std::size_t mostSamples = 0;  ///< of one triangle
+    std::vector<float> phi;      ///< [m]; +-farAway where no sample reaches
+    std::size_t samples = 0;     ///< of all triangles
+    std::size_t maxSamples = 0;  ///< of one triangle
 };
 
 /// The method as printed, but for one erratum: the scan conversion of section 3.3 sets phi(k + 1) where it ">

@@ -146,11 +146,11 @@ Picture mosaic(const std::vector<Picture>& pictures, int columns) {
     return all;
 }
 
-void writeJpeg(const std::filesystem::path& path, const Picture& picture, std::size_t mostBytes) {
+void writeJpeg(const std::filesystem::path& path, const Picture& picture, std::size_t maxBytes) {
     std::vector<std::uint8_t> bytes;
     for (int quality = 92; quality >= 40; quality -= 4) {
         bytes = jpeg(picture, quality);
-        if (bytes.size() <= mostBytes) break;
+        if (bytes.size() <= maxBytes) break;
     }
     std::ofstream file(path, std::ios::binary);
     file.write(reinterpret_cast<const char*>(bytes.data()), std::streamsize(bytes.size()));

@@ -37,6 +37,6 @@ Picture picture(const Mesh& mesh, const View& view);
 Picture mosaic(const std::vector<Picture>& pictures, int columns);
 
 /// Writes a JPEG, as good as the bytes allow. Throws std::runtime_error that names the file when it cannot be written.
-void writeJpeg(const std::filesystem::path& path, const Picture& picture, std::size_t mostBytes = 245'000);
+void writeJpeg(const std::filesystem::path& path, const Picture& picture, std::size_t maxBytes = 245'000);
 
 }  // namespace bilayer::paper

@@ -29,9 +29,9 @@ using bench::Stopwatch;
 using nlohmann::json;
 using published::tableNodes;
 
-constexpr float halfWidth = 2;      // "about 2 Delta away from the triangle mesh", for all [steps]
-constexpr int threads = 2;          // of those that take more than one, but devices
-constexpr double mostSeconds = 25;  // a builder takes no further turns once it has used up these
+constexpr float halfWidth = 2;     // "about 2 Delta away from the triangle mesh", for all [steps]
+constexpr int threads = 2;         // of those that take more than one, but devices
+constexpr double maxSeconds = 25;  // a builder takes no further turns once it has used up these
 constexpr double MiB = 1 << 20;
 
 // Something that is timed by turns.
@@ -47,7 +47,7 @@ json medians(std::vector<Contender> contenders, int rounds) {
         for (Contender& contender : contenders) {
             double spent = 0;
             for (const double s : contender.seconds) spent += s;
-            if (spent > mostSeconds) continue;
+            if (spent > maxSeconds) continue;
             const Stopwatch watch;
             contender.work();
             contender.seconds.push_back(watch.seconds());
@@ -575,7 +575,7 @@ json measureTable5(const Run& run) {
         json row{{"variance", variance(scene.mesh)},
                  {"triangles", scene.mesh.triangles.size()},
                  {"samples", field.samples},
-                 {"mostSamples", field.mostSamples}};
+                 {"mostSamples", field.maxSamples}};
         row["seconds"] =
             medians({builder("layers", scene, {Builder::doubleLayer, halfWidth, threads}),
                      builder("exact", scene, {Builder::exact, halfWidth, threads}), dense("dense", scene, lattice)},

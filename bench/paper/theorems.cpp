@@ -107,14 +107,14 @@ DistanceError overEdges(unsigned seed, int trials) {
     return worst;
 }
 
-DistanceError aroundWedges(unsigned seed, int trials, double leastAngle, double mostAngle) {
+DistanceError aroundWedges(unsigned seed, int trials, double minAngle, double maxAngle) {
     constexpr double delta = 0.5, extent = 4, farthest = 2;
     constexpr int points = 20;
     Dice dice(seed);
     DistanceError worst;
     for (int i = 0; i < trials; ++i) {
         const double longest = dice.logarithmic(0.1, 2);
-        const Wedge wedge(dice.between(leastAngle, mostAngle), longest, extent);
+        const Wedge wedge(dice.between(minAngle, maxAngle), longest, extent);
         for (int k = 0; k < points; ++k) {
             const double turn = dice.between(wedge.angle, 2 * pi), radius = dice.between(0.01, farthest);
             const dvec2 at = radius * dvec2(std::cos(turn), std::sin(turn));

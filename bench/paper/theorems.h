@@ -22,7 +22,7 @@ DistanceError overEdges(unsigned seed, int trials);
 /// A wedge: two rows of triangles that meet in an edge, at a random angle of the solid between two [rad]; a point
 /// anywhere outside within 2 of the edge, nearer to it than to the wedge's border. Delta is a half; L_max is from 0.1
 /// to 2.
-DistanceError aroundWedges(unsigned seed, int trials, double leastAngle, double mostAngle);
+DistanceError aroundWedges(unsigned seed, int trials, double minAngle, double maxAngle);
 
 /// Theorem 2, in 2D: an edge of 2 L1 and a longer one of 2 L2, bent outward by 2 theta, sampled in their middles:
 /// `OF <= (L2 - L1) / 2` where `L2 tan(theta) <= delta`. That F is the farthest point on the wrong side needs more: the

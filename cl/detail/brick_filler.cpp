@@ -319,9 +319,9 @@ std::size_t BrickFill::lastFitting(std::size_t first) const {
     if (!fits(loadOf(first, first + 1)))
         memory_.refuse(batchesInFlight * bytesOf(loadOf(first, first + 1)), "a brick of the grid");
     const std::size_t end = std::min(bins_->bricks(), first + (gpuMapping_ ? bricksForGpu : bricksForProcessor));
-    const std::uint64_t mostParts = gpuMapping_ || fillsBricks_ ? partsInBatch : partsForProcessor;
+    const std::uint64_t maxParts = gpuMapping_ || fillsBricks_ ? partsInBatch : partsForProcessor;
     std::size_t last = first + 1;
-    while (last < end && fits(loadOf(first, last + 1)) && loadOf(first, last + 1).parts < mostParts) ++last;
+    while (last < end && fits(loadOf(first, last + 1)) && loadOf(first, last + 1).parts < maxParts) ++last;
     return last;
 }
 

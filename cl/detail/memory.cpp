@@ -8,7 +8,7 @@ namespace {
 
 constexpr std::uint64_t mebibyte = 1 << 20;
 /// What a device keeps from one build to the next, at most.
-constexpr std::uint64_t mostSpareBytes = 128 * mebibyte;
+constexpr std::uint64_t maxSpareBytes = 128 * mebibyte;
 
 std::uint64_t sizeOf(const cl::Buffer& buffer) {
     return buffer.getInfo<CL_MEM_SIZE>();
@@ -53,8 +53,8 @@ void DeviceMemory::keepSpare(const cl::Buffer& buffer) {
     if (buffer.getInfo<CL_MEM_MAP_COUNT>() > 0) return;
     const std::uint64_t bytes = sizeOf(buffer);
     const std::lock_guard lock(device_.mutex);
-    if (bytes > mostSpareBytes) return;
-    if (device_.spareBytes + bytes > mostSpareBytes) clearSpares();
+    if (bytes > maxSpareBytes) return;
+    if (device_.spareBytes + bytes > maxSpareBytes) clearSpares();
     device_.spares.emplace(bytes, buffer);
     device_.spareBytes += bytes;
 }

@@ -24,7 +24,7 @@ namespace {
 constexpr std::size_t groupItems = 64;       // ITEMS of common.cl
 constexpr std::size_t itemsAlongParts = 32;  // along z: they stand side by side in memory
 constexpr cl_int unknownEntry = -3;          // UNKNOWN of resident.cl
-constexpr cl_float mostParts = 16;           // MOST_PARTS of resident.cl
+constexpr cl_float maxParts = 16;            // MOST_PARTS of resident.cl
 constexpr const char* field = "the field";
 
 // `Widths` of resident.cl.
@@ -229,7 +229,7 @@ void ResidentFill::measureClearances() {
     const KernelFrame frame(layout_.frame);
     const glm::ivec3 size = layout_.frame.parts();
     const std::size_t count = std::size_t(size.x) * size.y * size.z;
-    const cl_float far = layout_.frame.findsSurface() ? mostParts * mostParts : 0;
+    const cl_float far = layout_.frame.findsSurface() ? maxParts * maxParts : 0;
     layout_.centres = memory_.allocate(count * sizeof(cl_char), field);
     std::array<cl::Buffer, 2> ways;
     for (cl::Buffer& some : ways) some = memory_.allocate(count * sizeof(cl_float), field);

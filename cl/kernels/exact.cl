@@ -404,8 +404,8 @@ uint linked(SHARED const float* distance, int step) {
     return bitsOf(vloadLanes(0, distance) + vloadLanes(0, distance + step) > 1 + LINK_SLACK);
 }
 
-// Links of sdf/links.h.
-void findLinks(const Share* own, SHARED Block* block) {
+// SignLinks of sdf/links.h.
+void findSignLinks(const Share* own, SHARED Block* block) {
     const uint notLastZ = 0x7f7fu, notLastY = ROWS_AT_ONCE > 1 ? 0xffu : 0u;
     for (int slice = own->firstSlice; slice <= own->lastSlice; ++slice)
         for (int column = own->firstColumn; column <= own->lastColumn; ++column) {
@@ -635,7 +635,7 @@ GROUP_KERNEL void fillBlocks(global const float* points, global const uint* tria
     ulong known = 0;
     for (int x = 0; x < BLOCK_SIDE; ++x) known |= block.known.slice[x];
     if (known == 0) return;
-    if (sign) findLinks(&own, &block);
+    if (sign) findSignLinks(&own, &block);
     MEET;
     if (ITEM == 0) {
         block.open = 0;

@@ -262,14 +262,14 @@ void requireWithin(const SurfacePoints& points, const Bounds& bounds) {
 // Bytes of a type that OpenVDB does not know: other programs hand them on as they are.
 using Bytes = openvdb::UnknownMetadata;
 constexpr const char* meshType = "bilayer_mesh";
-constexpr std::size_t mostMeshBytes = std::size_t(1) << 31;
+constexpr std::size_t maxMeshBytes = std::size_t(1) << 31;
 
 struct MeshHead {
     std::uint64_t hash, points, triangles;
 };
 
 std::size_t bytesOf(const MeshHead& head) {
-    const std::size_t most = mostMeshBytes / sizeof(glm::vec3);  // of either: sums of more would overflow
+    const std::size_t most = maxMeshBytes / sizeof(glm::vec3);  // of either: sums of more would overflow
     if (head.points > most || head.triangles > most) return std::numeric_limits<std::size_t>::max();
     return sizeof(head) + head.points * sizeof(glm::vec3) + head.triangles * sizeof(glm::uvec3);
 }
@@ -277,7 +277,7 @@ std::size_t bytesOf(const MeshHead& head) {
 // A head, three coordinates of each vertex, three vertices of each triangle.
 openvdb::Metadata::Ptr packed(const Mesh& mesh) {
     const MeshHead head{hash(mesh), mesh.points.size(), mesh.triangles.size()};
-    if (bytesOf(head) > mostMeshBytes)
+    if (bytesOf(head) > maxMeshBytes)
         throw std::invalid_argument(
             "the mesh is too large to keep beside its field: leave it out (Body::mesh, --no-mesh)");
     Bytes::ByteVec bytes(bytesOf(head));
@@ -323,10 +323,11 @@ void requireSame(const Bounds& ofMesh, const Bounds& ofBody) {
     if (ofMesh.lower != ofBody.lower || ofMesh.upper != ofBody.upper) refuse("its mesh is of another body");
 }
 
-constexpr std::pair<Measure, const char*> measures[] = {
-    {Measure::samples, "samples"}, {Measure::edges, "edges"}, {Measure::triangles, "triangles"}};
+constexpr std::pair<ContactAccuracy, const char*> measures[] = {{ContactAccuracy::samples, "samples"},
+                                                                {ContactAccuracy::exactNearFeatures, "edges"},
+                                                                {ContactAccuracy::exact, "triangles"}};
 
-Measure measureOf(const std::string& name) {
+ContactAccuracy measureOf(const std::string& name) {
     for (const auto& [measure, itsName] : measures)
         if (name == itsName) return measure;
     refuse(fmt::format("'{}' is {}", entry::measure, name));
@@ -350,8 +351,8 @@ void requireWithin(const Bounds& bounds, const openvdb::FloatGrid& grid) {
 // Whether it can be one of this field.
 void check(const Body& body, const openvdb::FloatGrid& grid) {
     const auto voxel = float(grid.voxelSize()[0]);
-    if (!(body.margin >= 0 && body.margin <= mostMargin * voxel))
-        refuse(fmt::format("'{}' is {}, and must be 0 to {} voxels", entry::margin, body.margin, mostMargin));
+    if (!(body.margin >= 0 && body.margin <= maxMargin * voxel))
+        refuse(fmt::format("'{}' is {}, and must be 0 to {} voxels", entry::margin, body.margin, maxMargin));
     if (body.mass) check(*body.mass, body.bounds, voxel);
     requireWithin(body.points, body.bounds);
     requireWithin(body.bounds, grid);
@@ -377,7 +378,7 @@ LevelSet withBody(const LevelSet& given, const Body& body) {
     if (body.mass) storeMass(*distance, *body.mass);
     if (body.mesh) {
         distance->insertMeta(entry::mesh, *packed(*body.mesh));
-        distance->insertMeta(entry::measure, openvdb::StringMetadata(nameOf(body.measure)));
+        distance->insertMeta(entry::measure, openvdb::StringMetadata(nameOf(body.accuracy)));
     }
     auto grids = std::make_shared<Grids>(levelSet.grids());
     grids->distance = distance;
@@ -398,7 +399,7 @@ Body bodyOf(const LevelSet& levelSet) {
     body.mass = loadMass(entries);
     body.points = pointsOf(levelSet);
     body.mesh = meshOf(levelSet);
-    if (body.mesh) body.measure = measureOf(entries.get<std::string>(entry::measure));
+    if (body.mesh) body.accuracy = measureOf(entries.get<std::string>(entry::measure));
     check(body, *levelSet.grids().distance);
     return body;
 }
@@ -409,7 +410,7 @@ namespace bilayer {
 
 using namespace detail;
 
-const char* nameOf(Measure measure) {
+const char* nameOf(ContactAccuracy measure) {
     for (const auto& [one, name] : measures)
         if (one == measure) return name;
     throw std::invalid_argument("no such measure");

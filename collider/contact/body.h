@@ -19,16 +19,16 @@ struct Body {
     float margin = 0;                    ///< contacts are made up to this distance between surfaces [m]
     std::optional<MassProperties> mass;  ///< nothing where the mesh encloses no volume
     /// All of it facing outward. Null for a body that answers by its field alone, which rounds sharp edges: contacts
-    /// are those of Measure::samples, rays are off by half a voxel at most, and sweeps end up to a voxel and a half
-    /// late.
+    /// are those of ContactAccuracy::samples, rays are off by half a voxel at most, and sweeps end up to a voxel and a
+    /// half late.
     std::shared_ptr<const Mesh> mesh;
-    Measure measure = Measure::samples;  ///< as in ColliderOptions; samples where there is no mesh
+    ContactAccuracy accuracy = ContactAccuracy::samples;  ///< as in ColliderOptions; samples where there is no mesh
     /// The level set to collide by instead of the mesh's own, whose holes have been filled; nothing: its own.
     std::optional<LevelSet> filled;
 };
 
 /// Wider margins are a mistake of units [voxels].
-inline constexpr float mostMargin = 1000;
+inline constexpr float maxMargin = 1000;
 
 /// The level set, to write as a .vdb file, with the body beside it: surface points as a grid of OpenVDB points, the
 /// rest as metadata. Nothing is lost: bodyOf() gives the same bits, but that a body with Body::filled is put beside

@@ -65,10 +65,11 @@ struct Map {
 };
 
 // The touch of a point that comes from outside of the field and goes some way.
-std::optional<Touch> touchOnWay(const Field& field, const glm::vec3& point, const glm::vec3& way) {
+std::optional<SurfaceSample> touchOnWay(const Field& field, const glm::vec3& point, const glm::vec3& way) {
     const auto hit = field.segment(point, point + way);
     if (!hit) return std::nullopt;
-    return Touch{std::max(glm::dot(point - hit->position, hit->normal), 0.f), hit->normal, -glm::dot(way, hit->normal)};
+    return SurfaceSample{std::max(glm::dot(point - hit->position, hit->normal), 0.f), hit->normal,
+                         -glm::dot(way, hit->normal)};
 }
 
 // The surface points of one body in the field of another.
@@ -77,30 +78,30 @@ class PointsInField {
     PointsInField(const Placed& body, const Placed& other, const ContactOptions& options)
         : body_(body),
           other_(other),
-          field_(options.measured ? other.collider.exactField() : other.collider.field()),
+          field_(options.exact ? other.collider.exactField() : other.collider.field()),
           map_(body, other),
           coarse_(map_.inParts(field_)),
-          ways_(body.pose, body.motion, other.pose, other.motion),
+          relativeMotion_(body.pose, body.motion, other.pose, other.motion),
           clearance_(field_.data().coarse),
           options_(options),
           reach_(options.margin / other.scale) {
         const Bounds& bounds = body.collider.bounds();
         centre_ = bounds.centre();
         radius_ = 0.5f * glm::length(bounds.size());
-        sweeps_ =
+        speculative_ =
             longestWay(centre_, radius_) > std::min(reach_, surelyInBand(field_.exteriorWidth(), field_.voxelSize()));
     }
 
     /// Calls found(index, point, touch) for the points within reach of the surface, in it, or on their way to it.
     template <class Found>
-    void visit(NearPoints::List* near, ContactReport& report, Found&& found) {
-        if (!near || sweeps_ || options_.measured) return visitAll(report, found);
+    void visit(CandidateLists::List* near, ContactReport& report, Found&& found) {
+        if (!near || speculative_ || options_.exact) return visitAll(report, found);
         const float voxel = field_.voxelSize();
         // voxels beyond the band have no numbers: a list must not reach that far
-        const float mostSlack =
+        const float maxSlack =
             std::min(voxel, (field_.exteriorWidth() - reach_) / steepestInterpolant - rounding * voxel);
-        const NearPoints::Place now{body_.collider.id(), other_.collider.id(), reach_, map_.linear, map_.shift};
-        if (near->holds(now, centre_, radius_, voxel, mostSlack))
+        const CandidateLists::Place now{body_.collider.id(), other_.collider.id(), reach_, map_.linear, map_.shift};
+        if (near->holds(now, centre_, radius_, voxel, maxSlack))
             visitListed(*near, report, found);
         else if (near->slack() > 0)
             visitAndList(*near, report, found);
@@ -120,7 +121,7 @@ class PointsInField {
 
     /// What a sampler is to find.
     std::optional<PointQuery> query() const {
-        if (sweeps_) return std::nullopt;
+        if (speculative_) return std::nullopt;
         return PointQuery{0, 0, map_.linear, map_.shift, map_.scale, reach_};
     }
 
@@ -129,17 +130,17 @@ class PointsInField {
 
     // Of the points of the body in a ball, at most; in the other one's units.
     float longestWay(const glm::vec3& centre, float radius) const {
-        return ways_.longest(other_.scale * map_(centre), body_.scale * radius) / other_.scale;
+        return relativeMotion_.longest(other_.scale * map_(centre), body_.scale * radius) / other_.scale;
     }
 
     // How far away such points can be that come near.
     float seenFrom(const glm::vec3& centre, float radius) const {
-        return sweeps_ ? reach_ + longestWay(centre, radius) : reach_;
+        return speculative_ ? reach_ + longestWay(centre, radius) : reach_;
     }
 
     // Farther than this nothing of interest can be [parts].
     float keptWithin(float distance) const {
-        return (distance / field_.voxelSize() + mostInterpolationError) / float(Clearance::partSide);
+        return (distance / field_.voxelSize() + maxInterpolationError) / float(Clearance::partSide);
     }
 
     // @param kept  float (centre, radius): how far away points in a ball may be [parts]
@@ -157,7 +158,7 @@ class PointsInField {
         descend(kept, [&](std::uint32_t index, const SurfacePoint& point) {
             const glm::vec3 place = coarse_(point.position);
             const float seen = seenFrom(point.position, 0);
-            const bool isAbove = !options_.measured && clearance_.isAbove(place, seen);  // or beyond the band
+            const bool isAbove = !options_.exact && clearance_.isAbove(place, seen);  // or beyond the band
             if (isAbove || clearance_.isOutside(place, keptWithin(seen))) return;
             const glm::vec3 at = map_(point.position);
             touch(index, point, at, sampleAt(at, report), report, found);
@@ -167,9 +168,9 @@ class PointsInField {
     // Points that could touch before the bodies have moved by the slack: the interpolant then changes by the steepest
     // slope at most, the distance by the slack.
     template <class Found>
-    void visitAndList(NearPoints::List& near, ContactReport& report, Found& found) {
+    void visitAndList(CandidateLists::List& near, ContactReport& report, Found& found) {
         const float slack = near.slack(), above = reach_ + steepestInterpolant * slack, within = reach_ + slack,
-                    beside = within + mostInterpolationError * field_.voxelSize(), kept = keptWithin(within);
+                    beside = within + maxInterpolationError * field_.voxelSize(), kept = keptWithin(within);
         descend([&](const glm::vec3&, float) { return kept; },
                 [&](std::uint32_t index, const SurfacePoint& point) {
                     const glm::vec3 place = coarse_(point.position);
@@ -183,7 +184,7 @@ class PointsInField {
     }
 
     template <class Found>
-    void visitListed(const NearPoints::List& near, ContactReport& report, Found& found) {
+    void visitListed(const CandidateLists::List& near, ContactReport& report, Found& found) {
         const auto points = body_.collider.data().points().points();
         for (const std::uint32_t index : near.points()) {
             const SurfacePoint& point = points[index];
@@ -207,11 +208,11 @@ class PointsInField {
         }
         const auto here = sample.distance <= reach_ ? touchAt(at, sample, reach_) : std::nullopt;
         if (here && here->distance <= reach_) {
-            Touch touched = point.isSharp && here->distance <= 0 ? opposed(point, at, *here) : *here;
-            if (sweeps_) touched.approach = approachOf(point, at, touched);
+            SurfaceSample touched = point.isSharp && here->distance <= 0 ? opposed(point, at, *here) : *here;
+            if (speculative_) touched.approach = approachOf(point, at, touched);
             found(index, point, touched);
             if (point.isSharp) followEdges(index, at, *here, found);
-        } else if (sweeps_) {
+        } else if (speculative_) {
             const glm::vec3 way = wayOf(at);
             if (sample.distance > glm::length(way) || !meets(point, at, way)) return;
             if (const auto touched = touchOnWay(field_, at, way)) found(index, point, *touched);
@@ -219,32 +220,32 @@ class PointsInField {
     }
 
     // Beyond the band up to `most`, where that is asked for.
-    std::optional<Touch> touchAt(const glm::vec3& at, const Sample& sample, float most) const {
+    std::optional<SurfaceSample> touchAt(const glm::vec3& at, const Sample& sample, float most) const {
         if (sample.inBand)
-            return touchInBand(field_, at, sample, other_.collider.data().asksTriangles(at, options_.measured));
-        if (!options_.measured || sample.distance < 0) return std::nullopt;
+            return surfaceSampleAt(field_, at, sample, other_.collider.data().isExactAt(at, options_.exact));
+        if (!options_.exact || sample.distance < 0) return std::nullopt;
         const ClosestPoint closest = field_.closest(at, most);
         if (!closest.found) return std::nullopt;
-        return Touch{closest.distance, directionOf(closest, at, field_.voxelSize())};
+        return SurfaceSample{closest.distance, directionOf(closest, at, field_.voxelSize())};
     }
 
     // A tip, ridge or corner within the other body that opposes no surface there, a medial axis included: the one that
     // it opposes a bit back along its own normal, if that is outside.
-    Touch opposed(const SurfacePoint& point, const glm::vec3& at, const Touch& here) const {
+    SurfaceSample opposed(const SurfacePoint& point, const glm::vec3& at, const SurfaceSample& here) const {
         const glm::vec3 normal = map_.turned(point.normal);
-        const auto opposition = [&](const Touch& touch) { return -glm::dot(touch.normal, normal); };
-        if (keeps(options_, opposition(here), false)) return here;
+        const auto normalFilter = [&](const SurfaceSample& touch) { return -glm::dot(touch.normal, normal); };
+        if (keeps(options_, normalFilter(here), false)) return here;
         const float back = lift * field_.voxelSize();
         const glm::vec3 outside = at - back * normal;
         const Sample sample = field_.sample(outside);
         if (!sample.inBand) return here;
-        const Touch there =
-            touchInBand(field_, outside, sample, other_.collider.data().asksTriangles(outside, options_.measured));
-        if (!(there.distance > 0) || !keeps(options_, opposition(there), false)) return here;
-        return {std::min(there.distance - back * opposition(there), 0.f), there.normal};
+        const SurfaceSample there =
+            surfaceSampleAt(field_, outside, sample, other_.collider.data().isExactAt(outside, options_.exact));
+        if (!(there.distance > 0) || !keeps(options_, normalFilter(there), false)) return here;
+        return {std::min(there.distance - back * normalFilter(there), 0.f), there.normal};
     }
 
-    float approachOf(const SurfacePoint& point, const glm::vec3& at, const Touch& touched) const {
+    float approachOf(const SurfacePoint& point, const glm::vec3& at, const SurfaceSample& touched) const {
         const glm::vec3 way = wayOf(at);
         const float approach = -glm::dot(way, touched.normal);
         return approach > 0 && (touched.distance <= 0 || meets(point, at, way)) ? approach : 0;
@@ -260,7 +261,7 @@ class PointsInField {
 
     // Where edges go deeper from a point that touches before they come up to the next one.
     template <class Found>
-    void followEdges(std::uint32_t index, const glm::vec3& at, const Touch& here, Found& found) const {
+    void followEdges(std::uint32_t index, const glm::vec3& at, const SurfaceSample& here, Found& found) const {
         const SharpEdges& edges = body_.collider.data().edges();
         for (const std::uint32_t e : edges.around(index)) {
             const SharpEdge& edge = edges.edges()[e];
@@ -276,7 +277,7 @@ class PointsInField {
             const Slope from{0, here.distance, glm::dot(here.normal, along)},
                 to{length, there->distance, glm::dot(there->normal, along)};
             if (!fallsBetween(from, to) && !mayKinkBetween(from, to)) continue;
-            if (const auto touched = deepestOf(at, end, along, from, to, edge.wings)) {
+            if (const auto touched = deepestOf(at, end, along, from, to, edge.conormals)) {
                 const float part = touched->first / length;
                 const SurfacePoint &a = pointOf(index), &b = pointOf(next);
                 const SurfacePoint between{glm::mix(a.position, b.position, part), glm::normalize(a.normal + b.normal),
@@ -287,8 +288,9 @@ class PointsInField {
     }
 
     // How far along an edge the deepest place is, and how it touches.
-    std::optional<std::pair<float, Touch>> deepestOf(const glm::vec3& at, const glm::vec3& end, const glm::vec3& along,
-                                                     const Slope& from, const Slope& to, const Wings& wings) const {
+    std::optional<std::pair<float, SurfaceSample>> deepestOf(const glm::vec3& at, const glm::vec3& end,
+                                                             const glm::vec3& along, const Slope& from, const Slope& to,
+                                                             const Conormals& conormals) const {
         const auto touchOn = [&](float way) {
             const glm::vec3 place = at + way * along;
             return touchAt(place, field_.sample(place), reach_ + to.place);
@@ -307,12 +309,12 @@ class PointsInField {
         if (!touched) return std::nullopt;
 
         const glm::vec3 place = at + lowest->place * along;
-        const Wings seen{map_.turned(wings[0]), map_.turned(wings[1])};
+        const Conormals seen{map_.turned(conormals[0]), map_.turned(conormals[1])};
         if (const auto crossing = other_.collider.data().edges().crossing(
                 other_.collider.data().points(), at, end, seen, place, touched->distance, field_.voxelSize())) {
             if (crossing->distance > reach_) return std::nullopt;
             const glm::vec3 onEdge = crossing->position + crossing->distance * crossing->normal;
-            return std::pair(glm::dot(onEdge - at, along), Touch{crossing->distance, crossing->normal});
+            return std::pair(glm::dot(onEdge - at, along), SurfaceSample{crossing->distance, crossing->normal});
         }
         if (!falls) return std::nullopt;
         const float aside = 2 * searchTolerance * field_.voxelSize();
@@ -323,22 +325,23 @@ class PointsInField {
 
     const SurfacePoint& pointOf(std::uint32_t index) const { return body_.collider.data().points().points()[index]; }
 
-    glm::vec3 wayOf(const glm::vec3& at) const { return ways_.of(other_.scale * at) / other_.scale; }
+    glm::vec3 wayOf(const glm::vec3& at) const { return relativeMotion_.of(other_.scale * at) / other_.scale; }
 
     const Placed &body_, &other_;
     const Field& field_;
     Map map_, coarse_;
-    RelativeWays ways_;
+    RelativeMotion relativeMotion_;
     Clearance clearance_;
     ContactOptions options_;
     float reach_;
     glm::vec3 centre_;  // of a ball around the body
     float radius_;
-    bool sweeps_;  // whether any point moves farther than contacts are found for sure
+    bool speculative_;  // whether any point moves farther than contacts are found for sure
 };
 
 // Outward of `other`, in the world; where its field tells none, against the surface of the body that touches it.
-glm::vec3 outwardNormal(const Placed& other, const Touch& touch, const Placed& body, const SurfacePoint& point) {
+glm::vec3 outwardNormal(const Placed& other, const SurfaceSample& touch, const Placed& body,
+                        const SurfacePoint& point) {
     return touch.normal == glm::vec3(0) ? -(body.pose.rotation * point.normal) : other.pose.rotation * touch.normal;
 }
 
@@ -348,7 +351,7 @@ glm::vec3 normalNear(const Placed& body, const glm::vec3& place) {
     const Field& field = body.collider.field();
     const Sample sample = field.sample(at);
     if (!sample.inBand) return glm::vec3(0);
-    return body.pose.rotation * touchInBand(field, at, sample, body.collider.data().asksTriangles(at)).normal;
+    return body.pose.rotation * surfaceSampleAt(field, at, sample, body.collider.data().isExactAt(at)).normal;
 }
 
 // The contacts of A's points in B's field, then of B's in A's, of those that the visits find.
@@ -357,26 +360,26 @@ ContactReport addContacts(const Placed& a, const Placed& b, const ContactOptions
                           std::vector<Contact>& contacts, VisitA&& visitA, VisitB&& visitB) {
     ContactReport report;
     const auto opposes = [&](const glm::vec3& normal, const Placed& body, const Placed& other,
-                             const SurfacePoint& point, const Touch& touch) {
+                             const SurfacePoint& point, const SurfaceSample& touch) {
         const bool apart = touch.distance > 0 && !point.isSharp;
         const glm::vec3 own = body.pose.rotation * point.normal;
-        if (!keeps(options, normal, own, body.motion.turn - other.motion.turn, apart)) return false;
-        if (options.keepsEdgesAslant || !apart || touch.approach > 0) return true;
-        return !looksAtEdge(body.pose.toWorld(body.scale * point.position), own, touch.distance * other.scale, normal,
-                            [&](const glm::vec3& place) { return normalNear(other, place); });
+        if (!keeps(options, normal, own, body.motion.rotation - other.motion.rotation, apart)) return false;
+        if (options.keepsObliqueEdges || !apart || touch.approach > 0) return true;
+        return !seesEdgeObliquely(body.pose.toWorld(body.scale * point.position), own, touch.distance * other.scale,
+                                  normal, [&](const glm::vec3& place) { return normalNear(other, place); });
     };
     // of points, not of places between them
     const auto turningRadiusOf = [](const Placed& body, std::uint32_t feature) {
         return feature < body.collider.data().points().points().size() ? 0.f : -1.f;
     };
-    const auto addOfA = [&](std::uint32_t index, const SurfacePoint& point, const Touch& touch) {
+    const auto addOfA = [&](std::uint32_t index, const SurfacePoint& point, const SurfaceSample& touch) {
         const glm::vec3 normal = outwardNormal(b, touch, a, point);
         if (!opposes(normal, a, b, point, touch)) return;
         const float distance = touch.distance * b.scale;
         contacts.push_back({a.pose.toWorld(a.scale * point.position) - distance * normal, normal, distance, index,
                             touch.approach * b.scale, turningRadiusOf(a, index)});
     };
-    const auto addOfB = [&](std::uint32_t index, const SurfacePoint& point, const Touch& touch) {
+    const auto addOfB = [&](std::uint32_t index, const SurfacePoint& point, const SurfaceSample& touch) {
         const glm::vec3 normal = outwardNormal(a, touch, b, point);
         if (!opposes(normal, b, a, point, touch)) return;
         contacts.push_back({b.pose.toWorld(b.scale * point.position), -normal, touch.distance * a.scale,
@@ -477,21 +480,21 @@ namespace bilayer {
 
 using namespace detail;
 
-ContactCache::ContactCache() : data_(std::make_unique<NearPoints>()) {}
+ContactCache::ContactCache() : data_(std::make_unique<CandidateLists>()) {}
 ContactCache::~ContactCache() = default;
 ContactCache::ContactCache(ContactCache&&) noexcept = default;
 ContactCache& ContactCache::operator=(ContactCache&&) noexcept = default;
 
 ContactReport collide(const Placed& a, const Placed& b, const ContactOptions& options, std::vector<Contact>& contacts,
                       ContactCache* cache) {
-    const auto visit = [](NearPoints::List* list) {
+    const auto visit = [](CandidateLists::List* list) {
         return
             [=](PointsInField points, ContactReport& report, const auto& found) { points.visit(list, report, found); };
     };
     const std::size_t first = contacts.size();
     const ContactReport report = addContacts(a, b, options, contacts, visit(cache ? &cache->data().ofA : nullptr),
                                              visit(cache ? &cache->data().ofB : nullptr));
-    if (options.measured) settle(std::span(contacts).subspan(first), a, b);
+    if (options.exact) settle(std::span(contacts).subspan(first), a, b);
     return report;
 }
 

@@ -25,15 +25,15 @@ struct ColliderData {
     const Field& exactField() const;
     /// Whether contacts ask the triangles at a point of the body's coordinates [m], by Body::measure.
     /// @param measured  as in ContactOptions
-    bool asksTriangles(const glm::vec3& point, bool measured = false) const {
-        if (measured || body.measure == Measure::triangles) return body.mesh != nullptr;
-        return strays.hold(point);
+    bool isExactAt(const glm::vec3& point, bool measured = false) const {
+        if (measured || body.accuracy == ContactAccuracy::exact) return body.mesh != nullptr;
+        return errorMask.hold(point);
     }
     const SharpEdges& edges() const { return sharpEdges; }
 
     const Body body;
     const Field field;
-    const Strays strays;
+    const InterpolationErrorMask errorMask;
     const SharpEdges sharpEdges;
     const std::uint64_t id;
 

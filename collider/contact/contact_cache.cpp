@@ -8,18 +8,18 @@ namespace bilayer::detail {
 namespace {
 
 // Slack of a list: a longer one holds for more steps, and holds more points.
-constexpr float leastSlack = 0.25f;  // [voxels]
-constexpr float stepsThatHold = 8;   // that a list should hold
-constexpr float rounding = 1e-5f;    // of places, in parts of the lengths that they come from
+constexpr float minSlack = 0.25f;   // [voxels]
+constexpr float stepsThatHold = 8;  // that a list should hold
+constexpr float rounding = 1e-5f;   // of places, in parts of the lengths that they come from
 const float halfRoot = std::sqrt(0.5f);
 
-bool sameBodies(const NearPoints::Place& a, const NearPoints::Place& b) {
+bool sameBodies(const CandidateLists::Place& a, const CandidateLists::Place& b) {
     return a.body == b.body && a.other == b.other && a.reach == b.reach;
 }
 
 // How far any point of a ball has moved from one place to another, at most. The difference of two rotations stretches
 // by their angle's sine in a plane and not at all across it: by its Frobenius norm over the root of two.
-float moved(const NearPoints::Place& from, const NearPoints::Place& to, const glm::vec3& centre, float radius) {
+float moved(const CandidateLists::Place& from, const CandidateLists::Place& to, const glm::vec3& centre, float radius) {
     const glm::mat3 turn = to.linear - from.linear;
     const float norm2 = glm::dot(turn[0], turn[0]) + glm::dot(turn[1], turn[1]) + glm::dot(turn[2], turn[2]);
     const glm::vec3 way = turn * centre + (to.shift - from.shift);
@@ -29,13 +29,13 @@ float moved(const NearPoints::Place& from, const NearPoints::Place& to, const gl
 
 }  // namespace
 
-bool NearPoints::List::holds(const Place& now, const glm::vec3& centre, float radius, float voxel, float mostSlack) {
+bool CandidateLists::List::holds(const Place& now, const glm::vec3& centre, float radius, float voxel, float maxSlack) {
     const bool same = sameBodies(now, last_);
-    const float step = same ? moved(last_, now, centre, radius) : mostSlack;
+    const float step = same ? moved(last_, now, centre, radius) : maxSlack;
     last_ = now;
     if (same && slack_ > 0 && moved(listed_, now, centre, radius) <= slack_) return true;
-    slack_ = std::max(leastSlack * voxel, stepsThatHold * step);
-    if (!(slack_ <= mostSlack)) slack_ = 0;
+    slack_ = std::max(minSlack * voxel, stepsThatHold * step);
+    if (!(slack_ <= maxSlack)) slack_ = 0;
     listed_ = now;
     points_.clear();
     return false;

@@ -14,7 +14,7 @@ namespace bilayer::detail {
 /// Physical Review 159 (1967)). One for each pair of bodies: collide() finds the same contacts with it as without, but
 /// bodies that rest on each other cost little more than the contacts that they have, and those that rest beside each
 /// other next to nothing.
-struct NearPoints {
+struct CandidateLists {
     /// Where the points of one body are in the coordinates of the other.
     struct Place {
         std::uint64_t body = 0, other = 0;  ///< Collider::id()
@@ -29,8 +29,8 @@ struct NearPoints {
         /// Whether the points that can touch are among those listed.
         /// @param centre, radius  of a ball around the body, in its own coordinates [m]
         /// @param voxel           of the other body's field [m]
-        /// @param mostSlack       that a list may have [m]
-        bool holds(const Place& now, const glm::vec3& centre, float radius, float voxel, float mostSlack);
+        /// @param maxSlack       that a list may have [m]
+        bool holds(const Place& now, const glm::vec3& centre, float radius, float voxel, float maxSlack);
 
         /// How far the bodies may move until a new list no longer holds [m]; 0: they move too fast for one. Asked for
         /// after holds() has said no.

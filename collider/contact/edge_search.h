@@ -17,15 +17,15 @@ struct Slope {
 /// Whether a function may have a kink between two places or close to one of them, as where an edge crosses another that
 /// the interpolant has rounded off. Slopes are of distances.
 inline bool mayKinkBetween(const Slope& from, const Slope& to) {
-    constexpr float leastTurn = 0.1f;
+    constexpr float minRotation = 0.1f;
     constexpr float rounded = 0.5f;  // the slope that may be left at the kink itself
-    return to.slope - from.slope > leastTurn && from.slope < rounded && to.slope > -rounded;
+    return to.slope - from.slope > minRotation && from.slope < rounded && to.slope > -rounded;
 }
 
 /// Whether it falls from either into a valley, by more than rounding makes of a plane.
 inline bool fallsBetween(const Slope& from, const Slope& to) {
-    constexpr float leastSlope = 0.02f;
-    return from.slope < -leastSlope && to.slope > leastSlope;
+    constexpr float minSlope = 0.02f;
+    return from.slope < -minSlope && to.slope > minSlope;
 }
 
 /// The lowest place between two where the function falls from the first and rises to the second, as where an edge
@@ -37,11 +37,11 @@ inline bool fallsBetween(const Slope& from, const Slope& to) {
 /// @param at  (place) -> std::optional<Slope>; nothing where the function is not known: the search then gives up
 template <class Function>
 std::optional<Slope> lowestBetween(Slope from, Slope to, float tolerance, Function&& at) {
-    constexpr int mostQueries = 7;
+    constexpr int maxQueries = 7;
     constexpr float flat = 0.01f;        // slopes below lead nowhere
     constexpr float nearestEnd = 0.02f;  // no place is asked for nearer to the ends of a piece than this part of it
     Slope best = from.value < to.value ? from : to;
-    for (int i = 0; i < mostQueries; ++i) {
+    for (int i = 0; i < maxQueries; ++i) {
         const float width = to.place - from.place, turn = to.slope - from.slope;
         if (!(turn > 0)) break;
         const bool tangents = i % 2 == 0;
@@ -62,30 +62,31 @@ std::optional<Slope> lowestBetween(Slope from, Slope to, float tolerance, Functi
 /// shorter way. Else across the face that looks least along the edge. Nothing where all look along it.
 /// @param along  the edge's direction, of unit length
 /// @param before, after  touches very close to the place on either side, where they are known
-inline std::optional<Touch> acrossEdge(const glm::vec3& along, const Touch& here, const std::optional<Touch>& before,
-                                       const std::optional<Touch>& after) {
-    constexpr float leastAcross = 0.3f;  // cosine between the normal and its part across
-    constexpr float leastRidge = 0.05f;  // sine between two faces that are not one
-    constexpr float mostDeeper = 1.5f;
-    std::optional<Touch> held;
-    float most = leastAcross;
+inline std::optional<SurfaceSample> acrossEdge(const glm::vec3& along, const SurfaceSample& here,
+                                               const std::optional<SurfaceSample>& before,
+                                               const std::optional<SurfaceSample>& after) {
+    constexpr float minAcross = 0.3f;  // cosine between the normal and its part across
+    constexpr float minRidge = 0.05f;  // sine between two faces that are not one
+    constexpr float maxDeeper = 1.5f;
+    std::optional<SurfaceSample> held;
+    float most = minAcross;
     for (const auto& touch : {std::optional(here), before, after}) {
         if (!touch) continue;
         const glm::vec3 across = touch->normal - glm::dot(touch->normal, along) * along;
         const float length = glm::length(across);
         if (!(length > most)) continue;
         most = length;
-        held = Touch{touch->distance, across / length};
+        held = SurfaceSample{touch->distance, across / length};
     }
     if (!held || !before || !after) return held;
     const glm::vec3 &a = before->normal, &b = after->normal;
     const float fall = -glm::dot(a, along), rise = glm::dot(b, along);
-    if (!(fall > 0 && rise > 0 && glm::length(glm::cross(a, b)) > leastRidge)) return held;
+    if (!(fall > 0 && rise > 0 && glm::length(glm::cross(a, b)) > minRidge)) return held;
     // square to the edge and to the ridge
     const glm::vec3 over = rise * a + fall * b;
     const float length = glm::length(over);
-    const float deeper = std::fmin((fall + rise) / length, mostDeeper);
-    return Touch{here.distance < 0 ? deeper * here.distance : here.distance, over / length};
+    const float deeper = std::fmin((fall + rise) / length, maxDeeper);
+    return SurfaceSample{here.distance < 0 ? deeper * here.distance : here.distance, over / length};
 }
 
 }  // namespace bilayer::detail

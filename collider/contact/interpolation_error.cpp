@@ -21,11 +21,11 @@ constexpr std::uint64_t isMeasured = 1, isStray = 2;
 
 }  // namespace
 
-Strays::Strays(const Field& field)
+InterpolationErrorMask::InterpolationErrorMask(const Field& field)
     : field_(std::make_shared<const Field>(field)),
       known_(new std::atomic<std::uint64_t>[wordsPerBlock * field.data().stored]()) {}
 
-bool Strays::hold(const glm::vec3& point) const noexcept {
+bool InterpolationErrorMask::hold(const glm::vec3& point) const noexcept {
     if (!field_) return false;
     const FieldLayout& layout = field_->data();
     const glm::dvec3 local = (glm::dvec3(point) - layout.origin) * layout.perMetre;
@@ -46,7 +46,7 @@ bool Strays::hold(const glm::vec3& point) const noexcept {
     return bits & isStray;
 }
 
-bool Strays::areAt(const glm::ivec3& cell) const noexcept {
+bool InterpolationErrorMask::areAt(const glm::ivec3& cell) const noexcept {
     for (int i = 0; i < places * places * places; ++i) {
         const glm::ivec3 place(i / (places * places), i / places % places, i % places);
         if (isOff(glm::dvec3(cell) + (glm::dvec3(place) + 0.5) / double(places))) return true;
@@ -55,13 +55,13 @@ bool Strays::areAt(const glm::ivec3& cell) const noexcept {
 }
 
 // At a place in voxels from the layout's origin.
-bool Strays::isOff(const glm::dvec3& local) const noexcept {
+bool InterpolationErrorMask::isOff(const glm::dvec3& local) const noexcept {
     const FieldLayout& layout = field_->data();
     const float voxel = field_->voxelSize();
     const glm::vec3 place(local * layout.voxel + layout.origin);
     const Sample sample = field_->sample(place);
     if (!sample.inBand) return false;
-    const ClosestPoint closest = field_->closest(place, std::abs(sample.distance) + mostInterpolationError * voxel);
+    const ClosestPoint closest = field_->closest(place, std::abs(sample.distance) + maxInterpolationError * voxel);
     return !(std::abs(closest.distance - sample.distance) <= tolerance * voxel);
 }
 

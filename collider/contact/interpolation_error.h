@@ -14,12 +14,12 @@ namespace bilayer::detail {
 /// the mesh by more than a tenth of a voxel in one of 27 places: elsewhere it may be off by little more. A cell is
 /// measured when it is first asked for, which takes some microseconds; the answer depends on nothing but the cell.
 /// Copies share what they know. Safe from any thread.
-class Strays {
+class InterpolationErrorMask {
   public:
-    Strays() = default;  ///< none
+    InterpolationErrorMask() = default;  ///< none
 
     /// Of a field with its mesh. Takes 128 bytes a stored block.
-    explicit Strays(const Field& field);
+    explicit InterpolationErrorMask(const Field& field);
 
     /// Whether a point is in such a cell, in the field's coordinates [m].
     bool hold(const glm::vec3& point) const noexcept;

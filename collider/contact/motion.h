@@ -8,28 +8,29 @@
 
 namespace bilayer::detail {
 
-/// The ways of a body's points as another body sees them, in that one's coordinates [m].
-class RelativeWays {
+/// How the points of a body move as another body sees them, in that one's coordinates [m].
+class RelativeMotion {
   public:
-    RelativeWays(const Pose& body, const Motion& motion, const Pose& seenFrom, const Motion& its) {
+    RelativeMotion(const Pose& body, const Motion& motion, const Pose& seenFrom, const Motion& its) {
         const glm::quat into = glm::conjugate(seenFrom.rotation);
-        way_ = into * (motion.way - its.way + glm::cross(motion.turn, seenFrom.position - body.position));
-        turn_ = into * (motion.turn - its.turn);
+        displacement_ = into * (motion.displacement - its.displacement +
+                                glm::cross(motion.rotation, seenFrom.position - body.position));
+        rotation_ = into * (motion.rotation - its.rotation);
     }
 
     /// Of the body's point that is at `point` now.
-    glm::vec3 of(const glm::vec3& point) const { return way_ + glm::cross(turn_, point); }
+    glm::vec3 of(const glm::vec3& point) const { return displacement_ + glm::cross(rotation_, point); }
 
     /// Of the body, as the other one sees it [rad].
-    const glm::vec3& turn() const { return turn_; }
+    const glm::vec3& rotation() const { return rotation_; }
 
-    /// The longest way of a point in a sphere, at most.
+    /// An upper bound of the displacement of points in a sphere.
     float longest(const glm::vec3& centre, float radius) const {
-        return glm::length(of(centre)) + radius * glm::length(turn_);
+        return glm::length(of(centre)) + radius * glm::length(rotation_);
     }
 
   private:
-    glm::vec3 way_, turn_;
+    glm::vec3 displacement_, rotation_;
 };
 
 }  // namespace bilayer::detail

@@ -9,9 +9,9 @@ namespace bilayer::detail {
 
 /// Whether a contact is kept that looks against its point's normal by this cosine.
 /// @param apart  its point is of a face that does not touch yet
-inline bool keeps(const ContactOptions& options, float opposition, bool apart) {
-    return opposition >=
-           (apart ? std::max(options.leastOppositionApart, options.leastOpposition) : options.leastOpposition);
+inline bool keeps(const ContactOptions& options, float normalFilter, bool apart) {
+    return normalFilter >=
+           (apart ? std::max(options.minNormalCosineApart, options.minNormalCosine) : options.minNormalCosine);
 }
 /// The same where the point turns with its body, and looks against the surface now, later or in between.
 /// @param seen, normal  of the surface, outward, and of the point

@@ -16,14 +16,14 @@ constexpr float farthestNeighbour = 4.5f;
 // Of two neighbours in about the same direction the nearer one counts: cosine of 60 degrees.
 constexpr float sameDirection = 0.5f;
 // An edge runs square to the normals at its ends, but for corners: a cube's have 0.58.
-constexpr float leastSquare = 0.7f;
+constexpr float minSquare = 0.7f;
 // The interpolant rounds sharp edges off by up to this much [voxels]; farther away there is a groove between the two.
 constexpr float onSurface = 0.45f;
 // A piece may lie above the edge between its ends, as around a hole, by no more than this [voxels].
-constexpr float mostAbove = 0.05f;
-constexpr std::size_t mostNeighbours = 6;
+constexpr float maxAbove = 0.05f;
+constexpr std::size_t maxNeighbours = 6;
 // Edges that cross at a smaller angle (sine) are parallel: their points tell enough.
-constexpr float leastCrossing = 0.2f;
+constexpr float minCrossing = 0.2f;
 // A crossing lies so near to the deepest place that the field shows, which rounds edges off [voxels].
 constexpr float crossingWithin = 1.5f;
 // It is no deeper than so many times what the field shows, across faces instead of both edges, or than so much more
@@ -31,17 +31,17 @@ constexpr float crossingWithin = 1.5f;
 constexpr float deepestAcross = 1.5f, deepestUnseen = 1, deepestAcrossExact = 2, deepestUnseenExact = 0.25f;
 // Faces leave the plane between two edges at this angle (sine) at least: faces that lie on each other touch by their
 // points.
-constexpr float leastLeaving = 0.09f;
+constexpr float minLeaving = 0.09f;
 // What is seen at a smaller angle (sine) than this lies level.
 constexpr float level = 0.09f;
 // The mean way along the edges around a point: longer where they are bent by more than ten degrees.
-constexpr float leastBend = 0.0872f;
+constexpr float minBend = 0.0872f;
 // Faces are looked for so far beside their edge [voxels].
 constexpr float wingSpan = 1.5f;
 // Pieces of an edge end within this of each other, as parts of their length.
 constexpr float gap = 0.02f;
 // Fewer points than these, as near as neighbours, do not go around one.
-constexpr int leastAround = 3;
+constexpr int minAround = 3;
 
 struct Neighbour {
     std::uint32_t index;
@@ -65,7 +65,7 @@ std::vector<Neighbour> neighboursOf(std::uint32_t index, const SurfacePoints& po
                 std::max(std::abs(glm::dot(direction, point.normal)), std::abs(glm::dot(direction, there.normal)));
             // how far an arc with these normals lies below the piece: a quarter of its ends' heights over each other
             const float above = 0.125f * (glm::dot(way, point.normal) - glm::dot(way, there.normal));
-            if (aslant < leastSquare && above <= mostAbove * field.voxelSize())
+            if (aslant < minSquare && above <= maxAbove * field.voxelSize())
                 near.push_back({other, direction, distance});
         });
     std::sort(near.begin(), near.end(), [](const Neighbour& a, const Neighbour& b) {
@@ -74,7 +74,7 @@ std::vector<Neighbour> neighboursOf(std::uint32_t index, const SurfacePoints& po
     std::vector<Neighbour> kept;
     for (const Neighbour& next : near) {
         const auto hides = [&](const Neighbour& k) { return glm::dot(k.direction, next.direction) > sameDirection; };
-        if (kept.size() == mostNeighbours) break;
+        if (kept.size() == maxNeighbours) break;
         if (std::any_of(kept.begin(), kept.end(), hides)) continue;
         const glm::vec3 middle = 0.5f * (point.position + points.points()[next.index].position);
         if (std::abs(field.sample(middle).distance) <= onSurface * field.voxelSize()) kept.push_back(next);
@@ -83,7 +83,7 @@ std::vector<Neighbour> neighboursOf(std::uint32_t index, const SurfacePoints& po
 }
 
 /// By the surface beside the middle of an edge.
-Wings wingsOf(const SurfacePoint& a, const SurfacePoint& b, const Field& field) {
+Conormals wingsOf(const SurfacePoint& a, const SurfacePoint& b, const Field& field) {
     const glm::vec3 along = glm::normalize(b.position - a.position), middle = 0.5f * (a.position + b.position);
     const glm::vec3 aside = glm::normalize(glm::cross(along, a.normal + b.normal));
     const auto wing = [&](float side) {
@@ -126,7 +126,7 @@ SharpEdges::SharpEdges(const SurfacePoints& points, const Field& field)
         ofPoints_[next[edges_[e].from]++] = e, ofPoints_[next[edges_[e].to]++] = e;
 }
 
-bool SharpEdges::isTip(const SurfacePoints& points, std::uint32_t point, const glm::vec3& direction) const {
+bool SharpEdges::isConvexVertex(const SurfacePoints& points, std::uint32_t point, const glm::vec3& direction) const {
     return pointsFallBack(points, point, direction) || edgesFallBack(points, point, direction);
 }
 
@@ -136,7 +136,7 @@ bool SharpEdges::isWithinEdge(const SurfacePoints& points, std::uint32_t point) 
         const std::uint32_t next = edges_[e].from == point ? edges_[e].to : edges_[e].from;
         sum += glm::normalize(points.points()[next].position - points.points()[point].position);
     }
-    return !around(point).empty() && glm::length(sum) <= leastBend * float(around(point).size());
+    return !around(point).empty() && glm::length(sum) <= minBend * float(around(point).size());
 }
 
 bool SharpEdges::edgesFallBack(const SurfacePoints& points, std::uint32_t point, const glm::vec3& direction) const {
@@ -144,8 +144,8 @@ bool SharpEdges::edgesFallBack(const SurfacePoints& points, std::uint32_t point,
         const SharpEdge& edge = edges_[e];
         const std::uint32_t next = edge.from == point ? edge.to : edge.from;
         const glm::vec3 way = points.points()[next].position - points.points()[point].position;
-        return glm::dot(way, direction) <= level * glm::length(way) && glm::dot(edge.wings[0], direction) <= level &&
-               glm::dot(edge.wings[1], direction) <= level;
+        return glm::dot(way, direction) <= level * glm::length(way) &&
+               glm::dot(edge.conormals[0], direction) <= level && glm::dot(edge.conormals[1], direction) <= level;
     };
     const auto its = around(point);
     return !its.empty() && std::all_of(its.begin(), its.end(), fallsBack);
@@ -164,11 +164,11 @@ bool SharpEdges::pointsFallBack(const SurfacePoints& points, std::uint32_t point
                      ++found;
                      fallBack = fallBack && glm::dot(way, direction) <= level * distance;
                  });
-    return fallBack && found >= leastAround;
+    return fallBack && found >= minAround;
 }
 
 std::optional<SharpEdges::Crossing> SharpEdges::crossing(const SurfacePoints& points, const glm::vec3& from,
-                                                         const glm::vec3& to, const Wings& wings,
+                                                         const glm::vec3& to, const Conormals& conormals,
                                                          const glm::vec3& place, float distance,
                                                          float voxelSize) const {
     if (edges_.empty()) return std::nullopt;
@@ -182,7 +182,7 @@ std::optional<SharpEdges::Crossing> SharpEdges::crossing(const SurfacePoints& po
         const SurfacePoint &a = points.points()[edge.from], &b = points.points()[edge.to];
         const glm::vec3 its = b.position - a.position, across = glm::cross(along, its);
         const float area = glm::length(across);
-        if (area < leastCrossing * glm::length(along) * glm::length(its)) return;
+        if (area < minCrossing * glm::length(along) * glm::length(its)) return;
         // Where either line passes the other one.
         const glm::vec3 offset = a.position - from;
         const float onOther = glm::dot(glm::cross(offset, its), across) / (area * area);
@@ -193,7 +193,8 @@ std::optional<SharpEdges::Crossing> SharpEdges::crossing(const SurfacePoints& po
         const glm::vec3 normal = (glm::dot(across, a.normal + b.normal) < 0 ? -1.f : 1.f) / area * across;
         if (away > nearest) return;
         for (int i = 0; i < 2; ++i)
-            if (glm::dot(normal, edge.wings[i]) > -leastLeaving || glm::dot(normal, wings[i]) < leastLeaving) return;
+            if (glm::dot(normal, edge.conormals[i]) > -minLeaving || glm::dot(normal, conormals[i]) < minLeaving)
+                return;
         const float distance = glm::dot(there - here, normal);
         if (distance < least) return;
         nearest = away;

@@ -14,12 +14,12 @@
 namespace bilayer::detail {
 
 /// Directions from an edge into the faces on either side, square to it, of unit length.
-using Wings = std::array<glm::vec3, 2>;
+using Conormals = std::array<glm::vec3, 2>;
 
 /// Between two sharp surface points, by their indices.
 struct SharpEdge {
     std::uint32_t from, to;
-    Wings wings;
+    Conormals conormals;
 };
 
 /// Found from the points and the field alone, so that a body from a file has the same. Pieces join each sharp point to
@@ -43,7 +43,7 @@ class SharpEdges {
     /// what comes against it meets this point first. What is square to the direction, to within about five degrees, is
     /// met at once.
     /// @param direction  outward, of unit length
-    bool isTip(const SurfacePoints& points, std::uint32_t point, const glm::vec3& direction) const;
+    bool isConvexVertex(const SurfacePoints& points, std::uint32_t point, const glm::vec3& direction) const;
 
     /// Whether a sharp point lies within an edge: the edges that end in it go about opposite ways.
     bool isWithinEdge(const SurfacePoints& points, std::uint32_t point) const;
@@ -55,11 +55,12 @@ class SharpEdges {
     };
     /// Where another body's edge crosses one of this body's, nearest to a place on it, if there is a plane between the
     /// two that all four faces leave: else faces or corners touch first. All in this body's coordinates.
-    /// @param wings     of the other edge
+    /// @param conormals     of the other edge
     /// @param place     the deepest on it that the field shows, by the interpolant to within edges that it rounds off
     /// @param distance  that the field shows there [m]: what is much deeper is no touch, but an edge on another side
     std::optional<Crossing> crossing(const SurfacePoints& points, const glm::vec3& from, const glm::vec3& to,
-                                     const Wings& wings, const glm::vec3& place, float distance, float voxelSize) const;
+                                     const Conormals& conormals, const glm::vec3& place, float distance,
+                                     float voxelSize) const;
 
   private:
     bool edgesFallBack(const SurfacePoints& points, std::uint32_t point, const glm::vec3& direction) const;

@@ -16,14 +16,14 @@ namespace bilayer::detail {
 namespace {
 
 constexpr double latticePitch = 0.75;  // of candidates on edges and faces [spacings]
-constexpr double leastGap = 0.7;       // between points that look about the same way [spacings]
+constexpr double minGap = 0.7;         // between points that look about the same way [spacings]
 constexpr double likeness = 0.7;       // least cosine between their normals: an edge of a cube and its faces have 0.71
-constexpr double leastProtrusion = 0.035;  // over the tangent plane's height of such a point that needs none [spacings]
-constexpr double leastCornerGap = 0.1;     // between convex corners [spacings]: a fraction of a voxel
-constexpr double corner = 0.5;             // convexity from which a point is a corner: a cube's has 0.58
-constexpr double sharp = 0.15;             // and from which it is on an edge at least: a cube's have 0.35
-constexpr std::uint32_t leafPoints = 8;    // most points in a leaf of the tree
-constexpr float rounding = 1.000001f;      // spheres grow by this, so that single precision leaves no point outside
+constexpr double minProtrusion = 0.035;  // over the tangent plane's height of such a point that needs none [spacings]
+constexpr double minCornerGap = 0.1;     // between convex corners [spacings]: a fraction of a voxel
+constexpr double corner = 0.5;           // convexity from which a point is a corner: a cube's has 0.58
+constexpr double sharp = 0.15;           // and from which it is on an edge at least: a cube's have 0.35
+constexpr std::uint32_t leafPoints = 8;  // most points in a leaf of the tree
+constexpr float rounding = 1.000001f;    // spheres grow by this, so that single precision leaves no point outside
 
 struct Candidate {
     glm::dvec3 position;
@@ -197,11 +197,11 @@ class Grid {
 std::vector<SurfacePoint> thin(std::vector<Candidate> candidates, double spacing) {
     std::stable_sort(candidates.begin(), candidates.end(),
                      [](const Candidate& a, const Candidate& b) { return a.convexity > b.convexity; });
-    Grid grid(leastGap * spacing, candidates.size());
+    Grid grid(minGap * spacing, candidates.size());
     std::vector<SurfacePoint> points;
     for (const Candidate& candidate : candidates) {
-        const double gap = candidate.convexity >= corner ? leastCornerGap : leastGap;
-        if (grid.near(candidate, gap * spacing, leastProtrusion * spacing)) continue;
+        const double gap = candidate.convexity >= corner ? minCornerGap : minGap;
+        if (grid.near(candidate, gap * spacing, minProtrusion * spacing)) continue;
         grid.insert(candidate);
         points.push_back({glm::vec3(candidate.position), glm::vec3(candidate.normal), candidate.convexity >= sharp});
     }

@@ -29,9 +29,9 @@ glm::vec3 directionOf(const ClosestPoint& closest, const glm::vec3& point, float
     return isAside ? (point - closest.position) / closest.distance : closest.normal;
 }
 
-Touch touchInBand(const Field& field, const glm::vec3& point, const Sample& sample, bool byTriangles) {
+SurfaceSample surfaceSampleAt(const Field& field, const glm::vec3& point, const Sample& sample, bool byTriangles) {
     if (byTriangles) {
-        const float most = std::abs(sample.distance) + mostInterpolationError * field.voxelSize();
+        const float most = std::abs(sample.distance) + maxInterpolationError * field.voxelSize();
         if (const ClosestPoint closest = field.closest(point, most); closest.found)
             return {closest.distance, directionOf(closest, point, field.voxelSize())};
     }

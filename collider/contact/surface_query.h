@@ -6,14 +6,14 @@
 namespace bilayer::detail {
 
 /// In the field's own coordinates.
-struct Touch {
+struct SurfaceSample {
     float distance;    ///< of the point from the surface; of one that comes from afar from the plane that it will meet
     glm::vec3 normal;  ///< outward; zero where the field tells none
     float approach = 0;  ///< Contact::approach
 };
 
 /// Of a point in the band: by its sample, or by the triangles.
-Touch touchInBand(const Field& field, const glm::vec3& point, const Sample& sample, bool byTriangles);
+SurfaceSample surfaceSampleAt(const Field& field, const glm::vec3& point, const Sample& sample, bool byTriangles);
 
 /// Which way a point is from what is closest to it: across a face, and away from an edge or a corner, or from what a
 /// field without triangles does not tell apart.
@@ -25,8 +25,8 @@ glm::vec3 directionOf(const ClosestPoint& closest, const glm::vec3& point, float
 /// @param distance, seen    of the other surface there, outward
 /// @param normalAt          glm::vec3 (const glm::vec3&): of the other surface near a place
 template <class NormalAt>
-bool looksAtEdge(const glm::vec3& position, const glm::vec3& normal, float distance, const glm::vec3& seen,
-                 NormalAt&& normalAt) {
+bool seesEdgeObliquely(const glm::vec3& position, const glm::vec3& normal, float distance, const glm::vec3& seen,
+                       NormalAt&& normalAt) {
     // what is within half a degree of the normal is seen straight
     constexpr float straight = 0.99996f, straighter = 0.1f;
     const float cosine = -glm::dot(seen, normal);

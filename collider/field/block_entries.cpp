@@ -16,12 +16,12 @@ namespace {
 /// part of its size.
 constexpr float frameRounding = 1e-2f, placeRounding = 3e-7f;
 /// As many nodes fit into a cube's entries.
-constexpr std::size_t mostNodes = BlockEntries::most * BlockEntry::slots;
+constexpr std::size_t maxNodes = BlockEntries::most * BlockEntry::slots;
 /// Entries have room for the nodes of this part of the cubes; others make do with a coarser level. So many cubes are
 /// looked at to tell.
 constexpr double usual = 0.9;
 constexpr std::size_t samples = 512;
-constexpr std::uint32_t mostTreeNodes = 1 << 24;
+constexpr std::uint32_t maxTreeNodes = 1 << 24;
 constexpr std::size_t grain = 256;  // cubes a task
 /// A cube is one block, or larger if so few entries hold the leaves near it: these are read as quickly as one, and all
 /// of them stay in a cache that those of single blocks do not fit into.
@@ -141,9 +141,9 @@ class Maker {
         while (levels_[count_ - 1].size() > 0 && !tree_.isLeaf(levels_[count_ - 1].node(0))) {
             Nodes& finer = next();
             const Nodes& coarser = levels_[count_ - 2];
-            for (std::size_t i = 0; i < coarser.size() && finer.size() <= mostNodes; ++i)
+            for (std::size_t i = 0; i < coarser.size() && finer.size() <= maxNodes; ++i)
                 finer.addNear(tree_.group(coarser.node(i)), region);
-            if (finer.size() <= mostNodes) continue;
+            if (finer.size() <= maxNodes) continue;
             --count_;
             return;
         }
@@ -236,7 +236,7 @@ std::vector<glm::ivec3> BlockEntries::number(const FieldLayout& field) {
 
 BlockEntries::BlockEntries(const FieldLayout& field, const WideTree& tree, double perMetre, float reach)
     : reach_(reach) {
-    if (tree.leafCount + tree.groupCount > mostTreeNodes) return;
+    if (tree.leafCount + tree.groupCount > maxTreeNodes) return;
     extent_ = glm::dvec3(FieldFrame::side * field.blocks);
     std::vector<glm::ivec3> cubes;
     const auto makerOf = [&] { return Maker(field, tree, perMetre, reach, shift_); };

@@ -18,15 +18,15 @@ class Clearance {
     static constexpr int partSide = 4;  ///< [voxels]
     static constexpr int perBlock = 2;  ///< parts along a block
     static constexpr int blockParts = perBlock * perBlock * perBlock;
-    static constexpr int steps = 8;      ///< that a part's edge is divided into, where ways are stored
-    static constexpr int mostWay = 127;  ///< farther from the surface, ways grow no more [steps]
+    static constexpr int steps = 8;               ///< that a part's edge is divided into, where ways are stored
+    static constexpr int maxDistanceSteps = 127;  ///< farther from the surface, ways grow no more [steps]
 
     /// The arrays, by block: a block's eight parts lie together, the last axis fastest.
     struct Data {
         const std::int32_t* directory;  ///< of FieldLayout
         const std::int8_t* centres;     ///< each part's centre's way to the surface, at least, negative inside [steps]
-        const std::int8_t* leasts;      ///< by stored block: no sample in the part is below [leastStep]
-        float leastStep;                ///< [m]
+        const std::int8_t* minima;      ///< by stored block: no sample in the part is below [minimaStep]
+        float minimaStep;               ///< [m]
         float besides[2];               ///< the same for parts of empty blocks, outside and inside [m]
         glm::ivec3 blocks;              ///< along each axis
     };
@@ -55,7 +55,7 @@ class Clearance {
         const glm::ivec3 part = partOf(point);
         const std::int32_t block = data_.directory[entryOf(part)];
         if (block < 0) return data_.besides[-1 - block] > reach;
-        return float(data_.leasts[std::size_t(block) * blockParts + inBlock(part)]) * data_.leastStep > reach;
+        return float(data_.minima[std::size_t(block) * blockParts + inBlock(part)]) * data_.minimaStep > reach;
     }
 
   private:

@@ -69,7 +69,7 @@ struct FieldData : FieldLayout {
     static_assert(side == 1 << (32 - fractionBits));
     /// Added to a place, it leaves the fixed-point number in a double's lower bits [voxels].
     static constexpr double fixedPoint = 1.5 * (std::uint64_t(1) << (52 - fractionBits));
-    static_assert(fixedPoint / 3 == double(side) * mostBlocksAlong);
+    static_assert(fixedPoint / 3 == double(side) * maxBlocksAlong);
 
     /// The frame as samples need it, much of it in vectors.
     struct Lanes {

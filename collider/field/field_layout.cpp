@@ -23,16 +23,16 @@ using openvdb::FloatTree;
 using Accessor = openvdb::FloatGrid::ConstAccessor;
 
 constexpr int side = FieldLayout::side, stride = FieldLayout::stride;
-constexpr std::int64_t mostBlocks = 1 << 26;  // of the box: 0.75 GiB at 12 bytes each
+constexpr std::int64_t maxBlocks = 1 << 26;  // of the box: 0.75 GiB at 12 bytes each
 constexpr int partSide = Clearance::partSide, perBlock = Clearance::perBlock, blockParts = Clearance::blockParts;
-constexpr int mostParts = 16;                     // away from the surface: farther away, bounds grow no more
+constexpr int maxParts = 16;                      // away from the surface: farther away, bounds grow no more
 constexpr float nearSurface = 0.5f * 1.7320508f;  // some voxel of a cell that the surface meets is as near [voxels]
-constexpr int leastSteps = 126;                   // from 0 to the end of the band, where the least samples are stored
+constexpr int minSteps = 126;                     // from 0 to the end of the band, where the least samples are stored
 
 // Of parts: squared ways from their centres to the nearest one that the surface meets. In half parts, so that ways to
 // the faces of parts are whole.
 using Way = std::int16_t;
-constexpr Way farAway = 4 * mostParts * mostParts;
+constexpr Way farAway = 4 * maxParts * maxParts;
 
 // A leaf needs a block if it has voxels of the band, or lies on both sides of it (where the band is below one voxel).
 bool needsBlock(const FloatTree::LeafNodeType& leaf) {
@@ -76,8 +76,8 @@ void copyBlock(const Accessor& tree, const Coord& origin, float* block) {
 }
 
 // Of the least samples of parts [m].
-float leastStepOf(const FieldFrame& frame) {
-    return std::max(frame.exteriorWidth, frame.interiorWidth) / float(leastSteps);
+float minimaStepOf(const FieldFrame& frame) {
+    return std::max(frame.exteriorWidth, frame.interiorWidth) / float(minSteps);
 }
 
 // What is stored of a block beside its values.
@@ -168,7 +168,7 @@ bool lower(Way* ways, const Way* others, std::size_t count, Way way) {
 // D. Huttenlocher, "Distance transforms of sampled functions", 2012, but to the faces of parts).
 void transformRow(Way* ways, int length, std::vector<Way>& before) {
     before.assign(ways, ways + length);
-    for (int d = 1; d <= std::min(mostParts, length - 1); ++d) {
+    for (int d = 1; d <= std::min(maxParts, length - 1); ++d) {
         const std::size_t count = length - d;
         const bool up = lower(ways + d, before.data(), count, wayTo(d));
         const bool down = lower(ways, before.data() + d, count, wayTo(d));
@@ -182,7 +182,7 @@ void transformRows(Way* ways, std::size_t count, std::size_t step, int length, s
     for (int i = 0; i < length; ++i) std::copy_n(ways + i * step, count, before.data() + i * count);
     for (int i = 0; i < length; ++i) {
         bool more = true;
-        for (int d = 1; more && d <= mostParts; ++d) {
+        for (int d = 1; more && d <= maxParts; ++d) {
             more = false;
             if (i >= d) more |= lower(ways + i * step, before.data() + (i - d) * count, count, wayTo(d));
             if (i + d < length) more |= lower(ways + i * step, before.data() + (i + d) * count, count, wayTo(d));
@@ -228,9 +228,9 @@ std::vector<std::array<bool, blockParts>> enterBlocks(FieldLayout& field, const 
         field.values = LargeArray<float>(floats);
     else
         field.values16 = LargeArray<std::int16_t>(floats);
-    field.leasts = LargeArray<std::int8_t>(field.stored * blockParts);
+    field.minima = LargeArray<std::int8_t>(field.stored * blockParts);
     std::vector<std::array<bool, blockParts>> meets(field.stored);
-    const float leastStep = leastStepOf(field);
+    const float minimaStep = minimaStepOf(field);
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, field.stored), [&](const auto& range) {
         const Accessor accessor(tree);
         std::array<float, FieldLayout::blockFloats> block;
@@ -245,8 +245,8 @@ std::vector<std::array<bool, blockParts>> enterBlocks(FieldLayout& field, const 
             const BlockSummary summary = summaryOf(block.data(), field.voxelSize);
             meets[i] = summary.meetsSurface;
             for (int k = 0; k < blockParts; ++k)
-                field.leasts[i * blockParts + k] =
-                    std::int8_t(std::clamp(std::floor(summary.least[k] / leastStep), -127.f, 127.f));
+                field.minima[i * blockParts + k] =
+                    std::int8_t(std::clamp(std::floor(summary.least[k] / minimaStep), -127.f, 127.f));
         }
     });
     return meets;
@@ -278,7 +278,8 @@ std::array<std::size_t, blockParts> nextParts(const FieldLayout& field) {
 std::array<std::int8_t, farAway + 1> rootsOfWays() {
     std::array<std::int8_t, farAway + 1> roots;
     for (int way = 0; way <= farAway; ++way)
-        roots[way] = std::int8_t(std::min(Clearance::mostWay, int(0.5f * Clearance::steps * std::sqrt(float(way)))));
+        roots[way] =
+            std::int8_t(std::min(Clearance::maxDistanceSteps, int(0.5f * Clearance::steps * std::sqrt(float(way)))));
     return roots;
 }
 
@@ -303,7 +304,7 @@ void measureClearances(FieldLayout& field, const std::vector<std::array<bool, bl
         std::int8_t* const centres = field.centres.data() + entry * blockParts;
         for (int k = 0; k < blockParts; ++k) {
             const std::int8_t root = roots[ways[part + next[k]]];
-            const bool inside = block < 0 ? emptyInside : field.leasts[std::size_t(block) * blockParts + k] < 0;
+            const bool inside = block < 0 ? emptyInside : field.minima[std::size_t(block) * blockParts + k] < 0;
             centres[k] = std::int8_t(inside ? -root : root);
         }
     });
@@ -312,9 +313,9 @@ void measureClearances(FieldLayout& field, const std::vector<std::array<bool, bl
 }  // namespace
 
 void FieldFrame::requireSize() const {
-    if (double(blocks.x) * blocks.y * blocks.z > double(mostBlocks))
+    if (double(blocks.x) * blocks.y * blocks.z > double(maxBlocks))
         throw std::invalid_argument("field: the bounds hold more than 2^26 blocks of 8^3 voxels: take larger voxels");
-    if (std::max({blocks.x, blocks.y, blocks.z}) > mostBlocksAlong) throwTooLong();
+    if (std::max({blocks.x, blocks.y, blocks.z}) > maxBlocksAlong) throwTooLong();
 }
 
 bool FieldFrame::findsSurface() const {
@@ -342,7 +343,7 @@ FieldLayout::FieldLayout(const LevelSet& levelSet, Storage storage)
 
     // in 64 bits: what a file holds may be farther apart than an int tells
     for (int axis = 0; axis < 3; ++axis)
-        if (std::int64_t(box.max()[axis]) - box.min()[axis] >= std::int64_t(side) * mostBlocksAlong) throwTooLong();
+        if (std::int64_t(box.max()[axis]) - box.min()[axis] >= std::int64_t(side) * maxBlocksAlong) throwTooLong();
 
     const Coord first = box.min();
     sortForWalks(origins, first);
@@ -364,7 +365,7 @@ FieldLayout FieldLayout::shared() const {
     FieldLayout other{FieldFrame(*this)};
     other.directory = directory.shared();
     other.centres = centres.shared();
-    other.leasts = leasts.shared();
+    other.minima = minima.shared();
     other.storage = storage;
     other.values = values.shared();
     other.values16 = values16.shared();
@@ -376,14 +377,14 @@ FieldLayout FieldLayout::shared() const {
 Clearance FieldLayout::clearance() const {
     return Clearance({.directory = directory.data(),
                       .centres = centres.data(),
-                      .leasts = leasts.data(),
-                      .leastStep = leastStepOf(*this),
+                      .minima = minima.data(),
+                      .minimaStep = minimaStepOf(*this),
                       .besides = {exteriorWidth, -interiorWidth},
                       .blocks = blocks});
 }
 
 std::size_t FieldLayout::memoryBytes() const {
-    return sizeof *this + directory.bytes() + centres.bytes() + leasts.bytes() + values.bytes() + values16.bytes();
+    return sizeof *this + directory.bytes() + centres.bytes() + minima.bytes() + values.bytes() + values16.bytes();
 }
 
 }  // namespace bilayer::detail

@@ -37,7 +37,7 @@ struct FieldFrame {
         return (std::size_t(block.x) * blocks.y + block.y) * blocks.z + block.z;
     }
     /// Blocks along an axis at most.
-    static constexpr int mostBlocksAlong = 1 << 19;
+    static constexpr int maxBlocksAlong = 1 << 19;
     /// Throws std::invalid_argument if the directory has more than 2^26 entries, or more than 2^19 along an axis.
     void requireSize() const;
 
@@ -55,7 +55,7 @@ struct FieldLayout : FieldFrame {
 
     LargeArray<std::int32_t> directory;  ///< a block's number in `values`, or the side that it lies on
     LargeArray<std::int8_t> centres;     ///< of Clearance::Data
-    LargeArray<std::int8_t> leasts;      ///< likewise
+    LargeArray<std::int8_t> minima;      ///< likewise
     Storage storage = Storage::float32;
     LargeArray<float> values;           ///< blockFloats a block, if they are float32 [m]
     LargeArray<std::int16_t> values16;  ///< likewise, if they are fixed16 [step]

@@ -37,7 +37,7 @@ using Accessor = openvdb::FloatGrid::ConstAccessor;
 constexpr int side = 8, stride = side + 1;  // of a block: an OpenVDB leaf, and with the voxels that end its last cells
 constexpr std::size_t grain = 64;           // blocks that are summed at once: fixed, so that sums are
 constexpr double justBeside = 1e-6;         // the surface [voxels]: where a voxel stays that must not change its side
-constexpr double leastVolume = 1e-6;        // [voxels]: less is rounding
+constexpr double minVolume = 1e-6;          // [voxels]: less is rounding
 const std::array<double, 2> gauss{0.5 - std::sqrt(1.0 / 12), 0.5 + std::sqrt(1.0 / 12)};  // points of equal weight
 
 using Cell = std::array<double, 8>;  // distances at the corners, z fastest [voxels]
@@ -220,7 +220,7 @@ MassProperties massProperties(const LevelSet& levelSet) {
         },
         [](Moments a, const Moments& b) { return a += b; });
     integrator.addTiles(sum);
-    if (!(sum.volume > leastVolume)) throw std::invalid_argument("mass properties: the field has no inside");
+    if (!(sum.volume > minVolume)) throw std::invalid_argument("mass properties: the field has no inside");
 
     const double h = grid.voxelSize()[0];
     sum.volume *= h * h * h;

@@ -20,7 +20,7 @@ namespace {
 /// Segments are this much longer, so that those that end on a face meet it.
 constexpr double endRounding = 1 + 1e-12;
 /// Spheres of a smaller radius are rays [voxels].
-constexpr double leastRadius = 1e-6;
+constexpr double minRadius = 1e-6;
 
 bool isRay(const Ray& ray) {
     return isFinite(ray.origin) && isFinite(ray.direction) && ray.direction != glm::vec3(0) && ray.maxDistance >= 0;
@@ -114,7 +114,7 @@ std::optional<RayHit> Field::segment(const glm::vec3& from, const glm::vec3& to)
 
 std::optional<RayHit> Field::sphereCast(const Ray& ray, float radius) const noexcept {
     if (!isRay(ray) || !(radius >= 0) || !std::isfinite(radius)) return std::nullopt;
-    if (double(radius) * data_->perMetre < leastRadius) return raycast(ray);
+    if (double(radius) * data_->perMetre < minRadius) return raycast(ray);
     const ClosestPoint start = data_->closest(ray.origin, radius);
     if (start.found)
         return RayHit{.distance = 0, .position = start.position, .normal = start.normal, .triangle = start.triangle};

@@ -5,7 +5,7 @@ namespace bilayer::detail {
 
 /// What the interpolant may be off the distance, to either side: the mean way to the eight voxels around a point is at
 /// most half a cell's diagonal [voxels].
-inline constexpr float mostInterpolationError = 0.87f;
+inline constexpr float maxInterpolationError = 0.87f;
 
 /// How fast the interpolant may change: by a voxel along each axis at once.
 inline constexpr float steepestInterpolant = 1.7321f;

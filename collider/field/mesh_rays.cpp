@@ -22,7 +22,7 @@ HWY_BEFORE_NAMESPACE();
 namespace bilayer::detail::HWY_NAMESPACE {
 
 /// Eight levels of groups hold 2^27 leaves; of each level seven wait at most.
-constexpr std::size_t mostWaiting = 96;
+constexpr std::size_t maxWaiting = 96;
 /// Points and boxes in the tree's frame are rounded by no more than this part of their size.
 constexpr float placeRounding = 2.4e-7f;
 /// How far beside a triangle a ray may pass and still meet it [voxels].
@@ -38,8 +38,8 @@ constexpr float quotientRoundUp = 1 + 1e-6f;
 // Nodes that wait, each with what it has to stay below.
 struct Waiting {
     std::size_t count = 0;
-    float keys[mostWaiting];
-    std::uint32_t nodes[mostWaiting];
+    float keys[maxWaiting];
+    std::uint32_t nodes[maxWaiting];
 
     void push(float key, std::uint32_t node) { keys[count] = key, nodes[count++] = node; }
 };

@@ -25,7 +25,7 @@ HWY_BEFORE_NAMESPACE();
 namespace bilayer::detail::HWY_NAMESPACE {
 
 /// Eight levels of groups hold 2^27 leaves; of each level seven wait at most.
-constexpr std::size_t mostWaiting = 96;
+constexpr std::size_t maxWaiting = 96;
 /// Points that are looked at in turns, and how often before what is left: enough to hide what memory takes, and few
 /// enough for the first cache.
 constexpr std::size_t together = 16;
@@ -137,8 +137,8 @@ class Search {
     struct Waiting {
         float slack;  // boxes are rounded, triangles are not
         std::size_t count = 0;
-        float gaps[mostWaiting];
-        std::uint32_t nodes[mostWaiting];
+        float gaps[maxWaiting];
+        std::uint32_t nodes[maxWaiting];
     };
 
     bool isNear(std::int32_t key) const { return key <= (std::int32_t(best2_ * places2_) + 1) << keyBits; }
@@ -302,7 +302,7 @@ constexpr double near = 16;
 /// A point in floats is no farther than this part of its largest coordinate from the place that was meant.
 constexpr double pointRounding = 1.2e-7;
 /// A shorter mean of normals has cancelled out, or is not known.
-constexpr double leastMean = 1e-6;
+constexpr double minMean = 1e-6;
 
 // A place on an edge, seen from the point that is asked for.
 struct OnEdge {
@@ -403,7 +403,7 @@ void MeshTree::toSmallest(NearestFeature& found, const std::array<glm::dvec3, 3>
     const auto set = [&](Feature feature, std::size_t index, const glm::dvec3& normal) {
         found.feature = feature;
         found.index = std::uint8_t(index);
-        if (glm::length(normal) > leastMean) found.normal = normal;
+        if (glm::length(normal) > minMean) found.normal = normal;
     };
     const glm::uvec3& t = mesh_->triangles[found.triangle];
     for (int k = 0; k < 3; ++k)

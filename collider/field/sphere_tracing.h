@@ -27,7 +27,7 @@ template <class ClearanceAt>
 std::optional<SphereTouch> firstTouchOnWay(const MeshTree& mesh, const Path& path, double radius,
                                            const ClearanceAt& clearanceAt) {
     // pieces [voxels], and no more than so many of them
-    constexpr double pieceLength = 2, mostPieces = 4096;
+    constexpr double pieceLength = 2, maxPieces = 4096;
     // the nearest triangle is looked for no farther than this away from the sphere [pieces]
     constexpr double lookAhead = 4;
     // what it may be off by [voxels], and as a part of its distance
@@ -37,7 +37,7 @@ std::optional<SphereTouch> firstTouchOnWay(const MeshTree& mesh, const Path& pat
     const auto part = partIn(path, lower - radius, upper + radius);
     if (!part) return std::nullopt;
     const double voxel = mesh.voxelSize(), length = part->path.length;
-    const double piece = std::max(pieceLength * voxel, length / mostPieces), reach = lookAhead * piece;
+    const double piece = std::max(pieceLength * voxel, length / maxPieces), reach = lookAhead * piece;
     const auto freeWay = [&](const glm::dvec3& centre) {
         const double known = clearanceAt(centre) - radius - nearestSlack * voxel;
         if (known >= reach) return known;

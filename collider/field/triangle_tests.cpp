@@ -14,7 +14,7 @@ namespace {
 /// A sphere touches what is no farther from it than this [voxels].
 constexpr double touchTolerance = 1e-7;
 /// What is not reached in as many tangents is passed at that tolerance.
-constexpr int mostTangents = 64;
+constexpr int maxTangents = 64;
 
 }  // namespace
 
@@ -81,7 +81,7 @@ bool touches(const MeshTree& mesh, std::uint32_t triangle, const Path& path, dou
              glm::dvec3& position) {
     const double tolerance = touchTolerance * double(mesh.voxelSize());
     double here = 0;
-    for (int i = 0; i < mostTangents; ++i) {
+    for (int i = 0; i < maxTangents; ++i) {
         const glm::dvec3 centre = path.at(here), from = mesh.approached(centre);
         const glm::dvec3 fromThere = mesh.featureOf(triangle, from).way, way = fromThere + (from - centre);
         const double distance = glm::length(way), left = distance - radius;

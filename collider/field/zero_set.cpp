@@ -20,19 +20,19 @@ constexpr double infinity = std::numeric_limits<double>::infinity();
 /// Room for the single precision of clearances.
 constexpr double clearanceSlack = 1e-2;
 /// Rays step over what is clear from this on; nearer it is quicker to look at the next part.
-constexpr double leastStride = 6;
+constexpr double minStride = 6;
 /// A crossing along a ray is narrowed down to this.
 constexpr double rayTolerance = 1e-9;
 /// Cubes of this side are not divided: their diagonal is within zeroTolerance.
 constexpr double smallestSide = 1.0 / 2048;
 static_assert(1.7321 * smallestSide < zeroTolerance);
 /// The last half of a way to a box that is only grazed takes a tangent, and so on.
-constexpr int mostTangents = 64;
+constexpr int maxTangents = 64;
 /// They are followed no closer than this.
 constexpr double tangentTolerance = 1e-9;
 /// A multiplier is found to this, in distance from the plane, or after so many steps: three kinks are all there are.
 constexpr double multiplierTolerance = 1e-9;
-constexpr int mostMultipliers = 8;
+constexpr int maxMultipliers = 8;
 
 using Values = std::array<double, 8>;  // at the corners of a cube, the last axis fastest
 
@@ -388,7 +388,7 @@ Separation separation(const glm::dvec3& point, const glm::dvec3& lower, const gl
     double multiplier = 0;
     glm::dvec3 way = glm::clamp(glm::dvec3(0), low, high);
     const bool slices = std::isfinite(beyond) && beyond < 0;
-    for (int i = 0; slices && i < mostMultipliers; ++i) {
+    for (int i = 0; slices && i < maxMultipliers; ++i) {
         const double excess = glm::dot(normal, way) - beyond;
         if (std::abs(excess) <= multiplierTolerance) break;
         // coordinates that are not at an end follow the multiplier; if there is none, up to where the next one does
@@ -438,7 +438,7 @@ struct Nearest {
 };
 
 // Keys are ways of a sphere.
-struct Touch {
+struct SurfaceSample {
     Path path;
     double radius, best;
     std::optional<glm::dvec3> found{};
@@ -461,7 +461,7 @@ struct Touch {
     template <class Separate>
     double byTangents(Separate separate) const {
         double along = 0;
-        for (int i = 0; i < mostTangents; ++i) {
+        for (int i = 0; i < maxTangents; ++i) {
             const Separation found = separate(path.at(along));
             const double left = found.least - radius;
             if (!(left > 0)) break;
@@ -530,7 +530,7 @@ std::optional<double> firstInside(const FieldData& field, const Path& path) noex
         const std::int32_t entry = entryAt(field, Clearance::partSide * walk.cube);
         if (entry == FieldFrame::emptyInside) return walk.enter;
         const double stride = clearanceAt(field, path.at(walk.enter));
-        if (stride >= leastStride) {
+        if (stride >= minStride) {
             if (isInside(field, entry, walk.cube)) return walk.enter;
             walk = Walk(path, Clearance::partSide, glm::ivec3(0), parts, walk.enter + stride, to);
             continue;
@@ -572,7 +572,7 @@ bool isNearZero(const FieldData& field, const glm::dvec3& point, double reach) n
 }
 
 std::optional<ZeroTouch> firstZeroTouch(const FieldData& field, const Path& path, double radius) noexcept {
-    Touch touch{.path = path, .radius = radius, .best = path.length};
+    SurfaceSample touch{.path = path, .radius = radius, .best = path.length};
     ZeroSearch(field, touch).run();
     if (!touch.found) return std::nullopt;
     return ZeroTouch{touch.best, *touch.found};

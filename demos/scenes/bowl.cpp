@@ -36,7 +36,7 @@ constexpr float bowlVoxels = 3;                         // edge of its voxels [v
 
 constexpr float usualBodiesPerLayer = 5;
 constexpr float layerRadius = 0.26f;  // of a layer's ring, in the bowl for thirty [m]
-constexpr float leastApart = 0.26f;   // between the centres of bodies at the start, of neighbouring layers too [m]
+constexpr float minApart = 0.26f;     // between the centres of bodies at the start, of neighbouring layers too [m]
 constexpr float lastLook = 0.5f;      // how long the recording goes on when all is at rest [s]
 // A heap at rest trembles by far less; what still rolls as slowly as bodies may elsewhere goes on when it is woken.
 constexpr float restingSpeed = 0.02f, restingSpin = 0.2f;  // [m/s], [rad/s]
@@ -48,9 +48,9 @@ constexpr float bodyInteriorWidth = 20, bowlInteriorWidth = 6;
 // is kept awake.
 constexpr float pulledBack = 0.5f, restingFriction = 1.5f;
 
-constexpr double mostOverlap = 0.5;  // of 99 in 100 [voxels]
-constexpr double mostRise = 1;       // of energy, in parts of the kinetic energy's peak [%]
-constexpr double mostCreep = 1;      // while held awake [voxels]
+constexpr double maxOverlap = 0.5;  // of 99 in 100 [voxels]
+constexpr double maxRise = 1;       // of energy, in parts of the kinetic energy's peak [%]
+constexpr double maxCreep = 1;      // while held awake [voxels]
 
 constexpr Look bowlLook{.colour = 0x35506b, .roughness = 0.45f, .clearcoat = 0.6f};
 constexpr std::uint32_t colours[] = {0xe07a5f, 0xf2cc8f, 0x81b29a, 0xf4f1de, 0x9db4d6, 0xe8a598, 0xc9b1d9, 0x7fb7be};
@@ -84,7 +84,7 @@ std::vector<Pose> startPoses(const std::vector<std::shared_ptr<const Thing>>& th
                              float scale) {
     std::mt19937 random(options.seed);
     std::normal_distribution<float> normal;
-    float apart = leastApart;
+    float apart = minApart;
     std::vector<glm::vec3> middles;
     for (const auto& thing : things) {
         middles.push_back(bounds(thing->mesh).centre());
@@ -192,10 +192,10 @@ Outcome bowl(const BowlOptions& options) {
     const double voxel = outcome.voxelSize;
     outcome.criteria = {{"bodies still awake", double(awake), 0},
                         {"bodies that left the bowl", double(left), 0},
-                        {"99 in 100 penetrations", outcome.usuallyBelow() / voxel, mostOverlap, "voxels"},
-                        {"energy rises by", 100 * outcome.energies.rise(), mostRise, "%"}};
+                        {"99 in 100 penetrations", outcome.usuallyBelow() / voxel, maxOverlap, "voxels"},
+                        {"energy rises by", 100 * outcome.energies.rise(), maxRise, "%"}};
     if (options.hold > 0)
-        outcome.criteria.push_back({fmt::format("creep in {:g} s", options.hold), crept / voxel, mostCreep, "voxels"});
+        outcome.criteria.push_back({fmt::format("creep in {:g} s", options.hold), crept / voxel, maxCreep, "voxels"});
     return outcome;
 }
 

@@ -17,7 +17,7 @@ constexpr float major = 0.1f, minor = 0.025f;  // of a link's circle and tube [m
 constexpr float bobSize = 1.6f;                // of the last ring [links]
 constexpr float linkMass = 0.5f;               // [kg]
 constexpr int circlePoints = 96;               // of the integral: more change nothing down to a tenth of the radius
-constexpr double mostStretch = 2;              // [%]
+constexpr double maxStretch = 2;               // [%]
 
 constexpr std::uint32_t linkColours[] = {0x9db4d6, 0xf4f1de};
 constexpr Look bobLook{.colour = 0xe07a5f, .roughness = 0.35f, .metalness = 0.2f, .clearcoat = 0.4f};
@@ -105,7 +105,7 @@ Outcome chain(const ChainOptions& options) {
                                     .distance = 26 * major,
                                     .elevation = -0.14f,
                                     .groundHeight = height - 0.5f});
-    outcome.criteria = {{"links that parted", double(most), 0}, {"stretch", 100 * longest, mostStretch, "%"}};
+    outcome.criteria = {{"links that parted", double(most), 0}, {"stretch", 100 * longest, maxStretch, "%"}};
     return outcome;
 }
 

@@ -138,8 +138,9 @@ std::vector<Wheel> addTrain(Stage& stage, Axles& axles, Train train, const Gears
             place += distance * glm::vec3(std::cos(direction), std::sin(direction), 0);
             angle = shapes::meshingAngle(part, angle, last, direction);
         }
-        const auto thing = makeThing(std::move(train.meshes[i]),
-                                     {.voxelSize = options.voxelSize, .margin = margin, .measure = Measure::triangles});
+        const auto thing =
+            makeThing(std::move(train.meshes[i]),
+                      {.voxelSize = options.voxelSize, .margin = margin, .accuracy = ContactAccuracy::exact});
         const float mass = density * float(massProperties(thing->mesh).volume);
         const Pose pose{place, glm::angleAxis(angle, glm::vec3(0, 0, 1))};
         const Matter matter{.mass = mass, .friction = friction, .linearDamping = 0, .angularDamping = 0};

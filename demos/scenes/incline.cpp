@@ -10,13 +10,13 @@
 namespace bilayer::demo {
 namespace {
 
-constexpr float gravity = 9.81f;                             // [m/s^2]
-constexpr glm::vec3 halfBlock{0.12f, 0.12f, 0.06f};          // low: a slope of 60 degrees would not tip it [m]
-constexpr float lane = 0.36f;                                // between blocks [m]
-constexpr float halfThickness = 0.1f;                        // of the inclines [m]
-constexpr float settled = 0.25f;                             // acceleration is measured from then on [s]
-constexpr double mostCreep = 0.1;                            // of blocks that stick, in all the time [voxels]
-constexpr float mostSliding = 0.98f, leastSticking = 1.02f;  // friction in parts of the tangent
+constexpr float gravity = 9.81f;                          // [m/s^2]
+constexpr glm::vec3 halfBlock{0.12f, 0.12f, 0.06f};       // low: a slope of 60 degrees would not tip it [m]
+constexpr float lane = 0.36f;                             // between blocks [m]
+constexpr float halfThickness = 0.1f;                     // of the inclines [m]
+constexpr float settled = 0.25f;                          // acceleration is measured from then on [s]
+constexpr double maxCreep = 0.1;                          // of blocks that stick, in all the time [voxels]
+constexpr float maxSliding = 0.98f, minSticking = 1.02f;  // friction in parts of the tangent
 
 constexpr Look rampLook{.colour = 0x35506b, .roughness = 0.6f};
 constexpr std::uint32_t slidingColour = 0xe07a5f, stickingColour = 0x81b29a;
@@ -65,11 +65,11 @@ std::vector<Criterion> judge(const std::vector<Rider>& riders, double time, floa
     int sticking = 0, sliding = 0, stuck = 0;
     for (const Rider& rider : riders) {
         const double way = glm::distance(positionOf(rider.body), rider.start);
-        if (rider.friction > leastSticking) {
+        if (rider.friction > minSticking) {
             ++sticking;
             creep = worse(creep, way / voxelSize);
         }
-        if (rider.friction < mostSliding) {
+        if (rider.friction < maxSliding) {
             ++sliding;
             const double expected = rider.acceleration();
             const double measured =
@@ -82,7 +82,7 @@ std::vector<Criterion> judge(const std::vector<Rider>& riders, double time, floa
     if (sliding > 0)
         criteria = {{"blocks that should slide and stick", double(stuck), 0},
                     {"acceleration off theory", 100 * worst, 2, "%"}};
-    if (sticking > 0) criteria.push_back({"creep of blocks that should stick", creep, mostCreep, "voxels"});
+    if (sticking > 0) criteria.push_back({"creep of blocks that should stick", creep, maxCreep, "voxels"});
     if (criteria.empty()) criteria.push_back({"frictions of which theory says nothing, and no other", 1, 0});
     return criteria;
 }

@@ -27,16 +27,16 @@ constexpr float length = 1, width = 0.6f, height = 0.75f, pool = 0.2f;
 constexpr float bunnySize = 0.36f, bunnyHeight = 0.55f;                          // longest side; of its centre [m]
 constexpr float knotRadius = 0.14f, knotThickness = 0.045f, knotHeight = 0.16f;  // [m]
 constexpr float skin = 6;                                                        // of the knot's distances [voxels]
-constexpr float mostCells = 2;                                                   // that the liquid moves in a step
+constexpr float maxCells = 2;                                                    // that the liquid moves in a step
 constexpr float glass = 0.012f;                                                  // thickness of the tank's walls [m]
 constexpr float glassGap = 0.002f;  // between the liquid and the walls that are shown [m]
 constexpr float pictured = 0.4f;    // the moment of the picture [s]
 constexpr double turn = 6.283185307;
 
-constexpr double mostOff = 3, mostOffInTheEnd = 1;  // of the volume [%]
-constexpr double mostDepth = 0.25;                  // of the liquid's surface in the knot, anywhere [voxels]
-constexpr double mostWithin = 0.05;                 // of the liquid in the knot, all over it in the mean [voxels]
-constexpr double mostDivergence = 1e-3;             // in a step [parts of a cell]
+constexpr double maxError = 3, maxFinalError = 1;  // of the volume [%]
+constexpr double maxDepth = 0.25;                  // of the liquid's surface in the knot, anywhere [voxels]
+constexpr double maxWithin = 0.05;                 // of the liquid in the knot, all over it in the mean [voxels]
+constexpr double maxDivergence = 1e-3;             // in a step [parts of a cell]
 
 constexpr Look waterLook{.colour = 0x1b6fa3, .roughness = 0.05f, .opacity = 0.7f, .clear = true};
 constexpr Look glassLook{.colour = 0xdfeef2, .roughness = 0.02f, .opacity = 0.06f, .clear = true};
@@ -152,7 +152,7 @@ class Scene {
     // A step, shorter than what is left until a frame if the liquid is fast.
     void step(double left) {
         const auto start = std::chrono::steady_clock::now();
-        const double reach = double(mostCells * tank_.voxel) / std::max(water_->fastest() + 9.81 * left, 1e-6);
+        const double reach = double(maxCells * tank_.voxel) / std::max(water_->fastest() + 9.81 * left, 1e-6);
         const double seconds = left / std::ceil(left / reach);
         if (options_.turns != 0) basin_.place(knot_.at(time_ + seconds, tank_));
         const Projection projection = water_->step(basin_, float(seconds));
@@ -202,13 +202,13 @@ class Scene {
             {"volume given back", fmt::format("{:.2f} % in all", 100 * rows.back()[2] / first)},
             {"iterations of the pressure", fmt::format("{:.0f} a step", double(iterations_) / steps)}};
         outcome_.criteria = {
-            {"volume off by", off, mostOff, "%"},
-            {"volume off in the end", std::abs(100 * (rows.back()[1] / first - 1)), mostOffInTheEnd, "%"},
-            {"surface in the knot", faults_.depth / double(tank_.voxel), mostDepth, "voxels"},
+            {"volume off by", off, maxError, "%"},
+            {"volume off in the end", std::abs(100 * (rows.back()[1] / first - 1)), maxFinalError, "%"},
+            {"surface in the knot", faults_.depth / double(tank_.voxel), maxDepth, "voxels"},
             {"liquid in the knot, in the mean", faults_.within * first / inspect(knot_.mesh).area / double(tank_.voxel),
-             mostWithin, "voxels"},
-            {"surface behind the walls", faults_.beyond / double(tank_.voxel), mostDepth, "voxels"},
-            {"divergence left in a step", divergence_, mostDivergence},
+             maxWithin, "voxels"},
+            {"surface behind the walls", faults_.beyond / double(tank_.voxel), maxDepth, "voxels"},
+            {"divergence left in a step", divergence_, maxDivergence},
             {"pressures not found", double(failed_), 0}};
         outcome_.recording.view = {.target = tank_.at(0.5f * length, 0.5f * width, 0.3f * height),
                                    .distance = 2.9f,

@@ -28,7 +28,7 @@ constexpr float settled = 0.1f;  // by then nuts have fallen through their play 
 // Theory tells nuts that run from nuts that stay, farther than this from where they are the same [parts].
 constexpr double unclear = 0.2;
 constexpr int framesPerMeasuring = 16;
-constexpr double mostPlay = 1;  // that nuts that should stay may turn [degrees]
+constexpr double maxPlay = 1;  // that nuts that should stay may turn [degrees]
 
 constexpr Look boltLook{.colour = 0x9aa3ad, .roughness = 0.35f, .metalness = 0.6f};
 constexpr std::uint32_t runningColour = 0xe07a5f, stayingColour = 0x81b29a;
@@ -131,7 +131,7 @@ double advanceOffPitch(const Rider& rider, double pitch) {
     return 100 * worst;
 }
 
-// How far the angular speed strays from that of an even acceleration (standard deviation), in parts of its mean [%].
+// How far the angular speed errorMask from that of an even acceleration (standard deviation), in parts of its mean [%].
 double unevenness(const std::vector<glm::dvec2>& speeds) {
     glm::dvec2 mean(0);
     for (const glm::dvec2& at : speeds) mean += at / double(speeds.size());
@@ -180,7 +180,7 @@ std::vector<Criterion> criteriaOf(const Verdict& verdict, double deepest, double
                     {"nuts that should run and stuck", double(verdict.stuck), 0},
                     {"unevenness of angular speed", verdict.unevenness, 10, "%"}};
     if (verdict.staying > 0) {
-        criteria.push_back({"turn of nuts that should stay", verdict.turned, mostPlay, "degrees"});
+        criteria.push_back({"turn of nuts that should stay", verdict.turned, maxPlay, "degrees"});
         criteria.push_back({"way of nuts that should stay", verdict.slipped / voxelSize, 0.5, "voxels"});
     }
     if (criteria.empty()) criteria.push_back({"frictions of which theory says nothing, and no other", 1, 0});
@@ -202,7 +202,7 @@ Outcome nuts(const NutsOptions& options) {
                 {.stepsPerSecond = options.stepsPerSecond, .framesPerMeasuring = framesPerMeasuring});
     stage.world().bullet().getSolverInfo().m_numIterations = options.iterations;
     const ThingOptions things{
-        .voxelSize = options.voxelSize, .margin = margin, .sweeps = false, .measure = Measure::triangles};
+        .voxelSize = options.voxelSize, .margin = margin, .speculative = false, .accuracy = ContactAccuracy::exact};
     const auto bolt = makeThing(std::move(parts.bolt), things);
     const auto nut = makeThing(std::move(parts.nut), things);
     const float mass = density * float(massProperties(nut->mesh).volume);

@@ -42,7 +42,7 @@ constexpr int columns = 16;  // of the board
 constexpr int framesPerMeasuring = 30;
 constexpr int samplesAlong = 9;  // of a height field
 constexpr float mass = 2;        // at scale 1: it grows with the scale, since Bullet takes small inverses for zero [kg]
-constexpr double mostOff = 0.1;  // of heights and overlaps [voxels], of tilts [degrees]
+constexpr double maxError = 0.1;  // of heights and overlaps [voxels], of tilts [degrees]
 
 constexpr std::uint32_t fieldColour = 0xe07a5f, shapeColour = 0x9db4d6;
 
@@ -361,7 +361,7 @@ Outcome pairs(const PairsOptions& options) {
         const double height = (double(pose.position.z) - cell.height) / (scale * voxel), tilt = tiltOf(pose, cell.axis);
         worstHeight = worse(worstHeight, std::abs(height));
         worstTilt = worse(worstTilt, tilt);
-        if (!(std::abs(height) <= mostOff && tilt <= mostOff))
+        if (!(std::abs(height) <= maxError && tilt <= maxError))
             missed.emplace_back(cell.name, fmt::format("{:+.3f} voxels high, {:.3f} degrees", height, tilt));
     }
     const float width = scale * lane * columns;
@@ -371,9 +371,9 @@ Outcome pairs(const PairsOptions& options) {
                                     .groundHeight = -scale * halfThickness});
     outcome.facts = {{"pairs", std::to_string(board.cells().size())}};
     outcome.facts.insert(outcome.facts.end(), missed.begin(), missed.end());
-    outcome.criteria = {{"height off", worstHeight, mostOff, "voxels"},
-                        {"tilt", worstTilt, mostOff, "degrees"},
-                        {"deepest penetration", outcome.deepest() / outcome.voxelSize, mostOff, "voxels"}};
+    outcome.criteria = {{"height off", worstHeight, maxError, "voxels"},
+                        {"tilt", worstTilt, maxError, "degrees"},
+                        {"deepest penetration", outcome.deepest() / outcome.voxelSize, maxError, "voxels"}};
     return outcome;
 }
 

@@ -77,7 +77,7 @@ bool hasFactoryPeg(const std::filesystem::path& folder) {
 Outcome pegs(const PegsOptions& options) {
     Stage stage("Pegs in holes", {.stepsPerSecond = options.stepsPerSecond, .framesPerMeasuring = framesPerMeasuring});
     stage.world().bullet().getSolverInfo().m_numIterations = options.iterations;
-    const ThingOptions things{.voxelSize = options.voxelSize, .margin = margin, .measure = Measure::triangles};
+    const ThingOptions things{.voxelSize = options.voxelSize, .margin = margin, .accuracy = ContactAccuracy::exact};
     const shapes::HoledBlock blockPart;
     const auto block = makeThing(shapes::holedBlock(blockPart), things);
     const float mouth = blockPart.height / 2, floor = blockPart.floor - mouth;

@@ -16,8 +16,8 @@ constexpr float major = 0.12f, minor = 0.03f;  // of a ring's circle and tube [m
 constexpr float poleRadius = 0.05f;            // [m]
 constexpr float spacing = 0.36f;               // between poles: rings of neighbours can touch [m]
 constexpr float apart = 0.1f;                  // between rings at the start [m]
-constexpr float mostTilt = 0.1f;               // of rings at the start: neighbours do not meet [rad]
-constexpr float mostShift = 0.02f;             // of rings at the start, aside [m]
+constexpr float maxTilt = 0.1f;                // of rings at the start: neighbours do not meet [rad]
+constexpr float maxShift = 0.02f;              // of rings at the start, aside [m]
 constexpr float halfFloor = 0.06f;             // thickness [m]
 constexpr float coarse = 2;                    // edge of the floor's voxels [voxels of the rings]
 constexpr int framesPerMeasuring = 10;         // a thousand rings have thousands of pairs
@@ -67,8 +67,8 @@ Threading threading(const std::vector<std::vector<Pose>>& frames, std::size_t fi
 Pose startOf(int index, const glm::vec2& pole, std::mt19937& random) {
     std::uniform_real_distribution<float> side(-1, 1);
     const float shiftX = side(random), shiftY = side(random), tiltX = side(random), tiltY = side(random);
-    const glm::vec3 tilt = 0.7f * mostTilt * glm::vec3(tiltX, tiltY, 0);
-    const glm::vec3 position(pole + 0.7f * mostShift * glm::vec2(shiftX, shiftY), apart * (float(index) + 1));
+    const glm::vec3 tilt = 0.7f * maxTilt * glm::vec3(tiltX, tiltY, 0);
+    const glm::vec3 position(pole + 0.7f * maxShift * glm::vec2(shiftX, shiftY), apart * (float(index) + 1));
     return {position, glm::normalize(glm::quat(1, 0.5f * tilt.x, 0.5f * tilt.y, 0))};
 }
 

@@ -22,12 +22,12 @@ using openvdb::Vec3d;
 using openvdb::Vec3f;
 using openvdb::Vec3SGrid;
 
-constexpr int behind = 4;           // voxels and faces behind the box's walls that are mirrored
-constexpr double outside = 0.5;     // of the body: where its skin reads the level set [voxels]
-constexpr float skin = 3.5f;        // of the body in which the level set goes on [voxels]
-constexpr float halfWidth = 3;      // of the box's level set [voxels]
-constexpr float leastOpen = 0.02f;  // part of a face: through less, pressures find speeds that mean nothing
-constexpr double flat = 1e-3;       // slope of a distance below which it has no direction
+constexpr int behind = 4;         // voxels and faces behind the box's walls that are mirrored
+constexpr double outside = 0.5;   // of the body: where its skin reads the level set [voxels]
+constexpr float skin = 3.5f;      // of the body in which the level set goes on [voxels]
+constexpr float halfWidth = 3;    // of the box's level set [voxels]
+constexpr float minOpen = 0.02f;  // part of a face: through less, pressures find speeds that mean nothing
+constexpr double flat = 1e-3;     // slope of a distance below which it has no direction
 
 // The open faces of the box alone.
 Vec3SGrid::Ptr openFacesOf(const CoordBBox& box, const openvdb::math::Transform& cells) {
@@ -124,7 +124,7 @@ void Basin::place(const fluid::Solid& solid) {
         reach.intersect(box_);
         Vec3f parts = *faces;
         for (int axis = 0; axis < 3; ++axis)
-            if (parts[axis] < leastOpen) parts[axis] = 0;
+            if (parts[axis] < minOpen) parts[axis] = 0;
         for (auto cell = reach.begin(); cell; ++cell)
             open.setValue(*cell, openvdb::math::minComponent(open.getValue(*cell), parts));
     }

@@ -14,7 +14,7 @@ namespace {
 constexpr double pi = glm::pi<double>();
 
 constexpr int segmentStep = 24;  // puts vertices on the corners of hexagons and squares
-constexpr int leastAround = 6;   // vertices of the smallest ring around a pole: its triangles are equilateral
+constexpr int minAround = 6;     // vertices of the smallest ring around a pole: its triangles are equilateral
 // Of an edge: how near rows of a thread may come to its end, below which they give way to it.
 constexpr double nearestRow = 0.4;
 constexpr double mouthWidth = 1.05;              // of a nut [diameters]: ISO 4032 has 1 to 1.08
@@ -116,7 +116,7 @@ std::vector<Level> between(const Level& from, const Level& to) {
         const double t = double(i) / cells;
         const auto radius = [=](double angle) { return (1 - t) * from.radius(angle) + t * to.radius(angle); };
         const int count = int(std::lround((1 - t) * from.count + t * to.count));
-        levels.push_back({radius, (1 - t) * from.height + t * to.height, std::max(leastAround, count)});
+        levels.push_back({radius, (1 - t) * from.height + t * to.height, std::max(minAround, count)});
     }
     levels.push_back(to);
     return levels;
@@ -422,7 +422,7 @@ Mesh gear(const Gear& part) {
     const Row circle = addTeeth(flat, part);
     Lathe lathe(flat);
     lathe.begin({round(root), 0, int(circle.size() - 1)}, circle);
-    const int around = std::max(leastAround, cellsOf(2 * pi * bore, part.edge));
+    const int around = std::max(minAround, cellsOf(2 * pi * bore, part.edge));
     lathe.to({roundHole(bore, around), 0, around});
     return extrude(flat, part.faceWidth, part.edge);
 }
@@ -492,7 +492,7 @@ Mesh pole(const Pole& part) {
     lathe.to({round(r), shoulder, n});
     for (int i = 1; i < arc; ++i) {
         const double angle = pi / 2 * i / arc, ring = r * std::cos(angle);
-        lathe.to({round(ring), shoulder + r * std::sin(angle), std::max(leastAround, int(n * std::cos(angle)))});
+        lathe.to({round(ring), shoulder + r * std::sin(angle), std::max(minAround, int(n * std::cos(angle)))});
     }
     lathe.to(pole(part.height));
     return mesh;

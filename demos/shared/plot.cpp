@@ -14,15 +14,15 @@ namespace {
 
 // [pixels]
 constexpr double panelWidth = 620, panelHeight = 400, left = 70, right = 200, top = 44, bottom = 54;
-constexpr std::size_t mostInRow = 3;  // panels
-constexpr double labelSpacing = 34;   // of the two lines of text at the ends of lines
+constexpr std::size_t maxInRow = 3;  // panels
+constexpr double labelSpacing = 34;  // of the two lines of text at the ends of lines
 constexpr std::array colours{"#1f5fa8", "#c4572b", "#3d8a4f", "#7a4fa0", "#b8860b", "#1b98a0", "#b0478c", "#5a5a5a"};
 
 // A point this far beyond a decade does not ask for another one [decades].
 constexpr double decadeSlack = 0.02;
 
-constexpr std::size_t mostMarks = 30;  // points that a line of a linear panel is marked at: with more it is a curve
-constexpr double steps = 5;            // of a linear axis, about
+constexpr std::size_t maxMarks = 30;  // points that a line of a linear panel is marked at: with more it is a curve
+constexpr double steps = 5;           // of a linear axis, about
 
 // An axis from whole decade to whole decade, or from tick to tick, onto pixels; `low` and `high` are logarithms unless
 // it is linear, in steps of `step`.
@@ -114,7 +114,7 @@ std::string lines(const Panel& panel, const Axis& x, const Axis& y) {
         std::string points;
         for (std::size_t k = 0; k < line.x.size(); ++k) {
             points += fmt::format("{:.1f},{:.1f} ", x(line.x[k]), y(line.y[k]));
-            if (!panel.linear || line.x.size() <= mostMarks)
+            if (!panel.linear || line.x.size() <= maxMarks)
                 out += fmt::format("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"3\" fill=\"{}\"/>\n", x(line.x[k]),
                                    y(line.y[k]), colour);
         }
@@ -153,7 +153,7 @@ std::string drawn(const Panel& panel) {
 
 std::string svg(const std::vector<Panel>& panels) {
     if (panels.empty()) throw std::invalid_argument("a plot needs a panel");
-    const std::size_t inRow = std::min(panels.size(), mostInRow), rows = (panels.size() + inRow - 1) / inRow;
+    const std::size_t inRow = std::min(panels.size(), maxInRow), rows = (panels.size() + inRow - 1) / inRow;
     std::string out = fmt::format(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {0:g} {1:g}\" width=\"{0:g}\" height=\"{1:g}\" "
         "font-family=\"DejaVu Sans, Helvetica, sans-serif\" font-size=\"12\" fill=\"#222\">\n"

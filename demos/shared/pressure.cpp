@@ -26,9 +26,9 @@ using openvdb::Vec3SGrid;
 using Vector = pcg::Vector<double>;
 using Matrix = poisson::LaplacianMatrix;
 
-constexpr double leastDistance = 0.02;  // of the surface from a liquid cell's centre, where it divides [voxels]
-constexpr double tolerance = 1e-5;      // of the divergence, in parts of its largest
-constexpr int mostIterations = 1000;
+constexpr double minDistance = 0.02;  // of the surface from a liquid cell's centre, where it divides [voxels]
+constexpr double tolerance = 1e-5;    // of the divergence, in parts of its largest
+constexpr int maxIterations = 1000;
 constexpr double towardsZero = 1e-6;  // how much pressures are drawn there, where no surface tells them
 
 // All that the equations of a cell read; one for each thread.
@@ -64,7 +64,7 @@ struct Reader {
     // How far from a liquid cell's centre the surface is, on the way to a neighbour that is none [voxels].
     double surfaceBetween(const Coord& cell, const Coord& neighbour) const {
         const double here = liquid.getValue(cell), there = liquid.getValue(neighbour);
-        return there > 0 ? std::max(here / (here - there), leastDistance) : 1;
+        return there > 0 ? std::max(here / (here - there), minDistance) : 1;
     }
 };
 
@@ -163,10 +163,10 @@ pcg::State solve(const Matrix& matrix, const Vector& change, Vector& pressure) {
     limits.relativeError = tolerance;
     int iterations = 0;
     do {
-        limits.iterations = mostIterations - iterations;
+        limits.iterations = maxIterations - iterations;
         state = pcg::solve(matrix, change, pressure, preconditioner, std::as_const(limits));
         iterations += state.iterations;
-    } while (!state.success && iterations < mostIterations);
+    } while (!state.success && iterations < maxIterations);
     state.iterations = iterations;
     return state;
 }

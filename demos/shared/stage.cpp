@@ -45,10 +45,10 @@ std::shared_ptr<const Thing> makeThing(Mesh mesh, const ThingOptions& options) {
     band.voxelSize = options.voxelSize;
     band.interiorWidth = options.interiorWidth;
     LevelSet field = build(mesh, band);
-    auto collider = std::make_shared<Collider>(mesh, field, ColliderOptions{.measure = options.measure});
+    auto collider = std::make_shared<Collider>(mesh, field, ColliderOptions{.accuracy = options.accuracy});
     const bullet::ShapeOptions centred{.frame = bullet::centreOfMassFrame(*collider),
                                        .margin = options.margin,
-                                       .sweeps = options.sweeps,
+                                       .speculative = options.speculative,
                                        .restingFriction = options.restingFriction};
     auto shape = std::make_shared<bullet::Shape>(collider, centred);
     Specimen specimen(mesh, specimenSpacing * options.voxelSize);

@@ -17,12 +17,12 @@
 namespace bilayer::demo {
 
 struct ThingOptions {
-    float voxelSize;                   ///< [m]
-    float interiorWidth = 6;           ///< of the band: bodies that sink in deeper are lost [voxels]
-    float margin = -1;                 ///< up to which contacts are made [m]; negative: a voxel
-    bool sweeps = true;                ///< what moves farther is followed (see bullet::ShapeOptions)
-    Measure measure = Measure::edges;  ///< of contacts
-    float restingFriction = 1;         ///< see bullet::ShapeOptions
+    float voxelSize;          ///< [m]
+    float interiorWidth = 6;  ///< of the band: bodies that sink in deeper are lost [voxels]
+    float margin = -1;        ///< up to which contacts are made [m]; negative: a voxel
+    bool speculative = true;  ///< what moves farther is followed (see bullet::ShapeOptions)
+    ContactAccuracy accuracy = ContactAccuracy::exactNearFeatures;  ///< of contacts
+    float restingFriction = 1;                                      ///< see bullet::ShapeOptions
 };
 
 /// What bodies are made of: what Bullet collides, and what measures whether it did.

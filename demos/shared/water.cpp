@@ -14,8 +14,8 @@ namespace {
 using openvdb::FloatGrid;
 using openvdb::Vec3SGrid;
 
-constexpr int bandLayers = 5;       // around the liquid in which its velocity is known, beside what it moves in a step
-constexpr double mostGrowth = 0.5;  // by which lost volume comes back [1/s]
+constexpr int bandLayers = 5;      // around the liquid in which its velocity is known, beside what it moves in a step
+constexpr double maxGrowth = 0.5;  // by which lost volume comes back [1/s]
 
 void addTo(FloatGrid& grid, float value) {
     for (auto voxel = grid.beginValueOn(); voxel; ++voxel) voxel.setValue(*voxel + value);
@@ -48,7 +48,7 @@ void Water::carrySurface(float seconds) {
 
 double Water::growth() const {
     if (!(options_.restoring > 0) || !(volume_ > 0)) return 0;
-    return std::clamp((options_.volume - volume_) / (volume_ * double(options_.restoring)), -mostGrowth, mostGrowth);
+    return std::clamp((options_.volume - volume_) / (volume_ * double(options_.restoring)), -maxGrowth, maxGrowth);
 }
 
 void Water::measure(const Basin& basin) {

@@ -66,7 +66,7 @@ void Dispatcher::dispatchAllCollisionPairs(btOverlappingPairCache* cache, const 
     const auto start = std::chrono::steady_clock::now();
     const bool isStep = !isOfGhost(*cache);
     functions_->state = {
-        .running = {}, .seconds = isStep ? info.m_timeStep : 0, .foreseesAll = !ContinuousCollision::serves(*this)};
+        .running = {}, .seconds = isStep ? info.m_timeStep : 0, .speculatesOnAll = !ContinuousCollision::serves(*this)};
 
     std::vector<Task> tasks;
     for (int i = 0; i < cache->getNumOverlappingPairs(); ++i) {

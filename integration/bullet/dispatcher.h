@@ -18,7 +18,7 @@ struct DispatchStatistics {
     int contactsKept = 0;   ///< handed to the solver
     /// What that took off the contacts' effect: of all pairs, how deep a contact that was left out could come before
     /// one that was kept is met [m]
-    float lost = 0;
+    float reductionError = 0;
     int beyondBand = 0;  ///< points too deep for the band (see ContactReport)
     int sampled = 0;     ///< pairs whose points the sampler has sampled, see Dispatcher
     double seconds = 0;  ///< for all of these pairs, Bullet's own included

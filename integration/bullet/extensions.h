@@ -18,9 +18,10 @@ struct ExtensionOptions {
     /// that hold each other back once more then lose the speed at which they approach each other; what cannot move at
     /// all comes to rest.
     ///
-    /// Bodies that move less than a margin in a step cost next to nothing. Left alone are shapes with sweeps == false,
-    /// pairs without a field, kinematic bodies and btGImpactMeshShape, which the Dispatcher's speculative contacts
-    /// serve still, and a body that Bullet's own CCD has stopped in this step. The same bits for any number of threads.
+    /// Bodies that move less than a margin in a step cost next to nothing. Left alone are shapes with speculative ==
+    /// false, pairs without a field, kinematic bodies and btGImpactMeshShape, which the Dispatcher's speculative
+    /// contacts serve still, and a body that Bullet's own CCD has stopped in this step. The same bits for any number of
+    /// threads.
     bool continuousCollision = true;
 
     /// Bodies at rest stay where they are. Bullet's solver leaves them some speed in each step, which is rounding and

@@ -14,34 +14,34 @@ namespace bilayer::bullet {
 namespace {
 
 // Walls [voxels]: from three on, mass and inertia are good to 0.5 %; below two, sides are told apart by luck.
-constexpr float wallVoxels = 3, leastWallVoxels = 2;
-// Narrowest passage [voxels]: overlaps at rest are below half a voxel, on either side.
+constexpr float wallVoxels = 3, minWallVoxels = 2;
+// Narrowest timeOfImpact [voxels]: overlaps at rest are below half a voxel, on either side.
 constexpr float gapVoxels = 2;
 // Voxels along the longest side: features of what is not thin, and what memory takes.
-constexpr float leastResolution = 64, mostResolution = 512;
-constexpr float rounding = 1e-3f;    // [voxels] and steps: numbers that are off by less count as whole
-constexpr float leastVoxel = 2e-5f;  // [m] OpenVDB takes none smaller
-constexpr float mostIndex = 1e9f;    // and no field's coordinates are larger [voxels]
+constexpr float minResolution = 64, maxResolution = 512;
+constexpr float rounding = 1e-3f;  // [voxels] and steps: numbers that are off by less count as whole
+constexpr float minVoxel = 2e-5f;  // [m] OpenVDB takes none smaller
+constexpr float maxIndex = 1e9f;   // and no field's coordinates are larger [voxels]
 // A point is in the band if the eight voxels around it are.
 constexpr float cellDiagonal = 1.7320508f;  // [voxels]
 // Bands inside [voxels]: what shallow overlaps need, and where sweeps or shorter steps are cheaper than more voxels.
-constexpr int leastInterior = 3, mostInterior = 10;
+constexpr int minInterior = 3, maxInterior = 10;
 // Points are followed along straight ways: off by 3 % of a body's radius where it turns by this in a step [rad].
 constexpr float straightTurn = 0.5f;
 // Deeper than the middle of a wall, a point is pushed out on the far side.
 constexpr float wallPart = 0.5f;
 // Bullet's thresholds are lengths and speeds of their own: gContactBreakingThreshold is 2 cm, bodies sleep below
 // 0.8 m/s. A tenth of a body's size and four of its lengths a second are still harmless [m].
-constexpr float leastSize = 0.2f;
-constexpr float mostMassRatio = 10;  // what ten iterations of sequential impulses settle
-constexpr double mostMemory = double(1 << 30);
+constexpr float minSize = 0.2f;
+constexpr float maxMassRatio = 10;  // what ten iterations of sequential impulses settle
+constexpr double maxMemory = double(1 << 30);
 // Measured at the end of large builds on two cores of an AMD EPYC (Zen 4), 2023 [s].
 constexpr double secondsPerTriangle = 160e-9, secondsPerVoxel = 26e-9;
 // A block of 8^3 voxels as a Field keeps it, with an apron [bytes]; and how wide it is, seen from anywhere in the mean
 // [voxels].
 constexpr double blockBytes = 9 * 9 * 9 * 4, blockVoxels = 512, blockWidth = 12;
 
-void requireSensible(const MeshReport& mesh, const Scene& scene) {
+void requireSensible(const MeshReport& mesh, const SceneRequirements& scene) {
     for (const auto& [name, value, least] :
          {std::tuple("step", scene.step, 1e-9f), std::tuple("speed", scene.speed, 0.f),
           std::tuple("thickness", scene.thickness, 0.f), std::tuple("gap", scene.gap, 0.f),
@@ -51,32 +51,32 @@ void requireSensible(const MeshReport& mesh, const Scene& scene) {
         if (!(value >= least && std::isfinite(value)))
             throw std::invalid_argument(
                 fmt::format("advice: a {} of {}; it must be finite, and {} at least", name, value, least));
-    if (scene.voxelSize > 0 && scene.voxelSize < leastVoxel)
+    if (scene.voxelSize > 0 && scene.voxelSize < minVoxel)
         throw std::invalid_argument(
             fmt::format("advice: a voxel size of {}; no field has voxels below {:g}: scale the mesh up",
-                        scene.voxelSize, leastVoxel));
-    if (scene.voxelSize > 0 && mesh.bounds.longestSide() / scene.voxelSize > mostIndex)
+                        scene.voxelSize, minVoxel));
+    if (scene.voxelSize > 0 && mesh.bounds.longestSide() / scene.voxelSize > maxIndex)
         throw std::invalid_argument(fmt::format(
-            "advice: a voxel size of {}; no field has more than {:g} voxels in a row", scene.voxelSize, mostIndex));
+            "advice: a voxel size of {}; no field has more than {:g} voxels in a row", scene.voxelSize, maxIndex));
     if (mesh.triangles == 0 || !(mesh.bounds.longestSide() > 0))
         throw std::invalid_argument("advice: the mesh has no extent");
 }
 
 int wholeFrom(float value) {
-    return int(std::min(std::ceil(value - rounding), float(mostSubsteps)));
+    return int(std::min(std::ceil(value - rounding), float(maxSubsteps)));
 }
 
-float chosenVoxel(const Scene& scene, float longest, float wall) {
+float chosenVoxel(const SceneRequirements& scene, float longest, float wall) {
     if (scene.voxelSize > 0) return scene.voxelSize;
-    float voxel = longest / leastResolution;
+    float voxel = longest / minResolution;
     if (wall > 0) voxel = std::min(voxel, wall / wallVoxels);
     if (scene.gap > 0) voxel = std::min(voxel, scene.gap / gapVoxels);
-    return std::max({voxel, longest / mostResolution, leastVoxel});
+    return std::max({voxel, longest / maxResolution, minVoxel});
 }
 
 // By area and volume: exact to first order in the curvature. Blocks are counted on both sides of the surface, so that
 // walls thinner than a block need up to half of the memory only.
-void estimate(const MeshReport& mesh, Advice& advice) {
+void estimate(const MeshReport& mesh, Settings& advice) {
     const double h = advice.voxelSize, area = mesh.area / (h * h), volume = std::abs(mesh.volume) / (h * h * h);
     double inside = area * advice.interiorWidth;
     if (mesh.closed()) inside = std::min(inside, volume);
@@ -97,42 +97,44 @@ void warnOfMesh(const MeshReport& mesh, std::vector<std::string>& warnings) {
         warnings.push_back(fmt::format("the mesh is not clean: {}", verdict(mesh)));
 }
 
-void warnOfSizes(const MeshReport& mesh, const Scene& scene, const Advice& advice, std::vector<std::string>& warnings) {
+void warnOfSizes(const MeshReport& mesh, const SceneRequirements& scene, const Settings& advice,
+                 std::vector<std::string>& warnings) {
     const float tip = mesh.thinnestWall / advice.voxelSize;
-    if (advice.wallVoxels > 0 && advice.wallVoxels < leastWallVoxels - rounding)
+    if (advice.wallVoxels > 0 && advice.wallVoxels < minWallVoxels - rounding)
         warnings.push_back(fmt::format(
             "walls are {:.2g} voxels thick: below {:g}, contacts may come out on the far side and mass is lost",
-            advice.wallVoxels, leastWallVoxels));
-    else if (tip > 0 && tip < leastWallVoxels)
+            advice.wallVoxels, minWallVoxels));
+    else if (tip > 0 && tip < minWallVoxels)
         warnings.push_back(
             fmt::format("the thinnest place, a tip or a crease, has {:.2g} voxels: contacts there are coarse", tip));
     if (const float gap = scene.gap / advice.voxelSize; gap > 0 && gap < gapVoxels - rounding)
         warnings.push_back(
             fmt::format("the gap is {:.2g} voxels wide: below {:g}, bodies at rest overlap in it", gap, gapVoxels));
     if (advice.margin == 0) warnings.push_back("without a margin, contacts of what rests come and go");
-    if (advice.margin > advice.voxelSize * float(mostInterior))
+    if (advice.margin > advice.voxelSize * float(maxInterior))
         warnings.push_back(fmt::format("the margin is {:.2g} voxels: the band outside has to reach as far",
                                        advice.margin / advice.voxelSize));
-    if (double(advice.fieldBytes) > mostMemory)
-        warnings.push_back(fmt::format("the field takes about {:.1f} GiB", double(advice.fieldBytes) / mostMemory));
+    if (double(advice.fieldBytes) > maxMemory)
+        warnings.push_back(fmt::format("the field takes about {:.1f} GiB", double(advice.fieldBytes) / maxMemory));
 }
 
-void warnOfMotion(const Scene& scene, const Advice& advice, float way, std::vector<std::string>& warnings) {
-    if (advice.substepsUnswept > advice.substeps || advice.substeps == mostSubsteps)
-        warnings.push_back(
-            fmt::format("a step goes {:.3g} m, farther than half of a wall: impacts throw bodies through what is thin "
-                        "unless a bullet::WorldExtensions looks after the world; without it and without swept contacts "
-                        "(ShapeOptions::sweeps) that needs {} substeps{}",
-                        way, advice.substepsUnswept, advice.substepsUnswept < mostSubsteps ? "" : " or more"));
-    if (scene.massRatio > mostMassRatio)
+void warnOfMotion(const SceneRequirements& scene, const Settings& advice, float way,
+                  std::vector<std::string>& warnings) {
+    if (advice.substepsWithoutSpeculation > advice.substeps || advice.substeps == maxSubsteps)
+        warnings.push_back(fmt::format(
+            "a step goes {:.3g} m, farther than half of a wall: impacts throw bodies through what is thin "
+            "unless a bullet::WorldExtensions looks after the world; without it and without swept contacts "
+            "(ShapeOptions::speculative) that needs {} substeps{}",
+            way, advice.substepsWithoutSpeculation, advice.substepsWithoutSpeculation < maxSubsteps ? "" : " or more"));
+    if (scene.massRatio > maxMassRatio)
         warnings.push_back(
             fmt::format("masses of {:.3g} to 1: above {:g} to 1 the solver leaves what lies below "
                         "squeezed; take more substeps, not more iterations",
-                        scene.massRatio, mostMassRatio));
+                        scene.massRatio, maxMassRatio));
 }
 
 void warnOfBullet(float longest, std::vector<std::string>& warnings) {
-    if (longest < leastSize)
+    if (longest < minSize)
         warnings.push_back(
             fmt::format("a body of {:.3g} m is small to Bullet, which lets it sleep below 0.8 m/s and "
                         "widens its box by 0.02 m: lower setSleepingThresholds() and "
@@ -142,12 +144,12 @@ void warnOfBullet(float longest, std::vector<std::string>& warnings) {
 
 }  // namespace
 
-Advice advise(const MeshReport& mesh, const Scene& scene) {
+Settings recommendSettings(const MeshReport& mesh, const SceneRequirements& scene) {
     requireSensible(mesh, scene);
     const float longest = mesh.bounds.longestSide();
     const float wall = scene.thickness > 0 && mesh.commonWall > 0 ? std::min(scene.thickness, mesh.commonWall)
                                                                   : std::max(scene.thickness, mesh.commonWall);
-    Advice advice;
+    Settings advice;
     const float h = advice.voxelSize = chosenVoxel(scene, longest, wall);
     advice.margin = scene.margin < 0 ? h : scene.margin;
     advice.wallVoxels = wall / h;
@@ -158,10 +160,10 @@ Advice advise(const MeshReport& mesh, const Scene& scene) {
     const float spin = scene.spin < 0 ? 2 * scene.speed / longest : scene.spin;
     advice.substeps = std::max(1, wholeFrom(spin * scene.step / straightTurn));
     const float deepest = wallPart * (wall > 0 ? wall : longest);
-    advice.substepsUnswept = std::max(advice.substeps, wholeFrom(way / deepest));
+    advice.substepsWithoutSpeculation = std::max(advice.substeps, wholeFrom(way / deepest));
     advice.exteriorWidth = std::max(1, wholeFrom(advice.margin / h + cellDiagonal));
     advice.interiorWidth =
-        std::clamp(wholeFrom(way / (float(advice.substeps) * h) + cellDiagonal), leastInterior, mostInterior);
+        std::clamp(wholeFrom(way / (float(advice.substeps) * h) + cellDiagonal), minInterior, maxInterior);
     estimate(mesh, advice);
 
     warnOfMesh(mesh, advice.warnings);

@@ -37,7 +37,7 @@ constexpr float castVoxel = 0.05f;
 // Where a ray goes on behind a triangle that it sees from behind [voxels].
 constexpr double skippedVoxels = 1e-4;
 // Bullet's quantized hierarchy takes the upper bits of larger indices for the number of a part.
-constexpr std::size_t mostQuantized = std::size_t(1) << (31 - MAX_NUM_PARTS_IN_BITS);
+constexpr std::size_t maxQuantized = std::size_t(1) << (31 - MAX_NUM_PARTS_IN_BITS);
 // How far the triangles of a field's zero set lie from its interpolant's zeros at most, or a bit more [voxels].
 constexpr float zeroSetVoxels = 0.1f;
 
@@ -221,7 +221,7 @@ class Shape::Triangles {
         array_ = std::make_unique<btTriangleIndexVertexArray>(
             static_cast<int>(mesh.triangles.size()), indices_.data(), static_cast<int>(3 * sizeof(int)),
             static_cast<int>(points_.size()), &points_.front().x, static_cast<int>(sizeof(glm::vec3)));
-        mesh_.reset(new btBvhTriangleMeshShape(array_.get(), mesh.triangles.size() <= mostQuantized));
+        mesh_.reset(new btBvhTriangleMeshShape(array_.get(), mesh.triangles.size() <= maxQuantized));
         scaled_.reset(new btScaledBvhTriangleMeshShape(mesh_.get(), shape.getLocalScaling()));
     }
 
@@ -237,7 +237,7 @@ class Shape::Triangles {
 Shape::Shape(std::shared_ptr<const Collider> collider, const ShapeOptions& options)
     : collider_(std::move(collider)),
       frame_(options.frame),
-      sweeps_(options.sweeps),
+      speculative_(options.speculative),
       restingFriction_(options.restingFriction),
       triangles_(std::make_unique<Triangles>()) {
     if (!collider_) throw std::invalid_argument("Shape: no collider");

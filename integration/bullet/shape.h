@@ -25,7 +25,7 @@ struct ShapeOptions {
     /// what a step would meet, and the solver lets bodies come that far. Surface points follow straight ways, and the
     /// solver is iterative: what goes by more than the thickness of a wall in a step may still pass it, unless
     /// continuous collision (extensions.h) looks after the world.
-    bool sweeps = true;
+    bool speculative = true;
     /// How many times as much friction contacts bear that have not slipped for 120 steps; 1: no more. It comes by and
     /// by, and goes with the slip: all of it in a tenth of a voxel. Heaps come to rest with friction at its limit in
     /// many contacts, and there any rounding lets a body slip on that is kept awake. Of two fields the larger one
@@ -54,7 +54,7 @@ class Shape : public btConcaveShape {
     const Pose& frame() const { return frame_; }
     /// The collider in the world, for a body's transform.
     Placed placed(const btTransform& bodyTransform) const;
-    bool sweeps() const { return sweeps_; }
+    bool speculative() const { return speculative_; }
     float restingFriction() const { return restingFriction_; }
     /// The voxels' edge after scaling [m].
     float voxelSize() const { return scale() * collider_->field().voxelSize(); }
@@ -87,7 +87,7 @@ class Shape : public btConcaveShape {
 
     std::shared_ptr<const Collider> collider_;
     Pose frame_;
-    bool sweeps_;
+    bool speculative_;
     float restingFriction_;
     btVector3 scaling_{1, 1, 1};
     std::unique_ptr<Triangles> triangles_;

@@ -25,7 +25,7 @@ namespace {
 /// What the sweep takes for a voxel of the box: the field, its mask, the order of its voxels along eight diagonals.
 constexpr double bytesPerVoxel = 24;
 /// OpenVDB grows the band by whole voxels: one more reaches the distance everywhere.
-constexpr int spareLayers = 1, mostLayers = 1 << 20;
+constexpr int spareLayers = 1, maxLayers = 1 << 20;
 
 void check(const openvdb::FloatGrid& band, const openvdb::CoordBBox& box) {
     const auto range = openvdb::tools::minMax(band.tree());
@@ -76,7 +76,7 @@ LevelSet fill(const LevelSet& levelSet, float distance) {
     const float narrower = std::min(levelSet.exteriorWidth(), levelSet.interiorWidth());
     const double layers = std::ceil((double(distance) - double(narrower)) / double(levelSet.voxelSize())) + spareLayers;
     openvdb::CoordBBox box = band.evalActiveVoxelBoundingBox();
-    if (layers > double(mostLayers)) throw std::invalid_argument("the distance to fill to is too far for these voxels");
+    if (layers > double(maxLayers)) throw std::invalid_argument("the distance to fill to is too far for these voxels");
     box.expand(std::max(int(layers), 0));
     check(band, box);
     if (layers <= spareLayers) return levelSet;

@@ -26,8 +26,8 @@ using openvdb::Vec3SGrid;
 using openvdb::Vec3STree;
 using openvdb::math::Transform;
 
-constexpr float leastHalfWidth = 3, mostHalfWidth = 1000;  // [voxels]
-constexpr double alongAxes = 1e-9;                         // by which a cosine may differ from 1
+constexpr float minHalfWidth = 3, maxHalfWidth = 1000;  // [voxels]
+constexpr double alongAxes = 1e-9;                      // by which a cosine may differ from 1
 // A corner's number has bit 4 for the upper x, 2 for y, 1 for z. The tetrahedra go from corner 0 to corner 7 along
 // three edges, in each order of the axes.
 constexpr int tetrahedra[6][4] = {{0, 4, 6, 7}, {0, 4, 5, 7}, {0, 2, 6, 7}, {0, 2, 3, 7}, {0, 1, 5, 7}, {0, 1, 3, 7}};
@@ -173,7 +173,7 @@ void check(const SolidOptions& options, const Transform& cells) {
     }
     const float lengths = glm::length(options.velocity.linear) + glm::length(options.velocity.angular);
     if (!std::isfinite(lengths)) throw std::invalid_argument("solid: the velocity is not finite");
-    if (!(options.halfWidth >= leastHalfWidth && options.halfWidth <= mostHalfWidth))
+    if (!(options.halfWidth >= minHalfWidth && options.halfWidth <= maxHalfWidth))
         throw std::invalid_argument("solid: the half width must be in 3..1000 voxels");
 }
 
@@ -184,7 +184,7 @@ Solid solidOf(const Body& body, const Placement& placement, const Transform& cel
     Solid solid;
     solid.distance = regrid(body, placement, cells, options.halfWidth * voxel);
     solid.distance->setName("solid");
-    addOpenParts(solid, *regrid(body, placement, *cornersOf(cells), leastHalfWidth * voxel), cells);
+    addOpenParts(solid, *regrid(body, placement, *cornersOf(cells), minHalfWidth * voxel), cells);
     addVelocity(solid, options.velocity, placement.pose.position);
     return solid;
 }

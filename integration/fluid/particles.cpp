@@ -30,7 +30,7 @@ constexpr int blockSide = 8;  // [voxels] a task: a leaf
 constexpr int maxPerVoxel = 1000;
 constexpr double farOutside = 1;  // [voxels] of distance at a centre beyond which no part of the voxel is inside
 constexpr int jitterBits = 21;    // a coordinate: three fit into one hash
-constexpr double mostBlocks = 1 << 28, maxIndex = 1 << 29;  // of a body's box in a solver's voxels
+constexpr double maxBlocks = 1 << 28, maxIndex = 1 << 29;  // of a body's box in a solver's voxels
 
 // S. Vigna's splitmix64: every bit of the output depends on every bit of the input.
 std::uint64_t mix(std::uint64_t x) {
@@ -120,7 +120,7 @@ class Body {
           // how far in the body's own coordinates a voxel may reach
           reach_(0.5f * std::sqrt(3.f) * float(voxels.voxelSize()[0]) /
                  std::min({placement.scale.x, placement.scale.y, placement.scale.z})),
-          error_(mostInterpolationError * field.voxelSize()) {}
+          error_(maxInterpolationError * field.voxelSize()) {}
 
     // The blocks of voxels that meet the body's box.
     std::vector<Coord> blocks() const {
@@ -135,7 +135,7 @@ class Body {
             upper = openvdb::math::maxComponent(upper, index);
         }
         const Vec3d size = (upper - lower) / double(blockSide) + Vec3d(2);
-        if (!(size.x() * size.y() * size.z() <= mostBlocks && std::max(upper.length(), lower.length()) < maxIndex))
+        if (!(size.x() * size.y() * size.z() <= maxBlocks && std::max(upper.length(), lower.length()) < maxIndex))
             throw std::invalid_argument("particles: the body is out of range of these voxels");
         const Coord from = Coord::floor(lower - Vec3d(1)) & ~(blockSide - 1), to = Coord::ceil(upper + Vec3d(1));
         std::vector<Coord> origins;

@@ -1,5 +1,5 @@
 // Seeding in three steps: the body's distances are found at the liquid's voxels, the two level sets are combined by
-// OpenVDB's CSG, and the result is mended until it is a level set in the sense of openvdb::tools::checkLevelSet. All
+// OpenVDB's CSG, and the result is repaired until it is a level set in the sense of openvdb::tools::checkLevelSet. All
 // work is done on a copy.
 #include <bilayer/integration/fluid/seed.h>
 
@@ -35,7 +35,8 @@ void requireLiquid(const FloatGrid& liquid) {
     if (!(liquid.background() >= minHalfWidth * liquid.voxelSize()[0] * (1 - rounding)))
         refuse("the liquid's band is narrower than 3 voxels");
     if (!std::isfinite(liquid.background())) refuse("the liquid's background is not finite");
-    // all of OpenVDB's checks but that of the gradient, which is mended, and of the width, which may lack its last bit
+    // all of OpenVDB's checks but that of the gradient, which is repaired, and of the width, which may lack its last
+    // bit
     openvdb::tools::CheckLevelSet<FloatGrid> check(liquid);
     std::string fault = check.checkTiles();
     if (fault.empty()) fault = check.checkFinite();
@@ -76,7 +77,7 @@ SeedReport seedWith(FloatGrid& liquid, const FloatGrid::Ptr& band, SeedMode mode
     requireInside(*band);
     const openvdb::Coord core = deepest(*band);
     const FloatGrid::Ptr result = combined(liquid, band, mode);
-    const Changes changes = mend(*result);
+    const Changes changes = repair(*result);
     if (mode == SeedMode::unite && !(result->tree().getValue(core) < 0))
         refuse("the body is too small for these voxels: nothing of it would be left");
     liquid.setTree(result->treePtr());

@@ -15,6 +15,7 @@ namespace bilayer::detail {
 /// Calls work(i) for each i below `count`, in parallel. Throws what the first of them threw, whichever came first.
 template <class Work>
 void inOrder(std::size_t count, Work work) {
+    if (count == 1) return work(std::size_t(0));
     std::atomic<std::size_t> failed = std::numeric_limits<std::size_t>::max();
     std::exception_ptr error;
     std::mutex mutex;

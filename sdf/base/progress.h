@@ -25,7 +25,7 @@ class Progress {
                       std::chrono::steady_clock::duration interval = usualInterval)
         : listener_(listener), interval_(interval) {}
 
-    /// Sets what advance() counts against.
+    /// DisjointSets what advance() counts against.
     void begin(std::size_t total) {
         total_ = total;
         done_ = 0;
@@ -45,7 +45,7 @@ class Progress {
         if (now < next_.load(std::memory_order_relaxed)) return;
         const std::unique_lock lock(mutex_, std::try_to_lock);
         if (!lock || now < next_.load(std::memory_order_relaxed)) return;
-        // a second go, over a mended mesh, must not fall behind the first
+        // a second go, over a repaired mesh, must not fall behind the first
         told_ = std::max(told_, total_ == 0 ? 0.f : workShare * float(done_) / float(total_));
         tell(told_);
         next_ = std::chrono::steady_clock::now().time_since_epoch() + interval_;

@@ -19,7 +19,7 @@ namespace bilayer::detail {
 namespace {
 
 constexpr int bitsPerAxis = 12, indexBits = 28, keyBits = 3 * bitsPerAxis;
-static_assert(curveCells == 1u << bitsPerAxis && mostOnCurve == std::size_t(1) << indexBits);
+static_assert(curveCells == 1u << bitsPerAxis && maxOnCurve == std::size_t(1) << indexBits);
 /// A pass of the radix sort; three passes sort a key.
 constexpr int digitBits = 12;
 constexpr std::size_t digits = std::size_t(1) << digitBits;
@@ -29,7 +29,7 @@ constexpr std::size_t grain = 1024;         // groups a task
 /// What is worth splitting for another thread: items.
 constexpr std::size_t worthSplitting = 1 << 15;
 /// Selection halves what it looks at, on average, until there is little left; if not, it is done in another way.
-constexpr int mostRounds = 64;
+constexpr int maxRounds = 64;
 constexpr std::ptrdiff_t shortRun = 24;
 
 // Spreads 12 bits to every third bit.
@@ -97,7 +97,7 @@ class Splitter {
     // As std::nth_element, but without branches on what can not be foretold.
     static void select(TreeItem* begin, TreeItem* middle, TreeItem* end, int axis) {
         const auto inOrder = [axis](const TreeItem& a, const TreeItem& b) { return less(a, b, axis); };
-        for (int round = 0; round < mostRounds && end - begin > shortRun; ++round) {
+        for (int round = 0; round < maxRounds && end - begin > shortRun; ++round) {
             // all differ: something is less than the second of three
             std::array<TreeItem, 3> some{*begin, begin[(end - begin) / 2], end[-1]};
             std::sort(some.begin(), some.end(), inOrder);

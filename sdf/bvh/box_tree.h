@@ -43,8 +43,8 @@ struct BoxTree {
 /// Cells along an axis of the cube that Hilbert's curve runs through.
 inline constexpr std::uint32_t curveCells = 1 << 12;
 /// A place along the curve and the number of what is there share 64 bits.
-inline constexpr std::size_t mostOnCurve = std::size_t(1) << 28;
-inline constexpr std::uint64_t curveIndexMask = mostOnCurve - 1;
+inline constexpr std::size_t maxOnCurve = std::size_t(1) << 28;
+inline constexpr std::uint64_t curveIndexMask = maxOnCurve - 1;
 
 /// Coordinates of cells, in runs so that the compiler can use vectors.
 struct CurveCells {

@@ -20,7 +20,7 @@ using IndexTag = hn::RebindToUnsigned<Tag>;
 /// Rounding of a volume in floats, relative to the sum of the sizes of its products: eight roundings and some room.
 constexpr float roundingOfVolume = 1e-6f;
 /// More than what products lose where they are too small for a float.
-constexpr float leastProduct = 1e-30f, leastVolume = 1e-37f;
+constexpr float minProduct = 1e-30f, minVolume = 1e-37f;
 
 inline Points pointsAt(const float (&p)[3][treeWidth], std::size_t lane) {
     const Tag tag;
@@ -61,7 +61,7 @@ struct Planes {
         const auto products = [](Vec a, Vec b, Vec c, Vec d, Vec& difference, Vec& size) {
             const Vec first = hn::Mul(a, b), second = hn::Mul(c, d);
             difference = hn::Sub(first, second);
-            size = hn::Add(hn::Add(hn::Abs(first), hn::Abs(second)), hn::Set(Tag(), leastProduct));
+            size = hn::Add(hn::Add(hn::Abs(first), hn::Abs(second)), hn::Set(Tag(), minProduct));
         };
         products(u.y, v.z, u.z, v.y, normal.x, sizes.x);
         products(u.z, v.x, u.x, v.z, normal.y, sizes.y);
@@ -74,7 +74,7 @@ struct Planes {
         const Vec volume = sum(hn::Mul(normal.x, d.x), hn::Mul(normal.y, d.y), hn::Mul(normal.z, d.z));
         const Vec size =
             sum(hn::Mul(sizes.x, hn::Abs(d.x)), hn::Mul(sizes.y, hn::Abs(d.y)), hn::Mul(sizes.z, hn::Abs(d.z)));
-        const Vec room = hn::Add(hn::Mul(size, hn::Set(Tag(), roundingOfVolume)), hn::Set(Tag(), leastVolume));
+        const Vec room = hn::Add(hn::Mul(size, hn::Set(Tag(), roundingOfVolume)), hn::Set(Tag(), minVolume));
         above = hn::Gt(volume, room);
         below = hn::Lt(volume, hn::Neg(room));
     }

@@ -24,7 +24,7 @@ using NumberTag = hn::RebindToSigned<Tag>;
 /// then differ by less than tie * (1 + d^2), since 2 d <= 1 + d^2; so it is in exact_block.cpp [voxels].
 constexpr float tie = 1e-5f;
 /// Nearer to a face than this its side is left to a closer look [voxels].
-constexpr float leastHeight = 1e-3f;
+constexpr float minHeight = 1e-3f;
 /// Up to this reach the two above hold; they grow with it beyond, as the rounding of distances does [voxels].
 constexpr float usualReach = 16;
 /// Room for the rounding of distances, and for ties, when a bound is taken from one place to another [voxels].
@@ -33,7 +33,7 @@ constexpr float slack = 1e-3f;
 constexpr int path[8][3] = {{0, 0, 0}, {0, 0, 1}, {0, 1, 1}, {0, 1, 0}, {1, 1, 0}, {1, 1, 1}, {1, 0, 1}, {1, 0, 0}};
 /// The eight voxels of a cube are measured together against no more triangles than this: with more it is quicker to let
 /// each choose its own. Cubes with more nodes around them have more.
-constexpr std::size_t mostTogether = 64, mostNodes = 16;
+constexpr std::size_t maxTogether = 64, maxNodes = 16;
 
 // The squared distances of eight boxes, or as many as a vector holds, from a box of voxels.
 inline Vec boxDistance2(const float* const lower[3], const float* const upper[3], std::size_t i,
@@ -225,7 +225,7 @@ struct Together {
     const WideTree& tree;
     alignas(64) float x[treeWidth], y[treeWidth], z[treeWidth], best2[treeWidth];
     std::size_t count = 0;
-    Candidate candidates[mostTogether];
+    Candidate candidates[maxTogether];
 
     Together(const WideTree& whole, const glm::vec3& lower) : tree(whole) {
         for (int i = 0; i < treeWidth; ++i) {
@@ -330,7 +330,7 @@ struct BlockQuery {
     // Answers the voxels of a cube of side 2 at once, if few triangles matter to any of them: those that are no farther
     // from the centre, where all are measured first, than the nearest one of some voxel may be.
     bool answerTogether(Query& centre, const NodeList& list, const glm::vec3& lower, float atMost, float radius) {
-        if (list.count > mostNodes) return false;
+        if (list.count > maxNodes) return false;
         Together cube(tree, lower);
         const auto [visit, place] = centre.winner();
         const std::uint32_t winner = answer.visits[visit].leaf;
@@ -340,7 +340,7 @@ struct BlockQuery {
         for (const auto& v : answer.visits)
             for (std::size_t i = 0; i < treeWidth; ++i) {
                 if (v.distance2[i] > centre.limit2 || (v.leaf == winner && i == place)) continue;
-                if (cube.count == mostTogether) return false;
+                if (cube.count == maxTogether) return false;
                 cube.ask(v.leaf, i);
             }
         const Together::Answers found = cube.answers(centre.tieWidth);
@@ -365,7 +365,7 @@ struct BlockQuery {
         if (!sign) return;
         if (distance > farFrom) answer.far[x] |= bit;
         if (distance > midFrom) answer.mid[x] |= bit;
-        const float least = leastHeight * std::max(1.f, reach / usualReach);
+        const float least = minHeight * std::max(1.f, reach / usualReach);
         // on the surface either side is right, and no link can carry it on
         if (heights.lowest > least || distance < 0.5f * linkSlack) answer.sides.outside[x] |= bit;
         if (heights.highest < -least) answer.sides.inside[x] |= bit;

@@ -86,7 +86,7 @@ class Parts {
     void halve(const Corners& c, std::uint32_t triangle) {
         const auto [i, length2] = longest(c);
         if (length2 <= longest2_) {
-            if (count() >= mostOnCurve)
+            if (count() >= maxOnCurve)
                 throw std::invalid_argument("voxelSize is too small: the mesh has triangles too large for it");
             halves_.push_back({c, triangle});
             return;
@@ -239,7 +239,7 @@ void makeLeaf(const Parts& parts, const std::vector<std::uint64_t>& keys, std::s
 }  // namespace
 
 WideTree makeWideTree(const Mesh& mesh, float voxelSize, Progress* progress, const TreeShape& shape) {
-    if (mesh.triangles.size() >= mostOnCurve) throw std::invalid_argument("the mesh has 2^28 triangles or more");
+    if (mesh.triangles.size() >= maxOnCurve) throw std::invalid_argument("the mesh has 2^28 triangles or more");
     const Bounds box = bounds(mesh);
     const glm::dvec3 lower = glm::dvec3(box.lower) / double(voxelSize),
                      upper = glm::dvec3(box.upper) / double(voxelSize);

@@ -11,7 +11,7 @@ namespace {
 /// Pieces with a mean radius below this are grouped: several of them share a voxel [voxels].
 constexpr double smallRadius = 1.6;
 /// More cells than this, 4 MiB of counters, and a brick's pieces stay alone.
-constexpr double mostCells = 1 << 20;
+constexpr double maxCells = 1 << 20;
 /// Side of the cells that pieces are grouped by, as a multiple of their mean radius, and its limits; others took longer
 /// (measured) [voxels].
 constexpr float cellFactor = 4.f, smallestCell = 1.1f, largestCell = 3.f;
@@ -36,7 +36,7 @@ void Clusters::build(std::span<const Piece> pieces, const glm::ivec3& origin) {
     }
     const float meanRadius = float(radii / double(pieces.size()));
     const Cells cells(lower, upper, std::clamp(cellFactor * meanRadius, smallestCell, largestCell));
-    const bool grouped = radii < smallRadius * double(pieces.size()) && cells.count() <= mostCells;
+    const bool grouped = radii < smallRadius * double(pieces.size()) && cells.count() <= maxCells;
     if (!grouped) {
         for (std::uint32_t i = 0; i < members_.size(); ++i)
             clusters_.push_back({members_[i].sample, members_[i].radius, members_[i].normal, 0, i, i + 1});

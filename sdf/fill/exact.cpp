@@ -28,7 +28,7 @@ constexpr double longestPieceEdge = 16;
 /// A triangle must come this much nearer than a sample's piece might to be left out of a closer look [voxels].
 constexpr float sideSlack = 1e-3f;
 /// Ways that are tried before the winding number of the whole mesh.
-constexpr int mostWays = 16;
+constexpr int maxPaths = 16;
 constexpr std::size_t trianglesPerPoll = 1024;  // a tenth of a millisecond
 
 // What a thread works in; kept from brick to brick.
@@ -43,7 +43,7 @@ struct Scratch {
 
 class BrickFiller {
   public:
-    BrickFiller(const MeshJob& job, const TriangleBins& bins, double voxelsPerUnit, LastResort& lastResort,
+    BrickFiller(const MeshJob& job, const TriangleBins& bins, double voxelsPerUnit, FallbackSign& lastResort,
                 Scratch& scratch)
         : job_(job),
           bins_(bins),
@@ -130,7 +130,7 @@ class BrickFiller {
     BlockMask insideVoxels() {
         BlockSides sides{found_.outside, found_.inside};
         const std::size_t onBoth =
-            completeSides(findLinks(found_.distance), {&found_.far, &found_.mid, &found_.known}, sides,
+            completeSides(findSignLinks(found_.distance), {&found_.far, &found_.mid, &found_.known}, sides,
                           [&](int voxel) { return isInside(voxel, sides.outside, sides.inside); });
         if (onBoth > 0 && job_.conflicts) *job_.conflicts += onBoth;
         return sides.inside;
@@ -181,7 +181,7 @@ class BrickFiller {
                 const bool knownInside = (inside[x] >> bit) & 1;
                 const auto winding = windingAfter(inBlock(int(x) * 64 + bit) - from, knownInside ? 1 : 0);
                 if (winding && (*winding == 0 || *winding == 1)) return *winding == 1;
-                if (++tries == mostWays) return std::nullopt;
+                if (++tries == maxPaths) return std::nullopt;
             }
         return std::nullopt;
     }
@@ -206,7 +206,7 @@ class BrickFiller {
     const MeshJob& job_;
     const TriangleBins& bins_;
     double voxelsPerUnit_;
-    LastResort& lastResort_;
+    FallbackSign& lastResort_;
     Scratch& s_;
     std::size_t cut_ = 0;
     ClosestSide side_;
@@ -223,7 +223,7 @@ void fillExact(const MeshJob& job, const Bounds& box) {
     const double voxelsPerUnit = 1.0 / double(job.voxelSize);
     const TriangleBins bins = binTriangles(job.mesh, box, voxelsPerUnit, job.reach, &job.progress);
     job.progress.begin(bins.count());
-    LastResort lastResort(job);
+    FallbackSign lastResort(job);
     tbb::enumerable_thread_specific<Scratch> scratch;
     tbb::parallel_for(std::size_t(0), bins.count(), [&](std::size_t brick) {
         BrickFiller(job, bins, voxelsPerUnit, lastResort, scratch.local()).fill(brick);

@@ -33,7 +33,7 @@ constexpr float raisedPart = 1e-3f, raisedBy = 5e-7f;  // [voxels^2]
 /// Rounding of squared heights, with room to spare [voxels^2].
 constexpr float heightSlack = 1e-3f;
 /// Nearer to a face than this its side is left to a closer look [voxels].
-constexpr float leastHeight = 1e-3f;
+constexpr float minHeight = 1e-3f;
 
 /// A slice is the 64 voxels of one x; a chunk is what one vector holds of it.
 constexpr int sliceVoxels = blockSide * blockSide;
@@ -248,7 +248,7 @@ class SeenPiece {
         const Vec zero = hn::Zero(tag), n2 = squareOf(n);
         const Mask above = hn::And(hn::And(hn::Gt(w, zero), hn::Le(leftOf, zero)), hn::Ge(rightOf, zero));
         const Vec distance2 = hn::Add(n2, hn::IfThenZeroElse(above, hn::Min(base2, hn::Min(left2, right2))));
-        store(distance2, n, hn::And(above, hn::Gt(n2, hn::Set(tag, square(leastHeight)))), voxel, block);
+        store(distance2, n, hn::And(above, hn::Gt(n2, hn::Set(tag, square(minHeight)))), voxel, block);
     }
 
     // Keeps the smaller distances, and whose they are. Over a face its normal tells the side, unless two pieces are as

@@ -20,7 +20,7 @@ namespace hn = hwy::HWY_NAMESPACE;
 
 /// As many triangles at once as there are lanes of doubles, and as many samples of one triangle as of floats.
 using Wide = hn::CappedTag<double, 8>;
-constexpr std::size_t mostLanes = 8;
+constexpr std::size_t maxLanes = 8;
 /// Triangles of up to so many rows are taken together; of one with more, samples fill a vector of their own.
 constexpr int fewRows = 4;
 
@@ -152,9 +152,9 @@ class Spreader {
             step = hn::Div(one, rows);
         }
         const auto real = hn::And(hn::FirstN(wide, count), hn::Gt(length, hn::Zero(wide)));
-        const int mostRows = options.subdivision == Subdivision::rows ? std::min(fewRows, options.maxSubdivision) : 1;
+        const int maxRows = options.subdivision == Subdivision::rows ? std::min(fewRows, options.maxSubdivision) : 1;
         const auto whole = hn::Le(longest2, hn::Mul(hn::Mul(rows, rows), hn::Set(wide, longestOfOneSample2(options))));
-        const auto few = hn::And(hn::And(real, whole), hn::Le(rows, hn::Set(wide, double(mostRows))));
+        const auto few = hn::And(hn::And(real, whole), hn::Le(rows, hn::Set(wide, double(maxRows))));
         if (!hn::AllFalse(wide, few)) {
             const Points<Wide> down = scaled(ab, step),
                                start = scaled(down + scaled(ac, step), hn::Set(wide, 1.0 / 3.0));
@@ -292,11 +292,11 @@ class Spreader {
     glm::dvec3 origin_;  // of the brick [index coordinates]
     AddedSamples& to_;
     // rows of a number a triangle
-    alignas(64) float world_[3][3][mostLanes];
-    alignas(64) std::int32_t triangles_[mostLanes];
+    alignas(64) float world_[3][3][maxLanes];
+    alignas(64) std::int32_t triangles_[maxLanes];
     struct {
-        alignas(64) double corners[3][3][mostLanes];
-        alignas(64) double normal[3][mostLanes], length[mostLanes], longest2[mostLanes];
+        alignas(64) double corners[3][3][maxLanes];
+        alignas(64) double normal[3][maxLanes], length[maxLanes], longest2[maxLanes];
     } known_;
 };
 

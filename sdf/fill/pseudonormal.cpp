@@ -105,7 +105,7 @@ class Filler {
     // Sides over faces are known; links carry them on, beyond the reach too. What they do not reach is asked for.
     void signDistances(const glm::ivec3& block, Scratch& scratch) {
         BlockAnswer& answer = scratch.answer;
-        std::size_t onBoth = completeSides(findLinks(answer.distances), {&answer.far, &answer.mid, &answer.known},
+        std::size_t onBoth = completeSides(findSignLinks(answer.distances), {&answer.far, &answer.mid, &answer.known},
                                            answer.sides, [&](int voxel) { return isInside(voxel, block, scratch); });
         onBoth += contradictions(block, scratch);
         if (onBoth > 0 && job_.conflicts) *job_.conflicts += onBoth;
@@ -144,7 +144,7 @@ class Filler {
 
     const MeshJob& job_;
     WideTree tree_;
-    LastResort lastResort_;
+    FallbackSign lastResort_;
     tbb::enumerable_thread_specific<Scratch> scratch_;
 };
 

@@ -109,7 +109,7 @@ inline constexpr double sliverStep = 3.0;
 /// no other row is beside them.
 inline constexpr double thinStep = 1.6;
 /// Of one part, at most.
-inline constexpr double mostAlong = 1 << 30;
+inline constexpr double maxAlong = 1 << 30;
 
 /// A triangle with an area up to epsilon has one sample if the square of its longest edge is at most this [voxels^2].
 inline double longestOfOneSample2(const DoubleLayerOptions& options) {
@@ -199,7 +199,7 @@ class TileCutter {
 
     void emitThin(const TriangleCorners& c, double longest2) {
         const double along = std::ceil(std::sqrt(longest2 / (thinStep * thinStep * epsilon_)));
-        emit_(TilePart{c, 0, int(std::min(along, mostAlong)), normal_, length_});
+        emit_(TilePart{c, 0, int(std::min(along, maxAlong)), normal_, length_});
     }
 
     const DoubleLayerOptions& options_;

@@ -74,8 +74,8 @@ void checkMoved(const Mesh& before, const Mesh& after, std::span<const std::uint
         throw std::invalid_argument(fmt::format("triangle {} has other corners now, but is not in moved", first));
 }
 
-TouchedCells::TouchedCells(const Mesh& before, const Mesh& after, std::span<const std::uint32_t> moved,
-                           double voxelsPerUnit, float reach, int side)
+DirtyRegion::DirtyRegion(const Mesh& before, const Mesh& after, std::span<const std::uint32_t> moved,
+                         double voxelsPerUnit, float reach, int side)
     : shift_(std::countr_zero(unsigned(side))) {
     tbb::enumerable_thread_specific<openvdb::MaskTree> parts;
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, moved.size(), trianglesPerTask), [&](const auto& range) {
@@ -87,8 +87,8 @@ TouchedCells::TouchedCells(const Mesh& before, const Mesh& after, std::span<cons
     for (const openvdb::MaskTree& part : parts) cells_.topologyUnion(part);
 }
 
-void TouchedCells::add(const Mesh& mesh, const glm::uvec3& triangle, double voxelsPerUnit, double reach,
-                       openvdb::tree::ValueAccessor<openvdb::MaskTree>& cells) const {
+void DirtyRegion::add(const Mesh& mesh, const glm::uvec3& triangle, double voxelsPerUnit, double reach,
+                      openvdb::tree::ValueAccessor<openvdb::MaskTree>& cells) const {
     const auto corner = [&](unsigned i) { return glm::dvec3(mesh.points[i]) * voxelsPerUnit; };
     const glm::dvec3 a = corner(triangle.x), b = corner(triangle.y), c = corner(triangle.z);
     const glm::ivec3 lower = floorToInt(glm::min(a, glm::min(b, c)) - reach) >> shift_,
@@ -105,7 +105,7 @@ void TouchedCells::add(const Mesh& mesh, const glm::uvec3& triangle, double voxe
     });
 }
 
-bool TouchedCells::any(const glm::ivec3& first, int side) const {
+bool DirtyRegion::any(const glm::ivec3& first, int side) const {
     const glm::ivec3 lower = first >> shift_, upper = (first + (side - 1)) >> shift_;
     bool found = false;
     forEachIn(lower, upper, [&](const glm::ivec3& cell) { found = found || cells_.isValueOn(coord(cell)); });

@@ -17,13 +17,13 @@ namespace bilayer::detail {
 void checkMoved(const Mesh& before, const Mesh& after, std::span<const std::uint32_t> moved);
 
 /// A set of cells of a lattice.
-class TouchedCells {
+class DirtyRegion {
   public:
     /// The cells within reach of the triangles.
     /// @param side   of a cell [voxels], a power of two
     /// @param reach  how far from a triangle a voxel may lie [voxels]
-    TouchedCells(const Mesh& before, const Mesh& after, std::span<const std::uint32_t> moved, double voxelsPerUnit,
-                 float reach, int side);
+    DirtyRegion(const Mesh& before, const Mesh& after, std::span<const std::uint32_t> moved, double voxelsPerUnit,
+                float reach, int side);
 
     /// Whether a cube of voxels has part in any of the cells; its side is a power of two and its first voxel a multiple
     /// of that.

@@ -19,7 +19,7 @@
 namespace bilayer::detail {
 namespace {
 
-constexpr std::size_t partBytes = 1 << 20;  // of the text that one task reads
+constexpr std::size_t partBytes = 1 << 17;  // of the text that one task reads
 
 /// What of a file is left out, by its reason.
 enum Left { pointsAndLines, freeForm, unknown, leftKinds };

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <bit>
 #include <charconv>
 #include <cmath>
@@ -10,9 +11,11 @@
 #include <iterator>
 #include <limits>
 #include <optional>
+#include <span>
 #include <stdexcept>
 #include <utility>
 
+#include "sdf/base/large_array.h"
 #include "sdf/base/parallel_parts.h"
 #include "sdf/io/mapped_file.h"
 #include "sdf/io/mesh_readers.h"
@@ -239,6 +242,7 @@ class BinaryValues {
 
     const char* at() const { return at_; }
     std::size_t size() const { return std::size_t(end_ - at_); }
+    bool isSwapped() const { return swapped_; }
     BinaryValues from(const char* at) const { return {path_, {at, std::size_t(end_ - at)}, swapped_}; }
 
   private:
@@ -401,6 +405,82 @@ class ElementReader {
     std::uint64_t vertices_;
 };
 
+/// The bytes from the begin of a record to each of its values or lists, and to its end.
+/// @param listLength  items of each list
+std::vector<std::size_t> offsetsOf(const Element& element, std::size_t listLength) {
+    std::vector<std::size_t> offsets{0};
+    for (const Property& p : element.properties) {
+        const std::size_t size = p.countType ? sizeOf(*p.countType) + listLength * sizeOf(p.type) : sizeOf(p.type);
+        offsets.push_back(offsets.back() + size);
+    }
+    return offsets;
+}
+
+/// Vertices without lists whose coordinates are of one type.
+struct PointRecords {
+    Type type;
+    std::size_t size, offsets[3];  // bytes of a record, and to each coordinate
+
+    static std::optional<PointRecords> of(const Element& element, const std::array<std::size_t, 3>& axes) {
+        const std::vector<Property>& properties = element.properties;
+        const Type type = properties[axes[0]].type;
+        if (element.hasLists() || properties[axes[1]].type != type || properties[axes[2]].type != type)
+            return std::nullopt;
+        const std::vector<std::size_t> offsets = offsetsOf(element, 0);
+        return PointRecords{type, offsets.back(), {offsets[axes[0]], offsets[axes[1]], offsets[axes[2]]}};
+    }
+
+    /// False where a coordinate is no finite float.
+    template <class Point>
+    bool read(const char* at, bool swapped, std::span<Point> points) const {
+        return withType(type, [&](auto kind) { return readAs<decltype(kind)>(at, swapped, points); });
+    }
+
+  private:
+    template <class Stored, class Point>
+    bool readAs(const char* at, bool swapped, std::span<Point> points) const {
+        for (Point& point : points) {
+            for (int axis = 0; axis < 3; ++axis)
+                point[axis] = typename Point::value_type(load<Stored>(at + offsets[axis], swapped));
+            if (!std::isfinite(float(point.x)) || !std::isfinite(float(point.y)) || !std::isfinite(float(point.z)))
+                return false;
+            at += size;
+        }
+        return true;
+    }
+};
+
+/// Faces that are most often triangles, with a byte that counts their corners, which have four each, and nothing else
+/// of varying length.
+struct TriangleRecords {
+    std::size_t size, offset;  // bytes of a record, and to its list
+
+    static std::optional<TriangleRecords> of(const Element& element, std::size_t list) {
+        const Property& corners = element.properties[list];
+        const auto lists = std::count_if(element.properties.begin(), element.properties.end(),
+                                         [](const Property& p) { return bool(p.countType); });
+        const bool isUsual = corners.countType && sizeOf(*corners.countType) == 1 &&
+                             (corners.type == Type::int32 || corners.type == Type::uint32);
+        if (lists != 1 || !isUsual) return std::nullopt;
+        const std::vector<std::size_t> offsets = offsetsOf(element, 3);
+        return TriangleRecords{offsets.back(), offsets[list]};
+    }
+
+    bool isTriangle(const char* record) const { return record[offset] == 3; }
+
+    /// False where a face is no triangle or a corner no vertex.
+    bool read(const char* at, bool swapped, std::uint64_t vertices, std::span<glm::uvec3> triangles) const {
+        for (glm::uvec3& t : triangles) {
+            if (!isTriangle(at)) return false;
+            for (int k = 0; k < 3; ++k)
+                t[k] = load<std::uint32_t>(at + offset + 1 + std::size_t(k) * sizeof(std::uint32_t), swapped);
+            if (t.x >= vertices || t.y >= vertices || t.z >= vertices) return false;
+            at += size;
+        }
+        return true;
+    }
+};
+
 /// Reads the elements of a file in their order.
 template <class Scalar>
 class PlyReader {
@@ -436,6 +516,7 @@ class PlyReader {
         for (const Element& element : header_.elements) {
             if (element.properties.empty()) continue;
             makeRoom(element, values.size(), 1);
+            if (readPoints(element, values) || readTriangles(element, values)) continue;
             const ElementReader<BinaryValues> reader(element, vertices_->count);
             const std::vector<const char*> begins = partsOf(element, values);
             std::vector<Faces> parts(begins.size());
@@ -454,11 +535,63 @@ class PlyReader {
     }
 
   private:
+    /// Reads vertices whose records are alike. False where they are not or something is wrong: nothing is read then.
+    bool readPoints(const Element& element, BinaryValues& values) {
+        if (kindOf(element) != Kind::vertex || element.count == 0) return false;
+        const auto x = element.find({"x"}), y = element.find({"y"}), z = element.find({"z"});
+        if (!x || !y || !z) return false;
+        const auto records = PointRecords::of(element, {*x, *y, *z});
+        return records && readAlike(*records, values, polygons_.points);
+    }
+
+    /// The same for faces that are all of the file's, and all triangles.
+    bool readTriangles(const Element& element, BinaryValues& values) {
+        const auto list = element.find({"vertex_indices", "vertex_index"});
+        // as long as negative corners look like vertices that are not there
+        const bool isCountSmall = vertices_->count <= std::uint64_t(std::numeric_limits<std::int32_t>::max());
+        if (!list || !isCountSmall || !holdsAllFaces(element) || element.count == 0) return false;
+        const auto records = TriangleRecords::of(element, *list);
+        if (!records || values.size() < records->size || !records->isTriangle(values.at())) return false;
+        resizeLarge(polygons_.triangles, element.count);
+        if (readAlike(*records, values, polygons_.triangles)) return true;
+        polygons_.triangles = {};
+        return false;
+    }
+
+    template <class Records, class Item>
+    bool readAlike(const Records& records, BinaryValues& values, std::vector<Item>& items) const {
+        if (values.size() / records.size < items.size()) return false;
+        const char* begin = values.at();
+        std::atomic<bool> fits = true;
+        inOrder((items.size() + partElements - 1) / partElements, [&](std::size_t i) {
+            const std::size_t first = i * partElements, count = std::min(partElements, items.size() - first);
+            const std::span part(items.data() + first, count);
+            if (fits && !read(records, values, begin + first * records.size, part)) fits = false;
+        });
+        if (fits) values.skip(Type::uint8, items.size() * records.size);
+        return fits;
+    }
+
+    template <class Point>
+    bool read(const PointRecords& records, const BinaryValues& values, const char* at, std::span<Point> points) const {
+        return records.read(at, values.isSwapped(), points);
+    }
+    bool read(const TriangleRecords& records, const BinaryValues& values, const char* at,
+              std::span<glm::uvec3> triangles) const {
+        return records.read(at, values.isSwapped(), vertices_->count, triangles);
+    }
+
+    bool holdsAllFaces(const Element& element) const {
+        const auto holdsFaces = [](const Element& e) { return kindOf(e) == Kind::face || kindOf(e) == Kind::strips; };
+        return kindOf(element) == Kind::face &&
+               std::count_if(header_.elements.begin(), header_.elements.end(), holdsFaces) == 1;
+    }
+
     /// Before memory is taken for them: each property of an element takes some bytes.
     void makeRoom(const Element& element, std::size_t bytes, std::size_t bytesOfProperty) {
         const std::size_t size = element.properties.size() * bytesOfProperty;
         if (size > 0 && element.count > (bytes + 1) / size) refuse(path_, "ends before all that its header announces");
-        if (kindOf(element) == Kind::vertex) polygons_.points.resize(element.count);
+        if (kindOf(element) == Kind::vertex) resizeLarge(polygons_.points, element.count);
     }
 
     /// Where each part of an element's data begins. The values move behind them all.
@@ -530,7 +663,7 @@ class PlyReader {
     }
 
     PolygonsOf<Scalar> finished() {
-        setFaces(polygons_, faces_);
+        if (polygons_.triangles.empty()) setFaces(polygons_, faces_);
         return std::move(polygons_);
     }
 

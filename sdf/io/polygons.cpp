@@ -6,7 +6,6 @@
 #include <oneapi/tbb/parallel_reduce.h>
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <limits>
 #include <optional>
@@ -15,7 +14,9 @@
 
 #include <bilayer/sdf/mesh.h>
 #include <bilayer/sdf/mesh_io.h>
+#include "sdf/base/large_array.h"
 #include "sdf/base/parallel_parts.h"
+#include "sdf/base/welding.h"
 #include "sdf/io/text_source.h"
 #include "sdf/io/triangulate.h"
 
@@ -29,19 +30,15 @@ constexpr double farSizes = 1000;
 
 using Range = tbb::blocked_range<std::size_t>;
 
-/// A byte for each vertex: whether a face uses it. Throws for a corner without a vertex.
-std::vector<std::uint8_t> usedVertices(const std::vector<unsigned>& corners, std::size_t vertices) {
-    std::vector<std::uint8_t> used(vertices, 0);
+/// Throws for a corner without a vertex.
+void requireVertices(const std::vector<unsigned>& corners, std::size_t vertices) {
     inOrder((corners.size() + grain - 1) / grain, [&](std::size_t part) {
         const std::size_t end = std::min((part + 1) * grain, corners.size());
-        for (std::size_t i = part * grain; i < end; ++i) {
+        for (std::size_t i = part * grain; i < end; ++i)
             if (corners[i] >= vertices)
                 throw std::runtime_error(
                     fmt::format("a face refers to vertex {}, but there are {}, counted from 0", corners[i], vertices));
-            std::atomic_ref(used[corners[i]]).store(1, std::memory_order_relaxed);
-        }
     });
-    return used;
 }
 
 struct Box {
@@ -81,7 +78,8 @@ template <class Scalar>
 std::vector<glm::vec3> relativeTo(const glm::dvec3& origin, std::vector<glm::vec<3, Scalar>> points) {
     if constexpr (std::is_same_v<Scalar, float>)
         if (origin == glm::dvec3(0)) return points;
-    std::vector<glm::vec3> moved(points.size());
+    std::vector<glm::vec3> moved;
+    resizeLarge(moved, points.size());
     tbb::parallel_for(Range(0, points.size(), grain), [&](const Range& range) {
         for (std::size_t i = range.begin(); i < range.end(); ++i) moved[i] = glm::vec3(glm::dvec3(points[i]) - origin);
     });
@@ -170,22 +168,49 @@ std::vector<glm::uvec3> asTriangles(const std::vector<unsigned>& corners) {
 }
 
 template <class Scalar>
+std::vector<glm::uvec3> trianglesOf(PolygonsOf<Scalar>& polygons, std::vector<std::string>& notes) {
+    if (!polygons.triangles.empty()) return std::move(polygons.triangles);
+    if (polygons.sizes.empty()) return asTriangles(polygons.corners);
+    requireVertices(polygons.corners, polygons.points.size());
+    return FaceCutter(polygons).run(notes);
+}
+
+template <class Scalar>
+std::size_t faceCount(const PolygonsOf<Scalar>& polygons) {
+    if (!polygons.triangles.empty()) return polygons.triangles.size();
+    return polygons.sizes.empty() ? polygons.corners.size() / 3 : polygons.sizes.size();
+}
+
+/// The faces of all parts, which have three corners each.
+/// @param begins  of each part's corners among all; their count at the end
+void setTriangles(std::vector<glm::uvec3>& triangles, const std::vector<Faces>& parts,
+                  const std::vector<std::size_t>& begins) {
+    resizeLarge(triangles, begins.back() / 3);
+    inOrder(parts.size(), [&](std::size_t i) {
+        const std::vector<unsigned>& corners = parts[i].corners;
+        glm::uvec3* to = triangles.data() + begins[i] / 3;
+        for (std::size_t k = 0; k < corners.size(); k += 3) *to++ = {corners[k], corners[k + 1], corners[k + 2]};
+    });
+}
+
+template <class Scalar>
 Mesh meshOf(PolygonsOf<Scalar> polygons, ReadReport& report) {
     report.vertices = polygons.points.size();
-    report.faces = polygons.sizes.empty() ? polygons.corners.size() / 3 : polygons.sizes.size();
+    report.faces = faceCount(polygons);
     report.notes = std::move(polygons.notes);
     if (report.faces == 0)
         throw std::runtime_error(
             fmt::format("holds no triangle{}{}", report.notes.empty() ? "" : "; ", fmt::join(report.notes, "; ")));
-    const Box box = boxOf(polygons.points, usedVertices(polygons.corners, polygons.points.size()));
-    report.unusedVertices = report.vertices - box.vertices;
     Mesh mesh;
+    mesh.triangles = trianglesOf(polygons, report.notes);
+    const VertexUse use = vertexUse(mesh.triangles, polygons.points.size());
+    const Box box = boxOf(polygons.points, use.used);
+    report.unusedVertices = report.vertices - box.vertices;
     mesh.origin = originOf(box);
-    mesh.triangles = polygons.sizes.empty() ? asTriangles(polygons.corners) : FaceCutter(polygons).run(report.notes);
     mesh.points = relativeTo(mesh.origin, std::move(polygons.points));
     validate(mesh);
     const std::size_t triangles = mesh.triangles.size();
-    mesh = weld(std::move(mesh));
+    mesh = weld(std::move(mesh), use);
     report.mergedVertices = box.vertices - mesh.points.size();
     report.collapsedTriangles = triangles - mesh.triangles.size();
     if (mesh.triangles.empty()) throw std::runtime_error("holds no triangle with three different corners");
@@ -205,14 +230,17 @@ void setFaces(PolygonsOf<Scalar>& polygons, const std::vector<Faces>& parts) {
         isOfTriangles &= part.isOfTriangles;
         small += part.small;
     }
-    polygons.corners.resize(corners.back());
-    if (!isOfTriangles) polygons.sizes.resize(sizes.back());
-    inOrder(parts.size(), [&](std::size_t i) {
-        std::copy(parts[i].corners.begin(), parts[i].corners.end(),
-                  polygons.corners.begin() + std::ptrdiff_t(corners[i]));
-        if (!isOfTriangles)
+    if (isOfTriangles) {
+        setTriangles(polygons.triangles, parts, corners);
+    } else {
+        polygons.corners.resize(corners.back());
+        polygons.sizes.resize(sizes.back());
+        inOrder(parts.size(), [&](std::size_t i) {
+            std::copy(parts[i].corners.begin(), parts[i].corners.end(),
+                      polygons.corners.begin() + std::ptrdiff_t(corners[i]));
             std::copy(parts[i].sizes.begin(), parts[i].sizes.end(), polygons.sizes.begin() + std::ptrdiff_t(sizes[i]));
-    });
+        });
+    }
     if (small > 0)
         polygons.notes.push_back(
             fmt::format("left out: {} with fewer than three corners", counted(small, "face", "faces")));

@@ -24,6 +24,7 @@ struct PolygonsOf {
     std::vector<unsigned> corners;            ///< indices into `points`, of one face after the other
     std::vector<unsigned> sizes;              ///< corners of each face, in the same order; empty: each has three
     std::vector<std::string> notes;           ///< what of the file was left out and why, a sentence each
+    std::vector<glm::uvec3> triangles{};      ///< indices into `points`: all faces, instead of `corners` and `sizes`
 };
 using Polygons = PolygonsOf<double>;
 

@@ -5,12 +5,12 @@
 #include <cmath>
 #include <cstdint>
 #include <cstring>
-#include <numeric>
 #include <stdexcept>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "sdf/base/large_array.h"
 #include "sdf/base/parallel_parts.h"
 #include "sdf/io/mapped_file.h"
 #include "sdf/io/mesh_readers.h"
@@ -21,7 +21,7 @@ namespace bilayer::detail {
 namespace {
 
 constexpr std::size_t headerBytes = 80, facetBytes = 50, normalBytes = 12;
-constexpr std::size_t partBytes = 1 << 20;  // of the text that one task reads
+constexpr std::size_t partBytes = 1 << 17;  // of the text that one task reads
 
 std::uint32_t loadCount(std::string_view bytes) {
     std::uint32_t count = 0;
@@ -66,20 +66,20 @@ Mesh readBinary(std::string_view bytes, const std::filesystem::path& path, ReadR
     PolygonsOf<float> polygons;
     if (const std::uint64_t more = bytes.size() - binarySize(count))
         polygons.notes.push_back(fmt::format("left out: {} after the last triangle", counted(more, "byte", "bytes")));
-    polygons.points.resize(std::size_t(3) * count);
+    resizeLarge(polygons.points, std::size_t(3) * count);
+    resizeLarge(polygons.triangles, count);
     constexpr std::size_t partFacets = 1 << 14;
     inOrder((count + partFacets - 1) / partFacets, [&](std::size_t part) {
         const char* facets = bytes.data() + binarySize(0) + normalBytes;
         for (std::size_t i = part * partFacets; i < std::min<std::size_t>((part + 1) * partFacets, count); ++i) {
             glm::vec3* corners = &polygons.points[3 * i];
+            polygons.triangles[i] = unsigned(3 * i) + glm::uvec3(0, 1, 2);
             std::memcpy(corners, facets + facetBytes * i, 3 * sizeof(glm::vec3));
             const glm::vec3 sum = corners[0] + corners[1] + corners[2];
             // infinite where the sum of finite ones is too large: rare, and then looked at more closely
             if (!std::isfinite(sum.x + sum.y + sum.z)) requireFinite(corners, i, path);
         }
     });
-    polygons.corners.resize(polygons.points.size());
-    std::iota(polygons.corners.begin(), polygons.corners.end(), 0u);
     return assembled(std::move(polygons), path, report);
 }
 

@@ -21,7 +21,7 @@ struct TextRecords {
 
 /// Cuts off the next lines, a record each, into runs. Fewer where the text ends before.
 inline std::vector<TextRecords> linesOf(const Cursor& text, std::size_t count) {
-    constexpr std::size_t runLength = 1 << 14;
+    constexpr std::size_t runLength = 1 << 12;
     std::vector<TextRecords> runs;
     const char* at = text.at;
     for (std::size_t first = 0; first < count && at != text.end; first += runLength) {

@@ -20,7 +20,7 @@ namespace bilayer::detail {
 namespace {
 
 /// LZ4 writes no less than a byte for so many: what is decompressed is no larger.
-constexpr std::uint64_t mostExpansion = 256;
+constexpr std::uint64_t maxExpansion = 256;
 /// Blosc fills what is shorter up to this [bytes].
 constexpr std::uint64_t bloscPadding = 128;
 /// Voxels along the nodes of a tree, from the coarsest to the leaves, as powers of two.
@@ -82,7 +82,7 @@ class Stream {
         if (head.compressed != length)
             throw std::runtime_error(fmt::format("{} bytes of values that were {}", length, head.compressed));
         const bool padded = expected <= bloscPadding && head.bytes == bloscPadding;
-        if ((head.bytes != expected && !padded) || head.bytes > mostExpansion * length)
+        if ((head.bytes != expected && !padded) || head.bytes > maxExpansion * length)
             throw std::runtime_error(fmt::format("{} bytes of values, where {} are to be", head.bytes, expected));
         skip(length - sizeof(Head), "compressed values");
     }
@@ -326,7 +326,7 @@ class Points {
         const auto flags = in_.read<std::uint8_t>();
         const std::uint64_t count = in_.read<std::uint32_t>(), stride = flags & strided ? in_.read<std::uint32_t>() : 1;
         if (length <= headBytes) throw std::runtime_error("an attribute without values");
-        in_.require(count * stride / mostExpansion, "an attribute");
+        in_.require(count * stride / maxExpansion, "an attribute");
         const Array array{length - headBytes, flags & uniform ? valueSize : count * stride * valueSize,
                           (flags & uniform) != 0, (flags & paged) != 0};
         if (array.paged && array.length != array.bytes)

@@ -23,9 +23,9 @@ inline std::uint64_t linked(const float* a, const float* b) {
     return bits;
 }
 
-Links linksOf(const float* distances) {
+SignLinks linksOf(const float* distances) {
     constexpr std::uint64_t withoutLast = 0x7f;
-    Links links{};
+    SignLinks links{};
     for (int x = 0; x < blockSide; ++x)
         for (int y = 0; y < blockSide; ++y) {
             const float* row = distances + (x * blockSide + y) * blockSide;
@@ -59,11 +59,11 @@ std::uint64_t grownInSlice(std::uint64_t set, std::uint64_t linkY, std::uint64_t
 
 }  // namespace
 
-Links findLinks(const float* distances) {
+SignLinks findSignLinks(const float* distances) {
     return HWY_DYNAMIC_DISPATCH(linksOf)(distances);
 }
 
-void spread(const Links& links, BlockMask& set) {
+void spread(const SignLinks& links, BlockMask& set) {
     unsigned changed = 0;  // slices whose neighbours have not heard of them yet
     for (std::size_t x = 0; x < set.size(); ++x) {
         if (set[x] == 0) continue;

@@ -15,18 +15,18 @@ namespace bilayer::detail {
 /// Slack of the test for a link, far above the rounding of distances [voxels].
 inline constexpr float linkSlack = 1e-4f;
 
-/// Links inside a block. Bit of voxel v: v is linked with its next neighbour along the axis.
-struct Links {
+/// SignLinks inside a block. Bit of voxel v: v is linked with its next neighbour along the axis.
+struct SignLinks {
     BlockMask x, y, z;
 };
 
 /// Finds the links of a block by the distances of its voxels to the surface; those beyond some reach of a voxel or more
 /// may have any distance from there on.
 /// @param distances  blockVoxels of them, and a row more that may be read [voxels]
-Links findLinks(const float* distances);
+SignLinks findSignLinks(const float* distances);
 
 /// Adds to a set all voxels that links connect with it.
-void spread(const Links& links, BlockMask& set);
+void spread(const SignLinks& links, BlockMask& set);
 
 /// The voxels of a block on either side of the surface. One on both shows a contradiction.
 struct BlockSides {
@@ -40,7 +40,7 @@ inline constexpr float farFrom = 0.5f, midFrom = 0.1f;
 /// is asked for by isInside(voxel): one of the first of the `seeds` that hold any. Returns the number of voxels that
 /// came to be on both sides; there are none of them if all the sides that were known are right.
 template <class IsInside>
-std::size_t completeSides(const Links& links, std::initializer_list<const BlockMask*> seeds, BlockSides& sides,
+std::size_t completeSides(const SignLinks& links, std::initializer_list<const BlockMask*> seeds, BlockSides& sides,
                           IsInside isInside) {
     spread(links, sides.outside);
     spread(links, sides.inside);

@@ -1,14 +1,17 @@
 // Two rounds of hash tables that fit into a core's cache. The first looks at runs of points as they come, since equal
-// ones mostly stand near each other; the second at what is left of all runs, partitioned by hash.
+// ones mostly stand near each other; the second at what is left of all runs, partitioned by hash. A run that begins
+// without equal points is left to the second round.
 #include "sdf/mesh/equal_points.h"
 
 #include <oneapi/tbb/parallel_for.h>
 
 #include <algorithm>
+#include <atomic>
 #include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <glm/common.hpp>
+#include <numeric>
 #include <utility>
 #include <vector>
 
@@ -18,8 +21,9 @@ namespace bilayer::detail {
 namespace {
 
 constexpr std::size_t runLength = 1 << 15;           // points
-constexpr std::size_t pointsPerPartition = 1 << 13;  // about
-constexpr std::size_t mostPartitions = 1 << 10;
+constexpr std::size_t sampleLength = 1 << 11;        // points that a run begins with
+constexpr std::size_t pointsPerPartition = 1 << 12;  // about
+constexpr std::size_t maxPartitions = 1 << 10;
 
 // Coordinates as words that are the same exactly where coordinates are equal.
 struct Bits {
@@ -70,7 +74,7 @@ class EqualPoints {
           progress_(progress),
           first_(points.size()),
           runs_((points.size() + runLength - 1) / runLength),
-          partitions_(std::min(mostPartitions, std::bit_ceil(points.size() / pointsPerPartition + 1))) {}
+          partitions_(std::min(maxPartitions, std::bit_ceil(points.size() / pointsPerPartition + 1))) {}
 
     LargeArray<unsigned> find() && {
         places_.resize(runs_ * partitions_);
@@ -80,23 +84,25 @@ class EqualPoints {
             rest_ = LargeArray<Item>(begins.back());
             forEach(runs_, [&](std::size_t run) { scatter(run); });
             forEach(partitions_, [&](std::size_t i) { searchPartition(begins[i], begins[i + 1]); });
-            forEach(runs_, [&](std::size_t run) { follow(run); });
+            if (anyEqual_) forEach(runs_, [&](std::size_t run) { follow(run); });
         }
-        return std::move(first_);
+        return anyEqual_ ? std::move(first_) : LargeArray<unsigned>();
     }
 
   private:
     struct Item {
-        glm::vec3 point;
+        std::uint32_t hash;  // its lower bits
         unsigned index;
     };
 
     template <class Body>
     void forEach(std::size_t count, Body body) {
-        tbb::parallel_for(std::size_t(0), count, [&](std::size_t i) {
+        const auto polled = [&](std::size_t i) {
             poll(progress_);
             body(i);
-        });
+        };
+        if (count == 1) return polled(0);
+        tbb::parallel_for(std::size_t(0), count, polled);
     }
 
     std::size_t beginOf(std::size_t run) const { return run * runLength; }
@@ -104,20 +110,38 @@ class EqualPoints {
     // The upper bits, since tables take the lower ones.
     std::size_t partitionOf(std::uint64_t hash) const { return (hash >> 32) & (partitions_ - 1); }
 
+    Bits bitsAt(std::size_t i) const { return Bits(points_[i]); }
+
     // The first of equal points within a run, and how many remain for each partition.
     void searchRun(std::size_t run) {
-        thread_local Table<std::uint16_t> table;
-        const std::size_t begin = beginOf(run), count = endOf(run) - begin;
-        table.clear(count);
+        const std::size_t begin = beginOf(run), end = endOf(run);
+        const std::size_t sample = runs_ > 1 ? std::min(begin + sampleLength, end) : end;
+        const bool repeats = searchFirsts(begin, sample);
+        if (repeats && sample < end)
+            searchFirsts(begin, end);
+        else
+            std::iota(first_.data() + sample, first_.data() + end, unsigned(sample));
+        if (repeats) anyEqual_.store(true, std::memory_order_relaxed);
+        if (runs_ == 1) return;
         std::size_t* counts = places_.data() + run * partitions_;
-        for (std::size_t i = 0; i < count; ++i) {
-            const Bits bits(points_[begin + i]);
-            const std::uint64_t hash = bits.hash();
-            const std::uint16_t first = table.add(
-                hash, std::uint16_t(i), [&](std::uint16_t other) { return Bits(points_[begin + other]) == bits; });
-            first_[begin + i] = unsigned(begin + first);
-            counts[partitionOf(hash)] += first == i;
+        for (std::size_t i = begin; i < end; ++i)
+            if (first_[i] == i) ++counts[partitionOf(bitsAt(i).hash())];
+    }
+
+    // Whether any points of a part of a run are equal. DisjointSets the first of them for each.
+    bool searchFirsts(std::size_t begin, std::size_t end) {
+        thread_local Table<std::uint16_t> table;
+        table.clear(end - begin);
+        bool repeats = false;
+        for (std::size_t i = begin; i < end; ++i) {
+            const Bits bits = bitsAt(i);
+            const std::size_t first =
+                begin + table.add(bits.hash(), std::uint16_t(i - begin),
+                                  [&](std::uint16_t other) { return bitsAt(begin + other) == bits; });
+            first_[i] = unsigned(first);
+            repeats |= first != i;
         }
+        return repeats;
     }
 
     // Turns counts into places, partition by partition and within each by run; returns where partitions begin.
@@ -134,8 +158,11 @@ class EqualPoints {
 
     void scatter(std::size_t run) {
         std::size_t* places = places_.data() + run * partitions_;
-        for (std::size_t i = beginOf(run); i < endOf(run); ++i)
-            if (first_[i] == i) rest_[places[partitionOf(Bits(points_[i]).hash())]++] = {points_[i], unsigned(i)};
+        for (std::size_t i = beginOf(run); i < endOf(run); ++i) {
+            if (first_[i] != i) continue;
+            const std::uint64_t hash = bitsAt(i).hash();
+            rest_[places[partitionOf(hash)]++] = {std::uint32_t(hash), unsigned(i)};
+        }
     }
 
     // Items stand in the order of their indices, so what is found is the first.
@@ -143,12 +170,17 @@ class EqualPoints {
         thread_local Table<std::uint32_t> table;
         table.clear(end - begin);
         const Item* items = rest_.data() + begin;
+        bool repeats = false;
         for (std::size_t i = 0; i < end - begin; ++i) {
-            const Bits bits(items[i].point);
-            const std::uint32_t first = table.add(
-                bits.hash(), std::uint32_t(i), [&](std::uint32_t other) { return Bits(items[other].point) == bits; });
-            if (first != i) first_[items[i].index] = items[first].index;
+            const Item& item = items[i];
+            const std::uint32_t first = table.add(item.hash, std::uint32_t(i), [&](std::uint32_t other) {
+                return items[other].hash == item.hash && bitsAt(items[other].index) == bitsAt(item.index);
+            });
+            if (first == i) continue;
+            first_[item.index] = items[first].index;
+            repeats = true;
         }
+        if (repeats) anyEqual_.store(true, std::memory_order_relaxed);
     }
 
     // From the first in a run to the first of all.
@@ -163,6 +195,7 @@ class EqualPoints {
     std::size_t runs_, partitions_;
     std::vector<std::size_t> places_;  // of each run in each partition: first counts, then where its next item goes
     LargeArray<Item> rest_;            // the first points of each run, by partition
+    std::atomic<bool> anyEqual_ = false;
 };
 
 }  // namespace

@@ -16,13 +16,13 @@ namespace {
 
 /// A piece tells inside from outside if its volume is at least this part of the volume of the sphere with its area.
 /// Closed pieces need only rise above rounding; a hole leaves room for error, and what bulges less is a sheet.
-constexpr double leastRoundnessClosed = 1e-9;
-constexpr double leastRoundnessOpen = 1e-2;
+constexpr double minRoundnessClosed = 1e-9;
+constexpr double minRoundnessOpen = 1e-2;
 /// Points at which an open piece of negative volume is asked whether it bounds a solid as it stands: a half is told
 /// from little.
 constexpr std::size_t samplesOfPiece = 32;
 /// Nested doubts of open pieces settle one a pass; more than a few are not worth the time.
-constexpr int mostPasses = 8;
+constexpr int maxPasses = 8;
 
 struct Piece {
     Bounds bounds;
@@ -44,7 +44,7 @@ struct Piece {
     }
     double roundness() const { return 6 * std::sqrt(glm::pi<double>()) * std::abs(volume) / std::pow(area, 1.5); }
     bool bounding() const {
-        return !oneSided && !sheet && area > 0 && roundness() > (closed() ? leastRoundnessClosed : leastRoundnessOpen);
+        return !oneSided && !sheet && area > 0 && roundness() > (closed() ? minRoundnessClosed : minRoundnessOpen);
     }
 };
 
@@ -72,10 +72,10 @@ class Orienter {
     // originals.
     bool counts(unsigned triangle) const { return sound_[triangle] || topology_.original[triangle] == triangle; }
 
-    // Where triangles that hang together by edges run all of these both ways equally often, there is nothing to mend
+    // Where triangles that hang together by edges run all of these both ways equally often, there is nothing to repair
     // but the orientation of the whole, however many triangles meet at an edge.
     void findSound() {
-        Sets bodies(mesh_.triangles.size());
+        DisjointSets bodies(mesh_.triangles.size());
         topology_.forEachEdge([&](std::span<const EdgeUse> uses) {
             for (const EdgeUse& use : uses) bodies.join(uses[0].triangle, use.triangle);
         });
@@ -138,7 +138,7 @@ class Orienter {
 
     // Patches that meet at an edge of more than two triangles go together where they run it the same number of times.
     void joinPatches() {
-        Sets patches = sets_;
+        DisjointSets patches = sets_;
         const std::vector<std::uint64_t> sums = edgeSums(patches, [&](unsigned i) { return counts(i); });
         joinSound(patches, sums);
         topology_.forEachEdge([&](std::span<const EdgeUse> all) {
@@ -155,7 +155,7 @@ class Orienter {
     }
 
     // The open patches of a sound body stay as they are to each other; closed ones may be turned alone.
-    void joinSound(Sets& patches, const std::vector<std::uint64_t>& sums) {
+    void joinSound(DisjointSets& patches, const std::vector<std::uint64_t>& sums) {
         std::vector<unsigned> firstOpen(mesh_.triangles.size(), noPart);
         for (const unsigned i : eachTriangle()) {
             if (!sound_[i] || sums[patches.root(i)] == 0) continue;
@@ -183,7 +183,7 @@ class Orienter {
 
     // For each set, by its root: zero if its triangles, turned as their places in it say, close a surface.
     template <class Takes>
-    std::vector<std::uint64_t> edgeSums(Sets& sets, Takes takes) const {
+    std::vector<std::uint64_t> edgeSums(DisjointSets& sets, Takes takes) const {
         const std::vector<std::uint64_t> vertices = hashVertices(mesh_, progress_);
         auto sums = vectorOf<std::uint64_t>(mesh_.triangles.size(), progress_);
         for (const unsigned i : eachTriangle()) {
@@ -340,7 +340,7 @@ class Orienter {
     const Mesh& mesh_;
     Progress* progress_;
     Topology topology_;
-    Sets sets_;                             // triangles; opposites: exactly one of the two must be turned
+    DisjointSets sets_;                     // triangles; opposites: exactly one of the two must be turned
     std::vector<unsigned> body_;            // of each triangle: the first one that it hangs together with by edges
     std::vector<bool> sound_;               // of each triangle: its body runs all edges both ways equally often
     std::vector<int> excess_;               // of each original: how many more of its copies face as it does
@@ -363,7 +363,7 @@ Orientation orient(const Mesh& mesh, Progress* progress) {
     validate(mesh);
     Orientation all = Orienter(mesh, progress).run();
     // open pieces are judged by what is around them, which may just have been turned
-    for (int pass = 1; pass < mostPasses && all.turnedTriangles > 0; ++pass) {
+    for (int pass = 1; pass < maxPasses && all.turnedTriangles > 0; ++pass) {
         const Orientation next = Orienter(all.mesh, progress).run();
         if (next.turnedTriangles == 0) break;
         all.mesh = next.mesh;

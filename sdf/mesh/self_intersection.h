@@ -3,7 +3,6 @@
 
 #include <cstddef>
 
-#include <bilayer/collider/contact.h>
 #include <bilayer/sdf/mesh.h>
 #include "sdf/bvh/triangle_tree.h"
 #include "sdf/mesh/topology.h"

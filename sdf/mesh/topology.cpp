@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <atomic>
 #include <bit>
-#include <tuple>
+#include <numeric>
 
 #include "sdf/base/polled_loop.h"
 #include "sdf/mesh/equal_points.h"
@@ -56,7 +56,7 @@ LargeArray<EdgeUse> sortedEdges(const Topology& topology, std::size_t vertices) 
     forEachUse([&](const EdgeUse& use) { edges[increment(ends[use.low])] = use; });
     forAllPolled(vertices, grain, topology.progress, [&](std::size_t v) {
         std::sort(edges.data() + (v ? ends[v - 1] : 0), edges.data() + ends[v], [](const EdgeUse& a, const EdgeUse& b) {
-            return std::tie(a.high, a.triangle) < std::tie(b.high, b.triangle);
+            return a.high != b.high ? a.high < b.high : a.triangle < b.triangle;
         });
     });
     return edges;
@@ -108,6 +108,10 @@ Topology::Topology(const Mesh& mesh, const LargeArray<unsigned>& first, Progress
 bool Topology::proper(std::size_t triangle) const {
     const glm::uvec3& t = triangles[triangle];
     return t.x != t.y && t.y != t.z && t.z != t.x;
+}
+
+ConcurrentDisjointSets::ConcurrentDisjointSets(std::size_t n) : parent_(n) {
+    forAllPolled(n, grain, nullptr, [&](std::size_t i) { parent_[i] = unsigned(i); });
 }
 
 std::vector<std::uint64_t> hashVertices(const Mesh& mesh, Progress* progress) {

@@ -18,9 +18,9 @@ namespace bilayer::detail {
 
 /// One triangle's use of an edge.
 struct EdgeUse {
-    unsigned low, high;  ///< the edge's vertices
-    unsigned triangle;
-    bool forward;  ///< the triangle runs it from low to high
+    unsigned low, high;      ///< the edge's vertices
+    unsigned triangle : 31;  ///< validate() lets no more pass
+    bool forward : 1;        ///< the triangle runs it from low to high
 
     bool sameEdge(const EdgeUse& other) const { return low == other.low && high == other.high; }
     int direction() const { return forward ? 1 : -1; }
@@ -93,9 +93,11 @@ inline std::uint64_t hashEdge(std::uint64_t from, std::uint64_t to) {
 
 /// Disjoint sets of the numbers below n, by union-find (R. E. Tarjan, 1975). Each member is either like its set's root
 /// or its opposite.
-class Sets {
+class DisjointSets {
   public:
-    explicit Sets(std::size_t n) : parent_(n), opposite_(n, 0) { std::iota(parent_.begin(), parent_.end(), 0u); }
+    explicit DisjointSets(std::size_t n) : parent_(n), opposite_(n, 0) {
+        std::iota(parent_.begin(), parent_.end(), 0u);
+    }
 
     unsigned root(unsigned i) { return find(i).root; }
     bool oppositeToRoot(unsigned i) { return find(i).opposite; }
@@ -136,9 +138,9 @@ class Sets {
 /// Disjoint sets of the numbers below n that all threads may join at the same time (R. J. Anderson, H. Woll, "Wait-free
 /// parallel algorithms for the union-find problem", STOC 1991). A root is the smallest number of its set, whatever the
 /// order of joining.
-class SharedSets {
+class ConcurrentDisjointSets {
   public:
-    explicit SharedSets(std::size_t n) : parent_(n) { std::iota(parent_.begin(), parent_.end(), 0u); }
+    explicit ConcurrentDisjointSets(std::size_t n);
 
     unsigned root(unsigned i) {
         for (;;) {
@@ -166,7 +168,7 @@ class SharedSets {
   private:
     std::atomic_ref<unsigned> at(unsigned i) { return std::atomic_ref<unsigned>(parent_[i]); }
 
-    std::vector<unsigned> parent_;
+    LargeArray<unsigned> parent_;
 };
 
 }  // namespace bilayer::detail

@@ -173,7 +173,7 @@ class Uniter {
           pieces_(mesh.triangles.size()),
           buried_(mesh.triangles.size(), 0) {}
 
-    United run() {
+    UnionSurface run() {
         findContacts();
         const std::vector<unsigned> patches = findPatches();
         const bool touched =
@@ -205,7 +205,7 @@ class Uniter {
     // A patch hangs together by edges of two triangles, none of which others touch. Each is known by its largest
     // triangle.
     std::vector<unsigned> findPatches() {
-        Sets sets(mesh_.triangles.size());
+        DisjointSets sets(mesh_.triangles.size());
         topology_.forEachEdge([&](std::span<const EdgeUse> uses) {
             if (uses.size() == 2 && contacts_[uses[0].triangle].empty() && contacts_[uses[1].triangle].empty())
                 sets.join(uses[0].triangle, uses[1].triangle);
@@ -252,8 +252,8 @@ class Uniter {
         return pieces_[triangle].size() == 1 && pieces_[triangle][0] == face(triangle).polygon();
     }
 
-    United assembled() const {
-        United united{{mesh_.points, {}}, 0, 0};
+    UnionSurface assembled() const {
+        UnionSurface united{{mesh_.points, {}}, 0, 0};
         for (std::size_t i = 0; i < mesh_.triangles.size(); ++i) {
             if (isWhole(i)) {
                 united.mesh.triangles.push_back(mesh_.triangles[i]);
@@ -283,7 +283,7 @@ class Uniter {
 
 }  // namespace
 
-United unite(const Mesh& mesh, Progress* progress) {
+UnionSurface unite(const Mesh& mesh, Progress* progress) {
     validate(mesh);
     return Uniter(mesh, progress).run();
 }

@@ -10,7 +10,7 @@ namespace bilayer::detail {
 class Progress;
 
 /// What unite() made of a mesh.
-struct United {
+struct UnionSurface {
     Mesh mesh;                        ///< the surface of the union
     std::size_t buriedTriangles = 0;  ///< triangles of which nothing is left
     std::size_t cutTriangles = 0;     ///< triangles of which a part is left, in pieces
@@ -27,6 +27,6 @@ struct United {
 /// without buried walls keeps its bytes. The bytes of the result do not depend on the number of threads.
 /// @param progress  polled, unless null
 /// Throws as validate() does.
-United unite(const Mesh& mesh, Progress* progress = nullptr);
+UnionSurface unite(const Mesh& mesh, Progress* progress = nullptr);
 
 }  // namespace bilayer::detail

@@ -25,7 +25,7 @@ namespace bilayer::detail {
 namespace {
 
 /// A wall that a ray leaves under a flatter angle than this is an edge, not a wall (cosine).
-constexpr float leastFacing = 0.2f;
+constexpr float minFacing = 0.2f;
 constexpr float infinite = std::numeric_limits<float>::infinity();
 
 struct Ray {
@@ -50,7 +50,7 @@ float exitThrough(const Ray& ray, const Triangle& t) {
                              from = glm::dvec3(ray.origin) - a;
     const glm::dvec3 normal = glm::cross(ab, ac);
     const double facing = glm::dot(normal, d);
-    if (facing <= double(leastFacing) * glm::length(normal)) return infinite;
+    if (facing <= double(minFacing) * glm::length(normal)) return infinite;
     const glm::dvec3 side = glm::cross(d, from);
     const double u = glm::dot(ac, side) / facing, v = -glm::dot(ab, side) / facing;
     if (u < 0 || v < 0 || u + v > 1) return infinite;
@@ -69,7 +69,7 @@ namespace hn = hwy::HWY_NAMESPACE;
 /// Rounding of products in floats, relative to the sizes of their factors; generous.
 constexpr float rounding = 2e-6f;
 /// Directions are bent where they run along an axis, so that all can be divided by.
-constexpr float leastDirection = 1e-20f;
+constexpr float minDirection = 1e-20f;
 
 inline Vec dot(const Points& a, const Points& b) {
     return hn::Add(hn::Add(hn::Mul(a.x, b.x), hn::Mul(a.y, b.y)), hn::Mul(a.z, b.z));
@@ -100,14 +100,14 @@ struct Waiting {
 };
 
 // One ray's search for its nearest exit.
-class Search {
+class ExitSearch {
   public:
-    Search(const TriangleTree& tree, const Ray& ray) : tree_(tree), ray_(ray) {
+    ExitSearch(const TriangleTree& tree, const Ray& ray) : tree_(tree), ray_(ray) {
         // around boxes, against rounding [m]
         const float room = rounding * tree.largestCoordinate();
         for (int k = 0; k < 3; ++k) {
             const float d = ray.direction[k];
-            inverse_[k] = 1 / (std::abs(d) < leastDirection ? std::copysign(leastDirection, d) : d);
+            inverse_[k] = 1 / (std::abs(d) < minDirection ? std::copysign(minDirection, d) : d);
             forward_[k] = inverse_[k] > 0;
             enter_[k] = -(ray.origin[k] + (forward_[k] ? room : -room)) * inverse_[k];
             leave_[k] = -(ray.origin[k] - (forward_[k] ? room : -room)) * inverse_[k];
@@ -191,7 +191,7 @@ class Search {
 };
 
 float nearestExit(const TriangleTree& tree, const Ray& ray) {
-    return Search(tree, ray).run();
+    return ExitSearch(tree, ray).run();
 }
 
 }  // namespace bilayer::detail::HWY_NAMESPACE

@@ -25,7 +25,7 @@ struct Passes {
 
 }  // namespace
 
-bool LastResort::isInside(const glm::dvec3& point) {
+bool FallbackSign::isInside(const glm::dvec3& point) {
     if (asked_) ++*asked_;
     // isolated: a thread that waits must not be given a task that would wait for it too
     std::call_once(looked_, [&] {
@@ -42,7 +42,7 @@ bool LastResort::isInside(const glm::dvec3& point) {
 }
 
 // The winding number by the signed passes of a ray that ends outside; nothing if one of them is too close to tell.
-std::optional<int> LastResort::windingByRay(const glm::dvec3& point, const glm::dvec3& way) const {
+std::optional<int> FallbackSign::windingByRay(const glm::dvec3& point, const glm::dvec3& way) const {
     const auto passesOf = [&](const auto& range, Passes passes) {
         progress_.poll();
         for (std::size_t i = range.begin(); i < range.end() && passes.clear; ++i) {

@@ -13,10 +13,10 @@ namespace bilayer::detail {
 /// Counts how a ray passes the triangles of a closed mesh; for other meshes, and where all rays come too close to edges
 /// to tell, asks a hierarchy that is made when it is first needed, which for most meshes is never. Safe from any
 /// thread.
-class LastResort {
+class FallbackSign {
   public:
     /// Works from the job's mesh, and adds to its count of undecided voxels.
-    explicit LastResort(const MeshJob& job)
+    explicit FallbackSign(const MeshJob& job)
         : mesh_(job.mesh),
           progress_(job.progress),
           asked_(job.undecided),

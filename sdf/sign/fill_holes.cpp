@@ -119,9 +119,9 @@ glm::dvec3 areaOf(const Mesh& mesh, const glm::uvec3& t) {
 }
 
 // The triangulation of a loop that has the least area.
-class LeastArea {
+class MinArea {
   public:
-    LeastArea(const Mesh& mesh, const Loop& loop)
+    MinArea(const Mesh& mesh, const Loop& loop)
         : loop_(loop), size_(loop.size()), areas_(size_ * size_, 0), middles_(size_ * size_, 0) {
         for (std::size_t span = 2; span < size_; ++span)
             for (std::size_t first = 0; first + span < size_; ++first) {
@@ -194,7 +194,7 @@ bool isBorder(const Mesh& mesh, const Lid& lid, const WindingNumber& winding) {
 // A crack changes no winding number.
 std::optional<Lid> lidOf(const Mesh& mesh, const Loop& loop, double crack, const WindingNumber& winding) {
     if (loop.size() < 3 || loop.size() > maxEdges) return std::nullopt;
-    const LeastArea least(mesh, loop);
+    const MinArea least(mesh, loop);
     const bool isCrack = 2 * least.area() <= crack * lengthOf(mesh, loop);
     if (!isCrack && !isBorder(mesh, least.lid(), winding)) return std::nullopt;
     return least.lid();

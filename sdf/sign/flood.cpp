@@ -69,7 +69,7 @@ enum class Side : std::uint8_t { unknown, outside, inside };
 
 class Flood {
   public:
-    Flood(const Cells& cells, const Mesh& mesh, float gap, float background, double voxelSize, Progress* progress)
+    Flood(const OctreeCells& cells, const Mesh& mesh, float gap, float background, double voxelSize, Progress* progress)
         : cells_(cells),
           winding_(mesh, progress),
           gap_(gap),
@@ -111,7 +111,7 @@ class Flood {
     void settleRest();
     std::uint32_t beyond() const { return std::uint32_t(states_.size()); }
 
-    const Cells& cells_;
+    const OctreeCells& cells_;
     const WindingNumber winding_;
     float gap_, background_;
     double h_;
@@ -146,7 +146,7 @@ void Flood::findParts() {
     // links between two voxels farther than this keep gap / 2 all the way
     const float free = (0.5f * gap_ + 0.5f + slack) * float(h_);
     tbb::parallel_for(std::size_t(0), states_.size(), [&](std::size_t c) {
-        const Cell& cell = cells_.all()[c];
+        const OctreeCell& cell = cells_.all()[c];
         State& state = states_[c];
         if (!cell.leaf) return;
         poll(progress_);
@@ -154,7 +154,7 @@ void Flood::findParts() {
         for (int i = 0; i < 27; ++i) {
             const openvdb::Coord shift((i / 9 - 1) * blockSide, (i / 3 % 3 - 1) * blockSide, (i % 3 - 1) * blockSide);
             const std::size_t found = cells_.find(cell.origin + shift);
-            state.around[std::size_t(i)] = found == Cells::none ? beyond() : std::uint32_t(found);
+            state.around[std::size_t(i)] = found == OctreeCells::none ? beyond() : std::uint32_t(found);
         }
     });
 }
@@ -162,7 +162,7 @@ void Flood::findParts() {
 // Hands pairs of parts that touch across a face of a cell to `join`.
 template <class Join>
 void Flood::joinAcross(std::size_t cell, int face, const Join& join) const {
-    const Cell& self = cells_.all()[cell];
+    const OctreeCell& self = cells_.all()[cell];
     openvdb::Coord next = self.origin;
     next[face / 2] += face % 2 ? self.side : -1;
     const std::size_t found = cells_.find(next);
@@ -175,7 +175,7 @@ void Flood::joinAcross(std::size_t cell, int face, const Join& join) const {
             if (any(touching)) use(s.first + p, touching);
         }
     };
-    if (found == Cells::none)
+    if (found == OctreeCells::none)
         return each(cell, face / 2, face % 2, [&](std::uint32_t part, const BlockMask&) { join(infinity, part); });
     // the smaller of two cells sees the whole of its neighbour's side; of equals the lower
     const std::int32_t side = cells_.all()[found].side;
@@ -298,14 +298,14 @@ void signByFlood(openvdb::FloatGrid& grid, const Mesh& mesh, float gap, const Ba
     const std::vector<BandLeaf*> leaves = leavesOf(grid);
     std::vector<openvdb::CoordBBox> inside;
     if (!leaves.empty()) {
-        const Cells cells(leaves, {}, progress);
+        const OctreeCells cells(leaves, {}, progress);
         Flood flood(cells, mesh, gap, background, double(widths.voxelSize), progress);
         flood.run();
         tbb::parallel_for(std::size_t(0), cells.all().size(), [&](std::size_t c) {
             if (BandLeaf* leaf = cells.all()[c].leaf) signLeaf(*leaf, flood.inside(c), widths);
         });
         for (std::size_t c = 0; c < cells.all().size(); ++c) {
-            const Cell& cell = cells.all()[c];
+            const OctreeCell& cell = cells.all()[c];
             if (!cell.leaf && flood.cellInside(c))
                 inside.push_back(openvdb::CoordBBox::createCube(cell.origin, cell.side));
         }

@@ -37,21 +37,21 @@ struct Cube {
     double distance;  // of the centre to the mesh [m]
 
     double radius() const { return halfDiagonal * half; }
-    double mostDistance() const { return distance + radius(); }
-    bool operator<(const Cube& other) const { return mostDistance() < other.mostDistance(); }
+    double maxDistance() const { return distance + radius(); }
+    bool operator<(const Cube& other) const { return maxDistance() < other.maxDistance(); }
 };
 
 class Search {
   public:
     Search(const Mesh& mesh, double least, Progress* progress)
         : mesh_(mesh),
-          leastRadius_(0.5 * least),
+          minRadius_(0.5 * least),
           progress_(progress),
           tree_(mesh, progress),
           winding_(mesh, progress),
           slope_(mesh, progress) {}
 
-    Opening run() const {
+    Hole run() const {
         std::priority_queue<Cube> cubes;
         cubes.push(whole());
         while (!cubes.empty()) {
@@ -90,7 +90,7 @@ class Search {
         std::vector<Cube> parts;
         for (int octant = 0; octant < 8; ++octant) {
             const Cube part = child(cube, octant);
-            if (part.mostDistance() >= leastRadius_ && mayHoldClosing(part)) parts.push_back(part);
+            if (part.maxDistance() >= minRadius_ && mayHoldClosing(part)) parts.push_back(part);
         }
         return parts;
     }
@@ -132,7 +132,7 @@ class Search {
     }
 
     const Mesh& mesh_;
-    const double leastRadius_;
+    const double minRadius_;
     Progress* progress_;
     const TriangleTree tree_;
     const WindingNumber winding_;
@@ -141,7 +141,7 @@ class Search {
 
 }  // namespace
 
-Opening widestOpening(const Mesh& mesh, double least, Progress* progress) {
+Hole widestHole(const Mesh& mesh, double least, Progress* progress) {
     return Search(mesh, least, progress).run();
 }
 

@@ -31,7 +31,7 @@ openvdb::Coord child(const openvdb::Coord& origin, std::int64_t side, int octant
 
 }  // namespace
 
-Cells::Cells(std::vector<BandLeaf*> leaves, const openvdb::CoordBBox& space, Progress* progress) {
+OctreeCells::OctreeCells(std::vector<BandLeaf*> leaves, const openvdb::CoordBBox& space, Progress* progress) {
     openvdb::CoordBBox box = space;
     for (const BandLeaf* leaf : leaves) box.expand(leaf->origin());
     for (int axis = 0; axis < 3; ++axis) base_[axis] = std::int32_t(box.min()[axis] & ~(nodeVoxels - 1));
@@ -45,8 +45,8 @@ Cells::Cells(std::vector<BandLeaf*> leaves, const openvdb::CoordBBox& space, Pro
     bricks_.push_back(cells_.size());
 }
 
-void Cells::cut(std::span<BandLeaf* const> leaves, const openvdb::Coord& origin, std::int64_t side,
-                Progress* progress) {
+void OctreeCells::cut(std::span<BandLeaf* const> leaves, const openvdb::Coord& origin, std::int64_t side,
+                      Progress* progress) {
     if (side == brickVoxels) poll(progress);
     if (side == brickVoxels || (side > brickVoxels && leaves.empty())) bricks_.push_back(cells_.size());
     if (leaves.empty() || side == BandLeaf::DIM) {
@@ -68,13 +68,13 @@ void Cells::cut(std::span<BandLeaf* const> leaves, const openvdb::Coord& origin,
     }
 }
 
-std::size_t Cells::find(const openvdb::Coord& voxel) const {
+std::size_t OctreeCells::find(const openvdb::Coord& voxel) const {
     for (int axis = 0; axis < 3; ++axis) {
         const std::int64_t from = std::int64_t(voxel[axis]) - base_[axis];
         if (from < 0 || from >= side_) return none;
     }
     const auto next =
-        std::upper_bound(cells_.begin(), cells_.end(), voxel, [this](const openvdb::Coord& at, const Cell& cell) {
+        std::upper_bound(cells_.begin(), cells_.end(), voxel, [this](const openvdb::Coord& at, const OctreeCell& cell) {
             return beforeInMortonOrder(offset(at, base_), offset(cell.origin, base_));
         });
     return std::size_t(next - cells_.begin()) - 1;

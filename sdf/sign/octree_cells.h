@@ -19,22 +19,23 @@ class Progress;
 using BandLeaf = openvdb::FloatTree::LeafNodeType;
 
 /// A cube of voxels: a leaf, or space without leaves.
-struct Cell {
-    openvdb::Coord origin;  ///< index coordinates of the first voxel, multiples of `side`, counted from Cells::base()
-    std::int32_t side;      ///< [voxels], 8 times a power of two
-    BandLeaf* leaf;         ///< null: none
+struct OctreeCell {
+    openvdb::Coord
+        origin;         ///< index coordinates of the first voxel, multiples of `side`, counted from OctreeCells::base()
+    std::int32_t side;  ///< [voxels], 8 times a power of two
+    BandLeaf* leaf;     ///< null: none
 };
 
-class Cells {
+class OctreeCells {
   public:
     static constexpr std::size_t none = std::numeric_limits<std::size_t>::max();
 
     /// Cuts up a cube that holds the leaves (any order, at least one) and the box `space` [voxels].
     /// @param progress  polled, unless null
-    Cells(std::vector<BandLeaf*> leaves, const openvdb::CoordBBox& space, Progress* progress = nullptr);
+    OctreeCells(std::vector<BandLeaf*> leaves, const openvdb::CoordBBox& space, Progress* progress = nullptr);
 
-    std::span<const Cell> all() const { return cells_; }
-    /// Cells come brick by brick: those of one aligned cube of 64 voxels, or one larger cell. Brick b is
+    std::span<const OctreeCell> all() const { return cells_; }
+    /// OctreeCells come brick by brick: those of one aligned cube of 64 voxels, or one larger cell. Brick b is
     /// [bricks()[b], bricks()[b + 1]) of all().
     std::span<const std::size_t> bricks() const { return bricks_; }
     /// The index of the cell that holds a voxel, or none beyond the cube.
@@ -45,7 +46,7 @@ class Cells {
 
     openvdb::Coord base_;
     std::int64_t side_;
-    std::vector<Cell> cells_;
+    std::vector<OctreeCell> cells_;
     std::vector<std::size_t> bricks_;
 };
 

@@ -22,7 +22,7 @@ namespace {
 /// The most of the area that may bound nothing for winding numbers to make sense of the rest. Of the 35 public meshes
 /// that stay open or broken after orienting, 24 have less than a tenth of it; the others (soups, sheets, furniture of
 /// single walls) have a fifth or more.
-constexpr double mostNothing = 0.15;
+constexpr double maxIdle = 0.15;
 
 constexpr const char* unionOfSolids = "union of overlapping solids";
 
@@ -60,8 +60,8 @@ SignChoice chooseFor(Orientation orientation, std::string trouble, Progress* pro
     const bool closedByTurning = orientation.turnedTriangles > 0 && balanced(orientation.mesh, progress);
     const bool oneSided = 2 * orientation.oneSidedTriangles > orientation.mesh.triangles.size();
     const Bounding share = bounding(orientation.mesh, progress);
-    const bool separates = !oneSided && share.nothing + share.reversed <= mostNothing;
-    if (orientation.turnedTriangles) choice.mended = std::move(orientation.mesh);
+    const bool separates = !oneSided && share.nothing + share.reversed <= maxIdle;
+    if (orientation.turnedTriangles) choice.repaired = std::move(orientation.mesh);
     choice.sign = !separates ? Sign::flood : closedByTurning ? Sign::normals : Sign::winding;
     if (choice.sign == Sign::normals)
         choice.reason = fmt::format("closed, and oriented after {} triangles were turned", orientation.turnedTriangles);
@@ -75,7 +75,7 @@ SignChoice chooseFor(Orientation orientation, std::string trouble, Progress* pro
 
 }  // namespace
 
-std::string unionReason(const United& united) {
+std::string unionReason(const UnionSurface& united) {
     return fmt::format("{}: {} triangles are buried, {} in part", unionOfSolids, united.buriedTriangles,
                        united.cutTriangles);
 }
@@ -128,7 +128,7 @@ SignChoice chooseSign(const Mesh& mesh, Progress* progress) {
 
 SignChoice chooseSignOfSolid(const Mesh& mesh, Progress* progress) {
     const SignChoice choice = chooseSign(mesh, progress);
-    if (choice.sign != Sign::normals || choice.mended || bounding(mesh, progress).nothing <= mostNothing) return choice;
+    if (choice.sign != Sign::normals || choice.repaired || bounding(mesh, progress).nothing <= maxIdle) return choice;
     return chooseFor(orient(mesh, progress), "closed and oriented, but of sheets", progress);
 }
 

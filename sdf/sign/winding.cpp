@@ -456,7 +456,8 @@ Answer ask(const Question& question, const glm::dvec3& point) {
 // The signs of one brick: of leaves voxel by voxel, of the cells between them at once.
 class BrickSigns {
   public:
-    BrickSigns(const Question& question, std::span<const Cell> cells, std::vector<openvdb::CoordBBox>& insideBoxes);
+    BrickSigns(const Question& question, std::span<const OctreeCell> cells,
+               std::vector<openvdb::CoordBBox>& insideBoxes);
     void sign(const BandWidths& widths);
 
   private:
@@ -470,7 +471,7 @@ class BrickSigns {
         bool calm() const { return slope <= calmSlope; }
     };
     struct Empty {
-        Cell cell;
+        OctreeCell cell;
         double slope;   // [1/voxel]
         double margin;  // at the centre; negative: not known yet
         bool inside;
@@ -495,11 +496,11 @@ class BrickSigns {
     std::array<std::int16_t, blockVoxels> slots_;  // of the brick's blocks: a leaf's index, or -1 - an empty cell's
 };
 
-BrickSigns::BrickSigns(const Question& question, std::span<const Cell> cells,
+BrickSigns::BrickSigns(const Question& question, std::span<const OctreeCell> cells,
                        std::vector<openvdb::CoordBBox>& insideBoxes)
     : question_(question), insideBoxes_(insideBoxes), origin_(cells.front().origin) {
     const float open = (0.5f + slack) * float(question.voxelSize);
-    for (const Cell& cell : cells) {
+    for (const OctreeCell& cell : cells) {
         const glm::dvec3 centre = question.centre(cell.origin, cell.side);
         // links reach one voxel beyond a leaf
         const double reach = halfDiagonal * (cell.leaf ? cell.side + 1 : cell.side);
@@ -739,7 +740,7 @@ void signByWinding(openvdb::FloatGrid& grid, const Mesh& mesh, const BandWidths&
     const std::vector<BandLeaf*> leaves = leavesOf(grid);
     tbb::enumerable_thread_specific<std::vector<openvdb::CoordBBox>> found;
     if (!leaves.empty()) {
-        const Cells cells(leaves, spaceOf(leaves, question), progress);
+        const OctreeCells cells(leaves, spaceOf(leaves, question), progress);
         const std::span bricks = cells.bricks();
         tbb::parallel_for(std::size_t(0), bricks.size() - 1, [&](std::size_t b) {
             BrickSigns(question, cells.all().subspan(bricks[b], bricks[b + 1] - bricks[b]), found.local()).sign(widths);

@@ -137,7 +137,7 @@ TEST_CASE("samples of a triangle are counted") {
     const Lattice lattice{glm::ivec3(40), 0.1f};  // an area of 50 steps^2: 8 rows
     const DenseField field = denseDoubleLayer(triangle, lattice);
     CHECK(field.samples == 36);
-    CHECK(field.mostSamples == 36);
+    CHECK(field.maxSamples == 36);
     CHECK(denseDoubleLayer(triangle, lattice, {.subdivision = Subdivision::recursive}).samples == 64);
     CHECK(denseDoubleLayer(triangle, lattice, {.maxSubdivision = 4}).samples == 10);
 }

@@ -327,7 +327,7 @@ TEST_CASE("Fast bodies that Bullet follows itself stop at a field as at its tria
     CAPTURE(speed, isBox);
     const Mesh plate = shapes::box({1, 1, 0.1f});
     const auto play = [&](bool asField) {
-        Shape field(std::make_shared<Collider>(plate, build(plate, {.voxelSize = voxel})), {.sweeps = false});
+        Shape field(std::make_shared<Collider>(plate, build(plate, {.voxelSize = voxel})), {.speculative = false});
         const TriangleShape triangles(plate);
         triangles.shape->setMargin(0);
         World world;
@@ -355,8 +355,8 @@ TEST_CASE("Fast bodies that Bullet follows itself stop at a field as at its tria
 namespace {
 
 // The least value of a convex function between two places, by golden sections.
-double leastBetween(const glm::dvec3& from, const glm::dvec3& to,
-                    const std::function<double(const glm::dvec3&)>& function) {
+double minBetween(const glm::dvec3& from, const glm::dvec3& to,
+                  const std::function<double(const glm::dvec3&)>& function) {
     constexpr double golden = 0.6180339887498949;
     const auto at = [&](double part) { return function(glm::mix(from, to, part)); };
     double lower = 0, upper = 1, left = 1 - golden, right = golden, onLeft = at(left), onRight = at(right);
@@ -401,8 +401,8 @@ double distanceTo(const Mesh& mesh, double ofPoint(const glm::dvec3&)) {
     for (const glm::uvec3& t : mesh.triangles) {
         const glm::dvec3 a = mesh.points[t.x], b = mesh.points[t.y], c = mesh.points[t.z];
         if (ofPoint(a) - std::max(glm::distance(a, b), glm::distance(a, c)) >= least) continue;
-        const auto ofLine = [&](const glm::dvec3& p) { return leastBetween(a, p, ofPoint); };
-        least = std::min(least, leastBetween(b, c, ofLine));
+        const auto ofLine = [&](const glm::dvec3& p) { return minBetween(a, p, ofPoint); };
+        least = std::min(least, minBetween(b, c, ofLine));
     }
     return least;
 }

@@ -134,14 +134,14 @@ Mesh ring() {
     return shapes::torus(0.3f, 0.12f, 16, 10);
 }
 
-std::shared_ptr<const Collider> colliderOf(const Mesh& mesh, Measure measure) {
-    return std::make_shared<Collider>(mesh, build(mesh, {.voxelSize = voxel}), ColliderOptions{.measure = measure});
+std::shared_ptr<const Collider> colliderOf(const Mesh& mesh, ContactAccuracy measure) {
+    return std::make_shared<Collider>(mesh, build(mesh, {.voxelSize = voxel}), ColliderOptions{.accuracy = measure});
 }
 
 // What a field is asked about, and its triangles.
 class Other {
   public:
-    Other(int kind, Random& random, Measure measure) : triangles_(ring()), field_(colliderOf(ring(), measure)) {
+    Other(int kind, Random& random, ContactAccuracy measure) : triangles_(ring()), field_(colliderOf(ring(), measure)) {
         for (float& height : heights_) height = float(random(-0.1, 0.1));
         terrain_ = std::make_unique<btHeightfieldTerrainShape>(side, side, heights_.data(), 1, -0.1f, 0.1f, 2,
                                                                PHY_FLOAT, false);
@@ -192,7 +192,8 @@ btTransform anywhere(Random& random, double reach) {
 
 TEST_CASE("Contact tests between concave bodies tell the distance of their meshes") {
     const int kind = GENERATE(range(0, 4)), other = GENERATE(range(0, 4));
-    const Measure measure = GENERATE(Measure::samples, Measure::edges, Measure::triangles);
+    const ContactAccuracy measure =
+        GENERATE(ContactAccuracy::samples, ContactAccuracy::exactNearFeatures, ContactAccuracy::exact);
     const unsigned start = seed();
     CAPTURE(kind, other, nameOf(measure), start);
     Random random(start);
@@ -225,7 +226,7 @@ TEST_CASE("Contact tests that ask for no distance measure the depth by the trian
     CAPTURE(start);
     Random random(start);
     const Mesh pulley = shapes::revolve({{0, -0.3f}, {0.4f, -0.15f}, {0.25f, 0}, {0.4f, 0.15f}, {0, 0.3f}}, 48);
-    Shape field(colliderOf(pulley, Measure::samples));
+    Shape field(colliderOf(pulley, ContactAccuracy::samples));
     const float radius = 0.4f * voxel;  // between surface points
     btSphereShape ball(radius);
     World world;
@@ -252,7 +253,8 @@ TEST_CASE("Contact tests find how far round bodies are that nearly touch each ot
     const float radius = GENERATE(2.f, 3.f, 5.f, 9.f) * voxel;
     const float gap = GENERATE(0.5f, 0.1f, 0.001f) * voxel;
     const bool overPlane = GENERATE(false, true);
-    const Measure measure = GENERATE(Measure::samples, Measure::edges, Measure::triangles);
+    const ContactAccuracy measure =
+        GENERATE(ContactAccuracy::samples, ContactAccuracy::exactNearFeatures, ContactAccuracy::exact);
     const unsigned start = seed();
     CAPTURE(radius / voxel, gap / voxel, overPlane, nameOf(measure), start);
     Random random(start);

@@ -30,17 +30,18 @@ using namespace bilayer::detail;
 using namespace bilayer::bullet::detail;
 using namespace bilayer::test;
 using bullet::Shape;
-using bullet::detail::BallHull;
 using bullet::detail::Convex;
+using bullet::detail::MultisphereHull;
 
 namespace {
 
 constexpr float h = 0.05f;             // voxel [m]
 constexpr double tolerance = 0.1 * h;  // of depths
 
-std::shared_ptr<const Collider> colliderOf(const Mesh& mesh, Measure measure = Measure::edges) {
+std::shared_ptr<const Collider> colliderOf(const Mesh& mesh,
+                                           ContactAccuracy measure = ContactAccuracy::exactNearFeatures) {
     return std::make_shared<Collider>(mesh, build(mesh, {.voxelSize = h, .interiorWidth = 6}),
-                                      ColliderOptions{.measure = measure});
+                                      ColliderOptions{.accuracy = measure});
 }
 
 // Two long bars of square section, ridge on ridge: the lower one's along y with its ridge up, the upper one's turned
@@ -79,7 +80,7 @@ btTransform transformOf(const Pose& pose) {
 
 using Collide = std::function<std::vector<Contact>(const Crossing&, float)>;
 
-Collide collideBars(int kind, Measure measure) {
+Collide collideBars(int kind, ContactAccuracy measure) {
     const auto field = colliderOf(shapes::box(bar), measure);
     if (kind == 0)
         return [=](const Crossing& c, float margin) {
@@ -115,7 +116,8 @@ Collide collideBars(int kind, Measure measure) {
 
 TEST_CASE("Edges that cross touch where they cross, however their points lie") {
     const int kind = GENERATE(0, 1, 2, 3);
-    const Measure measure = GENERATE(Measure::samples, Measure::edges, Measure::triangles);
+    const ContactAccuracy measure =
+        GENERATE(ContactAccuracy::samples, ContactAccuracy::exactNearFeatures, ContactAccuracy::exact);
     const unsigned start = seed();
     CAPTURE(kind, nameOf(measure), start);
     const Collide collide = collideBars(kind, measure);
@@ -175,7 +177,8 @@ TEST_CASE("A plane of many triangles makes the contacts of a plane of two") {
 
 TEST_CASE("A contact on an edge goes as evenly as the edge that slides") {
     const int kind = GENERATE(0, 1, 2, 3);
-    const Measure measure = GENERATE(Measure::samples, Measure::edges, Measure::triangles);
+    const ContactAccuracy measure =
+        GENERATE(ContactAccuracy::samples, ContactAccuracy::exactNearFeatures, ContactAccuracy::exact);
     const unsigned start = seed();
     CAPTURE(kind, nameOf(measure), start);
     const Collide collide = collideBars(kind, measure);
@@ -352,11 +355,11 @@ TEST_CASE("The distance from a hull of balls is that of its support function, ou
     std::uniform_real_distribution<float> part(-1, 1);
     const auto vector = [&] { return glm::vec3(part(random), part(random), part(random)); };
     for (int run = 0; run < 60; ++run) {
-        std::vector<BallHull::Ball> balls;
+        std::vector<MultisphereHull::Ball> balls;
         for (int i = 0; i <= run % 6; ++i) balls.push_back({0.5f * vector(), 0.02f + 0.2f * std::abs(part(random))});
         if (run % 3 == 0)
             for (auto& ball : balls) ball.radius = 0.2f;
-        const BallHull hull(balls);
+        const MultisphereHull hull(balls);
         for (int i = 0; i < 20; ++i) {
             const glm::vec3 point = 1.2f * vector();
             const auto near = hull.nearest(point);
@@ -419,7 +422,7 @@ TEST_CASE("An edge that has sunk into two faces is as deep as the least way out 
         const float fall = -glm::dot(before, along), rise = glm::dot(after, along);
         if (fall < 0.1f || rise < 0.1f || fall > 0.9f || rise > 0.9f || glm::dot(before, after) < -0.9f) continue;
         ++tried;
-        const auto found = acrossEdge(along, {-1, before}, Touch{-1, before}, Touch{-1, after});
+        const auto found = acrossEdge(along, {-1, before}, SurfaceSample{-1, before}, SurfaceSample{-1, after});
         REQUIRE(found);
         // ways out are looked for all around the edge: moved so far, its line leaves either face where it meets the
         // other
@@ -439,7 +442,8 @@ TEST_CASE("An edge that has sunk into two faces is as deep as the least way out 
 
 TEST_CASE("No contact is much deeper than the bodies overlap, whichever edges cross") {
     const unsigned start = seed();
-    const Measure measure = GENERATE(Measure::samples, Measure::edges, Measure::triangles);
+    const ContactAccuracy measure =
+        GENERATE(ContactAccuracy::samples, ContactAccuracy::exactNearFeatures, ContactAccuracy::exact);
     CAPTURE(start, nameOf(measure));
     std::mt19937 random(start);
     std::normal_distribution<float> normal;
@@ -499,7 +503,8 @@ TEST_CASE("No contact is much deeper than the bodies overlap, whichever edges cr
 
 TEST_CASE("A corner is as deep in triangles as below their plane, however the body stands") {
     const unsigned start = seed();
-    const Measure measure = GENERATE(Measure::samples, Measure::edges, Measure::triangles);
+    const ContactAccuracy measure =
+        GENERATE(ContactAccuracy::samples, ContactAccuracy::exactNearFeatures, ContactAccuracy::exact);
     const bool asTerrain = GENERATE(false, true);
     const float depth = h * GENERATE(-0.5f, 0.05f, 0.2f, 0.5f);
     CAPTURE(start, nameOf(measure), asTerrain, depth / h);
@@ -537,7 +542,8 @@ TEST_CASE("A corner is as deep in triangles as below their plane, however the bo
 
 TEST_CASE("A tip below a crease of triangles is as deep as below both of its faces") {
     const unsigned start = seed();
-    const Measure measure = GENERATE(Measure::samples, Measure::edges, Measure::triangles);
+    const ContactAccuracy measure =
+        GENERATE(ContactAccuracy::samples, ContactAccuracy::exactNearFeatures, ContactAccuracy::exact);
     const float cell = GENERATE(0.7f, 20.f);  // [voxels]
     CAPTURE(start, nameOf(measure), cell);
     std::mt19937 random(start);
@@ -567,9 +573,9 @@ TEST_CASE("A tip below a crease of triangles is as deep as below both of its fac
 TEST_CASE("What is exact is so against Bullet's shapes too") {
     // small balls around the edges of a box, whose samples are rounded off there
     const glm::vec3 half(0.5f, 0.4f, 0.3f);
-    const auto exact = colliderOf(shapes::box(half), Measure::triangles),
-               usual = colliderOf(shapes::box(half), Measure::edges),
-               sampled = colliderOf(shapes::box(half), Measure::samples);
+    const auto exact = colliderOf(shapes::box(half), ContactAccuracy::exact),
+               usual = colliderOf(shapes::box(half), ContactAccuracy::exactNearFeatures),
+               sampled = colliderOf(shapes::box(half), ContactAccuracy::samples);
     const float radius = 0.1f * h;
     btSphereShape ball(radius);
     const Convex convex(ball);
@@ -612,7 +618,7 @@ TEST_CASE("Balls lie in a groove as deep as they do between two faces") {
         mesh.triangles.push_back({t.x, t.z, t.y});
         mesh.triangles.push_back(t + 5u);
     }
-    const auto deepestWith = [&](Measure measure, float radius) {
+    const auto deepestWith = [&](ContactAccuracy measure, float radius) {
         const auto groove = colliderOf(mesh, measure);
         btSphereShape ball(radius);
         std::vector<Contact> contacts;
@@ -622,8 +628,8 @@ TEST_CASE("Balls lie in a groove as deep as they do between two faces") {
     };
     for (const float voxels : {0.9f, 1.5f, 2.f}) {
         CAPTURE(voxels);
-        CHECK(std::abs(deepestWith(Measure::edges, voxels * h)) < 0.01f * h);
-        CHECK(std::abs(deepestWith(Measure::triangles, voxels * h)) < 0.01f * h);
-        CHECK(std::abs(deepestWith(Measure::samples, voxels * h)) > 0.1f * h);
+        CHECK(std::abs(deepestWith(ContactAccuracy::exactNearFeatures, voxels * h)) < 0.01f * h);
+        CHECK(std::abs(deepestWith(ContactAccuracy::exact, voxels * h)) < 0.01f * h);
+        CHECK(std::abs(deepestWith(ContactAccuracy::samples, voxels * h)) > 0.1f * h);
     }
 }

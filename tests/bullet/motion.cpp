@@ -203,7 +203,7 @@ std::vector<Contact> keptOf(const bullet::detail::Reduced& reduced) {
 }
 
 /// The least gap after a small motion of A about the origin.
-double leastGap(const std::vector<Contact>& contacts, const glm::dvec3& shift, const glm::dvec3& turn) {
+double minGap(const std::vector<Contact>& contacts, const glm::dvec3& shift, const glm::dvec3& turn) {
     double least = 1e30;
     for (const Contact& c : contacts)
         least = std::min(least,
@@ -302,7 +302,7 @@ TEST_CASE("What is kept of random bodies' contacts is met first, but for as much
         };
         const Pose a{{}, turned()}, b{0.05f * glm::vec3(normal(random), normal(random), normal(random)), turned()};
         std::vector<Contact> contacts;
-        collide(*knot, a, *knot, b, {.margin = 0.003f, .leastOpposition = 0.3f}, contacts);
+        collide(*knot, a, *knot, b, {.margin = 0.003f, .minNormalCosine = 0.3f}, contacts);
         if (contacts.size() < 40) continue;
         ++tried;
         const bullet::detail::Reduced reduced = bullet::detail::reduce(contacts);
@@ -316,8 +316,8 @@ TEST_CASE("What is kept of random bodies' contacts is met first, but for as much
             const double angle = std::exp2(-5 - 2 * part(random));
             const glm::dvec3 turn = angle * glm::normalize(glm::dvec3(normal(random), normal(random), normal(random)));
             const glm::dvec3 shift = -glm::cross(turn, centre);
-            const double more = leastGap(kept, shift, turn) - leastGap(contacts, shift, turn);
-            worst = std::max(worst, (more - reduced.lost) / (angle * reach));
+            const double more = minGap(kept, shift, turn) - minGap(contacts, shift, turn);
+            worst = std::max(worst, (more - reduced.reductionError) / (angle * reach));
         }
     }
     CHECK(worst < 0.1);
@@ -655,7 +655,7 @@ TEST_CASE("What has tips and edges comes to rest in a groove of triangles, howev
 
 TEST_CASE("What is thin lies on triangles, and its far side does not pull it through them") {
     const float degrees = GENERATE(5.f, 10.f, 20.f), voxel = GENERATE(0.02f, 0.01f);
-    const Measure measure = GENERATE(Measure::edges, Measure::triangles);
+    const ContactAccuracy measure = GENERATE(ContactAccuracy::exactNearFeatures, ContactAccuracy::exact);
     const unsigned seed = test::seed();
     CAPTURE(degrees, voxel, nameOf(measure), seed);
     Random random(seed);
@@ -664,7 +664,7 @@ TEST_CASE("What is thin lies on triangles, and its far side does not pull it thr
     wedge.points = {{-0.4f, 0, 0}, {0.4f, 0, 0}, {0.4f, y, z}, {-0.4f, y, z}, {0.4f, y, -z}, {-0.4f, y, -z}};
     wedge.triangles = {{0, 3, 2}, {0, 2, 1}, {0, 1, 4}, {0, 4, 5}, {3, 5, 4}, {3, 4, 2}, {0, 5, 3}, {1, 2, 4}};
     const auto collider =
-        std::make_shared<Collider>(wedge, build(wedge, {.voxelSize = voxel}), ColliderOptions{.measure = measure});
+        std::make_shared<Collider>(wedge, build(wedge, {.voxelSize = voxel}), ColliderOptions{.accuracy = measure});
     const Pose frame = bullet::centreOfMassFrame(*collider);
     Shape shape(collider, {.frame = frame});
     Mesh sheet;

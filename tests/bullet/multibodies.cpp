@@ -1,4 +1,4 @@
-// Links of Bullet's multibodies.
+// SignLinks of Bullet's multibodies.
 #include <BulletDynamics/Featherstone/btMultiBodyConstraintSolver.h>
 #include <BulletDynamics/Featherstone/btMultiBodyDynamicsWorld.h>
 #include <BulletDynamics/Featherstone/btMultiBodyLinkCollider.h>

@@ -29,7 +29,7 @@ constexpr float h = 0.05f;  // voxel [m]
 // On a sphere of radius R, the gradient of the trilinear interpolant is off by up to h / (2 R) along either tangent, so
 // that the deepest place of a ball is found that far beside the true one.
 constexpr float fieldRadius = 0.5f;
-const float leastCosine = std::cos(h / fieldRadius);
+const float minCosine = std::cos(h / fieldRadius);
 constexpr double depthError = 0.1 * h;
 
 struct Contacts : btCollisionWorld::ContactResultCallback {
@@ -293,7 +293,7 @@ TEST_CASE("Contact tests give the depth and the normal from the second body to t
         world.dynamics.contactPairTest(fieldFirst ? field : other, fieldFirst ? other : field, found);
         REQUIRE(found.count > 0);
         CHECK(found.deepest == Approx(gap).margin(depthError));
-        CHECK(found.normal.z() * (found.firstObject == field ? -1 : 1) > leastCosine);
+        CHECK(found.normal.z() * (found.firstObject == field ? -1 : 1) > minCosine);
     }
     SECTION("one against all") {
         Contacts found;

@@ -24,16 +24,17 @@ using namespace bilayer::test;
 
 namespace {
 
-std::shared_ptr<const Collider> colliderOf(const Mesh& mesh, float voxels, Measure measure = Measure::edges) {
+std::shared_ptr<const Collider> colliderOf(const Mesh& mesh, float voxels,
+                                           ContactAccuracy measure = ContactAccuracy::exactNearFeatures) {
     const float voxel = voxelSizeFor(mesh, voxels);
     return std::make_shared<Collider>(mesh, build(mesh, {.voxelSize = voxel, .interiorWidth = 5}),
-                                      ColliderOptions{.measure = measure});
+                                      ColliderOptions{.accuracy = measure});
 }
 
 std::vector<std::shared_ptr<const Collider>> someColliders() {
     return {colliderOf(shapes::torusKnot(2, 3, 0.1f, 0.03f, 90, 12), 48),
-            colliderOf(shapes::torus(0.12f, 0.04f), 40, Measure::samples),
-            colliderOf(shapes::box({0.1f, 0.06f, 0.03f}), 24, Measure::triangles),
+            colliderOf(shapes::torus(0.12f, 0.04f), 40, ContactAccuracy::samples),
+            colliderOf(shapes::box({0.1f, 0.06f, 0.03f}), 24, ContactAccuracy::exact),
             colliderOf(shapes::cone(0.08f, 0.15f, 16), 30), colliderOf(shapes::sphere(0.08f, 3), 20)};
 }
 
@@ -62,7 +63,7 @@ struct Crowd {
 // Every pair's contacts by the sampler against those of the processor. Returns their number.
 std::size_t check(const PointSampler& sampler, const Crowd& crowd, float margin) {
     const ContactOptions options{
-        .margin = margin, .leastOpposition = 0.3f, .leastOppositionApart = 0.9f, .keepsEdgesAslant = false};
+        .margin = margin, .minNormalCosine = 0.3f, .minNormalCosineApart = 0.9f, .keepsObliqueEdges = false};
     std::vector<SampledBody> bodies;
     std::vector<PointQuery> queries;
     for (const Placed& body : crowd.bodies) bodies.push_back(sampledBody(body.collider));

@@ -10,9 +10,9 @@
 #include "demos/shared/shapes.h"
 
 using namespace bilayer;
-using bullet::Advice;
-using bullet::advise;
-using bullet::Scene;
+using bullet::recommendSettings;
+using bullet::SceneRequirements;
+using bullet::Settings;
 
 namespace {
 
@@ -25,7 +25,7 @@ MeshReport ball(float radius) {
     return inspect(shapes::sphere(radius, 4));
 }
 
-bool warnsOf(const Advice& advice, const std::string& what) {
+bool warnsOf(const Settings& advice, const std::string& what) {
     for (const std::string& warning : advice.warnings)
         if (warning.find(what) != std::string::npos) return true;
     return false;
@@ -34,7 +34,7 @@ bool warnsOf(const Advice& advice, const std::string& what) {
 }  // namespace
 
 TEST_CASE("A plate gets three voxels of its thickness") {
-    const Advice advice = advise(plate(0.03f), {.speed = 1});
+    const Settings advice = recommendSettings(plate(0.03f), {.speed = 1});
     CHECK(advice.voxelSize == Approx(0.01));
     CHECK(advice.wallVoxels == Approx(3));
     CHECK(advice.margin == advice.voxelSize);
@@ -45,12 +45,12 @@ TEST_CASE("A plate gets three voxels of its thickness") {
 }
 
 TEST_CASE("A plate too thin for any affordable field is warned of") {
-    const Advice advice = advise(plate(1e-3f), {.speed = 1});
+    const Settings advice = recommendSettings(plate(1e-3f), {.speed = 1});
     CHECK(advice.voxelSize == Approx(1.f / 512));
     CHECK(warnsOf(advice, "voxels thick"));
     // a voxel size of the user's is judged by the same rule
-    CHECK(warnsOf(advise(plate(0.03f), {.voxelSize = 0.016f}), "voxels thick"));
-    CHECK_FALSE(warnsOf(advise(plate(0.03f), {.voxelSize = 0.015f}), "voxels thick"));
+    CHECK(warnsOf(recommendSettings(plate(0.03f), {.voxelSize = 0.016f}), "voxels thick"));
+    CHECK_FALSE(warnsOf(recommendSettings(plate(0.03f), {.voxelSize = 0.015f}), "voxels thick"));
 }
 
 TEST_CASE("A thin tip does not rule the voxel size, but is warned of") {
@@ -60,67 +60,67 @@ TEST_CASE("A thin tip does not rule the voxel size, but is warned of") {
     const MeshReport mesh = inspect(shapes::join({shapes::sphere(0.5f, 4), tip}));
     CHECK(mesh.thinnestWall == Approx(2e-4).margin(2e-7));  // coordinates near 0.6 are rounded by 6e-8
     CHECK(mesh.commonWall > 0.9f);
-    const Advice advice = advise(mesh, {});
+    const Settings advice = recommendSettings(mesh, {});
     CHECK(advice.voxelSize == Approx(mesh.bounds.longestSide() / 64));
     CHECK(warnsOf(advice, "tip"));
     CHECK_FALSE(warnsOf(advice, "voxels thick"));
 }
 
 TEST_CASE("A ball has no thin wall: its size decides") {
-    const Advice advice = advise(ball(0.5f), {});
+    const Settings advice = recommendSettings(ball(0.5f), {});
     CHECK(advice.voxelSize == Approx(1.f / 64));
     CHECK(advice.substeps == 1);
-    CHECK(advice.substepsUnswept == 1);
+    CHECK(advice.substepsWithoutSpeculation == 1);
     // unless it meets one, or has to pass a gap
-    CHECK(advise(ball(0.5f), {.thickness = 0.03f}).voxelSize == Approx(0.01));
+    CHECK(recommendSettings(ball(0.5f), {.thickness = 0.03f}).voxelSize == Approx(0.01));
     // its own wall counts where it is thinner
-    CHECK(advise(plate(0.03f), {.thickness = 0.5f}).voxelSize == Approx(0.01));
-    CHECK(warnsOf(advise(ball(0.5f), {.margin = 0}), "margin"));
-    CHECK(advise(ball(0.5f), {.gap = 0.01f}).voxelSize == Approx(0.005));
-    CHECK(warnsOf(advise(ball(0.5f), {.gap = 0.01f, .voxelSize = 0.01f}), "gap"));
-    CHECK_FALSE(warnsOf(advise(ball(0.5f), {.gap = 0.01f}), "gap"));
+    CHECK(recommendSettings(plate(0.03f), {.thickness = 0.5f}).voxelSize == Approx(0.01));
+    CHECK(warnsOf(recommendSettings(ball(0.5f), {.margin = 0}), "margin"));
+    CHECK(recommendSettings(ball(0.5f), {.gap = 0.01f}).voxelSize == Approx(0.005));
+    CHECK(warnsOf(recommendSettings(ball(0.5f), {.gap = 0.01f, .voxelSize = 0.01f}), "gap"));
+    CHECK_FALSE(warnsOf(recommendSettings(ball(0.5f), {.gap = 0.01f}), "gap"));
 }
 
 TEST_CASE("Speed asks for substeps, or for sweeps") {
     // 10 m/s at 1/60 s go 16.7 cm; half of the plate is 1.5 cm: 11.1 steps. It may turn by 20 rad/s then, 0.33 a step.
-    const Advice fast = advise(plate(0.03f), {.speed = 10});
-    CHECK(fast.substepsUnswept == 12);
+    const Settings fast = recommendSettings(plate(0.03f), {.speed = 10});
+    CHECK(fast.substepsWithoutSpeculation == 12);
     CHECK(fast.substeps == 1);
     CHECK(warnsOf(fast, "swept contacts"));
     CHECK(warnsOf(fast, "WorldExtensions"));
     CHECK(fast.interiorWidth == 10);
     // below the margin nothing passes
-    const Advice slow = advise(plate(0.03f), {.speed = 0.5f});
-    CHECK(slow.substepsUnswept == 1);
+    const Settings slow = recommendSettings(plate(0.03f), {.speed = 0.5f});
+    CHECK(slow.substepsWithoutSpeculation == 1);
     CHECK_FALSE(warnsOf(slow, "swept contacts"));
     CHECK(slow.interiorWidth == 3);
     // turns bend ways: half a radian a step at most
-    CHECK(advise(plate(0.03f), {.speed = 1, .spin = 100}).substeps == 4);
-    CHECK(advise(plate(0.03f), {.step = 1.f / 240, .speed = 1, .spin = 100}).substeps == 1);
-    CHECK(advise(plate(0.03f), {.speed = 100, .spin = 0}).substeps == 1);
-    CHECK(advise(plate(0.03f), {.speed = 100}).substeps == 7);
-    const Advice absurd = advise(plate(0.03f), {.step = 1e30f, .speed = 1e30f});
+    CHECK(recommendSettings(plate(0.03f), {.speed = 1, .spin = 100}).substeps == 4);
+    CHECK(recommendSettings(plate(0.03f), {.step = 1.f / 240, .speed = 1, .spin = 100}).substeps == 1);
+    CHECK(recommendSettings(plate(0.03f), {.speed = 100, .spin = 0}).substeps == 1);
+    CHECK(recommendSettings(plate(0.03f), {.speed = 100}).substeps == 7);
+    const Settings absurd = recommendSettings(plate(0.03f), {.step = 1e30f, .speed = 1e30f});
     CHECK(absurd.substeps == 1000000);
     CHECK(warnsOf(absurd, "1000000 substeps or more"));
 }
 
 TEST_CASE("What Bullet and its solver ask for is warned of") {
-    CHECK(warnsOf(advise(ball(0.05f), {}), "setSleepingThresholds"));
-    CHECK_FALSE(warnsOf(advise(ball(0.15f), {}), "setSleepingThresholds"));
-    CHECK(warnsOf(advise(ball(5), {.massRatio = 11}), "masses"));
-    CHECK_FALSE(warnsOf(advise(ball(5), {.massRatio = 10}), "masses"));
-    CHECK(advise(ball(5), {}).warnings.empty());
+    CHECK(warnsOf(recommendSettings(ball(0.05f), {}), "setSleepingThresholds"));
+    CHECK_FALSE(warnsOf(recommendSettings(ball(0.15f), {}), "setSleepingThresholds"));
+    CHECK(warnsOf(recommendSettings(ball(5), {.massRatio = 11}), "masses"));
+    CHECK_FALSE(warnsOf(recommendSettings(ball(5), {.massRatio = 10}), "masses"));
+    CHECK(recommendSettings(ball(5), {}).warnings.empty());
     Mesh open = shapes::sphere(5, 3);
     open.triangles.pop_back();
-    CHECK(warnsOf(advise(inspect(open), {}), "not closed"));
+    CHECK(warnsOf(recommendSettings(inspect(open), {}), "not closed"));
     Mesh inside = shapes::sphere(5, 3);
     for (glm::uvec3& triangle : inside.triangles) std::swap(triangle.x, triangle.y);
-    CHECK(warnsOf(advise(inspect(inside), {}), "not clean"));
+    CHECK(warnsOf(recommendSettings(inspect(inside), {}), "not clean"));
 }
 
 TEST_CASE("Estimates are near what is built") {
     const Mesh mesh = GENERATE(shapes::sphere(0.5f, 5), shapes::torus(0.4f, 0.1f), shapes::box({0.5f, 0.5f, 0.05f}, 8));
-    const Advice advice = advise(inspect(mesh), {.speed = 1});
+    const Settings advice = recommendSettings(inspect(mesh), {.speed = 1});
     const LevelSet field = build(mesh, {.voxelSize = advice.voxelSize,
                                         .exteriorWidth = float(advice.exteriorWidth),
                                         .interiorWidth = float(advice.interiorWidth)});
@@ -134,15 +134,16 @@ TEST_CASE("Estimates are near what is built") {
 TEST_CASE("Scenes of no sense are refused by name") {
     const MeshReport mesh = ball(0.5f);
     const float nan = std::numeric_limits<float>::quiet_NaN();
-    CHECK_THROWS_WITH(advise(mesh, {.step = 0}), Catch::Contains("step"));
-    CHECK_THROWS_WITH(advise(mesh, {.speed = -1}), Catch::Contains("speed"));
-    CHECK_THROWS_WITH(advise(mesh, {.spin = nan}), Catch::Contains("spin"));
-    CHECK_THROWS_WITH(advise(mesh, {.thickness = nan}), Catch::Contains("thickness"));
-    CHECK_THROWS_WITH(advise(mesh, {.gap = -1}), Catch::Contains("gap"));
-    CHECK_THROWS_WITH(advise(mesh, {.massRatio = 0.5f}), Catch::Contains("mass ratio"));
-    CHECK_THROWS_WITH(advise(mesh, {.margin = nan}), Catch::Contains("margin"));
-    CHECK_THROWS_WITH(advise(mesh, {.voxelSize = 1e-9f}), Catch::Contains("voxel size") && Catch::Contains("2e-05"));
-    CHECK_THROWS_WITH(advise(ball(1e5f), {.voxelSize = 2e-5f}),
+    CHECK_THROWS_WITH(recommendSettings(mesh, {.step = 0}), Catch::Contains("step"));
+    CHECK_THROWS_WITH(recommendSettings(mesh, {.speed = -1}), Catch::Contains("speed"));
+    CHECK_THROWS_WITH(recommendSettings(mesh, {.spin = nan}), Catch::Contains("spin"));
+    CHECK_THROWS_WITH(recommendSettings(mesh, {.thickness = nan}), Catch::Contains("thickness"));
+    CHECK_THROWS_WITH(recommendSettings(mesh, {.gap = -1}), Catch::Contains("gap"));
+    CHECK_THROWS_WITH(recommendSettings(mesh, {.massRatio = 0.5f}), Catch::Contains("mass ratio"));
+    CHECK_THROWS_WITH(recommendSettings(mesh, {.margin = nan}), Catch::Contains("margin"));
+    CHECK_THROWS_WITH(recommendSettings(mesh, {.voxelSize = 1e-9f}),
+                      Catch::Contains("voxel size") && Catch::Contains("2e-05"));
+    CHECK_THROWS_WITH(recommendSettings(ball(1e5f), {.voxelSize = 2e-5f}),
                       Catch::Contains("voxel size") && Catch::Contains("1e+09"));
-    CHECK_THROWS_AS(advise(MeshReport{}, {}), std::invalid_argument);
+    CHECK_THROWS_AS(recommendSettings(MeshReport{}, {}), std::invalid_argument);
 }

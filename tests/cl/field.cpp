@@ -238,7 +238,7 @@ TEST_CASE("fields of the corpus stay on the device") {
     }
 }
 
-TEST_CASE("fields stay on the device of a mesh that is mended, and of such whose sides the processor finds") {
+TEST_CASE("fields stay on the device of a mesh that is repaired, and of such whose sides the processor finds") {
     for (const char* name : {"casting_inverted.off", "thingi_73416.stl", "degenerated.obj"}) {
         const auto path = corpusMesh(name);
         if (!path) continue;

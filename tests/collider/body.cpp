@@ -74,7 +74,7 @@ void requireSame(const Body& a, const Body& b) {
     REQUIRE(a.bounds.lower == b.bounds.lower);
     REQUIRE(a.bounds.upper == b.bounds.upper);
     REQUIRE(a.margin == b.margin);
-    REQUIRE(a.measure == b.measure);
+    REQUIRE(a.accuracy == b.accuracy);
     REQUIRE((a.mesh == nullptr) == (b.mesh == nullptr));
     if (a.mesh) {
         REQUIRE(a.mesh->points == b.mesh->points);
@@ -147,7 +147,8 @@ TEST_CASE("a body comes back from its file bit by bit") {
     const bool half = GENERATE(false, true);
     CAPTURE(voxel, half);
     const Pair pair(mesh, voxel, {.halfFloat = half},
-                    {.margin = GENERATE(-1.f, 0.0123f), .measure = half ? Measure::samples : Measure::edges});
+                    {.margin = GENERATE(-1.f, 0.0123f),
+                     .accuracy = half ? ContactAccuracy::samples : ContactAccuracy::exactNearFeatures});
     REQUIRE(pair.made.data().points().points().size() > 100);
     REQUIRE(pair.made.data().body.mesh);
     requireSame(pair.made.data().body, pair.loaded.data().body);
@@ -159,10 +160,11 @@ TEST_CASE("bodies from files touch where those of meshes do, to the bit") {
     CAPTURE(seed);
     Random random(seed);
     const float h = 0.03f;
-    const Measure measure = GENERATE(Measure::samples, Measure::edges, Measure::triangles);
-    const Pair knot(shapes::torusKnot(2, 3, 0.5f, 0.15f, 200, 16), h, {}, {.measure = measure}),
-        box(shapes::box({0.3f, 0.2f, 0.1f}, 2), h, {}, {.measure = measure});
-    CHECK((knot.loaded.field().mesh() != nullptr) == (measure != Measure::samples));
+    const ContactAccuracy measure =
+        GENERATE(ContactAccuracy::samples, ContactAccuracy::exactNearFeatures, ContactAccuracy::exact);
+    const Pair knot(shapes::torusKnot(2, 3, 0.5f, 0.15f, 200, 16), h, {}, {.accuracy = measure}),
+        box(shapes::box({0.3f, 0.2f, 0.1f}, 2), h, {}, {.accuracy = measure});
+    CHECK((knot.loaded.field().mesh() != nullptr) == (measure != ContactAccuracy::samples));
     std::size_t found = 0;
     for (int i = 0; i < 200; ++i) {
         const Pose a{random.point(0.5), glm::angleAxis(float(random(0, 6.28)), random.direction())};
@@ -211,7 +213,7 @@ TEST_CASE("many threads may ask at once for the triangles of a body without a me
 TEST_CASE("a body keeps a mesh whose triangles were turned as it was turned") {
     Mesh inside = shapes::torusKnot(2, 3, 0.5f, 0.15f, 200, 16);
     for (glm::uvec3& triangle : inside.triangles) std::swap(triangle.x, triangle.y);
-    const Pair knot(inside, 0.03f, {}, {.measure = Measure::triangles});
+    const Pair knot(inside, 0.03f, {}, {.accuracy = ContactAccuracy::exact});
     const Mesh outward = shapes::torusKnot(2, 3, 0.5f, 0.15f, 200, 16);
     REQUIRE(massProperties(knot.loaded.mesh()).volume == Approx(massProperties(outward).volume));
     requireSame(knot.made.data().body, knot.loaded.data().body);
@@ -232,7 +234,7 @@ TEST_CASE("an open mesh has no mass, in a file neither") {
     REQUIRE_FALSE(bodyOf(withBody(stored(), body)).mass);
     body.mesh.reset();
     REQUIRE_FALSE(bodyOf(withBody(stored(), body)).mesh);
-    REQUIRE(bodyOf(withBody(stored(), body)).measure == Measure::samples);
+    REQUIRE(bodyOf(withBody(stored(), body)).accuracy == ContactAccuracy::samples);
 }
 
 TEST_CASE("a field alone is no body") {

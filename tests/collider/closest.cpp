@@ -272,7 +272,7 @@ TEST_CASE("at the edges of a mesh that meets itself closest points are on the ri
     CHECK(wrong == 0);
 }
 
-TEST_CASE("closest points of meshes that build() has to mend are those of their triangles, with the field's signs") {
+TEST_CASE("closest points of meshes that build() has to repair are those of their triangles, with the field's signs") {
     const unsigned seed = test::seed();
     CAPTURE(seed);
     const Mesh torus = tilted(shapes::torus(1, 0.3f, 48, 24));

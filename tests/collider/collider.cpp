@@ -318,7 +318,7 @@ TEST_CASE("contacts that look along the surface of their point are left out wher
             if (!opposes(contact) && point.isSharp && contact.distance <= 0) sunk.insert(contact.feature);
             ++all;
         }
-        collide(a, b, {.margin = h, .leastOpposition = 0.3f, .leastOppositionApart = apart}, found);
+        collide(a, b, {.margin = h, .minNormalCosine = 0.3f, .minNormalCosineApart = apart}, found);
         for (const Contact& contact : found) REQUIRE(opposes(contact));
         back += std::erase_if(found, [&](const Contact& contact) { return sunk.contains(contact.feature); });
         REQUIRE(found.size() == expected.size());
@@ -326,7 +326,7 @@ TEST_CASE("contacts that look along the surface of their point are left out wher
         kept += found.size();
 
         std::vector<Contact> straight;
-        collide(a, b, {.margin = h, .leastOpposition = 0.3f, .leastOppositionApart = apart, .keepsEdgesAslant = false},
+        collide(a, b, {.margin = h, .minNormalCosine = 0.3f, .minNormalCosineApart = apart, .keepsObliqueEdges = false},
                 straight);
         std::set<std::uint32_t> left;
         for (const Contact& contact : straight) left.insert(contact.feature);
@@ -348,11 +348,11 @@ TEST_CASE("contacts that look along the surface of their point are left out wher
 TEST_CASE("tips that meet are pushed back the way they came, whatever they see of each other's sides") {
     const Mesh cone = shapes::cone(0.2f, 0.8f, 4);
     const auto tip = std::make_shared<Collider>(cone, build(cone, {.voxelSize = 0.04f}),
-                                                ColliderOptions{.measure = Measure::triangles});
+                                                ColliderOptions{.accuracy = ContactAccuracy::exact});
     for (float depth = 0.01f; depth < 0.035f; depth += 0.005f) {
         std::vector<Contact> found;
         const Pose above{{0, 0, 0.8f - depth}, glm::angleAxis(glm::pi<float>(), glm::vec3(1, 0, 0))};
-        collide(*tip, above, *tip, {}, {.leastOpposition = 0.3f}, found);
+        collide(*tip, above, *tip, {}, {.minNormalCosine = 0.3f}, found);
         CAPTURE(depth);
         REQUIRE(found.size() == 2);
         for (const Contact& contact : found) {
@@ -368,7 +368,8 @@ const Contact& nearestOf(const std::vector<Contact>& contacts) {
 }
 
 TEST_CASE("beyond the band, edges are as far apart as those of the triangles, and look across") {
-    const Measure measure = GENERATE(Measure::samples, Measure::edges, Measure::triangles);
+    const ContactAccuracy measure =
+        GENERATE(ContactAccuracy::samples, ContactAccuracy::exactNearFeatures, ContactAccuracy::exact);
     const float gap = GENERATE(0.03f, 0.05f, 0.06f, 0.1f, 0.25f);
     const float scale = GENERATE(1.f, 10.f);
     const bool crosses = GENERATE(false, true);
@@ -376,7 +377,7 @@ TEST_CASE("beyond the band, edges are as far apart as those of the triangles, an
     // edges are followed from the points that touch
     const float beyond = crosses ? 0.02f : 0.001f;
     const Mesh mesh = shapes::box({0.3f, 0.2f, 0.1f});
-    const Collider brick(mesh, build(mesh, {.voxelSize = h}), {.measure = measure});
+    const Collider brick(mesh, build(mesh, {.voxelSize = h}), {.accuracy = measure});
     const float half = std::sqrt(0.5f), aside = half * gap, quarter = glm::pi<float>() / 4;
     // an edge beside and above another one, or above and across it
     Pose upper{{0.6f + aside, 0.01f, 0.2f + aside}}, lower;
@@ -388,7 +389,7 @@ TEST_CASE("beyond the band, edges are as far apart as those of the triangles, an
     }
     upper.position *= scale;
     std::vector<Contact> found;
-    const ContactOptions options{.margin = scale * (gap + beyond), .measured = true};
+    const ContactOptions options{.margin = scale * (gap + beyond), .exact = true};
     collide(Placed{brick, upper, scale}, Placed{brick, lower, scale}, options, found);
     REQUIRE(!found.empty());
     const Contact& nearest = nearestOf(found);
@@ -400,12 +401,12 @@ TEST_CASE("beyond the band, edges are as far apart as those of the triangles, an
 TEST_CASE("what lies between two walls is found at any distance, whether the margin ends in the band or not") {
     const Mesh wall = shapes::box({0.1f, 0.5f, 0.5f}), small = shapes::box({0.1f, 0.1f, 0.1f});
     const Mesh walls = shapes::join({shapes::moved(wall, {-0.6f, 0, 0}), shapes::moved(wall, {0.6f, 0, 0})});
-    const Collider two(walls, build(walls, {.voxelSize = h}), {.measure = Measure::triangles}),
+    const Collider two(walls, build(walls, {.voxelSize = h}), {.accuracy = ContactAccuracy::exact}),
         body(small, build(small, {.voxelSize = h}));
     for (float gap = 0.02f; gap < 0.2f; gap += 0.003f) {
         CAPTURE(gap);
         std::vector<Contact> found;
-        const ContactOptions options{.margin = gap + 0.001f, .measured = true};
+        const ContactOptions options{.margin = gap + 0.001f, .exact = true};
         collide(body, {{-0.4f + gap, 0.013f, 0.007f}}, two, {}, options, found);
         REQUIRE(!found.empty());
         const Contact& nearest = nearestOf(found);
@@ -427,7 +428,7 @@ TEST_CASE("what touches a face is told the face's direction, however near it is 
         place[beside] = half[beside] - aside * h;
         place[along] = float(random(-0.8, 0.8)) * half[along];
         CAPTURE(face, depth, aside);
-        const Touch touch = touchInBand(brick().field(), place, brick().field().sample(place), false);
+        const SurfaceSample touch = surfaceSampleAt(brick().field(), place, brick().field().sample(place), false);
         REQUIRE(touch.normal[face] > 0.99f);
         REQUIRE(std::abs(touch.distance) < 2e-3f * h);
     }
@@ -479,10 +480,10 @@ TEST_CASE("exact contacts lie on the triangles, on edges and in grooves of half 
     struct Errors {
         double distance = 0, foot = 0;
     };
-    const auto errors = [&](Measure measure, const Pose& pose) {
+    const auto errors = [&](ContactAccuracy measure, const Pose& pose) {
         std::vector<Collider> parts;
         for (const Mesh& mesh : meshes)
-            parts.emplace_back(mesh, build(mesh, {.voxelSize = voxel}), ColliderOptions{.measure = measure});
+            parts.emplace_back(mesh, build(mesh, {.voxelSize = voxel}), ColliderOptions{.accuracy = measure});
         const Pose poses[] = {pose, {}};
         std::vector<Contact> contacts;
         collide(parts[0], pose, parts[1], {}, {.margin = voxel / 2}, contacts);
@@ -508,8 +509,9 @@ TEST_CASE("exact contacts lie on the triangles, on edges and in grooves of half 
     for (int i = 0; i < 3; ++i) {
         Pose pose = shapes::onThread(thread, float(random(16e-3, 24e-3)));
         pose.position += random.point(50e-6f);
-        const Errors exact = errors(Measure::triangles, pose), mixed = errors(Measure::edges, pose),
-                     sampled = errors(Measure::samples, pose);
+        const Errors exact = errors(ContactAccuracy::exact, pose),
+                     mixed = errors(ContactAccuracy::exactNearFeatures, pose),
+                     sampled = errors(ContactAccuracy::samples, pose);
         CHECK(exact.distance < 1e-4);
         CHECK(exact.foot < 0.02);  // nearer to an edge its own normal is taken
         CHECK(mixed.distance < 0.2);
@@ -520,7 +522,8 @@ TEST_CASE("exact contacts lie on the triangles, on edges and in grooves of half 
 }
 
 TEST_CASE("a body of a mesh that faces the wrong way is the body of the right one") {
-    const Measure measure = GENERATE(Measure::samples, Measure::edges, Measure::triangles);
+    const ContactAccuracy measure =
+        GENERATE(ContactAccuracy::samples, ContactAccuracy::exactNearFeatures, ContactAccuracy::exact);
     const bool isShuffled = GENERATE(false, true);
     CAPTURE(nameOf(measure), isShuffled);
     const Mesh mesh = shapes::torus(0.35f, 0.13f);
@@ -529,22 +532,22 @@ TEST_CASE("a body of a mesh that faces the wrong way is the body of the right on
     if (isShuffled)
         for (glm::uvec3& t : wrong.triangles)
             if (random(0, 1) < 0.5) std::swap(t.y, t.z);
-    const ColliderOptions options{.measure = measure};
+    const ColliderOptions options{.accuracy = measure};
     const Collider right(mesh, build(mesh, {.voxelSize = h}), options),
-        mended(wrong, build(wrong, {.voxelSize = h}), options);
-    CHECK(mended.mass().volume == Approx(right.mass().volume));
-    CHECK(mended.data().edges().edges().empty());
-    REQUIRE(mended.data().points().points().size() > 100);
-    for (const SurfacePoint& point : mended.data().points().points())
+        repaired(wrong, build(wrong, {.voxelSize = h}), options);
+    CHECK(repaired.mass().volume == Approx(right.mass().volume));
+    CHECK(repaired.data().edges().edges().empty());
+    REQUIRE(repaired.data().points().points().size() > 100);
+    for (const SurfacePoint& point : repaired.data().points().points())
         REQUIRE(glm::dot(point.normal, right.field().sample(point.position).gradient) > 0.5f);
     // crossed: points whose normals looked inward would be left out
     const Pose across{{0.35f, 0, 0}, glm::angleAxis(glm::half_pi<float>(), glm::vec3(1, 0, 0))};
     const auto found = [&](const Collider& body) {
         std::vector<Contact> contacts;
-        collide({body, {{0.1f, 0, 0}}}, {body, across}, {.margin = h, .leastOpposition = 0.3f}, contacts);
+        collide({body, {{0.1f, 0, 0}}}, {body, across}, {.margin = h, .minNormalCosine = 0.3f}, contacts);
         return contacts;
     };
-    const auto expected = found(right), contacts = found(mended);
+    const auto expected = found(right), contacts = found(repaired);
     REQUIRE(expected.size() > 20);
     CHECK(contacts.size() > 0.8 * double(expected.size()));
     CHECK(deepest(contacts) == Approx(deepest(expected)).margin(0.1 * h));
@@ -552,7 +555,7 @@ TEST_CASE("a body of a mesh that faces the wrong way is the body of the right on
 
 TEST_CASE("what moves on from beyond the band is met, however wide the margin is") {
     const float margin = GENERATE(1.f, 2.f, 4.f) * h, gap = GENERATE(0.5f, 1.5f, 2.5f, 3.5f, 6.f) * h;
-    const Placed still{slab()}, moving{brick(), {{0, 0, 0.2f + gap}}, 1, {.way = {0, 0, -8 * h}}};
+    const Placed still{slab()}, moving{brick(), {{0, 0, 0.2f + gap}}, 1, {.displacement = {0, 0, -8 * h}}};
     std::vector<Contact> contacts;
     collide(moving, still, {.margin = margin}, contacts);
     CAPTURE(margin / h, gap / h);

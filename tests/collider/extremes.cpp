@@ -169,7 +169,7 @@ void checkQueries(const Field& field, unsigned seed, int count) {
 // A sphere of radius 0.5 with its mesh.
 const Collider& ball() {
     static const Collider collider(sphereMesh(), build(sphereMesh(), {.voxelSize = voxel}),
-                                   {.measure = Measure::edges});
+                                   {.accuracy = ContactAccuracy::exactNearFeatures});
     return collider;
 }
 
@@ -277,7 +277,7 @@ TEST_CASE("bodies anywhere, of any size, on any way, collide or do not") {
         const Placed a = placed(), b = placed();
         contacts.clear();
         ContactCache near;
-        const ContactOptions options{.margin = i % 4 ? voxel : extreme.number(), .measured = i % 11 == 0};
+        const ContactOptions options{.margin = i % 4 ? voxel : extreme.number(), .exact = i % 11 == 0};
         collide(a, b, options, contacts, i % 2 ? &near : nullptr);
         collide(a, b, options, contacts, i % 2 ? &near : nullptr);
         // of the same two balls, contacts lie where they overlap

@@ -258,7 +258,7 @@ TEST_CASE("mesh and field agree on the mass of clean meshes") {
     };
     // thinner walls than two voxels are beyond any field; the mean thickness of a solid is twice its volume over its
     // area
-    const double leastThickness = 3;  // [voxels]
+    const double minThickness = 3;  // [voxels]
     int compared = 0;
     for (const std::string& name : cleanMeshes()) {
         const auto path = corpusMesh(name);
@@ -267,7 +267,7 @@ TEST_CASE("mesh and field agree on the mass of clean meshes") {
         if (mesh.triangles.size() > 120'000) continue;  // for time
         const MassProperties exact = massProperties(mesh);
         const float voxel = voxelSizeFor(mesh, 128);
-        if (2 * exact.volume / area(mesh) < leastThickness * double(voxel)) continue;
+        if (2 * exact.volume / area(mesh) < minThickness * double(voxel)) continue;
         CAPTURE(name);
         requireMass(massProperties(build(mesh, {.voxelSize = voxel})), exact, 5e-3, double(bounds(mesh).longestSide()));
         ++compared;

@@ -51,14 +51,15 @@ std::vector<Mesh> degenerates() {
     return {spike, wedge, crack, shapes::box({half, half, half})};
 }
 
-std::shared_ptr<const Thing> thingOf(const Mesh& mesh, Measure measure) {
-    return demo::makeThing(mesh, {.voxelSize = voxel, .measure = measure});
+std::shared_ptr<const Thing> thingOf(const Mesh& mesh, ContactAccuracy measure) {
+    return demo::makeThing(mesh, {.voxelSize = voxel, .accuracy = measure});
 }
 
 }  // namespace
 
 TEST_CASE("Spikes, wedges, cracks and cliff edges that meet exactly come to rest, not deep in each other") {
-    const Measure measure = GENERATE(Measure::samples, Measure::edges, Measure::triangles);
+    const ContactAccuracy measure =
+        GENERATE(ContactAccuracy::samples, ContactAccuracy::exactNearFeatures, ContactAccuracy::exact);
     const unsigned start = test::seed();
     CAPTURE(nameOf(measure), start);
     std::mt19937 random(start);

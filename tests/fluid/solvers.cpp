@@ -79,7 +79,7 @@ TEST_CASE("LevelSetMeasure finds volume and area of a seeded body") {
     CHECK(measure.area() == Approx(area).epsilon(1e-3));
 }
 
-TEST_CASE("LevelSetTracker has nothing to mend") {
+TEST_CASE("LevelSetTracker has nothing to repair") {
     const Mesh mesh = shapes::torus(0.5f, 0.2f, 120, 60);
     const auto liquid = seeded(mesh);
     const openvdb::Index64 voxels = liquid->activeVoxelCount();

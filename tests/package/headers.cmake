@@ -26,7 +26,7 @@ foreach(compiler IN ITEMS g++ clang++-14)
     if(NOT header MATCHES "bullet/|fluid/|grids")
       execute_process(COMMAND ${found_${compiler}} -std=c++20 -I${prefix}/include -M ${scratch}/${name}.cpp
         OUTPUT_VARIABLE included COMMAND_ERROR_IS_FATAL ANY)
-      if(included MATCHES "/(openvdb|nanovdb|CL|hwy|bullet|tbb|oneapi|fmt|assimp)/")
+      if(included MATCHES "/(openvdb|nanovdb|CL|hwy|bullet|oneapi|fmt|assimp)/")
         message(FATAL_ERROR "${header} includes ${CMAKE_MATCH_1}")
       endif()
     endif()

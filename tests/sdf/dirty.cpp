@@ -106,7 +106,7 @@ void checkDistances(const Mesh& mesh, const Built& built, const std::vector<open
 // Against the winding numbers of the mesh that the build took, which may have triangles turned.
 void checkWinding(const Mesh& mesh, const Built& built, const std::vector<openvdb::Coord>& voxels) {
     const SignChoice choice = balanced(mesh) ? chooseSignAfterConflict(mesh) : chooseSign(mesh);
-    const Mesh& oriented = choice.mended ? *choice.mended : mesh;
+    const Mesh& oriented = choice.repaired ? *choice.repaired : mesh;
     std::size_t wrong = 0;
     for (const auto& voxel : voxels) {
         const double value = built.grid->tree().getValue(voxel);

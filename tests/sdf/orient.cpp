@@ -55,18 +55,18 @@ TEST_CASE("turned triangles and shells are turned back") {
     for (const Mesh& mesh : {shapes::box({1, 2, 3}), shapes::sphere(1, 3), shapes::bowl(1, 0.1f, 64)}) {
         CHECK(orient(shapes::flipped(mesh)).turnedTriangles == mesh.triangles.size());
         CHECK(orient(shapes::flipped(mesh)).turnedComponents == 1);
-        const Orientation mended = orient(shuffled(mesh, seed));
-        CHECK(mended.mixedComponents == 1);
-        CHECK(balanced(mended.mesh));
-        CHECK(inspect(mended.mesh).volume == Approx(inspect(mesh).volume));
+        const Orientation repaired = orient(shuffled(mesh, seed));
+        CHECK(repaired.mixedComponents == 1);
+        CHECK(balanced(repaired.mesh));
+        CHECK(inspect(repaired.mesh).volume == Approx(inspect(mesh).volume));
     }
 }
 
 TEST_CASE("a shell that touches another along an edge is turned alone") {
     const Mesh box = shapes::box({1, 1, 1});
-    const Orientation mended = orient(shapes::join({box, shapes::moved(shapes::flipped(box), {2, 2, 0})}));
-    CHECK(mended.turnedTriangles == box.triangles.size());
-    CHECK(inspect(mended.mesh).volume == Approx(16));
+    const Orientation repaired = orient(shapes::join({box, shapes::moved(shapes::flipped(box), {2, 2, 0})}));
+    CHECK(repaired.turnedTriangles == box.triangles.size());
+    CHECK(inspect(repaired.mesh).volume == Approx(16));
 }
 
 TEST_CASE("cavities are kept, and found where the file is not to be trusted") {
@@ -133,11 +133,11 @@ TEST_CASE("degenerate and repeated triangles do not hide a flip") {
     mesh.triangles.push_back({2, 2, 2});
     mesh.triangles.push_back(mesh.triangles[5]);
     std::swap(mesh.triangles[20].x, mesh.triangles[20].y);
-    Mesh mended = orient(mesh).mesh;
-    REQUIRE(mended.triangles.size() == mesh.triangles.size());
-    mended.triangles.pop_back();
-    CHECK(balanced(mended));
-    CHECK(inspect(mended).volume == Approx(8));
+    Mesh repaired = orient(mesh).mesh;
+    REQUIRE(repaired.triangles.size() == mesh.triangles.size());
+    repaired.triangles.pop_back();
+    CHECK(balanced(repaired));
+    CHECK(inspect(repaired).volume == Approx(8));
 }
 
 TEST_CASE("vertices that only coordinates identify are one") {

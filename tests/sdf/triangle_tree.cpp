@@ -166,9 +166,9 @@ TEST_CASE("sets that threads share are those of one thread") {
     for (const std::size_t joins : {1000, 50'000, 300'000}) {
         std::vector<std::pair<unsigned, unsigned>> pairs;
         for (std::size_t i = 0; i < joins; ++i) pairs.emplace_back(number(), number());
-        Sets sets(count);
+        DisjointSets sets(count);
         for (const auto& [a, b] : pairs) sets.join(a, b);
-        SharedSets shared(count);
+        ConcurrentDisjointSets shared(count);
         std::atomic<std::size_t> joined = 0;
         tbb::parallel_for(std::size_t(0), joins,
                           [&](std::size_t i) { joined += shared.join(pairs[i].first, pairs[i].second); });

@@ -232,7 +232,7 @@ TEST_CASE("a mesh without buried walls keeps its bytes") {
         if (const auto path = test::corpusMesh(name)) meshes.push_back(readMesh(*path));
     for (const Mesh& mesh : meshes) {
         CAPTURE(mesh.triangles.size());
-        const United united = unite(mesh);
+        const UnionSurface united = unite(mesh);
         CHECK(united.buriedTriangles == 0);
         CHECK(united.cutTriangles == 0);
         CHECK(hash(united.mesh) == hash(mesh));
@@ -251,7 +251,7 @@ TEST_CASE("the union of boxes has their outer surface, also where they touch and
         const glm::dquat rotation =
             i % 2 ? glm::normalize(glm::dquat(normal(random), normal(random), normal(random), normal(random)))
                   : glm::dquat(1, 0, 0, 0);
-        const United united = unite(turned(joined(boxes), rotation));
+        const UnionSurface united = unite(turned(joined(boxes), rotation));
         changed += united.changed();
         CHECK(difference(united.mesh, turned(truthOf(boxes), rotation), randomPoints(random, 200)) < 1e-6);
     }
@@ -286,7 +286,8 @@ TEST_CASE("the union of balls is that of their formula but for what their facets
     for (int i = 0; i < 5; ++i) {
         const float r1 = 0.5f, r2 = 0.4f + anywhere(random);
         const glm::vec3 c2(0.45f + anywhere(random), anywhere(random), anywhere(random));
-        const United united = unite(shapes::join({shapes::sphere(r1, 5), shapes::moved(shapes::sphere(r2, 5), c2)}));
+        const UnionSurface united =
+            unite(shapes::join({shapes::sphere(r1, 5), shapes::moved(shapes::sphere(r2, 5), c2)}));
         if (std::abs(r1 - r2) > 0.8f * glm::length(c2)) continue;  // the circle where they meet would not be told well
         CHECK(united.buriedTriangles > 100);
         CHECK(united.cutTriangles > 50);
@@ -302,7 +303,7 @@ TEST_CASE("solids within solids, copies and neighbours") {
     const Mesh outer = shapes::sphere(0.5f, 3);
     SECTION("a solid within a solid goes, a cavity within that stays") {
         const Mesh cavity = shapes::flipped(shapes::sphere(0.1f, 2));
-        const United united = unite(shapes::join({outer, shapes::sphere(0.3f, 3)}));
+        const UnionSurface united = unite(shapes::join({outer, shapes::sphere(0.3f, 3)}));
         CHECK(united.buriedTriangles == shapes::sphere(0.3f, 3).triangles.size());
         CHECK(united.cutTriangles == 0);
         CHECK(
@@ -316,12 +317,12 @@ TEST_CASE("solids within solids, copies and neighbours") {
     SECTION("a cavity that another solid fills goes") {
         const Mesh filled =
             shapes::join({shapes::sphere(0.5f, 3), shapes::flipped(shapes::sphere(0.3f, 3)), shapes::sphere(0.3f, 3)});
-        const United united = unite(filled);
+        const UnionSurface united = unite(filled);
         CHECK(united.mesh.triangles.size() == outer.triangles.size());
     }
     SECTION("the wall between neighbours goes") {
         const Box left{{-1, -1, -1}, {0, 1, 1}}, right{{0, -1, -1}, {1, 1, 1}};
-        const United united = unite(joined({left, right}));
+        const UnionSurface united = unite(joined({left, right}));
         CHECK(united.buriedTriangles == 4);
         CHECK(united.cutTriangles == 0);
         CHECK(inspect(united.mesh).area == Approx(24));

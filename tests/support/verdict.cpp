@@ -13,9 +13,9 @@
 namespace bilayer::test {
 namespace {
 
-constexpr double farFromSurface = 0.1;    // voxels: what Verdict::wrongFar counts from
-constexpr std::size_t mostWitnesses = 3;  // of a kind of fault: enough to see what is wrong
-constexpr int margin = 10;                // voxels beyond the band: one leaf and a little
+constexpr double farFromSurface = 0.1;   // voxels: what Verdict::wrongFar counts from
+constexpr std::size_t maxWitnesses = 3;  // of a kind of fault: enough to see what is wrong
+constexpr int margin = 10;               // voxels beyond the band: one leaf and a little
 
 using Random = std::mt19937_64;
 
@@ -157,7 +157,7 @@ struct Counter {
 
     void add(Fault fault, std::size_t& count) {
         witness.fault = fault;
-        if (++count <= mostWitnesses) verdict.witnesses.push_back(witness);
+        if (++count <= maxWitnesses) verdict.witnesses.push_back(witness);
     }
 };
 

@@ -389,7 +389,7 @@ TEST_CASE("build --body keeps what bodies need, and info tells of it") {
     for (const std::string measure : {"triangles", "samples"}) {
         const auto other = build(output, {"--voxel-size", "0.05", "--body", "--contacts", measure});
         CHECK(other["body"]["contacts"] == measure);
-        CHECK(nameOf(Collider(readVdb(output)).data().body.measure) == measure);
+        CHECK(nameOf(Collider(readVdb(output)).data().body.accuracy) == measure);
         CHECK((Collider(readVdb(output)).field().mesh() != nullptr) == (measure == "triangles"));
         CHECK(Collider(readVdb(output)).exactField().mesh());
     }

@@ -146,7 +146,7 @@ float StepState::secondsOf(const btDispatcherInfo& info, bool isTest) const {
 
 Task StepState::taskOf(std::shared_ptr<Pair> pair, Side a, Side b) const {
     const auto isLeft = [](const Side& side) { return side.object->isKinematicObject() || locks(*side.shape); };
-    if (!foreseesAll && !isLeft(a) && !isLeft(b) && goPastEachOther(a, b)) a.seconds = b.seconds = 0;
+    if (!speculatesOnAll && !isLeft(a) && !isLeft(b) && goPastEachOther(a, b)) a.seconds = b.seconds = 0;
     return {std::move(pair), a, b};
 }
 

@@ -30,7 +30,7 @@ struct Task {
 struct StepState {
     DispatchStatistics running{};  ///< contact tests between steps count here too
     float seconds = 0;             ///< that it takes; 0 between steps
-    bool foreseesAll = true;
+    bool speculatesOnAll = true;
     bool isForeign = false;     ///< the dispatcher is another one, which does not tell its steps
     bool leavesFields = false;  ///< Bullet goes through a compound whose fields are our business
 

@@ -8,14 +8,14 @@
 
 namespace bilayer::bullet::detail {
 
-btRigidBody* goingBody(btCollisionObject& object) {
+btRigidBody* activeDynamicBody(btCollisionObject& object) {
     auto* body = btRigidBody::upcast(&object);
     return body && !body->isStaticOrKinematicObject() && body->isActive() ? body : nullptr;
 }
 
-Course::Course(btCollisionObject& object, float seconds)
+BodySweep::BodySweep(btCollisionObject& object, float seconds)
     : object_(object), end_(object.getWorldTransform()), start_(end_.getOrigin()), orientation_(end_.getRotation()) {
-    body_ = goingBody(object);
+    body_ = activeDynamicBody(object);
     // Bullet's own CCD leaves a body that it has stopped its velocity, but not the way that it has gone
     if (!body_ || body_->getHitFraction() < 1) return;
     way_ = seconds * body_->getLinearVelocity();
@@ -29,25 +29,25 @@ Course::Course(btCollisionObject& object, float seconds)
     turn_ = angle > most ? 2 * std::atan(angle / most * std::tan(most / 2)) : angle;
 }
 
-btTransform Course::at(float time) const {
+btTransform BodySweep::at(float time) const {
     if (!body_ || std::min(time, part_) >= 1) return end_;
     const float gone = std::min(time, part_), left = 1 - gone;
     const btTransform back(btQuaternion(axis_, -left * turn_));
     return btTransform((back.getRotation() * orientation_).normalized(), start_ + gone * way_);
 }
 
-float Course::radius() const {
+float BodySweep::radius() const {
     btVector3 centre;
     btScalar radius;
     object_.getCollisionShape()->getBoundingSphere(centre, radius);
     return centre.length() + radius;
 }
 
-float Course::longest(const Course& other) const {
+float BodySweep::longest(const BodySweep& other) const {
     return (way_ - other.way_).length() + radius() * turn_ + other.radius() * other.turn_;
 }
 
-void Course::box(btVector3& lower, btVector3& upper) const {
+void BodySweep::box(btVector3& lower, btVector3& upper) const {
     const float r = radius();
     lower = upper = start_;
     lower.setMin(start_ + way_);
@@ -56,13 +56,13 @@ void Course::box(btVector3& lower, btVector3& upper) const {
     upper += btVector3(r, r, r);
 }
 
-bool Course::holdAt(float part) {
+bool BodySweep::holdAt(float part) {
     if (!body_ || part >= part_) return false;
     part_ = part;
     return true;
 }
 
-bool Course::apply() const {
+bool BodySweep::apply() const {
     if (part_ >= 1) return false;
     body_->setCenterOfMassTransform(at(part_));
     return true;

@@ -6,12 +6,12 @@
 namespace bilayer::bullet::detail {
 
 /// An object as a body that the world moves and that is awake; null for others.
-btRigidBody* goingBody(btCollisionObject& object);
+btRigidBody* activeDynamicBody(btCollisionObject& object);
 
 /// The way of an object through a step that has come to its end.
-class Course {
+class BodySweep {
   public:
-    Course(btCollisionObject& object, float seconds);
+    BodySweep(btCollisionObject& object, float seconds);
 
     const btCollisionObject& object() const { return object_; }
     float turn() const { return turn_; }
@@ -23,7 +23,7 @@ class Course {
     float radius() const;
     float longest() const { return way_.length() + radius() * turn_; }
     /// How far any of its points goes as another object sees it, at most.
-    float longest(const Course& other) const;
+    float longest(const BodySweep& other) const;
     /// Around all of its way.
     void box(btVector3& lower, btVector3& upper) const;
 

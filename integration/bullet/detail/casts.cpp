@@ -19,16 +19,15 @@ constexpr float touchVoxels = 1e-3f;
 // Steps in the band are shortened by this, since an interpolated distance may change by more than the way moved.
 constexpr float caution = 0.8f;
 // Steps are at least touchVoxels / 2 long, so that this only ends ways that graze the surface for thousands of voxels.
-constexpr int mostSteps = 100000;
+constexpr int maxSteps = 100000;
 }  // namespace
 
 bool sweepable(const Placed& body, float radius) {
     const Field& field = body.collider.field();
     // Beyond the band a bound is told, which falls to this near it: a sphere that it reaches could touch anywhere
     // there.
-    const float voxel = field.voxelSize(),
-                leastBound = surelyInBand(field.exteriorWidth(), voxel) - touchVoxels * voxel;
-    return radius < body.scale * leastBound;
+    const float voxel = field.voxelSize(), minBound = surelyInBand(field.exteriorWidth(), voxel) - touchVoxels * voxel;
+    return radius < body.scale * minBound;
 }
 
 std::optional<SweepHit> sweepSphere(const Placed& body, const glm::vec3& from, const glm::vec3& to, float radius,
@@ -42,7 +41,7 @@ std::optional<SweepHit> sweepSphere(const Placed& body, const glm::vec3& from, c
     const float touch = touchVoxels * field.voxelSize();
 
     float way = 0;
-    for (int i = 0; i < mostSteps && way <= length; ++i) {
+    for (int i = 0; i < maxSteps && way <= length; ++i) {
         const glm::vec3 centre = start + way * direction;
         const Sample sample = field.sample(centre);
         const float gap = sample.distance - gapAtHit;

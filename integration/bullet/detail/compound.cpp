@@ -40,7 +40,7 @@ float turningOf(const Motion& motion, const Side& side, const Box& box) {
     const btVector3 &origin = side.transform.getOrigin(), ofLower = (box.lower - origin).absolute();
     btVector3 farthest = (box.upper - origin).absolute();
     farthest.setMax(ofLower);
-    return glm::length(motion.turn) * farthest.length();
+    return glm::length(motion.rotation) * farthest.length();
 }
 
 /// Around all places where a shape's points are in the step.
@@ -48,7 +48,7 @@ Box sweptBoxOf(const Side& side) {
     Box box = boxOf(side);
     const Motion motion = side.motion();
     const float turning = turningOf(motion, side, box);
-    const btVector3 way = toBullet(motion.way), lower = box.lower + way, upper = box.upper + way;
+    const btVector3 way = toBullet(motion.displacement), lower = box.lower + way, upper = box.upper + way;
     box.lower.setMin(lower);
     box.upper.setMax(upper);
     box.grow(turning);
@@ -121,7 +121,7 @@ class Descent {
         around.grow(within_);
         Box from = around;  // where children are that come to it
         const Motion motion = compound.side.motion();
-        from.grow(glm::length(motion.way) + turningOf(motion, compound.side, boxOf(compound.side)));
+        from.grow(glm::length(motion.displacement) + turningOf(motion, compound.side, boxOf(compound.side)));
         visitChildren(compound.side, from, [&](int index) {
             const Side child = childOf(compound.side, index);
             const bool holds = compound.holdsField && holdsField(*child.shape);

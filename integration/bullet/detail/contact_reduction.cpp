@@ -22,7 +22,7 @@ constexpr float sameDirection = 0.9f;
 // that were kept, and trembles with them, but which contacts belong together must not.
 constexpr float stillSameDirection = 0.85f;
 // More patches than any resting body needs; contacts of further directions join the patch that suits them best.
-constexpr std::size_t mostPatches = 8;
+constexpr std::size_t maxPatches = 8;
 // A patch of the last step goes on until its normal is within about 15 degrees of another's.
 constexpr float mergedDirection = 0.966f;
 // Contacts that were kept in the last step are preferred, and patches keep their places, for bodies about at rest: when
@@ -44,14 +44,14 @@ constexpr float chosenWithin = 0.5f;
 // each met first by themselves.
 constexpr float tilts[] = {1.f / 8, 1.f / 32, 1.f / 128};
 // and, where a step takes a body farther than that, the turn of one whose other side is stopped, at most [rad].
-constexpr float mostTurn = 1;
+constexpr float maxRotation = 1;
 constexpr float aside = 1.f / 64;
 constexpr int tiltDirections = 8, shiftDirections = 8;
 constexpr float askew = 0.3f;  // [rad]
 // The tilts and shifts by which what is lost is measured [rad], [parts of the extent].
 constexpr float measured = 1.f / 32;
 // More contacts of a patch cost the solver more than they tell it.
-constexpr std::size_t mostOfPatch = 3 * MANIFOLD_CACHE_SIZE;
+constexpr std::size_t maxOfPatch = 3 * MANIFOLD_CACHE_SIZE;
 
 /// Contacts of one patch, as indices in ascending order of the distance that remains.
 using Group = std::vector<std::uint32_t>;
@@ -115,7 +115,7 @@ std::vector<Group> groupByNormal(const std::vector<Contact>& contacts, const Mem
     for (std::uint32_t i = 0; i < contacts.size(); ++i) {
         const auto [cosine, best] = nearest(contacts[i].normal);
         const float same = best < goingOn ? stillSameDirection : sameDirection;
-        if (cosine < same && groups.size() < mostPatches) {
+        if (cosine < same && groups.size() < maxPatches) {
             directions.push_back(contacts[i].normal);
             groups.push_back({i});
         } else {
@@ -205,7 +205,7 @@ class Gaps {
                 first = std::min(first, contacts[i].remaining());
                 approach = std::max(approach, contacts[i].approach);
             }
-        turn_ = extent_ > 0 ? std::min(approach / extent_, mostTurn) : 0;
+        turn_ = extent_ > 0 ? std::min(approach / extent_, maxRotation) : 0;
         for (std::size_t k = 0; k < count_; ++k) {
             const Contact& contact = contacts[group[k]];
             const glm::vec3 turn = glm::cross(contact.position - centre, contact.normal);
@@ -245,7 +245,7 @@ class Gaps {
     }
 
     /// Of some contacts, the least gap when A is moved.
-    float leastOf(const std::vector<std::uint32_t>& some, const Nudge& nudge) const {
+    float minOf(const std::vector<std::uint32_t>& some, const Nudge& nudge) const {
         float least = std::numeric_limits<float>::max();
         for (const std::uint32_t k : some) least = std::min(least, of(k, nudge));
         return least;
@@ -292,23 +292,23 @@ class FirstMet {
         for (const std::uint32_t k : before)
             if (metBy(k, loyalty) != 0) add(k);
         for (std::size_t n = 0; n < nudges_.size(); ++n) {
-            if (metByAny() >> n & 1 || (kept_.size() >= mostOfPatch && isNearlyMet(n))) continue;
+            if (metByAny() >> n & 1 || (kept_.size() >= maxOfPatch && isNearlyMet(n))) continue;
             gaps_.least(nudges_[n]);
             add(gaps_.with(least_[n]));
         }
         for (std::size_t i = kept_.size(); i-- > 0;)
             if (isSpare(i) && !mayBear(kept_[i])) leaveOut(i);
-        while (kept_.size() > mostOfPatch) leaveOut(leastNeeded());
+        while (kept_.size() > maxOfPatch) leaveOut(minNeeded());
         return kept_;
     }
 
     /// What other motions meet before those [m].
-    float lost() {
+    float reductionError() {
         static const std::vector<Nudge> between = nudgesBetween();
         float most = 0;
         for (const Nudge& nudge : between) {
             const float least = gaps_.least(nudge);
-            most = std::max(most, gaps_.leastOf(kept_, nudge) - least);
+            most = std::max(most, gaps_.minOf(kept_, nudge) - least);
         }
         return most;
     }
@@ -343,7 +343,7 @@ class FirstMet {
 
     /// Whether a motion meets one that is kept not much later than the first.
     bool isNearlyMet(std::size_t n) const {
-        return gaps_.leastOf(kept_, nudges_[n]) <= least_[n] + loyalty * toleranceOf(nudges_[n]);
+        return gaps_.minOf(kept_, nudges_[n]) <= least_[n] + loyalty * toleranceOf(nudges_[n]);
     }
 
     /// Whether every motion that meets it first meets others first, too.
@@ -355,7 +355,7 @@ class FirstMet {
     }
 
     /// Of what is spare that which is farthest away, else the last.
-    std::size_t leastNeeded() const {
+    std::size_t minNeeded() const {
         std::size_t which = kept_.size();
         for (std::size_t i = 0; i < kept_.size(); ++i)
             if (isSpare(i) && (which == kept_.size() || gaps_.of(kept_[i], {}) > gaps_.of(kept_[which], {}))) which = i;
@@ -376,13 +376,13 @@ class FirstMet {
 };
 
 std::vector<std::uint32_t> firstMet(const std::vector<Contact>& contacts, const Group& group, const Memory& memory,
-                                    float& lost) {
+                                    float& reductionError) {
     std::vector<std::uint32_t> before;
     for (std::uint32_t k = 0; k < group.size(); ++k)
         if (memory.kept(contacts[group[k]])) before.push_back(k);
     FirstMet met(contacts, group);
     std::vector<std::uint32_t> kept = met.choose(before);
-    lost = std::max(lost, met.lost());
+    reductionError = std::max(reductionError, met.reductionError());
     return kept;
 }
 
@@ -399,7 +399,7 @@ Reduced reduce(std::vector<Contact>& contacts, std::span<const Patch> last) {
         std::vector<std::uint32_t> kept(group.size());
         std::iota(kept.begin(), kept.end(), 0u);
         if (group.size() > MANIFOLD_CACHE_SIZE) {
-            kept = firstMet(contacts, group, memory, result.lost);
+            kept = firstMet(contacts, group, memory, result.reductionError);
             least = std::min(least, extentOf(contacts, group));
             result.slack = chosenWithin * tolerance * least;
         }

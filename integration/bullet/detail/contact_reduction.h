@@ -27,16 +27,16 @@ struct Reduced {
     /// How deep a contact that was left out could come in a small motion of the bodies before one that was kept is met
     /// [m]: the worst over tilts of 1/32 rad and shifts of 1/32 of a patch's extent, in directions between those that
     /// contacts were chosen for.
-    float lost = 0;
+    float reductionError = 0;
     /// As long as the bodies have moved past each other by no more than this, the same contacts would do [m].
     float slack = 0;
 };
 
 /// Divides contacts by their normals and keeps of each such patch those that any small motion of the bodies (a press,
 /// tilts about all axes along the patch, shifts and twists) meets first, up to twelve: the gap of a contact changes by
-/// the product of its wrench and the motion, so that these bear the same loads as all of them, but for what `lost`
-/// tells. Deterministic: depends on the contacts, their order and `last` only. The patch of the deepest contact of all
-/// comes first if there was none in the last step. `contacts` is left in another order.
+/// the product of its wrench and the motion, so that these bear the same loads as all of them, but for what
+/// `reductionError` tells. Deterministic: depends on the contacts, their order and `last` only. The patch of the
+/// deepest contact of all comes first if there was none in the last step. `contacts` is left in another order.
 /// @param last  the patches of the same pair in the last step, or nothing: while the bodies hardly move, patches keep
 ///              their places, and of contacts that are nearly as good, those that were kept then are kept again
 Reduced reduce(std::vector<Contact>& contacts, std::span<const Patch> last = {});

@@ -25,7 +25,7 @@ namespace {
 
 // A body that is held back may be met by another one: pairs are looked at again up to so many times, about once for
 // each body of a column that falls. In longer ones the last overlap for a step.
-constexpr int mostRounds = 256;
+constexpr int maxRounds = 256;
 // Who is held so early in a step has not moved.
 constexpr float atStart = 1e-3f;
 
@@ -33,11 +33,11 @@ constexpr float atStart = 1e-3f;
 using HeldPair = std::pair<const btCollisionObject*, const btCollisionObject*>;
 
 struct Meeting {
-    Course *a, *b;
+    BodySweep *a, *b;
     float margin;                  ///< what two that are not held come closer by than this is left to contacts [m]
-    Passing touch{};               ///< the first; from b to a
+    Impact touch{};                ///< the first; from b to a
     float heldA = -1, heldB = -1;  ///< their courses' parts when they were looked at
-    Passing stops{};               ///< where one of them was held
+    Impact stops{};                ///< where one of them was held
 
     /// Whether it has not been looked at since one of the two was held.
     bool isOpen() const { return a->part() != heldA || b->part() != heldB; }
@@ -48,8 +48,8 @@ struct Meeting {
         if (std::min(heldA, heldB) >= 1 && a->longest(*b) <= margin) return;
         visitParts(a->object(), [&](const Part& one) {
             visitParts(b->object(), [&](const Part& two) {
-                if (one.field()) touch = earlier(touch, passage(one, *a, two, *b));
-                if (two.field()) touch = earlier(touch, passage(two, *b, one, *a).turned());
+                if (one.field()) touch = earlier(touch, timeOfImpact(one, *a, two, *b));
+                if (two.field()) touch = earlier(touch, timeOfImpact(two, *b, one, *a).turned());
             });
         });
     }
@@ -57,7 +57,7 @@ struct Meeting {
     /// Holds what goes farther, and where that is held already, both: the other one goes on into it.
     bool hold() {
         if (touch.time >= 1 || isOpen()) return false;
-        Course *faster = a, *slower = b;
+        BodySweep *faster = a, *slower = b;
         if (a->longest() < b->longest()) std::swap(faster, slower);
         const bool goesOn = faster->part() < 1, isHeld = faster->holdAt(touch.time);
         const bool isOtherHeld = (goesOn || !isHeld) && slower->holdAt(touch.time);
@@ -72,7 +72,7 @@ struct Meeting {
 
     /// Leaves no speed to what does not move.
     void rest() const {
-        for (const Course* course : {a, b})
+        for (const BodySweep* course : {a, b})
             if (btRigidBody* body = course->body(); body && course->part() <= atStart) {
                 body->setLinearVelocity({0, 0, 0});
                 body->setAngularVelocity({0, 0, 0});
@@ -114,8 +114,8 @@ class Meetings {
         for (int i = 0; i < objects.size(); ++i)
             if (const auto margin = marginOf(*objects[i])) least = std::min(least, *margin);
         for (int i = 0; i < objects.size(); ++i) {
-            if (!goingBody(*objects[i])) continue;
-            const Course course(*objects[i], seconds);
+            if (!activeDynamicBody(*objects[i])) continue;
+            const BodySweep course(*objects[i], seconds);
             if (course.longest() > least) fast_.push_back(course);
         }
         for (std::size_t i = 0; i < fast_.size(); ++i) find(i);
@@ -123,7 +123,7 @@ class Meetings {
 
     /// Holds bodies until none passes.
     void settle() {
-        for (int round = 0; round < mostRounds; ++round) {
+        for (int round = 0; round < maxRounds; ++round) {
             tbb::parallel_for_each(meetings_, [](Meeting& meeting) {
                 if (meeting.isOpen()) meeting.look();
             });
@@ -144,7 +144,7 @@ class Meetings {
     /// @param before  the pairs of the last step; becomes those of this one
     int apply(std::vector<HeldPair>& before) const {
         int held = 0;
-        for (const Course& course : fast_) held += course.apply();
+        for (const BodySweep& course : fast_) held += course.apply();
         for (const auto& [object, course] : slow_) held += course.apply();
         std::vector<HeldPair> now;
         for (const Meeting& meeting : meetings_) {
@@ -185,9 +185,9 @@ class Meetings {
     }
 
     bool isFast(const btCollisionObject& object) const {
-        const auto index = [](const Course& course) { return course.object().getWorldArrayIndex(); };
+        const auto index = [](const BodySweep& course) { return course.object().getWorldArrayIndex(); };
         const auto at = std::lower_bound(fast_.begin(), fast_.end(), object.getWorldArrayIndex(),
-                                         [&](const Course& course, int other) { return index(course) < other; });
+                                         [&](const BodySweep& course, int other) { return index(course) < other; });
         return at != fast_.end() && &at->object() == &object;
     }
 
@@ -199,15 +199,15 @@ class Meetings {
                world_.getDispatcher()->needsCollision(&a, &b) && world_.getDispatcher()->needsResponse(&a, &b);
     }
 
-    void add(Course& a, Course& b) {
+    void add(BodySweep& a, BodySweep& b) {
         const auto margin = std::max(marginOf(a.object()), marginOf(b.object()));  // no field is less than any margin
         if (margin) meetings_.push_back({&a, &b, *margin});
     }
 
     btDynamicsWorld& world_;
     float seconds_;
-    std::vector<Course> fast_;                                   ///< in the world's order
-    std::unordered_map<const btCollisionObject*, Course> slow_;  ///< that these may meet, and what does not move
+    std::vector<BodySweep> fast_;                                   ///< in the world's order
+    std::unordered_map<const btCollisionObject*, BodySweep> slow_;  ///< that these may meet, and what does not move
     std::vector<Meeting> meetings_;
 };
 

@@ -41,7 +41,7 @@ constexpr float flatness = 1e-6f;
 // A normal that is tilted less than this off the axis belongs to a flat end.
 constexpr float flatEnd = 0.1f;
 // Of a search for the place where a way enters; what takes more only grazes it.
-constexpr int mostSteps = 64;
+constexpr int maxSteps = 64;
 // A place on the side is on a rim from this part of the half height on.
 constexpr float beforeRim = 0.999f;
 
@@ -170,8 +170,8 @@ void Convex::makeBox(const glm::vec3& halfExtents) {
         faces_.points.push_back(side * halfExtents);
         for (int axis = 0; axis < 3; ++axis) {
             const int next = (axis + 1) % 3, last = (axis + 2) % 3;
-            const Wings wings{-side[next] * direction(next), -side[last] * direction(last)};
-            if (side[axis] < 0) edges_.push_back({corner, corner | 1u << axis, 0, wings});
+            const Conormals conormals{-side[next] * direction(next), -side[last] * direction(last)};
+            if (side[axis] < 0) edges_.push_back({corner, corner | 1u << axis, 0, conormals});
         }
     }
 }
@@ -207,7 +207,7 @@ void Convex::makeHull(const std::vector<btVector3>& points) {
     btConvexHullComputer hull;
     hull.compute(&points.front().x(), sizeof(btVector3), static_cast<int>(points.size()), 0, 0);
     for (int i = 0; i < hull.vertices.size(); ++i) faces_.points.push_back(toGlm(hull.vertices[i]));
-    std::map<std::pair<std::uint32_t, std::uint32_t>, glm::vec3> wings;  // of the face on the left of an edge
+    std::map<std::pair<std::uint32_t, std::uint32_t>, glm::vec3> conormals;  // of the face on the left of an edge
     for (int i = 0; i < hull.faces.size(); ++i) {
         const auto* first = &hull.edges[hull.faces[i]];
         const auto apex = static_cast<std::uint32_t>(first->getSourceVertex());
@@ -228,7 +228,7 @@ void Convex::makeHull(const std::vector<btVector3>& points) {
         do {
             const auto from = static_cast<std::uint32_t>(edge->getSourceVertex());
             const auto to = static_cast<std::uint32_t>(edge->getTargetVertex());
-            wings[{from, to}] = glm::normalize(glm::cross(normal, faces_.points[to] - faces_.points[from]));
+            conormals[{from, to}] = glm::normalize(glm::cross(normal, faces_.points[to] - faces_.points[from]));
             edge = edge->getNextEdgeOfFace();
         } while (edge != first);
     }
@@ -237,8 +237,9 @@ void Convex::makeHull(const std::vector<btVector3>& points) {
         const auto to = static_cast<std::uint32_t>(hull.edges[i].getTargetVertex());
         if (from > to) continue;
         edges_.push_back({from, to, 0});
-        const auto left = wings.find({from, to}), right = wings.find({to, from});
-        if (left != wings.end() && right != wings.end()) edges_.back().wings = Wings{left->second, right->second};
+        const auto left = conormals.find({from, to}), right = conormals.find({to, from});
+        if (left != conormals.end() && right != conormals.end())
+            edges_.back().conormals = Conormals{left->second, right->second};
     }
     joinPlanes();
     isFlat_ = !planes_.empty() && std::all_of(faces_.points.begin(), faces_.points.end(), [&](const glm::vec3& point) {
@@ -263,11 +264,11 @@ void Convex::joinPlanes() {
 
 void Convex::makeBalls(const btMultiSphereShape& shape) {
     core_ = Core::balls;
-    std::vector<BallHull::Ball> balls;
+    std::vector<MultisphereHull::Ball> balls;
     for (int i = 0; i < shape.getSphereCount(); ++i)
         balls.push_back({toGlm(scaling_ * shape.getSpherePosition(i)), scaling_.x() * shape.getSphereRadius(i)});
-    balls_ = BallHull(std::move(balls));
-    for (const BallHull::Ball& ball : balls_.balls()) {
+    balls_ = MultisphereHull(std::move(balls));
+    for (const MultisphereHull::Ball& ball : balls_.balls()) {
         faces_.points.push_back(ball.centre);
         radii_.push_back(ball.radius);
         radius_ = std::max(radius_, ball.radius);
@@ -297,7 +298,7 @@ Convex::Near Convex::nearest(const glm::vec3& point, float reach) const {
 std::optional<Convex::Entry> Convex::enter(const glm::vec3& start, const glm::vec3& way, float tolerance) const {
     const float length = glm::length(way);
     float part = 0;
-    for (int i = 0; i < mostSteps; ++i) {
+    for (int i = 0; i < maxSteps; ++i) {
         const Near near = nearest(start + part * way, length);
         if (near.distance <= tolerance) return Entry{part, near};
         const float approach = -glm::dot(near.normal, way);

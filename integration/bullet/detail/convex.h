@@ -61,9 +61,9 @@ class Convex {
 
     /// What is asked about in a field, grown by radius(): corners, and places along edges. Their numbers stay the same.
     struct Edge {
-        std::uint32_t from, to;        ///< corners
-        float rim;                     ///< the radius of the circle whose chord this is, 0 for a straight edge [m]
-        std::optional<Wings> wings{};  ///< of a straight edge between two faces
+        std::uint32_t from, to;  ///< corners
+        float rim;               ///< the radius of the circle whose chord this is, 0 for a straight edge [m]
+        std::optional<Conormals> conormals{};  ///< of a straight edge between two faces
     };
     std::span<const glm::vec3> corners() const { return faces_.points; }
     std::span<const Edge> edges() const { return edges_; }
@@ -113,7 +113,7 @@ class Convex {
     /// The planes around corner i of a hull are planesAround_[j] with firstAround_[i] <= j < firstAround_[i + 1].
     std::vector<std::uint32_t> firstAround_, planesAround_;
     std::vector<Edge> edges_;
-    BallHull balls_;
+    MultisphereHull balls_;
     std::vector<float> radii_;  ///< of balls: of corners [m]
 };
 

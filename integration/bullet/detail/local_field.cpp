@@ -33,18 +33,18 @@ LocalField::LocalField(const Placed& field, const Pose& other, const Motion& mot
       scale_(field.scale),
       voxel_(field.scale * field.collider.field().voxelSize()),
       pose_(field.pose),
-      ways_(other, motion, field.pose, field.motion) {
+      relativeMotion_(other, motion, field.pose, field.motion) {
     const Bounds& bounds = field.collider.bounds();
     if (reach > surelyInBand(scale_ * field_.exteriorWidth(), voxel_)) farReach_ = reach / scale_;
-    exactReach_ = reach + mostInterpolationError * voxel_;
-    longestWay_ = ways_.longest(scale_ * bounds.centre(), 0.5f * scale_ * glm::length(bounds.size()));
+    exactReach_ = reach + maxInterpolationError * voxel_;
+    longestWay_ = relativeMotion_.longest(scale_ * bounds.centre(), 0.5f * scale_ * glm::length(bounds.size()));
 }
 
 LocalField::Answer LocalField::at(const glm::vec3& point, float radius) const {
     const Sample sample = field_.sample(point / scale_);
     if (!sample.inBand && sample.distance > 0 && farReach_ > 0) return farAway(point, radius, sample.distance);
     if (!sample.inBand) return {sample.distance > 0 ? Answer::outside : Answer::inside, scale_ * sample.distance};
-    if (scale_ * sample.distance - radius <= exactReach_ && collider_.data().asksTriangles(point / scale_, measured_))
+    if (scale_ * sample.distance - radius <= exactReach_ && collider_.data().isExactAt(point / scale_, measured_))
         return exactly(point, sample);
     const glm::vec3 normal = directionOf(sample, field_.voxelSize());
     const auto where = normal == glm::vec3(0) ? Answer::unclear : Answer::near;
@@ -53,7 +53,7 @@ LocalField::Answer LocalField::at(const glm::vec3& point, float radius) const {
 
 // By the triangles, in the band.
 LocalField::Answer LocalField::exactly(const glm::vec3& point, const Sample& sample) const {
-    const Touch touch = touchInBand(field_, point / scale_, sample, true);
+    const SurfaceSample touch = surfaceSampleAt(field_, point / scale_, sample, true);
     if (touch.normal == glm::vec3(0)) return {Answer::unclear, scale_ * touch.distance, {}, sample.gradient};
     return {Answer::near, scale_ * touch.distance, touch.normal, touch.normal};
 }
@@ -81,7 +81,7 @@ std::optional<Contact> LocalField::probe(const glm::vec3& point, const Answer& a
 std::optional<Contact> LocalField::probeOnWay(const glm::vec3& point, float radius, std::uint32_t feature, float margin,
                                               float distance) const {
     if (longestWay_ <= margin) return std::nullopt;
-    const glm::vec3 way = ways_.of(point);
+    const glm::vec3 way = relativeMotion_.of(point);
     const float length = glm::length(way);
     if (distance - radius > length) return std::nullopt;
     const Ray ray{point / scale_, way, length / scale_};
@@ -104,8 +104,8 @@ void LocalField::probeEdge(const Edge& edge, const Answer& first, const Answer& 
     if (!(length > 0)) return;
     // farther from the field the probes get sparser
     const int parts = probeParts(length, voxel_, (1 << partBits) - 1);
-    const float way = ways_.longest(edge.place(0.5f), length);
-    const float reach = margin + way + mostInterpolationError * voxel_ + std::max(edge.radius[0], edge.radius[1]);
+    const float way = relativeMotion_.longest(edge.place(0.5f), length);
+    const float reach = margin + way + maxInterpolationError * voxel_ + std::max(edge.radius[0], edge.radius[1]);
     if (edge.isStraight && !comesNear(edge.place(0), edge.place(1), reach)) return;
     Answer before = first;
     for (int i = 0; i < parts;) {
@@ -179,20 +179,20 @@ Slope LocalField::slopeOf(const Piece& piece, float way, const Answer& answer) c
 
 // Of a sharp edge with one of the field's.
 std::optional<SharpEdges::Crossing> LocalField::crossingAt(const Edge& edge, float part, const Answer& there) const {
-    if (!edge.wings || edge.radiusAt(part) > 0) return std::nullopt;
+    if (!edge.conormals || edge.radiusAt(part) > 0) return std::nullopt;
     return collider_.data().edges().crossing(collider_.data().points(), edge.place(0) / scale_, edge.place(1) / scale_,
-                                             *edge.wings, edge.place(part) / scale_, there.distance / scale_,
+                                             *edge.conormals, edge.place(part) / scale_, there.distance / scale_,
                                              voxel_ / scale_);
 }
 
 std::optional<Contact> LocalField::touchAcross(const Piece& piece, float way, const Answer& there, float margin) const {
     const float part = piece.partAt(way), radius = piece.edge.radiusAt(part), aside = 2 * searchTolerance * voxel_;
-    const auto touchAt = [&](float place) -> std::optional<Touch> {
+    const auto touchAt = [&](float place) -> std::optional<SurfaceSample> {
         const Answer answer = at(piece.edge.place(piece.partAt(place)), radius);
         if (answer.where != Answer::near) return std::nullopt;
-        return Touch{answer.distance, answer.normal};
+        return SurfaceSample{answer.distance, answer.normal};
     };
-    const auto held = acrossEdge(piece.edge.directionAt(part), Touch{there.distance, there.normal},
+    const auto held = acrossEdge(piece.edge.directionAt(part), SurfaceSample{there.distance, there.normal},
                                  touchAt(way - aside), touchAt(way + aside));
     if (!held || held->distance - radius > margin) return std::nullopt;
     const glm::vec3 point = piece.edge.place(part);
@@ -201,7 +201,7 @@ std::optional<Contact> LocalField::touchAcross(const Piece& piece, float way, co
 }
 
 float LocalField::approach(const glm::vec3& point, const glm::vec3& normal, float margin) const {
-    return longestWay_ > margin ? std::max(-glm::dot(ways_.of(point), normal), 0.f) : 0;
+    return longestWay_ > margin ? std::max(-glm::dot(relativeMotion_.of(point), normal), 0.f) : 0;
 }
 
 Contact LocalField::contact(const glm::vec3& position, const glm::vec3& normal, float distance, std::uint32_t feature,

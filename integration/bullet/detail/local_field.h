@@ -21,8 +21,8 @@ using namespace bilayer::detail;
 // A surface point touches a face that looks against its own normal, by this cosine at least: the points below the edge
 // of a box must not be pushed out sideways. The corners of a cube, whose normals are mixed of three, reach 0.57.
 // Those of faces that do not touch yet: farther aslant is an edge of the other body beside them.
-inline constexpr ContactOptions opposition{
-    .leastOpposition = 0.3f, .leastOppositionApart = 0.9f, .keepsEdgesAslant = false};
+inline constexpr ContactOptions normalFilter{
+    .minNormalCosine = 0.3f, .minNormalCosineApart = 0.9f, .keepsObliqueEdges = false};
 // Edges get no more parts: numbers beyond are those of the next edge.
 inline constexpr int partBits = 15;
 inline constexpr float searchTolerance = 2e-3f;  // of the deepest place between two probes [voxels]
@@ -36,7 +36,7 @@ class LocalField {
 
     const Collider& collider() const { return collider_; }
     /// Of the other body's points as the field sees them.
-    const RelativeWays& ways() const { return ways_; }
+    const RelativeMotion& relativeMotion() const { return relativeMotion_; }
     /// The longest way of any that is in the field's box; those that come from afar may go farther by their turn.
     float longestWay() const { return longestWay_; }
 
@@ -61,9 +61,9 @@ class LocalField {
         std::function<glm::vec3(float)> place;  ///< by the part of the way
         float radius[2];                        ///< by which it is grown at its ends [m]
         bool isStraight;
-        std::uint32_t feature;       ///< the first of 2^(partBits + 1)
-        std::optional<Wings> wings;  ///< of a sharp edge between two faces
-        bool isSearched = true;      ///< between the probes
+        std::uint32_t feature;               ///< the first of 2^(partBits + 1)
+        std::optional<Conormals> conormals;  ///< of a sharp edge between two faces
+        bool isSearched = true;              ///< between the probes
 
         float radiusAt(float part) const { return radius[0] + part * (radius[1] - radius[0]); }
         glm::vec3 directionAt(float part) const;
@@ -109,7 +109,7 @@ class LocalField {
     bool measured_;
     float scale_, voxel_;
     Pose pose_;
-    RelativeWays ways_;
+    RelativeMotion relativeMotion_;
     float longestWay_;
     float exactReach_;    ///< up to which triangles are asked, where the field has any [m]
     float farReach_ = 0;  ///< where contacts are asked for beyond the band; in the field's size

@@ -19,7 +19,7 @@ namespace {
 constexpr float sameDirection = 0.9f;
 // Friction holds below this part of the most that it can bear. What has drifted farther than this along the surface
 // stays where it is [parts of the distance within which contacts are the same].
-constexpr float held = 0.98f, mostDrift = 0.25f;
+constexpr float held = 0.98f, maxDrift = 0.25f;
 // How long a contact takes to come to rest [steps], and the slip that loses it [parts of the distance within which
 // contacts are the same]: by and by, so that others have time to take over what it bore. By more in one step friction
 // is not known to slip that holds.
@@ -111,7 +111,7 @@ btVector3 along(const btVector3& way, const btVector3& normal) {
 }
 
 /// A contact that turns in the step goes where it is going to be. What it drifts meanwhile is no slip.
-void put(btManifoldPoint& point, const Ahead& ahead) {
+void put(btManifoldPoint& point, const PredictedContact& ahead) {
     point.m_positionWorldOnA = ahead.onA;
     point.m_positionWorldOnB = ahead.onB;
     point.m_normalWorldOnB = ahead.normal;
@@ -135,7 +135,7 @@ Anchor anchorOf(const btManifoldPoint& point, const btVector3& before, const btP
     // Bullet bounds friction in each of its directions by itself
     const float friction = std::max(std::abs(point.m_appliedImpulseLateral1), std::abs(point.m_appliedImpulseLateral2));
     const bool holds = friction < held * point.m_combinedFriction * point.m_appliedImpulse;
-    const float most = holds ? mostDrift * sameWithin : std::min(mostDrift * sameWithin, float(before.length()));
+    const float most = holds ? maxDrift * sameWithin : std::min(maxDrift * sameWithin, float(before.length()));
     const float length = drift.length(), slip = (drift - before).length();
     const float left = before.isZero() ? 0 : std::clamp(drift.dot(before) / before.length2(), 0.f, 1.f);
     if (holds && (drift - left * before).length() > slipOfRest * sameWithin) return {btVector3(0, 0, 0), slip};

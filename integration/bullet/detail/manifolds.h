@@ -19,7 +19,7 @@ using namespace bilayer::detail;
 
 /// A contact of bodies that turn as it is going to be at the end of the step, in the coordinates of a world that goes
 /// along with either body's centre, and what is left of the gap but for the ways that the solver sees (Turning).
-struct Ahead {
+struct PredictedContact {
     btVector3 onA, onB;  ///< its places on the bodies [m]
     btVector3 normal;    ///< from B to A
     float distance;      ///< [m]
@@ -27,8 +27,8 @@ struct Ahead {
 
 /// What goes into a manifold besides a contact itself.
 struct ContactDetails {
-    std::optional<Ahead> ahead;          ///< of one that turns
-    std::optional<TriangleId> triangle;  ///< of A
+    std::optional<PredictedContact> ahead;  ///< of one that turns
+    std::optional<TriangleId> triangle;     ///< of A
 };
 
 /// How contacts go on from step to step.

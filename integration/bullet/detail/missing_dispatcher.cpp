@@ -18,7 +18,7 @@ std::atomic<int> knowing{0};
 std::atomic<bool> isDone{false};  // the warning is out
 
 // Of transforms that bodies have left behind no more are kept than this.
-constexpr std::size_t mostAsked = 4096;
+constexpr std::size_t maxEntries = 4096;
 
 using Address = std::uintptr_t;
 
@@ -37,7 +37,7 @@ class Boxes {
   public:
     /// Whether the box is that of a dynamic body and meets another body's.
     bool note(const void* field, Address transform, const btVector3& lower, const btVector3& upper) {
-        if (asked_.size() >= mostAsked) asked_.clear();
+        if (asked_.size() >= maxEntries) asked_.clear();
         const auto body = asked_.find(transform - aheadInBody());
         const bool isAhead = body != asked_.end() && body->second.field == field && body->second.time == time_;
         Asked& here = asked_[transform];

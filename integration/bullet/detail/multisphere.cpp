@@ -12,7 +12,7 @@ namespace {
 // Balls may stand out of a plane by this part of the hull's size: rounding.
 constexpr float rounding = 1e-5f;
 // Of the cosine between a cone and its axis where one ball holds the other but for rounding.
-constexpr double leastSquare = 1e-12;
+constexpr double minSquare = 1e-12;
 
 glm::dvec3 squareTo(const glm::dvec3& axis) {
     const glm::dvec3 away = std::abs(axis.x) < 0.6 ? glm::dvec3(1, 0, 0) : glm::dvec3(0, 1, 0);
@@ -21,7 +21,7 @@ glm::dvec3 squareTo(const glm::dvec3& axis) {
 
 }  // namespace
 
-BallHull::BallHull(std::vector<Ball> balls) {
+MultisphereHull::MultisphereHull(std::vector<Ball> balls) {
     for (std::size_t i = 0; i < balls.size(); ++i) {
         const auto holds = [&](std::size_t j) {
             const float room = balls[j].radius - balls[i].radius;
@@ -33,9 +33,9 @@ BallHull::BallHull(std::vector<Ball> balls) {
         for (std::size_t j = 0; j < balls.size(); ++j) isHeld |= holds(j);
         if (!isHeld) balls_.push_back(balls[i]);
     }
-    leastRadius_ = std::numeric_limits<float>::max();
+    minRadius_ = std::numeric_limits<float>::max();
     for (const Ball& ball : balls_) {
-        leastRadius_ = std::min(leastRadius_, ball.radius);
+        minRadius_ = std::min(minRadius_, ball.radius);
         size_ = std::max(size_, ball.radius + glm::distance(ball.centre, balls_.front().centre));
     }
     const auto count = static_cast<std::uint32_t>(balls_.size());
@@ -47,7 +47,7 @@ BallHull::BallHull(std::vector<Ball> balls) {
 }
 
 /// Those of the two planes on three balls that have all others below.
-void BallHull::addPlanes(std::uint32_t i, std::uint32_t j, std::uint32_t k) {
+void MultisphereHull::addPlanes(std::uint32_t i, std::uint32_t j, std::uint32_t k) {
     const glm::dvec3 from(balls_[i].centre), u = glm::dvec3(balls_[j].centre) - from,
                                              v = glm::dvec3(balls_[k].centre) - from;
     const glm::dvec3 square = glm::cross(u, v);
@@ -68,14 +68,15 @@ void BallHull::addPlanes(std::uint32_t i, std::uint32_t j, std::uint32_t k) {
     }
 }
 
-BallHull::Candidate BallHull::aroundBall(const Ball& ball, const glm::dvec3& point) const {
+MultisphereHull::Candidate MultisphereHull::aroundBall(const Ball& ball, const glm::dvec3& point) const {
     const glm::dvec3 centre(ball.centre);
     const double length = glm::distance(point, centre);
     return {length - ball.radius, length > 0 ? (point - centre) / length : glm::dvec3(0, 0, 1), centre, ball.radius};
 }
 
 /// Against all balls between two.
-BallHull::Candidate BallHull::aroundPair(const Ball& from, const Ball& to, const glm::dvec3& point) const {
+MultisphereHull::Candidate MultisphereHull::aroundPair(const Ball& from, const Ball& to,
+                                                       const glm::dvec3& point) const {
     const glm::dvec3 start(from.centre), between = glm::dvec3(to.centre) - start;
     const double length = glm::length(between), growth = double(to.radius) - from.radius;
     const glm::dvec3 axis = between / length, way = point - start;
@@ -83,7 +84,7 @@ BallHull::Candidate BallHull::aroundPair(const Ball& from, const Ball& to, const
     const glm::dvec3 aside = way - along * axis;
     const double out = glm::length(aside);
     // The normal leans towards the smaller ball.
-    const double sine = -growth / length, cosine = std::sqrt(std::max(1 - sine * sine, leastSquare));
+    const double sine = -growth / length, cosine = std::sqrt(std::max(1 - sine * sine, minSquare));
     const double part = (along - out * sine / cosine) / length;
     if (part <= 0) return aroundBall(from, point);
     if (part >= 1) return aroundBall(to, point);
@@ -93,7 +94,7 @@ BallHull::Candidate BallHull::aroundPair(const Ball& from, const Ball& to, const
     return {glm::dot(point - centre, normal) - radius, normal, centre, radius};
 }
 
-BallHull::Near BallHull::nearest(const glm::vec3& place) const {
+MultisphereHull::Near MultisphereHull::nearest(const glm::vec3& place) const {
     const glm::dvec3 point(place);
     Candidate best = aroundBall(balls_.front(), point);
     const auto consider = [&](const Candidate& candidate) {
@@ -124,7 +125,7 @@ BallHull::Near BallHull::nearest(const glm::vec3& place) const {
 }
 
 /// How far the hull lies below a point in a direction.
-double BallHull::along(const glm::dvec3& direction, const glm::dvec3& point) const {
+double MultisphereHull::along(const glm::dvec3& direction, const glm::dvec3& point) const {
     double least = std::numeric_limits<double>::max();
     for (const Ball& ball : balls_)
         least = std::min(least, glm::dot(direction, point - glm::dvec3(ball.centre)) - ball.radius);
@@ -132,8 +133,8 @@ double BallHull::along(const glm::dvec3& direction, const glm::dvec3& point) con
 }
 
 /// Of all directions in which the hull may be left, the shortest way out lies along a ball's, a cone's or a plane's.
-BallHull::Candidate BallHull::inside(const glm::dvec3& point) const {
-    Candidate best{-std::numeric_limits<double>::max(), {0, 0, 1}, point, leastRadius_};
+MultisphereHull::Candidate MultisphereHull::inside(const glm::dvec3& point) const {
+    Candidate best{-std::numeric_limits<double>::max(), {0, 0, 1}, point, minRadius_};
     const auto consider = [&](const glm::dvec3& normal) {
         const double distance = along(normal, point);
         if (distance > best.distance) best.distance = distance, best.normal = normal;
@@ -141,7 +142,7 @@ BallHull::Candidate BallHull::inside(const glm::dvec3& point) const {
     for (const Ball& ball : balls_) consider(aroundBall(ball, point).normal);
     for (const auto& [i, j] : pairs_) consider(aroundPair(balls_[i], balls_[j], point).normal);
     for (const Plane& plane : planes_) consider(plane.normal);
-    best.centre = point - (best.distance + leastRadius_) * best.normal;
+    best.centre = point - (best.distance + minRadius_) * best.normal;
     return best;
 }
 

@@ -8,16 +8,16 @@
 
 namespace bilayer::bullet::detail {
 
-class BallHull {
+class MultisphereHull {
   public:
     struct Ball {
         glm::vec3 centre;  ///< [m]
         float radius;      ///< not negative [m]
     };
 
-    BallHull() = default;
+    MultisphereHull() = default;
     /// At least one ball. Takes O(n^4) for n of them.
-    explicit BallHull(std::vector<Ball> balls);
+    explicit MultisphereHull(std::vector<Ball> balls);
 
     struct Near {
         float distance;    ///< signed, to the surface [m]
@@ -53,7 +53,7 @@ class BallHull {
     std::vector<Ball> balls_;
     std::vector<std::pair<std::uint32_t, std::uint32_t>> pairs_;
     std::vector<Plane> planes_;
-    float size_ = 0, leastRadius_ = 0;  ///< [m]
+    float size_ = 0, minRadius_ = 0;  ///< [m]
 };
 
 }  // namespace bilayer::bullet::detail

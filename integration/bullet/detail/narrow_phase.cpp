@@ -21,20 +21,20 @@ constexpr std::uint32_t lowestVertex = featureOfB - 1;
 
 ContactReport collideFields(const Placed& a, const Placed& b, float margin, bool measured, ContactCache& cache,
                             std::vector<Contact>& contacts) {
-    ContactOptions options = opposition;
+    ContactOptions options = normalFilter;
     options.margin = margin;
-    options.measured = measured;
+    options.exact = measured;
     // a test is told how far apart bodies are, whichever way their points look
     if (measured) {
-        options.leastOppositionApart = options.leastOpposition;
-        options.keepsEdgesAslant = true;
+        options.minNormalCosineApart = options.minNormalCosine;
+        options.keepsObliqueEdges = true;
     }
     return collide(a, b, options, contacts, &cache);
 }
 
 ContactReport collideFields(const Placed& a, const Placed& b, float margin, std::span<const FoundPoint> ofA,
                             std::span<const FoundPoint> ofB, std::vector<Contact>& contacts) {
-    ContactOptions options = opposition;
+    ContactOptions options = normalFilter;
     options.margin = margin;
     return collideFound(a, b, options, ofA, ofB, contacts);
 }

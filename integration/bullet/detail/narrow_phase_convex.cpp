@@ -21,9 +21,9 @@ using namespace bilayer::detail;
 namespace {
 
 // Steps towards the deepest place of a round surface; each divides the error by the ratio of the radii of curvature.
-constexpr int mostRefinements = 6;
+constexpr int maxRefinements = 6;
 // Faces that fall by less lie on what they touch: the next surface points are as deep to a hundredth of a voxel.
-constexpr float leastDownhill = 0.05f;
+constexpr float minDownhill = 0.05f;
 constexpr float touchingFace = 0.25f;  // [voxels]
 // Normals that enclose less than a degree are those of one face (cosine).
 constexpr float straight = 0.99985f;
@@ -52,7 +52,7 @@ class Touching {
     }
 
     bool reject(const glm::vec3& centre, float radius) const {
-        const float way = local_.ways().longest(scale_ * centre, scale_ * radius);
+        const float way = local_.relativeMotion().longest(scale_ * centre, scale_ * radius);
         const float reach = scale_ * radius + std::max(edgeReach_, margin_ + way);
         return convex_.nearest(intoConvex(scale_ * centre), reach).distance > reach;
     }
@@ -71,10 +71,10 @@ class Touching {
         if (near.distance > 0 && approach > 0 && !meets(position, point)) approach = 0;
         // What is round has no edge that a point could see aslant.
         const bool apart = near.distance > 0 && !point.isSharp && !convex_.isRound(near) && !measured_;
-        if (!keeps(opposition, -normal, point.normal, -local_.ways().turn(), apart)) return;
+        if (!keeps(normalFilter, -normal, point.normal, -local_.relativeMotion().rotation(), apart)) return;
         if (apart && approach == 0 &&
-            looksAtEdge(intoConvex(position), toConvex_ * point.normal, near.distance, near.normal,
-                        [&](const glm::vec3& place) { return convex_.nearest(place, edgeReach_).normal; }))
+            seesEdgeObliquely(intoConvex(position), toConvex_ * point.normal, near.distance, near.normal,
+                              [&](const glm::vec3& place) { return convex_.nearest(place, edgeReach_).normal; }))
             return;
         if (!convex_.isFlat(near)) {
             // corners and edges are exact, and samples next to them are not
@@ -112,8 +112,9 @@ class Touching {
                                   {convex_.radius(edge, 0), convex_.radius(edge, 1)},
                                   !(edge.rim > 0),
                                   number,
-                                  edge.wings};
-            if (edge.wings) seen.wings = Wings{toField_ * (*edge.wings)[0], toField_ * (*edge.wings)[1]};
+                                  edge.conormals};
+            if (edge.conormals)
+                seen.conormals = Conormals{toField_ * (*edge.conormals)[0], toField_ * (*edge.conormals)[1]};
             local_.probeEdge(seen, answers[edge.from], answers[edge.to], margin_, report, contacts);
             number = (number + (2u << partBits)) & ~featureOfB;
         }
@@ -128,7 +129,9 @@ class Touching {
         return convex_.enter(start, way, sweepTolerance * voxel_);
     }
 
-    glm::vec3 wayIntoConvex(const glm::vec3& position) const { return -(toConvex_ * local_.ways().of(position)); }
+    glm::vec3 wayIntoConvex(const glm::vec3& position) const {
+        return -(toConvex_ * local_.relativeMotion().of(position));
+    }
 
     /// Whether a surface point's way does more than graze the convex body (see collide()).
     bool meets(const glm::vec3& position, const SurfacePoint& point) const {
@@ -149,7 +152,7 @@ class Touching {
         if (!(gap > 0)) return;
         const glm::vec3 normal = -(toField_ * met->near.normal);
         const bool apart = !point.isSharp && !convex_.isRound(met->near);
-        if (!keeps(opposition, -normal, point.normal, -local_.ways().turn(), apart)) return;
+        if (!keeps(normalFilter, -normal, point.normal, -local_.relativeMotion().rotation(), apart)) return;
         contacts.push_back(local_.contact(position, normal, gap, feature, -glm::dot(met->near.normal, way)));
         contacts.back().turningRadius = 0;
     }
@@ -178,7 +181,7 @@ class Touching {
             const auto lowest = lowestBetween(first, last, searchTolerance * voxel_, [&](float way) {
                 return std::optional<Slope>(slopeOf(way, nearAt(way)));
             });
-            const auto touchAt = [&](float way) -> Touch {
+            const auto touchAt = [&](float way) -> SurfaceSample {
                 const Convex::Near near = nearAt(way);
                 return {near.distance, near.normal};
             };
@@ -187,7 +190,7 @@ class Touching {
                                           touchAt(lowest->place + aside));
             if (!touch || touch->distance > margin_) continue;
             const glm::vec3 normal = -(toField_ * touch->normal);
-            if (!keeps(opposition, glm::dot(normal, points[index].normal + points[next].normal), false)) continue;
+            if (!keeps(normalFilter, glm::dot(normal, points[index].normal + points[next].normal), false)) continue;
             const glm::vec3 place = intoField(from + lowest->place * along);
             contacts.push_back(local_.contact(place, normal, touch->distance,
                                               (std::uint32_t(points.size()) + e) | featureOfB,
@@ -200,7 +203,7 @@ class Touching {
         glm::vec3 place = intoField(near.core + near.radius * near.normal);
         LocalField::Answer here = local_.at(place);
         if (here.where != LocalField::Answer::near) return std::nullopt;
-        for (int i = 0; i < mostRefinements; ++i) {
+        for (int i = 0; i < maxRefinements; ++i) {
             const glm::vec3 next = intoField(convex_.slide(near, -(toConvex_ * here.normal)));
             const LocalField::Answer there = local_.at(next);
             if (there.where != LocalField::Answer::near || !(there.distance < here.distance)) break;
@@ -226,7 +229,7 @@ class Touching {
         if (const auto line = convex_.sideLine(near, start)) {
             const glm::vec3 from = (*line)[0] + near.radius * near.normal, along = (*line)[1] - (*line)[0];
             const float length = glm::length(along), steepness = glm::dot(slope, along) / length;
-            if (!(std::abs(steepness) > leastDownhill)) return std::nullopt;
+            if (!(std::abs(steepness) > minDownhill)) return std::nullopt;
             const float middle = glm::dot(start - from, along) / (length * length);
             const float there = std::clamp(middle - std::copysign(step / length, steepness), 0.f, 1.f);
             end = start + (there - middle) * along;
@@ -237,7 +240,7 @@ class Touching {
             if (!convex_.isFlat(near) || near.distance < least) return std::nullopt;
             const glm::vec3 uphill = slope - glm::dot(slope, near.normal) * near.normal;
             const float steepness = glm::length(uphill);
-            if (!(steepness > leastDownhill)) return std::nullopt;
+            if (!(steepness > minDownhill)) return std::nullopt;
             // no farther than to the border of the face
             const Convex::Near last = convex_.nearest(start - step / steepness * uphill, step);
             end = last.core + last.radius * near.normal;

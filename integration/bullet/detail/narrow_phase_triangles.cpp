@@ -30,7 +30,7 @@ namespace {
 constexpr std::uint32_t overPoints = 6;
 // A point lies over a face if it is no farther beyond its sides than this [probe spacings]: rounding.
 constexpr float onFace = 1e-4f;
-// Triangles whose wings enclose more than 179.9 degrees (cosine) have no edge between them.
+// Triangles whose conormals enclose more than 179.9 degrees (cosine) have no edge between them.
 constexpr float flatEdge = -0.9999985f;
 // A corner or an edge of the triangles touches what looks at it along one of its own normals, to within this cosine.
 constexpr float minNormalCosine = 0.9f;
@@ -42,7 +42,7 @@ constexpr float steepestCrease = 3;
 // are mixed there.
 constexpr float touchingFoot = 0.05f;
 // What looks at a face by less (cosine) does not tell on which side of it its body is.
-constexpr float leastFacing = 0.1f;
+constexpr float minFacing = 0.1f;
 // A side that looks the other way by this (cosine) is the far one of what is thin.
 constexpr float farSide = -0.8f;
 
@@ -103,13 +103,13 @@ class TriangleProbes : public btTriangleCallback {
     void visit(std::uint32_t f) {
         const Triangle& corners = triangles_[f];
         LocalField::Answer answers[3];
-        std::array<std::optional<Wings>, 3> wings;
+        std::array<std::optional<Conormals>, 3> conormals;
         std::array<bool, 3> flat;
         float longest = 0;
         for (int i = 0; i < 3; ++i) {
             answers[i] = local_.at(corners[i]);
-            wings[i] = adjacency_->wingsOf(f, i);
-            flat[i] = wings[i] && glm::dot((*wings[i])[0], (*wings[i])[1]) <= flatEdge;
+            conormals[i] = adjacency_->wingsOf(f, i);
+            flat[i] = conormals[i] && glm::dot((*conormals[i])[0], (*conormals[i])[1]) <= flatEdge;
             longest = std::max(longest, glm::distance(corners[i], corners[(i + 1) % 3]));
         }
         // Within a plane of large triangles the field's own points tell more.
@@ -123,7 +123,7 @@ class TriangleProbes : public btTriangleCallback {
                                         {0, 0},
                                         true,
                                         featureOf(ids_[f], std::uint32_t(i)),
-                                        wings[i],
+                                        conormals[i],
                                         !flat[i]};
             const std::size_t before = contacts_.size();
             local_.probeEdge(edge, answers[i], answers[(i + 1) % 3], margin_, report_, contacts_);
@@ -194,13 +194,13 @@ class TriangleProbes : public btTriangleCallback {
         const SurfacePoint& point = collider.data().points().points()[index];
         // where the foot lies in the middle of its body, that side counts which a point of a face looks to
         const bool isUnclear = foot.where == LocalField::Answer::unclear && !point.isSharp;
-        const float facing = glm::dot(foot.normal, normal), least = point.isSharp ? leastFacing : 0;
+        const float facing = glm::dot(foot.normal, normal), least = point.isSharp ? minFacing : 0;
         const bool isNearSide = height >= 0 || isUnclear || (foot.where == LocalField::Answer::near && facing >= least);
-        const bool isNearest = std::abs(foot.distance - height) <= mostInterpolationError * voxel_ && isNearSide;
-        const bool isKept = keeps(opposition, glm::dot(normal, point.normal), true);
+        const bool isNearest = std::abs(foot.distance - height) <= maxInterpolationError * voxel_ && isNearSide;
+        const bool isKept = keeps(normalFilter, glm::dot(normal, point.normal), true);
         if (isNearest && isKept && (point.isSharp || turnsTo(field_.scale * point.position, point.normal, normal)))
             return true;
-        if (!(isNearest || height < 0) || !isTip(index, normal)) return false;
+        if (!(isNearest || height < 0) || !isConvexVertex(index, normal)) return false;
         return isNearest || hasSunk(point, normal, height, wayThrough(point, normal, height));
     }
 
@@ -208,7 +208,7 @@ class TriangleProbes : public btTriangleCallback {
     /// points, now or while its body turns in the step. Where it does not, it goes on deeper, and touches elsewhere:
     /// where it turns, or where the face ends.
     bool turnsTo(const glm::vec3& place, const glm::vec3& seen, const glm::vec3& normal) const {
-        const glm::vec3 turn = local_.ways().turn();
+        const glm::vec3 turn = local_.relativeMotion().rotation();
         const auto isMet = [&](float part) {
             return turnsNowTo(place, seen, glm::normalize(normal + part * glm::cross(turn, normal)));
         };
@@ -223,15 +223,15 @@ class TriangleProbes : public btTriangleCallback {
         return there.where == LocalField::Answer::near && glm::dot(there.normal, lean) <= maxLean;
     }
 
-    bool isTip(std::uint32_t index, const glm::vec3& normal) const {
+    bool isConvexVertex(std::uint32_t index, const glm::vec3& normal) const {
         const Collider& collider = field_.collider;
         return collider.data().points().points()[index].isSharp &&
-               collider.data().edges().isTip(collider.data().points(), index, normal);
+               collider.data().edges().isConvexVertex(collider.data().points(), index, normal);
     }
 
     /// From a tip back along its axis to the plane of a face that it is below.
     static float wayThrough(const SurfacePoint& tip, const glm::vec3& normal, float height) {
-        return -height / std::max(glm::dot(normal, tip.normal), leastFacing);
+        return -height / std::max(glm::dot(normal, tip.normal), minFacing);
     }
 
     /// Whether a tip under a face has gone through it: its body goes on behind the face, and if the tip is deeper than
@@ -240,7 +240,7 @@ class TriangleProbes : public btTriangleCallback {
     bool hasSunk(const SurfacePoint& tip, const glm::vec3& normal, float height, float way) const {
         const glm::vec3 place = field_.scale * tip.position, through = place - way * tip.normal;
         const auto goesOn = [&](float parts) {
-            return local_.at(through - parts * mostInterpolationError * voxel_ * tip.normal).distance < 0;
+            return local_.at(through - parts * maxInterpolationError * voxel_ * tip.normal).distance < 0;
         };
         if (!goesOn(1) && !goesOn(2) && !goesOn(3)) return false;
         if (-height < voxel_) return true;
@@ -371,7 +371,7 @@ class TriangleProbes : public btTriangleCallback {
             findNeighbours(f, plane);
             if (plane.isBesideAll(sharp.place, rounding)) return;
         }
-        if (!isTip(sharp.index, normal)) return;
+        if (!isConvexVertex(sharp.index, normal)) return;
         if (const auto found = overFace(plane, false, sharp.index, point))
             overFaces_.push_back({sharp.index, ids_[f], *found});
     }
@@ -411,7 +411,7 @@ class TriangleProbes : public btTriangleCallback {
         if (isFar && !(point.isSharp && height < 0)) return std::nullopt;
         if (height <= margin_ && isExact(index, normal, height, there)) return touching(place, normal, height);
         if (isFar || !asksFoot) return std::nullopt;
-        if (glm::dot(point.normal, normal) < leastFacing || !turnsTo(foot, there.normal, normal)) return std::nullopt;
+        if (glm::dot(point.normal, normal) < minFacing || !turnsTo(foot, there.normal, normal)) return std::nullopt;
         return atFoot(foot, normal, there);
     }
 
@@ -419,7 +419,7 @@ class TriangleProbes : public btTriangleCallback {
     /// above both.
     std::optional<Contact> belowCrease(const Plane& plane, std::uint32_t index, const glm::vec3& normal, float height) {
         const SurfacePoint& point = field_.collider.data().points().points()[index];
-        if (height >= 0 || !isTip(index, normal)) return std::nullopt;
+        if (height >= 0 || !isConvexVertex(index, normal)) return std::nullopt;
         const glm::vec3 place = field_.scale * point.position;
         float way = wayThrough(point, normal, height), deepest = height;
         for (int i = 0; i < 3; ++i) {
@@ -453,10 +453,11 @@ class TriangleProbes : public btTriangleCallback {
         if (!found) return std::nullopt;
         const bool touches = std::abs(there.distance) <= touchingFoot * voxel_;
         const glm::quat& inWorld = field_.pose.rotation;
-        if (!keeps(opposition, found->normal, -(inWorld * normal), inWorld * local_.ways().turn(), !touches))
+        if (!keeps(normalFilter, found->normal, -(inWorld * normal), inWorld * local_.relativeMotion().rotation(),
+                   !touches))
             return std::nullopt;
         const auto normalAt = [&](const glm::vec3& place) { return local_.at(place).normal; };
-        if (!touches && there.distance > 0 && looksAtEdge(foot, -normal, there.distance, there.normal, normalAt))
+        if (!touches && there.distance > 0 && seesEdgeObliquely(foot, -normal, there.distance, there.normal, normalAt))
             return std::nullopt;
         turn(*found, normal);
         found->turningRadius = -1;  // it stays below the point

@@ -21,12 +21,12 @@ namespace {
 
 // Of the directions from a side or a corner into its triangles the mean is no shorter where these are folded by more
 // than 30 degrees (a side's), or leave as sharp a corner.
-constexpr float leastMean = 0.26f;
+constexpr float minMean = 0.26f;
 // A normal may leave its cone by this (sine). What has not reached the cone after so many projections, or is farther
 // from the direction than 60 degrees (cosine), is none.
 constexpr float coneTolerance = 1e-3f, minConeCosine = 0.5f;
 constexpr int maxProjections = 20;
-constexpr int mostPieces = 64;  // that a way is divided into
+constexpr int maxPieces = 64;  // that a way is divided into
 
 /// The ends of a side in one order.
 using SideKey = std::array<float, 6>;
@@ -95,7 +95,7 @@ class Away {
     }
     std::optional<glm::vec3> outward() const {
         const float length = glm::length(sum_);
-        if (!(length > leastMean * weight_)) return std::nullopt;
+        if (!(length > minMean * weight_)) return std::nullopt;
         return -sum_ / length;
     }
 
@@ -145,11 +145,11 @@ Adjacency::Groups Adjacency::groupBy(KeyOf&& keyOf) const {
     return groups;
 }
 
-std::optional<Wings> Adjacency::wingsOf(std::uint32_t triangle, int edge) const {
+std::optional<Conormals> Adjacency::wingsOf(std::uint32_t triangle, int edge) const {
     const auto both = atEdge(triangle, edge);
     if (both.size() != 2) return std::nullopt;
     const auto wing = [&](const Member& one) { return wingOf(triangles_[one.triangle], one.index); };
-    return Wings{wing(both[0]), wing(both[1])};
+    return Conormals{wing(both[0]), wing(both[1])};
 }
 
 std::optional<glm::vec3> Adjacency::neighbourOf(std::uint32_t triangle, int edge) const {
@@ -179,7 +179,7 @@ std::optional<glm::vec3> Adjacency::cornerNormal(std::uint32_t triangle, int cor
     });
 }
 
-SharpSheet sharpOf(std::span<const Triangle> triangles) {
+SharpTriangles sharpOf(std::span<const Triangle> triangles) {
     std::map<SideKey, Away> sides;
     std::map<std::array<float, 3>, Away> corners;
     for (const Triangle& triangle : triangles)
@@ -192,7 +192,7 @@ SharpSheet sharpOf(std::span<const Triangle> triangles) {
             const float angle = 2 * std::acos(std::min(0.5f * glm::length(sum), 1.f));
             if (angle > 0 && glm::length(sum) > 0) corners[{here.x, here.y, here.z}].add(glm::normalize(sum), angle);
         }
-    SharpSheet sharp;
+    SharpTriangles sharp;
     for (const auto& [key, away] : sides)
         if (const auto outward = away.outward())
             sharp.sides.push_back({{key[0], key[1], key[2]}, {key[3], key[4], key[5]}, *outward});
@@ -213,7 +213,7 @@ std::vector<Triangle> trianglesAlong(const btConcaveShape& mesh, std::span<const
     } all;
     for (std::size_t i = 0; i + 1 < way.size(); ++i) {
         const float pieces =
-            std::clamp(std::ceil(glm::distance(way[i], way[i + 1]) / (2 * radius)), 1.f, float(mostPieces));
+            std::clamp(std::ceil(glm::distance(way[i], way[i + 1]) / (2 * radius)), 1.f, float(maxPieces));
         for (float k = 0; k < pieces; ++k) {
             const glm::vec3 from = glm::mix(way[i], way[i + 1], k / pieces),
                             to = glm::mix(way[i], way[i + 1], (k + 1) / pieces);

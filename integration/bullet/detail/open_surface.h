@@ -37,7 +37,7 @@ class Adjacency {
     /// The triangles at an edge, that one included, in ascending order.
     std::span<const Member> atEdge(std::uint32_t triangle, int edge) const { return groupOf(edges_, triangle, edge); }
     /// The conormals of an edge that exactly two triangles share.
-    std::optional<Wings> wingsOf(std::uint32_t triangle, int edge) const;
+    std::optional<Conormals> wingsOf(std::uint32_t triangle, int edge) const;
     /// That of the other one of the two.
     std::optional<glm::vec3> neighbourOf(std::uint32_t triangle, int edge) const;
 
@@ -64,7 +64,7 @@ class Adjacency {
 };
 
 /// What is sharp of a sheet: its border, and where it is folded by more than 30 degrees.
-struct SharpSheet {
+struct SharpTriangles {
     struct Side {
         glm::vec3 from, to;
         glm::vec3 outward;  ///< away from the sheet, of unit length
@@ -75,7 +75,7 @@ struct SharpSheet {
     std::vector<Side> sides;
     std::vector<Corner> corners;
 };
-SharpSheet sharpOf(std::span<const Triangle> triangles);
+SharpTriangles sharpOf(std::span<const Triangle> triangles);
 
 /// The triangles of a mesh or a height field that a ball may touch on a way from place to place, each once.
 std::vector<Triangle> trianglesAlong(const btConcaveShape& mesh, std::span<const glm::vec3> way, float radius);

@@ -35,7 +35,7 @@ Continuity continuityOf(const Side& a, const Side& b) {
                               : std::numeric_limits<float>::max();
     };
     const auto isSwept = [](const Side& side) {
-        return side.seconds > 0 && (!isField(*side.shape) || static_cast<const Shape&>(*side.shape).sweeps());
+        return side.seconds > 0 && (!isField(*side.shape) || static_cast<const Shape&>(*side.shape).speculative());
     };
     return {.sameWithin = std::min(sameWithin(*a.shape), sameWithin(*b.shape)),
             .restingFriction = std::max(restingFriction(*a.shape), restingFriction(*b.shape)),
@@ -54,7 +54,7 @@ Motion Side::motionAt(const btVector3& point) const {
 Placed Side::placed() const {
     const auto& field = static_cast<const Shape&>(*shape);
     Placed body = field.placed(transform);
-    if (field.sweeps()) body.motion = motionAt(toBullet(body.pose.position));
+    if (field.speculative()) body.motion = motionAt(toBullet(body.pose.position));
     return body;
 }
 
@@ -94,7 +94,7 @@ void Pair::commit(const btCollisionObject& a, const btCollisionObject& b, float 
     ++statistics_.pairs;
     statistics_.contactsFound += found_;
     for (const Patch& patch : reduced.patches) statistics_.contactsKept += patch.count;
-    statistics_.lost = std::max(statistics_.lost, reduced.lost);
+    statistics_.reductionError = std::max(statistics_.reductionError, reduced.reductionError);
     statistics_.beyondBand += static_cast<int>(report_.beyondBand);
     statistics_.sampled += sampled_;
     isReady_ = false;
@@ -108,7 +108,7 @@ float Pair::nearest() const {
 
 void Pair::find(const Side& a, const Side& b, float margin, bool measured) {
     contacts_.clear();
-    const bool follows = static_cast<const Shape&>(*b.shape).sweeps();
+    const bool follows = static_cast<const Shape&>(*b.shape).speculative();
     report_ = isField(*a.shape) ? collideFields(a.placed(), b.placed(), margin, measured, cache_, contacts_)
                                 : collideOther(a, b.placed(), margin, measured, follows ? a.motion() : Motion{});
 }
@@ -118,7 +118,7 @@ void Pair::finish(const Side& a, const Side& b) {
     choice_.update(contacts_, a.transform, b.transform);
     continuity_ = continuityOf(a, b);
     details_.clear();
-    const Turning turning(a, b, continuity_);
+    const PredictedContacts turning(a, b, continuity_);
     for (const Patch& patch : choice_.reduced().patches)
         for (int i = 0; i < patch.count; ++i) details_.push_back({turning.ahead(patch.contacts[i]), std::nullopt});
     if (hasTriangles(*a.shape)) nameTriangles(static_cast<const btConcaveShape&>(*a.shape), a.transform, b.placed());

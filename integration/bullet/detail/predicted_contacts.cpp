@@ -21,10 +21,10 @@ namespace {
 constexpr float hardlyTurned = 0.05f;
 // Bodies are looked at after a turn of this at most [rad]. Where they are not swept, the points that take over are
 // known only up to a margin: a turn then takes none off the surface by more than this [parts of that distance].
-constexpr float mostTurn = 0.5f, turnsOff = 0.25f;
+constexpr float maxRotation = 0.5f, turnsOff = 0.25f;
 // It is met a bit too early: else the points around the lowest one of a wheel get in by what a step is off, and throw
 // it up when they touch [parts of the bend of their ways], at most [parts of that distance].
-constexpr float earlier = 0.1f, mostEarly = 0.05f;
+constexpr float earlier = 0.1f, maxEarly = 0.05f;
 // Where a field looks another way than a contact by more than this cosine tells, it says nothing about it: that is one
 // of an edge.
 constexpr float sameNormal = 0.95f;
@@ -49,11 +49,11 @@ std::optional<Surface> surfaceAt(const Side& side, const Surface& contact, const
     if (!isField(*side.shape)) return plane;
     const Placed body = side.placed();
     const Field& field = body.collider.field();
-    const auto touchAt = [&](const btVector3& point) -> std::optional<Touch> {
+    const auto touchAt = [&](const btVector3& point) -> std::optional<SurfaceSample> {
         const glm::vec3 at = body.pose.toBody(toGlm(point)) / body.scale;
         const Sample sample = field.sample(at);
         if (!sample.inBand) return std::nullopt;
-        return touchInBand(field, at, sample, body.collider.data().asksTriangles(at));
+        return surfaceSampleAt(field, at, sample, body.collider.data().isExactAt(at));
     };
     // as high as the contact, since deeper down thin walls have another side
     const float rise = contact.normal.dot(nearby - place);
@@ -69,17 +69,17 @@ std::optional<Surface> surfaceAt(const Side& side, const Surface& contact, const
 
 }  // namespace
 
-Turning::Turning(const Side& a, const Side& b, const Continuity& continuity)
+PredictedContacts::PredictedContacts(const Side& a, const Side& b, const Continuity& continuity)
     : a_{a, velocityOf(*a.object)}, b_{b, velocityOf(*b.object)}, continuity_(continuity) {}
 
 /// In which a body turns a place by no more than is known of what comes after.
-float Turning::mostSeconds(const Body& body, const btVector3& place) const {
+float PredictedContacts::maxSeconds(const Body& body, const btVector3& place) const {
     const float arm = (place - body.velocity.centre).length();
-    const float most = continuity_.isSwept ? mostTurn : std::sqrt(2 * turnsOff * continuity_.sameWithin / arm);
+    const float most = continuity_.isSwept ? maxRotation : std::sqrt(2 * turnsOff * continuity_.sameWithin / arm);
     return most / body.velocity.angular.length();  // infinite where nothing turns
 }
 
-std::optional<Ahead> Turning::ahead(const Contact& contact) const {
+std::optional<PredictedContact> PredictedContacts::ahead(const Contact& contact) const {
     // what touches is where it is: put behind a wheel, it would push it on
     if (contact.turningRadius < 0 || contact.distance <= 0) return std::nullopt;
     const bool isOfB = contact.feature & featureOfB;
@@ -91,7 +91,7 @@ std::optional<Ahead> Turning::ahead(const Contact& contact) const {
     const btVector3 onB = toBullet(contact.position), middle = onB + (isOfB ? radius : height) * outward;
     const btVector3 arm = middle - velocity.centre, itsArm = middle - its.centre;
 
-    const float seconds = std::min({own.side.seconds, mostSeconds(own, middle), mostSeconds(other, middle)});
+    const float seconds = std::min({own.side.seconds, maxSeconds(own, middle), maxSeconds(other, middle)});
     const float way = seconds * velocity.angular.cross(arm).length(),
                 itsWay = seconds * its.angular.cross(itsArm).length();
     if (!(std::max(way, itsWay) > hardlyTurned * continuity_.sameWithin)) return std::nullopt;
@@ -109,10 +109,10 @@ std::optional<Ahead> Turning::ahead(const Contact& contact) const {
     const float seen = seconds * normal.dot(velocity.at(ownThen) - its.at(otherThen)),
                 left = surface->distance - radius + seconds * leaving - seen;
     const float bend = seconds * velocity.angular.length() * way,
-                early = std::min(mostEarly * continuity_.sameWithin, earlier * bend);
+                early = std::min(maxEarly * continuity_.sameWithin, earlier * bend);
     const float distance = std::max(left - early, 0.f);
-    if (isOfB) return Ahead{otherThen, ownThen, -normal, distance};
-    return Ahead{ownThen, otherThen, normal, distance};
+    if (isOfB) return PredictedContact{otherThen, ownThen, -normal, distance};
+    return PredictedContact{ownThen, otherThen, normal, distance};
 }
 
 }  // namespace bilayer::bullet::detail

@@ -17,20 +17,20 @@ using namespace bilayer::detail;
 /// bear its weight and brake it: at 60 steps a second a ball of 0.1 m that rolls at 0.3 m/s loses half of its
 /// speed in a second. So the contact of a point that turns with its body is handed over as it is going to be at the
 /// step's end.
-class Turning {
+class PredictedContacts {
   public:
     /// Of two bodies, which must outlive it.
-    Turning(const Side& a, const Side& b, const Continuity& continuity);
+    PredictedContacts(const Side& a, const Side& b, const Continuity& continuity);
 
     /// Nothing where a contact touches already, or does not turn, or by next to nothing.
-    std::optional<Ahead> ahead(const Contact& contact) const;
+    std::optional<PredictedContact> ahead(const Contact& contact) const;
 
   private:
     struct Body {
         const Side& side;
         Velocity velocity;
     };
-    float mostSeconds(const Body& body, const btVector3& place) const;
+    float maxSeconds(const Body& body, const btVector3& place) const;
 
     Body a_, b_;
     const Continuity& continuity_;

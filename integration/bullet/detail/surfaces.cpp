@@ -16,17 +16,17 @@ using namespace bilayer::detail;
 
 namespace {
 
-constexpr float leastStride = 0.05f;  // through samples [voxels]
-constexpr int mostStrides = 64;       // what takes more is looked at point by point
+constexpr float minStride = 0.05f;  // through samples [voxels]
+constexpr int maxStrides = 64;      // what takes more is looked at point by point
 constexpr float everywhere = std::numeric_limits<float>::max();
 
 }  // namespace
 
-float FieldObstacle::bound(const glm::vec3& point) const {
-    return field_.distance(point) - mostInterpolationError * field_.voxelSize();
+float FieldSurface::bound(const glm::vec3& point) const {
+    return field_.distance(point) - maxInterpolationError * field_.voxelSize();
 }
 
-std::optional<Entry> FieldObstacle::entry(const glm::vec3& from, const glm::vec3& to, float radius) const {
+std::optional<Entry> FieldSurface::entry(const glm::vec3& from, const glm::vec3& to, float radius) const {
     if (from == to) return overlaps(from, radius) ? std::optional(Entry{from, glm::vec3(0)}) : std::nullopt;
     if (staysOut(from, to, radius)) return std::nullopt;
     const glm::vec3 way = to - from;
@@ -35,7 +35,7 @@ std::optional<Entry> FieldObstacle::entry(const glm::vec3& from, const glm::vec3
     return Entry{hit->position, hit->normal};
 }
 
-std::optional<glm::vec3> FieldObstacle::wayOut(const glm::vec3& point, float radius) const {
+std::optional<glm::vec3> FieldSurface::wayOut(const glm::vec3& point, float radius) const {
     if (radius > 0) {
         const ClosestPoint closest = field_.closest(point, radius);
         const glm::vec3 way = closest.distance < 0 ? closest.position - point : point - closest.position;
@@ -50,59 +50,59 @@ std::optional<glm::vec3> FieldObstacle::wayOut(const glm::vec3& point, float rad
 }
 
 // By strides through the samples; many times as quick as the search for the place of an entry.
-bool FieldObstacle::staysOut(const glm::vec3& from, const glm::vec3& to, float radius) const {
+bool FieldSurface::staysOut(const glm::vec3& from, const glm::vec3& to, float radius) const {
     const float length = glm::distance(from, to), voxel = field_.voxelSize();
-    const float error = field_.mesh() ? mostInterpolationError * voxel : 0;
+    const float error = field_.mesh() ? maxInterpolationError * voxel : 0;
     float gone = 0;
-    for (int i = 0; i < mostStrides && gone <= length; ++i) {
+    for (int i = 0; i < maxStrides && gone <= length; ++i) {
         const Sample sample = field_.sampleWithin(length > 0 ? from + gone / length * (to - from) : from, 0);
         const float left = sample.inBand && radius == 0 ? (sample.distance - error) / steepestInterpolant
-                                                        : sample.distance - radius - mostInterpolationError * voxel;
-        if (left < leastStride * voxel) return false;
+                                                        : sample.distance - radius - maxInterpolationError * voxel;
+        if (left < minStride * voxel) return false;
         gone += left;
     }
     return gone > length;
 }
 
-bool FieldObstacle::overlaps(const glm::vec3& point, float radius) const {
+bool FieldSurface::overlaps(const glm::vec3& point, float radius) const {
     return radius > 0 ? field_.overlapsSphere(point, radius) : field_.distance(point) <= 0;
 }
 
-float ConvexObstacle::bound(const glm::vec3& point) const {
+float ConvexSurface::bound(const glm::vec3& point) const {
     return convex_.nearest(point, everywhere).distance;
 }
 
-std::optional<Entry> ConvexObstacle::entry(const glm::vec3& from, const glm::vec3& to, float) const {
+std::optional<Entry> ConvexSurface::entry(const glm::vec3& from, const glm::vec3& to, float) const {
     const auto entry = convex_.enter(from, to - from, tolerance_);
     if (!entry) return std::nullopt;
     const glm::vec3 at = from + entry->part * (to - from);
     return Entry{at - entry->near.distance * entry->near.normal, entry->near.normal};
 }
 
-std::optional<glm::vec3> ConvexObstacle::wayOut(const glm::vec3& point, float) const {
+std::optional<glm::vec3> ConvexSurface::wayOut(const glm::vec3& point, float) const {
     const Convex::Near near = convex_.nearest(point, everywhere);
     return -near.distance * near.normal;
 }
 
-PlaneObstacle::PlaneObstacle(const btStaticPlaneShape& shape)
+PlaneSurface::PlaneSurface(const btStaticPlaneShape& shape)
     : normal_(toGlm(shape.getPlaneNormal())), offset_(shape.getPlaneConstant()) {}
 
-float PlaneObstacle::bound(const glm::vec3& point) const {
+float PlaneSurface::bound(const glm::vec3& point) const {
     return glm::dot(normal_, point) - offset_;
 }
 
-std::optional<Entry> PlaneObstacle::entry(const glm::vec3& from, const glm::vec3& to, float) const {
+std::optional<Entry> PlaneSurface::entry(const glm::vec3& from, const glm::vec3& to, float) const {
     const float before = bound(from), after = bound(to);
     if (before > 0 && after > 0) return std::nullopt;
     const float part = before > 0 ? before / (before - after) : 0;
     return Entry{from + part * (to - from), normal_};
 }
 
-std::optional<glm::vec3> PlaneObstacle::wayOut(const glm::vec3& point, float) const {
+std::optional<glm::vec3> PlaneSurface::wayOut(const glm::vec3& point, float) const {
     return -bound(point) * normal_;
 }
 
-std::optional<Entry> TriangleObstacle::entry(const glm::vec3& from, const glm::vec3& to, float) const {
+std::optional<Entry> TriangleSurface::entry(const glm::vec3& from, const glm::vec3& to, float) const {
     struct First : btTriangleCallback {
         glm::vec3 from, way;
         float part = 1;
@@ -125,7 +125,7 @@ std::optional<Entry> TriangleObstacle::entry(const glm::vec3& from, const glm::v
     return first.entry;
 }
 
-bool TriangleObstacle::isNear(const glm::vec3& from, const glm::vec3& to, float radius) const {
+bool TriangleSurface::isNear(const glm::vec3& from, const glm::vec3& to, float radius) const {
     struct Any : btTriangleCallback {
         bool found = false;
         void processTriangle(btVector3*, int, int) override { found = true; }
@@ -134,7 +134,7 @@ bool TriangleObstacle::isNear(const glm::vec3& from, const glm::vec3& to, float 
     return any.found;
 }
 
-void TriangleObstacle::visit(const glm::vec3& lower, const glm::vec3& upper, btTriangleCallback& callback) const {
+void TriangleSurface::visit(const glm::vec3& lower, const glm::vec3& upper, btTriangleCallback& callback) const {
     mesh_.processAllTriangles(&callback, toBullet(lower), toBullet(upper));
 }
 

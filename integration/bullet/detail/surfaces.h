@@ -24,9 +24,9 @@ struct Entry {
     glm::vec3 position, normal;  ///< outward, of unit length
 };
 
-class FieldObstacle {
+class FieldSurface {
   public:
-    explicit FieldObstacle(const Field& field) : field_(field) {}
+    explicit FieldSurface(const Field& field) : field_(field) {}
 
     /// Not more than the distance of its surface.
     float bound(const glm::vec3& point) const;
@@ -41,10 +41,10 @@ class FieldObstacle {
 };
 
 /// For points.
-class ConvexObstacle {
+class ConvexSurface {
   public:
     /// @param tolerance  how near counts as entered [m]
-    ConvexObstacle(const Convex& convex, float tolerance) : convex_(convex), tolerance_(tolerance) {}
+    ConvexSurface(const Convex& convex, float tolerance) : convex_(convex), tolerance_(tolerance) {}
 
     float bound(const glm::vec3& point) const;
     std::optional<Entry> entry(const glm::vec3& from, const glm::vec3& to, float) const;
@@ -56,9 +56,9 @@ class ConvexObstacle {
 };
 
 /// For points.
-class PlaneObstacle {
+class PlaneSurface {
   public:
-    explicit PlaneObstacle(const btStaticPlaneShape& shape);
+    explicit PlaneSurface(const btStaticPlaneShape& shape);
 
     float bound(const glm::vec3& point) const;
     std::optional<Entry> entry(const glm::vec3& from, const glm::vec3& to, float) const;
@@ -70,9 +70,9 @@ class PlaneObstacle {
 };
 
 /// The triangles of a mesh or a height field, for points: sheets, which nothing is inside of.
-class TriangleObstacle {
+class TriangleSurface {
   public:
-    explicit TriangleObstacle(const btConcaveShape& mesh) : mesh_(mesh) {}
+    explicit TriangleSurface(const btConcaveShape& mesh) : mesh_(mesh) {}
 
     std::optional<Entry> entry(const glm::vec3& from, const glm::vec3& to, float) const;
     std::optional<glm::vec3> wayOut(const glm::vec3&, float) const { return std::nullopt; }

@@ -33,9 +33,9 @@ constexpr float allowed = 0.1f;
 constexpr float pieceTurn = 0.1f;
 // A way is surely free as long as nothing is nearer than this [voxels].
 constexpr float nearby = 0.5f;
-constexpr int mostProbes = 1 << 20;  // along an edge: those of what is far away are not looked at
-constexpr float bent = 1.12f;        // the way along a rim, in parts of the straight one, up to a quarter of it
-constexpr int mostStrides = 64;      // of a way along which something is nearby; what takes more is taken as met
+constexpr int maxProbes = 1 << 20;  // along an edge: those of what is far away are not looked at
+constexpr float bent = 1.12f;       // the way along a rim, in parts of the straight one, up to a quarter of it
+constexpr int maxStrides = 64;      // of a way along which something is nearby; what takes more is taken as met
 
 /// Takes a field's coordinates into an obstacle's at some time of the step.
 struct Moment {
@@ -60,13 +60,13 @@ Frame frameOf(const Part& part, const btTransform& object) {
 }
 
 /// @param touch  in the coordinates of the obstacle
-Passing inWorld(const Passing& touch, const Part& obstacle, const Course& its) {
+Impact inWorld(const Impact& touch, const Part& obstacle, const BodySweep& its) {
     const Frame frame = frameOf(obstacle, its.at(touch.time));
     return {touch.time, frame.pose.toWorld(frame.scale * touch.place), frame.pose.rotation * touch.normal};
 }
 
 /// From start to end, so close together that the ways in between are straight.
-std::vector<Moment> momentsOf(const Part& points, const Course& its, const Part& obstacle, const Course& others) {
+std::vector<Moment> momentsOf(const Part& points, const BodySweep& its, const Part& obstacle, const BodySweep& others) {
     const int pieces = std::max(1, int(std::ceil((its.turn() + others.turn()) / pieceTurn)));
     std::vector<float> times{its.part(), others.part()};
     for (int i = 0; i <= pieces; ++i) times.push_back(float(i) / float(pieces));
@@ -144,14 +144,14 @@ class Passage {
     /// @param spacing  of the field that is met, in the same units
     template <class BallAt>
     void followEdge(float length, float spacing, const BallAt& ballAt) {
-        const int parts = probeParts(length, spacing, mostProbes);
+        const int parts = probeParts(length, spacing, maxProbes);
         const float radius = std::max(ballAt(0.f).radius, ballAt(1.f).radius);
         followBetween(0, parts, bent * length / float(parts), radius,
                       [&](int i) { return ballAt(float(i) / float(parts)); });
     }
 
     /// The first of them that goes too deep, in the obstacle's coordinates.
-    const Passing& first() const { return first_; }
+    const Impact& first() const { return first_; }
 
   private:
     /// Those with numbers in between, if any of them may come near.
@@ -174,12 +174,12 @@ class Passage {
     }
 
     bool isNear(const glm::vec3& from, const glm::vec3& to, float radius) const {
-        if constexpr (std::is_same_v<Obstacle, TriangleObstacle>) {
+        if constexpr (std::is_same_v<Obstacle, TriangleSurface>) {
             return obstacle_.isNear(from, to, radius);
         } else {
             const float length = glm::distance(from, to), near = nearby * voxel_;
             float gone = 0;
-            for (int i = 0; i < mostStrides && gone <= length; ++i) {
+            for (int i = 0; i < maxStrides && gone <= length; ++i) {
                 const glm::vec3 at = length > 0 ? from + gone / length * (to - from) : from;
                 const float left = obstacle_.bound(at) - radius;
                 if (left < near) return true;
@@ -192,54 +192,55 @@ class Passage {
     const Obstacle& obstacle_;
     const std::vector<Moment>& moments_;
     float voxel_, scale_;
-    Passing first_;
+    Impact first_;
 };
 
 template <class Obstacle>
-Passing passageOf(const Shape& field, const Obstacle& obstacle, const std::vector<Moment>& moments, float voxel) {
-    Passage passage(obstacle, moments, voxel);
-    passage.follow(field.collider().data().points());
-    return passage.first();
+Impact passageOf(const Shape& field, const Obstacle& obstacle, const std::vector<Moment>& moments, float voxel) {
+    Passage timeOfImpact(obstacle, moments, voxel);
+    timeOfImpact.follow(field.collider().data().points());
+    return timeOfImpact.first();
 }
 
 /// The corners and edges of a convex body, and what it is grown by.
-Passing passageOf(const Convex& convex, const Shape& field, const std::vector<Moment>& moments) {
-    const FieldObstacle obstacle(field.collider().field());
-    Passage passage(obstacle, moments, field.voxelSize() / field.scale());
+Impact passageOf(const Convex& convex, const Shape& field, const std::vector<Moment>& moments) {
+    const FieldSurface obstacle(field.collider().field());
+    Passage timeOfImpact(obstacle, moments, field.voxelSize() / field.scale());
     const auto ballAt = [](const glm::vec3& point, float radius) {
         const float length = glm::length(point);
         return Ball{point, length > 0 ? point / length : glm::vec3(0), radius};
     };
     const auto corners = convex.corners();
-    for (std::uint32_t i = 0; i < corners.size(); ++i) passage.follow(ballAt(corners[i], convex.radius(i)));
+    for (std::uint32_t i = 0; i < corners.size(); ++i) timeOfImpact.follow(ballAt(corners[i], convex.radius(i)));
     for (const Convex::Edge& edge : convex.edges())
-        passage.followEdge(glm::distance(corners[edge.from], corners[edge.to]), field.voxelSize(),
-                           [&](float part) { return ballAt(convex.place(edge, part), convex.radius(edge, part)); });
-    return passage.first();
+        timeOfImpact.followEdge(
+            glm::distance(corners[edge.from], corners[edge.to]), field.voxelSize(),
+            [&](float part) { return ballAt(convex.place(edge, part), convex.radius(edge, part)); });
+    return timeOfImpact.first();
 }
 
 /// What is sharp of the triangles that a field goes along.
 /// @param ways, moments  of the field into the mesh, and of the mesh into the field
-Passing passageOf(const btConcaveShape& mesh, const Shape& field, const std::vector<Moment>& ways,
-                  const std::vector<Moment>& moments) {
+Impact passageOf(const btConcaveShape& mesh, const Shape& field, const std::vector<Moment>& ways,
+                 const std::vector<Moment>& moments) {
     const Bounds& bounds = field.collider().bounds();
     std::vector<glm::vec3> way;
     for (const Moment& moment : ways) way.push_back(moment(bounds.centre()));
     const float radius = 0.5f * field.scale() * glm::length(bounds.size());
-    const SharpSheet sharp = sharpOf(trianglesAlong(mesh, way, radius));
-    const FieldObstacle obstacle(field.collider().field());
-    Passage passage(obstacle, moments, field.voxelSize() / field.scale());
-    for (const SharpSheet::Corner& corner : sharp.corners) passage.follow({corner.place, corner.outward});
-    for (const SharpSheet::Side& side : sharp.sides)
-        passage.followEdge(glm::distance(side.from, side.to), field.voxelSize(), [&](float part) {
+    const SharpTriangles sharp = sharpOf(trianglesAlong(mesh, way, radius));
+    const FieldSurface obstacle(field.collider().field());
+    Passage timeOfImpact(obstacle, moments, field.voxelSize() / field.scale());
+    for (const SharpTriangles::Corner& corner : sharp.corners) timeOfImpact.follow({corner.place, corner.outward});
+    for (const SharpTriangles::Side& side : sharp.sides)
+        timeOfImpact.followEdge(glm::distance(side.from, side.to), field.voxelSize(), [&](float part) {
             return Ball{glm::mix(side.from, side.to, part), side.outward};
         });
-    return passage.first();
+    return timeOfImpact.first();
 }
 
 }  // namespace
 
-Passing passage(const Part& part, const Course& its, const Part& other, const Course& others) {
+Impact timeOfImpact(const Part& part, const BodySweep& its, const Part& other, const BodySweep& others) {
     const Shape& field = *part.field();
     const std::vector<Moment> moments = momentsOf(part, its, other, others);
     const float voxel = field.voxelSize();
@@ -248,18 +249,18 @@ Passing passage(const Part& part, const Course& its, const Part& other, const Co
         return inWorld(passageOf(field, obstacle, moments, its), other, others);
     };
     if (const Shape* second = other.field())
-        return into(FieldObstacle(second->collider().field()), std::min(voxel, second->voxelSize()) / second->scale());
+        return into(FieldSurface(second->collider().field()), std::min(voxel, second->voxelSize()) / second->scale());
     if (type == STATIC_PLANE_PROXYTYPE)
-        return into(PlaneObstacle(static_cast<const btStaticPlaneShape&>(*other.shape)), voxel);
+        return into(PlaneSurface(static_cast<const btStaticPlaneShape&>(*other.shape)), voxel);
     if (other.shape->isConvex()) {
         const Convex convex(static_cast<const btConvexShape&>(*other.shape));
-        const Passing touch = passageOf(convex, field, momentsOf(other, others, part, its));
-        return earlier(into(ConvexObstacle(convex, 0.1f * allowed * voxel), voxel), inWorld(touch, part, its).turned());
+        const Impact touch = passageOf(convex, field, momentsOf(other, others, part, its));
+        return earlier(into(ConvexSurface(convex, 0.1f * allowed * voxel), voxel), inWorld(touch, part, its).turned());
     }
     if (!other.shape->isConcave() || type == GIMPACT_SHAPE_PROXYTYPE || type == FAST_CONCAVE_MESH_PROXYTYPE) return {};
     const auto& mesh = static_cast<const btConcaveShape&>(*other.shape);
-    const Passing touch = passageOf(mesh, field, moments, momentsOf(other, others, part, its));
-    return earlier(into(TriangleObstacle(mesh), voxel), inWorld(touch, part, its).turned());
+    const Impact touch = passageOf(mesh, field, moments, momentsOf(other, others, part, its));
+    return earlier(into(TriangleSurface(mesh), voxel), inWorld(touch, part, its).turned());
 }
 
 }  // namespace bilayer::bullet::detail

@@ -20,7 +20,7 @@ struct Part {
     const Shape* field() const {
         if (shape->getShapeType() != FAST_CONCAVE_MESH_PROXYTYPE) return nullptr;
         const auto* field = static_cast<const Shape*>(shape);
-        return field->sweeps() ? field : nullptr;
+        return field->speculative() ? field : nullptr;
     }
 };
 
@@ -39,18 +39,18 @@ void visitParts(const btCollisionObject& object, Found&& found) {
 }
 
 /// Where something first goes too deep into an obstacle: when, there, and the normal outward from it.
-struct Passing {
+struct Impact {
     float time = 1;  ///< 1: nothing does in this step
     glm::vec3 place{0}, normal{0};
 
-    Passing turned() const { return {time, place, -normal}; }
+    Impact turned() const { return {time, place, -normal}; }
 };
 
-inline Passing earlier(const Passing& one, const Passing& other) {
+inline Impact earlier(const Impact& one, const Impact& other) {
     return other.time < one.time ? other : one;
 }
 
 /// Where a field and another shape first get through each other; the normal is that of the other one.
-Passing passage(const Part& part, const Course& its, const Part& other, const Course& others);
+Impact timeOfImpact(const Part& part, const BodySweep& its, const Part& other, const BodySweep& others);
 
 }  // namespace bilayer::bullet::detail

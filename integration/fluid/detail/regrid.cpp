@@ -38,7 +38,7 @@ constexpr float minFieldWidth = 1;    // [field voxels] either side: less does n
 constexpr float rounding = 1e-5f;     // of a width that is a whole number of voxels but for its last bits
 constexpr double maxIndex = 1 << 29;  // keeps OpenVDB's 32-bit coordinates and sums of two of them in range
 constexpr double sameVoxels = 1e-6;   // two voxel sizes are the same but for this part of them
-constexpr double widestHole = 2;      // [voxels]; wider ones are not closed
+constexpr double maxHoleWidth = 2;    // [voxels]; wider ones are not closed
 
 // A mesh in voxels, near the origin, where floats are finest; and whole leaves from there to its place.
 struct Placed {
@@ -124,15 +124,15 @@ void requireSolid(const Placed& body, const Transform& voxels) {
     const SignChoice choice = chooseSignOfSolid(body.mesh);
     if (choice.sign == Sign::flood) refuseWithoutInside(choice.reason);
     if (choice.sign != Sign::winding) return;
-    const Opening hole = widestOpening(choice.mended ? *choice.mended : body.mesh, widestHole);
+    const Hole hole = widestHole(choice.repaired ? *choice.repaired : body.mesh, maxHoleWidth);
     if (hole.width == 0) return;
     const double voxel = voxels.voxelSize()[0];
     const openvdb::Vec3d centre(hole.centre.x, hole.centre.y, hole.centre.z);
     throw std::invalid_argument(fmt::format(
         "the mesh is open: its widest hole, around {}, is {:.3g} wide; {:g} voxels of {:g} are closed: close it in the "
         "mesh, or take voxels of {:.3g} or more",
-        text(voxels.indexToWorld(centre + body.shift.asVec3d())), hole.width * voxel, widestHole, voxel,
-        hole.width * voxel / widestHole));
+        text(voxels.indexToWorld(centre + body.shift.asVec3d())), hole.width * voxel, maxHoleWidth, voxel,
+        hole.width * voxel / maxHoleWidth));
 }
 
 }  // namespace

@@ -2,7 +2,7 @@
 // [0.5, 1.5] at all voxels next to the surface. Creases, walls below a voxel and noise break that. Each broken voxel is
 // a constraint on its own value and those of its neighbours, and these are moved by the least change that would satisfy
 // it if it were linear (S. Kaczmarz, 1937), over and over. Where that fails, the equation |gradient| = 1 is iterated
-// everywhere if much is broken; what remains is mended by descent on the sum of all violations.
+// everywhere if much is broken; what remains is repaired by descent on the sum of all violations.
 #include "integration/fluid/detail/repair.h"
 
 #include <openvdb/math/Stencils.h>
@@ -29,17 +29,17 @@ using Stencil = openvdb::math::WenoStencil<FloatGrid>;
 // The range of checkLevelSet, less what rounding may take.
 constexpr float lowest = 0.501f, highest = 1.499f;
 constexpr std::size_t manyBroken = 20;  // one broken voxel in so many next to the surface is noise, not creases
-// Where single voxels cannot be mended, the surface is smoothed around them, farther each time [voxels].
+// Where single voxels cannot be repaired, the surface is smoothed around them, farther each time [voxels].
 constexpr int maxSmoothings = 12, firstRadius = 2;
 // Distances nearer to 0 than exact ones are known to [voxels].
 constexpr float rounding = 1e-4f;
 // What a constraint's value is moved to lies this far within the range, so that rounds end.
 constexpr float margin = 0.02f;
-constexpr float mostMoved = 0.25f;   // by one constraint [voxels]: what is linear about it ends there
+constexpr float maxMoved = 0.25f;    // by one constraint [voxels]: what is linear about it ends there
 constexpr float almostOn = 0.15f;    // a face [voxels]
 constexpr float atSurface = 1e-3f;   // [voxels]
 constexpr float difference = 1e-2f;  // for derivatives [voxels]
-constexpr float leastSlope = 0.05f;  // of a constraint [1/voxel]; a flatter one cannot be satisfied by its voxels
+constexpr float minSlope = 0.05f;    // of a constraint [1/voxel]; a flatter one cannot be satisfied by its voxels
 constexpr int maxProjections = 100;  // rounds over all constraints
 constexpr int idleProjections = 30;  // rounds without a gain before other means are taken
 constexpr int maxRounds = 60;        // of descent; six or so do for what real meshes give
@@ -48,8 +48,8 @@ constexpr float notable = 0.1f - rounding;  // a change that is told [voxels]
 constexpr int reach = 3;                    // [voxels] of the WENO stencil along the axes
 // Changes that are tried at a voxel [voxels], either way.
 constexpr std::array<float, 6> steps{0.02f, 0.05f, 0.1f, 0.2f, 0.4f, 0.8f};
-constexpr float stepCost = 1e-3f;   // prefers small changes among equally good ones
-constexpr float leastGain = 1e-4f;  // of a change, so that descent ends
+constexpr float stepCost = 1e-3f;  // prefers small changes among equally good ones
+constexpr float minGain = 1e-4f;   // of a change, so that descent ends
 
 struct Survey {
     std::vector<Coord> broken;  // in the order of the leaves
@@ -121,9 +121,9 @@ void alongAxes(const Coord& centre, int distance, Visit visit) {
         }
 }
 
-class Mender {
+class Repairer {
   public:
-    explicit Mender(FloatGrid& grid)
+    explicit Repairer(FloatGrid& grid)
         : grid_(grid), values_(grid.getAccessor()), stencil_(grid), voxel_(float(grid.voxelSize()[0])) {}
 
     // One pass over the constraints of broken voxels; returns those that are broken now.
@@ -197,7 +197,7 @@ class Mender {
         const float old = values_.getValue(voxel), before = violationAround(voxel);
         if (std::abs(old) > almostOn * voxel_) return false;
         values_.setValueOnly(voxel, old > 0 ? 0 : std::numeric_limits<float>::min());
-        if (violationAround(voxel) < before - leastGain) return true;
+        if (violationAround(voxel) < before - minGain) return true;
         values_.setValueOnly(voxel, old);
         return false;
     }
@@ -219,9 +219,9 @@ class Mender {
             slopes[count++] = by;
             sum += by * by;
         });
-        if (sum < leastSlope * leastSlope) return;
+        if (sum < minSlope * minSlope) return;
         for (std::size_t i = 0; i < count; ++i)
-            move(around[i], std::clamp(wanted * slopes[i] / sum, -mostMoved, mostMoved) * voxel_);
+            move(around[i], std::clamp(wanted * slopes[i] / sum, -maxMoved, maxMoved) * voxel_);
     }
 
     // Whether a value may go that way: what is on the surface stays on it, lest its neighbours see it pass.
@@ -254,7 +254,7 @@ class Mender {
 
     // Makes the change of the voxel or one of its neighbours that lessens the violations most.
     bool improve(const Coord& voxel, Coord& changed) {
-        float best = -leastGain, bestValue = 0;
+        float best = -minGain, bestValue = 0;
         bool found = false;
         alongAxes(voxel, 1, [&](const Coord& candidate) {
             if (!values_.isValueOn(candidate)) return;
@@ -291,7 +291,7 @@ class Mender {
 
 // Repeats rounds until nothing is broken, or for some while nothing has been gained.
 std::vector<Coord> project(FloatGrid& grid) {
-    Mender mender(grid);
+    Repairer mender(grid);
     std::vector<Coord> broken = survey(grid).broken;
     std::size_t fewest = broken.size();
     for (int round = 0, idle = 0; round < maxProjections && idle < idleProjections && !broken.empty(); ++round) {
@@ -302,7 +302,7 @@ std::vector<Coord> project(FloatGrid& grid) {
     return broken;
 }
 
-// Mends what single voxels can mend; returns those still broken.
+// Mends what single voxels can repair; returns those still broken.
 std::vector<Coord> descend(FloatGrid& grid) {
     Survey found = survey(grid);
     if (found.broken.size() > found.crossed / manyBroken) {
@@ -311,7 +311,7 @@ std::vector<Coord> descend(FloatGrid& grid) {
         tracker.prune();
         found = survey(grid);
     }
-    Mender mender(grid);
+    Repairer mender(grid);
     std::vector<Coord> broken = std::move(found.broken);
     std::size_t fewest = broken.size();
     for (int round = 0, idle = 0; round < maxRounds && !broken.empty(); ++round) {
@@ -349,7 +349,7 @@ Changes changes(const FloatGrid& before, const FloatGrid& after) {
 
 }  // namespace
 
-Changes mend(FloatGrid& grid) {
+Changes repair(FloatGrid& grid) {
     const FloatGrid::ConstPtr before = grid.deepCopy();
     tidy(grid);
     std::vector<Coord> broken = project(grid);

@@ -5,7 +5,7 @@
 
 namespace bilayer::fluid::detail {
 
-/// What mend() did to the distances.
+/// What repair() did to the distances.
 struct Changes {
     float largest = 0;       ///< [voxels]
     openvdb::Coord where;    ///< the voxel of the largest change
@@ -15,6 +15,6 @@ struct Changes {
 /// Changes the distances next to the surface, as little as it can and only where it is needed, until the squared
 /// gradient that OpenVDB's check computes lies in its range everywhere. It must be a level set in every other sense
 /// already. Throws std::runtime_error if that fails; the grid is then in between.
-Changes mend(openvdb::FloatGrid& grid);
+Changes repair(openvdb::FloatGrid& grid);
 
 }  // namespace bilayer::fluid::detail

@@ -19,7 +19,7 @@ void checkSides(const Mesh& mesh, unsigned seed) {
     Progress progress(nobody);
     std::atomic<std::size_t> asked = 0;
     const MeshJob job{mesh, 0.1f, 3, false, true, [](const FilledBlocks&) {}, progress, {}, &asked};
-    LastResort lastResort(job);
+    FallbackSign lastResort(job);
     std::mt19937 random(seed);
     const Bounds box = bounds(mesh);
     std::size_t inside = 0, wrong = 0, count = 0;

@@ -32,7 +32,7 @@ Mesh ballWithHole(float radius, float angle) {
 TEST_CASE("a round hole is as wide as its rim") {
     for (const float angle : {0.15f, 0.3f, 0.6f}) {
         CAPTURE(angle);
-        const Opening hole = widestOpening(ballWithHole(0.5f, angle), 0.05);
+        const Hole hole = widestHole(ballWithHole(0.5f, angle), 0.05);
         // the rim goes along edges, a 26th of the radius long, within the circle
         const double circle = 2 * 0.5 * std::sin(double(angle)), edge = 0.5 / 26;
         CHECK(hole.width == Approx(circle).margin(0.1 * circle + edge));
@@ -41,11 +41,11 @@ TEST_CASE("a round hole is as wide as its rim") {
 }
 
 TEST_CASE("holes narrower than asked for, and closed meshes, have no width") {
-    CHECK(widestOpening(ballWithHole(0.5f, 0.15f), 0.2).width == 0);
-    CHECK(widestOpening(shapes::torus(0.5f, 0.2f), 0.01).width == 0);
-    CHECK(widestOpening(shapes::join({shapes::sphere(0.5f, 3), shapes::moved(shapes::sphere(0.5f, 3), {0.3f, 0, 0})}),
-                        0.01)
-              .width == 0);
+    CHECK(widestHole(ballWithHole(0.5f, 0.15f), 0.2).width == 0);
+    CHECK(widestHole(shapes::torus(0.5f, 0.2f), 0.01).width == 0);
+    CHECK(
+        widestHole(shapes::join({shapes::sphere(0.5f, 3), shapes::moved(shapes::sphere(0.5f, 3), {0.3f, 0, 0})}), 0.01)
+            .width == 0);
     // cracks: rims that almost meet
     const Mesh cracked = shapes::sphere(0.5f, 2);
     Mesh apart;
@@ -55,7 +55,7 @@ TEST_CASE("holes narrower than asked for, and closed meshes, have no width") {
         for (int k = 0; k < 3; ++k) apart.points.push_back(middle + 0.999f * (cracked.points[t[k]] - middle));
         apart.triangles.emplace_back(first, first + 1, first + 2);
     }
-    CHECK(widestOpening(apart, 0.1).width == 0);
+    CHECK(widestHole(apart, 0.1).width == 0);
 }
 
 TEST_CASE("the width of a hole does not depend on how the mesh lies") {
@@ -68,7 +68,7 @@ TEST_CASE("the width of a hole does not depend on how the mesh lies") {
         if (const auto path = test::corpusMesh(name)) meshes.push_back(orient(readMesh(*path)).mesh);
     for (const Mesh& mesh : meshes) {
         const double size = double(bounds(mesh).longestSide());
-        const double width = widestOpening(mesh, 0.005 * size).width;
+        const double width = widestHole(mesh, 0.005 * size).width;
         CHECK(width > 0);
         for (int i = 0; i < 5; ++i) {
             const glm::quat rotation =
@@ -76,7 +76,7 @@ TEST_CASE("the width of a hole does not depend on how the mesh lies") {
             const glm::vec3 shift = float(size) * glm::vec3(normal(random), normal(random), normal(random));
             Mesh placed = mesh;
             for (glm::vec3& p : placed.points) p = rotation * p + shift;
-            CHECK(widestOpening(placed, 0.005 * size).width == Approx(width).epsilon(0.12));
+            CHECK(widestHole(placed, 0.005 * size).width == Approx(width).epsilon(0.12));
         }
     }
 }

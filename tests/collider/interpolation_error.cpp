@@ -1,6 +1,6 @@
 // Which cells' samples are off from the mesh, against distances by brute force.
-#include "collider/contact/collider_data.h"
 #include "collider/contact/interpolation_error.h"
+#include "collider/contact/collider_data.h"
 #include "collider/field/field_data.h"
 
 #include <oneapi/tbb/parallel_for.h>
@@ -52,13 +52,14 @@ std::vector<glm::vec3> placesNear(const Mesh& mesh, const Field& field, Random& 
 
 }  // namespace
 
-TEST_CASE("where no strays are, samples are off by little more than a tenth of a voxel; where strays are, some are") {
+TEST_CASE(
+    "where no errorMask are, samples are off by little more than a tenth of a voxel; where errorMask are, some are") {
     const unsigned start = seed();
     CAPTURE(start);
     Random random(start);
     for (const Mesh& mesh : solids) {
         const Field field = fieldOf(mesh);
-        const Strays strays(field);
+        const InterpolationErrorMask errorMask(field);
         const Truth truth(mesh);
         const FieldLayout& layout = field.data();
         const auto offAt = [&](const glm::vec3& place) {
@@ -67,7 +68,7 @@ TEST_CASE("where no strays are, samples are off by little more than a tenth of a
         std::size_t held = 0, left = 0;
         for (const glm::vec3& place : placesNear(mesh, field, random, 2000)) {
             CAPTURE(place.x, place.y, place.z);
-            if (!strays.hold(place)) {
+            if (!errorMask.hold(place)) {
                 REQUIRE(offAt(place) < 0.2);
                 ++left;
                 continue;
@@ -86,30 +87,31 @@ TEST_CASE("where no strays are, samples are off by little more than a tenth of a
     }
 }
 
-TEST_CASE("what strays hold does not depend on who asks first, nor on how many ask at once") {
+TEST_CASE("what errorMask hold does not depend on who asks first, nor on how many ask at once") {
     const unsigned start = seed();
     CAPTURE(start);
     Random random(start);
     const Mesh& mesh = solids[2];
     const Field field = fieldOf(mesh);
     std::vector<glm::vec3> places = placesNear(mesh, field, random, 3000);
-    const auto answersOf = [&](const Strays& strays) {
+    const auto answersOf = [&](const InterpolationErrorMask& errorMask) {
         std::vector<char> answers(places.size());
-        tbb::parallel_for(std::size_t(0), places.size(), [&](std::size_t i) { answers[i] = strays.hold(places[i]); });
+        tbb::parallel_for(std::size_t(0), places.size(),
+                          [&](std::size_t i) { answers[i] = errorMask.hold(places[i]); });
         return answers;
     };
-    const Strays first(field), second(field);
+    const InterpolationErrorMask first(field), second(field);
     const std::vector<char> answers = answersOf(first);
     for (std::size_t i = places.size(); i-- > 0;) REQUIRE(second.hold(places[i]) == bool(answers[i]));
     REQUIRE(answersOf(first) == answers);
-    const Strays copy = first;
+    const InterpolationErrorMask copy = first;
     REQUIRE(answersOf(copy) == answers);
     CHECK(std::count(answers.begin(), answers.end(), 1) > 20);
 }
 
-TEST_CASE("edges hold strays, faces and gentle bends do not, and there are none where there is no field") {
+TEST_CASE("edges hold errorMask, faces and gentle bends do not, and there are none where there is no field") {
     const Field box = fieldOf(solids[0]);
-    const Strays ofBox(box);
+    const InterpolationErrorMask ofBox(box);
     CHECK(ofBox.hold({0.0999f, 0.0699f, 0}));
     CHECK_FALSE(ofBox.hold({0.1f, 0, 0}));
     CHECK_FALSE(ofBox.hold({0, 0, 0.05f}));
@@ -117,10 +119,10 @@ TEST_CASE("edges hold strays, faces and gentle bends do not, and there are none 
     const float huge = 1e30f, none = std::numeric_limits<float>::quiet_NaN();
     for (const glm::vec3& place : {glm::vec3(100, 0, 0), glm::vec3(-huge, 0, 0), glm::vec3(0, huge, none)})
         CHECK_FALSE(ofBox.hold(place));
-    CHECK_FALSE(Strays().hold({0.0999f, 0.0699f, 0}));
+    CHECK_FALSE(InterpolationErrorMask().hold({0.0999f, 0.0699f, 0}));
 
     const Mesh ring = shapes::torus(0.3f, 0.1f);
     const Collider smooth(ring, build(ring, {.voxelSize = voxel}));
-    CHECK_FALSE(smooth.data().asksTriangles({0.4f, 0, 0}));
-    CHECK(smooth.data().asksTriangles({0.4f, 0, 0}, true));
+    CHECK_FALSE(smooth.data().isExactAt({0.4f, 0, 0}));
+    CHECK(smooth.data().isExactAt({0.4f, 0, 0}, true));
 }

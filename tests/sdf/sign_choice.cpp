@@ -125,11 +125,11 @@ TEST_CASE("closed and oriented public meshes keep their normals") {
         const SignChoice choice = chooseSign(*mesh);
         CHECK(choice.sign == Sign::normals);
         CHECK(choice.reason == "closed and oriented");
-        CHECK_FALSE(choice.mended);
+        CHECK_FALSE(choice.repaired);
     }
 }
 
-TEST_CASE("flipped and inside-out public meshes are mended") {
+TEST_CASE("flipped and inside-out public meshes are repaired") {
     struct Case {
         const char* name;
         double volume;
@@ -144,9 +144,9 @@ TEST_CASE("flipped and inside-out public meshes are mended") {
         const SignChoice choice = c.conflict ? chooseSignAfterConflict(*mesh) : chooseSign(*mesh);
         CAPTURE(choice.reason);
         CHECK(choice.sign == Sign::normals);
-        REQUIRE(choice.mended);
-        CHECK(balanced(*choice.mended));
-        const MeshReport report = inspect(*choice.mended);
+        REQUIRE(choice.repaired);
+        CHECK(balanced(*choice.repaired));
+        const MeshReport report = inspect(*choice.repaired);
         CHECK(report.oriented());
         CHECK(report.volume > 0);
         if (c.volume > 0) CHECK(report.volume == Approx(c.volume).epsilon(1e-3));
@@ -211,7 +211,7 @@ TEST_CASE("after a conflict, surfaces that meet themselves get winding numbers, 
     struct Case {
         const char* name;
         Sign sign;
-        bool mended = false;  // five closed parts of the plane have every face twice, back to back
+        bool repaired = false;  // five closed parts of the plane have every face twice, back to back
     };
     for (const Case& c : {Case{"cgal-bones.off", Sign::winding}, Case{"self_intersectA.obj", Sign::winding},
                           Case{"counter.unitsmm.STL", Sign::winding}, Case{"cow.obj", Sign::winding},
@@ -221,6 +221,6 @@ TEST_CASE("after a conflict, surfaces that meet themselves get winding numbers, 
         const SignChoice choice = chooseSignAfterConflict(*mesh);
         CAPTURE(c.name, choice.reason);
         CHECK(choice.sign == c.sign);
-        CHECK(choice.mended.has_value() == c.mended);
+        CHECK(choice.repaired.has_value() == c.repaired);
     }
 }

@@ -68,7 +68,7 @@ TEST_CASE("links: neighbours are linked if their distances together exceed a vox
     Random random(seed);
     for (int round = 0; round < 20; ++round) {
         const std::vector<float> distances = anyDistances(random);
-        const Links links = findLinks(distances.data());
+        const SignLinks links = findSignLinks(distances.data());
         const BlockMask* const along[] = {&links.x, &links.y, &links.z};
         std::size_t wrong = 0, linked = 0, bits = 0;
         forEachPair([&](int a, int b, int axis) {
@@ -115,7 +115,7 @@ TEST_CASE("links: a side spreads to the whole group, and one voxel is asked for 
             ++asked;
             return answer(int(g));
         };
-        const std::size_t onBoth = completeSides(findLinks(distances.data()), {&first, &all}, sides, isInside);
+        const std::size_t onBoth = completeSides(findSignLinks(distances.data()), {&first, &all}, sides, isInside);
         CHECK(onBoth == expected);
         onBothEver += onBoth;
         std::size_t wrong = 0;
