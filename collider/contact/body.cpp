@@ -143,10 +143,18 @@ class Collector {
 template <class Value>
 using Handle = openvdb::points::AttributeHandle<Value>;
 
+// OpenVDB asks for no more than the first attribute's size.
+void requireValues(const Points::TreeType::LeafNodeType& leaf) {
+    leaf.validateOffsets();
+    for (const char* name : {attribute::position, attribute::normal, attribute::feature, attribute::sharp})
+        if (leaf.constAttributeArray(name).dataSize() < openvdb::Index(leaf.getLastValue()))
+            refuse(fmt::format("surface points have fewer values of the attribute '{}' than there are points", name));
+}
+
 SurfacePoints load(const Points& grid) {
     Collector collector;
     for (auto leaf = grid.tree().cbeginLeaf(); leaf; ++leaf) {
-        leaf->validateOffsets();
+        requireValues(*leaf);
         // as many as are said to be equal take no room in a file
         if (leaf->pointCount() > 1 && leaf->constAttributeArray(attribute::feature).isUniform())
             refuse("surface points have the same number");

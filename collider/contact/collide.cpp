@@ -24,10 +24,6 @@ namespace bilayer::detail {
 
 namespace {
 
-constexpr float searchTolerance = 2e-3f;  // of the deepest place on an edge [voxels]
-// A point that slides along a face ends in the edges beyond it by rounding: what only grazes, by less than this, goes
-// past [voxels].
-constexpr float grazing = 0.25f;
 // The two places of a contact are brought closer in so many turns at most, until one goes no farther than this
 // [voxels].
 constexpr int settlingTurns = 10;
@@ -233,16 +229,16 @@ class PointsInField {
     // it opposes a bit back along its own normal, if that is outside.
     SurfaceSample opposed(const SurfacePoint& point, const glm::vec3& at, const SurfaceSample& here) const {
         const glm::vec3 normal = map_.turned(point.normal);
-        const auto normalFilter = [&](const SurfaceSample& touch) { return -glm::dot(touch.normal, normal); };
-        if (keeps(options_, normalFilter(here), false)) return here;
+        const auto cosine = [&](const SurfaceSample& touch) { return -glm::dot(touch.normal, normal); };
+        if (keeps(options_, cosine(here), false)) return here;
         const float back = lift * field_.voxelSize();
         const glm::vec3 outside = at - back * normal;
         const Sample sample = field_.sample(outside);
         if (!sample.inBand) return here;
         const SurfaceSample there =
             surfaceSampleAt(field_, outside, sample, other_.collider.data().isExactAt(outside, options_.exact));
-        if (!(there.distance > 0) || !keeps(options_, normalFilter(there), false)) return here;
-        return {std::min(there.distance - back * normalFilter(there), 0.f), there.normal};
+        if (!(there.distance > 0) || !keeps(options_, cosine(there), false)) return here;
+        return {std::min(there.distance - back * cosine(there), 0.f), there.normal};
     }
 
     float approachOf(const SurfacePoint& point, const glm::vec3& at, const SurfaceSample& touched) const {
@@ -255,7 +251,7 @@ class PointsInField {
     bool meets(const SurfacePoint& point, const glm::vec3& at, const glm::vec3& way) const {
         const glm::vec3 normal = glm::normalize(map_.linear * point.normal);
         const glm::vec3 across = normal - glm::dot(normal, way) / glm::dot(way, way) * way;
-        const glm::vec3 inside = at - grazing * field_.voxelSize() * across;
+        const glm::vec3 inside = at - grazingTolerance * field_.voxelSize() * across;
         return field_.segment(inside, inside + way).has_value();
     }
 

@@ -9,6 +9,12 @@
 
 namespace bilayer::detail {
 
+/// Of the deepest place on an edge [voxels].
+inline constexpr float searchTolerance = 2e-3f;
+/// A point that slides along a face ends in the edges beyond it by rounding. A path that goes less deep than this only
+/// grazes a surface, and does not meet it [voxels].
+inline constexpr float grazingTolerance = 0.25f;
+
 /// A function of one variable at a place.
 struct Slope {
     float place, value, slope;

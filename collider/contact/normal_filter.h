@@ -9,8 +9,8 @@ namespace bilayer::detail {
 
 /// Whether a contact is kept that looks against its point's normal by this cosine.
 /// @param apart  its point is of a face that does not touch yet
-inline bool keeps(const ContactOptions& options, float normalFilter, bool apart) {
-    return normalFilter >=
+inline bool keeps(const ContactOptions& options, float cosine, bool apart) {
+    return cosine >=
            (apart ? std::max(options.minNormalCosineApart, options.minNormalCosine) : options.minNormalCosine);
 }
 /// The same where the point turns with its body, and looks against the surface now, later or in between.

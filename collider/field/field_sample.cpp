@@ -85,6 +85,7 @@ float boundBesideBand(const FieldData& field, float distance, const glm::dvec3& 
 HWY_BEFORE_NAMESPACE();
 namespace bilayer::detail::HWY_NAMESPACE {
 
+namespace {
 using Words [[gnu::vector_size(16)]] = std::uint32_t;
 using FourDoubles [[gnu::vector_size(32)]] = double;
 using TwoFloats [[gnu::vector_size(32)]] = float;  // of two places
@@ -492,6 +493,7 @@ const SampleKernels& kernels(Storage storage) {
     return storage == Storage::float32 ? kernelsOf<float> : kernelsOf<std::int16_t>;
 }
 
+}  // namespace
 }  // namespace bilayer::detail::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 

@@ -21,6 +21,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace bilayer::detail::HWY_NAMESPACE {
 
+namespace {
 /// Eight levels of groups hold 2^27 leaves; of each level seven wait at most.
 constexpr std::size_t maxWaiting = 96;
 /// Points and boxes in the tree's frame are rounded by no more than this part of their size.
@@ -381,6 +382,7 @@ bool searchBox(const MeshTree& mesh, const glm::dvec3& centre, const TurnedBox& 
     return BoxSearch(mesh, centre, box).run();
 }
 
+}  // namespace
 }  // namespace bilayer::detail::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 

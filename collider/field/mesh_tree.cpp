@@ -24,6 +24,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace bilayer::detail::HWY_NAMESPACE {
 
+namespace {
 /// Eight levels of groups hold 2^27 leaves; of each level seven wait at most.
 constexpr std::size_t maxWaiting = 96;
 /// Points that are looked at in turns, and how often before what is left: enough to hide what memory takes, and few
@@ -273,6 +274,7 @@ void searchEntries(const WideTree& tree, const TurnedGroup* groups, double perMe
     }
 }
 
+}  // namespace
 }  // namespace bilayer::detail::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 

@@ -14,6 +14,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace bilayer::detail::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
+namespace {
 
 using IndexTag = hn::RebindToUnsigned<Tag>;
 
@@ -226,6 +227,7 @@ void findPairs(const Mesh& mesh, const TriangleTree& tree, std::uint32_t leaf,
     LeafPairs(mesh, tree, leaf, pairs).find();
 }
 
+}  // namespace
 }  // namespace bilayer::detail::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 

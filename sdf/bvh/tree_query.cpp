@@ -17,6 +17,7 @@
 
 HWY_BEFORE_NAMESPACE();
 namespace bilayer::detail::HWY_NAMESPACE {
+namespace {
 using IndexTag = hn::RebindToUnsigned<Tag>;
 using NumberTag = hn::RebindToSigned<Tag>;
 
@@ -383,6 +384,7 @@ void answerVoxels(const WideTree& tree, const NodeList& list, const glm::vec3& o
     BlockQuery{tree, origin, reach, sign, answer}.answerCube(list, origin, 0);
 }
 
+}  // namespace
 }  // namespace bilayer::detail::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 

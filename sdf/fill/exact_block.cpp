@@ -14,6 +14,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace bilayer::detail::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
+namespace {
 
 /// As many voxels at once as there are lanes: half a row along z, a row, or two.
 using Tag = hn::CappedTag<float, 2 * blockSide>;
@@ -386,6 +387,7 @@ void signDistances(const BlockDistances& block, const BlockMask& inside, float* 
     }
 }
 
+}  // namespace
 }  // namespace bilayer::detail::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 

@@ -18,6 +18,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace bilayer::detail::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
+namespace {
 
 constexpr int cubeSide = LayerSamples::cellSide;  // voxels
 constexpr int sliceVoxels = cubeSide * cubeSide;  // of one x
@@ -254,6 +255,7 @@ const char* targetName() {
     return hwy::TargetName(HWY_TARGET);
 }
 
+}  // namespace
 }  // namespace bilayer::detail::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 

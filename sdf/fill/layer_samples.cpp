@@ -17,6 +17,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace bilayer::detail::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
+namespace {
 
 /// As many triangles at once as there are lanes of doubles, and as many samples of one triangle as of floats.
 using Wide = hn::CappedTag<double, 8>;
@@ -305,6 +306,7 @@ void spread(const Mesh& mesh, std::span<const std::uint32_t> triangles, const Sa
     Spreader(mesh, brick, cells, to).run(triangles);
 }
 
+}  // namespace
 }  // namespace bilayer::detail::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 

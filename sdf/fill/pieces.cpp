@@ -14,6 +14,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace bilayer::detail::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
+namespace {
 
 using Tag = hn::CappedTag<float, PieceCutter::batch>;
 using Vec = hn::Vec<Tag>;
@@ -155,6 +156,7 @@ void makePieces(const PieceCutter::Waiting& waiting, std::size_t count, Piece* p
                      waiting.triangle[i]};
 }
 
+}  // namespace
 }  // namespace bilayer::detail::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 

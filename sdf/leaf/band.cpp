@@ -12,6 +12,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace bilayer::detail::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
+namespace {
 
 using Tag = hn::CappedTag<float, 2 * blockSide>;
 using Mask = hn::Mask<Tag>;
@@ -75,6 +76,7 @@ void writeValues(const float* distances, const BandWidths& widths, const BlockMa
     }
 }
 
+}  // namespace
 }  // namespace bilayer::detail::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 

@@ -9,6 +9,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace bilayer::detail::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
+namespace {
 
 // Bits of the voxels of a row whose distance and a neighbour's together exceed a voxel.
 inline std::uint64_t linked(const float* a, const float* b) {
@@ -37,6 +38,7 @@ SignLinks linksOf(const float* distances) {
     return links;
 }
 
+}  // namespace
 }  // namespace bilayer::detail::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 

@@ -65,6 +65,7 @@ float exitThrough(const Ray& ray, const Triangle& t) {
 HWY_BEFORE_NAMESPACE();
 namespace bilayer::detail::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
+namespace {
 
 /// Rounding of products in floats, relative to the sizes of their factors; generous.
 constexpr float rounding = 2e-6f;
@@ -194,6 +195,7 @@ float nearestExit(const TriangleTree& tree, const Ray& ray) {
     return ExitSearch(tree, ray).run();
 }
 
+}  // namespace
 }  // namespace bilayer::detail::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 

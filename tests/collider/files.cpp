@@ -230,7 +230,8 @@ TEST_CASE("whatever a field's widths, voxels and shift are, they are refused or 
 }
 
 TEST_CASE("lengths in a file take no more memory than the file explains, whatever they are") {
-    const unsigned seed = test::seed();
+    // the second one makes an attribute of points shorter than the first of them
+    const unsigned seed = GENERATE(test::seed(), 2968168663u);
     CAPTURE(seed);
     Random random(seed);
     const auto path = scratch("lengths.vdb");

@@ -174,3 +174,21 @@ TEST_CASE("nothing is left to do, and no path of somebody's machine stands in th
     });
     CHECK(wrong == "");
 }
+
+TEST_CASE("what is compiled for several instruction sets has no names that another file may have too") {
+    // two classes of one name in one namespace are one class to the linker
+    int found = 0;
+    std::string wrong;
+    std::map<std::string, std::string> before;
+    eachLine([&](const std::string& file, int, const std::string& line) {
+        std::string& last = before[file];
+        if (file.ends_with(".cpp") && last.ends_with("::HWY_NAMESPACE {") && last.rfind("namespace ", 0) == 0) {
+            if (line.empty() || line.rfind("namespace hn", 0) == 0) return;
+            ++found;
+            if (line != "namespace {") wrong += file + "\n";
+        }
+        last = line;
+    });
+    CHECK(wrong == "");
+    CHECK(found >= 12);
+}

@@ -25,7 +25,6 @@ inline constexpr ContactOptions normalFilter{
     .minNormalCosine = 0.3f, .minNormalCosineApart = 0.9f, .keepsObliqueEdges = false};
 // Edges get no more parts: numbers beyond are those of the next edge.
 inline constexpr int partBits = 15;
-inline constexpr float searchTolerance = 2e-3f;  // of the deepest place between two probes [voxels]
 
 /// A field in metres of the world and the axes of its body, and how another body moves towards it.
 class LocalField {

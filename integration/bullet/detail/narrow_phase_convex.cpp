@@ -29,8 +29,6 @@ constexpr float touchingFace = 0.25f;  // [voxels]
 constexpr float straight = 0.99985f;
 // A way has met a convex body where it is this near to it [voxels]: by more, it would meet edges that it goes past.
 constexpr float sweepTolerance = 1e-3f;
-// By less than this a way only grazes, and goes past [voxels].
-constexpr float grazing = 0.25f;
 
 /// A convex body in the coordinates of a field.
 class Touching {
@@ -137,7 +135,7 @@ class Touching {
     bool meets(const glm::vec3& position, const SurfacePoint& point) const {
         const glm::vec3 way = wayIntoConvex(position), normal = toConvex_ * point.normal;
         const glm::vec3 across = normal - glm::dot(normal, way) / glm::dot(way, way) * way;
-        return meeting(intoConvex(position) - grazing * voxel_ * across, way).has_value();
+        return meeting(intoConvex(position) - grazingTolerance * voxel_ * across, way).has_value();
     }
 
     /// The same as visit() for a point that is farther away.
