@@ -27,7 +27,7 @@ constexpr float boundSlack = 1e-4f;
 /// Distances d that differ by less than this may be equal [voxels]: floats round the heights over two pieces by as
 /// much, at any height. Squared distances then differ by less than tie * (1 + d^2), since 2 d <= 1 + d^2.
 constexpr float tie = 1e-5f;
-/// Sample bounds are increased by this fraction and this amount, which is at least 2e-5 voxels. A piece's own distance
+/// Sample bounds are increased by this fraction and this amount, together at least 2e-5 voxels. A piece's own distance
 /// then replaces its sample's, although the two are rounded differently.
 constexpr float raisedPart = 1e-3f, raisedBy = 5e-7f;  // [voxels^2]
 /// Rounding of squared heights, with a margin [voxels^2].

@@ -97,7 +97,7 @@ inline void putEdge(Columns& columns, int row, std::size_t i, Vec x, Vec y) {
 inline void makeColumns(const PieceCutter::Waiting& waiting, std::size_t i, Columns& columns) {
     const Tag tag;
     const Vec3 corner = load(waiting.corner, i), ab = load(waiting.ab, i), ac = load(waiting.ac, i), bc = ac - ab;
-    // Rotates the corners so that the longest edge comes first.
+    // Permutes the corners cyclically so that the longest edge comes first.
     const Vec ab2 = dot(ab, ab), bc2 = dot(bc, bc), ca2 = dot(ac, ac);
     const Mask first = hn::And(hn::Ge(ab2, bc2), hn::Ge(ab2, ca2)), second = hn::Ge(bc2, ca2);
     const Vec3 none{hn::Zero(tag), hn::Zero(tag), hn::Zero(tag)};

@@ -493,8 +493,7 @@ class BrickSigns {
     openvdb::Coord origin_;
     std::vector<State> leaves_;
     std::vector<Empty> empties_;
-    std::array<std::int16_t, blockVoxels>
-        slots_;  // of the brick's blocks: the index of a leaf, or -1 - the index of an empty cell
+    std::array<std::int16_t, blockVoxels> slots_;  // per block of the brick: a leaf's index, or -1 - an empty cell's
 };
 
 BrickSigns::BrickSigns(const Question& question, std::span<const OctreeCell> cells,
@@ -717,8 +716,8 @@ bool BrickSigns::copyNear(State& state, unsigned voxel, BlockMask& firm) {
     return false;
 }
 
-// Returns the region where an open mesh's winding number can exceed one half. At a distance R it is at most area / (4
-// pi R^2).
+// Returns the region where an open mesh's winding number can exceed one half.
+// At a distance R the number is at most area / (4 pi R^2).
 openvdb::CoordBBox spaceOf(const std::vector<BandLeaf*>& leaves, const Question& question) {
     constexpr double farthest = 1e9;  // [voxels], as coordinates in a build
     openvdb::CoordBBox box;
