@@ -34,9 +34,8 @@ class LevelSet {
     const std::string& method() const;   ///< "exact", ..., or "" for a field from another program
     /// The sign method: "normals", "winding", "flood", "layers" or "prisms"; "" for a field from another program.
     const std::string& sign() const;
-    const std::string& signReason()
-        const;  ///< why this sign method was selected, without a full stop: "closed and oriented"
-    std::uint64_t signConflicts() const;  ///< count of voxels and neighbour pairs whose normals disagree
+    const std::string& signReason() const;  ///< why it was selected, without a full stop: "closed and oriented"
+    std::uint64_t signConflicts() const;    ///< count of voxels and neighbour pairs whose normals disagree
     /// Maximum error of the distances at active voxels [m]; infinity: not bounded; NaN: unknown.
     float errorBound() const;
     std::uint64_t meshHash() const;  ///< hash() of the source mesh, or 0

@@ -47,8 +47,8 @@ void validate(const Mesh& mesh);
 /// All indices must be in range.
 Mesh weld(Mesh mesh);
 
-/// Applies an affine map to a mesh. A map that mirrors also reverses the triangles, so that normals still point
-/// outward. A nonzero origin is transformed too.
+/// Applies an affine map to a mesh. A map with a negative determinant also flips the triangles, so that normals still
+/// point outward. A nonzero origin is transformed too.
 Mesh transformed(const Mesh& mesh, const glm::mat4& map);
 
 /// Returns a 64-bit hash of the vertices and triangles. It does not depend on the thread count.

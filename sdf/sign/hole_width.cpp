@@ -1,7 +1,7 @@
 // Branch and bound. Space is divided into cubes, starting with those that can contain the widest hole, until one is
 // small enough. A cube is discarded if no winding number in it can be one half. This follows from a bound of its slope,
-// apart from jumps across surfaces. In a ball without surface it follows from Harnack's inequality, because the winding
-// number is harmonic there.
+// which also holds for a cube that surfaces cross. In a ball without surface it follows from Harnack's inequality,
+// because the winding number is harmonic there.
 #include "sdf/sign/hole_width.h"
 
 #include <oneapi/tbb/parallel_for.h>
