@@ -1,4 +1,5 @@
-// The build: tiles, bricks, blocks filled by some device, leaves into the tree, far signs.
+// The phases of a build: bin triangles into bricks, fill blocks on a device, assemble the tree, sign the voxels far
+// from the surface.
 #include <bilayer/sdf/build.h>
 
 #include <fmt/format.h>
@@ -42,26 +43,26 @@ using namespace detail;
 
 namespace {
 
-/// Index coordinates stay well inside 32 bits, with room for the band around them.
+/// Limit of index coordinates: well within 32 bits, with room for the band.
 constexpr double farthestIndex = 1e9;
-/// OpenVDB takes a transform for singular below a determinant of 3e-15.
+/// OpenVDB treats a transform with a determinant below 3e-15 as singular.
 constexpr float smallestVoxel = 2e-5f;
-/// What a mesh with smaller voxels is scaled by, once or more often: metres become millimetres.
+/// Scale factor that the error for a small voxel size suggests, applied repeatedly: metres to millimetres.
 constexpr double unitStep = 1000;
-/// Bricks of this side that a box may have; a cube of 40,000 voxels a side.
+/// Maximum brick count of the mesh's box: a cube of 40,000 voxels a side.
 constexpr int brickSide = 64;  // [voxels]
 constexpr double maxBricks = double(1u << 28);
-/// Bytes that the build needs for a triangle (bins or hierarchy) and for a block, roughly.
+/// Approximate memory of a build per triangle (bins or hierarchy) and per block [bytes].
 constexpr double bytesPerTriangle = 60, bytesPerBlock = 2300;
-/// Of more moved triangles than this part of all, the field is built in full: little would be left to copy.
+/// Fraction of moved triangles above which the whole field is built: little would be left to copy.
 constexpr double maxMoved = 0.5;
-/// What exact methods promise [voxels]; it is ten times what was ever seen.
+/// Guaranteed error of exact distances [voxels]; ten times the largest observed error.
 constexpr float exactError = 1e-4f;
-/// Layers nearer to each other are told apart by rounding [voxels].
+/// Minimum layer distance: rounding makes closer layers indistinguishable [voxels].
 constexpr float minDelta = 0.1f;
-/// No point of a triangle is farther from a sample than this times the root of epsilon: samples stand no farther apart.
+/// Maximum distance from a point of a triangle to its nearest sample, in units of sqrt(epsilon).
 constexpr float coveringRadius = 3;
-/// Room between the reach of a sample and what the band needs, against rounding [voxels].
+/// Margin of the sample reach against rounding [voxels].
 constexpr float reachSlack = 1e-3f;
 
 void require(bool condition, const char* option, const char* range, double value) {
@@ -70,7 +71,7 @@ void require(bool condition, const char* option, const char* range, double value
 
 void checkWidth(const char* option, float voxels, float voxelSize) {
     require(voxels > 0 && voxels <= 1000, option, "in (0, 1000] voxels", voxels);
-    // [m]; the field's background
+    // Background of the field [m].
     const float width = voxels * voxelSize;
     require(std::isnormal(width), option, "a width that floats can hold", width);
 }
@@ -91,7 +92,7 @@ void checkVoxelSize(float voxelSize) {
 }
 
 void check(const BuildOptions& options) {
-    // false for NaN, and in floats: 1e-4f is no less than itself
+    // Comparison in the type of the value, so that 1e-4f passes a limit of 1e-4f; false for NaN.
     const auto within = [](auto value, decltype(value) low, decltype(value) high) {
         return value >= low && value <= high;
     };
@@ -112,7 +113,7 @@ void check(const BuildOptions& options) {
             "unite needs the method exact or pseudonormal and a sign by normals or winding numbers");
 }
 
-// The same options with the widths in voxels.
+// Returns the options with widths in voxels.
 BuildOptions inVoxels(BuildOptions options) {
     if (options.bandUnit == BandUnit::world) {
         require(options.voxelSize > 0, "voxelSize", "a positive length", options.voxelSize);
@@ -123,7 +124,7 @@ BuildOptions inVoxels(BuildOptions options) {
     return options;
 }
 
-// What one pass over the triangles tells.
+// Bounds and area of a mesh, from one pass over the triangles.
 struct Survey {
     Bounds box;
     double area = 0;  // [m^2]
@@ -147,8 +148,8 @@ Survey survey(const Mesh& mesh) {
         });
 }
 
-// Blocks that the band meets, roughly: as many as fill the space near the surface or, where that folds over itself,
-// near its box.
+// Estimates the count of blocks that the band meets. It is the volume near the surface or, for a surface that folds
+// over itself, near its bounding box.
 double countBlocks(const Bounds& box, double area, double h, double reach) {
     const double pi = glm::pi<double>(), r = reach + 0.5 * blockSide;
     const glm::dvec3 s = glm::dvec3(box.size()) / h;
@@ -158,7 +159,7 @@ double countBlocks(const Bounds& box, double area, double h, double reach) {
     return std::min(aroundSurface, aroundBox) / blockVoxels;
 }
 
-// Refuses what cannot work before anything is allocated for it.
+// Rejects a build that cannot succeed, before any allocation.
 void checkSize(const Mesh& mesh, const Survey& seen, const BuildOptions& options, float reach) {
     const Bounds& box = seen.box;
     const double h = options.voxelSize;
@@ -184,8 +185,8 @@ void checkSize(const Mesh& mesh, const Survey& seen, const BuildOptions& options
         refuse(fmt::format("with its band it would need about {:.0f} GiB of memory", bytes / double(1 << 30)));
 }
 
-// A sample must reach every voxel whose distance it may decide: a voxel of the band is nearer than the width plus delta
-// to its layer's sample, and that sample is delta from the point of the surface that the neighbourhood is centred on.
+// A sample must reach every voxel whose distance it may determine. A voxel of the band is within width + delta of its
+// layer's sample. That sample is delta from the surface point at the centre of its neighbourhood.
 FillParameters fillParameters(const BuildOptions& options) {
     const DoubleLayerOptions& layers = options.doubleLayer;
     const float cube = float(layers.neighbourhood) + 0.5f;
@@ -198,7 +199,7 @@ FillParameters fillParameters(const BuildOptions& options) {
 
 class Stopwatch {
   public:
-    // Seconds since the last call, or since construction.
+    // Returns the seconds since the last call or since construction.
     double lap() {
         const auto now = std::chrono::steady_clock::now();
         return std::chrono::duration<double>(now - std::exchange(last_, now)).count();
@@ -208,10 +209,10 @@ class Stopwatch {
     std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
 };
 
-// How a field got its signs.
+// The signs of a field and how they were found.
 struct Signs {
     std::string name, reason;
-    std::size_t conflicts = 0;  // voxels on both sides, and neighbours that contradict each other
+    std::size_t conflicts = 0;  // voxels on both sides, and contradictory neighbour pairs
     std::size_t undecided = 0;  // voxels whose nearest normals cancel out
 };
 
@@ -233,25 +234,25 @@ BandWidths bandOf(const BuildOptions& options) {
     return {options.exteriorWidth, options.interiorWidth, options.voxelSize};
 }
 
-// Voxels up to a voxel away are measured even for thinner bands: their signs carry over to all others by links. A flood
-// wants to know where a ball of the gap's width fits.
+// Distances up to one voxel are computed even for thinner bands, because sign propagation needs them. A flood needs
+// distances up to the radius of its ball.
 float reachOf(const BuildOptions& options, Sign sign) {
     const float ball = sign == Sign::flood ? options.gap / 2 + 1 : 1;
     return std::max({options.exteriorWidth, options.interiorWidth, ball}) + reachSlack;
 }
 
-// What the distances may be off by [voxels].
+// Returns the maximum error of distances [voxels].
 float errorBound(const BuildOptions& options) {
-    if (options.method == Method::prism) return std::numeric_limits<float>::infinity();  // where prisms leave gaps
+    if (options.method == Method::prism) return std::numeric_limits<float>::infinity();  // prisms leave gaps
     if (options.method != Method::doubleLayer) return exactError;
-    // a sample of the inner or outer layer is delta from the surface, and the nearest one at most the covering radius
-    // farther than that from the voxel's closest point; without gaps filled nothing bounds it
+    // A layer sample is delta from the surface. The nearest sample is farther than the voxel's closest point by at most
+    // the covering radius. If gaps are not filled, there is no bound.
     const DoubleLayerOptions& layers = options.doubleLayer;
     if (!layers.fillGaps) return std::numeric_limits<float>::infinity();
     return std::max(2 * layers.delta, coveringRadius * std::sqrt(layers.epsilon));
 }
 
-// Distances of blocks, negative where a field of the same surface is.
+// Returns the distances of blocks, negated where another field of the same surface is negative.
 std::vector<float> withSides(const openvdb::FloatGrid& sides, const FilledBlocks& blocks) {
     std::vector<float> distances(blocks.distances.begin(), blocks.distances.end());
     const auto values = sides.getConstAccessor();
@@ -297,7 +298,7 @@ void describe(openvdb::FloatGrid& grid, const Mesh& mesh, const BuildOptions& op
         grid.insertMeta(metadata::origin, openvdb::Vec3DMetadata({origin.x, origin.y, origin.z}));
 }
 
-// A build under way: what it works from, and what it has found.
+// State of one build: its input and its results so far.
 class Build {
   public:
     Build(const Mesh& mesh, const BuildOptions& options, const BlockFiller* filler, BuildTimes& times)
@@ -351,7 +352,7 @@ class Build {
         auto grids = std::make_shared<Grids>();
         grids->distance = distance_;
         if (triangle_) {
-            // where a sign decided which of two widths holds, fewer voxels may be left
+            // Voxels that were active for the wider of the two widths may lie outside the band on their final side.
             triangle_->tree().topologyIntersection(distance_->tree());
             triangle_->setTransform(distance_->transformPtr());
             grids->triangle = triangle_;
@@ -364,7 +365,7 @@ class Build {
         return result;
     }
 
-    // Throws if the old field cannot be one that the options ask for.
+    // Throws if the old field does not match the options.
     void checkOld(const LevelSet& old, const Mesh& oldMesh) const {
         const auto refuse = [](const std::string& why) { throw std::invalid_argument("the old field " + why); };
         const BandWidths widths = bandOf(options_);
@@ -377,7 +378,7 @@ class Build {
         if (old.meshHash() != hash(oldMesh)) refuse("is of another mesh");
     }
 
-    // Whether blocks of the old field are what a full build would make of triangles that have not moved.
+    // Returns whether a full build would reproduce the old field's blocks where no triangle moved.
     bool canCopy(const LevelSet& old) {
         if (options_.method != Method::exact || options_.unite) return false;
         if (plain(Sign::normals) == Assembler::Plain::keep) return false;
@@ -393,19 +394,21 @@ class Build {
             return meta && meta->value() == 0;
         };
         const std::string reason = text(metadata::signReason);
-        // another bound than that of a build: distances were swept or rounded since
+        // A different error bound shows that the distances were swept or rounded since the build.
         return text(metadata::version) == BILAYER_VERSION &&
                old.errorBound() == errorBound(options_) * options_.voxelSize &&
                text(metadata::sign) == name(Sign::normals) && (reason == asAskedFor || reason == closedAndOriented) &&
                isNone(metadata::signConflicts) && isNone(metadata::signUndecided);
     }
 
-    // Fills what the moved triangles reach and copies the rest. False if signs then contradict each other.
+    // Fills the blocks that moved triangles reach, and copies the others. Returns false if the signs then contradict
+    // each other.
     bool fillMoved(const LevelSet& old, const Mesh& oldMesh, std::span<const std::uint32_t> moved) {
         Stopwatch part;
         const double voxelsPerUnit = 1.0 / double(options_.voxelSize);
         const float reach = reachOf(options_, Sign::normals);
-        // which of two triangles at the same distance is the nearest goes by their order in a brick: bricks stay whole
+        // The order of triangles in a brick decides between nearest triangles at equal distance, so whole bricks are
+        // filled.
         int side = blockSide;
         if (options_.triangles) {
             side = brickSideFor(survey_.box, voxelsPerUnit, reach);
@@ -449,9 +452,9 @@ class Build {
         times_.assemble += part.lap();
     }
 
-    // Picks a way, and another one where the first contradicts itself. By normals the pseudonormal method takes the
-    // sides that the exact one finds: each rounds in its own way which triangles are equally near, and would count its
-    // own conflicts.
+    // Selects a sign method, and another one if the first gives contradictions. With normals, the pseudonormal method
+    // uses the signs of the exact method. The two methods round equal distances differently, so their conflict counts
+    // would differ.
     void fillChosen() {
         Stopwatch part;
         SignChoice choice = chooseSign(mesh_, &progress_);
@@ -459,7 +462,7 @@ class Build {
             choice = chooseSignAfterConflict(mesh_, &progress_);
         times_.tiles += part.lap();
         for (;;) {
-            // kept over the next choice, which may be made from it
+            // Kept alive during the next selection, which may use it.
             const std::optional<Mesh> repaired = std::move(choice.repaired);
             const Mesh& mesh = repaired ? *repaired : mesh_;
             const bool borrows = choice.sign == Sign::normals && options_.method == Method::pseudonormal;
@@ -479,15 +482,16 @@ class Build {
 
     bool isKnownToIntersectItself() const { return options_.inspected && options_.inspected->selfIntersections > 0; }
 
-    // Whether normals do not tell the sides: they contradict each other, or cancel out on faces back to back. Those of
-    // other diagonals have no triangle in common, but winding numbers find nothing between them.
+    // Returns whether normals fail to give signs: they contradict each other, or cancel out on coincident faces with
+    // opposite orientations. If such faces have different diagonals, they share no triangle, but winding numbers find
+    // no volume between them.
     bool contradictory(const Mesh& mesh) {
         if (signs_.conflicts > 0) return true;
         if (signs_.undecided == 0 || foldsBack(mesh, &progress_)) return false;
         return hasFacesBackToBack(mesh, &progress_) || chooseSignOfSolid(mesh, &progress_).sign == Sign::flood;
     }
 
-    // Fills by the method asked for, with the sides of another field of the mesh.
+    // Fills by the requested method, with the signs of another field of the mesh.
     void fillWithSides(const openvdb::FloatGrid::ConstPtr& sides, const Mesh& mesh, const std::string& reason) {
         fillFrom(mesh, mesh, Sign::normals, reason, options_.method, [&](MeshJob& job, Assembler& assembler) {
             job.sign = false;
@@ -498,7 +502,7 @@ class Build {
         });
     }
 
-    // Normals are taken from a mesh that is repaired, should it be inside out.
+    // If the mesh is inside out, the normals of a repaired mesh are used.
     void fillAsAsked() {
         fill(mesh_, options_.sign, asAskedFor, options_.method);
         if (options_.sign != Sign::normals || signs_.conflicts == 0) return;
@@ -509,21 +513,21 @@ class Build {
                  options_.method);
     }
 
-    // Bands wider than a voxel surround the surface: where it passes between two voxels, both are in the band.
+    // A band wider than one voxel encloses the surface: two neighbours on opposite sides are both in the band.
     Assembler::Plain plain(Sign sign) const {
         const bool wide = std::min(options_.exteriorWidth, options_.interiorWidth) > 1 + reachSlack;
         return sign == Sign::normals && wide ? Assembler::Plain::drop : Assembler::Plain::keep;
     }
 
-    // Returns by which sign.
+    // Returns the sign method that was used.
     Sign fill(const Mesh& mesh, Sign sign, const std::string& reason, Method method) {
         if (options_.unite && sign != Sign::flood && fillUnion(mesh)) return Sign::winding;
         fillFrom(mesh, mesh, sign, reason, method);
         return sign;
     }
 
-    // False if no wall is inside of the union, so that nothing was filled. What is filled is the union of what orient()
-    // makes of the mesh, as outwardMesh() says.
+    // Fills the union of the mesh after orient(), as outwardMesh() documents. Returns false and fills nothing if no
+    // wall lies inside the union.
     bool fillUnion(const Mesh& mesh) {
         Stopwatch part;
         UnionSurface united = unite(mesh, &progress_);
@@ -535,8 +539,7 @@ class Build {
         return true;
     }
 
-    // Distances are to `mesh`, winding numbers are those of `solids`. `adapt` may change the job, and add leaves that
-    // are known already.
+    // Fills distances to `mesh`, with winding numbers of `solids`. `adapt` may change the job and add known leaves.
     void fillFrom(const Mesh& mesh, const Mesh& solids, Sign sign, const std::string& reason, Method method,
                   const std::function<void(MeshJob&, Assembler&)>& adapt = {}) {
         Stopwatch part;
@@ -552,7 +555,7 @@ class Build {
                     progress_,  {},
                     &undecided, &conflicts};
         if (adapt) adapt(job, assembler);
-        // triangles turned around, in a repaired mesh, have the same box
+        // Flipping triangles does not change the bounding box.
         if (filler_)
             filler_->fill({job, options_, survey_.box, {}});
         else if (method == Method::exact)
@@ -571,8 +574,9 @@ class Build {
         times_.assemble += part.lap();
     }
 
-    // Normals of a balanced mesh that intersects itself may be wrong without a conflict: where the voxels between two
-    // walls are all near both. Those nearer than a voxel are repaired. Farther ones may go on beyond the band.
+    // The normals of a balanced mesh that self-intersects can be wrong without a conflict, where two walls are near all
+    // voxels between them. Signs of voxels within one voxel of the surface are corrected. Farther wrong regions may
+    // extend beyond the band.
     void repair(const Mesh& mesh) {
         const float limit = plain(Sign::normals) == Assembler::Plain::drop ? options_.voxelSize : 0;
         const SignRepair repair = repairSigns(*distance_, mesh, limit, &progress_);
@@ -584,7 +588,7 @@ class Build {
                         signs_.reason, repair.repaired);
     }
 
-    // Safe from any thread.
+    // Thread-safe.
     void take(Assembler& assembler, const FilledBlocks& blocks) {
         filledBlocks_ += blocks.origins.size();
         assembler.take(blocks);

@@ -1,7 +1,7 @@
-// From a triangle mesh to a narrow-band signed distance field.
+// Builds a narrow-band signed distance field from a triangle mesh.
 //
 // Method: Y. Wu, J. Man, Z. Xie, "A double layer method for constructing signed distance fields from triangle meshes",
-// Graphical Models 76 (2014) 214-223. docs/method.md tells how it is done here and where it departs from the paper.
+// Graphical Models 76 (2014) 214-223. docs/method.md describes the implementation and its differences from the paper.
 #pragma once
 
 #include <cstddef>
@@ -20,51 +20,58 @@ namespace detail {
 struct FillJob;
 }
 
-/// Fills the blocks of a field on some device: openclFiller() in cl/filler.h makes one. Without it the processor does.
+/// A device that fills the blocks of a field; openclFiller() in cl/filler.h creates one. build() uses the CPU by
+/// default.
 struct BlockFiller {
     std::string backend;  ///< "opencl"
     std::string device;   ///< the device's name
-    /// Throws what the device's trouble calls for; the build then ends with it.
+    /// Fills the blocks of one job. build() passes on any exception that it throws.
     std::function<void(const detail::FillJob&)> fill;
 };
 
-/// What a build took: the seconds of its parts, and blocks.
+/// Times of the phases of a build [s], and the count of blocks that it filled.
 struct BuildTimes {
-    double tiles = 0;     ///< triangles to tiles of samples, or the choice of the way to signs
-    double fill = 0;      ///< binning into blocks, distances
-    double assemble = 0;  ///< leaves into the tree, far signs, signs by winding number or flood
+    double tiles = 0;     ///< sorting triangles into sample tiles, or choosing a sign method
+    double fill = 0;      ///< binning triangles into blocks, computing distances
+    double assemble = 0;  ///< building the tree, signs far from the surface, signs by winding number or flood
     double total = 0;
-    /// Blocks of 8x8x8 voxels whose distances were computed, over again for each go at the signs; rebuild() copies all
-    /// others.
+    /// Blocks of 8x8x8 voxels whose distances were computed. A block counts again for each sign method that is tried.
+    /// rebuild() copies all other blocks.
     std::size_t filledBlocks = 0;
 };
 
-/// Builds the field of a mesh. The bytes of the result do not depend on the number of threads.
-/// @param filler  where the blocks are filled; null: TBB
-/// @param times   if not null, receives what it took
-/// Throws std::invalid_argument that names the option or triangle at fault, Cancelled, and what the filler throws.
+/// Builds the signed distance field of a mesh. The bytes of the result do not depend on the thread count.
+/// @param filler  the device that fills the blocks; null: the CPU, by TBB
+/// @param times   if not null, receives the times
+/// Throws std::invalid_argument that names the invalid option or triangle, Cancelled, and what the filler throws.
 LevelSet build(const Mesh& mesh, const BuildOptions& options, const BlockFiller* filler = nullptr,
                BuildTimes* times = nullptr);
 LevelSet build(const Mesh& mesh, const BuildOptions& options, const BlockFiller& filler, BuildTimes* times = nullptr);
 
-/// Builds the field of a mesh of which a part has moved, from the field before: only the blocks that the moved
-/// triangles reach from their old or new places are filled, all others are copied. The bytes are those of
-/// build(newMesh, options).
+/// Updates the field of a mesh after some of its triangles have moved. Fills only the blocks within reach of the old or
+/// new positions of those triangles, and copies all others. The bytes equal those of build(newMesh, options).
 ///
-/// That needs Method::exact, Sign::normals (or automatic, where it comes to normals), widths of more than a voxel, and
-/// a field as it was built (not swept or rounded since) in which nothing contradicted itself. For all else, for unions
-/// (BuildOptions::unite), and where most triangles have moved, it builds in full.
+/// An update requires all of the following; otherwise rebuild() builds the whole field:
+/// - Method::exact;
+/// - Sign::normals, or Sign::automatic where it selects normals;
+/// - widths of more than one voxel;
+/// - a field as build() made it, not swept or rounded since, without sign conflicts;
+/// - no union (BuildOptions::unite);
+/// - at most half of the triangles in `moved`.
 /// @param old      the field of `oldMesh`, built with the same options
-/// @param newMesh  as many triangles as `oldMesh`
-/// @param moved    indices of all triangles with a corner that moved, in any order; more do no harm
-/// Throws as build() does, and std::invalid_argument if the field is of another mesh, voxel size, method or width, or
-/// lacks the nearest triangles that the options ask for; if the numbers of triangles differ; if an index is out of
-/// range; if a triangle has other corners without being in `moved` (the first one is named).
+/// @param newMesh  has as many triangles as `oldMesh`
+/// @param moved    indices of all triangles with a corner that moved, in any order; may contain others
+/// Throws as build() does. Also throws std::invalid_argument if:
+/// - the field belongs to another mesh, voxel size, method or width;
+/// - the field lacks the nearest triangles that the options request;
+/// - the triangle counts differ;
+/// - an index is out of range;
+/// - a triangle has moved but is not in `moved` (the error names the first one).
 LevelSet rebuild(const LevelSet& old, const Mesh& oldMesh, const Mesh& newMesh, std::span<const std::uint32_t> moved,
                  const BuildOptions& options, BuildTimes* times = nullptr);
 
-/// The voxel size that puts `resolution` voxels along the longest side of the mesh's bounds [m].
-/// Throws std::invalid_argument for a resolution that is not positive or a mesh without extent.
+/// Returns the voxel size that puts `resolution` voxels along the longest side of the mesh's bounds [m]. Throws
+/// std::invalid_argument for a resolution that is not positive or a mesh without extent.
 float voxelSizeFor(const Mesh& mesh, float resolution);
 
 }  // namespace bilayer

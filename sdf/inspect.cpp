@@ -29,12 +29,12 @@ using namespace detail;
 
 namespace {
 
-/// Part of the area whose walls are not common: creases and tips, which most meshes have somewhere.
+/// Fraction of the area that commonWall excludes: creases and convex vertices, which most meshes have.
 constexpr double uncommonArea = 0.01;
-/// A volume that is not rounding, in parts of that of a cube with the area, about.
+/// Relative volume that exceeds rounding, in units of the volume of a cube with the same area (approximately).
 constexpr double clearVolume = 1e-6;
 
-/// Triangles, uses of edges or vertices that are worth a task.
+/// Minimum work per task: triangles, or uses of edges or vertices.
 constexpr std::size_t grain = 4096;
 
 struct Component {
@@ -47,7 +47,7 @@ void forAll(std::size_t count, Body body) {
     forAllPolled(count, grain, nullptr, body);
 }
 
-// Calls visit(uses, sum) for all edges; returns all sums, joined.
+// Calls visit(uses, sum) for all edges and returns the combined sum.
 template <class Sum, class Visit>
 Sum overEdges(const Topology& topology, Visit visit) {
     return tbb::parallel_reduce(
@@ -92,7 +92,7 @@ std::vector<EdgeUse> boundary(const Topology& topology) {
     return edges;
 }
 
-// Holes: sets of boundary edges that share vertices.
+// Counts holes: sets of boundary edges connected by shared vertices.
 std::size_t countLoops(const std::vector<EdgeUse>& boundary, std::size_t vertices) {
     DisjointSets sets(vertices);
     std::vector<unsigned> ends;
@@ -102,21 +102,21 @@ std::size_t countLoops(const std::vector<EdgeUse>& boundary, std::size_t vertice
     return std::size_t(std::unique(ends.begin(), ends.end()) - ends.begin());
 }
 
-// Vertices whose triangles form several fans: the corners at a vertex that edges connect are one fan.
+// Counts vertices with several fans. The corners at a vertex that are connected by edges form one fan.
 std::size_t countNonManifoldVertices(const Topology& topology, std::size_t vertices) {
     const auto corner = [&](unsigned triangle, unsigned vertex) {
         const glm::uvec3& t = topology.triangles[triangle];
         return 3 * triangle + (t.x == vertex ? 0 : t.y == vertex ? 1 : 2);
     };
     ConcurrentDisjointSets fans(3 * topology.triangles.size());
-    // each joining that two sets become one by leaves one fan less
+    // Each union of two sets reduces the count of fans by one.
     const std::size_t joined = overEdges<std::size_t>(topology, [&](std::span<const EdgeUse> uses, std::size_t& sum) {
         for (const EdgeUse& use : uses.subspan(1))
             for (const unsigned end : {use.low, use.high})
                 sum += fans.join(corner(uses[0].triangle, end), corner(use.triangle, end));
     });
     if (3 * topology.triangles.size() - joined == vertices) return 0;
-    std::vector<std::uint8_t> count(vertices, 0);  // 2 stands for more, too
+    std::vector<std::uint8_t> count(vertices, 0);  // 2 means two or more
     for (unsigned i = 0; i < topology.triangles.size(); ++i)
         for (unsigned k = 0; k < 3; ++k) {
             std::uint8_t& at = count[topology.triangles[i][k]];
@@ -131,7 +131,7 @@ std::size_t countDuplicates(const Topology& topology) {
     return duplicates;
 }
 
-// DisjointSets of triangles that share vertices; gives each triangle the number of its set.
+// Finds the components connected by shared vertices, and returns the component index of each triangle.
 std::vector<unsigned> components(const Mesh& mesh, std::size_t& count) {
     ConcurrentDisjointSets sets(mesh.points.size());
     forAll(mesh.triangles.size(), [&](std::size_t i) {
@@ -149,7 +149,7 @@ std::vector<unsigned> components(const Mesh& mesh, std::size_t& count) {
     return of;
 }
 
-// What each triangle adds to the sums over all.
+// Contributions of each triangle to the sums.
 struct Measures {
     LargeArray<double> areas, volumes;
 
@@ -165,8 +165,8 @@ struct Measures {
     }
 };
 
-// A component within an even number of others should have positive volume, a cavity within an odd number negative
-// volume.
+// Counts components with the wrong orientation. A component inside an even count of others should have positive volume,
+// a cavity inside an odd count negative volume.
 std::size_t countInsideOut(const Mesh& mesh, const TriangleTree& tree, std::vector<unsigned> of,
                            const std::vector<Component>& all) {
     if (all.size() == 1) return all[0].closed && all[0].volume < 0;
@@ -179,8 +179,9 @@ std::size_t countInsideOut(const Mesh& mesh, const TriangleTree& tree, std::vect
     return wrong;
 }
 
-// Where edges have two triangles each that run them both ways, vertices one fan, and all components clearly positive
-// volume, orient() has nothing to turn: a piece of negative volume is needed first.
+// Returns whether orient() has nothing to flip. This holds if every edge has two triangles with opposite directions,
+// every vertex has one fan, and all components have clearly positive volume. A flip requires a component of negative
+// volume.
 bool needsNoTurning(const MeshReport& report, const std::vector<Component>& all) {
     return report.closed() && report.misorientedEdges == 0 && report.nonManifoldVertices == 0 &&
            std::all_of(all.begin(), all.end(), [&](const Component& component) {
@@ -192,14 +193,14 @@ float finiteOrZero(float thickness) {
     return std::isfinite(thickness) ? thickness : 0.f;
 }
 
-// The thickness behind triangles that only a part of the area stays below.
+// Returns the thickness that only uncommonArea of the area stays below.
 float commonThickness(const std::vector<float>& thickness, const Measures& measures, double area) {
-    // by thickness, then number: the bits of positive floats are in their order
+    // Sorted by thickness, then by index: the bit patterns of positive floats have the same order as their values.
     LargeArray<std::uint64_t> order(thickness.size());
     forAll(order.size(),
            [&](std::size_t i) { order[i] = std::uint64_t(std::bit_cast<std::uint32_t>(thickness[i])) << 32 | i; });
     double below = 0;
-    // what is looked at is mostly the first of many
+    // The search usually ends within the first few of many triangles.
     std::size_t sorted = 0;
     for (std::size_t i = 0; i < order.size(); ++i) {
         if (i == sorted) {
@@ -248,7 +249,7 @@ MeshReport inspect(const Mesh& input, float wall) {
         report.boundaryLoops = countLoops(edges, mesh.points.size());
     }
     report.nonManifoldVertices = countNonManifoldVertices(topology, mesh.points.size());
-    // sums in the order of triangles, whatever the number of threads
+    // Sums are in triangle order, independent of the thread count.
     const Measures measures(mesh, report.bounds);
     for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
         all[of[i]].volume += measures.volumes[i];

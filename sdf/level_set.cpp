@@ -12,13 +12,13 @@
 namespace bilayer {
 namespace {
 
-/// Of voxels [m]: the squares of lengths from a thousandth of a voxel to thousands of them are floats.
+/// Range of voxel sizes [m]: squared lengths from 1/1000 voxel to thousands of voxels stay within the float range.
 constexpr double smallestVoxel = 1e-15, largestVoxel = 1e15;
-/// Of the voxel (0, 0, 0) [voxels]: farther away, floats tell no voxels apart.
+/// Maximum distance of voxel (0, 0, 0) from the origin [voxels]: floats cannot separate voxels farther away.
 constexpr double farthestOrigin = double(std::uint64_t(1) << 40);
-/// Wider than the longest field a band tells nothing, and is taken for damage [voxels].
+/// Maximum band width [voxels]: a wider band is treated as file damage.
 constexpr float widestBand = 1 << 23;
-/// Nothing for fields from elsewhere.
+/// The empty name is for fields from other programs.
 constexpr std::string_view methods[] = {"", "exact", "double-layer", "pseudonormal", "prism"};
 constexpr std::string_view signs[] = {"", "normals", "winding", "flood", "layers", "prisms"};
 
@@ -63,7 +63,7 @@ void requireLevelSet(const Grids& grids) {
     require(h >= smallestVoxel && h <= largestVoxel, grid, "the edge of a voxel", h, "from 1e-15 to 1e15");
     requireWidth(grid, "the background", grid.background());
     if (grid.activeVoxelCount() == 0) throw std::invalid_argument(fmt::format("grid '{}' is empty", grid.getName()));
-    // whole voxels along the axes: queries work in index space and must not need a rotation
+    // Requires a shift by whole voxels along the axes: queries work in index space and must not need a rotation.
     const openvdb::Vec3d origin = grid.indexToWorld(openvdb::Vec3d(0)) / h;
     for (int axis = 0; axis < 3; ++axis) {
         openvdb::Vec3d unit(0);

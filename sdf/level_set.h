@@ -1,4 +1,4 @@
-// A narrow-band signed distance field as a value. OpenVDB's headers are heavy, so its grids are behind grids.h.
+// A narrow-band signed distance field. grids.h gives access to its OpenVDB grids, whose headers are slow to compile.
 #pragma once
 
 #include <cstdint>
@@ -10,32 +10,35 @@ namespace bilayer {
 
 struct Grids;
 
-/// An immutable narrow-band signed distance field: cheap to copy, safe to share between threads. Distances are negative
-/// inside, in world units; voxel centres lie at integer index coordinates times the voxel size.
+/// An immutable narrow-band signed distance field, cheap to copy and safe to share between threads. Distances are
+/// negative inside, in world units. Voxel centres lie at integer index coordinates times the voxel size.
 class LevelSet {
   public:
-    /// Takes over grids that are complete and no longer change. Throws std::invalid_argument if they are no level set:
-    /// another grid class, a transform that is more than a uniform scale and whole voxels of shift, voxels below 1e-15
-    /// or above 1e15 m, no active voxel; or if an entry of theirs is not what it can be: a width that is not positive
-    /// or wider than 2^23 voxels, an error or a count below 0, a method or a way of signs that is not known.
+    /// Takes ownership of complete grids, which must not change afterwards. Throws std::invalid_argument if the grids
+    /// are not a valid level set:
+    /// - another grid class, or no active voxel;
+    /// - a transform other than a uniform scale and a shift by whole voxels;
+    /// - voxels below 1e-15 m or above 1e15 m;
+    /// - a width that is not positive or exceeds 2^23 voxels;
+    /// - a negative error bound or count;
+    /// - an unknown method or sign method.
     explicit LevelSet(std::shared_ptr<const Grids> grids);
 
     float voxelSize() const;             ///< [m]
-    glm::dvec3 origin() const;           ///< Mesh::origin: distances are asked for relative to it [m]
-    float exteriorWidth() const;         ///< every voxel with 0 <= distance < this is active [m]
-    float interiorWidth() const;         ///< every voxel with -this < distance < 0 is active [m]
+    glm::dvec3 origin() const;           ///< Mesh::origin; queries use coordinates relative to it [m]
+    float exteriorWidth() const;         ///< voxels with 0 <= distance < this are active [m]
+    float interiorWidth() const;         ///< voxels with -this < distance < 0 are active [m]
     std::uint64_t activeVoxels() const;  ///< count
-    std::uint64_t leaves() const;        ///< count of 8x8x8 blocks
+    std::uint64_t leaves() const;        ///< count of 8x8x8 leaves
     std::uint64_t memoryBytes() const;   ///< of all grids [bytes]
-    const std::string& method() const;   ///< "exact", ..., or "" for a field from elsewhere
-    /// What told inside from outside: "normals", "winding", "flood", "layers" or "prisms"; "" for a field from
-    /// elsewhere.
+    const std::string& method() const;   ///< "exact", ..., or "" for a field from another program
+    /// The sign method: "normals", "winding", "flood", "layers" or "prisms"; "" for a field from another program.
     const std::string& sign() const;
-    const std::string& signReason() const;  ///< why it was taken, without a full stop: "closed and oriented"
-    std::uint64_t signConflicts() const;    ///< voxels and pairs of neighbours whose normals contradict each other
-    /// What distances of active voxels are off by at most [m]; infinite: there is no bound; NaN: nobody knows.
+    const std::string& signReason() const;  ///< why it was selected, without a full stop: "closed and oriented"
+    std::uint64_t signConflicts() const;    ///< count of voxels and neighbour pairs whose normals disagree
+    /// Maximum error of the distances at active voxels [m]; infinity: not bounded; NaN: unknown.
     float errorBound() const;
-    std::uint64_t meshHash() const;  ///< hash() of the mesh it came from, or 0
+    std::uint64_t meshHash() const;  ///< hash() of the source mesh, or 0
     const Grids& grids() const { return *grids_; }
 
   private:

@@ -28,21 +28,21 @@ using namespace detail;
 
 namespace {
 
-/// Vertices or triangles that are worth a task.
+/// Vertices or triangles per task.
 constexpr std::size_t grain = 1 << 14;
 
 bool finite(const glm::vec3& p) {
     return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z);
 }
 
-// Calls body(run, begin, end) for runs of the numbers below n, side by side.
+// Calls body(run, begin, end) for runs of the indices below n, in parallel.
 template <class Body>
 void forEachRun(std::size_t n, Body body) {
     inOrder((n + grain - 1) / grain, [&](std::size_t run) { body(run, run * grain, std::min(n, (run + 1) * grain)); });
 }
 
-// Keeps the items that keeps(index) is true for, in their order; returns where those of each run went. keeps() is asked
-// once for each item, and may change that item.
+// Keeps the items for which keeps(index) returns true, in order. Returns the new start of each run. keeps() is called
+// once per item and may modify that item.
 template <class Item, class Keeps>
 std::vector<std::size_t> keepWhere(std::vector<Item>& items, Keeps keeps) {
     std::vector<std::size_t> places((items.size() + grain - 1) / grain + 1, 0);
@@ -62,7 +62,7 @@ std::vector<std::size_t> keepWhere(std::vector<Item>& items, Keeps keeps) {
     return places;
 }
 
-// DisjointSets a flag that other threads may set at the same time.
+// Sets a flag that other threads may set at the same time.
 void mark(std::uint8_t& flag) {
     const std::atomic_ref<std::uint8_t> shared(flag);
     if (!shared.load(std::memory_order_relaxed)) shared.store(1, std::memory_order_relaxed);
@@ -76,8 +76,8 @@ bool isCollapsed(const glm::uvec3& t) {
     return t.x == t.y || t.y == t.z || t.z == t.x;
 }
 
-// Drops triangles that use a vertex twice, after each vertex was replaced by the first of equal ones; `first` is empty
-// where none are equal. Returns a byte for each vertex: whether a triangle uses it.
+// Replaces each vertex by the first equal one, then removes triangles that use a vertex twice. `first` is empty if no
+// vertices are equal. Returns one byte per vertex: whether a triangle uses it.
 std::vector<std::uint8_t> keepProper(Mesh& mesh, const LargeArray<unsigned>& first) {
     std::vector<std::uint8_t> used(mesh.points.size(), 0);
     keepWhere(mesh.triangles, [&](std::size_t i) {
@@ -90,7 +90,7 @@ std::vector<std::uint8_t> keepProper(Mesh& mesh, const LargeArray<unsigned>& fir
     return used;
 }
 
-// Drops vertices that are not used, and numbers the others anew.
+// Removes unused vertices and renumbers the others.
 void keepUsed(Mesh& mesh, const std::vector<std::uint8_t>& used) {
     if (areAllSet(used)) return;
     LargeArray<unsigned> number(mesh.points.size());
@@ -109,7 +109,7 @@ void keepUsed(Mesh& mesh, const std::vector<std::uint8_t>& used) {
     mesh.points.shrink_to_fit();
 }
 
-// The first number below n that `holds` is true for; n if there is none.
+// Returns the first index below n for which `holds` returns true; n if there is none.
 template <class Holds>
 std::size_t firstWhere(std::size_t n, Holds holds) {
     return tbb::parallel_reduce(
@@ -122,14 +122,14 @@ std::size_t firstWhere(std::size_t n, Holds holds) {
         [](std::size_t a, std::size_t b) { return std::min(a, b); });
 }
 
-// Mixes a word into a hash: FNV-1a's step on 64 bits at once, with the high bits folded down.
+// Mixes a word into a hash: an FNV-1a step on 64 bits, with the high bits folded down.
 std::uint64_t mixed(std::uint64_t hash, std::uint64_t word) {
     constexpr std::uint64_t prime = 1099511628211ull;
     const std::uint64_t product = (hash ^ word) * prime;
     return product ^ (product >> 32);
 }
 
-// A hash of runs of fixed length, so that they can be hashed side by side.
+// Hashes runs of fixed length, so that the runs can be hashed in parallel.
 std::uint64_t hashOfRuns(std::span<const std::uint32_t> words) {
     constexpr std::size_t run = 1 << 15;
     std::vector<std::uint64_t> hashes((words.size() + run - 1) / run, 0);

@@ -1,4 +1,4 @@
-// The triangle mesh that everything starts from, and the small things one asks of it.
+// The triangle mesh that fields are built from, and basic operations on it.
 #pragma once
 
 #include <cstddef>
@@ -10,12 +10,13 @@
 
 namespace bilayer {
 
-/// A triangle mesh in world units. Triangles are counter-clockwise seen from outside.
+/// A triangle mesh in world units. Triangles are counter-clockwise when seen from outside.
 struct Mesh {
     std::vector<glm::vec3> points;      ///< vertex positions [m]
-    std::vector<glm::uvec3> triangles;  ///< three indices into `points` a triangle
-    /// Added to `points` it gives world coordinates [m]. Zero, but for a mesh that is so far away that floats would
-    /// round it (readMesh()); fields and queries of such a mesh are relative to it too.
+    std::vector<glm::uvec3> triangles;  ///< three indices into `points` per triangle
+    /// World coordinates are `points` plus this [m]. It is zero unless the mesh is so far from the world origin that
+    /// float coordinates would lose precision (see readMesh()). Fields and queries of such a mesh are also relative to
+    /// this origin.
     glm::dvec3 origin{0};
 };
 
@@ -34,23 +35,23 @@ struct Bounds {
     }
 };
 
-/// The box around all vertices that some triangle uses; empty for a mesh without triangles.
+/// Returns the bounds of all vertices that triangles use; empty for a mesh without triangles.
 Bounds bounds(const Mesh& mesh);
 
-/// Throws std::invalid_argument that names the first triangle or vertex at fault: no triangle, an index out of range,
-/// a coordinate that is NaN or infinite.
+/// Throws std::invalid_argument that names the first invalid triangle or vertex: no triangle, an index out of range, a
+/// coordinate that is NaN or infinite.
 void validate(const Mesh& mesh);
 
-/// Merges vertices with equal coordinates (0 and -0 are equal), drops triangles that use a vertex twice, and drops
-/// vertices that no triangle uses. Keeps the order of what remains. O(n), on all threads; a mesh that is moved in is
-/// welded in its own memory. No index may be out of range.
+/// Merges vertices with equal coordinates (0 and -0 are equal), removes triangles that use a vertex twice, and removes
+/// unused vertices. Preserves the order of the rest. O(n), on all threads. A mesh that is moved in is welded in place.
+/// All indices must be in range.
 Mesh weld(Mesh mesh);
 
-/// The mesh under an affine map; triangles are turned around when the map mirrors, so that normals stay outward. An
-/// origin that is not zero moves with the map.
+/// Applies an affine map to a mesh. A map with a negative determinant also flips the triangles, so that normals still
+/// point outward. A nonzero origin is transformed too.
 Mesh transformed(const Mesh& mesh, const glm::mat4& map);
 
-/// 64 bits that change with any vertex or triangle; the same for any number of threads.
+/// Returns a 64-bit hash of the vertices and triangles. It does not depend on the thread count.
 std::uint64_t hash(const Mesh& mesh);
 
 }  // namespace bilayer

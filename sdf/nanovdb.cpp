@@ -21,7 +21,7 @@ namespace {
 
 constexpr std::align_val_t alignment{NANOVDB_DATA_ALIGNMENT};
 
-// The memory that NanoVDB builds a grid in, as its GridHandle asks for it.
+// The buffer in which NanoVDB builds a grid, with the interface that its GridHandle requires.
 class Buffer {
   public:
     static Buffer create(std::uint64_t size, const Buffer* = nullptr) {
@@ -44,13 +44,13 @@ class Buffer {
 
 using Handle = nanovdb::GridHandle<Buffer>;
 
-// NanoVDB keeps notes in the nodes of the grid that it reads, which other threads may be reading: it gets a copy.
+// NanoVDB writes to the nodes of the grid that it reads, which other threads may be reading. It therefore gets a copy.
 template <class Grid>
 Handle convert(const Grid& grid) {
     return nanovdb::openToNanoVDB<Buffer>(*grid.deepCopy());
 }
 
-// The same as files hold it.
+// The same, with the origin in the transform, as in files.
 template <class Grid>
 Handle convertInWorld(const std::shared_ptr<const Grid>& grid, const LevelSet& levelSet) {
     return convert(*openvdb::gridPtrCast<Grid>(inWorld(grid, levelSet)));

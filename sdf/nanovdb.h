@@ -1,4 +1,4 @@
-// Fields as NanoVDB grids: one piece of memory each, which code on a GPU reads as it is.
+// Fields as NanoVDB grids: contiguous memory that GPU code reads without conversion.
 #pragma once
 
 #include <cstddef>
@@ -12,14 +12,14 @@
 
 namespace bilayer {
 
-/// An immutable NanoVDB grid without NanoVDB's headers. Copies share memory.
+/// An immutable NanoVDB grid; this header does not include NanoVDB's. Copies share memory.
 class NanoGrid {
   public:
     NanoGrid(std::shared_ptr<const std::byte> memory, std::size_t size) : memory_(std::move(memory)), size_(size) {}
 
-    /// The whole grid, to be uploaded unchanged; the first byte is aligned to 32, as a copy's must be. A kernel reads
-    /// it through `nanovdb::FloatGrid` (`nanovdb::Int32Grid` for triangles) or PNanoVDB.h. Lives as long as a copy of
-    /// this.
+    /// The whole grid, for upload without changes. The first byte is aligned to 32 bytes; copies of the bytes need the
+    /// same alignment. A kernel reads them through `nanovdb::FloatGrid` (`nanovdb::Int32Grid` for triangles) or
+    /// PNanoVDB.h. The span is valid as long as any copy of this object exists.
     std::span<const std::byte> bytes() const { return {memory_.get(), size_}; }
 
   private:
@@ -27,15 +27,16 @@ class NanoGrid {
     std::size_t size_;
 };
 
-/// The distances: the values, active states, background, transform and class of the level set's grid, with NanoVDB's
-/// statistics. The same bytes for any number of threads. Takes the level set's memory once more while it runs.
+/// Converts the distances: values, active states, background, transform and class of the level set's grid, with
+/// NanoVDB's statistics. The bytes do not depend on the thread count. Temporarily needs as much memory again as the
+/// level set.
 NanoGrid toNanoVdb(const LevelSet& levelSet);
 
-/// The index of the nearest triangle at each active voxel; nothing where the level set has no such grid.
+/// Converts the index of the nearest triangle at each active voxel; empty if the level set has no such grid.
 std::optional<NanoGrid> trianglesToNanoVdb(const LevelSet& levelSet);
 
-/// Writes the grids "distance" and, where present, "triangle" to a .nvdb file, not compressed: whole or not at all, as
-/// writeVdb() does. Throws std::runtime_error that names the file when it cannot be written.
+/// Writes the grids "distance" and, if present, "triangle" to an uncompressed .nvdb file. An error leaves no partial
+/// file, as with writeVdb(). Throws std::runtime_error that names the file if it cannot be written.
 void writeNanoVdb(const std::filesystem::path& path, const LevelSet& levelSet);
 
 }  // namespace bilayer

@@ -24,7 +24,7 @@ Mesh surface(const LevelSet& levelSet, const SurfaceOptions& options) {
     mesh.origin = levelSet.origin();
     mesh.points.reserve(points.size());
     for (const auto& p : points) mesh.points.push_back({p.x(), p.y(), p.z()});
-    // OpenVDB's faces are clockwise seen from outside
+    // OpenVDB's faces are clockwise when seen from outside.
     mesh.triangles.reserve(triangles.size() + 2 * quads.size());
     for (const auto& t : triangles) mesh.triangles.push_back({t[0], t[2], t[1]});
     for (const auto& q : quads) {

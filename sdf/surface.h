@@ -1,4 +1,4 @@
-// The mesh of an isosurface, by OpenVDB.
+// Isosurface extraction by OpenVDB.
 #pragma once
 
 #include <bilayer/sdf/level_set.h>
@@ -7,12 +7,12 @@
 namespace bilayer {
 
 struct SurfaceOptions {
-    float isovalue = 0;    ///< distance of the extracted surface [m]; within the band
-    float adaptivity = 0;  ///< 0: uniform, 1: as few triangles as flat regions allow
+    float isovalue = 0;    ///< distance at the extracted surface [m]; must lie within the band
+    float adaptivity = 0;  ///< 0: uniform mesh, 1: fewest triangles in flat regions
 };
 
-/// The isosurface as a mesh with outward normals; empty if the surface does not exist.
-/// Throws std::invalid_argument for an isovalue outside the band or an adaptivity outside 0..1.
+/// Extracts an isosurface as a mesh with outward normals; empty if there is no such surface. Throws
+/// std::invalid_argument for an isovalue outside the band or an adaptivity outside 0..1.
 Mesh surface(const LevelSet& levelSet, const SurfaceOptions& options = {});
 
 }  // namespace bilayer

@@ -36,7 +36,7 @@ using namespace detail;
 
 namespace {
 
-/// 16-bit floats have 11 binary digits: rounding is off by this part of a number at most.
+/// Maximum relative rounding error of 16-bit floats, which have 11 significant bits.
 constexpr float halfRounding = 1.f / 2048;
 
 template <class Grid>
@@ -46,12 +46,13 @@ typename Grid::ConstPtr first(const openvdb::GridPtrVec& grids, auto accept) {
     return nullptr;
 }
 
-/// Voxels lie no farther from the origin: sums of a few of their coordinates are ints.
+/// Limit of voxel coordinates: sums of a few coordinates still fit in an int.
 constexpr std::int32_t farthestVoxel = 1 << 30;
 
-/// Looks at all distances of a file. Throws std::invalid_argument where one is no number, which rounding, searches and
-/// solvers would pass on, where a tile is active, which solvers would fill with voxels, or where what is told of the
-/// band does not hold.
+/// Checks all distances of a file. Throws std::invalid_argument in these cases:
+/// - a distance is not finite, which rounding, searches and solvers would propagate;
+/// - a tile is active, which solvers would fill with voxels;
+/// - the stored interior width does not match the distances.
 class DistanceCheck {
   public:
     explicit DistanceCheck(const LevelSet& levelSet)
@@ -96,17 +97,18 @@ class DistanceCheck {
     }
 
     const openvdb::FloatGrid& grid_;
-    float interior_;  // no inactive voxel inside is nearer to the surface [m]
+    float interior_;  // minimum distance of inactive inside voxels from the surface [m]
 };
 
-/// What our files end with, behind all that OpenVDB reads: damage is found before it gets to see it, since its decoder
-/// of Blosc blocks trusts them.
+/// The checksum line at the end of our files, after the data that OpenVDB reads. Damage is thus detected before OpenVDB
+/// decodes the file, because its Blosc decoder does not validate its input.
 constexpr std::string_view sealName = "bilayer crc32 ";
 constexpr std::size_t sealSize = sealName.size() + 9;  // eight digits and a line feed
-// So many of its letters are no chance. Of a file that ends with fewer nothing else is missing.
+// A truncated file ends with a prefix of the checksum line. A prefix of at least this length is no coincidence; a file
+// that ends with a shorter one still has all of its grids.
 constexpr std::size_t minOfSeal = 4;
 
-/// On all threads: sums of parts combine.
+/// Computed on all threads: checksums of parts combine.
 std::string sealOf(std::string_view bytes) {
     struct Sum {
         uLong value = crc32(0, nullptr, 0);
@@ -131,10 +133,10 @@ std::ifstream opened(const std::filesystem::path& path) {
     return stream;
 }
 
-/// Files of others have no seal. Throws std::runtime_error where there is one, or the beginning of one, that does not
-/// hold or is not the end.
+/// Accepts files without a checksum line, which come from other programs. Throws std::runtime_error if the line is
+/// truncated, does not match the data, or is not at the end.
 void requireSeal(std::string_view bytes) {
-    // more than the seal: bytes may have come behind it
+    // Longer than the checksum line, because other bytes may follow it.
     const std::string_view end = bytes.substr(bytes.size() - std::min(bytes.size(), 4 * sealSize));
     for (std::size_t kept = sealName.size() - 1; kept >= minOfSeal; --kept)
         if (end.ends_with(sealName.substr(0, kept))) throw std::runtime_error("its end is missing");
@@ -144,11 +146,11 @@ void requireSeal(std::string_view bytes) {
         throw std::runtime_error("it is not as it was written");
 }
 
-/// Writes grids that have all of their metadata, without regard to grids that share a name or a tree. OpenVDB's own
-/// archives would compress all leaves once more, for the sizes that readers with delayed loading ask for.
+/// Writes grids with complete metadata. Does not handle grids that share a name or a tree. OpenVDB's own archives would
+/// compress all leaves a second time, to find the sizes for delayed loading.
 class FieldArchive : public openvdb::io::Archive {
   public:
-    /// How the values of a grid are compressed.
+    /// Returns the compression flags for the values of a grid.
     std::uint32_t compressionOf(const openvdb::GridBase& grid) const {
         std::ostringstream tagged;
         setGridCompression(tagged, grid);
@@ -180,7 +182,7 @@ class FieldArchive : public openvdb::io::Archive {
     }
 };
 
-/// Where the values of a leaf begin behind its mask and what stands for its inactive values.
+/// Returns where the values of a leaf begin, after its mask and its inactive values.
 template <class Leaf>
 std::size_t valuesBegin(std::string_view leaf) {
     using namespace openvdb::io;
@@ -195,8 +197,8 @@ std::size_t valuesBegin(std::string_view leaf) {
     return begin;
 }
 
-/// A grid whose leaves are compressed on all threads before it is written. It tells readers with delayed loading their
-/// sizes, as OpenVDB does; the bytes are the same.
+/// A grid whose leaves are compressed on all threads before it is written. It stores their sizes for delayed loading,
+/// as OpenVDB does. The bytes are the same as OpenVDB's.
 template <class Grid>
 class CompressedGrid : public Grid {
   public:
@@ -214,7 +216,7 @@ class CompressedGrid : public Grid {
         return sum;
     }
 
-    /// To be called once: memory is given back as it is written.
+    /// Call only once: memory is freed as it is written.
     void writeBuffers(std::ostream& out) const override {
         for (std::string& run : runs_) {
             out.write(run.data(), std::streamsize(run.size()));
@@ -263,7 +265,7 @@ void shift(openvdb::GridBase& grid, const glm::dvec3& by) {
     grid.setTransform(shifted);
 }
 
-/// The origin of the mesh that a field in a file is of.
+/// Returns the origin of the mesh from which a field in a file was built.
 glm::dvec3 originOf(const openvdb::GridPtrVec& grids) {
     for (const auto& grid : grids)
         if (const auto entry = grid->getMetadata<openvdb::Vec3DMetadata>(metadata::origin)) {
@@ -283,7 +285,7 @@ openvdb::GridBase::Ptr inWorld(const openvdb::GridBase::ConstPtr& grid, const Le
 
 namespace {
 
-/// Grids as an archive shall write them.
+/// Grids prepared for an archive.
 class PreparedGrids {
   public:
     explicit PreparedGrids(const openvdb::GridCPtrVec& grids) {
@@ -292,7 +294,7 @@ class PreparedGrids {
                 add(openvdb::ConstPtrCast<openvdb::GridBase>(grid)->copyGrid());
     }
 
-    /// What an archive writes.
+    /// Returns the bytes of the archive.
     std::string bytes() const {
         std::string room;
         room.reserve(bytes_);
@@ -321,9 +323,9 @@ class PreparedGrids {
         grids_.push_back(grid);
     }
 
-    static constexpr std::size_t topologyPart = 4;  // masks and tiles are about this part of a grid's leaves
+    static constexpr std::size_t topologyPart = 4;  // approximate fraction of masks and tiles, relative to the leaves
     openvdb::GridCPtrVec grids_;
-    std::size_t bytes_ = 1 << 20;  // about, of the file
+    std::size_t bytes_ = 1 << 20;  // estimated file size
 };
 
 }  // namespace
@@ -349,7 +351,7 @@ float storedErrorBound(const LevelSet& levelSet, const VdbOptions& options) {
 
 void writeVdb(const std::filesystem::path& path, const LevelSet& levelSet, const VdbOptions& options) {
     openvdb::initialize();
-    // a copy, since how distances are stored is a property of the grid
+    // A copy, because the storage precision is a property of the grid.
     const openvdb::GridBase::Ptr distance = inWorld(levelSet.grids().distance, levelSet);
     distance->setSaveFloatAsHalf(options.halfFloat);
     if (options.halfFloat && distance->getMetadata<openvdb::FloatMetadata>(metadata::errorBound))
@@ -369,7 +371,7 @@ LevelSet readVdb(const std::filesystem::path& path) {
         std::ifstream stream = opened(path);
         requireLengths(stream, std::filesystem::file_size(path));
         stream.seekg(0);
-        // delayed loading would leave the values, and any damage to them, in the file
+        // With delayed loading, the values and any damage to them would stay in the file.
         grids = *openvdb::io::Stream(stream, /*delayLoad=*/false).getGrids();
     } catch (const std::exception& error) {
         throw std::runtime_error(fmt::format("{}: is no .vdb file or is damaged ({})", path.string(), error.what()));

@@ -1,4 +1,4 @@
-// Fields from and to .vdb files, which Houdini, Blender and ParaView open too.
+// Reads and writes fields as .vdb files, which Houdini, Blender and ParaView also open.
 #pragma once
 
 #include <filesystem>
@@ -8,22 +8,26 @@
 namespace bilayer {
 
 struct VdbOptions {
-    bool halfFloat = false;  ///< store distances as 16-bit floats: half the size, 3 decimal digits
+    bool halfFloat = false;  ///< store distances as 16-bit floats: half the size, 3 significant decimal digits
 };
 
-/// LevelSet::errorBound() of the field that a file with these options gives back: rounding included [m].
+/// Returns the LevelSet::errorBound() of a field after writing and reading it with these options, rounding included
+/// [m].
 float storedErrorBound(const LevelSet& levelSet, const VdbOptions& options);
 
-/// Writes the grids "distance" and, where present, "triangle" and a body's "contact_points": whole or not at all (a
-/// temporary file beside the target is renamed at the end), and a checksum behind them, which OpenVDB passes over.
-/// Throws std::runtime_error that names the file when it cannot be written.
+/// Writes the grids "distance" and, if present, "triangle" and "contact_points". An error leaves no partial file: a
+/// temporary file next to the target is renamed at the end. A checksum follows the grids, and OpenVDB ignores it.
+/// Throws std::runtime_error that names the file if it cannot be written.
 void writeVdb(const std::filesystem::path& path, const LevelSet& levelSet, const VdbOptions& options = {});
 
-/// Reads the first level set of a .vdb file, from bilayer or elsewhere, with its grids of triangles and of a body's
-/// points if it has them.
-/// Throws std::runtime_error that names the file when it cannot be read, is truncated, is not what its checksum says
-/// that was written, or holds no level set, or one with an entry or a distance beyond its range. It takes no more
-/// memory than the file's size explains: lengths in it are checked before they are used.
+/// Reads the first level set of a .vdb file from bilayer or another program. Also reads the grids of triangles and of
+/// surface points if present. Checks all lengths in the file before use, so memory stays in proportion to the file
+/// size.
+/// Throws std::runtime_error that names the file if it:
+/// - cannot be read, or is truncated;
+/// - does not match its checksum;
+/// - holds no level set;
+/// - holds a level set with metadata or a distance out of range.
 LevelSet readVdb(const std::filesystem::path& path);
 
 }  // namespace bilayer

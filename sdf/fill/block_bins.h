@@ -1,4 +1,4 @@
-// Which balls reach which block of a brick: a counting sort, brick by brick.
+// Finds the balls that reach each block of a brick, by a counting sort per brick.
 #pragma once
 
 #include <algorithm>
@@ -15,13 +15,13 @@
 
 namespace bilayer::detail {
 
-/// The balls of a brick by the blocks that they reach. Memory is used again from brick to brick.
+/// The balls of a brick, binned by the blocks that they reach. Reuses its memory for each brick.
 class BlockBins {
   public:
-    /// @param balls   each with `sample` [in the voxels of the brick], `radius` around it, and `thickness` of the slab
-    ///                around the plane through it with `normal`, that hold all of its contents [voxels]
-    /// @param blocks  along the side of the brick
-    /// @param reach   how far beyond a ball a voxel may lie [voxels]
+    /// @param balls   each is a ball of `radius` around `sample` [brick voxels], cut by a slab: `thickness` on each
+    ///                side of the plane through `sample` with `normal`. Both contain the ball's contents [voxels].
+    /// @param blocks  count along the side of the brick
+    /// @param reach   maximum distance of a voxel from a ball that affects it [voxels]
     template <class Ball>
     void build(std::span<const Ball> balls, int blocks, float reach) {
         cursors_.assign(std::size_t(blocks) * std::size_t(blocks) * std::size_t(blocks), 0);
@@ -37,7 +37,7 @@ class BlockBins {
         for (std::size_t i = 0; i < count; ++i) balls_[cursors_[pairs_[i].block]++] = pairs_[i].ball;
     }
 
-    /// The balls that reach a block, in ascending order.
+    /// Returns the balls that reach a block, in ascending order.
     std::span<const std::uint32_t> at(std::size_t block) const {
         return {balls_.data() + offsets_[block], balls_.data() + offsets_[block + 1]};
     }
@@ -46,16 +46,16 @@ class BlockBins {
     struct Pair {
         std::uint32_t block, ball;
     };
-    static constexpr float slack = 1e-3f;  // far above rounding [voxels]
+    static constexpr float slack = 1e-3f;  // tolerance far above rounding [voxels]
 
-    // Adds the pairs of a ball behind the first `count`, and returns how many there are then.
+    // Appends the pairs of a ball after the first `count`, and returns the new count.
     template <class Ball>
     std::size_t addPairs(const Ball& ball, std::uint32_t index, int blocks, float beyond, std::size_t count) {
         const float reach = beyond + ball.radius;
         constexpr float half = 0.5f * float(blockSide - 1), perBlock = 1.f / float(blockSide);
         const float slab = beyond + ball.thickness + slack +
                            half * (std::abs(ball.normal.x) + std::abs(ball.normal.y) + std::abs(ball.normal.z));
-        // rounded to zero below the first block, which is the first block
+        // Conversion to int truncates toward zero, so coordinates slightly below 0 give block 0.
         const auto block = [&](float coordinate) { return std::clamp(int(coordinate * perBlock), 0, blocks - 1); };
         const glm::vec3 lower = ball.sample - reach, upper = ball.sample + reach;
         const int x1 = block(upper.x), y0 = block(lower.y), y1 = block(upper.y), z0 = block(lower.z),
@@ -74,7 +74,8 @@ class BlockBins {
                 const float dy = toCentre(y, ball.sample.y), rest = left - away2(dy), hy = hx + dy * ball.normal.y;
                 for (int z = z0; z <= z1; ++z) {
                     const float dz = toCentre(z, ball.sample.z);
-                    // written in any case and kept if it reaches: a branch would be guessed wrong half of the time
+                    // The pair is always written, and counted only if it reaches. A branch would be mispredicted half
+                    // of the time.
                     const auto number = std::uint32_t((x * blocks + y) * blocks + z);
                     const std::uint32_t reaches =
                         unsigned(away2(dz) < rest) & unsigned(std::abs(hy + dz * ball.normal.z) < slab);

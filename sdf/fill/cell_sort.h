@@ -1,4 +1,4 @@
-// A counting sort of things in a brick by the cell of space that they lie in.
+// A counting sort of the items in a brick by spatial cell.
 #pragma once
 
 #include <cstdint>
@@ -8,11 +8,11 @@
 
 namespace bilayer::detail {
 
-/// Cells of a box [voxels].
+/// A grid of cells over a box [voxels].
 struct Cells {
-    glm::vec3 lower;  ///< the box's first corner
+    glm::vec3 lower;  ///< minimum corner of the box
     float side;       ///< of a cell
-    glm::ivec3 size;  ///< cells along the axes
+    glm::ivec3 size;  ///< count of cells along each axis
 
     Cells(const glm::vec3& lower, const glm::vec3& upper, float side)
         : lower(lower), side(side), size(glm::ivec3((upper - lower) / side) + 1) {}
@@ -23,12 +23,12 @@ struct Cells {
     }
 };
 
-/// Sorts by cell. Memory is used again from brick to brick.
+/// Sorts items by cell. Reuses its memory for each brick.
 template <class Item>
 class CellSort {
   public:
-    /// Sorts stably, by the cell that place(item) lies in, then calls visit(begin, end) for the items of each cell that
-    /// has some, in ascending order. `visit` may change the order of those items.
+    /// Sorts stably by the cell that contains place(item). Then calls visit(begin, end) for the items of each nonempty
+    /// cell, in ascending order. `visit` may reorder those items.
     template <class Place, class Visit>
     void run(std::vector<Item>& items, const Cells& cells, Place place, Visit visit) {
         cellOf_.resize(items.size());
@@ -39,7 +39,7 @@ class CellSort {
         unsorted_.swap(items);
         items.resize(unsorted_.size());
         for (std::size_t i = 0; i < unsorted_.size(); ++i) items[ends_[cellOf_[i]]++] = unsorted_[i];
-        // each cursor now stands at the end of its cell
+        // Each cursor has reached the end of its cell.
         std::uint32_t begin = 0;
         for (const std::uint32_t end : ends_)
             if (end > begin) visit(std::exchange(begin, end), end);

@@ -8,14 +8,13 @@
 namespace bilayer::detail {
 namespace {
 
-/// Pieces with a mean radius below this are grouped: several of them share a voxel [voxels].
+/// Maximum mean radius for grouping: several smaller pieces share a voxel [voxels].
 constexpr double smallRadius = 1.6;
-/// More cells than this, 4 MiB of counters, and a brick's pieces stay alone.
+/// Maximum cell count, 4 MiB of counters. Above it, the pieces of a brick are not grouped.
 constexpr double maxCells = 1 << 20;
-/// Side of the cells that pieces are grouped by, as a multiple of their mean radius, and its limits; others took longer
-/// (measured) [voxels].
+/// Cell side as a multiple of the mean piece radius, and its limits. Measured to be the fastest [voxels].
 constexpr float cellFactor = 4.f, smallestCell = 1.1f, largestCell = 3.f;
-/// Rounding of a cluster's own numbers [voxels].
+/// Rounding of a cluster's own values [voxels].
 constexpr float clusterSlack = 1e-4f;
 
 }  // namespace
@@ -56,7 +55,7 @@ void Clusters::addCluster(std::uint32_t begin, std::uint32_t end) {
     mean /= float(end - begin);
     const float length = glm::length(normal);
     normal = length > 0 ? normal / length : glm::vec3(0, 0, 1);
-    // the sample must be a point of the surface: the member's nearest to the middle
+    // The sample must be a point of the surface: the member sample nearest to the mean.
     const auto nearer = [&](const Member& a, const Member& b) {
         const glm::vec3 toA = a.sample - mean, toB = b.sample - mean;
         return glm::dot(toA, toA) < glm::dot(toB, toB);

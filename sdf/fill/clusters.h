@@ -1,5 +1,5 @@
-// Small pieces grouped by the voxel that they lie in, so that a brick full of tiny triangles costs what its surface
-// costs and not what their number would.
+// Groups small pieces by voxel. The cost of a brick full of tiny triangles then depends on its surface area, not on the
+// triangle count.
 #pragma once
 
 #include <cstdint>
@@ -11,10 +11,10 @@
 
 namespace bilayer::detail {
 
-/// The pieces of a brick in clusters. Memory is used again from brick to brick.
+/// The pieces of a brick, grouped into clusters. Reuses its memory for each brick.
 class Clusters {
   public:
-    /// Groups the pieces of the brick with this origin [index coordinates].
+    /// Groups the pieces of a brick with this origin [index coordinates].
     void build(std::span<const Piece> pieces, const glm::ivec3& origin);
 
     std::span<const Cluster> clusters() const { return clusters_; }

@@ -1,5 +1,5 @@
-// The double layer method, brick by brick: triangles, samples, blocks. Nothing is kept of a mesh but the bins of
-// its triangles, so that memory stays a fraction of the mesh's own however many samples it has.
+// The double layer method, one brick at a time: triangles, samples, blocks. Only the bins of the triangles are stored
+// for the whole mesh. Memory is therefore a fraction of the mesh's, at any sample count.
 #include "sdf/fill/double_layer.h"
 
 #include <oneapi/tbb/enumerable_thread_specific.h>
@@ -18,9 +18,9 @@
 namespace bilayer::detail {
 namespace {
 
-constexpr std::size_t trianglesPerPoll = 1024;  // a tenth of a millisecond
+constexpr std::size_t trianglesPerPoll = 1024;  // about 0.1 ms
 
-// What a thread works in; kept from brick to brick.
+// Working memory of a thread, reused for each brick.
 struct Scratch {
     LayerSamples samples;
     LayerScratch block;
@@ -79,7 +79,7 @@ class BrickFiller {
 
 void fillDoubleLayer(const MeshJob& job, const Bounds& box, const DoubleLayerOptions& options,
                      const FillParameters& parameters) {
-    // the paper's cube sticks out of the ball
+    // The corners of the paper's cube lie outside the ball.
     const float reach = parameters.reach * (parameters.cube > 0 ? std::sqrt(3.f) : 1.f);
     const TriangleBins bins = binTriangles(job.mesh, box, 1.0 / double(job.voxelSize), reach, &job.progress);
     job.progress.begin(bins.count());

@@ -1,4 +1,4 @@
-// The exact method, brick by brick: pieces, clusters, blocks, sides.
+// The exact method, one brick at a time: pieces, clusters, blocks, signs.
 #include "sdf/fill/exact.h"
 
 #include <oneapi/tbb/enumerable_thread_specific.h>
@@ -23,15 +23,16 @@
 namespace bilayer::detail {
 namespace {
 
-/// Longer edges are halved, so that a piece stays near the blocks that ask for it and floats hold its frame [voxels].
+/// Maximum edge length of a piece [voxels]. Longer edges are halved, so that a piece stays near the blocks that query
+/// it and floats resolve its frame.
 constexpr double longestPieceEdge = 16;
-/// A triangle must come this much nearer than a sample's piece might to be left out of a closer look [voxels].
+/// Tolerance of the search for all triangles that can be nearest [voxels].
 constexpr float sideSlack = 1e-3f;
-/// Ways that are tried before the winding number of the whole mesh.
+/// Maximum count of paths that are tried before the winding number of the whole mesh.
 constexpr int maxPaths = 16;
-constexpr std::size_t trianglesPerPoll = 1024;  // a tenth of a millisecond
+constexpr std::size_t trianglesPerPoll = 1024;  // about 0.1 ms
 
-// What a thread works in; kept from brick to brick.
+// Working memory of a thread, reused for each brick.
 struct Scratch {
     std::vector<Piece> pieces;
     Clusters clusters;
@@ -70,7 +71,7 @@ class BrickFiller {
   private:
     bool wanted(const glm::ivec3& first, int side) const { return !job_.wanted || job_.wanted(first, side); }
 
-    // Pieces beyond these reach none of the wanted blocks.
+    // Pieces outside this box reach none of the wanted blocks.
     TriangleLimits limitsOfWanted() const {
         glm::ivec3 lower = origin_, upper = origin_ + (bins_.side - blockSide);
         if (job_.wanted) {
@@ -125,8 +126,8 @@ class BrickFiller {
                                                : std::int32_t(s_.pieces[std::size_t(nearest >> sideBits)].triangle));
     }
 
-    // Sides over faces are known; links carry them on. What they do not reach is asked for, a voxel a component, those
-    // far from the surface first.
+    // Voxels that project onto a face have a known sign, which links propagate. Each remaining component is queried at
+    // one voxel, one far from the surface if possible.
     BlockMask insideVoxels() {
         BlockSides sides{found_.outside, found_.inside};
         const std::size_t onBoth =
@@ -136,8 +137,8 @@ class BrickFiller {
         return sides.inside;
     }
 
-    // Asks the closest feature; where its normals cancel out, the way to a voxel whose side is known; at last the
-    // winding number.
+    // Classifies a voxel by its closest feature. If the normals cancel out there, follows a path to a voxel of known
+    // sign. The last fallback is the winding number.
     bool isInside(int voxel, const BlockMask& outside, const BlockMask& inside) {
         const glm::ivec3 local = inBlock(voxel);
         const auto nearest = std::size_t(found_.nearest[voxel] >> sideBits);
@@ -158,7 +159,7 @@ class BrickFiller {
 
     static glm::ivec3 inBlock(int voxel) { return {voxel / 64, voxel / 8 % 8, voxel % 8}; }
 
-    // Visits the triangles of all pieces near enough, some of them more than once.
+    // Visits the triangles of all pieces within range, some more than once.
     template <class Near, class Visit>
     void forEachNear(Near near, Visit visit) const {
         for (const std::uint32_t c : reaching_) {
@@ -171,7 +172,7 @@ class BrickFiller {
         }
     }
 
-    // Tries the ways to a few voxels well away from the surface whose side is known.
+    // Tries straight paths to voxels of known sign that are far from the surface, at most maxPaths.
     std::optional<bool> insideByWays(const glm::ivec3& from, const BlockMask& outside, const BlockMask& inside) {
         int tries = 0;
         for (std::size_t x = 0; x < inside.size(); ++x)
@@ -186,8 +187,8 @@ class BrickFiller {
         return std::nullopt;
     }
 
-    // The winding number at the beginning of a way from the point in question, by that at its end. The way lies in the
-    // block, so all that it passes reaches the block.
+    // Returns the winding number at the start of a straight path from the current point, given the number at its end.
+    // The path lies in the block, so every triangle that it crosses reaches the block.
     std::optional<int> windingAfter(const glm::ivec3& way, int atEnd) {
         passed_.clear();
         forEachNear([](const glm::vec3&, float) { return true; },

@@ -1,15 +1,15 @@
-// The exact method on the processor: in each block the samples of pieces of triangles tell which pieces can be nearest
-// to a voxel, those pieces tell the distance, and the closest feature tells the side.
+// The exact method on the CPU. In each block the samples of triangle pieces select the pieces that can be nearest to a
+// voxel. These pieces give the distance, and the closest feature gives the sign.
 #pragma once
 
 #include "sdf/leaf/blocks.h"
 
 namespace bilayer::detail {
 
-/// Fills all blocks of a job by TBB and SIMD. Distances are right within 1e-4 voxels of the true ones. Their bytes do
-/// not depend on the number of threads, on the order of the triangles, or on a shift by whole voxels (where the voxel
-/// size and the vertices are binary fractions, so that the shift itself is exact).
-/// @param box  of the mesh
+/// Fills all blocks of a job with TBB and SIMD. Distances are within 1e-4 voxels of the true ones. Their bytes do not
+/// depend on the thread count, on the triangle order, or on a shift by whole voxels. The latter requires a voxel size
+/// and vertices that are binary fractions, so that the shift itself is exact.
+/// @param box  bounds of the mesh
 void fillExact(const MeshJob& job, const Bounds& box);
 
 }  // namespace bilayer::detail

@@ -1,4 +1,4 @@
-// Highway compiles the part between HWY_BEFORE_NAMESPACE and HWY_AFTER_NAMESPACE once for each instruction set.
+// Highway compiles the code between HWY_BEFORE_NAMESPACE and HWY_AFTER_NAMESPACE once per instruction set.
 #include "sdf/fill/exact_block.h"
 
 #undef HWY_TARGET_INCLUDE
@@ -16,31 +16,31 @@ namespace bilayer::detail::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 namespace {
 
-/// As many voxels at once as there are lanes: half a row along z, a row, or two.
+/// As many voxels at once as there are lanes: half a row along z, a row, or two rows.
 using Tag = hn::CappedTag<float, 2 * blockSide>;
 using IntTag = hn::RebindToSigned<Tag>;
 using Vec = hn::Vec<Tag>;
 using Mask = hn::Mask<Tag>;
 
-/// What a distance computed in floats may be off by, with room to spare: pieces this much too far are still asked, so
-/// that which distance wins never depends on the order [voxels].
+/// Upper bound of the float error of a distance, with a margin [voxels]. Pieces that are too far by this much are still
+/// evaluated, so that the nearest piece never depends on the order.
 constexpr float boundSlack = 1e-4f;
-/// Distances d that differ by less than this may be equal: floats blur the heights over two pieces by as much, however
-/// low they are. Squared ones then differ by less than tie * (1 + d^2), since 2 d <= 1 + d^2 [voxels].
+/// Distances d that differ by less than this may be equal [voxels]: floats round the heights over two pieces by as
+/// much, at any height. Squared distances then differ by less than tie * (1 + d^2), since 2 d <= 1 + d^2.
 constexpr float tie = 1e-5f;
-/// Bounds by samples are raised by this part and this much, so that a piece's own distance wins over its sample's
-/// although the two are rounded differently: by 2e-5 voxels at least.
+/// Sample bounds are increased by this fraction and this amount, together at least 2e-5 voxels. A piece's own distance
+/// then replaces its sample's, although the two are rounded differently.
 constexpr float raisedPart = 1e-3f, raisedBy = 5e-7f;  // [voxels^2]
-/// Rounding of squared heights, with room to spare [voxels^2].
+/// Rounding of squared heights, with a margin [voxels^2].
 constexpr float heightSlack = 1e-3f;
-/// Nearer to a face than this its side is left to a closer look [voxels].
+/// Voxels closer to a face than this get no sign from its normal alone [voxels].
 constexpr float minHeight = 1e-3f;
 
-/// A slice is the 64 voxels of one x; a chunk is what one vector holds of it.
+/// A slice is the 64 voxels with one x. A chunk is one SIMD vector of a slice.
 constexpr int sliceVoxels = blockSide * blockSide;
 constexpr int chunkVoxels = int(hn::MaxLanes(Tag()));
 
-// Lattice coordinates of a slice's voxels.
+// Lattice coordinates of the voxels in a slice.
 struct Lattice {
     HWY_ALIGN float y[sliceVoxels], z[sliceVoxels];
 };
@@ -69,8 +69,8 @@ inline int lastTo(float coordinate) {
     return coordinate < 0 ? -1 : std::min(blockSide - 1, int(coordinate));
 }
 
-// Calls visit(c, first slice, last slice) for the chunks that a ball may reach. Only its box counts: that much less to
-// work out for each is worth more than the corners.
+// Calls visit(c, first slice, last slice) for the chunks that a ball may reach. Tests only the ball's box: a cheap test
+// saves more than excluding the corners.
 template <class Visit>
 inline void forEachChunk(const glm::vec3& centre, float radius, Visit visit) {
     const int x0 = firstFrom(centre.x - radius), x1 = lastTo(centre.x + radius);
@@ -79,12 +79,12 @@ inline void forEachChunk(const glm::vec3& centre, float radius, Visit visit) {
     for (int c = firstFrom(centre.y - radius) * blockSide / chunkVoxels; c * chunkVoxels < end; ++c) visit(c, x0, x1);
 }
 
-// A number for each slice.
+// One value per slice.
 struct Slices {
     using Row = hn::CappedTag<float, blockSide>;
     using RowVec = hn::Vec<Row>;
 
-    // make(x) for all slices at once, from x less `centre`
+    // Evaluates make(x) for all slices at once, with x relative to `centre`.
     template <class Make>
     Slices(float centre, Make make) {
         const Row row;
@@ -104,7 +104,7 @@ inline Vec latticeZ(int c) {
     return hn::Load(Tag(), lattice.z + c * chunkVoxels);
 }
 
-// Lowers squared distances to those to a sample.
+// Reduces squared distances to those to a sample.
 inline void applySample(const glm::vec3& sample, float reach, BlockDistances& block) {
     const Tag tag;
     const Slices px2(sample.x, Slices::square);
@@ -117,10 +117,10 @@ inline void applySample(const glm::vec3& sample, float reach, BlockDistances& bl
     });
 }
 
-// A disc, or a drum of some thickness, that holds pieces; seen from a block. A voxel at height h over its plane and r
-// from its axis, with a bound b of its distance, is farther from all of the drum if r exceeds the radius +
-// sqrt(b^2 - g^2), where g = max(0, |h| - thickness). Squared twice this is free of roots; r^2 = d^2 - h^2 comes from
-// the distance d to the centre.
+// A bounding disc, or a bounding cylinder ("drum") with some thickness, around pieces, relative to a block. Consider a
+// voxel at height h over the drum's plane and at distance r from its axis, with an upper bound b of its distance. It is
+// farther than b from the drum if r > radius + sqrt(b^2 - g^2), where g = max(0, |h| - thickness). Squaring this twice
+// removes the roots. r^2 = d^2 - h^2 follows from the distance d to the centre.
 class Drum {
   public:
     Drum(const glm::vec3& centre, float radius, const glm::vec3& normal, float thickness)
@@ -131,7 +131,7 @@ class Drum {
           px2_(centre.x, Slices::square),
           height_(centre.x, [&](auto px) { return hn::Mul(px, hn::Set(Slices::Row(), normal.x)); }) {}
 
-    // Bits of the slices out of x0 .. x1 whose chunk c has a voxel that the drum may be nearest to.
+    // Returns the slices out of x0 .. x1, one bit each, in which chunk c has a voxel that the drum may be nearest to.
     template <bool thick>
     inline unsigned near(int c, int x0, int x1, const BlockDistances& block) const {
         const Column column(*this, c);
@@ -142,7 +142,7 @@ class Drum {
         return near;
     }
 
-    // The same out of some slices.
+    // The same for the slices `among`.
     inline unsigned near(int c, unsigned among, const BlockDistances& block) const {
         const Column column(*this, c);
         unsigned near = 0;
@@ -155,7 +155,7 @@ class Drum {
     }
 
   private:
-    // What all chunks of a column have in common.
+    // Values shared by all slices of a chunk.
     struct Column {
         Column(const Drum& drum, int c) {
             const Tag tag;
@@ -188,7 +188,7 @@ class Drum {
     Slices px2_, height_;
 };
 
-// A piece seen from a block.
+// A piece relative to a block.
 class SeenPiece {
   public:
     SeenPiece(const Piece& piece, std::uint32_t number, const glm::ivec3& block)
@@ -199,8 +199,8 @@ class SeenPiece {
           w_(along(piece.w.x)),
           n_(along(piece.n.x)) {}
 
-    // Lowers the distances in some slices of chunk c to those to the piece. Lattice coordinates are exact in floats, so
-    // each voxel gets the same bytes whichever block it is asked in.
+    // Reduces the distances in some slices of chunk c to those to the piece. Lattice coordinates are exact in floats,
+    // so a voxel gets the same bytes in any block.
     inline void apply(int c, unsigned slices, BlockDistances& block) const {
         const Tag tag;
         const auto place = [&](Vec lattice, int shift, float origin) {
@@ -220,16 +220,16 @@ class SeenPiece {
     }
 
   private:
-    // The part of a coordinate along an axis that follows from x.
+    // The x-dependent part of a coordinate along an axis.
     Slices along(float axis) const {
         const Slices::Row row;
-        // the shift is added first: it and x are whole, and their sum is exact
+        // The shift is added first: it and x are integers, so their sum is exact.
         Slices part(-float(shift_.x),
                     [&](auto x) { return hn::Mul(hn::Sub(x, hn::Set(row, piece_.origin.x)), hn::Set(row, axis)); });
         return part;
     }
 
-    // How far a coordinate along an edge lies beyond its ends.
+    // Returns how far a coordinate along an edge lies outside the edge.
     static Vec beyond(Vec along, float length) {
         const Tag tag;
         return hn::Sub(along, hn::Min(hn::Max(along, hn::Zero(tag)), hn::Set(tag, length)));
@@ -239,7 +239,7 @@ class SeenPiece {
         const Tag tag;
         const Piece& t = piece_;
         const Vec base2 = hn::Add(squareOf(beyond(u, t.length)), squareOf(w));
-        // the edges from both ends of the longest one to the third corner
+        // The edges from both ends of the longest edge to the third corner.
         const Vec ox = hn::Set(tag, t.ox), oy = hn::Set(tag, t.oy), ex = hn::Set(tag, t.ex), ey = hn::Set(tag, t.ey);
         const Vec v = hn::Sub(u, hn::Set(tag, t.length));
         const Vec leftOf = hn::Sub(hn::Mul(w, ox), hn::Mul(u, oy)), rightOf = hn::Sub(hn::Mul(w, ex), hn::Mul(v, ey));
@@ -252,8 +252,8 @@ class SeenPiece {
         store(distance2, n, hn::And(above, hn::Gt(n2, hn::Set(tag, square(minHeight)))), voxel, block);
     }
 
-    // Keeps the smaller distances, and whose they are. Over a face its normal tells the side, unless two pieces are as
-    // near as floats can tell and say different things.
+    // Keeps the smaller distance and its piece. Where the voxel projects onto a face, its normal gives the sign, unless
+    // two pieces at equal distance (within float accuracy) disagree.
     inline void store(Vec distance2, Vec height, Mask overFace, int voxel, BlockDistances& block) const {
         const Tag tag;
         const IntTag intTag;
@@ -276,7 +276,8 @@ class SeenPiece {
     Slices u_, w_, n_;
 };
 
-// First bounds: the distances to the samples, a little raised so that a piece's own distance wins over its sample's.
+// Initial bounds: the distances to the samples. They are slightly increased, so that a piece's own distance replaces
+// its sample's.
 void applySamples(const BlockInput& input, BlockDistances& block) {
     const Tag tag;
     const IntTag intTag;
@@ -292,13 +293,13 @@ void applySamples(const BlockInput& input, BlockDistances& block) {
     }
 }
 
-// Slices of the chunks near a cluster, a bit each.
+// The slices near a cluster for each chunk, one bit each.
 struct NearChunks {
     int first, last;
     unsigned slices[sliceVoxels / chunkVoxels];
 };
 
-// Asks the members of a cluster that come near its chunks.
+// Evaluates the members of a cluster that come near its chunks.
 inline void askMembers(const BlockInput& input, const Cluster& cluster, const NearChunks& near, BlockDistances& block) {
     if (cluster.end - cluster.begin == 1) {
         const std::uint32_t number = input.members[cluster.begin].piece;
@@ -353,13 +354,13 @@ void summarize(BlockDistances& block) {
         hn::Store(distance, tag, block.distance + i);
         const auto nearest = hn::Load(intTag, block.nearest + i);
         const Mask known = hn::RebindMask(tag, hn::Gt(nearest, hn::Set(intTag, -1)));
-        // a piece that is as near as the reach leaves its side, but is not kept
+        // A piece at exactly the reach sets its sign bits, but is not stored as nearest.
         const auto has = [&](std::int32_t side) {
             const auto sides = hn::And(nearest, hn::Set(intTag, (1 << sideBits) - 1));
             return hn::And(known, hn::RebindMask(tag, hn::Eq(sides, hn::Set(intTag, side))));
         };
         setBits(known, i, block.known);
-        // on the surface either side is right, and no link can carry it on
+        // On the surface either sign is right, and no link can propagate it.
         setBits(hn::Or(has(sideOutside), hn::Lt(distance, hn::Set(tag, 0.5f * linkSlack))), i, block.outside);
         setBits(has(sideInside), i, block.inside);
         setBits(hn::And(known, hn::Gt(distance, hn::Set(tag, farFrom))), i, block.far);

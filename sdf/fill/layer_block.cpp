@@ -1,4 +1,4 @@
-// Highway compiles the part between HWY_BEFORE_NAMESPACE and HWY_AFTER_NAMESPACE once for each instruction set.
+// Highway compiles the code between HWY_BEFORE_NAMESPACE and HWY_AFTER_NAMESPACE once per instruction set.
 #include "sdf/fill/layer_block.h"
 
 #include "sdf/fill/double_layer.h"
@@ -21,7 +21,7 @@ namespace hn = hwy::HWY_NAMESPACE;
 namespace {
 
 constexpr int cubeSide = LayerSamples::cellSide;  // voxels
-constexpr int sliceVoxels = cubeSide * cubeSide;  // of one x
+constexpr int sliceVoxels = cubeSide * cubeSide;  // voxels with one x
 constexpr int cubesPerSide = blockSide / cubeSide;
 constexpr int cubesPerBlock = cubesPerSide * cubesPerSide * cubesPerSide;
 
@@ -33,9 +33,9 @@ using Mask = hn::Mask<Tag>;
 using IntVec = hn::Vec<IntTag>;
 
 constexpr float infinite = std::numeric_limits<float>::infinity();
-constexpr float halfCube = 0.5f * float(cubeSide - 1);  // from the middle of a cube to its last voxels
+constexpr float halfCube = 0.5f * float(cubeSide - 1);  // from the centre of a cube to its outermost voxels
 
-// Places of a slice's voxels, from the middle of their cube.
+// Positions of the voxels in a slice, relative to the centre of their cube.
 struct Lattice {
     alignas(64) float y[sliceVoxels], z[sliceVoxels];
 };
@@ -52,7 +52,7 @@ inline float sliceAt(int x) {
     return float(x) - halfCube;
 }
 
-// One vector's part of each slice of a cube, from the middle of the cube.
+// One vector of each slice of a cube, relative to the cube's centre.
 struct Voxels {
     explicit Voxels(int part) {
         const auto at = std::size_t(part) * hn::Lanes(Tag());
@@ -65,7 +65,7 @@ struct Voxels {
     Vec y, z;
 };
 
-// The points of a layer around a cube, from its middle.
+// The points of a layer near a cube, relative to its centre.
 struct LayerPoints {
     LayerPoints(LayerScratch::Layer& memory, std::size_t size) {
         for (auto& column : memory.columns)
@@ -78,7 +78,7 @@ struct LayerPoints {
         picked = memory.picked.data();
     }
 
-    // Places a vector of points, and picks those nearer to the cube's voxels than the root of reach2.
+    // Stores a vector of points, and selects those closer to the cube's voxels than sqrt(reach2).
     HWY_INLINE void put(std::uint32_t first, Vec px, Vec py, Vec pz, Mask among, Vec reach2) {
         const Tag tag;
         const auto square = [](Vec a, Vec b, Vec c) { return hn::MulAdd(a, a, hn::MulAdd(b, b, hn::Mul(c, c))); };
@@ -97,12 +97,12 @@ struct LayerPoints {
     }
 
     float *x, *y, *z, *halfSquare;  // of all points, in the order of the brick's samples
-    std::uint32_t* picked;          // those that reach the cube
-    std::size_t count = 0;          // of those
+    std::uint32_t* picked;          // indices of the points that reach the cube
+    std::size_t count = 0;          // count of `picked`
 };
 
-// The points of a layer that are nearest to voxels. They are those with the greatest p . v - |p|^2 / 2, as
-// |v - p|^2 = |v|^2 - 2 (p . v - |p|^2 / 2): one multiplication a voxel and point.
+// Finds the layer point nearest to each voxel. It maximizes p . v - |p|^2 / 2, because |v - p|^2 = |v|^2 - 2 (p . v -
+// |p|^2 / 2). This costs one multiplication per voxel and point.
 template <bool cube, bool withOwners>
 struct Nearest {
     HWY_INLINE Nearest(const LayerBlockInput& input, const LayerPoints& points, const glm::vec3& middle,
@@ -140,7 +140,7 @@ struct Nearest {
     IntVec owner[cubeSide];
 
   private:
-    // The paper's neighbourhood: voxels of a cube around the lattice point nearest to the sample.
+    // The paper's neighbourhood: a cube of voxels around the lattice point nearest to the sample.
     static glm::vec3 centreOf(const LayerBlockInput& input, std::uint32_t p) {
         const auto& place = input.samples.columns().place;
         return LayerSamples::nearestLattice({place[0][p], place[1][p], place[2][p]});
@@ -152,7 +152,7 @@ struct Nearest {
     }
 };
 
-// Writes rows of a part of a slice into the block.
+// Writes rows of one part of a slice to the block.
 template <class D, class T>
 HWY_INLINE void putRows(D tag, hn::Vec<D> values, int part, T* corner) {
     alignas(64) T rows[sliceVoxels];
@@ -162,7 +162,8 @@ HWY_INLINE void putRows(D tag, hn::Vec<D> values, int part, T* corner) {
         std::memcpy(corner + at / cubeSide * blockSide + at % cubeSide, rows + i, std::size_t(inRow) * sizeof(T));
 }
 
-// Eq. 3: from both layers to signed distances. The inside keeps its sign bit where the distance is clamped to zero.
+// Eq. 3: combines both layers into signed distances. Inside voxels keep their sign bit where the distance is clamped to
+// zero.
 template <class Nearest>
 HWY_INLINE void combine(const Nearest& inner, const Nearest& outer, const Voxels& v, const FillParameters& parameters,
                         int part, float* distances, std::int32_t* triangles) {
@@ -171,7 +172,7 @@ HWY_INLINE void combine(const Nearest& inner, const Nearest& outer, const Voxels
     for (int x = 0; x < cubeSide; ++x) {
         const int slice = x * blockSide * blockSide;
         const Vec inner2 = hn::Min(inner.distance2(v, x), certain2), outer2 = hn::Min(outer.distance2(v, x), certain2);
-        // where only the outer layer is near enough to be known, the tie tells nothing
+        // If only the outer layer is within the certain distance, a tie does not mean inside.
         const auto inside = hn::And(hn::Lt(inner2, certain2), hn::Le(inner2, hn::Add(outer2, hn::Set(tag, layerTie))));
         const Vec other2 = hn::Max(hn::Max(inner2, outer2), hn::Zero(tag));
         const Vec clamped = hn::Max(hn::Sub(hn::Sqrt(other2), delta), hn::Zero(tag));
@@ -184,8 +185,8 @@ HWY_INLINE void combine(const Nearest& inner, const Nearest& outer, const Voxels
     }
 }
 
-// Picks the points of both layers that reach a cube: those near enough or, with the paper's cubes, those whose
-// neighbourhood meets it.
+// Selects the points of both layers that reach a cube. With the paper's cubes, selects those whose neighbourhood
+// overlaps it.
 template <bool cube>
 HWY_INLINE void pick(const LayerBlockInput& input, const glm::vec3& middle, std::span<const LayerSamples::Range> ranges,
                      LayerPoints& inner, LayerPoints& outer) {

@@ -1,7 +1,7 @@
-// Both layers of one 8x8x8 block and the signed distances between them (section 3.2 and Eq. 3 of the paper).
+// The two layers of one 8x8x8 block and the signed distances between them (section 3.2 and Eq. 3 of the paper).
 //
-// The block is taken in cubes of 4x4x4 voxels. The points of both layers that reach a cube are picked from the cells
-// around it, then the voxels' nearest ones are kept in registers while all picked points are applied.
+// The block is processed in cubes of 4x4x4 voxels. The layer points that reach a cube are selected from the surrounding
+// cells. While these points are applied, the voxels' nearest points stay in registers.
 #pragma once
 
 #include <array>
@@ -14,14 +14,14 @@
 
 namespace bilayer::detail {
 
-/// What a block is filled from.
+/// The input for filling a block.
 struct LayerBlockInput {
     const LayerSamples& samples;
-    glm::ivec3 inBrick;  ///< the block's first voxel in the voxels of the brick
+    glm::ivec3 inBrick;  ///< the block's first voxel in brick voxels
     const FillParameters& parameters;
 };
 
-/// Both layers around a cube, seen from its middle. Memory is used again from cube to cube.
+/// The two layers around a cube, relative to its centre. Reuses its memory for each cube.
 struct LayerScratch {
     struct Layer {
         std::array<std::vector<float>, 4> columns;
@@ -32,8 +32,8 @@ struct LayerScratch {
 };
 
 /// Fills a block with signed distances [voxels]; +infinity where unknown. Returns whether any sample reaches the block;
-/// else nothing is written.
-/// @param triangles  if not null, receives the owners of the samples that decide
+/// otherwise writes nothing.
+/// @param triangles  if not null, receives the triangles of the nearest samples
 bool fillLayerBlock(const LayerBlockInput& input, LayerScratch& scratch, float* distances, std::int32_t* triangles);
 
 }  // namespace bilayer::detail

@@ -1,4 +1,4 @@
-// Highway compiles the part between HWY_BEFORE_NAMESPACE and HWY_AFTER_NAMESPACE once for each instruction set.
+// Highway compiles the code between HWY_BEFORE_NAMESPACE and HWY_AFTER_NAMESPACE once per instruction set.
 #include "sdf/fill/layer_samples.h"
 
 #undef HWY_TARGET_INCLUDE
@@ -19,16 +19,16 @@ namespace bilayer::detail::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 namespace {
 
-/// As many triangles at once as there are lanes of doubles, and as many samples of one triangle as of floats.
+/// As many triangles at once as there are double lanes, and as many samples of one triangle as there are float lanes.
 using Wide = hn::CappedTag<double, 8>;
 constexpr std::size_t maxLanes = 8;
-/// Triangles of up to so many rows are taken together; of one with more, samples fill a vector of their own.
+/// Triangles with up to this many rows are processed together. A triangle with more rows fills vectors of its own.
 constexpr int fewRows = 4;
 
 using Small = hn::Rebind<float, Wide>;
 using Row = hn::CappedTag<float, 16>;
 
-// Three coordinates of many points.
+// Three coordinates of several points.
 template <class D>
 struct Points {
     hn::Vec<D> x, y, z;
@@ -69,7 +69,7 @@ HWY_INLINE Points<D> pointsAt(D tag, const glm::vec3& place) {
     return {hn::Set(tag, place.x), hn::Set(tag, place.y), hn::Set(tag, place.z)};
 }
 
-// Spreads triangles of a brick out.
+// Generates the samples of the triangles in a brick.
 class Spreader {
   public:
     Spreader(const Mesh& mesh, const SampledBrick& brick, const SampleCells& cells, AddedSamples& to)
@@ -101,9 +101,9 @@ class Spreader {
     }
 
   private:
-    // The corners of some triangles. Those to come are fetched ahead, since they are all over memory.
+    // Loads the corners of some triangles. Prefetches the next ones, since they are scattered in memory.
     void load(std::span<const std::uint32_t> triangles, std::size_t first, std::size_t count) {
-        // as far ahead as memory takes to answer: first the indices, then the corners
+        // Prefetch distances match the memory latency: first the indices, then the corners.
         constexpr std::size_t indicesAhead = 32, cornersAhead = 16;
         for (std::size_t lane = 0; lane < count; ++lane) {
             const std::size_t i = first + lane;
@@ -118,7 +118,7 @@ class Spreader {
         }
     }
 
-    // In voxels.
+    // Returns corners in voxels.
     Points<Wide> corner(std::size_t k) {
         const Wide wide;
         const auto at = [&](std::size_t axis) {
@@ -137,7 +137,8 @@ class Spreader {
         hn::Store(points.z, Wide(), rows[2]);
     }
 
-    // Adds those of few rows, many triangles at once. Returns a bit for each of the others that have an area.
+    // Adds the samples of triangles with few rows, several triangles at once. Returns one bit for each other triangle
+    // with nonzero area.
     std::uint64_t addFew(std::size_t count) {
         const Wide wide;
         const Points<Wide> a = corner(0), b = corner(1), c = corner(2), ab = b - a, ac = c - a, bc = c - b,
@@ -174,7 +175,7 @@ class Spreader {
         return bytes[0];
     }
 
-    // Adds the samples of Algorithm 1, each of as many triangles as there are lanes: row i has i + 1 of them.
+    // Adds the samples of Algorithm 1 for as many triangles as there are lanes. Row i has i + 1 samples.
     void addRows(hn::Vec<Small> rows, const Points<Small>& start, const Points<Small>& down,
                  const Points<Small>& across, const Points<Small>& offset) {
         const Small small;
@@ -210,7 +211,7 @@ class Spreader {
         const auto half = hn::Set(tag, 0.5f), one = hn::Set(tag, 1.f);
         const int count = part.rows * (part.rows + 1) / 2;
         for (int k = 0; k < count; k += int(hn::Lanes(tag))) {
-            // the roots are exact where a row begins, and far enough from it before
+            // The square roots are exact at the start of a row, and clearly smaller before it.
             const auto number = hn::Add(hn::Iota(tag, 0), hn::Set(tag, float(k)));
             const auto root = hn::Sqrt(hn::MulAdd(number, hn::Set(tag, 8.f), one));
             const auto row = hn::Floor(hn::Mul(hn::Sub(root, one), half)),
@@ -224,7 +225,7 @@ class Spreader {
         }
     }
 
-    // The samples of a thin part.
+    // Adds the samples of a thin part.
     void addThin(const TilePart& part, std::uint32_t triangle, const TriangleLimits& limits) {
         const Row tag;
         const auto offset = offsetOf(part);
@@ -251,12 +252,13 @@ class Spreader {
         }
     }
 
-    // Of the outer layer from the samples. Divided in double: floats cannot hold the area of a very small triangle.
+    // Returns the vector from a sample to its outer layer point. The division is in double, since floats cannot hold
+    // the area of a very small triangle.
     Points<Row> offsetOf(const TilePart& part) const {
         return pointsAt(Row(), glm::vec3(part.normal * (double(brick_.options.delta) / part.length)));
     }
 
-    // Adds those `among` some samples, without those that stay away from the brick.
+    // Adds the samples in the mask `among`, except those too far from the brick.
     template <class Tag>
     HWY_INLINE void put(Tag tag, hn::Mask<Tag> among, const Points<Tag>& place, const Points<Tag>& offset,
                         hn::Vec<hn::RebindToSigned<Tag>> triangle) {
@@ -292,7 +294,7 @@ class Spreader {
     const SampleCells& cells_;
     glm::dvec3 origin_;  // of the brick [index coordinates]
     AddedSamples& to_;
-    // rows of a number a triangle
+    // One row per component, one column per triangle.
     alignas(64) float world_[3][3][maxLanes];
     alignas(64) std::int32_t triangles_[maxLanes];
     struct {
@@ -316,7 +318,7 @@ namespace {
 
 HWY_EXPORT(spread);
 
-constexpr std::size_t padding = 16;  // the floats of the widest vector
+constexpr std::size_t padding = 16;  // float count of the widest SIMD vector
 
 }  // namespace
 
@@ -335,7 +337,7 @@ void LayerSamples::begin(const SampledBrick& brick) {
     brick_.emplace(brick);
     cells_.lower = glm::vec3(-brick.reach);
     cells_.upper = glm::vec3(float(brick.side - 1) + brick.reach);
-    // a cell begins half a voxel before its voxels; a tenth of one is against rounding
+    // A cell begins half a voxel before its voxels. One tenth of a voxel is a margin for rounding.
     cells_.around = 1 + int(std::floor((brick.reach - 0.4f) / float(cellSide)));
     cells_.firstCorner = -0.5f - float(cells_.around * cellSide);
     cells_.size = brick.side / cellSide + 2 * cells_.around;
@@ -346,14 +348,14 @@ void LayerSamples::add(const Mesh& mesh, std::span<const std::uint32_t> triangle
     HWY_DYNAMIC_DISPATCH(spread)(mesh, triangles, *brick_, cells_, added_);
 }
 
-// A counting sort, stable.
+// A stable counting sort.
 void LayerSamples::finish() {
     const auto size = std::size_t(cells_.size);
     begins_.assign(size * size * size + 1, 0);
     for (std::size_t i = 0; i < added_.count; ++i) ++begins_[std::size_t(added_.cell[i]) + 1];
     std::partial_sum(begins_.begin(), begins_.end(), begins_.begin());
     sorted_.reserve(added_.count);
-    // from cells to places
+    // Converts cells to positions.
     for (std::size_t i = 0; i < added_.count; ++i)
         added_.cell[i] = std::int32_t(begins_[std::size_t(added_.cell[i])]++);
     const auto sort = [&](const auto& from, auto& to) {
@@ -365,7 +367,7 @@ void LayerSamples::finish() {
         sort(added_.columns.offset[axis], sorted_.offset[axis]);
     }
     sort(added_.columns.triangle, sorted_.triangle);
-    // each cursor now stands at the end of its cell
+    // Each cursor has reached the end of its cell.
     std::copy_backward(begins_.begin(), begins_.end() - 1, begins_.end());
     begins_[0] = 0;
 }

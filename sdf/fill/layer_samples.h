@@ -1,5 +1,4 @@
-// The samples of the double layer method in one brick: triangles spread out into samples, sorted by cells of space, in
-// columns that SIMD instructions read many of at once.
+// The samples of the double layer method in one brick. They are sorted by spatial cell and stored as columns for SIMD.
 #pragma once
 
 #include <array>
@@ -16,32 +15,32 @@
 
 namespace bilayer::detail {
 
-/// What samples are made for.
+/// The brick for which samples are generated, with its options.
 struct SampledBrick {
-    glm::ivec3 origin;  ///< index coordinates of its first voxel
+    glm::ivec3 origin;  ///< index coordinates of the first voxel
     int side;           ///< [voxels]
-    float reach;        ///< samples farther than this from the brick are left out [voxels]
+    float reach;        ///< samples farther than this from the brick are discarded [voxels]
     double voxelsPerUnit;
     const DoubleLayerOptions& options;
 };
 
-/// Samples in columns. As many numbers may be read, and written, beyond the last as a SIMD vector holds.
+/// Samples as a structure of arrays. One SIMD vector beyond the last sample may be read and written.
 struct SampleColumns {
-    std::array<std::vector<float>, 3> place;   ///< in the voxels of the brick
-    std::array<std::vector<float>, 3> offset;  ///< of the outer layer from it, minus that of the inner layer [voxels]
-    std::vector<std::int32_t> triangle;        ///< owner
+    std::array<std::vector<float>, 3> place;   ///< [brick voxels]
+    std::array<std::vector<float>, 3> offset;  ///< outer layer point minus sample; negated for the inner layer [voxels]
+    std::vector<std::int32_t> triangle;        ///< source triangle
 
-    /// Makes room for so many; memory only grows.
+    /// Ensures capacity for `count` samples; never shrinks.
     void reserve(std::size_t count);
 };
 
-/// Samples in the order of their triangles.
+/// Samples in triangle order.
 struct AddedSamples {
     SampleColumns columns;
     std::vector<std::int32_t> cell;
     std::size_t count = 0;
 
-    /// Makes room for so many.
+    /// Ensures capacity for `size` samples.
     void reserve(std::size_t size) {
         columns.reserve(size);
         if (cell.size() < columns.triangle.size()) cell.resize(columns.triangle.size());
@@ -50,28 +49,28 @@ struct AddedSamples {
 
 /// The cells of a brick.
 struct SampleCells {
-    int around = 1;                ///< cells beyond the brick, and around a cell that it looks at
+    int around = 1;                ///< layers of cells around the brick, and around a queried cell
     int size = 1;                  ///< cells along each axis
-    float firstCorner = 0;         ///< of all cells, on each axis
-    glm::vec3 lower{0}, upper{0};  ///< of all places that can matter
+    float firstCorner = 0;         ///< minimum corner of all cells, on each axis
+    glm::vec3 lower{0}, upper{0};  ///< bounds of all samples that can contribute
 };
 
-/// The samples of a brick. Memory is used again from brick to brick.
+/// The samples of a brick. Reuses its memory for each brick.
 class LayerSamples {
   public:
-    /// Side of a cell [voxels]. Cell (0, 0, 0) is around the first voxels of the brick, half a voxel beyond them.
+    /// Side of a cell [voxels]. Cell (0, 0, 0) covers the first voxels of the brick and half a voxel around them.
     static constexpr int cellSide = 4;
 
-    /// The lattice point nearest to a place. Halves go up, whatever the rounding.
+    /// Returns the lattice point nearest to a position. Halves round up, independent of rounding errors.
     static glm::vec3 nearestLattice(const glm::vec3& place) { return glm::floor(place + 0.5001f); }
 
-    /// Begins with a brick.
+    /// Starts a brick.
     void begin(const SampledBrick& brick);
 
     /// Adds the samples of triangles.
     void add(const Mesh& mesh, std::span<const std::uint32_t> triangles);
 
-    /// Sorts the samples; call it after the last triangle.
+    /// Sorts the samples. Call it after the last triangle.
     void finish();
 
     std::size_t count() const { return added_.count; }
@@ -82,16 +81,17 @@ class LayerSamples {
         std::uint32_t begin, end;
     };
 
-    /// Tells which samples may reach some cells, and perhaps others.
-    /// @param cells   along each axis
-    /// @param memory  that of the result
+    /// Returns ranges with all samples that may reach a cube of cells, and possibly others.
+    /// @param cells   count along each axis
+    /// @param memory  storage for the result
     std::span<const Range> near(const glm::ivec3& first, int cells, std::vector<Range>& memory) const {
         const int along = cells + 2 * cells_.around;
         if (memory.size() < std::size_t(along * along)) memory.resize(std::size_t(along * along));
         std::size_t count = 0;
         for (int x = first.x; x < first.x + along; ++x)
             for (int y = first.y; y < first.y + along; ++y) {
-                // written in any case and kept if it holds some: a branch would be guessed wrong half of the time
+                // The range is always written, and counted only if it is not empty. A branch would be mispredicted half
+                // of the time.
                 const std::uint32_t* row = begins_.data() + (x * cells_.size + y) * cells_.size + first.z;
                 memory[count] = {row[0], row[along]};
                 count += row[0] < row[along];

@@ -1,4 +1,4 @@
-// Highway compiles the part between HWY_BEFORE_NAMESPACE and HWY_AFTER_NAMESPACE once for each instruction set.
+// Highway compiles the code between HWY_BEFORE_NAMESPACE and HWY_AFTER_NAMESPACE once per instruction set.
 #include "sdf/fill/pieces.h"
 
 #undef HWY_TARGET_INCLUDE
@@ -20,10 +20,10 @@ using Tag = hn::CappedTag<float, PieceCutter::batch>;
 using Vec = hn::Vec<Tag>;
 using Mask = hn::Mask<Tag>;
 
-/// Rounding of a sample's place and of the radius around it [voxels].
+/// Rounding of a sample's position and its covering radius [voxels].
 constexpr float radiusSlack = 1e-5f;
-/// Shorter edges are points, and lower pieces are as good as their longest edge: floats hold the squares of all that is
-/// longer [voxels].
+/// Shorter edges count as points, and a piece with a smaller height counts as its longest edge [voxels]. Floats hold
+/// the squares of longer lengths.
 constexpr float shortest = 1e-9f;
 
 struct Vec3 {
@@ -54,17 +54,17 @@ inline Vec3 load(const float (&from)[3][PieceCutter::batch], std::size_t i) {
     return {hn::Load(tag, from[0] + i), hn::Load(tag, from[1] + i), hn::Load(tag, from[2] + i)};
 }
 
-// Whether a length gives a direction.
+// Returns whether a length is large enough to define a direction.
 inline Mask isLength(Vec length) {
     return hn::Gt(length, hn::Set(Tag(), shortest));
 }
 
-// One over a length; zero for what is none.
+// Returns the reciprocal of a length; zero if it is too small.
 inline Vec inverse(Vec length) {
     return hn::IfThenElseZero(isLength(length), hn::Div(hn::Set(Tag(), 1.f), length));
 }
 
-// A unit vector across a unit vector: for pieces without a height.
+// Returns a unit vector perpendicular to a unit vector, for pieces without height.
 inline Vec3 across(Vec3 u) {
     const Tag tag;
     const Mask useX = hn::Lt(hn::Abs(u.x), hn::Set(tag, 0.6f));
@@ -73,7 +73,7 @@ inline Vec3 across(Vec3 u) {
     return inverse(hn::Sqrt(dot(way, way))) * way;
 }
 
-// The numbers of a batch of pieces, a column each.
+// The values of a batch of pieces, one column per piece.
 struct Columns {
     void put(int row, std::size_t i, Vec value) { hn::Store(value, Tag(), values[row] + i); }
     void put(int row, std::size_t i, Vec3 value) {
@@ -86,7 +86,7 @@ struct Columns {
 };
 enum Row { origin = 0, axisU = 3, axisW = 6, axisN = 9, length = 12, left = 13, right = 16, sample = 19, radius = 22 };
 
-// The unit vector and the length of an edge in (u, w).
+// Stores the unit vector and the length of an edge in (u, w).
 inline void putEdge(Columns& columns, int row, std::size_t i, Vec x, Vec y) {
     const Tag tag;
     const Vec size = hn::Sqrt(hn::Add(hn::Mul(x, x), hn::Mul(y, y))), part = inverse(size);
@@ -98,7 +98,7 @@ inline void putEdge(Columns& columns, int row, std::size_t i, Vec x, Vec y) {
 inline void makeColumns(const PieceCutter::Waiting& waiting, std::size_t i, Columns& columns) {
     const Tag tag;
     const Vec3 corner = load(waiting.corner, i), ab = load(waiting.ab, i), ac = load(waiting.ac, i), bc = ac - ab;
-    // turned so that the longest edge comes first
+    // Permutes the corners cyclically so that the longest edge comes first.
     const Vec ab2 = dot(ab, ab), bc2 = dot(bc, bc), ca2 = dot(ac, ac);
     const Mask first = hn::And(hn::Ge(ab2, bc2), hn::Ge(ab2, ca2)), second = hn::Ge(bc2, ca2);
     const Vec3 none{hn::Zero(tag), hn::Zero(tag), hn::Zero(tag)};
@@ -111,7 +111,8 @@ inline void makeColumns(const PieceCutter::Waiting& waiting, std::size_t i, Colu
     const Vec along = hn::Min(hn::Max(dot(third, u), hn::Zero(tag)), size);
     const Vec3 rest = third - along * u;
     Vec height = hn::Sqrt(dot(rest, rest));
-    // once more across u, because the rest of a flat piece is mostly rounding; if nothing remains then, all of it was
+    // Orthogonalized a second time, because the remainder of a flat piece is mostly rounding. If nothing remains then,
+    // all of it was rounding.
     const Vec3 rough = inverse(height) * rest, way = rough - dot(rough, u) * u;
     const Vec wayLength = hn::Sqrt(dot(way, way));
     const Mask flat = hn::Or(hn::Not(isLength(height)), hn::Lt(wayLength, hn::Set(tag, 0.5f)));
@@ -124,7 +125,7 @@ inline void makeColumns(const PieceCutter::Waiting& waiting, std::size_t i, Colu
     columns.put(Row::length, i, size);
     putEdge(columns, Row::left, i, along, height);
     putEdge(columns, Row::right, i, hn::Sub(along, size), height);
-    // the centre of the smallest circle around the piece: of its corners', or the middle of the longest edge
+    // Centre of the smallest enclosing circle: the circumcentre, or the middle of the longest edge.
     const Vec half = hn::Mul(hn::Set(tag, 0.5f), size);
     const Vec lift = hn::Div(hn::Sub(hn::Add(hn::Mul(along, along), hn::Mul(height, height)), hn::Mul(along, size)),
                              hn::Add(height, height));

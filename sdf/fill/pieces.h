@@ -1,7 +1,7 @@
-// Triangles cut into pieces of about a voxel, each with a sample and the radius around it that covers the piece. The
-// samples tell which pieces can be nearest to a voxel; the pieces say how near. This is the double layer method's
-// sampling with both layers on the surface (delta = 0), where the covering radius makes the choice of pieces provably
-// sufficient: the nearest piece has its sample within its radius plus any upper bound of the distance.
+// Cuts triangles into pieces of about one voxel, each with a sample and a covering radius around the sample. The
+// samples select the pieces that can be nearest to a voxel, and the pieces give the distance. This is the sampling of
+// the double layer method with both layers on the surface (delta = 0). The covering radius makes the selection provably
+// sufficient: the sample of the nearest piece lies within its radius plus any upper bound of the distance.
 #pragma once
 
 #include <algorithm>
@@ -15,48 +15,50 @@
 
 namespace bilayer::detail {
 
-/// A piece in a frame of its own: the longest edge runs from the origin along `u`, the third corner lies on the side of
-/// `w`. All numbers follow from the corners' differences to a lattice point beside them, so distances do not depend on
-/// which block or brick asks, and floats hold them to 1e-6 voxels however far the mesh is from the origin.
+/// A piece in its local frame. The longest edge runs from the origin along `u`, and the third corner lies on the side
+/// of `w`. All values derive from the differences between the corners and a nearby lattice point. Distances therefore
+/// do not depend on the block or brick, and floats resolve them to 1e-6 voxels at any distance from the mesh origin.
 struct Piece {
-    glm::ivec3 base;     ///< a voxel near the piece [index coordinates]
-    glm::vec3 origin;    ///< one end of the longest edge, from `base` [voxels]
-    glm::vec3 u, w, n;   ///< unit vectors: along the longest edge, across it in the plane, normal (either side)
-    float length;        ///< of the longest edge [voxels]
+    glm::ivec3 base;   ///< a voxel near the piece [index coordinates]
+    glm::vec3 origin;  ///< one end of the longest edge, from `base` [voxels]
+    glm::vec3 u, w,
+        n;         ///< unit vectors: along the longest edge, perpendicular to it in the plane, normal (either side)
+    float length;  ///< of the longest edge [voxels]
     float ox, oy, olen;  ///< unit vector from the origin to the third corner in (u, w), and the length [voxels]
-    float ex, ey, elen;  ///< the same from the longest edge's other end
+    float ex, ey, elen;  ///< the same from the other end of the longest edge
     glm::vec3 sample;    ///< a point of the piece, from `base` [voxels]
-    float radius;        ///< no point of the piece is farther from the sample [voxels]
+    float radius;        ///< maximum distance of a point of the piece from the sample [voxels]
     std::uint32_t triangle;
 };
 
 /// Cuts triangles into pieces.
 class PieceCutter {
   public:
-    /// @param longestEdge  no piece has a longer edge than this [voxels]
-    /// @param pieces       where they go
+    /// @param longestEdge  maximum edge length of a piece [voxels]
+    /// @param pieces       receives the pieces
     PieceCutter(double longestEdge, std::vector<Piece>& pieces)
         : longestEdge2_(longestEdge * longestEdge), pieces_(pieces) {}
 
-    /// Cuts a triangle by halving longest edges, and leaves out pieces whose box misses the limits. Pieces do not
-    /// depend on the limits, and those of two triangles meet at the same points of a shared edge.
+    /// Cuts a triangle by bisecting longest edges, and discards pieces whose box misses the limits. Pieces do not
+    /// depend on the limits. The pieces of two triangles meet at the same points of a shared edge.
     void cut(const TriangleCorners& corners, std::uint32_t triangle, const TriangleLimits& limits) {
         const TriangleCorners& c = corners;
         const glm::dvec3 ab = c[1] - c[0], bc = c[2] - c[1], ca = c[0] - c[2];
-        // most triangles of a fine mesh are short, and a call for each would take as long as the rest
+        // Most triangles of a fine mesh are short. A function call for each would double the cost.
         if (std::max({glm::dot(ab, ab), glm::dot(bc, bc), glm::dot(ca, ca)}) <= longestEdge2_)
             add(c[0], ab, -ca, triangle);
         else
             halve(c, triangle, limits);
     }
 
-    /// Finishes the pieces that are still waiting: call it after the last triangle.
+    /// Processes the remaining pieces of the last batch. Call it after the last triangle.
     void finish();
 
-    /// Pieces are made by SIMD, this many at a time.
+    /// Batch size of the SIMD code.
     static constexpr int batch = 16;
 
-    /// Pieces to be made: a lattice point, a corner as seen from it, the ways from there to the next corners.
+    /// A batch of pieces to process: a lattice point, a corner relative to it, the vectors from there to the other
+    /// corners.
     struct Waiting {
         std::array<glm::ivec3, batch> base;
         std::array<std::uint32_t, batch> triangle;
@@ -80,7 +82,7 @@ class PieceCutter {
     }
     void halve(const TriangleCorners& corners, std::uint32_t triangle, const TriangleLimits& limits);
 
-    // Rounds to the nearest, halves always up, so that a shift by whole voxels shifts the result. For |value| < 2^31.
+    // Rounds to nearest with halves up, so that a shift by whole voxels shifts the result. Valid for |value| < 2^31.
     static int roundToInt(double value) {
         constexpr double shift = 2147483648.0;
         return int(std::int64_t(value + 0.5 + shift) - std::int64_t(shift));

@@ -17,11 +17,12 @@
 namespace bilayer::detail {
 namespace {
 
-/// One task fills the blocks of a cube with this side: enough work, and many tasks [voxels].
+/// Side of the cube of blocks that one task fills: large enough to amortize a task, small enough for many tasks
+/// [voxels].
 constexpr int taskSide = 32;
-/// Room for the rounding of a distance where all triangles are sought that may be nearest [voxels].
+/// Tolerance of the search for all triangles that can be nearest [voxels].
 constexpr float sideSlack = 1e-3f;
-/// As the largest side of a node that may stay in a list: leaves only.
+/// Maximum node side that opens every node: only leaves remain in the list.
 constexpr float openAll = -1;
 
 class Filler {
@@ -42,7 +43,7 @@ class Filler {
     }
 
   private:
-    // What a thread works in.
+    // Working memory of a thread.
     struct Scratch {
         explicit Scratch(const MeshJob& job) : side(job.mesh, 1.0 / double(job.voxelSize)) {}
 
@@ -102,7 +103,8 @@ class Filler {
             scratch.triangles.insert(scratch.triangles.end(), answer.triangles, answer.triangles + blockVoxels);
     }
 
-    // Sides over faces are known; links carry them on, beyond the reach too. What they do not reach is asked for.
+    // Voxels that project onto a face have a known sign, which links propagate, also beyond the reach. Each remaining
+    // component is queried.
     void signDistances(const glm::ivec3& block, Scratch& scratch) {
         BlockAnswer& answer = scratch.answer;
         std::size_t onBoth = completeSides(findSignLinks(answer.distances), {&answer.far, &answer.mid, &answer.known},
@@ -114,7 +116,7 @@ class Filler {
                 answer.distances[x * 64 + std::size_t(std::countr_zero(inside))] *= -1;
     }
 
-    // Voxels that links have given another side than their nearest face, and than their pseudonormal.
+    // Counts voxels whose propagated sign differs from their nearest face and from their pseudonormal.
     std::size_t contradictions(const glm::ivec3& block, Scratch& scratch) {
         const BlockSides &sides = scratch.answer.sides, &nearest = scratch.answer.nearest;
         std::size_t count = 0;
@@ -128,7 +130,7 @@ class Filler {
         return count;
     }
 
-    // Whether a voxel is inside by the pseudonormal at its closest point.
+    // Returns whether a voxel is inside by the pseudonormal at its closest point.
     bool isInside(int voxel, const glm::ivec3& block, Scratch& scratch) {
         const glm::ivec3 at = block + glm::ivec3(voxel / 64, voxel / 8 % 8, voxel % 8);
         const glm::dvec3 point(at + tree_.base);

@@ -1,5 +1,5 @@
-// Cuts triangles into parts that Algorithm 1 of the paper can sample without gaps. A header, because most triangles of
-// a fine mesh are one part with one sample, and a call for each would cost as much as the cut.
+// Cuts triangles into parts that Algorithm 1 of the paper can sample without gaps. It is a header because most
+// triangles of a fine mesh are one part with one sample. A function call for each would cost as much as the cut.
 #pragma once
 
 #include <algorithm>
@@ -15,25 +15,26 @@
 
 namespace bilayer::detail {
 
-/// A part of a triangle with the samples that it gets: rows of them or, where the part is thin, one row along it.
+/// A part of a triangle and its sampling: several rows or, if the part is thin, one row along its longest edge.
 struct TilePart {
     TriangleCorners corners;
     int rows;                  ///< n of Algorithm 1; 0 if the part is thin
-    int along;                 ///< samples of a thin part, see ThinPart
+    int along;                 ///< count of samples of a thin part, see ThinPart
     const glm::dvec3& normal;  ///< of the triangle, outward
     double length;             ///< of the normal
 };
 
-/// Where the samples of a thin part lie: at `(k + 1/3) / along` of its longest edge, and from there half of the way
-/// across. Thirds, because the neighbour that shares the edge runs along it the other way: its samples fall between.
+/// Sample positions of a thin part. Samples start at `(k + 1/3) / along` of the longest edge and lie half of the way
+/// across the part. The offset is one third because the neighbour at the edge traverses it in the opposite direction.
+/// Its samples therefore fall between these.
 class ThinPart {
   public:
-    static constexpr int run = 16;  ///< samples that are found together
+    static constexpr int run = 16;  ///< samples computed together
 
-    /// A run of them. The first one lies at `start + min(up, down) * rise`; from one to the next `start`, `up` and
-    /// `down` change by their steps.
+    /// A run of samples. The first is at `start + min(up, down) * rise`. Each next one adds the steps to `start`, `up`
+    /// and `down`.
     struct Run {
-        glm::dvec3 start, startStep, rise;  ///< on the edge, and half of the way to the corner opposite [voxels]
+        glm::dvec3 start, startStep, rise;  ///< on the edge, and half of the vector to the opposite corner [voxels]
         double up, upStep, down, downStep;
         int count;  ///< samples
     };
@@ -44,12 +45,12 @@ class ThinPart {
         from_ = c[i];
         edge_ = c[(i + 1) % 3] - from_;
         const glm::dvec3 opposite = c[(i + 2) % 3] - from_;
-        // a corner above an end of the edge is one that is almost there
+        // Keeps the opposite corner slightly away from the ends of the edge.
         peak_ = std::clamp(glm::dot(opposite, edge_) / glm::dot(edge_, edge_), 1e-6, 1 - 1e-6);
         rise_ = 0.5 * (opposite - peak_ * edge_);
     }
 
-    /// Each run is found anew, so that floats hold what they are from its first sample.
+    /// Each run is computed independently, so that floats resolve positions relative to its first sample.
     Run runFrom(int first) const {
         const double step = 1.0 / double(along_), at = (double(first) + 1.0 / 3.0) * step;
         return {from_ + at * edge_,
@@ -62,9 +63,9 @@ class ThinPart {
                 std::min(run, along_ - first)};
     }
 
-    /// The runs that may come into a box, by their first samples: from .first until .second, a run apart.
+    /// Returns the runs that may enter a box: first samples from .first to .second (exclusive), in steps of `run`.
     std::pair<int, int> within(const TriangleLimits& limits) const {
-        double low = 0, high = 1;  // of the edge
+        double low = 0, high = 1;  // fractions of the edge
         for (int axis = 0; axis < 3; ++axis) {
             const double lower = limits.lower[axis] - std::max(rise_[axis], 0.0) - from_[axis],
                          upper = limits.upper[axis] - std::min(rise_[axis], 0.0) - from_[axis];
@@ -77,7 +78,7 @@ class ThinPart {
             high = std::min(high, std::max(a, b));
         }
         if (low > high) return {0, 0};
-        // a sample more at each end is against rounding
+        // One more sample at each end allows for rounding.
         const int first = std::max(0, int(low * along_) - 2), end = std::min(along_, int(high * along_) + 2);
         return {first / run * run, end};
     }
@@ -98,20 +99,21 @@ class ThinPart {
   private:
     int along_;
     glm::dvec3 from_, edge_, rise_;
-    double peak_;  // where the corner opposite is above the edge, in parts of it
+    double peak_;  // projection of the opposite corner onto the edge, as a fraction of it
 };
 
-/// Algorithm 1 divides the longest edge into as many parts as the others. For a triangle of ordinary shape a part is at
-/// most 2 sqrt(epsilon) long (half a square: exactly 2); beyond this factor the triangle counts as a sliver.
+/// Sliver threshold. Algorithm 1 divides every edge into the same count of parts. For a triangle of ordinary shape, a
+/// part of the longest edge is at most 2 sqrt(epsilon) long (half a square: exactly 2). A triangle above this factor is
+/// a sliver.
 inline constexpr double sliverStep = 3.0;
 
-/// The samples of a thin part are so many roots of epsilon apart, fewer than along the longest edge of half a square:
-/// no other row is beside them.
+/// Distance between the samples of a thin part, in units of sqrt(epsilon). It is smaller than along the longest edge of
+/// half a square, because a thin part has no second row.
 inline constexpr double thinStep = 1.6;
-/// Of one part, at most.
+/// Maximum count of samples in a part.
 inline constexpr double maxAlong = 1 << 30;
 
-/// A triangle with an area up to epsilon has one sample if the square of its longest edge is at most this [voxels^2].
+/// A triangle with an area up to epsilon gets one sample if its squared longest edge is at most this [voxels^2].
 inline double longestOfOneSample2(const DoubleLayerOptions& options) {
     return sliverStep * sliverStep * double(options.epsilon);
 }
@@ -120,18 +122,18 @@ inline double longestOfOneSample2(const DoubleLayerOptions& options) {
 template <class Emit>
 class TileCutter {
   public:
-    /// @param limits  not null: of a triangle that is cut, parts whose box misses the limits are left out
+    /// @param limits  if not null, parts of a cut triangle are discarded if their box misses the limits
     TileCutter(const DoubleLayerOptions& options, const TriangleLimits* limits, Emit emit)
         : options_(options), epsilon_(double(options.epsilon)), limits_(limits), emit_(emit) {}
 
-    /// A triangle without area gives no part.
+    /// Emits no part for a triangle without area.
     void cut(const TriangleCorners& c) {
         const glm::dvec3 normal = glm::cross(c[1] - c[0], c[2] - c[0]);
         const double length = glm::length(normal);
         if (length > 0) cut(c, normal, length, longestEdge2(c));
     }
 
-    /// The same with what is known already.
+    /// The same with precomputed values.
     /// @param normal    outward, of any length above zero
     /// @param longest2  square of the longest edge
     void cut(const TriangleCorners& c, const glm::dvec3& normal, double length, double longest2) {
@@ -153,12 +155,12 @@ class TileCutter {
         return std::max({glm::dot(ab, ab), glm::dot(bc, bc), glm::dot(ca, ca)});
     }
 
-    // Algorithm 1; where it would leave gaps, on halves or quarters of the triangle, or a row of samples along it.
+    // Algorithm 1. Where it would leave gaps, bisects or quarters the triangle, or emits one row of samples along it.
     void rows(const TriangleCorners& c, double area, double longest2) {
         const double n = std::max(1.0, std::ceil(std::sqrt(area / epsilon_)));
         if (options_.fillGaps) {
             if (longest2 > sliverStep * sliverStep * n * n * epsilon_) {
-                // no higher above its longest edge than rows are apart
+                // The height above the longest edge is at most the row distance.
                 if (4 * area * area <= epsilon_ * longest2) return emitThin(c, longest2);
                 return halve(c, area, &TileCutter::rows);
             }
@@ -167,7 +169,7 @@ class TileCutter {
         emitRows(c, int(std::min(n, double(options_.maxSubdivision))));
     }
 
-    // Fig. 2: barycentres of parts below epsilon.
+    // Fig. 2: one sample at the barycentre of each part below epsilon.
     void recurse(const TriangleCorners& c, double area, double longest2) {
         if (options_.fillGaps && longest2 > sliverStep * sliverStep * epsilon_ && area <= epsilon_)
             return halve(c, area, &TileCutter::recurse);

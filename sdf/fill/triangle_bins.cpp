@@ -15,15 +15,15 @@
 namespace bilayer::detail {
 namespace {
 
-constexpr int smallestShift = 5;                 // bricks of 32 voxels a side: their work fits a core's own cache
-constexpr double cellsAtMost = 1 << 22;          // beyond this bricks are larger: 16 MiB of counters
+constexpr int smallestShift = 5;         // bricks of at least 32 voxels a side: their data fits a core's own cache
+constexpr double cellsAtMost = 1 << 22;  // maximum cell count, 16 MiB of counters; larger boxes get larger bricks
 constexpr std::size_t countersAtMost = 1 << 22;  // over all runs: 16 MiB
-constexpr std::size_t trianglesPerRun = 8192;    // what one task bins
-constexpr std::size_t runsPerThread = 8;         // enough to share out unequal runs
+constexpr std::size_t trianglesPerRun = 8192;    // work of one task
+constexpr std::size_t runsPerThread = 8;         // enough to balance unequal runs
 constexpr std::size_t trianglesPerPoll = 1024;   // tens of microseconds; huge triangles poll at each step
-constexpr std::size_t trianglesAhead = 16;       // whose corners are fetched: about the latency of memory
+constexpr std::size_t trianglesAhead = 16;       // prefetch distance of corners: about the memory latency
 
-// Rounds down; quicker than std::floor without SSE 4.1. Right for |value| < 2^31.
+// Rounds down. Faster than std::floor without SSE 4.1. Valid for |value| < 2^31.
 int floorToInt(double value) {
     constexpr double shift = 2147483648.0;
     return int(std::int64_t(value + shift) - std::int64_t(shift));
@@ -37,7 +37,7 @@ struct Corners {
     glm::dvec3 a, b, c;  // [voxels]
 };
 
-// The bricks along the axes.
+// The range of bricks along each axis.
 struct BrickRange {
     BrickRange(const Bounds& box, double voxelsPerUnit, double reach) {
         const glm::dvec3 lower = glm::dvec3(box.lower) * voxelsPerUnit - reach,
@@ -53,11 +53,12 @@ struct BrickRange {
         return (std::size_t(x) * std::size_t(size.y) + std::size_t(y)) * std::size_t(size.z) + std::size_t(z);
     }
 
-    int shift;               // bricks have 2^shift voxels a side
+    int shift;               // a brick has 2^shift voxels a side
     glm::ivec3 first, size;  // [bricks]
 };
 
-// The bricks around most triangles: two at most along each axis. In 32 bits, so that they are worked out once.
+// The bricks around a typical triangle: at most two along each axis. Packed into 32 bits, so that they are computed
+// only once.
 class FewBricks {
   public:
     FewBricks() = default;
@@ -95,7 +96,7 @@ class Binner {
           progress_(progress) {}
 
     TriangleBins run() {
-        // a counting sort, stable whatever the number of runs: count in each run, sum up, scatter
+        // A counting sort, stable for any run count: count in each run, compute offsets, scatter.
         const std::size_t count = mesh_.triangles.size(), cells = range_.cells();
         const auto threads = std::size_t(tbb::this_task_arena::max_concurrency());
         const std::size_t runs = std::max<std::size_t>(1, std::min({threads * runsPerThread, countersAtMost / cells,
@@ -130,14 +131,15 @@ class Binner {
     }
 
   private:
-    // Corners of triangles in the order of a file are all over memory.
+    // In file order, the corners of triangles are scattered in memory.
     void prefetch(std::size_t i) const {
         if (i + trianglesAhead >= mesh_.triangles.size()) return;
         const glm::uvec3& ahead = mesh_.triangles[i + trianglesAhead];
         for (int k = 0; k < 3; ++k) __builtin_prefetch(&mesh_.points[ahead[k]]);
     }
 
-    // Turns counts into places: `cursors` become offsets inside their brick, and the result the begin of each cell.
+    // Converts counts to offsets. `cursors` receives the offsets within each brick; the result is the start of each
+    // cell.
     std::vector<std::uint64_t> sumUp(std::vector<std::uint32_t>& cursors, std::size_t runs, TriangleBins& bins) const {
         const std::size_t cells = range_.cells();
         std::vector<std::uint64_t> begins(cells);
@@ -180,8 +182,8 @@ class Binner {
         return FewBricks::many();
     }
 
-    // Visits the bricks of a box that a triangle reaches: boxes of bricks are halved, and left out where it stays away.
-    // So a needle costs its length, not the box around it.
+    // Visits the bricks of a box that a triangle reaches. Bisects boxes of bricks and discards those out of reach. The
+    // cost of a needle triangle is thus proportional to its length, not to its box.
     template <class Visit>
     void divide(const Corners& c, const glm::ivec3& lower, const glm::ivec3& upper, const Visit& visit) const {
         if (staysAway(c, lower, upper)) return;
@@ -195,8 +197,9 @@ class Binner {
         divide(c, next, upper, visit);
     }
 
-    // Whether a plane parts a triangle from a box of bricks and all within reach of it: one along the triangle, a side
-    // of the box, or one along an edge of each (S. Gottschalk and others, SIGGRAPH 1996).
+    // Returns whether a plane separates a triangle from a box of bricks, enlarged by the reach. Separating axis test:
+    // the triangle's normal, the axes of the box, and the cross products of edges (S. Gottschalk and others, SIGGRAPH
+    // 1996).
     bool staysAway(const Corners& c, const glm::ivec3& lower, const glm::ivec3& upper) const {
         if (progress_) progress_->poll();
         const double side = double(1 << range_.shift), reach = reach_ + 1;

@@ -1,6 +1,5 @@
-// Which triangles reach which brick of space: the first, coarse step of the exact and the double layer
-// method. Bins hold indices only, so
-// that memory stays a fraction of the mesh's own.
+// Bins triangles into bricks of space, the coarse first step of the exact and the double layer method. Bins hold only
+// indices, so their memory is a fraction of the mesh's.
 #pragma once
 
 #include <array>
@@ -16,7 +15,7 @@ namespace bilayer::detail {
 
 class Progress;
 
-/// The bricks that some triangle reaches, each with its triangles in ascending order.
+/// The bricks that triangles reach, each with its triangles in ascending order.
 struct TriangleBins {
     int side = 0;                          ///< of a brick [voxels], a power of two, at least 32
     std::vector<glm::ivec3> origins;       ///< index coordinates of each brick's first voxel, multiples of `side`
@@ -29,18 +28,18 @@ struct TriangleBins {
     }
 };
 
-/// Bins triangles into bricks. `reach` is how far from a triangle a voxel may lie [voxels]. A brick may hold triangles
-/// that reach none of its voxels. Throws Cancelled.
-/// @param box       of the mesh
-/// @param progress  polled, unless null
+/// Bins triangles into bricks. A brick may contain triangles that reach none of its voxels. Throws Cancelled.
+/// @param box       bounds of the mesh
+/// @param reach     maximum distance of a voxel from a triangle that affects it [voxels]
+/// @param progress  polled for cancellation, unless null
 TriangleBins binTriangles(const Mesh& mesh, const Bounds& box, double voxelsPerUnit, float reach,
                           Progress* progress = nullptr);
 
-/// Calls visit(triangle, corners) for the triangles of a brick, with their corners in voxels. Those to come are fetched
-/// ahead, since they are all over memory.
+/// Calls visit(triangle, corners) for the triangles of a brick, with their corners in voxels. Prefetches the next
+/// triangles, since they are scattered in memory.
 template <class Visit>
 void forEachTriangle(const Mesh& mesh, std::span<const std::uint32_t> triangles, double voxelsPerUnit, Visit visit) {
-    // as far ahead as memory takes to answer: first the indices, then the corners
+    // Prefetch distances match the memory latency: first the indices, then the corners.
     constexpr std::size_t indicesAhead = 16, cornersAhead = 8;
     for (std::size_t i = 0; i < triangles.size(); ++i) {
         if (i + indicesAhead < triangles.size()) __builtin_prefetch(&mesh.triangles[triangles[i + indicesAhead]]);
@@ -54,7 +53,7 @@ void forEachTriangle(const Mesh& mesh, std::span<const std::uint32_t> triangles,
     }
 }
 
-/// The side of the bricks that binTriangles() would make [voxels].
+/// Returns the brick side that binTriangles() would choose [voxels].
 int brickSideFor(const Bounds& box, double voxelsPerUnit, float reach);
 
 }  // namespace bilayer::detail

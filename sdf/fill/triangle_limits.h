@@ -1,4 +1,4 @@
-// A triangle in voxels, and the box that it must come near to matter.
+// A triangle in voxels, and the box that it must overlap to be relevant.
 #pragma once
 
 #include <array>
@@ -16,7 +16,7 @@ struct TriangleLimits {
     glm::dvec3 lower, upper;
 };
 
-/// Whether the box around a triangle misses the limits.
+/// Returns whether the bounding box of a triangle misses the limits.
 inline bool misses(const TriangleCorners& c, const TriangleLimits& limits) {
     const glm::dvec3 lower = glm::min(c[0], glm::min(c[1], c[2])), upper = glm::max(c[0], glm::max(c[1], c[2]));
     return glm::any(glm::greaterThan(lower, limits.upper)) || glm::any(glm::lessThan(upper, limits.lower));

@@ -1,4 +1,4 @@
-// Highway compiles the part between HWY_BEFORE_NAMESPACE and HWY_AFTER_NAMESPACE once for each instruction set.
+// Highway compiles the code between HWY_BEFORE_NAMESPACE and HWY_AFTER_NAMESPACE once per instruction set.
 #include "sdf/leaf/band.h"
 
 #undef HWY_TARGET_INCLUDE
@@ -32,7 +32,7 @@ inline Mask getBits(const BlockMask& bits, int voxel) {
     return hn::LoadMaskBits(Tag(), some);
 }
 
-// What each voxel's distance says of it: unknown, inside, in the band.
+// Classifies each voxel by its distance: unknown, inside, in the band.
 void sortVoxels(const float* distances, const BandWidths& widths, BlockMask& unknown, BlockMask& inside,
                 BlockMask& band) {
     const Tag tag;
@@ -48,7 +48,7 @@ void sortVoxels(const float* distances, const BandWidths& widths, BlockMask& unk
     }
 }
 
-// Lets the known signs grow into the unknown voxels, a step at a time; where both arrive at once the outside wins.
+// Propagates the known signs into the unknown voxels, one step at a time. Outside wins a tie.
 void flood(BlockMask& unknown, BlockMask& outside, BlockMask& inside) {
     while (any(unknown)) {
         const BlockMask out = grown(outside), in = grown(inside);

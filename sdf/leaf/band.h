@@ -1,4 +1,4 @@
-// From the distances that a filler found to what a leaf of the band holds: trimmed to the band, every voxel signed.
+// Converts the distances of a block to the values of a leaf: limited to the band, every voxel signed.
 #pragma once
 
 #include <array>
@@ -8,7 +8,7 @@
 
 namespace bilayer::detail {
 
-/// One bit a voxel, in the order of an OpenVDB leaf: voxel (x, y, z) is bit y * 8 + z of word x.
+/// One bit per voxel, in the order of an OpenVDB leaf: voxel (x, y, z) is bit y * 8 + z of word x.
 using BlockMask = std::array<std::uint64_t, blockSide>;
 
 inline bool any(const BlockMask& mask) {
@@ -17,9 +17,9 @@ inline bool any(const BlockMask& mask) {
     return bits != 0;
 }
 
-/// The mask and all voxels that share a face with it inside the block.
+/// Returns the mask dilated by the face neighbours inside the block.
 inline BlockMask grown(const BlockMask& mask) {
-    constexpr std::uint64_t lowestZ = 0x0101010101010101ull, highestZ = lowestZ << 7;  // of a word's rows
+    constexpr std::uint64_t lowestZ = 0x0101010101010101ull, highestZ = lowestZ << 7;  // in each row of a word
     BlockMask result;
     for (std::size_t x = 0; x < blockSide; ++x) {
         const std::uint64_t m = mask[x];
@@ -37,19 +37,18 @@ struct BandWidths {
     float voxelSize;           ///< [m]
 };
 
-/// Which voxels of a leaf lie in the band, and which inside the surface.
+/// The voxels of a leaf that lie in the band, and those inside the surface.
 struct BandMasks {
     BlockMask active, inside;
 };
 
-/// Nearer to the edge of the band than this is outside of it, so that a face of the mesh exactly as far away as the
-/// band is wide gives the same voxels whatever the rounding [voxels].
+/// Voxels closer than this to the edge of the band are outside the band [voxels]. A face exactly one band width away
+/// thus gives the same voxels with any rounding.
 inline constexpr float bandEdge = 1e-5f;
 
-/// Turns one block's signed distances [voxels] into a leaf's values [m]: active where -interior < distance < exterior,
-/// else plus the exterior or minus the interior width. Voxels of unknown distance take the sign of the known ones that
-/// they are connected with inside the block, the nearest first. Returns false, and leaves the outputs alone, if nothing
-/// is known.
+/// Converts the signed distances of a block [voxels] to the values of a leaf [m]. Voxels with -interior < distance <
+/// exterior are active; others hold +exterior or -interior. Voxels of unknown distance take the sign of connected known
+/// voxels in the block, the nearest first. Returns false and writes nothing if no distance is known.
 bool trimToBand(const float* distances, const BandWidths& widths, float* values, BandMasks& masks);
 
 }  // namespace bilayer::detail

@@ -1,5 +1,5 @@
-// What fills blocks on the processor or on a device, and what it gives back. The processor's are in exact.h,
-// pseudonormal.h and double_layer.h, OpenCL's is in cl/filler.h.
+// The interface between a build and the code that fills its blocks. The CPU implementations are in exact.h,
+// pseudonormal.h and double_layer.h, the OpenCL implementation is in cl/filler.h.
 #pragma once
 
 #include <atomic>
@@ -15,52 +15,52 @@ namespace bilayer::detail {
 
 class Progress;
 
-inline constexpr int blockSide = 8;                                    ///< voxels: an OpenVDB leaf
+inline constexpr int blockSide = 8;                                    ///< [voxels], as an OpenVDB leaf
 inline constexpr int blockVoxels = blockSide * blockSide * blockSide;  ///< voxel (x, y, z) at (x * 8 + y) * 8 + z
 
-/// The constants of a fill, in voxels, the same for every device.
+/// Parameters of a fill, in voxels, the same on every device.
 struct FillParameters {
     float delta;     ///< distance of each layer from the surface
-    float reach;     ///< a sample counts for voxels nearer to it than this
-    float certain;   ///< a voxel is known if the nearer of its two layers is nearer than this
+    float reach;     ///< a sample affects voxels closer than this
+    float certain;   ///< a distance is known if the nearer of the two layers is closer than this
     int cube;        ///< 0, or K where the paper's cube of (2K + 1)^3 voxels replaces the ball of radius `reach`
-    bool triangles;  ///< whether the nearest triangle is asked for
+    bool triangles;  ///< whether the nearest triangle is requested
 };
 
-/// Blocks that a filler hands over. Distances are signed, in voxels, by Eq. 3 of the paper; +infinity where unknown.
+/// A batch of filled blocks. Distances are signed, in voxels, by Eq. 3 of the paper; +infinity where unknown.
 struct FilledBlocks {
     std::span<const glm::ivec3> origins;      ///< index coordinates of each block's first voxel
-    std::span<const float> distances;         ///< blockVoxels a block
-    std::span<const std::int32_t> triangles;  ///< blockVoxels a block; empty unless asked for
+    std::span<const float> distances;         ///< blockVoxels per block
+    std::span<const std::int32_t> triangles;  ///< blockVoxels per block; empty unless requested
 };
 
-/// Where the squared distances to both layers differ by less than this they are equal, whatever a device's rounding,
-/// and the voxel is inside [voxels^2].
+/// Tolerance for equal squared distances to the two layers [voxels^2]. It exceeds the rounding of every device. A voxel
+/// with equal distances is inside.
 inline constexpr float layerTie = 1e-5f;
 
-/// Stands for every distance beyond the reach of a job; its sign is right where signs are asked for [voxels].
+/// Represents any distance beyond the reach of a job [voxels]. Its sign is valid if signs are requested.
 inline constexpr float farAway = 1e30f;
 
-/// What all methods work from.
+/// The input of every method.
 struct MeshJob {
     const Mesh& mesh;
     float voxelSize;  ///< [m]
-    float reach;      ///< distances up to this must be found; beyond it they may be +-farAway [voxels], at least 1
-    bool triangles;   ///< whether the nearest triangle is asked for
+    float reach;      ///< distances up to this must be found, larger ones may be +-farAway [voxels]; at least 1
+    bool triangles;   ///< whether the nearest triangle is requested
     bool sign;        ///< false: all distances are positive
-    /// Takes filled blocks; may be called from several threads at once. Blocks without a voxel within the reach need
-    /// not come.
+    /// Receives filled blocks, possibly from several threads at once. Blocks without a voxel within reach may be
+    /// omitted.
     std::function<void(const FilledBlocks&)> sink;
     Progress& progress;
-    /// Whether any block is wanted of a cube of voxels with this first voxel and side; null: all are.
+    /// Returns whether any block in a cube of voxels with this first voxel and side is needed; null: all are.
     std::function<bool(const glm::ivec3& first, int side)> wanted{};
-    /// Counts the voxels whose side the triangles within reach leave open, so that all of the mesh was asked; or null.
+    /// Counts voxels that nearby triangles leave undecided, so that the whole mesh was queried; or null.
     std::atomic<std::size_t>* undecided = nullptr;
-    /// Counts the voxels that normals say are on both sides of the surface; or null.
+    /// Counts voxels that the normals place on both sides of the surface; or null.
     std::atomic<std::size_t>* conflicts = nullptr;
 };
 
-/// Everything that a device works from.
+/// The input of a device.
 struct FillJob {
     const MeshJob& mesh;
     const BuildOptions& options;
@@ -68,8 +68,8 @@ struct FillJob {
     FillParameters layers;  ///< of the double layer method
 };
 
-/// Has a filler fill the blocks of a mesh's field as build() has, but makes no level set of them: the filler keeps what
-/// it fills. It is called again, for another way to signs, where it counts conflicts. Throws as build() does.
+/// Fills the blocks of a mesh's field as build() does, but builds no level set: the filler keeps its results. Calls the
+/// filler again for another sign method if it counts conflicts. Throws as build() does.
 void fillOnly(const Mesh& mesh, const BuildOptions& options, const BlockFiller& filler);
 
 }  // namespace bilayer::detail

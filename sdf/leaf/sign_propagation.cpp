@@ -1,4 +1,4 @@
-// Highway compiles the part between HWY_BEFORE_NAMESPACE and HWY_AFTER_NAMESPACE once for each instruction set.
+// Highway compiles the code between HWY_BEFORE_NAMESPACE and HWY_AFTER_NAMESPACE once per instruction set.
 #include "sdf/leaf/sign_propagation.h"
 
 #undef HWY_TARGET_INCLUDE
@@ -11,7 +11,7 @@ namespace bilayer::detail::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 namespace {
 
-// Bits of the voxels of a row whose distance and a neighbour's together exceed a voxel.
+// Returns the bits of the voxels in a row whose distance plus a neighbour's distance exceeds one voxel.
 inline std::uint64_t linked(const float* a, const float* b) {
     const hn::CappedTag<float, blockSide> tag;
     std::uint64_t bits = 0;
@@ -49,7 +49,7 @@ HWY_EXPORT(linksOf);
 
 namespace {
 
-// Lets a set grow inside one slice of 64 voxels until it stops.
+// Grows a set within one slice of 64 voxels until it is stable.
 std::uint64_t grownInSlice(std::uint64_t set, std::uint64_t linkY, std::uint64_t linkZ) {
     for (;;) {
         const std::uint64_t old = set;
@@ -66,7 +66,7 @@ SignLinks findSignLinks(const float* distances) {
 }
 
 void spread(const SignLinks& links, BlockMask& set) {
-    unsigned changed = 0;  // slices whose neighbours have not heard of them yet
+    unsigned changed = 0;  // slices whose neighbours still need an update
     for (std::size_t x = 0; x < set.size(); ++x) {
         if (set[x] == 0) continue;
         set[x] = grownInSlice(set[x], links.y[x], links.z[x]);

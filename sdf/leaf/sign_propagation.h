@@ -1,6 +1,7 @@
-// Which voxels of a block must lie on the same side of the surface. The ball around a voxel with its distance as radius
-// is free of surface; where the balls of two neighbours overlap (d1 + d2 > 1 voxel), so is the way between them: they
-// are linked. A side found for one voxel then holds for all that links connect with it.
+// Finds the voxels of a block that must lie on the same side of the surface. The ball around a voxel with its distance
+// as radius contains no surface. Where the balls of two neighbours overlap (d1 + d2 > 1 voxel), the segment between
+// them crosses no surface, and the two are linked. The sign of one voxel then holds for all voxels that links connect
+// to it.
 #pragma once
 
 #include <bit>
@@ -12,33 +13,33 @@
 
 namespace bilayer::detail {
 
-/// Slack of the test for a link, far above the rounding of distances [voxels].
+/// Tolerance of the link test, far above the rounding of distances [voxels].
 inline constexpr float linkSlack = 1e-4f;
 
-/// SignLinks inside a block. Bit of voxel v: v is linked with its next neighbour along the axis.
+/// The links inside a block. The bit of voxel v is set if v is linked to its next neighbour along the axis.
 struct SignLinks {
     BlockMask x, y, z;
 };
 
-/// Finds the links of a block by the distances of its voxels to the surface; those beyond some reach of a voxel or more
-/// may have any distance from there on.
-/// @param distances  blockVoxels of them, and a row more that may be read [voxels]
+/// Finds the links of a block from the distances of its voxels to the surface. Distances beyond some reach of at least
+/// one voxel may have any value that is not below it.
+/// @param distances  blockVoxels values, plus one row that may be read [voxels]
 SignLinks findSignLinks(const float* distances);
 
-/// Adds to a set all voxels that links connect with it.
+/// Adds to a set all voxels that links connect to it.
 void spread(const SignLinks& links, BlockMask& set);
 
-/// The voxels of a block on either side of the surface. One on both shows a contradiction.
+/// Sets of voxels on each side of the surface. A voxel in both sets is a contradiction.
 struct BlockSides {
     BlockMask outside, inside;
 };
 
-/// Voxels farther from the surface than this are asked first for their side, then those beyond the next [voxels].
+/// Voxels farther from the surface than farFrom are queried first, then those beyond midFrom [voxels].
 inline constexpr float farFrom = 0.5f, midFrom = 0.1f;
 
-/// Spreads what sides are known over links. Of each group of linked voxels that this leaves without a side, one voxel
-/// is asked for by isInside(voxel): one of the first of the `seeds` that hold any. Returns the number of voxels that
-/// came to be on both sides; there are none of them if all the sides that were known are right.
+/// Propagates known signs over links. For each linked group without a sign, queries isInside(voxel) for one of its
+/// voxels. That voxel comes from the first of the `seeds` that contains any. Returns the count of voxels that ended on
+/// both sides, which is zero if all known signs are right.
 template <class IsInside>
 std::size_t completeSides(const SignLinks& links, std::initializer_list<const BlockMask*> seeds, BlockSides& sides,
                           IsInside isInside) {

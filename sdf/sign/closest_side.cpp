@@ -9,14 +9,16 @@
 namespace bilayer::detail {
 namespace {
 
-/// Points this close together are one: far above the rounding of doubles at 1e6 voxels from the origin, far below what
-/// the field resolves [voxels].
+/// Points this close together coincide [voxels]. The value is far above the rounding of doubles at 1e6 voxels from the
+/// origin, and far below the resolution of the field.
 constexpr double samePlace = 1e-7;
-/// A height below this part of the longest edge leaves no foot on the plane that is better than the edges.
+/// Relative to the longest edge: with a smaller height, a projection onto the plane is no better than one onto the
+/// edges.
 constexpr double flatness = 1e-10;
-/// Sums of unit normals below this part of their weights have nearly cancelled out.
+/// Relative to the sum of their weights: unit normals with a smaller sum nearly cancel out.
 constexpr double cancelled = 1e-2;
-/// Solid angles below this, of sides about a voxel long, are too flat to tell on which side of an edge a way passes.
+/// Minimum solid angle, of triangles with sides of about a voxel. Below it, the side on which a path passes an edge is
+/// uncertain.
 constexpr double tooClose = 1e-9;
 constexpr double wholeTurn = 2 * glm::pi<double>();
 
@@ -24,7 +26,7 @@ glm::dvec3 closestOnSegment(const glm::dvec3& a, const glm::dvec3& b) {
     const glm::dvec3 ab = b - a;
     const double length2 = glm::dot(ab, ab);
     const double t = length2 > 0 ? std::clamp(-glm::dot(a, ab) / length2, 0.0, 1.0) : 0.0;
-    // from the nearer end, so that both triangles of an edge find the same point whichever way they run it
+    // Computed from the nearer end, so that both triangles of an edge find the same point in either edge direction.
     return t <= 0.5 ? a + t * ab : b - (1 - t) * ab;
 }
 
@@ -33,7 +35,8 @@ double longestEdge2(const std::array<glm::dvec3, 3>& c) {
     return std::max({glm::dot(ab, ab), glm::dot(bc, bc), glm::dot(ca, ca)});
 }
 
-// The angle under which a triangle is seen from one of its points: all round from within, half from an edge.
+// Returns the angle that a triangle subtends at one of its points: a full circle in the interior, half of it on an
+// edge.
 double angleAt(const std::array<glm::dvec3, 3>& c, const glm::dvec3& p) {
     for (std::size_t i = 0; i < 3; ++i)
         if (glm::distance(c[i], p) <= samePlace) {
@@ -47,8 +50,8 @@ double angleAt(const std::array<glm::dvec3, 3>& c, const glm::dvec3& p) {
     return wholeTurn;
 }
 
-// Thinner than a place, a triangle has no normal to trust; its far side's neighbour meets the closest point as well and
-// speaks for it.
+// A triangle thinner than samePlace has no reliable normal. The neighbour at its far side also meets the closest point
+// and contributes its normal instead.
 bool hasNormal(const std::array<glm::dvec3, 3>& c) {
     return glm::length(glm::cross(c[1] - c[0], c[2] - c[0])) > samePlace * std::sqrt(longestEdge2(c));
 }
@@ -65,7 +68,7 @@ glm::dvec3 closestToOrigin(const std::array<glm::dvec3, 3>& c) {
     const glm::dvec3 ab = c[1] - c[0], ac = c[2] - c[0], n = glm::cross(ab, ac);
     const double n2 = glm::dot(n, n), longest2 = longestEdge2(c);
     if (n2 > flatness * flatness * longest2 * longest2) {
-        // inside all three edges: the foot on the plane
+        // Projects inside all three edges: the projection onto the plane is the closest point.
         const auto inner = [&](const glm::dvec3& p, const glm::dvec3& q) {
             return glm::dot(glm::cross(q - p, -p), n) >= 0;
         };

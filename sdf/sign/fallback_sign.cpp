@@ -14,8 +14,8 @@
 namespace bilayer::detail {
 namespace {
 
-/// Ways of rays, mostly along x, so that the box of most triangles misses them; aslant, because meshes like to lie
-/// along the axes.
+/// Ray directions. They are mostly along x, so that a ray misses the boxes of most triangles. They are slightly
+/// oblique, because many meshes are aligned with the axes.
 const glm::dvec3 ways[] = {{1, 0.0137, 0.0071}, {-1, 0.0113, -0.0239}, {1, -0.0317, 0.0193}, {-1, -0.0071, 0.0411}};
 
 struct Passes {
@@ -27,7 +27,7 @@ struct Passes {
 
 bool FallbackSign::isInside(const glm::dvec3& point) {
     if (asked_) ++*asked_;
-    // isolated: a thread that waits must not be given a task that would wait for it too
+    // Isolated: a waiting thread must not take a task that would wait for the same flag.
     std::call_once(looked_, [&] {
         tbb::this_task_arena::isolate([&] {
             closed_ = balanced(mesh_, &progress_);
@@ -41,14 +41,15 @@ bool FallbackSign::isInside(const glm::dvec3& point) {
     return (*winding_)(point) > 0.5;
 }
 
-// The winding number by the signed passes of a ray that ends outside; nothing if one of them is too close to tell.
+// Returns the winding number by the signed crossings of a ray that ends outside; empty if a crossing is too close to an
+// edge to decide.
 std::optional<int> FallbackSign::windingByRay(const glm::dvec3& point, const glm::dvec3& way) const {
     const auto passesOf = [&](const auto& range, Passes passes) {
         progress_.poll();
         for (std::size_t i = range.begin(); i < range.end() && passes.clear; ++i) {
             const glm::uvec3& t = mesh_.triangles[i];
             const glm::vec3 &a = mesh_.points[t.x], &b = mesh_.points[t.y], &c = mesh_.points[t.z];
-            // the ray may pass below or above the box of the triangle in y, which is told without products
+            // Quick rejection: the ray passes below or above the triangle's box in y.
             const double lowest = double(std::min({a.y, b.y, c.y})) - point.y,
                          highest = double(std::max({a.y, b.y, c.y})) - point.y;
             if (lowest > std::max(way.y, 0.0) || highest < std::min(way.y, 0.0)) continue;
@@ -63,7 +64,7 @@ std::optional<int> FallbackSign::windingByRay(const glm::dvec3& point, const glm
         return tbb::parallel_reduce(tbb::blocked_range<std::size_t>(0, mesh_.triangles.size(), 4096), Passes{},
                                     passesOf, join);
     });
-    // the ray ends outside, and a pass along a normal leaves the solid
+    // The ray ends outside, and a crossing along a normal leaves the solid.
     return passes.clear ? std::optional(passes.sum) : std::nullopt;
 }
 

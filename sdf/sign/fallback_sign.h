@@ -1,4 +1,4 @@
-// The winding number of the whole mesh, for the rare voxel whose side the triangles near it leave open.
+// Fallback sign test for the rare voxels that nearby triangles leave undecided: the winding number of the whole mesh.
 #pragma once
 
 #include <glm/vec3.hpp>
@@ -10,19 +10,19 @@
 
 namespace bilayer::detail {
 
-/// Counts how a ray passes the triangles of a closed mesh; for other meshes, and where all rays come too close to edges
-/// to tell, asks a hierarchy that is made when it is first needed, which for most meshes is never. Safe from any
-/// thread.
+/// Counts the signed crossings of a ray through a closed mesh. For other meshes, and if all rays pass too close to
+/// edges, evaluates the winding number with a hierarchy. The hierarchy is built on first use, which most meshes never
+/// need. Thread-safe.
 class FallbackSign {
   public:
-    /// Works from the job's mesh, and adds to its count of undecided voxels.
+    /// Uses the job's mesh, and adds to its count of undecided voxels.
     explicit FallbackSign(const MeshJob& job)
         : mesh_(job.mesh),
           progress_(job.progress),
           asked_(job.undecided),
           reach_(double(job.reach) * double(job.voxelSize)) {}
 
-    /// Whether a point is inside [m]. Throws Cancelled.
+    /// Returns whether a point is inside [m]. Throws Cancelled.
     bool isInside(const glm::dvec3& point);
 
   private:
@@ -31,10 +31,10 @@ class FallbackSign {
     const Mesh& mesh_;
     Progress& progress_;
     std::atomic<std::size_t>* asked_;
-    double reach_;  // points asked for are no farther from the mesh [m]
+    double reach_;  // maximum distance of queried points from the mesh [m]
     std::once_flag looked_, made_;
     bool closed_ = false;
-    double beyond_ = 0;  // a way as long as this leaves the mesh [m]
+    double beyond_ = 0;  // length of a ray that leaves the mesh for certain [m]
     std::optional<WindingNumber> winding_;
 };
 

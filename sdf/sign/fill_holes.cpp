@@ -19,18 +19,18 @@
 namespace bilayer::detail {
 namespace {
 
-// The triangulation of longer loops takes seconds.
+// Longer loops take seconds to triangulate.
 constexpr std::size_t maxEdges = 1000;
-// Winding numbers on a lid lie this close to a half: they are a half more than outside and a half less than inside, but
-// for what other holes let in or out.
+// Maximum deviation from one half of the winding number on a fill ("lid"). The fill lies halfway between outside (0)
+// and inside (1), except for the influence of other holes.
 constexpr double maxDeviation = 0.25;
-// They are looked at on both sides of a lid's triangle, so far away [edges of a square of its area].
+// Distance from a fill triangle at which winding numbers are evaluated, on both sides [sqrt of its area].
 constexpr double aside = 1e-3;
 
 using Loop = std::vector<unsigned>;  // vertices
 using Lid = std::vector<glm::uvec3>;
 
-// Edges that have no opposite edge yet, run the way that the triangles to be added have to run them.
+// Edges without an opposite edge, in the direction that the added triangles must use.
 class MissingEdges {
   public:
     explicit MissingEdges(const Mesh& mesh) : mesh_(mesh), next_(mesh.points.size()) {
@@ -49,8 +49,8 @@ class MissingEdges {
         return vertices;
     }
 
-    // At every vertex as many of them end as begin, so that they make up closed loops; a path that comes back to one of
-    // its own vertices has run around one.
+    // At every vertex the counts of incoming and outgoing edges are equal, so the edges form closed loops. A path that
+    // returns to one of its own vertices has completed a loop.
     std::vector<Loop> takeLoops() {
         std::vector<Loop> loops;
         std::vector<std::size_t> places(next_.size(), none);  // of vertices on the path
@@ -76,7 +76,7 @@ class MissingEdges {
         return glm::normalize(glm::dvec3(mesh_.points[to]) - glm::dvec3(mesh_.points[from]));
     }
 
-    // Takes the edge on from the end of a path that turns back the most: to the other rim of a crack.
+    // Takes the edge at the end of a path that turns back the most, which leads to the opposite side of a crack.
     unsigned take(const Loop& path) {
         auto& out = next_[path.back()];
         auto best = out.begin();
@@ -94,8 +94,8 @@ class MissingEdges {
     std::vector<std::vector<unsigned>> next_;
 };
 
-// The mesh by the first of vertices with equal coordinates, and of those of rims that are no farther apart than a crack
-// is wide; but the vertices of a triangle stay apart.
+// Merges vertices with equal coordinates, and boundary vertices that are closer together than the crack width. Keeps
+// the vertices of one triangle separate.
 Mesh withJoinedRims(const Mesh& mesh, std::vector<unsigned> rim, double crack) {
     std::vector<unsigned> first(mesh.points.size());
     std::iota(first.begin(), first.end(), 0u);
@@ -118,7 +118,7 @@ glm::dvec3 areaOf(const Mesh& mesh, const glm::uvec3& t) {
     return 0.5 * glm::cross(b - a, c - a);
 }
 
-// The triangulation of a loop that has the least area.
+// The minimum-area triangulation of a loop.
 class MinArea {
   public:
     MinArea(const Mesh& mesh, const Loop& loop)
@@ -171,8 +171,8 @@ double lengthOf(const Mesh& mesh, const Loop& loop) {
     return length;
 }
 
-// Whether most of a lid lies between inside and outside, and no triangle of the mesh lies there already: numbers would
-// jump across it.
+// Returns whether most of a fill separates inside from outside. Also requires that no triangle of the mesh is there
+// already, since winding numbers would jump across it.
 bool isBorder(const Mesh& mesh, const Lid& lid, const WindingNumber& winding) {
     double area = 0, border = 0;
     for (const glm::uvec3& t : lid) {
@@ -191,7 +191,7 @@ bool isBorder(const Mesh& mesh, const Lid& lid, const WindingNumber& winding) {
     return 2 * border > area;
 }
 
-// A crack changes no winding number.
+// A crack does not change winding numbers.
 std::optional<Lid> lidOf(const Mesh& mesh, const Loop& loop, double crack, const WindingNumber& winding) {
     if (loop.size() < 3 || loop.size() > maxEdges) return std::nullopt;
     const MinArea least(mesh, loop);
@@ -200,21 +200,21 @@ std::optional<Lid> lidOf(const Mesh& mesh, const Loop& loop, double crack, const
     return least.lid();
 }
 
-// Gets rid of triangles of lids that are next to no area, as between an edge and the vertices on it across a crack: the
-// longest edge of such a triangle and its neighbour is exchanged for the other diagonal of the two.
+// Removes fill triangles of almost no area ("caps"), such as between an edge and the vertices on it across a crack. An
+// edge flip replaces the longest edge of such a triangle by the other diagonal of the triangle and its neighbour.
 class CapRemoval {
   public:
-    /// @param first   of the triangles that may be removed
-    /// @param crack   the height of such triangles at most [m]
+    /// @param first   index of the first triangle that may be removed
+    /// @param crack   maximum height of such triangles [m]
     CapRemoval(Mesh& mesh, std::size_t first, double crack) : mesh_(mesh), first_(unsigned(first)), crack_(crack) {
         for (unsigned t = 0; t < mesh.triangles.size(); ++t) enter(t);
     }
 
-    // The longest edges of caps get shorter by each exchange between two of them.
+    // Each flip between two caps shortens their longest edges.
     void run() {
         std::vector<unsigned> caps;
         for (unsigned t = first_; t < mesh_.triangles.size(); ++t) caps.push_back(t);
-        const std::size_t rounds = caps.size();  // a row of caps loses one in each at least
+        const std::size_t rounds = caps.size();  // a row of caps loses at least one per round
         for (std::size_t round = 0; round < rounds && !caps.empty(); ++round) {
             for (const unsigned t : caps) exchange(t);
             std::erase_if(caps, [&](unsigned t) { return longestOfCap(t) < 0; });
@@ -230,7 +230,8 @@ class CapRemoval {
         for (int i = 0; i < 3; ++i) triangles_[keyOf(v[i], v[(i + 1) % 3])] = t;
     }
 
-    // The first corner of the longest edge if the third one is next to it, between its ends; else -1.
+    // Returns the first corner of the longest edge if the third corner lies close to the edge and between its ends;
+    // else -1.
     int longestOfCap(unsigned t) const {
         const glm::uvec3& v = mesh_.triangles[t];
         const auto length = [&](int i) { return glm::distance(at(v[i]), at(v[(i + 1) % 3])); };
@@ -242,7 +243,7 @@ class CapRemoval {
         return isCap ? i : -1;
     }
 
-    // Another cap across the edge has to agree that it is its longest.
+    // If the neighbour is also a cap, the edge must be its longest too.
     void exchange(unsigned cap) {
         const int i = longestOfCap(cap);
         if (i < 0) return;
@@ -267,7 +268,7 @@ class CapRemoval {
     Mesh& mesh_;
     unsigned first_;
     double crack_;
-    std::unordered_map<std::uint64_t, unsigned> triangles_;  // by the edges that they run
+    std::unordered_map<std::uint64_t, unsigned> triangles_;  // keyed by their directed edges
 };
 
 }  // namespace

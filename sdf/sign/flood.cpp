@@ -17,13 +17,13 @@
 namespace bilayer::detail {
 namespace {
 
-/// Room for the rounding of floats in distances that are added up [voxels].
+/// Tolerance for the rounding of floats in sums of distances [voxels].
 constexpr float slack = 1e-3f;
-/// Voxels nearer than this count as on the surface, on neither side of it [voxels].
+/// Voxels closer than this are on the surface and belong to neither side [voxels].
 constexpr float onSurface = 1e-4f;
-constexpr std::uint32_t infinity = 0;  // the part that holds what lies beyond all cells
+constexpr std::uint32_t infinity = 0;  // the part that contains all space beyond the cells
 
-// Parts of space that are joined one by one.
+// Disjoint sets of connected parts of space.
 class Parts {
   public:
     explicit Parts(std::size_t count) : parent_(count) { std::iota(parent_.begin(), parent_.end(), 0u); }
@@ -41,7 +41,7 @@ class Parts {
     std::vector<std::uint32_t> parent_;
 };
 
-// The connected parts of a mask.
+// Returns the connected components of a mask.
 std::vector<BlockMask> components(BlockMask mask) {
     std::vector<BlockMask> parts;
     for (unsigned voxel = 0; voxel < blockVoxels; ++voxel) {
@@ -78,19 +78,19 @@ class Flood {
           progress_(progress),
           states_(vectorOf<State>(cells.all().size(), progress)) {}
 
-    // The sides of all voxels of all leaves, and of the cells between them.
+    // Finds the signs of all voxels in leaves, and of the cells between leaves.
     void run();
     const BlockMask& inside(std::size_t cell) const { return states_[cell].inside; }
     bool cellInside(std::size_t cell) const { return test(states_[cell].inside, 0); }
 
   private:
     struct State {
-        std::vector<BlockMask> parts;  // of voxels where the ball's centre can be
-        std::uint32_t first = 0;       // the number of the first part
+        std::vector<BlockMask> parts;  // of voxels where the ball's centre fits
+        std::uint32_t first = 0;       // index of the first part
         BlockMask known{}, inside{};
         BlockMask fresh{};  // known since the last step
         BlockMask outsideNext{}, insideNext{};
-        std::array<std::uint32_t, 27> around{};  // cells of the blocks around a leaf, beyond() where there is none
+        std::array<std::uint32_t, 27> around{};  // cells of the blocks around a leaf, beyond() if none
     };
     struct Neighbour {
         Side side;
@@ -129,7 +129,7 @@ void Flood::run() {
     };
     while (step(certain)) {
     }
-    // what is left lies very near: there the triangles themselves are asked
+    // The remaining voxels are very close to the surface, so the triangles themselves are tested.
     for (State& state : states_) state.fresh = state.known;
     const auto clear = [this](std::size_t cell, unsigned voxel, const openvdb::Coord& link, float a, float b) {
         if (!(std::min(a, b) > onSurface * float(h_))) return false;
@@ -143,7 +143,7 @@ void Flood::run() {
 }
 
 void Flood::findParts() {
-    // links between two voxels farther than this keep gap / 2 all the way
+    // Links between two voxels farther than this keep gap / 2 from the surface along their whole length.
     const float free = (0.5f * gap_ + 0.5f + slack) * float(h_);
     tbb::parallel_for(std::size_t(0), states_.size(), [&](std::size_t c) {
         const OctreeCell& cell = cells_.all()[c];
@@ -159,7 +159,7 @@ void Flood::findParts() {
     });
 }
 
-// Hands pairs of parts that touch across a face of a cell to `join`.
+// Calls `join` for pairs of parts that touch across a face of a cell.
 template <class Join>
 void Flood::joinAcross(std::size_t cell, int face, const Join& join) const {
     const OctreeCell& self = cells_.all()[cell];
@@ -177,7 +177,7 @@ void Flood::joinAcross(std::size_t cell, int face, const Join& join) const {
     };
     if (found == OctreeCells::none)
         return each(cell, face / 2, face % 2, [&](std::uint32_t part, const BlockMask&) { join(infinity, part); });
-    // the smaller of two cells sees the whole of its neighbour's side; of equals the lower
+    // The smaller of two cells handles the face; of equal cells, the lower one.
     const std::int32_t side = cells_.all()[found].side;
     if (side < self.side || (side == self.side && face % 2 == 0)) return;
     each(cell, face / 2, face % 2, [&](std::uint32_t a, const BlockMask& maskA) {
@@ -222,7 +222,7 @@ void Flood::sidesOfParts(Parts& parts) {
     }
 }
 
-// A voxel next to or in a leaf, by coordinates from the leaf's first voxel.
+// Returns a voxel in or next to a leaf, by its coordinates relative to the leaf's first voxel.
 Flood::Neighbour Flood::neighbour(const State& state, const openvdb::Coord& local) const {
     const int block = ((local.x() + blockSide) / blockSide * 3 + (local.y() + blockSide) / blockSide) * 3 +
                       (local.z() + blockSide) / blockSide;
@@ -236,7 +236,7 @@ Flood::Neighbour Flood::neighbour(const State& state, const openvdb::Coord& loca
     return {test(other.inside, at) ? Side::inside : Side::outside, test(other.fresh, at), leaf->buffer().data()[at]};
 }
 
-// One step of growth over the links that `passes` lets through, from the voxels that the last step reached.
+// Grows by one step from the voxels that the last step reached, over the links that `passes` accepts.
 template <class Passes>
 bool Flood::step(const Passes& passes) {
     tbb::parallel_for(std::size_t(0), states_.size(), [&](std::size_t c) {
@@ -277,7 +277,7 @@ void Flood::stepIn(std::size_t cell, const Passes& passes) {
     }
 }
 
-// What no side reached is shut in, unless it lies on the surface.
+// Voxels that neither side reached are enclosed and inside, unless they lie on the surface.
 void Flood::settleRest() {
     tbb::parallel_for(std::size_t(0), states_.size(), [&](std::size_t c) {
         if (!cells_.all()[c].leaf) return;

@@ -1,5 +1,5 @@
-// Signs by what can be reached from outside. It copes with faces turned any way and with narrow gaps, and gives no sign
-// to sheets without thickness.
+// Signs by reachability from outside. Handles inconsistently oriented faces and narrow gaps. Open surfaces without
+// thickness get no inside.
 #pragma once
 
 #include <openvdb/openvdb.h>
@@ -11,27 +11,27 @@ namespace bilayer::detail {
 
 class Progress;
 
-/// Signs a narrow band of unsigned distances: outside is what a ball `gap` voxels wide reaches from infinity without
-/// touching the surface, and inside is the rest of where such a ball fits.
+/// Signs a narrow band of unsigned distances. The outside is the region that a ball of diameter `gap` voxels reaches
+/// from infinity without touching the surface. The inside is the remaining region where such a ball fits.
 ///
-/// `grid` is as for signByWinding(), with a reach of at least gap / 2 + 1 voxels; on return it is a level set of the
+/// `grid` is as for signByWinding(), with a reach of at least gap / 2 + 1 voxels. On return it is a level set of the
 /// given widths.
 ///
-/// What is promised:
-/// - No path along which every point is at most gap / 2 from the surface somewhere is taken: a gap that the ball cannot
-///   pass is closed.
-/// - A path along which every point is at least gap / 2 + 1.4 voxels from the surface is taken: openings wider than gap
-///   + 2.8 voxels stay open.
-/// - The voxels nearer to the surface, where the ball's centre cannot be, then take their side from their neighbours,
-///   a step at a time, outside first where both arrive at once, and never across the surface. So inside a gap that is
-///   closed the border lies about half-way.
-/// - What neither reaches is shut in by triangles on all sides and is inside: a closed solid too thin for the ball is
-///   kept, and a sheet without thickness has no inside. Voxels within 1e-4 voxel of the surface that neither reaches
-///   are outside.
-/// The orientation of faces does not matter. The bytes do not depend on the number of threads. Throws
-/// std::invalid_argument as validate() does, or if the gap is negative or the grid's background is too small, and
-/// Cancelled; the grid is then in between.
-/// @param progress  polled, unless null
+/// Guarantees:
+/// - The ball takes no path that comes within gap / 2 of the surface anywhere: a gap that it cannot pass is closed.
+/// - The ball takes every path that stays at least gap / 2 + 1.4 voxels from the surface: openings wider than gap + 2.8
+///   voxels stay open.
+/// - Voxels closer to the surface, where the ball's centre does not fit, then take the sign of their neighbours. This
+///   proceeds in steps and never crosses the surface; outside wins a tie. Inside a closed gap the border is therefore
+///   about half-way.
+/// - Voxels that neither region reaches are enclosed by triangles on all sides and are inside. A closed solid too thin
+///   for the ball is kept, and an open surface without thickness has no inside.
+/// - Voxels within 1e-4 voxel of the surface that neither region reaches are outside.
+///
+/// Face orientation does not matter. The bytes do not depend on the thread count. Throws std::invalid_argument as
+/// validate() does, for a negative gap, and for a grid background that is too small. Throws Cancelled. After an
+/// exception the grid is incomplete.
+/// @param progress  polled for cancellation, unless null
 void signByFlood(openvdb::FloatGrid& grid, const Mesh& mesh, float gap, const BandWidths& widths,
                  Progress* progress = nullptr);
 

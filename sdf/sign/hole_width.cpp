@@ -1,6 +1,7 @@
-// Space is divided into cubes, those first that can hold the widest hole, until one is small enough. Cubes are given up
-// where no winding number can be a half: it is so by a bound of its slope, whatever surface passes, or, in a ball that
-// no surface enters, by Harnack's inequality, for it is harmonic there.
+// Branch and bound. Space is divided into cubes, starting with those that can contain the widest hole, until one is
+// small enough. A cube is discarded if no winding number in it can be one half. This follows from a bound of its slope,
+// which also holds for a cube that surfaces cross. In a ball without surface it follows from Harnack's inequality,
+// because the winding number is harmonic there.
 #include "sdf/sign/hole_width.h"
 
 #include <oneapi/tbb/parallel_for.h>
@@ -23,18 +24,18 @@
 namespace bilayer::detail {
 namespace {
 
-/// Of the hole's radius: half the side of the cubes that are no further divided.
+/// Cubes with half a side below this fraction of the hole's radius are not divided further.
 constexpr double tolerance = 0.05;
-/// The error of winding numbers, of the way to a half.
+/// Error of winding numbers, as a fraction of their distance to one half.
 constexpr double share = 0.1;
-/// Cubes that are divided at once.
+/// Count of cubes that are divided at once.
 constexpr std::size_t batchSize = 64;
-const double halfDiagonal = std::sqrt(3.0);  // of a cube, by half its side
+const double halfDiagonal = std::sqrt(3.0);  // of a cube, in units of half its side
 
 struct Cube {
     glm::dvec3 centre;
-    double half;      // of a side [m]
-    double distance;  // of the centre to the mesh [m]
+    double half;      // half a side [m]
+    double distance;  // from the centre to the mesh [m]
 
     double radius() const { return halfDiagonal * half; }
     double maxDistance() const { return distance + radius(); }
@@ -73,7 +74,7 @@ class Search {
     }
 
   private:
-    // The winding number is below a half beyond a distance R with area / (4 pi R^2) = 1/2.
+    // The winding number is below one half beyond a distance R with area / (4 pi R^2) = 1/2.
     Cube whole() const {
         const Bounds box = bounds(mesh_);
         const double reach = std::sqrt(winding_.area() / (2 * glm::pi<double>()));
@@ -84,7 +85,7 @@ class Search {
 
     static bool isSmall(const Cube& cube) { return cube.half <= tolerance * cube.distance; }
 
-    /// The octants that may hold a hole that is wide enough.
+    /// Returns the octants that may contain a sufficiently wide hole.
     std::vector<Cube> divided(const Cube& cube) const {
         poll(progress_);
         std::vector<Cube> parts;
@@ -101,7 +102,7 @@ class Search {
         return {cube.centre + step, half, distance(cube.centre + step, cube.distance + glm::length(step))};
     }
 
-    /// To the nearest triangle, which is no farther than `bound`.
+    /// Returns the distance to the nearest triangle, which is at most `bound`.
     double distance(const glm::dvec3& point, double bound) const {
         tree_.descend(
             [&](const Bounds& box) {
@@ -119,10 +120,10 @@ class Search {
         return bound;
     }
 
-    /// Whether the winding number may be a half somewhere in a cube, and that not across a surface only.
+    /// Returns whether the winding number may be one half somewhere in a cube, other than by a jump across a surface.
     bool mayHoldClosing(const Cube& cube) const {
         const WindingNumber::Estimate number = winding_.estimate(cube.centre, share);
-        // across closed surfaces it changes by whole numbers
+        // Across closed surfaces the winding number changes by integers.
         const double off = std::abs(number.value - std::round(number.value)) + number.error;
         if (off < 0.5 && (slope_(cube.centre, cube.radius()) * cube.radius() < 0.5 - off)) return false;
         const double t = cube.radius() / cube.distance;

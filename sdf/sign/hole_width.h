@@ -1,4 +1,4 @@
-// How wide the holes of a mesh are.
+// The width of the holes of a mesh.
 #pragma once
 
 #include <glm/vec3.hpp>
@@ -9,17 +9,18 @@ namespace bilayer::detail {
 
 class Progress;
 
-/// The widest hole of a mesh. A hole is closed by the surface on which the winding number is a half; its width is the
-/// diameter of the largest ball around a point of that surface that no triangle reaches into.
+/// The widest hole of a mesh. A hole is closed by the surface on which the winding number is one half. Its width is the
+/// diameter of the largest ball around a point of that surface that contains no triangle.
 struct Hole {
-    double width = 0;      ///< [m], to 10 %; 0: there is none
-    glm::dvec3 centre{0};  ///< of that ball [m]
+    double width = 0;      ///< [m], accurate to 10 %; 0: no hole
+    glm::dvec3 centre{0};  ///< centre of the ball [m]
 };
 
-/// Finds the widest hole, if any is at least so wide. What sticks out of a solid without an inside of its own counts as
-/// a hole as well where winding numbers of a half surround it. The mesh must be valid, and face outward: see orient().
-/// @param least     [m], positive
-/// @param progress  polled, unless null
+/// Finds the widest hole with at least a minimum width. Parts that protrude from a solid and have no interior also
+/// count as a hole where winding numbers of one half surround them. The mesh must be valid and face outward (see
+/// orient()).
+/// @param least     minimum width [m], positive
+/// @param progress  polled for cancellation, unless null
 Hole widestHole(const Mesh& mesh, double least, Progress* progress = nullptr);
 
 }  // namespace bilayer::detail

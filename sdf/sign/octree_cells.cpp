@@ -13,9 +13,9 @@ namespace bilayer::detail {
 namespace {
 
 constexpr std::int32_t brickVoxels = 64;
-/// Side of the largest node of an OpenVDB tree [voxels]: cells aligned to it become as few tiles as can be.
+/// Side of the largest node of an OpenVDB tree [voxels]. Cells aligned to it become the fewest tiles.
 constexpr std::int64_t nodeVoxels = 4096;
-constexpr std::uint64_t lowestZ = 0x0101010101010101ull;  // the voxels with z = 0 of a slice
+constexpr std::uint64_t lowestZ = 0x0101010101010101ull;  // the voxels with z = 0 in a slice
 
 using Offset = std::array<std::uint32_t, 3>;
 
@@ -53,7 +53,7 @@ void OctreeCells::cut(std::span<BandLeaf* const> leaves, const openvdb::Coord& o
         cells_.push_back({origin, std::int32_t(side), leaves.empty() ? nullptr : leaves.front()});
         return;
     }
-    // sorted leaves: each octant has a run of them
+    // The leaves are sorted, so each octant has a contiguous run of them.
     for (int octant = 0; octant < 8; ++octant) {
         const openvdb::Coord corner = child(origin, side / 2, octant);
         const Offset from = offset(corner, base_);

@@ -1,4 +1,4 @@
-// Which way of finding signs suits a mesh, and why.
+// Selects the sign method for a mesh, and states the reason.
 #pragma once
 
 #include <optional>
@@ -12,51 +12,55 @@ namespace bilayer::detail {
 class Progress;
 struct UnionSurface;
 
-/// Whether every edge is run equally often both ways, where vertices count as one if their coordinates are equal. Never
-/// false for a mesh that is; true for one that is not with a probability of about 2^-63. O(n), on all threads, and
-/// 8 bytes a vertex. The mesh must be valid.
-/// @param progress  polled, unless null, here and below
+/// Returns whether every edge is used equally often in both directions; vertices with equal coordinates count as one.
+/// Always true for such a mesh. Wrongly true for another mesh with a probability of about 2^-63. O(n), on all threads,
+/// 8 bytes per vertex. The mesh must be valid.
+/// @param progress  polled for cancellation, unless null, here and below
 bool balanced(const Mesh& mesh, Progress* progress = nullptr);
 
-/// Whether some triangle is there twice, the two facing opposite ways. O(n log n). The mesh must be valid.
+/// Returns whether the mesh contains some triangle twice with opposite orientations. O(n log n). The mesh must be
+/// valid.
 bool hasFacesBackToBack(const Mesh& mesh, Progress* progress = nullptr);
 
-/// Whether two triangles lie on each other along an edge of theirs, facing opposite ways: as a sheet and its back do at
-/// the sheet's rim, and the walls of a solid do not. O(n log n). The mesh must be valid.
+/// Returns whether two triangles with opposite normals coincide along a shared edge. This occurs at the rim of a
+/// double-sided open surface, but not at the walls of a solid. O(n log n). The mesh must be valid.
 bool foldsBack(const Mesh& mesh, Progress* progress = nullptr);
 
-/// How signs are to be found.
+/// The sign method for a mesh.
 struct SignChoice {
     Sign sign = Sign::normals;     ///< never `automatic`
-    std::string reason;            ///< for people, without a full stop: "closed and oriented"
-    std::optional<Mesh> repaired;  ///< the mesh to build from instead: the same triangles, some turned around
+    std::string reason;            ///< human-readable, without a full stop: "closed and oriented"
+    std::optional<Mesh> repaired;  ///< the mesh to build from instead: the same triangles, some flipped
 };
 
-/// The reason of a choice that took no more than balanced().
+/// The reason if balanced() alone decided.
 inline constexpr const char* closedAndOriented = "closed and oriented";
-/// The reason of a way that the user chose.
+/// The reason if the user selected the method.
 inline constexpr const char* asAskedFor = "as asked for";
 
-/// The reason of signs of a union, by which outwardMesh() knows that walls were taken away.
+/// Returns the reason for signs of a union. outwardMesh() recognizes from it that walls were removed.
 std::string unionReason(const UnionSurface& united);
 
-/// What Sign::automatic picks. `normals` as they stand for a balanced mesh, which is all that it asks first and takes
-/// milliseconds; else the mesh is oriented: `normals` if that closes it, `winding` if winding numbers tell the two
-/// sides of most of the surface apart, `flood` where they do not. Throws as validate() does.
+/// Selects the method for Sign::automatic. Checks balanced() first, which takes milliseconds; a balanced mesh gets
+/// `normals` unchanged. Otherwise orients the mesh and selects:
+/// - `normals` if the oriented mesh is closed;
+/// - `winding` if winding numbers separate inside from outside on most of the surface;
+/// - `flood` otherwise.
+/// Throws as validate() does.
 SignChoice chooseSign(const Mesh& mesh, Progress* progress = nullptr);
 
-/// The same where a solid is needed: `flood` also for a balanced mesh of which much bounds nothing by winding numbers,
-/// such as double sheets. Never depends on where voxels lie. Throws as validate() does.
+/// The same for a mesh that must be a solid. Also selects `flood` for a balanced mesh if much of it bounds no volume by
+/// winding numbers, such as double-sided open surfaces. Never depends on voxel positions. Throws as validate() does.
 SignChoice chooseSignOfSolid(const Mesh& mesh, Progress* progress = nullptr);
 
-/// What to do where the normals of a balanced mesh contradict each other: it is inside out or has every face twice,
-/// back to back (then it is repaired), or intersects itself. Returns `normals` only together with a repaired mesh.
-/// Throws as validate() does.
+/// Selects the method for a balanced mesh whose normals contradict each other. Such a mesh is inside out, has every
+/// face twice with opposite orientations, or self-intersects. The first two cases are repaired. Returns `normals` only
+/// together with a repaired mesh. Throws as validate() does.
 SignChoice chooseSignAfterConflict(const Mesh& mesh, Progress* progress = nullptr);
 
-/// The mesh of a level set as build() understood it: all of it facing outward, without the walls inside of a union that
-/// BuildOptions::unite has taken away. One that needed no repairing keeps its bytes, and one whose normals were taken
-/// as they stand keeps them. Throws std::invalid_argument as validate() does, and if the level set is of another mesh.
+/// Returns the mesh of a level set as build() interpreted it: oriented outward, without the walls that
+/// BuildOptions::unite removed inside a union. A mesh that needed no repair, or whose normals were used unchanged,
+/// keeps its bytes. Throws std::invalid_argument as validate() does, and if the level set belongs to another mesh.
 Mesh outwardMesh(const LevelSet& levelSet, Mesh mesh);
 
 }  // namespace bilayer::detail

@@ -27,13 +27,13 @@ namespace {
 using Leaf = openvdb::FloatTree::LeafNodeType;
 constexpr int side = int(Leaf::DIM), columns = side * side;
 
-/// Nearer to the surface than this, either sign is right [voxels].
+/// Voxels closer to the surface than this may have either sign [voxels].
 constexpr float onSurface = 1e-3f;
 
-/// Up to so many leaves all columns are compared at once: they take milliseconds.
+/// Up to this many leaves, all columns are compared at once, in milliseconds.
 constexpr openvdb::Index32 fewLeaves = 1024;
 
-/// The columns of a leaf and of all above and below it: their place along x and y, for sorting.
+/// The columns of a leaf and of all leaves above and below it, encoded by their x and y for sorting.
 using Tile = std::uint64_t;
 
 Tile tileAt(std::int64_t x, std::int64_t y) {
@@ -41,7 +41,7 @@ Tile tileAt(std::int64_t x, std::int64_t y) {
     return Tile(x + half) << 32 | Tile(y + half);
 }
 
-/// Whole numbers in an interval.
+/// The integers in an interval.
 struct Range {
     std::int64_t first, last;
 
@@ -57,15 +57,15 @@ struct Range {
     bool empty() const { return first > last; }
 };
 
-// Which side of a line a column lies on; on neither only if the line is a point.
+// Returns the side of a line on which a column lies; 0 only if the line is degenerate.
 int sideOf(const glm::dvec2& a, const glm::dvec2& b, const glm::dvec2& column) {
     if (const int s = lineSide(a, b, column)) return s;
-    // a hair farther along x, and a hair's hair along y
+    // Perturbation: infinitesimally toward +x, and by a higher order toward +y.
     if (a.y != b.y) return b.y < a.y ? 1 : -1;
     return b.x > a.x ? 1 : a.x > b.x ? -1 : 0;
 }
 
-// Whether a column is one of every five: of it and its four neighbours, for any column, exactly one is.
+// Returns whether a column is one of every five. Of any column and its four neighbours, exactly one is.
 bool isFifth(std::int64_t x, std::int64_t y) {
     return (x + 2 * y) % 5 == 0;
 }
@@ -84,7 +84,7 @@ std::uint64_t fifthsOf(std::int64_t x0, std::int64_t y0) {
 }
 
 struct TriangleInTile {
-    std::uint32_t tile;  ///< which of the tiles with leaves
+    std::uint32_t tile;  ///< index among the tiles with leaves
     std::uint32_t triangle;
 };
 
@@ -97,21 +97,21 @@ struct LeafInTile {
     }
 };
 
-/// Where a column crosses a triangle.
+/// A crossing of a column and a triangle.
 struct Crossing {
     std::int32_t above;   ///< the first voxel above it
-    std::uint8_t column;  ///< in its tile
-    std::int8_t sign;     ///< +1: the solid begins there, upward; -1: it ends
+    std::uint8_t column;  ///< index in its tile
+    std::int8_t sign;     ///< +1: the solid begins there, going up; -1: it ends
 };
 
-/// The winding numbers along the columns of a tile, from below to above.
+/// The winding numbers along the columns of a tile, from bottom to top.
 class Rise {
   public:
     Rise(float tolerance, float limit) : tolerance_(tolerance), limit_(limit) {}
 
-    /// Compares a leaf, repairs it, and goes on to its top.
+    /// Compares a leaf, corrects it, and advances to its top.
     /// @param crossings  those between the last leaf's top and this one's
-    /// @param asked      the columns that are compared
+    /// @param asked      the columns to compare
     void repair(Leaf& leaf, std::span<const Crossing> crossings, std::uint64_t asked, SignRepair& sum) {
         for (const Crossing& crossing : crossings) {
             const std::int32_t k = std::max(crossing.above - leaf.origin().z(), 0);
@@ -153,11 +153,11 @@ class Rise {
 
     float tolerance_, limit_;
     std::array<std::int32_t, columns> winding_{};
-    std::array<std::int32_t, columns * side> changes_{};  ///< of the winding number, at voxels of one leaf
-    std::uint64_t inside_ = 0, crossed_ = 0;              ///< a bit a column
+    std::array<std::int32_t, columns * side> changes_{};  ///< changes of the winding number at the voxels of one leaf
+    std::uint64_t inside_ = 0, crossed_ = 0;              ///< one bit per column
 };
 
-/// Crossings of a tile's columns, sorted by the leaf that follows them.
+/// The crossings of a tile's columns, sorted by the leaf that follows them.
 struct CrossingsOfTile {
     std::vector<Crossing> found, sorted;
     std::vector<std::size_t> begins;
@@ -165,7 +165,7 @@ struct CrossingsOfTile {
 
 class Repairer {
   public:
-    /// @param fifths  whether only one column in five is compared
+    /// @param fifths  whether to compare only one column in five
     Repairer(openvdb::FloatGrid& distance, const Mesh& mesh, float limit, bool fifths, Progress* progress)
         : mesh_(mesh),
           fifths_(fifths),
@@ -265,7 +265,7 @@ class Repairer {
         }
     }
 
-    // The leaf that a crossing changes first is the lowest one whose top is not below it.
+    // The first leaf that a crossing affects is the lowest one whose top is not below it.
     static void sortByLeaf(std::span<const LeafInTile> leaves, CrossingsOfTile& crossings) {
         const auto leafOf = [&](const Crossing& crossing) {
             return std::size_t(
@@ -296,7 +296,7 @@ class Repairer {
                 const glm::dvec2 at(x, y);
                 const int s = sideOf(a, b, at);
                 if (s == 0 || sideOf(b, c, at) != s || sideOf(c, a, at) != s) continue;
-                // seen from above, triangles that face down run clockwise
+                // Seen from above, downward-facing triangles are clockwise.
                 crossings.push_back({firstAbove(p, at), std::uint8_t(column), std::int8_t(-s)});
             }
     }
@@ -314,16 +314,16 @@ class Repairer {
     }
 
     const Mesh& mesh_;
-    bool fifths_;  ///< only columns that are isFifth() are compared
+    bool fifths_;  ///< compare only columns with isFifth()
     float limit_;
     Progress* progress_;
     float voxelSize_;
     double voxelsPerUnit_;
-    std::vector<LeafInTile> leaves_;            ///< by tile, then from below to above
+    std::vector<LeafInTile> leaves_;            ///< by tile, then from bottom to top
     std::vector<Tile> tiles_;                   ///< those with leaves
-    std::vector<std::size_t> leavesOfTile_;     ///< where those of each tile begin
-    std::vector<std::uint32_t> triangles_;      ///< by tile, some in many
-    std::vector<std::size_t> trianglesOfTile_;  ///< where those of each tile begin
+    std::vector<std::size_t> leavesOfTile_;     ///< start of each tile's leaves
+    std::vector<std::uint32_t> triangles_;      ///< by tile, possibly repeated
+    std::vector<std::size_t> trianglesOfTile_;  ///< start of each tile's triangles
 };
 
 }  // namespace

@@ -1,4 +1,5 @@
-// Signs of a field compared with winding numbers, and set right. Heavy: it includes OpenVDB.
+// Compares the signs of a field with winding numbers and corrects them. This header includes OpenVDB and is slow to
+// compile.
 #pragma once
 
 #include <openvdb/openvdb.h>
@@ -11,28 +12,28 @@ namespace bilayer::detail {
 
 class Progress;
 
-/// What repairSigns() found.
+/// The result of repairSigns().
 struct SignRepair {
-    std::size_t repaired = 0;  ///< active voxels whose sign was changed
-    std::size_t refused = 0;   ///< active voxels with a wrong sign that they keep
+    std::size_t repaired = 0;  ///< active voxels whose sign was corrected
+    std::size_t refused = 0;   ///< active voxels that keep a wrong sign
 };
 
-/// Gives active voxels the sign of the mesh's winding number: negative where it is positive. For the field of a
-/// balanced mesh by normals without conflicts; only where the mesh intersects itself are signs wrong there. Voxels on
-/// the surface, up to a thousandth of a voxel, count as right. Signs are refused where the winding number is negative,
-/// so that a part of the mesh is inside out, and farther from the surface than a `limit`.
+/// Gives active voxels the sign of the mesh's winding number: negative where it is positive. Applies to the field of a
+/// balanced mesh, signed by normals without conflicts. Such a field is wrong only where the mesh self-intersects.
+/// Voxels within 1e-3 voxel of the surface count as right. Corrections are refused where the winding number is
+/// negative, because that part of the mesh is inside out. They are also refused farther from the surface than `limit`.
 ///
-/// Winding numbers are exact: along each column of voxels, sums of the signed crossings of triangles. On edges and
-/// vertices a column counts as a hair beside them, the same for all triangles (H. Edelsbrunner, E. P. Muecke,
+/// Winding numbers are exact: they sum the signed triangle crossings along each column of voxels. A column through an
+/// edge or vertex is perturbed infinitesimally, in the same way for all triangles (H. Edelsbrunner, E. P. Muecke,
 /// "Simulation of simplicity", ACM TOG 9 (1990)).
 ///
-/// Up to 1024 leaves, all columns are compared. Of more, first one in five: no voxel is more than a voxel from one of
-/// them, so that no wrong part of the field can hide there which holds a voxel of a distance of one voxel or more. All
-/// are, if one of these is wrong. A few percent of a build.
-/// @param distance  voxel centres are whole multiples of the voxel size
+/// Up to 1024 leaves, all columns are compared. With more leaves, one column in five is compared first. No voxel is
+/// more than one voxel from such a column, so this finds any wrong region that contains a voxel at a distance of one
+/// voxel or more. If any compared column is wrong, all columns are compared. The cost is a few percent of a build.
+/// @param distance  voxel centres are integer multiples of the voxel size
 /// @param mesh      balanced() and valid [m]
-/// @param limit     [m]
-/// @param progress  polled, unless null
+/// @param limit     maximum distance of a corrected voxel from the surface [m]
+/// @param progress  polled for cancellation, unless null
 SignRepair repairSigns(openvdb::FloatGrid& distance, const Mesh& mesh, float limit, Progress* progress = nullptr);
 
 }  // namespace bilayer::detail

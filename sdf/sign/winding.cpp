@@ -24,29 +24,28 @@ namespace {
 using Symmetric2 = std::array<double, 6>;
 using Symmetric3 = std::array<double, 10>;
 
-constexpr int brickSide = 64;  // of what one task signs [voxels]
+constexpr int brickSide = 64;  // region that one task signs [voxels]
 constexpr std::size_t leafTriangles = 12;
-/// Ranges of triangles or edges below this are sorted out by one task.
+/// Smaller ranges of triangles or edges are processed by one task.
 constexpr std::size_t taskItems = 4096;
-/// Expansions that may err by more than this are of no use: the node is opened. It also keeps sums of errors accurate.
+/// An expansion with a larger error bound is not used: the node is opened. This also keeps the sums of errors accurate.
 constexpr double uselessError = 10;
-/// Where the sign of a voxel is to be handed on, the error of an estimate in parts of the way to a half.
+/// Error of an estimate whose sign is propagated to other voxels, as a fraction of its distance to one half.
 constexpr double handOn = 0.5;
-/// Room for rounding where nothing but the side of a half is asked for [1].
+/// The same where only the side of one half matters: 1, less a margin for rounding.
 constexpr double onlySide = 0.999;
-/// Room for the rounding of floats in distances that are added up [voxels].
+/// Tolerance for the rounding of floats in sums of distances [voxels].
 constexpr float slack = 1e-3f;
-/// Where the winding number may change by more than this from voxel to voxel it is asked for in smaller regions.
+/// Where the winding number may change by more than this per voxel, it is evaluated in smaller regions.
 constexpr double calmSlope = 0.02;
-/// Kept back of the distance to a half for voxels near the surface: two links, each at most sqrt(3) voxels.
+/// Reserved part of the distance to one half, for voxels near the surface: two links of at most sqrt(3) voxels each.
 constexpr double reserve = 2 * 1.7320508075688772 * calmSlope;
-/// Where a closed mesh is asked about a voxel that no surface is near [voxels]: beside it, as walls that cancel out,
-/// those within a union, often pass through voxels. Shorter than the half voxel that is free, and along no simple
-/// plane.
+/// Offset of the query point for a voxel away from the surface, in a closed mesh [voxels]. Without it, query points
+/// often lie on cancelling walls inside a union. It is shorter than the free half voxel, and not along a simple plane.
 const glm::dvec3 beside(0.113, 0.071, 0.167);
-const double halfDiagonal = std::sqrt(3.0) / 2;  // of a cube of side 1
+const double halfDiagonal = std::sqrt(3.0) / 2;  // of a cube with side 1
 
-// The median split of items by the longest side of the box around them; returns the middle.
+// Median split of items along the longest side of their bounds; returns the middle.
 template <class Item>
 std::size_t split(std::vector<Item>& items, std::size_t begin, std::size_t end, Progress* progress) {
     poll(progress);
@@ -66,10 +65,11 @@ std::size_t split(std::vector<Item>& items, std::size_t begin, std::size_t end, 
     return middle;
 }
 
-// Nodes of the tree over n items; depends on n alone, so that every node's place is known before it is built.
+// Returns the node count of the tree over n items. It depends only on n, so every node's position is known before the
+// node is built.
 std::size_t nodesOver(std::size_t n, std::size_t leaf) {
     if (n <= leaf) return 1;
-    // halves differ by at most one: all sizes on a level are two neighbours
+    // Halves differ by at most one, so the sizes on a level are two consecutive integers.
     std::size_t nodes = 0, small = n, fewer = 1, more = 0;  // `fewer` nodes of `small` items, `more` of small + 1
     while (fewer + more > 0) {
         nodes += fewer + more;
@@ -108,7 +108,7 @@ double solidAngle(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c)
     return 2 * std::atan2(determinant(a, b, c), below);
 }
 
-// The symmetric part of a b^T: xx, yy, zz, xy, yz, zx.
+// Returns the symmetric part of a b^T: xx, yy, zz, xy, yz, zx.
 Symmetric2 product(const glm::dvec3& a, const glm::dvec3& b) {
     return {a.x * b.x,
             a.y * b.y,
@@ -118,7 +118,7 @@ Symmetric2 product(const glm::dvec3& a, const glm::dvec3& b) {
             0.5 * (a.z * b.x + a.x * b.z)};
 }
 
-// The symmetric part of m (x) v: xxx, yyy, zzz, xxy, xxz, yyx, yyz, zzx, zzy, xyz.
+// Returns the symmetric part of m (x) v: xxx, yyy, zzz, xxy, xxz, yyx, yyz, zzx, zzy, xyz.
 Symmetric3 product(const Symmetric2& m, const glm::dvec3& v) {
     const auto& [xx, yy, zz, xy, yz, zx] = m;
     const double third = 1.0 / 3;
@@ -139,7 +139,7 @@ void add(std::array<double, n>& sum, const std::array<double, n>& part, double t
     for (std::size_t i = 0; i < n; ++i) sum[i] += times * part[i];
 }
 
-// What a tensor gives for one vector in all places, and what its trace gives for that vector.
+// Returns a tensor applied to one vector in all places, and its trace applied to that vector.
 double cubic(const Symmetric3& t, const glm::dvec3& u) {
     return t[0] * u.x * u.x * u.x + t[1] * u.y * u.y * u.y + t[2] * u.z * u.z * u.z +
            3 * (u.x * u.x * (t[3] * u.y + t[4] * u.z) + u.y * u.y * (t[5] * u.x + t[6] * u.z) +
@@ -150,8 +150,8 @@ double trace(const Symmetric3& t, const glm::dvec3& u) {
     return (t[0] + t[5] + t[7]) * u.x + (t[1] + t[3] + t[8]) * u.y + (t[2] + t[4] + t[6]) * u.z;
 }
 
-// Touching counts. A shared edge's determinants are each other's negative to the last bit, so nothing slips between two
-// triangles.
+// Touching counts as an intersection. The determinants of a shared edge are exact negatives of each other, so no
+// segment passes between two triangles.
 bool segmentMeets(const glm::dvec3& from, const glm::dvec3& to, const std::array<glm::vec3, 3>& corners) {
     const glm::dvec3 way = to - from;
     const glm::dvec3 a = glm::dvec3(corners[0]) - from, b = glm::dvec3(corners[1]) - from,
@@ -182,7 +182,7 @@ WindingNumber::WindingNumber(const Mesh& mesh, Progress* progress) {
     });
     nodes_ = vectorOf<Node>(nodesOver(count, leafTriangles), progress);
     triangles_ = vectorOf<Corners>(count, progress);
-    // corners are copied as the ranges settle; sums go up on the way back
+    // Corners are copied once the ranges are final. Sums are computed on the way back up.
     struct Builder {
         WindingNumber& tree;
         const Mesh& mesh;
@@ -239,7 +239,7 @@ Bounds WindingNumber::sumTriangles(Node& node) const {
                          c = glm::dvec3(t[2]) - node.centre;
         const glm::dvec3 n = 0.5 * glm::cross(b - a, c - a), s = (a + b + c) / 3.0;
         node.radius = std::max({node.radius, glm::length(a), glm::length(b), glm::length(c)});
-        // the integral of x x^T over a triangle: area / 12 (a a^T + b b^T + c c^T + 9 s s^T)
+        // The integral of x x^T over a triangle: area / 12 (a a^T + b b^T + c c^T + 9 s s^T).
         Symmetric2 second{};
         for (const glm::dvec3& corner : {a, b, c}) add(second, product(corner, corner), 1.0 / 12);
         add(second, product(s, s), 9.0 / 12);
@@ -284,8 +284,8 @@ double WindingNumber::solidAngles(const Node& node, const glm::dvec3& point) con
 }
 
 // The kernel n . (x - q) / |x - q|^3 is expanded in s = x - centre to second order. The term of order k - 1 is the
-// gradient of a solid harmonic of degree k, at most k |s|^(k - 1) / R^(k + 1) (Bernstein's inequality), R = |centre -
-// q|. With |s| <= t R the terms that are left out sum up to at most t |s|^2 / R^4 (4 - 3 t) / (1 - t)^2.
+// gradient of a solid harmonic of degree k, at most k |s|^(k - 1) / R^(k + 1) (Bernstein's inequality), with R =
+// |centre - q|. For |s| <= t R the truncated terms sum to at most t |s|^2 / R^4 (4 - 3 t) / (1 - t)^2.
 WindingNumber::Estimate WindingNumber::expansion(const Node& node, const glm::dvec3& point) const {
     const glm::dvec3 way = node.centre - point;
     const double squared = glm::dot(way, way), distance = std::sqrt(squared);
@@ -309,7 +309,7 @@ WindingNumber::Estimate WindingNumber::estimate(const glm::dvec3& point, double 
         bool operator<(const Far& other) const { return estimate.error < other.estimate.error; }
     };
     Estimate sum{0, 0};
-    std::vector<Far> heap;  // clusters that stand for their triangles so far, the worst on top
+    std::vector<Far> heap;  // clusters that currently represent their triangles, the largest error on top
     std::vector<std::uint32_t> open{0};
     for (;;) {
         while (!open.empty()) {
@@ -415,13 +415,13 @@ double WindingSlope::ofEdge(const Edge& edge, const glm::dvec3& centre, double r
     const double along = squared > 0 ? std::clamp(glm::dot(centre - edge.from, way) / squared, 0.0, 1.0) : 0.0;
     const double gap = glm::length(edge.from + along * way - centre) - radius;
     if (gap <= 0) return std::numeric_limits<double>::infinity();
-    // an infinite straight line has 2 / gap
+    // An infinite straight line gives 2 / gap.
     return edge.times * std::min(std::sqrt(squared) / (gap * gap), 2 / gap);
 }
 
 namespace {
 
-// Everything that the signs of one brick need.
+// The input for the signs of one brick.
 struct Question {
     const WindingNumber& winding;
     const WindingSlope* slope;  // null: the number changes only across the surface
@@ -433,7 +433,7 @@ struct Question {
     glm::dvec3 centre(const openvdb::Coord& origin, std::int32_t side) const {
         return (glm::dvec3(origin.x(), origin.y(), origin.z()) + 0.5 * (side - 1)) * voxelSize;
     }
-    // Largest change of the winding number from voxel to voxel in a ball [1/voxel].
+    // Returns the maximum change of the winding number per voxel in a ball [1/voxel].
     double slopeIn(const glm::dvec3& ball, double radiusVoxels) const {
         return slope ? (*slope)(ball, radiusVoxels * voxelSize) * voxelSize : 0;
     }
@@ -441,19 +441,19 @@ struct Question {
 
 struct Answer {
     bool inside;
-    double margin;  // no less than the distance of the winding number from a half
+    double margin;  // lower bound of the winding number's distance to one half
 };
 
 Answer ask(const Question& question, const glm::dvec3& point) {
     poll(question.progress);
     const WindingNumber::Estimate e = question.winding.estimate(point, question.slope ? handOn : onlySide);
-    // where nothing changes without a surface between, an answer goes as far as the surface
+    // If the number changes only across the surface, an answer is valid up to the surface.
     const double margin =
         question.slope ? std::max(std::abs(e.value - 0.5) - e.error, 0.0) : std::numeric_limits<double>::infinity();
     return {e.value > 0.5, margin};
 }
 
-// The signs of one brick: of leaves voxel by voxel, of the cells between them at once.
+// The signs of one brick: of leaves voxel by voxel, of each cell between leaves at once.
 class BrickSigns {
   public:
     BrickSigns(const Question& question, std::span<const OctreeCell> cells,
@@ -464,16 +464,16 @@ class BrickSigns {
     struct State {
         BandLeaf* leaf;
         double slope;      // [1/voxel], for links that start in this leaf
-        BlockMask open{};  // voxels that no link from one to the next can cross the surface
+        BlockMask open{};  // voxels between which no link can cross the surface
         BlockMask known{}, inside{};
-        BlockMask firm{};  // with `reserve` left until a half
+        BlockMask firm{};  // with `reserve` left to one half
         BlockMask front{};
         bool calm() const { return slope <= calmSlope; }
     };
     struct Empty {
         OctreeCell cell;
         double slope;   // [1/voxel]
-        double margin;  // at the centre; negative: not known yet
+        double margin;  // at the centre; negative: unknown
         bool inside;
     };
 
@@ -493,7 +493,7 @@ class BrickSigns {
     openvdb::Coord origin_;
     std::vector<State> leaves_;
     std::vector<Empty> empties_;
-    std::array<std::int16_t, blockVoxels> slots_;  // of the brick's blocks: a leaf's index, or -1 - an empty cell's
+    std::array<std::int16_t, blockVoxels> slots_;  // per block of the brick: a leaf's index, or -1 - an empty cell's
 };
 
 BrickSigns::BrickSigns(const Question& question, std::span<const OctreeCell> cells,
@@ -502,7 +502,7 @@ BrickSigns::BrickSigns(const Question& question, std::span<const OctreeCell> cel
     const float open = (0.5f + slack) * float(question.voxelSize);
     for (const OctreeCell& cell : cells) {
         const glm::dvec3 centre = question.centre(cell.origin, cell.side);
-        // links reach one voxel beyond a leaf
+        // Links extend one voxel beyond a leaf.
         const double reach = halfDiagonal * (cell.leaf ? cell.side + 1 : cell.side);
         const double slope = question.slopeIn(centre, reach);
         const int index = cell.leaf ? int(leaves_.size()) : -1 - int(empties_.size());
@@ -521,7 +521,7 @@ BrickSigns::BrickSigns(const Question& question, std::span<const OctreeCell> cel
     }
 }
 
-// What holds a voxel; none beyond the brick.
+// Returns the slot of the cell that contains a voxel. Valid only inside the brick.
 int BrickSigns::slot(const openvdb::Coord& voxel) const {
     const openvdb::Coord o = voxel - origin_;
     return slots_[std::size_t(((o.x() / 8) * 8 + o.y() / 8) * 8 + o.z() / 8)];
@@ -549,7 +549,8 @@ void BrickSigns::signEmpty() {
     for (const Empty& e : empties_) settle(e.cell.origin, e.cell.side, {e.inside, e.margin}, e.slope);
 }
 
-// From the centre of a cell to those of its neighbours, as long as it is certain that the number stays on its side.
+// Propagates the sign from the centre of a cell to its neighbours' centres, as long as the number certainly stays on
+// its side.
 void BrickSigns::spreadEmpty(std::size_t seed) {
     const auto halfWay = [](const Empty& e) { return halfDiagonal * e.cell.side * e.slope; };
     const glm::dvec3 centre = question_.centre(empties_[seed].cell.origin, empties_[seed].cell.side);
@@ -580,7 +581,7 @@ void BrickSigns::spreadEmpty(std::size_t seed) {
     }
 }
 
-// Gives a cell its centre's sign, or cuts it up where the number may pass a half in it.
+// Gives a cell the sign of its centre, or divides it if the number may cross one half inside it.
 void BrickSigns::settle(const openvdb::Coord& origin, std::int32_t side, const Answer& answer, double slope) {
     if (side == blockSide || answer.margin > halfDiagonal * side * slope) {
         if (answer.inside) insideBoxes_.push_back(openvdb::CoordBBox::createCube(origin, side));
@@ -603,7 +604,7 @@ Answer BrickSigns::decide(State& state, unsigned voxel) {
     return answer;
 }
 
-// A wave over the open voxels of calm leaves, a step at a time, until the number might have come too near to a half.
+// Propagates over the open voxels of calm leaves, one step at a time, until the number may be too close to one half.
 void BrickSigns::spreadCalm(std::size_t leaf, unsigned voxel) {
     const Answer answer = decide(leaves_[leaf], voxel);
     double left = answer.margin - reserve;
@@ -647,7 +648,7 @@ void BrickSigns::spreadCalm(std::size_t leaf, unsigned voxel) {
     }
 }
 
-// Near a hole: regions of 4x4x4 voxels, each with a slope of its own.
+// Near a hole: regions of 4x4x4 voxels, each with its own slope.
 void BrickSigns::signRough(State& state) {
     constexpr int side = blockSide / 2;
     for (int octant = 0; octant < 8; ++octant) {
@@ -677,7 +678,8 @@ void BrickSigns::spreadIn(State& state, const BlockMask& region, double slope, u
     }
 }
 
-// Voxels near the surface take the sign of a neighbour that nothing can part them from; the few others are asked for.
+// Voxels near the surface take the sign of a neighbour that no surface can separate from them. The few others are
+// evaluated.
 void BrickSigns::signNear() {
     for (int pass = 0; pass < 2; ++pass) {
         std::vector<BlockMask> firm(leaves_.size());
@@ -714,7 +716,8 @@ bool BrickSigns::copyNear(State& state, unsigned voxel, BlockMask& firm) {
     return false;
 }
 
-// Where an open mesh's number can be above a half: area / (4 pi R^2) is no more than that at a distance R.
+// Returns the region where an open mesh's winding number can exceed one half.
+// At a distance R the number is at most area / (4 pi R^2).
 openvdb::CoordBBox spaceOf(const std::vector<BandLeaf*>& leaves, const Question& question) {
     constexpr double farthest = 1e9;  // [voxels], as coordinates in a build
     openvdb::CoordBBox box;

@@ -1,5 +1,5 @@
-// Signs by the generalized winding number (winding_number.h). It copes with holes, overlaps and soups, as long as most
-// faces are turned the right way.
+// Signs by the generalized winding number (winding_number.h). Handles holes, overlaps and triangle soups if most faces
+// are oriented correctly.
 #pragma once
 
 #include <openvdb/openvdb.h>
@@ -10,19 +10,19 @@
 
 namespace bilayer::detail {
 
-/// Signs a narrow band of unsigned distances: a voxel is inside where the mesh's winding number is above a half.
+/// Signs a narrow band of unsigned distances: a voxel is inside where the winding number of the mesh is above one half.
 ///
-/// `grid` holds a distance >= 0 [m] in every voxel nearer to the mesh than some reach, the reach as background and in
-/// all other voxels, and no active tile; on return it is a level set of the given widths: active exactly where
-/// -interior < distance < exterior, elsewhere +exterior or -interior, in tiles as large as they can be.
+/// `grid` holds a distance >= 0 [m] in every voxel closer to the mesh than some reach. Its background and all other
+/// voxels hold the reach, and it has no active tile. On return it is a level set of the given widths. Voxels with
+/// -interior < distance < exterior are active; others hold +exterior or -interior, in tiles as large as possible.
 ///
-/// @param closed  true: as many triangles run along every edge one way as the other, hence the number is the same
-///                wherever no surface lies between, and few voxels need to be asked. false: it changes across a hole,
-///                away from any surface. Then voxels of leaves get the sign at their own centre, and the space between
-///                leaves gets one sign for each 8x8x8 block, that of the block's centre.
-/// @param progress  polled, unless null
-/// The bytes do not depend on the number of threads. Throws std::invalid_argument as validate() does, and Cancelled;
-/// the grid is then in between.
+/// The bytes do not depend on the thread count. Throws std::invalid_argument as validate() does, and Cancelled. After
+/// an exception the grid is incomplete.
+/// @param closed  true: every edge is used equally often in both directions. The number is then constant where no
+///                surface lies between, and few voxels need a query. false: the number changes across a hole, away from
+///                any surface. Voxels of leaves then get the sign at their own centre. The space between leaves gets
+///                one sign for each 8x8x8 block, from the block's centre.
+/// @param progress  polled for cancellation, unless null
 void signByWinding(openvdb::FloatGrid& grid, const Mesh& mesh, const BandWidths& widths, bool closed,
                    Progress* progress = nullptr);
 
