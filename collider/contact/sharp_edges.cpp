@@ -28,8 +28,8 @@ constexpr std::size_t maxNeighbours = 6;
 constexpr float minCrossing = 0.2f;
 // Max distance of a crossing from the deepest place of the field, which rounds edges off [voxels].
 constexpr float crossingWithin = 1.5f;
-// It is no deeper than so many times what the field shows, across faces instead of both edges, or than so much more
-// [voxels]: a field by samples rounds edges off.
+// Max depth of a crossing, as a multiple of the depth in the field and as an excess over it [voxels]. The field's depth
+// is across faces instead of both edges, and a sampled field rounds edges off.
 constexpr float deepestAcross = 1.5f, deepestUnseen = 1, deepestAcrossExact = 2, deepestUnseenExact = 0.25f;
 // Min angle (sine) between the faces and the plane that separates two edges. Coplanar faces touch by their points.
 constexpr float minLeaving = 0.09f;
