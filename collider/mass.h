@@ -20,8 +20,8 @@ struct MassProperties {
 
 /// Exact integrals over the tetrahedra between the triangles and the centre of the bounds, in double precision (D.
 /// Eberly, "Polyhedral Mass Properties (Revisited)", 2002). The mesh should be closed. An inside-out mesh gives the
-/// same result as its reverse. Throws std::invalid_argument if the volume is zero, as for an open surface, if the
-/// inertia is not positive, or if it exceeds single precision, as for a body of 1e8 m.
+/// same result as its reverse. Throws std::invalid_argument if the volume is zero, as for an open surface, or if the
+/// inertia is not positive. The same for an inertia beyond single precision: that of a body of 1e8 m.
 MassProperties massProperties(const Mesh& mesh);
 
 /// Integrals over the negative region of the interpolated field. The same bytes for any number of threads.
@@ -29,8 +29,8 @@ MassProperties massProperties(const Mesh& mesh);
 ///   edges; first if the band is narrower than sqrt(3) voxels.
 /// - At 128 voxels the error is below 0.5 %, and mostly below 0.05 %, if walls are three voxels thick on average. Walls
 ///   thinner than two voxels are captured only in part.
-/// - With long sharp edges, a field of the double layer method is off by up to 0.5 % at 128 voxels and 0.3 % at 256,
-///   because its distances near the edges are too large.
+/// - With long sharp edges, a field of the double layer method is off by up to 0.5 % at 128 voxels and 0.3 % at 256.
+///   Its distances near such edges are too large.
 /// Throws std::invalid_argument if there is no interior, or if the inertia exceeds single precision.
 MassProperties massProperties(const LevelSet& levelSet);
 

@@ -39,9 +39,8 @@ inline bool fallsBetween(const Slope& from, const Slope& to) {
 template <class Function>
 std::optional<Slope> lowestBetween(Slope from, Slope to, float tolerance, Function&& at) {
     constexpr int maxQueries = 7;
-    constexpr float flat = 0.01f;  // slopes below this count as zero
-    constexpr float nearestEnd =
-        0.02f;  // min distance of a query from the interval's ends, as a fraction of the interval
+    constexpr float flat = 0.01f;        // slopes below this count as zero
+    constexpr float nearestEnd = 0.02f;  // min distance of queries from the ends, as a fraction of the interval
     Slope best = from.value < to.value ? from : to;
     for (int i = 0; i < maxQueries; ++i) {
         const float width = to.place - from.place, turn = to.slope - from.slope;

@@ -15,11 +15,10 @@
 namespace bilayer::detail {
 namespace {
 
-constexpr double latticePitch = 0.75;  // of candidates on edges and faces [spacings]
-constexpr double minGap = 0.7;         // min distance of points with about the same normal [spacings]
-constexpr double likeness = 0.7;       // min cosine between such normals: a cube's edge and its faces have 0.71
-constexpr double minProtrusion =
-    0.035;  // max height over the tangent plane of such a point, for a place without its own [spacings]
+constexpr double latticePitch = 0.75;    // of candidates on edges and faces [spacings]
+constexpr double minGap = 0.7;           // min distance of points with about the same normal [spacings]
+constexpr double likeness = 0.7;         // min cosine between such normals: a cube's edge and its faces have 0.71
+constexpr double minProtrusion = 0.035;  // max height of a dropped candidate over such a point [spacings]
 constexpr double minCornerGap = 0.1;     // between convex vertices [spacings]: a fraction of a voxel
 constexpr double corner = 0.5;           // min convexity of a vertex: a cube's has 0.58
 constexpr double sharp = 0.15;           // min convexity of an edge: a cube's have 0.35

@@ -12,8 +12,7 @@ namespace {
 // A shorter gradient has no direction. On the surface even a short one has: next to a sharp edge, the interpolant of
 // the voxels below rises only by the distance to the edge in voxels.
 constexpr float flattest = 0.1f, flattestOnSurface = 1e-3f;
-constexpr float onSurface =
-    0.01f;  // [voxels]: contains all places in the voxels of an edge with gradients shorter than 0.1
+constexpr float onSurface = 0.01f;     // [voxels]: includes all gradients below 0.1 in the voxels of an edge
 constexpr float nearestAside = 0.01f;  // [voxels] from an edge or vertex; nearer, rounding spoils the direction
 
 }  // namespace

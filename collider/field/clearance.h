@@ -24,12 +24,11 @@ class Clearance {
     /// The arrays, ordered by block. The eight coarse cells of a block are contiguous, the last axis fastest.
     struct Data {
         const std::int32_t* directory;  ///< of FieldLayout
-        const std::int8_t*
-            centres;  ///< lower bound of the distance from each cell's centre to the surface, negative inside [steps]
-        const std::int8_t* minima;  ///< lower bound of the samples in each cell, by stored block [minimaStep]
-        float minimaStep;           ///< [m]
-        float besides[2];           ///< the same for cells of empty blocks, outside and inside [m]
-        glm::ivec3 blocks;          ///< count along each axis
+        const std::int8_t* centres;  ///< min distance from each cell's centre to the surface, negative inside [steps]
+        const std::int8_t* minima;   ///< lower bound of the samples in each cell, by stored block [minimaStep]
+        float minimaStep;            ///< [m]
+        float besides[2];            ///< the same for cells of empty blocks, outside and inside [m]
+        glm::ivec3 blocks;           ///< count along each axis
     };
 
     explicit Clearance(const Data& data)

@@ -34,13 +34,11 @@ using openvdb::Coord;
 using openvdb::FloatTree;
 using Accessor = openvdb::FloatGrid::ConstAccessor;
 
-constexpr int side = 8,
-              stride = side + 1;     // of a block: an OpenVDB leaf, and with the voxels that complete its last cells
-constexpr std::size_t grain = 64;    // blocks per partial sum: fixed, for reproducible sums
+constexpr int side = 8, stride = side + 1;  // of a block: an OpenVDB leaf, and with the upper neighbours
+constexpr std::size_t grain = 64;           // blocks per partial sum: fixed, for reproducible sums
 constexpr double justBeside = 1e-6;  // distance of a corrected voxel that would otherwise change its sign [voxels]
 constexpr double minVolume = 1e-6;   // smaller volumes are rounding errors [voxels]
-const std::array<double, 2> gauss{0.5 - std::sqrt(1.0 / 12),
-                                  0.5 + std::sqrt(1.0 / 12)};  // Gauss points of equal weight
+const std::array<double, 2> gauss{0.5 - std::sqrt(1.0 / 12), 0.5 + std::sqrt(1.0 / 12)};  // points of equal weight
 
 using Cell = std::array<double, 8>;  // distances at the corners, z fastest [voxels]
 
