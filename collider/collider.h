@@ -17,7 +17,7 @@ struct ColliderData;
 
 /// The source of contact distances and normals. Field samples find the candidates first.
 enum class ContactAccuracy {
-    samples,            ///< field samples only; uses the least memory
+    samples,            ///< field samples only; lowest memory use
     exactNearFeatures,  ///< triangles where samples are inaccurate: at edges, in grooves, and where the surface bends
                         ///< within a voxel
     exact,              ///< triangles everywhere

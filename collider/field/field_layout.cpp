@@ -27,7 +27,7 @@ constexpr int side = FieldLayout::side, stride = FieldLayout::stride;
 constexpr std::int64_t maxBlocks = 1 << 26;  // of the box: 0.75 GiB at 12 bytes each
 constexpr int partSide = Clearance::partSide, perBlock = Clearance::perBlock, blockParts = Clearance::blockParts;
 constexpr int maxParts = 16;                      // distance limit of the bounds [coarse cells]
-constexpr float nearSurface = 0.5f * 1.7320508f;  // max distance of a voxel from the surface in its cell [voxels]
+constexpr float nearSurface = 0.5f * 1.7320508f;  // max distance from surface in a cell to its nearest voxel [voxels]
 constexpr int minSteps = 126;                     // from 0 to the end of the band, for the stored minima
 
 // Squared distances from the centres of coarse cells to the nearest one that the surface meets. The unit is half a
