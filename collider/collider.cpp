@@ -1,4 +1,4 @@
-// Colliders from meshes and from files.
+// Construction of colliders from meshes and from files.
 #include <bilayer/collider/collider.h>
 #include <bilayer/sdf/build.h>
 #include <bilayer/sdf/surface.h>
@@ -21,7 +21,7 @@
 namespace bilayer::detail {
 namespace {
 
-// Holes no wider than this are cracks, whose rims lie on each other [voxels].
+// Holes up to this width are cracks, whose rims coincide [voxels].
 constexpr float crackWidth = 0.01f;
 
 std::uint64_t nextId() {
@@ -38,8 +38,8 @@ Mesh withoutCopies(Mesh mesh) {
     return mesh;
 }
 
-// Of the mesh, where that is closed; else of what the field has inside. A solid whose every face was there back to back
-// has its volume twice in a mesh that faces outward.
+// Mass properties of the mesh if it is closed, otherwise of the field's interior. A solid whose faces were all
+// duplicated back to back has twice its volume in an outward-facing mesh; duplicates are dropped first.
 std::optional<MassProperties> massOf(const Mesh& mesh, const LevelSet& levelSet) {
     try {
         if (!balanced(mesh)) return massProperties(levelSet);
@@ -47,16 +47,16 @@ std::optional<MassProperties> massOf(const Mesh& mesh, const LevelSet& levelSet)
             if (const Mesh once = withoutCopies(mesh); balanced(once)) return massProperties(once);
         return massProperties(mesh);
     } catch (const std::invalid_argument&) {
-        return std::nullopt;  // a sheet: it can only be static
+        return std::nullopt;  // an open surface: it can only be static
     }
 }
 
 struct Filled {
     Mesh mesh;
-    std::optional<LevelSet> levelSet;  // where holes were filled
+    std::optional<LevelSet> levelSet;  // set if holes were filled
 };
 
-// What winding numbers take for the surface becomes one, with distances and normals of its own.
+// Fills the gaps that winding numbers treat as surface, so that they have distances and normals of their own.
 Filled filledMesh(Mesh outward, const LevelSet& levelSet) {
     if (levelSet.sign() != "winding" || levelSet.meshHash() == 0) return {std::move(outward), std::nullopt};
     FilledMesh filled = fillHoles(std::move(outward), double(crackWidth * levelSet.voxelSize()));
@@ -110,7 +110,7 @@ ColliderData::ColliderData(const LevelSet& given, Body made)
 
 template <class Make>
 void ColliderData::once(const Make& make) const {
-    // a thread that waits for others here must not take up work that asks for the very same
+    // isolated: a waiting thread must not take up a task that enters this same call
     std::call_once(once_, [&] { tbb::this_task_arena::isolate(make); });
 }
 

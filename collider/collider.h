@@ -1,4 +1,4 @@
-// A rigid body's shape: a field, its mesh, and what contacts need of both.
+// The collision shape of a rigid body: a field, its mesh, and the data that contact generation needs.
 #pragma once
 
 #include <bilayer/collider/field.h>
@@ -15,79 +15,76 @@ namespace detail {
 struct ColliderData;
 }
 
-/// What the distances and normals of contacts are taken from, once the field's samples have found them.
+/// The source of contact distances and normals. Field samples find the candidates first.
 enum class ContactAccuracy {
-    samples,            ///< nothing else: takes the least memory
-    exactNearFeatures,  ///< the triangles where samples are off: at edges, in grooves, and where the surface bends in a
-                        ///< voxel
-    exact,              ///< the triangles everywhere
+    samples,            ///< field samples only; lowest memory use
+    exactNearFeatures,  ///< triangles where samples are inaccurate: at edges, in grooves, and where the surface bends
+                        ///< within a voxel
+    exact,              ///< triangles everywhere
 };
 
-/// As in files and on the command line: samples, edges or triangles.
+/// The name in files and on the command line: samples, edges or triangles.
 const char* nameOf(ContactAccuracy accuracy);
 
 struct ColliderOptions {
-    /// Distance between neighbouring surface points [voxels of the field]. Smaller finds finer contacts and costs more.
-    /// What is round has points closer to each other, so that it sinks in between them by 0.05 spacings at most.
+    /// Distance between neighbouring surface points [voxels of the field]. A smaller spacing finds finer contacts and
+    /// costs more. Curved surfaces get denser points, which limits the penetration between points to 0.05 spacings.
     float pointSpacing = 2.0f;
-    /// Contacts are made up to this distance between the surfaces [m], 1000 voxels at most. Negative: one voxel of the
-    /// field.
+    /// Contacts are created up to this separation [m], at most 1000 voxels. Negative: one voxel of the field.
     float margin = -1;
-    /// ContactAccuracy::exactNearFeatures asks the triangles where samples are off by more than a tenth of a voxel (see
-    /// InterpolationErrorMask). But for samples alone, the mesh takes memory (see Field), and a microsecond a triangle
-    /// to sort. ContactAccuracy::exact costs more time the more contacts there are: for parts that fit into each other
-    /// to a fraction of a voxel.
+    /// ContactAccuracy::exactNearFeatures queries the triangles where samples are off by more than a tenth of a voxel
+    /// (see InterpolationErrorMask). Both exact modes keep the mesh in memory (see Field) and take a microsecond per
+    /// triangle to build. With ContactAccuracy::exact, time grows with the contact count. Use it for parts that fit
+    /// into each other to a fraction of a voxel.
     ContactAccuracy accuracy = ContactAccuracy::exactNearFeatures;
 };
 
-/// A field, points on the surface, and what else contacts need. Immutable; share it between bodies and threads.
+/// A field, surface points, and other contact data. Immutable: share it between bodies and threads.
 class Collider {
   public:
-    /// Of a mesh and the level set that was built of it. Triangles that face the wrong way are turned around, as
-    /// build() does. Where the signs are of winding numbers, the holes that these close are filled with triangles and
-    /// cracks of up to a hundredth of a voxel are closed (see fillHoles()): a level set is then built of the closed
-    /// mesh, with the same voxels and widths, and the body has its distances and normals there too. Throws
-    /// std::invalid_argument as validate() does, for options of no sense, and if the level set is of another mesh.
+    /// Builds a collider from a mesh and the level set that was built from it. Inward-facing triangles are flipped, as
+    /// in build(). If the signs come from winding numbers, holes are filled with triangles and cracks up to a hundredth
+    /// of a voxel are closed (see fillHoles()). A level set of the closed mesh is then built, with the same voxel size
+    /// and band widths. Distances and normals are thus defined at the former holes too. Throws std::invalid_argument
+    /// for a mesh that fails validate(), for invalid options, and if the level set belongs to another mesh.
     Collider(Mesh mesh, const LevelSet& levelSet, const ColliderOptions& options = {});
 
-    /// Of a level set with a body beside it, as readVdb() gives back what withBody() was written of. It is as the one
-    /// that it was made of, to the bit; but a body without a mesh gives the triangles of the field's zero set where
-    /// triangles are asked for. Throws std::invalid_argument
-    /// that says what is missing or damaged if there is no body, if it is of a newer kind, or if it cannot be one of
-    /// this field.
+    /// Restores a collider from a level set with a stored body, as readVdb() returns it for a file written by
+    /// withBody(). The result equals the original collider bit for bit. A body without a mesh uses the triangles of the
+    /// field's zero set where triangles are requested. Throws std::invalid_argument if there is no body, if its format
+    /// is newer, or if it cannot belong to this field; the message says what is missing or damaged.
     explicit Collider(const LevelSet& levelSet);
 
-    /// The mesh, all of it facing outward, the triangles over its holes last. Where the body has none, one like it is
-    /// extracted from the field when first asked for, once.
+    /// The mesh, with all triangles facing outward; the triangles over its holes come last. If the body has no mesh,
+    /// one is extracted from the field at the first call and kept.
     const Mesh& mesh() const;
     const Field& field() const;
-    /// The field with the mesh, if the body has one: field() itself where contacts ask triangles, else made when first
-    /// asked for, once, and sharing the samples.
+    /// The field with the mesh, if the body has one. This is field() itself if contacts use triangles; otherwise it is
+    /// created at the first call, and shares the samples.
     const Field& exactField() const;
     const Bounds& bounds() const;  ///< of the mesh [m]
     float margin() const;          ///< as in ColliderOptions, never negative [m]
-    /// Of the mesh; where that has holes, of what the field has inside, but for a body from elsewhere. Throws
-    /// std::invalid_argument where there is no volume.
+    /// Mass properties of the mesh. If the mesh has holes, they come from the interior of the field, unless they were
+    /// stored with the body. Throws std::invalid_argument if there is no volume.
     const MassProperties& mass() const;
-    std::uint64_t id() const;  ///< no other collider of this process has it
-    /// What contacts are made from, for the library itself.
+    std::uint64_t id() const;  ///< unique within this process
+    /// The contact data; for internal use.
     const detail::ColliderData& data() const { return *data_; }
 
   private:
     std::shared_ptr<const detail::ColliderData> data_;
 };
 
-/// The level set of a mesh, to write as a .vdb file, with the mesh's body beside it: Collider(const LevelSet&) then
-/// makes the same collider as Collider(mesh, levelSet, options), to the bit, and nobody needs the mesh's file again.
+/// Returns the level set of a mesh with the mesh's body stored in it, for writing as a .vdb file. Collider(const
+/// LevelSet&) then makes the same collider as Collider(mesh, levelSet, options), bit for bit, without the mesh file.
 /// The grids are shared, not copied.
-/// @param keepMesh  false: without the mesh. The body answers by its field alone, which rounds sharp edges: contacts
-/// are
-///                  those of ContactAccuracy::samples, rays are off by half a voxel at most, and sweeps end up to a
-///                  voxel and a half late.
-/// Throws as Collider's constructor, and std::invalid_argument for a mesh of more than 2 GiB.
+/// @param keepMesh  false: store no mesh. Queries then use the field alone, which rounds sharp edges: contacts are
+///                  those of ContactAccuracy::samples, ray hits are off by at most half a voxel, and swept motion stops
+///                  up to 1.5 voxels late.
+/// Throws as Collider's constructor does, and std::invalid_argument for a mesh of more than 2 GiB.
 LevelSet withBody(const LevelSet& levelSet, Mesh mesh, const ColliderOptions& options = {}, bool keepMesh = true);
 
-/// Whether some body was put beside a level set.
+/// Whether the level set stores a body.
 bool hasBody(const LevelSet& levelSet);
 
 }  // namespace bilayer

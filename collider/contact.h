@@ -1,4 +1,4 @@
-// The contacts between two posed bodies.
+// Contact generation between two posed bodies.
 #pragma once
 
 #include <bilayer/collider/collider.h>
@@ -21,76 +21,81 @@ struct PointQuery;
 class FoundPoints;
 }  // namespace detail
 
-/// How a body moves until it is looked at again: a point x of it goes way + turn x (x - its pose's position), in the
-/// world. Straight: turns of more than a fraction of a radian bend away from it.
+/// The predicted motion of a body over the step, in world coordinates. A point x of the body moves by displacement +
+/// rotation x (x - pose position). The path is linear: it deviates for rotations of more than a fraction of a radian.
 struct Motion {
-    glm::vec3 displacement{0};  ///< of the pose's position [m]
-    glm::vec3 rotation{0};      ///< about it [rad]
+    glm::vec3 displacement{0};  ///< of the pose position [m]
+    glm::vec3 rotation{0};      ///< rotation vector about the pose position [rad]
 
-    /// The same motion as told of another point of the body.
+    /// The same motion with another point of the body as its reference.
     Motion about(const glm::vec3& from, const glm::vec3& to) const {
         return {displacement + glm::cross(rotation, to - from), rotation};
     }
 };
 
-/// A collider somewhere in the world, perhaps grown: body coordinates x become pose.toWorld(scale * x).
+/// A collider placed in the world, with an optional uniform scale. Body coordinates x map to pose.toWorld(scale * x).
 struct Placed {
     const Collider& collider;
     Pose pose{};
-    float scale = 1;  ///< positive; distances grow by it
+    float scale = 1;  ///< positive; also scales distances
     Motion motion{};
 };
 
-/// A point where two bodies touch, nearly do, or are going to.
+/// A contact point between two bodies: touching, close to each other, or predicted to touch.
 struct Contact {
-    glm::vec3 position;  ///< on the surface of B, in the world [m]
-    glm::vec3 normal;    ///< from B to A, of unit length
-    float distance;      ///< gap between the surfaces, negative when they overlap [m]
-    /// Index of the surface point, or behind those of all points that of the sharp edge that it is on; the top bit is
-    /// set where the point is of B, else it is of A.
+    glm::vec3 position;  ///< on the surface of B, in world coordinates [m]
+    glm::vec3 normal;    ///< unit vector from B to A
+    float distance;      ///< separation of the surfaces; negative: penetration [m]
+    /// The surface point's index, or the point count plus the index of the sharp edge that the contact lies on. The top
+    /// bit is set for features of B, clear for features of A.
     std::uint32_t feature;
-    /// What the bodies' motion takes off the distance, where it takes any point farther than the margin [m].
+    /// How far the predicted motion reduces the distance [m]. Non-zero only if the motion moves some point farther than
+    /// the margin.
     float approach = 0;
-    /// Where its place turns with the body that the feature is of: 0, or what a corner or edge that turns so is rounded
-    /// by [m]. Else, where two surfaces are nearest to each other, and stay so while they roll: negative.
+    /// Tells how the contact position moves with the body that owns the feature. 0 or positive: the position is fixed
+    /// to a vertex or edge of that body and rotates with it; the value is the feature's rounding radius [m]. Negative:
+    /// the position is the closest point of two surfaces, and remains so while they roll.
     float turningRadius = -1;
 
-    /// What the motion leaves of the distance if nothing stops it [m].
+    /// The distance after the predicted motion, if nothing stops it [m].
     float remaining() const { return distance - approach; }
 };
 
 inline constexpr std::uint32_t featureOfB = 0x80000000u;
 
 struct ContactOptions {
-    /// Contacts are reported up to this distance [m], and beyond it where a point's motion meets the other surface. The
-    /// band must reach sqrt(3) voxels farther for all of them to be found (what moves on from there is met all the
-    /// same), and as much deeper than bodies sink into each other (see Sample::inBand).
+    /// Contacts are reported up to this separation [m], and as speculative contacts beyond it where a point's motion
+    /// hits the other surface. The exterior band must be sqrt(3) voxels wider than the margin to find all contacts
+    /// within it; speculative contacts from farther away need no band. The interior band must be sqrt(3) voxels wider
+    /// than the deepest penetration (see Sample::inBand).
     float margin = 0;
-    /// Whether distances are measured by the triangles, where the bodies have them (Collider::measured()), and points
-    /// outside of the other body and of its band are asked for the closest place, which takes a search for each; those
-    /// too deep inside are counted all the same.
+    /// Takes distances from the triangles where the bodies have them (Collider::exactField()). Points outside both the
+    /// other body and its band then run a closest-point search each. Points too deep inside are still only counted in
+    /// the report.
     bool exact = false;
-    /// Least cosine between the point's own normal and the opposite of the surface's that it touches; contacts below
-    /// are left out. Points just under the edge of the other body look along the surface that is nearest to them; sharp
-    /// ones among these touch the surface that they oppose a voxel back along their own normal, if there is one. The
-    /// corners of a cube, whose normals are mixed of three, reach 0.57. Below -1: no contact is left out.
+    /// Minimum cosine between a point's own normal and the reversed surface normal; contacts below it are dropped. It
+    /// is the ghost-collision (internal-edge) filter. Points just below an edge of the other body get the normal of the
+    /// nearest face, which may be the wrong one. A sharp point that fails the test is tested again one voxel back along
+    /// its own normal, if that is outside. Vertices of a cube, whose normals average three faces, reach 0.57. Below -1:
+    /// no contact is dropped.
     float minNormalCosine = -2;
-    /// The same for points of faces that do not touch yet: a point beside the other body sees its edge aslant, or meets
-    /// its side, and would stop it like a curb.
+    /// The same limit for face points that do not touch yet. A point next to the other body sees its edge obliquely, or
+    /// approaches its side, and would be blocked there.
     float minNormalCosineApart = -2;
-    /// Whether points of faces that neither touch yet nor are on their way touch edges that they see by more than half
-    /// a degree aslant: the edges' own points meet the faces straight.
+    /// Whether face points keep contacts with edges that they see at more than half a degree off their normal. Applies
+    /// to points that neither touch nor approach. Such contacts are redundant: the edges' own points meet the faces
+    /// perpendicularly.
     bool keepsObliqueEdges = true;
 };
 
-/// What collide() saw beside the contacts.
+/// Diagnostics of collide().
 struct ContactReport {
     std::uint32_t pointsTested = 0;  ///< surface points sampled in the other body's field
-    std::uint32_t beyondBand = 0;    ///< points so deep that the band does not reach them: no contact is made of them
+    std::uint32_t beyondBand = 0;    ///< points too deep inside for the band; they make no contact
 };
 
-/// What collide() keeps of two bodies from one step to the next, so that it finds the same contacts sooner. One for
-/// each pair of bodies; not for two threads at once.
+/// Data that collide() keeps for a pair of bodies between steps, to find the same contacts faster. Use one per pair,
+/// from one thread at a time.
 class ContactCache {
   public:
     ContactCache();
@@ -104,26 +109,26 @@ class ContactCache {
     std::unique_ptr<detail::CandidateLists> data_;
 };
 
-/// Appends the contacts between two bodies: surface points of A in B's field, then those of B in A's field, each in
-/// ascending order of points; behind a point's, those of the sharp edges that go deeper from there before they come up
-/// to the next point. Deterministic; safe from any thread. O(points near the other body).
-/// @param cache  null, or what was kept of the same two bodies in the last step: the contacts are the same, found
-/// sooner
+/// Appends the contacts between two bodies: surface points of A in the field of B, then surface points of B in the
+/// field of A, each in ascending order of points. After the points of a body come its sharp edges that reach deeper
+/// than their end points. Deterministic, and safe from any thread. Takes time proportional to the count of points near
+/// the other body.
+/// @param cache  null, or the cache of this pair from the last step; the contacts are the same, found faster
 ContactReport collide(const Placed& a, const Placed& b, const ContactOptions& options, std::vector<Contact>& contacts,
                       ContactCache* cache = nullptr);
 
-/// The same for bodies of their own size.
+/// The same for unscaled bodies without motion.
 inline ContactReport collide(const Collider& a, const Pose& poseA, const Collider& b, const Pose& poseB,
                              const ContactOptions& options, std::vector<Contact>& contacts) {
     return collide(Placed{a, poseA}, Placed{b, poseB}, options, contacts);
 }
 
-/// Samples the surface points of many bodies in the fields of others on some device: openclPointSampler() in
-/// cl/point_sampler.h makes one. To be called by one thread at a time.
+/// Samples the surface points of many bodies in each other's fields on a device. openclPointSampler() in
+/// cl/point_sampler.h makes one. Call it from one thread at a time.
 struct PointSampler {
     std::string backend;  ///< "opencl"
-    std::string device;   ///< the device's name
-    /// Throws what the device's trouble calls for; the next call may succeed.
+    std::string device;   ///< name of the device
+    /// Throws on device errors; the next call may succeed.
     std::function<void(std::span<const detail::SampledBody>, std::span<const detail::PointQuery>, detail::FoundPoints&)>
         sample;
 };

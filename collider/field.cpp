@@ -1,4 +1,4 @@
-// How fields are made, and what they say of themselves. Queries have files of their own.
+// Construction and properties of fields. Queries are in separate files.
 #include <bilayer/collider/field.h>
 
 #include <utility>

@@ -18,14 +18,14 @@ using namespace detail;
 
 namespace {
 
-constexpr double minThickness = 1e-7;  // of volume / (area * length): what single precision leaves of a flat sheet
+constexpr double minThickness = 1e-7;  // of volume / (area * length): single-precision noise of a flat surface
 constexpr int maxSweeps = 32;          // of Jacobi's method, which needs about five
 
 struct Integrals : Moments {
     double area = 0;
 };
 
-// Over the tetrahedra between `centre`, which becomes the origin, and the triangles.
+// Integrals over the tetrahedra between `centre`, which becomes the origin, and the triangles.
 Integrals integrate(const Mesh& mesh, const glm::dvec3& centre) {
     Integrals sum;
     for (const glm::uvec3& t : mesh.triangles) {
@@ -44,10 +44,10 @@ Integrals integrate(const Mesh& mesh, const glm::dvec3& centre) {
 
 struct Eigen {
     glm::dvec3 values;   // ascending
-    glm::dmat3 vectors;  // a right-handed system of columns
+    glm::dmat3 vectors;  // right-handed columns
 };
 
-// Turns the plane of axes p and q so that the entry (p, q) vanishes.
+// Rotates in the plane of axes p and q so that the entry (p, q) vanishes.
 void rotate(glm::dmat3& matrix, glm::dmat3& vectors, int p, int q) {
     if (matrix[p][q] == 0) return;
     const double theta = (matrix[q][q] - matrix[p][p]) / (2 * matrix[p][q]);

@@ -1,4 +1,4 @@
-// Where a rigid body is.
+// Position and orientation of a rigid body.
 #pragma once
 
 #include <glm/gtc/quaternion.hpp>
@@ -6,16 +6,16 @@
 
 namespace bilayer {
 
-/// A rigid motion: body coordinates x become rotation * x + position in the world.
+/// A rigid transform: body coordinates x map to rotation * x + position in the world.
 struct Pose {
     glm::vec3 position{0};           ///< [m]
-    glm::quat rotation{1, 0, 0, 0};  ///< of unit length; w, x, y, z
+    glm::quat rotation{1, 0, 0, 0};  ///< unit quaternion; w, x, y, z
 
     glm::vec3 toWorld(const glm::vec3& point) const { return rotation * point + position; }
     glm::vec3 toBody(const glm::vec3& point) const { return glm::conjugate(rotation) * (point - position); }
 };
 
-/// The pose of b seen from a: inverse(a) * b.
+/// The pose of b in the frame of a: inverse(a) * b.
 inline Pose relative(const Pose& a, const Pose& b) {
     const glm::quat inverse = glm::conjugate(a.rotation);
     return {inverse * (b.position - a.position), inverse * b.rotation};

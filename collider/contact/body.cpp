@@ -1,4 +1,4 @@
-// Bodies as metadata of the distance grid and a grid of OpenVDB points.
+// Storage of bodies: metadata of the distance grid, and a grid of OpenVDB points.
 #include "collider/contact/body.h"
 
 #include <fmt/format.h>
@@ -25,13 +25,13 @@ namespace {
 using openvdb::Vec3s;
 using Points = openvdb::points::PointDataGrid;
 
-constexpr std::int32_t format = 1;       // grows when an older reader would get it wrong
-constexpr double pointCell = 4;          // edge of a voxel of points, at least [voxels of the field]: holds a few
-constexpr float unitError = 1e-4f;       // of what ought to have unit length; single precision leaves 1e-7
-constexpr float massError = 1e-3f;       // of moments of inertia, in parts of the largest
-constexpr float boundsError = 1e-5f;     // of points outside of the bounds, in parts of their size
-constexpr double fieldBeyondBand = 4;    // what of a field may lie beyond its mesh and band [voxels]
-constexpr double fieldBesideMesh = 1.5;  // what of a mesh may lie outside of its field's box [voxels]
+constexpr std::int32_t format = 1;       // increases when an older reader would misread the data
+constexpr double pointCell = 4;          // min edge of a point voxel [voxels of the field]; holds a few points
+constexpr float unitError = 1e-4f;       // of unit vectors; single precision leaves 1e-7
+constexpr float massError = 1e-3f;       // of moments of inertia, relative to the largest
+constexpr float boundsError = 1e-5f;     // of points outside the bounds, relative to their size
+constexpr double fieldBeyondBand = 4;    // max extent of a field beyond its mesh and band [voxels]
+constexpr double fieldBesideMesh = 1.5;  // max extent of a mesh outside its field's box [voxels]
 
 namespace entry {
 constexpr const char* format = "bilayer:body";
@@ -48,7 +48,7 @@ constexpr const char* mesh = "bilayer:mesh";            // bytes: see packed()
 constexpr const char* measure = "bilayer:measure";
 }  // namespace entry
 
-// Names that other programs give such attributes, too.
+// The usual names of these attributes in other programs.
 namespace attribute {
 constexpr const char* position = "P";
 constexpr const char* normal = "N";
@@ -64,8 +64,8 @@ glm::vec3 toGlm(const Vec3s& v) {
     return {v.x(), v.y(), v.z()};
 }
 
-// The edge of a voxel of points is a power of two: then a point's place in its voxel, which is what OpenVDB keeps of
-// it, is a float without rounding, and so is the way back.
+// The edge of a point voxel is a power of two. OpenVDB stores a point's place within its voxel; it is then a float
+// without rounding, and so is the restored position.
 double pointVoxel(const LevelSet& levelSet) {
     return std::exp2(std::ceil(std::log2(pointCell * double(levelSet.voxelSize()))));
 }
@@ -115,7 +115,7 @@ bool isUnit(float length) {
     return std::abs(length - 1) < unitError;
 }
 
-// Puts points into the order of their features.
+// Sorts points by their feature ids.
 class Collector {
   public:
     void add(std::int32_t feature, const SurfacePoint& point) {
@@ -155,7 +155,7 @@ SurfacePoints load(const Points& grid) {
     Collector collector;
     for (auto leaf = grid.tree().cbeginLeaf(); leaf; ++leaf) {
         requireValues(*leaf);
-        // as many as are said to be equal take no room in a file
+        // a uniform array takes no space in a file, whatever count it claims
         if (leaf->pointCount() > 1 && leaf->constAttributeArray(attribute::feature).isUniform())
             refuse("surface points have the same number");
         const Handle<Vec3s> position(leaf->constAttributeArray(attribute::position));
@@ -182,7 +182,7 @@ SurfacePoints pointsOf(const LevelSet& levelSet) {
     }
 }
 
-// Entries of the distance grid.
+// Metadata entries of the distance grid.
 class Entries {
   public:
     explicit Entries(const LevelSet& levelSet) : grid_(*levelSet.grids().distance) {}
@@ -235,7 +235,7 @@ std::optional<MassProperties> loadMass(const Entries& entries) {
     return mass;
 }
 
-// Of a solid within a box; from a field, it may be a voxel wider than its mesh.
+// Checks the mass properties of a solid within a box. From a field, the solid may be a voxel wider than its mesh.
 void check(const MassProperties& mass, const Bounds& bounds, float room) {
     const auto require = [](bool holds, const char* name, const auto& value, const char* range) {
         if (!holds) refuse(fmt::format("'{}' is {}, and must be {}", name, value, range));
@@ -267,7 +267,7 @@ void requireWithin(const SurfacePoints& points, const Bounds& bounds) {
             refuse("a surface point lies outside of its bounds");
 }
 
-// Bytes of a type that OpenVDB does not know: other programs hand them on as they are.
+// Bytes of a type unknown to OpenVDB: other programs pass them through unchanged.
 using Bytes = openvdb::UnknownMetadata;
 constexpr const char* meshType = "bilayer_mesh";
 constexpr std::size_t maxMeshBytes = std::size_t(1) << 31;
@@ -277,12 +277,12 @@ struct MeshHead {
 };
 
 std::size_t bytesOf(const MeshHead& head) {
-    const std::size_t most = maxMeshBytes / sizeof(glm::vec3);  // of either: sums of more would overflow
+    const std::size_t most = maxMeshBytes / sizeof(glm::vec3);  // of either: larger sums would overflow
     if (head.points > most || head.triangles > most) return std::numeric_limits<std::size_t>::max();
     return sizeof(head) + head.points * sizeof(glm::vec3) + head.triangles * sizeof(glm::uvec3);
 }
 
-// A head, three coordinates of each vertex, three vertices of each triangle.
+// A header, three coordinates per vertex, three vertex indices per triangle.
 openvdb::Metadata::Ptr packed(const Mesh& mesh) {
     const MeshHead head{hash(mesh), mesh.points.size(), mesh.triangles.size()};
     if (bytesOf(head) > maxMeshBytes)
@@ -341,7 +341,7 @@ ContactAccuracy measureOf(const std::string& name) {
     refuse(fmt::format("'{}' is {}", entry::measure, name));
 }
 
-// A field that was moved or scaled elsewhere leaves its body behind.
+// Detects a field that was moved or scaled by another program, without its body.
 void requireWithin(const Bounds& bounds, const openvdb::FloatGrid& grid) {
     const openvdb::CoordBBox box = grid.evalActiveVoxelBoundingBox();
     const openvdb::Vec3d lower = grid.indexToWorld(box.min().asVec3d() - openvdb::Vec3d(fieldBesideMesh)),
@@ -356,7 +356,7 @@ void requireWithin(const Bounds& bounds, const openvdb::FloatGrid& grid) {
     }
 }
 
-// Whether it can be one of this field.
+// Checks whether the body can belong to this field.
 void check(const Body& body, const openvdb::FloatGrid& grid) {
     const auto voxel = float(grid.voxelSize()[0]);
     if (!(body.margin >= 0 && body.margin <= maxMargin * voxel))

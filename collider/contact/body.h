@@ -1,5 +1,5 @@
-// What a rigid body is beside its field. Made from the mesh once, it can stay with the field's grids, and in their .vdb
-// file, ever after: then nobody needs the mesh's own file again.
+// The contact data of a rigid body, apart from its field. Built once from the mesh, it can be stored with the field's
+// grids in their .vdb file. The mesh file is then not needed again.
 #pragma once
 
 #include <memory>
@@ -16,28 +16,29 @@ namespace bilayer::detail {
 struct Body {
     SurfacePoints points;
     Bounds bounds;                       ///< of the mesh [m]
-    float margin = 0;                    ///< contacts are made up to this distance between surfaces [m]
-    std::optional<MassProperties> mass;  ///< nothing where the mesh encloses no volume
-    /// All of it facing outward. Null for a body that answers by its field alone, which rounds sharp edges: contacts
-    /// are those of ContactAccuracy::samples, rays are off by half a voxel at most, and sweeps end up to a voxel and a
-    /// half late.
+    float margin = 0;                    ///< max separation of contacts [m]
+    std::optional<MassProperties> mass;  ///< none if the mesh encloses no volume
+    /// All triangles face outward. Null for a body that uses its field alone. The field rounds sharp edges: contacts
+    /// are those of ContactAccuracy::samples, ray hits are off by at most half a voxel, and swept motion stops up to
+    /// 1.5 voxels late.
     std::shared_ptr<const Mesh> mesh;
     ContactAccuracy accuracy = ContactAccuracy::samples;  ///< as in ColliderOptions; samples where there is no mesh
-    /// The level set to collide by instead of the mesh's own, whose holes have been filled; nothing: its own.
+    /// The level set of the mesh with its holes filled, which replaces the given one for collisions. None: the given
+    /// one is used.
     std::optional<LevelSet> filled;
 };
 
-/// Wider margins are a mistake of units [voxels].
+/// Wider margins are taken for a mistake of units [voxels].
 inline constexpr float maxMargin = 1000;
 
-/// The level set, to write as a .vdb file, with the body beside it: surface points as a grid of OpenVDB points, the
-/// rest as metadata. Nothing is lost: bodyOf() gives the same bits, but that a body with Body::filled is put beside
-/// that level set instead of the given one. The grids are shared, not copied. Throws std::invalid_argument if the body
-/// has no points, a mesh that is not valid or of more than 2 GiB, or if it is one that bodyOf() would refuse.
+/// Returns the level set with the body stored in it, for writing as a .vdb file: surface points as an OpenVDB point
+/// grid, the rest as metadata. The storage is lossless: bodyOf() returns the same bits. A body with Body::filled is
+/// stored with that level set instead of the given one. The grids are shared, not copied. Throws std::invalid_argument
+/// if the body has no points, if its mesh is invalid or larger than 2 GiB, or if bodyOf() would refuse the body.
 LevelSet withBody(const LevelSet& levelSet, const Body& body);
 
-/// The body beside a level set. Throws std::invalid_argument that says what is missing or damaged if there is none, if
-/// it is of a newer kind, or if it cannot be one of this field.
+/// Returns the body stored in a level set. Throws std::invalid_argument if there is none, if its format is newer, or if
+/// it cannot belong to this field; the message says what is missing or damaged.
 Body bodyOf(const LevelSet& levelSet);
 
 }  // namespace bilayer::detail

@@ -1,5 +1,5 @@
-// Contacts between two bodies: the surface points of either in the field of the other. The trees of points are
-// descended with the relative pose, so that only points near the other body are sampled.
+// Contacts between two bodies: the surface points of either body in the field of the other. The point hierarchies are
+// traversed with the relative pose, so that only points near the other body are sampled.
 #include <bilayer/collider/contact.h>
 
 #include <algorithm>
@@ -24,18 +24,18 @@ namespace bilayer::detail {
 
 namespace {
 
-// The two places of a contact are brought closer in so many turns at most, until one goes no farther than this
-// [voxels].
+// Refinement of the closest points of a contact: max count of iterations, and the step at which they end [voxels].
 constexpr int settlingTurns = 10;
 constexpr float settled = 1e-4f;
-// It goes on by no more than so many of its last steps at once.
+// Max extrapolation, in lengths of the last step.
 constexpr float farthestOn = 50;
-// Nearer to each other, the way between them tells no direction [voxels].
+// Min distance of the closest points that defines a direction [voxels].
 constexpr float shortest = 1e-3f;
-// A tip that has sunk into another one sees its sides; what it opposes is seen so far back along its normal [voxels].
+// Sharp points that penetrate another vertex see its sides. The surface that they oppose is looked up this far back
+// along their normal [voxels].
 constexpr float lift = 1;
 
-// The map from the coordinates of one body into those of another.
+// The transform from the coordinates of one body into those of another.
 struct Map {
     glm::mat3 linear;
     glm::vec3 shift;
@@ -49,7 +49,7 @@ struct Map {
     glm::vec3 operator()(const glm::vec3& point) const { return linear * point + shift; }
     glm::vec3 turned(const glm::vec3& direction) const { return linear * direction / scale; }
 
-    // The same map, into the parts of a field's clearance.
+    // The same transform, into the coarse cells of a field's clearance.
     Map inParts(const Field& field) const {
         const float edge = float(Clearance::partSide) * field.voxelSize();
         Map map = *this;
@@ -60,7 +60,7 @@ struct Map {
     }
 };
 
-// The touch of a point that comes from outside of the field and goes some way.
+// The speculative contact of a point outside the field with a displacement `way`.
 std::optional<SurfaceSample> touchOnWay(const Field& field, const glm::vec3& point, const glm::vec3& way) {
     const auto hit = field.segment(point, point + way);
     if (!hit) return std::nullopt;
@@ -68,7 +68,7 @@ std::optional<SurfaceSample> touchOnWay(const Field& field, const glm::vec3& poi
                          -glm::dot(way, hit->normal)};
 }
 
-// The surface points of one body in the field of another.
+// The search for contacts of one body's surface points in the field of another.
 class PointsInField {
   public:
     PointsInField(const Placed& body, const Placed& other, const ContactOptions& options)
@@ -88,12 +88,13 @@ class PointsInField {
             longestWay(centre_, radius_) > std::min(reach_, surelyInBand(field_.exteriorWidth(), field_.voxelSize()));
     }
 
-    /// Calls found(index, point, touch) for the points within reach of the surface, in it, or on their way to it.
+    /// Calls found(index, point, touch) for the points within the margin of the surface, inside it, or predicted to hit
+    /// it.
     template <class Found>
     void visit(CandidateLists::List* near, ContactReport& report, Found&& found) {
         if (!near || speculative_ || options_.exact) return visitAll(report, found);
         const float voxel = field_.voxelSize();
-        // voxels beyond the band have no numbers: a list must not reach that far
+        // voxels outside the band have no values: a list must not reach that far
         const float maxSlack =
             std::min(voxel, (field_.exteriorWidth() - reach_) / steepestInterpolant - rounding * voxel);
         const CandidateLists::Place now{body_.collider.id(), other_.collider.id(), reach_, map_.linear, map_.shift};
@@ -115,7 +116,7 @@ class PointsInField {
         }
     }
 
-    /// What a sampler is to find.
+    /// The query for a sampler.
     std::optional<PointQuery> query() const {
         if (speculative_) return std::nullopt;
         return PointQuery{0, 0, map_.linear, map_.shift, map_.scale, reach_};
@@ -124,22 +125,22 @@ class PointsInField {
   private:
     static constexpr float rounding = 1e-3f;  // [voxels]
 
-    // Of the points of the body in a ball, at most; in the other one's units.
+    // An upper bound of the displacements of the body's points in a sphere, in the other body's units.
     float longestWay(const glm::vec3& centre, float radius) const {
         return relativeMotion_.longest(other_.scale * map_(centre), body_.scale * radius) / other_.scale;
     }
 
-    // How far away such points can be that come near.
+    // Max distance of points in a sphere that may make a contact.
     float seenFrom(const glm::vec3& centre, float radius) const {
         return speculative_ ? reach_ + longestWay(centre, radius) : reach_;
     }
 
-    // Farther than this nothing of interest can be [parts].
+    // Min distance at which points can be rejected [coarse cells].
     float keptWithin(float distance) const {
         return (distance / field_.voxelSize() + maxInterpolationError) / float(Clearance::partSide);
     }
 
-    // @param kept  float (centre, radius): how far away points in a ball may be [parts]
+    // @param kept  float (centre, radius): max distance of points in a sphere that may matter [coarse cells]
     template <class Kept, class Visit>
     void descend(Kept&& kept, Visit&& visit) const {
         const auto reject = [&](const glm::vec3& centre, float radius) {
@@ -154,15 +155,15 @@ class PointsInField {
         descend(kept, [&](std::uint32_t index, const SurfacePoint& point) {
             const glm::vec3 place = coarse_(point.position);
             const float seen = seenFrom(point.position, 0);
-            const bool isAbove = !options_.exact && clearance_.isAbove(place, seen);  // or beyond the band
+            const bool isAbove = !options_.exact && clearance_.isAbove(place, seen);  // or outside the band
             if (isAbove || clearance_.isOutside(place, keptWithin(seen))) return;
             const glm::vec3 at = map_(point.position);
             touch(index, point, at, sampleAt(at, report), report, found);
         });
     }
 
-    // Points that could touch before the bodies have moved by the slack: the interpolant then changes by the steepest
-    // slope at most, the distance by the slack.
+    // Lists the points that can touch before the bodies have moved by the slack. Until then the interpolant changes by
+    // at most the max slope times the slack, and the distance by the slack.
     template <class Found>
     void visitAndList(CandidateLists::List& near, ContactReport& report, Found& found) {
         const float slack = near.slack(), above = reach_ + steepestInterpolant * slack, within = reach_ + slack,
@@ -215,7 +216,7 @@ class PointsInField {
         }
     }
 
-    // Beyond the band up to `most`, where that is asked for.
+    // Also outside the band, up to a distance of `most`, if exact distances are requested.
     std::optional<SurfaceSample> touchAt(const glm::vec3& at, const Sample& sample, float most) const {
         if (sample.inBand)
             return surfaceSampleAt(field_, at, sample, other_.collider.data().isExactAt(at, options_.exact));
@@ -225,8 +226,8 @@ class PointsInField {
         return SurfaceSample{closest.distance, directionOf(closest, at, field_.voxelSize())};
     }
 
-    // A tip, ridge or corner within the other body that opposes no surface there, a medial axis included: the one that
-    // it opposes a bit back along its own normal, if that is outside.
+    // For a sharp point in the other body that opposes no surface there, even on a medial axis. Returns the surface
+    // that it opposes a little back along its own normal, if that place is outside.
     SurfaceSample opposed(const SurfacePoint& point, const glm::vec3& at, const SurfaceSample& here) const {
         const glm::vec3 normal = map_.turned(point.normal);
         const auto cosine = [&](const SurfaceSample& touch) { return -glm::dot(touch.normal, normal); };
@@ -247,7 +248,7 @@ class PointsInField {
         return approach > 0 && (touched.distance <= 0 || meets(point, at, way)) ? approach : 0;
     }
 
-    // Whether a point's way into the field does more than graze it: so does that of a point a bit inside of its body.
+    // Whether a point's path into the field is more than a grazing hit: a point slightly inside its body also hits.
     bool meets(const SurfacePoint& point, const glm::vec3& at, const glm::vec3& way) const {
         const glm::vec3 normal = glm::normalize(map_.linear * point.normal);
         const glm::vec3 across = normal - glm::dot(normal, way) / glm::dot(way, way) * way;
@@ -255,7 +256,7 @@ class PointsInField {
         return field_.segment(inside, inside + way).has_value();
     }
 
-    // Where edges go deeper from a point that touches before they come up to the next one.
+    // Finds edges that reach deeper between a touching point and the next one.
     template <class Found>
     void followEdges(std::uint32_t index, const glm::vec3& at, const SurfaceSample& here, Found& found) const {
         const SharpEdges& edges = body_.collider.data().edges();
@@ -268,7 +269,7 @@ class PointsInField {
             const Sample sample = field_.sample(end);
             const auto there = touchAt(end, sample, reach_ + length);
             if (!there) continue;
-            // where both ends touch, one of them is enough
+            // if both ends touch, process the edge only once
             if (std::max(sample.distance, there->distance) <= reach_ && next < index) continue;
             const Slope from{0, here.distance, glm::dot(here.normal, along)},
                 to{length, there->distance, glm::dot(there->normal, along)};
@@ -283,7 +284,7 @@ class PointsInField {
         }
     }
 
-    // How far along an edge the deepest place is, and how it touches.
+    // The position of the deepest point along an edge, and its contact.
     std::optional<std::pair<float, SurfaceSample>> deepestOf(const glm::vec3& at, const glm::vec3& end,
                                                              const glm::vec3& along, const Slope& from, const Slope& to,
                                                              const Conormals& conormals) const {
@@ -330,18 +331,18 @@ class PointsInField {
     Clearance clearance_;
     ContactOptions options_;
     float reach_;
-    glm::vec3 centre_;  // of a ball around the body
+    glm::vec3 centre_;  // of a bounding sphere of the body
     float radius_;
-    bool speculative_;  // whether any point moves farther than contacts are found for sure
+    bool speculative_;  // some point moves farther than the range in which contacts are certainly found
 };
 
-// Outward of `other`, in the world; where its field tells none, against the surface of the body that touches it.
+// The outward normal of `other` in the world. Where its field has none, the reversed normal of the touching point.
 glm::vec3 outwardNormal(const Placed& other, const SurfaceSample& touch, const Placed& body,
                         const SurfacePoint& point) {
     return touch.normal == glm::vec3(0) ? -(body.pose.rotation * point.normal) : other.pose.rotation * touch.normal;
 }
 
-// Of the surface near a place of the world, outward; zero where the field tells none.
+// The outward normal of the surface near a place in the world; zero where the field has none.
 glm::vec3 normalNear(const Placed& body, const glm::vec3& place) {
     const glm::vec3 at = body.pose.toBody(place) / body.scale;
     const Field& field = body.collider.field();
@@ -350,7 +351,7 @@ glm::vec3 normalNear(const Placed& body, const glm::vec3& place) {
     return body.pose.rotation * surfaceSampleAt(field, at, sample, body.collider.data().isExactAt(at)).normal;
 }
 
-// The contacts of A's points in B's field, then of B's in A's, of those that the visits find.
+// Adds the contacts of A's points in the field of B, then of B's points in the field of A, as the visits find them.
 template <class VisitA, class VisitB>
 ContactReport addContacts(const Placed& a, const Placed& b, const ContactOptions& options,
                           std::vector<Contact>& contacts, VisitA&& visitA, VisitB&& visitB) {
@@ -364,7 +365,7 @@ ContactReport addContacts(const Placed& a, const Placed& b, const ContactOptions
         return !seesEdgeObliquely(body.pose.toWorld(body.scale * point.position), own, touch.distance * other.scale,
                                   normal, [&](const glm::vec3& place) { return normalNear(other, place); });
     };
-    // of points, not of places between them
+    // points are fixed to their body, places between them are not
     const auto turningRadiusOf = [](const Placed& body, std::uint32_t feature) {
         return feature < body.collider.data().points().points().size() ? 0.f : -1.f;
     };
@@ -385,14 +386,14 @@ ContactReport addContacts(const Placed& a, const Placed& b, const ContactOptions
     visitA(PointsInField(a, b, options), report, addOfA);
     const std::size_t second = contacts.size();
     visitB(PointsInField(b, a, options), report, addOfB);
-    // edges are found next to their points, and come behind all of these
+    // edges are found next to their points; sorting moves them after all points
     const auto byFeature = [](const Contact& one, const Contact& other) { return one.feature < other.feature; };
     std::stable_sort(contacts.begin() + std::ptrdiff_t(first), contacts.begin() + std::ptrdiff_t(second), byFeature);
     std::stable_sort(contacts.begin() + std::ptrdiff_t(second), contacts.end(), byFeature);
     return report;
 }
 
-// The place of a body's surface that is closest to one of the world that is outside of it.
+// The closest point on a body's surface for a place outside it, in world coordinates.
 std::optional<glm::vec3> closestOn(const Placed& body, const glm::vec3& place, float most) {
     const ClosestPoint closest =
         body.collider.exactField().closest(body.pose.toBody(place) / body.scale, most / body.scale);
@@ -400,9 +401,9 @@ std::optional<glm::vec3> closestOn(const Placed& body, const glm::vec3& place, f
     return body.pose.toWorld(body.scale * closest.position);
 }
 
-// Moves the two places of a contact apart to what is closest to the other, by turns: edges that are made of surface
-// points may cut across what lies between these. Where round bodies nearly touch each turn gains little, and the places
-// go on as they went (A. C. Aitken's extrapolation).
+// Refines the closest points of a contact by alternating projection. Edges made of surface points may cut across the
+// surface between these. Where round bodies nearly touch, convergence is slow; A. C. Aitken's extrapolation accelerates
+// it.
 void settle(Contact& contact, const Placed& a, const Placed& b) {
     const float voxel = b.scale * b.collider.field().voxelSize();
     const auto turned = [&](const glm::vec3& place) -> std::optional<Contact> {
@@ -414,7 +415,7 @@ void settle(Contact& contact, const Placed& a, const Placed& b) {
         const glm::vec3 normal = distance > shortest * voxel ? way / distance : contact.normal;
         return Contact{*onB, normal, distance, contact.feature, contact.approach, contact.turningRadius};
     };
-    glm::vec3 before(0);  // how far the place went in the last turn
+    glm::vec3 before(0);  // displacement of the closest point in the last iteration
     for (int turn = 0; turn < settlingTurns; ++turn) {
         const auto next = turned(contact.position);
         if (!next) return;
@@ -431,7 +432,7 @@ void settle(Contact& contact, const Placed& a, const Placed& b) {
     }
 }
 
-// Those that may be the nearest.
+// Refines the contacts that may be the closest.
 void settle(std::span<Contact> contacts, const Placed& a, const Placed& b) {
     float nearest = std::numeric_limits<float>::max();
     for (const Contact& contact : contacts) nearest = std::min(nearest, contact.distance);

@@ -1,4 +1,4 @@
-// What a Collider holds.
+// The data of a Collider.
 #pragma once
 
 #include <bilayer/collider/collider.h>
@@ -14,7 +14,7 @@
 
 namespace bilayer::detail {
 
-/// The body of a mesh and its level set: as Collider's constructor.
+/// Builds the body of a mesh and its level set, as Collider's constructor does.
 Body makeBody(Mesh mesh, const LevelSet& levelSet, const ColliderOptions& options);
 
 struct ColliderData {
@@ -23,8 +23,8 @@ struct ColliderData {
     const SurfacePoints& points() const { return body.points; }
     const Mesh& mesh() const;
     const Field& exactField() const;
-    /// Whether contacts ask the triangles at a point of the body's coordinates [m], by Body::measure.
-    /// @param measured  as in ContactOptions
+    /// Whether contacts use the triangles at a point in body coordinates [m], as Body::accuracy says.
+    /// @param measured  use them everywhere if there is a mesh (ContactOptions::exact)
     bool isExactAt(const glm::vec3& point, bool measured = false) const {
         if (measured || body.accuracy == ContactAccuracy::exact) return body.mesh != nullptr;
         return errorMask.hold(point);
@@ -41,8 +41,8 @@ struct ColliderData {
     template <class Make>
     void once(const Make& make) const;
 
-    // what few ask for, and takes longer than all else that a body from a file needs: the triangles of the field's zero
-    // set for a body without a mesh, and the field with the mesh's
+    // Created on demand, as they are rarely needed and take longer than restoring the rest of a body from a file. The
+    // triangles of the field's zero set, for a body without a mesh; and the field with the mesh.
     mutable std::once_flag once_;
     mutable std::optional<LevelSet> levelSet_;
     mutable Mesh zeroSet_;

@@ -7,18 +7,19 @@
 namespace bilayer::detail {
 namespace {
 
-// Slack of a list: a longer one holds for more steps, and holds more points.
+// Slack of a list. A longer slack keeps the list valid for more steps, but lists more points.
 constexpr float minSlack = 0.25f;   // [voxels]
-constexpr float stepsThatHold = 8;  // that a list should hold
-constexpr float rounding = 1e-5f;   // of places, in parts of the lengths that they come from
+constexpr float stepsThatHold = 8;  // the count of steps that a list should be valid for
+constexpr float rounding = 1e-5f;   // of places, relative to the lengths that they come from
 const float halfRoot = std::sqrt(0.5f);
 
 bool sameBodies(const CandidateLists::Place& a, const CandidateLists::Place& b) {
     return a.body == b.body && a.other == b.other && a.reach == b.reach;
 }
 
-// How far any point of a ball has moved from one place to another, at most. The difference of two rotations stretches
-// by their angle's sine in a plane and not at all across it: by its Frobenius norm over the root of two.
+// An upper bound of the displacement of any point in a sphere between two places. The difference of two rotations
+// scales vectors in a plane by 2 sin(angle / 2), and is zero along the axis. The factor is its Frobenius norm over the
+// root of two.
 float moved(const CandidateLists::Place& from, const CandidateLists::Place& to, const glm::vec3& centre, float radius) {
     const glm::mat3 turn = to.linear - from.linear;
     const float norm2 = glm::dot(turn[0], turn[0]) + glm::dot(turn[1], turn[1]) + glm::dot(turn[2], turn[2]);

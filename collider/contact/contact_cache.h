@@ -1,4 +1,4 @@
-// What the search for contacts between two bodies keeps from one step to the next.
+// The data that the contact search of a pair of bodies keeps between steps.
 #pragma once
 
 #include <array>
@@ -9,31 +9,31 @@
 
 namespace bilayer::detail {
 
-/// The surface points of two bodies that could touch the other one, as long as the bodies have not moved farther than a
-/// part of a voxel since they were listed (a list of neighbours: L. Verlet, "Computer experiments on classical fluids",
-/// Physical Review 159 (1967)). One for each pair of bodies: collide() finds the same contacts with it as without, but
-/// bodies that rest on each other cost little more than the contacts that they have, and those that rest beside each
-/// other next to nothing.
+/// Candidate lists: the surface points of two bodies that may touch the other body. A list is valid until the bodies
+/// have moved by its slack, a fraction of a voxel (a Verlet list: L. Verlet, "Computer experiments on classical
+/// fluids", Physical Review 159 (1967)). Use one per pair of bodies. collide() finds the same contacts with it as
+/// without. The cost of resting bodies is then little more than that of their contacts, and close to zero without
+/// contacts.
 struct CandidateLists {
-    /// Where the points of one body are in the coordinates of the other.
+    /// The transform from the coordinates of one body to those of the other.
     struct Place {
         std::uint64_t body = 0, other = 0;  ///< Collider::id()
-        float reach = 0;                    ///< up to which contacts are made [m, in the other body's size]
+        float reach = 0;                    ///< max separation of contacts [m, at the other body's scale]
         glm::mat3 linear{0};
         glm::vec3 shift{0};
     };
 
-    /// The points of one body in the other's field.
+    /// The candidate points of one body in the field of the other.
     class List {
       public:
-        /// Whether the points that can touch are among those listed.
-        /// @param centre, radius  of a ball around the body, in its own coordinates [m]
+        /// Whether the list contains all points that can touch. If not, clears the list and chooses a new slack.
+        /// @param centre, radius  of a bounding sphere of the body, in its own coordinates [m]
         /// @param voxel           of the other body's field [m]
-        /// @param maxSlack       that a list may have [m]
+        /// @param maxSlack        upper limit of the slack [m]
         bool holds(const Place& now, const glm::vec3& centre, float radius, float voxel, float maxSlack);
 
-        /// How far the bodies may move until a new list no longer holds [m]; 0: they move too fast for one. Asked for
-        /// after holds() has said no.
+        /// How far the bodies may move before a new list is invalid [m]. 0: they move too fast for a list. Call it
+        /// after holds() has returned false.
         float slack() const { return slack_; }
         const std::vector<std::uint32_t>& points() const { return points_; }
         void add(std::uint32_t point) { points_.push_back(point); }

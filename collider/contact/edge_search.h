@@ -1,4 +1,4 @@
-// Where an edge is deepest in another body between two places, and how it touches there; internal.
+// Finds the deepest point of an edge in another body, and the contact there; internal.
 #pragma once
 
 #include <cmath>
@@ -9,43 +9,43 @@
 
 namespace bilayer::detail {
 
-/// Of the deepest place on an edge [voxels].
+/// Of the deepest point on an edge [voxels].
 inline constexpr float searchTolerance = 2e-3f;
-/// A point that slides along a face ends in the edges beyond it by rounding. A path that goes less deep than this only
-/// grazes a surface, and does not meet it [voxels].
+/// Points that slide along a face hit the edges beyond it by rounding. Hits shallower than this are ignored [voxels].
 inline constexpr float grazingTolerance = 0.25f;
 
-/// A function of one variable at a place.
+/// A function of one variable at a place: value and slope.
 struct Slope {
     float place, value, slope;
 };
 
-/// Whether a function may have a kink between two places or close to one of them, as where an edge crosses another that
-/// the interpolant has rounded off. Slopes are of distances.
+/// Whether the function may have a kink between two places or close to one of them. An edge that crosses another one
+/// makes such a kink, which the interpolant rounds off. The function is a distance.
 inline bool mayKinkBetween(const Slope& from, const Slope& to) {
     constexpr float minRotation = 0.1f;
-    constexpr float rounded = 0.5f;  // the slope that may be left at the kink itself
+    constexpr float rounded = 0.5f;  // max remaining slope at the kink itself
     return to.slope - from.slope > minRotation && from.slope < rounded && to.slope > -rounded;
 }
 
-/// Whether it falls from either into a valley, by more than rounding makes of a plane.
+/// Whether the function falls from both ends to a minimum in between. The threshold excludes rounding noise on a plane.
 inline bool fallsBetween(const Slope& from, const Slope& to) {
     constexpr float minSlope = 0.02f;
     return from.slope < -minSlope && to.slope > minSlope;
 }
 
-/// The lowest place between two where the function falls from the first and rises to the second, as where an edge
-/// crosses another body. Where the tangents meet, and where the slope would vanish if it went evenly, in turns: the one
-/// is exact at a kink, the other on a parabola, and either leaves a shorter piece (the cutting planes of J. E. Kelley,
-/// "The cutting-plane method for solving convex programs", J. SIAM 8 (1960) 703-712, in one dimension). The same way
-/// for the same function: the answer goes as evenly as the function does.
-/// @param tolerance  of values
-/// @param at  (place) -> std::optional<Slope>; nothing where the function is not known: the search then gives up
+/// Finds the minimum between two places where the function falls from the first and rises to the second, as along an
+/// edge that crosses another body. Two steps alternate: the intersection of the tangents, which is exact at a kink, and
+/// the zero of the linearly interpolated slope, which is exact for a parabola. Either step shortens the interval (the
+/// cutting planes of J. E. Kelley, "The cutting-plane method for solving convex programs", J. SIAM 8 (1960) 703-712, in
+/// one dimension). The sequence of steps is fixed, so the result varies as smoothly as the function.
+/// @param tolerance  of the function's value
+/// @param at         (place) -> std::optional<Slope>; std::nullopt where the function is unknown: the search then
+///                   ends without a result
 template <class Function>
 std::optional<Slope> lowestBetween(Slope from, Slope to, float tolerance, Function&& at) {
     constexpr int maxQueries = 7;
-    constexpr float flat = 0.01f;        // slopes below lead nowhere
-    constexpr float nearestEnd = 0.02f;  // no place is asked for nearer to the ends of a piece than this part of it
+    constexpr float flat = 0.01f;        // slopes below this count as zero
+    constexpr float nearestEnd = 0.02f;  // min distance of queries from the ends, as a fraction of the interval
     Slope best = from.value < to.value ? from : to;
     for (int i = 0; i < maxQueries; ++i) {
         const float width = to.place - from.place, turn = to.slope - from.slope;
@@ -63,16 +63,17 @@ std::optional<Slope> lowestBetween(Slope from, Slope to, float tolerance, Functi
     return best;
 }
 
-/// How an edge touches at its deepest place, square to itself. Where it crosses the ridge between two faces: the way
-/// over the ridge, but no deeper than half as much again as it has sunk in, since through a thin blade there is a
-/// shorter way. Else across the face that looks least along the edge. Nothing where all look along it.
-/// @param along  the edge's direction, of unit length
-/// @param before, after  touches very close to the place on either side, where they are known
+/// The contact of an edge at its deepest point, perpendicular to the edge. If the edge crosses the ridge between two
+/// faces, the direction of depenetration leads over the ridge. The depth is limited to 1.5 times the measured one,
+/// since through a thin blade there is a shorter exit. Otherwise the normal is that of the face whose normal is the
+/// most perpendicular to the edge, projected. Nothing if all normals are nearly parallel to the edge.
+/// @param along          the edge's direction, of unit length
+/// @param before, after  samples very close to the point on either side, where they are known
 inline std::optional<SurfaceSample> acrossEdge(const glm::vec3& along, const SurfaceSample& here,
                                                const std::optional<SurfaceSample>& before,
                                                const std::optional<SurfaceSample>& after) {
-    constexpr float minAcross = 0.3f;  // cosine between the normal and its part across
-    constexpr float minRidge = 0.05f;  // sine between two faces that are not one
+    constexpr float minAcross = 0.3f;  // min length of the normal's projection perpendicular to the edge
+    constexpr float minRidge = 0.05f;  // sine of the angle between two normals; below, they belong to one face
     constexpr float maxDeeper = 1.5f;
     std::optional<SurfaceSample> held;
     float most = minAcross;
@@ -88,7 +89,7 @@ inline std::optional<SurfaceSample> acrossEdge(const glm::vec3& along, const Sur
     const glm::vec3 &a = before->normal, &b = after->normal;
     const float fall = -glm::dot(a, along), rise = glm::dot(b, along);
     if (!(fall > 0 && rise > 0 && glm::length(glm::cross(a, b)) > minRidge)) return held;
-    // square to the edge and to the ridge
+    // perpendicular to the edge and to the ridge
     const glm::vec3 over = rise * a + fall * b;
     const float length = glm::length(over);
     const float deeper = std::fmin((fall + rise) / length, maxDeeper);

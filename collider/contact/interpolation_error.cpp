@@ -10,12 +10,12 @@
 namespace bilayer::detail {
 namespace {
 
-// What samples may be off by [voxels].
+// Max error of samples [voxels].
 constexpr float tolerance = 0.1f;
-// Along each axis of a cell, so many places are looked at.
+// Count of tested places along each axis of a cell.
 constexpr int places = 3;
 
-// Two bits for each cell of a block: whether it has been measured, and what came of it.
+// Two bits per cell of a block: whether it has been tested, and the result.
 constexpr int side = FieldFrame::side, cellsPerWord = 32, wordsPerBlock = side * side * side / cellsPerWord;
 constexpr std::uint64_t isMeasured = 1, isStray = 2;
 
@@ -41,7 +41,7 @@ bool InterpolationErrorMask::hold(const glm::vec3& point) const noexcept {
     std::uint64_t bits = word.load(std::memory_order_relaxed) >> shift;
     if (!(bits & isMeasured)) {
         bits = areAt(cell) ? isMeasured | isStray : isMeasured;
-        word.fetch_or(bits << shift, std::memory_order_relaxed);  // others may have found the same by now
+        word.fetch_or(bits << shift, std::memory_order_relaxed);  // another thread may have stored the same result
     }
     return bits & isStray;
 }
@@ -54,7 +54,7 @@ bool InterpolationErrorMask::areAt(const glm::ivec3& cell) const noexcept {
     return false;
 }
 
-// At a place in voxels from the layout's origin.
+// Tests a place in voxels from the layout's origin.
 bool InterpolationErrorMask::isOff(const glm::dvec3& local) const noexcept {
     const FieldLayout& layout = field_->data();
     const float voxel = field_->voxelSize();

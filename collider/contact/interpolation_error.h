@@ -1,4 +1,4 @@
-// Where a field's samples are off from its mesh: at edges, in grooves, and wherever the surface bends within a voxel.
+// Where a field's samples are inaccurate: at edges, in grooves, and wherever the surface bends within a voxel.
 #pragma once
 
 #include <atomic>
@@ -10,18 +10,18 @@
 
 namespace bilayer::detail {
 
-/// The cells of a field's band, the corners of which are eight neighbouring voxels, where its interpolant is off from
-/// the mesh by more than a tenth of a voxel in one of 27 places: elsewhere it may be off by little more. A cell is
-/// measured when it is first asked for, which takes some microseconds; the answer depends on nothing but the cell.
-/// Copies share what they know. Safe from any thread.
+/// Marks the cells of a field's band where the interpolant is off from the mesh by more than a tenth of a voxel. A cell
+/// has eight neighbouring voxels as its corners, and is tested at 27 places; between them the error may be slightly
+/// larger. A cell is tested at its first query, which takes a few microseconds; the result depends only on the cell.
+/// Copies share the results. Safe from any thread.
 class InterpolationErrorMask {
   public:
-    InterpolationErrorMask() = default;  ///< none
+    InterpolationErrorMask() = default;  ///< marks no cell
 
-    /// Of a field with its mesh. Takes 128 bytes a stored block.
+    /// The mask of a field with its mesh. Takes 128 bytes per stored block.
     explicit InterpolationErrorMask(const Field& field);
 
-    /// Whether a point is in such a cell, in the field's coordinates [m].
+    /// Whether a point, in field coordinates [m], is in a marked cell.
     bool hold(const glm::vec3& point) const noexcept;
 
   private:
@@ -29,7 +29,7 @@ class InterpolationErrorMask {
     bool isOff(const glm::dvec3& local) const noexcept;
 
     std::shared_ptr<const Field> field_;
-    std::shared_ptr<std::atomic<std::uint64_t>[]> known_;  ///< of each stored block's cells, two bits each
+    std::shared_ptr<std::atomic<std::uint64_t>[]> known_;  ///< two bits per cell of each stored block
 };
 
 }  // namespace bilayer::detail

@@ -1,4 +1,4 @@
-// Where bodies go.
+// The relative motion of two bodies.
 #pragma once
 
 #include <glm/geometric.hpp>
@@ -8,7 +8,7 @@
 
 namespace bilayer::detail {
 
-/// How the points of a body move as another body sees them, in that one's coordinates [m].
+/// The motion of a body's points relative to another body, in the other one's coordinates [m].
 class RelativeMotion {
   public:
     RelativeMotion(const Pose& body, const Motion& motion, const Pose& seenFrom, const Motion& its) {
@@ -18,13 +18,13 @@ class RelativeMotion {
         rotation_ = into * (motion.rotation - its.rotation);
     }
 
-    /// Of the body's point that is at `point` now.
+    /// The displacement of the body's point at `point`.
     glm::vec3 of(const glm::vec3& point) const { return displacement_ + glm::cross(rotation_, point); }
 
-    /// Of the body, as the other one sees it [rad].
+    /// The body's rotation relative to the other one [rad].
     const glm::vec3& rotation() const { return rotation_; }
 
-    /// An upper bound of the displacement of points in a sphere.
+    /// An upper bound of the displacements of the points in a sphere.
     float longest(const glm::vec3& centre, float radius) const {
         return glm::length(of(centre)) + radius * glm::length(rotation_);
     }

@@ -1,4 +1,4 @@
-// Which contacts are kept by the directions of their normals.
+// The filter of contacts by their normals.
 #pragma once
 
 #include <bilayer/collider/contact.h>
@@ -7,15 +7,16 @@
 
 namespace bilayer::detail {
 
-/// Whether a contact is kept that looks against its point's normal by this cosine.
-/// @param apart  its point is of a face that does not touch yet
+/// Whether a contact passes, by the cosine between the reversed surface normal and the point's normal.
+/// @param apart  the point belongs to a face and does not touch yet
 inline bool keeps(const ContactOptions& options, float cosine, bool apart) {
     return cosine >=
            (apart ? std::max(options.minNormalCosineApart, options.minNormalCosine) : options.minNormalCosine);
 }
-/// The same where the point turns with its body, and looks against the surface now, later or in between.
-/// @param seen, normal  of the surface, outward, and of the point
-/// @param turn          in the step, as the surface sees it [rad]
+/// The same for a point that rotates with its body. The contact passes if the point opposes the surface at the start,
+/// the middle or the end of the step.
+/// @param seen, normal  outward normals of the surface and of the point
+/// @param turn          rotation in the step relative to the surface [rad]
 inline bool keeps(const ContactOptions& options, const glm::vec3& seen, const glm::vec3& normal, const glm::vec3& turn,
                   bool apart) {
     const auto isKept = [&](float part) {

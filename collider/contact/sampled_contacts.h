@@ -1,4 +1,4 @@
-// Contacts of points that a PointSampler has found.
+// Contacts from the results of a PointSampler.
 #pragma once
 
 #include <bilayer/collider/contact.h>
@@ -11,16 +11,15 @@
 
 namespace bilayer::detail {
 
-/// What a PointSampler is to find of a body in the field of another, for contacts up to a margin [m]; the places among
-/// its bodies are left open. Nothing where motion takes any point farther than the margin: such points are followed on
-/// their ways.
+/// The query to a PointSampler for a body in the field of another and contacts up to a margin [m]. The caller sets the
+/// body indices. Nothing if motion takes any point farther than the margin: such points need the swept search.
 std::optional<PointQuery> pointQuery(const Placed& body, const Placed& other, float margin);
 
-/// The body as a PointSampler sees it, which the collider must outlive.
+/// The body as input of a PointSampler. The collider must outlive it.
 SampledBody sampledBody(const Collider& collider);
 
-/// The same contacts as collide(), of what a sampler has found of A in B's field and of B in A's: to the bit, if its
-/// samples are. The report counts the points found as tested.
+/// The same contacts as collide(), from the sampler's results for A in the field of B and for B in the field of A. They
+/// are equal bit for bit if the samples are. The report counts the found points as tested.
 ContactReport collideFound(const Placed& a, const Placed& b, const ContactOptions& options,
                            std::span<const FoundPoint> ofA, std::span<const FoundPoint> ofB,
                            std::vector<Contact>& contacts);

@@ -1,5 +1,5 @@
-// Points of many bodies in the fields of others, all at once: what a device can do for contacts. A sampler plugs into
-// who has the bodies by a function type, as a BlockFiller does into who has the mesh.
+// Batch sampling of the points of many bodies in each other's fields, as a device can do it. A sampler is a function
+// object that its user calls, as a BlockFiller is.
 #pragma once
 
 #include <cstdint>
@@ -15,52 +15,52 @@
 
 namespace bilayer::detail {
 
-/// Consecutive points of a body, and a ball around them.
+/// Consecutive points of a body and their bounding sphere.
 struct PointBall {
     glm::vec3 centre;          ///< [m]
     float radius;              ///< [m]
-    std::uint32_t begin, end;  ///< of the points
+    std::uint32_t begin, end;  ///< range of points
 };
 
-/// The points of a body that may touch others. All of them are in some ball, in one only.
+/// The surface points of a body. Each of them is in exactly one ball.
 struct BallsOfPoints {
     std::vector<glm::vec3> points;  ///< [m]
     std::vector<PointBall> balls;
 };
 
-/// A body as a sampler sees it, which keeps what it has copied of it under its number.
+/// A body as a sampler's input. The sampler caches its copies under the id.
 struct SampledBody {
-    std::uint64_t id;          ///< no other body of this process has it, ever
+    std::uint64_t id;          ///< unique within this process, never reused
     const FieldLayout* field;  ///< of Storage::float32
     std::function<BallsOfPoints()> points;
 };
 
-/// All points of one body in the field of another.
+/// A query for all points of one body in the field of another.
 struct PointQuery {
-    std::uint32_t body, other;  ///< by their places among the bodies
-    /// From the coordinates of the body into those of the other one: linear * point + shift.
+    std::uint32_t body, other;  ///< indices in the array of bodies
+    /// The transform from the coordinates of the body to those of the other one: linear * point + shift.
     glm::mat3 linear;
     glm::vec3 shift;
-    float scale;  ///< by which `linear` makes lengths larger
-    float reach;  ///< of what is to be found [m]
+    float scale;  ///< the factor by which `linear` scales lengths
+    float reach;  ///< max distance of the points to find [m]
 };
 
-/// A point where the other body may be touched: its sample, of which out of the band only the sign counts.
+/// A point that may touch the other body, with its sample. Outside the band only the sign of the sample matters.
 struct FoundPoint {
     std::uint32_t point;
     Sample sample;
 };
 
-/// The answers of a batch of queries.
+/// The results of a batch of queries.
 class FoundPoints {
   public:
-    /// In ascending order of the points.
+    /// The points of one query, in ascending order.
     std::span<const FoundPoint> of(std::size_t query) const {
         return std::span(points).subspan(begins[query], begins[query + 1] - begins[query]);
     }
 
-    std::vector<FoundPoint> points;     ///< query by query
-    std::vector<std::uint32_t> begins;  ///< of each query's points, and the end
+    std::vector<FoundPoint> points;     ///< grouped by query
+    std::vector<std::uint32_t> begins;  ///< the first point of each query, and the end
 };
 
 }  // namespace bilayer::detail

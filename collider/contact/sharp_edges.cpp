@@ -10,37 +10,38 @@
 namespace bilayer::detail {
 namespace {
 
-// Neighbours on an edge are no farther apart than this [voxels]: of candidates 1.4 voxels apart at least, every second
-// or third is left where points lie two voxels apart.
+// Max distance of neighbours on an edge [voxels]. Candidates are at least 1.4 voxels apart. Every second or third of
+// them remains where points are two voxels apart.
 constexpr float farthestNeighbour = 4.5f;
-// Of two neighbours in about the same direction the nearer one counts: cosine of 60 degrees.
+// Of two neighbours in about the same direction, only the nearer one counts: cosine of 60 degrees.
 constexpr float sameDirection = 0.5f;
-// An edge runs square to the normals at its ends, but for corners: a cube's have 0.58.
+// Max cosine between an edge and the normals at its ends. An edge is perpendicular to them except at vertices: a cube's
+// have 0.58.
 constexpr float minSquare = 0.7f;
-// The interpolant rounds sharp edges off by up to this much [voxels]; farther away there is a groove between the two.
+// Max rounding of sharp edges by the interpolant [voxels]; at larger distances there is a groove between the two
+// points.
 constexpr float onSurface = 0.45f;
-// A piece may lie above the edge between its ends, as around a hole, by no more than this [voxels].
+// Max height of a segment above the edge between its ends, as around a hole [voxels].
 constexpr float maxAbove = 0.05f;
 constexpr std::size_t maxNeighbours = 6;
-// Edges that cross at a smaller angle (sine) are parallel: their points tell enough.
+// Edges that cross at a smaller angle (sine) count as parallel: the contacts of their points suffice.
 constexpr float minCrossing = 0.2f;
-// A crossing lies so near to the deepest place that the field shows, which rounds edges off [voxels].
+// Max distance of a crossing from the deepest place of the field, which rounds edges off [voxels].
 constexpr float crossingWithin = 1.5f;
-// It is no deeper than so many times what the field shows, across faces instead of both edges, or than so much more
-// [voxels]: a field by samples rounds edges off.
+// Max depth of a crossing, as a multiple of the depth in the field and as an excess over it [voxels]. The field's depth
+// is across faces instead of both edges, and a sampled field rounds edges off.
 constexpr float deepestAcross = 1.5f, deepestUnseen = 1, deepestAcrossExact = 2, deepestUnseenExact = 0.25f;
-// Faces leave the plane between two edges at this angle (sine) at least: faces that lie on each other touch by their
-// points.
+// Min angle (sine) between the faces and the plane that separates two edges. Coplanar faces touch by their points.
 constexpr float minLeaving = 0.09f;
-// What is seen at a smaller angle (sine) than this lies level.
+// Smaller angles (sine) count as level.
 constexpr float level = 0.09f;
-// The mean way along the edges around a point: longer where they are bent by more than ten degrees.
+// Max length of the mean direction along the edges around a point: longer where they bend by more than ten degrees.
 constexpr float minBend = 0.0872f;
-// Faces are looked for so far beside their edge [voxels].
+// Distance from an edge at which its faces are sampled [voxels].
 constexpr float wingSpan = 1.5f;
-// Pieces of an edge end within this of each other, as parts of their length.
+// Tolerance for the ends of an edge's segments, relative to their length.
 constexpr float gap = 0.02f;
-// Fewer points than these, as near as neighbours, do not go around one.
+// Min count of points, within the neighbour distance, to surround a point.
 constexpr int minAround = 3;
 
 struct Neighbour {
@@ -63,7 +64,7 @@ std::vector<Neighbour> neighboursOf(std::uint32_t index, const SurfacePoints& po
             const glm::vec3 direction = way / distance;
             const float aslant =
                 std::max(std::abs(glm::dot(direction, point.normal)), std::abs(glm::dot(direction, there.normal)));
-            // how far an arc with these normals lies below the piece: a quarter of its ends' heights over each other
+            // the height of the segment above an arc with these normals: a quarter of its ends' heights over each other
             const float above = 0.125f * (glm::dot(way, point.normal) - glm::dot(way, there.normal));
             if (aslant < minSquare && above <= maxAbove * field.voxelSize())
                 near.push_back({other, direction, distance});
@@ -82,7 +83,7 @@ std::vector<Neighbour> neighboursOf(std::uint32_t index, const SurfacePoints& po
     return kept;
 }
 
-/// By the surface beside the middle of an edge.
+/// The conormals of an edge, from the surface next to its middle.
 Conormals wingsOf(const SurfacePoint& a, const SurfacePoint& b, const Field& field) {
     const glm::vec3 along = glm::normalize(b.position - a.position), middle = 0.5f * (a.position + b.position);
     const glm::vec3 aside = glm::normalize(glm::cross(along, a.normal + b.normal));
@@ -183,7 +184,7 @@ std::optional<SharpEdges::Crossing> SharpEdges::crossing(const SurfacePoints& po
         const glm::vec3 its = b.position - a.position, across = glm::cross(along, its);
         const float area = glm::length(across);
         if (area < minCrossing * glm::length(along) * glm::length(its)) return;
-        // Where either line passes the other one.
+        // The closest points of the two lines.
         const glm::vec3 offset = a.position - from;
         const float onOther = glm::dot(glm::cross(offset, its), across) / (area * area);
         const float onThis = glm::dot(glm::cross(offset, along), across) / (area * area);

@@ -1,5 +1,5 @@
-// Points on a mesh: its vertices, and a lattice on edges and faces that are larger than the spacing, thinned out from
-// the most convex to the least so that what touches first is what stays.
+// Sampling of surface points. Candidates are the vertices, and a lattice on edges and faces that are larger than the
+// spacing. They are thinned out in order of decreasing convexity, so that the points that touch first remain.
 #include "collider/contact/surface_points.h"
 
 #include <algorithm>
@@ -15,20 +15,21 @@
 namespace bilayer::detail {
 namespace {
 
-constexpr double latticePitch = 0.75;  // of candidates on edges and faces [spacings]
-constexpr double minGap = 0.7;         // between points that look about the same way [spacings]
-constexpr double likeness = 0.7;       // least cosine between their normals: an edge of a cube and its faces have 0.71
-constexpr double minProtrusion = 0.035;  // over the tangent plane's height of such a point that needs none [spacings]
-constexpr double minCornerGap = 0.1;     // between convex corners [spacings]: a fraction of a voxel
-constexpr double corner = 0.5;           // convexity from which a point is a corner: a cube's has 0.58
-constexpr double sharp = 0.15;           // and from which it is on an edge at least: a cube's have 0.35
-constexpr std::uint32_t leafPoints = 8;  // most points in a leaf of the tree
-constexpr float rounding = 1.000001f;    // spheres grow by this, so that single precision leaves no point outside
+constexpr double latticePitch = 0.75;    // of candidates on edges and faces [spacings]
+constexpr double minGap = 0.7;           // min distance of points with about the same normal [spacings]
+constexpr double likeness = 0.7;         // min cosine between such normals: a cube's edge and its faces have 0.71
+constexpr double minProtrusion = 0.035;  // max height of a dropped candidate over such a point [spacings]
+constexpr double minCornerGap = 0.1;     // between convex vertices [spacings]: a fraction of a voxel
+constexpr double corner = 0.5;           // min convexity of a vertex: a cube's has 0.58
+constexpr double sharp = 0.15;           // min convexity of an edge: a cube's have 0.35
+constexpr std::uint32_t leafPoints = 8;  // max count of points in a leaf of the tree
+constexpr float rounding = 1.000001f;    // growth factor of spheres, against rounding in single precision
 
 struct Candidate {
     glm::dvec3 position;
     glm::dvec3 normal;
-    double convexity;  // mean sine by which the surface falls off around the point; 0 on a plane, negative in a dent
+    double convexity;  // mean sine of the angle by which the surface recedes around the point; 0 on a plane, negative
+                       // in a dent
 };
 
 struct Edge {
@@ -42,7 +43,7 @@ double angleBetween(const glm::dvec3& a, const glm::dvec3& b) {
     return std::atan2(glm::length(glm::cross(a, b)), glm::dot(a, b));
 }
 
-// The candidates of one mesh, in a fixed order.
+// The candidates of a mesh, in a fixed order.
 class Candidates {
   public:
     Candidates(const Mesh& mesh, double pitch) : mesh_(mesh), pitch_(pitch) {
@@ -61,7 +62,7 @@ class Candidates {
   private:
     glm::dvec3 at(std::uint32_t vertex) const { return glm::dvec3(mesh_.points[vertex]); }
 
-    // Nothing comes of places where all triangles are degenerate: they have no outside.
+    // Skips places where all triangles are degenerate: they have no outside.
     void add(const glm::dvec3& position, const glm::dvec3& direction, double convexity) {
         const double length = glm::length(direction);
         if (length > 0) result.push_back({position, direction / length, convexity});
@@ -101,7 +102,7 @@ class Candidates {
         }
     }
 
-    // The candidates on the edge that some triangles share, without its ends.
+    // Adds candidates on the edge that some triangles share, without its ends.
     void addEdge(std::vector<Edge>::const_iterator first, std::vector<Edge>::const_iterator last) {
         const glm::dvec3 a = at(first->low), along = at(first->high) - a;
         glm::dvec3 direction(0);
@@ -109,13 +110,13 @@ class Candidates {
         double fall = 0;
         for (auto e = first; e != last; ++e) fall -= glm::dot(inward(*e), direction);
         const double length = glm::length(direction);
-        // half of the way around the edge is along it, where nothing falls off
+        // half of the directions around an edge point are along the edge, where the surface does not recede
         const double convexity = length > 0 ? 0.5 * fall / (length * double(last - first)) : 0;
         const int parts = int(std::ceil(glm::length(along) / pitch_));
         for (int i = 1; i < parts; ++i) add(a + double(i) / parts * along, direction, convexity);
     }
 
-    // From an edge into its triangle, at a right angle.
+    // The conormal of an edge in its triangle.
     glm::dvec3 inward(const Edge& edge) const {
         const glm::uvec3& t = mesh_.triangles[edge.triangle];
         const std::uint32_t opposite = t.x ^ t.y ^ t.z ^ edge.low ^ edge.high;
@@ -125,7 +126,7 @@ class Candidates {
         return length > 0 ? across / length : glm::dvec3(0);
     }
 
-    // Rows parallel to the longest edge, so that slivers get no more than their area needs.
+    // Rows are parallel to the longest edge, so that the count of candidates on slivers is proportional to their area.
     void addFace(const glm::uvec3& t, const glm::dvec3& normal) {
         std::array<glm::dvec3, 3> p{at(t.x), at(t.y), at(t.z)};
         const auto length = [&](int i) { return glm::distance(p[i], p[(i + 1) % 3]); };
@@ -147,7 +148,7 @@ class Candidates {
     std::vector<glm::dvec3> normals_;  // of triangles; 0 if degenerate
 };
 
-// Points in a hashed grid, for looking up those within the side of a cell.
+// Points in a hashed grid, for neighbour search within the side of a cell.
 class Grid {
   public:
     Grid(double cell, std::size_t most) : cell_(cell), heads_(std::bit_ceil(most + 1), none) {}
@@ -158,8 +159,8 @@ class Grid {
         head = std::uint32_t(entries_.size() - 1);
     }
 
-    // Whether a point lies within `radius`, at most the side of a cell, that looks about the same way: it is on the
-    // same side of a thin wall, and what touches a tip finer than `radius` is met by a point that looks at it.
+    // Whether a point within `radius` (at most the side of a cell) has about the same normal. The normal separates the
+    // sides of a thin wall. Tips finer than `radius` thus keep points on all their sides.
     bool near(const Candidate& candidate, double radius, double protrusion) const {
         const glm::i64vec3 cell = cellOf(candidate.position);
         for (int i = 0; i < 27; ++i) {
@@ -193,7 +194,7 @@ class Grid {
     std::vector<Entry> entries_;
 };
 
-// Takes candidates from the most convex to the least, but none close to one that was taken.
+// Takes candidates in order of decreasing convexity, except those close to a taken one.
 std::vector<SurfacePoint> thin(std::vector<Candidate> candidates, double spacing) {
     std::stable_sort(candidates.begin(), candidates.end(),
                      [](const Candidate& a, const Candidate& b) { return a.convexity > b.convexity; });
@@ -214,7 +215,7 @@ Bounds boxOf(const std::vector<SurfacePoint>& points, std::uint32_t begin, std::
     return box;
 }
 
-// Orders the points of [begin, end) by halves along the longest side of their box.
+// Sorts the points of [begin, end) by recursive halving along the longest side of their box.
 void order(std::vector<SurfacePoint>& points, std::uint32_t begin, std::uint32_t end) {
     if (end - begin <= leafPoints) return;
     const glm::vec3 size = boxOf(points, begin, end).size();
@@ -228,7 +229,7 @@ void order(std::vector<SurfacePoint>& points, std::uint32_t begin, std::uint32_t
     order(points, middle, end);
 }
 
-// Appends the nodes of ordered points in preorder.
+// Appends the nodes of sorted points in preorder.
 void addNode(const std::vector<SurfacePoint>& points, std::vector<PointNode>& nodes, std::uint32_t begin,
              std::uint32_t end) {
     const glm::vec3 centre = boxOf(points, begin, end).centre();

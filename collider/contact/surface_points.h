@@ -1,4 +1,4 @@
-// Points on a body's surface in a tree of spheres: what is tested against another body's field.
+// Points on a body's surface in a bounding sphere hierarchy. They are tested against another body's field.
 #pragma once
 
 #include <cstdint>
@@ -9,41 +9,42 @@
 
 namespace bilayer::detail {
 
-/// A surface point. Its index in SurfacePoints::points() is its feature: stable as long as the collider lives.
+/// A surface point. Its index in SurfacePoints::points() is its feature id, stable for the life of the collider.
 struct SurfacePoint {
     glm::vec3 position;  ///< [m]
     glm::vec3 normal;    ///< outward, of unit length
-    bool isSharp;        ///< on a convex edge or corner, where surfaces of other normals meet
+    bool isSharp;        ///< on a convex edge or vertex, where faces with different normals meet
 };
 
-/// A node of the tree: a sphere around some consecutive points. Nodes lie in preorder: the first child of node i is
-/// i + 1, the second is what follows the first one's subtree. A node is a leaf if `next` is i + 1.
+/// A node of the tree: a bounding sphere of consecutive points. Nodes are in preorder: the first child of node i is i +
+/// 1; the second child follows the subtree of the first. A node is a leaf if `next` is i + 1.
 struct PointNode {
     glm::vec3 centre;          ///< [m]
     float radius;              ///< [m]
     std::uint32_t begin, end;  ///< range of points
-    std::uint32_t next;        ///< index of the node after this one's subtree
+    std::uint32_t next;        ///< index of the node after this subtree
 };
 
-/// Points spread over a mesh's surface: every place of the surface has one within about `spacing` that looks about the
-/// same way, and where the surface is round lies no lower than about 0.05 `spacing`; convex corners and edges sharper
-/// than the surface around them keep theirs. Deterministic.
+/// Points distributed over a mesh's surface. Every place of the surface has a point with about the same normal within
+/// about `spacing`. On curved surfaces this point is at most about 0.05 `spacing` lower along the normal. Convex
+/// vertices and edges that are sharper than the surface around them have their own points. Deterministic.
 class SurfacePoints {
   public:
     SurfacePoints() = default;
 
-    /// @param spacing  [m], positive and finite; else throws std::invalid_argument, as for an invalid mesh
+    /// Throws std::invalid_argument for an invalid mesh.
+    /// @param spacing  [m], positive and finite; otherwise throws std::invalid_argument
     SurfacePoints(const Mesh& mesh, float spacing);
 
-    /// The points() of another one, in the same order: has the same nodes, to the bit. At least one.
+    /// From the points() of another one, in the same order; the nodes are equal bit for bit. Needs at least one point.
     explicit SurfacePoints(std::vector<SurfacePoint> ordered);
 
     std::span<const SurfacePoint> points() const { return points_; }
     std::span<const PointNode> nodes() const { return nodes_; }
 
-    /// Visits the points near some region, in ascending order of their index, without memory of its own.
-    /// @param reject  (const glm::vec3& centre, float radius) -> bool: true if nothing in that sphere is of interest
-    /// @param visit   (std::uint32_t index, const SurfacePoint&), for each point of the leaves that remain
+    /// Visits the points near a region, in ascending order of their index, without allocation.
+    /// @param reject  (const glm::vec3& centre, float radius) -> bool: true if the sphere contains nothing of interest
+    /// @param visit   (std::uint32_t index, const SurfacePoint&): called for each point of the remaining leaves
     template <class Reject, class Visit>
     void visit(Reject&& reject, Visit&& visit) const;
 

@@ -9,11 +9,11 @@ namespace bilayer::detail {
 
 namespace {
 
-// A gradient shorter than this tells no direction. On the surface it does, however short: beside a sharp edge the
-// interpolant of the voxels below rises by no more than what the edge is away in voxels.
+// A shorter gradient has no direction. On the surface even a short one has: next to a sharp edge, the interpolant of
+// the voxels below rises only by the distance to the edge in voxels.
 constexpr float flattest = 0.1f, flattestOnSurface = 1e-3f;
-constexpr float onSurface = 0.01f;     // [voxels]: within the voxels of an edge all gradients shorter than 0.1 are
-constexpr float nearestAside = 0.01f;  // [voxels] from an edge or corner: nearer, rounding spoils the way's direction
+constexpr float onSurface = 0.01f;     // [voxels]: includes all gradients below 0.1 in the voxels of an edge
+constexpr float nearestAside = 0.01f;  // [voxels] from an edge or vertex; nearer, rounding spoils the direction
 
 }  // namespace
 

@@ -1,33 +1,35 @@
-// How a field is touched by a point; internal.
+// The result of a point query on a field's surface, for contacts; internal.
 #pragma once
 
 #include <bilayer/collider/field.h>
 
 namespace bilayer::detail {
 
-/// In the field's own coordinates.
+/// Distance and normal of the surface at a point, in field coordinates.
 struct SurfaceSample {
-    float distance;    ///< of the point from the surface; of one that comes from afar from the plane that it will meet
-    glm::vec3 normal;  ///< outward; zero where the field tells none
+    float distance;      ///< of the point from the surface; for a speculative contact, from the tangent plane at the
+                         ///< predicted hit
+    glm::vec3 normal;    ///< outward; zero where it is undefined
     float approach = 0;  ///< Contact::approach
 };
 
-/// Of a point in the band: by its sample, or by the triangles.
+/// Distance and normal at a point in the band, from its sample or from the triangles.
 SurfaceSample surfaceSampleAt(const Field& field, const glm::vec3& point, const Sample& sample, bool byTriangles);
 
-/// Which way a point is from what is closest to it: across a face, and away from an edge or a corner, or from what a
-/// field without triangles does not tell apart.
+/// The contact normal for a closest point. The face normal on a face. The direction from the closest point at an edge
+/// or vertex, and for a field without triangles, which does not distinguish features.
 glm::vec3 directionOf(const ClosestPoint& closest, const glm::vec3& point, float voxelSize);
 
-/// Whether a point of a face that is beside another surface looks at an edge of that one aslant: closer to the point's
-/// normal, below the place that it sees, the other surface turns towards it. The edge's own points meet the face there.
+/// Whether a face point next to another surface sees an edge of that surface obliquely. The surface normal is evaluated
+/// again next to the seen place, in the point's tangent plane. If it opposes the point's normal there, the place is on
+/// an edge. The edge's own points then make the contact with the face.
 /// @param position, normal  of the point
-/// @param distance, seen    of the other surface there, outward
-/// @param normalAt          glm::vec3 (const glm::vec3&): of the other surface near a place
+/// @param distance, seen    distance and outward normal of the other surface there
+/// @param normalAt          glm::vec3 (const glm::vec3&): normal of the other surface near a place
 template <class NormalAt>
 bool seesEdgeObliquely(const glm::vec3& position, const glm::vec3& normal, float distance, const glm::vec3& seen,
                        NormalAt&& normalAt) {
-    // what is within half a degree of the normal is seen straight
+    // within half a degree of the normal
     constexpr float straight = 0.99996f, straighter = 0.1f;
     const float cosine = -glm::dot(seen, normal);
     if (cosine > straight) return false;
@@ -35,7 +37,7 @@ bool seesEdgeObliquely(const glm::vec3& position, const glm::vec3& normal, float
     return 1 + glm::dot(there, normal) < straighter * (1 - cosine);
 }
 
-/// Where the gradient of a sample points to; zero where it is too short to tell: on a medial axis.
+/// The direction of a sample's gradient. Zero if it is too short to have one: on the medial axis.
 glm::vec3 directionOf(const Sample& sample, float voxelSize);
 
 }  // namespace bilayer::detail

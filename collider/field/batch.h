@@ -1,4 +1,4 @@
-// Queries of many points at once.
+// Checks of batch queries.
 #pragma once
 
 #include <cstddef>
@@ -7,7 +7,7 @@
 
 namespace bilayer::detail {
 
-/// Throws std::invalid_argument if a batch has not as many answers as points.
+/// Throws std::invalid_argument unless a batch has as many answers as points.
 inline void requireSameLength(std::size_t points, std::size_t answers, const char* name) {
     if (points != answers)
         throw std::invalid_argument(std::to_string(points) + " points need as many " + name + ", not " +

@@ -12,19 +12,19 @@
 namespace bilayer::detail {
 namespace {
 
-/// What the frames of field and tree may differ by [voxels], and floats in the latter from what they stand for, as a
-/// part of its size.
+/// Max offset between the frames of field and tree [voxels], and max rounding of floats in the tree, relative to its
+/// size.
 constexpr float frameRounding = 1e-2f, placeRounding = 3e-7f;
-/// As many nodes fit into a cube's entries.
+/// Max count of nodes in a cube's entries.
 constexpr std::size_t maxNodes = BlockEntries::most * BlockEntry::slots;
-/// Entries have room for the nodes of this part of the cubes; others make do with a coarser level. So many cubes are
-/// looked at to tell.
+/// Entries are sized for the nodes of this fraction of the cubes; the other cubes use a coarser level. The size is
+/// estimated from `samples` cubes.
 constexpr double usual = 0.9;
 constexpr std::size_t samples = 512;
 constexpr std::uint32_t maxTreeNodes = 1 << 24;
-constexpr std::size_t grain = 256;  // cubes a task
-/// A cube is one block, or larger if so few entries hold the leaves near it: these are read as quickly as one, and all
-/// of them stay in a cache that those of single blocks do not fit into.
+constexpr std::size_t grain = 256;  // cubes per task
+/// log2 of a cube's side [voxels]. A cube is one block, or larger if `fewEntries` entries hold the leaves near it.
+/// These are read as fast as one, and all of them fit into a cache that is too small for entries of single blocks.
 constexpr int blockShift = 3, largestShift = 5, fewEntries = 2;
 static_assert(FieldFrame::side == 1 << blockShift);
 
@@ -42,7 +42,7 @@ class Nodes {
     float lower(int k, std::size_t i) const { return lower_[k][i]; }
     float upper(int k, std::size_t i) const { return upper_[k][i]; }
 
-    // Adds those of eight boxes that come near a region.
+    // Adds those of up to eight boxes that are near a region.
     template <class NodeOf>
     void addNear(const float* const (&lower)[3], const float* const (&upper)[3], int count, NodeOf nodeOf,
                  const Region& region) {
@@ -63,7 +63,7 @@ class Nodes {
         }
     }
 
-    // Adds a node of which nothing is known.
+    // Adds a node with an unknown box.
     void add(std::uint32_t node, const Region& region) {
         reserve(size_);
         for (int k = 0; k < 3; ++k) {
@@ -73,14 +73,14 @@ class Nodes {
         nodes_[size_++] = node;
     }
 
-    // Adds those children of a group that come near a region.
+    // Adds the children of a group that are near a region.
     void addNear(const BoxGroup& group, const Region& region) {
         addNear(
             {group.lower[0], group.lower[1], group.lower[2]}, {group.upper[0], group.upper[1], group.upper[2]},
             treeWidth, [&](int i) { return group.firstChild + std::uint32_t(i); }, region);
     }
 
-    // Takes over those nodes that come near a region.
+    // Adds the given nodes that are near a region.
     void addNear(const Nodes& from, const Region& region) {
         for (std::size_t i = 0; i < from.size_; i += treeWidth)
             addNear(
@@ -104,7 +104,7 @@ class Nodes {
     std::vector<std::uint32_t> nodes_;
 };
 
-// Makes the entries of one cube after another.
+// Builds the entries of one cube after another.
 class Maker {
   public:
     Maker(const FieldLayout& field, const WideTree& tree, double perMetre, float reach, int shift)
@@ -115,7 +115,7 @@ class Maker {
           reach_(reach),
           room_(frameRounding + placeRounding * float(std::max({tree.size.x, tree.size.y, tree.size.z}))) {}
 
-    // How many nodes of the finest level that can have room in entries come near a cube, and whether they are leaves.
+    // The count of nodes near a cube, at the finest level that fits into entries, and whether they are leaves.
     std::pair<std::size_t, bool> count(const glm::ivec3& cube) {
         descend(cube);
         const Nodes& finest = levels_[count_ - 1];
@@ -132,7 +132,7 @@ class Maker {
   private:
     glm::vec3 lowerOf(const glm::ivec3& cube) const { return glm::vec3(origin_ + step_ * glm::dvec3(cube)); }
 
-    // The nodes near a cube, level by level from the root, as far as they are not too many.
+    // Finds the nodes near a cube, level by level from the root, until there are too many.
     void descend(const glm::ivec3& cube) {
         const glm::vec3 lower = lowerOf(cube);
         const Region region{lower - room_, lower + side_ + room_, reach_ * reach_};
@@ -180,10 +180,10 @@ class Maker {
     double step_;        // the same in the tree's frame
     float reach_, room_;
     std::vector<Nodes> levels_;
-    std::size_t count_ = 0;  // of levels that are filled
+    std::size_t count_ = 0;  // of filled levels
 };
 
-// Entries that are enough for most cubes, and whether these then have leaves in them.
+// The count of entries that is sufficient for most cubes, and whether most cubes then have leaves in them.
 struct Need {
     int entries;
     bool leaves;

@@ -1,6 +1,6 @@
-// Where searches for what is nearest to a point in the band begin: for each stored block, or for a cube of blocks where
-// triangles are large beside voxels, the nodes of the hierarchy that come within the band's reach of it, leaves where
-// they are few enough. The levels above them are never looked at, and neither are the field's distances.
+// Entry points of closest-point searches in the band. A cube is a stored block, or a group of blocks where triangles
+// are large compared with voxels. For each cube, the entries hold the hierarchy's nodes within the band's reach; they
+// are leaves where those are few enough. Searches thus skip the levels above, and the field's distances.
 #pragma once
 
 #include <hwy/cache_control.h>
@@ -19,14 +19,15 @@
 
 namespace bilayer::detail {
 
-/// Seven nodes of a tree with their boxes, in 1/255 of the cube's region: the cube and what is within reach of it. A
-/// box that is left over is empty, and out of reach. One cache line: it is the misses that searches wait for.
+/// Seven nodes of a tree with quantised boxes. The unit is 1/255 of the cube's region: the cube expanded by the reach.
+/// Boxes of unused slots are empty and out of reach. The size is one cache line, since cache misses dominate the search
+/// time.
 struct BlockEntry {
     static constexpr int slots = 7;
 
     alignas(64) std::uint8_t lower[3][slots];
     std::uint8_t upper[3][slots];
-    std::uint8_t nodes[slots][3];  ///< least byte first
+    std::uint8_t nodes[slots][3];  ///< lowest byte first
 
     std::uint32_t node(int slot) const {
         return nodes[slot][0] | std::uint32_t(nodes[slot][1]) << 8 | std::uint32_t(nodes[slot][2]) << 16;
@@ -36,30 +37,30 @@ static_assert(sizeof(BlockEntry) == 64, "a cache line");
 
 /// A point in the region of a cube.
 struct EntryPlace {
-    const BlockEntry* entries = nullptr;         ///< of the cube; null: the point is in no cube of stored blocks
+    const BlockEntry* entries = nullptr;         ///< of the cube; null: the point is in no cube with stored blocks
     int count = 0;                               ///< of entries
     std::array<std::int32_t, 3> place{0, 0, 0};  ///< from the region's lower corner [1/8 of the boxes' unit]
-    float perVoxel = 0;                          ///< that unit
+    float perVoxel = 0;                          ///< units of `place` per voxel
 
-    /// Asks for the entries' memory ahead of its use.
+    /// Prefetches the entries.
     void fetch() const {
         for (int i = 0; i < count; ++i) hwy::Prefetch(&entries[i]);
     }
 };
 
-/// Entries for all cubes with stored blocks, as many for each. None at all for a tree of more than 2^24 nodes.
+/// Entries for all cubes with stored blocks, with the same count for each. Empty for a tree of more than 2^24 nodes.
 class BlockEntries {
   public:
     static constexpr int placesPerUnit = 8, regionUnits = 255;
-    static constexpr int most = 6;  ///< entries for a cube
+    static constexpr int most = 6;  ///< max count of entries per cube
 
     BlockEntries() = default;
 
-    /// @param perMetre  voxels, of the tree
-    /// @param reach     of the searches that begin here [voxels]
+    /// @param perMetre  voxels per metre, of the tree
+    /// @param reach     of the searches that start here [voxels]
     BlockEntries(const FieldLayout& field, const WideTree& tree, double perMetre, float reach);
 
-    /// Of a point in the field's frame [voxels].
+    /// The entries for a point in the field's frame [voxels].
     EntryPlace at(const glm::dvec3& local) const {
         const glm::dvec3& size = extent_;
         const bool within =
@@ -78,8 +79,8 @@ class BlockEntries {
     std::size_t memoryBytes() const { return entries_.bytes() + tiles_.size() * sizeof(Tile); }
 
   private:
-    /// Of 4^3 cubes: which have stored blocks, and how many do before the first of them. It is small where the field's
-    /// directory is not.
+    /// A group of 4^3 cubes: a bit mask of those with stored blocks, and the count of such cubes before the group. It
+    /// is small compared with the field's directory.
     struct Tile {
         std::uint64_t stored = 0;
         std::uint32_t first = 0;

@@ -1,4 +1,4 @@
-// What a field knows of places that are not near its surface.
+// A coarse distance bound for places far from a field's surface.
 #pragma once
 
 #include <algorithm>
@@ -11,36 +11,36 @@
 
 namespace bilayer::detail {
 
-/// What a Field tells at once of places that are not near its surface: a view of its own data, coarse but small. Space
-/// is divided into parts of 4^3 voxels; coordinates are in parts from the field's origin.
+/// Fast conservative tests for places far from the surface. It is a view of a field's coarse cells, which take little
+/// memory. A coarse cell ("part") has 4^3 voxels. Coordinates are in coarse cells from the field's origin.
 class Clearance {
   public:
     static constexpr int partSide = 4;  ///< [voxels]
-    static constexpr int perBlock = 2;  ///< parts along a block
+    static constexpr int perBlock = 2;  ///< coarse cells along a block
     static constexpr int blockParts = perBlock * perBlock * perBlock;
-    static constexpr int steps = 8;               ///< that a part's edge is divided into, where ways are stored
-    static constexpr int maxDistanceSteps = 127;  ///< farther from the surface, ways grow no more [steps]
+    static constexpr int steps = 8;               ///< per edge of a coarse cell: the unit of stored distances
+    static constexpr int maxDistanceSteps = 127;  ///< stored distances are clamped to this [steps]
 
-    /// The arrays, by block: a block's eight parts lie together, the last axis fastest.
+    /// The arrays, ordered by block. The eight coarse cells of a block are contiguous, the last axis fastest.
     struct Data {
         const std::int32_t* directory;  ///< of FieldLayout
-        const std::int8_t* centres;     ///< each part's centre's way to the surface, at least, negative inside [steps]
-        const std::int8_t* minima;      ///< by stored block: no sample in the part is below [minimaStep]
-        float minimaStep;               ///< [m]
-        float besides[2];               ///< the same for parts of empty blocks, outside and inside [m]
-        glm::ivec3 blocks;              ///< along each axis
+        const std::int8_t* centres;  ///< min distance from each cell's centre to the surface, negative inside [steps]
+        const std::int8_t* minima;   ///< lower bound of the samples in each cell, by stored block [minimaStep]
+        float minimaStep;            ///< [m]
+        float besides[2];            ///< the same for cells of empty blocks, outside and inside [m]
+        glm::ivec3 blocks;           ///< count along each axis
     };
 
     explicit Clearance(const Data& data)
         : data_(data), size_(perBlock * data.blocks), extent_(perBlock * data.blocks) {}
 
-    /// The distance from the surface, at least; not positive where nothing is known [parts].
+    /// A lower bound of the distance to the surface; not positive where it is unknown [coarse cells].
     float around(const glm::dvec3& point) const noexcept {
         const glm::ivec3 part = partOf(glm::vec3(point));
         return std::abs(centreOf(part)) - float(glm::distance(point, glm::dvec3(part) + 0.5));
     }
 
-    /// Whether a sphere surely lies outside of the surface. False for a centre that is not finite.
+    /// Whether a sphere certainly lies outside the surface. False for a non-finite centre.
     bool isOutside(const glm::vec3& centre, float radius) const noexcept {
         const glm::vec3 toBox = centre - clamped(centre);
         if (glm::dot(toBox, toBox) > radius * radius) return true;
@@ -50,7 +50,7 @@ class Clearance {
         return left > 0 && glm::dot(way, way) < left * left;
     }
 
-    /// Whether a sample there is surely above `reach` [m], or out of the band.
+    /// Whether a sample there is certainly above `reach` [m], or outside the band.
     bool isAbove(const glm::vec3& point, float reach) const noexcept {
         const glm::ivec3 part = partOf(point);
         const std::int32_t block = data_.directory[entryOf(part)];
@@ -59,7 +59,7 @@ class Clearance {
     }
 
   private:
-    // NaN goes to 0
+    // maps NaN to 0
     glm::vec3 clamped(const glm::vec3& p) const noexcept {
         return {std::min(std::max(0.f, p.x), extent_.x), std::min(std::max(0.f, p.y), extent_.y),
                 std::min(std::max(0.f, p.z), extent_.z)};

@@ -16,14 +16,14 @@
 namespace bilayer::detail {
 namespace {
 
-/// Triangles that are worth a task.
+/// Count of triangles per task.
 constexpr std::size_t grain = 4096;
 
-// What a triangle adds to the features around it.
+// The contribution of a triangle to its features.
 struct Face {
     glm::dvec3 normal{0};            // zero: it has no area
     std::array<double, 3> angles{};  // [rad]
-    bool counts = false;             // neither without area nor a repetition
+    bool counts = false;             // it has area and is no duplicate
 };
 
 Face faceOf(const Mesh& mesh, const glm::uvec3& t, double thinnest) {
@@ -40,14 +40,14 @@ Face faceOf(const Mesh& mesh, const glm::uvec3& t, double thinnest) {
     return face;
 }
 
-// Whether two triangles with the same vertices run around them the same way.
+// Whether two triangles with the same vertices have the same orientation.
 bool sameTurn(const glm::uvec3& a, const glm::uvec3& b) {
     for (int turn = 0; turn < 3; ++turn)
         if (a.x == b[turn] && a.y == b[(turn + 1) % 3] && a.z == b[(turn + 2) % 3]) return true;
     return false;
 }
 
-// The faces of a mesh; of those with the same vertices, one for each way around counts.
+// The faces of a mesh. Of those with the same vertices, one counts per orientation.
 class Faces {
   public:
     Faces(const Mesh& mesh, const Topology& topology, double thinnest) : faces_(topology.triangles.size()) {
@@ -55,7 +55,7 @@ class Faces {
             for (std::size_t i = range.begin(); i < range.end(); ++i)
                 if (topology.proper(i)) faces_[i] = faceOf(mesh, topology.triangles[i], thinnest);
         });
-        std::set<unsigned> backs;  // of triangles that have one
+        std::set<unsigned> backs;  // first triangles that have a reverse
         for (std::size_t i = 0; i < faces_.size(); ++i) {
             const unsigned first = topology.original[i];
             if (first == i) continue;
@@ -76,7 +76,7 @@ class Faces {
     std::vector<std::uint32_t> flat_;
 };
 
-// A sum of normals and of their weights; nothing is known where a triangle without area took part.
+// A sum of normals and of their weights; unknown if a triangle without area is involved.
 struct Sum {
     glm::dvec3 normals{0};
     double weights = 0;

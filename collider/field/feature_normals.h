@@ -1,6 +1,6 @@
-// The normals of a mesh's edges and vertices: J. A. Baerentzen, H. Aanaes, "Signed distance computation using the angle
-// weighted pseudonormal", IEEE TVCG 11 (2005) 243-253. Vertices count as one if their coordinates are equal, triangles
-// that repeat another count once, and those without area not at all.
+// The pseudonormals of a mesh's edges and vertices: J. A. Baerentzen, H. Aanaes, "Signed distance computation using the
+// angle weighted pseudonormal", IEEE TVCG 11 (2005) 243-253. Vertices with equal coordinates count as one. Duplicate
+// triangles count once, and triangles without area are ignored.
 #pragma once
 
 #include <hwy/cache_control.h>
@@ -13,24 +13,24 @@
 
 namespace bilayer::detail {
 
-/// Means of the unit normals around edges and vertices, weighted by angles: as long as 1 where the surface is flat,
-/// next to nothing where normals cancel out and tell no side. Zero as well beside triangles without area, which hide
-/// from their neighbours who else is there.
+/// Angle-weighted means of the unit normals around edges and vertices. The length is 1 where the surface is flat, and
+/// close to zero where normals cancel out and define no side. It is also zero next to triangles without area, because
+/// these hide the neighbours of an edge from each other.
 class FeatureNormals {
   public:
     FeatureNormals() = default;
 
     /// @param mesh      valid
-    /// @param thinnest  triangles thinner than this have no area [m]
+    /// @param thinnest  triangles thinner than this count as having no area [m]
     FeatureNormals(const Mesh& mesh, double thinnest);
 
-    /// Of the edge from a corner (0..2) of a triangle to the next.
+    /// The pseudonormal of the edge from a corner (0..2) of a triangle to the next.
     const glm::vec3& ofEdge(std::uint32_t triangle, int edge) const { return edges_[3 * std::size_t(triangle) + edge]; }
-    /// Asks for the memory of a triangle's edges ahead of its use.
+    /// Prefetches the normals of a triangle's edges.
     void fetchEdges(std::uint32_t triangle) const { hwy::Prefetch(&edges_[3 * std::size_t(triangle)]); }
-    /// Of a point of the mesh.
+    /// The pseudonormal of a point of the mesh.
     const glm::vec3& ofVertex(std::uint32_t point) const { return vertices_[point]; }
-    /// Whether a triangle has no normal: it has no area, or another one is its back.
+    /// Whether a triangle has no normal: it has no area, or another triangle is its reverse.
     bool isFlat(std::uint32_t triangle) const;
 
     std::size_t memoryBytes() const;

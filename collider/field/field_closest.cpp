@@ -1,5 +1,5 @@
-// The field finds, triangles decide: the block that a point is in tells which nodes of the hierarchy over the mesh to
-// look at, and the feature that is found is measured in double precision.
+// Closest-point queries on a mesh with a field. The point's block holds the hierarchy nodes to search. The distance to
+// the closest feature is then computed in double precision.
 #include <hwy/cache_control.h>
 
 #include <algorithm>
@@ -23,27 +23,27 @@ using namespace detail;
 
 namespace {
 
-/// What distances in the band seldom exceed it by, so that a second search is seldom needed [voxels].
+/// Band distances seldom exceed the band by more than this, so that a second search is seldom needed [voxels].
 constexpr float usualError = 0.1f;
-/// Room for the rounding of single precision, in the distance that is asked for; and in itself [voxels].
+/// Tolerances for single-precision rounding of the search radius: relative, and absolute [voxels].
 constexpr float boundRounding = 1 + 1e-5f, boundRoom = 1e-5f;
-/// Points that are taken together; what is known of them fits into the first cache.
+/// Batch size; the data of the batch's points fit into the first-level cache.
 constexpr std::size_t batch = 64;
-/// Mean normals below this have cancelled out, and tell no side where they point aside: above the rounding of floats,
-/// below what needles leave at their tips.
+/// Shorter mean normals have cancelled out, and define no side for oblique directions. The limit is above the rounding
+/// of floats, and below the length at the tips of needles.
 constexpr double cancelled = 1e-6;
-/// How far on either side of a wall the field is asked which one is inside [voxels].
+/// Distance on either side of a wall at which the field decides which one is inside [voxels].
 constexpr float aside = 1;
-/// What samples may be off at an edge [voxels].
+/// Max error of samples at an edge [voxels].
 constexpr float roundedOff = 0.3f;
 
-// Of a point over the plane that the normal stands on; the normal may be shorter than 1.
+// The height of a point over the plane of the normal, which may be shorter than 1.
 double heightOver(const NearestFeature& nearest) {
     return -glm::dot(nearest.normal, nearest.way);
 }
 
-// The normal of a feature, turned around where it points to the other side; where there is none, from the surface to
-// the point or the other way. A point on the surface itself has no side.
+// The normal of a feature, flipped if it points to the other side. If there is none: the direction from the surface to
+// the point, or its reverse inside. A point on the surface itself has no side.
 glm::vec3 outwardNormal(const NearestFeature& nearest, bool inside) {
     const double length = glm::length(nearest.normal), distance = glm::length(nearest.way);
     if (length > cancelled || nearest.isOnSurface) {
@@ -68,7 +68,7 @@ FieldData::FieldData(const FieldData& samples, std::shared_ptr<const Mesh> outwa
     entries = BlockEntries(*this, mesh->tree(), 1 / double(voxelSize), reach);
 }
 
-// Where the value of the voxel nearest to a place stands; negative where the place lies in no stored block.
+// The index of the voxel nearest to a place; negative if the place is in no stored block.
 std::ptrdiff_t FieldData::nearestVoxel(const glm::dvec3& local) const {
     const glm::dvec3 size = extent();
     const bool within =
@@ -81,7 +81,7 @@ std::ptrdiff_t FieldData::nearestVoxel(const glm::dvec3& local) const {
     return std::ptrdiff_t(number) * blockFloats + (inBlock.x * stride + inBlock.y) * stride + inBlock.z;
 }
 
-// Asks for the memory that sideAt() reads, ahead of its use.
+// Prefetches the data that sideAt() reads.
 void FieldData::fetchSide(const glm::dvec3& local) const {
     const std::ptrdiff_t index = nearestVoxel(local);
     if (index < 0) return;
@@ -91,7 +91,7 @@ void FieldData::fetchSide(const glm::dvec3& local) const {
         hwy::Prefetch(values.data() + index);
 }
 
-// A ball around a voxel that the surface does not reach lies on the voxel's side.
+// A sphere around a voxel that does not reach the surface is on the voxel's side.
 FieldData::Side FieldData::sideAt(const glm::dvec3& local) const {
     const std::ptrdiff_t index = nearestVoxel(local);
     if (index < 0) {
@@ -105,8 +105,8 @@ FieldData::Side FieldData::sideAt(const glm::dvec3& local) const {
     return {(certain ? value : sample(local).distance) < 0, certain};
 }
 
-// Whether the field changes sign at a place of the mesh: not where a wall lies within the solid, or is one by itself.
-// Beside an edge the one or the other side is close to another wall.
+// Whether the field changes sign at a place of the mesh. It does not at walls within the solid, nor at free-standing
+// walls. Next to an edge, one of the two samples may be close to another wall.
 bool FieldData::divides(const glm::dvec3& place, const glm::dvec3& normal) const {
     const glm::dvec3 step = double(aside * voxelSize) * glm::normalize(normal);
     const auto distanceAt = [&](const glm::dvec3& at) { return sample((at - origin) * perMetre).distance; };
@@ -114,9 +114,9 @@ bool FieldData::divides(const glm::dvec3& place, const glm::dvec3& normal) const
     return outer > -roundedOff * voxelSize && inner < roundedOff * voxelSize && outer - inner > aside * voxelSize / 2;
 }
 
-// By the field where it is certain, so that all queries agree. Else by the normal, where it tells a side: of a mesh
-// whose normals do, or of a wall that the field confirms. Else by the field alone, whose samples blend what the surface
-// is on either side of an edge.
+// The field decides where it is certain, so that all queries agree. Otherwise the normal decides if it defines a side:
+// for meshes signed by normals, and for walls that the field confirms. Otherwise the field's sample decides, which
+// blends the surfaces on both sides of an edge.
 bool FieldData::isInside(const NearestFeature& nearest, const glm::vec3& point) const {
     const Side side = sideAt(toLocal(point));
     if (side.certain) return side.inside;
@@ -128,7 +128,7 @@ bool FieldData::isInside(const NearestFeature& nearest, const glm::vec3& point) 
     return byNormal ? height < 0 : side.inside;
 }
 
-// What is known of a point once the part of the mesh is found that is nearest to it.
+// The result for a point, from the closest part of the mesh.
 ClosestPoint FieldData::closestOn(std::uint32_t part, const glm::vec3& point, float maxDistance) const {
     if (part == MeshTree::noPart) return {};
     const glm::dvec3 from = mesh->approached(glm::dvec3(point));
@@ -145,12 +145,12 @@ ClosestPoint FieldData::closestOn(std::uint32_t part, const glm::vec3& point, fl
             .found = true};
 }
 
-// The distance that is asked for [voxels].
+// The search radius [voxels].
 float FieldData::boundOf(float maxDistance) const {
     return (maxDistance * float(perMetre) + boundRoom) * boundRounding;
 }
 
-// Of all the mesh, where the search from an entry has found nothing and others may be as near as asked for.
+// Searches the whole mesh if the search from an entry has found nothing and its reach is too short.
 std::uint32_t FieldData::orBeyond(std::uint32_t part, const EntryPlace& place, const glm::vec3& point,
                                   float maxDistance) const {
     const float bound = boundOf(maxDistance);
@@ -170,7 +170,7 @@ ClosestPoint FieldData::closest(const glm::vec3& point, float maxDistance) const
     return closestOn(orBeyond(part, place, point, maxDistance), point, maxDistance);
 }
 
-// What is far away is as near to the zeros as it is from there, to a millionth of the field's size.
+// Replaces a far point: its distance to the zeros equals that from the replacement, to a millionth of the field's size.
 glm::dvec3 FieldData::whereZerosTell(const glm::dvec3& local) const {
     constexpr double sizes = 1e6;
     return approached(local, glm::dvec3(0), extent(), sizes, sizes);
@@ -194,7 +194,7 @@ ClosestPoint Field::closest(const glm::vec3& point, float maxDistance) const noe
     return data_->closest(point, maxDistance);
 }
 
-// Step by step for some points at a time, so that memory is asked for well ahead of its use.
+// Interleaves the searches of several points, so that prefetches are well ahead of their use.
 void Field::closest(std::span<const glm::vec3> points, std::span<ClosestPoint> answers, float maxDistance) const {
     requireSameLength(points.size(), answers.size(), "answers");
     if (!data_->mesh || !(maxDistance >= 0)) {

@@ -1,4 +1,4 @@
-// What a Field holds, and how its queries read it.
+// The data of a Field, and its access by queries.
 #pragma once
 
 #include <algorithm>
@@ -27,15 +27,15 @@ inline float toFloat(double length) {
     return float(std::min(length, double(std::numeric_limits<float>::max())));
 }
 
-// Vectors of the compiler's own: Highway has none of fixed size for the plain instruction set.
+// The compiler's own vector types: Highway has no fixed-size vectors for the baseline instruction set.
 using Doubles [[gnu::vector_size(16)]] = double;
 using Floats [[gnu::vector_size(16)]] = float;
 using Ints [[gnu::vector_size(16)]] = std::int32_t;
 
 struct FieldData;
 
-/// How samples are taken: for one instruction set and one storage. `gradientReach`: the gradient is found where the
-/// distance is no more than that [m].
+/// Sampling functions for one instruction set and one storage. The gradient is computed where the distance is at most
+/// `gradientReach` [m].
 struct SampleKernels {
     Sample (*sampleAt)(const FieldData&, const glm::dvec3& local, float gradientReach) noexcept;
     Sample (*samplePoint)(const FieldData&, const glm::vec3& point) noexcept;
@@ -43,11 +43,11 @@ struct SampleKernels {
     void (*sampleMany)(const FieldData&, std::span<const glm::vec3> points, Sample*) noexcept;
 };
 
-/// The best for this processor.
+/// The fastest kernels for this processor.
 const SampleKernels& sampleKernels(Storage storage);
 
 struct FieldData : FieldLayout {
-    /// Also the Lipschitz bound of the trilinear interpolant [voxels].
+    /// Also the Lipschitz constant of the trilinear interpolant [voxels].
     static constexpr float cellDiagonal = 1.7320508f;
 
     FieldData(const LevelSet& levelSet, Storage storage);
@@ -58,36 +58,36 @@ struct FieldData : FieldLayout {
 
     const SampleKernels& kernels;
     const Clearance coarse;
-    std::unique_ptr<const MeshTree> mesh;  ///< null: the field has none
-    BlockEntries entries;                  ///< of searches for points in the band
-    bool signedByNormals;                  ///< of the mesh
-    float sampleError;                     ///< of distances in the band from the mesh's [m]; infinite: not known
-    float error = 0;                       ///< the same from what queries ask for: the mesh's where there is one [m]
+    std::unique_ptr<const MeshTree> mesh;  ///< null: the field has no mesh
+    BlockEntries entries;                  ///< for closest-point searches in the band
+    bool signedByNormals;                  ///< the signs come from the mesh's normals
+    float sampleError;  ///< max error of distances in the band relative to the mesh [m]; infinite: unknown
+    float error = 0;    ///< the same relative to the geometry that queries use: the mesh if there is one [m]
 
-    /// Bits of a place below the voxel, which leave those of the voxel in its block in the same word.
+    /// Fraction bits of a fixed-point place. The remaining bits of the 32-bit word hold the voxel within its block.
     static constexpr int fractionBits = 29;
     static_assert(side == 1 << (32 - fractionBits));
-    /// Added to a place, it leaves the fixed-point number in a double's lower bits [voxels].
+    /// Magic number: adding it to a place leaves the fixed-point number in the low bits of the double [voxels].
     static constexpr double fixedPoint = 1.5 * (std::uint64_t(1) << (52 - fractionBits));
     static_assert(fixedPoint / 3 == double(side) * maxBlocksAlong);
 
-    /// The frame as samples need it, much of it in vectors.
+    /// The frame in the form that samples need, mostly in vectors.
     struct Lanes {
         Doubles perMetre;
-        Doubles offsetXy, offsetYz;  ///< of a place, with the fixed point [voxels]
-        Ints fraction;               ///< the bits of a place below the voxel
-        Floats fractionUnit;         ///< the lowest of them [voxels]
-        Floats scales;               ///< of a distance and its gradient, from stored values and voxels [m]
-        std::uint32_t xBlocks;       ///< entries of the directory from one block to the next along x
+        Doubles offsetXy, offsetYz;  ///< of a place, with the fixed-point constant [voxels]
+        Ints fraction;               ///< mask of a place's fraction bits
+        Floats fractionUnit;         ///< value of the lowest fraction bit [voxels]
+        Floats scales;               ///< factors of a distance and its gradient, from stored values and voxels [m]
+        std::uint32_t xBlocks;       ///< count of directory entries between neighbouring blocks along x
     } lanes;
 
-    // Local places are in voxels from the directory's first one, in double: exact enough however far the mesh is from
+    // Local places are in voxels from the directory's first voxel. In double they are exact enough at any distance from
     // the origin.
     glm::dvec3 toLocal(const glm::vec3& point) const { return (glm::dvec3(point) - origin) * perMetre; }
     glm::vec3 toWorld(const glm::dvec3& local) const { return glm::vec3(local * voxel + origin); }
     glm::dvec3 extent() const { return double(side) * glm::dvec3(blocks); }
 
-    /// With the gradient where the distance is no more than `gradientReach` [m].
+    /// Computes the gradient where the distance is at most `gradientReach` [m].
     Sample sample(const glm::dvec3& local, float gradientReach) const noexcept {
         return kernels.sampleAt(*this, local, gradientReach);
     }
@@ -97,12 +97,12 @@ struct FieldData : FieldLayout {
         return sample(local, -std::numeric_limits<float>::infinity());
     }
 
-    /// The distance from the surface, at least; not positive where nothing is known [voxels].
+    /// A lower bound of the distance to the surface; not positive where it is unknown [voxels].
     float clearanceAt(const glm::dvec3& local) const {
         return float(Clearance::partSide) * coarse.around(local / double(Clearance::partSide));
     }
 
-    /// What the field knows of the side that a point lies on.
+    /// The field's answer to the side of a point.
     struct Side {
         bool inside, certain;
     };
@@ -116,14 +116,14 @@ struct FieldData : FieldLayout {
                            float maxDistance) const;
     ClosestPoint closestOn(std::uint32_t part, const glm::vec3& point, float maxDistance) const;
 
-    /// The closest point of the mesh, or of the zero set where there is none.
+    /// The closest point of the mesh, or of the zero set if there is no mesh.
     ClosestPoint closest(const glm::vec3& point, float maxDistance) const;
     glm::dvec3 whereZerosTell(const glm::dvec3& local) const;
     ClosestPoint closestZero(const glm::vec3& point, float maxDistance) const;
 
     bool inside(const glm::vec3& point) const;
 
-    /// A voxel of a stored block, apron included [m].
+    /// The value of a voxel of a stored block, apron included [m].
     float valueAt(std::size_t index) const {
         if (storage == Storage::fixed16)
             return std::clamp(float(values16.data()[index]) * step, -interiorWidth, exteriorWidth);

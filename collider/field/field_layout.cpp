@@ -1,4 +1,5 @@
-// Beside the band, distances are bounded from below by a coarse exact distance transform of where the surface can be.
+// Construction of field layouts. Outside the band, distances are bounded from below by a coarse exact distance
+// transform of the cells that the surface may meet.
 #include "collider/field/field_layout.h"
 
 #include <oneapi/tbb/parallel_for.h>
@@ -25,16 +26,16 @@ using Accessor = openvdb::FloatGrid::ConstAccessor;
 constexpr int side = FieldLayout::side, stride = FieldLayout::stride;
 constexpr std::int64_t maxBlocks = 1 << 26;  // of the box: 0.75 GiB at 12 bytes each
 constexpr int partSide = Clearance::partSide, perBlock = Clearance::perBlock, blockParts = Clearance::blockParts;
-constexpr int maxParts = 16;                      // away from the surface: farther away, bounds grow no more
-constexpr float nearSurface = 0.5f * 1.7320508f;  // some voxel of a cell that the surface meets is as near [voxels]
-constexpr int minSteps = 126;                     // from 0 to the end of the band, where the least samples are stored
+constexpr int maxParts = 16;                      // distance limit of the bounds [coarse cells]
+constexpr float nearSurface = 0.5f * 1.7320508f;  // max distance from surface in a cell to its nearest voxel [voxels]
+constexpr int minSteps = 126;                     // from 0 to the end of the band, for the stored minima
 
-// Of parts: squared ways from their centres to the nearest one that the surface meets. In half parts, so that ways to
-// the faces of parts are whole.
+// Squared distances from the centres of coarse cells to the nearest one that the surface meets. The unit is half a
+// coarse cell, so that distances to faces are integers.
 using Way = std::int16_t;
 constexpr Way farAway = 4 * maxParts * maxParts;
 
-// A leaf needs a block if it has voxels of the band, or lies on both sides of it (where the band is below one voxel).
+// A leaf needs a block if it has voxels of the band, or voxels of both signs (for bands below one voxel).
 bool needsBlock(const FloatTree::LeafNodeType& leaf) {
     if (!leaf.getValueMask().isOff()) return true;
     const auto [low, high] = std::minmax_element(leaf.buffer().data(), leaf.buffer().data() + side * side * side);
@@ -45,7 +46,7 @@ bool needsBlock(const FloatTree::LeafNodeType& leaf) {
     throw std::invalid_argument("field: the bounds are longer than 2^19 blocks of 8^3 voxels: take larger voxels");
 }
 
-// Blocks that are near one another in space are then near one another in memory: walks there run along it.
+// Sorts blocks in Morton order, so that blocks that are close in space are close in memory.
 void sortForWalks(std::vector<Coord>& origins, const Coord& first) {
     const auto place = [&](const Coord& origin) -> std::array<std::uint32_t, 3> {
         const Coord way = origin - first;
@@ -75,26 +76,26 @@ void copyBlock(const Accessor& tree, const Coord& origin, float* block) {
     }
 }
 
-// Of the least samples of parts [m].
+// The unit of stored minima [m].
 float minimaStepOf(const FieldFrame& frame) {
     return std::max(frame.exteriorWidth, frame.interiorWidth) / float(minSteps);
 }
 
-// What is stored of a block beside its values.
+// Summary of a block's coarse cells.
 struct BlockSummary {
-    std::array<float, blockParts> least;        // value of the voxels around a part's cells [m]
-    std::array<bool, blockParts> meetsSurface;  // a voxel is as near as the surface passes, or they lie on both sides
+    std::array<float, blockParts> least;        // min value of the voxels around each coarse cell [m]
+    std::array<bool, blockParts> meetsSurface;  // a voxel is close enough to the surface, or both signs occur
 };
 
 using Floats [[gnu::vector_size(16)]] = float;
 
-// What is least and most in a quarter of a block, its parts one after the other along the last axis.
+// Minima and maxima of a quarter of a block, over x and y, by place along the last axis.
 struct Quarter {
     float least[stride], most[stride];
 
     explicit Quarter(const float* rows) {
         for (int z = 0; z < stride; z += 4) {
-            // the last four overlap those before
+            // the last four overlap the previous ones
             const float* from = rows + std::min(z, stride - 4);
             Floats low, high;
             std::memcpy(&low, from, sizeof low);
@@ -132,14 +133,14 @@ bool isBeyondBand(float value, const FieldFrame& frame) {
     return value >= frame.exteriorWidth || value <= -frame.interiorWidth;
 }
 
-// Values as they are, those beyond the band marked.
+// Stores values, with marks for those outside the band.
 void store(const float* block, const FieldFrame& frame, float* to) {
     constexpr float beyond = std::numeric_limits<float>::quiet_NaN();
     for (int i = 0; i < FieldLayout::blockFloats; ++i)
         to[i] = isBeyondBand(block[i], frame) ? std::copysign(beyond, block[i]) : block[i];
 }
 
-// Values in steps, those beyond the band marked.
+// Stores values in steps, with marks for those outside the band.
 void store(const float* block, const FieldFrame& frame, float step, std::int16_t* to) {
     constexpr float most = FieldLayout::beyondOutside - 1;
     for (int i = 0; i < FieldLayout::blockFloats; ++i) {
@@ -149,12 +150,12 @@ void store(const float* block, const FieldFrame& frame, float step, std::int16_t
     }
 }
 
-// What a way grows by to the near face of a part `d` places away.
+// The increase of a squared distance to the near face of a coarse cell `d` places away.
 constexpr Way wayTo(int d) {
     return Way((2 * d - 1) * (2 * d - 1));
 }
 
-// Lowers some ways to those of others and what it takes to get there; false if all were as low already.
+// Lowers squared distances to those of others plus an increment. Returns false if no larger increment can lower any.
 bool lower(Way* ways, const Way* others, std::size_t count, Way way) {
     Way most = 0;
     for (std::size_t i = 0; i < count; ++i) {
@@ -164,8 +165,8 @@ bool lower(Way* ways, const Way* others, std::size_t count, Way way) {
     return most > way;
 }
 
-// Lowers each way along the last axis to the least of the others plus what it takes to get there (as P. Felzenszwalb,
-// D. Huttenlocher, "Distance transforms of sampled functions", 2012, but to the faces of parts).
+// Lowers each squared distance along the last axis to the minimum of the others plus their increments (as P.
+// Felzenszwalb, D. Huttenlocher, "Distance transforms of sampled functions", 2012, but to the faces of coarse cells).
 void transformRow(Way* ways, int length, std::vector<Way>& before) {
     before.assign(ways, ways + length);
     for (int d = 1; d <= std::min(maxParts, length - 1); ++d) {
@@ -176,7 +177,7 @@ void transformRow(Way* ways, int length, std::vector<Way>& before) {
     }
 }
 
-// The same across rows of `count` ways that are `step` apart.
+// The same across rows of `count` values with a stride of `step`.
 void transformRows(Way* ways, std::size_t count, std::size_t step, int length, std::vector<Way>& before) {
     before.resize(std::size_t(length) * count);
     for (int i = 0; i < length; ++i) std::copy_n(ways + i * step, count, before.data() + i * count);
@@ -190,8 +191,8 @@ void transformRows(Way* ways, std::size_t count, std::size_t step, int length, s
     }
 }
 
-// From 0 for parts that meet the surface, and `farAway` for others, to the ways to the nearest such part: axis by axis,
-// since a squared way is a sum over the axes.
+// Distance transform. Input: 0 for coarse cells that meet the surface, `farAway` for others. Processes one axis after
+// the other, since a squared distance is a sum over the axes.
 void transform(LargeArray<Way>& ways, const glm::ivec3& size) {
     const std::size_t row = std::size_t(size.z), plane = size.y * row;
     tbb::parallel_for(0, size.x, [&](int x) {
@@ -205,7 +206,7 @@ void transform(LargeArray<Way>& ways, const glm::ivec3& size) {
     });
 }
 
-// The side of space that each entry of the directory lies on, before blocks are entered.
+// Enters the side of each directory entry, before the blocks are entered.
 void enterSides(FieldLayout& field, const FloatTree& tree, const Coord& first) {
     field.directory = LargeArray<std::int32_t>(field.entries());
     tbb::parallel_for(0, field.blocks.x, [&](int x) {
@@ -219,7 +220,7 @@ void enterSides(FieldLayout& field, const FloatTree& tree, const Coord& first) {
     });
 }
 
-// Fills the blocks and enters them in the directory; true for each of their parts that the surface meets.
+// Fills the blocks and enters them in the directory. Returns whether the surface meets each of their coarse cells.
 std::vector<std::array<bool, blockParts>> enterBlocks(FieldLayout& field, const FloatTree& tree,
                                                       const std::vector<Coord>& origins, const Coord& first) {
     field.stored = origins.size();
@@ -252,8 +253,8 @@ std::vector<std::array<bool, blockParts>> enterBlocks(FieldLayout& field, const 
     return meets;
 }
 
-// Calls visit(entry, part of all) for the entries of the directory, with the first of their parts; the others follow as
-// `nextParts` tells.
+// Calls visit(entry, index) for the entries of the directory, with the index of their first coarse cell. nextParts()
+// returns the offsets of the others.
 template <class Visit>
 void forEachEntry(const FieldLayout& field, const Visit& visit) {
     const glm::ivec3 size = field.parts();
@@ -274,7 +275,7 @@ std::array<std::size_t, blockParts> nextParts(const FieldLayout& field) {
     return next;
 }
 
-// Ways are few: their roots are taken once, and rounded down [steps].
+// The square roots of all squared distances, rounded down [steps].
 std::array<std::int8_t, farAway + 1> rootsOfWays() {
     std::array<std::int8_t, farAway + 1> roots;
     for (int way = 0; way <= farAway; ++way)
@@ -341,7 +342,7 @@ FieldLayout::FieldLayout(const LevelSet& levelSet, Storage storage)
         }
     if (origins.empty()) throw std::invalid_argument("field: the level set has no voxel in its band");
 
-    // in 64 bits: what a file holds may be farther apart than an int tells
+    // in 64 bits: the extent of a file's data may exceed an int
     for (int axis = 0; axis < 3; ++axis)
         if (std::int64_t(box.max()[axis]) - box.min()[axis] >= std::int64_t(side) * maxBlocksAlong) throwTooLong();
 

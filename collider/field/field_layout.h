@@ -1,5 +1,6 @@
-// A level set laid out for queries: each leaf becomes a block of 9^3 floats, so that all eight voxels around a point
-// lie in one block, and a dense directory over the blocks' box tells which block a point is in, or on which side.
+// A level set laid out for queries. Each leaf becomes a block of 9^3 floats, so that the eight voxels around any point
+// are in one block. A dense directory over the blocks' bounding box holds the block of each place, or the side that it
+// is on.
 #pragma once
 
 #include <cstddef>
@@ -17,61 +18,62 @@
 
 namespace bilayer::detail {
 
-/// Where a laid out field is, and how wide its band.
+/// Position and band widths of a field layout.
 struct FieldFrame {
     static constexpr int side = 8;           ///< voxels along a block: an OpenVDB leaf
     static constexpr int stride = side + 1;  ///< with the apron that completes the last cells
     static constexpr int blockFloats = stride * stride * stride;
-    /// Entries of the directory for blocks that lie beside the band altogether.
+    /// Directory entries for blocks entirely outside the band.
     static constexpr std::int32_t emptyOutside = -1, emptyInside = -2;
 
-    glm::dvec3 origin{0};  ///< of the directory: its first voxel [m]
-    glm::ivec3 blocks{0};  ///< of the directory, along each axis
-    double voxel = 0;      ///< its edge [m], unrounded: far from the origin it counts
-    double perMetre = 0;   ///< voxels
+    glm::dvec3 origin{0};  ///< position of the directory's first voxel [m]
+    glm::ivec3 blocks{0};  ///< size of the directory along each axis
+    double voxel = 0;      ///< edge of a voxel [m], unrounded: the error would grow with the distance from the origin
+    double perMetre = 0;   ///< voxels per metre
     float voxelSize = 0, exteriorWidth = 0, interiorWidth = 0;  ///< [m]
-    Bounds bounds{};                                            ///< around all points in the band [m]
+    Bounds bounds{};                                            ///< of all points in the band [m]
 
     std::size_t entries() const { return std::size_t(blocks.x) * blocks.y * blocks.z; }
     std::size_t entryOf(const glm::ivec3& block) const {
         return (std::size_t(block.x) * blocks.y + block.y) * blocks.z + block.z;
     }
-    /// Blocks along an axis at most.
+    /// Max count of blocks along an axis.
     static constexpr int maxBlocksAlong = 1 << 19;
     /// Throws std::invalid_argument if the directory has more than 2^26 entries, or more than 2^19 along an axis.
     void requireSize() const;
 
-    /// Whether the band is wide enough to tell where the surface passes.
+    /// Whether the band is wide enough to locate the surface.
     bool findsSurface() const;
 
     glm::ivec3 parts() const { return Clearance::perBlock * blocks; }
 };
 
-/// What queries work from, independent of OpenVDB.
+/// The query data, independent of OpenVDB.
 struct FieldLayout : FieldFrame {
-    /// Of fixed16: a voxel beyond the band, outside or inside. No voxel of the band has it. Of float32 it is not a
-    /// number, positive or negative.
+    /// For fixed16: a voxel outside the band, on either side. No voxel of the band has these values. For float32 such a
+    /// voxel is NaN, with the sign of the side.
     static constexpr std::int16_t beyondOutside = 32767, beyondInside = -32768;
 
-    LargeArray<std::int32_t> directory;  ///< a block's number in `values`, or the side that it lies on
+    LargeArray<std::int32_t> directory;  ///< the index of a block in `values`, or the side that it lies on
     LargeArray<std::int8_t> centres;     ///< of Clearance::Data
-    LargeArray<std::int8_t> minima;      ///< likewise
+    LargeArray<std::int8_t> minima;      ///< of Clearance::Data
     Storage storage = Storage::float32;
-    LargeArray<float> values;           ///< blockFloats a block, if they are float32 [m]
-    LargeArray<std::int16_t> values16;  ///< likewise, if they are fixed16 [step]
-    float step = 0;                     ///< of fixed16 [m]
-    std::size_t stored = 0;             ///< blocks in `values`
+    LargeArray<float> values;           ///< for float32: blockFloats per block [m]
+    LargeArray<std::int16_t> values16;  ///< for fixed16: the same [step]
+    float step = 0;                     ///< for fixed16 [m]
+    std::size_t stored = 0;             ///< count of blocks in `values`
 
-    /// Throws std::invalid_argument if no voxel is in the band, or if the box is so large for its voxels that it holds
-    /// more than 2^26 blocks of 8^3 voxels, or more than 2^19 along an axis.
+    /// Throws std::invalid_argument if no voxel is in the band, if the box holds more than 2^26 blocks of 8^3 voxels,
+    /// or if it holds more than 2^19 along an axis.
     explicit FieldLayout(const LevelSet& levelSet, Storage storage = Storage::float32);
     FieldLayout(FieldLayout&&) noexcept = default;
     FieldLayout& operator=(FieldLayout&&) noexcept = default;
 
-    /// The same layout, whose arrays share memory.
+    /// The same layout, with shared arrays.
     FieldLayout shared() const;
     Clearance clearance() const;
-    /// Whether samples of the band are kept in a block, by its place in the directory; false for one beside it.
+    /// Whether the block at a place of the directory stores samples of the band. False for places outside the
+    /// directory.
     bool keeps(const glm::ivec3& block) const {
         return block == glm::clamp(block, glm::ivec3(0), blocks - 1) && directory.data()[entryOf(block)] >= 0;
     }

@@ -1,4 +1,4 @@
-// What a point, a sphere or a box has in common with the solid, and all questions asked many at once.
+// Inside tests and overlaps of spheres and boxes, and the batch versions of all queries.
 #include <algorithm>
 #include <cmath>
 #include <glm/common.hpp>
@@ -19,7 +19,7 @@ using namespace detail;
 
 namespace {
 
-// A box in double precision, for which it needs a rotation.
+// The box in double precision, with a normalised rotation.
 TurnedBox turned(const OrientedBox& box) {
     return {glm::dvec3(box.centre), glm::mat3_cast(glm::normalize(glm::dquat(box.rotation))), glm::dvec3(box.halfSize)};
 }
@@ -31,7 +31,7 @@ bool isBox(const OrientedBox& box) {
            glm::all(glm::greaterThanEqual(box.halfSize, glm::vec3(0))) && std::isfinite(length2) && length2 > 0;
 }
 
-// What the sample at the centre says of a sphere, where that is enough.
+// Decides an overlap with a sphere from the sample at its centre, if possible.
 std::optional<bool> overlapsRoughly(const FieldData& field, const glm::vec3& centre, float radius) {
     const Sample here = field.sample(field.toLocal(centre));
     const float away = std::abs(here.distance);
@@ -41,7 +41,7 @@ std::optional<bool> overlapsRoughly(const FieldData& field, const glm::vec3& cen
     return std::nullopt;
 }
 
-// Whether the surface comes into a box.
+// Whether the surface meets a box.
 bool meetsSurface(const FieldData& field, const OrientedBox& box) {
     TurnedBox exact = turned(box);
     if (field.mesh) return meetsTriangle(*field.mesh, exact);
@@ -71,7 +71,7 @@ bool Field::overlapsSphere(const glm::vec3& centre, float radius) const noexcept
     return data_->closest(centre, radius).found || data_->inside(centre);
 }
 
-// If the surface does not come into the box then all of it is on one side.
+// A box that the surface does not meet is entirely on one side.
 bool Field::overlapsBox(const OrientedBox& box) const noexcept {
     if (!isBox(box)) return false;
     if (data_->mesh) {

@@ -1,4 +1,4 @@
-// Rays and spheres on their way: with the mesh its triangles decide, else the zero set of the interpolant.
+// Ray and sphere casts: against the triangles if there is a mesh, otherwise against the zero set of the interpolant.
 #include <algorithm>
 #include <cmath>
 #include <glm/common.hpp>
@@ -17,9 +17,9 @@ using namespace detail;
 
 namespace {
 
-/// Segments are this much longer, so that those that end on a face meet it.
+/// Segments are extended by this factor, so that those that end on a face hit it.
 constexpr double endRounding = 1 + 1e-12;
-/// Spheres of a smaller radius are rays [voxels].
+/// Spheres with a smaller radius are cast as rays [voxels].
 constexpr double minRadius = 1e-6;
 
 bool isRay(const Ray& ray) {
@@ -30,21 +30,21 @@ Path pathOf(const Ray& ray) {
     return {glm::dvec3(ray.origin), glm::normalize(glm::dvec3(ray.direction)), double(ray.maxDistance)};
 }
 
-// Of a face, against the path.
+// The normal of the hit face, facing the path's start.
 glm::vec3 normalOf(const Mesh& mesh, const MeshHit& hit, const Path& path) {
     const Corners c = cornersOf(mesh, hit.triangle);
     const glm::dvec3 n = glm::normalize(glm::cross(c[1] - c[0], c[2] - c[0]));
     return glm::vec3(glm::dot(n, path.direction) > 0 ? -n : n);
 }
 
-// Where a ray starts inside.
+// The hit of a ray that starts inside.
 RayHit hitAtStart(const FieldData& field, const glm::vec3& origin, const glm::dvec3& direction) {
     const glm::vec3 gradient = field.sample(field.toLocal(origin), std::numeric_limits<float>::infinity()).gradient;
     const float steepness = glm::length(gradient);
     return {.distance = 0, .position = origin, .normal = steepness > 0 ? gradient / steepness : glm::vec3(-direction)};
 }
 
-// In voxels from the directory's first one.
+// In voxels from the directory's first voxel.
 Path toLocal(const FieldData& field, const Path& path) {
     return {(path.origin - field.origin) * field.perMetre, path.direction, path.length * field.perMetre};
 }
@@ -83,14 +83,14 @@ std::optional<RayHit> touchZero(const FieldData& field, const Path& path, double
     auto touch = firstZeroTouch(field, part->path, reach);
     if (!touch) return std::nullopt;
     const glm::dvec3 centre = part->path.at(touch->along), from = field.whereZerosTell(centre);
-    // of zeros that are equally near to a centre so far away, the nearest
+    // from so far away several zeros may be equally near: take the nearest one
     if (from != centre) touch->position = nearestZero(field, from, std::numeric_limits<double>::infinity()).value();
     return RayHit{.distance = toFloat((part->from + touch->along) * field.voxel),
                   .position = field.toWorld(touch->position),
                   .normal = glm::vec3(glm::normalize(centre - touch->position))};
 }
 
-// From outside or inside.
+// Casts from outside or inside.
 std::optional<RayHit> cast(const FieldData& field, const glm::vec3& origin, const Path& path) {
     if (field.inside(origin)) return hitAtStart(field, origin, path.direction);
     return field.mesh ? hitMesh(*field.mesh, path) : hitZero(field, path);

@@ -1,10 +1,10 @@
-// Samples, single and in batches. cl/field.cl samples in the same way, operation by operation.
+// Field sampling, single and in batches. cl/field.cl samples in the same way, operation by operation.
 //
-// A place is a fixed-point number along each axis: its upper word is the block, its lower one the voxel there and the
-// way to the next. The eight voxels around it are interpolated in two vectors of four: along x first, then y, then z,
-// and the gradient falls out on the way. Voxels beyond the band are no numbers, and so is then what comes of them.
-// Highway compiles the part between HWY_BEFORE_NAMESPACE and HWY_AFTER_NAMESPACE once for each instruction set; all of
-// them give the same bytes.
+// A place is a fixed-point number along each axis. Its upper word is the block; its lower word is the voxel in the
+// block and the fraction to the next voxel. The eight voxels around a place are interpolated in two vectors of four:
+// along x first, then y, then z. The gradient is a by-product. Voxels outside the band are NaN, which propagates to the
+// result. Highway compiles the part between HWY_BEFORE_NAMESPACE and HWY_AFTER_NAMESPACE once for each instruction set.
+// All of them give the same bytes.
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "collider/field/field_sample.cpp"
 #include <hwy/foreach_target.h>
@@ -31,21 +31,21 @@ namespace {
 constexpr float infinity = std::numeric_limits<float>::infinity();
 constexpr float cellDiagonal = FieldData::cellDiagonal;
 
-// Samples are stored as four floats in a row and a bool.
+// Samples are stored as four consecutive floats and a bool.
 static_assert(offsetof(Sample, distance) == 0 && offsetof(Sample, gradient) == sizeof(float));
 
-// What the interpolant of values that go no faster than the distance itself may be off by: the mean way to the eight
-// voxels, by their weights, which is at most the root of its mean square [voxels].
+// Max error of the interpolant for values with Lipschitz constant 1. It is the weighted mean distance to the eight
+// voxels, which is at most its root mean square [voxels].
 float interpolationError(const glm::vec3& fraction) {
     const glm::vec3 spread = fraction * (1.f - fraction);
     return std::sqrt(spread.x + spread.y + spread.z);
 }
 
-// Bounds are rounded down: room for what single precision makes of a voxel's size and of the bound itself.
+// Bounds are rounded down, against the single-precision rounding of the voxel size and of the bound itself.
 constexpr double downward = 1 - 0x1p-22;
 
-// Who comes from outside the directory's box has that way to go, and is then no more than a cell's diagonal from a
-// voxel beyond the band.
+// A point outside the directory's box first has to reach the box. There it is at most a cell's diagonal from a voxel
+// outside the band.
 float boundOutside(const FieldData& field, const glm::dvec3& local) {
     const double way = glm::distance(local, glm::clamp(local, glm::dvec3(0), field.extent()));
     if (!std::isfinite(way)) return infinity;
@@ -53,8 +53,8 @@ float boundOutside(const FieldData& field, const glm::dvec3& local) {
     return float(std::clamp(downward * bound, 0., double(std::numeric_limits<float>::max())));
 }
 
-// The nearest voxel of the block itself is beyond the band. It is half a cell's diagonal away, or a whole one where the
-// cell ends in another block.
+// The nearest voxel of the block is outside the band. It is half a cell's diagonal away, or a whole one if the cell
+// ends in another block.
 float boundInEmptyBlock(const FieldData& field, bool inside, const glm::dvec3& local) {
     const glm::dvec3 rest = local - double(FieldFrame::side) * glm::floor(local / double(FieldFrame::side));
     const bool ownCell = std::max({rest.x, rest.y, rest.z}) <= double(FieldFrame::side - 1);
@@ -64,7 +64,7 @@ float boundInEmptyBlock(const FieldData& field, bool inside, const glm::dvec3& l
     return inside ? -bound : bound;
 }
 
-// One of the cell's voxels is beyond the band.
+// One of the cell's voxels is outside the band.
 float boundBesideBand(const FieldData& field, float distance, const glm::dvec3& local) {
     const float besideBand =
         (distance < 0 ? field.interiorWidth : field.exteriorWidth) - cellDiagonal * field.voxelSize;
@@ -79,7 +79,7 @@ float boundBesideBand(const FieldData& field, float distance, const glm::dvec3& 
 
 #endif
 
-// vectors wider than those of the plain instruction set are passed between functions that are all inlined
+// wider vectors than those of the baseline instruction set are only passed between inlined functions
 #pragma GCC diagnostic ignored "-Wpsabi"
 
 HWY_BEFORE_NAMESPACE();
@@ -92,7 +92,7 @@ using TwoFloats [[gnu::vector_size(32)]] = float;  // of two places
 using TwoInts [[gnu::vector_size(32)]] = std::int32_t;
 
 constexpr int fractionBits = FieldData::fractionBits;
-// What single samples ask for beyond their own cells: two lines of memory behind, and the block after the next.
+// Prefetch distances of single samples: two cache lines ahead, and the block after the next.
 constexpr int rowsAhead = 4, blocksAhead = 2;
 /// The upper word of a place in the directory's first block.
 constexpr auto firstBlock = std::uint32_t(std::bit_cast<std::uint64_t>(FieldData::fixedPoint) >> 32);
@@ -105,7 +105,7 @@ HWY_INLINE Word load(const Element* from) {
     return word;
 }
 
-// Conversions in one instruction each, where GCC 12 makes more of the compiler's own.
+// Conversions in one instruction each: GCC 12 needs more for its own vector types.
 HWY_INLINE Doubles lowerAsDoubles(Floats v) {
 #if HWY_ARCH_X86 && HWY_COMPILER_GCC_ACTUAL
     return __builtin_ia32_cvtps2pd(v);
@@ -121,12 +121,12 @@ HWY_INLINE FourDoubles asDoubles(Floats v) {
 #endif
 }
 
-/// A place along the three axes, in fixed-point numbers.
+/// A place along the three axes, in fixed point.
 struct Place {
-    /// Of blocks in the directory. What is negative, huge or no number is beyond all of them.
+    /// In the directory. Negative, huge and NaN coordinates are all out of its range.
     std::array<std::uint32_t, 3> block;
-    std::array<std::uint32_t, 3> inBlock;  ///< the voxel in the upper bits, the way to the next in the lower ones
-    Floats fraction;                       ///< of that way: x, y, y, z
+    std::array<std::uint32_t, 3> inBlock;  ///< the voxel in the upper bits, the fraction to the next in the lower ones
+    Floats fraction;                       ///< as floats: x, y, y, z
 };
 
 HWY_INLINE Floats fractionOf(const FieldData& field, Words inBlock) {
@@ -134,8 +134,8 @@ HWY_INLINE Floats fractionOf(const FieldData& field, Words inBlock) {
            field.lanes.fractionUnit;
 }
 
-/// From fixed-point numbers in the lower bits of doubles. The blocks are found in plain registers: next to the vector
-/// units, which the interpolation keeps busy, they have time.
+/// From fixed-point numbers in the lower bits of doubles. The blocks are computed in general-purpose registers, in
+/// parallel with the vector units, which the interpolation keeps busy.
 HWY_INLINE Place placeOf(const FieldData& field, Doubles xy, Doubles yz) {
     const auto words = [](double fixed) { return std::bit_cast<std::uint64_t>(fixed); };
     const std::uint64_t x = words(xy[0]), y = words(yz[0]), z = words(yz[1]);
@@ -159,15 +159,15 @@ HWY_INLINE Place placeOf(const FieldData& field, const glm::dvec3& local) {
     return placeOf(field, Doubles{local.x, local.y} + zero, Doubles{local.y, local.z} + zero);
 }
 
-/// The voxels around a place at its lower and at its upper x: (y, z), (y, z + 1), (y + 1, z), (y + 1, z + 1). Of two
-/// places, one behind the other.
+/// The voxels around a place at its lower and at its upper x: (y, z), (y, z + 1), (y + 1, z), (y + 1, z + 1). For two
+/// places, one after the other.
 template <class Vector>
 struct Cell {
     Vector low, high;
-    bool beyond;  ///< some are beyond the band; where they are no numbers, that is told by what comes of them
+    bool beyond;  ///< fixed16: some are outside the band; float32 voxels there are NaN instead
 };
 
-// Of two vectors, four lanes at a time: their lower or upper halves, their even or odd lanes.
+// The lower or upper halves, and the even or odd lanes, of two vectors, in groups of four lanes.
 HWY_INLINE Floats lowerHalves(Floats a, Floats b) {
     return __builtin_shufflevector(a, b, 0, 1, 4, 5);
 }
@@ -192,7 +192,7 @@ HWY_INLINE TwoFloats evenLanes(TwoFloats a, TwoFloats b) {
 HWY_INLINE TwoFloats oddLanes(TwoFloats a, TwoFloats b) {
     return __builtin_shufflevector(a, b, 1, 3, 9, 11, 5, 7, 13, 15);
 }
-// The first three lanes of one, and the first of the other.
+// The first three lanes of `a` and the first lane of `b`.
 HWY_INLINE Floats withFourth(Floats a, Floats b) {
 #if HWY_ARCH_X86 && HWY_TARGET <= HWY_SSE4 && HWY_COMPILER_GCC_ACTUAL
     return __builtin_ia32_insertps128(a, b, 3 << 4);
@@ -207,7 +207,7 @@ HWY_INLINE TwoFloats both(Floats a, Floats b) {
     return __builtin_shufflevector(a, b, 0, 1, 2, 3, 4, 5, 6, 7);
 }
 
-/// Two neighbours along z, and two beside them.
+/// Two neighbours along z, and the two next to them along y.
 HWY_INLINE Floats loadPairs(const float* v) {
     using Pair [[gnu::vector_size(8)]] = float;
     return __builtin_shufflevector(load<Pair>(v), load<Pair>(v + yStep), 0, 1, 2, 3);
@@ -229,7 +229,7 @@ HWY_INLINE Steps loadSteps(const std::int16_t* v) {
     return reinterpret_cast<Steps>(pairs);
 }
 
-/// Whether some of them are one of the two marks, which are neighbours on the ring of all words.
+/// Whether some of the steps are one of the two marks, which are adjacent modulo 2^16.
 HWY_INLINE bool anyBeyondBand(Steps steps) {
     static_assert(FieldLayout::beyondOutside == INT16_MAX && FieldLayout::beyondInside == INT16_MIN);
     using Ring [[gnu::vector_size(16)]] = std::uint16_t;
@@ -257,14 +257,14 @@ HWY_INLINE Cell<TwoFloats> loadCells(const std::int16_t* v, const std::int16_t* 
             anyBeyondBand(first) || anyBeyondBand(second)};
 }
 
-/// The value and its gradient a voxel, by the fractions of the place, each in all lanes.
+/// The value and its gradient per voxel. The fractions of the place are in all lanes.
 template <class Vector>
 HWY_INLINE Vector interpolate(const Cell<Vector>& cell, Vector x, Vector y, Vector z) {
     const Vector dx = cell.high - cell.low, at = cell.low + x * dx;
-    // values at z and z + 1, then how they change along x
+    // values at z and z + 1, then their slopes along x
     const Vector y0 = lowerHalves(at, dx), y1 = upperHalves(at, dx);
     const Vector dy = y1 - y0, between = y0 + y * dy;
-    // value, along x, along y
+    // value, slope along x, slope along y
     const Vector z0 = evenLanes(between, dy), z1 = oddLanes(between, dy);
     const Vector dz = z1 - z0, found = z0 + z * dz;
     return withFourth(found, dz);
@@ -287,7 +287,7 @@ HWY_INLINE const Value* valuesOf(const FieldData& field) {
 HWY_INLINE Sample sampleOf(const Floats& distanceAndGradient) {
     Sample sample;
     std::memcpy(static_cast<void*>(&sample), &distanceAndGradient, sizeof distanceAndGradient);
-    // with the padding behind it: who reads all of a sample need not wait for a single byte
+    // writes the padding too: a reader of the whole sample does not wait for a single byte
     const std::array<bool, 4> padded{true};
     std::memcpy(static_cast<void*>(&sample.inBand), &padded, sizeof padded);
     return sample;
@@ -300,7 +300,7 @@ HWY_INLINE glm::dvec3 localOf(const FieldData&, const glm::dvec3& local) {
     return local;
 }
 
-/// Samples a cell that is partly beyond the band.
+/// Samples a cell that is partly outside the band.
 /// @param cell  its first voxel
 template <class Point>
 HWY_NOINLINE Sample sampleBesideBand(const FieldData& field, std::size_t cell, Floats fraction, const Point& point) {
@@ -311,7 +311,7 @@ HWY_NOINLINE Sample sampleBesideBand(const FieldData& field, std::size_t cell, F
     return {.distance = boundBesideBand(field, found[0], localOf(field, point))};
 }
 
-/// Samples beside all stored blocks.
+/// Samples outside all stored blocks.
 template <class Point>
 HWY_NOINLINE Sample sampleEmpty(const FieldData& field, std::int32_t block, const Point& point) {
     const bool inside = block == FieldFrame::emptyInside;
@@ -323,24 +323,23 @@ HWY_NOINLINE Sample sampleOutside(const FieldData& field, const Point& point) {
     return {.distance = boundOutside(field, localOf(field, point))};
 }
 
-/// Asks for voxels `steps` behind; there may be none.
+/// Prefetches voxels `steps` ahead; there may be none.
 template <class Value>
 HWY_INLINE void prefetch(const Value* v, int steps) {
     const auto address = reinterpret_cast<std::uintptr_t>(v) + std::size_t(steps) * sizeof(Value);
     __builtin_prefetch(reinterpret_cast<const void*>(address));
 }
 
-/// Who samples one point after the other mostly walks: asks for the rows behind those of a cell, in both of its layers,
-/// and for the same place in a block that comes soon.
+/// Sequential samples mostly move along a path. Prefetches the rows after those of a cell, in both of its layers, and
+/// the same place in a nearby block.
 template <class Value>
 HWY_INLINE void prefetchWay(const Value* v) {
     constexpr int rows = rowsAhead * yStep, blocks = blocksAhead * FieldFrame::blockFloats;
     for (const int steps : {rows, rows + xStep, blocks, blocks + rows}) prefetch(v, steps);
 }
 
-/// @param limited  whether the gradient is found only where the distance is no more than `gradientReach`
-/// @param point    glm::vec3 in the field's own coordinates [m], or glm::dvec3 from the directory's first voxel
-/// [voxels]
+/// @param limited  whether the gradient is computed only where the distance is at most `gradientReach`
+/// @param point    glm::vec3 in field coordinates [m], or glm::dvec3 from the directory's first voxel [voxels]
 template <class Value, bool limited, class Point>
 HWY_INLINE Sample sampleOne(const FieldData& field, const Point& point, float gradientReach) {
     const Place place = placeOf(field, point);
@@ -373,13 +372,13 @@ Sample samplePoint(const FieldData& field, const glm::vec3& point) noexcept {
     return sampleOne<Value, false>(field, point, infinity);
 }
 
-/// Points of a batch whose voxels are on their way to the cache: enough to hide the memory's latency, few enough for
-/// what a core can wait for.
+/// Count of points whose voxels are being prefetched: enough to hide the memory latency, and few enough for the
+/// outstanding misses of a core.
 constexpr std::size_t ahead = 32;
-constexpr std::size_t atOnce = 4;  // points that are located together
+constexpr std::size_t atOnce = 4;  // count of points that are located together
 static_assert(ahead % atOnce == 0);
 
-/// The cells of the points on their way, by their first voxels, and where the points lie in them: a ring.
+/// A ring buffer of located points: the first voxel of the cell, and the fractions.
 template <class Value>
 struct Cells {
     std::array<const Value*, ahead> first;
@@ -394,10 +393,10 @@ constexpr auto cellBeyondBand = [] {
     return values;
 }();
 
-/// Of four places, along one axis.
+/// Four places along one axis.
 struct FourWords {
     Words block, inBlock;
-    Words within;  ///< the directory's box: the highest bit
+    Words within;  ///< highest bit: the place is in the directory's box
 };
 
 HWY_INLINE FourWords wordsOf(const FieldData& field, Floats coordinate, double offset, int blocks) {
@@ -408,7 +407,7 @@ HWY_INLINE FourWords wordsOf(const FieldData& field, Floats coordinate, double o
     return {block, __builtin_shufflevector(words, words, 0, 2, 4, 6), ~block & (block - std::uint32_t(blocks))};
 }
 
-/// Finds the cells of four points, and asks for their voxels.
+/// Finds the cells of four points, and prefetches their voxels.
 template <class Value>
 HWY_INLINE void locateFour(const FieldData& field, const glm::vec3* points, Cells<Value>& cells, std::size_t slot) {
     const Floats a = load<Floats>(&points[0].x), b = load<Floats>(&points[1].y), c = load<Floats>(&points[2].z);
@@ -442,14 +441,14 @@ HWY_INLINE void locateFour(const FieldData& field, const glm::vec3* points, Cell
     }
 }
 
-/// Of two floats in a row, each in four lanes.
+/// Two consecutive floats, each in four lanes.
 HWY_INLINE TwoFloats eachInFour(const float* two) {
     const double pair = load<double>(two);
     const TwoFloats pairs = reinterpret_cast<TwoFloats>(FourDoubles{pair, pair, pair, pair});
     return __builtin_shufflevector(pairs, pairs, 0, 0, 0, 0, 5, 5, 5, 5);
 }
 
-/// Samples two points, if both are in the band.
+/// Samples two points if both are in the band.
 template <class Value>
 HWY_INLINE bool sampleTwo(const FieldData& field, const Cells<Value>& cells, std::size_t slot, Sample* samples) {
     const auto two = loadCells(cells.first[slot], cells.first[slot + 1]);

@@ -1,16 +1,16 @@
-// How far a field's interpolated distances may be off; internal.
+// Error bounds of a field's interpolated distances; internal.
 #pragma once
 
 namespace bilayer::detail {
 
-/// What the interpolant may be off the distance, to either side: the mean way to the eight voxels around a point is at
-/// most half a cell's diagonal [voxels].
+/// Max error of the interpolated distance to either side [voxels]. The mean distance to the eight voxels around a point
+/// is at most half a cell's diagonal.
 inline constexpr float maxInterpolationError = 0.87f;
 
-/// How fast the interpolant may change: by a voxel along each axis at once.
+/// Max slope of the interpolant: a voxel along each axis at once.
 inline constexpr float steepestInterpolant = 1.7321f;
 
-/// What is no farther outside of the surface than this is in the band. Both in one unit.
+/// Points no farther outside the surface than this are in the band. Both lengths are in one unit.
 inline float surelyInBand(float exteriorWidth, float voxelSize) {
     return exteriorWidth - steepestInterpolant * voxelSize;
 }

@@ -1,4 +1,4 @@
-// Nodes are visited near ones first. Highway compiles the searches once for each instruction set.
+// Nodes are visited in front-to-back order. Highway compiles the searches once for each instruction set.
 #include "collider/field/mesh_rays.h"
 
 #undef HWY_TARGET_INCLUDE
@@ -22,21 +22,21 @@ HWY_BEFORE_NAMESPACE();
 namespace bilayer::detail::HWY_NAMESPACE {
 
 namespace {
-/// Eight levels of groups hold 2^27 leaves; of each level seven wait at most.
+/// Stack size: eight levels of groups hold 2^27 leaves, with at most seven pending nodes per level.
 constexpr std::size_t maxWaiting = 96;
-/// Points and boxes in the tree's frame are rounded by no more than this part of their size.
+/// Max rounding of points and boxes in the tree's frame, relative to their size.
 constexpr float placeRounding = 2.4e-7f;
-/// How far beside a triangle a ray may pass and still meet it [voxels].
+/// Max distance at which a ray may pass a triangle and still hit it [voxels].
 constexpr double rayTolerance = 1e-5;
-/// Lines that pass a triangle at this distance, and this part of the way from the start, are left to double precision
-/// [voxels].
+/// Tolerances of the single-precision test, absolute [voxels] and relative to the distance from the start. Triangles
+/// within them are tested in double precision.
 constexpr float passTolerance = 1e-4f, passRounding = 1e-6f;
-/// Slower than this along an axis is not at all: it is not a voxel on the longest way.
+/// Min speed along an axis; below it the ray moves less than a voxel over the longest path.
 constexpr float slowest = 1e-9f;
-/// Room for the rounding of a quotient.
+/// Tolerance for the rounding of a quotient.
 constexpr float quotientRoundUp = 1 + 1e-6f;
 
-// Nodes that wait, each with what it has to stay below.
+// A stack of pending nodes with their keys.
 struct Waiting {
     std::size_t count = 0;
     float keys[maxWaiting];
@@ -45,7 +45,7 @@ struct Waiting {
     void push(float key, std::uint32_t node) { keys[count] = key, nodes[count++] = node; }
 };
 
-// Puts aside those of a group's children whose bits are set, the one with the least key last.
+// Pushes the children of a group whose bits are set, the one with the smallest key last.
 inline void pushNear(Waiting& waiting, unsigned bits, const float* keys, std::uint32_t firstChild) {
     const std::size_t first = waiting.count;
     for (; bits != 0; bits &= bits - 1) {
@@ -60,7 +60,7 @@ inline void pushNear(Waiting& waiting, unsigned bits, const float* keys, std::ui
     }
 }
 
-// Looks at nodes, near ones first, but for those whose keys are skipped; true as soon as a leaf is enough.
+// Visits nodes in ascending order of their keys, except skipped ones. Returns true as soon as a visit of a leaf does.
 template <class Skip, class Open, class Visit>
 inline bool descend(const WideTree& tree, Skip skip, Open open, Visit visit) {
     Waiting waiting;
@@ -77,14 +77,14 @@ inline bool descend(const WideTree& tree, Skip skip, Open open, Visit visit) {
     return false;
 }
 
-// Moved towards the tree's corner where it is too far away: all that lies in the tree comes nearer by that, but for the
-// slack of a Place.
+// Moves a point that is too far away towards the tree's corner. Everything in the tree becomes nearer by the same
+// distance, up to the slack of a Place.
 inline glm::dvec3 withinReach(const glm::dvec3& p) {
     const double away = std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)});
     return away > double(farthestPlace) ? p * (double(farthestPlace) / away) : p;
 }
 
-// A point in the tree's frame, in whole voxels and the rest, and how far rounding may move boxes from it [voxels].
+// A point in the tree's frame, as whole voxels and the rest, with the max rounding of boxes relative to it [voxels].
 struct Place {
     glm::vec3 cell, inCell, point;
     float slack;
@@ -98,7 +98,7 @@ struct Place {
         slack = placeRounding * (size.x + size.y + size.z);
     }
 
-    // From a leaf's corners; whole voxels first, without rounding.
+    // The vector from a leaf's corners; whole voxels first, without rounding.
     template <class Load>
     Vec from(const WideLeaf& leaf, Load load, int k) const {
         return hn::Add(hn::Sub(hn::Set(Tag(), cell[k]), load(leaf.cell[k])),
@@ -106,10 +106,10 @@ struct Place {
     }
 };
 
-// One ray's way through the tree.
+// The search for the first hit of a ray.
 class RaySearch {
   public:
-    // The start and the direction are in the tree's frame [voxels], the path and the answer in metres.
+    // The start and the direction are in the tree's frame [voxels]; path and result are in metres.
     RaySearch(const MeshTree& mesh, const glm::dvec3& start, const Path& path)
         : mesh_(mesh.mesh()),
           tree_(mesh.tree()),
@@ -143,7 +143,7 @@ class RaySearch {
         limit_ = std::min(float(along * perMetre_) * quotientRoundUp + place_.slack, std::numeric_limits<float>::max());
     }
 
-    // Boxes by their slabs: T. Kay, J. Kajiya, "Ray tracing complex scenes", SIGGRAPH 1986, 269-278.
+    // Slab test: T. Kay, J. Kajiya, "Ray tracing complex scenes", SIGGRAPH 1986, 269-278.
     void open(const BoxGroup& group, Waiting& waiting) const {
         const Tag tag;
         alignas(64) float enters[treeWidth];
@@ -163,8 +163,8 @@ class RaySearch {
         pushNear(waiting, met, enters, group.firstChild);
     }
 
-    // Which triangles the line passes, each in its own frame. All is multiplied by how steeply the line meets the
-    // plane: then distances along the plane become those from the line, however flat it lies.
+    // A bit mask of the triangles that the line passes, each in its own frame. All terms are multiplied by the cosine
+    // between line and normal. Distances in the plane thereby become distances from the line, at any angle.
     unsigned passed(const WideLeaf& leaf, std::size_t i) const {
         const Tag tag;
         const auto load = [&](const float* from) { return hn::Load(tag, from + i); };
@@ -188,7 +188,7 @@ class RaySearch {
         const Vec bcx = load(leaf.directionBC[0]), bcy = load(leaf.directionBC[1]);
         const Vec besideBC = det(bcx, bcy, hn::Sub(x, hn::Mul(load(leaf.lengthAB), steep)), y);
         const Vec besideAC = det(x, y, load(leaf.directionAC[0]), load(leaf.directionAC[1]));
-        // the sum of the coordinates is no less than the distance
+        // the sum of the coordinates is an upper bound of the distance
         const Vec away = hn::Add(hn::Add(hn::Abs(q[0]), hn::Abs(q[1])), hn::Abs(q[2]));
         const Vec room = hn::Add(hn::Mul(hn::Set(tag, passRounding), away), hn::Set(tag, passTolerance));
         const Vec inside = hn::Min(hn::Min(y, along), hn::Min(besideBC, besideAC));
@@ -220,7 +220,7 @@ class RaySearch {
     std::uint32_t triangle_ = noTriangle;
 };
 
-// The squared distances of a leaf's triangles.
+// The squared distances to a leaf's triangles.
 inline void measureLeaf(const WideLeaf& leaf, const Place& place, float* distance2) {
     const Tag tag;
     for (std::size_t i = 0; i < treeWidth; i += hn::Lanes(tag)) {
@@ -230,7 +230,7 @@ inline void measureLeaf(const WideLeaf& leaf, const Place& place, float* distanc
     }
 }
 
-// The first touch of a sphere among the triangles that it may reach.
+// The search for the first contact of a swept sphere, among the triangles that it may reach.
 class TouchSearch {
   public:
     TouchSearch(const MeshTree& mesh, const glm::dvec3& start, const Path& path, double radius)
@@ -253,7 +253,7 @@ class TouchSearch {
     }
 
   private:
-    // Only what is no farther from the start can be touched before the best.
+    // Only triangles within this distance from the start can be touched before the best one.
     void limit() {
         const double reach = (radius_ + hit_.along) / double(mesh_.voxelSize());
         const float rounded = std::min(float(reach) * (1 + passRounding) + passTolerance + place_.slack, longestReach);
@@ -298,7 +298,7 @@ class TouchSearch {
     float limit2_ = 0;
 };
 
-// Whether a box meets some triangle.
+// The search for a triangle that overlaps a box.
 class BoxSearch {
   public:
     BoxSearch(const MeshTree& mesh, const glm::dvec3& centre, const TurnedBox& box)
@@ -322,7 +322,7 @@ class BoxSearch {
     }
 
   private:
-    // The tree's axes and the box's own tell nearly all boxes apart that have no point in common.
+    // Separating axes: the tree's and the box's own axes separate nearly all disjoint boxes.
     void open(const BoxGroup& group, Waiting& waiting) const {
         const Tag tag;
         const Vec halve = hn::Set(tag, 0.5f);
@@ -367,7 +367,7 @@ class BoxSearch {
     TurnedBox box_;
     float limit2_ = 0;
     glm::vec3 axes_[3];
-    float half_[3], around_[3];  // of the box along its own axes, and along the tree's
+    float half_[3], around_[3];  // extents of the box along its own axes, and along the tree's
 };
 
 std::optional<MeshHit> searchRay(const MeshTree& mesh, const glm::dvec3& start, const Path& path) {
@@ -394,7 +394,7 @@ HWY_EXPORT(searchRay);
 HWY_EXPORT(searchTouch);
 HWY_EXPORT(searchBox);
 
-// In the tree's frame [voxels].
+// A point in the tree's frame [voxels].
 glm::dvec3 toTree(const MeshTree& mesh, const glm::dvec3& point) {
     return point / double(mesh.voxelSize()) - glm::dvec3(mesh.tree().base);
 }
@@ -402,7 +402,7 @@ glm::dvec3 toTree(const MeshTree& mesh, const glm::dvec3& point) {
 }  // namespace
 
 std::optional<MeshHit> firstHit(const MeshTree& mesh, const Path& path) noexcept {
-    // from where it comes near the mesh, so that single precision is enough
+    // starts near the mesh, where single precision is sufficient
     const auto [lower, upper] = mesh.box();
     const auto part = partIn(path, lower, upper);
     if (!part) return std::nullopt;

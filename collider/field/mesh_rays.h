@@ -1,6 +1,6 @@
-// Rays, spheres on their way, and boxes against the triangles of a mesh. SIMD and single precision rule triangles out,
-// with room for all rounding; double precision and the mesh's own corners decide (triangle_tests.h). Lengths in metres.
-// All may run on any number of threads at once, and allocate nothing.
+// Ray casts, sphere casts and box overlaps against the triangles of a mesh. SIMD tests in single precision reject
+// triangles conservatively; double precision and the mesh's own vertices decide (triangle_tests.h). Lengths in metres.
+// All functions may run on any number of threads at once, and allocate nothing.
 #pragma once
 
 #include <optional>
@@ -11,22 +11,22 @@
 
 namespace bilayer::detail {
 
-/// Where a path meets a mesh.
+/// The hit of a path on a mesh.
 struct MeshHit {
-    double along;         ///< the path
+    double along;         ///< distance along the path
     glm::dvec3 position;  ///< on the triangle
     std::uint32_t triangle;
 };
 
-/// The first triangle that a path meets, from either side. Nothing slips through: triangles take what passes no farther
-/// than 1e-5 voxels beside them. Triangles that are seen edge-on are left to their neighbours.
+/// The first triangle hit by a path, from either side. The test is watertight: triangles are hit by paths that pass
+/// them within 1e-5 voxels. Triangles seen edge-on are left to their neighbours.
 std::optional<MeshHit> firstHit(const MeshTree& mesh, const Path& path) noexcept;
 
-/// The first place of a path from which a triangle is no farther than the radius, to 1e-7 voxels. Made for paths of a
-/// few voxels: it looks at all triangles that come near, the more the longer the path.
+/// The first place of a path whose distance to a triangle is at most the radius, to 1e-7 voxels. Intended for paths of
+/// a few voxels: it tests all triangles near the path, so its cost grows with the length.
 std::optional<MeshHit> firstTouch(const MeshTree& mesh, const Path& path, double radius) noexcept;
 
-/// Whether a box and a triangle have a point in common.
+/// Whether a box overlaps a triangle.
 bool meetsTriangle(const MeshTree& mesh, const TurnedBox& box) noexcept;
 
 }  // namespace bilayer::detail

@@ -1,5 +1,5 @@
-// The search is branch and bound, nearest box first: N. Roussopoulos, S. Kelley, F. Vincent, "Nearest neighbor
-// queries", SIGMOD 1995, 71-79. Highway compiles it once for each instruction set.
+// Closest-triangle search by branch and bound, nearest box first: N. Roussopoulos, S. Kelley, F. Vincent, "Nearest
+// neighbor queries", SIGMOD 1995, 71-79. Highway compiles it once for each instruction set.
 #include "collider/field/mesh_tree.h"
 
 #undef HWY_TARGET_INCLUDE
@@ -25,24 +25,24 @@ HWY_BEFORE_NAMESPACE();
 namespace bilayer::detail::HWY_NAMESPACE {
 
 namespace {
-/// Eight levels of groups hold 2^27 leaves; of each level seven wait at most.
+/// Stack size: eight levels of groups hold 2^27 leaves, with at most seven pending nodes per level.
 constexpr std::size_t maxWaiting = 96;
-/// Points that are looked at in turns, and how often before what is left: enough to hide what memory takes, and few
-/// enough for the first cache.
+/// Count of searches that are interleaved, and of rounds before each runs to its end: enough to hide memory latency,
+/// and few enough for the first-level cache.
 constexpr std::size_t together = 16;
 constexpr int turns = 3;
 constexpr std::size_t cacheLine = 64;  // [bytes]
-/// Points and boxes in the tree's frame are rounded by no more than this part of their size.
+/// Max rounding of points and boxes in the tree's frame, relative to their size.
 constexpr float placeRounding = 5e-7f;
 
-// Asks for memory ahead of its use.
+// Prefetches an item.
 template <class Item>
 inline void fetch(const Item& item) {
     for (std::size_t line = 0; line < sizeof(Item); line += cacheLine)
         hwy::Prefetch(reinterpret_cast<const char*>(&item) + line);
 }
 
-// One point's search.
+// The search for one point.
 class Search {
   public:
     void begin(const WideTree& tree, const TurnedGroup* groups, const glm::dvec3& point, float bound) {
@@ -56,7 +56,7 @@ class Search {
         part_ = MeshTree::noPart;
     }
 
-    // Looks at all that may be nearer below a node.
+    // Visits all nodes below a node that may contain a nearer triangle.
     void descend(std::uint32_t from) {
         const glm::vec3 size = glm::max(glm::abs(cell_), glm::vec3(tree_->size));
         Waiting waiting;
@@ -75,7 +75,7 @@ class Search {
         }
     }
 
-    // Begins at entries: their nodes are told apart by their gaps, with the slot in the lowest bits.
+    // Starts at entries. A key holds the squared gap of a node's box, with the entry and slot in the lowest bits.
     void begin(const WideTree& tree, const TurnedGroup* groups, const glm::dvec3& point, float bound,
                const EntryPlace& place) {
         begin(tree, groups, point, bound);
@@ -88,7 +88,7 @@ class Search {
         choose();
     }
 
-    // The next node of the entry; false if none is left that may hold something nearer.
+    // Whether an entry's node is left that may contain a nearer triangle.
     bool chosen() const { return isNear(key_); }
     void visitChosen() {
         const std::uint32_t node = nodeOf(key_);
@@ -109,7 +109,7 @@ class Search {
                   BlockEntries::most <= 1 << numberBits && BlockEntries::placesPerUnit == 1 << placeBits);
     static constexpr std::size_t lanes = hn::MaxLanes(Ints()), entryVectors = treeWidth / lanes;
 
-    // The last lane has no slot; what is loaded there is something else.
+    // The last lane has no slot; the bytes loaded there belong to other members.
     void measure(const BlockEntry& entry, const EntryPlace& place, int number) {
         const Ints tag;
         const auto bytes = [&](const std::uint8_t* from) {
@@ -144,8 +144,7 @@ class Search {
 
     bool isNear(std::int32_t key) const { return key <= (std::int32_t(best2_ * places2_) + 1) << keyBits; }
 
-    // Takes the least key but for the one that was taken last, and asks for its node's memory: it is visited after
-    // that.
+    // Takes the next smallest key, and prefetches the node of the one after it.
     void choose() {
         key_ = nextKey_;
         const Ints tag;
@@ -166,7 +165,7 @@ class Search {
             fetch(groups_[node - tree_->leafCount]);
     }
 
-    // Puts those nodes of a group aside that may hold something nearer, the nearest of them last.
+    // Pushes the nodes of a group that may contain a nearer triangle, the nearest of them last.
     void open(const TurnedGroup& group, Waiting& waiting) {
         alignas(64) float gaps[treeWidth];
         // whole voxels first, without rounding
@@ -200,7 +199,7 @@ class Search {
         put(nearest);
     }
 
-    // Without branches: which triangles are nearer can not be foretold.
+    // Branchless: the nearer triangles cannot be predicted.
     void visit(std::uint32_t index) {
         const WideLeaf& leaf = tree_->leaves[index];
         const Tag tag;
@@ -222,7 +221,7 @@ class Search {
         for (std::size_t i = 0; i < treeWidth; i += hn::Lanes(tag))
             found |= bitsOf(hn::Eq(hn::Load(tag, distance2 + i), nearest)) << i;
         const float nearest2 = hn::GetLane(nearest);
-        // the bound counts as well
+        // the bound itself is included
         const bool nearer = part_ == MeshTree::noPart ? nearest2 <= best2_ : nearest2 < best2_;
         part_ = nearer ? index * treeWidth + std::uint32_t(std::countr_zero(found)) : part_;
         best2_ = nearer ? nearest2 : best2_;
@@ -254,7 +253,7 @@ std::uint32_t searchEntry(const WideTree& tree, const TurnedGroup* groups, const
     return search.part();
 }
 
-// Step by step for some points at a time, so that memory is asked for well ahead of its use.
+// Interleaves the searches of several points, so that prefetches are well ahead of their use.
 void searchEntries(const WideTree& tree, const TurnedGroup* groups, double perMetre, std::span<const glm::vec3> points,
                    float bound, std::span<const EntryPlace> places, std::span<std::uint32_t> parts) {
     Search searches[together];
@@ -286,27 +285,28 @@ HWY_EXPORT(searchAll);
 HWY_EXPORT(searchEntry);
 HWY_EXPORT(searchEntries);
 
-/// Longer triangles are halved: single precision is exact to 2e-6 around the others [voxels].
+/// Longer triangles are halved: around shorter ones single precision is accurate to 2e-6 [voxels].
 constexpr double longestEdge = 16;
-/// Thinner than this a triangle has no normal to trust [voxels].
+/// Thinner triangles have no reliable normal [voxels].
 constexpr double thinnest = 1e-7;
-/// A height below this part of the longest edge leaves no foot on the plane that is better than the edges.
+/// Min height relative to the longest edge. Flatter triangles use their edges, which are at least as accurate as the
+/// projection onto the plane.
 constexpr double flatness = 1e-10;
-/// Points that are farther from the mesh than the one are seen from the other instead [sizes of the mesh]. There,
-/// single precision is off by a thousandth of a size, and the other direction of what lies aside by half as much: less
-/// than a millionth of the way of points that are farther.
+/// Points farther from the mesh than `farthest` are replaced by points of the same direction at `farEnough` [mesh
+/// sizes]. There, single precision is off by a thousandth of a size, and the change of direction to off-centre features
+/// by half as much. Both are less than a millionth of the distance of points beyond `farthest`.
 constexpr double farthest = 4000, farEnough = 1000;
-/// What distances are exact to: places no farther from each other than this are one. So far from all edges a point lies
-/// over a triangle, whatever single precision made of these [voxels].
+/// The accuracy of distances: places closer than this count as one. A point projects into a triangle if it is this far
+/// from all edges, despite single-precision rounding [voxels].
 constexpr double samePlace = 1e-5;
-/// So near a point is as exact by single precision as by the corners [voxels].
+/// Up to this distance, single precision is as accurate as the vertices [voxels].
 constexpr double near = 16;
-/// A point in floats is no farther than this part of its largest coordinate from the place that was meant.
+/// Max rounding of a point in floats, relative to its largest coordinate.
 constexpr double pointRounding = 1.2e-7;
-/// A shorter mean of normals has cancelled out, or is not known.
+/// A shorter mean of normals has cancelled out, or is unknown.
 constexpr double minMean = 1e-6;
 
-// A place on an edge, seen from the point that is asked for.
+// A place on an edge, relative to the query point.
 struct OnEdge {
     glm::dvec3 way;
     double way2;
@@ -320,7 +320,7 @@ OnEdge closestOnEdge(const std::array<glm::dvec3, 3>& c, int from) {
     if (!(along > 0)) return {a, glm::dot(a, a), from};
     if (along >= length2) return {b, glm::dot(b, b), to};
     const double t = along / length2;
-    // from the nearer end, so that both triangles of an edge find the same point whichever way they run it
+    // from the nearer end: both triangles of an edge find the same point, whatever its direction in them
     const glm::dvec3 way = t <= 0.5 ? a + t * ab : b - (1 - t) * ab;
     return {way, glm::dot(way, way), -1};
 }
@@ -393,14 +393,14 @@ NearestFeature MeshTree::featureOfPart(std::uint32_t part, const glm::dvec3& poi
             .isOnSurface = std::abs(z) <= room};
 }
 
-// How far from a feature a point may be said to lie on it [m].
+// The distance from a feature up to which a point counts as on it [m].
 double MeshTree::roomAt(const glm::dvec3& point) const noexcept {
     const double largest = std::max({std::abs(point.x), std::abs(point.y), std::abs(point.z)});
     return std::max(samePlace * double(voxelSize_), pointRounding * largest);
 }
 
-// The corner or edge of a triangle that a point on its surface lies on, if any; the normal stays where that of the
-// feature is not known.
+// Selects the vertex or edge of a triangle that a point on its surface lies on, if any. Keeps the normal if that of the
+// feature is unknown.
 void MeshTree::toSmallest(NearestFeature& found, const std::array<glm::dvec3, 3>& c, double room) const noexcept {
     const auto set = [&](Feature feature, std::size_t index, const glm::dvec3& normal) {
         found.feature = feature;
@@ -439,7 +439,7 @@ NearestFeature MeshTree::featureOf(std::uint32_t triangle, const glm::dvec3& poi
     return found;
 }
 
-// The closest edge or corner of a triangle.
+// Selects the closest edge or vertex of a triangle.
 void MeshTree::toEdge(NearestFeature& found, const std::array<glm::dvec3, 3>& c) const noexcept {
     OnEdge best = closestOnEdge(c, 0);
     int edge = 0;

@@ -1,4 +1,4 @@
-// A mesh with a bounding hierarchy over its triangles, for questions that only triangles can decide.
+// A mesh with a bounding volume hierarchy over its triangles, for exact queries.
 #pragma once
 
 #include <array>
@@ -18,60 +18,60 @@
 
 namespace bilayer::detail {
 
-/// What of a mesh is closest to a point.
+/// The feature of a mesh that is closest to a point.
 struct NearestFeature {
     std::uint32_t triangle = noTriangle;
     Feature feature = Feature::face;
-    std::uint8_t index = 0;  ///< of the edge or the corner
-    glm::dvec3 way{0};       ///< from the point to the feature's closest point [m]
-    /// The mean of unit normals around the feature, weighted by angles (FeatureNormals): where it is short it tells no
+    std::uint8_t index = 0;  ///< of the edge or vertex
+    glm::dvec3 way{0};       ///< from the point to the closest point of the feature [m]
+    /// The angle-weighted mean of the unit normals around the feature (FeatureNormals). If it is short, it defines no
     /// side.
     glm::dvec3 normal{0};
-    bool isOnSurface = false;  ///< the point is no farther from the feature than the tree or floats can tell
+    bool isOnSurface = false;  ///< the distance to the feature is below the resolution of the tree or of floats
 };
 
 /// Immutable; all queries are safe from any thread and allocate nothing.
 class MeshTree {
   public:
-    /// Takes about 140 bytes a triangle and 6 a vertex beside the mesh, which it shares.
-    /// @param voxelSize  of the field that goes with it: lengths in the hierarchy are in voxels [m]
-    /// Throws as validate() and makeWideTree() do.
+    /// Takes about 140 bytes per triangle and 6 per vertex in addition to the mesh, which it shares. Throws as
+    /// validate() and makeWideTree() do.
+    /// @param voxelSize  of the associated field: lengths in the hierarchy are in voxels [m]
     MeshTree(std::shared_ptr<const Mesh> mesh, float voxelSize);
     MeshTree(Mesh mesh, float voxelSize) : MeshTree(std::make_shared<const Mesh>(std::move(mesh)), voxelSize) {}
 
-    /// A box around the mesh, a voxel away from it at least [m].
+    /// The bounding box of the mesh, expanded by at least a voxel [m].
     std::pair<glm::dvec3, glm::dvec3> box() const noexcept;
 
-    /// False for a point that is outside of that box: what the mesh encloses is not.
+    /// False for a point outside that box, which the mesh cannot enclose.
     bool mayEnclose(const glm::dvec3& point) const noexcept;
 
-    /// Where a point is looked for what is nearest to it: the point itself, or where it is thousands of sizes of the
-    /// mesh away, one between it and the mesh. What is nearest to the one is as near to the other, to a millionth of
-    /// the distance, and places on the mesh can be told from it.
+    /// The point from which to search for the closest feature. It is the point itself, or one between it and the mesh
+    /// if it is thousands of mesh sizes away. The closest feature is the same to a millionth of the distance, and
+    /// rounding there leaves enough digits for places on the mesh.
     glm::dvec3 approached(const glm::dvec3& point) const noexcept;
 
-    /// The triangle that is nearest to a point: to within 1e-5 voxels up to ten voxels away, to a millionth of the
-    /// distance farther away. `noTriangle` if none is as near as the bound, or the point is not finite.
+    /// The triangle closest to a point: to 1e-5 voxels up to ten voxels away, to a millionth of the distance beyond.
+    /// `noTriangle` if none is closer than the bound, or if the point is not finite.
     /// @param point  [m]
     /// @param bound  [voxels], may be infinite
     std::uint32_t nearest(const glm::dvec3& point, float bound) const noexcept;
 
-    /// The same, but tells the place in the tree: of a triangle, or of a part of a long one. `noPart` if there is none.
+    /// The same, but returns the place in the tree: a triangle, or a part of a long one. `noPart` if there is none.
     static constexpr std::uint32_t noPart = ~0u;
     std::uint32_t nearestPart(const glm::dvec3& point, float bound) const noexcept;
 
-    /// The same, beginning at an entry; the bound is no more than the entry's reach.
+    /// The same, starting at an entry. The bound must not exceed the entry's reach.
     std::uint32_t nearestPart(const glm::dvec3& point, float bound, const EntryPlace& place) const noexcept;
 
-    /// The same for many points, in less time: the spans are equally long. `noPart` where there is no entry.
+    /// The same for many points, faster. All spans have the same length. `noPart` for points without an entry.
     void nearestParts(std::span<const glm::vec3> points, float bound, std::span<const EntryPlace> places,
                       std::span<std::uint32_t> parts) const noexcept;
 
-    /// The feature of a triangle that is closest to a point [m], in double precision. Of a point on the surface itself
-    /// it is the smallest one: a corner before an edge, an edge before a face.
+    /// The feature of a triangle that is closest to a point [m], in double precision. For a point on the surface it is
+    /// the one of lowest dimension: a vertex before an edge, an edge before a face.
     NearestFeature featureOf(std::uint32_t triangle, const glm::dvec3& point) const noexcept;
 
-    /// The same for a triangle that nearestPart() has found for the point; quick where the point lies over it.
+    /// The same for a part that nearestPart() has found for the point. Fast if the point projects into the triangle.
     NearestFeature featureOfPart(std::uint32_t part, const glm::dvec3& point) const noexcept;
 
     const Mesh& mesh() const { return *mesh_; }
@@ -90,7 +90,7 @@ class MeshTree {
 
     std::shared_ptr<const Mesh> mesh_;
     float voxelSize_;
-    double perMetre_;  // voxels
+    double perMetre_;  // voxels per metre
     WideTree tree_;
     LargeArray<TurnedGroup> groups_;
     FeatureNormals normals_;

@@ -1,4 +1,4 @@
-// Sums over a solid that its mass properties follow from; what mesh and field have in common.
+// Volume integrals that mass properties are computed from, for meshes and fields.
 #pragma once
 
 #include <glm/mat3x3.hpp>
@@ -13,7 +13,8 @@ struct Moments {
     glm::dvec3 first{0};
     glm::dmat3 second{0};
 
-    /// Adds a box, or what a box of no width in some direction stands for: `part` is its volume, negative to take away.
+    /// Adds a box of volume `part`, negative to subtract it. Sizes of zero along some axes stand for infinitely thin
+    /// boxes.
     void add(double part, const glm::dvec3& centre, const glm::dvec3& size) {
         volume += part;
         first += part * centre;
@@ -29,7 +30,7 @@ struct Moments {
     }
 };
 
-/// From moments about `origin`, whose volume is above zero [m].
+/// From moments about `origin` with a positive volume [m].
 MassProperties massProperties(const Moments& moments, const glm::dvec3& origin);
 
 }  // namespace bilayer::detail

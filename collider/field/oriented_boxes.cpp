@@ -15,13 +15,13 @@
 namespace bilayer::detail {
 namespace {
 
-/// Levels of groups that are turned; what lies in larger ones is hardly flat.
+/// Count of group levels with oriented boxes; the surface in larger groups is hardly flat.
 constexpr int turnedLevels = 3;
-/// Room around boxes for what floats make of corners [voxels].
+/// Margin of boxes for the rounding of vertices to floats [voxels].
 constexpr float roundingRoom = 1e-5f;
-/// Turns of an axis pair that make a matrix of 3 x 3 diagonal: each pass nearly squares what is left beside it.
+/// Count of passes that diagonalise a 3 x 3 matrix: each pass nearly squares the off-diagonal remainder.
 constexpr int jacobiPasses = 6;
-constexpr std::size_t grain = 16;  // groups a task
+constexpr std::size_t grain = 16;  // groups per task
 constexpr float infinity = std::numeric_limits<float>::infinity();
 
 struct Box {
@@ -38,7 +38,7 @@ glm::vec3 vectorOf(const float (&from)[3][treeWidth], int i) {
     return {from[0][i], from[1][i], from[2][i]};
 }
 
-// Calls visit(corner a, b, c, normal) for the triangles of a leaf, as seen from an origin.
+// Calls visit(corner a, b, c, normal) for the triangles of a leaf, relative to an origin.
 template <class Visit>
 void forTriangles(const WideLeaf& leaf, const glm::vec3& origin, Visit visit) {
     for (int i = 0; i < treeWidth; ++i) {
@@ -56,7 +56,7 @@ glm::mat3 eigenvectors(glm::mat3 m) {
         for (int p = 0; p < 3; ++p) {
             const int q = (p + 1) % 3;
             if (m[p][q] == 0) continue;
-            // the tangent of the lesser of the two angles that clear the pair
+            // the tangent of the smaller of the two angles that clear the pair
             const float twice = (m[q][q] - m[p][p]) / (2 * m[p][q]);
             const float tangent = std::copysign(1 / (std::abs(twice) + std::sqrt(twice * twice + 1)), twice);
             glm::mat3 turn(1);
@@ -90,7 +90,7 @@ class Maker {
   private:
     using Boxes = std::array<Box, treeWidth>;
 
-    // Of the children's leaves, which follow one another.
+    // The leaves of the children, which are consecutive.
     struct Leaves {
         std::uint32_t first, each, end;
     };
@@ -131,7 +131,7 @@ class Maker {
         return sum;
     }
 
-    // Axes along and across most of the normals.
+    // The principal axes of the normals.
     glm::mat3 frameOf(const Leaves& leaves, const glm::vec3& origin) const {
         glm::mat3 spread(0);
         for (std::uint32_t leaf = leaves.first; leaf < leaves.end; ++leaf)

@@ -1,7 +1,7 @@
-// Boxes around the nodes of a WideTree that lie as the surface lies: those of a group share a frame that is turned
-// along the normals of its triangles. A piece of a smooth surface is flat in such a box, so that the box is hardly
-// nearer to a point than the piece itself; boxes along the axes stand up from slanted pieces, and searches open them
-// for nothing. After S. Gottschalk, M. C. Lin, D. Manocha, "OBBTree", SIGGRAPH 1996, 171-180.
+// Oriented bounding boxes of a WideTree's nodes. The boxes of a group share a frame that is rotated along the normals
+// of its triangles. Pieces of a smooth surface are flat in such boxes, so the distance bounds are tight. Axis-aligned
+// boxes of slanted pieces are loose, and searches would open them in vain. After S. Gottschalk, M. C. Lin, D. Manocha,
+// "OBBTree", SIGGRAPH 1996, 171-180.
 #pragma once
 
 #include <cstddef>
@@ -12,18 +12,18 @@
 
 namespace bilayer::detail {
 
-/// The boxes of eight leaves or of eight groups in a frame of their own [voxels]; one that is left over is empty:
-/// infinitely far away.
+/// The boxes of eight leaves or eight groups in a common frame [voxels]. Unused boxes are empty and infinitely far
+/// away.
 struct TurnedGroup {
     alignas(64) float lower[3][treeWidth];
     float upper[3][treeWidth];
-    float axes[3][3];          ///< of the frame, as seen from the tree's
-    float origin[3];           ///< of the frame in the tree's; whole voxels
+    float axes[3][3];          ///< of the frame, in the tree's frame
+    float origin[3];           ///< of the frame in the tree's frame; whole voxels
     std::uint32_t firstChild;  ///< the node of the first box; the others follow
 };
 static_assert(sizeof(TurnedGroup) == 256, "four cache lines");
 
-/// Groups in the order of the tree's; `groupCount` of them.
+/// The groups in the order of the tree's groups; `groupCount` of them.
 LargeArray<TurnedGroup> makeTurnedGroups(const WideTree& tree);
 
 }  // namespace bilayer::detail

@@ -1,4 +1,4 @@
-// Straight ways in double precision; internal.
+// Straight paths in double precision; internal.
 #pragma once
 
 #include <algorithm>
@@ -11,15 +11,15 @@
 
 namespace bilayer::detail {
 
-/// From an origin along a direction; lengths in one unit, whichever.
+/// An origin, a direction and a length, all in one unit.
 struct Path {
-    glm::dvec3 origin, direction;  ///< the direction of unit length
+    glm::dvec3 origin, direction;  ///< direction: unit length
     double length;                 ///< may be infinite
 
     glm::dvec3 at(double along) const { return origin + along * direction; }
 };
 
-/// The part of a path, from and to, that lies in a box.
+/// The interval of a path inside a box.
 inline std::optional<std::pair<double, double>> clip(const Path& path, const glm::dvec3& lower,
                                                      const glm::dvec3& upper) {
     double enter = 0, leave = path.length;
@@ -35,8 +35,8 @@ inline std::optional<std::pair<double, double>> clip(const Path& path, const glm
     return std::pair(enter, leave);
 }
 
-/// A point itself, or where it is more than `far` sizes of a box away from its middle, one on the way there, `near`
-/// sizes away.
+/// Returns the point itself if it is at most `far` box sizes away from the box centre. Otherwise returns the point of
+/// the same direction at `near` sizes.
 inline glm::dvec3 approached(const glm::dvec3& point, const glm::dvec3& lower, const glm::dvec3& upper, double far,
                              double near) {
     const glm::dvec3 centre = 0.5 * (lower + upper), way = point - centre, diagonal = upper - lower;
@@ -44,20 +44,20 @@ inline glm::dvec3 approached(const glm::dvec3& point, const glm::dvec3& lower, c
     return away2 > far * far * size2 ? centre + near * std::sqrt(size2 / away2) * way : point;
 }
 
-/// A path of its own, which begins some way along another one.
+/// A section of a path, as a path of its own.
 struct PathPart {
     Path path;
-    double from;  ///< where it begins on the other one
+    double from;  ///< its start on the whole path
 };
 
-/// The part of a path that lies in a box. It begins in the box and ends within reach of rounding there, however far
-/// away the whole path begins: what is measured along it is as exact as the box is small.
+/// The section of a path inside a box. It starts in the box and ends there up to rounding, however far away the whole
+/// path starts. Lengths along it are therefore as accurate as the box is small.
 inline std::optional<PathPart> partIn(const Path& path, const glm::dvec3& lower, const glm::dvec3& upper) {
     const auto whole = clip(path, lower, upper);
     if (!whole) return std::nullopt;
     const double from = whole->first;
     Path part{glm::clamp(path.at(from), lower, upper), path.direction, path.length - from};
-    // on the face that it comes through, whatever rounding leaves of the way there
+    // places the start exactly on the entry face, despite rounding
     for (int k = 0; from > 0 && k < 3; ++k) {
         const double face = path.direction[k] > 0 ? lower[k] : upper[k];
         if ((face - path.origin[k]) / path.direction[k] == from) part.origin[k] = face;

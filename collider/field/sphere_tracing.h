@@ -1,6 +1,6 @@
-// Spheres on their way until they touch a mesh; internal. Through what is empty they go in strides, as J. C. Hart,
-// "Sphere tracing", The Visual Computer 12 (1996) 527-545; what may be touched within the next piece of the way is
-// looked at triangle by triangle, so that a sphere that grazes the surface takes no more steps than there are pieces.
+// Sphere casts against a mesh; internal. Empty space is crossed by sphere tracing (J. C. Hart, "Sphere tracing", The
+// Visual Computer 12 (1996) 527-545). Near the mesh, each section of the path is tested against the triangles exactly.
+// A sphere that grazes the surface thus takes no more steps than there are sections.
 #pragma once
 
 #include <algorithm>
@@ -12,25 +12,25 @@
 
 namespace bilayer::detail {
 
-/// Where a sphere touches a mesh.
+/// The first contact of a swept sphere with a mesh.
 struct SphereTouch {
-    double along;         ///< the path of its centre [m]
+    double along;         ///< distance along the centre's path [m]
     glm::dvec3 position;  ///< on the triangle [m]
     glm::dvec3 normal;    ///< from there to the centre, of unit length
     std::uint32_t triangle;
 };
 
-/// The first one on a path of any length.
+/// The first contact on a path of any length.
 /// @param radius       [m], positive; the sphere touches nothing at the start
-/// @param clearanceAt  (const glm::dvec3&) -> how far the mesh is at least; not positive where that is not known [m]
+/// @param clearanceAt  (const glm::dvec3&) -> lower bound of the distance to the mesh; not positive where unknown [m]
 template <class ClearanceAt>
 std::optional<SphereTouch> firstTouchOnWay(const MeshTree& mesh, const Path& path, double radius,
                                            const ClearanceAt& clearanceAt) {
-    // pieces [voxels], and no more than so many of them
+    // section length [voxels], and the max count of sections
     constexpr double pieceLength = 2, maxPieces = 4096;
-    // the nearest triangle is looked for no farther than this away from the sphere [pieces]
+    // search distance for the nearest triangle, beyond the sphere [sections]
     constexpr double lookAhead = 4;
-    // what it may be off by [voxels], and as a part of its distance
+    // absolute [voxels] and relative error of the nearest triangle's distance
     constexpr double nearestSlack = 1e-4, nearestRounding = 2e-6;
 
     const auto [lower, upper] = mesh.box();
@@ -55,7 +55,7 @@ std::optional<SphereTouch> firstTouchOnWay(const MeshTree& mesh, const Path& pat
         const Path next{part->path.at(along), path.direction, std::min(piece, length - along)};
         if (auto hit = firstTouch(mesh, next, radius)) {
             const glm::dvec3 centre = next.at(hit->along), from = mesh.approached(centre);
-            // of triangles that are equally near to a centre so far away, the nearest
+            // from so far away several triangles may be equally near: take the nearest one
             if (from != centre) {
                 hit->triangle = mesh.nearest(from, std::numeric_limits<float>::infinity());
                 hit->position = from + mesh.featureOf(hit->triangle, from).way;

@@ -11,9 +11,9 @@
 namespace bilayer::detail {
 namespace {
 
-/// A sphere touches what is no farther from it than this [voxels].
+/// Max distance that counts as contact of a sphere [voxels].
 constexpr double touchTolerance = 1e-7;
-/// What is not reached in as many tangents is passed at that tolerance.
+/// Max count of tangent steps; a sphere that has made no contact by then passes the triangle within the tolerance.
 constexpr int maxTangents = 64;
 
 }  // namespace
@@ -27,7 +27,7 @@ TriangleRay::TriangleRay(const glm::dvec3& start, const glm::dvec3& direction, d
     shearX_ = direction[x_] * perZ_, shearY_ = direction[y_] * perZ_;
 }
 
-// Moved and sheared so that the ray becomes the z axis, and z the way along the ray.
+// Translated and sheared so that the ray becomes the z axis, and z the distance along the ray.
 glm::dvec3 TriangleRay::sheared(const glm::dvec3& corner) const {
     const glm::dvec3 p = corner - start_;
     return {p[x_] - shearX_ * p[z_], p[y_] - shearY_ * p[z_], perZ_ * p[z_]};
@@ -36,7 +36,7 @@ glm::dvec3 TriangleRay::sheared(const glm::dvec3& corner) const {
 bool TriangleRay::meets(const Corners& corners, double& along, glm::dvec3& position) const {
     const Corners seen{sheared(corners[0]), sheared(corners[1]), sheared(corners[2])};
     const auto& [a, b, c] = seen;
-    // twice the areas between the axis and the edges: neighbours get the same number for the edge that they share
+    // twice the areas between the axis and the edges; both triangles of a shared edge get the same number for it
     glm::dvec3 weights{c.x * b.y - c.y * b.x, a.x * c.y - a.y * c.x, b.x * a.y - b.y * a.x};
     const double facing = weights.x + weights.y + weights.z;
     if (facing == 0) return false;
@@ -54,8 +54,8 @@ bool TriangleRay::meets(const Corners& corners, double& along, glm::dvec3& posit
     return true;
 }
 
-// Whether the axis, outside of the triangle, passes an edge within the tolerance; the weights become those of the
-// point that it passes.
+// Whether the axis, outside the triangle, passes an edge within the tolerance. The weights become those of the closest
+// point on the edge.
 bool TriangleRay::besideEdge(const Corners& seen, glm::dvec3& weights) const {
     double nearest = tolerance_ * tolerance_;
     bool found = false;
@@ -76,7 +76,7 @@ bool TriangleRay::besideEdge(const Corners& seen, glm::dvec3& weights) const {
     return found;
 }
 
-// The distance to a triangle is convex along the way: tangents never lead past the first touch.
+// The distance to a triangle is convex along the path, so tangents never lead past the first contact.
 bool touches(const MeshTree& mesh, std::uint32_t triangle, const Path& path, double radius, double& along,
              glm::dvec3& position) {
     const double tolerance = touchTolerance * double(mesh.voxelSize());

@@ -1,4 +1,4 @@
-// Single triangles in double precision against rays, spheres on their way, and boxes; internal.
+// Tests of single triangles against rays, swept spheres and boxes in double precision; internal.
 #pragma once
 
 #include <array>
@@ -18,15 +18,16 @@ inline Corners cornersOf(const Mesh& mesh, std::uint32_t triangle) {
     return {mesh.points[t.x], mesh.points[t.y], mesh.points[t.z]};
 }
 
-/// A ray seen along itself: S. Woop, C. Benthin, I. Wald, "Watertight ray/triangle intersection", JCGT 2 (2013) 65-82.
+/// A ray in its sheared ray space: S. Woop, C. Benthin, I. Wald, "Watertight ray/triangle intersection", JCGT 2 (2013)
+/// 65-82.
 class TriangleRay {
   public:
     /// @param direction  of unit length
-    /// @param tolerance  triangles are met by what passes no farther beside them
+    /// @param tolerance  rays hit a triangle if they pass it within this distance
     TriangleRay(const glm::dvec3& start, const glm::dvec3& direction, double tolerance);
 
-    /// Where the ray meets a triangle, if that is before `along`, which it then becomes. One that starts on the
-    /// triangle meets it on the way in only.
+    /// Whether the ray hits a triangle before `along`, which then becomes the distance of the hit. A ray that starts on
+    /// the triangle hits it only if it enters there.
     bool meets(const Corners& corners, double& along, glm::dvec3& position) const;
 
   private:
@@ -39,20 +40,20 @@ class TriangleRay {
     double perZ_, shearX_, shearY_;
 };
 
-/// When a sphere on its way first touches a triangle, if that is before `along`, which it then becomes. The radius must
-/// be positive.
+/// Whether a swept sphere touches a triangle before `along`, which then becomes the distance of the contact. The radius
+/// must be positive.
 bool touches(const MeshTree& mesh, std::uint32_t triangle, const Path& path, double radius, double& along,
              glm::dvec3& position);
 
-/// A box with axes of its own.
+/// An oriented box.
 struct TurnedBox {
     glm::dvec3 centre;
     glm::dmat3 axes;  ///< columns of unit length
     glm::dvec3 halfSize;
 };
 
-/// Whether a box and a triangle have a point in common: T. Akenine-Moeller, "Fast 3D triangle-box overlap testing",
-/// Journal of Graphics Tools 6 (2001) 29-33.
+/// Whether a box and a triangle overlap: T. Akenine-Moeller, "Fast 3D triangle-box overlap testing", Journal of
+/// Graphics Tools 6 (2001) 29-33.
 bool overlaps(const TurnedBox& box, const Corners& corners);
 
 }  // namespace bilayer::detail

@@ -1,7 +1,8 @@
-// Rays walk from cell to cell (J. Amanatides, A. Woo, "A fast voxel traversal algorithm for ray tracing", Eurographics
-// 1987, 3-10), where the interpolant is a cubic along them: between its extrema it is monotone (H. Hansson-Soederlund,
-// A. Evans, T. Akenine-Moeller, "Ray tracing of signed distance function grids", JCGT 11 (2022) 94-113). All else is
-// branch and bound over cubes: the directory's, whose clearances rule most of them out, cells, and their eighths.
+// Queries of the zero set. Rays walk from cell to cell (J. Amanatides, A. Woo, "A fast voxel traversal algorithm for
+// ray tracing", Eurographics 1987, 3-10). Along a ray the interpolant of a cell is a cubic, monotone between its
+// extrema (H. Hansson-Soederlund, A. Evans, T. Akenine-Moeller, "Ray tracing of signed distance function grids", JCGT
+// 11 (2022) 94-113). All other queries are branch and bound over cubes: those of the directory, most of which are
+// rejected by their clearances, cells, and their octants.
 #include "collider/field/zero_set.h"
 
 #include <algorithm>
@@ -17,20 +18,20 @@ namespace bilayer::detail {
 namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
-/// Room for the single precision of clearances.
+/// Tolerance for the single precision of clearances.
 constexpr double clearanceSlack = 1e-2;
-/// Rays step over what is clear from this on; nearer it is quicker to look at the next part.
+/// Min clearance for a ray to skip empty space; below it, visiting the next coarse cell is faster.
 constexpr double minStride = 6;
-/// A crossing along a ray is narrowed down to this.
+/// Accuracy of a crossing along a ray.
 constexpr double rayTolerance = 1e-9;
-/// Cubes of this side are not divided: their diagonal is within zeroTolerance.
+/// Cubes of this side are not subdivided: their diagonal is within zeroTolerance.
 constexpr double smallestSide = 1.0 / 2048;
 static_assert(1.7321 * smallestSide < zeroTolerance);
-/// The last half of a way to a box that is only grazed takes a tangent, and so on.
+/// Max count of tangent steps. If a path only grazes a box, each step takes half of the remaining distance.
 constexpr int maxTangents = 64;
-/// They are followed no closer than this.
+/// Tangent steps end at this distance.
 constexpr double tangentTolerance = 1e-9;
-/// A multiplier is found to this, in distance from the plane, or after so many steps: three kinks are all there are.
+/// Accuracy of a multiplier, in distance from the plane, and max count of steps. There are at most three kinks.
 constexpr double multiplierTolerance = 1e-9;
 constexpr int maxMultipliers = 8;
 
@@ -40,7 +41,7 @@ glm::dvec3 corner(std::size_t i) {
     return {double(i >> 2), double(i >> 1 & 1), double(i & 1)};
 }
 
-// A stored block's cell.
+// The values of a cell in a stored block.
 Values cellValues(const FieldData& field, std::int32_t entry, const glm::ivec3& inBlock) {
     constexpr int x = FieldFrame::stride * FieldFrame::stride, y = FieldFrame::stride;
     const std::size_t at =
@@ -57,12 +58,12 @@ glm::ivec3 extentOf(const FieldData& field) {
     return FieldFrame::side * field.blocks;
 }
 
-// How far the surface is, at least.
+// A lower bound of the distance to the surface.
 double clearanceAt(const FieldData& field, const glm::dvec3& point) {
     return double(field.clearanceAt(point)) - clearanceSlack;
 }
 
-// The side of a part that is clear of the surface.
+// The side of a coarse cell without surface.
 bool isInside(const FieldData& field, std::int32_t entry, const glm::ivec3& part) {
     return entry < 0 ? entry == FieldFrame::emptyInside
                      : cellValues(field, entry, Clearance::partSide * part & 7).front() < 0;
@@ -75,11 +76,11 @@ struct Cubic {
     double operator()(double t) const { return ((c[3] * t + c[2]) * t + c[1]) * t + c[0]; }
     double slope(double t) const { return (3 * c[3] * t + 2 * c[2]) * t + c[1]; }
 
-    // Where the slope vanishes, in ascending order; infinite where it does not.
+    // The zeros of the slope in ascending order; infinite for missing ones.
     std::array<double, 2> extrema() const {
         const double a = 3 * c[3], b = c[2], discriminant = b * b - a * c[1];
         if (!(discriminant >= 0)) return {infinity, infinity};
-        const double q = -(b + std::copysign(std::sqrt(discriminant), b));  // never a difference of like numbers
+        const double q = -(b + std::copysign(std::sqrt(discriminant), b));  // without cancellation
         const double first = a != 0 ? q / a : infinity, second = q != 0 ? c[1] / q : infinity;
         return {std::min(first, second), std::max(first, second)};
     }
@@ -96,7 +97,7 @@ std::array<double, n + 1> times(const std::array<double, n>& p, double from, dou
     return product;
 }
 
-// What two polynomials come to in between, as the line from + by * t says.
+// Interpolates two polynomials by the weight from + by * t.
 template <std::size_t n>
 std::array<double, n + 1> between(const std::array<double, n>& low, std::array<double, n> high, double from,
                                   double by) {
@@ -114,7 +115,7 @@ Cubic cubicAlong(const Values& v, const glm::dvec3& from, const glm::dvec3& dire
     return {between(low, high, from.x, direction.x)};
 }
 
-// The first place from 0 to `length` where a cubic is negative, if there is one.
+// The first place in [0, length] with a negative cubic, if any.
 std::optional<double> firstNegative(const Cubic& f, double length) {
     if (f(0) < 0) return 0;
     const auto [first, second] = f.extrema();
@@ -123,12 +124,12 @@ std::optional<double> firstNegative(const Cubic& f, double length) {
         to = std::min(to, length);
         if (!(to > from)) continue;
         if (f(to) < 0) {
-            // from where it is not negative to where it is, by Newton's steps as long as they stay between
+            // brackets the root, with Newton steps as long as they stay in the bracket
             double inside = to, t = 0.5 * (from + to);
             while (inside - from > rayTolerance) {
                 const double value = f(t), step = t - value / f.slope(t);
                 (value < 0 ? inside : from) = t;
-                // a little beyond the root, so that either end comes near
+                // steps a little beyond the root, so that both ends converge
                 const double beyond = step + (value < 0 ? -0.25 : 0.25) * rayTolerance;
                 t = beyond > from && beyond < inside ? beyond : 0.5 * (from + inside);
             }
@@ -139,13 +140,13 @@ std::optional<double> firstNegative(const Cubic& f, double length) {
     return std::nullopt;
 }
 
-// A path's way through cubes of one side.
+// The traversal of equal cubes along a path.
 class Walk {
   public:
     glm::ivec3 cube;  // the current one
-    double enter;     // where the path comes to it
+    double enter;     // where the path enters it
 
-    // Through the cubes from `lower` to before `upper` [cubes].
+    // Traverses the cubes in [lower, upper).
     Walk(const Path& path, double side, const glm::ivec3& lower, const glm::ivec3& upper, double from, double to)
         : cube(glm::clamp(glm::floor(path.at(from) / side), glm::dvec3(lower), glm::dvec3(upper - 1))),
           enter(from),
@@ -183,7 +184,7 @@ class Walk {
     int axis_ = 0;
 };
 
-// Within one part of a stored block.
+// Searches one coarse cell of a stored block.
 std::optional<double> firstInsidePart(const FieldData& field, const Path& path, const glm::ivec3& part, double from,
                                       double to) {
     const glm::ivec3 lower = Clearance::partSide * part;
@@ -198,13 +199,13 @@ std::optional<double> firstInsidePart(const FieldData& field, const Path& path, 
     return std::nullopt;
 }
 
-// A cube of some power of two of voxels in the directory.
+// A cube of 2^level voxels in the directory.
 struct Block {
     glm::ivec3 lower;
     int level;
 };
 
-// A cell or a part of one.
+// A cell or a sub-cell.
 struct Cube {
     glm::dvec3 lower;
     double side;
@@ -217,16 +218,16 @@ struct Cube {
     glm::dvec3 centre() const { return lower + 0.5 * side; }
 };
 
-// The interpolant in a cube is within `error` of the plane's function.
+// A linear approximation of the interpolant in a cube, with its max error.
 struct Plane {
     glm::dvec3 through;
-    double value;  // there
+    double value;  // at `through`
     glm::dvec3 gradient;
     double error;
 
     explicit Plane(const Cube& cube) : through(cube.centre()) {
         const Values& v = cube.values;
-        // differences along the axes, of those, and of those: the coefficients of the interpolant about the centre
+        // Haar transform: the coefficients of the interpolant about the centre
         std::array<double, 8> sum = v;
         for (const std::size_t axis : {1, 2, 4})
             for (std::size_t i = 0; i < 8; ++i)
@@ -243,12 +244,12 @@ struct Plane {
     double at(const glm::dvec3& point) const { return value + glm::dot(gradient, point - through); }
 };
 
-// Looks for the point of the zero set with the least key. A Query has
-//   bound(lower, upper)  the key of any point in a box, at least; infinite if none counts
-//   bound(lower, upper, plane)  the same for points where a plane's function is zero but for its error
-//   limit()              keys matter below
-//   offer(point)         of the zero set
-//   settle(bound, point) the smallest cube around a point: no key in it is below the bound
+// Finds the point of the zero set with the smallest key. A Query has
+//   bound(lower, upper)  a lower bound of the keys in a box; infinite if no point counts
+//   bound(lower, upper, plane)  the same for the points where the plane's function is zero within its error
+//   limit()              only smaller keys matter
+//   offer(point)         a point of the zero set
+//   settle(bound, point) the smallest cube around a point, with a lower bound of its keys
 template <class Query>
 class ZeroSearch {
   public:
@@ -266,7 +267,7 @@ class ZeroSearch {
         Node node;
     };
 
-    // Near ones first, as long as they matter.
+    // Visits children in ascending order of their bounds, as long as they are below the limit.
     template <class Node>
     void visitAll(const std::array<Child<Node>, 8>& children, std::size_t count) {
         std::array<std::uint8_t, 8> order;
@@ -316,8 +317,8 @@ class ZeroSearch {
         visitEighths(cube);
     }
 
-    // The interpolant is linear along edges: where their ends have both signs, its zeros are known. Returns one of
-    // them.
+    // Offers the zeros on the edges, where the interpolant is linear: one on each edge whose ends have both signs.
+    // Returns one of them.
     glm::dvec3 offerEdges(const Cube& cube) {
         glm::dvec3 point(0);
         for (std::size_t i = 0; i < 8; ++i)
@@ -332,7 +333,7 @@ class ZeroSearch {
     }
 
     void visitEighths(const Cube& cube) {
-        // the values at the corners of the eighths, which lie halfway
+        // the values at the corners of the octants
         std::array<double, 27> grid;
         for (std::size_t i = 0; i < 27; ++i) {
             const std::size_t at[] = {i / 9, i / 3 % 3, i % 3};
@@ -370,19 +371,19 @@ double boxDistance(const glm::dvec3& point, const glm::dvec3& lower, const glm::
     return glm::distance(point, glm::clamp(point, lower, upper));
 }
 
-// The zeros that a cube may hold lie in its box, and no farther from its plane than the error says. Seen from a point
-// beside that slice, none of them is nearer than `least` in some direction of unit length.
+// A separating direction. The zeros of a cube are in its box, and no farther from its plane than the error. From a
+// point outside that slab of the box, all of them have at least the distance `least` along a unit direction.
 struct Separation {
     glm::dvec3 direction;
     double least;
 };
 
-// By Lagrange's dual of the way to the box that keeps to the plane's side: the multiplier is found by tangents, and
-// whichever it is, the bound holds.
+// Lagrangian dual of the distance to the box within the slab. The multiplier is found by tangents; the bound holds for
+// any multiplier.
 Separation separation(const glm::dvec3& point, const glm::dvec3& lower, const glm::dvec3& upper, const Plane& plane) {
     const double height = plane.at(point), steepness = glm::length(plane.gradient);
     const glm::dvec3 low = lower - point, high = upper - point;
-    // points of the slice have normal * way <= beyond
+    // points of the slab have normal * way <= beyond
     const glm::dvec3 normal = (height < 0 ? -1 : 1) / steepness * plane.gradient;
     const double beyond = (plane.error - std::abs(height)) / steepness;
     double multiplier = 0;
@@ -391,7 +392,7 @@ Separation separation(const glm::dvec3& point, const glm::dvec3& lower, const gl
     for (int i = 0; slices && i < maxMultipliers; ++i) {
         const double excess = glm::dot(normal, way) - beyond;
         if (std::abs(excess) <= multiplierTolerance) break;
-        // coordinates that are not at an end follow the multiplier; if there is none, up to where the next one does
+        // unclamped coordinates follow the multiplier; if there are none, up to the next one that is released
         double slope = 0, next = infinity;
         for (int k = 0; k < 3; ++k) {
             const double free = -multiplier * normal[k];
@@ -417,8 +418,8 @@ Separation separation(const glm::dvec3& point, const glm::dvec3& lower, const gl
 // Keys are distances from a point.
 struct Nearest {
     glm::dvec3 point;
-    double best;             // or the reach, while nothing is found
-    bool anyWillDo = false;  // nothing matters any more once something is found
+    double best;             // or the search radius, while nothing is found
+    bool anyWillDo = false;  // the search ends with the first point
     std::optional<glm::dvec3> found{};
 
     double limit() const {
@@ -437,7 +438,7 @@ struct Nearest {
     }
 };
 
-// Keys are ways of a sphere.
+// Keys are path lengths of a sphere's centre.
 struct SurfaceSample {
     Path path;
     double radius, best;
@@ -457,7 +458,7 @@ struct SurfaceSample {
                         byTangents([&](const glm::dvec3& centre) { return separation(centre, lower, upper, plane); }));
     }
 
-    // What is convex is reached no sooner than a plane that separates it.
+    // A convex shape is reached no sooner than a plane that separates it.
     template <class Separate>
     double byTangents(Separate separate) const {
         double along = 0;
@@ -488,7 +489,7 @@ struct SurfaceSample {
     }
 };
 
-// Keys are 0 in a box and infinite beside it.
+// Keys are 0 in the box and infinite outside.
 struct InBox {
     const TurnedBox& box;
     bool found = false;

@@ -1,7 +1,7 @@
-// The surface of a field without its mesh: the zero set of the trilinear interpolant. Lengths in voxels, places from
-// the directory's first voxel. Where a cell's eight values have one sign there is no surface in it, and where they have
-// both there is some on its edges, which holds for parts of cells as well: so all answers are certain but for the size
-// of the smallest parts. All may run on any number of threads at once, and allocate nothing.
+// The surface of a field without a mesh: the zero set of the trilinear interpolant. Lengths in voxels, places from the
+// directory's first voxel. A cell whose eight values have one sign contains no surface. A cell with both signs has
+// surface on its edges. Both hold for sub-cells too, so results are certain up to the size of the smallest sub-cells.
+// All functions may run on any number of threads at once, and allocate nothing.
 #pragma once
 
 #include <glm/vec3.hpp>
@@ -13,29 +13,29 @@
 
 namespace bilayer::detail {
 
-/// What nearest and first points of the zero set are off by at most, in distance or along the way.
+/// Max error of nearest and first points of the zero set, in distance or along the path.
 inline constexpr double zeroTolerance = 1e-3;
 
-/// The first place of a path where the interpolant is negative, to 1e-9: chords of any length count.
+/// The first place of a path with a negative interpolant, to 1e-9, for chords of any length.
 std::optional<double> firstInside(const FieldData& field, const Path& path) noexcept;
 
-/// The outward normal at a point of the zero set, of unit length; zero where the interpolant is flat.
+/// The outward unit normal at a point of the zero set; zero where the interpolant is flat.
 glm::dvec3 zeroNormal(const FieldData& field, const glm::dvec3& point) noexcept;
 
-/// The point of the zero set that is nearest, if it is within a reach.
+/// The nearest point of the zero set within a radius.
 std::optional<glm::dvec3> nearestZero(const FieldData& field, const glm::dvec3& point, double reach) noexcept;
 
-/// Whether some point of the zero set is within a reach.
+/// Whether the zero set has a point within a radius.
 bool isNearZero(const FieldData& field, const glm::dvec3& point, double reach) noexcept;
 
-/// Where a sphere on its way first touches the zero set.
+/// The first contact of a swept sphere with the zero set.
 struct ZeroTouch {
-    double along;         ///< the path
+    double along;         ///< distance along the path
     glm::dvec3 position;  ///< on the zero set
 };
 std::optional<ZeroTouch> firstZeroTouch(const FieldData& field, const Path& path, double radius) noexcept;
 
-/// Whether a box holds a point of the zero set.
+/// Whether the zero set has a point in a box.
 bool meetsZero(const FieldData& field, const TurnedBox& box) noexcept;
 
 }  // namespace bilayer::detail
