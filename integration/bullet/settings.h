@@ -36,7 +36,7 @@ struct Settings {
         0;  ///< the thinner of SceneRequirements::thickness and MeshReport::commonWall [voxels]; 0: unknown
     float splitImpulse = 0;    ///< for m_splitImpulsePenetrationThreshold [m]
     std::uint64_t voxels = 0;  ///< active voxels, approximate
-    /// size of the Field in memory, approximate; for thin bodies down to half of it [bytes]
+    /// approximate size of the Field in memory [bytes]; a thin body may take as little as half of it
     std::uint64_t fieldBytes = 0;
     double buildSeconds = 0;  ///< approximate, on two cores of 2023 [s]
     std::vector<std::string> warnings;
