@@ -1,4 +1,5 @@
-// Fills blocks by the build methods on an OpenCL device; kernels in the .cl files of this folder.
+// Fills blocks by the build methods on an OpenCL device; kernels in the .cl files of this folder. A block is a leaf of
+// 8^3 voxels.
 #pragma once
 
 #include <cstdint>

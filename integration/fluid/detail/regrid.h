@@ -18,7 +18,7 @@ namespace bilayer::fluid::detail {
 /// Throws std::invalid_argument for
 /// - a placement that check() refuses, or one beyond the range of OpenVDB's coordinates;
 /// - voxels that are no cubes or mirrored;
-/// - a mesh with a hole wider than two voxels (opening.h), at any position of the voxels;
+/// - a mesh with a hole wider than two voxels (hole_width.h), at any position of the voxels;
 /// - a mesh without an inside, which would need Sign::flood, at any position of the voxels;
 /// - everything that build() refuses, such as a band of more memory than the machine has.
 openvdb::FloatGrid::Ptr regrid(const Mesh& mesh, const Placement& placement, const openvdb::math::Transform& voxels,
