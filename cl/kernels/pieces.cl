@@ -129,7 +129,7 @@ void putEdge(float (*columns)[BATCH], int row, Real x, Real y) {
 void makeColumns(Real3 corner, Real3 ab, Real3 ac, Real3 shift, float (*columns)[BATCH]) {
     const Real zero = 0.0f, one = 1.0f;
     const Real3 bc = sub3(ac, ab), none = make3(zero, zero, zero);
-    // turned so that the longest edge comes first
+    // rotated so that the longest edge comes first
     const Real ab2 = dot3(ab, ab), bc2 = dot3(bc, bc), ca2 = dot3(ac, ac);
     const RealInt isFirst = ab2 >= bc2 && ab2 >= ca2, isSecond = bc2 >= ca2;
     const Real3 begin = select3(select3(add3(corner, ac), add3(corner, ab), isSecond), corner, isFirst);

@@ -14,8 +14,8 @@ struct DrawOptions {
     bool band = true;                      ///< outline of the leaves that hold the band
     bool points = false;                   ///< surface points, drawn as normals as long as the point spacing
     btVector3 bandColour{0.3f, 0.6f, 1};   ///< red, green, blue: 0..1
-    btVector3 pointColour{1, 0.6f, 0.2f};  ///< likewise
-    btVector3 sharpColour{1, 0.2f, 0.2f};  ///< likewise, for points on convex edges and vertices
+    btVector3 pointColour{1, 0.6f, 0.2f};  ///< of surface points
+    btVector3 sharpColour{1, 0.2f, 0.2f};  ///< for points on convex edges and vertices
 };
 
 /// Draws a field as lines for a body at this transform.

@@ -32,8 +32,8 @@ struct Settings {
     int interiorWidth = 0;               ///< [voxels]
     int substeps = 1;                    ///< substeps of a step, with ShapeOptions::speculative; at most maxSubsteps
     int substepsWithoutSpeculation = 1;  ///< substeps without speculative contacts
-    float wallVoxels =
-        0;  ///< the thinner of SceneRequirements::thickness and MeshReport::commonWall [voxels]; 0: unknown
+    /// the thinner of SceneRequirements::thickness and MeshReport::commonWall [voxels]; 0: unknown
+    float wallVoxels = 0;
     float splitImpulse = 0;    ///< for m_splitImpulsePenetrationThreshold [m]
     std::uint64_t voxels = 0;  ///< active voxels, approximate
     /// approximate size of the Field in memory [bytes]; a thin body may take as little as half of it

@@ -11,7 +11,7 @@ namespace bilayer::fluid {
 /// x).
 struct Placement {
     Pose pose{};
-    glm::vec3 scale{1};  ///< positive: a reflection would turn the body inside out
+    glm::vec3 scale{1};  ///< positive: a reflection would invert the body
 
     Placement() = default;
     Placement(const Pose& placed, const glm::vec3& stretch = glm::vec3(1)) : pose(placed), scale(stretch) {}

@@ -26,8 +26,8 @@ constexpr std::size_t maxPatches = 8;
 // A patch of the last step continues until its normal is within about 15 degrees of another's.
 constexpr float mergedDirection = 0.966f;
 // Bodies count as almost at rest if the deepest penetration has changed by less than this fraction of the contacts'
-// extent in one step. Contacts of the last step are then preferred, and patches keep their places. In an impact every
-// contact is judged anew.
+// extent in one step. Contacts of the last step are then preferred, and patches keep their places. In an impact all
+// contacts are chosen again.
 constexpr float stillness = 3e-3f;
 // Tolerance of the choice [fractions of the extent]. A contact that touches earlier than the kept ones by less than
 // this need not be kept, and contacts of the last step are kept again. Otherwise rounding would decide which of several

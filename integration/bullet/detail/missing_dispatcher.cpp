@@ -17,7 +17,7 @@ namespace {
 std::atomic<int> knowing{0};
 std::atomic<bool> isDone{false};  // the warning has been printed
 
-// Limit of entries, which include transforms that bodies no longer use.
+// Limit of entries, which include unused transforms of bodies.
 constexpr std::size_t maxEntries = 4096;
 
 using Address = std::uintptr_t;

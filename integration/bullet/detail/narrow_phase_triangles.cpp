@@ -43,7 +43,7 @@ constexpr float steepestCrease = 3;
 // A body closer than this to a point of the face touches the face [voxels]: next to an edge or a vertex, normals are
 // mixed.
 constexpr float touchingFoot = 0.05f;
-// Below this cosine to the face, a normal does not tell on which side of the face its body is.
+// Below this cosine to the face, a normal does not indicate the side of the face that its body is on.
 constexpr float minFacing = 0.1f;
 // A surface with an opposite normal by this cosine is the far side of a thin body.
 constexpr float farSide = -0.8f;

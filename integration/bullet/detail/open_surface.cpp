@@ -46,13 +46,13 @@ class Ascent {
   public:
     explicit Ascent(const glm::vec3& direction) : direction_(direction) {}
 
-    /// @param way  of unit length
+    /// @param way  direction, of unit length
     void along(const glm::vec3& way) {
         if (const float rise = glm::dot(way, direction_); rise > rise_) rise_ = rise, part_ = rise * way;
     }
     /// Considers all directions from a vertex into its triangle.
     /// @param one, other  along its two edges there, of unit length
-    /// @param wing        perpendicular to the first edge, into the triangle
+    /// @param wing        conormal of the first edge
     void between(const glm::vec3& one, const glm::vec3& other, const glm::vec3& wing) {
         along(one);
         along(other);
