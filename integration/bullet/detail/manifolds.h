@@ -45,8 +45,8 @@ bool isOfUser(const btManifoldResult& result);
 /// Bullet refreshes the positions of old contacts but not their normals. Each new contact inherits the impulse of the
 /// nearest old one, for warm starting.
 ///
-/// Sticking contacts have friction anchors. If they drift along the surface, btContactSolverInfo::m_frictionERP pulls
-/// them back (0: not at all), so that piles do not drift.
+/// Sticking contacts have friction anchors: btContactSolverInfo::m_frictionERP pulls back their drift along the surface
+/// (0: not at all), which keeps piles in place.
 class Manifolds {
   public:
     explicit Manifolds(btDispatcher& dispatcher) : dispatcher_(dispatcher) {}
