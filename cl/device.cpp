@@ -36,7 +36,7 @@ DeviceInfo describe(const cl::Platform& platform, const cl::Device& device) {
             .maxAllocationBytes = device.getInfo<CL_DEVICE_MAX_MEM_ALLOC_SIZE>()};
 }
 
-// Usable devices in the order of the platforms, GPUs before all others.
+// Usable devices in platform order, GPUs first.
 std::vector<Found> find() {
     std::vector<Found> found;
     try {

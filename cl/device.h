@@ -1,4 +1,4 @@
-// OpenCL devices: what there is, which one to use, and what goes wrong with them.
+// OpenCL devices: list them, open one, and report their errors.
 #pragma once
 
 #include <cstdint>
@@ -14,8 +14,8 @@ namespace detail {
 struct DeviceImpl;
 }
 
-/// Trouble with a device: the text names the call, the code and the device, and holds the build log where a kernel
-/// failed to build.
+/// Error of a device. The text names the call, the code and the device, and holds the build log if a kernel failed to
+/// build.
 struct DeviceError : std::runtime_error {
     using std::runtime_error::runtime_error;
 };
@@ -28,15 +28,15 @@ struct DeviceInfo {
     std::string driver;           ///< "3.1"
     bool gpu = false;
     bool unifiedMemory = false;     ///< host and device share one memory
-    bool exactSquareRoots = false;  ///< can round square roots correctly
-    bool doubles = false;           ///< can compute in double precision
+    bool exactSquareRoots = false;  ///< rounds square roots correctly
+    bool doubles = false;           ///< supports double precision
     unsigned computeUnits = 0;
     std::uint64_t memoryBytes = 0;         ///< global memory [bytes]
     std::uint64_t maxAllocationBytes = 0;  ///< largest single buffer [bytes]
 };
 
-/// An OpenCL device with its context, queue and compiled programs, and up to 128 MiB of buffers from the builds before.
-/// Copies share them. Several threads may use it at once; each build takes device memory of its own.
+/// An OpenCL device with its context, queue and compiled programs, and up to 128 MiB of buffers kept from earlier
+/// builds. Copies share them. Several threads may use it at once; each build takes device memory of its own.
 class Device {
   public:
     explicit Device(std::shared_ptr<detail::DeviceImpl> impl) : impl_(std::move(impl)) {}
@@ -47,12 +47,13 @@ class Device {
     std::shared_ptr<detail::DeviceImpl> impl_;
 };
 
-/// All devices of all platforms that can compile kernels, GPUs first. Empty where there is none, or no platform.
+/// All devices of all platforms that can compile kernels, GPUs first. Empty if there is no such device, or no platform.
 /// Throws DeviceError when a platform fails to answer.
 std::vector<DeviceInfo> devices();
 
-/// Opens the first device whose platform or device name contains `text`, ignoring case; empty: the environment variable
-/// BILAYER_DEVICE, else the first device. Throws DeviceError that lists what there is when none fits.
+/// Opens the first device whose platform or device name contains `text`, ignoring case. An empty text stands for the
+/// environment variable BILAYER_DEVICE, or without it for the first device. If none matches, throws DeviceError that
+/// lists the available devices.
 Device openDevice(const std::string& text = {});
 
 }  // namespace bilayer

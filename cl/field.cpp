@@ -1,4 +1,4 @@
-// Two batches of points take turns: while the device samples one, another one goes up or comes down.
+// Two batches of points alternate: while the device samples one, the other is uploaded or downloaded.
 #include <bilayer/cl/field.h>
 
 #include <algorithm>
@@ -28,17 +28,17 @@ extern const char* const field_cl;  // the text of field.cl
 namespace {
 
 constexpr std::size_t batchesInFlight = 2;
-/// Points of a batch: 4 MiB of points and samples, which take a GPU about as long as ten launches.
+/// Points in a batch: 4 MiB of points and samples, which take a GPU about as long as ten kernel launches.
 constexpr std::size_t batchPoints = 1 << 17;
-/// Work-items of a group on a GPU, and points that an item samples on a processor.
+/// Work-items of a group on a GPU, and points per item on a processor.
 constexpr std::size_t groupItems = 64, pointsPerProcessorItem = 1024;
 
-// The kernel reads points and writes samples as they lie in the host's memory.
+// The kernel uses the host's memory layout of points and samples.
 static_assert(sizeof(glm::vec3) == 3 * sizeof(cl_float));
 static_assert(sizeof(Sample) == 5 * sizeof(cl_float) && offsetof(Sample, gradient) == sizeof(cl_float) &&
               offsetof(Sample, inBand) == 4 * sizeof(cl_float) && sizeof(bool) == sizeof(cl_uchar));
 
-// A batch of points under way, in a queue of its own.
+// A batch of points in flight, with its own queue.
 struct Batch {
     cl::CommandQueue queue;
     cl::Buffer points, samples;
@@ -57,7 +57,7 @@ struct DeviceField::Data {
     const bool gpuMapping;
     DeviceMemory memory;
     cl::Program program;
-    std::optional<FieldLayout> shared;  // what the layout's buffers lie in where host and device share memory
+    std::optional<FieldLayout> shared;  // memory of the layout's buffers if host and device share memory
     DeviceLayout layout;
     std::array<Batch, batchesInFlight> batches;
     std::mutex mutex;  // guards `batches`
@@ -97,13 +97,13 @@ void DeviceField::Data::upload(FieldLayout from, OpenclTimes* times) {
     if (device.info().unifiedMemory) shared = std::move(from);
 }
 
-// Sends a batch on its way; in place where host and device share memory.
+// Enqueues a batch; in place if host and device share memory.
 void DeviceField::Data::start(Batch& batch, std::span<const glm::vec3> points, std::span<Sample> samples,
                               Timing& timing) {
     const cl::CommandQueue& queue = batch.queue;
     const bool unified = device.info().unifiedMemory;
     if (unified) {
-        // OpenCL's signature asks for a pointer to what may change; it is only read
+        // OpenCL's signature takes a pointer to mutable data; it is only read
         batch.points = cl::Buffer(device.impl().context, CL_MEM_READ_ONLY | CL_MEM_USE_HOST_PTR, points.size_bytes(),
                                   const_cast<glm::vec3*>(points.data()));
         batch.samples = cl::Buffer(device.impl().context, CL_MEM_WRITE_ONLY | CL_MEM_USE_HOST_PTR, samples.size_bytes(),

@@ -1,4 +1,4 @@
-// A field on an OpenCL device, for those who sample many points at once; kernel in field.cl.
+// A field on an OpenCL device, for sampling many points at once; kernel in field.cl.
 #pragma once
 
 #include <cstddef>
@@ -18,32 +18,34 @@ class DeviceField {
   public:
     /// Lays the level set out as Field in collider/field.h does, and uploads it. A device that shares the host's memory
     /// uses the host's copy in place.
-    /// @param options  `times` receives what the upload took
-    /// Throws what Field's constructor throws, and DeviceError, which says how many MiB are needed where the memory is
-    /// too small.
+    /// @param options  `times` receives the time of the upload
+    ///
+    /// Throws what Field's constructor throws, and DeviceError. If the memory is too small, the text states how many
+    /// MiB are needed.
     DeviceField(const Device& device, const LevelSet& levelSet, const OpenclOptions& options = {});
 
-    /// Builds the field of a mesh on the device, where it stays: only the mesh goes up, and only counts come down. It
-    /// answers as that of build(mesh, build, openclFiller(device, options)); but where the double layer method's signs
-    /// contradict each other, as on a mesh inside out, empty space may be on the other side. At its peak that takes
-    /// about 1.7 times the memory of the field, and a quarter of what the options allow for the fill. The nearest
-    /// triangles are not kept.
-    /// @param options  `times` receives what the build took
-    /// Throws what build() throws, and std::invalid_argument for what needs the processor: a method other than
-    /// Method::exact and Method::doubleLayer, and signs other than from normals, also where those contradict each
-    /// other.
+    /// Builds the field of a mesh on the device, where it stays. Only the mesh is uploaded, and only counts are
+    /// downloaded. Samples equal those of build(mesh, build, openclFiller(device, options)), with one exception: where
+    /// the double layer method's signs are contradictory, as on an inverted mesh, empty space may be on the other side.
+    /// The peak memory is about 1.7 times that of the field, and a quarter of the options' limit for the fill. The
+    /// nearest triangles are not kept.
+    /// @param options  `times` receives the time of the build
+    ///
+    /// Throws what build() throws. Throws std::invalid_argument for builds that need the processor: a method other than
+    /// Method::exact and Method::doubleLayer, and signs other than from normals, also where those are contradictory.
     DeviceField(const Device& device, const Mesh& mesh, const BuildOptions& build, const OpenclOptions& options = {});
 
-    /// Samples all points, as Field::sample() does one: the same values but for the device's rounding of square roots,
-    /// which matters out of the band only. Points stream through the device: there is no limit to their number. Any
+    /// Samples all points, as Field::sample() does one. The values are the same up to the device's rounding of square
+    /// roots, which matters outside the band only. Points stream through the device, so their count is not limited. Any
     /// thread may call it; calls on one field wait for each other.
     /// @param points  in the field's own coordinates [m]
-    /// @param times   if not null, receives what it took
-    /// Throws std::invalid_argument if `samples` is not as long as `points`, and DeviceError for the device's trouble.
+    /// @param times   if not null, receives the time of the call
+    ///
+    /// Throws std::invalid_argument if `samples` is not as long as `points`, and DeviceError for errors of the device.
     void sample(std::span<const glm::vec3> points, std::span<Sample> samples, OpenclTimes* times = nullptr) const;
 
     const Bounds& bounds() const;     ///< around all points in the band [m]
-    std::size_t memoryBytes() const;  ///< on the device, with room for points under way
+    std::size_t memoryBytes() const;  ///< on the device, including the buffers for points in flight
 
   private:
     struct Data;

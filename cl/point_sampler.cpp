@@ -1,4 +1,4 @@
-// Buffers that hold the bodies of all queries one behind the other grow as bodies come.
+// Buffers hold the bodies of all queries, concatenated, and grow with new bodies.
 #include <bilayer/cl/point_sampler.h>
 #include <bilayer/collider/contact.h>
 
@@ -27,9 +27,9 @@ extern const char* const point_sampler_cl;  // the text of point_sampler.cl
 
 namespace {
 
-/// Work-items of a group on a GPU, and balls that an item looks at on a processor.
+/// Work-items of a group on a GPU, and bounding spheres per item on a processor.
 constexpr std::size_t groupItems = 64, ballsPerProcessorItem = 64;
-/// Room for answers at first, and how much more than needed is taken when it is too small.
+/// Initial capacity for answers, and the factor by which it grows beyond the need.
 constexpr std::size_t minAnswers = 1 << 12, growth = 2;
 constexpr const char* ofBodies = "the batch of contacts";
 
@@ -56,7 +56,7 @@ struct KernelQuery {
     }
 };
 
-// The kernel reads balls as they lie in the host's memory, and points.
+// The kernel uses the host's memory layout of balls and points.
 static_assert(sizeof(PointBall) == 6 * sizeof(cl_float) && sizeof(glm::vec3) == 3 * sizeof(cl_float));
 
 // `Found`.
@@ -66,10 +66,10 @@ struct KernelFound {
     cl_uint inBand;
 };
 
-// A buffer that grows and keeps what it holds.
+// A growing buffer that keeps its content.
 class Pool {
   public:
-    /// @return the place of the first element
+    /// @return index of the first element
     template <class Element>
     cl_ulong append(std::span<const Element> data, const cl::CommandQueue& queue, DeviceMemory& memory,
                     Timing& timing) {
@@ -82,7 +82,7 @@ class Pool {
         return first / sizeof(Element);
     }
 
-    /// Room for so many bytes at least.
+    /// Ensures a capacity of at least so many bytes.
     void reserve(std::uint64_t bytes, const cl::CommandQueue& queue, DeviceMemory& memory) {
         if (bytes <= size_) return;
         const std::uint64_t size = std::max(bytes, growth * size_);
@@ -94,7 +94,7 @@ class Pool {
         size_ = size;
     }
 
-    /// Forgets what it holds.
+    /// Discards the content.
     void restart() { used_ = 0; }
     void clear(DeviceMemory& memory) {
         memory.free(buffer_);
@@ -127,7 +127,7 @@ class Sampler {
     void sample(std::span<const SampledBody> bodies, std::span<const PointQuery> queries, FoundPoints& answers);
 
   private:
-    // Where a body is.
+    // The location of a body in the buffers.
     struct Place {
         KernelBody body;
         cl_uint balls;
@@ -151,7 +151,7 @@ class Sampler {
     Pool directories_, centres_, values_, points_, balls_;  // of the bodies
     Pool bodies_, queries_, count_, answers_;               // of a batch
     std::size_t capacity_ = minAnswers;                     // of answers
-    bool failed_ = false;                                   // in the last batch: nobody knows what the buffers hold
+    bool failed_ = false;                                   // in the last batch: the content of the buffers is unknown
 };
 
 void Sampler::forget() {
@@ -178,7 +178,7 @@ void Sampler::add(const SampledBody& body, Timing& timing) {
     places_.emplace(body.id, Place{placed, cl_uint(own.balls.size())});
 }
 
-// Adds the bodies that are not there; where they do not fit beside the others, all others go.
+// Uploads missing bodies. If they do not fit in addition to the others, all others are released.
 void Sampler::keep(std::span<const SampledBody> bodies, Timing& timing) {
     const auto addMissing = [&] {
         for (const SampledBody& body : bodies)
@@ -193,7 +193,7 @@ void Sampler::keep(std::span<const SampledBody> bodies, Timing& timing) {
     }
 }
 
-// Runs again with more room where there are more answers than expected.
+// Runs the kernel, and again with more capacity if there are more answers than expected.
 std::vector<KernelFound> Sampler::run(const std::vector<KernelBody>& bodies, const std::vector<KernelQuery>& queries,
                                       cl_uint balls, Timing& timing) {
     const cl_uint none = 0;
@@ -243,7 +243,7 @@ std::vector<KernelFound> Sampler::found(std::span<const SampledBody> bodies, std
     return run(kernelBodies, kernelQueries, balls, timing);
 }
 
-// The device answers in any order.
+// The device returns answers in any order.
 void Sampler::sample(std::span<const SampledBody> bodies, std::span<const PointQuery> queries, FoundPoints& answers) {
     std::vector<KernelFound> all;
     Timing timing(times_);

@@ -1,4 +1,4 @@
-// The points of bodies in the fields of others on an OpenCL device, all of a step in one batch; kernel in
+// Samples the points of bodies in the fields of other bodies on an OpenCL device, in one batch per step; kernel in
 // point_sampler.cl.
 #pragma once
 
@@ -8,12 +8,13 @@
 
 namespace bilayer {
 
-/// Samples on a device. Bodies are uploaded when they are first asked for, and stay; where the memory is full, all go
-/// but those that are asked for. Queries go up and what they find comes down; no more than one batch is under way.
-/// @param options  `times` receives what each batch took
-/// Throws DeviceError, here and when it samples: for the device's own trouble, for one that cannot compute in double
-/// precision, and where the memory is too small for the bodies of one batch; the text then says how many MiB are
-/// needed.
+/// A point sampler on a device. Bodies are uploaded on first use, and stay. If the memory is full, all bodies are
+/// released except those of the current batch. Queries are uploaded, and their results downloaded; only one batch runs
+/// at a time.
+/// @param options  `times` receives the time of each batch
+///
+/// Throws DeviceError, here and when it samples: for errors of the device, for a device without double precision, and
+/// if the memory is too small for the bodies of one batch. The text then states how many MiB are needed.
 PointSampler openclPointSampler(const Device& device, const OpenclOptions& options = {});
 
 }  // namespace bilayer

@@ -10,10 +10,10 @@
 namespace bilayer::detail {
 namespace {
 
-constexpr std::size_t countersAtMost = 1 << 22;  // over all runs: 16 MiB
-constexpr std::size_t trianglesPerRun = 8192;    // what one item bins where items have counters of their own
-constexpr std::size_t runsPerUnit = 8;           // enough to share out unequal runs
-constexpr std::size_t itemsPerUnit = 2048;       // as many as a GPU's unit holds
+constexpr std::size_t countersAtMost = 1 << 22;  // maximum over all runs: 16 MiB
+constexpr std::size_t trianglesPerRun = 8192;    // triangles per item, where items have separate counters
+constexpr std::size_t runsPerUnit = 8;           // enough to balance unequal runs
+constexpr std::size_t itemsPerUnit = 2048;       // items that a GPU's unit holds
 constexpr std::size_t groupItems = 64;           // ITEMS of common.cl
 
 BrickGrid gridFor(const FillJob& job, float reach, float margin) {

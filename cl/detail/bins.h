@@ -1,4 +1,4 @@
-// A mesh on a device, and which of its triangles reach which brick of space; kernels in bins.cl.
+// Bins the triangles of a mesh by brick on a device; kernels in bins.cl.
 #pragma once
 
 #include <cstdint>
@@ -10,34 +10,34 @@
 
 namespace bilayer::detail {
 
-/// `Grid` of bins.cl: the bricks along the axes, and how the triangles are shared out.
+/// `Grid` of bins.cl: the bricks along the axes, and the parameters of the binning.
 struct BrickGrid {
     double voxelsPerUnit;  ///< [1/m]
-    double reach;          ///< how far from a triangle a voxel may lie [voxels]
-    double margin;         ///< parts of triangles beyond this from a brick do not matter to it [voxels]
+    double reach;          ///< maximum distance of a voxel from a triangle [voxels]
+    double margin;         ///< parts of triangles farther than this from a brick do not affect it [voxels]
     cl_int first[3];       ///< [bricks]
     cl_int size[3];        ///< [bricks]
-    cl_int shift;          ///< bricks have 2^shift voxels a side
+    cl_int shift;          ///< edge of a brick: 2^shift voxels
     cl_uint triangles, cells, runs;
     struct {
         double epsilon;
         cl_int maxSubdivision, fillGaps, recursive;
-    } sampling;  ///< by the double layer method
+    } sampling;  ///< options of the double layer method
 
     int blocksPerSide() const { return (1 << shift) / blockSide; }
 };
 
-/// The triangles of a mesh by the bricks that they reach, on a device. Bricks without triangles are left out.
+/// The triangles of a mesh, binned by the bricks that they reach, on a device. Bricks without triangles are left out.
 class DeviceBins {
   public:
     /// Uploads the mesh and bins its triangles.
-    /// @param program   includes bins.cl
+    /// @param program   must include bins.cl
     /// @param margin    see BrickGrid
     DeviceBins(DeviceImpl& device, const cl::Program& program, DeviceMemory& memory, const FillJob& job, float reach,
                float margin, bool gpuMapping, Timing& timing);
 
     std::size_t bricks() const { return partOffsets_.size() - 1; }
-    /// The first part of a brick's triangles, counted over all bricks; that of brick bricks() is their number.
+    /// Index of the first part of a brick's triangles, over all bricks; for brick bricks() the count of all parts.
     std::uint64_t firstPart(std::size_t brick) const { return partOffsets_[brick]; }
 
     const BrickGrid& grid() const { return grid_; }

@@ -1,5 +1,5 @@
-// Two batches of bricks take turns, each in a queue of its own: while the device fills one, the host takes the blocks
-// of the other.
+// Two batches of bricks alternate, each in its own queue: while the device fills one, the host receives the blocks of
+// the other.
 #include "cl/detail/brick_filler.h"
 
 #include <oneapi/tbb/blocked_range.h>
@@ -33,32 +33,33 @@ extern const char* const double_layer_cl;
 namespace {
 
 constexpr std::size_t batchesInFlight = 2;
-constexpr std::size_t blocksPerTask = 16;  // that the host takes at once
+constexpr std::size_t blocksPerTask = 16;  // blocks that the host receives at once
 /// Work-items of a group, lanes of a vector: ITEMS and LANES of common.cl.
 constexpr std::size_t groupItems = 64, lanes = 16;
-/// Bricks of a batch at most: results of a few megabytes stay in a processor's cache, and a GPU has enough to do.
+/// Maximum bricks in a batch: on a processor a few megabytes of results stay in its cache; on a GPU they are enough
+/// work.
 constexpr std::size_t bricksForProcessor = 40, bricksForGpu = 512;
-/// Groups for each compute unit that take bricks one after another, each with memory of its own. PoCL gives the first
-/// unit that asks more than its share of groups, so that one a unit would leave others without any.
+/// Groups for each compute unit that fill bricks one after another, each with its own memory. PoCL gives the first unit
+/// more than its share of groups; with one group per unit, other units would be idle.
 constexpr std::size_t groupsPerUnit = 4;
-constexpr std::uint64_t scratchPart = 8;  // of the budget, at most
-/// Parts that a kernel can number in one batch, and those whose numbers stay in a processor's cache where kernels hand
-/// a batch on.
+constexpr std::uint64_t scratchPart = 8;  // maximum fraction of the budget: 1 / scratchPart
+/// Maximum parts in a batch: the limit of a kernel's numbers, and for kernels that pass on a batch, the limit at which
+/// the numbers stay in a processor's cache.
 constexpr std::uint64_t partsInBatch = 1 << 27, partsForProcessor = 60000;
-/// Cells as small as those that pieces are grouped by, and how far beyond its reach a brick's samples lie [voxels].
+/// The smallest cells for grouping pieces, and the maximum distance of a brick's samples beyond its reach [voxels].
 constexpr float smallestCell = 1.1f, aroundBrick = 3;
 
 enum Counter { filledBlocks, openBlocks, conflicts, counters };
 
-// Bytes that the kernels of a method keep.
+// Memory that the kernels of a method need [bytes].
 struct KeptBytes {
     std::uint64_t part;      // of a part of a triangle: Piece of pieces.cl
     std::uint64_t unsorted;  // of a part: Member of groups.cl, Sample of samples.cl
     std::uint64_t sorted;    // of a part: Member again
     std::uint64_t cell;      // of a part: its cell
-    std::uint64_t columns;   // of a part: numbers in columns, of a group at most as large or of a sample
-    std::uint64_t begin;     // of a part: where a group's members begin
-    std::uint64_t brick;     // of a brick: groups of each slice of blocks, or where the samples of its cells begin
+    std::uint64_t columns;   // of a part: columns of numbers, for a group at most as large or for a sample
+    std::uint64_t begin;     // of a part: the first member of a group
+    std::uint64_t brick;     // of a brick: the groups of each slice of blocks, or the first samples of its cells
 
     std::uint64_t perPart() const { return part + unsorted + sorted + cell + columns + begin; }
 };
@@ -69,16 +70,16 @@ struct KernelLayers {
     cl_int cube;
 };
 
-// What a batch of bricks needs, or what its buffers hold.
+// The size of a batch of bricks, or the capacity of its buffers.
 struct Load {
     std::uint64_t bricks = 0, parts = 0;
-    std::uint64_t places = 0;  // for parts: vectors of a brick's last ones may reach beyond them
-    std::uint64_t room = 0;    // of the places, for each group that fills whole bricks
+    std::uint64_t places = 0;  // slots for parts: vectors of a brick's last parts may extend beyond them
+    std::uint64_t room = 0;    // size of the slots, for each group that fills whole bricks
 
     bool covers(const Load& other) const { return bricks >= other.bricks && places >= other.places; }
 };
 
-// Where what comes of a batch begins in its buffer of results [bytes]. A part begins where any device lets it.
+// Offsets of a batch's results in its buffer [bytes], aligned for any device.
 struct ResultPlaces {
     std::uint64_t counts = 0, origins, open, distances, triangles, end;
 
@@ -107,7 +108,7 @@ struct Buffers {
     }
 };
 
-// What a buffer holds, as the host sees it from when the queue's commands have ended until this goes.
+// Maps a buffer for the host, from the end of the queue's commands until destruction.
 template <class Item>
 class Mapped {
   public:
@@ -134,21 +135,21 @@ class Mapped {
     void* data_ = nullptr;
 };
 
-// Each has a queue of its own: where the kernels of one come to their end, those of the other take over.
+// A batch with its own queue: when the kernels of one batch are nearly done, those of the other start.
 struct Batch {
-    Load load;  // under way
+    Load load;  // in flight
     Buffers buffers;
     cl::Buffer scratch, next;
     std::array<cl_uint, counters> found{};
     cl::Event counted;
     cl::CommandQueue queue;
     Ended ended{queue};
-    // Of a device that shares the host's memory: a command right behind the kernels. PoCL's threads do one such command
-    // before they turn to the next kernel, and others after it.
+    // For a device that shares the host's memory: a command directly after the kernels. PoCL's threads run one such
+    // command before the next kernel, and others after it.
     std::optional<Mapped<std::byte>> results;
 };
 
-// What came of a batch, as the host sees it.
+// The results of a batch on the host.
 struct Results {
     const glm::ivec3* origins;
     const float* distances;
@@ -195,29 +196,29 @@ class BrickFill {
     OpenclTimes* times_;
     Timing timing_;
     DeviceMemory memory_;
-    const bool layered_;      // by the double layer method, else exact
-    const bool fillsBricks_;  // whole bricks at once, else block by block
+    const bool layered_;      // the double layer method, else the exact one
+    const bool fillsBricks_;  // whole bricks at once, else single blocks
     KeptBytes kept_{};
     cl::Program program_;
     std::optional<DeviceBins> bins_;
     cl::Buffer orders_;
     std::size_t scratchGroups_ = 0;
     cl_uint scratchCells_ = 0;
-    std::uint64_t share_ = 0;                                // of the memory, for a batch
-    std::vector<std::pair<std::size_t, std::size_t>> runs_;  // of bricks: a batch each
-    Load most_;                                              // of all batches
+    std::uint64_t share_ = 0;                                // memory for one batch
+    std::vector<std::pair<std::size_t, std::size_t>> runs_;  // runs of bricks, one per batch
+    Load most_;                                              // maximum over all batches
     std::array<Batch, batchesInFlight> batches_;
-    std::vector<glm::ivec3> open_;  // blocks that are left to the host
+    std::vector<glm::ivec3> open_;  // blocks that the host fills
     Ended ended_;                   // the device's queue
 };
 
-// How far a voxel may lie from a triangle that matters to it: the paper's cube sticks out of the ball.
+// The maximum distance between a voxel and a triangle that affects it. The cube of the paper extends beyond its ball.
 float reachOf(const FillJob& job) {
     if (job.options.method != Method::doubleLayer) return job.mesh.reach;
     return job.layers.reach * (job.layers.cube > 0 ? std::sqrt(3.f) : 1.f);
 }
 
-// Numbers that tell where the samples of each cell of a brick begin: cellsFor() of samples.cl.
+// Count of the indices to the samples of each cell of a brick: cellsFor() of samples.cl.
 std::uint64_t sampleCells(const BrickGrid& grid) {
     constexpr int cellSide = 4;  // [voxels]
     const int around = 1 + int(std::floor((float(grid.reach) - 0.4f) / float(cellSide)));
@@ -225,7 +226,7 @@ std::uint64_t sampleCells(const BrickGrid& grid) {
     return side * side * side + 2;
 }
 
-// For each byte the places of its bits in ascending order, a byte each: `orders` of double_layer.cl.
+// For each byte value, the positions of its set bits in ascending order, one byte each: `orders` of double_layer.cl.
 const std::array<cl_ulong, 256>& bitOrders() {
     static const std::array<cl_ulong, 256> orders = [] {
         std::array<cl_ulong, 256> made{};
@@ -301,12 +302,12 @@ Load BrickFill::loadOf(std::size_t first, std::size_t last) const {
     return load;
 }
 
-// Groups that take the bricks of a batch one after another.
+// Count of the groups that fill the bricks of a batch one after another.
 std::size_t BrickFill::groupsFor(const Load& load) const {
     return std::min<std::size_t>(load.bricks, std::max(1u, device_.info.computeUnits) * groupsPerUnit);
 }
 
-// Whether a batch may be as large as this: its share of the memory, and the largest buffer.
+// Whether a batch of this size fits its share of the memory and the largest buffer.
 bool BrickFill::fits(const Load& load) const {
     const std::uint64_t largest = std::max(ResultPlaces(blocksOf(load), job_.mesh.triangles).end,
                                            load.places * std::max(kept_.part, kept_.columns));
@@ -314,7 +315,7 @@ bool BrickFill::fits(const Load& load) const {
            largest <= device_.info.maxAllocationBytes;
 }
 
-// The end of the run of bricks from `first` on that go into one batch.
+// The end of the run of bricks from `first` on that fits into one batch.
 std::size_t BrickFill::lastFitting(std::size_t first) const {
     if (!fits(loadOf(first, first + 1)))
         memory_.refuse(batchesInFlight * bytesOf(loadOf(first, first + 1)), "a brick of the grid");
@@ -335,7 +336,7 @@ void BrickFill::planBatches() {
     }
 }
 
-// Makes the buffers large enough: for any batch, if the batch's share of the memory allows.
+// Enlarges the buffers: to the size of any batch, if the batch's share of the memory allows.
 void BrickFill::reserve(Batch& batch, const Load& load) {
     Buffers& b = batch.buffers;
     if (b.capacity.covers(load)) return;
@@ -365,7 +366,7 @@ void BrickFill::reserve(Batch& batch, const Load& load) {
     if (job_.mesh.triangles) b.triangles = part(places.triangles, places.end);
 }
 
-// Sends the kernels of a batch on their way, and the number of blocks that come of it.
+// Enqueues the kernels of a batch, and the download of the number of its blocks.
 void BrickFill::start(Batch& batch, std::size_t first, std::size_t last) {
     const Load load = loadOf(first, last);
     reserve(batch, load);
@@ -410,7 +411,7 @@ void BrickFill::start(Batch& batch, std::size_t first, std::size_t last) {
     batch.queue.flush();
 }
 
-// Waits for a batch, if it is under way, and hands its blocks on, on the device or to the host.
+// Waits for a batch in flight, and passes its blocks on, on the device or to the host.
 void BrickFill::finish(Batch& batch) {
     if (batch.load.bricks == 0) return;
     batch.counted.wait();
@@ -431,7 +432,7 @@ void BrickFill::finish(Batch& batch) {
     batch.load = {};
 }
 
-// Leaves blocks on the device: the batch goes on when the commands that take them over have ended.
+// Keeps blocks on the device. The batch is reused when the commands that read its blocks have ended.
 void BrickFill::keep(Batch& batch, std::size_t blocks) {
     keep_(batch.buffers.origins, batch.buffers.distances, blocks);
     std::vector<cl::Event> kept(1);
@@ -440,7 +441,7 @@ void BrickFill::keep(Batch& batch, std::size_t blocks) {
     batch.queue.enqueueBarrierWithWaitList(&kept);
 }
 
-// Hands blocks to the host.
+// Passes blocks to the host.
 void BrickFill::handOver(Batch& batch, std::size_t blocks) {
     const Buffers& b = batch.buffers;
     if (batch.results) {
@@ -487,7 +488,8 @@ void BrickFill::run() {
     if (!open_.empty()) fillOpen();
 }
 
-// Fills the blocks whose sides the triangles near them leave open on the processor, which knows the whole mesh.
+// Fills blocks on the processor whose inside/outside classification is not decided by nearby triangles; the processor
+// uses the whole mesh.
 void BrickFill::fillOpen() {
     const auto before = [](const glm::ivec3& a, const glm::ivec3& b) {
         return std::tie(a.x, a.y, a.z) < std::tie(b.x, b.y, b.z);

@@ -1,5 +1,5 @@
-// The methods that work brick by brick on a device: triangles are binned into bricks, cut into parts, and blocks filled
-// from those; bricks stream through the device's memory in batches.
+// The methods that fill brick by brick on a device. Triangles are binned into bricks and cut into parts, and blocks are
+// filled from the parts. Bricks stream through the device's memory in batches.
 #pragma once
 
 #include <functional>
@@ -10,16 +10,15 @@
 
 namespace bilayer::detail {
 
-/// Takes filled blocks over on the device, as FilledBlocks has them: commands that read the buffers go into the
-/// device's queue before it returns.
+/// Receives filled blocks on the device, in the layout of FilledBlocks. It must enqueue all commands that read the
+/// buffers in the device's queue before it returns.
 using DeviceSink = std::function<void(const cl::Buffer& origins, const cl::Buffer& distances, std::size_t blocks)>;
 
 /// Fills all blocks of a job by Method::exact or Method::doubleLayer.
-/// @param keep  gets the blocks that the device filled, if it is not null; the job's sink gets all others
-/// Throws as openclFiller()'s does.
+/// @param keep  if not null, gets the blocks that the device filled; the job's sink gets all others
 void fillByBricks(DeviceImpl& device, const OpenclOptions& options, const FillJob& job, const DeviceSink& keep = {});
 
-/// The x of a slot's origin where the slot is left empty.
+/// The x of the origin of an empty slot.
 inline constexpr int noBlock = std::numeric_limits<int>::min();
 
 }  // namespace bilayer::detail

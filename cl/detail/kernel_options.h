@@ -1,4 +1,4 @@
-// What the options of a filler or a field come to on a device.
+// Translates the options of a filler or a field for a device.
 #pragma once
 
 #include <cstdint>
@@ -9,7 +9,7 @@
 
 namespace bilayer::detail {
 
-/// Most device memory to use [bytes].
+/// Limit of device memory [bytes].
 inline std::uint64_t memoryBudget(const DeviceImpl& device, std::uint64_t memoryMiB) {
     constexpr std::uint64_t mebibyte = 1 << 20;
     return memoryMiB > 0 ? memoryMiB * mebibyte : device.info.memoryBytes / 4 * 3;
@@ -20,9 +20,7 @@ inline bool wantsGroups(const DeviceImpl& device, KernelMapping mapping) {
     return mapping == KernelMapping::automatic ? device.info.gpu : mapping == KernelMapping::groupPerBlock;
 }
 
-/// What every program is built with.
-/// @param groups     whether work-items share the work of a group
-/// @param triangles  whether the nearest triangles are kept
+/// Build options of every program.
 inline std::string commonBuildOptions(const DeviceImpl& device, bool groups = false, bool triangles = false) {
     std::string options = "-cl-std=CL1.2";
     if (device.info.exactSquareRoots) options += " -cl-fp32-correctly-rounded-divide-sqrt";
@@ -31,8 +29,8 @@ inline std::string commonBuildOptions(const DeviceImpl& device, bool groups = fa
     return options;
 }
 
-/// Commands in flight use memory that goes with what this stands in: they have ended when this goes, whatever else went
-/// wrong. As a member it comes last, to go first.
+/// Scope guard: its destructor waits until the commands of a queue have ended, also after an error. The commands use
+/// memory of the enclosing scope. As a class member it must be declared last, so that it is destroyed first.
 class Ended {
   public:
     explicit Ended(const cl::CommandQueue& queue) : queue_(queue) {}

@@ -7,7 +7,7 @@ namespace bilayer::detail {
 namespace {
 
 constexpr std::uint64_t mebibyte = 1 << 20;
-/// What a device keeps from one build to the next, at most.
+/// Maximum memory that a device keeps between builds.
 constexpr std::uint64_t maxSpareBytes = 128 * mebibyte;
 
 std::uint64_t sizeOf(const cl::Buffer& buffer) {
@@ -28,7 +28,7 @@ cl::Buffer DeviceMemory::allocate(std::uint64_t bytes, const std::string& purpos
     return buffer;
 }
 
-// Null if there is none of this size. Then those of other sizes make room where the budget would be exceeded.
+// Returns null if there is none of this size. Buffers of other sizes are then freed if the budget would be exceeded.
 cl::Buffer DeviceMemory::takeSpare(std::uint64_t bytes) {
     const std::lock_guard lock(device_.mutex);
     const auto found = device_.spares.find(bytes);
@@ -48,7 +48,7 @@ void DeviceMemory::clearSpares() {
     device_.spareBytes = 0;
 }
 
-// Not what is still mapped, as after an error.
+// Does not keep buffers that are still mapped, as after an error.
 void DeviceMemory::keepSpare(const cl::Buffer& buffer) {
     if (buffer.getInfo<CL_MEM_MAP_COUNT>() > 0) return;
     const std::uint64_t bytes = sizeOf(buffer);
@@ -85,7 +85,7 @@ cl::Buffer DeviceMemory::upload(const void* data, std::uint64_t bytes, const std
         return buffer;
     }
     count(bytes, purpose);
-    // OpenCL's signature asks for a pointer to what may change; it is only read
+    // OpenCL's signature takes a pointer to mutable data; it is only read
     return cl::Buffer(device_.context, CL_MEM_READ_ONLY | CL_MEM_USE_HOST_PTR, bytes, const_cast<void*>(data));
 }
 

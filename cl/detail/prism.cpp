@@ -1,5 +1,5 @@
-// Blocks stream through the device in batches of whole bricks. Two batches take turns: while the device fills one, the
-// host makes the prisms of the next and hands on the one before.
+// Blocks stream through the device in batches of whole bricks. Two batches alternate: while the device fills one, the
+// host makes the prisms of the next and passes on the previous one.
 #include "cl/detail/prism.h"
 
 #include <oneapi/tbb/parallel_for.h>
@@ -27,10 +27,10 @@ extern const char* const prism_cl;  // the text of prism.cl
 namespace {
 
 constexpr std::size_t windowBricks = 128;  // prepared at once: a few thousand blocks, enough to keep a large GPU busy
-constexpr std::size_t itemsPerBlock = 64;  // of a row an item; as in the kernel
+constexpr std::size_t itemsPerBlock = 64;  // one item per row, as in the kernel
 constexpr std::size_t batchesInFlight = 2;
 
-// How much a batch holds, and what that takes on the device.
+// The size of a batch, and its memory on the device.
 struct Load {
     std::uint64_t blocks = 0, prisms = 0, entries = 0;
 
@@ -57,11 +57,11 @@ Load loadOf(const PrismBlocks& blocks) {
 }
 
 struct Batch {
-    std::vector<Load> begins;         // what comes before each brick, and in all
+    std::vector<Load> begins;         // sum of the loads before each brick, and the total
     std::vector<glm::ivec3> origins;  // of blocks
     Load capacity;                    // of the buffers
     cl::Buffer prismBuffer, placeBuffer, offsetBuffer, reachingBuffer, distanceBuffer, triangleBuffer;
-    const float* distances = nullptr;         // mapped once `filled` has happened
+    const float* distances = nullptr;         // mapped after `filled`
     const std::int32_t* triangles = nullptr;  // likewise
     cl::Event filled;
 
@@ -95,7 +95,8 @@ class Fill {
     DeviceMemory memory_;
     const std::uint64_t share_;  // of the memory, for a batch [bytes]
     cl::Kernel kernel_;
-    cl::CommandQueue uploads_;         // beside the device's own, so that a batch goes up while another is filled
+    // in addition to the device's own, so that a batch is uploaded while another is filled
+    cl::CommandQueue uploads_;
     std::vector<PrismBlocks> window_;  // the bricks from firstPrepared_ on
     std::size_t firstPrepared_ = 0;
     std::array<Batch, batchesInFlight> batches_;
@@ -146,14 +147,13 @@ void Fill::prepare(std::size_t first, std::size_t last) {
     });
 }
 
-// Whether a batch may be as large as this: its share of the memory, the largest buffer, and 32 bits for the kernel's
-// indices.
+// Whether a batch of this size fits its share of the memory, the largest buffer, and the kernel's 32-bit indices.
 bool Fill::fits(const Load& load) const {
     return load.bytes(mesh_.triangles) <= share_ && load.largestBuffer() <= device_.info.maxAllocationBytes &&
            std::max(load.entries, load.prisms) <= std::numeric_limits<cl_uint>::max();
 }
 
-// The end of the run of prepared bricks from `first` on that go into one batch.
+// The end of the run of prepared bricks from `first` on that fits into one batch.
 std::size_t Fill::lastFitting(std::size_t first) const {
     const std::size_t end = std::min(firstPrepared_ + windowBricks, bins_.count());
     Load load = loadOf(window_[first - firstPrepared_]);
@@ -168,7 +168,7 @@ std::size_t Fill::lastFitting(std::size_t first) const {
     return last;
 }
 
-// Notes what a batch is to hold: the bricks' blocks.
+// Sets the content of a batch: the bricks' blocks.
 void Fill::take(Batch& batch, std::size_t first, std::size_t last) const {
     batch.begins.assign(1, {});
     for (std::size_t brick = first; brick < last; ++brick) {
@@ -179,7 +179,7 @@ void Fill::take(Batch& batch, std::size_t first, std::size_t last) const {
     }
 }
 
-// Makes the buffers large enough. They grow, but never beyond the batch's share of the memory.
+// Enlarges the buffers, up to the batch's share of the memory.
 void Fill::reserve(Batch& batch) {
     const Load load = batch.load(), grown = load.atLeast(batch.capacity);
     if (grown == batch.capacity) return;
@@ -197,7 +197,7 @@ void Fill::reserve(Batch& batch) {
     if (mesh_.triangles) batch.triangleBuffer = buffer(batch.capacity.resultBytes());
 }
 
-// Joins the bricks' prisms and lists right where the device, or its driver, wants them.
+// Writes the bricks' prisms and lists directly to the memory of the device or its driver.
 std::vector<cl::Event> Fill::upload(Batch& batch, std::size_t first) {
     const Load load = batch.load();
     const auto mapped = [&](const cl::Buffer& buffer, std::uint64_t bytes) {
@@ -228,7 +228,7 @@ std::vector<cl::Event> Fill::upload(Batch& batch, std::size_t first) {
     return uploaded;
 }
 
-// Sends a batch on its way: prisms and lists up, kernel, distances down.
+// Enqueues a batch: upload of prisms and lists, kernel, download of distances.
 void Fill::start(Batch& batch, std::size_t first) {
     const std::size_t blocks = batch.origins.size();
     if (blocks == 0) return;
@@ -246,7 +246,7 @@ void Fill::start(Batch& batch, std::size_t first) {
     device_.queue.enqueueNDRangeKernel(kernel_, cl::NullRange, cl::NDRange(blocks * items), cl::NDRange(items),
                                        &uploaded, timing_.event(Timing::Of::kernel));
 
-    // mapping copies nothing where the memory is shared
+    // mapping copies nothing in shared memory
     const auto mapped = [&](const cl::Buffer& buffer) {
         return device_.queue.enqueueMapBuffer(buffer, CL_FALSE, CL_MAP_READ, 0, batch.load().resultBytes(), nullptr,
                                               &batch.filled);
@@ -260,7 +260,7 @@ void Fill::start(Batch& batch, std::size_t first) {
     device_.queue.flush();
 }
 
-// Waits for a batch, if it is under way, and hands its blocks on.
+// Waits for a batch in flight, and passes its blocks on.
 void Fill::finish(Batch& batch) {
     const bool filled = !batch.origins.empty();
     if (filled) batch.filled.wait();

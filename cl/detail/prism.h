@@ -1,4 +1,4 @@
-// The prism method on an OpenCL device; kernels in prism.cl, what the host prepares in prism_bins.h.
+// The prism method on an OpenCL device; kernels in prism.cl, host side in prism_bins.h.
 #pragma once
 
 #include <bilayer/cl/device.h>
@@ -7,10 +7,9 @@
 
 namespace bilayer::detail {
 
-/// Fills the blocks of a job whose method is Method::prism. Distances are those to the nearest of the triangles whose
-/// prism holds the voxel, +infinity where none does or beyond the job's reach.
-/// Throws cl::Error, Cancelled, and DeviceError where the memory is too small for one brick's work; the text then says
-/// how many MiB are needed.
+/// Fills the blocks of a job whose method is Method::prism. A distance is that to the nearest triangle whose prism
+/// contains the voxel, or +infinity if there is none or it is beyond the job's reach. Throws cl::Error, Cancelled, and
+/// DeviceError if the memory is too small for one brick's work; the text then states how many MiB are needed.
 void fillPrism(DeviceImpl& device, const OpenclOptions& options, const FillJob& job);
 
 }  // namespace bilayer::detail

@@ -15,9 +15,9 @@
 namespace bilayer::detail {
 namespace {
 
-constexpr double boxSlack = 1e-2;      // around the box of a prism: its overlap and the rounding of floats [voxels]
-constexpr double folded = 1e-6;        // two faces that lie on each other to within this angle have no plane between
-constexpr double parallel = 1e-9;      // side planes this near to parallel have no corner that a box needs to hold
+constexpr double boxSlack = 1e-2;      // margin of a prism's box: overlap and rounding [voxels]
+constexpr double folded = 1e-6;        // two faces that coincide to within this angle have no bisecting plane
+constexpr double parallel = 1e-9;      // side planes this close to parallel have no corner that the box must contain
 constexpr int blocksWorthCulling = 8;  // a prism whose box meets more blocks is tested against each
 
 using Triangle = std::array<glm::dvec3, 3>;
@@ -30,7 +30,7 @@ struct Box {
     }
 };
 
-// A triangle with its longest edge first, and the vertices across its edges.
+// A triangle with its longest edge first, and the opposite vertices across its edges.
 struct Base {
     Triangle corners;
     std::array<std::optional<glm::dvec3>, 3> across;
@@ -63,7 +63,7 @@ struct Shape {
     double lengths[3];
     glm::dvec2 lean[3];
 
-    // In the frame, from an offset in voxels.
+    // An offset in voxels, transformed to the frame.
     glm::dvec3 inFrame(const glm::dvec3& offset) const {
         return {glm::dot(axes[0], offset), glm::dot(axes[1], offset), glm::dot(axes[2], offset)};
     }
@@ -71,8 +71,8 @@ struct Shape {
     glm::dvec2 inward(int k) const { return {-along[k].y, along[k].x}; }
 };
 
-// The plane that halves the angle between a face and its neighbour across edge k is as far from both, so that its
-// normal is the difference of the two directions from the edge into the faces.
+// The plane that bisects the angle between a face and its neighbour across edge k is equidistant from both. Its normal
+// is thus the difference of the two directions from the edge into the faces.
 glm::dvec2 leanTo(const Shape& shape, int k, const glm::dvec3& vertexAcross) {
     const glm::dvec3 offset = shape.inFrame(vertexAcross - shape.start);
     const glm::dvec2 fromEdge = glm::dvec2(offset) - shape.corners[k];
@@ -84,7 +84,7 @@ glm::dvec2 leanTo(const Shape& shape, int k, const glm::dvec3& vertexAcross) {
     return length > folded ? normal / length : glm::dvec2(0);
 }
 
-// Nothing where the triangle has no area.
+// Nothing if the triangle has no area.
 std::optional<Shape> shapeOf(const Base& base) {
     const auto& [a, b, c] = base.corners;
     const glm::dvec3 normal = glm::cross(b - a, c - a);
@@ -108,7 +108,7 @@ std::optional<Shape> shapeOf(const Base& base) {
     return shape;
 }
 
-// The two ends of the line in which the side planes at a corner meet; false where they do not.
+// Adds the two ends of the line in which the side planes at a vertex meet. Returns false if they do not meet.
 bool addCorner(const Shape& shape, int k, double reach, Box& box) {
     const int before = (k + 2) % 3;
     const glm::dvec2 p = shape.lean[before].x * shape.inward(before), q = shape.lean[k].x * shape.inward(k);
@@ -124,8 +124,8 @@ bool addCorner(const Shape& shape, int k, double reach, Box& box) {
     return true;
 }
 
-// A cut through the prism at any height is a triangle like its own, smaller or larger: so the prism lies between the
-// corners of its two ends.
+// A cross section of the prism at any height is a triangle similar to its own. So the vertices of its two ends bound
+// the prism.
 Box boxOf(const Shape& shape, const Triangle& corners, double reach) {
     Box near{corners[0], corners[0]};
     near.add(corners[1]);
@@ -151,7 +151,7 @@ Prism rounded(const Shape& shape, const Box& box, std::uint32_t triangle) {
     return prism;
 }
 
-// A half of space: normal . v >= -depth.
+// A half-space: normal . v >= -depth.
 struct Plane {
     glm::dvec3 normal;
     double depth;
@@ -171,7 +171,7 @@ std::array<Plane, 5> planesOf(const Shape& shape, double reach) {
     return planes;
 }
 
-// Whether all voxels of a block are outside one of the planes.
+// Whether all voxels of a block are outside of one of the planes.
 bool parted(const std::array<Plane, 5>& planes, const glm::ivec3& block) {
     constexpr double half = 0.5 * (blockSide - 1);
     const glm::dvec3 centre = glm::dvec3(block * blockSide) + half;
@@ -181,7 +181,7 @@ bool parted(const std::array<Plane, 5>& planes, const glm::ivec3& block) {
     });
 }
 
-// Adds a prism and its blocks, if it meets any.
+// Adds a prism and its blocks, if it reaches any.
 void bin(const Shape& shape, const Box& box, double reach, std::uint32_t triangle, int side, PrismBlocks& blocks) {
     const glm::ivec3 last(side / blockSide - 1);
     if (glm::any(glm::lessThan(box.upper, glm::dvec3(0))) || glm::any(glm::greaterThan(box.lower, glm::dvec3(side))))
@@ -205,7 +205,7 @@ void bin(const Shape& shape, const Box& box, double reach, std::uint32_t triangl
     if (blocks.pairs.size() > before) blocks.prisms.push_back(rounded(shape, box, triangle));
 }
 
-// The second half of a counting sort: pairs of block and prism become a list for each block.
+// The second half of a counting sort: converts pairs of block and prism to a list for each block.
 void sortPairs(int blocksAlong, PrismBlocks& blocks) {
     blocks.places.clear();
     blocks.offsets.assign(1, 0);
@@ -228,7 +228,7 @@ void sortPairs(int blocksAlong, PrismBlocks& blocks) {
 VerticesAcross::VerticesAcross(const Mesh& mesh, Progress& progress)
     : ofTriangle(mesh.triangles.size(), glm::uvec3(none)) {
     const Topology topology(mesh, &progress);
-    // the edge of a triangle that starts, or ends, with a vertex of the welded mesh
+    // the edge of a triangle that starts or ends at a vertex of the welded mesh
     const auto edgeOf = [&](const EdgeUse& use) {
         const glm::uvec3& t = topology.triangles[use.triangle];
         const unsigned from = use.forward ? use.low : use.high;

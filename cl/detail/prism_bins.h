@@ -1,11 +1,12 @@
-// Prisms around triangles, and which of them reach which block: what the host prepares for the prism method.
+// Builds the prisms around triangles and bins them by the blocks that they reach: the host side of the prism method.
 //
 // C. Sigg, R. Peikert, M. Gross, "Signed distance transform using graphics hardware", IEEE Visualization 2003. The
-// prism of a triangle is as high as the band on both sides, and its three side planes halve the angles to the
-// neighbours across its edges: one polyhedron a triangle, that stands for the Voronoi cell of the face and for parts of
-// those of its edges and vertices. Around a vertex of more than three edges the side planes do not meet in one line, so
-// that prisms overlap there or leave gaps; and those of triangles narrower than the band may close below it. That is
-// the method's leak.
+// prism of a triangle extends as high as the band on both sides. Its three side planes bisect the angles to the
+// neighbours across its edges. One polyhedron per triangle thus covers the Voronoi cell of the face and parts of the
+// cells of its edges and vertices.
+//
+// The method leaks. Around a vertex of more than three edges the side planes do not meet in one line, so the prisms
+// overlap there or leave gaps. The prisms of triangles narrower than the band may close below its full height.
 #pragma once
 
 #include <cstddef>
@@ -20,23 +21,23 @@
 
 namespace bilayer::detail {
 
-/// A prism in the frame (u, n x u, n) of its triangle, with corner 0 in the origin, corner 1 on u and n to the outside.
-/// Edge k runs from corner k to the next one. Lengths are in voxels, voxels are counted from the first of the brick. As
-/// in prism.cl.
+/// A prism in the frame (u, n x u, n) of its triangle: vertex 0 is the origin, vertex 1 is on u, and n points outward.
+/// Edge k runs from vertex k to the next one. Lengths are in voxels; voxels are counted from the first of the brick.
+/// Same layout as in prism.cl.
 struct Prism {
     glm::vec3 u, n;          ///< axes
     glm::vec3 origin;        ///< the brick's first voxel, in the frame
-    glm::vec3 lower, upper;  ///< a box around the part of the prism within reach of the triangle
+    glm::vec3 lower, upper;  ///< bounding box of the part of the prism within reach of the triangle
     float length;            ///< of edge 0, the longest
-    glm::vec2 apex;          ///< corner 2, in the frame
+    glm::vec2 apex;          ///< vertex 2, in the frame
     glm::vec2 lean[3];       ///< a point is on this side of edge k if lean.x * (its depth behind the edge) + lean.y *
                              ///< (its height) >= 0; zero where no two triangles share the edge: no plane ends it there
     std::int32_t triangle;   ///< index into Mesh::triangles
 };
 static_assert(sizeof(Prism) == 25 * sizeof(float));
 
-/// For each edge of each triangle (edge k runs from corner k to the next one) the vertex across it, of the one other
-/// triangle that shares it; `none` where there is no other one, or several. Throws Cancelled.
+/// For each edge of each triangle, the opposite vertex of the one other triangle that shares the edge. `none` if no
+/// other triangle shares it, or several do. Edge k runs from vertex k to the next one. Throws Cancelled.
 struct VerticesAcross {
     static constexpr std::uint32_t none = ~0u;
 
@@ -45,7 +46,7 @@ struct VerticesAcross {
     std::vector<glm::uvec3> ofTriangle;
 };
 
-/// What prisms are made from.
+/// Input of the prisms.
 struct PrismJob {
     const Mesh& mesh;
     const VerticesAcross& across;
@@ -55,8 +56,8 @@ struct PrismJob {
 
 /// The prisms and blocks of a brick.
 struct PrismBlocks {
-    std::vector<Prism> prisms;            ///< by triangle; those that reach a block
-    std::vector<glm::ivec3> places;       ///< each block's first voxel, from that of the brick
+    std::vector<Prism> prisms;            ///< sorted by triangle; only those that reach a block
+    std::vector<glm::ivec3> places;       ///< first voxel of each block, relative to the brick's
     std::vector<std::uint32_t> offsets;   ///< prisms of block b: reaching[offsets[b]] .. reaching[offsets[b + 1]]
     std::vector<std::uint32_t> reaching;  ///< indices into `prisms`, ascending in each block
 
@@ -67,8 +68,8 @@ struct PrismBlocks {
     std::vector<std::uint32_t> cursors;  ///< likewise
 };
 
-/// Makes the prisms of a brick's triangles and bins them into its blocks; a triangle without an area has none. `blocks`
-/// is overwritten; its memory is used again.
+/// Makes the prisms of a brick's triangles and bins them into its blocks. A triangle without an area has none.
+/// Overwrites `blocks` and reuses its memory.
 void binPrisms(const PrismJob& job, const TriangleBins& bins, std::size_t brick, PrismBlocks& blocks);
 
 }  // namespace bilayer::detail

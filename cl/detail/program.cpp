@@ -16,7 +16,7 @@ namespace {
 
 using Binary = std::vector<unsigned char>;
 
-constexpr std::string_view fileMark = "bilayer program\n";  // first bytes of a file in the cache; its checksum follows
+constexpr std::string_view fileMark = "bilayer program\n";  // first bytes of a cache file; its checksum follows
 
 // The names of OpenCL 1.2's codes without "CL_", from 0 down, and without "CL_INVALID_", from CL_INVALID_VALUE down.
 constexpr const char* runTimeCodes =
@@ -32,7 +32,7 @@ constexpr const char* invalidCodes =
     "GLOBAL_OFFSET EVENT_WAIT_LIST EVENT OPERATION GL_OBJECT BUFFER_SIZE MIP_LEVEL GLOBAL_WORK_SIZE PROPERTY "
     "IMAGE_DESCRIPTOR COMPILER_OPTIONS LINKER_OPTIONS DEVICE_PARTITION_COUNT";
 
-// The word at this index, or nothing beyond the last.
+// The word at this index, or nothing beyond the last one.
 std::string word(const char* words, int index) {
     std::istringstream stream(words);
     std::string found;
@@ -52,7 +52,7 @@ std::string_view viewed(const Binary& binary) {
     return {reinterpret_cast<const char*>(binary.data()), binary.size()};
 }
 
-// The program inside a file of the cache, unless it is missing or damaged: drivers may crash on a damaged one.
+// Reads a program from the cache. Nothing if the file is missing or damaged: drivers may crash on a damaged one.
 std::optional<Binary> readBinary(const std::filesystem::path& path) {
     std::ifstream file(path, std::ios::binary);
     std::string mark(fileMark.size(), '\0');
@@ -64,7 +64,8 @@ std::optional<Binary> readBinary(const std::filesystem::path& path) {
     return binary;
 }
 
-// A full disk or a folder without permission costs only the next start's time, so nobody hears of it.
+// Stores a program in the cache. Errors are not reported: a full disk or a folder without permission only costs time at
+// the next start.
 void writeBinary(const std::filesystem::path& path, const cl::Program& program) {
     try {
         const Binary binary = program.getInfo<CL_PROGRAM_BINARIES>().front();
@@ -82,7 +83,7 @@ void writeBinary(const std::filesystem::path& path, const cl::Program& program) 
     }
 }
 
-// Null where the driver no longer takes the binary.
+// Null if the driver rejects the binary.
 cl::Program loaded(const DeviceImpl& device, const Binary& binary, const std::string& options) try {
     cl::Program program(device.context, {device.device}, {binary});
     program.build(options.c_str());

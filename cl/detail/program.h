@@ -1,4 +1,5 @@
-// The inside of a Device, for the files of this folder and their tests: OpenCL objects, compiled programs, error texts.
+// The implementation of Device, for the files of this folder and their tests: OpenCL objects, compiled programs, error
+// texts.
 #pragma once
 
 #define CL_HPP_ENABLE_EXCEPTIONS
@@ -20,25 +21,27 @@ struct DeviceImpl {
     DeviceInfo info;
     cl::Device device;
     cl::Context context;
-    cl::CommandQueue queue;                                               // in order
-    std::mutex mutex;                                                     // guards what follows
+    cl::CommandQueue queue;                                               // in-order queue
+    std::mutex mutex;                                                     // guards the members below
     std::map<std::pair<std::string, std::string>, cl::Program> programs;  // by source and build options
-    std::multimap<std::uint64_t, cl::Buffer> spares;                      // by size: memory.h
+    std::multimap<std::uint64_t, cl::Buffer> spares;                      // by size; see memory.h
     std::uint64_t spareBytes = 0;
 };
 
 /// The name of an OpenCL error code, "CL_OUT_OF_RESOURCES"; "code -9999" for one that is not in the standard.
 std::string errorName(cl_int code);
 
-/// What an OpenCL call threw, as text: the call, the code's name, the device, and the log where a build failed.
+/// Converts an exception of an OpenCL call to text: the call, the code's name, the device, and the log of a failed
+/// build.
 DeviceError deviceError(const cl::Error& error, const std::string& deviceName);
 
-/// A program built for the device: from its memory, from the cache on disk, or compiled and put into both. A cache that
-/// cannot be read or written is done without. Throws DeviceError with the build log when the source does not compile.
+/// Returns a program built for the device: from its memory, from the cache on disk, or compiled and stored in both. A
+/// cache that cannot be read or written is ignored. Throws DeviceError with the build log if the source does not
+/// compile.
 cl::Program buildProgram(DeviceImpl& device, const std::string& source, const std::string& options);
 
-/// Where buildProgram() keeps the compiled program: in $XDG_CACHE_HOME/bilayer, else ~/.cache/bilayer; empty where
-/// neither variable is set. Another driver, platform, source or option gives another name.
+/// The file where buildProgram() stores the compiled program: in $XDG_CACHE_HOME/bilayer, else ~/.cache/bilayer; empty
+/// if neither variable is set. The name depends on driver, platform, source and options.
 std::filesystem::path cachedProgram(const DeviceInfo& device, const std::string& source, const std::string& options);
 
 }  // namespace bilayer::detail

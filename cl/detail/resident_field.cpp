@@ -1,5 +1,5 @@
-// Each batch of blocks that the fill leaves on the device is trimmed to the band at once, into a page of its own. When
-// all have come, and their number is known, pages are copied into the layout.
+// Each batch of blocks that the fill leaves on the device is trimmed to the band at once, into a page of its own. After
+// the last batch, when their number is known, the pages are copied into the layout.
 #include "cl/detail/resident_field.h"
 
 #include <algorithm>
@@ -22,7 +22,7 @@ extern const char* const resident_cl;  // the text of resident.cl
 namespace {
 
 constexpr std::size_t groupItems = 64;       // ITEMS of common.cl
-constexpr std::size_t itemsAlongParts = 32;  // along z: they stand side by side in memory
+constexpr std::size_t itemsAlongParts = 32;  // along z, which is contiguous in memory
 constexpr cl_int unknownEntry = -3;          // UNKNOWN of resident.cl
 constexpr cl_float maxParts = 16;            // MOST_PARTS of resident.cl
 constexpr const char* field = "the field";
@@ -81,13 +81,13 @@ class ResidentFill {
         device_.queue.enqueueNDRangeKernel(kernel, cl::NullRange, global, local, nullptr,
                                            timing_.event(Timing::Of::kernel));
     }
-    // A work-group, or a single item, for each block.
+    // Enqueues a kernel with a work-group, or a single item, for each block.
     template <class... Arguments>
     void enqueueBlocks(const char* name, std::size_t blocks, const Arguments&... arguments) {
         const std::size_t items = gpuMapping_ ? groupItems : 1;
         enqueue(name, cl::NDRange(blocks * items), cl::NDRange(items), arguments...);
     }
-    // A work-item for each part of space that has a clearance.
+    // Enqueues a kernel with a work-item for each coarse cell that has a clearance.
     template <class... Arguments>
     void enqueueParts(const char* name, const Arguments&... arguments) {
         const glm::ivec3 size = layout_.frame.parts();
@@ -105,7 +105,7 @@ class ResidentFill {
     cl::Program program_;
     cl::Buffer summary_;
     std::vector<Page> pages_;
-    std::mutex mutex_;                     // guards what comes from the host
+    std::mutex mutex_;                     // guards the data from the host
     std::vector<glm::ivec3> hostOrigins_;  // of blocks that the host filled
     std::vector<float> hostDistances_;     // [voxels]
     DeviceLayout layout_;
@@ -178,7 +178,7 @@ Summary ResidentFill::readSummary() {
     return summary;
 }
 
-// As FieldLayout's constructor and LevelSet have it.
+// Computes the frame as FieldLayout's constructor and LevelSet do.
 void ResidentFill::measureFrame() {
     const Summary summary = readSummary();
     if (summary.activeLower[0] > summary.activeUpper[0])
@@ -270,7 +270,7 @@ DeviceLayout buildResident(const Device& device, const Mesh& mesh, const BuildOp
     fillOnly(mesh, withoutTriangles,
              {"opencl", device.info().name, [&](const FillJob& job) {
                   checkJob(job);
-                  // what came before had signs that contradict each other
+                  // the first fill had contradictory signs
                   for (cl::Buffer* buffer : {&layout.directory, &layout.centres, &layout.values}) memory.free(*buffer);
                   layout = ResidentFill(device, fillOptions, memory, job).run();
               }});

@@ -1,4 +1,4 @@
-// A field that is built on a device and stays there; kernels in resident.cl.
+// Builds a field that stays on a device; kernels in resident.cl.
 #pragma once
 
 #include <bilayer/sdf/build.h>
@@ -29,13 +29,14 @@ struct DeviceLayout {
     cl::Buffer directory, centres, values;
 };
 
-/// The part of a memory budget that the fill's own work may take.
+/// Divisor of the memory budget: the fill's own work may take 1 / fillPart of it.
 inline constexpr std::uint64_t fillPart = 4;
 
-/// Builds the field of a mesh on a device: only the mesh goes up, and only counts come down. The layout's buffers come
-/// from `memory`, whose budget is that of the options less the fill's part.
-/// Throws what build() throws, cl::Error, DeviceError, and std::invalid_argument where the method or the way to signs
-/// needs the processor.
+/// Builds the field of a mesh on a device. Only the mesh is uploaded, and only counts are downloaded. The layout's
+/// buffers come from `memory`, whose budget is that of the options less the fill's part.
+///
+/// Throws what build() throws, cl::Error, DeviceError, and std::invalid_argument if the method or the sign method needs
+/// the processor.
 DeviceLayout buildResident(const Device& device, const Mesh& mesh, const BuildOptions& build,
                            const OpenclOptions& options, DeviceMemory& memory);
 

@@ -1,4 +1,4 @@
-// What a device took for a build, by the events of its queues.
+// Measures the device time of a build by the events of its queues.
 #pragma once
 
 #include <algorithm>
@@ -15,10 +15,10 @@ class Timing {
   public:
     enum class Of { kernel, upload, download };
 
-    /// @param times  where the sums go; null: nobody asks, and no event is kept
+    /// @param times  receives the sums; null: no event is kept
     explicit Timing(OpenclTimes* times) : times_(times) {}
 
-    /// Where a command's event shall go; null if nobody asks.
+    /// Storage for a command's event; null if times are not measured.
     cl::Event* event(Of what) {
         if (!times_) return nullptr;
         events_.emplace_back(what, cl::Event());
@@ -28,12 +28,11 @@ class Timing {
         if (times_) events_.emplace_back(what, event);
     }
 
-    /// Adds up all events so far; of kernels that ran at the same time, that time once. Call it when the commands have
-    /// ended.
+    /// Adds up all events so far. Overlapping kernels count once. Call it when the commands have ended.
     void sumUp() {
         std::vector<std::pair<cl_ulong, cl_ulong>> kernels;
         for (const auto& [what, event] : events_) {
-            if (!event()) continue;  // nothing was sent: host and device share the memory
+            if (!event()) continue;  // nothing was copied: host and device share the memory
             const auto begin = event.getProfilingInfo<CL_PROFILING_COMMAND_START>(),
                        end = event.getProfilingInfo<CL_PROFILING_COMMAND_END>();
             if (what == Of::kernel)

@@ -1,28 +1,28 @@
-// Which triangles reach which brick of space, by count, scan and scatter: sdf/triangle_bins.h on a device. A program
-// that includes this text says what parts it cuts a triangle into.
+// Bins triangles by the bricks that they reach, by count, scan and scatter: sdf/fill/triangle_bins.h on a device. A
+// program that includes this file defines the parts that a triangle is cut into.
 #include "vectors.cl"
 
-// What the double layer method samples triangles by (DoubleLayerOptions of sdf/build.h); nothing to others.
+// Sampling options of the double layer method (DoubleLayerOptions of sdf/options.h); unused by others.
 typedef struct {
     double epsilon;
     int maxSubdivision, fillGaps, recursive;
 } Sampling;
 
-// BrickRange of sdf/triangle_bins.cpp, and how the triangles are shared out.
+// BrickRange of sdf/fill/triangle_bins.cpp, and the parameters of the binning.
 typedef struct {
     double voxelsPerUnit;  // [1/m]
-    double reach;          // how far from a triangle a voxel may lie [voxels]
-    double margin;         // parts beyond this from a brick do not matter to it [voxels]
+    double reach;          // maximum distance of a voxel from a triangle [voxels]
+    double margin;         // parts farther than this from a brick do not affect it [voxels]
     int first[3];          // [bricks]
     int size[3];           // [bricks]
-    int shift;             // bricks have 2^shift voxels a side
+    int shift;             // edge of a brick: 2^shift voxels
     uint triangles;
-    uint cells;  // bricks in all
-    uint runs;   // of triangles, with counters of their own each
+    uint cells;  // count of all bricks
+    uint runs;   // runs of triangles, each with its own counters
     Sampling sampling;
 } Grid;
 
-// The next brick of a batch for this group, with no parts so far: groups take them one after another.
+// Takes the next brick of a batch for this group, with no parts so far. Groups take bricks one after another.
 uint takeBrick(global uint* next, SHARED uint* taken, SHARED uint* parts) {
     MEET;
     if (ITEM == 0) {
@@ -33,10 +33,10 @@ uint takeBrick(global uint* next, SHARED uint* taken, SHARED uint* parts) {
     return *taken;
 }
 
-// The parts of each triangle of a batch, whatever brick asks; 0 where that goes by the brick.
+// The parts of each triangle of a batch that are the same for all bricks; 0 if they depend on the brick.
 RealInt partsOfAny(const Grid* grid, const Batch* batch);
 
-// The most parts that a brick with these limits cuts a triangle into.
+// The maximum number of parts that a brick with these limits cuts a triangle into.
 uint countParts(const Grid* grid, const Corners* triangle, const Limits* limits);
 
 int3 toInt3(const int* v) {
@@ -64,8 +64,8 @@ bool parts(double3 axis, double3 a, double3 b, double3 c, double3 room, double r
     return min(x, min(y, z)) > most || max(x, max(y, z)) < -most;
 }
 
-// Whether a plane parts a triangle from a box of bricks and all within reach of it: one along the triangle, a side of
-// the box, or one along an edge of each (S. Gottschalk and others, SIGGRAPH 1996).
+// Separating axis test of a triangle and a box of bricks, grown by the reach. The planes are parallel to the triangle,
+// to a side of the box, or to an edge of each (S. Gottschalk and others, SIGGRAPH 1996).
 bool staysAway(const Grid* grid, const Corners* t, int3 lower, int3 upper) {
     const double side = (double)(1 << grid->shift), reach = grid->reach + 1;
     const double3 low = convert_double3(toInt3(grid->first) + lower) * side,
@@ -86,28 +86,28 @@ bool staysAway(const Grid* grid, const Corners* t, int3 lower, int3 upper) {
     return false;
 }
 
-// Where the bricks around a triangle are counted or listed.
+// Counters and lists of the bricks around a triangle.
 typedef struct {
-    global uint* cursors;  // of each cell: how many triangles, later the place of the next one
-    global uint* more;     // counted: parts of a cell's triangles beyond one each
-    global uint* list;     // listed: triangles of each cell; null while counting
+    global uint* cursors;  // of each cell: count of triangles, later the index of the next one
+    global uint* more;     // while counting: parts of a cell's triangles beyond one each
+    global uint* list;     // while listing: triangles of each cell; null while counting
     uint triangle;
 } Bins;
 
-// `parts` of the triangle come into the cell; 0 if they are to be counted.
+// Adds `parts` parts of the triangle to the cell; 0 if they must be counted.
 void visit(const Bins* bins, const Grid* grid, const Corners* t, uint cell, uint parts) {
     const uint place = takeGlobal(bins->cursors + cell, 1);
     if (bins->list) {
         bins->list[place] = bins->triangle;
     } else if (parts != 1) {
         const Limits limits = limitsOf(grid, brickAt(grid, cell));
-        // fewer than one comes out right too: sums of unsigned numbers wrap around
+        // a result below one is correct too: sums of unsigned numbers wrap around
         atomic_add(bins->more + cell, (parts ? parts : countParts(grid, t, &limits)) - 1);
     }
 }
 
-// Boxes of bricks are halved, and left out where the triangle stays away. So a needle costs its length, not the box
-// around it.
+// Halves boxes of bricks, and skips those that the triangle does not reach. The cost of a needle is thus proportional
+// to its length, not to the box around it.
 #define MOST_BOXES 100  // three times the bits of a coordinate
 void divide(const Bins* bins, const Grid* grid, const Corners* t, int3 lowest, int3 highest, uint parts) {
     int3 lower[MOST_BOXES], upper[MOST_BOXES];
@@ -133,8 +133,8 @@ void divide(const Bins* bins, const Grid* grid, const Corners* t, int3 lowest, i
     }
 }
 
-// The bricks around most triangles: two at most along each axis. A code of 32 bits for the lowest of them and for the
-// axes along which there are two, so that they are worked out once.
+// The bricks around most triangles are at most two along each axis. A 32-bit code holds the lowest brick and the axes
+// with two bricks, so that they are computed once.
 #define MANY_BRICKS UINT_MAX
 
 void visitFew(const Bins* bins, const Grid* grid, const Corners* t, uint code, uint parts) {
@@ -145,7 +145,7 @@ void visitFew(const Bins* bins, const Grid* grid, const Corners* t, uint code, u
                 visit(bins, grid, t, lowest + x * xStep + y * yStep + z, parts);
 }
 
-// The bricks around the triangles of a batch: lowest and extent, all inclusive.
+// The bricks around the triangles of a batch: lowest and extent, inclusive.
 void bricksAround(const Grid* grid, const Batch* batch, Int3* lowest, Int3* extent) {
     const Exact3 low = minExact(batch->a, minExact(batch->b, batch->c)),
                  high = maxExact(batch->a, maxExact(batch->b, batch->c));
@@ -168,7 +168,7 @@ void divideTriangle(const Bins* bins, const Grid* grid, global const float* poin
            (convert_int3(floor(high)) >> grid->shift) - toInt3(grid->first), parts);
 }
 
-// Counts the triangles of a batch in the bricks around them, and gives them their codes.
+// Counts the triangles of a batch in the bricks around them, and stores their codes.
 void countBatch(Bins* bins, const Grid* grid, const Batch* batch, global const float* points,
                 global const uint* triangles, global uint* codes) {
     Int3 lowest, extent;
@@ -194,8 +194,8 @@ void countBatch(Bins* bins, const Grid* grid, const Batch* batch, global const f
     }
 }
 
-// The triangles of this item: a run of them with counters of its own where an item does a group's work, so that no
-// counter is shared and the lists are in ascending order; else all items count together. A batch at each step.
+// The triangles of this item. If one item does a group's work, they are a run with its own counters, so that no counter
+// is shared and the lists are in ascending order. Otherwise all items count together, a batch at each step.
 typedef struct {
     ulong begin, end, step;
     uint run;
@@ -211,7 +211,7 @@ Turn ownTurn(const Grid* grid) {
     return turn;
 }
 
-// `cursors` has runs x cells counters, `more` cells of them; all are zero before. Each triangle gets its code.
+// `cursors` has runs x cells counters, `more` has one per cell; all must be zero. Stores a code for each triangle.
 kernel void countTriangles(global const float* points, global const uint* triangles, Grid grid, global uint* cursors,
                            global uint* more, global uint* codes) {
     const Turn turn = ownTurn(&grid);
@@ -223,8 +223,8 @@ kernel void countTriangles(global const float* points, global const uint* triang
     }
 }
 
-// Turns counts into places. The b-th brick that has triangles gets its cell, and the first of its triangles and of its
-// parts; `total` receives the number of such bricks, of triangles and of parts. One group does all.
+// Converts counts to offsets by a scan. The b-th brick that has triangles gets its cell, its first triangle and its
+// first part. `total` receives the counts of such bricks, of triangles and of parts. One group does all the work.
 GROUP_KERNEL void placeBricks(Grid grid, global uint* cursors, global const uint* more, global uint* cellOfBrick,
                               global uint* triangleOffsets, global uint* partOffsets, global ulong* total) {
     SHARED ulong bricks[ITEMS], triangles[ITEMS], pieces[ITEMS];
@@ -270,7 +270,7 @@ GROUP_KERNEL void placeBricks(Grid grid, global uint* cursors, global const uint
     total[2] = part;
 }
 
-// Lists the triangles of each brick, by the places that placeBricks() made of the counts.
+// Lists the triangles of each brick, at the offsets from placeBricks().
 kernel void listTriangles(global const float* points, global const uint* triangles, Grid grid, global uint* cursors,
                           global const uint* codes, global uint* list) {
     const Turn turn = ownTurn(&grid);

@@ -1,11 +1,11 @@
-// What all kernels share: how work is spread over work-items, vectors of voxels, the mesh.
+// Code of all kernels: division of work over work-items, vectors of voxels, the mesh. A block is a leaf of 8^3 voxels.
 //
 // Two mappings of work to work-items, chosen when a program is built:
-//   default             a work-item does the work of a whole group: for processors, whose vector units take two rows of
-//                       voxels at once
+//   default             a work-item does the work of a whole group: for processors, whose vector units process two rows
+//                       of voxels at once
 //   -D GROUP_PER_BLOCK  a work-group of 64 items works together, each on one row of a block: for GPUs
-// The text is the same: the items of a group share out loops, `ITEM, ITEM + ITEMS, ...`, and meet at barriers; a group
-// of one has all of the loop and needs no barrier.
+// The source is the same for both. The items of a group divide loops, `ITEM, ITEM + ITEMS, ...`, and meet at barriers.
+// A group of one item runs all of the loop and needs no barrier.
 #pragma OPENCL FP_CONTRACT OFF
 #pragma OPENCL EXTENSION cl_khr_fp64 : enable
 
@@ -39,7 +39,7 @@ typedef int16 IntLanes;
 
 #endif
 
-// Vectors that lie anywhere. vstore16() does the same, but PoCL makes many small stores of it.
+// Unaligned vectors. vstore16() does the same, but PoCL makes many small stores of it.
 typedef Lanes LooseLanes __attribute__((aligned(4)));
 typedef IntLanes LooseIntLanes __attribute__((aligned(4)));
 #define storeLanes(value, index, pointer) (*(LooseLanes*)((pointer) + (index) * LANES) = (value))
@@ -48,9 +48,9 @@ typedef IntLanes LooseIntLanes __attribute__((aligned(4)));
 #define storeGlobalLanes(value, index, pointer) (*(global LooseLanes*)((pointer) + (index) * LANES) = (value))
 #define storeGlobalInts(value, index, pointer) (*(global LooseIntLanes*)((pointer) + (index) * LANES) = (value))
 
-// Loops over what shall stay in registers, and functions that take part in such loops.
+// Loops over values that shall stay in registers, and functions used in such loops.
 #define UNROLLED _Pragma("unroll")
-// Loops over what lies all over memory: one load after another is faster than what compilers make for vectors of them.
+// Loops over scattered memory: single loads are faster than the vectors that compilers make of them.
 #ifdef __clang__
 #define ONE_BY_ONE _Pragma("clang loop vectorize(disable) interleave(disable)")
 #else
@@ -58,10 +58,10 @@ typedef IntLanes LooseIntLanes __attribute__((aligned(4)));
 #endif
 #define INLINED inline __attribute__((always_inline))
 
-// The x of a slot's origin where the slot is left empty: noBlock of cl/brick_filler.h.
+// The x of the origin of an empty slot: noBlock of cl/detail/brick_filler.h.
 #define NO_BLOCK INT_MIN
 
-// Stands for every distance beyond reach: farAway of sdf/blocks.h.
+// Value of all distances beyond reach: farAway of sdf/leaf/blocks.h.
 #define FAR_AWAY 1e30f
 
 // Corners of a triangle or of a part of one [voxels].
@@ -106,20 +106,20 @@ Corners cornersOf(global const float* points, global const uint* triangles, uint
 #define laneInts ((IntLanes)(0, 1, 2, 3, 4, 5, 6, 7))
 #endif
 
-// The place of the lowest bit.
+// The position of the lowest set bit.
 int lowestBit(uint bits) {
     return 31 - (int)(clz(bits & -bits));
 }
 
-// Processors with AVX-512 keep a bit for each lane by themselves, and can move the lanes of some bits together. OpenCL C
-// has no words for that, but the compiler that PoCL uses does.
+// Processors with AVX-512 have mask registers with a bit for each lane, and can compress the lanes of set bits. OpenCL
+// C cannot express that, but the compiler of PoCL can.
 #if LANES == 16 && defined(__clang__) && defined(__AVX512DQ__)
 #define COMPRESSES 1
 #else
 #define COMPRESSES 0
 #endif
 
-// A bit for each lane whose comparison held.
+// A bit for each lane where the comparison is true.
 #if COMPRESSES
 #define bitsOf(held) ((uint)(__builtin_ia32_cvtd2mask512(held)))
 #define compressInts(values, bits) __builtin_ia32_compresssi512_mask(values, (IntLanes)(0), (ushort)(bits))
@@ -135,7 +135,7 @@ uint bitsOf(IntLanes held) {
 }
 #endif
 
-// Lanes whose bit is set.
+// A lane mask from bits.
 IntLanes lanesOf(uint bits) {
     return ((IntLanes)(bits) & (IntLanes)(1) << laneInts) != 0;
 }
@@ -151,7 +151,7 @@ bool anyLane(IntLanes held) {
 #endif
 }
 
-// Adds to a counter that all groups, or the items of a group, share; returns what it was.
+// Adds to a counter that all groups, or the items of a group, share. Returns the old value.
 #if ITEMS > 1
 #define takeGlobal(counter, count) atomic_add(counter, count)
 #define takeShared(counter, count) atomic_add(counter, count)

@@ -1,7 +1,7 @@
-// The double layer method on a device: the samples of sdf/layer_samples.h, applied as sdf/layer_block.cpp does it.
+// The double layer method on a device: the samples of sdf/fill/layer_samples.h, applied as in sdf/fill/layer_block.cpp.
 //
-// -D TRIANGLES=1 also keeps whose sample is the nearest; -D PAPER_CUBE=1 replaces the ball around a sample by the
-// paper's cube of (2 K + 1)^3 voxels.
+// -D TRIANGLES=1 also stores the triangle of the nearest sample. -D PAPER_CUBE=1 replaces the ball around a sample by
+// the paper's cube of (2 K + 1)^3 voxels.
 #include "samples.cl"
 
 #ifndef TRIANGLES
@@ -11,8 +11,9 @@
 #define PAPER_CUBE 0
 #endif
 
-// What an item fills at once stays in registers: a cube of 4x4x4 voxels, a vector for each slice of one x, or a GPU's
-// row of 8. Points are picked for a cube or, by all items of a group, for a block; they are seen from its middle.
+// The voxels that an item fills at once stay in registers: a cube of 4x4x4 voxels, a vector for each slice of one x, or
+// on a GPU a row of 8. Points are selected for a cube or, by all items of a group, for a block. Their coordinates are
+// relative to its middle.
 #if ITEMS > 1
 #define SLICES 1
 #define CUBES 1
@@ -24,26 +25,26 @@
 #endif
 #define HALF_SIDE (0.5f * (PICKED_SIDE - 1))
 
-// Points of a layer that are looked at in one go.
+// Points of a layer that are tested at once.
 #define PAGE 1024
-// Rows of cells that an item looks at in one go.
+// Rows of cells that an item tests at once.
 #define MOST_ROWS 64
-// layerTie of sdf/blocks.h [voxels^2].
+// layerTie of sdf/leaf/blocks.h [voxels^2].
 #define LAYER_TIE 1e-5f
 
-// FillParameters of sdf/blocks.h [voxels].
+// FillParameters of sdf/leaf/blocks.h [voxels].
 typedef struct {
     float delta, reach, certain;
     int cube;
 } Layers;
 
-// Where an item's voxels are, from the middle of what points are picked for.
+// Positions of an item's voxels, relative to the middle of the cube or block that points are selected for.
 typedef struct {
     Lanes x[SLICES], y, z;
 } Voxels;
 
-// `first` is the x of the first voxel that points are picked for. Seen from their middle it is always the same, but
-// constants would be loaded anew for every point.
+// `first` is the x of the first voxel that points are selected for. Relative to their middle it is constant, but
+// constants would be loaded again for every point.
 Voxels ownVoxels(int first) {
     Voxels v;
     const float middle = (float)(first) + HALF_SIDE;
@@ -60,7 +61,7 @@ Voxels ownVoxels(int first) {
     return v;
 }
 
-// The lattice point nearest to a coordinate. Halves go up, whatever the rounding: LayerSamples::nearestLattice().
+// The lattice point nearest to a coordinate. Halves round up in spite of rounding: LayerSamples::nearestLattice().
 #define nearestLattice(coordinate) floor((coordinate) + 0.5001f)
 
 #if COMPRESSES
@@ -69,7 +70,7 @@ typedef uint PickedNumber;
 typedef ushort PickedNumber;
 #endif
 
-// Points of a layer, and those of them that reach the voxels.
+// Points of a layer, and the selection of those that reach the voxels.
 typedef struct {
     float x[PAGE] __attribute__((aligned(64))), y[PAGE], z[PAGE], halfSquare[PAGE];
 #if TRIANGLES
@@ -78,16 +79,16 @@ typedef struct {
 #if PAPER_CUBE
     float centre[3][PAGE];  // the lattice point nearest to the sample
 #endif
-    PickedNumber picked[PAGE + LANES];  // some more are written
+    PickedNumber picked[PAGE + LANES];  // some elements beyond the selection are written
 } Points;
 
 typedef struct {
     SHARED Points* points;
-    SHARED uint* picked;  // how many
+    SHARED uint* picked;  // count of selected points
 } Layer;
 
-// The nearest points of a layer so far. They are those with the greatest p . v - |p|^2 / 2, as
-// |v - p|^2 = |v|^2 - 2 (p . v - |p|^2 / 2): one multiplication a voxel and point.
+// The nearest points of a layer so far: those with the greatest p . v - |p|^2 / 2, as |v - p|^2 = |v|^2 - 2 (p . v -
+// |p|^2 / 2). This takes one multiplication per voxel and point.
 typedef struct {
     Lanes greatest[SLICES];
 #if TRIANGLES
@@ -147,8 +148,8 @@ Real beyondSide(Real at) {
 
 typedef ushort8 LooseUshort8 __attribute__((aligned(2)));
 
-// Adds the numbers of some lanes, counted from `first`, to those picked. `orders` has the places of its bits, in
-// ascending order, for each byte: without it there were a branch for each bit, and processors would guess it wrong.
+// Adds the numbers of some lanes, counted from `first`, to the selection. For each byte, `orders` has the positions of
+// its bits in ascending order. This avoids a branch for each bit, which processors would mispredict.
 INLINED void addPicked(Layer layer, uint lanes, uint first, global const ulong* orders) {
     SHARED PickedNumber* picked = layer.points->picked;
 #if ITEMS > 1
@@ -169,7 +170,7 @@ INLINED void addPicked(Layer layer, uint lanes, uint first, global const ulong* 
 #endif
 }
 
-// Places points of a layer, and picks those that reach the voxels: nearer than the root of reach2.
+// Stores points of a layer, and selects those that reach the voxels: closer than the square root of reach2.
 INLINED void placePoints(Layer layer, uint first, uint among, Real3 at, float reach2, global const ulong* orders) {
     SHARED Points* points = layer.points;
     const Real away2 = squareSum(beyondSide(at.x), beyondSide(at.y), beyondSide(at.z));
@@ -180,17 +181,17 @@ INLINED void placePoints(Layer layer, uint first, uint among, Real3 at, float re
     addPicked(layer, bitsOfReal(away2 < reach2) & among, first, orders);
 }
 
-// What a block works from.
+// The input of a block.
 typedef struct {
-    global const float* columns;  // from the first sample of the brick on
+    global const float* columns;  // columns from the first sample of the brick on
     uint stride;
-    global const uint* begins;  // of the brick's cells
+    global const uint* begins;  // first samples of the brick's cells
     SampleCells cells;
     Layers layers;
     global const ulong* orders;  // see addPicked()
 } Input;
 
-// Places the points of both layers around samples begin + ITEM * BATCH .. as those from `first` + ITEM * BATCH on.
+// Stores the points of both layers around samples begin + ITEM * BATCH .. at positions from `first` + ITEM * BATCH on.
 INLINED void placeLayers(const Input* input, uint begin, uint end, float3 middle, uint first, Layer inner,
                          Layer outer) {
     const uint at = begin + ITEM * BATCH, to = first + ITEM * BATCH;
@@ -225,7 +226,7 @@ INLINED void placeLayers(const Input* input, uint begin, uint end, float3 middle
     placePoints(outer, to, among, add3(seen, offset), reach2, input->orders);
 }
 
-// Whether any sample lies in the cells around a block.
+// Whether any sample is in the cells around a block.
 bool hasSamples(const Input* input, int3 corner) {
     const int size = input->cells.size, along = BLOCK_SIDE / CELL_SIDE + 2 * input->cells.around;
     const int3 cell = corner / CELL_SIDE;
@@ -238,18 +239,18 @@ bool hasSamples(const Input* input, int3 corner) {
     return false;
 }
 
-// The points of both layers around a cube, and the nearest of those looked at so far.
+// The points of both layers around a cube, and the nearest of those tested so far.
 typedef struct {
     const Input* input;
     const Voxels* voxels;
     Layer inner, outer;
     Nearest nearestInner, nearestOuter;
     float3 middle;
-    uint placed;  // points of each layer that wait
-    bool any;     // point reaches the cube
+    uint placed;  // waiting points of each layer
+    bool any;     // whether any point reaches the cube
 } Cube;
 
-// Looks at the points that wait.
+// Tests the waiting points.
 INLINED void applyLayers(Cube* cube) {
     MEET;
     if (*cube->inner.picked + *cube->outer.picked > 0) {
@@ -277,8 +278,8 @@ INLINED void placeCells(Cube* cube, int3 cell) {
     const Input* input = cube->input;
     const int size = input->cells.size, along = PICKED_SIDE / CELL_SIDE + 2 * input->cells.around;
 #if ITEMS == 1
-    // rows of cells are gathered first, kept where they hold some: a branch for each would be guessed wrong half of the
-    // time
+    // rows of cells are collected first, and kept if they hold samples: a branch for each would be mispredicted half of
+    // the time
     uint begins[MOST_ROWS], ends[MOST_ROWS], rows = 0;
 #endif
     global const uint* slab = input->begins + (cell.x * size + cell.y) * size + cell.z;
@@ -302,8 +303,8 @@ INLINED void placeCells(Cube* cube, int3 cell) {
 #endif
 }
 
-// Finds the nearest points of both layers for the voxels of a cube; `corner` is its first voxel in the brick. False if
-// no point reaches it.
+// Finds the nearest points of both layers for the voxels of a cube; `corner` is its first voxel in the brick. Returns
+// false if no point reaches it.
 INLINED bool fillCube(Cube* cube, int3 corner) {
     cube->middle = convert_float3(corner) + HALF_SIDE;
     cube->placed = 0;
@@ -318,14 +319,14 @@ INLINED bool fillCube(Cube* cube, int3 corner) {
     return cube->any;
 }
 
-// Eq. 3: from both layers to a slice's signed distances, and whose points they are of. The inside keeps its sign bit
+// Eq. 3: computes a slice's signed distances from both layers, and the points' owners. The inside keeps its sign bit
 // where the distance is clamped to zero. Returns whether any distance is known.
 INLINED uint combine(const Cube* cube, int slice, const Layers* layers, Lanes* values, IntLanes* owners) {
     const Nearest *inner = &cube->nearestInner, *outer = &cube->nearestOuter;
     const Lanes certain2 = square(layers->certain),
                 inner2 = min(distances2(inner, cube->voxels, slice), certain2),
                 outer2 = min(distances2(outer, cube->voxels, slice), certain2);
-    // where only the outer layer is near enough to be known, the tie tells nothing
+    // where only the outer layer is near enough to be known, the tie has no meaning
     const IntLanes inside = (inner2 < certain2) & (inner2 <= outer2 + LAYER_TIE), known = min(inner2, outer2) < certain2;
     const Lanes clamped = max(sqrt(max(max(inner2, outer2), (Lanes)(0.0f))) - layers->delta, (Lanes)(0.0f));
     *values = select((Lanes)(INFINITY), select(clamped, -clamped, inside), known);
@@ -337,7 +338,7 @@ INLINED uint combine(const Cube* cube, int slice, const Layers* layers, Lanes* v
     return (uint)(anyLane(known));
 }
 
-// Where an item writes a block: a group to memory of its own, until it knows that the block is kept.
+// Memory that an item writes a block to: a group uses its own, until it is known that the block is kept.
 #if ITEMS > 1
 #define WRITTEN local
 #else
@@ -365,7 +366,7 @@ void putSlice(Lanes values, int slice, int3 inBlock, WRITTEN float* block) {
 #define asLanes as_float8
 #endif
 
-// The mesh, and which of its triangles reach the bricks of a batch.
+// The mesh, and the triangles that reach the bricks of a batch.
 typedef struct {
     global const float* points;
     global const uint* triangles;
@@ -375,14 +376,14 @@ typedef struct {
     Layers layers;
 } Bricks;
 
-// The samples of a brick in columns, unsorted and sorted, and where those of each cell begin.
+// The samples of a brick in columns, unsorted and sorted, and the first one of each cell.
 typedef struct {
     global float *unsorted, *sorted;
     global uint* begins;
     uint stride;
 } Samples;
 
-// Where blocks that hold distances go: to the next slots. The origin of a slot that is left empty is NO_BLOCK.
+// Output slots of blocks that hold distances. The origin of an empty slot is NO_BLOCK.
 typedef struct {
     global int* origins;
     global float* distances;
@@ -392,7 +393,7 @@ typedef struct {
 
 enum { FILLED_BLOCKS };
 
-// What a group works in.
+// Working memory of a group.
 typedef struct {
     Points inner, outer;
 #if ITEMS > 1
@@ -413,7 +414,7 @@ uint cursorsOf(const Grid* grid) {
     return (uint)(cells.size * cells.size * cells.size + 2);
 }
 
-// A brick of the batch into sorted samples. `count` is 0 before.
+// Converts a brick of the batch to sorted samples. `count` is 0 before.
 void prepareBrick(const Bricks* bricks, uint brick, const Samples* samples, SHARED uint* count, SHARED uint* sums) {
     const uint b = bricks->firstBrick + brick, cursors = cursorsOf(&bricks->grid);
     const Grid* grid = &bricks->grid;
@@ -435,7 +436,7 @@ int3 firstVoxel(const Grid* grid, uint block) {
     return BLOCK_SIDE * (int3)(n >> 2 * bits, n >> bits & last, n & last);
 }
 
-// Fills a block of a brick. Returns whether this item knows any of its distances.
+// Fills a block of a brick. Returns whether this item has any known distance.
 INLINED uint fillBlock(const Input* input, int3 inBrick, SHARED Workplace* work, SHARED uint* innerPicked,
                        SHARED uint* outerPicked, WRITTEN float* values, WRITTEN float* owners) {
     const Layer inner = {&work->inner, innerPicked}, outer = {&work->outer, outerPicked};
@@ -467,7 +468,7 @@ void putOrigin(const Bricks* bricks, uint brick, int3 inBrick, uint slot, global
 
 #if ITEMS > 1
 
-// Bricks into sorted samples. Work-groups take the bricks one after another.
+// Converts bricks to sorted samples. Work-groups take the bricks one after another.
 GROUP_KERNEL void prepareBricks(global const float* points, global const uint* triangles, Grid grid,
                                 global const uint* cellOfBrick, global const uint* triangleOffsets,
                                 global const uint* partOffsets, global const uint* list, uint firstBrick,
@@ -483,7 +484,7 @@ GROUP_KERNEL void prepareBricks(global const float* points, global const uint* t
     }
 }
 
-// A group fills a block of a brick. For each byte `orders` has the places of its bits.
+// A group fills a block of a brick. For each byte, `orders` has the positions of its bits.
 GROUP_KERNEL void fillBlocks(Grid grid, global const uint* cellOfBrick, global const uint* partOffsets,
                              uint firstBrick, global float* sorted, global uint* begins, uint stride, Layers layers,
                              global const ulong* orders, global int* origins, global float* distances,
@@ -525,10 +526,10 @@ GROUP_KERNEL void fillBlocks(Grid grid, global const uint* cellOfBrick, global c
 
 #else
 
-// Blocks of a brick that take slots together: a bit for each.
+// Blocks of a brick that are given slots together: a bit for each.
 #define TOGETHER 64
 
-// Fills those blocks of a brick that may hold distances, TOGETHER from `first` on, in slots side by side.
+// Fills those blocks of a brick that may hold distances, TOGETHER from `first` on, in adjacent slots.
 INLINED void fillTogether(const Bricks* bricks, uint brick, uint first, const Input* input, const Filled* filled,
                           Workplace* work) {
     const Grid* grid = &bricks->grid;
@@ -549,8 +550,8 @@ INLINED void fillTogether(const Bricks* bricks, uint brick, uint first, const In
     for (; slot < end; ++slot) vstore3((int3)(NO_BLOCK), slot, filled->origins);
 }
 
-// Both in one go. Each group has `room` for the samples of a brick, which stays in the processor's cache. For each byte
-// `orders` has the places of its bits.
+// Does both steps at once. Each group has `room` for the samples of a brick, which stays in the processor's cache. For
+// each byte, `orders` has the positions of its bits.
 GROUP_KERNEL void fillBricks(global const float* points, global const uint* triangles, Grid grid,
                              global const uint* cellOfBrick, global const uint* triangleOffsets,
                              global const uint* partOffsets, global const uint* list, uint firstBrick, uint brickCount,

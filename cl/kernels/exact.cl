@@ -1,43 +1,43 @@
-// The exact method on a device: sdf/exact.cpp, with the same pieces, bounds, links and closest features. Blocks whose
-// sides the nearest triangles leave open are named and left to the host.
+// The exact method on a device: sdf/fill/exact.cpp, with the same pieces, bounds, sign propagation and closest
+// features. Blocks whose sides the nearest triangles leave open are listed and left to the host.
 //
-// -D TRIANGLES=1 also keeps the nearest triangle of each voxel.
+// -D TRIANGLES=1 also stores the nearest triangle of each voxel.
 #include "pieces.cl"
 
 #ifndef TRIANGLES
 #define TRIANGLES 0
 #endif
 
-// Rows of a block along z that a vector holds, vectors of a slice of one x, vectors of a block.
+// Rows along z in a vector, vectors in a slice of one x, vectors in a block.
 #define ROWS_AT_ONCE (LANES / BLOCK_SIDE)
 #define COLUMNS (BLOCK_SIDE / ROWS_AT_ONCE)
 #define CHUNKS (BLOCK_SIDE * COLUMNS / ITEMS)
-// Slices that an item works on.
+// Slices of an item.
 #define SLICES (ITEMS > 1 ? 1 : BLOCK_SIDE)
 
-// See sdf/exact_block.cpp for these: rounding [voxels, voxels^2 or parts].
+// See sdf/fill/exact_block.cpp for these: rounding [voxels, voxels^2 or fractions].
 #define BOUND_SLACK 1e-4f
 #define TIE 1e-5f
 #define RAISED_PART 1e-3f
 #define RAISED_BY 5e-7f
 #define HEIGHT_SLACK 1e-3f
 #define LEAST_HEIGHT 1e-3f
-// See sdf/links.h.
+// See sdf/leaf/sign_propagation.h.
 #define LINK_SLACK 1e-4f
 #define FAR_FROM 0.5f
 #define MID_FROM 0.1f
-// See sdf/closest_side.cpp, and what sdf/exact.cpp calls sideSlack.
+// See sdf/sign/closest_side.cpp, and sideSlack of sdf/fill/exact.cpp.
 #define SAME_PLACE 1e-7
 #define FLATNESS 1e-10
 #define CANCELLED 1e-2
 #define SIDE_SLACK 1e-3f
-// Faces that meet in the closest point of a voxel; with more of them the host is asked.
+// Maximum faces that meet in the closest point of a voxel; with more of them the host decides.
 #define MOST_FACES 48
 
-// What a voxel's code says besides the number of its nearest piece: PieceSide of sdf/exact_block.h.
+// Side bits of a voxel's code, below the number of its nearest piece: PieceSide of sdf/fill/exact_block.h.
 enum { SIDE_OUTSIDE = 1, SIDE_INSIDE = 2, SIDE_BITS = 2 };
 
-// Bricks into pieces and groups of them. Work-groups take the bricks one after another, so that few need scratch
+// Cuts bricks into pieces and groups these. Work-groups take the bricks one after another, so that few need scratch
 // memory.
 GROUP_KERNEL void prepareBricks(global const float* points, global const uint* triangles, Grid grid,
                                 global const uint* cellOfBrick, global const uint* triangleOffsets,
@@ -98,7 +98,7 @@ Share ownShare() {
     return own;
 }
 
-// The place of a chunk among those of its item.
+// The index of a chunk among those of its item.
 int chunkAt(int slice, int column) {
     return ITEMS > 1 ? 0 : slice * COLUMNS + column;
 }
@@ -121,15 +121,15 @@ Lanes latticeZ() {
 #endif
 }
 
-// What is known of an item's voxels: squared distance to the nearest piece, and its number with the side (-1: none).
+// State of an item's voxels: squared distance to the nearest piece, and its number with the side (-1: none).
 typedef struct {
     Lanes nearest2[CHUNKS];
     IntLanes nearest[CHUNKS];
 } Found;
 
-// The slices and columns of a share that a box around a ball meets.
+// The slices and columns of a share that a ball's bounding box overlaps.
 Share within(const Share* own, float3 centre, float radius) {
-    // cut off towards zero is rounded down here, as below zero is all the same
+    // truncation equals rounding down here, since all values below zero are equivalent
     const int low = (int)(max(centre.y - radius, 0.0f)) / ROWS_AT_ONCE,
               high = centre.y + radius < 0 ? -1 : (int)(min(centre.y + radius, 7.0f)) / ROWS_AT_ONCE;
     const int from = (int)(max(centre.x - radius, 0.0f)),
@@ -139,7 +139,7 @@ Share within(const Share* own, float3 centre, float radius) {
     return part;
 }
 
-// Lowers squared distances to those to a sample.
+// Reduces squared distances to those to a sample.
 void applySample(Found* found, const Share* own, float3 sample, float reach) {
     const Share part = within(own, sample, reach);
     const Lanes z2 = squareLanes(latticeZ() - sample.z);
@@ -152,8 +152,8 @@ void applySample(Found* found, const Share* own, float3 sample, float reach) {
     }
 }
 
-// Drum of sdf/exact_block.cpp: a disc of some thickness that holds pieces, seen from a block. What follows from a slice
-// is worked out once.
+// Bounding cylinder of pieces relative to a block: Drum of sdf/fill/exact_block.cpp. Values that depend on the slice
+// only are computed once.
 typedef struct {
     float3 centre, normal;
     float thickness, radius2;
@@ -172,7 +172,7 @@ void makeDrum(Drum* drum, const Share* own, float3 centre, float radius, float3 
     }
 }
 
-// What all chunks of a column have in common.
+// Values that all chunks of a column share.
 typedef struct {
     Lanes excess, height;
 } Column;
@@ -183,7 +183,7 @@ Column makeColumn(const Drum* drum, int column) {
     return result;
 }
 
-// Whether the drum may be nearest to some voxel of a chunk.
+// Whether the cylinder may be nearest to some voxel of a chunk.
 bool mayBeNearest(const Found* found, const Drum* drum, const Column* column, int slice, int chunk, bool thick) {
     const Lanes bound2 = found->nearest2[chunk], h = drum->height[slice] + column->height;
     Lanes excess = drum->px2[slice] + column->excess - bound2, g2 = h * h;
@@ -195,7 +195,7 @@ bool mayBeNearest(const Found* found, const Drum* drum, const Column* column, in
     return anyLane(excess * fabs(excess) <= 4 * drum->radius2 * (bound2 - g2 + HEIGHT_SLACK));
 }
 
-// Bits of the chunks, out of a part of a share, that have a voxel which the drum may be nearest to.
+// Bits of the chunks in a part of a share with a voxel that the cylinder may be nearest to.
 uint nearChunks(const Found* found, const Share* own, const Share* part, const Drum* drum, bool thick) {
     uint near = 0;
     for (int c = part->firstColumn; c <= part->lastColumn; ++c) {
@@ -217,7 +217,7 @@ int sliceOf(int chunk) {
     return ITEMS > 1 ? 0 : chunk / COLUMNS;
 }
 
-// The same out of some chunks, for a disc.
+// The same for a disc, out of some chunks.
 uint nearAmong(const Found* found, const Share* own, uint among, const Drum* drum) {
     uint near = 0;
     for (int c = own->firstColumn; c <= own->lastColumn; ++c) {
@@ -232,13 +232,13 @@ uint nearAmong(const Found* found, const Share* own, uint among, const Drum* dru
     return near;
 }
 
-// How far a coordinate along an edge lies beyond its ends.
+// Signed distance of a coordinate along an edge beyond the edge's ends.
 Lanes beyond(Lanes along, float length) {
     return along - min(max(along, (Lanes)(0.0f)), (Lanes)(length));
 }
 
-// Keeps the smaller distances, and whose they are. Over a face its normal tells the side, unless two pieces are as near
-// as floats can tell and say different things.
+// Keeps the smaller distances, and their pieces. Over a face the face's normal gives the side, unless two pieces are
+// equally near within rounding and disagree.
 void keepNearer(Found* found, int chunk, Lanes distance2, Lanes height, IntLanes overFace, int code) {
     const Lanes old2 = found->nearest2[chunk], nearest2 = min(distance2, old2);
     const IntLanes old = found->nearest[chunk];
@@ -247,12 +247,12 @@ void keepNearer(Found* found, int chunk, Lanes distance2, Lanes height, IntLanes
     const IntLanes winner = select(old, own, distance2 < old2);
     const IntLanes tied = max(distance2, old2) - nearest2 <= nearest2 * TIE + TIE;
     found->nearest2[chunk] = nearest2;
-    // the number stays, and of the side what both say; put otherwise, LLVM 14 makes wrong code of it for AVX-512
+    // keeps the number, and the side bits of both; LLVM 14 miscompiles other forms of it for AVX-512
     const IntLanes kept = (own & old) | ~((1 << SIDE_BITS) - 1) | ~tied;
     found->nearest[chunk] = winner & kept;
 }
 
-// Lowers the distances in some chunks to those to a piece. Lattice coordinates are exact in floats.
+// Reduces the distances in some chunks to those to a piece. Lattice coordinates are exact in floats.
 void askPiece(Found* found, const Share* own, uint chunks, global const Piece* piece, uint number, int3 block) {
     const float3 shift = convert_float3(block - vload3(0, piece->base)), origin = vload3(0, piece->origin);
     const float3 u = vload3(0, piece->u), w = vload3(0, piece->w), n = vload3(0, piece->n);
@@ -277,7 +277,7 @@ void askPiece(Found* found, const Share* own, uint chunks, global const Piece* p
             const Lanes along = uAlong[slice] + uAcross, aside = wAlong[slice] + wAcross,
                         height = nAlong[slice] + nAcross;
             const Lanes base2 = squareLanes(beyond(along, size)) + aside * aside;
-            // the edges from both ends of the longest one to the third corner
+            // the edges from both ends of the longest edge to the third corner
             const Lanes v = along - size;
             const Lanes leftOf = aside * ox - along * oy, rightOf = aside * ex - v * ey;
             const Lanes left2 = squareLanes(beyond(along * ox + aside * oy, olen)) + leftOf * leftOf;
@@ -290,7 +290,7 @@ void askPiece(Found* found, const Share* own, uint chunks, global const Piece* p
     }
 }
 
-// What a block works from.
+// The input of a block.
 typedef struct {
     Near near;
     global const Member* members;
@@ -302,7 +302,7 @@ void applySamples(const Input* input, const Share* own, SHARED const uint* page,
         applySample(found, own, placeOf(&input->near.groups, page[i]) - input->near.inBrick, input->near.reach);
 }
 
-// Asks the members of a cluster that come near some chunks.
+// Tests the members of a cluster that come near some chunks.
 void askMembers(const Input* input, const Share* own, uint cluster, uint near, Found* found) {
     const uint begin = input->near.groups.begins[cluster], end = input->near.groups.begins[cluster + 1];
     for (uint m = begin; m < end; ++m) {
@@ -335,8 +335,9 @@ void askGroups(const Input* input, const Share* own, SHARED const uint* page, ui
     }
 }
 
-// First bounds by samples, a little raised so that a piece's own distance wins over its sample's; then the pieces. The
-// page holds all clusters that reach the block, or else is turned once more. False if there is none.
+// Computes the distances. First come bounds by samples, raised slightly so that a piece's own distance wins over its
+// sample's; then the pieces. The page holds all clusters that reach the block, or else is refilled once more. Returns
+// false if there is none.
 bool measure(const Input* input, const Share* own, SHARED uint* page, SHARED uint* count, Found* found) {
     for (int i = 0; i < CHUNKS; ++i) found->nearest2[i] = square(input->near.reach);
     uint next = input->near.range.x, pages = 0;
@@ -358,7 +359,7 @@ bool measure(const Input* input, const Share* own, SHARED uint* page, SHARED uin
     return true;
 }
 
-// One bit a voxel: voxel (x, y, z) is bit 8 y + z of slice x.
+// One bit per voxel: voxel (x, y, z) is bit 8 y + z of slice x.
 typedef union {
     ulong slice[BLOCK_SIDE];
 #if LANES == 16
@@ -372,7 +373,7 @@ typedef union {
 #error "masks of chunks are read as masks of slices in little endian order"
 #endif
 
-// A block as all items of its group see it. A row more of distances can be read.
+// A block as all items of its group see it. One more row of distances may be read.
 typedef struct {
     float distance[BLOCK_VOXELS + BLOCK_SIDE * 2];
     int nearest[BLOCK_VOXELS];
@@ -391,7 +392,7 @@ void summarize(const Found* found, const Share* own, SHARED Block* block) {
             storeSharedLanes(distance, chunk, block->distance);
             storeSharedInts(nearest, chunk, block->nearest);
             block->known.chunk[chunk] = bitsOf(known);
-            // on the surface either side is right, and no link can carry it on
+            // on the surface either side is right, and no link propagates it
             block->outside.chunk[chunk] = bitsOf((side == SIDE_OUTSIDE) | (distance < 0.5f * LINK_SLACK));
             block->inside.chunk[chunk] = bitsOf(side == SIDE_INSIDE);
             block->far.chunk[chunk] = bitsOf(known & (distance > FAR_FROM));
@@ -399,12 +400,12 @@ void summarize(const Found* found, const Share* own, SHARED Block* block) {
         }
 }
 
-// Voxels whose distance and a neighbour's together exceed a voxel.
+// Links: voxels whose distance and a neighbour's sum up to more than a voxel.
 uint linked(SHARED const float* distance, int step) {
     return bitsOf(vloadLanes(0, distance) + vloadLanes(0, distance + step) > 1 + LINK_SLACK);
 }
 
-// SignLinks of sdf/links.h.
+// SignLinks of sdf/leaf/sign_propagation.h.
 void findSignLinks(const Share* own, SHARED Block* block) {
     const uint notLastZ = 0x7f7fu, notLastY = ROWS_AT_ONCE > 1 ? 0xffu : 0u;
     for (int slice = own->firstSlice; slice <= own->lastSlice; ++slice)
@@ -417,7 +418,7 @@ void findSignLinks(const Share* own, SHARED Block* block) {
         }
 }
 
-// Lets a set grow inside one slice until it stops.
+// Grows a set inside one slice until it stops.
 ulong grownInSlice(ulong set, ulong linkY, ulong linkZ) {
     for (;;) {
         const ulong old = set;
@@ -427,9 +428,9 @@ ulong grownInSlice(ulong set, ulong linkY, ulong linkZ) {
     }
 }
 
-// Adds to a set all voxels that links connect with it.
+// Adds all voxels to a set that links connect with it.
 void spread(SHARED const Block* block, SHARED Mask* set) {
-    uint changed = 0;  // slices whose neighbours have not heard of them yet
+    uint changed = 0;  // slices that have not been propagated to their neighbours
     for (int x = 0; x < BLOCK_SIDE; ++x) {
         if (set->slice[x] == 0) continue;
         set->slice[x] = grownInSlice(set->slice[x], block->linkY.slice[x], block->linkZ.slice[x]);
@@ -452,11 +453,11 @@ double3 closestOnSegment(double3 a, double3 b) {
     const double3 ab = b - a;
     const double length2 = dot(ab, ab);
     const double t = length2 > 0 ? clamp(-dot(a, ab) / length2, 0.0, 1.0) : 0.0;
-    // from the nearer end, so that both triangles of an edge find the same point whichever way they run it
+    // from the nearer end, so that both triangles of an edge find the same point for either direction of the edge
     return t <= 0.5 ? a + t * ab : b - (1 - t) * ab;
 }
 
-// The point of a triangle that is closest to the origin. Right for triangles without area too.
+// The point of a triangle that is closest to the origin. Correct for triangles without area too.
 double3 closestToOrigin(const Corners* t) {
     const double3 ab = t->b - t->a, ac = t->c - t->a, bc = t->c - t->b, n = cross(ab, ac);
     const double n2 = dot(n, n), longest2 = max(dot(ab, ab), max(dot(ac, ac), dot(bc, bc)));
@@ -471,7 +472,7 @@ double3 closestToOrigin(const Corners* t) {
     return best;
 }
 
-// The angle under which a triangle is seen from one of its points: all round from within, half from an edge.
+// The angle of a triangle at one of its points: the full angle inside, half of it on an edge.
 double angleAt(const Corners* t, double3 p) {
     const double3 c[3] = {t->a, t->b, t->c};
     for (int i = 0; i < 3; ++i)
@@ -492,7 +493,7 @@ bool sameCorners(const Corners* s, const Corners* t) {
            (all(s->a == t->c) && all(s->b == t->a) && all(s->c == t->b));
 }
 
-// The mesh as seen from a point.
+// The mesh relative to a point.
 typedef struct {
     global const float* points;
     global const uint* triangles;
@@ -512,7 +513,7 @@ Corners seen(const View* view, uint triangle) {
 typedef struct {
     uint triangle[MOST_FACES];
     int count;
-    bool all;  // none was left out for want of room
+    bool all;  // no triangle was left out because of the limit
     double nearest;
     double3 closest;  // the point of the nearest of them
 } Faces;
@@ -525,7 +526,7 @@ void offer(Faces* faces, const View* view, uint triangle) {
     const double away = length(closest);
     if (away > faces->nearest + SAME_PLACE) return;
     if (away < faces->nearest) {
-        // what was nearest may be so no more
+        // the nearest ones so far may be farther
         if (away < faces->nearest - SAME_PLACE) faces->count = 0;
         faces->nearest = away;
         faces->closest = closest;
@@ -536,8 +537,8 @@ void offer(Faces* faces, const View* view, uint triangle) {
         faces->triangle[faces->count++] = triangle;
 }
 
-// ClosestSide::side() of sdf/closest_side.cpp: below zero inside, above outside, zero where the normals at the closest
-// point cancel out or there are too many of them.
+// ClosestSide::side() of sdf/sign/closest_side.cpp: negative inside, positive outside, zero where the normals at the
+// closest point cancel or there are too many.
 double sideBy(const Faces* faces, const View* view) {
     double sum = 0, weights = 0;
     for (int i = 0; i < faces->count; ++i) {
@@ -545,7 +546,7 @@ double sideBy(const Faces* faces, const View* view) {
         const double3 closest = closestToOrigin(&t), ab = t.b - t.a, ac = t.c - t.a, bc = t.c - t.b,
                       normal = cross(ab, ac);
         const double size = length(normal), longest = sqrt(max(dot(ab, ab), max(dot(ac, ac), dot(bc, bc))));
-        // thinner than a place, a triangle has no normal to trust
+        // a triangle thinner than the tolerance has no reliable normal
         if (distance(closest, faces->closest) > SAME_PLACE || size <= SAME_PLACE * longest) continue;
         bool duplicate = false;
         for (int j = 0; j < i; ++j) {
@@ -560,7 +561,7 @@ double sideBy(const Faces* faces, const View* view) {
     return !faces->all || fabs(sum) <= CANCELLED * weights * faces->nearest ? 0 : sum;
 }
 
-// The same for a voxel of a block, by all pieces that may be as near as its nearest one.
+// The side of a voxel of a block, from all pieces that may be as near as its nearest one.
 double sideOf(const Input* input, SHARED const Block* block, View* view, int voxel) {
     const int3 at = (int3)(voxel / 64, voxel / 8 % 8, voxel % 8);
     view->from = convert_double3(input->near.block + at);
@@ -583,9 +584,9 @@ double sideOf(const Input* input, SHARED const Block* block, View* view, int vox
     return sideBy(&faces, view);
 }
 
-// completeSides() of sdf/links.h: what sides are known spread over links; of each group of linked voxels that this
-// leaves without a side, one voxel is asked for. Returns the number of voxels on both sides; marks the block as open
-// where the closest feature leaves a side open.
+// completeSides() of sdf/leaf/sign_propagation.h. Propagates the known sides over links. For each group of linked
+// voxels that remains without a side, the side of one voxel is computed. Returns the number of voxels that are on both
+// sides. Marks the block as open where the closest feature leaves a side open.
 uint completeSides(const Input* input, SHARED Block* block, View* view) {
     spread(block, &block->outside);
     spread(block, &block->inside);
@@ -613,9 +614,9 @@ uint completeSides(const Input* input, SHARED Block* block, View* view) {
 
 enum { FILLED_BLOCKS, OPEN_BLOCKS, CONFLICTS };
 
-// A group fills a block of a brick. Blocks that hold distances go to the next places of `origins`, `distances` and
-// `nearestTriangles`; the places of those whose sides stay open go to `openBlocks`. With sign = 0 all distances are
-// positive.
+// A group fills a block of a brick. Blocks that hold distances go to the next slots of `origins`, `distances` and
+// `nearestTriangles`. The positions of those whose sides remain open go to `openBlocks`. With sign = 0 all distances
+// are positive.
 GROUP_KERNEL void fillBlocks(global const float* points, global const uint* triangles, Grid grid,
                              global const uint* cellOfBrick, uint firstBrick, global const Piece* pieces,
                              global const Member* members, global float* groupColumns, global uint* groupBegins,

@@ -1,16 +1,16 @@
-// Samples of a field that is laid out as in sdf/field_layout.h: what collider/field_sample.cpp does, operation by
-// operation.
+// Samples a field that is laid out as in collider/field/field_layout.h. Does the same operations as
+// collider/field/field_sample.cpp.
 #include "layout.cl"
 
 // [voxels]
 #define CELL_DIAGONAL 1.7320508f
 #define BOUND_DOWNWARD (1 - 0x1p-22)
-// Bits of a place below the voxel, which leave those of the voxel in its block in the same word, and what leaves a
-// fixed-point number in the lower bits of a double below 2^22.
+// Bits of a coordinate below the voxel, which leave room for those of the voxel in its block in the same word. Adding
+// the second number moves a fixed-point number to the lower bits of a double below 2^22.
 #define FRACTION_BITS 29
 #define FIXED_POINT 12582912.0
 
-// Sample of sdf/sample.h.
+// Sample of collider/query.h.
 typedef struct {
     float distance, gradient[3];
     uchar inBand;
@@ -23,7 +23,7 @@ typedef struct {
     global const float* values;
 } Field;
 
-// The voxels around a place at its lower and at its upper x: (y, z), (y, z + 1), (y + 1, z), (y + 1, z + 1).
+// The voxels around a point at its lower and its upper x: (y, z), (y, z + 1), (y + 1, z), (y + 1, z + 1).
 typedef struct {
     float4 low, high;
 } Cell;
@@ -32,10 +32,10 @@ int3 blocksOf(const Field* field) {
     return vload3(0, field->frame.blocks);
 }
 
-// The distance [m] and its gradient [m a voxel].
+// The distance [m] and its gradient [m per voxel].
 float4 interpolate(const Cell* cell, float3 fraction) {
     const float4 dx = cell->high - cell->low, at = cell->low + fraction.x * dx;
-    // values at z and z + 1, then how they change along x
+    // values at z and z + 1, then their changes along x
     const float4 y0 = (float4)(at.lo, dx.lo), y1 = (float4)(at.hi, dx.hi);
     const float4 dy = y1 - y0, along = y0 + fraction.y * dy;
     // value, along x, along y
@@ -44,7 +44,7 @@ float4 interpolate(const Cell* cell, float3 fraction) {
     return (float4)(z0 + fraction.z * dz, dz.x);
 }
 
-// What the interpolant may be off by [voxels].
+// Bound of the interpolation error [voxels].
 float interpolationError(float3 fraction) {
     const float3 spread = fraction * (1.0f - fraction);
     return sqrt(spread.x + spread.y + spread.z);
@@ -61,7 +61,7 @@ float clearanceAt(const Field* field, double3 place) {
     return (float)(PART_SIDE) * (fabs(centre) - length);
 }
 
-// The bound for points outside of the directory's box, or that are nowhere.
+// The bound for points outside of the directory's box, and for coordinates that are not numbers.
 float boundOutside(const Field* field, double3 place, double3 extent) {
     const double3 way = place - clamp(place, (double3)(0.0), extent);
     const double length = sqrt(way.x * way.x + way.y * way.y + way.z * way.z);
@@ -94,13 +94,13 @@ bool isInBand(const Field* field, const Cell* cell) {
     return all(cell->low > least && cell->low < most && cell->high > least && cell->high < most);
 }
 
-// With the band's widths where a layout of the host has no numbers.
+// Replaces values that are not numbers in the host's layout by the band's widths.
 float4 withWidths(const Frame* frame, float4 values) {
     const float4 widths = select((float4)(frame->exteriorWidth), (float4)(-frame->interiorWidth), signbit(values));
     return select(values, widths, isnan(values));
 }
 
-// The bound in a cell of which a voxel is beyond the band.
+// The bound in a cell with a voxel beyond the band.
 float boundBesideBand(const Field* field, float distance, double3 place) {
     const Frame* frame = &field->frame;
     const float besideBand =
@@ -119,7 +119,8 @@ Sample sampleAt(const Field* field, float3 point) {
     const Frame* frame = &field->frame;
     const double3 origin = vload3(0, frame->origin);
     const double3 fixed = convert_double3(point) * frame->perMetre + (FIXED_POINT - origin * frame->perMetre);
-    // the upper words are blocks, the lower ones places there; what is negative, huge or no number is beyond all blocks
+    // the upper words are blocks, the lower ones positions in them; negative, huge and non-numeric values are beyond
+    // all blocks
     const ulong3 words = as_ulong3(fixed);
     const uint3 block = convert_uint3(words >> 32) - (uint)(as_ulong(FIXED_POINT) >> 32);
     const uint3 inBlock = convert_uint3(words & 0xffffffffUL);
@@ -145,7 +146,7 @@ Sample sampleAt(const Field* field, float3 point) {
     return sample;
 }
 
-// A work-item samples some points in a row: one on GPUs, whose items stand side by side.
+// A work-item samples some consecutive points: one on GPUs, whose items run side by side.
 kernel void sampleField(Frame frame, global const int* directory, global const char* centres,
                         global const float* values, global const float* points, uint count, uint pointsPerItem,
                         global Sample* samples) {

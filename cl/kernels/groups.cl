@@ -1,25 +1,25 @@
-// What lies in a brick, sorted by cells of space into groups that a block can look at or leave out as a whole.
+// Sorts the members of a brick by cells of space into groups that a block can test or cull as a whole.
 #include "bins.cl"
 
-// Groups near a block that are looked at in one go.
+// Groups near a block that are tested at once.
 #define PAGE 1024
-// Rounding of a group's own numbers, and of where it lies to a block [voxels].
+// Rounding of a group's own numbers, and of its position relative to a block [voxels].
 #define GROUP_SLACK 1e-4f
 #define BIN_SLACK 1e-3f
 
-// Something that lies in a brick, to be grouped with what lies near it.
+// An element of a brick, to be grouped with nearby ones.
 typedef struct {
     float place[3];  // in the voxels of the brick
-    float radius;    // around the place
+    float radius;    // of its bounding sphere
     float normal[3];
-    uint content;  // what it is: the kernels know
+    uint content;  // the index of its content, defined by the kernels
 } Member;
 
 // Groups of members of all bricks of a batch, a column for each number. The members of a group end where those of the
-// next one begin; so do the places of bricks in these columns.
+// next one begin; so do the ranges of bricks in these columns.
 enum { PLACE_X, PLACE_Y, PLACE_Z, RADIUS, NORMAL_X, NORMAL_Y, NORMAL_Z, THICKNESS };
 
-// What is known of all members of a brick, or of an item's part of them.
+// Summary of all members of a brick, or of an item's share of them.
 typedef struct {
     double radii;  // summed up
     float lower[3], upper[3];
@@ -49,7 +49,7 @@ Extent sumExtents(SHARED const Extent* extents) {
     return sum;
 }
 
-// Cells of a box.
+// A grid of cells over a box.
 typedef struct {
     float lower[3];
     float side;
@@ -95,8 +95,7 @@ void putGroup(const Groups* groups, uint index, float3 place, float radius, floa
     column[THICKNESS * stride] = thickness;
 }
 
-// Sorts members by cell into `sorted`; those of each cell that has some are a group.
-// Returns the number of groups.
+// Sorts members by cell into `sorted`. The members of each non-empty cell form a group. Returns the number of groups.
 uint sortMembers(const Groups* groups, uint first, global const Member* unsorted, global Member* sorted,
                   global uint* cellOfMember, uint count, const Cells* cells, global uint* cursors,
                   SHARED uint2* sums) {
@@ -109,7 +108,7 @@ uint sortMembers(const Groups* groups, uint first, global const Member* unsorted
         takeGlobal(cursors + cell, 1);
     }
     MEET;
-    // how many members and groups come before the cells of each item
+    // counts of members and groups before the cells of each item
     const uint begin = (uint)((ulong)(cellCount) * ITEM / ITEMS), end = (uint)((ulong)(cellCount) * (ITEM + 1) / ITEMS);
     uint2 sum = 0;
     if (ITEMS > 1) {
@@ -137,7 +136,7 @@ uint sortMembers(const Groups* groups, uint first, global const Member* unsorted
     return found;
 }
 
-// Which groups of a brick, in their order, may reach each slice of blocks of the same x.
+// Finds the range of a brick's groups, in their order, that may reach each slice of blocks of the same x.
 void rangeGroups(const Groups* groups, uint first, uint count, int slices, float reach, global uint2* ranges) {
     for (int slice = (int)(ITEM); slice < slices; slice += ITEMS) ranges[slice] = (uint2)(UINT_MAX, 0);
     MEET;
@@ -159,16 +158,16 @@ void rangeGroups(const Groups* groups, uint first, uint count, int slices, float
     }
 }
 
-// Where a block lies, and the groups that may reach it.
+// A block's position, and the groups that may reach it.
 typedef struct {
     Groups groups;
-    uint2 range;     // of groups that may reach its slice of blocks
+    uint2 range;     // groups that may reach its slice of blocks
     int3 block;      // index coordinates of its first voxel
     float3 inBrick;  // the same in the voxels of the brick
     float reach;     // [voxels]
 } Near;
 
-// The block of this group of items, of all blocks of a batch of bricks.
+// The block of this work-group, out of all blocks of a batch of bricks.
 Near nearBlock(const Grid* grid, const Groups* groups, global const uint* cellOfBrick, uint firstBrick,
                global const uint2* ranges) {
     const int side = (1 << grid->shift) / BLOCK_SIDE;
@@ -181,7 +180,7 @@ Near nearBlock(const Grid* grid, const Groups* groups, global const uint* cellOf
     return near;
 }
 
-// Which of LANES groups from the c-th on reach the block.
+// Mask of LANES groups from the c-th on that reach the block.
 IntLanes reaching(const Near* near, uint c) {
     const float halfBlock = 0.5f * (BLOCK_SIDE - 1);
     global const float* columns = near->groups.columns + c;
@@ -200,7 +199,7 @@ IntLanes reaching(const Near* near, uint c) {
 }
 
 // Lists groups that reach the block, from the c-th on, until the page may be full or there are no more. Returns the
-// group to go on with.
+// next group to test.
 uint turnPage(const Near* near, uint c, SHARED uint* page, SHARED uint* count) {
     MEET;
     if (ITEM == 0) *count = 0;
@@ -208,7 +207,7 @@ uint turnPage(const Near* near, uint c, SHARED uint* page, SHARED uint* count) {
     while (c < near->range.y && *count <= PAGE - ITEMS * LANES) {
         const uint at = c + ITEM * LANES;
         uint bits = at < near->range.y ? bitsOf(reaching(near, at)) : 0;
-        // the columns have room for a vector more, and what stands there does not count
+        // the columns have space for one more vector, whose content is ignored
         if (at < near->range.y && near->range.y - at < LANES) bits &= (1u << (near->range.y - at)) - 1;
         MEET;
         for (; bits != 0; bits &= bits - 1) {

@@ -1,25 +1,25 @@
-// A field laid out on a device, as in sdf/field_layout.h.
+// A field laid out on a device, as in collider/field/field_layout.h.
 #include "common.cl"
 
-// A block with the apron that completes its last cells.
+// A block with its apron, the upper neighbours' voxels that complete its last cells.
 #define STRIDE 9
 #define BLOCK_FLOATS 729
-// Entries of the directory that are no numbers of blocks.
+// Entries of the directory that are not block numbers.
 #define EMPTY_OUTSIDE -1
 #define EMPTY_INSIDE -2
-// Of clearances: voxels along a part, parts along a block, and what ways are stored in.
+// Clearances: voxels along a coarse cell, coarse cells along a block, and the unit of stored vectors.
 #define PART_SIDE 4
 #define PARTS_ALONG 2
 #define WAY_STEPS 8
 
-// FieldFrame of sdf/field_layout.h; metres and voxels as there.
+// FieldFrame of collider/field/field_layout.h; metres and voxels as there.
 typedef struct {
     double origin[3], perMetre;
     int blocks[3];
     float voxelSize, exteriorWidth, interiorWidth;
 } Frame;
 
-// The last axis fastest.
+// Linear index; the last axis varies fastest.
 size_t indexOf(int3 at, int3 size) {
     return ((size_t)(at.x) * size.y + at.y) * size.z + at.z;
 }
@@ -29,12 +29,12 @@ int3 placeAt(uint index, int3 size) {
     return (int3)((int)(slice), (int)(row - slice * size.y), (int)(index - row * size.z));
 }
 
-// Where a voxel of a block is, apron included.
+// Index of a block's voxel, apron included.
 size_t voxelOf(int block, int3 inBlock) {
     return (size_t)(block)*BLOCK_FLOATS + (inBlock.x * STRIDE + inBlock.y) * STRIDE + inBlock.z;
 }
 
-// Where a part's way to the surface is: a block's parts lie together, in the order of the directory.
+// Index of a coarse cell's vector to the surface. The cells of a block are contiguous, in the order of the directory.
 size_t centreOf(int3 part, int3 blocks) {
     const int3 inBlock = part & (PARTS_ALONG - 1);
     return (indexOf(part / PARTS_ALONG, blocks) * PARTS_ALONG + inBlock.x) * PARTS_ALONG * PARTS_ALONG +

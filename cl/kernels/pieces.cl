@@ -1,24 +1,24 @@
-// Triangles cut into pieces of about a voxel, and pieces grouped into clusters, brick by brick: sdf/pieces.h and
-// sdf/clusters.h on a device.
+// Cuts triangles into pieces of about a voxel, and groups pieces into clusters, brick by brick: sdf/fill/pieces.h and
+// sdf/fill/clusters.h on a device.
 #include "groups.cl"
 
 // Longer edges are halved [voxels].
 #define LONGEST_PIECE_EDGE 16.0
-// More halvings than any triangle of a grid needs.
+// Upper limit of the halvings of a triangle in a grid.
 #define MOST_HALVINGS 80
-// Rounding of a sample's place and of the radius around it [voxels].
+// Rounding of a sample's position and of the radius around it [voxels].
 #define RADIUS_SLACK 1e-5f
-// Shorter edges are points, and lower pieces are as good as their longest edge: floats hold the squares of all that is
-// longer [voxels].
+// Shorter edges count as points, and pieces of less height as their longest edge. Floats can hold the squares of all
+// greater lengths [voxels].
 #define SHORTEST 1e-9f
-// Pieces with a mean radius below this are grouped, by cells as large as their mean radius times a factor, within limits
+// Pieces with a mean radius below this are grouped. The cell size is their mean radius times a factor, within limits
 // [voxels].
 #define SMALL_RADIUS 1.6
 #define CELL_FACTOR 4.0f
 #define SMALLEST_CELL 1.1f
 #define LARGEST_CELL 3.0f
 
-// A piece in a frame of its own: Piece of sdf/pieces.h.
+// A piece in its own frame: Piece of sdf/fill/pieces.h.
 typedef struct {
     int base[3];
     uint triangle;
@@ -26,7 +26,7 @@ typedef struct {
     float length, ox, oy, olen, ex, ey, elen;
     float sample[3];
     float radius;
-    float unused;  // the numbers are written four at a time
+    float unused;  // padding: the numbers are written four at a time
 } Piece;
 
 bool isShort(const Corners* t) {
@@ -43,10 +43,10 @@ RealInt partsOfAny(const Grid* grid, const Batch* batch) {
     return lanesOfBits(shortBits(batch)) & 1;
 }
 
-// Cuts a triangle in two at the middle of its longest edge.
+// Halves a triangle at the middle of its longest edge.
 void halve(const Corners* t, Corners* first, Corners* second) {
     const double ab2 = lengthSquared(t->b - t->a), bc2 = lengthSquared(t->c - t->b), ca2 = lengthSquared(t->a - t->c);
-    // turned so that the longest edge comes first
+    // rotated so that the longest edge comes first
     double3 i = t->a, j = t->b, k = t->c;
     if (bc2 > ab2 && bc2 >= ca2) {
         i = t->b;
@@ -70,7 +70,8 @@ typedef struct {
     int count;
 } Parts;
 
-// Takes the next part that is short enough; false if there is none left. Parts whose box misses the limits are left out.
+// Takes the next part that is short enough; false if there is none left. Skips parts whose box is outside of the
+// limits.
 bool nextPart(Parts* parts, const Limits* limits, Corners* part) {
     while (parts->count > 0) {
         *part = parts->waiting[--parts->count];
@@ -94,12 +95,12 @@ uint countParts(const Grid* grid, const Corners* t, const Limits* limits) {
     return count;
 }
 
-// One over a length; zero for what is none.
+// The inverse of a length; zero for a length of zero.
 Real inverse(Real length) {
     return select((Real)(0.0f), 1.0f / length, length > SHORTEST);
 }
 
-// A unit vector across a unit vector: for pieces without a height.
+// A unit vector perpendicular to a unit vector: for pieces without a height.
 Real3 across(Real3 u) {
     const Real zero = 0.0f, one = 1.0f;
     const RealInt useX = fabs(u.x) < 0.6f;
@@ -107,7 +108,7 @@ Real3 across(Real3 u) {
     return scale3(inverse(sqrt(dot3(way, way))), way);
 }
 
-// The numbers of a batch of pieces, a column each: those of Piece, then the sample in the voxels of the brick.
+// The numbers of a batch of pieces, a column each: those of Piece, then the sample in the brick's voxels.
 enum { ORIGIN = 0, AXIS_U = 3, AXIS_W = 6, AXIS_N = 9, LENGTH = 12, LEFT = 13, RIGHT = 16, SAMPLE = 19, COVER = 22,
        PIECE_ROWS = 24, IN_BRICK = 24, ROWS = 27 };
 
@@ -123,12 +124,12 @@ void putEdge(float (*columns)[BATCH], int row, Real x, Real y) {
     put3(columns, row, make3(select((Real)(1.0f), x * part, size > SHORTEST), y * part, size));
 }
 
-// The frames of pieces, by a corner as seen from a lattice point and the ways from there to the next corners.
-// `shift` leads from the lattice points to the brick. Returns the samples in the voxels of the brick.
+// Computes the frames of pieces, from a corner relative to a lattice point and the vectors from there to the next
+// corners. `shift` leads from the lattice points to the brick. Adds the samples in the brick's voxels.
 void makeColumns(Real3 corner, Real3 ab, Real3 ac, Real3 shift, float (*columns)[BATCH]) {
     const Real zero = 0.0f, one = 1.0f;
     const Real3 bc = sub3(ac, ab), none = make3(zero, zero, zero);
-    // turned so that the longest edge comes first
+    // rotated so that the longest edge comes first
     const Real ab2 = dot3(ab, ab), bc2 = dot3(bc, bc), ca2 = dot3(ac, ac);
     const RealInt isFirst = ab2 >= bc2 && ab2 >= ca2, isSecond = bc2 >= ca2;
     const Real3 begin = select3(select3(add3(corner, ac), add3(corner, ab), isSecond), corner, isFirst);
@@ -140,7 +141,7 @@ void makeColumns(Real3 corner, Real3 ab, Real3 ac, Real3 shift, float (*columns)
     const Real along = min(max(dot3(third, u), zero), size);
     const Real3 rest = sub3(third, scale3(along, u));
     Real height = sqrt(dot3(rest, rest));
-    // once more across u, because the rest of a flat piece is mostly rounding; if nothing remains then, all of it was
+    // orthogonalised to u again, since the rest of a flat piece is mostly rounding; if nothing remains, all of it was
     const Real3 rough = scale3(inverse(height), rest), way = sub3(rough, scale3(dot3(rough, u), u));
     const Real wayLength = sqrt(dot3(way, way));
     const RealInt flat = height <= SHORTEST || wayLength < 0.5f;
@@ -153,7 +154,7 @@ void makeColumns(Real3 corner, Real3 ab, Real3 ac, Real3 shift, float (*columns)
     storeReal(size, columns[LENGTH]);
     putEdge(columns, LEFT, along, height);
     putEdge(columns, RIGHT, along - size, height);
-    // the centre of the smallest circle around the piece: of its corners', or the middle of the longest edge
+    // the centre of the smallest circle around the piece: the circumcircle, or the middle of the longest edge
     const Real middle = 0.5f * size;
     const Real lift = (along * along + height * height - along * size) / (height + height);
     const Real up = select(max(lift, zero), zero, flat);
@@ -164,12 +165,12 @@ void makeColumns(Real3 corner, Real3 ab, Real3 ac, Real3 shift, float (*columns)
     storeReal(zero, columns[COVER + 1]);
 }
 
-// The pieces of a brick, and how many of them there are so far.
+// The pieces of a brick, and their count so far.
 typedef struct {
     global Piece* pieces;
     global Member* members;
     SHARED uint* count;
-    uint first;    // the number of the brick's first piece
+    uint first;    // index of the brick's first piece
     int3 origin;   // of the brick
     Extent extent;
 } Cut;
@@ -178,7 +179,7 @@ float4 fourOf(float (*columns)[BATCH], int row, int lane) {
     return (float4)(columns[row][lane], columns[row + 1][lane], columns[row + 2][lane], columns[row + 3][lane]);
 }
 
-// Makes pieces and their members of some lanes.
+// Makes pieces and their members from some lanes.
 void makePieces(Cut* cut, uint lanes, Real3 corner, Real3 ab, Real3 ac, int (*base)[BATCH], const uint* triangles) {
     float columns[ROWS][BATCH];
     const Real3 shift = make3(toRealFromInt(loadRealInt(base[0]) - cut->origin.x),
@@ -209,8 +210,8 @@ void makePieces(Cut* cut, uint lanes, Real3 corner, Real3 ab, Real3 ac, int (*ba
     cut->extent.radii += radii;
 }
 
-// Parts of long triangles that wait until they are a batch: their lattice points, a corner as seen from there, the ways
-// from it to the next corners.
+// Parts of long triangles that wait until they fill a batch: their lattice points, a corner relative to it, and the
+// vectors from it to the next corners.
 typedef struct {
     int base[3][BATCH];
     uint triangle[BATCH];
@@ -229,7 +230,7 @@ void flush(Cut* cut, Waiting* waiting) {
     waiting->count = 0;
 }
 
-// The lattice point nearest to a place. Halves go up, so that a shift by whole voxels shifts the result.
+// The lattice point nearest to a point. Halves round up, so that a shift by whole voxels shifts the result.
 #define nearestLattice(place) floor((place) + 0.5)
 
 void addPart(Cut* cut, Waiting* waiting, const Corners* t, uint triangle) {
@@ -282,7 +283,7 @@ void cutTriangles(Cut* cut, global const float* points, global const uint* trian
     flush(cut, &waiting);
 }
 
-// A group of pieces becomes a cluster, with a sample and a radius that covers all of them: sdf/clusters.h.
+// Makes a cluster of a group of pieces, with a sample and a radius that covers all of them: sdf/fill/clusters.h.
 void makeCluster(const Groups* groups, uint index, global const Member* members) {
     const uint begin = groups->begins[index], end = groups->begins[index + 1];
     float3 mean = 0, normal = 0;
@@ -293,7 +294,7 @@ void makeCluster(const Groups* groups, uint index, global const Member* members)
     mean /= (float)(end - begin);
     const float size = length(normal);
     normal = size > 0 ? normal / size : (float3)(0, 0, 1);
-    // the sample must be a point of the surface: the member's nearest to the middle
+    // the sample must be on the surface: the member's sample nearest to the middle
     float3 sample = 0;
     float nearest2 = INFINITY;
     for (uint m = begin; m < end; ++m) {

@@ -1,13 +1,13 @@
-// Points of bodies in the fields of others: what collider/collider.cpp samples, operation by operation. A ball of
-// points that is surely far from the other body is left out as a whole.
+// Samples points of bodies in the fields of other bodies. Does the same operations as collider/collider.cpp. A bounding
+// sphere of points that is certainly far from the other body is culled.
 #include "field.cl"
 
-// What the interpolant may be below the distance [voxels], and what rounding adds, generously: who is not left out is
-// sampled.
+// How far the interpolant may be below the distance [voxels], and a generous bound of the rounding of a bounding
+// sphere. Points that are not culled are sampled.
 #define MOST_INTERPOLATION_ERROR 0.87f
 #define BALL_ROUNDING 0.01f
 
-// A body in the buffers of all.
+// The offsets of a body in the shared buffers.
 typedef struct {
     Frame frame;
     ulong directory, centres, values, points, balls;
@@ -16,7 +16,7 @@ typedef struct {
 typedef struct {
     float linear[9], shift[3], scale, reach;
     uint body, other;
-    uint firstBall;  // among those of all queries
+    uint firstBall;  // index over all queries
 } Query;
 
 typedef struct {
@@ -30,13 +30,13 @@ typedef struct {
     uint inBand;
 } Found;
 
-// The columns of a map, one after the other.
+// Applies an affine map, given by its columns.
 float3 mapped(const Query* query, float3 p) {
     const float3 a = vload3(0, query->linear), b = vload3(1, query->linear), c = vload3(2, query->linear);
     return a * p.x + b * p.y + c * p.z + vload3(0, query->shift);
 }
 
-// The query that a ball of the batch is of.
+// The query of a bounding sphere of the batch.
 uint queryOf(global const Query* queries, uint count, uint ball) {
     uint low = 0, high = count;
     while (low + 1 < high) {
@@ -49,7 +49,7 @@ uint queryOf(global const Query* queries, uint count, uint ball) {
     return low;
 }
 
-// Whether a ball surely lies outside, farther than `radius` from the surface: Clearance::isOutside() [parts].
+// Whether a sphere is certainly outside, farther than `radius` from the surface: Clearance::isOutside() [coarse cells].
 bool isOutside(const Field* field, float3 centre, float radius) {
     const int3 size = PARTS_ALONG * blocksOf(field);
     const float3 inBox = clamp(centre, (float3)(0.0f), convert_float3(size));
@@ -69,7 +69,7 @@ bool isOfInterest(const Field* field, const Query* query, const Ball* ball) {
     return !isOutside(field, convert_float3(place) * perPart, ball->radius * query->scale * perPart + reach);
 }
 
-// A work-item looks at some balls in a row: one on GPUs. Answers beyond the capacity are counted only.
+// A work-item tests some consecutive bounding spheres: one on GPUs. Answers beyond the capacity are counted only.
 kernel void samplePoints(global const Body* bodies, global const Query* queries, uint queryCount, uint ballCount,
                          uint ballsPerItem, global const int* directories, global const char* centres,
                          global const float* values, global const float* points, global const Ball* balls,

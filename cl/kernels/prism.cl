@@ -1,11 +1,12 @@
-// The prism method on a device: C. Sigg, R. Peikert, M. Gross, "Signed distance transform using graphics hardware", IEEE
-// Visualization 2003. A voxel inside the prism of a triangle gets the signed distance to it, and keeps the one with the
-// smallest absolute value; rows of voxels are scanned against the five planes of a prism.
+// The prism method on a device: C. Sigg, R. Peikert, M. Gross, "Signed distance transform using graphics hardware",
+// IEEE Visualization 2003. A voxel inside the prisms of several triangles gets the signed distance with the smallest
+// absolute value. Rows of voxels are scanned against the five planes of a prism.
 //
 // Two mappings of blocks of 8x8x8 voxels to work-items, chosen when this text is built:
-//   default             a work-item fills a whole block: for processors, whose vector units take a row of voxels at once
+//   default             a work-item fills a whole block: for processors, whose vector units process a row of voxels at
+//                       once
 //   -D GROUP_PER_BLOCK  a work-group of 64 items fills a block, each item one row of 8 voxels in registers: for GPUs
-// -D TRIANGLES=1 also keeps whose distance it is.
+// -D TRIANGLES=1 also stores the nearest triangle.
 #pragma OPENCL FP_CONTRACT OFF
 
 #ifndef TRIANGLES
@@ -18,7 +19,7 @@
 #define ROWS 64
 #endif
 
-// Prism of cl/prism_bins.h.
+// Prism of cl/detail/prism_bins.h.
 typedef struct {
     float u[3], n[3], origin[3];
     float lower[3], upper[3];
@@ -27,7 +28,7 @@ typedef struct {
     int triangle;
 } Prism;
 
-// A prism in the voxels of a block, with all that the rows ask for. Edge k of the triangle starts at corner k.
+// A prism in the voxels of a block, with the values that the rows need. Edge k of the triangle starts at corner k.
 typedef struct {
     float3 u, w, n, origin;
     float lower[2], upper[2];  // in x and y
@@ -37,13 +38,13 @@ typedef struct {
     int triangle;
 } Scanned;
 
-// The rows of 8 voxels along z of one work-item: squared distances, negative inside, and whose they are.
+// The rows of 8 voxels along z of one work-item: squared distances, negative inside, and their triangles.
 typedef struct {
     float8 signed2[ROWS];
     int8 owner[ROWS];  // only if TRIANGLES
 } Rows;
 
-// Prisms are wider by this, so that a voxel on the plane between two of them belongs to one at least [voxels].
+// Overlap of the prisms, so that a voxel on the plane between two of them belongs to at least one [voxels].
 constant float overlap = 1e-4f;
 
 float square(float value) { return value * value; }
@@ -56,7 +57,7 @@ void clear(Rows* rows) {
     }
 }
 
-// A prism, for a block whose first voxel is at `place` in the brick.
+// Transforms a prism to a block whose first voxel is at `place` in the brick.
 Scanned scanned(Prism prism, float3 place) {
     Scanned s;
     s.u = toFloat3(prism.u);
@@ -78,13 +79,13 @@ Scanned scanned(Prism prism, float3 place) {
     return s;
 }
 
-// Scans a row of voxels, the first of which is at (x, y, 0). The first triangle of equally near ones stays.
+// Scans a row of voxels whose first one is at (x, y, 0). Of equally near triangles the first one stays.
 void scanRow(Rows* rows, int row, const Scanned* prism, float x, float y, float reach) {
     const float8 z = (float8)(0, 1, 2, 3, 4, 5, 6, 7);
     const float8 u = prism->origin.x + prism->u.x * x + prism->u.y * y + prism->u.z * z,
                  w = prism->origin.y + prism->w.x * x + prism->w.y * y + prism->w.z * z,
                  h = prism->origin.z + prism->n.x * x + prism->n.y * y + prism->n.z * z;
-    float8 within[3];  // how far on the triangle's side of each edge
+    float8 within[3];  // distance from each edge on the triangle's side
     int8 held = fabs(h) <= reach, overFace = (int8)(-1);
     for (int k = 0; k < 3; ++k) {
         const float2 corner = prism->corner[k], along = prism->along[k], lean = prism->lean[k];
@@ -116,9 +117,9 @@ void store(const Rows* rows, size_t place, float reach, global float* distances,
     }
 }
 
-// Block b has its first voxel at places[3 b] in its brick and the prisms reaching[offsets[b]] .. reaching[offsets[b + 1]],
-// in ascending order. Voxel (x, y, z) of it goes to place (x * 8 + y) * 8 + z of its 512 places. Without TRIANGLES
-// `triangles` is not written.
+// Block b has its first voxel at places[3 b] in its brick, and the prisms reaching[offsets[b]] .. reaching[offsets[b +
+// 1]], in ascending order. Its voxel (x, y, z) is element (x * 8 + y) * 8 + z of its 512. Without TRIANGLES `triangles`
+// is not written.
 #ifdef GROUP_PER_BLOCK
 
 kernel __attribute__((reqd_work_group_size(64, 1, 1))) void fillBlocks(
@@ -149,7 +150,7 @@ kernel __attribute__((reqd_work_group_size(64, 1, 1))) void fillBlocks(
 
 #else
 
-// Scans the slices of a block, and in each the rows, that the box around a prism meets.
+// Scans the slices of a block, and in each the rows, that a prism's box overlaps.
 void scan(Rows* rows, const Scanned* prism, float reach) {
     const int x0 = max((int)(ceil(prism->lower[0])), 0), x1 = min((int)(floor(prism->upper[0])), 7),
               y0 = max((int)(ceil(prism->lower[1])), 0), y1 = min((int)(floor(prism->upper[1])), 7);

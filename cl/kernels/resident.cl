@@ -1,40 +1,40 @@
-// Blocks that a filler left on the device, laid out for queries: what trimToBand(), Assembler and FieldLayout of sdf do
-// on the host, in the same numbers.
+// Lays out the blocks that a filler has left on the device. Produces the same numbers as trimToBand(), Assembler and
+// FieldLayout on the host.
 #include "layout.cl"
 
-// A block of which nothing is known, or an entry of the directory without a block so far.
+// An unknown block, or an entry of the directory without a block so far.
 #define UNKNOWN -3
-// A block that the band meets.
+// A block that the band overlaps.
 #define NEEDED 0
-// bandEdge of sdf/band.h [voxels].
+// bandEdge of sdf/leaf/band.h [voxels].
 #define BAND_EDGE 1e-5f
-// linkSlack of sdf/links.h [voxels].
+// linkSlack of sdf/leaf/sign_propagation.h [voxels].
 #define LINK_SLACK 1e-4f
-// As in sdf/field_layout.cpp.
+// As in collider/field/field_layout.cpp.
 #define MOST_PARTS 16
-// Ways are stored no longer than that [WAY_STEPS].
+// Maximum length of a stored vector [WAY_STEPS].
 #define MOST_WAY 127
 #define NEAR_SURFACE (0.5f * 1.7320508f)
 
-// BandWidths of sdf/band.h.
+// BandWidths of sdf/leaf/band.h.
 typedef struct {
     float exterior, interior, voxelSize;
 } Widths;
 
-// What is known of all blocks together. Boxes are of the first voxels of needed blocks and of the active voxels.
+// Summary of all blocks. Boxes are of the first voxels of needed blocks and of the active voxels.
 typedef struct {
     int needed, conflicts;
     int blockLower[3], blockUpper[3], activeLower[3], activeUpper[3];
 } Summary;
 
-// Sides of a voxel, and bits of what a block has. The sides' bits tell whether there are such voxels.
+// Sides of a voxel, and bits of a block: a side's bit is set if the block has such voxels.
 #define NO_SIDE 0
 #define OUTSIDE 1
 #define INSIDE 2
 #define ACTIVE 4
 #define OPEN 8
 
-// The bits of all items.
+// Combines the bits of all items by OR.
 uint together(SHARED uint* bits, uint own) {
     bits[ITEM] = own;
     MEET;
@@ -52,8 +52,8 @@ uint sideBits(SHARED const uchar* sides, int voxel) {
            (z < last ? sides[voxel + 1] : 0);
 }
 
-// Lets the known sides grow into the voxels of none, a step at a time; where both arrive at once the outside wins.
-// Returns where the sides are then.
+// Propagates the known sides to voxels without a side, one step at a time. If both arrive at once, outside wins.
+// Returns the buffer with the result.
 SHARED uchar* growSides(SHARED uchar* from, SHARED uchar* to, SHARED uint* bits) {
     for (;;) {
         uint changed = 0;
@@ -77,7 +77,7 @@ bool isActive(float distance, const Widths* widths) {
     return distance < widths->exterior - BAND_EDGE && distance > BAND_EDGE - widths->interior;
 }
 
-// Racy reads spare most of the atomic operations: bounds only ever widen.
+// Racy reads avoid most of the atomic operations: bounds only ever widen.
 void addToBox(volatile global int* lower, volatile global int* upper, int3 low, int3 high) {
     if (low.x < lower[0]) atomic_min(lower, low.x);
     if (low.y < lower[1]) atomic_min(lower + 1, low.y);
@@ -87,7 +87,7 @@ void addToBox(volatile global int* lower, volatile global int* upper, int3 low, 
     if (high.z > upper[2]) atomic_max(upper + 2, high.z);
 }
 
-// Distances [voxels] to values [m], as trimToBand() does it, a block for each group. `sides` tells what became of it:
+// Converts distances [voxels] to values [m] as trimToBand() does, a block for each group. `sides` receives the result:
 // NEEDED, UNKNOWN, or an empty entry of the directory.
 GROUP_KERNEL void trimBlocks(global const int* origins, global const float* distances, Widths widths,
                              global int* keptOrigins, global float* values, global int* sides,
@@ -137,7 +137,7 @@ GROUP_KERNEL void trimBlocks(global const int* origins, global const float* dist
     if (has & ACTIVE) addToBox(summary->activeLower, summary->activeUpper, origin + low, origin + high);
 }
 
-// Copies needed blocks to where they stay and enters all blocks in the directory, a block for each group.
+// Copies needed blocks to their final slots and enters all blocks in the directory, a block for each group.
 GROUP_KERNEL void placeBlocks(Frame frame, int4 firstVoxel, global const int* origins, global const float* blocks,
                               global const int* sides, global uint* next, global int* directory, global float* values) {
     SHARED uint number;
@@ -161,13 +161,13 @@ int sideOf(float value) {
     return signbit(value) ? EMPTY_INSIDE : EMPTY_OUTSIDE;
 }
 
-// What an entry tells of the side of its first or last voxel.
+// The side of an entry's first or last voxel.
 int sideAt(int entry, global const float* values, int inBlock) {
     return entry < 0 ? entry : sideOf(values[voxelOf(entry, (int3)(inBlock))]);
 }
 
-// The sides of entries without a block follow from those before them in a column along z; a work-item does a column. A
-// column without any block reaches from outside to outside.
+// Derives the sides of entries without a block from those before them in a column along z. A work-item does a column. A
+// column without any block is outside.
 kernel void markEmpty(Frame frame, global int* directory, global const float* values) {
     const size_t columns = (size_t)(frame.blocks[0]) * frame.blocks[1], column = get_global_id(0);
     if (column >= columns) return;
@@ -181,7 +181,7 @@ kernel void markEmpty(Frame frame, global int* directory, global const float* va
     }
 }
 
-// An entry of the directory; all is outside beyond its box.
+// An entry of the directory; everything beyond its box is outside.
 int entryAt(const Frame* frame, global const int* directory, int3 block) {
     const int3 size = vload3(0, frame->blocks);
     return any(block < 0) || any(block >= size) ? EMPTY_OUTSIDE : directory[indexOf(block, size)];
@@ -192,7 +192,7 @@ float emptyValue(const Frame* frame, int entry) {
     return entry == EMPTY_INSIDE ? -frame->interiorWidth : frame->exteriorWidth;
 }
 
-// Voxel i of the apron: first those with z = 8, then those with y = 8, then those with x = 8.
+// Voxel i of the apron: those with z = 8, then y = 8, then x = 8.
 int3 apronVoxel(int i) {
     const int faceZ = STRIDE * STRIDE, faceY = STRIDE * BLOCK_SIDE;
     if (i < faceZ) return (int3)(i / STRIDE, i % STRIDE, BLOCK_SIDE);
@@ -202,7 +202,7 @@ int3 apronVoxel(int i) {
     return (int3)(BLOCK_SIDE, i / BLOCK_SIDE, i % BLOCK_SIDE);
 }
 
-// Copies the first layers of voxels of the upper neighbours, an entry of the directory for each group.
+// Copies the first layers of voxels of the upper neighbours; each group does one entry of the directory.
 GROUP_KERNEL void fillAprons(Frame frame, global const int* directory, global float* values) {
     const int entry = directory[get_group_id(0)];
     if (entry < 0) return;
@@ -224,15 +224,15 @@ int3 layerVoxel(int axis, int layer, int row) {
     return axis == 0 ? (int3)(layer, u, v) : axis == 1 ? (int3)(u, layer, v) : (int3)(u, v, layer);
 }
 
-// Whether two neighbouring values are on different sides without room for the surface between them. Empty space is a
-// voxel away from it at least, or as far as a narrower band is wide.
+// Whether two neighbouring values have different signs without room for the surface between them. Empty space is at
+// least a voxel away from it, or the width of a narrower band.
 bool conflict(float a, float b, bool empty, float voxelSize) {
     const float room = voxelSize * (1 + LINK_SLACK);
     return signbit(a) != signbit(b) && fabs(a) > room - (empty ? min(fabs(b), voxelSize) : fabs(b));
 }
 
-// Counts contradicting neighbours in different blocks, as Assembler::conflicts() does, and empty entries that touch
-// others of the other side; an entry of the directory for each group.
+// Counts contradictory neighbours in different blocks, as Assembler::conflicts() does, and empty entries that touch
+// entries of the other side. Each group does one entry of the directory.
 GROUP_KERNEL void countConflicts(Frame frame, global const int* directory, global const float* values,
                                  global Summary* summary) {
     const int3 block = placeAt((uint)(get_group_id(0)), vload3(0, frame.blocks));
@@ -257,13 +257,13 @@ GROUP_KERNEL void countConflicts(Frame frame, global const int* directory, globa
     if (found) atomic_add(&summary->conflicts, found);
 }
 
-// The part of space that this work-item is for; some are beyond the last along z.
+// The coarse cell of this work-item; some are beyond the last one along z.
 int3 ownPart(void) {
     return (int3)((int)(get_global_id(2)), (int)(get_global_id(1)), (int)(get_global_id(0)));
 }
 
-// The start of the clearances: 0 for parts that meet the surface, `far` for others, and in the centres only their
-// signs. A work-item does a part.
+// Initialises the clearances: 0 for coarse cells that the surface crosses, `far` for others. Sets only the signs in the
+// centres. A work-item does a cell.
 kernel void measureParts(Frame frame, float far, global const int* directory, global const float* values,
                          global float* ways, global char* centres) {
     const int3 blocks = vload3(0, frame.blocks), part = ownPart(), block = part / PARTS_ALONG;
@@ -289,7 +289,8 @@ kernel void measureParts(Frame frame, float far, global const int* directory, gl
     centres[centreOf(part, blocks)] = least < 0 ? -1 : 1;
 }
 
-// Squared ways along one more axis: transformRow() of sdf/field_layout.cpp. A work-item does a part.
+// Propagates squared distances along one more axis: transformRow() of collider/field/field_layout.cpp. A work-item does
+// a coarse cell.
 kernel void spreadParts(Frame frame, int axis, global const float* from, global float* to) {
     const int3 size = PARTS_ALONG * vload3(0, frame.blocks);
     const int3 part = ownPart();
@@ -312,13 +313,14 @@ kernel void spreadParts(Frame frame, int axis, global const float* from, global 
     to[p] = best;
 }
 
-// Squared ways to ways [WAY_STEPS], rounded down, with the signs that the centres hold. A work-item does a part.
+// Converts squared distances to distances [WAY_STEPS], rounded down, with the signs of the centres. A work-item does a
+// coarse cell.
 kernel void storeCentres(Frame frame, global const float* ways, global char* centres) {
     const int3 blocks = vload3(0, frame.blocks), part = ownPart();
     if (part.z >= PARTS_ALONG * blocks.z) return;
     const int squared = (int)(WAY_STEPS * WAY_STEPS * ways[indexOf(part, PARTS_ALONG * blocks)]);
     int way = (int)(sqrt((float)(squared)));
-    // a device's square root may be rounded either way
+    // a device may round square roots either way
     while (way * way > squared) --way;
     while ((way + 1) * (way + 1) <= squared) ++way;
     global char* centre = centres + centreOf(part, blocks);

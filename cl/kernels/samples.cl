@@ -1,19 +1,20 @@
-// The samples of the double layer method in a brick: triangles cut into parts, those spread out into samples, the
-// samples sorted by cells of space. sdf/tile_cutter.h and sdf/layer_samples.h on a device.
+// The samples of the double layer method in a brick. Triangles are cut into parts, the parts are sampled, and the
+// samples are sorted by cells of space: sdf/fill/tile_cutter.h and sdf/fill/layer_samples.h on a device.
 #include "bins.cl"
 
-// Algorithm 1 divides the longest edge into as many parts as the others; with parts beyond this many roots of epsilon
-// the triangle counts as a sliver.
+// Algorithm 1 divides the longest edge into as many parts as the others. If the parts are longer than this many square
+// roots of epsilon, the triangle is a sliver.
 #define SLIVER_STEP 3.0
-// The samples of a thin part are so many roots of epsilon apart along it, and begun anew after so many.
+// Spacing of the samples along a thin part [square roots of epsilon], and the number after which the sequence restarts.
 #define THIN_STEP 1.6
 #define MOST_ALONG (1 << 30)
 #define THIN_RUN 16
-// More tiles than wait at once for any triangle of a grid.
+// Upper limit of the tiles that wait at once for a triangle of a grid.
 #define MOST_TILES 160
-// Triangles of up to so many rows are spread a batch at a time; of one with more, samples are a batch of their own.
+// Triangles of up to this many rows are sampled in batches of triangles. The samples of one with more rows are a batch
+// of their own.
 #define FEW_ROWS 4
-// Side of the cells that samples are sorted by [voxels].
+// Edge of the cells that samples are sorted by [voxels].
 #define CELL_SIDE 4
 
 #if defined(FP_FAST_FMAF) || defined(__FMA__)
@@ -22,28 +23,28 @@
 #define multiplyAdd(a, b, c) ((a) * (b) + (c))
 #endif
 
-// Samples of all bricks of a batch, a column for each number: places are in the voxels of the brick, offsets are those of
-// the outer layer from them, minus those of the inner one [voxels]. Only samples that are not sorted yet have a cell.
+// Samples of all bricks of a batch, a column for each number. Positions are in the brick's voxels. Offsets lead from
+// them to the outer layer, and negated to the inner layer [voxels]. Only unsorted samples have a cell.
 enum { PLACE_X, PLACE_Y, PLACE_Z, OFFSET_X, OFFSET_Y, OFFSET_Z, OWNER, CELL };
 
-// Where the samples of a brick of a batch begin: each has room for a vector more.
+// Index of the first sample of a brick of a batch: each brick has space for one more vector.
 uint firstSample(global const uint* partOffsets, uint firstBrick, uint brick) {
     return partOffsets[firstBrick + brick] - partOffsets[firstBrick] + brick * LANES;
 }
 
-// The cells of a brick: SampleCells of sdf/layer_samples.h.
+// The cells of a brick: SampleCells of sdf/fill/layer_samples.h.
 typedef struct {
-    int around;          // cells beyond the brick, and around a cell that it looks at
+    int around;          // cells beyond the brick, and around a cell that are searched
     int size;            // along each axis
-    float firstCorner;   // of all cells, on each axis
-    float lower, upper;  // of all places that can matter
+    float firstCorner;   // first corner of all cells, on each axis
+    float lower, upper;  // bounds of all positions that matter
 } SampleCells;
 
 SampleCells cellsFor(const Grid* grid) {
     const float reach = (float)(grid->reach);
     const int side = 1 << grid->shift;
     SampleCells cells;
-    // a cell begins half a voxel before its voxels; a tenth of one is against rounding
+    // a cell begins half a voxel before its voxels; a tenth of a voxel allows for rounding
     cells.around = 1 + (int)(floor((reach - 0.4f) / CELL_SIDE));
     cells.firstCorner = -0.5f - (float)(cells.around * CELL_SIDE);
     cells.size = side / CELL_SIDE + 2 * cells.around;
@@ -86,7 +87,7 @@ Corners turnedToLongest(const Corners* t) {
     return *t;
 }
 
-// At the middle of the longest edge.
+// Halves a tile at the middle of the longest edge.
 void halve(Tiles* tiles, const Limits* limits, const Tile* tile) {
     const Corners t = turnedToLongest(&tile->corners);
     const double3 middle = 0.5 * (t.a + t.b);
@@ -105,7 +106,7 @@ void quarter(Tiles* tiles, const Limits* limits, const Tile* tile) {
     wait(tiles, limits, cornersFrom(t->a, ab, ca), area, longest2);
 }
 
-// The samples of a part of a triangle: rows of them or, where it is thin, one row along it. None if it must be cut.
+// The samples of a part of a triangle: rows of them, or one row along it if it is thin. None if it must be cut.
 typedef struct {
     int rows;   // n of Algorithm 1; 1 in Fig. 2 of the paper
     int along;  // see ThinPart
@@ -145,12 +146,12 @@ bool nextTile(Tiles* tiles, const Sampling* sampling, const Limits* limits, Tile
     return false;
 }
 
-// ThinPart of sdf/tile_cutter.h.
+// ThinPart of sdf/fill/tile_cutter.h.
 typedef struct {
     double3 from, edge, rise;
     double peak;
     int along;
-    int begin, end;  // of the runs that may come into the limits
+    int begin, end;  // range of the runs that may be within the limits
 } Thin;
 
 // A run of its samples.
@@ -168,7 +169,7 @@ Thin thinWithin(const Corners* t, int along, const Limits* limits) {
     thin.rise = 0.5 * (opposite - thin.peak * thin.edge);
     const double3 lower = limits->lower - max(thin.rise, none) - thin.from,
                   upper = limits->upper - min(thin.rise, none) - thin.from;
-    // an axis that the edge does not run along leaves all of it, or nothing
+    // on an axis perpendicular to the edge, all of it is within the limits, or nothing
     const long3 across = thin.edge == 0.0;
     if (any(across && (lower > 0.0 || upper < 0.0))) return thin;
     const double3 way = select(thin.edge, (double3)(1.0), across);
@@ -177,7 +178,7 @@ Thin thinWithin(const Corners* t, int along, const Limits* limits) {
     const double low = max(0.0, max(nearer.x, max(nearer.y, nearer.z))),
                  high = min(1.0, min(farther.x, min(farther.y, farther.z)));
     if (low > high) return thin;
-    // a sample more at each end is against rounding
+    // one more sample at each end allows for rounding
     thin.begin = max(0, (int)(low * along) - 2) / THIN_RUN * THIN_RUN;
     thin.end = min(along, (int)(high * along) + 2);
     return thin;
@@ -201,7 +202,7 @@ uint countThin(const Corners* t, int along, const Limits* limits) {
     return (uint)(end - thin.begin);
 }
 
-// Begins with a whole triangle.
+// Starts with a whole triangle.
 void beginTiles(Tiles* tiles, const Corners* t, double3 normal) {
     const Tile whole = {*t, 0.5 * length(normal), longestEdge2(t)};
     tiles->waiting[0] = whole;
@@ -224,7 +225,7 @@ Exact rowsOfAny(const Sampling* sampling, const Batch* batch, Exact size) {
     return ((longestEdges2(batch) <= sliver2) & (rows <= most)) ? rows : (Exact)(0.0);
 }
 
-// A part is a sample here.
+// Here a part is a sample.
 RealInt partsOfAny(const Grid* grid, const Batch* batch) {
     const Exact rows = rowsOfAny(&grid->sampling, batch, sqrt(squareExact(normals(batch))));
     return toRealInt(0.5 * rows * (rows + 1.0));
@@ -242,9 +243,9 @@ uint countParts(const Grid* grid, const Corners* t, const Limits* limits) {
     return count;
 }
 
-// The samples of a brick, and how many there are so far.
+// The samples of a brick, and their count so far.
 typedef struct {
-    global float* samples;  // the first one's place in the first column
+    global float* samples;  // the first sample in the first column
     uint stride;            // of the columns
     global uint* cursors;   // of the cells
     SHARED uint* count;
@@ -253,7 +254,7 @@ typedef struct {
     float delta;
 } Cut;
 
-// Adds the samples of some lanes, without those that stay away from the brick.
+// Adds the samples of some lanes, except those that do not reach the brick.
 void addSamples(Cut* cut, uint among, Real3 place, Real3 offset, RealInt owner) {
     const SampleCells* c = &cut->cells;
     const RealInt within = (place.x >= c->lower) & (place.x <= c->upper) & (place.y >= c->lower) &
@@ -276,7 +277,7 @@ void addSamples(Cut* cut, uint among, Real3 place, Real3 offset, RealInt owner) 
     putSome(asReal((x * c->size + y) * c->size + z), among, to + CELL * stride);
 }
 
-// What rows and columns of samples are made of.
+// The vectors that rows and columns of samples are made of.
 typedef struct {
     Real3 first, down, across, offset;
 } Spread;
@@ -287,7 +288,7 @@ Real3 placeIn(const Spread* s, Real row, Real column) {
                  multiplyAdd(column, s->across.z, multiplyAdd(row, s->down.z, s->first.z)));
 }
 
-// Adds the samples of Algorithm 1, each of all triangles of a batch: row i has i + 1 of them.
+// Adds the samples of Algorithm 1, one of each triangle of a batch at a time: row i has i + 1 of them.
 void addFew(Cut* cut, Real rows, const Spread* spread, RealInt owners) {
     for (int i = 0;; ++i) {
         const uint among = bitsOfReal(rows > (Real)((float)(i)));
@@ -301,12 +302,12 @@ Real3 same3(double3 v) {
     return make3((Real)((float)(v.x)), (Real)((float)(v.y)), (Real)((float)(v.z)));
 }
 
-// Bits of the first lanes of a batch, all of them at most.
+// Bits of the first lanes of a batch, at most all of them.
 uint firstLanes(int count) {
     return count < BATCH ? (1u << count) - 1 : (1u << BATCH) - 1;
 }
 
-// The same for one part of a triangle, many samples at once.
+// The same for one part of a triangle, with many samples at once.
 void addPart(Cut* cut, const Corners* t, int rows, double3 normal, uint triangle) {
     const double step = 1.0 / rows;
     const double3 s1 = (t->b - t->a) * step, s2 = (t->c - t->b) * step, s3 = (t->c - t->a) * step;
@@ -314,7 +315,7 @@ void addPart(Cut* cut, const Corners* t, int rows, double3 normal, uint triangle
                            same3(normal * (cut->delta / length(normal)))};
     const int count = rows * (rows + 1) / 2;
     for (int k = 0; k < count; k += BATCH) {
-        // the roots are exact where a row begins, and far enough from it before
+        // the roots are exact at the beginning of a row, and far enough from it before
         const Real number = laneNumbers + (float)(k);
         const Real row = floor((sqrt(multiplyAdd(number, (Real)(8.0f), (Real)(1.0f))) - 1.0f) * 0.5f),
                    column = number - 0.5f * multiplyAdd(row, row, row);
@@ -372,8 +373,8 @@ Exact3 addExact(Exact3 a, Exact3 b) {
     return v;
 }
 
-// Samples those triangles of a batch that have few rows. Returns bits of the others that have an area, and the rows of
-// all as they were counted.
+// Samples the triangles of a batch that have few rows. Returns bits of the others that have an area, and the counted
+// rows of all.
 uint cutFew(Cut* cut, const Grid* grid, const Batch* batch, int* rowsOfEach) {
     const Exact3 ab = subExact(batch->b, batch->a), ac = subExact(batch->c, batch->a),
                  bc = subExact(batch->c, batch->b), normal = normals(batch);
@@ -412,7 +413,7 @@ void cutTriangles(Cut* cut, const Grid* grid, global const float* points, global
     }
 }
 
-// Sorts the samples of a brick by cell. Afterwards the cursors, which are zero before, hold the first sample of each
+// Sorts the samples of a brick by cell. The cursors must be zero before. Afterwards they hold the first sample of each
 // cell, and the end of the last one.
 void sortSamples(const Cut* cut, uint count, global float* sorted, SHARED uint* sums) {
     const uint cells = (uint)(cut->cells.size * cut->cells.size * cut->cells.size), stride = cut->stride;
@@ -429,7 +430,7 @@ void sortSamples(const Cut* cut, uint count, global float* sorted, SHARED uint* 
         sum = 0;
         for (uint i = 0; i < ITEM; ++i) sum += sums[i];
     }
-    // the count of a cell becomes the place of the next one's first sample
+    // converts the count of a cell to the first sample of the next one
     for (uint cell = begin; cell < end; ++cell) counts[cell] = sum += counts[cell];
     MEET;
     ONE_BY_ONE for (uint i = ITEM; i < count; i += ITEMS) places[i] = takeGlobal(cut->cursors + places[i] + 1, 1);

@@ -1,4 +1,4 @@
-// Triangles a batch at a time: as many at once as there are lanes where one item does a group's work, else one by one.
+// Processes triangles in batches: as many at once as there are lanes if one item does a group's work, else one by one.
 #include "common.cl"
 
 #if ITEMS > 1
@@ -39,7 +39,7 @@ typedef double16 Exact;
 #define lanesOfBits lanesOf
 #endif
 
-// Puts those lanes side by side whose bit is set; some more places are written.
+// Compresses the lanes whose bit is set; writes some elements beyond them.
 #if BATCH == 1
 #define putSome(values, bits, to) (*(to) = (values))
 #elif COMPRESSES
@@ -110,10 +110,10 @@ Real3 toReal3(Exact3 a) {
     return make3(toReal(a.x), toReal(a.y), toReal(a.z));
 }
 
-// The triangles of a batch. Where a list ends the last one is repeated.
+// The triangles of a batch. At the end of a list the last one is repeated.
 typedef struct {
     uint triangle[BATCH];
-    uint real;  // a bit for each that is no repetition
+    uint real;  // a bit for each triangle that is not a repetition
     Exact3 a, b, c;  // corners [voxels]
 } Batch;
 
@@ -127,7 +127,7 @@ Exact longestEdges2(const Batch* batch) {
 
 #define fetchAhead(pointer) __builtin_prefetch((const void*)(size_t)(pointer))
 
-// Fetches what the next batches of a list will ask for: a processor's item waits for memory where a GPU's others run.
+// Prefetches the data of the next batches of a list: a processor's item stalls for memory where a GPU runs other items.
 INLINED void prefetchTriangle(global const float* points, global const uint* triangles, global const uint* list,
                               uint at, uint end) {
     if (at + 2 * BATCH < end) fetchAhead(triangles + 3 * (size_t)(list ? list[at + 2 * BATCH] : at + 2 * BATCH));
@@ -140,7 +140,7 @@ INLINED void prefetchTriangle(global const float* points, global const uint* tri
 #define prefetchTriangle(points, triangles, list, at, end)
 #endif
 
-// From the numbers of the corners' coordinates [m].
+// Converts the corners' coordinates [m] to voxels.
 Exact3 inVoxels(float (*world)[BATCH], double voxelsPerUnit) {
     const Exact3 corners = {toExact(loadReal(world[0])) * voxelsPerUnit, toExact(loadReal(world[1])) * voxelsPerUnit,
                             toExact(loadReal(world[2])) * voxelsPerUnit};

@@ -24,7 +24,7 @@ using namespace bilayer::detail;
 
 namespace {
 
-/// Whether the pairs are a ghost's own, as character controllers dispatch them once more within a step.
+/// Whether the pairs belong to a ghost object: character controllers dispatch them again within a step.
 bool isOfGhost(btOverlappingPairCache& cache) {
     if (cache.getNumOverlappingPairs() == 0) return false;
     const btBroadphasePair& pair = *cache.getOverlappingPairArrayPtr();
@@ -80,11 +80,11 @@ void Dispatcher::dispatchAllCollisionPairs(btOverlappingPairCache* cache, const 
         const btCollisionObjectWrapper two(nullptr, second->getCollisionShape(), second, second->getWorldTransform(),
                                            -1, -1);
         if (!overlap.m_algorithm) overlap.m_algorithm = findAlgorithm(&one, &two, nullptr, BT_CONTACT_POINT_ALGORITHMS);
-        // else it is GImpact's, which comes to us for its parts, or one that the user has registered
+        // else it is GImpact's, which calls us for its parts, or one that the user has registered
         if (auto* algorithm = dynamic_cast<FieldAlgorithm*>(overlap.m_algorithm))
             algorithm->gather(one, two, functions_->state.seconds, tasks);
     }
-    std::vector<std::optional<std::size_t>> numbers(tasks.size());  // among those sampled
+    std::vector<std::optional<std::size_t>> numbers(tasks.size());  // numbers of the sampled pairs
     SampledPairs& sampled = functions_->sampledPairs;
     sampled.clear();
     if (sampled.works())

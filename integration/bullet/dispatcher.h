@@ -1,4 +1,4 @@
-// Bullet's dispatcher with every pair that a field takes part in.
+// A Bullet dispatcher that collides fields with all of Bullet's shapes.
 #pragma once
 
 #include <BulletCollision/CollisionDispatch/btCollisionDispatcher.h>
@@ -11,38 +11,38 @@
 
 namespace bilayer::bullet {
 
-/// What the last step's narrow phase did.
+/// Counts and times of the last step's narrow phase.
 struct DispatchStatistics {
-    int pairs = 0;          ///< pairs with a field in them that were awake and whose boxes overlapped
+    int pairs = 0;          ///< pairs with a field that were awake and whose boxes overlapped
     int contactsFound = 0;  ///< before reduction
     int contactsKept = 0;   ///< handed to the solver
-    /// What that took off the contacts' effect: of all pairs, how deep a contact that was left out could come before
-    /// one that was kept is met [m]
+    /// Error of the reduction: over all pairs, the maximum depth that a discarded contact could reach before a kept
+    /// contact touches [m]
     float reductionError = 0;
-    int beyondBand = 0;  ///< points too deep for the band (see ContactReport)
-    int sampled = 0;     ///< pairs whose points the sampler has sampled, see Dispatcher
-    double seconds = 0;  ///< for all of these pairs, Bullet's own included
+    int beyondBand = 0;  ///< points deeper than the band reaches (see ContactReport)
+    int sampled = 0;     ///< pairs whose points were sampled by the sampler (see Dispatcher)
+    double seconds = 0;  ///< for all of these pairs, including Bullet's own work
 };
 
-/// Use it in place of btCollisionDispatcher: fields then collide with every convex shape, planes, triangle meshes,
-/// height fields and fields, also inside compounds, in contact tests, and in either order.
+/// Use it in place of btCollisionDispatcher. Fields then collide with every convex shape, planes, triangle meshes,
+/// height fields and other fields, also inside compounds, in contact tests, and in either order.
 ///
-/// All pairs of a step that hold a field, children of compounds included, are collided as one TBB batch, and their
-/// contacts are handed to Bullet in order: the same bits for any number of threads. Also set
-/// btCollisionWorld::getDispatchInfo().m_deterministicOverlappingPairs where runs that add and remove bodies in another
-/// order must agree.
+/// All pairs of a step that hold a field, children of compounds included, are collided as one TBB batch. Their contacts
+/// are handed to Bullet in order, so the results are the same bits for any number of threads. Runs that add and remove
+/// bodies in different orders agree only if btCollisionWorld::getDispatchInfo().m_deterministicOverlappingPairs is set
+/// too.
 ///
-/// With a sampler, `openclPointSampler(device)` for example, the points of all pairs of fields are sampled by it, in
-/// one batch, but for those whose motion is to be followed; the contacts are the same, bit by bit, where the device
-/// computes as IEEE 754 has it. Where the sampler fails, the processor takes over for good, in that very step, and a
-/// line on the standard error output says so: DispatchStatistics::sampled is then 0.
+/// A sampler, for example `openclPointSampler(device)`, samples the surface points of all pairs of fields in one batch.
+/// Pairs whose motion needs speculative contacts are excluded. The contacts are the same bits where the device computes
+/// as IEEE 754 specifies. If the sampler fails, the processor takes over within the same step and permanently, and a
+/// line on the standard error output reports it. DispatchStatistics::sampled is then 0.
 class Dispatcher : public btCollisionDispatcher {
   public:
     explicit Dispatcher(btCollisionConfiguration* configuration, PointSampler sampler = {});
     ~Dispatcher() override;
 
-    /// Fills Bullet's tables once more. The constructor has done so; btGImpactCollisionAlgorithm::registerAlgorithm
-    /// overwrites a row and a column.
+    /// Fills Bullet's algorithm tables again; the constructor fills them first. Needed after
+    /// btGImpactCollisionAlgorithm::registerAlgorithm, which overwrites a row and a column.
     void registerFields();
 
     void dispatchAllCollisionPairs(btOverlappingPairCache* pairs, const btDispatcherInfo& info,
@@ -55,17 +55,18 @@ class Dispatcher : public btCollisionDispatcher {
     std::unique_ptr<Functions> functions_;
 };
 
-/// Fields for a dispatcher that is Bullet's own, or yours: it then collides them with all that a Dispatcher does, by
-/// the same contacts, but pair after pair on the thread that steps the world. Not for btCollisionDispatcherMt.
+/// Adds fields to a dispatcher of Bullet's own, or of yours. The dispatcher then collides the same pairs with the same
+/// contacts as a Dispatcher, but one pair after another on the thread that steps the world. Not for
+/// btCollisionDispatcherMt.
 class FieldAlgorithms {
   public:
-    /// Fills the dispatcher's tables. Must outlive the worlds that the dispatcher serves.
+    /// Fills the dispatcher's algorithm tables. This object must outlive the worlds that the dispatcher serves.
     explicit FieldAlgorithms(btCollisionDispatcher& dispatcher);
     ~FieldAlgorithms();
     FieldAlgorithms(const FieldAlgorithms&) = delete;
     FieldAlgorithms& operator=(const FieldAlgorithms&) = delete;
 
-    /// Fills them once more, as Dispatcher::registerFields().
+    /// Fills the tables again, as Dispatcher::registerFields().
     void registerFields();
 
   private:

@@ -20,14 +20,14 @@ namespace {
 
 constexpr float normalVoxels = 1;  // length of a surface point's line [voxels]
 
-// Whether an edge of the lattice of blocks belongs to the outline of the occupied ones: of the four blocks around it,
-// one, three, or two opposite ones are. Two side by side make a flat face.
+// Whether an edge of the leaf lattice is on the outline of the occupied leaves. It is if one, three, or two opposite
+// ones of the four leaves around it are occupied. Two adjacent ones make a flat face.
 bool isOutline(bool here, bool besideU, bool besideV, bool besideBoth) {
     const int occupied = here + besideU + besideV + besideBoth;
     return occupied == 1 || occupied == 3 || (occupied == 2 && here == besideBoth);
 }
 
-// Calls line(from, to) for the edges along one axis [blocks], those in a row as one.
+// Calls line(from, to) for the edges along one axis [leaves]; collinear edges in a row make one line.
 template <class Line>
 void visitOutline(const Field& field, int axis, Line&& line) {
     const glm::ivec3 size = field.data().blocks;

@@ -15,14 +15,14 @@ using namespace detail;
 
 namespace {
 
-// A world's pre-tick callback, which it tells nobody.
+// A world's pre-tick callback, which Bullet does not expose.
 struct PreTick : btDynamicsWorld {
     static btInternalTickCallback& of(btDynamicsWorld& world) { return world.*&PreTick::m_internalPreTickCallback; }
 };
 
 }  // namespace
 
-/// Acts as one of the world's actions at the end of each internal step, and as its pre-tick callback at the beginning.
+/// Runs at the end of each internal step as one of the world's actions, and at the beginning as its pre-tick callback.
 class WorldExtensions::Hook : public btActionInterface {
   public:
     Hook(btDynamicsWorld& world, const ExtensionOptions& options) : world_(world) {
@@ -68,7 +68,7 @@ class WorldExtensions::Hook : public btActionInterface {
         hook->gyroscopic_->beforeStep(seconds);
     }
 
-    // also from a callback that the user has set since
+    // also replaces a callback that the user has set later
     void takePreTick() {
         btInternalTickCallback& current = PreTick::of(world_);
         if (current == preTick) return;
@@ -76,7 +76,7 @@ class WorldExtensions::Hook : public btActionInterface {
         current = preTick;
     }
 
-    static inline std::mutex mutex_;  // guards what follows
+    static inline std::mutex mutex_;  // guards the members below
     static inline std::map<btDynamicsWorld*, Hook*> hooks_;
 
     btDynamicsWorld& world_;

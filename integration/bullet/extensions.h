@@ -1,4 +1,5 @@
-// What a Bullet world of fields does at the end of each step, in addition to Bullet's own.
+// Work at the end of each step of a Bullet world with fields, in addition to Bullet's own: continuous collision, rest
+// stabilisation and gyroscopic integration.
 #pragma once
 
 #include <BulletDynamics/Dynamics/btDynamicsWorld.h>
@@ -8,50 +9,55 @@
 namespace bilayer::bullet {
 
 struct ExtensionOptions {
-    /// No body passes through a field, and no field through anything, however fast and however thin.
+    /// Tunnelling prevention: no body passes through a field, and no field through anything, at any speed and any
+    /// thickness.
     ///
-    /// The Dispatcher makes speculative contacts of what a body's motion would meet. But Bullet's solver is iterative,
-    /// and an impact throws bodies about: after it they may go elsewhere, by far more than a plate's thickness when
-    /// they are fast. So the path of each fast body in a step is looked at once more, with its rotation, against all
-    /// that it swept over. Where it would get through a surface, the body stays at the place where it touched, for the
-    /// rest of this step; it keeps its velocity, and the contacts that it has there are the next step's. Two bodies
-    /// that hold each other back once more then lose the speed at which they approach each other; what cannot move at
-    /// all comes to rest.
+    /// The Dispatcher makes speculative contacts along each body's motion. But Bullet's solver is iterative, and an
+    /// impact can send a fast body along a different path, by far more than the thickness of a plate. So the path of
+    /// each fast body in a step, rotation included, is checked at the end of the step against everything that it swept
+    /// over. Where it would cross a surface, the body stays at the point of impact for the rest of the step. It keeps
+    /// its velocity, and its contacts there belong to the next step. If two bodies hold each other back in two
+    /// successive steps, they lose their approach velocity. Bodies that cannot move at all come to rest.
     ///
-    /// Bodies that move less than a margin in a step cost next to nothing. Left alone are shapes with speculative ==
-    /// false, pairs without a field, kinematic bodies and btGImpactMeshShape, which the Dispatcher's speculative
-    /// contacts serve still, and a body that Bullet's own CCD has stopped in this step. The same bits for any number of
-    /// threads.
+    /// Bodies that move less than a margin in a step cost almost nothing. The results are the same bits for any number
+    /// of threads. Not handled are:
+    /// - shapes with speculative == false, pairs without a field, and kinematic bodies;
+    /// - btGImpactMeshShape, which still gets the Dispatcher's speculative contacts;
+    /// - a body that Bullet's own CCD has stopped in this step.
     bool continuousCollision = true;
 
-    /// Bodies at rest stay where they are. Bullet's solver leaves them some speed in each step, which is rounding and
-    /// has no direction, but in minutes it takes a body by a tenth of a voxel; then part of a pile slides.
+    /// Rest stabilisation: bodies at rest keep their positions. Bullet's solver leaves them some velocity in each step.
+    /// It is rounding and has no direction, but in minutes it moves a body by 0.1 voxels, and then part of a pile
+    /// slides.
     ///
-    /// A body that is slower at the end of a step than 5 % of the speed that gravity gives in one (at its farthest
-    /// point; 2 mm/s with 240 steps a second, 8 mm/s with 60), and gets no faster, stays where it was, to the bit, and
-    /// keeps its speed. It is released when its speed changes by 5 % for four steps, or grows to 15 %; then with the
-    /// speed that it had when it came to be held, so that what swings gets no energy.
+    /// A body is held if its speed at the end of a step is below 5 % of the speed that gravity adds in one step, and
+    /// does not grow. The speed is that of its farthest point; the limit is 2 mm/s at 240 steps a second and 8 mm/s at
+    /// 60. A held body keeps its position to the bit, and keeps its velocity. It is released when its speed changes by
+    /// 5 % for four steps, or grows to 15 %. It then gets the velocity that it had when it was first held, so that an
+    /// oscillating body gains no energy.
     ///
-    /// Never held are bodies without weight, those that a constraint or a force moves, and those that touch such a body
-    /// or a kinematic one that moves. But a body that is slower than that for any other reason stays for good, even on
-    /// ice: it stops rolling, does not start, and a body that slides by a part e of its weight beyond friction's limit
-    /// waits for 0.15 / e steps.
+    /// Never held are bodies without weight, bodies that a constraint or a force moves, and bodies in contact with one
+    /// of these or with a moving kinematic body.
+    ///
+    /// A body below the limit for any other reason is held for good, even on ice: it stops rolling, and does not start.
+    /// A body that slides because the load exceeds the friction limit by a fraction e of its weight starts only after
+    /// 0.15 / e steps.
     bool restStabilisation = false;
 
-    /// Bodies on which nothing acts keep their angular momentum, and their energy to second order in the step. Bullet
-    /// corrects the angular velocity by a gyroscopic torque to first order: a body that turns over in free flight loses
-    /// 10 % of its angular momentum a minute at 240 steps a second.
+    /// Gyroscopic integrator: bodies without external forces keep their angular momentum, and their energy to second
+    /// order in the step. Bullet corrects the angular velocity by a gyroscopic torque to first order. A body that
+    /// tumbles in free flight loses 10 % of its angular momentum a minute at 240 steps a second.
     ///
-    /// Each step turns a body by the angular velocity that it has in the middle of it, found from its angular momentum
-    /// (the implicit midpoint rule: J. C. Simo, K. K. Wong, "Unconditionally stable algorithms for rigid body dynamics
-    /// that exactly preserve energy and momentum", Int. J. Numer. Meth. Engng. 31 (1991)). What contacts, constraints,
-    /// torques and damping do to a body in the step is added to its angular momentum. Bullet's own gyroscopic torque is
-    /// switched off, body by body.
+    /// Each step rotates a body by its angular velocity in the middle of the step, found from its angular momentum (the
+    /// implicit midpoint rule: J. C. Simo, K. K. Wong, "Unconditionally stable algorithms for rigid body dynamics that
+    /// exactly preserve energy and momentum", Int. J. Numer. Meth. Engng. 31 (1991)). The changes by contacts,
+    /// constraints, torques and damping are added to the angular momentum. Bullet's own gyroscopic torque is switched
+    /// off, body by body.
     bool gyroscopicIntegration = false;
 };
 
-/// Extends a world from its construction on. The world must outlive it. Tick callbacks of the user's keep working,
-/// whether they are set before or after: pre-tick callbacks are called first, and others after the extensions.
+/// Extends a world from its construction on. The world must outlive it. The user's own tick callbacks keep working,
+/// whether they are set before or after: pre-tick callbacks run before the extensions, others after them.
 class WorldExtensions {
   public:
     explicit WorldExtensions(btDynamicsWorld& world, const ExtensionOptions& options = {});
@@ -59,8 +65,8 @@ class WorldExtensions {
     WorldExtensions(const WorldExtensions&) = delete;
     WorldExtensions& operator=(const WorldExtensions&) = delete;
 
-    int stoppedBodies() const;  ///< that continuous collision has stopped on their paths in the last step
-    int restingBodies() const;  ///< that rest stabilisation has kept where they were in the last step
+    int stoppedBodies() const;  ///< bodies that continuous collision stopped on their paths in the last step
+    int restingBodies() const;  ///< bodies that rest stabilisation held in the last step
 
   private:
     class Hook;

@@ -13,32 +13,34 @@ namespace bilayer::bullet {
 
 namespace {
 
-// Walls [voxels]: from three on, mass and inertia are good to 0.5 %; below two, sides are told apart by luck.
+// Wall thickness [voxels]: from three on, mass and inertia are accurate to 0.5 %; below two, the inside/outside
+// classification is unreliable.
 constexpr float wallVoxels = 3, minWallVoxels = 2;
-// Narrowest timeOfImpact [voxels]: overlaps at rest are below half a voxel, on either side.
+// Minimum gap to pass [voxels]: penetration at rest is below 0.5 voxels on either side.
 constexpr float gapVoxels = 2;
-// Voxels along the longest side: features of what is not thin, and what memory takes.
+// Voxels along the longest side. The minimum resolves the features of bodies that are not thin, the maximum limits the
+// memory.
 constexpr float minResolution = 64, maxResolution = 512;
-constexpr float rounding = 1e-3f;  // [voxels] and steps: numbers that are off by less count as whole
-constexpr float minVoxel = 2e-5f;  // [m] OpenVDB takes none smaller
-constexpr float maxIndex = 1e9f;   // and no field's coordinates are larger [voxels]
+constexpr float rounding = 1e-3f;  // [voxels] and steps: numbers within this of an integer count as integers
+constexpr float minVoxel = 2e-5f;  // [m] the minimum of OpenVDB
+constexpr float maxIndex = 1e9f;   // maximum coordinate of a field [voxels]
 // A point is in the band if the eight voxels around it are.
 constexpr float cellDiagonal = 1.7320508f;  // [voxels]
-// Bands inside [voxels]: what shallow overlaps need, and where sweeps or shorter steps are cheaper than more voxels.
+// Interior band width [voxels]: the minimum for shallow penetration, and the width beyond which CCD or shorter steps
+// are cheaper than more voxels.
 constexpr int minInterior = 3, maxInterior = 10;
-// Points are followed along straight ways: off by 3 % of a body's radius where it turns by this in a step [rad].
+// Points are followed along straight paths. The error is 3 % of a body's radius at this rotation in a step [rad].
 constexpr float straightTurn = 0.5f;
-// Deeper than the middle of a wall, a point is pushed out on the far side.
+// Beyond the middle of a wall, a point is pushed out on the far side.
 constexpr float wallPart = 0.5f;
-// Bullet's thresholds are lengths and speeds of their own: gContactBreakingThreshold is 2 cm, bodies sleep below
-// 0.8 m/s. A tenth of a body's size and four of its lengths a second are still harmless [m].
+// Minimum body size [m]. Bullet's thresholds are absolute lengths and speeds: gContactBreakingThreshold is 2 cm, and
+// bodies sleep below 0.8 m/s. A tenth of a body's size and four of its lengths a second are still harmless.
 constexpr float minSize = 0.2f;
-constexpr float maxMassRatio = 10;  // what ten iterations of sequential impulses settle
+constexpr float maxMassRatio = 10;  // settled by ten iterations of sequential impulses
 constexpr double maxMemory = double(1 << 30);
 // Measured at the end of large builds on two cores of an AMD EPYC (Zen 4), 2023 [s].
 constexpr double secondsPerTriangle = 160e-9, secondsPerVoxel = 26e-9;
-// A block of 8^3 voxels as a Field keeps it, with an apron [bytes]; and how wide it is, seen from anywhere in the mean
-// [voxels].
+// A leaf of 8^3 voxels as a Field stores it, with an apron [bytes]; and its mean width over all directions [voxels].
 constexpr double blockBytes = 9 * 9 * 9 * 4, blockVoxels = 512, blockWidth = 12;
 
 void requireSensible(const MeshReport& mesh, const SceneRequirements& scene) {
@@ -74,8 +76,8 @@ float chosenVoxel(const SceneRequirements& scene, float longest, float wall) {
     return std::max({voxel, longest / maxResolution, minVoxel});
 }
 
-// By area and volume: exact to first order in the curvature. Blocks are counted on both sides of the surface, so that
-// walls thinner than a block need up to half of the memory only.
+// Estimates from area and volume, exact to first order in the curvature. Leaves are counted on both sides of the
+// surface, so that walls thinner than a leaf need as little as half of the memory.
 void estimate(const MeshReport& mesh, Settings& advice) {
     const double h = advice.voxelSize, area = mesh.area / (h * h), volume = std::abs(mesh.volume) / (h * h * h);
     double inside = area * advice.interiorWidth;
@@ -156,7 +158,7 @@ Settings recommendSettings(const MeshReport& mesh, const SceneRequirements& scen
     advice.splitImpulse = -h;
 
     const float way = scene.speed * scene.step;
-    // an impact at one end stops that end: what was speed becomes spin about it
+    // an impact at one end stops that end; the linear velocity becomes rotation about it
     const float spin = scene.spin < 0 ? 2 * scene.speed / longest : scene.spin;
     advice.substeps = std::max(1, wholeFrom(spin * scene.step / straightTurn));
     const float deepest = wallPart * (wall > 0 ? wall : longest);

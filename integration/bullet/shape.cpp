@@ -32,21 +32,22 @@ namespace {
 // Points of a manifold count as the same from step to step within this distance [voxels]: the spacing of surface
 // points.
 constexpr float breakingVoxels = 2;
-// The voxels' edge where other shapes are swept [m]: Bullet then ends its search a fiftieth of it before they touch.
+// The voxel size used to sweep other shapes [m]: Bullet then ends its search a fiftieth of it before they touch.
 constexpr float castVoxel = 0.05f;
-// Where a ray goes on behind a triangle that it sees from behind [voxels].
+// Offset at which a ray continues behind a back-facing triangle [voxels].
 constexpr double skippedVoxels = 1e-4;
-// Bullet's quantized hierarchy takes the upper bits of larger indices for the number of a part.
+// Maximum index of a triangle: Bullet's quantized hierarchy stores the number of a part in the upper bits.
 constexpr std::size_t maxQuantized = std::size_t(1) << (31 - MAX_NUM_PARTS_IN_BITS);
-// How far the triangles of a field's zero set lie from its interpolant's zeros at most, or a bit more [voxels].
+// Upper bound of the distance between the triangles of a field's zero set and the zeros of its interpolant [voxels].
 constexpr float zeroSetVoxels = 0.1f;
 
 btVector3 halfSize(const Bounds& bounds) {
     return toBullet(0.5f * bounds.size());
 }
 
-/// From the field of a body that has no mesh. The fraction of the ray behind which triangles are to be asked: where the
-/// callback goes on behind the hit, or from the start of a ray within the body, which leaves it through a back face.
+/// Casts a ray by the field of a body without a mesh. Returns the fraction of the ray behind which the triangles must
+/// be tested. This is where the callback continues behind the hit, or the start of a ray inside the body, which leaves
+/// it through a back face.
 std::optional<float> castRay(const Placed& body, btTriangleRaycastCallback& callback) {
     const Field& field = body.collider.field();
     const glm::vec3 from = body.pose.toBody(toGlm(callback.m_from)) / body.scale;
@@ -80,7 +81,7 @@ class Behind : public btTriangleRaycastCallback {
     float fraction_;
 };
 
-/// From the triangles, seen by Bullet's own flags; those behind a hit too, where the callback goes on.
+/// Casts a ray by the triangles, with Bullet's own flags. Tests those behind a hit too, if the callback continues.
 void castRay(const Placed& body, const MeshTree& mesh, btTriangleRaycastCallback& callback) {
     const glm::dvec3 from(body.pose.toBody(toGlm(callback.m_from)) / body.scale);
     const glm::dvec3 way = glm::dvec3(body.pose.toBody(toGlm(callback.m_to)) / body.scale) - from;
@@ -106,7 +107,7 @@ void castRay(const Placed& body, const MeshTree& mesh, btTriangleRaycastCallback
     }
 }
 
-/// False where the callback wants what lies behind the hit as well.
+/// Returns false if the callback also wants what lies behind the hit.
 bool report(const std::optional<SweepHit>& hit, btTriangleConvexcastCallback& callback) {
     if (!hit || !(hit->fraction < callback.m_hitFraction)) return true;
     callback.m_hitFraction =
@@ -114,7 +115,7 @@ bool report(const std::optional<SweepHit>& hit, btTriangleConvexcastCallback& ca
     return callback.m_hitFraction <= hit->fraction;
 }
 
-/// By the field or, where there is one, the mesh. False where neither can tell, or does not tell all.
+/// Casts a sphere by the mesh, or without one by the field. Returns false if neither gives the complete answer.
 bool castSphere(const Placed& body, const MeshTree* mesh, float radius, btTriangleConvexcastCallback& callback) {
     const glm::vec3 from = toGlm(callback.m_convexShapeFrom.getOrigin());
     const glm::vec3 to = toGlm(callback.m_convexShapeTo.getOrigin());
@@ -124,7 +125,7 @@ bool castSphere(const Placed& body, const MeshTree* mesh, float radius, btTriang
     }
     const float reach = (radius - callback.m_allowedPenetration) / body.scale;
     const glm::vec3 start = body.pose.toBody(from) / body.scale;
-    // What touches already may leave, or go on to other triangles: Bullet asks one after the other.
+    // A sphere that touches at the start may separate, or hit other triangles: Bullet tests them one by one.
     if (!(reach > 0) || touches(*mesh, start, reach)) return false;
     auto hit = sweepSphere(*mesh, start, body.pose.toBody(to) / body.scale, reach);
     if (hit) {
@@ -134,11 +135,11 @@ bool castSphere(const Placed& body, const MeshTree* mesh, float radius, btTriang
     return report(hit, callback);
 }
 
-/// A sweep among bodies of about a metre, whatever their size: Bullet's search ends a millimetre before shapes touch.
+/// A sweep scaled to bodies of about one metre, since Bullet's search ends a millimetre before shapes touch.
 class Enlarged : public btTriangleConvexcastCallback {
   public:
     /// @param factor   of the world
-    /// @param scaling  of the triangles that come, before
+    /// @param scaling  of the incoming triangles, before
     Enlarged(btTriangleConvexcastCallback& sweep, btUniformScalingShape& shape, float factor, float scaling)
         : btTriangleConvexcastCallback(&shape, enlarged(sweep.m_convexShapeFrom, factor),
                                        enlarged(sweep.m_convexShapeTo, factor),
@@ -178,15 +179,15 @@ Pose centreOfMassFrame(const Collider& collider) {
     return {-(rotation * mass.centre), rotation};
 }
 
-/// The mesh in body coordinates under Bullet's own bounding hierarchy. It is built when first asked for: contacts, rays
-/// and spheres do without, and it takes longer to build than the surface points.
+/// The mesh in body coordinates in Bullet's own bounding volume hierarchy. It is built on first use: contacts, rays and
+/// spheres do not need it, and it takes longer to build than the surface points.
 class Shape::Triangles {
   public:
     const btScaledBvhTriangleMeshShape& of(const Shape& shape) {
         std::call_once(once_, [&] { build(shape); });
         return *scaled_;
     }
-    /// Hands on those that a shape may meet on its way.
+    /// Passes on the triangles that a shape may meet on its path.
     void cast(const Shape& shape, btTriangleConvexcastCallback& sweep) {
         of(shape);
         const btVector3 scaling = shape.getLocalScaling();
@@ -195,7 +196,7 @@ class Shape::Triangles {
         btVector3 lower, upper;
         sweep.m_convexShape->getAabb(btTransform(to.getBasis()), lower, upper);
         if (!(from.getBasis() == to.getBasis())) {
-            // Bullet looks at the last rotation only; what turns may need more room on its way.
+            // Bullet considers the last rotation only; a rotating shape may need more room on its path.
             const btScalar around = sweep.m_convexShape->getAngularMotionDisc();
             lower = btVector3(-around, -around, -around);
             upper = -lower;
@@ -244,8 +245,8 @@ Shape::Shape(std::shared_ptr<const Collider> collider, const ShapeOptions& optio
     if (!std::isfinite(options.margin)) throw std::invalid_argument("Shape: the margin is not finite");
     if (!(restingFriction_ >= 1) || !std::isfinite(restingFriction_))
         throw std::invalid_argument("Shape: the friction at rest must be 1 or more");
-    // Not the type for custom concave shapes: Bullet takes every shape of that type for its own btSdfCollisionShape.
-    // This one is used by nothing else in Bullet.
+    // Not the type for custom concave shapes, which Bullet always takes for its own btSdfCollisionShape. Nothing else
+    // in Bullet uses this type.
     m_shapeType = FAST_CONCAVE_MESH_PROXYTYPE;
     m_collisionMargin = options.margin < 0 ? collider_->margin() : options.margin;
 }
@@ -308,7 +309,7 @@ void Shape::processAllTriangles(btTriangleCallback* callback, const btVector3& l
         return;
     }
     if (auto* sweep = dynamic_cast<btTriangleConvexcastCallback*>(callback)) {
-        // The margin makes contacts early; it is no part of the body.
+        // The margin makes contacts early; it is not part of the body.
         sweep->m_triangleCollisionMargin = 0;
         const auto* sphere = dynamic_cast<const btSphereShape*>(sweep->m_convexShape);
         const Placed here = placed(sweep->m_triangleToWorld);

@@ -1,6 +1,6 @@
-// A body of any concave shape in Bullet: a collision shape that collides by its signed distance field.
+// A Bullet collision shape for any concave body: it collides by the signed distance field of its mesh.
 //
-// Written for Bullet 3.24 as packaged: single precision, no patches. docs/contacts.md tells the pipeline.
+// Written for Bullet 3.24 as packaged: single precision, no patches. docs/contacts.md describes the pipeline.
 #pragma once
 
 #include <BulletCollision/CollisionShapes/btConcaveShape.h>
@@ -14,37 +14,44 @@
 namespace bilayer::bullet {
 
 struct ShapeOptions {
-    /// Where the collider sits in the body: collider coordinates x become frame.toWorld(x). Bullet takes the body's
-    /// origin for the centre of mass and its axes for the principal ones: centreOfMassFrame() makes that true for a
-    /// mesh modelled about any other point.
+    /// Pose of the collider in the body: collider coordinates x become frame.toWorld(x). Bullet takes the body's origin
+    /// for the centre of mass and its axes for the principal axes. Use centreOfMassFrame() for a mesh that is modelled
+    /// about any other point.
     Pose frame{};
-    /// Contacts are made up to this distance between the surfaces, and the bodies' boxes grow by it [m, before
-    /// scaling]. It keeps resting contacts alive; bodies still rest surface on surface. Negative: the collider's own.
+    /// Contacts are made up to this separation of the surfaces, and the bodies' bounding boxes grow by it [m, before
+    /// scaling]. The margin keeps resting contacts alive; bodies still rest surface on surface. Negative: the
+    /// collider's own margin.
     float margin = -1;
-    /// Whether bodies that move farther than the margin in a step are followed on their way: contacts are then made of
-    /// what a step would meet, and the solver lets bodies come that far. Surface points follow straight ways, and the
-    /// solver is iterative: what goes by more than the thickness of a wall in a step may still pass it, unless
-    /// continuous collision (extensions.h) looks after the world.
+    /// Whether to make speculative contacts for bodies that move farther than the margin in a step. The contacts are
+    /// those that the motion of the step would meet, and the solver lets the bodies approach that far. Each surface
+    /// point is followed along a straight path, and the solver is iterative. A body that moves farther than the
+    /// thickness of a wall in a step may therefore still tunnel through it, unless the world has continuous collision
+    /// (extensions.h).
     bool speculative = true;
-    /// How many times as much friction contacts bear that have not slipped for 120 steps; 1: no more. It comes by and
-    /// by, and goes with the slip: all of it in a tenth of a voxel. Heaps come to rest with friction at its limit in
-    /// many contacts, and there any rounding lets a body slip on that is kept awake. Of two fields the larger one
-    /// counts. Real bodies rest more firmly too: J. H. Dieterich, "Time-dependent friction in rocks", J. Geophys. Res.
-    /// 77 (1972) 3690-3697.
+    /// Factor on the friction of contacts that have not slipped for 120 steps; 1: no increase. The friction rises
+    /// gradually, and falls again with the slip: a slip of 0.1 voxels removes the whole increase. In a pile, many
+    /// contacts come to rest at the friction limit, and there rounding alone makes a body that is kept awake slip on.
+    /// For two fields the larger factor applies. The friction of real bodies rises with contact time too: J. H.
+    /// Dieterich, "Time-dependent friction in rocks", J. Geophys. Res. 77 (1972) 3690-3697.
     float restingFriction = 1;
 };
 
-/// The frame in which the body's origin is the mesh's centre of mass and its axes are the principal ones.
+/// The frame whose origin is the mesh's centre of mass and whose axes are the principal axes of inertia.
 Pose centreOfMassFrame(const Collider& collider);
 
-/// Needs a bilayer::bullet::Dispatcher, or FieldAlgorithms with a dispatcher of Bullet's own: without either, Bullet
-/// falls back to the triangles of the mesh against convex bodies, and to nothing against concave ones (other fields,
-/// planes, triangle meshes, height fields), which it passes through. Bullet never calls the shapes of such a pair, so
-/// this is warned of only where boxes tell: once in a process, on the standard error output, when the box of a dynamic
-/// body of a field meets another field's while the process has no Dispatcher and no FieldAlgorithms at all. Not seen
-/// are dynamic compounds, worlds without getDispatchInfo().m_useContinuous, and all worlds of a process that has a
-/// Dispatcher for one of them. The warning is wrong where collision filters keep the two fields apart.
-/// Like all shapes, it may serve any number of bodies.
+/// A collision shape for a body with a signed distance field. Like all Bullet shapes, it may serve any number of
+/// bodies.
+///
+/// Needs a bilayer::bullet::Dispatcher, or FieldAlgorithms with a dispatcher of Bullet's own. Without either, Bullet
+/// collides the triangles of the mesh with convex bodies, and collides nothing with concave ones: the body passes
+/// through other fields, planes, triangle meshes and height fields.
+///
+/// Bullet never calls the shapes of such a pair, so the class can warn only from the bounding boxes. It warns once in a
+/// process, on the standard error output: when the box of a dynamic body with a field meets another field's box while
+/// the process has no Dispatcher and no FieldAlgorithms at all. The limits of this warning:
+/// - It misses dynamic compounds and worlds without getDispatchInfo().m_useContinuous.
+/// - It misses all worlds of a process that has a Dispatcher for one of them.
+/// - It is wrong where collision filters keep the two fields apart.
 class Shape : public btConcaveShape {
   public:
     explicit Shape(std::shared_ptr<const Collider> collider, const ShapeOptions& options = {});
@@ -52,32 +59,34 @@ class Shape : public btConcaveShape {
 
     const Collider& collider() const { return *collider_; }
     const Pose& frame() const { return frame_; }
-    /// The collider in the world, for a body's transform.
+    /// The collider in the world for a body at this transform.
     Placed placed(const btTransform& bodyTransform) const;
     bool speculative() const { return speculative_; }
     float restingFriction() const { return restingFriction_; }
-    /// The voxels' edge after scaling [m].
+    /// The edge length of a voxel after scaling [m].
     float voxelSize() const { return scale() * collider_->field().voxelSize(); }
 
-    /// Positive uniform scales only; others throw std::invalid_argument.
+    /// Takes positive uniform scales only. Throws std::invalid_argument for others.
     void setLocalScaling(const btVector3& scaling) override;
     const btVector3& getLocalScaling() const override { return scaling_; }
     float scale() const { return scaling_.x(); }
 
-    /// As in ShapeOptions, but after scaling [m].
+    /// ShapeOptions::margin, but after scaling [m].
     void setMargin(btScalar margin) override;
     btScalar getMargin() const override { return m_collisionMargin; }
 
     void getAabb(const btTransform& transform, btVector3& lower, btVector3& upper) const override;
-    /// From the mesh, about the body's origin. Throws std::invalid_argument for a mesh without volume.
+    /// Computed from the mesh, about the body's origin. Throws std::invalid_argument for a mesh without volume.
     void calculateLocalInertia(btScalar mass, btVector3& inertia) const override;
-    /// Serves rays, swept spheres and other casts as the mesh would answer, debug drawing and soft bodies with the
-    /// triangles that meet the box. Of a body without a mesh the field answers rays from outside, and swept spheres
-    /// that are narrower than the band less sqrt(3) voxels; all else is served with the triangles of the field's zero
-    /// set.
+    /// Calls back with the triangles that Bullet needs. Rays, swept spheres and other casts get the mesh's own answer;
+    /// debug drawing and soft bodies get the triangles that meet the box.
+    ///
+    /// Without a mesh, the field answers rays from outside, and swept spheres narrower than the band width less sqrt(3)
+    /// voxels. All other callers get the triangles of the field's zero set.
     void processAllTriangles(btTriangleCallback* callback, const btVector3& lower,
                              const btVector3& upper) const override;
-    /// In voxels, not in parts of the body's size as Bullet's default, which merges contacts on fine features.
+    /// The threshold in voxels. Bullet's default is a fraction of the body's size, which merges contacts on fine
+    /// features.
     btScalar getContactBreakingThreshold(btScalar defaultFactor) const override;
     const char* getName() const override { return "bilayer"; }
 

@@ -22,9 +22,9 @@ using namespace bilayer::detail;
 
 namespace {
 
-/// What the sweep takes for a voxel of the box: the field, its mask, the order of its voxels along eight diagonals.
+/// Memory of the sweep for a voxel of the box: the field, its mask, the order of its voxels along eight diagonals.
 constexpr double bytesPerVoxel = 24;
-/// OpenVDB grows the band by whole voxels: one more reaches the distance everywhere.
+/// OpenVDB grows the band by whole voxels; one more layer covers the distance everywhere.
 constexpr int spareLayers = 1, maxLayers = 1 << 20;
 
 void check(const openvdb::FloatGrid& band, const openvdb::CoordBBox& box) {
@@ -40,7 +40,7 @@ void check(const openvdb::FloatGrid& band, const openvdb::CoordBBox& box) {
                         size.x(), size.y(), size.z(), bytes / double(1 << 30)));
 }
 
-/// The field with other distances: what was promised for the band does not hold for what is swept.
+/// The field with other distances. The band's guarantees do not hold for swept values.
 LevelSet withDistances(const LevelSet& levelSet, const openvdb::FloatGrid::Ptr& filled, float exterior,
                        float interior) {
     openvdb::tools::changeAsymmetricLevelSetBackground(filled->tree(), exterior, -interior);

@@ -1,5 +1,5 @@
-// Open fractions by the distances at the cells' corners: a cube is cut into six tetrahedra along its diagonal, and its
-// faces into the triangles that these have there, so that neighbours agree on what they share.
+// Fluid fractions from the distances at the cells' corners. A cube is cut into six tetrahedra along its diagonal, and
+// its faces into the triangles of these, so that neighbours agree on shared faces.
 #include <bilayer/integration/fluid/obstacle.h>
 
 #include <openvdb/tree/LeafManager.h>
@@ -27,21 +27,21 @@ using openvdb::Vec3STree;
 using openvdb::math::Transform;
 
 constexpr float minHalfWidth = 3, maxHalfWidth = 1000;  // [voxels]
-constexpr double alongAxes = 1e-9;                      // by which a cosine may differ from 1
-// A corner's number has bit 4 for the upper x, 2 for y, 1 for z. The tetrahedra go from corner 0 to corner 7 along
-// three edges, in each order of the axes.
+constexpr double alongAxes = 1e-9;                      // tolerance of a cosine of 1
+// The number of a corner has bit 4 for the upper x, 2 for y, 1 for z. Each tetrahedron runs from corner 0 to corner 7
+// along three edges, in one of the orders of the axes.
 constexpr int tetrahedra[6][4] = {{0, 4, 6, 7}, {0, 4, 5, 7}, {0, 2, 6, 7}, {0, 2, 3, 7}, {0, 1, 5, 7}, {0, 1, 3, 7}};
-// Of the lower face along each axis.
+// The triangles of the lower face along each axis.
 constexpr int triangles[3][2][3] = {{{0, 2, 3}, {0, 1, 3}}, {{0, 4, 5}, {0, 1, 5}}, {{0, 4, 6}, {0, 2, 6}}};
 
 using Corners = std::array<double, 8>;  // distances
 
-// The part of an edge that is beyond the surface from an end with this sign on.
+// The fraction of an edge up to the surface, from the end with the first value.
 double partOf(double here, double there) {
     return here / (here - there);
 }
 
-// The negative part of a triangle or tetrahedron whose corners' values are sorted.
+// The negative fraction of a triangle or tetrahedron whose corner values are sorted.
 double negativePart(const std::array<double, 3>& v) {
     if (v[2] <= 0) return 1;
     if (v[0] >= 0) return 0;
@@ -86,7 +86,7 @@ Corners cornersOf(const FloatGrid::ConstAccessor& distances, const Coord& cell) 
     return corners;
 }
 
-// The cells' lower corners as voxels.
+// A grid whose voxels are the cells' lower corners.
 Transform::Ptr cornersOf(const Transform& cells) {
     const Transform::Ptr corners = cells.copy();
     corners->preTranslate(openvdb::Vec3d(-0.5));
@@ -101,8 +101,8 @@ typename Grid::Ptr named(const char* name, typename Grid::TreeType::Ptr tree, co
     return grid;
 }
 
-// Cells that the surface cuts have all corners in the band, so that the leaves of the corners hold them; what is solid
-// altogether beyond these leaves is so by tiles.
+// Computes the fluid fractions. Cells that the surface cuts have all corners in the band, so the leaves of the corners
+// hold them. Solid cells beyond these leaves become tiles.
 void addOpenParts(Solid& solid, const FloatGrid& corners, const Transform& cells) {
     const auto volume = std::make_shared<FloatTree>(corners.tree(), 1.f, openvdb::TopologyCopy());
     const auto faces = std::make_shared<Vec3STree>(corners.tree(), openvdb::Vec3f(1), openvdb::TopologyCopy());
@@ -138,7 +138,7 @@ openvdb::Vec3d toVdb(const glm::vec3& v) {
     return {v.x, v.y, v.z};
 }
 
-// The body's speed across the lower faces of the band's cells.
+// Computes the body's velocity across the lower faces of the band's cells.
 void addVelocity(Solid& solid, const Velocity& velocity, const glm::vec3& centre) {
     const auto tree = std::make_shared<Vec3STree>(solid.distance->tree(), openvdb::Vec3f(0), openvdb::TopologyCopy());
     const Transform& cells = solid.distance->transform();

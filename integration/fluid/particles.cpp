@@ -1,5 +1,5 @@
-// Jittered sampling: each voxel draws its positions from a counter-based generator keyed by the seed, the voxel and the
-// particle, so that neither the order of the voxels nor the number of threads matters.
+// Jittered sampling. Each voxel draws its positions from a counter-based generator keyed by the seed, the voxel and the
+// particle. The result is independent of the order of the voxels and the number of threads.
 #include <bilayer/integration/fluid/particles.h>
 
 #include <openvdb/points/PointAttribute.h>
@@ -26,11 +26,11 @@ using openvdb::CoordBBox;
 using openvdb::FloatGrid;
 using openvdb::Vec3d;
 
-constexpr int blockSide = 8;  // [voxels] a task: a leaf
+constexpr int blockSide = 8;  // edge of a task's block: a leaf [voxels]
 constexpr int maxPerVoxel = 1000;
-constexpr double farOutside = 1;  // [voxels] of distance at a centre beyond which no part of the voxel is inside
-constexpr int jitterBits = 21;    // a coordinate: three fit into one hash
-constexpr double maxBlocks = 1 << 28, maxIndex = 1 << 29;  // of a body's box in a solver's voxels
+constexpr double farOutside = 1;  // distance at a voxel's centre beyond which no part of it is inside [voxels]
+constexpr int jitterBits = 21;    // bits of a coordinate: three fit into one hash
+constexpr double maxBlocks = 1 << 28, maxIndex = 1 << 29;  // limits of a body's box in a solver's voxels
 
 // S. Vigna's splitmix64: every bit of the output depends on every bit of the input.
 std::uint64_t mix(std::uint64_t x) {
@@ -46,7 +46,7 @@ std::uint64_t voxelKey(std::uint64_t seed, const Coord& voxel) {
     return key;
 }
 
-// A point of the cube of one voxel around the origin.
+// A point in the unit cube around the origin.
 Vec3d jitter(std::uint64_t bits) {
     const auto part = [&](int axis) {
         const std::uint64_t mask = (1u << jitterBits) - 1;
@@ -62,7 +62,7 @@ void require(const openvdb::math::Transform& voxels, const ParticleOptions& opti
         throw std::invalid_argument("particles: perVoxel must be in 1..1000");
 }
 
-// The blocks that may hold liquid: leaves, then the interior tiles cut into pieces of a leaf's size.
+// The leaves that may hold liquid, and the interior tiles cut into blocks of a leaf's size.
 std::vector<Coord> blocks(const FloatGrid& liquid) {
     std::vector<Coord> origins;
     for (auto leaf = liquid.tree().cbeginLeaf(); leaf; ++leaf) origins.push_back(leaf->origin());
@@ -78,21 +78,21 @@ std::vector<Coord> blocks(const FloatGrid& liquid) {
     return origins;
 }
 
-// Calls visit(point) for the places of a voxel's particles, in voxels.
+// Calls visit(point) for the positions of a voxel's particles, in voxels.
 template <class Visit>
 void visitVoxel(const Coord& voxel, const ParticleOptions& options, Visit&& visit) {
     const std::uint64_t key = voxelKey(options.seed, voxel);
     for (int i = 0; i < options.perVoxel; ++i) visit(voxel.asVec3d() + jitter(mix(key + std::uint64_t(i))));
 }
 
-// Rounded to what is written. Inlined, GCC 12 leaves the rounding out of what is computed from it (x and y at once, as
-// a vector of two).
+// Rounds to single precision. Not inlined: GCC 12 would leave out the rounding in values computed from it (x and y at
+// once, as a vector of two).
 [[gnu::noinline]] glm::vec3 toWorld(const openvdb::math::Transform& voxels, const Vec3d& point) {
     const Vec3d world = voxels.indexToWorld(point);
     return {float(world.x()), float(world.y()), float(world.z())};
 }
 
-// What fill(origin, positions) finds in each block, in the order of the blocks.
+// Collects the results of fill(origin, positions) for each block, in block order.
 template <class Fill>
 Particles gather(const std::vector<Coord>& origins, const ParticleOptions& options, Fill&& fill) {
     std::vector<std::vector<glm::vec3>> parts(origins.size());
@@ -117,12 +117,12 @@ class Body {
           placement_(placement),
           voxels_(voxels),
           turnedBack_(glm::conjugate(glm::normalize(placement.pose.rotation))),
-          // how far in the body's own coordinates a voxel may reach
+          // maximum distance of a voxel's points from its centre, in the body's own coordinates
           reach_(0.5f * std::sqrt(3.f) * float(voxels.voxelSize()[0]) /
                  std::min({placement.scale.x, placement.scale.y, placement.scale.z})),
           error_(maxInterpolationError * field.voxelSize()) {}
 
-    // The blocks of voxels that meet the body's box.
+    // The blocks of voxels that overlap the body's box.
     std::vector<Coord> blocks() const {
         Vec3d lower(std::numeric_limits<double>::max()), upper(-lower);
         const Bounds& box = field_.bounds();
@@ -152,7 +152,8 @@ class Body {
         const Vec3d world = voxels_.indexToWorld(centre);
         const float distance = field_.distance(toBody({world.x(), world.y(), world.z()}));
         const float reach = float(side) * reach_;
-        // with a mesh the inside is the mesh's, from which the samples may differ; without one it is the samples' own
+        // with a mesh, the inside is the mesh's, and the samples may differ from it; without one it is that of the
+        // samples
         return distance <= (field_.mesh() ? reach + error_ : steepestInterpolant * reach);
     }
 

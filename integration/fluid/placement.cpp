@@ -8,7 +8,7 @@
 namespace bilayer::fluid {
 namespace {
 
-constexpr float unitTolerance = 1e-3f;  // by which a rotation's length may differ from 1: a float product's drift
+constexpr float unitTolerance = 1e-3f;  // tolerance of a rotation's length: rounding of float products
 
 bool isFinite(const glm::vec3& v) {
     return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);

@@ -1,4 +1,4 @@
-// Where a body stands that becomes liquid or solid in a fluid's voxels.
+// The placement of a body that becomes liquid or solid in a fluid's voxels.
 #pragma once
 
 #include <glm/vec3.hpp>
@@ -7,10 +7,11 @@
 
 namespace bilayer::fluid {
 
-/// A body's place in the world, stretched along its own axes first: body coordinates x become pose.toWorld(scale * x).
+/// The pose of a body in the world, after scaling along its own axes: body coordinates x become pose.toWorld(scale *
+/// x).
 struct Placement {
     Pose pose{};
-    glm::vec3 scale{1};  ///< positive: a mirror would turn the body inside out
+    glm::vec3 scale{1};  ///< positive: a reflection would invert the body
 
     Placement() = default;
     Placement(const Pose& placed, const glm::vec3& stretch = glm::vec3(1)) : pose(placed), scale(stretch) {}
@@ -20,7 +21,7 @@ struct Placement {
     }
 };
 
-/// Throws std::invalid_argument where a number is not finite, the rotation is not of unit length, or a scale is not
+/// Throws std::invalid_argument if a number is not finite, the rotation is not of unit length, or a scale is not
 /// positive.
 void check(const Placement& placement);
 

@@ -1,6 +1,5 @@
-// Seeding in three steps: the body's distances are found at the liquid's voxels, the two level sets are combined by
-// OpenVDB's CSG, and the result is repaired until it is a level set in the sense of openvdb::tools::checkLevelSet. All
-// work is done on a copy.
+// Seeding in three steps. The body's distances are computed at the liquid's voxels, the two level sets are combined by
+// OpenVDB's CSG, and the result is repaired until openvdb::tools::checkLevelSet accepts it. All work is done on a copy.
 #include <bilayer/integration/fluid/seed.h>
 
 #include <openvdb/tools/Composite.h>
@@ -22,8 +21,8 @@ namespace {
 using openvdb::FloatGrid;
 using openvdb::FloatTree;
 
-constexpr float minHalfWidth = 3;  // [voxels], what checkLevelSet asks for
-constexpr float rounding = 1e-5f;  // of a half width that is a whole number of voxels but for its last bits
+constexpr float minHalfWidth = 3;  // [voxels], required by checkLevelSet
+constexpr float rounding = 1e-5f;  // tolerance of a half width that is a whole number of voxels
 
 [[noreturn]] void refuse(const std::string& why) {
     throw std::invalid_argument("seed: " + why);
@@ -35,8 +34,8 @@ void requireLiquid(const FloatGrid& liquid) {
     if (!(liquid.background() >= minHalfWidth * liquid.voxelSize()[0] * (1 - rounding)))
         refuse("the liquid's band is narrower than 3 voxels");
     if (!std::isfinite(liquid.background())) refuse("the liquid's background is not finite");
-    // all of OpenVDB's checks but that of the gradient, which is repaired, and of the width, which may lack its last
-    // bit
+    // all of OpenVDB's checks except those of the gradient, which is repaired, and of the width, whose last bit may
+    // differ
     openvdb::tools::CheckLevelSet<FloatGrid> check(liquid);
     std::string fault = check.checkTiles();
     if (fault.empty()) fault = check.checkFinite();
@@ -62,7 +61,7 @@ FloatGrid::Ptr combined(const FloatGrid& liquid, const FloatGrid::Ptr& body, See
     return result;
 }
 
-// The voxel that is deepest inside, after requireInside().
+// The deepest voxel inside, after requireInside().
 openvdb::Coord deepest(const FloatGrid& body) {
     openvdb::Coord found;
     float least = 0;
@@ -72,7 +71,7 @@ openvdb::Coord deepest(const FloatGrid& body) {
     return found;
 }
 
-// Combines the liquid with a body's distances in its own voxels, of its own width.
+// Combines the liquid with a body's distances in the same voxels and of the same width.
 SeedReport seedWith(FloatGrid& liquid, const FloatGrid::Ptr& band, SeedMode mode) {
     requireInside(*band);
     const openvdb::Coord core = deepest(*band);

@@ -1,4 +1,4 @@
-// A liquid that starts from a mesh or a field, on OpenVDB's own tools.
+// Seeds a liquid's level set from a mesh or a field, on OpenVDB's own tools.
 #pragma once
 
 #include <openvdb/openvdb.h>
@@ -15,33 +15,38 @@ namespace bilayer::fluid {
 enum class SeedMode { unite, intersect, subtract };
 
 struct SeedOptions {
-    SeedMode mode = SeedMode::unite;  ///< with the liquid that is there
-    /// Solids of the mesh that overlap are one: walls inside of their union are no surface (BuildOptions::unite).
+    SeedMode mode = SeedMode::unite;  ///< CSG operation with the existing liquid
+    /// Whether overlapping solids of the mesh are united: walls inside their union are then no surface
+    /// (BuildOptions::unite).
     bool uniteSolids = true;
 
     SeedOptions(SeedMode how = SeedMode::unite, bool solids = true) : mode(how), uniteSolids(solids) {}
 };
 
-/// How far distances were changed to make a level set of them.
+/// How far distances were changed to make the result a level set.
 struct SeedReport {
-    float largestChange = 0;        ///< [voxels]; voxels count that were in the band and still are
-    glm::dvec3 where{0};            ///< the centre of the voxel with the largest change [m]
-    std::size_t changedVoxels = 0;  ///< voxels that changed by more than a tenth of a voxel
+    float largestChange = 0;        ///< maximum change [voxels], over the voxels that were in the band and still are
+    glm::dvec3 where{0};            ///< centre of the voxel with the maximum change [m]
+    std::size_t changedVoxels = 0;  ///< voxels that changed by more than 0.1 voxels
 };
 
-/// Combines a body with the caller's level set, whose voxel size and background stay as they are, bit for bit. The
-/// result is a true level set again: openvdb::tools::checkLevelSet finds nothing in it. (It finds a background "less
-/// than 3 voxel units" where the caller's is so by its last bit: that of createLevelSet(0.02, 3) is.) Distances from
-/// the mesh are exact (regrid.h); where bodies meet they are OpenVDB's CSG's, and next to creases, walls and gaps below
-/// a voxel they are changed by parts of it where that check asks for it, as the report tells. The grid gets a new tree:
-/// accessors and tree pointers from before go on seeing the old one. Throws std::invalid_argument if the grid is no
-/// level set, its voxels are no cubes, its band is narrower than 3 voxels, and what regrid() refuses;
-/// std::runtime_error if no level set of this voxel size could be made. The grid is then untouched.
+/// Combines a body with the caller's level set. Its voxel size and background stay the same to the bit. The grid gets a
+/// new tree; accessors and tree pointers from before keep referring to the old one.
+///
+/// The result is a true level set: openvdb::tools::checkLevelSet finds no fault in it. (One exception: it reports a
+/// background "less than 3 voxel units" where the caller's is so by its last bit, as that of createLevelSet(0.02, 3)
+/// is.) Distances from the mesh are exact (regrid.h). Where bodies meet, they are those of OpenVDB's CSG. Next to
+/// creases, walls and gaps below a voxel, they are changed by fractions of a voxel if that check needs it; SeedReport
+/// states how far.
+///
+/// Throws std::invalid_argument if the grid is no level set, its voxels are no cubes, or its band is narrower than 3
+/// voxels, and for everything that regrid() refuses. Throws std::runtime_error if no level set of this voxel size could
+/// be made. The grid is then unchanged.
 SeedReport seed(openvdb::FloatGrid& liquid, const Mesh& mesh, const Placement& placement = {},
                 const SeedOptions& options = {});
 
-/// The same with a field, whose band may be narrower than the liquid's. A mesh at hand is the better source: what a
-/// field's voxels do not tell is lost.
+/// Combines a field, whose band may be narrower than the liquid's. Prefer the mesh where you have it: details below the
+/// field's voxel size are lost.
 SeedReport seed(openvdb::FloatGrid& liquid, const LevelSet& field, const Placement& placement = {},
                 const SeedOptions& options = {});
 

@@ -17,7 +17,7 @@ using namespace bilayer::detail;
 
 namespace {
 
-// Bullet's pool hands out elements of this size, that of its own largest algorithm, whatever it is asked for [bytes].
+// The size of an element of Bullet's pool [bytes]: that of Bullet's largest algorithm, for any requested size.
 constexpr std::size_t poolElement = 184;
 
 template <class Algorithm, class... Arguments>
@@ -27,12 +27,13 @@ btCollisionAlgorithm* make(const btCollisionAlgorithmConstructionInfo& info, Arg
     return new (memory) Algorithm(info, std::forward<Arguments>(arguments)...);
 }
 
-/// Whether Bullet asks on its way through a compound that we look after; else it is a user, in a callback.
+/// Whether Bullet asks while it traverses a compound whose fields are collided by us. Otherwise a user asks, in a
+/// callback.
 bool isLeftOut(const StepState& state, const btCollisionObjectWrapper& first, const btCollisionObjectWrapper& second) {
     return state.leavesFields && (first.m_parent || second.m_parent);
 }
 
-/// A field and a shape that is no compound.
+/// A pair of a field and a shape other than a compound.
 class PairAlgorithm : public FieldAlgorithm {
   public:
     PairAlgorithm(const btCollisionAlgorithmConstructionInfo& info, bool bIsSecond, StepState& state)
@@ -84,7 +85,7 @@ struct CreatePair : btCollisionAlgorithmCreateFunc {
     StepState& state;
 };
 
-/// Of a pair that has a compound on one side or both. Where no field is in it, the pair is Bullet's alone.
+/// Creates the algorithm of a pair with one or two compounds. Pairs without a field are left to Bullet.
 struct CreateCompound : btCollisionAlgorithmCreateFunc {
     CreateCompound(btCollisionAlgorithmCreateFunc& ofBullet, StepState& state) : ofBullet(ofBullet), state(state) {}
 
@@ -94,7 +95,7 @@ struct CreateCompound : btCollisionAlgorithmCreateFunc {
         const bool ours = !isLeftOut(state, *first, *second) &&
                           (holdsField(*first->getCollisionShape()) || holdsField(*second->getCollisionShape()));
         if (!ours) return ofBullet.CreateCollisionAlgorithm(info, first, second);
-        const LeftToBullet left(state);  // it makes some of its children's at once
+        const LeftToBullet left(state);  // it creates some algorithms of the children at once
         btCollisionAlgorithm* rest = ofBullet.CreateCollisionAlgorithm(info, first, second);
         return make<CompoundAlgorithm>(info, rest, state);
     }
@@ -103,7 +104,7 @@ struct CreateCompound : btCollisionAlgorithmCreateFunc {
     StepState& state;
 };
 
-/// Of shapes that are neither fields nor compounds.
+/// Types of shapes that are neither fields nor compounds.
 std::vector<int> rigidTypes() {
     std::vector<int> types{
         STATIC_PLANE_PROXYTYPE,  TRIANGLE_MESH_SHAPE_PROXYTYPE, SCALED_TRIANGLE_MESH_SHAPE_PROXYTYPE,
@@ -112,7 +113,7 @@ std::vector<int> rigidTypes() {
     return types;
 }
 
-/// Whether a step takes two shapes farther than the size of either.
+/// Whether the relative displacement of two shapes in a step exceeds the size of either.
 bool goPastEachOther(const Side& a, const Side& b) {
     const auto sizeOf = [](const Side& side) {
         btVector3 centre;
@@ -151,7 +152,7 @@ Task StepState::taskOf(std::shared_ptr<Pair> pair, Side a, Side b) const {
 }
 
 struct FieldAlgorithmFunctions::Functions {
-    /// A function and the place that it has in the dispatcher's tables, of contacts or of contact tests.
+    /// A function and its position in the dispatcher's tables, of contacts or of contact tests.
     struct Compound {
         int first, second;
         bool isOfTests;
@@ -188,7 +189,7 @@ FieldAlgorithmFunctions::~FieldAlgorithmFunctions() = default;
 
 void FieldAlgorithmFunctions::registerWith(btCollisionDispatcher& dispatcher) {
     const int field = FAST_CONCAVE_MESH_PROXYTYPE;
-    // Bullet looks contacts and contact tests up in different tables.
+    // Bullet has separate tables for contacts and contact tests.
     const auto fill = [&](int first, int second, CreatePair& function) {
         dispatcher.registerCollisionCreateFunc(first, second, &function);
         dispatcher.registerClosestPointsCreateFunc(first, second, &function);

@@ -1,4 +1,4 @@
-// What Bullet's tables of algorithms hold for pairs with a field in them.
+// Collision algorithms that Bullet's tables hold for pairs with a field.
 #pragma once
 
 #include <BulletCollision/BroadphaseCollision/btCollisionAlgorithm.h>
@@ -17,33 +17,34 @@ namespace bilayer::bullet::detail {
 
 using namespace bilayer::detail;
 
-/// Two shapes to be collided, the second of which is a field.
+/// Two shapes to be collided; the second one is a field.
 struct Task {
-    std::shared_ptr<Pair> pair;  ///< shared, since a callback of the user's may remove the bodies in the meantime
+    std::shared_ptr<Pair> pair;  ///< shared, since a user's callback may remove the bodies in the meantime
     Side a, b;
 
-    /// For a result of Bullet's, unless that has been done with others' before.
+    /// Collides the pair for Bullet's result, unless the batch of the step has done so.
     void collide(const btManifoldResult& result, bool isTest) const;
 };
 
-/// Of the step under way.
+/// State of the current step.
 struct StepState {
-    DispatchStatistics running{};  ///< contact tests between steps count here too
-    float seconds = 0;             ///< that it takes; 0 between steps
+    DispatchStatistics running{};  ///< includes contact tests between steps
+    float seconds = 0;             ///< duration of the step [s]; 0 between steps
     bool speculatesOnAll = true;
-    bool isForeign = false;     ///< the dispatcher is another one, which does not tell its steps
-    bool leavesFields = false;  ///< Bullet goes through a compound whose fields are our business
+    bool isForeign = false;     ///< the dispatcher is not ours and does not report its steps
+    bool leavesFields = false;  ///< Bullet traverses a compound; its fields are collided by us
 
-    /// Contact tests ask for a distance, or hand over a result of their own kind, and not within a step.
+    /// Whether the call is a contact test. Contact tests ask for a distance, or pass a result of their own kind, and
+    /// run outside a step.
     bool isTest(const btManifoldResult& result) const;
     float secondsOf(const btDispatcherInfo& info, bool isTest) const;
 
-    /// Of two shapes for the seconds that a step takes. The ways of what goes farther than its own size are the
-    /// business of a NoPassing, which does not see what the user moves, nor inside of what locks.
+    /// The task for two shapes over the duration of a step. ContinuousCollision handles paths longer than the body's
+    /// own size, except those of objects that the user moves, and of shapes that lock (see locks()).
     Task taskOf(std::shared_ptr<Pair> pair, Side a, Side b) const;
 };
 
-/// Lets Bullet go through a compound, and leaves its fields out as long as this lives.
+/// Scope guard: during its lifetime Bullet traverses a compound and skips the fields in it.
 class LeftToBullet {
   public:
     explicit LeftToBullet(StepState& state) : state_(state), before_(std::exchange(state.leavesFields, true)) {}
@@ -56,30 +57,31 @@ class LeftToBullet {
     bool before_;
 };
 
-/// An algorithm whose pairs can be collided before Bullet asks it to process them: then it only hands contacts over.
+/// An algorithm whose pairs can be collided before Bullet calls processCollision(). That call then only hands over the
+/// contacts.
 class FieldAlgorithm : public btCollisionAlgorithm {
   public:
     using btCollisionAlgorithm::btCollisionAlgorithm;
 
-    /// Appends what can be collided at once with others'.
-    /// @param seconds  that the step takes
+    /// Appends the pairs that can be collided in the batch of the step.
+    /// @param seconds  duration of the step [s]
     virtual void gather(const btCollisionObjectWrapper& first, const btCollisionObjectWrapper& second, float seconds,
                         std::vector<Task>& tasks) = 0;
 
-    /// Bullet asks this of pairs in continuous dispatch, which its worlds never use.
+    /// Bullet calls this in continuous dispatch only, which its worlds never use.
     btScalar calculateTimeOfImpact(btCollisionObject*, btCollisionObject*, const btDispatcherInfo&,
                                    btManifoldResult*) override {
         return 1;
     }
 };
 
-/// What makes such algorithms for a dispatcher's tables, which point to it.
+/// Creates these algorithms for the tables of a dispatcher. The tables point to this object.
 class FieldAlgorithmFunctions {
   public:
     explicit FieldAlgorithmFunctions(btCollisionConfiguration& configuration);
     ~FieldAlgorithmFunctions();
 
-    /// Fills the rows and columns of fields and of compounds.
+    /// Fills the rows and columns of fields and compounds.
     void registerWith(btCollisionDispatcher& dispatcher);
 
     StepState state;

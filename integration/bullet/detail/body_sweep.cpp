@@ -16,7 +16,7 @@ btRigidBody* activeDynamicBody(btCollisionObject& object) {
 BodySweep::BodySweep(btCollisionObject& object, float seconds)
     : object_(object), end_(object.getWorldTransform()), start_(end_.getOrigin()), orientation_(end_.getRotation()) {
     body_ = activeDynamicBody(object);
-    // Bullet's own CCD leaves a body that it has stopped its velocity, but not the way that it has gone
+    // a body that Bullet's own CCD has stopped keeps its velocity, but its displacement is unknown
     if (!body_ || body_->getHitFraction() < 1) return;
     way_ = seconds * body_->getLinearVelocity();
     start_ -= way_;
@@ -24,7 +24,7 @@ BodySweep::BodySweep(btCollisionObject& object, float seconds)
     const float angle = seconds * spin.length();
     if (!(angle > 0)) return;
     axis_ = spin.normalized();
-    // beyond its limit, Bullet turns by another angle than the spin's, but about the same axis
+    // beyond its limit, Bullet rotates by another angle than that of the angular velocity, but about the same axis
     const float most = ANGULAR_MOTION_THRESHOLD;
     turn_ = angle > most ? 2 * std::atan(angle / most * std::tan(most / 2)) : angle;
 }

@@ -1,14 +1,14 @@
-// The way of an object through a step that has come to its end; internal.
+// The sweep of an object over a step that has ended; internal.
 #pragma once
 
 #include <BulletDynamics/Dynamics/btRigidBody.h>
 
 namespace bilayer::bullet::detail {
 
-/// An object as a body that the world moves and that is awake; null for others.
+/// The object as a body, if it is an active dynamic body of the world; null otherwise.
 btRigidBody* activeDynamicBody(btCollisionObject& object);
 
-/// The way of an object through a step that has come to its end.
+/// The sweep of an object over a step that has ended: its motion from the start to the end of the step.
 class BodySweep {
   public:
     BodySweep(btCollisionObject& object, float seconds);
@@ -16,23 +16,23 @@ class BodySweep {
     const btCollisionObject& object() const { return object_; }
     float turn() const { return turn_; }
 
-    /// Where it is after a part of the step [0..1].
+    /// Its transform after this fraction of the step [0..1].
     btTransform at(float time) const;
 
-    /// A ball around everything about the object's origin.
+    /// Radius of a sphere about the object's origin that contains the object.
     float radius() const;
     float longest() const { return way_.length() + radius() * turn_; }
-    /// How far any of its points goes as another object sees it, at most.
+    /// Upper bound of the displacement of its points in the frame of another object.
     float longest(const BodySweep& other) const;
-    /// Around all of its way.
+    /// Bounding box of the whole sweep.
     void box(btVector3& lower, btVector3& upper) const;
 
     btRigidBody* body() const { return body_; }
-    /// The part of the step after which it goes no farther.
+    /// The fraction of the step at which it is held; 1: not held.
     float part() const { return part_; }
-    /// Whether it goes less far now.
+    /// Shortens the sweep to this fraction. Returns whether that shortened it.
     bool holdAt(float part);
-    /// Puts the body where it is held; whether it is.
+    /// Moves the body to the pose where it is held. Returns whether it is held.
     bool apply() const;
 
   private:

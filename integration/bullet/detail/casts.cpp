@@ -14,18 +14,19 @@ using namespace bilayer::detail;
 
 namespace {
 
-// Far below what a field knows of its surface [voxels].
+// Distance that counts as contact, far below the accuracy of a field's surface [voxels].
 constexpr float touchVoxels = 1e-3f;
-// Steps in the band are shortened by this, since an interpolated distance may change by more than the way moved.
+// Factor on steps in the band: an interpolated distance may change by more than the displacement.
 constexpr float caution = 0.8f;
-// Steps are at least touchVoxels / 2 long, so that this only ends ways that graze the surface for thousands of voxels.
+// Limit of steps. Each is at least touchVoxels / 2 long, so that it only ends paths that graze the surface for
+// thousands of voxels.
 constexpr int maxSteps = 100000;
 }  // namespace
 
 bool sweepable(const Placed& body, float radius) {
     const Field& field = body.collider.field();
-    // Beyond the band a bound is told, which falls to this near it: a sphere that it reaches could touch anywhere
-    // there.
+    // Beyond the band the distance is a lower bound, which falls to this value near the band. A sphere of that radius
+    // could touch anywhere there.
     const float voxel = field.voxelSize(), minBound = surelyInBand(field.exteriorWidth(), voxel) - touchVoxels * voxel;
     return radius < body.scale * minBound;
 }

@@ -35,7 +35,7 @@ Box boxOf(const Side& side) {
     return box;
 }
 
-/// How far a turn takes any point of a shape, at most.
+/// Upper bound of the displacement of a shape's points by rotation.
 float turningOf(const Motion& motion, const Side& side, const Box& box) {
     const btVector3 &origin = side.transform.getOrigin(), ofLower = (box.lower - origin).absolute();
     btVector3 farthest = (box.upper - origin).absolute();
@@ -43,7 +43,7 @@ float turningOf(const Motion& motion, const Side& side, const Box& box) {
     return glm::length(motion.rotation) * farthest.length();
 }
 
-/// Around all places where a shape's points are in the step.
+/// Bounding box of a shape's points over the whole step.
 Box sweptBoxOf(const Side& side) {
     Box box = boxOf(side);
     const Motion motion = side.motion();
@@ -55,7 +55,8 @@ Box sweptBoxOf(const Side& side) {
     return box;
 }
 
-/// @param visit  (int index), for the children of a compound whose boxes meet one of the world, in no order
+/// @param visit  callback (int index) for the children of a compound whose boxes overlap a box of the world, in any
+///               order
 template <class Visit>
 void visitChildren(const Side& side, const Box& box, Visit&& visit) {
     const auto& compound = static_cast<const btCompoundShape&>(*side.shape);
@@ -81,15 +82,15 @@ Side childOf(const Side& side, int index) {
             side.seconds};
 }
 
-/// Goes down two compounds to the children that may meet in the step.
+/// Descends two compounds to the children that may meet in the step.
 class Descent {
   public:
     using Children = CompoundAlgorithm::Children;
 
-    /// @param within  how far apart children may be [m]
+    /// @param within  maximum distance of the children [m]
     explicit Descent(float within) : within_(within) {}
 
-    /// In the order of their indices.
+    /// Sorted by their indices.
     std::vector<Children> operator()(const Side& first, const Side& second) {
         areCompounds_ = first.shape->isCompound() && second.shape->isCompound();
         descend({first, holdsField(*first.shape)}, {second, holdsField(*second.shape)});
@@ -119,7 +120,7 @@ class Descent {
     void visit(const Part& compound, const Part& other, CompoundAlgorithm::Path& path, Visit&& visit) {
         Box around = sweptBoxOf(other.side);
         around.grow(within_);
-        Box from = around;  // where children are that come to it
+        Box from = around;  // positions of the children that may reach it
         const Motion motion = compound.side.motion();
         from.grow(glm::length(motion.displacement) + turningOf(motion, compound.side, boxOf(compound.side)));
         visitChildren(compound.side, from, [&](int index) {
@@ -132,7 +133,8 @@ class Descent {
         });
     }
 
-    /// By the callbacks that Bullet asks about children: another one, in another order, where both are compounds.
+    /// Calls Bullet's filter callbacks for children. If both shapes are compounds, it is a different callback with
+    /// another order of arguments.
     bool isRefused(const btCollisionShape& first, const btCollisionShape& second) const {
         if (areCompounds_)
             return gCompoundCompoundChildShapePairCallback && !gCompoundCompoundChildShapePairCallback(&first, &second);
@@ -147,7 +149,7 @@ class Descent {
     std::vector<Children> found_;
 };
 
-/// Puts other wraps into a result while children hand their contacts over.
+/// Scope guard: replaces the wrappers of a result while children hand over their contacts.
 class Unwrapped {
   public:
     Unwrapped(btManifoldResult& result, const btCollisionObjectWrapper& first, const btCollisionObjectWrapper& second)
@@ -168,7 +170,7 @@ class Unwrapped {
     const btCollisionObjectWrapper* before_[2];
 };
 
-/// Calls used(wrapper) with the wrapper of a child, whose parents are those of the compounds around it.
+/// Calls used(wrapper) with the wrapper of a child, whose parents are the wrappers of its enclosing compounds.
 template <class Used>
 void withWrapper(const btCollisionObjectWrapper& parent, std::span<const int> path, Used&& used) {
     if (path.empty()) return used(parent);
@@ -225,7 +227,7 @@ void CompoundAlgorithm::processCollision(const btCollisionObjectWrapper* first, 
     const bool isTest = state_.isTest(*result);
     const float seconds = state_.secondsOf(info, isTest);
     Pairs met;
-    const std::shared_ptr<Pairs> pairs = pairs_;  // a callback of the user's may end this algorithm
+    const std::shared_ptr<Pairs> pairs = pairs_;  // a user's callback may destroy this algorithm
     for (const Children& children :
          Descent(result->m_closestPointDistanceThreshold)(Side(*first, seconds), Side(*second, seconds))) {
         const Task task = taskOf(children);

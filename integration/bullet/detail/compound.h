@@ -1,4 +1,4 @@
-// Compounds with fields in them.
+// Collision of compounds that hold fields.
 #pragma once
 
 #include <map>
@@ -15,15 +15,16 @@ using namespace bilayer::detail;
 /// Whether a shape is a field or a compound that holds one, at any depth.
 bool holdsField(const btCollisionShape& shape);
 
-/// GImpact counts locks while its triangles are read, without atomics: such pairs are collided one after the other.
+/// Whether the shape locks. GImpact counts locks while its triangles are read, without atomics. Such pairs are collided
+/// serially.
 bool locks(const btCollisionShape& shape);
 
-/// A compound and another shape, which may be one, too. Bullet's own algorithm collides the children of other kinds.
-/// Those pairs of children that hold a field are found here, by the ways that the children go in the step, since Bullet
-/// asks only for those whose boxes overlap already.
+/// Collides a compound with another shape, which may be a compound too. Bullet's own algorithm collides the children
+/// without a field. This class finds the pairs of children with a field by the children's motion in the step, since
+/// Bullet visits only children whose boxes overlap already.
 class CompoundAlgorithm : public FieldAlgorithm {
   public:
-    /// @param rest  Bullet's algorithm for the same pair, which this one takes over
+    /// @param rest  Bullet's algorithm for the same pair; this object takes ownership of it
     CompoundAlgorithm(const btCollisionAlgorithmConstructionInfo& info, btCollisionAlgorithm* rest, StepState& state)
         : FieldAlgorithm(info), rest_(rest), state_(state) {}
     ~CompoundAlgorithm() override;
@@ -34,17 +35,18 @@ class CompoundAlgorithm : public FieldAlgorithm {
                           const btDispatcherInfo& info, btManifoldResult* result) override;
     void getAllContactManifolds(btManifoldArray& manifolds) override;
 
-    /// A child by its indices in its compound and in those around that, outermost first; empty for what is no compound.
+    /// A child, identified by its index in its compound and in each enclosing compound, outermost first. Empty for a
+    /// shape that is not a compound.
     using Path = std::vector<int>;
 
-    /// Two children one of which is a field.
+    /// Two children; one of them is a field.
     struct Children {
         Path firstPath, secondPath;
         Side first, second;
     };
 
   private:
-    /// Of two children, and whether the second one is the field that the other is collided with.
+    /// The paths of two children, and whether the second one is the field that the first one is collided with.
     using Key = std::tuple<Path, Path, bool>;
 
     using Pairs = std::map<Key, std::shared_ptr<Pair>>;

@@ -16,44 +16,45 @@ using namespace bilayer::detail;
 
 namespace {
 
-// Normals within about 25 degrees go into one patch: flat enough for four points to carry it.
+// Normals within about 25 degrees form one patch: flat enough for four points to carry it.
 constexpr float sameDirection = 0.9f;
-// Those of a patch that goes on from the last step stay within about 32 degrees: its direction is that of the contacts
-// that were kept, and trembles with them, but which contacts belong together must not.
+// Normals of a patch that continues from the last step stay within about 32 degrees. Its direction is that of the kept
+// contacts, and jitters with them; the grouping of the contacts must not.
 constexpr float stillSameDirection = 0.85f;
-// More patches than any resting body needs; contacts of further directions join the patch that suits them best.
+// More patches than any resting body needs. Contacts of further directions join the best matching patch.
 constexpr std::size_t maxPatches = 8;
-// A patch of the last step goes on until its normal is within about 15 degrees of another's.
+// A patch of the last step continues until its normal is within about 15 degrees of another's.
 constexpr float mergedDirection = 0.966f;
-// Contacts that were kept in the last step are preferred, and patches keep their places, for bodies about at rest: when
-// the deepest overlap has changed by less than this part of the contacts' extent in one step. In an impact every
-// contact is judged anew.
+// Bodies count as almost at rest if the deepest penetration has changed by less than this fraction of the contacts'
+// extent in one step. Contacts of the last step are then preferred, and patches keep their places. In an impact all
+// contacts are chosen again.
 constexpr float stillness = 3e-3f;
-// What is met sooner than the contacts that are kept by less than this need not be kept itself, and what was kept in
-// the last step is kept again [parts of the extent]: which of several is met first is then a matter of rounding, and
-// bodies would tremble with each change. Of a mere press it is less: the deepest overlap is what pushes bodies apart;
-// and of shifts and twists, which change gaps by as little as the least tilts.
+// Tolerance of the choice [fractions of the extent]. A contact that touches earlier than the kept ones by less than
+// this need not be kept, and contacts of the last step are kept again. Otherwise rounding would decide which of several
+// comes first, and bodies would jitter with each change. The tolerance is smaller for a mere press, since the deepest
+// penetration pushes bodies apart, and for shifts and twists, which change separations as little as the smallest tilts.
 constexpr float tolerance = 1e-3f, toleranceUntilted = tolerance / 4;
-// What was kept in the last step stays as long as some motion meets it first but for so many tolerances: contacts that
-// bear a load must not come and go, or a stack never comes to rest.
+// A contact of the last step stays while some motion meets it first to within this many tolerances. Contacts that bear
+// a load must not come and go, or a stack never comes to rest.
 constexpr float loyalty = 3;
-// Contacts are chosen anew when the bodies have moved past each other by this part of the tolerance.
+// Contacts are chosen again when the bodies have moved relative to each other by this fraction of the tolerance.
 constexpr float chosenWithin = 0.5f;
-// The small motions that contacts are kept for: tilts from those of a fall to those of rest [rad], shifts aside [parts
-// of the extent] and twists [rad]. Their directions are askew to everything one models: a rectangle's corners are then
-// each met first by themselves.
+// The small motions that contacts are kept for: tilts from those of a fall to those of rest [rad], lateral shifts
+// [fractions of the extent] and twists [rad]. Their directions are oblique to typical models, so that each vertex of a
+// rectangle is met first by some motion.
 constexpr float tilts[] = {1.f / 8, 1.f / 32, 1.f / 128};
-// and, where a step takes a body farther than that, the turn of one whose other side is stopped, at most [rad].
+// Upper limit of an additional tilt, for steps that move a body farther: the rotation of a body whose other side is
+// stopped [rad].
 constexpr float maxRotation = 1;
 constexpr float aside = 1.f / 64;
 constexpr int tiltDirections = 8, shiftDirections = 8;
 constexpr float askew = 0.3f;  // [rad]
-// The tilts and shifts by which what is lost is measured [rad], [parts of the extent].
+// The tilts and shifts at which the reduction error is measured [rad], [fractions of the extent].
 constexpr float measured = 1.f / 32;
-// More contacts of a patch cost the solver more than they tell it.
+// Limit of contacts in a patch: more would cost the solver more than they help.
 constexpr std::size_t maxOfPatch = 3 * MANIFOLD_CACHE_SIZE;
 
-/// Contacts of one patch, as indices in ascending order of the distance that remains.
+/// Contacts of one patch, as indices in ascending order of the remaining distance.
 using Group = std::vector<std::uint32_t>;
 
 /// The contacts of the last step, by feature.
@@ -67,10 +68,10 @@ class Memory {
         std::sort(features_.begin(), features_.end());
     }
 
-    /// How many groups there were.
+    /// The number of groups.
     int groups() const { return groups_; }
 
-    /// The group that a contact was kept of; -1 if it was not.
+    /// The group that the contact was kept in; -1 if it was not kept.
     int groupOf(const Contact& contact) const {
         const auto at = std::lower_bound(features_.begin(), features_.end(), std::pair(contact.feature, 0));
         return at != features_.end() && at->first == contact.feature ? at->second : -1;
@@ -82,8 +83,8 @@ class Memory {
     int groups_ = 0;
 };
 
-/// Where the groups of the last step look now: by those of their contacts that are still there. If there was none, the
-/// mean direction of all contacts if they differ little from it, or nothing.
+/// The current directions of the groups of the last step, from those of their contacts that still exist. Without a last
+/// step, the mean direction of all contacts if they differ little from it, else nothing.
 std::vector<glm::vec3> directionsOf(const std::vector<Contact>& contacts, const Memory& memory) {
     std::vector<glm::vec3> sums(std::size_t(std::max(memory.groups(), 1)), glm::vec3(0)), directions;
     for (const Contact& contact : contacts)
@@ -126,7 +127,7 @@ std::vector<Group> groupByNormal(const std::vector<Contact>& contacts, const Mem
     return groups;
 }
 
-/// The extent of a group, by the box of its places.
+/// The extent of a group: the size of the bounding box of its positions.
 float extentOf(const std::vector<Contact>& contacts, const Group& group) {
     glm::vec3 lower = contacts[group.front()].position, upper = lower;
     for (std::uint32_t i : group) {
@@ -146,7 +147,8 @@ bool isStill(const std::vector<Contact>& contacts, std::span<const Patch> last) 
     return std::abs(contacts.front().remaining() - before) <= stillness * extentOf(contacts, all);
 }
 
-/// A small motion of A in the axes of a patch: turned about one along it, or shifted along it and twisted.
+/// A small motion of A in the axes of a patch: a tilt about an axis in the patch, or a shift along the patch with a
+/// twist.
 struct Nudge {
     glm::vec2 tilt{0}, shift{0};
     float twist = 0;
@@ -161,7 +163,7 @@ void addTilts(float tilt, std::vector<Nudge>& all) {
     for (int k = 0; k < tiltDirections; ++k) all.push_back({.tilt = tilt * towards(float(k) / tiltDirections)});
 }
 
-/// Those that contacts are kept for, in the order in which they choose: what spans the patch comes first, a mere press
+/// The motions that contacts are kept for, in the order of the choice: those that span the patch first, a mere press
 /// last.
 std::vector<Nudge> nudges() {
     std::vector<Nudge> all;
@@ -172,7 +174,7 @@ std::vector<Nudge> nudges() {
     return all;
 }
 
-/// Those in between, by which what is lost is measured.
+/// The motions in between, at which the reduction error is measured.
 std::vector<Nudge> nudgesBetween() {
     std::vector<Nudge> all;
     for (int k = 0; k < tiltDirections; ++k)
@@ -182,8 +184,9 @@ std::vector<Nudge> nudgesBetween() {
     return all;
 }
 
-/// How the gaps of a patch's contacts change when A moves: to first order gap + normal . (shift + turn x arm), a row of
-/// the contact's wrench. Of each kind of number a column, padded so that processors take several contacts at once.
+/// The change of the separations of a patch's contacts when A moves. To first order it is separation + normal . (shift
+/// + rotation x arm), a row of the contact's wrench. Each kind of number has its own column, padded so that processors
+/// handle several contacts at once.
 class Gaps {
   public:
     Gaps(const std::vector<Contact>& contacts, const Group& group)
@@ -197,8 +200,8 @@ class Gaps {
         btPlaneSpace1(toBullet(normal), along, across);
         const glm::vec3 x = toGlm(along), y = toGlm(across);
         std::fill(column(gap) + count_, column(gap) + padded_, std::numeric_limits<float>::max());
-        // What is on its way is stopped where it touches: it gets no deeper than what touches already, which must bear
-        // its part of a body that comes down aslant.
+        // An approaching contact is stopped where it touches. It gets no deeper than the contacts that touch already,
+        // which must bear their part of a body that comes down at an angle.
         float first = 0, approach = 0;
         for (const std::uint32_t i : group)
             if (contacts[i].distance > 0) {
@@ -218,7 +221,7 @@ class Gaps {
         }
     }
 
-    /// Moves A. The least gap that there is then.
+    /// Moves A. Returns the minimum separation after the motion.
     float least(const Nudge& nudge) {
         const bool tilts = nudge.tilt != glm::vec2(0);
         const float *gaps = column(gap), *x = column(tilts ? tiltX : shiftX), *y = column(tilts ? tiltY : shiftY),
@@ -227,7 +230,7 @@ class Gaps {
         float *now = column(moved), found[lanes];
         std::fill(found, found + lanes, std::numeric_limits<float>::max());
         for (std::size_t k = 0; k < padded_; k += lanes) {
-            float values[lanes];  // apart from what is read, so that they are computed at once
+            float values[lanes];  // separate from the input, so that they are computed at once
             for (std::size_t j = 0; j < lanes; ++j)
                 values[j] = gaps[k + j] + way.x * x[k + j] + way.y * y[k + j] + nudge.twist * turns[k + j];
             for (std::size_t j = 0; j < lanes; ++j) now[k + j] = values[j];
@@ -236,7 +239,7 @@ class Gaps {
         return *std::min_element(found, found + lanes);
     }
 
-    /// The gap of one contact when A is moved.
+    /// The separation of one contact after a motion of A.
     float of(std::uint32_t k, const Nudge& nudge) const {
         const bool tilts = nudge.tilt != glm::vec2(0);
         const glm::vec2 way = tilts ? nudge.tilt : nudge.shift;
@@ -244,21 +247,21 @@ class Gaps {
         return at(gap, k) + way.x * x + way.y * y + nudge.twist * at(twist, k);
     }
 
-    /// Of some contacts, the least gap when A is moved.
+    /// The minimum separation of some contacts after a motion of A.
     float minOf(const std::vector<std::uint32_t>& some, const Nudge& nudge) const {
         float least = std::numeric_limits<float>::max();
         for (const std::uint32_t k : some) least = std::min(least, of(k, nudge));
         return least;
     }
 
-    /// The first contact whose gap that is after the last motion.
+    /// The first contact with this separation after the last motion.
     std::uint32_t with(float gap) const {
         const float* now = numbers_.data() + moved * padded_;
         return std::uint32_t(std::find(now, now + count_, gap) - now);
     }
 
     float extent() const { return extent_; }
-    /// By what a body is turned in the step whose one side is stopped while the other one goes on [rad].
+    /// The rotation in the step of a body whose one side is stopped while the other one moves on [rad].
     float turn() const { return turn_; }
 
   private:
@@ -268,12 +271,12 @@ class Gaps {
     float at(Column which, std::uint32_t k) const { return numbers_[which * padded_ + k]; }
 
     std::size_t count_, padded_;
-    std::vector<float> numbers_;  ///< column by column
+    std::vector<float> numbers_;  ///< stored by columns
     float extent_ = 0, turn_ = 0;
 };
 
-/// The contacts of a group that some small motion of the bodies meets first. Those of the last step stay as long as
-/// some motion meets them about first: contacts that bear a load must not come and go.
+/// The contacts of a group that some small motion of the bodies meets first. A contact of the last step stays while
+/// some motion meets it first within the tolerance: contacts that bear a load must not come and go.
 class FirstMet {
   public:
     FirstMet(const std::vector<Contact>& contacts, const Group& group) : gaps_(contacts, group) {
@@ -287,7 +290,7 @@ class FirstMet {
         for (const Nudge& nudge : nudges_) least_.push_back(gaps_.least(nudge));
     }
 
-    /// @param before  those of the last step
+    /// @param before  the contacts of the last step
     std::vector<std::uint32_t> choose(const std::vector<std::uint32_t>& before) {
         for (const std::uint32_t k : before)
             if (metBy(k, loyalty) != 0) add(k);
@@ -302,7 +305,7 @@ class FirstMet {
         return kept_;
     }
 
-    /// What other motions meet before those [m].
+    /// The maximum depth that motions in between reach before the chosen contacts touch [m].
     float reductionError() {
         static const std::vector<Nudge> between = nudgesBetween();
         float most = 0;
@@ -314,13 +317,13 @@ class FirstMet {
     }
 
   private:
-    using Motions = std::uint64_t;  ///< a bit for each
+    using Motions = std::uint64_t;  ///< one bit each
 
     float toleranceOf(const Nudge& nudge) const {
         return (nudge.tilt == glm::vec2(0) ? toleranceUntilted : tolerance) * gaps_.extent();
     }
 
-    /// The motions that meet a contact first, but for so many tolerances.
+    /// The motions that meet a contact first, to within so many tolerances.
     Motions metBy(std::uint32_t k, float tolerances) const {
         Motions met = 0;
         for (std::size_t n = 0; n < nudges_.size(); ++n) {
@@ -341,20 +344,20 @@ class FirstMet {
         return met;
     }
 
-    /// Whether a motion meets one that is kept not much later than the first.
+    /// Whether a kept contact touches not much later than the first one in a motion.
     bool isNearlyMet(std::size_t n) const {
         return gaps_.minOf(kept_, nudges_[n]) <= least_[n] + loyalty * toleranceOf(nudges_[n]);
     }
 
-    /// Whether every motion that meets it first meets others first, too.
+    /// Whether every motion that meets this contact first is covered by another kept contact.
     bool isSpare(std::size_t i) const { return !(met_[i] & ~metByAny(i)); }
 
-    /// Whether a press could have loaded it.
+    /// Whether a press could have loaded the contact.
     bool mayBear(std::uint32_t k) const {
         return gaps_.of(k, {}) <= least_.back() + loyalty * tolerance * gaps_.extent();
     }
 
-    /// Of what is spare that which is farthest away, else the last.
+    /// The redundant contact that is farthest away, or else the last contact.
     std::size_t minNeeded() const {
         std::size_t which = kept_.size();
         for (std::size_t i = 0; i < kept_.size(); ++i)
@@ -368,11 +371,11 @@ class FirstMet {
     }
 
     Gaps gaps_;
-    std::vector<Nudge> turned_;  ///< with those of a body that is turned in the step
+    std::vector<Nudge> turned_;  ///< including those of a body that rotates in the step
     std::span<const Nudge> nudges_;
-    std::vector<float> least_;         ///< gap after each motion
-    std::vector<std::uint32_t> kept_;  ///< as indices in the group
-    std::vector<Motions> met_;         ///< by each of these
+    std::vector<float> least_;         ///< minimum separation after each motion
+    std::vector<std::uint32_t> kept_;  ///< indices into the group
+    std::vector<Motions> met_;         ///< motions of each kept contact
 };
 
 std::vector<std::uint32_t> firstMet(const std::vector<Contact>& contacts, const Group& group, const Memory& memory,
@@ -429,7 +432,7 @@ void Choice::update(std::vector<Contact>& contacts, const btTransform& a, const 
                      [&](std::uint32_t i, std::uint32_t j) { return kept_[i].feature < kept_[j].feature; });
 }
 
-/// What was kept spans all contacts: these have moved no farther.
+/// The kept contacts span all contacts, so none of these has moved farther.
 bool Choice::holds(const btTransform& a, const btTransform& b) const {
     const auto hasHardlyMoved = [&](const Kept& kept) {
         return (a * kept.ofA - b * kept.ofB).length2() <= reduced_.slack * reduced_.slack;
@@ -437,8 +440,8 @@ bool Choice::holds(const btTransform& a, const btTransform& b) const {
     return reduced_.slack > 0 && std::all_of(kept_.begin(), kept_.end(), hasHardlyMoved);
 }
 
-/// Whether all that were chosen are there again, none of any is on its way from afar, and a press meets none by more
-/// than its tolerance before those.
+/// Whether all chosen contacts exist again, no contact approaches from afar, and a press meets no other contact earlier
+/// than these by more than its tolerance.
 bool Choice::takeAgain(const std::vector<Contact>& contacts) {
     std::vector<const Contact*> found(kept_.size(), nullptr);
     float deepest = std::numeric_limits<float>::max(), deepestFound = deepest;
@@ -447,7 +450,7 @@ bool Choice::takeAgain(const std::vector<Contact>& contacts) {
         deepest = std::min(deepest, contact.distance);
         auto at = std::lower_bound(byFeature_.begin(), byFeature_.end(), contact.feature,
                                    [&](std::uint32_t i, std::uint32_t feature) { return kept_[i].feature < feature; });
-        // of several contacts of one feature each has its turn
+        // several contacts of one feature are matched in turn
         while (at != byFeature_.end() && kept_[*at].feature == contact.feature && found[*at]) ++at;
         if (at != byFeature_.end() && kept_[*at].feature == contact.feature) found[*at] = &contact;
     }

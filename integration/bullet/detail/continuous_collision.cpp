@@ -23,23 +23,23 @@ using namespace bilayer::detail;
 
 namespace {
 
-// A body that is held back may be met by another one: pairs are looked at again up to so many times, about once for
-// each body of a column that falls. In longer ones the last overlap for a step.
+// Limit of rounds. A stopped body may be hit by another one, so pairs are checked again, about once for each body of a
+// falling column. In longer columns the last bodies overlap for one step.
 constexpr int maxRounds = 256;
-// Who is held so early in a step has not moved.
+// A body stopped this early in a step counts as not moved.
 constexpr float atStart = 1e-3f;
 
-/// Two objects of which one was held where it met the other one.
+/// Two objects; one was stopped where it met the other.
 using HeldPair = std::pair<const btCollisionObject*, const btCollisionObject*>;
 
 struct Meeting {
     BodySweep *a, *b;
-    float margin;                  ///< what two that are not held come closer by than this is left to contacts [m]
-    Impact touch{};                ///< the first; from b to a
-    float heldA = -1, heldB = -1;  ///< their courses' parts when they were looked at
-    Impact stops{};                ///< where one of them was held
+    float margin;    ///< two bodies that are not stopped may approach by up to this; contacts handle that [m]
+    Impact touch{};  ///< the first impact; normal from b to a
+    float heldA = -1, heldB = -1;  ///< the ends of their sweeps when they were last checked
+    Impact stops{};                ///< where one of them was stopped
 
-    /// Whether it has not been looked at since one of the two was held.
+    /// Whether the pair has not been checked since one of the two was stopped.
     bool isOpen() const { return a->part() != heldA || b->part() != heldB; }
 
     void look() {
@@ -54,7 +54,7 @@ struct Meeting {
         });
     }
 
-    /// Holds what goes farther, and where that is held already, both: the other one goes on into it.
+    /// Stops the body that moves farther. If it is stopped already, stops both, since the other one moves on into it.
     bool hold() {
         if (touch.time >= 1 || isOpen()) return false;
         BodySweep *faster = a, *slower = b;
@@ -70,7 +70,7 @@ struct Meeting {
     bool hasNotMoved() const { return stops.time <= atStart; }
     HeldPair pair() const { return std::minmax(&a->object(), &b->object()); }
 
-    /// Leaves no speed to what does not move.
+    /// Sets the velocity of bodies that do not move to zero.
     void rest() const {
         for (const BodySweep* course : {a, b})
             if (btRigidBody* body = course->body(); body && course->part() <= atStart) {
@@ -79,7 +79,7 @@ struct Meeting {
             }
     }
 
-    /// Takes away the speed at which the two go for each other, as an impact without restitution and friction does.
+    /// Removes the approach velocity of the two, as an impact without restitution and friction does.
     void stop() const {
         const btVector3 place = toBullet(stops.place), normal = toBullet(stops.normal);
         float speed = 0, perMass = 0;
@@ -96,7 +96,7 @@ struct Meeting {
     }
 };
 
-/// Up to which contacts are made with an object; nothing without a field.
+/// Maximum separation of contacts with an object; nothing without a field.
 std::optional<float> marginOf(const btCollisionObject& object) {
     std::optional<float> most;
     visitParts(object, [&](const Part& part) {
@@ -105,7 +105,7 @@ std::optional<float> marginOf(const btCollisionObject& object) {
     return most;
 }
 
-/// What fast bodies may have passed through in a step.
+/// The pairs in which a fast body may have tunnelled in a step.
 class Meetings {
   public:
     Meetings(btDynamicsWorld& world, float seconds) : world_(world), seconds_(seconds) {
@@ -121,13 +121,13 @@ class Meetings {
         for (std::size_t i = 0; i < fast_.size(); ++i) find(i);
     }
 
-    /// Holds bodies until none passes.
+    /// Stops bodies until none tunnels.
     void settle() {
         for (int round = 0; round < maxRounds; ++round) {
             tbb::parallel_for_each(meetings_, [](Meeting& meeting) {
                 if (meeting.isOpen()) meeting.look();
             });
-            // the first ones first: what is held may come no farther
+            // earliest first: a stopped body may come no farther
             std::vector<Meeting*> order;
             for (Meeting& meeting : meetings_)
                 if (meeting.touch.time < 1) order.push_back(&meeting);
@@ -139,9 +139,10 @@ class Meetings {
         }
     }
 
-    /// Puts them where they are held. Two that hold each other in a second step in a row, or that have not moved, lose
-    /// the speed that this step's contacts have left them; where both is true, all of it: it would grow with each step.
-    /// @param before  the pairs of the last step; becomes those of this one
+    /// Moves the bodies to the poses where they are stopped. Two bodies that stop each other in two successive steps,
+    /// or that have not moved, lose the approach velocity that this step's contacts have left. If both is true, they
+    /// lose all of their velocity, which would otherwise grow with each step.
+    /// @param before  the pairs of the last step; replaced by those of this one
     int apply(std::vector<HeldPair>& before) const {
         int held = 0;
         for (const BodySweep& course : fast_) held += course.apply();
@@ -174,7 +175,7 @@ class Meetings {
             if (isFast(*object) || !meets(fast_[i].object(), *object)) continue;
             add(fast_[i], slow_.try_emplace(object, *object, seconds_).first->second);
         }
-        // those are no longer where the broad phase has them
+        // their boxes in the broad phase are out of date
         for (std::size_t j = 0; j < i; ++j) {
             btVector3 lowerOther, upperOther;
             fast_[j].box(lowerOther, upperOther);
@@ -200,14 +201,16 @@ class Meetings {
     }
 
     void add(BodySweep& a, BodySweep& b) {
-        const auto margin = std::max(marginOf(a.object()), marginOf(b.object()));  // no field is less than any margin
+        // no field compares less than any margin
+        const auto margin = std::max(marginOf(a.object()), marginOf(b.object()));
         if (margin) meetings_.push_back({&a, &b, *margin});
     }
 
     btDynamicsWorld& world_;
     float seconds_;
-    std::vector<BodySweep> fast_;                                   ///< in the world's order
-    std::unordered_map<const btCollisionObject*, BodySweep> slow_;  ///< that these may meet, and what does not move
+    std::vector<BodySweep> fast_;  ///< in the world's order
+    /// bodies that these may meet, including static ones
+    std::unordered_map<const btCollisionObject*, BodySweep> slow_;
     std::vector<Meeting> meetings_;
 };
 

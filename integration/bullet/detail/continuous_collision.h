@@ -1,4 +1,4 @@
-// Bodies that stop at what a step would take them through.
+// Continuous collision: stops bodies at the surfaces that a step would take them through.
 #pragma once
 
 #include <BulletDynamics/Dynamics/btDynamicsWorld.h>
@@ -19,9 +19,9 @@ class ContinuousCollision {
     void afterStep(float seconds);
     int stoppedBodies() const { return stopped_; }  ///< in the last step
 
-    /// Whether the worlds of a dispatcher have it: speculative contacts are then made only of bodies that move less
-    /// than their own size, since a contact far ahead bends a body's path instead of ending it, and what is fast may
-    /// then miss what it would have hit.
+    /// Whether the worlds of a dispatcher have continuous collision. Speculative contacts are then made only for bodies
+    /// that move less than their own size. A contact far ahead bends a body's path instead of ending it, so a fast body
+    /// could miss what it would have hit.
     static bool serves(const btDispatcher& dispatcher);
 
   private:

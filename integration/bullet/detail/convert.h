@@ -1,4 +1,4 @@
-// Between Bullet's vectors and GLM's.
+// Conversions between Bullet's vectors and GLM's.
 #pragma once
 
 #include <LinearMath/btTransform.h>

@@ -31,18 +31,18 @@ using namespace bilayer::detail;
 
 namespace {
 
-// Chords of a rim: enough that each lies within 0.5 % of the radius from its arc before it is put onto it.
+// Chords of a rim. Each lies within 0.5 % of the radius from its arc, before its points are projected onto the arc.
 constexpr std::uint32_t rimChords = 32;
-// Support points on a shape that has no formula here: directions on a spiral, about 12 degrees apart.
+// Support points on a shape without a closed form here: directions on a spiral, about 12 degrees apart.
 constexpr int supportDirections = 256;
-// What is thinner than this has no inside, and what is no farther than this beyond a face is over it [parts of the
-// size]: rounding.
+// Tolerance for rounding [fractions of the size]. A thinner body has no inside, and a point no farther than this beyond
+// a face is over it.
 constexpr float flatness = 1e-6f;
-// A normal that is tilted less than this off the axis belongs to a flat end.
+// A normal within this of the axis belongs to a flat end.
 constexpr float flatEnd = 0.1f;
-// Of a search for the place where a way enters; what takes more only grazes it.
+// Limit of steps in the search for the entry of a path; longer searches only graze.
 constexpr int maxSteps = 64;
-// A place on the side is on a rim from this part of the half height on.
+// From this fraction of the half height on, a point on the side is on a rim.
 constexpr float beforeRim = 0.999f;
 
 glm::vec3 direction(int axis) {
@@ -51,7 +51,7 @@ glm::vec3 direction(int axis) {
     return unit;
 }
 
-/// Any unit vector square to an axis.
+/// Any unit vector perpendicular to an axis.
 glm::vec3 squareTo(int axis) {
     return direction((axis + 1) % 3);
 }
@@ -68,7 +68,7 @@ std::vector<btVector3> supportPoints(const btConvexShape& shape) {
     return points;
 }
 
-/// Bullet asks such a shape for its support only: it says that it has no vertices.
+/// The vertices of such a shape. Bullet uses its support only: the shape reports that it has no vertices.
 std::vector<btVector3> cornersOf(const btConvexTriangleMeshShape& shape) {
     struct Corners : btInternalTriangleIndexCallback {
         std::vector<btVector3> points;
@@ -144,7 +144,7 @@ Convex::Convex(const btConvexShape& shape)
             break;
         }
         case MULTI_SPHERE_SHAPE_PROXYTYPE:
-            // Scaled by several factors it is no hull of balls, but what its support says.
+            // With different scale factors it is no hull of spheres, but is defined by its support function.
             if (scaling_.x() == scaling_.y() && scaling_.x() == scaling_.z()) {
                 makeBalls(static_cast<const btMultiSphereShape&>(shape));
                 break;
@@ -207,7 +207,8 @@ void Convex::makeHull(const std::vector<btVector3>& points) {
     btConvexHullComputer hull;
     hull.compute(&points.front().x(), sizeof(btVector3), static_cast<int>(points.size()), 0, 0);
     for (int i = 0; i < hull.vertices.size(); ++i) faces_.points.push_back(toGlm(hull.vertices[i]));
-    std::map<std::pair<std::uint32_t, std::uint32_t>, glm::vec3> conormals;  // of the face on the left of an edge
+    // conormal of the face on the left of an edge
+    std::map<std::pair<std::uint32_t, std::uint32_t>, glm::vec3> conormals;
     for (int i = 0; i < hull.faces.size(); ++i) {
         const auto* first = &hull.edges[hull.faces[i]];
         const auto apex = static_cast<std::uint32_t>(first->getSourceVertex());
@@ -248,7 +249,7 @@ void Convex::makeHull(const std::vector<btVector3>& points) {
 }
 
 void Convex::joinPlanes() {
-    std::vector<std::pair<std::uint32_t, std::uint32_t>> around;  // corner, plane
+    std::vector<std::pair<std::uint32_t, std::uint32_t>> around;  // vertex, plane
     for (std::uint32_t p = 0; p < planes_.size(); ++p)
         for (std::size_t i = planes_[p].begin; i < planes_[p].end; ++i)
             for (int k = 0; k < 3; ++k) around.emplace_back(faces_.triangles[i][k], p);
@@ -293,8 +294,8 @@ Convex::Near Convex::nearest(const glm::vec3& point, float reach) const {
     }
 }
 
-/// By Newton's steps, which do not lead too far: distance is convex along a way, and so is the bound of a hull's. Once
-/// it grows, it grows for ever.
+/// By Newton's method, which does not overshoot: distance is convex along a path, and so is the bound of a hull's
+/// distance. Once the distance grows, it grows forever.
 std::optional<Convex::Entry> Convex::enter(const glm::vec3& start, const glm::vec3& way, float tolerance) const {
     const float length = glm::length(way);
     float part = 0;
@@ -329,7 +330,7 @@ Convex::Near Convex::nearestOfBox(const glm::vec3& point) const {
 }
 
 Convex::Near Convex::nearestOfRevolution(const glm::vec3& point) const {
-    // In the half plane of the point: x away from the axis, y along it.
+    // In the half plane through the point: x away from the axis, y along it.
     glm::vec3 out = point;
     out[axis_] = 0;
     const float rho = glm::length(out);
@@ -354,7 +355,7 @@ Convex::Near Convex::nearestOfRevolution(const glm::vec3& point) const {
         const bool isOver = way >= -rounding && way <= length + rounding;
         if (isOver && above > height) height = above, normal = outward;
     }
-    // The difference of places that nearly touch has no direction but that of rounding.
+    // Points that almost coincide give a normal of rounding only.
     if (!inside && !(height > 0)) normal = (p - core) / nearest;
     const auto lift = [&](const glm::vec2& v) { return v.x * out + v.y * direction(axis_); };
     return {(inside ? -nearest : nearest) - radius_, lift(normal), lift(core), radius_};
@@ -365,7 +366,7 @@ Convex::Near Convex::nearestOfHull(const glm::vec3& point, float reach) const {
     float depth = -std::numeric_limits<float>::max();
     for (const Plane& plane : planes_)
         if (const float height = plane.height(point); height > depth) depth = height, farthest = &plane;
-    // Inside, the nearest face decides; far outside, a bound does.
+    // Inside, the nearest face decides; far outside, the bound is enough.
     const bool isInside = depth <= 0 && !isFlat_;
     if (farthest && (isInside || depth > reach + radius_))
         return {depth - radius_, farthest->normal, point - depth * farthest->normal, radius_};
@@ -379,8 +380,8 @@ Convex::Near Convex::nearestOfHull(const glm::vec3& point, float reach) const {
         squared = s, core = q;
         return true;
     };
-    // Only faces that the point sees can be nearest; and of these that one is which is nearer than all around it, since
-    // a distance from what is convex has no other minimum.
+    // Only faces that the point is above can be nearest. A face nearer than all its neighbours is the nearest one,
+    // since the distance to a convex body has no other minimum.
     const Plane* plane = nullptr;
     std::size_t triangle = 0;
     const auto considerFace = [&](const Plane& face) {
@@ -403,7 +404,7 @@ Convex::Near Convex::nearestOfHull(const glm::vec3& point, float reach) const {
                         considerFace(next);
         }
     }
-    // A hull without faces is flat, a line or a point.
+    // A hull without faces is a line or a point.
     if (!farthest) {
         for (const Edge& edge : edges_)
             consider(
@@ -411,7 +412,7 @@ Convex::Near Convex::nearestOfHull(const glm::vec3& point, float reach) const {
         for (const glm::vec3& corner : faces_.points) consider(corner);
     }
     const float distance = std::sqrt(squared);
-    // The difference of places that nearly touch has no direction but that of rounding.
+    // Points that almost coincide give a normal of rounding only.
     if (farthest && glm::distance(point - core, depth * farthest->normal) <= flatness * size())
         return {distance - radius_, farthest->normal, core, radius_};
     const glm::vec3 normal = distance > 0 ? (point - core) / distance : farthest ? farthest->normal : squareTo(1);

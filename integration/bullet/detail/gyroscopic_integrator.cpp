@@ -7,7 +7,7 @@ namespace bilayer::bullet::detail {
 
 namespace {
 
-// Each divides the error by about the angle that the body turns by in a step [rad].
+// Each iteration reduces the error by about a factor of the body's rotation in a step [rad].
 constexpr int iterations = 4;
 
 constexpr int gyroscopic = BT_ENABLE_GYROSCOPIC_FORCE_EXPLICIT | BT_ENABLE_GYROSCOPIC_FORCE_IMPLICIT_WORLD |
@@ -53,7 +53,7 @@ void GyroscopicIntegrator::beforeStep(float seconds) {
 void GyroscopicIntegrator::afterStep() {
     const btCollisionObjectArray& objects = world_.getCollisionObjectArray();
     for (const auto& [index, body, axes, momentum, midway] : turning_) {
-        // a callback of the user's may have removed it
+        // a user's callback may have removed it
         if (index >= objects.size() || objects[index] != body) continue;
         const btVector3 gained = momentumOf(*body, axes, body->getAngularVelocity() - midway);
         body->setAngularVelocity(spinOf(*body, body->getWorldTransform().getBasis(), momentum + gained));

@@ -1,4 +1,4 @@
-// Bodies that spin as Euler's equations say.
+// Gyroscopic integrator: rigid bodies that rotate by Euler's equations.
 #pragma once
 
 #include <BulletDynamics/Dynamics/btDynamicsWorld.h>
@@ -8,7 +8,7 @@
 
 namespace bilayer::bullet::detail {
 
-/// Keeps angular momentum: ExtensionOptions::gyroscopicIntegration.
+/// Conserves angular momentum: ExtensionOptions::gyroscopicIntegration.
 class GyroscopicIntegrator {
   public:
     explicit GyroscopicIntegrator(btDynamicsWorld& world) : world_(world) {}
@@ -22,7 +22,7 @@ class GyroscopicIntegrator {
         btRigidBody* body;
         btMatrix3x3 axes;    // before the step
         btVector3 momentum;  // before the step [kg m^2 / s]
-        btVector3 midway;    // angular velocity in the middle of the step, if nothing acts [rad/s]
+        btVector3 midway;    // angular velocity in the middle of the step, without external torques [rad/s]
     };
 
     btDynamicsWorld& world_;

@@ -51,14 +51,14 @@ LocalField::Answer LocalField::at(const glm::vec3& point, float radius) const {
     return {where, scale_ * sample.distance, normal, sample.gradient};
 }
 
-// By the triangles, in the band.
+// The exact answer from the triangles, in the band.
 LocalField::Answer LocalField::exactly(const glm::vec3& point, const Sample& sample) const {
     const SurfaceSample touch = surfaceSampleAt(field_, point / scale_, sample, true);
     if (touch.normal == glm::vec3(0)) return {Answer::unclear, scale_ * touch.distance, {}, sample.gradient};
     return {Answer::near, scale_ * touch.distance, touch.normal, touch.normal};
 }
 
-// Beyond the band, where a contact test asks for more than the band tells.
+// Beyond the band, for contact tests that ask for more than the band covers.
 LocalField::Answer LocalField::farAway(const glm::vec3& point, float radius, float bound) const {
     const ClosestPoint closest = field_.closest(point / scale_, farReach_ + radius / scale_);
     if (!closest.found) return {Answer::outside, std::max(scale_ * bound, scale_ * farReach_ + radius)};
@@ -77,7 +77,7 @@ std::optional<Contact> LocalField::probe(const glm::vec3& point, const Answer& a
                    radius);
 }
 
-// The same for a point that is farther away: where its way meets the surface.
+// For a point that is farther away: the contact where its path meets the surface.
 std::optional<Contact> LocalField::probeOnWay(const glm::vec3& point, float radius, std::uint32_t feature, float margin,
                                               float distance) const {
     if (longestWay_ <= margin) return std::nullopt;
@@ -102,14 +102,14 @@ void LocalField::probeEdge(const Edge& edge, const Answer& first, const Answer& 
                            ContactReport& report, std::vector<Contact>& contacts) const {
     const float length = glm::distance(edge.place(0), edge.place(1));
     if (!(length > 0)) return;
-    // farther from the field the probes get sparser
+    // probes are sparser farther from the field
     const int parts = probeParts(length, voxel_, (1 << partBits) - 1);
     const float way = relativeMotion_.longest(edge.place(0.5f), length);
     const float reach = margin + way + maxInterpolationError * voxel_ + std::max(edge.radius[0], edge.radius[1]);
     if (edge.isStraight && !comesNear(edge.place(0), edge.place(1), reach)) return;
     Answer before = first;
     for (int i = 0; i < parts;) {
-        // What is clear of everything needs no probes.
+        // Parts that are clear of the surface need no probes.
         const float clear = (before.distance - reach) * float(parts) / length;
         const int next = i + std::max(1, int(std::min(clear, float(parts - i))));
         const float part = float(next) / float(parts);
@@ -131,7 +131,7 @@ void LocalField::probeEdge(const Edge& edge, const Answer& first, const Answer& 
     }
 }
 
-// Whether a straight line gets as near as this to the box around the surface.
+// Whether a line segment comes this close to the bounding box of the surface.
 bool LocalField::comesNear(const glm::vec3& from, const glm::vec3& to, float reach) const {
     const Bounds& bounds = collider_.bounds();
     const double length = glm::distance(from, to);
@@ -143,7 +143,7 @@ std::optional<Contact> LocalField::deepestBetween(const Edge& edge, float from, 
                                                   const Answer& atTo, float margin) const {
     if (!atFrom.isKnown() || !atTo.isKnown()) return std::nullopt;
     const Piece piece{edge, from, to, glm::distance(edge.place(from), edge.place(to))};
-    // no longer than rounding, it leads nowhere
+    // as short as rounding: it has no direction
     if (!(piece.length > searchTolerance * voxel_)) return std::nullopt;
     const Slope first = slopeOf(piece, 0, atFrom), last = slopeOf(piece, piece.length, atTo);
     const bool isNear = std::min(first.value, last.value) - 0.5f * piece.length <= margin;
@@ -177,7 +177,7 @@ Slope LocalField::slopeOf(const Piece& piece, float way, const Answer& answer) c
     return {way, answer.distance - edge.radiusAt(part), glm::dot(answer.gradient, edge.directionAt(part)) - growth};
 }
 
-// Of a sharp edge with one of the field's.
+// The crossing of a sharp edge with one of the field's.
 std::optional<SharpEdges::Crossing> LocalField::crossingAt(const Edge& edge, float part, const Answer& there) const {
     if (!edge.conormals || edge.radiusAt(part) > 0) return std::nullopt;
     return collider_.data().edges().crossing(collider_.data().points(), edge.place(0) / scale_, edge.place(1) / scale_,

@@ -1,5 +1,5 @@
-// A field as the other body of a pair sees it: in metres and in the field's axes, with the way that the other body
-// goes; internal.
+// A field from the view of the other body of a pair: in metres, in the field's axes, with the relative motion of the
+// other body; internal.
 #pragma once
 
 #include <cstdint>
@@ -18,25 +18,27 @@ namespace bilayer::bullet::detail {
 
 using namespace bilayer::detail;
 
-// A surface point touches a face that looks against its own normal, by this cosine at least: the points below the edge
-// of a box must not be pushed out sideways. The corners of a cube, whose normals are mixed of three, reach 0.57.
-// Those of faces that do not touch yet: farther aslant is an edge of the other body beside them.
+// Minimum cosine between the normal of a surface point and the opposite of the face's normal. It keeps points below the
+// edge of a box from being pushed out sideways. The vertices of a cube, whose normals are averaged over three faces,
+// reach 0.57. The second cosine is for points of faces that are still apart: an edge of the other body next to them is
+// at a more oblique angle.
 inline constexpr ContactOptions normalFilter{
     .minNormalCosine = 0.3f, .minNormalCosineApart = 0.9f, .keepsObliqueEdges = false};
-// Edges get no more parts: numbers beyond are those of the next edge.
+// Bits of the number of a probe on an edge. This limits the probes: higher numbers are the features of the next edge.
 inline constexpr int partBits = 15;
 
-/// A field in metres of the world and the axes of its body, and how another body moves towards it.
+/// A field in world units [m] and in the axes of its body, with the motion of another body relative to it.
 class LocalField {
   public:
-    /// @param reach     up to which contacts are made [m]
-    /// @param measured  as in ContactOptions
+    /// @param reach     maximum separation of contacts [m]
+    /// @param measured  as ContactOptions::exact
     LocalField(const Placed& field, const Pose& other, const Motion& motion, float reach, bool measured);
 
     const Collider& collider() const { return collider_; }
-    /// Of the other body's points as the field sees them.
+    /// The motion of the other body's points relative to the field.
     const RelativeMotion& relativeMotion() const { return relativeMotion_; }
-    /// The longest way of any that is in the field's box; those that come from afar may go farther by their turn.
+    /// The maximum displacement of the points that are in the field's box. Points that come from afar may move farther
+    /// by rotation.
     float longestWay() const { return longestWay_; }
 
     struct Answer {
@@ -48,47 +50,48 @@ class LocalField {
         bool isKnown() const { return where == near || where == unclear; }
     };
 
-    /// @param radius  by which the point is grown [m]
+    /// @param radius  growth of the point [m]
     Answer at(const glm::vec3& point, float radius = 0) const;
 
     /// The contact of a point of the other body's core, grown by a radius.
     std::optional<Contact> probe(const glm::vec3& point, const Answer& answer, float radius, std::uint32_t feature,
                                  float margin, ContactReport& report) const;
 
-    /// An edge of the other body, or the middle of one that is round.
+    /// An edge of the other body, or the axis of a rounded one.
     struct Edge {
-        std::function<glm::vec3(float)> place;  ///< by the part of the way
-        float radius[2];                        ///< by which it is grown at its ends [m]
+        std::function<glm::vec3(float)> place;  ///< by the fraction of the edge
+        float radius[2];                        ///< growth at its ends [m]
         bool isStraight;
         std::uint32_t feature;               ///< the first of 2^(partBits + 1)
         std::optional<Conormals> conormals;  ///< of a sharp edge between two faces
-        bool isSearched = true;              ///< between the probes
+        bool isSearched = true;              ///< whether to search between the probes for deeper points
 
         float radiusAt(float part) const { return radius[0] + part * (radius[1] - radius[0]); }
         glm::vec3 directionAt(float part) const;
     };
 
-    /// The contacts along an edge, ends excluded: of places that lie close enough to each other, and where it goes
-    /// deeper between two of them of the deepest one.
+    /// Finds the contacts along an edge, ends excluded: those of the probes, and between two probes that of the deepest
+    /// point, if the edge is deeper there.
     /// @param first, last  the answers at its ends
     void probeEdge(const Edge& edge, const Answer& first, const Answer& last, float margin, ContactReport& report,
                    std::vector<Contact>& contacts) const;
 
-    /// Where an edge between two of its places is deepest, if it falls from either, or crosses a sharp edge.
+    /// The contact at the deepest point of an edge between two probes. Nothing unless the edge descends from either
+    /// probe, or crosses a sharp edge.
     std::optional<Contact> deepestBetween(const Edge& edge, float from, const Answer& atFrom, float to,
                                           const Answer& atTo, float margin) const;
 
-    /// Contact::approach of the other body's point.
+    /// Contact::approach for a point of the other body.
     float approach(const glm::vec3& point, const glm::vec3& normal, float margin) const;
 
     Contact contact(const glm::vec3& position, const glm::vec3& normal, float distance, std::uint32_t feature,
                     float approach = 0) const;
 
   private:
-    /// Of an edge, between two of its places.
+    /// A part of an edge between two probes.
     struct Piece {
         const Edge& edge;
-        float from, to;  ///< parts of the edge's way
+        float from, to;  ///< fractions of the edge
         float length;    ///< [m]
 
         float partAt(float way) const { return from + way / length * (to - from); }
@@ -110,8 +113,8 @@ class LocalField {
     Pose pose_;
     RelativeMotion relativeMotion_;
     float longestWay_;
-    float exactReach_;    ///< up to which triangles are asked, where the field has any [m]
-    float farReach_ = 0;  ///< where contacts are asked for beyond the band; in the field's size
+    float exactReach_;    ///< maximum distance for exact queries of the triangles, where the field has any [m]
+    float farReach_ = 0;  ///< beyond the band, where contacts are asked for there; in the field's units
 };
 
 }  // namespace bilayer::bullet::detail

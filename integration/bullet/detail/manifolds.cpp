@@ -15,37 +15,37 @@ using namespace bilayer::detail;
 
 namespace {
 
-// A new contact goes on from an old one whose normal is within about 25 degrees of its own.
+// A new contact continues an old one whose normal is within about 25 degrees of its own.
 constexpr float sameDirection = 0.9f;
-// Friction holds below this part of the most that it can bear. What has drifted farther than this along the surface
-// stays where it is [parts of the distance within which contacts are the same].
+// A contact sticks below this fraction of the friction limit. A drift along the surface beyond the second value is not
+// pulled back [fractions of Continuity::sameWithin].
 constexpr float held = 0.98f, maxDrift = 0.25f;
-// How long a contact takes to come to rest [steps], and the slip that loses it [parts of the distance within which
-// contacts are the same]: by and by, so that others have time to take over what it bore. By more in one step friction
-// is not known to slip that holds.
+// The time until a contact bears its full resting friction [steps], and the slip that removes it [fractions of
+// Continuity::sameWithin]. It falls gradually, so that other contacts have time to take over the load. Sticking
+// contacts are not known to slip more in one step.
 constexpr float stepsOfRest = 120, slipOfRest = 0.05f;
 
-/// What a contact is with, as manifold points name it.
+/// The identifiers of a contact in a manifold point.
 struct Identifiers {
     TriangleId a, b;
 };
 
-/// @param aIsFirst  of the bodies that the result names
+/// @param aIsFirst  whether A is the first body of the result
 Identifiers identifiersOf(const Contact& contact, const std::optional<TriangleId>& triangle, bool aIsFirst,
                           const btManifoldResult& result) {
     const btCollisionObjectWrapper *a = result.getBody0Wrap(), *b = result.getBody1Wrap();
     if (!aIsFirst) std::swap(a, b);
     const int feature = static_cast<int>(contact.feature & ~featureOfB);
     const bool isOfB = (contact.feature & featureOfB) != 0;
-    // a wrapper of what is part of something bigger names it
+    // the wrapper of a part of a compound or mesh names the part
     const auto name = [](const btCollisionObjectWrapper& wrap, int feature) {
         return wrap.m_index >= 0 ? TriangleId{wrap.m_partId, wrap.m_index} : TriangleId{0, feature};
     };
     return {triangle ? *triangle : name(*a, isOfB ? -1 : feature), name(*b, isOfB ? feature : -1)};
 }
 
-/// What no solver has seen yet, as Bullet makes it in btManifoldResult::addContactPoint(), but beside all others,
-/// however far away it is, and without a word to the user.
+/// A new manifold point, as Bullet creates it in btManifoldResult::addContactPoint(), but without merging it with
+/// others, at any distance, and without user callbacks.
 btManifoldPoint pointOf(const Contact& contact, const Identifiers& of, const btPersistentManifold& manifold,
                         const btManifoldResult& result) {
     const btVector3 onB = toBullet(contact.position), normal = toBullet(contact.normal);
@@ -74,7 +74,7 @@ btManifoldPoint pointOf(const Contact& contact, const Identifiers& of, const btP
     return point;
 }
 
-/// Adds a contact to the manifold that the result holds.
+/// Adds a contact to the result's manifold.
 void emit(const Contact& contact, const Identifiers& of, bool aIsFirst, btManifoldResult& result) {
     btPersistentManifold& manifold = *result.getPersistentManifold();
     manifold.setContactBreakingThreshold(std::max(contact.distance, 0.f));
@@ -88,7 +88,8 @@ void emit(const Contact& contact, const Identifiers& of, bool aIsFirst, btManifo
     result.addContactPoint(toBullet(contact.normal), toBullet(contact.position), contact.distance);
 }
 
-/// Tells the user of a contact once it is as the solver will see it; what he keeps with it is there again each step.
+/// Calls the user's contact-added callback after the point has its final values. The user's data in the point is kept
+/// from step to step.
 void tellAdded(btManifoldPoint& point, const btPersistentManifold& manifold, const btManifoldResult& result) {
     const btCollisionObjectWrapper *first = result.getBody0Wrap(), *second = result.getBody1Wrap();
     const auto asks = [](const btCollisionObjectWrapper& side) {
@@ -99,7 +100,7 @@ void tellAdded(btManifoldPoint& point, const btPersistentManifold& manifold, con
     gContactAddedCallback(point, first, point.m_partId0, point.m_index0, second, point.m_partId1, point.m_index1);
 }
 
-/// Of what has been there before.
+/// Calls the user's callback for a point that existed before.
 void tellProcessed(btManifoldPoint& point, const btPersistentManifold& manifold) {
     if (!gContactProcessedCallback || point.m_lifeTime == 0) return;
     gContactProcessedCallback(point, const_cast<btCollisionObject*>(manifold.getBody0()),
@@ -110,7 +111,7 @@ btVector3 along(const btVector3& way, const btVector3& normal) {
     return way - normal.dot(way) * normal;
 }
 
-/// A contact that turns in the step goes where it is going to be. What it drifts meanwhile is no slip.
+/// Moves a contact that rotates in the step to its predicted position. The drift in between is not slip.
 void put(btManifoldPoint& point, const PredictedContact& ahead) {
     point.m_positionWorldOnA = ahead.onA;
     point.m_positionWorldOnB = ahead.onB;
@@ -119,20 +120,20 @@ void put(btManifoldPoint& point, const PredictedContact& ahead) {
     point.m_contactPointFlags &= ~BT_CONTACT_FLAG_FRICTION_ANCHOR;
 }
 
-/// What has become of a contact's anchor in a step.
+/// State of a contact's friction anchor after a step.
 struct Anchor {
-    btVector3 drift;  ///< how far the two places that once touched are to be pulled back along the surface
-    float slip;       ///< how far they have slipped past each other
+    btVector3 drift;  ///< distance to pull the two anchor points back along the surface
+    float slip;       ///< slip between them
 };
 
-/// Where friction did not hold the two places, they are pulled back no farther than before. What is held and all the
-/// same gets beside the way that it is pulled back on has been put there by the user, or torn away.
+/// The anchor after a step. Where the contact slipped, it is pulled back no farther than before. If a sticking contact
+/// leaves the path along which it is pulled back, the user has moved it, or it was torn off.
 Anchor anchorOf(const btManifoldPoint& point, const btVector3& before, const btPersistentManifold& manifold,
                 float sameWithin) {
     const btVector3 drift = along(manifold.getBody0()->getWorldTransform() * point.m_localPointA -
                                       manifold.getBody1()->getWorldTransform() * point.m_localPointB,
                                   point.m_normalWorldOnB);
-    // Bullet bounds friction in each of its directions by itself
+    // Bullet limits friction in each of its directions separately
     const float friction = std::max(std::abs(point.m_appliedImpulseLateral1), std::abs(point.m_appliedImpulseLateral2));
     const bool holds = friction < held * point.m_combinedFriction * point.m_appliedImpulse;
     const float most = holds ? maxDrift * sameWithin : std::min(maxDrift * sameWithin, float(before.length()));
@@ -151,8 +152,8 @@ bool isOfUser(const btManifoldResult& result) {
 struct Manifolds::Step {
     float seconds;
     Velocity a, b;
-    btVector3 gain;  ///< of speed by the forces on the bodies, of B as A sees it [m/s]
-    bool aIsFirst;   ///< of the bodies that the result names
+    btVector3 gain;  ///< velocity change by the forces on the bodies, of B relative to A [m/s]
+    bool aIsFirst;   ///< whether A is the first body of the result
     const Continuity& continuity;
     btManifoldResult& result;
 
@@ -166,9 +167,10 @@ struct Manifolds::Step {
           continuity(continuity),
           result(result) {}
 
-    /// The solver takes the gap that is left from the speed of a bounce. So what meets the surface in this step bounces
-    /// as if it touched already, and what comes nearer only keeps its speed. What lies there, or comes no faster than
-    /// its weight takes it there in two steps, does not bounce.
+    /// Sets the restitution of a speculative contact. The solver subtracts the remaining separation from the speed of a
+    /// bounce. So a body that reaches the surface in this step bounces as if it touched already, and one that only
+    /// comes nearer keeps its velocity. A body that rests, or comes no faster than its weight accelerates it in two
+    /// steps, does not bounce.
     void bounce(btManifoldPoint& point) const {
         if (!(seconds > 0 && point.m_distance1 > 0 && point.m_combinedRestitution > 0) || point.m_appliedImpulse > 0)
             return;
@@ -190,7 +192,7 @@ Manifolds::~Manifolds() {
 void Manifolds::write(std::span<const Patch> patches, std::span<const ContactDetails> details,
                       const btCollisionObject& a, const btCollisionObject& b, float seconds,
                       const Continuity& continuity, btManifoldResult& result) {
-    // One manifold at least: users expect a pair that overlaps to have one.
+    // At least one manifold: users expect one for a pair that overlaps.
     while (manifolds_.size() < std::max<std::size_t>(patches.size(), 1))
         manifolds_.push_back(dispatcher_.getNewManifold(&a, &b));
     written_.resize(manifolds_.size());
@@ -253,7 +255,7 @@ Manifolds::Written Manifolds::writtenAs(const btManifoldPoint& point, std::size_
     return {};
 }
 
-/// The user moves one surface along the other: what touched once drifts apart by right.
+/// Releases the anchor: the user moves one surface along the other, so former contact points drift apart as intended.
 void Manifolds::letGo(const btPersistentManifold& manifold, btManifoldPoint& point, Written& written) {
     point.m_contactPointFlags &= ~BT_CONTACT_FLAG_FRICTION_ANCHOR;
     point.m_positionWorldOnA -= written.drift;

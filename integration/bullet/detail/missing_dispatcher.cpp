@@ -15,9 +15,9 @@ namespace bilayer::bullet::detail {
 namespace {
 
 std::atomic<int> knowing{0};
-std::atomic<bool> isDone{false};  // the warning is out
+std::atomic<bool> isDone{false};  // the warning has been printed
 
-// Of transforms that bodies have left behind no more are kept than this.
+// Limit of entries, which include unused transforms of bodies.
 constexpr std::size_t maxEntries = 4096;
 
 using Address = std::uintptr_t;
@@ -26,13 +26,13 @@ Address addressOf(const btTransform& transform) {
     return reinterpret_cast<Address>(&transform);
 }
 
-/// How far behind a body's transform the one is stored that the body is going to have.
+/// Offset from a body's transform to its predicted transform in memory.
 Address aheadInBody() {
     static const btCollisionObject object;
     return addressOf(object.getInterpolationWorldTransform()) - addressOf(object.getWorldTransform());
 }
 
-/// The boxes that fields were asked for.
+/// The bounding boxes requested from fields.
 class Boxes {
   public:
     /// Whether the box is that of a dynamic body and meets another body's.
@@ -54,10 +54,10 @@ class Boxes {
     struct Asked {
         const void* field = nullptr;
         btVector3 lower, upper;
-        std::uint64_t time = 0;  ///< counts what is asked
+        std::uint64_t time = 0;  ///< number of the request
 
         bool meets(const Asked& other) const { return TestAabbAgainstAabb2(lower, upper, other.lower, other.upper); }
-        /// Whether another transform may be a copy of this one, as a program makes to draw a body.
+        /// Whether another transform may be a copy of this one, made by a program to draw a body.
         bool isCopyOf(const Asked& other) const {
             if (field != other.field) return false;
             const btVector3 apart = (lower + upper - other.lower - other.upper).absolute(), size = upper - lower;
@@ -65,7 +65,7 @@ class Boxes {
         }
     };
 
-    /// What is in the same world has been asked since the body was asked last.
+    /// Whether the box meets one that was requested after the body's last request: that one is in the same world.
     bool meetsAnother(Address transform, const Asked& box, std::uint64_t since) const {
         for (const auto& [other, asked] : asked_) {
             const Address apart = other > transform ? other - transform : transform - other;
@@ -75,7 +75,7 @@ class Boxes {
         return false;
     }
 
-    std::map<Address, Asked> asked_;  ///< by where the transform is stored
+    std::map<Address, Asked> asked_;  ///< by the address of the transform
     std::uint64_t time_ = 0;
 };
 

@@ -1,15 +1,15 @@
-// The warning of fields that no dispatcher knows; internal.
+// The warning about fields in a process without a dispatcher for them; internal.
 //
-// For two concave shapes Bullet's own tables hold an algorithm that does nothing, so that neither shape is called when
-// such a pair meets. All that a shape hears of its world is that its box is asked for: once a step for each body, and
-// once more for a dynamic body, where it is going to be.
+// For two concave shapes, Bullet's own tables hold an algorithm that does nothing, so neither shape is called when such
+// a pair meets. A shape is called by its world only for its bounding box: once a step for each body, and once more for
+// a dynamic body, for the predicted pose.
 #pragma once
 
 #include <LinearMath/btTransform.h>
 
 namespace bilayer::bullet::detail {
 
-/// Each Dispatcher and FieldAlgorithms holds one. While there is any, nothing is watched.
+/// Held by each Dispatcher and FieldAlgorithms. While one exists, boxes are not recorded.
 class KnowsFields {
   public:
     KnowsFields();
@@ -18,12 +18,12 @@ class KnowsFields {
     KnowsFields& operator=(const KnowsFields&) = delete;
 };
 
-/// Takes down that a field was asked for its box, from any thread. Warns on the standard error output, once in a
-/// process, when the box of a dynamic body meets another field's while nothing in the process knows fields.
-/// @param transform  bodies are told apart by where their transforms are stored
+/// Records the bounding box of a field, from any thread. Warns on the standard error output, once in a process, when
+/// the box of a dynamic body meets another field's while no KnowsFields exists.
+/// @param transform  its address identifies the body
 void noteBox(const void* field, const btTransform& transform, const btVector3& lower, const btVector3& upper);
 
-/// Before the field ends.
+/// Forgets a field's boxes; to be called before the field is destroyed.
 void forgetBoxes(const void* field);
 
 }  // namespace bilayer::bullet::detail

@@ -9,9 +9,9 @@ namespace bilayer::bullet::detail {
 
 namespace {
 
-// Balls may stand out of a plane by this part of the hull's size: rounding.
+// Tolerance for rounding: spheres may protrude from a plane by this fraction of the hull's size.
 constexpr float rounding = 1e-5f;
-// Of the cosine between a cone and its axis where one ball holds the other but for rounding.
+// Minimum squared cosine between a cone and its axis; one sphere then contains the other up to rounding.
 constexpr double minSquare = 1e-12;
 
 glm::dvec3 squareTo(const glm::dvec3& axis) {
@@ -26,7 +26,7 @@ MultisphereHull::MultisphereHull(std::vector<Ball> balls) {
         const auto holds = [&](std::size_t j) {
             const float room = balls[j].radius - balls[i].radius;
             const float apart = glm::distance(balls[i].centre, balls[j].centre);
-            // of two that are the same, the first stays
+            // of two equal spheres, the first one stays
             return j != i && apart <= room && (apart < room || j < i || room > 0);
         };
         bool isHeld = false;
@@ -46,14 +46,14 @@ MultisphereHull::MultisphereHull(std::vector<Ball> balls) {
         }
 }
 
-/// Those of the two planes on three balls that have all others below.
+/// Adds those of the two tangent planes of three spheres that have all other spheres below them.
 void MultisphereHull::addPlanes(std::uint32_t i, std::uint32_t j, std::uint32_t k) {
     const glm::dvec3 from(balls_[i].centre), u = glm::dvec3(balls_[j].centre) - from,
                                              v = glm::dvec3(balls_[k].centre) - from;
     const glm::dvec3 square = glm::cross(u, v);
     const double area = glm::length(square);
     if (area <= rounding * size_ * size_) return;
-    // The normal n goes down by the difference of radii along each side.
+    // Along each side, the height over the plane falls by the difference of the radii.
     const double a = double(balls_[i].radius) - balls_[j].radius, b = double(balls_[i].radius) - balls_[k].radius;
     const glm::dvec3 along = (a * glm::cross(v, square) + b * glm::cross(square, u)) / (area * area);
     const double rest = 1 - glm::dot(along, along);
@@ -74,7 +74,7 @@ MultisphereHull::Candidate MultisphereHull::aroundBall(const Ball& ball, const g
     return {length - ball.radius, length > 0 ? (point - centre) / length : glm::dvec3(0, 0, 1), centre, ball.radius};
 }
 
-/// Against all balls between two.
+/// Nearest point on the surface of the spheres between two spheres.
 MultisphereHull::Candidate MultisphereHull::aroundPair(const Ball& from, const Ball& to,
                                                        const glm::dvec3& point) const {
     const glm::dvec3 start(from.centre), between = glm::dvec3(to.centre) - start;
@@ -83,7 +83,7 @@ MultisphereHull::Candidate MultisphereHull::aroundPair(const Ball& from, const B
     const double along = glm::dot(way, axis);
     const glm::dvec3 aside = way - along * axis;
     const double out = glm::length(aside);
-    // The normal leans towards the smaller ball.
+    // The normal is inclined towards the smaller sphere.
     const double sine = -growth / length, cosine = std::sqrt(std::max(1 - sine * sine, minSquare));
     const double part = (along - out * sine / cosine) / length;
     if (part <= 0) return aroundBall(from, point);
@@ -108,7 +108,8 @@ MultisphereHull::Near MultisphereHull::nearest(const glm::vec3& place) const {
         const Ball &a = balls_[plane.corners[0]], &b = balls_[plane.corners[1]], &c = balls_[plane.corners[2]];
         const glm::dvec3 from(a.centre), u = glm::dvec3(b.centre) - from, v = glm::dvec3(c.centre) - from,
                                          square = glm::cross(u, v);
-        // Where the line along the normal meets the plane of the centres: only between them is the plane the hull's.
+        // The line along the normal through the plane of the centres: the tangent plane is on the hull only between the
+        // centres.
         const double way = glm::dot(point - from, square) / glm::dot(plane.normal, square);
         const glm::dvec3 foot = point - way * plane.normal - from;
         const double area = glm::dot(square, square);
@@ -118,13 +119,13 @@ MultisphereHull::Near MultisphereHull::nearest(const glm::vec3& place) const {
         const double radius = a.radius + atB * (b.radius - a.radius) + atC * (c.radius - a.radius);
         best = {distance, plane.normal, from + foot, radius};
     }
-    // Between four balls or more, none of the above is near though the point is inside.
+    // Between four or more spheres, the point may be inside although none of the above is near.
     const bool isOutside = best.distance >= 0 && along(best.normal, point) >= best.distance - rounding * size_;
     if (!isOutside && !planes_.empty()) best = inside(point);
     return {float(best.distance), glm::vec3(best.normal), {glm::vec3(best.centre), float(best.radius)}};
 }
 
-/// How far the hull lies below a point in a direction.
+/// The distance from a point to the hull's support plane in a direction.
 double MultisphereHull::along(const glm::dvec3& direction, const glm::dvec3& point) const {
     double least = std::numeric_limits<double>::max();
     for (const Ball& ball : balls_)
@@ -132,7 +133,7 @@ double MultisphereHull::along(const glm::dvec3& direction, const glm::dvec3& poi
     return least;
 }
 
-/// Of all directions in which the hull may be left, the shortest way out lies along a ball's, a cone's or a plane's.
+/// Inside: the shortest depenetration is along the normal of a sphere, a cone or a plane.
 MultisphereHull::Candidate MultisphereHull::inside(const glm::dvec3& point) const {
     Candidate best{-std::numeric_limits<double>::max(), {0, 0, 1}, point, minRadius_};
     const auto consider = [&](const glm::dvec3& normal) {

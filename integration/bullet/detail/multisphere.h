@@ -1,5 +1,5 @@
-// The convex hull of balls, which is what Bullet's multispheres are: spheres, cones between two of them, and planes
-// that rest on three.
+// The convex hull of spheres, which is what Bullet's multispheres are. Its surface consists of spheres, cones tangent
+// to two of them, and planes tangent to three.
 #pragma once
 
 #include <glm/vec3.hpp>
@@ -16,20 +16,20 @@ class MultisphereHull {
     };
 
     MultisphereHull() = default;
-    /// At least one ball. Takes O(n^4) for n of them.
+    /// Takes at least one sphere. Takes O(n^4) time for n of them.
     explicit MultisphereHull(std::vector<Ball> balls);
 
     struct Near {
         float distance;    ///< signed, to the surface [m]
-        glm::vec3 normal;  ///< of the surface there, outward, of unit length
-        Ball ball;         ///< one in the hull that touches its surface there
+        glm::vec3 normal;  ///< outward normal of the surface there, of unit length
+        Ball ball;         ///< a sphere inside the hull that touches the surface there
     };
-    /// Exact but for rounding, outside and inside. Takes O(n^2) outside, O(n^3) inside.
+    /// Exact up to rounding, outside and inside. Takes O(n^2) outside, O(n^3) inside.
     Near nearest(const glm::vec3& point) const;
 
-    /// Those that are in no other.
+    /// The spheres that no other one contains.
     const std::vector<Ball>& balls() const { return balls_; }
-    /// Balls between which a cone lies, some of them perhaps inside of the hull.
+    /// Pairs of spheres with a tangent cone; some cones may be inside the hull.
     const std::vector<std::pair<std::uint32_t, std::uint32_t>>& pairs() const { return pairs_; }
 
   private:
@@ -38,7 +38,8 @@ class MultisphereHull {
         double offset;
         std::uint32_t corners[3];
     };
-    // In double precision: where a ball and a cone are as near but for rounding, their normals differ by its root.
+    // In double precision: where the distances to a sphere and to a cone differ by rounding only, their normals differ
+    // by the square root of that.
     struct Candidate {
         double distance;
         glm::dvec3 normal, centre;

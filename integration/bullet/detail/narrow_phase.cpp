@@ -14,7 +14,7 @@ using namespace bilayer::detail;
 
 namespace {
 
-// The feature of what is lowest over a plane, for contact tests: no surface point's, no edge's.
+// Feature number of the lowest vertex over a plane, for contact tests: no surface point or edge has it.
 constexpr std::uint32_t lowestVertex = featureOfB - 1;
 
 }  // namespace
@@ -24,7 +24,7 @@ ContactReport collideFields(const Placed& a, const Placed& b, float margin, bool
     ContactOptions options = normalFilter;
     options.margin = margin;
     options.exact = measured;
-    // a test is told how far apart bodies are, whichever way their points look
+    // a contact test needs the distance of the bodies for any direction of their normals
     if (measured) {
         options.minNormalCosineApart = options.minNormalCosine;
         options.keepsObliqueEdges = true;
@@ -54,7 +54,7 @@ ContactReport collidePlane(const glm::vec3& normal, float offset, const Motion& 
     field.collider.data().points().visit(reject, [&](std::uint32_t index, const SurfacePoint& point) {
         ++report.pointsTested;
         const float distance = above(point.position);
-        // the plane's own points come up to this one
+        // the points of the plane approach this one
         const float approach = local.approach(field.scale * point.position, -up, margin) / field.scale;
         if (distance > std::max(reach, approach)) return;
         const glm::vec3 position = field.pose.toWorld(field.scale * point.position);

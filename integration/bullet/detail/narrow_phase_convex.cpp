@@ -20,14 +20,15 @@ using namespace bilayer::detail;
 
 namespace {
 
-// Steps towards the deepest place of a round surface; each divides the error by the ratio of the radii of curvature.
+// Iterations towards the deepest point of a curved surface; each reduces the error by the ratio of the radii of
+// curvature.
 constexpr int maxRefinements = 6;
-// Faces that fall by less lie on what they touch: the next surface points are as deep to a hundredth of a voxel.
+// Faces with a smaller slope lie flat on the other surface: the next surface points are as deep to 0.01 voxels.
 constexpr float minDownhill = 0.05f;
 constexpr float touchingFace = 0.25f;  // [voxels]
-// Normals that enclose less than a degree are those of one face (cosine).
+// Normals within one degree belong to one face (cosine).
 constexpr float straight = 0.99985f;
-// A way has met a convex body where it is this near to it [voxels]: by more, it would meet edges that it goes past.
+// A path meets a convex body at this distance [voxels]; a larger tolerance would hit edges that the path passes.
 constexpr float sweepTolerance = 1e-3f;
 
 /// A convex body in the coordinates of a field.
@@ -45,7 +46,7 @@ class Touching {
         toField_ = glm::mat3(inField.rotation);
         toConvex_ = glm::transpose(toField_);
         origin_ = inField.position;
-        // the deepest place of an edge is no farther than half of it from one of its ends
+        // the deepest point of an edge is within half its length of one of its ends
         if (convex.isCurved()) edgeReach_ += 0.5f * scale_ * field.collider.data().edges().longest();
     }
 
@@ -55,7 +56,7 @@ class Touching {
         return convex_.nearest(intoConvex(scale_ * centre), reach).distance > reach;
     }
 
-    /// A surface point against the convex body's formula.
+    /// Tests a surface point against the closed form of the convex body.
     void visit(std::uint32_t index, const SurfacePoint& point, ContactReport& report,
                std::vector<Contact>& contacts) const {
         ++report.pointsTested;
@@ -67,7 +68,7 @@ class Touching {
         const glm::vec3 normal = -(toField_ * near.normal);
         float approach = local_.approach(position, normal, margin_);
         if (near.distance > 0 && approach > 0 && !meets(position, point)) approach = 0;
-        // What is round has no edge that a point could see aslant.
+        // A curved surface has no edge that a point could see at an oblique angle.
         const bool apart = near.distance > 0 && !point.isSharp && !convex_.isRound(near) && !measured_;
         if (!keeps(normalFilter, -normal, point.normal, -local_.relativeMotion().rotation(), apart)) return;
         if (apart && approach == 0 &&
@@ -75,7 +76,7 @@ class Touching {
                               [&](const glm::vec3& place) { return convex_.nearest(place, edgeReach_).normal; }))
             return;
         if (!convex_.isFlat(near)) {
-            // corners and edges are exact, and samples next to them are not
+            // vertices and edges are exact, and samples next to them are not
             const auto better = refine(near, feature);
             if (better && !(point.isSharp && near.distance < better->distance)) {
                 contacts.push_back(*better);
@@ -94,7 +95,7 @@ class Touching {
         contacts.back().turningRadius = 0;
     }
 
-    /// The convex body's own corners and edges in the field.
+    /// Tests the convex body's own vertices and edges in the field.
     void visitProbes(ContactReport& report, std::vector<Contact>& contacts) const {
         const auto corners = convex_.corners();
         std::vector<LocalField::Answer> answers;
@@ -122,7 +123,7 @@ class Touching {
     glm::vec3 intoConvex(const glm::vec3& point) const { return toConvex_ * (point - origin_); }
     glm::vec3 intoField(const glm::vec3& point) const { return toField_ * point + origin_; }
 
-    /// Where a way meets the convex body, both in that one's coordinates.
+    /// The entry of a path into the convex body, both in the convex body's coordinates.
     std::optional<Convex::Entry> meeting(const glm::vec3& start, const glm::vec3& way) const {
         return convex_.enter(start, way, sweepTolerance * voxel_);
     }
@@ -131,14 +132,14 @@ class Touching {
         return -(toConvex_ * local_.relativeMotion().of(position));
     }
 
-    /// Whether a surface point's way does more than graze the convex body (see collide()).
+    /// Whether a surface point's path does more than graze the convex body (see collide()).
     bool meets(const glm::vec3& position, const SurfacePoint& point) const {
         const glm::vec3 way = wayIntoConvex(position), normal = toConvex_ * point.normal;
         const glm::vec3 across = normal - glm::dot(normal, way) / glm::dot(way, way) * way;
         return meeting(intoConvex(position) - grazingTolerance * voxel_ * across, way).has_value();
     }
 
-    /// The same as visit() for a point that is farther away.
+    /// visit() for a point that is farther away.
     void visitOnWay(const glm::vec3& position, const SurfacePoint& point, std::uint32_t feature, float distance,
                     std::vector<Contact>& contacts) const {
         if (local_.longestWay() <= margin_) return;
@@ -146,7 +147,8 @@ class Touching {
         if (distance > glm::length(way) || !meets(position, point)) return;
         const auto met = meeting(intoConvex(position), way);
         if (!met) return;
-        const float gap = -glm::dot(met->near.normal, met->part * way);  // to the plane that is met
+        // separation from the tangent plane at the entry
+        const float gap = -glm::dot(met->near.normal, met->part * way);
         if (!(gap > 0)) return;
         const glm::vec3 normal = -(toField_ * met->near.normal);
         const bool apart = !point.isSharp && !convex_.isRound(met->near);
@@ -155,7 +157,8 @@ class Touching {
         contacts.back().turningRadius = 0;
     }
 
-    /// Where sharp edges of the field go deeper into a round body from a point that touches before they come up again.
+    /// Follows sharp edges of the field from a touching point: adds the deepest point of each edge that descends into a
+    /// curved body and rises again.
     void followEdges(std::uint32_t index, const Convex::Near& near, std::vector<Contact>& contacts) const {
         const Collider& collider = local_.collider();
         const auto points = collider.data().points().points();
@@ -173,7 +176,7 @@ class Touching {
             };
             const Convex::Near there = nearAt(length);
             const Slope first = slopeOf(0, near), last = slopeOf(length, there);
-            // Where both ends are within reach, one of them is enough.
+            // If both ends are within reach, one of them is enough.
             const bool isOther = there.distance <= edgeReach_ && next < index;
             if (!fallsBetween(first, last) || isOther) continue;
             const auto lowest = lowestBetween(first, last, searchTolerance * voxel_, [&](float way) {
@@ -196,7 +199,7 @@ class Touching {
         }
     }
 
-    /// Follows the field's normal from the place of a round surface under a surface point to the deepest place nearby.
+    /// Follows the field's normal from the point of a curved surface under a surface point to the deepest point nearby.
     std::optional<Contact> refine(const Convex::Near& near, std::uint32_t feature) const {
         glm::vec3 place = intoField(near.core + near.radius * near.normal);
         LocalField::Answer here = local_.at(place);
@@ -216,7 +219,8 @@ class Touching {
         return found;
     }
 
-    /// Where a face, or the straight line on the side of a cylinder or a cone, goes deeper near a place on it.
+    /// Edge descent: the deeper point of a face, or of the generator line on the side of a cylinder or a cone, near a
+    /// point on it.
     std::optional<Contact> downhill(const Convex::Near& near, const glm::vec3& place,
                                     const LocalField::Answer& here) const {
         const float step = probeSpacing * scale_ * local_.collider().field().voxelSize();
@@ -232,14 +236,14 @@ class Touching {
             const float there = std::clamp(middle - std::copysign(step / length, steepness), 0.f, 1.f);
             end = start + (there - middle) * along;
         } else {
-            // Where faces touch, points are exact, and the interpolant is not beside sharp edges.
+            // Where faces touch, points are exact; next to sharp edges the interpolant is not.
             const bool isSmooth = local_.collider().data().edges().edges().empty();
             if (!measured_ && !isSmooth) least = touchingFace * scale_ * local_.collider().field().voxelSize();
             if (!convex_.isFlat(near) || near.distance < least) return std::nullopt;
             const glm::vec3 uphill = slope - glm::dot(slope, near.normal) * near.normal;
             const float steepness = glm::length(uphill);
             if (!(steepness > minDownhill)) return std::nullopt;
-            // no farther than to the border of the face
+            // no farther than the border of the face
             const Convex::Near last = convex_.nearest(start - step / steepness * uphill, step);
             end = last.core + last.radius * near.normal;
             isWithinFace = glm::dot(last.normal, near.normal) > straight;
@@ -248,7 +252,7 @@ class Touching {
             [&, to = intoField(end)](float part) { return glm::mix(place, to, part); }, {0, 0}, true, 0, std::nullopt};
         auto found = local_.deepestBetween(way, 0, here, 1, local_.at(intoField(end)), margin_);
         if (!found || found->distance < least) return std::nullopt;
-        // within a face it is the face's normal that counts, on its border the field's
+        // within a face the face's normal counts, on its border the field's
         const Contact border = local_.contact(intoField(end), -(toField_ * near.normal), 0, 0);
         const glm::vec3 onFace = found->position + found->distance * found->normal;
         if (isWithinFace && glm::distance(onFace, border.position) > 2 * searchTolerance * voxel_)
@@ -261,7 +265,7 @@ class Touching {
     float margin_;
     bool measured_;
     float scale_, voxel_;
-    float edgeReach_ = margin_;  ///< within which points of sharp edges are looked at
+    float edgeReach_ = margin_;  ///< maximum distance of sharp edges' points that are considered
     glm::mat3 toField_, toConvex_;
     glm::vec3 origin_;
 };

@@ -26,27 +26,29 @@ using namespace bilayer::detail;
 
 namespace {
 
-// Of what is found of a triangle: three edges, three corners, and from here on what lies over it.
+// Feature numbers of a triangle: three edges, three vertices, and from here on surface points over its face.
 constexpr std::uint32_t overPoints = 6;
-// A point lies over a face if it is no farther beyond its sides than this [probe spacings]: rounding.
+// A point is over a face if it is no farther beyond its edges than this [probe spacings]: rounding.
 constexpr float onFace = 1e-4f;
-// Triangles whose conormals enclose more than 179.9 degrees (cosine) have no edge between them.
+// Triangles whose conormals enclose more than 179.9 degrees (cosine) are coplanar, without an edge between them.
 constexpr float flatEdge = -0.9999985f;
-// A corner or an edge of the triangles touches what looks at it along one of its own normals, to within this cosine.
+// A vertex or an edge of the triangles touches points whose normals oppose one of its own normals to within this
+// cosine.
 constexpr float minNormalCosine = 0.9f;
-// So does a face what looks against it to within 5 degrees (cosine and sine).
+// A face touches points whose normals oppose its own to within 5 degrees (cosine and sine).
 constexpr float straight = 0.9962f, maxLean = 0.0872f;
-// Small triangles whose planes enclose less than 108 degrees have no crease that a tip could lie below (tangent).
+// Small triangles whose planes enclose less than 108 degrees have no crease that a convex vertex could be below
+// (tangent).
 constexpr float steepestCrease = 3;
-// What a face's place sees of a body nearer than this touches the face [voxels]: beside an edge or a corner, normals
-// are mixed there.
+// A body closer than this to a point of the face touches the face [voxels]: next to an edge or a vertex, normals are
+// mixed.
 constexpr float touchingFoot = 0.05f;
-// What looks at a face by less (cosine) does not tell on which side of it its body is.
+// Below this cosine to the face, a normal does not indicate the side of the face that its body is on.
 constexpr float minFacing = 0.1f;
-// A side that looks the other way by this (cosine) is the far one of what is thin.
+// A surface with an opposite normal by this cosine is the far side of a thin body.
 constexpr float farSide = -0.8f;
 
-/// Triangles as Bullet hands them over: what they share is asked about once.
+/// Collects the triangles that Bullet passes, and tests shared features once.
 class TriangleProbes : public btTriangleCallback {
   public:
     TriangleProbes(const btTransform& transform, const Motion& motion, const Placed& field, float margin, bool measured,
@@ -61,11 +63,11 @@ class TriangleProbes : public btTriangleCallback {
           report_(report),
           contacts_(contacts) {}
 
-    /// Triangles farther than this from the field's box are of no interest [m].
+    /// Maximum distance of relevant triangles from the field's box [m].
     float room() const { return margin_ + local_.longestWay(); }
 
     void processTriangle(btVector3* triangle, int part, int index) override {
-        // The two triangles of a height field's cell come one after the other, and bear the same numbers.
+        // The two triangles of a height field's cell arrive in succession with the same numbers.
         const bool isSecond = part == part_ && index == index_;
         part_ = isSecond ? -1 : part;
         index_ = index;
@@ -79,7 +81,7 @@ class TriangleProbes : public btTriangleCallback {
         ids_.push_back(mixed(mixed(mixed(std::uint64_t(part)) ^ std::uint64_t(index)) ^ std::uint64_t(isSecond)));
     }
 
-    /// Asks about all triangles that were handed over.
+    /// Tests all collected triangles.
     void probe() {
         adjacency_.emplace(triangles_);
         for (std::uint32_t f = 0; f < triangles_.size(); ++f) visit(f);
@@ -93,7 +95,7 @@ class TriangleProbes : public btTriangleCallback {
         glm::vec3 place;
         std::uint32_t index;
     };
-    /// What a surface point of the field finds on a triangle.
+    /// The contact of a surface point of the field with a triangle.
     struct OverFace {
         std::uint32_t point;
         std::uint64_t face;  ///< its id
@@ -112,7 +114,7 @@ class TriangleProbes : public btTriangleCallback {
             flat[i] = conormals[i] && glm::dot((*conormals[i])[0], (*conormals[i])[1]) <= flatEdge;
             longest = std::max(longest, glm::distance(corners[i], corners[(i + 1) % 3]));
         }
-        // Within a plane of large triangles the field's own points tell more.
+        // Inside a plane of large triangles the field's own points are more accurate.
         const bool isLarge = longest > spacing_;
         for (int i = 0; i < 3; ++i) {
             if (!isLarge || !flat[i] || !flat[(i + 2) % 3]) visitCorner(f, i, answers[i]);
@@ -147,9 +149,9 @@ class TriangleProbes : public btTriangleCallback {
         if (const auto contact = withNormal(*found, normalOf)) contacts_.push_back(*contact);
     }
 
-    /// The contact of an edge or a corner along the nearest normal that this has; nothing where it is far from the
-    /// field's: then something else of the triangles is nearer to the field's surface there.
-    /// @param normalOf  of a direction towards the field, in its axes
+    /// The contact of an edge or a vertex with its own normal that is nearest to the field's. Nothing if it is far from
+    /// the field's normal: another feature of the triangles is then nearer to the field's surface there.
+    /// @param normalOf  callback for a direction towards the field, in its axes
     template <class NormalOf>
     std::optional<Contact> withNormal(Contact contact, NormalOf&& normalOf) const {
         const glm::vec3 towards = -(glm::conjugate(field_.pose.rotation) * contact.normal);
@@ -160,14 +162,14 @@ class TriangleProbes : public btTriangleCallback {
         return contact;
     }
 
-    /// Gives a contact of a place of the triangles another normal, in the field's axes.
+    /// Replaces the normal of a contact at a point of the triangles, in the field's axes.
     void turn(Contact& contact, const glm::vec3& normal) const {
         const glm::vec3 place = contact.position + contact.distance * contact.normal;
         contact.normal = field_.pose.rotation * normal;
         contact.position = place - contact.distance * contact.normal;
     }
 
-    /// Scatters numbers over all bits (S. Vigna's SplitMix64).
+    /// Hashes a number over all bits (S. Vigna's SplitMix64).
     static std::uint64_t mixed(std::uint64_t bits) {
         bits += 0x9e3779b97f4a7c15u;
         bits = (bits ^ bits >> 30) * 0xbf58476d1ce4e5b9u;
@@ -175,24 +177,28 @@ class TriangleProbes : public btTriangleCallback {
         return bits ^ bits >> 31;
     }
 
-    /// The first of an edge's, a corner's, or a face's above a surface point: the same from step to step, and no
-    /// other's but for a chance of one in 2^31.
+    /// The first feature number of an edge, a vertex, or a face over a surface point. It is the same from step to step,
+    /// and unique up to a collision probability of 2^-31.
     static std::uint32_t featureOf(std::uint64_t triangle, std::uint32_t part) {
         constexpr std::uint32_t count = featureOfB - (2u << partBits);
         return std::uint32_t(mixed(triangle ^ part) % count);
     }
 
-    /// Whether a surface point is as far from a face as its height tells. One whose surface lies on the face is, and so
-    /// is a corner that points to it, or an edge along it. One aslant may have passed an edge of what the sheet belongs
-    /// to; and to the foot of one that looks away from a sheet that has not reached it, on the far side of what is
-    /// thin, the near side is nearer. So are the sides of a tip that has sunk in.
-    /// @param normal  of the face, on the side that the point looks at
+    /// Whether the height of a surface point over a face is its exact distance. It is for a point whose surface is
+    /// parallel to the face, for a vertex that points to the face, and for an edge along it.
+    ///
+    /// It may be wrong in these cases:
+    /// - An oblique point may have passed an edge of the open surface.
+    /// - A point on the far side of a thin body may point away from triangles that have not reached it: the near side
+    ///   is then nearer to its foot.
+    /// - The sides of a penetrating convex vertex are nearer in the same way.
+    /// @param normal  of the face, on the side that the point faces
     /// @param height  over the point
-    /// @param foot    what is nearest to the foot
+    /// @param foot    the field's answer at the foot
     bool isExact(std::uint32_t index, const glm::vec3& normal, float height, const LocalField::Answer& foot) const {
         const Collider& collider = field_.collider;
         const SurfacePoint& point = collider.data().points().points()[index];
-        // where the foot lies in the middle of its body, that side counts which a point of a face looks to
+        // where the foot is in the middle of its body, the side counts that a point of a face points to
         const bool isUnclear = foot.where == LocalField::Answer::unclear && !point.isSharp;
         const float facing = glm::dot(foot.normal, normal), least = point.isSharp ? minFacing : 0;
         const bool isNearSide = height >= 0 || isUnclear || (foot.where == LocalField::Answer::near && facing >= least);
@@ -204,9 +210,9 @@ class TriangleProbes : public btTriangleCallback {
         return isNearest || hasSunk(point, normal, height, wayThrough(point, normal, height));
     }
 
-    /// Whether the field's surface, seen along one normal from a place, turns to another one within the distance of its
-    /// points, now or while its body turns in the step. Where it does not, it goes on deeper, and touches elsewhere:
-    /// where it turns, or where the face ends.
+    /// Whether the field's surface, seen along one normal from a point, bends to another normal within the spacing of
+    /// its points, at present or during the rotation in the step. If not, it continues deeper, and touches elsewhere:
+    /// at the bend, or at the border of the face.
     bool turnsTo(const glm::vec3& place, const glm::vec3& seen, const glm::vec3& normal) const {
         const glm::vec3 turn = local_.relativeMotion().rotation();
         const auto isMet = [&](float part) {
@@ -229,14 +235,15 @@ class TriangleProbes : public btTriangleCallback {
                collider.data().edges().isConvexVertex(collider.data().points(), index, normal);
     }
 
-    /// From a tip back along its axis to the plane of a face that it is below.
+    /// The distance from a convex vertex back along its axis to the plane of a face that it is below.
     static float wayThrough(const SurfacePoint& tip, const glm::vec3& normal, float height) {
         return -height / std::max(glm::dot(normal, tip.normal), minFacing);
     }
 
-    /// Whether a tip under a face has gone through it: its body goes on behind the face, and if the tip is deeper than
-    /// a voxel, no far side of the body is near, its axis meets the triangles, and no other one is nearer to it.
-    /// @param way  along its axis to the triangles
+    /// Whether a convex vertex under a face has penetrated it: its body continues behind the face. If the vertex is
+    /// deeper than a voxel, also no far side of the body is near, its axis meets the triangles, and no other triangle
+    /// is nearer to it.
+    /// @param way  distance along its axis to the triangles
     bool hasSunk(const SurfacePoint& tip, const glm::vec3& normal, float height, float way) const {
         const glm::vec3 place = field_.scale * tip.position, through = place - way * tip.normal;
         const auto goesOn = [&](float parts) {
@@ -248,7 +255,7 @@ class TriangleProbes : public btTriangleCallback {
                distanceFrom(place) > (onFace - 1) * height;
     }
 
-    /// How far a place is from the triangles.
+    /// The distance of a point from the triangles.
     float distanceFrom(const glm::vec3& place) const {
         float least = std::numeric_limits<float>::max();
         for (const Triangle& corners : triangles_) {
@@ -258,7 +265,8 @@ class TriangleProbes : public btTriangleCallback {
         return least;
     }
 
-    /// A point over several faces, as in a valley, has a contact with each of them, and a feature for each.
+    /// Keeps the contacts over faces. A point over several faces, as in a valley, has a contact and a feature for each
+    /// of them.
     void keepOverFaces() {
         const auto isEarlier = [](const OverFace& a, const OverFace& b) { return a.point < b.point; };
         std::stable_sort(overFaces_.begin(), overFaces_.end(), isEarlier);
@@ -273,20 +281,21 @@ class TriangleProbes : public btTriangleCallback {
         }
     }
 
-    /// The plane of a triangle and its borders.
+    /// The plane of a triangle and its edges.
     struct Plane {
         Triangle corners;
         std::array<glm::vec3, 3> outwards;
-        std::array<std::optional<glm::vec3>, 3> neighbours;  ///< from a side outward of the triangle beyond it
+        /// at an edge: into the neighbouring triangle, outward of this one
+        std::array<std::optional<glm::vec3>, 3> neighbours;
         glm::vec3 up;
 
-        /// Whether a place is farther than this beyond the sides.
+        /// Whether a point is farther than this beyond the edges.
         bool isBeside(const glm::vec3& place, float by) const {
             for (int i = 0; i < 3; ++i)
                 if (glm::dot(outwards[i], place - corners[i]) > by) return true;
             return false;
         }
-        /// The same, but what is below a crease, over neither of the two triangles, has passed them both.
+        /// The same, but not for a point below a crease and over neither triangle: it has passed both.
         bool isBesideAll(const glm::vec3& place, float by) const {
             for (int i = 0; i < 3; ++i) {
                 const glm::vec3 way = place - corners[i];
@@ -294,17 +303,17 @@ class TriangleProbes : public btTriangleCallback {
             }
             return false;
         }
-        /// Whether that is so beyond a side.
+        /// Whether a point is below the crease at an edge.
         bool isBelow(int i, const glm::vec3& way, float by) const {
             const float rise = -glm::dot(*neighbours[i], up);
             return glm::dot(*neighbours[i], way) > -by && std::copysign(1.f, rise) * glm::dot(up, way) < by;
         }
-        /// On the side that a surface point looks at.
+        /// The normal on the side that a surface point faces.
         glm::vec3 normalFacing(const SurfacePoint& point) const { return glm::dot(up, point.normal) < 0 ? -up : up; }
         float heightOf(const glm::vec3& place) const { return std::abs(glm::dot(up, place - corners[0])); }
     };
 
-    /// Nothing for a triangle without area.
+    /// The plane of a triangle; nothing for one without area.
     std::optional<Plane> planeOf(std::uint32_t f) const {
         const Triangle& corners = triangles_[f];
         const glm::vec3 square = glm::cross(corners[1] - corners[0], corners[2] - corners[0]);
@@ -323,8 +332,8 @@ class TriangleProbes : public btTriangleCallback {
         }
     }
 
-    /// Asks the field at the feet of its own surface points on the triangle: a bump finds a large face. Points that are
-    /// not over the face are its edges' and its neighbours'.
+    /// Tests the field at the feet of its own surface points on the triangle, which finds bumps over a large face.
+    /// Points that are not over the face belong to its edges and neighbours.
     void visitFace(std::uint32_t f) {
         std::optional<Plane> plane = planeOf(f);
         if (!plane) return;
@@ -342,7 +351,8 @@ class TriangleProbes : public btTriangleCallback {
         });
     }
 
-    /// Of small triangles the corners and edges tell enough, but of a tip between them.
+    /// Tests small triangles. Their vertices and edges are enough, except for a convex vertex of the field between
+    /// them.
     void visitSmallFaces() {
         if (small_.empty()) return;
         const std::vector<Sharp> sharp = sharpNear();
@@ -376,7 +386,7 @@ class TriangleProbes : public btTriangleCallback {
             overFaces_.push_back({sharp.index, ids_[f], *found});
     }
 
-    /// The sharp corners and tips of the field that are near small triangles, by x.
+    /// The field's sharp vertices near small triangles, sorted by x.
     std::vector<Sharp> sharpNear() const {
         glm::vec3 lower = triangles_[small_.front()][0], upper = lower;
         for (const std::uint32_t f : small_) {
@@ -398,8 +408,9 @@ class TriangleProbes : public btTriangleCallback {
         return sharp;
     }
 
-    /// The contact of a surface point with the face under it. A foot that others are much nearer to is theirs.
-    /// @param asksFoot  whether the field is asked at the foot where the height does not tell
+    /// The contact of a surface point with the face under it. A foot that is much nearer to other triangles belongs to
+    /// them.
+    /// @param asksFoot  whether to test the field at the foot where the height is not exact
     std::optional<Contact> overFace(const Plane& plane, bool asksFoot, std::uint32_t index, const SurfacePoint& point) {
         const glm::vec3 place = field_.scale * point.position;
         const glm::vec3 foot = nearestOnTriangle(place, plane.corners[0], plane.corners[1], plane.corners[2]);
@@ -415,8 +426,8 @@ class TriangleProbes : public btTriangleCallback {
         return atFoot(foot, normal, there);
     }
 
-    /// Of a tip that has gone through a sheet beside a crease, where it is over neither triangle: it has come from
-    /// above both.
+    /// The contact of a convex vertex that has penetrated an open surface next to a crease and is over neither
+    /// triangle: it has come from above both.
     std::optional<Contact> belowCrease(const Plane& plane, std::uint32_t index, const glm::vec3& normal, float height) {
         const SurfacePoint& point = field_.collider.data().points().points()[index];
         if (height >= 0 || !isConvexVertex(index, normal)) return std::nullopt;
@@ -446,8 +457,8 @@ class TriangleProbes : public btTriangleCallback {
         return found;
     }
 
-    /// As the field sees the face. What its middle sees aslant is beside it, but where it touches: there an edge or a
-    /// corner has no direction of its own.
+    /// The contact of the face as the field's answer at the foot gives it. An oblique normal there means that the body
+    /// is next to the face. The exception is a touching foot: there an edge or a vertex has no direction of its own.
     std::optional<Contact> atFoot(const glm::vec3& foot, const glm::vec3& normal, const LocalField::Answer& there) {
         std::optional<Contact> found = local_.probe(foot, there, 0, 0, margin_, report_);
         if (!found) return std::nullopt;
@@ -471,11 +482,11 @@ class TriangleProbes : public btTriangleCallback {
     ContactReport& report_;
     std::vector<Contact>& contacts_;
     std::vector<Triangle> triangles_;
-    std::vector<std::uint64_t> ids_;  ///< of Bullet's numbers
+    std::vector<std::uint64_t> ids_;  ///< hashes of Bullet's numbers
     std::optional<Adjacency> adjacency_;
-    std::vector<std::uint32_t> small_;  ///< of the triangles
+    std::vector<std::uint32_t> small_;  ///< indices of small triangles
     std::vector<OverFace> overFaces_;
-    int part_ = -1, index_ = -1;  ///< of the last triangle that was handed over
+    int part_ = -1, index_ = -1;  ///< of the last triangle
 };
 
 }  // namespace

@@ -19,16 +19,16 @@ using namespace bilayer::detail;
 
 namespace {
 
-// Of the directions from a side or a corner into its triangles the mean is no shorter where these are folded by more
-// than 30 degrees (a side's), or leave as sharp a corner.
+// Minimum mean of the directions from an edge or a vertex into its triangles. The mean is at least this where an edge
+// is folded by more than 30 degrees, or a vertex is as sharp.
 constexpr float minMean = 0.26f;
-// A normal may leave its cone by this (sine). What has not reached the cone after so many projections, or is farther
-// from the direction than 60 degrees (cosine), is none.
+// A normal may leave its cone by this tolerance (sine). There is none if the cone is not reached after so many
+// projections, or the result is more than 60 degrees from the direction (cosine).
 constexpr float coneTolerance = 1e-3f, minConeCosine = 0.5f;
 constexpr int maxProjections = 20;
-constexpr int maxPieces = 64;  // that a way is divided into
+constexpr int maxPieces = 64;  // maximum number of parts of a path
 
-/// The ends of a side in one order.
+/// The end points of an edge in a unique order.
 using SideKey = std::array<float, 6>;
 SideKey keyOf(const Triangle& triangle, int side) {
     const glm::vec3 &a = triangle[side], &b = triangle[(side + 1) % 3];
@@ -41,18 +41,18 @@ glm::vec3 normalized(const glm::vec3& way) {
     return length > 0 ? way / length : glm::vec3(0);
 }
 
-/// The steepest of the ways along triangles away from one place of theirs, as seen along a direction.
+/// The steepest direction along triangles away from one point of theirs, relative to a given direction.
 class Ascent {
   public:
     explicit Ascent(const glm::vec3& direction) : direction_(direction) {}
 
-    /// @param way  of unit length
+    /// @param way  direction, of unit length
     void along(const glm::vec3& way) {
         if (const float rise = glm::dot(way, direction_); rise > rise_) rise_ = rise, part_ = rise * way;
     }
-    /// All ways into a triangle from its corner.
+    /// Considers all directions from a vertex into its triangle.
     /// @param one, other  along its two edges there, of unit length
-    /// @param wing        square to the first edge, into the triangle
+    /// @param wing        conormal of the first edge
     void between(const glm::vec3& one, const glm::vec3& other, const glm::vec3& wing) {
         along(one);
         along(other);
@@ -63,16 +63,17 @@ class Ascent {
     }
 
     float rise() const { return rise_; }             ///< sine
-    const glm::vec3& part() const { return part_; }  ///< of the direction, along the steepest way
+    const glm::vec3& part() const { return part_; }  ///< component of the direction along the steepest direction
 
   private:
     glm::vec3 direction_, part_{0};
     float rise_ = 0;
 };
 
-/// The unit vector nearest to a direction from which no way along triangles rises: its steepest part is taken away
-/// until none is left (projections onto half-spaces in turns: L. M. Bregman, Dokl. Akad. Nauk SSSR 162 (1965) 487-490).
-/// @param visit  hands the ways over to an Ascent
+/// The unit vector nearest to a direction from which no direction along the triangles rises. The steepest component is
+/// removed until none is left (alternating projections onto half-spaces: L. M. Bregman, Dokl. Akad. Nauk SSSR 162
+/// (1965) 487-490).
+/// @param visit  passes the directions to an Ascent
 template <class Visit>
 std::optional<glm::vec3> inNormalCone(const glm::vec3& direction, Visit&& visit) {
     glm::vec3 normal = direction;
@@ -86,7 +87,7 @@ std::optional<glm::vec3> inNormalCone(const glm::vec3& direction, Visit&& visit)
     return std::nullopt;
 }
 
-/// Away from all of these together, if they do not surround the place.
+/// The direction away from all of these together, unless they surround the point.
 class Away {
   public:
     void add(const glm::vec3& direction, float weight) {

@@ -1,5 +1,5 @@
-// Triangles as Bullet hands them over: sheets, each by itself, whose sides belong together where their ends are the
-// same; internal.
+// Open surfaces: the two-sided triangles that Bullet passes one at a time. Edges with equal end points are shared;
+// internal.
 #pragma once
 
 #include <BulletCollision/CollisionShapes/btConcaveShape.h>
@@ -19,38 +19,40 @@ using namespace bilayer::detail;
 
 using Triangle = std::array<glm::vec3, 3>;
 
-/// From one of its sides, from that corner to the next, into a triangle, of unit length; zero if it has no area.
+/// The conormal of an edge: in the triangle's plane, from edge `side` into the triangle, of unit length. The edge runs
+/// from that vertex to the next. Zero if the triangle has no area.
 glm::vec3 wingOf(const Triangle& triangle, int side);
 
-/// Which triangles share an edge or a corner: those that have it at the same coordinates, to the bit. Edge i of a
-/// triangle goes from its corner i to the next one.
+/// Adjacency of triangles by edge and vertex. Features are shared if their coordinates are equal to the bit. Edge i of
+/// a triangle runs from its vertex i to the next one.
 class Adjacency {
   public:
     struct Member {
         std::uint32_t triangle;
-        int index;  ///< of its edge or corner
+        int index;  ///< of its edge or vertex
     };
 
     /// @param triangles  must outlive this
     explicit Adjacency(std::span<const Triangle> triangles);
 
-    /// The triangles at an edge, that one included, in ascending order.
+    /// The triangles at an edge, including this one, in ascending order.
     std::span<const Member> atEdge(std::uint32_t triangle, int edge) const { return groupOf(edges_, triangle, edge); }
     /// The conormals of an edge that exactly two triangles share.
     std::optional<Conormals> wingsOf(std::uint32_t triangle, int edge) const;
-    /// That of the other one of the two.
+    /// The other triangle's conormal.
     std::optional<glm::vec3> neighbourOf(std::uint32_t triangle, int edge) const;
 
-    /// The unit vector nearest to a direction in the normal cone of an edge or a corner: the directions in which it is
-    /// the closest point of its triangles. Nothing where none is within 60 degrees.
+    /// The unit vector nearest to a direction in the normal cone of an edge or vertex. The normal cone holds the
+    /// directions in which the feature is the closest point of its triangles. Nothing if the nearest one is more than
+    /// 60 degrees away.
     std::optional<glm::vec3> edgeNormal(std::uint32_t triangle, int edge, const glm::vec3& direction) const;
     std::optional<glm::vec3> cornerNormal(std::uint32_t triangle, int corner, const glm::vec3& direction) const;
 
   private:
-    /// Edges or corners, those at the same coordinates one after the other.
+    /// Edges or vertices, grouped by equal coordinates.
     struct Groups {
         std::vector<Member> members;
-        std::vector<std::uint32_t> first, end;  ///< of the group of each triangle's edges or corners
+        std::vector<std::uint32_t> first, end;  ///< range of the group of each triangle's edges or vertices
     };
     std::span<const Member> groupOf(const Groups& groups, std::uint32_t triangle, int index) const {
         const std::size_t at = 3 * std::size_t(triangle) + std::size_t(index);
@@ -63,11 +65,11 @@ class Adjacency {
     Groups edges_, corners_;
 };
 
-/// What is sharp of a sheet: its border, and where it is folded by more than 30 degrees.
+/// The sharp features of an open surface: its border, and folds of more than 30 degrees.
 struct SharpTriangles {
     struct Side {
         glm::vec3 from, to;
-        glm::vec3 outward;  ///< away from the sheet, of unit length
+        glm::vec3 outward;  ///< away from the surface, of unit length
     };
     struct Corner {
         glm::vec3 place, outward;
@@ -77,7 +79,7 @@ struct SharpTriangles {
 };
 SharpTriangles sharpOf(std::span<const Triangle> triangles);
 
-/// The triangles of a mesh or a height field that a ball may touch on a way from place to place, each once.
+/// The triangles of a mesh or a height field that a sphere may touch along a polyline, each once.
 std::vector<Triangle> trianglesAlong(const btConcaveShape& mesh, std::span<const glm::vec3> way, float radius);
 
 }  // namespace bilayer::bullet::detail

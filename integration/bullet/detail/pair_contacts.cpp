@@ -18,14 +18,14 @@ using namespace bilayer::detail;
 
 namespace {
 
-// Triangles whose distances from a contact differ by less are as near to it [voxels].
+// Tolerance of equal distances of triangles from a contact [voxels].
 constexpr float sameDistance = 1e-3f;
 
 bool hasTriangles(const btCollisionShape& shape) {
     return shape.isConcave() && !isField(shape) && shape.getShapeType() != STATIC_PLANE_PROXYTYPE;
 }
 
-/// Of two bodies of which B is a field, until the next step.
+/// The parameters for two bodies until the next step; B is a field.
 Continuity continuityOf(const Side& a, const Side& b) {
     const auto restingFriction = [](const btCollisionShape& shape) {
         return isField(shape) ? static_cast<const Shape&>(shape).restingFriction() : 1;
@@ -78,7 +78,7 @@ void Pair::test(const Side& a, const Side& b, float asked) {
     const float voxel = static_cast<const Shape&>(*b.shape).voxelSize();
     float margin = std::max(marginOf(a, b), std::min(asked, voxel));
     const float most = std::max(margin, asked);
-    // a place between surface points is found by those around it, which are farther away
+    // a point between surface points is found by those around it, which are farther away
     const float between = probeSpacing * voxel;
     find(a, b, margin, true);
     while (contacts_.empty() && margin < most + between)

@@ -1,4 +1,4 @@
-// Two bodies one of which is a field, from their shapes to their contacts in Bullet.
+// A pair of bodies, one of them a field: from their shapes to contacts in Bullet.
 #pragma once
 
 #include <BulletCollision/CollisionDispatch/btCollisionObjectWrapper.h>
@@ -22,30 +22,30 @@ inline bool isField(const btCollisionShape& shape) {
     return shape.getShapeType() == FAST_CONCAVE_MESH_PROXYTYPE;
 }
 
-/// A shape where it stands in the world, and how it moves; for the child of a compound, the child's own.
+/// A shape with its world transform and its motion. For a child of a compound, the transform is the child's own.
 struct Side {
     const btCollisionShape* shape;
     btTransform transform;
     const btCollisionObject* object;
-    float seconds;  ///< until the next step; 0: contacts are asked for as things are
+    float seconds;  ///< until the next step; 0: contacts are for the current poses only
 
     Side(const btCollisionObjectWrapper& wrap, float seconds)
         : Side(*wrap.getCollisionShape(), wrap.getWorldTransform(), *wrap.getCollisionObject(), seconds) {}
     Side(const btCollisionShape& shape, const btTransform& transform, const btCollisionObject& object, float seconds)
         : shape(&shape), transform(transform), object(&object), seconds(seconds) {}
 
-    /// Of its origin, the forces on the body included.
+    /// Motion of its origin, including the forces on the body.
     Motion motion() const { return motionAt(transform.getOrigin()); }
     Motion motionAt(const btVector3& point) const;
-    /// Of a field's.
+    /// For a field.
     Placed placed() const;
 };
 
-/// Up to where contacts are made with B, a field [m].
+/// Maximum separation of contacts with the field B [m].
 float marginOf(const Side& a, const Side& b);
 
-/// Two overlapping bodies of which B is a field. Collides them without a call that changes anything in Bullet, so that
-/// many pairs can do it at once, and hands the contacts over later.
+/// Two overlapping bodies A and B; B is a field. Colliding them changes nothing in Bullet, so many pairs can be
+/// collided in parallel. The contacts are handed over later.
 class Pair {
   public:
     Pair(btDispatcher& dispatcher, DispatchStatistics& statistics) : manifolds_(dispatcher), statistics_(statistics) {}
@@ -53,19 +53,19 @@ class Pair {
     /// In a step: finds and reduces contacts up to the shapes' margins.
     void collide(const Side& a, const Side& b);
 
-    /// The same for two fields whose points have been sampled, as pair number `index`.
+    /// The same for two fields whose points have been sampled as pair number `index`.
     void collide(const Side& a, const Side& b, const SampledPairs& sampled, std::size_t index);
 
-    /// In a contact test: up to the margins; where there are none, up to twice as far in turns, and then once more, as
-    /// far as it takes to be sure of the nearest.
+    /// In a contact test: finds contacts up to the margins. If there are none, it doubles the distance until there are,
+    /// and repeats the search once more as far as needed to guarantee the nearest one.
     /// @param asked  contacts up to this distance, or the margin if that is larger [m]
     void test(const Side& a, const Side& b, float asked);
 
-    /// Writes what was found into the manifolds; once.
-    /// @param seconds  that the step takes; 0 between steps
+    /// Writes the contacts into the manifolds, once.
+    /// @param seconds  duration of the step [s]; 0 between steps
     void commit(const btCollisionObject& a, const btCollisionObject& b, float seconds, btManifoldResult& result);
 
-    bool isReady() const { return isReady_; }  ///< to be committed
+    bool isReady() const { return isReady_; }  ///< contacts are ready for commit()
     void forget() { isReady_ = false; }
     const Manifolds& manifolds() const { return manifolds_; }
 
@@ -83,7 +83,7 @@ class Pair {
     std::vector<Contact> contacts_;
     Choice choice_;
     Continuity continuity_;
-    std::vector<ContactDetails> details_;  ///< one for each contact that is kept
+    std::vector<ContactDetails> details_;  ///< one for each kept contact
     ContactReport report_;
     int found_ = 0, sampled_ = 0;
     bool isReady_ = false;

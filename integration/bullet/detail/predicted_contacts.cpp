@@ -16,19 +16,20 @@ using namespace bilayer::detail;
 
 namespace {
 
-// What goes no farther than this by its body's turn is left where it is [parts of the distance within which contacts
-// are the same].
+// Points that rotation moves by less than this are not predicted [fractions of Continuity::sameWithin].
 constexpr float hardlyTurned = 0.05f;
-// Bodies are looked at after a turn of this at most [rad]. Where they are not swept, the points that take over are
-// known only up to a margin: a turn then takes none off the surface by more than this [parts of that distance].
+// Maximum rotation of a prediction [rad]. Without speculative contacts, the points that take over are known only up to
+// a margin. A rotation then lifts no point off the surface by more than the second value [fractions of
+// Continuity::sameWithin].
 constexpr float maxRotation = 0.5f, turnsOff = 0.25f;
-// It is met a bit too early: else the points around the lowest one of a wheel get in by what a step is off, and throw
-// it up when they touch [parts of the bend of their ways], at most [parts of that distance].
+// Predicted contacts touch slightly too early. Otherwise the points around the lowest one of a wheel penetrate by the
+// error of a step, and throw it up when they touch. The first value is a fraction of the curvature of their paths, the
+// second its limit [fractions of Continuity::sameWithin].
 constexpr float earlier = 0.1f, maxEarly = 0.05f;
-// Where a field looks another way than a contact by more than this cosine tells, it says nothing about it: that is one
-// of an edge.
+// Minimum cosine between the field's and the contact's normals. Below it, the contact is that of an edge, and the field
+// gives no information about it.
 constexpr float sameNormal = 0.95f;
-// and where it looks another way there by more than this, that is another face.
+// Below this cosine, the field there belongs to another face.
 constexpr float likeNormal = 0.8f;
 
 btVector3 turned(const btVector3& arm, const btVector3& spin, float seconds) {
@@ -36,13 +37,13 @@ btVector3 turned(const btVector3& arm, const btVector3& spin, float seconds) {
     return speed * seconds != 0 ? arm.rotate(spin / speed, speed * seconds) : arm;
 }
 
-/// The surface of a body at a place near it.
+/// The surface of a body near a point.
 struct Surface {
     btVector3 normal;
     float distance;
 };
 
-/// That of a contact at some place, seen from another one nearby: by the field's samples, or as a plane.
+/// The surface of a contact at one point, evaluated at a nearby point: by the field's samples, or as a plane.
 std::optional<Surface> surfaceAt(const Side& side, const Surface& contact, const btVector3& place,
                                  const btVector3& nearby) {
     const Surface plane{contact.normal, contact.distance + contact.normal.dot(nearby - place)};
@@ -55,7 +56,7 @@ std::optional<Surface> surfaceAt(const Side& side, const Surface& contact, const
         if (!sample.inBand) return std::nullopt;
         return surfaceSampleAt(field, at, sample, body.collider.data().isExactAt(at));
     };
-    // as high as the contact, since deeper down thin walls have another side
+    // at the height of the contact, since thin walls have another side deeper down
     const float rise = contact.normal.dot(nearby - place);
     const auto here = touchAt(place), there = touchAt(nearby - rise * contact.normal);
     if (!here || !there) return std::nullopt;
@@ -72,21 +73,21 @@ std::optional<Surface> surfaceAt(const Side& side, const Surface& contact, const
 PredictedContacts::PredictedContacts(const Side& a, const Side& b, const Continuity& continuity)
     : a_{a, velocityOf(*a.object)}, b_{b, velocityOf(*b.object)}, continuity_(continuity) {}
 
-/// In which a body turns a place by no more than is known of what comes after.
+/// The time in which a body rotates a point no farther than the contacts are known.
 float PredictedContacts::maxSeconds(const Body& body, const btVector3& place) const {
     const float arm = (place - body.velocity.centre).length();
     const float most = continuity_.isSwept ? maxRotation : std::sqrt(2 * turnsOff * continuity_.sameWithin / arm);
-    return most / body.velocity.angular.length();  // infinite where nothing turns
+    return most / body.velocity.angular.length();  // infinite without rotation
 }
 
 std::optional<PredictedContact> PredictedContacts::ahead(const Contact& contact) const {
-    // what touches is where it is: put behind a wheel, it would push it on
+    // contacts that touch stay where they are: behind a wheel, they would push it on
     if (contact.turningRadius < 0 || contact.distance <= 0) return std::nullopt;
     const bool isOfB = contact.feature & featureOfB;
     const Body &own = isOfB ? b_ : a_, &other = isOfB ? a_ : b_;
     const Velocity &velocity = own.velocity, &its = other.velocity;
     const btVector3 fromB = toBullet(contact.normal), outward = isOfB ? -fromB : fromB;
-    // what turns is the middle of the ball that a corner is rounded by
+    // the centre of the sphere that a vertex is rounded by rotates
     const float radius = contact.turningRadius, height = contact.distance + radius;
     const btVector3 onB = toBullet(contact.position), middle = onB + (isOfB ? radius : height) * outward;
     const btVector3 arm = middle - velocity.centre, itsArm = middle - its.centre;
@@ -96,7 +97,7 @@ std::optional<PredictedContact> PredictedContacts::ahead(const Contact& contact)
                 itsWay = seconds * its.angular.cross(itsArm).length();
     if (!(std::max(way, itsWay) > hardlyTurned * continuity_.sameWithin)) return std::nullopt;
 
-    // From the other body's centre it goes along that one's surface; towards it, that is the solver's business.
+    // Seen from the other body's centre, it moves along that body's surface; the solver handles the motion towards it.
     const btVector3 armThen = turned(arm, velocity.angular, seconds), passing = velocity.linear - its.linear;
     const float leaving = outward.dot(passing);
     const btVector3 itsArmThen = itsArm + armThen - arm + seconds * (passing - leaving * outward);

@@ -1,4 +1,4 @@
-// Contacts of bodies that turn.
+// Predicted contacts of rotating bodies.
 #pragma once
 
 #include <bilayer/collider/contact.h>
@@ -12,17 +12,17 @@ namespace bilayer::bullet::detail {
 
 using namespace bilayer::detail;
 
-/// Bullet's solver takes a step's ways for straight and lets forces act where bodies are at its beginning. A wheel's
-/// points ahead of the lowest one, which come down in the step and would be in the ground if they went straight, then
-/// bear its weight and brake it: at 60 steps a second a ball of 0.1 m that rolls at 0.3 m/s loses half of its
-/// speed in a second. So the contact of a point that turns with its body is handed over as it is going to be at the
-/// step's end.
+/// Predicts contacts at the end of the step. Bullet's solver assumes straight paths in a step, and applies forces where
+/// the bodies are at its beginning. The points of a wheel ahead of the lowest one come down in the step, and would
+/// penetrate the ground on straight paths. They then bear the wheel's weight and brake it: at 60 steps a second, a
+/// sphere of 0.1 m that rolls at 0.3 m/s loses half of its speed in a second. So the contact of a point that rotates
+/// with its body is handed over as it will be at the end of the step.
 class PredictedContacts {
   public:
-    /// Of two bodies, which must outlive it.
+    /// The bodies must outlive this object.
     PredictedContacts(const Side& a, const Side& b, const Continuity& continuity);
 
-    /// Nothing where a contact touches already, or does not turn, or by next to nothing.
+    /// The predicted contact. Nothing if the contact touches already, or its rotation is negligible.
     std::optional<PredictedContact> ahead(const Contact& contact) const;
 
   private:

@@ -15,26 +15,26 @@ namespace bilayer::bullet::detail {
 
 namespace {
 
-// What is slower and gets no faster has not moved. Once it is held, it stays until it is faster than goesOn, or
-// something has pushed it: when its speed is another by so much and stays that for some steps, since what the solver
-// leaves over may jump as far from any step to the next [parts of the speed that gravity gives in a step].
+// Thresholds [fractions of the speed that gravity adds in a step]. A body slower than `still` that gets no faster has
+// not moved. A held body stays until it is faster than `goesOn`, or until something has pushed it: its velocity has
+// changed by `pushed` for `pushLasts` steps, since the solver's residual may jump as far from any step to the next.
 constexpr float still = 0.05f, goesOn = 0.15f, pushed = 0.05f;
 constexpr int pushLasts = 4;
-// Places in single precision are rounded by no more than this part of their size, turns by so much [rad], and forces by
-// this part of the weight.
+// Rounding limit, relative: of positions in single precision to their size, of rotations [rad], and of forces to the
+// weight.
 constexpr float rounding = 4 * std::numeric_limits<float>::epsilon();
 
 bool isDynamic(const btCollisionObject& object) {
     return btRigidBody::upcast(&object) && !object.isStaticOrKinematicObject();
 }
 
-// By a force other than its weight.
+// Whether a force other than its weight acts.
 bool isForced(const btRigidBody& body) {
     const btVector3 weight = body.getGravity() / body.getInvMass() * body.getLinearFactor();
     return body.getTotalForce().distance(weight) > rounding * weight.length() || !body.getTotalTorque().isZero();
 }
 
-// Bullet gives no weight to what it wakes within a step.
+// Bullet applies no gravity to bodies that it wakes within a step.
 bool isWithoutForce(const btRigidBody& body) {
     return body.getTotalForce().isZero() && body.getTotalTorque().isZero();
 }
@@ -54,18 +54,18 @@ Velocities velocitiesOf(const btRigidBody& body) {
     return {body.getLinearVelocity(), body.getAngularVelocity()};
 }
 
-// Of a body's farthest point, in parts of the speed that gravity gives in a step.
+// Speed of a body's farthest point, in fractions of the speed that gravity adds in a step.
 float speedOf(const btRigidBody& body, const Velocities& velocities, float seconds) {
     const float speed = velocities.linear.length() + radiusOf(body) * velocities.angular.length();
     return speed / (seconds * body.getGravity().length());
 }
 
-// How far a body's motion is from what it was, likewise.
+// Change of a body's velocity, in the same unit.
 float changeOf(const btRigidBody& body, const Velocities& before, float seconds) {
     return speedOf(body, velocitiesOf(body) - before, seconds);
 }
 
-// Whether a body has come from a place by its speed alone: neither the user has put it where it is, nor has the solver.
+// Whether a body has come from a pose by its velocity alone, and was not moved by the user or the solver.
 bool comesFrom(const btTransform& place, const btRigidBody& body, float seconds) {
     btTransform expected;
     btTransformUtil::integrateTransform(place, body.getLinearVelocity(), body.getAngularVelocity(), seconds, expected);
@@ -91,8 +91,8 @@ bool RestStabilisation::stays(Place& place, const btRigidBody& body, float secon
     return isCalm || hasGrown || (speed < goesOn && place.pushes < pushLasts);
 }
 
-/// Leaves a body where it was. What goes on does so with the speed that it came with, or what swings would get energy
-/// each time it turns.
+/// Holds a body at its pose. A released body gets the velocity that it had at first; otherwise an oscillating body
+/// would gain energy at each reversal.
 void RestStabilisation::hold(Place& place, btRigidBody& body, float seconds) {
     const Velocities velocities = velocitiesOf(body);
     const float speed = speedOf(body, velocities, seconds);
@@ -109,7 +109,7 @@ void RestStabilisation::hold(Place& place, btRigidBody& body, float seconds) {
     body.setCenterOfMassTransform(place.transform);
 }
 
-/// Whether an object moves by another reason than its weight, however slowly.
+/// Whether anything but its weight moves an object, at any speed.
 bool RestStabilisation::isDriven(const Place& place, const btCollisionObject& object) {
     const bool moves = place.object == &object && !(place.transform == object.getWorldTransform());
     if (!isDynamic(object)) return moves;
@@ -118,7 +118,7 @@ bool RestStabilisation::isDriven(const Place& place, const btCollisionObject& ob
     return isForced(body) && !(place.sleeps && isWithoutForce(body));
 }
 
-/// What is driven, and what it carries.
+/// The driven bodies, and the bodies that they carry.
 std::unordered_set<const btCollisionObject*> RestStabilisation::driven() const {
     std::unordered_set<const btCollisionObject*> driven;
     std::vector<const btCollisionObject*> open;
@@ -166,7 +166,7 @@ void RestStabilisation::afterStep(float seconds) {
             ++held_;
         } else {
             place = {.object = objects[i], .transform = objects[i]->getWorldTransform()};
-            // what wakes up is at rest until something pushes it
+            // a body that wakes up is at rest until something pushes it
             place.isHeld = body && !body->isActive();
             if (body) place.speed = speedOf(*body, velocitiesOf(*body), seconds);
         }

@@ -1,4 +1,4 @@
-// Bodies at rest that stay where they are.
+// Rest stabilisation: bodies at rest keep their positions.
 #pragma once
 
 #include <BulletDynamics/Dynamics/btDynamicsWorld.h>
@@ -8,12 +8,12 @@
 
 namespace bilayer::bullet::detail {
 
-/// Of a body.
+/// Velocities of a body.
 struct Velocities {
     btVector3 linear{0, 0, 0}, angular{0, 0, 0};  ///< [m/s], [rad/s]
 };
 
-/// Keeps bodies at rest where they are: ExtensionOptions::restStabilisation.
+/// Holds bodies at rest: ExtensionOptions::restStabilisation.
 class RestStabilisation {
   public:
     explicit RestStabilisation(btDynamicsWorld& world) : world_(world) {}
@@ -24,18 +24,18 @@ class RestStabilisation {
   private:
     std::unordered_set<const btCollisionObject*> driven() const;
 
-    /// Where an object was at the end of the last step, and how it went.
+    /// Pose and velocity of an object at the end of the last step.
     struct Place {
         const btCollisionObject* object = nullptr;
         btTransform transform = btTransform::getIdentity();
-        Velocities last{};  ///< of a body, in the last step
-        Velocities calm{};  ///< and before something pushed it, if it is held
-        int pushes = 0;     ///< steps since then
-        /// Of the farthest point, at that time; of what is held, when it came to be [parts of what gravity gives in a
-        /// step].
+        Velocities last{};  ///< of the body, in the last step
+        Velocities calm{};  ///< for a held body: before it was pushed
+        int pushes = 0;     ///< steps since the push began
+        /// Speed of the farthest point at that time; for a held body, when it was first held [fractions of the speed
+        /// that gravity adds in a step].
         float speed = 0;
         bool isHeld = false;
-        bool sleeps = false;  ///< or was woken since Bullet has given weight to bodies
+        bool sleeps = false;  ///< or was woken after Bullet applied gravity to the bodies
     };
     static bool isDriven(const Place& place, const btCollisionObject& object);
     static bool stays(Place& place, const btRigidBody& body, float seconds);

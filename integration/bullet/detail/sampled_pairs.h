@@ -1,4 +1,4 @@
-// The pairs of fields in a step whose points are sampled elsewhere, on an OpenCL device for example, all in one batch.
+// The pairs of fields of a step whose points a sampler samples in one batch, for example on an OpenCL device.
 #pragma once
 
 #include <cstddef>
@@ -27,13 +27,14 @@ class SampledPairs {
     /// Begins a step.
     void clear();
 
-    /// Takes a pair into the batch. Nothing for one that is to be collided without: whose motion is to be followed.
-    /// @return its number; the colliders must stay until the sample()
+    /// Adds a pair to the batch. Nothing for a pair that must be collided without the sampler, because it needs
+    /// speculative contacts.
+    /// @return its number; the colliders must outlive the call of sample()
     std::optional<std::size_t> add(const Placed& a, const Placed& b, float margin);
 
-    /// Samples all pairs of the batch. Where the sampler fails, that is told once on the standard error output, and it
-    /// is not asked again.
-    /// @return whether it has not
+    /// Samples all pairs of the batch. If the sampler fails, that is reported once on the standard error output, and
+    /// the sampler is not used again.
+    /// @return whether it succeeded
     bool sample();
 
     std::size_t size() const { return queries_.size() / 2; }
@@ -45,7 +46,7 @@ class SampledPairs {
 
     PointSampler sampler_;
     std::vector<SampledBody> bodies_;
-    std::map<std::uint64_t, std::uint32_t> places_;  // of bodies, by Collider::id()
+    std::map<std::uint64_t, std::uint32_t> places_;  // indices of bodies, by Collider::id()
     std::vector<PointQuery> queries_;                // two for each pair
     FoundPoints found_;
 };

@@ -16,8 +16,8 @@ using namespace bilayer::detail;
 
 namespace {
 
-constexpr float minStride = 0.05f;  // through samples [voxels]
-constexpr int maxStrides = 64;      // what takes more is looked at point by point
+constexpr float minStride = 0.05f;  // minimum stride through samples [voxels]
+constexpr int maxStrides = 64;      // longer paths are searched point by point
 constexpr float everywhere = std::numeric_limits<float>::max();
 
 }  // namespace
@@ -49,7 +49,7 @@ std::optional<glm::vec3> FieldSurface::wayOut(const glm::vec3& point, float radi
     return -sample.distance * normal;
 }
 
-// By strides through the samples; many times as quick as the search for the place of an entry.
+// Whether a path stays outside, by strides through the samples. Many times as fast as the search for the entry.
 bool FieldSurface::staysOut(const glm::vec3& from, const glm::vec3& to, float radius) const {
     const float length = glm::distance(from, to), voxel = field_.voxelSize();
     const float error = field_.mesh() ? maxInterpolationError * voxel : 0;

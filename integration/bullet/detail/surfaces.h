@@ -1,9 +1,9 @@
-// What points may not pass through, each in its own coordinates and units; internal. All have
+// The surfaces for continuous collision, each in its own coordinates and units; internal. All have
 //
-//   std::optional<Entry> entry(from, to, radius)      where a ball enters on a straight way; its start if it is inside
-//   std::optional<glm::vec3> wayOut(point, radius)    for a ball that is inside; none where that is not known
+//   std::optional<Entry> entry(from, to, radius)      where a sphere enters on a straight path; its start if inside
+//   std::optional<glm::vec3> wayOut(point, radius)    depenetration of a sphere that is inside; none if unknown
 //
-// and a bound() of the distance of their surface, or, of sheets, isNear().
+// and a bound() of the distance to their surface. Open surfaces have isNear() instead.
 #pragma once
 
 #include <BulletCollision/CollisionShapes/btConcaveShape.h>
@@ -19,16 +19,16 @@ namespace bilayer::bullet::detail {
 
 using namespace bilayer::detail;
 
-/// Where a way enters an obstacle.
+/// Where a path enters a surface.
 struct Entry {
-    glm::vec3 position, normal;  ///< outward, of unit length
+    glm::vec3 position, normal;  ///< the normal points outward and has unit length
 };
 
 class FieldSurface {
   public:
     explicit FieldSurface(const Field& field) : field_(field) {}
 
-    /// Not more than the distance of its surface.
+    /// A lower bound of the distance to the surface.
     float bound(const glm::vec3& point) const;
     std::optional<Entry> entry(const glm::vec3& from, const glm::vec3& to, float radius) const;
     std::optional<glm::vec3> wayOut(const glm::vec3& point, float radius) const;
@@ -43,7 +43,7 @@ class FieldSurface {
 /// For points.
 class ConvexSurface {
   public:
-    /// @param tolerance  how near counts as entered [m]
+    /// @param tolerance  distance that counts as entered [m]
     ConvexSurface(const Convex& convex, float tolerance) : convex_(convex), tolerance_(tolerance) {}
 
     float bound(const glm::vec3& point) const;
@@ -69,14 +69,14 @@ class PlaneSurface {
     float offset_;
 };
 
-/// The triangles of a mesh or a height field, for points: sheets, which nothing is inside of.
+/// The triangles of a mesh or a height field, for points: an open surface, which has no inside.
 class TriangleSurface {
   public:
     explicit TriangleSurface(const btConcaveShape& mesh) : mesh_(mesh) {}
 
     std::optional<Entry> entry(const glm::vec3& from, const glm::vec3& to, float) const;
     std::optional<glm::vec3> wayOut(const glm::vec3&, float) const { return std::nullopt; }
-    /// Whether a ball comes near any on a straight way.
+    /// Whether a sphere comes near any triangle on a straight path.
     bool isNear(const glm::vec3& from, const glm::vec3& to, float radius) const;
 
   private:

@@ -24,20 +24,21 @@ using namespace bilayer::detail;
 
 namespace {
 
-// What gets through is told by points that lie so far inside of their own body: contacts see to what overlaps less, and
-// a body that slides along another one is not held [voxels].
+// Depth of the test points inside their own body [voxels]. Contacts handle shallower penetration, so that a body that
+// slides along another one is not stopped.
 constexpr float sunk = 0.25f;
-// How deep such a point may go below the plane of the place where it enters, or deeper than it has been [voxels].
+// Maximum depth of such a point below the plane at its entry, or beyond its initial depth [voxels].
 constexpr float allowed = 0.1f;
-// Arcs are looked at as chords, which are off by the square of this over eight, in parts of the radius [rad].
+// Arcs are approximated by chords of this angle [rad]; their error is its square over eight, in fractions of the
+// radius.
 constexpr float pieceTurn = 0.1f;
-// A way is surely free as long as nothing is nearer than this [voxels].
+// A path is certainly free while nothing is closer than this [voxels].
 constexpr float nearby = 0.5f;
-constexpr int maxProbes = 1 << 20;  // along an edge: those of what is far away are not looked at
-constexpr float bent = 1.12f;       // the way along a rim, in parts of the straight one, up to a quarter of it
-constexpr int maxStrides = 64;      // of a way along which something is nearby; what takes more is taken as met
+constexpr int maxProbes = 1 << 20;  // along an edge; distant ones are skipped
+constexpr float bent = 1.12f;       // length of an arc of a rim over its chord, up to a quarter of the rim
+constexpr int maxStrides = 64;      // of a path near a surface; a longer path counts as a hit
 
-/// Takes a field's coordinates into an obstacle's at some time of the step.
+/// Transforms a field's coordinates into those of a surface at some time of the step.
 struct Moment {
     float time;
     glm::mat3 linear;
@@ -46,7 +47,7 @@ struct Moment {
     glm::vec3 operator()(const glm::vec3& point) const { return linear * point + shift; }
 };
 
-/// A field's coordinates, or those of another shape.
+/// The coordinate frame of a field or another shape.
 struct Frame {
     Pose pose;
     float scale;
@@ -59,13 +60,13 @@ Frame frameOf(const Part& part, const btTransform& object) {
     return {placed.pose, placed.scale};
 }
 
-/// @param touch  in the coordinates of the obstacle
+/// @param touch  in the coordinates of the surface
 Impact inWorld(const Impact& touch, const Part& obstacle, const BodySweep& its) {
     const Frame frame = frameOf(obstacle, its.at(touch.time));
     return {touch.time, frame.pose.toWorld(frame.scale * touch.place), frame.pose.rotation * touch.normal};
 }
 
-/// From start to end, so close together that the ways in between are straight.
+/// Moments from start to end, so close together that the paths between them are straight.
 std::vector<Moment> momentsOf(const Part& points, const BodySweep& its, const Part& obstacle, const BodySweep& others) {
     const int pieces = std::max(1, int(std::ceil((its.turn() + others.turn()) / pieceTurn)));
     std::vector<float> times{its.part(), others.part()};
@@ -84,19 +85,19 @@ std::vector<Moment> momentsOf(const Part& points, const BodySweep& its, const Pa
 /// A point of a body, grown by a radius.
 struct Ball {
     glm::vec3 place;
-    glm::vec3 outward;  ///< of the body, of unit length; or zero
+    glm::vec3 outward;  ///< outward normal of the body, of unit length; or zero
     float radius = 0;
 };
 
-/// Points on their ways through an obstacle.
+/// Follows points on their paths through a surface.
 template <class Obstacle>
 class Passage {
   public:
-    /// @param voxel  in the obstacle's units
+    /// @param voxel  in the surface's units
     Passage(const Obstacle& obstacle, const std::vector<Moment>& moments, float voxel)
         : obstacle_(obstacle), moments_(moments), voxel_(voxel), scale_(glm::length(moments.front().linear[0])) {}
 
-    /// The surface points of a field.
+    /// Follows the surface points of a field.
     void follow(const SurfacePoints& points) {
         const auto reject = [&](const glm::vec3& centre, float radius) { return !comesNear(centre, scale_ * radius); };
         points.visit(reject, [&](std::uint32_t, const SurfacePoint& point) { follow({point.position, point.normal}); });
@@ -107,7 +108,7 @@ class Passage {
         const float inward = sunk * voxel_, smaller = std::max(scale_ * radius - inward, 0.f);
         const glm::vec3 inner = point - (inward - scale_ * radius + smaller) / scale_ * outward;
         glm::vec3 from = moments_.front()(inner), aside(0);
-        // what is in there already may go on at its depth
+        // a point that starts inside may move on at its depth
         if (obstacle_.entry(from, from, smaller)) {
             const auto out = obstacle_.wayOut(from, smaller);
             if (!out) return;
@@ -124,7 +125,7 @@ class Passage {
                 };
                 const float before = depth(from), after = depth(to), deepest = allowed * voxel_;
                 if (after > deepest) {
-                    // back to where its own surface touched
+                    // back to the contact of its own surface
                     const glm::vec3 out = moments_[i].linear * outward / scale_;
                     const float touching = std::min(inward * glm::dot(out, entered->normal), 0.f);
                     const float part = (touching - before) / (after - before);
@@ -138,7 +139,7 @@ class Passage {
         }
     }
 
-    /// Along an edge, its ends excluded.
+    /// Follows the points of an edge, ends excluded.
     /// @param ballAt   (float part) -> Ball
     /// @param length   between its ends
     /// @param spacing  of the field that is met, in the same units
@@ -150,12 +151,12 @@ class Passage {
                       [&](int i) { return ballAt(float(i) / float(parts)); });
     }
 
-    /// The first of them that goes too deep, in the obstacle's coordinates.
+    /// The first impact, in the surface's coordinates.
     const Impact& first() const { return first_; }
 
   private:
-    /// Those with numbers in between, if any of them may come near.
-    /// @param length, radius  from one to the next, and of the largest
+    /// Follows the points with numbers in between, if any of them may come near.
+    /// @param length, radius  from one point to the next, and of the largest point
     template <class BallAt>
     void followBetween(int from, int to, float length, float radius, const BallAt& ballAt) {
         if (to - from < 2) return;
@@ -202,7 +203,7 @@ Impact passageOf(const Shape& field, const Obstacle& obstacle, const std::vector
     return timeOfImpact.first();
 }
 
-/// The corners and edges of a convex body, and what it is grown by.
+/// Follows the vertices and edges of a convex body, grown by its radius.
 Impact passageOf(const Convex& convex, const Shape& field, const std::vector<Moment>& moments) {
     const FieldSurface obstacle(field.collider().field());
     Passage timeOfImpact(obstacle, moments, field.voxelSize() / field.scale());
@@ -219,7 +220,7 @@ Impact passageOf(const Convex& convex, const Shape& field, const std::vector<Mom
     return timeOfImpact.first();
 }
 
-/// What is sharp of the triangles that a field goes along.
+/// Follows the sharp features of the triangles along a field's path.
 /// @param ways, moments  of the field into the mesh, and of the mesh into the field
 Impact passageOf(const btConcaveShape& mesh, const Shape& field, const std::vector<Moment>& ways,
                  const std::vector<Moment>& moments) {

@@ -1,4 +1,4 @@
-// Where shapes get through each other in a step; internal.
+// Time of impact of two shapes in a step; internal.
 #pragma once
 
 #include <BulletCollision/CollisionShapes/btCompoundShape.h>
@@ -12,7 +12,7 @@ namespace bilayer::bullet::detail {
 
 using namespace bilayer::detail;
 
-/// A shape that is no compound, and where its object has it.
+/// A shape other than a compound, and its pose in its object.
 struct Part {
     const btCollisionShape* shape;
     btTransform local;
@@ -24,7 +24,7 @@ struct Part {
     }
 };
 
-/// @param found  (const Part&)
+/// @param found  callback (const Part&)
 template <class Found>
 void visitParts(const btCollisionShape* shape, const btTransform& local, Found&& found) {
     if (!shape->isCompound()) return found(Part{shape, local});
@@ -38,9 +38,10 @@ void visitParts(const btCollisionObject& object, Found&& found) {
     visitParts(object.getCollisionShape(), btTransform::getIdentity(), found);
 }
 
-/// Where something first goes too deep into an obstacle: when, there, and the normal outward from it.
+/// The time of impact: when and where a body first penetrates a surface too deeply, with the outward normal of that
+/// surface.
 struct Impact {
-    float time = 1;  ///< 1: nothing does in this step
+    float time = 1;  ///< 1: no impact in this step
     glm::vec3 place{0}, normal{0};
 
     Impact turned() const { return {time, place, -normal}; }
@@ -50,7 +51,7 @@ inline Impact earlier(const Impact& one, const Impact& other) {
     return other.time < one.time ? other : one;
 }
 
-/// Where a field and another shape first get through each other; the normal is that of the other one.
+/// The first impact of a field and another shape; the normal is that of the other shape.
 Impact timeOfImpact(const Part& part, const BodySweep& its, const Part& other, const BodySweep& others);
 
 }  // namespace bilayer::bullet::detail

@@ -16,7 +16,7 @@ using namespace bilayer::detail;
 
 namespace {
 
-/// The search for the triangle of one place, in the mesh's coordinates.
+/// The search for the triangle of one point, in the mesh's coordinates.
 class Search {
   public:
     Search(const glm::vec3& place, const glm::vec3& normal, float reach, float tolerance)
@@ -45,7 +45,7 @@ class Search {
     glm::vec3 place_, normal_;
     float least_, tolerance_;
     std::optional<TriangleId> found_;
-    float distance_ = 0, cosine_ = 0;  ///< of what is found
+    float distance_ = 0, cosine_ = 0;  ///< of the result
 };
 
 struct Searches : btTriangleCallback {

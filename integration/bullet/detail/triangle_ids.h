@@ -1,4 +1,4 @@
-// Which triangle of a mesh or a height field a contact is with: what Bullet's users take materials by; internal.
+// Finds the triangle of a mesh or a height field that a contact touches, for example to look up a material; internal.
 #pragma once
 
 #include <BulletCollision/CollisionShapes/btConcaveShape.h>
@@ -10,22 +10,22 @@
 
 namespace bilayer::bullet::detail {
 
-/// A triangle by the numbers that Bullet hands to btTriangleCallback::processTriangle(); both triangles of a height
+/// A triangle by the numbers that Bullet passes to btTriangleCallback::processTriangle(). Both triangles of a height
 /// field's cell have the same ones.
 struct TriangleId {
     int part, index;
 };
 
-/// A place on a mesh, in the world.
+/// A point on a mesh, in the world.
 struct MeshPlace {
     btVector3 position;  ///< [m]
-    btVector3 normal;    ///< of the contact, of either sign
+    btVector3 normal;    ///< normal of the contact, of either sign
 };
 
-/// The nearest triangle to each place. Of several that are as near, as around an edge or a corner, it is the one whose
-/// normal is the nearest to the contact's.
-/// @param reach      how far triangles may be from their places; nothing is named beyond [m]
-/// @param tolerance  triangles whose distances differ by less are as near [m]
+/// The nearest triangle to each point. Of several equally near ones, as around an edge or vertex, it is the one whose
+/// normal is nearest to the contact's.
+/// @param reach      maximum distance of a triangle from its point; none is returned beyond [m]
+/// @param tolerance  distances that differ by less are equal [m]
 std::vector<std::optional<TriangleId>> trianglesAt(const btConcaveShape& mesh, const btTransform& transform,
                                                    std::span<const MeshPlace> places, float reach, float tolerance);
 

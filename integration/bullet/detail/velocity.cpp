@@ -10,7 +10,7 @@ namespace bilayer::bullet::detail {
 
 namespace {
 
-/// A link's velocities by the Jacobians that constraints on it have.
+/// A link's velocity, from the Jacobians that its constraints use.
 Velocity velocityOf(const btMultiBodyLinkCollider& collider) {
     const btMultiBody& body = *collider.m_multiBody;
     Velocity velocity{.centre = collider.getWorldTransform().getOrigin()};

@@ -1,5 +1,5 @@
-// Sampling a field at other voxels would blend distances on either side of medial axes, and stretching it leaves no
-// distances at all. So the surface is what is carried over, and distances are found anew: as quick, and exact.
+// Resampling a field at other voxels would blend distances across the medial axis, and after non-uniform scaling its
+// values are no distances. So the surface is transferred, and distances are computed again: as fast, and exact.
 #include "integration/fluid/detail/regrid.h"
 
 #include <fmt/format.h>
@@ -32,15 +32,15 @@ using openvdb::FloatTree;
 using openvdb::math::Transform;
 using Leaf = FloatTree::LeafNodeType;
 
-constexpr const char* byFlood = "flood";  // LevelSet::sign() of a mesh whose winding numbers tell nothing
+constexpr const char* byFlood = "flood";  // LevelSet::sign() of a mesh whose winding numbers are of no use
 
-constexpr float minFieldWidth = 1;    // [field voxels] either side: less does not tell where the surface is
-constexpr float rounding = 1e-5f;     // of a width that is a whole number of voxels but for its last bits
+constexpr float minFieldWidth = 1;    // [field voxels] on either side; a narrower band does not define the surface
+constexpr float rounding = 1e-5f;     // tolerance of a width that is a whole number of voxels
 constexpr double maxIndex = 1 << 29;  // keeps OpenVDB's 32-bit coordinates and sums of two of them in range
-constexpr double sameVoxels = 1e-6;   // two voxel sizes are the same but for this part of them
-constexpr double maxHoleWidth = 2;    // [voxels]; wider ones are not closed
+constexpr double sameVoxels = 1e-6;   // relative tolerance of equal voxel sizes
+constexpr double maxHoleWidth = 2;    // [voxels]; wider holes are not closed
 
-// A mesh in voxels, near the origin, where floats are finest; and whole leaves from there to its place.
+// A mesh in voxels near the origin, where floats are most precise, and its translation by whole leaves.
 struct Placed {
     Mesh mesh;
     Coord shift;
@@ -69,7 +69,7 @@ Placed inVoxels(const Mesh& mesh, const Placement& placement, const Transform& v
     return placed;
 }
 
-// Moves all leaves and multiplies their values; what is not active gets the band's width.
+// Moves all leaves and multiplies their values. Inactive voxels get the band's width.
 FloatGrid::Ptr moved(const FloatGrid& source, const Coord& shift, float factor, float width) {
     const auto result = FloatGrid::create(width);
     const FloatGrid::Ptr copy = source.deepCopy();
@@ -92,7 +92,7 @@ FloatGrid::Ptr moved(const FloatGrid& source, const Coord& shift, float factor, 
     return result;
 }
 
-// Whether a field lies in these very voxels, and its band reaches as far.
+// Whether a field is in these very voxels, and its band is as wide.
 bool fits(const LevelSet& field, const Placement& placement, const Transform& voxels, float width) {
     const Transform& own = field.grids().distance->transform();
     const auto near = [&](const openvdb::Vec3d& index) {
@@ -118,8 +118,8 @@ std::string text(const openvdb::Vec3d& v) {
     throw std::invalid_argument("the mesh has no inside: " + why);
 }
 
-// Refuses a mesh that bounds nothing, or has a hole that is too wide for the voxels. The mesh alone decides, not where
-// the voxels lie.
+// Refuses a mesh that bounds no volume, or has a hole too wide for the voxels. Depends on the mesh alone, not on the
+// positions of the voxels.
 void requireSolid(const Placed& body, const Transform& voxels) {
     const SignChoice choice = chooseSignOfSolid(body.mesh);
     if (choice.sign == Sign::flood) refuseWithoutInside(choice.reason);

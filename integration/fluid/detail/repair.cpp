@@ -1,8 +1,9 @@
-// OpenVDB calls a grid a level set only if |gradient|^2, by WENO differences and Godunov's upwinding, lies in
-// [0.5, 1.5] at all voxels next to the surface. Creases, walls below a voxel and noise break that. Each broken voxel is
-// a constraint on its own value and those of its neighbours, and these are moved by the least change that would satisfy
-// it if it were linear (S. Kaczmarz, 1937), over and over. Where that fails, the equation |gradient| = 1 is iterated
-// everywhere if much is broken; what remains is repaired by descent on the sum of all violations.
+// OpenVDB accepts a grid as a level set only if |gradient|^2, by WENO differences and Godunov's upwinding, is in [0.5,
+// 1.5] at all voxels next to the surface. Creases, walls below a voxel and noise violate that.
+//
+// Each violation is a constraint on the voxel's value and those of its neighbours. They are moved by the minimum change
+// that would satisfy the linearised constraint (S. Kaczmarz, 1937), repeatedly. If that fails and many voxels violate
+// it, the equation |gradient| = 1 is iterated everywhere. The rest is repaired by descent on the sum of all violations.
 #include "integration/fluid/detail/repair.h"
 
 #include <openvdb/math/Stencils.h>
@@ -26,33 +27,34 @@ using openvdb::Coord;
 using openvdb::FloatGrid;
 using Stencil = openvdb::math::WenoStencil<FloatGrid>;
 
-// The range of checkLevelSet, less what rounding may take.
+// The range of checkLevelSet, less a tolerance for rounding.
 constexpr float lowest = 0.501f, highest = 1.499f;
-constexpr std::size_t manyBroken = 20;  // one broken voxel in so many next to the surface is noise, not creases
-// Where single voxels cannot be repaired, the surface is smoothed around them, farther each time [voxels].
+// a violation at one in so many voxels next to the surface is noise, not a crease
+constexpr std::size_t manyBroken = 20;
+// If single voxels cannot be repaired, the surface is smoothed around them, by a larger radius each time [voxels].
 constexpr int maxSmoothings = 12, firstRadius = 2;
-// Distances nearer to 0 than exact ones are known to [voxels].
+// Distances below the accuracy of exact ones [voxels].
 constexpr float rounding = 1e-4f;
-// What a constraint's value is moved to lies this far within the range, so that rounds end.
+// Constraints aim this far inside the range, so that the iteration ends.
 constexpr float margin = 0.02f;
-constexpr float maxMoved = 0.25f;    // by one constraint [voxels]: what is linear about it ends there
-constexpr float almostOn = 0.15f;    // a face [voxels]
+constexpr float maxMoved = 0.25f;    // maximum change by one constraint [voxels]: the limit of the linearisation
+constexpr float almostOn = 0.15f;    // a point this close to a face is almost on it [voxels]
 constexpr float atSurface = 1e-3f;   // [voxels]
-constexpr float difference = 1e-2f;  // for derivatives [voxels]
-constexpr float minSlope = 0.05f;    // of a constraint [1/voxel]; a flatter one cannot be satisfied by its voxels
-constexpr int maxProjections = 100;  // rounds over all constraints
-constexpr int idleProjections = 30;  // rounds without a gain before other means are taken
-constexpr int maxRounds = 60;        // of descent; six or so do for what real meshes give
+constexpr float difference = 1e-2f;  // step of the derivatives [voxels]
+constexpr float minSlope = 0.05f;    // minimum slope of a constraint [1/voxel]; its voxels cannot satisfy a flatter one
+constexpr int maxProjections = 100;  // maximum rounds over all constraints
+constexpr int idleProjections = 30;  // rounds without a gain before other methods are used
+constexpr int maxRounds = 60;        // rounds of descent; about six are enough for real meshes
 constexpr int patience = 3;          // rounds without a gain before the surroundings are smoothed
-constexpr float notable = 0.1f - rounding;  // a change that is told [voxels]
-constexpr int reach = 3;                    // [voxels] of the WENO stencil along the axes
-// Changes that are tried at a voxel [voxels], either way.
+constexpr float notable = 0.1f - rounding;  // a change that is reported [voxels]
+constexpr int reach = 3;                    // radius of the WENO stencil along the axes [voxels]
+// Changes that are tried at a voxel, in both directions [voxels].
 constexpr std::array<float, 6> steps{0.02f, 0.05f, 0.1f, 0.2f, 0.4f, 0.8f};
 constexpr float stepCost = 1e-3f;  // prefers small changes among equally good ones
-constexpr float minGain = 1e-4f;   // of a change, so that descent ends
+constexpr float minGain = 1e-4f;   // minimum gain of a change, so that the descent ends
 
 struct Survey {
-    std::vector<Coord> broken;  // in the order of the leaves
+    std::vector<Coord> broken;  // in leaf order
     std::size_t crossed = 0;    // voxels next to the surface
 };
 
@@ -62,8 +64,8 @@ float violation(const Stencil& stencil) {
     return std::max({0.0f, lowest - q, q - highest});
 }
 
-// Whether the surface passes between a voxel and one beside it: what WenoStencil::zeroCrossing tells, but only one
-// voxel in five has it, and a stencil of nineteen values is not needed for the others.
+// Whether the surface passes between a voxel and a neighbour. Same as WenoStencil::zeroCrossing, but only one voxel in
+// five is crossed, and the others do not need a stencil of nineteen values.
 bool isCrossed(const FloatGrid::ConstAccessor& values, const Coord& voxel, float value) {
     for (int axis = 0; axis < 3; ++axis)
         for (const int side : {-1, 1}) {
@@ -75,8 +77,8 @@ bool isCrossed(const FloatGrid::ConstAccessor& values, const Coord& voxel, float
     return false;
 }
 
-// Where a flat face passes through voxels, rounding would tell the sides of its edges: what is on it has a distance of
-// 0.
+// If a flat face passes through voxels, rounding would decide the signs at its edges. Voxels on it therefore get a
+// distance of 0.
 void tidy(FloatGrid& grid) {
     const float onSurface = rounding * float(grid.voxelSize()[0]);
     openvdb::tree::LeafManager<openvdb::FloatTree> leaves(grid.tree());
@@ -107,7 +109,7 @@ Survey survey(const FloatGrid& grid) {
     return whole;
 }
 
-// A voxel and those on its axes up to `distance` away.
+// Visits a voxel and those on its axes up to `distance` away.
 template <class Visit>
 void alongAxes(const Coord& centre, int distance, Visit visit) {
     visit(centre);
@@ -126,7 +128,7 @@ class Repairer {
     explicit Repairer(FloatGrid& grid)
         : grid_(grid), values_(grid.getAccessor()), stencil_(grid), voxel_(float(grid.voxelSize()[0])) {}
 
-    // One pass over the constraints of broken voxels; returns those that are broken now.
+    // One pass over the constraints of broken voxels. Returns the voxels that are broken afterwards.
     std::vector<Coord> project(const std::vector<Coord>& broken) {
         std::vector<Coord> touched;
         for (const Coord& voxel : broken) {
@@ -140,7 +142,7 @@ class Repairer {
         return stillBroken(touched);
     }
 
-    // The same by the best change of single values.
+    // One pass by the best change of single values.
     std::vector<Coord> descend(const std::vector<Coord>& broken) {
         std::vector<Coord> touched;
         for (const Coord& voxel : broken) {
@@ -152,7 +154,7 @@ class Repairer {
         return stillBroken(touched);
     }
 
-    // Means over the neighbours around what resists, so that features below a voxel go.
+    // Averages values over the neighbours around voxels that cannot be repaired, which removes features below a voxel.
     std::vector<Coord> smooth(const std::vector<Coord>& broken) {
         std::vector<Coord> around, touched;
         for (const Coord& voxel : broken) alongAxes(voxel, 1, [&](const Coord& near) { around.push_back(near); });
@@ -178,7 +180,7 @@ class Repairer {
         return violation(stencil_);
     }
 
-    // Of all voxels whose stencils read this one.
+    // Sum of the violations of all voxels whose stencils read this one.
     float violationAround(const Coord& voxel) {
         float sum = 0;
         alongAxes(voxel, reach, [&](const Coord& near) { sum += violationAt(near); });
@@ -191,8 +193,8 @@ class Repairer {
         return sum / 7;
     }
 
-    // A voxel on one side of a face, and beside an edge of it, may see no slope where one on the other side does: one
-    // that is almost on the face can be put there.
+    // A voxel on one side of a face, next to an edge of it, may have no slope while one on the other side has one. A
+    // voxel that is almost on the face can be moved there.
     bool changeSide(const Coord& voxel) {
         const float old = values_.getValue(voxel), before = violationAround(voxel);
         if (std::abs(old) > almostOn * voxel_) return false;
@@ -202,8 +204,8 @@ class Repairer {
         return false;
     }
 
-    // Moves the values of a voxel and its neighbours by the least change that brings the squared gradient into its
-    // range, were that linear. None changes its side.
+    // Moves the values of a voxel and its neighbours by the minimum change that brings the linearised squared gradient
+    // into its range. No value changes its sign.
     void satisfy(const Coord& voxel) {
         const float q = squaredGradient(voxel);
         const float wanted = q < lowest ? lowest + margin - q : highest - margin - q;
@@ -224,7 +226,8 @@ class Repairer {
             move(around[i], std::clamp(wanted * slopes[i] / sum, -maxMoved, maxMoved) * voxel_);
     }
 
-    // Whether a value may go that way: what is on the surface stays on it, lest its neighbours see it pass.
+    // Whether a value may change in that direction. Values on the surface stay there, so that their neighbours do not
+    // see it pass.
     bool canMove(float value, float change) const {
         return value != 0 && (std::abs(value) > atSurface * voxel_ || (value > 0) == (change > 0));
     }
@@ -252,7 +255,7 @@ class Repairer {
                              old > 0 ? std::clamp(old + change, least, most) : std::clamp(old + change, -most, -least));
     }
 
-    // Makes the change of the voxel or one of its neighbours that lessens the violations most.
+    // Applies the change of the voxel or one of its neighbours that reduces the violations most.
     bool improve(const Coord& voxel, Coord& changed) {
         float best = -minGain, bestValue = 0;
         bool found = false;
@@ -289,7 +292,7 @@ class Repairer {
     float voxel_;
 };
 
-// Repeats rounds until nothing is broken, or for some while nothing has been gained.
+// Repeats rounds until nothing is broken, or some rounds have brought no gain.
 std::vector<Coord> project(FloatGrid& grid) {
     Repairer mender(grid);
     std::vector<Coord> broken = survey(grid).broken;
@@ -302,7 +305,7 @@ std::vector<Coord> project(FloatGrid& grid) {
     return broken;
 }
 
-// Mends what single voxels can repair; returns those still broken.
+// Repairs what changes of single voxels can repair. Returns the voxels that are still broken.
 std::vector<Coord> descend(FloatGrid& grid) {
     Survey found = survey(grid);
     if (found.broken.size() > found.crossed / manyBroken) {
@@ -322,7 +325,7 @@ std::vector<Coord> descend(FloatGrid& grid) {
     return broken;
 }
 
-// Smooths the surface within some voxels of the broken ones: features thinner than a voxel are more than it can hold.
+// Smooths the surface within this radius of the broken voxels: the grid cannot represent features thinner than a voxel.
 void smoothAround(FloatGrid& grid, const std::vector<Coord>& broken, int radius) {
     FloatGrid mask(0);
     mask.setTransform(grid.transformPtr());
@@ -332,7 +335,7 @@ void smoothAround(FloatGrid& grid, const std::vector<Coord>& broken, int radius)
     filter.prune();
 }
 
-// Of voxels that are in both bands.
+// The changes of the voxels that are in both bands.
 Changes changes(const FloatGrid& before, const FloatGrid& after) {
     Changes found;
     const float voxel = float(after.voxelSize()[0]);
