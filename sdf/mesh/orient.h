@@ -29,8 +29,8 @@ struct Orientation {
 ///
 /// - A component must have positive volume if the components around it leave it outside (their signs sum to zero).
 /// - Within others, a component may have either sign. Negative is a cavity. Positive is a solid in a solid, whose union
-///   is correct under winding numbers. If a component around it was flipped or inconsistent, the file is not reliable,
-///   and the component becomes a cavity.
+///   is correct under winding numbers. If the component was inconsistent, or one around it was inconsistent or flipped,
+///   the file is not reliable, and the component becomes a cavity.
 /// - Components that enclose almost no volume keep the orientation of most of their area.
 /// - A duplicate triangle follows the triangle that it repeats. If every face of a closed surface exists twice, back to
 ///   back, both copies are made to face outward.
