@@ -12,10 +12,9 @@
 namespace bilayer::demo {
 
 struct Projection {
-    int cells = 0;       ///< liquid cells
-    int iterations = 0;  ///< iterations of the conjugate gradients
-    double divergence =
-        0;  ///< max residual divergence of all cells, except for what liquid without a surface cannot release [1/s]
+    int cells = 0;          ///< liquid cells
+    int iterations = 0;     ///< iterations of the conjugate gradients
+    double divergence = 0;  ///< max residual, except for what liquid without a surface cannot release [1/s]
     bool converged = true;
 };
 
