@@ -36,9 +36,8 @@ constexpr float bowlVoxels = 3;                         // edge of its voxels [v
 
 constexpr float usualBodiesPerLayer = 5;
 constexpr float layerRadius = 0.26f;  // radius of a layer's ring in the bowl for thirty [m]
-constexpr float minApart =
-    0.26f;  // min initial distance between the centres of bodies, including neighbouring layers [m]
-constexpr float lastLook = 0.5f;  // how long the recording continues after all bodies are at rest [s]
+constexpr float minApart = 0.26f;     // min initial distance of bodies' centres, in neighbouring layers too [m]
+constexpr float lastLook = 0.5f;      // how long the recording continues after all bodies are at rest [s]
 // A resting pile jitters by far less. Bodies that roll as slowly as allowed elsewhere would continue when they are
 // woken.
 constexpr float restingSpeed = 0.02f, restingSpin = 0.2f;  // [m/s], [rad/s]

@@ -22,8 +22,7 @@ constexpr double maxStretch = 2;  // [%]
 constexpr std::uint32_t linkColours[] = {0x9db4d6, 0xf4f1de};
 constexpr Look bobLook{.colour = 0xe07a5f, .roughness = 0.35f, .metalness = 0.2f, .clearcoat = 0.4f};
 
-using Circle =
-    std::vector<std::pair<glm::dvec3, glm::dvec3>>;  // points, and approximate displacements to the next ones
+using Circle = std::vector<std::pair<glm::dvec3, glm::dvec3>>;  // points and steps to the next
 
 Circle circleOf(const Pose& pose, double radius) {
     const glm::dquat rotation = glm::normalize(glm::dquat(pose.rotation));

@@ -182,9 +182,8 @@ Outcome gears(const GearsOptions& options) {
     axles.drive(options.speed, strongest * options.load / options.stepsPerSecond);
     const btVector3 brake(0, 0, wheels.back().ratio > 0 ? -options.load : options.load);
 
-    std::vector<double> torques;  // of the motor [N m]
-    double worstAngle = 0,
-           worstTooth = 0;  // max deviation from the ratio at any time: of the last gear [rad], of any gear [teeth]
+    std::vector<double> torques;            // of the motor [N m]
+    double worstAngle = 0, worstTooth = 0;  // max deviation: of the last gear [rad], of any gear [teeth]
     const auto step = [&] {
         wheels.back().body.applyTorque(brake);
         stage.step();

@@ -13,8 +13,7 @@ struct PairsOptions {
     float scale = 1;     ///< of all lengths; at 1, bodies are about a metre wide
     int every = 1;       ///< uses only every n-th of all 188 pairs
     std::string only{};  ///< of these, only the ones with this text in their name, such as "hull on dynamic"
-    float seconds =
-        2;  ///< up to scale 1; above, multiplied by the root of the scale, because falls take longer by this factor
+    float seconds = 2;   ///< up to scale 1; above, times the root of the scale, as falls take longer by it
     float stepsPerSecond = 240;
     int iterations = 50;  ///< of Bullet's solver; with 10, bodies on small bodies rock
 };

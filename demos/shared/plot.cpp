@@ -21,9 +21,8 @@ constexpr std::array colours{"#1f5fa8", "#c4572b", "#3d8a4f", "#7a4fa0", "#b8860
 // A point that exceeds a decade by less than this does not add another decade [decades].
 constexpr double decadeSlack = 0.02;
 
-constexpr std::size_t maxMarks =
-    30;  // max points of a line with markers in a linear panel; lines with more points are plain curves
-constexpr double steps = 5;  // approximate count of steps of a linear axis
+constexpr std::size_t maxMarks = 30;  // max points of a line with markers in a linear panel
+constexpr double steps = 5;           // approximate count of steps of a linear axis
 
 // Maps an axis to pixels, from whole decade to whole decade or from tick to tick. `low` and `high` are logarithms,
 // unless the axis is linear with steps of `step`.

@@ -26,9 +26,8 @@ using openvdb::Vec3SGrid;
 using Vector = pcg::Vector<double>;
 using Matrix = poisson::LaplacianMatrix;
 
-constexpr double minDistance =
-    0.02;  // min distance of the surface from a liquid cell's centre, where it is a divisor [voxels]
-constexpr double tolerance = 1e-5;  // relative to the max divergence
+constexpr double minDistance = 0.02;  // of the surface from a cell centre, where it is a divisor [voxels]
+constexpr double tolerance = 1e-5;    // relative to the max divergence
 constexpr int maxIterations = 1000;
 constexpr double towardsZero = 1e-6;  // strength with which pressures are pulled to zero if no surface determines them
 

@@ -22,8 +22,7 @@ struct Look {
     float metalness = 0;
     float clearcoat = 0;  ///< clear coating layer, 0..1
     float opacity = 1;    ///< 1: solid, 0: invisible
-    bool clear =
-        false;  ///< like water and glass: full reflections at any opacity, stronger at grazing angles, without a shadow
+    bool clear = false;   ///< like water and glass: reflects at any opacity, more at grazing angles; no shadow
 };
 
 /// The initial camera. The z axis points up.

@@ -52,7 +52,7 @@ namespace carved {
 
 constexpr float halfHeight = 0.6f, dome = 0.08f;
 constexpr float footRadius = 0.92f, bodyRadius = 0.9f, lidRadius = 1;
-constexpr float wallDepth = 0.03f, topDepth = 0.02f;  // the latter never exceeds the height of the dome
+constexpr float wallDepth = 0.03f, topDepth = 0.02f;  // topDepth must not exceed the height of the dome
 
 // Carving depth of a lozenge pattern: 0 on the lozenges, 1 between them.
 float pattern(float a, float b) {
@@ -318,8 +318,7 @@ Mesh bowl(float radius, float wall, int segments, float opening, float foot) {
         const float angle = pi * float(i) / float(rim);
         profile.push_back(middle * outward + wall / 2 * (std::cos(angle) * outward + std::sin(angle) * onward));
     }
-    for (int i = arc; i >= 0; --i)
-        profile.push_back(at(inner, opening * float(i) / float(arc)));  // inner wall, back down
+    for (int i = arc; i >= 0; --i) profile.push_back(at(inner, opening * float(i) / float(arc)));  // inside, back down
     return revolve(profile, segments);
 }
 

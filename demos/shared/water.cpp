@@ -14,8 +14,7 @@ namespace {
 using openvdb::FloatGrid;
 using openvdb::Vec3SGrid;
 
-constexpr int bandLayers =
-    5;  // layers around the liquid in which its velocity is known, in addition to its movement per step
+constexpr int bandLayers = 5;      // with known velocity around the liquid, in addition to its movement per step
 constexpr double maxGrowth = 0.5;  // max rate of volume restoration [1/s]
 
 void addTo(FloatGrid& grid, float value) {

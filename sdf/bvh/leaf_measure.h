@@ -42,8 +42,8 @@ struct Measured {
 // Measures points against triangles, one pair per lane. load() returns a lane's triangle data from an array of the
 // leaf. The points are relative to corner A of the triangles. The distance within the plane is the min over the three
 // edges. Each edge contributes the distance perpendicular to it and the distance beyond its ends. If the projection
-// lies in the triangle, only the latter counts; it is zero for at least one edge. Thus rounding cannot mistake the line
-// of a sliver for its interior.
+// lies in the triangle, only the distance beyond counts; it is zero for at least one edge. Thus rounding cannot mistake
+// the line of a sliver for its interior.
 template <class Load>
 inline Measured measureFromCorner(const WideLeaf& leaf, Load load, Vec qx, Vec qy, Vec qz) {
     const Tag tag;

@@ -76,7 +76,8 @@ class WindingSlope {
     /// @param progress  polled, unless null
     explicit WindingSlope(const Mesh& mesh, Progress* progress = nullptr);
 
-    /// Returns an upper bound on the gradient's magnitude in a ball, along links that do not cross the surface [1/m].
+    /// Returns an upper bound on the gradient's magnitude in a ball [1/m]. Links in the ball must not cross the
+    /// surface.
     double operator()(const glm::dvec3& centre, double radius) const;
 
   private:

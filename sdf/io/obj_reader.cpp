@@ -41,8 +41,7 @@ struct Part {
     Cursor text;
     std::vector<glm::dvec3> points;
     Faces faces;
-    std::vector<std::size_t>
-        relativeCorners;  // corners that are counted from the first vertex of this part, not of the file
+    std::vector<std::size_t> relativeCorners;  // counted from the first vertex of this part, not of the file
     std::array<Skipped, leftKinds> skipped{};
 };
 

@@ -36,8 +36,8 @@ void requireAffine(const glm::dmat4& m, const std::string& name) {
 
 // Exporters round, and some do not normalise.
 glm::dquat rotationOf(const glm::dvec4& r, const std::string& name) {
-    const double largest = std::max({std::abs(r.x), std::abs(r.y), std::abs(r.z),
-                                     std::abs(r.w)});  // prevents overflow and underflow of the squares
+    const double largest = std::max(  // against overflow and underflow of the squares
+        {std::abs(r.x), std::abs(r.y), std::abs(r.z), std::abs(r.w)});
     const glm::dvec4 unit = glm::normalize(r / largest);
     require(largest > 0 && std::isfinite(unit.x + unit.y + unit.z + unit.w),
             "the {} is {} {} {} {}; it must be a quaternion of length 1", name, r.x, r.y, r.z, r.w);

@@ -193,9 +193,8 @@ class EqualPoints {
     Progress* progress_;
     LargeArray<unsigned> first_;
     std::size_t runs_, partitions_;
-    std::vector<std::size_t>
-        places_;             // for each run and partition: first the count, then the position of its next item
-    LargeArray<Item> rest_;  // the first points of each run, grouped by partition
+    std::vector<std::size_t> places_;  // per run and partition: first the count, then the position of its next item
+    LargeArray<Item> rest_;            // the first points of each run, grouped by partition
     std::atomic<bool> anyEqual_ = false;
 };
 

@@ -344,11 +344,10 @@ class Orienter {
     const Mesh& mesh_;
     Progress* progress_;
     Topology topology_;
-    DisjointSets sets_;           // of triangles; opposite members: exactly one of the two must be flipped
-    std::vector<unsigned> body_;  // for each triangle: the first triangle connected with it by edges
-    std::vector<bool> sound_;     // for each triangle: all edges of its body are balanced
-    std::vector<int>
-        excess_;  // for each original: count of copies with its orientation minus copies with the opposite one
+    DisjointSets sets_;                     // of triangles; opposite members: exactly one of the two must be flipped
+    std::vector<unsigned> body_;            // for each triangle: the first triangle connected with it by edges
+    std::vector<bool> sound_;               // for each triangle: all edges of its body are balanced
+    std::vector<int> excess_;               // for each original: copies with its orientation minus opposite ones
     std::vector<bool> doubled_;             // for each triangle: its body has each face twice, back to back
     std::vector<unsigned> contradictions_;  // triangles at edges where a one-sided surface meets itself reversed
     std::vector<Piece> pieces_;

@@ -16,12 +16,10 @@ namespace bilayer::detail {
 
 /// What a surface bounds, as shares of its area (estimated at a few hundred points).
 struct Bounding {
-    double solid =
-        0;  ///< winding number clearly above 1/2 behind and clearly below 1/2 in front: the surface of a solid
+    double solid = 0;     ///< winding number clearly above 1/2 behind, clearly below in front: surface of a solid
     double buried = 0;    ///< clearly above 1/2 on both sides: inside the solid
     double reversed = 0;  ///< the solid is in front
-    double nothing =
-        0;  ///< the remaining area: open surfaces, and places where holes leave the winding number near 1/2
+    double nothing = 0;   ///< the rest: open surfaces, and where holes leave the winding number near 1/2
 };
 
 /// Estimates the winding numbers on both sides of a surface. Keeps references to its arguments.

@@ -33,11 +33,9 @@ struct Topology {
     /// Builds the topology of a mesh that is already welded.
     static Topology ofWelded(const Mesh& mesh);
 
-    std::vector<glm::uvec3>
-        triangles;              ///< as in the mesh, with each vertex replaced by the first one of equal coordinates
-    LargeArray<EdgeUse> edges;  ///< sorted by (low, high, triangle); without triangles that use a vertex twice
-    std::vector<unsigned>
-        original;  ///< for each triangle, the first triangle with the same three vertices, often itself
+    std::vector<glm::uvec3> triangles;  ///< of the mesh, each vertex replaced by the first of equal coordinates
+    LargeArray<EdgeUse> edges;          ///< sorted by (low, high, triangle); without triangles that use a vertex twice
+    std::vector<unsigned> original;     ///< a triangle's first triangle with the same three vertices, often itself
     Progress* progress;
 
     /// Returns whether the three vertices of a triangle differ.
