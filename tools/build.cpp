@@ -25,7 +25,7 @@ namespace bilayer::tools {
 using namespace bilayer::detail;
 namespace {
 
-// Words of the contract.
+// The words are part of the command line's contract.
 const std::map<std::string, Method> methods{{"exact", Method::exact},
                                             {"double-layer", Method::doubleLayer},
                                             {"pseudonormal", Method::pseudonormal},
@@ -57,7 +57,7 @@ struct Arguments {
     CLI::Option* gapGiven = nullptr;
     std::vector<CLI::Option*> bodyOptions;
     CLI::Option *deviceGiven = nullptr, *memoryGiven = nullptr, *mappingGiven = nullptr;
-    std::vector<CLI::Option*> layerOptions;  // what only the double layer method understands
+    std::vector<CLI::Option*> layerOptions;  // options that only the double layer method supports
 };
 
 struct Outcome {
@@ -93,7 +93,7 @@ void requireUsage(const Arguments& a) {
     requireOther(a.output, a.mesh);
 }
 
-// The API's range is (0, 1000] voxels too; here the message names the option.
+// The API's range is (0, 1000] voxels too, but this message names the option.
 void requireWidth(const CLI::Option* option, float width, const Arguments& a) {
     const bool world = a.options.bandUnit == BandUnit::world;
     const double voxels = double(width) / (world ? double(a.options.voxelSize) : 1);
@@ -111,7 +111,7 @@ void requireBand(const Arguments& a) {
     requireWidth(a.interiorGiven, a.options.interiorWidth, a);
 }
 
-// Nothing for the processor.
+// Returns nothing for the CPU backend.
 std::optional<BlockFiller> makeFiller(const Arguments& a) {
     if (a.backend == "tbb") return std::nullopt;
     return openclFiller(openDevice(a.device), {.memoryMiB = a.deviceMemory, .mapping = mappings.at(a.mapping)});
@@ -135,7 +135,7 @@ LevelSet timedBuild(const Mesh& mesh, const Arguments& a, Outcome& outcome) {
     return field;
 }
 
-// With what bodies need beside the field.
+// Builds a field with the additional data that bodies need.
 LevelSet timedBody(const Mesh& mesh, const LevelSet& field, const Arguments& a, Outcome& outcome) {
     const Stopwatch watch;
     LevelSet stored = withBody(field, mesh, a.collider, !a.noMesh);
@@ -193,7 +193,7 @@ void printTable(const Arguments& a, const Outcome& o, const Mesh& mesh, const Le
 void run(Arguments a) {
     requireUsage(a);
     a.options.bandUnit = bandUnits.at(a.bandUnit);
-    // in the mesh's unit they wait for the voxel size
+    // widths in the mesh's unit are checked once the voxel size is known
     if (a.options.bandUnit == BandUnit::voxels || !a.resolutionGiven->count()) requireBand(a);
     a.options.method = methods.at(a.method);
     a.options.sign = signs.at(a.sign);

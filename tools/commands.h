@@ -1,5 +1,5 @@
-// The commands of the command line `bilayer`. Each function adds one command, whose callback does its work: it throws
-// CLI::ParseError for wrong usage and any other exception where the input or the machine is at fault.
+// The commands of the command line program `bilayer`. Each function adds one command, whose callback does the work. The
+// callback throws CLI::ParseError for wrong usage, and any other exception if the input or the machine is at fault.
 #pragma once
 
 #include <fmt/format.h>
@@ -13,7 +13,7 @@
 
 namespace bilayer::tools {
 
-/// Accepts numbers for which `good` holds. NaN must not: CLI::Range and CLI::PositiveNumber let it through.
+/// Accepts numbers for which `good` holds. `good` must reject NaN, which CLI::Range and CLI::PositiveNumber accept.
 template <class Good>
 CLI::Validator numbers(Good good, const std::string& complaint, const std::string& name) {
     const auto check = [=](const std::string& word) -> std::string {
@@ -23,7 +23,7 @@ CLI::Validator numbers(Good good, const std::string& complaint, const std::strin
     return CLI::Validator(check, name);
 }
 
-/// Accepts numbers that a float can hold.
+/// Accepts numbers that a float can represent.
 inline CLI::Validator finite() {
     const auto good = [](double value) { return std::abs(value) <= double(std::numeric_limits<float>::max()); };
     return numbers(good, "a finite number", "FINITE");
@@ -43,7 +43,7 @@ inline CLI::Validator within(double low, double high) {
     return numbers(good, fmt::format("in {:g}..{:g}", low, high), fmt::format("{:g}..{:g}", low, high));
 }
 
-/// Accepts finite numbers from zero on.
+/// Accepts finite numbers of zero or more.
 inline CLI::Validator nonNegative() {
     const auto good = [](double value) { return value >= 0 && value <= double(std::numeric_limits<float>::max()); };
     return numbers(good, "a finite number, zero at least", "NONNEGATIVE");

@@ -1,4 +1,4 @@
-// `bilayer query`, `surface` and `export`: what a field says, as numbers, as a mesh, and as grids for a GPU.
+// `bilayer query`, `surface` and `export`: field values as numbers, as a mesh, and as grids for a GPU.
 #include <fmt/format.h>
 
 #include <charconv>
@@ -29,7 +29,7 @@ struct Arguments {
     bool json = false;
 };
 
-// Three finite numbers and nothing else. Locales and hexadecimal digits have no say.
+// Parses exactly three finite numbers. Locales and hexadecimal digits are not supported.
 bool parsePoint(const std::string& line, glm::dvec3& point) {
     std::size_t at = 0;
     for (int axis = 0; axis < 3; ++axis) {
@@ -51,7 +51,7 @@ void runQuery(const Arguments& a) {
     std::ios::sync_with_stdio(false);
     std::string line;
     for (std::size_t count = 1;; ++count) {
-        // a program that asks and waits for the answer gets it; a long list is not slowed down by that
+        // flush for an interactive program that waits for each answer, without slowing down a long list
         if (std::cin.rdbuf()->in_avail() <= 0) std::fflush(stdout);
         if (!std::getline(std::cin, line)) break;
         glm::dvec3 point;

@@ -1,5 +1,5 @@
-// `bilayer`: fields from meshes on the command line. Status 0: done; 1: input or machine at fault, one line on stderr;
-// 2: wrong usage.
+// `bilayer`: fields from meshes on the command line. Exit status 0: done; 1: input or machine at fault, one line on
+// stderr; 2: wrong usage.
 #include <cerrno>
 #include <csignal>
 #include <cstdio>
@@ -17,13 +17,12 @@ enum Status { done = 0, fault = 1, usage = 2 };
 
 void setSignals() {
     bilayer::detail::removeAtomicFilesOnSignal();
-    // a reader that closes the pipe ends the command quietly, and a file above the size limit is an error like any
-    // other
+    // a closed pipe ends the command quietly; a file above the size limit is an ordinary error
     std::signal(SIGPIPE, SIG_DFL);
     std::signal(SIGXFSZ, SIG_IGN);
 }
 
-// Errors of devices and files may hold several lines; the contract is one.
+// Errors of devices and files may have several lines; the contract is one line.
 int complain(const std::string& message) {
     std::fprintf(stderr, "bilayer: %s\n", std::regex_replace(message, std::regex("\\s*\n\\s*"), "; ").c_str());
     return fault;

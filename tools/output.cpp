@@ -28,7 +28,7 @@ std::string text(const glm::vec3& v) {
     return fmt::format("{:.6g} {:.6g} {:.6g}", v.x, v.y, v.z);
 }
 
-// A place in the world, of one relative to an origin.
+// Converts a position relative to an origin to world coordinates.
 Json place(const glm::vec3& v, const glm::dvec3& origin) {
     return origin == glm::dvec3(0) ? vector(v) : vector(origin + glm::dvec3(v));
 }

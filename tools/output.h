@@ -1,4 +1,4 @@
-// What the commands print: tables for people, JSON for programs, a progress bar on a terminal.
+// Output of the commands: tables for people, JSON for programs, a progress bar on a terminal.
 #pragma once
 
 #include <chrono>
@@ -36,51 +36,51 @@ class Table {
     std::vector<std::pair<std::string, std::string>> rows_;
 };
 
-/// Prints one JSON object as the only thing on stdout.
+/// Prints one JSON object, which must be the only output on stdout.
 void print(const Json& json);
 
 std::string grouped(std::uint64_t count);  ///< 1234567 as "1,234,567"
 std::string metres(double length);         ///< six digits and the unit
 std::string bytes(std::uint64_t count);    ///< in KiB, MiB or GiB
 std::string hex(std::uint64_t hash);       ///< 16 digits
-Json number(float value);                  ///< with the digits that the float has, not those of its double
+Json number(float value);                  ///< with the shortest digits of the float, not those of its double
 Json vector(const glm::vec3& v);           ///< [x, y, z]
-Json vector(const glm::dvec3& v);          ///< likewise
-/// {"lower": [x, y, z], "upper": [x, y, z]} in the world, of bounds relative to an origin.
+Json vector(const glm::dvec3& v);          ///< [x, y, z]
+/// {"lower": [x, y, z], "upper": [x, y, z]} in world coordinates, for bounds relative to an origin.
 Json box(const Bounds& bounds, const glm::dvec3& origin);
-std::string boxText(const Bounds& bounds, const glm::dvec3& origin);  ///< "x y z .. x y z m", likewise
+std::string boxText(const Bounds& bounds, const glm::dvec3& origin);  ///< "x y z .. x y z m", in world coordinates
 
-/// A mesh's report. `wall` is the thickness that counted as thin [m]; 0: none did.
+/// The report of a mesh. `wall` is the thickness below which walls count as thin [m]; 0: no such test was made.
 Json toJson(const MeshReport& report, float wall);
 void addRows(Table& table, const MeshReport& report, float wall);
 
-/// What is known of a mesh without inspecting it.
-/// @param balanced  whether every edge is run both ways equally often: balanced() in sign.h
+/// The properties of a mesh that are known without inspection.
+/// @param balanced  whether every edge has balanced half-edges: balanced() in sign_choice.h
 Json toJson(const Mesh& mesh, bool balanced);
 void addRows(Table& table, const Mesh& mesh, bool balanced);
 
-/// What a mesh file held, and what of it was left out.
+/// What a mesh file contains, and what was omitted from it.
 Json toJson(const ReadReport& read);
 void addRows(Table& table, const ReadReport& read);
 
-/// Size, widths, method and signs of a field that comes from a file, or goes into one with these options.
+/// Size, band widths, method and signs of a field that was read from a file, or is written with these options.
 void addRows(Table& table, const LevelSet& levelSet, const VdbOptions& stored = {});
 
-/// How it got its distances and signs: method, sign, signReason, signConflicts, errorBound [m].
+/// How the field got its distances and signs: method, sign, signReason, signConflicts, errorBound [m].
 Json provenance(const LevelSet& levelSet, const VdbOptions& stored = {});
 
-/// Mass properties at density 1 [m]; null for nothing.
-/// @param origin  that the centre is relative to; it is told in the world
+/// Mass properties at density 1 [m]; null if there are none.
+/// @param origin  origin of the centre's coordinates; the output is in world coordinates
 Json toJson(const std::optional<MassProperties>& mass, const glm::dvec3& origin);
-/// All of them but the volume.
+/// Adds all mass properties except the volume.
 void addRows(Table& table, const std::optional<MassProperties>& mass, const glm::dvec3& origin);
 
-/// What is kept of a body beside its field.
+/// The data that is stored for a body in addition to its field.
 Json toJson(const Body& body, const glm::dvec3& origin);
-/// All of it but the mass.
+/// Adds all of it except the mass.
 void addRows(Table& table, const Body& body);
 
-/// Seconds since its construction.
+/// Measures the seconds since its construction.
 class Stopwatch {
   public:
     double seconds() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
@@ -89,7 +89,7 @@ class Stopwatch {
     std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
 
-/// A bar on stderr while it lives, where stderr is a terminal.
+/// A progress bar on stderr during its lifetime, if stderr is a terminal.
 class ProgressBar {
   public:
     explicit ProgressBar(std::string label);
@@ -97,7 +97,7 @@ class ProgressBar {
     ProgressBar(const ProgressBar&) = delete;
     ProgressBar& operator=(const ProgressBar&) = delete;
 
-    /// For BuildOptions::progress: null where nobody looks.
+    /// For BuildOptions::progress. Null if the bar is not visible.
     std::function<bool(float)> callback();
 
   private:
@@ -108,10 +108,11 @@ class ProgressBar {
     int drawn_ = -1;
 };
 
-/// Throws std::runtime_error that names the path if a file could not be put there: asked before work that takes time.
+/// Throws std::runtime_error that names the path if a file cannot be written there. Call this before work that takes
+/// time.
 void requireWritable(const std::filesystem::path& path);
 
-/// The most memory that the process has had [bytes].
+/// Returns the peak memory of the process [bytes].
 std::uint64_t peakMemory();
 
 }  // namespace bilayer::tools

@@ -1,4 +1,4 @@
-// `bilayer inspect`, `info` and `devices`: commands that only look.
+// `bilayer inspect`, `info` and `devices`: the read-only commands.
 #include <fmt/format.h>
 #include <openvdb/io/File.h>
 #include <openvdb/tools/Diagnostics.h>
@@ -41,7 +41,7 @@ std::shared_ptr<Kind> addArguments(CLI::App& command, const char* name, const ch
     return arguments;
 }
 
-// Nothing for what encloses no volume.
+// Returns nothing for a mesh that encloses no volume.
 template <class Solid>
 std::optional<MassProperties> massOf(const Solid& solid) {
     try {
@@ -105,7 +105,8 @@ void runInspect(const InspectArguments& a) {
     if (advice) printAdvice(a, *advice);
 }
 
-// What OpenVDB has to say about the grid as a level set: a remark, since a field may well have widths that differ.
+// Returns OpenVDB's verdict on the grid as a level set. It is only a remark, since a field may have two different
+// widths.
 std::string remark(const LevelSet& field) {
     const std::string text = openvdb::tools::checkLevelSet(*field.grids().distance);
     return text.substr(0, text.find('\n'));
@@ -134,7 +135,7 @@ Json gridList(const std::filesystem::path& path) {
     return list;
 }
 
-// Nothing for a field alone.
+// Returns nothing for a field without a body.
 std::optional<Body> bodyBeside(const Arguments& a, const LevelSet& field) {
     if (!hasBody(field)) return std::nullopt;
     try {
@@ -162,7 +163,7 @@ void printInfo(const Arguments& a, const LevelSet& field, const Json& grids, con
     table.print();
 }
 
-// To five digits: a width in metres over a voxel size is a whole number of voxels but for rounding.
+// Rounds to five digits: a width in metres divided by the voxel size is a whole number up to rounding.
 Json inVoxels(float width, const LevelSet& field) {
     return std::round(1e5 * double(width) / double(field.voxelSize())) / 1e5;
 }

@@ -1,4 +1,4 @@
-// `bilayer seed`: meshes and fields become one liquid level set, with marker particles if asked for.
+// `bilayer seed`: combines meshes and fields into one liquid level set, optionally with marker particles.
 #include <fmt/format.h>
 
 #include <cmath>
@@ -75,7 +75,8 @@ void requireUsage(const Arguments& a) {
         throw CLI::ValidationError("seed", "a mesh needs one of --voxel-size, --resolution and --into");
 }
 
-// What a placement in floats leaves of a far translation, far meshes take over: before they are stretched and turned.
+// Returns what a placement in floats loses of a large translation. Distant meshes absorb it before they are scaled and
+// rotated.
 glm::dvec3 remainder(const Arguments& a, const fluid::Placement& placement) {
     const glm::dvec3 left =
         glm::dvec3(a.translate[0], a.translate[1], a.translate[2]) - glm::dvec3(placement.pose.position);
@@ -89,7 +90,8 @@ Input read(const std::filesystem::path& path, const glm::dvec3& moved, ReadRepor
     return mesh;
 }
 
-// What the file says of a mesh and a body no longer holds for a liquid that starts from it; where it stands does.
+// Drops metadata about a mesh and a body, which do not apply to a liquid that starts from the file. Metadata about the
+// position stay.
 void dropHistory(openvdb::FloatGrid& liquid) {
     std::vector<std::string> names;
     for (auto entry = liquid.beginMeta(); entry != liquid.endMeta(); ++entry)
@@ -97,12 +99,12 @@ void dropHistory(openvdb::FloatGrid& liquid) {
     for (const std::string& name : names) liquid.removeMeta(name);
 }
 
-// Whole voxels near to a place: the origin of a liquid there.
+// Returns a position rounded to whole voxels: the origin of a liquid there.
 glm::dvec3 wholeVoxels(const glm::dvec3& place, double voxelSize) {
     return voxelSize * glm::round(place / voxelSize);
 }
 
-// Relative to its origin, which its metadata tell where it is not zero.
+// Returns the initial liquid relative to its origin, which is in its metadata if it is not zero.
 openvdb::FloatGrid::Ptr startingLiquid(const Arguments& a, const Input& first, const fluid::Placement& placement) {
     openvdb::initialize();
     if (!a.into.empty()) {
@@ -128,8 +130,8 @@ openvdb::FloatGrid::Ptr startingLiquid(const Arguments& a, const Input& first, c
     }
 }
 
-// Of what is negative between voxels; none where nothing is. OpenVDB's levelSetVolume() is off by up to half a percent
-// for a box of 25 voxels, this by less than a tenth of that.
+// Returns the volume of the negative region, interpolated between voxels; zero if there is none. OpenVDB's
+// levelSetVolume() is off by up to half a percent for a box of 25 voxels; this is off by less than a tenth of that.
 double volumeOf(const openvdb::FloatGrid::Ptr& liquid) {
     if (liquid->empty()) return 0;
     auto grids = std::make_shared<Grids>();
@@ -141,7 +143,7 @@ double volumeOf(const openvdb::FloatGrid::Ptr& liquid) {
     }
 }
 
-// Of one seed after another.
+// Adds the report of one seed to the sum of all.
 void add(fluid::SeedReport& all, const fluid::SeedReport& next) {
     if (next.largestChange > all.largestChange) {
         all.largestChange = next.largestChange;
@@ -211,7 +213,7 @@ void run(const Arguments& a) {
 
     const openvdb::FloatGrid::Ptr liquid = startingLiquid(a, inputs.front(), placement);
     liquid->setName("liquid");
-    // bodies are placed in the world; all else is relative to the origin, near which floats are finest
+    // bodies are placed in world coordinates; all else is relative to the origin, where floats are most accurate
     const auto entry = liquid->getMetadata<openvdb::Vec3DMetadata>(metadata::origin);
     const openvdb::math::Transform::Ptr near = liquid->transformPtr(), world = near->copy();
     world->postTranslate(entry ? entry->value() : openvdb::Vec3d(0));

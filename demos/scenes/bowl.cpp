@@ -27,30 +27,31 @@ namespace {
 constexpr const char* bunnyFile = "/usr/share/glmark2/models/bunny.obj";  // Debian's package glmark2-data
 constexpr float bodySize = 0.2f;                                          // longest side [m]
 
-// The bowl for thirty bodies; larger ones are scaled by the cube root of their number.
+// The bowl for thirty bodies. For other counts it is scaled by the cube root of the ratio.
 constexpr float usualBodies = 30;
-constexpr float bowlRadius = 0.66f, bowlWall = 0.035f;  // of the sphere that the bowl is cut from [m]
+constexpr float bowlRadius = 0.66f, bowlWall = 0.035f;  // of the sphere from which the bowl is cut [m]
 constexpr float bowlOpening = 1.25f;                    // from the bottom to the rim [rad]
 constexpr float bowlFoot = 0.2f;                        // radius of its foot [m]
 constexpr float bowlVoxels = 3;                         // edge of its voxels [voxels of the bodies]
 
 constexpr float usualBodiesPerLayer = 5;
-constexpr float layerRadius = 0.26f;  // of a layer's ring, in the bowl for thirty [m]
-constexpr float minApart = 0.26f;     // between the centres of bodies at the start, of neighbouring layers too [m]
-constexpr float lastLook = 0.5f;      // how long the recording goes on when all is at rest [s]
-// A heap at rest trembles by far less; what still rolls as slowly as bodies may elsewhere goes on when it is woken.
+constexpr float layerRadius = 0.26f;  // radius of a layer's ring in the bowl for thirty [m]
+constexpr float minApart = 0.26f;     // min initial distance of bodies' centres, in neighbouring layers too [m]
+constexpr float lastLook = 0.5f;      // how long the recording continues after all bodies are at rest [s]
+// A resting pile jitters by far less. Bodies that roll as slowly as allowed elsewhere would continue when they are
+// woken.
 constexpr float restingSpeed = 0.02f, restingSpin = 0.2f;  // [m/s], [rad/s]
-// at 6 m/s a bunny moves 16 of its voxels in one step: the bands must still hold it then [voxels]
+// at 6 m/s a bunny moves 16 of its voxels in one step; the band must still contain it then [voxels]
 constexpr float bodyInteriorWidth = 20, bowlInteriorWidth = 6;
 
-// What friction lets slip in a step, anchors pull back by this part of it; and what rests bears more (see
-// bullet::ShapeOptions), as wood on wood does. By Bullet's 0.2, and with no more, a body here and there slips on that
-// is kept awake.
+// The fraction of friction slip per step that anchors pull back, and the friction factor of resting contacts (see
+// bullet::ShapeOptions), as for wood on wood. With Bullet's 0.2 and a factor of 1, a few bodies that are kept awake
+// continue to slip.
 constexpr float pulledBack = 0.5f, restingFriction = 1.5f;
 
-constexpr double maxOverlap = 0.5;  // of 99 in 100 [voxels]
-constexpr double maxRise = 1;       // of energy, in parts of the kinetic energy's peak [%]
-constexpr double maxCreep = 1;      // while held awake [voxels]
+constexpr double maxOverlap = 0.5;  // of 99 % of the penetrations [voxels]
+constexpr double maxRise = 1;       // of energy, relative to the peak kinetic energy [%]
+constexpr double maxCreep = 1;      // drift while kept awake [voxels]
 
 constexpr Look bowlLook{.colour = 0x35506b, .roughness = 0.45f, .clearcoat = 0.6f};
 constexpr std::uint32_t colours[] = {0xe07a5f, 0xf2cc8f, 0x81b29a, 0xf4f1de, 0x9db4d6, 0xe8a598, 0xc9b1d9, 0x7fb7be};
@@ -62,14 +63,14 @@ std::shared_ptr<const Thing> bodyOf(const Kind& kind, float resolution) {
         {.voxelSize = bodySize / resolution, .interiorWidth = bodyInteriorWidth, .restingFriction = restingFriction});
 }
 
-// How far the surface reaches from a point [m].
+// Returns the max distance of the surface from a point [m].
 float reachOf(const Mesh& mesh, const glm::vec3& from) {
     float reach = 0;
     for (const glm::vec3& point : mesh.points) reach = std::max(reach, glm::distance(point, from));
     return reach;
 }
 
-// Places of a layer's bodies: rings, as many as there is room for.
+// Returns the positions of a layer's bodies: as many rings as fit.
 std::vector<glm::vec2> layerOf(float scale, float apart) {
     std::vector<glm::vec2> places;  // radius and angle
     for (float radius = layerRadius * scale; radius > 0; radius -= apart) {
@@ -79,7 +80,8 @@ std::vector<glm::vec2> layerOf(float scale, float apart) {
     return places;
 }
 
-// Layers above the bowl, each turned against those below, every body turned at random about the middle of its box.
+// Returns poses in layers above the bowl, each layer rotated relative to those below, and every body rotated at random
+// about the centre of its box.
 std::vector<Pose> startPoses(const std::vector<std::shared_ptr<const Thing>>& things, const BowlOptions& options,
                              float scale) {
     std::mt19937 random(options.seed);
@@ -115,7 +117,7 @@ std::vector<glm::vec3> centresOf(const std::vector<btRigidBody*>& bodies) {
     return centres;
 }
 
-// Keeps all awake for a time, and returns how far the body that creeps most gets [m].
+// Keeps all bodies awake for a time, and returns the max drift of any body [m].
 double creep(Stage& stage, const std::vector<btRigidBody*>& bodies, double seconds) {
     const std::vector<glm::vec3> before = centresOf(bodies);
     for (btRigidBody* body : bodies) body->forceActivationState(DISABLE_DEACTIVATION);

@@ -1,5 +1,4 @@
-// Bodies of any shape fall into a bowl and come to rest on each other: bilayer's whole path from a mesh to bodies in
-// Bullet.
+// Bodies of any shape fall into a bowl and come to rest in a pile: the complete path from a mesh to bodies in Bullet.
 #pragma once
 
 #include <cstdint>
@@ -18,25 +17,28 @@ struct Kind {
 };
 
 struct BowlOptions {
-    std::vector<Kind> kinds;  ///< that bodies are of in turn; at least one
-    int bodies = 30;          ///< the bowl is made large enough for them
+    std::vector<Kind> kinds;  ///< bodies use these in turn; at least one
+    int bodies = 30;          ///< the size of the bowl is adapted to the count
     int resolution = 128;     ///< voxels along a body's longest side
-    /// Of Bullet's solver, whose friction starts from nothing in each step: with 10, here and there a body of a heap
-    /// that is kept awake slides on by a few voxels.
+    /// Iterations of Bullet's solver, whose friction starts from zero in each step. With 10, a few bodies of a pile
+    /// that is kept awake slide on by a few voxels.
     int iterations = 40;
-    float seconds = 30;      ///< at most, until all sleep
-    float hold = 0;          ///< how long they are then kept awake, to see whether the heap creeps [s]
-    std::uint32_t seed = 7;  ///< of the first poses
+    float seconds = 30;      ///< max duration; ends when all bodies sleep
+    float hold = 0;          ///< how long bodies are then kept awake, to measure the drift of the pile [s]
+    std::uint32_t seed = 7;  ///< of the initial poses
 };
 
-/// Criteria: all bodies fall asleep, none leaves the bowl; overlaps, of which 99 in 100 are below half a voxel; energy,
-/// which never rises by more than 1 % of the kinetic energy's peak; creep while held, below a voxel.
+/// Criteria:
+/// - All bodies fall asleep, and none leaves the bowl.
+/// - 99 % of the penetrations are below half a voxel.
+/// - Energy never rises by more than 1 % of the peak kinetic energy.
+/// - Drift while kept awake is below one voxel.
 Outcome bowl(const BowlOptions& options);
 
-/// Reads a body from a file, turned from y upward to z upward, and named after the file.
+/// Reads a body from a file, rotated from y up to z up, and names it after the file.
 Kind readKind(const std::string& path);
 
-/// The Stanford bunny of Debian's package glmark2-data, or a knot where that is not installed.
+/// The Stanford bunny of Debian's package glmark2-data, or a knot if the package is not installed.
 Kind bunny();
 
 }  // namespace bilayer::demo

@@ -16,13 +16,13 @@ namespace {
 constexpr float major = 0.1f, minor = 0.025f;  // of a link's circle and tube [m]
 constexpr float bobSize = 1.6f;                // of the last ring [links]
 constexpr float linkMass = 0.5f;               // [kg]
-constexpr int circlePoints = 96;               // of the integral: more change nothing down to a tenth of the radius
-constexpr double maxStretch = 2;               // [%]
+constexpr int circlePoints = 96;  // for the integral: more have no effect for distances down to a tenth of the radius
+constexpr double maxStretch = 2;  // [%]
 
 constexpr std::uint32_t linkColours[] = {0x9db4d6, 0xf4f1de};
 constexpr Look bobLook{.colour = 0xe07a5f, .roughness = 0.35f, .metalness = 0.2f, .clearcoat = 0.4f};
 
-using Circle = std::vector<std::pair<glm::dvec3, glm::dvec3>>;  // points, and the way from each to the next, about
+using Circle = std::vector<std::pair<glm::dvec3, glm::dvec3>>;  // points and steps to the next
 
 Circle circleOf(const Pose& pose, double radius) {
     const glm::dquat rotation = glm::normalize(glm::dquat(pose.rotation));
@@ -36,7 +36,7 @@ Circle circleOf(const Pose& pose, double radius) {
     return circle;
 }
 
-// Pairs of neighbours whose linking number is not what it was.
+// Counts the neighbours whose linking number has changed.
 int parted(const std::vector<Pose>& start, const std::vector<Pose>& now) {
     int count = 0;
     for (std::size_t i = 1; i < now.size(); ++i) {
@@ -48,7 +48,7 @@ int parted(const std::vector<Pose>& start, const std::vector<Pose>& now) {
     return count;
 }
 
-// The length along the rings' centres [m].
+// Returns the length along the rings' centres [m].
 double lengthOf(const std::vector<Pose>& poses) {
     double length = 0;
     for (std::size_t i = 1; i < poses.size(); ++i)
@@ -77,9 +77,9 @@ Outcome chain(const ChainOptions& options) {
     const auto link = makeThing(shapes::torus(major, minor, 64, 24), {options.voxelSize});
     const auto bob = makeThing(shapes::torus(bobSize * major, bobSize * minor, 64, 24), {options.voxelSize});
 
-    // upright rings, every second one turned by a quarter, each hanging in the one above, surface on surface
+    // upright rings, every second one rotated by 90 degrees, each hanging in the previous one, surface on surface
     const glm::quat upright = glm::angleAxis(glm::half_pi<float>(), glm::vec3(1, 0, 0));
-    float height = 0, above = 0;  // of the ring's centre, and from the centre above to where this one's tube is centred
+    float height = 0, above = 0;  // of the ring's centre; from the centre above to the centre of this one's tube
     for (int i = 0; i < options.links; ++i) {
         const bool isLast = i + 1 == options.links;
         const float size = isLast ? bobSize : 1;

@@ -22,13 +22,13 @@ using openvdb::FloatGrid;
 
 constexpr float radius = 0.15f;     // of the sphere; half of the bunny's longest side
 constexpr glm::vec3 centre{0.35f};  // of both
-constexpr double period = 3;        // until all should be back [s]
+constexpr double period = 3;        // until all bodies should be restored [s]
 constexpr double pi = 3.14159265358979;
-constexpr int sphereLevels = 6;      // of triangles: they are finer than the voxels
-constexpr float adaptivity = 0.02f;  // of the surfaces that are recorded
-constexpr float apart = 1.1f;        // between the two cubes that are shown
-constexpr double noise = 0.5;        // between two seeds' losses [% of the volume]
-constexpr float pictured = 0.9f;     // the moment of the picture [s]
+constexpr int sphereLevels = 6;      // the triangles are smaller than the voxels
+constexpr float adaptivity = 0.02f;  // of the recorded surfaces
+constexpr float apart = 1.1f;        // between the two displayed cubes
+constexpr double noise = 0.5;        // between the losses of two seeds [% of the volume]
+constexpr float pictured = 0.9f;     // time of the still picture [s]
 
 constexpr Look sphereLook{.colour = 0x3d87b8, .roughness = 0.25f, .clearcoat = 0.6f};
 constexpr Look bunnyLook{.colour = 0xe07a5f, .roughness = 0.25f, .clearcoat = 0.6f};
@@ -36,7 +36,7 @@ constexpr Look bunnyLook{.colour = 0xe07a5f, .roughness = 0.25f, .clearcoat = 0.
 using Field = openvdb::tools::DiscreteField<openvdb::Vec3SGrid>;
 using Advection = openvdb::tools::LevelSetAdvection<FloatGrid, Field>;
 
-// The swirl at its first moment, at each voxel of the unit cube.
+// Returns the deformation flow at time zero, at each voxel of the unit cube.
 openvdb::Vec3SGrid::Ptr swirl(int resolution) {
     const auto grid = openvdb::Vec3SGrid::create(openvdb::Vec3f(0));
     grid->setTransform(openvdb::math::Transform::createLinearTransform(1.0 / resolution));
@@ -47,13 +47,13 @@ openvdb::Vec3SGrid::Ptr swirl(int resolution) {
     return grid;
 }
 
-// Later it is the same but for a factor, the cosine of half a turn in the whole period; so bodies are where the first
-// swirl alone takes them in the integral of that.
+// Later flow is the same times a factor: the cosine of half a revolution over the period. Bodies are therefore where
+// the initial flow alone moves them in the integral of the factor.
 float swirledUntil(double time) {
     return float(period / pi * std::sin(pi * time / period));
 }
 
-// A seeded body on its way.
+// A seeded body that the flow deforms.
 struct Swirled {
     std::string name;
     FloatGrid::Ptr grid;
@@ -108,7 +108,7 @@ std::vector<Swirled> seeded(const openvdb::Vec3SGrid& velocity) {
     return bodies;
 }
 
-// What checkLevelSet finds, but for the slopes next to the surface.
+// Returns what checkLevelSet finds, except for gradients next to the surface.
 bool isLevelSet(const FloatGrid& grid) {
     openvdb::tools::CheckLevelSet<FloatGrid> check(grid);
     return grid.getGridClass() == openvdb::GRID_LEVEL_SET &&

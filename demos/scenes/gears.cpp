@@ -27,35 +27,35 @@ using namespace bilayer::bullet::detail;
 namespace {
 
 constexpr float density = 7850;   // of steel [kg/m^3]
-constexpr float friction = 0.3f;  // of dry steel, as the product of both bodies' is 0.1
-constexpr float zigzag = 0.4f;    // of the way from gear to gear [rad]
-// Of contacts, half the backlash; a voxel does as well, with five times the contacts [m].
+constexpr float friction = 0.3f;  // of dry steel: the product of both bodies' coefficients is 0.1
+constexpr float zigzag = 0.4f;    // of the direction from gear to gear [rad]
+// Contact margin, half the backlash; one voxel works too, with five times the contacts [m].
 constexpr float margin = 50e-6f;
-constexpr float settled = 0.1f;         // by then the backlash is taken up [s]
-constexpr float strongest = 100;        // of the motor [loads]
-constexpr int framesPerMeasuring = 24;  // teeth lie on each other all the time
+constexpr float settled = 0.1f;         // the backlash is taken up by then [s]
+constexpr float strongest = 100;        // max torque of the motor [loads]
+constexpr int framesPerMeasuring = 24;  // teeth are in contact all the time
 constexpr double halfTooth = 0.5;
 
 constexpr const char* factoryGear = "factory_gear_medium.ply";
 constexpr int factoryTeeth = 40;
 constexpr float factoryModule = 1e-3f;   // [m]
-constexpr float factoryAxis = 20e-3f;    // of its bore, along x [m]
-constexpr float factoryApart = 0.5e-3f;  // how far its data set puts axles apart beyond half the diameters [m]
-constexpr double tips = 0.98;            // of the largest radius: what is farther out is of a tooth's tip
+constexpr float factoryAxis = 20e-3f;    // position of its bore along x [m]
+constexpr float factoryApart = 0.5e-3f;  // additional axis distance in the data set, beyond half the diameters [m]
+constexpr double tips = 0.98;            // relative to the max radius: points beyond belong to a tooth's tip
 
 constexpr std::uint32_t colours[] = {0xe07a5f, 0x9db4d6, 0xf2cc8f, 0x81b29a};
 
 struct Wheel {
     btRigidBody& body;
-    double ratio;  // of its angle to the first one's, by the teeth
+    double ratio;  // of its angle to the first gear's, by the teeth
     Turning turning;
     double start = 0;  // angle when settled [rad]
 
     double angle() const { return turning.angle() - start; }
 };
 
-// Holds bodies so that they can only turn about upright lines, and drives the first. To be gone
-// before their world.
+// Hinges bodies so that they can only rotate about vertical axes, and drives the first. Must be destroyed before their
+// world.
 class Axles {
   public:
     explicit Axles(btDiscreteDynamicsWorld& world) : world_(world) {}
@@ -65,7 +65,7 @@ class Axles {
         for (const auto& hinge : hinges_) world_.removeConstraint(hinge.get());
     }
 
-    /// @param place  on the axle, in the world
+    /// @param place  on the axle, in world coordinates
     void add(btRigidBody& body, const glm::vec3& place) {
         const btTransform& pose = body.getWorldTransform();
         const btVector3 upright = pose.getBasis().transpose() * btVector3(0, 0, 1);
@@ -74,12 +74,12 @@ class Axles {
         world_.addConstraint(hinges_.back().get());
     }
 
-    /// @param strongest  impulse of a step [N m s]
+    /// @param strongest  max impulse per step [N m s]
     void drive(float speed, float strongest) {
         hinges_.front()->enableAngularMotor(true, speed, strongest);
         hinges_.front()->setJointFeedback(&feedback_);
     }
-    // In the last step [N m].
+    // Returns the torque of the last step [N m].
     double torque() const { return feedback_.m_appliedTorqueBodyA.z(); }
 
   private:
@@ -88,11 +88,11 @@ class Axles {
     btJointFeedback feedback_{};
 };
 
-// Gears that mesh.
+// Meshing gears.
 struct Train {
     std::vector<shapes::Gear> parts;
     std::vector<Mesh> meshes;
-    float apart;  // axles, beyond half the diameters [m]
+    float apart;  // axis distance beyond half the diameters [m]
 
     static Train byFormula(const GearsOptions& options) {
         Train train{{}, {}, 0};
@@ -105,7 +105,7 @@ struct Train {
     static Train ofFactory(const std::filesystem::path& folder);
 };
 
-// As shapes::gear() makes them: around z, with a tooth along +x.
+// Makes gears as shapes::gear() does: around z, with a tooth along +x.
 Train Train::ofFactory(const std::filesystem::path& folder) {
     Mesh mesh = readMesh(folder / factoryGear);
     const float middle = (bounds(mesh).lower.z + bounds(mesh).upper.z) / 2;
@@ -114,7 +114,7 @@ Train Train::ofFactory(const std::filesystem::path& folder) {
         point -= glm::vec3(factoryAxis, 0, middle);
         largest = std::max(largest, double(glm::length(glm::vec2(point))));
     }
-    std::complex<double> sum = 0;  // of the tips, so that all teeth lie on each other
+    std::complex<double> sum = 0;  // of the tips, to align all teeth
     for (const glm::vec3& point : mesh.points)
         if (double(glm::length(glm::vec2(point))) > tips * largest)
             sum += std::polar(1.0, factoryTeeth * std::atan2(double(point.y), double(point.x)));
@@ -124,7 +124,7 @@ Train Train::ofFactory(const std::filesystem::path& folder) {
     return {{part, part}, {mesh, mesh}, factoryApart};
 }
 
-// From gear to gear, each in the middle of the backlash.
+// Adds the gears one after another, each centred in the backlash.
 std::vector<Wheel> addTrain(Stage& stage, Axles& axles, Train train, const GearsOptions& options) {
     std::vector<Wheel> wheels;
     glm::vec3 place(0);
@@ -183,7 +183,7 @@ Outcome gears(const GearsOptions& options) {
     const btVector3 brake(0, 0, wheels.back().ratio > 0 ? -options.load : options.load);
 
     std::vector<double> torques;            // of the motor [N m]
-    double worstAngle = 0, worstTooth = 0;  // off the ratio, at any time: the last gear's [rad], any one's [teeth]
+    double worstAngle = 0, worstTooth = 0;  // max deviation: of the last gear [rad], of any gear [teeth]
     const auto step = [&] {
         wheels.back().body.applyTorque(brake);
         stage.step();

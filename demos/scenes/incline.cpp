@@ -11,20 +11,20 @@ namespace bilayer::demo {
 namespace {
 
 constexpr float gravity = 9.81f;                          // [m/s^2]
-constexpr glm::vec3 halfBlock{0.12f, 0.12f, 0.06f};       // low: a slope of 60 degrees would not tip it [m]
+constexpr glm::vec3 halfBlock{0.12f, 0.12f, 0.06f};       // low: it would not tip over on a slope of 60 degrees [m]
 constexpr float lane = 0.36f;                             // between blocks [m]
 constexpr float halfThickness = 0.1f;                     // of the inclines [m]
-constexpr float settled = 0.25f;                          // acceleration is measured from then on [s]
-constexpr double maxCreep = 0.1;                          // of blocks that stick, in all the time [voxels]
-constexpr float maxSliding = 0.98f, minSticking = 1.02f;  // friction in parts of the tangent
+constexpr float settled = 0.25f;                          // start of the measurement of acceleration [s]
+constexpr double maxCreep = 0.1;                          // drift of blocks that stick, over the whole time [voxels]
+constexpr float maxSliding = 0.98f, minSticking = 1.02f;  // friction divided by the tangent
 
 constexpr Look rampLook{.colour = 0x35506b, .roughness = 0.6f};
 constexpr std::uint32_t slidingColour = 0xe07a5f, stickingColour = 0x81b29a;
 
-// A block, and what it is expected to do.
+// A block and its expected behaviour.
 struct Rider {
     btRigidBody& body;
-    float slope, friction;  // [rad], in parts of the tangent
+    float slope, friction;  // [rad]; divided by the tangent
     glm::vec3 start{0};
     float speedWhenSettled = 0;
 
@@ -36,11 +36,11 @@ glm::vec3 positionOf(const btRigidBody& body) {
     return {p.x(), p.y(), p.z()};
 }
 
-// An incline that falls towards +x, its lower end at `y`, with a block for each friction at its upper end.
+// Adds an incline that descends towards +x, with its lower end at `y`, and one block per friction at its upper end.
 void addIncline(Stage& stage, std::vector<Rider>& riders, const InclineOptions& options, float degrees, float y,
                 const std::shared_ptr<const Thing>& block) {
     const float slope = glm::radians(degrees);
-    // as long as the fastest block needs, and a bit
+    // as long as the fastest block needs, plus a margin
     const float way = 0.5f * gravity * std::sin(slope) * options.seconds * options.seconds;
     const float halfLength = 0.5f * way + 4 * halfBlock.x, width = lane * float(options.frictions.size());
     const glm::quat tilt = glm::angleAxis(slope, glm::vec3(0, 1, 0));
@@ -55,7 +55,7 @@ void addIncline(Stage& stage, std::vector<Rider>& riders, const InclineOptions& 
         const Matter matter{.mass = 1, .friction = friction * std::tan(slope), .linearDamping = 0, .angularDamping = 0};
         btRigidBody& body = stage.add(block, matter, {pose.toWorld(place), tilt},
                                       {.colour = friction < 1 ? slidingColour : stickingColour});
-        body.setActivationState(DISABLE_DEACTIVATION);  // a block that creeps must not be put to sleep
+        body.setActivationState(DISABLE_DEACTIVATION);  // a block that drifts must not be put to sleep
         riders.push_back({body, slope, friction, positionOf(body)});
     }
 }

@@ -22,21 +22,21 @@ namespace {
 
 using openvdb::FloatGrid;
 
-// Of the tank [its length, which is a metre]; cells are whole, so that heights and widths are so at best.
+// Dimensions of the tank, relative to its length of one metre; heights and widths are rounded to whole cells.
 constexpr float length = 1, width = 0.6f, height = 0.75f, pool = 0.2f;
-constexpr float bunnySize = 0.36f, bunnyHeight = 0.55f;                          // longest side; of its centre [m]
+constexpr float bunnySize = 0.36f, bunnyHeight = 0.55f;  // longest side; height of its centre [m]
 constexpr float knotRadius = 0.14f, knotThickness = 0.045f, knotHeight = 0.16f;  // [m]
-constexpr float skin = 6;                                                        // of the knot's distances [voxels]
-constexpr float maxCells = 2;                                                    // that the liquid moves in a step
-constexpr float glass = 0.012f;                                                  // thickness of the tank's walls [m]
-constexpr float glassGap = 0.002f;  // between the liquid and the walls that are shown [m]
-constexpr float pictured = 0.4f;    // the moment of the picture [s]
+constexpr float skin = 6;           // half width of the knot's band [voxels]
+constexpr float maxCells = 2;       // max movement of the liquid per step
+constexpr float glass = 0.012f;     // thickness of the tank's walls [m]
+constexpr float glassGap = 0.002f;  // between the liquid and the displayed walls [m]
+constexpr float pictured = 0.4f;    // time of the still picture [s]
 constexpr double turn = 6.283185307;
 
 constexpr double maxError = 3, maxFinalError = 1;  // of the volume [%]
-constexpr double maxDepth = 0.25;                  // of the liquid's surface in the knot, anywhere [voxels]
-constexpr double maxWithin = 0.05;                 // of the liquid in the knot, all over it in the mean [voxels]
-constexpr double maxDivergence = 1e-3;             // in a step [parts of a cell]
+constexpr double maxDepth = 0.25;                  // of the liquid's surface inside the knot, anywhere [voxels]
+constexpr double maxWithin = 0.05;                 // of the liquid inside the knot, averaged over its surface [voxels]
+constexpr double maxDivergence = 1e-3;             // per step [parts of a cell]
 
 constexpr Look waterLook{.colour = 0x1b6fa3, .roughness = 0.05f, .opacity = 0.7f, .clear = true};
 constexpr Look glassLook{.colour = 0xdfeef2, .roughness = 0.02f, .opacity = 0.06f, .clear = true};
@@ -52,7 +52,7 @@ struct Tank {
           voxel(length / float(resolution)),
           transform(openvdb::math::Transform::createLinearTransform(double(voxel))) {}
 
-    /// The corner of the first cell, and the opposite one [m].
+    /// The corner of the first cell, and the opposite corner [m].
     glm::vec3 lower() const { return glm::vec3(-0.5f * voxel); }
     glm::vec3 upper() const { return lower() + voxel * glm::vec3(cells.x(), cells.y(), cells.z()); }
     glm::vec3 at(float x, float y, float z) const { return lower() + glm::vec3(x, y, z); }
@@ -62,7 +62,7 @@ Mesh boxBetween(const glm::vec3& lower, const glm::vec3& upper) {
     return shapes::moved(shapes::box(0.5f * (upper - lower)), 0.5f * (upper + lower));
 }
 
-// Four walls and a floor around the liquid.
+// Makes four walls and a floor around the liquid.
 Mesh glassOf(const Tank& tank) {
     const glm::vec3 a = tank.lower() - glassGap, b = tank.upper() + glassGap, c = a - glass, d = b + glass;
     return shapes::join({boxBetween({c.x, c.y, c.z}, {d.x, d.y, a.z}), boxBetween({c.x, c.y, a.z}, {a.x, d.y, b.z}),
@@ -82,30 +82,30 @@ FloatGrid::Ptr startOf(const Tank& tank) {
     return liquid;
 }
 
-// The knot, which turns around the vertical.
+// The knot, which rotates about the vertical axis.
 struct Knot {
     Mesh mesh = shapes::torusKnot(2, 3, knotRadius, knotThickness, 400, 32);
     ExactDistance distance{mesh};
     glm::vec3 centre;
-    float turns;  // a second
+    float turns;  // revolutions per second
 
     Pose poseAt(double time) const { return {centre, glm::angleAxis(float(turn * turns * time), glm::vec3(0, 0, 1))}; }
     fluid::Solid at(double time, const Tank& tank) const {
         return fluid::solid(mesh, poseAt(time), *tank.transform,
                             {.velocity = {{}, {0, 0, float(turn * turns)}}, .halfWidth = skin});
     }
-    // Negative in the knot; far from it a bound [m].
+    // Returns the distance to the knot, negative inside; far away it is a bound [m].
     double from(const glm::vec3& point, const Pose& pose) const {
         const double away = double(glm::distance(point, centre)) - glm::length(distance.upper());
         return away > 0 ? away : distance(glm::dvec3(pose.toBody(point)));
     }
 };
 
-// What is worst in all frames.
+// The max errors over all frames.
 struct Faults {
     double depth = 0;   // of the surface in the knot [m]
     double within = 0;  // of the liquid in the knot [parts of the volume]
-    double beyond = 0;  // of the surface behind the tank's walls [m]
+    double beyond = 0;  // of the surface beyond the tank's walls [m]
 
     void look(const FloatGrid& shape, const Mesh& surface, const Knot& knot, const Pose& pose, const Tank& tank) {
         for (const glm::vec3& p : surface.points) {
@@ -149,7 +149,7 @@ class Scene {
     }
 
   private:
-    // A step, shorter than what is left until a frame if the liquid is fast.
+    // Advances one step, shorter than the time left until the next frame if the liquid is fast.
     void step(double left) {
         const auto start = std::chrono::steady_clock::now();
         const double reach = double(maxCells * tank_.voxel) / std::max(water_->fastest() + 9.81 * left, 1e-6);

@@ -17,47 +17,47 @@ namespace bilayer::demo {
 namespace {
 
 constexpr float density = 7850;       // of steel [kg/m^3]
-constexpr float boltLength = 70e-3f;  // some have run out 17 turns when others have made 10 [m]
+constexpr float boltLength = 70e-3f;  // some have run 17 revolutions by the time others have made 10 [m]
 constexpr const char *factoryBolt = "factory_bolt_m16_loose.obj", *factoryNut = "factory_nut_m16_loose_subdiv_3x.obj";
-constexpr float factoryStart = 10e-3f;  // above the head, where the thread still carries all of the nut [m]
+constexpr float factoryStart = 10e-3f;  // above the head, where the thread still carries the entire nut [m]
 constexpr float lane = 40e-3f;          // between bolts [m]
 constexpr float startBelowTip = 1e-3f;  // [m]
-// Contacts are made up to here: more than nuts advance in a step, less than from one flank to the other [m].
+// Contact margin: more than nuts advance per step, and less than the distance from one flank to the other [m].
 constexpr float margin = 50e-6f;
 constexpr float settled = 0.1f;  // by then nuts have fallen through their play [s]
-// Theory tells nuts that run from nuts that stay, farther than this from where they are the same [parts].
+// Relative distance from the limit between running and sticking below which theory does not decide.
 constexpr double unclear = 0.2;
 constexpr int framesPerMeasuring = 16;
-constexpr double maxPlay = 1;  // that nuts that should stay may turn [degrees]
+constexpr double maxPlay = 1;  // max rotation of nuts that should stick [degrees]
 
 constexpr Look boltLook{.colour = 0x9aa3ad, .roughness = 0.35f, .metalness = 0.6f};
 constexpr std::uint32_t runningColour = 0xe07a5f, stayingColour = 0x81b29a;
 
-// A nut on a thread as a body on an inclined plane: the flanks' lead, and friction that their slope makes larger.
+// The theory of a body on an inclined plane: the lead of the flanks, and friction increased by their slope.
 struct Theory {
-    double pitch, radius;  // the thread's, and where its flanks meet in the mean [m]
+    double pitch, radius;  // of the thread, and mean radius at which its flanks meet [m]
 
     explicit Theory(const shapes::Thread& thread) : pitch(thread.pitch) {
-        // the bolt's flanks reach from 1/8 to 3/4 of the height of the sharp triangle, the nut's to its sixth eighth
+        // the flanks of bolt and nut meet from 1/8 to 3/4 of the height of the sharp triangle
         radius = thread.diameter / 2 - 5.0 / 32 * std::sqrt(3.0) * pitch;
     }
     double lead() const { return std::atan(pitch / (2 * glm::pi<double>() * radius)); }
-    // The angle of friction on flanks at 30 degrees, seen from the axis.
+    // Returns the friction angle on flanks at 30 degrees, relative to the axis.
     double holding(double friction) const { return std::atan(friction / std::cos(glm::radians(30.0))); }
     bool runs(double friction) const { return holding(friction) < (1 - unclear) * lead(); }
     bool stays(double friction) const { return holding(friction) > (1 + unclear) * lead(); }
-    // Of a nut of unit mass, of some inertia about its axis and some weight [rad/s^2].
+    // Returns the acceleration of a nut of unit mass, with given inertia about its axis and weight [rad/s^2].
     double acceleration(double friction, double inertia, double weight) const {
         const double lever = radius * std::tan(lead() - holding(friction));
         return weight * lever / (inertia + lever * pitch / (2 * glm::pi<double>()));
     }
 };
 
-// What is screwed together.
+// The parts that are screwed together.
 struct Parts {
     Mesh bolt, nut;
-    float start;        // of nuts: shapes::onThread() [m]
-    float turns;        // that nuts make
+    float start;        // initial position of nuts: shapes::onThread() [m]
+    float turns;        // revolutions of the nuts
     float bottom, top;  // of the bolt [m]
 
     static Parts byFormula(const shapes::Thread& thread, const NutsOptions& options) {
@@ -66,7 +66,7 @@ struct Parts {
         const float start = boltLength - startBelowTip - nut.height / 2;
         return {shapes::bolt(bolt), shapes::nut(nut), start, options.turns, -bolt.headHeight, bolt.length};
     }
-    // As they are modelled the nut lies on the bolt's head.
+    // In the data set's coordinates, the nut is on the bolt's head.
     static Parts ofFactory(const NutsOptions& options) {
         Mesh bolt = readMesh(options.factory / factoryBolt), nut = readMesh(options.factory / factoryNut);
         const Bounds box = bounds(bolt);
@@ -80,11 +80,11 @@ struct Rider {
     float friction;
     double height;  // at the last step [m]
     Turning turning;
-    double turns = 0;                  // downward, since the nut had settled
-    std::vector<double> heights{};     // after each whole turn since, the start included [m]
-    double start = 0, speed = 0;       // turns and angular speed when it had settled [rad/s]
-    double acceleration = 0;           // since then, until it has made its turns [rad/s^2]
-    std::vector<glm::dvec2> speeds{};  // time and angular speed, while it makes them [s, rad/s]
+    double turns = 0;                  // downward, since the nut has settled
+    std::vector<double> heights{};     // after each whole revolution since then, including the start [m]
+    double start = 0, speed = 0;       // revolutions, and angular speed [rad/s], when settled
+    double acceleration = 0;           // since then, until it has made its revolutions [rad/s^2]
+    std::vector<glm::dvec2> speeds{};  // time and angular speed until then [s, rad/s]
 };
 
 double spinOf(const btRigidBody& body) {
@@ -99,7 +99,7 @@ void settle(Rider& rider) {
     rider.speeds.clear();
 }
 
-// Nobody need see it run into the bolt's head.
+// Stops the nut before it runs into the bolt's head.
 void hold(btRigidBody& body) {
     for (const auto set : {&btRigidBody::setLinearVelocity, &btRigidBody::setAngularVelocity})
         (body.*set)(btVector3(0, 0, 0));
@@ -107,7 +107,7 @@ void hold(btRigidBody& body) {
     body.setAngularFactor(btVector3(0, 0, 0));
 }
 
-// A nut that has made `most` turns is held there.
+// Stops a nut that has made `most` revolutions.
 void follow(Rider& rider, const Pose& pose, double time, double most) {
     const bool hasSettled = !rider.heights.empty();
     if (hasSettled && rider.turns >= most) return;
@@ -123,7 +123,7 @@ void follow(Rider& rider, const Pose& pose, double time, double most) {
     if (hasSettled && turns >= most) hold(rider.body);
 }
 
-// The worst of all turns [%].
+// Returns the max error of all revolutions [%].
 double advanceOffPitch(const Rider& rider, double pitch) {
     double worst = 0;
     for (std::size_t i = 1; i < rider.heights.size(); ++i)
@@ -131,7 +131,7 @@ double advanceOffPitch(const Rider& rider, double pitch) {
     return 100 * worst;
 }
 
-// How far the angular speed errorMask from that of an even acceleration (standard deviation), in parts of its mean [%].
+// Returns the standard deviation of the angular speed from a uniform acceleration, relative to its mean [%].
 double unevenness(const std::vector<glm::dvec2>& speeds) {
     glm::dvec2 mean(0);
     for (const glm::dvec2& at : speeds) mean += at / double(speeds.size());
@@ -144,11 +144,11 @@ double unevenness(const std::vector<glm::dvec2>& speeds) {
 }
 
 struct Verdict {
-    int running = 0, staying = 0;          // that should
-    int stuck = 0;                         // that should run
-    double turned = 0, slipped = 0;        // by those that should stay [degrees, m]
-    double advance = 0, acceleration = 0;  // off theory [%]
-    double unevenness = 0;                 // of those that run [%]
+    int running = 0, staying = 0;          // count of nuts that should run and of those that should stick
+    int stuck = 0;                         // nuts that should run but stick
+    double turned = 0, slipped = 0;        // max movement of nuts that should stick [degrees, m]
+    double advance = 0, acceleration = 0;  // max error against theory [%]
+    double unevenness = 0;                 // of running nuts [%]
 };
 
 Verdict judge(const std::vector<Rider>& riders, const Theory& theory, double turns) {
@@ -172,7 +172,7 @@ Verdict judge(const std::vector<Rider>& riders, const Theory& theory, double tur
     return verdict;
 }
 
-// What there is to judge; where there is nothing, that is what is wrong.
+// Returns the criteria to judge. If there are none, that is a failed criterion.
 std::vector<Criterion> criteriaOf(const Verdict& verdict, double deepest, double voxelSize) {
     std::vector<Criterion> criteria;
     if (verdict.running > 0)
@@ -195,7 +195,7 @@ bool hasFactoryThread(const std::filesystem::path& folder) {
 }
 
 Outcome nuts(const NutsOptions& options) {
-    const shapes::Thread thread{.clearance = options.clearance};  // Factory's has this diameter and pitch too
+    const shapes::Thread thread{.clearance = options.clearance};  // Factory's thread has this diameter and pitch too
     const Theory theory(thread);
     Parts parts = options.factory.empty() ? Parts::byFormula(thread, options) : Parts::ofFactory(options);
     Stage stage(fmt::format("{} nuts on their bolts", options.pairs),
@@ -212,7 +212,7 @@ Outcome nuts(const NutsOptions& options) {
     for (int i = 0; i < options.pairs; ++i) {
         const glm::vec3 place(lane * (glm::vec2(i % side, i / side) - 0.5f * float(side - 1)), 0);
         const float friction = options.frictions[std::size_t(i) % options.frictions.size()];
-        // each starts in another part of its first turn
+        // each starts at a different fraction of its first revolution
         Pose pose = shapes::onThread(thread, parts.start - thread.pitch * float(i) / float(options.pairs));
         pose.position += place;
         stage.add(bolt, {.friction = 1}, {place}, boltLook);

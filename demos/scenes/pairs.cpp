@@ -30,34 +30,34 @@
 namespace bilayer::demo {
 namespace {
 
-// All lengths at scale 1 [m].
+// All lengths are at scale 1 [m].
 constexpr float voxel = 0.05f;
-constexpr glm::vec3 halfBox{0.5f, 0.4f, 0.3f};  // bodies that lie on others
+constexpr glm::vec3 halfBox{0.5f, 0.4f, 0.3f};  // upper bodies
 constexpr float ball = 0.4f, major = 0.5f, minor = 0.2f;
-constexpr float halfSlab = 0.8f, halfThickness = 0.3f;  // what they lie on
-constexpr float fall = 0.2f;                            // from above [voxels]
-constexpr float rolling = 0.04f;                        // friction: what is round would roll off what it lies on
+constexpr float halfSlab = 0.8f, halfThickness = 0.3f;  // lower bodies
+constexpr float fall = 0.2f;                            // initial height above the lower body [voxels]
+constexpr float rolling = 0.04f;  // rolling friction: round bodies would otherwise roll off the lower body
 constexpr float lane = 2;
 constexpr int columns = 16;  // of the board
 constexpr int framesPerMeasuring = 30;
 constexpr int samplesAlong = 9;  // of a height field
-constexpr float mass = 2;        // at scale 1: it grows with the scale, since Bullet takes small inverses for zero [kg]
-constexpr double maxError = 0.1;  // of heights and overlaps [voxels], of tilts [degrees]
+constexpr float mass = 2;        // at scale 1; it grows with the scale, since Bullet treats small inverses as zero [kg]
+constexpr double maxError = 0.1;  // of heights and penetrations [voxels], of tilts [degrees]
 
 constexpr std::uint32_t fieldColour = 0xe07a5f, shapeColour = 0x9db4d6;
 
-// A body and how it comes to lie.
+// A body and its resting state.
 struct Part {
     std::string name;
     std::shared_ptr<const Thing> thing;
-    float below, above;       // its middle's height over its lowest point, and its top's over its middle [m]
-    glm::vec3 axis{0, 0, 1};  // upright or level at the start, and at rest; zero: it may roll
+    float below, above;       // height of its centre above its lowest point, and of its top above its centre [m]
+    glm::vec3 axis{0, 0, 1};  // vertical or horizontal, initially and at rest; zero: it may roll
     bool isField = false;
 };
 
 struct Cell {
     std::string name;
-    std::size_t upper;  // among the stage's bodies
+    std::size_t upper;  // index among the stage's bodies
     float height;       // at rest [m]
     glm::vec3 axis;
 };
@@ -66,7 +66,7 @@ btVector3 toBullet(const glm::vec3& v) {
     return {v.x, v.y, v.z};
 }
 
-// What keeps pointers to triangles, heights or children, with them.
+// Keeps a shape together with the triangles, heights or children that it points to.
 struct ConcaveShape {
     explicit ConcaveShape(const Mesh& mesh) : mesh(mesh), shape(&this->mesh.triangles) {
         shape.setMargin(0);
@@ -107,7 +107,7 @@ class Maker {
   public:
     explicit Maker(float scale) : s_(scale) {}
 
-    // Those that lie on others: fields, and Bullet's shapes.
+    // Upper bodies: fields, and Bullet's shapes.
     std::vector<Part> fields() const {
         return {field("field of a box", shapes::box(s_ * halfBox, 4), halfBox.z),
                 field("field of a ball", shapes::sphere(s_ * ball, 5), ball, glm::vec3(0)),
@@ -135,7 +135,7 @@ class Maker {
                 concave(),
                 part("compound", cubes, {compound, &compound->shape}, 0.2f)};
     }
-    // Those with a flat top.
+    // Lower bodies with a flat top.
     std::vector<Part> tops() const {
         const glm::vec3 half(halfSlab, halfSlab, halfThickness);
         const Mesh slab = shapes::box(s_ * half, 6);
@@ -143,7 +143,7 @@ class Maker {
         const auto triangles = std::make_shared<TriangleShape>(slab);
         const auto heights = std::make_shared<HeightShape>(2 * s_ * halfSlab);
         const auto compound = std::make_shared<CompoundShape>(box, std::vector{glm::vec3(0)});
-        // under what a height field is like, too, there is ground
+        // the space below a height field counts as ground too
         const Mesh below = moved(slab, {0, 0, -s_ * halfThickness});
         return {part("box", slab, box, halfThickness),
                 hull("hull", half),
@@ -154,7 +154,7 @@ class Maker {
                 part("compound", slab, {compound, &compound->shape}, halfThickness),
                 fieldSlab()};
     }
-    // Under all that is on the board.
+    // The ground below everything on the board.
     Part ground() const {
         const float half = 0.5f * lane * columns, thin = halfThickness / 4;
         const auto plane = std::make_shared<btStaticPlaneShape>(btVector3(0, 0, 1), -s_ * halfThickness);
@@ -162,14 +162,14 @@ class Maker {
                                 s_ * glm::vec3(half, half, -halfThickness - thin));
         return part("plane", mesh, plane, 0);
     }
-    // Stands for it where it is what others lie on.
+    // Represents the ground where it is the lower body.
     Part onGround() const { return {"plane", nullptr, 0, -s_ * halfThickness}; }
     Part fieldSlab() const {
         return field("field", shapes::box(s_ * glm::vec3(halfSlab, halfSlab, halfThickness), 6), halfThickness);
     }
 
   private:
-    // Of another size than its mesh, by Bullet's own means.
+    // A field that Bullet scales to a different size than its mesh.
     Part scaledField() const {
         constexpr float factor = 2.5f;
         const Mesh small = shapes::box(s_ / factor * halfBox, 4);
@@ -215,7 +215,7 @@ class Maker {
         for (const btVector3& centre : centres)
             balls.push_back(moved(shapes::sphere(radii[0], 4), {centre.x(), centre.y(), centre.z()}));
         const auto shape = std::make_shared<btMultiSphereShape>(centres, radii, 3);
-        // a field takes the balls as they are, but Bullet's own shapes around would meet its 4 cm at any scale
+        // a field sees the balls as they are, but Bullet's own shapes around would meet its 4 cm at any scale
         shape->setMargin(0.95f * radii[0]);
         return part("multisphere", shapes::join(balls), shape, 0.25f);
     }
@@ -235,20 +235,20 @@ class Maker {
     float s_;
 };
 
-// Whether what is below may move.
+// The motion type of the lower body.
 enum class State { fixed, kinematic, moving };
 
 std::string nameOf(State state) {
     return state == State::fixed ? "static" : state == State::kinematic ? "kinematic" : "dynamic";
 }
 
-// Lays parts on others, place by place.
+// Places pairs on a grid.
 class Board {
   public:
     Board(Stage& stage, const PairsOptions& options)
         : stage_(stage), scale_(options.scale), every_(options.every), only_(options.only) {}
 
-    /// An infinite plane: everything else must lie above.
+    /// An infinite plane; everything else must be above it.
     void addGround(const Part& ground) {
         stage_.add(ground.thing, {}, {}, {.colour = 0xcfd6dd});
         ++bodies_;
@@ -271,11 +271,11 @@ class Board {
     const std::vector<Cell>& cells() const { return cells_; }
 
   private:
-    // What stands upright must not: it could rest aslant, on an edge.
+    // Upright bodies must not roll: they could come to rest on an edge, at an angle.
     static bool mayRoll(const Part& part) { return part.axis.z == 0; }
 
-    // Bodies a hundred times as large fall ten times as fast, and turn ten times as slowly. A tenth of the usual: what
-    // rocks must not freeze aslant.
+    // Bodies a hundred times as large fall ten times as fast and rotate ten times as slowly. The sleeping thresholds
+    // are a tenth of the usual, so that rocking bodies do not freeze at an angle.
     Matter matter(float bodyMass, bool rolls = false) const {
         const Matter usual;
         return {.mass = bodyMass,
@@ -315,7 +315,7 @@ struct Parts {
     Part slab, plane;
 };
 
-// All pairs whose upper, or lower, part was there first.
+// Adds all pairs in which the upper, or the lower, body was created first.
 void addAll(Board& board, const Parts& parts, bool upperFirst) {
     const auto& [fields, shapes, tops, slab, plane] = parts;
     for (const State state : {State::fixed, State::kinematic}) {
@@ -328,7 +328,7 @@ void addAll(Board& board, const Parts& parts, bool upperFirst) {
         for (const Part& upper : *uppers) board.add(upper, slab, State::moving, upperFirst);
 }
 
-// Between an axis of a body that was upright or level at the start, and what it should be [degrees].
+// Returns the angle between a body's axis and its initial vertical or horizontal direction [degrees].
 double tiltOf(const Pose& pose, const glm::vec3& axis) {
     const glm::dvec3 now = glm::dquat(pose.rotation) * glm::dvec3(axis);
     const double aside = std::hypot(now.x, now.y);
@@ -347,7 +347,7 @@ Outcome pairs(const PairsOptions& options) {
     const Maker maker(scale);
     const Parts parts(maker);
     Board board(stage, options);
-    // a pair's order is that in which bodies were added
+    // the order of a pair is that in which its bodies were added
     addAll(board, parts, true);
     board.addGround(maker.ground());
     addAll(board, parts, false);

@@ -19,39 +19,39 @@ namespace {
 
 constexpr float density = 7850;    // of steel [kg/m^3]
 constexpr float lane = 40e-3f;     // between blocks [m]
-constexpr float above = 0.5e-3f;   // the block's mouth, at the start [m]
-constexpr float margin = 0.1e-3f;  // of contacts [m]
-constexpr float down = 0.1f;       // above the floor at most [voxels]
+constexpr float above = 0.5e-3f;   // initial height above the block's mouth [m]
+constexpr float margin = 0.1e-3f;  // contact margin [m]
+constexpr float down = 0.1f;       // max height above the floor [voxels]
 constexpr int framesPerMeasuring = 4;
 
 constexpr const char *factoryPeg = "factory_round_peg_8mm_tight.obj",
                      *factoryPlate = "factory_round_hole_8mm_subdiv_3x.obj";
-constexpr float factoryClearance = 0.1e-3f;  // radii of 4.048 mm between the plate's corners, and 3.9975 mm
-// The plate's mouth has no chamfer, and leaves less to chance.
+constexpr float factoryClearance = 0.1e-3f;  // radius of 4.048 mm between the plate's corners, and 3.9975 mm of the peg
+// The plate's hole has no chamfer, so the initial tilt is smaller.
 constexpr float factoryTilt = 0.1f;      // [degrees]
 constexpr float tableThickness = 5e-3f;  // [m]
 
 constexpr Look blockLook{.colour = 0x9db4d6, .roughness = 0.3f, .opacity = 0.5f};
 constexpr Look pegLook{.colour = 0xe07a5f, .roughness = 0.35f, .metalness = 0.3f};
 
-// A peg and the block that it belongs into.
+// A peg and its block.
 struct Lane {
     std::string name;
     float clearance;
     std::shared_ptr<const Thing> block, peg;
-    float mouth;                           // of the hole [m]
-    float aside, tilt;                     // at the start, see PegsOptions
-    std::size_t blockIndex{}, pegIndex{};  // in a frame
+    float mouth;                           // z of the hole's opening [m]
+    float aside, tilt;                     // initial, see PegsOptions
+    std::size_t blockIndex{}, pegIndex{};  // index in a frame
 };
 
-// With its lower end above the mouth, aside of the hole's axis, and turned about that end.
+// Returns a pose with the lower end above the opening, offset from the hole's axis, and tilted about that end.
 Pose startOf(const shapes::Peg& part, float mouth, float aside, float tilt) {
     const glm::quat turn = glm::angleAxis(glm::radians(tilt), glm::normalize(glm::vec3(1, 2, 0)));
     const glm::vec3 end(part.clearance / 2 + aside, 0, mouth + above);
     return {end + turn * glm::vec3(0, 0, part.length / 2), turn};
 }
 
-// The height of the lowest point of its lower end: where there is play, pegs lean.
+// Returns the height of the lowest point of its lower end: pegs lean within their play.
 float lowestOf(const Lane& lane, const Pose& pose) {
     const shapes::Peg part{.clearance = lane.clearance};
     const glm::vec3 axis = pose.rotation * glm::vec3(0, 0, 1);
@@ -59,7 +59,7 @@ float lowestOf(const Lane& lane, const Pose& pose) {
     return pose.position.z - axis.z * part.length / 2 - radius * glm::length(glm::vec2(axis));
 }
 
-// In parts of half the clearance, in any frame that is measured.
+// Returns the max penetration in any measured frame, relative to half the clearance.
 double deepestOf(const Lane& lane, const std::vector<std::vector<Pose>>& frames) {
     double deepest = 0;
     for (std::size_t i = 0; i < frames.size(); i += framesPerMeasuring)

@@ -15,18 +15,18 @@ namespace bilayer::demo {
 namespace {
 
 constexpr float radius = 0.05f, halfPlate = 0.3f;  // of balls and plates [m]
-constexpr float lane = 0.8f;                       // between balls side by side, and between plates' heights [m]
-constexpr float stepsBefore = 4, stepsAfter = 40;  // the impact
-constexpr double rounding = 1e-3;                  // that energy may grow by, in parts
+constexpr float lane = 0.8f;                       // between balls side by side, and between the heights of plates [m]
+constexpr float stepsBefore = 4, stepsAfter = 40;  // before and after the impact
+constexpr double rounding = 1e-3;                  // allowed relative energy gain
 
 constexpr Look plateLook{.colour = 0x35506b, .roughness = 0.3f, .opacity = 0.8f};
 constexpr std::uint32_t colours[] = {0x81b29a, 0xf2cc8f, 0xe07a5f};  // from slow to fast
 
 struct Shot {
     btRigidBody& ball;
-    Pose plate;              // its z points to where the ball is shot from
+    Pose plate;              // its z points towards the start of the ball
     float speed, thickness;  // [m/s], [voxels]
-    glm::vec3 last;          // of the ball's places
+    glm::vec3 last;          // previous position of the ball
     bool passed = false, lost = false, gained = false;
 };
 
@@ -35,7 +35,7 @@ std::uint32_t colourOf(float speed) {
     return colours[std::min(std::size_t(decade), std::size(colours) - 1)];
 }
 
-// Balls fall straight down, side by side, and plates are turned; all impacts fall into the same step.
+// Balls fall straight down, side by side, and plates are rotated. All impacts happen in the same step.
 Shot addLane(Stage& stage, const PlatesOptions& options, const std::shared_ptr<const Thing>& ball,
              const std::shared_ptr<const Thing>& plate, const glm::vec3& place, float angle, float thickness,
              float speed, float phase) {
@@ -51,7 +51,7 @@ Shot addLane(Stage& stage, const PlatesOptions& options, const std::shared_ptr<c
     return {body, {place, tilt}, speed, thickness, place + glm::vec3(0, 0, above)};
 }
 
-// Whether the ball's middle has gone through its plate; farther aside it has gone past the border.
+// Returns whether the ball's centre has passed through its plate; farther out it has passed the border.
 bool passes(const Shot& shot, const glm::vec3& now) {
     const glm::vec3 before = shot.plate.toBody(shot.last), after = shot.plate.toBody(now);
     if (before.z < 0 || after.z >= 0) return false;
@@ -62,7 +62,7 @@ bool passes(const Shot& shot, const glm::vec3& now) {
 void watch(Shot& shot) {
     const btVector3 &p = shot.ball.getWorldTransform().getOrigin(), &v = shot.ball.getLinearVelocity();
     const double spin = radius * double(shot.ball.getAngularVelocity().length());
-    const double squares = double(v.length2()) + 0.4 * spin * spin;  // of a ball's energy
+    const double squares = double(v.length2()) + 0.4 * spin * spin;  // proportional to a ball's energy
     shot.lost = shot.lost || !std::isfinite(double(p.length2()) + squares);
     const glm::vec3 now(p.x(), p.y(), p.z());
     shot.passed = shot.passed || passes(shot, now);
@@ -70,7 +70,7 @@ void watch(Shot& shot) {
     shot.gained = shot.gained || squares > (1 + rounding) * double(shot.speed) * shot.speed;
 }
 
-// How many fail, for each thickness and speed at which some do.
+// Returns the count of failures for each thickness and speed that has any.
 std::string tell(const std::vector<Shot>& shots, bool Shot::*failed) {
     std::string text;
     std::map<std::pair<float, float>, std::pair<int, int>> counts;
@@ -100,7 +100,7 @@ Outcome plates(const PlatesOptions& options) {
         for (const float angle : options.angles)
             for (int phase = 0; phase < options.phases; ++phase, ++row)
                 for (std::size_t i = 0; i < options.speeds.size(); ++i) {
-                    // steps, so that a ball thrown aside meets no other plate
+                    // lanes form steps, so that a deflected ball hits no other plate
                     const glm::vec3 place(lane * row, lane * float(i), lane * row);
                     shots.push_back(addLane(stage, options, ball, plate, place, angle, thickness, options.speeds[i],
                                             float(phase) / float(options.phases)));

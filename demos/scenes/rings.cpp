@@ -14,13 +14,13 @@ namespace {
 
 constexpr float major = 0.12f, minor = 0.03f;  // of a ring's circle and tube [m]
 constexpr float poleRadius = 0.05f;            // [m]
-constexpr float spacing = 0.36f;               // between poles: rings of neighbours can touch [m]
-constexpr float apart = 0.1f;                  // between rings at the start [m]
-constexpr float maxTilt = 0.1f;                // of rings at the start: neighbours do not meet [rad]
-constexpr float maxShift = 0.02f;              // of rings at the start, aside [m]
+constexpr float spacing = 0.36f;               // between poles: rings on neighbouring poles can touch [m]
+constexpr float apart = 0.1f;                  // initial separation of rings [m]
+constexpr float maxTilt = 0.1f;                // initial tilt of rings: neighbours do not touch [rad]
+constexpr float maxShift = 0.02f;              // initial horizontal offset of rings [m]
 constexpr float halfFloor = 0.06f;             // thickness [m]
 constexpr float coarse = 2;                    // edge of the floor's voxels [voxels of the rings]
-constexpr int framesPerMeasuring = 10;         // a thousand rings have thousands of pairs
+constexpr int framesPerMeasuring = 10;         // because a thousand rings have thousands of pairs
 
 constexpr Look poleLook{.colour = 0x35506b, .roughness = 0.4f, .clearcoat = 0.4f}, floorLook{.colour = 0xcfd6dd};
 constexpr std::uint32_t ringColours[] = {0xe07a5f, 0xf2cc8f, 0x81b29a, 0xf4f1de, 0x9db4d6, 0xc9b1d9};
@@ -29,12 +29,12 @@ glm::vec2 placeOf(int pole, int rows) {
     return spacing * (glm::vec2(pole % rows, pole / rows) - 0.5f * float(rows - 1));
 }
 
-// Whether the axis of a pole passes through a ring, or would do so above the pole's top.
+// Where a ring is: around its pole, around the pole's axis above its top, or off the pole.
 enum class Place { on, over, off };
 
 Place placeOf(const Pose& ring, const glm::vec2& pole, float top) {
     const glm::vec3 axis = ring.rotation * glm::vec3(0, 0, 1), aside = glm::vec3(pole, ring.position.z) - ring.position;
-    // where the pole's axis crosses the ring's plane; nowhere if it runs along
+    // intersection of the pole's axis with the ring's plane; none if they are parallel
     if (std::abs(axis.z) < 1e-3f) return ring.position.z + major > top ? Place::over : Place::off;
     const float rise = -glm::dot(aside, axis) / axis.z;
     const float crossing = ring.position.z + rise;
@@ -44,7 +44,7 @@ Place placeOf(const Pose& ring, const glm::vec2& pole, float top) {
 }
 
 struct Threading {
-    int lost = 0, over = 0;  // rings that came off below the top; rings that left over it
+    int lost = 0, over = 0;  // rings that came off below the top; rings that left over the top
 };
 
 Threading threading(const std::vector<std::vector<Pose>>& frames, std::size_t firstRing, const RingsOptions& options,

@@ -1,5 +1,5 @@
-// A thousand rings fall down poles, each with its pole through it. After E. Guendelman, R. Bridson, R. Fedkiw,
-// "Nonconvex rigid bodies with stacking", ACM TOG 22 (2003), figure 1.
+// A thousand rings fall down poles, each around its pole. After E. Guendelman, R. Bridson, R. Fedkiw, "Nonconvex rigid
+// bodies with stacking", ACM TOG 22 (2003), figure 1.
 #pragma once
 
 #include <cstdint>
@@ -9,19 +9,21 @@
 namespace bilayer::demo {
 
 struct RingsOptions {
-    int rows = 5;  ///< poles stand in a square of rows x rows
+    int rows = 5;  ///< poles form a square of rows x rows
     int ringsPerPole = 40;
-    float seconds = 20;  ///< at most; it ends when all rings sleep
+    float seconds = 20;  ///< max duration; ends when all rings sleep
     float stepsPerSecond = 240;
-    /// Of Bullet's solver: a stack takes about as many as it is high. With 10, one of 40 trembles at 2 to 3 cm/s, of
-    /// these rings as of rings made of Bullet's own capsules; with 50 it sleeps. A thousand that touch each other sleep
-    /// only when none has turned faster than its threshold for two seconds, which takes more.
+    /// Iterations of Bullet's solver: a stack needs about as many as its height in bodies. With 10, a stack of 40
+    /// jitters at 2 to 3 cm/s, both with these rings and with rings of Bullet's own capsules; with 50 it sleeps. A
+    /// thousand touching rings sleep only after none has rotated faster than its threshold for two seconds, which needs
+    /// more.
     int iterations = 200;
     float voxelSize = 0.006f;  ///< of the rings [m]
-    std::uint32_t seed = 7;    ///< of the rings' first poses
+    std::uint32_t seed = 7;    ///< of the initial poses of the rings
 };
 
-/// Criteria: no ring comes off its pole but over the top; no overlap as deep as a voxel; all sleep in time.
+/// Criteria: no ring leaves its pole except over the top. No penetration reaches one voxel. All rings fall asleep in
+/// time.
 Outcome rings(const RingsOptions& options);
 
 }  // namespace bilayer::demo

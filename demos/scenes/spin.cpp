@@ -15,10 +15,10 @@ namespace bilayer::demo {
 using namespace bilayer::detail;
 namespace {
 
-constexpr float size = 0.05f, halfThickness = 0.04f;  // of the handle's squares, and of the handle [m]
+constexpr float size = 0.05f, halfThickness = 0.04f;  // of the handle's squares; of the handle [m]
 constexpr float mass = 2;                             // [kg]
 
-// A T of squares, three across and four down: its three moments of inertia differ by tens of percents.
+// A T of squares, three across and four down. Its three moments of inertia differ by tens of percent.
 Mesh handle() {
     constexpr glm::vec2 outline[] = {{-3, 1}, {-1, 1}, {1, 1},   {3, 1},   {3, -1},
                                      {1, -1}, {1, -9}, {-1, -9}, {-1, -1}, {-3, -1}};
@@ -30,7 +30,7 @@ Mesh handle() {
         mesh.triangles.push_back({a, b, c});
         mesh.triangles.push_back({a, c, d});
     };
-    // clockwise seen from above
+    // clockwise as seen from above
     for (unsigned i = 0, next = 1; i < count; ++i, next = (i + 1) % count) quad(i, count + i, count + next, next);
     constexpr unsigned squares[][4] = {{0, 1, 8, 9}, {1, 2, 5, 8}, {2, 3, 4, 5}, {8, 5, 6, 7}};
     for (const auto& [a, b, c, d] : squares) {
@@ -50,7 +50,7 @@ glm::dvec3 angularMomentum(const btRigidBody& body) {
     return inWorld;
 }
 
-// The greatest difference of two solids' mass and moments of inertia, in parts of the second's.
+// Returns the max relative difference of the mass and moments of inertia of two solids.
 double difference(const MassProperties& a, const MassProperties& b) {
     double most = std::abs(a.volume / b.volume - 1);
     for (int i = 0; i < 3; ++i) most = worse(most, std::abs(double(a.principalInertia[i]) / b.principalInertia[i] - 1));
@@ -67,7 +67,7 @@ Outcome spin(const SpinOptions& options) {
     const auto thing = makeThing(handle(), {options.voxelSize});
     btRigidBody& body = stage.add(thing, {.mass = mass, .linearDamping = 0, .angularDamping = 0}, {},
                                   {.colour = 0xf2cc8f, .roughness = 0.4f, .clearcoat = 0.4f});
-    // the body's axes are the principal ones, in ascending order of their moments
+    // the body's axes are the principal axes, in ascending order of their moments
     body.setActivationState(DISABLE_DEACTIVATION);
     const btVector3 middle = body.getWorldTransform().getBasis().getColumn(1);
     body.setAngularVelocity(body.getWorldTransform().getBasis() *
@@ -79,7 +79,7 @@ Outcome spin(const SpinOptions& options) {
     float side = 1;
     stage.run(options.seconds, [&] {
         drift = worse(drift, glm::distance(angularMomentum(body), start) / glm::length(start));
-        // it has turned over when the middle axis looks the other way
+        // the handle has flipped over when the intermediate axis points in the opposite direction
         const float cosine = body.getWorldTransform().getBasis().getColumn(1).dot(middle);
         if (side * cosine < -0.5f) {
             side = -side;

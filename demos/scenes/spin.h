@@ -1,5 +1,5 @@
-// A handle that spins freely about its middle axis, and turns over again and again (the effect that V. Dzhanibekov saw
-// in orbit): nothing acts on it, so its angular momentum must stay what it is.
+// A handle spins freely about its intermediate axis and flips over repeatedly (the Dzhanibekov effect, seen in orbit).
+// Nothing acts on it, so its angular momentum must be conserved.
 #pragma once
 
 #include "demos/shared/outcome.h"
@@ -8,12 +8,12 @@ namespace bilayer::demo {
 
 struct SpinOptions {
     float seconds = 60;
-    float spin = 6;            ///< about the middle axis [rad/s]
-    float nudge = 0.05f;       ///< about the other two [rad/s]
+    float spin = 6;            ///< about the intermediate axis [rad/s]
+    float nudge = 0.05f;       ///< initial perturbation about the other two axes [rad/s]
     float voxelSize = 0.002f;  ///< [m]
 };
 
-/// Criteria: angular momentum drifts less than 1 % a minute, as a vector; the handle turns over; mass and inertia by
+/// Criteria: the angular momentum vector drifts by less than 1 % per minute. The handle flips over. Mass and inertia of
 /// the field are within 0.5 % of the mesh's.
 Outcome spin(const SpinOptions& options);
 

@@ -20,11 +20,11 @@ namespace {
 
 constexpr float gravity = 9.81f;        // [m/s^2]
 constexpr float startX = -5, lane = 1;  // [m]
-constexpr float groundVoxel = 0.05f;    // of the field that Bullet makes no use of [m]
-constexpr float settled = 0.25f;        // speeds are measured from then on [s]
+constexpr float groundVoxel = 0.05f;    // of the field, which Bullet does not use [m]
+constexpr float settled = 0.25f;        // start of the speed measurements [s]
 constexpr double maxSpeedError = 2;     // [%]
-constexpr double maxAngle = 5;          // between a contact's normal and those of the triangles around it [degrees]
-constexpr double aroundContact = 0.25;  // triangles this near are around it [voxels]
+constexpr double maxAngle = 5;          // between a contact normal and those of the triangles around it [degrees]
+constexpr double aroundContact = 0.25;  // distance within which triangles count as around it [voxels]
 constexpr double maxPenetration = 0.5;  // [voxels]
 constexpr double maxEnergyRise = 1e-2;  // [parts of the peak of the kinetic energy]
 
@@ -36,7 +36,7 @@ struct Kind {
     std::uint32_t colour;
 };
 
-// An upright prism with an L for its base, 0.6 m long.
+// An upright prism with an L-shaped base, 0.6 m long.
 Mesh angleIron() {
     const glm::vec2 outline[] = {{-.3f, -.3f}, {.3f, -.3f}, {.3f, 0}, {0, 0}, {0, .3f}, {-.3f, .3f}};
     Mesh mesh;
@@ -53,7 +53,7 @@ Mesh angleIron() {
     return mesh;
 }
 
-// Lies along y, 0.7 m long.
+// A capsule along y, 0.7 m long.
 Mesh capsule() {
     constexpr float radius = 0.15f, half = 0.2f;
     constexpr int rings = 24;
@@ -80,15 +80,15 @@ std::vector<Kind> kinds() {
             {"bowl", shapes::bowl(0.3f, 0.05f), 0x6d597a}};
 }
 
-// A body, and what a point without friction would do in its place.
+// A body, and the expected motion of a frictionless point in its place.
 struct Rider {
     std::string name;
     btRigidBody& body;
-    float energy = 0;  ///< once it has settled [J/kg]
+    float energy = 0;  ///< after it has settled [J/kg]
 
     float kinetic() const { return 0.5f * float(body.getLinearVelocity().length2()); }
     float potential() const { return gravity * float(body.getCenterOfMassPosition().z()); }
-    /// By which its speed is off [%].
+    /// Returns the error of its speed [%].
     double speedError() const {
         const double expected = std::sqrt(std::max(2.0 * (energy - potential()), 0.0));
         return 100 * (double(body.getLinearVelocity().length()) / expected - 1);
@@ -111,7 +111,7 @@ std::vector<Rider> addRiders(Stage& stage, const Waves& waves, const TerrainOpti
         btRigidBody& body = stage.add(thing, matter, {{startX, y, z}}, {.colour = all[i].colour});
         body.setActivationState(DISABLE_DEACTIVATION);
         body.setLinearVelocity({options.speed, 0, 0});
-        body.setLinearFactor({1, 0, 1});  // as between rails without friction: slopes would take it into other lanes
+        body.setLinearFactor({1, 0, 1});  // moves as between frictionless rails: slopes would move it into other lanes
         riders.push_back({all[i].name, body});
     }
     return riders;
@@ -121,7 +121,7 @@ glm::dvec3 toGlm(const btVector3& v) {
     return {v.x(), v.y(), v.z()};
 }
 
-// Contacts that leave the normals of the ground.
+// Counts contacts whose normals deviate from those of the ground.
 int ghostsIn(btDispatcher& dispatcher, const btCollisionObject& ground, const Waves& waves, double around) {
     int ghosts = 0;
     for (int m = 0; m < dispatcher.getNumManifolds(); ++m) {
@@ -131,7 +131,8 @@ int ghostsIn(btDispatcher& dispatcher, const btCollisionObject& ground, const Wa
         for (int i = 0; i < manifold.getNumContacts(); ++i) {
             const btManifoldPoint& point = manifold.getContactPoint(i);
             const btVector3 onB = point.getPositionWorldOnB(), normalOnB = point.m_normalWorldOnB;
-            // friction holds one of the two places of a contact, and what turns is told where it is going to be
+            // friction anchors replace one of the two contact points, and rotating bodies report predicted contact
+            // points
             const btVector3 places[] = {isFirst ? point.getPositionWorldOnA() : onB,
                                         isFirst ? onB + point.getDistance() * normalOnB : point.getPositionWorldOnA()};
             double angle = std::numeric_limits<double>::infinity();

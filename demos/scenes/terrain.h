@@ -1,5 +1,5 @@
-// Bodies slide without friction over waves of triangles, the ground of games and robotics: what holds them back there
-// are contacts with edges that are none, known as ghost collisions.
+// Bodies slide without friction over a wavy triangle mesh, the typical ground of games and robotics. Contacts with
+// internal edges, known as ghost collisions, would slow them down.
 #pragma once
 
 #include "demos/shared/outcome.h"
@@ -7,18 +7,20 @@
 namespace bilayer::demo {
 
 struct TerrainOptions {
-    float height = 0.01f;      ///< amplitude of the waves, which are 3 and 4.8 m long [m]
-    float cell = 0.25f;        ///< edge of the squares that the ground is divided into, two triangles each [m]
-    bool heightField = false;  ///< the ground is a btHeightfieldTerrainShape; else a btBvhTriangleMeshShape
-    float speed = 2;           ///< at the start [m/s]
+    float height = 0.01f;      ///< amplitude of the waves, whose wavelengths are 3 and 4.8 m [m]
+    float cell = 0.25f;        ///< edge of the squares of two triangles each that form the ground [m]
+    bool heightField = false;  ///< the ground is a btHeightfieldTerrainShape; otherwise a btBvhTriangleMeshShape
+    float speed = 2;           ///< initial speed [m/s]
     float seconds = 3;
     float stepsPerSecond = 240;
-    float voxelSize = 0.0125f;  ///< of all bodies, which are 0.3 to 0.7 m large [m]
+    float voxelSize = 0.0125f;  ///< of all bodies, whose sizes are 0.3 to 0.7 m [m]
 };
 
-/// Criteria: after a quarter of a second in which bodies settle, each is as fast as a point without friction that keeps
-/// its energy, within 2 %; no contact leaves the normals of the triangles around it by more than 5 degrees; no body
-/// overlaps the ground by half a voxel; energy never rises by 1 %.
+/// Criteria, after a quarter of a second in which bodies settle:
+/// - The speed of each body is that of a frictionless point with constant energy, within 2 %.
+/// - No contact normal is more than 5 degrees outside of the normals of the triangles around it.
+/// - No body penetrates the ground by half a voxel.
+/// - Energy never rises by 1 %.
 Outcome terrain(const TerrainOptions& options);
 
 }  // namespace bilayer::demo

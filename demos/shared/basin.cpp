@@ -22,14 +22,14 @@ using openvdb::Vec3d;
 using openvdb::Vec3f;
 using openvdb::Vec3SGrid;
 
-constexpr int behind = 4;         // voxels and faces behind the box's walls that are mirrored
-constexpr double outside = 0.5;   // of the body: where its skin reads the level set [voxels]
-constexpr float skin = 3.5f;      // of the body in which the level set goes on [voxels]
+constexpr int behind = 4;         // layers of voxels and faces behind the box's walls that are mirrored
+constexpr double outside = 0.5;   // distance outside the body at which its skin samples the level set [voxels]
+constexpr float skin = 3.5f;      // thickness of the body's skin into which the level set is extended [voxels]
 constexpr float halfWidth = 3;    // of the box's level set [voxels]
-constexpr float minOpen = 0.02f;  // part of a face: through less, pressures find speeds that mean nothing
-constexpr double flat = 1e-3;     // slope of a distance below which it has no direction
+constexpr float minOpen = 0.02f;  // min open fraction of a face: below, pressures cause meaningless speeds
+constexpr double flat = 1e-3;     // min slope of a distance that defines a direction
 
-// The open faces of the box alone.
+// Returns the open faces of the box alone.
 Vec3SGrid::Ptr openFacesOf(const CoordBBox& box, const openvdb::math::Transform& cells) {
     const Vec3SGrid::Ptr open = Vec3SGrid::create(Vec3f(0));
     open->setTransform(cells.copy());
@@ -51,7 +51,7 @@ FloatGrid::Ptr levelSetOf(const CoordBBox& box, const openvdb::math::Transform& 
                                  Pose{{centre.x(), centre.y(), centre.z()}}, cells, float(halfWidth * voxel));
 }
 
-// The cell in the box that a mirror in the walls shows in place of one behind them.
+// Returns the cell in the box that is the mirror image of a cell behind the walls.
 Coord mirrored(const CoordBBox& box, Coord cell) {
     for (int axis = 0; axis < 3; ++axis) {
         if (cell[axis] < box.min()[axis]) cell[axis] = 2 * box.min()[axis] - 1 - cell[axis];
@@ -60,7 +60,7 @@ Coord mirrored(const CoordBBox& box, Coord cell) {
     return cell;
 }
 
-// The same for a face: what crosses a mirror turns around in it, and what crosses at the mirror is nothing.
+// The mirror image of a face. The velocity across a mirrored face changes sign, and at the mirror it is zero.
 struct MirroredFace {
     Coord face;
     float sign;
@@ -73,13 +73,13 @@ MirroredFace mirrored(const CoordBBox& box, const Coord& face, int across) {
     return {seen, at == low || at == high ? 0.f : at < low || at > high ? -1.f : 1.f};
 }
 
-// The box and the layers behind its walls that are mirrored.
+// Returns the box with the mirrored layers behind its walls.
 CoordBBox withWalls(CoordBBox box) {
     box.expand(behind);
     return box;
 }
 
-// The direction away from the body at a point [index coordinates]; nothing where the distance tells none.
+// Returns the direction away from the body at a point [index coordinates]; zero if the distance has no direction there.
 Vec3d normalAt(const FloatGrid::ConstAccessor& distance, const Vec3d& point, double voxel) {
     Vec3d slope;
     for (int axis = 0; axis < 3; ++axis) {
@@ -101,7 +101,7 @@ Basin::Basin(const openvdb::math::Transform& cells, const Coord& size)
       open_(empty_),
       solid_{openvdb::createLevelSet<FloatGrid>(cells.voxelSize()[0]), Vec3SGrid::create(Vec3f(0)), nullptr, nullptr} {}
 
-// The body's velocity, but for faces in the box's walls, which do not move however near the body is.
+// Returns the body's velocity, but zero for faces in the box's walls, which never move.
 Vec3SGrid::Ptr Basin::besideWalls(const Vec3SGrid& bodyVelocity) const {
     const Vec3SGrid::Ptr result = bodyVelocity.deepCopy();
     for (auto face = result->beginValueOn(); face; ++face) {
@@ -146,8 +146,8 @@ void Basin::continueBehindWalls(FloatGrid& liquid) const {
     }
 }
 
-// In the body's skin a level set goes on as it rises or falls outside along the normal, so that it meets the body at
-// any angle.
+// Extends a level set into the body's skin by its slope along the normal outside, so that it may meet the body at any
+// angle.
 void Basin::continueInBody(FloatGrid& liquid, const FloatGrid& before) const {
     const double voxel = liquid.voxelSize()[0];
     const float far = liquid.background();
@@ -182,7 +182,7 @@ void Basin::continueBehindWalls(FaceVelocity& velocity) const {
     }
 }
 
-// Faces that the body closes get the velocity around, with the body's own part along the normal.
+// Gives faces that the body closes the velocity around them, with the body's own normal component.
 void Basin::slideAlongBody(FaceVelocity& velocity) const {
     const Vec3SGrid::Ptr around = velocity.together();
     const auto all = around->getConstAccessor(), own = solid_.velocity->getConstAccessor(),

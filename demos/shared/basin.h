@@ -1,4 +1,4 @@
-// What a liquid stands in: a closed box whose walls are faces of cells, and a solid body of any shape within.
+// The container of a liquid: a closed box whose walls are cell faces, with a solid body of any shape inside.
 #pragma once
 
 #include <openvdb/openvdb.h>
@@ -11,26 +11,27 @@ namespace bilayer::demo {
 class Basin {
   public:
     /// @param cells     the liquid's voxels
-    /// @param size      along each axis [cells]: those from 0 to size - 1 are in the box
+    /// @param size      along each axis [cells]; cells 0 to size - 1 are inside the box
     Basin(const openvdb::math::Transform& cells, const openvdb::Coord& size);
 
-    /// Puts a body into the box in place of the last one. Its half width must be 5 voxels at least.
+    /// Replaces the body in the box. Its half width must be at least 5 voxels.
     void place(const fluid::Solid& solid);
 
     const openvdb::CoordBBox& box() const { return box_; }
-    /// The part of each face that liquid can cross, 0..1; staggered, 0 outside the box.
+    /// Returns the fraction of each face that is open to liquid, 0..1; staggered, 0 outside the box.
     const openvdb::Vec3SGrid& open() const { return *open_; }
-    /// Of the body across each face in its band and not in the box's walls, else 0 [m/s]; staggered.
+    /// Returns the body's velocity across each face in its band, except for faces in the box's walls, which have 0
+    /// [m/s]; staggered.
     const openvdb::Vec3SGrid& bodyVelocity() const { return *solid_.velocity; }
 
-    /// Lets a level set go on behind walls as if these were mirrors, and in the body's skin by its slope outside, so
-    /// that what lies at a wall has no surface there.
+    /// Extends a level set behind the walls by mirroring, and into the body's skin by its slope outside. Liquid that
+    /// touches a wall then has no surface there.
     void continueBehindWalls(openvdb::FloatGrid& liquid) const;
-    /// The same for its velocity, which then neither enters nor leaves: the part along a normal is turned around behind
-    /// the box's walls, and is the body's own in the body.
+    /// Extends the liquid's velocity in the same way, so that no liquid crosses the walls. Behind the box's walls the
+    /// normal component is reversed. In the body it is the body's own.
     void continueBehindWalls(FaceVelocity& velocity) const;
 
-    /// What of a level set is in the box and not in the body.
+    /// Returns the part of a level set that is inside the box and outside the body.
     openvdb::FloatGrid::Ptr inside(const openvdb::FloatGrid& liquid) const;
 
   private:
@@ -40,7 +41,7 @@ class Basin {
 
     openvdb::CoordBBox box_;
     openvdb::FloatGrid::Ptr room_;          // the box as a level set
-    openvdb::Vec3SGrid::Ptr empty_, open_;  // open faces without and with the body
+    openvdb::Vec3SGrid::Ptr empty_, open_;  // open faces without the body, and with it
     fluid::Solid solid_;
 };
 

@@ -12,17 +12,17 @@
 namespace bilayer::demo {
 namespace {
 
-constexpr std::uint32_t leafTriangles = 4;  // fewer cost more boxes, more cost more triangles: flat around this
-constexpr std::uint32_t leafPoints = 8;     // points a ball at least: one distance to its centre may spare them all
+constexpr std::uint32_t leafTriangles = 4;  // fewer test more boxes, more test more triangles; the optimum is flat
+constexpr std::uint32_t leafPoints = 8;     // min points per ball: one distance at the centre may exclude them all
 
-enum Feature { face = 0, edge = 1, corner = 4 };  // the first place of each kind in Triangle::normals
+enum Feature { face = 0, edge = 1, corner = 4 };  // the first index of each kind in Triangle::normals
 
 struct Closest {
     glm::dvec3 point;
-    int feature;  // place in Triangle::normals
+    int feature;  // index in Triangle::normals
 };
 
-// The closest point of a segment, as that of the triangle whose edge `index` it is.
+// Returns the closest point on a segment, as that of the triangle with this segment as edge `index`.
 Closest closestOnEdge(const std::array<glm::dvec3, 3>& corners, int index, const glm::dvec3& point) {
     const glm::dvec3 &a = corners[std::size_t(index)], &b = corners[std::size_t((index + 1) % 3)];
     const double t = glm::dot(point - a, b - a) / glm::dot(b - a, b - a);
@@ -32,7 +32,7 @@ Closest closestOnEdge(const std::array<glm::dvec3, 3>& corners, int index, const
 }
 
 Closest closestOnTriangle(const std::array<glm::dvec3, 3>& corners, const glm::dvec3& normal, const glm::dvec3& point) {
-    // over the face: on the inner side of all three edges
+    // above the face: on the inner side of all three edges
     bool inside = true;
     for (std::size_t i = 0; i < 3; ++i)
         inside = inside && glm::dot(glm::cross(normal, corners[(i + 1) % 3] - corners[i]), point - corners[i]) >= 0;
@@ -60,7 +60,7 @@ double angleAt(const glm::dvec3& apex, const glm::dvec3& a, const glm::dvec3& b)
     return std::atan2(glm::length(glm::cross(a - apex, b - apex)), glm::dot(a - apex, b - apex));
 }
 
-// A rigid motion in double precision: single precision would blur penetrations of a few micrometres.
+// A rigid transform in double precision. Single precision would blur penetrations of a few micrometres.
 struct Motion {
     glm::dquat rotation;
     glm::dvec3 position;
@@ -70,7 +70,7 @@ struct Motion {
     glm::dvec3 toBody(const glm::dvec3& point) const { return glm::conjugate(rotation) * (point - position); }
 };
 
-// Cuts a range into halves across the axis of the box's longest side.
+// Divides a range into halves by the median along the longest axis of the box.
 template <class Iterator, class Position>
 void halve(Iterator begin, Iterator middle, Iterator end, const glm::dvec3& size, Position position) {
     const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
@@ -115,7 +115,7 @@ void ExactDistance::addTriangles(const Mesh& mesh) {
     }
     for (const auto& t : mesh.triangles) {
         const glm::dvec3 normal = unitNormal(t);
-        if (normal == glm::dvec3(0)) continue;  // its edges belong to its neighbours too
+        if (normal == glm::dvec3(0)) continue;  // its edges also belong to its neighbours
         triangles_.push_back(
             {cornersOf(mesh, t),
              {normal, edgeNormals.at(edgeOf(t, 0)), edgeNormals.at(edgeOf(t, 1)), edgeNormals.at(edgeOf(t, 2)),
@@ -135,7 +135,7 @@ void ExactDistance::addNode(std::uint32_t begin, std::uint32_t end) {
     nodes_.push_back(node);
     if (end - begin <= leafTriangles) return;
 
-    // halves by the median along the longest side keep the tree balanced whatever the mesh
+    // median splits along the longest axis keep the tree balanced for any mesh
     const std::uint32_t middle = begin + (end - begin) / 2;
     halve(triangles_.begin() + begin, triangles_.begin() + middle, triangles_.begin() + end, node.upper - node.lower,
           [](const Triangle& t) { return t.corners[0] + t.corners[1] + t.corners[2]; });
@@ -209,8 +209,8 @@ void Specimen::addBall(std::uint32_t begin, std::uint32_t end) {
     addBall(middle, end);
 }
 
-// Branch and bound: a true distance changes by no more than one walks, so the points of a ball lie no deeper than its
-// centre by more than its radius.
+// Branch and bound. The exact distance is 1-Lipschitz, so the depth of a ball's points exceeds that of its centre by at
+// most the radius.
 struct Specimen::Descent {
     const Specimen& specimen;
     const ExactDistance& other;

@@ -1,5 +1,5 @@
-// The true signed distance to a mesh, and how deep two meshes overlap by it. Double precision, and independent of the
-// library's own fields: what demos and tests measure them against.
+// The exact signed distance to a mesh, and the exact penetration depth of two meshes. It uses double precision and does
+// not depend on the library's own fields. Demos and tests use it as the reference.
 #pragma once
 
 #include <array>
@@ -13,31 +13,31 @@
 
 namespace bilayer::demo {
 
-/// The signed distance to a closed, oriented mesh: the nearest triangle by a tree of boxes, the sign by the
+/// The signed distance to a closed, oriented mesh. A tree of boxes finds the nearest triangle. The sign is that of the
 /// angle-weighted pseudonormal of the nearest face, edge or vertex (J. A. Baerentzen, H. Aanaes, "Signed distance
 /// computation using the angle weighted pseudonormal", IEEE TVCG 11 (2005) 243-253).
 class ExactDistance {
   public:
-    /// Throws std::invalid_argument as validate() does, or if all triangles are without area.
+    /// Throws std::invalid_argument as validate() does, or if no triangle has an area.
     explicit ExactDistance(const Mesh& mesh);
 
-    /// The distance at a point, negative inside [m]. Safe from any thread; O(log triangles) near the surface.
+    /// Returns the distance at a point, negative inside [m]. Thread-safe; O(log triangles) near the surface.
     double operator()(const glm::dvec3& point) const;
 
-    /// The box around the mesh [m].
+    /// The bounding box of the mesh [m].
     const glm::dvec3& lower() const { return nodes_.front().lower; }
     const glm::dvec3& upper() const { return nodes_.front().upper; }
 
   private:
     struct Triangle {
         std::array<glm::dvec3, 3> corners;
-        /// Of the face, of the edges after corners 0, 1, 2, and of the corners 0, 1, 2; not of unit length.
+        /// Normals of the face, of the edges after corners 0, 1, 2, and of the corners 0, 1, 2; not normalised.
         std::array<glm::dvec3, 7> normals;
     };
     struct Node {
         glm::dvec3 lower, upper;
         std::uint32_t begin, end;  // range of triangles
-        std::uint32_t right;       // the second child, the first is the next node; 0: a leaf
+        std::uint32_t right;       // the second child, or 0 for a leaf; the first child is the next node
     };
     struct Nearest;
 
@@ -49,17 +49,18 @@ class ExactDistance {
     std::vector<Node> nodes_;
 };
 
-/// A body to be measured: its true distance, and points all over its surface in a tree of balls.
+/// A body whose penetration is measured: its exact distance, and sample points on its surface in a tree of balls.
 class Specimen {
   public:
-    /// @param spacing  points are the vertices and, on longer triangles, as many more as leave no gap beyond this [m]
+    /// @param spacing  max distance between sample points [m]; points are the vertices, with additional ones on larger
+    ///                 triangles
     Specimen(const Mesh& mesh, double spacing);
 
     const ExactDistance& distance() const { return distance_; }
     std::span<const glm::dvec3> points() const { return points_; }
 
-    /// How deep some surface point of this body lies under the surface of another, if
-    /// deeper than `least`; else `least` [m].
+    /// Returns the max depth of this body's surface points below the surface of another body, or `least` if that is
+    /// greater [m].
     double deepestIn(const ExactDistance& other, const Pose& self, const Pose& otherPose, double least = 0) const;
 
   private:
@@ -67,7 +68,7 @@ class Specimen {
         glm::dvec3 centre;
         double radius;
         std::uint32_t begin, end;  // range of points
-        std::uint32_t right;       // the second child, the first is the next ball; 0: a leaf
+        std::uint32_t right;       // the second child, or 0 for a leaf; the first child is the next ball
     };
     struct Descent;
 
@@ -78,8 +79,8 @@ class Specimen {
     std::vector<Ball> balls_;
 };
 
-/// How deep some surface point of one body lies under the surface of the other, if deeper than `least`; else `least`
-/// [m].
+/// Returns the penetration depth: the max depth of the surface points of either body below the surface of the other, or
+/// `least` if that is greater [m].
 double penetration(const Specimen& a, const Pose& poseA, const Specimen& b, const Pose& poseB, double least = 0);
 
 }  // namespace bilayer::demo

@@ -17,7 +17,7 @@ using openvdb::FloatTree;
 using openvdb::Vec3SGrid;
 using openvdb::Vec3STree;
 
-// One layer more: what is newly active gets the mean of the neighbours that were active before.
+// Adds one layer: each new voxel gets the mean of the neighbours that were active before.
 void addLayer(FloatTree& tree) {
     const FloatTree before(tree);
     openvdb::tools::dilateActiveValues(tree, 1, openvdb::tools::NN_FACE, openvdb::tools::IGNORE_TILES);
@@ -44,7 +44,7 @@ void addLayer(FloatTree& tree) {
     });
 }
 
-// A vector for each cell with a known face, in the cells' own transform.
+// Returns one vector per cell with a known face, in the cells' own transform.
 template <class Part>
 Vec3SGrid::Ptr vectors(const FaceVelocity& velocity, const Part& part) {
     const auto& axes = velocity.axes;
@@ -112,7 +112,7 @@ FaceVelocity advected(const FaceVelocity& velocity, float seconds) {
     for (auto& axis : result.axes) {
         const FloatGrid::Ptr before = axis;
         axis = advection.advect<FloatGrid, FloatGrid, openvdb::tools::BoxSampler>(*before, *before, double(seconds));
-        axis->topologyUnion(*before);  // the advection takes what stands still for unknown
+        axis->topologyUnion(*before);  // the advection treats zero velocity as unknown
     }
     return result;
 }

@@ -1,4 +1,4 @@
-// The velocity of a liquid across the faces of its cells, carried by OpenVDB's own tools.
+// The velocity of a liquid across the faces of its cells, advected by OpenVDB's tools.
 #pragma once
 
 #include <openvdb/openvdb.h>
@@ -7,27 +7,28 @@
 
 namespace bilayer::demo {
 
-/// A staggered velocity as a grid for each axis, so that each face is known (active) or not by itself. A voxel's value
-/// is the speed across the cell's lower face along that axis [m/s], and the grid's transform places it there.
+/// A staggered velocity with one grid per axis, so that each face is known (active) or unknown independently. The value
+/// of a voxel is the speed across the cell's lower face along that axis [m/s]. The transform of the grid places the
+/// value at the face.
 struct FaceVelocity {
     explicit FaceVelocity(const openvdb::math::Transform& transform);
 
     openvdb::math::Transform::ConstPtr cells;
     std::array<openvdb::FloatGrid::Ptr, 3> axes;
 
-    /// The same as OpenVDB's tools take it: one staggered grid in the cells' own transform.
+    /// Returns one staggered grid in the transform of the cells, as OpenVDB's tools expect it.
     openvdb::Vec3SGrid::Ptr together() const;
-    /// At the cells' centres, between their faces.
+    /// Returns the velocity at the cell centres, interpolated between their faces.
     openvdb::Vec3SGrid::Ptr atCentres() const;
-    /// Of all known faces [m/s].
+    /// Returns the max speed of all known faces [m/s].
     float fastest() const;
 };
 
-/// Gives the faces around the known ones the mean of their known neighbours, so many layers outwards.
+/// Extends the velocity outwards by this count of layers. Each new face gets the mean of its known neighbours.
 void extrapolate(FaceVelocity& velocity, int layers);
 
-/// Carries the velocity along itself, by MacCormack's scheme with its limiter (openvdb::tools::VolumeAdvection). Known
-/// are the same faces as before.
+/// Advects the velocity along itself by MacCormack's scheme with its limiter (openvdb::tools::VolumeAdvection). The
+/// known faces stay the same.
 FaceVelocity advected(const FaceVelocity& velocity, float seconds);
 
 }  // namespace bilayer::demo

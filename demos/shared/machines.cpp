@@ -14,13 +14,13 @@ namespace {
 constexpr double pi = glm::pi<double>();
 
 constexpr int segmentStep = 24;  // puts vertices on the corners of hexagons and squares
-constexpr int minAround = 6;     // vertices of the smallest ring around a pole: its triangles are equilateral
-// Of an edge: how near rows of a thread may come to its end, below which they give way to it.
+constexpr int minAround = 6;     // vertices of the smallest ring around a pole, so that its triangles are equilateral
+// In edge lengths: rows of a thread that come closer to its end than this are dropped.
 constexpr double nearestRow = 0.4;
-constexpr double mouthWidth = 1.05;              // of a nut [diameters]: ISO 4032 has 1 to 1.08
-const double mouthSlope = std::sqrt(3.0);        // of a nut's mouth in the mean: that of a countersink of 120 degrees
+constexpr double mouthWidth = 1.05;              // of a nut [diameters]: ISO 4032 allows 1 to 1.08
+const double mouthSlope = std::sqrt(3.0);        // mean slope of a nut's opening: that of a 120 degree countersink
 constexpr double addendum = 1, dedendum = 1.25;  // ISO 53, profile A [modules]
-const double flankRise = std::sqrt(3.0);         // of a thread's flank, 30 degrees off the radial plane
+const double flankRise = std::sqrt(3.0);         // slope of a thread's flank, 30 degrees from the radial plane
 const double threadHeight = 5.0 / 16 * std::sqrt(3.0);  // from crest to root, 5/8 H [pitches]
 
 void require(bool met, const char* what) {
@@ -31,7 +31,7 @@ void requireSegments(int segments) {
     require(segments > 0 && segments % segmentStep == 0, "a round part needs a multiple of 24 segments");
 }
 
-// From 0 at `low` to 1 at `high`, flat at both.
+// Smooth step from 0 at `low` to 1 at `high`, with zero slope at both.
 double smoothStep(double low, double high, double x) {
     const double t = std::clamp((x - low) / (high - low), 0.0, 1.0);
     return t * t * (3 - 2 * t);
@@ -45,7 +45,7 @@ glm::vec3 aroundAxis(double radius, double angle, double height) {
     return glm::vec3(glm::dvec3(radius * std::cos(angle), radius * std::sin(angle), height));
 }
 
-// A vertex in a row of them, and where it stands in the row.
+// A vertex in a row, with its position in the row as the key.
 struct Link {
     unsigned vertex;
     double key;
@@ -57,8 +57,9 @@ unsigned addPoint(Mesh& mesh, const glm::vec3& point) {
     return unsigned(mesh.points.size() - 1);
 }
 
-// Triangles between two rows of ascending keys, always on to the lower key; `b` lies to the left of `a`. Of equal keys
-// that of `b` comes first: so the diagonals on the flanks of a thread, which are bent, cut into them and add nothing.
+// Fills the space between two rows of ascending keys with triangles, always advancing to the lower key; `b` is to the
+// left of `a`. On equal keys, `b` advances first. The diagonals on the curved flanks of a thread then cut into the
+// flanks and never add material.
 void zip(Mesh& mesh, const Row& a, const Row& b) {
     std::size_t i = 0, j = 0;
     while (i + 1 < a.size() || j + 1 < b.size())
@@ -71,19 +72,19 @@ void zip(Mesh& mesh, const Row& a, const Row& b) {
         }
 }
 
-// Radius by angle.
+// Radius as a function of the angle.
 using Outline = std::function<double(double)>;
 
 Outline round(double radius) {
     return [=](double) { return radius; };
 }
 
-// A circle within which `segments` chords stay outside the radius.
+// Returns a circle whose `segments` chords stay outside of the radius.
 Outline roundHole(double radius, int segments) {
     return round(radius / std::cos(pi / segments));
 }
 
-// A regular polygon; one of its sides faces +x.
+// Returns a regular polygon; one of its sides faces +x.
 Outline polygon(int sides, double apothem) {
     return [=](double angle) { return apothem / std::cos(std::remainder(angle, 2 * pi / sides)); };
 }
@@ -92,9 +93,9 @@ Outline polygon(int sides, double apothem) {
 struct Level {
     Outline radius;
     double height;
-    int count;  // of its vertices; 1: a pole
+    int count;  // count of vertices; 1: a pole
 
-    // How long its edges are.
+    // Returns the length of its edges.
     double edge() const { return 2 * pi * radius(0) / count; }
 };
 
@@ -102,7 +103,7 @@ Level pole(double height) {
     return {round(0), height, 1};
 }
 
-// Curves between two others, without the first, about as far apart as their edges are long.
+// Returns curves between two others, excluding the first, at a spacing of about their edge length.
 std::vector<Level> between(const Level& from, const Level& to) {
     double length = 0;
     for (int i = 0; i < segmentStep; ++i) {
@@ -122,19 +123,20 @@ std::vector<Level> between(const Level& from, const Level& to) {
     return levels;
 }
 
-// Turns a surface around z, curve by curve: outward on undersides, up on outsides, inward on tops, down in holes.
+// Builds a surface around z, curve by curve: outward on bottom faces, up on outer walls, inward on top faces, down in
+// holes.
 class Lathe {
   public:
     explicit Lathe(Mesh& mesh) : mesh_(mesh) {}
 
-    // Starts at a curve, with nothing to join it to.
+    // Starts at a curve without joining it to anything.
     const Row& begin(const Level& level) { return begin(level, addRow(level)); }
     const Row& begin(const Level& level, const Row& row) {
         level_ = level;
         return row_ = row;
     }
 
-    // Goes on to a curve, through others on the way.
+    // Continues to a curve, through intermediate ones.
     const Row& to(const Level& level) { return to(level, nullptr); }
     const Row& to(const Level& level, const Row* last) {
         const auto levels = between(level_, level);
@@ -148,7 +150,7 @@ class Lathe {
     }
 
   private:
-    // Rows begin where the last one does.
+    // The row starts at the same angle as the previous one.
     Row addRow(const Level& level) {
         Row row;
         const double start = row_.empty() ? 0 : row_.front().key;
@@ -165,12 +167,12 @@ class Lathe {
     Row row_;
 };
 
-// The section of a thread along its axis. `phase` is the way from the middle of a crest [pitches].
+// The axial section of a thread. `phase` is the distance from the middle of a crest [pitches].
 struct Profile {
     double crest, root;          // radii [m]
-    double crestEnd, rootStart;  // phases where the flank begins and ends
+    double crestEnd, rootStart;  // phases at the ends of the flank
 
-    // ISO 68-1, drawn in by the clearance on all sides.
+    // The profile of ISO 68-1, offset inward by the clearance.
     Profile(const Thread& thread, double clearance) {
         require(thread.pitch > 0 && thread.diameter > 2 * thread.pitch,
                 "a thread needs a pitch below half its diameter");
@@ -188,7 +190,8 @@ struct Profile {
         return crest + std::clamp(t, 0.0, 1.0) * (root - crest);
     }
 
-    // Phases of rows along the thread, from one crest to the next: on all edges, and about as close as asked for.
+    // Returns the phases of rows along the thread from one crest to the next: at all edges, and at about the given
+    // spacing.
     std::vector<double> rows(double pitch, double edge) const {
         const double ends[] = {-crestEnd, crestEnd, rootStart, 1 - rootStart, 1 - crestEnd};
         std::vector<double> phases;
@@ -202,10 +205,10 @@ struct Profile {
     }
 };
 
-// A threaded surface between two circles of as many vertices: radius by phase [pitches] and height. Its rows of
-// vertices run along the thread, so that its edges stay as sharp as the profile's; they begin and end at the circles.
-// There the radius must not change with the phase as far as plainEnd() says: else what joins the last row to the circle
-// would run across grooves.
+// A threaded surface between two circles with equal counts of vertices, given by the radius as a function of phase
+// [pitches] and height. Its rows of vertices run along the thread, so that its edges stay as sharp as the profile's.
+// The rows begin and end at the circles. Near the circles, up to the length plainEnd(), the radius must not depend on
+// the phase. Otherwise the triangles that join the last row to the circle would cross grooves.
 struct ThreadedWall {
     double bottom, top, pitch, edge;
     std::vector<double> phases;
@@ -222,11 +225,11 @@ struct ThreadedWall {
         return pitch * (double(crest) + phases[std::size_t(row - crest * size)] + turn);
     }
 
-    // The vertices above a place of the circles, from one to the other, keyed by the rows that they are of.
+    // Returns the vertices above a position on the circles, from one circle to the other, with their rows as keys.
     Row column(Mesh& mesh, const Link& low, const Link& high) const {
         const long size = long(phases.size());
         const long first = size * long(std::floor(bottom / pitch - 2)), last = size * long(std::ceil(top / pitch + 1));
-        Row column{{low.vertex, 0}};  // nothing asks for the first key
+        Row column{{low.vertex, 0}};  // the first key is never used
         for (long row = first; row < last; ++row) {
             const double z = height(row, low.key), phase = phases[std::size_t((row - first) % size)];
             if (z < bottom + nearestRow * edge || z > top - nearestRow * edge) continue;
@@ -240,7 +243,7 @@ struct ThreadedWall {
     void add(Mesh& mesh, const Row& low, const Row& high, bool inside) const {
         std::vector<Row> columns;
         for (std::size_t i = 0; i + 1 < low.size(); ++i) columns.push_back(column(mesh, low[i], high[i]));
-        // a turn further the rows have climbed by a pitch
+        // after one revolution, the rows have climbed by one pitch
         columns.push_back(columns.front());
         for (Link& link : columns.back()) link.key -= double(phases.size());
         for (std::size_t i = 0; i + 1 < columns.size(); ++i)
@@ -248,7 +251,7 @@ struct ThreadedWall {
     }
 };
 
-// The prism over a mesh in the plane z = 0 that faces up, half of it below.
+// Extrudes a planar mesh at z = 0 that faces up into a prism centred on that plane.
 Mesh extrude(const Mesh& flat, double height, double edge) {
     const int layers = cellsOf(height, edge);
     const auto size = unsigned(flat.points.size());
@@ -271,21 +274,21 @@ Mesh extrude(const Mesh& flat, double height, double edge) {
             mesh.triangles.push_back({low + from, high + to, high + from});
         }
     }
-    return weld(mesh);  // drops what the layers repeat of the inner points
+    return weld(mesh);  // removes the inner points that the layers repeat
 }
 
-// The outline of a tooth: radii, and half its angle there.
+// The outline of a tooth: radii, and half of its angle there.
 struct ToothStation {
     double radius, halfAngle;
 };
 
-// From the root to the tip: radially up to the base circle, then along the involute.
+// Returns the outline from root to tip: radially up to the base circle, then along the involute.
 std::vector<ToothStation> toothStations(const Gear& part) {
     const double pitchRadius = part.teeth * double(part.toothModule) / 2;
     const double base = pitchRadius * std::cos(double(part.pressureAngle));
     const double root = pitchRadius - dedendum * part.toothModule, tip = pitchRadius + addendum * part.toothModule;
     const double thickness = pi * part.toothModule / 2 - double(part.backlash) / 2;
-    // the unwound part of the string over the base circle, by the circle's radius: it grows from 0 at the base
+    // length of the unwound string, in base radii; 0 at the base circle
     const auto unwound = [&](double radius) { return std::sqrt(std::max(0.0, radius * radius / (base * base) - 1)); };
     const auto involute = [](double string) { return string - std::atan(string); };
     const double halfAtBase = thickness / (2 * pitchRadius) + involute(unwound(pitchRadius));
@@ -295,7 +298,7 @@ std::vector<ToothStation> toothStations(const Gear& part) {
     if (root < base)
         for (int i = 0, cells = cellsOf(base - root, edge); i < cells; ++i)
             stations.push_back({root + (base - root) * i / cells, halfAtBase});
-    // an involute is half the squared string long
+    // the arc length of an involute is half the squared string length
     const double low = std::pow(unwound(std::max(root, base)), 2), high = std::pow(unwound(tip), 2);
     const int cells = cellsOf(base * (high - low) / 2, edge);
     for (int i = 0; i <= cells; ++i) {
@@ -305,7 +308,7 @@ std::vector<ToothStation> toothStations(const Gear& part) {
     return stations;
 }
 
-// A row of vertices across a tooth, from one flank to the other.
+// Adds a row of vertices across a tooth, from one flank to the other.
 Row addAcross(Mesh& mesh, const ToothStation& at, double middle, int cells) {
     Row row;
     for (int i = 0; i <= cells; ++i) {
@@ -315,7 +318,7 @@ Row addAcross(Mesh& mesh, const ToothStation& at, double middle, int cells) {
     return row;
 }
 
-// The vertices of the root circle in order, after all teeth are there.
+// Adds all teeth. Returns the vertices of the root circle in order.
 Row addTeeth(Mesh& mesh, const Gear& part) {
     const auto stations = toothStations(part);
     require(stations.back().halfAngle > 0, "a gear's teeth must not end in a point");

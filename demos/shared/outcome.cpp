@@ -38,7 +38,7 @@ void writeTable(const Table& table, const std::filesystem::path& path) {
     if (!file.flush()) throw std::runtime_error(path.string() + ": cannot be written");
 }
 
-// What only rigid bodies have.
+// Prints what only rigid bodies have.
 void printBodies(const Outcome& outcome) {
     const auto steps = double(outcome.stepMs.size());
     const auto depth = [&](double d) {

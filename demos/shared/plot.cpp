@@ -15,17 +15,17 @@ namespace {
 // [pixels]
 constexpr double panelWidth = 620, panelHeight = 400, left = 70, right = 200, top = 44, bottom = 54;
 constexpr std::size_t maxInRow = 3;  // panels
-constexpr double labelSpacing = 34;  // of the two lines of text at the ends of lines
+constexpr double labelSpacing = 34;  // min distance of labels at the ends of lines
 constexpr std::array colours{"#1f5fa8", "#c4572b", "#3d8a4f", "#7a4fa0", "#b8860b", "#1b98a0", "#b0478c", "#5a5a5a"};
 
-// A point this far beyond a decade does not ask for another one [decades].
+// A point that exceeds a decade by less than this does not add another decade [decades].
 constexpr double decadeSlack = 0.02;
 
-constexpr std::size_t maxMarks = 30;  // points that a line of a linear panel is marked at: with more it is a curve
-constexpr double steps = 5;           // of a linear axis, about
+constexpr std::size_t maxMarks = 30;  // max points of a line with markers in a linear panel
+constexpr double steps = 5;           // approximate count of steps of a linear axis
 
-// An axis from whole decade to whole decade, or from tick to tick, onto pixels; `low` and `high` are logarithms unless
-// it is linear, in steps of `step`.
+// Maps an axis to pixels, from whole decade to whole decade or from tick to tick. `low` and `high` are logarithms,
+// unless the axis is linear with steps of `step`.
 struct Axis {
     double low, high, from, to, step = 0;
 
@@ -34,7 +34,7 @@ struct Axis {
     }
 };
 
-// From 0, or from below it, in steps of 1, 2 or 5 with zeros.
+// Returns an axis that starts at or below 0, with steps of 1, 2 or 5 times a power of ten.
 Axis linearAxisOf(const std::vector<double>& values, double from, double to) {
     const auto [least, most] = std::minmax_element(values.begin(), values.end());
     const double low = std::min(0.0, *least), high = *most > low ? *most : low + 1;
@@ -65,7 +65,7 @@ std::vector<double> ticksOf(const Axis& axis) {
     return ticks;
 }
 
-// 1000 as 10 with a raised 3; what is no power of ten as it is.
+// Formats a power of ten as 10 with an exponent, and any other number as it is.
 std::string tickText(const Axis& axis, double value) {
     if (axis.step > 0) return fmt::format("{:.6g}", std::abs(value) < 1e-9 * axis.step ? 0 : value);
     const double power = std::log10(value);
@@ -101,7 +101,7 @@ std::string grid(const Panel& panel, const Axis& x, const Axis& y) {
     return out;
 }
 
-// Labels stand where their lines end, pushed apart where lines end close together.
+// Labels are at the ends of their lines, and are pushed apart where lines end close together.
 std::string lines(const Panel& panel, const Axis& x, const Axis& y) {
     std::vector<std::pair<double, std::size_t>> ends;
     for (std::size_t i = 0; i < panel.lines.size(); ++i) ends.push_back({y(panel.lines[i].y.back()), i});

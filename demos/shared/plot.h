@@ -1,5 +1,5 @@
-// A plot as an SVG file: panels, up to three in a row, with labelled lines, log-log with decades or linear with round
-// steps.
+// Plots as an SVG file: panels with labelled lines, up to three per row, either log-log with decades or linear with
+// round steps.
 #pragma once
 
 #include <filesystem>
@@ -8,7 +8,7 @@
 
 namespace bilayer::demo {
 
-/// A line: its points and the text at its end.
+/// A line: its points and the label at its end.
 struct Line {
     std::string label;
     std::vector<double> x, y;  ///< positive, unless the panel is linear
@@ -16,16 +16,16 @@ struct Line {
 
 struct Panel {
     std::string title, xLabel, yLabel;
-    std::vector<double> xTicks;  ///< where x is labelled; empty: at each decade
-    std::vector<Line> lines;     ///< at least one, of at least one point
-    bool linear = false;         ///< both axes, y from 0; else logarithmic
+    std::vector<double> xTicks;  ///< labelled positions; empty: each decade
+    std::vector<Line> lines;     ///< at least one line of at least one point
+    bool linear = false;         ///< both axes are linear and y starts at 0; otherwise both are logarithmic
 };
 
-/// Draws the panels; lines of the same place in each panel share a colour. Throws std::invalid_argument where there is
-/// nothing to draw.
+/// Draws the panels. Lines with the same index in different panels share a colour. Throws std::invalid_argument if
+/// there is nothing to draw.
 std::string svg(const std::vector<Panel>& panels);
 
-/// Throws std::runtime_error that names the file when it cannot be written.
+/// Throws std::runtime_error that names the file if it cannot be written.
 void writeSvg(const std::filesystem::path& path, const std::vector<Panel>& panels);
 
 }  // namespace bilayer::demo

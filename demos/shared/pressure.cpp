@@ -26,12 +26,12 @@ using openvdb::Vec3SGrid;
 using Vector = pcg::Vector<double>;
 using Matrix = poisson::LaplacianMatrix;
 
-constexpr double minDistance = 0.02;  // of the surface from a liquid cell's centre, where it divides [voxels]
-constexpr double tolerance = 1e-5;    // of the divergence, in parts of its largest
+constexpr double minDistance = 0.02;  // of the surface from a cell centre, where it is a divisor [voxels]
+constexpr double tolerance = 1e-5;    // relative to the max divergence
 constexpr int maxIterations = 1000;
-constexpr double towardsZero = 1e-6;  // how much pressures are drawn there, where no surface tells them
+constexpr double towardsZero = 1e-6;  // strength with which pressures are pulled to zero if no surface determines them
 
-// All that the equations of a cell read; one for each thread.
+// The data that the equations of a cell read; one reader per thread.
 struct Reader {
     Reader(const FaceVelocity& velocity, const FloatGrid& liquid, const Basin& basin, const Int32Tree& cells)
         : speed{velocity.axes[0]->getConstAccessor(), velocity.axes[1]->getConstAccessor(),
@@ -46,7 +46,7 @@ struct Reader {
     Vec3SGrid::ConstAccessor open, body;
     openvdb::tree::ValueAccessor<const Int32Tree> cells;
 
-    // What leaves through the upper faces of a cell and enters through the lower ones [m/s].
+    // Returns the outflow through the upper faces of a cell minus the inflow through the lower ones [m/s].
     double outflow(const Coord& cell) const {
         double sum = 0;
         for (int axis = 0; axis < 3; ++axis)
@@ -61,14 +61,14 @@ struct Reader {
         return sum;
     }
 
-    // How far from a liquid cell's centre the surface is, on the way to a neighbour that is none [voxels].
+    // Returns the distance from a liquid cell's centre to the surface, towards a neighbour that is not liquid [voxels].
     double surfaceBetween(const Coord& cell, const Coord& neighbour) const {
         const double here = liquid.getValue(cell), there = liquid.getValue(neighbour);
         return there > 0 ? std::max(here / (here - there), minDistance) : 1;
     }
 };
 
-// The cells whose centres are in the liquid and that are not closed all around, numbered.
+// Returns the numbered cells whose centres are in the liquid and that have an open face.
 Int32Tree::Ptr cellsOf(const FloatGrid& liquid, const Basin& basin) {
     const auto mask = openvdb::tools::sdfInteriorMask(liquid);
     mask->tree().clip(basin.box());
@@ -90,7 +90,7 @@ Int32Tree::Ptr cellsOf(const FloatGrid& liquid, const Basin& basin) {
     return poisson::createIndexTree(mask->tree());
 }
 
-// Returns whether the cell has a way to the surface by a face of its own.
+// Returns whether one of the cell's own faces leads to the surface.
 bool fillRow(const Reader& read, const Coord& cell, int index, Matrix& matrix) {
     Matrix::RowEditor row = matrix.getRowEditor(pcg::SizeType(index));
     double diagonal = 0;
@@ -115,17 +115,17 @@ bool fillRow(const Reader& read, const Coord& cell, int index, Matrix& matrix) {
     return atSurface;
 }
 
-// The equations: what the pressures of cells make of their outflow.
+// The linear system: how the pressures of cells affect their outflow.
 struct System {
     explicit System(pcg::SizeType cells) : matrix(cells), outflow(cells), wanted(cells), atSurface(cells) {}
 
     Matrix matrix;
-    Vector outflow, wanted;       // before, and to be [m/s]
-    std::vector<char> atSurface;  // whether a cell has a way to it by a face of its own
+    Vector outflow, wanted;       // current and target outflow [m/s]
+    std::vector<char> atSurface;  // for each cell, whether one of its own faces leads to the surface
 };
 
-// Liquid that is closed in, without a surface, has no room to grow, and pressures that may all be higher by any number:
-// its cells share what they cannot let out, and are drawn a little to the pressure 0.
+// Handles enclosed liquid without a surface. It cannot expand, and its pressures are determined only up to a constant.
+// Its cells share the divergence that they cannot release, and their pressures are pulled slightly to zero.
 void closePockets(System& system) {
     const auto count = system.matrix.numRows();
     std::vector<pcg::SizeType> parent(count), cells(count);
@@ -155,8 +155,8 @@ void closePockets(System& system) {
     }
 }
 
-// OpenVDB gives up where the residual has doubled since it was least, as it may for a while with conjugate gradients;
-// they begin anew from there.
+// OpenVDB stops when the residual has doubled since its min, which may happen temporarily with conjugate gradients. The
+// solver then restarts from there.
 pcg::State solve(const Matrix& matrix, const Vector& change, Vector& pressure) {
     pcg::IncompleteCholeskyPreconditioner<Matrix> preconditioner(matrix);
     pcg::State limits = pcg::terminationDefaults<double>(), state;
@@ -171,7 +171,7 @@ pcg::State solve(const Matrix& matrix, const Vector& change, Vector& pressure) {
     return state;
 }
 
-// The faces of the liquid's cells, sped up by the difference of the pressures at either side.
+// Accelerates the faces of the liquid's cells by the pressure difference across them.
 void accelerate(FaceVelocity& velocity, const FloatGrid& liquid, const Basin& basin, const Int32Tree& cells,
                 const Vector& pressure) {
     const FaceVelocity before = velocity;
@@ -221,7 +221,7 @@ Projection Pressure::project(FaceVelocity& velocity, const FloatGrid& liquid, co
     const double voxel = liquid.voxelSize()[0];
     if (count == 0) return {};
 
-    // pressures are scaled: their differences are changes of speed [m/s]
+    // pressures are scaled: their differences are changes of velocity [m/s]
     System system(count);
     openvdb::tree::LeafManager<const Int32Tree> leaves(*cells);
     leaves.foreach ([&](const Int32Tree::LeafNodeType& leaf, std::size_t) {

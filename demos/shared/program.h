@@ -1,4 +1,4 @@
-// The program around a scene: its command line, what it prints, the files that it writes.
+// The program around a scene: command line, printed results, and output files.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -11,7 +11,7 @@
 
 namespace bilayer::demo {
 
-/// Accepts all but NaN, which CLI11 finds in every range.
+/// Accepts any number except NaN, which CLI11's ranges accept.
 CLI::Validator aNumber();
 
 /// Options that all scenes share, such as --out and --threads, and those that the scene adds:
@@ -26,7 +26,7 @@ class Program {
   public:
     Program(std::string name, const std::string& description);
 
-    /// An option of the scene's own; its present value is the default that --help tells.
+    /// Adds a scene-specific option. The current value is the default that --help shows.
     template <class Value>
     CLI::Option* option(const std::string& flag, Value& value, const std::string& help) {
         CLI::Option* added = app_.add_option(flag, value, help)->capture_default_str();
@@ -38,8 +38,8 @@ class Program {
         return app_.add_flag(flag, value, help);
     }
 
-    /// Parses, plays the scene, prints its outcome and writes its files.
-    /// @return the exit status: 0; 1 if the scene throws, 2 for wrong usage, 3 if a criterion is missed
+    /// Parses the command line, runs the scene, prints its outcome and writes its files.
+    /// @return the exit status: 0; 1 if the scene throws, 2 for wrong usage, 3 if a criterion is not met
     int run(int argc, char** argv, const std::function<Outcome()>& scene);
 
   private:

@@ -44,7 +44,7 @@ std::string base64(const std::vector<T>& values) {
         const unsigned word = unsigned(bytes[i]) << 16 | unsigned(bytes[i + 1]) << 8 | bytes[i + 2];
         for (int shift = 18; shift >= 0; shift -= 6) text += digits[word >> shift & 63];
     }
-    // the last group may carry one byte or two
+    // the last group may contain one byte or two
     for (std::size_t i = 0; i < (3 - size % 3) % 3; ++i) text[text.size() - 1 - i] = '=';
     return text;
 }
@@ -62,7 +62,7 @@ void replace(std::string& text, std::string_view placeholder, std::string_view v
     if (at != std::string::npos) text.replace(at, placeholder.size(), value);
 }
 
-// Points as 16-bit steps from `lower` to `upper`.
+// Points quantised to 16-bit steps from `lower` to `upper`.
 struct Quantised {
     Bounds box;
     std::vector<std::uint16_t> steps;
@@ -70,7 +70,7 @@ struct Quantised {
 
 void append(Quantised& to, const glm::vec3& point) {
     for (int axis = 0; axis < 3; ++axis) {
-        const float size = std::max(to.box.size()[axis], 1e-9f);  // a flat box has no steps to count
+        const float size = std::max(to.box.size()[axis], 1e-9f);  // avoids a division by zero for a flat box
         to.steps.push_back(std::uint16_t(std::lround((point[axis] - to.box.lower[axis]) / size * steps)));
     }
 }
@@ -84,7 +84,7 @@ nlohmann::json json(const Mesh& mesh) {
     for (const auto& point : mesh.points) append(points, point);
     std::vector<std::uint32_t> indices;
     for (const auto& t : mesh.triangles) indices.insert(indices.end(), {t.x, t.y, t.z});
-    // half the bytes where 16 bits can count the points
+    // half the bytes if 16 bits can index the points
     const bool small = mesh.points.size() <= 65536;
     return {{"lower", json(points.box.lower)},
             {"size", json(points.box.size())},
@@ -103,13 +103,13 @@ nlohmann::json json(const Look& look) {
     return all;
 }
 
-// A number of any size in as few bytes as it needs, seven bits each, the lowest first.
+// Appends a number as a variable-length integer: seven bits per byte, the lowest first.
 void append(std::vector<std::uint8_t>& to, std::uint32_t number) {
     for (; number > 127; number >>= 7) to.push_back(std::uint8_t(number | 128));
     to.push_back(std::uint8_t(number));
 }
 
-// The mesh with its vertices doubled along sharp edges, so that normals averaged at each vertex keep them sharp.
+// Duplicates the vertices of a mesh along sharp edges, so that averaged vertex normals keep these edges sharp.
 Mesh splitCreases(const Mesh& mesh, float crease) {
     const std::size_t corners = 3 * mesh.triangles.size();
     std::vector<std::size_t> parent(corners);
@@ -124,7 +124,7 @@ Mesh splitCreases(const Mesh& mesh, float crease) {
         return n / std::max(glm::length(n), 1e-30f);
     };
 
-    // corners of one vertex become one where a smooth edge joins their triangles
+    // corners of one vertex are merged if a smooth edge joins their triangles
     std::map<std::pair<unsigned, unsigned>, std::size_t> edges;  // directed edge to its first corner
     for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
         for (int i = 0; i < 3; ++i)
@@ -181,16 +181,16 @@ int Recording::addChanging(const Look& look) {
     return int(changing_.size()) - 1;
 }
 
-// Points in the order in which triangles use them first. Neighbours are close in both lists, so that differences are
-// small: a coordinate is kept as its step from the last one, a corner as how far back its point stands from the next
-// new one.
+// Packs the points in the order of their first use by triangles. Neighbours are then close in both lists and
+// differences are small. A coordinate is stored as the difference from the previous one. A corner is stored as the
+// distance of its point back from the next new one.
 Recording::Packed Recording::pack(const Mesh& mesh) {
     if (!mesh.triangles.empty()) validate(mesh);
     Packed packed;
     packed.box = bounds(mesh);
     if (packed.box.empty()) packed.box = {glm::vec3(0), glm::vec3(0)};
     const glm::vec3 size = glm::max(packed.box.size(), glm::vec3(1e-9f));
-    std::vector<std::uint32_t> places(mesh.points.size(), 0);  // 1 and on; 0: not used yet
+    std::vector<std::uint32_t> places(mesh.points.size(), 0);  // counted from 1; 0: not used yet
     std::uint32_t used = 0;
     glm::ivec3 last(0);
     for (const glm::uvec3& triangle : mesh.triangles)
@@ -227,7 +227,7 @@ void Recording::frame(double time, std::span<const Pose> poses, std::span<const 
     poses_.insert(poses_.end(), poses.begin(), poses.end());
 }
 
-// The JSON that the player reads.
+// Returns the JSON that the player reads.
 std::string Recording::data() const {
     nlohmann::json meshes = nlohmann::json::array(), bodies = meshes, notes = meshes;
     for (const Mesh& mesh : meshes_) meshes.push_back(json(mesh));
@@ -272,7 +272,7 @@ std::string Recording::data() const {
         all["changing"].push_back(std::move(body));
     }
     std::string text = all.dump();
-    // "</script>" in a title would end the element that holds the data
+    // "</script>" in a title would close the element that contains the data
     for (std::size_t at = 0; (at = text.find("</", at)) != std::string::npos; at += 3) text.insert(at + 1, "\\");
     return text;
 }

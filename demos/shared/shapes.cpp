@@ -18,7 +18,7 @@ void addQuad(Mesh& mesh, unsigned a, unsigned b, unsigned c, unsigned d) {
     mesh.triangles.push_back({a, c, d});
 }
 
-// A grid of around x across quadrilaterals that closes on itself both ways.
+// Adds a grid of around x across quadrilaterals that is closed in both directions.
 void addTorusFaces(Mesh& mesh, int around, int across) {
     const auto vertex = [&](int i, int j) { return unsigned((i % around) * across + j % across); };
     for (int i = 0; i < around; ++i)
@@ -26,19 +26,19 @@ void addTorusFaces(Mesh& mesh, int around, int across) {
             addQuad(mesh, vertex(i, j), vertex(i + 1, j), vertex(i + 1, j + 1), vertex(i, j + 1));
 }
 
-// From 0 at `low` to 1 at `high`, flat at both.
+// Smooth step from 0 at `low` to 1 at `high`, with zero slope at both.
 float smoothStep(float low, float high, float x) {
     const float t = glm::clamp((x - low) / (high - low), 0.f, 1.f);
     return t * t * (3 - 2 * t);
 }
 
-// 1 between `low` and `high`, 0 beyond `margin` around them.
+// 1 between `low` and `high`, 0 beyond a `margin` around them.
 float window(float low, float high, float margin, float x) {
     return smoothStep(low - margin, low, x) * (1 - smoothStep(high, high + margin, x));
 }
 
-// A square [-1, 1]^2 onto the unit disc, square rings onto circles. P. Shirley, K. Chiu, "A low distortion map between
-// disk and square", 1997.
+// Maps the square [-1, 1]^2 to the unit disc, and square rings to circles. P. Shirley, K. Chiu, "A low distortion map
+// between disk and square", 1997.
 glm::vec2 onDisc(const glm::vec2& square) {
     const bool flat = std::abs(square.x) >= std::abs(square.y);
     const float r = flat ? square.x : square.y;
@@ -47,14 +47,14 @@ glm::vec2 onDisc(const glm::vec2& square) {
     return flat ? glm::vec2(r * std::cos(turn), r * std::sin(turn)) : glm::vec2(r * std::sin(turn), r * std::cos(turn));
 }
 
-// The surface of the carved box of lid radius 1 and rims at -0.6 and 0.6.
+// The surface of the carved box with lid radius 1 and rims at -0.6 and 0.6.
 namespace carved {
 
 constexpr float halfHeight = 0.6f, dome = 0.08f;
 constexpr float footRadius = 0.92f, bodyRadius = 0.9f, lidRadius = 1;
-constexpr float wallDepth = 0.03f, topDepth = 0.02f;  // the latter is nowhere more than the dome is high
+constexpr float wallDepth = 0.03f, topDepth = 0.02f;  // topDepth must not exceed the height of the dome
 
-// How much of a lozenge pattern is carved away: 0 on the lozenges, 1 between them.
+// Carving depth of a lozenge pattern: 0 on the lozenges, 1 between them.
 float pattern(float a, float b) {
     return 1 - smoothStep(-0.25f, 0.25f, std::sin(a) * std::sin(b));
 }
@@ -74,14 +74,14 @@ float topHeight(const glm::vec2& point) {
 
 }  // namespace carved
 
-// The vertices of a cube's grid of across x across x up cells, without those inside: its top, its bottom, its wall.
+// The surface vertices of a cube's grid of across x across x up cells: the top, the bottom, the wall.
 struct CubeGrid {
     int across, up;
 
     int around() const { return 4 * across; }
     int capSize() const { return (across + 1) * (across + 1); }
     unsigned cap(bool top, int i, int j) const { return unsigned((top ? 0 : capSize()) + i * (across + 1) + j); }
-    // The k-th column and row of a cap's border, counter-clockwise.
+    // Returns the k-th column and row of a cap's border, counter-clockwise.
     glm::ivec2 border(int k) const {
         const int side = k / across, step = k % across;
         if (side == 0) return {step, 0};
@@ -97,8 +97,8 @@ struct CubeGrid {
     glm::vec2 disc(int i, int j) const { return onDisc(glm::vec2(2 * i - across, 2 * j - across) / float(across)); }
 };
 
-// Each cell of a cap is cut along the diagonal that runs towards the middle: the other one would lie on the rim where
-// a corner of the square has become a part of the circle.
+// Cuts each cell of a cap along the diagonal that points towards the centre. At a corner of the square, which becomes a
+// part of the circle, the other diagonal would lie on the rim.
 void addCap(Mesh& mesh, const CubeGrid& grid, bool top) {
     const int n = grid.across;
     for (int i = 0; i < n; ++i)
@@ -111,8 +111,8 @@ void addCap(Mesh& mesh, const CubeGrid& grid, bool top) {
         }
 }
 
-// Triangles between two rings of vertices, the second one the higher: turns on with whichever ring has its next vertex
-// first.
+// Adds triangles between two rings of vertices, the second one above the first. It always advances on the ring whose
+// next vertex comes first.
 void addStrip(Mesh& mesh, unsigned low, int lowCount, float lowTurn, unsigned high, int highCount, float highTurn) {
     const auto angle = [](int i, int count, float turn) { return (float(i) + turn) / float(count); };
     const auto at = [](unsigned begin, int i, int count) { return begin + unsigned(i % count); };
@@ -127,9 +127,9 @@ void addStrip(Mesh& mesh, unsigned low, int lowCount, float lowTurn, unsigned hi
     }
 }
 
-// A unit sphere of rings of vertices, as many on each as keep triangles alike, between two poles.
+// A unit sphere of vertex rings between two poles. The count of vertices of each ring keeps triangles similar.
 Mesh ringedSphere(std::size_t triangles) {
-    const float height = std::sqrt(std::sqrt(3.f) * 4 * pi / float(triangles));  // of an equilateral one
+    const float height = std::sqrt(std::sqrt(3.f) * 4 * pi / float(triangles));  // height of an equilateral triangle
     const int rings = std::max(3, int(std::lround(pi / height)) - 1);
     const auto slope = [&](int ring) { return pi * float(ring + 1) / float(rings + 1); };
     float sines = 0;
@@ -140,7 +140,7 @@ Mesh ringedSphere(std::size_t triangles) {
         counts.push_back(std::max(3, int(std::lround(float(triangles / 2) * std::sin(slope(i)) / sines))));
         rest -= counts.back();
     }
-    counts[std::size_t(rings / 2)] += rest;  // what rounding leaves over, on the longest one
+    counts[std::size_t(rings / 2)] += rest;  // the remainder from rounding goes to the longest ring
 
     Mesh mesh{{{0, 0, -1}}, {}};
     std::vector<unsigned> begins;
@@ -164,8 +164,8 @@ Mesh ringedSphere(std::size_t triangles) {
     return mesh;
 }
 
-// The unit sphere onto itself, angles kept: a plane laid on its lowest point, onto which it is projected from its
-// highest one, grows to `scale` times its size.
+// Maps the unit sphere to itself conformally. It projects the sphere from its highest point to the plane that touches
+// the lowest point, scales the plane by `scale`, and projects back.
 Mesh grownBelow(Mesh mesh, float scale) {
     for (glm::vec3& p : mesh.points) {
         const float above = scale * scale * (1 + p.z), below = 1 - p.z;
@@ -263,7 +263,7 @@ Mesh torusKnot(int p, int q, float radius, float thickness, int along, int acros
         const float s = float(i) / float(along), step = 0.25f / float(along);
         const glm::vec3 centre = curve(s), before = curve(s - step), after = curve(s + step);
         const glm::vec3 tangent = glm::normalize(after - before);
-        // the axis of the torus never runs along the curve, so this frame does not twist as it closes
+        // the axis of the torus is never parallel to the curve, so this frame closes without twist
         const glm::vec3 side = glm::normalize(glm::cross(tangent, glm::vec3(centre.x, centre.y, 0)));
         const glm::vec3 up = glm::cross(side, tangent);
         for (int j = 0; j < across; ++j) {
@@ -283,7 +283,7 @@ Mesh revolve(const std::vector<glm::vec2>& profile, int segments) {
             const float u = 2 * pi * float(i) / float(segments);
             mesh.points.push_back({point.x * std::cos(u), point.x * std::sin(u), point.y});
         }
-    // poles come out as equal points whatever the angle, and weld() drops the triangles that collapse there
+    // poles become equal points at all angles, and weld() removes the triangles that collapse there
     for (auto& point : mesh.points)
         if (std::abs(point.x) + std::abs(point.y) == 0.f) point.x = point.y = 0.f;
     addTorusFaces(mesh, segments, count);
@@ -301,7 +301,7 @@ Mesh cone(float radius, float height, int segments) {
 Mesh bowl(float radius, float wall, int segments, float opening, float foot) {
     const float inner = radius - wall, middle = radius - wall / 2;
     const int arc = segments / 4, rim = std::max(4, arc / 8);
-    const auto at = [](float r, float angle) {  // angles from the bottom
+    const auto at = [](float r, float angle) {  // angles are measured from the bottom
         return glm::vec2(angle == 0 ? 0.f : r * std::sin(angle), -r * std::cos(angle));
     };
     std::vector<glm::vec2> profile;
@@ -309,7 +309,7 @@ Mesh bowl(float radius, float wall, int segments, float opening, float foot) {
         const float bottom = -radius - wall / 2, bevel = wall / 8;
         profile = {{0, bottom}, {foot - bevel, bottom}, {foot, bottom + bevel}};
     }
-    for (int i = 0; i <= arc; ++i) {  // outside, from the bottom to the rim
+    for (int i = 0; i <= arc; ++i) {  // outer wall, from the bottom to the rim
         const glm::vec2 point = at(radius, opening * float(i) / float(arc));
         if (foot <= 0 || point.x >= foot) profile.push_back(point);
     }

@@ -18,7 +18,7 @@
 namespace bilayer::demo {
 namespace {
 
-constexpr double specimenSpacing = 2;  // between the points that penetration is measured at [voxels]
+constexpr double specimenSpacing = 2;  // between the sample points for penetration [voxels]
 
 // FNV-1a, 64 bits: www.isthe.com/chongo/tech/comp/fnv.
 constexpr std::uint64_t fnvStart = 0xcbf29ce484222325u, fnvPrime = 0x100000001b3u;
@@ -71,7 +71,7 @@ btRigidBody& Stage::add(std::shared_ptr<const Thing> thing, const Matter& matter
     const double voxel = thing->field.voxelSize();
     outcome_.voxelSize = bodies_.empty() ? voxel : std::min(outcome_.voxelSize, voxel);
     outcome_.bodies += matter.mass > 0;
-    // Bullet turns overlap above this, 4 cm by default, into speed
+    // above this penetration, 4 cm by default, Bullet converts penetration into velocity
     world_.bullet().getSolverInfo().m_splitImpulsePenetrationThreshold = -float(outcome_.voxelSize);
 
     btRigidBody& body = world_.add(thing->shape, matter, pose);
@@ -142,7 +142,7 @@ Recording Stage::record(const View& view) const {
     recording.note("bodies", std::to_string(outcome_.bodies));
     recording.note("time per step", fmt::format("{:.1f} ms", outcome_.medianStep()));
     std::map<const Thing*, int> meshes;
-    std::set<const Thing*> kinds;  // that move
+    std::set<const Thing*> kinds;  // of dynamic bodies
     std::uint64_t triangles = 0, voxels = 0;
     for (const auto& [thing, look, moves] : bodies_) {
         if (!meshes.contains(thing.get())) meshes[thing.get()] = recording.addMesh(thing->mesh);

@@ -1,5 +1,5 @@
-// Where scenes are played: a world whose every step is timed, whose frames are recorded, and whose bodies are measured
-// against their meshes afterwards.
+// The stage of a scene: a world that times every step, records frames, and afterwards measures the penetration of
+// bodies from their meshes.
 #pragma once
 
 #include <functional>
@@ -18,14 +18,14 @@ namespace bilayer::demo {
 
 struct ThingOptions {
     float voxelSize;          ///< [m]
-    float interiorWidth = 6;  ///< of the band: bodies that sink in deeper are lost [voxels]
-    float margin = -1;        ///< up to which contacts are made [m]; negative: a voxel
-    bool speculative = true;  ///< what moves farther is followed (see bullet::ShapeOptions)
+    float interiorWidth = 6;  ///< of the band; bodies that penetrate deeper are not detected [voxels]
+    float margin = -1;        ///< contact margin [m]; negative: one voxel
+    bool speculative = true;  ///< speculative contacts for fast bodies (see bullet::ShapeOptions)
     ContactAccuracy accuracy = ContactAccuracy::exactNearFeatures;  ///< of contacts
     float restingFriction = 1;                                      ///< see bullet::ShapeOptions
 };
 
-/// What bodies are made of: what Bullet collides, and what measures whether it did.
+/// The geometry that bodies share: the shape that Bullet collides, and the reference data for measurements.
 struct Thing {
     Mesh mesh;
     LevelSet field;
@@ -33,36 +33,36 @@ struct Thing {
     Specimen specimen;
 };
 
-/// From a mesh to a shape for Bullet. Throws as build() does.
+/// Makes a Bullet shape from a mesh. Throws as build() does.
 std::shared_ptr<const Thing> makeThing(Mesh mesh, const ThingOptions& options);
-/// A shape of Bullet's own, and the mesh that it is like: Bullet makes no use of the field. Throws as build() does.
+/// Wraps a native Bullet shape and its mesh. Bullet does not use the field. Throws as build() does.
 std::shared_ptr<const Thing> makeThing(Mesh mesh, std::shared_ptr<btCollisionShape> shape, float voxelSize);
 
 struct StageOptions {
     float stepsPerSecond = 240;
-    int stepsPerFrame = 4;       ///< a frame is recorded after so many steps
-    int framesPerMeasuring = 1;  ///< penetrations are measured in every so many frames, and in the last
+    int stepsPerFrame = 4;       ///< steps per recorded frame
+    int framesPerMeasuring = 1;  ///< penetrations are measured once per this count of frames, and in the last frame
 };
 
 class Stage {
   public:
     explicit Stage(std::string title, const StageOptions& options = {});
 
-    /// Adds a body that stands at a pose. Valid as long as the stage. Call it before the first step.
+    /// Adds a body at a pose. The reference is valid as long as the stage. Call this before the first step.
     btRigidBody& add(std::shared_ptr<const Thing> thing, const Matter& matter, const Pose& pose, const Look& look);
 
     void step();
-    /// Steps until so many seconds have passed since the start, or until `done`, which is asked after each step.
+    /// Steps until this time since the start has passed, or until `done` returns true. It is called after each step.
     void run(
         double seconds, const std::function<bool()>& done = [] { return false; });
 
     World& world() { return world_; }
     double time() const { return double(steps_) / options_.stepsPerSecond; }  ///< [s]
     bool allAsleep() const { return world_.asleep() == world_.moving(); }
-    /// The poses of all bodies in each recorded frame, in the order in which they were added.
+    /// The poses of all bodies in each recorded frame, in the order of add().
     const std::vector<std::vector<Pose>>& frames() const { return frames_; }
 
-    /// Measures, and hands everything over but the criteria; the stage is of no more use.
+    /// Measures, and returns all results except the criteria. The stage must not be used afterwards.
     Outcome finish(const View& view);
 
   private:
@@ -83,7 +83,7 @@ class Stage {
     long steps_ = 0;
 };
 
-/// Plays a scene again on 1, 2 and 8 threads: of these runs, those that differ from the first in any bit.
+/// Repeats a scene on 1, 2 and 8 threads, and counts the runs that differ from the first in any bit.
 Criterion sameBits(const Outcome& first, const std::function<Outcome()>& scene);
 
 }  // namespace bilayer::demo

@@ -1,4 +1,4 @@
-// The surface of a level set of OpenVDB's as a mesh.
+// The surface of an OpenVDB level set as a mesh.
 #pragma once
 
 #include <openvdb/openvdb.h>
@@ -7,7 +7,7 @@
 
 namespace bilayer::demo {
 
-/// As surface() in sdf/surface.h gives it; empty where the level set is.
+/// Extracts the surface as surface() in sdf/surface.h does. Returns an empty mesh for an empty level set.
 Mesh surfaceOf(const openvdb::FloatGrid& grid, float adaptivity = 0);
 
 }  // namespace bilayer::demo

@@ -1,4 +1,4 @@
-// A mesh as Bullet itself collides it.
+// A mesh as Bullet's own triangle mesh shape.
 #pragma once
 
 #include <btBulletCollisionCommon.h>

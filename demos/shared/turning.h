@@ -1,4 +1,4 @@
-// How far bodies have turned, all turns counted.
+// The accumulated rotation of bodies, including full revolutions.
 #pragma once
 
 #include <cmath>
@@ -7,8 +7,8 @@
 
 namespace bilayer::demo {
 
-/// The angle of a body about a world axis through its middle, from step to step: it must turn by less than half a turn
-/// in one, and tilt little.
+/// The rotation angle of a body about a world axis through its centre, updated each step. The body must rotate by less
+/// than half a revolution per step and tilt only slightly.
 class Turning {
   public:
     explicit Turning(const glm::quat& start, const glm::dvec3& axis = {0, 0, 1}) : axis_(axis), last_(start) {}

@@ -14,8 +14,8 @@ namespace {
 using openvdb::FloatGrid;
 using openvdb::Vec3SGrid;
 
-constexpr int bandLayers = 5;      // around the liquid in which its velocity is known, beside what it moves in a step
-constexpr double maxGrowth = 0.5;  // by which lost volume comes back [1/s]
+constexpr int bandLayers = 5;      // with known velocity around the liquid, in addition to its movement per step
+constexpr double maxGrowth = 0.5;  // max rate of volume restoration [1/s]
 
 void addTo(FloatGrid& grid, float value) {
     for (auto voxel = grid.beginValueOn(); voxel; ++voxel) voxel.setValue(*voxel + value);

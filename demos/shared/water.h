@@ -1,6 +1,6 @@
-// A liquid with a free surface in a box, around a solid body: a small solver on OpenVDB's own tools. The surface is a
-// level set that LevelSetAdvection carries, velocities stand at the faces of cells and are carried by VolumeAdvection,
-// and the pressure is found by OpenVDB's conjugate gradients (pressure.h).
+// A liquid with a free surface in a box, around a solid body: a small solver on OpenVDB's tools. LevelSetAdvection
+// advects the surface, which is a level set. VolumeAdvection advects the velocities, which are stored at cell faces.
+// OpenVDB's conjugate gradients solve for the pressure (pressure.h).
 #pragma once
 
 #include <openvdb/openvdb.h>
@@ -15,27 +15,27 @@ namespace bilayer::demo {
 
 struct WaterOptions {
     glm::vec3 gravity{0, 0, -9.81f};  ///< [m/s^2]
-    /// What is lost where the liquid is thinner than its voxels comes back in this time, evenly from all of it, as a
-    /// divergence (B. Kim, Y. Liu, I. Llamas, X. Jiao, J. Rossignac, "Simulation of bubbles in foam with the volume
-    /// control method", 2007) [s]; 0: never.
+    /// Time constant for restoring lost volume [s]; 0: never. Volume is lost where the liquid is thinner than its
+    /// voxels. It is restored as a uniform divergence of all liquid (B. Kim, Y. Liu, I. Llamas, X. Jiao, J. Rossignac,
+    /// "Simulation of bubbles in foam with the volume control method", 2007).
     float restoring = 0.1f;
-    double volume = 0;  ///< to be kept [m^3]; 0: that of the start
+    double volume = 0;  ///< target volume [m^3]; 0: the initial volume
 };
 
 class Water {
   public:
-    /// @param surface  a level set; behind the basin's walls and in its body it may be anything
+    /// @param surface  a level set; its values behind the basin's walls and in its body do not matter
     Water(const openvdb::FloatGrid& surface, const Basin& basin, const WaterOptions& options = {});
 
-    /// One step. The basin's body is where it will be at its end.
+    /// Advances one step. The basin's body must be at its pose at the end of the step.
     Projection step(const Basin& basin, float seconds);
 
-    /// What of the liquid is in the box and not in the body, as a level set.
+    /// Returns the part of the liquid that is inside the box and outside the body, as a level set.
     const openvdb::FloatGrid& shape() const { return *shape_; }
-    double volume() const { return volume_; }        ///< within the shape's surface, as a mesh [m^3]
-    double kept() const { return options_.volume; }  ///< the volume that is restored [m^3]
-    double restored() const { return restored_; }    ///< volume given back so far, taken away being negative [m^3]
-    /// The fastest of the liquid's faces [m/s].
+    double volume() const { return volume_; }        ///< enclosed by the surface of shape(), computed from a mesh [m^3]
+    double kept() const { return options_.volume; }  ///< the target volume [m^3]
+    double restored() const { return restored_; }  ///< volume restored so far; removed volume counts as negative [m^3]
+    /// Returns the max speed of the liquid's faces [m/s].
     float fastest() const { return velocity_.fastest(); }
 
   private:

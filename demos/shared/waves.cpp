@@ -15,7 +15,7 @@
 namespace bilayer::demo {
 namespace {
 
-constexpr float bottom = -0.4f;  // of the solid [m]
+constexpr float bottom = -0.4f;  // of the closed solid [m]
 
 /// Bullet keeps a pointer to the heights.
 struct HeightField {
@@ -51,8 +51,8 @@ double squaredDistance(const glm::dvec3& place, const std::array<glm::dvec3, 3>&
     return isOver ? height * height / glm::dot(normal, normal) : least;
 }
 
-/// The angle between a direction and the cone that others span, by going from the nearest of them towards each other
-/// one as long as that leads nearer.
+/// Returns the angle between a direction and the cone spanned by others. It starts at the nearest of these and moves
+/// towards each other one as long as that reduces the angle.
 double angleToCone(const glm::dvec3& direction, const std::vector<glm::dvec3>& normals) {
     const auto isFarther = [&](const glm::dvec3& a, const glm::dvec3& b) {
         return glm::dot(a, direction) < glm::dot(b, direction);
@@ -97,7 +97,7 @@ void Waves::addSolid() {
         const glm::vec3 point = solid_.points[i];
         solid_.points.emplace_back(point.x, point.y, bottom);
     }
-    // squares are divided as a btHeightfieldTerrainShape divides them
+    // squares are divided in the same way as in a btHeightfieldTerrainShape
     for (unsigned j = 0; j + 1 < rows; ++j)
         for (unsigned i = 0; i + 1 < columns; ++i) {
             const unsigned a = j * columns + i, b = a + 1, c = a + columns, d = c + 1;

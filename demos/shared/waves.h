@@ -1,4 +1,4 @@
-// A ground of waves in triangles, as Bullet collides it: static, in the world's own coordinates.
+// A wavy ground of triangles for Bullet: static, in world coordinates.
 #pragma once
 
 #include <BulletCollision/CollisionShapes/btConcaveShape.h>
@@ -12,25 +12,25 @@ namespace bilayer::demo {
 
 struct WavesOptions {
     float height;              ///< amplitude [m]
-    float cell;                ///< edge of the squares, of two triangles each [m]
-    bool heightField = false;  ///< a btHeightfieldTerrainShape; else a btBvhTriangleMeshShape
+    float cell;                ///< edge of the squares of two triangles each [m]
+    bool heightField = false;  ///< a btHeightfieldTerrainShape; otherwise a btBvhTriangleMeshShape
 };
 
-/// The height is `height sin(2.1 x + 1) cos(1.3 y)` at the corners of squares, and even in each triangle.
+/// The height is `height sin(2.1 x + 1) cos(1.3 y)` at the corners of squares, and linear in each triangle.
 class Waves {
   public:
-    static constexpr float length = 14, width = 8;  ///< of the ground, at least; its middle is at the origin [m]
+    static constexpr float length = 14, width = 8;  ///< min size of the ground; its centre is the origin [m]
 
     explicit Waves(const WavesOptions& options);
 
-    /// The triangles as the top of a closed solid.
+    /// The ground as the top of a closed solid.
     const Mesh& solid() const { return solid_; }
-    /// Stays valid without this.
+    /// The shape stays valid after this object is destroyed.
     std::shared_ptr<btConcaveShape> shape() const { return shape_; }
-    /// The highest place within a distance of an upright line [m].
+    /// Returns the max height within a distance of a vertical line [m].
     float highestAround(float x, float y, float distance) const;
-    /// The angle of a direction to the cone of the normals of the triangles within a distance of a place
-    /// [rad]; infinite where there are none.
+    /// Returns the angle between a direction and the cone of the normals of the triangles within a distance of a point
+    /// [rad]; infinite if there are none.
     double angleToNormals(const glm::dvec3& place, const glm::dvec3& direction, double within) const;
 
   private:

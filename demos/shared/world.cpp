@@ -15,7 +15,7 @@ btTransform toTransform(const Pose& pose) {
     return btTransform(btQuaternion(q.x, q.y, q.z, q.w), btVector3(p.x, p.y, p.z));
 }
 
-// Where a shape's mesh is in its body.
+// Returns the frame of a shape's mesh in its body.
 btTransform frameOf(const btCollisionShape& shape) {
     const auto* field = dynamic_cast<const bullet::Shape*>(&shape);
     return field ? toTransform(field->frame()) : btTransform::getIdentity();
@@ -33,7 +33,7 @@ double kineticEnergyOf(const btRigidBody& body) {
 
 World::World() {
     world_.setGravity({0, 0, -gravity});
-    // with Bullet's single direction of friction, a stack of rings at rest walks aside until it falls
+    // with Bullet's single friction direction, a resting stack of rings drifts sideways until it falls
     world_.getSolverInfo().m_solverMode |= SOLVER_USE_2_FRICTION_DIRECTIONS;
 }
 
@@ -45,7 +45,7 @@ btRigidBody& World::add(std::shared_ptr<btCollisionShape> shape, const Matter& m
     btVector3 inertia(0, 0, 0);
     if (matter.mass > 0) shape->calculateLocalInertia(matter.mass, inertia);
     btRigidBody::btRigidBodyConstructionInfo info(matter.mass, nullptr, shape.get(), inertia);
-    // a body's origin is its centre of mass, a mesh's is anywhere: the shape's frame lies between the two
+    // a body's origin is its centre of mass, but a mesh's is arbitrary; the shape's frame converts between the two
     info.m_startWorldTransform = toTransform(pose) * frameOf(*shape).inverse();
     info.m_friction = matter.friction;
     info.m_rollingFriction = matter.rollingFriction;

@@ -1,4 +1,4 @@
-// A Bullet world whose bodies collide by their fields: the few lines that every program with bilayer in Bullet has.
+// A Bullet world whose bodies collide by their fields: the few lines that every program with bilayer and Bullet needs.
 #pragma once
 
 #include <BulletCollision/BroadphaseCollision/btDbvtBroadphase.h>
@@ -20,47 +20,47 @@ namespace bilayer::demo {
 
 using namespace bilayer::detail;
 
-/// What bodies are made of.
+/// Material and mass of a body.
 struct Matter {
-    float mass = 0;  ///< 0: it never moves [kg]
+    float mass = 0;  ///< 0: a static body [kg]
     float friction = 0.5f;
     float rollingFriction = 0;  ///< [m]
     float restitution = 0;
-    /// What air and soft surfaces take: a share of the speed and of the spin a second.
+    /// Damping by air and soft surfaces: the fraction of linear and angular velocity lost per second.
     float linearDamping = 0.05f, angularDamping = 0.2f;
-    /// Slower than this for two seconds, bodies that touch fall asleep together [m/s], [rad/s]. Bullet's own thresholds
-    /// (0.8 m/s, 1 rad/s) are for crates and cars: small things that still roll would freeze.
+    /// Touching bodies fall asleep together after two seconds below these speeds [m/s], [rad/s]. Bullet's own
+    /// thresholds (0.8 m/s, 1 rad/s) suit crates and cars: small bodies would freeze while they still roll.
     float restingSpeed = 0.1f, restingSpin = 1;
 };
 
-/// Of a body that moves, by translation and rotation [J].
+/// Returns the kinetic energy of a dynamic body, of translation and rotation [J].
 double kineticEnergyOf(const btRigidBody& body);
 
-/// Bodies, in the order in which they were added, under gravity along -z.
+/// Bodies under gravity along -z, in the order of add().
 class World {
   public:
     World();
     ~World();
 
-    /// Adds a body whose mesh stands at a pose: a bullet::Shape's where its collider does, any other shape's in the
-    /// shape's own coordinates. Several bodies may share a shape.
+    /// Adds a body at the pose of its mesh: the mesh of the collider for a bullet::Shape, and the shape's own
+    /// coordinates for any other shape. Several bodies may share a shape.
     btRigidBody& add(std::shared_ptr<btCollisionShape> shape, const Matter& matter, const Pose& pose);
 
-    /// One step of fixed length [s].
+    /// Advances one step of fixed length [s].
     void step(float seconds);
 
-    /// Where the meshes are, as they were modelled.
+    /// Returns the poses of the original meshes.
     std::vector<Pose> poses() const;
 
-    /// Bodies that move, and those of them that have come to rest.
+    /// Count of dynamic bodies, and of those that are asleep.
     int moving() const;
     int asleep() const;
 
-    /// Of all bodies that move, asleep or not; potential energy is 0 at the origin [J].
+    /// Sums over all dynamic bodies, asleep or not; potential energy is 0 at the origin [J].
     double kineticEnergy() const;
     double potentialEnergy() const;
 
-    /// For constraints, rays and whatever else Bullet offers.
+    /// For constraints, rays and other features of Bullet.
     btDiscreteDynamicsWorld& bullet() { return world_; }
     const bullet::DispatchStatistics& statistics() const { return dispatcher_.statistics(); }
 

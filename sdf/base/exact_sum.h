@@ -1,4 +1,4 @@
-// Sums without rounding; internal.
+// Floating-point sums without rounding error; internal.
 #pragma once
 
 #include <array>
@@ -6,9 +6,9 @@
 
 namespace bilayer::detail {
 
-/// The exact sum of at most `Capacity` doubles, for its sign: J. R. Shewchuk, "Adaptive Precision Floating-Point
-/// Arithmetic and Fast Robust Geometric Predicates" (1997), growing an expansion by one number at a time. Exact as long
-/// as nothing overflows.
+/// The exact sum of at most `Capacity` doubles, computed for its sign. It grows a floating-point expansion by one term
+/// at a time, after J. R. Shewchuk, "Adaptive Precision Floating-Point Arithmetic and Fast Robust Geometric Predicates"
+/// (1997). The sum is exact as long as nothing overflows.
 template <std::size_t Capacity>
 class ExactSum {
   public:
@@ -24,7 +24,7 @@ class ExactSum {
         count_ = kept;
     }
 
-    // The largest part comes last, and outweighs all others.
+    // The last component is the largest and exceeds the sum of all others in magnitude.
     int sign() const { return count_ == 0 ? 0 : parts_[count_ - 1] > 0 ? 1 : -1; }
 
   private:

@@ -1,4 +1,4 @@
-// Memory for what is large and read at random.
+// Arrays on huge pages, for large data with random access.
 #pragma once
 
 #include <cstddef>
@@ -16,7 +16,8 @@ namespace bilayer::detail {
 
 inline constexpr std::size_t hugePage = 2 << 20;  ///< bytes
 
-/// Asks for huge pages where whole ones lie in a part of memory. A refusal costs speed only.
+/// Requests huge pages for the part of a memory range that covers whole ones. If the system refuses, only speed
+/// suffers.
 inline void adviseHugePages([[maybe_unused]] void* data, [[maybe_unused]] std::size_t bytes) {
 #ifdef MADV_HUGEPAGE
     const auto at = reinterpret_cast<std::uintptr_t>(data);
@@ -25,7 +26,7 @@ inline void adviseHugePages([[maybe_unused]] void* data, [[maybe_unused]] std::s
 #endif
 }
 
-/// Resizes an empty vector; a large one comes to lie on huge pages.
+/// Resizes an empty vector. The memory of a large one is placed on huge pages.
 template <class T>
 void resizeLarge(std::vector<T>& items, std::size_t size) {
     items.reserve(size);
@@ -33,8 +34,9 @@ void resizeLarge(std::vector<T>& items, std::size_t size) {
     items.resize(size);
 }
 
-/// An array that begins uninitialised, on huge pages where it is large and the system has them: random reads then miss
-/// the translation buffer less, and the first writes fault less often. It moves; copies are asked for by name.
+/// An array that starts uninitialised. A large array is placed on huge pages where the system supports them: random
+/// reads then cause fewer TLB misses, and first writes cause fewer page faults. It is movable but not copyable;
+/// shared() returns a second handle to the same memory.
 template <class T>
 class LargeArray {
     static_assert(std::is_trivially_copyable_v<T>);
@@ -55,7 +57,7 @@ class LargeArray {
     LargeArray(LargeArray&&) noexcept = default;
     LargeArray& operator=(LargeArray&&) noexcept = default;
 
-    /// The same memory, which lives as long as any of those that share it.
+    /// Returns a handle to the same memory. The memory lives as long as any handle to it.
     LargeArray shared() const {
         LargeArray other;
         other.data_ = data_;

@@ -1,4 +1,4 @@
-// Which side of a line a point of the plane lies on, without rounding; internal.
+// On which side of a line a point of the plane lies, without rounding error; internal.
 #pragma once
 
 #include <cmath>
@@ -6,13 +6,14 @@
 
 namespace bilayer::detail {
 
-/// lineSide() where rounding could decide.
+/// Computes lineSide() exactly, for inputs where rounding could change the result.
 int exactLineSide(const glm::dvec2& a, const glm::dvec2& b, const glm::dvec2& p);
 
-/// 1: `p` lies to the left of the line from `a` to `b`, so that the three run counter-clockwise; -1: to the right; 0:
-/// on it. Exact for coordinates whose products neither overflow nor underflow (sizes of 1e-140 to 1e150, or zero).
+/// Returns 1 if `p` lies to the left of the line from `a` to `b` (the three points run counter-clockwise), -1 if it
+/// lies to the right, and 0 if it lies on the line. Exact for coordinates whose products neither overflow nor underflow
+/// (magnitudes of 1e-140 to 1e150, or zero).
 inline int lineSide(const glm::dvec2& a, const glm::dvec2& b, const glm::dvec2& p) {
-    // the bound that J. R. Shewchuk (1997) proves for this filter
+    // the error bound of this filter, proved by J. R. Shewchuk (1997)
     constexpr double rounding = 3.3306690738754716e-16;
     const double left = (a.x - p.x) * (b.y - p.y), right = (a.y - p.y) * (b.x - p.x);
     const double area = left - right;

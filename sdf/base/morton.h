@@ -1,4 +1,4 @@
-// Morton order: places that are near one another in space are mostly near one another in it.
+// Morton order: points that are close in space are mostly close in this order.
 #pragma once
 
 #include <array>
@@ -7,8 +7,8 @@
 
 namespace bilayer::detail {
 
-/// Whether one place comes before another: the axis whose coordinates differ in the highest bit decides, and of those
-/// that differ alike the first. Keys need not be built.
+/// Returns whether one cell comes before another in Morton order. The axis whose coordinates differ in the highest bit
+/// decides; on a tie, the first such axis decides. No Morton keys are built.
 inline bool beforeInMortonOrder(const std::array<std::uint32_t, 3>& a, const std::array<std::uint32_t, 3>& b) {
     std::size_t axis = 0;
     std::uint32_t most = a[0] ^ b[0];

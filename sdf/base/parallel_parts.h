@@ -1,5 +1,4 @@
-// Work on the parts of a file in parallel, with the errors of a reader that goes from its beginning to its end;
-// internal.
+// Parallel work on the parts of a file that reports the same error as a sequential reader; internal.
 #pragma once
 
 #include <oneapi/tbb/parallel_for.h>
@@ -12,7 +11,8 @@
 
 namespace bilayer::detail {
 
-/// Calls work(i) for each i below `count`, in parallel. Throws what the first of them threw, whichever came first.
+/// Calls work(i) for each i below `count`, in parallel. Rethrows the exception with the lowest i, whichever was thrown
+/// first.
 template <class Work>
 void inOrder(std::size_t count, Work work) {
     if (count == 1) return work(std::size_t(0));

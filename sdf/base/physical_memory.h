@@ -1,11 +1,11 @@
-// How much memory the machine has: what cannot fit into it is refused before it is tried.
+// The physical memory of the machine. Requests that cannot fit into it are rejected early.
 #pragma once
 
 #include <unistd.h>
 
 namespace bilayer::detail {
 
-/// [bytes]
+/// Returns the size of the physical memory [bytes].
 inline double physicalMemory() {
     return double(::sysconf(_SC_PHYS_PAGES)) * double(::sysconf(_SC_PAGESIZE));
 }

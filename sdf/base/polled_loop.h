@@ -1,4 +1,4 @@
-// A loop on all threads that can be cancelled.
+// A parallel loop that can be cancelled.
 #pragma once
 
 #include <oneapi/tbb/blocked_range.h>
@@ -10,7 +10,7 @@
 
 namespace bilayer::detail {
 
-/// Calls body(i) for the numbers below `count`, `grain` of them at a time, on all threads. Throws Cancelled.
+/// Calls body(i) for each i below `count` in parallel, in ranges of `grain`. Throws Cancelled.
 template <class Body>
 void forAllPolled(std::size_t count, std::size_t grain, Progress* progress, const Body& body) {
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, count, grain), [&](const auto& range) {

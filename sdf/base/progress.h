@@ -1,4 +1,4 @@
-// Tells how far a build is, and stops it when the listener wants no more.
+// Reports the progress of a build, and stops the build when its listener requests cancellation.
 #pragma once
 
 #include <algorithm>
@@ -13,31 +13,32 @@
 
 namespace bilayer::detail {
 
-/// Safe from any thread; the listener is called by one at a time.
+/// Thread-safe. Only one thread at a time calls the listener.
 class Progress {
   public:
-    /// Often enough for a bar that moves and a user who stops it.
+    /// Short enough for a smooth progress bar and a prompt cancellation.
     static constexpr std::chrono::steady_clock::duration usualInterval = std::chrono::milliseconds(5);
 
-    /// @param listener  kept; a null one costs nothing
-    /// @param interval  least time from one question to the next
+    /// @param listener  a reference is kept; a null function costs nothing
+    /// @param interval  min time between two calls of the listener
     explicit Progress(const std::function<bool(float)>& listener,
                       std::chrono::steady_clock::duration interval = usualInterval)
         : listener_(listener), interval_(interval) {}
 
-    /// DisjointSets what advance() counts against.
+    /// Sets the total that advance() counts towards.
     void begin(std::size_t total) {
         total_ = total;
         done_ = 0;
     }
 
-    /// One more of the total is done. Throws Cancelled.
+    /// Counts one more unit of the total as done. Throws Cancelled.
     void advance() {
         ++done_;
         poll();
     }
 
-    /// Asks the listener, if it has not been asked for a while. Throws Cancelled. Call it every few milliseconds.
+    /// Calls the listener if the interval since its last call has passed. Throws Cancelled. Call this every few
+    /// milliseconds.
     void poll() {
         if (!listener_) return;
         if (cancelled_.load(std::memory_order_relaxed)) throw Cancelled();
@@ -45,13 +46,13 @@ class Progress {
         if (now < next_.load(std::memory_order_relaxed)) return;
         const std::unique_lock lock(mutex_, std::try_to_lock);
         if (!lock || now < next_.load(std::memory_order_relaxed)) return;
-        // a second go, over a repaired mesh, must not fall behind the first
+        // a second pass, over a repaired mesh, must not report less progress than the first
         told_ = std::max(told_, total_ == 0 ? 0.f : workShare * float(done_) / float(total_));
         tell(told_);
         next_ = std::chrono::steady_clock::now().time_since_epoch() + interval_;
     }
 
-    /// All is done.
+    /// Reports that everything is done.
     void finish() {
         if (listener_) tell(1);
     }
@@ -63,7 +64,7 @@ class Progress {
         throw Cancelled();
     }
 
-    /// The rest is for joining blocks, which cannot be counted.
+    /// The share of the progress that counted work takes. Joining blocks takes the rest and cannot be counted.
     static constexpr float workShare = 0.95f;
     const std::function<bool(float)>& listener_;
     const std::chrono::steady_clock::duration interval_;
@@ -74,16 +75,16 @@ class Progress {
     std::mutex mutex_;
 };
 
-/// Asks, if there is somebody to ask. Throws Cancelled.
+/// Polls unless `progress` is null. Throws Cancelled.
 inline void poll(Progress* progress) {
     if (progress) progress->poll();
 }
 
-/// The numbers below n, for a loop that asks on its way: `for (const std::size_t i : Polled(n, progress))`. Throws
+/// The numbers below n, for a loop that polls as it runs: `for (const std::size_t i : Polled(n, progress))`. Throws
 /// Cancelled.
 class Polled {
   public:
-    /// @param progress  null: nobody is asked
+    /// @param progress  null: nothing is polled
     Polled(std::size_t n, Progress* progress) : n_(n), progress_(progress) {}
 
     class Iterator {
@@ -104,15 +105,15 @@ class Polled {
     Iterator end() const { return {n_, progress_}; }
 
   private:
-    /// For steps of some microseconds at most.
+    /// Suits steps of at most a few microseconds.
     static constexpr std::size_t stepsPerPoll = 1024;
 
     std::size_t n_;
     Progress* progress_;
 };
 
-/// A vector of n items that is made bit by bit: the memory of a large one takes longer to come than a user waits.
-/// Throws Cancelled.
+/// Returns a vector of n items that grows in chunks and polls between them, because allocating a large vector at once
+/// takes too long for a prompt cancellation. Throws Cancelled.
 template <class Item>
 std::vector<Item> vectorOf(std::size_t n, Progress* progress) {
     constexpr std::size_t itemsPerPoll = (std::size_t(1) << 22) / sizeof(Item);
@@ -125,8 +126,8 @@ std::vector<Item> vectorOf(std::size_t n, Progress* progress) {
     return items;
 }
 
-/// A comparison that asks on its way, so that what sorts by it can be cancelled; items are then in between. Throws
-/// Cancelled.
+/// Returns a comparison that polls as it is called, so that a sort can be cancelled. A cancelled sort leaves the items
+/// in an unspecified order. Throws Cancelled.
 template <class Less>
 auto polled(Less less, Progress* progress) {
     return [less, progress](const auto& a, const auto& b) {

@@ -1,4 +1,4 @@
-// Welding where something is known of the mesh already; internal.
+// Vertex welding that reuses what is already known about the mesh; internal.
 #pragma once
 
 #include <cstddef>
@@ -10,19 +10,19 @@
 
 namespace bilayer::detail {
 
-/// How the vertices of a mesh are used by its triangles.
+/// How the triangles of a mesh use its vertices.
 struct VertexUse {
-    std::vector<std::uint8_t> used;  ///< a byte for each vertex: whether a triangle uses it
-    bool repeats = false;            ///< whether some triangle uses a vertex twice
+    std::vector<std::uint8_t> used;  ///< for each vertex, whether a triangle uses it
+    bool repeats = false;            ///< whether any triangle uses a vertex twice
 };
 
-/// Throws std::runtime_error for a corner without a vertex.
+/// Throws std::runtime_error if a triangle refers to a vertex that does not exist.
 VertexUse vertexUse(const std::vector<glm::uvec3>& triangles, std::size_t vertices);
 
-/// weld() of a mesh whose vertices are used so.
+/// Equals weld() for a mesh whose vertex use is `use`.
 Mesh weld(Mesh mesh, const VertexUse& use);
 
-/// weld() of a mesh; nothing where it is welded already.
+/// Equals weld(), but returns nothing if the mesh is already welded.
 std::optional<Mesh> weldUnlessDone(const Mesh& mesh);
 
 }  // namespace bilayer::detail

@@ -1,5 +1,5 @@
-// Sorting: J. Skilling, "Programming the Hilbert curve", AIP Conference Proceedings 707 (2004) 381-387. The layout is
-// that of packed R-trees: I. Kamel, C. Faloutsos, "On packing R-trees", CIKM 1993, 490-499.
+// Hilbert order: J. Skilling, "Programming the Hilbert curve", AIP Conference Proceedings 707 (2004) 381-387. The
+// layout is that of packed R-trees: I. Kamel, C. Faloutsos, "On packing R-trees", CIKM 1993, 490-499.
 #include "sdf/bvh/box_tree.h"
 
 #include <oneapi/tbb/parallel_for.h>
@@ -20,15 +20,16 @@ namespace {
 
 constexpr int bitsPerAxis = 12, indexBits = 28, keyBits = 3 * bitsPerAxis;
 static_assert(curveCells == 1u << bitsPerAxis && maxOnCurve == std::size_t(1) << indexBits);
-/// A pass of the radix sort; three passes sort a key.
+/// Digit size of the radix sort; three passes sort a key.
 constexpr int digitBits = 12;
 constexpr std::size_t digits = std::size_t(1) << digitBits;
 static_assert(keyBits % digitBits == 0 && keyBits + indexBits == 64);
-constexpr std::size_t runLength = 1 << 15;  // keys that one task sorts at a time: more than digits
-constexpr std::size_t grain = 1024;         // groups a task
-/// What is worth splitting for another thread: items.
+constexpr std::size_t runLength = 1 << 15;  // keys that one task sorts at a time; greater than `digits`
+constexpr std::size_t grain = 1024;         // groups per task
+/// Min count of items for which splitting starts another task.
 constexpr std::size_t worthSplitting = 1 << 15;
-/// Selection halves what it looks at, on average, until there is little left; if not, it is done in another way.
+/// On average, each round of the selection halves the range until it is short. After this many rounds std::nth_element
+/// takes over.
 constexpr int maxRounds = 64;
 constexpr std::ptrdiff_t shortRun = 24;
 
@@ -40,8 +41,8 @@ std::uint64_t spread(std::uint64_t x) {
     return (x | x << 2) & 0x249249249;
 }
 
-// From cells to their places along Hilbert's curve, by Skilling's transformation without branches; the place of a cell
-// is in the bits of the three numbers taken in turn.
+// Converts cells to their positions along the Hilbert curve, by Skilling's transformation without branches. The
+// position of a cell is the interleaved bits of the three numbers.
 void transformToHilbert(CurveCells& cells) {
     auto &x = cells.x[0], &y = cells.x[1], &z = cells.x[2];
     const auto undo = [&](int bit, std::uint32_t* v) {
@@ -60,7 +61,7 @@ void transformToHilbert(CurveCells& cells) {
     for (std::size_t i = 0; i < CurveCells::most; ++i) {
         y[i] ^= x[i];
         z[i] ^= y[i];
-        std::uint32_t parity = z[i] >> 1;  // bit b: of the bits of z above b
+        std::uint32_t parity = z[i] >> 1;  // bit b: parity of the bits of z above b
         for (int shift = 1; shift < bitsPerAxis; shift *= 2) parity ^= parity >> shift;
         x[i] ^= parity;
         y[i] ^= parity;
@@ -68,14 +69,13 @@ void transformToHilbert(CurveCells& cells) {
     }
 }
 
-// Puts items into an order of their own: halves by the middle of the longest side of where they are, those halved
-// again, and so on, each in full groups as the tree has them.
+// Sorts items by recursive splitting at the median along the longest axis. Each part fills whole groups of the tree.
 class Splitter {
   public:
     Splitter(std::vector<TreeItem>& items, Progress* progress) : items_(items), progress_(progress) {}
 
     void sort() {
-        std::size_t size = treeWidth;  // items of a child
+        std::size_t size = treeWidth;  // items per child
         while (size * treeWidth < items_.size()) size *= treeWidth;
         split(0, items_.size(), size);
     }
@@ -94,16 +94,16 @@ class Splitter {
         return bool(int(x < y) | (int(x == y) & int(a.index < b.index)));
     }
 
-    // As std::nth_element, but without branches on what can not be foretold.
+    // Equals std::nth_element, but without unpredictable branches.
     static void select(TreeItem* begin, TreeItem* middle, TreeItem* end, int axis) {
         const auto inOrder = [axis](const TreeItem& a, const TreeItem& b) { return less(a, b, axis); };
         for (int round = 0; round < maxRounds && end - begin > shortRun; ++round) {
-            // all differ: something is less than the second of three
+            // all items differ, so at least one is less than the median of three
             std::array<TreeItem, 3> some{*begin, begin[(end - begin) / 2], end[-1]};
             std::sort(some.begin(), some.end(), inOrder);
             TreeItem* store = begin;
             for (TreeItem* i = begin; i < end; ++i) {
-                // as wholes: what is written in pieces can not be read at once soon after
+                // copied as whole vectors: a load that spans several recent smaller stores would stall
                 const bool before = less(*i, some[1], axis);
                 const Whole here = wholeOf(i), there = wholeOf(store);
                 std::memcpy(i, &there, sizeof there);
@@ -147,7 +147,7 @@ void setBox(BoxGroup& group, std::size_t place, const glm::vec3& lower, const gl
     }
 }
 
-// The box around the boxes of a group becomes one box of its parent.
+// Joins the boxes of a group into one box of its parent.
 void joinInto(const BoxGroup& group, BoxGroup& parent, std::size_t place) {
     glm::vec3 lower, upper;
     for (int i = 0; i < 3; ++i) {
@@ -207,7 +207,7 @@ void makeCurveKeys(CurveCells& cells, std::size_t first, std::size_t count, std:
     }
 }
 
-// A radix sort, runs side by side.
+// A radix sort with parallel runs.
 void sortCurveKeys(std::vector<std::uint64_t>& keys, Progress* progress) {
     const std::size_t runs = (keys.size() + runLength - 1) / runLength;
     auto other = vectorOf<std::uint64_t>(keys.size(), progress);

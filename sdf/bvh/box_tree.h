@@ -1,6 +1,6 @@
-// A tree of boxes, eight to a group, eight groups to a larger one, and so on upward, with no pointers and no choices
-// that cost time, over leaves that stand along Hilbert's curve. What a leaf is, its user knows: eight triangles,
-// mostly.
+// A bounding volume hierarchy with eight children per node. It is implicit: nodes have no pointers, and traversal has
+// no expensive branches. Leaves are stored in Hilbert order. The user of the tree defines what a leaf holds, in most
+// cases eight triangles.
 #pragma once
 
 #include <cstddef>
@@ -14,16 +14,17 @@ namespace bilayer::detail {
 
 class Progress;
 
-inline constexpr int treeWidth = 8;  ///< triangles a leaf and boxes a group: a vector of floats
+inline constexpr int treeWidth = 8;  ///< triangles per leaf and boxes per group: one vector of floats
 
-/// The boxes of eight leaves or of eight groups; a box that is left over is empty: infinitely far away.
+/// The boxes of eight leaves or of eight groups. Unused boxes are empty, that is, infinitely far away.
 struct BoxGroup {
     alignas(64) float lower[3][treeWidth];
     float upper[3][treeWidth];
-    std::uint32_t firstChild;  ///< the node of the first box; the others follow
+    std::uint32_t firstChild;  ///< the node of the first box; the nodes of the other boxes follow
 };
 
-/// Nodes are numbered: first the leaves, then the groups from the finest to the coarsest; the last one is the root.
+/// Nodes are numbered: first the leaves, then the groups from the finest to the coarsest level. The last node is the
+/// root.
 struct BoxTree {
     std::uint32_t leafCount = 0, groupCount = 0;
     LargeArray<BoxGroup> groups;
@@ -32,42 +33,41 @@ struct BoxTree {
     const BoxGroup& group(std::uint32_t node) const { return groups[node - leafCount]; }
     std::uint32_t root() const { return leafCount + groupCount - 1; }
 
-    /// Takes memory for the groups over so many leaves, at least one.
+    /// Allocates the groups for this count of leaves, at least one.
     void makeRoom(std::size_t leaves);
-    /// Any thread may set the box of any leaf, each once.
+    /// Sets the box of a leaf. Any thread may call this for any leaf, once per leaf.
     void setLeafBox(std::size_t leaf, const glm::vec3& lower, const glm::vec3& upper);
-    /// Makes the boxes of groups from those of the leaves. Throws Cancelled.
+    /// Computes the boxes of groups bottom-up from those of the leaves. Throws Cancelled.
     void joinBoxes(Progress* progress);
 };
 
-/// Cells along an axis of the cube that Hilbert's curve runs through.
+/// Cells along each axis of the cube that the Hilbert curve fills.
 inline constexpr std::uint32_t curveCells = 1 << 12;
-/// A place along the curve and the number of what is there share 64 bits.
+/// A key of 64 bits holds a position along the curve and the index of the item there.
 inline constexpr std::size_t maxOnCurve = std::size_t(1) << 28;
 inline constexpr std::uint64_t curveIndexMask = maxOnCurve - 1;
 
-/// Coordinates of cells, in runs so that the compiler can use vectors.
+/// Cell coordinates, stored as arrays per axis so that the compiler can vectorise.
 struct CurveCells {
     static constexpr std::size_t most = 64;
     std::uint32_t x[3][most];
 };
 
-/// Writes the keys of what lies in the first `count` cells, numbered from `first`. The cells are changed.
+/// Writes the keys of the items in the first `count` cells, whose indices start at `first`. Overwrites the cells.
 void makeCurveKeys(CurveCells& cells, std::size_t first, std::size_t count, std::uint64_t* keys);
 
-/// Sorts keys by their places along the curve, stably. Throws Cancelled.
+/// Sorts keys by their positions along the curve, stably. Throws Cancelled.
 /// @param progress  polled, unless null
 void sortCurveKeys(std::vector<std::uint64_t>& keys, Progress* progress);
 
-/// What is put into an order by where it is; all indices differ.
+/// An item that is sorted by its position. All indices differ.
 struct TreeItem {
     glm::vec3 place;
     std::uint32_t index;
 };
 
-/// Puts items into an order by splitting, instead of that along the curve: halves by the middle of the longest side of
-/// where they are, those halved again, and so on, each in full groups as the tree has them. It takes longer, and boxes
-/// overlap less. Throws Cancelled.
+/// Sorts items by recursive splitting instead of Hilbert order. Each split is at the median along the longest axis of
+/// the positions, and fills whole groups of the tree. Splitting takes longer, but boxes overlap less. Throws Cancelled.
 /// @param progress  polled, unless null
 void sortBySplitting(std::vector<TreeItem>& items, Progress* progress);
 

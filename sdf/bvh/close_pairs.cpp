@@ -1,5 +1,5 @@
-// Highway compiles the part between HWY_BEFORE_NAMESPACE and HWY_AFTER_NAMESPACE once for each instruction set. What is
-// left out is left out for sure, so all of them lead to the same counts.
+// Highway compiles the part between HWY_BEFORE_NAMESPACE and HWY_AFTER_NAMESPACE once for each instruction set. The
+// tests omit a pair only when it certainly does not intersect, so all instruction sets lead to the same counts.
 #include "sdf/bvh/close_pairs.h"
 
 #undef HWY_TARGET_INCLUDE
@@ -18,9 +18,10 @@ namespace {
 
 using IndexTag = hn::RebindToUnsigned<Tag>;
 
-/// Rounding of a volume in floats, relative to the sum of the sizes of its products: eight roundings and some room.
+/// Rounding error of a volume in floats, relative to the sum of the absolute values of its products: eight roundings
+/// plus a margin.
 constexpr float roundingOfVolume = 1e-6f;
-/// More than what products lose where they are too small for a float.
+/// Upper bound on what underflow of products loses.
 constexpr float minProduct = 1e-30f, minVolume = 1e-37f;
 
 inline Points pointsAt(const float (&p)[3][treeWidth], std::size_t lane) {
@@ -53,9 +54,9 @@ struct Boxes {
     static Vec most(Vec a, Vec b, Vec c) { return hn::Max(a, hn::Max(b, c)); }
 };
 
-// The planes of triangles, and on which side of them points lie for sure.
+// The planes of triangles, and tests for the side on which points certainly lie.
 struct Planes {
-    Points origin, normal, sizes;  // the latter: of the products that the normal is made of
+    Points origin, normal, sizes;  // `sizes`: absolute values of the products in the normal
 
     explicit Planes(const Points* c) : origin(c[0]) {
         const Points u = c[1] - c[0], v = c[2] - c[0];
@@ -80,7 +81,7 @@ struct Planes {
         below = hn::Lt(volume, hn::Neg(room));
     }
 
-    // Whether a triangle lies on one side, but for corners that it shares.
+    // Tests whether a triangle lies on one side, except for corners that it shares.
     Mask apart(const Points* corners, const Mask* shared) const {
         Mask above[3], below[3];
         for (int k = 0; k < 3; ++k) {
@@ -102,7 +103,7 @@ struct Lanes {
           boxes(corners) {}
 };
 
-// The same, with what it takes to look at pairs.
+// The same lanes with the data for pair tests.
 struct Others {
     const Lanes& lanes;
     hn::Vec<IndexTag> vertices[3];
@@ -116,9 +117,9 @@ struct Others {
         for (int k = 0; k < 3; ++k) vertices[k] = hn::Load(IndexTag(), numbers[k] + lane);
     }
 
-    // Of those in the mask, the ones that a triangle may run through.
+    // Returns the lanes of the mask whose triangles may intersect a triangle.
     Mask close(const Points* other, const glm::uvec3& t, Mask mask) const {
-        // which corners of each lane, and which of the other, are shared
+        // the corners of each lane, and the corners of the other triangle, that are shared
         Mask mine[3], its[3];
         for (int k = 0; k < 3; ++k) mine[k] = its[k] = hn::FirstN(Tag(), 0);
         for (int i = 0; i < 3; ++i)
@@ -177,7 +178,7 @@ class LeafPairs {
         hn::Store(points.z, Tag(), to[2] + lane);
     }
 
-    // Which triangles of the leaf meet a box.
+    // Returns the triangles of the leaf whose boxes overlap a box.
     unsigned inBox(const Boxes& box) const {
         unsigned all = 0;
         for (std::size_t lane = 0; lane < treeWidth; lane += hn::Lanes(Tag()))
@@ -209,7 +210,7 @@ class LeafPairs {
         mask = others.close(corners, mesh_.triangles[leaf_.triangles[i]], mask);
         for (unsigned bits = bitsOf(mask); bits != 0; bits &= bits - 1) {
             const std::size_t k = lane + std::size_t(std::countr_zero(bits));
-            // in its own leaf, a triangle is paired with later ones
+            // within its own leaf, a triangle is paired with later ones only
             if (!same || k > i) pairs_.emplace_back(leaf_.triangles[i], leaf.triangles[k]);
         }
     }
@@ -218,7 +219,7 @@ class LeafPairs {
     const TriangleTree& tree_;
     const std::uint32_t index_;
     const TriangleLeaf& leaf_;
-    alignas(64) float lower_[3][treeWidth], upper_[3][treeWidth];  // boxes of its triangles
+    alignas(64) float lower_[3][treeWidth], upper_[3][treeWidth];  // boxes of the leaf's triangles
     std::vector<std::pair<unsigned, unsigned>>& pairs_;
 };
 

@@ -1,4 +1,4 @@
-// Which triangles of a mesh may run through each other, by a quick look at boxes and planes.
+// Finds pairs of triangles of a mesh that may intersect, by a fast test of boxes and planes.
 #pragma once
 
 #include <cstdint>
@@ -9,11 +9,13 @@
 
 namespace bilayer::detail {
 
-/// Pairs of the triangles of a leaf with each other and with those of later leaves, so that all leaves together have
-/// each pair of the mesh once. Left out are pairs whose boxes do not meet, that share an edge, or of which one triangle
-/// surely lies on one side of the other's plane but for vertices that they share.
-/// @param welded  the tree's mesh, in which triangles share vertices by number
-/// @param pairs   replaced; within each, the triangle of `leaf` comes first
+/// Pairs the triangles of a leaf with each other and with those of later leaves. All leaves together yield each pair of
+/// the mesh once. A pair is omitted in three cases:
+/// - its boxes do not overlap,
+/// - its triangles share an edge,
+/// - one triangle certainly lies on one side of the other's plane, except for shared vertices.
+/// @param welded  the tree's mesh, in which triangles share vertices by index
+/// @param pairs   overwritten; in each pair, the triangle of `leaf` comes first
 void findClosePairs(const Mesh& welded, const TriangleTree& tree, std::uint32_t leaf,
                     std::vector<std::pair<unsigned, unsigned>>& pairs);
 

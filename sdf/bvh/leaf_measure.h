@@ -1,6 +1,6 @@
-// How points are measured against the boxes and leaves of a WideTree, with SIMD. Highway includes this file once for
-// each instruction set: only between HWY_BEFORE_NAMESPACE's headers and its own, after hwy/highway.h. Lanes never add
-// up, so all instruction sets give the same bytes.
+// SIMD distances of points to the boxes and leaves of a WideTree. Highway includes this file once for each instruction
+// set: only between HWY_BEFORE_NAMESPACE's headers and its own, after hwy/highway.h. No sum crosses lanes, so all
+// instruction sets give the same bytes.
 #if defined(BILAYER_SDF_LEAF_MEASURE_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef BILAYER_SDF_LEAF_MEASURE_H
 #undef BILAYER_SDF_LEAF_MEASURE_H
@@ -17,31 +17,33 @@ HWY_BEFORE_NAMESPACE();
 namespace bilayer::detail::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-/// Room for the rounding of a squared distance.
+/// Margin for the rounding of a squared distance.
 constexpr float roundUp = 1 + 1e-6f;
-/// Searches place nothing farther away than this, and reach no farther than this: the squares are finite, so that boxes
-/// that are left over, which are infinitely far away, stay out of reach [voxels].
+/// The max coordinate and the max reach of a search [voxels]. Their squares are finite. Unused boxes are infinitely far
+/// away and therefore stay out of reach.
 constexpr float farthestPlace = 1e18f, longestReach = 4e18f;
 
 inline Vec square(Vec x) {
     return hn::Mul(x, x);
 }
 
-// Adds the square of what a place on an edge's line lies beyond the edge.
+// Returns the square of the distance by which a point on an edge's line lies beyond the ends of the edge.
 inline Vec beyond2(Vec place, Vec length) {
     const Vec zero = hn::Zero(Tag());
     return square(hn::Max(hn::Max(hn::Neg(place), hn::Sub(place, length)), zero));
 }
 
-// Squared distances, and heights over triangles; 0 beside them.
+// Squared distances, and signed heights above the triangles. A height is 0 for a point whose projection lies outside of
+// the triangle.
 struct Measured {
     Vec distance2, height;
 };
 
-// Measures points against triangles, a pair a lane; load() takes a lane's triangle from an array of a leaf, and the
-// points are seen from the triangles' corners. The distance along the plane is the least over the three edges of how
-// far the point lies beside and beyond them; over the triangle itself only the latter counts, which is zero for one
-// edge at least, so that rounding can not take a sliver's line for its inside.
+// Measures points against triangles, one pair per lane. load() returns a lane's triangle data from an array of the
+// leaf. The points are relative to corner A of the triangles. The distance within the plane is the min over the three
+// edges. Each edge contributes the distance perpendicular to it and the distance beyond its ends. If the projection
+// lies in the triangle, only the distance beyond counts; it is zero for at least one edge. Thus rounding cannot mistake
+// the line of a sliver for its interior.
 template <class Load>
 inline Measured measureFromCorner(const WideLeaf& leaf, Load load, Vec qx, Vec qy, Vec qz) {
     const Tag tag;
@@ -69,7 +71,7 @@ inline Measured measureFromCorner(const WideLeaf& leaf, Load load, Vec qx, Vec q
     return {hn::Add(flat2, square(z)), hn::IfThenElseZero(over, z)};
 }
 
-// The same for points in the tree's frame.
+// Does the same for points in the tree's frame.
 template <class Load>
 inline Measured measure(const WideLeaf& leaf, Load load, Vec px, Vec py, Vec pz) {
     return measureFromCorner(leaf, load, hn::Sub(hn::Sub(px, load(leaf.cell[0])), load(leaf.corner[0])),

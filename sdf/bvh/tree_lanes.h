@@ -1,4 +1,4 @@
-// A group or a leaf of a tree as SIMD sees it: a box or a triangle a lane. Highway includes this file once for each
+// SIMD lanes over a group or a leaf of a tree: one box or triangle per lane. Highway includes this file once for each
 // instruction set: only between HWY_BEFORE_NAMESPACE's headers and its own, after hwy/highway.h.
 #if defined(BILAYER_SDF_TREE_LANES_H) == defined(HWY_TARGET_TOGGLE)
 #ifdef BILAYER_SDF_TREE_LANES_H
@@ -27,7 +27,7 @@ inline unsigned bitsOf(Mask mask) {
     return bits[0];
 }
 
-// Points, a lane each.
+// Points, one per lane.
 struct Points {
     Vec x, y, z;
 

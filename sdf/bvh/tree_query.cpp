@@ -1,5 +1,5 @@
-// Highway compiles the part between HWY_BEFORE_NAMESPACE and HWY_AFTER_NAMESPACE once for each instruction set. Lanes
-// never add up, so all of them give the same bytes.
+// Highway compiles the part between HWY_BEFORE_NAMESPACE and HWY_AFTER_NAMESPACE once for each instruction set. No sum
+// crosses lanes, so all instruction sets give the same bytes.
 #include "sdf/bvh/tree_query.h"
 
 #undef HWY_TARGET_INCLUDE
@@ -21,22 +21,24 @@ namespace {
 using IndexTag = hn::RebindToUnsigned<Tag>;
 using NumberTag = hn::RebindToSigned<Tag>;
 
-/// Triangles whose distances d differ by less may share the closest point: more than floats blur. Squared distances
-/// then differ by less than tie * (1 + d^2), since 2 d <= 1 + d^2; so it is in exact_block.cpp [voxels].
+/// Triangles whose distances d differ by less than this may share the closest point [voxels]. It exceeds the rounding
+/// error of floats. Their squared distances then differ by less than tie * (1 + d^2), since 2 d <= 1 + d^2;
+/// exact_block.cpp does the same.
 constexpr float tie = 1e-5f;
-/// Nearer to a face than this its side is left to a closer look [voxels].
+/// If a voxel is closer to the plane of a face than this, its side is left to a more accurate test [voxels].
 constexpr float minHeight = 1e-3f;
-/// Up to this reach the two above hold; they grow with it beyond, as the rounding of distances does [voxels].
+/// The two tolerances above hold up to this reach. Beyond, they grow with the reach, like the rounding of distances
+/// [voxels].
 constexpr float usualReach = 16;
-/// Room for the rounding of distances, and for ties, when a bound is taken from one place to another [voxels].
+/// Margin for rounding of distances and for ties when a bound is transferred from one point to another [voxels].
 constexpr float slack = 1e-3f;
-/// The eight corners of a cube, each beside the one before.
+/// The eight corners of a cube, each adjacent to the previous one.
 constexpr int path[8][3] = {{0, 0, 0}, {0, 0, 1}, {0, 1, 1}, {0, 1, 0}, {1, 1, 0}, {1, 1, 1}, {1, 0, 1}, {1, 0, 0}};
-/// The eight voxels of a cube are measured together against no more triangles than this: with more it is quicker to let
-/// each choose its own. Cubes with more nodes around them have more.
+/// Limits for measuring the eight voxels of a cube together: max count of triangles and of nodes. Above these, it is
+/// faster to search for each voxel separately.
 constexpr std::size_t maxTogether = 64, maxNodes = 16;
 
-// The squared distances of eight boxes, or as many as a vector holds, from a box of voxels.
+// Returns the squared distances of up to a vector of boxes from a box of voxels.
 inline Vec boxDistance2(const float* const lower[3], const float* const upper[3], std::size_t i,
                         const VoxelBox& voxels) {
     const Tag tag;
@@ -49,7 +51,7 @@ inline Vec boxDistance2(const float* const lower[3], const float* const upper[3]
     return sum;
 }
 
-// Where boxes are stored: in a list or in a group.
+// References to boxes in a list or in a group.
 struct Boxes {
     const float *lower[3], *upper[3];
 
@@ -111,29 +113,30 @@ void narrowList(const WideTree& tree, const NodeList& from, const VoxelBox& voxe
         narrowing.take(boxes, i, hn::LoadU(IndexTag(), from.nodes.data() + i), hn::FirstN(tag, from.count - i));
 }
 
-// The range of a voxel's heights over the triangles around its closest point. It lies on a side that all of them agree
-// on; 0 stands for a triangle that the closest point is on an edge of.
+// The range of a voxel's heights above the triangles that share its closest point. If all heights have the same sign,
+// it gives the side of the voxel. A height of 0 marks a triangle with the closest point on one of its edges.
 struct Heights {
     float lowest = 0, highest = 0;
-    float nearest = 0;  // over the triangle that floats call the nearest
+    float nearest = 0;  // above the nearest triangle in floats
 };
 
-// One voxel's question.
+// The query of one voxel.
 struct Query {
     const WideTree& tree;
     const NodeList& list;
     BlockAnswer& answer;
-    float tieWidth;  // distances less than this apart are equal
+    float tieWidth;  // distances that differ by less count as equal
     VoxelBox voxel;
-    float best2, limit2;  // boxes farther away than the latter do not matter
-    std::size_t repeats;  // so many of the visits may come up again: the first one was a guess
+    float best2, limit2;  // min squared distance found; boxes farther than `limit2` are skipped
+    std::size_t repeats;  // the first `repeats` visits may occur again: the first one was a guess
 
     void lower(float distance2) {
         best2 = distance2;
         limit2 = best2 * (roundUp + tieWidth) + tieWidth;
     }
 
-    // From now on nothing is nearest: all leaves whose boxes are nearer than this are visited that were not yet.
+    // Restarts without a nearest triangle: visits all leaves that are not visited yet and whose boxes are closer than
+    // this.
     void widen(float distance) {
         best2 = 0;
         limit2 = distance * distance * roundUp;
@@ -146,7 +149,7 @@ struct Query {
         return false;
     }
 
-    // The squared distances to the triangles of a leaf.
+    // Computes the squared distances to the triangles of a leaf.
     void visit(std::uint32_t index) {
         const Tag tag;
         const WideLeaf& leaf = tree.leaves[index];
@@ -177,7 +180,7 @@ struct Query {
             hn::Store(distance2, tag, gaps);
             for (; bits != 0; bits &= bits - 1) {
                 const auto lane = std::size_t(std::countr_zero(bits));
-                if (gaps[lane] > limit2) continue;  // something nearer was found meanwhile
+                if (gaps[lane] > limit2) continue;  // something closer was found meanwhile
                 const std::uint32_t node = nodes ? nodes[i + lane] : firstNode + std::uint32_t(i + lane);
                 if (!tree.isLeaf(node))
                     look(Boxes(tree.group(node)), 0, treeWidth, nullptr, tree.group(node).firstChild);
@@ -187,7 +190,7 @@ struct Query {
         }
     }
 
-    // Where the nearest triangle's leaf stands in the visits, and its place there.
+    // Returns the visit with the nearest triangle, and the triangle's slot in the leaf.
     std::pair<std::size_t, std::size_t> winner() const {
         for (std::size_t v = 0; v < answer.visits.size(); ++v)
             for (std::size_t i = 0; i < treeWidth; ++i)
@@ -195,7 +198,7 @@ struct Query {
         return {0, 0};
     }
 
-    // The heights over all faces that share the closest point.
+    // Returns the range of heights above all faces that share the closest point.
     Heights heights(float nearest) const {
         const Tag tag;
         const Vec infinity = hn::Set(tag, std::numeric_limits<float>::infinity());
@@ -211,14 +214,14 @@ struct Query {
     }
 };
 
-// The eight voxels of a cube of side 2, a lane each, and the triangles that they were measured against.
+// The eight voxels of a cube of side 2, one per lane, and the triangles that they were measured against.
 struct Together {
     struct Candidate {
         alignas(64) float distance2[treeWidth];
         float height[treeWidth];
         std::int32_t triangle;
     };
-    // What a voxel's nearest triangles say.
+    // Results of the nearest triangles of each voxel.
     struct Answers {
         alignas(64) float lowest[treeWidth], highest[treeWidth], winner[treeWidth];
     };
@@ -251,10 +254,10 @@ struct Together {
         }
     }
 
-    // The distance that no voxel's nearest triangle exceeds.
+    // Returns the max over the voxels of the distance to the nearest triangle.
     float farthest() const { return std::sqrt(*std::max_element(best2, best2 + treeWidth)); }
 
-    // The first of the nearest triangles, and the heights over all that share the closest point.
+    // Returns the first of the nearest triangles, and the range of heights above all that share the closest point.
     Answers answers(float tieWidth) const {
         const Tag tag;
         Answers found;
@@ -278,7 +281,7 @@ struct Together {
     }
 };
 
-// What all voxels of a block share.
+// The data that all voxels of a block share.
 struct BlockQuery {
     const WideTree& tree;
     const glm::vec3& origin;
@@ -286,7 +289,7 @@ struct BlockQuery {
     bool sign;
     BlockAnswer& answer;
 
-    // Asks for what is nearer than `bound`.
+    // Searches within the distance `bound`.
     Query ask(const NodeList& list, const glm::vec3& position, float bound) const {
         const float ties = sign ? tie * std::max(1.f, reach / usualReach) : 0.f;
         Query query{tree, list, answer, ties, {position, position}, 0, 0, 1};
@@ -297,8 +300,8 @@ struct BlockQuery {
         return query;
     }
 
-    // The voxels of a cube, which are no farther than `radius` from its centre: what is known of the centre rules
-    // out most of the list, if not all voxels.
+    // Answers the voxels of a cube, which are at most `radius` from its centre. The result for the centre excludes most
+    // of the list, or all voxels.
     void answerCube(const NodeList& from, const glm::vec3& lower, int level) {
         const float side = float(blockSide >> level), radius = 0.5f * (side - 1) * std::sqrt(3.f) + slack;
         const float bound = reach + radius;
@@ -328,8 +331,9 @@ struct BlockQuery {
              sign ? query.heights(answer.visits[visit].height[place]) : Heights{});
     }
 
-    // Answers the voxels of a cube of side 2 at once, if few triangles matter to any of them: those that are no farther
-    // from the centre, where all are measured first, than the nearest one of some voxel may be.
+    // Answers the voxels of a cube of side 2 at once, if few triangles are relevant. Triangles are first measured from
+    // the centre. Relevant are those whose distance does not exceed the upper bound for the nearest triangle of any
+    // voxel.
     bool answerTogether(Query& centre, const NodeList& list, const glm::vec3& lower, float atMost, float radius) {
         if (list.count > maxNodes) return false;
         Together cube(tree, lower);
@@ -367,7 +371,7 @@ struct BlockQuery {
         if (distance > farFrom) answer.far[x] |= bit;
         if (distance > midFrom) answer.mid[x] |= bit;
         const float least = minHeight * std::max(1.f, reach / usualReach);
-        // on the surface either side is right, and no link can carry it on
+        // on the surface either side is correct, and no link propagates it
         if (heights.lowest > least || distance < 0.5f * linkSlack) answer.sides.outside[x] |= bit;
         if (heights.highest < -least) answer.sides.inside[x] |= bit;
         if (heights.nearest > least) answer.nearest.outside[x] |= bit;

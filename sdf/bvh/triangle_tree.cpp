@@ -15,13 +15,13 @@
 namespace bilayer::detail {
 namespace {
 
-constexpr std::size_t grain = 1024;  // leaves or triangles a task
-/// A box test's rounding in double precision, relative to the largest coordinate; generous.
+constexpr std::size_t grain = 1024;  // leaves or triangles per task
+/// Rounding error of a box test in double precision, relative to the max coordinate; generous.
 constexpr double roundingOfBoxes = 1e-12;
-/// Lines that vote on whether a part lies within another: odd, and more than one against lines along edges.
+/// Count of lines that vote on whether a part lies within another: odd, and more than one in case a line hits an edge.
 constexpr std::size_t votes = 3;
 
-// The triangles in the order of the tree.
+// Returns the triangles in the order of the tree.
 std::vector<TreeItem> sortedTriangles(const Mesh& mesh, Progress* progress) {
     auto items = vectorOf<TreeItem>(mesh.triangles.size(), progress);
     forAllPolled(items.size(), grain, progress, [&](std::size_t i) {
@@ -42,7 +42,7 @@ glm::dvec3 centroid(const Mesh& mesh, unsigned triangle) {
     return (glm::dvec3(mesh.points[t.x]) + glm::dvec3(mesh.points[t.y]) + glm::dvec3(mesh.points[t.z])) / 3.0;
 }
 
-// A line, and the plane across it that triangles are projected on.
+// A line, and a plane perpendicular to it onto which triangles are projected.
 struct Line {
     glm::dvec3 origin, direction, inverse, u, v;
 
@@ -63,12 +63,13 @@ struct Line {
         return first <= last;
     }
 
-    // Twice the signed area of the projected edge and the origin; exactly its own negative when the edge is reversed.
+    // Returns twice the signed area of the projected edge and the origin. The reversed edge has exactly the negative
+    // value.
     double beside(const glm::dvec3& a, const glm::dvec3& b) const {
         return glm::dot(a, u) * glm::dot(b, v) - glm::dot(a, v) * glm::dot(b, u);
     }
 
-    // 0 where it misses; else the sign, and where.
+    // Returns 0 for a miss, otherwise the sign of the crossing; `along` receives its position.
     int cross(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c, double& along) const {
         const double bc = beside(b, c), ca = beside(c, a), ab = beside(a, b);
         const bool front = bc > 0 && ca > 0 && ab > 0, back = bc < 0 && ca < 0 && ab < 0;
@@ -79,7 +80,7 @@ struct Line {
     }
 };
 
-// The parts that a ray from the point crosses an odd number of times, in order.
+// Returns the parts that a ray from the point crosses an odd number of times, in order.
 std::vector<unsigned> oddParts(const TriangleTree& tree, const glm::dvec3& point, const glm::dvec3& direction,
                                std::span<const unsigned> partOf) {
     std::vector<Crossing> found;

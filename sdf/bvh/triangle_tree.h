@@ -1,5 +1,5 @@
-// A tree of boxes over the triangles of a mesh: which triangles meet a box or a line, and which parts of the mesh lie
-// within which others. Boxes and corners are those of the mesh, without rounding.
+// A bounding volume hierarchy over the triangles of a mesh. It finds the triangles that overlap a box or a line, and
+// the parts of a mesh that lie within other parts. Boxes and corners are those of the mesh, without rounding.
 #pragma once
 
 #include <cstddef>
@@ -16,16 +16,16 @@ namespace bilayer::detail {
 
 class Progress;
 
-/// A triangle met by a line.
+/// An intersection of a line with a triangle.
 struct Crossing {
     unsigned triangle;
-    double along;  ///< from the line's origin, in lengths of its direction
-    int sign;      ///< +1: the line leaves through the front of the triangle; -1: it enters there
+    double along;  ///< line parameter: distance from the origin in lengths of the direction
+    int sign;      ///< +1: the line exits through the front of the triangle; -1: it enters there
 };
 
-/// Eight triangles. Places that are left over repeat the last one.
+/// Eight triangles. Unused slots repeat the last triangle.
 struct TriangleLeaf {
-    alignas(64) float corners[3][3][treeWidth];  ///< by corner, then axis [m]
+    alignas(64) float corners[3][3][treeWidth];  ///< by corner, then by axis [m]
     std::uint32_t triangles[treeWidth];          ///< indices into Mesh::triangles
 };
 
@@ -35,15 +35,15 @@ class TriangleTree {
     /// @param progress  polled, unless null
     explicit TriangleTree(const Mesh& mesh, Progress* progress = nullptr);
 
-    /// Calls visit(triangle) for the triangles whose own boxes meets(box) holds for; it must hold for any box around
-    /// such a box.
+    /// Calls visit(triangle) for each triangle whose bounding box satisfies meets(box). If meets() holds for a box, it
+    /// must hold for any box that contains it.
     template <class Meets, class Visit>
     void descend(const Meets& meets, const Visit& visit) const {
         if (boxes_.leafCount > 0) descend(boxes_.root(), meets, visit);
     }
 
-    /// All triangles that a line meets, both ways, in no order. An edge that two triangles share is met once, but for
-    /// lines that hit it exactly.
+    /// Finds all intersections of a line with triangles, in both directions and in no particular order. The line
+    /// crosses an edge that two triangles share only once, unless it hits the edge exactly.
     void crossings(const glm::dvec3& origin, const glm::dvec3& direction, std::vector<Crossing>& found) const;
 
     Bounds boxOf(unsigned triangle) const {
@@ -55,11 +55,11 @@ class TriangleTree {
     const BoxTree& boxes() const { return boxes_; }
     std::size_t triangleCount() const { return mesh_.triangles.size(); }
     const TriangleLeaf& leaf(std::size_t index) const { return leaves_[index]; }
-    /// The number of triangles in a leaf; only the last one may have places that are left over.
+    /// Returns the count of triangles in a leaf. Only the last leaf may have unused slots.
     std::size_t leafSize(std::size_t index) const {
         return index + 1 < leaves_.size() ? std::size_t(treeWidth) : mesh_.triangles.size() - index * treeWidth;
     }
-    /// The largest coordinate, in size [m].
+    /// Returns the max absolute coordinate [m].
     float largestCoordinate() const { return largest_; }
 
   private:
@@ -79,19 +79,19 @@ class TriangleTree {
     }
 
     const Mesh& mesh_;
-    float largest_ = 0;  // coordinate [m]
+    float largest_ = 0;  // max absolute coordinate [m]
     BoxTree boxes_;
     LargeArray<TriangleLeaf> leaves_;
 };
 
-/// Directions spread evenly over half the sphere (a Fibonacci lattice), none along an axis.
+/// Returns directions that are evenly distributed over a hemisphere (a Fibonacci lattice). None is parallel to an axis.
 std::vector<glm::dvec3> spreadDirections(std::size_t count);
 
 inline constexpr unsigned noPart = ~0u;
 
-/// For each part of a mesh, the parts that it lies within: lines from three of its triangles cross them an odd number
-/// of times, and their boxes hold its box. Their orientation does not matter.
-/// @param partOf    the part of each triangle; `noPart` for triangles that neither hold nor lie in anything
+/// For each part of a mesh, finds the parts that contain it. A part contains another if lines from three triangles of
+/// the other cross it an odd number of times, and if its box contains the other's box. Orientation does not matter.
+/// @param partOf    the part of each triangle; `noPart` for triangles to ignore
 /// @param progress  polled, unless null
 std::vector<std::vector<unsigned>> enclosingParts(const Mesh& mesh, const TriangleTree& tree,
                                                   std::span<const unsigned> partOf, std::size_t parts,

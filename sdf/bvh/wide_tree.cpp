@@ -18,9 +18,9 @@
 namespace bilayer::detail {
 namespace {
 
-/// Floats hold all whole numbers up to twice this [voxels].
+/// Floats represent all integers up to twice this [voxels].
 constexpr double longestMesh = 1 << 23;
-constexpr std::size_t grain = 1024;  // triangles or leaves a task
+constexpr std::size_t grain = 1024;  // triangles or leaves per task
 
 using Corners = std::array<glm::dvec3, 3>;
 
@@ -35,7 +35,7 @@ void forAll(std::size_t count, Progress* progress, Body body) {
     forAllPolled(count, grain, progress, body);
 }
 
-// The parts that the tree is made of: the triangles that are short enough, and the parts of those that are not.
+// The items of the tree: triangles that are short enough, and the parts of longer ones.
 class Parts {
   public:
     Parts(const Mesh& mesh, const glm::dvec3& base, double voxelSize, double longestEdge)
@@ -47,7 +47,7 @@ class Parts {
     std::uint32_t triangle(std::size_t part) const {
         return part < mesh_.triangles.size() ? std::uint32_t(part) : halves_[part - mesh_.triangles.size()].triangle;
     }
-    // Asks for memory ahead of its use: parts come in an order that the mesh does not know.
+    // Prefetches memory ahead of its use, because the order of parts is random in the mesh.
     void fetchIndices(std::size_t part) const {
         if (part < mesh_.triangles.size()) hwy::Prefetch(&mesh_.triangles[part]);
     }
@@ -57,7 +57,7 @@ class Parts {
     }
     std::size_t count() const { return mesh_.triangles.size() + halves_.size(); }
 
-    // The longest edge, from this corner to the next, and its squared length.
+    // Returns the longest edge, from this corner to the next, and its squared length.
     static std::pair<std::size_t, double> longest(const Corners& c) {
         const auto length2 = [&](std::size_t i) {
             const glm::dvec3 edge = c[(i + 1) % 3] - c[i];
@@ -103,10 +103,10 @@ class Parts {
     std::vector<Half> halves_;
 };
 
-/// The key of a part that is not used.
+/// The key of an unused part.
 constexpr std::uint64_t unused = ~std::uint64_t(0);
 
-// Keys of parts first .. first + count - 1; long triangles have none and are noted.
+// Computes the keys of parts first .. first + count - 1. Long triangles get no key and are recorded in `longOnes`.
 void makeKeys(const Parts& parts, const glm::ivec3& size, std::size_t first, std::size_t count, std::uint64_t* keys,
               std::vector<std::uint32_t>& longOnes) {
     constexpr double cells = curveCells;
@@ -126,7 +126,7 @@ void makeKeys(const Parts& parts, const glm::ivec3& size, std::size_t first, std
     }
 }
 
-// Adds the keys of the parts that have none yet; the long ones among them are returned in order.
+// Adds the keys of parts that have none yet. Returns the long ones among these in order.
 std::vector<std::uint32_t> addKeys(const Parts& parts, const glm::ivec3& size, std::vector<std::uint64_t>& keys,
                                    Progress* progress) {
     const std::size_t begin = keys.size();
@@ -144,7 +144,7 @@ std::vector<std::uint32_t> addKeys(const Parts& parts, const glm::ivec3& size, s
     return longOnes;
 }
 
-// In no particular order.
+// Returns the keys of all parts in no particular order.
 std::vector<std::uint64_t> keysOf(Parts& parts, const glm::ivec3& size, Progress* progress) {
     std::vector<std::uint64_t> keys;
     const std::vector<std::uint32_t> longOnes = addKeys(parts, size, keys, progress);
@@ -156,7 +156,7 @@ std::vector<std::uint64_t> keysOf(Parts& parts, const glm::ivec3& size, Progress
     return keys;
 }
 
-// In the order that splitting makes, instead of that along the curve.
+// Sorts the keys by recursive splitting instead of Hilbert order.
 void split(const Parts& parts, std::vector<std::uint64_t>& keys, Progress* progress) {
     auto items = vectorOf<TreeItem>(keys.size(), progress);
     forAll(keys.size(), progress, [&](std::size_t i) {
@@ -167,7 +167,7 @@ void split(const Parts& parts, std::vector<std::uint64_t>& keys, Progress* progr
     forAll(keys.size(), progress, [&](std::size_t i) { keys[i] = items[i].index; });
 }
 
-// A unit vector across `direction`.
+// Returns a unit vector perpendicular to `direction`.
 glm::dvec3 across(const glm::dvec3& direction) {
     const glm::dvec3 a = glm::abs(direction);
     const glm::dvec3 least(a.x <= a.y && a.x <= a.z, a.y < a.x && a.y <= a.z, a.z < a.x && a.z < a.y);
@@ -180,10 +180,10 @@ Vector unitOr(const Vector& v, const Vector& otherwise) {
     return length2 > 0 ? v * (1 / std::sqrt(length2)) : otherwise;
 }
 
-// Writes a triangle in its frame; one without an area becomes a segment or a point.
+// Writes a triangle in its own frame. A triangle without area becomes a segment or a point.
 void writeTriangle(WideLeaf& leaf, std::size_t place, const Corners& corners) {
-    // x along the longest edge, z straightened up from it: a sliver's normal is mostly rounding, but whatever is left
-    // of it then tilts the sliver about its own length
+    // x points along the longest edge, and z is made orthogonal to it. The normal of a sliver is mostly rounding error;
+    // the remaining error then only tilts the sliver about its long axis
     const Corners edges{corners[1] - corners[0], corners[2] - corners[1], corners[0] - corners[2]};
     const auto shorter = [](const glm::dvec3& p, const glm::dvec3& q) { return glm::dot(p, p) < glm::dot(q, q); };
     const auto first = std::size_t(std::max_element(edges.begin(), edges.end(), shorter) - edges.begin());

@@ -33,9 +33,9 @@ std::unique_ptr<TriangleLeaf> triangleLeaf(const std::int32_t* triangles, const 
     return leaf;
 }
 
-constexpr std::size_t leavesPerPoll = 256;  // tens of microseconds
+constexpr std::size_t leavesPerPoll = 256;  // takes tens of microseconds
 
-// The first voxels of all rows, as a byte: a bit a row.
+// Gathers the first voxels of all rows of a slice into one byte, one bit per row.
 std::uint64_t firstOfRows(std::uint64_t slice) {
     constexpr std::uint64_t everyFirst = 0x0101010101010101ull, gather = 0x0102040810204080ull;
     return ((slice & everyFirst) * gather) >> 56;
@@ -64,15 +64,15 @@ BlockMask insideOf(const Leaf& leaf) {
     return inside;
 }
 
-// All on one side, and nothing of it in the band.
+// Returns whether a block lies entirely on one side and has no voxel in the band.
 bool isPlain(const BandMasks& masks) {
     return !any(masks.active) && std::all_of(masks.inside.begin(), masks.inside.end(), [&](std::uint64_t word) {
         return word == masks.inside[0] && word + 1 <= 1;
     });
 }
 
-// Pairs of voxels across a face of a block: the block's own are at first + i * rowStep + j * step, the other side's at
-// `across` from them.
+// Pairs of voxels across a face of a block. The block's own voxels are at first + i * rowStep + j * step, their
+// partners at an offset of `across`.
 struct Face {
     openvdb::Coord toNeighbour;
     int first, rowStep, step, across;
@@ -82,7 +82,7 @@ const Face forwardFaces[3] = {{{blockSide, 0, 0}, lastLayer* xStep, yStep, 1, -l
                               {{0, blockSide, 0}, lastLayer* yStep, xStep, 1, -lastLayer* yStep},
                               {{0, 0, blockSide}, lastLayer, xStep, yStep, -lastLayer}};
 
-// Looks at distances only where the bits of two faces differ, which is where the surface passes between them.
+// Compares distances only where the bits of two faces differ, that is, where the surface passes between them.
 class ConflictCounter {
   public:
     ConflictCounter(const openvdb::FloatTree& tree, const std::vector<FaceBits>& faces, float voxelSize)
@@ -103,8 +103,8 @@ class ConflictCounter {
     }
 
   private:
-    // The flood of tiles stops at the edges of the tree's largest nodes. So a mesh inside out shows as large tiles that
-    // are inside, next to the space outside all nodes.
+    // The flood fill of tiles stops at the borders of the tree's largest nodes. An inside-out mesh therefore shows
+    // large inside tiles next to the space outside of all nodes.
     std::size_t atLargeTiles() const {
         std::size_t sum = 0;
         for (auto node = tree_.root().cbeginChildOn(); node; ++node)
@@ -121,7 +121,7 @@ class ConflictCounter {
             for (const int step : {-side, side}) {
                 openvdb::Coord next = tile;
                 next[axis] += step;
-                // a neighbour that is finer may well begin outside: leaves lie between
+                // a finer neighbour may start outside, because there are leaves in between
                 sum += tree_.getValueDepth(next) <= depthOfLargeTiles && tree_.getValue(next) > 0;
             }
         return sum;
@@ -158,7 +158,7 @@ class ConflictCounter {
         return sum;
     }
 
-    // Empty space is a voxel away from the surface at least, or as far as a narrower band is wide.
+    // Empty space is at least one voxel away from the surface, or the band width if that is less.
     std::size_t towards(const Face& face, std::uint64_t inside, const float* a, float tile) const {
         const float room = voxel_ * (1 + linkSlack) - std::min(std::abs(tile), voxel_);
         std::size_t sum = 0;
@@ -211,11 +211,11 @@ void Assembler::copy(const Grids& from, const std::function<bool(const openvdb::
         });
 }
 
-// The leaves below each node of the level above.
+// The leaves below each node of the next level.
 struct Assembler::Branch {
     std::vector<Collected*> leaves;
     std::size_t firstFaces = 0;
-    std::unique_ptr<SmallNode> owned{};  // until it is in the tree
+    std::unique_ptr<SmallNode> owned{};  // until the tree takes it over
     SmallNode* node = nullptr;
     std::vector<const Leaf*> plain{};
 };
@@ -227,7 +227,7 @@ std::vector<Assembler::Branch> Assembler::branches() {
     openvdb::Coord last;
     for (auto& some : leaves_)
         for (Collected& one : some) {
-            // leaves taken one after the other are mostly below the same node
+            // consecutive leaves are mostly below the same node
             const openvdb::Coord origin = one.leaf->origin() & ~(SmallNode::DIM - 1);
             if (all.empty() || origin != last) {
                 place = places.try_emplace(origin, all.size()).first->second;
@@ -269,11 +269,12 @@ openvdb::FloatGrid::Ptr Assembler::distances() {
         if (!grid->tree().probeNode<LargeNode>(origin)) grid->tree().root().addChild(new LargeNode(origin, exterior));
         grid->tree().probeNode<LargeNode>(origin)->addChild(branch.owned.release());
     }
-    // leaves carry their signs already: only tiles between them are flooded. Leaves of one far value become tiles too.
+    // leaves already have signs, so only tiles between them are flooded; uniform leaves beyond the band become tiles
+    // too
     openvdb::tools::signedFloodFillWithValues(grid->tree(), exterior, interior, true, 1, 1);
     forEachBranch([](Branch& branch) {
         for (const Leaf* leaf : branch.plain) {
-            const float value = leaf->getFirstValue();  // the leaf goes before the tile comes
+            const float value = leaf->getFirstValue();  // remove the leaf before its tile is added
             branch.node->addTile(1, leaf->origin(), value, false);
         }
     });

@@ -1,4 +1,4 @@
-// From filled blocks to grids. Heavy: it includes OpenVDB.
+// Assembles filled blocks into grids. Expensive to include: it includes OpenVDB.
 #pragma once
 
 #include <oneapi/tbb/enumerable_thread_specific.h>
@@ -16,42 +16,45 @@
 
 namespace bilayer::detail {
 
-/// Which voxels on the six faces of a block are inside: lower x, y, z, then upper x, y, z. The bits of a face run in
-/// the order of the block's voxels.
+/// The inside voxels on the six faces of a block: lower x, y, z, then upper x, y, z. The bits of a face are in the
+/// order of the block's voxels.
 using FaceBits = std::array<std::uint64_t, 6>;
 
-/// Collects filled blocks as leaves and joins them into trees; where a leaf goes follows from its origin, so no thread
-/// changes the result.
+/// Collects filled blocks as leaves and joins them into trees. The origin of a leaf determines its place, so the result
+/// does not depend on the threads.
 class Assembler {
   public:
-    /// What becomes of a block without a voxel of the band, all on one side.
+    /// What to do with a block that has no voxel in the band and lies entirely on one side.
     enum class Plain {
-        keep,  ///< it tells the side of the space around it
-        drop,  ///< that follows from its neighbours, as bands wider than a voxel surround all of the surface
+        keep,  ///< keep it: it determines the sign of the space around it
+        drop,  ///< drop it: its neighbours determine the sign, since bands wider than a voxel surround the whole
+               ///< surface
     };
 
-    /// @param triangles  whether blocks bring their nearest triangles
+    /// @param triangles  whether blocks include their nearest triangles
     /// @param progress   polled while leaves are joined
     Assembler(const BandWidths& widths, bool triangles, Plain plain, Progress& progress)
         : widths_(widths), wantTriangles_(triangles), plain_(plain), progress_(progress) {}
 
-    /// Takes blocks over. Safe from any thread.
+    /// Adds filled blocks. Thread-safe.
     void take(const FilledBlocks& blocks);
 
-    /// Takes a copy of the leaves of an earlier result whose origins `keep` accepts; called from all threads at once.
+    /// Copies the leaves of an earlier result whose origins satisfy `keep`, which is called concurrently from all
+    /// threads.
     void copy(const Grids& from, const std::function<bool(const openvdb::Coord&)>& keep);
 
-    /// The level set of all blocks, with the signs of the space between them. Call once, after the last block. Throws
-    /// Cancelled.
+    /// Builds the level set of all blocks, with signs in the space between them. Call it once, after the last block.
+    /// Throws Cancelled.
     openvdb::FloatGrid::Ptr distances();
 
-    /// The nearest triangles of its active voxels; null unless asked for. Call once. Throws Cancelled.
+    /// Builds the grid of nearest triangles of the active voxels; null unless requested. Call it once. Throws
+    /// Cancelled.
     openvdb::Int32Grid::Ptr triangles();
 
-    /// Counts the neighbouring voxels in what distances() gave that are on different sides of the surface without room
-    /// for it between them: their distances together exceed a voxel. None in the field of a closed, oriented mesh that
-    /// does not meet itself. Only pairs in different blocks count: what contradicts itself inside a block is known to
-    /// completeSides() in links.h. The space outside all blocks must be outside.
+    /// Counts the sign conflicts in the result of distances(): pairs of neighbouring voxels on different sides whose
+    /// distances sum to more than one voxel, so that no surface fits between them. The field of a closed, oriented mesh
+    /// without self-intersections has none. Only pairs in different blocks count; completeSides() in sign_propagation.h
+    /// reports the conflicts within a block. The space outside of all blocks must be outside.
     std::size_t conflicts(const openvdb::FloatGrid& distances) const;
 
   private:
@@ -60,7 +63,7 @@ class Assembler {
     struct Collected {
         std::unique_ptr<Leaf> leaf;
         FaceBits faces;
-        bool plain;  // all on one side, and nothing of it in the band
+        bool plain;  // entirely on one side, with no voxel in the band
     };
     struct Branch;
     template <class Item>
@@ -75,7 +78,7 @@ class Assembler {
     Progress& progress_;
     PerThread<Collected> leaves_;
     PerThread<std::unique_ptr<TriangleLeaf>> triangleLeaves_;
-    std::vector<FaceBits> faces_;  // of each leaf; its transient data is the index
+    std::vector<FaceBits> faces_;  // of each leaf; the leaf's transient data is the index
 };
 
 }  // namespace bilayer::detail

@@ -18,13 +18,13 @@
 namespace bilayer::detail {
 namespace {
 
-/// More than what binning and clustering add to the reach against rounding [voxels].
+/// Exceeds what binning and clustering add to the reach for rounding [voxels].
 constexpr double reachSlack = 2;
-/// A triangle over more cells than this is tested against each of them.
+/// A triangle whose box spans more cells than this is tested against each cell.
 constexpr int cellsWorthCulling = 8;
 constexpr std::size_t trianglesPerTask = 1024;
 
-// By their bits: 0 and -0 are not the same to a build that must give the same bytes.
+// Compares bits: builds must be bit-identical, so 0 and -0 differ.
 bool sameCorners(const Mesh& a, const Mesh& b, std::size_t triangle) {
     for (int k = 0; k < 3; ++k)
         if (std::memcmp(&a.points[a.triangles[triangle][k]], &b.points[b.triangles[triangle][k]], sizeof(glm::vec3)))
@@ -40,7 +40,7 @@ openvdb::Coord coord(const glm::ivec3& v) {
     return {v.x, v.y, v.z};
 }
 
-// Visits the whole numbers of a box, both ends included.
+// Visits all integer points of a box, including both ends.
 template <class Visit>
 void forEachIn(const glm::ivec3& lower, const glm::ivec3& upper, Visit visit) {
     for (int x = lower.x; x <= upper.x; ++x)
@@ -99,7 +99,7 @@ void DirtyRegion::add(const Mesh& mesh, const glm::uvec3& triangle, double voxel
     const glm::dvec3 normal = large ? glm::cross(b - a, c - a) : glm::dvec3(0);
     const double room = glm::dot(glm::abs(normal), glm::dvec3(half)) + reach * glm::length(normal);
     forEachIn(lower, upper, [&](const glm::ivec3& cell) {
-        // the plane of the triangle passes the cell too far away
+        // the plane of the triangle is too far from the cell
         if (large && std::abs(glm::dot(normal, glm::dvec3(cell * (1 << shift_)) + half - a)) > room) return;
         cells.setValueOn(coord(cell));
     });

@@ -1,5 +1,5 @@
-// What a part of a mesh that moves can change of its field: the cells of space that the triangles which moved reach,
-// from where they were or from where they are.
+// The dirty region of a field when a part of its mesh moves: the cells within reach of the moved triangles, at their
+// old or their new position.
 #pragma once
 
 #include <openvdb/openvdb.h>
@@ -12,21 +12,21 @@
 
 namespace bilayer::detail {
 
-/// Throws std::invalid_argument if the numbers of triangles differ, an index is out of range, or a triangle has other
-/// corners without being in `moved` (the first one is named). The meshes must be valid.
+/// Throws std::invalid_argument if the counts of triangles differ, if an index is out of range, or if a triangle has
+/// changed corners but is not in `moved` (the message names the first one). The meshes must be valid.
 void checkMoved(const Mesh& before, const Mesh& after, std::span<const std::uint32_t> moved);
 
 /// A set of cells of a lattice.
 class DirtyRegion {
   public:
-    /// The cells within reach of the triangles.
-    /// @param side   of a cell [voxels], a power of two
-    /// @param reach  how far from a triangle a voxel may lie [voxels]
+    /// Collects the cells within reach of the moved triangles.
+    /// @param side   side length of a cell [voxels], a power of two
+    /// @param reach  max distance of a voxel from a triangle [voxels]
     DirtyRegion(const Mesh& before, const Mesh& after, std::span<const std::uint32_t> moved, double voxelsPerUnit,
                 float reach, int side);
 
-    /// Whether a cube of voxels has part in any of the cells; its side is a power of two and its first voxel a multiple
-    /// of that.
+    /// Returns whether a cube of voxels overlaps any of the cells. The side of the cube must be a power of two, and its
+    /// first voxel a multiple of the side.
     bool any(const glm::ivec3& first, int side) const;
 
   private:
@@ -34,7 +34,7 @@ class DirtyRegion {
              openvdb::tree::ValueAccessor<openvdb::MaskTree>& cells) const;
 
     int shift_;
-    openvdb::MaskTree cells_;  // a voxel a cell
+    openvdb::MaskTree cells_;  // one voxel per cell
 };
 
 }  // namespace bilayer::detail

@@ -22,8 +22,8 @@
 namespace bilayer::detail {
 namespace {
 
-/// Of the files that a mesh refers to, materials for example, only regular ones are there for Assimp: others may never
-/// end. It writes none.
+/// Gives Assimp access only to regular files among those that a mesh refers to, such as materials. Other kinds of files
+/// may never end. Assimp writes no files.
 class RegularFiles : public Assimp::DefaultIOSystem {
   public:
     bool Exists(const char* file) const override {
@@ -44,8 +44,9 @@ glm::dmat4 columns(const aiMatrix4x4& m) {
     return {{m.a1, m.b1, m.c1, m.d1}, {m.a2, m.b2, m.c2, m.d2}, {m.a3, m.b3, m.c3, m.d3}, {m.a4, m.b4, m.c4, m.d4}};
 }
 
-// Whether a file is a ZIP archive with 64-bit sizes: by the version that its first file asks for, or by the locator of
-// the 64-bit directory, which stands before the 32-bit one. Sections 4.3 and 4.4 of the ZIP file format (APPNOTE).
+// Returns whether a file is a ZIP archive with 64-bit sizes. Criteria are the version required by its first entry, and
+// the locator of the 64-bit directory, which precedes the 32-bit one. See sections 4.3 and 4.4 of the ZIP file format
+// (APPNOTE).
 bool isZip64(const std::filesystem::path& path) {
     constexpr std::streamoff headSize = 5, tailSize = 22 + 65535 + 20;  // with the longest comment [bytes]
     constexpr char zip64Version = 45;
@@ -111,13 +112,13 @@ class AssimpScene {
 
     const aiScene& scene_;
     Polygons polygons_;
-    std::size_t pointsAndLines_ = 0, nodes_ = 0, shown_ = 0;  // shown: meshes, as often as nodes place them
+    std::size_t pointsAndLines_ = 0, nodes_ = 0, shown_ = 0;  // shown: count of mesh instances
 };
 
 }  // namespace
 
 Polygons readByAssimp(const std::filesystem::path& path) {
-    // Left to the end of the process: Assimp frees some scenes wrongly, those of 3MF files with thumbnails for one.
+    // Never deleted, because Assimp frees some scenes incorrectly, for example 3MF files with thumbnails.
     Assimp::Importer& importer = *new Assimp::Importer;
     const std::string ending = path.extension().string();
     if (!importer.IsExtensionSupported(ending.c_str()))
@@ -126,7 +127,7 @@ Polygons readByAssimp(const std::filesystem::path& path) {
                            : fmt::format("{} is not the ending of a format that is read, as .obj, .ply, .stl, .off, "
                                          ".gltf or .glb",
                                          ending));
-    importer.SetIOHandler(new RegularFiles);  // the importer's own from here on
+    importer.SetIOHandler(new RegularFiles);  // the importer takes ownership
     importer.SetPropertyBool(AI_CONFIG_IMPORT_NO_SKELETON_MESHES, true);
     importer.SetPropertyBool(AI_CONFIG_IMPORT_COLLADA_IGNORE_UP_DIRECTION, true);
     constexpr unsigned noFurtherStep = 0;
@@ -136,7 +137,7 @@ Polygons readByAssimp(const std::filesystem::path& path) {
     if (polygons.corners.empty() && isZip64(path))
         throw std::runtime_error("is a ZIP64 archive, of which the importer reads nothing; save it without ZIP64");
     if (scene) return polygons;
-    // an exception tells more than its text
+    // an exception carries more than its text
     if (importer.GetException()) std::rethrow_exception(importer.GetException());
     throw std::runtime_error(importer.GetErrorString());
 }

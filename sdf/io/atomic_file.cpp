@@ -1,4 +1,4 @@
-// A write-aside file and the list of those in use, which a signal handler may walk at any moment.
+// Writes to a temporary file, and keeps a list of the files in use that a signal handler may traverse at any time.
 #include "sdf/io/atomic_file.h"
 
 #include <fcntl.h>
@@ -18,7 +18,7 @@ namespace bilayer::detail {
 namespace {
 
 constexpr int endingSignals[] = {SIGINT, SIGTERM, SIGHUP};
-constexpr mode_t newFileMode = 0666;  // as std::ofstream has it; the umask takes the rest away
+constexpr mode_t newFileMode = 0666;  // as for std::ofstream; the umask removes bits
 
 [[noreturn]] void fail(const std::filesystem::path& target, const std::string& why) {
     throw std::runtime_error("cannot write " + target.string() + ": " + why);
@@ -28,7 +28,7 @@ std::string lastError() {
     return std::generic_category().message(errno);
 }
 
-// The file that the target's name stands for, links followed.
+// Returns the file that the target's name refers to after following links.
 std::filesystem::path resolve(const std::filesystem::path& target) {
     std::error_code error;
     const std::filesystem::file_status status = std::filesystem::status(target, error);
@@ -49,10 +49,10 @@ std::filesystem::path nameBeside(const std::filesystem::path& target) {
 
 }  // namespace
 
-// A name that the signal handler may have to remove. Entries are used again and never freed, so the handler can walk
-// their list while other threads write files.
+// A file name that the signal handler may have to remove. Entries are reused and never freed, so the handler can
+// traverse their list while other threads write files.
 struct AtomicFile::Entry {
-    enum State { idle, written, placed };  // placed: taking its target's place, or there
+    enum State { idle, written, placed };  // placed: replacing its target, or done
 
     std::atomic<bool> taken{true};
     std::atomic<State> state{idle};
@@ -60,7 +60,7 @@ struct AtomicFile::Entry {
     Entry* next = nullptr;
 
     static inline std::atomic<Entry*> first{nullptr};
-    static inline std::atomic<bool> isLastPlaced{false};  // of the files that this process has begun
+    static inline std::atomic<bool> isLastPlaced{false};  // of the files that this process has started
 
     static Entry* take() {
         for (Entry* entry = first; entry; entry = entry->next)
@@ -90,7 +90,7 @@ AtomicFile::AtomicFile(const std::filesystem::path& target) : target_(target) {
     const std::string name = std::filesystem::absolute(temporary_).string();
     if (name.size() >= PATH_MAX) fail(target, std::generic_category().message(ENAMETOOLONG));
 
-    // watched before it exists, so that no signal finds a file that nobody knows of
+    // registered before the file is created, so that a signal never leaves an unregistered file
     entry_ = Entry::take();
     entry_->watch(name);
     const int file = ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, newFileMode);
@@ -111,7 +111,7 @@ AtomicFile::~AtomicFile() {
 }
 
 void AtomicFile::commit() {
-    // before it is there, so that no signal ends the process as if it were not
+    // set before the rename, so that no signal ends the process as if the file were not in place
     entry_->state = Entry::placed;
     Entry::isLastPlaced = true;
     if (::rename(temporary_.c_str(), target_.c_str()) != 0) {
@@ -124,7 +124,7 @@ void AtomicFile::commit() {
     entry_ = nullptr;
 }
 
-// Runs as a signal handler: atomics, unlink(), signal() and raise() are all that it may use.
+// Runs as a signal handler, so it may only use atomics, unlink(), signal() and raise().
 void AtomicFile::removeAll(int signal) {
     static std::atomic<bool> cameLate{false};
     bool isLate = Entry::isLastPlaced;

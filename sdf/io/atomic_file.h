@@ -1,27 +1,27 @@
-// Files that appear whole or not at all.
+// Files that appear complete or not at all.
 #pragma once
 
 #include <filesystem>
 
 namespace bilayer::detail {
 
-/// A file that is written under another name beside its target and takes the target's place in commit(). Without
-/// commit() the destructor removes it, and whatever stood at the target stays as it was. A target that is a symbolic
-/// link is followed; an existing target hands its permissions on.
+/// A file that is written under a temporary name next to its target and replaces the target in commit(). Without
+/// commit(), the destructor removes it and an existing target stays unchanged. A symbolic link is followed to its
+/// target. The permissions of an existing target are kept.
 class AtomicFile {
   public:
-    /// Creates the empty temporary file. Throws std::runtime_error that names `target` when its folder cannot be
-    /// written to, or when `target` exists and is no regular file.
+    /// Creates the empty temporary file. Throws std::runtime_error that names `target` if its folder is not writable,
+    /// or if `target` exists and is not a regular file.
     explicit AtomicFile(const std::filesystem::path& target);
     ~AtomicFile();
     AtomicFile(const AtomicFile&) = delete;
     AtomicFile& operator=(const AtomicFile&) = delete;
 
-    /// Write here: in the folder of the target, so that commit() is one step of the file system.
+    /// The path to write to. It is in the folder of the target, so that commit() is one atomic rename.
     const std::filesystem::path& temporary() const { return temporary_; }
 
-    /// Puts the temporary file, which must be complete and closed, in the target's place.
-    /// Throws std::runtime_error that names the target.
+    /// Replaces the target by the temporary file, which must be complete and closed. Throws std::runtime_error that
+    /// names the target.
     void commit();
 
   private:
@@ -33,10 +33,10 @@ class AtomicFile {
     Entry* entry_ = nullptr;
 };
 
-/// For programs that write a file as their last act: SIGINT, SIGTERM and SIGHUP from now on remove the temporary files
-/// of this process before they end it, unless they are ignored. The first that comes when all files have taken their
-/// places comes too late: the program goes on to its end, and its status says that they are there. A library must not
-/// call this.
+/// For programs that write a file as their last action. After this call, SIGINT, SIGTERM and SIGHUP remove the
+/// temporary files of this process before they end it, unless they are ignored. The first signal after all files were
+/// committed has no effect: the program runs to its end, and its exit status reports the files as written. A library
+/// must not call this.
 void removeAtomicFilesOnSignal();
 
 }  // namespace bilayer::detail

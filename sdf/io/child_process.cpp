@@ -22,11 +22,11 @@
 namespace bilayer::detail {
 namespace {
 
-constexpr int answerPipe = 3;          // its number in the child: the first after the standard streams
-constexpr int pipeCapacity = 1 << 20;  // [bytes]: fewer changes between the two processes than the usual 64 kB need
+constexpr int answerPipe = 3;          // file descriptor in the child: the first after the standard streams
+constexpr int pipeCapacity = 1 << 20;  // [bytes]: needs fewer context switches than the usual 64 kB
 constexpr int diedBeforeAnswer = 127;  // exit status
 
-// No signal reaches the child before it has let go of the caller's handlers.
+// Blocks signals until the child has removed the caller's handlers.
 class SignalsBlocked {
   public:
     SignalsBlocked() {
@@ -42,16 +42,16 @@ class SignalsBlocked {
     sigset_t before_;
 };
 
-// Address space of this process [bytes]
+// Returns the address space of this process [bytes].
 std::size_t addressSpace() {
     std::size_t pages = 0;
     std::ifstream("/proc/self/statm") >> pages;
     return pages * std::size_t(::sysconf(_SC_PAGESIZE));
 }
 
-// Whatever ends the child by itself ends it at once, without what the caller has prepared for its own end.
+// Makes any exit of the child immediate, without the exit and terminate handlers of the caller.
 void takeDefaultEnds() {
-    std::atexit([] { ::_exit(diedBeforeAnswer); });  // called before the handlers that were there earlier
+    std::atexit([] { ::_exit(diedBeforeAnswer); });  // runs before handlers that were registered earlier
     std::set_terminate(std::abort);
     std::set_new_handler(nullptr);
 }
@@ -65,7 +65,7 @@ void takeDefaultSignals() {
     pthread_sigmask(SIG_SETMASK, &none, nullptr);
 }
 
-// Leaves the pipe, as `answerPipe`, and /dev/null as the standard streams. The pipe may have had any number.
+// Keeps only the pipe, as `answerPipe`, and /dev/null as the standard streams. The pipe may have any descriptor.
 bool keepOnly(int pipe) {
     const int aside = ::fcntl(pipe, F_DUPFD, answerPipe + 1);
     const int null = ::open("/dev/null", O_RDWR);
@@ -74,7 +74,7 @@ bool keepOnly(int pipe) {
         if (::dup2(null, stream) < 0) return false;
     if (::dup2(aside, answerPipe) < 0) return false;
     if (::close_range(answerPipe + 1, UINT_MAX, 0) == 0) return true;
-    const long last = ::sysconf(_SC_OPEN_MAX);  // kernels before 5.9
+    const long last = ::sysconf(_SC_OPEN_MAX);  // for kernels before 5.9
     for (int file = answerPipe + 1; file < last; ++file) ::close(file);
     return true;
 }
@@ -130,7 +130,7 @@ ChildProcess::ChildProcess(const ChildLimits& limits, const Work& work) : time_(
 ChildProcess::~ChildProcess() {
     ::close(pipe_);
     if (process_ <= 0) return;
-    // As long as it was not collected, here or by the caller's own handler, the number is still its own.
+    // Until the child is reaped, here or by the caller's own handler, its process id stays valid.
     if (::waitpid(process_, nullptr, WNOHANG) != 0) return;
     ::kill(process_, SIGKILL);
     while (::waitpid(process_, nullptr, 0) < 0 && errno == EINTR) {

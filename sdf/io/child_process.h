@@ -1,4 +1,4 @@
-// Work in a process of its own, so that whatever it does to itself, the caller goes on.
+// Runs work in a child process, so that a crash or hang does not affect the caller.
 #pragma once
 
 #include <sys/types.h>
@@ -10,42 +10,43 @@
 
 namespace bilayer::detail {
 
-/// What a child process may take before it is ended.
+/// Limits beyond which a child process is ended.
 struct ChildLimits {
-    std::chrono::milliseconds time;  ///< from its start to the last byte of its answer
-    std::size_t memory;              ///< address space beyond what the caller has [bytes]
+    std::chrono::milliseconds time;  ///< from the start to the last byte of the answer
+    std::size_t memory;              ///< address space in addition to the caller's [bytes]
 };
 
-/// A child process did not answer to the end. The text goes on after its subject: "ended by signal 11 ...".
+/// Thrown if a child process did not complete its answer. The text continues a sentence whose subject precedes it:
+/// "ended by signal 11 ...".
 class ChildFailure : public std::runtime_error {
     using std::runtime_error::runtime_error;
 };
 
-/// A fork of the calling process that does `work` and answers through a pipe; the destructor ends it.
+/// A fork of the calling process that runs `work` and answers through a pipe. The destructor ends it.
 ///
-/// Why a fork and no helper program: a library that is linked statically, packed or moved cannot know where a helper of
-/// its own stands, and a fork is always there. Only the calling thread goes on in the child. glibc puts its own locks
-/// (malloc, stdio, the loader) into order at a fork, so that `work` may allocate and throw; a malloc that replaces
-/// glibc's must do so too, as jemalloc and tcmalloc do. `work` must not start threads or use TBB, nor anything else
-/// that may hold a lock of its own in another thread of the caller: it would wait for it until its time is over.
+/// A fork is always available. A helper program is not: a library that is linked statically, packed or moved cannot
+/// locate one. Only the calling thread continues in the child. glibc resets its own locks (malloc, stdio, the loader)
+/// at a fork, so `work` may allocate and throw. A malloc that replaces glibc's must do so too, as jemalloc and tcmalloc
+/// do. `work` must not start threads or use TBB, nor take any lock that another thread of the caller may hold: it would
+/// wait until its time limit.
 ///
-/// The child has no signal handlers, no files but its pipe and /dev/null, never writes core files, and dies with the
-/// thread that made it. It leaves without exit handlers and without flushing the caller's streams. A caller that
-/// ignores SIGCHLD, or collects all children by itself, loses nothing but the number of the signal in error texts.
+/// The child has no signal handlers, no files except its pipe and /dev/null, never writes core files, and ends with the
+/// thread that created it. It exits without exit handlers and without flushing the caller's streams. If a caller
+/// ignores SIGCHLD or reaps all children itself, error texts lack the signal number; nothing else changes.
 class ChildProcess {
   public:
     /// Sends bytes to the caller.
     using Send = std::function<void(const void* bytes, std::size_t count)>;
-    /// An exception that leaves it ends the child without an answer.
+    /// An exception from this function ends the child without an answer.
     using Work = std::function<void(const Send&)>;
 
-    /// Throws std::system_error when no process can be made.
+    /// Throws std::system_error if no process can be created.
     ChildProcess(const ChildLimits& limits, const Work& work);
     ~ChildProcess();
     ChildProcess(const ChildProcess&) = delete;
     ChildProcess& operator=(const ChildProcess&) = delete;
 
-    /// The next bytes of the answer. Throws ChildFailure if the child ends before, or its time does.
+    /// Receives the next bytes of the answer. Throws ChildFailure if the child ends or times out before that.
     void receive(void* bytes, std::size_t count);
 
   private:

@@ -13,7 +13,7 @@ namespace {
 
 using Point = glm::dvec2;
 
-/// Up to this many corners, comparing all pairs of edges is faster than the sweep.
+/// Up to this count of corners, comparing all pairs of edges is faster than the sweep.
 constexpr std::size_t fewCorners = 24;
 
 bool isBefore(const Point& a, const Point& b) {
@@ -21,7 +21,7 @@ bool isBefore(const Point& a, const Point& b) {
 }
 
 struct Edge {
-    Point left, right;  ///< in the order of the sweep
+    Point left, right;  ///< in sweep order
     std::size_t index;
 };
 
@@ -36,7 +36,7 @@ bool boxesMeet(const Edge& e, const Edge& f) {
            std::min(f.left.y, f.right.y) <= std::max(e.left.y, e.right.y);
 }
 
-// Which side of an edge another one is on that begins later, where the sweep has reached both.
+// Returns the side of an edge on which a later edge lies, at a position that the sweep has reached for both.
 int sideOf(const Edge& edge, const Edge& later) {
     const int side = lineSide(edge.left, edge.right, later.left);
     return side != 0 ? side : lineSide(edge.left, edge.right, later.right);
@@ -68,7 +68,7 @@ bool anyPairCrosses(const std::vector<Edge>& edges) {
     return false;
 }
 
-// Edges under the sweep line, from below to above; those that come to be neighbours are compared.
+// The edges on the sweep line, from bottom to top. Edges that become neighbours are compared.
 class Sweep {
   public:
     explicit Sweep(const std::vector<Edge>& edges) : edges_(edges), places_(edges.size(), status_.end()) {}

@@ -1,4 +1,4 @@
-// Whether an outline in the plane crosses itself; internal.
+// Detects whether a polygon in the plane crosses itself; internal.
 #pragma once
 
 #include <glm/vec2.hpp>
@@ -6,9 +6,9 @@
 
 namespace bilayer::detail {
 
-/// Whether two edges of a closed outline cross within both. Edges that only touch, or that lie on one another, do not.
-/// Exact where lineSide() is. O(n log n): the sweep of M. I. Shamos and D. Hoey, "Geometric Intersection Problems"
-/// (1976), which stops at the first crossing.
+/// Returns whether two edges of a closed polygon cross at interior points of both. Edges that only touch or overlap do
+/// not count. Exact where lineSide() is. Takes O(n log n), by the sweep of M. I. Shamos and D. Hoey, "Geometric
+/// Intersection Problems" (1976), which stops at the first crossing.
 bool hasCrossingEdges(std::span<const glm::dvec2> outline);
 
 }  // namespace bilayer::detail

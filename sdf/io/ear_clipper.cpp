@@ -8,12 +8,12 @@
 namespace bilayer::detail {
 namespace {
 
-/// Room against rounding where boxes are compared with lines, relative to the products; generous.
+/// Margin for rounding in tests of boxes against lines, relative to the products; generous.
 constexpr double roundingOfLine = 1e-15;
 
 constexpr double pi = 3.14159265358979323846;
 
-// Which boxes a triangle may meet.
+// Tests which boxes a triangle may overlap.
 class Reach {
   public:
     Reach(const glm::dvec2& a, const glm::dvec2& b, const glm::dvec2& c)
@@ -25,7 +25,7 @@ class Reach {
     }
 
   private:
-    // Whether all of a box lies to the right of a line.
+    // Returns whether a box lies entirely to the right of a line.
     static bool isBeyond(const Box2& box, const glm::dvec2& a, const glm::dvec2& b) {
         const glm::dvec2 way = b - a;
         const double left = way.x * ((way.x > 0 ? box.upper.y : box.lower.y) - a.y);
@@ -45,12 +45,12 @@ double dotOf(const glm::dvec2& p, const glm::dvec2& q) {
     return p.x * q.x + p.y * q.y;
 }
 
-// Whether an outline leaves q for r on the line, and to the side, that it came from p.
+// Returns whether an outline reverses at q: it leaves for r along the line from which it came, back towards p.
 bool turnsBack(const glm::dvec2& p, const glm::dvec2& q, const glm::dvec2& r) {
     return dotOf(p - q, r - q) > 0 && lineSide(p, q, r) == 0;
 }
 
-// Calls f for each corner between the ones before and after it, without the repeated ones.
+// Calls f(previous, corner, next) for each corner, skipping repeated points.
 template <typename F>
 void forEachTurn(std::span<const glm::dvec2> outline, const F& f) {
     const std::size_t n = outline.size();
@@ -119,7 +119,7 @@ void EarClipper::tryTouched() {
     next_.clear();
 }
 
-// Tries corners of which no neighbour was cut in the same round, so that long runs of triangles at one corner are rare.
+// Tries corners of which no neighbour was cut in the same round, so that long fans of triangles at one corner are rare.
 // Returns whether any was cut.
 bool EarClipper::playRound(Rule rule, std::vector<glm::uvec3>& triangles) {
     ++round_;
@@ -180,7 +180,7 @@ bool EarClipper::isEar(unsigned v, Rule rule) const {
                            [&](std::size_t w) { return blocks(unsigned(w), v, rule); });
 }
 
-// Whether the cut leaves an angle at both of its ends. Angles of a half turn and more always do.
+// Returns whether the cut leaves a positive angle at both of its ends. Angles of 180 degrees and more always remain.
 bool EarClipper::keepsAngles(unsigned v, Rule rule) const {
     const unsigned a = corners_[v].before, b = corners_[v].after;
     const int least = rule == Rule::strict ? 1 : 0;
@@ -188,8 +188,9 @@ bool EarClipper::keepsAngles(unsigned v, Rule rule) const {
            (!corners_[b].convex || side(a, b, corners_[b].after) >= least);
 }
 
-// Whether the outline at a corner w enters the triangle of corner v. At the triangle's border it does so where it goes
-// on to the inner side of all the edges that w lies on; along the cut it must not go either, by the strict rule.
+// Returns whether the outline at a corner w enters the triangle of corner v. If w is on the triangle's border, it
+// enters if it continues to the inner side of all edges that w lies on. Under the strict rule it must not continue
+// along the cut either.
 bool EarClipper::blocks(unsigned w, unsigned v, Rule rule) const {
     const unsigned a = corners_[v].before, b = corners_[v].after;
     if (w == a || w == b || w == v) return false;
@@ -203,8 +204,9 @@ bool EarClipper::blocks(unsigned w, unsigned v, Rule rule) const {
     return enters(corners_[w].before) || enters(corners_[w].after);
 }
 
-// All in all a simple outline turns once to the left: half a turn to the left at each spike outward, to the right at
-// each one inward. So the other corners tell how many there are of each.
+// The total rotation of a simple outline is one revolution to the left. Outward spikes contribute half a revolution to
+// the left each, inward spikes half a revolution to the right. The other corners therefore determine the count of each
+// kind.
 EarClipper::Spikes EarClipper::spikesOf(std::span<const glm::dvec2> outline) {
     long spikes = 0;
     forEachTurn(outline, [&](auto& p, auto& q, auto& r) { spikes += turnsBack(p, q, r); });
@@ -217,8 +219,7 @@ EarClipper::Spikes EarClipper::spikesOf(std::span<const glm::dvec2> outline) {
     return halfTurns == 2 + spikes ? Spikes::inward : halfTurns == 2 - spikes ? Spikes::outward : Spikes::both;
 }
 
-// Of a corner where the outline turns back on itself: whether it lies outside of the rest. On its border counts as
-// outside.
+// Returns whether a spike lies outside of the rest of the outline. A spike on the border counts as outside.
 bool EarClipper::isOutwardSpike(unsigned v) const {
     if (spikes_ != Spikes::both) return spikes_ == Spikes::outward;
     const glm::dvec2& point = corners_[v].at;

@@ -1,4 +1,4 @@
-// Triangles from an outline in the plane; internal.
+// Triangulates a polygon in the plane by ear clipping; internal.
 #pragma once
 
 #include <cstddef>
@@ -11,40 +11,41 @@
 
 namespace bilayer::detail {
 
-/// Cuts ears off an outline until a triangle is left. An ear is a convex corner whose triangle no other corner lies in:
-/// G. H. Meisters, "Polygons have ears" (1975). Here the rest of the outline must in addition not touch the cut within,
-/// so that corners on straight edges become corners of triangles with area. Only corners that are not convex can be in
-/// the way; a tree holds them.
+/// Clips ears off a polygon until one triangle is left. An ear is a convex corner whose triangle contains no other
+/// corner (G. H. Meisters, "Polygons have ears", 1975). Here, in addition, the interior of the cut must not touch the
+/// rest of the outline, so that corners on straight edges become corners of triangles with area. Only corners that are
+/// not convex can block an ear; a tree holds them.
 ///
-/// Outlines may touch themselves and run both ways along an edge. Where one leaves no such ear, the rules are relaxed
-/// one by one; triangles may be folded over at last, if it crosses itself. Keeps its memory from one outline to the
-/// next.
+/// Outlines may touch themselves and traverse an edge in both directions. If an outline has no such ear, the rules are
+/// relaxed one by one. As a last resort, if the outline crosses itself, triangles may be folded over. Memory is reused
+/// from one outline to the next.
 class EarClipper {
   public:
     /// @param outline    at least three corners, counter-clockwise
     /// @param triangles  appended: indices into the outline
-    /// @return whether the outline fits together: no triangle is folded over, and each corner's triangles fill its
-    ///         angle. Parts of an outline that fits may still lie on one another, if it crosses itself.
+    /// @return whether the triangulation is consistent: no triangle is folded over, and the triangles at each corner
+    ///         fill its angle. Parts of a consistent triangulation may still overlap, if the outline crosses itself.
     bool clip(std::span<const glm::dvec2> outline, std::vector<glm::uvec3>& triangles);
 
-    /// Whether the outline that was clipped last has a corner that is not convex.
+    /// Returns whether the last outline was convex.
     bool wasConvex() const { return wasConvex_; }
 
   private:
-    /// What may be cut, in the order in which it is tried.
+    /// Rules for ears, in the order in which they are tried.
     enum class Rule {
-        strict,    ///< the cut touches the outline at its ends only
-        touching,  ///< the cut may touch the outline within
-        flat,      ///< corners without area: on a straight line, or where the outline turns back
+        strict,    ///< the cut touches the outline only at its ends
+        touching,  ///< the interior of the cut may touch the outline
+        flat,      ///< corners without area: on a straight line, or where the outline reverses
         convex,    ///< any convex corner; triangles may overlap
         any,       ///< any corner; triangles may be folded over
     };
-    /// Corners where the outline turns back on itself: inward ones have the angle of a full turn, outward ones of none.
+    /// Corners where the outline reverses direction. The interior angle is 360 degrees at inward spikes and 0 at
+    /// outward ones.
     enum class Spikes { inward, outward, both };
     struct Corner {
         glm::dvec2 at;
         unsigned before, after;
-        unsigned round;  ///< when its neighbours changed last
+        unsigned round;  ///< the round in which its neighbours last changed
         bool present, convex;
     };
 
@@ -65,7 +66,7 @@ class EarClipper {
     int side(unsigned a, unsigned b, unsigned p) const;
 
     std::vector<Corner> corners_;
-    std::vector<unsigned> tried_, next_;  ///< corners to be tried in this round and in the next one
+    std::vector<unsigned> tried_, next_;  ///< corners to try in this round and in the next one
     PointTree obstacles_;                 ///< corners that are not convex
     unsigned left_ = 0, round_ = 0;
     Spikes spikes_ = Spikes::inward;

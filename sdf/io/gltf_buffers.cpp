@@ -17,7 +17,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::string_view magic = "glTF";
-constexpr std::uint32_t jsonType = 0x4E4F534A, binType = 0x004E4942;  // of chunks
+constexpr std::uint32_t jsonType = 0x4E4F534A, binType = 0x004E4942;  // chunk types
 constexpr std::size_t fileHeader = 12, chunkHeader = 8;               // [bytes]
 
 Bytes readBytes(const fs::path& path) {
@@ -56,7 +56,7 @@ std::string percentDecoded(const std::string& uri) {
     return text;
 }
 
-// What a URI names in a folder; names that hold percent signs are often written as they are.
+// Returns the file that a URI names in a folder. File names with percent signs are often written unescaped.
 fs::path fileOf(const fs::path& folder, const std::string& uri) {
     std::error_code absent;
     const fs::path literal = folder / uri;
@@ -74,7 +74,7 @@ Bytes base64Decoded(std::string_view text) {
     text = text.substr(0, text.find_last_not_of('=') + 1);
     Bytes bytes;
     bytes.reserve(text.size() / 4 * 3 + 3);
-    unsigned bits = 0, count = 0;  // of the digits that make no whole byte yet
+    unsigned bits = 0, count = 0;  // of the digits that do not form a whole byte yet
     for (const char c : text) {
         const int digit = base64Digit(c);
         if (digit < 0) throw std::runtime_error(fmt::format("its data URI holds '{}', which is no base64 digit", c));
@@ -97,7 +97,7 @@ Bytes dataOf(const std::string& uri) {
     return base64Decoded(std::string_view(uri).substr(comma + 1));
 }
 
-// Of a data URI, or of a file in a folder
+// Reads a data URI, or a file in a folder.
 Bytes bytesOf(const fs::path& folder, const std::string& uri) {
     if (uri.rfind("data:", 0) == 0) return dataOf(uri);
     const fs::path path = fileOf(folder, uri);
@@ -117,7 +117,7 @@ GltfFile::GltfFile(const fs::path& path) : folder_(fs::absolute(path).parent_pat
     if (isBinary_) splitChunks();
 }
 
-// Section 4.4 of the glTF 2.0 specification
+// See section 4.4 of the glTF 2.0 specification.
 void GltfFile::splitChunks() {
     const std::string_view all = view(bytes_);
     if (all.size() < fileHeader + chunkHeader)

@@ -1,4 +1,4 @@
-// The bytes of a glTF file: its JSON, and what its buffers hold; internal.
+// The bytes of a glTF file: its JSON and its buffers; internal.
 #pragma once
 
 #include <cstddef>
@@ -12,17 +12,17 @@ namespace bilayer::detail {
 
 using Bytes = std::vector<unsigned char>;
 
-/// A .gltf or .glb file, told by its first bytes. Throws std::runtime_error, which does not name the file, if it is
-/// damaged, is not of glTF 2, or cannot be read.
+/// A .gltf or .glb file, identified by its first bytes. Throws std::runtime_error, which does not name the file, if the
+/// file is damaged, is not glTF 2, or cannot be read.
 class GltfFile {
   public:
     explicit GltfFile(const std::filesystem::path& path);
 
     std::string_view json() const { return json_; }
 
-    /// What a member of the JSON's array "buffers" holds: its chunk of a binary file, its data URI, or a regular file
-    /// in the folder of the scene; cut to its byteLength. The JSON is that of parseGltf(). Throws likewise, and names
-    /// the buffer.
+    /// Returns the contents of a member of the JSON array "buffers": its chunk of a binary file, its data URI, or a
+    /// regular file in the folder of the scene, truncated to its byteLength. `buffers` must come from parseGltf().
+    /// Throws std::runtime_error that names the buffer.
     Bytes buffer(const nlohmann::json& buffers, std::size_t index) const;
 
   private:

@@ -16,7 +16,7 @@ namespace {
 using nlohmann::json;
 
 constexpr std::size_t longestQuote = 40;  // [bytes]
-constexpr int maxNesting = 200;           // of objects and arrays; tinygltf calls itself once for each
+constexpr int maxNesting = 200;           // of objects and arrays; tinygltf recurses once per level
 
 void checkNesting(std::string_view text) {
     int depth = 0;
@@ -42,8 +42,8 @@ std::string placeOf(std::string_view text, std::size_t at) {
     return fmt::format("line {}, column {}", line, at - lineStart + 1);
 }
 
-// "invalid literal; expected string literal" of "[...] parse error at ...: syntax error while parsing object key -
-// invalid literal; last read: '{''; expected string literal"
+// Extracts "invalid literal; expected string literal" from "[...] parse error at ...: syntax error while parsing object
+// key - invalid literal; last read: '{''; expected string literal".
 std::string reasonOf(const json::parse_error& error) {
     std::string text = error.what();
     if (const std::size_t dash = text.find(" - "); dash != std::string::npos) text.erase(0, dash + 3);
@@ -63,7 +63,7 @@ std::string damage(std::string_view text, const json::parse_error& error) {
     return fmt::format("{}: its JSON is damaged: {}{}", placeOf(text, at), reasonOf(error), stands);
 }
 
-// A number beyond the range of doubles; the parser does not say where
+// Describes a number beyond the range of doubles; the parser does not report its position.
 std::string damage(std::string_view text, const json::out_of_range& error) {
     const std::string what = error.what();
     const std::size_t first = what.find('\'') + 1;
@@ -83,7 +83,7 @@ json parse(std::string_view text) {
     }
 }
 
-/// What a member holds.
+/// The type of a member.
 enum class Kind { Index, Size, Boolean, Text, AccessorType, Numbers, Indices, Texts, Indexed, Object, Objects };
 
 struct Member {
@@ -91,11 +91,11 @@ struct Member {
     Kind kind;
     bool isRequired = false;
     std::size_t count = 0;             ///< of Numbers; 0: any
-    const char* each = "";             ///< name of one of Objects
+    const char* each = "";             ///< singular name of Objects
     std::vector<Member> members = {};  ///< of an Object, or of each of Objects
 };
 
-// Section 5 of the glTF 2.0 specification, as far as it is about the shape
+// Section 5 of the glTF 2.0 specification, as far as it concerns the shape.
 const std::vector<Member>& gltfMembers() {
     static const std::vector<Member> sparseIndices{
         {"bufferView", Kind::Index, true}, {"byteOffset", Kind::Index}, {"componentType", Kind::Index, true}};
@@ -143,7 +143,7 @@ const std::vector<Member>& gltfMembers() {
     return gltf;
 }
 
-// An integer of at most `max`, also if it is written as 3.0
+// Accepts an integer of at most `max`, even if it is written as 3.0.
 bool takeInteger(json& value, std::uint64_t max) {
     constexpr double exact = 9007199254740992;  // 2^53
     if (value.is_number_float()) {
@@ -253,7 +253,7 @@ void check(json& object, const std::vector<Member>& members, const std::string& 
 std::string excerpt(std::string_view text) {
     if (text.size() <= longestQuote) return std::string(text);
     std::size_t end = longestQuote;
-    while (end > 0 && (static_cast<unsigned char>(text[end]) & 0xc0) == 0x80) --end;  // within a character of UTF-8
+    while (end > 0 && (static_cast<unsigned char>(text[end]) & 0xc0) == 0x80) --end;  // inside a UTF-8 character
     return std::string(text.substr(0, end)) + " ...";
 }
 

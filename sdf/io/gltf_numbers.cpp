@@ -14,7 +14,7 @@ T read(const unsigned char* bytes) {
     return value;
 }
 
-// A number, and what it stands for if it is normalised: section 3.11 of the glTF 2.0 specification.
+// Returns a number, converted to its represented value if it is normalised: section 3.11 of the glTF 2.0 specification.
 double number(const unsigned char* bytes, int componentType, bool normalized) {
     const auto scaled = [&](double value, double one) { return normalized ? std::max(value / one, -1.0) : value; };
     switch (componentType) {
@@ -121,7 +121,7 @@ std::vector<double> GltfNumbers::numbers(int index, int type, const std::string&
     const std::size_t components = componentsOf(type), size = sizeOf(a.componentType);
     require(a.count <= std::vector<double>().max_size() / components, "{} has {} elements, too many to hold", of,
             a.count);
-    // without a buffer view all elements are zero before sparse ones take their places
+    // without a buffer view, all elements are zero before sparse ones replace them
     if (a.bufferView < 0) {
         require(a.sparse.isSparse, "{} has neither a buffer view nor sparse elements", of);
         std::vector<double> zeros(a.count * components);

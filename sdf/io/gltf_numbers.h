@@ -1,4 +1,4 @@
-// Numbers out of the buffers of a glTF file, each range checked before it is read; internal.
+// Reads numbers from the buffers of a glTF file. Each range is checked before it is read; internal.
 #pragma once
 
 #include <fmt/format.h>
@@ -16,26 +16,26 @@
 
 namespace bilayer::detail {
 
-/// Throws std::runtime_error of a formatted text unless something holds.
+/// Throws std::runtime_error with a formatted text unless `holds` is true.
 template <class... Values>
 void require(bool holds, fmt::format_string<Values...> text, Values&&... values) {
     if (!holds) throw std::runtime_error(fmt::format(text, std::forward<Values>(values)...));
 }
 
-/// Reads accessors. Every member throws std::runtime_error that names the accessor or buffer view at fault, and says
-/// what would be right. Normalised integers become what they stand for.
+/// Reads accessors. Every member function throws std::runtime_error that names the faulty accessor or buffer view and
+/// states what would be correct. Normalised integers are converted to the values that they represent.
 class GltfNumbers {
   public:
     explicit GltfNumbers(const tinygltf::Model& model) : model_(model) {}
 
-    /// `use` says what the numbers are for, as "POSITION" or "indices".
+    /// `use` names the purpose of the numbers, such as "POSITION" or "indices".
     std::vector<unsigned> unsignedIntegers(int accessor, const std::string& use) const;
     std::vector<glm::dvec3> vectors3(int accessor, const std::string& use) const;
     std::vector<glm::dvec4> vectors4(int accessor, const std::string& use) const;
     std::vector<glm::dmat4> matrices(int accessor, const std::string& use) const;
 
   private:
-    /// Elements of equal size at equal distances in a buffer.
+    /// Elements of equal size at a constant stride in a buffer.
     struct Elements {
         const unsigned char* first;
         std::size_t stride;

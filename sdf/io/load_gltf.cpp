@@ -18,12 +18,12 @@ namespace {
 
 using nlohmann::json;
 
-// Extensions that change the shape, and are understood
+// Supported extensions that change the shape.
 constexpr std::string_view understood[] = {"KHR_mesh_quantization", "EXT_mesh_gpu_instancing"};
-// Beginnings of the names of those that only say how things look or sound, and who made them
+// Prefixes of extensions that only concern appearance or sound, and of their vendors.
 constexpr std::string_view looks[] = {"KHR_materials_", "KHR_texture_", "EXT_texture_", "MSFT_texture_", "KHR_lights_",
                                       "EXT_lights_",    "KHR_xmp",      "KHR_audio",    "KHR_technique"};
-// Those that hold the geometry itself, even if they are only said to be used
+// Extensions that contain the geometry itself, even if they are only listed as used.
 constexpr std::string_view compressions[] = {"KHR_draco_mesh_compression", "EXT_meshopt_compression",
                                              "KHR_meshopt_compression"};
 
@@ -49,7 +49,7 @@ void checkRequired(const json& file) {
                 fmt::format("requires the glTF extension {}, which is not read; export it without", excerpt(name)));
 }
 
-// Takes the buffers out of the file and names each by its index instead, by which tinygltf asks for them.
+// Takes the buffers out of the file and replaces each by its index, by which tinygltf requests it.
 std::vector<Bytes> takeBuffers(json& file, const GltfFile& source) {
     std::vector<Bytes> buffers;
     const auto declared = file.find("buffers");
@@ -107,7 +107,7 @@ tinygltf::Model loadGltf(const std::filesystem::path& path) {
     const std::string noFolder;
     const bool loaded =
         loader.LoadASCIIFromString(&model, &error, &warning, text.data(), unsigned(text.size()), noFolder);
-    // it leaves out primitives that it cannot read
+    // it omits primitives that it cannot read
     if (!loaded || countPrimitives(model) != countPrimitives(file)) throw std::runtime_error(complaint(file, error));
     if (model.asset.version.substr(0, 2) != "2.")
         throw std::runtime_error(fmt::format("is glTF {}; only glTF 2 is read", excerpt(model.asset.version)));

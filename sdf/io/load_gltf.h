@@ -1,4 +1,4 @@
-// A glTF file and the buffers that it refers to, as tinygltf's model; internal.
+// Loads a glTF file and the buffers that it refers to into tinygltf's model; internal.
 #pragma once
 
 #include <filesystem>
@@ -7,9 +7,9 @@
 
 namespace bilayer::detail {
 
-/// The parts of a glTF file that make its shape (see parseGltf()). Throws std::runtime_error, which does not name the
-/// file, if it is not as glTF 2 says, asks for an extension that is not understood, or lacks a buffer. Indices are not
-/// checked yet.
+/// Loads the parts of a glTF file that define its shape (see parseGltf()). Throws std::runtime_error, which does not
+/// name the file, if the file violates the glTF 2 specification, requires an unsupported extension, or lacks a buffer.
+/// Indices are not validated yet.
 tinygltf::Model loadGltf(const std::filesystem::path& path);
 
 }  // namespace bilayer::detail

@@ -26,7 +26,7 @@ MappedFile::MappedFile(const std::filesystem::path& path) {
     int error = ::fstat(file, &status);
     if (error == 0 && status.st_size > 0) {
         size_ = std::size_t(status.st_size);
-        // all pages at once: one fault each would cost as much as reading them
+        // map all pages at once: one page fault each would cost as much as reading them
         data = ::mmap(nullptr, size_, PROT_READ, MAP_PRIVATE | MAP_POPULATE, file, 0);
         if (data == MAP_FAILED) error = -1;
     }

@@ -1,4 +1,4 @@
-// The bytes of a file, where the system has them.
+// Memory-mapped input files.
 #pragma once
 
 #include <cstddef>
@@ -7,10 +7,10 @@
 
 namespace bilayer::detail {
 
-/// A file mapped into memory for reading. Another program that cuts the file off meanwhile ends this one.
+/// A file mapped into memory for reading. If another program truncates the file meanwhile, access ends this program.
 class MappedFile {
   public:
-    /// Throws as requireInputFile() does, and std::runtime_error that names the file where it cannot be mapped.
+    /// Throws as requireInputFile() does, and throws std::runtime_error that names the file if it cannot be mapped.
     explicit MappedFile(const std::filesystem::path& path);
     ~MappedFile();
     MappedFile(const MappedFile&) = delete;

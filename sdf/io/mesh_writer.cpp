@@ -18,7 +18,7 @@
 namespace bilayer::detail {
 namespace {
 
-constexpr std::size_t partItems = 1 << 14;  // vertices or triangles that one task writes
+constexpr std::size_t partItems = 1 << 14;  // vertices or triangles per task
 
 template <class Value>
 void append(std::string& bytes, const Value& value) {
@@ -33,7 +33,7 @@ glm::dvec3 inWorld(const Mesh& mesh, std::size_t point) {
     return mesh.origin + glm::dvec3(mesh.points[point]);
 }
 
-/// Runs of items as text or bytes, made in parallel.
+/// Formats runs of items as text or bytes, in parallel.
 /// @param write  write(std::size_t item, std::string& bytes) appends an item
 template <class Write>
 std::vector<std::string> runs(std::size_t items, Write write) {

@@ -19,9 +19,9 @@
 namespace bilayer::detail {
 namespace {
 
-constexpr std::size_t partBytes = 1 << 17;  // of the text that one task reads
+constexpr std::size_t partBytes = 1 << 17;  // bytes of text per task
 
-/// What of a file is left out, by its reason.
+/// What is omitted from a file, by reason.
 enum Left { pointsAndLines, freeForm, unknown, leftKinds };
 struct Reason {
     const char *one, *many;
@@ -36,12 +36,12 @@ struct Skipped {
     const char* first = nullptr;
 };
 
-/// A part of the text, of whole lines, and what stands in it.
+/// A part of the text, made of whole lines, and its contents.
 struct Part {
     Cursor text;
     std::vector<glm::dvec3> points;
     Faces faces;
-    std::vector<std::size_t> relativeCorners;  // those counted from the first vertex of this part, not of the file
+    std::vector<std::size_t> relativeCorners;  // counted from the first vertex of this part, not of the file
     std::array<Skipped, leftKinds> skipped{};
 };
 
@@ -59,11 +59,11 @@ bool isOneOf(std::string_view word, std::span<const std::string_view> words) {
 /// Reads the lines of a part.
 class PartReader {
   public:
-    /// The vertices of the file, and those before a part.
+    /// Count of vertices of the file, and of those before a part.
     struct Vertices {
         std::size_t all, before;
     };
-    /// @param vertices  where they are known: corners that refer to others are then an error
+    /// @param vertices  if known, corners that refer to other vertices are an error
     PartReader(const TextSource& source, Part& part, std::optional<Vertices> vertices = std::nullopt)
         : source_(source), part_(part), at_(part.text), vertices_(vertices) {}
 
@@ -91,7 +91,7 @@ class PartReader {
         skip(isElement ? pointsAndLines : isOneOf(word, ofFreeForm) ? freeForm : unknown, begin);
     }
 
-    // A backslash before the end of a line joins the next one to it.
+    // Returns whether a backslash at the end of a line joins the next line to it.
     bool atJoint() const { return at_.end - at_.at >= 2 && *at_.at == '\\' && isLineEnd(at_.at[1]); }
 
     void skipBlanks() {
@@ -101,7 +101,7 @@ class PartReader {
         }
     }
 
-    /// To the end of a statement.
+    /// Advances to the end of a statement.
     void skipRest() {
         for (skipBlanks(); !at_.atEnd() && !isLineEnd(*at_.at); skipBlanks())
             while (!atWordEnd()) ++at_.at;
@@ -130,7 +130,7 @@ class PartReader {
         while (!relative.empty() && relative.back() >= part_.faces.corners.size()) relative.pop_back();
     }
 
-    // The vertex of a corner; its texture and normal are behind slashes.
+    // Reads the vertex index of a corner; texture and normal indices follow after slashes.
     void readCorner() {
         const char* begin = at_.at;
         long long index = 0;
@@ -140,7 +140,7 @@ class PartReader {
         const auto points = static_cast<long long>(part_.points.size());
         if (index == 0) source_.fail(begin, "a face refers to vertex 0, but the first one has the number 1");
         if (index < 0) part_.relativeCorners.push_back(part_.faces.corners.size());
-        // a vertex before the first of the part wraps around, until the number of that one is added
+        // a vertex before the first of the part wraps around until the offset of the part is added
         part_.faces.corners.push_back(unsigned(index < 0 ? points + index : index - 1));
         constexpr long long max = std::numeric_limits<int>::max();
         const bool isOff = index > max || index < -max;
@@ -165,7 +165,7 @@ class PartReader {
     std::optional<Vertices> vertices_;
 };
 
-/// Cuts a text into parts that begin where a line does which is not joined to the one before.
+/// Cuts a text into parts that begin at the start of a line that is not joined to the previous one.
 std::vector<Part> cut(const TextSource& source) {
     std::vector<Part> parts;
     for (const char* begin = source.begin(); begin != source.end();) {
@@ -173,7 +173,7 @@ std::vector<Part> cut(const TextSource& source) {
         while (end != source.end() && !(isLineEnd(end[-1]) && !isLineEnd(*end))) ++end;
         const char* last = end;
         while (last != begin && isLineEnd(last[-1])) --last;
-        // a joined line goes on in the same part
+        // joined lines stay in the same part
         while (end != source.end() && last != begin && last[-1] == '\\') {
             while (end != source.end() && !isLineEnd(*end)) ++end;
             last = end;
@@ -202,7 +202,7 @@ std::vector<std::string> notes(const TextSource& source, const std::vector<Part>
     return notes;
 }
 
-/// The parts as one.
+/// Joins all parts.
 Polygons joined(const TextSource& source, std::vector<Part>& parts) {
     Polygons all;
     const std::vector<std::size_t> begins = setPoints(all, parts);

@@ -14,8 +14,8 @@
 namespace bilayer::detail {
 namespace {
 
-/// How a text is laid out. As words, what belongs together may be spread over lines, and lines may hold several of a
-/// kind. As lines, a vertex or a face ends its line, and normals, colours and what else may follow its numbers there.
+/// The layout of a text. In `words`, items may be spread over lines, and a line may hold several of them. In `lines`,
+/// each vertex or face ends with its line; normals, colours and other data may follow its numbers there.
 enum class Layout { words, lines };
 
 /// The words and numbers of a text without its comments, which begin with '#'.
@@ -52,7 +52,7 @@ class OffWords {
         return unsigned(corner);
     }
 
-    /// Whether another word stands on this line.
+    /// Returns whether the line has another word.
     bool isLineGoingOn() {
         at_.skipBlanks();
         return !at_.atEnd() && !isLineEnd(*at_.at) && *at_.at != '#';
@@ -69,7 +69,7 @@ class OffWords {
 
 struct Header {
     std::size_t vertices = 0, faces = 0;
-    bool hasMore = false;  ///< than three numbers a vertex: normals, colours or texture coordinates
+    bool hasMore = false;  ///< more than three numbers per vertex: normals, colours or texture coordinates
     Cursor data;
 };
 
@@ -91,12 +91,12 @@ Header readHeader(const TextSource& source) {
         source.fail(counts, "binary OFF is not read: write it as text, or as binary PLY");
     header.vertices = words.count("the number of vertices");
     header.faces = words.count("the number of faces");
-    // that of edges says nothing, and may be missing
+    // the count of edges has no effect, and may be missing
     if (words.isLineGoingOn()) words.count("the number of edges");
     return header;
 }
 
-/// Before memory is taken: a vertex has three numbers, a face a count at least.
+/// Checks the counts before memory is allocated: a vertex has three numbers, a face at least its count.
 void requireRoom(const TextSource& source, const Header& header) {
     const auto size = std::size_t(header.data.end - header.data.at);
     if (header.vertices > size / 5 || header.faces > size / 2)
@@ -130,7 +130,7 @@ Polygons read(const TextSource& source, const Header& header, Layout vertices, L
              }));
     const char* rest = OffWords(source, at).next();
     if (rest == source.end()) return polygons;
-    // vertices with colours, read as words, leave something over
+    // vertices with colours, read as words, leave a rest
     if (vertices == Layout::words) source.failExpected(rest, "the end of the file");
     polygons.notes.push_back(
         fmt::format("left out: what follows the last of the {} that the file announces, from line {} on",
@@ -138,7 +138,7 @@ Polygons read(const TextSource& source, const Header& header, Layout vertices, L
     return polygons;
 }
 
-/// The first layout that makes sense. Plain OFF has three numbers a vertex, but some programs write colours there too.
+/// Returns the first layout that fits. Plain OFF has three numbers per vertex, but some programs add colours.
 Polygons readAnyLayout(const TextSource& source, const Header& header) {
     constexpr std::pair<Layout, Layout> plain[]{{Layout::words, Layout::lines}, {Layout::words, Layout::words}};
     for (const auto& [vertices, faces] : plain) {
@@ -146,7 +146,7 @@ Polygons readAnyLayout(const TextSource& source, const Header& header) {
         try {
             return read(source, header, vertices, faces);
         } catch (const std::runtime_error&) {
-            // the last one tells what is wrong
+            // the last layout reports the error
         }
     }
     return read(source, header, Layout::lines, Layout::lines);

@@ -26,7 +26,7 @@
 namespace bilayer::detail {
 namespace {
 
-constexpr std::size_t partElements = 1 << 14;  // that one task reads
+constexpr std::size_t partElements = 1 << 14;  // elements per task
 
 [[noreturn]] void refuse(const std::filesystem::path& path, const std::string& why) {
     throw std::runtime_error(fmt::format("{}: {}", path.string(), why));
@@ -56,7 +56,7 @@ bool isInteger(Type type) {
 struct Property {
     std::string name;
     Type type = Type::float32;
-    std::optional<Type> countType;  // of a list
+    std::optional<Type> countType;  // only for lists
 };
 
 struct Element {
@@ -79,7 +79,7 @@ enum class Format { text, binaryLittle, binaryBig };
 struct Header {
     Format format = Format::text;
     std::vector<Element> elements;
-    const char* end = nullptr;  // where the data begins
+    const char* end = nullptr;  // start of the data
 };
 
 /// Reads the lines of a header.
@@ -107,7 +107,7 @@ class HeaderReader {
     }
 
   private:
-    // Data may begin with any byte: where lines end with CR alone, a byte LF behind the header's last line is data.
+    // Data may begin with any byte: if lines end with CR alone, a byte LF after the header's last line is data.
     void findLineEnd() {
         at_.skipBlanks();
         endsWithCr_ = at_.end - at_.at >= 2 && at_.at[0] == '\r' && at_.at[1] != '\n';
@@ -186,7 +186,7 @@ Value load(const char* from, bool swapped) {
     return std::bit_cast<Value>(bytes);
 }
 
-/// Calls visit(Value()) with a value of a type.
+/// Calls visit(Value()) with a default value of a type.
 template <class Visit>
 auto withType(Type type, Visit visit) {
     switch (type) {
@@ -214,7 +214,7 @@ Value loadAs(Type type, const char* from, bool swapped) {
     return withType(type, [&](auto kind) { return Value(load<decltype(kind)>(from, swapped)); });
 }
 
-/// What is looked for in a file.
+/// Kinds of elements.
 enum class Kind { vertex, face, strips, other };
 
 Kind kindOf(const Element& element) {
@@ -223,7 +223,7 @@ Kind kindOf(const Element& element) {
     return element.name == "tristrips" ? Kind::strips : Kind::other;
 }
 
-/// Values from binary data, one after the other.
+/// Reads consecutive values from binary data.
 class BinaryValues {
   public:
     BinaryValues(const std::filesystem::path& path, std::string_view bytes, bool swapped)
@@ -257,7 +257,7 @@ class BinaryValues {
     bool swapped_;
 };
 
-/// The same from text, whose words are values.
+/// Reads consecutive values from text, whose words are values.
 class TextValues {
   public:
     TextValues(const TextSource& source, Cursor& at) : source_(source), at_(at) {}
@@ -281,7 +281,7 @@ class TextValues {
         }
     }
 
-    /// An element has its lines for itself.
+    /// Each element has its own lines.
     void endRecord() {
         at_.skipBlanks();
         if (!at_.atEnd() && !isLineEnd(*at_.at)) source_.failExpected(at_.at, "the end of the line");
@@ -336,7 +336,7 @@ class ElementReader {
         return point;
     }
 
-    /// @param list  the property that holds the corners
+    /// @param list  the property that contains the corners
     void readFace(Values& values, std::size_t list, std::size_t index, Faces& faces) const {
         const std::size_t first = faces.corners.size();
         for (std::size_t i = 0; i < element_.properties.size(); ++i) {
@@ -352,7 +352,8 @@ class ElementReader {
         values.endRecord();
     }
 
-    /// Triangles that share an edge with the one before and turn round in turns; -1 begins again.
+    /// Reads triangle strips: each triangle shares an edge with the previous one and alternates in orientation; -1
+    /// restarts.
     void readStrips(Values& values, std::size_t list, std::size_t index, Faces& faces) const {
         for (std::size_t i = 0; i < element_.properties.size(); ++i) {
             const Property& property = element_.properties[i];
@@ -405,8 +406,8 @@ class ElementReader {
     std::uint64_t vertices_;
 };
 
-/// The bytes from the begin of a record to each of its values or lists, and to its end.
-/// @param listLength  items of each list
+/// Returns the byte offsets of each value or list in a record, and the size of the record.
+/// @param listLength  items per list
 std::vector<std::size_t> offsetsOf(const Element& element, std::size_t listLength) {
     std::vector<std::size_t> offsets{0};
     for (const Property& p : element.properties) {
@@ -416,10 +417,10 @@ std::vector<std::size_t> offsetsOf(const Element& element, std::size_t listLengt
     return offsets;
 }
 
-/// Vertices without lists whose coordinates are of one type.
+/// Vertices without lists whose coordinates all have the same type.
 struct PointRecords {
     Type type;
-    std::size_t size, offsets[3];  // bytes of a record, and to each coordinate
+    std::size_t size, offsets[3];  // size of a record, and offset of each coordinate [bytes]
 
     static std::optional<PointRecords> of(const Element& element, const std::array<std::size_t, 3>& axes) {
         const std::vector<Property>& properties = element.properties;
@@ -430,7 +431,7 @@ struct PointRecords {
         return PointRecords{type, offsets.back(), {offsets[axes[0]], offsets[axes[1]], offsets[axes[2]]}};
     }
 
-    /// False where a coordinate is no finite float.
+    /// Returns false if a coordinate is not a finite float.
     template <class Point>
     bool read(const char* at, bool swapped, std::span<Point> points) const {
         return withType(type, [&](auto kind) { return readAs<decltype(kind)>(at, swapped, points); });
@@ -450,10 +451,9 @@ struct PointRecords {
     }
 };
 
-/// Faces that are most often triangles, with a byte that counts their corners, which have four each, and nothing else
-/// of varying length.
+/// Faces that are mostly triangles: one byte for the count of corners, four bytes per corner, and no other list.
 struct TriangleRecords {
-    std::size_t size, offset;  // bytes of a record, and to its list
+    std::size_t size, offset;  // size of a record, and offset of its list [bytes]
 
     static std::optional<TriangleRecords> of(const Element& element, std::size_t list) {
         const Property& corners = element.properties[list];
@@ -468,7 +468,7 @@ struct TriangleRecords {
 
     bool isTriangle(const char* record) const { return record[offset] == 3; }
 
-    /// False where a face is no triangle or a corner no vertex.
+    /// Returns false if a face is not a triangle or a corner is not a vertex.
     bool read(const char* at, bool swapped, std::uint64_t vertices, std::span<glm::uvec3> triangles) const {
         for (glm::uvec3& t : triangles) {
             if (!isTriangle(at)) return false;
@@ -535,7 +535,7 @@ class PlyReader {
     }
 
   private:
-    /// Reads vertices whose records are alike. False where they are not or something is wrong: nothing is read then.
+    /// Reads vertices with fixed-size records. Returns false if they are not, or on an error; nothing is read then.
     bool readPoints(const Element& element, BinaryValues& values) {
         if (kindOf(element) != Kind::vertex || element.count == 0) return false;
         const auto x = element.find({"x"}), y = element.find({"y"}), z = element.find({"z"});
@@ -544,10 +544,10 @@ class PlyReader {
         return records && readAlike(*records, values, polygons_.points);
     }
 
-    /// The same for faces that are all of the file's, and all triangles.
+    /// Does the same for faces, if these are all faces of the file and all are triangles.
     bool readTriangles(const Element& element, BinaryValues& values) {
         const auto list = element.find({"vertex_indices", "vertex_index"});
-        // as long as negative corners look like vertices that are not there
+        // provided that negative corners look like vertices that do not exist
         const bool isCountSmall = vertices_->count <= std::uint64_t(std::numeric_limits<std::int32_t>::max());
         if (!list || !isCountSmall || !holdsAllFaces(element) || element.count == 0) return false;
         const auto records = TriangleRecords::of(element, *list);
@@ -587,14 +587,14 @@ class PlyReader {
                std::count_if(header_.elements.begin(), header_.elements.end(), holdsFaces) == 1;
     }
 
-    /// Before memory is taken for them: each property of an element takes some bytes.
+    /// Checks before allocation that the file is large enough: each property of an element takes some bytes.
     void makeRoom(const Element& element, std::size_t bytes, std::size_t bytesOfProperty) {
         const std::size_t size = element.properties.size() * bytesOfProperty;
         if (size > 0 && element.count > (bytes + 1) / size) refuse(path_, "ends before all that its header announces");
         if (kindOf(element) == Kind::vertex) resizeLarge(polygons_.points, element.count);
     }
 
-    /// Where each part of an element's data begins. The values move behind them all.
+    /// Returns the start of each part of an element's data. The values advance past all of them.
     std::vector<const char*> partsOf(const Element& element, BinaryValues& values) const {
         const ElementReader<BinaryValues> reader(element, vertices_->count);
         std::size_t size = 0;
@@ -674,7 +674,7 @@ class PlyReader {
     std::vector<Faces> faces_;
 };
 
-/// Whether floats hold all coordinates.
+/// Returns whether floats can represent all coordinates.
 bool storesFloats(const Header& header) {
     for (const Element& element : header.elements)
         for (const char* axis : {"x", "y", "z"})

@@ -1,4 +1,4 @@
-// A set of points in the plane that is searched by region; internal.
+// A set of points in the plane with search by region; internal.
 #pragma once
 
 #include <algorithm>
@@ -29,11 +29,11 @@ struct Box2 {
     }
 };
 
-/// Which of some points are present, for searches by region: a binary tree of boxes, of points that are near each
-/// other.
+/// A subset of given points, for searches by region. It is a balanced binary tree of bounding boxes, in which nearby
+/// points share nodes.
 class PointTree {
   public:
-    /// Takes all points, and marks none as present.
+    /// Takes all points and marks none as present.
     void reset(std::span<const glm::dvec2> points) {
         leaves_ = std::bit_ceil(points.size());
         boxes_.assign(2 * leaves_, Box2{});
@@ -47,16 +47,16 @@ class PointTree {
     void add(std::size_t item, const glm::dvec2& point) { put(item, {point, point}); }
     void remove(std::size_t item) { put(item, {}); }
 
-    /// Whether `found(item)` holds for some point that is present, among those in boxes for which `reaches(box)` holds.
+    /// Returns whether `found(item)` holds for any present point, among those in boxes for which `reaches(box)` holds.
     template <typename Reaches, typename Found>
     bool any(const Reaches& reaches, const Found& found) const {
         return anyBelow(1, reaches, found);
     }
 
   private:
-    static constexpr std::size_t fewPoints = 16;  ///< not worth sorting
+    static constexpr std::size_t fewPoints = 16;  ///< below this, sorting does not pay off
 
-    // Halves a range of places by the longer side of the box of its points, again and again.
+    // Recursively halves a range of slots along the longer side of the bounding box of its points.
     void sort(std::span<const glm::dvec2> points, std::size_t begin, std::size_t size) {
         const std::size_t end = std::min(begin + size, items_.size());
         if (size <= 4) return;
@@ -91,9 +91,9 @@ class PointTree {
     }
 
     std::size_t leaves_ = 1;
-    std::vector<Box2> boxes_;       ///< of node i: those of nodes 2 i and 2 i + 1; places begin at `leaves_`
-    std::vector<unsigned> items_;   ///< the point of each place
-    std::vector<unsigned> places_;  ///< the place of each point
+    std::vector<Box2> boxes_;       ///< box of node i contains those of nodes 2 i and 2 i + 1; slots begin at `leaves_`
+    std::vector<unsigned> items_;   ///< the point of each slot
+    std::vector<unsigned> places_;  ///< the slot of each point
 };
 
 }  // namespace bilayer::detail

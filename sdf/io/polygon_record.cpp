@@ -7,7 +7,7 @@
 namespace bilayer::detail {
 namespace {
 
-constexpr std::uint64_t maxNotes = 1000;       // a file is not told about at greater length
+constexpr std::uint64_t maxNotes = 1000;       // further notes on a file are not sent
 constexpr std::uint64_t maxTextBytes = 10000;  // of a note, of an error
 
 struct Header {

@@ -1,4 +1,4 @@
-// Polygons as a row of bytes, from one process to another; internal.
+// Serialises polygons for transfer from one process to another; internal.
 #pragma once
 
 #include <cstddef>
@@ -8,12 +8,12 @@
 
 namespace bilayer::detail {
 
-/// Sends polygons, or the text of an error instead of them.
+/// Sends polygons, or an error text instead.
 void sendPolygons(const ChildProcess::Send& send, const Polygons& polygons);
 void sendError(const ChildProcess::Send& send, const std::string& text);
 
-/// Receives what was sent, and takes nothing for granted: throws ChildFailure if the counts exceed `byteLimit`, do not
-/// belong together, or a corner is no point; std::runtime_error with the text of an error that was sent.
+/// Receives polygons without trusting the data. Throws ChildFailure if the counts exceed `byteLimit` or are
+/// inconsistent, or if a corner refers to no point. Throws std::runtime_error with the error text if one was sent.
 Polygons receivePolygons(ChildProcess& child, std::size_t byteLimit);
 
 }  // namespace bilayer::detail

@@ -23,14 +23,14 @@
 namespace bilayer::detail {
 namespace {
 
-constexpr std::size_t grain = 1 << 14;  // vertices or faces that are worth a task
-/// Farther from the zero point than so many times its size, a mesh gets an origin of its own: floats would round its
+constexpr std::size_t grain = 1 << 14;  // vertices or faces per task
+/// A mesh whose distance from zero exceeds this multiple of its size gets its own origin: floats would round its
 /// coordinates by up to 6e-5 of its size.
 constexpr double farSizes = 1000;
 
 using Range = tbb::blocked_range<std::size_t>;
 
-/// Throws for a corner without a vertex.
+/// Throws if a corner refers to a vertex that does not exist.
 void requireVertices(const std::vector<unsigned>& corners, std::size_t vertices) {
     inOrder((corners.size() + grain - 1) / grain, [&](std::size_t part) {
         const std::size_t end = std::min((part + 1) * grain, corners.size());
@@ -43,10 +43,10 @@ void requireVertices(const std::vector<unsigned>& corners, std::size_t vertices)
 
 struct Box {
     glm::dvec3 lower{std::numeric_limits<double>::infinity()}, upper{-std::numeric_limits<double>::infinity()};
-    std::size_t vertices = 0;  // in it
+    std::size_t vertices = 0;  // count of vertices inside
 };
 
-/// Around the vertices that are used.
+/// Returns the bounding box of the used vertices.
 template <class Scalar>
 Box boxOf(const std::vector<glm::vec<3, Scalar>>& points, const std::vector<std::uint8_t>& used) {
     return tbb::parallel_reduce(
@@ -65,7 +65,8 @@ Box boxOf(const std::vector<glm::vec<3, Scalar>>& points, const std::vector<std:
         });
 }
 
-/// Its middle, in digits so few that differences to coordinates near it are exact; zero for a mesh that is near.
+/// Returns the centre of the box, rounded to so few digits that differences to nearby coordinates are exact; zero for a
+/// mesh near zero.
 glm::dvec3 originOf(const Box& box) {
     const glm::dvec3 size = box.upper - box.lower, far = glm::max(glm::abs(box.lower), glm::abs(box.upper));
     const double side = std::max({size.x, size.y, size.z}), farthest = std::max({far.x, far.y, far.z});
@@ -89,11 +90,11 @@ std::vector<glm::vec3> relativeTo(const glm::dvec3& origin, std::vector<glm::vec
 /// Triangles of some faces.
 struct Cut {
     std::vector<glm::uvec3> triangles;
-    std::size_t uncovered = 0;  // faces whose triangles do not cover what their outline encloses
+    std::size_t uncovered = 0;  // faces whose triangles do not cover exactly what their outline encloses
     std::size_t firstUncovered = 0;
 };
 
-/// Cuts faces of any number of corners.
+/// Triangulates faces with any count of corners.
 template <class Scalar>
 class FaceCutter {
   public:
@@ -181,8 +182,8 @@ std::size_t faceCount(const PolygonsOf<Scalar>& polygons) {
     return polygons.sizes.empty() ? polygons.corners.size() / 3 : polygons.sizes.size();
 }
 
-/// The faces of all parts, which have three corners each.
-/// @param begins  of each part's corners among all; their count at the end
+/// Sets the faces of all parts, which have three corners each.
+/// @param begins  the first corner of each part among all; their count at the end
 void setTriangles(std::vector<glm::uvec3>& triangles, const std::vector<Faces>& parts,
                   const std::vector<std::size_t>& begins) {
     resizeLarge(triangles, begins.back() / 3);

@@ -1,4 +1,4 @@
-// What a mesh file holds: polygons, before they are cut into triangles and their vertices welded; internal.
+// The contents of a mesh file: polygons, before triangulation and welding; internal.
 #pragma once
 
 #include <algorithm>
@@ -17,14 +17,14 @@ struct ReadReport;
 
 namespace bilayer::detail {
 
-/// @tparam Scalar  float where the file holds no better
+/// @tparam Scalar  float if the file has single precision only
 template <class Scalar>
 struct PolygonsOf {
-    std::vector<glm::vec<3, Scalar>> points;  ///< vertex positions, as the file has them or under its node transforms
-    std::vector<unsigned> corners;            ///< indices into `points`, of one face after the other
-    std::vector<unsigned> sizes;              ///< corners of each face, in the same order; empty: each has three
-    std::vector<std::string> notes;           ///< what of the file was left out and why, a sentence each
-    std::vector<glm::uvec3> triangles{};      ///< indices into `points`: all faces, instead of `corners` and `sizes`
+    std::vector<glm::vec<3, Scalar>> points;  ///< vertex positions, as in the file or under its node transforms
+    std::vector<unsigned> corners;            ///< indices into `points`, face by face
+    std::vector<unsigned> sizes;     ///< count of corners of each face, in the same order; empty: each face has three
+    std::vector<std::string> notes;  ///< what was omitted from the file and why, one sentence each
+    std::vector<glm::uvec3> triangles{};  ///< indices into `points`: all faces, instead of `corners` and `sizes`
 };
 using Polygons = PolygonsOf<double>;
 
@@ -32,9 +32,9 @@ using Polygons = PolygonsOf<double>;
 struct Faces {
     std::vector<unsigned> corners, sizes;
     bool isOfTriangles = true;
-    std::size_t small = 0;  ///< left out, since they have fewer than three corners
+    std::size_t small = 0;  ///< omitted faces with fewer than three corners
 
-    /// The corners from `first` on are a face.
+    /// Makes a face of the corners from `first` on.
     void close(std::size_t first) {
         const std::size_t size = corners.size() - first;
         if (size < 3) {
@@ -47,13 +47,13 @@ struct Faces {
     }
 };
 
-/// The faces of all parts, in their order, as those of the polygons. Tells in their notes of those that were left out.
+/// Sets the faces of the polygons to those of all parts, in order. Adds notes about omitted faces.
 template <class Scalar>
 void setFaces(PolygonsOf<Scalar>& polygons, const std::vector<Faces>& parts);
 
-/// The points of all parts, in their order, as those of the polygons.
+/// Sets the points of the polygons to those of all parts, in order.
 /// @tparam Part  has `points`, a vector of glm::dvec3
-/// @return where those of each part begin, and how many there are at the end
+/// @return the index of the first point of each part, and the total count at the end
 template <class Part>
 std::vector<std::size_t> setPoints(Polygons& polygons, const std::vector<Part>& parts) {
     std::vector<std::size_t> begins{0};
@@ -65,9 +65,9 @@ std::vector<std::size_t> setPoints(Polygons& polygons, const std::vector<Part>& 
     return begins;
 }
 
-/// Cuts polygons into triangles, moves a mesh that is far away to an origin of its own, welds it, and tells what became
-/// of the file's contents. Throws std::runtime_error that names the file if no triangle is left, or if a face uses a
-/// vertex that is not there, and std::invalid_argument if a coordinate that a face uses is not finite.
+/// Triangulates polygons, moves a distant mesh to a local origin, welds it, and reports what was done with the file's
+/// contents. Throws std::runtime_error that names the file if no triangle is left, or if a face uses a vertex that does
+/// not exist. Throws std::invalid_argument if a coordinate that a face uses is not finite.
 template <class Scalar>
 Mesh assembled(PolygonsOf<Scalar> polygons, const std::filesystem::path& path, ReadReport& report);
 

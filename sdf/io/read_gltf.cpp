@@ -22,10 +22,10 @@ void requireIndex(int index, const Items& items, const char* what, const std::st
             items.size());
 }
 
-// Of the bottom row of a matrix: what exporters leave that round to floats
+// Tolerance for the bottom row of a matrix, for exporters that round to floats.
 constexpr double bottomRowTolerance = 1e-6;
 
-// The transform of a matrix must be affine: its bottom row is 0 0 0 1.
+// Requires that a matrix is affine: its bottom row is 0 0 0 1.
 void requireAffine(const glm::dmat4& m, const std::string& name) {
     const double row[] = {m[0][3], m[1][3], m[2][3], m[3][3]};
     for (int k = 0; k < 4; ++k)
@@ -36,8 +36,8 @@ void requireAffine(const glm::dmat4& m, const std::string& name) {
 
 // Exporters round, and some do not normalise.
 glm::dquat rotationOf(const glm::dvec4& r, const std::string& name) {
-    const double largest = std::max(
-        {std::abs(r.x), std::abs(r.y), std::abs(r.z), std::abs(r.w)});  // against overflow and underflow of the squares
+    const double largest = std::max(  // against overflow and underflow of the squares
+        {std::abs(r.x), std::abs(r.y), std::abs(r.z), std::abs(r.w)});
     const glm::dvec4 unit = glm::normalize(r / largest);
     require(largest > 0 && std::isfinite(unit.x + unit.y + unit.z + unit.w),
             "the {} is {} {} {} {}; it must be a quaternion of length 1", name, r.x, r.y, r.z, r.w);
@@ -58,7 +58,7 @@ glm::dmat4 matrixOf(const std::vector<double>& numbers, const std::string& name)
     return matrix;
 }
 
-// A node's own transform: what is not given changes nothing. The lengths are right: see parseGltf().
+// Returns a node's own transform. Missing members default to the identity. parseGltf() has checked the lengths.
 glm::dmat4 transformOf(const tinygltf::Node& node, std::size_t index) {
     const auto &t = node.translation, &r = node.rotation, &s = node.scale;
     if (!node.matrix.empty()) return matrixOf(node.matrix, fmt::format("the matrix of node {}", index));
@@ -69,7 +69,7 @@ glm::dmat4 transformOf(const tinygltf::Node& node, std::size_t index) {
                        s.empty() ? glm::dvec3(1) : glm::dvec3(s[0], s[1], s[2]));
 }
 
-// The corners of triangles out of the vertices of a strip or a fan: section 3.7.2.1 of the glTF 2.0 specification.
+// Converts the vertices of a strip or a fan into triangles: section 3.7.2.1 of the glTF 2.0 specification.
 std::vector<unsigned> trianglesOf(const std::vector<unsigned>& vertices, int mode) {
     if (mode == TINYGLTF_MODE_TRIANGLES) return vertices;
     std::vector<unsigned> corners;
@@ -108,7 +108,7 @@ class GltfScene {
 
     const tinygltf::Model& model_;
     GltfNumbers numbers_;
-    std::vector<glm::dmat4> world_;  // of each node
+    std::vector<glm::dmat4> world_;  // for each node
     std::vector<char> reached_;      // nodes of the scene
     Polygons scene_;
     Left left_;
@@ -132,7 +132,7 @@ std::vector<int> GltfScene::roots() {
     return roots;
 }
 
-// All transforms come before all meshes, since skins look at nodes anywhere.
+// All transforms are computed before all meshes, since skins refer to nodes anywhere.
 void GltfScene::placeNodes() {
     world_.assign(model_.nodes.size(), glm::dmat4(1));
     reached_.assign(model_.nodes.size(), 0);
@@ -169,8 +169,8 @@ void GltfScene::placeMesh(std::size_t index) {
     }
 }
 
-// Where the node's mesh stands, in the world: once, or as often as EXT_mesh_gpu_instancing says. The joints of a skin
-// place a mesh instead of its node.
+// Returns the world transforms of the node's mesh: one, or as many as EXT_mesh_gpu_instancing specifies. The joints of
+// a skin place a mesh instead of its node.
 std::vector<glm::dmat4> GltfScene::instances(const tinygltf::Node& node, std::size_t index) const {
     if (node.skin >= 0) return {glm::dmat4(1)};
     const auto extension = node.extensions.find("EXT_mesh_gpu_instancing");
@@ -236,7 +236,7 @@ void GltfScene::readPrimitive(ScenePart& part, const tinygltf::Primitive& primit
     part.corners.resize(part.corners.size() - part.corners.size() % 3);
 }
 
-// Vertices as the joints' own transforms place them: section 3.7.3.3 of the glTF 2.0 specification.
+// Transforms the vertices by the joints of a skin: section 3.7.3.3 of the glTF 2.0 specification.
 void GltfScene::applySkin(ScenePart& part, const tinygltf::Primitive& primitive, int index,
                           const std::string& name) const {
     requireIndex(index, model_.skins, "skin", name);

@@ -9,7 +9,7 @@
 namespace bilayer::detail {
 namespace {
 
-// Each face keeps its first corner; the others follow in reverse.
+// Each face keeps its first corner; the other corners are reversed.
 void appendReversed(std::vector<unsigned>& corners, const ScenePart& part, unsigned base) {
     std::size_t first = 0;
     for (std::size_t face = 0; first < part.corners.size(); ++face) {
@@ -20,7 +20,7 @@ void appendReversed(std::vector<unsigned>& corners, const ScenePart& part, unsig
     }
 }
 
-// A scene whose parts are all triangles has no sizes; the first other part brings them for what was there before.
+// A scene of triangles has no sizes. The first part with other faces adds the sizes of the existing ones.
 void appendSizes(Polygons& scene, const ScenePart& part) {
     if (part.sizes.empty() && scene.sizes.empty()) return;
     if (scene.sizes.empty()) scene.sizes.assign(scene.corners.size() / 3, 3);

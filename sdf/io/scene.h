@@ -1,4 +1,4 @@
-// What readers of scenes share: meshes placed by the transforms of nodes; internal.
+// Common parts of scene readers: meshes placed by node transforms; internal.
 #pragma once
 
 #include <glm/mat4x4.hpp>
@@ -9,15 +9,15 @@
 
 namespace bilayer::detail {
 
-/// One mesh of a scene in its own coordinates; the members as in Polygons.
+/// One mesh of a scene in local coordinates. The members are as in Polygons.
 struct ScenePart {
     std::vector<glm::dvec3> points;
     std::vector<unsigned> corners;
     std::vector<unsigned> sizes;  ///< empty: each face has three corners
 };
 
-/// Appends a part under an affine transform. A transform that mirrors reverses each face, so that outside stays
-/// outside. Throws std::runtime_error when there are more points than 32 bits can number.
+/// Appends a part under an affine transform. A mirroring transform reverses each face to preserve the outside. Throws
+/// std::runtime_error if the count of points exceeds 32 bits.
 void place(Polygons& scene, const ScenePart& part, const glm::dmat4& transform);
 
 }  // namespace bilayer::detail

@@ -17,9 +17,9 @@ namespace {
 
 constexpr std::chrono::seconds baseTime{60}, timePerMegabyte{10};
 constexpr std::size_t baseMemory = std::size_t(2)
-                                   << 30;  // [bytes]: compressed and text formats grow when they are read
+                                   << 30;  // [bytes]: compressed and text formats expand when they are read
 constexpr std::size_t memoryPerByte = 100;
-constexpr std::size_t longestError = 300;  // [bytes]: importers quote what stands in the file
+constexpr std::size_t longestError = 300;  // [bytes]: importers quote the contents of the file
 
 // "DAE" for a.dae
 std::string formatOf(const std::filesystem::path& path) {
@@ -33,7 +33,7 @@ bool isGltf(const std::string& format) {
     return format == "GLTF" || format == "GLB";
 }
 
-// One line of text, whatever an importer made of damaged input
+// Makes one line of a text, which an importer may have made of damaged input.
 std::string oneLine(std::string text) {
     for (char& c : text)
         if (std::iscntrl(static_cast<unsigned char>(c)) || static_cast<unsigned char>(c) >= 0x80) c = ' ';
@@ -54,11 +54,11 @@ void readInChild(const std::filesystem::path& path, std::size_t memory, const Ch
         polygons = isGltf(formatOf(path)) ? readGltf(path) : readByAssimp(path);
     } catch (const std::bad_alloc&) {
         return tooLarge();
-    } catch (const std::length_error&) {  // of a container of more items than memory has addresses
+    } catch (const std::length_error&) {  // from a container larger than the address space
         return tooLarge();
     } catch (const std::runtime_error& error) {
         return sendError(send, oneLine(error.what()));
-    } catch (const std::exception&) {  // a failed check within a library, whose text says nothing of the file
+    } catch (const std::exception&) {  // a failed check within a library, whose text is not about the file
         return sendError(send, "the importer cannot make sense of it; it may be damaged");
     }
     sendPolygons(send, polygons);

@@ -1,4 +1,4 @@
-// Scenes from files that have no fast reader here: glTF, and whatever Assimp knows; internal.
+// Reads scenes from formats without a native reader: glTF, and the formats of Assimp; internal.
 #pragma once
 
 #include <filesystem>
@@ -10,15 +10,16 @@ namespace bilayer::detail {
 
 /// Reads a glTF file (.gltf, .glb: see readGltf()) or one of the formats of Assimp (see readByAssimp()).
 ///
-/// It is read in a child process (see ChildProcess), since its library may crash, hang or ask for any amount of memory
-/// on damaged input. Throws std::runtime_error, in one line that names the file: it cannot be read, or reading ended by
-/// a signal or beyond `limits`. An exception of the C++ library, as std::bad_alloc, is told in plain words.
+/// Reading takes place in a child process (see ChildProcess), since the libraries may crash, hang or request any amount
+/// of memory on damaged input. Throws std::runtime_error, in one line that names the file, if it cannot be read, or if
+/// reading ended by a signal or exceeded `limits`. Exceptions of the C++ library, such as std::bad_alloc, are reported
+/// in plain words.
 Polygons readScene(const std::filesystem::path& path, const ChildLimits& limits);
 
-/// By the limits that the file's size asks for (see sceneLimits()).
+/// Reads a scene with the limits for the file's size (see sceneLimits()).
 Polygons readScene(const std::filesystem::path& path);
 
-/// 60 s and 10 s more for each megabyte; 2 GiB and 100 bytes more for each byte.
+/// Returns 60 s plus 10 s per megabyte, and 2 GiB plus 100 bytes per byte.
 ChildLimits sceneLimits(std::size_t fileSize);
 
 }  // namespace bilayer::detail

@@ -21,7 +21,7 @@ namespace bilayer::detail {
 namespace {
 
 constexpr std::size_t headerBytes = 80, facetBytes = 50, normalBytes = 12;
-constexpr std::size_t partBytes = 1 << 17;  // of the text that one task reads
+constexpr std::size_t partBytes = 1 << 17;  // bytes of text per task
 
 std::uint32_t loadCount(std::string_view bytes) {
     std::uint32_t count = 0;
@@ -29,13 +29,13 @@ std::uint32_t loadCount(std::string_view bytes) {
     return count;
 }
 
-/// The size of a binary file of so many facets.
+/// Returns the size of a binary file with this count of facets.
 std::uint64_t binarySize(std::uint64_t facets) {
     return headerBytes + sizeof(std::uint32_t) + facetBytes * facets;
 }
 
-/// A size that fits the count says binary, and so do bytes that are not of a text. Headers say nothing: those of some
-/// binary files begin with "solid".
+/// Decides between text and binary. A file is binary if its size matches its count of facets, or if its bytes are not
+/// text. Headers do not help: some binary files begin with "solid".
 bool isText(std::string_view bytes, std::string_view text) {
     if (bytes.size() >= binarySize(0) && bytes.size() == binarySize(loadCount(bytes))) return false;
     constexpr std::size_t sample = 1024;
@@ -76,7 +76,7 @@ Mesh readBinary(std::string_view bytes, const std::filesystem::path& path, ReadR
             polygons.triangles[i] = unsigned(3 * i) + glm::uvec3(0, 1, 2);
             std::memcpy(corners, facets + facetBytes * i, 3 * sizeof(glm::vec3));
             const glm::vec3 sum = corners[0] + corners[1] + corners[2];
-            // infinite where the sum of finite ones is too large: rare, and then looked at more closely
+            // infinite if the sum of finite numbers overflows: rare, and then checked one by one
             if (!std::isfinite(sum.x + sum.y + sum.z)) requireFinite(corners, i, path);
         }
     });
@@ -85,14 +85,14 @@ Mesh readBinary(std::string_view bytes, const std::filesystem::path& path, ReadR
 
 struct Part {
     Cursor text;
-    std::vector<glm::dvec3> points{};  // of the corners of its faces, one after the other
+    std::vector<glm::dvec3> points{};  // of the corners of the faces, in order
     Faces faces{};
     bool endsSolid = false;     // the last keyword was `endsolid`
-    std::size_t linesLeft = 0;  // behind an `endsolid`, of something else
+    std::size_t linesLeft = 0;  // after an `endsolid`, of other content
     const char* firstLeft = nullptr;
 };
 
-/// Reads facets. Keywords may be of upper or lower case; a name goes to the end of its line, whatever it says.
+/// Reads facets. Keywords are case-insensitive; a name extends to the end of its line, whatever it contains.
 class TextReader {
   public:
     TextReader(const TextSource& source, Part& part) : source_(source), part_(part), at_(part.text) {}
@@ -118,7 +118,7 @@ class TextReader {
     }
 
   private:
-    // The normal is not looked at: those that are no numbers say nothing about the triangle.
+    // The normal is ignored: an invalid normal does not invalidate the triangle.
     void readFacet(const char* begin) {
         const std::size_t first = part_.points.size();
         for (;;) {
@@ -154,7 +154,8 @@ class TextReader {
     Cursor at_;
 };
 
-/// The next line from a place on that begins with `facet`, or the end. Names and vertices do not stand on such a line.
+/// Returns the next line from a position on that begins with `facet`, or the end. Names and vertices cannot be on such
+/// a line.
 const char* nextFacet(const char* at, const char* end) {
     Cursor cursor{at, end};
     for (cursor.skipLine(); !cursor.atEnd(); cursor.skipLine()) {

@@ -1,4 +1,4 @@
-// Records of a text that mostly stand on a line each, read in parallel; internal.
+// Text records, mostly one per line, read in parallel; internal.
 #pragma once
 
 #include <algorithm>
@@ -13,13 +13,13 @@
 
 namespace bilayer::detail {
 
-/// A run of records, and the text that should hold nothing else.
+/// A run of records, and the text that should contain exactly these.
 struct TextRecords {
     Cursor text;
     std::size_t first, count;
 };
 
-/// Cuts off the next lines, a record each, into runs. Fewer where the text ends before.
+/// Splits the next lines into runs, one record per line. Returns fewer records if the text ends before.
 inline std::vector<TextRecords> linesOf(const Cursor& text, std::size_t count) {
     constexpr std::size_t runLength = 1 << 12;
     std::vector<TextRecords> runs;
@@ -36,12 +36,12 @@ inline std::vector<TextRecords> linesOf(const Cursor& text, std::size_t count) {
     return runs;
 }
 
-/// Reads records, in parallel if each stands on a line of its own, else one after the other.
-/// @param text  moves behind them
-/// @param read  read(Cursor& text, std::size_t first, std::size_t count) reads so many records, moves behind them, and
-///              returns what they hold; throws std::runtime_error where the text is at fault. Of the same text it must
-///              make the same, however it is cut
-/// @return what it returned, in the order of the records
+/// Reads records: in parallel if each is on a line of its own, otherwise sequentially.
+/// @param text  advances past the records
+/// @param read  read(Cursor& text, std::size_t first, std::size_t count) reads this count of records, advances past
+///              them, and returns their contents. It throws std::runtime_error on an error in the text. Its result must
+///              depend on the text only, however the text is split
+/// @return the returned values, in the order of the records
 template <class Read>
 auto readRecords(Cursor& text, std::size_t count, Read read) {
     text.skipSpace();
@@ -58,7 +58,7 @@ auto readRecords(Cursor& text, std::size_t count, Read read) {
                 asLines = false;
             }
             at.skipSpace();
-            // each run held what it should: together they are the sequence of records that one reader would find
+            // each run held what it should: together they equal the sequence that one reader would find
             if (!at.atEnd()) asLines = false;
         });
     }

@@ -19,7 +19,7 @@ constexpr std::size_t maxQuoted = 40;  // characters
 
 enum class Encoding { bytes, utf16Little, utf16Big };
 
-// By the byte order mark, or by the zeros of letters that need only half of their two bytes.
+// Detects the encoding by the byte order mark, or by the zero bytes of ASCII letters in UTF-16.
 Encoding encodingOf(std::string_view bytes) {
     if (bytes.size() < 4) return Encoding::bytes;
     if (bytes.starts_with("\xff\xfe")) return Encoding::utf16Little;
@@ -30,7 +30,7 @@ Encoding encodingOf(std::string_view bytes) {
     return Encoding::bytes;
 }
 
-// What meshes are told in is ASCII; other characters stand in names and comments only.
+// Mesh data is ASCII; other characters occur only in names and comments.
 std::string decoded(std::string_view bytes, bool little) {
     std::string text;
     text.reserve(bytes.size() / 2);
@@ -83,7 +83,7 @@ void TextSource::failExpected(const char* at, const std::string& what) const {
 bool Cursor::number(double& value) {
     const char* from = at + (at != end && *at == '+');
     const auto [next, error] = fast_float::from_chars(from, end, value);
-    // too large becomes infinite, too small zero: the first is told as not finite
+    // a value that is too large becomes infinite, one that is too small zero; infinity is then reported as not finite
     if (error == std::errc::invalid_argument || (from != at && from != end && *from == '-')) return false;
     at = next;
     return true;

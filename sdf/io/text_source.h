@@ -1,4 +1,4 @@
-// Text files of meshes: their words and numbers, and errors that say where they stand; internal.
+// Text files of meshes: words, numbers, and errors with line numbers; internal.
 #pragma once
 
 #include <cstddef>
@@ -8,10 +8,10 @@
 
 namespace bilayer::detail {
 
-/// The text of a file. UTF-16 is decoded, and a byte order mark at its beginning is left out.
+/// The text of a file. UTF-16 is decoded, and a leading byte order mark is skipped.
 class TextSource {
   public:
-    /// @param bytes  of the file; must outlive this
+    /// @param bytes  contents of the file; must outlive this object
     TextSource(std::filesystem::path path, std::string_view bytes);
     TextSource(const TextSource&) = delete;
     TextSource& operator=(const TextSource&) = delete;
@@ -20,19 +20,20 @@ class TextSource {
     const char* begin() const { return text_.data(); }
     const char* end() const { return text_.data() + text_.size(); }
 
-    /// The line that a place of the text lies on, counted from 1. Lines end with LF, CR LF, or CR.
+    /// Returns the line of a text position, counted from 1. Lines end with LF, CR LF, or CR.
     std::size_t lineOf(const char* at) const;
 
-    /// The word that begins at a place, in quotation marks and cut after 40 characters, or what else stands there.
+    /// Returns the word at a position, in quotation marks and truncated to 40 characters, or describes what else is
+    /// there.
     std::string quoted(const char* at) const;
 
-    /// Throws std::runtime_error if the coordinate that was read at a place is no number or too large for a float.
+    /// Throws std::runtime_error if the coordinate read at a position is not a number or too large for a float.
     void checkCoordinate(const char* at, double value) const;
 
-    /// Throws std::runtime_error: file, line, and what is wrong.
+    /// Throws std::runtime_error with file, line, and the reason.
     [[noreturn]] void fail(const char* at, const std::string& why) const;
 
-    /// Throws std::runtime_error: at a place stands something else than what is named here ("a coordinate").
+    /// Throws std::runtime_error: the text at a position is not what was expected ("a coordinate").
     [[noreturn]] void failExpected(const char* at, const std::string& what) const;
 
   private:
@@ -44,7 +45,7 @@ class TextSource {
 inline bool isLineEnd(char c) {
     return c == '\n' || c == '\r';
 }
-/// Blanks within a line. Zero bytes count: some programs pad lines with them.
+/// Blanks within a line. Zero bytes count, since some programs pad lines with them.
 inline bool isBlank(char c) {
     return c == ' ' || c == '\t' || c == '\v' || c == '\f' || c == '\0';
 }
@@ -52,44 +53,45 @@ inline bool isSpace(char c) {
     return isBlank(c) || isLineEnd(c);
 }
 
-/// A place in a text that moves on.
+/// A position in a text that advances.
 struct Cursor {
     const char* at;
     const char* end;
 
     bool atEnd() const { return at == end; }
-    /// To the next character of the line that is no blank, or to its end.
+    /// Advances to the next non-blank character of the line, or to its end.
     void skipBlanks() {
         while (at != end && isBlank(*at)) ++at;
     }
-    /// To the next character of the text that is none.
+    /// Advances to the next character of the text that is not a space.
     void skipSpace() {
         while (at != end && isSpace(*at)) ++at;
     }
-    /// To the end of the line.
+    /// Advances to the end of the line.
     void skipLine() {
         while (at != end && !isLineEnd(*at)) ++at;
     }
-    /// The word here, up to the next space; moves behind it.
+    /// Reads the word up to the next space, and advances past it.
     std::string_view word() {
         const char* from = at;
         while (at != end && !isSpace(*at)) ++at;
         return {from, std::size_t(at - from)};
     }
-    /// The number here, in decimal digits with or without a sign, a fraction and an exponent; also infinity and NaN.
-    /// Moves behind it. False, and stays, where there is none.
+    /// Reads a decimal number with optional sign, fraction and exponent, or infinity or NaN, and advances past it.
+    /// Returns false and does not advance if there is none.
     bool number(double& value);
-    /// The same for an integer in decimal digits.
+    /// Reads a decimal integer in the same way.
     bool integer(long long& value);
 };
 
-/// A word of a file in quotation marks, cut after 40 characters; what cannot be printed is a question mark.
+/// Returns a word of a file in quotation marks, truncated to 40 characters. Unprintable characters become question
+/// marks.
 std::string quotedWord(std::string_view word);
 
 /// "1 face", "2 faces".
 std::string counted(std::size_t count, std::string_view one, std::string_view many);
 
-/// Whether two words are the same but for upper and lower case of ASCII letters.
+/// Returns whether two words are equal, ignoring the case of ASCII letters.
 bool sameWord(std::string_view a, std::string_view b);
 
 }  // namespace bilayer::detail

@@ -1,5 +1,5 @@
-// tinygltf as the readers of glTF use it: without images, and in a namespace of its own, so that a program may hold
-// another build of it; internal.
+// tinygltf as the glTF readers use it: without images, and in its own namespace, so that a program may contain another
+// build of it; internal.
 #pragma once
 
 #define TINYGLTF_NO_STB_IMAGE

@@ -12,7 +12,7 @@
 namespace bilayer::detail {
 namespace {
 
-// Space as seen along one of its axes, the nearest to a normal, and from where the normal points to.
+// The projection along the coordinate axis nearest to a normal, seen from the side to which the normal points.
 class View {
   public:
     explicit View(const glm::dvec3& normal) {
@@ -29,7 +29,7 @@ class View {
     int u_, v_;
 };
 
-// Twice the area, by the method that M. E. Newell gave for outlines out of plane.
+// Returns twice the area vector, by M. E. Newell's method for non-planar outlines.
 glm::dvec3 areaOf(std::span<const glm::dvec3> outline) {
     glm::dvec3 sum(0);
     for (std::size_t i = 1; i + 1 < outline.size(); ++i)
@@ -42,7 +42,8 @@ bool hasArea(std::span<const glm::dvec3> triangle) {
     return lineSide(view(triangle[0]), view(triangle[1]), view(triangle[2])) != 0;
 }
 
-// By the first diagonal that leaves two triangles with area; none does where the outline crosses itself or has no area.
+// Cuts along the first diagonal that leaves two triangles with area. There is none if the outline crosses itself or has
+// no area.
 bool cutQuad(std::span<const glm::dvec3> outline, std::vector<glm::uvec3>& triangles) {
     const View view(glm::cross(outline[2] - outline[0], outline[3] - outline[1]));
     const glm::dvec2 p[4] = {view(outline[0]), view(outline[1]), view(outline[2]), view(outline[3])};

@@ -1,4 +1,4 @@
-// The format is that of OpenVDB's io::Archive, from version 222 to 224.
+// The format is that of OpenVDB's io::Archive, versions 222 to 224.
 #include "sdf/io/vdb_lengths.h"
 
 #include <fmt/format.h>
@@ -19,9 +19,9 @@
 namespace bilayer::detail {
 namespace {
 
-/// LZ4 writes no less than a byte for so many: what is decompressed is no larger.
+/// LZ4 writes at least one byte for this count of bytes, which limits the decompressed size.
 constexpr std::uint64_t maxExpansion = 256;
-/// Blosc fills what is shorter up to this [bytes].
+/// Blosc pads shorter data up to this size [bytes].
 constexpr std::uint64_t bloscPadding = 128;
 /// Voxels along the nodes of a tree, from the coarsest to the leaves, as powers of two.
 constexpr int coarse = 5, fine = 4, leaf = 3;
@@ -69,7 +69,7 @@ class Stream {
         return name;
     }
 
-    /// Bytes that Blosc made of others; `expected` of them, or as many as may be.
+    /// Skips bytes compressed by Blosc: `expected` decompressed bytes, or any count.
     void skipBlosc(std::uint64_t length, std::uint64_t expected) {
         struct Head {
             std::uint8_t versions[2], flags, valueSize;
@@ -96,7 +96,8 @@ void skipName(Stream& in) {
     in.skip(in.read<std::uint32_t>(), "a name");
 }
 
-// How values are read for the leaves of a grid. OpenVDB drops it, but takes memory for it first.
+// Skips the delayed-load metadata, which describes how to read the leaves. OpenVDB drops it, but allocates memory for
+// it first.
 void skipDelayedLoad(Stream& in, std::uint64_t size) {
     in.require(size, "metadata");
     const std::uint64_t end = in.left() - size;
@@ -122,7 +123,7 @@ void skipMetadata(Stream& in) {
             skipDelayedLoad(in, size);
             continue;
         }
-        // values of known types are read whatever their size is said to be
+        // values of known types are read at their own size, whatever size is stored
         const bool fixed = type != "string" && openvdb::Metadata::isRegisteredType(type);
         const std::uint64_t expected = fixed ? openvdb::Metadata::createMetadata(type)->size() : size;
         if (size != expected)
@@ -131,7 +132,7 @@ void skipMetadata(Stream& in) {
     }
 }
 
-// The numbers in it are as many as its name tells.
+// The type's name determines the count of numbers.
 void skipTransform(Stream& in) {
     const std::string type = in.readName();
     constexpr std::uint64_t vector = 3 * sizeof(double), matrix = 16 * sizeof(double);
@@ -155,11 +156,11 @@ void skipTransform(Stream& in) {
 struct Values {
     std::uint64_t size;  ///< [bytes]
     bool zip, blosc, activeOnly;
-    bool half;               ///< those of leaves and tiles, but for the root's
+    bool half;               ///< values of leaves and of tiles below the root are stored as halves
     std::uint64_t halfSize;  ///< [bytes]
 };
 
-/// Which voxels of a leaf are active.
+/// The active voxels of a leaf.
 using LeafMask = std::array<std::uint64_t, cube(leaf) / 64>;
 
 std::uint64_t bitsOf(std::span<const std::uint64_t> words) {
@@ -168,7 +169,7 @@ std::uint64_t bitsOf(std::span<const std::uint64_t> words) {
     return bits;
 }
 
-// Masks are stored twice, and OpenVDB takes the one or the other.
+// Masks are stored twice, and OpenVDB uses either.
 void readLeafMask(Stream& in, const LeafMask& expected) {
     if (in.read<LeafMask>() != expected) throw std::runtime_error("a leaf with two masks");
 }
@@ -186,7 +187,7 @@ class Tree {
         Place last;
         for (std::uint32_t i = 0; i < children; ++i) {
             const auto place = in_.read<Place>();
-            // leaves are read again in this order; of two nodes at a place, one is lost
+            // leaves are read again in this order; of two nodes at one position, one is lost
             if (i > 0 && !(last < place)) throw std::runtime_error("nodes of a tree that are not in order");
             last = place;
             skipNode(coarse);
@@ -214,7 +215,7 @@ class Tree {
         }
     }
 
-    // The bits that are set.
+    // Returns the count of set bits.
     std::uint64_t readMask(int log2) {
         std::array<std::uint64_t, cube(coarse) / 64> words;
         const std::uint64_t count = cube(log2) / 64;
@@ -223,7 +224,7 @@ class Tree {
     }
 
     void skipValues(std::uint64_t count, std::uint64_t active) {
-        // what is told of inactive values: whether all are stored, and if not, what they are
+        // storage of inactive values: all of them, or the values that they have in common
         enum : std::int8_t { oneValue = 2, mask = 3, maskAndOneValue = 4, maskAndTwoValues = 5, allValues = 6 };
         const auto kind = in_.read<std::int8_t>();
         if (kind == oneValue || kind == maskAndOneValue || kind == maskAndTwoValues)
@@ -256,7 +257,7 @@ class Points {
     Points(Stream& in, const std::vector<LeafMask>& leaves) : in_(in), leaves_(leaves) {}
 
     void skip() {
-        constexpr unsigned others = 4;  // passes that are not of one attribute
+        constexpr unsigned others = 4;  // passes that do not belong to one attribute
         const auto passes = in_.read<std::uint16_t>();
         if (passes < others || passes % 2 != 0) throw std::runtime_error("points in a wrong number of passes");
         in_.skip(leaves_.size() * sizeof(std::uint16_t), "sizes of leaves");
@@ -270,7 +271,7 @@ class Points {
   private:
     /// An attribute in a leaf.
     struct Array {
-        std::uint64_t length;  ///< as stored, or of the page's decompressed bytes
+        std::uint64_t length;  ///< stored length, or length of the page's decompressed bytes
         std::uint64_t bytes;
         bool uniform, paged;
     };
@@ -335,7 +336,7 @@ class Points {
         return array;
     }
 
-    // Arrays of one attribute, leaf after leaf.
+    // Visits the arrays of one attribute, leaf by leaf.
     template <class Visit>
     void forArrays(unsigned attribute, Visit visit) const {
         for (std::size_t i = attribute; i < arrays_.size(); i += attributes()) visit(arrays_[i]);
@@ -388,11 +389,11 @@ class Points {
     Stream& in_;
     const std::vector<LeafMask>& leaves_;
     std::vector<std::uint64_t> valueSizes_;  // [bytes]
-    std::vector<Array> arrays_;              // all attributes of a leaf, then those of the next
-    std::vector<std::vector<Page>> pages_;   // by attribute
+    std::vector<Array> arrays_;              // all attributes of one leaf, then those of the next
+    std::vector<std::vector<Page>> pages_;   // for each attribute
 };
 
-/// The size of a tree's values and of their halves; 0 for trees that are stored otherwise [bytes].
+/// Returns the size of a tree's values and of their half-float form; 0 for other kinds of trees [bytes].
 std::pair<std::uint64_t, std::uint64_t> valueSizes(std::string_view tree) {
     constexpr std::string_view prefix = "Tree_", nodes = "_5_4_3";
     if (!tree.starts_with(prefix) || !tree.ends_with(nodes)) return {0, 0};
@@ -409,7 +410,7 @@ std::pair<std::uint64_t, std::uint64_t> valueSizes(std::string_view tree) {
     return {0, 0};
 }
 
-// False for what is stored in a way that is not known here.
+// Returns false if the storage format is unknown.
 bool skipGrid(Stream& in) {
     constexpr std::string_view halfFloat = "_HalfFloat";
     constexpr std::uint64_t offsets = 3 * sizeof(std::int64_t);
@@ -417,7 +418,7 @@ bool skipGrid(Stream& in) {
     std::string type = in.readName();
     const bool half = type.ends_with(halfFloat);
     if (half) type.resize(type.size() - halfFloat.size());
-    const bool instance = !in.readName().empty();  // of another grid's tree
+    const bool instance = !in.readName().empty();  // shares the tree of another grid
     in.skip(offsets, "offsets");
     const auto compression = in.read<std::uint32_t>();
     skipMetadata(in);

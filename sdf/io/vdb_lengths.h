@@ -1,5 +1,5 @@
-// Whether the lengths that a .vdb file tells can be true. OpenVDB takes memory for them, and reads into it, before it
-// looks.
+// Checks the lengths stored in a .vdb file. OpenVDB allocates memory for them, and reads into it, before it checks
+// them.
 #pragma once
 
 #include <cstdint>
@@ -7,12 +7,12 @@
 
 namespace bilayer::detail {
 
-/// Walks over a stream of grids as openvdb::io::Stream would read it, without memory for the values that it holds.
-/// Every length is checked: of names, metadata, compressed values, and the attributes of points. Trees of other values
-/// than numbers, vectors and points end the walk: what comes behind them is not looked at.
-/// @param size  of the stream, from where it is [bytes]
-/// Throws std::runtime_error that says which length is wrong, and std::ios_base::failure where the stream ends too soon
-/// and has such exceptions.
+/// Walks over a stream of grids as openvdb::io::Stream would read it, without allocating memory for the values. It
+/// checks every length: of names, metadata, compressed values, and point attributes. The walk ends at trees of values
+/// other than numbers, vectors and points; the rest of the stream is not checked.
+/// @param size  of the stream, from its current position [bytes]
+/// Throws std::runtime_error that states which length is wrong, and std::ios_base::failure if the stream ends too soon
+/// and has such exceptions enabled.
 void requireLengths(std::istream& stream, std::uint64_t size);
 
 }  // namespace bilayer::detail

@@ -1,6 +1,6 @@
-// Two rounds of hash tables that fit into a core's cache. The first looks at runs of points as they come, since equal
-// ones mostly stand near each other; the second at what is left of all runs, partitioned by hash. A run that begins
-// without equal points is left to the second round.
+// Two rounds of hash tables that fit into a core's cache. The first round searches runs of consecutive points, since
+// equal points are mostly close in the list. The second round searches the remaining points of all runs, partitioned by
+// hash. If the sample at the start of a run has no equal points, the run is left to the second round.
 #include "sdf/mesh/equal_points.h"
 
 #include <oneapi/tbb/parallel_for.h>
@@ -21,15 +21,15 @@ namespace bilayer::detail {
 namespace {
 
 constexpr std::size_t runLength = 1 << 15;           // points
-constexpr std::size_t sampleLength = 1 << 11;        // points that a run begins with
-constexpr std::size_t pointsPerPartition = 1 << 12;  // about
+constexpr std::size_t sampleLength = 1 << 11;        // points in the sample at the start of a run
+constexpr std::size_t pointsPerPartition = 1 << 12;  // approximate
 constexpr std::size_t maxPartitions = 1 << 10;
 
-// Coordinates as words that are the same exactly where coordinates are equal.
+// Coordinates as words that are equal if and only if the coordinates are equal.
 struct Bits {
     std::uint32_t x, y, z;
 
-    // adding zero makes -0 into 0
+    // adding zero turns -0 into 0
     explicit Bits(const glm::vec3& p)
         : x(std::bit_cast<std::uint32_t>(p.x + 0.0f)),
           y(std::bit_cast<std::uint32_t>(p.y + 0.0f)),
@@ -37,7 +37,7 @@ struct Bits {
 
     bool operator==(const Bits&) const = default;
 
-    // Both halves of a 128-bit product, folded.
+    // The folded halves of a 128-bit product.
     std::uint64_t hash() const {
         __extension__ using Wide = unsigned __int128;
         const std::uint64_t xy = x | std::uint64_t(y) << 32;
@@ -46,13 +46,13 @@ struct Bits {
     }
 };
 
-// Finds the place of a key among those before it: open addressing, at most half full.
+// A hash table of earlier keys: open addressing, at most half full.
 template <class Index>
 class Table {
   public:
     void clear(std::size_t keys) { slots_.assign(std::bit_ceil(2 * keys), none); }
 
-    // The index that `index` is equal to: one that was added before, else itself, which is then added.
+    // Returns the index of an equal item that was added before. If there is none, adds `index` and returns it.
     template <class Equal>
     Index add(std::uint64_t hash, Index index, Equal equal) {
         const std::size_t mask = slots_.size() - 1;
@@ -91,7 +91,7 @@ class EqualPoints {
 
   private:
     struct Item {
-        std::uint32_t hash;  // its lower bits
+        std::uint32_t hash;  // lower bits of the hash
         unsigned index;
     };
 
@@ -107,12 +107,12 @@ class EqualPoints {
 
     std::size_t beginOf(std::size_t run) const { return run * runLength; }
     std::size_t endOf(std::size_t run) const { return std::min(points_.size(), beginOf(run) + runLength); }
-    // The upper bits, since tables take the lower ones.
+    // Uses the upper bits, because tables use the lower ones.
     std::size_t partitionOf(std::uint64_t hash) const { return (hash >> 32) & (partitions_ - 1); }
 
     Bits bitsAt(std::size_t i) const { return Bits(points_[i]); }
 
-    // The first of equal points within a run, and how many remain for each partition.
+    // Finds the first of equal points within a run, and counts what remains for each partition.
     void searchRun(std::size_t run) {
         const std::size_t begin = beginOf(run), end = endOf(run);
         const std::size_t sample = runs_ > 1 ? std::min(begin + sampleLength, end) : end;
@@ -128,7 +128,7 @@ class EqualPoints {
             if (first_[i] == i) ++counts[partitionOf(bitsAt(i).hash())];
     }
 
-    // Whether any points of a part of a run are equal. DisjointSets the first of them for each.
+    // Returns whether any points of a part of a run are equal, and sets the first equal point of each.
     bool searchFirsts(std::size_t begin, std::size_t end) {
         thread_local Table<std::uint16_t> table;
         table.clear(end - begin);
@@ -144,7 +144,7 @@ class EqualPoints {
         return repeats;
     }
 
-    // Turns counts into places, partition by partition and within each by run; returns where partitions begin.
+    // Converts counts into positions, ordered by partition and then by run. Returns the start of each partition.
     std::vector<std::size_t> makePlaces() {
         std::vector<std::size_t> begins(partitions_ + 1);
         std::size_t sum = 0;
@@ -165,7 +165,7 @@ class EqualPoints {
         }
     }
 
-    // Items stand in the order of their indices, so what is found is the first.
+    // Items are in the order of their indices, so the first match is the first of all equal points.
     void searchPartition(std::size_t begin, std::size_t end) {
         thread_local Table<std::uint32_t> table;
         table.clear(end - begin);
@@ -183,7 +183,7 @@ class EqualPoints {
         if (repeats) anyEqual_.store(true, std::memory_order_relaxed);
     }
 
-    // From the first in a run to the first of all.
+    // Replaces the first point within a run by the first of all.
     void follow(std::size_t run) {
         for (std::size_t i = beginOf(run); i < endOf(run); ++i)
             if (first_[i] >= beginOf(run)) first_[i] = first_[first_[i]];
@@ -193,8 +193,8 @@ class EqualPoints {
     Progress* progress_;
     LargeArray<unsigned> first_;
     std::size_t runs_, partitions_;
-    std::vector<std::size_t> places_;  // of each run in each partition: first counts, then where its next item goes
-    LargeArray<Item> rest_;            // the first points of each run, by partition
+    std::vector<std::size_t> places_;  // per run and partition: first the count, then the position of its next item
+    LargeArray<Item> rest_;            // the first points of each run, grouped by partition
     std::atomic<bool> anyEqual_ = false;
 };
 

@@ -1,4 +1,4 @@
-// Which vertices of a mesh stand at the same place.
+// Finds vertices of a mesh with equal coordinates.
 #pragma once
 
 #include <glm/vec3.hpp>
@@ -10,9 +10,9 @@ namespace bilayer::detail {
 
 class Progress;
 
-/// For each point, the first one with equal coordinates, often itself; empty where no two are equal. 0 and -0 are
-/// equal, and so are NaNs of the same bits. O(n), on all threads; the same for any number of them. At most 2^32 - 1
-/// points.
+/// For each point, returns the index of the first point with equal coordinates, often its own. Returns an empty array
+/// if no two points are equal. 0 and -0 are equal, and so are NaNs with the same bits. Takes O(n) on all threads; the
+/// result does not depend on their count. Accepts at most 2^32 - 1 points.
 /// @param progress  polled, unless null. Throws Cancelled.
 LargeArray<unsigned> firstOfEqual(std::span<const glm::vec3> points, Progress* progress = nullptr);
 

@@ -14,14 +14,15 @@
 namespace bilayer::detail {
 namespace {
 
-/// A piece tells inside from outside if its volume is at least this part of the volume of the sphere with its area.
-/// Closed pieces need only rise above rounding; a hole leaves room for error, and what bulges less is a sheet.
+/// Min ratio of a component's volume to that of a sphere with the same area, above which it separates inside from
+/// outside. Closed components only need to exceed rounding errors. Open components need a margin for error; below it
+/// they count as open surfaces.
 constexpr double minRoundnessClosed = 1e-9;
 constexpr double minRoundnessOpen = 1e-2;
-/// Points at which an open piece of negative volume is asked whether it bounds a solid as it stands: a half is told
-/// from little.
+/// Count of sample points for the test whether an open component with negative volume bounds a solid as it is. Few
+/// points suffice to recognise a majority.
 constexpr std::size_t samplesOfPiece = 32;
-/// Nested doubts of open pieces settle one a pass; more than a few are not worth the time.
+/// Each pass resolves one level of nested uncertain open components. More than a few passes are not worth the time.
 constexpr int maxPasses = 8;
 
 struct Piece {
@@ -29,16 +30,16 @@ struct Piece {
     std::vector<unsigned> triangles;
     std::uint64_t edgeSum = 0;  // zero: closed
     double area = 0, turnedArea = 0;
-    double volume = 0;  // as oriented; of open pieces closed by a cone over the border's centre
+    double volume = 0;  // as oriented; open components are closed by a cone over the border's centre
     glm::dvec3 borderCentre{0};
     double borderLength = 0;
     bool oneSided = false;
-    bool mixed = false;   // some, not all, of its triangles were turned to agree
-    bool turned = false;  // turned as a whole
-    bool sheet = false;   // of faces back to back that close nothing; left alone
+    bool mixed = false;   // some, but not all, of its triangles were flipped for consistency
+    bool turned = false;  // flipped as a whole
+    bool sheet = false;   // consists of back-to-back faces that enclose nothing; left unchanged
 
     bool closed() const { return edgeSum == 0; }
-    // Where volumes are measured from.
+    // The apex of the cones whose volumes are summed.
     glm::dvec3 apex() const {
         return borderLength > 0 && !closed() ? borderCentre / borderLength : glm::dvec3(bounds.centre());
     }
@@ -68,12 +69,12 @@ class Orienter {
   private:
     Polled eachTriangle() const { return {mesh_.triangles.size(), progress_}; }
 
-    // Repeated triangles would hide the edges of two: but in sound bodies they take no part and go with their
-    // originals.
+    // Duplicate triangles would hide that an edge has only two triangles. Except in sound bodies, they are ignored and
+    // follow their originals.
     bool counts(unsigned triangle) const { return sound_[triangle] || topology_.original[triangle] == triangle; }
 
-    // Where triangles that hang together by edges run all of these both ways equally often, there is nothing to repair
-    // but the orientation of the whole, however many triangles meet at an edge.
+    // Finds sound bodies: triangles connected by edges that are all balanced. However many triangles meet at an edge,
+    // only the orientation of a whole body can be wrong.
     void findSound() {
         DisjointSets bodies(mesh_.triangles.size());
         topology_.forEachEdge([&](std::span<const EdgeUse> uses) {
@@ -88,7 +89,8 @@ class Orienter {
         }
     }
 
-    // A sound body may have each of its faces twice, back to back. It bounds nothing, but may do so with half of them.
+    // Finds sound bodies in which every face exists twice, back to back. Together the copies enclose nothing, but one
+    // half of them may enclose a volume.
     void findDoubled() {
         excess_.assign(mesh_.triangles.size(), 0);
         auto copies = vectorOf<unsigned>(mesh_.triangles.size(), progress_);
@@ -107,7 +109,7 @@ class Orienter {
         }
     }
 
-    // Copies that face the same way are one wall; as many that face the other way leave none.
+    // Copies with the same orientation count as one wall. Equal counts of both orientations cancel out.
     bool encloses(unsigned triangle) const {
         return topology_.original[triangle] == triangle && (!sound_[triangle] || excess_[triangle] != 0);
     }
@@ -136,14 +138,14 @@ class Orienter {
             if (!counts(i)) sets_.join(topology_.original[i], i, doubled_[i] && opposite(i));
     }
 
-    // Patches that meet at an edge of more than two triangles go together where they run it the same number of times.
+    // Joins patches at edges of more than two triangles, if they traverse the edge the same number of times.
     void joinPatches() {
         DisjointSets patches = sets_;
         const std::vector<std::uint64_t> sums = edgeSums(patches, [&](unsigned i) { return counts(i); });
         joinSound(patches, sums);
         topology_.forEachEdge([&](std::span<const EdgeUse> all) {
             if (all.size() < 3 || sound_[all[0].triangle]) return;
-            std::vector<std::pair<unsigned, int>> runs;  // open patches and how often they run the edge forward
+            std::vector<std::pair<unsigned, int>> runs;  // open patches and their net count of forward half-edges
             for (const EdgeUse& use : countingUses(all)) {
                 const unsigned patch = patches.root(use.triangle);
                 if (sums[patch] == 0) continue;
@@ -154,7 +156,8 @@ class Orienter {
         });
     }
 
-    // The open patches of a sound body stay as they are to each other; closed ones may be turned alone.
+    // Joins the open patches of a sound body, which keep their relative orientation. Closed patches may be flipped
+    // alone.
     void joinSound(DisjointSets& patches, const std::vector<std::uint64_t>& sums) {
         std::vector<unsigned> firstOpen(mesh_.triangles.size(), noPart);
         for (const unsigned i : eachTriangle()) {
@@ -181,7 +184,8 @@ class Orienter {
             for (std::size_t i = 1; i < merged.size(); ++i) sets_.join(merged[0].first, merged[i].first);
     }
 
-    // For each set, by its root: zero if its triangles, turned as their places in it say, close a surface.
+    // Returns for each set, at its root, zero if its triangles, flipped relative to the root as stored, form a closed
+    // surface.
     template <class Takes>
     std::vector<std::uint64_t> edgeSums(DisjointSets& sets, Takes takes) const {
         const std::vector<std::uint64_t> vertices = hashVertices(mesh_, progress_);
@@ -215,7 +219,7 @@ class Orienter {
         findSheets();
     }
 
-    // Of a doubled body all pieces must close for it to be a solid.
+    // A doubled body is a solid only if all of its components are closed.
     void findSheets() {
         std::vector<bool> open(mesh_.triangles.size());
         const auto pieceOf = [&](unsigned i) -> Piece& { return pieces_[pieceOf_[i]]; };
@@ -263,7 +267,7 @@ class Orienter {
         }
     }
 
-    // Edges that a piece does not run both ways equally often, by length.
+    // Finds the unbalanced edges of each component, and sums them weighted by length.
     void findBorders() {
         topology_.forEachEdge([&](std::span<const EdgeUse> uses) {
             const glm::dvec3 a = mesh_.points[uses[0].low], b = mesh_.points[uses[0].high];
@@ -281,7 +285,7 @@ class Orienter {
         });
     }
 
-    // From the outermost inward: a piece's box lies within those of the pieces around it.
+    // Flips components from the outermost inward. The box of a component lies within the boxes of those around it.
     void turnPieces() {
         std::vector<unsigned> bounding, partOf(mesh_.triangles.size(), noPart);
         for (unsigned p = 0; p < pieces_.size(); ++p)
@@ -313,7 +317,7 @@ class Orienter {
         return winding <= 0 ? piece.volume < 0 : !trusted && piece.volume > 0;
     }
 
-    // An open piece may be the wall of a bore, with its volume on the other side: then the rest of the mesh tells.
+    // An open component may be the wall of a bore, with the solid on the other side. The rest of the mesh then decides.
     static bool standsRight(const Piece& piece, const Sides& sides) {
         return !piece.closed() && !piece.mixed && sides.measure(piece.triangles, samplesOfPiece).solid > 0.5;
     }
@@ -340,15 +344,15 @@ class Orienter {
     const Mesh& mesh_;
     Progress* progress_;
     Topology topology_;
-    DisjointSets sets_;                     // triangles; opposites: exactly one of the two must be turned
-    std::vector<unsigned> body_;            // of each triangle: the first one that it hangs together with by edges
-    std::vector<bool> sound_;               // of each triangle: its body runs all edges both ways equally often
-    std::vector<int> excess_;               // of each original: how many more of its copies face as it does
-    std::vector<bool> doubled_;             // of each triangle: its body has each face twice, back to back
-    std::vector<unsigned> contradictions_;  // triangles at edges where a surface comes back with its other side
+    DisjointSets sets_;                     // of triangles; opposite members: exactly one of the two must be flipped
+    std::vector<unsigned> body_;            // for each triangle: the first triangle connected with it by edges
+    std::vector<bool> sound_;               // for each triangle: all edges of its body are balanced
+    std::vector<int> excess_;               // for each original: copies with its orientation minus opposite ones
+    std::vector<bool> doubled_;             // for each triangle: its body has each face twice, back to back
+    std::vector<unsigned> contradictions_;  // triangles at edges where a one-sided surface meets itself reversed
     std::vector<Piece> pieces_;
-    std::vector<unsigned> pieceOf_;  // of each triangle
-    std::vector<bool> turned_;       // of each triangle
+    std::vector<unsigned> pieceOf_;  // for each triangle
+    std::vector<bool> turned_;       // for each triangle
 };
 
 std::size_t countDifferent(const Mesh& a, const Mesh& b) {
@@ -362,7 +366,7 @@ std::size_t countDifferent(const Mesh& a, const Mesh& b) {
 Orientation orient(const Mesh& mesh, Progress* progress) {
     validate(mesh);
     Orientation all = Orienter(mesh, progress).run();
-    // open pieces are judged by what is around them, which may just have been turned
+    // open components are judged by their surroundings, which the previous pass may have flipped
     for (int pass = 1; pass < maxPasses && all.turnedTriangles > 0; ++pass) {
         const Orientation next = Orienter(all.mesh, progress).run();
         if (next.turnedTriangles == 0) break;

@@ -1,8 +1,9 @@
-// Makes the triangles of a mesh agree on what is outside. Neighbours across an edge of two triangles are made to run it
-// both ways; then whole pieces are turned, by their volume and by what they lie within.
+// Orients the triangles of a mesh consistently. First, neighbours across an edge of two triangles are made to traverse
+// it in opposite directions. Then whole components are flipped, according to their volume and their nesting.
 //
 // Method: propagation over the dual graph, as in P. Borodin, G. Zachmann, R. Klein, "Consistent normal orientation for
-// polygonal meshes" (CGI 2004), with the volume of each piece, closed by a cone where it is open, for its outside.
+// polygonal meshes" (CGI 2004). The sign of a component's volume decides its outside; an open component is closed by a
+// cone.
 #pragma once
 
 #include <cstddef>
@@ -13,23 +14,28 @@ namespace bilayer::detail {
 
 class Progress;
 
-/// What orient() made of a mesh.
+/// The result of orient().
 struct Orientation {
-    Mesh mesh;                          ///< the same triangles in the same order, some turned around
-    std::size_t turnedTriangles = 0;    ///< triangles that run the other way now
-    std::size_t turnedComponents = 0;   ///< pieces that agreed within themselves and were turned as a whole
-    std::size_t mixedComponents = 0;    ///< pieces whose triangles did not agree and now do
-    std::size_t oneSidedTriangles = 0;  ///< triangles of pieces with one side only, as a Moebius strip; left alone
+    Mesh mesh;                          ///< the same triangles in the same order, some of them flipped
+    std::size_t turnedTriangles = 0;    ///< flipped triangles
+    std::size_t turnedComponents = 0;   ///< consistent components that were flipped as a whole
+    std::size_t mixedComponents = 0;    ///< inconsistent components that were made consistent
+    std::size_t oneSidedTriangles = 0;  ///< triangles of one-sided components, such as a Moebius strip; left unchanged
     bool orientable() const { return oneSidedTriangles == 0; }
 };
 
-/// Orients a mesh. A piece is what hangs together by edges of two triangles, and by edges of more where the triangles
-/// still pair off. A piece must have positive volume where the pieces around it leave it outside (their signs add up to
-/// zero). Within others it may have either: negative is a cavity, positive is a solid in a solid, whose union winding
-/// numbers understand. Only if one of the pieces around it was turned or mixed, so that the file is not to be trusted,
-/// it becomes a cavity. Pieces that bound next to no volume keep the orientation of most of their area. A repeated
-/// triangle goes with the one that it repeats; where all faces of a closed surface are there twice, back to back, both
-/// are made to face outward. A mesh that is fine keeps its bytes.
+/// Orients a mesh. A component consists of triangles connected by edges of two triangles, or by edges of more triangles
+/// whose half-edges still pair up.
+///
+/// - A component must have positive volume if the components around it leave it outside (their signs sum to zero).
+/// - Within others, a component may have either sign. Negative is a cavity. Positive is a solid in a solid, whose union
+///   is correct under winding numbers. If the component was inconsistent, or one around it was inconsistent or flipped,
+///   the file is not reliable, and the component becomes a cavity.
+/// - Components that enclose almost no volume keep the orientation of most of their area.
+/// - A duplicate triangle follows the triangle that it repeats. If every face of a closed surface exists twice, back to
+///   back, both copies are made to face outward.
+/// - A mesh that is already well oriented is returned bit-identical.
+///
 /// @param progress  polled, unless null
 /// Throws as validate() does.
 Orientation orient(const Mesh& mesh, Progress* progress = nullptr);

@@ -20,12 +20,13 @@
 namespace bilayer::detail {
 namespace {
 
-/// Rounding of a volume computed in double precision, relative to the sum of the sizes of its products: a generous
-/// bound (J. R. Shewchuk, "Adaptive Precision Floating-Point Arithmetic", 1997, has 7.8e-16 for exact differences).
+/// Rounding error of a volume in double precision, relative to the sum of the absolute values of its products: a
+/// generous bound (J. R. Shewchuk, "Adaptive Precision Floating-Point Arithmetic", 1997, gives 7.8e-16 for exact
+/// differences).
 constexpr double roundingOfVolume = 2e-15;
 
-// The sign of the volume of four points, for any floats: that of 24 products of three, each the exact sum of two
-// doubles.
+// Returns the sign of the volume of four points, for any floats: that of 24 products of three factors, each expanded
+// exactly into a sum of doubles.
 int exactSide(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c, const glm::dvec3& d) {
     ExactSum<64> sum;
     const auto add = [&](const glm::dvec3& p, const glm::dvec3& q, const glm::dvec3& r, double sign) {
@@ -45,12 +46,12 @@ int exactSide(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c, con
     return sum.sign();
 }
 
-// How a triangle lies to the plane of another: what it has in common with the plane is at most a point or all of it, an
-// edge, or a segment at whose sides it continues.
+// The intersection of a triangle with the plane of another: none (at most a point, or the whole triangle), one of its
+// edges, or a segment with the triangle on both sides.
 enum class Cut { none, edge, through };
 
-// The triangles that run through each other, by the signs of volumes of their corners: P. Guigue, O. Devillers, "Fast
-// and robust triangle-triangle overlap test using orientation predicates", Journal of Graphics Tools 8 (2003) 25-42.
+// Finds intersecting triangles by the signs of volumes of their corners: P. Guigue, O. Devillers, "Fast and robust
+// triangle-triangle overlap test using orientation predicates", Journal of Graphics Tools 8 (2003) 25-42.
 class Pairs {
   public:
     Pairs(const Mesh& mesh, const Topology& topology) : mesh_(mesh), topology_(topology) {}
@@ -81,20 +82,20 @@ class Pairs {
         return std::abs(s.x) + std::abs(s.y) + std::abs(s.z) == 1 ? Cut::edge : Cut::none;
     }
 
-    // On which side of the plane of a triangle another's vertices lie.
+    // Returns the side of one triangle's plane on which each vertex of another lies.
     glm::ivec3 sides(const glm::uvec3& plane, const glm::uvec3& t) const {
         return {side(plane, t.x), side(plane, t.y), side(plane, t.z)};
     }
     int side(const glm::uvec3& plane, unsigned vertex) const { return side(plane.x, plane.y, plane.z, vertex); }
 
-    // The corner that alone lies on its side of a plane; others may lie in the plane.
+    // Returns the corner that is alone on its side of a plane; others may lie in the plane.
     static int alone(const glm::ivec3& s) {
         int k = 0;
         while (s[k] == 0 || s[k] * s[(k + 1) % 3] > 0 || s[k] * s[(k + 2) % 3] > 0) ++k;
         return k;
     }
 
-    // Whether the segments that two triangles have in common with each other's planes have more than a point in common.
+    // Returns whether the two segments, each of one triangle in the other's plane, have more than a point in common.
     bool overlap(const glm::uvec3& a, const glm::ivec3& aSides, const glm::uvec3& b, const glm::ivec3& bSides) const {
         const int i = alone(aSides), k = alone(bSides);
         unsigned a1 = a[(i + 1) % 3], a2 = a[(i + 2) % 3], b1 = b[(k + 1) % 3], b2 = b[(k + 2) % 3];
@@ -103,7 +104,7 @@ class Pairs {
         return side(a[i], a1, b[k], b1) < 0 && side(a[i], a2, b2, b[k]) < 0;
     }
 
-    // Whether the surface continues beyond a plane across the edge of a triangle that lies in it.
+    // Returns whether the surface continues beyond a plane across a triangle's edge that lies in the plane.
     bool continues(const glm::uvec3& t, const glm::ivec3& sides, const glm::uvec3& plane) const {
         const int off = alone(sides);
         const auto [low, high] = std::minmax({t[(off + 1) % 3], t[(off + 2) % 3]});
@@ -119,7 +120,7 @@ class Pairs {
         return false;
     }
 
-    // The sign of the volume of four vertices; 0 where one comes twice.
+    // Returns the sign of the volume of four vertices; 0 if a vertex occurs twice.
     int side(unsigned a, unsigned b, unsigned c, unsigned d) const {
         if (a == c || b == c || d == a || d == b || d == c) return 0;
         const glm::dvec3 origin = mesh_.points[a], u = glm::dvec3(mesh_.points[b]) - origin,

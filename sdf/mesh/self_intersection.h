@@ -1,4 +1,4 @@
-// Where a surface runs through itself.
+// Finds where a surface self-intersects.
 #pragma once
 
 #include <cstddef>
@@ -9,10 +9,10 @@
 
 namespace bilayer::detail {
 
-/// Counts the pairs of triangles that share no edge and run through each other: they have a segment in common, and the
-/// surface of each continues on both sides of the other there, within the triangle or across an edge of it. Contact at
-/// points, along edges of both, and overlap within a plane do not count. The mesh must be welded, so that triangles
-/// share vertices by number; the topology is that of the mesh.
+/// Counts the pairs of intersecting triangles that share no edge. Two triangles intersect if they have a segment in
+/// common, and if each surface continues on both sides of the other there, within the triangle or across an edge of it.
+/// Contact at points, contact along edges of both, and overlap within a plane do not count. The mesh must be welded, so
+/// that triangles share vertices by index. `topology` must be that of the mesh.
 std::size_t countPiercingPairs(const Mesh& welded, const Topology& topology, const TriangleTree& tree);
 
 }  // namespace bilayer::detail

@@ -14,13 +14,13 @@
 namespace bilayer::detail {
 namespace {
 
-/// Points that a whole mesh is measured at: shares of its area are then good to about 2 %.
+/// Count of sample points for a whole mesh; shares of its area are then accurate to about 2 %.
 constexpr std::size_t samplesOfMesh = 512;
-/// Lines through each point, each a ray in two directions: winding numbers are then good to about 0.05.
+/// Lines through each point, each with two opposite rays; winding numbers are then accurate to about 0.05.
 constexpr std::size_t linesPerSample = 32;
-/// Nearer than this to a half, a winding number tells neither inside nor outside: three times its error.
+/// A winding number that differs from 1/2 by less than this is undecided: three times the error.
 constexpr double unclear = 0.15;
-/// How far apart surfaces lie that are one but for the rounding of coordinates, relative to the largest of them: half a
+/// Max distance of surfaces that coincide up to the rounding of coordinates, relative to the max coordinate: half a
 /// unit in the last place, on each axis of both.
 constexpr double roundingApart = 2.0 * std::numeric_limits<float>::epsilon();
 
@@ -61,10 +61,10 @@ Bounding Sides::measure(std::span<const unsigned> triangles, std::size_t samples
     return {counts.solid / all, counts.buried / all, counts.reversed / all, counts.nothing / all};
 }
 
-// Triangles that lie in the same place, copies or parts of another triangulation, add half of their number to the
-// winding number on either side, all others the mean of their crossings.
+// Coincident triangles, which are copies or belong to another triangulation, add half of their count to the winding
+// number on either side. All others add the mean of their crossings.
 void Sides::add(unsigned triangle, std::size_t sample, Bounding& sum) const {
-    // a large triangle gets many samples: points of R. Kronecker's sequence, the first of them off the edges
+    // large triangles get many samples: points of R. Kronecker's sequence, whose first one is off the edges
     double u = std::fmod(0.25 + 0.7548776662466927 * double(sample), 1);
     double v = std::fmod(0.25 + 0.5698402909980532 * double(sample), 1);
     if (u + v > 1) {

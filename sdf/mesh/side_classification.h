@@ -1,4 +1,4 @@
-// What lies on the two sides of a surface, by winding numbers: whether it bounds a solid there.
+// Classifies the two sides of a surface by winding numbers: does the surface bound a solid?
 //
 // The winding number is that of A. Jacobson, L. Kavan, O. Sorkine-Hornung, "Robust inside-outside segmentation using
 // generalized winding numbers" (SIGGRAPH 2013), as the mean over all directions of the signed crossings of a ray.
@@ -14,21 +14,22 @@
 
 namespace bilayer::detail {
 
-/// What a surface bounds by its winding numbers, in parts of its area (estimated at some hundred points of it).
+/// What a surface bounds, as shares of its area (estimated at a few hundred points).
 struct Bounding {
-    double solid = 0;     ///< clearly more than a half behind, clearly less before: the surface of a solid
-    double buried = 0;    ///< clearly more than a half on both sides: within the solid
+    double solid = 0;     ///< winding number clearly above 1/2 behind, clearly below in front: surface of a solid
+    double buried = 0;    ///< clearly above 1/2 on both sides: inside the solid
     double reversed = 0;  ///< the solid is in front
-    double nothing = 0;   ///< what remains: sheets, and where holes leave the winding number near a half
+    double nothing = 0;   ///< the rest: open surfaces, and where holes leave the winding number near 1/2
 };
 
-/// Estimates the winding numbers on both sides of a surface. Keeps references to what it is given.
+/// Estimates the winding numbers on both sides of a surface. Keeps references to its arguments.
 class Sides {
   public:
     /// @param progress  polled, unless null
     Sides(const Mesh& mesh, const TriangleTree& tree, Progress* progress = nullptr);
 
-    /// What some of the triangles bound, at `samples` points of equal shares of their area. Deterministic.
+    /// Classifies some of the triangles at `samples` points, each of which represents an equal share of their area.
+    /// Deterministic.
     Bounding measure(std::span<const unsigned> triangles, std::size_t samples) const;
 
   private:
@@ -38,11 +39,11 @@ class Sides {
     const Mesh& mesh_;
     const TriangleTree& tree_;
     Progress* progress_;
-    double samePlace_;  // surfaces no farther apart are one [m]
+    double samePlace_;  // max distance of coincident surfaces [m]
     std::vector<glm::dvec3> directions_;
 };
 
-/// Measures what a mesh bounds as a whole. The mesh must be valid.
+/// Classifies a mesh as a whole. The mesh must be valid.
 /// @param progress  polled, unless null
 Bounding bounding(const Mesh& mesh, Progress* progress = nullptr);
 

@@ -14,17 +14,17 @@
 namespace bilayer::detail {
 namespace {
 
-/// Vertices, triangles or uses of edges that are worth a task.
+/// Vertices, triangles or half-edges per task.
 constexpr std::size_t grain = 4096;
 
-// Spreads every bit of a word over all of it: the finalizer of S. Vigna's and G. Steele's SplitMix64.
+// Mixes every bit of a word into all others: the finalizer of S. Vigna's and G. Steele's SplitMix64.
 std::uint64_t mixed(std::uint64_t word) {
     word = (word ^ (word >> 30)) * 0xbf58476d1ce4e5b9u;
     word = (word ^ (word >> 27)) * 0x94d049bb133111ebu;
     return word ^ (word >> 31);
 }
 
-// The bits of a coordinate; adding zero makes -0 into 0.
+// Returns the bits of a coordinate; adding zero turns -0 into 0.
 std::uint64_t bitsOf(float coordinate) {
     return std::bit_cast<std::uint32_t>(coordinate + 0.0f);
 }
@@ -33,8 +33,8 @@ std::uint64_t hashOf(const glm::vec3& p) {
     return mixed(mixed(bitsOf(p.x) | bitsOf(p.y) << 32) + bitsOf(p.z));
 }
 
-// Buckets by the lower vertex, then a small sort in each: linear, where a sort of all edges is not. Threads fill a
-// bucket in any order; the sort makes it one.
+// Sorts half-edges into buckets by the lower vertex, then sorts each bucket. This takes linear time, unlike a sort of
+// all half-edges. Threads fill a bucket in any order, and the sort makes the result deterministic.
 LargeArray<EdgeUse> sortedEdges(const Topology& topology, std::size_t vertices) {
     std::vector<unsigned> ends(vertices + 1, 0);
     const auto forEachUse = [&](auto visit) {
@@ -52,7 +52,7 @@ LargeArray<EdgeUse> sortedEdges(const Topology& topology, std::size_t vertices) 
     forEachUse([&](const EdgeUse& use) { increment(ends[use.low + 1]); });
     std::partial_sum(ends.begin(), ends.end(), ends.begin());
     LargeArray<EdgeUse> edges(ends.back());
-    // where buckets begin becomes where they end
+    // advances each bucket from its begin to its end
     forEachUse([&](const EdgeUse& use) { edges[increment(ends[use.low])] = use; });
     forAllPolled(vertices, grain, topology.progress, [&](std::size_t v) {
         std::sort(edges.data() + (v ? ends[v - 1] : 0), edges.data() + ends[v], [](const EdgeUse& a, const EdgeUse& b) {
@@ -62,8 +62,8 @@ LargeArray<EdgeUse> sortedEdges(const Topology& topology, std::size_t vertices) 
     return edges;
 }
 
-// Triangles with the same vertices share all edges, so the uses of one edge are enough to find them: of that across
-// from the largest vertex.
+// Finds duplicate triangles. Triangles with the same vertices share all edges, so it suffices to compare the triangles
+// of one edge: the edge opposite to the largest vertex.
 std::vector<unsigned> originals(const Topology& topology) {
     auto original = vectorOf<unsigned>(topology.triangles.size(), topology.progress);
     std::iota(original.begin(), original.end(), 0u);

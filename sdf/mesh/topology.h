@@ -1,5 +1,5 @@
-// Who shares what in a mesh, where vertices count as one if their coordinates are equal: edges with their triangles,
-// and sets that grow together. Triangles keep their numbers. All that takes long polls a Progress, unless it is null.
+// Connectivity of a mesh: edges with their triangles, and disjoint sets. Vertices with equal coordinates count as one.
+// Triangles keep their indices. Long operations poll a Progress, unless it is null.
 #pragma once
 
 #include <atomic>
@@ -16,11 +16,11 @@
 
 namespace bilayer::detail {
 
-/// One triangle's use of an edge.
+/// A half-edge: the use of an edge by one triangle.
 struct EdgeUse {
     unsigned low, high;      ///< the edge's vertices
-    unsigned triangle : 31;  ///< validate() lets no more pass
-    bool forward : 1;        ///< the triangle runs it from low to high
+    unsigned triangle : 31;  ///< validate() limits the count
+    bool forward : 1;        ///< the triangle traverses the edge from `low` to `high`
 
     bool sameEdge(const EdgeUse& other) const { return low == other.low && high == other.high; }
     int direction() const { return forward ? 1 : -1; }
@@ -28,27 +28,27 @@ struct EdgeUse {
 
 /// The triangles and edges of a mesh after welding by coordinates (0 and -0 are equal).
 struct Topology {
-    /// @param progress  kept, for forEachEdge() to poll too
+    /// @param progress  kept; forEachEdge() polls it too
     explicit Topology(const Mesh& mesh, Progress* progress = nullptr);
-    /// The same for a mesh that is welded already.
+    /// Builds the topology of a mesh that is already welded.
     static Topology ofWelded(const Mesh& mesh);
 
-    std::vector<glm::uvec3> triangles;  ///< as in the mesh, each vertex replaced by the first of equal coordinates
-    LargeArray<EdgeUse> edges;          ///< by (low, high, triangle); none of triangles that use a vertex twice
+    std::vector<glm::uvec3> triangles;  ///< of the mesh, each vertex replaced by the first of equal coordinates
+    LargeArray<EdgeUse> edges;          ///< sorted by (low, high, triangle); without triangles that use a vertex twice
     std::vector<unsigned> original;     ///< a triangle's first triangle with the same three vertices, often itself
     Progress* progress;
 
-    /// Whether a triangle uses no vertex twice.
+    /// Returns whether the three vertices of a triangle differ.
     bool proper(std::size_t triangle) const;
 
-    /// Whether one of two triangles with the same three vertices runs them the other way.
+    /// Returns whether two triangles with the same three vertices have opposite orientation.
     bool facesOpposite(std::size_t triangle, std::size_t other) const {
         const glm::uvec3 &s = triangles[triangle], &t = triangles[other];
         const int at = t.x == s.x ? 0 : t.y == s.x ? 1 : 2;
         return t[(at + 1) % 3] != s.y;
     }
 
-    /// Calls visit(std::span<const EdgeUse>) with all uses of each edge that begins in a range of `edges`.
+    /// Calls visit(std::span<const EdgeUse>) with all uses of each edge whose uses begin in a range of `edges`.
     template <class Visit>
     void forEdges(std::size_t begin, std::size_t end, Visit visit) const {
         while (begin > 0 && begin < end && edges[begin].sameEdge(edges[begin - 1])) ++begin;
@@ -71,18 +71,18 @@ struct Topology {
     }
 
   private:
-    // `first`: of each vertex, the first one of equal coordinates; none: itself
+    // `first`: for each vertex, the first one of equal coordinates; empty: each vertex itself
     Topology(const Mesh& mesh, const LargeArray<unsigned>& first, Progress* progress);
 };
 
-/// 64 bits for each vertex that are equal where coordinates are.
+/// Returns a 64-bit hash for each vertex. Equal coordinates have equal hashes.
 std::vector<std::uint64_t> hashVertices(const Mesh& mesh, Progress* progress = nullptr);
 
-/// 64 bits for an edge run from one vertex to another, given the hashes of both. Running it the other way gives the
-/// negative, so that the sum (modulo 2^64) over the triangles of a closed and oriented surface is zero; for any other
+/// Returns a 64-bit hash of a half-edge from the hashes of its vertices. The opposite half-edge has the negated hash.
+/// The sum (modulo 2^64) over the triangles of a closed and oriented surface is therefore zero. For any other surface
 /// it is zero with a probability of about 2^-63.
 inline std::uint64_t hashEdge(std::uint64_t from, std::uint64_t to) {
-    // the halves of a 128-bit product, each operand with a constant of its own, so that the order counts
+    // fold the halves of a 128-bit product; each operand has its own constant, so that the order matters
     __extension__ using Wide = unsigned __int128;
     const auto folded = [](std::uint64_t a, std::uint64_t b) {
         const Wide product = Wide(a ^ 0x9e3779b97f4a7c15u) * (b ^ 0xd1b54a32d192ed03u);
@@ -91,8 +91,8 @@ inline std::uint64_t hashEdge(std::uint64_t from, std::uint64_t to) {
     return folded(from, to) - folded(to, from);
 }
 
-/// Disjoint sets of the numbers below n, by union-find (R. E. Tarjan, 1975). Each member is either like its set's root
-/// or its opposite.
+/// Disjoint sets of the numbers below n, by union-find (R. E. Tarjan, 1975). Each member has the same or the opposite
+/// sign as the root of its set.
 class DisjointSets {
   public:
     explicit DisjointSets(std::size_t n) : parent_(n), opposite_(n, 0) {
@@ -102,11 +102,12 @@ class DisjointSets {
     unsigned root(unsigned i) { return find(i).root; }
     bool oppositeToRoot(unsigned i) { return find(i).opposite; }
 
-    /// Puts a and b into one set, as opposites or alike; false if they are in one set already and otherwise related.
+    /// Joins the sets of a and b with equal or opposite signs. Returns false if they already share a set with the other
+    /// relation.
     bool join(unsigned a, unsigned b, bool opposite = false) {
         const Place pa = find(a), pb = find(b);
         if (pa.root == pb.root) return (pa.opposite != pb.opposite) == opposite;
-        // the smaller number becomes the root: the same roots whatever the order of joining
+        // the smaller number becomes the root, so that roots do not depend on the order of joining
         const auto [low, high] = pa.root < pb.root ? std::pair(pa, pb) : std::pair(pb, pa);
         parent_[high.root] = low.root;
         opposite_[high.root] = (low.opposite != high.opposite) != opposite;
@@ -122,7 +123,7 @@ class DisjointSets {
     Place find(unsigned i) {
         bool opposite = false;
         while (parent_[i] != i) {
-            // halve the path on the way
+            // path halving
             opposite_[i] ^= opposite_[parent_[i]];
             parent_[i] = parent_[parent_[i]];
             opposite ^= bool(opposite_[i]);
@@ -132,11 +133,11 @@ class DisjointSets {
     }
 
     std::vector<unsigned> parent_;
-    std::vector<std::uint8_t> opposite_;  // to the parent; a root is not opposite to itself
+    std::vector<std::uint8_t> opposite_;  // relative to the parent; a root is never opposite to itself
 };
 
-/// Disjoint sets of the numbers below n that all threads may join at the same time (R. J. Anderson, H. Woll, "Wait-free
-/// parallel algorithms for the union-find problem", STOC 1991). A root is the smallest number of its set, whatever the
+/// Disjoint sets of the numbers below n that all threads may join concurrently (R. J. Anderson, H. Woll, "Wait-free
+/// parallel algorithms for the union-find problem", STOC 1991). The root of a set is its smallest number, whatever the
 /// order of joining.
 class ConcurrentDisjointSets {
   public:
@@ -147,13 +148,13 @@ class ConcurrentDisjointSets {
             const unsigned parent = at(i).load(std::memory_order_relaxed);
             if (parent == i) return i;
             const unsigned next = at(parent).load(std::memory_order_relaxed);
-            // halve the path on the way; whoever else does so leaves an ancestor, too
+            // path halving; concurrent writers also store an ancestor
             if (next != parent) at(i).store(next, std::memory_order_relaxed);
             i = next;
         }
     }
 
-    /// False if a and b are in one set already.
+    /// Returns false if a and b are already in one set.
     bool join(unsigned a, unsigned b) {
         for (;;) {
             a = root(a);

@@ -12,13 +12,13 @@
 namespace bilayer::detail {
 namespace {
 
-/// More segments than this are first shared out by lines across the polygon: segments in convex position would be split
-/// off one by one.
+/// Above this count, segments are first divided by lines across the polygon. Otherwise segments in convex position
+/// would be split off one by one.
 constexpr std::size_t fewSegments = 8;
-/// Such a line is of use if no side has more than this part of the segments.
+/// Such a line is useful if neither side has more than this share of the segments.
 constexpr double usefulPart = 0.75;
 
-/// A line in the polygon's plane, told by a point and the direction across it.
+/// A line in the polygon's plane, given by a point and the normal direction within the plane.
 struct Line {
     glm::dvec3 point, across;
 
@@ -29,7 +29,7 @@ glm::dvec3 crossing(const glm::dvec3& a, double atA, const glm::dvec3& b, double
     return a + atA / (atA - atB) * (b - a);
 }
 
-/// What lies on the two sides of a line: 0 where heights are negative, 1 where they are positive.
+/// Items on the two sides of a line: 0 where heights are negative, 1 where they are positive.
 template <class Item>
 using Halves = std::array<Item, 2>;
 
@@ -47,7 +47,7 @@ Halves<Polygon> split(const Polygon& polygon, const Line& line) {
     return halves;
 }
 
-/// Segments along the line, and what is shorter than the slack, are on neither side.
+/// Splits segments. Segments along the line, and parts shorter than the slack, are on neither side.
 Halves<std::vector<Segment>> split(const std::vector<Segment>& segments, const Line& line, double slack) {
     Halves<std::vector<Segment>> halves;
     for (const Segment& s : segments) {
@@ -85,7 +85,7 @@ class Cutter {
     Cutter(const glm::dvec3& normal, double slack, const std::function<bool(const glm::dvec3&)>& keeps)
         : normal_(normal), slack_(slack), keeps_(keeps) {}
 
-    /// What is kept of a polygon; nothing is known of what is thinner than the slack.
+    /// The kept part of a polygon. Parts thinner than the slack are neither kept nor dropped.
     struct Part {
         bool anyKept = false, anyDropped = false;
         std::vector<Polygon> pieces;
@@ -112,7 +112,7 @@ class Cutter {
     struct Split {
         Halves<Polygon> polygons;
         Halves<std::vector<Segment>> segments;
-        bool thin = true;  // one half has no more than the slack
+        bool thin = true;  // one half is not wider than the slack
     };
 
     Split splitBy(const Line& line, const Polygon& polygon, const std::vector<Segment>& segments) const {
@@ -130,7 +130,7 @@ class Cutter {
         return !halves.thin && double(more) <= usefulPart * double(segments);
     }
 
-    /// Across the longer side of the box around the segments, with half of their middles on each side.
+    /// Returns a line across the longer side of the segments' bounding box, with half of their midpoints on each side.
     Line middle(const std::vector<Segment>& segments) const {
         std::vector<glm::dvec3> middles;
         for (const Segment& s : segments) middles.push_back(0.5 * (s.from + s.to));

@@ -1,6 +1,6 @@
-// Where no other surface passes, neighbours lie on the same side of everything: one winding number tells of all
-// triangles that hang together so. Those that others cross or touch are divided along the lines of contact, and each of
-// their pieces is asked for.
+// Where no other surface passes, neighbours lie on the same side of everything. One winding number therefore decides
+// for a patch of triangles connected in this way. Triangles that others cross or touch are cut along the lines of
+// contact, and each piece is tested separately.
 #include "sdf/mesh/unite.h"
 
 #include <oneapi/tbb/parallel_for.h>
@@ -24,13 +24,13 @@
 namespace bilayer::detail {
 namespace {
 
-/// Surfaces nearer than this touch: a float's last bit, in parts of the largest coordinate.
+/// Surfaces closer than this count as touching: one unit in the last place of a float, relative to the max coordinate.
 constexpr double slackPart = 1.2e-7;
-/// Of the slack: how far before and behind a triangle winding numbers are asked for.
+/// In units of the slack: distance in front of and behind a triangle at which winding numbers are evaluated.
 constexpr double stepOff = 2;
-/// Of the slack: neighbours that meet at a vertex or an edge share no more than this beside it.
+/// In units of the slack: max length of a contact that neighbours with a common vertex or edge have next to it.
 constexpr double shortContact = 4;
-/// Of the way to a half: the error of winding numbers that only tell a side.
+/// Error of winding numbers that only decide a side, as a share of the distance to 1/2.
 constexpr double onlySide = 0.999;
 
 using Corners = std::array<glm::dvec3, 3>;
@@ -45,7 +45,7 @@ double slackOf(const Mesh& mesh) {
 /// A triangle in double precision.
 struct Face {
     Corners corners;
-    glm::dvec3 normal;  // of unit length, or 0 without an area
+    glm::dvec3 normal;  // unit normal, or 0 for a triangle without area
     double area;
 
     Face(const Mesh& mesh, const glm::uvec3& t)
@@ -61,7 +61,7 @@ struct Face {
     glm::dvec3 onPlane(const glm::dvec3& p) const { return p - height(p) * normal; }
 };
 
-/// The boxes that meet a face's own box and its plane, but for the slack.
+/// Tests whether a box overlaps both a face's bounding box and its plane, with the slack as a margin.
 class Reach {
   public:
     Reach(const Bounds& own, const Face& face, double slack)
@@ -81,16 +81,16 @@ class Reach {
   private:
     const Bounds box_;
     const glm::dvec3 normal_, away_;
-    const double at_, slack_;  // twice
+    const double at_, slack_;  // both doubled
 };
 
-/// Where other triangles cross or touch a triangle.
+/// Finds where other triangles cross or touch a triangle.
 class Contacts {
   public:
     Contacts(const Mesh& mesh, const Topology& topology, const TriangleTree& tree, double slack)
         : mesh_(mesh), topology_(topology), tree_(tree), slack_(slack) {}
 
-    /// The lines of contact within a triangle, but for the edges and vertices that it shares with its neighbours.
+    /// Returns the contact segments within a triangle, except for edges and vertices that it shares with neighbours.
     std::vector<Segment> within(unsigned triangle) const {
         const Face face(mesh_, mesh_.triangles[triangle]);
         std::vector<Segment> found;
@@ -116,7 +116,7 @@ class Contacts {
         }
     }
 
-    /// What a triangle has in common with a face's plane: nothing, a segment, or all three edges.
+    /// Returns the intersection of a triangle with a face's plane: nothing, a segment, or all three edges.
     std::vector<Segment> traces(const Face& face, const Corners& corners, const Heights& heights) const {
         std::vector<Segment> edges;
         std::vector<glm::dvec3> points;
@@ -161,7 +161,7 @@ class Contacts {
     const double slack_;
 };
 
-/// Takes buried walls away.
+/// Removes buried surfaces.
 class Uniter {
   public:
     Uniter(const Mesh& mesh, Progress* progress)
@@ -202,8 +202,8 @@ class Uniter {
         forAll(contacts_.size(), [&](std::size_t i) { contacts_[i] = contacts.within(unsigned(i)); });
     }
 
-    // A patch hangs together by edges of two triangles, none of which others touch. Each is known by its largest
-    // triangle.
+    // Finds patches: triangles connected by edges of two triangles, without contacts. A patch is represented by its
+    // largest triangle.
     std::vector<unsigned> findPatches() {
         DisjointSets sets(mesh_.triangles.size());
         topology_.forEachEdge([&](std::span<const EdgeUse> uses) {
@@ -275,10 +275,10 @@ class Uniter {
     Progress* progress_;
     const Topology topology_;
     const double slack_;
-    std::vector<std::vector<Segment>> contacts_;  // of each triangle
-    std::vector<std::vector<Polygon>> pieces_;    // what is left of a triangle with contacts
-    std::vector<unsigned> patchOf_;               // of a triangle without
-    std::vector<char> buried_;                    // patches
+    std::vector<std::vector<Segment>> contacts_;  // for each triangle
+    std::vector<std::vector<Polygon>> pieces_;    // the remaining pieces of each triangle with contacts
+    std::vector<unsigned> patchOf_;               // for each triangle without contacts
+    std::vector<char> buried_;                    // for each patch
 };
 
 }  // namespace

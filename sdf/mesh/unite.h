@@ -9,22 +9,23 @@ namespace bilayer::detail {
 
 class Progress;
 
-/// What unite() made of a mesh.
+/// The result of unite().
 struct UnionSurface {
     Mesh mesh;                        ///< the surface of the union
-    std::size_t buriedTriangles = 0;  ///< triangles of which nothing is left
-    std::size_t cutTriangles = 0;     ///< triangles of which a part is left, in pieces
+    std::size_t buriedTriangles = 0;  ///< triangles that were removed entirely
+    std::size_t cutTriangles = 0;     ///< triangles that were removed in part and cut into pieces
 
     bool changed() const { return buriedTriangles + cutTriangles > 0; }
 };
 
-/// Takes away what lies inside of the union of all solids of a mesh: walls with a winding number above a half on both
-/// sides. Triangles that other triangles cross or touch are divided along these lines first, and the buried pieces
-/// dropped. The surface is exact but for the rounding of floats: walls nearer to each other than 2e-7 of the largest
-/// coordinate touch. Winding numbers of the given mesh tell the two sides of the result apart.
+/// Removes the surfaces inside of the union of all solids of a mesh, that is, surfaces with a winding number above 1/2
+/// on both sides. Triangles that intersect or touch others are first cut along the intersections; then the buried
+/// pieces are removed. The result is exact up to the rounding of floats: surfaces closer to each other than 2e-7 of the
+/// max coordinate count as touching. The winding numbers of the given mesh determine the two sides of the result.
 ///
-/// Sheets, and walls of solids that are inside out, stay: orient() the mesh first if it is not to be trusted. A mesh
-/// without buried walls keeps its bytes. The bytes of the result do not depend on the number of threads.
+/// Open surfaces and the surfaces of inside-out solids stay. Call orient() first if the orientation is not reliable. A
+/// mesh without buried surfaces is returned bit-identical. The bytes of the result do not depend on the count of
+/// threads.
 /// @param progress  polled, unless null
 /// Throws as validate() does.
 UnionSurface unite(const Mesh& mesh, Progress* progress = nullptr);

@@ -1,6 +1,6 @@
 // Highway compiles the part between HWY_BEFORE_NAMESPACE and HWY_AFTER_NAMESPACE once for each instruction set. It
-// finds the triangles that a ray may leave through, in floats and with room for their rounding; those are then measured
-// in double precision, so all instruction sets give the same.
+// finds the triangles through which a ray may exit, in floats with a margin for rounding. These are then measured in
+// double precision, so all instruction sets give the same result.
 #include "sdf/mesh/wall_thickness.h"
 
 #undef HWY_TARGET_INCLUDE
@@ -24,7 +24,7 @@
 namespace bilayer::detail {
 namespace {
 
-/// A wall that a ray leaves under a flatter angle than this is an edge, not a wall (cosine).
+/// If a ray exits at a more grazing angle than this, it hits an edge region and not a wall (cosine).
 constexpr float minFacing = 0.2f;
 constexpr float infinite = std::numeric_limits<float>::infinity();
 
@@ -44,7 +44,7 @@ struct Triangle {
     }
 };
 
-// Where a ray leaves through the front of a triangle (T. Moeller, B. Trumbore, 1997); infinite if it does not.
+// Returns where a ray exits through the front of a triangle (T. Moeller, B. Trumbore, 1997); infinite if it does not.
 float exitThrough(const Ray& ray, const Triangle& t) {
     const glm::dvec3 a(t.a), ab = glm::dvec3(t.b) - a, ac = glm::dvec3(t.c) - a, d(ray.direction),
                              from = glm::dvec3(ray.origin) - a;
@@ -67,9 +67,9 @@ namespace bilayer::detail::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 namespace {
 
-/// Rounding of products in floats, relative to the sizes of their factors; generous.
+/// Rounding error of products in floats, relative to the absolute values of their factors; generous.
 constexpr float rounding = 2e-6f;
-/// Directions are bent where they run along an axis, so that all can be divided by.
+/// Direction components below this are replaced by it, so that division is possible.
 constexpr float minDirection = 1e-20f;
 
 inline Vec dot(const Points& a, const Points& b) {
@@ -81,14 +81,14 @@ inline Points cross(const Points& a, const Points& b) {
     return {det(a.y, b.z, a.z, b.y), det(a.z, b.x, a.x, b.z), det(a.x, b.y, a.y, b.x)};
 }
 
-// Nodes to look at, the nearest last.
+// A stack of nodes to visit, nearest on top.
 struct Waiting {
-    static constexpr std::size_t most = 256;  // of seven for each of ten levels, and one
+    static constexpr std::size_t most = 256;  // seven for each of ten levels, and one
     std::array<float, most> entries;
     std::array<std::uint32_t, most> nodes;
     std::size_t count = 0;
 
-    // Puts a node among those that stand from `first` on.
+    // Inserts a node by distance among those from `first` on.
     void insert(std::size_t first, float entry, std::uint32_t node) {
         std::size_t place = count++;
         for (; place > first && entries[place - 1] < entry; --place) {
@@ -100,11 +100,11 @@ struct Waiting {
     }
 };
 
-// One ray's search for its nearest exit.
+// A ray's search for its nearest exit.
 class ExitSearch {
   public:
     ExitSearch(const TriangleTree& tree, const Ray& ray) : tree_(tree), ray_(ray) {
-        // around boxes, against rounding [m]
+        // margin around boxes for rounding [m]
         const float room = rounding * tree.largestCoordinate();
         for (int k = 0; k < 3; ++k) {
             const float d = ray.direction[k];
@@ -170,7 +170,7 @@ class ExitSearch {
             const Vec away = hn::Mul(room, hn::Sqrt(dot(from, from)));
             const Vec uRoom = hn::Mul(away, hn::Sqrt(ac2)), vRoom = hn::Mul(away, hn::Sqrt(ab2));
             const Vec u = hn::Add(dot(ac, side), uRoom), v = hn::Sub(vRoom, dot(ab, side));
-            // both sides of this have the room of u and v
+            // both sides of this comparison have the margins of u and v
             const Vec most = hn::Add(hn::Add(facing, facingRoom), hn::Mul(hn::Set(tag, 2.0f), hn::Add(uRoom, vRoom)));
             const Mask within = hn::And(hn::Ge(hn::Min(u, v), hn::Zero(tag)), hn::Le(hn::Add(u, v), most));
             for (unsigned bits = bitsOf(hn::And(faces, within)); bits != 0; bits &= bits - 1)
@@ -187,8 +187,8 @@ class ExitSearch {
     const TriangleTree& tree_;
     const Ray& ray_;
     float nearest_ = infinite;
-    bool forward_[3];                         // along an axis
-    float inverse_[3], enter_[3], leave_[3];  // a plane x is met at x * inverse + enter, or leave
+    bool forward_[3];                         // for each axis
+    float inverse_[3], enter_[3], leave_[3];  // a plane at x is crossed at x * inverse + enter (or leave)
 };
 
 float nearestExit(const TriangleTree& tree, const Ray& ray) {

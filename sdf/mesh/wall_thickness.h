@@ -1,4 +1,4 @@
-// How thick the solid behind a surface is.
+// The thickness of the solid behind a surface.
 #pragma once
 
 #include <vector>
@@ -7,9 +7,10 @@
 
 namespace bilayer::detail {
 
-/// For each triangle of the tree's mesh, the thickness of the solid behind it [m]: how far it is from its centre,
-/// against its normal, to where the surface is left through its front; infinite where nothing ends it, or where it is
-/// left at a flat angle (of less than 12 degrees), as at an edge.
+/// For each triangle of the tree's mesh, returns the thickness of the solid behind it [m]. The thickness is the
+/// distance from the triangle's centre, against its normal, to the point where the ray exits through the front of the
+/// surface. It is infinite if the ray does not exit, or if it exits at a grazing angle (less than 12 degrees), as near
+/// an edge.
 std::vector<float> wallThickness(const TriangleTree& tree);
 
 }  // namespace bilayer::detail
