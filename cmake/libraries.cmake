@@ -21,10 +21,10 @@ function(bilayer_flags target)
   target_include_directories(${target} PRIVATE ${PROJECT_SOURCE_DIR})
 endfunction()
 
-# bilayer_library(NAME FOLDER LINKS...): a library of all source files of a folder, unless BILAYER_COMPONENTS lacks it.
+# bilayer_library(NAME FOLDER LINKS...): a library of all source files of a folder, unless no component of BILAYER_COMPONENTS needs it.
 # Headers that stand directly in the folder are public: they are included as <bilayer/FOLDER/...> and installed.
 function(bilayer_library name folder)
-  if(NOT name IN_LIST BILAYER_COMPONENTS)
+  if(NOT name IN_LIST bilayer_components)
     return()
   endif()
   cmake_parse_arguments(ARG "" "" "LINKS" ${ARGN})
@@ -56,7 +56,7 @@ endfunction()
 # find_package(bilayer COMPONENTS ...) for users.
 function(bilayer_install_package)
   set(folder ${CMAKE_INSTALL_LIBDIR}/cmake/bilayer)
-  foreach(component IN LISTS BILAYER_COMPONENTS)
+  foreach(component IN LISTS bilayer_components)
     install(EXPORT bilayer-${component} NAMESPACE bilayer:: DESTINATION ${folder} COMPONENT ${component})
   endforeach()
   set(cmake ${PROJECT_SOURCE_DIR}/cmake)

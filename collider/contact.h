@@ -78,14 +78,14 @@ struct ContactOptions {
     /// nearest face, which may be the wrong one. A sharp point that fails the test is tested again one voxel back along
     /// its own normal, if that is outside. Vertices of a cube, whose normals average three faces, reach 0.57. Below -1:
     /// no contact is dropped.
-    float minNormalCosine = -2;
+    float minNormalCosine = 0.3f;
     /// The same limit for face points that do not touch yet. A point next to the other body sees its edge obliquely, or
     /// approaches its side, and would be blocked there.
-    float minNormalCosineApart = -2;
+    float minNormalCosineApart = 0.9f;
     /// Whether face points keep contacts with edges that they see at more than half a degree off their normal. Applies
     /// to points that neither touch nor approach. Such contacts are redundant: the edges' own points meet the faces
     /// perpendicularly.
-    bool keepsObliqueEdges = true;
+    bool keepsObliqueEdges = false;
 };
 
 /// Diagnostics of collide().

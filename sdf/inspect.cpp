@@ -259,7 +259,7 @@ MeshReport inspect(const Mesh& input, float wall) {
     for (const Component& component : all) report.volume += component.volume;
     report.duplicateTriangles = countDuplicates(topology);
     report.insideOutComponents = countInsideOut(mesh, tree, of, all);
-    report.selfIntersections = countPiercingPairs(mesh, topology, tree);
+    report.selfIntersections = countIntersectingPairs(mesh, topology, tree);
     if (!needsNoTurning(report, all)) report.flippedTriangles = orient(mesh).turnedTriangles;
     findThinWalls(tree, measures, wall, report);
     return report;

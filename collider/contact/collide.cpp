@@ -61,7 +61,7 @@ struct Map {
 };
 
 // The speculative contact of a point outside the field with a displacement `way`.
-std::optional<SurfaceSample> touchOnWay(const Field& field, const glm::vec3& point, const glm::vec3& way) {
+std::optional<SurfaceSample> impactOnPath(const Field& field, const glm::vec3& point, const glm::vec3& way) {
     const auto hit = field.segment(point, point + way);
     if (!hit) return std::nullopt;
     return SurfaceSample{std::max(glm::dot(point - hit->position, hit->normal), 0.f), hit->normal,
@@ -210,9 +210,9 @@ class PointsInField {
             found(index, point, touched);
             if (point.isSharp) followEdges(index, at, *here, found);
         } else if (speculative_) {
-            const glm::vec3 way = wayOf(at);
+            const glm::vec3 way = displacementOf(at);
             if (sample.distance > glm::length(way) || !meets(point, at, way)) return;
-            if (const auto touched = touchOnWay(field_, at, way)) found(index, point, *touched);
+            if (const auto touched = impactOnPath(field_, at, way)) found(index, point, *touched);
         }
     }
 
@@ -243,7 +243,7 @@ class PointsInField {
     }
 
     float approachOf(const SurfacePoint& point, const glm::vec3& at, const SurfaceSample& touched) const {
-        const glm::vec3 way = wayOf(at);
+        const glm::vec3 way = displacementOf(at);
         const float approach = -glm::dot(way, touched.normal);
         return approach > 0 && (touched.distance <= 0 || meets(point, at, way)) ? approach : 0;
     }
@@ -322,7 +322,7 @@ class PointsInField {
 
     const SurfacePoint& pointOf(std::uint32_t index) const { return body_.collider.data().points().points()[index]; }
 
-    glm::vec3 wayOf(const glm::vec3& at) const { return relativeMotion_.of(other_.scale * at) / other_.scale; }
+    glm::vec3 displacementOf(const glm::vec3& at) const { return relativeMotion_.of(other_.scale * at) / other_.scale; }
 
     const Placed &body_, &other_;
     const Field& field_;

@@ -84,7 +84,7 @@ std::vector<Neighbour> neighboursOf(std::uint32_t index, const SurfacePoints& po
 }
 
 /// The conormals of an edge, from the surface next to its middle.
-Conormals wingsOf(const SurfacePoint& a, const SurfacePoint& b, const Field& field) {
+Conormals conormalsOf(const SurfacePoint& a, const SurfacePoint& b, const Field& field) {
     const glm::vec3 along = glm::normalize(b.position - a.position), middle = 0.5f * (a.position + b.position);
     const glm::vec3 aside = glm::normalize(glm::cross(along, a.normal + b.normal));
     const auto wing = [&](float side) {
@@ -115,7 +115,7 @@ SharpEdges::SharpEdges(const SurfacePoints& points, const Field& field)
             const auto isBack = [&](const Neighbour& n) { return n.index == i; };
             const auto& its = neighbours[next.index];
             if (next.index < i || std::none_of(its.begin(), its.end(), isBack)) continue;
-            edges_.push_back({i, next.index, wingsOf(all[i], all[next.index], field)});
+            edges_.push_back({i, next.index, conormalsOf(all[i], all[next.index], field)});
             longest_ = std::max(longest_, next.distance);
         }
     first_.assign(all.size() + 1, 0);
@@ -128,7 +128,7 @@ SharpEdges::SharpEdges(const SurfacePoints& points, const Field& field)
 }
 
 bool SharpEdges::isConvexVertex(const SurfacePoints& points, std::uint32_t point, const glm::vec3& direction) const {
-    return pointsFallBack(points, point, direction) || edgesFallBack(points, point, direction);
+    return pointsRecede(points, point, direction) || edgesRecede(points, point, direction);
 }
 
 bool SharpEdges::isWithinEdge(const SurfacePoints& points, std::uint32_t point) const {
@@ -140,7 +140,7 @@ bool SharpEdges::isWithinEdge(const SurfacePoints& points, std::uint32_t point) 
     return !around(point).empty() && glm::length(sum) <= minBend * float(around(point).size());
 }
 
-bool SharpEdges::edgesFallBack(const SurfacePoints& points, std::uint32_t point, const glm::vec3& direction) const {
+bool SharpEdges::edgesRecede(const SurfacePoints& points, std::uint32_t point, const glm::vec3& direction) const {
     const auto fallsBack = [&](std::uint32_t e) {
         const SharpEdge& edge = edges_[e];
         const std::uint32_t next = edge.from == point ? edge.to : edge.from;
@@ -152,7 +152,7 @@ bool SharpEdges::edgesFallBack(const SurfacePoints& points, std::uint32_t point,
     return !its.empty() && std::all_of(its.begin(), its.end(), fallsBack);
 }
 
-bool SharpEdges::pointsFallBack(const SurfacePoints& points, std::uint32_t point, const glm::vec3& direction) const {
+bool SharpEdges::pointsRecede(const SurfacePoints& points, std::uint32_t point, const glm::vec3& direction) const {
     const glm::vec3 tip = points.points()[point].position;
     int found = 0;
     bool fallBack = true;

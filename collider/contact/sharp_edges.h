@@ -65,9 +65,9 @@ class SharpEdges {
                                      float voxelSize) const;
 
   private:
-    bool edgesFallBack(const SurfacePoints& points, std::uint32_t point, const glm::vec3& direction) const;
+    bool edgesRecede(const SurfacePoints& points, std::uint32_t point, const glm::vec3& direction) const;
     /// The test for points without edges: where edges meet at acute angles, and at the rounded tip of a body.
-    bool pointsFallBack(const SurfacePoints& points, std::uint32_t point, const glm::vec3& direction) const;
+    bool pointsRecede(const SurfacePoints& points, std::uint32_t point, const glm::vec3& direction) const;
 
     std::vector<SharpEdge> edges_;
     std::vector<std::uint32_t> first_, ofPoints_;

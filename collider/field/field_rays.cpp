@@ -71,7 +71,7 @@ std::optional<RayHit> touchMesh(const FieldData& field, const Path& path, double
         const Sample here = field.sample((centre - field.origin) * field.perMetre);
         return here.inBand ? 0 : double(here.distance) - double(field.error);
     };
-    const auto touch = firstTouchOnWay(*field.mesh, path, radius, clearanceAt);
+    const auto touch = firstTouchOnPath(*field.mesh, path, radius, clearanceAt);
     if (!touch) return std::nullopt;
     return RayHit{toFloat(touch->along), glm::vec3(touch->position), glm::vec3(touch->normal), touch->triangle};
 }

@@ -301,7 +301,7 @@ class TouchSearch {
 // The search for a triangle that overlaps a box.
 class BoxSearch {
   public:
-    BoxSearch(const MeshTree& mesh, const glm::dvec3& centre, const TurnedBox& box)
+    BoxSearch(const MeshTree& mesh, const glm::dvec3& centre, const RotatedBox& box)
         : mesh_(mesh.mesh()), tree_(mesh.tree()), place_(tree_, centre), box_(box) {
         const double perMetre = 1 / double(mesh.voxelSize());
         const glm::dvec3 half = box.halfSize * perMetre;
@@ -364,7 +364,7 @@ class BoxSearch {
     const Mesh& mesh_;
     const WideTree& tree_;
     Place place_;
-    TurnedBox box_;
+    RotatedBox box_;
     float limit2_ = 0;
     glm::vec3 axes_[3];
     float half_[3], around_[3];  // extents of the box along its own axes, and along the tree's
@@ -378,7 +378,7 @@ std::optional<MeshHit> searchTouch(const MeshTree& mesh, const glm::dvec3& start
     return TouchSearch(mesh, start, path, radius).run();
 }
 
-bool searchBox(const MeshTree& mesh, const glm::dvec3& centre, const TurnedBox& box) {
+bool searchBox(const MeshTree& mesh, const glm::dvec3& centre, const RotatedBox& box) {
     return BoxSearch(mesh, centre, box).run();
 }
 
@@ -415,7 +415,7 @@ std::optional<MeshHit> firstTouch(const MeshTree& mesh, const Path& path, double
     return HWY_DYNAMIC_DISPATCH(searchTouch)(mesh, toTree(mesh, path.origin), path, radius);
 }
 
-bool meetsTriangle(const MeshTree& mesh, const TurnedBox& box) noexcept {
+bool meetsTriangle(const MeshTree& mesh, const RotatedBox& box) noexcept {
     return HWY_DYNAMIC_DISPATCH(searchBox)(mesh, toTree(mesh, box.centre), box);
 }
 

@@ -27,6 +27,6 @@ std::optional<MeshHit> firstHit(const MeshTree& mesh, const Path& path) noexcept
 std::optional<MeshHit> firstTouch(const MeshTree& mesh, const Path& path, double radius) noexcept;
 
 /// Whether a box overlaps a triangle.
-bool meetsTriangle(const MeshTree& mesh, const TurnedBox& box) noexcept;
+bool meetsTriangle(const MeshTree& mesh, const RotatedBox& box) noexcept;
 
 }  // namespace bilayer::detail

@@ -45,7 +45,7 @@ inline void fetch(const Item& item) {
 // The search for one point.
 class Search {
   public:
-    void begin(const WideTree& tree, const TurnedGroup* groups, const glm::dvec3& point, float bound) {
+    void begin(const WideTree& tree, const OrientedGroup* groups, const glm::dvec3& point, float bound) {
         tree_ = &tree;
         groups_ = groups;
         const glm::dvec3 cell = glm::floor(point);
@@ -76,7 +76,7 @@ class Search {
     }
 
     // Starts at entries. A key holds the squared gap of a node's box, with the entry and slot in the lowest bits.
-    void begin(const WideTree& tree, const TurnedGroup* groups, const glm::dvec3& point, float bound,
+    void begin(const WideTree& tree, const OrientedGroup* groups, const glm::dvec3& point, float bound,
                const EntryPlace& place) {
         begin(tree, groups, point, bound);
         entries_ = place.entries;
@@ -166,7 +166,7 @@ class Search {
     }
 
     // Pushes the nodes of a group that may contain a nearer triangle, the nearest of them last.
-    void open(const TurnedGroup& group, Waiting& waiting) {
+    void open(const OrientedGroup& group, Waiting& waiting) {
         alignas(64) float gaps[treeWidth];
         // whole voxels first, without rounding
         const glm::vec3 origin(group.origin[0], group.origin[1], group.origin[2]), from = (cell_ - origin) + inCell_;
@@ -228,7 +228,7 @@ class Search {
     }
 
     const WideTree* tree_;
-    const TurnedGroup* groups_;
+    const OrientedGroup* groups_;
     const BlockEntry* entries_;
     std::size_t vectors_;  // of keys
     glm::vec3 cell_, inCell_;
@@ -238,14 +238,14 @@ class Search {
     alignas(64) std::int32_t keys_[BlockEntries::most * treeWidth];
 };
 
-std::uint32_t searchAll(const WideTree& tree, const TurnedGroup* groups, const glm::dvec3& point, float bound) {
+std::uint32_t searchAll(const WideTree& tree, const OrientedGroup* groups, const glm::dvec3& point, float bound) {
     Search search;
     search.begin(tree, groups, point, bound);
     search.descend(tree.root());
     return search.part();
 }
 
-std::uint32_t searchEntry(const WideTree& tree, const TurnedGroup* groups, const glm::dvec3& point, float bound,
+std::uint32_t searchEntry(const WideTree& tree, const OrientedGroup* groups, const glm::dvec3& point, float bound,
                           const EntryPlace& place) {
     Search search;
     search.begin(tree, groups, point, bound, place);
@@ -254,8 +254,9 @@ std::uint32_t searchEntry(const WideTree& tree, const TurnedGroup* groups, const
 }
 
 // Interleaves the searches of several points, so that prefetches are well ahead of their use.
-void searchEntries(const WideTree& tree, const TurnedGroup* groups, double perMetre, std::span<const glm::vec3> points,
-                   float bound, std::span<const EntryPlace> places, std::span<std::uint32_t> parts) {
+void searchEntries(const WideTree& tree, const OrientedGroup* groups, double perMetre,
+                   std::span<const glm::vec3> points, float bound, std::span<const EntryPlace> places,
+                   std::span<std::uint32_t> parts) {
     Search searches[together];
     for (std::size_t first = 0; first < points.size(); first += together) {
         const std::size_t count = std::min(together, points.size() - first);
@@ -456,7 +457,7 @@ void MeshTree::toEdge(NearestFeature& found, const std::array<glm::dvec3, 3>& c)
 
 std::size_t MeshTree::memoryBytes() const {
     return mesh_->points.size() * sizeof(glm::vec3) + mesh_->triangles.size() * sizeof(glm::uvec3) +
-           tree_.leafCount * sizeof(WideLeaf) + tree_.groupCount * (sizeof(BoxGroup) + sizeof(TurnedGroup)) +
+           tree_.leafCount * sizeof(WideLeaf) + tree_.groupCount * (sizeof(BoxGroup) + sizeof(OrientedGroup)) +
            normals_.memoryBytes();
 }
 

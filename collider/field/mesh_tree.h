@@ -92,7 +92,7 @@ class MeshTree {
     float voxelSize_;
     double perMetre_;  // voxels per metre
     WideTree tree_;
-    LargeArray<TurnedGroup> groups_;
+    LargeArray<OrientedGroup> groups_;
     FeatureNormals normals_;
 };
 

@@ -72,7 +72,7 @@ class Maker {
   public:
     explicit Maker(const WideTree& tree) : tree_(tree), groups_(tree.groupCount) {}
 
-    LargeArray<TurnedGroup> make() {
+    LargeArray<OrientedGroup> make() {
         std::uint32_t begin = 0, children = tree_.leafCount, leavesInChild = 1;
         for (int level = 0; begin < tree_.groupCount; ++level) {
             const std::uint32_t count = (children + treeWidth - 1) / treeWidth;
@@ -97,7 +97,7 @@ class Maker {
 
     void makeGroup(std::uint32_t index, std::uint32_t firstChild, std::uint32_t leavesInChild, bool turned) {
         const BoxGroup& straight = tree_.groups[index];
-        TurnedGroup& group = groups_[index];
+        OrientedGroup& group = groups_[index];
         group.firstChild = straight.firstChild;
         glm::vec3 origin(0);
         glm::mat3 frame(1);
@@ -154,12 +154,12 @@ class Maker {
     }
 
     const WideTree& tree_;
-    LargeArray<TurnedGroup> groups_;
+    LargeArray<OrientedGroup> groups_;
 };
 
 }  // namespace
 
-LargeArray<TurnedGroup> makeTurnedGroups(const WideTree& tree) {
+LargeArray<OrientedGroup> makeTurnedGroups(const WideTree& tree) {
     return Maker(tree).make();
 }
 

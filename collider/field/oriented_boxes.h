@@ -14,16 +14,16 @@ namespace bilayer::detail {
 
 /// The boxes of eight leaves or eight groups in a common frame [voxels]. Unused boxes are empty and infinitely far
 /// away.
-struct TurnedGroup {
+struct OrientedGroup {
     alignas(64) float lower[3][treeWidth];
     float upper[3][treeWidth];
     float axes[3][3];          ///< of the frame, in the tree's frame
     float origin[3];           ///< of the frame in the tree's frame; whole voxels
     std::uint32_t firstChild;  ///< the node of the first box; the others follow
 };
-static_assert(sizeof(TurnedGroup) == 256, "four cache lines");
+static_assert(sizeof(OrientedGroup) == 256, "four cache lines");
 
 /// The groups in the order of the tree's groups; `groupCount` of them.
-LargeArray<TurnedGroup> makeTurnedGroups(const WideTree& tree);
+LargeArray<OrientedGroup> makeTurnedGroups(const WideTree& tree);
 
 }  // namespace bilayer::detail

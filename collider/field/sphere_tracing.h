@@ -24,8 +24,8 @@ struct SphereTouch {
 /// @param radius       [m], positive; the sphere touches nothing at the start
 /// @param clearanceAt  (const glm::dvec3&) -> lower bound of the distance to the mesh; not positive where unknown [m]
 template <class ClearanceAt>
-std::optional<SphereTouch> firstTouchOnWay(const MeshTree& mesh, const Path& path, double radius,
-                                           const ClearanceAt& clearanceAt) {
+std::optional<SphereTouch> firstTouchOnPath(const MeshTree& mesh, const Path& path, double radius,
+                                            const ClearanceAt& clearanceAt) {
     // section length [voxels], and the max count of sections
     constexpr double pieceLength = 2, maxPieces = 4096;
     // search distance for the nearest triangle, beyond the sphere [sections]

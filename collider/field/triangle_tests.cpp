@@ -98,7 +98,7 @@ bool touches(const MeshTree& mesh, std::uint32_t triangle, const Path& path, dou
     return false;
 }
 
-bool overlaps(const TurnedBox& box, const Corners& corners) {
+bool overlaps(const RotatedBox& box, const Corners& corners) {
     const glm::dmat3 toBox = glm::transpose(box.axes);
     const Corners p{toBox * (corners[0] - box.centre), toBox * (corners[1] - box.centre),
                     toBox * (corners[2] - box.centre)};

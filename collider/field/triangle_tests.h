@@ -46,7 +46,7 @@ bool touches(const MeshTree& mesh, std::uint32_t triangle, const Path& path, dou
              glm::dvec3& position);
 
 /// An oriented box.
-struct TurnedBox {
+struct RotatedBox {
     glm::dvec3 centre;
     glm::dmat3 axes;  ///< columns of unit length
     glm::dvec3 halfSize;
@@ -54,6 +54,6 @@ struct TurnedBox {
 
 /// Whether a box and a triangle overlap: T. Akenine-Moeller, "Fast 3D triangle-box overlap testing", Journal of
 /// Graphics Tools 6 (2001) 29-33.
-bool overlaps(const TurnedBox& box, const Corners& corners);
+bool overlaps(const RotatedBox& box, const Corners& corners);
 
 }  // namespace bilayer::detail

@@ -491,7 +491,7 @@ struct SurfaceSample {
 
 // Keys are 0 in the box and infinite outside.
 struct InBox {
-    const TurnedBox& box;
+    const RotatedBox& box;
     bool found = false;
 
     double limit() const { return found ? 0 : infinity; }
@@ -579,7 +579,7 @@ std::optional<ZeroTouch> firstZeroTouch(const FieldData& field, const Path& path
     return ZeroTouch{touch.best, *touch.found};
 }
 
-bool meetsZero(const FieldData& field, const TurnedBox& box) noexcept {
+bool meetsZero(const FieldData& field, const RotatedBox& box) noexcept {
     InBox inBox{box};
     ZeroSearch(field, inBox).run();
     return inBox.found;

@@ -36,6 +36,6 @@ struct ZeroTouch {
 std::optional<ZeroTouch> firstZeroTouch(const FieldData& field, const Path& path, double radius) noexcept;
 
 /// Whether the zero set has a point in a box.
-bool meetsZero(const FieldData& field, const TurnedBox& box) noexcept;
+bool meetsZero(const FieldData& field, const RotatedBox& box) noexcept;
 
 }  // namespace bilayer::detail

@@ -44,12 +44,12 @@ struct Scratch {
 
 class BrickFiller {
   public:
-    BrickFiller(const MeshJob& job, const TriangleBins& bins, double voxelsPerUnit, FallbackSign& lastResort,
+    BrickFiller(const MeshJob& job, const TriangleBins& bins, double voxelsPerUnit, FallbackSign& fallbackSign,
                 Scratch& scratch)
         : job_(job),
           bins_(bins),
           voxelsPerUnit_(voxelsPerUnit),
-          lastResort_(lastResort),
+          lastResort_(fallbackSign),
           s_(scratch),
           side_(job.mesh, voxelsPerUnit) {}
 
@@ -153,7 +153,7 @@ class BrickFiller {
             },
             [&](std::uint32_t triangle) { side_.offer(triangle); });
         if (const Side side = side_.side(); side != Side::undecided) return side == Side::inside;
-        if (const auto known = insideByWays(local, outside, inside)) return *known;
+        if (const auto known = insideByPaths(local, outside, inside)) return *known;
         return lastResort_.isInside(point / voxelsPerUnit_);
     }
 
@@ -173,7 +173,7 @@ class BrickFiller {
     }
 
     // Tries straight paths to voxels of known sign that are far from the surface, at most maxPaths.
-    std::optional<bool> insideByWays(const glm::ivec3& from, const BlockMask& outside, const BlockMask& inside) {
+    std::optional<bool> insideByPaths(const glm::ivec3& from, const BlockMask& outside, const BlockMask& inside) {
         int tries = 0;
         for (std::size_t x = 0; x < inside.size(); ++x)
             for (std::uint64_t targets = found_.far[x] & (outside[x] | inside[x]); targets != 0;
@@ -224,10 +224,10 @@ void fillExact(const MeshJob& job, const Bounds& box) {
     const double voxelsPerUnit = 1.0 / double(job.voxelSize);
     const TriangleBins bins = binTriangles(job.mesh, box, voxelsPerUnit, job.reach, &job.progress);
     job.progress.begin(bins.count());
-    FallbackSign lastResort(job);
+    FallbackSign fallbackSign(job);
     tbb::enumerable_thread_specific<Scratch> scratch;
     tbb::parallel_for(std::size_t(0), bins.count(), [&](std::size_t brick) {
-        BrickFiller(job, bins, voxelsPerUnit, lastResort, scratch.local()).fill(brick);
+        BrickFiller(job, bins, voxelsPerUnit, fallbackSign, scratch.local()).fill(brick);
         job.progress.advance();
     });
 }

@@ -138,7 +138,7 @@ class Pairs {
 
 }  // namespace
 
-std::size_t countPiercingPairs(const Mesh& welded, const Topology& topology, const TriangleTree& tree) {
+std::size_t countIntersectingPairs(const Mesh& welded, const Topology& topology, const TriangleTree& tree) {
     const Pairs pairs(welded, topology);
     return tbb::parallel_reduce(
         tbb::blocked_range<std::uint32_t>(0, tree.boxes().leafCount, 64), std::size_t(0),

@@ -222,7 +222,7 @@ namespace {
 
 // Whether something is left of a triangle when the box's planes cut it off one after the other (I. Sutherland, G.
 // Hodgman, "Reentrant polygon clipping", 1974).
-bool leftInBox(const TurnedBox& box, const Corners& corners, double room) {
+bool leftInBox(const RotatedBox& box, const Corners& corners, double room) {
     std::vector<glm::dvec3> polygon(corners.begin(), corners.end());
     for (int axis = 0; axis < 3; ++axis)
         for (const double side : {-1.0, 1.0}) {
@@ -250,7 +250,7 @@ TEST_CASE("a box meets a triangle where something is left of it in the box") {
     for (const Mesh& mesh : someMeshes()) {
         const MeshTree tree(mesh, voxelSizeFor(mesh, 64));
         const double scale = bounds(mesh).longestSide(), room = 1e-6 * double(tree.voxelSize());
-        std::vector<TurnedBox> boxes(400);
+        std::vector<RotatedBox> boxes(400);
         for (std::size_t i = 0; i < boxes.size(); ++i) {
             const glm::vec3 axis = random.direction();
             const double angle = i % 5 ? random(0, 3) : 0;

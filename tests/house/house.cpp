@@ -192,3 +192,29 @@ TEST_CASE("what is compiled for several instruction sets has no names that anoth
     CHECK(wrong == "");
     CHECK(found >= 12);
 }
+
+TEST_CASE("docs/api.md lists each public header once, and no page names a source file that is not there") {
+    const fs::path root = BILAYER_SOURCES;
+    const auto text = [](const fs::path& path) {
+        std::ifstream stream(path);
+        return std::string(std::istreambuf_iterator<char>(stream), {});
+    };
+    const std::string api = text(root / "docs/api.md");
+    for (const auto& [library, ignored] : floors)
+        for (const auto& entry : fs::directory_iterator(root / library)) {
+            if (entry.path().extension() != ".h") continue;
+            const std::string name = "`" + library + "/" + entry.path().filename().string() + "`";
+            CAPTURE(name);
+            CHECK(api.find(name) != std::string::npos);
+        }
+    static const std::regex source(
+        R"re((?:^|[`( ])((?:sdf|collider|cl|integration|tests|tools|demos|bench)/[a-zA-Z0-9_/]+\.(?:h|cpp|cl)))re");
+    for (const auto& entry : fs::directory_iterator(root / "docs")) {
+        if (entry.path().extension() != ".md") continue;
+        const std::string page = text(entry.path());
+        for (std::sregex_iterator named(page.begin(), page.end(), source), end; named != end; ++named) {
+            CAPTURE(entry.path().filename().string(), (*named)[1].str());
+            CHECK(fs::exists(root / (*named)[1].str()));
+        }
+    }
+}

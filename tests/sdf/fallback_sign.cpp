@@ -19,7 +19,7 @@ void checkSides(const Mesh& mesh, unsigned seed) {
     Progress progress(nobody);
     std::atomic<std::size_t> asked = 0;
     const MeshJob job{mesh, 0.1f, 3, false, true, [](const FilledBlocks&) {}, progress, {}, &asked};
-    FallbackSign lastResort(job);
+    FallbackSign fallbackSign(job);
     std::mt19937 random(seed);
     const Bounds box = bounds(mesh);
     std::size_t inside = 0, wrong = 0, count = 0;
@@ -32,7 +32,7 @@ void checkSides(const Mesh& mesh, unsigned seed) {
         }
         if (test::distance(mesh, p) < 1e-6) continue;
         const bool truth = test::windingNumber(mesh, p) > 0.5;
-        wrong += lastResort.isInside(p) != truth;
+        wrong += fallbackSign.isInside(p) != truth;
         inside += truth;
         ++count;
     }

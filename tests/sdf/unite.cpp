@@ -105,7 +105,7 @@ double difference(const Mesh& a, const Mesh& b, const std::vector<glm::dvec3>& p
 }
 
 // A box that is turned: a convex solid of six half-spaces.
-struct TurnedBox {
+struct RotatedBox {
     glm::dvec3 centre, half;
     glm::dquat rotation;
 
@@ -174,7 +174,7 @@ double toSegment(const glm::dvec3& p, const glm::dvec3& a, const glm::dvec3& b) 
 
 // The distance to one box's surface outside of another: to a face where its foot is free, else to the borders of what
 // is free of it.
-double toFree(const glm::dvec3& p, const TurnedBox& box, const TurnedBox& other) {
+double toFree(const glm::dvec3& p, const RotatedBox& box, const RotatedBox& other) {
     double least = std::numeric_limits<double>::infinity();
     for (const auto& face : box.faces()) {
         const glm::dvec3 normal = glm::normalize(glm::cross(face[1] - face[0], face[2] - face[0]));
@@ -266,8 +266,8 @@ TEST_CASE("the union of two boxes at any angle has their outer surface") {
     std::uniform_real_distribution<double> size(0.2, 0.7), place(-0.3, 0.3);
     for (int i = 0; i < 200; ++i) {
         CAPTURE(i);
-        std::array<TurnedBox, 2> boxes;
-        for (TurnedBox& box : boxes)
+        std::array<RotatedBox, 2> boxes;
+        for (RotatedBox& box : boxes)
             box = {{place(random), place(random), place(random)},
                    {size(random), size(random), size(random)},
                    glm::normalize(glm::dquat(normal(random), normal(random), normal(random), normal(random)))};

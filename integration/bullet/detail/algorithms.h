@@ -89,7 +89,7 @@ class FieldAlgorithmFunctions {
   private:
     struct Functions;
     std::unique_ptr<Functions> functions_;
-    KnowsFields knows_;
+    FieldDispatcherMark knows_;
 };
 
 }  // namespace bilayer::bullet::detail

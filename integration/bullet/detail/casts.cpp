@@ -66,7 +66,7 @@ std::optional<SweepHit> sweepSphere(const MeshTree& mesh, const glm::vec3& from,
     const double length = glm::length(way);
     if (!(length > 0)) return std::nullopt;
     const Path path{glm::dvec3(from), way / length, length};
-    const auto touch = firstTouchOnWay(mesh, path, radius, [](const glm::dvec3&) { return 0.; });
+    const auto touch = firstTouchOnPath(mesh, path, radius, [](const glm::dvec3&) { return 0.; });
     if (!touch) return std::nullopt;
     return SweepHit{static_cast<float>(touch->along / length), glm::vec3(touch->position), glm::vec3(touch->normal),
                     static_cast<int>(touch->triangle)};

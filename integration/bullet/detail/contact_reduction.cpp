@@ -149,7 +149,7 @@ bool isStill(const std::vector<Contact>& contacts, std::span<const Patch> last) 
 
 /// A small motion of A in the axes of a patch: a tilt about an axis in the patch, or a shift along the patch with a
 /// twist.
-struct Nudge {
+struct Perturbation {
     glm::vec2 tilt{0}, shift{0};
     float twist = 0;
 };
@@ -159,14 +159,14 @@ glm::vec2 towards(float share) {
     return {std::cos(angle), std::sin(angle)};
 }
 
-void addTilts(float tilt, std::vector<Nudge>& all) {
+void addTilts(float tilt, std::vector<Perturbation>& all) {
     for (int k = 0; k < tiltDirections; ++k) all.push_back({.tilt = tilt * towards(float(k) / tiltDirections)});
 }
 
 /// The motions that contacts are kept for, in the order of the choice: those that span the patch first, a mere press
 /// last.
-std::vector<Nudge> nudges() {
-    std::vector<Nudge> all;
+std::vector<Perturbation> nudges() {
+    std::vector<Perturbation> all;
     for (const float tilt : tilts) addTilts(tilt, all);
     for (int k = 0; k < shiftDirections; ++k) all.push_back({.shift = aside * towards(float(k) / shiftDirections)});
     for (const float twist : {aside, -aside}) all.push_back({.twist = twist});
@@ -175,8 +175,8 @@ std::vector<Nudge> nudges() {
 }
 
 /// The motions in between, at which the reduction error is measured.
-std::vector<Nudge> nudgesBetween() {
-    std::vector<Nudge> all;
+std::vector<Perturbation> nudgesBetween() {
+    std::vector<Perturbation> all;
     for (int k = 0; k < tiltDirections; ++k)
         all.push_back({.tilt = measured * towards((float(k) + 0.5f) / tiltDirections)});
     for (int k = 0; k < shiftDirections; ++k)
@@ -222,7 +222,7 @@ class Gaps {
     }
 
     /// Moves A. Returns the minimum separation after the motion.
-    float least(const Nudge& nudge) {
+    float least(const Perturbation& nudge) {
         const bool tilts = nudge.tilt != glm::vec2(0);
         const float *gaps = column(gap), *x = column(tilts ? tiltX : shiftX), *y = column(tilts ? tiltY : shiftY),
                     *turns = column(twist);
@@ -240,7 +240,7 @@ class Gaps {
     }
 
     /// The separation of one contact after a motion of A.
-    float of(std::uint32_t k, const Nudge& nudge) const {
+    float of(std::uint32_t k, const Perturbation& nudge) const {
         const bool tilts = nudge.tilt != glm::vec2(0);
         const glm::vec2 way = tilts ? nudge.tilt : nudge.shift;
         const float x = at(tilts ? tiltX : shiftX, k), y = at(tilts ? tiltY : shiftY, k);
@@ -248,7 +248,7 @@ class Gaps {
     }
 
     /// The minimum separation of some contacts after a motion of A.
-    float minOf(const std::vector<std::uint32_t>& some, const Nudge& nudge) const {
+    float minOf(const std::vector<std::uint32_t>& some, const Perturbation& nudge) const {
         float least = std::numeric_limits<float>::max();
         for (const std::uint32_t k : some) least = std::min(least, of(k, nudge));
         return least;
@@ -280,14 +280,14 @@ class Gaps {
 class FirstMet {
   public:
     FirstMet(const std::vector<Contact>& contacts, const Group& group) : gaps_(contacts, group) {
-        static const std::vector<Nudge> all = nudges();
+        static const std::vector<Perturbation> all = nudges();
         nudges_ = all;
         if (gaps_.turn() > tilts[0]) {
             addTilts(gaps_.turn(), turned_);
             turned_.insert(turned_.end(), all.begin(), all.end());
             nudges_ = turned_;
         }
-        for (const Nudge& nudge : nudges_) least_.push_back(gaps_.least(nudge));
+        for (const Perturbation& nudge : nudges_) least_.push_back(gaps_.least(nudge));
     }
 
     /// @param before  the contacts of the last step
@@ -307,9 +307,9 @@ class FirstMet {
 
     /// The maximum depth that motions in between reach before the chosen contacts touch [m].
     float reductionError() {
-        static const std::vector<Nudge> between = nudgesBetween();
+        static const std::vector<Perturbation> between = nudgesBetween();
         float most = 0;
-        for (const Nudge& nudge : between) {
+        for (const Perturbation& nudge : between) {
             const float least = gaps_.least(nudge);
             most = std::max(most, gaps_.minOf(kept_, nudge) - least);
         }
@@ -319,7 +319,7 @@ class FirstMet {
   private:
     using Motions = std::uint64_t;  ///< one bit each
 
-    float toleranceOf(const Nudge& nudge) const {
+    float toleranceOf(const Perturbation& nudge) const {
         return (nudge.tilt == glm::vec2(0) ? toleranceUntilted : tolerance) * gaps_.extent();
     }
 
@@ -371,8 +371,8 @@ class FirstMet {
     }
 
     Gaps gaps_;
-    std::vector<Nudge> turned_;  ///< including those of a body that rotates in the step
-    std::span<const Nudge> nudges_;
+    std::vector<Perturbation> turned_;  ///< including those of a body that rotates in the step
+    std::span<const Perturbation> nudges_;
     std::vector<float> least_;         ///< minimum separation after each motion
     std::vector<std::uint32_t> kept_;  ///< indices into the group
     std::vector<Motions> met_;         ///< motions of each kept contact

@@ -18,12 +18,6 @@ namespace bilayer::bullet::detail {
 
 using namespace bilayer::detail;
 
-// Minimum cosine between the normal of a surface point and the opposite of the face's normal. It keeps points below the
-// edge of a box from being pushed out sideways. The vertices of a cube, whose normals are averaged over three faces,
-// reach 0.57. The second cosine is for points of faces that are still apart: an edge of the other body next to them is
-// at a more oblique angle.
-inline constexpr ContactOptions normalFilter{
-    .minNormalCosine = 0.3f, .minNormalCosineApart = 0.9f, .keepsObliqueEdges = false};
 // Bits of the number of a probe on an edge. This limits the probes: higher numbers are the features of the next edge.
 inline constexpr int partBits = 15;
 

@@ -33,9 +33,9 @@ struct ContactDetails {
 
 /// Parameters of the transfer of contacts from step to step.
 struct Continuity {
-    float sameWithin = 0;       ///< an old and a new contact closer than this on either body are the same [m]
-    float restingFriction = 1;  ///< as in ShapeOptions
-    bool isSwept = false;       ///< speculative contacts cover the whole motion of the step, not only the margin
+    float sameWithin = 0;        ///< an old and a new contact closer than this on either body are the same [m]
+    float restingFriction = 1;   ///< as in ShapeOptions
+    bool isSpeculative = false;  ///< speculative contacts cover the whole motion of the step, not only the margin
 };
 
 /// Whether the result is the user's own, as in contact tests. It then gets every contact.

@@ -89,11 +89,11 @@ Boxes& boxes() {
 
 }  // namespace
 
-KnowsFields::KnowsFields() {
+FieldDispatcherMark::FieldDispatcherMark() {
     ++knowing;
 }
 
-KnowsFields::~KnowsFields() {
+FieldDispatcherMark::~FieldDispatcherMark() {
     --knowing;
 }
 

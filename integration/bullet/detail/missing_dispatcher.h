@@ -10,16 +10,16 @@
 namespace bilayer::bullet::detail {
 
 /// Held by each Dispatcher and FieldAlgorithms. While one exists, boxes are not recorded.
-class KnowsFields {
+class FieldDispatcherMark {
   public:
-    KnowsFields();
-    ~KnowsFields();
-    KnowsFields(const KnowsFields&) = delete;
-    KnowsFields& operator=(const KnowsFields&) = delete;
+    FieldDispatcherMark();
+    ~FieldDispatcherMark();
+    FieldDispatcherMark(const FieldDispatcherMark&) = delete;
+    FieldDispatcherMark& operator=(const FieldDispatcherMark&) = delete;
 };
 
 /// Records the bounding box of a field, from any thread. Warns on the standard error output, once in a process, when
-/// the box of a dynamic body meets another field's while no KnowsFields exists.
+/// the box of a dynamic body meets another field's while no FieldDispatcherMark exists.
 /// @param transform  its address identifies the body
 void noteBox(const void* field, const btTransform& transform, const btVector3& lower, const btVector3& upper);
 

@@ -21,7 +21,7 @@ constexpr std::uint32_t lowestVertex = featureOfB - 1;
 
 ContactReport collideFields(const Placed& a, const Placed& b, float margin, bool measured, ContactCache& cache,
                             std::vector<Contact>& contacts) {
-    ContactOptions options = normalFilter;
+    ContactOptions options;
     options.margin = margin;
     options.exact = measured;
     // a contact test needs the distance of the bodies for any direction of their normals
@@ -34,7 +34,7 @@ ContactReport collideFields(const Placed& a, const Placed& b, float margin, bool
 
 ContactReport collideFields(const Placed& a, const Placed& b, float margin, std::span<const FoundPoint> ofA,
                             std::span<const FoundPoint> ofB, std::vector<Contact>& contacts) {
-    ContactOptions options = normalFilter;
+    ContactOptions options;
     options.margin = margin;
     return collideFound(a, b, options, ofA, ofB, contacts);
 }

@@ -110,7 +110,7 @@ class TriangleProbes : public btTriangleCallback {
         float longest = 0;
         for (int i = 0; i < 3; ++i) {
             answers[i] = local_.at(corners[i]);
-            conormals[i] = adjacency_->wingsOf(f, i);
+            conormals[i] = adjacency_->conormalsOf(f, i);
             flat[i] = conormals[i] && glm::dot((*conormals[i])[0], (*conormals[i])[1]) <= flatEdge;
             longest = std::max(longest, glm::distance(corners[i], corners[(i + 1) % 3]));
         }
@@ -203,7 +203,7 @@ class TriangleProbes : public btTriangleCallback {
         const float facing = glm::dot(foot.normal, normal), least = point.isSharp ? minFacing : 0;
         const bool isNearSide = height >= 0 || isUnclear || (foot.where == LocalField::Answer::near && facing >= least);
         const bool isNearest = std::abs(foot.distance - height) <= maxInterpolationError * voxel_ && isNearSide;
-        const bool isKept = keeps(normalFilter, glm::dot(normal, point.normal), true);
+        const bool isKept = keeps({}, glm::dot(normal, point.normal), true);
         if (isNearest && isKept && (point.isSharp || turnsTo(field_.scale * point.position, point.normal, normal)))
             return true;
         if (!(isNearest || height < 0) || !isConvexVertex(index, normal)) return false;
@@ -464,8 +464,7 @@ class TriangleProbes : public btTriangleCallback {
         if (!found) return std::nullopt;
         const bool touches = std::abs(there.distance) <= touchingFoot * voxel_;
         const glm::quat& inWorld = field_.pose.rotation;
-        if (!keeps(normalFilter, found->normal, -(inWorld * normal), inWorld * local_.relativeMotion().rotation(),
-                   !touches))
+        if (!keeps({}, found->normal, -(inWorld * normal), inWorld * local_.relativeMotion().rotation(), !touches))
             return std::nullopt;
         const auto normalAt = [&](const glm::vec3& place) { return local_.at(place).normal; };
         if (!touches && there.distance > 0 && seesEdgeObliquely(foot, -normal, there.distance, there.normal, normalAt))

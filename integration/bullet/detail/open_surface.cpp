@@ -107,7 +107,7 @@ class Away {
 
 }  // namespace
 
-glm::vec3 wingOf(const Triangle& triangle, int side) {
+glm::vec3 conormalOf(const Triangle& triangle, int side) {
     const glm::vec3 &from = triangle[side], &to = triangle[(side + 1) % 3], &opposite = triangle[(side + 2) % 3];
     const glm::vec3 along = to - from, way = opposite - from;
     const float squared = glm::dot(along, along);
@@ -146,10 +146,10 @@ Adjacency::Groups Adjacency::groupBy(KeyOf&& keyOf) const {
     return groups;
 }
 
-std::optional<Conormals> Adjacency::wingsOf(std::uint32_t triangle, int edge) const {
+std::optional<Conormals> Adjacency::conormalsOf(std::uint32_t triangle, int edge) const {
     const auto both = atEdge(triangle, edge);
     if (both.size() != 2) return std::nullopt;
-    const auto wing = [&](const Member& one) { return wingOf(triangles_[one.triangle], one.index); };
+    const auto wing = [&](const Member& one) { return conormalOf(triangles_[one.triangle], one.index); };
     return Conormals{wing(both[0]), wing(both[1])};
 }
 
@@ -157,7 +157,7 @@ std::optional<glm::vec3> Adjacency::neighbourOf(std::uint32_t triangle, int edge
     const auto both = atEdge(triangle, edge);
     if (both.size() != 2) return std::nullopt;
     const Member& other = both[0].triangle == triangle ? both[1] : both[0];
-    return wingOf(triangles_[other.triangle], other.index);
+    return conormalOf(triangles_[other.triangle], other.index);
 }
 
 std::optional<glm::vec3> Adjacency::edgeNormal(std::uint32_t triangle, int edge, const glm::vec3& direction) const {
@@ -166,7 +166,7 @@ std::optional<glm::vec3> Adjacency::edgeNormal(std::uint32_t triangle, int edge,
     return inNormalCone(direction, [&](Ascent& ascent) {
         ascent.along(along);
         ascent.along(-along);
-        for (const Member& one : atEdge(triangle, edge)) ascent.along(wingOf(triangles_[one.triangle], one.index));
+        for (const Member& one : atEdge(triangle, edge)) ascent.along(conormalOf(triangles_[one.triangle], one.index));
     });
 }
 
@@ -175,7 +175,7 @@ std::optional<glm::vec3> Adjacency::cornerNormal(std::uint32_t triangle, int cor
         for (const auto& [other, i] : groupOf(corners_, triangle, corner)) {
             const Triangle& corners = triangles_[other];
             ascent.between(normalized(corners[(i + 1) % 3] - corners[i]), normalized(corners[(i + 2) % 3] - corners[i]),
-                           wingOf(corners, i));
+                           conormalOf(corners, i));
         }
     });
 }
@@ -185,7 +185,7 @@ SharpTriangles sharpOf(std::span<const Triangle> triangles) {
     std::map<std::array<float, 3>, Away> corners;
     for (const Triangle& triangle : triangles)
         for (int i = 0; i < 3; ++i) {
-            if (const glm::vec3 wing = wingOf(triangle, i); wing != glm::vec3(0))
+            if (const glm::vec3 wing = conormalOf(triangle, i); wing != glm::vec3(0))
                 sides[keyOf(triangle, i)].add(wing, 1);
             const glm::vec3 &here = triangle[i], one = triangle[(i + 1) % 3] - here, two = triangle[(i + 2) % 3] - here;
             if (!(glm::dot(one, one) > 0 && glm::dot(two, two) > 0)) continue;

@@ -21,7 +21,7 @@ using Triangle = std::array<glm::vec3, 3>;
 
 /// The conormal of an edge: in the triangle's plane, from edge `side` into the triangle, of unit length. The edge runs
 /// from that vertex to the next. Zero if the triangle has no area.
-glm::vec3 wingOf(const Triangle& triangle, int side);
+glm::vec3 conormalOf(const Triangle& triangle, int side);
 
 /// Adjacency of triangles by edge and vertex. Features are shared if their coordinates are equal to the bit. Edge i of
 /// a triangle runs from its vertex i to the next one.
@@ -38,7 +38,7 @@ class Adjacency {
     /// The triangles at an edge, including this one, in ascending order.
     std::span<const Member> atEdge(std::uint32_t triangle, int edge) const { return groupOf(edges_, triangle, edge); }
     /// The conormals of an edge that exactly two triangles share.
-    std::optional<Conormals> wingsOf(std::uint32_t triangle, int edge) const;
+    std::optional<Conormals> conormalsOf(std::uint32_t triangle, int edge) const;
     /// The other triangle's conormal.
     std::optional<glm::vec3> neighbourOf(std::uint32_t triangle, int edge) const;
 

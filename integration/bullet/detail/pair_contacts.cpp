@@ -34,12 +34,12 @@ Continuity continuityOf(const Side& a, const Side& b) {
         return isField(shape) ? shape.getContactBreakingThreshold(gContactBreakingThreshold)
                               : std::numeric_limits<float>::max();
     };
-    const auto isSwept = [](const Side& side) {
+    const auto isSpeculative = [](const Side& side) {
         return side.seconds > 0 && (!isField(*side.shape) || static_cast<const Shape&>(*side.shape).speculative());
     };
     return {.sameWithin = std::min(sameWithin(*a.shape), sameWithin(*b.shape)),
             .restingFriction = std::max(restingFriction(*a.shape), restingFriction(*b.shape)),
-            .isSwept = isSwept(a) && isSwept(b)};
+            .isSpeculative = isSpeculative(a) && isSpeculative(b)};
 }
 
 }  // namespace

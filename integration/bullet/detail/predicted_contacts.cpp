@@ -76,7 +76,7 @@ PredictedContacts::PredictedContacts(const Side& a, const Side& b, const Continu
 /// The time in which a body rotates a point no farther than the contacts are known.
 float PredictedContacts::maxSeconds(const Body& body, const btVector3& place) const {
     const float arm = (place - body.velocity.centre).length();
-    const float most = continuity_.isSwept ? maxRotation : std::sqrt(2 * turnsOff * continuity_.sameWithin / arm);
+    const float most = continuity_.isSpeculative ? maxRotation : std::sqrt(2 * turnsOff * continuity_.sameWithin / arm);
     return most / body.velocity.angular.length();  // infinite without rotation
 }
 
