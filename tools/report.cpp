@@ -51,36 +51,37 @@ std::optional<MassProperties> massOf(const Solid& solid) {
     }
 }
 
-Json adviceJson(const bullet::Settings& advice) {
-    return {{"voxelSize", number(advice.voxelSize)},
-            {"margin", number(advice.margin)},
-            {"exteriorWidth", advice.exteriorWidth},
-            {"interiorWidth", advice.interiorWidth},
-            {"substeps", advice.substeps},
-            {"substepsWithoutSweeps", advice.substepsWithoutSpeculation},
-            {"wallVoxels", number(advice.wallVoxels)},
-            {"splitImpulsePenetrationThreshold", number(advice.splitImpulse)},
-            {"activeVoxels", advice.voxels},
-            {"fieldBytes", advice.fieldBytes},
-            {"buildSeconds", advice.buildSeconds},
-            {"warnings", advice.warnings}};
+Json settingsJson(const bullet::Settings& settings) {
+    return {{"voxelSize", number(settings.voxelSize)},
+            {"margin", number(settings.margin)},
+            {"exteriorWidth", settings.exteriorWidth},
+            {"interiorWidth", settings.interiorWidth},
+            {"substeps", settings.substeps},
+            {"substepsWithoutSweeps", settings.substepsWithoutSpeculation},
+            {"wallVoxels", number(settings.wallVoxels)},
+            {"splitImpulsePenetrationThreshold", number(settings.splitImpulse)},
+            {"activeVoxels", settings.voxels},
+            {"fieldBytes", settings.fieldBytes},
+            {"buildSeconds", settings.buildSeconds},
+            {"warnings", settings.warnings}};
 }
 
-void printAdvice(const InspectArguments& a, const bullet::Settings& advice) {
-    Table table(
-        fmt::format("advice: bodies that meet at up to {:g} m/s, steps of {:.4g} s", a.scene.speed, a.scene.step));
-    table.row("build", fmt::format("--voxel-size {:.4g} --exterior-width {} --interior-width {} --body --margin {:.4g}",
-                                   advice.voxelSize, advice.exteriorWidth, advice.interiorWidth, advice.margin));
-    if (advice.wallVoxels > 0) table.row("walls", fmt::format("{:.3g} voxels", advice.wallVoxels));
+void printSettings(const InspectArguments& a, const bullet::Settings& settings) {
+    Table table(fmt::format("recommended settings: bodies that meet at up to {:g} m/s, steps of {:.4g} s",
+                            a.scene.speed, a.scene.step));
+    table.row("build",
+              fmt::format("--voxel-size {:.4g} --exterior-width {} --interior-width {} --body --margin {:.4g}",
+                          settings.voxelSize, settings.exteriorWidth, settings.interiorWidth, settings.margin));
+    if (settings.wallVoxels > 0) table.row("walls", fmt::format("{:.3g} voxels", settings.wallVoxels));
     const auto told = [](int substeps) {
         return fmt::format("{}{}", substeps, substeps < bullet::maxSubsteps ? "" : " or more");
     };
-    table.row("substeps", fmt::format("{} with swept contacts, {} without", told(advice.substeps),
-                                      told(advice.substepsWithoutSpeculation)));
-    table.row("field", fmt::format("about {} active voxels, {}, built in {:.1g} s on two cores", grouped(advice.voxels),
-                                   bytes(advice.fieldBytes), advice.buildSeconds));
-    table.row("solver", fmt::format("m_splitImpulsePenetrationThreshold = {:.4g}", advice.splitImpulse));
-    for (const std::string& warning : advice.warnings) table.row("warning", warning);
+    table.row("substeps", fmt::format("{} with speculative contacts, {} without", told(settings.substeps),
+                                      told(settings.substepsWithoutSpeculation)));
+    table.row("field", fmt::format("about {} active voxels, {}, built in {:.1g} s on two cores",
+                                   grouped(settings.voxels), bytes(settings.fieldBytes), settings.buildSeconds));
+    table.row("solver", fmt::format("m_splitImpulsePenetrationThreshold = {:.4g}", settings.splitImpulse));
+    for (const std::string& warning : settings.warnings) table.row("warning", warning);
     table.print();
 }
 
@@ -88,13 +89,14 @@ void runInspect(const InspectArguments& a) {
     ReadReport read;
     const Mesh mesh = readMesh(a.input, &read);
     const MeshReport report = inspect(mesh);
-    const auto advice = a.stepGiven->count() ? std::optional(bullet::recommendSettings(report, a.scene)) : std::nullopt;
+    const auto settings =
+        a.stepGiven->count() ? std::optional(bullet::recommendSettings(report, a.scene)) : std::nullopt;
     const std::optional<MassProperties> mass = report.closed() ? massOf(mesh) : std::nullopt;
     if (a.json) {
         Json json = toJson(report, 0);
         json["file"] = toJson(read);
         json["mass"] = toJson(mass, mesh.origin);
-        if (advice) json["advice"] = adviceJson(*advice);
+        if (settings) json["advice"] = settingsJson(*settings);
         return print(json);
     }
     Table table(a.input.string());
@@ -102,7 +104,7 @@ void runInspect(const InspectArguments& a) {
     addRows(table, report, 0);
     addRows(table, mass, mesh.origin);
     table.print();
-    if (advice) printAdvice(a, *advice);
+    if (settings) printSettings(a, *settings);
 }
 
 // Returns OpenVDB's verdict on the grid as a level set. It is only a remark, since a field may have two different

@@ -18,6 +18,7 @@
 #include "demos/shared/machines.h"
 #include "demos/shared/shapes.h"
 #include "tests/support/analytic.h"
+#include "tests/support/contacts.h"
 #include "tests/support/random.h"
 #include "tests/support/support.h"
 #include "tests/support/truth.h"
@@ -52,7 +53,7 @@ const Collider& ring() {
 
 std::vector<Contact> contactsOf(const Placed& a, const Placed& b, float margin, ContactReport* report = nullptr) {
     std::vector<Contact> contacts;
-    const ContactReport seen = collide(a, b, {.margin = margin}, contacts);
+    const ContactReport seen = collide(a, b, unfiltered(margin), contacts);
     if (report) *report = seen;
     return contacts;
 }
@@ -318,7 +319,7 @@ TEST_CASE("contacts that look along the surface of their point are left out wher
             if (!opposes(contact) && point.isSharp && contact.distance <= 0) sunk.insert(contact.feature);
             ++all;
         }
-        collide(a, b, {.margin = h, .minNormalCosine = 0.3f, .minNormalCosineApart = apart}, found);
+        collide(a, b, {.margin = h, .minNormalCosineApart = apart, .keepsObliqueEdges = true}, found);
         for (const Contact& contact : found) REQUIRE(opposes(contact));
         back += std::erase_if(found, [&](const Contact& contact) { return sunk.contains(contact.feature); });
         REQUIRE(found.size() == expected.size());
@@ -326,8 +327,7 @@ TEST_CASE("contacts that look along the surface of their point are left out wher
         kept += found.size();
 
         std::vector<Contact> straight;
-        collide(a, b, {.margin = h, .minNormalCosine = 0.3f, .minNormalCosineApart = apart, .keepsObliqueEdges = false},
-                straight);
+        collide(a, b, {.margin = h, .minNormalCosineApart = apart}, straight);
         std::set<std::uint32_t> left;
         for (const Contact& contact : straight) left.insert(contact.feature);
         for (const Contact& contact : found) {

@@ -13,6 +13,7 @@
 #include <bilayer/sdf/build.h>
 #include "demos/shared/shapes.h"
 #include "tests/support/analytic.h"
+#include "tests/support/contacts.h"
 #include "tests/support/random.h"
 #include "tests/support/support.h"
 
@@ -277,7 +278,7 @@ TEST_CASE("bodies anywhere, of any size, on any way, collide or do not") {
         const Placed a = placed(), b = placed();
         contacts.clear();
         ContactCache near;
-        const ContactOptions options{.margin = i % 4 ? voxel : extreme.number(), .exact = i % 11 == 0};
+        const ContactOptions options = unfiltered(i % 4 ? voxel : extreme.number(), i % 11 == 0);
         collide(a, b, options, contacts, i % 2 ? &near : nullptr);
         collide(a, b, options, contacts, i % 2 ? &near : nullptr);
         // of the same two balls, contacts lie where they overlap
