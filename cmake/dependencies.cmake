@@ -16,12 +16,11 @@ foreach(component IN ITEMS sdf collider cl bullet fluid)
 endforeach()
 list(APPEND bilayer_components ${bilayer_wanted})  # unknown ones, for the message
 
+set(bilayer_shared ${BUILD_SHARED_LIBS})  # which packages of others set for everybody
 find_dependency(Threads)
 find_dependency(TBB CONFIG)
 find_dependency(glm)
-set(bilayer_shared ${BUILD_SHARED_LIBS})
 find_dependency(assimp)
-set(BUILD_SHARED_LIBS ${bilayer_shared})  # which assimp's package sets for everybody
 find_dependency(hwy)
 find_dependency(ZLIB)
 find_dependency(fmt)
@@ -36,6 +35,7 @@ foreach(prefix IN ITEMS /usr/lib/${CMAKE_LIBRARY_ARCHITECTURE} /usr/lib /usr/loc
 endforeach()
 find_dependency(OpenVDB)
 set(CMAKE_MODULE_PATH ${bilayer_module_path})
+set(BUILD_SHARED_LIBS ${bilayer_shared})
 
 if("cl" IN_LIST bilayer_components)
   find_dependency(OpenCL)

@@ -92,13 +92,13 @@ TEST_CASE("bodies that rest beside each other cost little, those that touch litt
         // the first step does not know how fast they are, the second makes the list
         for (int i = 0; i < 3; ++i) {
             contacts.clear();
-            report = collide(a, b, unfiltered(h), contacts, &near);
+            report = collide(a, b, test::unfiltered(h), contacts, &near);
         }
         return report.pointsTested;
     };
     const auto testedAnew = [&](const Placed& b) {
         std::vector<Contact> contacts;
-        return collide(a, b, unfiltered(h), contacts).pointsTested;
+        return collide(a, b, test::unfiltered(h), contacts).pointsTested;
     };
     std::vector<Contact> contacts;
     const Placed beside{brick(), {{-0.2f, 0, 0.375f}}}, touching{brick(), {{-0.2f, 0, 0.305f}}};

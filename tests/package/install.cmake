@@ -6,6 +6,13 @@ foreach(path IN ITEMS bin/bilayer include/bilayer/sdf/build.h include/bilayer/in
     message(FATAL_ERROR "not installed: ${path}")
   endif()
 endforeach()
+# static libraries unless shared ones are asked for
+file(GLOB libraries RELATIVE ${prefix} ${prefix}/lib/libbilayer_*)
+foreach(library IN LISTS libraries)
+  if(NOT library MATCHES "\\.a$")
+    message(FATAL_ERROR "installed, but no static library: ${library}")
+  endif()
+endforeach()
 # nothing but public headers: what stands directly in a library's folder, under the name of the project
 file(GLOB_RECURSE installed RELATIVE ${prefix}/include ${prefix}/include/*)
 foreach(header IN LISTS installed)
