@@ -40,7 +40,7 @@ inline std::string wrapped(const std::string& text, std::size_t width = 128) {
     return result;
 }
 
-/// `count` significant digits, but no more decimals than there are digits before the point.
+/// `count` significant digits; all digits before the point.
 inline std::string digits(double value, int count = 3) {
     if (value == 0 || !std::isfinite(value)) return fmt::format("{}", value);
     const int before = int(std::floor(std::log10(std::abs(value)))) + 1;

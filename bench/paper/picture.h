@@ -36,7 +36,8 @@ Picture picture(const Mesh& mesh, const View& view);
 /// Arranges pictures of equal size in rows, with a gap between them.
 Picture mosaic(const std::vector<Picture>& pictures, int columns);
 
-/// Writes a JPEG at full quality. Throws std::runtime_error with the file name if it cannot be written.
+/// Writes a JPEG of the highest quality within the size limit. Throws std::runtime_error with the file name if it
+/// cannot be written.
 void writeJpeg(const std::filesystem::path& path, const Picture& picture, std::size_t maxBytes = 245'000);
 
 }  // namespace bilayer::paper

@@ -69,7 +69,7 @@ struct Nearest : btCollisionWorld::ContactResultCallback {
     float distance = std::numeric_limits<float>::max();
 };
 
-/// Speed limit of residual drift of a resting body: linear [m/s] and angular [1/s] combined.
+/// Linear [m/s] plus angular [1/s] speed: the measure of residual drift of resting bodies.
 float motion(const btRigidBody& body);
 
 /// A groove along y with two slopes, made of squares of two triangles each.
