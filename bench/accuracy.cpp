@@ -36,8 +36,8 @@ struct Case {
     std::string name() const { return fmt::format("{:g}, {:g}/{:g}", resolution, band.exterior, band.interior); }
 };
 
-// covers all resolutions and widths for which exactness is guaranteed; every resolution is combined with every width at
-// least over the many shapes of the corpus
+// spans all resolutions and widths for which exactness is guaranteed; the many shapes of the corpus vary their
+// combinations
 const std::vector<Case> defaultCases = {{32, {3, 3}, false},    {60, {5, 2}, false},  {128, {3, 3}, true},
                                         {128, {10, 10}, false}, {251, {1, 1}, false}, {400, {1, 4}, false},
                                         {700, {3, 3}, false}};

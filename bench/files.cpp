@@ -213,7 +213,7 @@ double medianOf(const Contest& c, const std::string& way) {
     return found == c.seconds.end() ? std::nan("") : median(found->second);
 }
 
-/// Geometric means over all meshes and formats.
+/// Ratios over all meshes and formats, to be averaged.
 struct Means {
     std::vector<double> vdbTool, assimpVdb;
     std::map<std::string, std::vector<double>> reading;  // by format
