@@ -113,7 +113,7 @@ TEST_CASE("What lies on a face meets it along its normal, however near it is") {
         const glm::vec3 &p = faces.points[t.x], &q = faces.points[t.y], &r = faces.points[t.z];
         const auto u = float(random(0.1, 0.5)), v = float(random(0.1, 0.4));
         const glm::vec3 square = glm::cross(q - p, r - p);
-        if (glm::length(square) < 1e-3f) continue;  // the direction has too few digits
+        if (glm::length(square) < 1e-3f) continue;  // too small: rounding dominates the direction
         const glm::vec3 place = p + u * (q - p) + v * (r - p);
         check(ofPoints, place, std::copysign(1.f, glm::dot(square, place)) * glm::normalize(square));
     }

@@ -47,8 +47,7 @@ BuildOptions optionsFor(const Mesh& mesh, float resolution, Method method = Meth
 class NearTriangles {
   public:
     virtual ~NearTriangles() = default;
-    /// @param inside  the side of the voxel
-    /// @return the distance to the triangle
+    /// @param inside  the side of the surface on which the voxel lies
     virtual double distance(std::int32_t triangle, const openvdb::Coord& voxel, bool inside) const = 0;  // [voxels]
 };
 

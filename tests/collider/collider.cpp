@@ -301,7 +301,7 @@ TEST_CASE("contacts that look along the surface of their point are left out wher
     CAPTURE(seed);
     Random random(seed);
     std::size_t all = 0, kept = 0, back = 0, aslant = 0;
-    const float apart = GENERATE(-2.f, 0.9f);  // count of points of faces without contact yet
+    const float apart = GENERATE(-2.f, 0.9f);  // minimum normal cosine of face points that are not yet in contact
     for (const auto& [a, b] : touchingPairs(random)) {
         std::vector<Contact> expected, found;
         const auto opposes = [&, &a = a, &b = b](const Contact& contact) {

@@ -150,7 +150,7 @@ TEST_CASE("whatever an entry of a file holds, it is refused or the file is as go
         int refused = 0, accepted = 0;
         const openvdb::FloatGrid& grid = *field.grids().distance;
         for (auto entry = grid.beginMeta(); entry != grid.endMeta(); ++entry) {
-            // OpenVDB writes and reads the rest for itself; names are reported
+            // skips the entries that OpenVDB writes and reads itself; the name of the entry is reported
             if (!entry->first.starts_with("bilayer:")) continue;
             if (!withMesh && entry->first != metadata::interiorWidth) continue;
             for (const Metadata::Ptr& changed : changedEntries(*entry->second)) {

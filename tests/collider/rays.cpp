@@ -296,7 +296,7 @@ TEST_CASE("without the mesh no chord is too short for a ray") {
     const Field field(levelSetOf(sphereSolid(0.4), h), options);
     int shortOnes = 0, misses = 0;
     for (int i = 0; i < 1000; ++i) {
-        // past the surface, minus 1e-4 voxels
+        // grazes the surface, to within 1e-4 voxels
         const glm::dvec3 out(random.direction());
         const glm::dvec3 along = glm::normalize(glm::cross(out, glm::dvec3(random.direction())));
         Ray ray{glm::vec3(0.4 * out - 0.2 * along), glm::vec3(along), 1};
