@@ -362,7 +362,8 @@ TEST_CASE("pseudonormal: the automatic choice is that of the exact method, whate
         for (glm::vec3& p : mesh.points) p += noise * (glm::vec3(unit(random), unit(random), unit(random)) - 0.5f);
         meshes.push_back(mesh);
     }
-    // a few of its triangles intersect others by rounding: at 16.1944 voxels the closest features of a leaf are wrong
+    // a few of its triangles intersect others by rounding: at 16.1944 voxels the closest features of a leaf give wrong
+    // signs
     if (const auto path = test::corpusMesh("../cases/sliver110.obj")) meshes.insert(meshes.end(), 6, readMesh(*path));
     for (std::size_t i = 0; i < meshes.size(); ++i) {
         Mesh& mesh = meshes[i];
