@@ -224,9 +224,9 @@ constexpr float wholeCube = 5;  // half width that trims no node of a cube of 5^
 // Blocks round halves up from slightly below. Samples this close to that threshold may round either way.
 constexpr float halvesUp = 0.5001f, halfError = 5e-5f;
 constexpr float tieWidth = 0.02f;  // on both sides of zero [steps]
-constexpr double rounding = 1e-3;  // that floats may differ by, on a grid of hundreds of steps [steps]
+constexpr double rounding = 1e-3;  // tolerance of floats on a grid of hundreds of steps [steps]
 
-// tolerance of floats on a grid of hundreds of steps [steps]
+// Value of a node: a distance [steps], or only a side where the distance is unknown.
 struct Node {
     bool known;
     double phi;
@@ -383,7 +383,7 @@ json measureK(const Run& run) {
                         {"missing", missing},
                         {"reached", reachedNodes}});
     }
-    // Value of a node: a distance [steps], or only a side where the distance is unknown.
+    // the time independent of K: both grids are written and read once more
     const Stopwatch watch;
     const DenseField nothing = denseDoubleLayer({{{0, 0, 0}}, {{0, 0, 0}}}, lattice);
     return {{"rows", rows}, {"empty", watch.seconds()}};

@@ -27,7 +27,7 @@ class World {
     explicit World(PointSampler sampler = {});
     ~World();
 
-    /// mass 0: static. The shape must outlive the world.
+    /// Mass 0: static. The shape must outlive the world.
     btRigidBody* add(btCollisionShape& shape, float mass, const btVector3& position,
                      const btQuaternion& rotation = btQuaternion::getIdentity());
     /// Steps of 1/240 s.

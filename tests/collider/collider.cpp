@@ -379,7 +379,7 @@ TEST_CASE("beyond the band, edges are as far apart as those of the triangles, an
     const Mesh mesh = shapes::box({0.3f, 0.2f, 0.1f});
     const Collider brick(mesh, build(mesh, {.voxelSize = h}), {.accuracy = measure});
     const float half = std::sqrt(0.5f), aside = half * gap, quarter = glm::pi<float>() / 4;
-    // an edge beside and above another one, or above and across it
+    // an edge next to and above another one, or above and across it
     Pose upper{{0.6f + aside, 0.01f, 0.2f + aside}}, lower;
     glm::vec3 across(half, 0, half);
     if (crosses) {

@@ -42,7 +42,7 @@ Mesh turnedOver(Mesh mesh) {
     return mesh;
 }
 
-// With their tips, ridges and mouths upward.
+// With tips, ridges and openings upward.
 std::vector<Mesh> degenerates() {
     const Mesh spike = shapes::cone(half / 2, 2 * half, 4);
     const Mesh wedge = extruded({{-half / 2, -half}, {half / 2, -half}, {0, half}}, {0, -half / 2});
