@@ -30,8 +30,7 @@ namespace {
 
 constexpr float knotSize = 0.2f;   // [m]
 constexpr float room = 1;          // between bodies at the start [diagonal of their box]
-constexpr int smallestHeap = 20;   // bodies for a pen of two by two knots; the edge of a pen grows with the count of
-                                   // bodies
+constexpr int smallestHeap = 20;   // bodies for a pen of two by two knots; its edge grows with the count
 constexpr float wall = 0.1f;       // half of a wall's thickness [knots]
 constexpr float penHeight = 5;     // [knots], for each knot along the floor
 constexpr double measured = 0.02;  // distance of the points at which penetration is measured [size of a body]

@@ -24,8 +24,7 @@ namespace {
 constexpr float gravity = 9.81f;  // [m/s^2]
 constexpr float friction = 0.5f;
 constexpr float restingSpeed = 0.1f, restingSpin = 1;  // thresholds below which bodies could sleep [m/s, rad/s]
-constexpr float splitAt = 0.01f;  // penetration depth from which Bullet corrects positions separately [fraction of a
-                                  // body's size]
+constexpr float splitAt = 0.01f;  // Bullet splits off deeper penetration [fraction of a body's size]
 
 btTransform toTransform(const Pose& pose) {
     const auto& [p, q] = pose;

@@ -41,8 +41,7 @@ struct HeapOptions {
 struct HeapRun {
     std::vector<double> stepMs;         ///< time of each step [ms]
     std::vector<double> kineticEnergy;  ///< after each step [J]
-    std::vector<double> penetrations;   ///< penetration depths of overlapping pairs by the meshes, in the measured
-                                        ///< frames [m]
+    std::vector<double> penetrations;   ///< overlapping pairs in the measured frames, by the meshes [m]
     int restless = 0;                   ///< bodies at the end that are too fast to fall asleep
     double simulated = 0;               ///< [s]
 };

@@ -32,10 +32,8 @@ using namespace bilayer::bench;
 
 namespace {
 
-constexpr double differenceStep = 1e-5;  // [voxels]; keeps half of the digits of double precision, far below the
-                                         // measured errors
-constexpr double steepest = 0.999;       // gradients of distances have length 1, except where the closest point is not
-                                         // unique
+constexpr double differenceStep = 1e-5;  // [voxels]; keeps half the digits of doubles, far below the errors
+constexpr double steepest = 0.999;       // gradients of distances have length 1 if the closest point is unique
 constexpr double percentile = 0.99;
 
 struct Options {

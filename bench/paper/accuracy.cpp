@@ -63,7 +63,7 @@ Errors errors(const LevelSet& field, const DenseField& truth) {
     return result;
 }
 
-// Beyond any node of a cube of (2K + 1)^3 nodes around a sample: they are nearer than this to the surface.
+// Every node of a cube of (2K + 1)^3 nodes around a sample is nearer than this to the surface.
 constexpr float reached = 6.1f;
 constexpr float papersBand = 2;  // "about 2 Delta away from the triangle mesh" (section 5.2)
 constexpr float noLimit = 1e9f;
@@ -211,12 +211,12 @@ std::string textTable1(const json& data) {
 
 // Differences between the fields of the serial program and of the block-wise method.
 struct Apart {
-    double worst = 0;             // of nodes without another reason to differ [steps]
+    double worst = 0;             // maximum difference of nodes that count as equal [steps]
     std::uint64_t reached = 0;    // nodes
     std::uint64_t halfWay = 0;    // that depend on how a sample half-way between two nodes is rounded
     std::uint64_t ties = 0;       // with equally near layers and opposite signs
     std::uint64_t different = 0;  // without such a reason
-    std::uint64_t far = 0, farWrong = 0, farWrongBlocks = 0;  // without a distance in either field, and of these on the
+    std::uint64_t far = 0, farWrong = 0, farWrongBlocks = 0;  // without a distance in either field; of these on the
                                                               // wrong side
 };
 

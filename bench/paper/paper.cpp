@@ -150,9 +150,7 @@ Result read(const Part& part, const fs::path& store) {
         json kept = json::parse(file);
         for (const char* key : {"when", "seconds", "rounds", "machine", "data"}) kept.at(key);
         sentence(kept["machine"]);
-        if (!kept["data"].contains("skipped"))
-            part.text(kept["data"]);  // throws if numbers are missing or of another
-                                      // kind
+        if (!kept["data"].contains("skipped")) part.text(kept["data"]);  // throws if numbers are missing or invalid
         return {part, kept, ""};
     } catch (const json::exception& error) {
         fmt::print(stderr, "{}: {}\n", path.string(), error.what());

@@ -68,8 +68,7 @@ Path randomPath(Random& random, const Bounds& box) {
 std::string faultOf(const MeshTree& tree, const Path& path) {
     const double voxel = tree.voxelSize(), near = 2e-5 * voxel, exact = 1e-6 * voxel;
     const auto hit = firstHit(tree, path);
-    double surely = infinity, maybe = infinity;  // the first triangle that is hit well within its borders, or within
-                                                 // the tolerance of them
+    double surely = infinity, maybe = infinity;  // first triangle that is hit well inside, or near its border
     for (std::uint32_t i = 0; i < tree.mesh().triangles.size(); ++i) {
         const auto [along, margin] = crossing(path, cornersOf(tree.mesh(), i));
         if (along < -near || along > path.length + near) continue;

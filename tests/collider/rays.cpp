@@ -103,7 +103,7 @@ TEST_CASE("with the mesh, rays meet its surface, and nothing before it") {
             if (bool(expected) != bool(hit)) return fail(expected ? "missed" : "met nothing");
             if (!hit) return;
             ++met;
-            // grazing angles blur the end of the truth
+            // at grazing angles the end of the reference is inexact
             const double off = std::abs(double(hit->distance) - *expected);
             if (exact.truth.distance(glm::dvec3(hit->position)) > 0.1 * room + 1e-6 * scale) fail("not on the surface");
             if (glm::distance(from + double(hit->distance) * along, glm::dvec3(hit->position)) > room + 1e-6 * scale)

@@ -41,8 +41,7 @@ TEST_CASE("what planes cut off is exact") {
     const auto volume = solid.openVolume->getConstAccessor();
     const auto faces = solid.openFaces->getConstAccessor();
     CHECK(volume.getValue(Coord(0)) == 0);
-    CHECK(volume.getValue(Coord(2, 0, 0)) == Approx(0.2f).margin(1e-4));  // the cell is from 1.5 to 2.5, solid up to
-                                                                          // 2.3
+    CHECK(volume.getValue(Coord(2, 0, 0)) == Approx(0.2f).margin(1e-4));  // the cell: 1.5 to 2.5, solid up to 2.3
     CHECK(volume.getValue(Coord(0, -2, 0)) == Approx(0.9f).margin(1e-4));
     CHECK(volume.getValue(Coord(0, 0, 3)) == Approx(0.4f).margin(1e-4));
     CHECK(volume.getValue(Coord(0, 0, 4)) == 1);

@@ -120,8 +120,7 @@ TEST_CASE("a mesh seeds its exact distances, stretched and turned as it may be")
     const Mesh mesh = shapes::torus(0.5f, 0.2f, 60, 30);
     const fluid::Placement placement(poseOf(0.8f), {1.3f, 0.6f, 0.9f});
     const auto liquid = emptyLiquid(0.03f, 4);
-    liquid->transform().postTranslate({0.007, 0.011, 0.013});  // the offset from the origin is not a whole number of
-                                                               // voxels
+    liquid->transform().postTranslate({0.007, 0.011, 0.013});  // off the origin by fractions of a voxel
     fluid::seed(*liquid, mesh, placement);
     requireLevelSet(*liquid);
     Mesh placed = mesh;

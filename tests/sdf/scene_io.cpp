@@ -109,8 +109,7 @@ TEST_CASE("an importer that takes too long, too much, or crashes is an error tha
     CHECK_THROWS_WITH(readScene(path, {0ms, std::size_t(1) << 30}),
                       Catch::Contains("slow.gltf: the importer for GLTF files took longer than 0 s; convert it to "
                                       "OBJ, PLY or STL"));
-#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)  // sanitizers terminate a process that requests too
-                                                                     // much memory
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)  // sanitizers end a process that requests too much
     gltf.file["accessors"][0]["count"] = std::uint64_t(1) << 40;
     gltf.file["accessors"][0].erase("bufferView");
     gltf.file["accessors"][0]["sparse"] = {

@@ -9,7 +9,7 @@
 
 namespace bilayer::test {
 
-/// A solid: its signed distance [m], and centre and half size of a box around it.
+/// A solid: its signed distance [m], and the half size of a box around it, about `centre`.
 struct Solid {
     std::function<double(const glm::dvec3&)> distance;
     glm::dvec3 halfSize;

@@ -27,8 +27,7 @@ static_assert(sizeof(Tile) == 64, "one cache line, and the layout of the OpenCL 
 struct Tiles {
     std::span<const Tile> tiles;
     std::span<const std::int32_t> triangles;  ///< the triangle of each tile
-    glm::ivec3 lower{0}, upper{0};            ///< bounds of the voxels around all samples, both inclusive [index
-                                              ///< coordinates]
+    glm::ivec3 lower{0}, upper{0};            ///< voxels around all samples, both inclusive [index coordinates]
 
     /// Storage of the spans: arrays that are not cleared before they are written.
     std::unique_ptr<Tile[]> tileMemory;

@@ -9,8 +9,7 @@
 namespace bilayer::test {
 namespace {
 
-constexpr std::uint32_t leafTriangles = 4;  // triangles per leaf: fewer cost more boxes, more cost more triangles; the
-                                            // optimum is flat
+constexpr std::uint32_t leafTriangles = 4;  // fewer cost more boxes, more cost more triangles; flat optimum
 // Relative error bounds of 2x2 and 3x3 determinants of differences, times the sum of their products' magnitudes: J. R.
 // Shewchuk, "Adaptive Precision Floating-Point Arithmetic and Fast Robust Geometric Predicates", 1997, figs. 21 and 22,
 // rounded up.
