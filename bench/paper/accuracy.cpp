@@ -216,8 +216,8 @@ struct Apart {
     std::uint64_t halfWay = 0;    // that depend on how a sample half-way between two nodes is rounded
     std::uint64_t ties = 0;       // with equally near layers and opposite signs
     std::uint64_t different = 0;  // without such a reason
-    std::uint64_t far = 0, farWrong = 0, farWrongBlocks = 0;  // without a distance in either field; of these on the
-                                                              // wrong side
+    std::uint64_t far = 0, farWrong = 0, farWrongBlocks = 0;  // without a distance in either field, and on the wrong
+                                                              // side
 };
 
 constexpr float wholeCube = 5;  // half width that trims no node of a cube of 5^3 around a sample [steps]

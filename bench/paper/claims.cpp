@@ -46,8 +46,7 @@ json measureTheorems(const Run&) {
 constexpr double rounding = 1e-6;
 
 std::string remarkTheorem1(const json& data) {
-    double over = 0, flat = 0, convex = 0, convexDelta = 0;  // maximum; `flat`, `convex`: "under" at faces, convex
-                                                             // edges
+    double over = 0, flat = 0, convex = 0, convexDelta = 0;  // `flat` and `convex`: maximum "under"
     for (const char* which : {"triangles", "reflex", "blunt", "square", "sharp"})
         over = std::max(over, double(data[which]["over"]));
     for (const char* which : {"edges", "triangles", "reflex"}) flat = std::max(flat, double(data[which]["under"]));

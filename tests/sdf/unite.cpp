@@ -289,9 +289,7 @@ TEST_CASE("the union of balls is that of their formula but for what their facets
         const glm::vec3 c2(0.45f + anywhere(random), anywhere(random), anywhere(random));
         const UnionSurface united =
             unite(shapes::join({shapes::sphere(r1, 5), shapes::moved(shapes::sphere(r2, 5), c2)}));
-        if (std::abs(r1 - r2) > 0.8f * glm::length(c2))
-            continue;  // the circle where they meet would be
-                       // ill-conditioned
+        if (std::abs(r1 - r2) > 0.8f * glm::length(c2)) continue;  // ill-conditioned circle
         CHECK(united.buriedTriangles > 100);
         CHECK(united.cutTriangles > 50);
         const test::Truth truth(united.mesh);
