@@ -1,6 +1,6 @@
-// How exact the builders are, side by side: fields of all closed, oriented public meshes without self-intersection,
-// judged at hundreds of thousands of voxels each against distances in double precision and winding numbers that share
-// no code with the library. Exit status 1 where the method under test is not exact.
+// Compares the accuracy of the builders. The fields are of all closed, oriented public meshes without
+// self-intersection. Hundreds of thousands of voxels each are compared with distances in double precision and winding
+// numbers that share no code with the library. Exit status 1 if the method under test is not exact.
 #include <fmt/format.h>
 #include <openvdb/tools/MeshToVolume.h>
 
@@ -27,7 +27,7 @@ using namespace bilayer;
 
 namespace {
 
-/// A voxel grid to ask for, and whether the peers are asked too.
+/// A voxel grid to build, and whether the peers build it too.
 struct Case {
     float resolution;  // voxels along the longest side
     test::Band band;
@@ -36,7 +36,8 @@ struct Case {
     std::string name() const { return fmt::format("{:g}, {:g}/{:g}", resolution, band.exterior, band.interior); }
 };
 
-// all resolutions and widths that exactness is promised for, each with each at least over the corpus's many shapes
+// spans all resolutions and widths for which exactness is guaranteed; the many shapes of the corpus vary their
+// combinations
 const std::vector<Case> defaultCases = {{32, {3, 3}, false},    {60, {5, 2}, false},  {128, {3, 3}, true},
                                         {128, {10, 10}, false}, {251, {1, 1}, false}, {400, {1, 4}, false},
                                         {700, {3, 3}, false}};
@@ -47,7 +48,7 @@ struct Builder {
     std::function<openvdb::FloatGrid::ConstPtr(const Mesh&, float voxelSize, const test::Band&)> grid;
 };
 
-/// What one builder did to one mesh in one case.
+/// Result of one builder for one mesh in one case.
 struct Row {
     std::string mesh, grid, builder;
     std::size_t triangles;
@@ -89,7 +90,7 @@ Builder openvdbs(const std::string& name, int flags) {
             }};
 }
 
-// The method under test first: voxels are chosen by its field.
+// The method under test comes first: its field determines the voxels.
 std::vector<Builder> allBuilders(const std::string& method) {
     std::vector<Builder> builders = {ours(method)};
     builders.push_back(openvdbs("meshToVolume 0x4", openvdb::tools::DISABLE_RENORMALIZATION));
@@ -150,7 +151,7 @@ std::string totalsTable(const std::vector<Row>& sums) {
     return text;
 }
 
-// The builders beside each other, a line a mesh, for the cases that all of them met.
+// Compares the builders, a row per mesh, in the cases that all of them ran.
 std::string meshTable(const std::vector<Row>& rows, const std::vector<Builder>& builders) {
     std::string text = "| mesh | triangles | voxels, band |", rule = "|---|---|---|";
     for (const Builder& builder : builders) {
@@ -159,7 +160,7 @@ std::string meshTable(const std::vector<Row>& rows, const std::vector<Builder>& 
     }
     text += "\n" + rule + "\n";
     for (std::size_t i = 0; i + builders.size() <= rows.size(); ++i) {
-        // a case that all met stands in the rows as one run of builders
+        // a case that all builders ran is one contiguous run of rows
         const Row &first = rows[i], &last = rows[i + builders.size() - 1];
         if (first.builder != builders.front().name || last.mesh != first.mesh || last.grid != first.grid) continue;
         text += fmt::format("| {} | {} | {} |", first.mesh, first.triangles, first.grid);

@@ -16,14 +16,14 @@
 namespace bilayer::bench {
 namespace {
 
-constexpr std::size_t streamedBytes = std::size_t(1) << 29;  // beyond any cache
+constexpr std::size_t streamedBytes = std::size_t(1) << 29;  // larger than any cache
 constexpr std::size_t largePage = std::size_t(1) << 21;      // [bytes]
-constexpr std::size_t randomReads = std::size_t(1) << 22;    // by each thread
+constexpr std::size_t randomReads = std::size_t(1) << 22;    // per thread
 constexpr int rounds = 5;
 
 volatile std::uint64_t sink;
 
-// Memory that is there, in large pages where the machine grants them.
+// Allocates memory and writes to all of it, in large pages if the machine grants them.
 std::unique_ptr<std::uint64_t[], decltype(&std::free)> pages(std::size_t bytes) {
     const std::size_t whole = (bytes + largePage - 1) / largePage * largePage;
     void* const memory = std::aligned_alloc(largePage, whole);
@@ -33,7 +33,7 @@ std::unique_ptr<std::uint64_t[], decltype(&std::free)> pages(std::size_t bytes) 
     return {static_cast<std::uint64_t*>(memory), &std::free};
 }
 
-// How often a second `work` is done, by the median of some rounds.
+// Rate of `work` per second: the median of some rounds.
 template <class Work>
 double rate(double amount, int threads, const Work& work) {
     std::vector<double> rates;
@@ -45,7 +45,7 @@ double rate(double amount, int threads, const Work& work) {
     return median(rates);
 }
 
-// A good mix of the bits of i, by which no prefetcher sees a stride (the finaliser of splitmix64, Steele et al. 2014).
+// Mixes the bits of i well, so that no prefetcher detects a stride (the finaliser of splitmix64, Steele et al. 2014).
 std::uint64_t scattered(std::uint64_t i) {
     i = (i ^ (i >> 30)) * 0xbf58476d1ce4e5b9u;
     i = (i ^ (i >> 27)) * 0x94d049bb133111ebu;
@@ -71,7 +71,7 @@ double randomLines(std::size_t bytes, int threads) {
     return rate(double(randomReads) * threads, threads, [&](int thread) {
         std::uint64_t sum = 0;
         for (std::size_t i = 0; i < randomReads; ++i) {
-            // the high half of a product spreads evenly over any number of lines, without a division
+            // the high half of the product is uniform over any count of lines, without a division
             const std::uint64_t place = (scattered(i + std::size_t(thread) * randomReads) >> 32) * lines >> 32;
             sum += buffer[place * (cacheLine / sizeof(std::uint64_t))];
         }

@@ -1,4 +1,4 @@
-// What the memory of this machine gives, and what samples ask of it: the floor under their time.
+// Memory bandwidth of this machine and the memory traffic of samples: the lower bound of their time.
 #pragma once
 
 #include <cstddef>
@@ -13,18 +13,18 @@ using namespace bilayer::detail;
 
 inline constexpr std::size_t cacheLine = 64;  // [bytes]
 
-/// Bytes a second that `threads` threads read together from memory, one after the other, far beyond the caches.
+/// Bytes per second that `threads` threads read together from a buffer far larger than the caches, in sequence.
 double streamBandwidth(int threads);
 
-/// Lines of 64 bytes a second that `threads` threads read together at random places of a buffer, many at once, from
-/// pages as large as the machine has them.
-/// @param bytes  of the buffer: what fits into a cache comes from there
+/// Cache lines of 64 bytes per second that `threads` threads read together at random places of a buffer. Each thread
+/// has many reads in flight. The buffer uses the largest pages that the machine grants.
+/// @param bytes  size of the buffer; a buffer that fits into a cache is read from there
 double randomLines(std::size_t bytes, int threads);
 
-/// Lines of memory that samples read of a field.
+/// Cache lines that samples of a field read.
 struct Touched {
-    double linesEach = 0;    ///< by one sample, in the mean
-    double linesShared = 0;  ///< by all of them together, each line once, for each sample
+    double linesEach = 0;    ///< per sample, on average
+    double linesShared = 0;  ///< distinct lines over all samples, per sample
 };
 Touched linesTouched(const FieldLayout& field, std::span<const glm::vec3> points);
 

@@ -1,6 +1,6 @@
-// The builders side by side: the same mesh, voxel size and band, in one run. Prints each builder's median time on each
-// number of threads, its ratio to openvdb::tools::meshToVolume with flag 0x4 (exact distances) at the same half width,
-// the memory that it takes at its peak, and what the whole comes to.
+// Compares the builders on the same mesh, voxel size and band, in one run. Prints each builder's median time on each
+// count of threads, its ratio to openvdb::tools::meshToVolume with flag 0x4 (exact distances) at the same half width,
+// its peak memory, and a summary.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -21,9 +21,9 @@ using namespace bilayer::bench;
 
 namespace {
 
-// What the summary is held against: times as fast as meshToVolume (0x4) on 2 threads, geometric mean over the cells.
+// Required speed-ups of the summary over meshToVolume (0x4) on 2 threads, geometric mean over the cells.
 constexpr double exactRequired = 15, doubleLayerRequired = 30;
-constexpr double cellRequired = 8;       // the same, of the slowest cell
+constexpr double cellRequired = 8;       // the same, for the slowest cell
 constexpr double speedUpRequired = 1.8;  // from 1 to 2 threads, geometric mean
 constexpr int comparedThreads = 2;
 
@@ -33,12 +33,12 @@ struct Options {
     std::vector<float> resolutions{128, 251, 715};
     std::vector<int> threads{1, comparedThreads};
     int repetitions = 9;
-    double seconds = 1.2;  // a builder takes no further turns in a scene once it has used up this time
+    double seconds = 1.2;  // a builder gets no further turns in a scene once it has used this time
     bool memory = true;
     std::string json;
 };
 
-// One builder in one scene: its times on each number of threads.
+// One builder in one scene: its times on each count of threads.
 struct Row {
     std::string mesh;
     float resolution;
@@ -58,7 +58,8 @@ struct Row {
     }
 };
 
-// Half width 3 for all that has it; 2, which the double layer method was made for, for it, its rival and its reference.
+// Half width 3 for all builders that support it. Half width 2 is the one that the double layer method was made for; it,
+// its rival and its reference use it.
 std::vector<float> halfWidths(Builder builder) {
     if (builder == Builder::reference || builder == Builder::doubleLayer) return {3, 2};
     if (builder == Builder::doubleLayerOpencl || builder == Builder::prism) return {2};
@@ -83,14 +84,14 @@ void measureMemory(const Source& source, std::vector<Row>& rows) {
             inChild([&] { return scene(source, row.resolution); }, {row.builder, row.halfWidth, comparedThreads});
 }
 
-// On one thread OpenVDB is asked for one thing only, what the speed-up from 1 to 2 threads needs: the rest would double
-// the minutes that it takes of the whole run.
+// On one thread OpenVDB runs only what the speed-up from 1 to 2 threads needs. The rest would double its share of the
+// run, which is minutes.
 bool wanted(const Row& row, int threads) {
     return threads > 1 ||
            (row.builder != Builder::defaults && !(row.builder == Builder::reference && row.halfWidth < 3));
 }
 
-// Builders take turns. What takes long is repeated less.
+// Builders take turns. Slow builds are repeated less.
 void measureTime(const Scene& scene, std::vector<Row>& rows, const Options& options) {
     for (int round = 0; round < options.repetitions; ++round)
         for (Row& row : rows)
@@ -106,7 +107,7 @@ void measureTime(const Scene& scene, std::vector<Row>& rows, const Options& opti
             }
 }
 
-// How many times as fast as the reference in the same scene, with the same half width and threads.
+// Speed-up over the reference in the same scene, with the same half width and threads.
 std::optional<double> ratio(const std::vector<Row>& rows, const Row& row, int threads) {
     for (const Row& other : rows)
         if (other.builder == Builder::reference && other.mesh == row.mesh && other.resolution == row.resolution &&
@@ -210,7 +211,7 @@ void writeJson(const std::string& path, const std::vector<Row>& rows) {
     if (!file.flush()) throw std::runtime_error("cannot write " + path);
 }
 
-// Memory comes first: a child can be forked only while this process has started no threads.
+// Memory comes first: a child can be forked only before this process starts threads.
 std::vector<Row> compare(const std::vector<Source>& meshes, const Options& options) {
     std::vector<std::vector<Row>> scenes;
     for (const Source& source : meshes)

@@ -21,16 +21,16 @@ namespace bilayer::bench {
 namespace {
 
 const Source carvedBox{"carved box", ""};
-const std::string unevenSphere = "uneven sphere ";  // and the deviation of its areas
+const std::string unevenSphere = "uneven sphere ";  // followed by the deviation of its areas
 
-// Zero for no number, and no sphere has that.
+// Returns zero if there is no number; no sphere has deviation zero.
 float deviationIn(const std::string& name) {
     float deviation = 0;
     std::istringstream text(name.substr(unevenSphere.size()));
     return text >> deviation && text.eof() ? deviation : 0;
 }
 
-// OpenVDB reads the mesh in place, in voxels: no copy that it would have to pay for.
+// Adapter by which OpenVDB reads the mesh in place, in voxels, without the cost of a copy.
 class InVoxels {
   public:
     explicit InVoxels(const Scene& scene) : mesh_(scene.mesh), perMetre_(1 / double(scene.voxelSize)) {}
@@ -192,7 +192,7 @@ LevelSet fieldOf(const Scene& scene, const Job& job) {
     options.voxelSize = scene.voxelSize;
     options.exteriorWidth = options.interiorWidth = job.halfWidth;
     options.method = methodOf(job.builder);
-    // the signs of the method itself: the automatic choice would take those of the exact one
+    // the method's own signs: the automatic choice would use those of the exact method
     if (options.method == Method::pseudonormal) options.sign = Sign::normals;
     options.threads = job.threads;
     if (!isOpencl(job.builder)) return build(scene.mesh, options);

@@ -1,6 +1,7 @@
-// The builders and the meshes that the benchmarks compare: ours and OpenVDB's, each asked for the same field.
+// The builders and the meshes that the benchmarks compare: this project's and OpenVDB's builders, asked for the same
+// field.
 //
-// Reading a mesh is never timed. Neither is freeing a field.
+// Timings exclude reading the mesh and freeing the field.
 #pragma once
 
 #include <cstdint>
@@ -12,23 +13,22 @@
 
 namespace bilayer::bench {
 
-/// A mesh by name. `file` is empty where it is made by formula.
+/// A mesh by name. `file` is empty for meshes made by formula.
 struct Source {
     std::string name, file;
 };
 
-/// Where the corpus lies; the environment variable BILAYER_MESHES names it where that is not where it was at compile
-/// time.
+/// The folder of the corpus. The environment variable BILAYER_MESHES overrides the path known at compile time.
 std::filesystem::path corpusFolder();
 
-/// The meshes of the comparison that are here: of the corpus those present, and the carved box.
+/// The available meshes of the comparison: those of the corpus that are present, and the carved box.
 std::vector<Source> sources();
 
-/// A source by its name above, a mesh file, or "uneven sphere D": the sphere of the paper's Table 5, whose triangles'
-/// areas deviate by D. Throws std::invalid_argument for none of them.
+/// Finds a source by its name above, a mesh file, or "uneven sphere D": the sphere of the paper's Table 5, whose
+/// triangle areas have the deviation D. Throws std::invalid_argument for anything else.
 Source findSource(const std::string& nameOrFile);
 
-/// What is built: a mesh at a voxel size.
+/// Input of a build: a mesh and a voxel size.
 struct Scene {
     std::string name;
     float resolution = 0;  ///< voxels along the longest side
@@ -36,13 +36,13 @@ struct Scene {
     float voxelSize = 0;  ///< [m]
 };
 
-/// Reads or makes the mesh.
+/// Reads or generates the mesh.
 Scene scene(const Source& source, float resolution);
 Scene scene(const std::string& name, Mesh mesh, float resolution);
 
 enum class Builder {
     reference,  ///< openvdb::tools::meshToVolume with flag 0x4, DISABLE_RENORMALIZATION: its exact distances
-    defaults,   ///< openvdb::tools::meshToVolume as it is called without flags
+    defaults,   ///< openvdb::tools::meshToVolume without flags
     pseudonormal,
     exact,
     doubleLayer,
@@ -51,7 +51,7 @@ enum class Builder {
     prism,  ///< on OpenCL only
 };
 
-/// Every builder, in the order of the tables.
+/// All builders, in the order of the tables.
 const std::vector<Builder>& builders();
 
 /// "meshToVolume-0x4", "meshToVolume", "pseudonormal", "exact", "double-layer", "exact-opencl", "double-layer-opencl",
@@ -60,25 +60,26 @@ const char* nameOf(Builder builder);
 /// Throws std::invalid_argument for an unknown name.
 Builder builderNamed(const std::string& name);
 
-/// How a scene is built.
+/// Parameters of a build.
 struct Job {
     Builder builder = Builder::exact;
     float halfWidth = 3;  ///< on both sides [voxels]
     int threads = 2;
-    const BlockFiller* filler = nullptr;  ///< of the builders on OpenCL; null: the first device
+    const BlockFiller* filler = nullptr;  ///< for the builders on OpenCL; null: the first device
 };
 
-/// What a build took and gave.
+/// Cost and result of a build.
 struct Outcome {
-    double seconds = 0;  ///< mesh in memory to grid in memory
+    double seconds = 0;  ///< from mesh in memory to grid in memory
     std::uint64_t activeVoxels = 0;
     std::uint64_t bytes = 0;  ///< of the grid
 };
 
-/// Builds once. Throws what the builder throws.
+/// Builds once. Rethrows exceptions of the builder.
 Outcome run(const Scene& scene, const Job& job);
 
-/// Builds once and gives the field. Throws what the builder throws, and std::invalid_argument for OpenVDB's builders.
+/// Builds once and returns the field. Rethrows exceptions of the builder. Throws std::invalid_argument for OpenVDB's
+/// builders.
 LevelSet fieldOf(const Scene& scene, const Job& job);
 
 }  // namespace bilayer::bench

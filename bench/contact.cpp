@@ -1,4 +1,4 @@
-// Heaps of bodies in Bullet: fields beside what its users take instead, by speed, penetration and rest.
+// Piles of bodies in Bullet: compares fields with the alternatives of its users, by speed, penetration and rest.
 #include <BulletCollision/CollisionShapes/btBoxShape.h>
 #include <fmt/format.h>
 #include <oneapi/tbb/global_control.h>
@@ -29,11 +29,11 @@ using demo::writeSvg;
 namespace {
 
 constexpr float knotSize = 0.2f;   // [m]
-constexpr float room = 1;          // between bodies at the start [the diagonal of their box]
-constexpr int smallestHeap = 20;   // bodies for a pen of two knots by two; a larger one grows with its edge
+constexpr float room = 1;          // between bodies at the start [diagonal of their box]
+constexpr int smallestHeap = 20;   // bodies for a pen of two by two knots; its edge grows with the count
 constexpr float wall = 0.1f;       // half of a wall's thickness [knots]
-constexpr float penHeight = 5;     // [knots], for each along the floor
-constexpr double measured = 0.02;  // between points that penetration is measured at [size of a body]
+constexpr float penHeight = 5;     // [knots], for each knot along the floor
+constexpr double measured = 0.02;  // distance of the points at which penetration is measured [size of a body]
 constexpr float bowlRadius = 0.5f, bowlWall = 0.05f;  // [m]
 constexpr float bowlVoxels = 128, boxEdge = 0.1f;     // along the bowl; [m]
 constexpr int bowlCells = 32, boxesInBowl = 60;
@@ -50,7 +50,7 @@ struct Options {
     bool onDevice = false;
 };
 
-// About its centre of mass and along its principal axes, as Bullet wants bodies.
+// With its centre of mass at the origin and its principal axes along x, y and z, as Bullet requires.
 Mesh centred(Mesh mesh, float size) {
     const float scale = size / bounds(mesh).longestSide();
     for (glm::vec3& p : mesh.points) p *= scale;
@@ -69,7 +69,7 @@ glm::quat anyRotation(std::mt19937& random) {
     return glm::normalize(glm::quat(w, x, y, z));
 }
 
-// Layers of `along` by `along` bodies, each of them turned at random.
+// Adds layers of `along` by `along` bodies, each with a random rotation.
 void addLayers(std::vector<Member>& members, const Form& form, float mass, int bodies, int along, float lowest) {
     std::mt19937 random(7);
     const float step = room * glm::length(form.box.size());
@@ -81,7 +81,7 @@ void addLayers(std::vector<Member>& members, const Form& form, float mass, int b
     }
 }
 
-// A box that Bullet and the measuring agree on.
+// A box as Bullet's shape and as a mesh for measuring.
 struct BoxForm {
     explicit BoxForm(const glm::vec3& halfExtents)
         : shape(btVector3(halfExtents.x, halfExtents.y, halfExtents.z)),
@@ -115,7 +115,7 @@ class Knots {
     std::vector<std::unique_ptr<BoxForm>> walls_;
 };
 
-// Bullet's boxes in a bowl that does not move.
+// Bullet's boxes in a static bowl.
 class Boxes {
   public:
     Boxes(const Mesh& bowl, Rival& rival)
@@ -130,7 +130,7 @@ class Boxes {
     BoxForm box_;
 };
 
-// A line of a table.
+// A row of a table.
 struct Row {
     std::string name;
     double made;  // [s]
@@ -205,7 +205,7 @@ std::vector<Row> compareBoxes(const Options& options) {
 }
 
 struct Growth {
-    Line bodies{"bilayer", {}, {}}, voxels{"bilayer", {}, {}};  // milliseconds a step
+    Line bodies{"bilayer", {}, {}}, voxels{"bilayer", {}, {}};  // milliseconds per step
 };
 
 Growth grow(const Options& options) {
@@ -237,7 +237,7 @@ Growth grow(const Options& options) {
     return growth;
 }
 
-// Where the device finds the contacts: the bodies move by the same bits, so that the steps are the same ones.
+// Contact search on the device. The motion of the bodies is bitwise the same, so the steps are comparable.
 void compareDevice(const Options& options) {
     const Mesh mesh = knot();
     HeapOptions heap = options.heap;
@@ -256,7 +256,7 @@ void compareDevice(const Options& options) {
         const Row ours = playKnots(*processor, mesh, bodies, heap);
         times = {};
         const Row theirs = playKnots(*sampled, mesh, bodies, heap);
-        // whose patience ends first has fewer steps
+        // a run that reaches its time limit has fewer steps
         const auto steps = std::min(ours.run.kineticEnergy.size(), theirs.run.kineticEnergy.size());
         const auto usual = [&](const Row& row) {
             const auto begin = row.run.stepMs.begin();
@@ -281,7 +281,7 @@ Line energyOf(const Row& row, double stepsPerSecond) {
     return line;
 }
 
-// How long a step takes: medians of a tenth of a second each.
+// Step time: medians of 0.1 s each.
 Line stepTimeOf(const Row& row, double stepsPerSecond) {
     Line line{row.name, {}, {}};
     const auto steps = std::max<std::ptrdiff_t>(1, std::ptrdiff_t(stepsPerSecond / 10));
@@ -298,7 +298,7 @@ Line stepTimeOf(const Row& row, double stepsPerSecond) {
 void draw(const std::string& file, const std::vector<Row>& knots, const Growth& growth, const Options& options) {
     std::vector<Line> steps, energies, depths;
     for (const Row& row : knots) {
-        if (row.name.ends_with(oneThread)) continue;  // energies and penetrations are the same bits
+        if (row.name.ends_with(oneThread)) continue;  // energies and penetrations are bitwise the same
         steps.push_back(stepTimeOf(row, double(options.heap.stepsPerSecond)));
         energies.push_back(energyOf(row, double(options.heap.stepsPerSecond)));
         Line depth{row.name, {}, {}};
@@ -308,7 +308,7 @@ void draw(const std::string& file, const std::vector<Row>& knots, const Growth& 
         }
         depths.push_back(depth);
     }
-    // last, so that what is of the same name has the same colour everywhere
+    // last, so that equal names have equal colours in all plots
     for (const Row& row : knots)
         if (row.name.ends_with(oneThread)) steps.push_back(stepTimeOf(row, double(options.heap.stepsPerSecond)));
     std::vector<double> bodies(options.growBodies.begin(), options.growBodies.end()),

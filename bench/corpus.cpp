@@ -1,5 +1,5 @@
-// Every mesh of the public corpus, clean or not, with signs found automatically: what inspect() says of it, how signs
-// were found and why, and what the field is worth. Exit status 1 where a build fails that should not.
+// Builds every mesh of the public corpus, clean or not, with automatic signs. Prints the result of inspect(), the sign
+// method and its reason, and the quality of the field. Exit status 1 if a build fails that should not.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -24,10 +24,10 @@ using namespace bilayer::detail;
 
 namespace {
 
-/// Two neighbours on different sides are no farther from the surface than a voxel together if it runs between them;
-/// a little more, for the rounding of distances [voxels].
+/// If the surface passes between two neighbours of different sides, their distances sum to at most one voxel. The slack
+/// covers rounding of distances [voxels].
 constexpr float borderSlack = 1.001f;
-/// Pixels of a slice beside the mesh [voxels].
+/// Border of a slice around the mesh [voxels].
 constexpr int sliceMargin = 5;
 
 struct Options {
@@ -38,17 +38,17 @@ struct Options {
     float at = 0.5f;
 };
 
-/// What became of a mesh.
+/// Result for a mesh.
 struct Row {
-    std::string mesh, error;  // error: why there is no field
+    std::string mesh, error;  // error: the reason why there is no field
     MeshReport report;
     std::string sign, reason;
     std::int64_t conflicts = 0;
-    double inside = 0;            // share of the active voxels
-    double bridged = 0;           // share of the pairs of neighbours on different sides with no surface between them
+    double inside = 0;            // fraction of the active voxels
+    double bridged = 0;           // fraction of the neighbour pairs of different sides without a surface between them
     double area = 0, volume = 0;  // of the field's surface [m^2], [m^3]
-    bool none = false, closed = false;  // the field's surface
-    double seconds = 0;                 // of the build
+    bool none = false, closed = false;  // whether the field has no surface, or a closed one
+    double seconds = 0;                 // build time
 };
 
 std::vector<std::string> corpus() {
@@ -92,7 +92,7 @@ double volumeOf(const Mesh& mesh) {
     return volume;
 }
 
-// How much of the border between inside and outside no surface explains: lids over holes, and wrong signs.
+// Fraction of the inside/outside border that no surface explains: lids over holes, and wrong signs.
 double bridgedShare(const openvdb::FloatGrid& grid) {
     const auto reach = borderSlack * float(grid.voxelSize()[0]);
     std::size_t borders = 0, bridged = 0;
@@ -123,7 +123,7 @@ nlohmann::json json(const Mesh& mesh) {
     return {{"points", points}, {"triangles", triangles}};
 }
 
-// The voxels of one layer: values in voxels, rows along the axis after the next one.
+// The voxels of one layer. Values are in voxels; rows are along the axis after the next one.
 nlohmann::json slice(const openvdb::FloatGrid& grid, const Mesh& mesh, int axis, float at) {
     const Bounds box = bounds(mesh);
     const float h = float(grid.voxelSize()[0]);
@@ -150,7 +150,7 @@ nlohmann::json slice(const openvdb::FloatGrid& grid, const Mesh& mesh, int axis,
             {"active", active}};
 }
 
-// What docs/dirty.sh draws.
+// Writes the input of docs/dirty.sh.
 void writeScene(const Options& options, const Row& row, const Mesh& mesh, const Mesh& border,
                 const openvdb::FloatGrid& grid) {
     const std::string name = std::filesystem::path(row.mesh).stem().string();
@@ -191,7 +191,7 @@ Row judge(const Options& options, const std::string& name) {
         row.report = inspect(mesh);
         measure(options, mesh, row);
     } catch (const std::exception& error) {
-        // the message names the file by its whole path
+        // the message names the file by its full path
         row.error = error.what();
         const std::string folder = std::string(BILAYER_MESHES) + "/";
         if (const auto at = row.error.find(folder); at != std::string::npos) row.error.erase(at, folder.size());
@@ -265,7 +265,7 @@ int run(int argc, char** argv) {
     const auto fields = std::count_if(rows.begin(), rows.end(), [](const Row& row) { return row.error.empty(); });
     fmt::print("{} meshes, {} fields\n", rows.size(), fields);
     if (!options.markdownFile.empty()) std::ofstream(options.markdownFile) << markdown(rows);
-    // a mesh whose triangles were read has a field
+    // a mesh whose triangles were read must have a field
     return std::any_of(rows.begin(), rows.end(),
                        [](const Row& row) { return !row.error.empty() && row.report.triangles > 0; });
 }

@@ -1,5 +1,5 @@
-// A mesh that deforms from frame to frame: frames per second where its field is built in full for each, and where it is
-// rebuilt from the frame before because only a part of the mesh moves.
+// A mesh that deforms from frame to frame. Compares frames per second of a full build per frame with those of an
+// incremental rebuild from the previous frame, where only a part of the mesh moves.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -20,7 +20,7 @@ using namespace bilayer::bench;
 
 namespace {
 
-constexpr float swing = 0.05f;       // to each side, as a part of the longest side of the mesh
+constexpr float swing = 0.05f;       // amplitude to each side, as a fraction of the longest side of the mesh
 constexpr float wavesAlongMesh = 1;  // from the bottom to the top
 constexpr int framesPerSwing = 40;
 constexpr float tug = 2;  // [voxels]
@@ -35,7 +35,7 @@ struct Options {
     int frames = 60;
 };
 
-// The mesh of 70 thousand triangles that is here: the bunny, or else a knot.
+// The available mesh of 70 thousand triangles: the bunny, or else a knot.
 Scene restingScene(const Options& options) {
     if (!options.mesh.empty()) return scene(findSource(options.mesh), options.resolution);
     for (const Source& source : sources())
@@ -43,7 +43,7 @@ Scene restingScene(const Options& options) {
     return scene("knot", shapes::torusKnot(2, 3, 1, 0.2f, 1094, 32), options.resolution);
 }
 
-// Sways the mesh like a reed in water: each height moves sideways as a whole, so that nothing can run into itself.
+// Sways the mesh like a reed in water. Each height moves sideways rigidly, so the mesh cannot self-intersect.
 Mesh swayed(const Mesh& mesh, int frame) {
     const Bounds box = bounds(mesh);
     const float side = box.longestSide(), phase = glm::two_pi<float>() * float(frame) / framesPerSwing;
@@ -54,7 +54,7 @@ Mesh swayed(const Mesh& mesh, int frame) {
     return moved;
 }
 
-// The builds of one builder on one number of threads.
+// The builds of one builder on one count of threads.
 struct Row {
     Job job;
     std::vector<double> seconds;
@@ -87,7 +87,7 @@ void deform(const Options& options) {
     for (const Row& row : rows) print(row);
 }
 
-// The part of a mesh nearest to one of its points, and how far it goes.
+// The part of a mesh nearest to one of its points, and its amplitude.
 struct Part {
     glm::vec3 centre;
     float radius;
@@ -101,7 +101,7 @@ Part partOf(const Mesh& mesh, double share) {
     return {centre, distances[std::min(distances.size() - 1, std::size_t(share * double(distances.size())))]};
 }
 
-// Moves the part to and fro sideways, most in its middle, by a voxel or two.
+// Oscillates the part sideways by a voxel or two, most in its middle.
 Mesh tugged(const Mesh& mesh, const Part& part, float voxelSize, int frame) {
     const float phase = glm::two_pi<float>() * float(frame) / framesPerSwing;
     Mesh moved = mesh;
@@ -122,7 +122,7 @@ std::vector<std::uint32_t> trianglesThatMoved(const Mesh& before, const Mesh& af
     return moved;
 }
 
-// Full and incremental builds of the same frames, side by side.
+// Compares full and incremental builds of the same frames.
 void deformInPart(const Options& options, double share, int threads) {
     const Scene rest = restingScene(options);
     const Part part = partOf(rest.mesh, share);
@@ -134,7 +134,7 @@ void deformInPart(const Options& options, double share, int threads) {
     LevelSet field = build(before, how);
     std::vector<double> full, incremental;
     std::size_t movedTriangles = 0;
-    double filled = 0;  // the largest part of all blocks
+    double filled = 0;  // maximum fraction of all leaves
     for (int i = 1; i <= options.frames; ++i) {
         const Mesh after = tugged(rest.mesh, part, rest.voxelSize, i);
         const auto moved = trianglesThatMoved(before, after);

@@ -12,7 +12,7 @@ namespace {
 
 using Corners = std::array<glm::vec3, 3>;
 
-// C. Ericson, "Real-Time Collision Detection" (2005), 5.1.5: by the regions of the triangle's features.
+// C. Ericson, "Real-Time Collision Detection" (2005), 5.1.5: by the Voronoi regions of the triangle's features.
 glm::vec3 closestOn(const Corners& t, const glm::vec3& point) {
     const glm::vec3 ab = t[1] - t[0], ac = t[2] - t[0], fromA = point - t[0];
     const float d1 = glm::dot(ab, fromA), d2 = glm::dot(ac, fromA);
@@ -33,7 +33,7 @@ glm::vec3 closestOn(const Corners& t, const glm::vec3& point) {
     return t[0] + b * scale * ab + c * scale * ac;
 }
 
-// What a query for the closest point has found so far.
+// State of a closest-point query.
 struct Search {
     const Corners* triangles;
     ClosestPoint* best;
@@ -59,7 +59,7 @@ bool visit(RTCPointQueryFunctionArguments* arguments) {
 struct Embree::Scene {
     RTCDevice device = rtcNewDevice(nullptr);
     RTCScene scene = rtcNewScene(device);
-    std::vector<Corners> triangles;  // together, for the callback
+    std::vector<Corners> triangles;  // both are passed to the callback
 
     Scene(const Mesh& mesh, bool robust) {
         for (const glm::uvec3& t : mesh.triangles)

@@ -1,4 +1,4 @@
-// Embree on the triangles of a mesh: the exact peer of closest points and rays.
+// Embree on the triangles of a mesh: the exact peer for closest points and rays.
 #pragma once
 
 #include <memory>
@@ -10,14 +10,14 @@ namespace bilayer::bench {
 
 class Embree {
   public:
-    /// @param robust  rays miss no edge between triangles, and take longer
+    /// @param robust  rays miss no edge between triangles, but are slower
     Embree(const Mesh& mesh, bool robust);
 
-    /// rtcPointQuery: the closest point of the mesh. The distance has no sign, and no normal is told.
-    /// @param radius  how far it looks [m], may be infinite
+    /// rtcPointQuery: the closest point of the mesh. The distance is unsigned; there is no normal.
+    /// @param radius  search radius [m], may be infinite
     Closest closest(const std::string& name, float radius) const;
 
-    /// rtcIntersect1: the first triangle along a ray, from either side.
+    /// rtcIntersect1: the first triangle along a ray, two-sided.
     RayCaster rays() const;
 
   private:

@@ -1,5 +1,5 @@
-// From a mesh file to a field file: whole commands in cold processes, compared with OpenVDB's own ways;
-// and reading alone, compared with Assimp.
+// From mesh file to field file: compares whole commands in cold processes with the same by OpenVDB, and reading alone
+// with Assimp.
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <openvdb/io/File.h>
@@ -45,18 +45,18 @@ struct Options {
     std::vector<std::string> meshes{"bunny", "dragon", "armadillo", "screwdriver", "fandisk", "carved box"};
     std::vector<std::string> formats{"ply", "ascii-ply", "obj", "stl"};
     int resolution = 251, threads = 2, rounds = 5;
-    fs::path bilayer;  // the command line
-    // one thing that this program does in a process of its own
+    fs::path bilayer;  // path of the command line program
+    // one task that this program runs in its own process
     std::string work, mesh, output;
 };
 
 using Words = std::vector<std::string>;
 
-/// What a command took.
+/// Cost of a command.
 struct Run {
     double seconds = 0;
     std::string out;
-    bool done = false;  // with status 0
+    bool done = false;  // exited with status 0
 };
 
 std::string slurp(const fs::path& path) {
@@ -64,7 +64,7 @@ std::string slurp(const fs::path& path) {
     return {std::istreambuf_iterator<char>(file), {}};
 }
 
-/// Runs a command from its start to its end.
+/// Runs a command until it exits.
 Run timed(const Words& words, const fs::path& scratch) {
     std::vector<char*> arguments;
     for (const std::string& word : words) arguments.push_back(const_cast<char*>(word.c_str()));
@@ -86,7 +86,7 @@ Run timed(const Words& words, const fs::path& scratch) {
     return {seconds, slurp(out), WIFEXITED(status) && WEXITSTATUS(status) == 0};
 }
 
-// PLY as text, which the project itself does not write.
+// Writes text PLY, which the project itself does not.
 void writeText(const fs::path& path, const Mesh& mesh) {
     std::ofstream file(path);
     file << fmt::format(
@@ -109,7 +109,7 @@ fs::path writeAs(const std::string& format, const std::string& name, const Mesh&
     return path;
 }
 
-/// What a program that builds on OpenVDB does: read by Assimp, fill by meshToVolume, write.
+/// The steps of a program on top of OpenVDB: read by Assimp, fill by meshToVolume, write.
 const aiScene* readByAssimp(Assimp::Importer& importer, const std::string& path) {
     const aiScene* scene = importer.ReadFile(path, aiProcess_Triangulate | aiProcess_JoinIdenticalVertices);
     if (!scene) throw std::runtime_error(importer.GetErrorString());
@@ -143,7 +143,7 @@ void buildByOpenVdb(const Options& options) {
     openvdb::io::File(options.output).write({grid});
 }
 
-// Prints the seconds that reading takes, after the program is there.
+// Prints the seconds of reading, without the start of the program.
 void readOnly(const Options& options, bool byAssimp) {
     const Stopwatch watch;
     if (byAssimp) {
@@ -158,10 +158,10 @@ void readOnly(const Options& options, bool byAssimp) {
     std::_Exit(0);
 }
 
-/// The ways from file to file and of reading, and what each took.
+/// The alternatives for file to file and for reading, and their times.
 struct Contest {
     std::map<std::string, std::vector<double>> seconds;
-    std::map<std::string, std::vector<double>> parts;  // of ours
+    std::map<std::string, std::vector<double>> parts;  // of our command
 };
 
 Contest contest(const Options& options, const fs::path& mesh, const fs::path& scratch) {
@@ -213,7 +213,7 @@ double medianOf(const Contest& c, const std::string& way) {
     return found == c.seconds.end() ? std::nan("") : median(found->second);
 }
 
-/// Ratios that count, over all meshes and formats.
+/// Ratios over all meshes and formats, to be averaged.
 struct Means {
     std::vector<double> vdbTool, assimpVdb;
     std::map<std::string, std::vector<double>> reading;  // by format

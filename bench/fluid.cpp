@@ -1,5 +1,5 @@
-// Liquids that start from meshes: how long seeding takes beside OpenVDB's meshToLevelSet and what a user must do around
-// it, and how true volume and area of the result are.
+// Liquids seeded from meshes: compares the time with OpenVDB's meshToLevelSet and the code that a user must write
+// around it, and measures the error of volume and area.
 #include <fmt/format.h>
 #include <openvdb/tools/Composite.h>
 #include <openvdb/tools/Diagnostics.h>
@@ -46,7 +46,7 @@ Mesh meshOf(const std::string& name) {
     return name == "sphere" ? shapes::sphere(0.5f, 7) : scene(findSource(name), 64).mesh;
 }
 
-// Askew to all axes, beside the origin.
+// Oblique to all axes, and off the origin.
 fluid::Placement placementOf(const Mesh& mesh) {
     const glm::vec3 size = bounds(mesh).size();
     return {Pose{0.3f * size, glm::angleAxis(0.8f, glm::normalize(glm::vec3(1, -2, 0.5f)))}};
@@ -58,7 +58,7 @@ Mesh placed(const Mesh& mesh, const fluid::Placement& placement) {
     return result;
 }
 
-// The lower half of the body's box and the space around it, full of liquid.
+// The lower half of the body's box and its surroundings, filled with liquid.
 FloatGrid::Ptr pool(const Mesh& body, float voxelSize) {
     const Bounds box = bounds(body);
     Mesh water = shapes::box(0.6f * box.size());
@@ -68,7 +68,7 @@ FloatGrid::Ptr pool(const Mesh& body, float voxelSize) {
     return liquid;
 }
 
-// As a user of OpenVDB alone would pour a mesh into a liquid.
+// The way to add a mesh to a liquid with OpenVDB alone.
 void seedByOpenVdb(FloatGrid& liquid, const Mesh& mesh, const fluid::Placement& placement, bool renormalise) {
     std::vector<openvdb::Vec3s> points;
     std::vector<openvdb::Vec3I> triangles;
@@ -134,8 +134,8 @@ double areaOf(const Mesh& mesh) {
     return area;
 }
 
-// How far |gradient| is from 1 within a voxel of the surface, in the mean, by central differences: everywhere, and
-// where it turns by less than 15 degrees from each neighbour to the next (off creases).
+// Mean deviation of |gradient| from 1 within a voxel of the surface, by central differences: everywhere, and off
+// creases. Off creases the gradient rotates by less than 15 degrees from each neighbour to the next.
 struct SlopeError {
     double everywhere = 0, offCreases = 0;
 };
@@ -184,7 +184,7 @@ void measureAt(const std::string& name, const Mesh& mesh, float resolution) {
     std::fflush(stdout);
 }
 
-// What fill() is off by, by how far from the surface the voxel lies [voxels].
+// Error of fill() by distance from the surface [voxels].
 struct Shell {
     double from, to;
     double sum = 0, largest = 0;

@@ -1,5 +1,5 @@
-// How the cost of a build grows: with the triangles of a mesh at one resolution, and with the resolution of one mesh.
-// The meshes are carved boxes, so that nothing but their size changes. Each build runs in a process of its own.
+// Growth of build cost with the triangle count at one resolution, and with the resolution of one mesh. The meshes are
+// carved boxes, so that only their size changes. Each build runs in its own process.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>

@@ -1,5 +1,5 @@
-// Hashes of the fields of a folder of meshes, by every method and way of finding signs: two versions of the library
-// that print the same lines build the same fields.
+// Prints hashes of the fields of a folder of meshes, for every method and sign option. Two versions of the library with
+// the same output build the same fields.
 #include <fmt/format.h>
 #include <openvdb/tree/LeafManager.h>
 
@@ -66,7 +66,7 @@ class Hash {
     std::uint64_t value_ = 0xcbf29ce484222325u;
 };
 
-// Values and states of all voxels of leaves, and of all tiles.
+// Hashes values and states of all voxels of leaves, and of all tiles.
 template <class Grid>
 void add(Hash& hash, const Grid& grid) {
     hash.add(grid.background());

@@ -23,8 +23,8 @@ namespace {
 
 constexpr float gravity = 9.81f;  // [m/s^2]
 constexpr float friction = 0.5f;
-constexpr float restingSpeed = 0.1f, restingSpin = 1;  // below them bodies could sleep [m/s, rad/s]
-constexpr float splitAt = 0.01f;  // Bullet turns deeper overlap into speed [parts of a body's size]
+constexpr float restingSpeed = 0.1f, restingSpin = 1;  // thresholds below which bodies could sleep [m/s, rad/s]
+constexpr float splitAt = 0.01f;  // Bullet splits off deeper penetration [fraction of a body's size]
 
 btTransform toTransform(const Pose& pose) {
     const auto& [p, q] = pose;
@@ -37,7 +37,7 @@ btVector3 inertiaOf(const Member& member) {
     return {inertia.x, inertia.y, inertia.z};
 }
 
-// Bullet's world with the bodies of one run in it.
+// Bullet's world with the bodies of one run.
 class Arena {
   public:
     Arena(const Rival& rival, const std::vector<Member>& members)

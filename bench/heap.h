@@ -1,4 +1,4 @@
-// A heap of bodies in Bullet: the same bodies at the same poses, whatever some of them collide by.
+// A pile of bodies in Bullet. The bodies and their initial poses are the same for every rival.
 #pragma once
 
 #include <memory>
@@ -12,13 +12,13 @@
 
 namespace bilayer::bench {
 
-/// Bodies of one form: its origin is the centre of mass, its axes are the principal ones.
+/// Bodies of one shape. The origin is the centre of mass; the axes are the principal ones.
 struct Form {
     Mesh mesh;
     Bounds box;
     btCollisionShape* shape = nullptr;
     MassProperties mass;
-    std::unique_ptr<demo::Specimen> specimen;  ///< measures them
+    std::unique_ptr<demo::Specimen> specimen;  ///< measures the penetration of these bodies
 
     /// @param shape  of the mesh
     Form(Mesh mesh, btCollisionShape& shape, double spacing);
@@ -26,27 +26,27 @@ struct Form {
 
 struct Member {
     const Form* form = nullptr;
-    float mass = 0;  ///< 0: it never moves [kg]
+    float mass = 0;  ///< 0: static [kg]
     Pose pose{};
 };
 
 struct HeapOptions {
     float stepsPerSecond = 240;
     double seconds = 4;
-    double patience = 60;  ///< ends a run that has not got as far after so many seconds of waiting
+    double patience = 60;  ///< limit of wall-clock time; ends a run that takes longer [s]
     int measuredFrames = 40;
 };
 
-/// What became of a heap.
+/// Result of a run.
 struct HeapRun {
-    std::vector<double> stepMs;         ///< what each step took [ms]
+    std::vector<double> stepMs;         ///< time of each step [ms]
     std::vector<double> kineticEnergy;  ///< after each step [J]
-    std::vector<double> penetrations;   ///< of pairs that overlap, by the meshes, in the frames measured [m]
+    std::vector<double> penetrations;   ///< overlapping pairs in the measured frames, by the meshes [m]
     int restless = 0;                   ///< bodies at the end that are too fast to fall asleep
     double simulated = 0;               ///< [s]
 };
 
-/// Lets the bodies fall. None may sleep, so that each step does all the work there is.
+/// Lets the bodies fall. Sleeping is disabled, so each step does its full work.
 HeapRun play(const Rival& rival, const std::vector<Member>& members, const HeapOptions& options);
 
 }  // namespace bilayer::bench

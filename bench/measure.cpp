@@ -21,10 +21,10 @@ namespace {
 constexpr double MiB = 1 << 20;
 constexpr float infinity = std::numeric_limits<float>::infinity();
 constexpr double none = std::numeric_limits<double>::quiet_NaN();
-// "VmHWM" of /proc/self/status is the peak since this was last written to /proc/self/clear_refs
+// writing this to /proc/self/clear_refs resets the peak "VmHWM" of /proc/self/status
 constexpr const char* resetPeak = "5";
 
-// What the child sends back, in one piece through a pipe.
+// The child's reply, sent in one piece through a pipe.
 struct Answer {
     bool ok = false;
     Footprint footprint;
@@ -64,7 +64,7 @@ Footprint measure(const Scene& scene, const Job& job, int repetitions, double se
     return result;
 }
 
-// The child's whole life: it must not return into what its parent was doing, nor run what its parent runs at exit.
+// Runs in the child until it exits. It must neither return into the parent's code nor run the parent's exit handlers.
 [[noreturn]] void live(int pipe, const std::function<Footprint()>& work) {
     Answer answer;
     try {
@@ -82,11 +82,11 @@ std::size_t threadsOfThisProcess() {
     return std::size_t(std::distance(begin(tasks), end(tasks)));
 }
 
-// Before main() there are only the threads that libraries start as they are loaded (log4cplus, which OpenVDB brings);
-// they wait for log messages, and nobody waits for them.
+// Before main() the only threads are those that libraries start on loading (log4cplus, through OpenVDB). They wait for
+// log messages, and no other thread waits for them.
 const std::size_t threadsAtStart = threadsOfThisProcess();
 
-// What work gives in a child process.
+// Result of `work` in a child process.
 Footprint answerOfChild(const std::string& name, const std::function<Footprint()>& work) {
     if (threadsOfThisProcess() != threadsAtStart)
         throw std::logic_error("a process that runs several threads cannot be forked safely");

@@ -1,6 +1,6 @@
-// OpenCL devices against TBB: the same mesh, voxel size and band, in one run. First each device's field is compared
-// with TBB's, which also compiles the kernels; then the builders take turns; then a device's own clock and memory are
-// read in builds of their own, so that no event burdens those that are timed.
+// Compares OpenCL devices with TBB on the same mesh, voxel size and band, in one run. First each device's field is
+// compared with TBB's, which also compiles the kernels. Then the builders take turns. Last, separate builds read a
+// device's own clock and memory, so that profiling events do not slow the timed builds.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -26,8 +26,8 @@ using namespace bilayer::bench;
 namespace {
 
 const std::vector<std::string> usualMeshes{"bunny", "dragon", "carved box"};
-constexpr double required = 1.2;  // times TBB's time that a whole build on a processor may take
-constexpr int profiledRuns = 3;   // of which the one with the median of the kernels' time counts
+constexpr double required = 1.2;  // limit of a whole build on a CPU device, times TBB's time
+constexpr int profiledRuns = 3;   // the run with the median kernel time is reported
 constexpr double MiB = 1 << 20;
 
 struct Options {
@@ -37,15 +37,15 @@ struct Options {
     std::string device;
     std::uint64_t deviceMemory = 0;
     int repetitions = 9, threads = int(std::thread::hardware_concurrency());
-    double seconds = 4;  // a builder takes no further turns in a scene once it has used up this time
+    double seconds = 4;  // a builder gets no further turns in a scene once it has used this time
     std::string json;
 };
 
-// A device and what builds there, without and with its clock.
+// A device and its builders, without and with profiling.
 struct Engine {
     DeviceInfo info;
     BlockFiller timed, profiled;
-    std::unique_ptr<OpenclTimes> times;  // where `profiled` adds up
+    std::unique_ptr<OpenclTimes> times;  // accumulates the times of `profiled`
 };
 
 Engine openEngine(const std::string& name, std::uint64_t memoryMiB) {
@@ -55,7 +55,7 @@ Engine openEngine(const std::string& name, std::uint64_t memoryMiB) {
             openclFiller(device, {.memoryMiB = memoryMiB, .times = times.get()}), std::move(times)};
 }
 
-// The device asked for, or each that there is.
+// The requested device, or all available ones.
 std::vector<Engine> openAll(const Options& options) {
     std::vector<Engine> found;
     if (!options.device.empty()) {
@@ -63,19 +63,19 @@ std::vector<Engine> openAll(const Options& options) {
         return found;
     }
     for (const DeviceInfo& info : devices()) found.push_back(openEngine(info.name, options.deviceMemory));
-    if (found.empty()) openDevice();  // which says what is missing
+    if (found.empty()) openDevice();  // throws with the missing requirement
     return found;
 }
 
-// A method by TBB and on a device.
+// A method on TBB and on a device.
 struct Contest {
     const char* method;
     Builder tbb, opencl;
     float halfWidth;
-    bool same;  // both must give the same field
+    bool same;  // whether both must give the same field
 };
 
-// The prism method has no builder on TBB; the double layer method, which replaced it, stands in.
+// The prism method has no builder on TBB; its successor, the double layer method, is used instead.
 constexpr Contest contests[] = {{"exact", Builder::exact, Builder::exactOpencl, 3, true},
                                 {"double-layer", Builder::doubleLayer, Builder::doubleLayerOpencl, 2, true},
                                 {"prism", Builder::doubleLayer, Builder::prism, 2, false}};
@@ -86,7 +86,7 @@ struct Row {
     const Contest* contest;
     const Engine* engine;  // null: TBB
     Job job;
-    std::size_t tbb;  // the row of the scene that it is compared with
+    std::size_t tbb;  // index of the TBB row of the same scene
     std::vector<double> seconds{};
     double ratio = 1;
     std::uint64_t activeVoxels = 0;
@@ -118,7 +118,7 @@ std::vector<Row> emptyRows(const Scene& scene, const std::string& voxels, const 
 }
 
 void compareFields(const Scene& scene, std::vector<Row>& rows) {
-    std::map<std::size_t, LevelSet> expected;  // by TBB's row
+    std::map<std::size_t, LevelSet> expected;  // key: TBB's row
     for (Row& row : rows) {
         const LevelSet field = fieldOf(scene, row.job);
         row.activeVoxels = field.activeVoxels();
@@ -127,7 +127,7 @@ void compareFields(const Scene& scene, std::vector<Row>& rows) {
     }
 }
 
-// Builders take turns. What takes long is repeated less.
+// Builders take turns. Slow builds are repeated less.
 void measureTime(const Scene& scene, std::vector<Row>& rows, const Options& options) {
     for (int round = 0; round < options.repetitions; ++round)
         for (Row& row : rows) {
@@ -155,7 +155,7 @@ void profile(const Scene& scene, std::vector<Row>& rows) {
     }
 }
 
-// Where a row was built: "tbb", or the number that the head of the table gives to a device.
+// Where a row was built: "tbb", or the number of a device in the head of the table.
 std::string placeOf(const Row& row, const std::vector<Engine>& engines) {
     return row.engine ? fmt::format("opencl {}", row.engine - engines.data() + 1) : "tbb";
 }
@@ -200,7 +200,7 @@ void printRow(const Row& row, const std::vector<Engine>& engines) {
                row.seconds.size());
 }
 
-// Each device's slowest cell. Returns whether all fields are as they must be.
+// Prints each device's slowest cell. Returns whether all fields are correct.
 bool printSummary(const std::vector<Row>& rows, const std::vector<Engine>& engines) {
     fmt::print("\nWhole builds as multiples of tbb's time, at worst\n");
     for (const Contest& contest : contests)
@@ -257,7 +257,7 @@ void writeJson(const std::string& path, const std::vector<Row>& rows, const std:
     if (!file.flush()) throw std::runtime_error("cannot write " + path);
 }
 
-// The mesh scaled along each axis, so that its bounds are this many voxels of a metre.
+// The mesh scaled along each axis so that its bounds have this many voxels of one metre.
 Scene stretched(Scene scene, const std::vector<int>& voxels) {
     glm::vec3 low = scene.mesh.points.at(0), high = low;
     for (const glm::vec3& point : scene.mesh.points) {

@@ -15,7 +15,7 @@ glm::vec3 toGlm(const openvdb::Vec3s& v) {
     return {v.x(), v.y(), v.z()};
 }
 
-// Uniform scale without a shift, as build() makes it: a product is all that the way to voxels needs.
+// build() makes transforms of uniform scale without translation, so world to voxel coordinates is one product.
 double voxelsPerMetre(const openvdb::FloatGrid& grid) {
     return 1 / grid.voxelSize()[0];
 }

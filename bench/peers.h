@@ -1,7 +1,7 @@
-// Who answers queries in the comparison: OpenVDB, NanoVDB and Embree beside the field.
+// Peers of the query benchmark: the field, OpenVDB, NanoVDB and Embree.
 //
-// All are asked in the same way, a stretch of questions at a time, in world coordinates. What a peer needs for itself
-// (an accessor, a stencil) it makes anew for each stretch, so that stretches can run on several threads.
+// All have the same interface: a batch of queries at a time, in world coordinates. A peer creates its own helpers (an
+// accessor, a stencil) for each batch, so that batches can run on several threads.
 #pragma once
 
 #include <openvdb/openvdb.h>
@@ -17,40 +17,40 @@
 
 namespace bilayer::bench {
 
-/// One who answers: as many answers as questions.
+/// Answers queries, one answer per query.
 template <class Question, class Answer>
 struct Peer {
     std::string name;
     std::function<void(std::span<const Question>, std::span<Answer>)> answer;
 };
 
-/// Value and gradient of the trilinear interpolant at points [m]. Peers leave Sample::inBand alone.
+/// Value and gradient of the trilinear interpolant at points [m]. Peers do not set Sample::inBand.
 using Sampler = Peer<glm::vec3, Sample>;
 
 /// Closest points of the surface [m].
 using Closest = Peer<glm::vec3, ClosestPoint>;
 
-/// The answer to a ray that meets nothing.
+/// The answer to a ray without a hit.
 inline constexpr RayHit missed{.distance = std::numeric_limits<float>::infinity()};
 
-/// Where rays meet the surface first.
+/// First hits of rays on the surface.
 using RayCaster = Peer<Ray, RayHit>;
 
-/// openvdb::tools::BoxSampler for the value, openvdb::math::BoxStencil for the gradient: what the library has for each.
+/// openvdb::tools::BoxSampler for the value, openvdb::math::BoxStencil for the gradient: OpenVDB's own tool for each.
 Sampler openvdbSampler(openvdb::FloatGrid::ConstPtr grid);
 
 /// openvdb::math::BoxStencil for both, with one fetch of eight voxels.
 Sampler openvdbStencil(openvdb::FloatGrid::ConstPtr grid);
 
-/// One fetch of eight voxels by BoxSampler::getValues, and no more than the arithmetic of value and gradient, which is
-/// NanoVDB's: the most that can be made of OpenVDB's tree. BoxStencil's gradient takes a shared pointer to the grid's
-/// map each time, and two threads that do so wait for each other.
+/// One fetch of eight voxels by BoxSampler::getValues, and only the arithmetic of value and gradient, which is
+/// NanoVDB's. This is the best that OpenVDB's tree allows. BoxStencil's gradient copies a shared pointer to the grid's
+/// map each time, and threads that do so contend for it.
 Sampler openvdbCell(openvdb::FloatGrid::ConstPtr grid);
 
-/// openvdb::tools::LevelSetRayIntersector with position, normal and distance: crossings of the interpolant.
+/// openvdb::tools::LevelSetRayIntersector with position, normal and distance: hits on the interpolant.
 RayCaster openvdbRays(openvdb::FloatGrid::ConstPtr grid);
 
-/// A grid of NanoVDB with its trilinear sampler, which fetches eight voxels once for value and gradient.
+/// A NanoVDB grid with its trilinear sampler, which fetches eight voxels once for value and gradient.
 class Nanovdb {
   public:
     explicit Nanovdb(const openvdb::FloatGrid& grid);

@@ -1,4 +1,4 @@
-// What main() of every benchmark comes to.
+// The main() of every benchmark.
 #pragma once
 
 #include <fmt/format.h>
@@ -7,8 +7,8 @@
 
 namespace bilayer::bench {
 
-/// Runs a benchmark and returns its status; 1, after a line on stderr, where something is thrown.
-/// @param name  as it is called after `./run bench`
+/// Runs a benchmark and returns its exit status. For an exception it prints one line on stderr and returns 1.
+/// @param name  the name that follows `./run bench`
 inline int program(const char* name, int (*run)(int, char**), int argc, char** argv) {
     try {
         return run(argc, argv);

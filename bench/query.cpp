@@ -1,6 +1,6 @@
-// Queries side by side: the same field and the same questions, in one run, for the field, OpenVDB, NanoVDB and Embree.
-// First all answers are compared; only then the peers take turns, and medians are printed, nanoseconds a query, beside
-// what the memory of the machine allows.
+// Compares queries on the same field in one run: the field, OpenVDB, NanoVDB and Embree. All answers are compared
+// first; then the peers take turns. Prints median nanoseconds per query next to the bound from the machine's memory
+// bandwidth.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
@@ -32,14 +32,15 @@ namespace {
 const std::string ours = "bilayer";
 constexpr float infinity = std::numeric_limits<float>::infinity();
 constexpr double tolerance = 1e-4;  // of distances [voxels]
-// In 16 bits voxels are off by half a step of 9.2e-5 voxels, and differences of two along each axis by a whole one.
+// With 16 bits voxels are off by half a quantum of 9.2e-5 voxels, and differences of two voxels along each axis by a
+// whole one.
 constexpr double gradientTolerance = 2e-4;
-// Rays cross the interpolant, not the triangles: hits may differ where rays graze, and by the interpolant's own error.
-constexpr double missedAlike = 0.01, hitAlike = 0.5;  // share of rays; median difference [voxels]
+// Rays hit the interpolant, not the triangles. Hits may differ for grazing rays, and by the interpolation error.
+constexpr double missedAlike = 0.01, hitAlike = 0.5;  // fraction of rays; median difference [voxels]
 
 struct Options {
     std::string mesh = "bunny", json;
-    std::vector<float> resolutions{192, 922};  // grids of OpenVDB's of about 9 and 150 MB
+    std::vector<float> resolutions{192, 922};  // OpenVDB grids of about 9 and 150 MB
     float halfWidth = 3;
     std::size_t points = 1000000, others = 200000;
     std::vector<int> threads{1, 2};
@@ -90,7 +91,7 @@ void require(bool alike, const std::string& peer, const std::string& reference) 
 // The first peer is the reference.
 void requireAlike(const std::vector<Sampler>& peers, const Questions<glm::vec3>& questions, float voxelSize) {
     const std::vector<Sample> truth = answersOf(peers.front(), questions.all);
-    double value = 0, gradient = 0;  // the largest differences
+    double value = 0, gradient = 0;  // maximum differences
     for (const Sampler& peer : peers) {
         const std::vector<Sample> samples = answersOf(peer, questions.all);
         for (std::size_t i = 0; i < samples.size(); ++i) {
@@ -104,7 +105,7 @@ void requireAlike(const std::vector<Sampler>& peers, const Questions<glm::vec3>&
 
 void requireAlike(const std::vector<Closest>& peers, const Questions<glm::vec3>& questions, float voxelSize) {
     const std::vector<ClosestPoint> truth = answersOf(peers.front(), questions.all);
-    double worst = 0;  // of distances, and of positions as far as they lie at that distance
+    double worst = 0;  // of distances, and of positions that must be at that distance
     for (const Closest& peer : peers) {
         const std::vector<ClosestPoint> answers = answersOf(peer, questions.all);
         for (std::size_t i = 0; i < answers.size(); ++i) {
@@ -138,7 +139,7 @@ void requireAlike(const std::vector<RayCaster>& peers, const Questions<Ray>& que
     }
 }
 
-// Compares, then lets take turns, then prints.
+// Compares the answers, times the peers in turns, and prints.
 template <class Question, class Answer>
 std::vector<Time> contest(const std::string& title, const std::vector<Peer<Question, Answer>>& peers,
                           const std::vector<Questions<Question>>& orders, float voxelSize, const Options& options) {
@@ -150,8 +151,8 @@ std::vector<Time> contest(const std::string& title, const std::vector<Peer<Quest
     return times;
 }
 
-// What the memory allows: random points take their lines one by one, many at once; coherent ones have each line once.
-// To both comes the stream of points, and of samples that are fetched and written back.
+// Lower bound by memory. Random points fetch their cache lines one by one, many in flight; coherent points fetch each
+// line once. Both add the stream of points, and of samples that are fetched and written back.
 nlohmann::json floors(const LevelSet& levelSet, std::size_t fieldBytes, const std::vector<Questions<glm::vec3>>& orders,
                       const Options& options) {
     const Touched touched = linesTouched(FieldLayout(levelSet), orders.front().all);

@@ -19,7 +19,7 @@ double cellFaceDistance(const glm::dvec3& voxels) {
     return std::min({way.x, way.y, way.z});
 }
 
-// Bits of the three coordinates in turn.
+// Interleaves the bits of the three coordinates.
 std::uint64_t mortonCode(const glm::uvec3& voxel) {
     std::uint64_t code = 0;
     for (int bit = 0; bit < 21; ++bit)

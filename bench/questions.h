@@ -1,4 +1,4 @@
-// Points and rays to ask about, each in a random and in a coherent order.
+// Points and rays for queries, each in a random and in a coherent order.
 #pragma once
 
 #include <cstddef>
@@ -10,9 +10,9 @@
 
 namespace bilayer::bench {
 
-/// Points evenly over the band less a voxel, as far as all eight voxels around them are active; and the same along
-/// Morton's curve through the voxels. None is so near to a cell's face that one who reckons in single precision may see
-/// it on the other side, where the gradient is another.
+/// Points uniformly distributed in the band without its outermost voxel, where all eight surrounding voxels are active;
+/// and the same points in Morton order of their voxels. No point is so close to a cell face that single precision may
+/// put it on the other side, where the gradient differs.
 std::vector<Questions<glm::vec3>> pointsInBand(const Field& field, const LevelSet& levelSet, std::size_t count,
                                                unsigned seed);
 

@@ -1,4 +1,4 @@
-// Peers that answer the same questions, side by side in time.
+// Times peers that answer the same queries in turns.
 #pragma once
 
 #include <fmt/format.h>
@@ -14,21 +14,21 @@
 
 namespace bilayer::bench {
 
-/// Questions in some order, "random" or "coherent".
+/// Queries in one order, "random" or "coherent".
 template <class Question>
 struct Questions {
     std::string order;
     std::vector<Question> all;
 };
 
-/// What a peer took for questions in one order on some threads.
+/// Time of a peer for queries in one order on a count of threads.
 struct Time {
     std::string peer, order;
     int threads;
-    double nanoseconds;  ///< a question, all threads together; the median of all rounds
+    double nanoseconds;  ///< per query, all threads together; the median of all rounds
 };
 
-/// Seconds that a peer takes for all questions, a stretch for each thread.
+/// Seconds that a peer takes for all queries, one batch per thread.
 template <class Question, class Answer>
 double secondsOf(const Peer<Question, Answer>& peer, std::span<const Question> questions, std::span<Answer> answers,
                  int threads) {
@@ -42,7 +42,8 @@ double secondsOf(const Peer<Question, Answer>& peer, std::span<const Question> q
     return watch.seconds();
 }
 
-/// Lets peers take turns, in each order and on each number of threads, so that a slow minute hits all of them alike.
+/// Runs the peers in turns, in each order and on each count of threads, so that a slow minute affects all of them
+/// alike.
 template <class Question, class Answer>
 std::vector<Time> race(const std::vector<Peer<Question, Answer>>& peers, const std::vector<Questions<Question>>& orders,
                        const std::vector<int>& threads, int rounds) {
@@ -64,9 +65,9 @@ std::vector<Time> race(const std::vector<Peer<Question, Answer>>& peers, const s
     return times;
 }
 
-/// A table in Markdown: a line for each peer, a column for each order and number of threads; then, for each of `ours`,
-/// how many times as fast as each other peer it is.
-/// @param ours  what the names of our own peers begin with
+/// A table in Markdown: a row per peer, a column per order and count of threads. For each of `ours`, further rows give
+/// its speed-up over each other peer.
+/// @param ours  prefix of the names of our own peers
 inline std::string table(const std::vector<Time>& times, const std::string& ours) {
     std::vector<std::string> peers;
     for (const Time& time : times)

@@ -31,7 +31,7 @@ namespace {
 
 constexpr float bandInside = 6;       // of our fields [voxels]
 constexpr int maxHullPoints = 64;     // of a hull
-constexpr double anyConcavity = 1e9;  // so many hulls and no more, however concave they are
+constexpr double anyConcavity = 1e9;  // disables the limit of concavity: only the count of hulls matters
 
 class Field : public Rival {
   public:
@@ -57,7 +57,7 @@ class Field : public Rival {
     std::unique_ptr<bullet::Shape> shape_;
 };
 
-// A mesh as Bullet sees it: it keeps pointers.
+// A mesh as Bullet's interface, which keeps pointers to it.
 class TriangleArray {
   public:
     explicit TriangleArray(const Mesh& mesh) : mesh_(mesh) {
@@ -149,11 +149,11 @@ class Hulls : public Rival {
     btCompoundShape compound_;
 };
 
-// The nodes of a cell of btMiniSDF within [-1, 1]^3, in their order: the one where its n-th function is 1.
+// The nodes of a cell of btMiniSDF within [-1, 1]^3, in its order: node n is where the n-th shape function is 1.
 constexpr int nodesOfCell = 32;
 
 std::array<glm::dvec3, nodesOfCell> nodePlaces() {
-    std::vector<glm::dvec3> places;  // the corners, and two on each edge
+    std::vector<glm::dvec3> places;  // the vertices, and two nodes on each edge
     for (const double x : {-1., 1.})
         for (const double y : {-1., 1.}) {
             for (const double z : {-1., 1.}) places.push_back({x, y, z});
@@ -173,7 +173,7 @@ std::array<glm::dvec3, nodesOfCell> nodePlaces() {
     return nodes;
 }
 
-// The bytes that btMiniSDF::load() reads.
+// Writes the bytes that btMiniSDF::load() reads.
 class SdfBytes {
   public:
     template <class Value>
@@ -210,7 +210,7 @@ std::vector<char> sdfOf(const Mesh& mesh, int cells) {
     bytes.add(size);
     bytes.add(inverse);
     bytes.addCount(all);
-    bytes.addCount(1);  // fields
+    bytes.addCount(1);  // count of fields
     bytes.addCount(1);
     bytes.addCount(values.size());
     for (const double value : values) bytes.add(value);

@@ -1,8 +1,9 @@
-// What samples and closest points are off by: random points of the band less a voxel, values and directions beside the
-// truth. Five shapes, from 64 to 512 voxels.
+// Errors of samples and closest points at random points of the band without its outermost voxel: values and directions
+// against ground truth. Five shapes, from 64 to 512 voxels.
 //
-// The truth about samples of sphere, torus and box is their formula, and their fields are made by it: no facets get
-// between. All else is measured against triangles in double precision: samples of meshes, and every closest point.
+// The ground truth of samples of sphere, torus and box is their formula; their fields are built from it, so facets have
+// no influence. All other results are compared with triangles in double precision: samples of meshes, and every closest
+// point.
 #include <fmt/format.h>
 #include <oneapi/tbb/parallel_for.h>
 
@@ -31,8 +32,8 @@ using namespace bilayer::bench;
 
 namespace {
 
-constexpr double differenceStep = 1e-5;  // [voxels]; halves the digits of double precision, far below what is measured
-constexpr double steepest = 0.999;       // gradients of distances have length 1 but where no point is closest alone
+constexpr double differenceStep = 1e-5;  // [voxels]; keeps half the digits of doubles, far below the errors
+constexpr double steepest = 0.999;       // gradients of distances have length 1 if the closest point is unique
 constexpr double percentile = 0.99;
 
 struct Options {
@@ -44,7 +45,7 @@ struct Options {
     std::string json;
 };
 
-/// A shape, by its triangles and perhaps by a formula.
+/// A shape by its triangles and optionally by a formula.
 struct Shape {
     std::string name;
     Mesh mesh;
@@ -53,18 +54,18 @@ struct Shape {
 
 using Distance = std::function<double(const glm::dvec3&)>;
 
-// A point in the band, and what is true there.
+// A point in the band with its ground truth.
 struct Place {
     glm::vec3 point;
     double distance;      // signed [m]
-    glm::dvec3 gradient;  // of unit length; zero where no point of the surface is closest alone
+    glm::dvec3 gradient;  // of unit length; zero where the closest point is not unique
 };
 
-// How far answers are from the truth.
+// Errors of answers.
 struct Errors {
     std::vector<double> values;  // [voxels]
     std::vector<double> angles;  // [degrees]
-    std::size_t answered = 0;    // with a distance
+    std::size_t answered = 0;    // answers that have a distance
 };
 
 struct Row {
@@ -94,14 +95,14 @@ glm::dvec3 gradientOf(const Distance& distance, const glm::dvec3& point, double 
     return glm::length(gradient) > steepest ? glm::normalize(gradient) : glm::dvec3(0);
 }
 
-// Evenly over the band less a voxel.
+// Uniformly distributed in the band without its outermost voxel.
 std::vector<Place> places(const LevelSet& levelSet, const Distance& distance, const Options& options) {
     const openvdb::FloatGrid& grid = *levelSet.grids().distance;
     std::vector<glm::vec3> leaves;
     for (auto leaf = grid.tree().cbeginLeaf(); leaf; ++leaf)
         leaves.emplace_back(leaf->origin().x(), leaf->origin().y(), leaf->origin().z());
     const double voxel = grid.voxelSize()[0], reach = (double(options.halfWidth) - 1) * voxel;
-    // points are made in single precision: GCC 12 leaves out the rounding of a double to a float and back
+    // points are rounded to single precision here: GCC 12 omits the rounding of a double to a float and back
     std::vector<Place> result(options.points);
     tbb::parallel_for(std::size_t(0), result.size(), [&](std::size_t i) {
         std::seed_seq seeds{options.seed, unsigned(i)};
@@ -149,7 +150,7 @@ Errors errorsOfSamples(const Field& field, const std::vector<Place>& all) {
     });
 }
 
-// On a face its normal is the direction; at edges and corners it is the way from them.
+// On a face the direction is its normal; at edges and vertices it is the direction from them to the point.
 Errors errorsOfClosest(const Field& field, const std::vector<Place>& all) {
     return errorsOf(all, field.voxelSize(), [&](const glm::vec3& point) -> std::optional<Answer> {
         const ClosestPoint closest = field.closest(point);

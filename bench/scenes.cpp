@@ -1,5 +1,5 @@
-// The scenes of rigid bodies of the demos, in sizes that take minutes: how long their steps take on one thread and on
-// all, and whether they still do what they must.
+// The rigid-body scenes of the demos, in sizes that run for minutes: step times on one thread and on all, and whether
+// their criteria are still met.
 #include <fmt/format.h>
 #include <oneapi/tbb/global_control.h>
 #include <oneapi/tbb/info.h>
@@ -56,7 +56,7 @@ demo::Outcome play(const NamedScene& scene, int threads) {
     return scene.play();
 }
 
-// Throws std::runtime_error where another number of threads has led elsewhere.
+// Throws std::runtime_error if another count of threads gives another result.
 void compare(const NamedScene& scene, int threads, int repetitions) {
     std::vector<double> one, all, slow;
     std::optional<demo::Outcome> outcome;

@@ -1,4 +1,4 @@
-// A block slides without friction over waves of triangles: by its field, and as Bullet's own shapes.
+// A block slides without friction over wavy triangles: by its field, and by Bullet's own shapes.
 #include <BulletCollision/CollisionDispatch/btInternalEdgeUtility.h>
 #include <BulletCollision/CollisionShapes/btBoxShape.h>
 #include <BulletCollision/CollisionShapes/btBvhTriangleMeshShape.h>
@@ -29,7 +29,7 @@ namespace {
 
 constexpr glm::vec3 halfBlock{0.3f, 0.3f, 0.15f};  // [m]
 constexpr float startX = -5, startY = 0.13f;       // [m]
-constexpr float settled = 0.25f;                   // speeds are measured from then on [s]
+constexpr float settled = 0.25f;                   // speeds are measured from this time on [s]
 constexpr float gravity = 9.81f;                   // [m/s^2]
 
 struct Options {
@@ -37,7 +37,7 @@ struct Options {
     float cell = 0.25f, speed = 2, seconds = 3, stepsPerSecond = 240, voxelSize = 0.0125f;
 };
 
-/// What collides, and with what of the ground's.
+/// Collision shapes of block and ground.
 struct Rival {
     std::string name;
     std::shared_ptr<btCollisionShape> block;
@@ -74,7 +74,7 @@ bool adjustEdges(btManifoldPoint& point, const btCollisionObjectWrapper* a, int 
 }
 
 struct Slide {
-    double kept;  ///< of the speed that a point without friction has [%]
+    double kept;  ///< speed relative to that of a frictionless point [%]
     double step;  ///< [ms]
 };
 

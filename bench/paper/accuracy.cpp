@@ -1,4 +1,4 @@
-// What the double layer method's distances are worth: Table 1, and K.
+// Accuracy of the double layer method's distances: Table 1, and K.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -21,7 +21,7 @@ using bench::logSlope;
 using bench::Stopwatch;
 using nlohmann::json;
 
-// Eq. 4, and the signs. Lengths in steps.
+// Errors by Eq. 4, and wrong signs. Lengths in steps.
 struct Errors {
     double worst = 0, sum = 0;
     std::uint64_t nodes = 0, signs = 0;
@@ -41,7 +41,7 @@ bool finite(float phi) {
     return std::abs(phi) < farAway;
 }
 
-// Over all nodes where both are finite and the truth is no farther than this.
+// Over all nodes where both are finite and the true distance does not exceed the limit.
 Errors errors(const DenseField& field, const DenseField& truth, float within) {
     Errors result;
     const float step = field.lattice.step;
@@ -63,7 +63,7 @@ Errors errors(const LevelSet& field, const DenseField& truth) {
     return result;
 }
 
-// The corner of a cube of (2K + 1)^3 nodes around a sample is nearer than this to the surface.
+// Every node of a cube of (2K + 1)^3 nodes around a sample is nearer than this to the surface.
 constexpr float reached = 6.1f;
 constexpr float papersBand = 2;  // "about 2 Delta away from the triangle mesh" (section 5.2)
 constexpr float noLimit = 1e9f;
@@ -94,7 +94,8 @@ json measureTable1(const Run& run) {
     return {{"rows", rows}, {"triangles", bunny->mesh.triangles.size()}, {"origin", bunny->origin}};
 }
 
-// The power of the step that an error goes with; "-" where the error does not fall from grid to grid.
+// Order of convergence: the power of the step with which an error falls; "-" if the error does not fall from grid to
+// grid.
 std::string order(const std::vector<double>& steps, const std::vector<double>& errors) {
     if (!std::is_sorted(errors.rbegin(), errors.rend())) return "-";
     return fmt::format("{:.2f}", logSlope(steps, errors));
@@ -118,7 +119,7 @@ std::string papersOrder(double published::Error::*norm) {
     return order(steps, values);
 }
 
-// "6.9, 2.1, 1.47 and 0.83" of rows; nothing where a row has no such number.
+// Lists numbers of rows as "6.9, 2.1, 1.47 and 0.83"; empty if a row lacks the number.
 std::string listed(const json& rows, const char* what) {
     std::string text;
     for (std::size_t i = 0; i < rows.size(); ++i) {
@@ -176,7 +177,7 @@ std::string textTable1(const json& data) {
     const auto smaller = [&](std::size_t i) {  // the mean error in the mesh's unit
         return published::table1[i].mean / (steps(i, "all", "mean") * double(data["rows"][i]["step"]));
     };
-    double minRatio = 1e9, maxRatio = 0;  // of the blocks' worst error to the paper's, in steps
+    double minRatio = 1e9, maxRatio = 0;  // range of the block-wise method's worst error over the paper's, in steps
     for (std::size_t i = 0; i <= last; ++i) {
         const double ratio = steps(i, "blocks", "worst") / (published::table1[i].worst / published::table1[i].step);
         minRatio = std::min(minRatio, ratio);
@@ -208,23 +209,24 @@ std::string textTable1(const json& data) {
                published::table1[0].nodes - 1, boxSide / (published::table1[0].nodes - 1));
 }
 
-// How far the serial program's field and the block-wise one are apart.
+// Differences between the fields of the serial program and of the block-wise method.
 struct Apart {
-    double worst = 0;             // of nodes that are the same [steps]
+    double worst = 0;             // maximum difference of nodes that count as equal [steps]
     std::uint64_t reached = 0;    // nodes
     std::uint64_t halfWay = 0;    // that depend on how a sample half-way between two nodes is rounded
-    std::uint64_t ties = 0;       // whose layers are equally near, with the other sign
-    std::uint64_t different = 0;  // for no such reason
-    std::uint64_t far = 0, farWrong = 0, farWrongBlocks = 0;  // known to neither, and on the wrong side
+    std::uint64_t ties = 0;       // with equally near layers and opposite signs
+    std::uint64_t different = 0;  // without such a reason
+    std::uint64_t far = 0, farWrong = 0, farWrongBlocks = 0;  // without a distance in either field, and on the wrong
+                                                              // side
 };
 
 constexpr float wholeCube = 5;  // half width that trims no node of a cube of 5^3 around a sample [steps]
-// Blocks round halves up from a little below; samples this near to there may go either way.
+// Blocks round halves up from slightly below. Samples this close to that threshold may round either way.
 constexpr float halvesUp = 0.5001f, halfError = 5e-5f;
 constexpr float tieWidth = 0.02f;  // on both sides of zero [steps]
-constexpr double rounding = 1e-3;  // that floats may differ by, on a grid of hundreds of steps [steps]
+constexpr double rounding = 1e-3;  // tolerance of floats on a grid of hundreds of steps [steps]
 
-// What the programs say of a node: a distance [steps], or the side of one that they do not know.
+// Value of a node: a distance [steps], or only a side where the distance is unknown.
 struct Node {
     bool known;
     double phi;
@@ -350,7 +352,7 @@ std::vector<std::string> behindTable1(const json& data) {
 }
 
 constexpr int kNodes = 251;
-constexpr float kBand = 1;  // that a neighbourhood of any K covers, but for gaps [steps]
+constexpr float kBand = 1;  // covered by a neighbourhood of any K, except for gaps [steps]
 
 json measureK(const Run& run) {
     const auto bunny = findModel("bunny", run.meshes);
@@ -381,7 +383,7 @@ json measureK(const Run& run) {
                         {"missing", missing},
                         {"reached", reachedNodes}});
     }
-    // what does not depend on K: both grids written and read once more
+    // the time independent of K: both grids are written and read once more
     const Stopwatch watch;
     const DenseField nothing = denseDoubleLayer({{{0, 0, 0}}, {{0, 0, 0}}}, lattice);
     return {{"rows", rows}, {"empty", watch.seconds()}};
@@ -390,7 +392,7 @@ json measureK(const Run& run) {
 std::string textK(const json& data) {
     std::vector<std::vector<std::string>> rows;
     double before = 0;
-    bool cheaper = true;  // every step of K, than Eq. 6 has it
+    bool cheaper = true;  // each step of K costs less than Eq. 6 predicts
     const double empty = data["empty"];
     for (const json& row : data["rows"]) {
         const int k = row["k"];

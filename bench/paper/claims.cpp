@@ -1,4 +1,4 @@
-// What the paper proves of its method, and where it ends: Theorems 1 and 2 at random, and thin walls.
+// The paper's proved claims and their limits: Theorems 1 and 2 at random, and thin walls.
 #include <fmt/format.h>
 #include <openvdb/tools/MeshToVolume.h>
 
@@ -46,7 +46,7 @@ json measureTheorems(const Run&) {
 constexpr double rounding = 1e-6;
 
 std::string remarkTheorem1(const json& data) {
-    double over = 0, flat = 0, convex = 0, convexDelta = 0;  // the worst; "under" over faces, at convex edges
+    double over = 0, flat = 0, convex = 0, convexDelta = 0;  // `flat` and `convex`: maximum "under"
     for (const char* which : {"triangles", "reflex", "blunt", "square", "sharp"})
         over = std::max(over, double(data[which]["over"]));
     for (const char* which : {"edges", "triangles", "reflex"}) flat = std::max(flat, double(data[which]["under"]));
@@ -113,7 +113,7 @@ std::string textTheorems(const json& data) {
                 : "\n");
 }
 
-// A wall of side x side x thickness, whose two faces are cut into triangles that know nothing of each other.
+// A wall of side x side x thickness. Its two faces are triangulated independently.
 Mesh wall(float side, float thickness, int cells, std::mt19937& random) {
     std::uniform_real_distribution<float> jitter(-0.3f, 0.3f);
     Mesh mesh;
@@ -159,7 +159,7 @@ constexpr float wallSide = 30, wallBand = 1.5f;  // [voxels]
 constexpr int wallCells = 20, wallTurns = 6;
 constexpr float wallHalfWidth = 3;
 
-// Voxels within the band, and those on the wrong side.
+// Voxels within the band, and those of wrong sign.
 struct Sides {
     std::uint64_t outside = 0, inside = 0, outsideWrong = 0, insideWrong = 0;
 };
@@ -228,7 +228,7 @@ std::string textWalls(const json& data) {
         }
         rows.push_back(cells);
     }
-    double thickest = 0;  // wall with a wrong sign
+    double thickest = 0;  // thickest wall with a wrong sign
     for (const json& row : data["rows"])
         if (row["layers"]["outsideWrong"] > 0) thickest = std::max(thickest, row["thickness"].get<double>());
     return fmt::format(

@@ -8,7 +8,7 @@
 namespace bilayer::paper {
 namespace {
 
-// Sections 3.1 and 3.2: both layers, in squared distances.
+// Sections 3.1 and 3.2: both layers, as squared distances.
 class Layers {
   public:
     Layers(const Lattice& lattice, const DenseOptions& options)
@@ -19,7 +19,8 @@ class Layers {
           delta_(double(options.delta) * double(lattice.step)),
           epsilon_(double(options.epsilon) * double(lattice.step) * double(lattice.step)) {}
 
-    // Places are in double until they are chosen: how a triangle is divided must not hang on rounding.
+    // Positions are double until they are rounded to nodes, so that the subdivision of a triangle does not depend on
+    // rounding.
     void add(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c) {
         const glm::dvec3 cross = glm::cross(b - a, c - a);
         const double length = glm::length(cross), area = length / 2;
@@ -128,7 +129,7 @@ DenseField denseDoubleLayer(const Mesh& mesh, const Lattice& lattice, const Dens
     Layers layers(lattice, options);
     for (const glm::uvec3& t : mesh.triangles) layers.add(mesh.points[t.x], mesh.points[t.y], mesh.points[t.z]);
     const float delta = options.delta * lattice.step;
-    std::vector<float>& phi = layers.outer;  // takes its place (section 4.2)
+    std::vector<float>& phi = layers.outer;  // reuses its memory (section 4.2)
     for (std::size_t i = 0; i < phi.size(); ++i) {
         const float inner2 = layers.inner[i], outer2 = layers.outer[i];
         if (inner2 == farAway || outer2 == farAway)

@@ -1,4 +1,4 @@
-// The paper's pictures: the original beside what the field keeps of it.
+// The paper's pictures: the original next to the surface of its field.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -19,7 +19,7 @@ using published::largeGrid;
 
 constexpr float halfWidth = 2;
 
-// The paper's field: its samples, its cubes of nodes.
+// The paper's field, with its samples and its cubes of nodes.
 LevelSet lettered(const Mesh& mesh, const Lattice& lattice, float delta = 0.5f) {
     BuildOptions options = optionsFor(lattice, Method::doubleLayer, halfWidth);
     options.doubleLayer.fillGaps = false;
@@ -27,7 +27,7 @@ LevelSet lettered(const Mesh& mesh, const Lattice& lattice, float delta = 0.5f) 
     return build(mesh, options);
 }
 
-// A mesh from a side, as large as the picture holds.
+// A view of a mesh from a direction, as large as the picture allows.
 View viewOf(const Mesh& mesh, const glm::dvec3& from, const glm::dvec3& up, int pixels, int lines) {
     View view{bounds(mesh).centre(), from, up, 0, pixels, lines};
     const glm::dvec3 back = glm::normalize(from), right = glm::normalize(glm::cross(up, back)),
@@ -48,7 +48,7 @@ std::size_t surfaceTriangles(const LevelSet& field) {
     return surface(field).triangles.size();
 }
 
-// Writes a figure and tells where.
+// Writes a figure and returns its location.
 std::string write(const Run& run, const std::string& name, const std::vector<Picture>& pictures, int columns) {
     writeJpeg(run.pictures + "/" + name, mosaic(pictures, columns));
     return run.picturesOnPage + "/" + name;
@@ -68,7 +68,7 @@ json measureFigure7(const Run& run) {
     const View view = viewOf(mesh, {0.15, 0.15, 1}, upright, 440, 440);
     std::vector<Picture> pictures{picture(mesh, view)};
     for (const int nodes : published::figure7) {
-        // the same bunny in all pictures: the grids differ in their steps alone
+        // the same bunny in all pictures: only the steps of the grids differ
         const Lattice lattice = latticeOf(nodes);
         pictures.push_back(picture(lettered(mesh, lattice), view));
     }
@@ -83,7 +83,7 @@ std::string textFigure7(const json& data) {
            "under it, as in the paper.\n";
 }
 
-constexpr int coarse = published::figure7.front();  // the paper does not tell its grid
+constexpr int coarse = published::figure7.front();  // the paper does not state its grid
 
 json measureFigure8(const Run& run) {
     const Lattice lattice = latticeOf(coarse);
@@ -117,7 +117,7 @@ json largeFigure(const Run& run, const std::string& name, const char* file, cons
             {"result", surfaceTriangles(field)}};
 }
 
-// Triangles of a figure, the paper's beside ours.
+// Triangle counts of a figure, the paper's next to ours.
 std::string counts(const json& data, const published::Surface& paper) {
     const auto kilo = [](const json& triangles) {
         return fmt::format("{:.2f}", triangles.get<double>() / published::thousand);
@@ -155,7 +155,7 @@ std::string textFigure10(const json& data) {
                      "The paper's box is not public; this one is carved by formula, with relief of like kind.");
 }
 
-// The grid at which the double layer's surface has as many triangles as the paper's.
+// The grid on which the double layer's surface has as many triangles as the paper's.
 Lattice latticeForTriangles(const Mesh& mesh, double wanted) {
     int low = 32, high = 512;
     while (high - low > 1) {

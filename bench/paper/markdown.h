@@ -1,4 +1,4 @@
-// Tables and numbers as the page shows them.
+// Formats tables and numbers for the page.
 #pragma once
 
 #include <fmt/format.h>
@@ -24,7 +24,7 @@ inline std::string table(const std::vector<std::string>& head, const std::vector
     return text;
 }
 
-/// The same text with lines of paragraphs broken at spaces; tables, headings and pictures stay as they are.
+/// The same text with paragraphs wrapped at spaces. Tables, headings and pictures stay unchanged.
 inline std::string wrapped(const std::string& text, std::size_t width = 128) {
     std::string result;
     std::istringstream lines(text);
@@ -40,7 +40,7 @@ inline std::string wrapped(const std::string& text, std::size_t width = 128) {
     return result;
 }
 
-/// Three digits, and no more behind the point than there are before the first of them.
+/// `count` significant digits; all digits before the point.
 inline std::string digits(double value, int count = 3) {
     if (value == 0 || !std::isfinite(value)) return fmt::format("{}", value);
     const int before = int(std::floor(std::log10(std::abs(value)))) + 1;
@@ -48,12 +48,12 @@ inline std::string digits(double value, int count = 3) {
     return fmt::format("{:.{}f}", value, std::max(0, count - before));
 }
 
-/// A number of the paper's with the two digits behind the point that all its seconds have.
+/// A number of the paper's, with two decimals as all its times have.
 inline std::string printed(double value) {
     return fmt::format("{:.2f}", value);
 }
 
-/// Seconds; "-" for none.
+/// Seconds; "-" for no value.
 inline std::string seconds(double value) {
     return std::isfinite(value) ? digits(value) : "-";
 }

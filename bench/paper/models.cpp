@@ -12,7 +12,7 @@
 namespace bilayer::paper {
 namespace {
 
-// A model's file in the corpus, and the one that is fetched instead.
+// A model's file in the corpus, and the downloaded alternative.
 struct Files {
     const char *name, *corpus, *corpusOrigin, *fetched, *fetchedOrigin;
 };
@@ -25,7 +25,7 @@ constexpr Files files[] = {
     {"screwdriver", "screwdriver.off", "the AIM@SHAPE screwdriver", "screwdriver.off", "the AIM@SHAPE screwdriver"},
 };
 
-// The lid's axis along y, where the paper's grids are longest.
+// Rotates the lid's axis to y, where the paper's grids are longest.
 Mesh standing(Mesh mesh) {
     for (glm::vec3& p : mesh.points) p = {p.x, p.z, -p.y};
     return mesh;
@@ -37,7 +37,7 @@ Mesh placed(Mesh mesh, const Lattice& lattice, const glm::vec3& scale) {
     return mesh;
 }
 
-// Times that the mesh fits into the grid along each axis.
+// How many times the mesh fits into the grid along each axis.
 glm::vec3 room(const Mesh& mesh, const Lattice& lattice) {
     return lattice.step * glm::vec3(lattice.nodes - 1 - 2 * marginNodes) / bounds(mesh).size();
 }

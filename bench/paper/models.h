@@ -1,8 +1,8 @@
-// The paper's models and the grids that they are put into.
+// The paper's models and grids.
 //
 // Its grids of 72, 126, 251, 501 and 715 nodes along a side are 5 / 0.07, 5 / 0.04, 5 / 0.02, 5 / 0.01 and 5 / 0.007
-// steps, and one node more; its grids of 834, 1001, 1251 and 1667 nodes along y are 5 / 0.006 to 5 / 0.003. So the box
-// is a cube of side 5, and a longer grid has a finer step along y.
+// steps, plus one node. Its grids of 834, 1001, 1251 and 1667 nodes along y are 5 / 0.006 to 5 / 0.003. So the box is a
+// cube of side 5, and a longer grid has a finer step along y.
 #pragma once
 
 #include <optional>
@@ -15,38 +15,38 @@ namespace bilayer::paper {
 /// Side of the box that holds every model [m].
 inline constexpr float boxSide = 5;
 
-/// Nodes between the model and the end of the grid: K + 1 of the default K.
+/// Nodes between the model and the border of the grid: K + 1 for the default K.
 inline constexpr int marginNodes = 3;
 
-/// A model that is there.
+/// An available model.
 struct Model {
     std::string name;    ///< "bunny"
-    std::string origin;  ///< where it is from, for the page
+    std::string origin;  ///< its origin, for the page
     Mesh mesh;
 };
 
-/// "bunny", "dragon", "circular box" or "screwdriver"; nothing if it is not here. Looks in the folder of the corpus
-/// (the environment variable BILAYER_MESHES names another one), then in `fetched`.
-/// @param fetched  the folder that ./run paper puts public meshes into
+/// Finds "bunny", "dragon", "circular box" or "screwdriver"; returns nothing if it is absent. Searches the folder of
+/// the corpus first (the environment variable BILAYER_MESHES overrides it), then `fetched`.
+/// @param fetched  the folder into which ./run paper downloads public meshes
 std::optional<Model> findModel(const std::string& name, const std::string& fetched);
 
-/// The paper's grid of so many nodes along x, y and z.
+/// The paper's grid of this many nodes along x, y and z.
 Lattice latticeOf(const glm::ivec3& nodes);
 inline Lattice latticeOf(int nodes) {
     return latticeOf(glm::ivec3(nodes));
 }
 
-/// The mesh in the middle of a grid, as large as the margin lets it be.
+/// The mesh centred in a grid, as large as the margin allows.
 Mesh fitted(Mesh mesh, const Lattice& lattice);
 
-/// The same, but stretched along each axis: as a grid of unlike steps over a cube sees it.
+/// The same, but scaled separately along each axis: as a grid of different steps over a cube sees it.
 Mesh stretched(Mesh mesh, const Lattice& lattice);
 
-/// The sphere of Table 5, which does not say how large it is: it fills the grid as other models do.
+/// The sphere of Table 5. The paper does not give its size; it fills the grid as other models do.
 /// @param areaVariance  Eq. 5 [m^4]
 Mesh unevenSphere(double areaVariance, const Lattice& lattice);
 
-/// What the block-wise builder is asked for: nodes of the lattice are its voxels.
+/// Options of the block-wise builder: its voxels are the nodes of the lattice.
 BuildOptions optionsFor(const Lattice& lattice, Method method, float halfWidth, int threads = 0);
 
 }  // namespace bilayer::paper

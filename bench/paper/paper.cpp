@@ -1,4 +1,5 @@
-// The experiments of the double layer paper, repeated: measures parts by name, each kept as JSON, and writes the page.
+// Reproduces the experiments of the double layer paper: measures parts by name, keeps each as JSON, and writes the
+// page.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <oneapi/tbb/version.h>
@@ -56,7 +57,7 @@ std::string procValue(const char* path, const std::string& key) {
     return "unknown";
 }
 
-// Without what PoCL adds after its version.
+// Removes the suffix after PoCL's version.
 std::string shortened(const std::string& version) {
     return version.substr(0, version.find("  "));
 }
@@ -86,7 +87,7 @@ fs::path keptAt(const fs::path& store, const std::string& name) {
     return store / (name + ".json");
 }
 
-// Under another name first: what was there stays whole until all is written.
+// Writes a temporary file first, then renames it: the old file stays intact until the new one is complete.
 void writeWhole(const fs::path& path, const std::string& text) {
     const fs::path unfinished = path.string() + ".part";
     std::ofstream file(unfinished);
@@ -134,11 +135,11 @@ std::string opening() {
         published::processor, published::gpu, boxSide, marginNodes);
 }
 
-// What is known of a part.
+// State of a part.
 struct Result {
     Part part;
-    json kept;            // null if there is none
-    std::string problem;  // why there is none
+    json kept;            // null if there is no data
+    std::string problem;  // reason for the lack of data
 };
 
 Result read(const Part& part, const fs::path& store) {
@@ -149,7 +150,7 @@ Result read(const Part& part, const fs::path& store) {
         json kept = json::parse(file);
         for (const char* key : {"when", "seconds", "rounds", "machine", "data"}) kept.at(key);
         sentence(kept["machine"]);
-        if (!kept["data"].contains("skipped")) part.text(kept["data"]);  // throws where numbers are not what it needs
+        if (!kept["data"].contains("skipped")) part.text(kept["data"]);  // throws if numbers are missing or invalid
         return {part, kept, ""};
     } catch (const json::exception& error) {
         fmt::print(stderr, "{}: {}\n", path.string(), error.what());
@@ -157,7 +158,8 @@ Result read(const Part& part, const fs::path& store) {
     }
 }
 
-// A part of the page; what falls behind goes onto a list. The machine is named if there are several.
+// A part of the page. Results worse than the paper or a peer are added to a list. The machine is named if there are
+// several.
 std::string textOf(const Part& part, const json& kept, bool severalMachines, std::string& behind) {
     const json& data = kept["data"];
     if (data.contains("skipped")) return fmt::format("Left out: {}.\n", data["skipped"].get<std::string>());

@@ -1,5 +1,5 @@
-// A part of the paper that is repeated: a table, a figure, a claim. Measuring gives JSON, which is kept from run to
-// run; the page is written from what is kept.
+// A reproduced part of the paper: a table, a figure or a claim. Measuring produces JSON, which is kept between runs;
+// the page is written from the kept JSON.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -8,29 +8,29 @@
 
 namespace bilayer::paper {
 
-/// What the parts are told.
+/// Options of all parts.
 struct Run {
-    int rounds = 3;              ///< builders take turns so many times
-    std::string meshes;          ///< folder of fetched meshes
-    std::string pictures;        ///< folder that pictures are written to
-    std::string picturesOnPage;  ///< the same, as seen from the page
+    int rounds = 3;              ///< timing rounds, in each of which every builder runs once
+    std::string meshes;          ///< folder of downloaded meshes
+    std::string pictures;        ///< output folder of the pictures
+    std::string picturesOnPage;  ///< the same, relative to the page
 };
 
 struct Part {
     const char* name;   ///< on the command line: "table1"
     const char* title;  ///< on the page
-    /// Runs the experiment. An object with "skipped" says why there is none.
+    /// Runs the experiment. If it cannot run, the object has a "skipped" member with the reason.
     nlohmann::json (*measure)(const Run& run);
-    /// Markdown of what measure() gave.
+    /// Markdown of the result of measure().
     std::string (*text)(const nlohmann::json& data);
-    /// Sentences: where bilayer falls behind the paper, or behind a peer, in what measure() gave. May be null.
+    /// Sentences about results of measure() where bilayer is worse than the paper or a peer. May be null.
     std::vector<std::string> (*behind)(const nlohmann::json& data) = nullptr;
 };
 
-/// All, in the order of the page.
+/// All parts, in the order of the page.
 std::vector<Part> parts();
 
-// In the files of the same names.
+// Each group is in the file of the same name.
 std::vector<Part> accuracyParts();  ///< same, table1, k
 std::vector<Part> speedParts();     ///< table2 to table5
 std::vector<Part> figureParts();    ///< figure7 to figure11

@@ -1,7 +1,7 @@
 #include "bench/paper/picture.h"
 
 #include <openvdb/tools/RayTracer.h>
-// after cstdio's FILE is known
+// cstdio's FILE must be known first
 #include <jpeglib.h>
 
 #include <algorithm>
@@ -32,8 +32,8 @@ Vec3d toVdb(const glm::dvec3& v) {
     return {v.x, v.y, v.z};
 }
 
-// A matt surface under a strong lamp at the upper left and weak light from the eye and from below; grey blue, and what
-// turns its back is orange.
+// A matt surface with a strong light at the upper left, and weak light from the eye and from below. Front faces are
+// grey blue, back faces orange.
 class Studio : public openvdb::tools::BaseShader {
   public:
     Studio(const Vec3d& right, const Vec3d& up, const Vec3d& back)
@@ -53,7 +53,7 @@ class Studio : public openvdb::tools::BaseShader {
     Vec3d lamp_, back_;
 };
 
-// What OpenVDB's tracer asks of an intersector, answered by triangles.
+// The interface that OpenVDB's tracer requires of an intersector, on triangles.
 class MeshIntersector {
   public:
     using Vec3Type = Vec3d;

@@ -1,5 +1,5 @@
-// Pictures of fields and of the meshes that they are from, by OpenVDB's ray tracer: one camera and one shader for both;
-// where a ray meets a mesh, its triangles say.
+// Pictures of fields and of their source meshes by OpenVDB's ray tracer, with the same camera and shader. Ray hits on a
+// mesh use its triangles.
 #pragma once
 
 #include <cstdint>
@@ -18,25 +18,26 @@ struct Picture {
     std::vector<std::uint8_t> pixels;
 };
 
-/// Where one looks from: without perspective.
+/// An orthographic view.
 struct View {
-    glm::dvec3 centre;  ///< in the middle of the picture [m]
-    glm::dvec3 from;    ///< direction from there to the eye
+    glm::dvec3 centre;  ///< centre of the picture [m]
+    glm::dvec3 from;    ///< direction from the centre to the eye
     glm::dvec3 up{0, 1, 0};
-    double width;  ///< of what is seen [m]
+    double width;  ///< width of the visible area [m]
     int pixels = 480, lines = 480;
 };
 
 /// The zero surface of a field.
 Picture picture(const LevelSet& field, const View& view);
 
-/// A mesh, each triangle flat.
+/// A mesh with flat shading.
 Picture picture(const Mesh& mesh, const View& view);
 
-/// Pictures of one size side by side in rows, with a gap between.
+/// Arranges pictures of equal size in rows, with a gap between them.
 Picture mosaic(const std::vector<Picture>& pictures, int columns);
 
-/// Writes a JPEG, as good as the bytes allow. Throws std::runtime_error that names the file when it cannot be written.
+/// Writes a JPEG of the highest quality within the size limit. Throws std::runtime_error with the file name if it
+/// cannot be written.
 void writeJpeg(const std::filesystem::path& path, const Picture& picture, std::size_t maxBytes = 245'000);
 
 }  // namespace bilayer::paper

@@ -1,6 +1,6 @@
-// Every number that is taken from the paper, and nothing else. Y. Wu, J. Man, Z. Xie, "A double layer method for
-// constructing signed distance fields from triangle meshes", Graphical Models 76 (2014) 214-223. K is 1024 triangles
-// there.
+// All numbers that are taken from the paper, and nothing else. Y. Wu, J. Man, Z. Xie, "A double layer method for
+// constructing signed distance fields from triangle meshes", Graphical Models 76 (2014) 214-223. In the paper K is 1024
+// triangles.
 #pragma once
 
 #include <array>
@@ -36,7 +36,7 @@ inline constexpr std::array<Seconds, 3> tables23{{{"bunny", 68.91, 0.62, 0.68, 0
                                                   {"dragon", 850.88, 3.60, 1.59, 0.37, 0.21},
                                                   {"circular box", 1369.77, 4.56, 2.44, 0.43, 0.14}}};
 
-/// Table 4, the circular box: serial, Tesla, OpenCL on the processor [s]. None: out of memory.
+/// Table 4, the circular box: serial, Tesla, OpenCL on the CPU [s]. None: out of memory.
 struct Growth {
     std::array<int, 3> nodes;
     double serial;
@@ -51,7 +51,7 @@ inline constexpr std::array<Growth, 7> table4{{{{251, 251, 251}, 2.44, 0.08, 0.1
                                                {{715, 1251, 715}, 41.47, std::nullopt, 1.38},
                                                {{715, 1667, 715}, 110.37, std::nullopt, 2.50}}};
 
-/// Table 5, the sphere of 3.21 K triangles, OpenCL on the processor.
+/// Table 5, the sphere of 3.21 K triangles, OpenCL on the CPU.
 struct Uneven {
     double variance;  ///< of areas, Eq. 5
     double seconds;
@@ -64,7 +64,7 @@ inline constexpr std::array<int, 3> figure7{72, 126, 251};
 inline constexpr std::array<float, 3> figure8{0.1f, 0.5f, 1.f};
 inline const glm::ivec3 largeGrid(715, 834, 715);
 
-/// Triangles of originals and of the surfaces extracted from their fields, Figs. 9 to 11 [K].
+/// Triangle counts of the originals and of the surfaces extracted from their fields, Figs. 9 to 11 [K].
 struct Surface {
     const char* model;
     double original, result;
@@ -72,6 +72,6 @@ struct Surface {
 inline constexpr std::array<Surface, 3> surfaces{
     {{"dragon", 850.88, 1902.90}, {"circular box", 1369.77, 3975.68}, {"screwdriver", 53.03, 37.57}}};
 
-inline constexpr double thousand = 1024;  ///< triangles in a K
+inline constexpr double thousand = 1024;  ///< triangles in one K
 
 }  // namespace bilayer::paper::published

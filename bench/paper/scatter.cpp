@@ -10,7 +10,7 @@
 namespace bilayer::paper {
 namespace {
 
-// A directed edge and the triangle that runs it, for sorting.
+// A directed edge and its triangle, for sorting.
 struct Edge {
     std::uint64_t vertices;  // the smaller index first
     std::uint32_t triangle, side;
@@ -26,7 +26,7 @@ class Normals {
     }
 
     std::vector<glm::dvec3> faces;
-    std::vector<std::array<glm::dvec3, 3>> edges;  // of a triangle: from its first corner to its second one, ...
+    std::vector<std::array<glm::dvec3, 3>> edges;  // of a triangle: from its first vertex to its second one, ...
     std::vector<glm::dvec3> vertices;
 
   private:
@@ -64,8 +64,7 @@ class Normals {
     }
 };
 
-// The point of a triangle that is closest, and the normal there. C. Ericson, "Real-Time Collision Detection"
-// (2005), 5.1.5.
+// The closest point of a triangle, and the normal there. C. Ericson, "Real-Time Collision Detection" (2005), 5.1.5.
 struct Closest {
     glm::dvec3 point;
     const glm::dvec3* normal;
@@ -76,7 +75,7 @@ class Scatter {
     Scatter(const Mesh& mesh, const Lattice& lattice, float band)
         : field{lattice, std::vector<float>(lattice.count(), farAway)}, mesh_(mesh), normals_(mesh), band_(band) {}
 
-    // All in steps until finish().
+    // All lengths are in steps until finish().
     void add(std::size_t t) {
         const glm::uvec3& v = mesh_.triangles[t];
         const double perMetre = 1 / double(field.lattice.step);

@@ -1,4 +1,4 @@
-// What fields take: Tables 2 to 5.
+// Build times of fields: Tables 2 to 5.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -29,19 +29,20 @@ using bench::Stopwatch;
 using nlohmann::json;
 using published::tableNodes;
 
-constexpr float halfWidth = 2;     // "about 2 Delta away from the triangle mesh", for all [steps]
-constexpr int threads = 2;         // of those that take more than one, but devices
-constexpr double maxSeconds = 25;  // a builder takes no further turns once it has used up these
+constexpr float halfWidth = 2;     // "about 2 Delta away from the triangle mesh", for all builders [steps]
+constexpr int threads = 2;         // of builders with more than one thread, except devices
+constexpr double maxSeconds = 25;  // a builder gets no further turns once it has used this time
 constexpr double MiB = 1 << 20;
 
-// Something that is timed by turns.
+// A timed alternative; alternatives run in turns.
 struct Contender {
     std::string name;
     std::function<void()> work;
     std::vector<double> seconds{};
 };
 
-// Contenders take turns, so that a slow minute hits all of them alike. The first round is kept: a mesh is built once.
+// Contenders take turns, so that a slow minute affects all of them alike. The first round counts, since a mesh is built
+// only once.
 json medians(std::vector<Contender> contenders, int rounds) {
     for (int round = 0; round < rounds; ++round)
         for (Contender& contender : contenders) {
@@ -69,7 +70,7 @@ double value(const json& row, const char* name) {
     return row.contains(name) && row[name].is_number() ? row[name].get<double>() : std::nan("");
 }
 
-// An OpenCL device, and what builds there without and with its clock.
+// An OpenCL device and its builders, without and with profiling.
 struct Engine {
     DeviceInfo info;
     std::unique_ptr<OpenclTimes> times;
@@ -100,7 +101,7 @@ json profiled(const Engine& engine, const Scene& scene, Builder builder, int rou
     return {{"kernels", bench::median(kernels)}, {"peak", peak}};
 }
 
-// What a device takes for some builders: a warm-up, which compiles, turns, and the device's own clock.
+// Times of a device for some builders: a warm-up, which compiles; the turns; and the device's own clock.
 json onDevice(const Engine& engine, const Scene& scene, const std::vector<Builder>& builders, int rounds) {
     std::vector<Contender> contenders;
     for (const Builder which : builders) {
@@ -116,13 +117,13 @@ json onDevice(const Engine& engine, const Scene& scene, const std::vector<Builde
     return result;
 }
 
-// A device, and on how many compute units it runs.
+// Name of a device with its count of compute units.
 std::string nameOf(const json& device) {
     const int units = device.value("units", 0);
     return device["device"].get<std::string>() + (units ? fmt::format(" ({} compute units)", units) : "");
 }
 
-// What columns of a table call "OpenCL 1" and so on.
+// Legend for the column names "OpenCL 1" and so on.
 std::string legend(const json& devices) {
     std::string text;
     for (std::size_t i = 0; i < devices.size(); ++i) text += fmt::format(" OpenCL {}: {}.", i + 1, nameOf(devices[i]));
@@ -239,7 +240,7 @@ std::string counted(int count) {
     return count == 1 ? "1 thread" : fmt::format("{} threads", count);
 }
 
-// A line where our seconds are more than another's.
+// Notes a row where our time exceeds another's.
 void note(std::vector<std::string>& found, const std::string& where, const std::string& what, double ours,
           const std::string& other, double theirs, const std::string& shown) {
     if (ours > theirs) found.push_back(fmt::format("{}: {} {} s, {} {} s.", where, what, digits(ours), other, shown));
@@ -249,7 +250,7 @@ void note(std::vector<std::string>& found, const std::string& where, const std::
     note(found, where, what, ours, other, theirs, digits(theirs));
 }
 
-// The same beside a number of the paper's.
+// The same against a number of the paper's.
 void notePapers(std::vector<std::string>& found, const std::string& where, const std::string& what, double ours,
                 const std::string& papers, double theirs) {
     note(found, where, what, ours, fmt::format("the paper's {} on a {}", papers, published::processor), theirs,
@@ -307,7 +308,7 @@ double whole(const json& row, Builder builder) {
 
 std::string textTable3(const json& data) {
     std::vector<std::vector<std::string>> rows;
-    std::vector<std::string> hosts;  // where most of the prism method's build is not in kernels
+    std::vector<std::string> hosts;  // devices where most of the prism method's build time is outside the kernels
     for (const json& row : data["rows"]) {
         const std::string model = row["model"];
         const published::Seconds& paper = published23(model);
@@ -363,7 +364,7 @@ std::vector<std::string> behindTable3(const json& data) {
     return found;
 }
 
-// What can be had without swapping [bytes].
+// Memory that is available without swapping [bytes].
 double memoryAvailable() {
     std::ifstream file("/proc/meminfo");
     std::string word;
@@ -373,9 +374,9 @@ double memoryAvailable() {
     return kiB * 1024;
 }
 
-constexpr double room = 1.2;  // times its two grids that must be available for the dense program
+constexpr double room = 1.2;  // the dense program runs only if this times its two grids is available
 
-// Peaks are taken first, in processes of their own: a process that has started threads cannot be forked.
+// Peaks are measured first, in processes of their own: a process with threads cannot be forked.
 json peaks(const Mesh& box, const Lattice& lattice, bool fits) {
     Scene scene{"circular box", float(lattice.nodes.x), {}, lattice.step};
     const auto make = [&] {
@@ -499,12 +500,13 @@ std::string textTable4(const json& data) {
                most, published::processor, threads, gpu ? "" : " No GPU was at hand for the Tesla's column.");
 }
 
-// Ours in Tables 4 and 5.
+// Our methods in Tables 4 and 5.
 constexpr std::array onTbb{std::pair("layers", "`double-layer`"), std::pair("exact", "`exact`")};
 constexpr std::array onDevices{std::pair(Builder::doubleLayerOpencl, "`double-layer`"),
                                std::pair(Builder::exactOpencl, "`exact`")};
 
-// Grids of Table 4 where one of ours is slower than one of the paper's, or gains less over the serial program.
+// Grids of Table 4 where one of ours is slower than one of the paper's, or has a smaller speed-up over the serial
+// program.
 struct Lag {
     std::vector<std::string> opencl, tesla, gain;
 

@@ -36,7 +36,7 @@ void note(DistanceError& worst, double error, double longest, double delta) {
 }
 
 // A wedge around the z axis: the solid between two half planes, in cross-section at the angles 0 and `angle`. Its faces
-// are cut into right triangles of two equal legs, each with its barycentre for a sample.
+// are divided into isosceles right triangles, each with its barycentre as its sample.
 struct Wedge {
     double angle, leg;
     std::vector<dvec3> samples[2];
@@ -57,7 +57,7 @@ struct Wedge {
                     }
     }
 
-    // To the surface.
+    // Distance to the surface.
     double distance(const dvec2& p) const {
         double nearest = glm::length(p);
         for (int face = 0; face < 2; ++face)
@@ -65,7 +65,7 @@ struct Wedge {
         return nearest;
     }
 
-    // By the inner layer (Eq. 3).
+    // Distance by the inner layer (Eq. 3).
     double approximate(const dvec3& p, double delta) const {
         double nearest = 1e9;
         for (int face = 0; face < 2; ++face)
@@ -127,7 +127,7 @@ DistanceError aroundWedges(unsigned seed, int trials, double minAngle, double ma
 
 namespace {
 
-// Fig. 6: two edges that meet in the origin, the solid above them.
+// Fig. 6: two edges that meet at the origin, with the solid above them.
 struct Bend {
     double theta, l1, l2, delta;
     dvec2 left, right;                                   // along the edges
@@ -164,14 +164,14 @@ struct Bend {
         const dvec2 upLeft(std::sin(theta), std::cos(theta)), upRight(-std::sin(theta), std::cos(theta));
         return glm::dot(p, upLeft) < 0 || glm::dot(p, upRight) < 0;
     }
-    // To both edges; the neighbours beyond their ends are not known.
+    // Distance to both edges; neighbours beyond their ends are unknown.
     double distance(const dvec2& p) const {
         const auto to = [&](const dvec2& along, double length) {
             return glm::distance(p, std::clamp(glm::dot(p, along), 0.0, length) * along);
         };
         return std::min(to(left, 2 * l1), to(right, 2 * l2));
     }
-    // Whether the edges themselves, not their far ends, are nearest.
+    // Whether the edges themselves are nearest, not their far ends.
     bool within(const dvec2& p) const { return glm::dot(p, left) < 2 * l1 && glm::dot(p, right) < 2 * l2; }
 };
 
@@ -179,7 +179,7 @@ struct Bend {
 
 SignError aroundBends(unsigned seed, int trials, bool closed) {
     constexpr int points = 40;
-    constexpr double around = 4;  // of O [OF]
+    constexpr double around = 4;  // radius of the search around O [OF]
     Dice dice(seed);
     SignError worst;
     while (trials > 0) {

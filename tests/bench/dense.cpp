@@ -16,17 +16,17 @@ using namespace bilayer::paper;
 
 namespace {
 
-constexpr float width = 7;  // beyond the corner of a cube of 7^3 nodes, so that no value is trimmed [steps]
+constexpr float width = 7;  // beyond the corner of a cube of 7^3 nodes, so that no value is clamped [steps]
 
-/// The dense program works in the mesh's unit, the blocks in voxels from a place nearby: a float of 100 steps is
-/// rounded by 4e-6, and its error goes into the distance at most twice [steps].
+/// The dense program works in the mesh's unit, the blocks in voxels relative to a nearby origin. A float of 100 steps
+/// is rounded by 4e-6; its error enters the distance at most twice [steps].
 constexpr float rounding = 5e-5f;
 
-/// Blocks round halves up from this far below, so that all ways to compute a place agree. A sample nearer to it than
-/// rounding may go to either node, and then the cube around it lies a step aside.
+/// Blocks round halves up from this far below, so that all ways to compute a position agree. A sample within the
+/// rounding error of it may go to either node; the cube around it then shifts by one step.
 constexpr float halfOfBlocks = 0.5001f, halfError = 2e-5f;
 
-// A mesh in the middle of a lattice of so many nodes along its longest side.
+// A mesh in the middle of a lattice with this many nodes along its longest side.
 std::pair<Mesh, Lattice> inLattice(Mesh mesh, int nodes) {
     const int margin = int(width) + 2;
     const Bounds box = bounds(mesh);
@@ -40,8 +40,8 @@ bool agree(float a, float b, float step) {
                                                             : std::abs(a - b) < rounding * step;
 }
 
-// The layers are equally near up to rounding: the sign is the one or the other, and inside the distance is to the outer
-// layer, outside to the inner one.
+// The layers are equally near up to rounding, so either sign is valid. Inside, the distance is that to the outer layer;
+// outside, that to the inner one.
 bool tie(float a, float b, float step) {
     return std::abs(a) != farAway && std::abs(b) != farAway && a * b <= 0 &&
            std::abs(std::abs(a) - std::abs(b)) < 0.02f * step;
@@ -88,7 +88,7 @@ Counts compare(const Mesh& input, int nodes, const DenseOptions& options) {
     return counts;
 }
 
-// A closed mesh of random triangles: a sphere whose points are pulled in and out.
+// A closed mesh of random triangles: a sphere whose points are displaced in and out.
 Mesh crumpled(unsigned seed, int levels, float depth) {
     std::mt19937 random(seed);
     std::uniform_real_distribution<float> pull(1 - depth, 1 + depth);

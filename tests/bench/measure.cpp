@@ -1,4 +1,4 @@
-// What the benchmarks say must follow from what they measured.
+// Summaries of the benchmarks must follow from their measurements.
 #include "bench/measure.h"
 
 #include <catch2/catch.hpp>
@@ -63,7 +63,7 @@ TEST_CASE("fields differ where their meshes do") {
     CHECK(difference(narrow, one).voxels == width.voxels);
     CHECK(width.signs == 0);
 
-    // half a voxel to the side: distances on the axis differ by as much, voxels around the equator change sign
+    // shifted by half a voxel: distances on the axis differ by as much, voxels around the equator change sign
     Scene moved = ball;
     for (glm::vec3& point : moved.mesh.points) point.x += moved.voxelSize / 2;
     const Difference shifted = difference(one, fieldOf(moved, {}));

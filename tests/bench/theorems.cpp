@@ -1,4 +1,4 @@
-// The paper's theorems at random triangles and wedges, and where they end.
+// The paper's theorems at random triangles and wedges, and their limits.
 #include "bench/paper/theorems.h"
 
 #include <catch2/catch.hpp>
@@ -58,5 +58,5 @@ TEST_CASE("theorem 2: OF is no more than half of what the edges' halves differ b
         CHECK(error.formula < 1e-12);
     }
     CHECK(closed.farthest <= 1 + none);
-    CHECK(open.farthest > 1);  // F is the farthest only where Fig. 6 draws a triangle
+    CHECK(open.farthest > 1);  // F is the farthest point only where Fig. 6 draws a triangle
 }

@@ -33,7 +33,7 @@ Pair bodyOf(const Mesh& mesh, float voxelSize) {
     return {made, std::make_shared<Collider>(readVdb(path))};
 }
 
-// The poses of a heap of two fields, a ball and a block over one and a half seconds.
+// The poses of a pile of two fields, a ball and a block over 1.5 s.
 std::vector<btTransform> heap(const std::shared_ptr<const Collider>& knot,
                               const std::shared_ptr<const Collider>& slab) {
     Shape floor(slab), body(knot, {.frame = bullet::centreOfMassFrame(*knot)});
@@ -63,7 +63,7 @@ TEST_CASE("Bodies from files move as those of meshes, to the bit") {
         CAPTURE(i);
         REQUIRE(std::memcmp(&poses[i], &expected[i], sizeof(btTransform)) == 0);
     }
-    // they did meet: the block lies on the slab by now, on one of its faces
+    // they did collide: the block rests on the slab by then, on one of its faces
     const float height = poses.back().getOrigin().z();
     CHECK(std::min({std::abs(height - 0.06f), std::abs(height - 0.08f), std::abs(height - 0.1f)}) < 0.004f);
 }

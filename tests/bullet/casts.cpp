@@ -1,5 +1,5 @@
-// What is cast against a field is answered as Bullet's own triangle mesh answers it: rays, shapes on their way, contact
-// tests, and fast bodies that Bullet follows itself.
+// Casts against a field give the results of Bullet's own triangle mesh: rays, shape sweeps, contact tests, and Bullet's
+// CCD of fast bodies.
 #include <BulletCollision/CollisionShapes/btMultiSphereShape.h>
 #include <BulletCollision/NarrowPhaseCollision/btRaycastCallback.h>
 
@@ -33,7 +33,7 @@ using bullet::detail::toBullet;
 namespace {
 
 constexpr float voxel = 0.05f;  // at scale 1 [m]
-// Bullet stops a shape this far before it touches, at any scale [m].
+// Bullet stops a shape this far before contact, at any scale [m].
 constexpr float stopsBefore = 1e-3f;
 
 Mesh scaled(Mesh mesh, float scale) {
@@ -41,9 +41,9 @@ Mesh scaled(Mesh mesh, float scale) {
     return mesh;
 }
 
-// The same body twice, as a field and as triangles, each in a world of its own.
+// The same body twice, as a field and as triangles, each in its own world.
 struct Twins {
-    /// @param scaledByBullet  the field, instead of its mesh
+    /// @param scaledByBullet  scale the field by Bullet instead of its mesh
     /// @param itsScale        of the triangles
     Twins(const Mesh& mesh, float scale, bool scaledByBullet, float itsScale)
         : field(std::make_shared<Collider>(scaledByBullet ? mesh : scaled(mesh, scale),
@@ -73,7 +73,7 @@ class Directions {
     float part() { return part_(random_); }
     btVector3 vector() { return {part(), part(), part()}; }
     btQuaternion turn() { return btQuaternion(part(), part(), part(), part() + 0.01f).normalized(); }
-    /// From somewhere outside of a ball to a place in it, and beyond.
+    /// From somewhere outside a ball to a place in it, and beyond.
     std::pair<btVector3, btVector3> way(float scale) {
         const btVector3 through = 0.6f * scale * vector(), from = 2 * scale * vector().normalized();
         return {from, from + 1.8f * (through - from)};
@@ -84,7 +84,7 @@ class Directions {
     std::uniform_real_distribution<float> part_{-1, 1};
 };
 
-// Sizes less the margin, which Bullet itself rounds otherwise at each scale.
+// Sets the sizes minus the margin, which Bullet itself rounds differently at each scale.
 void setSize(btConvexInternalShape& shape, float s, const btVector3& halfExtents, float margin) {
     shape.setMargin(s * margin);
     shape.setImplicitShapeDimensions(s * (halfExtents - btVector3(margin, margin, margin)));
@@ -95,7 +95,7 @@ std::unique_ptr<btConvexShape> shapeOf(int kind, float s) {
         case 0:
             return std::make_unique<btSphereShape>(0.12f * s);
         case 1: {
-            // by this Bullet rounds it off
+            // Bullet rounds the shape off by this
             const btVector3 halfExtents(0.1f, 0.15f, 0.2f);
             auto box = std::make_unique<btBoxShape>(s * halfExtents);
             setSize(*box, s, halfExtents, 0.005f);
@@ -130,8 +130,8 @@ std::unique_ptr<btConvexShape> shapeOf(int kind, float s) {
     }
 }
 
-// The first touch of a sphere on its way, over all triangles, in double precision, by bisection of a brute-force
-// distance that falls until then.
+// The first contact of a sphere along its displacement, over all triangles, in double precision. Bisects a brute-force
+// distance that decreases until contact.
 double firstTouch(const Mesh& mesh, const glm::dvec3& from, const glm::dvec3& to, double radius) {
     double along = 0;
     const double length = glm::distance(from, to);
@@ -143,8 +143,8 @@ double firstTouch(const Mesh& mesh, const glm::dvec3& from, const glm::dvec3& to
     return 2;
 }
 
-// The first hit of a ray over all triangles, in double precision (Moller and Trumbore 1997), as a part of the way; 1 if
-// there is none. Triangles are grown by a part of their sides.
+// The first hit of a ray over all triangles, in double precision (Moller and Trumbore 1997), as a fraction of the
+// displacement; 1 if there is none. Triangles are grown by a fraction of their sides.
 double firstHit(const Mesh& mesh, const glm::dvec3& from, const glm::dvec3& to, bool oneSided, double grown) {
     double first = 1;
     const glm::dvec3 way = to - from;
@@ -161,7 +161,7 @@ double firstHit(const Mesh& mesh, const glm::dvec3& from, const glm::dvec3& to, 
     return first;
 }
 
-// How far a contact test finds a shape from the first body of a world.
+// The distance from the first body of a world to a shape, by a contact test.
 float distanceOf(btCollisionShape& shape, const btTransform& place, World& world) {
     btCollisionObject object;
     object.setCollisionShape(&shape);
@@ -194,7 +194,7 @@ TEST_CASE("Rays meet a field where they meet its triangles") {
         twins.ofField.dynamics.rayTest(begin, to, ray);
         twins.ofTriangles.dynamics.rayTest(begin, to, expected);
         CAPTURE(i, ray.m_closestHitFraction, expected.m_closestHitFraction);
-        // what passes the outline of the mesh by no more than rounding may hit it or not; Bullet grows its triangles
+        // rays that pass the outline of the mesh within rounding may hit or miss; Bullet grows its triangles
         const btTransform body = twins.ofField.dynamics.getCollisionObjectArray()[0]->getWorldTransform();
         const auto exact = [&, to = to](double grown) {
             return firstHit(mesh, glm::dvec3(bullet::detail::toGlm(body.invXform(begin))),
@@ -209,18 +209,18 @@ TEST_CASE("Rays meet a field where they meet its triangles") {
         turned += ray.m_hitNormalWorld.dot(expected.m_hitNormalWorld) < 0.999f;
     }
     CHECK(hits > 100);
-    // on an edge either triangle may answer
+    // on an edge the normal of either triangle is valid
     CHECK(turned <= hits / 50);
 }
 
 TEST_CASE("Shapes of all kinds on their way meet a field as they meet its triangles") {
     const int kind = GENERATE(range(0, 7));
-    // powers of two: all that Bullet searches is rounded alike
+    // powers of two: all values of Bullet's search are rounded alike
     const float scale = GENERATE(1.f / 128, 1.f, 128.f);
     const bool scaledByBullet = GENERATE(false, true);
     const unsigned start = seed();
     CAPTURE(kind, scale, scaledByBullet, start);
-    // Bullet's own search is rough where bodies are small: what it says of a metre holds at any scale
+    // Bullet's own search is inaccurate for small bodies; its result at the scale of 1 m is the reference at any scale
     Twins twins(bodyOf(kind % 2), scale, scaledByBullet, 1);
     const auto shape = shapeOf(kind, scale), itsShape = shapeOf(kind, 1);
     Directions random(start);
@@ -235,7 +235,7 @@ TEST_CASE("Shapes of all kinds on their way meet a field as they meet its triang
         twins.ofTriangles.dynamics.convexSweepTest(itsShape.get(), at(itsFrom), at(itsTo), expected);
         CAPTURE(i, sweep.m_closestHitFraction, expected.m_closestHitFraction);
         if (kind == 0) {
-            // spheres are exact: Bullet's own search stops a millimetre before, or where it does not converge
+            // spheres are exact; Bullet's own search stops a millimetre early, or where it does not converge
             const btTransform body = twins.ofField.dynamics.getCollisionObjectArray()[0]->getWorldTransform();
             const double exact =
                 firstTouch(scaled(bodyOf(kind % 2), scale), glm::dvec3(bullet::detail::toGlm(body.invXform(from))),
@@ -246,9 +246,9 @@ TEST_CASE("Shapes of all kinds on their way meet a field as they meet its triang
             ++hits;
             CHECK(sweep.m_closestHitFraction == Approx(exact).margin(1e-4));
         } else {
-            // Either search ends within a millimetre of where it touches, at the scale of 1. Where they differ by more,
-            // as where a shape skims along, ours is as near to the triangles, and has not gone into them since
-            // Bullet's.
+            // Either search ends within a millimetre of contact, at the scale of 1. They may differ by more, for
+            // example where a shape grazes the surface. Then ours must be as near to the triangles, and must not have
+            // penetrated them after Bullet's hit.
             const float ours = sweep.hasHit() ? sweep.m_closestHitFraction : 1;
             const float bullets = expected.hasHit() ? expected.m_closestHitFraction : 1;
             const float apart = itsFrom.distance(itsTo) * (ours - bullets);
@@ -269,7 +269,7 @@ TEST_CASE("Shapes of all kinds on their way meet a field as they meet its triang
         }
     }
     CHECK(hits > 15);
-    // where a shape meets two triangles at once, their order tells which one's normal Bullet gives
+    // where a shape touches two triangles at once, their order determines which normal Bullet returns
     CHECK(turned <= hits / 20);
 }
 
@@ -313,7 +313,7 @@ TEST_CASE("A body from a file answers casts and contact tests as the one of its 
 TEST_CASE("A shape that turns on its way meets what lies beside its last rotation") {
     Twins twins(bodyOf(0), 1, false, 1);
     const btBoxShape plank({0.02f, 0.02f, 0.9f});
-    // upright at the end, level on its way
+    // upright at the end, horizontal in between
     const btVector3 from(0.3f, 0.75f, 1.5f), to(0.3f, 0.75f, -1.5f);
     const btTransform first(btQuaternion({1, 0, 0}, SIMD_HALF_PI), from), last(btQuaternion({1, 0, 0}, 0), to);
     btCollisionWorld::ClosestConvexResultCallback sweep(from, to);
@@ -354,7 +354,7 @@ TEST_CASE("Fast bodies that Bullet follows itself stop at a field as at its tria
 
 namespace {
 
-// The least value of a convex function between two places, by golden sections.
+// The minimum of a convex function between two places, by golden-section search.
 double minBetween(const glm::dvec3& from, const glm::dvec3& to,
                   const std::function<double(const glm::dvec3&)>& function) {
     constexpr double golden = 0.6180339887498949;
@@ -371,19 +371,19 @@ double minBetween(const glm::dvec3& from, const glm::dvec3& to,
     return std::min({at(0), at(1), onLeft, onRight});
 }
 
-// How far a point is from the box of shapeOf(1, 1), whose corners Bullet rounds off.
+// Distance from a point to the box of shapeOf(1, 1), whose corners Bullet rounds off.
 double fromBox(const glm::dvec3& p) {
     const glm::dvec3 beyond = glm::abs(p) - glm::dvec3(0.1, 0.15, 0.2);
     return glm::length(glm::max(beyond, 0.)) + std::min(std::max({beyond.x, beyond.y, beyond.z}), 0.);
 }
 
-// How far a point is from the cylinder of shapeOf(3, 1).
+// Distance from a point to the cylinder of shapeOf(3, 1).
 double fromCylinder(const glm::dvec3& p) {
     const glm::dvec2 beyond(std::hypot(p.x, p.z) - 0.1, std::abs(p.y) - 0.2);
     return glm::length(glm::max(beyond, 0.)) + std::min(std::max(beyond.x, beyond.y), 0.);
 }
 
-// How far a point is from the cone of shapeOf(4, 1), which its margin rounds off.
+// Distance from a point to the cone of shapeOf(4, 1), which its margin rounds off.
 double fromCone(const glm::dvec3& p) {
     const glm::dvec2 at(std::hypot(p.x, p.z), p.y), apex(0, 0.15), rim(0.12, -0.15), side = rim - apex;
     const double part = std::clamp(glm::dot(at - apex, side) / glm::dot(side, side), 0., 1.);
@@ -394,8 +394,8 @@ double fromCone(const glm::dvec3& p) {
     return (isInside ? std::max(above, beyond) : std::min(toSide, toBase)) - 0.01;
 }
 
-// The distance of triangles from a convex solid, in whose coordinates they are. Bullet's own search among them rounds
-// a cylinder's rims off, and stops up to a tenth of a voxel before it has found the nearest place of one.
+// Distance between triangles and a convex solid, in the solid's coordinates. Bullet's own search rounds off a
+// cylinder's rims, and stops up to 0.1 voxels before it has found the nearest place of a triangle.
 double distanceTo(const Mesh& mesh, double ofPoint(const glm::dvec3&)) {
     double least = std::numeric_limits<double>::max();
     for (const glm::uvec3& t : mesh.triangles) {
@@ -412,11 +412,11 @@ double distanceTo(const Mesh& mesh, double ofPoint(const glm::dvec3&)) {
 TEST_CASE("Contact tests tell the distance that the triangles have") {
     const int kind = GENERATE(range(0, 7));
     const float scale = GENERATE(0.01f, 1.f, 100.f);
-    // of the first two, places are nearest that lie between surface points that are farther than the margin
+    // with the first two seeds, the nearest places lie between surface points that are outside the margin
     const unsigned start = GENERATE(28u, 116239924u, seed());
     CAPTURE(kind, scale, start);
     Twins twins(bodyOf(kind % 2 ? 2 : 0), scale, false, 1);
-    // a ring of four voxels' radius: the interpolant of distances from thinner ones is off by a tenth of a voxel
+    // a ring of four voxels' radius: for thinner ones the interpolation error reaches 0.1 voxels
     const Mesh mesh = bodyOf(kind % 2 ? 2 : 0);
     const auto shape = shapeOf(kind, scale), itsShape = shapeOf(kind, 1);
     Directions random(start);
@@ -434,7 +434,7 @@ TEST_CASE("Contact tests tell the distance that the triangles have") {
             world.dynamics.contactPairTest(world.dynamics.getCollisionObjectArray()[0], body, nearest);
             return nearest.distance / factor;
         };
-        // triangles tell nothing of a solid that they have sunk into
+        // triangles give no penetration depth of a solid
         const auto body = twins.ofTriangles.dynamics.getCollisionObjectArray()[0]->getWorldTransform();
         const float distance = ask(twins.ofField, ofField, scale), byBullet = ask(twins.ofTriangles, ofTriangles, 1);
         Mesh seen = mesh;

@@ -61,7 +61,7 @@ TEST_CASE("However fast, no child passes a plate, be it a compound's or one's in
 }
 
 TEST_CASE("A compound lies on its fields and on its other children alike, until a child is taken away") {
-    // two feet far from the middle, and a weight between them that touches nothing
+    // two feet far from the middle, and a weight between them without contact
     Shape foot(exactBox({0.1f, 0.3f, 0.2f}, h)), slab(exactBox({2, 1, 0.3f}, h));
     btBoxShape own({0.1f, 0.3f, 0.2f}), weight({0.3f, 0.1f, 0.05f});
     btStaticPlaneShape plane({0, 0, 1}, 0);
@@ -81,7 +81,7 @@ TEST_CASE("A compound lies on its fields and on its other children alike, until 
         world.add(ground.shape, 0, {0, 0, -ground.top});
         btRigidBody* body = world.add(compound, 2, {0, 0, 0.2f + 0.5f * h});
         world.run(2);
-        // Bullet's own box may keep a margin off Bullet's own ground
+        // Bullet's own box may keep a margin above Bullet's own ground
         CHECK(body->getWorldTransform().getOrigin().z() == Approx(0.2f).margin(0.1 * h));
         CHECK(body->getWorldTransform().getBasis()[2][2] > std::cos(0.01f));
 
@@ -103,7 +103,7 @@ TEST_CASE("Children that the user leaves out do not collide") {
     World world;
     world.add(both ? static_cast<btCollisionShape&>(ground) : slab, 0, {0, 0, -0.3f});
     btRigidBody* body = world.add(compound, 1, {0, 0, 0.25f});
-    // Bullet asks another callback where both are compounds
+    // Bullet calls another callback if both are compounds
     (ofCompounds ? gCompoundCompoundChildShapePairCallback : gCompoundChildShapePairCallback) =
         [](const btCollisionShape*, const btCollisionShape*) { return false; };
     world.run(0.5f);
@@ -129,7 +129,7 @@ TEST_CASE("Each child makes its contacts once, with a tree of boxes or without")
 
 namespace {
 
-/// What a callback sees of a contact, and does.
+/// Values of a contact in a callback, and the callback's action.
 struct Seen {
     std::vector<int> indices;  ///< of the child and of the compounds around it
     btDynamicsWorld* removesFrom = nullptr;
@@ -188,7 +188,7 @@ TEST_CASE("A compound's children are collided in one batch with all other pairs"
     CHECK(world.dispatcher.statistics().pairs == 100);
     CHECK(world.dispatcher.statistics().contactsKept >= 100);
     CHECK(body->getCenterOfMassPosition().z() == Approx(0.2f).margin(0.1 * h));
-    // what is far away costs nothing
+    // distant children cost nothing
     body->setCenterOfMassTransform(at({4.5f, 4.5f, 0.2f}));
     body->activate(true);
     world.run(1 / 240.f);

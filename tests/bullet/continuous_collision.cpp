@@ -1,4 +1,4 @@
-// Nothing passes through anything, however fast: after the solver, by the ways that bodies have truly gone.
+// Tunnelling prevention at any speed: it acts after the solver, along the actual trajectories of bodies.
 #include <bilayer/integration/bullet/extensions.h>
 
 #include <algorithm>
@@ -26,7 +26,8 @@ namespace {
 constexpr float h = 0.05f;        // voxel [m]
 constexpr float step = 1 / 60.f;  // [s]
 
-/// Bullet keeps a body's spin, not its energy, while it turns: after an impact the least that its spin may be worth.
+/// Kinetic energy of a body. Under rotation Bullet keeps the angular velocity of a body, not its energy.
+/// @param atLeast  after an impact: the minimum energy for this angular velocity
 double energyOf(const btRigidBody& body, bool atLeast) {
     const btVector3 spin = body.getWorldTransform().getBasis().transpose() * body.getAngularVelocity();
     const btVector3& inverse = body.getInvInertiaDiagLocal();
@@ -85,12 +86,13 @@ TEST_CASE("However fast and however they turn, no bodies pass through a thin pla
                 const btQuaternion turned(btVector3(any(random), any(random), any(random) + 2).normalized(),
                                           3 * any(random));
                 btRigidBody* body = world.add(one.moving, 1, {0.1f * any(random), 0.1f * any(random), 1.f}, turned);
-                // aslant by up to about 30 degrees, but so that it meets the plate
+                // oblique by up to about 30 degrees, but still aimed at the plate
                 const float aslant = std::min(0.5f, 0.5f * half);
                 body->setLinearVelocity(speed * btVector3(aslant * any(random), aslant * any(random), -1));
                 body->setAngularVelocity(0.3f * speed * btVector3(any(random), any(random), any(random)));
                 body->setActivationState(DISABLE_DEACTIVATION);
-                // Bullet's own adds energy without bound to a body that turns by radians in a step
+                // Bullet's own gyroscopic integrator adds energy without bound to a body that rotates by radians in a
+                // step
                 body->setFlags(body->getFlags() & ~BT_ENABLE_GYROSCOPIC_FORCE_IMPLICIT_BODY);
                 const double before = energyOf(*body, false);
                 CAPTURE(one.name, speed, shot);
@@ -109,8 +111,8 @@ TEST_CASE("However fast and however they turn, no bodies pass through a thin pla
 
 TEST_CASE("What a wall holds is not run over by what follows close behind") {
     const float radius = 0.2f;
-    // points are followed from a quarter of a voxel inside of their body, to a tenth below where they enter; and what
-    // is round sinks in between points (see ColliderOptions::pointSpacing)
+    // points are followed from 0.25 voxels inside their body to 0.1 below the surface where they enter; and round
+    // bodies penetrate further between points (see ColliderOptions::pointSpacing)
     const float deepest = 0.35f * h + 0.23f * 4 * h * h / radius;
     Shape ball(exactSphere(radius, h)), wall(exactBox({h, 1, 1}, h));
     const unsigned seed = test::seed();
@@ -121,7 +123,7 @@ TEST_CASE("What a wall holds is not run over by what follows close behind") {
         World world;
         const WorldExtensions guard(world.dynamics);
         world.dynamics.setGravity({0, 0, 0});
-        // nothing but the guard holds them
+        // without solver iterations only tunnelling prevention stops them
         world.dynamics.getSolverInfo().m_numIterations = 0;
         world.add(wall, 0, {2, 0, 0});
         const auto add = [&](const btVector3& place, float speed) {
@@ -144,7 +146,7 @@ TEST_CASE("What a wall holds is not run over by what follows close behind") {
 
 TEST_CASE("What a wall holds is not run over by a long column, each held by the one before it") {
     const float radius = 0.2f;
-    // as above; both are round, and lie on each other as they lie in a row
+    // as above; both bodies are round and penetrate between points
     const float deepest = 0.35f * h + 2 * 0.23f * 4 * h * h / radius;
     Shape ball(exactSphere(radius, h)), wall(exactBox({h, 1, 1}, h));
     World world;
@@ -163,7 +165,7 @@ TEST_CASE("What a wall holds is not run over by a long column, each held by the 
     for (int i = 0; i < 2; ++i) {
         world.dynamics.stepSimulation(step, 0);
         held += guard.stoppedBodies();
-        // some are pushed aside
+        // some are pushed sideways
         for (std::size_t k = 0; k < column.size(); ++k)
             for (std::size_t other = 0; other < k; ++other) {
                 CAPTURE(seed, i, k, other);
@@ -227,7 +229,7 @@ TEST_CASE("Two fast bodies do not pass each other, nor what they meet after a bo
     }
     CHECK(held >= 2);
 
-    // a ball that bounces off one plate in a step does not leave through the other one
+    // a ball that bounces off one plate in a step must not tunnel through the other
     World between;
     const WorldExtensions other(between.dynamics);
     between.dynamics.setGravity({0, 0, 0});
@@ -253,7 +255,7 @@ TEST_CASE("Edges and tips of what does not move stop fields as well, however thi
     CAPTURE(speed, kind, seed);
     Random random(seed);
     const float half = 0.1f, voxel = 0.2f / 32, apart = 0.083f;
-    // upright sheets with their upper edges at height 0, a needle of triangles, or a long blade
+    // upright open surfaces with their upper edges at height 0, a needle of triangles, or a long blade
     Mesh sheets;
     for (int i = -20; i <= 20; ++i) {
         const auto first = unsigned(sheets.points.size());
@@ -321,7 +323,7 @@ TEST_CASE("A body that Bullet's own CCD stops is not set down behind what it cam
     world.dynamics.setGravity({0, 0, 0});
     world.add(wall, 0, {0, 0, 0});
     world.add(wall, 0, {0.8f, 0, 0});
-    // struck in this very step: Bullet foresees by the velocity before
+    // hit in this very step: Bullet's speculative contacts use the velocity before the hit
     world.add(box, 1000, {0.149f, 0.1f, 0.2f})->setLinearVelocity({100, 0, 0});
     btRigidBody* body = world.add(sphere, 1, {0.3f, 0.1f, 0.2f});
     body->setCcdMotionThreshold(0.05f);
@@ -352,7 +354,7 @@ TEST_CASE("What slides, rolls or rests is not held, and a world is as it was whe
         CHECK(sliding->getCenterOfMassPosition().x() == Approx(2).margin(0.01));
         CHECK(rolling->getCenterOfMassPosition().x() == Approx(2).margin(0.02));
     }
-    // its contacts foresee motions again
+    // its contacts are speculative again
     World fast;
     { const WorldExtensions guard(fast.dynamics); }
     fast.add(floor, 0, {0, 0, -0.3f});

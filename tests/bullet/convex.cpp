@@ -98,7 +98,7 @@ TEST_CASE("What lies on a face meets it along its normal, however near it is") {
             const Convex::Near near = convex.nearest(place + height * normal, 1);
             CAPTURE(height, place.x, place.y, place.z, near.normal.x, near.normal.y, near.normal.z);
             REQUIRE(near.distance == Approx(height).margin(1e-6));
-            // on a rim what is nearer than rounding lies on the side as well
+            // on a rim a point within rounding of the side counts as on it too
             if (height > 1e-6f || !isOnRim) REQUIRE(glm::dot(near.normal, normal) > 0.9999f);
         }
     };
@@ -113,7 +113,7 @@ TEST_CASE("What lies on a face meets it along its normal, however near it is") {
         const glm::vec3 &p = faces.points[t.x], &q = faces.points[t.y], &r = faces.points[t.z];
         const auto u = float(random(0.1, 0.5)), v = float(random(0.1, 0.4));
         const glm::vec3 square = glm::cross(q - p, r - p);
-        if (glm::length(square) < 1e-3f) continue;  // whose direction is rounded
+        if (glm::length(square) < 1e-3f) continue;  // too small: rounding dominates the direction
         const glm::vec3 place = p + u * (q - p) + v * (r - p);
         check(ofPoints, place, std::copysign(1.f, glm::dot(square, place)) * glm::normalize(square));
     }
@@ -162,7 +162,7 @@ TEST_CASE("Straight ways enter convex shapes where distance says, and only then"
                             way = float(random(0, 4)) * random.direction();
             CAPTURE(i);
             const auto entry = convex.enter(start, way, tolerance);
-            // until then it is outside, and without an entry all the way
+            // until then it is outside; without an entry, over the whole displacement
             const float until = entry ? entry->part : 1;
             for (float part = 0; part < until; part += 2e-3f)
                 REQUIRE(convex.nearest(start + part * way, 10).distance > -1e-4f);
@@ -190,7 +190,7 @@ TEST_CASE("Nothing is inside of a flat hull, and ways beside it do not enter it"
     quad.triangles = {{0, 1, 2}, {0, 2, 3}};
     shape.recalcLocalAabb();
     shape.setMargin(0);
-    const Convex convex(shape);  // whose corners Bullet rounds to a ten-thousandth of its size
+    const Convex convex(shape);  // Bullet rounds its vertices to 1e-4 of its size
     for (int i = 0; i < 2000; ++i) {
         const glm::vec3 point(float(random(-3, 3)), float(random(-3, 3)), i % 2 ? 0.f : float(random(-1, 1)));
         CAPTURE(i, point.x, point.y, point.z);

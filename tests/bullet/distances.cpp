@@ -1,5 +1,5 @@
-// Contact tests between a field and what is concave: they tell the distance that two meshes have, in double precision
-// and by brute force.
+// Contact tests between a field and concave shapes: they return the distance between two meshes, compared with brute
+// force in double precision.
 #include <BulletCollision/CollisionShapes/btHeightfieldTerrainShape.h>
 
 #include <algorithm>
@@ -29,7 +29,7 @@ using bullet::Shape;
 namespace {
 
 constexpr float voxel = 0.02f;
-constexpr float asked = 5 * voxel;  // of contact tests
+constexpr float asked = 5 * voxel;  // distance threshold of contact tests
 constexpr double error = 0.1 * double(voxel);
 
 struct Triangle {
@@ -67,7 +67,7 @@ std::vector<Triangle> trianglesOf(const btConcaveShape& shape, const btTransform
     return collector.triangles;
 }
 
-// Between two straight lines of some length (C. Ericson, "Real-Time Collision Detection", 2004, 5.1.9).
+// Distance of two line segments (C. Ericson, "Real-Time Collision Detection", 2004, 5.1.9).
 double distanceBetween(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c, const glm::dvec3& d) {
     const glm::dvec3 ab = b - a, cd = d - c, ca = a - c;
     const double abab = glm::dot(ab, ab), cdcd = glm::dot(cd, cd), abcd = glm::dot(ab, cd), abca = glm::dot(ab, ca),
@@ -89,7 +89,7 @@ double distanceBetween(const Triangle& a, const Triangle& b, double best) {
     return best;
 }
 
-// Whether an edge of A passes through B.
+// Whether an edge of A intersects B.
 bool pierces(const Triangle& a, const Triangle& b) {
     const auto& q = b.corners;
     const glm::dvec3 normal = glm::cross(q[1] - q[0], q[2] - q[0]);
@@ -105,7 +105,7 @@ bool pierces(const Triangle& a, const Triangle& b) {
     return false;
 }
 
-// Up to a bound; nothing where they pass through each other.
+// The distance up to a bound; nothing if they intersect.
 std::optional<double> distanceBetween(const std::vector<Triangle>& a, const std::vector<Triangle>& b, double bound) {
     double best = bound;
     for (const Triangle& one : a)
@@ -138,7 +138,7 @@ std::shared_ptr<const Collider> colliderOf(const Mesh& mesh, ContactAccuracy mea
     return std::make_shared<Collider>(mesh, build(mesh, {.voxelSize = voxel}), ColliderOptions{.accuracy = measure});
 }
 
-// What a field is asked about, and its triangles.
+// The other shape of a query, and its triangles.
 class Other {
   public:
     Other(int kind, Random& random, ContactAccuracy measure) : triangles_(ring()), field_(colliderOf(ring(), measure)) {

@@ -1,5 +1,4 @@
-// Bodies of meshes with holes, cracks and parts that run through each other fall on all kinds of ground: none may gain
-// energy.
+// Bodies of meshes with holes, cracks and self-intersections fall on all kinds of ground: none may gain energy.
 #include <BulletCollision/CollisionShapes/btHeightfieldTerrainShape.h>
 #include <btBulletDynamicsCommon.h>
 
@@ -28,7 +27,7 @@ using namespace bilayer::test;
 namespace {
 
 constexpr float size = 0.8f;      // of bodies [m]
-constexpr float fall = 0.1f;      // to the top of the ground [m]
+constexpr float fall = 0.1f;      // drop height above the top of the ground [m]
 constexpr float height = 0.03f;   // of the waves in the ground [m]
 constexpr float cell = 0.25f;     // of meshes and height fields [m]
 constexpr int cells = 20;         // along each of their sides
@@ -62,7 +61,7 @@ Mesh slab() {
     return mesh;
 }
 
-// All kinds of ground, with their tops at a height of `height` at most.
+// All kinds of ground, with their tops at `height` or below.
 class Grounds {
   public:
     Grounds()
@@ -100,13 +99,13 @@ double energyOf(const btRigidBody& body) {
 }
 
 struct Drop {
-    double gain = 0;  // over the least energy before, in parts of that of the fall to the ground
-    int aside = 0;    // contacts that look sideways or down
+    double gain = 0;  // maximum increase over the minimum energy before, divided by that of the fall
+    int aside = 0;    // contacts whose normals point sideways or down
     bool sleeps = false;
 };
 
-/// A body of 1 kg dropped upright.
-/// @param turn  around z, before
+/// Drops a body of 1 kg upright.
+/// @param turn  initial rotation about z
 Drop drop(const std::shared_ptr<const Collider>& collider, btCollisionShape& ground, float turn, const glm::vec2& place,
           float seconds) {
     bullet::Shape shape(collider, {.frame = bullet::centreOfMassFrame(*collider)});
@@ -138,7 +137,7 @@ Drop drop(const std::shared_ptr<const Collider>& collider, btCollisionShape& gro
     return result;
 }
 
-// Round, with a flat base that four holes are cut into, or none.
+// A round stone with a flat base; if open, four holes are cut into the base.
 Mesh stone(bool isOpen) {
     Mesh mesh = shapes::sphere(0.4f, 5);
     for (glm::vec3& p : mesh.points) p = {p.x, 0.8f * p.y, std::max(0.6f * p.z, -0.12f)};
@@ -154,7 +153,7 @@ Mesh stone(bool isOpen) {
     return mesh;
 }
 
-// Upright, as large as all others.
+// Upright, scaled to the size of all others.
 Mesh corpusBody(const std::filesystem::path& path) {
     const Mesh mesh = readMesh(path);
     const Bounds box = bounds(mesh);

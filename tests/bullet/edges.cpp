@@ -1,4 +1,4 @@
-// Edges that meet between their corners and between the points of a field; the hull of balls; sharp edges of bodies.
+// Edge-edge contacts between vertices and between surface points of a field; the hull of balls; sharp edges of bodies.
 #include <BulletCollision/CollisionShapes/btHeightfieldTerrainShape.h>
 #include <BulletCollision/CollisionShapes/btMultiSphereShape.h>
 
@@ -44,8 +44,8 @@ std::shared_ptr<const Collider> colliderOf(const Mesh& mesh,
                                       ColliderOptions{.accuracy = measure});
 }
 
-// Two long bars of square section, ridge on ridge: the lower one's along y with its ridge up, the upper one's turned
-// by an angle from x with its ridge down, both sheared along and turned together at random.
+// Two long bars of square section, ridge on ridge. The lower bar is along y with its ridge up. The upper bar is at an
+// angle to x with its ridge down. Both are displaced along their ridges and rotated together at random.
 struct Crossing {
     Pose upper, lower;
     glm::vec3 normal;  // from the lower one to the upper one
@@ -144,7 +144,7 @@ TEST_CASE("A plane of many triangles makes the contacts of a plane of two") {
     std::uniform_real_distribution<float> part(-1, 1);
     int touching = 0;
     for (int i = 0; i < 100; ++i) {
-        const bool overMiddle = i % 2;  // else anywhere, over the rim, or beside it
+        const bool overMiddle = i % 2;  // over the middle, else anywhere: over the rim, or next to it
         const float spread = overMiddle ? 0.4f : 2;
         Pose pose{{spread * part(random), spread * part(random), 0},
                   glm::normalize(glm::quat(part(random), part(random), part(random), part(random) + 0.1f))};
@@ -160,14 +160,14 @@ TEST_CASE("A plane of many triangles makes the contacts of a plane of two") {
         const auto few = collide(two), others = collide(many);
         CAPTURE(i, few.size(), others.size());
         if (few.empty() || others.empty()) {
-            // at the margin itself either may find a place a bit nearer
+            // near the margin either search may find a slightly nearer place
             for (const auto& found : {few, others})
                 if (!found.empty()) REQUIRE(deepest(found).distance > h - tolerance);
             continue;
         }
         ++touching;
         CHECK(deepest(others).distance == Approx(deepest(few).distance).margin(tolerance));
-        // of the rim each piece is probed by itself
+        // each surface piece at the rim is searched separately
         if (!overMiddle) continue;
         CHECK(others.size() <= few.size() + few.size() / 8);
         CHECK(others.size() >= few.size() - few.size() / 8);
@@ -190,7 +190,7 @@ TEST_CASE("A contact on an edge goes as evenly as the edge that slides") {
         const float step = 0.02f * h;
         glm::vec3 before(0);
         for (int i = 0; i < 150; ++i) {
-            // along both edges, aslant
+            // along both edges, obliquely
             crossing.upper.position += step * glm::normalize(along + 0.6f * its);
             const auto contacts = collide(crossing, h);
             const glm::vec3 place = deepest(contacts).position;
@@ -228,7 +228,7 @@ TEST_CASE("An edge finds a bump between its probes, and stays on it") {
 TEST_CASE("Contacts of solids of revolution are numbers, wherever a line of their sides ends") {
     const auto plate = exactBox({1.2f, 1.2f, 0.1f}, h);
     const Convex cylinder(btCylinderShape({0.15f, 0.1f, 0.15f})), cone(btConeShape(0.12f, 0.3f));
-    // one of the places where the lowest point of a rim is that of a side, too
+    // an orientation where the lowest point of a rim is also that of a side
     const glm::quat aslant(-0.3470952f, -0.3281656f, 0.4082684f, 0.7779134f);
     const unsigned start = seed();
     std::mt19937 random(start);
@@ -296,7 +296,7 @@ TEST_CASE("Sharp edges are those of the mesh, and none lies across a groove") {
         total += glm::distance(a, b);
         CHECK(std::abs(signedDistance(mesh, 0.5f * (a + b))) < 0.5 * h);
     }
-    // all twelve edges are covered once
+    // the pieces cover all twelve edges once
     if (!grooved) CHECK(total == Approx(4 * 2 * (0.5 + 0.4 + 0.3)).epsilon(1e-3));
 }
 
@@ -368,7 +368,7 @@ TEST_CASE("The distance from a hull of balls is that of its support function, ou
                 for (const auto& ball : balls) least = std::min(least, glm::dot(v, point - ball.centre) - ball.radius);
                 return least;
             };
-            // uphill from many directions
+            // hill climbing from many directions
             float best = -std::numeric_limits<float>::max();
             for (int k = 0; k < 40; ++k) {
                 glm::vec3 v = glm::normalize(vector());
@@ -383,11 +383,11 @@ TEST_CASE("The distance from a hull of balls is that of its support function, ou
                 best = std::max(best, value);
             }
             CAPTURE(run, i, balls.size());
-            // no direction does better, and this one does as well
+            // no direction gives a greater distance, and the returned one attains it
             CHECK(best < near.distance + 1e-5f);
             CHECK(best > near.distance - 1e-2f);
             CHECK(along(near.normal) == Approx(near.distance).margin(1e-5));
-            // the ball named touches the surface there
+            // the returned ball touches the surface there
             const glm::vec3 foot = point - near.distance * near.normal;
             CHECK(glm::distance(foot, near.ball.centre + near.ball.radius * near.normal) < 1e-4f);
         }
@@ -424,8 +424,8 @@ TEST_CASE("An edge that has sunk into two faces is as deep as the least way out 
         ++tried;
         const auto found = acrossEdge(along, {-1, before}, SurfaceSample{-1, before}, SurfaceSample{-1, after});
         REQUIRE(found);
-        // ways out are looked for all around the edge: moved so far, its line leaves either face where it meets the
-        // other
+        // reference by sampling: depenetration directions all around the edge. Displaced by s, the edge's line leaves
+        // either face where it meets the other
         const glm::vec3 aside = glm::normalize(glm::cross(along, before)), up = glm::cross(aside, along);
         float least = 100;
         for (int k = 0; k < 3600; ++k) {
@@ -456,7 +456,7 @@ TEST_CASE("No contact is much deeper than the bodies overlap, whichever edges cr
         specimens.emplace_back(mesh, 0.5 * double(h));
     }
     const TriangleShape triangles[] = {TriangleShape(meshes[0]), TriangleShape(meshes[1]), TriangleShape(meshes[2])};
-    // the plank as Bullet's box, too
+    // the plank also as Bullet's box
     const btBoxShape plank({0.9f, 0.1f, 0.1f});
     const Convex convex(plank);
     int overlapping = 0;
@@ -468,7 +468,7 @@ TEST_CASE("No contact is much deeper than the bodies overlap, whichever edges cr
         const auto depthAt = [&](float away) {
             return float(demo::penetration(specimens[a], {away * way, turn}, specimens[b], {}));
         };
-        // overlaps of up to half a voxel
+        // penetration of up to half a voxel
         const float wanted = (0.05f + 0.05f * float(run % 10)) * h;
         float near = 0, far = 2.5f;
         for (int i = 0; i < 20; ++i) (depthAt(0.5f * (near + far)) > wanted ? near : far) = 0.5f * (near + far);
@@ -571,7 +571,7 @@ TEST_CASE("A tip below a crease of triangles is as deep as below both of its fac
 }
 
 TEST_CASE("What is exact is so against Bullet's shapes too") {
-    // small balls around the edges of a box, whose samples are rounded off there
+    // small balls around the edges of a box, where trilinear samples are rounded off
     const glm::vec3 half(0.5f, 0.4f, 0.3f);
     const auto exact = colliderOf(shapes::box(half), ContactAccuracy::exact),
                usual = colliderOf(shapes::box(half), ContactAccuracy::exactNearFeatures),
@@ -587,7 +587,7 @@ TEST_CASE("What is exact is so against Bullet's shapes too") {
         const auto errorOf = [&](const Collider& collider) {
             std::vector<Contact> contacts;
             bullet::detail::collideConvex(convex, pose, {}, {collider, {}}, h, false, contacts);
-            // the ball's own centre in the field, not the box's edge in the ball
+            // measures the ball's own centre in the field, not the box's edge in the ball
             float error = h;
             for (const Contact& contact : contacts)
                 if (!(contact.feature & featureOfB))
@@ -603,7 +603,7 @@ TEST_CASE("What is exact is so against Bullet's shapes too") {
 }
 
 TEST_CASE("Balls lie in a groove as deep as they do between two faces") {
-    // a groove of a right angle along x, its bottom off the voxels
+    // a right-angled groove along x, its bottom off the voxel centres
     const glm::vec3 bottom(0, 0.37f * h, 0.61f * h);
     const glm::vec2 section[] = {{-0.3f, -0.2f}, {0.3f, -0.2f}, {0.3f, 0.3f}, {0, 0}, {-0.3f, 0.3f}};
     Mesh mesh;

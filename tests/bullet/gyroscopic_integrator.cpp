@@ -1,4 +1,4 @@
-// Free bodies keep their angular momentum; what acts on them changes it by what it should.
+// Free bodies conserve their angular momentum; torques change it by the correct amount.
 #include "integration/bullet/detail/gyroscopic_integrator.h"
 
 #include <bilayer/integration/bullet/extensions.h>
@@ -28,7 +28,7 @@ double energyOf(const btRigidBody& body) {
     return 0.5 * double(momentumOf(body).dot(body.getAngularVelocity()));
 }
 
-// A brick in free space that spins about an axis of its own and two that are none.
+// A brick in free space that spins about a principal axis or about two other axes.
 struct Free {
     explicit Free(const btVector3& spin) {
         world.dynamics.setGravity({0, 0, 0});

@@ -1,4 +1,4 @@
-// The part and index by which users find the triangle or the child that a contact is with.
+// Part and index identify the triangle or child of a contact for users.
 #include <BulletCollision/CollisionShapes/btHeightfieldTerrainShape.h>
 #include <BulletCollision/Gimpact/btGImpactShape.h>
 
@@ -28,7 +28,7 @@ using bullet::detail::toGlm;
 namespace {
 
 constexpr float h = 0.05f;  // voxel [m]
-constexpr int side = 13;    // points of a ground's side, a cell apart
+constexpr int side = 13;    // points along a ground's side, a cell apart
 constexpr float cell = 0.25f;
 
 btTransform at(const btVector3& place) {
@@ -39,12 +39,12 @@ float heightAt(float x, float y) {
     return 0.1f * std::sin(2.1f * x + 1) * std::cos(1.3f * y);
 }
 
-/// Where a point of the ground's lattice is.
+/// Coordinate of a point of the ground's lattice.
 float placeOf(int i) {
     return cell * (float(i) - 0.5f * (side - 1));
 }
 
-/// Hills of two parts: 0 where x < 0, and 1.
+/// Hills of two parts: part 0 where x < 0, else part 1.
 class TwoParts {
   public:
     TwoParts() {
@@ -96,7 +96,7 @@ class Terrain {
 
 using Id = std::pair<int, int>;
 
-/// By Bullet's numbers; a height field's cell has two.
+/// Triangles by Bullet's identifiers; a cell of a height field has two.
 std::multimap<Id, std::array<glm::dvec3, 3>> trianglesOf(const btConcaveShape& mesh) {
     struct All : btTriangleCallback {
         void processTriangle(btVector3* corners, int part, int index) override {
@@ -109,7 +109,7 @@ std::multimap<Id, std::array<glm::dvec3, 3>> trianglesOf(const btConcaveShape& m
     return all.found;
 }
 
-/// A contact as users see it. The mesh is the static side.
+/// A contact as users receive it. The mesh is the static side.
 struct Seen {
     btVector3 onMesh, normal;
     Id ofMesh, ofOther;
@@ -131,7 +131,7 @@ bool tell(btManifoldPoint& point, const btCollisionObjectWrapper* first, int par
     return false;
 }
 
-/// What a step's contacts are named, in callbacks; the manifolds hold the same.
+/// The identifiers of a step's contacts in callbacks; the manifolds hold the same.
 std::vector<Seen> namesOf(World& world) {
     told.clear();
     gContactAddedCallback = tell;
@@ -150,7 +150,7 @@ std::vector<Seen> namesOf(World& world) {
     return told;
 }
 
-/// Whether a contact's triangle is as near as any, and of those that are as near the one that faces it most.
+/// Whether a contact's triangle is among the nearest, and among these faces the contact most directly.
 void checkTriangle(const Seen& seen, const std::multimap<Id, std::array<glm::dvec3, 3>>& triangles,
                    const btTransform& ofMesh, double tolerance) {
     const btTransform inMesh = ofMesh.inverse();
@@ -201,7 +201,7 @@ TEST_CASE("Contacts with a mesh or a height field name their triangle, as those 
     for (const Ground& ground : grounds) {
         const auto triangles = trianglesOf(ground.shape);
         for (const auto& body : bodies) {
-            if (&ground.shape == &gimpact && !body.isField) continue;  // needs an algorithm of its own
+            if (&ground.shape == &gimpact && !body.isField) continue;  // requires its own algorithm
             int contacts = 0;
             std::map<int, int> parts;
             for (int round = 0; round < 40; ++round) {
@@ -224,7 +224,7 @@ TEST_CASE("Contacts with a mesh or a height field name their triangle, as those 
                         checkTriangle(seen, triangles, groundPlace, 0.01 * h);
                         CHECK(seen.ofOther.first == 0);
                     } else {
-                        CHECK(triangles.count(seen.ofMesh) > 0);  // Bullet leaves the other side as it finds it
+                        CHECK(triangles.count(seen.ofMesh) > 0);  // Bullet leaves the other side unchanged
                     }
                 }
             }
@@ -236,7 +236,7 @@ TEST_CASE("Contacts with a mesh or a height field name their triangle, as those 
 
 namespace {
 
-/// A small box on the middle of a triangle, and what is found to be under it.
+/// A small box on the middle of a triangle, and the identifiers found below it.
 struct Small {
     std::vector<Seen> inStep, inTest;
     std::vector<std::vector<int>> children;  ///< of the mesh's side, innermost first
@@ -259,7 +259,7 @@ bool tellChildren(btManifoldPoint& point, const btCollisionObjectWrapper* first,
                   const btCollisionObjectWrapper* second, int part1, int index1) {
     tell(point, first, part0, index0, second, part1, index1);
     const btCollisionObjectWrapper* mesh = first->getCollisionObject()->isStaticObject() ? first : second;
-    // Bullet's own contacts are with a triangle in place of the mesh
+    // Bullet's own contacts have a triangle in place of the mesh
     if (mesh->getCollisionShape()->getShapeType() == TRIANGLE_SHAPE_PROXYTYPE) mesh = mesh->m_parent;
     toldChildren.emplace_back();
     for (; mesh->m_parent; mesh = mesh->m_parent) toldChildren.back().push_back(mesh->m_index);
@@ -296,7 +296,7 @@ TEST_CASE("A small box names the triangle and the children that Bullet's own box
     for (const Ground& ground : grounds) {
         const auto triangles = trianglesOf(ground.shape);
         btCompoundShape inner, outer, ofBullet, ofField;
-        // the first children touch nothing
+        // the first children have no contacts
         btSphereShape far(0.1f);
         inner.addChildShape(at({0, 0, 50}), &far);
         inner.addChildShape(at({0, 0, 0}), &ground.shape);

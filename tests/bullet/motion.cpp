@@ -1,4 +1,5 @@
-// What bodies do over many steps: stay threaded, stay linked, and do the same for any number of threads.
+// Bodies over many steps: threaded nuts stay on, linked rings stay linked, and results do not depend on the count of
+// threads.
 #include <tbb/global_control.h>
 #include <tbb/task_arena.h>
 
@@ -34,7 +35,7 @@ namespace {
 
 constexpr float h = 0.05f;  // voxel [m]
 
-/// The transforms of a heap of bodies of several kinds after some steps, on a number of threads.
+/// The transforms of a pile of bodies of several kinds after some steps, on a count of threads.
 std::vector<float> heap(int threads) {
     static const auto torus = exactTorus(0.4f, 0.15f, h), box = exactBox({0.3f, 0.2f, 0.15f}, h),
                       bowl = exactBowl(2.f, 0.2f, 0.1f);
@@ -86,7 +87,7 @@ std::set<std::uint32_t> featuresOf(std::span<const bullet::detail::Patch> patche
     return found;
 }
 
-/// Contacts on a circle of 0.1 m, as deep as each other: every side has many that are farthest but for rounding.
+/// Contacts on a circle of 0.1 m with equal depths: every side has many farthest contacts up to rounding.
 std::vector<Contact> circle() {
     std::vector<Contact> flat;
     for (std::uint32_t i = 0; i < 400; ++i) {
@@ -126,7 +127,7 @@ TEST_CASE("Contacts that may bear a load stay while a body rocks on them") {
     CAPTURE(start);
     std::mt19937 random(start);
     std::uniform_real_distribution<float> rough(-2e-4f, 2e-4f), tilt(-1.5e-3f, 1.5e-3f), side(-1, 1);
-    const float bend = GENERATE(0.f, 0.15f, 0.3f);  // of normals towards the rim
+    const float bend = GENERATE(0.f, 0.15f, 0.3f);  // tilt of normals towards the rim
     CAPTURE(bend);
     std::vector<Contact> flat;
     for (std::uint32_t i = 0; i < 200; ++i) {
@@ -161,7 +162,7 @@ TEST_CASE("The same contacts are kept until the bodies have moved, and are where
     std::uint32_t other = 0;
     while (first.contains(other)) ++other;
 
-    // one that was left out is a bit deeper and farther out now, and all have changed a bit
+    // a contact that was removed becomes slightly deeper and farther out, and all others change slightly
     const auto changed = [&](float approach = 0, float deeper = 5e-5f) {
         std::vector<Contact> all = circle();
         for (Contact& contact : all) contact.distance -= 1e-6f;
@@ -183,7 +184,7 @@ TEST_CASE("The same contacts are kept until the bodies have moved, and are where
     CHECK(featuresOf(after(changed(), away * hardly, away)) == first);
     CHECK(featuresOf(after(changed(), farther, here)).contains(other));
     CHECK(featuresOf(after(changed(), here, farther)).contains(other));
-    // one is on its way from afar, or a press meets it before the others, or one that was kept is there no longer
+    // the selection changes if a contact is speculative, if a load reaches it first, or if a kept contact is missing
     CHECK(featuresOf(after(changed(1e-3f), here, here)).contains(other));
     CHECK(featuresOf(after(changed(0, 2e-4f), here, here)).contains(other));
     std::vector<Contact> fewer = changed();
@@ -202,7 +203,7 @@ std::vector<Contact> keptOf(const bullet::detail::Reduced& reduced) {
     return kept;
 }
 
-/// The least gap after a small motion of A about the origin.
+/// The minimum separation after a small motion of A about the origin.
 double minGap(const std::vector<Contact>& contacts, const glm::dvec3& shift, const glm::dvec3& turn) {
     double least = 1e30;
     for (const Contact& c : contacts)
@@ -223,7 +224,7 @@ double dot(const Wrench& a, const Wrench& b) {
     return std::inner_product(a.begin(), a.end(), b.begin(), 0.0);
 }
 
-/// Of a push by each contact; its turn in parts of an extent.
+/// Wrenches of unit pushes at each contact; torques are divided by an extent.
 std::vector<Wrench> wrenchesOf(const std::vector<Contact>& contacts, double extent) {
     std::vector<Wrench> all;
     for (const Contact& c : contacts) {
@@ -233,8 +234,8 @@ std::vector<Wrench> wrenchesOf(const std::vector<Contact>& contacts, double exte
     return all;
 }
 
-/// What pushes of some contacts cannot bear of a load, in parts of it (least squares with positive pushes, one at a
-/// time until none changes it).
+/// Fraction of a load that pushes at some contacts cannot balance (least squares with non-negative pushes, by
+/// coordinate descent until convergence).
 double unborne(const std::vector<Wrench>& pushes, const Wrench& load) {
     Wrench rest = load;
     std::vector<double> force(pushes.size(), 0);
@@ -255,9 +256,9 @@ TEST_CASE("What is kept of many contacts bears what all of them bear, to two par
     std::mt19937 random(start);
     std::uniform_real_distribution<float> side(-1, 1);
     std::uniform_real_distribution<double> part(0, 1);
-    const float bend = GENERATE(0.f, 0.15f, 0.3f);  // of normals towards the rim
+    const float bend = GENERATE(0.f, 0.15f, 0.3f);  // tilt of normals towards the rim
     CAPTURE(bend);
-    std::vector<double> parts;  // of loads, that are not borne
+    std::vector<double> parts;  // unbalanced fractions of loads
     for (int trial = 0; trial < 20; ++trial) {
         const float length = 0.1f + 0.05f * side(random), width = 0.1f + 0.08f * side(random);
         std::vector<Contact> all;
@@ -349,12 +350,12 @@ TEST_CASE("A ring hangs in another") {
     const auto collider = exactTorus(0.5f, 0.12f, 0.04f);
     Shape ring(collider);
     World world;
-    // the fixed one stands upright in the plane of x and z; the other lies across its lowest part
+    // the fixed ring is upright in the xz plane; the other hangs across its lowest part
     world.add(ring, 0, {0, 0, 0}, btQuaternion(btVector3(1, 0, 0), SIMD_HALF_PI));
     btRigidBody* body = world.add(ring, 1, {0, 0, -0.85f}, btQuaternion(btVector3(0, 1, 0), SIMD_HALF_PI));
     world.run(4);
     const btVector3& at = body->getWorldTransform().getOrigin();
-    // it hangs by the inside of its tube on the inside of the other's: 2 (R - r)
+    // it hangs with the inside of its tube on the inside of the other's: 2 (R - r)
     CAPTURE(at.x(), at.y(), at.z());
     CHECK(at.z() == Approx(-2 * (0.5f - 0.12f)).margin(0.2 * 0.04));
     CHECK(std::hypot(at.x(), at.y()) < 0.05f);
@@ -373,7 +374,7 @@ TEST_CASE("What has rested bears as much more friction as it is told to, until i
     btRigidBody* body = world.add(inCompound ? static_cast<btCollisionShape&>(compound) : box, 1, {0, 0, 0.1f});
     body->setFriction(0.5f);
     body->setActivationState(DISABLE_DEACTIVATION);
-    // as on a slope: how far it slides in a time
+    // as on a slope: sliding distance in a given time
     const auto slides = [&](float slope, float seconds) {
         const float before = body->getWorldTransform().getOrigin().x();
         world.dynamics.setGravity({9.81f * slope, 0, -9.81f});
@@ -394,7 +395,7 @@ TEST_CASE("What has rested bears as much more friction as it is told to, until i
 }
 
 TEST_CASE("A slope holds a body by friction, and lets it slide where it must") {
-    const float friction = GENERATE(0.7f, 0.3f);  // of the pair: the product of both
+    const float friction = GENERATE(0.7f, 0.3f);  // of the pair: the product of both coefficients
     const float slope = std::atan(0.5f);
     Shape block(exactBox({0.3f, 0.3f, 0.2f}, h)), ramp(exactBox({2, 1, 0.3f}, h));
     World world;
@@ -510,7 +511,7 @@ TEST_CASE("What falls bounces with its restitution, wherever a step takes it") {
             rebound = std::max(rebound, speed);
         }
         sum += double(rebound / fastest) / drops;
-        // the speed that the weight adds in the step of the bounce is the solver's to take
+        // the solver may remove the speed that gravity adds in the step of the bounce
         CHECK(rebound / fastest == Approx(restitution).margin(1.1 * 9.81 / double(perSecond * fastest)));
     }
     CHECK(sum == Approx(restitution).margin(0.02));
@@ -747,7 +748,7 @@ TEST_CASE("However fast, nothing round passes a plate or gains energy, and nothi
     btCapsuleShape capsule(0.1f, 0.2f);
     btBoxShape box({0.2f, 0.1f, 0.15f}), plateBox({1.f, 1.f, 0.5f * thickness * h});
     btStaticPlaneShape ground({0, 0, 1}, 0);
-    // what is edged is thrown about by an impact: in longer steps it would turn by radians
+    // an impact makes bodies with edges spin: in longer steps they would rotate by radians
     const float ofRound = 1 / 60.f, ofEdged = 1 / 240.f;  // [s]
     const struct {
         const char* name;
@@ -775,7 +776,7 @@ TEST_CASE("However fast, nothing round passes a plate or gains energy, and nothi
                 world.dynamics.stepSimulation(one.step, 0);
                 const btVector3 v = body->getLinearVelocity(), w = body->getAngularVelocity();
                 REQUIRE(std::isfinite(v.length2() + w.length2()));
-                // no body here has less than a thousandth of its mass [m^2] as moment of inertia
+                // the moments of inertia of all bodies here exceed 1e-3 m^2 times their mass
                 REQUIRE(v.length2() + 1e-3f * w.length2() <= 1.01f * before);
                 const btVector3 at = body->getCenterOfMassPosition();
                 if (std::max(std::abs(at.x()), std::abs(at.y())) < 0.7f) REQUIRE(at.z() > 0);

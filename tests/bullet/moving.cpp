@@ -1,4 +1,4 @@
-// Kinematic bodies that move, and soft bodies, against fields.
+// Moving kinematic bodies, and soft bodies, against fields.
 #include <BulletSoftBody/btSoftBodyHelpers.h>
 #include <BulletSoftBody/btSoftBodyRigidBodyCollisionConfiguration.h>
 #include <BulletSoftBody/btSoftRigidDynamicsWorld.h>
@@ -30,7 +30,7 @@ void makeKinematic(btRigidBody& body) {
     body.setActivationState(DISABLE_DEACTIVATION);
 }
 
-// Moves a kinematic body evenly, as its owner would between steps.
+// Moves a kinematic body at constant velocity, as its owner would between steps.
 void carry(World& world, btRigidBody& body, const btVector3& velocity, float seconds) {
     for (int i = 0; i < std::lround(seconds / step); ++i) {
         btTransform at = body.getWorldTransform();
@@ -58,7 +58,7 @@ TEST_CASE("A kinematic field carries what lies on it, up, down and along") {
     body->setFriction(1);
     lift->setFriction(1);
     carry(world, *lift, {0, 0, 0}, 0.5f);
-    // slowly enough up to speed that it need not slide or lift off
+    // accelerates slowly enough that the body need not slide or lift off
     for (int i = 1; i <= 20; ++i) carry(world, *lift, float(i) / 20 * velocity, 0.02f);
     const btVector3 before = body->getWorldTransform().getOrigin() - lift->getWorldTransform().getOrigin();
     carry(world, *lift, velocity, 1);

@@ -1,4 +1,4 @@
-// SignLinks of Bullet's multibodies.
+// Links of Bullet's multibodies as fields.
 #include <BulletDynamics/Featherstone/btMultiBodyConstraintSolver.h>
 #include <BulletDynamics/Featherstone/btMultiBodyDynamicsWorld.h>
 #include <BulletDynamics/Featherstone/btMultiBodyLinkCollider.h>
@@ -22,7 +22,7 @@ namespace {
 
 constexpr float h = 0.05f;  // voxel [m]
 
-/// A floating base with some links one after the other, and a collider for each of them.
+/// A floating base with a chain of links, and a collider for each of them.
 struct Robot {
     btMultiBody body;
     std::vector<std::unique_ptr<btMultiBodyLinkCollider>> colliders;
@@ -78,7 +78,7 @@ TEST_CASE("Links move as their places from step to step say") {
             speeds[std::size_t(d)] = btScalar(random(-2, 2));
             robot.body.setJointVelMultiDof(i, speeds.data());
         }
-    robot.body.stepPositionsMultiDof(0.2f);  // to some other place
+    robot.body.stepPositionsMultiDof(0.2f);  // to another pose
     robot.update();
     std::vector<bullet::detail::Velocity> velocities;
     std::vector<btTransform> before;
@@ -99,7 +99,8 @@ TEST_CASE("Links move as their places from step to step say") {
 
 TEST_CASE("A link passes no plate, thin as it is, as far as Bullet's boxes let them meet") {
     Shape ball(exactSphere(0.2f, h)), plate(exactBox({1, 1, h}, h));
-    // Bullet does not grow the boxes of links by their ways: they must reach the plate's when the step begins
+    // Bullet does not extend the bounds of links by their displacement: they must overlap the plate's when the step
+    // begins
     const float speed = GENERATE(1.f, 10.f, 15.f);
     CAPTURE(speed);
     btDefaultCollisionConfiguration configuration;

@@ -1,4 +1,4 @@
-// Every pair of shapes comes to rest where it must, in either order of insertion.
+// Every pair of shapes comes to rest at the correct height, in either order of insertion.
 #include <BulletCollision/CollisionShapes/btBox2dShape.h>
 #include <BulletCollision/CollisionShapes/btConvexTriangleMeshShape.h>
 #include <BulletCollision/CollisionShapes/btHeightfieldTerrainShape.h>
@@ -25,7 +25,7 @@ namespace {
 constexpr float h = 0.05f;         // voxel [m]
 constexpr float tolerance = 0.1f;  // of rest heights [voxels]
 
-/// Drops `falling` onto `lying` from a little above, and checks where it comes to rest.
+/// Drops `falling` onto `lying` from slightly above, and checks where it comes to rest.
 void rests(btCollisionShape& falling, btCollisionShape& lying, const btVector3& lyingAt, const btVector3& expected,
            float scale = 1, bool rolls = false) {
     const bool fallingFirst = GENERATE(false, true);
@@ -43,7 +43,7 @@ void rests(btCollisionShape& falling, btCollisionShape& lying, const btVector3& 
     CHECK(at.getOrigin().z() == Approx(expected.z()).margin(tolerance * scale * h));
     if (!rolls) {
         CHECK(std::hypot(at.getOrigin().x() - expected.x(), at.getOrigin().y() - expected.y()) < scale * h);
-        CHECK(at.getBasis()[2][2] > std::cos(glm::radians(1.f)));  // upright; it may have turned about the vertical
+        CHECK(at.getBasis()[2][2] > std::cos(glm::radians(1.f)));  // upright; rotation about the vertical is allowed
     }
     CHECK(motion(*body) < 1e-2f);
     CHECK(world.dispatcher.statistics().beyondBand == 0);
@@ -128,7 +128,7 @@ TEST_CASE("Bullet's flat box stands on its sides, where its margin ends") {
     World world;
     world.add(slab, 0, {0, 0, -0.3f});
     btRigidBody* body = world.add(box, 1, {0, 0, 0.25f}, btQuaternion({1, 0, 0}, SIMD_HALF_PI));
-    body->setAngularFactor(0);  // as such shapes are for flat worlds
+    body->setAngularFactor(0);  // such shapes are meant for 2D worlds
     world.run(1.5f);
     CHECK(body->getWorldTransform().getOrigin().z() == Approx(0.2).margin(tolerance * h));
 }
@@ -195,7 +195,7 @@ TEST_CASE("A field comes to rest on uneven ground, where each contact has a feat
     for (const Contact& contact : contacts) features.insert(contact.feature);
     CHECK(features.size() == contacts.size());
     CHECK(contacts.size() > 20);
-    // some for each of the ground's 180 triangles below the box, however wide the band
+    // a few for each of the ground's 180 triangles below the box, however wide the band
     CHECK(contacts.size() < 1000);
 }
 
@@ -338,7 +338,7 @@ TEST_CASE("Bodies lie at the bottom of a field's bowl") {
 
 TEST_CASE("A bump of a field carries a flat face, and a groove both flanks of a sphere") {
     SECTION("a plate on three bumps") {
-        // three spheres of one field under a plate: only the field's own points can meet its face
+        // three spheres of one field under a plate: only the field's own points can contact its face
         Shape sphere(exactSphere(0.4f, h));
         btCompoundShape three;
         for (int i = 0; i < 3; ++i)

@@ -1,4 +1,4 @@
-// What a world is asked between steps: rays, sweeps, contact tests, inertia, bounds, drawing.
+// Queries between steps: rays, sweeps, contact tests, inertia, bounds, drawing.
 #include <BulletCollision/CollisionDispatch/btCollisionWorld.h>
 #include <BulletCollision/CollisionDispatch/btGhostObject.h>
 #include <BulletCollision/NarrowPhaseCollision/btRaycastCallback.h>
@@ -26,8 +26,8 @@ namespace {
 
 constexpr float h = 0.05f;  // voxel [m]
 
-// On a sphere of radius R, the gradient of the trilinear interpolant is off by up to h / (2 R) along either tangent, so
-// that the deepest place of a ball is found that far beside the true one.
+// On a sphere of radius R, the gradient of the trilinear interpolant is off by up to h / (2 R) along either tangent.
+// The deepest place of a ball is found with that lateral error.
 constexpr float fieldRadius = 0.5f;
 const float minCosine = std::cos(h / fieldRadius);
 constexpr double depthError = 0.1 * h;
@@ -80,7 +80,7 @@ TEST_CASE("Rays meet a field's sphere where the formula says") {
 
     int hits = 0;
     for (int i = 0; i < 40; ++i) {
-        // around the rim too, so that some pass by
+        // around the rim too, so that some miss
         const float offset = radius * i / 35.f;
         const btVector3 from = centre + btVector3(-5, offset, 0.1f), to = from + btVector3(10, 0, 0);
         btCollisionWorld::ClosestRayResultCallback ray(from, to);
@@ -117,7 +117,7 @@ TEST_CASE("Spheres are swept against the field, or against the mesh where they a
     CHECK(sweep.m_hitNormalWorld.z() == Approx(1).margin(1e-3));
     CHECK(sweep.m_hitPointWorld.z() == Approx(1.3f).margin(1e-3));
 
-    // beside the box, and away from it
+    // next to the box, and away from it
     for (const auto& [a, b] :
          {std::pair(btVector3(0.9f, 0, 3), btVector3(0.9f, 0, -3)), std::pair(from, from + btVector3(0, 0, 1))}) {
         btCollisionWorld::ClosestConvexResultCallback miss(a, b);
@@ -176,7 +176,7 @@ TEST_CASE("Meshes of more triangles than Bullet's quantized hierarchy can number
     World world;
     world.add(shape, 0, {0, 0, 0});
     btBoxShape box({0.1f, 0.1f, 0.1f});
-    // on all sides, in the middle and near the corners: some of these triangles are the last
+    // on all sides, in the middle and near the corners, so that the last triangles are included
     for (int i = 0; i < 6 * 5; ++i) {
         btVector3 side(0, 0, 0), across(0, 0, 0);
         side[i / 10] = i / 5 % 2 ? 1 : -1;
@@ -220,7 +220,7 @@ TEST_CASE("A ghost that dispatches its own pairs is no step") {
 
 namespace {
 
-// Takes no hit on what looks up, as characters do that are swept along the ground.
+// Ignores hits whose normal points up, like characters that are swept along the ground.
 template <class Callback, class Result>
 struct Refusing : Callback {
     using Callback::Callback;
@@ -261,7 +261,7 @@ TEST_CASE("Rays and swept spheres go on behind a hit where their callback does")
     world.dynamics.convexSweepTest(&sphere, btTransform(btQuaternion::getIdentity(), from),
                                    btTransform(btQuaternion::getIdentity(), to), sweep);
     REQUIRE(sweep.hasHit());
-    // the zero set has small triangles, which a sphere that has passed some of the top meets by their sides
+    // the zero set has small triangles; a sphere that has passed some of the top hits them from the side
     CHECK(sweep.m_closestHitFraction > 0.25 / 0.6 + 0.01);
     if (hasMesh) CHECK(sweep.m_closestHitFraction == Approx(1.35 / 1.8).margin(0.002));
 }
@@ -363,7 +363,7 @@ TEST_CASE("Inertia is that of the solid, about the centre of mass and its princi
     btVector3 inertia;
     shape.calculateLocalInertia(3, inertia);
     const glm::vec3 square = 4.f * half * half * scale * scale;
-    // ascending: about the longest side first
+    // ascending: the moment about the longest side comes first
     CHECK(inertia.x() == Approx(3.f / 12 * (square.y + square.z)).epsilon(1e-4));
     CHECK(inertia.y() == Approx(3.f / 12 * (square.x + square.z)).epsilon(1e-4));
     CHECK(inertia.z() == Approx(3.f / 12 * (square.x + square.y)).epsilon(1e-4));
@@ -431,7 +431,7 @@ TEST_CASE("Contacts are drawn where bodies touch") {
 }
 
 TEST_CASE("A band is outlined by the blocks that it lies in") {
-    // a ball in the middle of a block, whose band leaves it by a voxel on each of its sides: seven blocks in a cross
+    // a ball in the middle of a leaf, whose band extends one voxel beyond each side: seven leaves in a cross
     const glm::vec3 centre(4 * h, 4 * h, 4 * h);
     const float radius = 2.5f * h;
     Mesh mesh = shapes::sphere(radius, 3);
@@ -447,7 +447,7 @@ TEST_CASE("A band is outlined by the blocks that it lies in") {
     CHECK((drawer.lower - btVector3(1, 2, 3) - btVector3(-block, -block, -block)).length() < 1e-5f);
     CHECK((drawer.upper - btVector3(1, 2, 3) - btVector3(2 * block, 2 * block, 2 * block)).length() < 1e-5f);
 
-    // also inside a compound, with a line a surface point
+    // also inside a compound, with a line per surface point
     btCompoundShape compound;
     compound.addChildShape(btTransform(btQuaternion::getIdentity(), {0, 0, 1}), &shape);
     World world;

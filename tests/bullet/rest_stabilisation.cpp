@@ -1,4 +1,4 @@
-// What rests stays where it is, and nothing else does.
+// Resting bodies stay in place; rest stabilisation affects no other body.
 #include <bilayer/integration/bullet/extensions.h>
 
 #include <BulletDynamics/ConstraintSolver/btPoint2PointConstraint.h>
@@ -27,13 +27,13 @@ constexpr bullet::ExtensionOptions resting{.continuousCollision = false, .restSt
 
 constexpr float h = 0.02f;  // voxel [m]
 
-/// Friction in all directions: with Bullet's single one, what lies on something slow goes on as it likes.
+/// Friction along two tangents. With Bullet's single friction direction, bodies on slowly moving ones drift.
 void useFriction(World& world) {
     world.dynamics.getSolverInfo().m_solverMode |= SOLVER_USE_2_FRICTION_DIRECTIONS;
     world.dynamics.getSolverInfo().m_numIterations = 40;
 }
 
-/// Rings that lie in a bowl, across each other.
+/// Rings that rest in a bowl, across each other.
 struct Heap {
     Shape bowl{exactBowl(1, 0.1f, 2 * h)};
     Shape ring{exactTorus(0.2f, 0.07f, h), {.restingFriction = 1.5f}};
@@ -54,14 +54,14 @@ struct Heap {
         }
     }
 
-    /// Until nothing rocks any more, which takes some of them half a minute.
+    /// Runs until no ring rocks, which takes some of them half a minute.
     void settle() {
         world.run(8);
         for (int i = 0; i < 60 && farthest(1) > 0.02f * h; ++i) {
         }
     }
 
-    /// How far the ring goes that goes farthest, on its way too.
+    /// Maximum displacement of any ring, at any time in between.
     float farthest(float seconds) {
         std::vector<btVector3> before;
         for (const btRigidBody* body : rings) before.push_back(body->getCenterOfMassPosition());
@@ -75,7 +75,7 @@ struct Heap {
     }
 };
 
-/// A box on level ground that friction does not hold and nothing lets sleep, after a second.
+/// A box on level frictionless ground with sleeping disabled, after one second.
 struct BoxOnIce {
     Shape floor{exactBox({1, 1, 0.1f}, h)}, box{exactBox({0.1f, 0.1f, 0.1f}, h)};
     btRigidBody* body;
@@ -114,7 +114,7 @@ TEST_CASE("A heap that nothing lets sleep stays where it is, and falls when its 
 
 TEST_CASE("What slept is where it was when it wakes up") {
     const unsigned start = seed();
-    const bool byIsland = GENERATE(false, true);  // Bullet wakes the others then, in the middle of a step
+    const bool byIsland = GENERATE(false, true);  // Bullet then wakes the others, in the middle of a step
     CAPTURE(start, byIsland);
     Heap heap(start);
     const WorldExtensions still(heap.world.dynamics, resting);
@@ -214,7 +214,7 @@ TEST_CASE("What moves for a reason is not held: thrown, without weight, hung up,
             CHECK(body->getCenterOfMassPosition().x() == Approx(place.getOrigin().x()).margin(2e-3 * h));
             CHECK(still.restingBodies() == 1);
         }
-        world.dynamics.getSolverInfo().m_frictionERP = 0;  // else friction turns it back
+        world.dynamics.getSolverInfo().m_frictionERP = 0;  // else friction pulls it back
         const btTransform before = body->getWorldTransform();
         for (int i = 0; i < 240; ++i) {
             world.run(1.f / 240);
@@ -228,7 +228,7 @@ TEST_CASE("What moves for a reason is not held: thrown, without weight, hung up,
 }
 
 TEST_CASE("What swings gets no energy each time it turns, and comes to rest where it is damped") {
-    // a tilt of 0.05 changes the speed where it turns by as much in each step as something that pushes would
+    // a tilt of 0.05 changes the speed near the turning point by as much per step as a push would
     const float perSecond = GENERATE(60.f, 240.f), damping = GENERATE(0.f, 0.2f), tilt = GENERATE(0.02f, 0.05f, 0.13f);
     CAPTURE(perSecond, damping, tilt);
     constexpr float radius = 0.3f, below = 0.12f;  // a ball whose mass lies below its middle
@@ -236,7 +236,8 @@ TEST_CASE("What swings gets no energy each time it turns, and comes to rest wher
     btSphereShape sphere(radius);
     btCompoundShape tumbler;
     tumbler.addChildShape(btTransform(btQuaternion(0, 0, 0, 1), {0, 0, below}), &sphere);
-    // until then, how fast it is in the last ten seconds, and the steps that it is held in the very last one
+    // end of the run; outputs are the speed in the last ten seconds, and the count of steps at the end in which the
+    // body is held
     constexpr float until = 90;
     const auto swing = [&](bool holds) {
         World world;
@@ -255,7 +256,7 @@ TEST_CASE("What swings gets no energy each time it turns, and comes to rest wher
             if (float(i) > (until - 10) * perSecond) speeds.push_back(body->getLinearVelocity().length());
             if (holds && float(i) >= (until - 1) * perSecond) held += still->restingBodies();
         }
-        // the usual ones: a step here and there is off, with and without
+        // uses typical speeds: single steps deviate with and without
         std::sort(speeds.begin(), speeds.end());
         return std::pair(speeds[speeds.size() * 9 / 10], held);
     };
@@ -297,7 +298,7 @@ TEST_CASE("What a platform without weight carries comes along, however slowly, a
 TEST_CASE("What a slow lift or a slow belt carries comes along, and what is stacked on it") {
     const btVector3 way =
         GENERATE(btVector3(0, 0, 1e-4f), btVector3(1e-4f, 0, 0), btVector3(5e-4f, 5e-4f, 0), btVector3(0, 0, -1e-4f));
-    // of friction's anchors; the size of all, and whether it is Bullet's own
+    // friction-anchor ERP; the size of all bodies; and whether Bullet's own box is used
     const float pulledBack = GENERATE(0.f, 0.2f), size = GENERATE(0.1f, 1e-3f);
     const bool isField = GENERATE(true, false);
     CAPTURE(way.x(), way.z(), pulledBack, size, isField);

@@ -1,4 +1,4 @@
-// What is round: how high it lies, and how it rolls.
+// Round bodies: their height at rest, and how they roll.
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
@@ -104,9 +104,9 @@ TEST_CASE("Balls roll on") {
         CHECK(left < 1.02f);
         kept += left / balls;
     }
-    // what its facets take, each of which it comes down on: those between points 1.4 voxels apart, at 0.3 m/s about a
-    // sixth in a second; and it is not thrown up: at 3 m/s, which turns it by half a radian in a step, it lifts by 1 to
-    // 2 mm, where straight ways would throw it up by 20; slower it does not hop
+    // the loss at its facets, on each of which it lands. Those between points 1.4 voxels apart take about a sixth in
+    // one second at 0.3 m/s. The ball must not be thrown up. At 3 m/s it rotates by half a radian per step and lifts by
+    // 1 to 2 mm; straight point displacements would lift it by 20 mm. At lower speeds it does not hop
     CHECK(kept > 0.75f);
     CHECK(highest < (speed < 2 ? 0.3f / 32 : 0.03f) * radius);
 }
@@ -122,7 +122,7 @@ TEST_CASE("Hulls roll over fields") {
     Shape slab(exactBox({4, 0.5f, 0.1f}, 0.02f));
     Roller roller(hull, slab, {2, 0, -0.1f}, speed, false);
     for (int i = 0; i < 60; ++i) roller.world.dynamics.stepSimulation(1 / 60.f, 0);
-    // on a box of Bullet's, its facets take a seventh at 0.3 m/s
+    // on one of Bullet's boxes its facets take a seventh at 0.3 m/s
     CHECK(roller.body->getLinearVelocity().x() > 0.5f * speed);
     CHECK(roller.body->getLinearVelocity().x() < 1.02f * speed);
 }

@@ -1,4 +1,4 @@
-// Contacts whose points a sampler has sampled: the same as without, to the bit.
+// Contacts with points sampled by a sampler are bitwise the same as without.
 #include <tbb/global_control.h>
 #include <tbb/task_arena.h>
 
@@ -60,7 +60,7 @@ struct Crowd {
     }
 };
 
-// Every pair's contacts by the sampler against those of the processor. Returns their number.
+// Compares every pair's contacts by the sampler with those of the CPU. Returns their count.
 std::size_t check(const PointSampler& sampler, const Crowd& crowd, float margin) {
     const ContactOptions options{
         .margin = margin, .minNormalCosine = 0.3f, .minNormalCosineApart = 0.9f, .keepsObliqueEdges = false};
@@ -98,11 +98,11 @@ std::size_t check(const PointSampler& sampler, const Crowd& crowd, float margin)
 
 struct Played {
     std::vector<float> poses;    // of all bodies, after every step
-    std::vector<int> sampled{};  // pairs, in every step
+    std::vector<int> sampled{};  // count of pairs, in every step
     int pairs = 0;
 };
 
-// A heap that falls down and comes nearly to rest.
+// A pile that falls and comes nearly to rest.
 Played play(PointSampler sampler, unsigned seed) {
     Random random(seed);
     const auto colliders = someColliders();

@@ -48,13 +48,13 @@ TEST_CASE("A plate too thin for any affordable field is warned of") {
     const Settings advice = recommendSettings(plate(1e-3f), {.speed = 1});
     CHECK(advice.voxelSize == Approx(1.f / 512));
     CHECK(warnsOf(advice, "voxels thick"));
-    // a voxel size of the user's is judged by the same rule
+    // a user-defined voxel size is checked by the same rule
     CHECK(warnsOf(recommendSettings(plate(0.03f), {.voxelSize = 0.016f}), "voxels thick"));
     CHECK_FALSE(warnsOf(recommendSettings(plate(0.03f), {.voxelSize = 0.015f}), "voxels thick"));
 }
 
 TEST_CASE("A thin tip does not rule the voxel size, but is warned of") {
-    // a ball with a sheet of a hundred thousandth of its area on top
+    // a ball with a thin plate of 1e-5 of its area on top
     Mesh tip = shapes::box({5e-3f, 5e-3f, 1e-4f});
     for (glm::vec3& point : tip.points) point.z += 0.6f;
     const MeshReport mesh = inspect(shapes::join({shapes::sphere(0.5f, 4), tip}));
@@ -71,9 +71,9 @@ TEST_CASE("A ball has no thin wall: its size decides") {
     CHECK(advice.voxelSize == Approx(1.f / 64));
     CHECK(advice.substeps == 1);
     CHECK(advice.substepsWithoutSpeculation == 1);
-    // unless it meets one, or has to pass a gap
+    // unless it collides with one, or must fit through a gap
     CHECK(recommendSettings(ball(0.5f), {.thickness = 0.03f}).voxelSize == Approx(0.01));
-    // its own wall counts where it is thinner
+    // its own wall counts if it is thinner
     CHECK(recommendSettings(plate(0.03f), {.thickness = 0.5f}).voxelSize == Approx(0.01));
     CHECK(warnsOf(recommendSettings(ball(0.5f), {.margin = 0}), "margin"));
     CHECK(recommendSettings(ball(0.5f), {.gap = 0.01f}).voxelSize == Approx(0.005));
@@ -82,19 +82,20 @@ TEST_CASE("A ball has no thin wall: its size decides") {
 }
 
 TEST_CASE("Speed asks for substeps, or for sweeps") {
-    // 10 m/s at 1/60 s go 16.7 cm; half of the plate is 1.5 cm: 11.1 steps. It may turn by 20 rad/s then, 0.33 a step.
+    // 10 m/s at 1/60 s is a displacement of 16.7 cm; half of the plate is 1.5 cm: 11.1 steps. Its spin may then be 20
+    // rad/s, 0.33 rad per step.
     const Settings fast = recommendSettings(plate(0.03f), {.speed = 10});
     CHECK(fast.substepsWithoutSpeculation == 12);
     CHECK(fast.substeps == 1);
     CHECK(warnsOf(fast, "swept contacts"));
     CHECK(warnsOf(fast, "WorldExtensions"));
     CHECK(fast.interiorWidth == 10);
-    // below the margin nothing passes
+    // below the margin nothing tunnels
     const Settings slow = recommendSettings(plate(0.03f), {.speed = 0.5f});
     CHECK(slow.substepsWithoutSpeculation == 1);
     CHECK_FALSE(warnsOf(slow, "swept contacts"));
     CHECK(slow.interiorWidth == 3);
-    // turns bend ways: half a radian a step at most
+    // rotation curves the paths of points: at most half a radian per step
     CHECK(recommendSettings(plate(0.03f), {.speed = 1, .spin = 100}).substeps == 4);
     CHECK(recommendSettings(plate(0.03f), {.step = 1.f / 240, .speed = 1, .spin = 100}).substeps == 1);
     CHECK(recommendSettings(plate(0.03f), {.speed = 100, .spin = 0}).substeps == 1);

@@ -1,4 +1,4 @@
-// Bodies slide as friction says, on whatever they lie.
+// Bodies slide according to friction, on every kind of ground.
 #include <BulletCollision/CollisionShapes/btHeightfieldTerrainShape.h>
 
 #include <algorithm>
@@ -18,7 +18,7 @@ using bullet::Shape;
 
 namespace {
 
-/// An upright prism whose outline is a cross: at its inner corners edges meet that look every way.
+/// An upright prism with a cross-shaped outline: at its inner corners edges of all directions meet.
 Mesh crossPrism(float arm, float halfHeight) {
     const glm::vec2 quarter[] = {{1, -0.4f}, {1, 0.4f}, {0.4f, 0.4f}};
     Mesh mesh;
@@ -62,7 +62,7 @@ struct Grounds {
     struct Ground {
         const char* name;
         btCollisionShape& shape;
-        float top;  ///< above the shape's origin [m]
+        float top;  ///< height of the top above the shape's origin [m]
     };
     std::vector<Ground> all() {
         return {{"plane", plane, 0},
@@ -83,7 +83,7 @@ TEST_CASE("What is flat below slides to a stop where friction says, on all that 
     const unsigned seed = test::seed();
     CAPTURE(seed, steps, voxel);
     Random random(seed);
-    const float edge = 0.1f;  // half of the bodies' [m]
+    const float edge = 0.1f;  // half the edge length of the bodies [m]
     Shape cube(exactBox(glm::vec3(edge), voxel));
     const Mesh mesh = crossPrism(2 * edge, edge);
     Shape cross(std::make_shared<Collider>(mesh, build(mesh, {.voxelSize = voxel, .interiorWidth = 6})));
@@ -102,7 +102,7 @@ TEST_CASE("What is flat below slides to a stop where friction says, on all that 
             const float start = float(random(-2, 0));
             btRigidBody* body = world.add(kind.shape, 1, {start, float(random(-1, 1)), edge},
                                           btQuaternion(btVector3(0, 0, 1), float(random(0, 3))));
-            // Bullet multiplies the coefficients of two bodies, 0.5 for the ground
+            // Bullet multiplies the coefficients of both bodies; the ground has 0.5
             body->setFriction(0.5f);
             body->setDamping(0, 0);
             const float speed = float(random(1, 3));
@@ -112,7 +112,7 @@ TEST_CASE("What is flat below slides to a stop where friction says, on all that 
                 world.dynamics.stepSimulation(1 / steps, 0);
                 highest = std::max(highest, float(body->getWorldTransform().getOrigin().z()) - edge);
             }
-            // each step's friction acts before the step's way
+            // each step applies friction before its displacement
             const float deceleration = 0.25f * 9.81f, way = speed * speed / (2 * deceleration) - speed / (2 * steps);
             CHECK(body->getWorldTransform().getOrigin().x() - start == Approx(way).epsilon(0.02).margin(0.01));
             CHECK(highest < 0.1f * voxel);
@@ -170,7 +170,7 @@ TEST_CASE("What is round below keeps its speed without friction") {
     Grounds grounds;
     for (const auto& kind : bodies)
         for (const auto& ground : grounds.all()) {
-            // curved ways over points that touch soon are taken for straight ones there
+            // the curved paths of points that are about to touch are approximated as straight
             if (&ground.shape == &grounds.field) continue;
             if (steps < 100 && &ground.shape != &grounds.plane && &ground.shape != &grounds.box) continue;
             CAPTURE(kind.name, ground.name);
@@ -182,7 +182,7 @@ TEST_CASE("What is round below keeps its speed without friction") {
             body->setDamping(0, 0);
             body->setLinearVelocity({2, 0, 0});
             for (float time = 0; time < 1; time += 1 / steps) world.dynamics.stepSimulation(1 / steps, 0);
-            CHECK(body->getLinearVelocity().x() == Approx(2).epsilon(0.03));  // of a ball, 2 % on a box
+            CHECK(body->getLinearVelocity().x() == Approx(2).epsilon(0.03));  // for a ball, 2 % for a box
             CHECK(body->getWorldTransform().getOrigin().z() == Approx(kind.height).margin(0.002));
         }
 }

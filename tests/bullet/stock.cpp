@@ -1,4 +1,4 @@
-// Fields on a dispatcher that is Bullet's own.
+// Fields with Bullet's own dispatcher.
 #include <bilayer/collider/contact.h>
 #include <unistd.h>
 
@@ -20,7 +20,7 @@ namespace {
 
 constexpr float h = 0.05f;  // voxel [m]
 
-/// A heap of fields and Bullet's shapes, and where all of them are after a second; then how far apart two fields are.
+/// A pile of fields and Bullet's shapes: positions of all bodies after one second, then the distance of two fields.
 struct Played {
     std::vector<btTransform> places;
     float gap = 1;
@@ -111,7 +111,7 @@ TEST_CASE("Fast fields do not pass a plate on a dispatcher of Bullet's own") {
 
 namespace {
 
-/// What is written to the standard error output meanwhile.
+/// Returns what `work` writes to standard error.
 std::string errorsOf(const std::function<void()>& work) {
     std::fflush(stderr);
     std::FILE* file = std::tmpfile();
@@ -129,7 +129,7 @@ std::string errorsOf(const std::function<void()>& work) {
     return text;
 }
 
-/// A world of Bullet's own, which knows no fields unless somebody else has told its dispatcher.
+/// A world of Bullet's own. Its dispatcher supports fields only if other code has registered them.
 struct StockWorld {
     StockWorld() { world.setGravity({0, 0, -9.81f}); }
     ~StockWorld() {
@@ -168,7 +168,8 @@ TEST_CASE("A dispatcher that knows no fields is warned of when the first two fal
         });
     };
     const auto nothing = [](StockWorld&) {};
-    // not of a field that meets only what Bullet collides with its triangles, and is drawn from a copy of its transform
+    // no warning for a field that meets only shapes that Bullet collides with its triangles, and that is drawn from a
+    // copy of its transform
     CHECK(errorsOf([&] {
               Shape body(ball);
               btBoxShape box({1, 1, 0.3f});
@@ -182,7 +183,7 @@ TEST_CASE("A dispatcher that knows no fields is warned of when the first two fal
                   body.getAabb(copy, lower, upper);
               }
           }).empty());
-    // nor of fields that stand still where they meet
+    // nor for static fields that overlap
     CHECK(errorsOf([&] {
               Shape ground(slab), body(ball);
               StockWorld stock;
@@ -190,7 +191,7 @@ TEST_CASE("A dispatcher that knows no fields is warned of when the first two fal
               stock.add(body, 0, {0, 0, 0.3f});
               stock.run(60);
           }).empty());
-    // nor of compounds that are made of fields that meet
+    // nor for static compounds of fields that overlap
     CHECK(errorsOf([&] {
               Shape body(ball);
               btCompoundShape compound;

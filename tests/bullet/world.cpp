@@ -21,7 +21,7 @@ using namespace bilayer::bullet::detail;
 World::World(PointSampler sampler) : dispatcher(&configuration, std::move(sampler)) {
     dynamics.setGravity({0, 0, -9.81f});
     dynamics.getDispatchInfo().m_deterministicOverlappingPairs = true;
-    // Small parts: overlaps of centimetres are not to be answered with speed.
+    // Small parts: avoids adding velocity for penetration of centimetres.
     dynamics.getSolverInfo().m_splitImpulsePenetrationThreshold = -1e-3f;
 }
 

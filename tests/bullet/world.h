@@ -23,11 +23,11 @@ using demo::TriangleShape;
 /// A world with gravity (0, 0, -9.81) m/s^2 that owns its bodies.
 class World {
   public:
-    /// @param sampler  of the dispatcher
+    /// @param sampler  passed to the dispatcher
     explicit World(PointSampler sampler = {});
     ~World();
 
-    /// mass 0: static. The shape must outlive the world.
+    /// Mass 0: static. The shape must outlive the world.
     btRigidBody* add(btCollisionShape& shape, float mass, const btVector3& position,
                      const btQuaternion& rotation = btQuaternion::getIdentity());
     /// Steps of 1/240 s.
@@ -43,24 +43,23 @@ class World {
     std::vector<std::unique_ptr<btRigidBody>> bodies_;
 };
 
-/// A field whose distances are those of a formula, not of the mesh's triangles: what is left of an error is the
-/// contacts'.
+/// A field with the distances of a formula, not of the mesh's triangles. Remaining errors are those of the contacts.
 std::shared_ptr<const Collider> exactCollider(const Mesh& mesh, const std::function<float(const glm::vec3&)>& distance,
                                               float voxelSize);
 
 std::shared_ptr<const Collider> exactBox(const glm::vec3& halfExtents, float voxelSize);
 std::shared_ptr<const Collider> exactSphere(float radius, float voxelSize);
 std::shared_ptr<const Collider> exactTorus(float major, float minor, float voxelSize);
-/// A shell like shapes::bowl: the lower half of the sphere of `radius`, `wall` thick, with a round rim.
+/// A shell like shapes::bowl: the lower half of the sphere of `radius`, with wall thickness `wall` and a round rim.
 std::shared_ptr<const Collider> exactBowl(float radius, float wall, float voxelSize);
 
 /// The height of the lowest vertex [m].
 float lowest(const Mesh& mesh, const btTransform& at);
 
-/// The body of a mesh as it comes back from a file that leaves the mesh out.
+/// The collider of a mesh as it is read from a file without the mesh.
 std::shared_ptr<const Collider> withoutMesh(const Mesh& mesh, const LevelSet& field);
 
-/// What a contact test finds nearest.
+/// Keeps the nearest contact of a contact test.
 struct Nearest : btCollisionWorld::ContactResultCallback {
     btScalar addSingleResult(btManifoldPoint& point, const btCollisionObjectWrapper*, int, int,
                              const btCollisionObjectWrapper*, int, int) override {
@@ -70,10 +69,10 @@ struct Nearest : btCollisionWorld::ContactResultCallback {
     float distance = std::numeric_limits<float>::max();
 };
 
-/// Speed at which a body at rest may still creep: linear [m/s] and angular [1/s] together.
+/// Linear [m/s] plus angular [1/s] speed: the measure of residual drift of resting bodies.
 float motion(const btRigidBody& body);
 
-/// A groove along y of two slopes, in squares of two triangles each.
+/// A groove along y with two slopes, made of squares of two triangles each.
 Mesh grooveOf(float slope, float cell, int cells);
 
 }  // namespace bilayer::test

@@ -1,4 +1,4 @@
-// Which devices there are, which one is opened, and what is said where there is none.
+// Lists devices, opens one of them, and reports missing ones.
 #include <bilayer/cl/device.h>
 
 #include <fmt/core.h>
@@ -15,7 +15,7 @@ using Catch::Matchers::Contains;
 
 namespace {
 
-// An environment variable while this lives; restored afterwards.
+// Sets an environment variable for its lifetime; restores it afterwards.
 class Variable {
   public:
     Variable(const char* name, const char* value) : name_(name) {
@@ -78,7 +78,8 @@ TEST_CASE("the environment names the device where the caller does not") {
 }
 
 TEST_CASE("without a driver there is no device, and opening one says so") {
-    // loaders look for drivers once in a process, so this takes another one; a packed one starts by bench/packed.sh
+    // loaders search for drivers once per process, so this test starts another process; a packed program is started by
+    // bench/packed.sh
     const char* const packed = std::getenv("BILAYER_SELF");
     const std::string self =
         packed ? packed : fmt::format("'{}'", std::filesystem::read_symlink("/proc/self/exe").string());

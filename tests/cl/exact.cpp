@@ -1,4 +1,4 @@
-// The exact method on an OpenCL device against the truth: every distance, every sign, the whole band.
+// The exact method on an OpenCL device against the ground truth: every distance, every sign, the whole band.
 #include <openvdb/openvdb.h>
 #include <catch2/catch.hpp>
 
@@ -16,7 +16,7 @@ using namespace bilayer;
 
 namespace {
 
-constexpr std::size_t manyVoxels = 10000;  // active ones checked of a mesh; smaller grids are checked whole
+constexpr std::size_t manyVoxels = 10000;  // active voxels checked per mesh; smaller grids are checked completely
 
 void checkExact(const Mesh& mesh, float resolution, const test::Band& band, KernelMapping mapping, unsigned seed) {
     const float voxelSize = voxelSizeFor(mesh, resolution);

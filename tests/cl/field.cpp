@@ -1,4 +1,4 @@
-// Samples on a device: the checks that the processor's pass too, and both side by side.
+// Samples on a device: the same checks as on the CPU, and a direct comparison of both.
 #include <bilayer/cl/field.h>
 #include <bilayer/sdf/mesh_io.h>
 
@@ -21,11 +21,11 @@ using Catch::Matchers::Contains;
 namespace {
 
 constexpr double h = 0.02;  // of most fields here [m]
-/// How far samples of device and processor may lie apart: single precision at a few voxels [voxels].
+/// Tolerance between samples of device and CPU: single precision at a few voxels [voxels].
 constexpr float margin = 1e-6f;
 
 std::vector<Sample> samplesOf(const DeviceField& field, std::span<const glm::vec3> points) {
-    // what a sampler forgets to write shows
+    // poisoned, so that a sample that is not written is detected
     std::vector<Sample> samples(points.size(), {.distance = 77, .gradient = glm::vec3(7), .inBand = true});
     field.sample(points, samples);
     return samples;
@@ -40,7 +40,7 @@ MakeSampler onDevice() {
     };
 }
 
-// Points in and beside the band, far away, and nowhere.
+// Points in the band, next to it, far away, and not finite.
 std::vector<glm::vec3> allKindsOfPoints(Random& random, const Bounds& bounds, std::size_t count) {
     const glm::vec3 middle = 0.5f * (bounds.lower + bounds.upper);
     const double half = 0.5 * double(bounds.longestSide());
@@ -54,7 +54,7 @@ std::vector<glm::vec3> allKindsOfPoints(Random& random, const Bounds& bounds, st
 }
 
 bool areAlike(const Sample& a, const Sample& b, float voxelSize) {
-    // far away, distances have their own precision
+    // far away the precision is relative to the distance
     const float allowed = margin * std::max(voxelSize, std::abs(b.distance));
     const glm::vec3 apart = glm::abs(a.gradient - b.gradient);
     return a.inBand == b.inBand && std::signbit(a.distance) == std::signbit(b.distance) &&
@@ -96,7 +96,7 @@ BuildOptions optionsFor(const Mesh& mesh, float resolution, Method method) {
     return options;
 }
 
-// What is built to stay on the device answers as what is built there and comes down.
+// A field that stays on the device gives the same answers as one that is built there and downloaded.
 void checkResident(const Mesh& mesh, const BuildOptions& build, const OpenclOptions& options = {}) {
     const Device device = openDevice();
     const Field field(bilayer::build(mesh, build, openclFiller(device, options)));
@@ -267,7 +267,7 @@ TEST_CASE("what needs the processor cannot stay on the device, nor what exceeds 
     options.progress = [](float) { return false; };
     CHECK_THROWS_AS(DeviceField(device, ball, options), Cancelled);
 
-    // two balls that meet: inside one, the normals of the other contradict
+    // two balls that overlap: inside one, the normals of the other contradict
     Mesh both = ball;
     const Mesh other = transformed(ball, glm::mat4(1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0.7f, 0.1f, 0, 1));
     const auto shift = std::uint32_t(both.points.size());

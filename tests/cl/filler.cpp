@@ -1,5 +1,5 @@
-// Fields that an OpenCL device builds against those of the processor, by both methods and in both mappings; budgets of
-// device memory; what goes wrong. The exact method is judged by the truth in exact.cpp.
+// Fields built by an OpenCL device against those of the CPU, by both methods and in both mappings; budgets of device
+// memory; error conditions. exact.cpp compares the exact method with the ground truth.
 #include <bilayer/cl/filler.h>
 
 #include <algorithm>
@@ -28,7 +28,7 @@ using Catch::Matchers::Contains;
 
 namespace {
 
-// Voxels along the longest side, and the mapping under test; a GPU's mapping crawls on a processor.
+// Voxels along the longest side, and the mapping under test. A GPU's mapping is very slow on a CPU.
 struct Way {
     KernelMapping mapping;
     float resolution;
@@ -43,11 +43,11 @@ BuildOptions optionsFor(const Mesh& mesh, float resolution, Method method = Meth
     return options;
 }
 
-// Of two triangles that may be equally near, how far each is from a voxel.
+// Distances of two triangles that may be equally near to a voxel.
 class NearTriangles {
   public:
     virtual ~NearTriangles() = default;
-    /// @param inside  on which side of the surface the voxel lies
+    /// @param inside  the side of the surface on which the voxel lies
     virtual double distance(std::int32_t triangle, const openvdb::Coord& voxel, bool inside) const = 0;  // [voxels]
 };
 
@@ -68,14 +68,14 @@ class ExactTriangles : public NearTriangles {
     double voxel_;
 };
 
-// The samples of each triangle in double precision.
+// By the samples of each triangle in double precision.
 class LayerSamplesOfTriangles : public NearTriangles {
   public:
     LayerSamplesOfTriangles(const Mesh& mesh, const BuildOptions& options) : tiles_(makeTiles(mesh, options)) {
         for (std::size_t t = 0; t < tiles_.tiles.size(); ++t) ofTriangle_[tiles_.triangles[t]].push_back(t);
     }
 
-    // To the nearest sample of the layer that decides: the farther one.
+    // Distance to the nearest sample of the layer that determines the value: the farther layer.
     double distance(std::int32_t triangle, const openvdb::Coord& voxel, bool inside) const override {
         double nearest = std::numeric_limits<double>::infinity();
         for (const std::size_t t : ofTriangle_.at(triangle)) {
@@ -96,7 +96,7 @@ class LayerSamplesOfTriangles : public NearTriangles {
     std::map<std::int32_t, std::vector<std::size_t>> ofTriangle_;
 };
 
-// Both fields have the same voxels and signs everywhere, and distances within the margin.
+// Checks that both fields have the same voxels and signs everywhere, and distances within the margin.
 void checkSame(const LevelSet& a, const LevelSet& b) {
     const openvdb::FloatGrid &expected = *a.grids().distance, &found = *b.grids().distance;
     REQUIRE(found.activeVoxelCount() == expected.activeVoxelCount());
@@ -136,7 +136,7 @@ void checkSameTriangles(const Mesh& mesh, const BuildOptions& options, const Lev
     CHECK(none == 0);
 }
 
-// The one test body over both fillers.
+// Compares both fillers; shared by all tests.
 void checkFillers(const Mesh& mesh, const BuildOptions& options, const OpenclOptions& opencl = {}) {
     const LevelSet expected = build(mesh, options);
     REQUIRE(expected.activeVoxels() > 0);
@@ -225,7 +225,7 @@ TEST_CASE("OpenCL and TBB agree far from the origin") {
 }
 
 TEST_CASE("OpenCL and TBB agree on triangles of very different size, however wide the band") {
-    // long needles, a fine ball, and a box whose sides are far larger than a brick
+    // long needles, a fine ball, and a box whose faces are far larger than a brick
     const Mesh mesh = shapes::join(
         {shapes::cone(0.01f, 2, 24), shapes::moved(shapes::sphere(0.1f, 4), glm::vec3(0.5f, 0, 0)),
          transformed(shapes::box({0.4f, 0.9f, 0.8f}),
@@ -252,7 +252,7 @@ TEST_CASE("OpenCL and TBB agree on signs that are asked for, and on meshes that 
 }
 
 TEST_CASE("blocks whose sides the nearest normals leave open come from the processor") {
-    // Two boxes that touch in a corner: at the voxel in that corner's far shadow their normals cancel out.
+    // Two boxes that share a corner. At the voxel on the far side of that corner their normals cancel out.
     const Mesh mesh = shapes::join({shapes::moved(shapes::box(glm::vec3(0.5f)), glm::vec3(0.5f)),
                                     shapes::moved(shapes::box(glm::vec3(0.5f)), glm::vec3(-0.5f))});
     BuildOptions options = optionsFor(mesh, 40, Method::exact);
@@ -261,7 +261,7 @@ TEST_CASE("blocks whose sides the nearest normals leave open come from the proce
 }
 
 TEST_CASE("OpenCL and TBB agree where faces of opposite sides lie on each other") {
-    // a box in a box of the same height, inside out or not: their tops and bottoms share planes
+    // a box in a box of the same height, inside out or not: their tops and bottoms are coplanar
     Mesh inner = shapes::box({0.7f, 0.4f, 0.5f}, GENERATE(1, 3));
     if (GENERATE(false, true))
         for (glm::uvec3& t : inner.triangles) std::swap(t.x, t.y);
@@ -296,7 +296,7 @@ TEST_CASE("a device keeps buffers for the next build, which may be of another me
     for (int i = 0; i < 3; ++i) {
         checkSame(expected, build(ball, ofBall, openclFiller(device)));
         CHECK(device.impl().spareBytes > 0);
-        if (i > 0) CHECK(device.impl().spareBytes == kept);  // they were used again, and none came on top
+        if (i > 0) CHECK(device.impl().spareBytes == kept);  // the spare buffers were reused, and none was added
         kept = device.impl().spareBytes;
     }
     OpenclTimes times;

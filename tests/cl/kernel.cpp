@@ -1,4 +1,4 @@
-// The kernel files by themselves: valid OpenCL C 1.2 to a compiler that is not the device's.
+// The kernel files alone must be valid OpenCL C 1.2 for a compiler other than the device's.
 #include <catch2/catch.hpp>
 #include <cstdlib>
 #include <string>

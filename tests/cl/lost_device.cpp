@@ -1,5 +1,5 @@
-// A device that is lost half-way through a build. The calls that send work to a device are defined here, before the
-// loader's, and fail from some call on, as drivers make them do when a GPU has gone.
+// A device that is lost during a build. This file defines the calls that send work to a device, before the loader's.
+// They fail from a chosen call on, as drivers make them fail after the loss of a GPU.
 #include <dlfcn.h>
 
 #include <atomic>
@@ -96,11 +96,11 @@ TEST_CASE("a device lost half-way is an error that names call and device, and le
                 ++failures;
                 CHECK_THAT(error.what(), Contains(name) && Contains(device.info().name) && Contains("CL_"));
             }
-            const bool all = callsLeft >= 0;  // there were no more of them
+            const bool all = callsLeft >= 0;  // the work made fewer calls
             callsLeft = INT_MAX;
             CHECK(complete == all);
             if (all) break;
-            // what is left on the device harms no other build
+            // remains on the device affect no other build
             REQUIRE(build(mesh, options, filler).activeVoxels() == voxels);
         }
     CHECK(failures > 6);

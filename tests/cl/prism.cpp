@@ -1,5 +1,5 @@
-// The prism method against a program that asks every triangle at every voxel in double precision, against true
-// distances where the method promises them, and against itself: mappings, batches of memory.
+// The prism method against three references: brute force over all triangles and voxels in double precision; true
+// distances where the method guarantees them; and itself, with other mappings and batch sizes.
 #include "cl/detail/prism.h"
 
 #include <algorithm>
@@ -24,8 +24,8 @@ using Catch::Matchers::Contains;
 
 namespace {
 
-constexpr double exactness = 1e-4;  // of the distance to a triangle [voxels]
-constexpr double unsure = 2e-3;     // this near to a prism's side a voxel may be in it or not [voxels]
+constexpr double exactness = 1e-4;  // tolerance of the distance to a triangle [voxels]
+constexpr double unsure = 2e-3;     // this close to a side of a prism, a voxel may be inside or outside of it [voxels]
 
 BuildOptions optionsFor(const Mesh& mesh, float resolution, float halfWidth = 2) {
     BuildOptions options;
@@ -39,13 +39,13 @@ LevelSet built(const Mesh& mesh, const BuildOptions& options, const OpenclOption
     return build(mesh, options, openclFiller(openDevice(), opencl));
 }
 
-// What the method makes of a voxel.
+// The method's expected result for a voxel.
 struct Expected {
-    double distance = std::numeric_limits<double>::infinity();  // without its sign
-    bool inside = false, outside = false;  // what the nearest triangles say, both where they differ
+    double distance = std::numeric_limits<double>::infinity();  // unsigned
+    bool inside = false, outside = false;  // by the nearest triangles; both are set where these disagree
 };
 
-// The method as it is written down, for meshes that are welded and have two triangles at each edge, or one.
+// The method as specified, for welded meshes with one or two triangles at each edge.
 class Reference {
   public:
     Reference(const Mesh& mesh, float voxelSize, double reach) : reach_(reach) {
@@ -72,7 +72,7 @@ class Reference {
         }
     }
 
-    // With all prisms wider by a margin, or narrower [voxels].
+    // With all prisms wider or narrower by a margin [voxels].
     Expected at(const glm::dvec3& voxel, double wider) const {
         Expected found;
         for (const Prism& prism : prisms_) {
@@ -112,7 +112,7 @@ glm::dvec3 pointOf(const openvdb::Coord& voxel) {
     return {voxel.x(), voxel.y(), voxel.z()};
 }
 
-// All voxels of the blocks that hold some of the band.
+// Visits all voxels of the leaves that meet the band.
 template <class Visit>
 void forEachVoxel(const openvdb::FloatGrid& grid, Visit visit) {
     for (auto leaf = grid.tree().cbeginLeaf(); leaf; ++leaf)
@@ -158,7 +158,7 @@ void checkSame(const LevelSet& a, const LevelSet& b) {
     CHECK(differing == 0);
 }
 
-// Not along the lattice.
+// Rotates the mesh off the lattice directions.
 Mesh tilted(const Mesh& mesh) {
     return transformed(mesh, glm::rotate(glm::mat4(1), 0.7f, glm::vec3(0.3f, 0.5f, -0.8f)));
 }
@@ -186,7 +186,7 @@ TEST_CASE("prisms give what asking all of them at every voxel gives") {
         CAPTURE(shape.name, width);
         const BuildOptions options = optionsFor(shape.mesh, shape.resolution, width);
         const LevelSet field = built(shape.mesh, options, {.mapping = mapping});
-        // as build() asks for: a little more than the band
+        // as build() requests: slightly more than the band
         const Reference reference(shape.mesh, options.voxelSize, double(width) + 1e-3);
         const Count count = compare(reference, field, double(width));
         CHECK(count.compared > 1000);
@@ -215,7 +215,7 @@ TEST_CASE("prisms give what asking all of them gives where they leak") {
 }
 
 TEST_CASE("in a convex body every voxel nearest to the inside of a face is right") {
-    // of huge triangles, so that floats are put to the test
+    // of huge triangles, which stress single precision
     const Mesh mesh = tilted(shapes::box({1.f, 0.6f, 0.3f}));
     const BuildOptions options = optionsFor(mesh, 250);
     const LevelSet field = built(mesh, options);

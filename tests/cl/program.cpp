@@ -17,7 +17,7 @@ namespace {
 const std::string source = "kernel void answer(global int* out) { out[get_global_id(0)] = ANSWER; }";
 const std::string options = "-D ANSWER=42";
 
-// What the kernel writes.
+// The kernel's output.
 int answer(DeviceImpl& device, const cl::Program& program) {
     cl::Kernel kernel(program, "answer");
     const cl::Buffer out(device.context, CL_MEM_WRITE_ONLY, sizeof(cl_int));
@@ -28,7 +28,7 @@ int answer(DeviceImpl& device, const cl::Program& program) {
     return value;
 }
 
-// Opens the device anew, so that its memory of programs is empty, and runs the kernel.
+// Opens the device again, so that its in-memory program cache is empty, and runs the kernel.
 int answerAnew() {
     const Device device = openDevice();
     return answer(device.impl(), buildProgram(device.impl(), source, options));
@@ -43,9 +43,10 @@ void overwrite(const std::filesystem::path& path, const std::string& bytes) {
     std::ofstream(path, std::ios::binary) << bytes;
 }
 
-// The cache goes to this folder from now on; each test runs in a process of its own or sets it anew.
+// Redirects the cache to this folder for the rest of the process. Each test runs in its own process or sets the folder
+// again.
 void cacheIn(const std::filesystem::path& folder) {
-    // PoCL keeps files of its own there too, and is no device without them
+    // PoCL also keeps its own files there and fails without them
     ::setenv("POCL_CACHE_DIR", bilayer::test::scratch("pocl").c_str(), 1);
     ::setenv("XDG_CACHE_HOME", folder.c_str(), 1);
 }
@@ -109,7 +110,7 @@ TEST_CASE("a program comes back from the disk") {
     CHECK(answerAnew() == 42);
     CHECK(std::filesystem::last_write_time(path) == written);
 
-    // the other program under this one's name shows whose binary is run
+    // stores the other program under this one's name, which shows whose binary runs
     const Device device = openDevice();
     const std::string other = "-D ANSWER=7";
     CHECK(answer(device.impl(), buildProgram(device.impl(), source, other)) == 7);
@@ -132,8 +133,7 @@ TEST_CASE("damaged files in the cache are compiled anew and replaced") {
     CAPTURE(damaged.size());
     overwrite(path, damaged);
     CHECK(answerAnew() == 42);
-    // replaced by one that is taken as it is the next time; its size may differ, PoCL's binaries are not always the
-    // same
+    // replaced by one that is used the next time; its size may differ, since PoCL's binaries are not reproducible
     CHECK(contents(path) != damaged);
     const auto written = std::filesystem::last_write_time(path);
     CHECK(answerAnew() == 42);

@@ -36,7 +36,7 @@ Mesh shifted(Mesh mesh, const glm::vec3& by) {
     return mesh;
 }
 
-// A collider of a mesh, and the same read from a file.
+// A collider of a mesh, and the same collider read from a file.
 struct Pair {
     explicit Pair(const Mesh& mesh, float voxel, const VdbOptions& file = {}, const ColliderOptions& options = {})
         : field(build(mesh, {.voxelSize = voxel})), made(mesh, field, options), loaded(read(made.data().body, file)) {}
@@ -101,7 +101,7 @@ const LevelSet& stored() {
 using Distance = openvdb::FloatGrid;
 using Points = openvdb::points::PointDataGrid;
 
-// The stored body with something changed in copies of its grids.
+// The stored body, modified in copies of its grids.
 LevelSet changed(const std::function<void(Distance&)>& distance, const std::function<void(Points&)>& points = {}) {
     auto grids = std::make_shared<Grids>(stored().grids());
     const auto field = grids->distance->deepCopy();
@@ -141,7 +141,7 @@ TEST_CASE("a body comes back from its file bit by bit") {
     const auto [mesh, voxel] =
         GENERATE(std::pair(shapes::torusKnot(2, 3, 0.5f, 0.15f, 200, 16), 0.03f),
                  std::pair(shapes::sphere(0.4f, 4), 1.f / 32), std::pair(shapes::box({0.3f, 0.2f, 0.1f}, 2), 0.0217f),
-                 // coordinates with few digits to spare, and with many
+                 // coordinates with few digits left, and with many
                  std::pair(shifted(shapes::sphere(0.4f, 3), {1000.3f, -77.77f, 1e-4f}), 0.05f),
                  std::pair(shapes::torus(0.0035f, 0.0013f), 1e-4f));
     const bool half = GENERATE(false, true);
@@ -227,7 +227,7 @@ TEST_CASE("an open mesh has no mass, in a file neither") {
     requireSame(pair.made.data().body, pair.loaded.data().body);
     REQUIRE_THROWS_WITH(pair.made.mass(), Catch::Contains("no volume"));
     REQUIRE_THROWS_WITH(pair.loaded.mass(), Catch::Contains("no volume"));
-    // put beside a field that had a body with a mass, it leaves none of that
+    // added to a field that had a body with a mass, it replaces all of that
     Body body = bodyOf(stored());
     REQUIRE(body.mass);
     body.mass.reset();

@@ -1,4 +1,4 @@
-// Closest points against all triangles in double precision.
+// Closest points against brute force over all triangles in double precision.
 #include <oneapi/tbb/parallel_for.h>
 
 #include <array>
@@ -32,9 +32,9 @@ namespace {
 
 constexpr float infinity = std::numeric_limits<float>::infinity();
 constexpr double tolerance = 1e-5;      // of distances up to ten voxels away [voxels]
-constexpr double farTolerance = 1e-6;   // of distances farther away, of themselves
-constexpr double interpolantOff = 0.1;  // of the torus below, at most [voxels]
-constexpr double samePlace = 1e-4;      // triangles so near to a closest point meet it [voxels]
+constexpr double farTolerance = 1e-6;   // relative, of distances farther away
+constexpr double interpolantOff = 0.1;  // maximum interpolation error of the torus below [voxels]
+constexpr double samePlace = 1e-4;      // triangles within this distance of a closest point share it [voxels]
 
 glm::dvec3 normalOf(const Corners& c) {
     return glm::normalize(glm::cross(c[1] - c[0], c[2] - c[0]));
@@ -44,8 +44,8 @@ double distanceToSegment(const glm::dvec3& p, const glm::dvec3& a, const glm::dv
     return std::sqrt(squaredDistance(p, a, b, b));
 }
 
-// The normal at a place on the surface: the mean of those of all triangles that meet it, weighted by the angles under
-// which they do.
+// The normal at a point of the surface: the mean of the normals of all triangles that share it, weighted by their
+// angles there.
 glm::dvec3 normalAt(const Mesh& mesh, const glm::dvec3& place, double room) {
     glm::dvec3 sum(0);
     for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
@@ -63,7 +63,7 @@ glm::dvec3 normalAt(const Mesh& mesh, const glm::dvec3& place, double room) {
     return glm::normalize(sum);
 }
 
-// Whether a place on a triangle lies on the feature that is claimed, and on no smaller one.
+// Whether a point on a triangle lies on the claimed feature, and on no smaller one.
 bool isFeature(const Corners& c, const glm::dvec3& place, const ClosestPoint& claimed, double room) {
     std::array<bool, 3> onEdge, onCorner;
     for (std::size_t k = 0; k < 3; ++k) {
@@ -73,7 +73,7 @@ bool isFeature(const Corners& c, const glm::dvec3& place, const ClosestPoint& cl
     const auto count = [](const std::array<bool, 3>& on) { return on[0] + on[1] + on[2]; };
     switch (claimed.feature) {
         case Feature::face:
-            return true;  // what is near to an edge may still be beside it
+            return true;  // a point near an edge may still be on the face
         case Feature::edge:
             return onEdge[claimed.index];
         case Feature::vertex:
@@ -82,8 +82,8 @@ bool isFeature(const Corners& c, const glm::dvec3& place, const ClosestPoint& cl
     return false;
 }
 
-// Whether a place can be told from places beside it that have other normals: on the claimed feature it is far from
-// others, and no triangle there meets it with two of its edges, as needles do a long way from their tips.
+// Whether the feature at a point is unambiguous. On the claimed feature the point must be far from others. No triangle
+// there may be near it with two of its edges, as needles are over a long stretch from their tips.
 bool isClear(const Mesh& mesh, const Corners& own, const glm::dvec3& place, const ClosestPoint& claimed, double room) {
     if (claimed.feature == Feature::vertex) return true;
     for (std::size_t k = 0; k < 3; ++k) {
@@ -106,13 +106,13 @@ bool same(const ClosestPoint& a, const ClosestPoint& b) {
 }
 
 struct Tally {
-    double worst = 0, worstFar = 0;  // [voxels], of the distance
+    double worst = 0, worstFar = 0;  // [voxels]; relative
     std::size_t points = 0, features = 0, wrongSigns = 0, wrongFeatures = 0, wrongNormals = 0, wrongPlaces = 0,
                 wrongBatch = 0;
     std::array<std::size_t, 3> kinds{};
 };
 
-// Random points: in the band and a little beyond, anywhere in the box, and far away.
+// Random points: in the band and slightly beyond, anywhere in the box, and far away.
 std::vector<glm::vec3> pointsAround(const Mesh& mesh, double h, int count, unsigned seed) {
     Random random(seed);
     const Bounds box = bounds(mesh);
@@ -133,7 +133,7 @@ std::vector<glm::vec3> pointsAround(const Mesh& mesh, double h, int count, unsig
     return points;
 }
 
-// The features and normals of the first `normals` points are checked too: that takes all triangles once more.
+// The features and normals of the first `normals` points are checked too, which visits all triangles once more.
 Tally check(const Mesh& mesh, float resolution, int count, int normals, unsigned seed) {
     const float voxelSize = voxelSizeFor(mesh, resolution);
     const double h = double(voxelSize), room = samePlace * h;
@@ -184,7 +184,7 @@ void require(const std::string& name, const Tally& tally) {
     CHECK(tally.features > 100);
 }
 
-// Lies across the axes, so that nothing is exact by chance.
+// Oblique to the axes, so that nothing is exact by chance.
 Mesh tilted(const Mesh& mesh) {
     return transformed(mesh, glm::rotate(glm::translate(glm::mat4(1), glm::vec3(0.31f, -0.17f, 0.23f)), 0.7f,
                                          glm::normalize(glm::vec3(1, 2, 3))));
@@ -260,7 +260,7 @@ TEST_CASE("at the edges of a mesh that meets itself closest points are on the ri
     Random random(seed);
     int near = 0, wrong = 0;
     for (int i = 0; i < 20000; ++i) {
-        // about an edge of the box that the bar does not reach
+        // around an edge of the box that the bar does not reach
         const glm::vec3 local(random(-0.9, 0.9), 0.8 + random(-0.02, 0.02), 0.6 + random(-0.02, 0.02));
         const glm::vec3 place = tilted(Mesh{{local}, {}}).points[0];
         const ClosestPoint closest = field.closest(place);
@@ -289,7 +289,7 @@ TEST_CASE("closest points of meshes that build() has to repair are those of thei
         const char* name;
         Mesh mesh;
         Sign sign;
-        bool byNormals;  // else the field's interpolant tells the side
+        bool byNormals;  // else the field's interpolant determines the side
     } cases[] = {{"every third triangle turned", turned, Sign::automatic, true},
                  {"triangles twice", twice, Sign::automatic, false},
                  {"triangles without area", flat, Sign::automatic, true},
@@ -321,7 +321,7 @@ TEST_CASE("closest points of meshes that build() has to repair are those of thei
 
 namespace {
 
-// A closed, oriented surface that runs through itself in places, a little or much.
+// A closed, oriented surface that self-intersects in places, slightly or strongly.
 Mesh crumpled(Random& random) {
     const float noise = std::pow(10.f, float(random(-2.5, -0.5)));
     Mesh mesh = random(0, 1) < 0.5 ? shapes::torus(1, 0.3f, 24, 12) : shapes::sphere(1, 3);
@@ -329,7 +329,7 @@ Mesh crumpled(Random& random) {
     return tilted(mesh);
 }
 
-// How often queries contradict each other at points of the band, of the box, and far away.
+// Counts how often queries contradict each other at points of the band, of the box, and far away.
 struct Contradictions {
     std::size_t points = 0, inside = 0, sample = 0, batch = 0;
 };
@@ -391,7 +391,7 @@ TEST_CASE("closest, inside and sample agree on the side of whatever mesh, howeve
             const LevelSet levelSet = build(mesh, {.voxelSize = voxelSize, .sign = sign});
             const std::vector<glm::vec3> points = pointsAround(mesh, double(voxelSize), 1500, seed + unsigned(round));
             Contradictions found = contradictions(Field(levelSet, mesh), points);
-            // voxels that contradict each other make no interpolant, and a flood closes gaps half-way between walls
+            // contradicting voxels form no valid interpolant, and a flood closes gaps half-way between walls
             if (levelSet.signConflicts() > 0 || sign == Sign::flood) found.sample = 0;
             requireNone(found);
         }

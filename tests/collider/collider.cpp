@@ -72,7 +72,7 @@ Pose compose(const Pose& a, const Pose& b) {
     return {a.toWorld(b.position), a.rotation * b.rotation};
 }
 
-// Two bodies that touch each other somewhere: one is moved until the other's surface is near its own.
+// Pairs of bodies in contact: one is moved until the other's surface is near its own.
 std::vector<std::pair<Placed, Placed>> touchingPairs(Random& random) {
     std::vector<std::pair<Placed, Placed>> pairs;
     const std::vector<const Collider*> all{&ball(), &brick(), &slab(), &ring()};
@@ -112,8 +112,8 @@ TEST_CASE("two balls touch where the line of their centres goes through") {
             const glm::vec3 centre = ofB ? poseA.position : poseB.position;
             const glm::vec3 point = ofB ? contact.position : contact.position + contact.distance * contact.normal;
             const glm::vec3 expected = glm::normalize(ofB ? centre - point : point - centre);
-            // a gradient turns by h / R in a cell, so it is off by half of that at most, in either direction along the
-            // ball
+            // a gradient rotates by h / R within a cell, so its error is at most half of that in either tangent
+            // direction of the ball
             REQUIRE(glm::distance(contact.normal, expected) < std::sqrt(2.f) * 0.5f * h / (0.4f - 2 * h));
             REQUIRE(glm::dot(contact.normal, line) > 0.8f);
             REQUIRE(contact.distance == Approx(glm::distance(point, centre) - 0.4).margin(0.02 * h));
@@ -127,7 +127,7 @@ TEST_CASE("a brick on a slab touches with its corners") {
         const auto contacts = contactsOf({brick(), above}, {slab()}, h);
         int corners = 0;
         for (const Contact& contact : contacts) {
-            // beyond the brick's edges, from where it is seen by the slab's points, its field is round
+            // beyond the brick's edges, where the slab's points sample it, its field is rounded
             if (contact.feature & featureOfB) {
                 REQUIRE(contact.position.z == Approx(0.1).margin(1e-6));
                 continue;
@@ -144,7 +144,7 @@ TEST_CASE("a brick on a slab touches with its corners") {
 }
 
 TEST_CASE("a corner that points into a slab is the deepest contact") {
-    // the brick stands on the corner (-,-,-): its diagonal is turned upright
+    // the brick stands on the corner (-,-,-): its diagonal is vertical
     const glm::vec3 diagonal(0.3f, 0.2f, 0.1f);
     const glm::vec3 axis = glm::normalize(glm::cross(diagonal, glm::vec3(0, 0, 1)));
     const float angle = std::acos(diagonal.z / glm::length(diagonal));
@@ -174,7 +174,7 @@ TEST_CASE("exchanged bodies have the same contacts, seen from the other side") {
             const Contact& other = byFeature[contact.feature];
             REQUIRE(contact.distance == other.distance);
             REQUIRE(glm::distance(contact.normal, -other.normal) < 1e-6f);
-            // on the surface of the one and of the other: a distance apart
+            // on the surfaces of both bodies: a distance apart
             const glm::vec3 across = contact.position + contact.distance * contact.normal;
             REQUIRE(glm::distance(across, other.position) < 1e-6f);
         }
@@ -183,7 +183,7 @@ TEST_CASE("exchanged bodies have the same contacts, seen from the other side") {
 
 namespace {
 
-// The point that a contact was found at: on the surface of the body that its feature is of.
+// The point at which a contact was found: on the surface of the body that owns its feature.
 glm::vec3 surfacePoint(const Contact& contact) {
     const bool ofB = (contact.feature & featureOfB) != 0;
     return ofB ? contact.position : contact.position + contact.distance * contact.normal;
@@ -202,11 +202,11 @@ TEST_CASE("contacts move with the bodies") {
         std::map<std::uint32_t, Contact> byFeature;
         for (const Contact& contact : moved) byFeature[contact.feature] = contact;
         for (const Contact& contact : still) {
-            if (contact.distance > h - 1e-5f) continue;  // rounding may take it over the margin
+            if (contact.distance > h - 1e-5f) continue;  // rounding may move it outside the margin
             REQUIRE(byFeature.contains(contact.feature));
             const Contact& other = byFeature[contact.feature];
             REQUIRE(other.distance == Approx(contact.distance).margin(5e-6));
-            // the surface point; the normal may jump where rounding takes that point into the next cell of the field
+            // the surface point; the normal may jump if rounding moves that point into the next cell of the field
             REQUIRE(glm::distance(surfacePoint(other), motion.toWorld(surfacePoint(contact))) < 1e-5f);
             REQUIRE(glm::dot(other.normal, motion.rotation * contact.normal) > 0.99f);
         }
@@ -218,7 +218,7 @@ TEST_CASE("contacts of scaled bodies are the contacts scaled") {
     CAPTURE(seed);
     Random random(seed);
     for (const auto& [a, b] : touchingPairs(random)) {
-        const float scale = 4;  // a power of two: nothing is rounded differently
+        const float scale = 4;  // a power of two: rounding is unchanged
         const auto small = contactsOf(a, b, h);
         const Placed bigA{a.collider, {scale * a.pose.position, a.pose.rotation}, scale};
         const Placed bigB{b.collider, {scale * b.pose.position, b.pose.rotation}, scale};
@@ -237,7 +237,7 @@ TEST_CASE("contacts of scaled bodies are the contacts scaled") {
     for (const Contact& contact : contacts) REQUIRE(glm::length(contact.position) == Approx(0.8).margin(0.04 * h));
 }
 
-// What touches by a feature: a surface point, or a place on a sharp edge between two of them.
+// The feature of a contact: a surface point, or a place on a sharp edge between two of them.
 SurfacePoint pointOf(const Collider& collider, std::uint32_t feature) {
     const auto points = collider.data().points().points();
     if (feature < points.size()) return points[feature];
@@ -271,7 +271,7 @@ TEST_CASE("the tree leaves no contact out") {
         tested += report.pointsTested;
         total += a.collider.data().points().points().size() + b.collider.data().points().points().size();
     }
-    REQUIRE(tested < total);  // a ball in a ring may need them all, the pairs together do not
+    REQUIRE(tested < total);  // a ball in a ring may need all of them, the pairs together do not
 }
 
 TEST_CASE("bodies apart have no contact and cost next to nothing") {
@@ -279,7 +279,7 @@ TEST_CASE("bodies apart have no contact and cost next to nothing") {
     REQUIRE(contactsOf({ball(), {{5, 0, 0}}}, {ring()}, h, &report).empty());
     REQUIRE(report.pointsTested == 0);
     REQUIRE(contactsOf({ball(), {{1e30f, 0, 0}}}, {ring()}, h, &report).empty());
-    // a small ball in the hole of a ring: their boxes overlap, they do not
+    // a small ball in the hole of a ring: their boxes overlap, the bodies do not
     REQUIRE(contactsOf({ball(), {}, 0.3f}, {ring()}, h, &report).empty());
     REQUIRE(report.pointsTested <
             (ball().data().points().points().size() + ring().data().points().points().size()) / 4);
@@ -301,7 +301,7 @@ TEST_CASE("contacts that look along the surface of their point are left out wher
     CAPTURE(seed);
     Random random(seed);
     std::size_t all = 0, kept = 0, back = 0, aslant = 0;
-    const float apart = GENERATE(-2.f, 0.9f);  // of points of faces that do not touch yet
+    const float apart = GENERATE(-2.f, 0.9f);  // minimum normal cosine of face points that are not yet in contact
     for (const auto& [a, b] : touchingPairs(random)) {
         std::vector<Contact> expected, found;
         const auto opposes = [&, &a = a, &b = b](const Contact& contact) {
@@ -311,7 +311,7 @@ TEST_CASE("contacts that look along the surface of their point are left out wher
             const float least = contact.distance > 0 && !point.isSharp ? std::max(apart, 0.3f) : 0.3f;
             return (ofB ? cosine : -cosine) >= least;
         };
-        std::set<std::uint32_t> sunk;  // tips that may be pushed back the way they came
+        std::set<std::uint32_t> sunk;  // convex vertices that may be pushed back along their entry path
         for (const Contact& contact : contactsOf(a, b, h)) {
             const bool ofB = contact.feature & featureOfB;
             const SurfacePoint point = pointOf((ofB ? b : a).collider, contact.feature & ~featureOfB);
@@ -374,12 +374,12 @@ TEST_CASE("beyond the band, edges are as far apart as those of the triangles, an
     const float scale = GENERATE(1.f, 10.f);
     const bool crosses = GENERATE(false, true);
     CAPTURE(nameOf(measure), gap, scale, crosses);
-    // edges are followed from the points that touch
+    // edge descent starts from points in contact
     const float beyond = crosses ? 0.02f : 0.001f;
     const Mesh mesh = shapes::box({0.3f, 0.2f, 0.1f});
     const Collider brick(mesh, build(mesh, {.voxelSize = h}), {.accuracy = measure});
     const float half = std::sqrt(0.5f), aside = half * gap, quarter = glm::pi<float>() / 4;
-    // an edge beside and above another one, or above and across it
+    // an edge next to and above another one, or above and across it
     Pose upper{{0.6f + aside, 0.01f, 0.2f + aside}}, lower;
     glm::vec3 across(half, 0, half);
     if (crosses) {
@@ -476,7 +476,7 @@ TEST_CASE("exact contacts lie on the triangles, on edges and in grooves of half 
     const unsigned seed = test::seed();
     CAPTURE(seed);
     Random random(seed);
-    // how far distances are off, and how far from the surface contacts lie [voxels]
+    // errors of distances, and distances of contacts from the surface [voxels]
     struct Errors {
         double distance = 0, foot = 0;
     };
@@ -493,7 +493,7 @@ TEST_CASE("exact contacts lie on the triangles, on edges and in grooves of half 
             const int other = contact.feature & featureOfB ? 0 : 1;
             const auto points = parts[std::size_t(1 - other)].data().points().points();
             const std::uint32_t index = contact.feature & ~featureOfB;
-            // where edges cross, the distance is not that of a point
+            // for crossing edges the distance is not that of a point
             if (index >= points.size()) continue;
             const SurfacePoint& point = points[index];
             const glm::vec3 from = poses[other].toBody(poses[1 - other].toWorld(point.position));
@@ -513,7 +513,7 @@ TEST_CASE("exact contacts lie on the triangles, on edges and in grooves of half 
                      mixed = errors(ContactAccuracy::exactNearFeatures, pose),
                      sampled = errors(ContactAccuracy::samples, pose);
         CHECK(exact.distance < 1e-4);
-        CHECK(exact.foot < 0.02);  // nearer to an edge its own normal is taken
+        CHECK(exact.foot < 0.02);  // near an edge its own normal is used
         CHECK(mixed.distance < 0.2);
         CHECK(mixed.foot < 0.2);
         CHECK(sampled.distance > 0.02);
@@ -540,7 +540,7 @@ TEST_CASE("a body of a mesh that faces the wrong way is the body of the right on
     REQUIRE(repaired.data().points().points().size() > 100);
     for (const SurfacePoint& point : repaired.data().points().points())
         REQUIRE(glm::dot(point.normal, right.field().sample(point.position).gradient) > 0.5f);
-    // crossed: points whose normals looked inward would be left out
+    // crossed: inward normals would remove the points
     const Pose across{{0.35f, 0, 0}, glm::angleAxis(glm::half_pi<float>(), glm::vec3(1, 0, 0))};
     const auto found = [&](const Collider& body) {
         std::vector<Contact> contacts;
@@ -573,7 +573,7 @@ TEST_CASE("what moves on from beyond the band is met, however wide the margin is
 TEST_CASE("a body whose mesh has holes, or one side only, has the mass of its field, and can be kept beside it") {
     Mesh open = shapes::box({0.3f, 0.2f, 0.1f}, 8);
     open.triangles.resize(open.triangles.size() - 40);
-    Mesh strip;  // Moebius'
+    Mesh strip;  // a Moebius strip
     constexpr unsigned around = 96;
     for (unsigned i = 0; i < around; ++i) {
         const float angle = 2 * glm::pi<float>() * float(i) / around;

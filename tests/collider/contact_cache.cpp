@@ -1,4 +1,4 @@
-// What is kept of the last steps changes how soon contacts are found, never which.
+// The cache of previous steps changes only the speed of the search, never the contacts.
 #include "collider/contact/contact_cache.h"
 
 #include <catch2/catch.hpp>
@@ -47,7 +47,7 @@ Pose randomPose(Random& random) {
     return {random.point(0.45), glm::angleAxis(float(random(0, 6.28)), random.direction())};
 }
 
-// A step of a walk: as far as `size`, by moving and by turning.
+// A step of a random walk: translation and rotation up to `size`.
 void stroll(Pose& pose, Random& random, float size) {
     pose.position += 0.7f * random.point(double(size));
     pose.rotation = glm::normalize(glm::angleAxis(0.7f * size, random.direction()) * pose.rotation);
@@ -67,7 +67,7 @@ TEST_CASE("contacts are the same with what was kept of the steps before, however
         const ContactOptions options{.margin = h * float(walk % 4) / 2};
         ContactCache near;
         for (int step = 0; step < 40; ++step) {
-            // at rest, slowly, fast, and from rest to fast
+            // at rest, slow, fast, and from rest to fast
             const float size = h * (step % 10 < 3 ? 0.f : step % 10 < 8 ? 0.02f : step % 10 == 8 ? 0.3f : 2.f);
             stroll(a.pose, random, size);
             stroll(b.pose, random, size);
@@ -89,7 +89,7 @@ TEST_CASE("bodies that rest beside each other cost little, those that touch litt
     const auto testedAtRest = [&](const Placed& b, std::vector<Contact>& contacts) {
         ContactCache near;
         ContactReport report;
-        // the first step does not know how fast they are, the second makes the list
+        // the first step has no velocities, the second creates the list
         for (int i = 0; i < 3; ++i) {
             contacts.clear();
             report = collide(a, b, test::unfiltered(h), contacts, &near);

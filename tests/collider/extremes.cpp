@@ -1,4 +1,4 @@
-// Queries with whatever floats hold: nothing crashes or hangs, and what is answered holds.
+// Queries with arbitrary floats: nothing crashes or hangs, and all answers are valid.
 #include <algorithm>
 #include <array>
 #include <catch2/catch.hpp>
@@ -39,7 +39,7 @@ const Field& withoutMesh() {
     return field;
 }
 
-// Numbers of all sizes, and those that are none.
+// Numbers of all magnitudes, including NaN and infinities.
 class Extremes {
   public:
     explicit Extremes(unsigned seed) : random_(seed) {}
@@ -59,7 +59,7 @@ class Extremes {
         for (;;)
             if (const float f = number(); std::isfinite(f)) return f;
     }
-    // Mostly all three of one size, so that few of a billion directions are along an axis.
+    // Mostly all three of one magnitude, so that few of a billion directions are along an axis.
     glm::vec3 vector() {
         if (random_(0, 1) < 0.5) return {number(), number(), number()};
         return std::abs(number()) * random_.direction();
@@ -93,7 +93,7 @@ void checkPoint(const Field& field, const glm::vec3& point, float maxDistance) {
         return;
     }
     const double truth = glm::length(glm::dvec3(point)) - double(radius);
-    // the sphere's triangles lie within 3 thousandths of it
+    // the sphere's triangles lie within 0.003 of it
     if (std::abs(truth) > 0.02 * radius) {
         REQUIRE(inside == (truth < 0));
         REQUIRE(std::signbit(sample.distance) == (truth < 0));
@@ -141,7 +141,7 @@ void checkQueries(const Field& field, unsigned seed, int count) {
         CAPTURE(i);
         const glm::vec3 point = extreme.vector();
         checkPoint(field, point, i % 2 ? infinity : std::abs(extreme.number()));
-        // every other one from where it may well hit
+        // every other ray points towards the sphere
         const glm::vec3 direction = i % 2 ? -point : extreme.vector();
         const Ray ray{point, direction, i % 3 ? infinity : extreme.number()};
         checkHit(field, field.raycast(ray), ray, 0);
@@ -249,9 +249,9 @@ TEST_CASE("the closest point of what is far away is on the near side, and bounds
             REQUIRE(double(sample.distance) >= (1 - 1e-6) * truth - 0.3);
             const ClosestPoint closest = field.closest(point);
             REQUIRE(closest.found);
-            // the interpolant rounds corners off, by less than a voxel
+            // the interpolant rounds off corners by less than a voxel
             REQUIRE(closest.distance == Approx(truth).epsilon(1e-6).margin(field.mesh() ? 1e-3 : 0.02));
-            // the corner, or what is as near to a thousandth of the size
+            // the corner, or a point as near to 1e-3 of the size
             const double reach = glm::dot(glm::dvec3(closest.position), glm::dvec3(direction));
             REQUIRE(reach > glm::dot(glm::dvec3(half), glm::abs(glm::dvec3(direction))) - 0.02 - 1 / away);
             REQUIRE(glm::dot(closest.normal, direction) > 0);
@@ -281,7 +281,7 @@ TEST_CASE("bodies anywhere, of any size, on any way, collide or do not") {
         const ContactOptions options = unfiltered(i % 4 ? voxel : extreme.number(), i % 11 == 0);
         collide(a, b, options, contacts, i % 2 ? &near : nullptr);
         collide(a, b, options, contacts, i % 2 ? &near : nullptr);
-        // of the same two balls, contacts lie where they overlap
+        // contacts of the same two balls lie where they overlap
         if (i % 2 == 0 && i % 3 && i % 5 && i % 7 && i % 4) REQUIRE_FALSE(contacts.empty());
     }
 }

@@ -49,7 +49,7 @@ Sampler makeBatched(const LevelSet& levelSet) {
     };
 }
 
-// Points in and beside a field's box, some of them nowhere.
+// Points in a field's box and around it, some of them not finite.
 std::vector<glm::vec3> pointsAround(Random& random, std::size_t count) {
     std::vector<glm::vec3> points;
     for (std::size_t i = 0; i < count; ++i) points.push_back(random.point(i % 4 ? 0.5 : 3));
@@ -90,13 +90,13 @@ TEST_CASE("what a clearance rules out is ruled out, and little else far from the
             REQUIRE(clearance.around(place) * edge <= std::abs(truth) + 1e-6);
             if (clearance.isOutside(place, radius / edge)) REQUIRE(truth >= radius - 1e-6);
             if (clearance.isAbove(place, reach)) REQUIRE((!sample.inBand || sample.distance > reach - 1e-6f));
-            // a part's diagonal, and the way to where the surface is in another
+            // the diagonal of a coarse cell, plus the distance to the surface in another one
             if (truth < radius + 2 * 1.7321 * edge) continue;
             ++beside;
             ruledOut += clearance.isOutside(place, radius / edge);
         }
         REQUIRE(beside > 1000);
-        REQUIRE(ruledOut > 0.9 * beside);  // about 0.95, and these are a few thousand random points
+        REQUIRE(ruledOut > 0.9 * beside);  // about 0.95; the sample is a few thousand random points
     }
     const Field field(levelSetOf(sphereSolid(0.4), h));
     for (const glm::vec3& p : {glm::vec3(notANumber, 0, 0), glm::vec3(0, notANumber, 0)})
@@ -252,7 +252,7 @@ TEST_CASE("bounds of points as far away as floats reach are finite, and so are t
         CHECK(sample.distance <= away);
         CHECK(sample.distance > 0.99f * away);
     }
-    // two voxels of the band, farther apart than an int tells
+    // two voxels of the band, farther apart than the range of int
     const auto grid = openvdb::createLevelSet<openvdb::FloatGrid>(1.f, 3.f);
     for (const int x : {-2147483640, 2147483632}) grid->tree().setValue({x, x, 0}, 0.5f);
     auto grids = std::make_shared<Grids>();

@@ -1,4 +1,4 @@
-// Files whose entries hold what they must not: they are refused, or what is read of them can be asked anything.
+// Files with invalid entries: they are refused, or the result answers all queries safely.
 #include <sys/resource.h>
 
 #include <openvdb/points/PointDataGrid.h>
@@ -55,7 +55,7 @@ std::string bytesOf(const std::filesystem::path& path) {
     return {std::istreambuf_iterator<char>(file), {}};
 }
 
-// What a file that is accepted must be good for.
+// Queries that an accepted file must survive.
 void askAll(const std::filesystem::path& path, std::optional<std::size_t> expected) {
     const LevelSet field = readVdb(path);
     const Body body = bodyOf(field);
@@ -77,7 +77,7 @@ void askAll(const std::filesystem::path& path, std::optional<std::size_t> expect
     REQUIRE(massProperties(field).volume > 0);
 }
 
-// Numbers that an entry must not be, and some that it may.
+// Numbers that an entry must not have, and some that it may.
 std::vector<double> extremes() {
     std::vector<double> values{std::numeric_limits<double>::quiet_NaN()};
     for (const double value : {0., 1e-45, 1e-10, 0.1, 3., 1e15, 3.5e37, 1e300, std::numeric_limits<double>::infinity()})
@@ -123,7 +123,7 @@ std::vector<Metadata::Ptr> changedEntries(const Metadata& entry) {
     return changed;
 }
 
-/// The most memory that this process has taken [bytes].
+/// Peak memory of this process [bytes].
 std::size_t peakMemory() {
     rusage usage{};
     ::getrusage(RUSAGE_SELF, &usage);
@@ -150,7 +150,7 @@ TEST_CASE("whatever an entry of a file holds, it is refused or the file is as go
         int refused = 0, accepted = 0;
         const openvdb::FloatGrid& grid = *field.grids().distance;
         for (auto entry = grid.beginMeta(); entry != grid.endMeta(); ++entry) {
-            // what OpenVDB writes and reads for itself; names are told
+            // skips the entries that OpenVDB writes and reads itself; the name of the entry is reported
             if (!entry->first.starts_with("bilayer:")) continue;
             if (!withMesh && entry->first != metadata::interiorWidth) continue;
             for (const Metadata::Ptr& changed : changedEntries(*entry->second)) {
@@ -230,7 +230,7 @@ TEST_CASE("whatever a field's widths, voxels and shift are, they are refused or 
 }
 
 TEST_CASE("lengths in a file take no more memory than the file explains, whatever they are") {
-    // the second one makes an attribute of points shorter than the first of them
+    // the second seed shortens an attribute of points relative to the first
     const unsigned seed = GENERATE(test::seed(), 2968168663u);
     CAPTURE(seed);
     Random random(seed);
@@ -238,7 +238,7 @@ TEST_CASE("lengths in a file take no more memory than the file explains, whateve
     writeVdb(path, stored());
     constexpr std::size_t sealSize = 23, headSize = 3000;
     std::string whole = bytesOf(path);
-    whole.resize(whole.size() - sealSize);  // as files of others
+    whole.resize(whole.size() - sealSize);  // like files of other programs
     std::ofstream(path, std::ios::binary) << whole;
     askAll(path, contacts(Collider(stored()), Collider(stored())).size());
     const std::size_t before = peakMemory();
@@ -249,7 +249,7 @@ TEST_CASE("lengths in a file take no more memory than the file explains, whateve
         std::ofstream(path, std::ios::binary) << wrong;
         CAPTURE(at, value, size);
         try {
-            (void)bodyOf(readVdb(path));  // fields take memory for their boxes
+            (void)bodyOf(readVdb(path));  // a field allocates memory for its box
             ++accepted;
         } catch (const std::exception& error) {
             REQUIRE(std::strlen(error.what()) > 0);

@@ -1,4 +1,4 @@
-// Which cells' samples are off from the mesh, against distances by brute force.
+// Finds cells whose samples are off from the mesh, compared with brute-force distances.
 #include "collider/contact/interpolation_error.h"
 #include "collider/contact/collider_data.h"
 #include "collider/field/field_data.h"
@@ -33,7 +33,7 @@ Field fieldOf(const Mesh& mesh) {
     return Field(build(mesh, {.voxelSize = voxel}), mesh);
 }
 
-// Places within a voxel of the surface, by the samples.
+// Points within a voxel of the surface, by the samples.
 std::vector<glm::vec3> placesNear(const Mesh& mesh, const Field& field, Random& random, int count) {
     std::vector<glm::vec3> places;
     while (count > 0) {

@@ -42,7 +42,7 @@ void requireNear(const glm::mat3& a, const glm::mat3& b, double margin) {
     for (int i = 0; i < 3; ++i) requireNear(a[i], b[i], margin);
 }
 
-// The axes turn the diagonal of principal moments into the inertia, without a mirror.
+// Checks that the axes rotate the diagonal of principal moments into the inertia tensor, without reflection.
 void requireDiagonalises(const MassProperties& mass) {
     const glm::mat3 axes = glm::mat3_cast(mass.principalAxes);
     glm::mat3 diagonal(0);
@@ -53,7 +53,7 @@ void requireDiagonalises(const MassProperties& mass) {
     REQUIRE(mass.principalInertia.y <= mass.principalInertia.z);
 }
 
-// The mass that `formula` says, to a part of itself; `size` is that of the solid [m].
+// Compares with the mass of `formula` to a relative tolerance; `size` is that of the solid [m].
 void requireMass(const MassProperties& mass, const MassProperties& formula, double part, double size) {
     CAPTURE(mass.volume, formula.volume);
     REQUIRE(mass.volume == Approx(formula.volume).epsilon(part));
@@ -91,7 +91,7 @@ MassProperties torusMass(double major, double minor) {
     return massOf(volume, glm::dvec3(across, across, volume * (major * major + 0.75 * minor * minor)));
 }
 
-// The field of a copy of the grid, changed.
+// The field with a modified copy of the grid.
 LevelSet withGrid(const LevelSet& field, auto change) {
     const auto grid = field.grids().distance->deepCopy();
     change(*grid);
@@ -103,7 +103,7 @@ glm::mat4 randomMotion(Random& random) {
     return glm::translate(glm::mat4(1), random.point(3)) * glm::mat4_cast(turn);
 }
 
-// Of boxes that overlap: the surface of all the cells that their faces cut space into and that lie in one of them.
+// Union of overlapping boxes: the surface of all cells between their face planes that lie in one of them.
 Mesh surfaceOfUnion(const std::vector<Bounds>& boxes) {
     Planes cuts;
     for (const Bounds& box : boxes)
@@ -237,7 +237,8 @@ TEST_CASE("the mass of a field converges: third order where it is smooth") {
     const auto box = [&](double voxels) {
         return error(levelSetOf(boxSolid({0.97, 0.71, 0.53}), 1.94 / voxels), boxMass({0.97, 0.71, 0.53}));
     };
-    // a bound for each order through 32 voxels: a factor of 8 a step for the smooth ones, of 4 for the box
+    // a tolerance for each resolution, at 32 voxels: the error falls by 8 per doubling for smooth shapes, by 4 for the
+    // box
     for (const double voxels : {32., 64., 128.}) {
         const double finer = voxels / 32;
         CAPTURE(voxels);
@@ -256,15 +257,14 @@ TEST_CASE("mesh and field agree on the mass of clean meshes") {
         }
         return sum;
     };
-    // thinner walls than two voxels are beyond any field; the mean thickness of a solid is twice its volume over its
-    // area
+    // no field resolves walls thinner than two voxels; the mean thickness of a solid is twice its volume over its area
     const double minThickness = 3;  // [voxels]
     int compared = 0;
     for (const std::string& name : cleanMeshes()) {
         const auto path = corpusMesh(name);
         if (!path) continue;
         const Mesh mesh = readMesh(*path);
-        if (mesh.triangles.size() > 120'000) continue;  // for time
+        if (mesh.triangles.size() > 120'000) continue;  // limits the run time
         const MassProperties exact = massProperties(mesh);
         const float voxel = voxelSizeFor(mesh, 128);
         if (2 * exact.volume / area(mesh) < minThickness * double(voxel)) continue;
@@ -276,7 +276,7 @@ TEST_CASE("mesh and field agree on the mass of clean meshes") {
 }
 
 TEST_CASE("the mass of a field knows hollows, tiles, and inactive insides") {
-    // a large box, so that nodes of 8 and more voxels lie inside; the same with nothing but tiles there
+    // a large box, so that nodes of 8 and more voxels lie inside; the same with tiles only
     const LevelSet box = levelSetOf(boxSolid({1, 1.5, 2}), 0.02);
     const MassProperties mass = massProperties(box);
     requireMass(mass, boxMass({1, 1.5, 2}), 1e-3, 2);
@@ -290,7 +290,7 @@ TEST_CASE("the mass of a field knows hollows, tiles, and inactive insides") {
                        {solid.inertia[0][0] - ball.inertia[0][0], solid.inertia[1][1] - ball.inertia[1][1],
                         solid.inertia[2][2] - ball.inertia[2][2]}),
                 1e-3, 2);
-    // the inside is inactive, and what is left of the band tells the surface to half a voxel
+    // the inside is inactive, and the rest of the band determines the surface to half a voxel
     const LevelSet outer = withGrid(box, [](openvdb::FloatGrid& grid) {
         for (auto value = grid.beginValueOn(); value; ++value)
             if (*value < 0) {
@@ -300,7 +300,7 @@ TEST_CASE("the mass of a field knows hollows, tiles, and inactive insides") {
         openvdb::tools::prune(grid.tree());
     });
     requireMass(massProperties(outer), boxMass({1, 1.5, 2}), 0.03, 2);
-    // nor does it matter how the inside is stored
+    // the storage of the inside has no influence either
     const LevelSet dense = withGrid(box, [](openvdb::FloatGrid& grid) { grid.tree().voxelizeActiveTiles(); });
     const LevelSet leaves = withGrid(box, [](openvdb::FloatGrid& grid) {
         for (int x = -40; x <= 40; x += 8) grid.tree().touchLeaf({x, 0, 0});
@@ -314,7 +314,7 @@ TEST_CASE("bands of any width give a mass") {
     const MassProperties formula = ballMass(0.7);
     for (const float width : {0.01f, 0.3f, 0.9f, 1.5f, 2.5f, 8.f}) {
         CAPTURE(width);
-        // below a voxel the surface is known to half a voxel only, but lies in the middle in the mean
+        // with widths below a voxel each surface crossing is known only to half a voxel, but without bias on average
         requireMass(massProperties(levelSetOf(sphereSolid(0.7), 1.4 / 64, width, width)), formula,
                     width < 2 ? 0.02 : 1e-3, 0.7);
     }

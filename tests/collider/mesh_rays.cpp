@@ -1,4 +1,4 @@
-// The searches among triangles against all triangles in double precision, by other formulas.
+// Ray and box searches among triangles against brute force in double precision, by other formulas.
 #include "collider/field/mesh_rays.h"
 
 #include <oneapi/tbb/parallel_for.h>
@@ -30,13 +30,13 @@ constexpr double infinity = std::numeric_limits<double>::infinity();
 std::vector<Mesh> someMeshes() {
     std::vector<Mesh> meshes{shapes::box(glm::vec3(0.5f), 1), shapes::torus(0.4f, 0.15f, 48, 24),
                              shapes::bowl(0.5f, 0.003f, 48)};
-    // closed ones, one with slivers, one of loose triangles, a character of open pieces
+    // closed ones, one with slivers, one of loose triangles, a character of open surfaces
     for (const char* name : {"screwdriver_7k.off", "fandisk.obj", "soup.stl", "Wuson.ply"})
         if (const auto path = corpusMesh(name)) meshes.push_back(readMesh(*path));
     return meshes;
 }
 
-// Where a line meets a triangle's plane, and how far within the triangle that is: negative beside it.
+// The intersection of a line with a triangle's plane, and its depth within the triangle; negative outside.
 struct Crossing {
     double along, margin;
 };
@@ -48,7 +48,7 @@ Crossing crossing(const Path& path, const Corners& c) {
     const double along = glm::dot(c[0] - path.origin, n) / steep;
     double margin = infinity;
     for (std::size_t k = 0; k < 3; ++k) {
-        // the distance of the two lines, with a sign: the ray's and the edge's
+        // the signed distance between the ray's line and the edge's
         const glm::dvec3 edge = c[(k + 1) % 3] - c[k];
         const glm::dvec3 across = glm::cross(path.direction, edge);
         const double side = glm::dot(across, c[k] - path.origin) / glm::length(across);
@@ -64,11 +64,11 @@ Path randomPath(Random& random, const Bounds& box) {
     return {from, glm::normalize(target - from), random(0, 1) < 0.5 ? infinity : random(0, 3) * scale};
 }
 
-// What a search says about a path that all triangles say otherwise about.
+// The disagreement between a search and brute force about a path.
 std::string faultOf(const MeshTree& tree, const Path& path) {
     const double voxel = tree.voxelSize(), near = 2e-5 * voxel, exact = 1e-6 * voxel;
     const auto hit = firstHit(tree, path);
-    double surely = infinity, maybe = infinity;  // the first triangle that is met well within, or nearly
+    double surely = infinity, maybe = infinity;  // first triangle that is hit well inside, or near its border
     for (std::uint32_t i = 0; i < tree.mesh().triangles.size(); ++i) {
         const auto [along, margin] = crossing(path, cornersOf(tree.mesh(), i));
         if (along < -near || along > path.length + near) continue;
@@ -125,7 +125,7 @@ TEST_CASE("no ray leaves a closed mesh through an edge or a vertex") {
                 targets.push_back(0.5 * (a + b));
                 targets.push_back(glm::mix(a, b, random(0, 1)));
             }
-        // exactly at them from the middle, and nearly from elsewhere inside
+        // exactly towards them from the middle, and nearly from elsewhere inside
         for (const glm::dvec3& from : {glm::dvec3(0), glm::dvec3(random.point(0.05))})
             for (const glm::dvec3& target : targets) {
                 const auto hit = firstHit(tree, {from, glm::normalize(target - from), infinity});
@@ -143,7 +143,7 @@ TEST_CASE("a ray meets what it passes by a hair, seen edge-on too, and nothing b
     Random random(start);
     int met = 0, passed = 0;
     for (int i = 0; i < 100000; ++i) {
-        // slivers along x, about as thin as the tolerance; the ray is the z axis, before both are turned
+        // slivers along x, about as thin as the tolerance; the ray is the z axis, before both are rotated
         const double width = std::pow(10, random(-10, -6));
         Corners corners, flat;
         for (std::size_t k = 0; k < 3; ++k) {
@@ -151,7 +151,7 @@ TEST_CASE("a ray meets what it passes by a hair, seen edge-on too, and nothing b
             flat[k] = {corners[k].x, corners[k].y, 0};
         }
         const double beside = std::sqrt(squaredDistance(glm::dvec3(0), flat[0], flat[1], flat[2]));
-        // the turned corners are rounded, which moves what is seen edge-on along itself
+        // the rotated corners are rounded; a triangle seen edge-on shifts along itself
         const double twiceArea = std::abs(glm::cross(flat[1] - flat[0], flat[2] - flat[0]).z);
         const double rounding = 1e-14 / twiceArea;
         if (rounding > tolerance) continue;
@@ -162,7 +162,7 @@ TEST_CASE("a ray meets what it passes by a hair, seen edge-on too, and nothing b
         glm::dvec3 position;
         const bool meets = TriangleRay(glm::dvec3(0), direction, tolerance).meets(corners, along, position);
         CAPTURE(i, width, beside);
-        // the tolerance is one across the longest axis of the direction
+        // the tolerance is perpendicular to the longest axis of the direction
         if (beside < 0.5 * tolerance) REQUIRE(meets);
         if (beside > 1.001 * tolerance) REQUIRE_FALSE(meets);
         (meets ? met : passed) += 1;
@@ -220,8 +220,8 @@ TEST_CASE("a sphere first touches the triangle that all triangles say") {
 
 namespace {
 
-// Whether something is left of a triangle when the box's planes cut it off one after the other (I. Sutherland, G.
-// Hodgman, "Reentrant polygon clipping", 1974).
+// Whether a part of a triangle remains after clipping by the box's planes (I. Sutherland, G. Hodgman, "Reentrant
+// polygon clipping", 1974).
 bool leftInBox(const RotatedBox& box, const Corners& corners, double room) {
     std::vector<glm::dvec3> polygon(corners.begin(), corners.end());
     for (int axis = 0; axis < 3; ++axis)
@@ -255,7 +255,7 @@ TEST_CASE("a box meets a triangle where something is left of it in the box") {
             const glm::vec3 axis = random.direction();
             const double angle = i % 5 ? random(0, 3) : 0;
             boxes[i].axes = glm::mat3_cast(glm::angleAxis(angle, glm::normalize(glm::dvec3(axis))));
-            // a quarter of them around a corner of the mesh, so that enough of them meet it
+            // a quarter of them around a vertex of the mesh, so that enough of them overlap it
             const std::size_t corner = std::size_t(random(0, double(mesh.points.size()) - 1));
             boxes[i].centre = i % 4 ? glm::dvec3(bounds(mesh).centre()) + glm::dvec3(random.point(0.6 * scale))
                                     : glm::dvec3(mesh.points[corner]);

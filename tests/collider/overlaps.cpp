@@ -1,4 +1,4 @@
-// Points, spheres and boxes against the solid, and the closest points of fields without their mesh.
+// Points, spheres and boxes against the solid, and closest points of fields without their mesh.
 #include <oneapi/tbb/parallel_for.h>
 
 #include <array>
@@ -41,7 +41,7 @@ Field withMesh(const Mesh& mesh, const FieldOptions& options = {}, float resolut
     return Field(build(mesh, {.voxelSize = voxelSizeFor(mesh, resolution)}), mesh, options);
 }
 
-// Near the surface, in the band, inside and far away.
+// Near the surface, in the band, inside or far away.
 glm::vec3 somewhere(Random& random, const Mesh& mesh, float voxel) {
     const glm::vec3 vertex = mesh.points[mesh.triangles[std::size_t(random(0, double(mesh.triangles.size())))].x];
     const float scale = bounds(mesh).longestSide();
@@ -64,7 +64,7 @@ OrientedBox someBox(Random& random, const glm::vec3& centre, double size) {
     return box;
 }
 
-// A grid of points in a box, its corners among them.
+// Visits a grid of points in a box, including its corners.
 template <class Visit>
 void forPointsIn(const OrientedBox& box, int count, Visit visit) {
     for (int x = 0; x < count; ++x)
@@ -138,7 +138,7 @@ TEST_CASE("with the mesh, spheres overlap where it is near enough") {
         for (std::size_t i = 0; i < count; ++i) {
             centres[i] = somewhere(random, mesh, field.voxelSize());
             distances[i] = truth.signedDistance(glm::dvec3(centres[i]));
-            // about as large as is needed, or by far not
+            // about the required size, or far from it
             radii[i] = float(std::abs(distances[i]) * (1 + random(-1, 1) * std::pow(10, random(-6, 0))));
         }
         const auto answers = std::make_unique<bool[]>(count);
@@ -240,7 +240,7 @@ TEST_CASE("without the mesh, boxes overlap where they hold a negative sample") {
             double least = infinity;
             forPointsIn(box, 13, [&](const glm::vec3& p) { least = std::min(least, double(field.distance(p))); });
             if (least < -1e-5 * h) REQUIRE(answer);
-            // the interpolant is no steeper than 1.74
+            // the gradient of the interpolant is at most 1.74
             if (least > 1.74 * double(glm::length(box.halfSize)) / 12 + 2e-3 * h) REQUIRE_FALSE(answer);
         }
         REQUIRE(overlapping > 30);

@@ -1,5 +1,5 @@
-// Rays, segments and spheres on their way: with the mesh against all triangles in double precision, without it against
-// the interpolant.
+// Ray casts, segment casts and sphere sweeps: with the mesh against brute force over all triangles in double precision,
+// without it against the interpolant.
 #include <oneapi/tbb/parallel_for.h>
 
 #include <atomic>
@@ -30,7 +30,7 @@ constexpr double h = 0.02;  // of most fields here [m]
 constexpr float infinity = std::numeric_limits<float>::infinity();
 constexpr float notANumber = std::numeric_limits<float>::quiet_NaN();
 
-// A field with its mesh, and the truth about it.
+// A field with its mesh, and its ground truth.
 struct Exact {
     Mesh mesh;
     Field field;
@@ -47,15 +47,14 @@ struct Exact {
 std::vector<Exact> exactFields() {
     std::vector<Exact> fields;
     fields.emplace_back(shapes::torusKnot(2, 3, 0.4f, 0.1f, 200, 16));
-    fields.emplace_back(shapes::bowl(0.5f, 0.004f, 64));  // a wall of a fifth of a voxel
+    fields.emplace_back(shapes::bowl(0.5f, 0.004f, 64));  // a wall of 0.2 voxels
     for (const char* name : {"bunny_watertight.obj", "fandisk.obj", "cgal-cheese.off"})
         if (const auto path = corpusMesh(name)) fields.emplace_back(readMesh(*path));
     return fields;
 }
 
-// Where a path first comes within a radius of the surface, by steps that cannot lead past it; none if it comes no
-// nearer than `room` more. Where it comes nearer than that, but not within the radius, there is no answer, which is
-// NaN.
+// Where a path first comes within a radius of the surface, by conservative advancement; none if it stays farther than
+// the radius plus `room`. NaN if it comes nearer than that but not within the radius: then the answer is undefined.
 std::optional<double> firstWithin(const Truth& truth, const glm::dvec3& from, const glm::dvec3& along, double length,
                                   double radius, double room) {
     double least = 1e30, t = 0;
@@ -104,7 +103,7 @@ TEST_CASE("with the mesh, rays meet its surface, and nothing before it") {
             if (bool(expected) != bool(hit)) return fail(expected ? "missed" : "met nothing");
             if (!hit) return;
             ++met;
-            // flat angles blur where the truth ends
+            // at grazing angles the end of the reference is inexact
             const double off = std::abs(double(hit->distance) - *expected);
             if (exact.truth.distance(glm::dvec3(hit->position)) > 0.1 * room + 1e-6 * scale) fail("not on the surface");
             if (glm::distance(from + double(hit->distance) * along, glm::dvec3(hit->position)) > room + 1e-6 * scale)
@@ -145,7 +144,7 @@ TEST_CASE("with the mesh, rays from very far, along axes and through voxel centr
             REQUIRE(bool(hit) == within);
             if (hit) REQUIRE(hit->distance == Approx(0.5).margin(1e-6));
         }
-    // in the plane of a face: the faces beside it are met at their edges
+    // in the plane of a face: the ray hits the adjacent faces at their edges
     const auto along = box.field.raycast({{-1, 0.1f, 0.125f}, {1, 0, 0}, infinity});
     REQUIRE(along);
     REQUIRE(along->distance == Approx(0.5).margin(1e-6));
@@ -177,13 +176,13 @@ TEST_CASE("rays meet a sphere and a box where geometry says") {
                 REQUIRE_FALSE(hit);
                 continue;
             }
-            if (nearest > 1e-6) continue;  // grazes the surface by less than the interpolant's error
+            if (nearest > 1e-6) continue;  // grazes the surface by less than the interpolation error
             const glm::dvec3 p = from + t * along;
             if (solid.distance(p + h * along) > -0.5 * h) continue;  // cuts an edge that the interpolant rounds off
             ++hits;
             REQUIRE(hit);
             REQUIRE(std::abs(field.distance(hit->position)) < 2e-4 * h);
-            // where a corner of the box lies amid a cell, the interpolant is off by half a voxel
+            // if a corner of the box lies in the middle of a cell, the interpolation error is half a voxel
             REQUIRE(std::abs(solid.distance(glm::dvec3(hit->position))) < 0.5 * h);
             REQUIRE(std::abs(hit->distance - t) < 2 * h);
             REQUIRE(glm::distance(origin + hit->distance * towards, hit->position) < 1e-5f);
@@ -206,7 +205,7 @@ TEST_CASE("rays meet the interpolant where steps of a fiftieth of a voxel do") {
             const glm::vec3 origin = random.direction();
             const glm::vec3 towards = glm::normalize(random.point(0.5) - origin);
             const double step = 0.02 * h;
-            double first = 0;  // where it is surely inside
+            double first = 0;  // distance at which it is certainly inside
             while (first < 2 && field.distance(origin + float(first) * towards) > -1e-5 * h) first += step;
             const auto hit = field.raycast({origin, towards, 2});
             CAPTURE(origin.x, origin.y, origin.z, towards.x, towards.y, towards.z, first);
@@ -282,7 +281,7 @@ TEST_CASE("without the mesh rays that start inside, end early or are no rays") {
     REQUIRE_FALSE(field.raycast({{infinity, 0, 0}, {-1, 0, 0}, infinity}));
     REQUIRE_FALSE(field.raycast({{1, 0, 0}, {-1, 0, 0}, notANumber}));
     REQUIRE_FALSE(field.raycast({{1, 0, 0}, {-1, 0, 0}, -1}));
-    // from so far that single precision cannot tell whether it hits: it must only end
+    // from so far that single precision cannot determine a hit: the cast must only terminate
     (void)field.raycast({{1e30f, 1e30f, 1e30f}, {-1, -1, -1}, infinity});
     (void)field.raycast({{3e38f, 0, 0}, {-1, 0, 0}, infinity});
     // along the surface all the way
@@ -297,7 +296,7 @@ TEST_CASE("without the mesh no chord is too short for a ray") {
     const Field field(levelSetOf(sphereSolid(0.4), h), options);
     int shortOnes = 0, misses = 0;
     for (int i = 0; i < 1000; ++i) {
-        // past the surface, but for a ten-thousandth of a voxel
+        // grazes the surface, to within 1e-4 voxels
         const glm::dvec3 out(random.direction());
         const glm::dvec3 along = glm::normalize(glm::cross(out, glm::dvec3(random.direction())));
         Ray ray{glm::vec3(0.4 * out - 0.2 * along), glm::vec3(along), 1};
@@ -444,7 +443,7 @@ TEST_CASE("a sphere that slides along a wall a hair above it passes it") {
         for (const auto& [gap, meets] : {std::pair(2e-3f, false), std::pair(-2e-3f, true)}) {
             const Ray ray{{-1 - radius, 0.01f, 0.1f + radius + gap * 0.01f}, {1, 0, 0}, infinity};
             CAPTURE(radius, gap);
-            // single precision does not hold the gap over the largest one
+            // single precision cannot resolve the gap at the largest radius
             if (radius > 1) {
                 (void)wall.field.sphereCast(ray, radius);
                 (void)bare.sphereCast(ray, radius);
@@ -477,7 +476,7 @@ TEST_CASE("segments are rays that end, and many at once are the same as one by o
             // the ray's direction is rounded to floats
             REQUIRE(std::abs(one->distance - ray->distance) < 1e-4f);
             const glm::dvec3 beside = glm::cross(glm::dvec3(one->position) - glm::dvec3(from[i]), glm::normalize(way));
-            // triangles are met by what passes them this near; then come floats
+            // triangles are hit by rays that pass within this tolerance; the rest is rounding of floats
             REQUIRE(glm::length(beside) < 1e-5 * double(field.voxelSize()) + 6e-8);
             REQUIRE(one->position == hits[i]->position);
             REQUIRE(double(one->distance) <= glm::length(way) * (1 + 1e-6));
@@ -522,7 +521,7 @@ TEST_CASE("casts of what is no ray or no sphere hit nothing") {
         }
         REQUIRE_FALSE(field.raycast({{1, 0, 0}, {0, 0, 0}, 10}));
         REQUIRE_FALSE(field.sphereCast({{1, 0, 0}, {0, 0, 0}, 10}, 0.1f));
-        // they must only end
+        // they must only terminate
         (void)field.raycast({{1e30f, 1e30f, 1e30f}, {-1, -1, -1}, infinity});
         (void)field.sphereCast({{3e38f, 0, 0}, {-1, 0, 0}, infinity}, 1);
         (void)field.sphereCast({{3, 0, 0}, {-1, 0, 0}, infinity}, 3e38f);

@@ -48,7 +48,7 @@ double area(const Mesh& mesh) {
     return sum;
 }
 
-// A point anywhere on the surface, all places alike.
+// A uniformly distributed random point of the surface.
 glm::dvec3 randomSurfacePoint(const Mesh& mesh, double total, Random& random) {
     double left = random(0, total);
     std::size_t i = 0;
@@ -91,7 +91,7 @@ TEST_CASE("points lie on the mesh, cover it at the spacing, and are not many mor
 }
 
 TEST_CASE("points closer than the spacing allows stand out over each other's tangent planes, or are corners") {
-    const float radius = GENERATE(1.f, 3.f, 12.f), spacing = 1;  // small balls want points closer to each other
+    const float radius = GENERATE(1.f, 3.f, 12.f), spacing = 1;  // small balls require points closer together
     CAPTURE(radius);
     const SurfacePoints points(shapes::sphere(radius, 5), spacing);
     const auto standsOut = [&](const SurfacePoint& p, const SurfacePoint& over) {
@@ -160,7 +160,7 @@ TEST_CASE("convex corners stay, whatever the spacing") {
 }
 
 TEST_CASE("an edge keeps its points before the faces beside it") {
-    // finely divided, so that all of its points are vertices to choose from
+    // finely divided, so that all of its points can be vertices
     const SurfacePoints points(shapes::box({1, 1, 1}, 30), 0.25f);
     for (float along = -1; along <= 1; along += 0.01f) {
         float gap = 2;
@@ -174,7 +174,7 @@ TEST_CASE("tips finer than the spacing have points that look every way") {
     const unsigned seed = test::seed();
     CAPTURE(seed);
     Random random(seed);
-    const float size = GENERATE(0.05f, 0.4f, 1.f, 1.5f);  // of a ball's radius, or a tube's [spacings]
+    const float size = GENERATE(0.05f, 0.4f, 1.f, 1.5f);  // radius of a ball or a tube [spacings]
     CAPTURE(size);
     const SurfacePoints ball(shapes::sphere(size, 4), 1), ring(shapes::torus(4, size, 200, 48), 1);
     const auto looks = [](const SurfacePoints& points, const glm::vec3& way, const glm::vec3& near, float within) {
@@ -186,7 +186,7 @@ TEST_CASE("tips finer than the spacing have points that look every way") {
     for (int i = 0; i < 300; ++i) {
         const glm::vec3 way = random.direction();
         REQUIRE(looks(ball, way, {}, 2 * size) > 0.65f);
-        const double around = random(0, 6.28), across = random(0, 6.28);  // the ring, the tube
+        const double around = random(0, 6.28), across = random(0, 6.28);  // around the ring, around the tube
         const glm::vec3 radial(std::cos(around), std::sin(around), 0);
         const glm::vec3 out = float(std::cos(across)) * radial + glm::vec3(0, 0, std::sin(across));
         REQUIRE(looks(ring, out, 4.f * radial + size * out, 1) > 0.65f);
@@ -289,8 +289,8 @@ TEST_CASE("dirty meshes have points, empty ones are refused") {
     dirty.triangles.push_back({0, 1, 1});  // no triangle
     dirty.points.insert(dirty.points.end(), {{0, 0, 0}, {1, 0, 0}, {2, 0, 0}});
     const auto last = unsigned(dirty.points.size());
-    dirty.triangles.push_back({last - 3, last - 2, last - 1});  // no area
-    dirty.triangles.push_back(dirty.triangles[0]);              // twice
+    dirty.triangles.push_back({last - 3, last - 2, last - 1});  // zero area
+    dirty.triangles.push_back(dirty.triangles[0]);              // duplicate
     const SurfacePoints points(dirty, 0.2f);
     for (const SurfacePoint& p : points.points()) REQUIRE(glm::length(p.normal) == Approx(1));
 

@@ -1,4 +1,4 @@
-// The demo itself, small: three bodies for a second.
+// The demo itself, small: three bodies for one second.
 #include <fmt/core.h>
 
 #include <catch2/catch.hpp>
@@ -20,7 +20,7 @@ TEST_CASE(
                                                    BILAYER_BOWL, seconds, out.string(), log.string())
                                            .c_str()));
     };
-    CHECK(play(0.5) == 3);  // they still fall
+    CHECK(play(0.5) == 3);  // they are still falling
     REQUIRE(play(30) == 0);
     std::ifstream file(log);
     const std::string table{std::istreambuf_iterator<char>(file), {}};

@@ -1,5 +1,5 @@
-// Bodies whose tips, ridges, cracks and borders meet exactly: after the tests of K. Erleben, "Methodology for assessing
-// mesh-based contact point methods", ACM Transactions on Graphics 37 (3), 2018.
+// Bodies whose tips, ridges, cracks and borders align exactly, after the tests of K. Erleben, "Methodology for
+// assessing mesh-based contact point methods", ACM Transactions on Graphics 37 (3), 2018.
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <glm/gtc/constants.hpp>
@@ -17,7 +17,8 @@ namespace {
 constexpr float voxel = 0.04f, half = 0.4f;  // [m]
 constexpr float lane = 4;                    // between pairs [m]
 
-// Along y; the profile, in x and z, runs counter-clockwise and is seen whole from a place within.
+// Extrudes along y. The profile, in x and z, is counter-clockwise and star-shaped: entirely visible from a point
+// within.
 Mesh extruded(const std::vector<glm::vec2>& profile, const glm::vec2& within) {
     Mesh mesh;
     const auto count = std::uint32_t(profile.size());
@@ -41,7 +42,7 @@ Mesh turnedOver(Mesh mesh) {
     return mesh;
 }
 
-// With their tips, ridges and mouths upward.
+// With tips, ridges and openings upward.
 std::vector<Mesh> degenerates() {
     const Mesh spike = shapes::cone(half / 2, 2 * half, 4);
     const Mesh wedge = extruded({{-half / 2, -half}, {half / 2, -half}, {0, half}}, {0, -half / 2});
@@ -71,7 +72,7 @@ TEST_CASE("Spikes, wedges, cracks and cliff edges that meet exactly come to rest
         upright.push_back(thingOf(mesh, measure));
         over.push_back(thingOf(turnedOver(mesh), measure));
     }
-    // exactly above each other; half over the edge; and a hair off either
+    // exactly above each other; offset by half over the edge; and slightly off either
     const float asides[] = {0, half};
     int pairs = 0;
     for (const auto& falling : over)
@@ -95,7 +96,7 @@ TEST_CASE("Spikes, wedges, cracks and cliff edges that meet exactly come to rest
     CHECK(outcome.deepest() < voxel);
     CHECK(outcome.energies.rise() < 0.01);
     for (std::size_t i = 2; i < poses.size(); i += 3) {
-        const glm::vec3 at = poses[i].position;  // of a body that has fallen, on the floor at least
+        const glm::vec3 at = poses[i].position;  // of a fallen body, at floor height or above
         REQUIRE(std::isfinite(glm::dot(at, at)));
         CHECK(at.z > -half);
     }

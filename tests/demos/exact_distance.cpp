@@ -1,4 +1,4 @@
-// What demos measure penetration with must itself be right.
+// Tests the measure of penetration that the demos use.
 #define GLM_ENABLE_EXPERIMENTAL  // for the rotation between two vectors
 #include "demos/shared/exact_distance.h"
 
@@ -33,7 +33,7 @@ TEST_CASE("penetration is the depth of the deepest surface point") {
     CHECK(demo::penetration(cube, {}, ball, {{0, 0, 0.9f}}) == Approx(0.1).epsilon(0.02));
     CHECK(demo::penetration(ball, {{0, 0, 0.9f}}, cube, {}) == Approx(0.1).epsilon(0.02));
     CHECK(demo::penetration(cube, {}, ball, {{0, 0, 0.9f}}, 0.3) == 0.3);
-    // a corner first: half a cube's diagonal, less the gap
+    // a corner first: half a cube's diagonal, minus the separation
     const glm::quat onCorner = glm::rotation(glm::normalize(glm::vec3(1, 1, 1)), glm::vec3(0, 0, -1));
     const double corner = 0.5 * std::sqrt(3.0);
     CHECK(demo::penetration(cube, {}, cube, {{0, 0, 0.5f + float(corner) - 0.08f}, onCorner}) ==

@@ -1,4 +1,4 @@
-// Machine parts are what their norms say, and fit into each other as their clearances say.
+// Machine parts match their standards, and their fits match their clearances.
 #include "demos/shared/machines.h"
 
 #include <algorithm>
@@ -29,7 +29,7 @@ struct Part {
     int eulerCharacteristic;  // 2 for a ball, 0 for a ring
 };
 
-// Parts as they come, and others far from them.
+// Parts in their default pose, and others far from it.
 std::vector<Part> someParts() {
     const Thread m8{.diameter = 8e-3f, .pitch = 1.25e-3f, .clearance = 0.05e-3f}, m16{.clearance = 0};
     return {{"bolt", bolt(), 2},
@@ -63,12 +63,12 @@ double volume(const Mesh& mesh) {
     return inspect(mesh).volume;
 }
 
-// What a circle of a radius has in area where `segments` chords stand for it.
+// Area of a circle of this radius that is approximated by `segments` chords.
 double polygonArea(double radius, int segments) {
     return segments / 2.0 * std::sin(2 * pi / segments) * radius * radius;
 }
 
-// The smallest distance between two bodies, negative where they overlap [m].
+// The minimum distance between two bodies; negative if they overlap [m].
 double gap(const demo::Specimen& a, const Pose& poseA, const demo::Specimen& b, const Pose& poseB) {
     return -demo::penetration(a, poseA, b, poseB, -1);
 }
@@ -81,7 +81,7 @@ Pose turned(const Pose& pose, double angle) {
     return {pose.position, pose.rotation * glm::angleAxis(float(angle), glm::vec3(0, 0, 1))};
 }
 
-// M16 by ISO 68-1: the mean squared radius over one pitch, the profile drawn in by a clearance.
+// M16 by ISO 68-1: the mean squared radius over one pitch, of the profile reduced by a clearance.
 double meanSquaredRadius(const Thread& thread) {
     const double P = thread.pitch, H = std::sqrt(3.0) / 2 * P, c = thread.clearance;
     const double crest = thread.diameter / 2 - c, root = crest - 5.0 / 8 * H;
@@ -90,7 +90,7 @@ double meanSquaredRadius(const Thread& thread) {
     return (crestFlat * crest * crest + rootFlat * root * root + flanks) / P;
 }
 
-// The heights at which a parallel to the z axis passes through a mesh, from below.
+// The heights, in ascending order, at which a line parallel to z intersects a mesh.
 std::vector<double> crossings(const Mesh& mesh, const glm::dvec2& at) {
     std::vector<double> heights;
     for (const auto& t : mesh.triangles) {
@@ -106,7 +106,7 @@ std::vector<double> crossings(const Mesh& mesh, const glm::dvec2& at) {
     return heights;
 }
 
-// How often two circles of a radius, those in the tubes of two links, wind around each other: Gauss's integral.
+// The linking number of two circles of this radius, the centre lines of two links' tubes: Gauss's integral.
 double linkingNumber(const Pose& a, const Pose& b, double radius) {
     constexpr int steps = 200;
     const auto at = [&](const Pose& pose, int i) {
@@ -168,7 +168,7 @@ TEST_CASE("rays along a bolt and through a nut meet right-handed crests one pitc
     std::mt19937 random(seed);
     const Thread thread;
     const Mesh screw = bolt(), hexagon = nut();
-    // where the basic profile's teeth and gaps are equally wide
+    // where the basic profile's teeth and grooves are equally wide
     const double radius = thread.diameter / 2 - 3.0 / 8 * std::sqrt(3.0) / 2 * thread.pitch;
     for (int i = 0; i < 5; ++i) {
         const double turn = std::uniform_real_distribution<double>(0, 1)(random);
@@ -199,13 +199,13 @@ TEST_CASE("a nut that follows the thread is as far from its bolt as the clearanc
         const Thread thread{.clearance = clearance};
         const demo::Specimen screw(bolt({.thread = thread, .length = 40e-3f, .segments = segments}), 0.5e-3);
         const demo::Specimen hexagon(nut({.thread = thread, .segments = segments}), 0.5e-3);
-        // from where the thread is whole to where the nut is half over the tip
+        // from where the thread is complete to where half of the nut is over the end
         std::uniform_real_distribution<float> height(6e-3f + 7.4e-3f, 40e-3f);
         for (int i = 0; i < 6; ++i) {
             const float at = height(random);
             CAPTURE(clearance, at);
             const double found = gap(screw, {}, hexagon, onThread(thread, at));
-            CHECK(found > clearance * 0.999 - rounding);  // the lead angle takes one part in a thousand
+            CHECK(found > clearance * 0.999 - rounding);  // the lead angle reduces it by 0.1 %
             CHECK(found < clearance + sagitta(8e-3, segments));
         }
     }
@@ -217,7 +217,7 @@ TEST_CASE("a nut does not leave its thread by a straight pull or a turn without 
     const demo::Specimen hexagon(nut({.thread = thread}), 0.5e-3);
     const double play = thread.clearance / cos30, facets = 2 * sagitta(8e-3, 96), P = thread.pitch;
     const Pose middle = onThread(thread, 20e-3f);
-    // how deep the nut overlaps after a pull [m]
+    // penetration depth of the nut after an axial pull [m]
     const auto depth = [&](double pull, double turn) {
         Pose pose = turned(middle, 2 * pi * turn);
         pose.position.z += float(pull);
@@ -227,7 +227,7 @@ TEST_CASE("a nut does not leave its thread by a straight pull or a turn without 
         CAPTURE(sign);
         CHECK(depth(sign * 0.95 * play, 0) == 0);
         CHECK(depth(sign * 0.9 * play, sign) == 0);
-        // the flanks overlap by what the pull goes beyond the play
+        // the flanks overlap by the pull beyond the play
         for (const double beyond : {0.05e-3, 0.1e-3, 0.3e-3}) {
             const double expected = beyond * cos30;
             CHECK(depth(sign * (play + beyond), 0) == Approx(expected).margin(facets));
@@ -237,7 +237,7 @@ TEST_CASE("a nut does not leave its thread by a straight pull or a turn without 
             CHECK(depth(sign * pull, 0) > 0.05e-3);
         CHECK(depth(sign * P, 0) == 0);
         CHECK(depth(sign * P / 3, sign / 3) == 0);
-        CHECK(depth(sign * P / 3, -sign / 3) > 0.3e-3);  // a left-handed one does not fit
+        CHECK(depth(sign * P / 3, -sign / 3) > 0.3e-3);  // a left-handed nut does not fit
     }
 }
 
@@ -264,8 +264,8 @@ TEST_CASE("gears mesh over a whole pitch with the backlash that was asked for") 
                 CAPTURE(i);
                 const double found = gap(one, self, other, mesh);
                 CHECK(found > along - rounding);
-                CHECK(found < along + 4e-6);  // chords of the involutes
-                // the teeth lock when the mate is turned by half the backlash, either way
+                CHECK(found < along + 4e-6);  // error of the involutes' chords
+                // the teeth lock when the mate is rotated by half the backlash, either way
                 const double half = backlash / mate.pitchDiameter();
                 for (const double sign : {-1.0, 1.0}) {
                     CHECK(demo::penetration(one, self, other, turned(mesh, sign * 0.95 * half)) == 0);

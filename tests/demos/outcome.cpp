@@ -1,4 +1,4 @@
-// What scenes are judged by must itself be right.
+// Tests the measures by which scenes are judged.
 #include "demos/shared/outcome.h"
 
 #include <catch2/catch.hpp>
@@ -56,7 +56,7 @@ TEST_CASE("a stage tells what a falling body does, and how deep bodies overlap")
     const auto play = [&](float way) {
         demo::Stage stage("fall", {.stepsPerSecond = 100, .stepsPerFrame = 10});
         stage.add(ball, {.mass = 2, .linearDamping = 0, .angularDamping = 0}, {{0, 0, 5}}, {});
-        // two that stand in each other for good, and one that overlaps one of them and moves
+        // two bodies that overlap permanently, and a moving one that overlaps one of them
         stage.add(ball, {}, {{0, 0, 0}}, {});
         stage.add(ball, {}, {{0.15f, 0, 0}}, {});
         stage.add(ball, {.mass = 1}, {{3 + way, 0, 0}}, {});
@@ -69,7 +69,7 @@ TEST_CASE("a stage tells what a falling body does, and how deep bodies overlap")
     CHECK(outcome.stepMs.size() == 50);
     CHECK(outcome.penetrations.empty());
     REQUIRE(outcome.energies.kinetic.size() == 51);
-    // v = g t; the second ball's share is 1 of 3 kg, less what the air takes
+    // v = g t; the second ball's share is 1 of 3 kg, minus the loss by drag
     CHECK(outcome.energies.kinetic.back() == Approx(0.5 * 3 * 4.905 * 4.905).epsilon(0.03));
     CHECK(outcome.energies.potential.front() == Approx(2 * 9.81 * 5).epsilon(1e-5));
     CHECK(outcome.energies.rise() < 1e-6);
@@ -91,7 +91,7 @@ TEST_CASE("the linking number of circles is that of Gauss") {
     CHECK(std::abs(linking(flat, {{1.85f, 0, 0}, upright})) == Approx(1).margin(1e-3));
     CHECK(linking(flat, {{2.15f, 0, 0}, upright}) == Approx(0).margin(1e-3));
     CHECK(linking(flat, {{0, 0, 0.5f}}) == Approx(0).margin(1e-6));
-    // turned around, it runs the other way
+    // upside down it runs the other way
     const glm::quat over = glm::angleAxis(-1.5707963f, glm::vec3(1, 0, 0));
     CHECK(linking(flat, {{1, 0, 0}, upright}) == Approx(-linking(flat, {{1, 0, 0}, over})));
 }

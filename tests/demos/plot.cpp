@@ -1,4 +1,4 @@
-// A plot shows each point where its numbers say.
+// A plot draws each point at the place of its values.
 #include "demos/shared/plot.h"
 
 #include <fmt/format.h>
@@ -63,7 +63,7 @@ TEST_CASE("equal differences are equal distances in a linear plot, which starts 
     REQUIRE(at.size() == 3);
     CHECK(at[1].first - at[0].first == Approx(at[2].first - at[1].first).margin(0.11));
     CHECK(at[0].second - at[1].second == Approx(at[1].second - at[2].second).margin(0.11));
-    // 0 is as far below 40 as 80 above it
+    // 0 is as far below 40 as 80 is above it
     CHECK(svg.find(fmt::format("y1=\"{:.1f}\"", 2 * at[0].second - at[2].second)) != std::string::npos);
     for (const char* tick : {">0<", ">20<", ">80<", ">0.5<"}) CHECK(svg.find(tick) != std::string::npos);
 }

@@ -18,14 +18,14 @@ std::string textOf(const std::filesystem::path& path) {
     return {std::istreambuf_iterator<char>(file), {}};
 }
 
-// The data that a page holds.
+// The data in a page.
 nlohmann::json dataOf(const std::string& html) {
     const std::string start = "id=\"data\">";
     const std::size_t from = html.find(start) + start.size();
     return nlohmann::json::parse(html.substr(from, html.find("</script>", from) - from));
 }
 
-// The numbers of a list that the player reads: base64, in it seven bits of a number in each byte, the lowest first.
+// Decodes a list of numbers as the player does: base64, each byte with seven bits of a number, lowest first.
 std::vector<std::uint32_t> numbersOf(const std::string& text) {
     const std::string digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     std::vector<std::uint32_t> numbers;
@@ -80,9 +80,9 @@ TEST_CASE("a recording is one file that asks the network for nothing") {
     const auto path = test::scratch("ball.html");
     recording.write(path);
     const std::string html = textOf(path);
-    CHECK(html.size() > 500'000);  // three.js is inside
+    CHECK(html.size() > 500'000);  // three.js is included
     CHECK(html.find("OrbitControls") != std::string::npos);
-    CHECK(html.find("</script> title") == std::string::npos);  // a title cannot end the script that holds it
+    CHECK(html.find("</script> title") == std::string::npos);  // a title cannot terminate the script that holds it
     for (const char* outside : {"<script src", "<link", "import(", "@import"}) {
         CAPTURE(outside);
         CHECK(html.find(outside) == std::string::npos);
@@ -126,7 +126,7 @@ TEST_CASE("surfaces that change are kept, each in its frame") {
             }
         CHECK(near);
     }
-    // what was recorded without such bodies is as it was
+    // recordings without such bodies are unchanged
     demo::Recording still("y");
     still.addBody(still.addMesh(shapes::sphere(0.1f, 1)), {});
     still.frame(0, std::vector<Pose>(1));

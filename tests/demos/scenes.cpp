@@ -1,5 +1,5 @@
-// Each scene, small. What a criterion asks that the library cannot do yet is known by name here, with what it gave when
-// it was written down; a criterion of these that is met after all fails the test, so that it leaves the list.
+// Each scene at small size. Criteria that the library does not meet yet are listed by name, with their value at the
+// time of writing. A listed criterion that is met fails the test, so that it is removed from the list.
 #include <catch2/catch.hpp>
 #include <functional>
 #include <set>
@@ -27,7 +27,7 @@ using demo::Outcome;
 
 namespace {
 
-// Checks every criterion of a scene whose threads and bits others have checked.
+// Checks every criterion of a scene. Other tests cover its thread count and determinism.
 void judgeOnce(const Outcome& outcome) {
     for (const demo::Criterion& criterion : outcome.criteria) {
         CAPTURE(outcome.title, criterion.name, criterion.value, criterion.limit, criterion.unit);
@@ -35,7 +35,7 @@ void judgeOnce(const Outcome& outcome) {
     }
 }
 
-// Checks every criterion but those known to be missed, and that threads change no bit.
+// Checks every criterion except the known failures, and that the result is bitwise the same for any count of threads.
 void judge(const std::function<Outcome()>& scene, const std::set<std::string>& missed = {}) {
     Outcome outcome = scene();
     outcome.criteria.push_back(demo::sameBits(outcome, scene));
@@ -60,7 +60,7 @@ TEST_CASE("blocks stick and slide on an incline as friction says") {
     demo::InclineOptions options;
     options.slopes = {40};
     options.frictions = {0, 0.25f, 0.975f, 1.025f};
-    options.seconds = 1.25f;  // the fastest go farther than a voxel in a step by then
+    options.seconds = 1.25f;  // by then the fastest move more than a voxel per step
     judge([&] { return demo::incline(options); });
 }
 
@@ -128,7 +128,7 @@ TEST_CASE("knots in a bowl come to rest") {
 
 TEST_CASE("however many bodies fall into a bowl, none starts in another") {
     demo::BowlOptions options;
-    // it turns about its middle, wherever its origin is
+    // it rotates about its centre, wherever its origin is
     const Mesh cube = shapes::moved(shapes::box({0.1f, 0.1f, 0.1f}), {0.3f, 0, 0});
     options.kinds = {{"knot", shapes::torusKnot(2, 3, 0.06f, 0.02f, 60, 8)}};
     if (GENERATE(false, true)) options.kinds.push_back({"cube", cube});
@@ -186,7 +186,7 @@ TEST_CASE("nuts under ten times their weight run and stay as they should") {
     options.weights = 10;
     const Outcome outcome = demo::nuts(options);
     CHECK(outcome.stepMs.size() < slow.stepMs.size() / 2);
-    // they hop in their play: a turn's advance is off by as much
+    // they hop within their play, which changes the advance of a rotation by as much
     for (const char* name : {"nuts that should run and stuck", "unevenness of angular speed",
                              "turn of nuts that should stay", "way of nuts that should stay", "deepest penetration"}) {
         CAPTURE(name, outcome.criterion(name).value);
@@ -250,7 +250,7 @@ TEST_CASE("bodies lie on each other at their height, at any scale") {
     demo::PairsOptions options;
     options.scale = GENERATE(0.01f, 100.f);
     options.every = 41;
-    options.seconds = options.scale > 1 ? 2.f : 0.5f;  // from a fifth of a voxel
+    options.seconds = options.scale > 1 ? 2.f : 0.5f;  // from 0.2 voxels
     CAPTURE(options.scale);
     judge([&] { return demo::pairs(options); });
 }
@@ -258,13 +258,13 @@ TEST_CASE("bodies lie on each other at their height, at any scale") {
 TEST_CASE("a liquid bunny keeps its volume and stays out of the knot") {
     demo::LiquidOptions options;
     options.resolution = 32;
-    options.seconds = 0.7f;  // it has hit the knot, and what that cost has come back
+    options.seconds = 0.7f;  // it has hit the knot, and the volume lost by that is restored
     options.turns = 1;
     options.framesPerSecond = 10;
     const Outcome outcome = demo::liquid(options);
     judgeOnce(outcome);
     CHECK(outcome.table.rows.size() == 8);
-    // without what gives it back, the loss is there to be seen
+    // without restoration the loss is measurable
     options.restoring = 0;
     CHECK_FALSE(demo::liquid(options).criterion("volume off in the end").met());
 }
@@ -275,7 +275,7 @@ TEST_CASE("bodies in Enright's swirl stay as whole as OpenVDB's own") {
     options.framesPerSecond = 4;
     const Outcome outcome = demo::enright(options);
     judgeOnce(outcome);
-    const std::vector<double>&start = outcome.table.rows[0], &stretched = outcome.table.rows[2];  // half a second
+    const std::vector<double>&start = outcome.table.rows[0], &stretched = outcome.table.rows[2];  // after half a second
     for (const std::size_t body : {1, 3}) {
         const double ours = stretched[body] / start[body], theirs = stretched[body + 1] / start[body + 1];
         CAPTURE(body);
@@ -284,7 +284,7 @@ TEST_CASE("bodies in Enright's swirl stay as whole as OpenVDB's own") {
             WARN("skipped: the bunny of Debian's package glmark2-data; at 32 voxels nothing is left of a knot");
             continue;
         }
-        CHECK(ours > 0.15);  // the sphere has 0.80 then, the bunny 0.21
+        CHECK(ours > 0.15);  // the sphere has 0.80 by then, the bunny 0.21
         CHECK(ours < 0.9);
     }
 }

@@ -1,4 +1,4 @@
-// The carved box and the uneven sphere, which benchmarks stand on, are the meshes that they claim to be.
+// The carved box and the uneven sphere, the meshes of the benchmarks, have their documented properties.
 #include "demos/shared/shapes.h"
 
 #include <algorithm>
@@ -26,7 +26,7 @@ double volume(const Mesh& mesh) {
     return sum;
 }
 
-// Each directed edge stands once, and so does its reverse.
+// Each directed edge occurs once, and so does its reverse.
 bool closedAndOriented(const Mesh& mesh) {
     std::set<std::pair<unsigned, unsigned>> edges;
     for (const auto& t : mesh.triangles)
@@ -41,7 +41,7 @@ double sixVolumes(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c,
     return glm::dot(b - a, glm::cross(c - a, d - a));
 }
 
-// Touching counts: a segment that meets no vertex of the triangle must not meet the triangle at all.
+// Includes touching: a segment without a vertex of the triangle must not meet the triangle at all.
 bool pierces(const glm::dvec3& p, const glm::dvec3& q, const Corners& t) {
     const double below = sixVolumes(p, t[0], t[1], t[2]), above = sixVolumes(q, t[0], t[1], t[2]);
     if (below * above > 0 || (below == 0 && above == 0)) return false;
@@ -58,7 +58,7 @@ bool apart(const Corners& a, const Corners& b) {
     return false;
 }
 
-// Edges of one triangle through another with which they share no vertex, over all pairs.
+// Counts edges that pass through a triangle with which they share no vertex, over all pairs.
 int piercings(const Mesh& mesh) {
     int count = 0;
     for (const auto& s : mesh.triangles)
@@ -79,10 +79,10 @@ TEST_CASE("a carved box is closed, oriented and about as many triangles as asked
         const Mesh mesh = shapes::carvedBox(wanted, 2);
         CHECK(double(mesh.triangles.size()) == Approx(double(wanted)).epsilon(0.02));
         CHECK(closedAndOriented(mesh));
-        CHECK(2 * mesh.points.size() == mesh.triangles.size() + 4);  // one sphere, no vertex to spare
-        // a cylinder of the body's radius, within what lid, dome and carving add and take
+        CHECK(2 * mesh.points.size() == mesh.triangles.size() + 4);  // one sphere without unused vertices
+        // a cylinder of the body's radius, within the volume that lid, dome and carving add and remove
         CHECK(volume(mesh) == Approx(8 * 3.1416 * 0.9 * 0.9 * 1.2).epsilon(0.1));
-        // vertices of an odd grid lie beside the axes, by half a cell of at most 1/30
+        // vertices of an odd grid lie off the axes by half a cell of at most 1/30
         CHECK(bounds(mesh).longestSide() == Approx(4).epsilon(1.0 / 900));
         CHECK(bounds(mesh).size().z == Approx(2 * 1.28).epsilon(1.0 / 900));
     }
@@ -92,7 +92,7 @@ TEST_CASE("a carved box is closed, oriented and about as many triangles as asked
 TEST_CASE("a carved box does not pierce itself") {
     for (const std::size_t triangles : {std::size_t(100), std::size_t(3000), std::size_t(10000)})
         CHECK(piercings(shapes::carvedBox(triangles)) == 0);
-    // the count itself finds two boxes through each other
+    // the count itself finds two boxes that intersect
     CHECK(piercings(shapes::join({shapes::box({1, 1, 1}), shapes::box({0.4f, 0.5f, 2})})) > 0);
 }
 
@@ -126,7 +126,7 @@ TEST_CASE("uneven spheres have the areas and the shapes of triangles that they c
         }
         const double count = double(mesh.triangles.size());
         CHECK(std::sqrt(squares / count - sum * sum / (count * count)) == Approx(deviation).epsilon(1e-3));
-        CHECK(thinnest > 0.12);  // an equilateral one: 0.43, half a square: 0.25
+        CHECK(thinnest > 0.12);  // an equilateral triangle has 0.43, half a square 0.25
     }
     CHECK_THROWS_AS(shapes::unevenSphere(0.0052f, 98), std::invalid_argument);
     CHECK_THROWS_AS(shapes::unevenSphere(0), std::invalid_argument);

@@ -1,4 +1,4 @@
-// The small solver for liquids: what can be told of it without a computer.
+// The small liquid solver, in cases with an analytic result.
 #include "demos/shared/water.h"
 
 #include <catch2/catch.hpp>
@@ -24,7 +24,7 @@ openvdb::math::Transform::Ptr cells() {
     return openvdb::math::Transform::createLinearTransform(double(voxel));
 }
 
-// All below a height [m].
+// Liquid below a height [m].
 FloatGrid::Ptr pool(float height) {
     const FloatGrid::Ptr liquid = openvdb::createLevelSet<FloatGrid>(double(voxel));
     Mesh box = shapes::box({1, 1, 1});
@@ -51,7 +51,7 @@ TEST_CASE("a pool stays at rest, around a body too, wherever its surface is betw
         CHECK(projection.divergence < 1e-3);
     }
     CAPTURE(height, around);
-    // 0.2 s of falling would be 2 m/s
+    // 0.2 s of free fall would give 2 m/s
     CHECK(water.fastest() < (around ? 0.05f : 0.002f));
     CHECK(water.volume() == Approx(water.kept()).epsilon(around ? 2e-3 : 2e-4));
 }
@@ -61,7 +61,7 @@ TEST_CASE("a ball that spins beside a wall leaves a pool at rest") {
     basin.place(sphereAt({0.3f, 0.5f, 0.3f}, {{}, {0, 0, 6}}));  // its distances reach into the wall
     demo::Water water(*pool(0.4f), basin, {.restoring = 0});
     for (int step = 0; step < 5; ++step) water.step(basin, 0.02f);
-    CHECK(water.fastest() < 0.4f);  // the ball has 1.2 m/s, and faces that it all but closes follow it
+    CHECK(water.fastest() < 0.4f);  // the ball has 1.2 m/s, and faces that it almost closes follow it
     CHECK(water.volume() == Approx(water.kept()).epsilon(2e-3));
 }
 
@@ -72,7 +72,7 @@ TEST_CASE("a drop falls as gravity says and keeps its volume") {
     demo::Water water(*drop, basin, {.restoring = 0});
     for (int step = 0; step < 20; ++step) water.step(basin, 0.01f);
     const MassProperties mass = massProperties(demo::surfaceOf(water.shape()));
-    // after n steps of velocity first, then way: g dt^2 n (n - 1) / 2
+    // after n steps that update the velocity first, then the position: g dt^2 n (n - 1) / 2
     CHECK(mass.centre.z == Approx(0.7f - 9.81f * 1e-4f * 190).margin(0.1 * double(voxel)));
     CHECK(mass.centre.x == Approx(0.5f).margin(0.02 * double(voxel)));
     CHECK(water.volume() == Approx(water.kept()).epsilon(0.01));
@@ -100,7 +100,8 @@ TEST_CASE("a pressure takes all divergence out, and leaves what moves with a bod
     const demo::Projection projection = pressure.project(velocity, *liquid, basin, growth);
     CHECK(projection.converged);
     CHECK(projection.divergence < 5e-3);  // of differences up to 6 / voxel = 144 1/s
-    // the whole: what leaves through the faces between liquid and air is what grows, and what the body displaces
+    // the total: the flux through the faces between liquid and air equals the growth plus the volume that the body
+    // displaces
     CHECK(projection.cells > side * side * 8);
 }
 

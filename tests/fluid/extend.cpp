@@ -25,14 +25,14 @@ TEST_CASE("fill keeps the band and knows every other voxel of the box") {
         if (before.tree().probeValue(at, old)) REQUIRE(value == old);
         largest = std::max(largest, std::abs(value - (at.asVec3d().length() * h - 0.5)));
     }
-    CHECK(largest / h < 1.5);  // first order, 11 voxels from the band at most
+    CHECK(largest / h < 1.5);  // first order, at most 11 voxels from the band
     CHECK(after.tree().getValue(openvdb::Coord(0)) < -0.4f);
     CHECK(filled.exteriorWidth() == band.exteriorWidth());
     CHECK(filled.interiorWidth() == band.interiorWidth());
     CHECK(filled.method() == band.method());
     CHECK(filled.meshHash() == band.meshHash());
     CHECK(after.background() == before.background());
-    // the sweep is off by more than the band was
+    // the error of the sweep exceeds that of the band
     CHECK(largest > 2 * double(band.errorBound()));
     CHECK(std::isnan(filled.errorBound()));
 }
@@ -60,13 +60,13 @@ TEST_CASE("fill goes as far as it is asked to") {
     CHECK(missing == 0);
     CHECK(largest / h < 1);
     CHECK(std::isnan(filled.errorBound()));
-    // what is there already is kept
+    // a wider existing band is kept
     CHECK(fluid::fill(band, h).exteriorWidth() == band.exteriorWidth());
     CHECK(fluid::fill(band, 3 * h).interiorWidth() == 3 * h);
 }
 
 TEST_CASE("fill refuses what cannot be swept") {
-    // a sheet that the flood finds no inside of
+    // an open surface in which the flood finds no inside
     const Mesh sheet{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}};
     const LevelSet outside = build(sheet, {.voxelSize = 0.1f, .sign = Sign::flood});
     CHECK_THROWS_WITH(fluid::fill(outside), Catch::Matchers::Contains("no inside"));

@@ -17,7 +17,7 @@ using openvdb::math::Transform;
 
 namespace {
 
-// Sums of the solid parts: of cells, and of faces across each axis [voxels].
+// Sums of the solid fractions: of cells, and of faces across each axis [voxels].
 struct Sums {
     double cells = 0;
     openvdb::Vec3d faces{0, 0, 0};
@@ -34,18 +34,18 @@ Sums sumsOf(const fluid::Solid& solid) {
 }  // namespace
 
 TEST_CASE("what planes cut off is exact") {
-    // a box whose sides lie at parts of a voxel: 2.3, 1.6 and 3.1 voxels from its centre at the origin
+    // a box whose sides lie at fractions of a voxel: 2.3, 1.6 and 3.1 voxels from its centre at the origin
     const float h = 0.1f;
     const auto cells = Transform::createLinearTransform(h);
     const fluid::Solid solid = fluid::solid(shapes::box({0.23f, 0.16f, 0.31f}), {}, *cells);
     const auto volume = solid.openVolume->getConstAccessor();
     const auto faces = solid.openFaces->getConstAccessor();
     CHECK(volume.getValue(Coord(0)) == 0);
-    CHECK(volume.getValue(Coord(2, 0, 0)) == Approx(0.2f).margin(1e-4));  // from 1.5 to 2.5, solid to 2.3
+    CHECK(volume.getValue(Coord(2, 0, 0)) == Approx(0.2f).margin(1e-4));  // the cell: 1.5 to 2.5, solid up to 2.3
     CHECK(volume.getValue(Coord(0, -2, 0)) == Approx(0.9f).margin(1e-4));
     CHECK(volume.getValue(Coord(0, 0, 3)) == Approx(0.4f).margin(1e-4));
     CHECK(volume.getValue(Coord(0, 0, 4)) == 1);
-    // faces across y and z of a cell that the plane x = 2.3 cuts; its lower one across x is covered, the next is not
+    // faces across y and z of a cell that the plane x = 2.3 cuts; its lower face across x is covered, the next is not
     CHECK(faces.getValue(Coord(2, 0, 0)).x() == 0);
     CHECK(faces.getValue(Coord(2, 0, 0)).y() == Approx(0.2f).margin(1e-4));
     CHECK(faces.getValue(Coord(2, 0, 0)).z() == Approx(0.2f).margin(1e-4));
@@ -57,8 +57,8 @@ TEST_CASE("open parts leave the body's volume, by cells and by faces, to second 
     const double radius = 0.5, volume = 4 * glm::pi<double>() / 3 * radius * radius * radius;
     const Mesh ball = shapes::sphere(float(radius), 6);
     const fluid::Placement placement({{0.313f, -0.127f, 0.071f}, glm::angleAxis(0.6f, glm::vec3(0, 0, 1))});
-    // a linear function on an edge of length l misses a distance of curvature 1 / radius by l^2 / (8 radius) at most;
-    // the longest edges are diagonals of cells and of faces
+    // a linear function on an edge of length l is off from a distance of curvature 1 / radius by at most l^2 / (8
+    // radius); the longest edges are diagonals of cells and of faces
     const auto bound = [&](double longest) { return 3 * longest * longest / (8 * radius * radius); };
     std::vector<double> errors;
     for (const double h : {0.1, 0.05, 0.025}) {

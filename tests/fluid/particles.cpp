@@ -32,7 +32,7 @@ double ball(double radius) {
     return 4 * glm::pi<double>() / 3 * radius * radius * radius;
 }
 
-// A ball's outermost layer, a third of the particles' voxels thick.
+// A ball's outermost layer, a third of a particle voxel thick.
 constexpr float outer = 0.5f, inner = 0.467f, wideVoxel = 0.1f;
 
 Field shell() {
@@ -68,7 +68,7 @@ TEST_CASE("particles of a body stay on their side of walls thinner than a voxel"
     int outside = 0;
     for (const glm::vec3& p : found.positions) {
         const float r = glm::length(glm::conjugate(placement.pose.rotation) * (p - centre) / scale);
-        // chords of the sphere's triangles lie below it by a thousandth of its radius
+        // chords of the sphere's triangles lie below it by 1e-3 of its radius
         outside += !(r < outer + 1e-5f && r > inner - 1e-3f);
     }
     CHECK(outside == 0);
@@ -77,7 +77,7 @@ TEST_CASE("particles of a body stay on their side of walls thinner than a voxel"
 }
 
 TEST_CASE("particles of a film that the field's voxels hardly know") {
-    // three tenths of a voxel thin and between two layers of voxels, in a solver's voxels of a quarter
+    // 0.3 voxels thin, between two layers of voxels, and with solver voxels of a quarter of the size
     const float h = 0.04f, half = 0.15f * h, solver = h / 4;
     Mesh film = shapes::box({0.4f, 0.4f, half});
     for (glm::vec3& p : film.points) p.z += h / 2;
@@ -88,7 +88,7 @@ TEST_CASE("particles of a film that the field's voxels hardly know") {
 }
 
 TEST_CASE("particles are inside as they are rounded") {
-    const double far = 1e5;  // floats are a quarter of a voxel apart
+    const double far = 1e5;  // floats are 0.25 voxels apart there
     const auto liquid = sphere();
     liquid->transform().postTranslate({far, 0, 0});
     int outside = 0;

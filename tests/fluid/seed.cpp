@@ -1,4 +1,4 @@
-// Seeding: the result passes OpenVDB's own check, has the distances it should have, and bad input changes nothing.
+// Seeding: the result passes OpenVDB's own check and has the correct distances; invalid input changes nothing.
 #include <bilayer/integration/fluid/seed.h>
 
 #include <openvdb/tools/Diagnostics.h>
@@ -40,7 +40,7 @@ Pose poseOf(float angle, const glm::vec3& position = {0.11f, -0.07f, 0.23f}) {
     return {position, glm::angleAxis(angle, glm::normalize(glm::vec3(1, -2, 0.5f)))};
 }
 
-// All that OpenVDB finds, but a background below three voxels by its last bit: that is the caller's.
+// All faults that OpenVDB finds, except a background below three voxels by its last bit, which comes from the caller.
 std::string faultOf(const FloatGrid& liquid) {
     openvdb::tools::CheckLevelSet<FloatGrid> check(liquid);
     std::string fault = check.checkTiles();
@@ -57,7 +57,7 @@ void requireLevelSet(const FloatGrid& liquid) {
     CHECK(liquid.tree().isValueOff(openvdb::Coord(100000)));
 }
 
-// The largest difference between the active values and a formula [voxels].
+// The maximum difference between the active values and a formula [voxels].
 template <class Formula>
 double error(const FloatGrid& liquid, Formula distance) {
     double largest = 0;
@@ -72,7 +72,7 @@ double volume(const FloatGrid& liquid) {
     return openvdb::tools::levelSetVolume(liquid);
 }
 
-// Of |gradient| from 1, by central differences within a voxel of the surface, in the mean.
+// Mean deviation of |gradient| from 1, by central differences within a voxel of the surface.
 double meanSlopeError(const FloatGrid& liquid) {
     const auto values = liquid.getConstAccessor();
     const double voxel = liquid.voxelSize()[0];
@@ -107,7 +107,7 @@ TEST_CASE("a sphere's field of any resolution seeds the sphere under the pose") 
     const Pose pose = poseOf(0.8f);
     fluid::seed(*liquid, fieldOf(sphere, fieldVoxel, width), pose);
     requireLevelSet(*liquid);
-    // the field's own error of some tenths of its voxel, and first-order sweeping beyond its band
+    // the field's own error of some tenths of its voxel, and that of first-order sweeping beyond its band
     const double allowed = 0.35 + 0.35 * fieldVoxel / liquidVoxel;
     CHECK(error(*liquid, [&](const glm::dvec3& p) { return glm::length(p - glm::dvec3(pose.position)) - 0.5; }) <
           allowed);
@@ -120,7 +120,7 @@ TEST_CASE("a mesh seeds its exact distances, stretched and turned as it may be")
     const Mesh mesh = shapes::torus(0.5f, 0.2f, 60, 30);
     const fluid::Placement placement(poseOf(0.8f), {1.3f, 0.6f, 0.9f});
     const auto liquid = emptyLiquid(0.03f, 4);
-    liquid->transform().postTranslate({0.007, 0.011, 0.013});  // whole voxels are nowhere near the origin
+    liquid->transform().postTranslate({0.007, 0.011, 0.013});  // off the origin by fractions of a voxel
     fluid::seed(*liquid, mesh, placement);
     requireLevelSet(*liquid);
     Mesh placed = mesh;
@@ -128,7 +128,7 @@ TEST_CASE("a mesh seeds its exact distances, stretched and turned as it may be")
     const test::Truth truth(placed);
     CHECK(error(*liquid, [&](const glm::dvec3& p) { return truth.signedDistance(p); }) < 1e-3);
 
-    // its field, stretched, has lost what is finer than its voxels
+    // a stretched field lacks details below its voxel size
     const auto ofField = emptyLiquid(0.03f, 4);
     fluid::seed(*ofField, fieldOf(mesh, 0.02f, 1.5f), placement);
     requireLevelSet(*ofField);
@@ -140,11 +140,11 @@ TEST_CASE("far from the origin a liquid is as fine as near it") {
     const Mesh mesh = shapes::sphere(0.5f, 4);
     const auto near = emptyLiquid(0.03125f), far = emptyLiquid(0.03125f);
     fluid::seed(*near, mesh);
-    const double shift = 1024;  // whole voxels
+    const double shift = 1024;  // a whole number of voxels
     far->transform().postTranslate({-shift, 0, 0});
     fluid::seed(*far, mesh, Pose{{float(-shift), 0, 0}});
     REQUIRE(near->activeVoxelCount() == far->activeVoxelCount());
-    // and where the liquid's own coordinates are large
+    // and with large coordinates of the liquid itself
     const auto away = emptyLiquid(0.03125f);
     fluid::seed(*away, mesh, Pose{{float(shift), 0, 0}});
     REQUIRE(near->activeVoxelCount() == away->activeVoxelCount());
@@ -230,7 +230,7 @@ TEST_CASE("a wide hole is named") {
 TEST_CASE("subtract and intersect") {
     const LevelSet field = fieldOf(shapes::sphere(0.5f, 5), 0.02f);
     const auto liquid = openvdb::tools::createLevelSetSphere<FloatGrid>(0.5f, openvdb::Vec3f(0.5f, 0, 0), 0.025f, 3);
-    const double whole = volume(*liquid), lens = ball * 5 / 16;  // of unit spheres whose centres lie one radius apart
+    const double whole = volume(*liquid), lens = ball * 5 / 16;  // of unit spheres whose centres are one radius apart
     SECTION("subtract") {
         fluid::seed(*liquid, field, {}, fluid::SeedMode::subtract);
         requireLevelSet(*liquid);
@@ -264,7 +264,7 @@ TEST_CASE("the background stays the caller's to the last bit, also where it is b
 
 namespace {
 
-// Two rows of cells that a letter each fills or leaves out: shapes of right angles, some cells high.
+// Two rows of cells that letters fill or leave out: shapes with right angles, some of them several cells high.
 struct Profile {
     const char* name;
     std::vector<std::string> rows;
@@ -280,7 +280,7 @@ const std::vector<Profile> profiles{{"box", {"#"}},
 // A profile with steps of random lengths [m]; plates are thin along one axis, rods along two.
 Mesh prism(const Profile& profile, std::mt19937& random, double voxel) {
     std::uniform_real_distribution<double> any(2, 12), thin(1.5, 3);
-    const bool whole = random() % 2;  // whole numbers of voxels, as CAD models have them
+    const bool whole = random() % 2;  // whole numbers of voxels, as in CAD models
     const std::string name = profile.name;
     const auto step = [&](int axis) {
         const bool isThin = (name == "plate" && axis == 0) || (name == "rod" && axis < 2);
@@ -341,7 +341,7 @@ TEST_CASE("the corpus seeds level sets") {
 }
 
 TEST_CASE("a report tells how far distances had to change, and where") {
-    // a box one and a half voxels thick, whose edges lie where the lattice sees them worst
+    // a box 1.5 voxels thick, with its edges at the worst positions relative to the lattice
     const auto liquid = emptyLiquid(0.1f);
     const Mesh mesh = shapes::box({0.55f, 0.45f, 0.35f});
     const fluid::SeedReport report = fluid::seed(*liquid, mesh);
@@ -371,7 +371,7 @@ TEST_CASE("overlapping solids are one liquid") {
     fluid::seed(*united, mesh);
     requireLevelSet(*united);
     const double whole = 2 * 0.48 - 0.7 * 0.6 * 0.5;
-    CHECK(volume(*united) == Approx(whole).epsilon(5e-3));  // as of one box: its edges are rounded
+    CHECK(volume(*united) == Approx(whole).epsilon(5e-3));  // like that of one box; its edges are rounded
     CHECK(united->tree().getValue(openvdb::Coord(7, 5, 2)) < 0);
     fluid::seed(*apart, mesh, {}, {fluid::SeedMode::unite, false});
     CHECK(volume(*apart) < 0.99 * whole);
@@ -394,7 +394,7 @@ TEST_CASE("boxes stacked face on face seed as one, wherever voxels lie") {
     std::mt19937 random(seed);
     std::normal_distribution<float> normal;
     const Mesh half = shapes::box({0.5f, 0.5f, 0.5f}), whole = shapes::box({1, 0.5f, 0.5f});
-    // mirrored in y, so that the other box's share of the wall has the other diagonal
+    // mirrored in y, so that the other box's part of the shared wall has the other diagonal
     Mesh mirrored = shapes::flipped(half);
     for (glm::vec3& p : mirrored.points) p.y = -p.y;
     const auto stackOf = [&](const Mesh& other) {
@@ -456,7 +456,7 @@ TEST_CASE("whether an open mesh is taken depends on the mesh and the voxels' siz
             CAPTURE(name, resolution, seeded, solid);
             CHECK(seeded == solid);
             CHECK((seeded == 0 || seeded == tried));
-            // what is taken at some voxel size is so at all larger ones
+            // a mesh accepted at one voxel size is accepted at all larger ones
             CHECK((seeded > 0 || finer));
             finer = seeded == 0;
         }
@@ -526,7 +526,7 @@ TEST_CASE("bad input throws and changes nothing") {
     mirrored->transform().preScale(openvdb::Vec3d(-1, 1, 1));
     refused(mirrored);
     CHECK_THROWS_WITH(fluid::seed(*mirrored, shapes::sphere(0.5f, 3)), Catch::Matchers::Contains("mirror"));
-    // what has no inside has nothing to seed, be it a mesh, a field, or a field in the liquid's own voxels
+    // a surface without an inside cannot be seeded: as a mesh, as a field, or as a field in the liquid's own voxels
     const Mesh sheet{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}};
     const LevelSet empty = build(sheet, {.voxelSize = 0.1f, .sign = Sign::flood});
     const auto liquid = sphere();

@@ -1,4 +1,5 @@
-// OpenVDB's own level set tools take a seeded liquid as it is: they find its volume, leave it where it is, move it.
+// OpenVDB's own level set tools accept a seeded liquid unchanged: they measure its volume, keep it in place, and advect
+// it.
 #include <openvdb/tools/Diagnostics.h>
 #include <openvdb/tools/LevelSetAdvect.h>
 #include <openvdb/tools/LevelSetMeasure.h>
@@ -33,7 +34,7 @@ FloatGrid::Ptr seeded(const Mesh& mesh, float voxelSize = h) {
     return liquid;
 }
 
-// How far the surface of a liquid is from a mesh, in the mean and at most, by the voxels next to it [voxels].
+// Mean and maximum distance from a liquid's surface to a mesh, by the voxels next to it [voxels].
 struct Distance {
     double mean = 0, largest = 0;
 };
@@ -54,7 +55,7 @@ Distance distance(const FloatGrid& liquid, const Mesh& mesh) {
     return result;
 }
 
-// The same speed everywhere.
+// A uniform velocity field.
 struct Stream {
     using VectorType = openvdb::Vec3f;
     openvdb::Vec3f velocity;
@@ -68,7 +69,7 @@ struct Stream {
 
 TEST_CASE("LevelSetMeasure finds volume and area of a seeded body") {
     const Mesh mesh = shapes::torus(0.5f, 0.2f, 120, 60);
-    const auto liquid = seeded(mesh, fine);  // its own error is of second order: 0.2 % of a ring of ten voxels' radius
+    const auto liquid = seeded(mesh, fine);  // its own error is of second order: 0.2 % for a ring of ten voxels' radius
     openvdb::tools::LevelSetMeasure<FloatGrid> measure(*liquid);
     CHECK(measure.volume() == Approx(massProperties(mesh).volume).epsilon(1e-3));
     double area = 0;

@@ -1,4 +1,4 @@
-// The order of the house: who may include whom, and what must not stand in its files.
+// Checks the include dependencies between folders, and forbidden text in files.
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <filesystem>
@@ -14,7 +14,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// The libraries, and the programs on top of them: each may include itself and these.
+// The libraries, and the programs on top of them: each may include itself and the listed ones.
 const std::map<std::string, std::set<std::string>> allowed{
     {"sdf", {}},
     {"collider", {"sdf"}},
@@ -26,7 +26,7 @@ const std::map<std::string, std::set<std::string>> allowed{
     {"bench", {"demos", "integration/bullet", "integration/fluid", "collider", "cl", "sdf"}},
 };
 
-// The private folders of a library from the bottom up: none includes one above it.
+// The private folders of a library from the bottom layer up: none may include a later one.
 const std::map<std::string, std::vector<std::string>> floors{
     {"sdf", {"base", "leaf", "bvh", "io", "mesh", "sign", "fill", "grid"}},
     {"collider", {"field", "contact"}},
@@ -37,7 +37,7 @@ const std::map<std::string, std::vector<std::string>> floors{
 
 const std::vector<std::string> folders{"sdf", "cl", "collider", "integration", "tools", "demos", "bench", "tests"};
 
-// The room of the house that a path lies in, or nothing.
+// The library or program folder that contains a path, or nothing.
 std::string room(const std::string& path) {
     for (const auto& [name, ignored] : allowed)
         if (path.rfind(name + "/", 0) == 0) return name;
@@ -64,14 +64,14 @@ void eachLine(Visit visit) {
     }
 }
 
-// The folder of a file within its library; empty for what stands directly in it.
+// The folder of a file within its library; empty for a file directly in it.
 std::string folderIn(const std::string& library, const std::string& path) {
     const std::string rest = path.substr(library.size() + 1);
     const std::size_t end = rest.find('/');
     return end == std::string::npos ? "" : rest.substr(0, end);
 }
 
-// How high a folder stands in its library; throws for one that no floor is known of.
+// The layer of a folder in its library. Throws for an unknown folder.
 std::size_t floorOf(const std::string& library, const std::string& folder) {
     const std::vector<std::string>& all = floors.at(library);
     const auto found = std::find(all.begin(), all.end(), folder);
@@ -84,7 +84,7 @@ bool isPublicHeader(const std::string& path) {
     return floors.count(library) && folderIn(library, path).empty() && path.ends_with(".h");
 }
 
-// What is wrong with an include line, or nothing.
+// The fault of an include line, or nothing.
 std::string complaint(const std::string& file, const std::string& line) {
     static const std::regex pattern(R"re(^\s*#\s*include\s*(["<])(bilayer/)?([^">]+)[">])re");
     std::smatch match;
@@ -94,7 +94,7 @@ std::string complaint(const std::string& file, const std::string& line) {
     if (isPublicHeader(included) != (match[2].matched && match[1] == "<") && (match[2].matched || !to.empty()))
         return "includes " + included + " otherwise than public headers as <bilayer/...> and others as \"...\"";
     if (from.empty()) return {};
-    // the truth that tests go by is also what the benchmark of accuracy measures against
+    // the ground truth of the tests is also the reference of the accuracy benchmark
     if (from == "bench" && included.rfind("tests/support/", 0) == 0) return {};
     if (included.rfind("tests/", 0) == 0) return "includes tests";
     if (to.empty()) return {};
@@ -164,7 +164,7 @@ TEST_CASE("public headers are few, the options stand at the bottom, and building
 }
 
 TEST_CASE("nothing is left to do, and no path of somebody's machine stands in the code") {
-    // put together here, so that this file does not find itself
+    // assembled here, so that this file does not match itself
     const std::regex leftover(std::string("\\b(TO") + "DO|FIX" + "ME|X" + "XX)\\b");
     const std::regex machine(std::string("/(ho") + "me|wo" + "rk|Us" + "ers|ro" + "ot)/(?!someone)[a-zA-Z]");
     std::string wrong;

@@ -41,7 +41,7 @@ TEST_CASE("a block is trimmed to the band, exclusive of its widths") {
 }
 
 TEST_CASE("unknown voxels take the sign that they are connected with") {
-    // a wall of known voxels at x = 3 (inside) and x = 4 (outside) parts the block
+    // a wall of known voxels at x = 3 (inside) and x = 4 (outside) divides the leaf
     std::vector<float> distances(blockVoxels, unknown), values(blockVoxels);
     for (int y = 0; y < 8; ++y)
         for (int z = 0; z < 8; ++z) {
@@ -59,7 +59,7 @@ TEST_CASE("unknown voxels take the sign that they are connected with") {
 }
 
 TEST_CASE("known voxels beyond a narrow band sign the background") {
-    // widths of a quarter voxel: nothing is active between -0.4 and 0.6, yet the signs differ across
+    // widths of 0.25 voxels: nothing is active between -0.4 and 0.6, yet the signs differ
     std::vector<float> distances(blockVoxels), values(blockVoxels);
     for (int x = 0; x < 8; ++x)
         for (int y = 0; y < 8; ++y)

@@ -23,7 +23,7 @@ namespace {
 
 struct Errors {
     double worst = 0, mean = 0;  // [voxels]
-    double wrongSign = 0;        // largest true distance of a voxel of the wrong sign [voxels]
+    double wrongSign = 0;        // maximum true distance of a voxel of wrong sign [voxels]
     std::size_t count = 0;
 };
 
@@ -75,7 +75,7 @@ TEST_CASE("spheres, tori and boxes get their analytic distances within the metho
         const glm::dvec3 q = glm::abs(p) - glm::dvec3(1, 0.7, 0.4);
         return glm::length(glm::max(q, 0.0)) + std::min(0.0, std::max({q.x, q.y, q.z}));
     };
-    // table 1 of the paper: worst about 1.2 voxels, mean about 0.45; better here, since the band is complete
+    // table 1 of the paper: maximum about 1.2 voxels, mean about 0.45; smaller here, since the band is complete
     for (const float resolution : {32.f, 64.f, 128.f}) {
         CAPTURE(resolution);
         for (const Mesh& mesh : {shapes::sphere(1, 6), shapes::torus(1, 0.3f, 400, 200)}) {
@@ -180,7 +180,7 @@ TEST_CASE("OpenVDB finds a level set in it") {
     for (const Mesh& mesh : {shapes::sphere(1, 5), shapes::torus(1, 0.4f, 200, 100)}) {
         const LevelSet field = build(mesh, {.voxelSize = voxelSizeFor(mesh, 100)});
         openvdb::tools::CheckLevelSet<openvdb::FloatGrid> check(*field.grids().distance);
-        // up to its eighth test: the ninth asks for gradients of length 1 within a half, which samples do not keep
+        // up to the eighth check: the ninth requires gradients of length 1 within 0.5, which samples violate
         CHECK(check.check(8) == "");
         CHECK(field.grids().distance->getGridClass() == openvdb::GRID_LEVEL_SET);
         CHECK(field.grids().distance->getName() == "distance");
@@ -213,7 +213,8 @@ TEST_CASE("a shift by whole blocks keeps the bytes") {
 }
 
 TEST_CASE("nothing shows where blocks and bricks meet") {
-    // a plane of the cylinder's side crosses many borders; moved by a part of a voxel, all its errors stay small
+    // a plane of the cylinder's side crosses many leaf borders; shifted by a fraction of a voxel, all its errors stay
+    // small
     const auto truth = [](const glm::dvec3& p) { return glm::length(p) - 1.0; };
     const LevelSet field = build(shapes::sphere(1, 6), {.voxelSize = 1.f / 64});
     double atBorder = 0, elsewhere = 0;
@@ -240,7 +241,7 @@ TEST_CASE("a mesh smaller than a voxel, and one far from the origin, still have 
     const Errors e =
         errors(field, [](const glm::dvec3& p) { return glm::distance(p, glm::dvec3(1e4, -1e4, 1e4)) - 0.5; });
     CAPTURE(e.worst, e.mean);
-    CHECK(e.worst < 0.8);  // coordinates of 1e4 are themselves known to 0.05 voxels only
+    CHECK(e.worst < 0.8);  // coordinates of 1e4 have a precision of only 0.05 voxels
 }
 
 TEST_CASE("voxels too small for OpenVDB are refused with the scale to use") {
@@ -279,7 +280,7 @@ TEST_CASE("bad options and meshes are refused by name") {
             refused({.voxelSize = 1, .interiorWidth = bad, .bandUnit = unit}, "interiorWidth");
             refused({.voxelSize = bad > 0 ? INFINITY : bad, .bandUnit = unit}, "voxelSize");
         }
-    // widths that overflow or vanish in the mesh's unit
+    // widths that overflow or underflow in the mesh's unit
     refused({.voxelSize = 1e37f, .exteriorWidth = 100}, "exteriorWidth");
     refused({.voxelSize = 1e-3f, .interiorWidth = 1e-37f}, "interiorWidth");
     refused({.voxelSize = 1, .threads = 4097}, "threads");
@@ -313,7 +314,7 @@ TEST_CASE("bad options and meshes are refused by name") {
         CHECK_THROWS_WITH(build(flat, {.voxelSize = 1, .method = method}), Catch::Contains("no triangle with an area"));
     refused({.voxelSize = 0.1f, .exteriorWidth = 101, .bandUnit = BandUnit::world}, "exteriorWidth");
     refused({.voxelSize = 0, .bandUnit = BandUnit::world}, "voxelSize");
-    // 3e8 voxels of surface with 2000 across each
+    // 3e8 voxels of surface, 2000 voxels across the band at each
     refused({.voxelSize = 2e-4f, .exteriorWidth = 1000, .interiorWidth = 1000, .method = Method::pseudonormal},
             "memory");
     CHECK_THROWS_AS(voxelSizeFor(mesh, 0), std::invalid_argument);
@@ -346,7 +347,7 @@ TEST_CASE("a build can be cancelled at any moment, whatever the method") {
         options.progress = [&](float) { return ++calls > 0; };
         build(mesh, options);
         for (int i = 0; i < 5; ++i) {
-            // the listener hears by the clock, so a quick run may end before the moment comes
+            // the callback is called by time, so a quick run may end before that
             int left = 1 + int(random() % unsigned(calls));
             bool asked = false;
             options.progress = [&](float) {

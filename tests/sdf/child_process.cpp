@@ -31,7 +31,7 @@ using namespace std::chrono_literals;
 
 namespace {
 
-// The sanitizers have a malloc of their own, which does not put its locks into order at a fork.
+// The sanitizers replace malloc, without its preparation of locks for a fork.
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 constexpr bool usualMalloc = false;
 #else
@@ -40,7 +40,7 @@ constexpr bool usualMalloc = true;
 
 constexpr ChildLimits ample{60s, std::size_t(1) << 30};
 
-// What the caller is told of work that goes wrong
+// The error message for failed work
 std::string failureOf(const ChildProcess::Work& work, const ChildLimits& limits = ample) {
     ChildProcess child(limits, work);
     try {
@@ -61,7 +61,7 @@ bool hasNoChildren() {
     return ::waitpid(-1, nullptr, WNOHANG) < 0 && errno == ECHILD;
 }
 
-// A signal's disposition for a while
+// Sets a signal's disposition for its lifetime
 class Handler {
   public:
     Handler(int signal, void (*handler)(int)) : signal_(signal), before_(::signal(signal, handler)) {}
@@ -106,7 +106,7 @@ TEST_CASE("a child process that fails is an error") {
     CHECK(failureOf([](const auto&) { throw 1; }) == "ended without an answer");
     CHECK(failureOf([](const auto&) { ::_exit(0); }) == "ended without an answer");
     CHECK(failureOf([](const auto&) { ::pause(); }, {300ms, 0}) == "took longer than 0.3 s");
-    // even a part of an answer buys no time
+    // a partial answer does not extend the time limit
     const auto drips = [](const ChildProcess::Send& send) {
         for (;; ::usleep(10000)) send("x", 1);
     };
@@ -141,11 +141,11 @@ TEST_CASE("a child process leaves nothing behind and takes nothing with it") {
         static bool left = false;
         ::atexit([] { left = true; });
         ChildProcess child(ample, [](const ChildProcess::Send& send) {
-            // no file but the pipe, and standard streams that lead nowhere
+            // no file but the pipe, and standard streams to /dev/null
             const std::size_t found = openFiles();
             send(&found, sizeof found);
             ::puts("unheard");
-            ::exit(0);  // by a library that gives up
+            ::exit(0);  // like a library that aborts
         });
         std::size_t found = 0;
         child.receive(&found, sizeof found);
@@ -186,7 +186,7 @@ TEST_CASE("a caller may ignore or collect its children, and may handle signals")
 }
 
 TEST_CASE("a child process answers where the caller has no standard streams") {
-    // in a child itself: this test needs its own
+    // in a child process: this test needs its own
     ChildProcess outer(ample, [](const ChildProcess::Send& send) {
         for (int stream = 0; stream < 3; ++stream) ::close(stream);
         ChildProcess inner(ample, [](const ChildProcess::Send& sendInner) { sendInner("inner", 5); });

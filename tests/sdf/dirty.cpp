@@ -1,4 +1,4 @@
-// Meshes as they are found: every public one gets a sensible field, whatever is wrong with it, or a clear refusal.
+// Defective meshes: every public mesh gets a valid field, whatever its faults, or a clear error.
 #include <openvdb/openvdb.h>
 
 #include <algorithm>
@@ -19,11 +19,11 @@ using namespace bilayer::detail;
 
 namespace {
 
-// Few voxels, so that all meshes together take seconds.
+// Low resolution, so that all meshes together take seconds.
 constexpr float resolution = 24;
-// What distances are promised to, and what they are checked to; sums over two voxels in single precision [voxels].
+// Guaranteed accuracy of distances, and the tolerance of the check: sums over two voxels in single precision [voxels].
 constexpr double exactness = 1e-4, slack = 1e-3;
-// Triangles times voxels that brute force may look at for one mesh.
+// Limit of triangles times voxels for brute force, per mesh.
 constexpr std::size_t work = 1'000'000;
 
 struct Built {
@@ -54,8 +54,8 @@ std::vector<std::string> corpus() {
     return names;
 }
 
-// Voxels whose value is no number, is active outside the band, or is inactive and no width. A distance just within the
-// band may round to its width.
+// Counts voxels that are NaN, active outside the band, or inactive with a value other than a width. A distance just
+// within the band may round to its width.
 std::size_t countOddValues(const Built& built) {
     const float out = built.field.exteriorWidth(), in = -built.field.interiorWidth();
     std::size_t odd = 0;
@@ -65,7 +65,7 @@ std::size_t countOddValues(const Built& built) {
     return odd;
 }
 
-// Neighbours on different sides without room for the surface between them.
+// Counts neighbours of different sides whose distances leave no room for the surface between them.
 std::size_t countBridges(const Built& built) {
     const double h = built.field.voxelSize();
     auto voxels = built.grid->getConstAccessor();
@@ -81,7 +81,7 @@ std::size_t countBridges(const Built& built) {
     return bridges;
 }
 
-// Active voxels at random, as many as brute force has time for.
+// Random active voxels, limited by the cost of brute force.
 std::vector<openvdb::Coord> someVoxels(const Built& built, std::size_t triangles, std::mt19937& random) {
     std::vector<openvdb::Coord> all;
     for (auto voxel = built.grid->cbeginValueOn(); voxel; ++voxel) all.push_back(voxel.getCoord());
@@ -103,7 +103,7 @@ void checkDistances(const Mesh& mesh, const Built& built, const std::vector<open
     CHECK(worst <= exactness * double(built.field.voxelSize()));
 }
 
-// Against the winding numbers of the mesh that the build took, which may have triangles turned.
+// Compares with the winding numbers of the mesh as built, which may have flipped triangles.
 void checkWinding(const Mesh& mesh, const Built& built, const std::vector<openvdb::Coord>& voxels) {
     const SignChoice choice = balanced(mesh) ? chooseSignAfterConflict(mesh) : chooseSign(mesh);
     const Mesh& oriented = choice.repaired ? *choice.repaired : mesh;
@@ -142,7 +142,7 @@ TEST_CASE("every public mesh has a sensible field or is refused by name") {
         CHECK_FALSE(built.reason.empty());
         CHECK(countOddValues(built) == 0);
         CHECK(built.at(bounds(mesh).lower - 0.5f * bounds(mesh).size()) == double(built.field.exteriorWidth()));
-        // sides change where the surface is, but for lids over holes
+        // sides change only at the surface, except for lids over holes
         if (built.sign == "normals") CHECK(countBridges(built) == 0);
         const auto voxels = someVoxels(built, mesh.triangles.size(), random);
         checkDistances(mesh, built, voxels);
@@ -163,7 +163,7 @@ TEST_CASE("public meshes get their signs in the way that suits them") {
           Case{"cgal-bones.off", "winding", meets, 128}, Case{"bunny_5k_open.obj", "winding", open},
           Case{"cgal-elephant-with-holes.off", "winding", open}, Case{"suzanne.obj", "winding", open},
           Case{"teapot.obj", "winding", open}, Case{"cgal-three_knives.off", "winding", "unbalanced"},
-          // so coarse that only voxels within blocks contradict each other
+          // so coarse that only voxels within leaves contradict each other
           Case{"cow.obj", "winding", meets, 24}, Case{"cgal-bones.off", "winding", meets, 40},
           Case{"self_intersectA.obj", "winding", meets, 40}, Case{"moebius.obj", "flood", "one side only"},
           Case{"soup.stl", "flood", "only"}, Case{"mp_chair.off", "flood", "only"},
@@ -183,7 +183,8 @@ TEST_CASE("solids that overlap inside one block are noticed") {
     std::mt19937 random(seed);
     const auto any = [&](float low, float high) { return std::uniform_real_distribution<float>(low, high)(random); };
     for (int round = 0; round < 50; ++round) {
-        // one solid reaches 2.5 voxels out of the other: room for links between voxels over the faces of both
+        // one solid protrudes 2.5 voxels from the other: room for sign propagation between voxels over the faces of
+        // both
         const Mesh solid = shapes::box({1, 2.4f, 2.4f});
         const Mesh other = shapes::moved(shapes::box({1.75f, any(1.9f, 2.1f), any(1.9f, 2.1f)}), {1.75f, 0, 0});
         const glm::vec3 block(8 * int(random() % 9), 8 * int(random() % 9), 8 * int(random() % 9));

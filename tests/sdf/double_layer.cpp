@@ -44,14 +44,14 @@ class Dense {
         }
     }
 
-    // Signed distance in voxels, infinite where a layer is.
+    // Signed distance in voxels; infinite where a layer is.
     float phi(const glm::ivec3& v) const {
         const std::size_t i = index(v);
         if (inner2_[i] == infinite || outer2_[i] == infinite) return infinite;
         return inner2_[i] <= outer2_[i] ? -std::max(0.f, std::sqrt(outer2_[i]) - delta_)
                                         : std::max(0.f, std::sqrt(inner2_[i]) - delta_);
     }
-    // Both layers are equally near, up to rounding: either sign is right.
+    // Both layers are equally near, up to rounding: either sign is valid.
     bool tie(const glm::ivec3& v) const {
         const std::size_t i = index(v);
         return std::abs(inner2_[i] - outer2_[i]) <= 2 * layerTie + 1e-5f * inner2_[i];
@@ -104,7 +104,7 @@ class Dense {
     std::vector<std::int32_t> innerOwner_, outerOwner_;
 };
 
-/// Squared distances are sums in another order, from another origin: a few units in the last place of 100 voxels^2.
+/// Squared distances are summed in another order, from another origin: a few units in the last place of 100 voxels^2.
 constexpr float rounding = 2e-5f;
 
 BuildOptions layered(BuildOptions options) {
@@ -136,14 +136,14 @@ void compare(const Mesh& mesh, const BuildOptions& options, int k) {
     CHECK(missing == 0);
     CHECK(extra == 0);
     CHECK(worst < rounding);
-    CHECK(active == field.activeVoxels());  // none outside the dense grid
+    CHECK(active == field.activeVoxels());  // no active voxel lies outside the dense grid
 }
 
 }  // namespace
 
 TEST_CASE("in the band, a voxel has the distance that all samples together give it") {
     const Mesh knot = shapes::torusKnot(2, 3, 5, 1, 150, 12), box = shapes::box({6, 4, 2});
-    for (const float width : {0.5f, 1.f, 2.f, 3.f, 3.499f, 7.f}) {  // 3.499: cells end where samples do
+    for (const float width : {0.5f, 1.f, 2.f, 3.f, 3.499f, 7.f}) {  // 3.499: cells end at the same place as samples
         compare(knot, {.voxelSize = 0.5f, .exteriorWidth = width, .interiorWidth = width}, -1);
         compare(box, {.voxelSize = 0.31f, .exteriorWidth = width, .interiorWidth = width}, -1);
     }
@@ -194,7 +194,7 @@ TEST_CASE("the triangle of a voxel is the owner of the sample that decides its d
     CHECK(double(differ) < 1e-3 * double(count));
 }
 
-// Of two layers of which only the outer one is near enough to be known, that one is the nearer, however narrowly.
+// If only the outer layer is near enough to be known, it is the nearer one, by however little.
 TEST_CASE("beyond the band, voxels lie on the side that exact distances give them") {
     const auto onWrongSide = [](const Mesh& mesh, BuildOptions options) {
         options.exteriorWidth = options.interiorWidth = 2;
@@ -235,5 +235,5 @@ TEST_CASE("a triangle whose area floats cannot hold changes nothing but what is 
         if (voxel.getCoord().asVec3d().length() > 5) changed += values.getValue(voxel.getCoord()) != *voxel;
     CHECK(count > 500);
     CHECK(changed == 0);
-    CHECK(values.getValue(openvdb::Coord(0)) > -0.5f * options.voxelSize);  // it has a sample too
+    CHECK(values.getValue(openvdb::Coord(0)) > -0.5f * options.voxelSize);  // so it has a sample too
 }

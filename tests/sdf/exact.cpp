@@ -1,5 +1,5 @@
-// The exact method against the truth: every distance, every sign, the whole band, over the public meshes and over
-// shapes that break other builders. `bench_accuracy` does the same at length.
+// The exact method against the ground truth: every distance, every sign, the whole band, over the public meshes and
+// over shapes on which other builders fail. `bench_accuracy` does the same with more voxels.
 #include <oneapi/tbb/global_control.h>
 #include <openvdb/openvdb.h>
 
@@ -26,7 +26,7 @@ using namespace bilayer;
 
 namespace {
 
-constexpr std::size_t manyVoxels = 30000;  // active ones checked of a shape; smaller grids are checked whole
+constexpr std::size_t manyVoxels = 30000;  // active voxels checked per shape; smaller grids are checked completely
 
 using Random = std::mt19937;
 
@@ -44,7 +44,7 @@ openvdb::FloatGrid::ConstPtr exactGrid(const Mesh& mesh, float voxelSize, const 
         .distance;
 }
 
-// Builds a field of `mesh` and judges it by the truth about `like`.
+// Builds a field of `mesh` and compares it with the ground truth of `like`.
 void checkExact(const Mesh& mesh, const Mesh& like, float voxelSize, const test::Band& band, unsigned seed,
                 std::size_t count = manyVoxels) {
     const auto grid = exactGrid(mesh, voxelSize, band);
@@ -59,7 +59,7 @@ void checkExact(const Mesh& mesh, const Mesh& like, float voxelSize, const test:
                    << verdict.missing << ", extra " << verdict.extra << faults);
     CHECK(verdict.active > 0);
     CHECK(verdict.exact());
-    std::size_t outsiders = 0;  // what is inactive holds the width of its side
+    std::size_t outsiders = 0;  // inactive voxels hold the width of their side
     for (auto value = grid->cbeginValueOff(); value; ++value)
         outsiders += *value != float(band.exterior) * voxelSize && *value != -float(band.interior) * voxelSize;
     CHECK(outsiders == 0);
@@ -70,13 +70,13 @@ void checkExact(const Mesh& mesh, float voxelSize, const test::Band& band, unsig
     checkExact(mesh, mesh, voxelSize, band, seed, count);
 }
 
-// None of a half: all faces of a cube may lie half-way between voxels, and no voxel in its band.
+// No width is 0.5: all faces of a cube may lie half-way between voxels, with no voxel in the band.
 test::Band anyBand(Random& random) {
     const test::Band bands[] = {{3, 3}, {1, 1}, {5, 2}, {1, 4}, {0.6, 0.6}, {2.25, 3.5}, {10, 10}};
     return bands[random() % std::size(bands)];
 }
 
-// Turned any way, and moved by less than a meter.
+// A random rotation, and a translation of less than a metre.
 Mesh anyPose(const Mesh& mesh, Random& random) {
     const glm::vec3 axis(uniform(random, -1, 1), uniform(random, -1, 1), 1.5f);
     const glm::vec3 shift(uniform(random, -1, 1), uniform(random, -1, 1), uniform(random, -1, 1));
@@ -91,19 +91,20 @@ Mesh wedge(float thickness) {
             {{0, 2, 3}, {0, 3, 1}, {0, 5, 4}, {0, 1, 5}, {2, 5, 3}, {2, 4, 5}, {0, 4, 2}, {1, 3, 5}}};
 }
 
-// A star of needles around the origin, with valleys between them: the vertices where pseudonormals are hardest.
+// A star of needles around the origin, with valleys between them: hard vertices for pseudonormals.
 Mesh star(Random& random) {
     Mesh mesh = shapes::sphere(1, 2);
     for (auto& p : mesh.points) p *= random() % 3 == 0 ? uniform(random, 0.05f, 0.2f) : uniform(random, 0.5f, 1);
     return mesh;
 }
 
-// A surface of slivers: a cylinder and a cone whose sides are far narrower than a voxel.
+// A surface of slivers: a cylinder and a cone whose side triangles are far narrower than a voxel.
 Mesh slivers() {
     return shapes::join({shapes::cylinder(0.3f, 2, 800), shapes::moved(shapes::cone(0.4f, 2, 500), {1, 0, 0})});
 }
 
-// Cuts one edge of some triangles in half on one side only, and closes the crack with a triangle without area.
+// Splits one edge of some triangles at its midpoint on one side only, and closes the crack with a triangle without
+// area.
 Mesh withZeroArea(const Mesh& mesh, int every) {
     Mesh result = mesh;
     for (std::size_t i = 0; i < mesh.triangles.size(); i += std::size_t(every)) {
@@ -117,7 +118,7 @@ Mesh withZeroArea(const Mesh& mesh, int every) {
     return result;
 }
 
-// Coordinates that single precision adds and halves without rounding.
+// Rounds coordinates to values that single precision adds and halves exactly.
 Mesh onBinaryFractions(Mesh mesh, float step = 1.f / 1024) {
     for (auto& p : mesh.points) p = glm::round(p / step) * step;
     return weld(mesh);
@@ -259,7 +260,7 @@ TEST_CASE("exact: walls and gaps thinner than a voxel") {
         CAPTURE(wall);
         const Mesh plate = shapes::box({1, 0.7f, wall / 2});
         checkExact(anyPose(plate, random), h, anyBand(random), seed);
-        // two plates a wall apart: four surfaces in a voxel
+        // two plates a wall thickness apart: four surfaces within a voxel
         checkExact(anyPose(shapes::join({plate, shapes::moved(plate, {0.1f, 0.05f, 2 * wall})}), random), h, {3, 3},
                    seed);
         checkExact(anyPose(shapes::bowl(1, std::max(wall, 0.005f), 48), random), h, {3, 3}, seed);
@@ -336,7 +337,7 @@ TEST_CASE("exact: nested cavities and components that touch") {
                    seed);
     }
     SECTION("in a cavity that touches the hull at a vertex") {
-        // a box squeezed towards the diagonal through the hull's corner, so that it keeps clear of the hull's faces
+        // a box compressed towards the diagonal through the hull's corner, so that it does not touch the hull's faces
         const glm::vec3 diagonal = glm::normalize(glm::vec3(1));
         const glm::mat3 squeeze = 0.2f * glm::mat3(1) + 0.3f * glm::outerProduct(diagonal, diagonal);
         Mesh hole = shapes::flipped(box);
@@ -354,7 +355,7 @@ TEST_CASE("exact: far from the origin, and smaller than a voxel") {
     checkExact(weld(shapes::moved(shapes::box({0.5f, 0.25f, 0.125f}), {-1e4f, 1e4f, 1e4f})), 0.01f, {5, 2}, seed);
     for (int i = 0; i < 5; ++i) {
         const Mesh tiny = anyPose(shapes::sphere(0.4f * std::pow(0.1f, float(i)), 2), random);
-        checkExact(tiny, 1, {double(1 + i), 1}, seed);  // narrower bands may meet no voxel at all
+        checkExact(tiny, 1, {double(1 + i), 1}, seed);  // narrower bands may contain no voxel
     }
 }
 
@@ -365,7 +366,8 @@ TEST_CASE("exact: triangles and edges so short that floats do not hold their squ
     const auto any = [&] { return glm::vec3(uniform(random, -1, 1), uniform(random, -1, 1), uniform(random, -1, 1)); };
     for (int round = 0; round < 300; ++round) {
         const float leg = std::pow(10.f, uniform(random, -36, -4)), other = std::pow(10.f, uniform(random, -36, 1));
-        // a point, a segment or a triangle, as seen by a voxel, at the origin: only there floats tell its corners apart
+        // a point, a segment or a triangle relative to a voxel, at the origin: only there do floats distinguish its
+        // vertices
         const Mesh mesh{{{0, 0, 0}, leg * any(), other * any()}, {{0, 1, 2}}};
         if (!(glm::length(glm::cross(glm::dvec3(mesh.points[1]), glm::dvec3(mesh.points[2]))) > 0)) continue;
         for (const Method method : {Method::exact, Method::pseudonormal}) {

@@ -1,4 +1,4 @@
-// The last resort for the side of a point, against solid angles summed up in double precision.
+// The fallback sign test of a point, against solid angles summed in double precision.
 #include "sdf/sign/fallback_sign.h"
 
 #include <catch2/catch.hpp>
@@ -13,7 +13,7 @@ using namespace bilayer::detail;
 
 namespace {
 
-// Points on a lattice, where rays meet edges and corners, and between.
+// Points on a lattice, where rays meet edges and vertices, and in between.
 void checkSides(const Mesh& mesh, unsigned seed) {
     const std::function<bool(float)> nobody;
     Progress progress(nobody);

@@ -35,7 +35,7 @@ Mesh without(Mesh mesh, const glm::vec3& centre, float radius) {
     return mesh;
 }
 
-// A box of six faces that share no vertex; each is divided in its own way, so that vertices of one lie on edges of
+// A box of six faces that share no vertex. Each face is divided differently, so that vertices of one lie on edges of
 // another, or next to them by some rounding.
 Mesh crackedBox(float rounding, Random& random) {
     Mesh all;
@@ -78,10 +78,10 @@ TEST_CASE("holes in a round body are filled, and the body is closed, oriented an
         for (int i = 0; i < holes; ++i) {
             glm::vec3 axis(0);
             axis[i % 3] = i < 3 ? 1.f : -1.f;
-            const glm::vec3 centre = glm::normalize(axis + random.point(0.2));  // apart from all others
+            const glm::vec3 centre = glm::normalize(axis + random.point(0.2));  // separate from all others
             const double radius = random(0.12, 0.35);
             open = without(std::move(open), centre, float(radius));
-            const double rim = radius + 0.12, height = rim * rim / 2;  // no cap is higher than that
+            const double rim = radius + 0.12, height = rim * rim / 2;  // no cap is higher than this
             lost += 3.1416 * height * height * (1 - height / 3);
         }
         const FilledMesh filled = fillHoles(open, 1e-6);

@@ -23,7 +23,7 @@ Mesh someFlipped(Mesh mesh, unsigned seed) {
     return mesh;
 }
 
-// Without the triangles whose centre `gone` holds for.
+// The mesh without the triangles whose centre satisfies `gone`.
 template <class Gone>
 Mesh without(const Mesh& mesh, const Gone& gone) {
     Mesh rest{mesh.points, {}};
@@ -72,7 +72,7 @@ bool inBox(const glm::dvec3& p, const glm::dvec3& half) {
 TEST_CASE("closed meshes get the right sign in every voxel, whichever way their faces are turned") {
     const unsigned seed = test::seed();
     CAPTURE(seed);
-    // the plate is thin enough for no ball to fit into, cut at skew angles by the voxels
+    // the plate is too thin for any free ball, and oblique to the voxels
     const glm::mat4 skew = glm::rotate(glm::mat4(1), 0.7f, glm::vec3(1, 2, 3));
     const Mesh sphere = shapes::sphere(1, 3), plate = transformed(shapes::box({1, 0.8f, 0.03f}, 2), skew);
     for (const float gap : {0.f, 5.f})
@@ -85,7 +85,7 @@ TEST_CASE("closed meshes get the right sign in every voxel, whichever way their 
 }
 
 TEST_CASE("gaps up to the stated width are closed and wide openings stay open") {
-    // a box with a slit all along its lid; voxels of 1
+    // a box with a slit along its whole lid; voxels of 1
     for (const float gap : {0.f, 2.f, 4.f, 6.f})
         for (const float offset : {0.f, 0.3f, 0.5f}) {
             const auto slit = [&](float width) {
@@ -119,7 +119,7 @@ TEST_CASE("a small hole leaves the rest of a solid as it was") {
     CHECK(wrongSigns(
               f, 1e-4 * 0.05,
               [&](const glm::dvec3& p) {
-                  // in the hole the border lies somewhere between
+                  // in the hole the position of the border is not checked
                   if (p.z > 0.8 && glm::length(glm::dvec2(p)) < 0.3)
                       return std::signbit(f.field->getConstAccessor().getValue(
                           openvdb::Coord::round(openvdb::Vec3d(p.x, p.y, p.z) / 0.05)));
@@ -136,7 +136,7 @@ TEST_CASE("sheets without thickness have no inside") {
     const Mesh sheet = without(shapes::box({20, 20, 0.5f}, 1), [](const glm::vec3& p) { return p.z < 0.4f; });
     for (const Mesh& one : {sheet, transformed(sheet, skew)}) {
         CHECK(wrongSigns(flooded(one, 1, 2), 0, nowhere) == 0);
-        // two sheets with less room between than the ball needs, open all around
+        // two open surfaces with less room between them than the ball needs, open all around
         CHECK(wrongSigns(flooded(shapes::join({one, shapes::moved(one, {0, 0, 2.3f})}), 1, 4), 0, nowhere) == 0);
     }
 }
@@ -151,7 +151,7 @@ TEST_CASE("public meshes flood to the solid they stand for", "[corpus]") {
     struct Expected {
         const char* name;
         float gap;
-        glm::vec3 inside, outside;  // in parts of the mesh's box
+        glm::vec3 inside, outside;  // in fractions of the mesh's box
     };
     for (const Expected& e : {Expected{"bunny_zipper.ply", 4, {0.5f, 0.4f, 0.5f}, {0.02f, 0.02f, 0.02f}},
                               Expected{"cow.obj", 2, {0.5f, 0.6f, 0.5f}, {0.5f, 0.1f, 0.5f}}}) {
@@ -168,7 +168,7 @@ TEST_CASE("public meshes flood to the solid they stand for", "[corpus]") {
         CAPTURE(e.name);
         CHECK(at(e.inside) < 0);
         CHECK(at(e.outside) > 0);
-        // neighbours of different signs with no surface between: only in a gap that was closed
+        // neighbours of different signs without a surface between them: only in a closed gap
         std::size_t jumps = 0, inside = 0;
         for (auto v = f.field->cbeginValueOn(); v; ++v) {
             inside += *v < 0;

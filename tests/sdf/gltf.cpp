@@ -34,7 +34,7 @@ nlohmann::json& primitive(Gltf& gltf) {
     return gltf.file["meshes"][0]["primitives"][0];
 }
 
-// The cube, its positions as other numbers
+// The cube, with positions in another number format
 Gltf cubeOf(Gltf::Type type, double half, bool normalized) {
     Gltf gltf = Gltf::cube();
     std::vector<double> numbers;
@@ -74,7 +74,7 @@ TEST_CASE("glTF: a cube is read, whatever its indices are and wherever its buffe
     }
     CHECK(volume(readScene(gltf.writeBinary("cube.glb"))) == 8);
     CHECK(volume(readScene(gltf.writeBinary("cube.GLTF"))) == 8);
-    // a file of its own, which may be longer
+    // a separate file, which may be longer
     CHECK(volume(readScene(gltf.writeApart("apart.gltf", "cube.bin", "cube.bin"))) == 8);
     CHECK(volume(readScene(gltf.writeApart("apart.gltf", "a%20cube.bin", "a cube.bin"))) == 8);
     CHECK(volume(readScene(gltf.writeApart("apart.gltf", "a+cube.bin", "a+cube.bin"))) == 8);
@@ -299,7 +299,7 @@ TEST_CASE("glTF: trees of nodes may be deep, and must be trees") {
 
 TEST_CASE("glTF: skins are applied, morph targets are told of") {
     Gltf gltf = Gltf::cube();
-    // the upper half hangs on a joint that is 4 higher than where it was bound
+    // the upper half is bound to a joint that is 4 higher than in the bind pose
     std::vector<double> joints, weights, inverse;
     for (const glm::vec3& p : test::cubePoints()) {
         joints.insert(joints.end(), {0, 1, 0, 0});
@@ -443,7 +443,7 @@ TEST_CASE("glTF: what stands in the file is quoted to 40 bytes") {
     const std::string longName = std::string(38, 'X') + "\xc3\xa4\xc3\xa4" + std::string(200, 'X');
     Gltf gltf = Gltf::cube();
     gltf.file["extensionsRequired"] = {longName};
-    refuses(gltf, {"extension " + std::string(38, 'X') + "   ..."});  // the letter's two bytes are blanked
+    refuses(gltf, {"extension " + std::string(38, 'X') + "   ..."});  // the letter's two bytes are replaced by blanks
     gltf.file.erase("extensionsRequired");
     gltf.file["asset"]["version"] = std::string(300, '1');
     refuses(gltf, {"is glTF " + std::string(40, '1') + " ...;"});

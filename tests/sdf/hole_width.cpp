@@ -1,4 +1,4 @@
-// Widths of holes: those of round ones by formula, the same however the mesh lies, none in what is closed.
+// Widths of holes: round ones match the formula, rotation does not matter, closed meshes have none.
 #include "sdf/sign/hole_width.h"
 
 #include <algorithm>
@@ -33,7 +33,7 @@ TEST_CASE("a round hole is as wide as its rim") {
     for (const float angle : {0.15f, 0.3f, 0.6f}) {
         CAPTURE(angle);
         const Hole hole = widestHole(ballWithHole(0.5f, angle), 0.05);
-        // the rim goes along edges, a 26th of the radius long, within the circle
+        // the rim follows edges, 1/26 of the radius long, within the circle
         const double circle = 2 * 0.5 * std::sin(double(angle)), edge = 0.5 / 26;
         CHECK(hole.width == Approx(circle).margin(0.1 * circle + edge));
         CHECK(glm::length(hole.centre - glm::dvec3(0, 0, 0.5 * std::cos(double(angle)))) < 0.3 * hole.width);
@@ -46,7 +46,7 @@ TEST_CASE("holes narrower than asked for, and closed meshes, have no width") {
     CHECK(
         widestHole(shapes::join({shapes::sphere(0.5f, 3), shapes::moved(shapes::sphere(0.5f, 3), {0.3f, 0, 0})}), 0.01)
             .width == 0);
-    // cracks: rims that almost meet
+    // cracks: rims that almost touch
     const Mesh cracked = shapes::sphere(0.5f, 2);
     Mesh apart;
     for (const glm::uvec3& t : cracked.triangles) {

@@ -16,8 +16,8 @@ using namespace bilayer;
 
 namespace {
 
-// A box of 12 triangles whose upper corners are in another order than the lower ones; bit i of `diagonals` is the way
-// in which face i is divided.
+// A box of 12 triangles whose upper corners are permuted relative to the lower ones. Bit i of `diagonals` selects the
+// diagonal of face i.
 Mesh twistedBox(const std::array<int, 4>& upper, unsigned diagonals) {
     const glm::vec3 corners[] = {{-1, -1, 0}, {1, -1, 0}, {1, 1, 0}, {-1, 1, 0}};
     Mesh mesh;
@@ -36,7 +36,7 @@ Mesh twistedBox(const std::array<int, 4>& upper, unsigned diagonals) {
     return mesh;
 }
 
-// Whether some of space is surrounded more than once, or both ways: then the surface runs through itself.
+// Whether a part of space has a winding number above one, or of either sign: then the surface self-intersects.
 bool overlapsItself(const Mesh& mesh, test::Random& random) {
     long lowest = 0, highest = 0;
     for (int i = 0; i < 300; ++i) {
@@ -102,7 +102,7 @@ TEST_CASE("inside-out components are told from cavities") {
 }
 
 TEST_CASE("a hundredth of the area does not count as a common wall") {
-    // a cube of area 24 and a small plate whose area is below, or above, a hundredth of that
+    // a cube of area 24 and a small plate whose area is below, or above, 1 % of that
     for (const float side : {0.2f, 0.5f}) {
         Mesh plate = shapes::box({side / 2, side / 2, 0.005f});
         for (glm::vec3& point : plate.points) point.x += 3;
@@ -123,7 +123,7 @@ TEST_CASE("the thinnest wall is measured through the solid") {
     CHECK(plate.thinWalls == 2 * 2 * 8 * 8);
     CHECK(inspect(shapes::box({1, 1, 0.05f}, 8), 0.05f).thinWalls == 0);
     CHECK(inspect(shapes::bowl(1, 0.1f, 256)).thinnestWall == Approx(0.1).epsilon(0.05));
-    // the gap between two bodies is no wall
+    // the gap between two bodies does not count as a wall
     const Mesh pair = shapes::join({shapes::box({1, 1, 1}), shapes::moved(shapes::box({1, 1, 1}), {2.01f, 0, 0})});
     CHECK(inspect(pair).thinnestWall == Approx(2));
     CHECK(inspect(pair).commonWall == Approx(2));
@@ -156,7 +156,7 @@ TEST_CASE("the public corpus is reported as it is known to be") {
 TEST_CASE("pairs of triangles that run through each other are counted") {
     const Mesh box = shapes::box({1, 1, 1});
     CHECK(inspect(box).selfIntersections == 0);
-    // touching in a plane, along an edge or at a corner is no piercing
+    // contact in a plane, along an edge or at a corner is no self-intersection
     CHECK(inspect(shapes::join({box, shapes::moved(box, {2, 0.5f, 0.25f})})).selfIntersections == 0);
     CHECK(inspect(shapes::join({box, shapes::moved(box, {2, 2, 2})})).selfIntersections == 0);
     Mesh needle = box;
@@ -183,7 +183,7 @@ TEST_CASE("surfaces that run through each other where edges cross or touch are n
     while (std::next_permutation(upper.begin(), upper.end()));
     CHECK(overlapping > 500);
     CHECK(inspect(twistedBox({0, 1, 2, 3}, 0)).selfIntersections == 0);
-    // a quarter of a turn: at some diagonals four edges meet in the middle, and nothing else does
+    // a rotation by a quarter turn: for some diagonals four edges meet in the middle, without another intersection
     CHECK(inspect(twistedBox({1, 2, 3, 0}, 0b111100)).selfIntersections == 0);
 }
 
@@ -222,7 +222,7 @@ TEST_CASE("piercings, loops and fans of the public corpus are those of an indepe
     struct Case {
         const char* name;
         std::size_t piercings, loops, vertices;
-        std::size_t byEdges = 0;  // pairs that no edge pierces, in the arithmetic of whole numbers
+        std::size_t byEdges = 0;  // pairs of which no edge intersects the other triangle, in integer arithmetic
     };
     for (const Case& c :
          {Case{"dragon_vrip_871k.ply", 206, 0, 0}, Case{"brain.ply", 2182, 9, 2}, Case{"hippo.ply", 274, 1, 3, 14},

@@ -20,7 +20,7 @@ Mesh triangle() {
     return {{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}};
 }
 
-// Coordinates by which a map finds equal ones: -0 is 0.
+// Key by which a map identifies equal coordinates: -0 equals 0.
 std::array<float, 3> keyOf(const glm::vec3& p) {
     return {p.x + 0.f, p.y + 0.f, p.z + 0.f};
 }
@@ -79,7 +79,7 @@ TEST_CASE("weld agrees with a map of coordinates, wherever equal vertices stand"
     const unsigned seed = test::seed();
     CAPTURE(seed);
     std::mt19937 random(seed);
-    // corners of a lattice with signed zeros: side^3 places for some hundred thousand vertices
+    // lattice points with signed zeros: side^3 places for some hundred thousand vertices
     for (const int side : {1, 7, 40, 200}) {
         std::uniform_int_distribution<int> place(-side / 2, (side - 1) / 2);
         std::bernoulli_distribution negative;

@@ -39,7 +39,7 @@ const Nano& gridIn(const NanoGrid& grid) {
     return nano;
 }
 
-// Every value and state in and around the box of the active voxels; the background; the name.
+// Compares every value and state in and around the box of the active voxels, the background and the name.
 template <class Nano, class Open>
 void requireSame(const Nano& nano, const Open& open) {
     CHECK(nano.activeVoxelCount() == open.activeVoxelCount());
@@ -80,7 +80,7 @@ TEST_CASE("a NanoVDB grid holds what the level set holds") {
 }
 
 TEST_CASE("NanoVDB places and samples the grid as OpenVDB does") {
-    // a grid whose origin is shifted by whole voxels too
+    // also a grid whose origin is shifted by whole voxels
     auto grid = openvdb::ConstPtrCast<openvdb::FloatGrid>(torus().grids().distance)->deepCopy();
     grid->transform().postTranslate(40 * grid->voxelSize());
     const LevelSet field(std::make_shared<Grids>(Grids{grid, nullptr}));
@@ -158,7 +158,7 @@ TEST_CASE("a .nvdb file that cannot be written is named, and leaves what was the
     CHECK_THROWS_WITH(writeNanoVdb("/nonexistent/a.nvdb", field), Catch::Contains("/nonexistent/a.nvdb"));
     CHECK_THROWS_WITH(writeNanoVdb("/dev/full", field), Catch::Contains("/dev/full"));
     CHECK_THROWS_AS(writeNanoVdb("/dev/full", field), std::runtime_error);
-    // over a file in place
+    // overwrites a file in place
     const auto path = test::scratch("kept.nvdb");
     std::ofstream(path) << "old";
     writeNanoVdb(path, field);

@@ -82,7 +82,7 @@ TEST_CASE("cavities are kept, and found where the file is not to be trusted") {
         CHECK(windingAfter(mesh, inWall) == Approx(1));
     }
     CHECK(windingAfter(shapes::join({big, small}), inCavity) == Approx(2));
-    // outside of everything, negative is wrong whatever its neighbours are
+    // outside of everything a negative winding number is wrong, regardless of neighbours
     const Mesh beside = shapes::join({big, shapes::moved(shapes::flipped(small), {5, 0, 0})});
     CHECK(windingAfter(beside, glm::dvec3(5, 0.1, 0.2)) == Approx(1));
     CHECK(orient(beside).turnedTriangles == small.triangles.size());
@@ -93,7 +93,7 @@ TEST_CASE("open surfaces are oriented by what they would bound") {
     open.triangles.resize(open.triangles.size() - 40);
     CHECK(orient(open).turnedTriangles == open.triangles.size());
     CHECK(orient(shapes::flipped(open)).turnedTriangles == 0);
-    // a flat sheet has no inside: the orientation of most of it stays
+    // an open flat surface has no inside: the orientation of its majority is kept
     Mesh sheet = shapes::box({1, 1, 1}, 4);
     std::erase_if(sheet.triangles, [&](const glm::uvec3& t) {
         return sheet.points[t.x].z < 1 || sheet.points[t.y].z < 1 || sheet.points[t.z].z < 1;

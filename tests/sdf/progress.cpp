@@ -23,7 +23,7 @@ using namespace bilayer::detail;
 
 namespace {
 
-// Answers the n-th question, and all that follow, with no.
+// Cancels at the n-th call, and at all later ones.
 struct Listener {
     unsigned patience;
     unsigned asked = 0;
@@ -37,7 +37,7 @@ constexpr unsigned always = ~0u;
 template <class Work>
 bool isCancelled(Listener& listener, const Work& work) {
     const auto function = listener.function();
-    // each poll asks, whatever the clock says
+    // each poll calls the function, regardless of the time
     Progress progress(function, {});
     try {
         work(&progress);
@@ -47,7 +47,7 @@ bool isCancelled(Listener& listener, const Work& work) {
     return false;
 }
 
-// Asked at least `least` times, and cancelled wherever the answer is no.
+// Checks that the callback is called at least `least` times, and that cancelling at any call stops the work.
 template <class Work>
 void checkCancelling(const std::string& what, unsigned least, const Work& work) {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, 1);
@@ -61,7 +61,7 @@ void checkCancelling(const std::string& what, unsigned least, const Work& work) 
         Listener listener{i == 0 ? 1 : 1 + unsigned(random() % content.asked)};
         CAPTURE(content.asked, listener.patience);
         const bool cancelled = isCancelled(listener, work);
-        // sorts count comparisons over calls, so that the last question may fall out
+        // sorts poll by their count of comparisons over calls, so the last poll may be missing
         CHECK(cancelled == (listener.asked >= listener.patience));
         CHECK(listener.asked <= listener.patience);
         CHECK((cancelled || listener.patience + 8 > content.asked));
@@ -78,7 +78,7 @@ Mesh openKnot() {
     return mesh;
 }
 
-// Single triangles all over the place: winding numbers make nothing of them.
+// Random separate triangles: winding numbers fail for them.
 Mesh soup(unsigned triangles) {
     std::mt19937 random(1);
     std::uniform_real_distribution<float> uniform(-1, 1);
@@ -177,7 +177,7 @@ TEST_CASE("a build of any mesh can be cancelled wherever it asks") {
             } catch (const Cancelled&) {
                 cancelled = true;
             }
-            // it hears by the clock, so a quick run may end before the moment comes
+            // the callback is called by time, so a quick run may end before that
             CAPTURE(sign, content.asked, listener.patience);
             CHECK(cancelled == (listener.asked >= listener.patience));
         }

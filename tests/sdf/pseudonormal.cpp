@@ -24,7 +24,7 @@ using namespace bilayer::detail;
 namespace {
 
 constexpr double tolerance = 1e-5;    // of distances [voxels]
-constexpr double signsMatter = 1e-4;  // from the surface on [voxels]
+constexpr double signsMatter = 1e-4;  // signs are checked from this distance of the surface on [voxels]
 
 struct Block {
     std::vector<float> distances;
@@ -56,7 +56,7 @@ Blocks fill(const Mesh& mesh, float voxelSize, float reach = 3, bool sign = true
 }
 
 struct Found {
-    bool known = false;  // whether the voxel's block came
+    bool known = false;  // whether the voxel's leaf was filled
     double distance = farAway;
     int triangle = -1;
 };
@@ -79,7 +79,7 @@ double distanceTo(const Mesh& mesh, int triangle, const glm::dvec3& p) {
                                            glm::dvec3(mesh.points[t.z])));
 }
 
-// Compares one voxel with brute force in double precision and, where signs are asked for, the winding number.
+// Compares one voxel with brute force in double precision and, if signs are checked, the winding number.
 void compare(const Mesh& mesh, float voxelSize, float reach, bool sign, const Blocks& blocks, const glm::ivec3& v,
              Errors& errors) {
     const double h = voxelSize;
@@ -131,7 +131,7 @@ void check(const Mesh& mesh, float voxelSize, float reach = 3, bool sign = true,
         report(errors);
         return;
     }
-    // half of them in blocks that came, half of them anywhere near the surface
+    // half of them in filled leaves, half of them anywhere near the surface
     std::uniform_int_distribution<std::size_t> whichTriangle(0, mesh.triangles.size() - 1);
     std::uniform_real_distribution<double> unit(0, 1), offset(-double(reach), double(reach));
     std::vector<std::tuple<int, int, int>> origins;
@@ -159,7 +159,7 @@ glm::mat4 turned() {
     return glm::rotate(glm::mat4(1), 0.7f, glm::normalize(glm::vec3(1, 2, 3)));
 }
 
-// Triangles all over, of all shapes: no closed surface.
+// Random separate triangles of all shapes: no closed surface.
 Mesh randomTriangles(std::mt19937& random, std::size_t count, float length) {
     std::uniform_real_distribution<float> place(-6, 6), size(-length, length);
     Mesh mesh;
@@ -174,7 +174,7 @@ Mesh randomTriangles(std::mt19937& random, std::size_t count, float length) {
     return mesh;
 }
 
-// Every triangle with vertices of its own.
+// The mesh with separate vertices for every triangle.
 Mesh unwelded(const Mesh& mesh) {
     Mesh soup;
     for (const glm::uvec3& t : mesh.triangles) {
@@ -185,7 +185,7 @@ Mesh unwelded(const Mesh& mesh) {
     return soup;
 }
 
-// Voxels of different sides by two methods, farther from the surface than where a side is either.
+// Counts voxels of different sides by two methods, beyond the distance at which either side is valid.
 std::size_t differentSides(const LevelSet& a, const LevelSet& b) {
     std::size_t different = 0;
     const auto values = a.grids().distance->getConstAccessor();
@@ -195,7 +195,7 @@ std::size_t differentSides(const LevelSet& a, const LevelSet& b) {
     return different;
 }
 
-// A sheet of squares, and the same from behind.
+// An open surface of squares, and the same flipped.
 Mesh doubleSheet(std::mt19937& random) {
     std::uniform_real_distribution<float> height(-0.2f, 0.2f);
     const unsigned n = 1 + unsigned(random() % 6);
@@ -273,7 +273,7 @@ TEST_CASE("pseudonormal: small parts far apart keep their precision") {
 }
 
 TEST_CASE("pseudonormal: far from the origin nothing is lost") {
-    // the vertices are rounded there, but what is left is taken as it is
+    // the vertices are rounded there; the reference uses the rounded ones
     const glm::vec3 far(1e4f, -1e4f, 5e3f);
     check(shapes::moved(shapes::sphere(0.08f, 2), far), 0.01f);
     check(shapes::moved(shapes::box({0.06f, 0.05f, 0.04f}), far), 0.01f);
@@ -287,7 +287,7 @@ TEST_CASE("pseudonormal: a mesh smaller than a voxel") {
 TEST_CASE("pseudonormal: vertices of their own, duplicate and zero-area faces change nothing") {
     const Mesh cone = transformed(shapes::cone(4, 9, 9), turned());
     Mesh dirty = unwelded(cone);
-    for (std::size_t i = 0; i < cone.triangles.size(); i += 3)  // duplicates that begin with another corner
+    for (std::size_t i = 0; i < cone.triangles.size(); i += 3)  // duplicates that begin with another vertex
         dirty.triangles.push_back({cone.triangles[i].y, cone.triangles[i].z, cone.triangles[i].x});
     const auto soupPoints = unsigned(dirty.points.size());
     dirty.points.insert(dirty.points.end(), cone.points.begin(), cone.points.end());
@@ -328,7 +328,8 @@ TEST_CASE("pseudonormal: signs are found in the same way and are the same as tho
         const auto path = test::corpusMesh(name);
         if (!path) return;
         const Mesh mesh = readMesh(*path);
-        // at 52 one voxel alone tells that the cow meets itself, and two triangles are as near as floats can tell there
+        // at 52 a single voxel reveals that the cow self-intersects; two triangles there are equally near to float
+        // precision
         for (const auto resolution : {52.f, float(40 + random() % 100)}) {
             CAPTURE(seed, name, resolution);
             const float h = voxelSizeFor(mesh, resolution);
@@ -355,13 +356,14 @@ TEST_CASE("pseudonormal: the automatic choice is that of the exact method, whate
     std::uniform_real_distribution<float> unit(0, 1);
     std::vector<Mesh> meshes;
     for (int i = 0; i < 12; ++i) {
-        // a surface that runs through itself a little or much, or not at all
+        // a surface that self-intersects slightly, strongly, or not at all
         Mesh mesh = i % 2 ? shapes::sphere(1, 2) : shapes::torus(1, 0.4f, 16, 8);
         const float noise = std::pow(10.f, -0.5f - 3 * unit(random));
         for (glm::vec3& p : mesh.points) p += noise * (glm::vec3(unit(random), unit(random), unit(random)) - 0.5f);
         meshes.push_back(mesh);
     }
-    // a few of its triangles run through others by rounding: at 16.1944 voxels a block's closest features lie
+    // a few of its triangles intersect others by rounding: at 16.1944 voxels the closest features of a leaf give wrong
+    // signs
     if (const auto path = test::corpusMesh("../cases/sliver110.obj")) meshes.insert(meshes.end(), 6, readMesh(*path));
     for (std::size_t i = 0; i < meshes.size(); ++i) {
         Mesh& mesh = meshes[i];

@@ -1,4 +1,4 @@
-// The formats that are read here: every way of writing that their readers must know, and what is no mesh.
+// The project's own readers: every valid variant of their formats, and invalid files.
 #include <fmt/format.h>
 #include <catch2/catch.hpp>
 #include <cstring>
@@ -22,7 +22,7 @@ std::filesystem::path write(const std::string& name, const std::string& bytes) {
     return path;
 }
 
-// A box from 0 to 1, 2 and 3 as polygons of four corners.
+// A box from 0 to 1, 2 and 3, as quadrilaterals.
 const std::vector<glm::dvec3> boxPoints{{0, 0, 0}, {1, 0, 0}, {1, 2, 0}, {0, 2, 0},
                                         {0, 0, 3}, {1, 0, 3}, {1, 2, 3}, {0, 2, 3}};
 const std::vector<std::vector<int>> boxFaces{{0, 3, 2, 1}, {4, 5, 6, 7}, {0, 1, 5, 4},
@@ -120,7 +120,7 @@ struct PlyStyle {
     bool facesFirst = false, more = false;
 };
 
-// With `more`, properties and elements that are not looked at stand before, between and behind those that are.
+// With `more`, unused properties and elements stand before, between and after the used ones.
 std::string plyOfBox(const PlyStyle& style) {
     const std::string e = style.end;
     std::string vertexHead = "element vertex 8" + e, faceHead = "element face 6" + e, vertices, faces;
@@ -263,7 +263,7 @@ TEST_CASE("What of a file is left out is told") {
     readMesh(write("more.stl", binaryStlOfBox("") + "xyz"), &report);
     CHECK(report.mergedVertices == 28);
     CHECK_THAT(fmt::format("{}", fmt::join(report.notes, "\n")), Contains("3 bytes after the last triangle"));
-    // more than is announced
+    // more than declared
     const std::string off = offOfBox("OFF", "", "");
     for (const auto& [name, text] :
          {std::pair("more.off", replaced(off, "8 6 12", "8 5 12")), std::pair("more.off", off + "4 0 1 2 3\n"),
@@ -383,7 +383,7 @@ TEST_CASE("OFF: words, not lines, with colours or without") {
 }
 
 TEST_CASE("A mesh far from the zero point keeps its shape") {
-    // in float coordinates nothing of a box of this size would be left there
+    // float coordinates would lose a box of this size entirely
     const glm::dvec3 far(512344.7230, 5403209.7230, 249.7230);
     const auto shifted = [&](const std::string& begin, const std::string& end) {
         std::string text;
@@ -404,14 +404,14 @@ TEST_CASE("A mesh far from the zero point keeps its shape") {
     for (const auto& path : files) {
         CAPTURE(path);
         checkBox(path, far);
-        // and keeps it when it is written
+        // and writing it keeps the origin
         for (const std::string ending : {".obj", ".ply"}) {
             const auto again = test::scratch("again" + ending);
             writeMesh(again, readMesh(path));
             checkBox(again, far);
         }
     }
-    // near meshes have none
+    // meshes near the origin have none
     CHECK(readMesh(write("near.obj", objOfBox("v {} {} 100{}\n"))).origin == glm::dvec3(0));
 }
 
@@ -468,7 +468,7 @@ TEST_CASE("Errors of readers name the file, the place, what stands there, and wh
 }
 
 TEST_CASE("The parts that a file is read in make no difference to errors") {
-    // two faults in different parts: the first one is told, whichever thread is faster
+    // two faults in different parts: the first one is reported, whichever thread is faster
     std::string text;
     for (int i = 0; i < 200000; ++i) text += "v 1.5 2.5 3.5\n";
     const std::string twice = text + "v 1 2 x\n" + text + text + "v 1 y 3\n" + text;

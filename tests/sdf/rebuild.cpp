@@ -60,7 +60,7 @@ std::vector<std::uint32_t> trianglesThatMoved(const Mesh& before, const Mesh& af
     return moved;
 }
 
-// Pulls what lies within a radius of a point along with it.
+// Displaces points within a radius of a centre, fading with distance.
 Mesh dented(Mesh mesh, const glm::vec3& centre, float radius, const glm::vec3& pull) {
     for (auto& point : mesh.points) {
         const float part = glm::distance(point, centre) / radius;
@@ -76,7 +76,7 @@ void checkFrame(const Mesh& before, const Mesh& after, const BuildOptions& optio
     CHECK(sameFields(rebuild(old, before, after, moved, options), full));
 }
 
-// Leaves of either grid that the other one lacks or has with other values.
+// Counts leaves that only one of the grids has, or that have different values.
 std::size_t changedLeaves(const openvdb::FloatGrid& a, const openvdb::FloatGrid& b) {
     std::size_t changed = 0;
     for (auto leaf = a.tree().cbeginLeaf(); leaf; ++leaf) {
@@ -87,7 +87,7 @@ std::size_t changedLeaves(const openvdb::FloatGrid& a, const openvdb::FloatGrid&
     return changed;
 }
 
-// A knot of a tube thick enough that dents do not push it through itself.
+// A knot with a tube thick enough that dents do not cause self-intersection.
 Mesh knot() {
     return shapes::torusKnot(2, 3, 1, 0.2f);
 }
@@ -112,7 +112,7 @@ TEST_CASE("a field rebuilt from the one before is the one built in full") {
             const Mesh after = dented(before, centre, 0.2f * side, 0.03f * side * pull);
             const auto moved = trianglesThatMoved(before, after);
             CAPTURE(frame, moved.size(), before.triangles.size());
-            // each frame from the last, so that no fault is lost
+            // each frame is built from the last, so that errors accumulate
             field = rebuild(field, before, after, moved, options);
             CHECK(sameFields(field, build(after, options)));
             before = after;
@@ -140,7 +140,7 @@ TEST_CASE("nothing may move, or all, or far away and back") {
     checkFrame(still, still, options);
     checkFrame(still, shapes::moved(still, {0.3f, 5, -0.1f}), options);
 
-    // a ball leaves the band, whose voxels are to vanish, and comes back; another one inside a hollow one turns its
+    // a ball leaves the band, so that its voxels must vanish, and returns; another ball inside a hollow one flips its
     // tiles
     const Mesh ball = shapes::sphere(0.3f, 3);
     const auto scene = [&](const glm::vec3& at) { return shapes::join({still, shapes::moved(ball, at)}); };
@@ -186,7 +186,7 @@ TEST_CASE("a rebuild fills the blocks around what moved and copies the others") 
     CHECK(part.filledBlocks >= changed);
     CHECK(changed > 10);
     CHECK(part.filledBlocks < full.filledBlocks / 10);
-    // nothing is to be filled where nothing moved
+    // nothing is filled if nothing moved
     CHECK(sameFields(rebuild(old, before, before, {}, options, &part), old));
     CHECK(part.filledBlocks == 0);
 }
@@ -201,7 +201,7 @@ TEST_CASE("a rebuild is a build in full where old blocks cannot be copied") {
         CHECK(sameFields(rebuild(old, before, after, moved, options, &part), expected));
         return part.filledBlocks == full.filledBlocks;
     };
-    const float h = 1.f / 32;  // widths are the same in 16 bits
+    const float h = 1.f / 32;  // these widths are exact in 16 bits
     const BuildOptions plain{.voxelSize = h};
     CHECK_FALSE(filledInFull(build(before, plain), plain));
     for (const BuildOptions& options : {BuildOptions{.voxelSize = h, .sign = Sign::winding},
@@ -214,7 +214,7 @@ TEST_CASE("a rebuild is a build in full where old blocks cannot be copied") {
     const auto path = test::scratch("rounded.vdb");
     writeVdb(path, build(before, plain), {.halfFloat = true});
     CHECK(filledInFull(readVdb(path), plain));
-    // swept, as fluid::fill() does: no bound is known, other voxels are active
+    // swept, as by fluid::fill(): the error bound is unknown, and other voxels are active
     auto swept = std::make_shared<Grids>();
     const auto grid = build(before, plain).grids().distance->deepCopy();
     grid->removeMeta(metadata::errorBound);

@@ -1,4 +1,5 @@
-// Damaged scene files: every one is read or refused in one line that names it. BILAYER_FUZZ multiplies the rounds.
+// Damaged scene files: each is read, or refused by a one-line message that names it. BILAYER_FUZZ multiplies the
+// rounds.
 #include <catch2/catch.hpp>
 #include <chrono>
 #include <cstdlib>
@@ -25,7 +26,7 @@ class Damage {
 
     std::size_t below(std::size_t count) { return std::uniform_int_distribution<std::size_t>(0, count - 1)(engine_); }
 
-    // One to four changes, each of a random kind.
+    // Applies one to four changes, each of a random kind.
     std::string of(std::string bytes) {
         for (std::size_t changes = 1 + below(4); changes > 0; --changes) change(bytes);
         return bytes;
@@ -77,7 +78,7 @@ class Damage {
         return below(2) ? numbers[below(std::size(numbers))] : std::uint32_t(below(300));
     }
 
-    // The first number in the text from there on becomes another one.
+    // Replaces the first number in the text from this position on.
     void replaceNumber(std::string& bytes, std::size_t at) {
         constexpr const char* numbers[]{"",    "-1",          "0",   "1e999", "nan",  "99999999999999999999",
                                         "255", "-2147483649", "0x1", "1e",    "\"\"", "4294967295"};
@@ -101,7 +102,7 @@ std::size_t rounds(std::size_t usual) {
     return factor ? usual * std::strtoul(factor, nullptr, 10) : usual;
 }
 
-// What is wrong with how a file was read, or nothing
+// The fault in how a file was read, or nothing
 std::string complaint(const SceneFile& file) {
     constexpr ChildLimits limits{std::chrono::seconds(1), std::size_t(1) << 30};
     const auto path = test::scratch(file.name);
@@ -140,7 +141,7 @@ TEST_CASE("damaged files of Assimp's formats are read or refused") {
     for (const SceneFile& file : test::cubeFiles()) requireAnswer(file, rounds(20), damage);
     for (const SceneFile& file : test::headFiles()) {
         CHECK(complaint(file) == "");
-        // a head alone, and one with something behind it
+        // a header alone, and one followed by other bytes
         for (std::size_t i = 0; i < rounds(10); ++i) {
             std::string bytes = file.bytes;
             for (std::size_t k = damage.below(400); k > 0; --k)

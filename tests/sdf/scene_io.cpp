@@ -25,7 +25,7 @@ std::filesystem::path write(const SceneFile& file) {
     return path;
 }
 
-// A box of 1 x 2 x 3 with square corners, as polygons of four, under a node's matrix
+// A box of 1 x 2 x 3 with right angles, as quadrilaterals, under a node's matrix
 std::string collada(const std::string& upAxis, const std::string& matrix) {
     return "<?xml version=\"1.0\"?><COLLADA xmlns=\"http://www.collada.org/2005/11/COLLADASchema\" version=\"1.4.1\">"
            "<asset><up_axis>" +
@@ -109,7 +109,7 @@ TEST_CASE("an importer that takes too long, too much, or crashes is an error tha
     CHECK_THROWS_WITH(readScene(path, {0ms, std::size_t(1) << 30}),
                       Catch::Contains("slow.gltf: the importer for GLTF files took longer than 0 s; convert it to "
                                       "OBJ, PLY or STL"));
-#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)  // they end a process that asks for too much
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)  // sanitizers end a process that requests too much
     gltf.file["accessors"][0]["count"] = std::uint64_t(1) << 40;
     gltf.file["accessors"][0].erase("bufferView");
     gltf.file["accessors"][0]["sparse"] = {
@@ -122,7 +122,7 @@ TEST_CASE("an importer that takes too long, too much, or crashes is an error tha
     CHECK_THROWS_WITH(readScene(write({"corners.dae", corners})),
                       Catch::Contains("corners.dae: reading it needs more than the 2048 MiB of memory that importers"));
 #endif
-    // this Assimp does not survive a texture without a name; others may
+    // Assimp 5.2 crashes on a texture without a name; other versions may not
     const std::string text = collada("Z_UP", "1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1");
     const std::size_t at = text.find("<library_geometries>");
     const auto crash = write({"nameless.dae", text.substr(0, at) +

@@ -20,7 +20,7 @@ std::optional<Mesh> corpus(const std::string& name) {
     return path ? std::optional(readMesh(*path)) : std::nullopt;
 }
 
-// Every edge run equally often both ways, by counting.
+// Whether half-edges are balanced, by counting.
 bool balancedByCounting(const Mesh& input) {
     const Mesh mesh = weld(input);
     std::vector<std::pair<std::pair<unsigned, unsigned>, int>> runs;
@@ -69,7 +69,7 @@ TEST_CASE("balanced() agrees with counting edges, whatever is done to a mesh") {
                 case 4:
                     mesh.triangles.push_back({0, 0, 1});
                     break;
-                default:  // a vertex of its own at the same place
+                default:  // a separate vertex at the same place
                     glm::uvec3& t = mesh.triangles[any()];
                     mesh.points.push_back(mesh.points[t.x] * 1.f);
                     t.x = unsigned(mesh.points.size() - 1);
@@ -101,11 +101,11 @@ TEST_CASE("what a surface bounds is told by area") {
     Mesh sheet = shapes::box({1, 1, 1});
     sheet.triangles.resize(2);
     CHECK(bounding(sheet).nothing == 1);
-    // doubled faces: the winding number goes up by two behind a surface, and back to none behind a sheet
+    // doubled faces: the winding number rises by two behind a surface, and returns to zero behind an open surface
     Mesh doubled = shapes::sphere(1, 2);
     doubled.triangles.insert(doubled.triangles.end(), doubled.triangles.begin(), doubled.triangles.end());
     CHECK(bounding(doubled).solid == 1);
-    // coplanar sides in part: the wall between two boxes is buried
+    // partly coplanar sides: the wall between two boxes is buried
     for (const float offset : {0.f, 0.1f, 0.25f}) {
         const Mesh box = shapes::box({0.5f, 0.5f, 0.5f}, 3);
         const Bounding stack = bounding(shapes::join({box, shapes::moved(box, {1, offset, 0})}));
@@ -133,9 +133,10 @@ TEST_CASE("flipped and inside-out public meshes are repaired") {
     struct Case {
         const char* name;
         double volume;
-        bool conflict;  // balanced, so that only the build sees it
+        bool conflict;  // balanced, so only the build detects it
     };
-    // the volumes are those of the same surfaces with outward normals; the shuffled files say nothing of theirs
+    // the volumes are those of the same surfaces with outward normals; the shuffled files have no reference of their
+    // own
     for (const Case& c : {Case{"casting_inverted.off", 0.03391, true}, Case{"cgal-cube-shuffled.off", 8, false},
                           Case{"cgal-blobby-shuffled.off", 0, false}}) {
         const auto mesh = corpus(c.name);
@@ -189,7 +190,7 @@ TEST_CASE("a clean solid that holds the tree's large tiles has no conflict where
         const LevelSet field = build(mesh, options);
         CHECK(field.sign() == "normals");
         CHECK(field.signConflicts() == 0);
-        // turned inside out the same tiles give it away
+        // inside out, the same tiles reveal the conflict
         for (glm::uvec3& t : mesh.triangles) std::swap(t.x, t.y);
         CHECK(build(mesh, options).signReason().find("triangles were turned") != std::string::npos);
     }

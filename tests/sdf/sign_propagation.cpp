@@ -25,7 +25,7 @@ void put(BlockMask& mask, int voxel) {
     mask[std::size_t(voxel / 64)] |= std::uint64_t(1) << (voxel % 64);
 }
 
-// Distances of all sizes, and a row more, which must not matter.
+// Distances of all magnitudes, plus one extra row, which must not matter.
 std::vector<float> anyDistances(Random& random) {
     std::uniform_real_distribution<float> scale(0.3f, 1.2f), part(0, 1);
     const float most = scale(random);
@@ -44,7 +44,7 @@ void forEachPair(Visit visit) {
             if (placeOf(voxel)[axis] < blockSide - 1) visit(voxel, voxel + steps[axis], axis);
 }
 
-// A number for each voxel, the same for all that links connect.
+// A group number for each voxel, equal for all voxels that links connect.
 std::vector<int> groupsOf(const std::vector<float>& distances) {
     std::vector<int> group(blockVoxels);
     for (int voxel = 0; voxel < blockVoxels; ++voxel) group[std::size_t(voxel)] = voxel;

@@ -21,7 +21,7 @@ namespace {
 
 using Random = std::mt19937;
 
-// Voxels on the surface may have either sign [voxels].
+// Within this distance of the surface either sign is valid [voxels].
 constexpr double onSurface = 1e-3;
 
 std::size_t wrongSigns(const LevelSet& field, const test::Truth& truth) {
@@ -50,7 +50,7 @@ glm::dvec3 anyPoint(Random& random, double size) {
     return {place(random), place(random), place(random)};
 }
 
-// Bars, plates and balls that overlap in places at least.
+// Bars, plates and balls, at least some of which overlap.
 Mesh overlapping(Random& random) {
     std::uniform_real_distribution<float> thin(0.05f, 0.3f), wide(0.5f, 2.f);
     std::vector<Mesh> parts;
@@ -64,7 +64,7 @@ Mesh overlapping(Random& random) {
     return shapes::join(parts);
 }
 
-// Each face again, the other way around; copies are shuffled, and some have vertices of their own.
+// Duplicates each face with reversed orientation. The copies are shuffled, and some have separate vertices.
 Mesh doubled(const Mesh& mesh, Random& random) {
     Mesh both = mesh;
     for (glm::uvec3 t : mesh.triangles) {
@@ -80,8 +80,8 @@ Mesh doubled(const Mesh& mesh, Random& random) {
     return both;
 }
 
-// Pairs of triangles are quadrilaterals (a, b, c), (a, c, d); each again, the other way around, at random by the other
-// diagonal.
+// Pairs of triangles are quadrilaterals (a, b, c), (a, c, d). Duplicates each with reversed orientation, at random with
+// the other diagonal.
 Mesh withBacksOfQuads(const Mesh& mesh, Random& random) {
     Mesh both = mesh;
     for (std::size_t i = 0; i < mesh.triangles.size(); i += 2) {
@@ -193,7 +193,7 @@ TEST_CASE("signs that were turned are turned back") {
             grid->tree().setValue(at, -grid->tree().getValue(at));
             ++count;
         };
-        // in a large field, wrong parts hold a voxel well away from the surface
+        // in a large field, wrong regions contain a voxel well away from the surface
         const openvdb::Coord first = deep[random() % deep.size()];
         for (const openvdb::Coord step : {openvdb::Coord(0, 0, 0), openvdb::Coord(1, 0, 0), openvdb::Coord(-1, 0, 0),
                                           openvdb::Coord(0, 1, 0), openvdb::Coord(0, -1, 0)})

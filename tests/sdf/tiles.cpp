@@ -21,7 +21,7 @@ std::vector<glm::dvec3> samples(const Tile& tile) {
     return all;
 }
 
-// Algorithm 1 of the paper, word by word.
+// Algorithm 1 of the paper, literally.
 std::vector<glm::dvec3> algorithm1(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c, double epsilon,
                                    int most) {
     const double area = 0.5 * glm::length(glm::cross(b - a, c - a));
@@ -108,7 +108,7 @@ TEST_CASE("recursive subdivision samples barycentres of parts no larger than eps
         const double area = 0.5 * glm::length(glm::cross(b - a, c - a));
         CHECK(double(tiles.tiles.size()) >= area);
         CHECK(double(tiles.tiles.size()) <= 4 * area + 1);
-        // parts of equal area: the mean of their barycentres is the triangle's, weighted by halves and quarters
+        // parts of equal area: the mean of their barycentres is the triangle's, with weights of halves and quarters
         for (const Tile& tile : tiles.tiles) {
             REQUIRE(tile.rows == 1);
             CHECK(std::sqrt(test::squaredDistance(samples(tile)[0], a, b, c)) < 1e-4);
@@ -158,7 +158,7 @@ TEST_CASE("no gap is left on large triangles and slivers") {
         }
 }
 
-// Table 5 of the paper: the same surface took its parallel program 7.6 times as long where areas were uneven.
+// Table 5 of the paper: its parallel program took 7.6 times as long for the same surface with uneven areas.
 TEST_CASE("samples are as many whatever the triangles of a surface are like") {
     const auto count = [](const Mesh& mesh) {
         const Tiles tiles = makeTiles(mesh, {.voxelSize = voxelSizeFor(mesh, 251)});
@@ -169,7 +169,7 @@ TEST_CASE("samples are as many whatever the triangles of a surface are like") {
     const double even = count(shapes::unevenSphere(0.0013f));
     CHECK(count(shapes::unevenSphere(0.0052f)) < 1.02 * even);
     CHECK(count(shapes::unevenSphere(0.0098f)) < 1.02 * even);
-    // needles a tenth of a voxel wide: a sample for each 1.6 voxels of their length
+    // needles 0.1 voxels wide: one sample per 1.6 voxels of their length
     const Mesh needles = shapes::cylinder(1, 2, 8000);
     double lengths = 0;
     for (const auto& t : needles.triangles) {

@@ -51,7 +51,7 @@ int shared(const glm::uvec3& a, const glm::uvec3& b) {
 
 using Wide = glm::vec<3, long double>;
 
-// Whether a triangle lies on one side of another's plane, but for vertices that they share.
+// Whether a triangle lies on one side of another's plane, except for shared vertices.
 bool onOneSide(const Mesh& mesh, const glm::uvec3& plane, const glm::uvec3& t) {
     const Wide a(mesh.points[plane.x]), u = Wide(mesh.points[plane.y]) - a, v = Wide(mesh.points[plane.z]) - a;
     int above = 0, below = 0, on = 0;
@@ -65,7 +65,7 @@ bool onOneSide(const Mesh& mesh, const glm::uvec3& plane, const glm::uvec3& t) {
     return above + on == 3 || below + on == 3;
 }
 
-// As wallThickness(), over all triangles and in double precision.
+// As wallThickness(), by brute force over all triangles in double precision.
 std::vector<float> wallsByBruteForce(const Mesh& mesh) {
     std::vector<float> all;
     for (const glm::uvec3& t : mesh.triangles) {
@@ -134,7 +134,7 @@ TEST_CASE("pairs of triangles that are left out can not run through each other")
                 ++apart;
                 if (!onOneSide(mesh, s, t) && !onOneSide(mesh, t, s)) FAIL_CHECK("triangles " << a << " and " << b);
             }
-        // the quick look is worth it
+        // the quick rejection is effective
         CHECK(apart > close.size());
     }
 }
@@ -143,7 +143,7 @@ TEST_CASE("walls are as thick as by brute force") {
     const unsigned seed = test::seed();
     CAPTURE(seed);
     test::Random random(seed);
-    // rays along axes, through edges and corners, in and beside the planes of boxes
+    // rays along axes, through edges and corners, in the planes of boxes and next to them
     const Mesh box = shapes::box({0.5f, 0.25f, 0.125f}, 5);
     const std::vector<Mesh> meshes{box,
                                    weld(shapes::moved(box, {100, -200, 300})),

@@ -21,7 +21,7 @@ using namespace bilayer::detail;
 
 namespace {
 
-/// Outlines have integer coordinates, so that areas and sides are exact.
+/// A point of an outline. Coordinates are integers, so that areas and orientation tests are exact.
 struct Point {
     std::int64_t x, y;
     auto operator<=>(const Point&) const = default;
@@ -56,7 +56,7 @@ bool touch(const Point& a, const Point& b, const Point& c, const Point& d) {
     return sideOf(a, b, c) * sideOf(a, b, d) < 0 && sideOf(c, d, a) * sideOf(c, d, b) < 0;
 }
 
-// A plane through integer points, or one of the coordinate planes.
+// The outline in a plane through integer points, or in one of the coordinate planes.
 std::vector<glm::dvec3> inSpace(const Outline& outline, Random& random) {
     std::uniform_int_distribution<int> axis(0, 2), slope(-9, 9), shift(-1000, 1000);
     glm::dvec3 u(0), v(0), origin(shift(random), shift(random), shift(random));
@@ -77,7 +77,8 @@ std::vector<glm::dvec3> inSpace(const Outline& outline, Random& random) {
     return points;
 }
 
-// Triangles are n - 2, use all corners, run along each edge of the outline once and along all others once both ways.
+// Checks that there are n - 2 triangles, that they use all corners, and that they contain each outline edge once and
+// every other edge once in each direction.
 void checkEdges(std::size_t corners, const std::vector<glm::uvec3>& triangles) {
     REQUIRE(triangles.size() == corners - 2);
     std::vector<std::pair<unsigned, unsigned>> edges;
@@ -99,8 +100,8 @@ void checkEdges(std::size_t corners, const std::vector<glm::uvec3>& triangles) {
     REQUIRE(wrong == 0);
 }
 
-// The number of triangles without area. None is folded over: then their areas add up to that of the outline, and they
-// cover each point as often as the outline winds around it.
+// Returns the count of triangles without area. Checks that none is flipped: then their areas sum to that of the
+// outline, and they cover each point as often as the outline winds around it.
 std::size_t checkAreas(const Outline& outline, const std::vector<glm::uvec3>& triangles) {
     const std::int64_t whole = doubleArea(outline);
     std::int64_t sum = 0;
@@ -127,20 +128,20 @@ void check(Outline outline, Random& random, std::size_t flat = 0) {
     REQUIRE(right);
 }
 
-// A wrong outline is told; the triangles still close what they are a part of.
+// Checks that an invalid outline is reported; its triangles still close the surface that they belong to.
 void checkWrong(const Outline& outline, Random& random) {
     std::vector<glm::uvec3> triangles;
     REQUIRE_FALSE(triangulate(inSpace(outline, random), triangles));
     checkEdges(outline.size(), triangles);
 }
 
-// Squares of a grid, some of which are joined; their outline is one walk around them if those joined make a tree, and
-// runs both ways along edges between squares that are not.
+// Squares of a grid, some of which are joined. If the joined ones form a tree, their outline is one closed walk around
+// them, with both directions of each edge between squares that are not joined.
 class Squares {
   public:
     using Square = std::pair<int, int>;
 
-    // All neighbours are joined, or, for a maze, those through which a square was added.
+    // Joins all neighbours or, for a maze, only each square to the one from which it was added.
     Squares(int count, bool maze, Random& random) {
         std::vector<Square> list{{0, 0}};
         squares_.insert(list[0]);
@@ -163,10 +164,10 @@ class Squares {
                 if (squares_.count(beyond(square, side))) joined_.insert({square, side});
     }
 
-    // Counter-clockwise, around all of them; unless it is a maze, holes are not walked around. Corners on straight
-    // edges stay with a probability.
+    // Counter-clockwise around all of them, without their holes unless it is a maze. Corners on straight edges are kept
+    // with a probability.
     Outline outline(double straight, Random& random) const {
-        Square square = *squares_.begin();  // the left side of the first one is on the outer border
+        Square square = *squares_.begin();  // the left side of the first square is on the outer border
         int side = 3;
         const std::pair<Square, int> first(square, side);
         Outline corners;
@@ -199,7 +200,7 @@ class Squares {
     std::set<std::pair<Square, int>> joined_;
 };
 
-// Corners around a centre that sees all of them.
+// Corners around a centre from which all are visible.
 Outline star(std::size_t count, int size, Random& random, Point centre = {0, 0}) {
     std::uniform_int_distribution<int> coordinate(-size, size);
     const auto half = [](const Point& p) { return p.y > 0 || (p.y == 0 && p.x > 0) ? 0 : 1; };
@@ -224,7 +225,7 @@ Outline star(std::size_t count, int size, Random& random, Point centre = {0, 0})
     }
 }
 
-// Grows corner by corner, each in the place of an edge, as long as the outline stays simple.
+// Adds corner by corner, each in place of an edge, while the outline stays simple.
 Outline grown(std::size_t count, int size, Random& random) {
     std::uniform_int_distribution<int> coordinate(0, size);
     Outline outline{{0, 0}, {size, 0}, {size / 2, size}};
@@ -246,7 +247,8 @@ Outline grown(std::size_t count, int size, Random& random) {
     return outline;
 }
 
-// Joins the first of some holes, clockwise, to the outline by an edge both ways: the shortest one that meets nothing.
+// Connects the first of some clockwise holes to the outline by an edge in both directions: the shortest one without an
+// intersection.
 void bridge(Outline& outline, std::span<const Outline> holes) {
     const Outline& hole = holes[0];
     struct Bridge {
@@ -296,7 +298,7 @@ Outline comb(int teeth, int length) {
     return outline;
 }
 
-// A band of a width of one around and around.
+// A spiral band of width one.
 Outline spiral(int turns) {
     Outline inner, outer;
     for (int i = 0; i < 4 * turns; ++i) {
@@ -313,7 +315,7 @@ Outline spiral(int turns) {
     return inner;
 }
 
-// Corners at random places of the edges, where they have integer ones.
+// Adds corners at random places of the edges with integer coordinates.
 Outline withStraightCorners(const Outline& outline, Random& random) {
     Outline result;
     for (std::size_t i = 0; i < outline.size(); ++i) {
@@ -445,7 +447,7 @@ TEST_CASE("repeated corners and edges out and back cost a triangle without area 
         }
         check(outline, random, flat);
     }
-    // a spike outward takes two, one inward none
+    // an outward spike takes two, an inward one none
     check({{0, 0}, {4, 0}, {4, 4}, {6, 6}, {4, 4}, {0, 4}}, random, 2);
     check({{0, 0}, {4, 0}, {4, 4}, {3, 3}, {4, 4}, {0, 4}}, random, 0);
     check({{0, 0}, {4, 0}, {4, 2}, {2, 2}, {4, 2}, {6, 2}, {4, 2}, {4, 4}, {0, 4}}, random, 2);
@@ -462,7 +464,7 @@ TEST_CASE("outlines that cross themselves or enclose nothing are told") {
     checkWrong({{0, 0}, {4, 4}, {4, 0}, {0, 5}}, random);
     checkWrong({{0, 0}, {2, 2}, {4, 4}, {4, 0}, {2, 2}, {0, 5}}, random);
     checkWrong({{0, 10}, {6, -8}, {-9, 3}, {9, 3}, {-6, -8}}, random);  // a pentagram
-    // a band whose ends lie on one another: all of it turns left once, as a simple outline does
+    // a band whose ends overlap: its total rotation is one turn to the left, like that of a simple outline
     checkWrong({{0, 0}, {10, 0}, {10, 10}, {4, 10}, {4, -4}, {6, -4}, {6, 8}, {8, 8}, {8, 2}, {0, 2}}, random);
     int wrong = 0;
     for (int i = 0; i < 300; ++i) {

@@ -1,4 +1,5 @@
-// Unions: what unite() leaves is the outer surface, by the truth about boxes and spheres; fields of unions are exact.
+// Unions: unite() leaves the outer surface, compared with the ground truth of boxes and spheres; fields of unions are
+// exact.
 #include "sdf/mesh/unite.h"
 
 #include <openvdb/openvdb.h>
@@ -56,7 +57,7 @@ Mesh truthOf(const std::vector<Box>& boxes) {
     });
 }
 
-// Boxes whose planes often are the same, so that they touch and lie flush.
+// Boxes that often have planes in common, so that they touch or are flush.
 std::vector<Box> randomBoxes(std::mt19937& random, int count) {
     std::uniform_real_distribution<float> anywhere(-1, 1);
     std::uniform_int_distribution<int> coarse(-4, 4);
@@ -96,7 +97,7 @@ std::vector<glm::dvec3> randomPoints(std::mt19937& random, int count, double rea
     return points;
 }
 
-// The largest difference of distances to two surfaces.
+// The maximum difference of distances to two surfaces.
 double difference(const Mesh& a, const Mesh& b, const std::vector<glm::dvec3>& points) {
     const test::Truth first(a), second(b);
     double largest = 0;
@@ -104,7 +105,7 @@ double difference(const Mesh& a, const Mesh& b, const std::vector<glm::dvec3>& p
     return largest;
 }
 
-// A box that is turned: a convex solid of six half-spaces.
+// A rotated box: a convex solid of six half-spaces.
 struct RotatedBox {
     glm::dvec3 centre, half;
     glm::dquat rotation;
@@ -145,7 +146,7 @@ struct RotatedBox {
             }
         return found;
     }
-    // What a convex polygon has within the box.
+    // The part of a convex polygon within the box.
     std::vector<glm::dvec3> clipped(std::vector<glm::dvec3> polygon) const {
         for (int axis = 0; axis < 3; ++axis)
             for (const double side : {-1.0, 1.0}) {
@@ -172,8 +173,8 @@ double toSegment(const glm::dvec3& p, const glm::dvec3& a, const glm::dvec3& b) 
     return glm::length(p - a - t * way);
 }
 
-// The distance to one box's surface outside of another: to a face where its foot is free, else to the borders of what
-// is free of it.
+// The distance to the surface of one box outside another: to a face if the projection on it is free, else to the
+// borders of its free part.
 double toFree(const glm::dvec3& p, const RotatedBox& box, const RotatedBox& other) {
     double least = std::numeric_limits<double>::infinity();
     for (const auto& face : box.faces()) {
@@ -192,7 +193,7 @@ double toFree(const glm::dvec3& p, const RotatedBox& box, const RotatedBox& othe
             if (first > 0) least = std::min(least, toSegment(p, a, a + first * (b - a)));
             if (last < 1) least = std::min(least, toSegment(p, a + last * (b - a), b));
         }
-        // the other box's surface on the face; where it is the face's own border, that has been asked
+        // the border of the other box on the face; the face's own border is handled above
         const auto hole = other.clipped(face);
         for (std::size_t i = 0; i < hole.size(); ++i) {
             const glm::dvec3 &a = hole[i], &b = hole[(i + 1) % hole.size()];
@@ -203,7 +204,7 @@ double toFree(const glm::dvec3& p, const RotatedBox& box, const RotatedBox& othe
     return least;
 }
 
-// The signed distance of two balls whose surfaces cross.
+// The signed distance of two balls whose surfaces intersect.
 double toBalls(const glm::dvec3& p, const glm::dvec3& c1, double r1, const glm::dvec3& c2, double r2) {
     const double d1 = glm::length(p - c1) - r1, d2 = glm::length(p - c2) - r2;
     if (d1 > 0 && d2 > 0) return std::min(d1, d2);
@@ -288,11 +289,11 @@ TEST_CASE("the union of balls is that of their formula but for what their facets
         const glm::vec3 c2(0.45f + anywhere(random), anywhere(random), anywhere(random));
         const UnionSurface united =
             unite(shapes::join({shapes::sphere(r1, 5), shapes::moved(shapes::sphere(r2, 5), c2)}));
-        if (std::abs(r1 - r2) > 0.8f * glm::length(c2)) continue;  // the circle where they meet would not be told well
+        if (std::abs(r1 - r2) > 0.8f * glm::length(c2)) continue;  // ill-conditioned circle
         CHECK(united.buriedTriangles > 100);
         CHECK(united.cutTriangles > 50);
         const test::Truth truth(united.mesh);
-        // sagitta of edges of a length of a 1/26 radius, larger where the surfaces meet at an angle
+        // sagitta of edges 1/26 of the radius long, larger where the surfaces meet at an angle
         for (const glm::dvec3& p : randomPoints(random, 500))
             REQUIRE(truth.distance(p) ==
                     Approx(std::abs(toBalls(p, glm::dvec3(0), double(r1), glm::dvec3(c2), double(r2)))).margin(2e-3));

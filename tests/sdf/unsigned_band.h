@@ -1,4 +1,4 @@
-// Unsigned narrow bands by brute force, and what tests ask of signed ones.
+// Unsigned narrow bands by brute force, and checks of signed ones.
 #pragma once
 
 #include <oneapi/tbb/global_control.h>
@@ -39,7 +39,7 @@ inline openvdb::FloatGrid::Ptr unsignedBand(const Mesh& mesh, float voxelSize, f
     return grid;
 }
 
-/// The first complaint about a signed grid that is no level set of the widths over `distances`, or "".
+/// The first fault of a signed grid as a level set of these widths over `distances`, or "".
 inline std::string fault(const openvdb::FloatGrid& field, const openvdb::FloatGrid& distances,
                          const BandWidths& widths) {
     const float exterior = widths.exterior * widths.voxelSize, interior = widths.interior * widths.voxelSize;
@@ -74,7 +74,7 @@ inline bool sameBytes(const openvdb::FloatGrid& a, const openvdb::FloatGrid& b) 
     return true;
 }
 
-/// What `sign` makes of the grid with one thread and with four; false if they differ.
+/// Applies `sign` to the grid with one thread and with four; returns false if the results differ.
 template <class Signer>
 bool sameForAnyThreads(const openvdb::FloatGrid& distances, const Signer& sign) {
     const auto one = distances.deepCopy(), four = distances.deepCopy();

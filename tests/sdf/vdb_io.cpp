@@ -142,7 +142,7 @@ TEST_CASE("a file of ours with one wrong byte, or one too few or too many, is re
     }
     std::ofstream(path, std::ios::binary) << whole << "\n\n";
     CHECK_THROWS_WITH(readVdb(path), Catch::Contains("damaged"));
-    // other programs need not care: OpenVDB reads the file, and what it writes has no checksum
+    // the checksum is optional for other programs: OpenVDB reads the file, and files that it writes have none
     openvdb::io::File file(test::scratch("whole.vdb").string());
     file.open();
     openvdb::io::File(test::scratch("again.vdb").string()).write(*file.getGrids());

@@ -31,7 +31,7 @@ bool holds(const Box& box, const glm::dvec3& p, double room) {
     return true;
 }
 
-// Counts what does not lie in its box, from a node downward, and notes the triangles met.
+// Counts contents outside their box, from a node downward, and records the visited triangles.
 std::size_t outside(const WideTree& tree, std::uint32_t node, const Box& box, std::set<std::uint32_t>& met) {
     std::size_t count = 0;
     if (tree.isLeaf(node)) {
@@ -41,7 +41,7 @@ std::size_t outside(const WideTree& tree, std::uint32_t node, const Box& box, st
             const glm::dvec3 a = glm::dvec3(leaf.cell[0][i], leaf.cell[1][i], leaf.cell[2][i]) +
                                  glm::dvec3(leaf.corner[0][i], leaf.corner[1][i], leaf.corner[2][i]);
             const glm::dvec3 along(leaf.along[0][i], leaf.along[1][i], leaf.along[2][i]);
-            // rounding: of a part of a voxel, and of eight voxels
+            // rounding: of a fraction of a voxel, and of eight voxels
             count += !holds(box, a, 1e-7) + !holds(box, a + double(leaf.lengthAB[i]) * along, 2e-6);
         }
         return count;

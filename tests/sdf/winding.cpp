@@ -18,10 +18,10 @@ using namespace bilayer::detail;
 
 namespace {
 
-// Below this distance of the winding number from a half rounding may decide [1].
+// Within this distance of 0.5, rounding may decide the winding number [1].
 constexpr double undecided = 1e-9;
 
-// Without the triangles whose centre `gone` holds for.
+// The mesh without the triangles whose centre satisfies `gone`.
 template <class Gone>
 Mesh without(const Mesh& mesh, const Gone& gone) {
     Mesh rest{mesh.points, {}};
@@ -56,7 +56,7 @@ Field signedField(const Mesh& mesh, float h, bool closed, float exterior = 3, fl
     return result;
 }
 
-// Voxels in and around the box of the band, near the surface and far from it alike.
+// Voxels in and around the box of the band, both near the surface and far from it.
 std::vector<openvdb::Coord> voxelsOf(const openvdb::FloatGrid& distances, std::size_t count, unsigned seed) {
     std::mt19937 random(seed);
     std::vector<openvdb::Coord> voxels;
@@ -74,7 +74,7 @@ std::vector<openvdb::Coord> voxelsOf(const openvdb::FloatGrid& distances, std::s
     return voxels;
 }
 
-// Voxels whose sign is not what brute force finds at `at(voxel)`.
+// Counts voxels whose sign differs from brute force at `at(voxel)`.
 template <class At>
 std::size_t wrongSigns(const openvdb::FloatGrid& field, const Mesh& mesh, const std::vector<openvdb::Coord>& voxels,
                        const At& at) {
@@ -91,7 +91,8 @@ std::size_t wrongSigns(const openvdb::FloatGrid& field, const Mesh& mesh, const 
     return std::size_t(std::count(wrong.begin(), wrong.end(), 1));
 }
 
-// In leaves each voxel has its own sign; between them an open mesh's blocks have their centre's.
+// In leaves each voxel has its own sign; elsewhere all voxels of a leaf-sized block of an open mesh have the sign of
+// its centre.
 std::size_t wrongSigns(const Field& f, const Mesh& mesh, bool closed, std::size_t count, unsigned seed) {
     return wrongSigns(*f.field, mesh, voxelsOf(*f.distances, count, seed), [&](const openvdb::Coord& voxel) {
         if (closed || f.distances->tree().probeConstLeaf(voxel)) return voxel.asVec3d();
@@ -140,14 +141,14 @@ TEST_CASE("the expansion about a far cluster is of second order") {
         far = std::max(far, error(80));
     }
     CAPTURE(near, far);
-    // the first term left out falls with the fifth power of the distance
+    // the first omitted term falls with the fifth power of the distance
     CHECK(far > 0);
     CHECK(near / far > 28);
     CHECK(near / far < 37);
 }
 
 TEST_CASE("a point in the opening of a hemisphere sees half of all directions up to its own precision") {
-    // there the number is a half to 1e-6 and less: only single triangles can decide
+    // there the winding number is 0.5 to within 1e-6 or less: only the exact sum over triangles decides
     const Mesh half = without(shapes::sphere(1, 5), [](const glm::vec3& p) { return p.z > 0; });
     const WindingNumber winding(half);
     for (double height = 1e-3; height > 1e-8; height /= 10)
@@ -162,7 +163,7 @@ TEST_CASE("closed meshes get the signs of brute force in every voxel") {
     const unsigned seed = test::seed();
     CAPTURE(seed);
     const Mesh ball = shapes::sphere(1, 3);
-    // shells in one another count twice inside; a cavity not at all; overlapping boxes count as their union
+    // nested shells count twice inside; a cavity does not count; overlapping boxes count as their union
     const std::vector<Mesh> meshes{ball,
                                    shapes::join({ball, shapes::sphere(0.5f, 3)}),
                                    shapes::join({ball, shapes::flipped(shapes::sphere(0.5f, 3))}),
@@ -197,7 +198,7 @@ TEST_CASE("open meshes get the signs of brute force in every voxel of a leaf and
 }
 
 TEST_CASE("signs change where the number passes a half slowly, amid the voxels of a leaf") {
-    // a ball in the opening of a hemisphere brings leaves to where nothing but the opening parts inside from outside
+    // a ball in the opening of a hemisphere adds leaves where only the opening separates inside from outside
     const Mesh half = without(shapes::sphere(1, 3), [](const glm::vec3& p) { return p.z > 0; });
     const Mesh mesh = shapes::join({half, shapes::moved(shapes::sphere(0.3f, 2), {0.1f, 0, 0})});
     const unsigned seed = test::seed();
@@ -207,7 +208,7 @@ TEST_CASE("signs change where the number passes a half slowly, amid the voxels o
 }
 
 TEST_CASE("what a mesh of many sheets has inside may lie outside its box") {
-    // ten hemispheres in one: their sum is above a half far out of the opening
+    // ten hemispheres in one: their sum exceeds 0.5 far outside the opening
     const Mesh half = without(shapes::sphere(1, 3), [](const glm::vec3& p) { return p.z > 0; });
     const Mesh mesh = shapes::join(std::vector<Mesh>(10, half));
     const Field f = signedField(mesh, 0.02f, false);

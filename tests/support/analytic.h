@@ -1,4 +1,4 @@
-// Solids by formula: distances in double precision, and level sets of them that owe nothing to the double layer method.
+// Solids by formula: distances in double precision, and level sets of them made without the double layer method.
 #pragma once
 
 #include <functional>
@@ -9,7 +9,7 @@
 
 namespace bilayer::test {
 
-/// A solid: its signed distance [m] and the half size of a box around it, about `centre`.
+/// A solid: its signed distance [m], and the half size of a box around it, about `centre`.
 struct Solid {
     std::function<double(const glm::dvec3&)> distance;
     glm::dvec3 halfSize;
@@ -23,7 +23,7 @@ Solid torusSolid(double major, double minor);
 /// The level set of a solid; widths in voxels.
 LevelSet levelSetOf(const Solid& solid, double voxel, float exterior = 3, float interior = 3);
 
-/// The field that the double layer method makes of a mesh.
+/// The field of a mesh by the double layer method.
 LevelSet built(const Mesh& mesh, float voxel);
 
 }  // namespace bilayer::test

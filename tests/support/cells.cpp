@@ -13,7 +13,7 @@ Mesh solidOf(const Planes& planes, const std::function<bool(const glm::ivec3& ce
     };
     Mesh mesh;
     const auto addFace = [&](const glm::ivec3& cell, int axis, int side) {
-        // corners counter-clockwise seen from along the axis; the other way round from the lower side
+        // corners counter-clockwise seen from along the axis; clockwise for the lower side
         const int u = (axis + 1) % 3, v = (axis + 2) % 3;
         const auto first = unsigned(mesh.points.size());
         for (int corner = 0; corner < 4; ++corner) {

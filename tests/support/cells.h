@@ -1,5 +1,4 @@
-// Solids with right angles: the union of some cells of a grid of planes, and the surface of it, which is closed,
-// oriented and exact.
+// Solids with right angles: unions of cells of an axis-aligned grid. Their surface is closed, oriented and exact.
 #pragma once
 
 #include <array>
@@ -14,7 +13,7 @@ namespace bilayer::test {
 /// The planes along each axis, in ascending order.
 using Planes = std::array<std::vector<float>, 3>;
 
-/// The surface of the filled cells. Cell (x, y, z) lies between the planes x and x + 1 and so on.
+/// The surface of the filled cells. Cell (x, y, z) lies between planes x and x + 1, and likewise along y and z.
 Mesh solidOf(const Planes& planes, const std::function<bool(const glm::ivec3& cell)>& filled);
 
 }  // namespace bilayer::test

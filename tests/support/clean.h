@@ -1,4 +1,4 @@
-// Which public meshes an exact field is promised for.
+// Public meshes for which the exact method guarantees an exact field.
 #pragma once
 
 #include <string>
@@ -6,8 +6,8 @@
 
 namespace bilayer::test {
 
-/// The meshes of the public corpus that are watertight and oriented after welding and have no self-intersection, as the
-/// corpus's own table says; no mesh that is inside out. Empty where the corpus is absent.
+/// The meshes of the public corpus that, by the corpus's own table, are watertight and oriented after welding and do
+/// not self-intersect. Inside-out meshes are excluded. Empty if the corpus is absent.
 std::vector<std::string> cleanMeshes();
 
 }  // namespace bilayer::test

@@ -1,4 +1,4 @@
-// What polygons measure.
+// Measurements of polygons.
 #pragma once
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// Random numbers, points and directions of a seed.
+// Random numbers, points and directions from a seed.
 #pragma once
 
 #include <glm/geometric.hpp>

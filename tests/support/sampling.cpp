@@ -38,7 +38,7 @@ bool allEightActive(const LevelSet& levelSet, const openvdb::Vec3d& index) {
     return true;
 }
 
-// Some points and what a field says of them.
+// Points and the samples of a field there.
 struct Sampled {
     std::vector<glm::vec3> points;
     std::vector<Sample> samples;
@@ -86,7 +86,7 @@ void checkInBand(const MakeSampler& make) {
             }
             ++inBand;
             REQUIRE(std::abs(sample.distance - trilinear(levelSet, index)) <= rounding);
-            // along an axis, within a cell, the interpolant is linear: differences are the derivative itself
+            // along an axis, within a cell, the interpolant is linear: differences equal the derivative
             for (int axis = 0; axis < 3; ++axis) {
                 openvdb::Vec3d low = index, high = index;
                 low[axis] = std::floor(index[axis]);
@@ -144,7 +144,7 @@ void checkBeyondBand(const MakeSampler& make) {
 
 void checkEmptyBlocks(const MakeSampler& make) {
     const Sampler sample = make(levelSetOf(sphereSolid(1), h));
-    REQUIRE(distanceAt(sample, {0, 0, 0}) < -0.3f);  // of 1: blocks are counted by the longest axis, 0.16 each
+    REQUIRE(distanceAt(sample, {0, 0, 0}) < -0.3f);  // of 1: coarse cells are counted by the longest axis, 0.16 each
     REQUIRE(distanceAt(sample, {0, 0, 0}) >= -1.f);
     REQUIRE(distanceAt(sample, {1, 1, 1}) > 0.2f);  // of 0.73
     REQUIRE(distanceAt(sample, {100, 0, 0}) == Approx(99).epsilon(0.01));

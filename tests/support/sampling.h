@@ -1,4 +1,4 @@
-// What samples of a field owe, wherever they are taken: one body of checks for the processor and for devices.
+// Checks of samples of a field, shared by CPU and devices.
 #pragma once
 
 #include <functional>
@@ -12,15 +12,15 @@
 
 namespace bilayer::test {
 
-/// Samples some points of one field.
+/// Samples points of one field.
 using Sampler = std::function<std::vector<Sample>(std::span<const glm::vec3>)>;
-/// Makes a level set's.
+/// Makes the sampler of a level set.
 using MakeSampler = std::function<Sampler(const LevelSet&)>;
 
 /// A sphere, a box and a torus in the cube of half size 0.5.
 std::vector<Solid> smallSolids();
 
-// Each of these has a test case's name in tests/collider/field.cpp.
+// Each check has the name of a test case in tests/collider/field.cpp.
 void checkInBand(const MakeSampler& make);
 void checkVoxelCentres(const MakeSampler& make);
 void checkBeyondBand(const MakeSampler& make);

@@ -217,7 +217,7 @@ SceneFile md2() {
         for (const float x : {p.x + 1, p.y + 1, p.z + 1, 0.f}) append(frame, std::uint8_t(x));
     std::string faces;
     for (const unsigned c : cubeCorners()) append(faces, std::uint16_t(c));
-    std::string interleaved;  // three vertices and three texture coordinates a triangle
+    std::string interleaved;  // three vertices and three texture coordinates per triangle
     for (std::size_t t = 0; t < triangles; ++t) interleaved += faces.substr(6 * t, 6) + std::string(6, '\0');
     std::string bytes = "IDP2";
     const std::uint32_t textureAt = headerSize, triangleAt = textureAt + 4,
@@ -308,7 +308,7 @@ std::string zip(const std::vector<SceneFile>& files) {
     for (const SceneFile& file : files) {
         const auto check =
             std::uint32_t(::crc32(0, reinterpret_cast<const Bytef*>(file.bytes.data()), unsigned(file.bytes.size())));
-        std::string common;  // of the file's own header and its entry in the directory
+        std::string common;  // fields that the file's own header and its directory entry share
         for (const std::uint16_t n : {20, 0, 0, 0, 33}) append(common, n);
         for (const std::uint32_t n : {check, std::uint32_t(file.bytes.size()), std::uint32_t(file.bytes.size())})
             append(common, n);

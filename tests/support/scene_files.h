@@ -1,4 +1,4 @@
-// Small files in the formats of Assimp, for tests.
+// Small files in Assimp's formats, for tests.
 #pragma once
 
 #include <string>
@@ -7,14 +7,14 @@
 namespace bilayer::test {
 
 struct SceneFile {
-    std::string name;  ///< with its ending
+    std::string name;  ///< with extension
     std::string bytes;
 };
 
-/// The cube of cubePoints(), once in each format that it is written in here: by Assimp's exporters or by hand.
+/// The cube of cubePoints() in each supported format, written by Assimp's exporters or by hand.
 std::vector<SceneFile> cubeFiles();
 
-/// First bytes of further binary formats, without a model.
+/// Only the first bytes of further binary formats, without a model.
 std::vector<SceneFile> headFiles();
 
 /// A ZIP archive of uncompressed files.

@@ -13,7 +13,7 @@
 namespace bilayer::test {
 namespace {
 
-// A folder known at compile time, or where an environment variable says that it is: tests may run on another machine.
+// A folder known at compile time, or that of an environment variable: tests may run on another machine.
 std::filesystem::path folderOf(const char* variable, const char* atCompileTime) {
     const char* const elsewhere = std::getenv(variable);
     return elsewhere ? elsewhere : atCompileTime;

@@ -1,4 +1,4 @@
-// What all tests share: the public corpus of meshes, a scratch folder, distances by brute force.
+// Utilities of all tests: the public corpus of meshes, a scratch folder, brute-force distances.
 #pragma once
 
 #include <filesystem>
@@ -10,19 +10,19 @@
 
 namespace bilayer::test {
 
-/// A mesh of the public corpus, or nothing where the corpus is absent; then a message says that the test is skipped.
-/// The environment variable BILAYER_MESHES names the corpus' folder where it is not where it was at compile time.
+/// A mesh of the public corpus. If the corpus is absent, returns nothing and prints that the test is skipped. The
+/// environment variable BILAYER_MESHES overrides the corpus folder known at compile time.
 std::optional<std::filesystem::path> corpusMesh(const std::string& name);
 
-/// A path in an empty folder of this process's own, removed at exit; within BILAYER_SCRATCH, likewise.
+/// A path in an empty folder of this process, removed at exit. The folder is created in BILAYER_SCRATCH if that is set.
 std::filesystem::path scratch(const std::string& name);
 
-/// A random seed: from the environment variable BILAYER_SEED, which ./run test sets, else from the clock. Printed with
-/// every failure by CAPTURE(seed).
+/// A random seed: from the environment variable BILAYER_SEED, which ./run test sets, else from the clock. CAPTURE(seed)
+/// prints it with every failure.
 unsigned seed();
 
-/// The squared distance from a point to a triangle in double precision, by the regions of the plane that the closest
-/// feature divides (independent of the library's own code).
+/// The squared distance from a point to a triangle in double precision, by the Voronoi regions of its features in the
+/// plane. Independent of the library's own code.
 double squaredDistance(const glm::dvec3& point, const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c);
 
 /// The distance from a point to a mesh, over all its triangles.
@@ -31,7 +31,7 @@ double distance(const Mesh& mesh, const glm::dvec3& point);
 /// The generalized winding number of a point: near 1 inside a closed, outward mesh, near 0 outside.
 double windingNumber(const Mesh& mesh, const glm::dvec3& point);
 
-/// distance(), negative where the winding number is above a half.
+/// distance(), negated where the winding number exceeds 0.5.
 double signedDistance(const Mesh& mesh, const glm::dvec3& point);
 
 }  // namespace bilayer::test

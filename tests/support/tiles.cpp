@@ -1,4 +1,4 @@
-// Triangles to tiles: section 3.2, Algorithm 1 and Fig. 2 of the paper.
+// Divides triangles into tiles: section 3.2, Algorithm 1 and Fig. 2 of the paper.
 #include "tests/support/tiles.h"
 
 #include <oneapi/tbb/parallel_for.h>
@@ -16,7 +16,7 @@ namespace bilayer {
 using namespace bilayer::detail;
 namespace {
 
-/// Triangles that one task cuts: enough to hide what a task costs, few enough to share out.
+/// Triangles per task: enough to amortise the cost of a task, few enough for load balance.
 constexpr std::size_t grain = 2048;
 
 Tile tileOf(const TilePart& part, float delta, const glm::dvec3& first, const glm::dvec3& down,
@@ -30,7 +30,7 @@ Tile tileOf(const TilePart& part, float delta, const glm::dvec3& first, const gl
             std::max(part.rows, 1)};
 }
 
-// A sample of a thin part is a tile of its own.
+// Each sample of a thin part becomes a tile of its own.
 template <class Emit>
 void makeTilesOf(const TilePart& part, float delta, Emit emit) {
     const TriangleCorners& c = part.corners;
@@ -55,8 +55,7 @@ Tiles makeTiles(const Mesh& mesh, const BuildOptions& options) {
         return TriangleCorners{glm::dvec3(mesh.points[t.x]) * voxels, glm::dvec3(mesh.points[t.y]) * voxels,
                                glm::dvec3(mesh.points[t.z]) * voxels};
     };
-    // a run of triangles is a task's; all runs are cut twice, first to count their tiles, then to put them in their
-    // place
+    // each task takes a run of triangles; all runs are processed twice, first to count their tiles, then to store them
     const std::size_t runs = (mesh.triangles.size() + grain - 1) / grain;
     const auto cutRun = [&](std::size_t run, auto emit) {
         std::int32_t triangle = 0;

@@ -9,13 +9,13 @@
 namespace bilayer::test {
 namespace {
 
-constexpr std::uint32_t leafTriangles = 4;  // fewer cost more boxes, more cost more triangles: flat around this
-// Bounds on the rounding of 2x2 and 3x3 determinants of differences, as a part of the sum of their products' sizes:
-// J. R. Shewchuk, "Adaptive Precision Floating-Point Arithmetic and Fast Robust Geometric Predicates", 1997, figs. 21
-// and 22, rounded up.
+constexpr std::uint32_t leafTriangles = 4;  // fewer cost more boxes, more cost more triangles; flat optimum
+// Relative error bounds of 2x2 and 3x3 determinants of differences, times the sum of their products' magnitudes: J. R.
+// Shewchuk, "Adaptive Precision Floating-Point Arithmetic and Fast Robust Geometric Predicates", 1997, figs. 21 and 22,
+// rounded up.
 constexpr double planarRounding = 4e-16, spatialRounding = 1e-15;
 
-// 113 bits of mantissa hold the determinants of what floats and voxel centres give
+// a mantissa of 113 bits holds the determinants of floats and voxel centres
 __extension__ typedef __float128 Quadruple;
 
 template <class Number>
@@ -23,7 +23,7 @@ Number cross(Number ax, Number ay, Number bx, Number by) {
     return ax * by - ay * bx;
 }
 
-// On which side of the line a -> b in the x-y plane the point lies: > 0 left, 0 on it.
+// The side of the line a -> b in the x-y plane on which the point lies: > 0 left, 0 on it.
 int planarSide(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& p) {
     const double left = (a.x - p.x) * (b.y - p.y), right = (a.y - p.y) * (b.x - p.x);
     if (std::abs(left - right) > planarRounding * (std::abs(left) + std::abs(right))) return left > right ? 1 : -1;
@@ -40,7 +40,8 @@ Number volume(const std::array<glm::dvec3, 3>& t, const glm::dvec3& p) {
            at(2, 2) * cross(at(0, 0), at(0, 1), at(1, 0), at(1, 1));
 }
 
-// On which side of a triangle's plane the point lies: > 0 behind its front (from where it runs counter-clockwise).
+// The side of a triangle's plane on which the point lies: > 0 behind its front (the side from which it is
+// counter-clockwise).
 int spatialSide(const std::array<glm::dvec3, 3>& t, const glm::dvec3& p) {
     const auto product = [&](std::size_t i, std::size_t j, std::size_t k) {
         return std::abs(t[i].z - p.z) *
@@ -53,16 +54,16 @@ int spatialSide(const std::array<glm::dvec3, 3>& t, const glm::dvec3& p) {
     return exact > 0 ? 1 : exact < 0 ? -1 : 0;
 }
 
-// What an edge adds to the winding of a polygon around the point in the x-y plane: +-1 where it crosses the half-line
-// towards +x. Edges own their lower end, so that a vertex on the half-line counts once; the same edge run backwards
-// gives the negative, bit for bit, because both orders end in the same call.
+// The contribution of an edge to the winding number of a polygon around the point in the x-y plane: +-1 if it crosses
+// the half-line towards +x. Edges own their lower end, so that a vertex on the half-line counts once. The reversed edge
+// gives exactly the negative, because both directions end in the same call.
 int planarCrossing(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& p) {
     if ((a.y > p.y) == (b.y > p.y)) return 0;
     if (a.y > b.y) return -planarCrossing(b, a, p);
     return planarSide(a, b, p) > 0 ? 1 : 0;
 }
 
-// +1 where the ray from the point towards +z leaves through the triangle's front, -1 where it enters.
+// +1 if the ray from the point towards +z leaves through the triangle's front, -1 if it enters.
 int crossing(const std::array<glm::dvec3, 3>& t, const glm::dvec3& p) {
     const int shadow = planarCrossing(t[0], t[1], p) + planarCrossing(t[1], t[2], p) + planarCrossing(t[2], t[0], p);
     return shadow != 0 && shadow * spatialSide(t, p) > 0 ? shadow : 0;
@@ -75,9 +76,9 @@ glm::dvec3 closestOnSegment(const glm::dvec3& point, const glm::dvec3& a, const 
     return a + std::clamp(glm::dot(point - a, edge) / squared, 0.0, 1.0) * edge;
 }
 
-// Rounding may misjudge the foot of the perpendicular on a sliver. So the foot is made from weights that keep it in the
-// triangle whatever they are, and the edges are always asked too: never too near, and too far by less than the width of
-// a sliver that double precision cannot tell from a segment.
+// Rounding may misplace the foot of the perpendicular on a sliver. So the foot is computed from weights that keep it in
+// the triangle for any values, and the edges are always tested too. The result is never too small. It is too large by
+// at most the width of a sliver that double precision cannot distinguish from a segment.
 double squaredDistanceTo(const std::array<glm::dvec3, 3>& t, const glm::dvec3& point) {
     const auto squared = [&](const glm::dvec3& q) { return glm::dot(point - q, point - q); };
     double nearest = std::numeric_limits<double>::infinity();
@@ -123,9 +124,9 @@ void Truth::addNode(std::uint32_t begin, std::uint32_t end) {
             node.upper = glm::max(node.upper, corner);
         }
     nodes_.push_back(node);
-    if (end - begin <= leafTriangles) return;  // `after` is right already
+    if (end - begin <= leafTriangles) return;  // `after` is already correct
 
-    // halves by the median along the longest side keep the tree balanced whatever the mesh
+    // splitting at the median along the longest side keeps the tree balanced for any mesh
     const glm::dvec3 size = node.upper - node.lower;
     const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
     const std::uint32_t middle = begin + (end - begin) / 2;
@@ -165,8 +166,8 @@ double Truth::distance(const glm::dvec3& point) const {
 }
 
 int Truth::winding(const glm::dvec3& point) const {
-    // the surface crosses a ray towards +z where a triangle's shadow on the x-y plane winds around the point, and the
-    // triangle lies above it
+    // the surface crosses a ray towards +z where a triangle's projection on the x-y plane winds around the point, and
+    // the triangle lies above it
     int result = 0;
     for (std::uint32_t n = 0; n < nodes_.size();) {
         const Node& node = nodes_[n];

@@ -1,9 +1,9 @@
-// The truth about a mesh at a point: how far its surface is, and how often it winds around the point. Double precision
-// and exact predicates, no line shared with the library, fast enough for millions of points. Fields are judged by it;
-// it is itself tested against sums over all triangles (support.h).
+// Ground truth of a mesh at a point: its distance and winding number. It uses double precision and exact predicates,
+// shares no code with the library, and is fast enough for millions of points. Fields are compared with it; its own
+// tests compare it with sums over all triangles (support.h).
 //
-// Winding by signed crossings of a ray: the sum that J. O'Rourke ("Computational Geometry in C", 1998, 7.4) takes for
-// polygons, edge by edge, so that crossings add up without a gap or a doublet wherever the ray meets edges or vertices.
+// The winding number sums signed crossings of a ray edge by edge, as J. O'Rourke ("Computational Geometry in C", 1998,
+// 7.4) does for polygons. So crossings are counted exactly once even where the ray meets edges or vertices.
 #pragma once
 
 #include <array>
@@ -15,8 +15,8 @@
 
 namespace bilayer::test {
 
-/// Distances and winding numbers of one mesh, by a tree of boxes. Vertices need not be welded; triangles may be
-/// slivers, without area, or there twice.
+/// Distances and winding numbers of one mesh, by a bounding volume hierarchy. Vertices need not be welded. Triangles
+/// may be slivers, without area, or duplicates.
 class Truth {
   public:
     /// Throws as validate() does.
@@ -25,11 +25,11 @@ class Truth {
     /// The distance to the nearest triangle [m]. Safe from any thread.
     double distance(const glm::dvec3& point) const;
 
-    /// How often the surface winds around a point that does not lie on it: the generalized winding number, an integer
-    /// for closed meshes (each edge run both ways equally often). Means nothing for others. Safe from any thread.
+    /// The generalized winding number of a point that is not on the surface. It is an integer for closed meshes
+    /// (balanced half-edges) and meaningless for others. Safe from any thread.
     int winding(const glm::dvec3& point) const;
 
-    /// distance(), negative where winding() is positive.
+    /// distance(), negated where winding() is positive.
     double signedDistance(const glm::dvec3& point) const;
 
   private:
@@ -37,7 +37,7 @@ class Truth {
     struct Node {
         glm::dvec3 lower, upper;
         std::uint32_t begin, end;  // range of triangles
-        std::uint32_t after;       // the first node beyond this one's children; the next one: a leaf
+        std::uint32_t after;       // the first node after this one's descendants; the next node for a leaf
     };
 
     void addNode(std::uint32_t begin, std::uint32_t end);

@@ -13,9 +13,9 @@
 namespace bilayer::test {
 namespace {
 
-constexpr double farFromSurface = 0.1;   // voxels: what Verdict::wrongFar counts from
-constexpr std::size_t maxWitnesses = 3;  // of a kind of fault: enough to see what is wrong
-constexpr int margin = 10;               // voxels beyond the band: one leaf and a little
+constexpr double farFromSurface = 0.1;   // [voxels]: threshold of Verdict::wrongFar
+constexpr std::size_t maxWitnesses = 3;  // per kind of fault: enough for a diagnosis
+constexpr int margin = 10;               // voxels beyond the band: one leaf plus a few
 
 using Random = std::mt19937_64;
 
@@ -47,7 +47,7 @@ openvdb::CoordBBox boxAround(const Mesh& mesh, const Band& band, double voxelSiz
     return result;
 }
 
-// Draws voxels for a field, each kind into the same list.
+// Draws voxels for a field; all kinds go into one list.
 class Chooser {
   public:
     Chooser(const openvdb::FloatGrid& grid, const Mesh& mesh, const Band& band, unsigned seed)
@@ -73,7 +73,7 @@ class Chooser {
     }
 
   private:
-    // `count` active voxels, or all where there are fewer, and for every fourth one that lies just beyond the band.
+    // Draws `count` active voxels, or all if there are fewer; and for every fourth one a voxel just beyond the band.
     void drawActive(std::size_t count) {
         const double part = double(count) / double(grid_.activeVoxelCount());
         for (auto voxel = grid_.cbeginValueOn(); voxel; ++voxel)
@@ -83,7 +83,7 @@ class Chooser {
             }
     }
 
-    // Inactive voxels among the active ones; fewer where almost none is inactive.
+    // Draws inactive voxels among the active ones; fewer if almost none is inactive.
     void drawInactive(std::size_t count) {
         std::vector<const openvdb::FloatTree::LeafNodeType*> leaves;
         grid_.tree().getNodes(leaves);
@@ -99,7 +99,7 @@ class Chooser {
         }
     }
 
-    // The first inactive voxel that a walk along an axis meets.
+    // The first inactive voxel along an axis from here.
     openvdb::Coord beyondBand(openvdb::Coord at) {
         const auto values = grid_.getConstAccessor();
         const int axis = int(random_() % 3), step = random_() % 2 ? 1 : -1;
@@ -107,8 +107,8 @@ class Chooser {
         return at;
     }
 
-    // Voxels about a band's width away from points of the surface, and voxels next to it; as many at each triangle,
-    // for where triangles are small the shape is intricate.
+    // Draws voxels about a band's width from points of the surface, and voxels next to it. Each triangle gets the same
+    // count, because small triangles mark intricate shapes.
     void drawNearTriangles(std::size_t count) {
         std::uniform_int_distribution<std::size_t> anyTriangle(0, mesh_.triangles.size() - 1);
         for (std::size_t i = 0; i < count; ++i) {
@@ -128,7 +128,7 @@ class Chooser {
     const openvdb::FloatGrid& grid_;
     const Mesh& mesh_;
     Band band_;
-    double h_;  // m
+    double h_;  // [m]
     openvdb::CoordBBox box_;
     Random random_;
     std::vector<openvdb::Coord> chosen_;

@@ -1,4 +1,4 @@
-// `bilayer` on input that it must refuse: status 1 and one line that names the culprit, or status 2.
+// `bilayer` on input that it must refuse: status 1 and one line that names the cause, or status 2.
 #include <fmt/format.h>
 #include <sys/stat.h>
 
@@ -16,7 +16,7 @@ using namespace bilayer::test;
 
 namespace {
 
-// Status 1, one line on stderr with `culprit` in it, nothing on stdout.
+// Checks for status 1, one line on stderr with `culprit` in it, nothing on stdout.
 void requireFault(const Words& words, const std::string& culprit, const Surroundings& surroundings = {}) {
     std::string command;
     for (const std::string& word : words) command += word + " ";
@@ -28,7 +28,7 @@ void requireFault(const Words& words, const std::string& culprit, const Surround
     CHECK(r.out.empty());
 }
 
-// Status 2, a complaint on stderr with `culprit` in it, nothing on stdout.
+// Checks for status 2, a message on stderr with `culprit` in it, nothing on stdout.
 void requireUsage(const Words& words, const std::string& culprit = "") {
     std::string command;
     for (const std::string& word : words) command += word + " ";
@@ -144,7 +144,7 @@ TEST_CASE("what is there, but no file, is told from what is not there") {
         refusesAll((here / ("absent" + ending)).string(), "no such file");
         refusesAll((here / "field.vdb" / ("inside" + ending)).string(), "no such file");
     }
-    // nor is such a thing opened that a mesh refers to
+    // special files that a mesh refers to are not opened either
     REQUIRE(mkfifo((here / "fifo.mtl").c_str(), 0600) == 0);
     std::ofstream(here / "material.obj") << "mtllib fifo.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
     CHECK(run({"inspect", (here / "material.obj").string()}).status == 0);
@@ -185,7 +185,7 @@ TEST_CASE("bodies that are damaged") {
     bilayer::writeVdb(broken, bilayer::LevelSet(grids));
     requireFault({"info", broken.string()}, "broken_body.vdb: the body is damaged: it has no surface points");
     requireFault({"info", broken.string(), "--json"}, "broken_body.vdb");
-    // its field is still one
+    // its field is still valid
     CHECK(run({"query", broken.string()}, {.input = "0 0 0\n"}).status == 0);
 }
 

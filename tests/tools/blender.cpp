@@ -1,4 +1,4 @@
-// Blender, where it is installed, opens what `bilayer` writes: a program of its own with an OpenVDB of its own.
+// Blender, if installed, opens the files of `bilayer`: a separate program with its own OpenVDB.
 #include <array>
 #include <catch2/catch.hpp>
 #include <cmath>
@@ -17,7 +17,7 @@ bool hasBlender() {
     return false;
 }
 
-// What blender.py finds in a file.
+// The values that blender.py finds in a file.
 nlohmann::json inBlender(const std::filesystem::path& file) {
     const auto log = scratch("blender.log");
     const std::string command = "blender --background --factory-startup --python-exit-code 1 --python '" BILAYER_SCRIPT
@@ -34,7 +34,7 @@ nlohmann::json inBlender(const std::filesystem::path& file) {
 
 constexpr double radius = 0.5, voxelSize = 0.02;
 
-// Blender's "Volume to Mesh" moves what it extracts by half a voxel along each axis, on to where it draws fog.
+// Blender's "Volume to Mesh" shifts the extracted mesh by half a voxel along each axis, to where it draws fog.
 void requireBall(const nlohmann::json& found, const std::array<double, 3>& centre) {
     CHECK(found["volume"].get<double>() == Approx(4.0 / 3.0 * 3.141592653589793 * std::pow(radius, 3)).epsilon(0.01));
     for (int axis = 0; axis < 3; ++axis) {

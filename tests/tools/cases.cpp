@@ -1,5 +1,5 @@
-// Small files from public fault reports, beside the public corpus: each gives what is right, or one line that says why
-// not.
+// Small files from public bug reports, in addition to the public corpus: each gives the correct result, or a one-line
+// error with the reason.
 #include <catch2/catch.hpp>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -45,7 +45,7 @@ void checkTrianglesOrError(const json& expected, const std::string& path) {
         CHECK_THAT(r.err, Catch::Contains(expected[1].get<std::string>()));
 }
 
-// The distance that the field has at a point.
+// The field's distance at a point.
 double distanceAt(const json& expected, const std::string& path) {
     const std::string field = scratch("case.vdb").string();
     const Result built = run({"build", path, "-o", field, expected[0], expected[1]});

@@ -1,4 +1,4 @@
-// Output files of `bilayer` appear whole or not at all.
+// Output files of `bilayer` appear complete or not at all.
 #include <signal.h>
 #include <unistd.h>
 
@@ -109,7 +109,7 @@ TEST_CASE("a signal leaves no file") {
 
 TEST_CASE("a signal that comes when the file has its place is too late, once") {
     const auto here = folder("late");
-    // the status of a process that gets so many signals after its first file
+    // the exit status of a process that gets this many signals after its first file
     const auto statusAfter = [&](int signals, bool beginsAnother) {
         const pid_t process = ::fork();
         if (process == 0) {

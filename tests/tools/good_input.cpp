@@ -1,4 +1,4 @@
-// Every command of `bilayer` on input that it must take.
+// Every command of `bilayer` on valid input.
 #include <nanovdb/util/IO.h>
 #include <openvdb/openvdb.h>
 #include <openvdb/tools/LevelSetSphere.h>
@@ -26,7 +26,7 @@ using namespace bilayer::test;
 
 namespace {
 
-// A field of the sphere at 0.05, built once.
+// A field of the sphere at voxel size 0.05, built once.
 std::string fieldFile() {
     const std::string path = scratch("sphere.vdb").string();
     if (!std::filesystem::exists(path)) {
@@ -123,7 +123,7 @@ TEST_CASE("what a mesh file holds beside its mesh is told") {
 }
 
 TEST_CASE("a mesh far from the zero point keeps its shape from file to file") {
-    // a cube of 0.8 m at coordinates of a map
+    // a cube of 0.8 m at map coordinates
     const glm::dvec3 corner(512344.7230, 5403209.7230, 249.7230);
     const auto path = scratch("far.obj"), output = scratch("far.vdb"), again = scratch("far.ply");
     {
@@ -145,7 +145,7 @@ TEST_CASE("a mesh far from the zero point keeps its shape from file to file") {
     REQUIRE(
         run({"build", path.string(), "-o", output.string(), "--voxel-size", "0.02", "--body", "--triangles"}).status ==
         0);
-    // the transform of the file's grids says where they are
+    // the transform of the file's grids contains the offset
     openvdb::initialize();
     openvdb::io::File file(output.string());
     file.open();
@@ -170,7 +170,7 @@ TEST_CASE("a mesh far from the zero point keeps its shape from file to file") {
     CHECK(run({"seed", path.string(), "-o", liquid.string(), "--voxel-size", "0.05", "--json"})
               .json()["volume"]
               .get<double>() == Approx(0.512).epsilon(0.002));
-    // the liquid keeps it too, by itself and beside others, moved back, and as a mesh again
+    // the liquid keeps it too: alone and with others, moved back, and converted to a mesh
     const auto in = [&](const std::string& file, const glm::dvec3& place) {
         const std::string point = fmt::format("{:.10f} {:.10f} {:.10f}\n", place.x, place.y, place.z);
         return std::stod(run({"query", file}, {.input = point}).out);
@@ -234,7 +234,7 @@ TEST_CASE("every option of build has an effect") {
     CHECK(layers({"--threads", "1"}) == byLayers);
     CHECK(layers({"--delta", "0.25"}) != byLayers);
     CHECK(layers({"--epsilon", "0.1"}) != byLayers);
-    CHECK(layers({"--neighbourhood", "9"}) == byLayers);  // the band is complete with any
+    CHECK(layers({"--neighbourhood", "9"}) == byLayers);  // the band is complete for any value
     CHECK(layers({"--epsilon", "0.1", "--max-subdivision", "1"}) != layers({"--epsilon", "0.1"}));
     phi({});
     const auto full = std::filesystem::file_size(output);
@@ -256,7 +256,7 @@ TEST_CASE("widths may be given in the mesh's unit") {
     CHECK(world["activeVoxels"] == voxels["activeVoxels"]);
     CHECK(readVdb(output).exteriorWidth() == 0.25f);
     CHECK(readVdb(output).interiorWidth() == 0.125f);
-    // the band stays where it is at another resolution
+    // the band keeps its width at another resolution
     build(output, {"--resolution", "40", "--band-unit", "world", "--half-width", "0.1"});
     CHECK(readVdb(output).exteriorWidth() == Approx(0.1f));
     CHECK(readVdb(output).interiorWidth() == Approx(0.1f));
@@ -280,7 +280,7 @@ TEST_CASE("each method says what it did, and both exact ones agree") {
         return readVdb(output);
     };
     const LevelSet exact = with("exact"), pseudonormal = with("pseudonormal"), layers = with("double-layer");
-    // at the band's limit one may have a voxel that is background to the other
+    // at the band's limit a voxel may be active in one and background in the other
     const auto contains = [](const LevelSet& a, const LevelSet& b) {
         const auto other = a.grids().distance->getConstAccessor();
         for (auto value = b.grids().distance->cbeginValueOn(); value; ++value)

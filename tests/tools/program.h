@@ -13,34 +13,34 @@ namespace bilayer::test {
 struct Result {
     int status = -1;  ///< exit status, or 128 plus the signal
     std::string out, err;
-    std::size_t peakMemory = 0;  ///< that it took [bytes]
+    std::size_t peakMemory = 0;  ///< peak resident memory [bytes]
 
     nlohmann::json json() const { return nlohmann::json::parse(out); }
     std::size_t errorLines() const;
 };
 
 struct Surroundings {
-    std::string input{};                   ///< for its standard input
+    std::string input{};                   ///< written to its standard input
     long fileSizeLimit = -1;               ///< RLIMIT_FSIZE [bytes]
-    std::string output{};                  ///< a path for its standard output instead of Result::out
+    std::string output{};                  ///< a path to redirect standard output to, instead of Result::out
     std::vector<std::string> variables{};  ///< "NAME=value"
 };
 
 using Words = std::vector<std::string>;
 
-/// Runs it to its end.
+/// Runs it until it exits.
 Result run(const Words& arguments, const Surroundings& surroundings = {});
 
-/// Starts it and returns its process; its output goes to /dev/null.
+/// Starts it and returns its process id; its output goes to /dev/null.
 pid_t start(const Words& arguments);
 
-/// Waits for a process; exit status, or 128 plus the signal.
+/// Waits for a process; returns the exit status, or 128 plus the signal.
 int wait(pid_t process);
 
-/// A sphere of radius 0.5 as a mesh file of its own.
+/// A sphere of radius 0.5 as a mesh file.
 std::filesystem::path sphereFile(const std::string& name = "sphere.ply", int levels = 3);
 
-/// What a file holds.
+/// The contents of a file.
 std::string contents(const std::filesystem::path& path);
 
 /// A text file in the scratch folder.

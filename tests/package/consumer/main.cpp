@@ -1,4 +1,4 @@
-// What a user writes, against the installed headers and all five libraries.
+// User code against the installed headers and all five libraries.
 #include <BulletCollision/CollisionDispatch/btDefaultCollisionConfiguration.h>
 #include <bilayer/cl/device.h>
 #include <bilayer/collider/contact.h>

@@ -1,4 +1,4 @@
-// Ten lines with the sources added: a cube, its field, its surface.
+// A minimal user of the sources, added by add_subdirectory or FetchContent: a cube, its field, its surface.
 #include <bilayer/sdf/build.h>
 #include <bilayer/sdf/surface.h>
 
