@@ -53,7 +53,7 @@ std::vector<glm::vec3> placesNear(const Mesh& mesh, const Field& field, Random& 
 }  // namespace
 
 TEST_CASE(
-    "where no errorMask are, samples are off by little more than a tenth of a voxel; where errorMask are, some are") {
+    "samples outside of the interpolation-error mask are off by little more than a tenth of a voxel; some within are") {
     const unsigned start = seed();
     CAPTURE(start);
     Random random(start);
@@ -87,7 +87,7 @@ TEST_CASE(
     }
 }
 
-TEST_CASE("what errorMask hold does not depend on who asks first, nor on how many ask at once") {
+TEST_CASE("the interpolation-error mask does not depend on who asks first, nor on how many ask at once") {
     const unsigned start = seed();
     CAPTURE(start);
     Random random(start);
@@ -109,7 +109,7 @@ TEST_CASE("what errorMask hold does not depend on who asks first, nor on how man
     CHECK(std::count(answers.begin(), answers.end(), 1) > 20);
 }
 
-TEST_CASE("edges hold errorMask, faces and gentle bends do not, and there are none where there is no field") {
+TEST_CASE("edges are in the interpolation-error mask, faces and gentle bends are not; without a field nothing is") {
     const Field box = fieldOf(solids[0]);
     const InterpolationErrorMask ofBox(box);
     CHECK(ofBox.hold({0.0999f, 0.0699f, 0}));

@@ -141,7 +141,7 @@ TEST_CASE("however many bodies fall into a bowl, none starts in another") {
     CHECK(outcome.deepest() < outcome.voxelSize);
 }
 
-TEST_CASE("needles in a bowl gain no energy where nothing but NoPassing holds them") {
+TEST_CASE("needles in a bowl gain no energy where nothing but continuous collision holds them") {
     demo::BowlOptions options;
     options.kinds = {{"needle", shapes::cone(0.02f, 0.2f, 12)}};
     options.bodies = 8;
