@@ -24,26 +24,21 @@ constexpr float roundingOfVolume = 1e-6f;
 /// Upper bound on what underflow of products loses.
 constexpr float minProduct = 1e-30f, minVolume = 1e-37f;
 
-inline Points pointsAt(const float (&p)[3][treeWidth], std::size_t lane) {
-    const Tag tag;
-    return {hn::Load(tag, p[0] + lane), hn::Load(tag, p[1] + lane), hn::Load(tag, p[2] + lane)};
-}
-
 // One point in all lanes.
-inline Points pointAt(const float (&p)[3][treeWidth], std::size_t i) {
+inline PointLanes pointAt(const float (&p)[3][treeWidth], std::size_t i) {
     const Tag tag;
     return {hn::Set(tag, p[0][i]), hn::Set(tag, p[1][i]), hn::Set(tag, p[2][i])};
 }
 
-struct Boxes {
-    Points lower, upper;
+struct BoxLanes {
+    PointLanes lower, upper;
 
-    explicit Boxes(const Points* c)
+    explicit BoxLanes(const PointLanes* c)
         : lower{least(c[0].x, c[1].x, c[2].x), least(c[0].y, c[1].y, c[2].y), least(c[0].z, c[1].z, c[2].z)},
           upper{most(c[0].x, c[1].x, c[2].x), most(c[0].y, c[1].y, c[2].y), most(c[0].z, c[1].z, c[2].z)} {}
-    Boxes(const Points& lower, const Points& upper) : lower(lower), upper(upper) {}
+    BoxLanes(const PointLanes& lower, const PointLanes& upper) : lower(lower), upper(upper) {}
 
-    Mask meet(const Boxes& o) const {
+    Mask meet(const BoxLanes& o) const {
         const Mask x = hn::And(hn::Le(lower.x, o.upper.x), hn::Le(o.lower.x, upper.x));
         const Mask y = hn::And(hn::Le(lower.y, o.upper.y), hn::Le(o.lower.y, upper.y));
         const Mask z = hn::And(hn::Le(lower.z, o.upper.z), hn::Le(o.lower.z, upper.z));
@@ -56,10 +51,10 @@ struct Boxes {
 
 // The planes of triangles, and tests for the side on which points certainly lie.
 struct Planes {
-    Points origin, normal, sizes;  // `sizes`: absolute values of the products in the normal
+    PointLanes origin, normal, sizes;  // `sizes`: absolute values of the products in the normal
 
-    explicit Planes(const Points* c) : origin(c[0]) {
-        const Points u = c[1] - c[0], v = c[2] - c[0];
+    explicit Planes(const PointLanes* c) : origin(c[0]) {
+        const PointLanes u = c[1] - c[0], v = c[2] - c[0];
         const auto products = [](Vec a, Vec b, Vec c, Vec d, Vec& difference, Vec& size) {
             const Vec first = hn::Mul(a, b), second = hn::Mul(c, d);
             difference = hn::Sub(first, second);
@@ -70,8 +65,8 @@ struct Planes {
         products(u.x, v.y, u.y, v.x, normal.z, sizes.z);
     }
 
-    void sides(const Points& p, Mask& above, Mask& below) const {
-        const Points d = p - origin;
+    void sides(const PointLanes& p, Mask& above, Mask& below) const {
+        const PointLanes d = p - origin;
         const auto sum = [](Vec a, Vec b, Vec c) { return hn::Add(hn::Add(a, b), c); };
         const Vec volume = sum(hn::Mul(normal.x, d.x), hn::Mul(normal.y, d.y), hn::Mul(normal.z, d.z));
         const Vec size =
@@ -82,7 +77,7 @@ struct Planes {
     }
 
     // Tests whether a triangle lies on one side, except for corners that it shares.
-    Mask apart(const Points* corners, const Mask* shared) const {
+    Mask apart(const PointLanes* corners, const Mask* shared) const {
         Mask above[3], below[3];
         for (int k = 0; k < 3; ++k) {
             sides(corners[k], above[k], below[k]);
@@ -95,11 +90,12 @@ struct Planes {
 
 // The triangles of a leaf, or as many as a vector holds.
 struct Lanes {
-    Points corners[3];
-    Boxes boxes;
+    PointLanes corners[3];
+    BoxLanes boxes;
 
     Lanes(const TriangleLeaf& leaf, std::size_t lane)
-        : corners{pointsAt(leaf.corners[0], lane), pointsAt(leaf.corners[1], lane), pointsAt(leaf.corners[2], lane)},
+        : corners{loadLanes(Tag(), leaf.corners[0], lane), loadLanes(Tag(), leaf.corners[1], lane),
+                  loadLanes(Tag(), leaf.corners[2], lane)},
           boxes(corners) {}
 };
 
@@ -118,7 +114,7 @@ struct Others {
     }
 
     // Returns the lanes of the mask whose triangles may intersect a triangle.
-    Mask close(const Points* other, const glm::uvec3& t, Mask mask) const {
+    Mask close(const PointLanes* other, const glm::uvec3& t, Mask mask) const {
         // the corners of each lane, and the corners of the other triangle, that are shared
         Mask mine[3], its[3];
         for (int k = 0; k < 3; ++k) mine[k] = its[k] = hn::FirstN(Tag(), 0);
@@ -141,26 +137,26 @@ class LeafPairs {
               std::vector<std::pair<unsigned, unsigned>>& pairs)
         : mesh_(mesh), tree_(tree), index_(leaf), leaf_(tree.leaf(leaf)), pairs_(pairs) {
         for (std::size_t lane = 0; lane < treeWidth; lane += hn::Lanes(Tag())) {
-            const Boxes boxes = Lanes(leaf_, lane).boxes;
+            const BoxLanes boxes = Lanes(leaf_, lane).boxes;
             store(boxes.lower, lower_, lane);
             store(boxes.upper, upper_, lane);
         }
     }
 
     void find() {
-        const Boxes own = boxAt(tree_.boxes().groups[index_ / treeWidth], index_ % treeWidth);
+        const BoxLanes own = boxAt(tree_.boxes().groups[index_ / treeWidth], index_ % treeWidth);
         descend(tree_.boxes().root(), own);
     }
 
   private:
-    static Boxes boxAt(const BoxGroup& group, std::size_t place) {
+    static BoxLanes boxAt(const BoxGroup& group, std::size_t place) {
         return {pointAt(group.lower, place), pointAt(group.upper, place)};
     }
 
-    void descend(std::uint32_t node, const Boxes& own) {
+    void descend(std::uint32_t node, const BoxLanes& own) {
         const BoxGroup& group = tree_.boxes().group(node);
         for (std::size_t lane = 0; lane < treeWidth; lane += hn::Lanes(Tag())) {
-            const Boxes boxes(pointsAt(group.lower, lane), pointsAt(group.upper, lane));
+            const BoxLanes boxes(loadLanes(Tag(), group.lower, lane), loadLanes(Tag(), group.upper, lane));
             for (unsigned bits = bitsOf(boxes.meet(own)); bits != 0; bits &= bits - 1) {
                 const std::size_t place = lane + std::size_t(std::countr_zero(bits));
                 const std::uint32_t child = group.firstChild + std::uint32_t(place);
@@ -172,21 +168,21 @@ class LeafPairs {
         }
     }
 
-    static void store(const Points& points, float (&to)[3][treeWidth], std::size_t lane) {
+    static void store(const PointLanes& points, float (&to)[3][treeWidth], std::size_t lane) {
         hn::Store(points.x, Tag(), to[0] + lane);
         hn::Store(points.y, Tag(), to[1] + lane);
         hn::Store(points.z, Tag(), to[2] + lane);
     }
 
     // Returns the triangles of the leaf whose boxes overlap a box.
-    unsigned inBox(const Boxes& box) const {
+    unsigned inBox(const BoxLanes& box) const {
         unsigned all = 0;
         for (std::size_t lane = 0; lane < treeWidth; lane += hn::Lanes(Tag()))
-            all |= bitsOf(Boxes(pointsAt(lower_, lane), pointsAt(upper_, lane)).meet(box)) << lane;
+            all |= bitsOf(BoxLanes(loadLanes(Tag(), lower_, lane), loadLanes(Tag(), upper_, lane)).meet(box)) << lane;
         return all & ((1u << tree_.leafSize(index_)) - 1);
     }
 
-    void meet(std::uint32_t other, const Boxes& box, const Boxes& own) {
+    void meet(std::uint32_t other, const BoxLanes& box, const BoxLanes& own) {
         const unsigned mine = inBox(box);
         if (mine == 0) return;
         const TriangleLeaf& leaf = tree_.leaf(other);
@@ -205,8 +201,8 @@ class LeafPairs {
     void take(const Others& others, const TriangleLeaf& leaf, std::size_t lane, std::size_t i, Mask near, bool same) {
         Mask mask = hn::And(near, others.lanes.boxes.meet({pointAt(lower_, i), pointAt(upper_, i)}));
         if (hn::AllFalse(Tag(), mask)) return;
-        const Points corners[3] = {pointAt(leaf_.corners[0], i), pointAt(leaf_.corners[1], i),
-                                   pointAt(leaf_.corners[2], i)};
+        const PointLanes corners[3] = {pointAt(leaf_.corners[0], i), pointAt(leaf_.corners[1], i),
+                                       pointAt(leaf_.corners[2], i)};
         mask = others.close(corners, mesh_.triangles[leaf_.triangles[i]], mask);
         for (unsigned bits = bitsOf(mask); bits != 0; bits &= bits - 1) {
             const std::size_t k = lane + std::size_t(std::countr_zero(bits));

@@ -11,6 +11,7 @@
 
 #include <cstdint>
 
+#include "sdf/base/vector_lanes.h"
 #include "sdf/bvh/box_tree.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -27,12 +28,8 @@ inline unsigned bitsOf(Mask mask) {
     return bits[0];
 }
 
-// Points, one per lane.
-struct Points {
-    Vec x, y, z;
-
-    Points operator-(const Points& o) const { return {hn::Sub(x, o.x), hn::Sub(y, o.y), hn::Sub(z, o.z)}; }
-};
+/// Points, one per lane.
+using PointLanes = VectorLanes<Tag>;
 
 }  // namespace bilayer::detail::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();

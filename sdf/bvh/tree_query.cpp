@@ -52,13 +52,13 @@ inline Vec boxDistance2(const float* const lower[3], const float* const upper[3]
 }
 
 // References to boxes in a list or in a group.
-struct Boxes {
+struct BoxArrays {
     const float *lower[3], *upper[3];
 
-    explicit Boxes(const NodeList& list) {
+    explicit BoxArrays(const NodeList& list) {
         for (int k = 0; k < 3; ++k) lower[k] = list.lower[k].data(), upper[k] = list.upper[k].data();
     }
-    explicit Boxes(const BoxGroup& group) {
+    explicit BoxArrays(const BoxGroup& group) {
         for (int k = 0; k < 3; ++k) lower[k] = group.lower[k], upper[k] = group.upper[k];
     }
 };
@@ -69,7 +69,7 @@ struct Narrowing {
     float reach2, largest;
     NodeList& to;
 
-    void take(const Boxes& boxes, std::size_t i, hn::Vec<IndexTag> nodes, Mask valid) {
+    void take(const BoxArrays& boxes, std::size_t i, hn::Vec<IndexTag> nodes, Mask valid) {
         const Tag tag;
         Vec side = hn::Zero(tag);
         for (int k = 0; k < 3; ++k)
@@ -87,12 +87,12 @@ struct Narrowing {
     }
 
     void takeGroup(const BoxGroup& group) {
-        const Boxes boxes(group);
+        const BoxArrays boxes(group);
         for (std::size_t i = 0; i < treeWidth; i += hn::Lanes(Tag()))
             take(boxes, i, hn::Iota(IndexTag(), group.firstChild + std::uint32_t(i)), hn::FirstN(Tag(), treeWidth));
     }
 
-    void keep(const Boxes& boxes, std::size_t i, hn::Vec<IndexTag> nodes, Mask mask) {
+    void keep(const BoxArrays& boxes, std::size_t i, hn::Vec<IndexTag> nodes, Mask mask) {
         const Tag tag;
         to.makeRoom(treeWidth);
         for (int k = 0; k < 3; ++k) {
@@ -108,7 +108,7 @@ void narrowList(const WideTree& tree, const NodeList& from, const VoxelBox& voxe
     const Tag tag;
     to.count = 0;
     Narrowing narrowing{tree, voxels, reach * reach * roundUp, largest, to};
-    const Boxes boxes(from);
+    const BoxArrays boxes(from);
     for (std::size_t i = 0; i < from.count; i += hn::Lanes(tag))
         narrowing.take(boxes, i, hn::LoadU(IndexTag(), from.nodes.data() + i), hn::FirstN(tag, from.count - i));
 }
@@ -168,7 +168,7 @@ struct Query {
         if (nearest < best2) lower(nearest);
     }
 
-    void look(const Boxes& boxes, std::size_t begin, std::size_t count, const std::uint32_t* nodes,
+    void look(const BoxArrays& boxes, std::size_t begin, std::size_t count, const std::uint32_t* nodes,
               std::uint32_t firstNode) {
         const Tag tag;
         for (std::size_t i = begin; i < begin + count; i += hn::Lanes(tag)) {
@@ -183,7 +183,7 @@ struct Query {
                 if (gaps[lane] > limit2) continue;  // something closer was found meanwhile
                 const std::uint32_t node = nodes ? nodes[i + lane] : firstNode + std::uint32_t(i + lane);
                 if (!tree.isLeaf(node))
-                    look(Boxes(tree.group(node)), 0, treeWidth, nullptr, tree.group(node).firstChild);
+                    look(BoxArrays(tree.group(node)), 0, treeWidth, nullptr, tree.group(node).firstChild);
                 else if (!met(node))
                     visit(node);
             }
@@ -296,7 +296,7 @@ struct BlockQuery {
         query.lower(bound * bound * roundUp);
         answer.visits.clear();
         query.visit(answer.lastWinner);
-        query.look(Boxes(list), 0, list.count, list.nodes.data(), 0);
+        query.look(BoxArrays(list), 0, list.count, list.nodes.data(), 0);
         return query;
     }
 
@@ -341,7 +341,7 @@ struct BlockQuery {
         const std::uint32_t winner = answer.visits[visit].leaf;
         cube.ask(winner, place);
         centre.widen(std::min(atMost, cube.farthest()) + radius + slack);
-        centre.look(Boxes(list), 0, list.count, list.nodes.data(), 0);
+        centre.look(BoxArrays(list), 0, list.count, list.nodes.data(), 0);
         for (const auto& v : answer.visits)
             for (std::size_t i = 0; i < treeWidth; ++i) {
                 if (v.distance2[i] > centre.limit2 || (v.leaf == winner && i == place)) continue;

@@ -43,10 +43,10 @@ glm::dvec3 centroid(const Mesh& mesh, unsigned triangle) {
 }
 
 // A line, and a plane perpendicular to it onto which triangles are projected.
-struct Line {
+struct LineFrame {
     glm::dvec3 origin, direction, inverse, u, v;
 
-    Line(const glm::dvec3& from, const glm::dvec3& along) : origin(from), direction(along), inverse(1.0 / along) {
+    LineFrame(const glm::dvec3& from, const glm::dvec3& along) : origin(from), direction(along), inverse(1.0 / along) {
         const glm::dvec3 helper = std::abs(along.x) < 0.5 ? glm::dvec3(1, 0, 0) : glm::dvec3(0, 1, 0);
         u = glm::normalize(glm::cross(along, helper));
         v = glm::cross(along, u);
@@ -133,7 +133,7 @@ TriangleTree::TriangleTree(const Mesh& mesh, Progress* progress) : mesh_(mesh) {
 
 void TriangleTree::crossings(const glm::dvec3& origin, const glm::dvec3& direction,
                              std::vector<Crossing>& found) const {
-    const Line line(origin, direction);
+    const LineFrame line(origin, direction);
     const double slack = roundingOfBoxes * double(largest_);
     found.clear();
     descend([&](const Bounds& box) { return line.meets(box, slack); },

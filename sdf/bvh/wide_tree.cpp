@@ -24,7 +24,7 @@ constexpr std::size_t grain = 1024;  // triangles or leaves per task
 
 using Corners = std::array<glm::dvec3, 3>;
 
-struct Box {
+struct DoubleBounds {
     glm::dvec3 lower{std::numeric_limits<double>::infinity()}, upper{-std::numeric_limits<double>::infinity()};
 
     void add(const glm::dvec3& p) { lower = glm::min(lower, p), upper = glm::max(upper, p); }
@@ -36,9 +36,9 @@ void forAll(std::size_t count, Progress* progress, Body body) {
 }
 
 // The items of the tree: triangles that are short enough, and the parts of longer ones.
-class Parts {
+class TriangleParts {
   public:
-    Parts(const Mesh& mesh, const glm::dvec3& base, double voxelSize, double longestEdge)
+    TriangleParts(const Mesh& mesh, const glm::dvec3& base, double voxelSize, double longestEdge)
         : mesh_(mesh), base_(base), perVoxelSize_(1 / voxelSize), longest2_(longestEdge * longestEdge) {}
 
     Corners corners(std::size_t part) const {
@@ -107,8 +107,8 @@ class Parts {
 constexpr std::uint64_t unused = ~std::uint64_t(0);
 
 // Computes the keys of parts first .. first + count - 1. Long triangles get no key and are recorded in `longOnes`.
-void makeKeys(const Parts& parts, const glm::ivec3& size, std::size_t first, std::size_t count, std::uint64_t* keys,
-              std::vector<std::uint32_t>& longOnes) {
+void makeKeys(const TriangleParts& parts, const glm::ivec3& size, std::size_t first, std::size_t count,
+              std::uint64_t* keys, std::vector<std::uint32_t>& longOnes) {
     constexpr double cells = curveCells;
     const double scale = cells / (3.0 * std::max({size.x, size.y, size.z}));
     CurveCells run{};
@@ -127,7 +127,7 @@ void makeKeys(const Parts& parts, const glm::ivec3& size, std::size_t first, std
 }
 
 // Adds the keys of parts that have none yet. Returns the long ones among these in order.
-std::vector<std::uint32_t> addKeys(const Parts& parts, const glm::ivec3& size, std::vector<std::uint64_t>& keys,
+std::vector<std::uint32_t> addKeys(const TriangleParts& parts, const glm::ivec3& size, std::vector<std::uint64_t>& keys,
                                    Progress* progress) {
     const std::size_t begin = keys.size();
     keys.resize(parts.count());
@@ -145,7 +145,7 @@ std::vector<std::uint32_t> addKeys(const Parts& parts, const glm::ivec3& size, s
 }
 
 // Returns the keys of all parts in no particular order.
-std::vector<std::uint64_t> keysOf(Parts& parts, const glm::ivec3& size, Progress* progress) {
+std::vector<std::uint64_t> keysOf(TriangleParts& parts, const glm::ivec3& size, Progress* progress) {
     std::vector<std::uint64_t> keys;
     const std::vector<std::uint32_t> longOnes = addKeys(parts, size, keys, progress);
     if (!longOnes.empty()) {
@@ -157,7 +157,7 @@ std::vector<std::uint64_t> keysOf(Parts& parts, const glm::ivec3& size, Progress
 }
 
 // Sorts the keys by recursive splitting instead of Hilbert order.
-void split(const Parts& parts, std::vector<std::uint64_t>& keys, Progress* progress) {
+void split(const TriangleParts& parts, std::vector<std::uint64_t>& keys, Progress* progress) {
     auto items = vectorOf<TreeItem>(keys.size(), progress);
     forAll(keys.size(), progress, [&](std::size_t i) {
         const Corners c = parts.corners(std::size_t(keys[i] & curveIndexMask));
@@ -215,7 +215,7 @@ float below(double x) {
     return double(f) > x ? std::nextafter(f, -std::numeric_limits<float>::infinity()) : f;
 }
 
-void makeLeaf(const Parts& parts, const std::vector<std::uint64_t>& keys, std::size_t index, WideTree& tree) {
+void makeLeaf(const TriangleParts& parts, const std::vector<std::uint64_t>& keys, std::size_t index, WideTree& tree) {
     const std::size_t begin = index * treeWidth, count = std::min<std::size_t>(treeWidth, keys.size() - begin);
     const auto partAt = [&](std::size_t i) { return std::size_t(keys[std::min(i, keys.size() - 1)] & curveIndexMask); };
     for (std::size_t i = begin; i < begin + treeWidth; ++i) {
@@ -224,7 +224,7 @@ void makeLeaf(const Parts& parts, const std::vector<std::uint64_t>& keys, std::s
     }
     std::array<Corners, treeWidth> corners;
     WideLeaf& leaf = tree.leaves[index];
-    Box box;
+    DoubleBounds box;
     for (std::size_t i = 0; i < treeWidth; ++i) {
         const std::size_t part = partAt(begin + std::min(i, count - 1));
         corners[i] = parts.corners(part);
@@ -250,7 +250,7 @@ WideTree makeWideTree(const Mesh& mesh, float voxelSize, Progress* progress, con
     tree.base = glm::ivec3(base);
     tree.size = glm::ivec3(size);
 
-    Parts parts(mesh, base, voxelSize, shape.longestEdge);
+    TriangleParts parts(mesh, base, voxelSize, shape.longestEdge);
     std::vector<std::uint64_t> keys = keysOf(parts, tree.size, progress);
     if (shape.order == TreeOrder::split)
         split(parts, keys, progress);

@@ -37,12 +37,19 @@ class WindingNumber {
     Estimate estimate(const glm::dvec3& point, double share) const;
     double operator()(const glm::dvec3& point) const { return estimate(point, 0.5).value; }
 
+    /// Returns whether the winding number at a point [m] is above one half. Refines less than estimate().
+    bool isInside(const glm::dvec3& point) const { return estimate(point, onlySide).value > 0.5; }
+
     /// Returns whether any triangle intersects or touches the segment between two points [m].
     bool meets(const glm::dvec3& from, const glm::dvec3& to) const;
 
     double area() const { return nodes_.front().total; }  ///< of all triangles [m^2]
 
   private:
+    /// Error of an estimate that only decides the side, as a share of its distance to 1/2: 1, less a margin for
+    /// rounding.
+    static constexpr double onlySide = 0.999;
+
     using Corners = std::array<glm::vec3, 3>;
     struct Node {
         glm::dvec3 centre;               // area-weighted
@@ -81,7 +88,7 @@ class WindingSlope {
     double operator()(const glm::dvec3& centre, double radius) const;
 
   private:
-    struct Edge {
+    struct UnbalancedEdge {
         glm::dvec3 from, to;
         double times;  // excess of half-edges in one direction over the other
         glm::vec3 at;  // midpoint
@@ -96,9 +103,9 @@ class WindingSlope {
 
     void build(std::size_t at, std::size_t begin, std::size_t end, Progress* progress);
     double bound(std::size_t at, const glm::dvec3& centre, double radius) const;
-    static double ofEdge(const Edge& edge, const glm::dvec3& centre, double radius);
+    static double ofEdge(const UnbalancedEdge& edge, const glm::dvec3& centre, double radius);
 
-    std::vector<Edge> edges_;
+    std::vector<UnbalancedEdge> edges_;
     std::vector<Node> nodes_;
 };
 

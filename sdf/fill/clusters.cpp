@@ -42,7 +42,7 @@ void Clusters::build(std::span<const Piece> pieces, const glm::ivec3& origin) {
         return;
     }
     sort_.run(
-        members_, cells, [](const Member& member) { return member.sample; },
+        members_, cells, [](const ClusterMember& member) { return member.sample; },
         [&](std::uint32_t begin, std::uint32_t end) { addCluster(begin, end); });
 }
 
@@ -56,14 +56,14 @@ void Clusters::addCluster(std::uint32_t begin, std::uint32_t end) {
     const float length = glm::length(normal);
     normal = length > 0 ? normal / length : glm::vec3(0, 0, 1);
     // The sample must be a point of the surface: the member sample nearest to the mean.
-    const auto nearer = [&](const Member& a, const Member& b) {
+    const auto nearer = [&](const ClusterMember& a, const ClusterMember& b) {
         const glm::vec3 toA = a.sample - mean, toB = b.sample - mean;
         return glm::dot(toA, toA) < glm::dot(toB, toB);
     };
     const glm::vec3 sample = std::min_element(&members_[begin], &members_[begin] + (end - begin), nearer)->sample;
     float radius = 0, thickness = 0;
     for (std::uint32_t m = begin; m < end; ++m) {
-        const Member& member = members_[m];
+        const ClusterMember& member = members_[m];
         const glm::vec3 away = member.sample - sample;
         const float facing = glm::dot(member.normal, normal);
         radius = std::max(radius, glm::length(away) + member.radius);

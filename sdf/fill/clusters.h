@@ -18,14 +18,14 @@ class Clusters {
     void build(std::span<const Piece> pieces, const glm::ivec3& origin);
 
     std::span<const Cluster> clusters() const { return clusters_; }
-    std::span<const Member> members() const { return members_; }
+    std::span<const ClusterMember> members() const { return members_; }
 
   private:
     void addCluster(std::uint32_t begin, std::uint32_t end);
 
     std::vector<Cluster> clusters_;
-    std::vector<Member> members_;
-    CellSort<Member> sort_;
+    std::vector<ClusterMember> members_;
+    CellSort<ClusterMember> sort_;
 };
 
 }  // namespace bilayer::detail

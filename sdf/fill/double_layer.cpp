@@ -21,7 +21,7 @@ namespace {
 constexpr std::size_t trianglesPerPoll = 1024;  // about 0.1 ms
 
 // Working memory of a thread, reused for each brick.
-struct Scratch {
+struct LayerBrickScratch {
     LayerSamples samples;
     LayerScratch block;
     std::vector<glm::ivec3> origins;
@@ -29,10 +29,10 @@ struct Scratch {
     std::vector<std::int32_t> triangles;
 };
 
-class BrickFiller {
+class LayerBrickFiller {
   public:
-    BrickFiller(const MeshJob& job, const DoubleLayerOptions& options, const FillParameters& parameters, float reach,
-                const TriangleBins& bins, Scratch& scratch)
+    LayerBrickFiller(const MeshJob& job, const DoubleLayerOptions& options, const FillParameters& parameters,
+                     float reach, const TriangleBins& bins, LayerBrickScratch& scratch)
         : job_(job), options_(options), parameters_(parameters), reach_(reach), bins_(bins), s_(scratch) {}
 
     void fill(std::size_t brick) {
@@ -72,7 +72,7 @@ class BrickFiller {
     const FillParameters& parameters_;
     float reach_;
     const TriangleBins& bins_;
-    Scratch& s_;
+    LayerBrickScratch& s_;
 };
 
 }  // namespace
@@ -83,9 +83,9 @@ void fillDoubleLayer(const MeshJob& job, const Bounds& box, const DoubleLayerOpt
     const float reach = parameters.reach * (parameters.cube > 0 ? std::sqrt(3.f) : 1.f);
     const TriangleBins bins = binTriangles(job.mesh, box, 1.0 / double(job.voxelSize), reach, &job.progress);
     job.progress.begin(bins.count());
-    tbb::enumerable_thread_specific<Scratch> scratch;
+    tbb::enumerable_thread_specific<LayerBrickScratch> scratch;
     tbb::parallel_for(std::size_t(0), bins.count(), [&](std::size_t brick) {
-        BrickFiller(job, options, parameters, reach, bins, scratch.local()).fill(brick);
+        LayerBrickFiller(job, options, parameters, reach, bins, scratch.local()).fill(brick);
         job.progress.advance();
     });
 }

@@ -33,7 +33,7 @@ constexpr int maxPaths = 16;
 constexpr std::size_t trianglesPerPoll = 1024;  // about 0.1 ms
 
 // Working memory of a thread, reused for each brick.
-struct Scratch {
+struct ExactBrickScratch {
     std::vector<Piece> pieces;
     Clusters clusters;
     BlockBins bins;
@@ -42,14 +42,14 @@ struct Scratch {
     std::vector<std::int32_t> triangles;
 };
 
-class BrickFiller {
+class ExactBrickFiller {
   public:
-    BrickFiller(const MeshJob& job, const TriangleBins& bins, double voxelsPerUnit, FallbackSign& fallbackSign,
-                Scratch& scratch)
+    ExactBrickFiller(const MeshJob& job, const TriangleBins& bins, double voxelsPerUnit, FallbackSign& fallbackSign,
+                     ExactBrickScratch& scratch)
         : job_(job),
           bins_(bins),
           voxelsPerUnit_(voxelsPerUnit),
-          lastResort_(fallbackSign),
+          fallbackSign_(fallbackSign),
           s_(scratch),
           side_(job.mesh, voxelsPerUnit) {}
 
@@ -154,7 +154,7 @@ class BrickFiller {
             [&](std::uint32_t triangle) { side_.offer(triangle); });
         if (const Side side = side_.side(); side != Side::undecided) return side == Side::inside;
         if (const auto known = insideByPaths(local, outside, inside)) return *known;
-        return lastResort_.isInside(point / voxelsPerUnit_);
+        return fallbackSign_.isInside(point / voxelsPerUnit_);
     }
 
     static glm::ivec3 inBlock(int voxel) { return {voxel / 64, voxel / 8 % 8, voxel % 8}; }
@@ -166,7 +166,7 @@ class BrickFiller {
             const Cluster& cluster = s_.clusters.clusters()[c];
             if (!near(cluster.sample, cluster.radius)) continue;
             for (std::uint32_t m = cluster.begin; m < cluster.end; ++m) {
-                const Member& member = s_.clusters.members()[m];
+                const ClusterMember& member = s_.clusters.members()[m];
                 if (near(member.sample, member.radius)) visit(s_.pieces[member.piece].triangle);
             }
         }
@@ -207,8 +207,8 @@ class BrickFiller {
     const MeshJob& job_;
     const TriangleBins& bins_;
     double voxelsPerUnit_;
-    FallbackSign& lastResort_;
-    Scratch& s_;
+    FallbackSign& fallbackSign_;
+    ExactBrickScratch& s_;
     std::size_t cut_ = 0;
     ClosestSide side_;
     BlockDistances found_;
@@ -225,9 +225,9 @@ void fillExact(const MeshJob& job, const Bounds& box) {
     const TriangleBins bins = binTriangles(job.mesh, box, voxelsPerUnit, job.reach, &job.progress);
     job.progress.begin(bins.count());
     FallbackSign fallbackSign(job);
-    tbb::enumerable_thread_specific<Scratch> scratch;
+    tbb::enumerable_thread_specific<ExactBrickScratch> scratch;
     tbb::parallel_for(std::size_t(0), bins.count(), [&](std::size_t brick) {
-        BrickFiller(job, bins, voxelsPerUnit, fallbackSign, scratch.local()).fill(brick);
+        ExactBrickFiller(job, bins, voxelsPerUnit, fallbackSign, scratch.local()).fill(brick);
         job.progress.advance();
     });
 }

@@ -41,11 +41,11 @@ constexpr int sliceVoxels = blockSide * blockSide;
 constexpr int chunkVoxels = int(hn::MaxLanes(Tag()));
 
 // Lattice coordinates of the voxels in a slice.
-struct Lattice {
+struct BlockLattice {
     HWY_ALIGN float y[sliceVoxels], z[sliceVoxels];
 };
-constexpr Lattice lattice = [] {
-    Lattice l{};
+constexpr BlockLattice lattice = [] {
+    BlockLattice l{};
     for (int i = 0; i < sliceVoxels; ++i) {
         l.y[i] = float(i / blockSide);
         l.z[i] = float(i % blockSide);
@@ -308,7 +308,7 @@ inline void askMembers(const BlockInput& input, const Cluster& cluster, const Ne
         return;
     }
     for (std::uint32_t m = cluster.begin; m < cluster.end; ++m) {
-        const Member& member = input.members[m];
+        const ClusterMember& member = input.members[m];
         const Drum drum(member.sample - input.inBrick, member.radius, member.normal, 0);
         NearChunks ask{near.first, near.last, {}};
         unsigned any = 0;

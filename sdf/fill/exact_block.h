@@ -27,7 +27,7 @@ struct Cluster {
 };
 
 /// A piece of a cluster, with the bounds that decide whether it must be evaluated.
-struct Member {
+struct ClusterMember {
     glm::vec3 sample;  ///< [brick voxels]
     float radius;
     glm::vec3 normal;
@@ -38,7 +38,7 @@ struct Member {
 struct BlockInput {
     std::span<const std::uint32_t> reaching;  ///< indices into `clusters`
     const Cluster* clusters;
-    const Member* members;
+    const ClusterMember* members;
     const Piece* pieces;
     glm::ivec3 origin;  ///< index coordinates of the block's first voxel
     glm::vec3 inBrick;  ///< the same in brick voxels

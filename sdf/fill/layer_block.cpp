@@ -36,11 +36,11 @@ constexpr float infinite = std::numeric_limits<float>::infinity();
 constexpr float halfCube = 0.5f * float(cubeSide - 1);  // from the centre of a cube to its outermost voxels
 
 // Positions of the voxels in a slice, relative to the centre of their cube.
-struct Lattice {
+struct CubeLattice {
     alignas(64) float y[sliceVoxels], z[sliceVoxels];
 };
-constexpr Lattice lattice = [] {
-    Lattice l{};
+constexpr CubeLattice lattice = [] {
+    CubeLattice l{};
     for (int i = 0; i < sliceVoxels; ++i) {
         l.y[i] = float(i / cubeSide) - halfCube;
         l.z[i] = float(i % cubeSide) - halfCube;
@@ -188,8 +188,8 @@ HWY_INLINE void combine(const Nearest& inner, const Nearest& outer, const Voxels
 // Selects the points of both layers that reach a cube. With the paper's cubes, selects those whose neighbourhood
 // overlaps it.
 template <bool cube>
-HWY_INLINE void pick(const LayerBlockInput& input, const glm::vec3& middle, std::span<const LayerSamples::Range> ranges,
-                     LayerPoints& inner, LayerPoints& outer) {
+HWY_INLINE void pick(const LayerBlockInput& input, const glm::vec3& middle,
+                     std::span<const LayerSamples::SampleRange> ranges, LayerPoints& inner, LayerPoints& outer) {
     const Tag tag;
     const SampleColumns& columns = input.samples.columns();
     const float* places[] = {columns.place[0].data(), columns.place[1].data(), columns.place[2].data()};
@@ -197,7 +197,7 @@ HWY_INLINE void pick(const LayerBlockInput& input, const glm::vec3& middle, std:
     const Vec reach2 = hn::Set(tag, input.parameters.certain * input.parameters.certain),
               half = hn::Set(tag, float(input.parameters.cube) + halfCube),
               centre[] = {hn::Set(tag, middle.x), hn::Set(tag, middle.y), hn::Set(tag, middle.z)};
-    for (const LayerSamples::Range& range : ranges)
+    for (const LayerSamples::SampleRange& range : ranges)
         for (std::uint32_t i = range.begin; i < range.end; i += std::uint32_t(hn::Lanes(tag))) {
             Mask among = hn::FirstN(tag, range.end - i);
             Vec in[3], out[3];

@@ -28,7 +28,7 @@ struct LayerScratch {
         std::vector<std::uint32_t> picked;
     };
     Layer inner, outer;
-    std::vector<LayerSamples::Range> near;
+    std::vector<LayerSamples::SampleRange> near;
 };
 
 /// Fills a block with signed distances [voxels]; +infinity where unknown. Returns whether any sample reaches the block;

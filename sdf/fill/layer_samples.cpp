@@ -12,6 +12,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "sdf/base/vector_lanes.h"
 #include "sdf/fill/tile_cutter.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -28,44 +29,12 @@ constexpr int fewRows = 4;
 using Small = hn::Rebind<float, Wide>;
 using Row = hn::CappedTag<float, 16>;
 
-// Three coordinates of several points.
-template <class D>
-struct Points {
-    hn::Vec<D> x, y, z;
-};
-
-template <class D>
-HWY_INLINE Points<D> operator-(const Points<D>& a, const Points<D>& b) {
-    return {hn::Sub(a.x, b.x), hn::Sub(a.y, b.y), hn::Sub(a.z, b.z)};
-}
-
-template <class D>
-HWY_INLINE Points<D> operator+(const Points<D>& a, const Points<D>& b) {
-    return {hn::Add(a.x, b.x), hn::Add(a.y, b.y), hn::Add(a.z, b.z)};
-}
-
-template <class D>
-HWY_INLINE Points<D> scaled(const Points<D>& a, hn::Vec<D> factor) {
-    return {hn::Mul(a.x, factor), hn::Mul(a.y, factor), hn::Mul(a.z, factor)};
-}
-
-inline Points<Small> narrowed(const Points<Wide>& a) {
+inline VectorLanes<Small> narrowed(const VectorLanes<Wide>& a) {
     return {hn::DemoteTo(Small(), a.x), hn::DemoteTo(Small(), a.y), hn::DemoteTo(Small(), a.z)};
 }
 
 template <class D>
-HWY_INLINE hn::Vec<D> dot(const Points<D>& a, const Points<D>& b) {
-    return hn::Add(hn::Add(hn::Mul(a.x, b.x), hn::Mul(a.y, b.y)), hn::Mul(a.z, b.z));
-}
-
-template <class D>
-HWY_INLINE Points<D> cross(const Points<D>& a, const Points<D>& b) {
-    return {hn::Sub(hn::Mul(a.y, b.z), hn::Mul(a.z, b.y)), hn::Sub(hn::Mul(a.z, b.x), hn::Mul(a.x, b.z)),
-            hn::Sub(hn::Mul(a.x, b.y), hn::Mul(a.y, b.x))};
-}
-
-template <class D>
-HWY_INLINE Points<D> pointsAt(D tag, const glm::vec3& place) {
+HWY_INLINE VectorLanes<D> pointsAt(D tag, const glm::vec3& place) {
     return {hn::Set(tag, place.x), hn::Set(tag, place.y), hn::Set(tag, place.z)};
 }
 
@@ -119,19 +88,19 @@ class Spreader {
     }
 
     // Returns corners in voxels.
-    Points<Wide> corner(std::size_t k) {
+    VectorLanes<Wide> corner(std::size_t k) {
         const Wide wide;
         const auto at = [&](std::size_t axis) {
             const auto world = hn::PromoteTo(wide, hn::Load(Small(), world_[k][axis]));
             return hn::Mul(world, hn::Set(wide, brick_.voxelsPerUnit));
         };
-        const Points<Wide> corners{at(0), at(1), at(2)};
+        const VectorLanes<Wide> corners{at(0), at(1), at(2)};
         keep(corners, known_.corners[k]);
         return corners;
     }
 
     template <class Rows>
-    static void keep(const Points<Wide>& points, Rows& rows) {
+    static void keep(const VectorLanes<Wide>& points, Rows& rows) {
         hn::Store(points.x, Wide(), rows[0]);
         hn::Store(points.y, Wide(), rows[1]);
         hn::Store(points.z, Wide(), rows[2]);
@@ -141,8 +110,8 @@ class Spreader {
     // with nonzero area.
     std::uint64_t addFew(std::size_t count) {
         const Wide wide;
-        const Points<Wide> a = corner(0), b = corner(1), c = corner(2), ab = b - a, ac = c - a, bc = c - b,
-                           normal = cross(ab, ac);
+        const VectorLanes<Wide> a = corner(0), b = corner(1), c = corner(2), ab = b - a, ac = c - a, bc = c - b,
+                                normal = cross(ab, ac);
         const auto length = hn::Sqrt(dot(normal, normal)),
                    longest2 = hn::Max(dot(ab, ab), hn::Max(dot(bc, bc), dot(ac, ac)));
         const DoubleLayerOptions& options = brick_.options;
@@ -158,9 +127,10 @@ class Spreader {
         const auto whole = hn::Le(longest2, hn::Mul(hn::Mul(rows, rows), hn::Set(wide, longestOfOneSample2(options))));
         const auto few = hn::And(hn::And(real, whole), hn::Le(rows, hn::Set(wide, double(maxRows))));
         if (!hn::AllFalse(wide, few)) {
-            const Points<Wide> down = scaled(ab, step),
-                               start = scaled(down + scaled(ac, step), hn::Set(wide, 1.0 / 3.0));
-            const Points<Wide> origin{hn::Set(wide, origin_.x), hn::Set(wide, origin_.y), hn::Set(wide, origin_.z)};
+            const VectorLanes<Wide> down = scaled(ab, step),
+                                    start = scaled(down + scaled(ac, step), hn::Set(wide, 1.0 / 3.0));
+            const VectorLanes<Wide> origin{hn::Set(wide, origin_.x), hn::Set(wide, origin_.y),
+                                           hn::Set(wide, origin_.z)};
             addRows(hn::DemoteTo(Small(), hn::IfThenElseZero(few, rows)), narrowed(a - origin + start), narrowed(down),
                     narrowed(scaled(bc, step)),
                     narrowed(scaled(normal, hn::Div(hn::Set(wide, double(options.delta)), length))));
@@ -176,8 +146,8 @@ class Spreader {
     }
 
     // Adds the samples of Algorithm 1 for as many triangles as there are lanes. Row i has i + 1 samples.
-    void addRows(hn::Vec<Small> rows, const Points<Small>& start, const Points<Small>& down,
-                 const Points<Small>& across, const Points<Small>& offset) {
+    void addRows(hn::Vec<Small> rows, const VectorLanes<Small>& start, const VectorLanes<Small>& down,
+                 const VectorLanes<Small>& across, const VectorLanes<Small>& offset) {
         const Small small;
         const auto owners = hn::Load(hn::RebindToSigned<Small>(), triangles_);
         for (int i = 0;; ++i) {
@@ -254,13 +224,13 @@ class Spreader {
 
     // Returns the vector from a sample to its outer layer point. The division is in double, since floats cannot hold
     // the area of a very small triangle.
-    Points<Row> offsetOf(const TilePart& part) const {
+    VectorLanes<Row> offsetOf(const TilePart& part) const {
         return pointsAt(Row(), glm::vec3(part.normal * (double(brick_.options.delta) / part.length)));
     }
 
     // Adds the samples in the mask `among`, except those too far from the brick.
     template <class Tag>
-    HWY_INLINE void put(Tag tag, hn::Mask<Tag> among, const Points<Tag>& place, const Points<Tag>& offset,
+    HWY_INLINE void put(Tag tag, hn::Mask<Tag> among, const VectorLanes<Tag>& place, const VectorLanes<Tag>& offset,
                         hn::Vec<hn::RebindToSigned<Tag>> triangle) {
         const hn::RebindToSigned<Tag> intTag;
         const auto within = [&](auto at, int axis) {

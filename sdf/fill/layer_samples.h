@@ -77,14 +77,14 @@ class LayerSamples {
     const SampleColumns& columns() const { return sorted_; }
 
     /// Samples `begin` to `end` - 1.
-    struct Range {
+    struct SampleRange {
         std::uint32_t begin, end;
     };
 
     /// Returns ranges with all samples that may reach a cube of cells, and possibly others.
     /// @param cells   count along each axis
     /// @param memory  storage for the result
-    std::span<const Range> near(const glm::ivec3& first, int cells, std::vector<Range>& memory) const {
+    std::span<const SampleRange> near(const glm::ivec3& first, int cells, std::vector<SampleRange>& memory) const {
         const int along = cells + 2 * cells_.around;
         if (memory.size() < std::size_t(along * along)) memory.resize(std::size_t(along * along));
         std::size_t count = 0;

@@ -11,6 +11,8 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
+#include "sdf/base/vector_lanes.h"
+
 HWY_BEFORE_NAMESPACE();
 namespace bilayer::detail::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
@@ -26,34 +28,11 @@ constexpr float radiusSlack = 1e-5f;
 /// the squares of longer lengths.
 constexpr float shortest = 1e-9f;
 
-struct Vec3 {
-    Vec x, y, z;
-};
+using Vec3 = VectorLanes<Tag>;
 
-inline Vec3 operator+(Vec3 a, Vec3 b) {
-    return {hn::Add(a.x, b.x), hn::Add(a.y, b.y), hn::Add(a.z, b.z)};
-}
-inline Vec3 operator-(Vec3 a, Vec3 b) {
-    return {hn::Sub(a.x, b.x), hn::Sub(a.y, b.y), hn::Sub(a.z, b.z)};
-}
-inline Vec3 operator*(Vec s, Vec3 a) {
-    return {hn::Mul(s, a.x), hn::Mul(s, a.y), hn::Mul(s, a.z)};
-}
-inline Vec dot(Vec3 a, Vec3 b) {
-    return hn::Add(hn::Add(hn::Mul(a.x, b.x), hn::Mul(a.y, b.y)), hn::Mul(a.z, b.z));
-}
-inline Vec3 cross(Vec3 a, Vec3 b) {
-    return {hn::Sub(hn::Mul(a.y, b.z), hn::Mul(a.z, b.y)), hn::Sub(hn::Mul(a.z, b.x), hn::Mul(a.x, b.z)),
-            hn::Sub(hn::Mul(a.x, b.y), hn::Mul(a.y, b.x))};
-}
 inline Vec3 select(Mask mask, Vec3 yes, Vec3 no) {
     return {hn::IfThenElse(mask, yes.x, no.x), hn::IfThenElse(mask, yes.y, no.y), hn::IfThenElse(mask, yes.z, no.z)};
 }
-inline Vec3 load(const float (&from)[3][PieceCutter::batch], std::size_t i) {
-    const Tag tag;
-    return {hn::Load(tag, from[0] + i), hn::Load(tag, from[1] + i), hn::Load(tag, from[2] + i)};
-}
-
 // Returns whether a length is large enough to define a direction.
 inline Mask isLength(Vec length) {
     return hn::Gt(length, hn::Set(Tag(), shortest));
@@ -69,8 +48,8 @@ inline Vec3 across(Vec3 u) {
     const Tag tag;
     const Mask useX = hn::Lt(hn::Abs(u.x), hn::Set(tag, 0.6f));
     const Vec one = hn::Set(tag, 1.f), zero = hn::Zero(tag);
-    const Vec3 way = cross(u, select(useX, {one, zero, zero}, {zero, one, zero}));
-    return inverse(hn::Sqrt(dot(way, way))) * way;
+    const Vec3 perpendicular = cross(u, select(useX, {one, zero, zero}, {zero, one, zero}));
+    return scaled(perpendicular, inverse(hn::Sqrt(dot(perpendicular, perpendicular))));
 }
 
 // The values of a batch of pieces, one column per piece.
@@ -95,9 +74,10 @@ inline void putEdge(Columns& columns, int row, std::size_t i, Vec x, Vec y) {
     columns.put(row + 2, i, size);
 }
 
-inline void makeColumns(const PieceCutter::Waiting& waiting, std::size_t i, Columns& columns) {
+inline void makeColumns(const PieceCutter::WaitingPieces& waiting, std::size_t i, Columns& columns) {
     const Tag tag;
-    const Vec3 corner = load(waiting.corner, i), ab = load(waiting.ab, i), ac = load(waiting.ac, i), bc = ac - ab;
+    const Vec3 corner = loadLanes(tag, waiting.corner, i), ab = loadLanes(tag, waiting.ab, i),
+               ac = loadLanes(tag, waiting.ac, i), bc = ac - ab;
     // Permutes the corners cyclically so that the longest edge comes first.
     const Vec ab2 = dot(ab, ab), bc2 = dot(bc, bc), ca2 = dot(ac, ac);
     const Mask first = hn::And(hn::Ge(ab2, bc2), hn::Ge(ab2, ca2)), second = hn::Ge(bc2, ca2);
@@ -107,16 +87,17 @@ inline void makeColumns(const PieceCutter::Waiting& waiting, std::size_t i, Colu
     const Vec3 third = select(first, ac, select(second, none - ab, ab - ac));
 
     const Vec size = hn::Sqrt(dot(edge, edge));
-    const Vec3 u = select(isLength(size), inverse(size) * edge, {hn::Set(tag, 1.f), hn::Zero(tag), hn::Zero(tag)});
+    const Vec3 u =
+        select(isLength(size), scaled(edge, inverse(size)), {hn::Set(tag, 1.f), hn::Zero(tag), hn::Zero(tag)});
     const Vec along = hn::Min(hn::Max(dot(third, u), hn::Zero(tag)), size);
-    const Vec3 rest = third - along * u;
+    const Vec3 rest = third - scaled(u, along);
     Vec height = hn::Sqrt(dot(rest, rest));
     // Orthogonalized a second time, because the remainder of a flat piece is mostly rounding. If nothing remains then,
     // all of it was rounding.
-    const Vec3 rough = inverse(height) * rest, way = rough - dot(rough, u) * u;
-    const Vec wayLength = hn::Sqrt(dot(way, way));
-    const Mask flat = hn::Or(hn::Not(isLength(height)), hn::Lt(wayLength, hn::Set(tag, 0.5f)));
-    const Vec3 w = select(flat, across(u), inverse(wayLength) * way);
+    const Vec3 rough = scaled(rest, inverse(height)), straight = rough - scaled(u, dot(rough, u));
+    const Vec straightLength = hn::Sqrt(dot(straight, straight));
+    const Mask flat = hn::Or(hn::Not(isLength(height)), hn::Lt(straightLength, hn::Set(tag, 0.5f)));
+    const Vec3 w = select(flat, across(u), scaled(straight, inverse(straightLength)));
     height = hn::IfThenZeroElse(flat, height);
     columns.put(Row::origin, i, begin);
     columns.put(Row::axisU, i, u);
@@ -130,12 +111,12 @@ inline void makeColumns(const PieceCutter::Waiting& waiting, std::size_t i, Colu
     const Vec lift = hn::Div(hn::Sub(hn::Add(hn::Mul(along, along), hn::Mul(height, height)), hn::Mul(along, size)),
                              hn::Add(height, height));
     const Vec up = hn::IfThenZeroElse(flat, hn::Max(lift, hn::Zero(tag)));
-    columns.put(Row::sample, i, begin + half * u + up * w);
+    columns.put(Row::sample, i, begin + scaled(u, half) + scaled(w, up));
     columns.put(Row::radius, i,
                 hn::Add(hn::Sqrt(hn::Add(hn::Mul(half, half), hn::Mul(up, up))), hn::Set(tag, radiusSlack)));
 }
 
-void makePieces(const PieceCutter::Waiting& waiting, std::size_t count, Piece* pieces) {
+void makePieces(const PieceCutter::WaitingPieces& waiting, std::size_t count, Piece* pieces) {
     Columns columns;
     for (std::size_t i = 0; i < count; i += hn::Lanes(Tag())) makeColumns(waiting, i, columns);
     const auto& v = columns.values;

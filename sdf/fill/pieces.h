@@ -59,7 +59,7 @@ class PieceCutter {
 
     /// A batch of pieces to process: a lattice point, a corner relative to it, the vectors from there to the other
     /// corners.
-    struct Waiting {
+    struct WaitingPieces {
         std::array<glm::ivec3, batch> base;
         std::array<std::uint32_t, batch> triangle;
         alignas(64) float corner[3][batch];
@@ -90,7 +90,7 @@ class PieceCutter {
 
     double longestEdge2_;
     std::vector<Piece>& pieces_;
-    Waiting waiting_{};
+    WaitingPieces waiting_{};
     int count_ = 0;
 };
 

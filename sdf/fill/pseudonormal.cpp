@@ -25,13 +25,13 @@ constexpr float sideSlack = 1e-3f;
 /// Maximum node side that opens every node: only leaves remain in the list.
 constexpr float openAll = -1;
 
-class Filler {
+class PseudonormalFiller {
   public:
-    explicit Filler(const MeshJob& job)
+    explicit PseudonormalFiller(const MeshJob& job)
         : job_(job),
           tree_(makeWideTree(job.mesh, job.voxelSize, &job.progress)),
-          lastResort_(job),
-          scratch_([&job] { return Scratch(job); }) {}
+          fallbackSign_(job),
+          scratch_([&job] { return TaskScratch(job); }) {}
 
     void fill() {
         const int margin = int(std::ceil(job_.reach)) / blockSide * blockSide + blockSide;
@@ -44,8 +44,8 @@ class Filler {
 
   private:
     // Working memory of a thread.
-    struct Scratch {
-        explicit Scratch(const MeshJob& job) : side(job.mesh, 1.0 / double(job.voxelSize)) {}
+    struct TaskScratch {
+        explicit TaskScratch(const MeshJob& job) : side(job.mesh, 1.0 / double(job.voxelSize)) {}
 
         NodeList half, block, near;
         BlockAnswer answer;
@@ -73,7 +73,7 @@ class Filler {
     }
 
     void fillTask(const glm::ivec3& origin, const NodeList& list) {
-        Scratch& scratch = scratch_.local();
+        TaskScratch& scratch = scratch_.local();
         scratch.origins.clear();
         scratch.distances.clear();
         scratch.triangles.clear();
@@ -91,7 +91,7 @@ class Filler {
         if (!scratch.origins.empty()) job_.sink({scratch.origins, scratch.distances, scratch.triangles});
     }
 
-    void fillBlock(const glm::ivec3& block, Scratch& scratch) {
+    void fillBlock(const glm::ivec3& block, TaskScratch& scratch) {
         job_.progress.poll();
         BlockAnswer& answer = scratch.answer;
         answerBlock(tree_, scratch.block, glm::vec3(block), job_.reach, job_.sign, answer);
@@ -105,7 +105,7 @@ class Filler {
 
     // Voxels that project onto a face have a known sign, which links propagate, also beyond the reach. Each remaining
     // component is queried.
-    void signDistances(const glm::ivec3& block, Scratch& scratch) {
+    void signDistances(const glm::ivec3& block, TaskScratch& scratch) {
         BlockAnswer& answer = scratch.answer;
         std::size_t onBoth = completeSides(findSignLinks(answer.distances), {&answer.far, &answer.mid, &answer.known},
                                            answer.sides, [&](int voxel) { return isInside(voxel, block, scratch); });
@@ -117,7 +117,7 @@ class Filler {
     }
 
     // Counts voxels whose propagated sign differs from their nearest face and from their pseudonormal.
-    std::size_t contradictions(const glm::ivec3& block, Scratch& scratch) {
+    std::size_t contradictions(const glm::ivec3& block, TaskScratch& scratch) {
         const BlockSides &sides = scratch.answer.sides, &nearest = scratch.answer.nearest;
         std::size_t count = 0;
         for (std::size_t x = 0; x < sides.inside.size(); ++x)
@@ -131,7 +131,7 @@ class Filler {
     }
 
     // Returns whether a voxel is inside by the pseudonormal at its closest point.
-    bool isInside(int voxel, const glm::ivec3& block, Scratch& scratch) {
+    bool isInside(int voxel, const glm::ivec3& block, TaskScratch& scratch) {
         const glm::ivec3 at = block + glm::ivec3(voxel / 64, voxel / 8 % 8, voxel % 8);
         const glm::dvec3 point(at + tree_.base);
         const float distance = scratch.answer.distances[voxel] + sideSlack;
@@ -141,19 +141,19 @@ class Filler {
             for (const std::uint32_t triangle : tree_.leaves[scratch.near.nodes[i]].triangles)
                 scratch.side.offer(triangle);
         const Side side = scratch.side.side();
-        return side == Side::undecided ? lastResort_.isInside(point * double(job_.voxelSize)) : side == Side::inside;
+        return side == Side::undecided ? fallbackSign_.isInside(point * double(job_.voxelSize)) : side == Side::inside;
     }
 
     const MeshJob& job_;
     WideTree tree_;
-    FallbackSign lastResort_;
-    tbb::enumerable_thread_specific<Scratch> scratch_;
+    FallbackSign fallbackSign_;
+    tbb::enumerable_thread_specific<TaskScratch> scratch_;
 };
 
 }  // namespace
 
 void fillPseudonormal(const MeshJob& job) {
-    Filler(job).fill();
+    PseudonormalFiller(job).fill();
 }
 
 }  // namespace bilayer::detail

@@ -20,13 +20,13 @@ namespace bilayer::detail {
 namespace {
 
 using Leaf = openvdb::FloatTree::LeafNodeType;
-using TriangleLeaf = openvdb::Int32Tree::LeafNodeType;
+using TriangleGridLeaf = openvdb::Int32Tree::LeafNodeType;
 using LargeNode = openvdb::FloatTree::RootNodeType::ChildNodeType;
 using SmallNode = LargeNode::ChildNodeType;
 static_assert(Leaf::DIM == blockSide);
 
-std::unique_ptr<TriangleLeaf> triangleLeaf(const std::int32_t* triangles, const Leaf& like) {
-    auto leaf = std::make_unique<TriangleLeaf>(openvdb::PartialCreate(), like.origin());
+std::unique_ptr<TriangleGridLeaf> triangleLeaf(const std::int32_t* triangles, const Leaf& like) {
+    auto leaf = std::make_unique<TriangleGridLeaf>(openvdb::PartialCreate(), like.origin());
     leaf->buffer().allocate();
     for (openvdb::Index i = 0; i < blockVoxels; ++i) leaf->buffer().data()[i] = like.isValueOn(i) ? triangles[i] : -1;
     leaf->setValueMask(like.getValueMask());
@@ -73,14 +73,14 @@ bool isPlain(const BandMasks& masks) {
 
 // Pairs of voxels across a face of a block. The block's own voxels are at first + i * rowStep + j * step, their
 // partners at an offset of `across`.
-struct Face {
+struct BlockFace {
     openvdb::Coord toNeighbour;
     int first, rowStep, step, across;
 };
 constexpr int lastLayer = blockSide - 1, xStep = blockSide * blockSide, yStep = blockSide;
-const Face forwardFaces[3] = {{{blockSide, 0, 0}, lastLayer* xStep, yStep, 1, -lastLayer* xStep},
-                              {{0, blockSide, 0}, lastLayer* yStep, xStep, 1, -lastLayer* yStep},
-                              {{0, 0, blockSide}, lastLayer, xStep, yStep, -lastLayer}};
+const BlockFace forwardFaces[3] = {{{blockSide, 0, 0}, lastLayer* xStep, yStep, 1, -lastLayer* xStep},
+                                   {{0, blockSide, 0}, lastLayer* yStep, xStep, 1, -lastLayer* yStep},
+                                   {{0, 0, blockSide}, lastLayer, xStep, yStep, -lastLayer}};
 
 // Compares distances only where the bits of two faces differ, that is, where the surface passes between them.
 class ConflictCounter {
@@ -133,7 +133,7 @@ class ConflictCounter {
         const float* values = leaf.buffer().data();
         const FaceBits& bits = faces_[leaf.transientData()];
         for (std::size_t axis = 0; axis < 3; ++axis) {
-            const Face& face = forwardFaces[axis];
+            const BlockFace& face = forwardFaces[axis];
             const openvdb::Coord next = leaf.origin() + face.toNeighbour, previous = leaf.origin() - face.toNeighbour;
             if (const Leaf* other = accessor.probeConstLeaf(next))
                 sum += between(face, bits[axis + 3] ^ faces_[other->transientData()][axis], values + face.first,
@@ -146,9 +146,11 @@ class ConflictCounter {
         return sum;
     }
 
-    static int place(const Face& face, int bit) { return bit / blockSide * face.rowStep + bit % blockSide * face.step; }
+    static int place(const BlockFace& face, int bit) {
+        return bit / blockSide * face.rowStep + bit % blockSide * face.step;
+    }
 
-    std::size_t between(const Face& face, std::uint64_t differ, const float* a, const float* b) const {
+    std::size_t between(const BlockFace& face, std::uint64_t differ, const float* a, const float* b) const {
         const float room = voxel_ * (1 + linkSlack);
         std::size_t sum = 0;
         for (; differ; differ &= differ - 1) {
@@ -159,7 +161,7 @@ class ConflictCounter {
     }
 
     // Empty space is at least one voxel away from the surface, or the band width if that is less.
-    std::size_t towards(const Face& face, std::uint64_t inside, const float* a, float tile) const {
+    std::size_t towards(const BlockFace& face, std::uint64_t inside, const float* a, float tile) const {
         const float room = voxel_ * (1 + linkSlack) - std::min(std::abs(tile), voxel_);
         std::size_t sum = 0;
         for (std::uint64_t differ = tile < 0 ? ~inside : inside; differ; differ &= differ - 1)
@@ -206,8 +208,8 @@ void Assembler::copy(const Grids& from, const std::function<bool(const openvdb::
         leaves_.local().push_back({std::make_unique<Leaf>(leaf), facesOf(insideOf(leaf)), false});
     });
     if (wantTriangles_)
-        forEachKept(from.triangle->tree(), [&](const TriangleLeaf& leaf) {
-            triangleLeaves_.local().push_back(std::make_unique<TriangleLeaf>(leaf));
+        forEachKept(from.triangle->tree(), [&](const TriangleGridLeaf& leaf) {
+            triangleLeaves_.local().push_back(std::make_unique<TriangleGridLeaf>(leaf));
         });
 }
 

@@ -59,7 +59,7 @@ class Assembler {
 
   private:
     using Leaf = openvdb::FloatTree::LeafNodeType;
-    using TriangleLeaf = openvdb::Int32Tree::LeafNodeType;
+    using TriangleGridLeaf = openvdb::Int32Tree::LeafNodeType;
     struct Collected {
         std::unique_ptr<Leaf> leaf;
         FaceBits faces;
@@ -77,7 +77,7 @@ class Assembler {
     Plain plain_;
     Progress& progress_;
     PerThread<Collected> leaves_;
-    PerThread<std::unique_ptr<TriangleLeaf>> triangleLeaves_;
+    PerThread<std::unique_ptr<TriangleGridLeaf>> triangleLeaves_;
     std::vector<FaceBits> faces_;  // of each leaf; the leaf's transient data is the index
 };
 

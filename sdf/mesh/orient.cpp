@@ -25,7 +25,7 @@ constexpr std::size_t samplesOfPiece = 32;
 /// Each pass resolves one level of nested uncertain open components. More than a few passes are not worth the time.
 constexpr int maxPasses = 8;
 
-struct Piece {
+struct OrientedComponent {
     Bounds bounds;
     std::vector<unsigned> triangles;
     std::uint64_t edgeSum = 0;  // zero: closed
@@ -222,7 +222,7 @@ class Orienter {
     // A doubled body is a solid only if all of its components are closed.
     void findSheets() {
         std::vector<bool> open(mesh_.triangles.size());
-        const auto pieceOf = [&](unsigned i) -> Piece& { return pieces_[pieceOf_[i]]; };
+        const auto pieceOf = [&](unsigned i) -> OrientedComponent& { return pieces_[pieceOf_[i]]; };
         for (const unsigned i : eachTriangle())
             if (pieceOf(i).oneSided || !pieceOf(i).closed()) open[body_[i]] = true;
         for (const unsigned i : eachTriangle()) pieceOf(i).sheet = doubled_[i] && open[body_[i]];
@@ -236,14 +236,14 @@ class Orienter {
 
     void keepMajority() {
         for (const unsigned i : eachTriangle()) {
-            Piece& piece = pieces_[pieceOf_[i]];
+            OrientedComponent& piece = pieces_[pieceOf_[i]];
             const double area = glm::length(areaVector(i));
             piece.area += area;
             if (turned_[i]) piece.turnedArea += area;
             piece.mixed |= turned_[i] && topology_.proper(i);
             for (int k = 0; k < 3; ++k) piece.bounds.add(mesh_.points[mesh_.triangles[i][k]]);
         }
-        for (Piece& piece : pieces_) {
+        for (OrientedComponent& piece : pieces_) {
             if (piece.oneSided || piece.sheet) {
                 for (const unsigned i : piece.triangles) turned_[i] = false;
                 piece.mixed = false;
@@ -252,7 +252,7 @@ class Orienter {
         }
     }
 
-    void flip(Piece& piece) {
+    void flip(OrientedComponent& piece) {
         for (const unsigned i : piece.triangles) turned_[i] = !turned_[i];
         piece.volume = -piece.volume;
     }
@@ -261,7 +261,7 @@ class Orienter {
         findBorders();
         for (const unsigned i : eachTriangle()) {
             if (!counts(i)) continue;
-            Piece& piece = pieces_[pieceOf_[i]];
+            OrientedComponent& piece = pieces_[pieceOf_[i]];
             const double volume = glm::dot(areaVector(i), point(i, 0) - piece.apex()) / 3;
             piece.volume += turned_[i] ? -volume : volume;
         }
@@ -277,7 +277,7 @@ class Orienter {
                     if (counts(other.triangle) && pieceOf_[other.triangle] == pieceOf_[use.triangle])
                         net += turned_[other.triangle] ? -other.direction() : other.direction();
                 if (net == 0) continue;
-                Piece& piece = pieces_[pieceOf_[use.triangle]];
+                OrientedComponent& piece = pieces_[pieceOf_[use.triangle]];
                 const double length = glm::length(b - a);
                 piece.borderCentre += 0.5 * length * (a + b);
                 piece.borderLength += length;
@@ -307,7 +307,7 @@ class Orienter {
             }
     }
 
-    bool wrong(const Piece& piece, const std::vector<unsigned>& enclosing) const {
+    bool wrong(const OrientedComponent& piece, const std::vector<unsigned>& enclosing) const {
         int winding = 0;
         bool trusted = !piece.mixed;
         for (const unsigned outer : enclosing) {
@@ -318,7 +318,7 @@ class Orienter {
     }
 
     // An open component may be the wall of a bore, with the solid on the other side. The rest of the mesh then decides.
-    static bool standsRight(const Piece& piece, const Sides& sides) {
+    static bool standsRight(const OrientedComponent& piece, const Sides& sides) {
         return !piece.closed() && !piece.mixed && sides.measure(piece.triangles, samplesOfPiece).solid > 0.5;
     }
 
@@ -333,7 +333,7 @@ class Orienter {
             std::swap(orientation.mesh.triangles[i].y, orientation.mesh.triangles[i].z);
             ++orientation.turnedTriangles;
         }
-        for (const Piece& piece : pieces_) {
+        for (const OrientedComponent& piece : pieces_) {
             orientation.mixedComponents += piece.mixed;
             orientation.turnedComponents += piece.turned && !piece.mixed;
             if (piece.oneSided && !piece.sheet) orientation.oneSidedTriangles += piece.triangles.size();
@@ -350,7 +350,7 @@ class Orienter {
     std::vector<int> excess_;               // for each original: copies with its orientation minus opposite ones
     std::vector<bool> doubled_;             // for each triangle: its body has each face twice, back to back
     std::vector<unsigned> contradictions_;  // triangles at edges where a one-sided surface meets itself reversed
-    std::vector<Piece> pieces_;
+    std::vector<OrientedComponent> pieces_;
     std::vector<unsigned> pieceOf_;  // for each triangle
     std::vector<bool> turned_;       // for each triangle
 };

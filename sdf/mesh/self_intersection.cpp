@@ -48,7 +48,7 @@ int exactSide(const glm::dvec3& a, const glm::dvec3& b, const glm::dvec3& c, con
 
 // The intersection of a triangle with the plane of another: none (at most a point, or the whole triangle), one of its
 // edges, or a segment with the triangle on both sides.
-enum class Cut { none, edge, through };
+enum class PlaneCut { none, edge, through };
 
 // Finds intersecting triangles by the signs of volumes of their corners: P. Guigue, O. Devillers, "Fast and robust
 // triangle-triangle overlap test using orientation predicates", Journal of Graphics Tools 8 (2003) 25-42.
@@ -60,13 +60,15 @@ class Pairs {
         const glm::uvec3 &a = mesh_.triangles[first], &b = mesh_.triangles[second];
         if (shared(a, b) > 1) return false;
         const glm::ivec3 aSides = sides(b, a);
-        const Cut aCut = cutOf(aSides);
-        if (aCut == Cut::none) return false;
+        const PlaneCut aCut = cutOf(aSides);
+        if (aCut == PlaneCut::none) return false;
         const glm::ivec3 bSides = sides(a, b);
-        const Cut bCut = cutOf(bSides);
-        if (bCut == Cut::none || (aCut == Cut::edge && bCut == Cut::edge) || !overlap(a, aSides, b, bSides))
+        const PlaneCut bCut = cutOf(bSides);
+        if (bCut == PlaneCut::none || (aCut == PlaneCut::edge && bCut == PlaneCut::edge) ||
+            !overlap(a, aSides, b, bSides))
             return false;
-        return (aCut == Cut::through || continues(a, aSides, b)) && (bCut == Cut::through || continues(b, bSides, a));
+        return (aCut == PlaneCut::through || continues(a, aSides, b)) &&
+               (bCut == PlaneCut::through || continues(b, bSides, a));
     }
 
   private:
@@ -77,9 +79,9 @@ class Pairs {
         return count;
     }
 
-    static Cut cutOf(const glm::ivec3& s) {
-        if (std::min({s.x, s.y, s.z}) < 0 && std::max({s.x, s.y, s.z}) > 0) return Cut::through;
-        return std::abs(s.x) + std::abs(s.y) + std::abs(s.z) == 1 ? Cut::edge : Cut::none;
+    static PlaneCut cutOf(const glm::ivec3& s) {
+        if (std::min({s.x, s.y, s.z}) < 0 && std::max({s.x, s.y, s.z}) > 0) return PlaneCut::through;
+        return std::abs(s.x) + std::abs(s.y) + std::abs(s.z) == 1 ? PlaneCut::edge : PlaneCut::none;
     }
 
     // Returns the side of one triangle's plane on which each vertex of another lies.

@@ -19,7 +19,7 @@ constexpr std::size_t fewSegments = 8;
 constexpr double usefulPart = 0.75;
 
 /// A line in the polygon's plane, given by a point and the normal direction within the plane.
-struct Line {
+struct CuttingLine {
     glm::dvec3 point, across;
 
     double height(const glm::dvec3& p) const { return glm::dot(across, p - point); }
@@ -33,7 +33,7 @@ glm::dvec3 crossing(const glm::dvec3& a, double atA, const glm::dvec3& b, double
 template <class Item>
 using Halves = std::array<Item, 2>;
 
-Halves<Polygon> split(const Polygon& polygon, const Line& line) {
+Halves<Polygon> split(const Polygon& polygon, const CuttingLine& line) {
     Halves<Polygon> halves;
     for (std::size_t i = 0; i < polygon.size(); ++i) {
         const glm::dvec3 &a = polygon[i], &b = polygon[(i + 1) % polygon.size()];
@@ -48,7 +48,7 @@ Halves<Polygon> split(const Polygon& polygon, const Line& line) {
 }
 
 /// Splits segments. Segments along the line, and parts shorter than the slack, are on neither side.
-Halves<std::vector<Segment>> split(const std::vector<Segment>& segments, const Line& line, double slack) {
+Halves<std::vector<Segment>> split(const std::vector<Segment>& segments, const CuttingLine& line, double slack) {
     Halves<std::vector<Segment>> halves;
     for (const Segment& s : segments) {
         const double from = line.height(s.from), to = line.height(s.to);
@@ -64,7 +64,7 @@ Halves<std::vector<Segment>> split(const std::vector<Segment>& segments, const L
     return halves;
 }
 
-bool isThin(const Polygon& polygon, const Line& line, double slack) {
+bool isThin(const Polygon& polygon, const CuttingLine& line, double slack) {
     return std::none_of(polygon.begin(), polygon.end(),
                         [&](const glm::dvec3& p) { return std::abs(line.height(p)) > slack; });
 }
@@ -115,7 +115,7 @@ class Cutter {
         bool thin = true;  // one half is not wider than the slack
     };
 
-    Split splitBy(const Line& line, const Polygon& polygon, const std::vector<Segment>& segments) const {
+    Split splitBy(const CuttingLine& line, const Polygon& polygon, const std::vector<Segment>& segments) const {
         Split halves{split(polygon, line), split(segments, line, slack_), false};
         halves.thin = isThin(halves.polygons[0], line, slack_) || isThin(halves.polygons[1], line, slack_);
         return halves;
@@ -131,7 +131,7 @@ class Cutter {
     }
 
     /// Returns a line across the longer side of the segments' bounding box, with half of their midpoints on each side.
-    Line middle(const std::vector<Segment>& segments) const {
+    CuttingLine middle(const std::vector<Segment>& segments) const {
         std::vector<glm::dvec3> middles;
         for (const Segment& s : segments) middles.push_back(0.5 * (s.from + s.to));
         glm::dvec3 lower = middles[0], upper = middles[0];

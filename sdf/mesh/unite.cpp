@@ -30,11 +30,9 @@ constexpr double slackPart = 1.2e-7;
 constexpr double stepOff = 2;
 /// In units of the slack: max length of a contact that neighbours with a common vertex or edge have next to it.
 constexpr double shortContact = 4;
-/// Error of winding numbers that only decide a side, as a share of the distance to 1/2.
-constexpr double onlySide = 0.999;
 
 using Corners = std::array<glm::dvec3, 3>;
-using Heights = std::array<double, 3>;
+using CornerHeights = std::array<double, 3>;
 
 double slackOf(const Mesh& mesh) {
     const Bounds box = bounds(mesh);
@@ -43,12 +41,12 @@ double slackOf(const Mesh& mesh) {
 }
 
 /// A triangle in double precision.
-struct Face {
+struct DoubleTriangle {
     Corners corners;
     glm::dvec3 normal;  // unit normal, or 0 for a triangle without area
     double area;
 
-    Face(const Mesh& mesh, const glm::uvec3& t)
+    DoubleTriangle(const Mesh& mesh, const glm::uvec3& t)
         : corners{glm::dvec3(mesh.points[t.x]), glm::dvec3(mesh.points[t.y]), glm::dvec3(mesh.points[t.z])} {
         normal = glm::cross(corners[1] - corners[0], corners[2] - corners[0]);
         area = 0.5 * glm::length(normal);
@@ -62,9 +60,9 @@ struct Face {
 };
 
 /// Tests whether a box overlaps both a face's bounding box and its plane, with the slack as a margin.
-class Reach {
+class TriangleOverlap {
   public:
-    Reach(const Bounds& own, const Face& face, double slack)
+    TriangleOverlap(const Bounds& own, const DoubleTriangle& face, double slack)
         : box_{own.lower - float(slack), own.upper + float(slack)},
           normal_(face.normal),
           away_(glm::abs(face.normal)),
@@ -92,21 +90,21 @@ class Contacts {
 
     /// Returns the contact segments within a triangle, except for edges and vertices that it shares with neighbours.
     std::vector<Segment> within(unsigned triangle) const {
-        const Face face(mesh_, mesh_.triangles[triangle]);
+        const DoubleTriangle face(mesh_, mesh_.triangles[triangle]);
         std::vector<Segment> found;
         if (!(face.area > 0)) return found;
-        tree_.descend(Reach(tree_.boxOf(triangle), face, slack_), [&](unsigned other) {
+        tree_.descend(TriangleOverlap(tree_.boxOf(triangle), face, slack_), [&](unsigned other) {
             if (other != triangle) add(triangle, face, other, found);
         });
         return found;
     }
 
   private:
-    void add(unsigned triangle, const Face& face, unsigned other, std::vector<Segment>& found) const {
+    void add(unsigned triangle, const DoubleTriangle& face, unsigned other, std::vector<Segment>& found) const {
         const glm::uvec3& t = mesh_.triangles[other];
         const Corners corners{glm::dvec3(mesh_.points[t.x]), glm::dvec3(mesh_.points[t.y]),
                               glm::dvec3(mesh_.points[t.z])};
-        const Heights heights{face.height(corners[0]), face.height(corners[1]), face.height(corners[2])};
+        const CornerHeights heights{face.height(corners[0]), face.height(corners[1]), face.height(corners[2])};
         const auto [lowest, highest] = std::minmax({heights[0], heights[1], heights[2]});
         if (lowest > slack_ || highest < -slack_) return;
         for (Segment segment : traces(face, corners, heights)) {
@@ -117,7 +115,8 @@ class Contacts {
     }
 
     /// Returns the intersection of a triangle with a face's plane: nothing, a segment, or all three edges.
-    std::vector<Segment> traces(const Face& face, const Corners& corners, const Heights& heights) const {
+    std::vector<Segment> traces(const DoubleTriangle& face, const Corners& corners,
+                                const CornerHeights& heights) const {
         std::vector<Segment> edges;
         std::vector<glm::dvec3> points;
         for (std::size_t i = 0; i < 3; ++i) {
@@ -141,7 +140,7 @@ class Contacts {
         return best;
     }
 
-    bool alongSharedEdge(unsigned triangle, unsigned other, const Face& face, const Segment& segment) const {
+    bool alongSharedEdge(unsigned triangle, unsigned other, const DoubleTriangle& face, const Segment& segment) const {
         const glm::uvec3 &a = topology_.triangles[triangle], &b = topology_.triangles[other];
         const auto shares = [&b](unsigned vertex) { return vertex == b.x || vertex == b.y || vertex == b.z; };
         for (int i = 0; i < 3; ++i) {
@@ -194,7 +193,7 @@ class Uniter {
         });
     }
 
-    Face face(std::size_t triangle) const { return {mesh_, mesh_.triangles[triangle]}; }
+    DoubleTriangle face(std::size_t triangle) const { return {mesh_, mesh_.triangles[triangle]}; }
 
     void findContacts() {
         const TriangleTree tree(mesh_, progress_);
@@ -227,7 +226,7 @@ class Uniter {
 
     void judge(const std::vector<unsigned>& patches, const WindingNumber& winding) {
         forAll(patches.size(), [&](std::size_t p) {
-            const Face largest = face(patches[p]);
+            const DoubleTriangle largest = face(patches[p]);
             buried_[patches[p]] = largest.area > 0 && isBuried(largest.centroid(), largest.normal, winding);
         });
     }
@@ -243,8 +242,7 @@ class Uniter {
 
     bool isBuried(const glm::dvec3& point, const glm::dvec3& normal, const WindingNumber& winding) const {
         const glm::dvec3 step = stepOff * slack_ * normal;
-        return winding.estimate(point + step, onlySide).value > 0.5 &&
-               winding.estimate(point - step, onlySide).value > 0.5;
+        return winding.isInside(point + step) && winding.isInside(point - step);
     }
 
     bool isWhole(std::size_t triangle) const {

@@ -72,17 +72,8 @@ constexpr float rounding = 2e-6f;
 /// Direction components below this are replaced by it, so that division is possible.
 constexpr float minDirection = 1e-20f;
 
-inline Vec dot(const Points& a, const Points& b) {
-    return hn::Add(hn::Add(hn::Mul(a.x, b.x), hn::Mul(a.y, b.y)), hn::Mul(a.z, b.z));
-}
-
-inline Points cross(const Points& a, const Points& b) {
-    const auto det = [](Vec a, Vec b, Vec c, Vec d) { return hn::Sub(hn::Mul(a, b), hn::Mul(c, d)); };
-    return {det(a.y, b.z, a.z, b.y), det(a.z, b.x, a.x, b.z), det(a.x, b.y, a.y, b.x)};
-}
-
 // A stack of nodes to visit, nearest on top.
-struct Waiting {
+struct NodeStack {
     static constexpr std::size_t most = 256;  // seven for each of ten levels, and one
     std::array<float, most> entries;
     std::array<std::uint32_t, most> nodes;
@@ -116,7 +107,7 @@ class ExitSearch {
     }
 
     float run() {
-        Waiting waiting;
+        NodeStack waiting;
         waiting.insert(0, 0, tree_.boxes().root());
         while (waiting.count > 0) {
             --waiting.count;
@@ -131,7 +122,7 @@ class ExitSearch {
     }
 
   private:
-    void open(const BoxGroup& group, Waiting& waiting) const {
+    void open(const BoxGroup& group, NodeStack& waiting) const {
         const Tag tag;
         const std::size_t first = waiting.count;
         for (std::size_t lane = 0; lane < treeWidth; lane += hn::Lanes(tag)) {
@@ -154,19 +145,16 @@ class ExitSearch {
 
     void visit(const TriangleLeaf& leaf) {
         const Tag tag;
-        const Points d = all(ray_.direction);
+        const PointLanes d = all(ray_.direction);
         for (std::size_t lane = 0; lane < treeWidth; lane += hn::Lanes(tag)) {
-            const auto corner = [&](int i) {
-                const auto& c = leaf.corners[i];
-                return Points{hn::Load(tag, c[0] + lane), hn::Load(tag, c[1] + lane), hn::Load(tag, c[2] + lane)};
-            };
-            const Points a = corner(0), ab = corner(1) - a, ac = corner(2) - a;
+            const auto corner = [&](int i) { return loadLanes(tag, leaf.corners[i], lane); };
+            const PointLanes a = corner(0), ab = corner(1) - a, ac = corner(2) - a;
             const Vec ab2 = dot(ab, ab), ac2 = dot(ac, ac), room = hn::Set(tag, rounding);
             const Vec facing = dot(cross(ab, ac), d);
             const Vec facingRoom = hn::Mul(room, hn::Sqrt(hn::Mul(ab2, ac2)));
             const Mask faces = hn::Gt(hn::Add(facing, facingRoom), hn::Zero(tag));
             if (hn::AllFalse(tag, faces)) continue;
-            const Points from = all(ray_.origin) - a, side = cross(d, from);
+            const PointLanes from = all(ray_.origin) - a, side = cross(d, from);
             const Vec away = hn::Mul(room, hn::Sqrt(dot(from, from)));
             const Vec uRoom = hn::Mul(away, hn::Sqrt(ac2)), vRoom = hn::Mul(away, hn::Sqrt(ab2));
             const Vec u = hn::Add(dot(ac, side), uRoom), v = hn::Sub(vRoom, dot(ab, side));
@@ -179,7 +167,7 @@ class ExitSearch {
         }
     }
 
-    static Points all(const glm::vec3& p) {
+    static PointLanes all(const glm::vec3& p) {
         const Tag tag;
         return {hn::Set(tag, p.x), hn::Set(tag, p.y), hn::Set(tag, p.z)};
     }

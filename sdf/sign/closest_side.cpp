@@ -111,9 +111,9 @@ void ClosestSide::begin(const glm::dvec3& point) {
 }
 
 void ClosestSide::offer(std::uint32_t triangle) {
-    const auto same = [&](const Face& face) { return face.triangle == triangle; };
+    const auto same = [&](const CandidateFace& face) { return face.triangle == triangle; };
     if (std::any_of(faces_.begin(), faces_.end(), same)) return;
-    Face face{triangle, cornersOf(triangle), {}, 0};
+    CandidateFace face{triangle, cornersOf(triangle), {}, 0};
     face.closest = closestToOrigin(face.corners);
     face.distance = glm::length(face.closest);
     if (face.distance > distance_ + samePlace) return;
@@ -122,12 +122,12 @@ void ClosestSide::offer(std::uint32_t triangle) {
 }
 
 Side ClosestSide::side() const {
-    const auto nearer = [](const Face& a, const Face& b) { return a.distance < b.distance; };
+    const auto nearer = [](const CandidateFace& a, const CandidateFace& b) { return a.distance < b.distance; };
     const glm::dvec3 closest = std::min_element(faces_.begin(), faces_.end(), nearer)->closest;
     double sum = 0, weights = 0;
     for (auto face = faces_.begin(); face != faces_.end(); ++face) {
         if (glm::distance(face->closest, closest) > samePlace || !hasNormal(face->corners)) continue;
-        const auto duplicate = [&](const Face& other) { return sameCorners(other.corners, face->corners); };
+        const auto duplicate = [&](const CandidateFace& other) { return sameCorners(other.corners, face->corners); };
         if (std::any_of(faces_.begin(), face, duplicate)) continue;
         const auto& c = face->corners;
         const double angle = angleAt(c, closest);

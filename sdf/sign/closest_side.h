@@ -41,7 +41,7 @@ class ClosestSide {
     double distance() const { return distance_; }
 
   private:
-    struct Face {
+    struct CandidateFace {
         std::uint32_t triangle;
         std::array<glm::dvec3, 3> corners;  // relative to the point [voxels]
         glm::dvec3 closest;                 // likewise
@@ -52,7 +52,7 @@ class ClosestSide {
     double voxelsPerUnit_;
     glm::dvec3 point_{0};
     double distance_ = 0;
-    std::vector<Face> faces_;
+    std::vector<CandidateFace> faces_;
 };
 
 /// Returns how the segment from the origin to `way` crosses a triangle: +1 along its normal, -1 against it, 0 not at

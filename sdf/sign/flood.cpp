@@ -6,12 +6,12 @@
 
 #include <atomic>
 #include <cmath>
-#include <numeric>
 #include <span>
 #include <stdexcept>
 
 #include "sdf/base/progress.h"
 #include "sdf/bvh/winding_number.h"
+#include "sdf/mesh/topology.h"
 #include "sdf/sign/octree_cells.h"
 
 namespace bilayer::detail {
@@ -22,24 +22,6 @@ constexpr float slack = 1e-3f;
 /// Voxels closer than this are on the surface and belong to neither side [voxels].
 constexpr float onSurface = 1e-4f;
 constexpr std::uint32_t infinity = 0;  // the part that contains all space beyond the cells
-
-// Disjoint sets of connected parts of space.
-class Parts {
-  public:
-    explicit Parts(std::size_t count) : parent_(count) { std::iota(parent_.begin(), parent_.end(), 0u); }
-    std::uint32_t root(std::uint32_t part) {
-        while (parent_[part] != part) part = parent_[part] = parent_[parent_[part]];
-        return part;
-    }
-    void join(std::uint32_t a, std::uint32_t b) {
-        a = root(a);
-        b = root(b);
-        parent_[std::max(a, b)] = std::min(a, b);
-    }
-
-  private:
-    std::vector<std::uint32_t> parent_;
-};
 
 // Returns the connected components of a mask.
 std::vector<BlockMask> components(BlockMask mask) {
@@ -65,7 +47,7 @@ bool meet(const BlockMask& a, const BlockMask& b) {
     return bits != 0;
 }
 
-enum class Side : std::uint8_t { unknown, outside, inside };
+enum class FloodSide : std::uint8_t { unknown, outside, inside };
 
 class Flood {
   public:
@@ -76,7 +58,7 @@ class Flood {
           background_(background),
           h_(voxelSize),
           progress_(progress),
-          states_(vectorOf<State>(cells.all().size(), progress)) {}
+          states_(vectorOf<CellState>(cells.all().size(), progress)) {}
 
     // Finds the signs of all voxels in leaves, and of the cells between leaves.
     void run();
@@ -84,7 +66,7 @@ class Flood {
     bool cellInside(std::size_t cell) const { return test(states_[cell].inside, 0); }
 
   private:
-    struct State {
+    struct CellState {
         std::vector<BlockMask> parts;  // of voxels where the ball's centre fits
         std::uint32_t first = 0;       // index of the first part
         BlockMask known{}, inside{};
@@ -93,7 +75,7 @@ class Flood {
         std::array<std::uint32_t, 27> around{};  // cells of the blocks around a leaf, beyond() if none
     };
     struct Neighbour {
-        Side side;
+        FloodSide side;
         bool fresh;      // since the last step
         float distance;  // [m]
     };
@@ -102,12 +84,12 @@ class Flood {
     void joinParts();
     template <class Join>
     void joinAcross(std::size_t cell, int face, const Join& join) const;
-    void sidesOfParts(Parts& parts);
+    void sidesOfParts(DisjointSets& parts);
     template <class Passes>
     bool step(const Passes& passes);
     template <class Passes>
     void stepIn(std::size_t cell, const Passes& passes);
-    Neighbour neighbour(const State& state, const openvdb::Coord& local) const;
+    Neighbour neighbour(const CellState& state, const openvdb::Coord& local) const;
     void settleRest();
     std::uint32_t beyond() const { return std::uint32_t(states_.size()); }
 
@@ -116,7 +98,7 @@ class Flood {
     float gap_, background_;
     double h_;
     Progress* progress_;
-    std::vector<State> states_;
+    std::vector<CellState> states_;
 };
 
 void Flood::run() {
@@ -130,7 +112,7 @@ void Flood::run() {
     while (step(certain)) {
     }
     // The remaining voxels are very close to the surface, so the triangles themselves are tested.
-    for (State& state : states_) state.fresh = state.known;
+    for (CellState& state : states_) state.fresh = state.known;
     const auto clear = [this](std::size_t cell, unsigned voxel, const openvdb::Coord& link, float a, float b) {
         if (!(std::min(a, b) > onSurface * float(h_))) return false;
         poll(progress_);
@@ -147,7 +129,7 @@ void Flood::findParts() {
     const float free = (0.5f * gap_ + 0.5f + slack) * float(h_);
     tbb::parallel_for(std::size_t(0), states_.size(), [&](std::size_t c) {
         const OctreeCell& cell = cells_.all()[c];
-        State& state = states_[c];
+        CellState& state = states_[c];
         if (!cell.leaf) return;
         poll(progress_);
         state.parts = components(farther(*cell.leaf, free));
@@ -167,7 +149,7 @@ void Flood::joinAcross(std::size_t cell, int face, const Join& join) const {
     next[face / 2] += face % 2 ? self.side : -1;
     const std::size_t found = cells_.find(next);
     const auto each = [&](std::size_t c, int axis, int side, const auto& use) {
-        const State& s = states_[c];
+        const CellState& s = states_[c];
         const BlockMask all{~0ull, ~0ull, ~0ull, ~0ull, ~0ull, ~0ull, ~0ull, ~0ull};
         if (!cells_.all()[c].leaf) return use(s.first, across(all, axis, side));
         for (std::uint32_t p = 0; p < s.parts.size(); ++p) {
@@ -200,15 +182,15 @@ void Flood::joinParts() {
         for (int face = 0; face < 6; ++face)
             joinAcross(c, face, [&](std::uint32_t a, std::uint32_t b) { mine.emplace_back(a, b); });
     });
-    Parts parts(count);
+    DisjointSets parts(count);
     for (const auto& some : pairs)
         for (const std::size_t i : Polled(some.size(), progress_)) parts.join(some[i].first, some[i].second);
     sidesOfParts(parts);
 }
 
-void Flood::sidesOfParts(Parts& parts) {
+void Flood::sidesOfParts(DisjointSets& parts) {
     for (const std::size_t c : Polled(states_.size(), progress_)) {
-        State& state = states_[c];
+        CellState& state = states_[c];
         if (!cells_.all()[c].leaf) {
             state.known.fill(~0ull);
             if (parts.root(state.first) != infinity) state.inside.fill(~0ull);
@@ -223,17 +205,19 @@ void Flood::sidesOfParts(Parts& parts) {
 }
 
 // Returns a voxel in or next to a leaf, by its coordinates relative to the leaf's first voxel.
-Flood::Neighbour Flood::neighbour(const State& state, const openvdb::Coord& local) const {
+Flood::Neighbour Flood::neighbour(const CellState& state, const openvdb::Coord& local) const {
     const int block = ((local.x() + blockSide) / blockSide * 3 + (local.y() + blockSide) / blockSide) * 3 +
                       (local.z() + blockSide) / blockSide;
     const std::uint32_t cell = state.around[std::size_t(block)];
-    if (cell == beyond()) return {Side::outside, true, background_};
-    const State& other = states_[cell];
+    if (cell == beyond()) return {FloodSide::outside, true, background_};
+    const CellState& other = states_[cell];
     const BandLeaf* leaf = cells_.all()[cell].leaf;
     const unsigned at = BandLeaf::coordToOffset(local);
-    if (!leaf) return {test(other.inside, 0) ? Side::inside : Side::outside, test(other.fresh, 0), background_};
-    if (!test(other.known, at)) return {Side::unknown, false, 0};
-    return {test(other.inside, at) ? Side::inside : Side::outside, test(other.fresh, at), leaf->buffer().data()[at]};
+    if (!leaf)
+        return {test(other.inside, 0) ? FloodSide::inside : FloodSide::outside, test(other.fresh, 0), background_};
+    if (!test(other.known, at)) return {FloodSide::unknown, false, 0};
+    return {test(other.inside, at) ? FloodSide::inside : FloodSide::outside, test(other.fresh, at),
+            leaf->buffer().data()[at]};
 }
 
 // Grows by one step from the voxels that the last step reached, over the links that `passes` accepts.
@@ -246,7 +230,7 @@ bool Flood::step(const Passes& passes) {
     });
     std::atomic<bool> grew = false;
     tbb::parallel_for(std::size_t(0), states_.size(), [&](std::size_t c) {
-        State& state = states_[c];
+        CellState& state = states_[c];
         for (std::size_t x = 0; x < blockSide; ++x) {
             state.fresh[x] = state.outsideNext[x] | state.insideNext[x];
             state.known[x] |= state.fresh[x];
@@ -259,21 +243,21 @@ bool Flood::step(const Passes& passes) {
 
 template <class Passes>
 void Flood::stepIn(std::size_t cell, const Passes& passes) {
-    State& state = states_[cell];
+    CellState& state = states_[cell];
     state.outsideNext = state.insideNext = {};
     const float* distances = cells_.all()[cell].leaf->buffer().data();
     for (unsigned voxel = 0; voxel < blockVoxels; ++voxel) {
         if (test(state.known, voxel)) continue;
         const openvdb::Coord local(int(voxel / 64), int(voxel / 8 % 8), int(voxel % 8));
-        Side found = Side::unknown;
-        for (int i = 0; i < 27 && found != Side::outside; ++i) {
+        FloodSide found = FloodSide::unknown;
+        for (int i = 0; i < 27 && found != FloodSide::outside; ++i) {
             const openvdb::Coord link(i / 9 - 1, i / 3 % 3 - 1, i % 3 - 1);
-            const Neighbour next = i == 13 ? Neighbour{Side::unknown, false, 0} : neighbour(state, local + link);
-            if (next.side == Side::unknown || !next.fresh || next.side == found) continue;
+            const Neighbour next = i == 13 ? Neighbour{FloodSide::unknown, false, 0} : neighbour(state, local + link);
+            if (next.side == FloodSide::unknown || !next.fresh || next.side == found) continue;
             if (passes(cell, voxel, link, distances[voxel], next.distance)) found = next.side;
         }
-        if (found == Side::outside) set(state.outsideNext, voxel);
-        if (found == Side::inside) set(state.insideNext, voxel);
+        if (found == FloodSide::outside) set(state.outsideNext, voxel);
+        if (found == FloodSide::inside) set(state.insideNext, voxel);
     }
 }
 

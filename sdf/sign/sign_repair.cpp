@@ -42,18 +42,18 @@ Tile tileAt(std::int64_t x, std::int64_t y) {
 }
 
 /// The integers in an interval.
-struct Range {
+struct Interval {
     std::int64_t first, last;
 
-    Range(std::int64_t from, std::int64_t to) : first(from), last(to) {}
-    Range(double a, double b, double c) {
+    Interval(std::int64_t from, std::int64_t to) : first(from), last(to) {}
+    Interval(double a, double b, double c) {
         const double low = std::min(std::min(a, b), c), high = std::max(std::max(a, b), c);
         first = std::int64_t(low);
         first += double(first) < low;
         last = std::int64_t(high);
         last -= double(last) > high;
     }
-    Range within(const Range& other) const { return {std::max(first, other.first), std::min(last, other.last)}; }
+    Interval within(const Interval& other) const { return {std::max(first, other.first), std::min(last, other.last)}; }
     bool empty() const { return first > last; }
 };
 
@@ -70,7 +70,7 @@ bool isFifth(std::int64_t x, std::int64_t y) {
     return (x + 2 * y) % 5 == 0;
 }
 
-bool anyFifth(const Range& x, const Range& y) {
+bool anyFifth(const Interval& x, const Interval& y) {
     for (std::int64_t u = x.first; u <= std::min(x.last, x.first + 4); ++u)
         if (((2 * u - y.first) % 5 + 5) % 5 <= y.last - y.first) return true;
     return false;
@@ -98,7 +98,7 @@ struct LeafInTile {
 };
 
 /// A crossing of a column and a triangle.
-struct Crossing {
+struct ColumnCrossing {
     std::int32_t above;   ///< the first voxel above it
     std::uint8_t column;  ///< index in its tile
     std::int8_t sign;     ///< +1: the solid begins there, going up; -1: it ends
@@ -112,8 +112,8 @@ class Rise {
     /// Compares a leaf, corrects it, and advances to its top.
     /// @param crossings  those between the last leaf's top and this one's
     /// @param asked      the columns to compare
-    void repair(Leaf& leaf, std::span<const Crossing> crossings, std::uint64_t asked, SignRepair& sum) {
-        for (const Crossing& crossing : crossings) {
+    void repair(Leaf& leaf, std::span<const ColumnCrossing> crossings, std::uint64_t asked, SignRepair& sum) {
+        for (const ColumnCrossing& crossing : crossings) {
             const std::int32_t k = std::max(crossing.above - leaf.origin().z(), 0);
             changes_[std::size_t(crossing.column * side + k)] += crossing.sign;
             crossed_ |= std::uint64_t(1) << crossing.column;
@@ -143,9 +143,9 @@ class Rise {
             float& value = leaf.buffer().data()[voxel];
             if (std::signbit(value) == (winding > 0) || std::abs(value) <= tolerance_) continue;
             if (!leaf.isValueOn(openvdb::Index(voxel))) continue;
-            const bool mayTurn = winding >= 0 && std::abs(value) < limit_;
-            if (mayTurn) value = -value;
-            ++(mayTurn ? sum.repaired : sum.refused);
+            const bool mayFlip = winding >= 0 && std::abs(value) < limit_;
+            if (mayFlip) value = -value;
+            ++(mayFlip ? sum.repaired : sum.refused);
         }
         const std::uint64_t bit = std::uint64_t(1) << column;
         inside_ = winding > 0 ? inside_ | bit : inside_ & ~bit;
@@ -159,7 +159,7 @@ class Rise {
 
 /// The crossings of a tile's columns, sorted by the leaf that follows them.
 struct CrossingsOfTile {
-    std::vector<Crossing> found, sorted;
+    std::vector<ColumnCrossing> found, sorted;
     std::vector<std::size_t> begins;
 };
 
@@ -235,12 +235,12 @@ class Repairer {
         const glm::uvec3& t = mesh_.triangles[triangle];
         const glm::vec3 &a = mesh_.points[t.x], &b = mesh_.points[t.y], &c = mesh_.points[t.z];
         const auto range = [&](int axis) {
-            return Range(double(a[axis]) * voxelsPerUnit_, double(b[axis]) * voxelsPerUnit_,
-                         double(c[axis]) * voxelsPerUnit_);
+            return Interval(double(a[axis]) * voxelsPerUnit_, double(b[axis]) * voxelsPerUnit_,
+                            double(c[axis]) * voxelsPerUnit_);
         };
-        const Range x = range(0);
+        const Interval x = range(0);
         if (x.empty()) return;
-        const Range y = range(1);
+        const Interval y = range(1);
         if (y.empty() || (fifths_ && !anyFifth(x, y))) return;
         for (std::int64_t u = x.first >> 3; u <= x.last >> 3; ++u) {
             auto tile = std::lower_bound(tiles_.begin(), tiles_.end(), tileAt(u, y.first >> 3));
@@ -267,28 +267,28 @@ class Repairer {
 
     // The first leaf that a crossing affects is the lowest one whose top is not below it.
     static void sortByLeaf(std::span<const LeafInTile> leaves, CrossingsOfTile& crossings) {
-        const auto leafOf = [&](const Crossing& crossing) {
+        const auto leafOf = [&](const ColumnCrossing& crossing) {
             return std::size_t(
                 std::partition_point(leaves.begin(), leaves.end(),
                                      [&](const LeafInTile& one) { return one.bottom() + side <= crossing.above; }) -
                 leaves.begin());
         };
         crossings.begins.assign(leaves.size() + 2, 0);
-        for (const Crossing& crossing : crossings.found) ++crossings.begins[leafOf(crossing) + 1];
+        for (const ColumnCrossing& crossing : crossings.found) ++crossings.begins[leafOf(crossing) + 1];
         for (std::size_t i = 1; i < crossings.begins.size(); ++i) crossings.begins[i] += crossings.begins[i - 1];
         crossings.sorted.resize(crossings.found.size());
         std::vector<std::size_t>& next = crossings.begins;
-        for (const Crossing& crossing : crossings.found) crossings.sorted[next[leafOf(crossing)]++] = crossing;
+        for (const ColumnCrossing& crossing : crossings.found) crossings.sorted[next[leafOf(crossing)]++] = crossing;
         next.insert(next.begin(), 0);
     }
 
     void addCrossings(std::uint32_t triangle, const openvdb::Coord& origin, std::uint64_t asked,
-                      std::vector<Crossing>& crossings) const {
+                      std::vector<ColumnCrossing>& crossings) const {
         const glm::dvec3 p[3] = {corner(triangle, 0), corner(triangle, 1), corner(triangle, 2)};
         const glm::dvec2 a(p[0]), b(p[1]), c(p[2]);
         const std::int64_t x0 = origin.x(), y0 = origin.y();
-        const Range xs = Range(a.x, b.x, c.x).within({x0, x0 + side - 1});
-        const Range ys = Range(a.y, b.y, c.y).within({y0, y0 + side - 1});
+        const Interval xs = Interval(a.x, b.x, c.x).within({x0, x0 + side - 1});
+        const Interval ys = Interval(a.y, b.y, c.y).within({y0, y0 + side - 1});
         for (std::int64_t x = xs.first; x <= xs.last; ++x)
             for (std::int64_t y = ys.first; y <= ys.last; ++y) {
                 const std::int64_t column = (x - x0) * side + (y - y0);

@@ -32,8 +32,6 @@ constexpr std::size_t taskItems = 4096;
 constexpr double uselessError = 10;
 /// Error of an estimate whose sign is propagated to other voxels, as a fraction of its distance to one half.
 constexpr double handOn = 0.5;
-/// The same where only the side of one half matters: 1, less a margin for rounding.
-constexpr double onlySide = 0.999;
 /// Tolerance for the rounding of floats in sums of distances [voxels].
 constexpr float slack = 1e-3f;
 /// Where the winding number may change by more than this per voxel, it is evaluated in smaller regions.
@@ -387,7 +385,7 @@ void WindingSlope::build(std::size_t at, std::size_t begin, std::size_t end, Pro
     Node& node = nodes_[at];
     node = {glm::dvec3(edges_[begin].at), 0, 0, begin, end, 0};
     for (std::size_t i = begin; i < end; ++i) {
-        const Edge& edge = edges_[i];
+        const UnbalancedEdge& edge = edges_[i];
         node.length += edge.times * glm::length(edge.to - edge.from);
         node.radius = std::max({node.radius, glm::length(edge.from - node.centre), glm::length(edge.to - node.centre)});
     }
@@ -409,7 +407,7 @@ double WindingSlope::bound(std::size_t at, const glm::dvec3& centre, double radi
     return sum;
 }
 
-double WindingSlope::ofEdge(const Edge& edge, const glm::dvec3& centre, double radius) {
+double WindingSlope::ofEdge(const UnbalancedEdge& edge, const glm::dvec3& centre, double radius) {
     const glm::dvec3 way = edge.to - edge.from;
     const double squared = glm::dot(way, way);
     const double along = squared > 0 ? std::clamp(glm::dot(centre - edge.from, way) / squared, 0.0, 1.0) : 0.0;
@@ -446,11 +444,10 @@ struct Answer {
 
 Answer ask(const Question& question, const glm::dvec3& point) {
     poll(question.progress);
-    const WindingNumber::Estimate e = question.winding.estimate(point, question.slope ? handOn : onlySide);
     // If the number changes only across the surface, an answer is valid up to the surface.
-    const double margin =
-        question.slope ? std::max(std::abs(e.value - 0.5) - e.error, 0.0) : std::numeric_limits<double>::infinity();
-    return {e.value > 0.5, margin};
+    if (!question.slope) return {question.winding.isInside(point), std::numeric_limits<double>::infinity()};
+    const WindingNumber::Estimate e = question.winding.estimate(point, handOn);
+    return {e.value > 0.5, std::max(std::abs(e.value - 0.5) - e.error, 0.0)};
 }
 
 // The signs of one brick: of leaves voxel by voxel, of each cell between leaves at once.
