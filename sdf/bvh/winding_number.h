@@ -12,6 +12,7 @@
 #include <vector>
 
 #include <bilayer/sdf/mesh.h>
+#include "sdf/bvh/symmetric_tensors.h"
 
 namespace bilayer::detail {
 
@@ -52,15 +53,15 @@ class WindingNumber {
 
     using Corners = std::array<glm::vec3, 3>;
     struct Node {
-        glm::dvec3 centre;               // area-weighted
-        double radius;                   // of a ball around `centre` that contains all triangles
-        double total;                    // area
-        glm::dvec3 area;                 // integral of the normal n
-        std::array<double, 6> moment;    // of s n^T, symmetric part, s relative to the centre: xx, yy, zz, xy, yz, zx
-        std::array<double, 10> moment2;  // of s s^T (x) n, symmetric part: see product() in winding.cpp
-        double spread;                   // integral of |s|^2
-        std::uint32_t begin, end;        // range of triangles
-        std::uint32_t right;             // the second child, or 0 for a leaf; the first child is the next node
+        glm::dvec3 centre;         // area-weighted
+        double radius;             // of a ball around `centre` that contains all triangles
+        double total;              // area
+        glm::dvec3 area;           // integral of the normal n
+        Symmetric2 moment;         // of s n^T, symmetric part, s relative to the centre
+        Symmetric3 moment2;        // of s s^T (x) n, symmetric part
+        double spread;             // integral of |s|^2
+        std::uint32_t begin, end;  // range of triangles
+        std::uint32_t right;       // the second child, or 0 for a leaf; the first child is the next node
     };
     struct Item;
 
@@ -72,40 +73,6 @@ class WindingNumber {
                 std::vector<std::uint32_t>& open) const;
 
     std::vector<Corners> triangles_;
-    std::vector<Node> nodes_;
-};
-
-/// An upper bound on the gradient of the winding number. Away from the surface, the gradient equals the field of a
-/// current along the boundary of the mesh (Biot-Savart law). Edges with balanced half-edges do not contribute.
-/// Thread-safe.
-class WindingSlope {
-  public:
-    /// @param progress  polled, unless null
-    explicit WindingSlope(const Mesh& mesh, Progress* progress = nullptr);
-
-    /// Returns an upper bound on the gradient's magnitude in a ball [1/m]. Links in the ball must not cross the
-    /// surface.
-    double operator()(const glm::dvec3& centre, double radius) const;
-
-  private:
-    struct UnbalancedEdge {
-        glm::dvec3 from, to;
-        double times;  // excess of half-edges in one direction over the other
-        glm::vec3 at;  // midpoint
-        std::uint32_t index;
-    };
-    struct Node {
-        glm::dvec3 centre;
-        double radius, length;
-        std::size_t begin, end, right;
-    };
-    static constexpr std::size_t leafEdges = 4;
-
-    void build(std::size_t at, std::size_t begin, std::size_t end, Progress* progress);
-    double bound(std::size_t at, const glm::dvec3& centre, double radius) const;
-    static double ofEdge(const UnbalancedEdge& edge, const glm::dvec3& centre, double radius);
-
-    std::vector<UnbalancedEdge> edges_;
     std::vector<Node> nodes_;
 };
 

@@ -13,8 +13,8 @@
 #include <utility>
 #include <vector>
 
+#include "sdf/bvh/winding_number.h"
 #include "sdf/mesh/topology.h"
-#include "sdf/sign/winding.h"
 
 namespace bilayer::detail {
 namespace {

@@ -17,8 +17,6 @@
 namespace bilayer::detail {
 namespace {
 
-/// Tolerance for the rounding of floats in sums of distances [voxels].
-constexpr float slack = 1e-3f;
 /// Voxels closer than this are on the surface and belong to neither side [voxels].
 constexpr float onSurface = 1e-4f;
 constexpr std::uint32_t infinity = 0;  // the part that contains all space beyond the cells
@@ -106,7 +104,7 @@ void Flood::run() {
     joinParts();
     const auto certain = [this](std::size_t, unsigned, const openvdb::Coord& link, float a, float b) {
         const double length =
-            std::sqrt(double(link.x() * link.x() + link.y() * link.y() + link.z() * link.z())) + double(slack);
+            std::sqrt(double(link.x() * link.x() + link.y() * link.y() + link.z() * link.z())) + double(distanceSlack);
         return double(a) + double(b) > length * h_;
     };
     while (step(certain)) {
@@ -126,7 +124,7 @@ void Flood::run() {
 
 void Flood::findParts() {
     // Links between two voxels farther than this keep gap / 2 from the surface along their whole length.
-    const float free = (0.5f * gap_ + 0.5f + slack) * float(h_);
+    const float free = (0.5f * gap_ + 0.5f + distanceSlack) * float(h_);
     tbb::parallel_for(std::size_t(0), states_.size(), [&](std::size_t c) {
         const OctreeCell& cell = cells_.all()[c];
         CellState& state = states_[c];
@@ -275,7 +273,7 @@ void Flood::settleRest() {
 void signByFlood(openvdb::FloatGrid& grid, const Mesh& mesh, float gap, const BandWidths& widths, Progress* progress) {
     const float reach = 0.5f * gap + 1;
     if (!(gap >= 0)) throw std::invalid_argument(fmt::format("gap must be at least 0 voxels, not {}", gap));
-    if (grid.background() < (reach - slack) * widths.voxelSize)
+    if (grid.background() < (reach - distanceSlack) * widths.voxelSize)
         throw std::invalid_argument(fmt::format("a gap of {} voxels needs distances up to {} voxels", gap, reach));
     validate(mesh);
     const float background = grid.background();

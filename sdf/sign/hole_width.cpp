@@ -20,6 +20,7 @@
 #include "sdf/bvh/triangle_tree.h"
 #include "sdf/bvh/winding_number.h"
 #include "sdf/sign/closest_side.h"
+#include "sdf/sign/winding_slope.h"
 
 namespace bilayer::detail {
 namespace {

@@ -12,7 +12,6 @@
 namespace bilayer::detail {
 namespace {
 
-constexpr std::int32_t brickVoxels = 64;
 /// Side of the largest node of an OpenVDB tree [voxels]. Cells aligned to it become the fewest tiles.
 constexpr std::int64_t nodeVoxels = 4096;
 constexpr std::uint64_t lowestZ = 0x0101010101010101ull;  // the voxels with z = 0 in a slice
@@ -47,8 +46,8 @@ OctreeCells::OctreeCells(std::vector<BandLeaf*> leaves, const openvdb::CoordBBox
 
 void OctreeCells::cut(std::span<BandLeaf* const> leaves, const openvdb::Coord& origin, std::int64_t side,
                       Progress* progress) {
-    if (side == brickVoxels) poll(progress);
-    if (side == brickVoxels || (side > brickVoxels && leaves.empty())) bricks_.push_back(cells_.size());
+    if (side == brickSide) poll(progress);
+    if (side == brickSide || (side > brickSide && leaves.empty())) bricks_.push_back(cells_.size());
     if (leaves.empty() || side == BandLeaf::DIM) {
         cells_.push_back({origin, std::int32_t(side), leaves.empty() ? nullptr : leaves.front()});
         return;

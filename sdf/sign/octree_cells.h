@@ -26,6 +26,7 @@ struct OctreeCell {
 
 class OctreeCells {
   public:
+    static constexpr std::int32_t brickSide = 64;  ///< [voxels]
     static constexpr std::size_t none = std::numeric_limits<std::size_t>::max();
 
     /// Divides a cube that contains the leaves (any order, at least one) and the box `space` [voxels].
@@ -47,6 +48,9 @@ class OctreeCells {
     std::vector<OctreeCell> cells_;
     std::vector<std::size_t> bricks_;
 };
+
+/// Tolerance for the rounding of floats in sums of distances [voxels].
+inline constexpr float distanceSlack = 1e-3f;
 
 inline bool test(const BlockMask& mask, unsigned voxel) {
     return (mask[voxel / 64] >> (voxel % 64)) & 1;

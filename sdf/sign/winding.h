@@ -1,11 +1,10 @@
-// Signs by the generalized winding number (winding_number.h). Handles holes, overlaps and triangle soups if most faces
-// are oriented correctly.
+// Signs by the generalized winding number (bvh/winding_number.h). Handles holes, overlaps and triangle soups if most
+// faces are oriented correctly.
 #pragma once
 
 #include <openvdb/openvdb.h>
 
 #include <bilayer/sdf/mesh.h>
-#include "sdf/bvh/winding_number.h"
 #include "sdf/leaf/band.h"
 
 namespace bilayer::detail {

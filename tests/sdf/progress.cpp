@@ -9,6 +9,7 @@
 #include "demos/shared/shapes.h"
 #include "sdf/bvh/triangle_tree.h"
 #include "sdf/bvh/wide_tree.h"
+#include "sdf/bvh/winding_number.h"
 #include "sdf/mesh/orient.h"
 #include "sdf/mesh/side_classification.h"
 #include "sdf/mesh/topology.h"

@@ -1,0 +1,17 @@
+// Signs of the space between leaves by winding numbers.
+#pragma once
+
+#include <openvdb/openvdb.h>
+
+#include <vector>
+
+#include "sdf/sign/winding_brick.h"
+#include "sdf/sign/winding_query.h"
+
+namespace bilayer::detail {
+
+/// Signs the cells of a brick without leaves, each at once if possible. Adds the cubes that are inside to
+/// `insideBoxes`.
+void signEmptyCells(const WindingQuery& query, const WindingBrick& brick, std::vector<openvdb::CoordBBox>& insideBoxes);
+
+}  // namespace bilayer::detail
