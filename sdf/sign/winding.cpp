@@ -10,6 +10,7 @@
 #include <span>
 
 #include "sdf/base/progress.h"
+#include "sdf/leaf/build_size.h"
 #include "sdf/sign/octree_cells.h"
 #include "sdf/sign/winding_cells.h"
 #include "sdf/sign/winding_leaves.h"
@@ -20,15 +21,14 @@ namespace {
 // Returns the region where an open mesh's winding number can exceed one half.
 // At a distance R the number is at most area / (4 pi R^2).
 openvdb::CoordBBox spaceOf(const std::vector<BandLeaf*>& leaves, const WindingQuery& query) {
-    constexpr double farthest = 1e9;  // [voxels], as coordinates in a build
     openvdb::CoordBBox box;
     for (const BandLeaf* leaf : leaves) box.expand(leaf->getNodeBoundingBox());
     if (!query.slope) return box;
     const double reach = std::sqrt(query.winding.area() / (2 * glm::pi<double>())) / query.voxelSize;
-    const auto margin = std::int32_t(std::min(std::ceil(reach), farthest));
+    const auto margin = std::int32_t(std::min(std::ceil(reach), farthestIndex));
     for (int axis = 0; axis < 3; ++axis) {
-        box.min()[axis] = std::int32_t(std::max(double(box.min()[axis]) - margin, -farthest));
-        box.max()[axis] = std::int32_t(std::min(double(box.max()[axis]) + margin, farthest));
+        box.min()[axis] = std::int32_t(std::max(double(box.min()[axis]) - margin, -farthestIndex));
+        box.max()[axis] = std::int32_t(std::min(double(box.max()[axis]) + margin, farthestIndex));
     }
     return box;
 }

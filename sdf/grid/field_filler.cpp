@@ -1,0 +1,198 @@
+#include "sdf/grid/field_filler.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <atomic>
+#include <memory>
+#include <stdexcept>
+#include <utility>
+#include <vector>
+
+#include <bilayer/sdf/grids.h>
+#include <bilayer/sdf/inspect.h>
+#include "sdf/fill/double_layer.h"
+#include "sdf/fill/exact.h"
+#include "sdf/fill/pseudonormal.h"
+#include "sdf/leaf/build_options.h"
+#include "sdf/mesh/orient.h"
+#include "sdf/mesh/unite.h"
+#include "sdf/sign/flood.h"
+#include "sdf/sign/sign_choice.h"
+#include "sdf/sign/sign_repair.h"
+#include "sdf/sign/winding.h"
+
+namespace bilayer::detail {
+namespace {
+
+// Returns the distances of blocks, negated where another field of the same surface is negative.
+std::vector<float> withSides(const openvdb::FloatGrid& sides, const FilledBlocks& blocks) {
+    std::vector<float> distances(blocks.distances.begin(), blocks.distances.end());
+    const auto values = sides.getConstAccessor();
+    for (std::size_t i = 0; i < distances.size(); ++i) {
+        const glm::ivec3& block = blocks.origins[i / blockVoxels];
+        const int voxel = int(i % blockVoxels);
+        const openvdb::Coord at(block.x + voxel / 64, block.y + voxel / 8 % 8, block.z + voxel % 8);
+        if (values.getValue(at) < 0) distances[i] = -distances[i];
+    }
+    return distances;
+}
+
+Assembler::Plain plainBlocks(const BuildOptions& options, Sign sign) {
+    return sign == Sign::normals && enclosesSurface(options) ? Assembler::Plain::drop : Assembler::Plain::keep;
+}
+
+}  // namespace
+
+FieldFiller::FieldFiller(const Mesh& mesh, const BuildOptions& options, const BlockFiller* device, BuildTimes& times)
+    : mesh_(mesh), options_(options), device_(device), times_(times), progress_(options.progress) {
+    times_ = {};
+    progress_.poll();
+    validate(mesh_);
+    progress_.poll();
+    extent_ = extentOf(mesh_);
+    const bool layers = options_.method == Method::doubleLayer;
+    checkSize(mesh_, extent_, options_, layers ? fillParameters(options_).reach : reachOf(options_, options_.sign));
+    progress_.poll();
+}
+
+void FieldFiller::fillWithOwnSigns() {
+    Stopwatch part;
+    const bool prism = options_.method == Method::prism;
+    if (prism)
+        signs_ = {"prisms", "the side of the nearest triangle whose prism holds the voxel"};
+    else
+        signs_ = {"layers", "the nearer of two layers tells the side"};
+    FillParameters parameters = fillParameters(options_);
+    if (prism) parameters.reach = reachOf(options_, Sign::normals);
+    Assembler assembler(bandOf(options_), options_.triangles, Assembler::Plain::keep, progress_);
+    const MeshJob job{mesh_,
+                      options_.voxelSize,
+                      parameters.reach,
+                      options_.triangles,
+                      true,
+                      [&](const FilledBlocks& blocks) { take(assembler, blocks); },
+                      progress_};
+    if (device_)
+        device_->fill({job, options_, extent_.box, parameters});
+    else
+        fillDoubleLayer(job, extent_.box, options_.doubleLayer, parameters);
+    times_.fill += part.lap();
+    finish(assembler);
+    times_.assemble += part.lap();
+}
+
+Sign FieldFiller::fill(const Mesh& mesh, Sign sign, const std::string& reason, Method method) {
+    if (options_.unite && sign != Sign::flood && fillUnion(mesh)) return Sign::winding;
+    fillFrom(mesh, mesh, sign, reason, method);
+    return sign;
+}
+
+// The union is that of the mesh after orient(), as outwardMesh() documents.
+bool FieldFiller::fillUnion(const Mesh& mesh) {
+    Stopwatch part;
+    UnionSurface united = unite(mesh, &progress_);
+    if (!united.changed()) return false;
+    const Orientation solids = orient(mesh, &progress_);
+    if (solids.turnedTriangles > 0) united = unite(solids.mesh, &progress_);
+    times_.tiles += part.lap();
+    fillFrom(united.mesh, solids.mesh, Sign::winding, unionReason(united), options_.method);
+    return true;
+}
+
+void FieldFiller::fillFrom(const Mesh& mesh, const Mesh& solids, Sign sign, const std::string& reason, Method method,
+                           const Adapt& adapt) {
+    Stopwatch part;
+    const bool byNormals = sign == Sign::normals;
+    const float reach = reachOf(options_, sign);
+    const BandWidths widths = bandOf(options_);
+    Assembler assembler(byNormals ? widths : BandWidths{reach, reach, options_.voxelSize}, options_.triangles,
+                        plainBlocks(options_, sign), progress_);
+    std::atomic<std::size_t> undecided = 0, conflicts = 0;
+    MeshJob job{mesh,       options_.voxelSize,
+                reach,      options_.triangles,
+                byNormals,  [&](const FilledBlocks& blocks) { take(assembler, blocks); },
+                progress_,  {},
+                &undecided, &conflicts};
+    if (adapt) adapt(job, assembler);
+    // Flipping triangles does not change the bounding box.
+    if (device_)
+        device_->fill({job, options_, extent_.box, {}});
+    else if (method == Method::exact)
+        fillExact(job, extent_.box);
+    else
+        fillPseudonormal(job);
+    times_.fill += part.lap();
+    finish(assembler);
+    progress_.poll();
+    if (sign == Sign::winding) signByWinding(*distance_, solids, widths, balanced(solids, &progress_), &progress_);
+    if (sign == Sign::flood) signByFlood(*distance_, mesh, options_.gap, widths, &progress_);
+    if (byNormals) conflicts += assembler.conflicts(*distance_);
+    signs_ = {nameOf(sign), reason, conflicts, undecided};
+    const bool isKnownToBeClean = options_.inspected && options_.inspected->selfIntersections == 0;
+    if (byNormals && options_.sign == Sign::automatic && conflicts == 0 && !isKnownToBeClean) repair(mesh);
+    times_.assemble += part.lap();
+}
+
+// A second field of the mesh gives the signs: the one that was filled last.
+void FieldFiller::fillWithSidesOfLast(const Mesh& mesh, const std::string& reason) {
+    const openvdb::FloatGrid::ConstPtr sides = distance_;
+    const FieldSigns signs = signs_;
+    fillFrom(mesh, mesh, Sign::normals, reason, options_.method, [&](MeshJob& job, Assembler& assembler) {
+        job.sign = false;
+        job.sink = [this, &sides, &assembler](const FilledBlocks& blocks) {
+            const std::vector<float> distances = withSides(*sides, blocks);
+            take(assembler, {blocks.origins, distances, blocks.triangles});
+        };
+    });
+    signs_ = signs;
+}
+
+// The normals of a balanced mesh that self-intersects can be wrong without a conflict, where two walls are near all
+// voxels between them. Signs of voxels within one voxel of the surface are corrected. Farther wrong regions may extend
+// beyond the band.
+void FieldFiller::repair(const Mesh& mesh) {
+    const float limit = plainBlocks(options_, Sign::normals) == Assembler::Plain::drop ? options_.voxelSize : 0;
+    const SignRepair repair = repairSigns(*distance_, mesh, limit, &progress_);
+    signs_.conflicts += repair.refused;
+    if (repair.repaired == 0) return;
+    signs_.name = nameOf(Sign::winding);
+    signs_.reason =
+        fmt::format("{}, but the surface intersects itself; {} voxels have the side of their winding number",
+                    signs_.reason, repair.repaired);
+}
+
+void FieldFiller::take(Assembler& assembler, const FilledBlocks& blocks) {
+    filledBlocks_ += blocks.origins.size();
+    assembler.take(blocks);
+}
+
+void FieldFiller::finish(Assembler& assembler) {
+    distance_ = assembler.distances();
+    distance_->setTransform(openvdb::math::Transform::createLinearTransform(options_.voxelSize));
+    triangle_ = assembler.triangles();
+}
+
+LevelSet FieldFiller::levelSet() {
+    Stopwatch part;
+    if (distance_->empty() || distance_->activeVoxelCount() == 0)
+        throw std::invalid_argument("no voxel lies within the band: the widths are too small for this voxel size");
+    progress_.poll();
+    describe(*distance_, mesh_, options_, signs_);
+    auto grids = std::make_shared<Grids>();
+    grids->distance = distance_;
+    if (triangle_) {
+        // Voxels that were active for the wider of the two widths may lie outside the band on their final side.
+        triangle_->tree().topologyIntersection(distance_->tree());
+        triangle_->setTransform(distance_->transformPtr());
+        grids->triangle = triangle_;
+    }
+    LevelSet result(std::move(grids));
+    progress_.finish();
+    times_.assemble += part.lap();
+    times_.total = total_.lap();
+    times_.filledBlocks = filledBlocks_;
+    return result;
+}
+
+}  // namespace bilayer::detail

@@ -1,0 +1,81 @@
+// The state of one build. It fills a field by one method of distances and one of signs, again if needed, and makes a
+// LevelSet of the last one.
+#pragma once
+
+#include <openvdb/openvdb.h>
+
+#include <atomic>
+#include <cstddef>
+#include <functional>
+#include <string>
+
+#include <bilayer/sdf/build.h>
+#include <bilayer/sdf/level_set.h>
+#include <bilayer/sdf/mesh.h>
+#include <bilayer/sdf/options.h>
+#include "sdf/base/progress.h"
+#include "sdf/base/stopwatch.h"
+#include "sdf/grid/assemble.h"
+#include "sdf/grid/field_metadata.h"
+#include "sdf/leaf/blocks.h"
+#include "sdf/leaf/build_size.h"
+
+namespace bilayer::detail {
+
+/// Fills the field of a mesh.
+class FieldFiller {
+  public:
+    /// @param options  valid, with widths in voxels
+    /// @param device   fills the blocks; null: the CPU
+    /// @param times    receives the times of the phases
+    /// Throws as validate() and checkSize() do. The arguments must outlive the filler.
+    FieldFiller(const Mesh& mesh, const BuildOptions& options, const BlockFiller* device, BuildTimes& times);
+
+    /// Fills by a method that finds signs itself.
+    void fillWithOwnSigns();
+
+    /// Fills by a sign method, or the union of the solids if the options ask for it. Returns the sign method that was
+    /// used.
+    Sign fill(const Mesh& mesh, Sign sign, const std::string& reason, Method method);
+
+    /// May change a job, and add known leaves.
+    using Adapt = std::function<void(MeshJob&, Assembler&)>;
+
+    /// Fills distances to `mesh`, with winding numbers of `solids`.
+    void fillFrom(const Mesh& mesh, const Mesh& solids, Sign sign, const std::string& reason, Method method,
+                  const Adapt& adapt = {});
+
+    /// Fills by the requested method, with the signs of the last field.
+    void fillWithSidesOfLast(const Mesh& mesh, const std::string& reason);
+
+    /// Returns the last field as a level set.
+    LevelSet levelSet();
+
+    const Mesh& mesh() const { return mesh_; }
+    const BuildOptions& options() const { return options_; }
+    const Bounds& box() const { return extent_.box; }
+    /// The signs of the last field.
+    const FieldSigns& signs() const { return signs_; }
+    BuildTimes& times() { return times_; }
+    Progress& progress() { return progress_; }
+
+  private:
+    bool fillUnion(const Mesh& mesh);
+    void repair(const Mesh& mesh);
+    void take(Assembler& assembler, const FilledBlocks& blocks);  // thread-safe
+    void finish(Assembler& assembler);
+
+    const Mesh& mesh_;
+    const BuildOptions& options_;
+    const BlockFiller* device_;
+    BuildTimes& times_;
+    Stopwatch total_;
+    Progress progress_;
+    MeshExtent extent_;
+    FieldSigns signs_;
+    std::atomic<std::size_t> filledBlocks_ = 0;
+    openvdb::FloatGrid::Ptr distance_;
+    openvdb::Int32Grid::Ptr triangle_;
+};
+
+}  // namespace bilayer::detail

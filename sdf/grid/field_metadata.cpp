@@ -1,0 +1,63 @@
+#include "sdf/grid/field_metadata.h"
+
+#include <fmt/format.h>
+
+#include <cstdint>
+#include <stdexcept>
+
+#include <bilayer/sdf/grids.h>
+#include "sdf/leaf/build_options.h"
+#include "sdf/sign/sign_choice.h"
+
+namespace bilayer::detail {
+
+void describe(openvdb::FloatGrid& grid, const Mesh& mesh, const BuildOptions& options, const FieldSigns& signs) {
+    grid.setTransform(openvdb::math::Transform::createLinearTransform(options.voxelSize));
+    grid.setName("distance");
+    grid.setGridClass(openvdb::GRID_LEVEL_SET);
+    grid.setCreator("bilayer");
+    grid.insertMeta(metadata::version, openvdb::StringMetadata(BILAYER_VERSION));
+    grid.insertMeta(metadata::method, openvdb::StringMetadata(nameOf(options.method)));
+    grid.insertMeta(metadata::sign, openvdb::StringMetadata(signs.name));
+    grid.insertMeta(metadata::signReason, openvdb::StringMetadata(signs.reason));
+    grid.insertMeta(metadata::signConflicts, openvdb::Int64Metadata(std::int64_t(signs.conflicts)));
+    grid.insertMeta(metadata::signUndecided, openvdb::Int64Metadata(std::int64_t(signs.undecided)));
+    grid.insertMeta(metadata::errorBound, openvdb::FloatMetadata(errorBound(options) * options.voxelSize));
+    grid.insertMeta(metadata::meshHash, openvdb::Int64Metadata(std::int64_t(hash(mesh))));
+    grid.insertMeta(metadata::interiorWidth, openvdb::FloatMetadata(options.interiorWidth * options.voxelSize));
+    const glm::dvec3& origin = mesh.origin;
+    if (origin != glm::dvec3(0))
+        grid.insertMeta(metadata::origin, openvdb::Vec3DMetadata({origin.x, origin.y, origin.z}));
+}
+
+void checkFieldOf(const LevelSet& field, const Mesh& mesh, const BuildOptions& options) {
+    const auto refuse = [](const std::string& why) { throw std::invalid_argument("the old field " + why); };
+    const BandWidths widths = bandOf(options);
+    if (field.voxelSize() != options.voxelSize) refuse(fmt::format("has voxels of {:g}", field.voxelSize()));
+    if (field.exteriorWidth() != widths.exterior * widths.voxelSize ||
+        field.interiorWidth() != widths.interior * widths.voxelSize)
+        refuse(fmt::format("has a band {:g} wide outside, {:g} inside", field.exteriorWidth(), field.interiorWidth()));
+    if (field.method() != nameOf(options.method)) refuse(fmt::format("is of the method '{}'", field.method()));
+    if (options.triangles && !field.grids().triangle) refuse("lacks the nearest triangles");
+    if (field.meshHash() != hash(mesh)) refuse("is of another mesh");
+}
+
+bool hasCleanNormalSigns(const LevelSet& field, const BuildOptions& options) {
+    const openvdb::FloatGrid& grid = *field.grids().distance;
+    const auto text = [&](const char* key) {
+        const auto meta = grid.getMetadata<openvdb::StringMetadata>(key);
+        return meta ? meta->value() : std::string();
+    };
+    const auto isNone = [&](const char* key) {
+        const auto meta = grid.getMetadata<openvdb::Int64Metadata>(key);
+        return meta && meta->value() == 0;
+    };
+    const std::string reason = text(metadata::signReason);
+    // A different error bound shows that the distances were swept or rounded since the build.
+    return text(metadata::version) == BILAYER_VERSION &&
+           field.errorBound() == errorBound(options) * options.voxelSize &&
+           text(metadata::sign) == nameOf(Sign::normals) && (reason == asAskedFor || reason == closedAndOriented) &&
+           isNone(metadata::signConflicts) && isNone(metadata::signUndecided);
+}
+
+}  // namespace bilayer::detail

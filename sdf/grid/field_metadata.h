@@ -1,0 +1,33 @@
+// The metadata of a field: how it was built, from what, and how its signs were found.
+#pragma once
+
+#include <openvdb/openvdb.h>
+
+#include <cstddef>
+#include <string>
+
+#include <bilayer/sdf/level_set.h>
+#include <bilayer/sdf/mesh.h>
+#include <bilayer/sdf/options.h>
+
+namespace bilayer::detail {
+
+/// The signs of a field and how they were found.
+struct FieldSigns {
+    std::string name, reason;
+    std::size_t conflicts = 0;  ///< voxels on both sides, and contradictory neighbour pairs
+    std::size_t undecided = 0;  ///< voxels whose nearest normals cancel out
+};
+
+/// Sets the name, transform and metadata of a distance grid.
+/// @param mesh     the mesh that build() was given
+/// @param options  with widths in voxels, here and below
+void describe(openvdb::FloatGrid& grid, const Mesh& mesh, const BuildOptions& options, const FieldSigns& signs);
+
+/// Throws std::invalid_argument if the options and the mesh are not those of an existing field.
+void checkFieldOf(const LevelSet& field, const Mesh& mesh, const BuildOptions& options);
+
+/// Returns whether a field is as build() made it, with signs by normals and without conflicts.
+bool hasCleanNormalSigns(const LevelSet& field, const BuildOptions& options);
+
+}  // namespace bilayer::detail

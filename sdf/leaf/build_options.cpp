@@ -1,0 +1,151 @@
+#include "sdf/leaf/build_options.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+namespace bilayer::detail {
+namespace {
+
+/// OpenVDB treats a transform with a determinant below 3e-15 as singular.
+constexpr float smallestVoxel = 2e-5f;
+/// Scale factor that the error for a small voxel size suggests, applied repeatedly: metres to millimetres.
+constexpr double unitStep = 1000;
+/// Guaranteed error of exact distances [voxels]; ten times the largest observed error.
+constexpr float exactError = 1e-4f;
+/// Minimum layer distance: rounding makes closer layers indistinguishable [voxels].
+constexpr float minDelta = 0.1f;
+/// Maximum distance from a point of a triangle to its nearest sample, in units of sqrt(epsilon).
+constexpr float coveringRadius = 3;
+/// Margin of the sample reach against rounding [voxels].
+constexpr float reachSlack = 1e-3f;
+
+void require(bool condition, const char* option, const char* range, double value) {
+    if (!condition) throw std::invalid_argument(fmt::format("{} must be {}, not {}", option, range, value));
+}
+
+void checkWidth(const char* option, float voxels, float voxelSize) {
+    require(voxels > 0 && voxels <= 1000, option, "in (0, 1000] voxels", voxels);
+    // Background of the field [m].
+    const float width = voxels * voxelSize;
+    require(std::isnormal(width), option, "a width that floats can hold", width);
+}
+
+void checkVoxelSize(float voxelSize) {
+    if (voxelSize >= smallestVoxel) return;
+    double scale = unitStep;
+    while (scale * double(voxelSize) < double(smallestVoxel)) scale *= unitStep;
+    throw std::invalid_argument(
+        fmt::format("voxelSize {:g} is below {:g}, the smallest that OpenVDB takes: scale the mesh by {:g}{}, so that "
+                    "voxels are {:g}",
+                    voxelSize, smallestVoxel, scale, scale == unitStep ? " (from metres to millimetres)" : "",
+                    scale * double(voxelSize)));
+}
+
+}  // namespace
+
+BuildOptions optionsInVoxels(BuildOptions options) {
+    if (options.bandUnit == BandUnit::world) {
+        require(options.voxelSize > 0, "voxelSize", "a positive length", options.voxelSize);
+        options.exteriorWidth /= options.voxelSize;
+        options.interiorWidth /= options.voxelSize;
+        options.bandUnit = BandUnit::voxels;
+    }
+    return options;
+}
+
+void checkOptions(const BuildOptions& options) {
+    // Comparison in the type of the value, so that 1e-4f passes a limit of 1e-4f; false for NaN.
+    const auto within = [](auto value, decltype(value) low, decltype(value) high) {
+        return value >= low && value <= high;
+    };
+    const DoubleLayerOptions& layers = options.doubleLayer;
+    require(options.voxelSize > 0 && std::isnormal(options.voxelSize), "voxelSize", "a positive length",
+            options.voxelSize);
+    checkVoxelSize(options.voxelSize);
+    checkWidth("exteriorWidth", options.exteriorWidth, options.voxelSize);
+    checkWidth("interiorWidth", options.interiorWidth, options.voxelSize);
+    require(within(options.gap, 0, 100), "gap", "in 0..100 voxels", options.gap);
+    require(layers.delta >= minDelta && layers.delta <= 4, "delta", "in [0.1, 4] voxels", layers.delta);
+    require(within(layers.epsilon, 1e-4f, 1e4f), "epsilon", "in 1e-4..1e4 square voxels", layers.epsilon);
+    require(within(layers.neighbourhood, 1, 64), "neighbourhood", "in 1..64", layers.neighbourhood);
+    require(within(layers.maxSubdivision, 1, 1024), "maxSubdivision", "in 1..1024", layers.maxSubdivision);
+    require(within(options.threads, 0, 4096), "threads", "in 0..4096", options.threads);
+    if (options.unite && (hasOwnSigns(options.method) || options.sign == Sign::flood))
+        throw std::invalid_argument(
+            "unite needs the method exact or pseudonormal and a sign by normals or winding numbers");
+}
+
+bool hasOwnSigns(Method method) {
+    return method == Method::doubleLayer || method == Method::prism;
+}
+
+const char* nameOf(Method method) {
+    switch (method) {
+        case Method::exact:
+            return "exact";
+        case Method::doubleLayer:
+            return "double-layer";
+        case Method::pseudonormal:
+            return "pseudonormal";
+        case Method::prism:
+            return "prism";
+    }
+    return "";
+}
+
+const char* nameOf(Sign sign) {
+    switch (sign) {
+        case Sign::automatic:
+            return "auto";
+        case Sign::normals:
+            return "normals";
+        case Sign::winding:
+            return "winding";
+        case Sign::flood:
+            return "flood";
+    }
+    return "";
+}
+
+BandWidths bandOf(const BuildOptions& options) {
+    return {options.exteriorWidth, options.interiorWidth, options.voxelSize};
+}
+
+bool enclosesSurface(const BuildOptions& options) {
+    return std::min(options.exteriorWidth, options.interiorWidth) > 1 + reachSlack;
+}
+
+// Distances up to one voxel are computed even for thinner bands, because sign propagation needs them. A flood needs
+// distances up to the radius of its ball.
+float reachOf(const BuildOptions& options, Sign sign) {
+    const float ball = sign == Sign::flood ? options.gap / 2 + 1 : 1;
+    return std::max({options.exteriorWidth, options.interiorWidth, ball}) + reachSlack;
+}
+
+// A sample must reach every voxel whose distance it may determine. A voxel of the band is within width + delta of its
+// layer's sample. That sample is delta from the surface point at the centre of its neighbourhood.
+FillParameters fillParameters(const BuildOptions& options) {
+    const DoubleLayerOptions& layers = options.doubleLayer;
+    const float cube = float(layers.neighbourhood) + 0.5f;
+    if (!layers.fillGaps)
+        return {layers.delta, cube, std::numeric_limits<float>::infinity(), layers.neighbourhood, options.triangles};
+    const float width = std::max(options.exteriorWidth, options.interiorWidth);
+    const float reach = std::max(width + 2 * layers.delta, cube) + reachSlack;
+    return {layers.delta, reach, reach - layers.delta, 0, options.triangles};
+}
+
+float errorBound(const BuildOptions& options) {
+    if (options.method == Method::prism) return std::numeric_limits<float>::infinity();  // prisms leave gaps
+    if (options.method != Method::doubleLayer) return exactError;
+    // A layer sample is delta from the surface. The nearest sample is farther than the voxel's closest point by at most
+    // the covering radius. If gaps are not filled, there is no bound.
+    const DoubleLayerOptions& layers = options.doubleLayer;
+    if (!layers.fillGaps) return std::numeric_limits<float>::infinity();
+    return std::max(2 * layers.delta, coveringRadius * std::sqrt(layers.epsilon));
+}
+
+}  // namespace bilayer::detail

@@ -1,0 +1,38 @@
+// What follows from the options of a build alone: whether they are valid, the reach of distances, the error bound.
+#pragma once
+
+#include <bilayer/sdf/options.h>
+#include "sdf/leaf/band.h"
+#include "sdf/leaf/blocks.h"
+
+namespace bilayer::detail {
+
+/// Returns the options with widths in voxels.
+BuildOptions optionsInVoxels(BuildOptions options);
+
+/// Throws std::invalid_argument that names an option out of range. The widths must be in voxels, here and below.
+void checkOptions(const BuildOptions& options);
+
+/// Returns whether a method finds signs itself, without a sign method.
+bool hasOwnSigns(Method method);
+
+/// The names in the metadata of a field.
+const char* nameOf(Method method);
+const char* nameOf(Sign sign);
+
+BandWidths bandOf(const BuildOptions& options);
+
+/// Returns whether two neighbouring voxels on opposite sides of the surface are both in the band. This holds for a band
+/// wider than one voxel.
+bool enclosesSurface(const BuildOptions& options);
+
+/// Returns the distance up to which a sign method needs distances [voxels].
+float reachOf(const BuildOptions& options, Sign sign);
+
+/// Returns the parameters of the double layer method.
+FillParameters fillParameters(const BuildOptions& options);
+
+/// Returns the maximum error of distances [voxels].
+float errorBound(const BuildOptions& options);
+
+}  // namespace bilayer::detail

@@ -1,0 +1,84 @@
+#include "sdf/leaf/build_size.h"
+
+#include <fmt/format.h>
+#include <oneapi/tbb/blocked_range.h>
+#include <oneapi/tbb/parallel_reduce.h>
+
+#include <algorithm>
+#include <cmath>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <glm/gtc/constants.hpp>
+#include <stdexcept>
+#include <string>
+
+#include "sdf/base/physical_memory.h"
+#include "sdf/leaf/blocks.h"
+
+namespace bilayer::detail {
+namespace {
+
+/// Maximum brick count of the mesh's box: a cube of 40,000 voxels a side.
+constexpr int brickSide = 64;  // [voxels]
+constexpr double maxBricks = double(1u << 28);
+/// Approximate memory of a build per triangle (bins or hierarchy) and per block [bytes].
+constexpr double bytesPerTriangle = 60, bytesPerBlock = 2300;
+
+// Estimates the count of blocks that the band meets. It is the volume near the surface or, for a surface that folds
+// over itself, near its bounding box.
+double countBlocks(const Bounds& box, double area, double h, double reach) {
+    const double pi = glm::pi<double>(), r = reach + 0.5 * blockSide;
+    const glm::dvec3 s = glm::dvec3(box.size()) / h;
+    const double aroundSurface = 2 * r * area + 8 * pi / 3 * r * r * r;
+    const double aroundBox = s.x * s.y * s.z + 2 * r * (s.x * s.y + s.y * s.z + s.z * s.x) +
+                             pi * r * r * (s.x + s.y + s.z) + 4 * pi / 3 * r * r * r;
+    return std::min(aroundSurface, aroundBox) / blockVoxels;
+}
+
+}  // namespace
+
+MeshExtent extentOf(const Mesh& mesh) {
+    return tbb::parallel_reduce(
+        tbb::blocked_range<std::size_t>(0, mesh.triangles.size(), 4096), MeshExtent{},
+        [&](const auto& range, MeshExtent extent) {
+            for (std::size_t i = range.begin(); i < range.end(); ++i) {
+                const glm::uvec3 t = mesh.triangles[i];
+                const glm::vec3 &a = mesh.points[t.x], &b = mesh.points[t.y], &c = mesh.points[t.z];
+                for (const glm::vec3* p : {&a, &b, &c}) extent.box.add(*p);
+                extent.area +=
+                    0.5 * glm::length(glm::cross(glm::dvec3(b) - glm::dvec3(a), glm::dvec3(c) - glm::dvec3(a)));
+            }
+            return extent;
+        },
+        [](const MeshExtent& a, const MeshExtent& b) {
+            return MeshExtent{{glm::min(a.box.lower, b.box.lower), glm::max(a.box.upper, b.box.upper)},
+                              a.area + b.area};
+        });
+}
+
+void checkSize(const Mesh& mesh, const MeshExtent& extent, const BuildOptions& options, float reach) {
+    const Bounds& box = extent.box;
+    const double h = options.voxelSize;
+    const auto refuse = [&](const std::string& why) {
+        throw std::invalid_argument(fmt::format("voxelSize {:g} is too small for this mesh, {:g} voxels long: {}", h,
+                                                double(box.longestSide()) / h, why));
+    };
+    double bricks = 1;
+    for (int axis = 0; axis < 3; ++axis) {
+        const double low = double(box.lower[axis]) / h, high = double(box.upper[axis]) / h;
+        if (!(std::abs(low) < farthestIndex && std::abs(high) < farthestIndex))
+            refuse("index coordinates would leave 32 bits");
+        bricks *= (high - low + 2 * double(reach)) / brickSide + 2;
+    }
+    if (bricks > maxBricks) refuse("its box would have more than 2^28 bricks of 64^3 voxels");
+    const double area = extent.area / (h * h);
+    if (!(area > 0)) throw std::invalid_argument("the mesh has no triangle with an area");
+    const double block = bytesPerBlock * (options.triangles ? 2 : 1);
+    const double bytes =
+        double(mesh.triangles.size()) * bytesPerTriangle + countBlocks(box, area, h, double(reach)) * block;
+    const double memory = physicalMemory();
+    if (bytes > memory)
+        refuse(fmt::format("with its band it would need about {:.0f} GiB of memory", bytes / double(1 << 30)));
+}
+
+}  // namespace bilayer::detail
