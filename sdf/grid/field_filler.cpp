@@ -88,7 +88,8 @@ Sign FieldFiller::fill(const Mesh& mesh, Sign sign, const std::string& reason, M
     return sign;
 }
 
-// The union is that of the mesh after orient(), as outwardMesh() documents.
+// Fills the union of the mesh after orient(), as outwardMesh() documents. Returns false and fills nothing if no wall
+// lies inside the union.
 bool FieldFiller::fillUnion(const Mesh& mesh) {
     Stopwatch part;
     UnionSurface united = unite(mesh, &progress_);
@@ -152,7 +153,7 @@ void FieldFiller::fillWithSidesOfLast(const Mesh& mesh, const std::string& reaso
 // voxels between them. Signs of voxels within one voxel of the surface are corrected. Farther wrong regions may extend
 // beyond the band.
 void FieldFiller::repair(const Mesh& mesh) {
-    const float limit = plainBlocks(options_, Sign::normals) == Assembler::Plain::drop ? options_.voxelSize : 0;
+    const float limit = enclosesSurface(options_) ? options_.voxelSize : 0;
     const SignRepair repair = repairSigns(*distance_, mesh, limit, &progress_);
     signs_.conflicts += repair.refused;
     if (repair.repaired == 0) return;
