@@ -13,20 +13,21 @@
 #include <numeric>
 
 #include "sdf/base/vector_lanes.h"
+#include "sdf/fill/sample_writer.h"
 #include "sdf/fill/tile_cutter.h"
+#include "sdf/fill/triangle_lanes.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace bilayer::detail::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 namespace {
 
-/// As many triangles at once as there are double lanes, and as many samples of one triangle as there are float lanes.
-using Wide = hn::CappedTag<double, 8>;
-constexpr std::size_t maxLanes = 8;
 /// Triangles with up to this many rows are processed together. A triangle with more rows fills vectors of its own.
 constexpr int fewRows = 4;
 
-using Small = hn::Rebind<float, Wide>;
+using Wide = TriangleLanes::Wide;
+using Small = TriangleLanes::Small;
+/// As many samples of one triangle at once as there are float lanes.
 using Row = hn::CappedTag<float, 16>;
 
 inline VectorLanes<Small> narrowed(const VectorLanes<Wide>& a) {
@@ -39,10 +40,10 @@ HWY_INLINE VectorLanes<D> pointsAt(D tag, const glm::vec3& place) {
 }
 
 // Generates the samples of the triangles in a brick.
-class Spreader {
+class SampleGenerator {
   public:
-    Spreader(const Mesh& mesh, const SampledBrick& brick, const SampleCells& cells, AddedSamples& to)
-        : mesh_(mesh), brick_(brick), cells_(cells), origin_(brick.origin), to_(to) {}
+    SampleGenerator(const Mesh& mesh, const SampledBrick& brick, const SampleCells& cells, AddedSamples& to)
+        : mesh_(mesh), brick_(brick), cells_(cells), origin_(brick.origin), writer_(cells, to) {}
 
     void run(std::span<const std::uint32_t> triangles) {
         const std::size_t lanes = hn::Lanes(Wide());
@@ -56,61 +57,25 @@ class Spreader {
         });
         for (std::size_t i = 0; i < triangles.size(); i += lanes) {
             const std::size_t count = std::min(lanes, triangles.size() - i);
-            load(triangles, i, count);
+            lanes_.load(mesh_, triangles, i, count);
             for (std::uint64_t others = addFew(count); others != 0; others &= others - 1) {
                 const auto lane = std::size_t(std::countr_zero(others));
                 triangle = triangles[i + lane];
-                const auto at = [&](const auto& rows) {
-                    return glm::dvec3(rows[0][lane], rows[1][lane], rows[2][lane]);
-                };
-                cutter.cut({at(known_.corners[0]), at(known_.corners[1]), at(known_.corners[2])}, at(known_.normal),
-                           known_.length[lane], known_.longest2[lane]);
+                const auto at = [&](const auto& rows) { return TriangleLanes::at(rows, lane); };
+                cutter.cut({at(lanes_.corners[0]), at(lanes_.corners[1]), at(lanes_.corners[2])}, at(lanes_.normal),
+                           lanes_.length[lane], lanes_.longest2[lane]);
             }
         }
     }
 
   private:
-    // Loads the corners of some triangles. Prefetches the next ones, since they are scattered in memory.
-    void load(std::span<const std::uint32_t> triangles, std::size_t first, std::size_t count) {
-        // Prefetch distances match the memory latency: first the indices, then the corners.
-        constexpr std::size_t indicesAhead = 32, cornersAhead = 16;
-        for (std::size_t lane = 0; lane < count; ++lane) {
-            const std::size_t i = first + lane;
-            if (i + indicesAhead < triangles.size()) __builtin_prefetch(&mesh_.triangles[triangles[i + indicesAhead]]);
-            if (i + cornersAhead < triangles.size())
-                for (int k = 0; k < 3; ++k)
-                    __builtin_prefetch(&mesh_.points[mesh_.triangles[triangles[i + cornersAhead]][k]]);
-            const glm::uvec3& t = mesh_.triangles[triangles[i]];
-            for (int k = 0; k < 3; ++k)
-                for (int axis = 0; axis < 3; ++axis) world_[k][axis][lane] = mesh_.points[t[k]][axis];
-            triangles_[lane] = std::int32_t(triangles[i]);
-        }
-    }
-
-    // Returns corners in voxels.
-    VectorLanes<Wide> corner(std::size_t k) {
-        const Wide wide;
-        const auto at = [&](std::size_t axis) {
-            const auto world = hn::PromoteTo(wide, hn::Load(Small(), world_[k][axis]));
-            return hn::Mul(world, hn::Set(wide, brick_.voxelsPerUnit));
-        };
-        const VectorLanes<Wide> corners{at(0), at(1), at(2)};
-        keep(corners, known_.corners[k]);
-        return corners;
-    }
-
-    template <class Rows>
-    static void keep(const VectorLanes<Wide>& points, Rows& rows) {
-        hn::Store(points.x, Wide(), rows[0]);
-        hn::Store(points.y, Wide(), rows[1]);
-        hn::Store(points.z, Wide(), rows[2]);
-    }
-
     // Adds the samples of triangles with few rows, several triangles at once. Returns one bit for each other triangle
     // with nonzero area.
     std::uint64_t addFew(std::size_t count) {
         const Wide wide;
-        const VectorLanes<Wide> a = corner(0), b = corner(1), c = corner(2), ab = b - a, ac = c - a, bc = c - b,
+        const double voxelsPerUnit = brick_.voxelsPerUnit;
+        const VectorLanes<Wide> a = lanes_.corner(0, voxelsPerUnit), b = lanes_.corner(1, voxelsPerUnit),
+                                c = lanes_.corner(2, voxelsPerUnit), ab = b - a, ac = c - a, bc = c - b,
                                 normal = cross(ab, ac);
         const auto length = hn::Sqrt(dot(normal, normal)),
                    longest2 = hn::Max(dot(ab, ab), hn::Max(dot(bc, bc), dot(ac, ac)));
@@ -137,9 +102,9 @@ class Spreader {
         }
         const auto others = hn::AndNot(few, real);
         if (hn::AllFalse(wide, others)) return 0;
-        keep(normal, known_.normal);
-        hn::Store(length, wide, known_.length);
-        hn::Store(longest2, wide, known_.longest2);
+        TriangleLanes::store(normal, lanes_.normal);
+        hn::Store(length, wide, lanes_.length);
+        hn::Store(longest2, wide, lanes_.longest2);
         std::uint8_t bytes[8] = {};
         hn::StoreMaskBits(wide, others, bytes);
         return bytes[0];
@@ -149,7 +114,7 @@ class Spreader {
     void addRows(hn::Vec<Small> rows, const VectorLanes<Small>& start, const VectorLanes<Small>& down,
                  const VectorLanes<Small>& across, const VectorLanes<Small>& offset) {
         const Small small;
-        const auto owners = hn::Load(hn::RebindToSigned<Small>(), triangles_);
+        const auto owners = hn::Load(hn::RebindToSigned<Small>(), lanes_.triangles);
         for (int i = 0;; ++i) {
             const auto row = hn::Set(small, float(i));
             const auto among = hn::Gt(rows, row);
@@ -159,10 +124,10 @@ class Spreader {
                 const auto place = [&](auto begin, auto s1, auto s2) {
                     return hn::MulAdd(column, s2, hn::MulAdd(row, s1, begin));
                 };
-                put(small, among,
-                    {place(start.x, down.x, across.x), place(start.y, down.y, across.y),
-                     place(start.z, down.z, across.z)},
-                    offset, owners);
+                writer_.put(small, among,
+                            {place(start.x, down.x, across.x), place(start.y, down.y, across.y),
+                             place(start.z, down.z, across.z)},
+                            offset, owners);
             }
         }
     }
@@ -189,7 +154,8 @@ class Spreader {
             const auto place = [&](auto begin, auto s1, auto s2) {
                 return hn::MulAdd(column, s2, hn::MulAdd(row, s1, begin));
             };
-            put(tag, hn::FirstN(tag, std::size_t(count - k)),
+            writer_.put(
+                tag, hn::FirstN(tag, std::size_t(count - k)),
                 {place(first.x, down.x, across.x), place(first.y, down.y, across.y), place(first.z, down.z, across.z)},
                 offset, owner);
         }
@@ -215,7 +181,8 @@ class Spreader {
                 const auto place = [&](auto at, auto each, auto upwards) {
                     return hn::MulAdd(across, upwards, hn::MulAdd(number, each, at));
                 };
-                put(tag, hn::FirstN(tag, std::size_t(run.count - k)),
+                writer_.put(
+                    tag, hn::FirstN(tag, std::size_t(run.count - k)),
                     {place(first.x, step.x, rise.x), place(first.y, step.y, rise.y), place(first.z, step.z, rise.z)},
                     offset, owner);
             }
@@ -228,54 +195,17 @@ class Spreader {
         return pointsAt(Row(), glm::vec3(part.normal * (double(brick_.options.delta) / part.length)));
     }
 
-    // Adds the samples in the mask `among`, except those too far from the brick.
-    template <class Tag>
-    HWY_INLINE void put(Tag tag, hn::Mask<Tag> among, const VectorLanes<Tag>& place, const VectorLanes<Tag>& offset,
-                        hn::Vec<hn::RebindToSigned<Tag>> triangle) {
-        const hn::RebindToSigned<Tag> intTag;
-        const auto within = [&](auto at, int axis) {
-            return hn::And(hn::Ge(at, hn::Set(tag, cells_.lower[axis])), hn::Le(at, hn::Set(tag, cells_.upper[axis])));
-        };
-        const auto near = hn::And(hn::And(among, within(place.x, 0)), hn::And(within(place.y, 1), within(place.z, 2)));
-        const auto cellAt = [&](auto at) {
-            return hn::ConvertTo(intTag, hn::Mul(hn::Sub(at, hn::Set(tag, cells_.firstCorner)),
-                                                 hn::Set(tag, 1.f / float(LayerSamples::cellSide))));
-        };
-        const auto size = hn::Set(intTag, cells_.size);
-        const auto cell =
-            hn::Add(hn::Mul(hn::Add(hn::Mul(cellAt(place.x), size), cellAt(place.y)), size), cellAt(place.z));
-        to_.reserve(to_.count + hn::Lanes(tag));
-        const auto compress = [&](auto d, auto values, auto* column) {
-            hn::StoreU(hn::Compress(values, hn::RebindMask(d, near)), d, column + to_.count);
-        };
-        compress(tag, place.x, to_.columns.place[0].data());
-        compress(tag, place.y, to_.columns.place[1].data());
-        compress(tag, place.z, to_.columns.place[2].data());
-        compress(tag, offset.x, to_.columns.offset[0].data());
-        compress(tag, offset.y, to_.columns.offset[1].data());
-        compress(tag, offset.z, to_.columns.offset[2].data());
-        compress(intTag, triangle, to_.columns.triangle.data());
-        compress(intTag, cell, to_.cell.data());
-        to_.count += hn::CountTrue(tag, near);
-    }
-
     const Mesh& mesh_;
     const SampledBrick& brick_;
     const SampleCells& cells_;
     glm::dvec3 origin_;  // of the brick [index coordinates]
-    AddedSamples& to_;
-    // One row per component, one column per triangle.
-    alignas(64) float world_[3][3][maxLanes];
-    alignas(64) std::int32_t triangles_[maxLanes];
-    struct {
-        alignas(64) double corners[3][3][maxLanes];
-        alignas(64) double normal[3][maxLanes], length[maxLanes], longest2[maxLanes];
-    } known_;
+    SampleWriter writer_;
+    TriangleLanes lanes_;
 };
 
-void spread(const Mesh& mesh, std::span<const std::uint32_t> triangles, const SampledBrick& brick,
-            const SampleCells& cells, AddedSamples& to) {
-    Spreader(mesh, brick, cells, to).run(triangles);
+void generateSamples(const Mesh& mesh, std::span<const std::uint32_t> triangles, const SampledBrick& brick,
+                     const SampleCells& cells, AddedSamples& to) {
+    SampleGenerator(mesh, brick, cells, to).run(triangles);
 }
 
 }  // namespace
@@ -286,7 +216,7 @@ HWY_AFTER_NAMESPACE();
 namespace bilayer::detail {
 namespace {
 
-HWY_EXPORT(spread);
+HWY_EXPORT(generateSamples);
 
 constexpr std::size_t padding = 16;  // float count of the widest SIMD vector
 
@@ -315,7 +245,7 @@ void LayerSamples::begin(const SampledBrick& brick) {
 }
 
 void LayerSamples::add(const Mesh& mesh, std::span<const std::uint32_t> triangles) {
-    HWY_DYNAMIC_DISPATCH(spread)(mesh, triangles, *brick_, cells_, added_);
+    HWY_DYNAMIC_DISPATCH(generateSamples)(mesh, triangles, *brick_, cells_, added_);
 }
 
 // A stable counting sort.
