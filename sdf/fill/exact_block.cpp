@@ -25,17 +25,11 @@ using Mask = hn::Mask<Tag>;
 /// Upper bound of the float error of a distance, with a margin [voxels]. Pieces that are too far by this much are still
 /// evaluated, so that the nearest piece never depends on the order.
 constexpr float boundSlack = 1e-4f;
-/// Distances d that differ by less than this may be equal [voxels]: floats round the heights over two pieces by as
-/// much, at any height. Squared distances then differ by less than tie * (1 + d^2), since 2 d <= 1 + d^2.
-constexpr float tie = 1e-5f;
 /// Sample bounds are increased by this fraction and this amount, together at least 2e-5 voxels. A piece's own distance
 /// then replaces its sample's, although the two are rounded differently.
 constexpr float raisedPart = 1e-3f, raisedBy = 5e-7f;  // [voxels^2]
 /// Rounding of squared heights, with a margin [voxels^2].
 constexpr float heightSlack = 1e-3f;
-/// Voxels closer to a face than this get no sign from its normal alone [voxels].
-constexpr float minHeight = 1e-3f;
-
 /// A slice is the 64 voxels with one x. A chunk is one SIMD vector of a slice.
 constexpr int sliceVoxels = blockSide * blockSide;
 constexpr int chunkVoxels = int(hn::MaxLanes(Tag()));
@@ -249,7 +243,7 @@ class SeenPiece {
         const Vec zero = hn::Zero(tag), n2 = squareOf(n);
         const Mask above = hn::And(hn::And(hn::Gt(w, zero), hn::Le(leftOf, zero)), hn::Ge(rightOf, zero));
         const Vec distance2 = hn::Add(n2, hn::IfThenZeroElse(above, hn::Min(base2, hn::Min(left2, right2))));
-        store(distance2, n, hn::And(above, hn::Gt(n2, hn::Set(tag, square(minHeight)))), voxel, block);
+        store(distance2, n, hn::And(above, hn::Gt(n2, hn::Set(tag, square(minFaceHeight)))), voxel, block);
     }
 
     // Keeps the smaller distance and its piece. Where the voxel projects onto a face, its normal gives the sign, unless
@@ -264,7 +258,8 @@ class SeenPiece {
         const auto code = hn::IfThenElse(hn::RebindMask(intTag, overFace), side, hn::Set(intTag, code_));
         const auto winner = hn::IfThenElse(hn::RebindMask(intTag, hn::Lt(distance2, old2)), code, old);
         const Vec difference = hn::Sub(hn::Max(distance2, old2), nearest2);
-        const Mask tied = hn::Le(difference, hn::Add(hn::Mul(nearest2, hn::Set(tag, tie)), hn::Set(tag, tie)));
+        const Mask tied =
+            hn::Le(difference, hn::Add(hn::Mul(nearest2, hn::Set(tag, distanceTie)), hn::Set(tag, distanceTie)));
         const auto agreed = hn::Or(hn::AndNot(sides, winner), hn::And(hn::And(code, old), sides));
         hn::Store(nearest2, tag, block.nearest2 + voxel);
         hn::Store(hn::IfThenElse(hn::RebindMask(intTag, tied), agreed, winner), intTag, block.nearest + voxel);

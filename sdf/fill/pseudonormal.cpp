@@ -8,7 +8,7 @@
 #include <cmath>
 
 #include "sdf/base/progress.h"
-#include "sdf/bvh/tree_query.h"
+#include "sdf/bvh/block_query.h"
 #include "sdf/bvh/wide_tree.h"
 #include "sdf/leaf/sign_propagation.h"
 #include "sdf/sign/closest_side.h"

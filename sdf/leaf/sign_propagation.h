@@ -16,6 +16,12 @@ namespace bilayer::detail {
 /// Tolerance of the link test, far above the rounding of distances [voxels].
 inline constexpr float linkSlack = 1e-4f;
 
+/// Distances d that differ by less than this may be equal [voxels]: floats round the heights above two faces by as
+/// much, at any height. Squared distances then differ by less than distanceTie * (1 + d^2), since 2 d <= 1 + d^2.
+inline constexpr float distanceTie = 1e-5f;
+/// A voxel that is closer to the plane of a face than this gets no side from the face's normal alone [voxels].
+inline constexpr float minFaceHeight = 1e-3f;
+
 /// The links inside a block. The bit of voxel v is set if v is linked to its next neighbour along the axis.
 struct SignLinks {
     BlockMask x, y, z;

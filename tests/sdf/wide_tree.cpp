@@ -8,7 +8,7 @@
 #include <set>
 
 #include "demos/shared/shapes.h"
-#include "sdf/bvh/tree_query.h"
+#include "sdf/bvh/node_list.h"
 #include "tests/support/support.h"
 
 using namespace bilayer;

@@ -1,9 +1,9 @@
 // Highway compiles the part between HWY_BEFORE_NAMESPACE and HWY_AFTER_NAMESPACE once for each instruction set. No sum
 // crosses lanes, so all instruction sets give the same bytes.
-#include "sdf/bvh/tree_query.h"
+#include "sdf/bvh/block_query.h"
 
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "sdf/bvh/tree_query.cpp"
+#define HWY_TARGET_INCLUDE "sdf/bvh/block_query.cpp"
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
@@ -13,22 +13,15 @@
 #include <limits>
 
 #include "sdf/bvh/leaf_measure.h"
+#include "sdf/bvh/node_narrowing.h"
 #include "sdf/leaf/blocks.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace bilayer::detail::HWY_NAMESPACE {
 namespace {
-using IndexTag = hn::RebindToUnsigned<Tag>;
-using NumberTag = hn::RebindToSigned<Tag>;
 
-/// Triangles whose distances d differ by less than this may share the closest point [voxels]. It exceeds the rounding
-/// error of floats. Their squared distances then differ by less than tie * (1 + d^2), since 2 d <= 1 + d^2;
-/// exact_block.cpp does the same.
-constexpr float tie = 1e-5f;
-/// If a voxel is closer to the plane of a face than this, its side is left to a more accurate test [voxels].
-constexpr float minHeight = 1e-3f;
-/// The two tolerances above hold up to this reach. Beyond, they grow with the reach, like the rounding of distances
-/// [voxels].
+/// distanceTie and minFaceHeight hold up to this reach. Beyond, they grow with the reach, like the rounding of
+/// distances [voxels].
 constexpr float usualReach = 16;
 /// Margin for rounding of distances and for ties when a bound is transferred from one point to another [voxels].
 constexpr float slack = 1e-3f;
@@ -36,82 +29,7 @@ constexpr float slack = 1e-3f;
 constexpr int path[8][3] = {{0, 0, 0}, {0, 0, 1}, {0, 1, 1}, {0, 1, 0}, {1, 1, 0}, {1, 1, 1}, {1, 0, 1}, {1, 0, 0}};
 /// Limits for measuring the eight voxels of a cube together: max count of triangles and of nodes. Above these, it is
 /// faster to search for each voxel separately.
-constexpr std::size_t maxTogether = 64, maxNodes = 16;
-
-// Returns the squared distances of up to a vector of boxes from a box of voxels.
-inline Vec boxDistance2(const float* const lower[3], const float* const upper[3], std::size_t i,
-                        const VoxelBox& voxels) {
-    const Tag tag;
-    Vec sum = hn::Zero(tag);
-    for (int k = 0; k < 3; ++k) {
-        const Vec gap = hn::Max(hn::Sub(hn::LoadU(tag, lower[k] + i), hn::Set(tag, voxels.upper[k])),
-                                hn::Sub(hn::Set(tag, voxels.lower[k]), hn::LoadU(tag, upper[k] + i)));
-        sum = hn::Add(sum, square(hn::Max(gap, hn::Zero(tag))));
-    }
-    return sum;
-}
-
-// References to boxes in a list or in a group.
-struct BoxArrays {
-    const float *lower[3], *upper[3];
-
-    explicit BoxArrays(const NodeList& list) {
-        for (int k = 0; k < 3; ++k) lower[k] = list.lower[k].data(), upper[k] = list.upper[k].data();
-    }
-    explicit BoxArrays(const BoxGroup& group) {
-        for (int k = 0; k < 3; ++k) lower[k] = group.lower[k], upper[k] = group.upper[k];
-    }
-};
-
-struct Narrowing {
-    const WideTree& tree;
-    const VoxelBox& voxels;
-    float reach2, largest;
-    NodeList& to;
-
-    void take(const BoxArrays& boxes, std::size_t i, hn::Vec<IndexTag> nodes, Mask valid) {
-        const Tag tag;
-        Vec side = hn::Zero(tag);
-        for (int k = 0; k < 3; ++k)
-            side = hn::Max(side, hn::Sub(hn::LoadU(tag, boxes.upper[k] + i), hn::LoadU(tag, boxes.lower[k] + i)));
-        const Mask near =
-            hn::And(valid, hn::Le(boxDistance2(boxes.lower, boxes.upper, i, voxels), hn::Set(tag, reach2)));
-        const Mask isGroup = hn::RebindMask(
-            tag, hn::Gt(hn::BitCast(NumberTag(), nodes), hn::Set(NumberTag(), std::int32_t(tree.leafCount) - 1)));
-        const Mask open = hn::And(near, hn::And(isGroup, hn::Gt(side, hn::Set(tag, largest))));
-        keep(boxes, i, nodes, hn::AndNot(open, near));
-        HWY_ALIGN std::uint32_t numbers[treeWidth];
-        hn::Store(nodes, IndexTag(), numbers);
-        for (unsigned bits = bitsOf(open); bits != 0; bits &= bits - 1)
-            takeGroup(tree.group(numbers[std::countr_zero(bits)]));
-    }
-
-    void takeGroup(const BoxGroup& group) {
-        const BoxArrays boxes(group);
-        for (std::size_t i = 0; i < treeWidth; i += hn::Lanes(Tag()))
-            take(boxes, i, hn::Iota(IndexTag(), group.firstChild + std::uint32_t(i)), hn::FirstN(Tag(), treeWidth));
-    }
-
-    void keep(const BoxArrays& boxes, std::size_t i, hn::Vec<IndexTag> nodes, Mask mask) {
-        const Tag tag;
-        to.makeRoom(treeWidth);
-        for (int k = 0; k < 3; ++k) {
-            hn::CompressStore(hn::LoadU(tag, boxes.lower[k] + i), mask, tag, to.lower[k].data() + to.count);
-            hn::CompressStore(hn::LoadU(tag, boxes.upper[k] + i), mask, tag, to.upper[k].data() + to.count);
-        }
-        to.count += hn::CompressStore(nodes, hn::RebindMask(IndexTag(), mask), IndexTag(), to.nodes.data() + to.count);
-    }
-};
-
-void narrowList(const WideTree& tree, const NodeList& from, const VoxelBox& voxels, float reach, float largest,
-                NodeList& to) {
-    const Tag tag;
-    to.count = 0;
-    Narrowing narrowing{tree, voxels, reach * reach * roundUp, largest, to};
-    const BoxArrays boxes(from);
-    for (std::size_t i = 0; i < from.count; i += hn::Lanes(tag))
-        narrowing.take(boxes, i, hn::LoadU(IndexTag(), from.nodes.data() + i), hn::FirstN(tag, from.count - i));
-}
+constexpr std::size_t maxCandidates = 64, maxNodes = 16;
 
 // The range of a voxel's heights above the triangles that share its closest point. If all heights have the same sign,
 // it gives the side of the voxel. A height of 0 marks a triangle with the closest point on one of its edges.
@@ -121,7 +39,7 @@ struct Heights {
 };
 
 // The query of one voxel.
-struct Query {
+struct VoxelQuery {
     const WideTree& tree;
     const NodeList& list;
     BlockAnswer& answer;
@@ -143,7 +61,7 @@ struct Query {
         repeats = answer.visits.size();
     }
 
-    bool met(std::uint32_t leaf) const {
+    bool wasVisited(std::uint32_t leaf) const {
         for (std::size_t v = 0; v < repeats; ++v)
             if (answer.visits[v].leaf == leaf) return true;
         return false;
@@ -168,8 +86,8 @@ struct Query {
         if (nearest < best2) lower(nearest);
     }
 
-    void look(const BoxArrays& boxes, std::size_t begin, std::size_t count, const std::uint32_t* nodes,
-              std::uint32_t firstNode) {
+    void search(const BoxArrays& boxes, std::size_t begin, std::size_t count, const std::uint32_t* nodes,
+                std::uint32_t firstNode) {
         const Tag tag;
         for (std::size_t i = begin; i < begin + count; i += hn::Lanes(tag)) {
             const Vec distance2 = boxDistance2(boxes.lower, boxes.upper, i, voxel);
@@ -183,8 +101,8 @@ struct Query {
                 if (gaps[lane] > limit2) continue;  // something closer was found meanwhile
                 const std::uint32_t node = nodes ? nodes[i + lane] : firstNode + std::uint32_t(i + lane);
                 if (!tree.isLeaf(node))
-                    look(BoxArrays(tree.group(node)), 0, treeWidth, nullptr, tree.group(node).firstChild);
-                else if (!met(node))
+                    search(BoxArrays(tree.group(node)), 0, treeWidth, nullptr, tree.group(node).firstChild);
+                else if (!wasVisited(node))
                     visit(node);
             }
         }
@@ -215,7 +133,7 @@ struct Query {
 };
 
 // The eight voxels of a cube of side 2, one per lane, and the triangles that they were measured against.
-struct Together {
+struct CubeQuery {
     struct Candidate {
         alignas(64) float distance2[treeWidth];
         float height[treeWidth];
@@ -229,9 +147,9 @@ struct Together {
     const WideTree& tree;
     alignas(64) float x[treeWidth], y[treeWidth], z[treeWidth], best2[treeWidth];
     std::size_t count = 0;
-    Candidate candidates[maxTogether];
+    Candidate candidates[maxCandidates];
 
-    Together(const WideTree& whole, const glm::vec3& lower) : tree(whole) {
+    CubeQuery(const WideTree& whole, const glm::vec3& lower) : tree(whole) {
         for (int i = 0; i < treeWidth; ++i) {
             x[i] = lower.x + float(path[i][0]);
             y[i] = lower.y + float(path[i][1]);
@@ -240,7 +158,7 @@ struct Together {
         }
     }
 
-    void ask(std::uint32_t leafIndex, std::size_t place) {
+    void add(std::uint32_t leafIndex, std::size_t place) {
         const Tag tag;
         const WideLeaf& leaf = tree.leaves[leafIndex];
         Candidate& candidate = candidates[count++];
@@ -290,13 +208,13 @@ struct BlockQuery {
     BlockAnswer& answer;
 
     // Searches within the distance `bound`.
-    Query ask(const NodeList& list, const glm::vec3& position, float bound) const {
-        const float ties = sign ? tie * std::max(1.f, reach / usualReach) : 0.f;
-        Query query{tree, list, answer, ties, {position, position}, 0, 0, 1};
+    VoxelQuery searchFrom(const NodeList& list, const glm::vec3& position, float bound) const {
+        const float ties = sign ? distanceTie * std::max(1.f, reach / usualReach) : 0.f;
+        VoxelQuery query{tree, list, answer, ties, {position, position}, 0, 0, 1};
         query.lower(bound * bound * roundUp);
         answer.visits.clear();
         query.visit(answer.lastWinner);
-        query.look(BoxArrays(list), 0, list.count, list.nodes.data(), 0);
+        query.search(BoxArrays(list), 0, list.count, list.nodes.data(), 0);
         return query;
     }
 
@@ -305,13 +223,13 @@ struct BlockQuery {
     void answerCube(const NodeList& from, const glm::vec3& lower, int level) {
         const float side = float(blockSide >> level), radius = 0.5f * (side - 1) * std::sqrt(3.f) + slack;
         const float bound = reach + radius;
-        Query centre = ask(from, lower + 0.5f * (side - 1), bound);
+        VoxelQuery centre = searchFrom(from, lower + 0.5f * (side - 1), bound);
         if (!(centre.best2 < bound * bound)) return;
         answer.lastWinner = answer.visits[centre.winner().first].leaf;
         NodeList& list = answer.lists[level];
         const float atMost = std::min(reach, std::sqrt(centre.best2) + radius);
         narrowList(tree, from, {lower, lower + (side - 1)}, atMost + slack, 2 * side, list);
-        if (level == 2 && answerTogether(centre, list, lower, atMost, radius)) return;
+        if (level == 2 && answerAtOnce(centre, list, lower, atMost, radius)) return;
         for (const auto& step : path) {
             const glm::vec3 part = lower + 0.5f * side * glm::vec3(step[0], step[1], step[2]);
             if (level < 2)
@@ -322,7 +240,7 @@ struct BlockQuery {
     }
 
     void answerVoxel(const NodeList& list, const glm::vec3& position, float atMost) {
-        const Query query = ask(list, position, std::min(reach, atMost + slack));
+        const VoxelQuery query = searchFrom(list, position, std::min(reach, atMost + slack));
         if (query.best2 > reach * reach * roundUp || answer.visits.empty()) return;
         const auto [visit, place] = query.winner();
         if (answer.visits[visit].distance2[place] != query.best2) return;
@@ -334,24 +252,24 @@ struct BlockQuery {
     // Answers the voxels of a cube of side 2 at once, if few triangles are relevant. Triangles are first measured from
     // the centre. Relevant are those whose distance does not exceed the upper bound for the nearest triangle of any
     // voxel.
-    bool answerTogether(Query& centre, const NodeList& list, const glm::vec3& lower, float atMost, float radius) {
+    bool answerAtOnce(VoxelQuery& centre, const NodeList& list, const glm::vec3& lower, float atMost, float radius) {
         if (list.count > maxNodes) return false;
-        Together cube(tree, lower);
+        CubeQuery cube(tree, lower);
         const auto [visit, place] = centre.winner();
         const std::uint32_t winner = answer.visits[visit].leaf;
-        cube.ask(winner, place);
+        cube.add(winner, place);
         centre.widen(std::min(atMost, cube.farthest()) + radius + slack);
-        centre.look(BoxArrays(list), 0, list.count, list.nodes.data(), 0);
+        centre.search(BoxArrays(list), 0, list.count, list.nodes.data(), 0);
         for (const auto& v : answer.visits)
             for (std::size_t i = 0; i < treeWidth; ++i) {
                 if (v.distance2[i] > centre.limit2 || (v.leaf == winner && i == place)) continue;
-                if (cube.count == maxTogether) return false;
-                cube.ask(v.leaf, i);
+                if (cube.count == maxCandidates) return false;
+                cube.add(v.leaf, i);
             }
-        const Together::Answers found = cube.answers(centre.tieWidth);
+        const CubeQuery::Answers found = cube.answers(centre.tieWidth);
         for (std::size_t i = 0; i < treeWidth; ++i)
             if (cube.best2[i] <= reach * reach * roundUp) {
-                const Together::Candidate& nearest = cube.candidates[std::size_t(found.winner[i])];
+                const CubeQuery::Candidate& nearest = cube.candidates[std::size_t(found.winner[i])];
                 keep({cube.x[i], cube.y[i], cube.z[i]}, cube.best2[i], nearest.triangle,
                      {found.lowest[i], found.highest[i], nearest.height[i]});
             }
@@ -370,7 +288,7 @@ struct BlockQuery {
         if (!sign) return;
         if (distance > farFrom) answer.far[x] |= bit;
         if (distance > midFrom) answer.mid[x] |= bit;
-        const float least = minHeight * std::max(1.f, reach / usualReach);
+        const float least = minFaceHeight * std::max(1.f, reach / usualReach);
         // on the surface either side is correct, and no link propagates it
         if (heights.lowest > least || distance < 0.5f * linkSlack) answer.sides.outside[x] |= bit;
         if (heights.highest < -least) answer.sides.inside[x] |= bit;
@@ -395,29 +313,7 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace bilayer::detail {
 
-HWY_EXPORT(narrowList);
 HWY_EXPORT(answerVoxels);
-
-void NodeList::makeRoom(std::size_t more) {
-    if (count + 2 * more <= nodes.size()) return;
-    const std::size_t size = 2 * (count + 2 * more);
-    for (int k = 0; k < 3; ++k) lower[k].resize(size), upper[k].resize(size);
-    nodes.resize(size);
-}
-
-NodeList wholeTree(const WideTree& tree) {
-    NodeList list;
-    list.makeRoom(treeWidth);
-    for (int k = 0; k < 3; ++k) list.lower[k][0] = -1, list.upper[k][0] = float(tree.size[k] + 1);
-    list.nodes[0] = tree.root();
-    list.count = 1;
-    return list;
-}
-
-void narrow(const WideTree& tree, const NodeList& from, const VoxelBox& voxels, float reach, float largest,
-            NodeList& to) {
-    HWY_DYNAMIC_DISPATCH(narrowList)(tree, from, voxels, reach, largest, to);
-}
 
 void answerBlock(const WideTree& tree, const NodeList& list, const glm::vec3& origin, float reach, bool sign,
                  BlockAnswer& answer) {
