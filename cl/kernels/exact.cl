@@ -15,7 +15,8 @@
 // Slices of an item.
 #define SLICES (ITEMS > 1 ? 1 : BLOCK_SIDE)
 
-// See sdf/fill/exact_block.cpp for these: rounding [voxels, voxels^2 or fractions].
+// See sdf/fill/exact_block.cpp, sdf/fill/bounding_cylinder.h and sdf/leaf/sign_propagation.h for these: rounding [voxels,
+// voxels^2 or fractions].
 #define BOUND_SLACK 1e-4f
 #define TIE 1e-5f
 #define RAISED_PART 1e-3f
@@ -152,8 +153,8 @@ void applySample(Found* found, const Share* own, float3 sample, float reach) {
     }
 }
 
-// Bounding cylinder of pieces relative to a block: Drum of sdf/fill/exact_block.cpp. Values that depend on the slice
-// only are computed once.
+// Bounding cylinder of pieces relative to a block: BoundingCylinder of sdf/fill/bounding_cylinder.h. Values that depend
+// on the slice only are computed once.
 typedef struct {
     float3 centre, normal;
     float thickness, radius2;

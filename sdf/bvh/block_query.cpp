@@ -208,7 +208,7 @@ struct BlockQuery {
     BlockAnswer& answer;
 
     // Searches within the distance `bound`.
-    VoxelQuery searchFrom(const NodeList& list, const glm::vec3& position, float bound) const {
+    VoxelQuery searchWithin(const NodeList& list, const glm::vec3& position, float bound) const {
         const float ties = sign ? distanceTie * std::max(1.f, reach / usualReach) : 0.f;
         VoxelQuery query{tree, list, answer, ties, {position, position}, 0, 0, 1};
         query.lower(bound * bound * roundUp);
@@ -223,7 +223,7 @@ struct BlockQuery {
     void answerCube(const NodeList& from, const glm::vec3& lower, int level) {
         const float side = float(blockSide >> level), radius = 0.5f * (side - 1) * std::sqrt(3.f) + slack;
         const float bound = reach + radius;
-        VoxelQuery centre = searchFrom(from, lower + 0.5f * (side - 1), bound);
+        VoxelQuery centre = searchWithin(from, lower + 0.5f * (side - 1), bound);
         if (!(centre.best2 < bound * bound)) return;
         answer.lastWinner = answer.visits[centre.winner().first].leaf;
         NodeList& list = answer.lists[level];
@@ -240,7 +240,7 @@ struct BlockQuery {
     }
 
     void answerVoxel(const NodeList& list, const glm::vec3& position, float atMost) {
-        const VoxelQuery query = searchFrom(list, position, std::min(reach, atMost + slack));
+        const VoxelQuery query = searchWithin(list, position, std::min(reach, atMost + slack));
         if (query.best2 > reach * reach * roundUp || answer.visits.empty()) return;
         const auto [visit, place] = query.winner();
         if (answer.visits[visit].distance2[place] != query.best2) return;

@@ -19,6 +19,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace bilayer::detail::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
+namespace {
 
 // Returns the squared distances of up to a vector of boxes from a box of voxels.
 inline Vec boxDistance2(const float* const lower[3], const float* const upper[3], std::size_t i,
@@ -101,6 +102,7 @@ inline void narrowList(const WideTree& tree, const NodeList& from, const VoxelBo
                        hn::FirstN(tag, from.count - i));
 }
 
+}  // namespace
 }  // namespace bilayer::detail::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 

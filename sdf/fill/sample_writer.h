@@ -17,6 +17,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace bilayer::detail::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
+namespace {
 
 class SampleWriter {
   public:
@@ -59,6 +60,7 @@ class SampleWriter {
     AddedSamples& to_;
 };
 
+}  // namespace
 }  // namespace bilayer::detail::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 

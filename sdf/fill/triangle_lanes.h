@@ -20,6 +20,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace bilayer::detail::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
+namespace {
 
 /// One row per component, one column per triangle.
 struct TriangleLanes {
@@ -75,6 +76,7 @@ struct TriangleLanes {
     }
 };
 
+}  // namespace
 }  // namespace bilayer::detail::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
