@@ -77,7 +77,7 @@ struct Planes {
     }
 
     // Tests whether a triangle lies on one side, except for corners that it shares.
-    Mask apart(const PointLanes* corners, const Mask* shared) const {
+    Mask separates(const PointLanes* corners, const Mask* shared) const {
         Mask above[3], below[3];
         for (int k = 0; k < 3; ++k) {
             sides(corners[k], above[k], below[k]);
@@ -125,9 +125,9 @@ struct Others {
                 its[k] = hn::Or(its[k], same);
             }
         const Mask edge = hn::Or(hn::And(mine[0], hn::Or(mine[1], mine[2])), hn::And(mine[1], mine[2]));
-        mask = hn::AndNot(hn::Or(edge, Planes(other).apart(lanes.corners, mine)), mask);
+        mask = hn::AndNot(hn::Or(edge, Planes(other).separates(lanes.corners, mine)), mask);
         if (hn::AllFalse(Tag(), mask)) return mask;
-        return hn::AndNot(planes.apart(other, its), mask);
+        return hn::AndNot(planes.separates(other, its), mask);
     }
 };
 

@@ -14,6 +14,7 @@
 #include <utility>
 
 #include "sdf/base/polled_loop.h"
+#include "sdf/base/triangle_corners.h"
 
 namespace bilayer::detail {
 namespace {
@@ -21,8 +22,6 @@ namespace {
 /// Floats represent all integers up to twice this [voxels].
 constexpr double longestMesh = 1 << 23;
 constexpr std::size_t grain = 1024;  // triangles or leaves per task
-
-using Corners = std::array<glm::dvec3, 3>;
 
 struct DoubleBounds {
     glm::dvec3 lower{std::numeric_limits<double>::infinity()}, upper{-std::numeric_limits<double>::infinity()};
@@ -41,7 +40,7 @@ class TriangleParts {
     TriangleParts(const Mesh& mesh, const glm::dvec3& base, double voxelSize, double longestEdge)
         : mesh_(mesh), base_(base), perVoxelSize_(1 / voxelSize), longest2_(longestEdge * longestEdge) {}
 
-    Corners corners(std::size_t part) const {
+    TriangleCorners corners(std::size_t part) const {
         return part < mesh_.triangles.size() ? ofTriangle(part) : halves_[part - mesh_.triangles.size()].corners;
     }
     std::uint32_t triangle(std::size_t part) const {
@@ -58,7 +57,7 @@ class TriangleParts {
     std::size_t count() const { return mesh_.triangles.size() + halves_.size(); }
 
     // Returns the longest edge, from this corner to the next, and its squared length.
-    static std::pair<std::size_t, double> longest(const Corners& c) {
+    static std::pair<std::size_t, double> longest(const TriangleCorners& c) {
         const auto length2 = [&](std::size_t i) {
             const glm::dvec3 edge = c[(i + 1) % 3] - c[i];
             return glm::dot(edge, edge);
@@ -67,23 +66,23 @@ class TriangleParts {
         const auto edge = std::size_t(std::max_element(all.begin(), all.end()) - all.begin());
         return {edge, all[edge]};
     }
-    bool isLong(const Corners& c) const { return longest(c).second > longest2_; }
+    bool isLong(const TriangleCorners& c) const { return longest(c).second > longest2_; }
 
     void halve(std::uint32_t triangle) { halve(ofTriangle(triangle), triangle); }
 
   private:
     struct Half {
-        Corners corners;
+        TriangleCorners corners;
         std::uint32_t triangle;
     };
 
-    Corners ofTriangle(std::size_t index) const {
+    TriangleCorners ofTriangle(std::size_t index) const {
         const glm::uvec3& t = mesh_.triangles[index];
         return {local(t.x), local(t.y), local(t.z)};
     }
     glm::dvec3 local(unsigned point) const { return glm::dvec3(mesh_.points[point]) * perVoxelSize_ - base_; }
 
-    void halve(const Corners& c, std::uint32_t triangle) {
+    void halve(const TriangleCorners& c, std::uint32_t triangle) {
         const auto [i, length2] = longest(c);
         if (length2 <= longest2_) {
             if (count() >= maxOnCurve)
@@ -114,7 +113,7 @@ void makeKeys(const TriangleParts& parts, const glm::ivec3& size, std::size_t fi
     CurveCells run{};
     std::array<bool, CurveCells::most> isLong{};
     for (std::size_t i = 0; i < count; ++i) {
-        const Corners c = parts.corners(first + i);
+        const TriangleCorners c = parts.corners(first + i);
         for (int k = 0; k < 3; ++k)
             run.x[k][i] = std::uint32_t(std::clamp((c[0][k] + c[1][k] + c[2][k]) * scale, 0.0, cells - 1));
         isLong[i] = parts.isLong(c);
@@ -160,7 +159,7 @@ std::vector<std::uint64_t> keysOf(TriangleParts& parts, const glm::ivec3& size, 
 void split(const TriangleParts& parts, std::vector<std::uint64_t>& keys, Progress* progress) {
     auto items = vectorOf<TreeItem>(keys.size(), progress);
     forAll(keys.size(), progress, [&](std::size_t i) {
-        const Corners c = parts.corners(std::size_t(keys[i] & curveIndexMask));
+        const TriangleCorners c = parts.corners(std::size_t(keys[i] & curveIndexMask));
         items[i] = {glm::vec3(c[0] + c[1] + c[2]), std::uint32_t(keys[i] & curveIndexMask)};
     });
     sortBySplitting(items, progress);
@@ -181,10 +180,10 @@ Vector unitOr(const Vector& v, const Vector& otherwise) {
 }
 
 // Writes a triangle in its own frame. A triangle without area becomes a segment or a point.
-void writeTriangle(WideLeaf& leaf, std::size_t place, const Corners& corners) {
+void writeTriangle(WideLeaf& leaf, std::size_t place, const TriangleCorners& corners) {
     // x points along the longest edge, and z is made orthogonal to it. The normal of a sliver is mostly rounding error;
     // the remaining error then only tilts the sliver about its long axis
-    const Corners edges{corners[1] - corners[0], corners[2] - corners[1], corners[0] - corners[2]};
+    const TriangleCorners edges{corners[1] - corners[0], corners[2] - corners[1], corners[0] - corners[2]};
     const auto shorter = [](const glm::dvec3& p, const glm::dvec3& q) { return glm::dot(p, p) < glm::dot(q, q); };
     const auto first = std::size_t(std::max_element(edges.begin(), edges.end(), shorter) - edges.begin());
     const glm::dvec3 &a = corners[first], &b = corners[(first + 1) % 3], &c = corners[(first + 2) % 3];
@@ -222,7 +221,7 @@ void makeLeaf(const TriangleParts& parts, const std::vector<std::uint64_t>& keys
         parts.fetchIndices(partAt(i + 4 * treeWidth));
         parts.fetchCorners(partAt(i + 2 * treeWidth));
     }
-    std::array<Corners, treeWidth> corners;
+    std::array<TriangleCorners, treeWidth> corners;
     WideLeaf& leaf = tree.leaves[index];
     DoubleBounds box;
     for (std::size_t i = 0; i < treeWidth; ++i) {

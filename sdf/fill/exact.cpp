@@ -180,7 +180,7 @@ class ExactBrickFiller {
                  targets &= targets - 1) {
                 const int bit = std::countr_zero(targets);
                 const bool knownInside = (inside[x] >> bit) & 1;
-                const auto winding = windingAfter(inBlock(int(x) * 64 + bit) - from, knownInside ? 1 : 0);
+                const auto winding = windingAtStart(inBlock(int(x) * 64 + bit) - from, knownInside ? 1 : 0);
                 if (winding && (*winding == 0 || *winding == 1)) return *winding == 1;
                 if (++tries == maxPaths) return std::nullopt;
             }
@@ -189,17 +189,17 @@ class ExactBrickFiller {
 
     // Returns the winding number at the start of a straight path from the current point, given the number at its end.
     // The path lies in the block, so every triangle that it crosses reaches the block.
-    std::optional<int> windingAfter(const glm::ivec3& way, int atEnd) {
-        passed_.clear();
+    std::optional<int> windingAtStart(const glm::ivec3& path, int atEnd) {
+        candidates_.clear();
         forEachNear([](const glm::vec3&, float) { return true; },
-                    [&](std::uint32_t triangle) { passed_.push_back(triangle); });
-        std::sort(passed_.begin(), passed_.end());
-        passed_.erase(std::unique(passed_.begin(), passed_.end()), passed_.end());
+                    [&](std::uint32_t triangle) { candidates_.push_back(triangle); });
+        std::sort(candidates_.begin(), candidates_.end());
+        candidates_.erase(std::unique(candidates_.begin(), candidates_.end()), candidates_.end());
         int winding = atEnd;
-        for (const std::uint32_t triangle : passed_) {
-            const std::optional<int> turn = passing(side_.cornersOf(triangle), glm::dvec3(way));
-            if (!turn) return std::nullopt;
-            winding += *turn;
+        for (const std::uint32_t triangle : candidates_) {
+            const std::optional<int> crossing = segmentCrossing(side_.cornersOf(triangle), glm::dvec3(path));
+            if (!crossing) return std::nullopt;
+            winding += *crossing;
         }
         return winding;
     }
@@ -212,7 +212,7 @@ class ExactBrickFiller {
     std::size_t cut_ = 0;
     ClosestSide side_;
     BlockDistances found_;
-    std::vector<std::uint32_t> passed_;
+    std::vector<std::uint32_t> candidates_;
     std::span<const std::uint32_t> reaching_;  // clusters of the current block
     glm::ivec3 origin_{0}, block_{0}, inBrick_{0};
     int blocks_ = 0;

@@ -63,7 +63,17 @@ struct Columns {
     glm::vec3 vec3(int row, std::size_t i) const { return {values[row][i], values[row + 1][i], values[row + 2][i]}; }
     alignas(64) float values[24][PieceCutter::batch];
 };
-enum Row { origin = 0, axisU = 3, axisW = 6, axisN = 9, length = 12, left = 13, right = 16, sample = 19, radius = 22 };
+enum PieceRow {
+    origin = 0,
+    axisU = 3,
+    axisW = 6,
+    axisN = 9,
+    length = 12,
+    left = 13,
+    right = 16,
+    sample = 19,
+    radius = 22
+};
 
 // Stores the unit vector and the length of an edge in (u, w).
 inline void putEdge(Columns& columns, int row, std::size_t i, Vec x, Vec y) {
@@ -99,20 +109,20 @@ inline void makeColumns(const PieceCutter::WaitingPieces& waiting, std::size_t i
     const Mask flat = hn::Or(hn::Not(isLength(height)), hn::Lt(straightLength, hn::Set(tag, 0.5f)));
     const Vec3 w = select(flat, across(u), scaled(straight, inverse(straightLength)));
     height = hn::IfThenZeroElse(flat, height);
-    columns.put(Row::origin, i, begin);
-    columns.put(Row::axisU, i, u);
-    columns.put(Row::axisW, i, w);
-    columns.put(Row::axisN, i, cross(u, w));
-    columns.put(Row::length, i, size);
-    putEdge(columns, Row::left, i, along, height);
-    putEdge(columns, Row::right, i, hn::Sub(along, size), height);
+    columns.put(PieceRow::origin, i, begin);
+    columns.put(PieceRow::axisU, i, u);
+    columns.put(PieceRow::axisW, i, w);
+    columns.put(PieceRow::axisN, i, cross(u, w));
+    columns.put(PieceRow::length, i, size);
+    putEdge(columns, PieceRow::left, i, along, height);
+    putEdge(columns, PieceRow::right, i, hn::Sub(along, size), height);
     // Centre of the smallest enclosing circle: the circumcentre, or the middle of the longest edge.
     const Vec half = hn::Mul(hn::Set(tag, 0.5f), size);
     const Vec lift = hn::Div(hn::Sub(hn::Add(hn::Mul(along, along), hn::Mul(height, height)), hn::Mul(along, size)),
                              hn::Add(height, height));
     const Vec up = hn::IfThenZeroElse(flat, hn::Max(lift, hn::Zero(tag)));
-    columns.put(Row::sample, i, begin + scaled(u, half) + scaled(w, up));
-    columns.put(Row::radius, i,
+    columns.put(PieceRow::sample, i, begin + scaled(u, half) + scaled(w, up));
+    columns.put(PieceRow::radius, i,
                 hn::Add(hn::Sqrt(hn::Add(hn::Mul(half, half), hn::Mul(up, up))), hn::Set(tag, radiusSlack)));
 }
 
@@ -122,19 +132,19 @@ void makePieces(const PieceCutter::WaitingPieces& waiting, std::size_t count, Pi
     const auto& v = columns.values;
     for (std::size_t i = 0; i < count; ++i)
         pieces[i] = {waiting.base[i],
-                     columns.vec3(Row::origin, i),
-                     columns.vec3(Row::axisU, i),
-                     columns.vec3(Row::axisW, i),
-                     columns.vec3(Row::axisN, i),
-                     v[Row::length][i],
-                     v[Row::left][i],
-                     v[Row::left + 1][i],
-                     v[Row::left + 2][i],
-                     v[Row::right][i],
-                     v[Row::right + 1][i],
-                     v[Row::right + 2][i],
-                     columns.vec3(Row::sample, i),
-                     v[Row::radius][i],
+                     columns.vec3(PieceRow::origin, i),
+                     columns.vec3(PieceRow::axisU, i),
+                     columns.vec3(PieceRow::axisW, i),
+                     columns.vec3(PieceRow::axisN, i),
+                     v[PieceRow::length][i],
+                     v[PieceRow::left][i],
+                     v[PieceRow::left + 1][i],
+                     v[PieceRow::left + 2][i],
+                     v[PieceRow::right][i],
+                     v[PieceRow::right + 1][i],
+                     v[PieceRow::right + 2][i],
+                     columns.vec3(PieceRow::sample, i),
+                     v[PieceRow::radius][i],
                      waiting.triangle[i]};
 }
 

@@ -33,10 +33,6 @@ glm::ivec3 floorToInt(const glm::dvec3& v) {
     return {floorToInt(v.x), floorToInt(v.y), floorToInt(v.z)};
 }
 
-struct Corners {
-    glm::dvec3 a, b, c;  // [voxels]
-};
-
 // The range of bricks along each axis.
 struct BrickRange {
     BrickRange(const Bounds& box, double voxelsPerUnit, double reach) {
@@ -166,12 +162,13 @@ class Binner {
     template <class Visit>
     FewBricks visitBricks(std::size_t triangle, Visit visit) const {
         const glm::uvec3 t = mesh_.triangles[triangle];
-        const Corners c{glm::dvec3(mesh_.points[t.x]) * voxelsPerUnit_, glm::dvec3(mesh_.points[t.y]) * voxelsPerUnit_,
-                        glm::dvec3(mesh_.points[t.z]) * voxelsPerUnit_};
+        const TriangleCorners c{glm::dvec3(mesh_.points[t.x]) * voxelsPerUnit_,
+                                glm::dvec3(mesh_.points[t.y]) * voxelsPerUnit_,
+                                glm::dvec3(mesh_.points[t.z]) * voxelsPerUnit_};
         const glm::ivec3 lower =
-                             (floorToInt(glm::min(c.a, glm::min(c.b, c.c)) - reach_) >> range_.shift) - range_.first,
+                             (floorToInt(glm::min(c[0], glm::min(c[1], c[2])) - reach_) >> range_.shift) - range_.first,
                          upper =
-                             (floorToInt(glm::max(c.a, glm::max(c.b, c.c)) + reach_) >> range_.shift) - range_.first;
+                             (floorToInt(glm::max(c[0], glm::max(c[1], c[2])) + reach_) >> range_.shift) - range_.first;
         const glm::ivec3 extent = upper - lower + 1;
         if (extent.x <= 2 && extent.y <= 2 && extent.z <= 2) {
             const FewBricks few(range_.cell(lower.x, lower.y, lower.z), extent);
@@ -185,7 +182,7 @@ class Binner {
     // Visits the bricks of a box that a triangle reaches. Bisects boxes of bricks and discards those out of reach. The
     // cost of a needle triangle is thus proportional to its length, not to its box.
     template <class Visit>
-    void divide(const Corners& c, const glm::ivec3& lower, const glm::ivec3& upper, const Visit& visit) const {
+    void divide(const TriangleCorners& c, const glm::ivec3& lower, const glm::ivec3& upper, const Visit& visit) const {
         if (staysAway(c, lower, upper)) return;
         const glm::ivec3 size = upper - lower;
         const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
@@ -200,13 +197,13 @@ class Binner {
     // Returns whether a plane separates a triangle from a box of bricks, enlarged by the reach. Separating axis test:
     // the triangle's normal, the axes of the box, and the cross products of edges (S. Gottschalk and others, SIGGRAPH
     // 1996).
-    bool staysAway(const Corners& c, const glm::ivec3& lower, const glm::ivec3& upper) const {
+    bool staysAway(const TriangleCorners& c, const glm::ivec3& lower, const glm::ivec3& upper) const {
         if (progress_) progress_->poll();
         const double side = double(1 << range_.shift), reach = reach_ + 1;
         const glm::dvec3 low = glm::dvec3(range_.first + lower) * side,
                          high = glm::dvec3(range_.first + upper + 1) * side;
         const glm::dvec3 centre = 0.5 * (low + high), half = 0.5 * (high - low);
-        const glm::dvec3 a = c.a - centre, b = c.b - centre, p = c.c - centre;
+        const glm::dvec3 a = c[0] - centre, b = c[1] - centre, p = c[2] - centre;
         const auto parts = [&](const glm::dvec3& axis) {
             const double x = glm::dot(axis, a), y = glm::dot(axis, b), z = glm::dot(axis, p);
             const double room = glm::dot(glm::abs(axis), half) + reach * glm::length(axis);

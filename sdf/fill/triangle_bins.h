@@ -2,7 +2,6 @@
 // indices, so their memory is a fraction of the mesh's.
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <glm/vec3.hpp>
@@ -10,6 +9,7 @@
 #include <vector>
 
 #include <bilayer/sdf/mesh.h>
+#include "sdf/base/triangle_corners.h"
 
 namespace bilayer::detail {
 
@@ -49,7 +49,7 @@ void forEachTriangle(const Mesh& mesh, std::span<const std::uint32_t> triangles,
         }
         const glm::uvec3& t = mesh.triangles[triangles[i]];
         const auto corner = [&](unsigned k) { return glm::dvec3(mesh.points[k]) * voxelsPerUnit; };
-        visit(triangles[i], std::array<glm::dvec3, 3>{corner(t.x), corner(t.y), corner(t.z)});
+        visit(triangles[i], TriangleCorners{corner(t.x), corner(t.y), corner(t.z)});
     }
 }
 

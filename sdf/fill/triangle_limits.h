@@ -1,15 +1,13 @@
-// A triangle in voxels, and the box that it must overlap to be relevant.
+// The box that a triangle must overlap to be relevant.
 #pragma once
 
-#include <array>
 #include <glm/common.hpp>
 #include <glm/vec3.hpp>
 #include <glm/vector_relational.hpp>
 
-namespace bilayer::detail {
+#include "sdf/base/triangle_corners.h"
 
-/// Corners of a triangle or of a part of one [voxels].
-using TriangleCorners = std::array<glm::dvec3, 3>;
+namespace bilayer::detail {
 
 /// A box in index coordinates [voxels].
 struct TriangleLimits {

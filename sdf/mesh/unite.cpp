@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "sdf/base/progress.h"
+#include "sdf/base/triangle_corners.h"
 #include "sdf/bvh/triangle_tree.h"
 #include "sdf/bvh/winding_number.h"
 #include "sdf/mesh/topology.h"
@@ -31,7 +32,6 @@ constexpr double stepOff = 2;
 /// In units of the slack: max length of a contact that neighbours with a common vertex or edge have next to it.
 constexpr double shortContact = 4;
 
-using Corners = std::array<glm::dvec3, 3>;
 using CornerHeights = std::array<double, 3>;
 
 double slackOf(const Mesh& mesh) {
@@ -42,7 +42,7 @@ double slackOf(const Mesh& mesh) {
 
 /// A triangle in double precision.
 struct DoubleTriangle {
-    Corners corners;
+    TriangleCorners corners;
     glm::dvec3 normal;  // unit normal, or 0 for a triangle without area
     double area;
 
@@ -102,8 +102,8 @@ class Contacts {
   private:
     void add(unsigned triangle, const DoubleTriangle& face, unsigned other, std::vector<Segment>& found) const {
         const glm::uvec3& t = mesh_.triangles[other];
-        const Corners corners{glm::dvec3(mesh_.points[t.x]), glm::dvec3(mesh_.points[t.y]),
-                              glm::dvec3(mesh_.points[t.z])};
+        const TriangleCorners corners{glm::dvec3(mesh_.points[t.x]), glm::dvec3(mesh_.points[t.y]),
+                                      glm::dvec3(mesh_.points[t.z])};
         const CornerHeights heights{face.height(corners[0]), face.height(corners[1]), face.height(corners[2])};
         const auto [lowest, highest] = std::minmax({heights[0], heights[1], heights[2]});
         if (lowest > slack_ || highest < -slack_) return;
@@ -115,7 +115,7 @@ class Contacts {
     }
 
     /// Returns the intersection of a triangle with a face's plane: nothing, a segment, or all three edges.
-    std::vector<Segment> traces(const DoubleTriangle& face, const Corners& corners,
+    std::vector<Segment> traces(const DoubleTriangle& face, const TriangleCorners& corners,
                                 const CornerHeights& heights) const {
         std::vector<Segment> edges;
         std::vector<glm::dvec3> points;

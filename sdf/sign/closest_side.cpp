@@ -30,14 +30,14 @@ glm::dvec3 closestOnSegment(const glm::dvec3& a, const glm::dvec3& b) {
     return t <= 0.5 ? a + t * ab : b - (1 - t) * ab;
 }
 
-double longestEdge2(const std::array<glm::dvec3, 3>& c) {
+double longestEdge2(const TriangleCorners& c) {
     const glm::dvec3 ab = c[1] - c[0], bc = c[2] - c[1], ca = c[0] - c[2];
     return std::max({glm::dot(ab, ab), glm::dot(bc, bc), glm::dot(ca, ca)});
 }
 
 // Returns the angle that a triangle subtends at one of its points: a full circle in the interior, half of it on an
 // edge.
-double angleAt(const std::array<glm::dvec3, 3>& c, const glm::dvec3& p) {
+double angleAt(const TriangleCorners& c, const glm::dvec3& p) {
     for (std::size_t i = 0; i < 3; ++i)
         if (glm::distance(c[i], p) <= samePlace) {
             const glm::dvec3 a = c[(i + 1) % 3] - c[i], b = c[(i + 2) % 3] - c[i];
@@ -52,19 +52,19 @@ double angleAt(const std::array<glm::dvec3, 3>& c, const glm::dvec3& p) {
 
 // A triangle thinner than samePlace has no reliable normal. The neighbour at its far side also meets the closest point
 // and contributes its normal instead.
-bool hasNormal(const std::array<glm::dvec3, 3>& c) {
+bool hasNormal(const TriangleCorners& c) {
     return glm::length(glm::cross(c[1] - c[0], c[2] - c[0])) > samePlace * std::sqrt(longestEdge2(c));
 }
 
-bool sameCorners(const std::array<glm::dvec3, 3>& a, const std::array<glm::dvec3, 3>& b) {
-    for (std::size_t turn = 0; turn < 3; ++turn)
-        if (a[0] == b[turn] && a[1] == b[(turn + 1) % 3] && a[2] == b[(turn + 2) % 3]) return true;
+bool sameCorners(const TriangleCorners& a, const TriangleCorners& b) {
+    for (std::size_t shift = 0; shift < 3; ++shift)
+        if (a[0] == b[shift] && a[1] == b[(shift + 1) % 3] && a[2] == b[(shift + 2) % 3]) return true;
     return false;
 }
 
 }  // namespace
 
-glm::dvec3 closestToOrigin(const std::array<glm::dvec3, 3>& c) {
+glm::dvec3 closestToOrigin(const TriangleCorners& c) {
     const glm::dvec3 ab = c[1] - c[0], ac = c[2] - c[0], n = glm::cross(ab, ac);
     const double n2 = glm::dot(n, n), longest2 = longestEdge2(c);
     if (n2 > flatness * flatness * longest2 * longest2) {
@@ -82,23 +82,23 @@ glm::dvec3 closestToOrigin(const std::array<glm::dvec3, 3>& c) {
     return best;
 }
 
-std::optional<int> passing(const std::array<glm::dvec3, 3>& c, const glm::dvec3& way) {
+std::optional<int> segmentCrossing(const TriangleCorners& c, const glm::dvec3& end) {
     const glm::dvec3 n = glm::cross(c[1] - c[0], c[2] - c[0]);
     int positive = 0, negative = 0;
     for (std::size_t i = 0; i < 3; ++i) {
         const glm::dvec3 &a = c[(i + 1) % 3], &b = c[(i + 2) % 3];
-        const double volume = glm::dot(way, glm::cross(a, b));
-        const double scale = glm::length(way) * glm::length(a) * glm::length(b);
+        const double volume = glm::dot(end, glm::cross(a, b));
+        const double scale = glm::length(end) * glm::length(a) * glm::length(b);
         if (std::abs(volume) > tooClose * scale) ++(volume > 0 ? positive : negative);
     }
     if (positive > 0 && negative > 0) return 0;
-    const double from = -glm::dot(c[0], n), to = glm::dot(way, n) + from, flat = tooClose * glm::length(n);
+    const double from = -glm::dot(c[0], n), to = glm::dot(end, n) + from, flat = tooClose * glm::length(n);
     if ((from > flat && to > flat) || (from < -flat && to < -flat)) return 0;
     if (positive + negative < 3 || std::abs(from) <= flat || std::abs(to) <= flat) return std::nullopt;
     return to > from ? 1 : -1;
 }
 
-std::array<glm::dvec3, 3> ClosestSide::cornersOf(std::uint32_t triangle) const {
+TriangleCorners ClosestSide::cornersOf(std::uint32_t triangle) const {
     const glm::uvec3 t = mesh_.triangles[triangle];
     const auto corner = [&](unsigned i) { return glm::dvec3(mesh_.points[i]) * voxelsPerUnit_ - point_; };
     return {corner(t.x), corner(t.y), corner(t.z)};

@@ -6,13 +6,13 @@
 // not count.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <glm/vec3.hpp>
 #include <optional>
 #include <vector>
 
 #include <bilayer/sdf/mesh.h>
+#include "sdf/base/triangle_corners.h"
 
 namespace bilayer::detail {
 
@@ -35,7 +35,7 @@ class ClosestSide {
     Side side() const;
 
     /// Returns the corners of a triangle relative to the point [voxels].
-    std::array<glm::dvec3, 3> cornersOf(std::uint32_t triangle) const;
+    TriangleCorners cornersOf(std::uint32_t triangle) const;
 
     /// Returns the distance to the nearest offered triangle [voxels].
     double distance() const { return distance_; }
@@ -43,8 +43,8 @@ class ClosestSide {
   private:
     struct CandidateFace {
         std::uint32_t triangle;
-        std::array<glm::dvec3, 3> corners;  // relative to the point [voxels]
-        glm::dvec3 closest;                 // likewise
+        TriangleCorners corners;  // relative to the point [voxels]
+        glm::dvec3 closest;       // likewise
         double distance;
     };
 
@@ -55,11 +55,11 @@ class ClosestSide {
     std::vector<CandidateFace> faces_;
 };
 
-/// Returns how the segment from the origin to `way` crosses a triangle: +1 along its normal, -1 against it, 0 not at
+/// Returns how the segment from the origin to `end` crosses a triangle: +1 along its normal, -1 against it, 0 not at
 /// all. Empty if the crossing is too close to an edge, a corner or the ends of the segment.
-std::optional<int> passing(const std::array<glm::dvec3, 3>& corners, const glm::dvec3& way);
+std::optional<int> segmentCrossing(const TriangleCorners& corners, const glm::dvec3& end);
 
 /// Returns the point of a triangle that is closest to the origin. Also valid for triangles without area.
-glm::dvec3 closestToOrigin(const std::array<glm::dvec3, 3>& corners);
+glm::dvec3 closestToOrigin(const TriangleCorners& corners);
 
 }  // namespace bilayer::detail

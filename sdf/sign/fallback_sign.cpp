@@ -16,7 +16,8 @@ namespace {
 
 /// Ray directions. They are mostly along x, so that a ray misses the boxes of most triangles. They are slightly
 /// oblique, because many meshes are aligned with the axes.
-const glm::dvec3 ways[] = {{1, 0.0137, 0.0071}, {-1, 0.0113, -0.0239}, {1, -0.0317, 0.0193}, {-1, -0.0071, 0.0411}};
+const glm::dvec3 rayDirections[] = {
+    {1, 0.0137, 0.0071}, {-1, 0.0113, -0.0239}, {1, -0.0317, 0.0193}, {-1, -0.0071, 0.0411}};
 
 struct Passes {
     int sum = 0;
@@ -35,15 +36,15 @@ bool FallbackSign::isInside(const glm::dvec3& point) {
         });
     });
     if (closed_)
-        for (const glm::dvec3& way : ways)
-            if (const auto winding = windingByRay(point, beyond_ * way)) return *winding > 0;
+        for (const glm::dvec3& direction : rayDirections)
+            if (const auto winding = windingByRay(point, beyond_ * direction)) return *winding > 0;
     std::call_once(made_, [&] { tbb::this_task_arena::isolate([&] { winding_.emplace(mesh_, &progress_); }); });
     return (*winding_)(point) > 0.5;
 }
 
 // Returns the winding number by the signed crossings of a ray that ends outside; empty if a crossing is too close to an
 // edge to decide.
-std::optional<int> FallbackSign::windingByRay(const glm::dvec3& point, const glm::dvec3& way) const {
+std::optional<int> FallbackSign::windingByRay(const glm::dvec3& point, const glm::dvec3& end) const {
     const auto passesOf = [&](const auto& range, Passes passes) {
         progress_.poll();
         for (std::size_t i = range.begin(); i < range.end() && passes.clear; ++i) {
@@ -52,10 +53,11 @@ std::optional<int> FallbackSign::windingByRay(const glm::dvec3& point, const glm
             // Quick rejection: the ray passes below or above the triangle's box in y.
             const double lowest = double(std::min({a.y, b.y, c.y})) - point.y,
                          highest = double(std::max({a.y, b.y, c.y})) - point.y;
-            if (lowest > std::max(way.y, 0.0) || highest < std::min(way.y, 0.0)) continue;
-            const auto turn = passing({glm::dvec3(a) - point, glm::dvec3(b) - point, glm::dvec3(c) - point}, way);
-            passes.clear = turn.has_value();
-            passes.sum += turn.value_or(0);
+            if (lowest > std::max(end.y, 0.0) || highest < std::min(end.y, 0.0)) continue;
+            const auto crossing =
+                segmentCrossing({glm::dvec3(a) - point, glm::dvec3(b) - point, glm::dvec3(c) - point}, end);
+            passes.clear = crossing.has_value();
+            passes.sum += crossing.value_or(0);
         }
         return passes;
     };

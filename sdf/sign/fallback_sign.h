@@ -26,7 +26,7 @@ class FallbackSign {
     bool isInside(const glm::dvec3& point);
 
   private:
-    std::optional<int> windingByRay(const glm::dvec3& point, const glm::dvec3& way) const;
+    std::optional<int> windingByRay(const glm::dvec3& point, const glm::dvec3& end) const;
 
     const Mesh& mesh_;
     Progress& progress_;

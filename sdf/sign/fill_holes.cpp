@@ -25,7 +25,7 @@ constexpr std::size_t maxEdges = 1000;
 // and inside (1), except for the influence of other holes.
 constexpr double maxDeviation = 0.25;
 // Distance from a fill triangle at which winding numbers are evaluated, on both sides [sqrt of its area].
-constexpr double aside = 1e-3;
+constexpr double sampleOffset = 1e-3;
 
 using Loop = std::vector<unsigned>;  // vertices
 using Lid = std::vector<glm::uvec3>;
@@ -82,8 +82,9 @@ class MissingEdges {
         auto best = out.begin();
         if (path.size() > 1 && out.size() > 1) {
             const glm::dvec3 back = directionOf(path.back(), path[path.size() - 2]);
-            const auto turn = [&](unsigned to) { return glm::dot(directionOf(path.back(), to), back); };
-            best = std::max_element(out.begin(), out.end(), [&](unsigned a, unsigned b) { return turn(a) < turn(b); });
+            const auto cosine = [&](unsigned to) { return glm::dot(directionOf(path.back(), to), back); };
+            best =
+                std::max_element(out.begin(), out.end(), [&](unsigned a, unsigned b) { return cosine(a) < cosine(b); });
         }
         const unsigned to = *best;
         out.erase(best);
@@ -181,7 +182,7 @@ bool isBorder(const Mesh& mesh, const Lid& lid, const WindingNumber& winding) {
         const glm::dvec3 vector = areaOf(mesh, t);
         const double its = glm::length(vector);
         if (!(its > 0)) continue;
-        const glm::dvec3 step = aside / std::sqrt(its) * vector;
+        const glm::dvec3 step = sampleOffset / std::sqrt(its) * vector;
         const auto isHalf = [&](const glm::dvec3& place) {
             return std::abs(winding.estimate(place, 0.1).value - 0.5) < maxDeviation;
         };

@@ -113,9 +113,9 @@ class Search {
             },
             [&](unsigned triangle) {
                 const glm::uvec3& t = mesh_.triangles[triangle];
-                const std::array<glm::dvec3, 3> corners{glm::dvec3(mesh_.points[t.x]) - point,
-                                                        glm::dvec3(mesh_.points[t.y]) - point,
-                                                        glm::dvec3(mesh_.points[t.z]) - point};
+                const TriangleCorners corners{glm::dvec3(mesh_.points[t.x]) - point,
+                                              glm::dvec3(mesh_.points[t.y]) - point,
+                                              glm::dvec3(mesh_.points[t.z]) - point};
                 bound = std::min(bound, glm::length(closestToOrigin(corners)));
             });
         return bound;

@@ -1,0 +1,11 @@
+// The corners of a triangle in double precision.
+#pragma once
+
+#include <array>
+#include <glm/vec3.hpp>
+
+namespace bilayer::detail {
+
+using TriangleCorners = std::array<glm::dvec3, 3>;
+
+}  // namespace bilayer::detail
