@@ -15,8 +15,8 @@
 // Slices of an item.
 #define SLICES (ITEMS > 1 ? 1 : BLOCK_SIDE)
 
-// See sdf/fill/exact_block.cpp, sdf/fill/bounding_cylinder.h and sdf/leaf/sign_propagation.h for these: rounding [voxels,
-// voxels^2 or fractions].
+// See sdf/fill/exact_block.cpp, sdf/fill/bounding_cylinder.h and sdf/leaf/sign_propagation.h for these: rounding
+// [voxels, voxels^2 or fractions].
 #define BOUND_SLACK 1e-4f
 #define TIE 1e-5f
 #define RAISED_PART 1e-3f
