@@ -90,7 +90,7 @@ class PointAttributes {
                           (flags & uniform) != 0, (flags & paged) != 0};
         if (array.paged && array.length != array.bytes)
             throw std::runtime_error(
-                fmt::format("an attribute of {} bytes, where {} are to be", array.length, array.bytes));
+                fmt::format("an attribute of {} bytes, where {} are expected", array.length, array.bytes));
         return array;
     }
 

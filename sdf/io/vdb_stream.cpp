@@ -47,10 +47,10 @@ void VdbStream::skipBlosc(std::uint64_t length, std::uint64_t expected) {
     if (length < sizeof(Head)) throw std::runtime_error("compressed values that are too short");
     const auto head = read<Head>();
     if (head.compressed != length)
-        throw std::runtime_error(fmt::format("{} bytes of values that were {}", length, head.compressed));
+        throw std::runtime_error(fmt::format("{} bytes of values, which state {}", length, head.compressed));
     const bool padded = expected <= bloscPadding && head.bytes == bloscPadding;
     if ((head.bytes != expected && !padded) || head.bytes > maxLz4Expansion * length)
-        throw std::runtime_error(fmt::format("{} bytes of values, where {} are to be", head.bytes, expected));
+        throw std::runtime_error(fmt::format("{} bytes of values, where {} are expected", head.bytes, expected));
     skip(length - sizeof(Head), "compressed values");
 }
 
@@ -85,7 +85,7 @@ void VdbStream::skipMetadata() {
         const bool fixed = type != "string" && openvdb::Metadata::isRegisteredType(type);
         const std::uint64_t expected = fixed ? openvdb::Metadata::createMetadata(type)->size() : size;
         if (size != expected)
-            throw std::runtime_error(fmt::format("'{}' of {} bytes, where {} are to be", name, size, expected));
+            throw std::runtime_error(fmt::format("'{}' of {} bytes, where {} are expected", name, size, expected));
         skip(size, "metadata");
     }
 }

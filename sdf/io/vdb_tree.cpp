@@ -36,7 +36,7 @@ void skipBytes(VdbStream& in, const VdbValueFormat& format, std::uint64_t expect
     if (!format.zip && !format.blosc) return in.skip(expected, "values");
     const auto length = in.read<std::int64_t>();
     if (length <= 0 && length != -std::int64_t(expected))
-        throw std::runtime_error(fmt::format("{} bytes of values, where {} are to be", -length, expected));
+        throw std::runtime_error(fmt::format("{} bytes of values, where {} are expected", -length, expected));
     if (length > 0 && format.blosc) return in.skipBlosc(std::uint64_t(length), expected);
     in.skip(std::uint64_t(std::abs(length)), "values");
 }
