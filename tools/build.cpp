@@ -15,6 +15,7 @@
 #include <bilayer/sdf/build.h>
 #include <bilayer/sdf/mesh_io.h>
 #include <bilayer/sdf/vdb_io.h>
+#include "sdf/base/method_names.h"
 #include "sdf/fill/double_layer.h"
 #include "sdf/sign/sign_choice.h"
 #include "tools/commands.h"
@@ -26,12 +27,8 @@ using namespace bilayer::detail;
 namespace {
 
 // The words are part of the command line's contract.
-const std::map<std::string, Method> methods{{"exact", Method::exact},
-                                            {"double-layer", Method::doubleLayer},
-                                            {"pseudonormal", Method::pseudonormal},
-                                            {"prism", Method::prism}};
-const std::map<std::string, Sign> signs{
-    {"auto", Sign::automatic}, {"normals", Sign::normals}, {"winding", Sign::winding}, {"flood", Sign::flood}};
+const std::map<std::string, Method> methods(methodNames.begin(), methodNames.end());
+const std::map<std::string, Sign> signs(signNames.begin(), signNames.end());
 const std::map<std::string, BandUnit> bandUnits{{"voxels", BandUnit::voxels}, {"world", BandUnit::world}};
 const std::map<std::string, ContactAccuracy> measures{
     {nameOf(ContactAccuracy::samples), ContactAccuracy::samples},
@@ -47,8 +44,9 @@ struct Arguments {
     BuildOptions options;
     float resolution = 0;
     float halfWidth = 3;
-    std::string bandUnit = "voxels", method = "exact", backend = "tbb", sign = "auto", device, mapping = "auto",
-                contacts = "edges";
+    std::string bandUnit = "voxels", method = nameOf(BuildOptions().method), backend = "tbb",
+                sign = nameOf(BuildOptions().sign), device, mapping = "auto",
+                contacts = nameOf(ColliderOptions().accuracy);
     std::uint64_t deviceMemory = 0;
     VdbOptions stored;
     ColliderOptions collider;

@@ -10,6 +10,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "sdf/base/method_names.h"
 #include "sdf/io/atomic_file.h"
 
 namespace bilayer::tools {
@@ -214,7 +215,7 @@ void addRows(Table& table, const LevelSet& levelSet, const VdbOptions& stored) {
         table.row("error bound", fmt::format("{}, {:.4g} voxels", metres(bound), bound / size));
     if (levelSet.sign().empty()) return;
     table.row("sign", fmt::format("{}: {}", levelSet.sign(), levelSet.signReason()));
-    if (levelSet.sign() == "normals")
+    if (levelSet.sign() == nameOf(Sign::normals))
         table.row("sign conflicts", fmt::format("{} pairs of neighbours", grouped(levelSet.signConflicts())));
 }
 
