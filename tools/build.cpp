@@ -39,7 +39,7 @@ const std::map<std::string, KernelMapping> mappings{{"auto", KernelMapping::auto
                                                     {"group", KernelMapping::groupPerBlock}};
 constexpr double thinnestBand = 1e-3, widestBand = 1e3;  // [voxels]
 
-struct Arguments {
+struct BuildArguments {
     std::filesystem::path mesh, output;
     BuildOptions options;
     float resolution = 0;
@@ -67,24 +67,25 @@ struct Outcome {
     double read = 0, inspect = 0, build = 0, fill = 0, body = 0, write = 0;
 };
 
-void requireUsage(const Arguments& a) {
+void requireUsage(const BuildArguments& a) {
     if (a.backend != "opencl" && (a.deviceGiven->count() || a.memoryGiven->count() || a.mappingGiven->count()))
         throw CLI::ValidationError("--device, --device-memory and --mapping", "need --backend opencl");
-    if (a.backend == "opencl" && a.method == "pseudonormal")
+    if (a.backend == "opencl" && a.options.method == Method::pseudonormal)
         throw CLI::ValidationError("--method pseudonormal", "needs --backend tbb");
-    const bool layers = a.method == "double-layer", prism = a.method == "prism";
+    const bool layers = a.options.method == Method::doubleLayer, prism = a.options.method == Method::prism;
+    const Sign sign = a.options.sign;
     if (prism && a.backend != "opencl") throw CLI::ValidationError("--method prism", "needs --backend opencl");
     for (const CLI::Option* option : a.layerOptions)
         if (!layers && option->count()) throw CLI::ValidationError(option->get_name(), "needs --method double-layer");
-    if (layers && a.sign != "auto")
+    if (layers && sign != Sign::automatic)
         throw CLI::ValidationError("--sign", "is not for --method double-layer: the layers tell the signs");
-    if (prism && a.sign != "auto")
+    if (prism && sign != Sign::automatic)
         throw CLI::ValidationError("--sign", "is not for --method prism: the triangles tell the signs");
-    if (a.gapGiven->count() && (layers || prism || (a.sign != "auto" && a.sign != "flood")))
+    if (a.gapGiven->count() && (layers || prism || (sign != Sign::automatic && sign != Sign::flood)))
         throw CLI::ValidationError("--gap", "needs --sign flood or auto, and --method exact or pseudonormal");
-    if (a.options.unite && (layers || prism || a.sign == "flood"))
+    if (a.options.unite && (layers || prism || sign == Sign::flood))
         throw CLI::ValidationError("--union", "needs --method exact or pseudonormal, and no --sign flood");
-    if (a.bandUnit == "world" && !a.halfGiven->count() && !a.exteriorGiven->count())
+    if (a.options.bandUnit == BandUnit::world && !a.halfGiven->count() && !a.exteriorGiven->count())
         throw CLI::ValidationError("--band-unit", "world needs --half-width, or --exterior-width and --interior-width");
     for (const CLI::Option* option : a.bodyOptions)
         if (!a.body && option->count()) throw CLI::ValidationError(option->get_name(), "needs --body");
@@ -92,7 +93,7 @@ void requireUsage(const Arguments& a) {
 }
 
 // The API's range is (0, 1000] voxels too, but this message names the option.
-void requireWidth(const CLI::Option* option, float width, const Arguments& a) {
+void requireWidth(const CLI::Option* option, float width, const BuildArguments& a) {
     const bool world = a.options.bandUnit == BandUnit::world;
     const double voxels = double(width) / (world ? double(a.options.voxelSize) : 1);
     if (option->count() && !(voxels >= thinnestBand && voxels <= widestBand))
@@ -103,19 +104,19 @@ void requireWidth(const CLI::Option* option, float width, const Arguments& a) {
                         thinnestBand, widestBand));
 }
 
-void requireBand(const Arguments& a) {
+void requireBand(const BuildArguments& a) {
     requireWidth(a.halfGiven, a.halfWidth, a);
     requireWidth(a.exteriorGiven, a.options.exteriorWidth, a);
     requireWidth(a.interiorGiven, a.options.interiorWidth, a);
 }
 
 // Returns nothing for the CPU backend.
-std::optional<BlockFiller> makeFiller(const Arguments& a) {
+std::optional<BlockFiller> makeFiller(const BuildArguments& a) {
     if (a.backend == "tbb") return std::nullopt;
     return openclFiller(openDevice(a.device), {.memoryMiB = a.deviceMemory, .mapping = mappings.at(a.mapping)});
 }
 
-LevelSet timedBuild(const Mesh& mesh, const Arguments& a, Outcome& outcome) {
+LevelSet timedBuild(const Mesh& mesh, const BuildArguments& a, Outcome& outcome) {
     const std::optional<BlockFiller> filler = makeFiller(a);
     outcome.device = filler ? filler->device : fmt::format("processor ({})", simdName());
     ProgressBar bar("building");
@@ -134,14 +135,14 @@ LevelSet timedBuild(const Mesh& mesh, const Arguments& a, Outcome& outcome) {
 }
 
 // Builds a field with the additional data that bodies need.
-LevelSet timedBody(const Mesh& mesh, const LevelSet& field, const Arguments& a, Outcome& outcome) {
+LevelSet timedBody(const Mesh& mesh, const LevelSet& field, const BuildArguments& a, Outcome& outcome) {
     const Stopwatch watch;
     LevelSet stored = withBody(field, mesh, a.collider, !a.noMesh);
     outcome.body = watch.seconds();
     return stored;
 }
 
-void printJson(const Arguments& a, const Outcome& o, const Mesh& mesh, const LevelSet& field) {
+void printJson(const BuildArguments& a, const Outcome& o, const Mesh& mesh, const LevelSet& field) {
     Json json{{"file", toJson(o.file)},
               {"mesh", o.report ? toJson(*o.report, a.options.voxelSize) : toJson(mesh, o.balanced)},
               {"output", a.output.string()},
@@ -169,7 +170,7 @@ void printJson(const Arguments& a, const Outcome& o, const Mesh& mesh, const Lev
     print(json);
 }
 
-void printTable(const Arguments& a, const Outcome& o, const Mesh& mesh, const LevelSet& field) {
+void printTable(const BuildArguments& a, const Outcome& o, const Mesh& mesh, const LevelSet& field) {
     Table input(a.mesh.string());
     addRows(input, o.file);
     if (o.report)
@@ -188,13 +189,13 @@ void printTable(const Arguments& a, const Outcome& o, const Mesh& mesh, const Le
     table.print();
 }
 
-void run(Arguments a) {
-    requireUsage(a);
+void run(BuildArguments a) {
     a.options.bandUnit = bandUnits.at(a.bandUnit);
-    // widths in the mesh's unit are checked once the voxel size is known
-    if (a.options.bandUnit == BandUnit::voxels || !a.resolutionGiven->count()) requireBand(a);
     a.options.method = methods.at(a.method);
     a.options.sign = signs.at(a.sign);
+    requireUsage(a);
+    // widths in the mesh's unit are checked once the voxel size is known
+    if (a.options.bandUnit == BandUnit::voxels || !a.resolutionGiven->count()) requireBand(a);
     a.collider.accuracy = a.noMesh ? ContactAccuracy::samples : measures.at(a.contacts);
     std::optional<tbb::global_control> threads;
     if (a.options.threads > 0)
@@ -231,7 +232,7 @@ void run(Arguments a) {
     a.json ? printJson(a, outcome, mesh, field) : printTable(a, outcome, mesh, field);
 }
 
-void addBand(CLI::App& command, Arguments& a) {
+void addBand(CLI::App& command, BuildArguments& a) {
     auto* size = command.add_option_group("voxel size", "exactly one of");
     size->add_option("--voxel-size", a.options.voxelSize, "edge of a voxel in the mesh's unit")->check(positive());
     a.resolutionGiven = size->add_option("--resolution", a.resolution, "voxels along the longest side of the bounds")
@@ -251,7 +252,7 @@ void addBand(CLI::App& command, Arguments& a) {
         ->check(CLI::IsMember(bandUnits));
 }
 
-void addMethod(CLI::App& command, Arguments& a) {
+void addMethod(CLI::App& command, BuildArguments& a) {
     command
         .add_option("--method", a.method,
                     "exact (default), double-layer, pseudonormal or prism (with --backend opencl)")
@@ -262,7 +263,7 @@ void addMethod(CLI::App& command, Arguments& a) {
                      ->check(within(0, 100));
 }
 
-void addLayers(CLI::App& command, Arguments& a) {
+void addLayers(CLI::App& command, BuildArguments& a) {
     DoubleLayerOptions& layers = a.options.doubleLayer;
     auto* group = command.add_option_group("layers", "only for --method double-layer");
     a.layerOptions = {
@@ -278,7 +279,7 @@ void addLayers(CLI::App& command, Arguments& a) {
             ->check(CLI::Range(1, 1024))};
 }
 
-void addBody(CLI::App& command, Arguments& a) {
+void addBody(CLI::App& command, BuildArguments& a) {
     auto* group = command.add_option_group("body", "what rigid bodies need beside the field");
     group->add_flag("--body", a.body, "keep surface points, mass, margin and the mesh: the file is all that collides");
     auto* contacts = group
@@ -296,7 +297,7 @@ void addBody(CLI::App& command, Arguments& a) {
         contacts, noMesh->excludes(contacts)};
 }
 
-void addMachine(CLI::App& command, Arguments& a) {
+void addMachine(CLI::App& command, BuildArguments& a) {
     command.add_option("--backend", a.backend, "tbb (default) or opencl")->check(CLI::IsMember({"tbb", "opencl"}));
     a.deviceGiven = command.add_option("--device", a.device, "part of an OpenCL device's or platform's name");
     a.memoryGiven = command.add_option("--device-memory", a.deviceMemory, "most memory of the device to use [MiB]")
@@ -312,7 +313,7 @@ void addMachine(CLI::App& command, Arguments& a) {
 
 void addBuild(CLI::App& app) {
     auto* command = app.add_subcommand("build", "Build the field of a mesh");
-    const auto a = std::make_shared<Arguments>();
+    const auto a = std::make_shared<BuildArguments>();
     command->add_option("mesh", a->mesh, "OBJ, PLY, STL, OFF, glTF, ...")->required();
     command->add_option("-o,--output", a->output, "the .vdb file")->required();
     addBand(*command, *a);

@@ -23,19 +23,19 @@ namespace bilayer::tools {
 using namespace bilayer::detail;
 namespace {
 
-struct Arguments {
+struct ReportArguments {
     std::filesystem::path input;
     bool json = false;
 };
 
-struct InspectArguments : Arguments {
+struct InspectArguments : ReportArguments {
     bullet::SceneRequirements scene;
     CLI::Option* stepGiven = nullptr;
 };
 
-template <class Kind = Arguments>
-std::shared_ptr<Kind> addArguments(CLI::App& command, const char* name, const char* help) {
-    auto arguments = std::make_shared<Kind>();
+template <class Arguments = ReportArguments>
+std::shared_ptr<Arguments> addArguments(CLI::App& command, const char* name, const char* help) {
+    auto arguments = std::make_shared<Arguments>();
     if (name) command.add_option(name, arguments->input, help)->required();
     command.add_flag("--json", arguments->json, "print one JSON object");
     return arguments;
@@ -138,7 +138,7 @@ Json gridList(const std::filesystem::path& path) {
 }
 
 // Returns nothing for a field without a body.
-std::optional<Body> bodyBeside(const Arguments& a, const LevelSet& field) {
+std::optional<Body> storedBody(const ReportArguments& a, const LevelSet& field) {
     if (!hasBody(field)) return std::nullopt;
     try {
         return bodyOf(field);
@@ -147,7 +147,7 @@ std::optional<Body> bodyBeside(const Arguments& a, const LevelSet& field) {
     }
 }
 
-void printInfo(const Arguments& a, const LevelSet& field, const Json& grids, const std::optional<Body>& body,
+void printInfo(const ReportArguments& a, const LevelSet& field, const Json& grids, const std::optional<Body>& body,
                const std::optional<MassProperties>& mass) {
     Table table(a.input.string());
     for (const Json& grid : grids)
@@ -170,10 +170,10 @@ Json inVoxels(float width, const LevelSet& field) {
     return std::round(1e5 * double(width) / double(field.voxelSize())) / 1e5;
 }
 
-void runInfo(const Arguments& a) {
+void runInfo(const ReportArguments& a) {
     const LevelSet field = readVdb(a.input);
     const Json grids = gridList(a.input);
-    const std::optional<Body> body = bodyBeside(a, field);
+    const std::optional<Body> body = storedBody(a, field);
     const std::optional<MassProperties> mass = body ? body->mass : massOf(field);
     if (!a.json) return printInfo(a, field, grids, body, mass);
     Json json{{"grids", grids},
@@ -205,7 +205,7 @@ Json toJson(const DeviceInfo& device) {
             {"maxAllocationBytes", device.maxAllocationBytes}};
 }
 
-void runDevices(const Arguments& a) {
+void runDevices(const ReportArguments& a) {
     const std::vector<DeviceInfo> found = devices();
     if (a.json) {
         Json list = Json::array();
