@@ -78,9 +78,9 @@ void requireUsage(const BuildArguments& a) {
     for (const CLI::Option* option : a.layerOptions)
         if (!layers && option->count()) throw CLI::ValidationError(option->get_name(), "needs --method double-layer");
     if (layers && sign != Sign::automatic)
-        throw CLI::ValidationError("--sign", "is not for --method double-layer: the layers tell the signs");
+        throw CLI::ValidationError("--sign", "is not for --method double-layer: the layers determine the signs");
     if (prism && sign != Sign::automatic)
-        throw CLI::ValidationError("--sign", "is not for --method prism: the triangles tell the signs");
+        throw CLI::ValidationError("--sign", "is not for --method prism: the triangles determine the signs");
     if (a.gapGiven->count() && (layers || prism || (sign != Sign::automatic && sign != Sign::flood)))
         throw CLI::ValidationError("--gap", "needs --sign flood or auto, and --method exact or pseudonormal");
     if (a.options.unite && (layers || prism || sign == Sign::flood))
@@ -239,16 +239,18 @@ void addBand(CLI::App& command, BuildArguments& a) {
                             ->check(positive());
     size->require_option(1);
     a.halfGiven =
-        command.add_option("--half-width", a.halfWidth, "band on either side of the surface, default 3 voxels")
+        command
+            .add_option("--half-width", a.halfWidth, "width of the band on each side of the surface, default 3 voxels")
             ->check(positive());
     a.exteriorGiven =
-        command.add_option("--exterior-width", a.options.exteriorWidth, "band outside")->check(positive());
-    a.interiorGiven = command.add_option("--interior-width", a.options.interiorWidth, "band inside")->check(positive());
+        command.add_option("--exterior-width", a.options.exteriorWidth, "width of the band outside")->check(positive());
+    a.interiorGiven =
+        command.add_option("--interior-width", a.options.interiorWidth, "width of the band inside")->check(positive());
     a.exteriorGiven->needs(a.interiorGiven)->excludes(a.halfGiven);
     a.interiorGiven->needs(a.exteriorGiven)->excludes(a.halfGiven);
     command
         .add_option("--band-unit", a.bandUnit,
-                    "of the three widths: voxels (default) or world, the mesh's unit; 0.001 to 1000 voxels either way")
+                    "unit of the three widths: voxels (default) or world, the mesh's unit; both 0.001 to 1000 voxels")
         ->check(CLI::IsMember(bandUnits));
 }
 
@@ -258,9 +260,11 @@ void addMethod(CLI::App& command, BuildArguments& a) {
                     "exact (default), double-layer, pseudonormal or prism (with --backend opencl)")
         ->check(CLI::IsMember(methods));
     command.add_option("--sign", a.sign, "auto (default), normals, winding or flood")->check(CLI::IsMember(signs));
-    command.add_flag("--union", a.options.unite, "solids that overlap are one: walls inside of their union go");
-    a.gapGiven = command.add_option("--gap", a.options.gap, "gaps that --sign flood closes [voxels], default 2")
-                     ->check(within(0, 100));
+    command.add_flag("--union", a.options.unite, "build the union of overlapping solids, without the walls inside it");
+    a.gapGiven =
+        command
+            .add_option("--gap", a.options.gap, "maximum width of gaps that --sign flood closes [voxels], default 2")
+            ->check(within(0, 100));
 }
 
 void addLayers(CLI::App& command, BuildArguments& a) {
@@ -269,30 +273,31 @@ void addLayers(CLI::App& command, BuildArguments& a) {
     a.layerOptions = {
         group->add_option("--delta", layers.delta, "distance of each layer from the surface [voxels], default 0.5")
             ->check(within(0.1, 4)),
-        group->add_option("--epsilon", layers.epsilon, "area that one sample stands for [voxels^2], default 1")
+        group->add_option("--epsilon", layers.epsilon, "area per sample [voxels^2], default 1")
             ->check(within(1e-4, 1e4)),
-        group->add_option("--neighbourhood", layers.neighbourhood, "voxels that a sample reaches at least, default 2")
+        group->add_option("--neighbourhood", layers.neighbourhood, "minimum reach of a sample [voxels], default 2")
             ->check(CLI::Range(1, 64)),
         group
             ->add_option("--max-subdivision", layers.maxSubdivision,
-                         "rows of samples in a piece of a triangle, default 32")
+                         "maximum rows of samples in a piece of a triangle, default 32")
             ->check(CLI::Range(1, 1024))};
 }
 
 void addBody(CLI::App& command, BuildArguments& a) {
-    auto* group = command.add_option_group("body", "what rigid bodies need beside the field");
-    group->add_flag("--body", a.body, "keep surface points, mass, margin and the mesh: the file is all that collides");
-    auto* contacts = group
-                         ->add_option("--contacts", a.contacts,
-                                      "measured by samples alone, by triangles at edges (default) or everywhere")
-                         ->check(CLI::IsMember(measures));
-    auto* noMesh = group->add_flag("--no-mesh", a.noMesh, "a smaller file, which rounds sharp edges");
-    a.bodyOptions = {
+    auto* group = command.add_option_group("body", "what rigid bodies need in addition to the field");
+    group->add_flag("--body", a.body,
+                    "also store surface points, mass, margin and the mesh: all that a collider needs");
+    auto* contacts =
         group
-            ->add_option("--margin", a.collider.margin,
-                         "bodies touch up to this distance in the mesh's unit, default a voxel")
+            ->add_option("--contacts", a.contacts,
+                         "contact accuracy: samples alone, exact triangles near edges (default), or everywhere")
+            ->check(CLI::IsMember(measures));
+    auto* noMesh =
+        group->add_flag("--no-mesh", a.noMesh, "store no mesh: the file is smaller, and sharp edges are rounded");
+    a.bodyOptions = {
+        group->add_option("--margin", a.collider.margin, "collision margin in the mesh's unit, default a voxel")
             ->check(positive()),
-        group->add_option("--point-spacing", a.collider.pointSpacing, "distance of surface points [voxels], default 2")
+        group->add_option("--point-spacing", a.collider.pointSpacing, "spacing of surface points [voxels], default 2")
             ->check(within(0.1, 100)),
         contacts, noMesh->excludes(contacts)};
 }
@@ -300,13 +305,15 @@ void addBody(CLI::App& command, BuildArguments& a) {
 void addMachine(CLI::App& command, BuildArguments& a) {
     command.add_option("--backend", a.backend, "tbb (default) or opencl")->check(CLI::IsMember({"tbb", "opencl"}));
     a.deviceGiven = command.add_option("--device", a.device, "part of an OpenCL device's or platform's name");
-    a.memoryGiven = command.add_option("--device-memory", a.deviceMemory, "most memory of the device to use [MiB]")
+    a.memoryGiven = command.add_option("--device-memory", a.deviceMemory, "maximum device memory to use [MiB]")
                         ->check(CLI::Range(std::uint64_t(1), std::uint64_t(1) << 30));
-    a.mappingGiven = command
-                         .add_option("--mapping", a.mapping,
-                                     "how kernels share blocks out: auto (default), block (an item each) or group")
-                         ->check(CLI::IsMember(mappings));
-    command.add_option("--threads", a.options.threads, "most threads, default all")->check(CLI::Range(1, 4096));
+    a.mappingGiven =
+        command
+            .add_option(
+                "--mapping", a.mapping,
+                "how blocks are mapped: auto (default), block (one per work-item) or group (one per work-group)")
+            ->check(CLI::IsMember(mappings));
+    command.add_option("--threads", a.options.threads, "maximum thread count, default all")->check(CLI::Range(1, 4096));
 }
 
 }  // namespace
@@ -321,11 +328,11 @@ void addBuild(CLI::App& app) {
     addLayers(*command, *a);
     addMachine(*command, *a);
     addBody(*command, *a);
-    command->add_flag("--triangles", a->options.triangles, "keep the nearest triangle of each voxel too");
-    command->add_flag("--fill", a->fill, "sweep distances into all voxels of the field's box");
+    command->add_flag("--triangles", a->options.triangles, "also store the nearest triangle of each voxel");
+    command->add_flag("--fill", a->fill, "extend the distances to all voxels of the field's bounding box");
     command->add_flag("--half-float", a->stored.halfFloat, "store 16-bit distances");
     command->add_flag("--report", a->report,
-                      "inspect the mesh too, as the command inspect does, with walls below a voxel");
+                      "also inspect the mesh, as the command inspect does, and count walls thinner than a voxel");
     command->add_flag("--json", a->json, "print one JSON object");
     command->callback([a] { run(*a); });
 }

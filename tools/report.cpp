@@ -67,17 +67,17 @@ Json settingsJson(const bullet::Settings& settings) {
 }
 
 void printSettings(const InspectArguments& a, const bullet::Settings& settings) {
-    Table table(fmt::format("recommended settings: bodies that meet at up to {:g} m/s, steps of {:.4g} s",
-                            a.scene.speed, a.scene.step));
+    Table table(fmt::format("recommended settings: impact speeds up to {:g} m/s, steps of {:.4g} s", a.scene.speed,
+                            a.scene.step));
     table.row("build",
               fmt::format("--voxel-size {:.4g} --exterior-width {} --interior-width {} --body --margin {:.4g}",
                           settings.voxelSize, settings.exteriorWidth, settings.interiorWidth, settings.margin));
     if (settings.wallVoxels > 0) table.row("walls", fmt::format("{:.3g} voxels", settings.wallVoxels));
-    const auto told = [](int substeps) {
+    const auto text = [](int substeps) {
         return fmt::format("{}{}", substeps, substeps < bullet::maxSubsteps ? "" : " or more");
     };
-    table.row("substeps", fmt::format("{} with speculative contacts, {} without", told(settings.substeps),
-                                      told(settings.substepsWithoutSpeculation)));
+    table.row("substeps", fmt::format("{} with speculative contacts, {} without", text(settings.substeps),
+                                      text(settings.substepsWithoutSpeculation)));
     table.row("field", fmt::format("about {} active voxels, {}, built in {:.1g} s on two cores",
                                    grouped(settings.voxels), bytes(settings.fieldBytes), settings.buildSeconds));
     table.row("solver", fmt::format("m_splitImpulsePenetrationThreshold = {:.4g}", settings.splitImpulse));
@@ -219,8 +219,8 @@ void runDevices(const ReportArguments& a) {
         table.row("driver", device.driver);
         table.row("kind", fmt::format("{}, {} compute units, {}", device.gpu ? "GPU" : "no GPU", device.computeUnits,
                                       device.doubles ? "double precision" : "single precision only: prism alone"));
-        table.row("memory",
-                  fmt::format("{}, {} in one piece", bytes(device.memoryBytes), bytes(device.maxAllocationBytes)));
+        table.row("memory", fmt::format("{}, at most {} in one allocation", bytes(device.memoryBytes),
+                                        bytes(device.maxAllocationBytes)));
         table.print();
     }
 }
@@ -239,37 +239,40 @@ std::string asSeconds(std::string& word) {
 
 void addScene(CLI::App& command, InspectArguments& a) {
     bullet::SceneRequirements& scene = a.scene;
-    auto* group = command.add_option_group("scene", "say what a body's field needs, and warn of the rest");
-    auto* step = group->add_option("--dt", scene.step, "step of the simulation [s], as 0.01 or 1/60")
+    auto* group =
+        command.add_option_group("scene", "recommend settings for a body's field, and warn of what they cannot solve");
+    auto* step = group->add_option("--dt", scene.step, "time step of the simulation [s], as 0.01 or 1/60")
                      ->check(positive())
                      ->transform(CLI::Validator(asSeconds, "SECONDS"));
     auto* speed =
-        group->add_option("--speed", scene.speed, "that bodies meet with at most [m/s]")->check(nonNegative());
+        group->add_option("--speed", scene.speed, "maximum relative speed of bodies [m/s]")->check(nonNegative());
     step->needs(speed);
     speed->needs(step);
     const auto also = [&](const char* name, float& value, const char* help, const CLI::Validator& check) {
         group->add_option(name, value, help)->check(check)->needs(step);
     };
-    also("--spin", scene.spin, "that bodies turn with at most [rad/s], default what an impact may give", nonNegative());
-    also("--thickness", scene.thickness, "of the thinnest wall that it meets [m]; its own count besides", positive());
-    also("--gap", scene.gap, "narrowest clearance to pass [m]", positive());
-    also("--voxel-size", scene.voxelSize, "to judge instead of choosing one [m]", positive());
-    also("--margin", scene.margin, "likewise [m], default a voxel", nonNegative());
-    also("--mass-ratio", scene.massRatio, "of the heaviest to the lightest in contact, default 1", within(1, 1e9));
+    also("--spin", scene.spin, "maximum angular speed [rad/s], default what an impact can cause", nonNegative());
+    also("--thickness", scene.thickness, "thinnest wall that it collides with [m], in addition to its own walls",
+         positive());
+    also("--gap", scene.gap, "narrowest gap that it must pass [m]", positive());
+    also("--voxel-size", scene.voxelSize, "check this voxel size instead of choosing one [m]", positive());
+    also("--margin", scene.margin, "check this collision margin [m], default a voxel", nonNegative());
+    also("--mass-ratio", scene.massRatio, "mass ratio of the heaviest to the lightest body in contact, default 1",
+         within(1, 1e9));
     a.stepGiven = step;
 }
 
 }  // namespace
 
 void addInspect(CLI::App& app) {
-    auto* command = app.add_subcommand("inspect", "Count what is wrong with a mesh");
+    auto* command = app.add_subcommand("inspect", "Report the defects of a mesh");
     const auto a = addArguments<InspectArguments>(*command, "mesh", "OBJ, PLY, STL, OFF, glTF, ...");
     addScene(*command, *a);
     command->callback([a] { runInspect(*a); });
 }
 
 void addInfo(CLI::App& app) {
-    auto* command = app.add_subcommand("info", "Tell what is in a .vdb file");
+    auto* command = app.add_subcommand("info", "Show the contents of a .vdb file");
     const auto a = addArguments(*command, "field", "a .vdb file");
     command->callback([a] { runInfo(*a); });
 }

@@ -246,27 +246,28 @@ void addSeed(CLI::App& app) {
         command->add_option("--voxel-size", a->voxelSize, "edge of the liquid's voxels, default the first field's")
             ->check(positive());
     auto* resolution =
-        command->add_option("--resolution", a->resolution, "voxels along the longest side of the first mesh, stretched")
+        command->add_option("--resolution", a->resolution, "voxels along the longest side of the first mesh, scaled")
             ->check(positive());
     size->excludes(into)->excludes(resolution);
     resolution->excludes(into);
-    command->add_option("--half-width", a->halfWidth, "the liquid's band [voxels], default 3")
+    command->add_option("--half-width", a->halfWidth, "width of the liquid's band [voxels], default 3")
         ->check(within(3, 1e3))
         ->excludes(into);
-    command->add_option("--translate", a->translate, "moves all inputs: x y z")->expected(3)->check(finite());
-    command->add_option("--rotate", a->rotate, "turns all inputs first: axis x y z and angle [radians]")
+    command->add_option("--translate", a->translate, "translates all inputs: x y z")->expected(3)->check(finite());
+    command->add_option("--rotate", a->rotate, "rotates all inputs first: axis x y z and angle [radians]")
         ->expected(4)
         ->check(finite());
-    command->add_option("--scale", a->scale, "stretches all inputs before that: one number, or x y z")
+    command->add_option("--scale", a->scale, "scales all inputs before that: one number, or x y z")
         ->expected(1, 3)
         ->check(positive());
     command->add_option("--mode", a->mode, "unite (default), intersect or subtract")
         ->check(CLI::IsMember({"unite", "intersect", "subtract"}));
     command->add_flag("--union,!--no-union", a->uniteSolids,
-                      "solids of a mesh that overlap are one (default): walls inside of their union go");
-    a->particlesGiven = command->add_option("--particles", a->particles.perVoxel, "particles in a voxel: a points grid")
-                            ->check(CLI::Range(1, 1000));
-    command->add_option("--seed", a->particles.seed, "other particles for another number")->needs(a->particlesGiven);
+                      "use the union of a mesh's overlapping solids, without the walls inside it (default)");
+    a->particlesGiven =
+        command->add_option("--particles", a->particles.perVoxel, "also write a grid of points: particles per voxel")
+            ->check(CLI::Range(1, 1000));
+    command->add_option("--seed", a->particles.seed, "random seed of the particles")->needs(a->particlesGiven);
     command->add_flag("--json", a->json, "print one JSON object");
     command->callback([a] { run(*a); });
 }
