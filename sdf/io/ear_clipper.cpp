@@ -182,9 +182,9 @@ bool EarClipper::isEar(unsigned v, Rule rule) const {
 // Returns whether the cut leaves a positive angle at both of its ends. Angles of 180 degrees and more always remain.
 bool EarClipper::keepsAngles(unsigned v, Rule rule) const {
     const unsigned a = corners_[v].before, b = corners_[v].after;
-    const int least = rule == Rule::strict ? 1 : 0;
-    return (!corners_[a].convex || side(corners_[a].before, a, b) >= least) &&
-           (!corners_[b].convex || side(a, b, corners_[b].after) >= least);
+    const int minSide = rule == Rule::strict ? 1 : 0;
+    return (!corners_[a].convex || side(corners_[a].before, a, b) >= minSide) &&
+           (!corners_[b].convex || side(a, b, corners_[b].after) >= minSide);
 }
 
 // Returns whether the outline at a corner w enters the triangle of corner v. If w is on the triangle's border, it

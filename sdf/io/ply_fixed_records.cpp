@@ -97,7 +97,7 @@ struct TriangleRecords {
 
 /// Reads one record for each item. Returns false if one does not fit, or if the data is too short.
 template <class Records, class Item>
-bool readRecords(const Records& records, PlyData& data, std::vector<Item>& items) {
+bool readAllRecords(const Records& records, PlyData& data, std::vector<Item>& items) {
     if (data.size() / records.size < items.size()) return false;
     std::atomic<bool> fits = true;
     inOrder((items.size() + plyTaskElements - 1) / plyTaskElements, [&](std::size_t i) {
@@ -114,7 +114,7 @@ bool readRecords(const Records& records, PlyData& data, std::vector<Item>& items
 template <class Scalar>
 bool readFixedVertices(const PlyElement& element, PlyData& data, std::vector<glm::vec<3, Scalar>>& points) {
     const auto records = VertexRecords::of(element);
-    return records && readRecords(*records, data, points);
+    return records && readAllRecords(*records, data, points);
 }
 
 bool readFixedTriangles(const PlyElement& element, std::uint64_t vertices, PlyData& data,
@@ -122,7 +122,7 @@ bool readFixedTriangles(const PlyElement& element, std::uint64_t vertices, PlyDa
     const auto records = TriangleRecords::of(element, vertices);
     if (!records || data.size() < records->size || !records->isTriangle(data.at)) return false;
     resizeLarge(triangles, element.count);
-    if (readRecords(*records, data, triangles)) return true;
+    if (readAllRecords(*records, data, triangles)) return true;
     triangles = {};
     return false;
 }
