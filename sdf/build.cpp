@@ -20,7 +20,6 @@
 
 #include <bilayer/sdf/grids.h>
 #include <bilayer/sdf/inspect.h>
-#include "sdf/base/method_names.h"
 #include "sdf/base/physical_memory.h"
 #include "sdf/base/progress.h"
 #include "sdf/fill/double_layer.h"
@@ -217,6 +216,20 @@ struct Signs {
     std::size_t undecided = 0;  // voxels whose nearest normals cancel out
 };
 
+const char* name(Sign sign) {
+    switch (sign) {
+        case Sign::automatic:
+            return "auto";
+        case Sign::normals:
+            return "normals";
+        case Sign::winding:
+            return "winding";
+        case Sign::flood:
+            return "flood";
+    }
+    return "";
+}
+
 BandWidths bandOf(const BuildOptions& options) {
     return {options.exteriorWidth, options.interiorWidth, options.voxelSize};
 }
@@ -252,13 +265,27 @@ std::vector<float> withSides(const openvdb::FloatGrid& sides, const FilledBlocks
     return distances;
 }
 
+const char* name(Method method) {
+    switch (method) {
+        case Method::exact:
+            return "exact";
+        case Method::doubleLayer:
+            return "double-layer";
+        case Method::pseudonormal:
+            return "pseudonormal";
+        case Method::prism:
+            return "prism";
+    }
+    return "";
+}
+
 void describe(openvdb::FloatGrid& grid, const Mesh& mesh, const BuildOptions& options, const Signs& signs) {
     grid.setTransform(openvdb::math::Transform::createLinearTransform(options.voxelSize));
     grid.setName("distance");
     grid.setGridClass(openvdb::GRID_LEVEL_SET);
     grid.setCreator("bilayer");
     grid.insertMeta(metadata::version, openvdb::StringMetadata(BILAYER_VERSION));
-    grid.insertMeta(metadata::method, openvdb::StringMetadata(nameOf(options.method)));
+    grid.insertMeta(metadata::method, openvdb::StringMetadata(name(options.method)));
     grid.insertMeta(metadata::sign, openvdb::StringMetadata(signs.name));
     grid.insertMeta(metadata::signReason, openvdb::StringMetadata(signs.reason));
     grid.insertMeta(metadata::signConflicts, openvdb::Int64Metadata(std::int64_t(signs.conflicts)));
@@ -346,7 +373,7 @@ class Build {
         if (old.exteriorWidth() != widths.exterior * widths.voxelSize ||
             old.interiorWidth() != widths.interior * widths.voxelSize)
             refuse(fmt::format("has a band {:g} wide outside, {:g} inside", old.exteriorWidth(), old.interiorWidth()));
-        if (old.method() != nameOf(options_.method)) refuse(fmt::format("is of the method '{}'", old.method()));
+        if (old.method() != name(options_.method)) refuse(fmt::format("is of the method '{}'", old.method()));
         if (options_.triangles && !old.grids().triangle) refuse("lacks the nearest triangles");
         if (old.meshHash() != hash(oldMesh)) refuse("is of another mesh");
     }
@@ -370,7 +397,7 @@ class Build {
         // A different error bound shows that the distances were swept or rounded since the build.
         return text(metadata::version) == BILAYER_VERSION &&
                old.errorBound() == errorBound(options_) * options_.voxelSize &&
-               text(metadata::sign) == nameOf(Sign::normals) && (reason == asAskedFor || reason == closedAndOriented) &&
+               text(metadata::sign) == name(Sign::normals) && (reason == asAskedFor || reason == closedAndOriented) &&
                isNone(metadata::signConflicts) && isNone(metadata::signUndecided);
     }
 
@@ -396,16 +423,16 @@ class Build {
                 return !touched.any({block.x(), block.y(), block.z()}, blockSide);
             });
         });
-        return signs_.conflicts == 0 && signs_.name == nameOf(Sign::normals);
+        return signs_.conflicts == 0 && signs_.name == name(Sign::normals);
     }
 
     void fillOwnSigns() {
         Stopwatch part;
         const bool prism = options_.method == Method::prism;
         if (prism)
-            signs_ = {prismSigns, "the side of the nearest triangle whose prism holds the voxel"};
+            signs_ = {"prisms", "the side of the nearest triangle whose prism holds the voxel"};
         else
-            signs_ = {layerSigns, "the nearer of two layers tells the side"};
+            signs_ = {"layers", "the nearer of two layers tells the side"};
         FillParameters parameters = fillParameters(options_);
         if (prism) parameters.reach = reachOf(options_, Sign::normals);
         Assembler assembler(bandOf(options_), options_.triangles, Assembler::Plain::keep, progress_);
@@ -541,7 +568,7 @@ class Build {
         if (sign == Sign::winding) signByWinding(*distance_, solids, widths, balanced(solids, &progress_), &progress_);
         if (sign == Sign::flood) signByFlood(*distance_, mesh, options_.gap, widths, &progress_);
         if (byNormals) conflicts += assembler.conflicts(*distance_);
-        signs_ = {nameOf(sign), reason, conflicts, undecided};
+        signs_ = {name(sign), reason, conflicts, undecided};
         const bool isKnownToBeClean = options_.inspected && options_.inspected->selfIntersections == 0;
         if (byNormals && options_.sign == Sign::automatic && conflicts == 0 && !isKnownToBeClean) repair(mesh);
         times_.assemble += part.lap();
@@ -555,7 +582,7 @@ class Build {
         const SignRepair repair = repairSigns(*distance_, mesh, limit, &progress_);
         signs_.conflicts += repair.refused;
         if (repair.repaired == 0) return;
-        signs_.name = nameOf(Sign::winding);
+        signs_.name = name(Sign::winding);
         signs_.reason =
             fmt::format("{}, but the surface intersects itself; {} voxels have the side of their winding number",
                         signs_.reason, repair.repaired);
@@ -594,7 +621,7 @@ void refusePrism(const BuildOptions& options) {
 void refuseForDevices(const BuildOptions& options, const BlockFiller& filler) {
     if (options.method == Method::pseudonormal)
         throw std::invalid_argument(
-            fmt::format("the {} back end has no method {}", filler.backend, nameOf(options.method)));
+            fmt::format("the {} back end has no method {}", filler.backend, name(options.method)));
 }
 
 template <class Work>
