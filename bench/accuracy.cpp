@@ -19,6 +19,7 @@
 #include <bilayer/sdf/grids.h>
 #include <bilayer/sdf/mesh_io.h>
 #include "bench/program.h"
+#include "sdf/base/method_names.h"
 #include "tests/support/clean.h"
 #include "tests/support/truth.h"
 #include "tests/support/verdict.h"
@@ -55,12 +56,7 @@ struct Row {
     test::Verdict verdict;
 };
 
-const std::map<std::string, Method> methods = {
-    {"exact", Method::exact},
-    {"double-layer", Method::doubleLayer},
-    {"pseudonormal", Method::pseudonormal},
-    {"prism", Method::prism},
-};
+const std::map<std::string, Method> methods(detail::methodNames.begin(), detail::methodNames.end());
 
 // The prism method runs on the first OpenCL device.
 Builder ours(const std::string& name) {
@@ -95,8 +91,8 @@ std::vector<Builder> allBuilders(const std::string& method) {
     std::vector<Builder> builders = {ours(method)};
     builders.push_back(openvdbs("meshToVolume 0x4", openvdb::tools::DISABLE_RENORMALIZATION));
     builders.push_back(openvdbs("meshToVolume", 0));
-    std::vector<std::string> others = {"pseudonormal", "double-layer"};
-    if (!devices().empty()) others.push_back("prism");
+    std::vector<std::string> others = {detail::nameOf(Method::pseudonormal), detail::nameOf(Method::doubleLayer)};
+    if (!devices().empty()) others.push_back(detail::nameOf(Method::prism));
     for (const std::string& other : others)
         if (other != method) builders.push_back(ours(other));
     return builders;
@@ -219,7 +215,7 @@ test::Band parseBand(const std::string& text) {
 struct Options {
     std::vector<std::string> meshes, bands;
     std::vector<float> resolutions;
-    std::string method = "exact", markdownFile;
+    std::string method = detail::nameOf(Method::exact), markdownFile;
     std::size_t samples = 200000;
     unsigned seed = 1;
     bool json = false, alone = false, unsignedOnly = false;

@@ -29,7 +29,8 @@ constexpr int comparedThreads = 2;
 
 struct Options {
     std::vector<std::string> meshes,
-        methods{"meshToVolume-0x4", "meshToVolume", "pseudonormal", "exact", "double-layer"};
+        methods{nameOf(Builder::reference), nameOf(Builder::defaults), nameOf(Builder::pseudonormal),
+                nameOf(Builder::exact), nameOf(Builder::doubleLayer)};
     std::vector<float> resolutions{128, 251, 715};
     std::vector<int> threads{1, comparedThreads};
     int repetitions = 9;

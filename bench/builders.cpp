@@ -16,6 +16,7 @@
 #include <bilayer/sdf/mesh_io.h>
 #include "bench/measure.h"
 #include "demos/shared/shapes.h"
+#include "sdf/base/method_names.h"
 
 namespace bilayer::bench {
 namespace {
@@ -83,12 +84,6 @@ bool isOpencl(Builder builder) {
     return builder == Builder::exactOpencl || builder == Builder::doubleLayerOpencl || builder == Builder::prism;
 }
 
-const char* methodName(Method method) {
-    if (method == Method::exact) return "exact";
-    if (method == Method::prism) return "prism";
-    return method == Method::doubleLayer ? "double-layer" : "pseudonormal";
-}
-
 const BlockFiller& openclOnce() {
     static const BlockFiller filler = openclFiller(openDevice(""));
     return filler;
@@ -98,7 +93,7 @@ Outcome runOurs(const Scene& scene, const Job& job) {
     const Stopwatch watch;
     const LevelSet field = fieldOf(scene, job);
     const double seconds = watch.seconds();
-    if (field.method() != methodName(methodOf(job.builder)))
+    if (field.method() != detail::nameOf(methodOf(job.builder)))
         throw std::logic_error("the field came from method " + field.method());
     return {seconds, field.activeVoxels(), field.memoryBytes()};
 }
@@ -161,17 +156,14 @@ const char* nameOf(Builder builder) {
         case Builder::defaults:
             return "meshToVolume";
         case Builder::pseudonormal:
-            return "pseudonormal";
         case Builder::exact:
-            return "exact";
         case Builder::doubleLayer:
-            return "double-layer";
+        case Builder::prism:
+            return detail::nameOf(methodOf(builder));
         case Builder::exactOpencl:
             return "exact-opencl";
         case Builder::doubleLayerOpencl:
             return "double-layer-opencl";
-        case Builder::prism:
-            return "prism";
     }
     throw std::invalid_argument("no such builder");
 }

@@ -28,7 +28,7 @@ constexpr std::array movingShares{0.01, 0.1, 1.0};
 
 struct Options {
     std::string mesh;
-    std::vector<std::string> methods{"exact", "double-layer"};
+    std::vector<std::string> methods{nameOf(Builder::exact), nameOf(Builder::doubleLayer)};
     std::vector<int> threads{1, 2};
     float resolution = 128;
     float halfWidth = 3;

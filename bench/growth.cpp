@@ -22,7 +22,7 @@ namespace {
 struct Options {
     std::vector<double> triangles{1e4, 3e4, 1e5, 3e5, 1e6, 3e6, 1e7};
     std::vector<double> resolutions{64, 128, 256, 512, 1024, 2048};
-    std::vector<std::string> methods{"exact", "double-layer"};
+    std::vector<std::string> methods{nameOf(Builder::exact), nameOf(Builder::doubleLayer)};
     float resolution = 256;
     double fixedTriangles = 1e5;
     int threads = 2, repetitions = 5;

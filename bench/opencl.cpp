@@ -17,6 +17,7 @@
 #include "bench/builders.h"
 #include "bench/measure.h"
 #include "bench/program.h"
+#include "sdf/base/method_names.h"
 #include "sdf/fill/double_layer.h"
 
 using namespace bilayer;
@@ -31,7 +32,7 @@ constexpr int profiledRuns = 3;   // the run with the median kernel time is repo
 constexpr double MiB = 1 << 20;
 
 struct Options {
-    std::vector<std::string> meshes, methods{"exact", "double-layer", "prism"};
+    std::vector<std::string> meshes, methods{nameOf(Method::exact), nameOf(Method::doubleLayer), nameOf(Method::prism)};
     std::vector<float> resolutions{251, 715};
     std::vector<int> grid;
     std::string device;
@@ -76,9 +77,10 @@ struct Contest {
 };
 
 // The prism method has no builder on TBB; its successor, the double layer method, is used instead.
-constexpr Contest contests[] = {{"exact", Builder::exact, Builder::exactOpencl, 3, true},
-                                {"double-layer", Builder::doubleLayer, Builder::doubleLayerOpencl, 2, true},
-                                {"prism", Builder::doubleLayer, Builder::prism, 2, false}};
+constexpr Contest contests[] = {
+    {nameOf(Method::exact), Builder::exact, Builder::exactOpencl, 3, true},
+    {nameOf(Method::doubleLayer), Builder::doubleLayer, Builder::doubleLayerOpencl, 2, true},
+    {nameOf(Method::prism), Builder::doubleLayer, Builder::prism, 2, false}};
 
 // One builder in one scene.
 struct Row {
@@ -303,7 +305,7 @@ int run(int argc, char** argv) {
         ->excludes(resolution)
         ->check(CLI::PositiveNumber);
     app.add_option("--method", options.methods, "of exact, double-layer and prism")
-        ->check(CLI::IsMember({"exact", "double-layer", "prism"}));
+        ->check(CLI::IsMember(Options().methods));
     app.add_option("--device", options.device, "part of the name of one device; by default all are measured");
     app.add_option("--device-memory", options.deviceMemory, "most to use of a device's memory [MiB]");
     app.add_option("--repetitions", options.repetitions, "at most, of each builder in a scene")->capture_default_str();

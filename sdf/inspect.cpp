@@ -281,7 +281,7 @@ std::string verdict(const MeshReport& report) {
     add(report.nonManifoldEdges, "non-manifold edge", "non-manifold edges");
     add(report.misorientedEdges, "misoriented edge", "misoriented edges");
     add(report.insideOutComponents, "component inside out", "components inside out");
-    add(report.flippedTriangles, "triangle to be turned", "triangles to be turned");
+    add(report.flippedTriangles, "triangle to be flipped", "triangles to be flipped");
     add(report.selfIntersections, "pair of triangles intersecting", "pairs of triangles intersecting");
     add(report.nonManifoldVertices, "non-manifold vertex", "non-manifold vertices");
     add(report.duplicateTriangles, "repeated triangle", "repeated triangles");

@@ -8,8 +8,12 @@
 #include <string_view>
 
 #include <bilayer/sdf/grids.h>
+#include "sdf/base/method_names.h"
 
 namespace bilayer {
+
+using namespace detail;
+
 namespace {
 
 /// Range of voxel sizes [m]: squared lengths from 1/1000 voxel to thousands of voxels stay within the float range.
@@ -19,8 +23,10 @@ constexpr double farthestOrigin = double(std::uint64_t(1) << 40);
 /// Maximum band width [voxels]: a wider band is treated as file damage.
 constexpr float widestBand = 1 << 23;
 /// The empty name is for fields from other programs.
-constexpr std::string_view methods[] = {"", "exact", "double-layer", "pseudonormal", "prism"};
-constexpr std::string_view signs[] = {"", "normals", "winding", "flood", "layers", "prisms"};
+constexpr std::string_view methods[] = {"", nameOf(Method::exact), nameOf(Method::doubleLayer),
+                                        nameOf(Method::pseudonormal), nameOf(Method::prism)};
+constexpr std::string_view signs[] = {
+    "", nameOf(Sign::normals), nameOf(Sign::winding), nameOf(Sign::flood), layerSigns, prismSigns};
 
 template <class Value>
 Value meta(const openvdb::GridBase& grid, const char* name, const Value& fallback) {

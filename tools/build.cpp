@@ -15,6 +15,7 @@
 #include <bilayer/sdf/build.h>
 #include <bilayer/sdf/mesh_io.h>
 #include <bilayer/sdf/vdb_io.h>
+#include "sdf/base/method_names.h"
 #include "sdf/fill/double_layer.h"
 #include "sdf/sign/sign_choice.h"
 #include "tools/commands.h"
@@ -26,12 +27,8 @@ using namespace bilayer::detail;
 namespace {
 
 // The words are part of the command line's contract.
-const std::map<std::string, Method> methods{{"exact", Method::exact},
-                                            {"double-layer", Method::doubleLayer},
-                                            {"pseudonormal", Method::pseudonormal},
-                                            {"prism", Method::prism}};
-const std::map<std::string, Sign> signs{
-    {"auto", Sign::automatic}, {"normals", Sign::normals}, {"winding", Sign::winding}, {"flood", Sign::flood}};
+const std::map<std::string, Method> methods(methodNames.begin(), methodNames.end());
+const std::map<std::string, Sign> signs(signNames.begin(), signNames.end());
 const std::map<std::string, BandUnit> bandUnits{{"voxels", BandUnit::voxels}, {"world", BandUnit::world}};
 const std::map<std::string, ContactAccuracy> measures{
     {nameOf(ContactAccuracy::samples), ContactAccuracy::samples},
@@ -42,13 +39,14 @@ const std::map<std::string, KernelMapping> mappings{{"auto", KernelMapping::auto
                                                     {"group", KernelMapping::groupPerBlock}};
 constexpr double thinnestBand = 1e-3, widestBand = 1e3;  // [voxels]
 
-struct Arguments {
+struct BuildArguments {
     std::filesystem::path mesh, output;
     BuildOptions options;
     float resolution = 0;
     float halfWidth = 3;
-    std::string bandUnit = "voxels", method = "exact", backend = "tbb", sign = "auto", device, mapping = "auto",
-                contacts = "edges";
+    std::string bandUnit = "voxels", method = nameOf(BuildOptions().method), backend = "tbb",
+                sign = nameOf(BuildOptions().sign), device, mapping = "auto",
+                contacts = nameOf(ColliderOptions().accuracy);
     std::uint64_t deviceMemory = 0;
     VdbOptions stored;
     ColliderOptions collider;
@@ -69,24 +67,25 @@ struct Outcome {
     double read = 0, inspect = 0, build = 0, fill = 0, body = 0, write = 0;
 };
 
-void requireUsage(const Arguments& a) {
+void requireUsage(const BuildArguments& a) {
     if (a.backend != "opencl" && (a.deviceGiven->count() || a.memoryGiven->count() || a.mappingGiven->count()))
         throw CLI::ValidationError("--device, --device-memory and --mapping", "need --backend opencl");
-    if (a.backend == "opencl" && a.method == "pseudonormal")
+    if (a.backend == "opencl" && a.options.method == Method::pseudonormal)
         throw CLI::ValidationError("--method pseudonormal", "needs --backend tbb");
-    const bool layers = a.method == "double-layer", prism = a.method == "prism";
+    const bool layers = a.options.method == Method::doubleLayer, prism = a.options.method == Method::prism;
+    const Sign sign = a.options.sign;
     if (prism && a.backend != "opencl") throw CLI::ValidationError("--method prism", "needs --backend opencl");
     for (const CLI::Option* option : a.layerOptions)
         if (!layers && option->count()) throw CLI::ValidationError(option->get_name(), "needs --method double-layer");
-    if (layers && a.sign != "auto")
-        throw CLI::ValidationError("--sign", "is not for --method double-layer: the layers tell the signs");
-    if (prism && a.sign != "auto")
-        throw CLI::ValidationError("--sign", "is not for --method prism: the triangles tell the signs");
-    if (a.gapGiven->count() && (layers || prism || (a.sign != "auto" && a.sign != "flood")))
+    if (layers && sign != Sign::automatic)
+        throw CLI::ValidationError("--sign", "is not for --method double-layer: the layers determine the signs");
+    if (prism && sign != Sign::automatic)
+        throw CLI::ValidationError("--sign", "is not for --method prism: the triangles determine the signs");
+    if (a.gapGiven->count() && (layers || prism || (sign != Sign::automatic && sign != Sign::flood)))
         throw CLI::ValidationError("--gap", "needs --sign flood or auto, and --method exact or pseudonormal");
-    if (a.options.unite && (layers || prism || a.sign == "flood"))
+    if (a.options.unite && (layers || prism || sign == Sign::flood))
         throw CLI::ValidationError("--union", "needs --method exact or pseudonormal, and no --sign flood");
-    if (a.bandUnit == "world" && !a.halfGiven->count() && !a.exteriorGiven->count())
+    if (a.options.bandUnit == BandUnit::world && !a.halfGiven->count() && !a.exteriorGiven->count())
         throw CLI::ValidationError("--band-unit", "world needs --half-width, or --exterior-width and --interior-width");
     for (const CLI::Option* option : a.bodyOptions)
         if (!a.body && option->count()) throw CLI::ValidationError(option->get_name(), "needs --body");
@@ -94,7 +93,7 @@ void requireUsage(const Arguments& a) {
 }
 
 // The API's range is (0, 1000] voxels too, but this message names the option.
-void requireWidth(const CLI::Option* option, float width, const Arguments& a) {
+void requireWidth(const CLI::Option* option, float width, const BuildArguments& a) {
     const bool world = a.options.bandUnit == BandUnit::world;
     const double voxels = double(width) / (world ? double(a.options.voxelSize) : 1);
     if (option->count() && !(voxels >= thinnestBand && voxels <= widestBand))
@@ -105,19 +104,19 @@ void requireWidth(const CLI::Option* option, float width, const Arguments& a) {
                         thinnestBand, widestBand));
 }
 
-void requireBand(const Arguments& a) {
+void requireBand(const BuildArguments& a) {
     requireWidth(a.halfGiven, a.halfWidth, a);
     requireWidth(a.exteriorGiven, a.options.exteriorWidth, a);
     requireWidth(a.interiorGiven, a.options.interiorWidth, a);
 }
 
 // Returns nothing for the CPU backend.
-std::optional<BlockFiller> makeFiller(const Arguments& a) {
+std::optional<BlockFiller> makeFiller(const BuildArguments& a) {
     if (a.backend == "tbb") return std::nullopt;
     return openclFiller(openDevice(a.device), {.memoryMiB = a.deviceMemory, .mapping = mappings.at(a.mapping)});
 }
 
-LevelSet timedBuild(const Mesh& mesh, const Arguments& a, Outcome& outcome) {
+LevelSet timedBuild(const Mesh& mesh, const BuildArguments& a, Outcome& outcome) {
     const std::optional<BlockFiller> filler = makeFiller(a);
     outcome.device = filler ? filler->device : fmt::format("processor ({})", simdName());
     ProgressBar bar("building");
@@ -136,14 +135,14 @@ LevelSet timedBuild(const Mesh& mesh, const Arguments& a, Outcome& outcome) {
 }
 
 // Builds a field with the additional data that bodies need.
-LevelSet timedBody(const Mesh& mesh, const LevelSet& field, const Arguments& a, Outcome& outcome) {
+LevelSet timedBody(const Mesh& mesh, const LevelSet& field, const BuildArguments& a, Outcome& outcome) {
     const Stopwatch watch;
     LevelSet stored = withBody(field, mesh, a.collider, !a.noMesh);
     outcome.body = watch.seconds();
     return stored;
 }
 
-void printJson(const Arguments& a, const Outcome& o, const Mesh& mesh, const LevelSet& field) {
+void printJson(const BuildArguments& a, const Outcome& o, const Mesh& mesh, const LevelSet& field) {
     Json json{{"file", toJson(o.file)},
               {"mesh", o.report ? toJson(*o.report, a.options.voxelSize) : toJson(mesh, o.balanced)},
               {"output", a.output.string()},
@@ -171,7 +170,7 @@ void printJson(const Arguments& a, const Outcome& o, const Mesh& mesh, const Lev
     print(json);
 }
 
-void printTable(const Arguments& a, const Outcome& o, const Mesh& mesh, const LevelSet& field) {
+void printTable(const BuildArguments& a, const Outcome& o, const Mesh& mesh, const LevelSet& field) {
     Table input(a.mesh.string());
     addRows(input, o.file);
     if (o.report)
@@ -190,13 +189,13 @@ void printTable(const Arguments& a, const Outcome& o, const Mesh& mesh, const Le
     table.print();
 }
 
-void run(Arguments a) {
-    requireUsage(a);
+void run(BuildArguments a) {
     a.options.bandUnit = bandUnits.at(a.bandUnit);
-    // widths in the mesh's unit are checked once the voxel size is known
-    if (a.options.bandUnit == BandUnit::voxels || !a.resolutionGiven->count()) requireBand(a);
     a.options.method = methods.at(a.method);
     a.options.sign = signs.at(a.sign);
+    requireUsage(a);
+    // widths in the mesh's unit are checked once the voxel size is known
+    if (a.options.bandUnit == BandUnit::voxels || !a.resolutionGiven->count()) requireBand(a);
     a.collider.accuracy = a.noMesh ? ContactAccuracy::samples : measures.at(a.contacts);
     std::optional<tbb::global_control> threads;
     if (a.options.threads > 0)
@@ -233,88 +232,95 @@ void run(Arguments a) {
     a.json ? printJson(a, outcome, mesh, field) : printTable(a, outcome, mesh, field);
 }
 
-void addBand(CLI::App& command, Arguments& a) {
+void addBand(CLI::App& command, BuildArguments& a) {
     auto* size = command.add_option_group("voxel size", "exactly one of");
     size->add_option("--voxel-size", a.options.voxelSize, "edge of a voxel in the mesh's unit")->check(positive());
     a.resolutionGiven = size->add_option("--resolution", a.resolution, "voxels along the longest side of the bounds")
                             ->check(positive());
     size->require_option(1);
     a.halfGiven =
-        command.add_option("--half-width", a.halfWidth, "band on either side of the surface, default 3 voxels")
+        command
+            .add_option("--half-width", a.halfWidth, "width of the band on each side of the surface, default 3 voxels")
             ->check(positive());
     a.exteriorGiven =
-        command.add_option("--exterior-width", a.options.exteriorWidth, "band outside")->check(positive());
-    a.interiorGiven = command.add_option("--interior-width", a.options.interiorWidth, "band inside")->check(positive());
+        command.add_option("--exterior-width", a.options.exteriorWidth, "width of the band outside")->check(positive());
+    a.interiorGiven =
+        command.add_option("--interior-width", a.options.interiorWidth, "width of the band inside")->check(positive());
     a.exteriorGiven->needs(a.interiorGiven)->excludes(a.halfGiven);
     a.interiorGiven->needs(a.exteriorGiven)->excludes(a.halfGiven);
     command
         .add_option("--band-unit", a.bandUnit,
-                    "of the three widths: voxels (default) or world, the mesh's unit; 0.001 to 1000 voxels either way")
+                    "unit of the three widths: voxels (default) or world, the mesh's unit; both 0.001 to 1000 voxels")
         ->check(CLI::IsMember(bandUnits));
 }
 
-void addMethod(CLI::App& command, Arguments& a) {
+void addMethod(CLI::App& command, BuildArguments& a) {
     command
         .add_option("--method", a.method,
                     "exact (default), double-layer, pseudonormal or prism (with --backend opencl)")
         ->check(CLI::IsMember(methods));
     command.add_option("--sign", a.sign, "auto (default), normals, winding or flood")->check(CLI::IsMember(signs));
-    command.add_flag("--union", a.options.unite, "solids that overlap are one: walls inside of their union go");
-    a.gapGiven = command.add_option("--gap", a.options.gap, "gaps that --sign flood closes [voxels], default 2")
-                     ->check(within(0, 100));
+    command.add_flag("--union", a.options.unite, "build the union of overlapping solids, without the walls inside it");
+    a.gapGiven =
+        command
+            .add_option("--gap", a.options.gap, "maximum width of gaps that --sign flood closes [voxels], default 2")
+            ->check(within(0, 100));
 }
 
-void addLayers(CLI::App& command, Arguments& a) {
+void addLayers(CLI::App& command, BuildArguments& a) {
     DoubleLayerOptions& layers = a.options.doubleLayer;
     auto* group = command.add_option_group("layers", "only for --method double-layer");
     a.layerOptions = {
         group->add_option("--delta", layers.delta, "distance of each layer from the surface [voxels], default 0.5")
             ->check(within(0.1, 4)),
-        group->add_option("--epsilon", layers.epsilon, "area that one sample stands for [voxels^2], default 1")
+        group->add_option("--epsilon", layers.epsilon, "area per sample [voxels^2], default 1")
             ->check(within(1e-4, 1e4)),
-        group->add_option("--neighbourhood", layers.neighbourhood, "voxels that a sample reaches at least, default 2")
+        group->add_option("--neighbourhood", layers.neighbourhood, "minimum reach of a sample [voxels], default 2")
             ->check(CLI::Range(1, 64)),
         group
             ->add_option("--max-subdivision", layers.maxSubdivision,
-                         "rows of samples in a piece of a triangle, default 32")
+                         "maximum rows of samples in a piece of a triangle, default 32")
             ->check(CLI::Range(1, 1024))};
 }
 
-void addBody(CLI::App& command, Arguments& a) {
-    auto* group = command.add_option_group("body", "what rigid bodies need beside the field");
-    group->add_flag("--body", a.body, "keep surface points, mass, margin and the mesh: the file is all that collides");
-    auto* contacts = group
-                         ->add_option("--contacts", a.contacts,
-                                      "measured by samples alone, by triangles at edges (default) or everywhere")
-                         ->check(CLI::IsMember(measures));
-    auto* noMesh = group->add_flag("--no-mesh", a.noMesh, "a smaller file, which rounds sharp edges");
-    a.bodyOptions = {
+void addBody(CLI::App& command, BuildArguments& a) {
+    auto* group = command.add_option_group("body", "what rigid bodies need in addition to the field");
+    group->add_flag("--body", a.body,
+                    "also store surface points, mass, margin and the mesh: all that a collider needs");
+    auto* contacts =
         group
-            ->add_option("--margin", a.collider.margin,
-                         "bodies touch up to this distance in the mesh's unit, default a voxel")
+            ->add_option("--contacts", a.contacts,
+                         "contact accuracy: samples alone, exact triangles near edges (default), or everywhere")
+            ->check(CLI::IsMember(measures));
+    auto* noMesh =
+        group->add_flag("--no-mesh", a.noMesh, "store no mesh: the file is smaller, and sharp edges are rounded");
+    a.bodyOptions = {
+        group->add_option("--margin", a.collider.margin, "collision margin in the mesh's unit, default a voxel")
             ->check(positive()),
-        group->add_option("--point-spacing", a.collider.pointSpacing, "distance of surface points [voxels], default 2")
+        group->add_option("--point-spacing", a.collider.pointSpacing, "spacing of surface points [voxels], default 2")
             ->check(within(0.1, 100)),
         contacts, noMesh->excludes(contacts)};
 }
 
-void addMachine(CLI::App& command, Arguments& a) {
+void addMachine(CLI::App& command, BuildArguments& a) {
     command.add_option("--backend", a.backend, "tbb (default) or opencl")->check(CLI::IsMember({"tbb", "opencl"}));
     a.deviceGiven = command.add_option("--device", a.device, "part of an OpenCL device's or platform's name");
-    a.memoryGiven = command.add_option("--device-memory", a.deviceMemory, "most memory of the device to use [MiB]")
+    a.memoryGiven = command.add_option("--device-memory", a.deviceMemory, "maximum device memory to use [MiB]")
                         ->check(CLI::Range(std::uint64_t(1), std::uint64_t(1) << 30));
-    a.mappingGiven = command
-                         .add_option("--mapping", a.mapping,
-                                     "how kernels share blocks out: auto (default), block (an item each) or group")
-                         ->check(CLI::IsMember(mappings));
-    command.add_option("--threads", a.options.threads, "most threads, default all")->check(CLI::Range(1, 4096));
+    a.mappingGiven =
+        command
+            .add_option(
+                "--mapping", a.mapping,
+                "how blocks are mapped: auto (default), block (one per work-item) or group (one per work-group)")
+            ->check(CLI::IsMember(mappings));
+    command.add_option("--threads", a.options.threads, "maximum thread count, default all")->check(CLI::Range(1, 4096));
 }
 
 }  // namespace
 
 void addBuild(CLI::App& app) {
     auto* command = app.add_subcommand("build", "Build the field of a mesh");
-    const auto a = std::make_shared<Arguments>();
+    const auto a = std::make_shared<BuildArguments>();
     command->add_option("mesh", a->mesh, "OBJ, PLY, STL, OFF, glTF, ...")->required();
     command->add_option("-o,--output", a->output, "the .vdb file")->required();
     addBand(*command, *a);
@@ -322,11 +328,11 @@ void addBuild(CLI::App& app) {
     addLayers(*command, *a);
     addMachine(*command, *a);
     addBody(*command, *a);
-    command->add_flag("--triangles", a->options.triangles, "keep the nearest triangle of each voxel too");
-    command->add_flag("--fill", a->fill, "sweep distances into all voxels of the field's box");
+    command->add_flag("--triangles", a->options.triangles, "also store the nearest triangle of each voxel");
+    command->add_flag("--fill", a->fill, "extend the distances to all voxels of the field's bounding box");
     command->add_flag("--half-float", a->stored.halfFloat, "store 16-bit distances");
     command->add_flag("--report", a->report,
-                      "inspect the mesh too, as the command inspect does, with walls below a voxel");
+                      "also inspect the mesh, as the command inspect does, and count walls thinner than a voxel");
     command->add_flag("--json", a->json, "print one JSON object");
     command->callback([a] { run(*a); });
 }

@@ -46,7 +46,7 @@ inline CLI::Validator within(double low, double high) {
 /// Accepts finite numbers of zero or more.
 inline CLI::Validator nonNegative() {
     const auto good = [](double value) { return value >= 0 && value <= double(std::numeric_limits<float>::max()); };
-    return numbers(good, "a finite number, zero at least", "NONNEGATIVE");
+    return numbers(good, "a finite number, zero or more", "NONNEGATIVE");
 }
 
 /// Throws CLI::ValidationError if writing the output would overwrite an input.

@@ -23,7 +23,7 @@ namespace {
 
 constexpr const char* blanks = " \t\r";
 
-struct Arguments {
+struct FieldArguments {
     std::filesystem::path field, output;
     SurfaceOptions options;
     bool json = false;
@@ -44,7 +44,7 @@ bool parsePoint(const std::string& line, glm::dvec3& point) {
     return line.find_first_not_of(blanks, at) == std::string::npos;
 }
 
-void runQuery(const Arguments& a) {
+void runQuery(const FieldArguments& a) {
     const LevelSet levelSet = readVdb(a.field);
     const Field field(levelSet);
     const glm::dvec3 origin = levelSet.origin();
@@ -63,7 +63,7 @@ void runQuery(const Arguments& a) {
     }
 }
 
-void runSurface(const Arguments& a) {
+void runSurface(const FieldArguments& a) {
     requireOther(a.output, a.field);
     const LevelSet field = readVdb(a.field);
     requireWritable(a.output);
@@ -77,7 +77,7 @@ void runSurface(const Arguments& a) {
     table.print();
 }
 
-void runExport(const Arguments& a) {
+void runExport(const FieldArguments& a) {
     requireOther(a.output, a.field);
     const LevelSet field = readVdb(a.field);
     requireWritable(a.output);
@@ -114,14 +114,14 @@ void addQuery(CLI::App& app) {
     auto* command = app.add_subcommand(
         "query",
         "Read points x y z from standard input, a line each; print distance, gradient and whether in the band");
-    const auto a = std::make_shared<Arguments>();
+    const auto a = std::make_shared<FieldArguments>();
     command->add_option("field", a->field, "a .vdb file")->required();
     command->callback([a] { runQuery(*a); });
 }
 
 void addSurface(CLI::App& app) {
     auto* command = app.add_subcommand("surface", "Extract an isosurface as a mesh");
-    const auto a = std::make_shared<Arguments>();
+    const auto a = std::make_shared<FieldArguments>();
     command->add_option("field", a->field, "a .vdb file")->required();
     command->add_option("-o,--output", a->output, "a .ply, .obj or .stl file")
         ->required()
@@ -134,7 +134,7 @@ void addSurface(CLI::App& app) {
 
 void addExport(CLI::App& app) {
     auto* command = app.add_subcommand("export", "Write a field as NanoVDB grids, for code on a GPU");
-    const auto a = std::make_shared<Arguments>();
+    const auto a = std::make_shared<FieldArguments>();
     command->add_option("field", a->field, "a .vdb file")->required();
     command->add_option("-o,--output", a->output, "a .nvdb file")
         ->required()

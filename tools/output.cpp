@@ -10,6 +10,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "sdf/base/method_names.h"
 #include "sdf/io/atomic_file.h"
 
 namespace bilayer::tools {
@@ -41,8 +42,7 @@ std::string placeText(const glm::vec3& v, const glm::dvec3& origin) {
 
 void addOrigin(Table& table, const glm::dvec3& origin) {
     if (origin != glm::dvec3(0))
-        table.row("origin",
-                  fmt::format("{} {} {} m: coordinates are kept relative to it", origin.x, origin.y, origin.z));
+        table.row("origin", fmt::format("{} {} {} m: coordinates are relative to it", origin.x, origin.y, origin.z));
 }
 
 std::string holes(const MeshReport& report) {
@@ -52,7 +52,7 @@ std::string holes(const MeshReport& report) {
 }
 
 std::string orientation(const MeshReport& report) {
-    return fmt::format("{} ({} misoriented edges, {} inside-out components, {} triangles to be turned)",
+    return fmt::format("{} ({} misoriented edges, {} inside-out components, {} triangles to be flipped)",
                        report.oriented() ? "yes" : "no", grouped(report.misorientedEdges),
                        grouped(report.insideOutComponents), grouped(report.flippedTriangles));
 }
@@ -150,7 +150,7 @@ void addRows(Table& table, const MeshReport& report, float wall) {
     table.row("degenerate triangles", grouped(report.degenerateTriangles));
     table.row("duplicate triangles", grouped(report.duplicateTriangles));
     if (report.thinnestWall > 0)
-        table.row("thinnest wall", fmt::format("{}; behind 99 % of the area {} at least", metres(report.thinnestWall),
+        table.row("thinnest wall", fmt::format("{}; at least {} behind 99 % of the area", metres(report.thinnestWall),
                                                metres(report.commonWall)));
     if (wall > 0)
         table.row("thin walls", fmt::format("{} triangles, below {}", grouped(report.thinWalls), metres(wall)));
@@ -171,8 +171,7 @@ void addRows(Table& table, const Mesh& mesh, bool balanced) {
     table.row("triangles", grouped(mesh.triangles.size()));
     table.row("bounds", boxText(bounds(mesh), mesh.origin));
     addOrigin(table, mesh.origin);
-    table.row("closed, oriented",
-              balanced ? "yes: every edge is run both ways equally often" : "no (--report tells why)");
+    table.row("closed, oriented", balanced ? "yes: every edge has balanced half-edges" : "no (--report shows why)");
 }
 
 Json toJson(const ReadReport& read) {
@@ -191,13 +190,13 @@ void addRows(Table& table, const ReadReport& read) {
     table.row("file", fmt::format("{}, {}", counted(read.vertices, "vertex", "vertices"),
                                   counted(read.faces, "face", "faces")));
     if (read.mergedVertices)
-        table.row("merged",
-                  counted(read.mergedVertices, "vertex at the place of another", "vertices at the places of others"));
+        table.row("merged", counted(read.mergedVertices, "vertex at the position of another",
+                                    "vertices at the positions of others"));
     if (read.unusedVertices)
         table.row("left out", counted(read.unusedVertices, "vertex that no face uses", "vertices that no face uses"));
     if (read.collapsedTriangles)
-        table.row("left out", counted(read.collapsedTriangles, "triangle with two corners in one place",
-                                      "triangles with two corners in one place"));
+        table.row("left out", counted(read.collapsedTriangles, "triangle with two coincident corners",
+                                      "triangles with two coincident corners"));
     for (const std::string& note : read.notes) table.row("note", note);
 }
 
@@ -214,7 +213,7 @@ void addRows(Table& table, const LevelSet& levelSet, const VdbOptions& stored) {
         table.row("error bound", fmt::format("{}, {:.4g} voxels", metres(bound), bound / size));
     if (levelSet.sign().empty()) return;
     table.row("sign", fmt::format("{}: {}", levelSet.sign(), levelSet.signReason()));
-    if (levelSet.sign() == "normals")
+    if (levelSet.sign() == nameOf(Sign::normals))
         table.row("sign conflicts", fmt::format("{} pairs of neighbours", grouped(levelSet.signConflicts())));
 }
 

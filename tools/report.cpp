@@ -23,19 +23,19 @@ namespace bilayer::tools {
 using namespace bilayer::detail;
 namespace {
 
-struct Arguments {
+struct ReportArguments {
     std::filesystem::path input;
     bool json = false;
 };
 
-struct InspectArguments : Arguments {
+struct InspectArguments : ReportArguments {
     bullet::SceneRequirements scene;
     CLI::Option* stepGiven = nullptr;
 };
 
-template <class Kind = Arguments>
-std::shared_ptr<Kind> addArguments(CLI::App& command, const char* name, const char* help) {
-    auto arguments = std::make_shared<Kind>();
+template <class Arguments = ReportArguments>
+std::shared_ptr<Arguments> addArguments(CLI::App& command, const char* name, const char* help) {
+    auto arguments = std::make_shared<Arguments>();
     if (name) command.add_option(name, arguments->input, help)->required();
     command.add_flag("--json", arguments->json, "print one JSON object");
     return arguments;
@@ -67,17 +67,17 @@ Json settingsJson(const bullet::Settings& settings) {
 }
 
 void printSettings(const InspectArguments& a, const bullet::Settings& settings) {
-    Table table(fmt::format("recommended settings: bodies that meet at up to {:g} m/s, steps of {:.4g} s",
-                            a.scene.speed, a.scene.step));
+    Table table(fmt::format("recommended settings: impact speeds up to {:g} m/s, steps of {:.4g} s", a.scene.speed,
+                            a.scene.step));
     table.row("build",
               fmt::format("--voxel-size {:.4g} --exterior-width {} --interior-width {} --body --margin {:.4g}",
                           settings.voxelSize, settings.exteriorWidth, settings.interiorWidth, settings.margin));
     if (settings.wallVoxels > 0) table.row("walls", fmt::format("{:.3g} voxels", settings.wallVoxels));
-    const auto told = [](int substeps) {
+    const auto text = [](int substeps) {
         return fmt::format("{}{}", substeps, substeps < bullet::maxSubsteps ? "" : " or more");
     };
-    table.row("substeps", fmt::format("{} with speculative contacts, {} without", told(settings.substeps),
-                                      told(settings.substepsWithoutSpeculation)));
+    table.row("substeps", fmt::format("{} with speculative contacts, {} without", text(settings.substeps),
+                                      text(settings.substepsWithoutSpeculation)));
     table.row("field", fmt::format("about {} active voxels, {}, built in {:.1g} s on two cores",
                                    grouped(settings.voxels), bytes(settings.fieldBytes), settings.buildSeconds));
     table.row("solver", fmt::format("m_splitImpulsePenetrationThreshold = {:.4g}", settings.splitImpulse));
@@ -138,7 +138,7 @@ Json gridList(const std::filesystem::path& path) {
 }
 
 // Returns nothing for a field without a body.
-std::optional<Body> bodyBeside(const Arguments& a, const LevelSet& field) {
+std::optional<Body> storedBody(const ReportArguments& a, const LevelSet& field) {
     if (!hasBody(field)) return std::nullopt;
     try {
         return bodyOf(field);
@@ -147,7 +147,7 @@ std::optional<Body> bodyBeside(const Arguments& a, const LevelSet& field) {
     }
 }
 
-void printInfo(const Arguments& a, const LevelSet& field, const Json& grids, const std::optional<Body>& body,
+void printInfo(const ReportArguments& a, const LevelSet& field, const Json& grids, const std::optional<Body>& body,
                const std::optional<MassProperties>& mass) {
     Table table(a.input.string());
     for (const Json& grid : grids)
@@ -170,10 +170,10 @@ Json inVoxels(float width, const LevelSet& field) {
     return std::round(1e5 * double(width) / double(field.voxelSize())) / 1e5;
 }
 
-void runInfo(const Arguments& a) {
+void runInfo(const ReportArguments& a) {
     const LevelSet field = readVdb(a.input);
     const Json grids = gridList(a.input);
-    const std::optional<Body> body = bodyBeside(a, field);
+    const std::optional<Body> body = storedBody(a, field);
     const std::optional<MassProperties> mass = body ? body->mass : massOf(field);
     if (!a.json) return printInfo(a, field, grids, body, mass);
     Json json{{"grids", grids},
@@ -205,7 +205,7 @@ Json toJson(const DeviceInfo& device) {
             {"maxAllocationBytes", device.maxAllocationBytes}};
 }
 
-void runDevices(const Arguments& a) {
+void runDevices(const ReportArguments& a) {
     const std::vector<DeviceInfo> found = devices();
     if (a.json) {
         Json list = Json::array();
@@ -219,8 +219,8 @@ void runDevices(const Arguments& a) {
         table.row("driver", device.driver);
         table.row("kind", fmt::format("{}, {} compute units, {}", device.gpu ? "GPU" : "no GPU", device.computeUnits,
                                       device.doubles ? "double precision" : "single precision only: prism alone"));
-        table.row("memory",
-                  fmt::format("{}, {} in one piece", bytes(device.memoryBytes), bytes(device.maxAllocationBytes)));
+        table.row("memory", fmt::format("{}, at most {} in one allocation", bytes(device.memoryBytes),
+                                        bytes(device.maxAllocationBytes)));
         table.print();
     }
 }
@@ -239,37 +239,40 @@ std::string asSeconds(std::string& word) {
 
 void addScene(CLI::App& command, InspectArguments& a) {
     bullet::SceneRequirements& scene = a.scene;
-    auto* group = command.add_option_group("scene", "say what a body's field needs, and warn of the rest");
-    auto* step = group->add_option("--dt", scene.step, "step of the simulation [s], as 0.01 or 1/60")
+    auto* group =
+        command.add_option_group("scene", "recommend settings for a body's field, and warn of what they cannot solve");
+    auto* step = group->add_option("--dt", scene.step, "time step of the simulation [s], as 0.01 or 1/60")
                      ->check(positive())
                      ->transform(CLI::Validator(asSeconds, "SECONDS"));
     auto* speed =
-        group->add_option("--speed", scene.speed, "that bodies meet with at most [m/s]")->check(nonNegative());
+        group->add_option("--speed", scene.speed, "maximum relative speed of bodies [m/s]")->check(nonNegative());
     step->needs(speed);
     speed->needs(step);
     const auto also = [&](const char* name, float& value, const char* help, const CLI::Validator& check) {
         group->add_option(name, value, help)->check(check)->needs(step);
     };
-    also("--spin", scene.spin, "that bodies turn with at most [rad/s], default what an impact may give", nonNegative());
-    also("--thickness", scene.thickness, "of the thinnest wall that it meets [m]; its own count besides", positive());
-    also("--gap", scene.gap, "narrowest clearance to pass [m]", positive());
-    also("--voxel-size", scene.voxelSize, "to judge instead of choosing one [m]", positive());
-    also("--margin", scene.margin, "likewise [m], default a voxel", nonNegative());
-    also("--mass-ratio", scene.massRatio, "of the heaviest to the lightest in contact, default 1", within(1, 1e9));
+    also("--spin", scene.spin, "maximum angular speed [rad/s], default what an impact can cause", nonNegative());
+    also("--thickness", scene.thickness, "thinnest wall that it collides with [m], in addition to its own walls",
+         positive());
+    also("--gap", scene.gap, "narrowest gap that it must pass [m]", positive());
+    also("--voxel-size", scene.voxelSize, "check this voxel size instead of choosing one [m]", positive());
+    also("--margin", scene.margin, "check this collision margin [m], default a voxel", nonNegative());
+    also("--mass-ratio", scene.massRatio, "mass ratio of the heaviest to the lightest body in contact, default 1",
+         within(1, 1e9));
     a.stepGiven = step;
 }
 
 }  // namespace
 
 void addInspect(CLI::App& app) {
-    auto* command = app.add_subcommand("inspect", "Count what is wrong with a mesh");
+    auto* command = app.add_subcommand("inspect", "Report the defects of a mesh");
     const auto a = addArguments<InspectArguments>(*command, "mesh", "OBJ, PLY, STL, OFF, glTF, ...");
     addScene(*command, *a);
     command->callback([a] { runInspect(*a); });
 }
 
 void addInfo(CLI::App& app) {
-    auto* command = app.add_subcommand("info", "Tell what is in a .vdb file");
+    auto* command = app.add_subcommand("info", "Show the contents of a .vdb file");
     const auto a = addArguments(*command, "field", "a .vdb file");
     command->callback([a] { runInfo(*a); });
 }

@@ -23,7 +23,7 @@
 namespace bilayer::tools {
 namespace {
 
-struct Arguments {
+struct SeedArguments {
     std::vector<std::filesystem::path> inputs;
     std::filesystem::path output, into;
     float voxelSize = 0, resolution = 0, halfWidth = 3;
@@ -47,7 +47,7 @@ bool isVdb(const std::filesystem::path& path) {
     return path.extension() == ".vdb";
 }
 
-fluid::Placement makePlacement(const Arguments& a) {
+fluid::Placement makePlacement(const SeedArguments& a) {
     const glm::vec3 axis(a.rotate[0], a.rotate[1], a.rotate[2]);
     const float length = glm::length(axis);
     if (!(length > 0) || !std::isfinite(length)) throw CLI::ValidationError("--rotate", "the axis has no direction");
@@ -63,7 +63,7 @@ fluid::SeedMode makeMode(const std::string& word) {
     return word == "subtract" ? fluid::SeedMode::subtract : fluid::SeedMode::unite;
 }
 
-void requireUsage(const Arguments& a) {
+void requireUsage(const SeedArguments& a) {
     if (a.into.empty() && a.mode != "unite") throw CLI::ValidationError("--mode " + a.mode, "needs --into");
     for (const auto& input : a.inputs) requireOther(a.output, input);
     if (!a.into.empty() || a.voxelSize > 0 || a.resolution > 0) {
@@ -77,7 +77,7 @@ void requireUsage(const Arguments& a) {
 
 // Returns what a placement in floats loses of a large translation. Distant meshes absorb it before they are scaled and
 // rotated.
-glm::dvec3 remainder(const Arguments& a, const fluid::Placement& placement) {
+glm::dvec3 remainder(const SeedArguments& a, const fluid::Placement& placement) {
     const glm::dvec3 left =
         glm::dvec3(a.translate[0], a.translate[1], a.translate[2]) - glm::dvec3(placement.pose.position);
     return glm::inverse(glm::dquat(placement.pose.rotation)) * left / glm::dvec3(placement.scale);
@@ -105,7 +105,7 @@ glm::dvec3 wholeVoxels(const glm::dvec3& place, double voxelSize) {
 }
 
 // Returns the initial liquid relative to its origin, which is in its metadata if it is not zero.
-openvdb::FloatGrid::Ptr startingLiquid(const Arguments& a, const Input& first, const fluid::Placement& placement) {
+openvdb::FloatGrid::Ptr startingLiquid(const SeedArguments& a, const Input& first, const fluid::Placement& placement) {
     openvdb::initialize();
     if (!a.into.empty()) {
         const openvdb::FloatGrid::Ptr liquid = readVdb(a.into).grids().distance->deepCopy();
@@ -152,7 +152,7 @@ void add(fluid::SeedReport& all, const fluid::SeedReport& next) {
     all.changedVoxels += next.changedVoxels;
 }
 
-void report(const Arguments& a, const openvdb::FloatGrid& liquid, const std::vector<ReadReport>& files,
+void report(const SeedArguments& a, const openvdb::FloatGrid& liquid, const std::vector<ReadReport>& files,
             const fluid::SeedReport& changes, std::uint64_t particles, double seconds) {
     const double volume = volumeOf(liquid.deepCopy());
     const float voxelSize = float(liquid.voxelSize()[0]);
@@ -188,7 +188,7 @@ void report(const Arguments& a, const openvdb::FloatGrid& liquid, const std::vec
 }
 
 // Errors name the file.
-fluid::SeedReport seedInput(openvdb::FloatGrid& liquid, const Arguments& a, std::size_t index, const Input& input,
+fluid::SeedReport seedInput(openvdb::FloatGrid& liquid, const SeedArguments& a, std::size_t index, const Input& input,
                             const fluid::Placement& placement) {
     try {
         const fluid::SeedOptions options(makeMode(a.mode), a.uniteSolids);
@@ -201,7 +201,7 @@ fluid::SeedReport seedInput(openvdb::FloatGrid& liquid, const Arguments& a, std:
     }
 }
 
-void run(const Arguments& a) {
+void run(const SeedArguments& a) {
     requireUsage(a);
     const fluid::Placement placement = makePlacement(a);
     const Stopwatch watch;
@@ -238,7 +238,7 @@ void run(const Arguments& a) {
 
 void addSeed(CLI::App& app) {
     auto* command = app.add_subcommand("seed", "Unite meshes and fields into the level set of a liquid");
-    const auto a = std::make_shared<Arguments>();
+    const auto a = std::make_shared<SeedArguments>();
     command->add_option("inputs", a->inputs, "meshes and .vdb fields")->required();
     command->add_option("-o,--output", a->output, "the .vdb file")->required();
     auto* into = command->add_option("--into", a->into, "a liquid to start from, instead of an empty one");
@@ -246,27 +246,28 @@ void addSeed(CLI::App& app) {
         command->add_option("--voxel-size", a->voxelSize, "edge of the liquid's voxels, default the first field's")
             ->check(positive());
     auto* resolution =
-        command->add_option("--resolution", a->resolution, "voxels along the longest side of the first mesh, stretched")
+        command->add_option("--resolution", a->resolution, "voxels along the longest side of the first mesh, scaled")
             ->check(positive());
     size->excludes(into)->excludes(resolution);
     resolution->excludes(into);
-    command->add_option("--half-width", a->halfWidth, "the liquid's band [voxels], default 3")
+    command->add_option("--half-width", a->halfWidth, "width of the liquid's band [voxels], default 3")
         ->check(within(3, 1e3))
         ->excludes(into);
-    command->add_option("--translate", a->translate, "moves all inputs: x y z")->expected(3)->check(finite());
-    command->add_option("--rotate", a->rotate, "turns all inputs first: axis x y z and angle [radians]")
+    command->add_option("--translate", a->translate, "translates all inputs: x y z")->expected(3)->check(finite());
+    command->add_option("--rotate", a->rotate, "rotates all inputs first: axis x y z and angle [radians]")
         ->expected(4)
         ->check(finite());
-    command->add_option("--scale", a->scale, "stretches all inputs before that: one number, or x y z")
+    command->add_option("--scale", a->scale, "scales all inputs before that: one number, or x y z")
         ->expected(1, 3)
         ->check(positive());
     command->add_option("--mode", a->mode, "unite (default), intersect or subtract")
         ->check(CLI::IsMember({"unite", "intersect", "subtract"}));
     command->add_flag("--union,!--no-union", a->uniteSolids,
-                      "solids of a mesh that overlap are one (default): walls inside of their union go");
-    a->particlesGiven = command->add_option("--particles", a->particles.perVoxel, "particles in a voxel: a points grid")
-                            ->check(CLI::Range(1, 1000));
-    command->add_option("--seed", a->particles.seed, "other particles for another number")->needs(a->particlesGiven);
+                      "use the union of a mesh's overlapping solids, without the walls inside it (default)");
+    a->particlesGiven =
+        command->add_option("--particles", a->particles.perVoxel, "also write a grid of points: particles per voxel")
+            ->check(CLI::Range(1, 1000));
+    command->add_option("--seed", a->particles.seed, "random seed of the particles")->needs(a->particlesGiven);
     command->add_flag("--json", a->json, "print one JSON object");
     command->callback([a] { run(*a); });
 }

@@ -41,7 +41,7 @@ std::filesystem::path resolve(const std::filesystem::path& target) {
     return error ? target : resolved;
 }
 
-std::filesystem::path nameBeside(const std::filesystem::path& target) {
+std::filesystem::path nameNextTo(const std::filesystem::path& target) {
     static std::atomic<unsigned> count{0};
     const std::string suffix = "." + std::to_string(::getpid()) + "-" + std::to_string(count++) + ".part";
     return target.parent_path() / ("." + target.filename().string() + suffix);
@@ -86,7 +86,7 @@ struct AtomicFile::Entry {
 
 AtomicFile::AtomicFile(const std::filesystem::path& target) : target_(target) {
     target_ = resolve(target);
-    temporary_ = nameBeside(target_);
+    temporary_ = nameNextTo(target_);
     const std::string name = std::filesystem::absolute(temporary_).string();
     if (name.size() >= PATH_MAX) fail(target, std::generic_category().message(ENAMETOOLONG));
 

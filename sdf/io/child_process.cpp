@@ -67,12 +67,12 @@ void takeDefaultSignals() {
 
 // Keeps only the pipe, as `answerPipe`, and /dev/null as the standard streams. The pipe may have any descriptor.
 bool keepOnly(int pipe) {
-    const int aside = ::fcntl(pipe, F_DUPFD, answerPipe + 1);
+    const int moved = ::fcntl(pipe, F_DUPFD, answerPipe + 1);
     const int null = ::open("/dev/null", O_RDWR);
-    if (aside < 0 || null < 0) return false;
+    if (moved < 0 || null < 0) return false;
     for (int stream = 0; stream < answerPipe; ++stream)
         if (::dup2(null, stream) < 0) return false;
-    if (::dup2(aside, answerPipe) < 0) return false;
+    if (::dup2(moved, answerPipe) < 0) return false;
     if (::close_range(answerPipe + 1, UINT_MAX, 0) == 0) return true;
     const long last = ::sysconf(_SC_OPEN_MAX);  // for kernels before 5.9
     for (int file = answerPipe + 1; file < last; ++file) ::close(file);

@@ -20,37 +20,37 @@ bool isBefore(const Point& a, const Point& b) {
     return a.x < b.x || (a.x == b.x && a.y < b.y);
 }
 
-struct Edge {
+struct OutlineEdge {
     Point left, right;  ///< in sweep order
     std::size_t index;
 };
 
-bool cross(const Edge& e, const Edge& f) {
+bool cross(const OutlineEdge& e, const OutlineEdge& f) {
     return lineSide(e.left, e.right, f.left) * lineSide(e.left, e.right, f.right) < 0 &&
            lineSide(f.left, f.right, e.left) * lineSide(f.left, f.right, e.right) < 0;
 }
 
-bool boxesMeet(const Edge& e, const Edge& f) {
+bool boxesMeet(const OutlineEdge& e, const OutlineEdge& f) {
     return e.left.x <= f.right.x && f.left.x <= e.right.x &&
            std::min(e.left.y, e.right.y) <= std::max(f.left.y, f.right.y) &&
            std::min(f.left.y, f.right.y) <= std::max(e.left.y, e.right.y);
 }
 
-// Returns the side of an edge on which a later edge lies, at a position that the sweep has reached for both.
-int sideOf(const Edge& edge, const Edge& later) {
+// Returns the side of an edge on which a later edge lies, at a position that the sweep line has reached for both.
+int sideOf(const OutlineEdge& edge, const OutlineEdge& later) {
     const int side = lineSide(edge.left, edge.right, later.left);
     return side != 0 ? side : lineSide(edge.left, edge.right, later.right);
 }
 
 struct IsBelow {
-    bool operator()(const Edge* e, const Edge* f) const {
+    bool operator()(const OutlineEdge* e, const OutlineEdge* f) const {
         const int above = isBefore(e->left, f->left) ? sideOf(*e, *f) : -sideOf(*f, *e);
         return above != 0 ? above > 0 : e->index < f->index;
     }
 };
 
-std::vector<Edge> edgesOf(std::span<const Point> outline) {
-    std::vector<Edge> edges;
+std::vector<OutlineEdge> edgesOf(std::span<const Point> outline) {
+    std::vector<OutlineEdge> edges;
     edges.reserve(outline.size());
     for (std::size_t i = 0; i < outline.size(); ++i) {
         Point a = outline[i], b = outline[i + 1 < outline.size() ? i + 1 : 0];
@@ -61,7 +61,7 @@ std::vector<Edge> edgesOf(std::span<const Point> outline) {
     return edges;
 }
 
-bool anyPairCrosses(const std::vector<Edge>& edges) {
+bool anyPairCrosses(const std::vector<OutlineEdge>& edges) {
     for (std::size_t i = 0; i < edges.size(); ++i)
         for (std::size_t j = 0; j < i; ++j)
             if (boxesMeet(edges[i], edges[j]) && cross(edges[i], edges[j])) return true;
@@ -69,9 +69,9 @@ bool anyPairCrosses(const std::vector<Edge>& edges) {
 }
 
 // The edges on the sweep line, from bottom to top. Edges that become neighbours are compared.
-class Sweep {
+class SweepLine {
   public:
-    explicit Sweep(const std::vector<Edge>& edges) : edges_(edges), places_(edges.size(), status_.end()) {}
+    explicit SweepLine(const std::vector<OutlineEdge>& edges) : edges_(edges), places_(edges.size(), status_.end()) {}
 
     bool findsCrossing() {
         struct Event {
@@ -94,7 +94,7 @@ class Sweep {
     }
 
   private:
-    using Status = std::multiset<const Edge*, IsBelow>;
+    using Status = std::multiset<const OutlineEdge*, IsBelow>;
 
     bool begin(std::size_t edge) {
         const auto place = status_.insert(&edges_[edge]);
@@ -109,7 +109,7 @@ class Sweep {
         return above != status_.begin() && above != status_.end() && cross(**std::prev(above), **above);
     }
 
-    const std::vector<Edge>& edges_;
+    const std::vector<OutlineEdge>& edges_;
     Status status_;
     std::vector<Status::iterator> places_;
 };
@@ -117,8 +117,8 @@ class Sweep {
 }  // namespace
 
 bool hasCrossingEdges(std::span<const glm::dvec2> outline) {
-    const std::vector<Edge> edges = edgesOf(outline);
-    return edges.size() <= fewCorners ? anyPairCrosses(edges) : Sweep(edges).findsCrossing();
+    const std::vector<OutlineEdge> edges = edgesOf(outline);
+    return edges.size() <= fewCorners ? anyPairCrosses(edges) : SweepLine(edges).findsCrossing();
 }
 
 }  // namespace bilayer::detail

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "sdf/base/line_side.h"
 
@@ -11,12 +12,10 @@ namespace {
 /// Margin for rounding in tests of boxes against lines, relative to the products; generous.
 constexpr double roundingOfLine = 1e-15;
 
-constexpr double pi = 3.14159265358979323846;
-
 // Tests which boxes a triangle may overlap.
-class Reach {
+class TriangleBoxTest {
   public:
-    Reach(const glm::dvec2& a, const glm::dvec2& b, const glm::dvec2& c)
+    TriangleBoxTest(const glm::dvec2& a, const glm::dvec2& b, const glm::dvec2& c)
         : box_{glm::min(glm::min(a, b), c), glm::max(glm::max(a, b), c)}, corners_{a, b, c} {}
 
     bool operator()(const Box2& box) const {
@@ -27,9 +26,9 @@ class Reach {
   private:
     // Returns whether a box lies entirely to the right of a line.
     static bool isBeyond(const Box2& box, const glm::dvec2& a, const glm::dvec2& b) {
-        const glm::dvec2 way = b - a;
-        const double left = way.x * ((way.x > 0 ? box.upper.y : box.lower.y) - a.y);
-        const double right = way.y * ((way.y > 0 ? box.lower.x : box.upper.x) - a.x);
+        const glm::dvec2 edge = b - a;
+        const double left = edge.x * ((edge.x > 0 ? box.upper.y : box.lower.y) - a.y);
+        const double right = edge.y * ((edge.y > 0 ? box.lower.x : box.upper.x) - a.x);
         return left - right < -roundingOfLine * (std::abs(left) + std::abs(right));
     }
 
@@ -46,13 +45,13 @@ double dotOf(const glm::dvec2& p, const glm::dvec2& q) {
 }
 
 // Returns whether an outline reverses at q: it leaves for r along the line from which it came, back towards p.
-bool turnsBack(const glm::dvec2& p, const glm::dvec2& q, const glm::dvec2& r) {
+bool reverses(const glm::dvec2& p, const glm::dvec2& q, const glm::dvec2& r) {
     return dotOf(p - q, r - q) > 0 && lineSide(p, q, r) == 0;
 }
 
 // Calls f(previous, corner, next) for each corner, skipping repeated points.
 template <typename F>
-void forEachTurn(std::span<const glm::dvec2> outline, const F& f) {
+void forEachCorner(std::span<const glm::dvec2> outline, const F& f) {
     const std::size_t n = outline.size();
     const auto next = [&](std::size_t i) { return i + 1 < n ? i + 1 : 0; };
     std::size_t before = 0;
@@ -86,7 +85,7 @@ bool EarClipper::clip(std::span<const glm::dvec2> outline, std::vector<glm::uvec
         if (next_.empty())
             tryAll();
         else
-            tryTouched();
+            tryChanged();
     }
     const auto last =
         unsigned(std::find_if(corners_.begin(), corners_.end(), [](auto& c) { return c.present; }) - corners_.begin());
@@ -114,7 +113,7 @@ void EarClipper::tryAll() {
         if (corners_[i].present) tried_.push_back(i);
 }
 
-void EarClipper::tryTouched() {
+void EarClipper::tryChanged() {
     std::swap(tried_, next_);
     next_.clear();
 }
@@ -141,11 +140,11 @@ void EarClipper::cut(unsigned v, std::vector<glm::uvec3>& triangles) {
     corners_[corner.before].after = corner.after;
     corners_[corner.after].before = corner.before;
     --left_;
-    touch(corner.before);
-    touch(corner.after);
+    update(corner.before);
+    update(corner.after);
 }
 
-void EarClipper::touch(unsigned v) {
+void EarClipper::update(unsigned v) {
     classify(v);
     if (corners_[v].round == round_) return;
     corners_[v].round = round_;
@@ -170,22 +169,22 @@ bool EarClipper::mayCut(unsigned v, Rule rule) const {
     if (rule == Rule::convex) return corner.convex;
     if (corner.convex) return rule != Rule::flat && isEar(v, rule);
     if (rule == Rule::flat) return lineSide(a, corner.at, b) == 0;
-    return turnsBack(a, corner.at, b) && isOutwardSpike(v);
+    return reverses(a, corner.at, b) && isOutwardSpike(v);
 }
 
 bool EarClipper::isEar(unsigned v, Rule rule) const {
     const Corner& corner = corners_[v];
     if (!keepsAngles(v, rule)) return false;
-    return !obstacles_.any(Reach(corners_[corner.before].at, corner.at, corners_[corner.after].at),
+    return !obstacles_.any(TriangleBoxTest(corners_[corner.before].at, corner.at, corners_[corner.after].at),
                            [&](std::size_t w) { return blocks(unsigned(w), v, rule); });
 }
 
 // Returns whether the cut leaves a positive angle at both of its ends. Angles of 180 degrees and more always remain.
 bool EarClipper::keepsAngles(unsigned v, Rule rule) const {
     const unsigned a = corners_[v].before, b = corners_[v].after;
-    const int least = rule == Rule::strict ? 1 : 0;
-    return (!corners_[a].convex || side(corners_[a].before, a, b) >= least) &&
-           (!corners_[b].convex || side(a, b, corners_[b].after) >= least);
+    const int minSide = rule == Rule::strict ? 1 : 0;
+    return (!corners_[a].convex || side(corners_[a].before, a, b) >= minSide) &&
+           (!corners_[b].convex || side(a, b, corners_[b].after) >= minSide);
 }
 
 // Returns whether the outline at a corner w enters the triangle of corner v. If w is on the triangle's border, it
@@ -209,29 +208,31 @@ bool EarClipper::blocks(unsigned w, unsigned v, Rule rule) const {
 // kind.
 EarClipper::Spikes EarClipper::spikesOf(std::span<const glm::dvec2> outline) {
     long spikes = 0;
-    forEachTurn(outline, [&](auto& p, auto& q, auto& r) { spikes += turnsBack(p, q, r); });
+    forEachCorner(outline, [&](auto& p, auto& q, auto& r) { spikes += reverses(p, q, r); });
     if (spikes == 0) return Spikes::inward;
     double angle = 0;
-    forEachTurn(outline, [&](auto& p, auto& q, auto& r) {
-        if (!turnsBack(p, q, r)) angle += std::atan2(crossOf(q - p, r - q), dotOf(q - p, r - q));
+    forEachCorner(outline, [&](auto& p, auto& q, auto& r) {
+        if (!reverses(p, q, r)) angle += std::atan2(crossOf(q - p, r - q), dotOf(q - p, r - q));
     });
-    const long halfTurns = std::lround(angle / pi);
-    return halfTurns == 2 + spikes ? Spikes::inward : halfTurns == 2 - spikes ? Spikes::outward : Spikes::both;
+    const long halfRevolutions = std::lround(angle / std::numbers::pi);
+    return halfRevolutions == 2 + spikes   ? Spikes::inward
+           : halfRevolutions == 2 - spikes ? Spikes::outward
+                                           : Spikes::both;
 }
 
 // Returns whether a spike lies outside of the rest of the outline. A spike on the border counts as outside.
 bool EarClipper::isOutwardSpike(unsigned v) const {
     if (spikes_ != Spikes::both) return spikes_ == Spikes::outward;
     const glm::dvec2& point = corners_[v].at;
-    int turns = 0;
+    int windings = 0;
     const unsigned first = corners_[v].after, last = corners_[v].before;
     for (unsigned i = first;; i = corners_[i].after) {
         const glm::dvec2 &p = corners_[i].at, &q = corners_[i == last ? first : corners_[i].after].at;
         const int side = lineSide(p, q, point);
         if (side == 0 && dotOf(p - point, q - point) <= 0) return true;
-        if (p.y <= point.y && q.y > point.y && side > 0) ++turns;
-        if (p.y > point.y && q.y <= point.y && side < 0) --turns;
-        if (i == last) return turns <= 0;
+        if (p.y <= point.y && q.y > point.y && side > 0) ++windings;
+        if (p.y > point.y && q.y <= point.y && side < 0) --windings;
+        if (i == last) return windings <= 0;
     }
 }
 

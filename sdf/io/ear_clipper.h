@@ -17,7 +17,7 @@ namespace bilayer::detail {
 /// not convex can block an ear; a tree holds them.
 ///
 /// Outlines may touch themselves and traverse an edge in both directions. If an outline has no such ear, the rules are
-/// relaxed one by one. As a last resort, if the outline crosses itself, triangles may be folded over. Memory is reused
+/// relaxed one by one. As a fallback, if the outline crosses itself, triangles may be folded over. Memory is reused
 /// from one outline to the next.
 class EarClipper {
   public:
@@ -53,9 +53,9 @@ class EarClipper {
     bool playRound(Rule rule, std::vector<glm::uvec3>& triangles);
     void cut(unsigned v, std::vector<glm::uvec3>& triangles);
     void classify(unsigned v);
-    void touch(unsigned v);
+    void update(unsigned v);
     void tryAll();
-    void tryTouched();
+    void tryChanged();
 
     bool mayCut(unsigned v, Rule rule) const;
     bool isEar(unsigned v, Rule rule) const;

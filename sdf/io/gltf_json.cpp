@@ -84,62 +84,82 @@ json parse(std::string_view text) {
 }
 
 /// The type of a member.
-enum class Kind { Index, Size, Boolean, Text, AccessorType, Numbers, Indices, Texts, Indexed, Object, Objects };
+enum class GltfMemberKind {
+    Index,
+    Size,
+    Boolean,
+    Text,
+    AccessorType,
+    Numbers,
+    Indices,
+    Texts,
+    Indexed,
+    Object,
+    Objects
+};
 
-struct Member {
+struct GltfMember {
     const char* name;
-    Kind kind;
+    GltfMemberKind kind;
     bool isRequired = false;
-    std::size_t count = 0;             ///< of Numbers; 0: any
-    const char* each = "";             ///< singular name of Objects
-    std::vector<Member> members = {};  ///< of an Object, or of each of Objects
+    std::size_t count = 0;                 ///< of Numbers; 0: any
+    const char* each = "";                 ///< singular name of Objects
+    std::vector<GltfMember> members = {};  ///< of an Object, or of each of Objects
 };
 
 // Section 5 of the glTF 2.0 specification, as far as it concerns the shape.
-const std::vector<Member>& gltfMembers() {
-    static const std::vector<Member> sparseIndices{
-        {"bufferView", Kind::Index, true}, {"byteOffset", Kind::Index}, {"componentType", Kind::Index, true}};
-    static const std::vector<Member> sparseValues{{"bufferView", Kind::Index, true}, {"byteOffset", Kind::Index}};
-    static const std::vector<Member> sparse{{"count", Kind::Index, true},
-                                            {"indices", Kind::Object, true, 0, "", sparseIndices},
-                                            {"values", Kind::Object, true, 0, "", sparseValues}};
-    static const std::vector<Member> accessor{{"bufferView", Kind::Index},
-                                              {"byteOffset", Kind::Size},
-                                              {"componentType", Kind::Index, true},
-                                              {"normalized", Kind::Boolean},
-                                              {"count", Kind::Size, true},
-                                              {"type", Kind::AccessorType, true},
-                                              {"sparse", Kind::Object, false, 0, "", sparse}};
-    static const std::vector<Member> view{{"buffer", Kind::Index, true},
-                                          {"byteOffset", Kind::Size},
-                                          {"byteLength", Kind::Size, true},
-                                          {"byteStride", Kind::Size}};
-    static const std::vector<Member> node{{"mesh", Kind::Index},
-                                          {"skin", Kind::Index},
-                                          {"children", Kind::Indices},
-                                          {"matrix", Kind::Numbers, false, 16},
-                                          {"extensions", Kind::Object},
-                                          {"translation", Kind::Numbers, false, 3},
-                                          {"scale", Kind::Numbers, false, 3},
-                                          {"rotation", Kind::Numbers, false, 4}};
-    static const std::vector<Member> primitive{{"attributes", Kind::Indexed, true},
-                                               {"indices", Kind::Index},
-                                               {"mode", Kind::Index},
-                                               {"extensions", Kind::Object}};
-    static const std::vector<Member> mesh{{"primitives", Kind::Objects, true, 0, "primitive", primitive}};
-    static const std::vector<Member> skin{{"joints", Kind::Indices}, {"inverseBindMatrices", Kind::Index}};
-    static const std::vector<Member> gltf{
-        {"asset", Kind::Object, true, 0, "", {{"version", Kind::Text, true}}},
-        {"extensionsUsed", Kind::Texts},
-        {"extensionsRequired", Kind::Texts},
-        {"buffers", Kind::Objects, false, 0, "buffer", {{"byteLength", Kind::Size, true}, {"uri", Kind::Text}}},
-        {"bufferViews", Kind::Objects, false, 0, "buffer view", view},
-        {"accessors", Kind::Objects, false, 0, "accessor", accessor},
-        {"meshes", Kind::Objects, false, 0, "mesh", mesh},
-        {"skins", Kind::Objects, false, 0, "skin", skin},
-        {"nodes", Kind::Objects, false, 0, "node", node},
-        {"scene", Kind::Index},
-        {"scenes", Kind::Objects, false, 0, "scene", {{"nodes", Kind::Indices}}}};
+const std::vector<GltfMember>& gltfMembers() {
+    static const std::vector<GltfMember> sparseIndices{{"bufferView", GltfMemberKind::Index, true},
+                                                       {"byteOffset", GltfMemberKind::Index},
+                                                       {"componentType", GltfMemberKind::Index, true}};
+    static const std::vector<GltfMember> sparseValues{{"bufferView", GltfMemberKind::Index, true},
+                                                      {"byteOffset", GltfMemberKind::Index}};
+    static const std::vector<GltfMember> sparse{{"count", GltfMemberKind::Index, true},
+                                                {"indices", GltfMemberKind::Object, true, 0, "", sparseIndices},
+                                                {"values", GltfMemberKind::Object, true, 0, "", sparseValues}};
+    static const std::vector<GltfMember> accessor{{"bufferView", GltfMemberKind::Index},
+                                                  {"byteOffset", GltfMemberKind::Size},
+                                                  {"componentType", GltfMemberKind::Index, true},
+                                                  {"normalized", GltfMemberKind::Boolean},
+                                                  {"count", GltfMemberKind::Size, true},
+                                                  {"type", GltfMemberKind::AccessorType, true},
+                                                  {"sparse", GltfMemberKind::Object, false, 0, "", sparse}};
+    static const std::vector<GltfMember> view{{"buffer", GltfMemberKind::Index, true},
+                                              {"byteOffset", GltfMemberKind::Size},
+                                              {"byteLength", GltfMemberKind::Size, true},
+                                              {"byteStride", GltfMemberKind::Size}};
+    static const std::vector<GltfMember> node{{"mesh", GltfMemberKind::Index},
+                                              {"skin", GltfMemberKind::Index},
+                                              {"children", GltfMemberKind::Indices},
+                                              {"matrix", GltfMemberKind::Numbers, false, 16},
+                                              {"extensions", GltfMemberKind::Object},
+                                              {"translation", GltfMemberKind::Numbers, false, 3},
+                                              {"scale", GltfMemberKind::Numbers, false, 3},
+                                              {"rotation", GltfMemberKind::Numbers, false, 4}};
+    static const std::vector<GltfMember> primitive{{"attributes", GltfMemberKind::Indexed, true},
+                                                   {"indices", GltfMemberKind::Index},
+                                                   {"mode", GltfMemberKind::Index},
+                                                   {"extensions", GltfMemberKind::Object}};
+    static const std::vector<GltfMember> mesh{{"primitives", GltfMemberKind::Objects, true, 0, "primitive", primitive}};
+    static const std::vector<GltfMember> skin{{"joints", GltfMemberKind::Indices},
+                                              {"inverseBindMatrices", GltfMemberKind::Index}};
+    static const std::vector<GltfMember> gltf{
+        {"asset", GltfMemberKind::Object, true, 0, "", {{"version", GltfMemberKind::Text, true}}},
+        {"extensionsUsed", GltfMemberKind::Texts},
+        {"extensionsRequired", GltfMemberKind::Texts},
+        {"buffers",
+         GltfMemberKind::Objects,
+         false,
+         0,
+         "buffer",
+         {{"byteLength", GltfMemberKind::Size, true}, {"uri", GltfMemberKind::Text}}},
+        {"bufferViews", GltfMemberKind::Objects, false, 0, "buffer view", view},
+        {"accessors", GltfMemberKind::Objects, false, 0, "accessor", accessor},
+        {"meshes", GltfMemberKind::Objects, false, 0, "mesh", mesh},
+        {"skins", GltfMemberKind::Objects, false, 0, "skin", skin},
+        {"nodes", GltfMemberKind::Objects, false, 0, "node", node},
+        {"scene", GltfMemberKind::Index},
+        {"scenes", GltfMemberKind::Objects, false, 0, "scene", {{"nodes", GltfMemberKind::Indices}}}};
     return gltf;
 }
 
@@ -167,80 +187,81 @@ bool isAccessorType(const json& value) {
     return std::any_of(std::begin(types), std::end(types), [&](const char* type) { return value == type; });
 }
 
-bool isOfKind(json& value, Kind kind) {
+bool isOfKind(json& value, GltfMemberKind kind) {
     switch (kind) {
-        case Kind::Index:
+        case GltfMemberKind::Index:
             return takeIndex(value);
-        case Kind::Size:
+        case GltfMemberKind::Size:
             return takeInteger(value, std::numeric_limits<std::uint64_t>::max());
-        case Kind::Boolean:
+        case GltfMemberKind::Boolean:
             return value.is_boolean();
-        case Kind::Text:
+        case GltfMemberKind::Text:
             return value.is_string();
-        case Kind::AccessorType:
+        case GltfMemberKind::AccessorType:
             return isAccessorType(value);
-        case Kind::Numbers:
+        case GltfMemberKind::Numbers:
             return value.is_array() && allOf(value, [](const json& v) { return v.is_number(); });
-        case Kind::Indices:
+        case GltfMemberKind::Indices:
             return value.is_array() && allOf(value, takeIndex);
-        case Kind::Texts:
+        case GltfMemberKind::Texts:
             return value.is_array() && allOf(value, [](const json& v) { return v.is_string(); });
-        case Kind::Indexed:
+        case GltfMemberKind::Indexed:
             return value.is_object() && allOf(value, takeIndex);
-        case Kind::Object:
+        case GltfMemberKind::Object:
             return value.is_object();
-        case Kind::Objects:
+        case GltfMemberKind::Objects:
             return value.is_array() && allOf(value, [](const json& v) { return v.is_object(); });
     }
     return false;
 }
 
-std::string wanted(const Member& member) {
+std::string wanted(const GltfMember& member) {
     switch (member.kind) {
-        case Kind::Index:
+        case GltfMemberKind::Index:
             return fmt::format("an integer from 0 to {}", std::numeric_limits<int>::max());
-        case Kind::Size:
+        case GltfMemberKind::Size:
             return "an integer that is not negative";
-        case Kind::Boolean:
+        case GltfMemberKind::Boolean:
             return "true or false";
-        case Kind::Text:
+        case GltfMemberKind::Text:
             return "a string";
-        case Kind::AccessorType:
+        case GltfMemberKind::AccessorType:
             return "SCALAR, VEC2, VEC3, VEC4, MAT2, MAT3 or MAT4";
-        case Kind::Numbers:
+        case GltfMemberKind::Numbers:
             return fmt::format("an array of {} numbers", member.count);
-        case Kind::Indices:
+        case GltfMemberKind::Indices:
             return "an array of integers that are not negative";
-        case Kind::Texts:
+        case GltfMemberKind::Texts:
             return "an array of strings";
-        case Kind::Indexed:
+        case GltfMemberKind::Indexed:
             return "an object whose members are integers that are not negative";
-        case Kind::Object:
+        case GltfMemberKind::Object:
             return "an object";
-        case Kind::Objects:
+        case GltfMemberKind::Objects:
             return "an array of objects";
     }
     return {};
 }
 
-void check(json& object, const std::vector<Member>& members, const std::string& of);
+void check(json& object, const std::vector<GltfMember>& members, const std::string& of);
 
-void check(json& value, const Member& member, const std::string& of) {
+void check(json& value, const GltfMember& member, const std::string& of) {
     if (!isOfKind(value, member.kind))
         throw std::runtime_error(
             fmt::format("the {} of {} is {}; it must be {}", member.name, of, excerpt(value.dump()), wanted(member)));
     if (member.count > 0 && value.size() != member.count)
         throw std::runtime_error(
             fmt::format("the {} of {} has {} numbers; it must have {}", member.name, of, value.size(), member.count));
-    if (member.kind == Kind::Object) check(value, member.members, fmt::format("the {} of {}", member.name, of));
-    if (member.kind != Kind::Objects) return;
+    if (member.kind == GltfMemberKind::Object)
+        check(value, member.members, fmt::format("the {} of {}", member.name, of));
+    if (member.kind != GltfMemberKind::Objects) return;
     const std::string whole = of == "the file" ? "" : " of " + of;
     for (std::size_t i = 0; i < value.size(); ++i)
         check(value[i], member.members, fmt::format("{} {}{}", member.each, i, whole));
 }
 
-void check(json& object, const std::vector<Member>& members, const std::string& of) {
-    for (const Member& member : members) {
+void check(json& object, const std::vector<GltfMember>& members, const std::string& of) {
+    for (const GltfMember& member : members) {
         if (const auto found = object.find(member.name); found != object.end())
             check(*found, member, of);
         else if (member.isRequired)
@@ -262,7 +283,7 @@ json parseGltf(std::string_view text) {
     if (!file.is_object()) throw std::runtime_error("its JSON is no object, as glTF's is");
     const auto isKnown = [](const std::string& name) {
         return std::any_of(gltfMembers().begin(), gltfMembers().end(),
-                           [&](const Member& member) { return name == member.name; });
+                           [&](const GltfMember& member) { return name == member.name; });
     };
     for (auto member = file.begin(); member != file.end();)
         member = isKnown(member.key()) ? std::next(member) : file.erase(member);

@@ -21,8 +21,9 @@ using nlohmann::json;
 // Supported extensions that change the shape.
 constexpr std::string_view understood[] = {"KHR_mesh_quantization", "EXT_mesh_gpu_instancing"};
 // Prefixes of extensions that only concern appearance or sound, and of their vendors.
-constexpr std::string_view looks[] = {"KHR_materials_", "KHR_texture_", "EXT_texture_", "MSFT_texture_", "KHR_lights_",
-                                      "EXT_lights_",    "KHR_xmp",      "KHR_audio",    "KHR_technique"};
+constexpr std::string_view appearanceOnly[] = {"KHR_materials_", "KHR_texture_", "EXT_texture_",
+                                               "MSFT_texture_",  "KHR_lights_",  "EXT_lights_",
+                                               "KHR_xmp",        "KHR_audio",    "KHR_technique"};
 // Extensions that contain the geometry itself, even if they are only listed as used.
 constexpr std::string_view compressions[] = {"KHR_draco_mesh_compression", "EXT_meshopt_compression",
                                              "KHR_meshopt_compression"};
@@ -38,7 +39,7 @@ std::vector<std::string> names(const json& file, const char* member) {
 
 bool isUnderstood(std::string_view name) {
     if (contains(understood, name)) return true;
-    return std::any_of(std::begin(looks), std::end(looks),
+    return std::any_of(std::begin(appearanceOnly), std::end(appearanceOnly),
                        [&](std::string_view beginning) { return name.substr(0, beginning.size()) == beginning; });
 }
 

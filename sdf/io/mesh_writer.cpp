@@ -33,61 +33,62 @@ glm::dvec3 inWorld(const Mesh& mesh, std::size_t point) {
     return mesh.origin + glm::dvec3(mesh.points[point]);
 }
 
-/// Formats runs of items as text or bytes, in parallel.
+/// Formats items as text or bytes, in parallel. Returns the bytes of each part, in order.
 /// @param write  write(std::size_t item, std::string& bytes) appends an item
 template <class Write>
-std::vector<std::string> runs(std::size_t items, Write write) {
-    std::vector<std::string> runs((items + partItems - 1) / partItems);
-    inOrder(runs.size(), [&](std::size_t run) {
-        for (std::size_t i = run * partItems; i < std::min((run + 1) * partItems, items); ++i) write(i, runs[run]);
+std::vector<std::string> formatItems(std::size_t items, Write write) {
+    std::vector<std::string> parts((items + partItems - 1) / partItems);
+    inOrder(parts.size(), [&](std::size_t part) {
+        for (std::size_t i = part * partItems; i < std::min((part + 1) * partItems, items); ++i) write(i, parts[part]);
     });
-    return runs;
+    return parts;
 }
 
-using Runs = std::vector<std::string>;
+/// The bytes of one section of a file, in parts.
+using FileSection = std::vector<std::string>;
 
-std::vector<Runs> objOf(const Mesh& mesh) {
+std::vector<FileSection> objOf(const Mesh& mesh) {
     const auto text = [](std::string& bytes) { return std::back_inserter(bytes); };
-    return {runs(mesh.points.size(),
-                 [&](std::size_t i, std::string& bytes) {
-                     const glm::dvec3 p = inWorld(mesh, i);
-                     const glm::vec3& q = mesh.points[i];
-                     if (isFar(mesh))
-                         fmt::format_to(text(bytes), "v {} {} {}\n", p.x, p.y, p.z);
-                     else
-                         fmt::format_to(text(bytes), "v {} {} {}\n", q.x, q.y, q.z);
-                 }),
-            runs(mesh.triangles.size(), [&](std::size_t i, std::string& bytes) {
+    return {formatItems(mesh.points.size(),
+                        [&](std::size_t i, std::string& bytes) {
+                            const glm::dvec3 p = inWorld(mesh, i);
+                            const glm::vec3& q = mesh.points[i];
+                            if (isFar(mesh))
+                                fmt::format_to(text(bytes), "v {} {} {}\n", p.x, p.y, p.z);
+                            else
+                                fmt::format_to(text(bytes), "v {} {} {}\n", q.x, q.y, q.z);
+                        }),
+            formatItems(mesh.triangles.size(), [&](std::size_t i, std::string& bytes) {
                 const glm::uvec3 t = mesh.triangles[i] + 1u;
                 fmt::format_to(text(bytes), "f {} {} {}\n", t.x, t.y, t.z);
             })};
 }
 
-std::vector<Runs> plyOf(const Mesh& mesh) {
+std::vector<FileSection> plyOf(const Mesh& mesh) {
     const char* type = isFar(mesh) ? "double" : "float";
     const std::string header = fmt::format(
         "ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty {} x\nproperty {} y\nproperty {} z\n"
         "element face {}\nproperty list uchar uint vertex_indices\nend_header\n",
         mesh.points.size(), type, type, type, mesh.triangles.size());
     return {{header},
-            runs(mesh.points.size(),
-                 [&](std::size_t i, std::string& bytes) {
-                     if (isFar(mesh))
-                         append(bytes, inWorld(mesh, i));
-                     else
-                         append(bytes, mesh.points[i]);
-                 }),
-            runs(mesh.triangles.size(), [&](std::size_t i, std::string& bytes) {
+            formatItems(mesh.points.size(),
+                        [&](std::size_t i, std::string& bytes) {
+                            if (isFar(mesh))
+                                append(bytes, inWorld(mesh, i));
+                            else
+                                append(bytes, mesh.points[i]);
+                        }),
+            formatItems(mesh.triangles.size(), [&](std::size_t i, std::string& bytes) {
                 bytes.push_back(3);
                 append(bytes, mesh.triangles[i]);
             })};
 }
 
-std::vector<Runs> stlOf(const Mesh& mesh) {
+std::vector<FileSection> stlOf(const Mesh& mesh) {
     std::string header("binary STL");
     header.resize(80, ' ');
     append(header, std::uint32_t(mesh.triangles.size()));
-    return {{header}, runs(mesh.triangles.size(), [&](std::size_t i, std::string& bytes) {
+    return {{header}, formatItems(mesh.triangles.size(), [&](std::size_t i, std::string& bytes) {
                 const glm::uvec3& t = mesh.triangles[i];
                 const std::array<glm::vec3, 3> p{glm::vec3(inWorld(mesh, t.x)), glm::vec3(inWorld(mesh, t.y)),
                                                  glm::vec3(inWorld(mesh, t.z))};
@@ -100,7 +101,7 @@ std::vector<Runs> stlOf(const Mesh& mesh) {
             })};
 }
 
-std::vector<Runs> contentsOf(const Mesh& mesh, const std::filesystem::path& path) {
+std::vector<FileSection> contentsOf(const Mesh& mesh, const std::filesystem::path& path) {
     const std::string ending = lowerEnding(path);
     if (ending == ".obj") return objOf(mesh);
     if (ending == ".ply") return plyOf(mesh);
@@ -118,11 +119,11 @@ using namespace detail;
 
 void writeMesh(const std::filesystem::path& path, const Mesh& mesh) {
     validate(mesh);
-    const std::vector<Runs> contents = contentsOf(mesh, path);
+    const std::vector<FileSection> contents = contentsOf(mesh, path);
     AtomicFile file(path);
     std::ofstream stream(file.temporary(), std::ios::binary);
-    for (const Runs& runs : contents)
-        for (const std::string& run : runs) stream.write(run.data(), std::streamsize(run.size()));
+    for (const FileSection& section : contents)
+        for (const std::string& part : section) stream.write(part.data(), std::streamsize(part.size()));
     stream.close();
     if (!stream) throw std::runtime_error(fmt::format("{}: cannot be written (is the disk full?)", path.string()));
     file.commit();

@@ -21,12 +21,12 @@ namespace {
 
 constexpr std::size_t partBytes = 1 << 17;  // bytes of text per task
 
-/// What is omitted from a file, by reason.
-enum Left { pointsAndLines, freeForm, unknown, leftKinds };
-struct Reason {
+/// What is omitted from a file.
+enum Omission { pointsAndLines, freeForm, unknown, omissions };
+struct OmissionName {
     const char *one, *many;
 };
-constexpr std::array<Reason, leftKinds> reasons{
+constexpr std::array<OmissionName, omissions> omissionNames{
     {{"element that is points or lines", "elements that are points or lines"},
      {"statement of a free-form curve or surface", "statements of free-form curves or surfaces"},
      {"line that begins with a word that is not known", "lines that begin with a word that is not known"}}};
@@ -36,13 +36,9 @@ struct Skipped {
     const char* first = nullptr;
 };
 
-/// A part of the text, made of whole lines, and its contents.
-struct Part {
-    Cursor text;
-    std::vector<glm::dvec3> points;
-    Faces faces;
-    std::vector<std::size_t> relativeCorners;  // counted from the first vertex of this part, not of the file
-    std::array<Skipped, leftKinds> skipped{};
+struct ObjPart : TextPart {
+    std::vector<std::size_t> relativeCorners{};  // counted from the first vertex of this part, not of the file
+    std::array<Skipped, omissions> skipped{};
 };
 
 constexpr std::string_view withoutShape[] = {"vn",     "vt",       "vp",       "g",          "o",        "s",
@@ -64,7 +60,7 @@ class PartReader {
         std::size_t all, before;
     };
     /// @param vertices  if known, corners that refer to other vertices are an error
-    PartReader(const TextSource& source, Part& part, std::optional<Vertices> vertices = std::nullopt)
+    PartReader(const TextSource& source, ObjPart& part, std::optional<Vertices> vertices = std::nullopt)
         : source_(source), part_(part), at_(part.text), vertices_(vertices) {}
 
     void run() {
@@ -153,21 +149,21 @@ class PartReader {
                                                         : fmt::format("only {} come before it", before + points)));
     }
 
-    void skip(Left reason, const char* begin) {
-        Skipped& skipped = part_.skipped[reason];
+    void skip(Omission kind, const char* begin) {
+        Skipped& skipped = part_.skipped[kind];
         if (skipped.count++ == 0) skipped.first = begin;
         skipRest();
     }
 
     const TextSource& source_;
-    Part& part_;
+    ObjPart& part_;
     Cursor at_;
     std::optional<Vertices> vertices_;
 };
 
 /// Cuts a text into parts that begin at the start of a line that is not joined to the previous one.
-std::vector<Part> cut(const TextSource& source) {
-    std::vector<Part> parts;
+std::vector<ObjPart> cut(const TextSource& source) {
+    std::vector<ObjPart> parts;
     for (const char* begin = source.begin(); begin != source.end();) {
         const char* end = begin + std::min<std::size_t>(partBytes, std::size_t(source.end() - begin));
         while (end != source.end() && !(isLineEnd(end[-1]) && !isLineEnd(*end))) ++end;
@@ -179,46 +175,44 @@ std::vector<Part> cut(const TextSource& source) {
             last = end;
             while (end != source.end() && isLineEnd(*end)) ++end;
         }
-        parts.push_back({{begin, end}, {}, {}, {}, {}});
+        parts.push_back({{{begin, end}}});
         begin = end;
     }
     return parts;
 }
 
-std::vector<std::string> notes(const TextSource& source, const std::vector<Part>& parts) {
+std::vector<std::string> notes(const TextSource& source, const std::vector<ObjPart>& parts) {
     std::vector<std::string> notes;
-    for (int reason = 0; reason < leftKinds; ++reason) {
+    for (int kind = 0; kind < omissions; ++kind) {
         Skipped all;
-        for (const Part& part : parts) {
-            const Skipped& skipped = part.skipped[reason];
+        for (const ObjPart& part : parts) {
+            const Skipped& skipped = part.skipped[kind];
             if (all.count == 0) all.first = skipped.first;
             all.count += skipped.count;
         }
         if (all.count > 0)
             notes.push_back(fmt::format("left out: {}; the first is {} on line {}",
-                                        counted(all.count, reasons[reason].one, reasons[reason].many),
+                                        counted(all.count, omissionNames[kind].one, omissionNames[kind].many),
                                         source.quoted(all.first), source.lineOf(all.first)));
     }
     return notes;
 }
 
 /// Joins all parts.
-Polygons joined(const TextSource& source, std::vector<Part>& parts) {
+Polygons joined(const TextSource& source, std::vector<ObjPart>& parts) {
     Polygons all;
     const std::vector<std::size_t> begins = setPoints(all, parts);
     const std::size_t vertices = all.points.size();
     inOrder(parts.size(), [&](std::size_t i) {
-        Part& part = parts[i];
+        ObjPart& part = parts[i];
         std::vector<unsigned>& corners = part.faces.corners;
         for (const std::size_t corner : part.relativeCorners) corners[corner] += unsigned(begins[i]);
         if (!std::all_of(corners.begin(), corners.end(), [&](unsigned corner) { return corner < vertices; })) {
-            Part again{part.text, {}, {}, {}, {}};
+            ObjPart again{{part.text}};
             PartReader(source, again, PartReader::Vertices{vertices, begins[i]}).run();
         }
     });
-    std::vector<Faces> faces;
-    for (Part& part : parts) faces.push_back(std::move(part.faces));
-    setFaces(all, faces);
+    takeFaces(all, parts);
     for (std::string& note : notes(source, parts)) all.notes.push_back(std::move(note));
     return all;
 }
@@ -228,7 +222,7 @@ Polygons joined(const TextSource& source, std::vector<Part>& parts) {
 Mesh readObj(const std::filesystem::path& path, ReadReport& report) {
     const MappedFile file(path);
     const TextSource source(path, file.bytes());
-    std::vector<Part> parts = cut(source);
+    std::vector<ObjPart> parts = cut(source);
     inOrder(parts.size(), [&](std::size_t i) { PartReader(source, parts[i]).run(); });
     return assembled(joined(source, parts), path, report);
 }

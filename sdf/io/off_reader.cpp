@@ -67,14 +67,14 @@ class OffWords {
     Cursor& at_;
 };
 
-struct Header {
+struct OffHeader {
     std::size_t vertices = 0, faces = 0;
     bool hasMore = false;  ///< more than three numbers per vertex: normals, colours or texture coordinates
     Cursor data;
 };
 
-Header readHeader(const TextSource& source) {
-    Header header{0, 0, false, {source.begin(), source.end()}};
+OffHeader readHeader(const TextSource& source) {
+    OffHeader header{0, 0, false, {source.begin(), source.end()}};
     OffWords words(source, header.data);
     const char* begin = words.next();
     while (!header.data.atEnd() && std::string_view("STCN4n").find(*header.data.at) != std::string_view::npos)
@@ -97,14 +97,14 @@ Header readHeader(const TextSource& source) {
 }
 
 /// Checks the counts before memory is allocated: a vertex has three numbers, a face at least its count.
-void requireRoom(const TextSource& source, const Header& header) {
+void requireRoom(const TextSource& source, const OffHeader& header) {
     const auto size = std::size_t(header.data.end - header.data.at);
     if (header.vertices > size / 5 || header.faces > size / 2)
         source.fail(header.data.at, fmt::format("{} vertices and {} faces are announced, but the file ends before them",
                                                 header.vertices, header.faces));
 }
 
-Polygons read(const TextSource& source, const Header& header, Layout vertices, Layout faces) {
+Polygons read(const TextSource& source, const OffHeader& header, Layout vertices, Layout faces) {
     Polygons polygons;
     polygons.points.resize(header.vertices);
     Cursor at = header.data;
@@ -139,7 +139,7 @@ Polygons read(const TextSource& source, const Header& header, Layout vertices, L
 }
 
 /// Returns the first layout that fits. Plain OFF has three numbers per vertex, but some programs add colours.
-Polygons readAnyLayout(const TextSource& source, const Header& header) {
+Polygons readAnyLayout(const TextSource& source, const OffHeader& header) {
     constexpr std::pair<Layout, Layout> plain[]{{Layout::words, Layout::lines}, {Layout::words, Layout::words}};
     for (const auto& [vertices, faces] : plain) {
         if (header.hasMore) break;
@@ -157,7 +157,7 @@ Polygons readAnyLayout(const TextSource& source, const Header& header) {
 Mesh readOff(const std::filesystem::path& path, ReadReport& report) {
     const MappedFile file(path);
     const TextSource source(path, file.bytes());
-    const Header header = readHeader(source);
+    const OffHeader header = readHeader(source);
     requireRoom(source, header);
     return assembled(readAnyLayout(source, header), path, report);
 }

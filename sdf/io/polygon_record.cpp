@@ -10,7 +10,7 @@ namespace {
 constexpr std::uint64_t maxNotes = 1000;       // further notes on a file are not sent
 constexpr std::uint64_t maxTextBytes = 10000;  // of a note, of an error
 
-struct Header {
+struct RecordHeader {
     std::uint64_t isError, points, corners, sizes, notes;
 };
 
@@ -35,7 +35,7 @@ void receiveAll(ChildProcess& child, std::vector<T>& items, std::uint64_t count)
     child.receive(items.data(), count * sizeof(T));
 }
 
-bool fits(const Header& header, std::size_t byteLimit) {
+bool fits(const RecordHeader& header, std::size_t byteLimit) {
     return header.notes <= maxNotes && header.points <= byteLimit / sizeof(glm::dvec3) &&
            header.corners <= byteLimit / sizeof(unsigned) && header.sizes <= byteLimit / sizeof(unsigned);
 }
@@ -52,8 +52,8 @@ bool consistent(const Polygons& p) {
 }  // namespace
 
 void sendPolygons(const ChildProcess::Send& send, const Polygons& p) {
-    const Header header{0, p.points.size(), p.corners.size(), p.sizes.size(),
-                        std::min<std::uint64_t>(p.notes.size(), maxNotes)};
+    const RecordHeader header{0, p.points.size(), p.corners.size(), p.sizes.size(),
+                              std::min<std::uint64_t>(p.notes.size(), maxNotes)};
     send(&header, sizeof header);
     send(p.points.data(), p.points.size() * sizeof(glm::dvec3));
     send(p.corners.data(), p.corners.size() * sizeof(unsigned));
@@ -62,13 +62,13 @@ void sendPolygons(const ChildProcess::Send& send, const Polygons& p) {
 }
 
 void sendError(const ChildProcess::Send& send, const std::string& text) {
-    const Header header{1, 0, 0, 0, 0};
+    const RecordHeader header{1, 0, 0, 0, 0};
     send(&header, sizeof header);
     sendText(send, text);
 }
 
 Polygons receivePolygons(ChildProcess& child, std::size_t byteLimit) {
-    Header header{};
+    RecordHeader header{};
     child.receive(&header, sizeof header);
     if (header.isError == 1) throw std::runtime_error(receiveText(child));
     if (header.isError != 0 || !fits(header, byteLimit)) throw ChildFailure("gave a damaged answer");

@@ -28,7 +28,7 @@ constexpr std::size_t grain = 1 << 14;  // vertices or faces per task
 /// coordinates by up to 6e-5 of its size.
 constexpr double farSizes = 1000;
 
-using Range = tbb::blocked_range<std::size_t>;
+using IndexRange = tbb::blocked_range<std::size_t>;
 
 /// Throws if a corner refers to a vertex that does not exist.
 void requireVertices(const std::vector<unsigned>& corners, std::size_t vertices) {
@@ -41,38 +41,38 @@ void requireVertices(const std::vector<unsigned>& corners, std::size_t vertices)
     });
 }
 
-struct Box {
+struct VertexBounds {
     glm::dvec3 lower{std::numeric_limits<double>::infinity()}, upper{-std::numeric_limits<double>::infinity()};
     std::size_t vertices = 0;  // count of vertices inside
 };
 
 /// Returns the bounding box of the used vertices.
 template <class Scalar>
-Box boxOf(const std::vector<glm::vec<3, Scalar>>& points, const std::vector<std::uint8_t>& used) {
+VertexBounds boundsOf(const std::vector<glm::vec<3, Scalar>>& points, const std::vector<std::uint8_t>& used) {
     return tbb::parallel_reduce(
-        Range(0, points.size(), grain), Box{},
-        [&](const Range& range, Box box) {
+        IndexRange(0, points.size(), grain), VertexBounds{},
+        [&](const IndexRange& range, VertexBounds bounds) {
             for (std::size_t i = range.begin(); i < range.end(); ++i) {
                 if (!used[i]) continue;
-                box.lower = glm::min(box.lower, glm::dvec3(points[i]));
-                box.upper = glm::max(box.upper, glm::dvec3(points[i]));
-                ++box.vertices;
+                bounds.lower = glm::min(bounds.lower, glm::dvec3(points[i]));
+                bounds.upper = glm::max(bounds.upper, glm::dvec3(points[i]));
+                ++bounds.vertices;
             }
-            return box;
+            return bounds;
         },
-        [](const Box& a, const Box& b) {
-            return Box{glm::min(a.lower, b.lower), glm::max(a.upper, b.upper), a.vertices + b.vertices};
+        [](const VertexBounds& a, const VertexBounds& b) {
+            return VertexBounds{glm::min(a.lower, b.lower), glm::max(a.upper, b.upper), a.vertices + b.vertices};
         });
 }
 
-/// Returns the centre of the box, rounded to so few digits that differences to nearby coordinates are exact; zero for a
-/// mesh near zero.
-glm::dvec3 originOf(const Box& box) {
-    const glm::dvec3 size = box.upper - box.lower, far = glm::max(glm::abs(box.lower), glm::abs(box.upper));
+/// Returns the centre of a bounding box, rounded to so few digits that differences to nearby coordinates are exact;
+/// zero for a mesh near zero.
+glm::dvec3 originOf(const VertexBounds& bounds) {
+    const glm::dvec3 size = bounds.upper - bounds.lower, far = glm::max(glm::abs(bounds.lower), glm::abs(bounds.upper));
     const double side = std::max({size.x, size.y, size.z}), farthest = std::max({far.x, far.y, far.z});
     if (!(side > 0) || !(farthest > farSizes * side) || !std::isfinite(farthest)) return glm::dvec3(0);
     const double step = std::exp2(std::ceil(std::log2(side)));
-    return step * glm::round(0.5 * (box.lower + box.upper) / step);
+    return step * glm::round(0.5 * (bounds.lower + bounds.upper) / step);
 }
 
 template <class Scalar>
@@ -81,14 +81,14 @@ std::vector<glm::vec3> relativeTo(const glm::dvec3& origin, std::vector<glm::vec
         if (origin == glm::dvec3(0)) return points;
     std::vector<glm::vec3> moved;
     resizeLarge(moved, points.size());
-    tbb::parallel_for(Range(0, points.size(), grain), [&](const Range& range) {
+    tbb::parallel_for(IndexRange(0, points.size(), grain), [&](const IndexRange& range) {
         for (std::size_t i = range.begin(); i < range.end(); ++i) moved[i] = glm::vec3(glm::dvec3(points[i]) - origin);
     });
     return moved;
 }
 
 /// Triangles of some faces.
-struct Cut {
+struct FaceTriangles {
     std::vector<glm::uvec3> triangles;
     std::size_t uncovered = 0;  // faces whose triangles do not cover exactly what their outline encloses
     std::size_t firstUncovered = 0;
@@ -96,9 +96,9 @@ struct Cut {
 
 /// Triangulates faces with any count of corners.
 template <class Scalar>
-class FaceCutter {
+class FaceTriangulator {
   public:
-    explicit FaceCutter(const PolygonsOf<Scalar>& polygons) : polygons_(polygons) {
+    explicit FaceTriangulator(const PolygonsOf<Scalar>& polygons) : polygons_(polygons) {
         begins_.reserve(parts() + 1);
         std::size_t corner = 0;
         for (std::size_t face = 0; face < polygons.sizes.size(); corner += polygons.sizes[face++])
@@ -106,14 +106,14 @@ class FaceCutter {
     }
 
     std::vector<glm::uvec3> run(std::vector<std::string>& notes) const {
-        std::vector<Cut> cuts(parts());
-        inOrder(parts(), [&](std::size_t i) { cuts[i] = cut(i); });
+        std::vector<FaceTriangles> results(parts());
+        inOrder(parts(), [&](std::size_t i) { results[i] = triangulatePart(i); });
         std::vector<std::size_t> begins{0};
-        Cut all;
-        for (const Cut& cut : cuts) {
-            begins.push_back(begins.back() + cut.triangles.size());
-            if (all.uncovered == 0) all.firstUncovered = cut.firstUncovered;
-            all.uncovered += cut.uncovered;
+        FaceTriangles all;
+        for (const FaceTriangles& result : results) {
+            begins.push_back(begins.back() + result.triangles.size());
+            if (all.uncovered == 0) all.firstUncovered = result.firstUncovered;
+            all.uncovered += result.uncovered;
         }
         if (all.uncovered > 0)
             notes.push_back(fmt::format(
@@ -121,8 +121,8 @@ class FaceCutter {
                 "first is face {}, counted from 0",
                 counted(all.uncovered, "face", "faces"), all.firstUncovered));
         all.triangles.resize(begins.back());
-        inOrder(cuts.size(), [&](std::size_t i) {
-            std::copy(cuts[i].triangles.begin(), cuts[i].triangles.end(),
+        inOrder(results.size(), [&](std::size_t i) {
+            std::copy(results[i].triangles.begin(), results[i].triangles.end(),
                       all.triangles.begin() + std::ptrdiff_t(begins[i]));
         });
         return std::move(all.triangles);
@@ -131,28 +131,28 @@ class FaceCutter {
   private:
     std::size_t parts() const { return (polygons_.sizes.size() + grain - 1) / grain; }
 
-    Cut cut(std::size_t part) const {
-        Cut cut;
+    FaceTriangles triangulatePart(std::size_t part) const {
+        FaceTriangles result;
         std::size_t corner = begins_[part];
         std::vector<glm::dvec3> outline;
         const std::size_t end = std::min((part + 1) * grain, polygons_.sizes.size());
         for (std::size_t face = part * grain; face < end; corner += polygons_.sizes[face++]) {
             const unsigned* corners = &polygons_.corners[corner];
             if (polygons_.sizes[face] == 3) {
-                cut.triangles.push_back({corners[0], corners[1], corners[2]});
+                result.triangles.push_back({corners[0], corners[1], corners[2]});
                 continue;
             }
             outline.clear();
             for (unsigned k = 0; k < polygons_.sizes[face]; ++k)
                 outline.push_back(glm::dvec3(polygons_.points[corners[k]]));
-            const std::size_t first = cut.triangles.size();
-            if (!triangulate(outline, cut.triangles) && cut.uncovered++ == 0) cut.firstUncovered = face;
-            for (std::size_t i = first; i < cut.triangles.size(); ++i) {
-                glm::uvec3& t = cut.triangles[i];
+            const std::size_t first = result.triangles.size();
+            if (!triangulate(outline, result.triangles) && result.uncovered++ == 0) result.firstUncovered = face;
+            for (std::size_t i = first; i < result.triangles.size(); ++i) {
+                glm::uvec3& t = result.triangles[i];
                 t = {corners[t.x], corners[t.y], corners[t.z]};
             }
         }
-        return cut;
+        return result;
     }
 
     const PolygonsOf<Scalar>& polygons_;
@@ -161,7 +161,7 @@ class FaceCutter {
 
 std::vector<glm::uvec3> asTriangles(const std::vector<unsigned>& corners) {
     std::vector<glm::uvec3> triangles(corners.size() / 3);
-    tbb::parallel_for(Range(0, triangles.size(), grain), [&](const Range& range) {
+    tbb::parallel_for(IndexRange(0, triangles.size(), grain), [&](const IndexRange& range) {
         for (std::size_t i = range.begin(); i < range.end(); ++i)
             triangles[i] = {corners[3 * i], corners[3 * i + 1], corners[3 * i + 2]};
     });
@@ -173,7 +173,7 @@ std::vector<glm::uvec3> trianglesOf(PolygonsOf<Scalar>& polygons, std::vector<st
     if (!polygons.triangles.empty()) return std::move(polygons.triangles);
     if (polygons.sizes.empty()) return asTriangles(polygons.corners);
     requireVertices(polygons.corners, polygons.points.size());
-    return FaceCutter(polygons).run(notes);
+    return FaceTriangulator(polygons).run(notes);
 }
 
 template <class Scalar>
@@ -205,14 +205,14 @@ Mesh meshOf(PolygonsOf<Scalar> polygons, ReadReport& report) {
     Mesh mesh;
     mesh.triangles = trianglesOf(polygons, report.notes);
     const VertexUse use = vertexUse(mesh.triangles, polygons.points.size());
-    const Box box = boxOf(polygons.points, use.used);
-    report.unusedVertices = report.vertices - box.vertices;
-    mesh.origin = originOf(box);
+    const VertexBounds bounds = boundsOf(polygons.points, use.used);
+    report.unusedVertices = report.vertices - bounds.vertices;
+    mesh.origin = originOf(bounds);
     mesh.points = relativeTo(mesh.origin, std::move(polygons.points));
     validate(mesh);
     const std::size_t triangles = mesh.triangles.size();
     mesh = weld(std::move(mesh), use);
-    report.mergedVertices = box.vertices - mesh.points.size();
+    report.mergedVertices = bounds.vertices - mesh.points.size();
     report.collapsedTriangles = triangles - mesh.triangles.size();
     if (mesh.triangles.empty()) throw std::runtime_error("holds no triangle with three different corners");
     return mesh;

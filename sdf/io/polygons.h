@@ -6,9 +6,11 @@
 #include <filesystem>
 #include <glm/vec3.hpp>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "sdf/base/parallel_parts.h"
+#include "sdf/io/text_source.h"
 
 namespace bilayer {
 struct Mesh;
@@ -51,8 +53,15 @@ struct Faces {
 template <class Scalar>
 void setFaces(PolygonsOf<Scalar>& polygons, const std::vector<Faces>& parts);
 
+/// A part of a text file, made of whole lines, and its contents.
+struct TextPart {
+    Cursor text;
+    std::vector<glm::dvec3> points{};
+    Faces faces{};
+};
+
 /// Sets the points of the polygons to those of all parts, in order.
-/// @tparam Part  has `points`, a vector of glm::dvec3
+/// @tparam Part  derives from TextPart
 /// @return the index of the first point of each part, and the total count at the end
 template <class Part>
 std::vector<std::size_t> setPoints(Polygons& polygons, const std::vector<Part>& parts) {
@@ -63,6 +72,14 @@ std::vector<std::size_t> setPoints(Polygons& polygons, const std::vector<Part>& 
         std::copy(parts[i].points.begin(), parts[i].points.end(), polygons.points.begin() + std::ptrdiff_t(begins[i]));
     });
     return begins;
+}
+
+/// Moves the faces of all parts into the polygons, in order.
+template <class Part>
+void takeFaces(Polygons& polygons, std::vector<Part>& parts) {
+    std::vector<Faces> faces;
+    for (Part& part : parts) faces.push_back(std::move(part.faces));
+    setFaces(polygons, faces);
 }
 
 /// Triangulates polygons, moves a distant mesh to a local origin, welds it, and reports what was done with the file's

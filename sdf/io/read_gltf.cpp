@@ -89,12 +89,12 @@ class GltfScene {
 
     Polygons read() {
         placeNodes();
-        tell();
+        addNotes();
         return std::move(scene_);
     }
 
   private:
-    struct Left {
+    struct Omitted {
         std::size_t linesOrPoints = 0, morphed = 0, cornersOfNone = 0;
     };
 
@@ -104,14 +104,14 @@ class GltfScene {
     std::vector<glm::dmat4> instances(const tinygltf::Node& node, std::size_t index) const;
     void readPrimitive(ScenePart& part, const tinygltf::Primitive& primitive, const std::string& name);
     void applySkin(ScenePart& part, const tinygltf::Primitive& primitive, int skin, const std::string& name) const;
-    void tell();
+    void addNotes();
 
     const tinygltf::Model& model_;
     GltfNumbers numbers_;
     std::vector<glm::dmat4> world_;  // for each node
     std::vector<char> reached_;      // nodes of the scene
     Polygons scene_;
-    Left left_;
+    Omitted omitted_;
 };
 
 std::vector<int> GltfScene::roots() {
@@ -210,13 +210,13 @@ void GltfScene::readPrimitive(ScenePart& part, const tinygltf::Primitive& primit
     require(primitive.mode >= TINYGLTF_MODE_POINTS && primitive.mode <= TINYGLTF_MODE_TRIANGLE_FAN,
             "{} has mode {}; it must be 0 to 6", name, primitive.mode);
     if (primitive.mode < TINYGLTF_MODE_TRIANGLES) {
-        ++left_.linesOrPoints;
+        ++omitted_.linesOrPoints;
         return;
     }
     for (const char* compression : {"KHR_draco_mesh_compression", "EXT_meshopt_compression"})
         require(!primitive.extensions.count(compression), "{} uses {}, which is not read; export it without", name,
                 compression);
-    left_.morphed += !primitive.targets.empty();
+    omitted_.morphed += !primitive.targets.empty();
     const auto positions = primitive.attributes.find("POSITION");
     require(positions != primitive.attributes.end(), "{} has no POSITION", name);
     part.points = numbers_.vectors3(positions->second, "POSITION");
@@ -232,7 +232,7 @@ void GltfScene::readPrimitive(ScenePart& part, const tinygltf::Primitive& primit
         require(vertices[i] < part.points.size(), "index {} of {} is {}, but there are {} vertices", i, name,
                 vertices[i], part.points.size());
     part.corners = trianglesOf(vertices, primitive.mode);
-    left_.cornersOfNone += part.corners.size() % 3;
+    omitted_.cornersOfNone += part.corners.size() % 3;
     part.corners.resize(part.corners.size() - part.corners.size() % 3);
 }
 
@@ -275,13 +275,13 @@ void GltfScene::applySkin(ScenePart& part, const tinygltf::Primitive& primitive,
     }
 }
 
-void GltfScene::tell() {
+void GltfScene::addNotes() {
     const auto note = [&](std::size_t count, const char* text) {
         if (count > 0) scene_.notes.push_back(fmt::format("{} {}", count, text));
     };
-    note(left_.linesOrPoints, "primitives of points or lines were left out");
-    note(left_.morphed, "primitives have morph targets, which were not applied");
-    note(left_.cornersOfNone, "indices at the ends of primitives make no whole triangle and were left out");
+    note(omitted_.linesOrPoints, "primitives of points or lines were left out");
+    note(omitted_.morphed, "primitives have morph targets, which were not applied");
+    note(omitted_.cornersOfNone, "indices at the ends of primitives make no whole triangle and were left out");
     std::vector<char> used(model_.meshes.size(), 0);
     std::size_t shown = 0, outside = 0;  // nodes with a mesh
     for (std::size_t i = 0; i < model_.nodes.size(); ++i) {

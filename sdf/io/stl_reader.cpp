@@ -83,10 +83,8 @@ Mesh readBinary(std::string_view bytes, const std::filesystem::path& path, ReadR
     return assembled(std::move(polygons), path, report);
 }
 
-struct Part {
-    Cursor text;
-    std::vector<glm::dvec3> points{};  // of the corners of the faces, in order
-    Faces faces{};
+/// A part of a text file. Its points are the corners of its faces, in order.
+struct StlPart : TextPart {
     bool endsSolid = false;     // the last keyword was `endsolid`
     std::size_t linesLeft = 0;  // after an `endsolid`, of other content
     const char* firstLeft = nullptr;
@@ -95,7 +93,7 @@ struct Part {
 /// Reads facets. Keywords are case-insensitive; a name extends to the end of its line, whatever it contains.
 class TextReader {
   public:
-    TextReader(const TextSource& source, Part& part) : source_(source), part_(part), at_(part.text) {}
+    TextReader(const TextSource& source, StlPart& part) : source_(source), part_(part), at_(part.text) {}
 
     void run() {
         for (at_.skipSpace(); !at_.atEnd(); at_.skipSpace()) {
@@ -150,7 +148,7 @@ class TextReader {
     }
 
     const TextSource& source_;
-    Part& part_;
+    StlPart& part_;
     Cursor at_;
 };
 
@@ -167,11 +165,11 @@ const char* nextFacet(const char* at, const char* end) {
 }
 
 Mesh readText(const TextSource& source, const std::filesystem::path& path, ReadReport& report) {
-    std::vector<Part> parts;
+    std::vector<StlPart> parts;
     for (const char* begin = source.begin(); begin != source.end();) {
         const std::size_t size = std::min(partBytes, std::size_t(source.end() - begin));
         const char* end = nextFacet(begin + size, source.end());
-        parts.push_back({{begin, end}});
+        parts.push_back({{{begin, end}}});
         begin = end;
     }
     inOrder(parts.size(), [&](std::size_t i) { TextReader(source, parts[i]).run(); });
@@ -181,14 +179,12 @@ Mesh readText(const TextSource& source, const std::filesystem::path& path, ReadR
     inOrder(parts.size(), [&](std::size_t i) {
         for (unsigned& corner : parts[i].faces.corners) corner += unsigned(begins[i]);
     });
-    for (const Part& part : parts)
+    for (const StlPart& part : parts)
         if (part.linesLeft > 0)
             polygons.notes.push_back(fmt::format("left out: {} after 'endsolid'; the first is {} on line {}",
                                                  counted(part.linesLeft, "line", "lines"),
                                                  source.quoted(part.firstLeft), source.lineOf(part.firstLeft)));
-    std::vector<Faces> faces;
-    for (Part& part : parts) faces.push_back(std::move(part.faces));
-    setFaces(polygons, faces);
+    takeFaces(polygons, parts);
     return assembled(std::move(polygons), path, report);
 }
 

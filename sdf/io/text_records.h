@@ -13,27 +13,27 @@
 
 namespace bilayer::detail {
 
-/// A run of records, and the text that should contain exactly these.
+/// Consecutive records, and the text that should contain exactly these.
 struct TextRecords {
     Cursor text;
     std::size_t first, count;
 };
 
-/// Splits the next lines into runs, one record per line. Returns fewer records if the text ends before.
+/// Splits the next lines into parts, one record per line. Returns fewer records if the text ends before.
 inline std::vector<TextRecords> linesOf(const Cursor& text, std::size_t count) {
-    constexpr std::size_t runLength = 1 << 12;
-    std::vector<TextRecords> runs;
+    constexpr std::size_t partRecords = 1 << 12;
+    std::vector<TextRecords> parts;
     const char* at = text.at;
-    for (std::size_t first = 0; first < count && at != text.end; first += runLength) {
-        const std::size_t length = std::min(runLength, count - first);
+    for (std::size_t first = 0; first < count && at != text.end; first += partRecords) {
+        const std::size_t length = std::min(partRecords, count - first);
         const char* begin = at;
         for (std::size_t i = 0; i < length && at != text.end; ++i) {
             const void* end = std::memchr(at, '\n', std::size_t(text.end - at));
             at = end ? static_cast<const char*>(end) + 1 : text.end;
         }
-        runs.push_back({{begin, at}, first, length});
+        parts.push_back({{begin, at}, first, length});
     }
-    return runs;
+    return parts;
 }
 
 /// Reads records: in parallel if each is on a line of its own, otherwise sequentially.
@@ -45,25 +45,25 @@ inline std::vector<TextRecords> linesOf(const Cursor& text, std::size_t count) {
 template <class Read>
 auto readRecords(Cursor& text, std::size_t count, Read read) {
     text.skipSpace();
-    const std::vector<TextRecords> runs = linesOf(text, count);
-    std::vector<decltype(read(text, std::size_t(0), count))> parts(runs.size());
-    std::atomic<bool> asLines = runs.size() > 1;
+    const std::vector<TextRecords> lines = linesOf(text, count);
+    std::vector<decltype(read(text, std::size_t(0), count))> parts(lines.size());
+    std::atomic<bool> asLines = lines.size() > 1;
     if (asLines) {
-        inOrder(runs.size(), [&](std::size_t i) {
+        inOrder(lines.size(), [&](std::size_t i) {
             if (!asLines) return;
-            Cursor at = runs[i].text;
+            Cursor at = lines[i].text;
             try {
-                parts[i] = read(at, runs[i].first, runs[i].count);
+                parts[i] = read(at, lines[i].first, lines[i].count);
             } catch (const std::runtime_error&) {
                 asLines = false;
             }
             at.skipSpace();
-            // each run held what it should: together they equal the sequence that one reader would find
+            // each part held what it should: together they equal the sequence that one reader would find
             if (!at.atEnd()) asLines = false;
         });
     }
     if (asLines) {
-        text.at = runs.back().text.end;
+        text.at = lines.back().text.end;
     } else {
         parts.clear();
         parts.push_back(read(text, std::size_t(0), count));

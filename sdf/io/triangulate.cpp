@@ -12,7 +12,7 @@
 namespace bilayer::detail {
 namespace {
 
-// The projection along the coordinate axis nearest to a normal, seen from the side to which the normal points.
+// The projection along the coordinate axis nearest to a normal, viewed from the side to which the normal points.
 class View {
   public:
     explicit View(const glm::dvec3& normal) {

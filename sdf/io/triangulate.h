@@ -13,7 +13,7 @@ namespace bilayer::detail {
 /// The outline may be concave, have corners on straight edges, repeat corners, touch itself, and reach holes by edges
 /// that it traverses in both directions. It need not be planar: it is triangulated in projection onto the coordinate
 /// plane nearest to its own plane. All decisions in that plane are exact. Triangles without area occur only where the
-/// outline leaves no choice: at repeated corners, and where it runs out and back along a line with nothing in between.
+/// outline leaves no choice: at repeated corners, and where it goes along a line and back with nothing in between.
 /// Takes O(n log n) for all but contrived outlines. Thread-safe.
 /// @param outline    corners in order; of either orientation. Finite.
 /// @param triangles  appended: indices into `outline`, oriented like the outline. None for fewer than three corners.

@@ -243,7 +243,7 @@ TEST_CASE("the verdict says what is wrong") {
     Mesh mesh = shapes::box({1, 1, 1});
     CHECK(verdict(inspect(mesh)) == "closed and oriented");
     CHECK(verdict(inspect(shapes::flipped(mesh))) ==
-          "closed, but not oriented: 1 component inside out, 12 triangles to be turned");
+          "closed, but not oriented: 1 component inside out, 12 triangles to be flipped");
     mesh.triangles.pop_back();
     CHECK(verdict(inspect(mesh)) == "open: 3 boundary edges in 1 loop");
     CHECK(verdict(inspect(Mesh{{{0, 0, 0}, {1, 0, 0}}, {{0, 0, 1}}})) == "no triangle has an area");

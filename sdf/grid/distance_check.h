@@ -1,0 +1,15 @@
+// Checks the distances of a level set that comes from a file; internal.
+#pragma once
+
+#include <bilayer/sdf/level_set.h>
+
+namespace bilayer::detail {
+
+/// Throws std::invalid_argument in these cases:
+/// - a distance is not finite, which rounding, searches and solvers would propagate;
+/// - a tile is active, which solvers would fill with voxels;
+/// - the stored interior width does not match the distances;
+/// - a voxel is too far from the origin of the grid.
+void requireValidDistances(const LevelSet& levelSet);
+
+}  // namespace bilayer::detail
