@@ -9,8 +9,8 @@
 
 #include <bilayer/collider/field.h>
 #include "collider/field/batch.h"
+#include "collider/field/box_overlaps.h"
 #include "collider/field/field_data.h"
-#include "collider/field/mesh_rays.h"
 #include "collider/field/zero_set.h"
 
 namespace bilayer {

@@ -12,6 +12,10 @@
 
 namespace bilayer::detail {
 
+/// The first place of a path whose distance to a triangle is at most the radius, to 1e-7 voxels. Intended for paths of
+/// a few voxels: it tests all triangles near the path, so its cost grows with the length.
+std::optional<MeshHit> firstTouch(const MeshTree& mesh, const Path& path, double radius) noexcept;
+
 /// The first contact of a swept sphere with a mesh.
 struct SphereTouch {
     double along;         ///< distance along the centre's path [m]
