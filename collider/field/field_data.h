@@ -47,9 +47,6 @@ struct SampleKernels {
 const SampleKernels& sampleKernels(Storage storage);
 
 struct FieldData : FieldLayout {
-    /// Also the Lipschitz constant of the trilinear interpolant [voxels].
-    static constexpr float cellDiagonal = 1.7320508f;
-
     FieldData(const LevelSet& levelSet, Storage storage);
     /// Shares the samples.
     FieldData(const FieldData& samples, std::shared_ptr<const Mesh> outward);

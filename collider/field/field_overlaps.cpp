@@ -11,6 +11,7 @@
 #include "collider/field/batch.h"
 #include "collider/field/box_overlaps.h"
 #include "collider/field/field_data.h"
+#include "collider/field/interpolant.h"
 #include "collider/field/zero_set.h"
 
 namespace bilayer {
@@ -35,7 +36,7 @@ bool isBox(const OrientedBox& box) {
 std::optional<bool> overlapsRoughly(const FieldData& field, const glm::vec3& centre, float radius) {
     const Sample here = field.sample(field.toLocal(centre));
     const float away = std::abs(here.distance);
-    const float room = field.error + (here.inBand ? FieldData::cellDiagonal * field.voxelSize : 0.f);
+    const float room = field.error + (here.inBand ? cellDiagonal * field.voxelSize : 0.f);
     if (away > radius + room) return here.distance < 0;
     if (here.inBand && away + room < radius) return true;
     return std::nullopt;

@@ -18,6 +18,7 @@
 #include <bilayer/collider/field.h>
 #include "collider/field/batch.h"
 #include "collider/field/field_data.h"
+#include "collider/field/interpolant.h"
 
 #ifndef BILAYER_COLLIDER_FIELD_SAMPLE_ONCE
 #define BILAYER_COLLIDER_FIELD_SAMPLE_ONCE
@@ -29,7 +30,6 @@ using namespace detail;
 namespace {
 
 constexpr float infinity = std::numeric_limits<float>::infinity();
-constexpr float cellDiagonal = FieldData::cellDiagonal;
 
 // Samples are stored as four consecutive floats and a bool.
 static_assert(offsetof(Sample, distance) == 0 && offsetof(Sample, gradient) == sizeof(float));

@@ -19,6 +19,10 @@ struct Path {
     glm::dvec3 at(double along) const { return origin + along * direction; }
 };
 
+/// Max count of tangent steps along a path towards a convex shape. If a path only grazes the shape, each step takes
+/// half of the remaining distance.
+inline constexpr int maxTangents = 64;
+
 /// The interval of a path inside a box.
 inline std::optional<std::pair<double, double>> clip(const Path& path, const glm::dvec3& lower,
                                                      const glm::dvec3& upper) {

@@ -13,8 +13,6 @@ namespace {
 
 /// Max distance that counts as contact of a sphere [voxels].
 constexpr double touchTolerance = 1e-7;
-/// Max count of tangent steps; a sphere that has made no contact by then passes the triangle within the tolerance.
-constexpr int maxTangents = 64;
 
 }  // namespace
 
@@ -76,7 +74,8 @@ bool TriangleRay::besideEdge(const Corners& seen, glm::dvec3& weights) const {
     return found;
 }
 
-// The distance to a triangle is convex along the path, so tangents never lead past the first contact.
+// The distance to a triangle is convex along the path, so tangents never lead past the first contact. A sphere that has
+// made none after the last step passes the triangle within the tolerance.
 bool touches(const MeshTree& mesh, std::uint32_t triangle, const Path& path, double radius, double& along,
              glm::dvec3& position) {
     const double tolerance = touchTolerance * double(mesh.voxelSize());
