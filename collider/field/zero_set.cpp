@@ -24,8 +24,8 @@ double boxDistance(const glm::dvec3& point, const glm::dvec3& lower, const glm::
     return glm::distance(point, glm::clamp(point, lower, upper));
 }
 
-// A separating direction. The zeros of a cube are in its box, and no farther from the plane of its linear bound than the
-// error. From a point outside that slab of the box, all of them have at least the distance `least` along a unit
+// A separating direction. The zeros of a cube are in its box, and no farther from the plane of its linear bound than
+// the error. From a point outside that slab of the box, all of them have at least the distance `least` along a unit
 // direction.
 struct Separation {
     glm::dvec3 direction;
