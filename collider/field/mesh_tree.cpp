@@ -31,8 +31,6 @@ constexpr double samePlace = 1e-5;
 constexpr double near = 16;
 /// Max rounding of a point in floats, relative to its largest coordinate.
 constexpr double pointRounding = 1.2e-7;
-/// A shorter mean of normals has cancelled out, or is unknown.
-constexpr double minMean = 1e-6;
 
 // A place on an edge, relative to the query point.
 struct OnEdge {
@@ -59,7 +57,7 @@ MeshTree::MeshTree(std::shared_ptr<const Mesh> mesh, float voxelSize)
     : mesh_((validate(*mesh), std::move(mesh))), voxelSize_(voxelSize), perMetre_(1 / double(voxelSize)) {
     const auto makeTree = [&] {
         tree_ = makeWideTree(*mesh_, voxelSize_, nullptr, {TreeOrder::split, longestEdge});
-        groups_ = makeTurnedGroups(tree_);
+        groups_ = makeOrientedGroups(tree_);
     };
     tbb::parallel_invoke(makeTree, [&] { normals_ = FeatureNormals(*mesh_, thinnest * double(voxelSize_)); });
 }
@@ -111,7 +109,7 @@ void MeshTree::toSmallest(NearestFeature& found, const std::array<glm::dvec3, 3>
     const auto set = [&](Feature feature, std::size_t index, const glm::dvec3& normal) {
         found.feature = feature;
         found.index = std::uint8_t(index);
-        if (glm::length(normal) > minMean) found.normal = normal;
+        if (glm::length(normal) > minMeanNormal) found.normal = normal;
     };
     const glm::uvec3& t = mesh_->triangles[found.triangle];
     for (int k = 0; k < 3; ++k)
