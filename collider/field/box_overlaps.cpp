@@ -61,12 +61,12 @@ class BoxSearch {
                 met = hn::And(met, hn::Le(gap, hn::Set(tag, around_[k])));
             }
             for (int axis = 0; axis < 3; ++axis) {
-                Vec way = hn::Zero(tag), reach = hn::Set(tag, half_[axis]);
+                Vec distance = hn::Zero(tag), reach = hn::Set(tag, half_[axis]);
                 for (int k = 0; k < 3; ++k) {
-                    way = hn::Add(way, hn::Mul(centre[k], hn::Set(tag, axes_[axis][k])));
+                    distance = hn::Add(distance, hn::Mul(centre[k], hn::Set(tag, axes_[axis][k])));
                     reach = hn::Add(reach, hn::Mul(half[k], hn::Set(tag, std::abs(axes_[axis][k]))));
                 }
-                met = hn::And(met, hn::Le(hn::Abs(way), reach));
+                met = hn::And(met, hn::Le(hn::Abs(distance), reach));
             }
             hn::Store(sum, tag, distance2 + i);
             near |= bitsOf(met) << i;

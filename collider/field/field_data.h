@@ -115,7 +115,7 @@ struct FieldData : FieldLayout {
 
     /// The closest point of the mesh, or of the zero set if there is no mesh.
     ClosestPoint closest(const glm::vec3& point, float maxDistance) const;
-    glm::dvec3 whereZerosTell(const glm::dvec3& local) const;
+    glm::dvec3 approachedPoint(const glm::dvec3& local) const;
     ClosestPoint closestZero(const glm::vec3& point, float maxDistance) const;
 
     bool inside(const glm::vec3& point) const;

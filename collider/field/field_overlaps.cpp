@@ -21,7 +21,7 @@ using namespace detail;
 namespace {
 
 // The box in double precision, with a normalised rotation.
-RotatedBox turned(const OrientedBox& box) {
+RotatedBox rotatedBox(const OrientedBox& box) {
     return {glm::dvec3(box.centre), glm::mat3_cast(glm::normalize(glm::dquat(box.rotation))), glm::dvec3(box.halfSize)};
 }
 
@@ -44,7 +44,7 @@ std::optional<bool> overlapsRoughly(const FieldData& field, const glm::vec3& cen
 
 // Whether the surface meets a box.
 bool meetsSurface(const FieldData& field, const OrientedBox& box) {
-    RotatedBox exact = turned(box);
+    RotatedBox exact = rotatedBox(box);
     if (field.mesh) return meetsTriangle(*field.mesh, exact);
     exact.centre = field.toLocal(box.centre);
     exact.halfSize *= field.perMetre;

@@ -34,8 +34,8 @@ constexpr double pointRounding = 1.2e-7;
 
 // A place on an edge, relative to the query point.
 struct OnEdge {
-    glm::dvec3 way;
-    double way2;
+    glm::dvec3 offset;
+    double distance2;
     int corner;  // an end, or -1 between them
 };
 
@@ -47,8 +47,8 @@ OnEdge closestOnEdge(const std::array<glm::dvec3, 3>& c, int from) {
     if (along >= length2) return {b, glm::dot(b, b), to};
     const double t = along / length2;
     // from the nearer end: both triangles of an edge find the same point, whatever its direction in them
-    const glm::dvec3 way = t <= 0.5 ? a + t * ab : b - (1 - t) * ab;
-    return {way, glm::dot(way, way), -1};
+    const glm::dvec3 offset = t <= 0.5 ? a + t * ab : b - (1 - t) * ab;
+    return {offset, glm::dot(offset, offset), -1};
 }
 
 }  // namespace
@@ -92,7 +92,7 @@ NearestFeature MeshTree::featureOfPart(std::uint32_t part, const glm::dvec3& poi
     const bool over = std::min({y, besideBC, besideAC}) > room && std::abs(z) < near;
     if (!over || normals_.isFlat(triangle)) return featureOf(triangle, point);
     return {.triangle = triangle,
-            .way = (-z * double(voxelSize_)) * normal,
+            .offset = (-z * double(voxelSize_)) * normal,
             .normal = normal,
             .isOnSurface = std::abs(z) <= room};
 }
@@ -116,7 +116,7 @@ void MeshTree::toSmallest(NearestFeature& found, const std::array<glm::dvec3, 3>
         if (glm::length(c[std::size_t(k)]) <= room)
             return set(Feature::vertex, std::size_t(k), normals_.ofVertex(t[k]));
     for (int k = 0; k < 3; ++k)
-        if (closestOnEdge(c, k).way2 <= room * room)
+        if (closestOnEdge(c, k).distance2 <= room * room)
             return set(Feature::edge, std::size_t(k), normals_.ofEdge(found.triangle, k));
 }
 
@@ -132,13 +132,13 @@ NearestFeature MeshTree::featureOf(std::uint32_t triangle, const glm::dvec3& poi
     NearestFeature found{.triangle = triangle};
     const auto inside = [&](std::size_t i) { return glm::dot(glm::cross(c[i], edges[i]), n) >= 0; };
     if (n2 > flatness * flatness * longest2 * longest2 && inside(0) && inside(1) && inside(2)) {
-        found.way = (glm::dot(c[0], n) / n2) * n;
+        found.offset = (glm::dot(c[0], n) / n2) * n;
         if (!normals_.isFlat(triangle)) found.normal = n / std::sqrt(n2);
     } else {
         toEdge(found, c);
     }
     const double room = roomAt(point);
-    found.isOnSurface = glm::length(found.way) <= room;
+    found.isOnSurface = glm::length(found.offset) <= room;
     if (found.isOnSurface) toSmallest(found, c, room);
     return found;
 }
@@ -149,9 +149,9 @@ void MeshTree::toEdge(NearestFeature& found, const std::array<glm::dvec3, 3>& c)
     int edge = 0;
     for (int i = 1; i < 3; ++i) {
         const OnEdge other = closestOnEdge(c, i);
-        if (other.way2 < best.way2) best = other, edge = i;
+        if (other.distance2 < best.distance2) best = other, edge = i;
     }
-    found.way = best.way;
+    found.offset = best.offset;
     found.feature = best.corner < 0 ? Feature::edge : Feature::vertex;
     found.index = std::uint8_t(best.corner < 0 ? edge : best.corner);
     found.normal = best.corner < 0 ? normals_.ofEdge(found.triangle, edge)

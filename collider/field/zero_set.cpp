@@ -38,31 +38,31 @@ Separation separation(const glm::dvec3& point, const glm::dvec3& lower, const gl
                       const LinearBound& linear) {
     const double height = linear.at(point), steepness = glm::length(linear.gradient);
     const glm::dvec3 low = lower - point, high = upper - point;
-    // points of the slab have normal * way <= beyond
+    // points of the slab have normal * offset <= beyond
     const glm::dvec3 normal = (height < 0 ? -1 : 1) / steepness * linear.gradient;
     const double beyond = (linear.error - std::abs(height)) / steepness;
     double multiplier = 0;
-    glm::dvec3 way = glm::clamp(glm::dvec3(0), low, high);
+    glm::dvec3 offset = glm::clamp(glm::dvec3(0), low, high);
     const bool slices = std::isfinite(beyond) && beyond < 0;
     for (int i = 0; slices && i < maxMultipliers; ++i) {
-        const double excess = glm::dot(normal, way) - beyond;
+        const double excess = glm::dot(normal, offset) - beyond;
         if (std::abs(excess) <= multiplierTolerance) break;
         // unclamped coordinates follow the multiplier; if there are none, up to the next one that is released
         double slope = 0, next = infinity;
         for (int k = 0; k < 3; ++k) {
             const double free = -multiplier * normal[k];
             if (free > low[k] && free < high[k]) slope += normal[k] * normal[k];
-            const double leaves = -way[k] / normal[k];
+            const double leaves = -offset[k] / normal[k];
             if (leaves > multiplier) next = std::min(next, leaves);
         }
         const double step = slope > 0 ? excess / slope : excess > 0 ? (1 + 1e-9) * next - multiplier : 0;
         if (!std::isfinite(step) || step == 0) break;
         multiplier = std::max(0.0, multiplier + step);
-        way = glm::clamp(-multiplier * normal, low, high);
+        offset = glm::clamp(-multiplier * normal, low, high);
     }
-    const double length = glm::length(way);
+    const double length = glm::length(offset);
     if (!(length > 0)) return {glm::dvec3(1, 0, 0), -infinity};
-    const glm::dvec3 direction = way / length;
+    const glm::dvec3 direction = offset / length;
     if (!slices) return {direction, length};
     const double weight = multiplier / length;
     const glm::dvec3 tilted = direction + weight * normal;
@@ -103,9 +103,9 @@ struct SphereCastQuery {
 
     double bound(const glm::dvec3& lower, const glm::dvec3& upper) const {
         return byTangents([&](const glm::dvec3& centre) -> Separation {
-            const glm::dvec3 way = glm::clamp(centre, lower, upper) - centre;
-            const double distance = glm::length(way);
-            return {way / distance, distance};
+            const glm::dvec3 offset = glm::clamp(centre, lower, upper) - centre;
+            const double distance = glm::length(offset);
+            return {offset / distance, distance};
         });
     }
     double bound(const glm::dvec3& lower, const glm::dvec3& upper, const LinearBound& linear) const {
@@ -131,10 +131,10 @@ struct SphereCastQuery {
     }
 
     void offer(const glm::dvec3& zero) {
-        const glm::dvec3 way = zero - path.origin;
-        const double along = glm::dot(way, path.direction), beside = glm::length(way - along * path.direction);
-        if (glm::length(way) <= radius) return settle(0, zero);
-        const double half2 = (radius - beside) * (radius + beside);
+        const glm::dvec3 offset = zero - path.origin;
+        const double along = glm::dot(offset, path.direction), across = glm::length(offset - along * path.direction);
+        if (glm::length(offset) <= radius) return settle(0, zero);
+        const double half2 = (radius - across) * (radius + across);
         if (half2 >= 0 && along >= 0) settle(std::max(0.0, along - std::sqrt(half2)), zero);
     }
     void settle(double key, const glm::dvec3& zero) {
@@ -151,12 +151,12 @@ struct BoxQuery {
 
     double limit() const { return found ? 0 : infinity; }
     double bound(const glm::dvec3& lower, const glm::dvec3& upper) const {
-        const glm::dvec3 half = 0.5 * (upper - lower), way = 0.5 * (upper + lower) - box.centre;
+        const glm::dvec3 half = 0.5 * (upper - lower), offset = 0.5 * (upper + lower) - box.centre;
         for (int k = 0; k < 3; ++k) {
-            const double along = glm::dot(box.axes[k], way), reach = glm::dot(glm::abs(box.axes[k]), half);
+            const double along = glm::dot(box.axes[k], offset), reach = glm::dot(glm::abs(box.axes[k]), half);
             if (std::abs(along) > reach + box.halfSize[k]) return infinity;
             const glm::dvec3 row(box.axes[0][k], box.axes[1][k], box.axes[2][k]);
-            if (std::abs(way[k]) > half[k] + glm::dot(glm::abs(row), box.halfSize)) return infinity;
+            if (std::abs(offset[k]) > half[k] + glm::dot(glm::abs(row), box.halfSize)) return infinity;
         }
         return 0;
     }
@@ -167,9 +167,9 @@ struct BoxQuery {
         return std::abs(linear.at(box.centre)) > reach ? infinity : bound(lower, upper);
     }
     void offer(const glm::dvec3& zero) {
-        const glm::dvec3 way = zero - box.centre;
+        const glm::dvec3 offset = zero - box.centre;
         for (int k = 0; k < 3; ++k)
-            if (std::abs(glm::dot(box.axes[k], way)) > box.halfSize[k]) return;
+            if (std::abs(glm::dot(box.axes[k], offset)) > box.halfSize[k]) return;
         found = true;
     }
     void settle(double, const glm::dvec3&) { found = true; }
@@ -185,8 +185,8 @@ glm::dvec3 zeroNormal(const FieldData& field, const glm::dvec3& point) noexcept 
     const glm::dvec3 f = point - glm::dvec3(voxel), g = 1.0 - f;
     glm::dvec3 gradient(0);
     for (std::size_t i = 0; i < 8; ++i) {
-        const glm::dvec3 at = cubeCorner(i), weight = glm::mix(g, f, at), way = 2.0 * at - 1.0;
-        gradient += v[i] * way * glm::dvec3(weight.y * weight.z, weight.x * weight.z, weight.x * weight.y);
+        const glm::dvec3 at = cubeCorner(i), weight = glm::mix(g, f, at), sign = 2.0 * at - 1.0;
+        gradient += v[i] * sign * glm::dvec3(weight.y * weight.z, weight.x * weight.z, weight.x * weight.y);
     }
     const double steepness = glm::length(gradient);
     return steepness > 0 ? gradient / steepness : glm::dvec3(0);
