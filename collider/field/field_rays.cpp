@@ -9,6 +9,7 @@
 #include "collider/field/field_data.h"
 #include "collider/field/mesh_rays.h"
 #include "collider/field/sphere_tracing.h"
+#include "collider/field/triangle_tests.h"
 #include "collider/field/zero_set.h"
 
 namespace bilayer {
