@@ -1,3 +1,4 @@
+// Construction of mesh trees, and the closest features of triangles in double precision.
 #include "collider/field/mesh_tree.h"
 
 #include <oneapi/tbb/parallel_invoke.h>

@@ -1,4 +1,5 @@
-// A mesh with a bounding volume hierarchy over its triangles, for exact queries.
+// A mesh with a bounding volume hierarchy over its triangles, for exact queries. The closest-triangle search is in
+// mesh_nearest.cpp.
 #pragma once
 
 #include <array>
