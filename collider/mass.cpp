@@ -10,6 +10,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "collider/field/jacobi_rotation.h"
 #include "collider/field/moments.h"
 
 namespace bilayer {
@@ -50,16 +51,10 @@ struct Eigen {
 // Rotates in the plane of axes p and q so that the entry (p, q) vanishes.
 void rotate(glm::dmat3& matrix, glm::dmat3& vectors, int p, int q) {
     if (matrix[p][q] == 0) return;
-    const double theta = (matrix[q][q] - matrix[p][p]) / (2 * matrix[p][q]);
-    const double t = std::copysign(1 / (std::abs(theta) + std::sqrt(theta * theta + 1)), theta);
-    const double c = 1 / std::sqrt(t * t + 1), s = t * c;
-    glm::dmat3 turn(1);
-    turn[p][p] = turn[q][q] = c;
-    turn[q][p] = s;
-    turn[p][q] = -s;
-    matrix = glm::transpose(turn) * matrix * turn;
+    const glm::dmat3 rotation = jacobiRotation(matrix, p, q);
+    matrix = glm::transpose(rotation) * matrix * rotation;
     matrix[p][q] = matrix[q][p] = 0;
-    vectors = vectors * turn;
+    vectors = vectors * rotation;
 }
 
 Eigen eigen(glm::dmat3 matrix) {

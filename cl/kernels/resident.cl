@@ -10,7 +10,7 @@
 #define BAND_EDGE 1e-5f
 // linkSlack of sdf/leaf/sign_propagation.h [voxels].
 #define LINK_SLACK 1e-4f
-// As in collider/field/field_layout.cpp.
+// As in collider/field/coarse_distance.cpp, clearance.h and field_layout.cpp.
 #define MOST_PARTS 16
 // Maximum length of a stored vector [WAY_STEPS].
 #define MOST_WAY 127
@@ -289,8 +289,8 @@ kernel void measureParts(Frame frame, float far, global const int* directory, gl
     centres[centreOf(part, blocks)] = least < 0 ? -1 : 1;
 }
 
-// Propagates squared distances along one more axis: transformRow() of collider/field/field_layout.cpp. A work-item does
-// a coarse cell.
+// Propagates squared distances along one more axis: transformRow() of collider/field/coarse_distance.cpp. A work-item
+// does a coarse cell.
 kernel void spreadParts(Frame frame, int axis, global const float* from, global float* to) {
     const int3 size = PARTS_ALONG * vload3(0, frame.blocks);
     const int3 part = ownPart();

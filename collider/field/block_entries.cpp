@@ -9,12 +9,14 @@
 #include <utility>
 #include <vector>
 
+#include "sdf/bvh/tree_query.h"
+
 namespace bilayer::detail {
 namespace {
 
 /// Max offset between the frames of field and tree [voxels], and max rounding of floats in the tree, relative to its
 /// size.
-constexpr float frameRounding = 1e-2f, placeRounding = 3e-7f;
+constexpr float frameRounding = 1e-2f, treeRounding = 3e-7f;
 /// Max count of nodes in a cube's entries.
 constexpr std::size_t maxNodes = BlockEntries::most * BlockEntry::slots;
 /// Entries are sized for the nodes of this fraction of the cubes; the other cubes use a coarser level. The size is
@@ -33,99 +35,63 @@ struct Region {
     float reach2;
 };
 
-// Nodes of one level with their boxes, in the tree's frame.
-class Nodes {
-  public:
-    void clear() { size_ = 0; }
-    std::size_t size() const { return size_; }
-    std::uint32_t node(std::size_t i) const { return nodes_[i]; }
-    float lower(int k, std::size_t i) const { return lower_[k][i]; }
-    float upper(int k, std::size_t i) const { return upper_[k][i]; }
+// Makes room for a whole group: all of its boxes are written, also those that are not kept.
+void makeRoom(NodeList& list) {
+    if (list.count + 2 * treeWidth > list.nodes.size()) list.makeRoom(treeWidth);
+}
 
-    // Adds those of up to eight boxes that are near a region.
-    template <class NodeOf>
-    void addNear(const float* const (&lower)[3], const float* const (&upper)[3], int count, NodeOf nodeOf,
-                 const Region& region) {
-        float sums[treeWidth] = {};
-        for (int k = 0; k < 3; ++k)
-            for (int i = 0; i < treeWidth; ++i) {
-                const float gap = std::max(std::max(0.f, lower[k][i] - region.upper[k]), region.lower[k] - upper[k][i]);
-                sums[i] += gap * gap;
-            }
-        reserve(size_ + treeWidth);
-        for (int i = 0; i < count; ++i) {
-            for (int k = 0; k < 3; ++k) {
-                lower_[k][size_] = lower[k][i];
-                upper_[k][size_] = upper[k][i];
-            }
-            nodes_[size_] = nodeOf(i);
-            size_ += sums[i] <= region.reach2;
-        }
+// Adds a node with an unknown box.
+void add(std::uint32_t node, const Region& region, NodeList& to) {
+    makeRoom(to);
+    for (int k = 0; k < 3; ++k) {
+        to.lower[k][to.count] = region.lower[k];
+        to.upper[k][to.count] = region.upper[k];
     }
+    to.nodes[to.count++] = node;
+}
 
-    // Adds a node with an unknown box.
-    void add(std::uint32_t node, const Region& region) {
-        reserve(size_);
+// Adds the children of a group that are near a region.
+void addNear(const BoxGroup& group, const Region& region, NodeList& to) {
+    float sums[treeWidth] = {};
+    for (int k = 0; k < 3; ++k)
+        for (int i = 0; i < treeWidth; ++i) {
+            const float gap =
+                std::max(std::max(0.f, group.lower[k][i] - region.upper[k]), region.lower[k] - group.upper[k][i]);
+            sums[i] += gap * gap;
+        }
+    makeRoom(to);
+    for (int i = 0; i < treeWidth; ++i) {
         for (int k = 0; k < 3; ++k) {
-            lower_[k][size_] = region.lower[k];
-            upper_[k][size_] = region.upper[k];
+            to.lower[k][to.count] = group.lower[k][i];
+            to.upper[k][to.count] = group.upper[k][i];
         }
-        nodes_[size_++] = node;
+        to.nodes[to.count] = group.firstChild + std::uint32_t(i);
+        to.count += sums[i] <= region.reach2;
     }
-
-    // Adds the children of a group that are near a region.
-    void addNear(const BoxGroup& group, const Region& region) {
-        addNear(
-            {group.lower[0], group.lower[1], group.lower[2]}, {group.upper[0], group.upper[1], group.upper[2]},
-            treeWidth, [&](int i) { return group.firstChild + std::uint32_t(i); }, region);
-    }
-
-    // Adds the given nodes that are near a region.
-    void addNear(const Nodes& from, const Region& region) {
-        for (std::size_t i = 0; i < from.size_; i += treeWidth)
-            addNear(
-                {&from.lower_[0][i], &from.lower_[1][i], &from.lower_[2][i]},
-                {&from.upper_[0][i], &from.upper_[1][i], &from.upper_[2][i]},
-                int(std::min<std::size_t>(treeWidth, from.size_ - i)),
-                [&](int k) { return from.nodes_[i + std::size_t(k)]; }, region);
-    }
-
-  private:
-    // Whole vectors may be read and written.
-    void reserve(std::size_t size) {
-        if (size + treeWidth <= nodes_.size()) return;
-        const std::size_t room = 2 * (size + treeWidth);
-        for (int k = 0; k < 3; ++k) lower_[k].resize(room), upper_[k].resize(room);
-        nodes_.resize(room);
-    }
-
-    std::size_t size_ = 0;
-    std::vector<float> lower_[3], upper_[3];
-    std::vector<std::uint32_t> nodes_;
-};
+}
 
 // Builds the entries of one cube after another.
-class Maker {
+class EntryBuilder {
   public:
-    Maker(const FieldLayout& field, const WideTree& tree, double perMetre, float reach, int shift)
+    EntryBuilder(const FieldLayout& field, const WideTree& tree, double perMetre, float reach, int shift)
         : tree_(tree),
           origin_(field.origin * perMetre - glm::dvec3(tree.base)),
           side_(float(1 << shift)),
           step_(double(side_) * field.voxel * perMetre),
           reach_(reach),
-          room_(frameRounding + placeRounding * float(std::max({tree.size.x, tree.size.y, tree.size.z}))) {}
+          room_(frameRounding + treeRounding * float(std::max({tree.size.x, tree.size.y, tree.size.z}))) {}
 
     // The count of nodes near a cube, at the finest level that fits into entries, and whether they are leaves.
     std::pair<std::size_t, bool> count(const glm::ivec3& cube) {
         descend(cube);
-        const Nodes& finest = levels_[count_ - 1];
-        return {finest.size(), finest.size() == 0 || tree_.isLeaf(finest.node(0))};
+        const NodeList& finest = levels_[count_ - 1];
+        return {finest.count, finest.count == 0 || tree_.isLeaf(finest.nodes[0])};
     }
 
     void make(const glm::ivec3& cube, BlockEntry* to, int each) {
         descend(cube);
         std::size_t level = count_ - 1;
-        while (levels_[level].size() > std::size_t(each * BlockEntry::slots)) --level;
+        while (levels_[level].count > std::size_t(each * BlockEntry::slots)) --level;
         write(levels_[level], lowerOf(cube) - reach_, to, each);
     }
 
@@ -137,39 +103,39 @@ class Maker {
         const glm::vec3 lower = lowerOf(cube);
         const Region region{lower - room_, lower + side_ + room_, reach_ * reach_};
         count_ = 0;
-        next().add(tree_.root(), region);
-        while (levels_[count_ - 1].size() > 0 && !tree_.isLeaf(levels_[count_ - 1].node(0))) {
-            Nodes& finer = next();
-            const Nodes& coarser = levels_[count_ - 2];
-            for (std::size_t i = 0; i < coarser.size() && finer.size() <= maxNodes; ++i)
-                finer.addNear(tree_.group(coarser.node(i)), region);
-            if (finer.size() <= maxNodes) continue;
+        add(tree_.root(), region, next());
+        while (levels_[count_ - 1].count > 0 && !tree_.isLeaf(levels_[count_ - 1].nodes[0])) {
+            NodeList& finer = next();
+            const NodeList& coarser = levels_[count_ - 2];
+            for (std::size_t i = 0; i < coarser.count && finer.count <= maxNodes; ++i)
+                addNear(tree_.group(coarser.nodes[i]), region, finer);
+            if (finer.count <= maxNodes) continue;
             --count_;
             return;
         }
     }
-    Nodes& next() {
+    NodeList& next() {
         if (count_ == levels_.size()) levels_.emplace_back();
-        levels_[count_].clear();
+        levels_[count_].count = 0;
         return levels_[count_++];
     }
 
-    void write(const Nodes& nodes, const glm::vec3& corner, BlockEntry* entries, int each) const {
+    void write(const NodeList& list, const glm::vec3& corner, BlockEntry* entries, int each) const {
         constexpr float most = BlockEntries::regionUnits;
         const float perVoxel = most / (side_ + 2 * reach_), room = room_ * perVoxel + 1.f / BlockEntries::placesPerUnit;
         for (int i = 0; i < each; ++i) {
             std::memset(&entries[i], 0, sizeof(BlockEntry));
             std::memset(entries[i].lower, BlockEntries::regionUnits, sizeof entries[i].lower);
         }
-        for (std::size_t i = 0; i < nodes.size(); ++i) {
+        for (std::size_t i = 0; i < list.count; ++i) {
             BlockEntry& entry = entries[i / BlockEntry::slots];
             const std::size_t slot = i % BlockEntry::slots;
             for (int k = 0; k < 3; ++k) {
-                const float low = (nodes.lower(k, i) - corner[k]) * perVoxel - room;
-                const float high = (nodes.upper(k, i) - corner[k]) * perVoxel + room;
+                const float low = (list.lower[k][i] - corner[k]) * perVoxel - room;
+                const float high = (list.upper[k][i] - corner[k]) * perVoxel + room;
                 entry.lower[k][slot] = std::uint8_t(std::clamp(low, 0.f, most));
                 entry.upper[k][slot] = std::uint8_t(std::clamp(high + 1, 0.f, most));
-                entry.nodes[slot][k] = std::uint8_t(nodes.node(i) >> 8 * k);
+                entry.nodes[slot][k] = std::uint8_t(list.nodes[i] >> 8 * k);
             }
         }
     }
@@ -179,7 +145,7 @@ class Maker {
     float side_;         // of a cube [voxels]
     double step_;        // the same in the tree's frame
     float reach_, room_;
-    std::vector<Nodes> levels_;
+    std::vector<NodeList> levels_;
     std::size_t count_ = 0;  // of filled levels
 };
 
@@ -189,11 +155,11 @@ struct Need {
     bool leaves;
 };
 
-Need needOf(Maker maker, const std::vector<glm::ivec3>& cubes) {
+Need needOf(EntryBuilder builder, const std::vector<glm::ivec3>& cubes) {
     std::vector<std::size_t> counts;
     std::size_t withLeaves = 0;
     for (std::size_t i = 0; i < cubes.size(); i += 1 + cubes.size() / samples) {
-        const auto [count, leaves] = maker.count(cubes[i]);
+        const auto [count, leaves] = builder.count(cubes[i]);
         counts.push_back(count);
         withLeaves += leaves;
     }
@@ -239,18 +205,18 @@ BlockEntries::BlockEntries(const FieldLayout& field, const WideTree& tree, doubl
     if (tree.leafCount + tree.groupCount > maxTreeNodes) return;
     extent_ = glm::dvec3(FieldFrame::side * field.blocks);
     std::vector<glm::ivec3> cubes;
-    const auto makerOf = [&] { return Maker(field, tree, perMetre, reach, shift_); };
+    const auto builderOf = [&] { return EntryBuilder(field, tree, perMetre, reach, shift_); };
     for (shift_ = largestShift;; --shift_) {
         cubes = number(field);
-        const Need need = needOf(makerOf(), cubes);
+        const Need need = needOf(builderOf(), cubes);
         each_ = need.entries;
         if ((each_ <= fewEntries && need.leaves) || shift_ == blockShift) break;
     }
     placesPerVoxel_ = float(placesPerUnit * regionUnits) / (float(1 << shift_) + 2 * reach);
     entries_ = LargeArray<BlockEntry>(cubes.size() * std::size_t(each_));
-    const Maker maker = makerOf();
+    const EntryBuilder builder = builderOf();
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, cubes.size(), grain), [&](const auto& range) {
-        Maker own(maker);
+        EntryBuilder own(builder);
         for (std::size_t i = range.begin(); i < range.end(); ++i)
             own.make(cubes[i], entries_.data() + i * std::size_t(each_), each_);
     });

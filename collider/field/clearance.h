@@ -45,9 +45,9 @@ class Clearance {
         const glm::vec3 toBox = centre - clamped(centre);
         if (glm::dot(toBox, toBox) > radius * radius) return true;
         const glm::ivec3 part = partOf(centre);
-        const glm::vec3 way = centre - (glm::vec3(part) + 0.5f);
+        const glm::vec3 offset = centre - (glm::vec3(part) + 0.5f);
         const float left = centreOf(part) - radius;
-        return left > 0 && glm::dot(way, way) < left * left;
+        return left > 0 && glm::dot(offset, offset) < left * left;
     }
 
     /// Whether a sample there is certainly above `reach` [m], or outside the band.

@@ -41,9 +41,9 @@ Face faceOf(const Mesh& mesh, const glm::uvec3& t, double thinnest) {
 }
 
 // Whether two triangles with the same vertices have the same orientation.
-bool sameTurn(const glm::uvec3& a, const glm::uvec3& b) {
-    for (int turn = 0; turn < 3; ++turn)
-        if (a.x == b[turn] && a.y == b[(turn + 1) % 3] && a.z == b[(turn + 2) % 3]) return true;
+bool sameOrientation(const glm::uvec3& a, const glm::uvec3& b) {
+    for (int k = 0; k < 3; ++k)
+        if (a.x == b[k] && a.y == b[(k + 1) % 3] && a.z == b[(k + 2) % 3]) return true;
     return false;
 }
 
@@ -59,7 +59,7 @@ class Faces {
         for (std::size_t i = 0; i < faces_.size(); ++i) {
             const unsigned first = topology.original[i];
             if (first == i) continue;
-            const bool back = !sameTurn(topology.triangles[i], topology.triangles[first]);
+            const bool back = !sameOrientation(topology.triangles[i], topology.triangles[first]);
             faces_[i].counts = faces_[i].counts && back && backs.insert(first).second;
         }
         for (std::size_t i = 0; i < faces_.size(); ++i)

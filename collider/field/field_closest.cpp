@@ -29,28 +29,25 @@ constexpr float usualError = 0.1f;
 constexpr float boundRounding = 1 + 1e-5f, boundRoom = 1e-5f;
 /// Batch size; the data of the batch's points fit into the first-level cache.
 constexpr std::size_t batch = 64;
-/// Shorter mean normals have cancelled out, and define no side for oblique directions. The limit is above the rounding
-/// of floats, and below the length at the tips of needles.
-constexpr double cancelled = 1e-6;
 /// Distance on either side of a wall at which the field decides which one is inside [voxels].
-constexpr float aside = 1;
+constexpr float probeOffset = 1;
 /// Max error of samples at an edge [voxels].
-constexpr float roundedOff = 0.3f;
+constexpr float edgeError = 0.3f;
 
 // The height of a point over the plane of the normal, which may be shorter than 1.
 double heightOver(const NearestFeature& nearest) {
-    return -glm::dot(nearest.normal, nearest.way);
+    return -glm::dot(nearest.normal, nearest.offset);
 }
 
 // The normal of a feature, flipped if it points to the other side. If there is none: the direction from the surface to
 // the point, or its reverse inside. A point on the surface itself has no side.
 glm::vec3 outwardNormal(const NearestFeature& nearest, bool inside) {
-    const double length = glm::length(nearest.normal), distance = glm::length(nearest.way);
-    if (length > cancelled || nearest.isOnSurface) {
-        const bool turned = !nearest.isOnSurface && (inside ? heightOver(nearest) > 0 : heightOver(nearest) < 0);
-        return length > 0 ? glm::vec3(nearest.normal * ((turned ? -1 : 1) / length)) : glm::vec3(0, 0, 1);
+    const double length = glm::length(nearest.normal), distance = glm::length(nearest.offset);
+    if (length > minMeanNormal || nearest.isOnSurface) {
+        const bool flipped = !nearest.isOnSurface && (inside ? heightOver(nearest) > 0 : heightOver(nearest) < 0);
+        return length > 0 ? glm::vec3(nearest.normal * ((flipped ? -1 : 1) / length)) : glm::vec3(0, 0, 1);
     }
-    return glm::vec3(nearest.way * ((inside ? 1 : -1) / distance));
+    return glm::vec3(nearest.offset * ((inside ? 1 : -1) / distance));
 }
 
 }  // namespace
@@ -108,10 +105,11 @@ FieldData::Side FieldData::sideAt(const glm::dvec3& local) const {
 // Whether the field changes sign at a place of the mesh. It does not at walls within the solid, nor at free-standing
 // walls. Next to an edge, one of the two samples may be close to another wall.
 bool FieldData::divides(const glm::dvec3& place, const glm::dvec3& normal) const {
-    const glm::dvec3 step = double(aside * voxelSize) * glm::normalize(normal);
+    const glm::dvec3 step = double(probeOffset * voxelSize) * glm::normalize(normal);
     const auto distanceAt = [&](const glm::dvec3& at) { return sample((at - origin) * perMetre).distance; };
     const float outer = distanceAt(place + step), inner = distanceAt(place - step);
-    return outer > -roundedOff * voxelSize && inner < roundedOff * voxelSize && outer - inner > aside * voxelSize / 2;
+    return outer > -edgeError * voxelSize && inner < edgeError * voxelSize &&
+           outer - inner > probeOffset * voxelSize / 2;
 }
 
 // The field decides where it is certain, so that all queries agree. Otherwise the normal decides if it defines a side:
@@ -122,9 +120,9 @@ bool FieldData::isInside(const NearestFeature& nearest, const glm::vec3& point) 
     if (side.certain) return side.inside;
     if (!mesh->mayEnclose(glm::dvec3(point))) return false;
     const double height = heightOver(nearest);
-    const bool tells = std::abs(height) > cancelled * glm::length(nearest.way);
-    if (!tells) return side.inside;
-    const bool byNormal = signedByNormals || divides(glm::dvec3(point) + nearest.way, nearest.normal);
+    const bool hasSide = std::abs(height) > minMeanNormal * glm::length(nearest.offset);
+    if (!hasSide) return side.inside;
+    const bool byNormal = signedByNormals || divides(glm::dvec3(point) + nearest.offset, nearest.normal);
     return byNormal ? height < 0 : side.inside;
 }
 
@@ -133,11 +131,11 @@ ClosestPoint FieldData::closestOn(std::uint32_t part, const glm::vec3& point, fl
     if (part == MeshTree::noPart) return {};
     const glm::dvec3 from = mesh->approached(glm::dvec3(point));
     const NearestFeature nearest = mesh->featureOfPart(part, from);
-    const double distance = glm::length(nearest.way + (from - glm::dvec3(point)));
+    const double distance = glm::length(nearest.offset + (from - glm::dvec3(point)));
     if (!(distance <= double(maxDistance))) return {};
     const bool inside = isInside(nearest, point);
     return {.distance = inside ? -toFloat(distance) : toFloat(distance),
-            .position = glm::vec3(from + nearest.way),
+            .position = glm::vec3(from + nearest.offset),
             .normal = outwardNormal(nearest, inside),
             .triangle = nearest.triangle,
             .feature = nearest.feature,
@@ -171,7 +169,7 @@ ClosestPoint FieldData::closest(const glm::vec3& point, float maxDistance) const
 }
 
 // Replaces a far point: its distance to the zeros equals that from the replacement, to a millionth of the field's size.
-glm::dvec3 FieldData::whereZerosTell(const glm::dvec3& local) const {
+glm::dvec3 FieldData::approachedPoint(const glm::dvec3& local) const {
     constexpr double sizes = 1e6;
     return approached(local, glm::dvec3(0), extent(), sizes, sizes);
 }
@@ -179,7 +177,7 @@ glm::dvec3 FieldData::whereZerosTell(const glm::dvec3& local) const {
 ClosestPoint FieldData::closestZero(const glm::vec3& point, float maxDistance) const {
     const glm::dvec3 local = toLocal(point);
     if (!std::isfinite(local.x + local.y + local.z) || !(maxDistance >= 0)) return {};
-    const glm::dvec3 from = whereZerosTell(local);
+    const glm::dvec3 from = approachedPoint(local);
     const double reach = double(maxDistance) * perMetre;
     const auto nearest = nearestZero(*this, from, from == local ? reach : std::numeric_limits<double>::infinity());
     if (!nearest || glm::distance(local, *nearest) > reach) return {};

@@ -47,9 +47,6 @@ struct SampleKernels {
 const SampleKernels& sampleKernels(Storage storage);
 
 struct FieldData : FieldLayout {
-    /// Also the Lipschitz constant of the trilinear interpolant [voxels].
-    static constexpr float cellDiagonal = 1.7320508f;
-
     FieldData(const LevelSet& levelSet, Storage storage);
     /// Shares the samples.
     FieldData(const FieldData& samples, std::shared_ptr<const Mesh> outward);
@@ -118,7 +115,7 @@ struct FieldData : FieldLayout {
 
     /// The closest point of the mesh, or of the zero set if there is no mesh.
     ClosestPoint closest(const glm::vec3& point, float maxDistance) const;
-    glm::dvec3 whereZerosTell(const glm::dvec3& local) const;
+    glm::dvec3 approachedPoint(const glm::dvec3& local) const;
     ClosestPoint closestZero(const glm::vec3& point, float maxDistance) const;
 
     bool inside(const glm::vec3& point) const;

@@ -1,5 +1,4 @@
-// Construction of field layouts. Outside the band, distances are bounded from below by a coarse exact distance
-// transform of the cells that the surface may meet.
+// Construction of field layouts.
 #include "collider/field/field_layout.h"
 
 #include <oneapi/tbb/parallel_for.h>
@@ -14,6 +13,9 @@
 #include <stdexcept>
 
 #include <bilayer/sdf/grids.h>
+#include "collider/field/coarse_distance.h"
+#include "collider/field/interpolant.h"
+#include "collider/field/leaf_block.h"
 #include "sdf/base/morton.h"
 
 namespace bilayer::detail {
@@ -26,14 +28,8 @@ using Accessor = openvdb::FloatGrid::ConstAccessor;
 constexpr int side = FieldLayout::side, stride = FieldLayout::stride;
 constexpr std::int64_t maxBlocks = 1 << 26;  // of the box: 0.75 GiB at 12 bytes each
 constexpr int partSide = Clearance::partSide, perBlock = Clearance::perBlock, blockParts = Clearance::blockParts;
-constexpr int maxParts = 16;                      // distance limit of the bounds [coarse cells]
-constexpr float nearSurface = 0.5f * 1.7320508f;  // max distance from surface in a cell to its nearest voxel [voxels]
-constexpr int minSteps = 126;                     // from 0 to the end of the band, for the stored minima
-
-// Squared distances from the centres of coarse cells to the nearest one that the surface meets. The unit is half a
-// coarse cell, so that distances to faces are integers.
-using Way = std::int16_t;
-constexpr Way farAway = 4 * maxParts * maxParts;
+constexpr float nearSurface = 0.5f * cellDiagonal;  // max distance from surface in a cell to its nearest voxel [voxels]
+constexpr int minSteps = 126;                       // from 0 to the end of the band, for the stored minima
 
 // A leaf needs a block if it has voxels of the band, or voxels of both signs (for bands below one voxel).
 bool needsBlock(const FloatTree::LeafNodeType& leaf) {
@@ -47,33 +43,13 @@ bool needsBlock(const FloatTree::LeafNodeType& leaf) {
 }
 
 // Sorts blocks in Morton order, so that blocks that are close in space are close in memory.
-void sortForWalks(std::vector<Coord>& origins, const Coord& first) {
+void sortAlongMortonCurve(std::vector<Coord>& origins, const Coord& first) {
     const auto place = [&](const Coord& origin) -> std::array<std::uint32_t, 3> {
-        const Coord way = origin - first;
-        return {std::uint32_t(way.x()), std::uint32_t(way.y()), std::uint32_t(way.z())};
+        const Coord offset = origin - first;
+        return {std::uint32_t(offset.x()), std::uint32_t(offset.y()), std::uint32_t(offset.z())};
     };
     tbb::parallel_sort(origins.begin(), origins.end(),
                        [&](const Coord& a, const Coord& b) { return beforeInMortonOrder(place(a), place(b)); });
-}
-
-// Copies a leaf, and the first layer of voxels of its seven upper neighbours.
-void copyBlock(const Accessor& tree, const Coord& origin, float* block) {
-    for (int part = 0; part < 8; ++part) {
-        const glm::ivec3 first = side * glm::ivec3(part >> 2, part >> 1 & 1, part & 1);
-        const glm::ivec3 count = glm::min(glm::ivec3(side), stride - first);
-        const Coord corner = origin.offsetBy(first.x, first.y, first.z);
-        const auto* leaf = tree.probeConstLeaf(corner);
-        const float* values = leaf ? leaf->buffer().data() : nullptr;
-        const float tile = leaf ? 0.f : tree.getValue(corner);
-        for (int x = 0; x < count.x; ++x)
-            for (int y = 0; y < count.y; ++y) {
-                float* row = block + ((first.x + x) * stride + first.y + y) * stride + first.z;
-                if (values)
-                    std::copy_n(values + (x * side + y) * side, count.z, row);
-                else
-                    std::fill_n(row, count.z, tile);
-            }
-    }
 }
 
 // The unit of stored minima [m].
@@ -87,22 +63,22 @@ struct BlockSummary {
     std::array<bool, blockParts> meetsSurface;  // a voxel is close enough to the surface, or both signs occur
 };
 
-using Floats [[gnu::vector_size(16)]] = float;
-
 // Minima and maxima of a quarter of a block, over x and y, by place along the last axis.
 struct Quarter {
+    using FourFloats [[gnu::vector_size(16)]] = float;
+
     float least[stride], most[stride];
 
     explicit Quarter(const float* rows) {
         for (int z = 0; z < stride; z += 4) {
             // the last four overlap the previous ones
             const float* from = rows + std::min(z, stride - 4);
-            Floats low, high;
+            FourFloats low, high;
             std::memcpy(&low, from, sizeof low);
             high = low;
             for (int x = 0; x <= partSide; ++x)
                 for (int y = 0; y <= partSide; ++y) {
-                    Floats values;
+                    FourFloats values;
                     std::memcpy(&values, from + (x * stride + y) * stride, sizeof values);
                     low = values < low ? values : low;
                     high = values > high ? values : high;
@@ -148,62 +124,6 @@ void store(const float* block, const FieldFrame& frame, float step, std::int16_t
         const std::int16_t beyond = block[i] < 0 ? FieldLayout::beyondInside : FieldLayout::beyondOutside;
         to[i] = isBeyondBand(block[i], frame) ? beyond : steps;
     }
-}
-
-// The increase of a squared distance to the near face of a coarse cell `d` places away.
-constexpr Way wayTo(int d) {
-    return Way((2 * d - 1) * (2 * d - 1));
-}
-
-// Lowers squared distances to those of others plus an increment. Returns false if no larger increment can lower any.
-bool lower(Way* ways, const Way* others, std::size_t count, Way way) {
-    Way most = 0;
-    for (std::size_t i = 0; i < count; ++i) {
-        most = std::max(most, ways[i]);
-        ways[i] = std::min(ways[i], Way(others[i] + way));
-    }
-    return most > way;
-}
-
-// Lowers each squared distance along the last axis to the minimum of the others plus their increments (as P.
-// Felzenszwalb, D. Huttenlocher, "Distance transforms of sampled functions", 2012, but to the faces of coarse cells).
-void transformRow(Way* ways, int length, std::vector<Way>& before) {
-    before.assign(ways, ways + length);
-    for (int d = 1; d <= std::min(maxParts, length - 1); ++d) {
-        const std::size_t count = length - d;
-        const bool up = lower(ways + d, before.data(), count, wayTo(d));
-        const bool down = lower(ways, before.data() + d, count, wayTo(d));
-        if (!up && !down) break;
-    }
-}
-
-// The same across rows of `count` values with a stride of `step`.
-void transformRows(Way* ways, std::size_t count, std::size_t step, int length, std::vector<Way>& before) {
-    before.resize(std::size_t(length) * count);
-    for (int i = 0; i < length; ++i) std::copy_n(ways + i * step, count, before.data() + i * count);
-    for (int i = 0; i < length; ++i) {
-        bool more = true;
-        for (int d = 1; more && d <= maxParts; ++d) {
-            more = false;
-            if (i >= d) more |= lower(ways + i * step, before.data() + (i - d) * count, count, wayTo(d));
-            if (i + d < length) more |= lower(ways + i * step, before.data() + (i + d) * count, count, wayTo(d));
-        }
-    }
-}
-
-// Distance transform. Input: 0 for coarse cells that meet the surface, `farAway` for others. Processes one axis after
-// the other, since a squared distance is a sum over the axes.
-void transform(LargeArray<Way>& ways, const glm::ivec3& size) {
-    const std::size_t row = std::size_t(size.z), plane = size.y * row;
-    tbb::parallel_for(0, size.x, [&](int x) {
-        std::vector<Way> before;
-        for (int y = 0; y < size.y; ++y) transformRow(ways.data() + x * plane + y * row, size.z, before);
-        transformRows(ways.data() + x * plane, row, row, size.y, before);
-    });
-    tbb::parallel_for(0, size.y, [&](int y) {
-        std::vector<Way> before;
-        transformRows(ways.data() + y * row, row, plane, size.x, before);
-    });
 }
 
 // Enters the side of each directory entry, before the blocks are entered.
@@ -253,64 +173,6 @@ std::vector<std::array<bool, blockParts>> enterBlocks(FieldLayout& field, const 
     return meets;
 }
 
-// Calls visit(entry, index) for the entries of the directory, with the index of their first coarse cell. nextParts()
-// returns the offsets of the others.
-template <class Visit>
-void forEachEntry(const FieldLayout& field, const Visit& visit) {
-    const glm::ivec3 size = field.parts();
-    tbb::parallel_for(0, field.blocks.x, [&](int x) {
-        for (int y = 0; y < field.blocks.y; ++y) {
-            const std::size_t entry = field.entryOf({x, y, 0});
-            const std::size_t part = (std::size_t(perBlock * x) * size.y + std::size_t(perBlock * y)) * size.z;
-            for (int z = 0; z < field.blocks.z; ++z) visit(entry + std::size_t(z), part + std::size_t(perBlock * z));
-        }
-    });
-}
-
-std::array<std::size_t, blockParts> nextParts(const FieldLayout& field) {
-    const glm::ivec3 size = field.parts();
-    std::array<std::size_t, blockParts> next;
-    for (int k = 0; k < blockParts; ++k)
-        next[k] = (std::size_t(k >> 2) * size.y + std::size_t(k >> 1 & 1)) * size.z + std::size_t(k & 1);
-    return next;
-}
-
-// The square roots of all squared distances, rounded down [steps].
-std::array<std::int8_t, farAway + 1> rootsOfWays() {
-    std::array<std::int8_t, farAway + 1> roots;
-    for (int way = 0; way <= farAway; ++way)
-        roots[way] =
-            std::int8_t(std::min(Clearance::maxDistanceSteps, int(0.5f * Clearance::steps * std::sqrt(float(way)))));
-    return roots;
-}
-
-void measureClearances(FieldLayout& field, const std::vector<std::array<bool, blockParts>>& meets) {
-    field.centres = LargeArray<std::int8_t>(field.entries() * blockParts);
-    if (!field.findsSurface()) {
-        std::fill_n(field.centres.data(), field.centres.size(), std::int8_t(0));
-        return;
-    }
-    const glm::ivec3 size = field.parts();
-    LargeArray<Way> ways(std::size_t(size.x) * size.y * size.z);
-    const auto next = nextParts(field);
-    forEachEntry(field, [&](std::size_t entry, std::size_t part) {
-        const std::int32_t block = field.directory[entry];
-        for (int k = 0; k < blockParts; ++k) ways[part + next[k]] = block >= 0 && meets[block][k] ? 0 : farAway;
-    });
-    transform(ways, size);
-    const auto roots = rootsOfWays();
-    forEachEntry(field, [&](std::size_t entry, std::size_t part) {
-        const std::int32_t block = field.directory[entry];
-        const bool emptyInside = block == FieldLayout::emptyInside;
-        std::int8_t* const centres = field.centres.data() + entry * blockParts;
-        for (int k = 0; k < blockParts; ++k) {
-            const std::int8_t root = roots[ways[part + next[k]]];
-            const bool inside = block < 0 ? emptyInside : field.minima[std::size_t(block) * blockParts + k] < 0;
-            centres[k] = std::int8_t(inside ? -root : root);
-        }
-    });
-}
-
 }  // namespace
 
 void FieldFrame::requireSize() const {
@@ -347,7 +209,7 @@ FieldLayout::FieldLayout(const LevelSet& levelSet, Storage storage)
         if (std::int64_t(box.max()[axis]) - box.min()[axis] >= std::int64_t(side) * maxBlocksAlong) throwTooLong();
 
     const Coord first = box.min();
-    sortForWalks(origins, first);
+    sortAlongMortonCurve(origins, first);
     blocks = glm::ivec3((box.max() - first).x(), (box.max() - first).y(), (box.max() - first).z()) / side + 1;
     requireSize();
     enterSides(*this, grid.tree(), first);

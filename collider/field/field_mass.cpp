@@ -22,6 +22,8 @@
 #include <vector>
 
 #include <bilayer/sdf/grids.h>
+#include "collider/field/field_layout.h"
+#include "collider/field/leaf_block.h"
 #include "collider/field/moments.h"
 
 namespace bilayer {
@@ -32,15 +34,14 @@ namespace {
 
 using openvdb::Coord;
 using openvdb::FloatTree;
-using Accessor = openvdb::FloatGrid::ConstAccessor;
 
-constexpr int side = 8, stride = side + 1;  // of a block: an OpenVDB leaf, and with the upper neighbours
-constexpr std::size_t grain = 64;           // blocks per partial sum: fixed, for reproducible sums
-constexpr double justBeside = 1e-6;  // distance of a corrected voxel that would otherwise change its sign [voxels]
-constexpr double minVolume = 1e-6;   // smaller volumes are rounding errors [voxels]
+constexpr int side = FieldFrame::side, stride = FieldFrame::stride;
+constexpr std::size_t grain = 64;       // blocks per partial sum: fixed, for reproducible sums
+constexpr double nextToSurface = 1e-6;  // distance of a corrected voxel that would otherwise change its sign [voxels]
+constexpr double minVolume = 1e-6;      // smaller volumes are rounding errors [voxels]
 const std::array<double, 2> gauss{0.5 - std::sqrt(1.0 / 12), 0.5 + std::sqrt(1.0 / 12)};  // points of equal weight
 
-using Cell = std::array<double, 8>;  // distances at the corners, z fastest [voxels]
+using CellDistances = std::array<double, 8>;  // distances at the corners, z fastest [voxels]
 
 glm::dvec3 vector(const Coord& at) {
     return {at.x(), at.y(), at.z()};
@@ -51,7 +52,7 @@ Coord corner(const Coord& at, int i) {
 }
 
 // The axis along which the distance changes most: lines along it cross the surface steeply.
-int steepest(const Cell& cell) {
+int steepest(const CellDistances& cell) {
     glm::dvec3 change(0);
     for (int i = 0; i < 8; ++i)
         for (int axis = 0; axis < 3; ++axis) change[axis] += i & (4 >> axis) ? cell[i] : -cell[i];
@@ -61,7 +62,7 @@ int steepest(const Cell& cell) {
 }
 
 // Adds the negative part of a cell's trilinear interpolant, which is linear along each of the four Gauss lines.
-void addInside(Moments& sum, const Cell& cell, const glm::dvec3& at) {
+void addInside(Moments& sum, const CellDistances& cell, const glm::dvec3& at) {
     const int axis = steepest(cell), u = (axis + 1) % 3, v = (axis + 2) % 3;
     for (const double s : gauss)
         for (const double t : gauss) {
@@ -83,7 +84,7 @@ void addInside(Moments& sum, const Cell& cell, const glm::dvec3& at) {
 }
 
 // Subtracts the octants of negative voxels' cubes that lie in a cell.
-void takeCubes(Moments& sum, const Cell& cell, const glm::dvec3& at) {
+void takeCubes(Moments& sum, const CellDistances& cell, const glm::dvec3& at) {
     for (int i = 0; i < 8; ++i)
         if (cell[i] < 0) sum.add(-0.125, at + 0.25 + 0.5 * vector(corner(Coord(0), i)), glm::dvec3(0.5));
 }
@@ -96,9 +97,9 @@ class Integrator {
 
     // Adds all cells whose lowest voxel is in the block, and the cubes of its voxels if it is a leaf.
     void addBlock(Moments& sum, const Coord& origin) const {
-        const Accessor accessor(tree_);
-        Block block;
-        copy(block.values, accessor, origin);
+        const openvdb::FloatGrid::ConstAccessor accessor(tree_);
+        BlockValues block;
+        copyBlock(accessor, origin, block.values.data());
         const auto inside = std::count_if(block.values.begin(), block.values.end(), [](float v) { return v < 0; });
         const auto* leaf = accessor.probeConstLeaf(origin);
         if (leaf && inside == block.size)
@@ -110,9 +111,10 @@ class Integrator {
             for (int y = 0; y < side; ++y)
                 for (int z = 0; z < side; ++z) {
                     const Coord at(x, y, z);
-                    if (leaf && block.values[Block::index(at)] < 0) sum.add(1, fromMiddle(origin + at), glm::dvec3(1));
+                    if (leaf && block.values[BlockValues::index(at)] < 0)
+                        sum.add(1, fromMiddle(origin + at), glm::dvec3(1));
                     int count = 0;
-                    for (int i = 0; i < 8; ++i) count += block.values[Block::index(corner(at, i))] < 0;
+                    for (int i = 0; i < 8; ++i) count += block.values[BlockValues::index(corner(at, i))] < 0;
                     if (count != 0 && count != 8) addCell(sum, block, accessor, origin, at);
                 }
     }
@@ -130,56 +132,39 @@ class Integrator {
     }
 
   private:
-    struct Block {
-        static constexpr int size = stride * stride * stride;
+    struct BlockValues {
+        static constexpr int size = FieldFrame::blockFloats;
         std::array<float, size> values;
         std::array<double, size> corrected;  // NaN until computed
 
         static int index(const Coord& at) { return (at.x() * stride + at.y()) * stride + at.z(); }
     };
 
-    // Copies a block's voxels, and the first layer of its seven upper neighbours.
-    static void copy(std::array<float, Block::size>& values, const Accessor& accessor, const Coord& origin) {
-        for (int i = 0; i < 8; ++i) {
-            const Coord first = Coord(side * (i >> 2), side * (i >> 1 & 1), side * (i & 1));
-            const auto* leaf = accessor.probeConstLeaf(origin + first);
-            const float tile = leaf ? 0.f : accessor.getValue(origin + first);
-            for (int x = first.x(); x < (first.x() ? stride : side); ++x)
-                for (int y = first.y(); y < (first.y() ? stride : side); ++y) {
-                    float* row = &values[Block::index({x, y, first.z()})];
-                    const int count = first.z() ? 1 : side;
-                    if (leaf)
-                        std::copy_n(leaf->buffer().data() + ((x % side) * side + y % side) * side, count, row);
-                    else
-                        std::fill_n(row, count, tile);
-                }
-        }
-    }
-
     glm::dvec3 fromMiddle(const Coord& at) const { return vector(at - middle_); }
 
     // A distance minus the mean interpolation error around it, on the same side of the surface [voxels].
-    double corrected(const Accessor& accessor, const Coord& at) const {
+    double corrected(const openvdb::FloatGrid::ConstAccessor& accessor, const Coord& at) const {
         float value;
         bool known = accessor.probeValue(at, value);
         const double distance = perMetre_ * double(value);
         double differences = -6 * distance;
         for (int i = 0; i < 6 && known; ++i) {
-            Coord beside = at;
-            beside[i / 2] += i % 2 ? 1 : -1;
-            known = accessor.probeValue(beside, value);
+            Coord next = at;
+            next[i / 2] += i % 2 ? 1 : -1;
+            known = accessor.probeValue(next, value);
             differences += perMetre_ * double(value);
         }
         if (!known) return distance;
         const double result = distance - differences / 12;
         if ((result < 0) == (distance < 0)) return result;
-        return distance < 0 ? -justBeside : justBeside;
+        return distance < 0 ? -nextToSurface : nextToSurface;
     }
 
-    void addCell(Moments& sum, Block& block, const Accessor& accessor, const Coord& origin, const Coord& at) const {
-        Cell cell;
+    void addCell(Moments& sum, BlockValues& block, const openvdb::FloatGrid::ConstAccessor& accessor,
+                 const Coord& origin, const Coord& at) const {
+        CellDistances cell;
         for (int i = 0; i < 8; ++i) {
-            double& value = block.corrected[Block::index(corner(at, i))];
+            double& value = block.corrected[BlockValues::index(corner(at, i))];
             if (std::isnan(value)) value = corrected(accessor, origin + corner(at, i));
             cell[i] = value;
         }

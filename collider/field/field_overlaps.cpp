@@ -9,8 +9,9 @@
 
 #include <bilayer/collider/field.h>
 #include "collider/field/batch.h"
+#include "collider/field/box_overlaps.h"
 #include "collider/field/field_data.h"
-#include "collider/field/mesh_rays.h"
+#include "collider/field/interpolant.h"
 #include "collider/field/zero_set.h"
 
 namespace bilayer {
@@ -20,7 +21,7 @@ using namespace detail;
 namespace {
 
 // The box in double precision, with a normalised rotation.
-RotatedBox turned(const OrientedBox& box) {
+RotatedBox rotatedBox(const OrientedBox& box) {
     return {glm::dvec3(box.centre), glm::mat3_cast(glm::normalize(glm::dquat(box.rotation))), glm::dvec3(box.halfSize)};
 }
 
@@ -35,7 +36,7 @@ bool isBox(const OrientedBox& box) {
 std::optional<bool> overlapsRoughly(const FieldData& field, const glm::vec3& centre, float radius) {
     const Sample here = field.sample(field.toLocal(centre));
     const float away = std::abs(here.distance);
-    const float room = field.error + (here.inBand ? FieldData::cellDiagonal * field.voxelSize : 0.f);
+    const float room = field.error + (here.inBand ? cellDiagonal * field.voxelSize : 0.f);
     if (away > radius + room) return here.distance < 0;
     if (here.inBand && away + room < radius) return true;
     return std::nullopt;
@@ -43,7 +44,7 @@ std::optional<bool> overlapsRoughly(const FieldData& field, const glm::vec3& cen
 
 // Whether the surface meets a box.
 bool meetsSurface(const FieldData& field, const OrientedBox& box) {
-    RotatedBox exact = turned(box);
+    RotatedBox exact = rotatedBox(box);
     if (field.mesh) return meetsTriangle(*field.mesh, exact);
     exact.centre = field.toLocal(box.centre);
     exact.halfSize *= field.perMetre;

@@ -9,6 +9,7 @@
 #include "collider/field/field_data.h"
 #include "collider/field/mesh_rays.h"
 #include "collider/field/sphere_tracing.h"
+#include "collider/field/triangle_tests.h"
 #include "collider/field/zero_set.h"
 
 namespace bilayer {
@@ -82,7 +83,7 @@ std::optional<RayHit> touchZero(const FieldData& field, const Path& path, double
     if (!part) return std::nullopt;
     auto touch = firstZeroTouch(field, part->path, reach);
     if (!touch) return std::nullopt;
-    const glm::dvec3 centre = part->path.at(touch->along), from = field.whereZerosTell(centre);
+    const glm::dvec3 centre = part->path.at(touch->along), from = field.approachedPoint(centre);
     // from so far away several zeros may be equally near: take the nearest one
     if (from != centre) touch->position = nearestZero(field, from, std::numeric_limits<double>::infinity()).value();
     return RayHit{.distance = toFloat((part->from + touch->along) * field.voxel),
@@ -105,9 +106,9 @@ std::optional<RayHit> Field::raycast(const Ray& ray) const noexcept {
 
 std::optional<RayHit> Field::segment(const glm::vec3& from, const glm::vec3& to) const noexcept {
     if (!isFinite(from) || !isFinite(to)) return std::nullopt;
-    const glm::dvec3 way = glm::dvec3(to) - glm::dvec3(from);
-    const double length = glm::length(way);
-    if (length > 0) return cast(*data_, from, {glm::dvec3(from), way / length, length * endRounding});
+    const glm::dvec3 delta = glm::dvec3(to) - glm::dvec3(from);
+    const double length = glm::length(delta);
+    if (length > 0) return cast(*data_, from, {glm::dvec3(from), delta / length, length * endRounding});
     if (!data_->inside(from)) return std::nullopt;
     return hitAtStart(*data_, from, {0, 0, -1});
 }

@@ -3,6 +3,9 @@
 
 namespace bilayer::detail {
 
+/// The diagonal of a cell, and the Lipschitz constant of the trilinear interpolant [voxels].
+inline constexpr float cellDiagonal = 1.7320508f;
+
 /// Max error of the interpolated distance to either side [voxels]. The mean distance to the eight voxels around a point
 /// is at most half a cell's diagonal.
 inline constexpr float maxInterpolationError = 0.87f;

@@ -1,13 +1,12 @@
-// Ray casts, sphere casts and box overlaps against the triangles of a mesh. SIMD tests in single precision reject
-// triangles conservatively; double precision and the mesh's own vertices decide (triangle_tests.h). Lengths in metres.
-// All functions may run on any number of threads at once, and allocate nothing.
+// Ray casts against the triangles of a mesh. SIMD tests in single precision reject triangles conservatively; double
+// precision and the mesh's own vertices decide (triangle_tests.h). Lengths in metres. May run on any number of threads
+// at once, and allocates nothing.
 #pragma once
 
 #include <optional>
 
 #include "collider/field/mesh_tree.h"
 #include "collider/field/path.h"
-#include "collider/field/triangle_tests.h"
 
 namespace bilayer::detail {
 
@@ -21,12 +20,5 @@ struct MeshHit {
 /// The first triangle hit by a path, from either side. The test is watertight: triangles are hit by paths that pass
 /// them within 1e-5 voxels. Triangles seen edge-on are left to their neighbours.
 std::optional<MeshHit> firstHit(const MeshTree& mesh, const Path& path) noexcept;
-
-/// The first place of a path whose distance to a triangle is at most the radius, to 1e-7 voxels. Intended for paths of
-/// a few voxels: it tests all triangles near the path, so its cost grows with the length.
-std::optional<MeshHit> firstTouch(const MeshTree& mesh, const Path& path, double radius) noexcept;
-
-/// Whether a box overlaps a triangle.
-bool meetsTriangle(const MeshTree& mesh, const RotatedBox& box) noexcept;
 
 }  // namespace bilayer::detail

@@ -1,4 +1,5 @@
-// A mesh with a bounding volume hierarchy over its triangles, for exact queries.
+// A mesh with a bounding volume hierarchy over its triangles, for exact queries. The closest-triangle search is in
+// mesh_nearest.cpp.
 #pragma once
 
 #include <array>
@@ -23,7 +24,7 @@ struct NearestFeature {
     std::uint32_t triangle = noTriangle;
     Feature feature = Feature::face;
     std::uint8_t index = 0;  ///< of the edge or vertex
-    glm::dvec3 way{0};       ///< from the point to the closest point of the feature [m]
+    glm::dvec3 offset{0};    ///< from the point to the closest point of the feature [m]
     /// The angle-weighted mean of the unit normals around the feature (FeatureNormals). If it is short, it defines no
     /// side.
     glm::dvec3 normal{0};

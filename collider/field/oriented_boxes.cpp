@@ -10,13 +10,14 @@
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
 #include <limits>
-#include <utility>
+
+#include "collider/field/jacobi_rotation.h"
 
 namespace bilayer::detail {
 namespace {
 
 /// Count of group levels with oriented boxes; the surface in larger groups is hardly flat.
-constexpr int turnedLevels = 3;
+constexpr int orientedLevels = 3;
 /// Margin of boxes for the rounding of vertices to floats [voxels].
 constexpr float roundingRoom = 1e-5f;
 /// Count of passes that diagonalise a 3 x 3 matrix: each pass nearly squares the off-diagonal remainder.
@@ -49,118 +50,101 @@ void forTriangles(const WideLeaf& leaf, const glm::vec3& origin, Visit visit) {
     }
 }
 
-// The eigenvectors of a symmetric matrix, as columns, by C. G. J. Jacobi's method.
+// The eigenvectors of a symmetric matrix, as columns.
 glm::mat3 eigenvectors(glm::mat3 m) {
     glm::mat3 v(1);
     for (int pass = 0; pass < jacobiPasses; ++pass)
         for (int p = 0; p < 3; ++p) {
             const int q = (p + 1) % 3;
             if (m[p][q] == 0) continue;
-            // the tangent of the smaller of the two angles that clear the pair
-            const float twice = (m[q][q] - m[p][p]) / (2 * m[p][q]);
-            const float tangent = std::copysign(1 / (std::abs(twice) + std::sqrt(twice * twice + 1)), twice);
-            glm::mat3 turn(1);
-            turn[p][p] = turn[q][q] = 1 / std::sqrt(tangent * tangent + 1);
-            turn[q][p] = tangent * turn[p][p], turn[p][q] = -turn[q][p];
-            m = glm::transpose(turn) * m * turn;
-            v = v * turn;
+            const glm::mat3 rotation = jacobiRotation(m, p, q);
+            m = glm::transpose(rotation) * m * rotation;
+            v = v * rotation;
         }
     return v;
 }
 
-class Maker {
-  public:
-    explicit Maker(const WideTree& tree) : tree_(tree), groups_(tree.groupCount) {}
+using Boxes = std::array<Box, treeWidth>;
 
-    LargeArray<OrientedGroup> make() {
-        std::uint32_t begin = 0, children = tree_.leafCount, leavesInChild = 1;
-        for (int level = 0; begin < tree_.groupCount; ++level) {
-            const std::uint32_t count = (children + treeWidth - 1) / treeWidth;
-            tbb::parallel_for(tbb::blocked_range<std::uint32_t>(0, count, grain), [&](const auto& range) {
-                for (std::uint32_t i = range.begin(); i < range.end(); ++i)
-                    makeGroup(begin + i, i * treeWidth, leavesInChild, level < turnedLevels);
-            });
-            begin += count;
-            children = count;
-            leavesInChild *= treeWidth;
-        }
-        return std::move(groups_);
-    }
-
-  private:
-    using Boxes = std::array<Box, treeWidth>;
-
-    // The leaves of the children, which are consecutive.
-    struct Leaves {
-        std::uint32_t first, each, end;
-    };
-
-    void makeGroup(std::uint32_t index, std::uint32_t firstChild, std::uint32_t leavesInChild, bool turned) {
-        const BoxGroup& straight = tree_.groups[index];
-        OrientedGroup& group = groups_[index];
-        group.firstChild = straight.firstChild;
-        glm::vec3 origin(0);
-        glm::mat3 frame(1);
-        Boxes boxes;
-        for (int i = 0; i < treeWidth; ++i)
-            boxes[std::size_t(i)] = {vectorOf(straight.lower, i), vectorOf(straight.upper, i)};
-        if (turned) {
-            origin = glm::floor(boxes[0].lower);
-            const Leaves leaves{firstChild * leavesInChild, leavesInChild,
-                                std::min(tree_.leafCount, (firstChild + treeWidth) * leavesInChild)};
-            frame = frameOf(leaves, origin);
-            boxes = boxesOf(leaves, origin, frame);
-            const Boxes others = boxesOf(leaves, origin, glm::mat3(1));
-            if (halfArea(others) <= halfArea(boxes)) boxes = others, frame = glm::mat3(1);
-        }
-        for (int k = 0; k < 3; ++k) {
-            group.origin[k] = origin[k];
-            for (int j = 0; j < 3; ++j) group.axes[k][j] = frame[k][j];
-            for (int i = 0; i < treeWidth; ++i) {
-                const Box& box = boxes[std::size_t(i)];
-                group.lower[k][i] = box.lower[k] - roundingRoom;
-                group.upper[k][i] = box.upper[k] + roundingRoom;
-            }
-        }
-    }
-
-    static float halfArea(const Boxes& boxes) {
-        float sum = 0;
-        for (const Box& box : boxes)
-            if (box.lower.x <= box.upper.x) sum += box.halfArea();
-        return sum;
-    }
-
-    // The principal axes of the normals.
-    glm::mat3 frameOf(const Leaves& leaves, const glm::vec3& origin) const {
-        glm::mat3 spread(0);
-        for (std::uint32_t leaf = leaves.first; leaf < leaves.end; ++leaf)
-            forTriangles(tree_.leaves[leaf], origin, [&](const auto& a, const auto& b, const auto& c, const auto& n) {
-                const float area = glm::length(glm::cross(b - a, c - a));
-                for (int k = 0; k < 3; ++k) spread[k] += area * n[k] * n;
-            });
-        return eigenvectors(spread);
-    }
-
-    Boxes boxesOf(const Leaves& leaves, const glm::vec3& origin, const glm::mat3& frame) const {
-        Boxes boxes;
-        for (std::uint32_t leaf = leaves.first; leaf < leaves.end; ++leaf) {
-            Box& box = boxes[(leaf - leaves.first) / leaves.each];
-            forTriangles(tree_.leaves[leaf], origin, [&](const auto& a, const auto& b, const auto& c, const auto&) {
-                for (const glm::vec3* p : {&a, &b, &c}) box.add(*p * frame);
-            });
-        }
-        return boxes;
-    }
-
-    const WideTree& tree_;
-    LargeArray<OrientedGroup> groups_;
+// The leaves of a group's children, which are consecutive.
+struct LeafRange {
+    std::uint32_t first, each, end;
 };
+
+float halfArea(const Boxes& boxes) {
+    float sum = 0;
+    for (const Box& box : boxes)
+        if (box.lower.x <= box.upper.x) sum += box.halfArea();
+    return sum;
+}
+
+// The principal axes of the normals.
+glm::mat3 frameOf(const WideTree& tree, const LeafRange& leaves, const glm::vec3& origin) {
+    glm::mat3 spread(0);
+    for (std::uint32_t leaf = leaves.first; leaf < leaves.end; ++leaf)
+        forTriangles(tree.leaves[leaf], origin, [&](const auto& a, const auto& b, const auto& c, const auto& n) {
+            const float area = glm::length(glm::cross(b - a, c - a));
+            for (int k = 0; k < 3; ++k) spread[k] += area * n[k] * n;
+        });
+    return eigenvectors(spread);
+}
+
+Boxes boxesOf(const WideTree& tree, const LeafRange& leaves, const glm::vec3& origin, const glm::mat3& frame) {
+    Boxes boxes;
+    for (std::uint32_t leaf = leaves.first; leaf < leaves.end; ++leaf) {
+        Box& box = boxes[(leaf - leaves.first) / leaves.each];
+        forTriangles(tree.leaves[leaf], origin, [&](const auto& a, const auto& b, const auto& c, const auto&) {
+            for (const glm::vec3* p : {&a, &b, &c}) box.add(*p * frame);
+        });
+    }
+    return boxes;
+}
+
+// Fills a group with the boxes of its children, oriented or along the axes.
+void fill(const WideTree& tree, const BoxGroup& aligned, const LeafRange& leaves, bool oriented, OrientedGroup& group) {
+    group.firstChild = aligned.firstChild;
+    glm::vec3 origin(0);
+    glm::mat3 frame(1);
+    Boxes boxes;
+    for (int i = 0; i < treeWidth; ++i)
+        boxes[std::size_t(i)] = {vectorOf(aligned.lower, i), vectorOf(aligned.upper, i)};
+    if (oriented) {
+        origin = glm::floor(boxes[0].lower);
+        frame = frameOf(tree, leaves, origin);
+        boxes = boxesOf(tree, leaves, origin, frame);
+        const Boxes others = boxesOf(tree, leaves, origin, glm::mat3(1));
+        if (halfArea(others) <= halfArea(boxes)) boxes = others, frame = glm::mat3(1);
+    }
+    for (int k = 0; k < 3; ++k) {
+        group.origin[k] = origin[k];
+        for (int j = 0; j < 3; ++j) group.axes[k][j] = frame[k][j];
+        for (int i = 0; i < treeWidth; ++i) {
+            const Box& box = boxes[std::size_t(i)];
+            group.lower[k][i] = box.lower[k] - roundingRoom;
+            group.upper[k][i] = box.upper[k] + roundingRoom;
+        }
+    }
+}
 
 }  // namespace
 
-LargeArray<OrientedGroup> makeTurnedGroups(const WideTree& tree) {
-    return Maker(tree).make();
+LargeArray<OrientedGroup> makeOrientedGroups(const WideTree& tree) {
+    LargeArray<OrientedGroup> groups(tree.groupCount);
+    std::uint32_t begin = 0, children = tree.leafCount, leavesInChild = 1;
+    for (int level = 0; begin < tree.groupCount; ++level) {
+        const std::uint32_t count = (children + treeWidth - 1) / treeWidth;
+        tbb::parallel_for(tbb::blocked_range<std::uint32_t>(0, count, grain), [&](const auto& range) {
+            for (std::uint32_t i = range.begin(); i < range.end(); ++i) {
+                const LeafRange leaves{i * treeWidth * leavesInChild, leavesInChild,
+                                       std::min(tree.leafCount, (i + 1) * treeWidth * leavesInChild)};
+                fill(tree, tree.groups[begin + i], leaves, level < orientedLevels, groups[begin + i]);
+            }
+        });
+        begin += count;
+        children = count;
+        leavesInChild *= treeWidth;
+    }
+    return groups;
 }
 
 }  // namespace bilayer::detail

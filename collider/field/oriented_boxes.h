@@ -24,6 +24,6 @@ struct OrientedGroup {
 static_assert(sizeof(OrientedGroup) == 256, "four cache lines");
 
 /// The groups in the order of the tree's groups; `groupCount` of them.
-LargeArray<OrientedGroup> makeTurnedGroups(const WideTree& tree);
+LargeArray<OrientedGroup> makeOrientedGroups(const WideTree& tree);
 
 }  // namespace bilayer::detail

@@ -19,6 +19,10 @@ struct Path {
     glm::dvec3 at(double along) const { return origin + along * direction; }
 };
 
+/// Max count of tangent steps along a path towards a convex shape. If a path only grazes the shape, each step takes
+/// half of the remaining distance.
+inline constexpr int maxTangents = 64;
+
 /// The interval of a path inside a box.
 inline std::optional<std::pair<double, double>> clip(const Path& path, const glm::dvec3& lower,
                                                      const glm::dvec3& upper) {
@@ -39,9 +43,9 @@ inline std::optional<std::pair<double, double>> clip(const Path& path, const glm
 /// the same direction at `near` sizes.
 inline glm::dvec3 approached(const glm::dvec3& point, const glm::dvec3& lower, const glm::dvec3& upper, double far,
                              double near) {
-    const glm::dvec3 centre = 0.5 * (lower + upper), way = point - centre, diagonal = upper - lower;
-    const double size2 = glm::dot(diagonal, diagonal), away2 = glm::dot(way, way);
-    return away2 > far * far * size2 ? centre + near * std::sqrt(size2 / away2) * way : point;
+    const glm::dvec3 centre = 0.5 * (lower + upper), offset = point - centre, diagonal = upper - lower;
+    const double size2 = glm::dot(diagonal, diagonal), away2 = glm::dot(offset, offset);
+    return away2 > far * far * size2 ? centre + near * std::sqrt(size2 / away2) * offset : point;
 }
 
 /// A section of a path, as a path of its own.

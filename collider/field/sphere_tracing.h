@@ -12,6 +12,10 @@
 
 namespace bilayer::detail {
 
+/// The first place of a path whose distance to a triangle is at most the radius, to 1e-7 voxels. Intended for paths of
+/// a few voxels: it tests all triangles near the path, so its cost grows with the length.
+std::optional<MeshHit> firstTouch(const MeshTree& mesh, const Path& path, double radius) noexcept;
+
 /// The first contact of a swept sphere with a mesh.
 struct SphereTouch {
     double along;         ///< distance along the centre's path [m]
@@ -38,16 +42,16 @@ std::optional<SphereTouch> firstTouchOnPath(const MeshTree& mesh, const Path& pa
     if (!part) return std::nullopt;
     const double voxel = mesh.voxelSize(), length = part->path.length;
     const double piece = std::max(pieceLength * voxel, length / maxPieces), reach = lookAhead * piece;
-    const auto freeWay = [&](const glm::dvec3& centre) {
+    const auto freeDistance = [&](const glm::dvec3& centre) {
         const double known = clearanceAt(centre) - radius - nearestSlack * voxel;
         if (known >= reach) return known;
         const std::uint32_t triangle = mesh.nearest(centre, float((radius + reach) / voxel));
         if (triangle == noTriangle) return reach;
-        const double distance = glm::length(mesh.featureOf(triangle, centre).way);
+        const double distance = glm::length(mesh.featureOf(triangle, centre).offset);
         return distance * (1 - nearestRounding) - radius - nearestSlack * voxel;
     };
     for (double along = 0; along <= length;) {
-        const double free = freeWay(part->path.at(along));
+        const double free = freeDistance(part->path.at(along));
         if (free > piece) {
             along += free;
             continue;
@@ -58,7 +62,7 @@ std::optional<SphereTouch> firstTouchOnPath(const MeshTree& mesh, const Path& pa
             // from so far away several triangles may be equally near: take the nearest one
             if (from != centre) {
                 hit->triangle = mesh.nearest(from, std::numeric_limits<float>::infinity());
-                hit->position = from + mesh.featureOf(hit->triangle, from).way;
+                hit->position = from + mesh.featureOf(hit->triangle, from).offset;
             }
             return SphereTouch{part->from + along + hit->along, hit->position, glm::normalize(centre - hit->position),
                                hit->triangle};

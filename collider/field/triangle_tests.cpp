@@ -13,8 +13,6 @@ namespace {
 
 /// Max distance that counts as contact of a sphere [voxels].
 constexpr double touchTolerance = 1e-7;
-/// Max count of tangent steps; a sphere that has made no contact by then passes the triangle within the tolerance.
-constexpr int maxTangents = 64;
 
 }  // namespace
 
@@ -34,8 +32,8 @@ glm::dvec3 TriangleRay::sheared(const glm::dvec3& corner) const {
 }
 
 bool TriangleRay::meets(const Corners& corners, double& along, glm::dvec3& position) const {
-    const Corners seen{sheared(corners[0]), sheared(corners[1]), sheared(corners[2])};
-    const auto& [a, b, c] = seen;
+    const Corners projected{sheared(corners[0]), sheared(corners[1]), sheared(corners[2])};
+    const auto& [a, b, c] = projected;
     // twice the areas between the axis and the edges; both triangles of a shared edge get the same number for it
     glm::dvec3 weights{c.x * b.y - c.y * b.x, a.x * c.y - a.y * c.x, b.x * a.y - b.y * a.x};
     const double facing = weights.x + weights.y + weights.z;
@@ -43,7 +41,7 @@ bool TriangleRay::meets(const Corners& corners, double& along, glm::dvec3& posit
     if (facing < 0) weights = -weights;
     if (glm::all(glm::greaterThanEqual(weights, glm::dvec3(0))))
         weights /= std::abs(facing);
-    else if (!besideEdge(seen, weights))
+    else if (!passesEdge(projected, weights))
         return false;
     const double here = weights.x * a.z + weights.y * b.z + weights.z * c.z;
     if (!(here < along)) return false;
@@ -56,14 +54,14 @@ bool TriangleRay::meets(const Corners& corners, double& along, glm::dvec3& posit
 
 // Whether the axis, outside the triangle, passes an edge within the tolerance. The weights become those of the closest
 // point on the edge.
-bool TriangleRay::besideEdge(const Corners& seen, glm::dvec3& weights) const {
+bool TriangleRay::passesEdge(const Corners& projected, glm::dvec3& weights) const {
     double nearest = tolerance_ * tolerance_;
     bool found = false;
     const glm::dvec3 areas = weights;
     for (int k = 0; k < 3; ++k) {
         if (areas[k] >= 0) continue;
         const int from = (k + 1) % 3, to = (k + 2) % 3;
-        const glm::dvec2 start(seen[from]), edge = glm::dvec2(seen[to]) - start;
+        const glm::dvec2 start(projected[from]), edge = glm::dvec2(projected[to]) - start;
         const double length2 = glm::dot(edge, edge);
         if (areas[k] * areas[k] > nearest * length2) continue;
         const double part = length2 > 0 ? std::clamp(-glm::dot(start, edge) / length2, 0.0, 1.0) : 0;
@@ -76,21 +74,22 @@ bool TriangleRay::besideEdge(const Corners& seen, glm::dvec3& weights) const {
     return found;
 }
 
-// The distance to a triangle is convex along the path, so tangents never lead past the first contact.
+// The distance to a triangle is convex along the path, so tangents never lead past the first contact. A sphere that has
+// made none after the last step passes the triangle within the tolerance.
 bool touches(const MeshTree& mesh, std::uint32_t triangle, const Path& path, double radius, double& along,
              glm::dvec3& position) {
     const double tolerance = touchTolerance * double(mesh.voxelSize());
     double here = 0;
     for (int i = 0; i < maxTangents; ++i) {
         const glm::dvec3 centre = path.at(here), from = mesh.approached(centre);
-        const glm::dvec3 fromThere = mesh.featureOf(triangle, from).way, way = fromThere + (from - centre);
-        const double distance = glm::length(way), left = distance - radius;
+        const glm::dvec3 offset = mesh.featureOf(triangle, from).offset, delta = offset + (from - centre);
+        const double distance = glm::length(delta), left = distance - radius;
         if (left <= tolerance) {
             along = here;
-            position = from + fromThere;
+            position = from + offset;
             return true;
         }
-        const double approach = glm::dot(way, path.direction) / distance;
+        const double approach = glm::dot(delta, path.direction) / distance;
         if (!(approach > 0)) return false;
         here += left / approach;
         if (!(here < along)) return false;

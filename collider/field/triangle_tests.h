@@ -32,7 +32,7 @@ class TriangleRay {
 
   private:
     glm::dvec3 sheared(const glm::dvec3& corner) const;
-    bool besideEdge(const Corners& seen, glm::dvec3& weights) const;
+    bool passesEdge(const Corners& projected, glm::dvec3& weights) const;
 
     glm::dvec3 start_;
     double tolerance_;

@@ -18,6 +18,7 @@
 #include "collider/contact/collider_data.h"
 #include "collider/field/field_data.h"
 #include "collider/field/mesh_rays.h"
+#include "collider/field/triangle_tests.h"
 #include "integration/bullet/detail/casts.h"
 #include "integration/bullet/detail/convert.h"
 #include "integration/bullet/detail/missing_dispatcher.h"

@@ -11,12 +11,12 @@
 #include <oneapi/tbb/parallel_for.h>
 
 #include <algorithm>
-#include <array>
 #include <bit>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <limits>
 
+#include "sdf/bvh/node_stack.h"
 #include "sdf/bvh/tree_lanes.h"
 
 #ifndef BILAYER_SDF_WALLS_ONCE
@@ -72,24 +72,6 @@ constexpr float rounding = 2e-6f;
 /// Direction components below this are replaced by it, so that division is possible.
 constexpr float minDirection = 1e-20f;
 
-// A stack of nodes to visit, nearest on top.
-struct NodeStack {
-    static constexpr std::size_t most = 256;  // seven for each of ten levels, and one
-    std::array<float, most> entries;
-    std::array<std::uint32_t, most> nodes;
-    std::size_t count = 0;
-
-    // Inserts a node by distance among those from `first` on.
-    void insert(std::size_t first, float entry, std::uint32_t node) {
-        std::size_t place = count++;
-        for (; place > first && entries[place - 1] < entry; --place) {
-            entries[place] = entries[place - 1];
-            nodes[place] = nodes[place - 1];
-        }
-        entries[place] = entry;
-        nodes[place] = node;
-    }
-};
 
 // A ray's search for its nearest exit.
 class ExitSearch {
@@ -107,24 +89,19 @@ class ExitSearch {
     }
 
     float run() {
-        NodeStack waiting;
-        waiting.insert(0, 0, tree_.boxes().root());
-        while (waiting.count > 0) {
-            --waiting.count;
-            if (waiting.entries[waiting.count] > nearest_) continue;
-            const std::uint32_t node = waiting.nodes[waiting.count];
-            if (tree_.boxes().isLeaf(node))
-                visit(tree_.leaf(node));
-            else
-                open(tree_.boxes().group(node), waiting);
-        }
+        const BoxTree& boxes = tree_.boxes();
+        descend(
+            boxes, boxes.root(), [&](float entry) { return entry > nearest_; },
+            [&](std::uint32_t group, NodeStack& stack) { open(boxes.groups[group], stack); },
+            [&](std::uint32_t leaf) { return visit(tree_.leaf(leaf)), false; });
         return nearest_;
     }
 
   private:
-    void open(const BoxGroup& group, NodeStack& waiting) const {
+    void open(const BoxGroup& group, NodeStack& stack) const {
         const Tag tag;
-        const std::size_t first = waiting.count;
+        alignas(64) float entries[treeWidth];
+        unsigned met = 0;
         for (std::size_t lane = 0; lane < treeWidth; lane += hn::Lanes(tag)) {
             Vec enter = hn::Zero(tag), leave = hn::Set(tag, nearest_);
             for (int k = 0; k < 3; ++k) {
@@ -134,13 +111,10 @@ class ExitSearch {
                 enter = hn::Max(enter, hn::MulAdd(hn::Load(tag, near + lane), inverse, hn::Set(tag, enter_[k])));
                 leave = hn::Min(leave, hn::MulAdd(hn::Load(tag, far + lane), inverse, hn::Set(tag, leave_[k])));
             }
-            alignas(32) float entries[treeWidth];
-            hn::Store(enter, tag, entries);
-            for (unsigned bits = bitsOf(hn::Le(enter, leave)); bits != 0; bits &= bits - 1) {
-                const auto i = std::size_t(std::countr_zero(bits));
-                waiting.insert(first, entries[i], group.firstChild + std::uint32_t(lane + i));
-            }
+            hn::Store(enter, tag, entries + lane);
+            met |= bitsOf(hn::Le(enter, leave)) << lane;
         }
+        stack.pushChildren(met, entries, group.firstChild);
     }
 
     void visit(const TriangleLeaf& leaf) {

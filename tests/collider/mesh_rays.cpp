@@ -13,6 +13,8 @@
 
 #include <bilayer/sdf/build.h>
 #include <bilayer/sdf/mesh_io.h>
+#include "collider/field/box_overlaps.h"
+#include "collider/field/sphere_tracing.h"
 #include "collider/field/triangle_tests.h"
 #include "demos/shared/shapes.h"
 #include "tests/support/random.h"

@@ -75,7 +75,7 @@ std::optional<SweepHit> sweepSphere(const MeshTree& mesh, const glm::vec3& from,
 bool touches(const MeshTree& mesh, const glm::vec3& centre, float radius) {
     const glm::dvec3 point(centre);
     const std::uint32_t triangle = mesh.nearest(point, 2 * radius / mesh.voxelSize());
-    return triangle != noTriangle && glm::length(mesh.featureOf(triangle, point).way) < static_cast<double>(radius);
+    return triangle != noTriangle && glm::length(mesh.featureOf(triangle, point).offset) < static_cast<double>(radius);
 }
 
 }  // namespace bilayer::bullet::detail

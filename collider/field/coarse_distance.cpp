@@ -1,0 +1,144 @@
+// An exact distance transform of the coarse cells that the surface may meet.
+#include "collider/field/coarse_distance.h"
+
+#include <oneapi/tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <vector>
+
+#include "sdf/base/large_array.h"
+
+namespace bilayer::detail {
+namespace {
+
+constexpr int perBlock = Clearance::perBlock, blockParts = Clearance::blockParts;
+constexpr int maxParts = 16;  // distance limit of the bounds [coarse cells]
+
+// Squared distances from the centres of coarse cells to the nearest one that the surface meets. The unit is half a
+// coarse cell, so that distances to faces are integers.
+using SquaredSteps = std::int16_t;
+constexpr SquaredSteps farAway = 4 * maxParts * maxParts;
+
+// The increase of a squared distance to the near face of a coarse cell `d` places away.
+constexpr SquaredSteps squaredStepsTo(int d) {
+    return SquaredSteps((2 * d - 1) * (2 * d - 1));
+}
+
+// Lowers squared distances to those of others plus an increment. Returns false if no larger increment can lower any.
+bool lower(SquaredSteps* squares, const SquaredSteps* others, std::size_t count, SquaredSteps more) {
+    SquaredSteps most = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+        most = std::max(most, squares[i]);
+        squares[i] = std::min(squares[i], SquaredSteps(others[i] + more));
+    }
+    return most > more;
+}
+
+// Lowers each squared distance along the last axis to the minimum of the others plus their increments (as P.
+// Felzenszwalb, D. Huttenlocher, "Distance transforms of sampled functions", 2012, but to the faces of coarse cells).
+void transformRow(SquaredSteps* squares, int length, std::vector<SquaredSteps>& before) {
+    before.assign(squares, squares + length);
+    for (int d = 1; d <= std::min(maxParts, length - 1); ++d) {
+        const std::size_t count = length - d;
+        const bool up = lower(squares + d, before.data(), count, squaredStepsTo(d));
+        const bool down = lower(squares, before.data() + d, count, squaredStepsTo(d));
+        if (!up && !down) break;
+    }
+}
+
+// The same across rows of `count` values with a stride of `step`.
+void transformRows(SquaredSteps* squares, std::size_t count, std::size_t step, int length,
+                   std::vector<SquaredSteps>& before) {
+    before.resize(std::size_t(length) * count);
+    for (int i = 0; i < length; ++i) std::copy_n(squares + i * step, count, before.data() + i * count);
+    for (int i = 0; i < length; ++i) {
+        bool more = true;
+        for (int d = 1; more && d <= maxParts; ++d) {
+            more = false;
+            if (i >= d) more |= lower(squares + i * step, before.data() + (i - d) * count, count, squaredStepsTo(d));
+            if (i + d < length)
+                more |= lower(squares + i * step, before.data() + (i + d) * count, count, squaredStepsTo(d));
+        }
+    }
+}
+
+// Distance transform. Input: 0 for coarse cells that meet the surface, `farAway` for others. Processes one axis after
+// the other, since a squared distance is a sum over the axes.
+void transform(LargeArray<SquaredSteps>& squares, const glm::ivec3& size) {
+    const std::size_t row = std::size_t(size.z), plane = size.y * row;
+    tbb::parallel_for(0, size.x, [&](int x) {
+        std::vector<SquaredSteps> before;
+        for (int y = 0; y < size.y; ++y) transformRow(squares.data() + x * plane + y * row, size.z, before);
+        transformRows(squares.data() + x * plane, row, row, size.y, before);
+    });
+    tbb::parallel_for(0, size.y, [&](int y) {
+        std::vector<SquaredSteps> before;
+        transformRows(squares.data() + y * row, row, plane, size.x, before);
+    });
+}
+
+// Calls visit(entry, index) for the entries of the directory, with the index of their first coarse cell. nextParts()
+// returns the offsets of the others.
+template <class Visit>
+void forEachEntry(const FieldLayout& field, const Visit& visit) {
+    const glm::ivec3 size = field.parts();
+    tbb::parallel_for(0, field.blocks.x, [&](int x) {
+        for (int y = 0; y < field.blocks.y; ++y) {
+            const std::size_t entry = field.entryOf({x, y, 0});
+            const std::size_t part = (std::size_t(perBlock * x) * size.y + std::size_t(perBlock * y)) * size.z;
+            for (int z = 0; z < field.blocks.z; ++z) visit(entry + std::size_t(z), part + std::size_t(perBlock * z));
+        }
+    });
+}
+
+std::array<std::size_t, blockParts> nextParts(const FieldLayout& field) {
+    const glm::ivec3 size = field.parts();
+    std::array<std::size_t, blockParts> next;
+    for (int k = 0; k < blockParts; ++k)
+        next[k] = (std::size_t(k >> 2) * size.y + std::size_t(k >> 1 & 1)) * size.z + std::size_t(k & 1);
+    return next;
+}
+
+// The square roots of all squared distances, rounded down [steps].
+std::array<std::int8_t, farAway + 1> rootsOfSquares() {
+    std::array<std::int8_t, farAway + 1> roots;
+    for (int square = 0; square <= farAway; ++square)
+        roots[square] =
+            std::int8_t(std::min(Clearance::maxDistanceSteps, int(0.5f * Clearance::steps * std::sqrt(float(square)))));
+    return roots;
+}
+
+}  // namespace
+
+void measureClearances(FieldLayout& field, std::span<const std::array<bool, Clearance::blockParts>> meets) {
+    field.centres = LargeArray<std::int8_t>(field.entries() * blockParts);
+    if (!field.findsSurface()) {
+        std::fill_n(field.centres.data(), field.centres.size(), std::int8_t(0));
+        return;
+    }
+    const glm::ivec3 size = field.parts();
+    LargeArray<SquaredSteps> squares(std::size_t(size.x) * size.y * size.z);
+    const auto next = nextParts(field);
+    forEachEntry(field, [&](std::size_t entry, std::size_t part) {
+        const std::int32_t block = field.directory[entry];
+        for (int k = 0; k < blockParts; ++k) squares[part + next[k]] = block >= 0 && meets[block][k] ? 0 : farAway;
+    });
+    transform(squares, size);
+    const auto roots = rootsOfSquares();
+    forEachEntry(field, [&](std::size_t entry, std::size_t part) {
+        const std::int32_t block = field.directory[entry];
+        const bool emptyInside = block == FieldLayout::emptyInside;
+        std::int8_t* const centres = field.centres.data() + entry * blockParts;
+        for (int k = 0; k < blockParts; ++k) {
+            const std::int8_t root = roots[squares[part + next[k]]];
+            const bool inside = block < 0 ? emptyInside : field.minima[std::size_t(block) * blockParts + k] < 0;
+            centres[k] = std::int8_t(inside ? -root : root);
+        }
+    });
+}
+
+}  // namespace bilayer::detail

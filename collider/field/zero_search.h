@@ -1,0 +1,194 @@
+// Branch and bound over the zero set of a field's interpolant: over the cubes of the directory, most of which are
+// rejected by their clearances, then cells, then their octants. Lengths in voxels, places from the directory's first
+// voxel.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <glm/vec3.hpp>
+
+#include "collider/field/interpolant.h"
+#include "collider/field/zero_cells.h"
+#include "collider/field/zero_set.h"
+
+namespace bilayer::detail {
+
+/// Cubes of this side are not subdivided: their diagonal is within zeroTolerance.
+inline constexpr double smallestSide = 1.0 / 2048;
+static_assert(double(cellDiagonal) * smallestSide < zeroTolerance);
+
+/// A cube of 2^level voxels in the directory.
+struct DirectoryCube {
+    glm::ivec3 lower;
+    int level;
+};
+
+/// A cell or a sub-cell.
+struct ZeroCube {
+    glm::dvec3 lower;
+    double side;
+    CornerValues values;
+
+    bool holdsZero() const {
+        const auto [low, high] = std::minmax_element(values.begin(), values.end());
+        return *low < 0 && *high >= 0;
+    }
+    glm::dvec3 centre() const { return lower + 0.5 * side; }
+};
+
+/// A linear approximation of the interpolant in a cube, with its max error.
+struct LinearBound {
+    glm::dvec3 through;
+    double value;  // at `through`
+    glm::dvec3 gradient;
+    double error;
+
+    explicit LinearBound(const ZeroCube& cube) : through(cube.centre()) {
+        const CornerValues& v = cube.values;
+        // Haar transform: the coefficients of the interpolant about the centre
+        std::array<double, 8> sum = v;
+        for (const std::size_t axis : {1, 2, 4})
+            for (std::size_t i = 0; i < 8; ++i)
+                if (!(i & axis)) {
+                    const double low = sum[i], high = sum[i | axis];
+                    sum[i] = 0.5 * (low + high);
+                    sum[i | axis] = 0.5 * (high - low);
+                }
+        value = sum[0];
+        gradient = 2 / cube.side * glm::dvec3(sum[4], sum[2], sum[1]);
+        error = std::abs(sum[3]) + std::abs(sum[5]) + std::abs(sum[6]) + std::abs(sum[7]);
+    }
+
+    double at(const glm::dvec3& point) const { return value + glm::dot(gradient, point - through); }
+};
+
+/// Finds the point of the zero set with the smallest key. A Query has
+///   bound(lower, upper)  a lower bound of the keys in a box; infinite if no point counts
+///   bound(lower, upper, linear)  the same for the points where the linear function is zero within its error
+///   limit()              only smaller keys matter
+///   offer(point)         a point of the zero set
+///   settle(bound, point) the smallest cube around a point, with a lower bound of its keys
+template <class Query>
+class ZeroSearch {
+  public:
+    ZeroSearch(const FieldData& field, Query& query) : field_(field), query_(query), extent_(extentOf(field)) {}
+
+    void run() {
+        const auto longest = unsigned(std::max({extent_.x, extent_.y, extent_.z}));
+        visit(DirectoryCube{glm::ivec3(0), int(std::bit_width(longest - 1))});
+    }
+
+  private:
+    template <class Node>
+    struct Child {
+        double bound;
+        Node node;
+    };
+
+    // Visits children in ascending order of their bounds, as long as they are below the limit.
+    template <class Node>
+    void visitAll(const std::array<Child<Node>, 8>& children, std::size_t count) {
+        std::array<std::uint8_t, 8> order;
+        for (std::size_t i = 0; i < count; ++i) {
+            std::size_t place = i;
+            for (; place > 0 && children[order[place - 1]].bound > children[i].bound; --place)
+                order[place] = order[place - 1];
+            order[place] = std::uint8_t(i);
+        }
+        for (std::size_t i = 0; i < count; ++i)
+            if (children[order[i]].bound < query_.limit()) visit(children[order[i]].node);
+    }
+
+    void visit(const DirectoryCube& cube) {
+        constexpr int blockLevel = 3, partLevel = 2;
+        if (cube.level == blockLevel && entryAt(field_, cube.lower) < 0) return;
+        if (cube.level == 0) return visitCell(cube.lower);
+        std::array<Child<DirectoryCube>, 8> children;
+        std::size_t count = 0;
+        const int level = cube.level - 1, side = 1 << level;
+        for (int i = 0; i < 8; ++i) {
+            const glm::ivec3 lower = cube.lower + side * glm::ivec3(i >> 2, i >> 1 & 1, i & 1);
+            if (lower.x >= extent_.x || lower.y >= extent_.y || lower.z >= extent_.z) continue;
+            const glm::dvec3 low(lower), high(glm::min(lower + side, extent_));
+            if (level >= partLevel && isClear(low, high)) continue;
+            const double bound = query_.bound(low, high);
+            if (bound < query_.limit()) children[count++] = {bound, {lower, level}};
+        }
+        visitAll(children, count);
+    }
+
+    bool isClear(const glm::dvec3& lower, const glm::dvec3& upper) const {
+        return clearanceAt(field_, 0.5 * (lower + upper)) > 0.5 * glm::distance(lower, upper);
+    }
+
+    void visitCell(const glm::ivec3& voxel) {
+        const ZeroCube cell{glm::dvec3(voxel), 1, cellValues(field_, entryAt(field_, voxel), voxel & 7)};
+        if (cell.holdsZero()) visit(cell);
+    }
+
+    void visit(const ZeroCube& cube) {
+        const double bound = query_.bound(cube.lower, cube.lower + cube.side, LinearBound(cube));
+        if (!(bound < query_.limit())) return;
+        const glm::dvec3 point = offerEdges(cube);
+        if (cube.side <= smallestSide) return query_.settle(bound, point);
+        if (!(bound < query_.limit())) return;
+        visitOctants(cube);
+    }
+
+    // Offers the zeros on the edges, where the interpolant is linear: one on each edge whose ends have both signs.
+    // Returns one of them.
+    glm::dvec3 offerEdges(const ZeroCube& cube) {
+        glm::dvec3 point(0);
+        for (std::size_t i = 0; i < 8; ++i)
+            for (const std::size_t axis : {1, 2, 4}) {
+                const double low = cube.values[i], high = cube.values[i | axis];
+                if ((i & axis) || (low < 0) == (high < 0)) continue;
+                const glm::dvec3 from = cubeCorner(i), to = cubeCorner(i | axis);
+                point = cube.lower + cube.side * (from + low / (low - high) * (to - from));
+                query_.offer(point);
+            }
+        return point;
+    }
+
+    void visitOctants(const ZeroCube& cube) {
+        // the values at the corners of the octants
+        std::array<double, 27> grid;
+        for (std::size_t i = 0; i < 27; ++i) {
+            const std::size_t at[] = {i / 9, i / 3 % 3, i % 3};
+            double sum = 0;
+            for (std::size_t c = 0; c < 8; ++c) {
+                const std::size_t side[] = {c >> 2, c >> 1 & 1, c & 1};
+                double weight = 1;
+                for (int k = 0; k < 3; ++k) weight *= 0.5 * double(side[k] ? at[k] : 2 - at[k]);
+                sum += weight * cube.values[c];
+            }
+            grid[i] = sum;
+        }
+        std::array<Child<ZeroCube>, 8> children;
+        std::size_t count = 0;
+        for (std::size_t i = 0; i < 8; ++i) {
+            ZeroCube& octant = children[count].node;
+            octant.side = 0.5 * cube.side;
+            octant.lower = cube.lower + octant.side * cubeCorner(i);
+            const std::size_t first = 9 * (i >> 2) + 3 * (i >> 1 & 1) + (i & 1);
+            for (std::size_t c = 0; c < 8; ++c)
+                octant.values[c] = grid[first + 9 * (c >> 2) + 3 * (c >> 1 & 1) + (c & 1)];
+            if (!octant.holdsZero()) continue;
+            children[count].bound = query_.bound(octant.lower, octant.lower + octant.side);
+            if (children[count].bound < query_.limit()) ++count;
+        }
+        visitAll(children, count);
+    }
+
+    const FieldData& field_;
+    Query& query_;
+    glm::ivec3 extent_;
+};
+
+}  // namespace bilayer::detail
