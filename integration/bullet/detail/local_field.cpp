@@ -37,7 +37,7 @@ LocalField::LocalField(const Placed& field, const Pose& other, const Motion& mot
     const Bounds& bounds = field.collider.bounds();
     if (reach > surelyInBand(scale_ * field_.exteriorWidth(), voxel_)) farReach_ = reach / scale_;
     exactReach_ = reach + maxInterpolationError * voxel_;
-    longestWay_ = relativeMotion_.longest(scale_ * bounds.centre(), 0.5f * scale_ * glm::length(bounds.size()));
+    longestWay_ = relativeMotion_.maxDisplacement(scale_ * bounds.centre(), 0.5f * scale_ * glm::length(bounds.size()));
 }
 
 LocalField::Answer LocalField::at(const glm::vec3& point, float radius) const {
@@ -104,7 +104,7 @@ void LocalField::probeEdge(const Edge& edge, const Answer& first, const Answer& 
     if (!(length > 0)) return;
     // probes are sparser farther from the field
     const int parts = probeParts(length, voxel_, (1 << partBits) - 1);
-    const float way = relativeMotion_.longest(edge.place(0.5f), length);
+    const float way = relativeMotion_.maxDisplacement(edge.place(0.5f), length);
     const float reach = margin + way + maxInterpolationError * voxel_ + std::max(edge.radius[0], edge.radius[1]);
     if (edge.isStraight && !comesNear(edge.place(0), edge.place(1), reach)) return;
     Answer before = first;

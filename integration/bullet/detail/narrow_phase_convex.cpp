@@ -47,11 +47,11 @@ class Touching {
         toConvex_ = glm::transpose(toField_);
         origin_ = inField.position;
         // the deepest point of an edge is within half its length of one of its ends
-        if (convex.isCurved()) edgeReach_ += 0.5f * scale_ * field.collider.data().edges().longest();
+        if (convex.isCurved()) edgeReach_ += 0.5f * scale_ * field.collider.data().edges().maxLength();
     }
 
     bool reject(const glm::vec3& centre, float radius) const {
-        const float way = local_.relativeMotion().longest(scale_ * centre, scale_ * radius);
+        const float way = local_.relativeMotion().maxDisplacement(scale_ * centre, scale_ * radius);
         const float reach = scale_ * radius + std::max(edgeReach_, margin_ + way);
         return convex_.nearest(intoConvex(scale_ * centre), reach).distance > reach;
     }
@@ -70,10 +70,10 @@ class Touching {
         if (near.distance > 0 && approach > 0 && !meets(position, point)) approach = 0;
         // A curved surface has no edge that a point could see at an oblique angle.
         const bool apart = near.distance > 0 && !point.isSharp && !convex_.isRound(near) && !measured_;
-        if (!keeps({}, -normal, point.normal, -local_.relativeMotion().rotation(), apart)) return;
+        if (!passesNormalFilter({}, -normal, point.normal, -local_.relativeMotion().rotation(), apart)) return;
         if (apart && approach == 0 &&
-            seesEdgeObliquely(intoConvex(position), toConvex_ * point.normal, near.distance, near.normal,
-                              [&](const glm::vec3& place) { return convex_.nearest(place, edgeReach_).normal; }))
+            facesEdgeObliquely(intoConvex(position), toConvex_ * point.normal, near.distance, near.normal,
+                               [&](const glm::vec3& place) { return convex_.nearest(place, edgeReach_).normal; }))
             return;
         if (!convex_.isFlat(near)) {
             // vertices and edges are exact, and samples next to them are not
@@ -152,7 +152,7 @@ class Touching {
         if (!(gap > 0)) return;
         const glm::vec3 normal = -(toField_ * met->near.normal);
         const bool apart = !point.isSharp && !convex_.isRound(met->near);
-        if (!keeps({}, -normal, point.normal, -local_.relativeMotion().rotation(), apart)) return;
+        if (!passesNormalFilter({}, -normal, point.normal, -local_.relativeMotion().rotation(), apart)) return;
         contacts.push_back(local_.contact(position, normal, gap, feature, -glm::dot(met->near.normal, way)));
         contacts.back().turningRadius = 0;
     }
@@ -191,7 +191,7 @@ class Touching {
                                           touchAt(lowest->place + aside));
             if (!touch || touch->distance > margin_) continue;
             const glm::vec3 normal = -(toField_ * touch->normal);
-            if (!keeps({}, glm::dot(normal, points[index].normal + points[next].normal), false)) continue;
+            if (!passesNormalFilter({}, glm::dot(normal, points[index].normal + points[next].normal), false)) continue;
             const glm::vec3 place = intoField(from + lowest->place * along);
             contacts.push_back(local_.contact(place, normal, touch->distance,
                                               (std::uint32_t(points.size()) + e) | featureOfB,

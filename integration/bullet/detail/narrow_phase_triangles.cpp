@@ -203,7 +203,7 @@ class TriangleProbes : public btTriangleCallback {
         const float facing = glm::dot(foot.normal, normal), least = point.isSharp ? minFacing : 0;
         const bool isNearSide = height >= 0 || isUnclear || (foot.where == LocalField::Answer::near && facing >= least);
         const bool isNearest = std::abs(foot.distance - height) <= maxInterpolationError * voxel_ && isNearSide;
-        const bool isKept = keeps({}, glm::dot(normal, point.normal), true);
+        const bool isKept = passesNormalFilter({}, glm::dot(normal, point.normal), true);
         if (isNearest && isKept && (point.isSharp || turnsTo(field_.scale * point.position, point.normal, normal)))
             return true;
         if (!(isNearest || height < 0) || !isConvexVertex(index, normal)) return false;
@@ -464,10 +464,11 @@ class TriangleProbes : public btTriangleCallback {
         if (!found) return std::nullopt;
         const bool touches = std::abs(there.distance) <= touchingFoot * voxel_;
         const glm::quat& inWorld = field_.pose.rotation;
-        if (!keeps({}, found->normal, -(inWorld * normal), inWorld * local_.relativeMotion().rotation(), !touches))
+        if (!passesNormalFilter({}, found->normal, -(inWorld * normal), inWorld * local_.relativeMotion().rotation(),
+                                !touches))
             return std::nullopt;
         const auto normalAt = [&](const glm::vec3& place) { return local_.at(place).normal; };
-        if (!touches && there.distance > 0 && seesEdgeObliquely(foot, -normal, there.distance, there.normal, normalAt))
+        if (!touches && there.distance > 0 && facesEdgeObliquely(foot, -normal, there.distance, there.normal, normalAt))
             return std::nullopt;
         turn(*found, normal);
         found->turningRadius = -1;  // it stays below the point
