@@ -11,7 +11,7 @@
 #include "collider/contact/surface_query.h"
 #include "collider/field/interpolant.h"
 #include "collider/field/path.h"
-#include "integration/bullet/detail/convex.h"
+#include "integration/bullet/detail/edge_probes.h"
 
 namespace bilayer::bullet::detail {
 
@@ -103,7 +103,7 @@ void LocalField::probeEdge(const Edge& edge, const Answer& first, const Answer& 
     const float length = glm::distance(edge.place(0), edge.place(1));
     if (!(length > 0)) return;
     // probes are sparser farther from the field
-    const int parts = probeParts(length, voxel_, (1 << partBits) - 1);
+    const int parts = probeIntervals(length, voxel_, (1 << partBits) - 1);
     const float way = relativeMotion_.maxDisplacement(edge.place(0.5f), length);
     const float reach = margin + way + maxInterpolationError * voxel_ + std::max(edge.radius[0], edge.radius[1]);
     if (edge.isStraight && !comesNear(edge.place(0), edge.place(1), reach)) return;

@@ -11,6 +11,7 @@
 #include "collider/contact/edge_search.h"
 #include "collider/contact/normal_filter.h"
 #include "collider/contact/surface_query.h"
+#include "integration/bullet/detail/edge_probes.h"
 #include "integration/bullet/detail/local_field.h"
 #include "integration/bullet/detail/narrow_phase.h"
 
@@ -62,7 +63,7 @@ class Touching {
         ++report.pointsTested;
         const glm::vec3 position = scale_ * point.position;
         const std::uint32_t feature = index | featureOfB;
-        const Convex::Near near = convex_.nearest(intoConvex(position), edgeReach_);
+        const NearestPoint near = convex_.nearest(intoConvex(position), edgeReach_);
         if (convex_.isCurved() && point.isSharp && near.distance <= edgeReach_) followEdges(index, near, contacts);
         if (near.distance > margin_) return visitOnWay(position, point, feature, near.distance, contacts);
         const glm::vec3 normal = -(toField_ * near.normal);
@@ -97,7 +98,7 @@ class Touching {
 
     /// Tests the convex body's own vertices and edges in the field.
     void visitProbes(ContactReport& report, std::vector<Contact>& contacts) const {
-        const auto corners = convex_.corners();
+        const auto corners = convex_.vertices();
         std::vector<LocalField::Answer> answers;
         for (std::uint32_t i = 0; i < corners.size(); ++i) {
             const glm::vec3 point = intoField(corners[i]);
@@ -124,8 +125,8 @@ class Touching {
     glm::vec3 intoField(const glm::vec3& point) const { return toField_ * point + origin_; }
 
     /// The entry of a path into the convex body, both in the convex body's coordinates.
-    std::optional<Convex::Entry> meeting(const glm::vec3& start, const glm::vec3& way) const {
-        return convex_.enter(start, way, sweepTolerance * voxel_);
+    std::optional<Convex::PathHit> meeting(const glm::vec3& start, const glm::vec3& way) const {
+        return convex_.castPoint(start, way, sweepTolerance * voxel_);
     }
 
     glm::vec3 wayIntoConvex(const glm::vec3& position) const {
@@ -148,18 +149,18 @@ class Touching {
         const auto met = meeting(intoConvex(position), way);
         if (!met) return;
         // separation from the tangent plane at the entry
-        const float gap = -glm::dot(met->near.normal, met->part * way);
+        const float gap = -glm::dot(met->nearest.normal, met->fraction * way);
         if (!(gap > 0)) return;
-        const glm::vec3 normal = -(toField_ * met->near.normal);
-        const bool apart = !point.isSharp && !convex_.isRound(met->near);
+        const glm::vec3 normal = -(toField_ * met->nearest.normal);
+        const bool apart = !point.isSharp && !convex_.isRound(met->nearest);
         if (!passesNormalFilter({}, -normal, point.normal, -local_.relativeMotion().rotation(), apart)) return;
-        contacts.push_back(local_.contact(position, normal, gap, feature, -glm::dot(met->near.normal, way)));
+        contacts.push_back(local_.contact(position, normal, gap, feature, -glm::dot(met->nearest.normal, way)));
         contacts.back().turningRadius = 0;
     }
 
     /// Follows sharp edges of the field from a touching point: adds the deepest point of each edge that descends into a
     /// curved body and rises again.
-    void followEdges(std::uint32_t index, const Convex::Near& near, std::vector<Contact>& contacts) const {
+    void followEdges(std::uint32_t index, const NearestPoint& near, std::vector<Contact>& contacts) const {
         const Collider& collider = local_.collider();
         const auto points = collider.data().points().points();
         const SharpEdges& edges = collider.data().edges();
@@ -171,10 +172,10 @@ class Touching {
             const float length = glm::distance(from, to);
             const glm::vec3 along = (to - from) / length;
             const auto nearAt = [&](float way) { return convex_.nearest(from + way * along, edgeReach_); };
-            const auto slopeOf = [&](float way, const Convex::Near& there) {
+            const auto slopeOf = [&](float way, const NearestPoint& there) {
                 return Slope{way, there.distance, glm::dot(there.normal, along)};
             };
-            const Convex::Near there = nearAt(length);
+            const NearestPoint there = nearAt(length);
             const Slope first = slopeOf(0, near), last = slopeOf(length, there);
             // If both ends are within reach, one of them is enough.
             const bool isOther = there.distance <= edgeReach_ && next < index;
@@ -183,7 +184,7 @@ class Touching {
                 return std::optional<Slope>(slopeOf(way, nearAt(way)));
             });
             const auto touchAt = [&](float way) -> SurfaceSample {
-                const Convex::Near near = nearAt(way);
+                const NearestPoint near = nearAt(way);
                 return {near.distance, near.normal};
             };
             const float aside = 2 * searchTolerance * voxel_;
@@ -200,12 +201,12 @@ class Touching {
     }
 
     /// Follows the field's normal from the point of a curved surface under a surface point to the deepest point nearby.
-    std::optional<Contact> refine(const Convex::Near& near, std::uint32_t feature) const {
+    std::optional<Contact> refine(const NearestPoint& near, std::uint32_t feature) const {
         glm::vec3 place = intoField(near.core + near.radius * near.normal);
         LocalField::Answer here = local_.at(place);
         if (here.where != LocalField::Answer::near) return std::nullopt;
         for (int i = 0; i < maxRefinements; ++i) {
-            const glm::vec3 next = intoField(convex_.slide(near, -(toConvex_ * here.normal)));
+            const glm::vec3 next = intoField(convex_.supportNear(near, -(toConvex_ * here.normal)));
             const LocalField::Answer there = local_.at(next);
             if (there.where != LocalField::Answer::near || !(there.distance < here.distance)) break;
             place = next;
@@ -221,7 +222,7 @@ class Touching {
 
     /// Edge descent: the deeper point of a face, or of the generator line on the side of a cylinder or a cone, near a
     /// point on it.
-    std::optional<Contact> downhill(const Convex::Near& near, const glm::vec3& place,
+    std::optional<Contact> downhill(const NearestPoint& near, const glm::vec3& place,
                                     const LocalField::Answer& here) const {
         const float step = probeSpacing * scale_ * local_.collider().field().voxelSize();
         const glm::vec3 slope = toConvex_ * here.gradient, start = intoConvex(place);
@@ -244,7 +245,7 @@ class Touching {
             const float steepness = glm::length(uphill);
             if (!(steepness > minDownhill)) return std::nullopt;
             // no farther than the border of the face
-            const Convex::Near last = convex_.nearest(start - step / steepness * uphill, step);
+            const NearestPoint last = convex_.nearest(start - step / steepness * uphill, step);
             end = last.core + last.radius * near.normal;
             isWithinFace = glm::dot(last.normal, near.normal) > straight;
         }

@@ -16,9 +16,11 @@
 #include "collider/contact/surface_query.h"
 #include "collider/field/interpolant.h"
 #include "integration/bullet/detail/convert.h"
+#include "integration/bullet/detail/edge_probes.h"
 #include "integration/bullet/detail/local_field.h"
 #include "integration/bullet/detail/narrow_phase.h"
 #include "integration/bullet/detail/open_surface.h"
+#include "integration/bullet/detail/triangle_distance.h"
 
 namespace bilayer::bullet::detail {
 

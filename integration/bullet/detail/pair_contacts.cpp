@@ -8,6 +8,7 @@
 #include <bilayer/collider/contact.h>
 #include <bilayer/integration/bullet/shape.h>
 #include "integration/bullet/detail/convert.h"
+#include "integration/bullet/detail/edge_probes.h"
 #include "integration/bullet/detail/narrow_phase.h"
 #include "integration/bullet/detail/predicted_contacts.h"
 #include "integration/bullet/detail/velocity.h"
@@ -151,7 +152,7 @@ ContactReport Pair::collideOther(const Side& a, const Placed& field, float margi
     }
     if (a.shape->isConvex()) {
         const auto& convex = static_cast<const btConvexShape&>(*a.shape);
-        if (!convex_ || !convex_->isOf(convex)) convex_.emplace(convex);
+        if (!convex_ || !convex_->represents(convex)) convex_.emplace(convex);
         return collideConvex(*convex_, toPose(a.transform), motion, field, margin, measured, contacts_);
     }
     return collideTriangles(static_cast<const btConcaveShape&>(*a.shape), a.transform, motion, field, margin, measured,

@@ -73,15 +73,15 @@ float ConvexSurface::bound(const glm::vec3& point) const {
 }
 
 std::optional<Entry> ConvexSurface::entry(const glm::vec3& from, const glm::vec3& to, float) const {
-    const auto entry = convex_.enter(from, to - from, tolerance_);
+    const auto entry = convex_.castPoint(from, to - from, tolerance_);
     if (!entry) return std::nullopt;
-    const glm::vec3 at = from + entry->part * (to - from);
-    return Entry{at - entry->near.distance * entry->near.normal, entry->near.normal};
+    const glm::vec3 at = from + entry->fraction * (to - from);
+    return Entry{at - entry->nearest.distance * entry->nearest.normal, entry->nearest.normal};
 }
 
 std::optional<glm::vec3> ConvexSurface::wayOut(const glm::vec3& point, float) const {
-    const Convex::Near near = convex_.nearest(point, everywhere);
-    return -near.distance * near.normal;
+    const NearestPoint nearest = convex_.nearest(point, everywhere);
+    return -nearest.distance * nearest.normal;
 }
 
 PlaneSurface::PlaneSurface(const btStaticPlaneShape& shape)

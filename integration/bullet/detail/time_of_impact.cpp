@@ -15,6 +15,7 @@
 
 #include "integration/bullet/detail/convert.h"
 #include "integration/bullet/detail/convex.h"
+#include "integration/bullet/detail/edge_probes.h"
 #include "integration/bullet/detail/open_surface.h"
 #include "integration/bullet/detail/surfaces.h"
 
@@ -145,7 +146,7 @@ class Passage {
     /// @param spacing  of the field that is met, in the same units
     template <class BallAt>
     void followEdge(float length, float spacing, const BallAt& ballAt) {
-        const int parts = probeParts(length, spacing, maxProbes);
+        const int parts = probeIntervals(length, spacing, maxProbes);
         const float radius = std::max(ballAt(0.f).radius, ballAt(1.f).radius);
         followBetween(0, parts, bent * length / float(parts), radius,
                       [&](int i) { return ballAt(float(i) / float(parts)); });
@@ -211,11 +212,11 @@ Impact passageOf(const Convex& convex, const Shape& field, const std::vector<Mom
         const float length = glm::length(point);
         return Ball{point, length > 0 ? point / length : glm::vec3(0), radius};
     };
-    const auto corners = convex.corners();
-    for (std::uint32_t i = 0; i < corners.size(); ++i) timeOfImpact.follow(ballAt(corners[i], convex.radius(i)));
+    const auto vertices = convex.vertices();
+    for (std::uint32_t i = 0; i < vertices.size(); ++i) timeOfImpact.follow(ballAt(vertices[i], convex.radius(i)));
     for (const Convex::Edge& edge : convex.edges())
         timeOfImpact.followEdge(
-            glm::distance(corners[edge.from], corners[edge.to]), field.voxelSize(),
+            glm::distance(vertices[edge.from], vertices[edge.to]), field.voxelSize(),
             [&](float part) { return ballAt(convex.place(edge, part), convex.radius(edge, part)); });
     return timeOfImpact.first();
 }
