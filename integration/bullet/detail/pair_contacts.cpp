@@ -90,7 +90,7 @@ void Pair::test(const Side& a, const Side& b, float asked) {
 }
 
 void Pair::commit(const btCollisionObject& a, const btCollisionObject& b, float seconds, btManifoldResult& result) {
-    const Reduced& reduced = choice_.reduced();
+    const ReducedContacts& reduced = reduction_.reduced();
     manifolds_.write(reduced.patches, details_, a, b, seconds, continuity_, result);
     ++statistics_.pairs;
     statistics_.contactsFound += found_;
@@ -116,11 +116,11 @@ void Pair::find(const Side& a, const Side& b, float margin, bool measured) {
 
 void Pair::finish(const Side& a, const Side& b) {
     found_ = static_cast<int>(contacts_.size());
-    choice_.update(contacts_, a.transform, b.transform);
+    reduction_.update(contacts_, a.transform, b.transform);
     continuity_ = continuityOf(a, b);
     details_.clear();
     const PredictedContacts turning(a, b, continuity_);
-    for (const Patch& patch : choice_.reduced().patches)
+    for (const Patch& patch : reduction_.reduced().patches)
         for (int i = 0; i < patch.count; ++i) details_.push_back({turning.ahead(patch.contacts[i]), std::nullopt});
     if (hasTriangles(*a.shape)) nameTriangles(static_cast<const btConcaveShape&>(*a.shape), a.transform, b.placed());
     isReady_ = true;
@@ -129,7 +129,7 @@ void Pair::finish(const Side& a, const Side& b) {
 
 void Pair::nameTriangles(const btConcaveShape& mesh, const btTransform& transform, const Placed& field) {
     std::vector<MeshPlace> places;
-    for (const Patch& patch : choice_.reduced().patches)
+    for (const Patch& patch : reduction_.reduced().patches)
         for (int i = 0; i < patch.count; ++i) {
             const Contact& contact = patch.contacts[i];
             places.push_back(

@@ -81,7 +81,7 @@ class Pair {
     std::optional<Convex> convex_;  ///< of A
     ContactCache cache_;            ///< of two fields
     std::vector<Contact> contacts_;
-    Choice choice_;
+    ContactReduction reduction_;
     Continuity continuity_;
     std::vector<ContactDetails> details_;  ///< one for each kept contact
     ContactReport report_;
