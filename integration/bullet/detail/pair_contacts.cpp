@@ -107,11 +107,11 @@ float Pair::nearest() const {
     return least;
 }
 
-void Pair::find(const Side& a, const Side& b, float margin, bool measured) {
+void Pair::find(const Side& a, const Side& b, float margin, bool exact) {
     contacts_.clear();
     const bool follows = static_cast<const Shape&>(*b.shape).speculative();
-    report_ = isField(*a.shape) ? collideFields(a.placed(), b.placed(), margin, measured, cache_, contacts_)
-                                : collideOther(a, b.placed(), margin, measured, follows ? a.motion() : Motion{});
+    report_ = isField(*a.shape) ? collideFields(a.placed(), b.placed(), margin, exact, cache_, contacts_)
+                                : collideOther(a, b.placed(), margin, exact, follows ? a.motion() : Motion{});
 }
 
 void Pair::finish(const Side& a, const Side& b) {
@@ -141,21 +141,20 @@ void Pair::nameTriangles(const btConcaveShape& mesh, const btTransform& transfor
     for (std::size_t i = 0; i < details_.size(); ++i) details_[i].triangle = triangles[i];
 }
 
-ContactReport Pair::collideOther(const Side& a, const Placed& field, float margin, bool measured,
-                                 const Motion& motion) {
+ContactReport Pair::collideOther(const Side& a, const Placed& field, float margin, bool exact, const Motion& motion) {
     if (a.shape->getShapeType() == STATIC_PLANE_PROXYTYPE) {
         const auto& plane = static_cast<const btStaticPlaneShape&>(*a.shape);
         const btVector3 normal = a.transform.getBasis() * plane.getPlaneNormal();
         const float offset = plane.getPlaneConstant() + normal.dot(a.transform.getOrigin());
         const Motion planeMotion = motion.about(toGlm(a.transform.getOrigin()), glm::vec3(0));
-        return collidePlane(toGlm(normal), offset, planeMotion, field, margin, measured, contacts_);
+        return collidePlane(toGlm(normal), offset, planeMotion, field, margin, exact, contacts_);
     }
     if (a.shape->isConvex()) {
         const auto& convex = static_cast<const btConvexShape&>(*a.shape);
         if (!convex_ || !convex_->represents(convex)) convex_.emplace(convex);
-        return collideConvex(*convex_, toPose(a.transform), motion, field, margin, measured, contacts_);
+        return collideConvex(*convex_, toPose(a.transform), motion, field, margin, exact, contacts_);
     }
-    return collideTriangles(static_cast<const btConcaveShape&>(*a.shape), a.transform, motion, field, margin, measured,
+    return collideTriangles(static_cast<const btConcaveShape&>(*a.shape), a.transform, motion, field, margin, exact,
                             contacts_);
 }
 
