@@ -74,7 +74,7 @@ class TriangleProbes {
         const auto found = field_.local.probe(triangles_[f][i], sample, 0, feature, field_.margin, report_);
         if (!found) return;
         const auto normalOf = [&](const glm::vec3& towards) {
-            return triangles_.adjacency().cornerNormal(f, i, towards);
+            return triangles_.adjacency().vertexNormal(f, i, towards);
         };
         if (const auto contact = withNormal(*found, normalOf)) contacts_.push_back(*contact);
     }

@@ -48,8 +48,8 @@ Continuity continuityOf(const Side& a, const Side& b) {
 Motion Side::motionAt(const btVector3& point) const {
     if (!(seconds > 0) || !object->isActive()) return {};
     const Velocity velocity = velocityOf(*object);
-    const btVector3 way = seconds * (velocity.at(point) + seconds * accelerationOf(*object));
-    return {toGlm(way), toGlm(seconds * velocity.angular)};
+    const btVector3 displacement = seconds * (velocity.at(point) + seconds * accelerationOf(*object));
+    return {toGlm(displacement), toGlm(seconds * velocity.angular)};
 }
 
 Placed Side::placed() const {
@@ -78,14 +78,15 @@ void Pair::collide(const Side& a, const Side& b, const SampledPairs& sampled, st
 void Pair::test(const Side& a, const Side& b, float asked) {
     const float voxel = static_cast<const Shape&>(*b.shape).voxelSize();
     float margin = std::max(marginOf(a, b), std::min(asked, voxel));
-    const float most = std::max(margin, asked);
+    const float maxDistance = std::max(margin, asked);
     // a point between surface points is found by those around it, which are farther away
     const float between = probeSpacing * voxel;
     find(a, b, margin, true);
-    while (contacts_.empty() && margin < most + between)
-        find(a, b, margin = std::min(std::max(2 * margin, voxel), most + between), true);
-    if (const float surely = nearest() + between; !contacts_.empty() && surely > margin) find(a, b, surely, true);
-    std::erase_if(contacts_, [&](const Contact& contact) { return contact.distance > most; });
+    while (contacts_.empty() && margin < maxDistance + between)
+        find(a, b, margin = std::min(std::max(2 * margin, voxel), maxDistance + between), true);
+    if (const float sufficient = nearest() + between; !contacts_.empty() && sufficient > margin)
+        find(a, b, sufficient, true);
+    std::erase_if(contacts_, [&](const Contact& contact) { return contact.distance > maxDistance; });
     finish(a, b);
 }
 
@@ -102,9 +103,9 @@ void Pair::commit(const btCollisionObject& a, const btCollisionObject& b, float 
 }
 
 float Pair::nearest() const {
-    float least = std::numeric_limits<float>::max();
-    for (const Contact& contact : contacts_) least = std::min(least, contact.distance);
-    return least;
+    float minDistance = std::numeric_limits<float>::max();
+    for (const Contact& contact : contacts_) minDistance = std::min(minDistance, contact.distance);
+    return minDistance;
 }
 
 void Pair::find(const Side& a, const Side& b, float margin, bool exact) {
@@ -119,9 +120,10 @@ void Pair::finish(const Side& a, const Side& b) {
     reduction_.update(contacts_, a.transform, b.transform);
     continuity_ = continuityOf(a, b);
     details_.clear();
-    const PredictedContacts turning(a, b, continuity_);
+    const PredictedContacts predictions(a, b, continuity_);
     for (const Patch& patch : reduction_.reduced().patches)
-        for (int i = 0; i < patch.count; ++i) details_.push_back({turning.ahead(patch.contacts[i]), std::nullopt});
+        for (int i = 0; i < patch.count; ++i)
+            details_.push_back({predictions.predict(patch.contacts[i]), std::nullopt});
     if (hasTriangles(*a.shape)) nameTriangles(static_cast<const btConcaveShape&>(*a.shape), a.transform, b.placed());
     isReady_ = true;
     sampled_ = 0;

@@ -1,7 +1,8 @@
-// The surfaces for continuous collision, each in its own coordinates and units; internal. All have
+// The surfaces for continuous collision, each in its own coordinates and units. All have
 //
-//   std::optional<Entry> entry(from, to, radius)      where a sphere enters on a straight path; its start if inside
-//   std::optional<glm::vec3> wayOut(point, radius)    depenetration of a sphere that is inside; none if unknown
+//   std::optional<SurfaceEntry> entry(from, to, radius)      where a sphere enters on a straight path; its start if
+//   inside std::optional<glm::vec3> depenetration(point, radius)    displacement of a sphere that is inside to the
+//   surface; none if unknown
 //
 // and a bound() of the distance to their surface. Open surfaces have isNear() instead.
 #pragma once
@@ -20,7 +21,7 @@ namespace bilayer::bullet::detail {
 using namespace bilayer::detail;
 
 /// Where a path enters a surface.
-struct Entry {
+struct SurfaceEntry {
     glm::vec3 position, normal;  ///< the normal points outward and has unit length
 };
 
@@ -30,8 +31,8 @@ class FieldSurface {
 
     /// A lower bound of the distance to the surface.
     float bound(const glm::vec3& point) const;
-    std::optional<Entry> entry(const glm::vec3& from, const glm::vec3& to, float radius) const;
-    std::optional<glm::vec3> wayOut(const glm::vec3& point, float radius) const;
+    std::optional<SurfaceEntry> entry(const glm::vec3& from, const glm::vec3& to, float radius) const;
+    std::optional<glm::vec3> depenetration(const glm::vec3& point, float radius) const;
 
   private:
     bool staysOut(const glm::vec3& from, const glm::vec3& to, float radius) const;
@@ -47,8 +48,8 @@ class ConvexSurface {
     ConvexSurface(const Convex& convex, float tolerance) : convex_(convex), tolerance_(tolerance) {}
 
     float bound(const glm::vec3& point) const;
-    std::optional<Entry> entry(const glm::vec3& from, const glm::vec3& to, float) const;
-    std::optional<glm::vec3> wayOut(const glm::vec3& point, float) const;
+    std::optional<SurfaceEntry> entry(const glm::vec3& from, const glm::vec3& to, float) const;
+    std::optional<glm::vec3> depenetration(const glm::vec3& point, float) const;
 
   private:
     const Convex& convex_;
@@ -61,8 +62,8 @@ class PlaneSurface {
     explicit PlaneSurface(const btStaticPlaneShape& shape);
 
     float bound(const glm::vec3& point) const;
-    std::optional<Entry> entry(const glm::vec3& from, const glm::vec3& to, float) const;
-    std::optional<glm::vec3> wayOut(const glm::vec3& point, float) const;
+    std::optional<SurfaceEntry> entry(const glm::vec3& from, const glm::vec3& to, float) const;
+    std::optional<glm::vec3> depenetration(const glm::vec3& point, float) const;
 
   private:
     glm::vec3 normal_;
@@ -74,8 +75,8 @@ class TriangleSurface {
   public:
     explicit TriangleSurface(const btConcaveShape& mesh) : mesh_(mesh) {}
 
-    std::optional<Entry> entry(const glm::vec3& from, const glm::vec3& to, float) const;
-    std::optional<glm::vec3> wayOut(const glm::vec3&, float) const { return std::nullopt; }
+    std::optional<SurfaceEntry> entry(const glm::vec3& from, const glm::vec3& to, float) const;
+    std::optional<glm::vec3> depenetration(const glm::vec3&, float) const { return std::nullopt; }
     /// Whether a sphere comes near any triangle on a straight path.
     bool isNear(const glm::vec3& from, const glm::vec3& to, float radius) const;
 
