@@ -23,11 +23,11 @@ namespace {
 
 using openvdb::Vec3s;
 
-constexpr std::int32_t format = 1;      // increases when an older reader would misread the data
-constexpr float massError = 1e-3f;      // of moments of inertia, relative to the largest
-constexpr float boundsError = 1e-5f;    // of points outside the bounds, relative to their size
-constexpr double fieldBeyondBand = 4;   // max extent of a field beyond its mesh and band [voxels]
-constexpr double maxMeshOutside = 1.5;  // max extent of a mesh outside its field's box [voxels]
+constexpr std::int32_t format = 1;        // increases when an older reader would misread the data
+constexpr float massError = 1e-3f;        // of moments of inertia, relative to the largest
+constexpr float boundsError = 1e-5f;      // of points outside the bounds, relative to their size
+constexpr double maxFieldBeyondBand = 4;  // max extent of a field beyond its mesh and band [voxels]
+constexpr double maxMeshOutside = 1.5;    // max extent of a mesh outside its field's box [voxels]
 
 namespace entry {
 constexpr const char* format = "bilayer:body";
@@ -159,7 +159,7 @@ void requireWithin(const Bounds& bounds, const openvdb::FloatGrid& grid) {
     const openvdb::CoordBBox box = grid.evalActiveVoxelBoundingBox();
     const openvdb::Vec3d lower = grid.indexToWorld(box.min().asVec3d() - openvdb::Vec3d(maxMeshOutside)),
                          upper = grid.indexToWorld(box.max().asVec3d() + openvdb::Vec3d(maxMeshOutside));
-    const double band = double(grid.background()) + fieldBeyondBand * grid.voxelSize()[0];
+    const double band = double(grid.background()) + maxFieldBeyondBand * grid.voxelSize()[0];
     for (int axis = 0; axis < 3; ++axis) {
         const double low = double(bounds.lower[axis]) - lower[axis], high = upper[axis] - double(bounds.upper[axis]);
         if (!(low >= 0 && high >= 0))
@@ -210,7 +210,8 @@ LevelSet withBody(const LevelSet& given, const Body& body) {
 Body bodyOf(const LevelSet& levelSet) {
     const Entries entries(levelSet);
     const auto kind = entries.find<std::int32_t>(entry::format);
-    if (!kind) throw std::invalid_argument("the field has no body beside it (withBody(), or bilayer build --body)");
+    if (!kind)
+        throw std::invalid_argument("the field has no body stored with it (withBody(), or bilayer build --body)");
     if (*kind != format)
         throw std::invalid_argument(fmt::format("the body is of kind {}, which only another version knows", *kind));
     Body body;

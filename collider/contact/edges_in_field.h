@@ -50,13 +50,13 @@ class EdgesInField {
 
   private:
     /// The contact of an edge, and its distance from the edge's start.
-    struct OnEdge {
+    struct EdgeContact {
         float place;
         SurfaceSample sample;
     };
 
-    std::optional<OnEdge> deepestOf(const glm::vec3& start, const glm::vec3& end, const glm::vec3& along,
-                                    const Slope& from, const Slope& to, const Conormals& conormals) const {
+    std::optional<EdgeContact> deepestOf(const glm::vec3& start, const glm::vec3& end, const glm::vec3& along,
+                                         const Slope& from, const Slope& to, const Conormals& conormals) const {
         const auto sampleAt = [&](float place) {
             const glm::vec3 point = start + place * along;
             return other_.at(point, other_.field().sample(point), reach_ + to.place);
@@ -74,12 +74,12 @@ class EdgesInField {
         if (const auto crossing = other_.crossing(start, end, rotated, start + lowest->place * along, here->distance)) {
             if (crossing->distance > reach_) return std::nullopt;
             const glm::vec3 onEdge = crossing->position + crossing->distance * crossing->normal;
-            return OnEdge{glm::dot(onEdge - start, along), SurfaceSample{crossing->distance, crossing->normal}};
+            return EdgeContact{glm::dot(onEdge - start, along), SurfaceSample{crossing->distance, crossing->normal}};
         }
         if (!fallsBetween(from, to)) return std::nullopt;
         const auto across = acrossEdge(along, *here, lowest->place, other_.voxelSize(), sampleAt);
         if (!across || across->distance > reach_) return std::nullopt;
-        return OnEdge{lowest->place, *across};
+        return EdgeContact{lowest->place, *across};
     }
 
     const SurfacePoint& pointOf(std::uint32_t index) const { return body_.data().points().points()[index]; }

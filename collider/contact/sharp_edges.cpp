@@ -15,8 +15,8 @@ namespace {
 constexpr float maxNeighbourDistance = 4.5f;
 // Of two neighbours in about the same direction, only the nearer one counts: cosine of 60 degrees.
 constexpr float sameDirection = 0.5f;
-// Max cosine between an edge and the normals at its ends. An edge is perpendicular to them except at vertices: a cube's
-// have 0.58.
+// Max cosine between an edge and the normals at its ends. An edge is perpendicular to them except at vertices: a
+// cube's have 0.58.
 constexpr float maxNormalCosine = 0.7f;
 // Max rounding of sharp edges by the interpolant [voxels]; at larger distances there is a groove between the two
 // points.
@@ -40,7 +40,7 @@ constexpr float minBend = 0.0872f;
 // Distance from an edge at which its faces are sampled [voxels].
 constexpr float conormalOffset = 1.5f;
 // Tolerance for the ends of an edge's segments, relative to their length.
-constexpr float gap = 0.02f;
+constexpr float endTolerance = 0.02f;
 // Min count of points, within the neighbour distance, to surround a point.
 constexpr int minAround = 3;
 
@@ -53,7 +53,7 @@ struct Neighbour {
 std::vector<Neighbour> neighboursOf(std::uint32_t index, const SurfacePoints& points, const Field& field) {
     const SurfacePoint& point = points.points()[index];
     const float reach = maxNeighbourDistance * field.voxelSize();
-    std::vector<Neighbour> near;
+    std::vector<Neighbour> candidates;
     points.visit(
         [&](const glm::vec3& centre, float radius) { return glm::distance(centre, point.position) > radius + reach; },
         [&](std::uint32_t other, const SurfacePoint& there) {
@@ -64,16 +64,17 @@ std::vector<Neighbour> neighboursOf(std::uint32_t index, const SurfacePoints& po
             const glm::vec3 direction = offset / distance;
             const float cosine =
                 std::max(std::abs(glm::dot(direction, point.normal)), std::abs(glm::dot(direction, there.normal)));
-            // the height of the segment above an arc with these normals: a quarter of its ends' heights over each other
+            // the height of the segment above an arc with these normals: a quarter of its ends' heights over each
+            // other
             const float above = 0.125f * (glm::dot(offset, point.normal) - glm::dot(offset, there.normal));
             if (cosine < maxNormalCosine && above <= maxAbove * field.voxelSize())
-                near.push_back({other, direction, distance});
+                candidates.push_back({other, direction, distance});
         });
-    std::sort(near.begin(), near.end(), [](const Neighbour& a, const Neighbour& b) {
+    std::sort(candidates.begin(), candidates.end(), [](const Neighbour& a, const Neighbour& b) {
         return a.distance < b.distance || (a.distance == b.distance && a.index < b.index);
     });
     std::vector<Neighbour> kept;
-    for (const Neighbour& next : near) {
+    for (const Neighbour& next : candidates) {
         const auto hides = [&](const Neighbour& k) { return glm::dot(k.direction, next.direction) > sameDirection; };
         if (kept.size() == maxNeighbours) break;
         if (std::any_of(kept.begin(), kept.end(), hides)) continue;
@@ -113,8 +114,8 @@ SharpEdges::SharpEdges(const SurfacePoints& points, const Field& field)
     for (std::uint32_t i = 0; i < all.size(); ++i)
         for (const Neighbour& next : neighbours[i]) {
             const auto isBack = [&](const Neighbour& n) { return n.index == i; };
-            const auto& its = neighbours[next.index];
-            if (next.index < i || std::none_of(its.begin(), its.end(), isBack)) continue;
+            const auto& theirs = neighbours[next.index];
+            if (next.index < i || std::none_of(theirs.begin(), theirs.end(), isBack)) continue;
             edges_.push_back({i, next.index, conormalsOf(all[i], all[next.index], field)});
             maxLength_ = std::max(maxLength_, next.distance);
         }
@@ -181,24 +182,24 @@ std::optional<SharpEdges::Crossing> SharpEdges::crossing(const SurfacePoints& po
     float nearest = within;
     const auto consider = [&](const SharpEdge& edge) {
         const SurfacePoint &a = points.points()[edge.from], &b = points.points()[edge.to];
-        const glm::vec3 its = b.position - a.position, across = glm::cross(along, its);
+        const glm::vec3 thisAlong = b.position - a.position, across = glm::cross(along, thisAlong);
         const float area = glm::length(across);
-        if (area < minCrossing * glm::length(along) * glm::length(its)) return;
+        if (area < minCrossing * glm::length(along) * glm::length(thisAlong)) return;
         // The closest points of the two lines.
         const glm::vec3 offset = a.position - from;
-        const float onOther = glm::dot(glm::cross(offset, its), across) / (area * area);
+        const float onOther = glm::dot(glm::cross(offset, thisAlong), across) / (area * area);
         const float onThis = glm::dot(glm::cross(offset, along), across) / (area * area);
-        if (onOther < 0 || onOther > 1 || onThis < -gap || onThis > 1 + gap) return;
-        const glm::vec3 there = from + onOther * along, here = a.position + onThis * its;
-        const float away = glm::distance(there, place);
+        if (onOther < 0 || onOther > 1 || onThis < -endTolerance || onThis > 1 + endTolerance) return;
+        const glm::vec3 there = from + onOther * along, here = a.position + onThis * thisAlong;
+        const float distanceFromPlace = glm::distance(there, place);
         const glm::vec3 normal = (glm::dot(across, a.normal + b.normal) < 0 ? -1.f : 1.f) / area * across;
-        if (away > nearest) return;
+        if (distanceFromPlace > nearest) return;
         for (int i = 0; i < 2; ++i)
             if (glm::dot(normal, edge.conormals[i]) > -minLeaving || glm::dot(normal, conormals[i]) < minLeaving)
                 return;
         const float distance = glm::dot(there - here, normal);
         if (distance < minDistance) return;
-        nearest = away;
+        nearest = distanceFromPlace;
         best = Crossing{here, normal, distance};
     };
     points.visit([&](const glm::vec3& centre, float radius) { return glm::distance(centre, place) > radius + reach; },

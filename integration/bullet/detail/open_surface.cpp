@@ -29,10 +29,10 @@ constexpr int maxProjections = 20;
 constexpr int maxIntervals = 64;  // maximum count of intervals of a path
 
 /// The end points of an edge in a unique order.
-using SideKey = std::array<float, 6>;
-SideKey keyOf(const Triangle& triangle, int side) {
-    const glm::vec3 &a = triangle[side], &b = triangle[(side + 1) % 3];
-    const SideKey key{a.x, a.y, a.z, b.x, b.y, b.z}, back{b.x, b.y, b.z, a.x, a.y, a.z};
+using EdgeKey = std::array<float, 6>;
+EdgeKey keyOf(const Triangle& triangle, int edge) {
+    const glm::vec3 &a = triangle[edge], &b = triangle[(edge + 1) % 3];
+    const EdgeKey key{a.x, a.y, a.z, b.x, b.y, b.z}, back{b.x, b.y, b.z, a.x, a.y, a.z};
     return std::min(key, back);
 }
 
@@ -107,8 +107,8 @@ class OutwardMean {
 
 }  // namespace
 
-glm::vec3 conormalOf(const Triangle& triangle, int side) {
-    const glm::vec3 &from = triangle[side], &to = triangle[(side + 1) % 3], &opposite = triangle[(side + 2) % 3];
+glm::vec3 conormalOf(const Triangle& triangle, int edge) {
+    const glm::vec3 &from = triangle[edge], &to = triangle[(edge + 1) % 3], &opposite = triangle[(edge + 2) % 3];
     const glm::vec3 along = to - from, inward = opposite - from;
     const float squared = glm::dot(along, along);
     const glm::vec3 across = squared > 0 ? inward - glm::dot(inward, along) / squared * along : inward;
@@ -182,24 +182,24 @@ std::optional<glm::vec3> Adjacency::vertexNormal(std::uint32_t triangle, int ver
 }
 
 SharpFeatures sharpFeaturesOf(std::span<const Triangle> triangles) {
-    std::map<SideKey, OutwardMean> sides;
-    std::map<std::array<float, 3>, OutwardMean> corners;
+    std::map<EdgeKey, OutwardMean> edges;
+    std::map<std::array<float, 3>, OutwardMean> vertices;
     for (const Triangle& triangle : triangles)
         for (int i = 0; i < 3; ++i) {
             if (const glm::vec3 conormal = conormalOf(triangle, i); conormal != glm::vec3(0))
-                sides[keyOf(triangle, i)].add(conormal, 1);
+                edges[keyOf(triangle, i)].add(conormal, 1);
             const glm::vec3 &here = triangle[i], one = triangle[(i + 1) % 3] - here, two = triangle[(i + 2) % 3] - here;
             if (!(glm::dot(one, one) > 0 && glm::dot(two, two) > 0)) continue;
             const glm::vec3 sum = glm::normalize(one) + glm::normalize(two);
             const float angle = 2 * std::acos(std::min(0.5f * glm::length(sum), 1.f));
-            if (angle > 0 && glm::length(sum) > 0) corners[{here.x, here.y, here.z}].add(glm::normalize(sum), angle);
+            if (angle > 0 && glm::length(sum) > 0) vertices[{here.x, here.y, here.z}].add(glm::normalize(sum), angle);
         }
     SharpFeatures sharp;
-    for (const auto& [key, away] : sides)
-        if (const auto outward = away.outward())
+    for (const auto& [key, mean] : edges)
+        if (const auto outward = mean.outward())
             sharp.edges.push_back({{key[0], key[1], key[2]}, {key[3], key[4], key[5]}, *outward});
-    for (const auto& [place, away] : corners)
-        if (const auto outward = away.outward()) sharp.vertices.push_back({{place[0], place[1], place[2]}, *outward});
+    for (const auto& [place, mean] : vertices)
+        if (const auto outward = mean.outward()) sharp.vertices.push_back({{place[0], place[1], place[2]}, *outward});
     return sharp;
 }
 

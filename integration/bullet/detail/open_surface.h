@@ -18,9 +18,9 @@ using namespace bilayer::detail;
 
 using Triangle = std::array<glm::vec3, 3>;
 
-/// The conormal of an edge: in the triangle's plane, from edge `side` into the triangle, of unit length. The edge runs
+/// The conormal of an edge: in the triangle's plane, from an edge into the triangle, of unit length. The edge runs
 /// from that vertex to the next. Zero if the triangle has no area.
-glm::vec3 conormalOf(const Triangle& triangle, int side);
+glm::vec3 conormalOf(const Triangle& triangle, int edge);
 
 /// Adjacency of triangles by edge and vertex. Features are shared if their coordinates are equal to the bit. Edge i of
 /// a triangle runs from its vertex i to the next one.

@@ -22,9 +22,9 @@ constexpr float minDisplacement = 0.05f;
 // a margin. A rotation then lifts no point off the surface by more than the second value [fractions of
 // Continuity::sameWithin].
 constexpr float maxRotation = 0.5f, maxLift = 0.25f;
-// Predicted contacts touch slightly too earlyBy. Otherwise the points around the lowest one of a wheel penetrate by the
+// Predicted contacts touch slightly too early. Otherwise the points around the lowest one of a wheel penetrate by the
 // error of a step, and throw it up when they touch. The first value is a fraction of the curvature of their paths, the
-// second otherVelocity limit [fractions of Continuity::sameWithin].
+// second its limit [fractions of Continuity::sameWithin].
 constexpr float earlyFraction = 0.1f, maxEarly = 0.05f;
 // Minimum cosine between the field's and the contact's normals. Below it, the contact is that of an edge, and the field
 // gives no information about it.

@@ -1,10 +1,9 @@
 // The surfaces for continuous collision, each in its own coordinates and units. All have
 //
-//   std::optional<SurfaceEntry> entry(from, to, radius)      where a sphere enters on a straight path; its start if
-//   inside std::optional<glm::vec3> depenetration(point, radius)    displacement of a sphere that is inside to the
-//   surface; none if unknown
-//
-// and a bound() of the distance to their surface. Open surfaces have isNear() instead.
+// - std::optional<SurfaceEntry> entry(from, to, radius): where a sphere enters on a straight path; its start if inside;
+// - std::optional<glm::vec3> depenetration(point, radius): the displacement to the surface of a sphere that is inside;
+//   none if unknown;
+// - a bound() of the distance to their surface. Open surfaces have isNear() instead.
 #pragma once
 
 #include <BulletCollision/CollisionShapes/btConcaveShape.h>
