@@ -13,6 +13,13 @@ btRigidBody* activeDynamicBody(btCollisionObject& object) {
     return body && !body->isStaticOrKinematicObject() && body->isActive() ? body : nullptr;
 }
 
+float boundingRadius(const btCollisionObject& object) {
+    btVector3 centre;
+    btScalar radius;
+    object.getCollisionShape()->getBoundingSphere(centre, radius);
+    return centre.length() + radius;
+}
+
 BodySweep::BodySweep(btCollisionObject& object, float seconds)
     : object_(object), end_(object.getWorldTransform()), start_(end_.getOrigin()), orientation_(end_.getRotation()) {
     body_ = activeDynamicBody(object);
@@ -34,13 +41,6 @@ btTransform BodySweep::at(float time) const {
     const float elapsed = std::min(time, stopTime_), left = 1 - elapsed;
     const btTransform back(btQuaternion(axis_, -left * angle_));
     return btTransform((back.getRotation() * orientation_).normalized(), start_ + elapsed * displacement_);
-}
-
-float BodySweep::radius() const {
-    btVector3 centre;
-    btScalar radius;
-    object_.getCollisionShape()->getBoundingSphere(centre, radius);
-    return centre.length() + radius;
 }
 
 float BodySweep::maxDisplacement(const BodySweep& other) const {

@@ -8,6 +8,9 @@ namespace bilayer::bullet::detail {
 /// The object as a body, if it is an active dynamic body of the world; null otherwise.
 btRigidBody* activeDynamicBody(btCollisionObject& object);
 
+/// Radius of a sphere about an object's origin that contains the object.
+float boundingRadius(const btCollisionObject& object);
+
 /// The sweep of an object over a step that has ended: its motion from the start to the end of the step.
 class BodySweep {
   public:
@@ -20,8 +23,7 @@ class BodySweep {
     /// Its transform after this fraction of the step [0..1].
     btTransform at(float time) const;
 
-    /// Radius of a sphere about the object's origin that contains the object.
-    float radius() const;
+    float radius() const { return boundingRadius(object_); }
     /// Upper bound of the displacement of its points.
     float maxDisplacement() const { return displacement_.length() + radius() * angle_; }
     /// Upper bound of the displacement of its points in the frame of another object.

@@ -1,6 +1,5 @@
 #include "integration/bullet/detail/rest_stabilisation.h"
 
-#include <BulletCollision/CollisionShapes/btCollisionShape.h>
 #include <BulletDynamics/ConstraintSolver/btTypedConstraint.h>
 #include <BulletDynamics/Dynamics/btRigidBody.h>
 #include <LinearMath/btTransformUtil.h>
@@ -10,6 +9,8 @@
 #include <limits>
 #include <unordered_map>
 #include <vector>
+
+#include "integration/bullet/detail/body_sweep.h"
 
 namespace bilayer::bullet::detail {
 
@@ -40,13 +41,6 @@ bool isWithoutForce(const btRigidBody& body) {
     return body.getTotalForce().isZero() && body.getTotalTorque().isZero();
 }
 
-float radiusOf(const btRigidBody& body) {
-    btVector3 centre;
-    btScalar radius;
-    body.getCollisionShape()->getBoundingSphere(centre, radius);
-    return centre.length() + radius;
-}
-
 Velocities operator-(const Velocities& a, const Velocities& b) {
     return {a.linear - b.linear, a.angular - b.angular};
 }
@@ -57,7 +51,7 @@ Velocities velocitiesOf(const btRigidBody& body) {
 
 // Speed of a body's farthest point, in fractions of the speed that gravity adds in a step.
 float speedOf(const btRigidBody& body, const Velocities& velocities, float seconds) {
-    const float speed = velocities.linear.length() + radiusOf(body) * velocities.angular.length();
+    const float speed = velocities.linear.length() + boundingRadius(body) * velocities.angular.length();
     return speed / (seconds * body.getGravity().length());
 }
 

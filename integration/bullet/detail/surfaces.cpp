@@ -17,7 +17,6 @@ using namespace bilayer::detail;
 namespace {
 
 constexpr float minStride = 0.05f;  // minimum stride through samples [voxels]
-constexpr int maxStrides = 64;      // longer paths are searched point by point
 constexpr float everywhere = std::numeric_limits<float>::max();
 
 }  // namespace
@@ -52,17 +51,12 @@ std::optional<glm::vec3> FieldSurface::depenetration(const glm::vec3& point, flo
 
 // Whether a path stays outside, by strides through the samples. Many times as fast as the search for the entry.
 bool FieldSurface::staysOut(const glm::vec3& from, const glm::vec3& to, float radius) const {
-    const float length = glm::distance(from, to), voxel = field_.voxelSize();
-    const float error = field_.mesh() ? maxInterpolationError * voxel : 0;
-    float travelled = 0;
-    for (int i = 0; i < maxStrides && travelled <= length; ++i) {
-        const Sample sample = field_.sampleWithin(length > 0 ? from + travelled / length * (to - from) : from, 0);
-        const float clearance = sample.inBand && radius == 0 ? (sample.distance - error) / steepestInterpolant
-                                                             : sample.distance - radius - maxInterpolationError * voxel;
-        if (clearance < minStride * voxel) return false;
-        travelled += clearance;
-    }
-    return travelled > length;
+    const float voxel = field_.voxelSize(), error = field_.mesh() ? maxInterpolationError * voxel : 0;
+    return staysClear(from, to, minStride * voxel, [&](const glm::vec3& at) {
+        const Sample sample = field_.sampleWithin(at, 0);
+        return sample.inBand && radius == 0 ? (sample.distance - error) / steepestInterpolant
+                                            : sample.distance - radius - maxInterpolationError * voxel;
+    });
 }
 
 bool FieldSurface::overlaps(const glm::vec3& point, float radius) const {

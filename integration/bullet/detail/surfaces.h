@@ -9,6 +9,7 @@
 #include <BulletCollision/CollisionShapes/btConcaveShape.h>
 #include <BulletCollision/CollisionShapes/btStaticPlaneShape.h>
 
+#include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
 #include <optional>
 
@@ -23,6 +24,23 @@ using namespace bilayer::detail;
 struct SurfaceEntry {
     glm::vec3 position, normal;  ///< the normal points outward and has unit length
 };
+
+/// Whether a path stays clear of a surface, by strides of the clearance. A path that takes too many strides counts as
+/// not clear.
+/// @param minClearance  at each stride, positive
+/// @param clearanceAt   float (const glm::vec3&): a lower bound of the distance from the surface
+template <class ClearanceAt>
+bool staysClear(const glm::vec3& from, const glm::vec3& to, float minClearance, ClearanceAt&& clearanceAt) {
+    constexpr int maxStrides = 64;
+    const float length = glm::distance(from, to);
+    float travelled = 0;
+    for (int i = 0; i < maxStrides && travelled <= length; ++i) {
+        const float clearance = clearanceAt(length > 0 ? from + travelled / length * (to - from) : from);
+        if (clearance < minClearance) return false;
+        travelled += clearance;
+    }
+    return travelled > length;
+}
 
 class FieldSurface {
   public:

@@ -37,7 +37,6 @@ constexpr float maxChordAngle = 0.1f;
 constexpr float nearDistance = 0.5f;
 constexpr int maxProbes = 1 << 20;     // along an edge; distant ones are skipped
 constexpr float arcOverChord = 1.12f;  // length of an arc of a rim over its chord, up to a quarter of the rim
-constexpr int maxStrides = 64;         // of a path near a surface; a longer path counts as a hit
 
 /// Transforms a field's coordinates into those of a surface at some time of the step.
 struct StepTransform {
@@ -184,15 +183,8 @@ class PointSweep {
         if constexpr (std::is_same_v<Surface, TriangleSurface>) {
             return surface_.isNear(from, to, radius);
         } else {
-            const float length = glm::distance(from, to), near = nearDistance * voxel_;
-            float travelled = 0;
-            for (int i = 0; i < maxStrides && travelled <= length; ++i) {
-                const glm::vec3 at = length > 0 ? from + travelled / length * (to - from) : from;
-                const float clearance = surface_.bound(at) - radius;
-                if (clearance < near) return true;
-                travelled += clearance;
-            }
-            return travelled <= length;
+            return !staysClear(from, to, nearDistance * voxel_,
+                               [&](const glm::vec3& at) { return surface_.bound(at) - radius; });
         }
     }
 
