@@ -11,6 +11,7 @@ namespace bilayer::detail {
 
 /// Of the deepest point on an edge [voxels].
 inline constexpr float searchTolerance = 2e-3f;
+
 /// A function of one variable at a place: value and slope.
 struct Slope {
     float place, value, slope;
@@ -25,9 +26,9 @@ inline Slope slopeAlong(const glm::vec3& along, float place, const SurfaceSample
 /// Whether the function may have a kink between two places or close to one of them. An edge that crosses another one
 /// makes such a kink, which the interpolant rounds off. The function is a distance.
 inline bool mayKinkBetween(const Slope& from, const Slope& to) {
-    constexpr float minRotation = 0.1f;
+    constexpr float minSlopeChange = 0.1f;
     constexpr float rounded = 0.5f;  // max remaining slope at the kink itself
-    return to.slope - from.slope > minRotation && from.slope < rounded && to.slope > -rounded;
+    return to.slope - from.slope > minSlopeChange && from.slope < rounded && to.slope > -rounded;
 }
 
 /// Whether the function falls from both ends to a minimum in between. The threshold excludes rounding noise on a plane.
