@@ -24,9 +24,9 @@ struct ColliderData {
     const Mesh& mesh() const;
     const Field& exactField() const;
     /// Whether contacts use the triangles at a point in body coordinates [m], as Body::accuracy says.
-    /// @param measured  use them everywhere if there is a mesh (ContactOptions::exact)
-    bool isExactAt(const glm::vec3& point, bool measured = false) const {
-        if (measured || body.accuracy == ContactAccuracy::exact) return body.mesh != nullptr;
+    /// @param exact  use them everywhere if there is a mesh (ContactOptions::exact)
+    bool isExactAt(const glm::vec3& point, bool exact = false) const {
+        if (exact || body.accuracy == ContactAccuracy::exact) return body.mesh != nullptr;
         return errorMask.hold(point);
     }
     const SharpEdges& edges() const { return sharpEdges; }

@@ -1,5 +1,7 @@
 #include "collider/contact/contact_cache.h"
 
+#include <bilayer/collider/contact.h>
+
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
@@ -9,37 +11,51 @@ namespace {
 
 // Slack of a list. A longer slack keeps the list valid for more steps, but lists more points.
 constexpr float minSlack = 0.25f;   // [voxels]
-constexpr float stepsThatHold = 8;  // the count of steps that a list should be valid for
-constexpr float rounding = 1e-5f;   // of places, relative to the lengths that they come from
+constexpr float minValidSteps = 8;  // the count of steps that a list should be valid for
+constexpr float rounding = 1e-5f;   // of positions, relative to the lengths that they come from
 const float halfRoot = std::sqrt(0.5f);
 
-bool sameBodies(const CandidateLists::Place& a, const CandidateLists::Place& b) {
+bool isSameSearch(const CandidateLists::RelativePose& a, const CandidateLists::RelativePose& b) {
     return a.body == b.body && a.other == b.other && a.reach == b.reach;
 }
 
-// An upper bound of the displacement of any point in a sphere between two places. The difference of two rotations
+// An upper bound of the displacement of any point in a sphere between two poses. The difference of two rotations
 // scales vectors in a plane by 2 sin(angle / 2), and is zero along the axis. The factor is its Frobenius norm over the
 // root of two.
-float moved(const CandidateLists::Place& from, const CandidateLists::Place& to, const glm::vec3& centre, float radius) {
-    const glm::mat3 turn = to.linear - from.linear;
-    const float norm2 = glm::dot(turn[0], turn[0]) + glm::dot(turn[1], turn[1]) + glm::dot(turn[2], turn[2]);
-    const glm::vec3 way = turn * centre + (to.shift - from.shift);
+float maxDisplacement(const CandidateLists::RelativePose& from, const CandidateLists::RelativePose& to,
+                      const glm::vec3& centre, float radius) {
+    const glm::mat3 change = to.linear - from.linear;
+    const float norm2 =
+        glm::dot(change[0], change[0]) + glm::dot(change[1], change[1]) + glm::dot(change[2], change[2]);
+    const glm::vec3 displacement = change * centre + (to.shift - from.shift);
     const float size = glm::length(to.shift) + glm::length(to.linear[0]) * (glm::length(centre) + radius);
-    return glm::length(way) + radius * halfRoot * std::sqrt(norm2) + rounding * size;
+    return glm::length(displacement) + radius * halfRoot * std::sqrt(norm2) + rounding * size;
 }
 
 }  // namespace
 
-bool CandidateLists::List::holds(const Place& now, const glm::vec3& centre, float radius, float voxel, float maxSlack) {
-    const bool same = sameBodies(now, last_);
-    const float step = same ? moved(last_, now, centre, radius) : maxSlack;
-    last_ = now;
-    if (same && slack_ > 0 && moved(listed_, now, centre, radius) <= slack_) return true;
-    slack_ = std::max(minSlack * voxel, stepsThatHold * step);
+bool CandidateLists::List::holds(const RelativePose& pose, const glm::vec3& centre, float radius, float voxel,
+                                 float maxSlack) {
+    const bool same = isSameSearch(pose, last_);
+    const float step = same ? maxDisplacement(last_, pose, centre, radius) : maxSlack;
+    last_ = pose;
+    if (same && slack_ > 0 && maxDisplacement(listed_, pose, centre, radius) <= slack_) return true;
+    slack_ = std::max(minSlack * voxel, minValidSteps * step);
     if (!(slack_ <= maxSlack)) slack_ = 0;
-    listed_ = now;
+    listed_ = pose;
     points_.clear();
     return false;
 }
 
 }  // namespace bilayer::detail
+
+namespace bilayer {
+
+using namespace detail;
+
+ContactCache::ContactCache() : data_(std::make_unique<CandidateLists>()) {}
+ContactCache::~ContactCache() = default;
+ContactCache::ContactCache(ContactCache&&) noexcept = default;
+ContactCache& ContactCache::operator=(ContactCache&&) noexcept = default;
+
+}  // namespace bilayer

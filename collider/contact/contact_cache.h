@@ -16,7 +16,7 @@ namespace bilayer::detail {
 /// contacts.
 struct CandidateLists {
     /// The transform from the coordinates of one body to those of the other.
-    struct Place {
+    struct RelativePose {
         std::uint64_t body = 0, other = 0;  ///< Collider::id()
         float reach = 0;                    ///< max separation of contacts [m, at the other body's scale]
         glm::mat3 linear{0};
@@ -30,7 +30,7 @@ struct CandidateLists {
         /// @param centre, radius  of a bounding sphere of the body, in its own coordinates [m]
         /// @param voxel           of the other body's field [m]
         /// @param maxSlack        upper limit of the slack [m]
-        bool holds(const Place& now, const glm::vec3& centre, float radius, float voxel, float maxSlack);
+        bool holds(const RelativePose& pose, const glm::vec3& centre, float radius, float voxel, float maxSlack);
 
         /// How far the bodies may move before a new list is invalid [m]. 0: they move too fast for a list. Call it
         /// after holds() has returned false.
@@ -40,7 +40,7 @@ struct CandidateLists {
 
       private:
         std::vector<std::uint32_t> points_;
-        Place listed_, last_;
+        RelativePose listed_, last_;
         float slack_ = 0;
     };
 

@@ -1,4 +1,4 @@
-// Finds the deepest point of an edge in another body, and the contact there; internal.
+// Finds the deepest point of an edge in another body, and the contact there.
 #pragma once
 
 #include <cmath>
@@ -11,26 +11,35 @@ namespace bilayer::detail {
 
 /// Of the deepest point on an edge [voxels].
 inline constexpr float searchTolerance = 2e-3f;
-/// Points that slide along a face hit the edges beyond it by rounding. Hits shallower than this are ignored [voxels].
-inline constexpr float grazingTolerance = 0.25f;
 
 /// A function of one variable at a place: value and slope.
 struct Slope {
     float place, value, slope;
 };
 
+/// The distance of a surface along an edge.
+/// @param along  the edge's direction, of unit length
+inline Slope slopeAlong(const glm::vec3& along, float place, const SurfaceSample& sample) {
+    return {place, sample.distance, glm::dot(sample.normal, along)};
+}
+
 /// Whether the function may have a kink between two places or close to one of them. An edge that crosses another one
 /// makes such a kink, which the interpolant rounds off. The function is a distance.
 inline bool mayKinkBetween(const Slope& from, const Slope& to) {
-    constexpr float minRotation = 0.1f;
+    constexpr float minSlopeChange = 0.1f;
     constexpr float rounded = 0.5f;  // max remaining slope at the kink itself
-    return to.slope - from.slope > minRotation && from.slope < rounded && to.slope > -rounded;
+    return to.slope - from.slope > minSlopeChange && from.slope < rounded && to.slope > -rounded;
 }
 
 /// Whether the function falls from both ends to a minimum in between. The threshold excludes rounding noise on a plane.
 inline bool fallsBetween(const Slope& from, const Slope& to) {
     constexpr float minSlope = 0.02f;
     return from.slope < -minSlope && to.slope > minSlope;
+}
+
+/// Whether an edge may be deeper between two places than at both of them.
+inline bool mayBeDeeperBetween(const Slope& from, const Slope& to) {
+    return fallsBetween(from, to) || mayKinkBetween(from, to);
 }
 
 /// Finds the minimum between two places where the function falls from the first and rises to the second, as along an
@@ -48,11 +57,11 @@ std::optional<Slope> lowestBetween(Slope from, Slope to, float tolerance, Functi
     constexpr float nearestEnd = 0.02f;  // min distance of queries from the ends, as a fraction of the interval
     Slope best = from.value < to.value ? from : to;
     for (int i = 0; i < maxQueries; ++i) {
-        const float width = to.place - from.place, turn = to.slope - from.slope;
-        if (!(turn > 0)) break;
+        const float width = to.place - from.place, slopeChange = to.slope - from.slope;
+        if (!(slopeChange > 0)) break;
         const bool tangents = i % 2 == 0;
-        const float aside = tangents ? from.value - to.value + to.slope * width : -from.slope * width;
-        const float part = std::fmin(std::fmax(aside / (turn * width), nearestEnd), 1 - nearestEnd);
+        const float offset = tangents ? from.value - to.value + to.slope * width : -from.slope * width;
+        const float part = std::fmin(std::fmax(offset / (slopeChange * width), nearestEnd), 1 - nearestEnd);
         const std::optional<Slope> next = at(from.place + part * width);
         if (!next) return std::nullopt;
         if (next->value <= best.value) best = *next;
@@ -61,6 +70,14 @@ std::optional<Slope> lowestBetween(Slope from, Slope to, float tolerance, Functi
         (next->slope < 0 ? from : to) = *next;
     }
     return best;
+}
+
+/// The deepest place of an edge between two places: the minimum where the distance falls to one, else the lower end.
+/// Arguments are those of lowestBetween().
+template <class Function>
+std::optional<Slope> deepestBetween(const Slope& from, const Slope& to, float tolerance, Function&& at) {
+    if (fallsBetween(from, to)) return lowestBetween(from, to, tolerance, at);
+    return from.value < to.value ? from : to;
 }
 
 /// The contact of an edge at its deepest point, perpendicular to the edge. If the edge crosses the ridge between two
@@ -75,25 +92,34 @@ inline std::optional<SurfaceSample> acrossEdge(const glm::vec3& along, const Sur
     constexpr float minAcross = 0.3f;  // min length of the normal's projection perpendicular to the edge
     constexpr float minRidge = 0.05f;  // sine of the angle between two normals; below, they belong to one face
     constexpr float maxDeeper = 1.5f;
-    std::optional<SurfaceSample> held;
-    float most = minAcross;
-    for (const auto& touch : {std::optional(here), before, after}) {
-        if (!touch) continue;
-        const glm::vec3 across = touch->normal - glm::dot(touch->normal, along) * along;
+    std::optional<SurfaceSample> best;
+    float maxLength = minAcross;
+    for (const auto& sample : {std::optional(here), before, after}) {
+        if (!sample) continue;
+        const glm::vec3 across = sample->normal - glm::dot(sample->normal, along) * along;
         const float length = glm::length(across);
-        if (!(length > most)) continue;
-        most = length;
-        held = SurfaceSample{touch->distance, across / length};
+        if (!(length > maxLength)) continue;
+        maxLength = length;
+        best = SurfaceSample{sample->distance, across / length};
     }
-    if (!held || !before || !after) return held;
+    if (!best || !before || !after) return best;
     const glm::vec3 &a = before->normal, &b = after->normal;
     const float fall = -glm::dot(a, along), rise = glm::dot(b, along);
-    if (!(fall > 0 && rise > 0 && glm::length(glm::cross(a, b)) > minRidge)) return held;
+    if (!(fall > 0 && rise > 0 && glm::length(glm::cross(a, b)) > minRidge)) return best;
     // perpendicular to the edge and to the ridge
     const glm::vec3 over = rise * a + fall * b;
     const float length = glm::length(over);
     const float deeper = std::fmin((fall + rise) / length, maxDeeper);
     return SurfaceSample{here.distance < 0 ? deeper * here.distance : here.distance, over / length};
+}
+
+/// The same with samples on either side of a place.
+/// @param sampleAt  the surface at a place of the edge, where it is known
+template <class SampleAt>
+std::optional<SurfaceSample> acrossEdge(const glm::vec3& along, const SurfaceSample& here, float place, float voxelSize,
+                                        SampleAt&& sampleAt) {
+    const float offset = 2 * searchTolerance * voxelSize;
+    return acrossEdge(along, here, sampleAt(place - offset), sampleAt(place + offset));
 }
 
 }  // namespace bilayer::detail

@@ -17,7 +17,7 @@ constexpr int places = 3;
 
 // Two bits per cell of a block: whether it has been tested, and the result.
 constexpr int side = FieldFrame::side, cellsPerWord = 32, wordsPerBlock = side * side * side / cellsPerWord;
-constexpr std::uint64_t isMeasured = 1, isStray = 2;
+constexpr std::uint64_t isTested = 1, isInaccurate = 2;
 
 }  // namespace
 
@@ -39,11 +39,11 @@ bool InterpolationErrorMask::hold(const glm::vec3& point) const noexcept {
     const int index = (inBlock.x * side + inBlock.y) * side + inBlock.z, shift = 2 * (index % cellsPerWord);
     std::atomic<std::uint64_t>& word = known_[std::ptrdiff_t(block) * wordsPerBlock + index / cellsPerWord];
     std::uint64_t bits = word.load(std::memory_order_relaxed) >> shift;
-    if (!(bits & isMeasured)) {
-        bits = areAt(cell) ? isMeasured | isStray : isMeasured;
+    if (!(bits & isTested)) {
+        bits = areAt(cell) ? isTested | isInaccurate : isTested;
         word.fetch_or(bits << shift, std::memory_order_relaxed);  // another thread may have stored the same result
     }
-    return bits & isStray;
+    return bits & isInaccurate;
 }
 
 bool InterpolationErrorMask::areAt(const glm::ivec3& cell) const noexcept {

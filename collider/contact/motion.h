@@ -11,11 +11,11 @@ namespace bilayer::detail {
 /// The motion of a body's points relative to another body, in the other one's coordinates [m].
 class RelativeMotion {
   public:
-    RelativeMotion(const Pose& body, const Motion& motion, const Pose& seenFrom, const Motion& its) {
-        const glm::quat into = glm::conjugate(seenFrom.rotation);
-        displacement_ = into * (motion.displacement - its.displacement +
-                                glm::cross(motion.rotation, seenFrom.position - body.position));
-        rotation_ = into * (motion.rotation - its.rotation);
+    RelativeMotion(const Pose& body, const Motion& motion, const Pose& other, const Motion& otherMotion) {
+        const glm::quat into = glm::conjugate(other.rotation);
+        displacement_ = into * (motion.displacement - otherMotion.displacement +
+                                glm::cross(motion.rotation, other.position - body.position));
+        rotation_ = into * (motion.rotation - otherMotion.rotation);
     }
 
     /// The displacement of the body's point at `point`.
@@ -25,7 +25,7 @@ class RelativeMotion {
     const glm::vec3& rotation() const { return rotation_; }
 
     /// An upper bound of the displacements of the points in a sphere.
-    float longest(const glm::vec3& centre, float radius) const {
+    float maxDisplacement(const glm::vec3& centre, float radius) const {
         return glm::length(of(centre)) + radius * glm::length(rotation_);
     }
 

@@ -1,28 +1,77 @@
-// The filter of contacts by their normals.
+// The filter of contacts by their normals, and the test for points that only graze a surface. They suppress ghost
+// collisions with edges between faces.
 #pragma once
 
 #include <bilayer/collider/contact.h>
+
 #include <algorithm>
 #include <glm/geometric.hpp>
 
 namespace bilayer::detail {
 
-/// Whether a contact passes, by the cosine between the reversed surface normal and the point's normal.
-/// @param apart  the point belongs to a face and does not touch yet
-inline bool keeps(const ContactOptions& options, float cosine, bool apart) {
-    return cosine >=
-           (apart ? std::max(options.minNormalCosineApart, options.minNormalCosine) : options.minNormalCosine);
+/// Points that slide along a face hit the edges beyond it by rounding. Hits shallower than this are ignored [voxels].
+inline constexpr float grazingTolerance = 0.25f;
+
+/// Where the path of a surface point starts that tests whether the point only grazes another surface: slightly inside
+/// its own body, perpendicular to the path. A point that grazes hits nothing from there.
+/// @param normal  of the point, of unit length
+inline glm::vec3 grazingTestStart(const glm::vec3& point, const glm::vec3& normal, const glm::vec3& displacement,
+                                  float voxelSize) {
+    const glm::vec3 across =
+        normal - glm::dot(normal, displacement) / glm::dot(displacement, displacement) * displacement;
+    return point - grazingTolerance * voxelSize * across;
 }
-/// The same for a point that rotates with its body. The contact passes if the point opposes the surface at the start,
-/// the middle or the end of the step.
-/// @param seen, normal  outward normals of the surface and of the point
-/// @param turn          rotation in the step relative to the surface [rad]
-inline bool keeps(const ContactOptions& options, const glm::vec3& seen, const glm::vec3& normal, const glm::vec3& turn,
-                  bool apart) {
-    const auto isKept = [&](float part) {
-        return keeps(options, -glm::dot(seen, glm::normalize(normal + part * glm::cross(turn, normal))), apart);
-    };
-    return isKept(0) || (turn != glm::vec3(0) && (isKept(0.5f) || isKept(1)));
+
+/// Whether a test holds for a normal that rotates: at the start, the middle or the end of the step.
+/// @param rotation  in the step [rad]
+/// @param test      bool (const glm::vec3& normal)
+template <class Test>
+bool holdsDuringRotation(const glm::vec3& normal, const glm::vec3& rotation, Test&& test) {
+    const auto holdsAt = [&](float part) { return test(glm::normalize(normal + part * glm::cross(rotation, normal))); };
+    return holdsAt(0) || (rotation != glm::vec3(0) && (holdsAt(0.5f) || holdsAt(1)));
+}
+
+/// Whether a contact passes, by the cosine between the reversed surface normal and the point's normal.
+/// @param isSeparated  the point belongs to a face and does not touch yet
+inline bool passesNormalFilter(const ContactOptions& options, float cosine, bool isSeparated) {
+    return cosine >=
+           (isSeparated ? std::max(options.minNormalCosineApart, options.minNormalCosine) : options.minNormalCosine);
+}
+
+/// The same for a point that rotates with its body: whether the point opposes the surface at some time of the step.
+/// @param surfaceNormal, normal  outward normals of the surface and of the point
+/// @param rotation               in the step relative to the surface [rad]
+inline bool passesNormalFilter(const ContactOptions& options, const glm::vec3& surfaceNormal, const glm::vec3& normal,
+                               const glm::vec3& rotation, bool isSeparated) {
+    return holdsDuringRotation(normal, rotation, [&](const glm::vec3& rotated) {
+        return passesNormalFilter(options, -glm::dot(surfaceNormal, rotated), isSeparated);
+    });
+}
+
+/// The same, and a separated point that does not approach must not face an edge obliquely.
+/// @param facesEdge  bool (): facesEdgeObliquely() for this contact
+template <class FacesEdge>
+bool passesNormalFilter(const ContactOptions& options, const glm::vec3& surfaceNormal, const glm::vec3& normal,
+                        const glm::vec3& rotation, bool isSeparated, bool isApproaching, FacesEdge&& facesEdge) {
+    if (!passesNormalFilter(options, surfaceNormal, normal, rotation, isSeparated)) return false;
+    return options.keepsObliqueEdges || !isSeparated || isApproaching || !facesEdge();
+}
+
+/// Whether a face point next to another surface faces an edge of that surface obliquely. The surface normal is
+/// evaluated again next to the closest place, in the point's tangent plane. If it opposes the point's normal there, the
+/// place is on an edge. The edge's own points then make the contact with the face.
+/// @param position, normal         of the point
+/// @param distance, surfaceNormal  distance and outward normal of the other surface there
+/// @param normalAt                 glm::vec3 (const glm::vec3&): normal of the other surface near a place
+template <class NormalAt>
+bool facesEdgeObliquely(const glm::vec3& position, const glm::vec3& normal, float distance,
+                        const glm::vec3& surfaceNormal, NormalAt&& normalAt) {
+    // within half a degree of the normal
+    constexpr float straight = 0.99996f, straighter = 0.1f;
+    const float cosine = -glm::dot(surfaceNormal, normal);
+    if (cosine > straight) return false;
+    const glm::vec3 there = normalAt(position - distance * surfaceNormal - cosine * distance * normal);
+    return 1 + glm::dot(there, normal) < straighter * (1 - cosine);
 }
 
 }  // namespace bilayer::detail

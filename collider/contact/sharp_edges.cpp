@@ -12,12 +12,12 @@ namespace {
 
 // Max distance of neighbours on an edge [voxels]. Candidates are at least 1.4 voxels apart. Every second or third of
 // them remains where points are two voxels apart.
-constexpr float farthestNeighbour = 4.5f;
+constexpr float maxNeighbourDistance = 4.5f;
 // Of two neighbours in about the same direction, only the nearer one counts: cosine of 60 degrees.
 constexpr float sameDirection = 0.5f;
-// Max cosine between an edge and the normals at its ends. An edge is perpendicular to them except at vertices: a cube's
-// have 0.58.
-constexpr float minSquare = 0.7f;
+// Max cosine between an edge and the normals at its ends. An edge is perpendicular to them except at vertices: a
+// cube's have 0.58.
+constexpr float maxNormalCosine = 0.7f;
 // Max rounding of sharp edges by the interpolant [voxels]; at larger distances there is a groove between the two
 // points.
 constexpr float onSurface = 0.45f;
@@ -30,7 +30,7 @@ constexpr float minCrossing = 0.2f;
 constexpr float crossingWithin = 1.5f;
 // Max depth of a crossing, as a multiple of the depth in the field and as an excess over it [voxels]. The field's depth
 // is across faces instead of both edges, and a sampled field rounds edges off.
-constexpr float deepestAcross = 1.5f, deepestUnseen = 1, deepestAcrossExact = 2, deepestUnseenExact = 0.25f;
+constexpr float maxDepthFactor = 1.5f, maxExcessDepth = 1, maxDepthFactorExact = 2, maxExcessDepthExact = 0.25f;
 // Min angle (sine) between the faces and the plane that separates two edges. Coplanar faces touch by their points.
 constexpr float minLeaving = 0.09f;
 // Smaller angles (sine) count as level.
@@ -38,9 +38,9 @@ constexpr float level = 0.09f;
 // Max length of the mean direction along the edges around a point: longer where they bend by more than ten degrees.
 constexpr float minBend = 0.0872f;
 // Distance from an edge at which its faces are sampled [voxels].
-constexpr float wingSpan = 1.5f;
+constexpr float conormalOffset = 1.5f;
 // Tolerance for the ends of an edge's segments, relative to their length.
-constexpr float gap = 0.02f;
+constexpr float endTolerance = 0.02f;
 // Min count of points, within the neighbour distance, to surround a point.
 constexpr int minAround = 3;
 
@@ -52,28 +52,29 @@ struct Neighbour {
 
 std::vector<Neighbour> neighboursOf(std::uint32_t index, const SurfacePoints& points, const Field& field) {
     const SurfacePoint& point = points.points()[index];
-    const float reach = farthestNeighbour * field.voxelSize();
-    std::vector<Neighbour> near;
+    const float reach = maxNeighbourDistance * field.voxelSize();
+    std::vector<Neighbour> candidates;
     points.visit(
         [&](const glm::vec3& centre, float radius) { return glm::distance(centre, point.position) > radius + reach; },
         [&](std::uint32_t other, const SurfacePoint& there) {
             if (!there.isSharp || other == index) return;
-            const glm::vec3 way = there.position - point.position;
-            const float distance = glm::length(way);
+            const glm::vec3 offset = there.position - point.position;
+            const float distance = glm::length(offset);
             if (!(distance > 0) || distance > reach) return;
-            const glm::vec3 direction = way / distance;
-            const float aslant =
+            const glm::vec3 direction = offset / distance;
+            const float cosine =
                 std::max(std::abs(glm::dot(direction, point.normal)), std::abs(glm::dot(direction, there.normal)));
-            // the height of the segment above an arc with these normals: a quarter of its ends' heights over each other
-            const float above = 0.125f * (glm::dot(way, point.normal) - glm::dot(way, there.normal));
-            if (aslant < minSquare && above <= maxAbove * field.voxelSize())
-                near.push_back({other, direction, distance});
+            // the height of the segment above an arc with these normals: a quarter of its ends' heights over each
+            // other
+            const float above = 0.125f * (glm::dot(offset, point.normal) - glm::dot(offset, there.normal));
+            if (cosine < maxNormalCosine && above <= maxAbove * field.voxelSize())
+                candidates.push_back({other, direction, distance});
         });
-    std::sort(near.begin(), near.end(), [](const Neighbour& a, const Neighbour& b) {
+    std::sort(candidates.begin(), candidates.end(), [](const Neighbour& a, const Neighbour& b) {
         return a.distance < b.distance || (a.distance == b.distance && a.index < b.index);
     });
     std::vector<Neighbour> kept;
-    for (const Neighbour& next : near) {
+    for (const Neighbour& next : candidates) {
         const auto hides = [&](const Neighbour& k) { return glm::dot(k.direction, next.direction) > sameDirection; };
         if (kept.size() == maxNeighbours) break;
         if (std::any_of(kept.begin(), kept.end(), hides)) continue;
@@ -86,25 +87,25 @@ std::vector<Neighbour> neighboursOf(std::uint32_t index, const SurfacePoints& po
 /// The conormals of an edge, from the surface next to its middle.
 Conormals conormalsOf(const SurfacePoint& a, const SurfacePoint& b, const Field& field) {
     const glm::vec3 along = glm::normalize(b.position - a.position), middle = 0.5f * (a.position + b.position);
-    const glm::vec3 aside = glm::normalize(glm::cross(along, a.normal + b.normal));
-    const auto wing = [&](float side) {
-        glm::vec3 place = middle + side * wingSpan * field.voxelSize() * aside;
+    const glm::vec3 across = glm::normalize(glm::cross(along, a.normal + b.normal));
+    const auto conormal = [&](float side) {
+        glm::vec3 place = middle + side * conormalOffset * field.voxelSize() * across;
         for (int i = 0; i < 2; ++i) {
             const Sample sample = field.sample(place);
             if (sample.inBand) place -= sample.distance * sample.gradient;
         }
-        const glm::vec3 way = place - middle;
-        return glm::normalize(way - glm::dot(way, along) * along);
+        const glm::vec3 offset = place - middle;
+        return glm::normalize(offset - glm::dot(offset, along) * along);
     };
-    return {wing(-1), wing(1)};
+    return {conormal(-1), conormal(1)};
 }
 
 }  // namespace
 
 SharpEdges::SharpEdges(const SurfacePoints& points, const Field& field)
-    : deepestAcross_(field.mesh() ? deepestAcrossExact : deepestAcross),
-      deepestUnseen_(field.mesh() ? deepestUnseenExact : deepestUnseen),
-      nearby_(farthestNeighbour * field.voxelSize()) {
+    : maxDepthFactor_(field.mesh() ? maxDepthFactorExact : maxDepthFactor),
+      maxExcessDepth_(field.mesh() ? maxExcessDepthExact : maxExcessDepth),
+      neighbourDistance_(maxNeighbourDistance * field.voxelSize()) {
     const auto all = points.points();
     std::vector<std::vector<Neighbour>> neighbours(all.size());
     tbb::parallel_for(std::uint32_t(0), std::uint32_t(all.size()), [&](std::uint32_t i) {
@@ -113,10 +114,10 @@ SharpEdges::SharpEdges(const SurfacePoints& points, const Field& field)
     for (std::uint32_t i = 0; i < all.size(); ++i)
         for (const Neighbour& next : neighbours[i]) {
             const auto isBack = [&](const Neighbour& n) { return n.index == i; };
-            const auto& its = neighbours[next.index];
-            if (next.index < i || std::none_of(its.begin(), its.end(), isBack)) continue;
+            const auto& theirs = neighbours[next.index];
+            if (next.index < i || std::none_of(theirs.begin(), theirs.end(), isBack)) continue;
             edges_.push_back({i, next.index, conormalsOf(all[i], all[next.index], field)});
-            longest_ = std::max(longest_, next.distance);
+            maxLength_ = std::max(maxLength_, next.distance);
         }
     first_.assign(all.size() + 1, 0);
     for (const SharpEdge& edge : edges_) ++first_[edge.from + 1], ++first_[edge.to + 1];
@@ -134,38 +135,38 @@ bool SharpEdges::isConvexVertex(const SurfacePoints& points, std::uint32_t point
 bool SharpEdges::isWithinEdge(const SurfacePoints& points, std::uint32_t point) const {
     glm::vec3 sum(0);
     for (const std::uint32_t e : around(point)) {
-        const std::uint32_t next = edges_[e].from == point ? edges_[e].to : edges_[e].from;
+        const std::uint32_t next = edges_[e].otherEnd(point);
         sum += glm::normalize(points.points()[next].position - points.points()[point].position);
     }
     return !around(point).empty() && glm::length(sum) <= minBend * float(around(point).size());
 }
 
 bool SharpEdges::edgesRecede(const SurfacePoints& points, std::uint32_t point, const glm::vec3& direction) const {
-    const auto fallsBack = [&](std::uint32_t e) {
+    const auto recedes = [&](std::uint32_t e) {
         const SharpEdge& edge = edges_[e];
-        const std::uint32_t next = edge.from == point ? edge.to : edge.from;
-        const glm::vec3 way = points.points()[next].position - points.points()[point].position;
-        return glm::dot(way, direction) <= level * glm::length(way) &&
+        const std::uint32_t next = edge.otherEnd(point);
+        const glm::vec3 along = points.points()[next].position - points.points()[point].position;
+        return glm::dot(along, direction) <= level * glm::length(along) &&
                glm::dot(edge.conormals[0], direction) <= level && glm::dot(edge.conormals[1], direction) <= level;
     };
-    const auto its = around(point);
-    return !its.empty() && std::all_of(its.begin(), its.end(), fallsBack);
+    const auto edges = around(point);
+    return !edges.empty() && std::all_of(edges.begin(), edges.end(), recedes);
 }
 
 bool SharpEdges::pointsRecede(const SurfacePoints& points, std::uint32_t point, const glm::vec3& direction) const {
-    const glm::vec3 tip = points.points()[point].position;
+    const glm::vec3 vertex = points.points()[point].position;
     int found = 0;
-    bool fallBack = true;
+    bool recede = true;
     points.visit([&](const glm::vec3& centre,
-                     float radius) { return !fallBack || glm::distance(centre, tip) > radius + nearby_; },
+                     float radius) { return !recede || glm::distance(centre, vertex) > radius + neighbourDistance_; },
                  [&](std::uint32_t other, const SurfacePoint& there) {
-                     const glm::vec3 way = there.position - tip;
-                     const float distance = glm::length(way);
-                     if (other == point || distance > nearby_) return;
+                     const glm::vec3 offset = there.position - vertex;
+                     const float distance = glm::length(offset);
+                     if (other == point || distance > neighbourDistance_) return;
                      ++found;
-                     fallBack = fallBack && glm::dot(way, direction) <= level * distance;
+                     recede = recede && glm::dot(offset, direction) <= level * distance;
                  });
-    return fallBack && found >= minAround;
+    return recede && found >= minAround;
 }
 
 std::optional<SharpEdges::Crossing> SharpEdges::crossing(const SurfacePoints& points, const glm::vec3& from,
@@ -175,30 +176,30 @@ std::optional<SharpEdges::Crossing> SharpEdges::crossing(const SurfacePoints& po
     if (edges_.empty()) return std::nullopt;
     const glm::vec3 along = to - from;
     const float within = crossingWithin * voxelSize,
-                least = std::min(deepestAcross_ * distance, distance - deepestUnseen_ * voxelSize);
-    const float reach = within + longest_;
+                minDistance = std::min(maxDepthFactor_ * distance, distance - maxExcessDepth_ * voxelSize);
+    const float reach = within + maxLength_;
     std::optional<Crossing> best;
     float nearest = within;
     const auto consider = [&](const SharpEdge& edge) {
         const SurfacePoint &a = points.points()[edge.from], &b = points.points()[edge.to];
-        const glm::vec3 its = b.position - a.position, across = glm::cross(along, its);
+        const glm::vec3 thisAlong = b.position - a.position, across = glm::cross(along, thisAlong);
         const float area = glm::length(across);
-        if (area < minCrossing * glm::length(along) * glm::length(its)) return;
+        if (area < minCrossing * glm::length(along) * glm::length(thisAlong)) return;
         // The closest points of the two lines.
         const glm::vec3 offset = a.position - from;
-        const float onOther = glm::dot(glm::cross(offset, its), across) / (area * area);
+        const float onOther = glm::dot(glm::cross(offset, thisAlong), across) / (area * area);
         const float onThis = glm::dot(glm::cross(offset, along), across) / (area * area);
-        if (onOther < 0 || onOther > 1 || onThis < -gap || onThis > 1 + gap) return;
-        const glm::vec3 there = from + onOther * along, here = a.position + onThis * its;
-        const float away = glm::distance(there, place);
+        if (onOther < 0 || onOther > 1 || onThis < -endTolerance || onThis > 1 + endTolerance) return;
+        const glm::vec3 there = from + onOther * along, here = a.position + onThis * thisAlong;
+        const float distanceFromPlace = glm::distance(there, place);
         const glm::vec3 normal = (glm::dot(across, a.normal + b.normal) < 0 ? -1.f : 1.f) / area * across;
-        if (away > nearest) return;
+        if (distanceFromPlace > nearest) return;
         for (int i = 0; i < 2; ++i)
             if (glm::dot(normal, edge.conormals[i]) > -minLeaving || glm::dot(normal, conormals[i]) < minLeaving)
                 return;
         const float distance = glm::dot(there - here, normal);
-        if (distance < least) return;
-        nearest = away;
+        if (distance < minDistance) return;
+        nearest = distanceFromPlace;
         best = Crossing{here, normal, distance};
     };
     points.visit([&](const glm::vec3& centre, float radius) { return glm::distance(centre, place) > radius + reach; },

@@ -20,6 +20,8 @@ using Conormals = std::array<glm::vec3, 2>;
 struct SharpEdge {
     std::uint32_t from, to;
     Conormals conormals;
+
+    std::uint32_t otherEnd(std::uint32_t point) const { return from == point ? to : from; }
 };
 
 /// The sharp edges of a body, derived from its points and field alone; a body from a file thus has the same ones.
@@ -37,7 +39,7 @@ class SharpEdges {
         if (edges_.empty()) return {};
         return {ofPoints_.data() + first_[point], ofPoints_.data() + first_[point + 1]};
     }
-    float longest() const { return longest_; }  ///< [m]
+    float maxLength() const { return maxLength_; }  ///< [m]
 
     /// Whether a sharp point is a convex vertex (support vertex) in a direction: the body recedes from it on all sides,
     /// or along all edges at the point and their faces. A body that approaches along the direction hits this point
@@ -71,7 +73,7 @@ class SharpEdges {
 
     std::vector<SharpEdge> edges_;
     std::vector<std::uint32_t> first_, ofPoints_;
-    float longest_ = 0, deepestAcross_ = 0, deepestUnseen_ = 0, nearby_ = 0;
+    float maxLength_ = 0, maxDepthFactor_ = 0, maxExcessDepth_ = 0, neighbourDistance_ = 0;
 };
 
 }  // namespace bilayer::detail

@@ -17,7 +17,7 @@ namespace {
 
 constexpr double latticePitch = 0.75;    // of candidates on edges and faces [spacings]
 constexpr double minGap = 0.7;           // min distance of points with about the same normal [spacings]
-constexpr double likeness = 0.7;         // min cosine between such normals: a cube's edge and its faces have 0.71
+constexpr double minLikeCosine = 0.7;    // min cosine between such normals: a cube's edge and its faces have 0.71
 constexpr double minProtrusion = 0.035;  // max height of a dropped candidate over such a point [spacings]
 constexpr double minCornerGap = 0.1;     // between convex vertices [spacings]: a fraction of a voxel
 constexpr double corner = 0.5;           // min convexity of a vertex: a cube's has 0.58
@@ -130,8 +130,8 @@ class Candidates {
     void addFace(const glm::uvec3& t, const glm::dvec3& normal) {
         std::array<glm::dvec3, 3> p{at(t.x), at(t.y), at(t.z)};
         const auto length = [&](int i) { return glm::distance(p[i], p[(i + 1) % 3]); };
-        const int longest = length(0) >= length(1) && length(0) >= length(2) ? 0 : length(1) >= length(2) ? 1 : 2;
-        std::rotate(p.begin(), p.begin() + longest, p.end());
+        const int longestEdge = length(0) >= length(1) && length(0) >= length(2) ? 0 : length(1) >= length(2) ? 1 : 2;
+        std::rotate(p.begin(), p.begin() + longestEdge, p.end());
         const double base = glm::distance(p[0], p[1]);
         const double height = glm::length(glm::cross(p[1] - p[0], p[2] - p[0])) / base;
         const int rows = int(std::ceil(height / pitch_));
@@ -151,7 +151,7 @@ class Candidates {
 // Points in a hashed grid, for neighbour search within the side of a cell.
 class Grid {
   public:
-    Grid(double cell, std::size_t most) : cell_(cell), heads_(std::bit_ceil(most + 1), none) {}
+    Grid(double cell, std::size_t maxCount) : cell_(cell), heads_(std::bit_ceil(maxCount + 1), none) {}
 
     void insert(const Candidate& candidate) {
         std::uint32_t& head = heads_[slot(cellOf(candidate.position))];
@@ -161,13 +161,13 @@ class Grid {
 
     // Whether a point within `radius` (at most the side of a cell) has about the same normal. The normal separates the
     // sides of a thin wall. Tips finer than `radius` thus keep points on all their sides.
-    bool near(const Candidate& candidate, double radius, double protrusion) const {
+    bool hasNeighbour(const Candidate& candidate, double radius, double protrusion) const {
         const glm::i64vec3 cell = cellOf(candidate.position);
         for (int i = 0; i < 27; ++i) {
             const glm::i64vec3 neighbour = cell + glm::i64vec3(i / 9 - 1, i / 3 % 3 - 1, i % 3 - 1);
             for (std::uint32_t e = heads_[slot(neighbour)]; e != none; e = entries_[e].next)
                 if (glm::distance2(entries_[e].position, candidate.position) < radius * radius &&
-                    glm::dot(entries_[e].normal, candidate.normal) > likeness &&
+                    glm::dot(entries_[e].normal, candidate.normal) > minLikeCosine &&
                     glm::dot(candidate.position - entries_[e].position, candidate.normal) < protrusion)
                     return true;
         }
@@ -202,7 +202,7 @@ std::vector<SurfacePoint> thin(std::vector<Candidate> candidates, double spacing
     std::vector<SurfacePoint> points;
     for (const Candidate& candidate : candidates) {
         const double gap = candidate.convexity >= corner ? minCornerGap : minGap;
-        if (grid.near(candidate, gap * spacing, minProtrusion * spacing)) continue;
+        if (grid.hasNeighbour(candidate, gap * spacing, minProtrusion * spacing)) continue;
         grid.insert(candidate);
         points.push_back({glm::vec3(candidate.position), glm::vec3(candidate.normal), candidate.convexity >= sharp});
     }

@@ -3,7 +3,6 @@
 
 #include <BulletCollision/CollisionDispatch/btCollisionDispatcher.h>
 #include <BulletCollision/CollisionDispatch/btDefaultCollisionConfiguration.h>
-#include <bilayer/collider/contact.h>
 
 #include <memory>
 

@@ -22,9 +22,9 @@ constexpr float normalVoxels = 1;  // length of a surface point's line [voxels]
 
 // Whether an edge of the leaf lattice is on the outline of the occupied leaves. It is if one, three, or two opposite
 // ones of the four leaves around it are occupied. Two adjacent ones make a flat face.
-bool isOutline(bool here, bool besideU, bool besideV, bool besideBoth) {
-    const int occupied = here + besideU + besideV + besideBoth;
-    return occupied == 1 || occupied == 3 || (occupied == 2 && here == besideBoth);
+bool isOutline(bool here, bool neighbourU, bool neighbourV, bool diagonal) {
+    const int occupied = here + neighbourU + neighbourV + diagonal;
+    return occupied == 1 || occupied == 3 || (occupied == 2 && here == diagonal);
 }
 
 // Calls line(from, to) for the edges along one axis [leaves]; collinear edges in a row make one line.
@@ -32,15 +32,14 @@ template <class Line>
 void visitOutline(const Field& field, int axis, Line&& line) {
     const glm::ivec3 size = field.data().blocks;
     const int u = (axis + 1) % 3, v = (axis + 2) % 3;
-    glm::ivec3 at(0), beyondU(0), beyondV(0);
-    beyondU[u] = beyondV[v] = 1;
+    glm::ivec3 at(0), unitU(0), unitV(0);
+    unitU[u] = unitV[v] = 1;
     for (at[u] = 0; at[u] <= size[u]; ++at[u])
         for (at[v] = 0; at[v] <= size[v]; ++at[v]) {
             glm::ivec3 start(-1);
             for (at[axis] = 0; at[axis] <= size[axis]; ++at[axis]) {
-                const bool outlined =
-                    isOutline(field.data().keeps(at), field.data().keeps(at - beyondU),
-                              field.data().keeps(at - beyondV), field.data().keeps(at - beyondU - beyondV));
+                const bool outlined = isOutline(field.data().keeps(at), field.data().keeps(at - unitU),
+                                                field.data().keeps(at - unitV), field.data().keeps(at - unitU - unitV));
                 if (outlined && start[axis] < 0) start = at;
                 if (outlined || start[axis] < 0) continue;
                 line(start, at);

@@ -4,6 +4,7 @@
 #include <map>
 #include <mutex>
 #include <optional>
+#include <stdexcept>
 
 #include "integration/bullet/detail/continuous_collision.h"
 #include "integration/bullet/detail/gyroscopic_integrator.h"
@@ -28,12 +29,8 @@ class WorldExtensions::Hook : public btActionInterface {
     Hook(btDynamicsWorld& world, const ExtensionOptions& options) : world_(world) {
         if (options.continuousCollision) collision.emplace(world);
         if (options.restStabilisation) rest.emplace(world);
-        if (options.gyroscopicIntegration) gyroscopic_.emplace(world);
+        if (options.gyroscopicIntegration) integrateGyroscopically();
         world_.addAction(this);
-        if (!gyroscopic_) return;
-        const std::lock_guard lock(mutex_);
-        hooks_[&world_] = this;
-        takePreTick();
     }
 
     ~Hook() override {
@@ -68,6 +65,16 @@ class WorldExtensions::Hook : public btActionInterface {
         hook->gyroscopic_->beforeStep(seconds);
     }
 
+    void integrateGyroscopically() {
+        const std::lock_guard lock(mutex_);
+        if (!hooks_.emplace(&world_, this).second)
+            throw std::invalid_argument(
+                "WorldExtensions: another one of this world integrates gyroscopically already; set "
+                "ExtensionOptions::gyroscopicIntegration in only one of them");
+        gyroscopic_.emplace(world_);
+        takePreTick();
+    }
+
     // also replaces a callback that the user has set later
     void takePreTick() {
         btInternalTickCallback& current = PreTick::of(world_);
@@ -76,8 +83,8 @@ class WorldExtensions::Hook : public btActionInterface {
         current = preTick;
     }
 
-    static inline std::mutex mutex_;  // guards the members below
-    static inline std::map<btDynamicsWorld*, Hook*> hooks_;
+    static inline std::mutex mutex_;                         // guards the members below
+    static inline std::map<btDynamicsWorld*, Hook*> hooks_;  // those with a gyroscopic integrator
 
     btDynamicsWorld& world_;
     std::optional<GyroscopicIntegrator> gyroscopic_;

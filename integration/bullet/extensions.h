@@ -52,12 +52,16 @@ struct ExtensionOptions {
     /// implicit midpoint rule: J. C. Simo, K. K. Wong, "Unconditionally stable algorithms for rigid body dynamics that
     /// exactly preserve energy and momentum", Int. J. Numer. Meth. Engng. 31 (1991)). The changes by contacts,
     /// constraints, torques and damping are added to the angular momentum. Bullet's own gyroscopic torque is switched
-    /// off, body by body.
+    /// off, body by body. A world takes one integrator only: see WorldExtensions.
     bool gyroscopicIntegration = false;
 };
 
 /// Extends a world from its construction on. The world must outlive it. The user's own tick callbacks keep working,
 /// whether they are set before or after: pre-tick callbacks run before the extensions, others after them.
+///
+/// A world may have several of these. Only one of them may have ExtensionOptions::gyroscopicIntegration, since each
+/// integrator takes over the rotation of all bodies: the constructor of a second one throws std::invalid_argument and
+/// leaves the world as it was.
 class WorldExtensions {
   public:
     explicit WorldExtensions(btDynamicsWorld& world, const ExtensionOptions& options = {});

@@ -18,8 +18,8 @@ namespace {
 constexpr float wallVoxels = 3, minWallVoxels = 2;
 // Minimum gap to pass [voxels]: penetration at rest is below 0.5 voxels on either side.
 constexpr float gapVoxels = 2;
-// Voxels along the longest side. The minimum resolves the features of bodies that are not thin, the maximum limits the
-// memory.
+// Voxels along the longest side. The minimum resolves the features of bodies that are not thin, the maximum limits
+// the memory.
 constexpr float minResolution = 64, maxResolution = 512;
 constexpr float rounding = 1e-3f;  // [voxels] and steps: numbers within this of an integer count as integers
 constexpr float minVoxel = 2e-5f;  // [m] the minimum of OpenVDB
@@ -36,7 +36,7 @@ constexpr float wallPart = 0.5f;
 // Minimum body size [m]. Bullet's thresholds are absolute lengths and speeds: gContactBreakingThreshold is 2 cm, and
 // bodies sleep below 0.8 m/s. A tenth of a body's size and four of its lengths a second are still harmless.
 constexpr float minSize = 0.2f;
-constexpr float maxMassRatio = 10;  // settled by ten iterations of sequential impulses
+constexpr float maxMassRatio = 10;  // solved by ten iterations of sequential impulses
 constexpr double maxMemory = double(1 << 30);
 // Measured at the end of large builds on two cores of an AMD EPYC (Zen 4), 2023 [s].
 constexpr double secondsPerTriangle = 160e-9, secondsPerVoxel = 26e-9;
@@ -44,15 +44,15 @@ constexpr double secondsPerTriangle = 160e-9, secondsPerVoxel = 26e-9;
 constexpr double blockBytes = 9 * 9 * 9 * 4, blockVoxels = 512, blockWidth = 12;
 
 void requireSensible(const MeshReport& mesh, const SceneRequirements& scene) {
-    for (const auto& [name, value, least] :
+    for (const auto& [name, value, minimum] :
          {std::tuple("step", scene.step, 1e-9f), std::tuple("speed", scene.speed, 0.f),
           std::tuple("thickness", scene.thickness, 0.f), std::tuple("gap", scene.gap, 0.f),
           std::tuple("mass ratio", scene.massRatio, 1.f), std::tuple("voxel size", scene.voxelSize, 0.f),
           std::tuple("spin", std::max(scene.spin, -1.f), -1.f),
           std::tuple("margin", std::max(scene.margin, -1.f), -1.f)})
-        if (!(value >= least && std::isfinite(value)))
+        if (!(value >= minimum && std::isfinite(value)))
             throw std::invalid_argument(
-                fmt::format("advice: a {} of {}; it must be finite, and {} at least", name, value, least));
+                fmt::format("advice: a {} of {}; it must be finite, and {} at least", name, value, minimum));
     if (scene.voxelSize > 0 && scene.voxelSize < minVoxel)
         throw std::invalid_argument(
             fmt::format("advice: a voxel size of {}; no field has voxels below {:g}: scale the mesh up",
@@ -68,12 +68,12 @@ int wholeFrom(float value) {
     return int(std::min(std::ceil(value - rounding), float(maxSubsteps)));
 }
 
-float chosenVoxel(const SceneRequirements& scene, float longest, float wall) {
+float chosenVoxel(const SceneRequirements& scene, float longestSide, float wall) {
     if (scene.voxelSize > 0) return scene.voxelSize;
-    float voxel = longest / minResolution;
+    float voxel = longestSide / minResolution;
     if (wall > 0) voxel = std::min(voxel, wall / wallVoxels);
     if (scene.gap > 0) voxel = std::min(voxel, scene.gap / gapVoxels);
-    return std::max({voxel, longest / maxResolution, minVoxel});
+    return std::max({voxel, longestSide / maxResolution, minVoxel});
 }
 
 // Estimates from area and volume, exact to first order in the curvature. Leaves are counted on both sides of the
@@ -101,14 +101,14 @@ void warnOfMesh(const MeshReport& mesh, std::vector<std::string>& warnings) {
 
 void warnOfSizes(const MeshReport& mesh, const SceneRequirements& scene, const Settings& advice,
                  std::vector<std::string>& warnings) {
-    const float tip = mesh.thinnestWall / advice.voxelSize;
+    const float thinnest = mesh.thinnestWall / advice.voxelSize;
     if (advice.wallVoxels > 0 && advice.wallVoxels < minWallVoxels - rounding)
         warnings.push_back(fmt::format(
             "walls are {:.2g} voxels thick: below {:g}, contacts may come out on the far side and mass is lost",
             advice.wallVoxels, minWallVoxels));
-    else if (tip > 0 && tip < minWallVoxels)
-        warnings.push_back(
-            fmt::format("the thinnest place, a tip or a crease, has {:.2g} voxels: contacts there are coarse", tip));
+    else if (thinnest > 0 && thinnest < minWallVoxels)
+        warnings.push_back(fmt::format(
+            "the thinnest place, a tip or a crease, has {:.2g} voxels: contacts there are coarse", thinnest));
     if (const float gap = scene.gap / advice.voxelSize; gap > 0 && gap < gapVoxels - rounding)
         warnings.push_back(
             fmt::format("the gap is {:.2g} voxels wide: below {:g}, bodies at rest overlap in it", gap, gapVoxels));
@@ -120,14 +120,15 @@ void warnOfSizes(const MeshReport& mesh, const SceneRequirements& scene, const S
         warnings.push_back(fmt::format("the field takes about {:.1f} GiB", double(advice.fieldBytes) / maxMemory));
 }
 
-void warnOfMotion(const SceneRequirements& scene, const Settings& advice, float way,
+void warnOfMotion(const SceneRequirements& scene, const Settings& advice, float stepLength,
                   std::vector<std::string>& warnings) {
     if (advice.substepsWithoutSpeculation > advice.substeps || advice.substeps == maxSubsteps)
-        warnings.push_back(fmt::format(
-            "a step goes {:.3g} m, farther than half of a wall: impacts throw bodies through what is thin "
-            "unless a bullet::WorldExtensions looks after the world; without it and without swept contacts "
-            "(ShapeOptions::speculative) that needs {} substeps{}",
-            way, advice.substepsWithoutSpeculation, advice.substepsWithoutSpeculation < maxSubsteps ? "" : " or more"));
+        warnings.push_back(
+            fmt::format("a step goes {:.3g} m, farther than half of a wall: impacts throw bodies through what is thin "
+                        "unless a bullet::WorldExtensions looks after the world; without it and without swept contacts "
+                        "(ShapeOptions::speculative) that needs {} substeps{}",
+                        stepLength, advice.substepsWithoutSpeculation,
+                        advice.substepsWithoutSpeculation < maxSubsteps ? "" : " or more"));
     if (scene.massRatio > maxMassRatio)
         warnings.push_back(
             fmt::format("masses of {:.3g} to 1: above {:g} to 1 the solver leaves what lies below "
@@ -135,43 +136,43 @@ void warnOfMotion(const SceneRequirements& scene, const Settings& advice, float 
                         scene.massRatio, maxMassRatio));
 }
 
-void warnOfBullet(float longest, std::vector<std::string>& warnings) {
-    if (longest < minSize)
+void warnOfBullet(float longestSide, std::vector<std::string>& warnings) {
+    if (longestSide < minSize)
         warnings.push_back(
             fmt::format("a body of {:.3g} m is small to Bullet, which lets it sleep below 0.8 m/s and "
                         "widens its box by 0.02 m: lower setSleepingThresholds() and "
                         "gContactBreakingThreshold, or scale the scene up",
-                        longest));
+                        longestSide));
 }
 
 }  // namespace
 
 Settings recommendSettings(const MeshReport& mesh, const SceneRequirements& scene) {
     requireSensible(mesh, scene);
-    const float longest = mesh.bounds.longestSide();
+    const float longestSide = mesh.bounds.longestSide();
     const float wall = scene.thickness > 0 && mesh.commonWall > 0 ? std::min(scene.thickness, mesh.commonWall)
                                                                   : std::max(scene.thickness, mesh.commonWall);
     Settings advice;
-    const float h = advice.voxelSize = chosenVoxel(scene, longest, wall);
+    const float h = advice.voxelSize = chosenVoxel(scene, longestSide, wall);
     advice.margin = scene.margin < 0 ? h : scene.margin;
     advice.wallVoxels = wall / h;
     advice.splitImpulse = -h;
 
-    const float way = scene.speed * scene.step;
+    const float stepLength = scene.speed * scene.step;
     // an impact at one end stops that end; the linear velocity becomes rotation about it
-    const float spin = scene.spin < 0 ? 2 * scene.speed / longest : scene.spin;
+    const float spin = scene.spin < 0 ? 2 * scene.speed / longestSide : scene.spin;
     advice.substeps = std::max(1, wholeFrom(spin * scene.step / straightTurn));
-    const float deepest = wallPart * (wall > 0 ? wall : longest);
-    advice.substepsWithoutSpeculation = std::max(advice.substeps, wholeFrom(way / deepest));
+    const float deepest = wallPart * (wall > 0 ? wall : longestSide);
+    advice.substepsWithoutSpeculation = std::max(advice.substeps, wholeFrom(stepLength / deepest));
     advice.exteriorWidth = std::max(1, wholeFrom(advice.margin / h + cellDiagonal));
     advice.interiorWidth =
-        std::clamp(wholeFrom(way / (float(advice.substeps) * h) + cellDiagonal), minInterior, maxInterior);
+        std::clamp(wholeFrom(stepLength / (float(advice.substeps) * h) + cellDiagonal), minInterior, maxInterior);
     estimate(mesh, advice);
 
     warnOfMesh(mesh, advice.warnings);
     warnOfSizes(mesh, scene, advice, advice.warnings);
-    warnOfMotion(scene, advice, way, advice.warnings);
-    warnOfBullet(longest, advice.warnings);
+    warnOfMotion(scene, advice, stepLength, advice.warnings);
+    warnOfBullet(longestSide, advice.warnings);
     return advice;
 }
 

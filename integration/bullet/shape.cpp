@@ -53,10 +53,10 @@ std::optional<float> castRay(const Placed& body, btTriangleRaycastCallback& call
     const Field& field = body.collider.field();
     const glm::vec3 from = body.pose.toBody(toGlm(callback.m_from)) / body.scale;
     if (field.inside(from)) return 0;
-    const glm::vec3 way = body.pose.toBody(toGlm(callback.m_to)) / body.scale - from;
-    const float length = glm::length(way);
+    const glm::vec3 displacement = body.pose.toBody(toGlm(callback.m_to)) / body.scale - from;
+    const float length = glm::length(displacement);
     if (!(length > 0)) return std::nullopt;
-    const auto hit = field.raycast({from, way / length, length * callback.m_hitFraction});
+    const auto hit = field.raycast({from, displacement / length, length * callback.m_hitFraction});
     if (!hit) return std::nullopt;
     const float fraction = hit->distance / length;
     if (!(fraction < callback.m_hitFraction)) return std::nullopt;
@@ -85,25 +85,25 @@ class Behind : public btTriangleRaycastCallback {
 /// Casts a ray by the triangles, with Bullet's own flags. Tests those behind a hit too, if the callback continues.
 void castRay(const Placed& body, const MeshTree& mesh, btTriangleRaycastCallback& callback) {
     const glm::dvec3 from(body.pose.toBody(toGlm(callback.m_from)) / body.scale);
-    const glm::dvec3 way = glm::dvec3(body.pose.toBody(toGlm(callback.m_to)) / body.scale) - from;
-    const double length = glm::length(way);
+    const glm::dvec3 displacement = glm::dvec3(body.pose.toBody(toGlm(callback.m_to)) / body.scale) - from;
+    const double length = glm::length(displacement);
     if (!(length > 0)) return;
     const bool oneSided = callback.m_flags & btTriangleRaycastCallback::kF_FilterBackfaces;
     const bool keepsNormal = callback.m_flags & btTriangleRaycastCallback::kF_KeepUnflippedNormal;
     for (double start = 0; start <= length * callback.m_hitFraction; start += skippedVoxels * mesh.voxelSize()) {
-        const auto hit =
-            firstHit(mesh, {from + start * (way / length), way / length, length * callback.m_hitFraction - start});
+        const auto hit = firstHit(mesh, {from + start * (displacement / length), displacement / length,
+                                         length * callback.m_hitFraction - start});
         if (!hit) return;
         const Corners corners = cornersOf(mesh.mesh(), hit->triangle);
         const glm::dvec3 normal = glm::normalize(glm::cross(corners[1] - corners[0], corners[2] - corners[0]));
-        const bool isBack = glm::dot(normal, way) > 0;
+        const bool isBack = glm::dot(normal, displacement) > 0;
         start += hit->along;
         if (isBack && oneSided) continue;
         const float fraction = static_cast<float>(start / length);
         if (!(fraction < callback.m_hitFraction)) return;
-        const glm::vec3 seen(isBack && !keepsNormal ? -normal : normal);
+        const glm::vec3 reported(isBack && !keepsNormal ? -normal : normal);
         callback.m_hitFraction =
-            callback.reportHit(toBullet(body.pose.rotation * seen), fraction, 0, static_cast<int>(hit->triangle));
+            callback.reportHit(toBullet(body.pose.rotation * reported), fraction, 0, static_cast<int>(hit->triangle));
         if (!(callback.m_hitFraction > fraction)) return;
     }
 }
@@ -290,13 +290,13 @@ void Shape::boxOf(const btTransform& transform, btVector3& lower, btVector3& upp
 void Shape::calculateLocalInertia(btScalar mass, btVector3& inertia) const {
     const MassProperties& solid = collider_->mass();
     const glm::mat3 axes(frame_.rotation);
-    const glm::mat3 turned = axes * solid.inertia * glm::transpose(axes);
+    const glm::mat3 rotated = axes * solid.inertia * glm::transpose(axes);
     const glm::vec3 centre = frame_.toWorld(solid.centre);
     const float density = mass / static_cast<float>(solid.volume);
     // Steiner's theorem, then Bullet's simplification: the diagonal alone.
     for (int i = 0; i < 3; ++i)
         inertia[i] =
-            scale() * scale() * (density * turned[i][i] + mass * (glm::dot(centre, centre) - centre[i] * centre[i]));
+            scale() * scale() * (density * rotated[i][i] + mass * (glm::dot(centre, centre) - centre[i] * centre[i]));
 }
 
 void Shape::processAllTriangles(btTriangleCallback* callback, const btVector3& lower, const btVector3& upper) const {

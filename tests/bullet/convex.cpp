@@ -79,7 +79,7 @@ TEST_CASE("Points near hulls are as far away as from the nearest of all their fa
         const Mesh faces = hullOf(hull.points);
         for (int i = 0; i < 3000; ++i) {
             const glm::vec3 point = float(random(0.01, 3)) * random.direction();
-            const Convex::Near near = convex.nearest(point, std::numeric_limits<float>::max());
+            const bullet::detail::NearestPoint near = convex.nearest(point, std::numeric_limits<float>::max());
             CAPTURE(i, point.x, point.y, point.z);
             REQUIRE(std::abs(near.distance) == Approx(test::distance(faces, glm::dvec3(point))).margin(2e-6));
             REQUIRE(glm::distance(near.core + near.distance * near.normal, point) < 4e-6f);
@@ -95,7 +95,7 @@ TEST_CASE("What lies on a face meets it along its normal, however near it is") {
     const auto check = [&](const Convex& convex, const glm::vec3& place, const glm::vec3& normal,
                            bool isOnRim = false) {
         for (const float height : {1e-9f, 1e-8f, 1e-7f, 1e-6f, 1e-5f, 1e-3f}) {
-            const Convex::Near near = convex.nearest(place + height * normal, 1);
+            const bullet::detail::NearestPoint near = convex.nearest(place + height * normal, 1);
             CAPTURE(height, place.x, place.y, place.z, near.normal.x, near.normal.y, near.normal.z);
             REQUIRE(near.distance == Approx(height).margin(1e-6));
             // on a rim a point within rounding of the side counts as on it too
@@ -161,16 +161,16 @@ TEST_CASE("Straight ways enter convex shapes where distance says, and only then"
             const glm::vec3 start = float(random(0, 2.5)) * random.direction(),
                             way = float(random(0, 4)) * random.direction();
             CAPTURE(i);
-            const auto entry = convex.enter(start, way, tolerance);
+            const auto entry = convex.castPoint(start, way, tolerance);
             // until then it is outside; without an entry, over the whole displacement
-            const float until = entry ? entry->part : 1;
+            const float until = entry ? entry->fraction : 1;
             for (float part = 0; part < until; part += 2e-3f)
                 REQUIRE(convex.nearest(start + part * way, 10).distance > -1e-4f);
             if (!entry) continue;
             ++entries;
-            REQUIRE(convex.nearest(start + entry->part * way, 10).distance ==
-                    Approx(entry->near.distance).margin(1e-5));
-            REQUIRE(entry->near.distance <= tolerance);
+            REQUIRE(convex.nearest(start + entry->fraction * way, 10).distance ==
+                    Approx(entry->nearest.distance).margin(1e-5));
+            REQUIRE(entry->nearest.distance <= tolerance);
         }
     }
     CHECK(entries > 1500);
@@ -196,7 +196,7 @@ TEST_CASE("Nothing is inside of a flat hull, and ways beside it do not enter it"
         CAPTURE(i, point.x, point.y, point.z);
         REQUIRE(convex.nearest(point, 10).distance == Approx(test::distance(quad, glm::dvec3(point))).margin(3e-4));
         const glm::vec3 way(float(random(-1, 1)), float(random(-1, 1)), float(random(-3, 3)));
-        if (const auto entry = convex.enter(point, way, 1e-3f))
-            REQUIRE(test::distance(quad, glm::dvec3(point + entry->part * way)) < 1.4e-3);
+        if (const auto entry = convex.castPoint(point, way, 1e-3f))
+            REQUIRE(test::distance(quad, glm::dvec3(point + entry->fraction * way)) < 1.4e-3);
     }
 }

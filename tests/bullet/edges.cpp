@@ -355,7 +355,7 @@ TEST_CASE("The distance from a hull of balls is that of its support function, ou
     std::uniform_real_distribution<float> part(-1, 1);
     const auto vector = [&] { return glm::vec3(part(random), part(random), part(random)); };
     for (int run = 0; run < 60; ++run) {
-        std::vector<MultisphereHull::Ball> balls;
+        std::vector<MultisphereHull::Sphere> balls;
         for (int i = 0; i <= run % 6; ++i) balls.push_back({0.5f * vector(), 0.02f + 0.2f * std::abs(part(random))});
         if (run % 3 == 0)
             for (auto& ball : balls) ball.radius = 0.2f;
@@ -389,7 +389,7 @@ TEST_CASE("The distance from a hull of balls is that of its support function, ou
             CHECK(along(near.normal) == Approx(near.distance).margin(1e-5));
             // the returned ball touches the surface there
             const glm::vec3 foot = point - near.distance * near.normal;
-            CHECK(glm::distance(foot, near.ball.centre + near.ball.radius * near.normal) < 1e-4f);
+            CHECK(glm::distance(foot, near.core + near.radius * near.normal) < 1e-4f);
         }
     }
 }

@@ -4,6 +4,7 @@
 #include <bilayer/integration/bullet/extensions.h>
 
 #include <catch2/catch.hpp>
+#include <stdexcept>
 
 #include "tests/support/random.h"
 #include "tests/support/support.h"
@@ -86,6 +87,22 @@ TEST_CASE("Nothing is left behind in the world") {
     CHECK_NOTHROW(keeps.afterStep());
     CHECK_NOTHROW(free.world.run(0.1f));
     free.world.dynamics.addRigidBody(free.body);
+}
+
+TEST_CASE("A world takes one gyroscopic integrator at a time") {
+    Free free({1, 5, 2}), other({1, 5, 2});
+    {
+        const WorldExtensions keeps(free.world.dynamics, gyroscopic);
+        CHECK_THROWS_AS(WorldExtensions(free.world.dynamics, gyroscopic), std::invalid_argument);
+        CHECK_NOTHROW(WorldExtensions(free.world.dynamics));
+        CHECK_NOTHROW(WorldExtensions(other.world.dynamics, gyroscopic));
+        // the first one goes on
+        const btVector3 before = momentumOf(*free.body);
+        free.world.run(10);
+        CHECK((momentumOf(*free.body) - before).length() < 1e-3f * before.length());
+    }
+    CHECK_NOTHROW(WorldExtensions(free.world.dynamics, gyroscopic));
+    CHECK_NOTHROW(free.world.run(0.1f));
 }
 
 TEST_CASE("Tick callbacks of the user's are called with the extensions, set before or after them, and stay") {

@@ -153,11 +153,11 @@ TEST_CASE("Contacts that may bear a load stay while a body rocks on them") {
 
 TEST_CASE("The same contacts are kept until the bodies have moved, and are where they are now") {
     std::vector<Contact> contacts = circle();
-    bullet::detail::Choice choice;
+    bullet::detail::ContactReduction reduction;
     const btTransform here = btTransform::getIdentity();
-    choice.update(contacts, here, here);
-    const std::set<std::uint32_t> first = featuresOf(choice.reduced().patches);
-    const float slack = choice.reduced().slack;
+    reduction.update(contacts, here, here);
+    const std::set<std::uint32_t> first = featuresOf(reduction.reduced().patches);
+    const float slack = reduction.reduced().slack;
     REQUIRE(slack > 0);
     std::uint32_t other = 0;
     while (first.contains(other)) ++other;
@@ -172,7 +172,7 @@ TEST_CASE("The same contacts are kept until the bodies have moved, and are where
         return all;
     };
     const auto after = [&](std::vector<Contact> all, const btTransform& a, const btTransform& b) {
-        bullet::detail::Choice next = choice;
+        bullet::detail::ContactReduction next = reduction;
         next.update(all, a, b);
         return next.reduced().patches;
     };
@@ -196,7 +196,7 @@ TEST_CASE("The same contacts are kept until the bodies have moved, and are where
 
 namespace {
 
-std::vector<Contact> keptOf(const bullet::detail::Reduced& reduced) {
+std::vector<Contact> keptOf(const bullet::detail::ReducedContacts& reduced) {
     std::vector<Contact> kept;
     for (const bullet::detail::Patch& patch : reduced.patches)
         kept.insert(kept.end(), patch.contacts.begin(), patch.contacts.begin() + patch.count);
@@ -268,7 +268,7 @@ TEST_CASE("What is kept of many contacts bears what all of them bear, to two par
         }
         const double extent = 2 * std::hypot(length, width);
         const std::vector<Wrench> before = wrenchesOf(all, extent);
-        const bullet::detail::Reduced reduced = bullet::detail::reduce(all);
+        const bullet::detail::ReducedContacts reduced = bullet::detail::reduce(all);
         const std::vector<Contact> kept = keptOf(reduced);
         REQUIRE(kept.size() <= 24);
         const std::vector<Wrench> after = wrenchesOf(kept, extent);
@@ -306,7 +306,7 @@ TEST_CASE("What is kept of random bodies' contacts is met first, but for as much
         collide(*knot, a, *knot, b, {.margin = 0.003f, .minNormalCosine = 0.3f}, contacts);
         if (contacts.size() < 40) continue;
         ++tried;
-        const bullet::detail::Reduced reduced = bullet::detail::reduce(contacts);
+        const bullet::detail::ReducedContacts reduced = bullet::detail::reduce(contacts);
         const std::vector<Contact> kept = keptOf(reduced);
         CHECK(kept.size() < contacts.size());
         glm::dvec3 centre(0);

@@ -114,15 +114,15 @@ std::vector<int> rigidTypes() {
 }
 
 /// Whether the relative displacement of two shapes in a step exceeds the size of either.
-bool goPastEachOther(const Side& a, const Side& b) {
+bool mayPassEachOther(const Side& a, const Side& b) {
     const auto sizeOf = [](const Side& side) {
         btVector3 centre;
         btScalar radius;
         side.shape->getBoundingSphere(centre, radius);
         return radius;
     };
-    const btVector3 way = a.seconds * (velocityOf(*a.object).linear - velocityOf(*b.object).linear);
-    return way.length() > std::min(sizeOf(a), sizeOf(b));
+    const btVector3 displacement = a.seconds * (velocityOf(*a.object).linear - velocityOf(*b.object).linear);
+    return displacement.length() > std::min(sizeOf(a), sizeOf(b));
 }
 
 }  // namespace
@@ -147,7 +147,7 @@ float StepState::secondsOf(const btDispatcherInfo& info, bool isTest) const {
 
 Task StepState::taskOf(std::shared_ptr<Pair> pair, Side a, Side b) const {
     const auto isLeft = [](const Side& side) { return side.object->isKinematicObject() || locks(*side.shape); };
-    if (!speculatesOnAll && !isLeft(a) && !isLeft(b) && goPastEachOther(a, b)) a.seconds = b.seconds = 0;
+    if (!speculatesOnAll && !isLeft(a) && !isLeft(b) && mayPassEachOther(a, b)) a.seconds = b.seconds = 0;
     return {std::move(pair), a, b};
 }
 

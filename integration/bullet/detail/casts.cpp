@@ -38,34 +38,34 @@ std::optional<SweepHit> sweepSphere(const Placed& body, const glm::vec3& from, c
     const float length = glm::length(end - start);
     if (!(length > 0)) return std::nullopt;
     const glm::vec3 direction = (end - start) / length;
-    const float gapAtHit = (radius - allowed) / body.scale;
+    const float separationAtHit = (radius - allowed) / body.scale;
     const float touch = touchVoxels * field.voxelSize();
 
-    float way = 0;
-    for (int i = 0; i < maxSteps && way <= length; ++i) {
-        const glm::vec3 centre = start + way * direction;
+    float travelled = 0;
+    for (int i = 0; i < maxSteps && travelled <= length; ++i) {
+        const glm::vec3 centre = start + travelled * direction;
         const Sample sample = field.sample(centre);
-        const float gap = sample.distance - gapAtHit;
-        if (gap <= touch) {
+        const float separation = sample.distance - separationAtHit;
+        if (separation <= touch) {
             const bool inward = glm::dot(sample.gradient, direction) < 0;
             if (inward) {
                 const glm::vec3 normal = glm::normalize(sample.gradient);
                 const glm::vec3 point = centre - sample.distance * normal;
-                return SweepHit{way / length, body.pose.toWorld(body.scale * point), body.pose.rotation * normal};
+                return SweepHit{travelled / length, body.pose.toWorld(body.scale * point), body.pose.rotation * normal};
             }
             if (!sample.inBand) return std::nullopt;
         }
-        const float step = sample.inBand ? caution * std::abs(gap) : std::abs(gap);
-        way += std::max(step, 0.5f * touch);
+        const float step = sample.inBand ? caution * std::abs(separation) : std::abs(separation);
+        travelled += std::max(step, 0.5f * touch);
     }
     return std::nullopt;
 }
 
 std::optional<SweepHit> sweepSphere(const MeshTree& mesh, const glm::vec3& from, const glm::vec3& to, float radius) {
-    const glm::dvec3 way = glm::dvec3(to) - glm::dvec3(from);
-    const double length = glm::length(way);
+    const glm::dvec3 displacement = glm::dvec3(to) - glm::dvec3(from);
+    const double length = glm::length(displacement);
     if (!(length > 0)) return std::nullopt;
-    const Path path{glm::dvec3(from), way / length, length};
+    const Path path{glm::dvec3(from), displacement / length, length};
     const auto touch = firstTouchOnPath(mesh, path, radius, [](const glm::dvec3&) { return 0.; });
     if (!touch) return std::nullopt;
     return SweepHit{static_cast<float>(touch->along / length), glm::vec3(touch->position), glm::vec3(touch->normal),

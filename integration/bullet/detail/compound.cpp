@@ -36,7 +36,7 @@ Box boxOf(const Side& side) {
 }
 
 /// Upper bound of the displacement of a shape's points by rotation.
-float turningOf(const Motion& motion, const Side& side, const Box& box) {
+float maxRotationDisplacement(const Motion& motion, const Side& side, const Box& box) {
     const btVector3 &origin = side.transform.getOrigin(), ofLower = (box.lower - origin).absolute();
     btVector3 farthest = (box.upper - origin).absolute();
     farthest.setMax(ofLower);
@@ -47,11 +47,12 @@ float turningOf(const Motion& motion, const Side& side, const Box& box) {
 Box sweptBoxOf(const Side& side) {
     Box box = boxOf(side);
     const Motion motion = side.motion();
-    const float turning = turningOf(motion, side, box);
-    const btVector3 way = toBullet(motion.displacement), lower = box.lower + way, upper = box.upper + way;
+    const float rotation = maxRotationDisplacement(motion, side, box);
+    const btVector3 displacement = toBullet(motion.displacement), lower = box.lower + displacement,
+                    upper = box.upper + displacement;
     box.lower.setMin(lower);
     box.upper.setMax(upper);
-    box.grow(turning);
+    box.grow(rotation);
     return box;
 }
 
@@ -65,15 +66,15 @@ void visitChildren(const Side& side, const Box& box, Visit&& visit) {
         for (int i = 0; i < compound.getNumChildShapes(); ++i) visit(i);
         return;
     }
-    struct Found : btDbvt::ICollide {
-        explicit Found(Visit& visit) : visit(visit) {}
+    struct LeafVisitor : btDbvt::ICollide {
+        explicit LeafVisitor(Visit& visit) : visit(visit) {}
         void Process(const btDbvtNode* leaf) override { visit(leaf->dataAsInt); }
         Visit& visit;
-    } found(visit);
+    } visitor(visit);
     btVector3 lower, upper;
     const btVector3 half = 0.5f * (box.upper - box.lower), middle = 0.5f * (box.upper + box.lower);
     btTransformAabb(half, 0, side.transform.inverse() * btTransform(btQuaternion::getIdentity(), middle), lower, upper);
-    tree->collideTV(tree->m_root, btDbvtVolume::FromMM(lower, upper), found);
+    tree->collideTV(tree->m_root, btDbvtVolume::FromMM(lower, upper), visitor);
 }
 
 Side childOf(const Side& side, int index) {
@@ -83,12 +84,12 @@ Side childOf(const Side& side, int index) {
 }
 
 /// Descends two compounds to the children that may meet in the step.
-class Descent {
+class ChildPairSearch {
   public:
     using Children = CompoundAlgorithm::Children;
 
     /// @param within  maximum distance of the children [m]
-    explicit Descent(float within) : within_(within) {}
+    explicit ChildPairSearch(float within) : within_(within) {}
 
     /// Sorted by their indices.
     std::vector<Children> operator()(const Side& first, const Side& second) {
@@ -101,28 +102,30 @@ class Descent {
     }
 
   private:
-    struct Part {
+    /// A shape on the way down the compounds.
+    struct Node {
         Side side;
         bool holdsField;
     };
 
-    void descend(const Part& first, const Part& second) {
+    void descend(const Node& first, const Node& second) {
         if (!first.holdsField && !second.holdsField) return;
         if (first.side.shape->isCompound())
-            visit(first, second, firstPath_, [&](const Part& child) { descend(child, second); });
+            visit(first, second, firstPath_, [&](const Node& child) { descend(child, second); });
         else if (second.side.shape->isCompound())
-            visit(second, first, secondPath_, [&](const Part& child) { descend(first, child); });
+            visit(second, first, secondPath_, [&](const Node& child) { descend(first, child); });
         else if (!isRefused(*first.side.shape, *second.side.shape))
             found_.push_back({firstPath_, secondPath_, first.side, second.side});
     }
 
     template <class Visit>
-    void visit(const Part& compound, const Part& other, CompoundAlgorithm::Path& path, Visit&& visit) {
+    void visit(const Node& compound, const Node& other, CompoundAlgorithm::Path& path, Visit&& visit) {
         Box around = sweptBoxOf(other.side);
         around.grow(within_);
         Box from = around;  // positions of the children that may reach it
         const Motion motion = compound.side.motion();
-        from.grow(glm::length(motion.displacement) + turningOf(motion, compound.side, boxOf(compound.side)));
+        from.grow(glm::length(motion.displacement) +
+                  maxRotationDisplacement(motion, compound.side, boxOf(compound.side)));
         visitChildren(compound.side, from, [&](int index) {
             const Side child = childOf(compound.side, index);
             const bool holds = compound.holdsField && holdsField(*child.shape);
@@ -150,20 +153,21 @@ class Descent {
 };
 
 /// Scope guard: replaces the wrappers of a result while children hand over their contacts.
-class Unwrapped {
+class ChildWrappers {
   public:
-    Unwrapped(btManifoldResult& result, const btCollisionObjectWrapper& first, const btCollisionObjectWrapper& second)
+    ChildWrappers(btManifoldResult& result, const btCollisionObjectWrapper& first,
+                  const btCollisionObjectWrapper& second)
         : result_(result), before_{result.getBody0Wrap(), result.getBody1Wrap()} {
         const bool isStraight = result.getBody0Internal() == first.getCollisionObject();
         result.setBody0Wrap(isStraight ? &first : &second);
         result.setBody1Wrap(isStraight ? &second : &first);
     }
-    ~Unwrapped() {
+    ~ChildWrappers() {
         result_.setBody0Wrap(before_[0]);
         result_.setBody1Wrap(before_[1]);
     }
-    Unwrapped(const Unwrapped&) = delete;
-    Unwrapped& operator=(const Unwrapped&) = delete;
+    ChildWrappers(const ChildWrappers&) = delete;
+    ChildWrappers& operator=(const ChildWrappers&) = delete;
 
   private:
     btManifoldResult& result_;
@@ -214,7 +218,7 @@ Task CompoundAlgorithm::taskOf(const Children& children) {
 
 void CompoundAlgorithm::gather(const btCollisionObjectWrapper& first, const btCollisionObjectWrapper& second,
                                float seconds, std::vector<Task>& tasks) {
-    for (const Children& children : Descent(0)(Side(first, seconds), Side(second, seconds)))
+    for (const Children& children : ChildPairSearch(0)(Side(first, seconds), Side(second, seconds)))
         tasks.push_back(taskOf(children));
 }
 
@@ -229,12 +233,12 @@ void CompoundAlgorithm::processCollision(const btCollisionObjectWrapper* first, 
     Pairs met;
     const std::shared_ptr<Pairs> pairs = pairs_;  // a user's callback may destroy this algorithm
     for (const Children& children :
-         Descent(result->m_closestPointDistanceThreshold)(Side(*first, seconds), Side(*second, seconds))) {
+         ChildPairSearch(result->m_closestPointDistanceThreshold)(Side(*first, seconds), Side(*second, seconds))) {
         const Task task = taskOf(children);
         task.collide(*result, isTest);
         withWrapper(*first, children.firstPath, [&](const btCollisionObjectWrapper& one) {
             withWrapper(*second, children.secondPath, [&](const btCollisionObjectWrapper& two) {
-                const Unwrapped unwrapped(*result, one, two);
+                const ChildWrappers wrappers(*result, one, two);
                 task.pair->commit(*task.a.object, *task.b.object, seconds, *result);
             });
         });

@@ -18,11 +18,11 @@ using namespace bilayer::detail;
 struct Patch {
     std::array<Contact, MANIFOLD_CACHE_SIZE> contacts;
     int count = 0;
-    bool goesOn = false;  ///< continues the previous patch, which was full
+    bool continuesPrevious = false;  ///< the previous patch, which was full
 };
 
 /// Result of the reduction of a pair's contacts.
-struct Reduced {
+struct ReducedContacts {
     std::vector<Patch> patches;
     /// Maximum depth that a discarded contact could reach in a small motion of the bodies before a kept contact touches
     /// [m]. The maximum is over tilts of 1/32 rad and shifts of 1/32 of a patch's extent, in directions between those
@@ -41,17 +41,17 @@ struct Reduced {
 /// the deepest contact comes first. Reorders `contacts`.
 /// @param last  the patches of the same pair in the last step, or nothing. While the bodies hardly move, patches keep
 ///              their places; among contacts that are nearly as good, those of the last step are kept again
-Reduced reduce(std::vector<Contact>& contacts, std::span<const Patch> last = {});
+ReducedContacts reduce(std::vector<Contact>& contacts, std::span<const Patch> last = {});
 
 /// The reduced contacts of one pair of bodies from step to step. They are chosen again only when the bodies have moved
 /// relative to each other since the last choice, which resting bodies rarely do.
-class Choice {
+class ContactReduction {
   public:
     /// Reduces this step's contacts. Reorders `contacts`.
     /// @param a, b  transforms of the bodies
     void update(std::vector<Contact>& contacts, const btTransform& a, const btTransform& b);
 
-    const Reduced& reduced() const { return reduced_; }
+    const ReducedContacts& reduced() const { return reduced_; }
 
   private:
     struct Kept {
@@ -59,9 +59,9 @@ class Choice {
         btVector3 ofA, ofB;  ///< its position when it was chosen, in the coordinates of each body
     };
     bool holds(const btTransform& a, const btTransform& b) const;
-    bool takeAgain(const std::vector<Contact>& contacts);
+    bool reuse(const std::vector<Contact>& contacts);
 
-    Reduced reduced_;
+    ReducedContacts reduced_;
     std::vector<Kept> kept_;                ///< of all patches, concatenated
     std::vector<std::uint32_t> byFeature_;  ///< indices into `kept_`, in ascending order of features
 };

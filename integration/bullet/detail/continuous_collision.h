@@ -27,7 +27,7 @@ class ContinuousCollision {
   private:
     btDynamicsWorld& world_;
     const btDispatcher* const dispatcher_;
-    std::vector<std::pair<const btCollisionObject*, const btCollisionObject*>> heldPairs_;  ///< in the last step
+    std::vector<std::pair<const btCollisionObject*, const btCollisionObject*>> stoppedPairs_;  ///< in the last step
     int stopped_ = 0;
 };
 

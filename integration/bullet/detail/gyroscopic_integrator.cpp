@@ -21,12 +21,12 @@ btVector3 spinOf(const btRigidBody& body, const btMatrix3x3& axes, const btVecto
     return axes * (axes.transpose() * momentum * body.getInvInertiaDiagLocal());
 }
 
-btMatrix3x3 turned(const btMatrix3x3& axes, const btVector3& by) {
+btMatrix3x3 rotated(const btMatrix3x3& axes, const btVector3& by) {
     const btScalar angle = by.length();
     return angle > SIMD_EPSILON ? btMatrix3x3(btQuaternion(by / angle, angle)) * axes : axes;
 }
 
-bool turns(const btRigidBody& body) {
+bool rotates(const btRigidBody& body) {
     const btVector3& inverse = body.getInvInertiaDiagLocal();
     return !body.isStaticOrKinematicObject() && body.isActive() && inverse.x() > 0 && inverse.y() > 0 &&
            inverse.z() > 0;
@@ -35,30 +35,30 @@ bool turns(const btRigidBody& body) {
 }  // namespace
 
 void GyroscopicIntegrator::beforeStep(float seconds) {
-    turning_.clear();
+    bodies_.clear();
     const btCollisionObjectArray& objects = world_.getCollisionObjectArray();
     for (int i = 0; i < objects.size(); ++i) {
         btRigidBody* const body = btRigidBody::upcast(objects[i]);
-        if (!body || !turns(*body)) continue;
+        if (!body || !rotates(*body)) continue;
         body->setFlags(body->getFlags() & ~gyroscopic);
         const btMatrix3x3& axes = body->getWorldTransform().getBasis();
         const btVector3 momentum = momentumOf(*body, axes, body->getAngularVelocity());
         btVector3 midway = body->getAngularVelocity();
-        for (int k = 0; k < iterations; ++k) midway = spinOf(*body, turned(axes, seconds / 2 * midway), momentum);
+        for (int k = 0; k < iterations; ++k) midway = spinOf(*body, rotated(axes, seconds / 2 * midway), momentum);
         body->setAngularVelocity(midway);
-        turning_.push_back({i, body, axes, momentum, midway});
+        bodies_.push_back({i, body, axes, momentum, midway});
     }
 }
 
 void GyroscopicIntegrator::afterStep() {
     const btCollisionObjectArray& objects = world_.getCollisionObjectArray();
-    for (const auto& [index, body, axes, momentum, midway] : turning_) {
+    for (const auto& [index, body, axes, momentum, midway] : bodies_) {
         // a user's callback may have removed it
         if (index >= objects.size() || objects[index] != body) continue;
         const btVector3 gained = momentumOf(*body, axes, body->getAngularVelocity() - midway);
         body->setAngularVelocity(spinOf(*body, body->getWorldTransform().getBasis(), momentum + gained));
     }
-    turning_.clear();
+    bodies_.clear();
 }
 
 }  // namespace bilayer::bullet::detail

@@ -17,7 +17,7 @@ class GyroscopicIntegrator {
     void afterStep();
 
   private:
-    struct Turning {
+    struct RotatingBody {
         int index;  // in the world's array of objects
         btRigidBody* body;
         btMatrix3x3 axes;    // before the step
@@ -26,7 +26,7 @@ class GyroscopicIntegrator {
     };
 
     btDynamicsWorld& world_;
-    std::vector<Turning> turning_;
+    std::vector<RotatingBody> bodies_;
 };
 
 }  // namespace bilayer::bullet::detail

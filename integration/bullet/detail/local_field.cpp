@@ -11,25 +11,16 @@
 #include "collider/contact/surface_query.h"
 #include "collider/field/interpolant.h"
 #include "collider/field/path.h"
-#include "integration/bullet/detail/convex.h"
+#include "integration/bullet/detail/edge_probes.h"
 
 namespace bilayer::bullet::detail {
 
 using namespace bilayer::detail;
 
-namespace {
-
-Contact turning(Contact contact, float radius) {
-    contact.turningRadius = radius;
-    return contact;
-}
-
-}  // namespace
-
-LocalField::LocalField(const Placed& field, const Pose& other, const Motion& motion, float reach, bool measured)
+LocalField::LocalField(const Placed& field, const Pose& other, const Motion& motion, float reach, bool exact)
     : collider_(field.collider),
-      field_(measured ? field.collider.exactField() : field.collider.field()),
-      measured_(measured),
+      field_(exact ? field.collider.exactField() : field.collider.field()),
+      exact_(exact),
       scale_(field.scale),
       voxel_(field.scale * field.collider.field().voxelSize()),
       pose_(field.pose),
@@ -37,92 +28,93 @@ LocalField::LocalField(const Placed& field, const Pose& other, const Motion& mot
     const Bounds& bounds = field.collider.bounds();
     if (reach > surelyInBand(scale_ * field_.exteriorWidth(), voxel_)) farReach_ = reach / scale_;
     exactReach_ = reach + maxInterpolationError * voxel_;
-    longestWay_ = relativeMotion_.longest(scale_ * bounds.centre(), 0.5f * scale_ * glm::length(bounds.size()));
+    maxDisplacement_ =
+        relativeMotion_.maxDisplacement(scale_ * bounds.centre(), 0.5f * scale_ * glm::length(bounds.size()));
 }
 
-LocalField::Answer LocalField::at(const glm::vec3& point, float radius) const {
+LocalField::FieldSample LocalField::at(const glm::vec3& point, float radius) const {
     const Sample sample = field_.sample(point / scale_);
-    if (!sample.inBand && sample.distance > 0 && farReach_ > 0) return farAway(point, radius, sample.distance);
-    if (!sample.inBand) return {sample.distance > 0 ? Answer::outside : Answer::inside, scale_ * sample.distance};
-    if (scale_ * sample.distance - radius <= exactReach_ && collider_.data().isExactAt(point / scale_, measured_))
-        return exactly(point, sample);
+    if (!sample.inBand && sample.distance > 0 && farReach_ > 0) return sampleBeyondBand(point, radius, sample.distance);
+    if (!sample.inBand)
+        return {sample.distance > 0 ? FieldSample::outside : FieldSample::inside, scale_ * sample.distance};
+    if (scale_ * sample.distance - radius <= exactReach_ && collider_.data().isExactAt(point / scale_, exact_))
+        return exactSample(point, sample);
     const glm::vec3 normal = directionOf(sample, field_.voxelSize());
-    const auto where = normal == glm::vec3(0) ? Answer::unclear : Answer::near;
+    const auto where = normal == glm::vec3(0) ? FieldSample::noNormal : FieldSample::nearSurface;
     return {where, scale_ * sample.distance, normal, sample.gradient};
 }
 
-// The exact answer from the triangles, in the band.
-LocalField::Answer LocalField::exactly(const glm::vec3& point, const Sample& sample) const {
-    const SurfaceSample touch = surfaceSampleAt(field_, point / scale_, sample, true);
-    if (touch.normal == glm::vec3(0)) return {Answer::unclear, scale_ * touch.distance, {}, sample.gradient};
-    return {Answer::near, scale_ * touch.distance, touch.normal, touch.normal};
+// The exact sample from the triangles, in the band.
+LocalField::FieldSample LocalField::exactSample(const glm::vec3& point, const Sample& sample) const {
+    const SurfaceSample surface = surfaceSampleAt(field_, point / scale_, sample, true);
+    if (surface.normal == glm::vec3(0)) return {FieldSample::noNormal, scale_ * surface.distance, {}, sample.gradient};
+    return {FieldSample::nearSurface, scale_ * surface.distance, surface.normal, surface.normal};
 }
 
 // Beyond the band, for contact tests that ask for more than the band covers.
-LocalField::Answer LocalField::farAway(const glm::vec3& point, float radius, float bound) const {
+LocalField::FieldSample LocalField::sampleBeyondBand(const glm::vec3& point, float radius, float bound) const {
     const ClosestPoint closest = field_.closest(point / scale_, farReach_ + radius / scale_);
-    if (!closest.found) return {Answer::outside, std::max(scale_ * bound, scale_ * farReach_ + radius)};
+    if (!closest.found) return {FieldSample::outside, std::max(scale_ * bound, scale_ * farReach_ + radius)};
     const glm::vec3 normal = (point / scale_ - closest.position) / closest.distance;
-    return {Answer::near, scale_ * closest.distance, normal, normal};
+    return {FieldSample::nearSurface, scale_ * closest.distance, normal, normal};
 }
 
-std::optional<Contact> LocalField::probe(const glm::vec3& point, const Answer& answer, float radius,
+std::optional<Contact> LocalField::probe(const glm::vec3& point, const FieldSample& sample, float radius,
                                          std::uint32_t feature, float margin, ContactReport& report) const {
     ++report.pointsTested;
-    if (answer.where == Answer::inside) ++report.beyondBand;
-    if (answer.distance - radius > margin) return probeOnWay(point, radius, feature, margin, answer.distance);
-    if (answer.where != Answer::near) return std::nullopt;
-    return turning(contact(point - answer.distance * answer.normal, answer.normal, answer.distance - radius, feature,
-                           approach(point, answer.normal, margin)),
-                   radius);
+    if (sample.where == FieldSample::inside) ++report.beyondBand;
+    if (sample.distance - radius > margin) return speculativeContact(point, radius, feature, margin, sample.distance);
+    if (sample.where != FieldSample::nearSurface) return std::nullopt;
+    return contact(point - sample.distance * sample.normal, sample.normal, sample.distance - radius, feature,
+                   approach(point, sample.normal, margin), radius);
 }
 
 // For a point that is farther away: the contact where its path meets the surface.
-std::optional<Contact> LocalField::probeOnWay(const glm::vec3& point, float radius, std::uint32_t feature, float margin,
-                                              float distance) const {
-    if (longestWay_ <= margin) return std::nullopt;
-    const glm::vec3 way = relativeMotion_.of(point);
-    const float length = glm::length(way);
+std::optional<Contact> LocalField::speculativeContact(const glm::vec3& point, float radius, std::uint32_t feature,
+                                                      float margin, float distance) const {
+    if (maxDisplacement_ <= margin) return std::nullopt;
+    const glm::vec3 displacement = relativeMotion_.of(point);
+    const float length = glm::length(displacement);
     if (distance - radius > length) return std::nullopt;
-    const Ray ray{point / scale_, way, length / scale_};
+    const Ray ray{point / scale_, displacement, length / scale_};
     const auto hit = radius > 0 ? field_.sphereCast(ray, radius / scale_) : field_.raycast(ray);
     if (!hit) return std::nullopt;
-    const float gap = glm::dot(point - scale_ * hit->position, hit->normal);
-    return turning(contact(point - gap * hit->normal, hit->normal, std::max(gap - radius, 0.f), feature,
-                           -glm::dot(way, hit->normal)),
-                   radius);
+    const float separation = glm::dot(point - scale_ * hit->position, hit->normal);
+    return contact(point - separation * hit->normal, hit->normal, std::max(separation - radius, 0.f), feature,
+                   -glm::dot(displacement, hit->normal), radius);
 }
 
-glm::vec3 LocalField::Edge::directionAt(float part) const {
-    const float aside = isStraight ? 0.5f : 1e-3f;
-    return glm::normalize(place(part + aside) - place(part - aside));
+glm::vec3 ProbedEdge::directionAt(float fraction) const {
+    const float offset = isStraight ? 0.5f : 1e-3f;
+    return glm::normalize(place(fraction + offset) - place(fraction - offset));
 }
 
-void LocalField::probeEdge(const Edge& edge, const Answer& first, const Answer& last, float margin,
+void LocalField::probeEdge(const ProbedEdge& edge, const FieldSample& first, const FieldSample& last, float margin,
                            ContactReport& report, std::vector<Contact>& contacts) const {
     const float length = glm::distance(edge.place(0), edge.place(1));
     if (!(length > 0)) return;
     // probes are sparser farther from the field
-    const int parts = probeParts(length, voxel_, (1 << partBits) - 1);
-    const float way = relativeMotion_.longest(edge.place(0.5f), length);
-    const float reach = margin + way + maxInterpolationError * voxel_ + std::max(edge.radius[0], edge.radius[1]);
-    if (edge.isStraight && !comesNear(edge.place(0), edge.place(1), reach)) return;
-    Answer before = first;
-    for (int i = 0; i < parts;) {
-        // Parts that are clear of the surface need no probes.
-        const float clear = (before.distance - reach) * float(parts) / length;
-        const int next = i + std::max(1, int(std::min(clear, float(parts - i))));
-        const float part = float(next) / float(parts);
-        Answer there = last;
-        if (next < parts) {
-            const glm::vec3 point = edge.place(part);
-            there = at(point, edge.radiusAt(part));
+    const int intervals = probeIntervals(length, voxel_, (1 << probeBits) - 1);
+    const float displacement = relativeMotion_.maxDisplacement(edge.place(0.5f), length);
+    const float reach =
+        margin + displacement + maxInterpolationError * voxel_ + std::max(edge.radius[0], edge.radius[1]);
+    if (edge.isStraight && !mayReach(edge.place(0), edge.place(1), reach)) return;
+    FieldSample before = first;
+    for (int i = 0; i < intervals;) {
+        // Intervals that are clear of the surface need no probes.
+        const float clear = (before.distance - reach) * float(intervals) / length;
+        const int next = i + std::max(1, int(std::min(clear, float(intervals - i))));
+        const float fraction = float(next) / float(intervals);
+        FieldSample there = last;
+        if (next < intervals) {
+            const glm::vec3 point = edge.place(fraction);
+            there = at(point, edge.radiusAt(fraction));
             const std::uint32_t feature = edge.feature + 2 * std::uint32_t(next);
-            if (const auto found = probe(point, there, edge.radiusAt(part), feature, margin, report))
+            if (const auto found = probe(point, there, edge.radiusAt(fraction), feature, margin, report))
                 contacts.push_back(*found);
         }
         if (edge.isSearched && next == i + 1)
-            if (const auto found = deepestBetween(edge, float(i) / float(parts), before, part, there, margin)) {
+            if (const auto found = deepestContact(edge, float(i) / float(intervals), before, fraction, there, margin)) {
                 contacts.push_back(*found);
                 contacts.back().feature = edge.feature + 2 * std::uint32_t(i) + 1;
             }
@@ -132,81 +124,81 @@ void LocalField::probeEdge(const Edge& edge, const Answer& first, const Answer& 
 }
 
 // Whether a line segment comes this close to the bounding box of the surface.
-bool LocalField::comesNear(const glm::vec3& from, const glm::vec3& to, float reach) const {
+bool LocalField::mayReach(const glm::vec3& from, const glm::vec3& to, float reach) const {
     const Bounds& bounds = collider_.bounds();
     const double length = glm::distance(from, to);
     const Path path{from, glm::dvec3(to - from) / length, length};
     return clip(path, scale_ * bounds.lower - reach, scale_ * bounds.upper + reach).has_value();
 }
 
-std::optional<Contact> LocalField::deepestBetween(const Edge& edge, float from, const Answer& atFrom, float to,
-                                                  const Answer& atTo, float margin) const {
+std::optional<Contact> LocalField::deepestContact(const ProbedEdge& edge, float from, const FieldSample& atFrom,
+                                                  float to, const FieldSample& atTo, float margin) const {
     if (!atFrom.isKnown() || !atTo.isKnown()) return std::nullopt;
-    const Piece piece{edge, from, to, glm::distance(edge.place(from), edge.place(to))};
+    const EdgeInterval interval{edge, from, to, glm::distance(edge.place(from), edge.place(to))};
     // as short as rounding: it has no direction
-    if (!(piece.length > searchTolerance * voxel_)) return std::nullopt;
-    const Slope first = slopeOf(piece, 0, atFrom), last = slopeOf(piece, piece.length, atTo);
-    const bool isNear = std::min(first.value, last.value) - 0.5f * piece.length <= margin;
-    const bool falls = fallsBetween(first, last);
-    if (!isNear || !(falls || mayKinkBetween(first, last))) return std::nullopt;
-    const auto slopeAt = [&](float way) -> std::optional<Slope> {
-        const float part = piece.partAt(way);
-        const Answer answer = at(edge.place(part), edge.radiusAt(part));
-        if (!answer.isKnown()) return std::nullopt;
-        return slopeOf(piece, way, answer);
+    if (!(interval.length > searchTolerance * voxel_)) return std::nullopt;
+    const Slope first = slopeOf(interval, 0, atFrom), last = slopeOf(interval, interval.length, atTo);
+    const bool isNear = std::min(first.value, last.value) - 0.5f * interval.length <= margin;
+    if (!isNear || !mayBeDeeperBetween(first, last)) return std::nullopt;
+    const auto slopeAt = [&](float distance) -> std::optional<Slope> {
+        const float fraction = interval.fractionAt(distance);
+        const FieldSample sample = at(edge.place(fraction), edge.radiusAt(fraction));
+        if (!sample.isKnown()) return std::nullopt;
+        return slopeOf(interval, distance, sample);
     };
-    const std::optional<Slope> lowest = falls ? lowestBetween(first, last, searchTolerance * voxel_, slopeAt)
-                                        : first.value < last.value ? first
-                                                                   : last;
+    const std::optional<Slope> lowest = deepestBetween(first, last, searchTolerance * voxel_, slopeAt);
     if (!lowest) return std::nullopt;
-    const float part = piece.partAt(lowest->place);
-    const Answer here = at(edge.place(part), edge.radiusAt(part));
-    if (const auto crossing = crossingAt(edge, part, here)) {
+    const float fraction = interval.fractionAt(lowest->place);
+    const FieldSample here = at(edge.place(fraction), edge.radiusAt(fraction));
+    if (const auto crossing = crossingAt(edge, fraction, here)) {
         if (scale_ * crossing->distance > margin) return std::nullopt;
         return contact(scale_ * crossing->position, crossing->normal, scale_ * crossing->distance, 0,
-                       approach(edge.place(part), crossing->normal, margin));
+                       approach(edge.place(fraction), crossing->normal, margin));
     }
-    if (!falls || here.where != Answer::near) return std::nullopt;
-    return touchAcross(piece, lowest->place, here, margin);
+    if (!fallsBetween(first, last) || here.where != FieldSample::nearSurface) return std::nullopt;
+    return contactAcross(interval, lowest->place, here, margin);
 }
 
-Slope LocalField::slopeOf(const Piece& piece, float way, const Answer& answer) const {
-    const Edge& edge = piece.edge;
-    const float part = piece.partAt(way);
-    const float growth = (edge.radius[1] - edge.radius[0]) * (piece.to - piece.from) / piece.length;
-    return {way, answer.distance - edge.radiusAt(part), glm::dot(answer.gradient, edge.directionAt(part)) - growth};
+Slope LocalField::slopeOf(const EdgeInterval& interval, float distance, const FieldSample& sample) const {
+    const ProbedEdge& edge = interval.edge;
+    const float fraction = interval.fractionAt(distance);
+    const float growth = (edge.radius[1] - edge.radius[0]) * (interval.to - interval.from) / interval.length;
+    return {distance, sample.distance - edge.radiusAt(fraction),
+            glm::dot(sample.gradient, edge.directionAt(fraction)) - growth};
 }
 
 // The crossing of a sharp edge with one of the field's.
-std::optional<SharpEdges::Crossing> LocalField::crossingAt(const Edge& edge, float part, const Answer& there) const {
-    if (!edge.conormals || edge.radiusAt(part) > 0) return std::nullopt;
+std::optional<SharpEdges::Crossing> LocalField::crossingAt(const ProbedEdge& edge, float fraction,
+                                                           const FieldSample& there) const {
+    if (!edge.conormals || edge.radiusAt(fraction) > 0) return std::nullopt;
     return collider_.data().edges().crossing(collider_.data().points(), edge.place(0) / scale_, edge.place(1) / scale_,
-                                             *edge.conormals, edge.place(part) / scale_, there.distance / scale_,
+                                             *edge.conormals, edge.place(fraction) / scale_, there.distance / scale_,
                                              voxel_ / scale_);
 }
 
-std::optional<Contact> LocalField::touchAcross(const Piece& piece, float way, const Answer& there, float margin) const {
-    const float part = piece.partAt(way), radius = piece.edge.radiusAt(part), aside = 2 * searchTolerance * voxel_;
-    const auto touchAt = [&](float place) -> std::optional<SurfaceSample> {
-        const Answer answer = at(piece.edge.place(piece.partAt(place)), radius);
-        if (answer.where != Answer::near) return std::nullopt;
-        return SurfaceSample{answer.distance, answer.normal};
+std::optional<Contact> LocalField::contactAcross(const EdgeInterval& interval, float distance, const FieldSample& there,
+                                                 float margin) const {
+    const float fraction = interval.fractionAt(distance), radius = interval.edge.radiusAt(fraction);
+    const auto sampleAt = [&](float other) -> std::optional<SurfaceSample> {
+        const FieldSample sample = at(interval.edge.place(interval.fractionAt(other)), radius);
+        if (sample.where != FieldSample::nearSurface) return std::nullopt;
+        return SurfaceSample{sample.distance, sample.normal};
     };
-    const auto held = acrossEdge(piece.edge.directionAt(part), SurfaceSample{there.distance, there.normal},
-                                 touchAt(way - aside), touchAt(way + aside));
-    if (!held || held->distance - radius > margin) return std::nullopt;
-    const glm::vec3 point = piece.edge.place(part);
-    return contact(point - held->distance * held->normal, held->normal, held->distance - radius, 0,
-                   approach(point, held->normal, margin));
+    const auto across = acrossEdge(interval.edge.directionAt(fraction), SurfaceSample{there.distance, there.normal},
+                                   distance, voxel_, sampleAt);
+    if (!across || across->distance - radius > margin) return std::nullopt;
+    const glm::vec3 point = interval.edge.place(fraction);
+    return contact(point - across->distance * across->normal, across->normal, across->distance - radius, 0,
+                   approach(point, across->normal, margin));
 }
 
 float LocalField::approach(const glm::vec3& point, const glm::vec3& normal, float margin) const {
-    return longestWay_ > margin ? std::max(-glm::dot(relativeMotion_.of(point), normal), 0.f) : 0;
+    return maxDisplacement_ > margin ? std::max(-glm::dot(relativeMotion_.of(point), normal), 0.f) : 0;
 }
 
 Contact LocalField::contact(const glm::vec3& position, const glm::vec3& normal, float distance, std::uint32_t feature,
-                            float approach) const {
-    return {pose_.toWorld(position), pose_.rotation * normal, distance, feature, approach};
+                            float approach, float turningRadius) const {
+    return {pose_.toWorld(position), pose_.rotation * normal, distance, feature, approach, turningRadius};
 }
 
 }  // namespace bilayer::bullet::detail

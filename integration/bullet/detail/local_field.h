@@ -1,5 +1,5 @@
 // A field from the view of the other body of a pair: in metres, in the field's axes, with the relative motion of the
-// other body; internal.
+// other body.
 #pragma once
 
 #include <cstdint>
@@ -19,94 +19,98 @@ namespace bilayer::bullet::detail {
 using namespace bilayer::detail;
 
 // Bits of the number of a probe on an edge. This limits the probes: higher numbers are the features of the next edge.
-inline constexpr int partBits = 15;
+inline constexpr int probeBits = 15;
+
+/// An edge of the other body, or the axis of a rounded one.
+struct ProbedEdge {
+    std::function<glm::vec3(float)> place;  ///< by the fraction of the edge
+    float radius[2];                        ///< growth at its ends [m]
+    bool isStraight;
+    std::uint32_t feature;               ///< the first of 2^(probeBits + 1)
+    std::optional<Conormals> conormals;  ///< of a sharp edge between two faces
+    bool isSearched = true;              ///< whether to search between the probes for deeper points
+
+    float radiusAt(float fraction) const { return radius[0] + fraction * (radius[1] - radius[0]); }
+    glm::vec3 directionAt(float fraction) const;
+};
 
 /// A field in world units [m] and in the axes of its body, with the motion of another body relative to it.
 class LocalField {
   public:
-    /// @param reach     maximum separation of contacts [m]
-    /// @param measured  as ContactOptions::exact
-    LocalField(const Placed& field, const Pose& other, const Motion& motion, float reach, bool measured);
+    /// @param reach  maximum separation of contacts [m]
+    /// @param exact  as ContactOptions::exact
+    LocalField(const Placed& field, const Pose& other, const Motion& motion, float reach, bool exact);
 
     const Collider& collider() const { return collider_; }
     /// The motion of the other body's points relative to the field.
     const RelativeMotion& relativeMotion() const { return relativeMotion_; }
     /// The maximum displacement of the points that are in the field's box. Points that come from afar may move farther
     /// by rotation.
-    float longestWay() const { return longestWay_; }
+    float maxDisplacement() const { return maxDisplacement_; }
 
-    struct Answer {
-        enum { near, outside, inside, unclear } where = unclear;
+    /// The field at a point.
+    struct FieldSample {
+        /// `noNormal` is near the surface too, but on the medial axis.
+        enum { nearSurface, outside, inside, noNormal } where = noNormal;
         float distance = 0;   ///< [m]
-        glm::vec3 normal{0};  ///< of unit length if near
+        glm::vec3 normal{0};  ///< of unit length if near the surface
         glm::vec3 gradient{0};
 
-        bool isKnown() const { return where == near || where == unclear; }
+        bool isKnown() const { return where == nearSurface || where == noNormal; }
     };
 
     /// @param radius  growth of the point [m]
-    Answer at(const glm::vec3& point, float radius = 0) const;
+    FieldSample at(const glm::vec3& point, float radius = 0) const;
 
     /// The contact of a point of the other body's core, grown by a radius.
-    std::optional<Contact> probe(const glm::vec3& point, const Answer& answer, float radius, std::uint32_t feature,
+    std::optional<Contact> probe(const glm::vec3& point, const FieldSample& sample, float radius, std::uint32_t feature,
                                  float margin, ContactReport& report) const;
-
-    /// An edge of the other body, or the axis of a rounded one.
-    struct Edge {
-        std::function<glm::vec3(float)> place;  ///< by the fraction of the edge
-        float radius[2];                        ///< growth at its ends [m]
-        bool isStraight;
-        std::uint32_t feature;               ///< the first of 2^(partBits + 1)
-        std::optional<Conormals> conormals;  ///< of a sharp edge between two faces
-        bool isSearched = true;              ///< whether to search between the probes for deeper points
-
-        float radiusAt(float part) const { return radius[0] + part * (radius[1] - radius[0]); }
-        glm::vec3 directionAt(float part) const;
-    };
 
     /// Finds the contacts along an edge, ends excluded: those of the probes, and between two probes that of the deepest
     /// point, if the edge is deeper there.
-    /// @param first, last  the answers at its ends
-    void probeEdge(const Edge& edge, const Answer& first, const Answer& last, float margin, ContactReport& report,
-                   std::vector<Contact>& contacts) const;
+    /// @param first, last  the field at its ends
+    void probeEdge(const ProbedEdge& edge, const FieldSample& first, const FieldSample& last, float margin,
+                   ContactReport& report, std::vector<Contact>& contacts) const;
 
     /// The contact at the deepest point of an edge between two probes. Nothing unless the edge descends from either
     /// probe, or crosses a sharp edge.
-    std::optional<Contact> deepestBetween(const Edge& edge, float from, const Answer& atFrom, float to,
-                                          const Answer& atTo, float margin) const;
+    std::optional<Contact> deepestContact(const ProbedEdge& edge, float from, const FieldSample& atFrom, float to,
+                                          const FieldSample& atTo, float margin) const;
 
     /// Contact::approach for a point of the other body.
     float approach(const glm::vec3& point, const glm::vec3& normal, float margin) const;
 
     Contact contact(const glm::vec3& position, const glm::vec3& normal, float distance, std::uint32_t feature,
-                    float approach = 0) const;
+                    float approach = 0, float turningRadius = -1) const;
 
   private:
-    /// A part of an edge between two probes.
-    struct Piece {
-        const Edge& edge;
+    /// The interval of an edge between two probes.
+    struct EdgeInterval {
+        const ProbedEdge& edge;
         float from, to;  ///< fractions of the edge
         float length;    ///< [m]
 
-        float partAt(float way) const { return from + way / length * (to - from); }
+        float fractionAt(float distance) const { return from + distance / length * (to - from); }
     };
 
-    bool comesNear(const glm::vec3& from, const glm::vec3& to, float reach) const;
-    std::optional<Contact> probeOnWay(const glm::vec3& point, float radius, std::uint32_t feature, float margin,
-                                      float distance) const;
-    Slope slopeOf(const Piece& piece, float way, const Answer& answer) const;
-    std::optional<SharpEdges::Crossing> crossingAt(const Edge& edge, float part, const Answer& there) const;
-    std::optional<Contact> touchAcross(const Piece& piece, float way, const Answer& there, float margin) const;
-    Answer exactly(const glm::vec3& point, const Sample& sample) const;
-    Answer farAway(const glm::vec3& point, float radius, float bound) const;
+    bool mayReach(const glm::vec3& from, const glm::vec3& to, float reach) const;
+    std::optional<Contact> speculativeContact(const glm::vec3& point, float radius, std::uint32_t feature, float margin,
+                                              float distance) const;
+    Slope slopeOf(const EdgeInterval& interval, float distance, const FieldSample& sample) const;
+    std::optional<SharpEdges::Crossing> crossingAt(const ProbedEdge& edge, float fraction,
+                                                   const FieldSample& there) const;
+    std::optional<Contact> contactAcross(const EdgeInterval& interval, float distance, const FieldSample& there,
+                                         float margin) const;
+    FieldSample exactSample(const glm::vec3& point, const Sample& sample) const;
+    FieldSample sampleBeyondBand(const glm::vec3& point, float radius, float bound) const;
 
     const Collider& collider_;
     const Field& field_;
-    bool measured_;
+    bool exact_;
     float scale_, voxel_;
     Pose pose_;
     RelativeMotion relativeMotion_;
-    float longestWay_;
+    float maxDisplacement_;
     float exactReach_;    ///< maximum distance for exact queries of the triangles, where the field has any [m]
     float farReach_ = 0;  ///< beyond the band, where contacts are asked for there; in the field's units
 };

@@ -19,7 +19,7 @@ namespace {
 constexpr float sameDirection = 0.9f;
 // A contact sticks below this fraction of the friction limit. A drift along the surface beyond the second value is not
 // pulled back [fractions of Continuity::sameWithin].
-constexpr float held = 0.98f, maxDrift = 0.25f;
+constexpr float stickingLimit = 0.98f, maxDrift = 0.25f;
 // The time until a contact bears its full resting friction [steps], and the slip that removes it [fractions of
 // Continuity::sameWithin]. It falls gradually, so that other contacts have time to take over the load. Sticking
 // contacts are not known to slip more in one step.
@@ -75,7 +75,7 @@ btManifoldPoint pointOf(const Contact& contact, const Identifiers& of, const btP
 }
 
 /// Adds a contact to the result's manifold.
-void emit(const Contact& contact, const Identifiers& of, bool aIsFirst, btManifoldResult& result) {
+void addContact(const Contact& contact, const Identifiers& of, bool aIsFirst, btManifoldResult& result) {
     btPersistentManifold& manifold = *result.getPersistentManifold();
     manifold.setContactBreakingThreshold(std::max(contact.distance, 0.f));
     if (!isOfUser(result)) {
@@ -90,33 +90,34 @@ void emit(const Contact& contact, const Identifiers& of, bool aIsFirst, btManifo
 
 /// Calls the user's contact-added callback after the point has its final values. The user's data in the point is kept
 /// from step to step.
-void tellAdded(btManifoldPoint& point, const btPersistentManifold& manifold, const btManifoldResult& result) {
+void notifyAdded(btManifoldPoint& point, const btPersistentManifold& manifold, const btManifoldResult& result) {
     const btCollisionObjectWrapper *first = result.getBody0Wrap(), *second = result.getBody1Wrap();
-    const auto asks = [](const btCollisionObjectWrapper& side) {
+    const auto wantsCallback = [](const btCollisionObjectWrapper& side) {
         return (side.getCollisionObject()->getCollisionFlags() & btCollisionObject::CF_CUSTOM_MATERIAL_CALLBACK) != 0;
     };
-    if (!gContactAddedCallback || !(asks(*first) || asks(*second))) return;
+    if (!gContactAddedCallback || !(wantsCallback(*first) || wantsCallback(*second))) return;
     if (manifold.getBody0() != first->getCollisionObject()) std::swap(first, second);
     gContactAddedCallback(point, first, point.m_partId0, point.m_index0, second, point.m_partId1, point.m_index1);
 }
 
 /// Calls the user's callback for a point that existed before.
-void tellProcessed(btManifoldPoint& point, const btPersistentManifold& manifold) {
+void notifyProcessed(btManifoldPoint& point, const btPersistentManifold& manifold) {
     if (!gContactProcessedCallback || point.m_lifeTime == 0) return;
     gContactProcessedCallback(point, const_cast<btCollisionObject*>(manifold.getBody0()),
                               const_cast<btCollisionObject*>(manifold.getBody1()));
 }
 
-btVector3 along(const btVector3& way, const btVector3& normal) {
-    return way - normal.dot(way) * normal;
+/// The component of a vector along a surface.
+btVector3 tangential(const btVector3& v, const btVector3& normal) {
+    return v - normal.dot(v) * normal;
 }
 
 /// Moves a contact that rotates in the step to its predicted position. The drift in between is not slip.
-void put(btManifoldPoint& point, const PredictedContact& ahead) {
-    point.m_positionWorldOnA = ahead.onA;
-    point.m_positionWorldOnB = ahead.onB;
-    point.m_normalWorldOnB = ahead.normal;
-    point.m_distance1 = ahead.distance;
+void applyPrediction(btManifoldPoint& point, const PredictedContact& prediction) {
+    point.m_positionWorldOnA = prediction.onA;
+    point.m_positionWorldOnB = prediction.onB;
+    point.m_normalWorldOnB = prediction.normal;
+    point.m_distance1 = prediction.distance;
     point.m_contactPointFlags &= ~BT_CONTACT_FLAG_FRICTION_ANCHOR;
 }
 
@@ -130,17 +131,17 @@ struct Anchor {
 /// leaves the path along which it is pulled back, the user has moved it, or it was torn off.
 Anchor anchorOf(const btManifoldPoint& point, const btVector3& before, const btPersistentManifold& manifold,
                 float sameWithin) {
-    const btVector3 drift = along(manifold.getBody0()->getWorldTransform() * point.m_localPointA -
-                                      manifold.getBody1()->getWorldTransform() * point.m_localPointB,
-                                  point.m_normalWorldOnB);
+    const btVector3 drift = tangential(manifold.getBody0()->getWorldTransform() * point.m_localPointA -
+                                           manifold.getBody1()->getWorldTransform() * point.m_localPointB,
+                                       point.m_normalWorldOnB);
     // Bullet limits friction in each of its directions separately
     const float friction = std::max(std::abs(point.m_appliedImpulseLateral1), std::abs(point.m_appliedImpulseLateral2));
-    const bool holds = friction < held * point.m_combinedFriction * point.m_appliedImpulse;
-    const float most = holds ? maxDrift * sameWithin : std::min(maxDrift * sameWithin, float(before.length()));
+    const bool holds = friction < stickingLimit * point.m_combinedFriction * point.m_appliedImpulse;
+    const float maxLength = holds ? maxDrift * sameWithin : std::min(maxDrift * sameWithin, float(before.length()));
     const float length = drift.length(), slip = (drift - before).length();
     const float left = before.isZero() ? 0 : std::clamp(drift.dot(before) / before.length2(), 0.f, 1.f);
     if (holds && (drift - left * before).length() > slipOfRest * sameWithin) return {btVector3(0, 0, 0), slip};
-    return {length > most ? most / length * drift : drift, holds ? 0 : slip};
+    return {length > maxLength ? maxLength / length * drift : drift, holds ? 0 : slip};
 }
 
 }  // namespace
@@ -197,7 +198,7 @@ void Manifolds::write(std::span<const Patch> patches, std::span<const ContactDet
         manifolds_.push_back(dispatcher_.getNewManifold(&a, &b));
     written_.resize(manifolds_.size());
 
-    takeOld();
+    takeOldPoints();
     const Step step(a, b, seconds, continuity, result);
     for (std::size_t m = 0, at = 0; m < manifolds_.size(); ++m) {
         std::span<const Contact> contacts;
@@ -210,7 +211,7 @@ void Manifolds::write(std::span<const Patch> patches, std::span<const ContactDet
             gContactDestroyedCallback(point.m_userPersistentData);
 }
 
-void Manifolds::takeOld() {
+void Manifolds::takeOldPoints() {
     old_.clear();
     for (std::size_t m = 0; m < manifolds_.size(); ++m)
         for (int i = 0; i < manifolds_[m]->getNumContacts(); ++i) {
@@ -228,24 +229,24 @@ void Manifolds::fill(std::size_t m, std::span<const Contact> contacts, std::span
     step.result.setPersistentManifold(manifold);
     for (std::size_t n = 0; n < contacts.size(); ++n) {
         const Identifiers of = identifiersOf(contacts[n], details[n].triangle, step.aIsFirst, step.result);
-        emit(contacts[n], of, step.aIsFirst, step.result);
+        addContact(contacts[n], of, step.aIsFirst, step.result);
     }
-    const bool isTold = !isOfUser(step.result);
+    const bool notifies = !isOfUser(step.result);
     for (int i = 0; i < manifold->getNumContacts(); ++i) {
         const auto n = std::size_t(i);
         btManifoldPoint& point = manifold->getContactPoint(i);
         Written& written = written_[m][n];
         written = inherit(*manifold, i, step.continuity);
-        if (isTold) tellAdded(point, *manifold, step.result);
-        if (point.m_contactMotion1 != 0 || point.m_contactMotion2 != 0) letGo(*manifold, point, written);
-        const bool isAsFound = point.m_normalWorldOnB == toBullet(contacts[n].normal);
-        if (details[n].ahead && isAsFound) put(point, *details[n].ahead);
+        if (notifies) notifyAdded(point, *manifold, step.result);
+        if (point.m_contactMotion1 != 0 || point.m_contactMotion2 != 0) releaseAnchor(*manifold, point, written);
+        const bool isUnchanged = point.m_normalWorldOnB == toBullet(contacts[n].normal);
+        if (details[n].prediction && isUnchanged) applyPrediction(point, *details[n].prediction);
         step.bounce(point);
-        tellProcessed(point, *manifold);
+        notifyProcessed(point, *manifold);
     }
     manifold->setContactBreakingThreshold(step.continuity.sameWithin);
     const bool touches = manifold->getNumContacts() > 0;
-    if (isTold && !touched && touches && gContactStartedCallback) gContactStartedCallback(manifold);
+    if (notifies && !touched && touches && gContactStartedCallback) gContactStartedCallback(manifold);
     if (touched && !touches && gContactEndedCallback) gContactEndedCallback(manifold);
 }
 
@@ -256,7 +257,7 @@ Manifolds::Written Manifolds::writtenAs(const btManifoldPoint& point, std::size_
 }
 
 /// Releases the anchor: the user moves one surface along the other, so former contact points drift apart as intended.
-void Manifolds::letGo(const btPersistentManifold& manifold, btManifoldPoint& point, Written& written) {
+void Manifolds::releaseAnchor(const btPersistentManifold& manifold, btManifoldPoint& point, Written& written) {
     point.m_contactPointFlags &= ~BT_CONTACT_FLAG_FRICTION_ANCHOR;
     point.m_positionWorldOnA -= written.drift;
     point.m_localPointA = manifold.getBody0()->getWorldTransform().invXform(point.m_positionWorldOnA);
@@ -284,14 +285,14 @@ Manifolds::Written Manifolds::inherit(btPersistentManifold& manifold, int index,
     point.m_lifeTime = old.m_lifeTime + 1;
     point.m_userPersistentData = old.m_userPersistentData;
     const Anchor anchor = anchorOf(old, written.drift, manifold, sameWithin);
-    point.m_positionWorldOnA += along(anchor.drift, point.m_normalWorldOnB);
+    point.m_positionWorldOnA += tangential(anchor.drift, point.m_normalWorldOnB);
     point.m_localPointA = manifold.getBody0()->getWorldTransform().invXform(point.m_positionWorldOnA);
     const float gained = anchor.slip > 0 ? -anchor.slip / (slipOfRest * sameWithin) : 1 / stepsOfRest;
     const float rest = std::clamp(written.rest + gained, 0.f, 1.f);
     point.m_combinedFriction *= 1 + rest * (continuity.restingFriction - 1);
     *source = old_.back();
     old_.pop_back();
-    const btVector3 drift = along(point.m_positionWorldOnA - point.m_positionWorldOnB, point.m_normalWorldOnB);
+    const btVector3 drift = tangential(point.m_positionWorldOnA - point.m_positionWorldOnB, point.m_normalWorldOnB);
     return {point.m_localPointA, point.m_localPointB, drift, rest};
 }
 

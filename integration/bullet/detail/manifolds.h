@@ -27,8 +27,8 @@ struct PredictedContact {
 
 /// Data that a manifold gets in addition to the contact itself.
 struct ContactDetails {
-    std::optional<PredictedContact> ahead;  ///< if the contact point rotates with its body
-    std::optional<TriangleId> triangle;     ///< the triangle of A
+    std::optional<PredictedContact> prediction;  ///< if the contact point rotates with its body
+    std::optional<TriangleId> triangle;          ///< the triangle of A
 };
 
 /// Parameters of the transfer of contacts from step to step.
@@ -69,7 +69,7 @@ class Manifolds {
   private:
     /// The bodies and parameters of the coming step.
     struct Step;
-    void takeOld();
+    void takeOldPoints();
     /// Writes manifold m.
     void fill(std::size_t m, std::span<const Contact> contacts, std::span<const ContactDetails> details,
               const Step& step);
@@ -82,17 +82,17 @@ class Manifolds {
     };
     Written writtenAs(const btManifoldPoint& point, std::size_t manifold) const;
     Written inherit(btPersistentManifold& manifold, int index, const Continuity& continuity);
-    static void letGo(const btPersistentManifold& manifold, btManifoldPoint& point, Written& written);
+    static void releaseAnchor(const btPersistentManifold& manifold, btManifoldPoint& point, Written& written);
 
     /// A manifold point of the last step.
-    struct Old {
+    struct OldPoint {
         btManifoldPoint point;
         Written written;
     };
     btDispatcher& dispatcher_;
     std::vector<btPersistentManifold*> manifolds_;
     std::vector<std::array<Written, MANIFOLD_CACHE_SIZE>> written_;  ///< the contents of the manifolds
-    std::vector<Old> old_;  ///< those that no new contact has inherited from yet
+    std::vector<OldPoint> old_;  ///< those that no new contact has inherited from yet
 };
 
 }  // namespace bilayer::bullet::detail

@@ -27,7 +27,7 @@ Address addressOf(const btTransform& transform) {
 }
 
 /// Offset from a body's transform to its predicted transform in memory.
-Address aheadInBody() {
+Address predictedOffset() {
     static const btCollisionObject object;
     return addressOf(object.getInterpolationWorldTransform()) - addressOf(object.getWorldTransform());
 }
@@ -38,12 +38,12 @@ class Boxes {
     /// Whether the box is that of a dynamic body and meets another body's.
     bool note(const void* field, Address transform, const btVector3& lower, const btVector3& upper) {
         if (asked_.size() >= maxEntries) asked_.clear();
-        const auto body = asked_.find(transform - aheadInBody());
-        const bool isAhead = body != asked_.end() && body->second.field == field && body->second.time == time_;
+        const auto body = asked_.find(transform - predictedOffset());
+        const bool isPredicted = body != asked_.end() && body->second.field == field && body->second.time == time_;
         Asked& here = asked_[transform];
         const std::uint64_t before = here.field == field ? here.time : 0;
         here = {field, lower, upper, ++time_};
-        return isAhead && before > 0 && meetsAnother(transform, here, before);
+        return isPredicted && before > 0 && meetsAnother(transform, here, before);
     }
 
     void forget(const void* field) {
@@ -60,16 +60,16 @@ class Boxes {
         /// Whether another transform may be a copy of this one, made by a program to draw a body.
         bool isCopyOf(const Asked& other) const {
             if (field != other.field) return false;
-            const btVector3 apart = (lower + upper - other.lower - other.upper).absolute(), size = upper - lower;
-            return apart.x() < size.x() && apart.y() < size.y() && apart.z() < size.z();
+            const btVector3 offset = (lower + upper - other.lower - other.upper).absolute(), size = upper - lower;
+            return offset.x() < size.x() && offset.y() < size.y() && offset.z() < size.z();
         }
     };
 
     /// Whether the box meets one that was requested after the body's last request: that one is in the same world.
     bool meetsAnother(Address transform, const Asked& box, std::uint64_t since) const {
         for (const auto& [other, asked] : asked_) {
-            const Address apart = other > transform ? other - transform : transform - other;
-            const bool isSameBody = apart < sizeof(btCollisionObject);
+            const Address distance = other > transform ? other - transform : transform - other;
+            const bool isSameBody = distance < sizeof(btCollisionObject);
             if (!isSameBody && asked.time > since && asked.meets(box) && !asked.isCopyOf(box)) return true;
         }
         return false;

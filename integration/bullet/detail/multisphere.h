@@ -6,34 +6,32 @@
 #include <utility>
 #include <vector>
 
+#include "integration/bullet/detail/nearest_point.h"
+
 namespace bilayer::bullet::detail {
 
 class MultisphereHull {
   public:
-    struct Ball {
+    struct Sphere {
         glm::vec3 centre;  ///< [m]
         float radius;      ///< not negative [m]
     };
 
     MultisphereHull() = default;
     /// Takes at least one sphere. Takes O(n^4) time for n of them.
-    explicit MultisphereHull(std::vector<Ball> balls);
+    explicit MultisphereHull(std::vector<Sphere> spheres);
 
-    struct Near {
-        float distance;    ///< signed, to the surface [m]
-        glm::vec3 normal;  ///< outward normal of the surface there, of unit length
-        Ball ball;         ///< a sphere inside the hull that touches the surface there
-    };
-    /// Exact up to rounding, outside and inside. Takes O(n^2) outside, O(n^3) inside.
-    Near nearest(const glm::vec3& point) const;
+    /// The nearest point of the surface. Its core point is the centre of a sphere inside the hull that touches the
+    /// surface there. Exact up to rounding, outside and inside. Takes O(n^2) outside, O(n^3) inside.
+    NearestPoint nearest(const glm::vec3& point) const;
 
     /// The spheres that no other one contains.
-    const std::vector<Ball>& balls() const { return balls_; }
+    const std::vector<Sphere>& spheres() const { return spheres_; }
     /// Pairs of spheres with a tangent cone; some cones may be inside the hull.
     const std::vector<std::pair<std::uint32_t, std::uint32_t>>& pairs() const { return pairs_; }
 
   private:
-    struct Plane {
+    struct TangentPlane {
         glm::dvec3 normal;
         double offset;
         std::uint32_t corners[3];
@@ -46,14 +44,14 @@ class MultisphereHull {
         double radius;
     };
     void addPlanes(std::uint32_t i, std::uint32_t j, std::uint32_t k);
-    Candidate aroundBall(const Ball& ball, const glm::dvec3& point) const;
-    Candidate aroundPair(const Ball& from, const Ball& to, const glm::dvec3& point) const;
+    Candidate aroundSphere(const Sphere& sphere, const glm::dvec3& point) const;
+    Candidate aroundPair(const Sphere& from, const Sphere& to, const glm::dvec3& point) const;
     Candidate inside(const glm::dvec3& point) const;
     double along(const glm::dvec3& direction, const glm::dvec3& point) const;
 
-    std::vector<Ball> balls_;
+    std::vector<Sphere> spheres_;
     std::vector<std::pair<std::uint32_t, std::uint32_t>> pairs_;
-    std::vector<Plane> planes_;
+    std::vector<TangentPlane> planes_;
     float size_ = 0, minRadius_ = 0;  ///< [m]
 };
 

@@ -19,13 +19,13 @@ constexpr std::uint32_t lowestVertex = featureOfB - 1;
 
 }  // namespace
 
-ContactReport collideFields(const Placed& a, const Placed& b, float margin, bool measured, ContactCache& cache,
+ContactReport collideFields(const Placed& a, const Placed& b, float margin, bool exact, ContactCache& cache,
                             std::vector<Contact>& contacts) {
     ContactOptions options;
     options.margin = margin;
-    options.exact = measured;
+    options.exact = exact;
     // a contact test needs the distance of the bodies for any direction of their normals
-    if (measured) {
+    if (exact) {
         options.minNormalCosineApart = options.minNormalCosine;
         options.keepsObliqueEdges = true;
     }
@@ -40,7 +40,7 @@ ContactReport collideFields(const Placed& a, const Placed& b, float margin, std:
 }
 
 ContactReport collidePlane(const glm::vec3& normal, float offset, const Motion& motion, const Placed& field,
-                           float margin, bool measured, std::vector<Contact>& contacts) {
+                           float margin, bool exact, std::vector<Contact>& contacts) {
     ContactReport report;
     // The plane in the collider's own coordinates.
     const glm::vec3 up = glm::conjugate(field.pose.rotation) * normal;
@@ -49,7 +49,7 @@ ContactReport collidePlane(const glm::vec3& normal, float offset, const Motion& 
     const LocalField local(field, {}, motion, margin, false);
     const auto above = [&](const glm::vec3& point) { return glm::dot(up, point) - height; };
     const auto reject = [&](const glm::vec3& centre, float radius) {
-        return above(centre) - radius > reach + local.longestWay() / field.scale;
+        return above(centre) - radius > reach + local.maxDisplacement() / field.scale;
     };
     field.collider.data().points().visit(reject, [&](std::uint32_t index, const SurfacePoint& point) {
         ++report.pointsTested;
@@ -60,7 +60,7 @@ ContactReport collidePlane(const glm::vec3& normal, float offset, const Motion& 
         const glm::vec3 position = field.pose.toWorld(field.scale * point.position);
         contacts.push_back({position, -normal, field.scale * distance, index | featureOfB, field.scale * approach, 0});
     });
-    if (!measured || !field.collider.data().body.mesh) return report;
+    if (!exact || !field.collider.data().body.mesh) return report;
     const auto& vertices = field.collider.data().body.mesh->points;
     const auto isLower = [&](const glm::vec3& a, const glm::vec3& b) { return above(a) < above(b); };
     const auto lowest = std::min_element(vertices.begin(), vertices.end(), isLower);

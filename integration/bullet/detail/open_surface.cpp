@@ -26,19 +26,19 @@ constexpr float minMean = 0.26f;
 // projections, or the result is more than 60 degrees from the direction (cosine).
 constexpr float coneTolerance = 1e-3f, minConeCosine = 0.5f;
 constexpr int maxProjections = 20;
-constexpr int maxPieces = 64;  // maximum number of parts of a path
+constexpr int maxIntervals = 64;  // maximum count of intervals of a path
 
 /// The end points of an edge in a unique order.
-using SideKey = std::array<float, 6>;
-SideKey keyOf(const Triangle& triangle, int side) {
-    const glm::vec3 &a = triangle[side], &b = triangle[(side + 1) % 3];
-    const SideKey key{a.x, a.y, a.z, b.x, b.y, b.z}, back{b.x, b.y, b.z, a.x, a.y, a.z};
+using EdgeKey = std::array<float, 6>;
+EdgeKey keyOf(const Triangle& triangle, int edge) {
+    const glm::vec3 &a = triangle[edge], &b = triangle[(edge + 1) % 3];
+    const EdgeKey key{a.x, a.y, a.z, b.x, b.y, b.z}, back{b.x, b.y, b.z, a.x, a.y, a.z};
     return std::min(key, back);
 }
 
-glm::vec3 normalized(const glm::vec3& way) {
-    const float length = glm::length(way);
-    return length > 0 ? way / length : glm::vec3(0);
+glm::vec3 normalized(const glm::vec3& v) {
+    const float length = glm::length(v);
+    return length > 0 ? v / length : glm::vec3(0);
 }
 
 /// The steepest direction along triangles away from one point of theirs, relative to a given direction.
@@ -46,20 +46,20 @@ class Ascent {
   public:
     explicit Ascent(const glm::vec3& direction) : direction_(direction) {}
 
-    /// @param way  direction, of unit length
-    void along(const glm::vec3& way) {
-        if (const float rise = glm::dot(way, direction_); rise > rise_) rise_ = rise, part_ = rise * way;
+    /// @param along  of unit length
+    void consider(const glm::vec3& along) {
+        if (const float rise = glm::dot(along, direction_); rise > rise_) rise_ = rise, part_ = rise * along;
     }
     /// Considers all directions from a vertex into its triangle.
     /// @param one, other  along its two edges there, of unit length
-    /// @param wing        conormal of the first edge
-    void between(const glm::vec3& one, const glm::vec3& other, const glm::vec3& wing) {
-        along(one);
-        along(other);
-        const float ahead = glm::dot(one, direction_), aside = glm::dot(wing, direction_);
-        const bool isWithin = aside >= 0 && ahead * glm::dot(other, wing) >= aside * glm::dot(other, one);
-        if (const float rise = std::hypot(ahead, aside); isWithin && rise > rise_)
-            rise_ = rise, part_ = ahead * one + aside * wing;
+    /// @param conormal    of the first edge
+    void considerBetween(const glm::vec3& one, const glm::vec3& other, const glm::vec3& conormal) {
+        consider(one);
+        consider(other);
+        const float ahead = glm::dot(one, direction_), across = glm::dot(conormal, direction_);
+        const bool isWithin = across >= 0 && ahead * glm::dot(other, conormal) >= across * glm::dot(other, one);
+        if (const float rise = std::hypot(ahead, across); isWithin && rise > rise_)
+            rise_ = rise, part_ = ahead * one + across * conormal;
     }
 
     float rise() const { return rise_; }             ///< sine
@@ -88,7 +88,7 @@ std::optional<glm::vec3> inNormalCone(const glm::vec3& direction, Visit&& visit)
 }
 
 /// The direction away from all of these together, unless they surround the point.
-class Away {
+class OutwardMean {
   public:
     void add(const glm::vec3& direction, float weight) {
         sum_ += weight * direction;
@@ -107,18 +107,18 @@ class Away {
 
 }  // namespace
 
-glm::vec3 conormalOf(const Triangle& triangle, int side) {
-    const glm::vec3 &from = triangle[side], &to = triangle[(side + 1) % 3], &opposite = triangle[(side + 2) % 3];
-    const glm::vec3 along = to - from, way = opposite - from;
+glm::vec3 conormalOf(const Triangle& triangle, int edge) {
+    const glm::vec3 &from = triangle[edge], &to = triangle[(edge + 1) % 3], &opposite = triangle[(edge + 2) % 3];
+    const glm::vec3 along = to - from, inward = opposite - from;
     const float squared = glm::dot(along, along);
-    const glm::vec3 across = squared > 0 ? way - glm::dot(way, along) / squared * along : way;
+    const glm::vec3 across = squared > 0 ? inward - glm::dot(inward, along) / squared * along : inward;
     const float length = glm::length(across);
     return length > 0 ? across / length : glm::vec3(0);
 }
 
 Adjacency::Adjacency(std::span<const Triangle> triangles) : triangles_(triangles) {
     edges_ = groupBy([](const Triangle& triangle, int i) { return keyOf(triangle, i); });
-    corners_ = groupBy([](const Triangle& triangle, int i) {
+    vertices_ = groupBy([](const Triangle& triangle, int i) {
         return std::array{triangle[i].x, triangle[i].y, triangle[i].z};
     });
 }
@@ -149,8 +149,8 @@ Adjacency::Groups Adjacency::groupBy(KeyOf&& keyOf) const {
 std::optional<Conormals> Adjacency::conormalsOf(std::uint32_t triangle, int edge) const {
     const auto both = atEdge(triangle, edge);
     if (both.size() != 2) return std::nullopt;
-    const auto wing = [&](const Member& one) { return conormalOf(triangles_[one.triangle], one.index); };
-    return Conormals{wing(both[0]), wing(both[1])};
+    const auto conormal = [&](const Member& one) { return conormalOf(triangles_[one.triangle], one.index); };
+    return Conormals{conormal(both[0]), conormal(both[1])};
 }
 
 std::optional<glm::vec3> Adjacency::neighbourOf(std::uint32_t triangle, int edge) const {
@@ -164,60 +164,61 @@ std::optional<glm::vec3> Adjacency::edgeNormal(std::uint32_t triangle, int edge,
     const Triangle& corners = triangles_[triangle];
     const glm::vec3 along = normalized(corners[(edge + 1) % 3] - corners[edge]);
     return inNormalCone(direction, [&](Ascent& ascent) {
-        ascent.along(along);
-        ascent.along(-along);
-        for (const Member& one : atEdge(triangle, edge)) ascent.along(conormalOf(triangles_[one.triangle], one.index));
+        ascent.consider(along);
+        ascent.consider(-along);
+        for (const Member& one : atEdge(triangle, edge))
+            ascent.consider(conormalOf(triangles_[one.triangle], one.index));
     });
 }
 
-std::optional<glm::vec3> Adjacency::cornerNormal(std::uint32_t triangle, int corner, const glm::vec3& direction) const {
+std::optional<glm::vec3> Adjacency::vertexNormal(std::uint32_t triangle, int vertex, const glm::vec3& direction) const {
     return inNormalCone(direction, [&](Ascent& ascent) {
-        for (const auto& [other, i] : groupOf(corners_, triangle, corner)) {
+        for (const auto& [other, i] : groupOf(vertices_, triangle, vertex)) {
             const Triangle& corners = triangles_[other];
-            ascent.between(normalized(corners[(i + 1) % 3] - corners[i]), normalized(corners[(i + 2) % 3] - corners[i]),
-                           conormalOf(corners, i));
+            ascent.considerBetween(normalized(corners[(i + 1) % 3] - corners[i]),
+                                   normalized(corners[(i + 2) % 3] - corners[i]), conormalOf(corners, i));
         }
     });
 }
 
-SharpTriangles sharpOf(std::span<const Triangle> triangles) {
-    std::map<SideKey, Away> sides;
-    std::map<std::array<float, 3>, Away> corners;
+SharpFeatures sharpFeaturesOf(std::span<const Triangle> triangles) {
+    std::map<EdgeKey, OutwardMean> edges;
+    std::map<std::array<float, 3>, OutwardMean> vertices;
     for (const Triangle& triangle : triangles)
         for (int i = 0; i < 3; ++i) {
-            if (const glm::vec3 wing = conormalOf(triangle, i); wing != glm::vec3(0))
-                sides[keyOf(triangle, i)].add(wing, 1);
+            if (const glm::vec3 conormal = conormalOf(triangle, i); conormal != glm::vec3(0))
+                edges[keyOf(triangle, i)].add(conormal, 1);
             const glm::vec3 &here = triangle[i], one = triangle[(i + 1) % 3] - here, two = triangle[(i + 2) % 3] - here;
             if (!(glm::dot(one, one) > 0 && glm::dot(two, two) > 0)) continue;
             const glm::vec3 sum = glm::normalize(one) + glm::normalize(two);
             const float angle = 2 * std::acos(std::min(0.5f * glm::length(sum), 1.f));
-            if (angle > 0 && glm::length(sum) > 0) corners[{here.x, here.y, here.z}].add(glm::normalize(sum), angle);
+            if (angle > 0 && glm::length(sum) > 0) vertices[{here.x, here.y, here.z}].add(glm::normalize(sum), angle);
         }
-    SharpTriangles sharp;
-    for (const auto& [key, away] : sides)
-        if (const auto outward = away.outward())
-            sharp.sides.push_back({{key[0], key[1], key[2]}, {key[3], key[4], key[5]}, *outward});
-    for (const auto& [place, away] : corners)
-        if (const auto outward = away.outward()) sharp.corners.push_back({{place[0], place[1], place[2]}, *outward});
+    SharpFeatures sharp;
+    for (const auto& [key, mean] : edges)
+        if (const auto outward = mean.outward())
+            sharp.edges.push_back({{key[0], key[1], key[2]}, {key[3], key[4], key[5]}, *outward});
+    for (const auto& [place, mean] : vertices)
+        if (const auto outward = mean.outward()) sharp.vertices.push_back({{place[0], place[1], place[2]}, *outward});
     return sharp;
 }
 
-std::vector<Triangle> trianglesAlong(const btConcaveShape& mesh, std::span<const glm::vec3> way, float radius) {
+std::vector<Triangle> trianglesAlong(const btConcaveShape& mesh, std::span<const glm::vec3> path, float radius) {
     struct All : btTriangleCallback {
-        std::set<std::array<float, 9>> seen;
+        std::set<std::array<float, 9>> passed;
         std::vector<Triangle> triangles;
 
         void processTriangle(btVector3* corners, int, int) override {
             const glm::vec3 a = toGlm(corners[0]), b = toGlm(corners[1]), c = toGlm(corners[2]);
-            if (seen.insert({a.x, a.y, a.z, b.x, b.y, b.z, c.x, c.y, c.z}).second) triangles.push_back({a, b, c});
+            if (passed.insert({a.x, a.y, a.z, b.x, b.y, b.z, c.x, c.y, c.z}).second) triangles.push_back({a, b, c});
         }
     } all;
-    for (std::size_t i = 0; i + 1 < way.size(); ++i) {
-        const float pieces =
-            std::clamp(std::ceil(glm::distance(way[i], way[i + 1]) / (2 * radius)), 1.f, float(maxPieces));
-        for (float k = 0; k < pieces; ++k) {
-            const glm::vec3 from = glm::mix(way[i], way[i + 1], k / pieces),
-                            to = glm::mix(way[i], way[i + 1], (k + 1) / pieces);
+    for (std::size_t i = 0; i + 1 < path.size(); ++i) {
+        const float intervals =
+            std::clamp(std::ceil(glm::distance(path[i], path[i + 1]) / (2 * radius)), 1.f, float(maxIntervals));
+        for (float k = 0; k < intervals; ++k) {
+            const glm::vec3 from = glm::mix(path[i], path[i + 1], k / intervals),
+                            to = glm::mix(path[i], path[i + 1], (k + 1) / intervals);
             mesh.processAllTriangles(&all, toBullet(glm::min(from, to) - radius),
                                      toBullet(glm::max(from, to) + radius));
         }

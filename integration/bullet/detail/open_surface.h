@@ -1,5 +1,4 @@
-// Open surfaces: the two-sided triangles that Bullet passes one at a time. Edges with equal end points are shared;
-// internal.
+// Open surfaces: the two-sided triangles that Bullet passes one at a time. Edges with equal end points are shared.
 #pragma once
 
 #include <BulletCollision/CollisionShapes/btConcaveShape.h>
@@ -19,9 +18,9 @@ using namespace bilayer::detail;
 
 using Triangle = std::array<glm::vec3, 3>;
 
-/// The conormal of an edge: in the triangle's plane, from edge `side` into the triangle, of unit length. The edge runs
+/// The conormal of an edge: in the triangle's plane, from an edge into the triangle, of unit length. The edge runs
 /// from that vertex to the next. Zero if the triangle has no area.
-glm::vec3 conormalOf(const Triangle& triangle, int side);
+glm::vec3 conormalOf(const Triangle& triangle, int edge);
 
 /// Adjacency of triangles by edge and vertex. Features are shared if their coordinates are equal to the bit. Edge i of
 /// a triangle runs from its vertex i to the next one.
@@ -46,7 +45,7 @@ class Adjacency {
     /// directions in which the feature is the closest point of its triangles. Nothing if the nearest one is more than
     /// 60 degrees away.
     std::optional<glm::vec3> edgeNormal(std::uint32_t triangle, int edge, const glm::vec3& direction) const;
-    std::optional<glm::vec3> cornerNormal(std::uint32_t triangle, int corner, const glm::vec3& direction) const;
+    std::optional<glm::vec3> vertexNormal(std::uint32_t triangle, int vertex, const glm::vec3& direction) const;
 
   private:
     /// Edges or vertices, grouped by equal coordinates.
@@ -62,24 +61,24 @@ class Adjacency {
     Groups groupBy(KeyOf&& keyOf) const;
 
     std::span<const Triangle> triangles_;
-    Groups edges_, corners_;
+    Groups edges_, vertices_;
 };
 
 /// The sharp features of an open surface: its border, and folds of more than 30 degrees.
-struct SharpTriangles {
-    struct Side {
+struct SharpFeatures {
+    struct OutwardEdge {
         glm::vec3 from, to;
         glm::vec3 outward;  ///< away from the surface, of unit length
     };
-    struct Corner {
+    struct OutwardVertex {
         glm::vec3 place, outward;
     };
-    std::vector<Side> sides;
-    std::vector<Corner> corners;
+    std::vector<OutwardEdge> edges;
+    std::vector<OutwardVertex> vertices;
 };
-SharpTriangles sharpOf(std::span<const Triangle> triangles);
+SharpFeatures sharpFeaturesOf(std::span<const Triangle> triangles);
 
 /// The triangles of a mesh or a height field that a sphere may touch along a polyline, each once.
-std::vector<Triangle> trianglesAlong(const btConcaveShape& mesh, std::span<const glm::vec3> way, float radius);
+std::vector<Triangle> trianglesAlong(const btConcaveShape& mesh, std::span<const glm::vec3> path, float radius);
 
 }  // namespace bilayer::bullet::detail

@@ -8,6 +8,7 @@
 #include <bilayer/collider/contact.h>
 #include <bilayer/integration/bullet/shape.h>
 #include "integration/bullet/detail/convert.h"
+#include "integration/bullet/detail/edge_probes.h"
 #include "integration/bullet/detail/narrow_phase.h"
 #include "integration/bullet/detail/predicted_contacts.h"
 #include "integration/bullet/detail/velocity.h"
@@ -47,8 +48,8 @@ Continuity continuityOf(const Side& a, const Side& b) {
 Motion Side::motionAt(const btVector3& point) const {
     if (!(seconds > 0) || !object->isActive()) return {};
     const Velocity velocity = velocityOf(*object);
-    const btVector3 way = seconds * (velocity.at(point) + seconds * accelerationOf(*object));
-    return {toGlm(way), toGlm(seconds * velocity.angular)};
+    const btVector3 displacement = seconds * (velocity.at(point) + seconds * accelerationOf(*object));
+    return {toGlm(displacement), toGlm(seconds * velocity.angular)};
 }
 
 Placed Side::placed() const {
@@ -77,19 +78,20 @@ void Pair::collide(const Side& a, const Side& b, const SampledPairs& sampled, st
 void Pair::test(const Side& a, const Side& b, float asked) {
     const float voxel = static_cast<const Shape&>(*b.shape).voxelSize();
     float margin = std::max(marginOf(a, b), std::min(asked, voxel));
-    const float most = std::max(margin, asked);
+    const float maxDistance = std::max(margin, asked);
     // a point between surface points is found by those around it, which are farther away
     const float between = probeSpacing * voxel;
     find(a, b, margin, true);
-    while (contacts_.empty() && margin < most + between)
-        find(a, b, margin = std::min(std::max(2 * margin, voxel), most + between), true);
-    if (const float surely = nearest() + between; !contacts_.empty() && surely > margin) find(a, b, surely, true);
-    std::erase_if(contacts_, [&](const Contact& contact) { return contact.distance > most; });
+    while (contacts_.empty() && margin < maxDistance + between)
+        find(a, b, margin = std::min(std::max(2 * margin, voxel), maxDistance + between), true);
+    if (const float sufficient = nearest() + between; !contacts_.empty() && sufficient > margin)
+        find(a, b, sufficient, true);
+    std::erase_if(contacts_, [&](const Contact& contact) { return contact.distance > maxDistance; });
     finish(a, b);
 }
 
 void Pair::commit(const btCollisionObject& a, const btCollisionObject& b, float seconds, btManifoldResult& result) {
-    const Reduced& reduced = choice_.reduced();
+    const ReducedContacts& reduced = reduction_.reduced();
     manifolds_.write(reduced.patches, details_, a, b, seconds, continuity_, result);
     ++statistics_.pairs;
     statistics_.contactsFound += found_;
@@ -101,26 +103,27 @@ void Pair::commit(const btCollisionObject& a, const btCollisionObject& b, float 
 }
 
 float Pair::nearest() const {
-    float least = std::numeric_limits<float>::max();
-    for (const Contact& contact : contacts_) least = std::min(least, contact.distance);
-    return least;
+    float minDistance = std::numeric_limits<float>::max();
+    for (const Contact& contact : contacts_) minDistance = std::min(minDistance, contact.distance);
+    return minDistance;
 }
 
-void Pair::find(const Side& a, const Side& b, float margin, bool measured) {
+void Pair::find(const Side& a, const Side& b, float margin, bool exact) {
     contacts_.clear();
     const bool follows = static_cast<const Shape&>(*b.shape).speculative();
-    report_ = isField(*a.shape) ? collideFields(a.placed(), b.placed(), margin, measured, cache_, contacts_)
-                                : collideOther(a, b.placed(), margin, measured, follows ? a.motion() : Motion{});
+    report_ = isField(*a.shape) ? collideFields(a.placed(), b.placed(), margin, exact, cache_, contacts_)
+                                : collideOther(a, b.placed(), margin, exact, follows ? a.motion() : Motion{});
 }
 
 void Pair::finish(const Side& a, const Side& b) {
     found_ = static_cast<int>(contacts_.size());
-    choice_.update(contacts_, a.transform, b.transform);
+    reduction_.update(contacts_, a.transform, b.transform);
     continuity_ = continuityOf(a, b);
     details_.clear();
-    const PredictedContacts turning(a, b, continuity_);
-    for (const Patch& patch : choice_.reduced().patches)
-        for (int i = 0; i < patch.count; ++i) details_.push_back({turning.ahead(patch.contacts[i]), std::nullopt});
+    const PredictedContacts predictions(a, b, continuity_);
+    for (const Patch& patch : reduction_.reduced().patches)
+        for (int i = 0; i < patch.count; ++i)
+            details_.push_back({predictions.predict(patch.contacts[i]), std::nullopt});
     if (hasTriangles(*a.shape)) nameTriangles(static_cast<const btConcaveShape&>(*a.shape), a.transform, b.placed());
     isReady_ = true;
     sampled_ = 0;
@@ -128,7 +131,7 @@ void Pair::finish(const Side& a, const Side& b) {
 
 void Pair::nameTriangles(const btConcaveShape& mesh, const btTransform& transform, const Placed& field) {
     std::vector<MeshPlace> places;
-    for (const Patch& patch : choice_.reduced().patches)
+    for (const Patch& patch : reduction_.reduced().patches)
         for (int i = 0; i < patch.count; ++i) {
             const Contact& contact = patch.contacts[i];
             places.push_back(
@@ -140,21 +143,20 @@ void Pair::nameTriangles(const btConcaveShape& mesh, const btTransform& transfor
     for (std::size_t i = 0; i < details_.size(); ++i) details_[i].triangle = triangles[i];
 }
 
-ContactReport Pair::collideOther(const Side& a, const Placed& field, float margin, bool measured,
-                                 const Motion& motion) {
+ContactReport Pair::collideOther(const Side& a, const Placed& field, float margin, bool exact, const Motion& motion) {
     if (a.shape->getShapeType() == STATIC_PLANE_PROXYTYPE) {
         const auto& plane = static_cast<const btStaticPlaneShape&>(*a.shape);
         const btVector3 normal = a.transform.getBasis() * plane.getPlaneNormal();
         const float offset = plane.getPlaneConstant() + normal.dot(a.transform.getOrigin());
         const Motion planeMotion = motion.about(toGlm(a.transform.getOrigin()), glm::vec3(0));
-        return collidePlane(toGlm(normal), offset, planeMotion, field, margin, measured, contacts_);
+        return collidePlane(toGlm(normal), offset, planeMotion, field, margin, exact, contacts_);
     }
     if (a.shape->isConvex()) {
         const auto& convex = static_cast<const btConvexShape&>(*a.shape);
-        if (!convex_ || !convex_->isOf(convex)) convex_.emplace(convex);
-        return collideConvex(*convex_, toPose(a.transform), motion, field, margin, measured, contacts_);
+        if (!convex_ || !convex_->represents(convex)) convex_.emplace(convex);
+        return collideConvex(*convex_, toPose(a.transform), motion, field, margin, exact, contacts_);
     }
-    return collideTriangles(static_cast<const btConcaveShape&>(*a.shape), a.transform, motion, field, margin, measured,
+    return collideTriangles(static_cast<const btConcaveShape&>(*a.shape), a.transform, motion, field, margin, exact,
                             contacts_);
 }
 

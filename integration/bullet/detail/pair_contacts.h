@@ -71,8 +71,8 @@ class Pair {
 
   private:
     float nearest() const;
-    void find(const Side& a, const Side& b, float margin, bool measured);
-    ContactReport collideOther(const Side& a, const Placed& field, float margin, bool measured, const Motion& motion);
+    void find(const Side& a, const Side& b, float margin, bool exact);
+    ContactReport collideOther(const Side& a, const Placed& field, float margin, bool exact, const Motion& motion);
     void finish(const Side& a, const Side& b);
     void nameTriangles(const btConcaveShape& mesh, const btTransform& transform, const Placed& field);
 
@@ -81,7 +81,7 @@ class Pair {
     std::optional<Convex> convex_;  ///< of A
     ContactCache cache_;            ///< of two fields
     std::vector<Contact> contacts_;
-    Choice choice_;
+    ContactReduction reduction_;
     Continuity continuity_;
     std::vector<ContactDetails> details_;  ///< one for each kept contact
     ContactReport report_;

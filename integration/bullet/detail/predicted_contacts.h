@@ -23,16 +23,16 @@ class PredictedContacts {
     PredictedContacts(const Side& a, const Side& b, const Continuity& continuity);
 
     /// The predicted contact. Nothing if the contact touches already, or its rotation is negligible.
-    std::optional<PredictedContact> ahead(const Contact& contact) const;
+    std::optional<PredictedContact> predict(const Contact& contact) const;
 
   private:
-    struct Body {
+    struct MovingSide {
         const Side& side;
         Velocity velocity;
     };
-    float maxSeconds(const Body& body, const btVector3& place) const;
+    float maxSeconds(const MovingSide& body, const btVector3& place) const;
 
-    Body a_, b_;
+    MovingSide a_, b_;
     const Continuity& continuity_;
 };
 

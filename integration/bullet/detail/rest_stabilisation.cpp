@@ -1,6 +1,5 @@
 #include "integration/bullet/detail/rest_stabilisation.h"
 
-#include <BulletCollision/CollisionShapes/btCollisionShape.h>
 #include <BulletDynamics/ConstraintSolver/btTypedConstraint.h>
 #include <BulletDynamics/Dynamics/btRigidBody.h>
 #include <LinearMath/btTransformUtil.h>
@@ -11,15 +10,18 @@
 #include <unordered_map>
 #include <vector>
 
+#include "integration/bullet/detail/body_sweep.h"
+
 namespace bilayer::bullet::detail {
 
 namespace {
 
-// Thresholds [fractions of the speed that gravity adds in a step]. A body slower than `still` that gets no faster has
-// not moved. A held body stays until it is faster than `goesOn`, or until something has pushed it: its velocity has
-// changed by `pushed` for `pushLasts` steps, since the solver's residual may jump as far from any step to the next.
-constexpr float still = 0.05f, goesOn = 0.15f, pushed = 0.05f;
-constexpr int pushLasts = 4;
+// Thresholds [fractions of the speed that gravity adds in a step]. A body slower than `restSpeed` that gets no faster
+// has not moved. A held body stays until it is faster than `releaseSpeed`, or until something has pushed it: its
+// velocity has changed by `pushSpeed` for `pushSteps` steps, since the solver's residual may jump as far from any step
+// to the next.
+constexpr float restSpeed = 0.05f, releaseSpeed = 0.15f, pushSpeed = 0.05f;
+constexpr int pushSteps = 4;
 // Rounding limit, relative: of positions in single precision to their size, of rotations [rad], and of forces to the
 // weight.
 constexpr float rounding = 4 * std::numeric_limits<float>::epsilon();
@@ -39,13 +41,6 @@ bool isWithoutForce(const btRigidBody& body) {
     return body.getTotalForce().isZero() && body.getTotalTorque().isZero();
 }
 
-float radiusOf(const btRigidBody& body) {
-    btVector3 centre;
-    btScalar radius;
-    body.getCollisionShape()->getBoundingSphere(centre, radius);
-    return centre.length() + radius;
-}
-
 Velocities operator-(const Velocities& a, const Velocities& b) {
     return {a.linear - b.linear, a.angular - b.angular};
 }
@@ -56,7 +51,7 @@ Velocities velocitiesOf(const btRigidBody& body) {
 
 // Speed of a body's farthest point, in fractions of the speed that gravity adds in a step.
 float speedOf(const btRigidBody& body, const Velocities& velocities, float seconds) {
-    const float speed = velocities.linear.length() + radiusOf(body) * velocities.angular.length();
+    const float speed = velocities.linear.length() + boundingRadius(body) * velocities.angular.length();
     return speed / (seconds * body.getGravity().length());
 }
 
@@ -79,43 +74,43 @@ bool comesFrom(const btTransform& place, const btRigidBody& body, float seconds)
 
 }  // namespace
 
-bool RestStabilisation::stays(Place& place, const btRigidBody& body, float seconds) {
-    if (place.object != &body || !comesFrom(place.transform, body, seconds)) return false;
+bool RestStabilisation::stays(ObjectState& state, const btRigidBody& body, float seconds) {
+    if (state.object != &body || !comesFrom(state.transform, body, seconds)) return false;
     const float speed = speedOf(body, velocitiesOf(body), seconds);
-    if (!place.isHeld) return speed < still && speed <= place.speed;
-    const bool isCalm = changeOf(body, place.calm, seconds) < pushed;
-    const bool isSteady = changeOf(body, place.last, seconds) < pushed;
-    const bool hasGrown = speed >= goesOn && speedOf(body, place.last - place.calm, seconds) >= pushed;
-    if (isCalm) place.calm = velocitiesOf(body);
-    place.pushes = isCalm || !isSteady ? 0 : place.pushes + 1;
-    return isCalm || hasGrown || (speed < goesOn && place.pushes < pushLasts);
+    if (!state.isHeld) return speed < restSpeed && speed <= state.speed;
+    const bool isCalm = changeOf(body, state.calm, seconds) < pushSpeed;
+    const bool isSteady = changeOf(body, state.last, seconds) < pushSpeed;
+    const bool hasGrown = speed >= releaseSpeed && speedOf(body, state.last - state.calm, seconds) >= pushSpeed;
+    if (isCalm) state.calm = velocitiesOf(body);
+    state.pushes = isCalm || !isSteady ? 0 : state.pushes + 1;
+    return isCalm || hasGrown || (speed < releaseSpeed && state.pushes < pushSteps);
 }
 
 /// Holds a body at its pose. A released body gets the velocity that it had at first; otherwise an oscillating body
 /// would gain energy at each reversal.
-void RestStabilisation::hold(Place& place, btRigidBody& body, float seconds) {
+void RestStabilisation::hold(ObjectState& state, btRigidBody& body, float seconds) {
     const Velocities velocities = velocitiesOf(body);
     const float speed = speedOf(body, velocities, seconds);
-    if (!place.isHeld) {
-        place.calm = velocities;
-        place.pushes = 0;
-        place.speed = speed;
+    if (!state.isHeld) {
+        state.calm = velocities;
+        state.pushes = 0;
+        state.speed = speed;
     }
-    place.isHeld = speed < goesOn;
-    if (!place.isHeld) {
-        body.setLinearVelocity(place.speed / speed * velocities.linear);
-        body.setAngularVelocity(place.speed / speed * velocities.angular);
+    state.isHeld = speed < releaseSpeed;
+    if (!state.isHeld) {
+        body.setLinearVelocity(state.speed / speed * velocities.linear);
+        body.setAngularVelocity(state.speed / speed * velocities.angular);
     }
-    body.setCenterOfMassTransform(place.transform);
+    body.setCenterOfMassTransform(state.transform);
 }
 
 /// Whether anything but its weight moves an object, at any speed.
-bool RestStabilisation::isDriven(const Place& place, const btCollisionObject& object) {
-    const bool moves = place.object == &object && !(place.transform == object.getWorldTransform());
+bool RestStabilisation::isDriven(const ObjectState& state, const btCollisionObject& object) {
+    const bool moves = state.object == &object && !(state.transform == object.getWorldTransform());
     if (!isDynamic(object)) return moves;
     const btRigidBody& body = *btRigidBody::upcast(&object);
     if (body.getGravity().isZero()) return moves;
-    return isForced(body) && !(place.sleeps && isWithoutForce(body));
+    return isForced(body) && !(state.sleeps && isWithoutForce(body));
 }
 
 /// The driven bodies, and the bodies that they carry.
@@ -132,7 +127,7 @@ std::unordered_set<const btCollisionObject*> RestStabilisation::driven() const {
     }
     const btCollisionObjectArray& objects = world_.getCollisionObjectArray();
     for (int i = 0; i < objects.size(); ++i)
-        if (isDriven(places_[std::size_t(i)], *objects[i])) add(*objects[i]);
+        if (isDriven(states_[std::size_t(i)], *objects[i])) add(*objects[i]);
     if (open.empty()) return driven;
 
     std::unordered_map<const btCollisionObject*, std::vector<const btCollisionObject*>> touching;
@@ -154,24 +149,24 @@ std::unordered_set<const btCollisionObject*> RestStabilisation::driven() const {
 
 void RestStabilisation::afterStep(float seconds) {
     const btCollisionObjectArray& objects = world_.getCollisionObjectArray();
-    places_.resize(std::size_t(objects.size()));
+    states_.resize(std::size_t(objects.size()));
     const std::unordered_set<const btCollisionObject*> moving = driven();
     held_ = 0;
     for (int i = 0; i < objects.size(); ++i) {
-        Place& place = places_[std::size_t(i)];
+        ObjectState& state = states_[std::size_t(i)];
         btRigidBody* const body = isDynamic(*objects[i]) ? btRigidBody::upcast(objects[i]) : nullptr;
-        const bool sleeps = body && (!body->isActive() || (place.sleeps && isWithoutForce(*body)));
-        if (body && body->isActive() && !moving.contains(body) && stays(place, *body, seconds)) {
-            hold(place, *body, seconds);
+        const bool sleeps = body && (!body->isActive() || (state.sleeps && isWithoutForce(*body)));
+        if (body && body->isActive() && !moving.contains(body) && stays(state, *body, seconds)) {
+            hold(state, *body, seconds);
             ++held_;
         } else {
-            place = {.object = objects[i], .transform = objects[i]->getWorldTransform()};
+            state = {.object = objects[i], .transform = objects[i]->getWorldTransform()};
             // a body that wakes up is at rest until something pushes it
-            place.isHeld = body && !body->isActive();
-            if (body) place.speed = speedOf(*body, velocitiesOf(*body), seconds);
+            state.isHeld = body && !body->isActive();
+            if (body) state.speed = speedOf(*body, velocitiesOf(*body), seconds);
         }
-        place.sleeps = sleeps;
-        if (body) place.last = velocitiesOf(*body);
+        state.sleeps = sleeps;
+        if (body) state.last = velocitiesOf(*body);
     }
 }
 

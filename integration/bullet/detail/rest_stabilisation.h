@@ -25,7 +25,7 @@ class RestStabilisation {
     std::unordered_set<const btCollisionObject*> driven() const;
 
     /// Pose and velocity of an object at the end of the last step.
-    struct Place {
+    struct ObjectState {
         const btCollisionObject* object = nullptr;
         btTransform transform = btTransform::getIdentity();
         Velocities last{};  ///< of the body, in the last step
@@ -37,12 +37,12 @@ class RestStabilisation {
         bool isHeld = false;
         bool sleeps = false;  ///< or was woken after Bullet applied gravity to the bodies
     };
-    static bool isDriven(const Place& place, const btCollisionObject& object);
-    static bool stays(Place& place, const btRigidBody& body, float seconds);
-    static void hold(Place& place, btRigidBody& body, float seconds);
+    static bool isDriven(const ObjectState& state, const btCollisionObject& object);
+    static bool stays(ObjectState& state, const btRigidBody& body, float seconds);
+    static void hold(ObjectState& state, btRigidBody& body, float seconds);
 
     btDynamicsWorld& world_;
-    std::vector<Place> places_;  ///< in the world's order
+    std::vector<ObjectState> states_;  ///< in the world's order
     int held_ = 0;
 };
 

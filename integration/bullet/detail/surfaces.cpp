@@ -17,7 +17,6 @@ using namespace bilayer::detail;
 namespace {
 
 constexpr float minStride = 0.05f;  // minimum stride through samples [voxels]
-constexpr int maxStrides = 64;      // longer paths are searched point by point
 constexpr float everywhere = std::numeric_limits<float>::max();
 
 }  // namespace
@@ -26,22 +25,23 @@ float FieldSurface::bound(const glm::vec3& point) const {
     return field_.distance(point) - maxInterpolationError * field_.voxelSize();
 }
 
-std::optional<Entry> FieldSurface::entry(const glm::vec3& from, const glm::vec3& to, float radius) const {
-    if (from == to) return overlaps(from, radius) ? std::optional(Entry{from, glm::vec3(0)}) : std::nullopt;
+std::optional<SurfaceEntry> FieldSurface::entry(const glm::vec3& from, const glm::vec3& to, float radius) const {
+    if (from == to) return overlaps(from, radius) ? std::optional(SurfaceEntry{from, glm::vec3(0)}) : std::nullopt;
     if (staysOut(from, to, radius)) return std::nullopt;
-    const glm::vec3 way = to - from;
-    const auto hit = radius > 0 ? field_.sphereCast({from, way, glm::length(way)}, radius) : field_.segment(from, to);
+    const glm::vec3 displacement = to - from;
+    const auto hit = radius > 0 ? field_.sphereCast({from, displacement, glm::length(displacement)}, radius)
+                                : field_.segment(from, to);
     if (!hit) return std::nullopt;
-    return Entry{hit->position, hit->normal};
+    return SurfaceEntry{hit->position, hit->normal};
 }
 
-std::optional<glm::vec3> FieldSurface::wayOut(const glm::vec3& point, float radius) const {
+std::optional<glm::vec3> FieldSurface::depenetration(const glm::vec3& point, float radius) const {
     if (radius > 0) {
         const ClosestPoint closest = field_.closest(point, radius);
-        const glm::vec3 way = closest.distance < 0 ? closest.position - point : point - closest.position;
-        const float length = glm::length(way);
+        const glm::vec3 outward = closest.distance < 0 ? closest.position - point : point - closest.position;
+        const float length = glm::length(outward);
         if (!closest.found || !(length > 0)) return std::nullopt;
-        return (radius - closest.distance) / length * way;
+        return (radius - closest.distance) / length * outward;
     }
     const Sample sample = field_.sample(point);
     const glm::vec3 normal = directionOf(sample, field_.voxelSize());
@@ -51,17 +51,12 @@ std::optional<glm::vec3> FieldSurface::wayOut(const glm::vec3& point, float radi
 
 // Whether a path stays outside, by strides through the samples. Many times as fast as the search for the entry.
 bool FieldSurface::staysOut(const glm::vec3& from, const glm::vec3& to, float radius) const {
-    const float length = glm::distance(from, to), voxel = field_.voxelSize();
-    const float error = field_.mesh() ? maxInterpolationError * voxel : 0;
-    float gone = 0;
-    for (int i = 0; i < maxStrides && gone <= length; ++i) {
-        const Sample sample = field_.sampleWithin(length > 0 ? from + gone / length * (to - from) : from, 0);
-        const float left = sample.inBand && radius == 0 ? (sample.distance - error) / steepestInterpolant
-                                                        : sample.distance - radius - maxInterpolationError * voxel;
-        if (left < minStride * voxel) return false;
-        gone += left;
-    }
-    return gone > length;
+    const float voxel = field_.voxelSize(), error = field_.mesh() ? maxInterpolationError * voxel : 0;
+    return staysClear(from, to, minStride * voxel, [&](const glm::vec3& at) {
+        const Sample sample = field_.sampleWithin(at, 0);
+        return sample.inBand && radius == 0 ? (sample.distance - error) / steepestInterpolant
+                                            : sample.distance - radius - maxInterpolationError * voxel;
+    });
 }
 
 bool FieldSurface::overlaps(const glm::vec3& point, float radius) const {
@@ -72,16 +67,16 @@ float ConvexSurface::bound(const glm::vec3& point) const {
     return convex_.nearest(point, everywhere).distance;
 }
 
-std::optional<Entry> ConvexSurface::entry(const glm::vec3& from, const glm::vec3& to, float) const {
-    const auto entry = convex_.enter(from, to - from, tolerance_);
+std::optional<SurfaceEntry> ConvexSurface::entry(const glm::vec3& from, const glm::vec3& to, float) const {
+    const auto entry = convex_.castPoint(from, to - from, tolerance_);
     if (!entry) return std::nullopt;
-    const glm::vec3 at = from + entry->part * (to - from);
-    return Entry{at - entry->near.distance * entry->near.normal, entry->near.normal};
+    const glm::vec3 at = from + entry->fraction * (to - from);
+    return SurfaceEntry{at - entry->nearest.distance * entry->nearest.normal, entry->nearest.normal};
 }
 
-std::optional<glm::vec3> ConvexSurface::wayOut(const glm::vec3& point, float) const {
-    const Convex::Near near = convex_.nearest(point, everywhere);
-    return -near.distance * near.normal;
+std::optional<glm::vec3> ConvexSurface::depenetration(const glm::vec3& point, float) const {
+    const NearestPoint nearest = convex_.nearest(point, everywhere);
+    return -nearest.distance * nearest.normal;
 }
 
 PlaneSurface::PlaneSurface(const btStaticPlaneShape& shape)
@@ -91,36 +86,36 @@ float PlaneSurface::bound(const glm::vec3& point) const {
     return glm::dot(normal_, point) - offset_;
 }
 
-std::optional<Entry> PlaneSurface::entry(const glm::vec3& from, const glm::vec3& to, float) const {
+std::optional<SurfaceEntry> PlaneSurface::entry(const glm::vec3& from, const glm::vec3& to, float) const {
     const float before = bound(from), after = bound(to);
     if (before > 0 && after > 0) return std::nullopt;
     const float part = before > 0 ? before / (before - after) : 0;
-    return Entry{from + part * (to - from), normal_};
+    return SurfaceEntry{from + part * (to - from), normal_};
 }
 
-std::optional<glm::vec3> PlaneSurface::wayOut(const glm::vec3& point, float) const {
+std::optional<glm::vec3> PlaneSurface::depenetration(const glm::vec3& point, float) const {
     return -bound(point) * normal_;
 }
 
-std::optional<Entry> TriangleSurface::entry(const glm::vec3& from, const glm::vec3& to, float) const {
+std::optional<SurfaceEntry> TriangleSurface::entry(const glm::vec3& from, const glm::vec3& to, float) const {
     struct First : btTriangleCallback {
-        glm::vec3 from, way;
+        glm::vec3 from, displacement;
         float part = 1;
-        std::optional<Entry> entry;
+        std::optional<SurfaceEntry> entry;
 
         void processTriangle(btVector3* corners, int, int) override {
             const glm::vec3 a = toGlm(corners[0]), one = toGlm(corners[1]) - a, two = toGlm(corners[2]) - a;
-            const glm::vec3 normal = glm::cross(one, two), start = from - a, turned = glm::cross(start, way);
-            const float along = -glm::dot(way, normal);
+            const glm::vec3 normal = glm::cross(one, two), start = from - a, moment = glm::cross(start, displacement);
+            const float along = -glm::dot(displacement, normal);
             if (along == 0) return;
-            const float s = glm::dot(start, normal) / along, u = glm::dot(two, turned) / along,
-                        v = -glm::dot(one, turned) / along;
+            const float s = glm::dot(start, normal) / along, u = glm::dot(two, moment) / along,
+                        v = -glm::dot(one, moment) / along;
             if (!(s >= 0 && s < part && u >= 0 && v >= 0 && u + v <= 1)) return;
             part = s;
-            entry = Entry{from + s * way, (along > 0 ? 1.f : -1.f) * glm::normalize(normal)};
+            entry = SurfaceEntry{from + s * displacement, (along > 0 ? 1.f : -1.f) * glm::normalize(normal)};
         }
     } first;
-    first.from = from, first.way = to - from;
+    first.from = from, first.displacement = to - from;
     visit(glm::min(from, to), glm::max(from, to), first);
     return first.entry;
 }

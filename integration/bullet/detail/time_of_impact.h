@@ -1,4 +1,4 @@
-// Time of impact of two shapes in a step; internal.
+// Time of impact of two shapes in a step.
 #pragma once
 
 #include <BulletCollision/CollisionShapes/btCompoundShape.h>
@@ -13,7 +13,7 @@ namespace bilayer::bullet::detail {
 using namespace bilayer::detail;
 
 /// A shape other than a compound, and its pose in its object.
-struct Part {
+struct LeafShape {
     const btCollisionShape* shape;
     btTransform local;
 
@@ -24,18 +24,18 @@ struct Part {
     }
 };
 
-/// @param found  callback (const Part&)
+/// @param found  callback (const LeafShape&)
 template <class Found>
-void visitParts(const btCollisionShape* shape, const btTransform& local, Found&& found) {
-    if (!shape->isCompound()) return found(Part{shape, local});
+void visitLeafShapes(const btCollisionShape* shape, const btTransform& local, Found&& found) {
+    if (!shape->isCompound()) return found(LeafShape{shape, local});
     const auto* compound = static_cast<const btCompoundShape*>(shape);
     for (int i = 0; i < compound->getNumChildShapes(); ++i)
-        visitParts(compound->getChildShape(i), local * compound->getChildTransform(i), found);
+        visitLeafShapes(compound->getChildShape(i), local * compound->getChildTransform(i), found);
 }
 
 template <class Found>
-void visitParts(const btCollisionObject& object, Found&& found) {
-    visitParts(object.getCollisionShape(), btTransform::getIdentity(), found);
+void visitLeafShapes(const btCollisionObject& object, Found&& found) {
+    visitLeafShapes(object.getCollisionShape(), btTransform::getIdentity(), found);
 }
 
 /// The time of impact: when and where a body first penetrates a surface too deeply, with the outward normal of that
@@ -44,7 +44,7 @@ struct Impact {
     float time = 1;  ///< 1: no impact in this step
     glm::vec3 place{0}, normal{0};
 
-    Impact turned() const { return {time, place, -normal}; }
+    Impact reversed() const { return {time, place, -normal}; }
 };
 
 inline Impact earlier(const Impact& one, const Impact& other) {
@@ -52,6 +52,7 @@ inline Impact earlier(const Impact& one, const Impact& other) {
 }
 
 /// The first impact of a field and another shape; the normal is that of the other shape.
-Impact timeOfImpact(const Part& part, const BodySweep& its, const Part& other, const BodySweep& others);
+Impact timeOfImpact(const LeafShape& fieldShape, const BodySweep& fieldSweep, const LeafShape& other,
+                    const BodySweep& otherSweep);
 
 }  // namespace bilayer::bullet::detail

@@ -8,11 +8,9 @@
 #include <glm/geometric.hpp>
 
 #include "integration/bullet/detail/convert.h"
-#include "integration/bullet/detail/convex.h"
+#include "integration/bullet/detail/triangle_distance.h"
 
 namespace bilayer::bullet::detail {
-
-using namespace bilayer::detail;
 
 namespace {
 

@@ -18,9 +18,9 @@ Velocity velocityOf(const btMultiBodyLinkCollider& collider) {
     btAlignedObjectArray<btScalar> scalars;
     btAlignedObjectArray<btVector3> vectors;
     btAlignedObjectArray<btMatrix3x3> matrices;
-    const auto along = [&](const btVector3& turn, const btVector3& way) {
-        body.fillConstraintJacobianMultiDof(collider.m_link, velocity.centre, turn, way, jacobian.data(), scalars,
-                                            vectors, matrices);
+    const auto along = [&](const btVector3& rotation, const btVector3& translation) {
+        body.fillConstraintJacobianMultiDof(collider.m_link, velocity.centre, rotation, translation, jacobian.data(),
+                                            scalars, vectors, matrices);
         return std::inner_product(jacobian.begin(), jacobian.end(), body.getVelocityVector(), btScalar(0));
     };
     for (int axis = 0; axis < 3; ++axis) {

@@ -1,0 +1,14 @@
+// Refinement of contacts to the closest points of two surfaces.
+#pragma once
+
+#include <bilayer/collider/contact.h>
+
+#include <span>
+
+namespace bilayer::detail {
+
+/// Refines the contacts that may be the closest of two bodies, for exact distances. Contacts between surface points are
+/// only approximate there: edges made of surface points may cut across the surface.
+void refineClosest(std::span<Contact> contacts, const Placed& a, const Placed& b);
+
+}  // namespace bilayer::detail

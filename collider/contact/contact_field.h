@@ -1,0 +1,58 @@
+// The field of the other body of a pair, as the contact search queries it.
+#pragma once
+
+#include <bilayer/collider/contact.h>
+
+#include <glm/geometric.hpp>
+#include <optional>
+
+#include "collider/contact/collider_data.h"
+#include "collider/contact/surface_query.h"
+
+namespace bilayer::detail {
+
+class ContactField {
+  public:
+    ContactField(const Collider& collider, bool exact)
+        : collider_(collider), field_(exact ? collider.exactField() : collider.field()), exact_(exact) {}
+
+    const Field& field() const { return field_; }
+    float voxelSize() const { return field_.voxelSize(); }
+
+    /// The surface near a point in the band, from its sample or from the triangles.
+    SurfaceSample inBand(const glm::vec3& point, const Sample& sample) const {
+        return surfaceSampleAt(field_, point, sample, collider_.data().isExactAt(point, exact_));
+    }
+
+    /// The same at any point. Outside the band the surface is known up to `maxDistance`, if exact distances are
+    /// requested.
+    std::optional<SurfaceSample> at(const glm::vec3& point, const Sample& sample, float maxDistance) const {
+        if (sample.inBand) return inBand(point, sample);
+        if (!exact_ || sample.distance < 0) return std::nullopt;
+        const ClosestPoint closest = field_.closest(point, maxDistance);
+        if (!closest.found) return std::nullopt;
+        return SurfaceSample{closest.distance, directionOf(closest, point, field_.voxelSize())};
+    }
+
+    /// The speculative contact of a point outside the field with a displacement.
+    std::optional<SurfaceSample> impact(const glm::vec3& point, const glm::vec3& displacement) const {
+        const auto hit = field_.segment(point, point + displacement);
+        if (!hit) return std::nullopt;
+        return SurfaceSample{std::max(glm::dot(point - hit->position, hit->normal), 0.f), hit->normal,
+                             -glm::dot(displacement, hit->normal)};
+    }
+
+    /// The crossing of a sharp edge of another body with one of this body's edges (SharpEdges::crossing()).
+    std::optional<SharpEdges::Crossing> crossing(const glm::vec3& from, const glm::vec3& to, const Conormals& conormals,
+                                                 const glm::vec3& place, float distance) const {
+        return collider_.data().edges().crossing(collider_.data().points(), from, to, conormals, place, distance,
+                                                 field_.voxelSize());
+    }
+
+  private:
+    const Collider& collider_;
+    const Field& field_;
+    bool exact_;
+};
+
+}  // namespace bilayer::detail

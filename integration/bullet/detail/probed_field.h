@@ -1,0 +1,44 @@
+// A field that is collided with the triangles of an open surface, and the lengths of the search.
+#pragma once
+
+#include <bilayer/collider/contact.h>
+
+#include <algorithm>
+
+#include "integration/bullet/detail/edge_probes.h"
+#include "integration/bullet/detail/local_field.h"
+
+namespace bilayer::bullet::detail {
+
+using namespace bilayer::detail;
+
+struct ProbedField {
+    const Placed& placed;
+    LocalField local;
+    float margin;   ///< maximum separation of contacts [m]
+    float reach;    ///< maximum distance of the field's surface points from a face that they may touch [m]
+    float voxel;    ///< [m]
+    float spacing;  ///< of probes, and of the field's surface points [m]
+
+    /// @param mesh, motion  pose and motion of the triangles
+    /// @param exact         as ContactOptions::exact
+    ProbedField(const Placed& field, const Pose& mesh, const Motion& motion, float margin, bool exact)
+        : placed(field),
+          local(field, mesh, motion, margin, exact),
+          margin(margin),
+          reach(std::max(margin, field.scale * field.collider.field().interiorWidth()) + local.maxDisplacement()),
+          voxel(field.scale * field.collider.field().voxelSize()),
+          spacing(probeSpacing * voxel) {}
+
+    /// Maximum distance of relevant triangles from the field's box [m].
+    float maxTriangleDistance() const { return margin + local.maxDisplacement(); }
+};
+
+/// Replaces the normal of a contact at a point of the triangles by one in the field's axes.
+inline void setNormal(Contact& contact, const ProbedField& field, const glm::vec3& normal) {
+    const glm::vec3 place = contact.position + contact.distance * contact.normal;
+    contact.normal = field.placed.pose.rotation * normal;
+    contact.position = place - contact.distance * contact.normal;
+}
+
+}  // namespace bilayer::bullet::detail
