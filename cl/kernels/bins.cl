@@ -228,7 +228,8 @@ kernel void countTriangles(global const float* points, global const uint* triang
 GROUP_KERNEL void placeBricks(Grid grid, global uint* cursors, global const uint* more, global uint* cellOfBrick,
                               global uint* triangleOffsets, global uint* partOffsets, global ulong* total) {
     SHARED ulong bricks[ITEMS], triangles[ITEMS], pieces[ITEMS];
-    const uint begin = (uint)((ulong)(grid.cells) * ITEM / ITEMS), end = (uint)((ulong)(grid.cells) * (ITEM + 1) / ITEMS);
+    const uint begin = (uint)((ulong)(grid.cells) * ITEM / ITEMS),
+               end = (uint)((ulong)(grid.cells) * (ITEM + 1) / ITEMS);
     ulong brick = 0, triangle = 0, part = 0;
     for (uint cell = begin; cell < end; ++cell) {
         uint inCell = 0;
