@@ -59,13 +59,13 @@ DeviceBins::DeviceBins(DeviceImpl& device, const cl::Program& program, DeviceMem
     const std::uint64_t cursorBytes = std::uint64_t(grid_.runs) * grid_.cells * sizeof(cl_uint),
                         cellBytes = std::uint64_t(grid_.cells) * sizeof(cl_uint);
     const auto bins = [&](std::uint64_t bytes) { return memory.allocate(bytes, "the binning of the mesh"); };
-    cl::Buffer cursors = bins(cursorBytes), more = bins(cellBytes), total = bins(3 * sizeof(cl_ulong)),
+    cl::Buffer cursors = bins(cursorBytes), extraParts = bins(cellBytes), total = bins(3 * sizeof(cl_ulong)),
                codes = bins(count * sizeof(cl_uint));
     cellOfBrick_ = bins(cellBytes);
     triangleOffsets_ = bins(cellBytes + sizeof(cl_uint));
     partOffsetBuffer_ = bins(cellBytes + sizeof(cl_uint));
     queue.enqueueFillBuffer(cursors, cl_uint(0), 0, cursorBytes);
-    queue.enqueueFillBuffer(more, cl_uint(0), 0, cellBytes);
+    queue.enqueueFillBuffer(extraParts, cl_uint(0), 0, cellBytes);
     const auto run = [&](const char* name, std::size_t global, std::size_t local, const auto&... arguments) {
         cl::Kernel kernel(program, name);
         cl_uint index = 0;
@@ -74,8 +74,9 @@ DeviceBins::DeviceBins(DeviceImpl& device, const cl::Program& program, DeviceMem
                                    timing.event(Timing::Of::kernel));
     };
     const std::size_t local = gpuMapping ? groupItems : 1;
-    run("countTriangles", items, local, points_, triangles_, grid_, cursors, more, codes);
-    run("placeBricks", local, local, grid_, cursors, more, cellOfBrick_, triangleOffsets_, partOffsetBuffer_, total);
+    run("countTriangles", items, local, points_, triangles_, grid_, cursors, extraParts, codes);
+    run("scanBricks", local, local, grid_, cursors, extraParts, cellOfBrick_, triangleOffsets_, partOffsetBuffer_,
+        total);
     std::array<cl_ulong, 3> totals{};
     queue.enqueueReadBuffer(total, CL_TRUE, 0, sizeof totals, totals.data(), nullptr,
                             timing.event(Timing::Of::download));
@@ -87,7 +88,7 @@ DeviceBins::DeviceBins(DeviceImpl& device, const cl::Program& program, DeviceMem
     partOffsets_.resize(bricks + 1);
     queue.enqueueReadBuffer(partOffsetBuffer_, CL_TRUE, 0, partOffsets_.size() * sizeof(cl_uint), partOffsets_.data(),
                             nullptr, timing.event(Timing::Of::download));
-    for (cl::Buffer* buffer : {&cursors, &more, &total, &codes}) memory.free(*buffer);
+    for (cl::Buffer* buffer : {&cursors, &extraParts, &total, &codes}) memory.free(*buffer);
 }
 
 }  // namespace bilayer::detail

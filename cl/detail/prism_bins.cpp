@@ -61,7 +61,7 @@ struct Shape {
     glm::dvec3 start;    // corner 0
     glm::dvec2 corners[3], along[3];
     double lengths[3];
-    glm::dvec2 lean[3];
+    glm::dvec2 sideNormal[3];
 
     // An offset in voxels, transformed to the frame.
     glm::dvec3 inFrame(const glm::dvec3& offset) const {
@@ -73,7 +73,7 @@ struct Shape {
 
 // The plane that bisects the angle between a face and its neighbour across edge k is equidistant from both. Its normal
 // is thus the difference of the two directions from the edge into the faces.
-glm::dvec2 leanTo(const Shape& shape, int k, const glm::dvec3& vertexAcross) {
+glm::dvec2 sideNormalTo(const Shape& shape, int k, const glm::dvec3& vertexAcross) {
     const glm::dvec3 offset = shape.inFrame(vertexAcross - shape.start);
     const glm::dvec2 fromEdge = glm::dvec2(offset) - shape.corners[k];
     const glm::dvec2 intoNeighbour(glm::dot(shape.inward(k), fromEdge), offset.z);
@@ -103,7 +103,7 @@ std::optional<Shape> shapeOf(const Base& base) {
     }
     for (int k = 0; k < 3; ++k) {
         const auto& vertex = base.across[std::size_t(k)];
-        shape.lean[k] = vertex ? leanTo(shape, k, *vertex) : glm::dvec2(0);
+        shape.sideNormal[k] = vertex ? sideNormalTo(shape, k, *vertex) : glm::dvec2(0);
     }
     return shape;
 }
@@ -111,11 +111,11 @@ std::optional<Shape> shapeOf(const Base& base) {
 // Adds the two ends of the line in which the side planes at a vertex meet. Returns false if they do not meet.
 bool addCorner(const Shape& shape, int k, double reach, Box& box) {
     const int before = (k + 2) % 3;
-    const glm::dvec2 p = shape.lean[before].x * shape.inward(before), q = shape.lean[k].x * shape.inward(k);
+    const glm::dvec2 p = shape.sideNormal[before].x * shape.inward(before), q = shape.sideNormal[k].x * shape.inward(k);
     const double determinant = p.x * q.y - p.y * q.x;
     if (std::abs(determinant) < parallel) return false;
-    const glm::dvec2 slope = glm::dvec2(p.y * shape.lean[k].y - q.y * shape.lean[before].y,
-                                        q.x * shape.lean[before].y - p.x * shape.lean[k].y) /
+    const glm::dvec2 slope = glm::dvec2(p.y * shape.sideNormal[k].y - q.y * shape.sideNormal[before].y,
+                                        q.x * shape.sideNormal[before].y - p.x * shape.sideNormal[k].y) /
                              determinant;
     const glm::dvec3 corner = shape.start + shape.corners[k].x * shape.axes[0] + shape.corners[k].y * shape.axes[1];
     const glm::dvec3 edge = slope.x * shape.axes[0] + slope.y * shape.axes[1] + shape.axes[2];
@@ -146,7 +146,7 @@ Prism rounded(const Shape& shape, const Box& box, std::uint32_t triangle) {
     prism.upper = glm::vec3(box.upper);
     prism.length = float(shape.lengths[0]);
     prism.apex = glm::vec2(shape.corners[2]);
-    for (int k = 0; k < 3; ++k) prism.lean[k] = glm::vec2(shape.lean[k]);
+    for (int k = 0; k < 3; ++k) prism.sideNormal[k] = glm::vec2(shape.sideNormal[k]);
     prism.triangle = std::int32_t(triangle);
     return prism;
 }
@@ -163,8 +163,8 @@ std::array<Plane, 5> planesOf(const Shape& shape, double reach) {
     const double height = glm::dot(n, shape.start);
     std::array<Plane, 5> planes{Plane{n, reach - height}, Plane{-n, reach + height}};
     for (int k = 0; k < 3; ++k) {
-        const glm::dvec2 inward = shape.lean[k].x * shape.inward(k);
-        const glm::dvec3 normal = inward.x * shape.axes[0] + inward.y * shape.axes[1] + shape.lean[k].y * n;
+        const glm::dvec2 inward = shape.sideNormal[k].x * shape.inward(k);
+        const glm::dvec3 normal = inward.x * shape.axes[0] + inward.y * shape.axes[1] + shape.sideNormal[k].y * n;
         const glm::dvec3 corner = shape.start + shape.corners[k].x * shape.axes[0] + shape.corners[k].y * shape.axes[1];
         planes[std::size_t(k) + 2] = {normal, -glm::dot(normal, corner)};
     }

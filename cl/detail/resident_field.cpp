@@ -24,7 +24,7 @@ namespace {
 constexpr std::size_t groupItems = 64;       // ITEMS of common.cl
 constexpr std::size_t itemsAlongParts = 32;  // along z, which is contiguous in memory
 constexpr cl_int unknownEntry = -3;          // UNKNOWN of resident.cl
-constexpr cl_float maxParts = 16;            // MOST_PARTS of resident.cl
+constexpr cl_float maxParts = 16;            // MAX_PARTS of resident.cl
 constexpr const char* field = "the field";
 
 // `Widths` of resident.cl.
@@ -231,16 +231,16 @@ void ResidentFill::measureClearances() {
     const std::size_t count = std::size_t(size.x) * size.y * size.z;
     const cl_float far = layout_.frame.findsSurface() ? maxParts * maxParts : 0;
     layout_.centres = memory_.allocate(count * sizeof(cl_char), field);
-    std::array<cl::Buffer, 2> ways;
-    for (cl::Buffer& some : ways) some = memory_.allocate(count * sizeof(cl_float), field);
-    enqueueParts("measureParts", frame, far, layout_.directory, layout_.values, ways[0], layout_.centres);
+    std::array<cl::Buffer, 2> distances2;
+    for (cl::Buffer& buffer : distances2) buffer = memory_.allocate(count * sizeof(cl_float), field);
+    enqueueParts("initialiseParts", frame, far, layout_.directory, layout_.values, distances2[0], layout_.centres);
     for (cl_int axis = 2; axis >= 0; --axis) {
-        enqueueParts("spreadParts", frame, axis, ways[0], ways[1]);
-        std::swap(ways[0], ways[1]);
+        enqueueParts("transformParts", frame, axis, distances2[0], distances2[1]);
+        std::swap(distances2[0], distances2[1]);
     }
-    enqueueParts("storeCentres", frame, ways[0], layout_.centres);
+    enqueueParts("storeCentres", frame, distances2[0], layout_.centres);
     device_.queue.finish();
-    for (cl::Buffer& some : ways) memory_.free(some);
+    for (cl::Buffer& buffer : distances2) memory_.free(buffer);
     memory_.free(summary_);
 }
 

@@ -3,12 +3,12 @@
 #include "piece_distances.cl"
 
 // See sdf/sign/closest_side.cpp, and sideSlack of sdf/fill/exact.cpp.
-#define SAME_PLACE 1e-7
+#define SAME_POINT 1e-7
 #define FLATNESS 1e-10
 #define CANCELLED 1e-2
 #define SIDE_SLACK 1e-3f
 // Maximum faces that meet in the closest point of a voxel; with more of them the host decides.
-#define MOST_FACES 48
+#define MAX_FACES 48
 
 double3 closestOnSegment(double3 a, double3 b) {
     const double3 ab = b - a;
@@ -37,13 +37,13 @@ double3 closestToOrigin(const Corners* t) {
 double angleAt(const Corners* t, double3 p) {
     const double3 c[3] = {t->a, t->b, t->c};
     for (int i = 0; i < 3; ++i)
-        if (distance(c[i], p) <= SAME_PLACE) {
+        if (distance(c[i], p) <= SAME_POINT) {
             const double3 a = c[(i + 1) % 3] - c[i], b = c[(i + 2) % 3] - c[i];
             return atan2(length(cross(a, b)), dot(a, b));
         }
     for (int i = 0; i < 3; ++i) {
         const double3 edge = c[(i + 1) % 3] - c[i];
-        if (length(cross(edge, p - c[i])) <= SAME_PLACE * length(edge)) return M_PI;
+        if (length(cross(edge, p - c[i])) <= SAME_POINT * length(edge)) return M_PI;
     }
     return 2 * M_PI;
 }
@@ -59,40 +59,40 @@ typedef struct {
     global const float* points;
     global const uint* triangles;
     double voxelsPerUnit;
-    double3 from;  // [voxels]
-} View;
+    double3 origin;  // [voxels]
+} RelativeMesh;
 
-Corners seen(const View* view, uint triangle) {
-    Corners t = cornersOf(view->points, view->triangles, triangle, view->voxelsPerUnit);
-    t.a -= view->from;
-    t.b -= view->from;
-    t.c -= view->from;
+Corners relativeCorners(const RelativeMesh* mesh, uint triangle) {
+    Corners t = cornersOf(mesh->points, mesh->triangles, triangle, mesh->voxelsPerUnit);
+    t.a -= mesh->origin;
+    t.b -= mesh->origin;
+    t.c -= mesh->origin;
     return t;
 }
 
 // Triangles that may be nearest to a point.
 typedef struct {
-    uint triangle[MOST_FACES];
+    uint triangle[MAX_FACES];
     int count;
     bool all;  // no triangle was left out because of the limit
     double nearest;
     double3 closest;  // the point of the nearest of them
 } Faces;
 
-void offer(Faces* faces, const View* view, uint triangle) {
+void addFace(Faces* faces, const RelativeMesh* mesh, uint triangle) {
     for (int i = 0; i < faces->count; ++i)
         if (faces->triangle[i] == triangle) return;
-    const Corners t = seen(view, triangle);
+    const Corners t = relativeCorners(mesh, triangle);
     const double3 closest = closestToOrigin(&t);
-    const double away = length(closest);
-    if (away > faces->nearest + SAME_PLACE) return;
-    if (away < faces->nearest) {
+    const double faceDistance = length(closest);
+    if (faceDistance > faces->nearest + SAME_POINT) return;
+    if (faceDistance < faces->nearest) {
         // the nearest ones so far may be farther
-        if (away < faces->nearest - SAME_PLACE) faces->count = 0;
-        faces->nearest = away;
+        if (faceDistance < faces->nearest - SAME_POINT) faces->count = 0;
+        faces->nearest = faceDistance;
         faces->closest = closest;
     }
-    if (faces->count == MOST_FACES)
+    if (faces->count == MAX_FACES)
         faces->all = false;
     else
         faces->triangle[faces->count++] = triangle;
@@ -100,18 +100,18 @@ void offer(Faces* faces, const View* view, uint triangle) {
 
 // ClosestSide::side() of sdf/sign/closest_side.cpp: negative inside, positive outside, zero where the normals at the
 // closest point cancel or there are too many.
-double sideBy(const Faces* faces, const View* view) {
+double pseudonormalSide(const Faces* faces, const RelativeMesh* mesh) {
     double sum = 0, weights = 0;
     for (int i = 0; i < faces->count; ++i) {
-        const Corners t = seen(view, faces->triangle[i]);
+        const Corners t = relativeCorners(mesh, faces->triangle[i]);
         const double3 closest = closestToOrigin(&t), ab = t.b - t.a, ac = t.c - t.a, bc = t.c - t.b,
                       normal = cross(ab, ac);
         const double size = length(normal), longest = sqrt(max(dot(ab, ab), max(dot(ac, ac), dot(bc, bc))));
         // a triangle thinner than the tolerance has no reliable normal
-        if (distance(closest, faces->closest) > SAME_PLACE || size <= SAME_PLACE * longest) continue;
+        if (distance(closest, faces->closest) > SAME_POINT || size <= SAME_POINT * longest) continue;
         bool duplicate = false;
         for (int j = 0; j < i; ++j) {
-            const Corners other = seen(view, faces->triangle[j]);
+            const Corners other = relativeCorners(mesh, faces->triangle[j]);
             duplicate = duplicate || sameCorners(&other, &t);
         }
         if (duplicate) continue;
@@ -123,24 +123,24 @@ double sideBy(const Faces* faces, const View* view) {
 }
 
 // The side of a voxel of a block, from all pieces that may be as near as its nearest one, `piece`.
-double sideOf(const Input* input, uint piece, View* view, int voxel) {
+double sideOf(const Input* input, uint piece, RelativeMesh* mesh, int voxel) {
     const int3 at = (int3)(voxel / 64, voxel / 8 % 8, voxel % 8);
-    view->from = convert_double3(input->near.block + at);
+    mesh->origin = convert_double3(input->nearby.block + at);
     Faces faces;
     faces.count = 0;
     faces.all = true;
     faces.nearest = INFINITY;
-    offer(&faces, view, input->pieces[piece].triangle);
-    const float3 place = input->near.inBrick + convert_float3(at);
-    const float away = (float)(faces.nearest) + SIDE_SLACK;
-    global const float* radii = input->near.groups.columns + RADIUS * input->near.groups.stride;
-    for (uint c = input->near.range.x; c < input->near.range.y; ++c) {
-        if (distance(place, placeOf(&input->near.groups, c)) > away + radii[c]) continue;
-        for (uint m = input->near.groups.begins[c]; m < input->near.groups.begins[c + 1]; ++m) {
+    addFace(&faces, mesh, input->pieces[piece].triangle);
+    const float3 position = input->nearby.inBrick + convert_float3(at);
+    const float limit = (float)(faces.nearest) + SIDE_SLACK;
+    global const float* radii = input->nearby.groups.columns + RADIUS * input->nearby.groups.stride;
+    for (uint c = input->nearby.range.x; c < input->nearby.range.y; ++c) {
+        if (distance(position, positionOf(&input->nearby.groups, c)) > limit + radii[c]) continue;
+        for (uint m = input->nearby.groups.begins[c]; m < input->nearby.groups.begins[c + 1]; ++m) {
             global const Member* member = input->members + m;
-            if (distance(place, vload3(0, member->place)) <= away + member->radius)
-                offer(&faces, view, input->pieces[member->content].triangle);
+            if (distance(position, vload3(0, member->position)) <= limit + member->radius)
+                addFace(&faces, mesh, input->pieces[member->content].triangle);
         }
     }
-    return sideBy(&faces, view);
+    return pseudonormalSide(&faces, mesh);
 }

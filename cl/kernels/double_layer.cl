@@ -6,23 +6,23 @@
 
 // Memory that an item writes a block to: a group uses its own, until it is known that the block is kept.
 #if ITEMS > 1
-#define WRITTEN local
+#define BLOCK_MEMORY local
 #else
-#define WRITTEN global
+#define BLOCK_MEMORY global
 #endif
 
 // Writes a slice of a cube into its block.
-void putSlice(Lanes values, int slice, int3 inBlock, WRITTEN float* block) {
+void storeSlice(Lanes values, int slice, int3 inBlock, BLOCK_MEMORY float* block) {
 #if ITEMS > 1
     (void)(slice);
     (void)(inBlock);
     vstore8(values, ITEM, block);
 #else
-    WRITTEN float* corner = block + ((inBlock.x + slice) * BLOCK_SIDE + inBlock.y) * BLOCK_SIDE + inBlock.z;
-    *(WRITTEN float4*)(corner) = values.s0123;
-    *(WRITTEN float4*)(corner + BLOCK_SIDE) = values.s4567;
-    *(WRITTEN float4*)(corner + 2 * BLOCK_SIDE) = values.s89ab;
-    *(WRITTEN float4*)(corner + 3 * BLOCK_SIDE) = values.scdef;
+    BLOCK_MEMORY float* corner = block + ((inBlock.x + slice) * BLOCK_SIDE + inBlock.y) * BLOCK_SIDE + inBlock.z;
+    *(BLOCK_MEMORY float4*)(corner) = values.s0123;
+    *(BLOCK_MEMORY float4*)(corner + BLOCK_SIDE) = values.s4567;
+    *(BLOCK_MEMORY float4*)(corner + 2 * BLOCK_SIDE) = values.s89ab;
+    *(BLOCK_MEMORY float4*)(corner + 3 * BLOCK_SIDE) = values.scdef;
 #endif
 }
 
@@ -55,7 +55,7 @@ typedef struct {
     global float* distances;
     global int* triangles;
     global uint* counters;
-} Filled;
+} FilledBlocks;
 
 enum { FILLED_BLOCKS };
 
@@ -69,7 +69,7 @@ typedef struct {
 #endif
     uint slot, anyKnown;
 #endif
-} Workplace;
+} Scratch;
 
 uint blocksPerBrick(const Grid* grid) {
     return 1u << 3 * (grid->shift - BLOCK_SHIFT);
@@ -84,17 +84,17 @@ uint cursorsOf(const Grid* grid) {
 void prepareBrick(const Bricks* bricks, uint brick, const Samples* samples, SHARED uint* count, SHARED uint* sums) {
     const uint b = bricks->firstBrick + brick, cursors = cursorsOf(&bricks->grid);
     const Grid* grid = &bricks->grid;
-    const int3 place = brickAt(grid, bricks->cellOfBrick[b]);
-    const Limits limits = limitsOf(grid, place);
-    const double3 origin = convert_double3(place * (1 << grid->shift));
-    Cut cut = {samples->unsorted, samples->stride,     samples->begins, count, origin,
-               cellsFor(grid),    bricks->layers.delta};
-    for (uint i = ITEM; i < cursors; i += ITEMS) cut.cursors[i] = 0;
-    MEET;
-    cutTriangles(&cut, grid, bricks->points, bricks->triangles, bricks->list, bricks->triangleOffsets[b],
-                 bricks->triangleOffsets[b + 1], &limits);
-    MEET;
-    sortSamples(&cut, *count, samples->sorted, sums);
+    const int3 coordinates = brickAt(grid, bricks->cellOfBrick[b]);
+    const Limits limits = limitsOf(grid, coordinates);
+    const double3 origin = convert_double3(coordinates * (1 << grid->shift));
+    SampleOutput output = {samples->unsorted, samples->stride,     samples->begins, count, origin,
+                           cellsFor(grid),    bricks->layers.delta};
+    for (uint i = ITEM; i < cursors; i += ITEMS) output.cursors[i] = 0;
+    BARRIER;
+    sampleTriangles(&output, grid, bricks->points, bricks->triangles, bricks->list, bricks->triangleOffsets[b],
+                    bricks->triangleOffsets[b + 1], &limits);
+    BARRIER;
+    sortSamples(&output, *count, samples->sorted, sums);
 }
 
 // The first voxel of a block in its brick.
@@ -104,9 +104,9 @@ int3 firstVoxel(const Grid* grid, uint block) {
 }
 
 // Fills a block of a brick. Returns whether this item has any known distance.
-INLINED uint fillBlock(const Input* input, int3 inBrick, SHARED Workplace* work, SHARED uint* innerPicked,
-                       SHARED uint* outerPicked, WRITTEN float* values, WRITTEN float* owners) {
-    const Layer inner = {&work->inner, innerPicked}, outer = {&work->outer, outerPicked};
+INLINED uint fillBlock(const Input* input, int3 inBrick, SHARED Scratch* work, SHARED uint* innerSelected,
+                       SHARED uint* outerSelected, BLOCK_MEMORY float* values, BLOCK_MEMORY float* owners) {
+    const Layer inner = {&work->inner, innerSelected}, outer = {&work->outer, outerSelected};
     uint known = 0;
     for (int cube = 0; cube < CUBES; ++cube) {
         const int3 inBlock = CUBES > 1 ? SLICES * (int3)(cube / 4, cube / 2 % 2, cube % 2) : (int3)(0);
@@ -117,9 +117,9 @@ INLINED uint fillBlock(const Input* input, int3 inBrick, SHARED Workplace* work,
             Lanes distances = INFINITY;
             IntLanes nearest = -1;
             if (any) known |= combine(&around, i, &input->layers, &distances, &nearest);
-            putSlice(distances, i, inBlock, values);
+            storeSlice(distances, i, inBlock, values);
 #if TRIANGLES
-            putSlice(asLanes(nearest), i, inBlock, owners);
+            storeSlice(asLanes(nearest), i, inBlock, owners);
 #else
             (void)(owners);
 #endif
@@ -128,9 +128,9 @@ INLINED uint fillBlock(const Input* input, int3 inBrick, SHARED Workplace* work,
     return known;
 }
 
-void putOrigin(const Bricks* bricks, uint brick, int3 inBrick, uint slot, global int* origins) {
-    const int3 place = brickAt(&bricks->grid, bricks->cellOfBrick[bricks->firstBrick + brick]);
-    vstore3(place * (1 << bricks->grid.shift) + inBrick, slot, origins);
+void storeOrigin(const Bricks* bricks, uint brick, int3 inBrick, uint slot, global int* origins) {
+    const int3 coordinates = brickAt(&bricks->grid, bricks->cellOfBrick[bricks->firstBrick + brick]);
+    vstore3(coordinates * (1 << bricks->grid.shift) + inBrick, slot, origins);
 }
 
 #if ITEMS > 1
@@ -156,8 +156,8 @@ GROUP_KERNEL void fillBlocks(Grid grid, global const uint* cellOfBrick, global c
                              global float* sorted, global uint* begins, uint stride, Layers layers,
                              global const ulong* orders, global int* origins, global float* distances,
                              global int* nearestTriangles, global uint* counters) {
-    SHARED Workplace work;
-    SHARED uint innerPicked, outerPicked;
+    SHARED Scratch work;
+    SHARED uint innerSelected, outerSelected;
     const uint perBrick = blocksPerBrick(&grid), brick = (uint)(get_group_id(0)) / perBrick;
     const Bricks bricks = {0, 0, grid, cellOfBrick, 0, partOffsets, 0, firstBrick, layers};
     const Input input = {sorted + firstSample(partOffsets, firstBrick, brick),
@@ -174,23 +174,23 @@ GROUP_KERNEL void fillBlocks(Grid grid, global const uint* cellOfBrick, global c
     (void)(nearestTriangles);
     local float* const owners = 0;
 #endif
-    const uint known = fillBlock(&input, inBrick, &work, &innerPicked, &outerPicked, work.values, owners);
-    MEET;
+    const uint known = fillBlock(&input, inBrick, &work, &innerSelected, &outerSelected, work.values, owners);
+    BARRIER;
     if (ITEM == 0) work.anyKnown = 0;
-    MEET;
+    BARRIER;
     if (known) work.anyKnown = 1;
-    MEET;
+    BARRIER;
     if (!work.anyKnown) return;
     if (ITEM == 0) {
         work.slot = atomic_inc(counters + FILLED_BLOCKS);
-        putOrigin(&bricks, brick, inBrick, work.slot, origins);
+        storeOrigin(&bricks, brick, inBrick, work.slot, origins);
     }
-    MEET;
+    BARRIER;
     for (uint i = ITEM; i < BLOCK_VOXELS / LANES; i += ITEMS) {
-        const size_t place = (size_t)(work.slot) * (BLOCK_VOXELS / LANES) + i;
-        storeGlobalLanes(vloadLanes(i, work.values), place, distances);
+        const size_t offset = (size_t)(work.slot) * (BLOCK_VOXELS / LANES) + i;
+        storeGlobalLanes(vloadLanes(i, work.values), offset, distances);
 #if TRIANGLES
-        storeGlobalLanes(vloadLanes(i, owners), place, (global float*)(nearestTriangles));
+        storeGlobalLanes(vloadLanes(i, owners), offset, (global float*)(nearestTriangles));
 #endif
     }
 }
@@ -198,50 +198,50 @@ GROUP_KERNEL void fillBlocks(Grid grid, global const uint* cellOfBrick, global c
 #else
 
 // Blocks of a brick that are given slots together: a bit for each.
-#define TOGETHER 64
+#define BLOCKS_AT_ONCE 64
 
-// Fills those blocks of a brick that may hold distances, TOGETHER from `first` on, in adjacent slots.
-INLINED void fillTogether(const Bricks* bricks, uint brick, uint first, const Input* input, const Filled* filled,
-                          Workplace* work) {
+// Fills those blocks of a brick that may hold distances, BLOCKS_AT_ONCE from `first` on, in adjacent slots.
+INLINED void fillBlocksFrom(const Bricks* bricks, uint brick, uint first, const Input* input,
+                            const FilledBlocks* filled, Scratch* work) {
     const Grid* grid = &bricks->grid;
-    ulong wanted = 0;
-    for (uint i = 0; i < TOGETHER; ++i) wanted |= (ulong)(hasSamples(input, firstVoxel(grid, first + i))) << i;
-    const uint count = (uint)(popcount(wanted));
-    uint slot = atomic_add(filled->counters + FILLED_BLOCKS, count), innerPicked, outerPicked;
+    ulong nonEmpty = 0;
+    for (uint i = 0; i < BLOCKS_AT_ONCE; ++i) nonEmpty |= (ulong)(hasSamples(input, firstVoxel(grid, first + i))) << i;
+    const uint count = (uint)(popcount(nonEmpty));
+    uint slot = atomic_add(filled->counters + FILLED_BLOCKS, count), innerSelected, outerSelected;
     const uint end = slot + count;
-    for (; wanted != 0; wanted &= wanted - 1) {
-        const int3 inBrick = firstVoxel(grid, first + 63 - (uint)(clz(wanted & -wanted)));
-        const size_t place = (size_t)(slot)*BLOCK_VOXELS;
-        if (!fillBlock(input, inBrick, work, &innerPicked, &outerPicked, filled->distances + place,
-                       (global float*)(filled->triangles) + place))
+    for (; nonEmpty != 0; nonEmpty &= nonEmpty - 1) {
+        const int3 inBrick = firstVoxel(grid, first + 63 - (uint)(clz(nonEmpty & -nonEmpty)));
+        const size_t offset = (size_t)(slot)*BLOCK_VOXELS;
+        if (!fillBlock(input, inBrick, work, &innerSelected, &outerSelected, filled->distances + offset,
+                       (global float*)(filled->triangles) + offset))
             continue;
-        putOrigin(bricks, brick, inBrick, slot, filled->origins);
+        storeOrigin(bricks, brick, inBrick, slot, filled->origins);
         ++slot;
     }
     for (; slot < end; ++slot) vstore3((int3)(NO_BLOCK), slot, filled->origins);
 }
 
-// Does both steps at once. Each group has `room` for the samples of a brick, which stays in the processor's cache. For
-// each byte, `orders` has the positions of its bits.
+// Does both steps at once. Each group has space for `samplesPerGroup` samples of a brick, which stays in the
+// processor's cache. For each byte, `orders` has the positions of its bits.
 GROUP_KERNEL void fillBricks(global const float* points, global const uint* triangles, Grid grid,
                              global const uint* cellOfBrick, global const uint* triangleOffsets,
                              global const uint* partOffsets, global const uint* list, uint firstBrick, uint brickCount,
                              global float* unsorted, global float* sorted, global uint* begins, uint stride,
-                             global uint* next, Layers layers, uint room, global const ulong* orders,
+                             global uint* next, Layers layers, uint samplesPerGroup, global const ulong* orders,
                              global int* origins, global float* distances, global int* nearestTriangles,
                              global uint* counters) {
     uint taken, count, sums[ITEMS];
-    Workplace work;
+    Scratch work;
     const Bricks bricks = {points,      triangles, grid,       cellOfBrick, triangleOffsets,
                            partOffsets, list,      firstBrick, layers};
-    const uint group = (uint)(get_group_id(0)), first = group * room, perBrick = blocksPerBrick(&grid);
+    const uint group = (uint)(get_group_id(0)), first = group * samplesPerGroup, perBrick = blocksPerBrick(&grid);
     const Samples samples = {unsorted + first, sorted + first, begins + group * cursorsOf(&grid), stride};
     const Input input = {samples.sorted, stride, samples.begins, cellsFor(&grid), layers, orders};
-    const Filled filled = {origins, distances, nearestTriangles, counters};
+    const FilledBlocks filled = {origins, distances, nearestTriangles, counters};
     while (takeBrick(next, &taken, &count) < brickCount) {
         prepareBrick(&bricks, taken, &samples, &count, sums);
-        for (uint block = 0; block < perBrick; block += TOGETHER)
-            fillTogether(&bricks, taken, block, &input, &filled, &work);
+        for (uint block = 0; block < perBrick; block += BLOCKS_AT_ONCE)
+            fillBlocksFrom(&bricks, taken, block, &input, &filled, &work);
     }
 }
 

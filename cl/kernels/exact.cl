@@ -26,15 +26,15 @@ GROUP_KERNEL void prepareBricks(global const float* points, global const uint* t
         const uint b = firstBrick + taken, first = partOffsets[b] - partOffsets[firstBrick];
         const int3 brick = brickAt(&grid, cellOfBrick[b]);
         const Limits limits = limitsOf(&grid, brick);
-        Cut cut = {pieces + first, unsorted + first, &count, first, brick * (1 << grid.shift), noExtent()};
-        cutTriangles(&cut, points, triangles, list, triangleOffsets[b], triangleOffsets[b + 1], grid.voxelsPerUnit,
+        PieceOutput output = {pieces + first, unsorted + first, &count, first, brick * (1 << grid.shift), noExtent()};
+        cutTriangles(&output, points, triangles, list, triangleOffsets[b], triangleOffsets[b + 1], grid.voxelsPerUnit,
                      &limits);
-        extents[ITEM] = cut.extent;
-        MEET;
+        extents[ITEM] = output.extent;
+        BARRIER;
         const uint found = count;
         const Extent all = sumExtents(extents);
         const float meanRadius = (float)(all.radii / found);
-        const Cells cells = makeCells(&all, clamp(CELL_FACTOR * meanRadius, SMALLEST_CELL, LARGEST_CELL));
+        const Cells cells = makeCells(&all, clamp(CELL_FACTOR * meanRadius, MIN_CELL, MAX_CELL));
         uint groupCount = found;
         if (all.radii < SMALL_RADIUS * found && countCells(&cells) <= (float)(scratchCells)) {
             groupCount = sortMembers(&groups, first, unsorted + first, members + first, cellOfMember + first, found,
@@ -45,11 +45,11 @@ GROUP_KERNEL void prepareBricks(global const float* points, global const uint* t
                 const Member member = unsorted[i];
                 members[i] = member;
                 groups.begins[i] = i;
-                putGroup(&groups, i, vload3(0, member.place), member.radius, vload3(0, member.normal), 0);
+                storeGroup(&groups, i, vload3(0, member.position), member.radius, vload3(0, member.normal), 0);
             }
             if (ITEM == 0) groups.begins[first + found] = first + found;
         }
-        MEET;
+        BARRIER;
         rangeGroups(&groups, first, groupCount, slices, (float)(grid.reach), ranges + taken * slices);
     }
 }
@@ -68,42 +68,42 @@ GROUP_KERNEL void fillBlocks(global const float* points, global const uint* tria
     SHARED uint page[PAGE], count;
     SHARED Block block;
     const Groups groups = {groupColumns, groupBegins, stride};
-    const Input input = {nearBlock(&grid, &groups, cellOfBrick, firstBrick, ranges), members, pieces};
-    if (input.near.range.x >= input.near.range.y) return;
+    const Input input = {ownBlockGroups(&grid, &groups, cellOfBrick, firstBrick, ranges), members, pieces};
+    if (input.nearby.range.x >= input.nearby.range.y) return;
     const Share own = ownShare();
-    Found found;
-    if (!measure(&input, &own, page, &count, &found)) return;
-    summarize(&found, &own, &block);
-    MEET;
+    NearestPieces found;
+    if (!computeDistances(&input, &own, page, &count, &found)) return;
+    storeResults(&found, &own, &block);
+    BARRIER;
     ulong known = 0;
     for (int x = 0; x < BLOCK_SIDE; ++x) known |= block.known.slice[x];
     if (known == 0) return;
     if (sign) findSignLinks(&own, &block);
-    MEET;
+    BARRIER;
     if (ITEM == 0) {
         block.open = 0;
-        View view = {points, triangles, grid.voxelsPerUnit, 0};
-        const uint conflicts = sign ? completeSides(&input, &block, &view) : 0;
+        RelativeMesh mesh = {points, triangles, grid.voxelsPerUnit, 0};
+        const uint conflicts = sign ? completeSides(&input, &block, &mesh) : 0;
         if (conflicts > 0) atomic_add(counters + CONFLICTS, conflicts);
         block.slot = atomic_inc(counters + (block.open ? OPEN_BLOCKS : FILLED_BLOCKS));
-        vstore3(input.near.block, block.slot, block.open ? openBlocks : origins);
+        vstore3(input.nearby.block, block.slot, block.open ? openBlocks : origins);
     }
-    MEET;
+    BARRIER;
     if (block.open) return;
     for (int slice = own.firstSlice; slice <= own.lastSlice; ++slice)
         for (int column = own.firstColumn; column <= own.lastColumn; ++column) {
             const int chunk = slice * COLUMNS + column;
-            const size_t place = (size_t)(block.slot) * (BLOCK_VOXELS / LANES) + chunk;
+            const size_t offset = (size_t)(block.slot) * (BLOCK_VOXELS / LANES) + chunk;
             const IntLanes nearest = vloadLanes(chunk, block.nearest);
             const Lanes distance = select((Lanes)(FAR_AWAY), vloadLanes(chunk, block.distance), nearest >= 0);
             const IntLanes inside = lanesOf(sign ? block.inside.chunk[chunk] : 0);
-            storeGlobalLanes(select(distance, -distance, inside), place, distances);
+            storeGlobalLanes(select(distance, -distance, inside), offset, distances);
             if (TRIANGLES) {
                 int owners[LANES];
-                *(LooseIntLanes*)(owners) = nearest;
+                *(UnalignedIntLanes*)(owners) = nearest;
                 for (int i = 0; i < LANES; ++i)
                     owners[i] = owners[i] < 0 ? -1 : (int)(pieces[owners[i] >> SIDE_BITS].triangle);
-                storeGlobalInts(vloadLanes(0, owners), place, nearestTriangles);
+                storeGlobalInts(vloadLanes(0, owners), offset, nearestTriangles);
             }
         }
 }

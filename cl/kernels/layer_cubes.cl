@@ -3,7 +3,7 @@
 #include "layer_points.cl"
 
 // Rows of cells that an item tests at once.
-#define MOST_ROWS 64
+#define MAX_ROWS 64
 // layerTie of sdf/leaf/blocks.h [voxels^2].
 #define LAYER_TIE 1e-5f
 
@@ -20,27 +20,27 @@ typedef struct {
     global const uint* begins;  // first samples of the brick's cells
     SampleCells cells;
     Layers layers;
-    global const ulong* orders;  // see addPicked()
+    global const ulong* orders;  // see addSelected()
 } Input;
 
 // Stores the points of both layers around samples begin + ITEM * BATCH .. at positions from `first` + ITEM * BATCH on.
-INLINED void placeLayers(const Input* input, uint begin, uint end, float3 middle, uint first, Layer inner,
-                         Layer outer) {
+INLINED void storeLayerPoints(const Input* input, uint begin, uint end, float3 middle, uint first, Layer inner,
+                              Layer outer) {
     const uint at = begin + ITEM * BATCH, to = first + ITEM * BATCH;
     if (at >= end) return;
     global const float* columns = input->columns + at;
     const uint stride = input->stride;
-    uint among = end - at < BATCH ? (1u << (end - at)) - 1 : (1u << BATCH) - 1;
-    const Real3 place = make3(loadReal(columns + PLACE_X * stride), loadReal(columns + PLACE_Y * stride),
-                              loadReal(columns + PLACE_Z * stride)),
+    uint lanes = end - at < BATCH ? (1u << (end - at)) - 1 : (1u << BATCH) - 1;
+    const Real3 position = make3(loadReal(columns + POSITION_X * stride), loadReal(columns + POSITION_Y * stride),
+                                 loadReal(columns + POSITION_Z * stride)),
                 offset = make3(loadReal(columns + OFFSET_X * stride), loadReal(columns + OFFSET_Y * stride),
                                loadReal(columns + OFFSET_Z * stride)),
-                seen = make3(place.x - middle.x, place.y - middle.y, place.z - middle.z);
+                relative = make3(position.x - middle.x, position.y - middle.y, position.z - middle.z);
 #if PAPER_CUBE
-    const float most = (float)(input->layers.cube) + HALF_SIDE;
-    const Real3 centre = make3(nearestLattice(place.x) - middle.x, nearestLattice(place.y) - middle.y,
-                               nearestLattice(place.z) - middle.z);
-    among &= bitsOfReal((fabs(centre.x) <= most) & (fabs(centre.y) <= most) & (fabs(centre.z) <= most));
+    const float limit = (float)(input->layers.cube) + HALF_SIDE;
+    const Real3 centre = make3(nearestLattice(position.x) - middle.x, nearestLattice(position.y) - middle.y,
+                               nearestLattice(position.z) - middle.z);
+    lanes &= bitsOfReal((fabs(centre.x) <= limit) & (fabs(centre.y) <= limit) & (fabs(centre.z) <= limit));
     storeReal(centre.x, inner.points->centre[0] + to);
     storeReal(centre.y, inner.points->centre[1] + to);
     storeReal(centre.z, inner.points->centre[2] + to);
@@ -54,8 +54,8 @@ INLINED void placeLayers(const Input* input, uint begin, uint end, float3 middle
     storeReal(owners, (SHARED float*)(outer.points->owner) + to);
 #endif
     const float reach2 = square(input->layers.certain);
-    placePoints(inner, to, among, sub3(seen, offset), reach2, input->orders);
-    placePoints(outer, to, among, add3(seen, offset), reach2, input->orders);
+    storePoints(inner, to, lanes, sub3(relative, offset), reach2, input->orders);
+    storePoints(outer, to, lanes, add3(relative, offset), reach2, input->orders);
 }
 
 // Whether any sample is in the cells around a block.
@@ -78,60 +78,60 @@ typedef struct {
     Layer inner, outer;
     Nearest nearestInner, nearestOuter;
     float3 middle;
-    uint placed;  // waiting points of each layer
-    bool any;     // whether any point reaches the cube
+    uint pending;  // stored points of each layer that are not tested yet
+    bool any;      // whether any point reaches the cube
 } Cube;
 
-// Tests the waiting points.
+// Tests the pending points.
 INLINED void applyLayers(Cube* cube) {
-    MEET;
-    if (*cube->inner.picked + *cube->outer.picked > 0) {
+    BARRIER;
+    if (*cube->inner.selected + *cube->outer.selected > 0) {
         cube->any = true;
         applyPoints(cube->inner, cube->voxels, cube->input->layers.cube, &cube->nearestInner);
         applyPoints(cube->outer, cube->voxels, cube->input->layers.cube, &cube->nearestOuter);
     }
-    MEET;
-    if (ITEM == 0) *cube->inner.picked = *cube->outer.picked = 0;
-    MEET;
-    cube->placed = 0;
+    BARRIER;
+    if (ITEM == 0) *cube->inner.selected = *cube->outer.selected = 0;
+    BARRIER;
+    cube->pending = 0;
 }
 
 // Adds the points around samples begin .. end - 1.
-INLINED void placeSamples(Cube* cube, uint begin, uint end) {
+INLINED void storeSamples(Cube* cube, uint begin, uint end) {
     for (uint i = begin; i < end; i += ITEMS * BATCH) {
-        if (cube->placed == PAGE) applyLayers(cube);
-        placeLayers(cube->input, i, end, cube->middle, cube->placed, cube->inner, cube->outer);
-        cube->placed += ITEMS * BATCH;
+        if (cube->pending == PAGE) applyLayers(cube);
+        storeLayerPoints(cube->input, i, end, cube->middle, cube->pending, cube->inner, cube->outer);
+        cube->pending += ITEMS * BATCH;
     }
 }
 
 // Adds the points around all samples of the cells around a cube.
-INLINED void placeCells(Cube* cube, int3 cell) {
+INLINED void storeCells(Cube* cube, int3 cell) {
     const Input* input = cube->input;
-    const int size = input->cells.size, along = PICKED_SIDE / CELL_SIDE + 2 * input->cells.around;
+    const int size = input->cells.size, along = SELECTION_SIDE / CELL_SIDE + 2 * input->cells.around;
 #if ITEMS == 1
     // rows of cells are collected first, and kept if they hold samples: a branch for each would be mispredicted half of
     // the time
-    uint begins[MOST_ROWS], ends[MOST_ROWS], rows = 0;
+    uint begins[MAX_ROWS], ends[MAX_ROWS], rows = 0;
 #endif
     global const uint* slab = input->begins + (cell.x * size + cell.y) * size + cell.z;
     for (int x = 0; x < along; ++x, slab += size * size) {
         global const uint* row = slab;
         for (int y = 0; y < along; ++y, row += size) {
 #if ITEMS > 1
-            placeSamples(cube, row[0], row[along]);
+            storeSamples(cube, row[0], row[along]);
 #else
             begins[rows] = row[0];
             ends[rows] = row[along];
             rows += row[0] < row[along];
-            if (rows < MOST_ROWS) continue;
-            for (uint i = 0; i < rows; ++i) placeSamples(cube, begins[i], ends[i]);
+            if (rows < MAX_ROWS) continue;
+            for (uint i = 0; i < rows; ++i) storeSamples(cube, begins[i], ends[i]);
             rows = 0;
 #endif
         }
     }
 #if ITEMS == 1
-    for (uint i = 0; i < rows; ++i) placeSamples(cube, begins[i], ends[i]);
+    for (uint i = 0; i < rows; ++i) storeSamples(cube, begins[i], ends[i]);
 #endif
 }
 
@@ -139,14 +139,14 @@ INLINED void placeCells(Cube* cube, int3 cell) {
 // false if no point reaches it.
 INLINED bool fillCube(Cube* cube, int3 corner) {
     cube->middle = convert_float3(corner) + HALF_SIDE;
-    cube->placed = 0;
+    cube->pending = 0;
     cube->any = false;
     clear(&cube->nearestInner);
     clear(&cube->nearestOuter);
-    MEET;
-    if (ITEM == 0) *cube->inner.picked = *cube->outer.picked = 0;
-    MEET;
-    placeCells(cube, corner / CELL_SIDE);
+    BARRIER;
+    if (ITEM == 0) *cube->inner.selected = *cube->outer.selected = 0;
+    BARRIER;
+    storeCells(cube, corner / CELL_SIDE);
     applyLayers(cube);
     return cube->any;
 }

@@ -15,13 +15,13 @@
 #if ITEMS > 1
 #define SLICES 1
 #define CUBES 1
-#define PICKED_SIDE 8
+#define SELECTION_SIDE 8
 #else
 #define SLICES 4
 #define CUBES 8
-#define PICKED_SIDE 4
+#define SELECTION_SIDE 4
 #endif
-#define HALF_SIDE (0.5f * (PICKED_SIDE - 1))
+#define HALF_SIDE (0.5f * (SELECTION_SIDE - 1))
 
 // Points of a layer that are tested at once.
 #define PAGE 1024
@@ -53,9 +53,9 @@ Voxels ownVoxels(int first) {
 #define nearestLattice(coordinate) floor((coordinate) + 0.5001f)
 
 #if COMPRESSES
-typedef uint PickedNumber;
+typedef uint SelectedIndex;
 #else
-typedef ushort PickedNumber;
+typedef ushort SelectedIndex;
 #endif
 
 // Points of a layer, and the selection of those that reach the voxels.
@@ -67,12 +67,12 @@ typedef struct {
 #if PAPER_CUBE
     float centre[3][PAGE];  // the lattice point nearest to the sample
 #endif
-    PickedNumber picked[PAGE + LANES];  // some elements beyond the selection are written
+    SelectedIndex selected[PAGE + LANES];  // some elements beyond the selection are written
 } Points;
 
 typedef struct {
     SHARED Points* points;
-    SHARED uint* picked;  // count of selected points
+    SHARED uint* selected;  // count of selected points
 } Layer;
 
 // The nearest points of a layer so far: those with the greatest p . v - |p|^2 / 2, as |v - p|^2 = |v|^2 - 2 (p . v -
@@ -95,15 +95,15 @@ INLINED void clear(Nearest* nearest) {
 
 INLINED void applyPoints(Layer layer, const Voxels* v, int cube, Nearest* nearest) {
     SHARED const Points* points = layer.points;
-    const uint count = *layer.picked;
+    const uint count = *layer.selected;
     for (uint i = 0; i < count; ++i) {
-        const uint p = points->picked[i];
+        const uint p = points->selected[i];
         const float along = points->x[p];
         Lanes across = multiplyAdd(v->z, (Lanes)(points->z[p]),
                                    multiplyAdd(v->y, (Lanes)(points->y[p]), (Lanes)(-points->halfSquare[p])));
 #if PAPER_CUBE
-        const Lanes away = max(fabs(v->y - points->centre[1][p]), fabs(v->z - points->centre[2][p]));
-        across = select((Lanes)(-INFINITY), across, away <= (float)(cube));
+        const Lanes distance = max(fabs(v->y - points->centre[1][p]), fabs(v->z - points->centre[2][p]));
+        across = select((Lanes)(-INFINITY), across, distance <= (float)(cube));
 #else
         (void)(cube);
 #endif
@@ -111,12 +111,12 @@ INLINED void applyPoints(Layer layer, const Voxels* v, int cube, Nearest* neares
 #if PAPER_CUBE
             if (fabs(v->x[slice].s0 - points->centre[0][p]) > (float)(cube)) continue;
 #endif
-            const Lanes some = multiplyAdd((Lanes)(along), v->x[slice], across);
+            const Lanes value = multiplyAdd((Lanes)(along), v->x[slice], across);
 #if TRIANGLES
             nearest->owner[slice] =
-                select(nearest->owner[slice], (IntLanes)(points->owner[p]), some > nearest->greatest[slice]);
+                select(nearest->owner[slice], (IntLanes)(points->owner[p]), value > nearest->greatest[slice]);
 #endif
-            nearest->greatest[slice] = max(nearest->greatest[slice], some);
+            nearest->greatest[slice] = max(nearest->greatest[slice], value);
         }
     }
 }
@@ -130,41 +130,42 @@ Real squareSum(Real a, Real b, Real c) {
     return multiplyAdd(a, a, multiplyAdd(b, b, c * c));
 }
 
-Real beyondSide(Real at) {
-    return max(fabs(at) - HALF_SIDE, (Real)(0.0f));
+Real beyondSide(Real position) {
+    return max(fabs(position) - HALF_SIDE, (Real)(0.0f));
 }
 
-typedef ushort8 LooseUshort8 __attribute__((aligned(2)));
+typedef ushort8 UnalignedUshort8 __attribute__((aligned(2)));
 
 // Adds the numbers of some lanes, counted from `first`, to the selection. For each byte, `orders` has the positions of
 // its bits in ascending order. This avoids a branch for each bit, which processors would mispredict.
-INLINED void addPicked(Layer layer, uint lanes, uint first, global const ulong* orders) {
-    SHARED PickedNumber* picked = layer.points->picked;
+INLINED void addSelected(Layer layer, uint lanes, uint first, global const ulong* orders) {
+    SHARED SelectedIndex* selected = layer.points->selected;
 #if ITEMS > 1
     (void)(orders);
-    if (lanes) picked[atomic_inc(layer.picked)] = (PickedNumber)(first);
+    if (lanes) selected[atomic_inc(layer.selected)] = (SelectedIndex)(first);
 #elif COMPRESSES
     (void)(orders);
-    storeSharedInts(compressInts(laneInts + (int)(first), lanes), 0, (SHARED int*)(picked + *layer.picked));
-    *layer.picked += popcount(lanes);
+    storeSharedInts(compressInts(laneInts + (int)(first), lanes), 0, (SHARED int*)(selected + *layer.selected));
+    *layer.selected += popcount(lanes);
 #else
-    uint count = *layer.picked;
+    uint count = *layer.selected;
     UNROLLED for (uint i = 0; i < LANES / 8; ++i) {
         const uint byte = lanes >> 8 * i & 255;
-        *(LooseUshort8*)(picked + count) = convert_ushort8(as_uchar8(orders[byte])) + (ushort)(first + 8 * i);
+        *(UnalignedUshort8*)(selected + count) = convert_ushort8(as_uchar8(orders[byte])) + (ushort)(first + 8 * i);
         count += popcount(byte);
     }
-    *layer.picked = count;
+    *layer.selected = count;
 #endif
 }
 
 // Stores points of a layer, and selects those that reach the voxels: closer than the square root of reach2.
-INLINED void placePoints(Layer layer, uint first, uint among, Real3 at, float reach2, global const ulong* orders) {
+INLINED void storePoints(Layer layer, uint first, uint lanes, Real3 position, float reach2,
+                         global const ulong* orders) {
     SHARED Points* points = layer.points;
-    const Real away2 = squareSum(beyondSide(at.x), beyondSide(at.y), beyondSide(at.z));
-    storeReal(at.x, points->x + first);
-    storeReal(at.y, points->y + first);
-    storeReal(at.z, points->z + first);
-    storeReal(0.5f * squareSum(at.x, at.y, at.z), points->halfSquare + first);
-    addPicked(layer, bitsOfReal(away2 < reach2) & among, first, orders);
+    const Real distance2 = squareSum(beyondSide(position.x), beyondSide(position.y), beyondSide(position.z));
+    storeReal(position.x, points->x + first);
+    storeReal(position.y, points->y + first);
+    storeReal(position.z, points->z + first);
+    storeReal(0.5f * squareSum(position.x, position.y, position.z), points->halfSquare + first);
+    addSelected(layer, bitsOfReal(distance2 < reach2) & lanes, first, orders);
 }

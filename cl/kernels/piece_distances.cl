@@ -15,7 +15,7 @@
 #define RAISED_PART 1e-3f
 #define RAISED_BY 5e-7f
 #define HEIGHT_SLACK 1e-3f
-#define LEAST_HEIGHT 1e-3f
+#define MIN_HEIGHT 1e-3f
 
 // Side bits of a voxel's code, below the number of its nearest piece: PieceSide of sdf/fill/exact_block.h.
 enum { SIDE_OUTSIDE = 1, SIDE_INSIDE = 2, SIDE_BITS = 2 };
@@ -62,10 +62,10 @@ Lanes latticeZ() {
 typedef struct {
     Lanes nearest2[CHUNKS];
     IntLanes nearest[CHUNKS];
-} Found;
+} NearestPieces;
 
 // The slices and columns of a share that a ball's bounding box overlaps.
-Share within(const Share* own, float3 centre, float radius) {
+Share overlap(const Share* own, float3 centre, float radius) {
     // truncation equals rounding down here, since all values below zero are equivalent
     const int low = (int)(max(centre.y - radius, 0.0f)) / ROWS_AT_ONCE,
               high = centre.y + radius < 0 ? -1 : (int)(min(centre.y + radius, 7.0f)) / ROWS_AT_ONCE;
@@ -77,8 +77,8 @@ Share within(const Share* own, float3 centre, float radius) {
 }
 
 // Reduces squared distances to those to a sample.
-void applySample(Found* found, const Share* own, float3 sample, float reach) {
-    const Share part = within(own, sample, reach);
+void applySample(NearestPieces* found, const Share* own, float3 sample, float reach) {
+    const Share part = overlap(own, sample, reach);
     const Lanes z2 = squareLanes(latticeZ() - sample.z);
     for (int column = part.firstColumn; column <= part.lastColumn; ++column) {
         const Lanes across2 = squareLanes(latticeY(column) - sample.y) + z2;
@@ -121,7 +121,8 @@ Column makeColumn(const Drum* drum, int column) {
 }
 
 // Whether the cylinder may be nearest to some voxel of a chunk.
-bool mayBeNearest(const Found* found, const Drum* drum, const Column* column, int slice, int chunk, bool thick) {
+bool mayBeNearest(const NearestPieces* found, const Drum* drum, const Column* column, int slice, int chunk,
+                  bool thick) {
     const Lanes bound2 = found->nearest2[chunk], h = drum->height[slice] + column->height;
     Lanes excess = drum->px2[slice] + column->excess - bound2, g2 = h * h;
     if (thick) {
@@ -133,7 +134,7 @@ bool mayBeNearest(const Found* found, const Drum* drum, const Column* column, in
 }
 
 // Bits of the chunks in a part of a share with a voxel that the cylinder may be nearest to.
-uint nearChunks(const Found* found, const Share* own, const Share* part, const Drum* drum, bool thick) {
+uint nearChunks(const NearestPieces* found, const Share* own, const Share* part, const Drum* drum, bool thick) {
     uint near = 0;
     for (int c = part->firstColumn; c <= part->lastColumn; ++c) {
         const Column column = makeColumn(drum, c);
@@ -146,7 +147,7 @@ uint nearChunks(const Found* found, const Share* own, const Share* part, const D
 }
 
 // Bits of the chunks of a column.
-uint ofColumn(uint chunks, int column) {
+uint chunksOfColumn(uint chunks, int column) {
     return ITEMS > 1 ? chunks : chunks & 0x11111111u << column;
 }
 
@@ -155,10 +156,10 @@ int sliceOf(int chunk) {
 }
 
 // The same for a disc, out of some chunks.
-uint nearAmong(const Found* found, const Share* own, uint among, const Drum* drum) {
+uint nearChunksAmong(const NearestPieces* found, const Share* own, uint among, const Drum* drum) {
     uint near = 0;
     for (int c = own->firstColumn; c <= own->lastColumn; ++c) {
-        uint chunks = ofColumn(among, c);
+        uint chunks = chunksOfColumn(among, c);
         if (chunks == 0) continue;
         const Column column = makeColumn(drum, c);
         for (; chunks != 0; chunks &= chunks - 1) {
@@ -176,7 +177,7 @@ Lanes beyond(Lanes along, float length) {
 
 // Keeps the smaller distances, and their pieces. Over a face the face's normal gives the side, unless two pieces are
 // equally near within rounding and disagree.
-void keepNearer(Found* found, int chunk, Lanes distance2, Lanes height, IntLanes overFace, int code) {
+void keepNearer(NearestPieces* found, int chunk, Lanes distance2, Lanes height, IntLanes overFace, int code) {
     const Lanes old2 = found->nearest2[chunk], nearest2 = min(distance2, old2);
     const IntLanes old = found->nearest[chunk];
     const IntLanes side = select((IntLanes)(code + SIDE_INSIDE), (IntLanes)(code + SIDE_OUTSIDE), height > 0.0f);
@@ -190,7 +191,8 @@ void keepNearer(Found* found, int chunk, Lanes distance2, Lanes height, IntLanes
 }
 
 // Reduces the distances in some chunks to those to a piece. Lattice coordinates are exact in floats.
-void askPiece(Found* found, const Share* own, uint chunks, global const Piece* piece, uint number, int3 block) {
+void applyPiece(NearestPieces* found, const Share* own, uint chunks, global const Piece* piece, uint number,
+                int3 block) {
     const float3 shift = convert_float3(block - vload3(0, piece->base)), origin = vload3(0, piece->origin);
     const float3 u = vload3(0, piece->u), w = vload3(0, piece->w), n = vload3(0, piece->n);
     const float size = piece->length, ox = piece->ox, oy = piece->oy, olen = piece->olen, ex = piece->ex,
@@ -205,94 +207,97 @@ void askPiece(Found* found, const Share* own, uint chunks, global const Piece* p
     }
     const Lanes pz = latticeZ() + shift.z - origin.z;
     for (int column = own->firstColumn; column <= own->lastColumn; ++column) {
-        uint slices = ofColumn(chunks, column);
+        uint slices = chunksOfColumn(chunks, column);
         if (slices == 0) continue;
         const Lanes py = latticeY(column) + shift.y - origin.y;
         const Lanes uAcross = py * u.y + pz * u.z, wAcross = py * w.y + pz * w.z, nAcross = py * n.y + pz * n.z;
         for (; slices != 0; slices &= slices - 1) {
             const int chunk = lowestBit(slices), slice = sliceOf(chunk);
-            const Lanes along = uAlong[slice] + uAcross, aside = wAlong[slice] + wAcross,
+            const Lanes along = uAlong[slice] + uAcross, across = wAlong[slice] + wAcross,
                         height = nAlong[slice] + nAcross;
-            const Lanes base2 = squareLanes(beyond(along, size)) + aside * aside;
+            const Lanes base2 = squareLanes(beyond(along, size)) + across * across;
             // the edges from both ends of the longest edge to the third corner
             const Lanes v = along - size;
-            const Lanes leftOf = aside * ox - along * oy, rightOf = aside * ex - v * ey;
-            const Lanes left2 = squareLanes(beyond(along * ox + aside * oy, olen)) + leftOf * leftOf;
-            const Lanes right2 = squareLanes(beyond(v * ex + aside * ey, elen)) + rightOf * rightOf;
+            const Lanes leftOf = across * ox - along * oy, rightOf = across * ex - v * ey;
+            const Lanes left2 = squareLanes(beyond(along * ox + across * oy, olen)) + leftOf * leftOf;
+            const Lanes right2 = squareLanes(beyond(v * ex + across * ey, elen)) + rightOf * rightOf;
             const Lanes height2 = height * height;
-            const IntLanes above = (aside > 0.0f) & (leftOf <= 0.0f) & (rightOf >= 0.0f);
+            const IntLanes above = (across > 0.0f) & (leftOf <= 0.0f) & (rightOf >= 0.0f);
             const Lanes distance2 = height2 + select(min(base2, min(left2, right2)), (Lanes)(0.0f), above);
-            keepNearer(found, chunk, distance2, height, above & (height2 > square(LEAST_HEIGHT)), code);
+            keepNearer(found, chunk, distance2, height, above & (height2 > square(MIN_HEIGHT)), code);
         }
     }
 }
 
 // The input of a block.
 typedef struct {
-    Near near;
+    BlockGroups nearby;
     global const Member* members;
     global const Piece* pieces;
 } Input;
 
-void applySamples(const Input* input, const Share* own, SHARED const uint* page, uint count, Found* found) {
+void applySamples(const Input* input, const Share* own, SHARED const uint* page, uint count, NearestPieces* found) {
     for (uint i = 0; i < count; ++i)
-        applySample(found, own, placeOf(&input->near.groups, page[i]) - input->near.inBrick, input->near.reach);
+        applySample(found, own, positionOf(&input->nearby.groups, page[i]) - input->nearby.inBrick,
+                    input->nearby.reach);
 }
 
 // Tests the members of a cluster that come near some chunks.
-void askMembers(const Input* input, const Share* own, uint cluster, uint near, Found* found) {
-    const uint begin = input->near.groups.begins[cluster], end = input->near.groups.begins[cluster + 1];
+void applyMembers(const Input* input, const Share* own, uint cluster, uint chunks, NearestPieces* found) {
+    const uint begin = input->nearby.groups.begins[cluster], end = input->nearby.groups.begins[cluster + 1];
     for (uint m = begin; m < end; ++m) {
         global const Member* member = input->members + m;
-        uint ask = near;
+        uint nearby = chunks;
         if (end - begin > 1) {
             Drum drum;
-            makeDrum(&drum, own, vload3(0, member->place) - input->near.inBrick, member->radius,
+            makeDrum(&drum, own, vload3(0, member->position) - input->nearby.inBrick, member->radius,
                      vload3(0, member->normal), 0);
-            ask = nearAmong(found, own, near, &drum);
+            nearby = nearChunksAmong(found, own, chunks, &drum);
         }
-        if (ask != 0) askPiece(found, own, ask, input->pieces + member->content, member->content, input->near.block);
+        if (nearby != 0)
+            applyPiece(found, own, nearby, input->pieces + member->content, member->content, input->nearby.block);
     }
 }
 
-void askGroups(const Input* input, const Share* own, SHARED const uint* page, uint count, Found* found) {
-    const uint stride = input->near.groups.stride;
+void applyGroups(const Input* input, const Share* own, SHARED const uint* page, uint count, NearestPieces* found) {
+    const uint stride = input->nearby.groups.stride;
     for (uint i = 0; i < count; ++i) {
         const uint c = page[i];
-        global const float* columns = input->near.groups.columns + c;
-        const float3 sample = placeOf(&input->near.groups, c) - input->near.inBrick;
+        global const float* columns = input->nearby.groups.columns + c;
+        const float3 sample = positionOf(&input->nearby.groups, c) - input->nearby.inBrick;
         const float radius = columns[RADIUS * stride], thickness = columns[THICKNESS * stride];
         Drum drum;
         makeDrum(&drum, own, sample, radius,
                  (float3)(columns[NORMAL_X * stride], columns[NORMAL_Y * stride], columns[NORMAL_Z * stride]),
                  thickness);
-        const Share part = within(own, sample, input->near.reach + radius);
+        const Share part = overlap(own, sample, input->nearby.reach + radius);
         const uint near = nearChunks(found, own, &part, &drum, thickness > 0);
-        if (near != 0) askMembers(input, own, c, near, found);
+        if (near != 0) applyMembers(input, own, c, near, found);
     }
 }
 
 // Computes the distances. First come bounds by samples, raised slightly so that a piece's own distance wins over its
 // sample's; then the pieces. The page holds all clusters that reach the block, or else is refilled once more. Returns
 // false if there is none.
-bool measure(const Input* input, const Share* own, SHARED uint* page, SHARED uint* count, Found* found) {
-    for (int i = 0; i < CHUNKS; ++i) found->nearest2[i] = square(input->near.reach);
-    uint next = input->near.range.x, pages = 0;
+bool computeDistances(const Input* input, const Share* own, SHARED uint* page, SHARED uint* count,
+                      NearestPieces* found) {
+    for (int i = 0; i < CHUNKS; ++i) found->nearest2[i] = square(input->nearby.reach);
+    uint next = input->nearby.range.x, pages = 0;
     do {
-        next = turnPage(&input->near, next, page, count);
+        next = fillPage(&input->nearby, next, page, count);
         applySamples(input, own, page, *count, found);
         ++pages;
-    } while (next < input->near.range.y);
+    } while (next < input->nearby.range.y);
     if (pages == 1 && *count == 0) return false;
     for (int i = 0; i < CHUNKS; ++i) {
         found->nearest2[i] =
-            min(found->nearest2[i] * (1 + RAISED_PART) + RAISED_BY, (Lanes)(square(input->near.reach)));
+            min(found->nearest2[i] * (1 + RAISED_PART) + RAISED_BY, (Lanes)(square(input->nearby.reach)));
         found->nearest[i] = -1;
     }
-    if (pages > 1) next = input->near.range.x;
+    if (pages > 1) next = input->nearby.range.x;
     do {
-        if (pages > 1) next = turnPage(&input->near, next, page, count);
-        askGroups(input, own, page, *count, found);
-    } while (next < input->near.range.y);
+        if (pages > 1) next = fillPage(&input->nearby, next, page, count);
+        applyGroups(input, own, page, *count, found);
+    } while (next < input->nearby.range.y);
     return true;
 }

@@ -30,7 +30,7 @@ typedef struct {
     uint slot, open;
 } Block;
 
-void summarize(const Found* found, const Share* own, SHARED Block* block) {
+void storeResults(const NearestPieces* found, const Share* own, SHARED Block* block) {
     for (int slice = own->firstSlice; slice <= own->lastSlice; ++slice)
         for (int column = own->firstColumn; column <= own->lastColumn; ++column) {
             const int i = chunkAt(slice, column), chunk = slice * COLUMNS + column;
@@ -67,7 +67,7 @@ void findSignLinks(const Share* own, SHARED Block* block) {
 }
 
 // Grows a set inside one slice until it stops.
-ulong grownInSlice(ulong set, ulong linkY, ulong linkZ) {
+ulong growInSlice(ulong set, ulong linkY, ulong linkZ) {
     for (;;) {
         const ulong old = set;
         set |= (set & linkZ) << 1 | (set >> 1 & linkZ);
@@ -77,11 +77,11 @@ ulong grownInSlice(ulong set, ulong linkY, ulong linkZ) {
 }
 
 // Adds all voxels to a set that links connect with it.
-void spread(SHARED const Block* block, SHARED Mask* set) {
+void propagate(SHARED const Block* block, SHARED Mask* set) {
     uint changed = 0;  // slices that have not been propagated to their neighbours
     for (int x = 0; x < BLOCK_SIDE; ++x) {
         if (set->slice[x] == 0) continue;
-        set->slice[x] = grownInSlice(set->slice[x], block->linkY.slice[x], block->linkZ.slice[x]);
+        set->slice[x] = growInSlice(set->slice[x], block->linkY.slice[x], block->linkZ.slice[x]);
         changed |= 1u << x;
     }
     while (changed != 0) {
@@ -89,9 +89,9 @@ void spread(SHARED const Block* block, SHARED Mask* set) {
         changed &= changed - 1;
         for (int to = x - 1; to <= x + 1; to += 2) {
             if (to < 0 || to >= BLOCK_SIDE) continue;
-            const ulong given = set->slice[x] & block->linkX.slice[min(x, to)];
-            if ((given & ~set->slice[to]) == 0) continue;
-            set->slice[to] = grownInSlice(set->slice[to] | given, block->linkY.slice[to], block->linkZ.slice[to]);
+            const ulong incoming = set->slice[x] & block->linkX.slice[min(x, to)];
+            if ((incoming & ~set->slice[to]) == 0) continue;
+            set->slice[to] = growInSlice(set->slice[to] | incoming, block->linkY.slice[to], block->linkZ.slice[to]);
             changed |= 1u << to;
         }
     }
@@ -100,28 +100,29 @@ void spread(SHARED const Block* block, SHARED Mask* set) {
 // completeSides() of sdf/leaf/sign_propagation.h. Propagates the known sides over links. For each group of linked
 // voxels that remains without a side, the side of one voxel is computed. Returns the number of voxels that are on both
 // sides. Marks the block as open where the closest feature leaves a side open.
-uint completeSides(const Input* input, SHARED Block* block, View* view) {
-    spread(block, &block->outside);
-    spread(block, &block->inside);
-    uint onBoth = 0;
-    for (int x = 0; x < BLOCK_SIDE; ++x) onBoth += (uint)(popcount(block->outside.slice[x] & block->inside.slice[x]));
-    for (int seeds = 0; seeds < 3; ++seeds) {
-        SHARED const Mask* some = seeds == 0 ? &block->far : seeds == 1 ? &block->mid : &block->known;
+uint completeSides(const Input* input, SHARED Block* block, RelativeMesh* mesh) {
+    propagate(block, &block->outside);
+    propagate(block, &block->inside);
+    uint conflicts = 0;
+    for (int x = 0; x < BLOCK_SIDE; ++x)
+        conflicts += (uint)(popcount(block->outside.slice[x] & block->inside.slice[x]));
+    for (int level = 0; level < 3; ++level) {
+        SHARED const Mask* seeds = level == 0 ? &block->far : level == 1 ? &block->mid : &block->known;
         for (int x = 0; x < BLOCK_SIDE; ++x)
             for (;;) {
-                const ulong open = some->slice[x] & ~(block->outside.slice[x] | block->inside.slice[x]);
+                const ulong open = seeds->slice[x] & ~(block->outside.slice[x] | block->inside.slice[x]);
                 if (open == 0) break;
                 const int bit = 63 - (int)(clz(open & -open));
                 const double side =
-                    sideOf(input, (uint)(block->nearest[x * 64 + bit] >> SIDE_BITS), view, x * 64 + bit);
+                    sideOf(input, (uint)(block->nearest[x * 64 + bit] >> SIDE_BITS), mesh, x * 64 + bit);
                 if (side == 0) {
                     block->open = 1;
                     return 0;
                 }
                 SHARED Mask* set = side < 0 ? &block->inside : &block->outside;
                 set->slice[x] |= 1ul << bit;
-                spread(block, set);
+                propagate(block, set);
             }
     }
-    return onBoth;
+    return conflicts;
 }

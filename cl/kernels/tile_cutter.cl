@@ -6,10 +6,10 @@
 #define SLIVER_STEP 3.0
 // Spacing of the samples along a thin part [square roots of epsilon], and the number after which the sequence restarts.
 #define THIN_STEP 1.6
-#define MOST_ALONG (1 << 30)
+#define MAX_ALONG (1 << 30)
 #define THIN_RUN 16
 // Upper limit of the tiles that wait at once for a triangle of a grid.
-#define MOST_TILES 160
+#define MAX_TILES 160
 
 // A part of a triangle that is still to be cut or to be sampled.
 typedef struct {
@@ -18,7 +18,7 @@ typedef struct {
 } Tile;
 
 typedef struct {
-    Tile waiting[MOST_TILES];
+    Tile waiting[MAX_TILES];
     int count;
 } Tiles;
 
@@ -31,14 +31,14 @@ Corners cornersFrom(double3 a, double3 b, double3 c) {
     return corners;
 }
 
-void wait(Tiles* tiles, const Limits* limits, Corners corners, double area, double longest2) {
+void push(Tiles* tiles, const Limits* limits, Corners corners, double area, double longest2) {
     if (misses(&corners, limits)) return;
     const Tile tile = {corners, area, longest2};
     tiles->waiting[tiles->count++] = tile;
 }
 
 // The same triangle, its longest edge from a to b.
-Corners turnedToLongest(const Corners* t) {
+Corners rotatedToLongest(const Corners* t) {
     const double ab2 = lengthSquared(t->b - t->a), bc2 = lengthSquared(t->c - t->b), ca2 = lengthSquared(t->a - t->c);
     if (bc2 > ab2 && bc2 >= ca2) return cornersFrom(t->b, t->c, t->a);
     if (ca2 > ab2) return cornersFrom(t->c, t->a, t->b);
@@ -47,21 +47,21 @@ Corners turnedToLongest(const Corners* t) {
 
 // Halves a tile at the middle of the longest edge.
 void halve(Tiles* tiles, const Limits* limits, const Tile* tile) {
-    const Corners t = turnedToLongest(&tile->corners);
+    const Corners t = rotatedToLongest(&tile->corners);
     const double3 middle = 0.5 * (t.a + t.b);
     const Corners first = cornersFrom(t.a, middle, t.c), second = cornersFrom(middle, t.b, t.c);
-    wait(tiles, limits, second, 0.5 * tile->area, longestEdge2(&second));
-    wait(tiles, limits, first, 0.5 * tile->area, longestEdge2(&first));
+    push(tiles, limits, second, 0.5 * tile->area, longestEdge2(&second));
+    push(tiles, limits, first, 0.5 * tile->area, longestEdge2(&first));
 }
 
 void quarter(Tiles* tiles, const Limits* limits, const Tile* tile) {
     const Corners* t = &tile->corners;
     const double3 ab = 0.5 * (t->a + t->b), bc = 0.5 * (t->b + t->c), ca = 0.5 * (t->c + t->a);
     const double area = 0.25 * tile->area, longest2 = 0.25 * tile->longest2;
-    wait(tiles, limits, cornersFrom(ab, bc, ca), area, longest2);
-    wait(tiles, limits, cornersFrom(ca, bc, t->c), area, longest2);
-    wait(tiles, limits, cornersFrom(ab, t->b, bc), area, longest2);
-    wait(tiles, limits, cornersFrom(t->a, ab, ca), area, longest2);
+    push(tiles, limits, cornersFrom(ab, bc, ca), area, longest2);
+    push(tiles, limits, cornersFrom(ca, bc, t->c), area, longest2);
+    push(tiles, limits, cornersFrom(ab, t->b, bc), area, longest2);
+    push(tiles, limits, cornersFrom(t->a, ab, ca), area, longest2);
 }
 
 // The samples of a part of a triangle: rows of them, or one row along it if it is thin. None if it must be cut.
@@ -75,14 +75,14 @@ Shape shapeOf(const Sampling* sampling, const Tile* tile) {
                  longest2 = tile->longest2;
     const Shape cut = {0, 0}, one = {1, 0};
     if (sampling->recursive) return area <= epsilon && !(sampling->fillGaps && longest2 > sliver2) ? one : cut;
-    const double n = max(1.0, ceil(sqrt(area / epsilon))), most = sampling->maxSubdivision;
+    const double n = max(1.0, ceil(sqrt(area / epsilon))), maxRows = sampling->maxSubdivision;
     if (sampling->fillGaps && longest2 > sliver2 * n * n) {
         const Shape thin = {0,
-                            (int)(min(ceil(sqrt(longest2 / (THIN_STEP * THIN_STEP * epsilon))), (double)(MOST_ALONG)))};
+                            (int)(min(ceil(sqrt(longest2 / (THIN_STEP * THIN_STEP * epsilon))), (double)(MAX_ALONG)))};
         return 4 * area * area <= epsilon * longest2 ? thin : cut;
     }
-    const Shape rows = {(int)(min(n, most)), 0};
-    return sampling->fillGaps && n > most ? cut : rows;
+    const Shape rows = {(int)(min(n, maxRows)), 0};
+    return sampling->fillGaps && n > maxRows ? cut : rows;
 }
 
 void cutTile(Tiles* tiles, const Sampling* sampling, const Limits* limits, const Tile* tile) {
@@ -121,18 +121,19 @@ typedef struct {
 } ThinRun;
 
 Thin thinWithin(const Corners* t, int along, const Limits* limits) {
-    const Corners turned = turnedToLongest(t);
-    Thin thin = {.from = turned.a, .edge = turned.b - turned.a, .along = along};
-    const double3 opposite = turned.c - turned.a, none = 0.0;
+    const Corners rotated = rotatedToLongest(t);
+    Thin thin = {.from = rotated.a, .edge = rotated.b - rotated.a, .along = along};
+    const double3 opposite = rotated.c - rotated.a, none = 0.0;
     thin.peak = clamp(dot(opposite, thin.edge) / dot(thin.edge, thin.edge), 1e-6, 1 - 1e-6);
     thin.rise = 0.5 * (opposite - thin.peak * thin.edge);
     const double3 lower = limits->lower - max(thin.rise, none) - thin.from,
                   upper = limits->upper - min(thin.rise, none) - thin.from;
     // on an axis perpendicular to the edge, all of it is within the limits, or nothing
-    const long3 across = thin.edge == 0.0;
-    if (any(across && (lower > 0.0 || upper < 0.0))) return thin;
-    const double3 way = select(thin.edge, (double3)(1.0), across);
-    const double3 a = select(lower / way, none, across), b = select(upper / way, (double3)(1.0), across);
+    const long3 perpendicular = thin.edge == 0.0;
+    if (any(perpendicular && (lower > 0.0 || upper < 0.0))) return thin;
+    const double3 divisor = select(thin.edge, (double3)(1.0), perpendicular);
+    const double3 a = select(lower / divisor, none, perpendicular),
+                  b = select(upper / divisor, (double3)(1.0), perpendicular);
     const double3 nearer = min(a, b), farther = max(a, b);
     const double low = max(0.0, max(nearer.x, max(nearer.y, nearer.z))),
                  high = min(1.0, min(farther.x, min(farther.y, farther.z)));
@@ -177,16 +178,16 @@ Exact3 normals(const Batch* batch) {
 }
 
 // Rows of Algorithm 1 for triangles of a batch that need no cut; 0 for the others.
-Exact rowsOfAny(const Sampling* sampling, const Batch* batch, Exact size) {
-    const double epsilon = sampling->epsilon, most = sampling->recursive ? 1 : sampling->maxSubdivision;
+Exact rowsOfBatch(const Sampling* sampling, const Batch* batch, Exact size) {
+    const double epsilon = sampling->epsilon, maxRows = sampling->recursive ? 1 : sampling->maxSubdivision;
     const Exact rows = max((Exact)(1.0), ceil(sqrt(0.5 * size / epsilon)));
     const Exact sliver2 = rows * rows * (SLIVER_STEP * SLIVER_STEP * epsilon);
-    return ((longestEdges2(batch) <= sliver2) & (rows <= most)) ? rows : (Exact)(0.0);
+    return ((longestEdges2(batch) <= sliver2) & (rows <= maxRows)) ? rows : (Exact)(0.0);
 }
 
 // Here a part is a sample.
-RealInt partsOfAny(const Grid* grid, const Batch* batch) {
-    const Exact rows = rowsOfAny(&grid->sampling, batch, sqrt(squareExact(normals(batch))));
+RealInt partsOfBatch(const Grid* grid, const Batch* batch) {
+    const Exact rows = rowsOfBatch(&grid->sampling, batch, sqrt(squareExact(normals(batch))));
     return toRealInt(0.5 * rows * (rows + 1.0));
 }
 
