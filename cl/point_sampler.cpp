@@ -32,7 +32,7 @@ namespace {
 constexpr std::size_t ballsPerProcessorItem = 64;  // bounding spheres
 /// Initial capacity for answers, and the factor by which it grows beyond the need.
 constexpr std::size_t minAnswers = 1 << 12, growth = 2;
-constexpr const char* ofBodies = "the batch of contacts";
+constexpr const char* purpose = "the batch of contacts";  // of memory, for error texts
 
 // `Body` of point_sampler.cl.
 struct KernelBody {
@@ -87,7 +87,7 @@ class GrowingBuffer {
     void reserve(std::uint64_t bytes, const cl::CommandQueue& queue, DeviceMemory& memory) {
         if (bytes <= size_) return;
         const std::uint64_t size = std::max(bytes, growth * size_);
-        cl::Buffer larger = memory.allocate(size, ofBodies);
+        cl::Buffer larger = memory.allocate(size, purpose);
         if (used_ > 0) queue.enqueueCopyBuffer(buffer_, larger, 0, 0, used_);
         queue.finish();
         memory.free(buffer_);
@@ -128,16 +128,16 @@ class Sampler {
 
   private:
     // The location of a body in the buffers.
-    struct Place {
+    struct BodyLocation {
         KernelBody body;
         cl_uint balls;
     };
 
     void releaseBodies();
-    void add(const SampledBody& body, Timing& timing);
-    void keep(std::span<const SampledBody> bodies, Timing& timing);
-    std::vector<KernelFound> found(std::span<const SampledBody> bodies, std::span<const PointQuery> queries,
-                                   Timing& timing);
+    void upload(const SampledBody& body, Timing& timing);
+    void uploadMissing(std::span<const SampledBody> bodies, Timing& timing);
+    std::vector<KernelFound> answer(std::span<const SampledBody> bodies, std::span<const PointQuery> queries,
+                                    Timing& timing);
     std::vector<KernelFound> run(const std::vector<KernelBody>& bodies, const std::vector<KernelQuery>& queries,
                                  cl_uint balls, Timing& timing);
 
@@ -147,7 +147,7 @@ class Sampler {
     DeviceMemory memory_;
     cl::Program program_;
     cl::CommandQueue queue_;
-    std::map<std::uint64_t, Place> places_;
+    std::map<std::uint64_t, BodyLocation> locations_;
     GrowingBuffer directories_, centres_, values_, points_, balls_;  // of the bodies
     GrowingBuffer bodies_, queries_, count_, answers_;               // of a batch
     std::size_t capacity_ = minAnswers;                              // of answers
@@ -156,13 +156,13 @@ class Sampler {
 
 void Sampler::releaseBodies() {
     queue_.finish();
-    places_.clear();
+    locations_.clear();
     for (GrowingBuffer* buffer :
          {&directories_, &centres_, &values_, &points_, &balls_, &bodies_, &queries_, &count_, &answers_})
         buffer->clear(memory_);
 }
 
-void Sampler::add(const SampledBody& body, Timing& timing) {
+void Sampler::upload(const SampledBody& body, Timing& timing) {
     const FieldLayout& field = *body.field;
     if (field.storage != Storage::float32) throw std::invalid_argument("points are sampled in fields of float32 only");
     const BallsOfPoints own = body.points();
@@ -176,16 +176,16 @@ void Sampler::add(const SampledBody& body, Timing& timing) {
                             append(points_, own.points.data(), own.points.size()),
                             append(balls_, own.balls.data(), own.balls.size())};
     queue_.finish();
-    places_.emplace(body.id, Place{placed, cl_uint(own.balls.size())});
+    locations_.emplace(body.id, BodyLocation{placed, cl_uint(own.balls.size())});
 }
 
 // Uploads missing bodies. If they do not fit in addition to the others, all others are released.
-void Sampler::keep(std::span<const SampledBody> bodies, Timing& timing) {
+void Sampler::uploadMissing(std::span<const SampledBody> bodies, Timing& timing) {
     const auto addMissing = [&] {
         for (const SampledBody& body : bodies)
-            if (!places_.contains(body.id)) add(body, timing);
+            if (!locations_.contains(body.id)) upload(body, timing);
     };
-    if (places_.empty()) return addMissing();
+    if (locations_.empty()) return addMissing();
     try {
         addMissing();
     } catch (const DeviceError&) {
@@ -226,16 +226,16 @@ std::vector<KernelFound> Sampler::run(const std::vector<KernelBody>& bodies, con
     return found;
 }
 
-std::vector<KernelFound> Sampler::found(std::span<const SampledBody> bodies, std::span<const PointQuery> queries,
-                                        Timing& timing) {
-    keep(bodies, timing);
+std::vector<KernelFound> Sampler::answer(std::span<const SampledBody> bodies, std::span<const PointQuery> queries,
+                                         Timing& timing) {
+    uploadMissing(bodies, timing);
     std::vector<KernelBody> kernelBodies;
-    for (const SampledBody& body : bodies) kernelBodies.push_back(places_.at(body.id).body);
+    for (const SampledBody& body : bodies) kernelBodies.push_back(locations_.at(body.id).body);
     std::vector<KernelQuery> kernelQueries;
     cl_uint balls = 0;
     for (const PointQuery& query : queries) {
         kernelQueries.emplace_back(query, balls);
-        balls += places_.at(bodies[query.body].id).balls;
+        balls += locations_.at(bodies[query.body].id).balls;
     }
     if (balls == 0) return {};
     return run(kernelBodies, kernelQueries, balls, timing);
@@ -249,7 +249,7 @@ OpenclTimes Sampler::sample(std::span<const SampledBody> bodies, std::span<const
     try {
         Timing timing(profile_);
         if (std::exchange(failed_, true)) releaseBodies();
-        all = found(bodies, queries, timing);
+        all = answer(bodies, queries, timing);
         failed_ = false;
         times = timing.total(memory_.peak());
     } catch (const cl::Error& error) {

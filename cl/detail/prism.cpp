@@ -79,7 +79,7 @@ class PrismFill {
     void prepare(std::size_t first, std::size_t last);
     bool fits(const PrismBatchSize& size) const;
     std::size_t lastFitting(std::size_t first) const;
-    void take(PrismBatch& batch, std::size_t first, std::size_t last) const;
+    void assign(PrismBatch& batch, std::size_t first, std::size_t last) const;
     void reserve(PrismBatch& batch);
     std::vector<cl::Event> upload(PrismBatch& batch, std::size_t first);
     void start(PrismBatch& batch, std::size_t first);
@@ -126,7 +126,7 @@ OpenclTimes PrismFill::run() {
             to = lastFitting(from);
             PrismBatch& batch = batches_[next++ % batchesInFlight];
             finish(batch);
-            take(batch, from, to);
+            assign(batch, from, to);
             start(batch, from);
         }
     }
@@ -166,7 +166,7 @@ std::size_t PrismFill::lastFitting(std::size_t first) const {
 }
 
 // Sets the content of a batch: the bricks' blocks.
-void PrismFill::take(PrismBatch& batch, std::size_t first, std::size_t last) const {
+void PrismFill::assign(PrismBatch& batch, std::size_t first, std::size_t last) const {
     batch.begins.assign(1, {});
     for (std::size_t brick = first; brick < last; ++brick) {
         const PrismBlocks& blocks = window_[brick - firstPrepared_];

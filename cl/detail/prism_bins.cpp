@@ -15,10 +15,10 @@
 namespace bilayer::detail {
 namespace {
 
-constexpr double boxSlack = 1e-2;      // margin of a prism's box: overlap and rounding [voxels]
-constexpr double folded = 1e-6;        // two faces that coincide to within this angle have no bisecting plane
-constexpr double parallel = 1e-9;      // side planes this close to parallel have no corner that the box must contain
-constexpr int blocksWorthCulling = 8;  // a prism whose box meets more blocks is tested against each
+constexpr double boxSlack = 1e-2;           // margin of a prism's box: overlap and rounding [voxels]
+constexpr double minBisectorLength = 1e-6;  // two faces that coincide to within this angle have no bisecting plane
+constexpr double minDeterminant = 1e-9;     // side planes closer to parallel have no corner that the box must contain
+constexpr int blocksWorthCulling = 8;       // a prism whose box meets more blocks is tested against each
 
 using Triangle = std::array<glm::dvec3, 3>;
 
@@ -81,7 +81,7 @@ glm::dvec2 sideNormalTo(const Shape& shape, int k, const glm::dvec3& vertexAcros
     if (!(depth > 0)) return {0, 0};
     const glm::dvec2 normal = glm::dvec2(1, 0) - intoNeighbour / depth;
     const double length = glm::length(normal);
-    return length > folded ? normal / length : glm::dvec2(0);
+    return length > minBisectorLength ? normal / length : glm::dvec2(0);
 }
 
 // Nothing if the triangle has no area.
@@ -113,7 +113,7 @@ bool addCorner(const Shape& shape, int k, double reach, Box& box) {
     const int before = (k + 2) % 3;
     const glm::dvec2 p = shape.sideNormal[before].x * shape.inward(before), q = shape.sideNormal[k].x * shape.inward(k);
     const double determinant = p.x * q.y - p.y * q.x;
-    if (std::abs(determinant) < parallel) return false;
+    if (std::abs(determinant) < minDeterminant) return false;
     const glm::dvec2 slope = glm::dvec2(p.y * shape.sideNormal[k].y - q.y * shape.sideNormal[before].y,
                                         q.x * shape.sideNormal[before].y - p.x * shape.sideNormal[k].y) /
                              determinant;
@@ -171,13 +171,13 @@ std::array<Plane, 5> planesOf(const Shape& shape, double reach) {
     return planes;
 }
 
-// Whether all voxels of a block are outside of one of the planes.
-bool parted(const std::array<Plane, 5>& planes, const glm::ivec3& block) {
+// Whether all voxels of a block are beyond one of the planes.
+bool isBeyondPlane(const std::array<Plane, 5>& planes, const glm::ivec3& block) {
     constexpr double half = 0.5 * (blockSide - 1);
     const glm::dvec3 centre = glm::dvec3(block * blockSide) + half;
     return std::any_of(planes.begin(), planes.end(), [&](const Plane& plane) {
-        const double room = half * (std::abs(plane.normal.x) + std::abs(plane.normal.y) + std::abs(plane.normal.z));
-        return glm::dot(plane.normal, centre) + plane.depth + room < -boxSlack;
+        const double extent = half * (std::abs(plane.normal.x) + std::abs(plane.normal.y) + std::abs(plane.normal.z));
+        return glm::dot(plane.normal, centre) + plane.depth + extent < -boxSlack;
     });
 }
 
@@ -197,7 +197,7 @@ void bin(const Shape& shape, const Box& box, double reach, std::uint32_t triangl
     for (int x = lower.x; x <= upper.x; ++x)
         for (int y = lower.y; y <= upper.y; ++y)
             for (int z = lower.z; z <= upper.z; ++z) {
-                if (large && parted(planes, {x, y, z})) continue;
+                if (large && isBeyondPlane(planes, {x, y, z})) continue;
                 const auto block = std::uint32_t((x * (last.x + 1) + y) * (last.x + 1) + z);
                 ++blocks.cursors[block];
                 blocks.pairs.push_back({block, prism});

@@ -64,11 +64,11 @@ class ResidentFill {
     ResidentField run();
 
   private:
-    void keep(const cl::Buffer& origins, const cl::Buffer& distances, std::size_t blocks);
-    void keepFromHost();
-    void measureFrame();
+    void addPage(const cl::Buffer& origins, const cl::Buffer& distances, std::size_t blocks);
+    void addHostBlocks();
+    void computeFrame();
     void placeBlocks();
-    void measureClearances();
+    void computeClearances();
     void countConflicts();
     Summary readSummary();
 
@@ -134,18 +134,18 @@ ResidentField ResidentFill::run() {
     };
     OpenclTimes times = fillByBricks(device_, options_, {mesh, job_.options, job_.box, job_.layers},
                                      [&](const cl::Buffer& origins, const cl::Buffer& distances, std::size_t blocks) {
-                                         keep(origins, distances, blocks);
+                                         addPage(origins, distances, blocks);
                                      });
-    keepFromHost();
-    measureFrame();
+    addHostBlocks();
+    computeFrame();
     placeBlocks();
     countConflicts();
-    measureClearances();
+    computeClearances();
     times += timing_.total(0);
     return {std::move(layout_), times};
 }
 
-void ResidentFill::keep(const cl::Buffer& origins, const cl::Buffer& distances, std::size_t blocks) {
+void ResidentFill::addPage(const cl::Buffer& origins, const cl::Buffer& distances, std::size_t blocks) {
     if (blocks == 0) return;
     const auto buffer = [&](std::uint64_t each) { return memory_.allocate(blocks * each, purpose); };
     const Page page{cl_uint(blocks), buffer(sizeof(glm::ivec3)), buffer(blockVoxels * sizeof(float)),
@@ -157,14 +157,14 @@ void ResidentFill::keep(const cl::Buffer& origins, const cl::Buffer& distances, 
     pages_.push_back(page);
 }
 
-void ResidentFill::keepFromHost() {
+void ResidentFill::addHostBlocks() {
     if (hostOrigins_.empty()) return;
     const auto uploaded = [&](const auto& data) {
         return memory_.upload(data.data(), data.size() * sizeof data[0], purpose,
                               timing_.event(Timing::Command::upload));
     };
     cl::Buffer origins = uploaded(hostOrigins_), distances = uploaded(hostDistances_);
-    keep(origins, distances, hostOrigins_.size());
+    addPage(origins, distances, hostOrigins_.size());
     device_.queue.finish();
     memory_.free(origins);
     memory_.free(distances);
@@ -178,7 +178,7 @@ Summary ResidentFill::readSummary() {
 }
 
 // Computes the frame as FieldLayout's constructor and LevelSet do.
-void ResidentFill::measureFrame() {
+void ResidentFill::computeFrame() {
     const Summary summary = readSummary();
     if (summary.activeLower[0] > summary.activeUpper[0])
         throw std::invalid_argument("no voxel lies within the band: the widths are too small for this voxel size");
@@ -224,7 +224,7 @@ void ResidentFill::countConflicts() {
     *job_.mesh.conflicts += std::size_t(readSummary().conflicts);
 }
 
-void ResidentFill::measureClearances() {
+void ResidentFill::computeClearances() {
     const KernelFrame frame(layout_.frame);
     const glm::ivec3 size = layout_.frame.parts();
     const std::size_t count = std::size_t(size.x) * size.y * size.z;

@@ -4,8 +4,8 @@
 //   default             a work-item does the work of a whole group: for processors, whose vector units process two rows
 //                       of voxels at once
 //   -D GROUP_PER_BLOCK  a work-group of 64 items works together, each on one row of a block: for GPUs
-// The source is the same for both. The items of a group divide loops, `ITEM, ITEM + ITEMS, ...`, and synchronise at barriers.
-// A group of one item runs all of the loop and needs no barrier.
+// The source is the same for both. The items of a group divide loops, `ITEM, ITEM + ITEMS, ...`, and synchronise at
+// barriers. A group of one item runs all of the loop and needs no barrier.
 #pragma OPENCL FP_CONTRACT OFF
 #pragma OPENCL EXTENSION cl_khr_fp64 : enable
 
