@@ -40,6 +40,9 @@ constexpr std::size_t blocksPerTask = 16;  // blocks that the host receives at o
 constexpr std::uint64_t scratchPart = 8;   // maximum fraction of the budget: 1 / scratchPart
 /// The smallest cells for grouping pieces, and the maximum distance of a brick's samples beyond its reach [voxels].
 constexpr float smallestCell = 1.1f, aroundBrick = 3;
+/// Sizes in the kernels [bytes]: Piece of pieces.cl, Member and the columns of Groups in groups.cl, and the columns of
+/// a sample in samples.cl, with its cell and without.
+constexpr std::uint64_t pieceBytes = 112, memberBytes = 32, groupBytes = 32, unsortedSampleBytes = 32, sampleBytes = 28;
 constexpr const char* purpose = "a batch of bricks";  // of memory, for error texts
 
 // `Layers` of layer_cubes.cl.
@@ -164,14 +167,16 @@ BrickFill::BrickFill(DeviceImpl& device, const OpenclOptions& options, const Fil
         batch.next = memory_.allocate(sizeof(cl_uint), purpose);
     }
     if (doubleLayer_) {
-        bytes_ = {.unsorted = 32, .columns = 28, .brick = sampleCells(bins_->grid()) * sizeof(cl_uint)};
+        bytes_ = {.unsorted = unsortedSampleBytes,
+                  .columns = sampleBytes,
+                  .brick = sampleCells(bins_->grid()) * sizeof(cl_uint)};
     } else {
         const auto slices = std::uint64_t(bins_->grid().blocksPerSide());
-        bytes_ = {.part = 112,
-                  .unsorted = 32,
-                  .sorted = 32,
+        bytes_ = {.part = pieceBytes,
+                  .unsorted = memberBytes,
+                  .sorted = memberBytes,
                   .cell = sizeof(cl_uint),
-                  .columns = 32,
+                  .columns = groupBytes,
                   .begin = sizeof(cl_uint),
                   .brick = slices * sizeof(cl_uint2)};
         makeScratch();

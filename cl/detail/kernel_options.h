@@ -1,4 +1,4 @@
-// Translates the options of a filler or a field for a device, and what all kernels have in common.
+// Translates the options of a filler or a field for a device, and holds the constants of all kernels.
 #pragma once
 
 #include <cstddef>

@@ -64,6 +64,9 @@ typedef IntLanes UnalignedIntLanes __attribute__((aligned(4)));
 // Value of all distances beyond reach: farAway of sdf/leaf/blocks.h.
 #define FAR_AWAY 1e30f
 
+// linkSlack of sdf/leaf/sign_propagation.h [voxels].
+#define LINK_SLACK 1e-4f
+
 // Corners of a triangle or of a part of one [voxels].
 typedef struct {
     double3 a, b, c;

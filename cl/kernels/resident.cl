@@ -8,8 +8,6 @@
 #define NEEDED 0
 // bandEdge of sdf/leaf/band.h [voxels].
 #define BAND_EDGE 1e-5f
-// linkSlack of sdf/leaf/sign_propagation.h [voxels].
-#define LINK_SLACK 1e-4f
 // As in collider/field/field_layout.cpp.
 #define MAX_PARTS 16
 // Maximum stored distance [CLEARANCE_STEPS].

@@ -3,7 +3,6 @@
 #include "closest_side.cl"
 
 // See sdf/leaf/sign_propagation.h.
-#define LINK_SLACK 1e-4f
 #define FAR_FROM 0.5f
 #define MID_FROM 0.1f
 
