@@ -243,10 +243,10 @@ void compareDevice(const Options& options) {
     HeapOptions heap = options.heap;
     heap.seconds = options.growSeconds;
     heap.measuredFrames = 1;
-    OpenclTimes times;
     const Device device = openDevice();
+    const OpenclPointSampler sampler = openclPointSampler(device, {.profile = true});
     const auto processor = makeField(mesh, options.voxels);
-    const auto sampled = makeField(mesh, options.voxels, openclPointSampler(device, {.times = &times}));
+    const auto sampled = makeField(mesh, options.voxels, sampler);
     fmt::print("\n## Points sampled by {}: {:g} s of knots, {:g} voxels each\n\n", device.info().name, heap.seconds,
                options.voxels);
     fmt::print(
@@ -254,8 +254,11 @@ void compareDevice(const Options& options) {
         "that differ |\n|---|---|---|---|---|---|\n");
     for (const int bodies : options.growBodies) {
         const Row ours = playKnots(*processor, mesh, bodies, heap);
-        times = {};
+        const OpenclTimes before = sampler.times();
         const Row theirs = playKnots(*sampled, mesh, bodies, heap);
+        const OpenclTimes after = sampler.times();
+        const double kernels = after.kernels - before.kernels,
+                     transfers = after.upload + after.download - before.upload - before.download;
         // a run that reaches its time limit has fewer steps
         const auto steps = std::min(ours.run.kineticEnergy.size(), theirs.run.kineticEnergy.size());
         const auto usual = [&](const Row& row) {
@@ -266,7 +269,7 @@ void compareDevice(const Options& options) {
         for (std::size_t i = 0; i < steps; ++i) differing += ours.run.kineticEnergy[i] != theirs.run.kineticEnergy[i];
         const double each = 1e3 / double(theirs.run.stepMs.size());
         fmt::print("| {} | {:.2f} | {:.2f} | {:.2f} | {:.2f} | {} |\n", bodies, usual(ours), usual(theirs),
-                   each * times.kernels, each * (times.upload + times.download), differing);
+                   each * kernels, each * transfers, differing);
         std::fflush(stdout);
     }
 }

@@ -9,7 +9,6 @@
 #include <fstream>
 #include <glm/common.hpp>
 #include <map>
-#include <memory>
 #include <nlohmann/json.hpp>
 #include <thread>
 
@@ -42,18 +41,20 @@ struct Options {
     std::string json;
 };
 
-// A device and its builders, without and with profiling.
+// A device and its builder.
 struct Engine {
+    Device device;
     DeviceInfo info;
-    BlockFiller timed, profiled;
-    std::unique_ptr<OpenclTimes> times;  // accumulates the times of `profiled`
+    std::uint64_t memoryMiB;
+    BlockFiller filler;
+
+    // A builder with times of its own.
+    OpenclFiller profiled() const { return openclFiller(device, {.memoryMiB = memoryMiB, .profile = true}); }
 };
 
 Engine openEngine(const std::string& name, std::uint64_t memoryMiB) {
     const Device device = openDevice(name);
-    auto times = std::make_unique<OpenclTimes>();
-    return {device.info(), openclFiller(device, {.memoryMiB = memoryMiB}),
-            openclFiller(device, {.memoryMiB = memoryMiB, .times = times.get()}), std::move(times)};
+    return {device, device.info(), memoryMiB, openclFiller(device, {.memoryMiB = memoryMiB})};
 }
 
 // The requested device, or all available ones.
@@ -112,7 +113,7 @@ std::vector<Row> emptyRows(const Scene& scene, const std::string& voxels, const 
         const Job onTbb{contest.tbb, contest.halfWidth, options.threads};
         if (found == rows.end()) rows.push_back({scene.name, voxels, &contest, nullptr, onTbb, tbb});
         for (const Engine& engine : engines) {
-            const Job onDevice{contest.opencl, contest.halfWidth, options.threads, &engine.timed};
+            const Job onDevice{contest.opencl, contest.halfWidth, options.threads, &engine.filler};
             rows.push_back({scene.name, voxels, &contest, &engine, onDevice, tbb});
         }
     }
@@ -145,11 +146,11 @@ void profile(const Scene& scene, std::vector<Row>& rows) {
         if (!row.engine) continue;
         std::vector<OpenclTimes> runs;
         Job job = row.job;
-        job.filler = &row.engine->profiled;
         while (runs.size() < profiledRuns) {
-            *row.engine->times = {};
+            const OpenclFiller filler = row.engine->profiled();
+            job.filler = &filler;
             run(scene, job);
-            runs.push_back(*row.engine->times);
+            runs.push_back(filler.times());
         }
         std::sort(runs.begin(), runs.end(),
                   [](const OpenclTimes& a, const OpenclTimes& b) { return a.kernels < b.kernels; });

@@ -14,7 +14,7 @@ namespace {
 
 constexpr cl_int noPlatform = -1001;  // CL_PLATFORM_NOT_FOUND_KHR, of the loader's extension cl_khr_icd
 
-struct Found {
+struct FoundDevice {
     cl::Device device;
     DeviceInfo info;
 };
@@ -37,8 +37,8 @@ DeviceInfo describe(const cl::Platform& platform, const cl::Device& device) {
 }
 
 // Usable devices in platform order, GPUs first.
-std::vector<Found> find() {
-    std::vector<Found> found;
+std::vector<FoundDevice> findDevices() {
+    std::vector<FoundDevice> found;
     try {
         std::vector<cl::Platform> platforms;
         cl::Platform::get(&platforms);
@@ -52,7 +52,7 @@ std::vector<Found> find() {
     } catch (const cl::Error& error) {
         if (error.err() != noPlatform) throw deviceError(error, "any device, while listing them");
     }
-    std::stable_partition(found.begin(), found.end(), [](const Found& f) { return f.info.gpu; });
+    std::stable_partition(found.begin(), found.end(), [](const FoundDevice& f) { return f.info.gpu; });
     return found;
 }
 
@@ -61,21 +61,21 @@ std::string lowered(std::string text) {
     return text;
 }
 
-std::string listed(const std::vector<Found>& found) {
+std::string listed(const std::vector<FoundDevice>& found) {
     std::string list;
-    for (const Found& f : found) list += (list.empty() ? "" : ", ") + f.info.name + " (" + f.info.platform + ")";
+    for (const FoundDevice& f : found) list += (list.empty() ? "" : ", ") + f.info.name + " (" + f.info.platform + ")";
     return list;
 }
 
-Found choose(const std::string& text) {
-    const std::vector<Found> found = find();
+FoundDevice choose(const std::string& text) {
+    const std::vector<FoundDevice> found = findDevices();
     if (found.empty())
         throw DeviceError(
             "there is no OpenCL device on this machine: no driver is installed, or none finds its hardware (PoCL also "
             "needs a "
             "folder that it can write to: $POCL_CACHE_DIR, or ~/.cache)");
     const std::string wanted = lowered(text);
-    const auto fits = [&](const Found& f) {
+    const auto fits = [&](const FoundDevice& f) {
         return lowered(f.info.name).find(wanted) != std::string::npos ||
                lowered(f.info.platform).find(wanted) != std::string::npos;
     };
@@ -93,13 +93,13 @@ const DeviceInfo& Device::info() const {
 
 std::vector<DeviceInfo> devices() {
     std::vector<DeviceInfo> infos;
-    for (Found& f : find()) infos.push_back(std::move(f.info));
+    for (FoundDevice& f : findDevices()) infos.push_back(std::move(f.info));
     return infos;
 }
 
 Device openDevice(const std::string& text) {
     const char* fallback = std::getenv("BILAYER_DEVICE");
-    const Found found = choose(text.empty() && fallback ? fallback : text);
+    const FoundDevice found = choose(text.empty() && fallback ? fallback : text);
     auto impl = std::make_shared<DeviceImpl>();
     impl->info = found.info;
     impl->device = found.device;

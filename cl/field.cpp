@@ -9,9 +9,11 @@
 #include <stdexcept>
 #include <utility>
 
+#include "cl/detail/enqueue.h"
 #include "cl/detail/kernel_options.h"
 #include "cl/detail/memory.h"
 #include "cl/detail/program.h"
+#include "cl/detail/queue_guard.h"
 #include "cl/detail/resident_field.h"
 #include "cl/detail/timing.h"
 #include "collider/field/batch.h"
@@ -27,11 +29,9 @@ extern const char* const field_cl;  // the text of field.cl
 
 namespace {
 
-constexpr std::size_t batchesInFlight = 2;
 /// Points in a batch: 4 MiB of points and samples, which take a GPU about as long as ten kernel launches.
 constexpr std::size_t batchPoints = 1 << 17;
-/// Work-items of a group on a GPU, and points per item on a processor.
-constexpr std::size_t groupItems = 64, pointsPerProcessorItem = 1024;
+constexpr std::size_t pointsPerProcessorItem = 1024;
 
 // The kernel uses the host's memory layout of points and samples.
 static_assert(sizeof(glm::vec3) == 3 * sizeof(cl_float));
@@ -39,14 +39,13 @@ static_assert(sizeof(Sample) == 5 * sizeof(cl_float) && offsetof(Sample, gradien
               offsetof(Sample, inBand) == 4 * sizeof(cl_float) && sizeof(bool) == sizeof(cl_uchar));
 
 // A batch of points in flight, with its own queue.
-struct Batch {
+struct PointBatch {
     cl::CommandQueue queue;
     cl::Buffer points, samples;
 };
 
 cl::Program samplingProgram(const Device& device) {
-    if (!device.info().doubles)
-        throw DeviceError(device.info().name + " cannot compute in double precision, which samples of fields need");
+    requireDoubles(device.info(), "which samples of fields need");
     return buildProgram(device.impl(), field_cl, commonBuildOptions(device.impl()));
 }
 
@@ -59,13 +58,15 @@ struct DeviceField::Data {
     cl::Program program;
     std::optional<FieldLayout> shared;  // memory of the layout's buffers if host and device share memory
     DeviceLayout layout;
-    std::array<Batch, batchesInFlight> batches;
+    std::array<PointBatch, batchesInFlight> batches;
     std::mutex mutex;  // guards `batches`
+    const bool profile;
+    OpenclTimes buildTimes;
 
     Data(const Device& device, const OpenclOptions& options, std::uint64_t budget);
 
-    void upload(FieldLayout from, OpenclTimes* times);
-    void start(Batch& batch, std::span<const glm::vec3> points, std::span<Sample> samples, Timing& timing);
+    void upload(FieldLayout from);
+    void start(PointBatch& batch, std::span<const glm::vec3> points, std::span<Sample> samples, Timing& timing);
     void sample(std::span<const glm::vec3> points, std::span<Sample> samples, Timing& timing);
 };
 
@@ -73,9 +74,10 @@ DeviceField::Data::Data(const Device& device, const OpenclOptions& options, std:
     : device(device),
       gpuMapping(wantsGroups(device.impl(), options.mapping)),
       memory(device.impl(), budget),
-      program(samplingProgram(device)) {
+      program(samplingProgram(device)),
+      profile(options.profile) {
     const DeviceImpl& impl = device.impl();
-    for (Batch& batch : batches) {
+    for (PointBatch& batch : batches) {
         batch.queue = cl::CommandQueue(impl.context, impl.device, CL_QUEUE_PROFILING_ENABLE);
         if (impl.info.unifiedMemory) continue;
         batch.points = memory.allocate(batchPoints * sizeof(glm::vec3), "a batch of points");
@@ -83,22 +85,21 @@ DeviceField::Data::Data(const Device& device, const OpenclOptions& options, std:
     }
 }
 
-void DeviceField::Data::upload(FieldLayout from, OpenclTimes* times) {
-    Timing timing(times);
-    const Ended ended(device.impl().queue);
+void DeviceField::Data::upload(FieldLayout from) {
+    Timing timing(profile);
+    const QueueGuard guard(device.impl().queue);
     const auto uploaded = [&](const auto* data, std::size_t count) {
-        return memory.upload(data, count * sizeof *data, "the field", timing.event(Timing::Of::upload));
+        return memory.upload(data, count * sizeof *data, "the field", timing.event(Timing::Command::upload));
     };
     layout = {from, uploaded(from.directory.data(), from.directory.size()),
               uploaded(from.centres.data(), from.centres.size()), uploaded(from.values.data(), from.values.size())};
     device.impl().queue.finish();
-    timing.sumUp();
-    if (times) times->peakBytes = std::max(times->peakBytes, memory.peak());
+    buildTimes = timing.total(memory.peak());
     if (device.info().unifiedMemory) shared = std::move(from);
 }
 
 // Enqueues a batch; in place if host and device share memory.
-void DeviceField::Data::start(Batch& batch, std::span<const glm::vec3> points, std::span<Sample> samples,
+void DeviceField::Data::start(PointBatch& batch, std::span<const glm::vec3> points, std::span<Sample> samples,
                               Timing& timing) {
     const cl::CommandQueue& queue = batch.queue;
     const bool unified = device.info().unifiedMemory;
@@ -110,18 +111,14 @@ void DeviceField::Data::start(Batch& batch, std::span<const glm::vec3> points, s
                                    samples.data());
     } else {
         queue.enqueueWriteBuffer(batch.points, CL_FALSE, 0, points.size_bytes(), points.data(), nullptr,
-                                 timing.event(Timing::Of::upload));
+                                 timing.event(Timing::Command::upload));
     }
     const std::size_t each = gpuMapping ? 1 : pointsPerProcessorItem, local = gpuMapping ? groupItems : 1;
     const std::size_t items = (points.size() + each - 1) / each, global = (items + local - 1) / local * local;
-    cl::Kernel kernel(program, "sampleField");
-    cl_uint index = 0;
-    const auto set = [&](const auto&... arguments) { (kernel.setArg(index++, arguments), ...); };
-    set(KernelFrame(layout.frame), layout.directory, layout.centres, layout.values, batch.points,
-        cl_uint(points.size()), cl_uint(each), batch.samples);
-    queue.enqueueNDRangeKernel(kernel, cl::NullRange, cl::NDRange(global), cl::NDRange(local), nullptr,
-                               timing.event(Timing::Of::kernel));
-    cl::Event* const download = timing.event(Timing::Of::download);
+    enqueueKernel(queue, program, "sampleField", cl::NDRange(global), cl::NDRange(local),
+                  timing.event(Timing::Command::kernel), KernelFrame(layout.frame), layout.directory, layout.centres,
+                  layout.values, batch.points, cl_uint(points.size()), cl_uint(each), batch.samples);
+    cl::Event* const download = timing.event(Timing::Command::download);
     if (unified) {
         void* const mapped =
             queue.enqueueMapBuffer(batch.samples, CL_FALSE, CL_MAP_READ, 0, samples.size_bytes(), nullptr, download);
@@ -133,20 +130,20 @@ void DeviceField::Data::start(Batch& batch, std::span<const glm::vec3> points, s
 }
 
 void DeviceField::Data::sample(std::span<const glm::vec3> points, std::span<Sample> samples, Timing& timing) {
-    const std::array<Ended, batchesInFlight> ended{Ended(batches[0].queue), Ended(batches[1].queue)};
-    std::size_t turn = 0;
+    const std::array<QueueGuard, batchesInFlight> guards{QueueGuard(batches[0].queue), QueueGuard(batches[1].queue)};
+    std::size_t next = 0;
     for (std::size_t first = 0; first < points.size(); first += batchPoints) {
-        Batch& batch = batches[turn++ % batchesInFlight];
+        PointBatch& batch = batches[next++ % batchesInFlight];
         batch.queue.finish();
         const std::size_t count = std::min(batchPoints, points.size() - first);
         start(batch, points.subspan(first, count), samples.subspan(first, count), timing);
     }
-    for (Batch& batch : batches) batch.queue.finish();
+    for (PointBatch& batch : batches) batch.queue.finish();
 }
 
 DeviceField::DeviceField(const Device& device, const LevelSet& levelSet, const OpenclOptions& options) try {
     data_ = std::make_shared<Data>(device, options, memoryBudget(device.impl(), options.memoryMiB));
-    data_->upload(FieldLayout(levelSet), options.times);
+    data_->upload(FieldLayout(levelSet));
 } catch (const cl::Error& error) {
     throw deviceError(error, device.info().name);
 }
@@ -155,22 +152,23 @@ DeviceField::DeviceField(const Device& device, const Mesh& mesh, const BuildOpti
                          const OpenclOptions& options) try {
     const std::uint64_t budget = memoryBudget(device.impl(), options.memoryMiB);
     data_ = std::make_shared<Data>(device, options, budget - budget / fillPart);
-    data_->layout = buildResident(device, mesh, build, options, data_->memory);
+    ResidentField field = buildResident(device, mesh, build, options, data_->memory);
+    data_->layout = std::move(field.layout);
+    data_->buildTimes = field.times;
 } catch (const cl::Error& error) {
     throw deviceError(error, device.info().name);
 }
 
-void DeviceField::sample(std::span<const glm::vec3> points, std::span<Sample> samples, OpenclTimes* times) const {
+OpenclTimes DeviceField::sample(std::span<const glm::vec3> points, std::span<Sample> samples) const {
     requireSameLength(points.size(), samples.size(), "samples");
     const std::lock_guard lock(data_->mutex);
-    Timing timing(times);
+    Timing timing(data_->profile);
     try {
         data_->sample(points, samples, timing);
+        return timing.total(data_->memory.used());
     } catch (const cl::Error& error) {
         throw deviceError(error, data_->device.info().name);
     }
-    timing.sumUp();
-    if (times) times->peakBytes = std::max(times->peakBytes, data_->memory.used());
 }
 
 const Bounds& DeviceField::bounds() const {
@@ -179,6 +177,10 @@ const Bounds& DeviceField::bounds() const {
 
 std::size_t DeviceField::memoryBytes() const {
     return data_->memory.used();
+}
+
+const OpenclTimes& DeviceField::buildTimes() const {
+    return data_->buildTimes;
 }
 
 }  // namespace bilayer

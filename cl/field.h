@@ -18,7 +18,6 @@ class DeviceField {
   public:
     /// Lays the level set out as Field in collider/field.h does, and uploads it. A device that shares the host's memory
     /// uses the host's copy in place.
-    /// @param options  `times` receives the time of the upload
     ///
     /// Throws what Field's constructor throws, and DeviceError. If the memory is too small, the text states how many
     /// MiB are needed.
@@ -29,7 +28,6 @@ class DeviceField {
     /// the double layer method's signs are contradictory, as on an inverted mesh, empty space may be on the other side.
     /// The peak memory is about 1.7 times that of the field, and a quarter of the options' limit for the fill. The
     /// nearest triangles are not kept.
-    /// @param options  `times` receives the time of the build
     ///
     /// Throws what build() throws. Throws std::invalid_argument for builds that need the processor: a method other than
     /// Method::exact and Method::doubleLayer, and signs other than from normals, also where those are contradictory.
@@ -39,13 +37,14 @@ class DeviceField {
     /// roots, which matters outside the band only. Points stream through the device, so their count is not limited. Any
     /// thread may call it; calls on one field wait for each other.
     /// @param points  in the field's own coordinates [m]
-    /// @param times   if not null, receives the time of the call
+    /// @return the times of the call, measured if OpenclOptions::profile was set
     ///
     /// Throws std::invalid_argument if `samples` is not as long as `points`, and DeviceError for errors of the device.
-    void sample(std::span<const glm::vec3> points, std::span<Sample> samples, OpenclTimes* times = nullptr) const;
+    OpenclTimes sample(std::span<const glm::vec3> points, std::span<Sample> samples) const;
 
-    const Bounds& bounds() const;     ///< around all points in the band [m]
-    std::size_t memoryBytes() const;  ///< on the device, including the buffers for points in flight
+    const Bounds& bounds() const;           ///< around all points in the band [m]
+    std::size_t memoryBytes() const;        ///< on the device, including the buffers for points in flight
+    const OpenclTimes& buildTimes() const;  ///< of the constructor: of the upload, or of the build
 
   private:
     struct Data;

@@ -10,9 +10,11 @@
 #include <stdexcept>
 #include <utility>
 
+#include "cl/detail/enqueue.h"
 #include "cl/detail/kernel_options.h"
 #include "cl/detail/memory.h"
 #include "cl/detail/program.h"
+#include "cl/detail/queue_guard.h"
 #include "cl/detail/resident_field.h"
 #include "cl/detail/timing.h"
 #include "collider/contact/sampled_points.h"
@@ -27,11 +29,10 @@ extern const char* const point_sampler_cl;  // the text of point_sampler.cl
 
 namespace {
 
-/// Work-items of a group on a GPU, and bounding spheres per item on a processor.
-constexpr std::size_t groupItems = 64, ballsPerProcessorItem = 64;
+constexpr std::size_t ballsPerProcessorItem = 64;  // bounding spheres
 /// Initial capacity for answers, and the factor by which it grows beyond the need.
 constexpr std::size_t minAnswers = 1 << 12, growth = 2;
-constexpr const char* ofBodies = "the batch of contacts";
+constexpr const char* purpose = "the batch of contacts";  // of memory, for error texts
 
 // `Body` of point_sampler.cl.
 struct KernelBody {
@@ -59,7 +60,7 @@ struct KernelQuery {
 // The kernel uses the host's memory layout of balls and points.
 static_assert(sizeof(PointBall) == 6 * sizeof(cl_float) && sizeof(glm::vec3) == 3 * sizeof(cl_float));
 
-// `Found`.
+// `FoundPoint`.
 struct KernelFound {
     cl_uint query, point;
     cl_float distance, gradient[3];
@@ -67,7 +68,7 @@ struct KernelFound {
 };
 
 // A growing buffer that keeps its content.
-class Pool {
+class GrowingBuffer {
   public:
     /// @return index of the first element
     template <class Element>
@@ -77,7 +78,7 @@ class Pool {
         reserve(used_ + bytes, queue, memory);
         if (bytes > 0)
             queue.enqueueWriteBuffer(buffer_, CL_FALSE, first, bytes, data.data(), nullptr,
-                                     timing.event(Timing::Of::upload));
+                                     timing.event(Timing::Command::upload));
         used_ += bytes;
         return first / sizeof(Element);
     }
@@ -86,7 +87,7 @@ class Pool {
     void reserve(std::uint64_t bytes, const cl::CommandQueue& queue, DeviceMemory& memory) {
         if (bytes <= size_) return;
         const std::uint64_t size = std::max(bytes, growth * size_);
-        cl::Buffer larger = memory.allocate(size, ofBodies);
+        cl::Buffer larger = memory.allocate(size, purpose);
         if (used_ > 0) queue.enqueueCopyBuffer(buffer_, larger, 0, 0, used_);
         queue.finish();
         memory.free(buffer_);
@@ -109,8 +110,7 @@ class Pool {
 };
 
 cl::Program samplerProgram(const Device& device) {
-    if (!device.info().doubles)
-        throw DeviceError(device.info().name + " cannot compute in double precision, which samples of fields need");
+    requireDoubles(device.info(), "which samples of fields need");
     return buildProgram(device.impl(), point_sampler_cl, commonBuildOptions(device.impl()));
 }
 
@@ -118,55 +118,56 @@ class Sampler {
   public:
     Sampler(const Device& device, const OpenclOptions& options)
         : device_(device),
-          times_(options.times),
+          profile_(options.profile),
           gpuMapping_(wantsGroups(device.impl(), options.mapping)),
           memory_(device.impl(), memoryBudget(device.impl(), options.memoryMiB)),
           program_(samplerProgram(device)),
           queue_(device.impl().context, device.impl().device, CL_QUEUE_PROFILING_ENABLE) {}
 
-    void sample(std::span<const SampledBody> bodies, std::span<const PointQuery> queries, FoundPoints& answers);
+    OpenclTimes sample(std::span<const SampledBody> bodies, std::span<const PointQuery> queries, FoundPoints& answers);
 
   private:
     // The location of a body in the buffers.
-    struct Place {
+    struct BodyLocation {
         KernelBody body;
         cl_uint balls;
     };
 
-    void forget();
-    void add(const SampledBody& body, Timing& timing);
-    void keep(std::span<const SampledBody> bodies, Timing& timing);
-    std::vector<KernelFound> found(std::span<const SampledBody> bodies, std::span<const PointQuery> queries,
-                                   Timing& timing);
+    void releaseBodies();
+    void upload(const SampledBody& body, Timing& timing);
+    void uploadMissing(std::span<const SampledBody> bodies, Timing& timing);
+    std::vector<KernelFound> answer(std::span<const SampledBody> bodies, std::span<const PointQuery> queries,
+                                    Timing& timing);
     std::vector<KernelFound> run(const std::vector<KernelBody>& bodies, const std::vector<KernelQuery>& queries,
                                  cl_uint balls, Timing& timing);
 
     const Device device_;
-    OpenclTimes* const times_;
+    const bool profile_;
     const bool gpuMapping_;
     DeviceMemory memory_;
     cl::Program program_;
     cl::CommandQueue queue_;
-    std::map<std::uint64_t, Place> places_;
-    Pool directories_, centres_, values_, points_, balls_;  // of the bodies
-    Pool bodies_, queries_, count_, answers_;               // of a batch
-    std::size_t capacity_ = minAnswers;                     // of answers
-    bool failed_ = false;                                   // in the last batch: the content of the buffers is unknown
+    std::map<std::uint64_t, BodyLocation> locations_;
+    GrowingBuffer directories_, centres_, values_, points_, balls_;  // of the bodies
+    GrowingBuffer bodies_, queries_, count_, answers_;               // of a batch
+    std::size_t capacity_ = minAnswers;                              // of answers
+    bool failed_ = false;  // in the last batch: the content of the buffers is unknown
 };
 
-void Sampler::forget() {
+void Sampler::releaseBodies() {
     queue_.finish();
-    places_.clear();
-    for (Pool* pool : {&directories_, &centres_, &values_, &points_, &balls_, &bodies_, &queries_, &count_, &answers_})
-        pool->clear(memory_);
+    locations_.clear();
+    for (GrowingBuffer* buffer :
+         {&directories_, &centres_, &values_, &points_, &balls_, &bodies_, &queries_, &count_, &answers_})
+        buffer->clear(memory_);
 }
 
-void Sampler::add(const SampledBody& body, Timing& timing) {
+void Sampler::upload(const SampledBody& body, Timing& timing) {
     const FieldLayout& field = *body.field;
     if (field.storage != Storage::float32) throw std::invalid_argument("points are sampled in fields of float32 only");
     const BallsOfPoints own = body.points();
-    const auto append = [&](Pool& pool, const auto* data, std::size_t count) {
-        return pool.append(std::span(data, count), queue_, memory_, timing);
+    const auto append = [&](GrowingBuffer& buffer, const auto* data, std::size_t count) {
+        return buffer.append(std::span(data, count), queue_, memory_, timing);
     };
     const KernelBody placed{KernelFrame(field),
                             append(directories_, field.directory.data(), field.directory.size()),
@@ -175,20 +176,20 @@ void Sampler::add(const SampledBody& body, Timing& timing) {
                             append(points_, own.points.data(), own.points.size()),
                             append(balls_, own.balls.data(), own.balls.size())};
     queue_.finish();
-    places_.emplace(body.id, Place{placed, cl_uint(own.balls.size())});
+    locations_.emplace(body.id, BodyLocation{placed, cl_uint(own.balls.size())});
 }
 
 // Uploads missing bodies. If they do not fit in addition to the others, all others are released.
-void Sampler::keep(std::span<const SampledBody> bodies, Timing& timing) {
+void Sampler::uploadMissing(std::span<const SampledBody> bodies, Timing& timing) {
     const auto addMissing = [&] {
         for (const SampledBody& body : bodies)
-            if (!places_.contains(body.id)) add(body, timing);
+            if (!locations_.contains(body.id)) upload(body, timing);
     };
-    if (places_.empty()) return addMissing();
+    if (locations_.empty()) return addMissing();
     try {
         addMissing();
     } catch (const DeviceError&) {
-        forget();
+        releaseBodies();
         addMissing();
     }
 }
@@ -199,63 +200,61 @@ std::vector<KernelFound> Sampler::run(const std::vector<KernelBody>& bodies, con
     const cl_uint none = 0;
     cl_uint count = 0;
     std::vector<KernelFound> found;
-    const Ended ended(queue_);
-    for (Pool* pool : {&bodies_, &queries_}) pool->restart();
+    const QueueGuard guard(queue_);
+    for (GrowingBuffer* buffer : {&bodies_, &queries_}) buffer->restart();
     bodies_.append(std::span(bodies), queue_, memory_, timing);
     queries_.append(std::span(queries), queue_, memory_, timing);
     count_.reserve(sizeof none, queue_, memory_);
 
     const std::size_t each = gpuMapping_ ? 1 : ballsPerProcessorItem, local = gpuMapping_ ? groupItems : 1;
     const std::size_t items = (balls + each - 1) / each, global = (items + local - 1) / local * local;
-    cl::Kernel kernel(program_, "samplePoints");
     do {
         answers_.reserve(capacity_ * sizeof(KernelFound), queue_, memory_);
-        cl_uint index = 0;
-        const auto set = [&](const auto&... arguments) { (kernel.setArg(index++, arguments), ...); };
-        set(bodies_.buffer(), queries_.buffer(), cl_uint(queries.size()), balls, cl_uint(each), directories_.buffer(),
-            centres_.buffer(), values_.buffer(), points_.buffer(), balls_.buffer(), cl_uint(capacity_), count_.buffer(),
-            answers_.buffer());
         queue_.enqueueFillBuffer(count_.buffer(), none, 0, sizeof none);
-        queue_.enqueueNDRangeKernel(kernel, cl::NullRange, cl::NDRange(global), cl::NDRange(local), nullptr,
-                                    timing.event(Timing::Of::kernel));
+        enqueueKernel(queue_, program_, "samplePoints", cl::NDRange(global), cl::NDRange(local),
+                      timing.event(Timing::Command::kernel), bodies_.buffer(), queries_.buffer(),
+                      cl_uint(queries.size()), balls, cl_uint(each), directories_.buffer(), centres_.buffer(),
+                      values_.buffer(), points_.buffer(), balls_.buffer(), cl_uint(capacity_), count_.buffer(),
+                      answers_.buffer());
         queue_.enqueueReadBuffer(count_.buffer(), CL_TRUE, 0, sizeof count, &count, nullptr,
-                                 timing.event(Timing::Of::download));
+                                 timing.event(Timing::Command::download));
     } while (count > std::exchange(capacity_, std::max<std::size_t>(capacity_, growth * count)));
     found.resize(count);
     if (count > 0)
         queue_.enqueueReadBuffer(answers_.buffer(), CL_TRUE, 0, count * sizeof(KernelFound), found.data(), nullptr,
-                                 timing.event(Timing::Of::download));
+                                 timing.event(Timing::Command::download));
     return found;
 }
 
-std::vector<KernelFound> Sampler::found(std::span<const SampledBody> bodies, std::span<const PointQuery> queries,
-                                        Timing& timing) {
-    keep(bodies, timing);
+std::vector<KernelFound> Sampler::answer(std::span<const SampledBody> bodies, std::span<const PointQuery> queries,
+                                         Timing& timing) {
+    uploadMissing(bodies, timing);
     std::vector<KernelBody> kernelBodies;
-    for (const SampledBody& body : bodies) kernelBodies.push_back(places_.at(body.id).body);
+    for (const SampledBody& body : bodies) kernelBodies.push_back(locations_.at(body.id).body);
     std::vector<KernelQuery> kernelQueries;
     cl_uint balls = 0;
     for (const PointQuery& query : queries) {
         kernelQueries.emplace_back(query, balls);
-        balls += places_.at(bodies[query.body].id).balls;
+        balls += locations_.at(bodies[query.body].id).balls;
     }
     if (balls == 0) return {};
     return run(kernelBodies, kernelQueries, balls, timing);
 }
 
 // The device returns answers in any order.
-void Sampler::sample(std::span<const SampledBody> bodies, std::span<const PointQuery> queries, FoundPoints& answers) {
+OpenclTimes Sampler::sample(std::span<const SampledBody> bodies, std::span<const PointQuery> queries,
+                            FoundPoints& answers) {
     std::vector<KernelFound> all;
-    Timing timing(times_);
+    OpenclTimes times;
     try {
-        if (std::exchange(failed_, true)) forget();
-        all = found(bodies, queries, timing);
+        Timing timing(profile_);
+        if (std::exchange(failed_, true)) releaseBodies();
+        all = answer(bodies, queries, timing);
         failed_ = false;
+        times = timing.total(memory_.peak());
     } catch (const cl::Error& error) {
         throw deviceError(error, device_.info().name);
     }
-    timing.sumUp();
-    if (times_) times_->peakBytes = std::max(times_->peakBytes, memory_.peak());
 
     std::sort(all.begin(), all.end(), [](const KernelFound& a, const KernelFound& b) {
         return std::pair(a.query, a.point) < std::pair(b.query, b.point);
@@ -268,18 +267,21 @@ void Sampler::sample(std::span<const SampledBody> bodies, std::span<const PointQ
         answers.points.push_back({each.point, {each.distance, {x, y, z}, each.inBand != 0}});
     }
     for (std::size_t q = 0; q < queries.size(); ++q) answers.begins[q + 1] += answers.begins[q];
+    return times;
 }
 
 }  // namespace
 
-PointSampler openclPointSampler(const Device& device, const OpenclOptions& options) try {
+OpenclPointSampler openclPointSampler(const Device& device, const OpenclOptions& options) try {
     const auto sampler = std::make_shared<Sampler>(device, options);
     const auto mutex = std::make_shared<std::mutex>();
-    return {"opencl", device.info().name,
-            [=](std::span<const SampledBody> bodies, std::span<const PointQuery> queries, FoundPoints& answers) {
-                const std::lock_guard lock(*mutex);
-                sampler->sample(bodies, queries, answers);
-            }};
+    const auto sum = std::make_shared<TimesSum>();
+    const auto sample = [=](std::span<const SampledBody> bodies, std::span<const PointQuery> queries,
+                            FoundPoints& answers) {
+        const std::lock_guard lock(*mutex);
+        sum->add(sampler->sample(bodies, queries, answers));
+    };
+    return {{"opencl", device.info().name, sample}, [sum] { return sum->get(); }};
 } catch (const cl::Error& error) {
     throw deviceError(error, device.info().name);
 }

@@ -2,19 +2,25 @@
 // point_sampler.cl.
 #pragma once
 
+#include <functional>
+
 #include <bilayer/cl/device.h>
 #include <bilayer/cl/filler.h>
 #include <bilayer/collider/contact.h>
 
 namespace bilayer {
 
+/// A point sampler on a device, with its times.
+struct OpenclPointSampler : PointSampler {
+    std::function<OpenclTimes()> times;  ///< of all batches so far by this sampler and its copies
+};
+
 /// A point sampler on a device. Bodies are uploaded on first use, and stay. If the memory is full, all bodies are
 /// released except those of the current batch. Queries are uploaded, and their results downloaded; only one batch runs
 /// at a time.
-/// @param options  `times` receives the time of each batch
 ///
 /// Throws DeviceError, here and when it samples: for errors of the device, for a device without double precision, and
 /// if the memory is too small for the bodies of one batch. The text then states how many MiB are needed.
-PointSampler openclPointSampler(const Device& device, const OpenclOptions& options = {});
+OpenclPointSampler openclPointSampler(const Device& device, const OpenclOptions& options = {});
 
 }  // namespace bilayer

@@ -8,7 +8,6 @@
 #include <fstream>
 #include <functional>
 #include <glm/geometric.hpp>
-#include <memory>
 #include <stdexcept>
 
 #include <bilayer/cl/filler.h>
@@ -70,20 +69,18 @@ double value(const json& row, const char* name) {
     return row.contains(name) && row[name].is_number() ? row[name].get<double>() : std::nan("");
 }
 
-// An OpenCL device and its builders, without and with profiling.
+// An OpenCL device and its builder.
 struct Engine {
+    Device device;
     DeviceInfo info;
-    std::unique_ptr<OpenclTimes> times;
-    BlockFiller timed, profiled;
+    BlockFiller filler;
 };
 
 std::vector<Engine> engines() {
     std::vector<Engine> all;
     for (const DeviceInfo& info : devices()) {
         const Device device = openDevice(info.name);
-        auto times = std::make_unique<OpenclTimes>();
-        OpenclTimes* const clock = times.get();
-        all.push_back({device.info(), std::move(times), openclFiller(device), openclFiller(device, {.times = clock})});
+        all.push_back({device, device.info(), openclFiller(device)});
     }
     return all;
 }
@@ -93,10 +90,10 @@ json profiled(const Engine& engine, const Scene& scene, Builder builder, int rou
     std::vector<double> kernels;
     std::uint64_t peak = 0;
     for (int round = 0; round < rounds; ++round) {
-        *engine.times = {};
-        bench::run(scene, {builder, halfWidth, threads, &engine.profiled});
-        kernels.push_back(engine.times->kernels);
-        peak = std::max(peak, engine.times->peakBytes);
+        const OpenclFiller filler = openclFiller(engine.device, {.profile = true});
+        bench::run(scene, {builder, halfWidth, threads, &filler});
+        kernels.push_back(filler.times().kernels);
+        peak = std::max(peak, filler.times().peakBytes);
     }
     return {{"kernels", bench::median(kernels)}, {"peak", peak}};
 }
@@ -105,7 +102,7 @@ json profiled(const Engine& engine, const Scene& scene, Builder builder, int rou
 json onDevice(const Engine& engine, const Scene& scene, const std::vector<Builder>& builders, int rounds) {
     std::vector<Contender> contenders;
     for (const Builder which : builders) {
-        const bench::Job job{which, halfWidth, threads, &engine.timed};
+        const bench::Job job{which, halfWidth, threads, &engine.filler};
         bench::run(scene, job);
         contenders.push_back(builder(bench::nameOf(which), scene, job));
     }

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <limits>
 
+#include "cl/detail/enqueue.h"
+#include "cl/detail/kernel_options.h"
 #include "sdf/fill/triangle_bins.h"
 
 namespace bilayer::detail {
@@ -14,7 +16,6 @@ constexpr std::size_t countersAtMost = 1 << 22;  // maximum over all runs: 16 Mi
 constexpr std::size_t trianglesPerRun = 8192;    // triangles per item, where items have separate counters
 constexpr std::size_t runsPerUnit = 8;           // enough to balance unequal runs
 constexpr std::size_t itemsPerUnit = 2048;       // items that a GPU's unit holds
-constexpr std::size_t groupItems = 64;           // ITEMS of common.cl
 
 BrickGrid gridFor(const FillJob& job, float reach, float margin) {
     BrickGrid grid{};
@@ -51,7 +52,8 @@ DeviceBins::DeviceBins(DeviceImpl& device, const cl::Program& program, DeviceMem
                                                         (count + trianglesPerRun - 1) / trianglesPerRun}));
     grid_.runs = gpuMapping ? 1 : cl_uint(items);
     const auto uploaded = [&](const auto& data) {
-        return memory.upload(data.data(), data.size() * sizeof data[0], "the mesh", timing.event(Timing::Of::upload));
+        return memory.upload(data.data(), data.size() * sizeof data[0], "the mesh",
+                             timing.event(Timing::Command::upload));
     };
     points_ = uploaded(mesh.points);
     triangles_ = uploaded(mesh.triangles);
@@ -59,26 +61,24 @@ DeviceBins::DeviceBins(DeviceImpl& device, const cl::Program& program, DeviceMem
     const std::uint64_t cursorBytes = std::uint64_t(grid_.runs) * grid_.cells * sizeof(cl_uint),
                         cellBytes = std::uint64_t(grid_.cells) * sizeof(cl_uint);
     const auto bins = [&](std::uint64_t bytes) { return memory.allocate(bytes, "the binning of the mesh"); };
-    cl::Buffer cursors = bins(cursorBytes), more = bins(cellBytes), total = bins(3 * sizeof(cl_ulong)),
+    cl::Buffer cursors = bins(cursorBytes), extraParts = bins(cellBytes), total = bins(3 * sizeof(cl_ulong)),
                codes = bins(count * sizeof(cl_uint));
     cellOfBrick_ = bins(cellBytes);
     triangleOffsets_ = bins(cellBytes + sizeof(cl_uint));
     partOffsetBuffer_ = bins(cellBytes + sizeof(cl_uint));
     queue.enqueueFillBuffer(cursors, cl_uint(0), 0, cursorBytes);
-    queue.enqueueFillBuffer(more, cl_uint(0), 0, cellBytes);
+    queue.enqueueFillBuffer(extraParts, cl_uint(0), 0, cellBytes);
     const auto run = [&](const char* name, std::size_t global, std::size_t local, const auto&... arguments) {
-        cl::Kernel kernel(program, name);
-        cl_uint index = 0;
-        (kernel.setArg(index++, arguments), ...);
-        queue.enqueueNDRangeKernel(kernel, cl::NullRange, cl::NDRange(global), cl::NDRange(local), nullptr,
-                                   timing.event(Timing::Of::kernel));
+        enqueueKernel(queue, program, name, cl::NDRange(global), cl::NDRange(local),
+                      timing.event(Timing::Command::kernel), arguments...);
     };
     const std::size_t local = gpuMapping ? groupItems : 1;
-    run("countTriangles", items, local, points_, triangles_, grid_, cursors, more, codes);
-    run("placeBricks", local, local, grid_, cursors, more, cellOfBrick_, triangleOffsets_, partOffsetBuffer_, total);
+    run("countTriangles", items, local, points_, triangles_, grid_, cursors, extraParts, codes);
+    run("scanBricks", local, local, grid_, cursors, extraParts, cellOfBrick_, triangleOffsets_, partOffsetBuffer_,
+        total);
     std::array<cl_ulong, 3> totals{};
     queue.enqueueReadBuffer(total, CL_TRUE, 0, sizeof totals, totals.data(), nullptr,
-                            timing.event(Timing::Of::download));
+                            timing.event(Timing::Command::download));
     const auto [bricks, entries, parts] = totals;
     if (std::max(entries, parts) > std::numeric_limits<cl_uint>::max())
         memory.refuse(entries * sizeof(cl_uint), "the binning of the mesh");
@@ -86,8 +86,8 @@ DeviceBins::DeviceBins(DeviceImpl& device, const cl::Program& program, DeviceMem
     run("listTriangles", items, local, points_, triangles_, grid_, cursors, codes, list_);
     partOffsets_.resize(bricks + 1);
     queue.enqueueReadBuffer(partOffsetBuffer_, CL_TRUE, 0, partOffsets_.size() * sizeof(cl_uint), partOffsets_.data(),
-                            nullptr, timing.event(Timing::Of::download));
-    for (cl::Buffer* buffer : {&cursors, &more, &total, &codes}) memory.free(*buffer);
+                            nullptr, timing.event(Timing::Command::download));
+    for (cl::Buffer* buffer : {&cursors, &extraParts, &total, &codes}) memory.free(*buffer);
 }
 
 }  // namespace bilayer::detail

@@ -13,16 +13,20 @@
 #include <optional>
 #include <span>
 #include <string>
-#include <tuple>
 #include <utility>
 #include <vector>
 
+#include "cl/detail/batch_memory.h"
+#include "cl/detail/batch_plan.h"
 #include "cl/detail/bins.h"
+#include "cl/detail/enqueue.h"
+#include "cl/detail/host_blocks.h"
 #include "cl/detail/kernel_options.h"
+#include "cl/detail/mapped_buffer.h"
 #include "cl/detail/memory.h"
+#include "cl/detail/queue_guard.h"
 #include "cl/detail/timing.h"
 #include "sdf/base/progress.h"
-#include "sdf/fill/exact.h"
 
 namespace bilayer::detail {
 
@@ -32,125 +36,37 @@ extern const char* const double_layer_cl;
 
 namespace {
 
-constexpr std::size_t batchesInFlight = 2;
 constexpr std::size_t blocksPerTask = 16;  // blocks that the host receives at once
-/// Work-items of a group, lanes of a vector: ITEMS and LANES of common.cl.
-constexpr std::size_t groupItems = 64, lanes = 16;
-/// Maximum bricks in a batch: on a processor a few megabytes of results stay in its cache; on a GPU they are enough
-/// work.
-constexpr std::size_t bricksForProcessor = 40, bricksForGpu = 512;
-/// Groups for each compute unit that fill bricks one after another, each with its own memory. PoCL gives the first unit
-/// more than its share of groups; with one group per unit, other units would be idle.
-constexpr std::size_t groupsPerUnit = 4;
-constexpr std::uint64_t scratchPart = 8;  // maximum fraction of the budget: 1 / scratchPart
-/// Maximum parts in a batch: the limit of a kernel's numbers, and for kernels that pass on a batch, the limit at which
-/// the numbers stay in a processor's cache.
-constexpr std::uint64_t partsInBatch = 1 << 27, partsForProcessor = 60000;
+constexpr std::uint64_t scratchPart = 8;   // maximum fraction of the budget: 1 / scratchPart
 /// The smallest cells for grouping pieces, and the maximum distance of a brick's samples beyond its reach [voxels].
 constexpr float smallestCell = 1.1f, aroundBrick = 3;
+/// Sizes in the kernels [bytes]: Piece of pieces.cl, Member and the columns of Groups in groups.cl, and the columns of
+/// a sample in samples.cl, with its cell and without.
+constexpr std::uint64_t pieceBytes = 112, memberBytes = 32, groupBytes = 32, unsortedSampleBytes = 32, sampleBytes = 28;
+constexpr const char* purpose = "a batch of bricks";  // of memory, for error texts
 
-enum Counter { filledBlocks, openBlocks, conflicts, counters };
-
-// Memory that the kernels of a method need [bytes].
-struct KeptBytes {
-    std::uint64_t part;      // of a part of a triangle: Piece of pieces.cl
-    std::uint64_t unsorted;  // of a part: Member of groups.cl, Sample of samples.cl
-    std::uint64_t sorted;    // of a part: Member again
-    std::uint64_t cell;      // of a part: its cell
-    std::uint64_t columns;   // of a part: columns of numbers, for a group at most as large or for a sample
-    std::uint64_t begin;     // of a part: the first member of a group
-    std::uint64_t brick;     // of a brick: the groups of each slice of blocks, or the first samples of its cells
-
-    std::uint64_t perPart() const { return part + unsorted + sorted + cell + columns + begin; }
-};
-
-// `Layers` of double_layer.cl.
+// `Layers` of layer_cubes.cl.
 struct KernelLayers {
     cl_float delta, reach, certain;
     cl_int cube;
 };
 
-// The size of a batch of bricks, or the capacity of its buffers.
-struct Load {
-    std::uint64_t bricks = 0, parts = 0;
-    std::uint64_t places = 0;  // slots for parts: vectors of a brick's last parts may extend beyond them
-    std::uint64_t room = 0;    // size of the slots, for each group that fills whole bricks
-
-    bool covers(const Load& other) const { return bricks >= other.bricks && places >= other.places; }
-};
-
-// Offsets of a batch's results in its buffer [bytes], aligned for any device.
-struct ResultPlaces {
-    std::uint64_t counts = 0, origins, open, distances, triangles, end;
-
-    ResultPlaces(std::uint64_t blocks, bool withTriangles) {
-        constexpr std::uint64_t alignment = 4096;
-        const auto after = [](std::uint64_t begin, std::uint64_t bytes) {
-            return begin + (bytes + alignment - 1) / alignment * alignment;
-        };
-        origins = after(counts, counters * sizeof(cl_uint));
-        open = after(origins, blocks * sizeof(glm::ivec3));
-        distances = after(open, blocks * sizeof(glm::ivec3));
-        triangles = after(distances, blocks * blockVoxels * sizeof(float));
-        end = withTriangles ? after(triangles, blocks * blockVoxels * sizeof(cl_int)) : triangles;
-    }
-};
-
-struct Buffers {
-    Load capacity;
-    cl::Buffer parts, unsorted, sorted, cells, columns, begins, ofBricks, results;
-    cl::Buffer counts, origins, open, distances, triangles;  // parts of the results
-
-    void freeAll(DeviceMemory& memory) {
-        for (cl::Buffer* part : {&counts, &origins, &open, &distances, &triangles}) *part = {};
-        for (cl::Buffer* buffer : {&parts, &unsorted, &sorted, &cells, &columns, &begins, &ofBricks, &results})
-            memory.free(*buffer);
-    }
-};
-
-// Maps a buffer for the host, from the end of the queue's commands until destruction.
-template <class Item>
-class Mapped {
-  public:
-    /// @param mapped  if not null, receives the event of the mapping
-    Mapped(const cl::CommandQueue& queue, const cl::Buffer& buffer, std::size_t count, Timing& timing,
-           cl::Event* mapped = nullptr)
-        : queue_(queue), buffer_(buffer) {
-        if (count == 0) return;
-        cl::Event event;
-        data_ = queue.enqueueMapBuffer(buffer, CL_FALSE, CL_MAP_READ, 0, count * sizeof(Item), nullptr, &event);
-        timing.keep(Timing::Of::download, event);
-        if (mapped) *mapped = event;
-    }
-    Mapped(const Mapped&) = delete;
-    Mapped& operator=(const Mapped&) = delete;
-    ~Mapped() {
-        if (data_) ::clEnqueueUnmapMemObject(queue_(), buffer_(), data_, 0, nullptr, nullptr);
-    }
-    const Item* data() const { return static_cast<const Item*>(data_); }
-
-  private:
-    const cl::CommandQueue& queue_;
-    const cl::Buffer& buffer_;
-    void* data_ = nullptr;
-};
-
-// A batch with its own queue: when the kernels of one batch are nearly done, those of the other start.
-struct Batch {
-    Load load;  // in flight
-    Buffers buffers;
+// A batch in flight with its own queue: when the kernels of one batch are nearly done, those of the other start.
+struct BrickBatch {
+    BatchSize size;
+    BatchBuffers buffers;
     cl::Buffer scratch, next;
-    std::array<cl_uint, counters> found{};
+    BatchCounts counts;
     cl::Event counted;
     cl::CommandQueue queue;
-    Ended ended{queue};
+    QueueGuard guard{queue};
     // For a device that shares the host's memory: a command directly after the kernels. PoCL's threads run one such
     // command before the next kernel, and others after it.
-    std::optional<Mapped<std::byte>> results;
+    std::optional<MappedBuffer<std::byte>> results;
 };
 
 // The results of a batch on the host.
-struct Results {
+struct HostResults {
     const glm::ivec3* origins;
     const float* distances;
     const std::int32_t* triangles;
@@ -159,57 +75,42 @@ struct Results {
 class BrickFill {
   public:
     BrickFill(DeviceImpl& device, const OpenclOptions& options, const FillJob& job, const DeviceSink& keep);
-    void run();
+    OpenclTimes run();
 
   private:
-    std::uint64_t slices() const { return std::uint64_t(bins_->grid().blocksPerSide()); }
-    std::uint64_t bytesOf(const Load& load) const;
-    std::uint64_t blocksOf(const Load& load) const;
-    bool fits(const Load& load) const;
-    Load loadOf(std::size_t first, std::size_t last) const;
-    std::size_t groupsFor(const Load& load) const;
-    std::size_t lastFitting(std::size_t first) const;
     void makeScratch();
-    void planBatches();
-    void reserve(Batch& batch, const Load& load);
-    void start(Batch& batch, std::size_t first, std::size_t last);
-    void finish(Batch& batch);
-    void keep(Batch& batch, std::size_t blocks);
-    void handOver(Batch& batch, std::size_t blocks);
-    void handOver(const Results& results, std::size_t blocks);
-    void fillOpen();
+    void reserve(BrickBatch& batch, const BatchSize& size);
+    void enqueueKernels(BrickBatch& batch, std::size_t first);
+    void start(BrickBatch& batch, const BatchPlan::Range& bricks);
+    void finish(BrickBatch& batch);
+    void keepOnDevice(BrickBatch& batch, std::size_t blocks);
+    void passToHost(BrickBatch& batch, std::size_t blocks);
+    void passToHost(const HostResults& results, std::size_t blocks);
 
     template <class... Arguments>
     void enqueue(const cl::CommandQueue& queue, const char* name, std::size_t groups, const Arguments&... arguments) {
-        cl::Kernel kernel(program_, name);
-        cl_uint index = 0;
-        (kernel.setArg(index++, arguments), ...);
-        const std::size_t items = gpuMapping_ ? groupItems : 1;
-        queue.enqueueNDRangeKernel(kernel, cl::NullRange, cl::NDRange(groups * items), cl::NDRange(items), nullptr,
-                                   timing_.event(Timing::Of::kernel));
+        const std::size_t items = mode_.gpuMapping ? groupItems : 1;
+        enqueueKernel(queue, program_, name, cl::NDRange(groups * items), cl::NDRange(items),
+                      timing_.event(Timing::Command::kernel), arguments...);
     }
 
     DeviceImpl& device_;
     const FillJob& job_;
     const DeviceSink& keep_;
-    const bool gpuMapping_;
-    OpenclTimes* times_;
+    const bool doubleLayer_;  // the method; else it is the exact one
+    const BatchMode mode_;
     Timing timing_;
     DeviceMemory memory_;
-    const bool layered_;      // the double layer method, else the exact one
-    const bool fillsBricks_;  // whole bricks at once, else single blocks
-    KeptBytes kept_{};
     cl::Program program_;
     std::optional<DeviceBins> bins_;
+    PartBytes bytes_;
     cl::Buffer orders_;
     std::size_t scratchGroups_ = 0;
     cl_uint scratchCells_ = 0;
-    std::uint64_t share_ = 0;                                // memory for one batch
-    std::vector<std::pair<std::size_t, std::size_t>> runs_;  // runs of bricks, one per batch
-    Load most_;                                              // maximum over all batches
-    std::array<Batch, batchesInFlight> batches_;
+    std::optional<BatchPlan> plan_;
+    std::array<BrickBatch, batchesInFlight> batches_;
     std::vector<glm::ivec3> open_;  // blocks that the host fills
-    Ended ended_;                   // the device's queue
+    QueueGuard guard_;              // of the device's queue
 };
 
 // The maximum distance between a voxel and a triangle that affects it. The cube of the paper extends beyond its ball.
@@ -238,40 +139,52 @@ const std::array<cl_ulong, 256>& bitOrders() {
     return orders;
 }
 
+BatchMode modeOf(const DeviceImpl& device, const OpenclOptions& options, const FillJob& job) {
+    const bool gpuMapping = wantsGroups(device, options.mapping);
+    return {gpuMapping, job.options.method == Method::doubleLayer && !gpuMapping, job.mesh.triangles};
+}
+
 BrickFill::BrickFill(DeviceImpl& device, const OpenclOptions& options, const FillJob& job, const DeviceSink& keep)
     : device_(device),
       job_(job),
       keep_(keep),
-      gpuMapping_(wantsGroups(device, options.mapping)),
-      times_(options.times),
-      timing_(options.times),
+      doubleLayer_(job.options.method == Method::doubleLayer),
+      mode_(modeOf(device, options, job)),
+      timing_(options.profile),
       memory_(device, memoryBudget(device, options.memoryMiB)),
-      layered_(job.options.method == Method::doubleLayer),
-      fillsBricks_(layered_ && !gpuMapping_),
-      program_(buildProgram(device, layered_ ? double_layer_cl : exact_cl,
-                            commonBuildOptions(device, gpuMapping_, job.mesh.triangles) +
-                                (layered_ && job.layers.cube > 0 ? " -D PAPER_CUBE=1" : ""))),
-      ended_(device.queue) {
+      program_(buildProgram(device, doubleLayer_ ? double_layer_cl : exact_cl,
+                            commonBuildOptions(device, mode_.gpuMapping, mode_.triangles) +
+                                (doubleLayer_ && job.layers.cube > 0 ? " -D PAPER_CUBE=1" : ""))),
+      guard_(device.queue) {
     const float reach = reachOf(job);
-    if (layered_)
-        orders_ = memory_.upload(bitOrders().data(), sizeof bitOrders(), "a batch of bricks",
-                                 timing_.event(Timing::Of::upload));
-    bins_.emplace(device, program_, memory_, job, reach, layered_ ? reach : reach + 1, gpuMapping_, timing_);
+    if (doubleLayer_)
+        orders_ =
+            memory_.upload(bitOrders().data(), sizeof bitOrders(), purpose, timing_.event(Timing::Command::upload));
+    bins_.emplace(device, program_, memory_, job, reach, doubleLayer_ ? reach : reach + 1, mode_.gpuMapping, timing_);
     job.mesh.progress.begin(bins_->bricks());
-    for (Batch& batch : batches_) {
+    for (BrickBatch& batch : batches_) {
         batch.queue = cl::CommandQueue(device.context, device.device, CL_QUEUE_PROFILING_ENABLE);
-        batch.next = memory_.allocate(sizeof(cl_uint), "a batch of bricks");
+        batch.next = memory_.allocate(sizeof(cl_uint), purpose);
     }
-    if (layered_) {
-        kept_ = {0, 32, 0, 0, 28, 0, sampleCells(bins_->grid()) * sizeof(cl_uint)};
+    if (doubleLayer_) {
+        bytes_ = {.unsorted = unsortedSampleBytes,
+                  .columns = sampleBytes,
+                  .brick = sampleCells(bins_->grid()) * sizeof(cl_uint)};
     } else {
-        kept_ = {112, 32, 32, sizeof(cl_uint), 32, sizeof(cl_uint), slices() * sizeof(cl_uint2)};
+        const auto slices = std::uint64_t(bins_->grid().blocksPerSide());
+        bytes_ = {.part = pieceBytes,
+                  .unsorted = memberBytes,
+                  .sorted = memberBytes,
+                  .cell = sizeof(cl_uint),
+                  .columns = groupBytes,
+                  .begin = sizeof(cl_uint),
+                  .brick = slices * sizeof(cl_uint2)};
         makeScratch();
     }
-    share_ = memory_.left() / batchesInFlight;
-    planBatches();
+    plan_.emplace(device.info, *bins_, memory_, bytes_, mode_);
 }
 
+// Allocates the cells that each group sorts the pieces of a brick by.
 void BrickFill::makeScratch() {
     const float side = float(1 << bins_->grid().shift) + 2 * (float(bins_->grid().margin) + aroundBrick);
     const std::size_t cells = std::size_t(side / smallestCell) + 2;
@@ -279,103 +192,21 @@ void BrickFill::makeScratch() {
     const std::uint64_t bytes = std::uint64_t(scratchCells_) * sizeof(cl_uint);
     const std::size_t wanted = std::max(1u, device_.info.computeUnits) * groupsPerUnit;
     scratchGroups_ = std::clamp<std::size_t>(memory_.left() / batchesInFlight / scratchPart / bytes, 1, wanted);
-    for (Batch& batch : batches_)
+    for (BrickBatch& batch : batches_)
         batch.scratch = memory_.allocate(scratchGroups_ * bytes, "grouping the triangles of a brick");
 }
 
-std::uint64_t BrickFill::bytesOf(const Load& load) const {
-    return load.places * kept_.perPart() + load.bricks * kept_.brick +
-           ResultPlaces(blocksOf(load), job_.mesh.triangles).end;
-}
-
-std::uint64_t BrickFill::blocksOf(const Load& load) const {
-    return load.bricks * slices() * slices() * slices();
-}
-
-Load BrickFill::loadOf(std::size_t first, std::size_t last) const {
-    Load load{last - first, bins_->firstPart(last) - bins_->firstPart(first)};
-    load.places = load.parts + load.bricks * lanes;
-    if (!fillsBricks_) return load;
-    for (std::size_t brick = first; brick < last; ++brick)
-        load.room = std::max(load.room, bins_->firstPart(brick + 1) - bins_->firstPart(brick) + lanes);
-    load.places = load.room * groupsFor(load);
-    return load;
-}
-
-// Count of the groups that fill the bricks of a batch one after another.
-std::size_t BrickFill::groupsFor(const Load& load) const {
-    return std::min<std::size_t>(load.bricks, std::max(1u, device_.info.computeUnits) * groupsPerUnit);
-}
-
-// Whether a batch of this size fits its share of the memory and the largest buffer.
-bool BrickFill::fits(const Load& load) const {
-    const std::uint64_t largest = std::max(ResultPlaces(blocksOf(load), job_.mesh.triangles).end,
-                                           load.places * std::max(kept_.part, kept_.columns));
-    return std::max(load.parts, load.places) < partsInBatch && bytesOf(load) <= share_ &&
-           largest <= device_.info.maxAllocationBytes;
-}
-
-// The end of the run of bricks from `first` on that fits into one batch.
-std::size_t BrickFill::lastFitting(std::size_t first) const {
-    if (!fits(loadOf(first, first + 1)))
-        memory_.refuse(batchesInFlight * bytesOf(loadOf(first, first + 1)), "a brick of the grid");
-    const std::size_t end = std::min(bins_->bricks(), first + (gpuMapping_ ? bricksForGpu : bricksForProcessor));
-    const std::uint64_t maxParts = gpuMapping_ || fillsBricks_ ? partsInBatch : partsForProcessor;
-    std::size_t last = first + 1;
-    while (last < end && fits(loadOf(first, last + 1)) && loadOf(first, last + 1).parts < maxParts) ++last;
-    return last;
-}
-
-void BrickFill::planBatches() {
-    for (std::size_t first = 0, last; first < bins_->bricks(); first = last) {
-        last = lastFitting(first);
-        runs_.emplace_back(first, last);
-        const Load load = loadOf(first, last);
-        most_ = {std::max(most_.bricks, load.bricks), std::max(most_.parts, load.parts),
-                 std::max(most_.places, load.places)};
-    }
-}
-
 // Enlarges the buffers: to the size of any batch, if the batch's share of the memory allows.
-void BrickFill::reserve(Batch& batch, const Load& load) {
-    Buffers& b = batch.buffers;
-    if (b.capacity.covers(load)) return;
+void BrickFill::reserve(BrickBatch& batch, const BatchSize& size) {
+    if (batch.buffers.capacity.covers(size)) return;
     batch.queue.finish();
-    b.freeAll(memory_);
-    b.capacity = fits(most_) ? most_ : load;
-    const Load& c = b.capacity;
-    const auto buffer = [&](std::uint64_t bytes) { return memory_.allocate(bytes, "a batch of bricks"); };
-    for (const auto& [part, bytes] : {std::pair{&b.parts, kept_.part},
-                                      {&b.unsorted, kept_.unsorted},
-                                      {&b.sorted, kept_.sorted},
-                                      {&b.cells, kept_.cell},
-                                      {&b.columns, kept_.columns},
-                                      {&b.begins, kept_.begin}})
-        if (bytes > 0) *part = buffer(c.places * bytes);
-    b.ofBricks = buffer(c.bricks * kept_.brick);
-    const ResultPlaces places(blocksOf(c), job_.mesh.triangles);
-    b.results = buffer(places.end);
-    const auto part = [&](std::uint64_t begin, std::uint64_t end) {
-        const cl_buffer_region region{std::size_t(begin), std::size_t(end - begin)};
-        return b.results.createSubBuffer(CL_MEM_READ_WRITE, CL_BUFFER_CREATE_TYPE_REGION, &region);
-    };
-    b.counts = part(places.counts, places.origins);
-    b.origins = part(places.origins, places.open);
-    b.open = part(places.open, places.distances);
-    b.distances = part(places.distances, places.triangles);
-    if (job_.mesh.triangles) b.triangles = part(places.triangles, places.end);
+    batch.buffers.freeAll(memory_);
+    batch.buffers.allocate(memory_, plan_->capacityFor(size), bytes_, mode_.triangles);
 }
 
-// Enqueues the kernels of a batch, and the download of the number of its blocks.
-void BrickFill::start(Batch& batch, std::size_t first, std::size_t last) {
-    const Load load = loadOf(first, last);
-    reserve(batch, load);
-    batch.load = load;
-    const Buffers& b = batch.buffers;
-    const cl_uint none = 0, stride = cl_uint(b.capacity.places), firstBrick = cl_uint(first),
-                  bricks = cl_uint(load.bricks);
-    batch.queue.enqueueFillBuffer(batch.next, none, 0, sizeof none);
-    batch.queue.enqueueFillBuffer(b.counts, none, 0, counters * sizeof none);
+void BrickFill::enqueueKernels(BrickBatch& batch, std::size_t first) {
+    const BatchBuffers& b = batch.buffers;
+    const cl_uint stride = cl_uint(b.capacity.slots), firstBrick = cl_uint(first), bricks = cl_uint(batch.size.bricks);
     const FillParameters& p = job_.layers;
     const KernelLayers layers{p.delta, p.reach, p.certain, p.cube};
     const DeviceBins& bins = *bins_;
@@ -384,56 +215,68 @@ void BrickFill::start(Batch& batch, std::size_t first, std::size_t last) {
                 bins.cellOfBrick(), bins.triangleOffsets(), bins.partOffsets(), bins.list(), firstBrick, bricks,
                 more...);
     };
-    const cl::Buffer& triangles = job_.mesh.triangles ? b.triangles : b.origins;
-    if (fillsBricks_) {
-        prepare("fillBricks", groupsFor(load), b.unsorted, b.columns, b.ofBricks, stride, batch.next, layers,
-                cl_uint(load.room), orders_, b.origins, b.distances, triangles, b.counts);
-    } else if (layered_) {
+    const cl::Buffer& triangles = mode_.triangles ? b.triangles : b.origins;
+    if (mode_.fillsBricks) {
+        prepare("fillBricks", plan_->groupsFor(bricks), b.unsorted, b.columns, b.ofBricks, stride, batch.next, layers,
+                cl_uint(batch.size.groupSlots), orders_, b.origins, b.distances, triangles, b.counts);
+    } else if (doubleLayer_) {
         prepare("prepareBricks", bricks, b.unsorted, b.columns, b.ofBricks, stride, batch.next, layers);
-        enqueue(batch.queue, "fillBlocks", blocksOf(load), bins.grid(), bins.cellOfBrick(), bins.partOffsets(),
+        enqueue(batch.queue, "fillBlocks", batch.size.blocks, bins.grid(), bins.cellOfBrick(), bins.partOffsets(),
                 firstBrick, b.columns, b.ofBricks, stride, layers, orders_, b.origins, b.distances, triangles,
                 b.counts);
     } else {
         prepare("prepareBricks", scratchGroups_, b.parts, b.unsorted, b.sorted, b.cells, b.columns, b.begins, stride,
                 batch.scratch, scratchCells_, b.ofBricks, batch.next);
-        enqueue(batch.queue, "fillBlocks", blocksOf(load), bins.points(), bins.triangles(), bins.grid(),
+        enqueue(batch.queue, "fillBlocks", batch.size.blocks, bins.points(), bins.triangles(), bins.grid(),
                 bins.cellOfBrick(), firstBrick, b.parts, b.sorted, b.columns, b.begins, stride, b.ofBricks,
                 cl_int(job_.mesh.sign), b.origins, b.distances, triangles, b.open, b.counts);
     }
+}
+
+// Enqueues the kernels of a batch, and the download of the number of its blocks.
+void BrickFill::start(BrickBatch& batch, const BatchPlan::Range& bricks) {
+    const BatchSize size = plan_->sizeOf(bricks);
+    reserve(batch, size);
+    batch.size = size;
+    const BatchBuffers& b = batch.buffers;
+    const cl_uint none = 0;
+    batch.queue.enqueueFillBuffer(batch.next, none, 0, sizeof none);
+    batch.queue.enqueueFillBuffer(b.counts, none, 0, sizeof batch.counts);
+    enqueueKernels(batch, bricks.first);
     if (device_.info.unifiedMemory && !keep_) {
-        const ResultPlaces places(blocksOf(b.capacity), job_.mesh.triangles);
-        batch.results.emplace(batch.queue, b.results, places.end, timing_, &batch.counted);
+        const ResultLayout layout(b.capacity.blocks, mode_.triangles);
+        batch.results.emplace(batch.queue, b.results, layout.end, timing_, &batch.counted);
     } else {
-        batch.queue.enqueueReadBuffer(b.counts, CL_FALSE, 0, sizeof batch.found, batch.found.data(), nullptr,
+        batch.queue.enqueueReadBuffer(b.counts, CL_FALSE, 0, sizeof batch.counts, &batch.counts, nullptr,
                                       &batch.counted);
-        timing_.keep(Timing::Of::download, batch.counted);
+        timing_.keep(Timing::Command::download, batch.counted);
     }
     batch.queue.flush();
 }
 
 // Waits for a batch in flight, and passes its blocks on, on the device or to the host.
-void BrickFill::finish(Batch& batch) {
-    if (batch.load.bricks == 0) return;
+void BrickFill::finish(BrickBatch& batch) {
+    if (batch.size.bricks == 0) return;
     batch.counted.wait();
-    if (batch.results) std::memcpy(batch.found.data(), batch.results->data(), sizeof batch.found);
-    const std::size_t blocks = batch.found[filledBlocks], open = batch.found[openBlocks];
-    if (job_.mesh.conflicts) *job_.mesh.conflicts += batch.found[conflicts];
+    if (batch.results) std::memcpy(&batch.counts, batch.results->data(), sizeof batch.counts);
+    const std::size_t blocks = batch.counts.filledBlocks, open = batch.counts.openBlocks;
+    if (job_.mesh.conflicts) *job_.mesh.conflicts += batch.counts.conflicts;
     if (open > 0) {
-        const Mapped<glm::ivec3> openOrigins(batch.queue, batch.buffers.open, open, timing_);
+        const MappedBuffer<glm::ivec3> origins(batch.queue, batch.buffers.open, open, timing_);
         batch.queue.finish();
-        open_.insert(open_.end(), openOrigins.data(), openOrigins.data() + open);
+        open_.insert(open_.end(), origins.data(), origins.data() + open);
     }
     job_.mesh.progress.poll();
     if (keep_)
-        keep(batch, blocks);
+        keepOnDevice(batch, blocks);
     else
-        handOver(batch, blocks);
-    for (std::size_t brick = 0; brick < batch.load.bricks; ++brick) job_.mesh.progress.advance();
-    batch.load = {};
+        passToHost(batch, blocks);
+    for (std::size_t brick = 0; brick < batch.size.bricks; ++brick) job_.mesh.progress.advance();
+    batch.size = {};
 }
 
-// Keeps blocks on the device. The batch is reused when the commands that read its blocks have ended.
-void BrickFill::keep(Batch& batch, std::size_t blocks) {
+// The batch is reused when the commands that read its blocks have ended.
+void BrickFill::keepOnDevice(BrickBatch& batch, std::size_t blocks) {
     keep_(batch.buffers.origins, batch.buffers.distances, blocks);
     std::vector<cl::Event> kept(1);
     device_.queue.enqueueMarkerWithWaitList(nullptr, &kept[0]);
@@ -441,28 +284,27 @@ void BrickFill::keep(Batch& batch, std::size_t blocks) {
     batch.queue.enqueueBarrierWithWaitList(&kept);
 }
 
-// Passes blocks to the host.
-void BrickFill::handOver(Batch& batch, std::size_t blocks) {
-    const Buffers& b = batch.buffers;
+void BrickFill::passToHost(BrickBatch& batch, std::size_t blocks) {
+    const BatchBuffers& b = batch.buffers;
     if (batch.results) {
-        const ResultPlaces places(blocksOf(b.capacity), job_.mesh.triangles);
+        const ResultLayout layout(b.capacity.blocks, mode_.triangles);
         const std::byte* all = batch.results->data();
-        handOver(Results{reinterpret_cast<const glm::ivec3*>(all + places.origins),
-                         reinterpret_cast<const float*>(all + places.distances),
-                         reinterpret_cast<const std::int32_t*>(all + places.triangles)},
-                 blocks);
+        passToHost(HostResults{reinterpret_cast<const glm::ivec3*>(all + layout.origins),
+                               reinterpret_cast<const float*>(all + layout.distances),
+                               reinterpret_cast<const std::int32_t*>(all + layout.triangles)},
+                   blocks);
         batch.results.reset();
         return;
     }
-    const Mapped<glm::ivec3> origins(batch.queue, b.origins, blocks, timing_);
-    const Mapped<float> distances(batch.queue, b.distances, blocks * blockVoxels, timing_);
-    const Mapped<std::int32_t> triangles(batch.queue, b.triangles, job_.mesh.triangles ? blocks * blockVoxels : 0,
-                                         timing_);
+    const MappedBuffer<glm::ivec3> origins(batch.queue, b.origins, blocks, timing_);
+    const MappedBuffer<float> distances(batch.queue, b.distances, blocks * blockVoxels, timing_);
+    const MappedBuffer<std::int32_t> triangles(batch.queue, b.triangles, mode_.triangles ? blocks * blockVoxels : 0,
+                                               timing_);
     batch.queue.finish();
-    handOver(Results{origins.data(), distances.data(), triangles.data()}, blocks);
+    passToHost(HostResults{origins.data(), distances.data(), triangles.data()}, blocks);
 }
 
-void BrickFill::handOver(const Results& results, std::size_t blocks) {
+void BrickFill::passToHost(const HostResults& results, std::size_t blocks) {
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, blocks, blocksPerTask), [&](const auto& range) {
         job_.mesh.progress.poll();
         for (std::size_t i = range.begin(); i < range.end(); ++i) {
@@ -470,49 +312,29 @@ void BrickFill::handOver(const Results& results, std::size_t blocks) {
             const auto values = [&](const auto* all) { return std::span(all + i * blockVoxels, blockVoxels); };
             job_.mesh.sink({{results.origins + i, 1},
                             values(results.distances),
-                            job_.mesh.triangles ? values(results.triangles) : std::span<const std::int32_t>()});
+                            mode_.triangles ? values(results.triangles) : std::span<const std::int32_t>()});
         }
     });
 }
 
-void BrickFill::run() {
-    std::size_t turn = 0;
-    for (const auto& [first, last] : runs_) {
-        Batch& batch = batches_[turn++ % batchesInFlight];
+OpenclTimes BrickFill::run() {
+    std::size_t next = 0;
+    for (const BatchPlan::Range& bricks : plan_->ranges()) {
+        BrickBatch& batch = batches_[next++ % batchesInFlight];
         finish(batch);
-        start(batch, first, last);
+        start(batch, bricks);
     }
-    for (std::size_t i = 0; i < batchesInFlight; ++i) finish(batches_[turn++ % batchesInFlight]);
-    timing_.sumUp();
-    if (times_) times_->peakBytes = std::max(times_->peakBytes, memory_.peak());
-    if (!open_.empty()) fillOpen();
-}
-
-// Fills blocks on the processor whose inside/outside classification is not decided by nearby triangles; the processor
-// uses the whole mesh.
-void BrickFill::fillOpen() {
-    const auto before = [](const glm::ivec3& a, const glm::ivec3& b) {
-        return std::tie(a.x, a.y, a.z) < std::tie(b.x, b.y, b.z);
-    };
-    std::sort(open_.begin(), open_.end(), before);
-    MeshJob job = job_.mesh;
-    job.wanted = [&](const glm::ivec3& first, int side) {
-        if (side == blockSide) return std::binary_search(open_.begin(), open_.end(), first, before);
-        return std::any_of(open_.begin(), open_.end(), [&](const glm::ivec3& block) {
-            const glm::ivec3 away = block - first;
-            return std::min({away.x, away.y, away.z}) >= 0 && std::max({away.x, away.y, away.z}) < side;
-        });
-    };
-    fillExact(job, job_.box);
+    for (std::size_t i = 0; i < batchesInFlight; ++i) finish(batches_[next++ % batchesInFlight]);
+    const OpenclTimes times = timing_.total(memory_.peak());
+    if (!open_.empty()) fillOnHost(job_, std::move(open_));
+    return times;
 }
 
 }  // namespace
 
-void fillByBricks(DeviceImpl& device, const OpenclOptions& options, const FillJob& job, const DeviceSink& keep) {
-    if (!device.info.doubles)
-        throw DeviceError(device.info.name +
-                          " cannot compute in double precision, which exact and double-layer need; prism does not");
-    BrickFill(device, options, job, keep).run();
+OpenclTimes fillByBricks(DeviceImpl& device, const OpenclOptions& options, const FillJob& job, const DeviceSink& keep) {
+    requireDoubles(device.info, "which exact and double-layer need; prism does not");
+    return BrickFill(device, options, job, keep).run();
 }
 
 }  // namespace bilayer::detail

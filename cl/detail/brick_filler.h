@@ -16,7 +16,9 @@ using DeviceSink = std::function<void(const cl::Buffer& origins, const cl::Buffe
 
 /// Fills all blocks of a job by Method::exact or Method::doubleLayer.
 /// @param keep  if not null, gets the blocks that the device filled; the job's sink gets all others
-void fillByBricks(DeviceImpl& device, const OpenclOptions& options, const FillJob& job, const DeviceSink& keep = {});
+/// @return the times of the fill
+OpenclTimes fillByBricks(DeviceImpl& device, const OpenclOptions& options, const FillJob& job,
+                         const DeviceSink& keep = {});
 
 /// The x of the origin of an empty slot.
 inline constexpr int noBlock = std::numeric_limits<int>::min();

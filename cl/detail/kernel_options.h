@@ -1,17 +1,23 @@
-// Translates the options of a filler or a field for a device.
+// Translates the options of a filler or a field for a device, and holds the constants of all kernels.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <string>
 
 #include <bilayer/cl/filler.h>
+#include "cl/detail/memory.h"
 #include "cl/detail/program.h"
 
 namespace bilayer::detail {
 
+/// Work-items of a group on a GPU: ITEMS of common.cl.
+inline constexpr std::size_t groupItems = 64;
+/// While the device works on one batch, the host works on the other.
+inline constexpr std::size_t batchesInFlight = 2;
+
 /// Limit of device memory [bytes].
 inline std::uint64_t memoryBudget(const DeviceImpl& device, std::uint64_t memoryMiB) {
-    constexpr std::uint64_t mebibyte = 1 << 20;
     return memoryMiB > 0 ? memoryMiB * mebibyte : device.info.memoryBytes / 4 * 3;
 }
 
@@ -29,19 +35,10 @@ inline std::string commonBuildOptions(const DeviceImpl& device, bool groups = fa
     return options;
 }
 
-/// Scope guard: its destructor waits until the commands of a queue have ended, also after an error. The commands use
-/// memory of the enclosing scope. As a class member it must be declared last, so that it is destroyed first.
-class Ended {
-  public:
-    explicit Ended(const cl::CommandQueue& queue) : queue_(queue) {}
-    Ended(const Ended&) = delete;
-    Ended& operator=(const Ended&) = delete;
-    ~Ended() {
-        if (queue_()) ::clFinish(queue_());
-    }
-
-  private:
-    const cl::CommandQueue& queue_;
-};
+/// Throws DeviceError if the device has no double precision.
+/// @param need  who needs it, for the error text: "which samples of fields need"
+inline void requireDoubles(const DeviceInfo& device, const std::string& need) {
+    if (!device.doubles) throw DeviceError(device.name + " cannot compute in double precision, " + need);
+}
 
 }  // namespace bilayer::detail

@@ -6,7 +6,6 @@
 namespace bilayer::detail {
 namespace {
 
-constexpr std::uint64_t mebibyte = 1 << 20;
 /// Maximum memory that a device keeps between builds.
 constexpr std::uint64_t maxSpareBytes = 128 * mebibyte;
 

@@ -9,6 +9,8 @@
 
 namespace bilayer::detail {
 
+inline constexpr std::uint64_t mebibyte = 1 << 20;
+
 /// Allocates buffers and counts their bytes, so that a build stays within its budget. Freed buffers go back to the
 /// device, which keeps some of them for the next build: new ones cost a page fault every 4 KiB on a processor, and
 /// milliseconds on some GPUs.

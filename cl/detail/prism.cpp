@@ -16,6 +16,7 @@
 #include "cl/detail/kernel_options.h"
 #include "cl/detail/memory.h"
 #include "cl/detail/prism_bins.h"
+#include "cl/detail/queue_guard.h"
 #include "cl/detail/timing.h"
 #include "sdf/base/progress.h"
 #include "sdf/fill/triangle_bins.h"
@@ -28,19 +29,18 @@ namespace {
 
 constexpr std::size_t windowBricks = 128;  // prepared at once: a few thousand blocks, enough to keep a large GPU busy
 constexpr std::size_t itemsPerBlock = 64;  // one item per row, as in the kernel
-constexpr std::size_t batchesInFlight = 2;
 
 // The size of a batch, and its memory on the device.
-struct Load {
+struct PrismBatchSize {
     std::uint64_t blocks = 0, prisms = 0, entries = 0;
 
-    Load operator+(const Load& other) const {
+    PrismBatchSize operator+(const PrismBatchSize& other) const {
         return {blocks + other.blocks, prisms + other.prisms, entries + other.entries};
     }
-    Load atLeast(const Load& other) const {
+    PrismBatchSize atLeast(const PrismBatchSize& other) const {
         return {std::max(blocks, other.blocks), std::max(prisms, other.prisms), std::max(entries, other.entries)};
     }
-    bool operator==(const Load&) const = default;
+    bool operator==(const PrismBatchSize&) const = default;
     std::uint64_t resultBytes() const { return blocks * blockVoxels * sizeof(float); }
     std::uint64_t prismBytes() const { return prisms * sizeof(Prism); }
     std::uint64_t entryBytes() const { return entries * sizeof(cl_uint); }
@@ -52,45 +52,44 @@ struct Load {
     std::uint64_t largestBuffer() const { return std::max({resultBytes(), prismBytes(), entryBytes()}); }
 };
 
-Load loadOf(const PrismBlocks& blocks) {
+PrismBatchSize sizeOf(const PrismBlocks& blocks) {
     return {blocks.places.size(), blocks.prisms.size(), blocks.reaching.size()};
 }
 
-struct Batch {
-    std::vector<Load> begins;         // sum of the loads before each brick, and the total
-    std::vector<glm::ivec3> origins;  // of blocks
-    Load capacity;                    // of the buffers
+struct PrismBatch {
+    std::vector<PrismBatchSize> begins;  // sum of the sizes before each brick, and the total
+    std::vector<glm::ivec3> origins;     // of blocks
+    PrismBatchSize capacity;             // of the buffers
     cl::Buffer prismBuffer, placeBuffer, offsetBuffer, reachingBuffer, distanceBuffer, triangleBuffer;
     const float* distances = nullptr;         // mapped after `filled`
     const std::int32_t* triangles = nullptr;  // likewise
     cl::Event filled;
 
     std::size_t bricks() const { return begins.empty() ? 0 : begins.size() - 1; }
-    Load load() const { return begins.back(); }
+    PrismBatchSize size() const { return begins.back(); }
 };
 
-class Fill {
+class PrismFill {
   public:
-    Fill(DeviceImpl& device, const OpenclOptions& options, const PrismJob& job, const MeshJob& mesh,
-         const TriangleBins& bins);
-    void run();
+    PrismFill(DeviceImpl& device, const OpenclOptions& options, const PrismJob& job, const MeshJob& mesh,
+              const TriangleBins& bins);
+    OpenclTimes run();
 
   private:
     void prepare(std::size_t first, std::size_t last);
-    bool fits(const Load& load) const;
+    bool fits(const PrismBatchSize& size) const;
     std::size_t lastFitting(std::size_t first) const;
-    void take(Batch& batch, std::size_t first, std::size_t last) const;
-    void reserve(Batch& batch);
-    std::vector<cl::Event> upload(Batch& batch, std::size_t first);
-    void start(Batch& batch, std::size_t first);
-    void finish(Batch& batch);
+    void assign(PrismBatch& batch, std::size_t first, std::size_t last) const;
+    void reserve(PrismBatch& batch);
+    std::vector<cl::Event> upload(PrismBatch& batch, std::size_t first);
+    void start(PrismBatch& batch, std::size_t first);
+    void finish(PrismBatch& batch);
 
     DeviceImpl& device_;
     const PrismJob job_;
     const MeshJob& mesh_;
     const TriangleBins& bins_;
     const bool groups_;
-    OpenclTimes* times_;
     Timing timing_;
     DeviceMemory memory_;
     const std::uint64_t share_;  // of the memory, for a batch [bytes]
@@ -99,46 +98,44 @@ class Fill {
     cl::CommandQueue uploads_;
     std::vector<PrismBlocks> window_;  // the bricks from firstPrepared_ on
     std::size_t firstPrepared_ = 0;
-    std::array<Batch, batchesInFlight> batches_;
-    Ended kernelsEnded_, transfersEnded_;  // the device's queue, and that of the uploads
+    std::array<PrismBatch, batchesInFlight> batches_;
+    QueueGuard fillGuard_, uploadGuard_;  // the device's queue, and that of the uploads
 };
 
-Fill::Fill(DeviceImpl& device, const OpenclOptions& options, const PrismJob& job, const MeshJob& mesh,
-           const TriangleBins& bins)
+PrismFill::PrismFill(DeviceImpl& device, const OpenclOptions& options, const PrismJob& job, const MeshJob& mesh,
+                     const TriangleBins& bins)
     : device_(device),
       job_(job),
       mesh_(mesh),
       bins_(bins),
       groups_(wantsGroups(device, options.mapping)),
-      times_(options.times),
-      timing_(options.times),
+      timing_(options.profile),
       memory_(device, memoryBudget(device, options.memoryMiB)),
       share_(memory_.left() / batchesInFlight),
       kernel_(buildProgram(device, prism_cl, commonBuildOptions(device, groups_, mesh.triangles)), "fillBlocks"),
       uploads_(device.context, device.device, CL_QUEUE_PROFILING_ENABLE),
-      kernelsEnded_(device.queue),
-      transfersEnded_(uploads_) {}
+      fillGuard_(device.queue),
+      uploadGuard_(uploads_) {}
 
-void Fill::run() {
-    std::size_t turn = 0;
+OpenclTimes PrismFill::run() {
+    std::size_t next = 0;
     for (std::size_t first = 0; first < bins_.count(); first += windowBricks) {
         const std::size_t last = std::min(first + windowBricks, bins_.count());
         prepare(first, last);
         for (std::size_t from = first, to; from < last; from = to) {
             to = lastFitting(from);
-            Batch& batch = batches_[turn++ % batchesInFlight];
+            PrismBatch& batch = batches_[next++ % batchesInFlight];
             finish(batch);
-            take(batch, from, to);
+            assign(batch, from, to);
             start(batch, from);
         }
     }
-    for (std::size_t i = 0; i < batchesInFlight; ++i) finish(batches_[turn++ % batchesInFlight]);
+    for (std::size_t i = 0; i < batchesInFlight; ++i) finish(batches_[next++ % batchesInFlight]);
     device_.queue.finish();
-    timing_.sumUp();
-    if (times_) times_->peakBytes = std::max(times_->peakBytes, memory_.peak());
+    return timing_.total(memory_.peak());
 }
 
-void Fill::prepare(std::size_t first, std::size_t last) {
+void PrismFill::prepare(std::size_t first, std::size_t last) {
     firstPrepared_ = first;
     window_.resize(std::max(window_.size(), last - first));
     tbb::parallel_for(first, last, [&](std::size_t brick) {
@@ -148,46 +145,46 @@ void Fill::prepare(std::size_t first, std::size_t last) {
 }
 
 // Whether a batch of this size fits its share of the memory, the largest buffer, and the kernel's 32-bit indices.
-bool Fill::fits(const Load& load) const {
-    return load.bytes(mesh_.triangles) <= share_ && load.largestBuffer() <= device_.info.maxAllocationBytes &&
-           std::max(load.entries, load.prisms) <= std::numeric_limits<cl_uint>::max();
+bool PrismFill::fits(const PrismBatchSize& size) const {
+    return size.bytes(mesh_.triangles) <= share_ && size.largestBuffer() <= device_.info.maxAllocationBytes &&
+           std::max(size.entries, size.prisms) <= std::numeric_limits<cl_uint>::max();
 }
 
-// The end of the run of prepared bricks from `first` on that fits into one batch.
-std::size_t Fill::lastFitting(std::size_t first) const {
+// The end of the range of prepared bricks from `first` on that fits into one batch.
+std::size_t PrismFill::lastFitting(std::size_t first) const {
     const std::size_t end = std::min(firstPrepared_ + windowBricks, bins_.count());
-    Load load = loadOf(window_[first - firstPrepared_]);
-    if (!fits(load))
-        memory_.refuse(std::max(batchesInFlight * load.bytes(mesh_.triangles), load.largestBuffer()),
+    PrismBatchSize size = sizeOf(window_[first - firstPrepared_]);
+    if (!fits(size))
+        memory_.refuse(std::max(batchesInFlight * size.bytes(mesh_.triangles), size.largestBuffer()),
                        "a brick of prisms");
     std::size_t last = first + 1;
     for (; last < end; ++last) {
-        load = load + loadOf(window_[last - firstPrepared_]);
-        if (!fits(load)) break;
+        size = size + sizeOf(window_[last - firstPrepared_]);
+        if (!fits(size)) break;
     }
     return last;
 }
 
 // Sets the content of a batch: the bricks' blocks.
-void Fill::take(Batch& batch, std::size_t first, std::size_t last) const {
+void PrismFill::assign(PrismBatch& batch, std::size_t first, std::size_t last) const {
     batch.begins.assign(1, {});
     for (std::size_t brick = first; brick < last; ++brick) {
         const PrismBlocks& blocks = window_[brick - firstPrepared_];
         std::transform(blocks.places.begin(), blocks.places.end(), std::back_inserter(batch.origins),
                        [&](const glm::ivec3& place) { return bins_.origins[brick] + place; });
-        batch.begins.push_back(batch.begins.back() + loadOf(blocks));
+        batch.begins.push_back(batch.begins.back() + sizeOf(blocks));
     }
 }
 
 // Enlarges the buffers, up to the batch's share of the memory.
-void Fill::reserve(Batch& batch) {
-    const Load load = batch.load(), grown = load.atLeast(batch.capacity);
+void PrismFill::reserve(PrismBatch& batch) {
+    const PrismBatchSize size = batch.size(), grown = size.atLeast(batch.capacity);
     if (grown == batch.capacity) return;
     device_.queue.finish();
     for (cl::Buffer* buffer : {&batch.prismBuffer, &batch.placeBuffer, &batch.offsetBuffer, &batch.reachingBuffer,
                                &batch.distanceBuffer, &batch.triangleBuffer})
         memory_.free(*buffer);
-    batch.capacity = fits(grown) ? grown : load;
+    batch.capacity = fits(grown) ? grown : size;
     const auto buffer = [&](std::uint64_t bytes) { return memory_.allocate(bytes, "a batch of bricks"); };
     batch.prismBuffer = buffer(batch.capacity.prismBytes());
     batch.placeBuffer = buffer(batch.capacity.placeBytes());
@@ -198,18 +195,18 @@ void Fill::reserve(Batch& batch) {
 }
 
 // Writes the bricks' prisms and lists directly to the memory of the device or its driver.
-std::vector<cl::Event> Fill::upload(Batch& batch, std::size_t first) {
-    const Load load = batch.load();
+std::vector<cl::Event> PrismFill::upload(PrismBatch& batch, std::size_t first) {
+    const PrismBatchSize size = batch.size();
     const auto mapped = [&](const cl::Buffer& buffer, std::uint64_t bytes) {
         return uploads_.enqueueMapBuffer(buffer, CL_TRUE, CL_MAP_WRITE_INVALIDATE_REGION, 0, bytes);
     };
-    auto* const prisms = static_cast<Prism*>(mapped(batch.prismBuffer, load.prismBytes()));
-    auto* const places = static_cast<glm::ivec3*>(mapped(batch.placeBuffer, load.placeBytes()));
-    auto* const offsets = static_cast<cl_uint*>(mapped(batch.offsetBuffer, load.offsetBytes()));
-    auto* const reaching = static_cast<cl_uint*>(mapped(batch.reachingBuffer, load.entryBytes()));
+    auto* const prisms = static_cast<Prism*>(mapped(batch.prismBuffer, size.prismBytes()));
+    auto* const places = static_cast<glm::ivec3*>(mapped(batch.placeBuffer, size.placeBytes()));
+    auto* const offsets = static_cast<cl_uint*>(mapped(batch.offsetBuffer, size.offsetBytes()));
+    auto* const reaching = static_cast<cl_uint*>(mapped(batch.reachingBuffer, size.entryBytes()));
     offsets[0] = 0;
     tbb::parallel_for(std::size_t(0), batch.bricks(), [&](std::size_t brick) {
-        const Load& begin = batch.begins[brick];
+        const PrismBatchSize& begin = batch.begins[brick];
         const PrismBlocks& blocks = window_[first + brick - firstPrepared_];
         std::copy(blocks.prisms.begin(), blocks.prisms.end(), prisms + begin.prisms);
         std::copy(blocks.places.begin(), blocks.places.end(), places + begin.blocks);
@@ -224,12 +221,12 @@ std::vector<cl::Event> Fill::upload(Batch& batch, std::size_t first) {
     uploads_.enqueueUnmapMemObject(batch.offsetBuffer, offsets, nullptr, &uploaded[2]);
     uploads_.enqueueUnmapMemObject(batch.reachingBuffer, reaching, nullptr, &uploaded[3]);
     uploads_.flush();
-    for (const cl::Event& event : uploaded) timing_.keep(Timing::Of::upload, event);
+    for (const cl::Event& event : uploaded) timing_.keep(Timing::Command::upload, event);
     return uploaded;
 }
 
 // Enqueues a batch: upload of prisms and lists, kernel, download of distances.
-void Fill::start(Batch& batch, std::size_t first) {
+void PrismFill::start(PrismBatch& batch, std::size_t first) {
     const std::size_t blocks = batch.origins.size();
     if (blocks == 0) return;
     reserve(batch);
@@ -244,24 +241,24 @@ void Fill::start(Batch& batch, std::size_t first) {
     kernel_.setArg(argument++, batch.triangleBuffer);
     const std::size_t items = groups_ ? itemsPerBlock : 1;
     device_.queue.enqueueNDRangeKernel(kernel_, cl::NullRange, cl::NDRange(blocks * items), cl::NDRange(items),
-                                       &uploaded, timing_.event(Timing::Of::kernel));
+                                       &uploaded, timing_.event(Timing::Command::kernel));
 
     // mapping copies nothing in shared memory
     const auto mapped = [&](const cl::Buffer& buffer) {
-        return device_.queue.enqueueMapBuffer(buffer, CL_FALSE, CL_MAP_READ, 0, batch.load().resultBytes(), nullptr,
+        return device_.queue.enqueueMapBuffer(buffer, CL_FALSE, CL_MAP_READ, 0, batch.size().resultBytes(), nullptr,
                                               &batch.filled);
     };
     if (mesh_.triangles) {
         batch.triangles = static_cast<const std::int32_t*>(mapped(batch.triangleBuffer));
-        timing_.keep(Timing::Of::download, batch.filled);
+        timing_.keep(Timing::Command::download, batch.filled);
     }
     batch.distances = static_cast<const float*>(mapped(batch.distanceBuffer));
-    timing_.keep(Timing::Of::download, batch.filled);
+    timing_.keep(Timing::Command::download, batch.filled);
     device_.queue.flush();
 }
 
 // Waits for a batch in flight, and passes its blocks on.
-void Fill::finish(Batch& batch) {
+void PrismFill::finish(PrismBatch& batch) {
     const bool filled = !batch.origins.empty();
     if (filled) batch.filled.wait();
     tbb::parallel_for(std::size_t(0), batch.bricks(), [&](std::size_t brick) {
@@ -283,13 +280,13 @@ void Fill::finish(Batch& batch) {
 
 }  // namespace
 
-void fillPrism(DeviceImpl& device, const OpenclOptions& options, const FillJob& job) {
+OpenclTimes fillPrism(DeviceImpl& device, const OpenclOptions& options, const FillJob& job) {
     const MeshJob& mesh = job.mesh;
     const double voxelsPerUnit = 1.0 / double(mesh.voxelSize);
     const VerticesAcross across(mesh.mesh, mesh.progress);
     const TriangleBins bins = binTriangles(mesh.mesh, job.box, voxelsPerUnit, mesh.reach, &mesh.progress);
     mesh.progress.begin(bins.count());
-    Fill(device, options, {mesh.mesh, across, voxelsPerUnit, mesh.reach}, mesh, bins).run();
+    return PrismFill(device, options, {mesh.mesh, across, voxelsPerUnit, mesh.reach}, mesh, bins).run();
 }
 
 }  // namespace bilayer::detail

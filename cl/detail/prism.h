@@ -8,8 +8,10 @@
 namespace bilayer::detail {
 
 /// Fills the blocks of a job whose method is Method::prism. A distance is that to the nearest triangle whose prism
-/// contains the voxel, or +infinity if there is none or it is beyond the job's reach. Throws cl::Error, Cancelled, and
-/// DeviceError if the memory is too small for one brick's work; the text then states how many MiB are needed.
-void fillPrism(DeviceImpl& device, const OpenclOptions& options, const FillJob& job);
+/// contains the voxel, or +infinity if there is none or it is beyond the job's reach. Returns the times of the fill.
+///
+/// Throws cl::Error, Cancelled, and DeviceError if the memory is too small for one brick's work; the text then states
+/// how many MiB are needed.
+OpenclTimes fillPrism(DeviceImpl& device, const OpenclOptions& options, const FillJob& job);
 
 }  // namespace bilayer::detail

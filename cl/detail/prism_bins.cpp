@@ -15,10 +15,10 @@
 namespace bilayer::detail {
 namespace {
 
-constexpr double boxSlack = 1e-2;      // margin of a prism's box: overlap and rounding [voxels]
-constexpr double folded = 1e-6;        // two faces that coincide to within this angle have no bisecting plane
-constexpr double parallel = 1e-9;      // side planes this close to parallel have no corner that the box must contain
-constexpr int blocksWorthCulling = 8;  // a prism whose box meets more blocks is tested against each
+constexpr double boxSlack = 1e-2;           // margin of a prism's box: overlap and rounding [voxels]
+constexpr double minBisectorLength = 1e-6;  // two faces that coincide to within this angle have no bisecting plane
+constexpr double minDeterminant = 1e-9;     // side planes closer to parallel have no corner that the box must contain
+constexpr int blocksWorthCulling = 8;       // a prism whose box meets more blocks is tested against each
 
 using Triangle = std::array<glm::dvec3, 3>;
 
@@ -61,7 +61,7 @@ struct Shape {
     glm::dvec3 start;    // corner 0
     glm::dvec2 corners[3], along[3];
     double lengths[3];
-    glm::dvec2 lean[3];
+    glm::dvec2 sideNormal[3];
 
     // An offset in voxels, transformed to the frame.
     glm::dvec3 inFrame(const glm::dvec3& offset) const {
@@ -73,7 +73,7 @@ struct Shape {
 
 // The plane that bisects the angle between a face and its neighbour across edge k is equidistant from both. Its normal
 // is thus the difference of the two directions from the edge into the faces.
-glm::dvec2 leanTo(const Shape& shape, int k, const glm::dvec3& vertexAcross) {
+glm::dvec2 sideNormalTo(const Shape& shape, int k, const glm::dvec3& vertexAcross) {
     const glm::dvec3 offset = shape.inFrame(vertexAcross - shape.start);
     const glm::dvec2 fromEdge = glm::dvec2(offset) - shape.corners[k];
     const glm::dvec2 intoNeighbour(glm::dot(shape.inward(k), fromEdge), offset.z);
@@ -81,7 +81,7 @@ glm::dvec2 leanTo(const Shape& shape, int k, const glm::dvec3& vertexAcross) {
     if (!(depth > 0)) return {0, 0};
     const glm::dvec2 normal = glm::dvec2(1, 0) - intoNeighbour / depth;
     const double length = glm::length(normal);
-    return length > folded ? normal / length : glm::dvec2(0);
+    return length > minBisectorLength ? normal / length : glm::dvec2(0);
 }
 
 // Nothing if the triangle has no area.
@@ -103,7 +103,7 @@ std::optional<Shape> shapeOf(const Base& base) {
     }
     for (int k = 0; k < 3; ++k) {
         const auto& vertex = base.across[std::size_t(k)];
-        shape.lean[k] = vertex ? leanTo(shape, k, *vertex) : glm::dvec2(0);
+        shape.sideNormal[k] = vertex ? sideNormalTo(shape, k, *vertex) : glm::dvec2(0);
     }
     return shape;
 }
@@ -111,11 +111,11 @@ std::optional<Shape> shapeOf(const Base& base) {
 // Adds the two ends of the line in which the side planes at a vertex meet. Returns false if they do not meet.
 bool addCorner(const Shape& shape, int k, double reach, Box& box) {
     const int before = (k + 2) % 3;
-    const glm::dvec2 p = shape.lean[before].x * shape.inward(before), q = shape.lean[k].x * shape.inward(k);
+    const glm::dvec2 p = shape.sideNormal[before].x * shape.inward(before), q = shape.sideNormal[k].x * shape.inward(k);
     const double determinant = p.x * q.y - p.y * q.x;
-    if (std::abs(determinant) < parallel) return false;
-    const glm::dvec2 slope = glm::dvec2(p.y * shape.lean[k].y - q.y * shape.lean[before].y,
-                                        q.x * shape.lean[before].y - p.x * shape.lean[k].y) /
+    if (std::abs(determinant) < minDeterminant) return false;
+    const glm::dvec2 slope = glm::dvec2(p.y * shape.sideNormal[k].y - q.y * shape.sideNormal[before].y,
+                                        q.x * shape.sideNormal[before].y - p.x * shape.sideNormal[k].y) /
                              determinant;
     const glm::dvec3 corner = shape.start + shape.corners[k].x * shape.axes[0] + shape.corners[k].y * shape.axes[1];
     const glm::dvec3 edge = slope.x * shape.axes[0] + slope.y * shape.axes[1] + shape.axes[2];
@@ -146,7 +146,7 @@ Prism rounded(const Shape& shape, const Box& box, std::uint32_t triangle) {
     prism.upper = glm::vec3(box.upper);
     prism.length = float(shape.lengths[0]);
     prism.apex = glm::vec2(shape.corners[2]);
-    for (int k = 0; k < 3; ++k) prism.lean[k] = glm::vec2(shape.lean[k]);
+    for (int k = 0; k < 3; ++k) prism.sideNormal[k] = glm::vec2(shape.sideNormal[k]);
     prism.triangle = std::int32_t(triangle);
     return prism;
 }
@@ -163,21 +163,21 @@ std::array<Plane, 5> planesOf(const Shape& shape, double reach) {
     const double height = glm::dot(n, shape.start);
     std::array<Plane, 5> planes{Plane{n, reach - height}, Plane{-n, reach + height}};
     for (int k = 0; k < 3; ++k) {
-        const glm::dvec2 inward = shape.lean[k].x * shape.inward(k);
-        const glm::dvec3 normal = inward.x * shape.axes[0] + inward.y * shape.axes[1] + shape.lean[k].y * n;
+        const glm::dvec2 inward = shape.sideNormal[k].x * shape.inward(k);
+        const glm::dvec3 normal = inward.x * shape.axes[0] + inward.y * shape.axes[1] + shape.sideNormal[k].y * n;
         const glm::dvec3 corner = shape.start + shape.corners[k].x * shape.axes[0] + shape.corners[k].y * shape.axes[1];
         planes[std::size_t(k) + 2] = {normal, -glm::dot(normal, corner)};
     }
     return planes;
 }
 
-// Whether all voxels of a block are outside of one of the planes.
-bool parted(const std::array<Plane, 5>& planes, const glm::ivec3& block) {
+// Whether all voxels of a block are beyond one of the planes.
+bool isBeyondPlane(const std::array<Plane, 5>& planes, const glm::ivec3& block) {
     constexpr double half = 0.5 * (blockSide - 1);
     const glm::dvec3 centre = glm::dvec3(block * blockSide) + half;
     return std::any_of(planes.begin(), planes.end(), [&](const Plane& plane) {
-        const double room = half * (std::abs(plane.normal.x) + std::abs(plane.normal.y) + std::abs(plane.normal.z));
-        return glm::dot(plane.normal, centre) + plane.depth + room < -boxSlack;
+        const double extent = half * (std::abs(plane.normal.x) + std::abs(plane.normal.y) + std::abs(plane.normal.z));
+        return glm::dot(plane.normal, centre) + plane.depth + extent < -boxSlack;
     });
 }
 
@@ -197,7 +197,7 @@ void bin(const Shape& shape, const Box& box, double reach, std::uint32_t triangl
     for (int x = lower.x; x <= upper.x; ++x)
         for (int y = lower.y; y <= upper.y; ++y)
             for (int z = lower.z; z <= upper.z; ++z) {
-                if (large && parted(planes, {x, y, z})) continue;
+                if (large && isBeyondPlane(planes, {x, y, z})) continue;
                 const auto block = std::uint32_t((x * (last.x + 1) + y) * (last.x + 1) + z);
                 ++blocks.cursors[block];
                 blocks.pairs.push_back({block, prism});

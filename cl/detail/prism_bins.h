@@ -30,9 +30,10 @@ struct Prism {
     glm::vec3 lower, upper;  ///< bounding box of the part of the prism within reach of the triangle
     float length;            ///< of edge 0, the longest
     glm::vec2 apex;          ///< vertex 2, in the frame
-    glm::vec2 lean[3];       ///< a point is on this side of edge k if lean.x * (its depth behind the edge) + lean.y *
-                             ///< (its height) >= 0; zero where no two triangles share the edge: no plane ends it there
-    std::int32_t triangle;   ///< index into Mesh::triangles
+    /// The side plane at edge k: the prism is where sideNormal.x * (depth behind the edge) + sideNormal.y * (height) >=
+    /// 0. Zero where no two triangles share the edge: no plane ends the prism there.
+    glm::vec2 sideNormal[3];
+    std::int32_t triangle;  ///< index into Mesh::triangles
 };
 static_assert(sizeof(Prism) == 25 * sizeof(float));
 

@@ -11,7 +11,9 @@
 #include <vector>
 
 #include "cl/detail/brick_filler.h"
+#include "cl/detail/enqueue.h"
 #include "cl/detail/kernel_options.h"
+#include "cl/detail/queue_guard.h"
 #include "sdf/leaf/band.h"
 #include "sdf/leaf/blocks.h"
 
@@ -21,11 +23,10 @@ extern const char* const resident_cl;  // the text of resident.cl
 
 namespace {
 
-constexpr std::size_t groupItems = 64;       // ITEMS of common.cl
-constexpr std::size_t itemsAlongParts = 32;  // along z, which is contiguous in memory
-constexpr cl_int unknownEntry = -3;          // UNKNOWN of resident.cl
-constexpr cl_float maxParts = 16;            // MOST_PARTS of resident.cl
-constexpr const char* field = "the field";
+constexpr std::size_t itemsAlongParts = 32;   // along z, which is contiguous in memory
+constexpr cl_int unknownEntry = -3;           // UNKNOWN of resident.cl
+constexpr cl_float maxParts = 16;             // MAX_PARTS of resident.cl
+constexpr const char* purpose = "the field";  // of memory, for error texts
 
 // `Widths` of resident.cl.
 struct KernelWidths {
@@ -60,14 +61,14 @@ class ResidentFill {
     ResidentFill(const Device& device, const OpenclOptions& options, DeviceMemory& memory, const FillJob& job);
     ResidentFill(const ResidentFill&) = delete;
     ResidentFill& operator=(const ResidentFill&) = delete;
-    DeviceLayout run();
+    ResidentField run();
 
   private:
-    void keep(const cl::Buffer& origins, const cl::Buffer& distances, std::size_t blocks);
-    void keepFromHost();
-    void measureFrame();
+    void addPage(const cl::Buffer& origins, const cl::Buffer& distances, std::size_t blocks);
+    void addHostBlocks();
+    void computeFrame();
     void placeBlocks();
-    void measureClearances();
+    void computeClearances();
     void countConflicts();
     Summary readSummary();
 
@@ -75,11 +76,8 @@ class ResidentFill {
 
     template <class... Arguments>
     void enqueue(const char* name, const cl::NDRange& global, const cl::NDRange& local, const Arguments&... arguments) {
-        cl::Kernel kernel(program_, name);
-        cl_uint index = 0;
-        (kernel.setArg(index++, arguments), ...);
-        device_.queue.enqueueNDRangeKernel(kernel, cl::NullRange, global, local, nullptr,
-                                           timing_.event(Timing::Of::kernel));
+        enqueueKernel(device_.queue, program_, name, global, local, timing_.event(Timing::Command::kernel),
+                      arguments...);
     }
     // Enqueues a kernel with a work-group, or a single item, for each block.
     template <class... Arguments>
@@ -110,7 +108,7 @@ class ResidentFill {
     std::vector<float> hostDistances_;     // [voxels]
     DeviceLayout layout_;
     glm::ivec3 firstVoxel_{0};
-    Ended ended_;  // commands in flight use the blocks of the host
+    QueueGuard guard_;  // commands in flight use the blocks of the host
 };
 
 ResidentFill::ResidentFill(const Device& device, const OpenclOptions& options, DeviceMemory& memory, const FillJob& job)
@@ -120,12 +118,12 @@ ResidentFill::ResidentFill(const Device& device, const OpenclOptions& options, D
       job_(job),
       gpuMapping_(wantsGroups(device_, options.mapping)),
       widths_{job.options.exteriorWidth, job.options.interiorWidth, job.mesh.voxelSize},
-      timing_(options.times),
+      timing_(options.profile),
       program_(buildProgram(device_, resident_cl, commonBuildOptions(device_, gpuMapping_))),
-      summary_(memory.allocate(sizeof(Summary), field)),
-      ended_(device_.queue) {}
+      summary_(memory.allocate(sizeof(Summary), purpose)),
+      guard_(device_.queue) {}
 
-DeviceLayout ResidentFill::run() {
+ResidentField ResidentFill::run() {
     const Summary none;
     device_.queue.enqueueWriteBuffer(summary_, CL_TRUE, 0, sizeof none, &none);
     MeshJob mesh = job_.mesh;
@@ -134,22 +132,22 @@ DeviceLayout ResidentFill::run() {
         hostOrigins_.insert(hostOrigins_.end(), blocks.origins.begin(), blocks.origins.end());
         hostDistances_.insert(hostDistances_.end(), blocks.distances.begin(), blocks.distances.end());
     };
-    fillByBricks(device_, options_, {mesh, job_.options, job_.box, job_.layers},
-                 [&](const cl::Buffer& origins, const cl::Buffer& distances, std::size_t blocks) {
-                     keep(origins, distances, blocks);
-                 });
-    keepFromHost();
-    measureFrame();
+    OpenclTimes times = fillByBricks(device_, options_, {mesh, job_.options, job_.box, job_.layers},
+                                     [&](const cl::Buffer& origins, const cl::Buffer& distances, std::size_t blocks) {
+                                         addPage(origins, distances, blocks);
+                                     });
+    addHostBlocks();
+    computeFrame();
     placeBlocks();
     countConflicts();
-    measureClearances();
-    timing_.sumUp();
-    return std::move(layout_);
+    computeClearances();
+    times += timing_.total(0);
+    return {std::move(layout_), times};
 }
 
-void ResidentFill::keep(const cl::Buffer& origins, const cl::Buffer& distances, std::size_t blocks) {
+void ResidentFill::addPage(const cl::Buffer& origins, const cl::Buffer& distances, std::size_t blocks) {
     if (blocks == 0) return;
-    const auto buffer = [&](std::uint64_t each) { return memory_.allocate(blocks * each, field); };
+    const auto buffer = [&](std::uint64_t each) { return memory_.allocate(blocks * each, purpose); };
     const Page page{cl_uint(blocks), buffer(sizeof(glm::ivec3)), buffer(blockVoxels * sizeof(float)),
                     buffer(sizeof(cl_int))};
     enqueueBlocks("trimBlocks", blocks, origins, distances,
@@ -159,13 +157,14 @@ void ResidentFill::keep(const cl::Buffer& origins, const cl::Buffer& distances, 
     pages_.push_back(page);
 }
 
-void ResidentFill::keepFromHost() {
+void ResidentFill::addHostBlocks() {
     if (hostOrigins_.empty()) return;
     const auto uploaded = [&](const auto& data) {
-        return memory_.upload(data.data(), data.size() * sizeof data[0], field, timing_.event(Timing::Of::upload));
+        return memory_.upload(data.data(), data.size() * sizeof data[0], purpose,
+                              timing_.event(Timing::Command::upload));
     };
     cl::Buffer origins = uploaded(hostOrigins_), distances = uploaded(hostDistances_);
-    keep(origins, distances, hostOrigins_.size());
+    addPage(origins, distances, hostOrigins_.size());
     device_.queue.finish();
     memory_.free(origins);
     memory_.free(distances);
@@ -174,12 +173,12 @@ void ResidentFill::keepFromHost() {
 Summary ResidentFill::readSummary() {
     Summary summary;
     device_.queue.enqueueReadBuffer(summary_, CL_TRUE, 0, sizeof summary, &summary, nullptr,
-                                    timing_.event(Timing::Of::download));
+                                    timing_.event(Timing::Command::download));
     return summary;
 }
 
 // Computes the frame as FieldLayout's constructor and LevelSet do.
-void ResidentFill::measureFrame() {
+void ResidentFill::computeFrame() {
     const Summary summary = readSummary();
     if (summary.activeLower[0] > summary.activeUpper[0])
         throw std::invalid_argument("no voxel lies within the band: the widths are too small for this voxel size");
@@ -195,14 +194,14 @@ void ResidentFill::measureFrame() {
     frame.origin = glm::dvec3(firstVoxel_) * frame.voxel;
     frame.bounds = {glm::vec3(glm::dvec3(vectorOf(summary.activeLower)) * frame.voxel),
                     glm::vec3(glm::dvec3(vectorOf(summary.activeUpper)) * frame.voxel)};
-    layout_.values = memory_.allocate(std::uint64_t(summary.needed) * FieldFrame::blockFloats * sizeof(float), field);
+    layout_.values = memory_.allocate(std::uint64_t(summary.needed) * FieldFrame::blockFloats * sizeof(float), purpose);
 }
 
 void ResidentFill::placeBlocks() {
     const KernelFrame frame(layout_.frame);
     const cl_int4 first{{firstVoxel_.x, firstVoxel_.y, firstVoxel_.z, 0}};
-    cl::Buffer next = memory_.allocate(sizeof(cl_uint), field);
-    layout_.directory = memory_.allocate(entries() * sizeof(cl_int), field);
+    cl::Buffer next = memory_.allocate(sizeof(cl_uint), purpose);
+    layout_.directory = memory_.allocate(entries() * sizeof(cl_int), purpose);
     device_.queue.enqueueFillBuffer(next, cl_uint(0), 0, sizeof(cl_uint));
     device_.queue.enqueueFillBuffer(layout_.directory, unknownEntry, 0, entries() * sizeof(cl_int));
     for (const Page& page : pages_)
@@ -225,22 +224,22 @@ void ResidentFill::countConflicts() {
     *job_.mesh.conflicts += std::size_t(readSummary().conflicts);
 }
 
-void ResidentFill::measureClearances() {
+void ResidentFill::computeClearances() {
     const KernelFrame frame(layout_.frame);
     const glm::ivec3 size = layout_.frame.parts();
     const std::size_t count = std::size_t(size.x) * size.y * size.z;
     const cl_float far = layout_.frame.findsSurface() ? maxParts * maxParts : 0;
-    layout_.centres = memory_.allocate(count * sizeof(cl_char), field);
-    std::array<cl::Buffer, 2> ways;
-    for (cl::Buffer& some : ways) some = memory_.allocate(count * sizeof(cl_float), field);
-    enqueueParts("measureParts", frame, far, layout_.directory, layout_.values, ways[0], layout_.centres);
+    layout_.centres = memory_.allocate(count * sizeof(cl_char), purpose);
+    std::array<cl::Buffer, 2> distances2;
+    for (cl::Buffer& buffer : distances2) buffer = memory_.allocate(count * sizeof(cl_float), purpose);
+    enqueueParts("initialiseParts", frame, far, layout_.directory, layout_.values, distances2[0], layout_.centres);
     for (cl_int axis = 2; axis >= 0; --axis) {
-        enqueueParts("spreadParts", frame, axis, ways[0], ways[1]);
-        std::swap(ways[0], ways[1]);
+        enqueueParts("transformParts", frame, axis, distances2[0], distances2[1]);
+        std::swap(distances2[0], distances2[1]);
     }
-    enqueueParts("storeCentres", frame, ways[0], layout_.centres);
+    enqueueParts("storeCentres", frame, distances2[0], layout_.centres);
     device_.queue.finish();
-    for (cl::Buffer& some : ways) memory_.free(some);
+    for (cl::Buffer& buffer : distances2) memory_.free(buffer);
     memory_.free(summary_);
 }
 
@@ -255,32 +254,27 @@ void checkJob(const FillJob& job) {
 
 }  // namespace
 
-DeviceLayout buildResident(const Device& device, const Mesh& mesh, const BuildOptions& build,
-                           const OpenclOptions& options, DeviceMemory& memory) {
-    constexpr std::uint64_t mebibyte = 1 << 20;
-    OpenclTimes fillTimes;
+ResidentField buildResident(const Device& device, const Mesh& mesh, const BuildOptions& build,
+                            const OpenclOptions& options, DeviceMemory& memory) {
     OpenclOptions fillOptions = options;
     fillOptions.memoryMiB =
         std::max<std::uint64_t>(1, memoryBudget(device.impl(), options.memoryMiB) / fillPart / mebibyte);
-    fillOptions.times = options.times ? &fillTimes : nullptr;
     BuildOptions withoutTriangles = build;
     withoutTriangles.triangles = false;
 
     DeviceLayout layout;
+    OpenclTimes times;
     fillOnly(mesh, withoutTriangles,
              {"opencl", device.info().name, [&](const FillJob& job) {
                   checkJob(job);
                   // the first fill had contradictory signs
                   for (cl::Buffer* buffer : {&layout.directory, &layout.centres, &layout.values}) memory.free(*buffer);
-                  layout = ResidentFill(device, fillOptions, memory, job).run();
+                  ResidentField field = ResidentFill(device, fillOptions, memory, job).run();
+                  layout = std::move(field.layout);
+                  times += field.times;
               }});
-    if (options.times) {
-        options.times->kernels += fillTimes.kernels;
-        options.times->upload += fillTimes.upload;
-        options.times->download += fillTimes.download;
-        options.times->peakBytes = std::max(options.times->peakBytes, fillTimes.peakBytes + memory.peak());
-    }
-    return layout;
+    times.peakBytes += memory.peak();
+    return {std::move(layout), times};
 }
 
 }  // namespace bilayer::detail

@@ -32,12 +32,18 @@ struct DeviceLayout {
 /// Divisor of the memory budget: the fill's own work may take 1 / fillPart of it.
 inline constexpr std::uint64_t fillPart = 4;
 
+/// A field in a device's memory, and the times of its build.
+struct ResidentField {
+    DeviceLayout layout;
+    OpenclTimes times;
+};
+
 /// Builds the field of a mesh on a device. Only the mesh is uploaded, and only counts are downloaded. The layout's
 /// buffers come from `memory`, whose budget is that of the options less the fill's part.
 ///
 /// Throws what build() throws, cl::Error, DeviceError, and std::invalid_argument if the method or the sign method needs
 /// the processor.
-DeviceLayout buildResident(const Device& device, const Mesh& mesh, const BuildOptions& build,
-                           const OpenclOptions& options, DeviceMemory& memory);
+ResidentField buildResident(const Device& device, const Mesh& mesh, const BuildOptions& build,
+                            const OpenclOptions& options, DeviceMemory& memory);
 
 }  // namespace bilayer::detail

@@ -1,7 +1,9 @@
-// Measures the device time of a build by the events of its queues.
+// Measures device time by the events of queues.
 #pragma once
 
 #include <algorithm>
+#include <cstdint>
+#include <mutex>
 #include <utility>
 #include <vector>
 
@@ -10,48 +12,66 @@
 
 namespace bilayer::detail {
 
-/// Collects the events of one build.
+/// Collects the events of one call, for example of a build.
 class Timing {
   public:
-    enum class Of { kernel, upload, download };
+    enum class Command { kernel, upload, download };
 
-    /// @param times  receives the sums; null: no event is kept
-    explicit Timing(OpenclTimes* times) : times_(times) {}
+    /// @param profile  false: no event is kept, and the times are zero
+    explicit Timing(bool profile) : profile_(profile) {}
 
     /// Storage for a command's event; null if times are not measured.
-    cl::Event* event(Of what) {
-        if (!times_) return nullptr;
-        events_.emplace_back(what, cl::Event());
+    cl::Event* event(Command command) {
+        if (!profile_) return nullptr;
+        events_.emplace_back(command, cl::Event());
         return &events_.back().second;
     }
-    void keep(Of what, const cl::Event& event) {
-        if (times_) events_.emplace_back(what, event);
+    void keep(Command command, const cl::Event& event) {
+        if (profile_) events_.emplace_back(command, event);
     }
 
-    /// Adds up all events so far. Overlapping kernels count once. Call it when the commands have ended.
-    void sumUp() {
+    /// The sum over all events so far. Overlapping kernels count once. Call it when the commands have ended.
+    OpenclTimes total(std::uint64_t peakBytes) const {
+        OpenclTimes times{.peakBytes = peakBytes};
         std::vector<std::pair<cl_ulong, cl_ulong>> kernels;
-        for (const auto& [what, event] : events_) {
+        for (const auto& [command, event] : events_) {
             if (!event()) continue;  // nothing was copied: host and device share the memory
             const auto begin = event.getProfilingInfo<CL_PROFILING_COMMAND_START>(),
                        end = event.getProfilingInfo<CL_PROFILING_COMMAND_END>();
-            if (what == Of::kernel)
+            if (command == Command::kernel)
                 kernels.emplace_back(begin, end);
             else
-                (what == Of::upload ? times_->upload : times_->download) += 1e-9 * double(end - begin);
+                (command == Command::upload ? times.upload : times.download) += 1e-9 * double(end - begin);
         }
-        events_.clear();
         std::sort(kernels.begin(), kernels.end());
         cl_ulong until = 0;
         for (const auto& [begin, end] : kernels) {
-            if (end > until) times_->kernels += 1e-9 * double(end - std::max(begin, until));
+            if (end > until) times.kernels += 1e-9 * double(end - std::max(begin, until));
             until = std::max(until, end);
         }
+        return times;
     }
 
   private:
-    OpenclTimes* times_;
-    std::vector<std::pair<Of, cl::Event>> events_;
+    bool profile_;
+    std::vector<std::pair<Command, cl::Event>> events_;
+};
+
+/// A sum of times that several threads add to.
+class TimesSum {
+  public:
+    void add(const OpenclTimes& times) {
+        const std::lock_guard lock(mutex_);
+        sum_ += times;
+    }
+    OpenclTimes get() const {
+        const std::lock_guard lock(mutex_);
+        return sum_;
+    }
+
+  private:
+    mutable std::mutex mutex_;
+    OpenclTimes sum_;
 };
 
 }  // namespace bilayer::detail

@@ -24,17 +24,17 @@ typedef struct {
 
 // Takes the next brick of a batch for this group, with no parts so far. Groups take bricks one after another.
 uint takeBrick(global uint* next, SHARED uint* taken, SHARED uint* parts) {
-    MEET;
+    BARRIER;
     if (ITEM == 0) {
         *taken = atomic_inc(next);
         *parts = 0;
     }
-    MEET;
+    BARRIER;
     return *taken;
 }
 
 // The parts of each triangle of a batch that are the same for all bricks; 0 if they depend on the brick.
-RealInt partsOfAny(const Grid* grid, const Batch* batch);
+RealInt partsOfBatch(const Grid* grid, const Batch* batch);
 
 // The maximum number of parts that a brick with these limits cuts a triangle into.
 uint countParts(const Grid* grid, const Corners* triangle, const Limits* limits);
@@ -58,29 +58,32 @@ Limits limitsOf(const Grid* grid, int3 brick) {
     return limits;
 }
 
-bool parts(double3 axis, double3 a, double3 b, double3 c, double3 room, double reach) {
+// Whether an axis separates a triangle from a box around the origin, grown by the reach.
+bool separates(double3 axis, double3 a, double3 b, double3 c, double3 halfSize, double reach) {
     const double x = dot(axis, a), y = dot(axis, b), z = dot(axis, c);
-    const double most = dot(fabs(axis), room) + reach * length(axis);
-    return min(x, min(y, z)) > most || max(x, max(y, z)) < -most;
+    const double limit = dot(fabs(axis), halfSize) + reach * length(axis);
+    return min(x, min(y, z)) > limit || max(x, max(y, z)) < -limit;
 }
 
 // Separating axis test of a triangle and a box of bricks, grown by the reach. The planes are parallel to the triangle,
 // to a side of the box, or to an edge of each (S. Gottschalk and others, SIGGRAPH 1996).
-bool staysAway(const Grid* grid, const Corners* t, int3 lower, int3 upper) {
+bool isOutOfReach(const Grid* grid, const Corners* t, int3 lower, int3 upper) {
     const double side = (double)(1 << grid->shift), reach = grid->reach + 1;
     const double3 low = convert_double3(toInt3(grid->first) + lower) * side,
                   high = convert_double3(toInt3(grid->first) + upper + 1) * side;
-    const double3 centre = 0.5 * (low + high), size = 0.5 * (high - low);
+    const double3 centre = 0.5 * (low + high), halfSize = 0.5 * (high - low);
     const double3 a = t->a - centre, b = t->b - centre, c = t->c - centre;
     const double3 edges[3] = {b - a, c - b, a - c};
-    if (parts((double3)(1, 0, 0), a, b, c, size, reach) || parts((double3)(0, 1, 0), a, b, c, size, reach) ||
-        parts((double3)(0, 0, 1), a, b, c, size, reach) || parts(cross(edges[0], c - a), a, b, c, size, reach))
+    if (separates((double3)(1, 0, 0), a, b, c, halfSize, reach) ||
+        separates((double3)(0, 1, 0), a, b, c, halfSize, reach) ||
+        separates((double3)(0, 0, 1), a, b, c, halfSize, reach) ||
+        separates(cross(edges[0], c - a), a, b, c, halfSize, reach))
         return true;
     for (int i = 0; i < 3; ++i) {
         const double3 e = edges[i];
-        if (parts((double3)(0, -e.z, e.y), a, b, c, size, reach) ||
-            parts((double3)(e.z, 0, -e.x), a, b, c, size, reach) ||
-            parts((double3)(-e.y, e.x, 0), a, b, c, size, reach))
+        if (separates((double3)(0, -e.z, e.y), a, b, c, halfSize, reach) ||
+            separates((double3)(e.z, 0, -e.x), a, b, c, halfSize, reach) ||
+            separates((double3)(-e.y, e.x, 0), a, b, c, halfSize, reach))
             return true;
     }
     return false;
@@ -88,47 +91,47 @@ bool staysAway(const Grid* grid, const Corners* t, int3 lower, int3 upper) {
 
 // Counters and lists of the bricks around a triangle.
 typedef struct {
-    global uint* cursors;  // of each cell: count of triangles, later the index of the next one
-    global uint* more;     // while counting: parts of a cell's triangles beyond one each
-    global uint* list;     // while listing: triangles of each cell; null while counting
+    global uint* cursors;     // of each cell: count of triangles, later the index of the next one
+    global uint* extraParts;  // while counting: parts of a cell's triangles beyond one each
+    global uint* list;        // while listing: triangles of each cell; null while counting
     uint triangle;
 } Bins;
 
 // Adds `parts` parts of the triangle to the cell; 0 if they must be counted.
-void visit(const Bins* bins, const Grid* grid, const Corners* t, uint cell, uint parts) {
-    const uint place = takeGlobal(bins->cursors + cell, 1);
+void addToBrick(const Bins* bins, const Grid* grid, const Corners* t, uint cell, uint parts) {
+    const uint slot = fetchAddGlobal(bins->cursors + cell, 1);
     if (bins->list) {
-        bins->list[place] = bins->triangle;
+        bins->list[slot] = bins->triangle;
     } else if (parts != 1) {
         const Limits limits = limitsOf(grid, brickAt(grid, cell));
         // a result below one is correct too: sums of unsigned numbers wrap around
-        atomic_add(bins->more + cell, (parts ? parts : countParts(grid, t, &limits)) - 1);
+        atomic_add(bins->extraParts + cell, (parts ? parts : countParts(grid, t, &limits)) - 1);
     }
 }
 
 // Halves boxes of bricks, and skips those that the triangle does not reach. The cost of a needle is thus proportional
 // to its length, not to the box around it.
-#define MOST_BOXES 100  // three times the bits of a coordinate
-void divide(const Bins* bins, const Grid* grid, const Corners* t, int3 lowest, int3 highest, uint parts) {
-    int3 lower[MOST_BOXES], upper[MOST_BOXES];
+#define MAX_BOXES 100  // three times the bits of a coordinate
+void addToBricks(const Bins* bins, const Grid* grid, const Corners* t, int3 lowest, int3 highest, uint parts) {
+    int3 lower[MAX_BOXES], upper[MAX_BOXES];
     int waiting = 1;
     lower[0] = lowest;
     upper[0] = highest;
     while (waiting > 0) {
         --waiting;
         const int3 low = lower[waiting], high = upper[waiting], size = high - low;
-        if (staysAway(grid, t, low, high)) continue;
+        if (isOutOfReach(grid, t, low, high)) continue;
         if (size.x + size.y + size.z == 0) {
-            visit(bins, grid, t, cellAt(grid, low), parts);
+            addToBrick(bins, grid, t, cellAt(grid, low), parts);
             continue;
         }
-        const int3 way = size.x >= size.y && size.x >= size.z ? (int3)(1, 0, 0)
-                         : size.y >= size.z                   ? (int3)(0, 1, 0)
-                                                              : (int3)(0, 0, 1);
-        const int3 middle = way * (low + size / 2) + (1 - way) * high;
+        const int3 axis = size.x >= size.y && size.x >= size.z ? (int3)(1, 0, 0)
+                          : size.y >= size.z                   ? (int3)(0, 1, 0)
+                                                               : (int3)(0, 0, 1);
+        const int3 middle = axis * (low + size / 2) + (1 - axis) * high;
         lower[waiting] = low;
         upper[waiting++] = middle;
-        lower[waiting] = way * (middle + 1) + (1 - way) * low;
+        lower[waiting] = axis * (middle + 1) + (1 - axis) * low;
         upper[waiting++] = high;
     }
 }
@@ -137,12 +140,11 @@ void divide(const Bins* bins, const Grid* grid, const Corners* t, int3 lowest, i
 // with two bricks, so that they are computed once.
 #define MANY_BRICKS UINT_MAX
 
-void visitFew(const Bins* bins, const Grid* grid, const Corners* t, uint code, uint parts) {
+void addToFewBricks(const Bins* bins, const Grid* grid, const Corners* t, uint code, uint parts) {
     const uint lowest = code >> 3, xStep = (uint)(grid->size[1] * grid->size[2]), yStep = (uint)(grid->size[2]);
     for (uint x = 0; x <= (code >> 2 & 1); ++x)
         for (uint y = 0; y <= (code >> 1 & 1); ++y)
-            for (uint z = 0; z <= (code & 1); ++z)
-                visit(bins, grid, t, lowest + x * xStep + y * yStep + z, parts);
+            for (uint z = 0; z <= (code & 1); ++z) addToBrick(bins, grid, t, lowest + x * xStep + y * yStep + z, parts);
 }
 
 // The bricks around the triangles of a batch: lowest and extent, inclusive.
@@ -160,12 +162,12 @@ void bricksAround(const Grid* grid, const Batch* batch, Int3* lowest, Int3* exte
     extent->z = (toRealInt(floor(high.z + grid->reach)) >> grid->shift) - first.z;
 }
 
-void divideTriangle(const Bins* bins, const Grid* grid, global const float* points, global const uint* triangles,
-                    uint parts) {
+void addToManyBricks(const Bins* bins, const Grid* grid, global const float* points, global const uint* triangles,
+                     uint parts) {
     const Corners t = cornersOf(points, triangles, bins->triangle, grid->voxelsPerUnit);
     const double3 low = min(t.a, min(t.b, t.c)) - grid->reach, high = max(t.a, max(t.b, t.c)) + grid->reach;
-    divide(bins, grid, &t, (convert_int3(floor(low)) >> grid->shift) - toInt3(grid->first),
-           (convert_int3(floor(high)) >> grid->shift) - toInt3(grid->first), parts);
+    addToBricks(bins, grid, &t, (convert_int3(floor(low)) >> grid->shift) - toInt3(grid->first),
+                (convert_int3(floor(high)) >> grid->shift) - toInt3(grid->first), parts);
 }
 
 // Counts the triangles of a batch in the bricks around them, and stores their codes.
@@ -178,18 +180,18 @@ void countBatch(Bins* bins, const Grid* grid, const Batch* batch, global const f
     const uint few = bitsOfReal((extent.x <= 1) & (extent.y <= 1) & (extent.z <= 1));
     int all[BATCH], parts[BATCH];
     storeRealInt(code, all);
-    storeRealInt(partsOfAny(grid, batch), parts);
-    for (uint rest = batch->real; rest != 0; rest &= rest - 1) {
+    storeRealInt(partsOfBatch(grid, batch), parts);
+    for (uint rest = batch->valid; rest != 0; rest &= rest - 1) {
         const int lane = lowestBit(rest);
         bins->triangle = batch->triangle[lane];
         if (few >> lane & 1) {
             codes[bins->triangle] = (uint)(all[lane]);
             Corners t;
             if (parts[lane] == 0) t = cornersOf(points, triangles, bins->triangle, grid->voxelsPerUnit);
-            visitFew(bins, grid, &t, (uint)(all[lane]), (uint)(parts[lane]));
+            addToFewBricks(bins, grid, &t, (uint)(all[lane]), (uint)(parts[lane]));
         } else {
             codes[bins->triangle] = MANY_BRICKS;
-            divideTriangle(bins, grid, points, triangles, (uint)(parts[lane]));
+            addToManyBricks(bins, grid, points, triangles, (uint)(parts[lane]));
         }
     }
 }
@@ -199,48 +201,49 @@ void countBatch(Bins* bins, const Grid* grid, const Batch* batch, global const f
 typedef struct {
     ulong begin, end, step;
     uint run;
-} Turn;
+} TriangleRange;
 
-Turn ownTurn(const Grid* grid) {
+TriangleRange ownRange(const Grid* grid) {
     const ulong count = grid->triangles, item = get_global_id(0), items = get_global_size(0);
 #if ITEMS > 1
-    const Turn turn = {item, count, items, 0};
+    const TriangleRange range = {item, count, items, 0};
 #else
-    const Turn turn = {count * item / items, count * (item + 1) / items, BATCH, (uint)(item)};
+    const TriangleRange range = {count * item / items, count * (item + 1) / items, BATCH, (uint)(item)};
 #endif
-    return turn;
+    return range;
 }
 
 // `cursors` has runs x cells counters, `more` has one per cell; all must be zero. Stores a code for each triangle.
 kernel void countTriangles(global const float* points, global const uint* triangles, Grid grid, global uint* cursors,
-                           global uint* more, global uint* codes) {
-    const Turn turn = ownTurn(&grid);
-    Bins bins = {cursors + turn.run * grid.cells, more, 0, 0};
-    for (ulong i = turn.begin; i < turn.end; i += turn.step) {
+                           global uint* extraParts, global uint* codes) {
+    const TriangleRange range = ownRange(&grid);
+    Bins bins = {cursors + range.run * grid.cells, extraParts, 0, 0};
+    for (ulong i = range.begin; i < range.end; i += range.step) {
         Batch batch;
-        fetchBatch(&batch, points, triangles, 0, (uint)(i), (uint)(turn.end), grid.voxelsPerUnit);
+        fetchBatch(&batch, points, triangles, 0, (uint)(i), (uint)(range.end), grid.voxelsPerUnit);
         countBatch(&bins, &grid, &batch, points, triangles, codes);
     }
 }
 
 // Converts counts to offsets by a scan. The b-th brick that has triangles gets its cell, its first triangle and its
 // first part. `total` receives the counts of such bricks, of triangles and of parts. One group does all the work.
-GROUP_KERNEL void placeBricks(Grid grid, global uint* cursors, global const uint* more, global uint* cellOfBrick,
-                              global uint* triangleOffsets, global uint* partOffsets, global ulong* total) {
+GROUP_KERNEL void scanBricks(Grid grid, global uint* cursors, global const uint* extraParts, global uint* cellOfBrick,
+                             global uint* triangleOffsets, global uint* partOffsets, global ulong* total) {
     SHARED ulong bricks[ITEMS], triangles[ITEMS], pieces[ITEMS];
-    const uint begin = (uint)((ulong)(grid.cells) * ITEM / ITEMS), end = (uint)((ulong)(grid.cells) * (ITEM + 1) / ITEMS);
+    const uint begin = (uint)((ulong)(grid.cells) * ITEM / ITEMS),
+               end = (uint)((ulong)(grid.cells) * (ITEM + 1) / ITEMS);
     ulong brick = 0, triangle = 0, part = 0;
     for (uint cell = begin; cell < end; ++cell) {
         uint inCell = 0;
         for (uint run = 0; run < grid.runs; ++run) inCell += cursors[run * grid.cells + cell];
         brick += inCell > 0;
         triangle += inCell;
-        part += (uint)(inCell + more[cell]);
+        part += (uint)(inCell + extraParts[cell]);
     }
     bricks[ITEM] = brick;
     triangles[ITEM] = triangle;
     pieces[ITEM] = part;
-    MEET;
+    BARRIER;
     brick = triangle = part = 0;
     for (uint i = 0; i < ITEM; ++i) {
         brick += bricks[i];
@@ -260,7 +263,7 @@ GROUP_KERNEL void placeBricks(Grid grid, global uint* cursors, global const uint
         cellOfBrick[brick] = cell;
         triangleOffsets[brick] = (uint)(first);
         partOffsets[brick++] = (uint)(part);
-        part += (uint)(inCell + more[cell]);
+        part += (uint)(inCell + extraParts[cell]);
     }
     if (ITEM < ITEMS - 1) return;
     triangleOffsets[brick] = (uint)(triangle);
@@ -270,16 +273,17 @@ GROUP_KERNEL void placeBricks(Grid grid, global uint* cursors, global const uint
     total[2] = part;
 }
 
-// Lists the triangles of each brick, at the offsets from placeBricks().
+// Lists the triangles of each brick, at the offsets from scanBricks().
 kernel void listTriangles(global const float* points, global const uint* triangles, Grid grid, global uint* cursors,
                           global const uint* codes, global uint* list) {
-    const Turn turn = ownTurn(&grid);
-    Bins bins = {cursors + turn.run * grid.cells, 0, list, 0};
-    for (ulong i = turn.begin; i < turn.end; i += ITEMS > 1 ? turn.step : 1) {
+    const TriangleRange range = ownRange(&grid);
+    Bins bins = {cursors + range.run * grid.cells, 0, list, 0};
+    const ulong step = ITEMS > 1 ? range.step : 1;
+    for (ulong i = range.begin; i < range.end; i += step) {
         bins.triangle = (uint)(i);
         if (codes[i] != MANY_BRICKS)
-            visitFew(&bins, &grid, 0, codes[i], 1);
+            addToFewBricks(&bins, &grid, 0, codes[i], 1);
         else
-            divideTriangle(&bins, &grid, points, triangles, 1);
+            addToManyBricks(&bins, &grid, points, triangles, 1);
     }
 }

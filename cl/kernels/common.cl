@@ -4,8 +4,8 @@
 //   default             a work-item does the work of a whole group: for processors, whose vector units process two rows
 //                       of voxels at once
 //   -D GROUP_PER_BLOCK  a work-group of 64 items works together, each on one row of a block: for GPUs
-// The source is the same for both. The items of a group divide loops, `ITEM, ITEM + ITEMS, ...`, and meet at barriers.
-// A group of one item runs all of the loop and needs no barrier.
+// The source is the same for both. The items of a group divide loops, `ITEM, ITEM + ITEMS, ...`, and synchronise at
+// barriers. A group of one item runs all of the loop and needs no barrier.
 #pragma OPENCL FP_CONTRACT OFF
 #pragma OPENCL EXTENSION cl_khr_fp64 : enable
 
@@ -17,7 +17,7 @@
 
 #define ITEMS 64
 #define ITEM ((uint)(get_local_id(0)))
-#define MEET barrier(CLK_LOCAL_MEM_FENCE | CLK_GLOBAL_MEM_FENCE)
+#define BARRIER barrier(CLK_LOCAL_MEM_FENCE | CLK_GLOBAL_MEM_FENCE)
 #define SHARED local
 #define GROUP_KERNEL kernel __attribute__((reqd_work_group_size(ITEMS, 1, 1)))
 #define LANES 8
@@ -29,7 +29,7 @@ typedef int8 IntLanes;
 
 #define ITEMS 1
 #define ITEM 0u
-#define MEET
+#define BARRIER
 #define SHARED private
 #define GROUP_KERNEL kernel __attribute__((reqd_work_group_size(1, 1, 1)))
 #define LANES 16
@@ -40,21 +40,21 @@ typedef int16 IntLanes;
 #endif
 
 // Unaligned vectors. vstore16() does the same, but PoCL makes many small stores of it.
-typedef Lanes LooseLanes __attribute__((aligned(4)));
-typedef IntLanes LooseIntLanes __attribute__((aligned(4)));
-#define storeLanes(value, index, pointer) (*(LooseLanes*)((pointer) + (index) * LANES) = (value))
-#define storeSharedLanes(value, index, pointer) (*(SHARED LooseLanes*)((pointer) + (index) * LANES) = (value))
-#define storeSharedInts(value, index, pointer) (*(SHARED LooseIntLanes*)((pointer) + (index) * LANES) = (value))
-#define storeGlobalLanes(value, index, pointer) (*(global LooseLanes*)((pointer) + (index) * LANES) = (value))
-#define storeGlobalInts(value, index, pointer) (*(global LooseIntLanes*)((pointer) + (index) * LANES) = (value))
+typedef Lanes UnalignedLanes __attribute__((aligned(4)));
+typedef IntLanes UnalignedIntLanes __attribute__((aligned(4)));
+#define storeLanes(value, index, pointer) (*(UnalignedLanes*)((pointer) + (index) * LANES) = (value))
+#define storeSharedLanes(value, index, pointer) (*(SHARED UnalignedLanes*)((pointer) + (index) * LANES) = (value))
+#define storeSharedInts(value, index, pointer) (*(SHARED UnalignedIntLanes*)((pointer) + (index) * LANES) = (value))
+#define storeGlobalLanes(value, index, pointer) (*(global UnalignedLanes*)((pointer) + (index) * LANES) = (value))
+#define storeGlobalInts(value, index, pointer) (*(global UnalignedIntLanes*)((pointer) + (index) * LANES) = (value))
 
 // Loops over values that shall stay in registers, and functions used in such loops.
 #define UNROLLED _Pragma("unroll")
 // Loops over scattered memory: single loads are faster than the vectors that compilers make of them.
 #ifdef __clang__
-#define ONE_BY_ONE _Pragma("clang loop vectorize(disable) interleave(disable)")
+#define SCALAR_LOOP _Pragma("clang loop vectorize(disable) interleave(disable)")
 #else
-#define ONE_BY_ONE
+#define SCALAR_LOOP
 #endif
 #define INLINED inline __attribute__((always_inline))
 
@@ -63,6 +63,9 @@ typedef IntLanes LooseIntLanes __attribute__((aligned(4)));
 
 // Value of all distances beyond reach: farAway of sdf/leaf/blocks.h.
 #define FAR_AWAY 1e30f
+
+// linkSlack of sdf/leaf/sign_propagation.h [voxels].
+#define LINK_SLACK 1e-4f
 
 // Corners of a triangle or of a part of one [voxels].
 typedef struct {
@@ -121,16 +124,16 @@ int lowestBit(uint bits) {
 
 // A bit for each lane where the comparison is true.
 #if COMPRESSES
-#define bitsOf(held) ((uint)(__builtin_ia32_cvtd2mask512(held)))
+#define bitsOf(mask) ((uint)(__builtin_ia32_cvtd2mask512(mask)))
 #define compressInts(values, bits) __builtin_ia32_compresssi512_mask(values, (IntLanes)(0), (ushort)(bits))
 #else
-uint bitsOf(IntLanes held) {
+uint bitsOf(IntLanes mask) {
     const ulong gather = 0x0102040810204080ul;
 #if LANES == 16
-    const ulong2 bytes = as_ulong2(convert_uchar16(held & 1)) * gather >> 56;
+    const ulong2 bytes = as_ulong2(convert_uchar16(mask & 1)) * gather >> 56;
     return (uint)(bytes.x | bytes.y << 8);
 #else
-    return (uint)(as_ulong(convert_uchar8(held & 1)) * gather >> 56);
+    return (uint)(as_ulong(convert_uchar8(mask & 1)) * gather >> 56);
 #endif
 }
 #endif
@@ -140,28 +143,28 @@ IntLanes lanesOf(uint bits) {
     return ((IntLanes)(bits) & (IntLanes)(1) << laneInts) != 0;
 }
 
-bool anyLane(IntLanes held) {
+bool anyLane(IntLanes mask) {
 #if COMPRESSES
-    return bitsOf(held) != 0;
+    return bitsOf(mask) != 0;
 #elif LANES == 16
-    const ulong2 bytes = as_ulong2(convert_char16(held));
+    const ulong2 bytes = as_ulong2(convert_char16(mask));
     return (bytes.x | bytes.y) != 0;
 #else
-    return as_ulong(convert_char8(held)) != 0;
+    return as_ulong(convert_char8(mask)) != 0;
 #endif
 }
 
 // Adds to a counter that all groups, or the items of a group, share. Returns the old value.
 #if ITEMS > 1
-#define takeGlobal(counter, count) atomic_add(counter, count)
-#define takeShared(counter, count) atomic_add(counter, count)
+#define fetchAddGlobal(counter, count) atomic_add(counter, count)
+#define fetchAddShared(counter, count) atomic_add(counter, count)
 #else
-uint takeGlobal(global uint* counter, uint count) {
+uint fetchAddGlobal(global uint* counter, uint count) {
     const uint before = *counter;
     *counter = before + count;
     return before;
 }
-uint takeShared(SHARED uint* counter, uint count) {
+uint fetchAddShared(SHARED uint* counter, uint count) {
     const uint before = *counter;
     *counter = before + count;
     return before;

@@ -4,7 +4,7 @@
 
 // [voxels]
 #define CELL_DIAGONAL 1.7320508f
-#define BOUND_DOWNWARD (1 - 0x1p-22)
+#define ROUND_DOWN (1 - 0x1p-22)
 // Bits of a coordinate below the voxel, which leave room for those of the voxel in its block in the same word. Adding
 // the second number moves a fixed-point number to the lower bits of a double below 2^22.
 #define FRACTION_BITS 29
@@ -51,34 +51,34 @@ float interpolationError(float3 fraction) {
 }
 
 // Clearance::around() [voxels].
-float clearanceAt(const Field* field, double3 place) {
-    const double3 point = place / (double)(PART_SIDE);
+float clearanceAt(const Field* field, double3 position) {
+    const double3 point = position / (double)(PART_SIDE);
     const int3 size = BLOCK_SIDE / PART_SIDE * blocksOf(field);
     const int3 part = min(convert_int3(clamp(convert_float3(point), (float3)(0.0f), convert_float3(size))), size - 1);
-    const double3 way = point - (convert_double3(part) + 0.5);
-    const float length = (float)(sqrt(way.x * way.x + way.y * way.y + way.z * way.z));
-    const float centre = (float)(field->centres[centreOf(part, blocksOf(field))]) * (1.0f / WAY_STEPS);
+    const double3 offset = point - (convert_double3(part) + 0.5);
+    const float length = (float)(sqrt(offset.x * offset.x + offset.y * offset.y + offset.z * offset.z));
+    const float centre = (float)(field->centres[centreOf(part, blocksOf(field))]) * (1.0f / CLEARANCE_STEPS);
     return (float)(PART_SIDE) * (fabs(centre) - length);
 }
 
 // The bound for points outside of the directory's box, and for coordinates that are not numbers.
-float boundOutside(const Field* field, double3 place, double3 extent) {
-    const double3 way = place - clamp(place, (double3)(0.0), extent);
-    const double length = sqrt(way.x * way.x + way.y * way.y + way.z * way.z);
+float boundOutside(const Field* field, double3 position, double3 extent) {
+    const double3 offset = position - clamp(position, (double3)(0.0), extent);
+    const double length = sqrt(offset.x * offset.x + offset.y * offset.y + offset.z * offset.z);
     if (!isfinite(length)) return INFINITY;
     const Frame* frame = &field->frame;
     const double bound =
         (length - (double)(CELL_DIAGONAL)) * (double)(frame->voxelSize) + (double)(frame->exteriorWidth);
-    return (float)(clamp(BOUND_DOWNWARD * bound, 0.0, (double)(FLT_MAX)));
+    return (float)(clamp(ROUND_DOWN * bound, 0.0, (double)(FLT_MAX)));
 }
 
-float boundInEmptyBlock(const Field* field, bool inside, double3 place) {
+float boundInEmptyBlock(const Field* field, bool inside, double3 position) {
     const Frame* frame = &field->frame;
-    const double3 rest = place - (double)(BLOCK_SIDE)*floor(place / (double)(BLOCK_SIDE));
+    const double3 rest = position - (double)(BLOCK_SIDE)*floor(position / (double)(BLOCK_SIDE));
     const bool ownCell = max(max(rest.x, rest.y), rest.z) <= (double)(BLOCK_SIDE - 1);
     const float width = inside ? frame->interiorWidth : frame->exteriorWidth;
-    const float besideBand = width - (ownCell ? 0.5f : 1.0f) * CELL_DIAGONAL * frame->voxelSize;
-    const float bound = max(0.0f, max(besideBand, frame->voxelSize * clearanceAt(field, place)));
+    const float nextToBand = width - (ownCell ? 0.5f : 1.0f) * CELL_DIAGONAL * frame->voxelSize;
+    const float bound = max(0.0f, max(nextToBand, frame->voxelSize * clearanceAt(field, position)));
     return inside ? -bound : bound;
 }
 
@@ -90,8 +90,8 @@ Cell cellAt(const Field* field, int entry, int3 inBlock) {
 }
 
 bool isInBand(const Field* field, const Cell* cell) {
-    const float least = -field->frame.interiorWidth, most = field->frame.exteriorWidth;
-    return all(cell->low > least && cell->low < most && cell->high > least && cell->high < most);
+    const float lower = -field->frame.interiorWidth, upper = field->frame.exteriorWidth;
+    return all(cell->low > lower && cell->low < upper && cell->high > lower && cell->high < upper);
 }
 
 // Replaces values that are not numbers in the host's layout by the band's widths.
@@ -101,13 +101,14 @@ float4 withWidths(const Frame* frame, float4 values) {
 }
 
 // The bound in a cell with a voxel beyond the band.
-float boundBesideBand(const Field* field, float distance, double3 place) {
+float boundNextToBand(const Field* field, float distance, double3 position) {
     const Frame* frame = &field->frame;
-    const float besideBand =
+    const float nextToBand =
         (distance < 0 ? frame->interiorWidth : frame->exteriorWidth) - CELL_DIAGONAL * frame->voxelSize;
-    const float within = fabs(distance) - frame->voxelSize * interpolationError(convert_float3(place - floor(place)));
-    const float known = max(within, frame->voxelSize * clearanceAt(field, place));
-    return copysign(max(0.0f, max(besideBand, known)), distance);
+    const float within =
+        fabs(distance) - frame->voxelSize * interpolationError(convert_float3(position - floor(position)));
+    const float known = max(within, frame->voxelSize * clearanceAt(field, position));
+    return copysign(max(0.0f, max(nextToBand, known)), distance);
 }
 
 Sample beyondBand(float distance) {
@@ -124,12 +125,12 @@ Sample sampleAt(const Field* field, float3 point) {
     const ulong3 words = as_ulong3(fixed);
     const uint3 block = convert_uint3(words >> 32) - (uint)(as_ulong(FIXED_POINT) >> 32);
     const uint3 inBlock = convert_uint3(words & 0xffffffffUL);
-    const double3 place = (convert_double3(point) - origin) * frame->perMetre;
+    const double3 position = (convert_double3(point) - origin) * frame->perMetre;
     if (any(block >= convert_uint3(blocksOf(field))))
-        return beyondBand(boundOutside(field, place, convert_double3(BLOCK_SIDE * blocksOf(field))));
+        return beyondBand(boundOutside(field, position, convert_double3(BLOCK_SIDE * blocksOf(field))));
 
     const int entry = field->directory[indexOf(convert_int3(block), blocksOf(field))];
-    if (entry < 0) return beyondBand(boundInEmptyBlock(field, entry == EMPTY_INSIDE, place));
+    if (entry < 0) return beyondBand(boundInEmptyBlock(field, entry == EMPTY_INSIDE, position));
 
     const int3 bits = convert_int3(inBlock & ((1u << FRACTION_BITS) - 1));
     const float3 fraction = convert_float3(bits) * (1.0f / (1 << FRACTION_BITS));
@@ -140,7 +141,7 @@ Sample sampleAt(const Field* field, float3 point) {
         cell.high = withWidths(frame, cell.high);
     }
     const float4 found = interpolate(&cell, fraction);
-    if (!inBand) return beyondBand(boundBesideBand(field, found.x, place));
+    if (!inBand) return beyondBand(boundNextToBand(field, found.x, position));
     const float3 gradient = found.yzw * (float)(frame->perMetre);
     const Sample sample = {found.x, {gradient.x, gradient.y, gradient.z}, 1};
     return sample;

@@ -7,10 +7,10 @@
 // Entries of the directory that are not block numbers.
 #define EMPTY_OUTSIDE -1
 #define EMPTY_INSIDE -2
-// Clearances: voxels along a coarse cell, coarse cells along a block, and the unit of stored vectors.
+// Clearances: voxels along a coarse cell, coarse cells along a block, and the unit of stored distances.
 #define PART_SIDE 4
 #define PARTS_ALONG 2
-#define WAY_STEPS 8
+#define CLEARANCE_STEPS 8
 
 // FieldFrame of collider/field/field_layout.h; metres and voxels as there.
 typedef struct {
@@ -34,7 +34,7 @@ size_t voxelOf(int block, int3 inBlock) {
     return (size_t)(block)*BLOCK_FLOATS + (inBlock.x * STRIDE + inBlock.y) * STRIDE + inBlock.z;
 }
 
-// Index of a coarse cell's vector to the surface. The cells of a block are contiguous, in the order of the directory.
+// Index of a coarse cell's distance to the surface. The cells of a block are contiguous, in the order of the directory.
 size_t centreOf(int3 part, int3 blocks) {
     const int3 inBlock = part & (PARTS_ALONG - 1);
     return (indexOf(part / PARTS_ALONG, blocks) * PARTS_ALONG + inBlock.x) * PARTS_ALONG * PARTS_ALONG +

@@ -3,20 +3,20 @@
 #include "groups.cl"
 
 // Longer edges are halved [voxels].
-#define LONGEST_PIECE_EDGE 16.0
+#define MAX_PIECE_EDGE 16.0
 // Upper limit of the halvings of a triangle in a grid.
-#define MOST_HALVINGS 80
+#define MAX_HALVINGS 80
 // Rounding of a sample's position and of the radius around it [voxels].
 #define RADIUS_SLACK 1e-5f
 // Shorter edges count as points, and pieces of less height as their longest edge. Floats can hold the squares of all
 // greater lengths [voxels].
-#define SHORTEST 1e-9f
+#define MIN_LENGTH 1e-9f
 // Pieces with a mean radius below this are grouped. The cell size is their mean radius times a factor, within limits
 // [voxels].
 #define SMALL_RADIUS 1.6
 #define CELL_FACTOR 4.0f
-#define SMALLEST_CELL 1.1f
-#define LARGEST_CELL 3.0f
+#define MIN_CELL 1.1f
+#define MAX_CELL 3.0f
 
 // A piece in its own frame: Piece of sdf/fill/pieces.h.
 typedef struct {
@@ -31,14 +31,14 @@ typedef struct {
 
 bool isShort(const Corners* t) {
     return max(lengthSquared(t->b - t->a), max(lengthSquared(t->c - t->b), lengthSquared(t->a - t->c))) <=
-           LONGEST_PIECE_EDGE * LONGEST_PIECE_EDGE;
+           MAX_PIECE_EDGE * MAX_PIECE_EDGE;
 }
 
 uint shortBits(const Batch* batch) {
-    return bitsOfReal(toReal(longestEdges2(batch)) <= (float)(LONGEST_PIECE_EDGE * LONGEST_PIECE_EDGE)) & batch->real;
+    return bitsOfReal(toReal(longestEdges2(batch)) <= (float)(MAX_PIECE_EDGE * MAX_PIECE_EDGE)) & batch->valid;
 }
 
-RealInt partsOfAny(const Grid* grid, const Batch* batch) {
+RealInt partsOfBatch(const Grid* grid, const Batch* batch) {
     (void)(grid);
     return lanesOfBits(shortBits(batch)) & 1;
 }
@@ -66,7 +66,7 @@ void halve(const Corners* t, Corners* first, Corners* second) {
 
 // The parts of a triangle that are still to be cut.
 typedef struct {
-    Corners waiting[MOST_HALVINGS];
+    Corners waiting[MAX_HALVINGS];
     int count;
 } Parts;
 
@@ -97,31 +97,43 @@ uint countParts(const Grid* grid, const Corners* t, const Limits* limits) {
 
 // The inverse of a length; zero for a length of zero.
 Real inverse(Real length) {
-    return select((Real)(0.0f), 1.0f / length, length > SHORTEST);
+    return select((Real)(0.0f), 1.0f / length, length > MIN_LENGTH);
 }
 
 // A unit vector perpendicular to a unit vector: for pieces without a height.
-Real3 across(Real3 u) {
+Real3 perpendicularTo(Real3 u) {
     const Real zero = 0.0f, one = 1.0f;
     const RealInt useX = fabs(u.x) < 0.6f;
-    const Real3 way = cross3(u, select3(make3(zero, one, zero), make3(one, zero, zero), useX));
-    return scale3(inverse(sqrt(dot3(way, way))), way);
+    const Real3 perpendicular = cross3(u, select3(make3(zero, one, zero), make3(one, zero, zero), useX));
+    return scale3(inverse(sqrt(dot3(perpendicular, perpendicular))), perpendicular);
 }
 
 // The numbers of a batch of pieces, a column each: those of Piece, then the sample in the brick's voxels.
-enum { ORIGIN = 0, AXIS_U = 3, AXIS_W = 6, AXIS_N = 9, LENGTH = 12, LEFT = 13, RIGHT = 16, SAMPLE = 19, COVER = 22,
-       PIECE_ROWS = 24, IN_BRICK = 24, ROWS = 27 };
+enum {
+    ORIGIN = 0,
+    AXIS_U = 3,
+    AXIS_W = 6,
+    AXIS_N = 9,
+    LENGTH = 12,
+    LEFT = 13,
+    RIGHT = 16,
+    SAMPLE = 19,
+    COVERING_RADIUS = 22,
+    PIECE_ROWS = 24,
+    IN_BRICK = 24,
+    ROWS = 27
+};
 
-void put3(float (*columns)[BATCH], int row, Real3 value) {
+void store3(float (*columns)[BATCH], int row, Real3 value) {
     storeReal(value.x, columns[row]);
     storeReal(value.y, columns[row + 1]);
     storeReal(value.z, columns[row + 2]);
 }
 
 // The unit vector and the length of an edge in (u, w).
-void putEdge(float (*columns)[BATCH], int row, Real x, Real y) {
+void storeEdge(float (*columns)[BATCH], int row, Real x, Real y) {
     const Real size = sqrt(x * x + y * y), part = inverse(size);
-    put3(columns, row, make3(select((Real)(1.0f), x * part, size > SHORTEST), y * part, size));
+    store3(columns, row, make3(select((Real)(1.0f), x * part, size > MIN_LENGTH), y * part, size));
 }
 
 // Computes the frames of pieces, from a corner relative to a lattice point and the vectors from there to the next
@@ -137,32 +149,32 @@ void makeColumns(Real3 corner, Real3 ab, Real3 ac, Real3 shift, float (*columns)
     const Real3 third = select3(select3(sub3(ab, ac), sub3(none, ab), isSecond), ac, isFirst);
 
     const Real size = sqrt(dot3(edge, edge));
-    const Real3 u = select3(make3(one, zero, zero), scale3(inverse(size), edge), size > SHORTEST);
+    const Real3 u = select3(make3(one, zero, zero), scale3(inverse(size), edge), size > MIN_LENGTH);
     const Real along = min(max(dot3(third, u), zero), size);
     const Real3 rest = sub3(third, scale3(along, u));
     Real height = sqrt(dot3(rest, rest));
     // orthogonalised to u again, since the rest of a flat piece is mostly rounding; if nothing remains, all of it was
-    const Real3 rough = scale3(inverse(height), rest), way = sub3(rough, scale3(dot3(rough, u), u));
-    const Real wayLength = sqrt(dot3(way, way));
-    const RealInt flat = height <= SHORTEST || wayLength < 0.5f;
-    const Real3 w = select3(scale3(inverse(wayLength), way), across(u), flat);
+    const Real3 rough = scale3(inverse(height), rest), perpendicular = sub3(rough, scale3(dot3(rough, u), u));
+    const Real perpendicularLength = sqrt(dot3(perpendicular, perpendicular));
+    const RealInt flat = height <= MIN_LENGTH || perpendicularLength < 0.5f;
+    const Real3 w = select3(scale3(inverse(perpendicularLength), perpendicular), perpendicularTo(u), flat);
     height = select(height, zero, flat);
-    put3(columns, ORIGIN, begin);
-    put3(columns, AXIS_U, u);
-    put3(columns, AXIS_W, w);
-    put3(columns, AXIS_N, cross3(u, w));
+    store3(columns, ORIGIN, begin);
+    store3(columns, AXIS_U, u);
+    store3(columns, AXIS_W, w);
+    store3(columns, AXIS_N, cross3(u, w));
     storeReal(size, columns[LENGTH]);
-    putEdge(columns, LEFT, along, height);
-    putEdge(columns, RIGHT, along - size, height);
+    storeEdge(columns, LEFT, along, height);
+    storeEdge(columns, RIGHT, along - size, height);
     // the centre of the smallest circle around the piece: the circumcircle, or the middle of the longest edge
     const Real middle = 0.5f * size;
     const Real lift = (along * along + height * height - along * size) / (height + height);
     const Real up = select(max(lift, zero), zero, flat);
     const Real3 sample = add3(begin, add3(scale3(middle, u), scale3(up, w)));
-    put3(columns, SAMPLE, sample);
-    put3(columns, IN_BRICK, add3(sample, shift));
-    storeReal(sqrt(middle * middle + up * up) + RADIUS_SLACK, columns[COVER]);
-    storeReal(zero, columns[COVER + 1]);
+    store3(columns, SAMPLE, sample);
+    store3(columns, IN_BRICK, add3(sample, shift));
+    storeReal(sqrt(middle * middle + up * up) + RADIUS_SLACK, columns[COVERING_RADIUS]);
+    storeReal(zero, columns[COVERING_RADIUS + 1]);
 }
 
 // The pieces of a brick, and their count so far.
@@ -170,44 +182,45 @@ typedef struct {
     global Piece* pieces;
     global Member* members;
     SHARED uint* count;
-    uint first;    // index of the brick's first piece
-    int3 origin;   // of the brick
+    uint first;   // index of the brick's first piece
+    int3 origin;  // of the brick
     Extent extent;
-} Cut;
+} PieceOutput;
 
 float4 fourOf(float (*columns)[BATCH], int row, int lane) {
     return (float4)(columns[row][lane], columns[row + 1][lane], columns[row + 2][lane], columns[row + 3][lane]);
 }
 
 // Makes pieces and their members from some lanes.
-void makePieces(Cut* cut, uint lanes, Real3 corner, Real3 ab, Real3 ac, int (*base)[BATCH], const uint* triangles) {
+void makePieces(PieceOutput* output, uint lanes, Real3 corner, Real3 ab, Real3 ac, int (*base)[BATCH],
+                const uint* triangles) {
     float columns[ROWS][BATCH];
-    const Real3 shift = make3(toRealFromInt(loadRealInt(base[0]) - cut->origin.x),
-                              toRealFromInt(loadRealInt(base[1]) - cut->origin.y),
-                              toRealFromInt(loadRealInt(base[2]) - cut->origin.z));
+    const Real3 shift = make3(toRealFromInt(loadRealInt(base[0]) - output->origin.x),
+                              toRealFromInt(loadRealInt(base[1]) - output->origin.y),
+                              toRealFromInt(loadRealInt(base[2]) - output->origin.z));
     makeColumns(corner, ab, ac, shift, columns);
-    uint place = takeShared(cut->count, popcount(lanes));
-    float3 lower = vload3(0, cut->extent.lower), upper = vload3(0, cut->extent.upper);
+    uint slot = fetchAddShared(output->count, popcount(lanes));
+    float3 lower = vload3(0, output->extent.lower), upper = vload3(0, output->extent.upper);
     float radii = 0;
-    for (; lanes != 0; lanes &= lanes - 1, ++place) {
+    for (; lanes != 0; lanes &= lanes - 1, ++slot) {
         const int lane = lowestBit(lanes);
-        global Piece* piece = cut->pieces + place;
+        global Piece* piece = output->pieces + slot;
         *(global int4*)(piece->base) = (int4)(base[0][lane], base[1][lane], base[2][lane], (int)(triangles[lane]));
         global float4* numbers = (global float4*)(piece->origin);
         UNROLLED for (int row = 0; row < PIECE_ROWS; row += 4) numbers[row / 4] = fourOf(columns, row, lane);
         const float3 sample = fourOf(columns, IN_BRICK, lane).xyz;
-        const float radius = columns[COVER][lane];
-        global float4* member = (global float4*)(cut->members + place);
+        const float radius = columns[COVERING_RADIUS][lane];
+        global float4* member = (global float4*)(output->members + slot);
         member[0] = (float4)(sample, radius);
         member[1] = (float4)(columns[AXIS_N][lane], columns[AXIS_N + 1][lane], columns[AXIS_N + 2][lane],
-                             as_float(cut->first + place));
+                             as_float(output->first + slot));
         lower = min(lower, sample);
         upper = max(upper, sample);
         radii += radius;
     }
-    vstore3(lower, 0, cut->extent.lower);
-    vstore3(upper, 0, cut->extent.upper);
-    cut->extent.radii += radii;
+    vstore3(lower, 0, output->extent.lower);
+    vstore3(upper, 0, output->extent.upper);
+    output->extent.radii += radii;
 }
 
 // Parts of long triangles that wait until they fill a batch: their lattice points, a corner relative to it, and the
@@ -223,21 +236,20 @@ Real3 load3(float (*from)[BATCH]) {
     return make3(loadReal(from[0]), loadReal(from[1]), loadReal(from[2]));
 }
 
-void flush(Cut* cut, Waiting* waiting) {
+void flush(PieceOutput* output, Waiting* waiting) {
     if (waiting->count == 0) return;
-    makePieces(cut, (1u << waiting->count) - 1, load3(waiting->corner), load3(waiting->ab), load3(waiting->ac),
+    makePieces(output, (1u << waiting->count) - 1, load3(waiting->corner), load3(waiting->ab), load3(waiting->ac),
                waiting->base, waiting->triangle);
     waiting->count = 0;
 }
 
 // The lattice point nearest to a point. Halves round up, so that a shift by whole voxels shifts the result.
-#define nearestLattice(place) floor((place) + 0.5)
+#define nearestLattice(point) floor((point) + 0.5)
 
-void addPart(Cut* cut, Waiting* waiting, const Corners* t, uint triangle) {
+void addPart(PieceOutput* output, Waiting* waiting, const Corners* t, uint triangle) {
     const uint at = waiting->count;
     const double3 base = nearestLattice(t->a), corner = t->a - base, ab = t->b - t->a, ac = t->c - t->a;
-    const double from[12] = {base.x, base.y, base.z, corner.x, corner.y, corner.z,
-                             ab.x,   ab.y,   ab.z,   ac.x,     ac.y,     ac.z};
+    const double from[12] = {base.x, base.y, base.z, corner.x, corner.y, corner.z, ab.x, ab.y, ab.z, ac.x, ac.y, ac.z};
     for (int axis = 0; axis < 3; ++axis) {
         waiting->base[axis][at] = (int)(from[axis]);
         waiting->corner[axis][at] = (float)(from[3 + axis]);
@@ -245,20 +257,20 @@ void addPart(Cut* cut, Waiting* waiting, const Corners* t, uint triangle) {
         waiting->ac[axis][at] = (float)(from[9 + axis]);
     }
     waiting->triangle[at] = triangle;
-    if (++waiting->count == BATCH) flush(cut, waiting);
+    if (++waiting->count == BATCH) flush(output, waiting);
 }
 
-void cutLong(Cut* cut, Waiting* waiting, const Corners* t, uint triangle, const Limits* limits) {
+void cutLong(PieceOutput* output, Waiting* waiting, const Corners* t, uint triangle, const Limits* limits) {
     Parts parts;
     Corners part;
     parts.waiting[0] = *t;
     parts.count = 1;
-    while (nextPart(&parts, limits, &part)) addPart(cut, waiting, &part, triangle);
+    while (nextPart(&parts, limits, &part)) addPart(output, waiting, &part, triangle);
 }
 
 // Cuts the triangles of a list.
-void cutTriangles(Cut* cut, global const float* points, global const uint* triangles, global const uint* list,
-                  uint begin, uint end, double voxelsPerUnit, const Limits* limits) {
+void cutTriangles(PieceOutput* output, global const float* points, global const uint* triangles,
+                  global const uint* list, uint begin, uint end, double voxelsPerUnit, const Limits* limits) {
     Waiting waiting;
     waiting.count = 0;
     for (uint first = begin + ITEM * BATCH; first < end; first += ITEMS * BATCH) {
@@ -266,21 +278,21 @@ void cutTriangles(Cut* cut, global const float* points, global const uint* trian
         fetchBatch(&batch, points, triangles, list, first, end, voxelsPerUnit);
         const Exact3 base = {nearestLattice(batch.a.x), nearestLattice(batch.a.y), nearestLattice(batch.a.z)};
         const Exact3 ab = subExact(batch.b, batch.a), ac = subExact(batch.c, batch.a);
-        const uint shortOnes = shortBits(&batch);
+        const uint shortTriangles = shortBits(&batch);
         int bases[3][BATCH];
         storeRealInt(toRealInt(base.x), bases[0]);
         storeRealInt(toRealInt(base.y), bases[1]);
         storeRealInt(toRealInt(base.z), bases[2]);
-        if (shortOnes)
-            makePieces(cut, shortOnes, toReal3(subExact(batch.a, base)), toReal3(ab), toReal3(ac), bases,
+        if (shortTriangles)
+            makePieces(output, shortTriangles, toReal3(subExact(batch.a, base)), toReal3(ab), toReal3(ac), bases,
                        batch.triangle);
-        for (uint rest = batch.real & ~shortOnes; rest != 0; rest &= rest - 1) {
+        for (uint rest = batch.valid & ~shortTriangles; rest != 0; rest &= rest - 1) {
             const uint one = batch.triangle[lowestBit(rest)];
             const Corners t = cornersOf(points, triangles, one, voxelsPerUnit);
-            cutLong(cut, &waiting, &t, one, limits);
+            cutLong(output, &waiting, &t, one, limits);
         }
     }
-    flush(cut, &waiting);
+    flush(output, &waiting);
 }
 
 // Makes a cluster of a group of pieces, with a sample and a radius that covers all of them: sdf/fill/clusters.h.
@@ -288,7 +300,7 @@ void makeCluster(const Groups* groups, uint index, global const Member* members)
     const uint begin = groups->begins[index], end = groups->begins[index + 1];
     float3 mean = 0, normal = 0;
     for (uint m = begin; m < end; ++m) {
-        mean += vload3(0, members[m].place);
+        mean += vload3(0, members[m].position);
         normal += vload3(0, members[m].normal);
     }
     mean /= (float)(end - begin);
@@ -298,19 +310,19 @@ void makeCluster(const Groups* groups, uint index, global const Member* members)
     float3 sample = 0;
     float nearest2 = INFINITY;
     for (uint m = begin; m < end; ++m) {
-        const float3 place = vload3(0, members[m].place), away = place - mean;
-        const float away2 = dot(away, away);
-        if (away2 < nearest2) {
-            nearest2 = away2;
-            sample = place;
+        const float3 position = vload3(0, members[m].position), offset = position - mean;
+        const float distance2 = dot(offset, offset);
+        if (distance2 < nearest2) {
+            nearest2 = distance2;
+            sample = position;
         }
     }
     float radius = 0, thickness = 0;
     for (uint m = begin; m < end; ++m) {
-        const float3 away = vload3(0, members[m].place) - sample;
+        const float3 offset = vload3(0, members[m].position) - sample;
         const float facing = dot(vload3(0, members[m].normal), normal), own = members[m].radius;
-        radius = max(radius, length(away) + own);
-        thickness = max(thickness, fabs(dot(away, normal)) + own * sqrt(max(0.0f, 1 - facing * facing)));
+        radius = max(radius, length(offset) + own);
+        thickness = max(thickness, fabs(dot(offset, normal)) + own * sqrt(max(0.0f, 1 - facing * facing)));
     }
-    putGroup(groups, index, sample, radius + GROUP_SLACK, normal, thickness + GROUP_SLACK);
+    storeGroup(groups, index, sample, radius + GROUP_SLACK, normal, thickness + GROUP_SLACK);
 }

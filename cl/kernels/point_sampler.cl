@@ -4,7 +4,7 @@
 
 // How far the interpolant may be below the distance [voxels], and a generous bound of the rounding of a bounding
 // sphere. Points that are not culled are sampled.
-#define MOST_INTERPOLATION_ERROR 0.87f
+#define MAX_INTERPOLATION_ERROR 0.87f
 #define BALL_ROUNDING 0.01f
 
 // The offsets of a body in the shared buffers.
@@ -28,7 +28,7 @@ typedef struct {
     uint query, point;
     float distance, gradient[3];
     uint inBand;
-} Found;
+} FoundPoint;
 
 // Applies an affine map, given by its columns.
 float3 mapped(const Query* query, float3 p) {
@@ -56,16 +56,17 @@ bool isOutside(const Field* field, float3 centre, float radius) {
     const float3 toBox = centre - inBox;
     if (dot(toBox, toBox) > radius * radius) return true;
     const int3 part = min(convert_int3(inBox), size - 1);
-    const float3 way = centre - (convert_float3(part) + 0.5f);
-    const float left = (float)(field->centres[centreOf(part, blocksOf(field))]) * (1.0f / WAY_STEPS) - radius;
-    return left > 0 && dot(way, way) < left * left;
+    const float3 toCentre = centre - (convert_float3(part) + 0.5f);
+    const float clearance =
+        (float)(field->centres[centreOf(part, blocksOf(field))]) * (1.0f / CLEARANCE_STEPS) - radius;
+    return clearance > 0 && dot(toCentre, toCentre) < clearance * clearance;
 }
 
-bool isOfInterest(const Field* field, const Query* query, const Ball* ball) {
+bool mayBeWithinReach(const Field* field, const Query* query, const Ball* ball) {
     const Frame* frame = &field->frame;
     const float perPart = (float)(frame->perMetre) / (float)(PART_SIDE);
     const double3 place = convert_double3(mapped(query, vload3(0, ball->centre))) - vload3(0, frame->origin);
-    const float reach = query->reach * perPart + MOST_INTERPOLATION_ERROR / (float)(PART_SIDE) + BALL_ROUNDING;
+    const float reach = query->reach * perPart + MAX_INTERPOLATION_ERROR / (float)(PART_SIDE) + BALL_ROUNDING;
     return !isOutside(field, convert_float3(place) * perPart, ball->radius * query->scale * perPart + reach);
 }
 
@@ -73,7 +74,7 @@ bool isOfInterest(const Field* field, const Query* query, const Ball* ball) {
 kernel void samplePoints(global const Body* bodies, global const Query* queries, uint queryCount, uint ballCount,
                          uint ballsPerItem, global const int* directories, global const char* centres,
                          global const float* values, global const float* points, global const Ball* balls,
-                         uint capacity, global uint* count, global Found* found) {
+                         uint capacity, global uint* count, global FoundPoint* found) {
     const uint first = (uint)(get_global_id(0)) * ballsPerItem, last = min(ballCount, first + ballsPerItem);
     if (first >= last) return;
     uint at = queryOf(queries, queryCount, first);
@@ -85,15 +86,15 @@ kernel void samplePoints(global const Body* bodies, global const Query* queries,
         const Field field = {other->frame, directories + other->directory, centres + other->centres,
                              values + other->values};
         const Ball ball = balls[body->balls + (i - query.firstBall)];
-        if (!isOfInterest(&field, &query, &ball)) continue;
+        if (!mayBeWithinReach(&field, &query, &ball)) continue;
         global const float* own = points + 3 * body->points;
         for (uint p = ball.begin; p < ball.end; ++p) {
             const Sample sample = sampleAt(&field, mapped(&query, vload3(p, own)));
             if (!(sample.distance <= query.reach) || (!sample.inBand && !(sample.distance < 0))) continue;
             const uint place = atomic_inc(count);
             if (place >= capacity) continue;
-            const Found answer = {at, p, sample.distance,
-                                  {sample.gradient[0], sample.gradient[1], sample.gradient[2]}, sample.inBand};
+            const FoundPoint answer = {
+                at, p, sample.distance, {sample.gradient[0], sample.gradient[1], sample.gradient[2]}, sample.inBand};
             found[place] = answer;
         }
     }

@@ -24,7 +24,7 @@ typedef struct {
     float u[3], n[3], origin[3];
     float lower[3], upper[3];
     float length, apex[2];
-    float lean[3][2];
+    float sideNormal[3][2];
     int triangle;
 } Prism;
 
@@ -34,7 +34,7 @@ typedef struct {
     float lower[2], upper[2];  // in x and y
     float2 corner[3], along[3];
     float length[3];
-    float2 lean[3];
+    float2 sideNormal[3];
     int triangle;
 } Scanned;
 
@@ -73,7 +73,7 @@ Scanned scanned(Prism prism, float3 place) {
         const float2 edge = s.corner[(k + 1) % 3] - s.corner[k];
         s.length[k] = sqrt(edge.x * edge.x + edge.y * edge.y);
         s.along[k] = edge / s.length[k];
-        s.lean[k] = (float2)(prism.lean[k][0], prism.lean[k][1]);
+        s.sideNormal[k] = (float2)(prism.sideNormal[k][0], prism.sideNormal[k][1]);
     }
     s.triangle = prism.triangle;
     return s;
@@ -85,24 +85,24 @@ void scanRow(Rows* rows, int row, const Scanned* prism, float x, float y, float 
     const float8 u = prism->origin.x + prism->u.x * x + prism->u.y * y + prism->u.z * z,
                  w = prism->origin.y + prism->w.x * x + prism->w.y * y + prism->w.z * z,
                  h = prism->origin.z + prism->n.x * x + prism->n.y * y + prism->n.z * z;
-    float8 within[3];  // distance from each edge on the triangle's side
-    int8 held = fabs(h) <= reach, overFace = (int8)(-1);
+    float8 depth[3];  // distance from each edge on the triangle's side
+    int8 covered = fabs(h) <= reach, overFace = (int8)(-1);
     for (int k = 0; k < 3; ++k) {
-        const float2 corner = prism->corner[k], along = prism->along[k], lean = prism->lean[k];
-        within[k] = along.x * (w - corner.y) - along.y * (u - corner.x);
-        held &= lean.x * within[k] + lean.y * h >= -overlap;
-        overFace &= within[k] >= 0.0f;
+        const float2 corner = prism->corner[k], along = prism->along[k], sideNormal = prism->sideNormal[k];
+        depth[k] = along.x * (w - corner.y) - along.y * (u - corner.x);
+        covered &= sideNormal.x * depth[k] + sideNormal.y * h >= -overlap;
+        overFace &= depth[k] >= 0.0f;
     }
-    if (!any(held)) return;
-    float8 beside2 = (float8)(INFINITY);
+    if (!any(covered)) return;
+    float8 edge2 = (float8)(INFINITY);
     for (int k = 0; k < 3; ++k) {
         const float2 corner = prism->corner[k], along = prism->along[k];
         const float8 s = along.x * (u - corner.x) + along.y * (w - corner.y),
                      beyond = s - clamp(s, 0.0f, prism->length[k]);
-        beside2 = min(beside2, beyond * beyond + within[k] * within[k]);
+        edge2 = min(edge2, beyond * beyond + depth[k] * depth[k]);
     }
-    const float8 squared = h * h + select(beside2, (float8)(0.0f), overFace);
-    const int8 nearer = held & (squared < fabs(rows->signed2[row]));
+    const float8 squared = h * h + select(edge2, (float8)(0.0f), overFace);
+    const int8 nearer = covered & (squared < fabs(rows->signed2[row]));
     rows->signed2[row] = select(rows->signed2[row], select(squared, -squared, h < 0.0f), nearer);
     if (TRIANGLES) rows->owner[row] = select(rows->owner[row], (int8)(prism->triangle), nearer);
 }

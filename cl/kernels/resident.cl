@@ -8,12 +8,10 @@
 #define NEEDED 0
 // bandEdge of sdf/leaf/band.h [voxels].
 #define BAND_EDGE 1e-5f
-// linkSlack of sdf/leaf/sign_propagation.h [voxels].
-#define LINK_SLACK 1e-4f
 // As in collider/field/coarse_distance.cpp, clearance.h and field_layout.cpp.
-#define MOST_PARTS 16
-// Maximum length of a stored vector [WAY_STEPS].
-#define MOST_WAY 127
+#define MAX_PARTS 16
+// Maximum stored distance [CLEARANCE_STEPS].
+#define MAX_CLEARANCE_STEPS 127
 #define NEAR_SURFACE (0.5f * 1.7320508f)
 
 // BandWidths of sdf/leaf/band.h.
@@ -35,12 +33,12 @@ typedef struct {
 #define OPEN 8
 
 // Combines the bits of all items by OR.
-uint together(SHARED uint* bits, uint own) {
+uint combineBits(SHARED uint* bits, uint own) {
     bits[ITEM] = own;
-    MEET;
+    BARRIER;
     uint all = 0;
     for (uint i = 0; i < ITEMS; ++i) all |= bits[i];
-    MEET;
+    BARRIER;
     return all;
 }
 
@@ -69,7 +67,7 @@ SHARED uchar* growSides(SHARED uchar* from, SHARED uchar* to, SHARED uint* bits)
         SHARED uchar* const next = to;
         to = from;
         from = next;
-        if (!together(bits, changed)) return from;
+        if (!combineBits(bits, changed)) return from;
     }
 }
 
@@ -114,7 +112,7 @@ GROUP_KERNEL void trimBlocks(global const int* origins, global const float* dist
     }
     lowest[ITEM] = low;
     highest[ITEM] = high;
-    has = together(bits, has);
+    has = combineBits(bits, has);
     const int3 origin = vload3(b, origins);
     const bool known = has & (OUTSIDE | INSIDE) && origin.x != NO_BLOCK,
                needed = known && (has & ACTIVE || (has & OUTSIDE && has & INSIDE));
@@ -149,7 +147,7 @@ GROUP_KERNEL void placeBlocks(Frame frame, int4 firstVoxel, global const int* or
         if (side == NEEDED) number = atomic_inc(next);
         directory[indexOf(at, size)] = side == NEEDED ? (int)(number) : side;
     }
-    MEET;
+    BARRIER;
     if (side != NEEDED) return;
     for (uint row = ITEM; row < BLOCK_SIDE * BLOCK_SIDE; row += ITEMS) {
         const int3 inBlock = (int3)((int)(row) / BLOCK_SIDE, (int)(row) % BLOCK_SIDE, 0);
@@ -227,8 +225,8 @@ int3 layerVoxel(int axis, int layer, int row) {
 // Whether two neighbouring values have different signs without room for the surface between them. Empty space is at
 // least a voxel away from it, or the width of a narrower band.
 bool conflict(float a, float b, bool empty, float voxelSize) {
-    const float room = voxelSize * (1 + LINK_SLACK);
-    return signbit(a) != signbit(b) && fabs(a) > room - (empty ? min(fabs(b), voxelSize) : fabs(b));
+    const float separation = voxelSize * (1 + LINK_SLACK);
+    return signbit(a) != signbit(b) && fabs(a) > separation - (empty ? min(fabs(b), voxelSize) : fabs(b));
 }
 
 // Counts contradictory neighbours in different blocks, as Assembler::conflicts() does, and empty entries that touch
@@ -264,34 +262,34 @@ int3 ownPart(void) {
 
 // Initialises the clearances: 0 for coarse cells that the surface crosses, `far` for others. Sets only the signs in the
 // centres. A work-item does a cell.
-kernel void measureParts(Frame frame, float far, global const int* directory, global const float* values,
-                         global float* ways, global char* centres) {
+kernel void initialiseParts(Frame frame, float far, global const int* directory, global const float* values,
+                            global float* distances2, global char* centres) {
     const int3 blocks = vload3(0, frame.blocks), part = ownPart(), block = part / PARTS_ALONG;
     if (part.z >= PARTS_ALONG * blocks.z) return;
     const size_t p = indexOf(part, PARTS_ALONG * blocks);
     const int entry = directory[indexOf(block, blocks)];
     if (entry < 0) {
-        ways[p] = far;
+        distances2[p] = far;
         centres[centreOf(part, blocks)] = entry == EMPTY_INSIDE ? -1 : 1;
         return;
     }
     global const float* corner = values + voxelOf(entry, PART_SIDE * (part - PARTS_ALONG * block));
-    float least = INFINITY, most = -INFINITY, nearest = INFINITY;
+    float minValue = INFINITY, maxValue = -INFINITY, nearest = INFINITY;
     for (int x = 0; x <= PART_SIDE; ++x)
         for (int y = 0; y <= PART_SIDE; ++y)
             for (int z = 0; z <= PART_SIDE; ++z) {
                 const float value = corner[(x * STRIDE + y) * STRIDE + z];
-                least = min(least, value);
-                most = max(most, value);
+                minValue = min(minValue, value);
+                maxValue = max(maxValue, value);
                 nearest = min(nearest, fabs(value));
             }
-    ways[p] = nearest <= NEAR_SURFACE * frame.voxelSize || (least < 0) != (most < 0) ? 0 : far;
-    centres[centreOf(part, blocks)] = least < 0 ? -1 : 1;
+    distances2[p] = nearest <= NEAR_SURFACE * frame.voxelSize || (minValue < 0) != (maxValue < 0) ? 0 : far;
+    centres[centreOf(part, blocks)] = minValue < 0 ? -1 : 1;
 }
 
-// Propagates squared distances along one more axis: transformRow() of collider/field/coarse_distance.cpp. A work-item
-// does a coarse cell.
-kernel void spreadParts(Frame frame, int axis, global const float* from, global float* to) {
+// Propagates squared distances along one more axis: transformRow() of collider/field/coarse_distance.cpp. A work-item does
+// a coarse cell.
+kernel void transformParts(Frame frame, int axis, global const float* from, global float* to) {
     const int3 size = PARTS_ALONG * vload3(0, frame.blocks);
     const int3 part = ownPart();
     if (part.z >= size.z) return;
@@ -303,26 +301,26 @@ kernel void spreadParts(Frame frame, int axis, global const float* from, global 
                       : axis == 1 ? size.y
                                   : size.z;
     float best = from[p];
-    const int reach = min(MOST_PARTS, max(i, count - 1 - i));
+    const int reach = min(MAX_PARTS, max(i, count - 1 - i));
     for (int d = 1; d <= reach; ++d) {
-        const float way = ((float)(d)-0.5f) * ((float)(d)-0.5f);
-        if (way >= best) break;
-        if (i >= d) best = min(best, way + from[p - d * step]);
-        if (i + d < count) best = min(best, way + from[p + d * step]);
+        const float along2 = ((float)(d)-0.5f) * ((float)(d)-0.5f);
+        if (along2 >= best) break;
+        if (i >= d) best = min(best, along2 + from[p - d * step]);
+        if (i + d < count) best = min(best, along2 + from[p + d * step]);
     }
     to[p] = best;
 }
 
-// Converts squared distances to distances [WAY_STEPS], rounded down, with the signs of the centres. A work-item does a
-// coarse cell.
-kernel void storeCentres(Frame frame, global const float* ways, global char* centres) {
+// Converts squared distances to distances [CLEARANCE_STEPS], rounded down, with the signs of the centres. A work-item
+// does a coarse cell.
+kernel void storeCentres(Frame frame, global const float* distances2, global char* centres) {
     const int3 blocks = vload3(0, frame.blocks), part = ownPart();
     if (part.z >= PARTS_ALONG * blocks.z) return;
-    const int squared = (int)(WAY_STEPS * WAY_STEPS * ways[indexOf(part, PARTS_ALONG * blocks)]);
-    int way = (int)(sqrt((float)(squared)));
+    const int squared = (int)(CLEARANCE_STEPS * CLEARANCE_STEPS * distances2[indexOf(part, PARTS_ALONG * blocks)]);
+    int steps = (int)(sqrt((float)(squared)));
     // a device may round square roots either way
-    while (way * way > squared) --way;
-    while ((way + 1) * (way + 1) <= squared) ++way;
+    while (steps * steps > squared) --steps;
+    while ((steps + 1) * (steps + 1) <= squared) ++steps;
     global char* centre = centres + centreOf(part, blocks);
-    *centre = (char)(*centre * min(way, MOST_WAY));
+    *centre = (char)(*centre * min(steps, MAX_CLEARANCE_STEPS));
 }

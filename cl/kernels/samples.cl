@@ -1,16 +1,7 @@
-// The samples of the double layer method in a brick. Triangles are cut into parts, the parts are sampled, and the
-// samples are sorted by cells of space: sdf/fill/tile_cutter.h and sdf/fill/layer_samples.h on a device.
-#include "bins.cl"
+// The samples of the double layer method in a brick. The parts of triangles are sampled, and the samples are sorted by
+// cells of space: sdf/fill/layer_samples.h on a device.
+#include "tile_cutter.cl"
 
-// Algorithm 1 divides the longest edge into as many parts as the others. If the parts are longer than this many square
-// roots of epsilon, the triangle is a sliver.
-#define SLIVER_STEP 3.0
-// Spacing of the samples along a thin part [square roots of epsilon], and the number after which the sequence restarts.
-#define THIN_STEP 1.6
-#define MOST_ALONG (1 << 30)
-#define THIN_RUN 16
-// Upper limit of the tiles that wait at once for a triangle of a grid.
-#define MOST_TILES 160
 // Triangles of up to this many rows are sampled in batches of triangles. The samples of one with more rows are a batch
 // of their own.
 #define FEW_ROWS 4
@@ -25,7 +16,7 @@
 
 // Samples of all bricks of a batch, a column for each number. Positions are in the brick's voxels. Offsets lead from
 // them to the outer layer, and negated to the inner layer [voxels]. Only unsorted samples have a cell.
-enum { PLACE_X, PLACE_Y, PLACE_Z, OFFSET_X, OFFSET_Y, OFFSET_Z, OWNER, CELL };
+enum { POSITION_X, POSITION_Y, POSITION_Z, OFFSET_X, OFFSET_Y, OFFSET_Z, OWNER, CELL };
 
 // Index of the first sample of a brick of a batch: each brick has space for one more vector.
 uint firstSample(global const uint* partOffsets, uint firstBrick, uint brick) {
@@ -53,196 +44,6 @@ SampleCells cellsFor(const Grid* grid) {
     return cells;
 }
 
-// A part of a triangle that is still to be cut or to be sampled.
-typedef struct {
-    Corners corners;
-    double area, longest2;
-} Tile;
-
-typedef struct {
-    Tile waiting[MOST_TILES];
-    int count;
-} Tiles;
-
-double longestEdge2(const Corners* t) {
-    return max(lengthSquared(t->b - t->a), max(lengthSquared(t->c - t->b), lengthSquared(t->a - t->c)));
-}
-
-Corners cornersFrom(double3 a, double3 b, double3 c) {
-    const Corners corners = {a, b, c};
-    return corners;
-}
-
-void wait(Tiles* tiles, const Limits* limits, Corners corners, double area, double longest2) {
-    if (misses(&corners, limits)) return;
-    const Tile tile = {corners, area, longest2};
-    tiles->waiting[tiles->count++] = tile;
-}
-
-// The same triangle, its longest edge from a to b.
-Corners turnedToLongest(const Corners* t) {
-    const double ab2 = lengthSquared(t->b - t->a), bc2 = lengthSquared(t->c - t->b), ca2 = lengthSquared(t->a - t->c);
-    if (bc2 > ab2 && bc2 >= ca2) return cornersFrom(t->b, t->c, t->a);
-    if (ca2 > ab2) return cornersFrom(t->c, t->a, t->b);
-    return *t;
-}
-
-// Halves a tile at the middle of the longest edge.
-void halve(Tiles* tiles, const Limits* limits, const Tile* tile) {
-    const Corners t = turnedToLongest(&tile->corners);
-    const double3 middle = 0.5 * (t.a + t.b);
-    const Corners first = cornersFrom(t.a, middle, t.c), second = cornersFrom(middle, t.b, t.c);
-    wait(tiles, limits, second, 0.5 * tile->area, longestEdge2(&second));
-    wait(tiles, limits, first, 0.5 * tile->area, longestEdge2(&first));
-}
-
-void quarter(Tiles* tiles, const Limits* limits, const Tile* tile) {
-    const Corners* t = &tile->corners;
-    const double3 ab = 0.5 * (t->a + t->b), bc = 0.5 * (t->b + t->c), ca = 0.5 * (t->c + t->a);
-    const double area = 0.25 * tile->area, longest2 = 0.25 * tile->longest2;
-    wait(tiles, limits, cornersFrom(ab, bc, ca), area, longest2);
-    wait(tiles, limits, cornersFrom(ca, bc, t->c), area, longest2);
-    wait(tiles, limits, cornersFrom(ab, t->b, bc), area, longest2);
-    wait(tiles, limits, cornersFrom(t->a, ab, ca), area, longest2);
-}
-
-// The samples of a part of a triangle: rows of them, or one row along it if it is thin. None if it must be cut.
-typedef struct {
-    int rows;   // n of Algorithm 1; 1 in Fig. 2 of the paper
-    int along;  // see ThinPart
-} Shape;
-
-Shape shapeOf(const Sampling* sampling, const Tile* tile) {
-    const double epsilon = sampling->epsilon, sliver2 = SLIVER_STEP * SLIVER_STEP * epsilon, area = tile->area,
-                 longest2 = tile->longest2;
-    const Shape cut = {0, 0}, one = {1, 0};
-    if (sampling->recursive) return area <= epsilon && !(sampling->fillGaps && longest2 > sliver2) ? one : cut;
-    const double n = max(1.0, ceil(sqrt(area / epsilon))), most = sampling->maxSubdivision;
-    if (sampling->fillGaps && longest2 > sliver2 * n * n) {
-        const Shape thin = {0, (int)(min(ceil(sqrt(longest2 / (THIN_STEP * THIN_STEP * epsilon))), (double)(MOST_ALONG)))};
-        return 4 * area * area <= epsilon * longest2 ? thin : cut;
-    }
-    const Shape rows = {(int)(min(n, most)), 0};
-    return sampling->fillGaps && n > most ? cut : rows;
-}
-
-void cutTile(Tiles* tiles, const Sampling* sampling, const Limits* limits, const Tile* tile) {
-    const double epsilon = sampling->epsilon, n2 = ceil(sqrt(tile->area / epsilon)) * ceil(sqrt(tile->area / epsilon));
-    const bool isSliver = tile->longest2 > SLIVER_STEP * SLIVER_STEP * epsilon * max(1.0, n2);
-    if (sampling->recursive ? tile->area <= 2 * epsilon : isSliver)
-        halve(tiles, limits, tile);
-    else
-        quarter(tiles, limits, tile);
-}
-
-// Takes the next tile that is to be sampled. False if there is none left.
-bool nextTile(Tiles* tiles, const Sampling* sampling, const Limits* limits, Tile* tile, Shape* shape) {
-    while (tiles->count > 0) {
-        *tile = tiles->waiting[--tiles->count];
-        *shape = shapeOf(sampling, tile);
-        if (shape->rows + shape->along > 0) return true;
-        cutTile(tiles, sampling, limits, tile);
-    }
-    return false;
-}
-
-// ThinPart of sdf/fill/tile_cutter.h.
-typedef struct {
-    double3 from, edge, rise;
-    double peak;
-    int along;
-    int begin, end;  // range of the runs that may be within the limits
-} Thin;
-
-// A run of its samples.
-typedef struct {
-    double3 start, startStep;
-    double up, upStep, down, downStep;
-    int count;
-} ThinRun;
-
-Thin thinWithin(const Corners* t, int along, const Limits* limits) {
-    const Corners turned = turnedToLongest(t);
-    Thin thin = {.from = turned.a, .edge = turned.b - turned.a, .along = along};
-    const double3 opposite = turned.c - turned.a, none = 0.0;
-    thin.peak = clamp(dot(opposite, thin.edge) / dot(thin.edge, thin.edge), 1e-6, 1 - 1e-6);
-    thin.rise = 0.5 * (opposite - thin.peak * thin.edge);
-    const double3 lower = limits->lower - max(thin.rise, none) - thin.from,
-                  upper = limits->upper - min(thin.rise, none) - thin.from;
-    // on an axis perpendicular to the edge, all of it is within the limits, or nothing
-    const long3 across = thin.edge == 0.0;
-    if (any(across && (lower > 0.0 || upper < 0.0))) return thin;
-    const double3 way = select(thin.edge, (double3)(1.0), across);
-    const double3 a = select(lower / way, none, across), b = select(upper / way, (double3)(1.0), across);
-    const double3 nearer = min(a, b), farther = max(a, b);
-    const double low = max(0.0, max(nearer.x, max(nearer.y, nearer.z))),
-                 high = min(1.0, min(farther.x, min(farther.y, farther.z)));
-    if (low > high) return thin;
-    // one more sample at each end allows for rounding
-    thin.begin = max(0, (int)(low * along) - 2) / THIN_RUN * THIN_RUN;
-    thin.end = min(along, (int)(high * along) + 2);
-    return thin;
-}
-
-ThinRun thinRun(const Thin* thin, int first) {
-    const double step = 1.0 / thin->along, at = (first + 1.0 / 3.0) * step, peak = thin->peak;
-    const ThinRun run = {thin->from + at * thin->edge,
-                         step * thin->edge,
-                         at / peak,
-                         step / peak,
-                         (1 - at) / (1 - peak),
-                         -step / (1 - peak),
-                         min(THIN_RUN, thin->along - first)};
-    return run;
-}
-
-uint countThin(const Corners* t, int along, const Limits* limits) {
-    const Thin thin = thinWithin(t, along, limits);
-    const int end = min(along, (thin.end + THIN_RUN - 1) / THIN_RUN * THIN_RUN);
-    return (uint)(end - thin.begin);
-}
-
-// Starts with a whole triangle.
-void beginTiles(Tiles* tiles, const Corners* t, double3 normal) {
-    const Tile whole = {*t, 0.5 * length(normal), longestEdge2(t)};
-    tiles->waiting[0] = whole;
-    tiles->count = 1;
-}
-
-double3 normalOf(const Corners* t) {
-    return cross(t->b - t->a, t->c - t->a);
-}
-
-Exact3 normals(const Batch* batch) {
-    return crossExact(subExact(batch->b, batch->a), subExact(batch->c, batch->a));
-}
-
-// Rows of Algorithm 1 for triangles of a batch that need no cut; 0 for the others.
-Exact rowsOfAny(const Sampling* sampling, const Batch* batch, Exact size) {
-    const double epsilon = sampling->epsilon, most = sampling->recursive ? 1 : sampling->maxSubdivision;
-    const Exact rows = max((Exact)(1.0), ceil(sqrt(0.5 * size / epsilon)));
-    const Exact sliver2 = rows * rows * (SLIVER_STEP * SLIVER_STEP * epsilon);
-    return ((longestEdges2(batch) <= sliver2) & (rows <= most)) ? rows : (Exact)(0.0);
-}
-
-// Here a part is a sample.
-RealInt partsOfAny(const Grid* grid, const Batch* batch) {
-    const Exact rows = rowsOfAny(&grid->sampling, batch, sqrt(squareExact(normals(batch))));
-    return toRealInt(0.5 * rows * (rows + 1.0));
-}
-
-uint countParts(const Grid* grid, const Corners* t, const Limits* limits) {
-    Tiles tiles;
-    Tile tile;
-    beginTiles(&tiles, t, normalOf(t));
-    Shape shape;
-    uint count = 0;
-    while (nextTile(&tiles, &grid->sampling, limits, &tile, &shape))
-        count += shape.rows > 0 ? (uint)(shape.rows * (shape.rows + 1) / 2)
-                                : countThin(&tile.corners, shape.along, limits);
-    return count;
-}
-
 // The samples of a brick, and their count so far.
 typedef struct {
     global float* samples;  // the first sample in the first column
@@ -252,53 +53,54 @@ typedef struct {
     double3 origin;  // of the brick
     SampleCells cells;
     float delta;
-} Cut;
+} SampleOutput;
 
 // Adds the samples of some lanes, except those that do not reach the brick.
-void addSamples(Cut* cut, uint among, Real3 place, Real3 offset, RealInt owner) {
-    const SampleCells* c = &cut->cells;
-    const RealInt within = (place.x >= c->lower) & (place.x <= c->upper) & (place.y >= c->lower) &
-                           (place.y <= c->upper) & (place.z >= c->lower) & (place.z <= c->upper);
-    among &= bitsOfReal(within);
-    if (among == 0) return;
+void addSamples(SampleOutput* output, uint lanes, Real3 position, Real3 offset, RealInt owner) {
+    const SampleCells* c = &output->cells;
+    const RealInt within = (position.x >= c->lower) & (position.x <= c->upper) & (position.y >= c->lower) &
+                           (position.y <= c->upper) & (position.z >= c->lower) & (position.z <= c->upper);
+    lanes &= bitsOfReal(within);
+    if (lanes == 0) return;
     const float perCell = 1.0f / CELL_SIDE;
-    const RealInt x = toRealInt((place.x - c->firstCorner) * perCell),
-                  y = toRealInt((place.y - c->firstCorner) * perCell),
-                  z = toRealInt((place.z - c->firstCorner) * perCell);
-    global float* to = cut->samples + takeShared(cut->count, popcount(among));
-    const uint stride = cut->stride;
-    putSome(place.x, among, to + PLACE_X * stride);
-    putSome(place.y, among, to + PLACE_Y * stride);
-    putSome(place.z, among, to + PLACE_Z * stride);
-    putSome(offset.x, among, to + OFFSET_X * stride);
-    putSome(offset.y, among, to + OFFSET_Y * stride);
-    putSome(offset.z, among, to + OFFSET_Z * stride);
-    putSome(asReal(owner), among, to + OWNER * stride);
-    putSome(asReal((x * c->size + y) * c->size + z), among, to + CELL * stride);
+    const RealInt x = toRealInt((position.x - c->firstCorner) * perCell),
+                  y = toRealInt((position.y - c->firstCorner) * perCell),
+                  z = toRealInt((position.z - c->firstCorner) * perCell);
+    global float* to = output->samples + fetchAddShared(output->count, popcount(lanes));
+    const uint stride = output->stride;
+    storeCompressed(position.x, lanes, to + POSITION_X * stride);
+    storeCompressed(position.y, lanes, to + POSITION_Y * stride);
+    storeCompressed(position.z, lanes, to + POSITION_Z * stride);
+    storeCompressed(offset.x, lanes, to + OFFSET_X * stride);
+    storeCompressed(offset.y, lanes, to + OFFSET_Y * stride);
+    storeCompressed(offset.z, lanes, to + OFFSET_Z * stride);
+    storeCompressed(asReal(owner), lanes, to + OWNER * stride);
+    storeCompressed(asReal((x * c->size + y) * c->size + z), lanes, to + CELL * stride);
 }
 
 // The vectors that rows and columns of samples are made of.
 typedef struct {
     Real3 first, down, across, offset;
-} Spread;
+} SampleLattice;
 
-Real3 placeIn(const Spread* s, Real row, Real column) {
+Real3 positionIn(const SampleLattice* s, Real row, Real column) {
     return make3(multiplyAdd(column, s->across.x, multiplyAdd(row, s->down.x, s->first.x)),
                  multiplyAdd(column, s->across.y, multiplyAdd(row, s->down.y, s->first.y)),
                  multiplyAdd(column, s->across.z, multiplyAdd(row, s->down.z, s->first.z)));
 }
 
 // Adds the samples of Algorithm 1, one of each triangle of a batch at a time: row i has i + 1 of them.
-void addFew(Cut* cut, Real rows, const Spread* spread, RealInt owners) {
+void addRowsOfBatch(SampleOutput* output, Real rows, const SampleLattice* lattice, RealInt owners) {
     for (int i = 0;; ++i) {
-        const uint among = bitsOfReal(rows > (Real)((float)(i)));
-        if (among == 0) return;
+        const uint lanes = bitsOfReal(rows > (Real)((float)(i)));
+        if (lanes == 0) return;
         for (int j = 0; j <= i; ++j)
-            addSamples(cut, among, placeIn(spread, (Real)((float)(i)), (Real)((float)(j))), spread->offset, owners);
+            addSamples(output, lanes, positionIn(lattice, (Real)((float)(i)), (Real)((float)(j))), lattice->offset,
+                       owners);
     }
 }
 
-Real3 same3(double3 v) {
+Real3 splat3(double3 v) {
     return make3((Real)((float)(v.x)), (Real)((float)(v.y)), (Real)((float)(v.z)));
 }
 
@@ -308,53 +110,54 @@ uint firstLanes(int count) {
 }
 
 // The same for one part of a triangle, with many samples at once.
-void addPart(Cut* cut, const Corners* t, int rows, double3 normal, uint triangle) {
+void addPart(SampleOutput* output, const Corners* t, int rows, double3 normal, uint triangle) {
     const double step = 1.0 / rows;
     const double3 s1 = (t->b - t->a) * step, s2 = (t->c - t->b) * step, s3 = (t->c - t->a) * step;
-    const Spread spread = {same3(t->a - cut->origin + (s1 + s3) / 3.0), same3(s1), same3(s2),
-                           same3(normal * (cut->delta / length(normal)))};
+    const SampleLattice lattice = {splat3(t->a - output->origin + (s1 + s3) / 3.0), splat3(s1), splat3(s2),
+                                   splat3(normal * (output->delta / length(normal)))};
     const int count = rows * (rows + 1) / 2;
     for (int k = 0; k < count; k += BATCH) {
         // the roots are exact at the beginning of a row, and far enough from it before
         const Real number = laneNumbers + (float)(k);
         const Real row = floor((sqrt(multiplyAdd(number, (Real)(8.0f), (Real)(1.0f))) - 1.0f) * 0.5f),
                    column = number - 0.5f * multiplyAdd(row, row, row);
-        addSamples(cut, firstLanes(count - k), placeIn(&spread, row, column), spread.offset,
+        addSamples(output, firstLanes(count - k), positionIn(&lattice, row, column), lattice.offset,
                    (RealInt)((int)(triangle)));
     }
 }
 
 // The samples of a thin part.
-void addThin(Cut* cut, const Corners* t, int along, double3 normal, uint triangle, const Limits* limits) {
+void addThin(SampleOutput* output, const Corners* t, int along, double3 normal, uint triangle, const Limits* limits) {
     const Thin thin = thinWithin(t, along, limits);
-    const Real3 offset = same3(normal * (cut->delta / length(normal))), rise = same3(thin.rise);
+    const Real3 offset = splat3(normal * (output->delta / length(normal))), rise = splat3(thin.rise);
     for (int first = thin.begin; first < thin.end; first += THIN_RUN) {
         const ThinRun run = thinRun(&thin, first);
-        const Real3 start = same3(run.start - cut->origin), step = same3(run.startStep);
+        const Real3 start = splat3(run.start - output->origin), step = splat3(run.startStep);
         const Real up = (Real)((float)(run.up)), upStep = (Real)((float)(run.upStep)), down = (Real)((float)(run.down)),
                    downStep = (Real)((float)(run.downStep));
         for (int k = 0; k < run.count; k += BATCH) {
             const Real number = laneNumbers + (float)(k);
             const Real across = min(multiplyAdd(number, upStep, up), multiplyAdd(number, downStep, down));
-            const Real3 place = make3(multiplyAdd(across, rise.x, multiplyAdd(number, step.x, start.x)),
-                                      multiplyAdd(across, rise.y, multiplyAdd(number, step.y, start.y)),
-                                      multiplyAdd(across, rise.z, multiplyAdd(number, step.z, start.z)));
-            addSamples(cut, firstLanes(run.count - k), place, offset, (RealInt)((int)(triangle)));
+            const Real3 position = make3(multiplyAdd(across, rise.x, multiplyAdd(number, step.x, start.x)),
+                                         multiplyAdd(across, rise.y, multiplyAdd(number, step.y, start.y)),
+                                         multiplyAdd(across, rise.z, multiplyAdd(number, step.z, start.z)));
+            addSamples(output, firstLanes(run.count - k), position, offset, (RealInt)((int)(triangle)));
         }
     }
 }
 
 // Samples a triangle that must be cut.
-void cutLarge(Cut* cut, const Grid* grid, uint triangle, const Corners* t, double3 normal, const Limits* limits) {
+void sampleLarge(SampleOutput* output, const Grid* grid, uint triangle, const Corners* t, double3 normal,
+                 const Limits* limits) {
     Tiles tiles;
     Tile tile;
     beginTiles(&tiles, t, normal);
     Shape shape;
     while (nextTile(&tiles, &grid->sampling, limits, &tile, &shape)) {
         if (shape.rows > 0)
-            addPart(cut, &tile.corners, shape.rows, normal, triangle);
+            addPart(output, &tile.corners, shape.rows, normal, triangle);
         else
-            addThin(cut, &tile.corners, shape.along, normal, triangle, limits);
+            addThin(output, &tile.corners, shape.along, normal, triangle, limits);
     }
 }
 
@@ -375,69 +178,70 @@ Exact3 addExact(Exact3 a, Exact3 b) {
 
 // Samples the triangles of a batch that have few rows. Returns bits of the others that have an area, and the counted
 // rows of all.
-uint cutFew(Cut* cut, const Grid* grid, const Batch* batch, int* rowsOfEach) {
+uint sampleFewRows(SampleOutput* output, const Grid* grid, const Batch* batch, int* rowsOfEach) {
     const Exact3 ab = subExact(batch->b, batch->a), ac = subExact(batch->c, batch->a),
                  bc = subExact(batch->c, batch->b), normal = normals(batch);
-    const Exact size = sqrt(squareExact(normal)), rows = rowsOfAny(&grid->sampling, batch, size), step = 1.0 / rows;
+    const Exact size = sqrt(squareExact(normal)), rows = rowsOfBatch(&grid->sampling, batch, size), step = 1.0 / rows;
     storeRealInt(toRealInt(rows), rowsOfEach);
-    const uint real = bitsOfExact(size > 0.0) & batch->real;
-    const uint few = bitsOfExact((rows > 0.0) & (rows <= (double)(FEW_ROWS))) & real;
+    const uint valid = bitsOfExact(size > 0.0) & batch->valid;
+    const uint few = bitsOfExact((rows > 0.0) & (rows <= (double)(FEW_ROWS))) & valid;
     if (few != 0) {
         const Exact3 s1 = scaleExact(ab, step), start = scaleExact(addExact(s1, scaleExact(ac, step)), 1.0 / 3.0);
-        const Spread spread = {toReal3(addExact(fromOrigin(batch->a, cut->origin), start)), toReal3(s1),
-                               toReal3(scaleExact(bc, step)),
-                               toReal3(scaleExact(normal, (double)(cut->delta) / size))};
-        addFew(cut, select((Real)(0.0f), toReal(rows), lanesOfBits(few)), &spread,
-               loadRealInt((const int*)(batch->triangle)));
+        const SampleLattice lattice = {toReal3(addExact(fromOrigin(batch->a, output->origin), start)), toReal3(s1),
+                                       toReal3(scaleExact(bc, step)),
+                                       toReal3(scaleExact(normal, (double)(output->delta) / size))};
+        addRowsOfBatch(output, select((Real)(0.0f), toReal(rows), lanesOfBits(few)), &lattice,
+                       loadRealInt((const int*)(batch->triangle)));
     }
-    return real & ~few;
+    return valid & ~few;
 }
 
 // Samples the triangles of a list.
-void cutTriangles(Cut* cut, const Grid* grid, global const float* points, global const uint* triangles,
-                  global const uint* list, uint begin, uint end, const Limits* limits) {
+void sampleTriangles(SampleOutput* output, const Grid* grid, global const float* points, global const uint* triangles,
+                     global const uint* list, uint begin, uint end, const Limits* limits) {
     for (uint first = begin + ITEM * BATCH; first < end; first += ITEMS * BATCH) {
         Batch batch;
         fetchBatch(&batch, points, triangles, list, first, end, grid->voxelsPerUnit);
         int rows[BATCH];
-        for (uint rest = cutFew(cut, grid, &batch, rows); rest != 0; rest &= rest - 1) {
+        for (uint rest = sampleFewRows(output, grid, &batch, rows); rest != 0; rest &= rest - 1) {
             const int lane = lowestBit(rest);
             const uint triangle = batch.triangle[lane];
             const Corners t = cornersOf(points, triangles, triangle, grid->voxelsPerUnit);
             const double3 normal = normalOf(&t);
             if (rows[lane] > 0)
-                addPart(cut, &t, rows[lane], normal, triangle);
+                addPart(output, &t, rows[lane], normal, triangle);
             else
-                cutLarge(cut, grid, triangle, &t, normal, limits);
+                sampleLarge(output, grid, triangle, &t, normal, limits);
         }
     }
 }
 
 // Sorts the samples of a brick by cell. The cursors must be zero before. Afterwards they hold the first sample of each
 // cell, and the end of the last one.
-void sortSamples(const Cut* cut, uint count, global float* sorted, SHARED uint* sums) {
-    const uint cells = (uint)(cut->cells.size * cut->cells.size * cut->cells.size), stride = cut->stride;
-    global uint* places = (global uint*)(cut->samples + CELL * stride);
-    global uint* counts = cut->cursors + 2;
-    ONE_BY_ONE for (uint i = ITEM; i < count; i += ITEMS) takeGlobal(counts + places[i], 1);
-    MEET;
+void sortSamples(const SampleOutput* output, uint count, global float* sorted, SHARED uint* sums) {
+    const uint cells = (uint)(output->cells.size * output->cells.size * output->cells.size), stride = output->stride;
+    global uint* places = (global uint*)(output->samples + CELL * stride);
+    global uint* counts = output->cursors + 2;
+    SCALAR_LOOP for (uint i = ITEM; i < count; i += ITEMS) fetchAddGlobal(counts + places[i], 1);
+    BARRIER;
     const uint begin = cells * ITEM / ITEMS, end = cells * (ITEM + 1) / ITEMS;
     uint sum = 0;
     if (ITEMS > 1) {
         for (uint cell = begin; cell < end; ++cell) sum += counts[cell];
         sums[ITEM] = sum;
-        MEET;
+        BARRIER;
         sum = 0;
         for (uint i = 0; i < ITEM; ++i) sum += sums[i];
     }
     // converts the count of a cell to the first sample of the next one
     for (uint cell = begin; cell < end; ++cell) counts[cell] = sum += counts[cell];
-    MEET;
-    ONE_BY_ONE for (uint i = ITEM; i < count; i += ITEMS) places[i] = takeGlobal(cut->cursors + places[i] + 1, 1);
-    for (int column = PLACE_X; column <= OWNER; ++column) {
-        global const float* from = cut->samples + column * stride;
+    BARRIER;
+    SCALAR_LOOP for (uint i = ITEM; i < count; i += ITEMS) places[i] =
+        fetchAddGlobal(output->cursors + places[i] + 1, 1);
+    for (int column = POSITION_X; column <= OWNER; ++column) {
+        global const float* from = output->samples + column * stride;
         global float* to = sorted + column * stride;
-        ONE_BY_ONE for (uint i = ITEM; i < count; i += ITEMS) to[places[i]] = from[i];
+        SCALAR_LOOP for (uint i = ITEM; i < count; i += ITEMS) to[places[i]] = from[i];
     }
-    MEET;
+    BARRIER;
 }

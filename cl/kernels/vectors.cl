@@ -13,8 +13,8 @@ typedef double Exact;
 #define toReal convert_float
 #define toRealInt convert_int
 #define toRealFromInt convert_float
-#define bitsOfReal(held) ((uint)((held) != 0))
-#define bitsOfExact(held) ((uint)((held) != 0))
+#define bitsOfReal(mask) ((uint)((mask) != 0))
+#define bitsOfExact(mask) ((uint)((mask) != 0))
 #define storeRealInt(v, p) (*(p) = (v))
 #define laneNumbers 0.0f
 #define asReal as_float
@@ -32,8 +32,8 @@ typedef double16 Exact;
 #define toRealInt convert_int16
 #define toRealFromInt convert_float16
 #define bitsOfReal bitsOf
-#define bitsOfExact(held) bitsOf(convert_int16(held))
-#define storeRealInt(v, p) (*(LooseIntLanes*)(p) = (v))
+#define bitsOfExact(mask) bitsOf(convert_int16(mask))
+#define storeRealInt(v, p) (*(UnalignedIntLanes*)(p) = (v))
 #define asReal as_float16
 #define laneNumbers ((Real)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15))
 #define lanesOfBits lanesOf
@@ -41,12 +41,12 @@ typedef double16 Exact;
 
 // Compresses the lanes whose bit is set; writes some elements beyond them.
 #if BATCH == 1
-#define putSome(values, bits, to) (*(to) = (values))
+#define storeCompressed(values, bits, to) (*(to) = (values))
 #elif COMPRESSES
-#define putSome(values, bits, to) \
+#define storeCompressed(values, bits, to) \
     storeGlobalLanes(__builtin_ia32_compresssf512_mask(values, (Real)(0), (ushort)(bits)), 0, to)
 #else
-void putSome(Real values, uint bits, global float* to) {
+void storeCompressed(Real values, uint bits, global float* to) {
     float all[BATCH];
     storeReal(values, all);
     for (; bits != 0; bits &= bits - 1) *to++ = all[lowestBit(bits)];
@@ -113,7 +113,7 @@ Real3 toReal3(Exact3 a) {
 // The triangles of a batch. At the end of a list the last one is repeated.
 typedef struct {
     uint triangle[BATCH];
-    uint real;  // a bit for each triangle that is not a repetition
+    uint valid;  // a bit for each triangle that is not a repetition
     Exact3 a, b, c;  // corners [voxels]
 } Batch;
 
@@ -125,15 +125,15 @@ Exact longestEdges2(const Batch* batch) {
 
 #if ITEMS == 1 && defined(__clang__)
 
-#define fetchAhead(pointer) __builtin_prefetch((const void*)(size_t)(pointer))
+#define prefetchLine(pointer) __builtin_prefetch((const void*)(size_t)(pointer))
 
 // Prefetches the data of the next batches of a list: a processor's item stalls for memory where a GPU runs other items.
 INLINED void prefetchTriangle(global const float* points, global const uint* triangles, global const uint* list,
                               uint at, uint end) {
-    if (at + 2 * BATCH < end) fetchAhead(triangles + 3 * (size_t)(list ? list[at + 2 * BATCH] : at + 2 * BATCH));
+    if (at + 2 * BATCH < end) prefetchLine(triangles + 3 * (size_t)(list ? list[at + 2 * BATCH] : at + 2 * BATCH));
     if (at + BATCH >= end) return;
     global const uint* corners = triangles + 3 * (size_t)(list ? list[at + BATCH] : at + BATCH);
-    for (int k = 0; k < 3; ++k) fetchAhead(points + 3 * (size_t)(corners[k]));
+    for (int k = 0; k < 3; ++k) prefetchLine(points + 3 * (size_t)(corners[k]));
 }
 
 #else
@@ -152,7 +152,7 @@ void fetchBatch(Batch* batch, global const float* points, global const uint* tri
                 uint first, uint end, double voxelsPerUnit) {
     float world[3][3][BATCH];  // of each corner
     const uint count = min(end - first, (uint)(BATCH));
-    ONE_BY_ONE for (uint i = 0; i < BATCH; ++i) {
+    SCALAR_LOOP for (uint i = 0; i < BATCH; ++i) {
         const uint at = first + min(i, count - 1);
         prefetchTriangle(points, triangles, list, at, end);
         batch->triangle[i] = list ? list[at] : at;
@@ -162,7 +162,7 @@ void fetchBatch(Batch* batch, global const float* points, global const uint* tri
             UNROLLED for (int axis = 0; axis < 3; ++axis) world[k][axis][i] = point[axis];
         }
     }
-    batch->real = (1u << count) - 1;
+    batch->valid = (1u << count) - 1;
     batch->a = inVoxels(world[0], voxelsPerUnit);
     batch->b = inVoxels(world[1], voxelsPerUnit);
     batch->c = inVoxels(world[2], voxelsPerUnit);

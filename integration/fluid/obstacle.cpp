@@ -27,7 +27,7 @@ using openvdb::Vec3STree;
 using openvdb::math::Transform;
 
 constexpr float minHalfWidth = 3, maxHalfWidth = 1000;  // [voxels]
-constexpr double alongAxes = 1e-9;                      // tolerance of a cosine of 1
+constexpr double axisTolerance = 1e-9;                  // tolerance of a cosine of 1
 // The number of a corner has bit 4 for the upper x, 2 for y, 1 for z. Each tetrahedron runs from corner 0 to corner 7
 // along three edges, in one of the orders of the axes.
 constexpr int tetrahedra[6][4] = {{0, 4, 6, 7}, {0, 4, 5, 7}, {0, 2, 6, 7}, {0, 2, 3, 7}, {0, 1, 5, 7}, {0, 1, 3, 7}};
@@ -37,46 +37,49 @@ constexpr int triangles[3][2][3] = {{{0, 2, 3}, {0, 1, 3}}, {{0, 4, 5}, {0, 1, 5
 using Corners = std::array<double, 8>;  // distances
 
 // The fraction of an edge up to the surface, from the end with the first value.
-double partOf(double here, double there) {
+double crossingFraction(double here, double there) {
     return here / (here - there);
 }
 
 // The negative fraction of a triangle or tetrahedron whose corner values are sorted.
-double negativePart(const std::array<double, 3>& v) {
+double negativeFraction(const std::array<double, 3>& v) {
     if (v[2] <= 0) return 1;
     if (v[0] >= 0) return 0;
-    if (v[1] >= 0) return partOf(v[0], v[1]) * partOf(v[0], v[2]);
-    return 1 - partOf(v[2], v[0]) * partOf(v[2], v[1]);
+    if (v[1] >= 0) return crossingFraction(v[0], v[1]) * crossingFraction(v[0], v[2]);
+    return 1 - crossingFraction(v[2], v[0]) * crossingFraction(v[2], v[1]);
 }
 
-double negativePart(const std::array<double, 4>& v) {
+double negativeFraction(const std::array<double, 4>& v) {
     if (v[3] <= 0) return 1;
     if (v[0] >= 0) return 0;
-    if (v[1] >= 0) return partOf(v[0], v[1]) * partOf(v[0], v[2]) * partOf(v[0], v[3]);
-    if (v[2] <= 0) return 1 - partOf(v[3], v[0]) * partOf(v[3], v[1]) * partOf(v[3], v[2]);
+    if (v[1] >= 0) return crossingFraction(v[0], v[1]) * crossingFraction(v[0], v[2]) * crossingFraction(v[0], v[3]);
+    if (v[2] <= 0)
+        return 1 - crossingFraction(v[3], v[0]) * crossingFraction(v[3], v[1]) * crossingFraction(v[3], v[2]);
     // a prism between two corners on either side, in three tetrahedra
-    const double ac = partOf(v[0], v[2]), ad = partOf(v[0], v[3]), bc = partOf(v[1], v[2]), bd = partOf(v[1], v[3]);
+    const double ac = crossingFraction(v[0], v[2]), ad = crossingFraction(v[0], v[3]),
+                 bc = crossingFraction(v[1], v[2]), bd = crossingFraction(v[1], v[3]);
     return ac * ad + bd * (1 - ad) * ac + bc * bd * (1 - ac);
 }
 
 template <std::size_t n>
-double solidPart(const Corners& corners, const int (&simplex)[n]) {
+double solidFraction(const Corners& corners, const int (&simplex)[n]) {
     std::array<double, n> values;
     for (std::size_t i = 0; i < n; ++i) values[i] = corners[std::size_t(simplex[i])];
     std::sort(values.begin(), values.end());
-    return negativePart(values);
+    return negativeFraction(values);
 }
 
 float openVolumeOf(const Corners& corners) {
     double solid = 0;
-    for (const auto& tetrahedron : tetrahedra) solid += solidPart(corners, tetrahedron);
+    for (const auto& tetrahedron : tetrahedra) solid += solidFraction(corners, tetrahedron);
     return float(1 - solid / 6);
 }
 
 openvdb::Vec3f openFacesOf(const Corners& corners) {
     openvdb::Vec3f open;
     for (int axis = 0; axis < 3; ++axis)
-        open[axis] = float(1 - 0.5 * (solidPart(corners, triangles[axis][0]) + solidPart(corners, triangles[axis][1])));
+        open[axis] =
+            float(1 - 0.5 * (solidFraction(corners, triangles[axis][0]) + solidFraction(corners, triangles[axis][1])));
     return open;
 }
 
@@ -103,7 +106,7 @@ typename Grid::Ptr named(const char* name, typename Grid::TreeType::Ptr tree, co
 
 // Computes the fluid fractions. Cells that the surface cuts have all corners in the band, so the leaves of the corners
 // hold them. Solid cells beyond these leaves become tiles.
-void addOpenParts(Solid& solid, const FloatGrid& corners, const Transform& cells) {
+void addFluidFractions(Solid& solid, const FloatGrid& corners, const Transform& cells) {
     const auto volume = std::make_shared<FloatTree>(corners.tree(), 1.f, openvdb::TopologyCopy());
     const auto faces = std::make_shared<Vec3STree>(corners.tree(), openvdb::Vec3f(1), openvdb::TopologyCopy());
     openvdb::tree::LeafManager<FloatTree> leaves(*volume);
@@ -168,7 +171,7 @@ void check(const SolidOptions& options, const Transform& cells) {
         openvdb::Vec3d unit(0);
         unit[axis] = 1;
         const openvdb::Vec3d edge = cells.indexToWorld(unit) - cells.indexToWorld(openvdb::Vec3d(0));
-        if (!(edge[axis] > (1 - alongAxes) * voxel))
+        if (!(edge[axis] > (1 - axisTolerance) * voxel))
             throw std::invalid_argument("solid: the cells' axes are not those of the world");
     }
     const float lengths = glm::length(options.velocity.linear) + glm::length(options.velocity.angular);
@@ -184,7 +187,7 @@ Solid solidOf(const Body& body, const Placement& placement, const Transform& cel
     Solid solid;
     solid.distance = regrid(body, placement, cells, options.halfWidth * voxel);
     solid.distance->setName("solid");
-    addOpenParts(solid, *regrid(body, placement, *cornersOf(cells), minHalfWidth * voxel), cells);
+    addFluidFractions(solid, *regrid(body, placement, *cornersOf(cells), minHalfWidth * voxel), cells);
     addVelocity(solid, options.velocity, placement.pose.position);
     return solid;
 }

@@ -116,7 +116,7 @@ class Body {
         : field_(field),
           placement_(placement),
           voxels_(voxels),
-          turnedBack_(glm::conjugate(glm::normalize(placement.pose.rotation))),
+          inverseRotation_(glm::conjugate(glm::normalize(placement.pose.rotation))),
           // maximum distance of a voxel's points from its centre, in the body's own coordinates
           reach_(0.5f * std::sqrt(3.f) * float(voxels.voxelSize()[0]) /
                  std::min({placement.scale.x, placement.scale.y, placement.scale.z})),
@@ -157,18 +157,18 @@ class Body {
         return distance <= (field_.mesh() ? reach + error_ : steepestInterpolant * reach);
     }
 
-    bool holds(const glm::vec3& point) const { return field_.inside(toBody(point)); }
+    bool contains(const glm::vec3& point) const { return field_.inside(toBody(point)); }
 
   private:
     glm::vec3 toBody(const glm::dvec3& point) const {
-        const glm::dvec3 way = point - glm::dvec3(placement_.pose.position);
-        return glm::vec3((turnedBack_ * way) / glm::dvec3(placement_.scale));
+        const glm::dvec3 offset = point - glm::dvec3(placement_.pose.position);
+        return glm::vec3((inverseRotation_ * offset) / glm::dvec3(placement_.scale));
     }
 
     const Field& field_;
     const Placement& placement_;
     const openvdb::math::Transform& voxels_;
-    glm::dquat turnedBack_;
+    glm::dquat inverseRotation_;
     float reach_, error_;
 };
 
@@ -201,7 +201,7 @@ Particles particles(const Field& field, const Placement& placement, const openvd
         for (const Coord& voxel : CoordBBox::createCube(origin, blockSide)) {
             if (!body.reaches(voxel, 1)) continue;
             visitVoxel(voxel, options, [&](const Vec3d& point) {
-                if (const glm::vec3 p = toWorld(voxels, point); body.holds(p)) found.push_back(p);
+                if (const glm::vec3 p = toWorld(voxels, point); body.contains(p)) found.push_back(p);
             });
         }
     });

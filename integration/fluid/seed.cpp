@@ -64,10 +64,10 @@ FloatGrid::Ptr combined(const FloatGrid& liquid, const FloatGrid::Ptr& body, See
 // The deepest voxel inside, after requireInside().
 openvdb::Coord deepest(const FloatGrid& body) {
     openvdb::Coord found;
-    float least = 0;
+    float minimum = 0;
     for (auto leaf = body.tree().cbeginLeaf(); leaf; ++leaf)
         for (auto voxel = leaf->cbeginValueAll(); voxel; ++voxel)
-            if (*voxel < least) least = *voxel, found = voxel.getCoord();
+            if (*voxel < minimum) minimum = *voxel, found = voxel.getCoord();
     return found;
 }
 

@@ -177,10 +177,9 @@ TEST_CASE("any number of points is sampled, none too") {
 TEST_CASE("a field on a device needs memory, says how much, and what it took") {
     const LevelSet levelSet = levelSetOf(sphereSolid(0.4), h);
     const Device device = openDevice();
-    OpenclTimes times;
-    const DeviceField field(device, levelSet, {.memoryMiB = 64, .times = &times});
+    const DeviceField field(device, levelSet, {.memoryMiB = 64, .profile = true});
     CHECK(field.memoryBytes() > levelSet.leaves() * 729 * sizeof(float));
-    CHECK(times.peakBytes == field.memoryBytes());
+    CHECK(field.buildTimes().peakBytes == field.memoryBytes());
     const LevelSet fine = levelSetOf(sphereSolid(0.4), h / 2);
     CHECK_THROWS_AS(DeviceField(device, fine, {.memoryMiB = 1}), DeviceError);
     CHECK_THROWS_WITH(DeviceField(device, fine, {.memoryMiB = 1}),
@@ -188,8 +187,7 @@ TEST_CASE("a field on a device needs memory, says how much, and what it took") {
 
     std::vector<glm::vec3> points(200000);
     std::vector<Sample> samples(points.size());
-    times = {};
-    field.sample(points, samples, &times);
+    const OpenclTimes times = field.sample(points, samples);
     CHECK(times.kernels > 0);
     CHECK(times.download >= 0);
 }

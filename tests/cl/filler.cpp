@@ -136,15 +136,17 @@ void checkSameTriangles(const Mesh& mesh, const BuildOptions& options, const Lev
     CHECK(none == 0);
 }
 
-// Compares both fillers; shared by all tests.
-void checkFillers(const Mesh& mesh, const BuildOptions& options, const OpenclOptions& opencl = {}) {
+// Compares both fillers; shared by all tests. Returns the times of the device.
+OpenclTimes checkFillers(const Mesh& mesh, const BuildOptions& options, const OpenclOptions& opencl = {}) {
     const LevelSet expected = build(mesh, options);
     REQUIRE(expected.activeVoxels() > 0);
-    const LevelSet found = build(mesh, options, openclFiller(openDevice(), opencl));
+    const OpenclFiller filler = openclFiller(openDevice(), opencl);
+    const LevelSet found = build(mesh, options, filler);
     checkSame(expected, found);
     CHECK(found.sign() == expected.sign());
     CHECK(found.signReason() == expected.signReason());
     if (options.triangles) checkSameTriangles(mesh, options, expected, found);
+    return filler.times();
 }
 
 struct Shape {
@@ -280,8 +282,7 @@ TEST_CASE("a little device memory means many batches and the same field") {
     CAPTURE(memory);
     const LevelSet expected = build(mesh, options);
     REQUIRE(expected.leaves() * blockVoxels * sizeof(float) > memory << 20);
-    OpenclTimes times;
-    checkFillers(mesh, options, {.memoryMiB = memory, .times = &times});
+    const OpenclTimes times = checkFillers(mesh, options, {.memoryMiB = memory, .profile = true});
     CHECK(times.peakBytes <= memory << 20);
     CHECK(times.kernels > 0);
 }
@@ -299,10 +300,12 @@ TEST_CASE("a device keeps buffers for the next build, which may be of another me
         if (i > 0) CHECK(device.impl().spareBytes == kept);  // the spare buffers were reused, and none was added
         kept = device.impl().spareBytes;
     }
-    OpenclTimes times;
     constexpr std::uint64_t memory = 4;
-    checkSame(other, build(ring, ofRing, openclFiller(device, {.memoryMiB = memory, .times = &times})));
-    CHECK(times.peakBytes <= memory << 20);
+    const OpenclFiller small = openclFiller(device, {.memoryMiB = memory});
+    checkSame(other, build(ring, ofRing, small));
+    CHECK(small.times().peakBytes > 0);
+    CHECK(small.times().peakBytes <= memory << 20);
+    CHECK(small.times().kernels == 0);  // not measured without `profile`
     CHECK(device.impl().spareBytes <= memory << 20);
     checkSame(expected, build(ball, ofBall, openclFiller(device)));
 }

@@ -293,8 +293,9 @@ TEST_CASE("too little device memory for prisms is an error that says how much is
 TEST_CASE("a build of prisms tells what it took on the device") {
     const Mesh mesh = shapes::sphere(1.f, 4);
     const std::uint64_t memory = 16;
-    OpenclTimes times;
-    built(mesh, optionsFor(mesh, 150), {.memoryMiB = memory, .times = &times});
+    const OpenclFiller filler = openclFiller(openDevice(), {.memoryMiB = memory, .profile = true});
+    build(mesh, optionsFor(mesh, 150), filler);
+    const OpenclTimes times = filler.times();
     CHECK(times.kernels > 0);
     CHECK(times.peakBytes > sizeof(float) * blockVoxels);
     CHECK(times.peakBytes <= memory << 20);

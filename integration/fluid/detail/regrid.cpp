@@ -95,13 +95,13 @@ FloatGrid::Ptr moved(const FloatGrid& source, const Coord& shift, float factor, 
 // Whether a field is in these very voxels, and its band is as wide.
 bool fits(const LevelSet& field, const Placement& placement, const Transform& voxels, float width) {
     const Transform& own = field.grids().distance->transform();
-    const auto near = [&](const openvdb::Vec3d& index) {
+    const auto coincides = [&](const openvdb::Vec3d& index) {
         const openvdb::Vec3d there = own.indexToWorld(index);
         const glm::dvec3 moved = placement.toWorld(field.origin() + glm::dvec3(there.x(), there.y(), there.z()));
         return (voxels.worldToIndex({moved.x, moved.y, moved.z}) - index).length() <= sameVoxels;
     };
-    return placement.scale == glm::vec3(1) && near({0, 0, 0}) && near({1, 0, 0}) && near({0, 1, 0}) &&
-           near({0, 0, 1}) && std::min(field.exteriorWidth(), field.interiorWidth()) >= width * (1 - rounding);
+    return placement.scale == glm::vec3(1) && coincides({0, 0, 0}) && coincides({1, 0, 0}) && coincides({0, 1, 0}) &&
+           coincides({0, 0, 1}) && std::min(field.exteriorWidth(), field.interiorWidth()) >= width * (1 - rounding);
 }
 
 void requireCubes(const Transform& voxels) {

@@ -28,7 +28,7 @@ using openvdb::FloatGrid;
 using Stencil = openvdb::math::WenoStencil<FloatGrid>;
 
 // The range of checkLevelSet, less a tolerance for rounding.
-constexpr float lowest = 0.501f, highest = 1.499f;
+constexpr float minGradient2 = 0.501f, maxGradient2 = 1.499f;
 // a violation at one in so many voxels next to the surface is noise, not a crease
 constexpr std::size_t manyBroken = 20;
 // If single voxels cannot be repaired, the surface is smoothed around them, by a larger radius each time [voxels].
@@ -36,24 +36,24 @@ constexpr int maxSmoothings = 12, firstRadius = 2;
 // Distances below the accuracy of exact ones [voxels].
 constexpr float rounding = 1e-4f;
 // Constraints aim this far inside the range, so that the iteration ends.
-constexpr float margin = 0.02f;
-constexpr float maxMoved = 0.25f;    // maximum change by one constraint [voxels]: the limit of the linearisation
-constexpr float almostOn = 0.15f;    // a point this close to a face is almost on it [voxels]
-constexpr float atSurface = 1e-3f;   // [voxels]
-constexpr float difference = 1e-2f;  // step of the derivatives [voxels]
+constexpr float rangeMargin = 0.02f;
+constexpr float maxChange = 0.25f;       // maximum change by one constraint [voxels]: the limit of the linearisation
+constexpr float nearFace = 0.15f;        // a point this close to a face is almost on it [voxels]
+constexpr float onSurface = 1e-3f;       // [voxels]
+constexpr float derivativeStep = 1e-2f;  // step of the derivatives [voxels]
 constexpr float minSlope = 0.05f;    // minimum slope of a constraint [1/voxel]; its voxels cannot satisfy a flatter one
 constexpr int maxProjections = 100;  // maximum rounds over all constraints
 constexpr int idleProjections = 30;  // rounds without a gain before other methods are used
 constexpr int maxRounds = 60;        // rounds of descent; about six are enough for real meshes
-constexpr int patience = 3;          // rounds without a gain before the surroundings are smoothed
-constexpr float notable = 0.1f - rounding;  // a change that is reported [voxels]
-constexpr int reach = 3;                    // radius of the WENO stencil along the axes [voxels]
+constexpr int idleRounds = 3;        // rounds without a gain before the surroundings are smoothed
+constexpr float reportedChange = 0.1f - rounding;  // a change that is reported [voxels]
+constexpr int stencilReach = 3;                    // radius of the WENO stencil along the axes [voxels]
 // Changes that are tried at a voxel, in both directions [voxels].
 constexpr std::array<float, 6> steps{0.02f, 0.05f, 0.1f, 0.2f, 0.4f, 0.8f};
 constexpr float stepCost = 1e-3f;  // prefers small changes among equally good ones
 constexpr float minGain = 1e-4f;   // minimum gain of a change, so that the descent ends
 
-struct Survey {
+struct Violations {
     std::vector<Coord> broken;  // in leaf order
     std::size_t crossed = 0;    // voxels next to the surface
 };
@@ -61,7 +61,7 @@ struct Survey {
 float violation(const Stencil& stencil) {
     if (!stencil.zeroCrossing()) return 0;
     const float q = stencil.normSqGrad();
-    return std::max({0.0f, lowest - q, q - highest});
+    return std::max({0.0f, minGradient2 - q, q - maxGradient2});
 }
 
 // Whether the surface passes between a voxel and a neighbour. Same as WenoStencil::zeroCrossing, but only one voxel in
@@ -69,9 +69,9 @@ float violation(const Stencil& stencil) {
 bool isCrossed(const FloatGrid::ConstAccessor& values, const Coord& voxel, float value) {
     for (int axis = 0; axis < 3; ++axis)
         for (const int side : {-1, 1}) {
-            Coord beside = voxel;
-            beside[axis] += side;
-            const float there = values.getValue(beside);
+            Coord neighbour = voxel;
+            neighbour[axis] += side;
+            const float there = values.getValue(neighbour);
             if (value > 0 ? there < 0 : there > 0) return true;
         }
     return false;
@@ -79,18 +79,18 @@ bool isCrossed(const FloatGrid::ConstAccessor& values, const Coord& voxel, float
 
 // If a flat face passes through voxels, rounding would decide the signs at its edges. Voxels on it therefore get a
 // distance of 0.
-void tidy(FloatGrid& grid) {
-    const float onSurface = rounding * float(grid.voxelSize()[0]);
+void snapToSurface(FloatGrid& grid) {
+    const float tolerance = rounding * float(grid.voxelSize()[0]);
     openvdb::tree::LeafManager<openvdb::FloatTree> leaves(grid.tree());
-    leaves.foreach ([onSurface](openvdb::FloatTree::LeafNodeType& leaf, std::size_t) {
+    leaves.foreach ([tolerance](openvdb::FloatTree::LeafNodeType& leaf, std::size_t) {
         for (auto voxel = leaf.beginValueOn(); voxel; ++voxel)
-            if (std::abs(*voxel) <= onSurface) voxel.setValue(0);
+            if (std::abs(*voxel) <= tolerance) voxel.setValue(0);
     });
 }
 
-Survey survey(const FloatGrid& grid) {
+Violations findViolations(const FloatGrid& grid) {
     openvdb::tree::LeafManager<const openvdb::FloatTree> leaves(grid.tree());
-    std::vector<Survey> parts(leaves.leafCount());
+    std::vector<Violations> parts(leaves.leafCount());
     leaves.foreach ([&](const openvdb::FloatTree::LeafNodeType& leaf, std::size_t index) {
         Stencil stencil(grid);
         const auto values = grid.getConstAccessor();
@@ -101,8 +101,8 @@ Survey survey(const FloatGrid& grid) {
             if (violation(stencil) > 0) parts[index].broken.push_back(voxel.getCoord());
         }
     });
-    Survey whole;
-    for (const Survey& part : parts) {
+    Violations whole;
+    for (const Violations& part : parts) {
         whole.broken.insert(whole.broken.end(), part.broken.begin(), part.broken.end());
         whole.crossed += part.crossed;
     }
@@ -134,9 +134,9 @@ class Repairer {
         for (const Coord& voxel : broken) {
             touched.push_back(voxel);
             if (violationAt(voxel) == 0) continue;
-            if (!changeSide(voxel)) satisfy(voxel);
+            if (!flipSign(voxel)) satisfyConstraint(voxel);
             alongAxes(voxel, 1, [&](const Coord& changed) {
-                alongAxes(changed, reach, [&](const Coord& near) { touched.push_back(near); });
+                alongAxes(changed, stencilReach, [&](const Coord& neighbour) { touched.push_back(neighbour); });
             });
         }
         return stillBroken(touched);
@@ -148,8 +148,8 @@ class Repairer {
         for (const Coord& voxel : broken) {
             touched.push_back(voxel);
             if (violationAt(voxel) == 0) continue;
-            if (Coord changed; improve(voxel, changed))
-                alongAxes(changed, reach, [&](const Coord& near) { touched.push_back(near); });
+            if (Coord changed; applyBestChange(voxel, changed))
+                alongAxes(changed, stencilReach, [&](const Coord& neighbour) { touched.push_back(neighbour); });
         }
         return stillBroken(touched);
     }
@@ -157,13 +157,14 @@ class Repairer {
     // Averages values over the neighbours around voxels that cannot be repaired, which removes features below a voxel.
     std::vector<Coord> smooth(const std::vector<Coord>& broken) {
         std::vector<Coord> around, touched;
-        for (const Coord& voxel : broken) alongAxes(voxel, 1, [&](const Coord& near) { around.push_back(near); });
+        for (const Coord& voxel : broken)
+            alongAxes(voxel, 1, [&](const Coord& neighbour) { around.push_back(neighbour); });
         sortUnique(around);
         std::vector<float> means;
         for (const Coord& voxel : around) means.push_back(mean(voxel));
         for (std::size_t i = 0; i < around.size(); ++i) {
             if (values_.isValueOn(around[i])) values_.setValueOnly(around[i], means[i]);
-            alongAxes(around[i], reach, [&](const Coord& near) { touched.push_back(near); });
+            alongAxes(around[i], stencilReach, [&](const Coord& neighbour) { touched.push_back(neighbour); });
         }
         return stillBroken(touched);
     }
@@ -183,64 +184,64 @@ class Repairer {
     // Sum of the violations of all voxels whose stencils read this one.
     float violationAround(const Coord& voxel) {
         float sum = 0;
-        alongAxes(voxel, reach, [&](const Coord& near) { sum += violationAt(near); });
+        alongAxes(voxel, stencilReach, [&](const Coord& neighbour) { sum += violationAt(neighbour); });
         return sum;
     }
 
     float mean(const Coord& voxel) {
         float sum = 0;
-        alongAxes(voxel, 1, [&](const Coord& near) { sum += values_.getValue(near); });
+        alongAxes(voxel, 1, [&](const Coord& neighbour) { sum += values_.getValue(neighbour); });
         return sum / 7;
     }
 
     // A voxel on one side of a face, next to an edge of it, may have no slope while one on the other side has one. A
     // voxel that is almost on the face can be moved there.
-    bool changeSide(const Coord& voxel) {
+    bool flipSign(const Coord& voxel) {
         const float old = values_.getValue(voxel), before = violationAround(voxel);
-        if (std::abs(old) > almostOn * voxel_) return false;
+        if (std::abs(old) > nearFace * voxel_) return false;
         values_.setValueOnly(voxel, old > 0 ? 0 : std::numeric_limits<float>::min());
         if (violationAround(voxel) < before - minGain) return true;
         values_.setValueOnly(voxel, old);
         return false;
     }
 
-    // Moves the values of a voxel and its neighbours by the minimum change that brings the linearised squared gradient
-    // into its range. No value changes its sign.
-    void satisfy(const Coord& voxel) {
+    // Changes the values of a voxel and its neighbours by the minimum amount that brings the linearised squared
+    // gradient into its range. No value changes its sign.
+    void satisfyConstraint(const Coord& voxel) {
         const float q = squaredGradient(voxel);
-        const float wanted = q < lowest ? lowest + margin - q : highest - margin - q;
+        const float wanted = q < minGradient2 ? minGradient2 + rangeMargin - q : maxGradient2 - rangeMargin - q;
         std::array<Coord, 7> around;
         std::array<float, 7> slopes;
         std::size_t count = 0;
         float sum = 0;
-        alongAxes(voxel, 1, [&](const Coord& near) {
-            if (!values_.isValueOn(near)) return;
-            const float by = slope(voxel, near);
-            if (!canMove(values_.getValue(near), wanted * by)) return;
-            around[count] = near;
+        alongAxes(voxel, 1, [&](const Coord& neighbour) {
+            if (!values_.isValueOn(neighbour)) return;
+            const float by = slope(voxel, neighbour);
+            if (!mayChange(values_.getValue(neighbour), wanted * by)) return;
+            around[count] = neighbour;
             slopes[count++] = by;
             sum += by * by;
         });
         if (sum < minSlope * minSlope) return;
         for (std::size_t i = 0; i < count; ++i)
-            move(around[i], std::clamp(wanted * slopes[i] / sum, -maxMoved, maxMoved) * voxel_);
+            changeValue(around[i], std::clamp(wanted * slopes[i] / sum, -maxChange, maxChange) * voxel_);
     }
 
-    // Whether a value may change in that direction. Values on the surface stay there, so that their neighbours do not
-    // see it pass.
-    bool canMove(float value, float change) const {
-        return value != 0 && (std::abs(value) > atSurface * voxel_ || (value > 0) == (change > 0));
+    // Whether a value may change in that direction. Values on the surface stay there, so that the surface moves past no
+    // neighbour.
+    bool mayChange(float value, float change) const {
+        return value != 0 && (std::abs(value) > onSurface * voxel_ || (value > 0) == (change > 0));
     }
 
     // The derivative of the squared gradient at a voxel by the value of another [1/voxel].
     float slope(const Coord& voxel, const Coord& by) {
-        const float old = values_.getValue(by), step = difference * voxel_;
+        const float old = values_.getValue(by), step = derivativeStep * voxel_;
         values_.setValueOnly(by, old + step);
         const float above = squaredGradient(voxel);
         values_.setValueOnly(by, old - step);
         const float below = squaredGradient(voxel);
         values_.setValueOnly(by, old);
-        return (above - below) / (2 * difference);
+        return (above - below) / (2 * derivativeStep);
     }
 
     float squaredGradient(const Coord& voxel) {
@@ -248,15 +249,15 @@ class Repairer {
         return stencil_.normSqGrad();
     }
 
-    void move(const Coord& voxel, float change) {
-        constexpr float least = std::numeric_limits<float>::min();
-        const float old = values_.getValue(voxel), most = std::nextafter(grid_.background(), 0.f);
-        values_.setValueOnly(voxel,
-                             old > 0 ? std::clamp(old + change, least, most) : std::clamp(old + change, -most, -least));
+    void changeValue(const Coord& voxel, float change) {
+        constexpr float minValue = std::numeric_limits<float>::min();
+        const float old = values_.getValue(voxel), maxValue = std::nextafter(grid_.background(), 0.f);
+        values_.setValueOnly(voxel, old > 0 ? std::clamp(old + change, minValue, maxValue)
+                                            : std::clamp(old + change, -maxValue, -minValue));
     }
 
     // Applies the change of the voxel or one of its neighbours that reduces the violations most.
-    bool improve(const Coord& voxel, Coord& changed) {
+    bool applyBestChange(const Coord& voxel, Coord& changed) {
         float best = -minGain, bestValue = 0;
         bool found = false;
         alongAxes(voxel, 1, [&](const Coord& candidate) {
@@ -294,33 +295,33 @@ class Repairer {
 
 // Repeats rounds until nothing is broken, or some rounds have brought no gain.
 std::vector<Coord> project(FloatGrid& grid) {
-    Repairer mender(grid);
-    std::vector<Coord> broken = survey(grid).broken;
-    std::size_t fewest = broken.size();
+    Repairer repairer(grid);
+    std::vector<Coord> broken = findViolations(grid).broken;
+    std::size_t minBroken = broken.size();
     for (int round = 0, idle = 0; round < maxProjections && idle < idleProjections && !broken.empty(); ++round) {
-        broken = mender.project(broken);
-        idle = broken.size() < fewest ? 0 : idle + 1;
-        fewest = std::min(fewest, broken.size());
+        broken = repairer.project(broken);
+        idle = broken.size() < minBroken ? 0 : idle + 1;
+        minBroken = std::min(minBroken, broken.size());
     }
     return broken;
 }
 
 // Repairs what changes of single voxels can repair. Returns the voxels that are still broken.
 std::vector<Coord> descend(FloatGrid& grid) {
-    Survey found = survey(grid);
+    Violations found = findViolations(grid);
     if (found.broken.size() > found.crossed / manyBroken) {
         openvdb::tools::LevelSetTracker<FloatGrid> tracker(grid);
         tracker.normalize();
         tracker.prune();
-        found = survey(grid);
+        found = findViolations(grid);
     }
-    Repairer mender(grid);
+    Repairer repairer(grid);
     std::vector<Coord> broken = std::move(found.broken);
-    std::size_t fewest = broken.size();
+    std::size_t minBroken = broken.size();
     for (int round = 0, idle = 0; round < maxRounds && !broken.empty(); ++round) {
-        broken = idle < patience ? mender.descend(broken) : mender.smooth(broken);
-        idle = broken.size() < fewest || idle == patience ? 0 : idle + 1;
-        fewest = std::min(fewest, broken.size());
+        broken = idle < idleRounds ? repairer.descend(broken) : repairer.smooth(broken);
+        idle = broken.size() < minBroken || idle == idleRounds ? 0 : idle + 1;
+        minBroken = std::min(minBroken, broken.size());
     }
     return broken;
 }
@@ -344,7 +345,7 @@ Changes changes(const FloatGrid& before, const FloatGrid& after) {
         const Coord at = value.getCoord();
         if (!old.isValueOn(at)) continue;
         const float change = std::abs(*value - old.getValue(at)) / voxel;
-        found.voxels += change > notable;
+        found.voxels += change > reportedChange;
         if (change > found.largest) found.largest = change, found.where = at;
     }
     return found;
@@ -354,7 +355,7 @@ Changes changes(const FloatGrid& before, const FloatGrid& after) {
 
 Changes repair(FloatGrid& grid) {
     const FloatGrid::ConstPtr before = grid.deepCopy();
-    tidy(grid);
+    snapToSurface(grid);
     std::vector<Coord> broken = project(grid);
     for (int smoothing = 0; !broken.empty(); ++smoothing) {
         if (smoothing > 0) smoothAround(grid, broken, firstRadius + smoothing);

@@ -1,0 +1,20 @@
+// Enqueues kernels by name.
+#pragma once
+
+#include "cl/detail/program.h"
+
+namespace bilayer::detail {
+
+/// Enqueues a kernel of a program with its arguments in order.
+/// @param event  if not null, receives the event of the kernel
+template <class... Arguments>
+void enqueueKernel(const cl::CommandQueue& queue, const cl::Program& program, const char* name,
+                   const cl::NDRange& global, const cl::NDRange& local, cl::Event* event,
+                   const Arguments&... arguments) {
+    cl::Kernel kernel(program, name);
+    cl_uint index = 0;
+    (kernel.setArg(index++, arguments), ...);
+    queue.enqueueNDRangeKernel(kernel, cl::NullRange, global, local, nullptr, event);
+}
+
+}  // namespace bilayer::detail
