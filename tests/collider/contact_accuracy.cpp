@@ -9,8 +9,8 @@
 #include <bilayer/collider/contact.h>
 #include <bilayer/sdf/build.h>
 #include "collider/contact/collider_data.h"
-#include "demos/shared/machines.h"
 #include "demos/shared/shapes.h"
+#include "demos/shared/threads.h"
 #include "tests/support/analytic.h"
 #include "tests/support/contacts.h"
 #include "tests/support/random.h"

@@ -11,7 +11,9 @@
 
 #include <bilayer/sdf/inspect.h>
 #include "demos/shared/exact_distance.h"
+#include "demos/shared/gears.h"
 #include "demos/shared/shapes.h"
+#include "demos/shared/threads.h"
 #include "tests/support/support.h"
 
 using namespace bilayer;
