@@ -28,17 +28,15 @@ namespace bilayer::paper {
 using namespace bilayer::detail;
 
 std::vector<Part> parts() {
-    std::vector<Part> all;
+    std::vector<Part> all{same(), table1(), table2(), table3(), table4(), table5()};
     const auto add = [&](const std::vector<Part>& some, const std::vector<const char*>& names) {
         for (const char* name : names)
             for (const Part& part : some)
                 if (std::string(part.name) == name) all.push_back(part);
     };
-    add(accuracyParts(), {"same", "table1"});
-    add(speedParts(), {"table2", "table3", "table4", "table5"});
     add(figureParts(), {"figure7", "figure8", "figure9", "figure10", "figure11"});
     add(claimParts(), {"theorems"});
-    add(accuracyParts(), {"k"});
+    all.push_back(k());
     add(claimParts(), {"walls"});
     return all;
 }
