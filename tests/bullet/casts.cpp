@@ -111,7 +111,7 @@ TEST_CASE("Rays meet a field where they meet its triangles") {
     CHECK(turned <= hits / 50);
 }
 
-TEST_CASE("Shapes of all kinds on their way meet a field as they meet its triangles") {
+TEST_CASE("Sweeps of shapes of all kinds hit a field where they hit its triangles") {
     const int kind = GENERATE(range(0, 7));
     // powers of two: all values of Bullet's search are rounded alike
     const float scale = GENERATE(1.f / 128, 1.f, 128.f);
@@ -208,7 +208,7 @@ TEST_CASE("A body from a file answers casts and contact tests as the one of its 
     CHECK(touches > 0);
 }
 
-TEST_CASE("A shape that turns on its way meets what lies beside its last rotation") {
+TEST_CASE("A shape that rotates during a sweep hits what its last rotation does not reach") {
     FieldAndMesh both(bodyOf(0), 1, false, 1);
     const btBoxShape plank({0.02f, 0.02f, 0.9f});
     // upright at the end, horizontal in between

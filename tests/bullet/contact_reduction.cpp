@@ -41,7 +41,7 @@ std::vector<Contact> circle() {
 
 }  // namespace
 
-TEST_CASE("Of contacts that tremble by rounding the same are kept, of those that move apart the deepest") {
+TEST_CASE("Contact reduction keeps the same contacts under rounding noise, and the deepest of contacts that separate") {
     std::mt19937 random(5);
     std::uniform_real_distribution<float> tremble(-2e-5f, 2e-5f);
     const std::vector<Contact> flat = circle();
@@ -64,7 +64,7 @@ TEST_CASE("Of contacts that tremble by rounding the same are kept, of those that
     CHECK(featuresOf(bullet::detail::reduce(tilted).patches) == featuresOf(anew));
 }
 
-TEST_CASE("Contacts that may bear a load stay while a body rocks on them") {
+TEST_CASE("Contact reduction keeps load-bearing contacts while a body rocks on them") {
     const unsigned start = seed();
     CAPTURE(start);
     std::mt19937 random(start);
@@ -93,7 +93,7 @@ TEST_CASE("Contacts that may bear a load stay while a body rocks on them") {
     CHECK(gone <= kept / 100);
 }
 
-TEST_CASE("The same contacts are kept until the bodies have moved, and are where they are now") {
+TEST_CASE("Contact reduction keeps its selection until the bodies have moved, and updates positions") {
     std::vector<Contact> contacts = circle();
     bullet::detail::Choice choice;
     const btTransform here = btTransform::getIdentity();
@@ -192,7 +192,7 @@ double unborne(const std::vector<Wrench>& pushes, const Wrench& load) {
 
 }  // namespace
 
-TEST_CASE("What is kept of many contacts bears what all of them bear, to two parts in a hundred but for odd loads") {
+TEST_CASE("The reduced contacts balance the loads that all contacts balance, up to two per cent for most loads") {
     const unsigned start = seed();
     CAPTURE(start);
     std::mt19937 random(start);
@@ -229,7 +229,7 @@ TEST_CASE("What is kept of many contacts bears what all of them bear, to two par
     CHECK(parts.back() < 0.05);
 }
 
-TEST_CASE("What is kept of random bodies' contacts is met first, but for as much as is said to be lost") {
+TEST_CASE("The reduced contacts of random bodies are reached first, up to the reduction error") {
     const unsigned start = seed();
     CAPTURE(start);
     std::mt19937 random(start);

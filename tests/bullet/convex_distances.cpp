@@ -76,7 +76,7 @@ double distanceTo(const Mesh& mesh, double ofPoint(const glm::dvec3&)) {
 
 }  // namespace
 
-TEST_CASE("Contact tests tell the distance that the triangles have") {
+TEST_CASE("Contact tests between a field and convex shapes return the distance to the triangles") {
     const int kind = GENERATE(range(0, 7));
     const float scale = GENERATE(0.01f, 1.f, 100.f);
     // with the first two seeds, the nearest places lie between surface points that are outside the margin

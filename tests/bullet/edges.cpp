@@ -94,7 +94,7 @@ Collide collideBars(int kind, ContactAccuracy measure) {
 
 }  // namespace
 
-TEST_CASE("Edges that cross touch where they cross, however their points lie") {
+TEST_CASE("Crossing edges are in contact where they cross, wherever their sample points are") {
     const int kind = GENERATE(0, 1, 2, 3);
     const ContactAccuracy measure =
         GENERATE(ContactAccuracy::samples, ContactAccuracy::exactNearFeatures, ContactAccuracy::exact);
@@ -113,7 +113,7 @@ TEST_CASE("Edges that cross touch where they cross, however their points lie") {
     }
 }
 
-TEST_CASE("A contact on an edge goes as evenly as the edge that slides") {
+TEST_CASE("A contact on an edge moves as smoothly as the sliding edge") {
     const int kind = GENERATE(0, 1, 2, 3);
     const ContactAccuracy measure =
         GENERATE(ContactAccuracy::samples, ContactAccuracy::exactNearFeatures, ContactAccuracy::exact);
@@ -139,7 +139,7 @@ TEST_CASE("A contact on an edge goes as evenly as the edge that slides") {
     }
 }
 
-TEST_CASE("An edge finds a bump between its probes, and stays on it") {
+TEST_CASE("Edge descent finds a bump between its samples, and keeps it") {
     // a small ball of three voxels' radius under the edge of a long box
     const float radius = 3 * h;
     static const auto ball = exactSphere(radius, h);
@@ -163,7 +163,7 @@ TEST_CASE("An edge finds a bump between its probes, and stays on it") {
     }
 }
 
-TEST_CASE("Contacts of solids of revolution are numbers, wherever a line of their sides ends") {
+TEST_CASE("Contacts of solids of revolution are finite in all orientations") {
     const auto plate = exactBox({1.2f, 1.2f, 0.1f}, h);
     const Convex cylinder(btCylinderShape({0.15f, 0.1f, 0.15f})), cone(btConeShape(0.12f, 0.3f));
     // an orientation where the lowest point of a rim is also that of a side
@@ -190,7 +190,7 @@ TEST_CASE("Contacts of solids of revolution are numbers, wherever a line of thei
     CHECK(found > 4000);
 }
 
-TEST_CASE("Tips that have sunk into faces are told how deep, and each contact that is kept gets to the solver") {
+TEST_CASE("Convex vertices below faces have the right penetration depth, and each kept contact reaches the solver") {
     const int kind = GENERATE(0, 1, 2, 3, 4);
     const unsigned start = seed();
     CAPTURE(kind, start);
@@ -238,7 +238,7 @@ TEST_CASE("Tips that have sunk into faces are told how deep, and each contact th
     }
 }
 
-TEST_CASE("No contact is much deeper than the bodies overlap, whichever edges cross") {
+TEST_CASE("No contact is much deeper than the penetration depth of the bodies, whichever edges cross") {
     const unsigned start = seed();
     const ContactAccuracy measure =
         GENERATE(ContactAccuracy::samples, ContactAccuracy::exactNearFeatures, ContactAccuracy::exact);
@@ -299,7 +299,7 @@ TEST_CASE("No contact is much deeper than the bodies overlap, whichever edges cr
     CHECK(overlapping > 150);
 }
 
-TEST_CASE("What is exact is so against Bullet's shapes too") {
+TEST_CASE("Exact contacts are exact against Bullet's shapes too") {
     // small balls around the edges of a box, where trilinear samples are rounded off
     const glm::vec3 half(0.5f, 0.4f, 0.3f);
     const auto exact = deepCollider(shapes::box(half), h, ContactAccuracy::exact),

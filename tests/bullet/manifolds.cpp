@@ -20,7 +20,7 @@ constexpr float h = 0.05f;  // voxel [m]
 
 }  // namespace
 
-TEST_CASE("What has rested bears as much more friction as it is told to, until it slips") {
+TEST_CASE("Resting friction is higher by its factor, until the body slips") {
     World world;
     const bool more = GENERATE(false, true), inCompound = GENERATE(false, true);
     CAPTURE(more, inCompound);
@@ -52,7 +52,7 @@ TEST_CASE("What has rested bears as much more friction as it is told to, until i
         CHECK_THROWS_AS(Shape(exactBox({1, 1, 1}, 0.5f), {.restingFriction = less}), std::invalid_argument);
 }
 
-TEST_CASE("Callbacks see contacts with their features, and impulses are handed on from step to step") {
+TEST_CASE("Callbacks receive contacts with their features, and impulses persist from step to step") {
     static int added, started;
     added = started = 0;
     Shape box(exactBox({0.3f, 0.3f, 0.2f}, h));
@@ -84,7 +84,7 @@ TEST_CASE("Callbacks see contacts with their features, and impulses are handed o
     CHECK(impulse == Approx(2 * 9.81f / 240).epsilon(0.02));
 }
 
-TEST_CASE("What a user keeps with a contact stays with it, and is given back in the end") {
+TEST_CASE("User data of a contact persists with it, and is released at the end") {
     static int made, destroyed;
     made = destroyed = 0;
     Shape box(exactBox({0.3f, 0.3f, 0.2f}, h));
@@ -125,7 +125,7 @@ TEST_CASE("What a user keeps with a contact stays with it, and is given back in 
     gContactDestroyedCallback = nullptr;
 }
 
-TEST_CASE("A belt takes along what lies on it, by the motion that the user gives its contacts") {
+TEST_CASE("A conveyor belt carries a body by the surface velocity that the user gives its contacts") {
     constexpr float speed = 0.1f;
     gContactAddedCallback = [](btManifoldPoint& point, const btCollisionObjectWrapper* first, int, int,
                                const btCollisionObjectWrapper*, int, int) {
@@ -150,7 +150,7 @@ TEST_CASE("A belt takes along what lies on it, by the motion that the user gives
     CHECK(std::abs(body->getCenterOfMassPosition().y()) < 1e-3f);
 }
 
-TEST_CASE("Users are told of contacts that go on") {
+TEST_CASE("The processed callback is called for persistent contacts") {
     static int processed;
     processed = 0;
     gContactProcessedCallback = [](btManifoldPoint&, void*, void*) {
@@ -167,7 +167,7 @@ TEST_CASE("Users are told of contacts that go on") {
     CHECK(processed <= 12 * 120);
 }
 
-TEST_CASE("A contact that starts is told as the solver sees it") {
+TEST_CASE("The started callback receives the contact as the solver does") {
     static float distance, apart;
     gContactStartedCallback = [](btPersistentManifold* const& manifold) {
         const btManifoldPoint& point = manifold->getContactPoint(0);
@@ -187,7 +187,7 @@ TEST_CASE("A contact that starts is told as the solver sees it") {
     CHECK(apart == Approx(gap).margin(0.01 * h));
 }
 
-TEST_CASE("Worlds in several threads keep their callbacks: none is taken away while contacts are made") {
+TEST_CASE("Global callbacks stay set while contacts are made on several threads") {
     static int asked, missing;
     asked = missing = 0;
     gContactAddedCallback = [](btManifoldPoint&, const btCollisionObjectWrapper*, int, int,

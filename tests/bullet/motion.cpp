@@ -107,7 +107,7 @@ TEST_CASE("A ring hangs in another") {
     CHECK(motion(*body) < 0.05f);
 }
 
-TEST_CASE("A slope holds a body by friction, and lets it slide where it must") {
+TEST_CASE("A body on a slope sticks or slides by friction") {
     const float friction = GENERATE(0.7f, 0.3f);  // of the pair: the product of both coefficients
     const float slope = std::atan(0.5f);
     Shape block(exactBox({0.3f, 0.3f, 0.2f}, h)), ramp(exactBox({2, 1, 0.3f}, h));
@@ -126,7 +126,7 @@ TEST_CASE("A slope holds a body by friction, and lets it slide where it must") {
         CHECK(way == Approx(0.5f * 9.81f * (std::sin(slope) - friction * std::cos(slope)) * 0.25f).epsilon(0.03));
 }
 
-TEST_CASE("What falls bounces with its restitution, wherever a step takes it") {
+TEST_CASE("Falling bodies bounce with their restitution, wherever a step ends") {
     const float perSecond = GENERATE(60.f, 240.f), restitution = GENERATE(0.5f, 0.9f);
     const int kind = GENERATE(0, 1, 2);
     CAPTURE(perSecond, restitution, kind);
@@ -157,7 +157,7 @@ TEST_CASE("What falls bounces with its restitution, wherever a step takes it") {
     CHECK(sum == Approx(restitution).margin(0.02));
 }
 
-TEST_CASE("What has tips and edges comes to rest in a groove of triangles, however fine they are") {
+TEST_CASE("Bodies with vertices and edges come to rest in a groove of triangles of any size") {
     const unsigned seed = test::seed();
     const float cell = GENERATE(0.9f, 12.f);  // [voxels]
     const bool hasTips = GENERATE(true, false);
@@ -185,7 +185,7 @@ TEST_CASE("What has tips and edges comes to rest in a groove of triangles, howev
     }
 }
 
-TEST_CASE("What is thin lies on triangles, and its far side does not pull it through them") {
+TEST_CASE("Thin bodies rest on triangles, and their far side does not pull them through") {
     const float degrees = GENERATE(5.f, 10.f, 20.f), voxel = GENERATE(0.02f, 0.01f);
     const ContactAccuracy measure = GENERATE(ContactAccuracy::exactNearFeatures, ContactAccuracy::exact);
     const unsigned seed = test::seed();
@@ -219,7 +219,7 @@ TEST_CASE("What is thin lies on triangles, and its far side does not pull it thr
     }
 }
 
-TEST_CASE("What falls flat without friction goes nowhere else") {
+TEST_CASE("Bodies that fall flat without friction do not drift sideways") {
     const unsigned seed = test::seed();
     CAPTURE(seed);
     Random random(seed);

@@ -31,7 +31,7 @@ constexpr float h = 0.05f;  // voxel [m]
 
 }  // namespace
 
-TEST_CASE("The distance from a hull of balls is that of its support function, outside and inside") {
+TEST_CASE("The distance from a multisphere is that of its support function, outside and inside") {
     const unsigned start = seed();
     CAPTURE(start);
     std::mt19937 random(start);
@@ -77,7 +77,7 @@ TEST_CASE("The distance from a hull of balls is that of its support function, ou
     }
 }
 
-TEST_CASE("A multisphere is that of its balls, whatever its margin and scale") {
+TEST_CASE("The surface of a multisphere is that of its balls at any margin and scale") {
     const float scale = GENERATE(0.01f, 1.f, 100.f);
     const btVector3 centres[] = {scale * btVector3(-0.3f, -0.2f, 0), scale * btVector3(0.3f, -0.2f, 0),
                                  scale * btVector3(0, 0.3f, 0)};
@@ -93,7 +93,7 @@ TEST_CASE("A multisphere is that of its balls, whatever its margin and scale") {
     CHECK(convex.nearest(beside, scale).normal.x == Approx(-1));
 }
 
-TEST_CASE("Balls lie in a groove as deep as they do between two faces") {
+TEST_CASE("Balls rest in a groove at the depth of its two faces") {
     // a right-angled groove along x, its bottom off the voxel centres
     const glm::vec3 bottom(0, 0.37f * h, 0.61f * h);
     const glm::vec2 section[] = {{-0.3f, -0.2f}, {0.3f, -0.2f}, {0.3f, 0.3f}, {0, 0}, {-0.3f, 0.3f}};

@@ -69,7 +69,7 @@ TEST_CASE("A plane of many triangles makes the contacts of a plane of two") {
     CHECK(touching > 40);
 }
 
-TEST_CASE("A corner is as deep in triangles as below their plane, however the body stands") {
+TEST_CASE("A corner has the same depth below triangles as below their plane, in any orientation") {
     const unsigned start = seed();
     const ContactAccuracy measure =
         GENERATE(ContactAccuracy::samples, ContactAccuracy::exactNearFeatures, ContactAccuracy::exact);
@@ -108,7 +108,7 @@ TEST_CASE("A corner is as deep in triangles as below their plane, however the bo
     }
 }
 
-TEST_CASE("A tip below a crease of triangles is as deep as below both of its faces") {
+TEST_CASE("A vertex below a crease of triangles has the depths of both faces") {
     const unsigned start = seed();
     const ContactAccuracy measure =
         GENERATE(ContactAccuracy::samples, ContactAccuracy::exactNearFeatures, ContactAccuracy::exact);

@@ -311,7 +311,7 @@ TEST_CASE("Scaled fields rest where scaled bodies do") {
     }
 }
 
-TEST_CASE("Bodies lie at the bottom of a field's bowl") {
+TEST_CASE("Bodies rest at the bottom of a field's bowl") {
     static const auto bowlCollider = exactBowl(1.5f, 0.2f, h);
     Shape bowl(bowlCollider);
     // the lowest place of the cavity is at -1.3
@@ -356,7 +356,7 @@ TEST_CASE("A bump of a field carries a flat face, and a groove both flanks of a 
     }
 }
 
-TEST_CASE("A ghost that dispatches its own pairs is no step") {
+TEST_CASE("A ghost object that dispatches its own pairs does not count as a step") {
     Shape floor(exactBox({1, 1, 0.1f}, h)), ball(exactSphere(0.2f, h));
     World world;
     btGhostPairCallback ghosts;

@@ -21,7 +21,7 @@ constexpr float h = 0.05f;  // voxel [m]
 
 }  // namespace
 
-TEST_CASE("What is about to land is met by all of its corners, finer than the floor or not") {
+TEST_CASE("A body about to land has contacts at all corners, whether finer than the floor or not") {
     const bool fineFirst = GENERATE(false, true);
     CAPTURE(fineFirst);
     Shape floor(exactBox({1, 1, 0.2f}, 0.05f)), box(exactBox({0.03f, 0.03f, 0.03f}, 0.01f));
@@ -44,7 +44,7 @@ TEST_CASE("What is about to land is met by all of its corners, finer than the fl
     CHECK(contacts == world.dispatcher.statistics().contactsKept);
 }
 
-TEST_CASE("What is small and falls by voxels in a step is borne on all sides, and comes to rest") {
+TEST_CASE("Small bodies that fall by voxels per step are supported on all sides, and come to rest") {
     const unsigned seed = test::seed();
     const float size = GENERATE(0.01f, 0.03f), steps = GENERATE(60.f, 120.f);
     CAPTURE(seed, size, steps);
@@ -63,7 +63,8 @@ TEST_CASE("What is small and falls by voxels in a step is borne on all sides, an
     }
 }
 
-TEST_CASE("However fast, nothing round passes a plate or gains energy, and nothing edged as long as it turns little") {
+TEST_CASE(
+    "No body without CCD passes through a plate or gains energy: round ones at any speed, others at small rotations") {
     const float thickness = GENERATE(1.f, 2.f, 4.f);  // of the plate [voxels]
     CAPTURE(thickness);
     const auto plate = exactBox({1.f, 1.f, 0.5f * thickness * h}, h);
@@ -109,7 +110,7 @@ TEST_CASE("However fast, nothing round passes a plate or gains energy, and nothi
         }
 }
 
-TEST_CASE("Contact tests between steps see things as they are, however fast they move") {
+TEST_CASE("Contact tests between steps use the current poses of fast bodies") {
     const auto ball = exactSphere(0.2f, h), plate = exactBox({1.f, 1.f, 0.1f}, h);
     Shape ballShape(ball), plateShape(plate);
     World world;

@@ -126,7 +126,7 @@ TEST_CASE(
     }
 }
 
-TEST_CASE("A ray from within a body without a mesh leaves it as it leaves the mesh") {
+TEST_CASE("A ray from inside a body without a mesh leaves it where it leaves the mesh") {
     const Mesh mesh = shapes::box({0.5f, 0.4f, 0.3f});
     const LevelSet field = build(mesh, {.voxelSize = h});
     Shape ofMesh(std::make_shared<Collider>(mesh, field)), ofField(withoutMesh(mesh, field));
@@ -181,7 +181,7 @@ struct Refusing : Callback {
 
 }  // namespace
 
-TEST_CASE("Rays and swept spheres go on behind a hit where their callback does") {
+TEST_CASE("Rays and swept spheres continue behind a hit that their callback ignores") {
     const bool hasMesh = GENERATE(true, false);
     CAPTURE(hasMesh);
     const Mesh mesh = shapes::box({0.5f, 0.4f, 0.3f});
@@ -270,7 +270,7 @@ TEST_CASE("Contact tests give the depth and the normal from the second body to t
     CHECK(world.dispatcher.getNumManifolds() == 0);
 }
 
-TEST_CASE("Contact tests of two fields tell how far apart they are, beyond the band too") {
+TEST_CASE("Contact tests of two fields return their distance, beyond the band too") {
     Shape one(exactSphere(fieldRadius, h)), two(exactBox({0.4f, 0.3f, 0.2f}, h));
     const float gap = GENERATE(0.02f, 0.08f, 0.1f, 0.2f, 0.28f);
     const bool inCompound = GENERATE(false, true);
@@ -324,7 +324,7 @@ TEST_CASE("Inertia is that of the solid, about the centre of mass and its princi
     CHECK((lower - btVector3(1, 2, 3) + expected).length() < 1e-5f);
 }
 
-TEST_CASE("Bad input is refused by name") {
+TEST_CASE("Invalid arguments are rejected by name") {
     Shape shape(exactSphere(0.3f, h));
     CHECK_THROWS_AS(Shape(nullptr), std::invalid_argument);
     CHECK_THROWS_AS(shape.setLocalScaling({1, 2, 1}), std::invalid_argument);

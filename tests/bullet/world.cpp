@@ -8,7 +8,6 @@
 #include <limits>
 #include <utility>
 
-#include <bilayer/collider/contact.h>
 #include <bilayer/sdf/build.h>
 #include <bilayer/sdf/grids.h>
 #include "demos/shared/shapes.h"

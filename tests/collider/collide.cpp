@@ -26,7 +26,7 @@ Pose compose(const Pose& a, const Pose& b) {
 
 }  // namespace
 
-TEST_CASE("two balls touch where the line of their centres goes through") {
+TEST_CASE("the contact of two balls is on the line of their centres") {
     const unsigned seed = test::seed();
     CAPTURE(seed);
     Random random(seed);
@@ -99,7 +99,7 @@ TEST_CASE("a corner that points into a slab is the deepest contact") {
     REQUIRE_FALSE(least.feature & featureOfB);
 }
 
-TEST_CASE("exchanged bodies have the same contacts, seen from the other side") {
+TEST_CASE("exchanged bodies have the same contacts with opposite normals") {
     const unsigned seed = test::seed();
     CAPTURE(seed);
     Random random(seed);
@@ -204,7 +204,7 @@ TEST_CASE("the tree leaves no contact out") {
     REQUIRE(tested < total);  // a ball in a ring may need all of them, the pairs together do not
 }
 
-TEST_CASE("bodies apart have no contact and cost next to nothing") {
+TEST_CASE("separate bodies have no contact and cost almost nothing") {
     ContactReport report;
     REQUIRE(contactsOf({ball(), {{5, 0, 0}}}, {ring()}, h, &report).empty());
     REQUIRE(report.pointsTested == 0);
@@ -225,7 +225,7 @@ TEST_CASE("points too deep for the band are counted") {
     REQUIRE(contacts.empty());
 }
 
-TEST_CASE("what was in the list stays, and the same question has the same answer") {
+TEST_CASE("existing contacts in the list stay, and repeated queries have equal results") {
     std::vector<Contact> contacts(3);
     collide(ball(), {{0.79f, 0, 0}}, ball(), {}, unfiltered(h), contacts);
     const auto again = contactsOf({ball(), {{0.79f, 0, 0}}}, {ball()}, h);
@@ -238,7 +238,7 @@ TEST_CASE("what was in the list stays, and the same question has the same answer
     }
 }
 
-TEST_CASE("what moves on from beyond the band is met, however wide the margin is") {
+TEST_CASE("bodies that approach from beyond the band get contacts, at any margin") {
     const float margin = GENERATE(1.f, 2.f, 4.f) * h, gap = GENERATE(0.5f, 1.5f, 2.5f, 3.5f, 6.f) * h;
     const Placed still{slab()}, moving{brick(), {{0, 0, 0.2f + gap}}, 1, {.displacement = {0, 0, -8 * h}}};
     std::vector<Contact> contacts;

@@ -28,7 +28,7 @@ constexpr float h = 0.02f;
 
 }  // namespace
 
-TEST_CASE("a margin that is no number, or no length for a body of this size, is refused") {
+TEST_CASE("margins that are not finite, or too large for the body, are rejected") {
     const Mesh mesh = shapes::box({1, 1, 1});
     const LevelSet field = build(mesh, {.voxelSize = 0.25f});
     for (const float margin : {std::numeric_limits<float>::quiet_NaN(), 251.f, 1e30f})
@@ -68,7 +68,7 @@ TEST_CASE("a body of a mesh that faces the wrong way is the body of the right on
     CHECK(minDistance(contacts) == Approx(minDistance(expected)).margin(0.1 * h));
 }
 
-TEST_CASE("a body whose mesh has holes, or one side only, has the mass of its field, and can be kept beside it") {
+TEST_CASE("a body whose mesh is open or one-sided has the mass of its field, and can be stored with it") {
     Mesh open = shapes::box({0.3f, 0.2f, 0.1f}, 8);
     open.triangles.resize(open.triangles.size() - 40);
     Mesh strip;  // a Moebius strip
@@ -95,11 +95,11 @@ TEST_CASE("a body whose mesh has holes, or one side only, has the mass of its fi
     CHECK(box.mass().volume == Approx(0.6 * 0.4 * 0.2).epsilon(0.05));
 }
 
-TEST_CASE("a collider refuses the level set of another mesh") {
+TEST_CASE("a collider rejects the level set of another mesh") {
     const Mesh mesh = shapes::box({0.3f, 0.2f, 0.1f});
     REQUIRE_THROWS_AS(Collider(mesh, build(shapes::sphere(0.4f, 4), {.voxelSize = h})), std::invalid_argument);
 }
 
-TEST_CASE("a collider refuses an empty mesh") {
+TEST_CASE("a collider rejects an empty mesh") {
     REQUIRE_THROWS_AS(Collider(Mesh{}, levelSetOf(sphereSolid(0.4), h)), std::invalid_argument);
 }

@@ -22,7 +22,7 @@ using namespace bilayer;
 using namespace bilayer::detail;
 using namespace bilayer::test;
 
-TEST_CASE("beyond the band, edges are as far apart as those of the triangles, and look across") {
+TEST_CASE("beyond the band, edges have the distance of the triangles' edges, and normals across both") {
     const ContactAccuracy measure =
         GENERATE(ContactAccuracy::samples, ContactAccuracy::exactNearFeatures, ContactAccuracy::exact);
     const float gap = GENERATE(0.03f, 0.05f, 0.06f, 0.1f, 0.25f);
@@ -52,7 +52,7 @@ TEST_CASE("beyond the band, edges are as far apart as those of the triangles, an
     CHECK(glm::dot(nearest.normal, across) > 0.9999f);
 }
 
-TEST_CASE("what lies between two walls is found at any distance, whether the margin ends in the band or not") {
+TEST_CASE("a body between two walls has contacts at any distance, with margins inside and beyond the band") {
     const Mesh wall = shapes::box({0.1f, 0.5f, 0.5f}), small = shapes::box({0.1f, 0.1f, 0.1f});
     const Mesh walls = shapes::join({shapes::moved(wall, {-0.6f, 0, 0}), shapes::moved(wall, {0.6f, 0, 0})});
     const Collider two(walls, build(walls, {.voxelSize = h}), {.accuracy = ContactAccuracy::exact}),

@@ -14,7 +14,7 @@ using namespace bilayer;
 using namespace bilayer::detail;
 using namespace bilayer::test;
 
-TEST_CASE("The lowest place between two is found at kinks and on parabolas") {
+TEST_CASE("The minimum between two points is found at kinks and on parabolas") {
     const float lowest = GENERATE(0.13f, 0.5f, 0.91f);
     const auto kink = [&](float x) {
         return x < lowest ? Slope{x, 0.7f * (lowest - x), -0.7f} : Slope{x, x - lowest, 1};
@@ -37,7 +37,7 @@ TEST_CASE("The lowest place between two is found at kinks and on parabolas") {
     CHECK_FALSE(lowestBetween(kink(0), kink(1), 1e-4f, [](float) { return std::optional<Slope>(); }));
 }
 
-TEST_CASE("An edge that has sunk into two faces is as deep as the least way out over the ridge between them") {
+TEST_CASE("An edge below two faces has the depth of the minimum translation over the ridge between them") {
     const unsigned start = seed();
     CAPTURE(start);
     std::mt19937 random(start);

@@ -216,7 +216,7 @@ TEST_CASE("closest points need a place, a distance that is not exceeded, and the
     CHECK_THROWS_AS(field.closest(std::vector<glm::vec3>(2), std::span(&one, 1)), std::invalid_argument);
 }
 
-TEST_CASE("at the edges of a mesh that meets itself closest points are on the right side") {
+TEST_CASE("at the edges of a self-intersecting mesh closest points are on the right side") {
     const unsigned seed = test::seed();
     CAPTURE(seed);
     const float voxel = 0.05f;
@@ -287,7 +287,7 @@ TEST_CASE("closest points of meshes that build() has to repair are those of thei
     }
 }
 
-TEST_CASE("a point on an edge or a corner is told the edge or the corner, and the mean of its normals") {
+TEST_CASE("a point on an edge or a vertex has that feature, and its pseudonormal") {
     const unsigned seed = test::seed();
     CAPTURE(seed);
     Random random(seed);

@@ -68,7 +68,7 @@ std::optional<double> firstWithin(const Truth& truth, const glm::dvec3& from, co
 
 }  // namespace
 
-TEST_CASE("with the mesh, rays meet its surface, and nothing before it") {
+TEST_CASE("with the mesh, rays hit its surface, and nothing before it") {
     const unsigned seed = test::seed();
     CAPTURE(seed);
     Random random(seed);
@@ -208,7 +208,7 @@ TEST_CASE("with the mesh, spheres stop where they touch it") {
     }
 }
 
-TEST_CASE("a sphere that slides along a wall a hair above it passes it") {
+TEST_CASE("a sphere that moves along a wall slightly above it does not hit it") {
     const Exact wall(shapes::box({0.5f, 0.5f, 0.1f}, 8), 100);
     const Field bare(levelSetOf(boxSolid({0.5, 0.5, 0.1}), 0.01));
     for (const float radius : {0.03f, 0.3f, 30.f})
@@ -264,7 +264,7 @@ TEST_CASE("segments are rays that end, and many at once are the same as one by o
     REQUIRE(Field(levelSetOf(sphereSolid(0.4), h)).segment(glm::vec3(0), glm::vec3(0))->distance == 0);
 }
 
-TEST_CASE("casts of what is no ray or no sphere hit nothing") {
+TEST_CASE("casts of invalid rays and spheres hit nothing") {
     const Exact exact(shapes::sphere(0.4f, 3), 40);
     const Field bare(levelSetOf(sphereSolid(0.4), h));
     for (const Field& field : {exact.field, bare}) {
@@ -302,7 +302,7 @@ TEST_CASE("casts of what is no ray or no sphere hit nothing") {
     }
 }
 
-TEST_CASE("segments go straight from point to point, however long, and meet the face that they end on") {
+TEST_CASE("segments are exact at any length, and hit the face that they end on") {
     const unsigned seed = test::seed();
     CAPTURE(seed);
     Random random(seed);

@@ -32,7 +32,7 @@ SurfacePoint pointOf(const Collider& collider, std::uint32_t feature) {
 
 }  // namespace
 
-TEST_CASE("contacts that look along the surface of their point are left out where asked") {
+TEST_CASE("contacts with normals along the surface of their point are filtered out") {
     const unsigned seed = test::seed();
     CAPTURE(seed);
     Random random(seed);
@@ -81,7 +81,7 @@ TEST_CASE("contacts that look along the surface of their point are left out wher
     REQUIRE(kept + back < all);
 }
 
-TEST_CASE("tips that meet are pushed back the way they came, whatever they see of each other's sides") {
+TEST_CASE("convex vertices in contact are pushed apart along their entry direction") {
     const Mesh cone = shapes::cone(0.2f, 0.8f, 4);
     const auto tip = std::make_shared<Collider>(cone, build(cone, {.voxelSize = 0.04f}),
                                                 ColliderOptions{.accuracy = ContactAccuracy::exact});

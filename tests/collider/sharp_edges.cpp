@@ -19,7 +19,7 @@ constexpr float h = 0.05f;  // voxel [m]
 
 }  // namespace
 
-TEST_CASE("Sharp edges are those of the mesh, and none lies across a groove") {
+TEST_CASE("Sharp edges are those of the mesh, and none crosses a groove") {
     const bool grooved = GENERATE(false, true);
     Mesh mesh = shapes::box({0.5f, 0.4f, 0.3f});
     // a comb: teeth four voxels apart

@@ -78,7 +78,7 @@ TEST_CASE("closest, inside and sample agree on the side where the surface runs t
     requireNone(contradictions(field, points));
 }
 
-TEST_CASE("closest, inside and sample agree on the side of whatever mesh, however it was signed") {
+TEST_CASE("closest, inside and sample agree on the side for any mesh and sign method") {
     const unsigned seed = test::seed();
     CAPTURE(seed);
     Random random(seed);

@@ -11,7 +11,7 @@ using namespace bilayer;
 using namespace bilayer::detail;
 using namespace bilayer::test;
 
-TEST_CASE("what touches a face is told the face's direction, however near it is to an edge") {
+TEST_CASE("a point on a face has the face's normal, however near it is to an edge") {
     const unsigned seed = test::seed();
     CAPTURE(seed);
     Random random(seed);

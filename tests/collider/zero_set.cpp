@@ -24,7 +24,7 @@ constexpr float notANumber = std::numeric_limits<float>::quiet_NaN();
 
 }  // namespace
 
-TEST_CASE("rays meet a sphere and a box where geometry says") {
+TEST_CASE("rays hit a sphere and a box at the analytic distance") {
     const unsigned seed = test::seed();
     CAPTURE(seed);
     Random random(seed);
@@ -67,7 +67,7 @@ TEST_CASE("rays meet a sphere and a box where geometry says") {
     }
 }
 
-TEST_CASE("rays meet the interpolant where steps of a fiftieth of a voxel do") {
+TEST_CASE("rays hit the interpolant where steps of a fiftieth of a voxel do") {
     const FieldOptions options{GENERATE(Storage::float32, Storage::fixed16)};
     const unsigned seed = test::seed();
     CAPTURE(seed);
@@ -134,7 +134,7 @@ TEST_CASE("a ray does not pass a wall of one voxel") {
     }
 }
 
-TEST_CASE("without the mesh rays that start inside, end early or are no rays") {
+TEST_CASE("without the mesh: rays that start inside, end early or are invalid") {
     const Field field(levelSetOf(sphereSolid(0.4), h));
     for (const glm::vec3 start : {glm::vec3(0), glm::vec3(0.39f, 0, 0)}) {
         const auto hit = field.raycast({start, {1, 0, 0}, 10});

@@ -99,7 +99,7 @@ TEST_CASE("the corpus seeds level sets") {
         }
 }
 
-TEST_CASE("a report tells how far distances had to change, and where") {
+TEST_CASE("the report has the maximum change of distances, and its position") {
     // a box 1.5 voxels thick, with its edges at the worst positions relative to the lattice
     const auto liquid = emptyLiquid(0.1f);
     const Mesh mesh = shapes::box({0.55f, 0.45f, 0.35f});

@@ -164,7 +164,7 @@ TEST_CASE("a cavity stays empty") {
     CHECK(volume(*liquid) == Approx(ball * (1 - 0.216)).epsilon(0.05));
 }
 
-TEST_CASE("a wide hole is named") {
+TEST_CASE("a wide hole is rejected by name") {
     // a ball without the cap of 30 degrees around z
     Mesh mesh = shapes::sphere(0.5f, 5);
     std::erase_if(mesh.triangles, [&](const glm::uvec3& t) {
@@ -214,7 +214,7 @@ TEST_CASE("the background stays the caller's to the last bit, also where it is b
     }
 }
 
-TEST_CASE("whether an open mesh is taken depends on the mesh and the voxels' size, not on their place") {
+TEST_CASE("whether an open mesh is accepted depends on the mesh and the voxel size, not on their position") {
     const unsigned seed = test::seed();
     CAPTURE(seed);
     std::mt19937 random(seed);
@@ -257,7 +257,7 @@ TEST_CASE("whether an open mesh is taken depends on the mesh and the voxels' siz
     }
 }
 
-TEST_CASE("a body hardly wider than a voxel is there, or is refused") {
+TEST_CASE("a body hardly wider than a voxel is seeded or rejected") {
     const Mesh mesh = shapes::sphere(0.5f, 3);
     int kept = 0, refused = 0;
     for (const float voxel : {0.2f, 0.4f, 0.6f, 0.8f, 1.f, 1.3f, 1.7f, 2.5f, 4.f, 50.f})

@@ -56,7 +56,7 @@ Mesh doubleSheet(std::mt19937& random) {
 
 }  // namespace
 
-TEST_CASE("pseudonormal: signs are found in the same way and are the same as those of the exact method") {
+TEST_CASE("pseudonormal: signs and their methods are those of the exact method") {
     const unsigned seed = test::seed();
     std::mt19937 random(seed);
     for (const char* name : {"fandisk.obj", "spot.obj", "cow.obj", "cgal-bones.off", "self_intersectA.obj",
@@ -86,7 +86,7 @@ TEST_CASE("pseudonormal: signs are found in the same way and are the same as tho
     }
 }
 
-TEST_CASE("pseudonormal: the automatic choice is that of the exact method, whatever the mesh") {
+TEST_CASE("pseudonormal: the automatic choice is that of the exact method for any mesh") {
     const unsigned seed = test::seed();
     std::mt19937 random(seed);
     std::uniform_real_distribution<float> unit(0, 1);
@@ -118,7 +118,7 @@ TEST_CASE("pseudonormal: the automatic choice is that of the exact method, whate
     }
 }
 
-TEST_CASE("pseudonormal: both methods say that a sheet and its back have no inside") {
+TEST_CASE("pseudonormal: a double-sided open surface has no inside, by both methods") {
     const unsigned seed = test::seed();
     std::mt19937 random(seed);
     for (int round = 0; round < 60; ++round) {

@@ -145,7 +145,7 @@ std::vector<Mesh> propertyMeshes(Random& random) {
 
 }  // namespace
 
-TEST_CASE("the truth is what sums over all triangles say, also on edges' and vertices' lines") {
+TEST_CASE("the ground truth is that of sums over all triangles, also in line with edges and vertices") {
     const unsigned seed = test::seed();
     CAPTURE(seed);
     Random random(seed);
@@ -241,7 +241,7 @@ TEST_CASE("exact: a box of 12 triangles, a thousand voxels long") {
     checkExact(anyPose(shapes::box({1, 0.3f, 0.1f}), random), 0.002f, {1, 1}, seed);
 }
 
-TEST_CASE("exact: triangles without area and triangles that are there twice") {
+TEST_CASE("exact: triangles without area and duplicate triangles") {
     const unsigned seed = test::seed();
     CAPTURE(seed);
     Random random(seed);
@@ -370,7 +370,7 @@ TEST_CASE("exact: a shift by whole voxels keeps the values") {
         }
 }
 
-TEST_CASE("exact: a turn by 90 degrees keeps the distances within float rounding") {
+TEST_CASE("exact: a rotation by 90 degrees keeps the distances within float rounding") {
     const unsigned seed = test::seed();
     CAPTURE(seed);
     Random random(seed);

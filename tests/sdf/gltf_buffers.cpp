@@ -39,7 +39,7 @@ TEST_CASE("glTF: buffers are regular files in the folder of the scene") {
     CHECK(test::faceCount(data(zeros)) == 12);
 }
 
-TEST_CASE("glTF: binary files that end early, or are damaged, are refused") {
+TEST_CASE("glTF: truncated and damaged binary files are rejected") {
     Gltf gltf = Gltf::cube();
     const auto path = gltf.writeBinary("whole.glb");
     std::ifstream stream(path, std::ios::binary);

@@ -16,7 +16,7 @@ using namespace bilayer::detail;
 using namespace bilayer::test;
 using nlohmann::json;
 
-TEST_CASE("glTF: what is damaged is refused by its name") {
+TEST_CASE("glTF: damaged parts are rejected by name") {
     const auto damaged = [](const std::function<void(json&)>& damage, const Strings& words) {
         Gltf gltf = Gltf::cube();
         damage(gltf.file);
@@ -46,7 +46,7 @@ TEST_CASE("glTF: what is damaged is refused by its name") {
     refuses(gltf, {"index 2", "is 8", "8 vertices"});
 }
 
-TEST_CASE("glTF: members of a wrong type or length are refused by what stands there") {
+TEST_CASE("glTF: members of a wrong type or length are rejected with their text") {
     const auto wrong = [](const std::string& at, const json& value, const Strings& words) {
         Gltf gltf = Gltf::cube();
         gltf.file["skins"] = {{{"joints", {0}}}};
@@ -97,7 +97,7 @@ TEST_CASE("glTF: members of a wrong type or length are refused by what stands th
     refuses(gltf, {"accessor 0 has no count"});
 }
 
-TEST_CASE("glTF: what stands in the file is quoted to 40 bytes") {
+TEST_CASE("glTF: text of the file is quoted up to 40 bytes") {
     const std::string longName = std::string(38, 'X') + "\xc3\xa4\xc3\xa4" + std::string(200, 'X');
     Gltf gltf = Gltf::cube();
     gltf.file["extensionsRequired"] = {longName};
@@ -110,7 +110,7 @@ TEST_CASE("glTF: what stands in the file is quoted to 40 bytes") {
                           Catch::Contains("buffer 0: its uri is " + std::string(40, 'b') + " ...: "));
 }
 
-TEST_CASE("glTF: damaged JSON is refused by line and column, or by what stands there") {
+TEST_CASE("glTF: damaged JSON is rejected with line and column, or with its text") {
     const auto path = test::scratch("damaged.gltf");
     const auto damaged = [&](const std::string& text, const std::string& words) {
         std::ofstream(path, std::ios::binary) << text;

@@ -27,7 +27,7 @@ Gltf cubeOf(Gltf::Type type, double half, bool normalized) {
 
 }  // namespace
 
-TEST_CASE("glTF: quantised positions stand for what the specification says") {
+TEST_CASE("glTF: quantised positions have the values of the specification") {
     const auto size = [](Gltf gltf) { return upper(readGltf(std::move(gltf))).x; };
     for (const bool required : {true, false}) {
         Gltf gltf = cubeOf(Gltf::Short, 100, false);

@@ -14,7 +14,7 @@ using namespace bilayer;
 using namespace bilayer::test;
 using Catch::Contains;
 
-TEST_CASE("What of a file is left out is told") {
+TEST_CASE("Omitted parts of a file are reported") {
     ReadReport report;
     const std::string more =
         "v 7 7 7\nf 1 2\nf 3\nf 1 1 2\nl 1 2\np 1 2 3\ncstype bspline\ncurv 0 1 1 2\nhello world\nhello\n";
@@ -50,7 +50,7 @@ TEST_CASE("What of a file is left out is told") {
     CHECK_THAT(fmt::format("{}", fmt::join(report.notes, "\n")), Contains("the triangles of 1 face do not cover"));
 }
 
-TEST_CASE("A mesh far from the zero point keeps its shape") {
+TEST_CASE("A mesh far from the origin keeps its shape") {
     // float coordinates would lose a box of this size entirely
     const glm::dvec3 far(512344.7230, 5403209.7230, 249.7230);
     const auto shifted = [&](const std::string& begin, const std::string& end) {
@@ -83,7 +83,7 @@ TEST_CASE("A mesh far from the zero point keeps its shape") {
     CHECK(readMesh(write("near.obj", objOfBox("v {} {} 100{}\n"))).origin == glm::dvec3(0));
 }
 
-TEST_CASE("Errors of readers name the file, the place, what stands there, and what would be right") {
+TEST_CASE("Errors of readers name the file, the position, the text there, and what is expected") {
     const auto obj = objOfBox();
     const auto fails = [](const std::string& name, const std::string& text, const std::string& what) {
         CAPTURE(name);
@@ -135,7 +135,7 @@ TEST_CASE("Errors of readers name the file, the place, what stands there, and wh
     fails("e.stl", "hello", "'hello' stands where 'facet'");
 }
 
-TEST_CASE("The parts that a file is read in make no difference to errors") {
+TEST_CASE("Errors do not depend on the parts that a file is read in") {
     // two faults in different parts: the first one is reported, whichever thread is faster
     std::string text;
     for (int i = 0; i < 200000; ++i) text += "v 1.5 2.5 3.5\n";
@@ -143,7 +143,7 @@ TEST_CASE("The parts that a file is read in make no difference to errors") {
     for (int go = 0; go < 5; ++go) CHECK_THROWS_WITH(readMesh(write("twice.obj", twice)), Contains("line 200001: 'x'"));
 }
 
-TEST_CASE("Damaged files are read or refused") {
+TEST_CASE("Damaged files are read or rejected") {
     const unsigned start = test::seed();
     CAPTURE(start);
     std::mt19937 random(start);

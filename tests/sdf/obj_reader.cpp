@@ -25,7 +25,7 @@ TEST_CASE("OBJ: vertices may have three to eight numbers, in any way that number
     CHECK(inspect(readMesh(write("halves.obj", replaced(halves, "v .5 ", "v 5.e-1 ")))).volume == Approx(3));
 }
 
-TEST_CASE("OBJ: texture and normal indices are not looked at") {
+TEST_CASE("OBJ: texture and normal indices are ignored") {
     for (const char* texture : {"/1", "//1", "/1/1", "/999/-999", "/", "//", "/x/y"}) {
         CAPTURE(texture);
         checkBox(write("textured.obj", objOfBox("v {} {} {}\n", texture)));

@@ -254,7 +254,7 @@ TEST_CASE("pseudonormal: a mesh smaller than a voxel") {
     check(shapes::moved(shapes::box({1e-3f, 1e-3f, 1e-3f}), glm::vec3(0.01f, 0, 0)), 1.f);
 }
 
-TEST_CASE("pseudonormal: vertices of their own, duplicate and zero-area faces change nothing") {
+TEST_CASE("pseudonormal: unwelded vertices, duplicate and zero-area faces change nothing") {
     const Mesh cone = transformed(shapes::cone(4, 9, 9), turned());
     Mesh dirty = unwelded(cone);
     for (std::size_t i = 0; i < cone.triangles.size(); i += 3)  // duplicates that begin with another vertex
@@ -311,7 +311,7 @@ TEST_CASE("pseudonormal: the bytes do not depend on the number of threads") {
     }
 }
 
-TEST_CASE("pseudonormal: what the sink throws ends the work") {
+TEST_CASE("pseudonormal: an exception of the sink ends the work") {
     const Mesh mesh = shapes::sphere(20, 3);
     const std::function<bool(float)> nobody;
     Progress progress(nobody);

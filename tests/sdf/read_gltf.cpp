@@ -56,7 +56,7 @@ TEST_CASE("glTF: strips and fans are triangles") {
     CHECK(tells(readGltf(gltf), "1 primitives of points or lines"));
 }
 
-TEST_CASE("glTF: nodes place meshes in double precision, and mirrors keep outside outside") {
+TEST_CASE("glTF: nodes place meshes in double precision, and mirrors keep the outward side") {
     Gltf gltf = Gltf::cube();
     json& nodes = gltf.file["nodes"];
     nodes[0]["scale"] = {-1, 1, 1};
@@ -110,7 +110,7 @@ TEST_CASE("glTF: rotations are normalised, and matrices are affine") {
     refuses(gltf, {"instances of node 0", "ROTATION"});
 }
 
-TEST_CASE("glTF: every instance of EXT_mesh_gpu_instancing is there") {
+TEST_CASE("glTF: every instance of EXT_mesh_gpu_instancing is read") {
     Gltf gltf = Gltf::cube();
     const int t = gltf.points({{0, 0, 0}, {5, 0, 0}, {0, 5, 0}});
     const int s = gltf.points({{1, 1, 1}, {-1, 1, 1}, {2, 2, 2}});
@@ -137,7 +137,7 @@ TEST_CASE("glTF: every instance of EXT_mesh_gpu_instancing is there") {
     refuses(gltf, {"instances of node 0", "no TRANSLATION"});
 }
 
-TEST_CASE("glTF: the scene that is shown is read") {
+TEST_CASE("glTF: the default scene is read") {
     Gltf gltf = Gltf::cube();
     gltf.add("nodes", {{"mesh", 0}, {"translation", {10, 0, 0}}});
     CHECK(upper(readGltf(gltf)).x == 1);
@@ -155,7 +155,7 @@ TEST_CASE("glTF: the scene that is shown is read") {
     CHECK(tells(readGltf(gltf), "1 meshes were left out"));
 }
 
-TEST_CASE("glTF: what the scene does not show is told") {
+TEST_CASE("glTF: parts outside the scene are reported") {
     Gltf gltf = Gltf::cube();
     gltf.add("nodes", {{"mesh", 0}, {"translation", {10, 0, 0}}});
     gltf.add("nodes", {{"children", {1}}});
@@ -197,7 +197,7 @@ TEST_CASE("glTF: trees of nodes may be deep, and must be trees") {
     CHECK_THROWS_WITH(readScene(path), Catch::Contains("nested more than"));
 }
 
-TEST_CASE("glTF: skins are applied, morph targets are told of") {
+TEST_CASE("glTF: skins are applied, and morph targets are reported") {
     Gltf gltf = Gltf::cube();
     // the upper half is bound to a joint that is 4 higher than in the bind pose
     std::vector<double> joints, weights, inverse;
@@ -239,7 +239,7 @@ TEST_CASE("glTF: images are never loaded") {
     CHECK(volume(readGltf(gltf)) == 8);
 }
 
-TEST_CASE("glTF: required extensions that are not understood are refused by name") {
+TEST_CASE("glTF: unknown required extensions are rejected by name") {
     for (const char* name : {"KHR_draco_mesh_compression", "EXT_meshopt_compression", "VENDOR_new"}) {
         Gltf gltf = Gltf::cube();
         gltf.file["extensionsUsed"] = gltf.file["extensionsRequired"] = {name};

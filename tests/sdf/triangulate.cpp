@@ -201,7 +201,7 @@ TEST_CASE("repeated corners and edges out and back cost a triangle without area 
     check({{0, 0}, {4, 0}, {4, 2}, {2, 2}, {4, 2}, {6, 2}, {4, 2}, {4, 4}, {0, 4}}, random, 2);
 }
 
-TEST_CASE("outlines that cross themselves or enclose nothing are told") {
+TEST_CASE("outlines that cross themselves or enclose nothing are reported") {
     const unsigned seed = test::seed();
     CAPTURE(seed);
     std::mt19937 random(seed);
@@ -254,7 +254,7 @@ TEST_CASE("a quadrangle is cut along the diagonal that lies within") {
     CHECK(triangles.size() == 2);
 }
 
-TEST_CASE("places near the rounding of their coordinates are told apart") {
+TEST_CASE("points that differ by the last bit of their coordinates are distinguished") {
     const unsigned seed = test::seed();
     CAPTURE(seed);
     std::mt19937 random(seed);

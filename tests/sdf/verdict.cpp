@@ -12,7 +12,7 @@
 
 using namespace bilayer;
 
-TEST_CASE("the verdict on the truth is that it is exact, and each fault is noticed") {
+TEST_CASE("a field of true distances is judged exact, and each fault is detected") {
     const Mesh mesh = shapes::sphere(1, 2);
     const test::Truth truth(mesh);
     const float h = 0.1f;

@@ -88,7 +88,7 @@ TEST_CASE("fields that cannot be read") {
     CHECK_FALSE(std::filesystem::exists(rejectedOutput()));
 }
 
-TEST_CASE("what is there, but no file, is told from what is not there") {
+TEST_CASE("existing paths that are not files are distinguished from missing ones") {
     const std::filesystem::path here = scratch("odd");
     std::filesystem::create_directories(here);
     const std::string field = (here / "field.vdb").string();
@@ -128,7 +128,7 @@ TEST_CASE("what is there, but no file, is told from what is not there") {
     CHECK_FALSE(std::filesystem::exists(rejectedOutput()));
 }
 
-TEST_CASE("a small file that tells of gigabytes takes no memory for them") {
+TEST_CASE("a small file that announces gigabytes takes no memory for them") {
     const auto path = corpusMesh("../cases/small-file-gigabytes.vdb");
     if (!path) return;
     for (const char* command : {"info", "query"}) {
@@ -141,7 +141,7 @@ TEST_CASE("a small file that tells of gigabytes takes no memory for them") {
     }
 }
 
-TEST_CASE("what is built of a body of any size can be read") {
+TEST_CASE("the built file of a body of any size can be read") {
     const std::string field = scratch("size.vdb").string();
     for (const std::string size : {"1e-3", "1", "1e7", "1e10"}) {
         const auto mesh = textFile("size.obj", "v 0 0 0\nv " + size + " 0 0\nv 0 " + size + " 0\nv 0 0 " + size +
@@ -174,7 +174,7 @@ TEST_CASE("points that cannot be parsed") {
         requireFault({"query", field}, "line 1", {.input = std::string(line) + "\n"});
 }
 
-TEST_CASE("voxel sizes that no machine can serve are refused at once") {
+TEST_CASE("voxel sizes beyond any machine's memory are rejected at once") {
     const auto start = std::chrono::steady_clock::now();
     for (const char* size : {"1e-9", "1e-12", "1e-30"})
         requireFault(rejectedBuild(sphereFile(), {"--voxel-size", size}), "voxel");
@@ -184,7 +184,7 @@ TEST_CASE("voxel sizes that no machine can serve are refused at once") {
     CHECK_FALSE(std::filesystem::exists(rejectedOutput()));
 }
 
-TEST_CASE("what cannot become liquid is named") {
+TEST_CASE("bodies that cannot become liquid are rejected by name") {
     const std::string sheet = textFile("sheet.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").string();
     requireFault({"seed", sheet, "-o", rejectedOutput(), "--voxel-size", "0.05"}, sheet + ": ");
     requireFault({"seed", sphereFile().string(), sheet, "-o", rejectedOutput(), "--voxel-size", "0.05"}, sheet + ": ");

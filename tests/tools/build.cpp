@@ -71,7 +71,7 @@ TEST_CASE("build inspects a mesh only where a report is asked for") {
     CHECK_THAT(with({"--report"}).out, Catch::Contains("thin walls"));
 }
 
-TEST_CASE("what a mesh file holds beside its mesh is told") {
+TEST_CASE("omitted parts of a mesh file are reported") {
     const auto path = scratch("more.obj");
     std::ofstream(path) << "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nv 5 5 5\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\nf 1 2\n";
     const Words build{"build", path.string(), "-o", scratch("more.vdb").string(), "--resolution", "8"};
@@ -84,7 +84,7 @@ TEST_CASE("what a mesh file holds beside its mesh is told") {
     CHECK(json["file"]["notes"].size() == 1);
 }
 
-TEST_CASE("a mesh far from the zero point keeps its shape from file to file") {
+TEST_CASE("a mesh far from the origin keeps its shape from file to file") {
     // a cube of 0.8 m at map coordinates
     const glm::dvec3 corner(512344.7230, 5403209.7230, 249.7230);
     const auto path = scratch("far.obj"), output = scratch("far.vdb"), again = scratch("far.ply");
@@ -226,13 +226,13 @@ TEST_CASE("widths may be given in the mesh's unit") {
     CHECK_THAT(run({"build", "--help"}).out, Catch::Contains("--band-unit") && Catch::Contains("world"));
 }
 
-TEST_CASE("a filled field promises no bound of its error") {
+TEST_CASE("a field without gaps has no error bound") {
     const std::string output = scratch("filled.vdb").string();
     CHECK(buildSphere(output, {"--voxel-size", "0.05", "--fill"})["errorBound"].is_null());
     CHECK(run({"info", output, "--json"}).json()["errorBound"].is_null());
 }
 
-TEST_CASE("each method says what it did, and both exact ones agree") {
+TEST_CASE("each method is reported, and both exact ones agree") {
     const std::string output = scratch("methods.vdb").string();
     const auto with = [&](const std::string& method) {
         const auto json = buildSphere(output, {"--voxel-size", "0.05", "--method", method});
@@ -255,7 +255,7 @@ TEST_CASE("each method says what it did, and both exact ones agree") {
     contains(pseudonormal, exact);
 }
 
-TEST_CASE("each sign says who asked for it") {
+TEST_CASE("each sign method is reported with its reason") {
     for (const std::string method : {"exact", "pseudonormal"})
         for (const std::string sign : {"normals", "winding", "flood"}) {
             const std::string output = scratch("signs.vdb").string();
@@ -266,7 +266,7 @@ TEST_CASE("each sign says who asked for it") {
         }
 }
 
-TEST_CASE("an open mesh is signed by other means, and build says why") {
+TEST_CASE("an open mesh gets another sign method, and build reports why") {
     // a sphere without the triangles around one vertex: a hole about 0.13 wide
     Mesh open = shapes::sphere(0.5f, 3);
     std::erase_if(open.triangles, [](const glm::uvec3& t) { return t.x == 0 || t.y == 0 || t.z == 0; });
@@ -292,7 +292,7 @@ TEST_CASE("an open mesh is signed by other means, and build says why") {
     CHECK(centre() < 0);
 }
 
-TEST_CASE("a body's points look outward, whichever way its triangles run") {
+TEST_CASE("the surface points of a body face outward for either orientation of its triangles") {
     Mesh inside = shapes::sphere(0.5f, 3);
     for (glm::uvec3& triangle : inside.triangles) std::swap(triangle.x, triangle.y);
     const auto path = scratch("inside.ply"), output = scratch("inside.vdb");
@@ -322,7 +322,7 @@ TEST_CASE("build on an OpenCL device gives the same voxels") {
     CHECK(cl["activeVoxels"] == tbb["activeVoxels"]);
 }
 
-TEST_CASE("build by prisms says that nothing bounds its error") {
+TEST_CASE("build by prisms reports no error bound") {
     const auto devices = run({"devices", "--json"}).json()["devices"];
     if (devices.empty()) {
         WARN("skipped: there is no OpenCL device");

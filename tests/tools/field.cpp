@@ -7,8 +7,8 @@
 #include <glm/geometric.hpp>
 #include <sstream>
 
-#include <bilayer/sdf/mesh_io.h>
 #include <bilayer/sdf/grids.h>
+#include <bilayer/sdf/mesh_io.h>
 #include <bilayer/sdf/vdb_io.h>
 #include "tests/support/support.h"
 #include "tests/tools/program.h"
@@ -56,7 +56,7 @@ TEST_CASE("query answers line by line") {
     CHECK((d[3] > 0 && band[3] == 0 && x[3] == 0));
 }
 
-TEST_CASE("surface gives the sphere back") {
+TEST_CASE("surface returns the sphere") {
     for (const char* name : {"surface.ply", "surface.obj", "surface.stl"}) {
         const std::string output = scratch(name).string();
         const Result r = run({"surface", fieldFile(), "-o", output});

@@ -18,7 +18,7 @@ TEST_CASE("help and version") {
     }
 }
 
-TEST_CASE("devices may be none") {
+TEST_CASE("devices reports no device") {
     CHECK(run({"devices", "--json"}).json()["devices"].is_array());
     CHECK(run({"devices"}).status == 0);
     const Result none = run({"devices"}, {.variables = {"OCL_ICD_VENDORS=/nonexistent"}});

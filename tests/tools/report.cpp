@@ -18,7 +18,7 @@ using namespace bilayer;
 using namespace bilayer::detail;
 using namespace bilayer::test;
 
-TEST_CASE("inspect tells of holes") {
+TEST_CASE("inspect reports holes") {
     Mesh open = shapes::sphere(1, 2);
     open.triangles.pop_back();
     const auto path = scratch("open.obj");
@@ -31,7 +31,7 @@ TEST_CASE("inspect tells of holes") {
     CHECK(run({"inspect", path.string()}).out.find("3 boundary edges") != std::string::npos);
 }
 
-TEST_CASE("info tells what is in a file") {
+TEST_CASE("info reports the contents of a file") {
     const Result r = run({"info", fieldFile(), "--json"});
     INFO(r.err);
     REQUIRE(r.status == 0);
@@ -53,7 +53,7 @@ TEST_CASE("info tells what is in a file") {
     CHECK_THAT(table.out, Catch::Contains("normals: closed and oriented") && Catch::Contains("0.0001 voxels"));
 }
 
-TEST_CASE("build --body keeps what bodies need, and info tells of it") {
+TEST_CASE("build --body stores the data of bodies, and info reports it") {
     const std::string output = scratch("body.vdb").string();
     const auto plain = buildSphere(output, {"--voxel-size", "0.05"});
     CHECK_FALSE(plain.contains("body"));
@@ -91,7 +91,7 @@ TEST_CASE("build --body keeps what bodies need, and info tells of it") {
     CHECK(Collider(readVdb(output)).data().points().points().size() == body.data().points().points().size());
 }
 
-TEST_CASE("inspect says what a scene needs") {
+TEST_CASE("inspect reports recommended settings") {
     const auto path = scratch("plate.ply");
     writeMesh(path, shapes::box({0.5f, 0.5f, 0.015f}, 4));
     const Words words{"inspect", path.string(), "--dt", "1/60", "--speed", "10"};
@@ -123,7 +123,7 @@ TEST_CASE("inspect says what a scene needs") {
     CHECK_FALSE(run({"inspect", path.string(), "--json"}).json().contains("advice"));
 }
 
-TEST_CASE("inspect and info tell the mass, each by its own means") {
+TEST_CASE("inspect and info report the mass") {
     const auto mesh = run({"inspect", sphereFile().string(), "--json"}).json()["mass"];
     const auto field = run({"info", fieldFile(), "--json"}).json()["mass"];
     const double ball = 4. / 3 * 3.14159265 * 0.125;
@@ -145,7 +145,7 @@ TEST_CASE("inspect and info tell the mass, each by its own means") {
     CHECK(run({"inspect", scratch("lidless.obj").string(), "--json"}).json()["mass"].is_null());
 }
 
-TEST_CASE("info takes fields from elsewhere") {
+TEST_CASE("info accepts fields of other programs") {
     openvdb::initialize();
     const auto grid = openvdb::tools::createLevelSetSphere<openvdb::FloatGrid>(1, openvdb::Vec3f(0), 0.1f);
     const std::string path = scratch("elsewhere.vdb").string();

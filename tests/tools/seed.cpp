@@ -41,7 +41,7 @@ TEST_CASE("seed unites inputs, moves them, and adds particles") {
     CHECK(stretched["voxelSize"].get<double>() == Approx(0.3).epsilon(0.01));
 }
 
-TEST_CASE("a liquid does not say what its body said") {
+TEST_CASE("a liquid does not keep its body's metadata") {
     const std::string body = scratch("poured.vdb").string(), output = scratch("poured_liquid.vdb").string();
     buildSphere(body, {"--voxel-size", "0.05", "--body"});
     const Result r = run({"seed", sphereFile().string(), "-o", output, "--into", body, "--translate", "0.3", "0", "0"});

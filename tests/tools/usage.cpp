@@ -65,7 +65,7 @@ TEST_CASE("wrong usage") {
     CHECK_FALSE(std::filesystem::exists(rejectedOutput()));
 }
 
-TEST_CASE("bodies and scenes that are told by halves are wrong usage") {
+TEST_CASE("incomplete options of bodies and scenes are wrong usage") {
     const std::string mesh = sphereFile().string();
     requireUsage(rejectedBuild(mesh, {"--voxel-size", "0.1", "--margin", "0.1"}), "--margin: needs --body");
     requireUsage(rejectedBuild(mesh, {"--voxel-size", "0.1", "--point-spacing", "1"}), "--point-spacing: needs --body");
@@ -91,7 +91,7 @@ TEST_CASE("bodies and scenes that are told by halves are wrong usage") {
     requireUsage({"inspect", mesh, "--gap", "1"}, "--dt");
 }
 
-TEST_CASE("widths in the mesh's unit must come to as many voxels as others") {
+TEST_CASE("widths in the mesh's unit have the same limits in voxels") {
     const std::string mesh = sphereFile().string();
     const auto refused = [&](Words options, const std::string& culprit) {
         options.insert(options.end(), {"--band-unit", "world"});
@@ -139,7 +139,7 @@ TEST_CASE("options that belong to other methods are wrong usage") {
     CHECK_FALSE(std::filesystem::exists(rejectedOutput()));
 }
 
-TEST_CASE("ranges in the help are those that are taken") {
+TEST_CASE("ranges in the help are the accepted ones") {
     const Result help = run({"build", "--help"});
     REQUIRE(help.status == 0);
     const struct {
@@ -171,7 +171,7 @@ TEST_CASE("ranges in the help are those that are taken") {
     std::filesystem::remove(rejectedOutput());
 }
 
-TEST_CASE("what is no number is wrong usage wherever a number is expected") {
+TEST_CASE("NaN and text are wrong usage wherever a number is expected") {
     const std::string mesh = sphereFile().string();
     for (const char* word : {"nan", "-nan", "inf", "1e400", "x"}) {
         for (const char* option : {"--half-width", "--gap", "--threads", "--device-memory"})
