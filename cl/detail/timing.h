@@ -1,4 +1,5 @@
 // Measures the device time of a build by the events of its queues.
+// Tested by tests/cl/filler.cpp.
 #pragma once
 
 #include <algorithm>

@@ -5,6 +5,7 @@
 // along x first, then y, then z. The gradient is a by-product. Voxels outside the band are NaN, which propagates to the
 // result. Highway compiles the part between HWY_BEFORE_NAMESPACE and HWY_AFTER_NAMESPACE once for each instruction set.
 // All of them give the same bytes.
+// Tested by tests/collider/field.cpp.
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "collider/field/field_sample.cpp"
 #include <hwy/foreach_target.h>

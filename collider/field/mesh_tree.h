@@ -1,4 +1,5 @@
 // A mesh with a bounding volume hierarchy over its triangles, for exact queries.
+// Tested by tests/collider/mesh_rays.cpp.
 #pragma once
 
 #include <array>

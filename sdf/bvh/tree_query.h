@@ -1,6 +1,7 @@
 // SIMD queries of the triangle hierarchy: which nodes come near a box of voxels, and how far each voxel of a block is
 // from its nearest triangle. Queries do not start at the root. A list of candidate nodes is narrowed from large boxes
 // of voxels to small ones, and a voxel tests only the remaining candidates.
+// Tested by tests/sdf/wide_tree.cpp.
 #pragma once
 
 #include <cstddef>

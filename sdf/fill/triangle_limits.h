@@ -1,4 +1,5 @@
 // A triangle in voxels, and the box that it must overlap to be relevant.
+// Tested by tests/sdf/exact.cpp.
 #pragma once
 
 #include <array>

@@ -4,6 +4,7 @@
 //   std::optional<glm::vec3> wayOut(point, radius)    depenetration of a sphere that is inside; none if unknown
 //
 // and a bound() of the distance to their surface. Open surfaces have isNear() instead.
+// Tested by tests/bullet/continuous_collision.cpp.
 #pragma once
 
 #include <BulletCollision/CollisionShapes/btConcaveShape.h>
