@@ -44,8 +44,8 @@ void Program::factory(std::filesystem::path& folder, const std::string& parts, c
     option("--factory", folder, "folder with " + parts + " of the Factory data set, " + use);
     checkFactory_ = [this, &folder, parts, hasParts] {
         if (folder.empty() || hasParts(folder)) return;
-        fmt::print(stderr, "{}: cannot find {} of the Factory data set in {}: parts by formula are used\n", name_, parts,
-                   folder.string());
+        fmt::print(stderr, "{}: cannot find {} of the Factory data set in {}: parts by formula are used\n", name_,
+                   parts, folder.string());
         folder.clear();
     };
 }

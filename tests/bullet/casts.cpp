@@ -45,14 +45,14 @@ double firstTouch(const Mesh& mesh, const glm::dvec3& from, const glm::dvec3& to
 // displacement; 1 if there is none. Triangles are grown by a fraction of their sides.
 double firstHit(const Mesh& mesh, const glm::dvec3& from, const glm::dvec3& to, bool oneSided, double grown) {
     double first = 1;
-    const glm::dvec3 way = to - from;
+    const glm::dvec3 delta = to - from;
     for (const glm::uvec3& t : mesh.triangles) {
         const glm::dvec3 a = mesh.points[t.x], u = glm::dvec3(mesh.points[t.y]) - a,
                          v = glm::dvec3(mesh.points[t.z]) - a;
-        const glm::dvec3 p = glm::cross(way, v), q = glm::cross(from - a, u);
+        const glm::dvec3 p = glm::cross(delta, v), q = glm::cross(from - a, u);
         const double volume = glm::dot(u, p);
         if (oneSided ? volume <= 0 : volume == 0) continue;
-        const double alongU = glm::dot(from - a, p) / volume, alongV = glm::dot(way, q) / volume;
+        const double alongU = glm::dot(from - a, p) / volume, alongV = glm::dot(delta, q) / volume;
         if (alongU < -grown || alongV < -grown || alongU + alongV > 1 + grown) continue;
         if (const double part = glm::dot(v, q) / volume; part >= 0) first = std::min(first, part);
     }
@@ -126,8 +126,8 @@ TEST_CASE("Sweeps of shapes of all kinds hit a field where they hit its triangle
     for (int i = 0; i < 60; ++i) {
         const auto [itsFrom, itsTo] = random.path(1);
         const btVector3 from = scale * itsFrom, to = scale * itsTo;
-        const btTransform turn(random.rotation());
-        const auto at = [&](const btVector3& place) { return btTransform(turn.getBasis(), place); };
+        const btTransform rotation(random.rotation());
+        const auto at = [&](const btVector3& place) { return btTransform(rotation.getBasis(), place); };
         btCollisionWorld::ClosestConvexResultCallback sweep(from, to), expected(itsFrom, itsTo);
         both.ofField.dynamics.convexSweepTest(shape.get(), at(from), at(to), sweep);
         both.ofTriangles.dynamics.convexSweepTest(itsShape.get(), at(itsFrom), at(itsTo), expected);

@@ -146,11 +146,11 @@ std::vector<Contact> keptOf(const bullet::detail::Reduced& reduced) {
 }
 
 /// The minimum separation after a small motion of A about the origin.
-double minGap(const std::vector<Contact>& contacts, const glm::dvec3& shift, const glm::dvec3& turn) {
+double minSeparation(const std::vector<Contact>& contacts, const glm::dvec3& shift, const glm::dvec3& rotation) {
     double least = 1e30;
     for (const Contact& c : contacts)
-        least = std::min(least,
-                         c.distance + glm::dot(glm::dvec3(c.normal), shift + glm::cross(turn, glm::dvec3(c.position))));
+        least = std::min(
+            least, c.distance + glm::dot(glm::dvec3(c.normal), shift + glm::cross(rotation, glm::dvec3(c.position))));
     return least;
 }
 
@@ -170,8 +170,8 @@ double dot(const Wrench& a, const Wrench& b) {
 std::vector<Wrench> wrenchesOf(const std::vector<Contact>& contacts, double extent) {
     std::vector<Wrench> all;
     for (const Contact& c : contacts) {
-        const glm::dvec3 n(c.normal), turn = glm::cross(glm::dvec3(c.position), n) / extent;
-        all.push_back({n.x, n.y, n.z, turn.x, turn.y, turn.z});
+        const glm::dvec3 n(c.normal), torque = glm::cross(glm::dvec3(c.position), n) / extent;
+        all.push_back({n.x, n.y, n.z, torque.x, torque.y, torque.z});
     }
     return all;
 }
@@ -257,9 +257,10 @@ TEST_CASE("The reduced contacts of random bodies are reached first, up to the re
         for (const Contact& c : contacts) reach = std::max(reach, glm::distance(glm::dvec3(c.position), centre));
         for (int k = 0; k < 50; ++k) {
             const double angle = std::exp2(-5 - 2 * part(random));
-            const glm::dvec3 turn = angle * glm::normalize(glm::dvec3(normal(random), normal(random), normal(random)));
-            const glm::dvec3 shift = -glm::cross(turn, centre);
-            const double more = minGap(kept, shift, turn) - minGap(contacts, shift, turn);
+            const glm::dvec3 rotation =
+                angle * glm::normalize(glm::dvec3(normal(random), normal(random), normal(random)));
+            const glm::dvec3 shift = -glm::cross(rotation, centre);
+            const double more = minSeparation(kept, shift, rotation) - minSeparation(contacts, shift, rotation);
             worst = std::max(worst, (more - reduced.reductionError) / (angle * reach));
         }
     }

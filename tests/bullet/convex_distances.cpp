@@ -90,14 +90,14 @@ TEST_CASE("Contact tests between a field and convex shapes return the distance t
     btRigidBody* ofField = both.ofField.add(*shape, 1, {0, 0, 0});
     btRigidBody* ofTriangles = both.ofTriangles.add(*itsShape, 1, {0, 0, 0});
     int found = 0;
-    const float most = 0.1f;
+    const float maxDistance = 0.1f;
     for (int i = 0; i < 100; ++i) {
-        const btTransform turn(random.rotation());
+        const btTransform rotation(random.rotation());
         const btVector3 place = 0.9f * random.vector() + btVector3(0.3f, -0.2f, 0.1f);
         const auto ask = [&](World& world, btRigidBody* body, float factor) {
-            body->setWorldTransform(btTransform(turn.getBasis(), factor * place));
+            body->setWorldTransform(btTransform(rotation.getBasis(), factor * place));
             Nearest nearest;
-            nearest.m_closestDistanceThreshold = factor * most;
+            nearest.m_closestDistanceThreshold = factor * maxDistance;
             world.dynamics.contactPairTest(world.dynamics.getCollisionObjectArray()[0], body, nearest);
             return nearest.distance / factor;
         };
@@ -106,14 +106,14 @@ TEST_CASE("Contact tests between a field and convex shapes return the distance t
         const float distance = ask(both.ofField, ofField, scale), byBullet = ask(both.ofTriangles, ofTriangles, 1);
         Mesh seen = mesh;
         for (glm::vec3& p : seen.points)
-            p = bullet::detail::toGlm(btTransform(turn.getBasis(), place).inverse() * (body * toBullet(p)));
+            p = bullet::detail::toGlm(btTransform(rotation.getBasis(), place).inverse() * (body * toBullet(p)));
         const float expected = kind == 1   ? float(distanceTo(seen, fromBox))
                                : kind == 3 ? float(distanceTo(seen, fromCylinder))
                                : kind == 4 ? float(distanceTo(seen, fromCone))
                                            : byBullet;
         CAPTURE(i, distance / voxel, expected / voxel, byBullet / voxel);
         if (windingNumber(mesh, glm::dvec3(bullet::detail::toGlm(body.invXform(place)))) > 0.5) continue;
-        if (expected < 0.1f * voxel || expected > 0.9f * most) continue;
+        if (expected < 0.1f * voxel || expected > 0.9f * maxDistance) continue;
         ++found;
         CHECK(distance == Approx(expected).margin(0.1 * double(voxel)));
     }

@@ -45,13 +45,13 @@ Crossing crossingOf(std::mt19937& random, float gap) {
     std::uniform_real_distribution<float> part(-1, 1);
     const glm::quat ridge = glm::angleAxis(glm::quarter_pi<float>(), glm::vec3(1, 0, 0));
     const glm::quat square = glm::angleAxis(glm::half_pi<float>(), glm::vec3(0, 0, 1));
-    const glm::quat askew = glm::angleAxis(0.6f * part(random), glm::vec3(0, 0, 1));
+    const glm::quat oblique = glm::angleAxis(0.6f * part(random), glm::vec3(0, 0, 1));
     const float height = std::sqrt(2.f) * halfBar;
     Pose lower{{0.3f * part(random), 0.3f * part(random), -height}, square * ridge};
-    Pose upper{{0.3f * part(random), 0.3f * part(random), height + gap}, askew * ridge};
-    const glm::quat turn = glm::normalize(glm::quat(part(random), part(random), part(random), part(random) + 0.1f));
-    for (Pose* pose : {&lower, &upper}) *pose = {turn * pose->position, glm::normalize(turn * pose->rotation)};
-    return {upper, lower, turn * glm::vec3(0, 0, 1), gap};
+    Pose upper{{0.3f * part(random), 0.3f * part(random), height + gap}, oblique * ridge};
+    const glm::quat rotation = glm::normalize(glm::quat(part(random), part(random), part(random), part(random) + 0.1f));
+    for (Pose* pose : {&lower, &upper}) *pose = {rotation * pose->position, glm::normalize(rotation * pose->rotation)};
+    return {upper, lower, rotation * glm::vec3(0, 0, 1), gap};
 }
 
 btTransform transformOf(const Pose& pose) {
@@ -149,10 +149,10 @@ TEST_CASE("Edge descent finds a bump between its samples, and keeps it") {
     const Convex convex(box);
     float before = 0;
     for (int i = 0; i < 200; ++i) {
-        const float way = 0.02f * h * float(i), gap = -0.1f * h;
+        const float displacement = 0.02f * h * float(i), gap = -0.1f * h;
         std::vector<Contact> contacts;
-        bullet::detail::collideConvex(convex, {{0.3f + way, 0, radius + side + gap}, ridge}, {}, {*ball, {}}, h, false,
-                                      contacts);
+        bullet::detail::collideConvex(convex, {{0.3f + displacement, 0, radius + side + gap}, ridge}, {}, {*ball, {}},
+                                      h, false, contacts);
         const Contact& contact = deepest(contacts);
         CAPTURE(i, contact.distance / h);
         CHECK(contact.distance == Approx(gap).margin(tolerance));
@@ -167,7 +167,7 @@ TEST_CASE("Contacts of solids of revolution are finite in all orientations") {
     const auto plate = exactBox({1.2f, 1.2f, 0.1f}, h);
     const Convex cylinder(btCylinderShape({0.15f, 0.1f, 0.15f})), cone(btConeShape(0.12f, 0.3f));
     // an orientation where the lowest point of a rim is also that of a side
-    const glm::quat aslant(-0.3470952f, -0.3281656f, 0.4082684f, 0.7779134f);
+    const glm::quat oblique(-0.3470952f, -0.3281656f, 0.4082684f, 0.7779134f);
     const unsigned start = seed();
     std::mt19937 random(start);
     std::uniform_real_distribution<float> part(-1, 1);
@@ -178,7 +178,7 @@ TEST_CASE("Contacts of solids of revolution are finite in all orientations") {
         const glm::vec3 at(0.29426688f + 2e-4f * part(random), 0.296223223f,
                            isPlace ? 0.263574898f : 0.25f + 0.05f * part(random));
         std::vector<Contact> contacts;
-        bullet::detail::collideConvex(isPlace || i % 4 ? cylinder : cone, {at, isPlace ? aslant : glm::normalize(any)},
+        bullet::detail::collideConvex(isPlace || i % 4 ? cylinder : cone, {at, isPlace ? oblique : glm::normalize(any)},
                                       {}, {*plate, {}}, h, false, contacts);
         for (const Contact& contact : contacts) {
             CAPTURE(start, i, contact.distance, contact.feature);
@@ -260,11 +260,11 @@ TEST_CASE("No contact is much deeper than the penetration depth of the bodies, w
     int overlapping = 0;
     for (int run = 0; run < 200; ++run) {
         const std::size_t a = random() % 3, b = random() % 3;
-        const glm::quat turn =
+        const glm::quat rotation =
             glm::normalize(glm::quat(normal(random), normal(random), normal(random), normal(random)));
-        const glm::vec3 way = glm::normalize(glm::vec3(normal(random), normal(random), normal(random)));
+        const glm::vec3 axis = glm::normalize(glm::vec3(normal(random), normal(random), normal(random)));
         const auto depthAt = [&](float away) {
-            return float(demo::penetration(specimens[a], {away * way, turn}, specimens[b], {}));
+            return float(demo::penetration(specimens[a], {away * axis, rotation}, specimens[b], {}));
         };
         // penetration of up to half a voxel
         const float wanted = (0.05f + 0.05f * float(run % 10)) * h;
@@ -273,7 +273,7 @@ TEST_CASE("No contact is much deeper than the penetration depth of the bodies, w
         const float depth = depthAt(near);
         if (depth > h) continue;
         ++overlapping;
-        const Pose pose{near * way, turn};
+        const Pose pose{near * axis, rotation};
         const auto check = [&](const char* as, const std::vector<Contact>& contacts) {
             float deepest = 0;
             for (const Contact& contact : contacts) deepest = std::min(deepest, contact.distance);

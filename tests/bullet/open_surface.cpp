@@ -124,10 +124,10 @@ TEST_CASE("A vertex below a crease of triangles has the depths of both faces") {
         const float below = (0.5f + 0.4f * any(random)) * h;
         const glm::vec3 tip(0.9f * slope * below * any(random), 3 * h * any(random), -below);
         const glm::vec3 axis = glm::normalize(glm::vec3(0.3f * any(random), 0.3f * any(random), -1));
-        const glm::quat turn = glm::angleAxis(std::acos(axis.z), glm::normalize(glm::vec3(-axis.y, axis.x, 0)));
+        const glm::quat rotation = glm::angleAxis(std::acos(axis.z), glm::normalize(glm::vec3(-axis.y, axis.x, 0)));
         std::vector<Contact> contacts;
         bullet::detail::collideTriangles(*groove.shape, btTransform::getIdentity(), {},
-                                         {*cone, {tip - 0.5f * height * axis, turn}}, h, false, contacts);
+                                         {*cone, {tip - 0.5f * height * axis, rotation}}, h, false, contacts);
         for (const glm::vec3& up : {left, right}) {
             float deepest = h;
             for (const Contact& contact : contacts)

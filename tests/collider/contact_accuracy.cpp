@@ -33,9 +33,9 @@ TEST_CASE("beyond the band, edges have the distance of the triangles' edges, and
     const float beyond = crosses ? 0.02f : 0.001f;
     const Mesh mesh = shapes::box({0.3f, 0.2f, 0.1f});
     const Collider brick(mesh, build(mesh, {.voxelSize = h}), {.accuracy = measure});
-    const float half = std::sqrt(0.5f), aside = half * gap, quarter = glm::pi<float>() / 4;
+    const float half = std::sqrt(0.5f), sideways = half * gap, quarter = glm::pi<float>() / 4;
     // an edge next to and above another one, or above and across it
-    Pose upper{{0.6f + aside, 0.01f, 0.2f + aside}}, lower;
+    Pose upper{{0.6f + sideways, 0.01f, 0.2f + sideways}}, lower;
     glm::vec3 across(half, 0, half);
     if (crosses) {
         upper = {{0, 0, half * 0.3f + half * 0.4f + gap}, glm::angleAxis(quarter, glm::vec3(1, 0, 0))};

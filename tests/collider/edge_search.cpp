@@ -53,13 +53,13 @@ TEST_CASE("An edge below two faces has the depth of the minimum translation over
         REQUIRE(found);
         // reference by sampling: depenetration directions all around the edge. Displaced by s, the edge's line leaves
         // either face where it meets the other
-        const glm::vec3 aside = glm::normalize(glm::cross(along, before)), up = glm::cross(aside, along);
+        const glm::vec3 lateral = glm::normalize(glm::cross(along, before)), up = glm::cross(lateral, along);
         float least = 100;
         for (int k = 0; k < 3600; ++k) {
             const float angle = glm::two_pi<float>() * float(k) / 3600;
-            const glm::vec3 way = std::cos(angle) * up + std::sin(angle) * aside;
-            // before * (s way + t along) = after * (s way + t along) = 1
-            const float s = (fall + rise) / (glm::dot(before, way) * rise + glm::dot(after, way) * fall);
+            const glm::vec3 push = std::cos(angle) * up + std::sin(angle) * lateral;
+            // before * (s push + t along) = after * (s push + t along) = 1
+            const float s = (fall + rise) / (glm::dot(before, push) * rise + glm::dot(after, push) * fall);
             if (s > 0) least = std::min(least, s);
         }
         CHECK(-found->distance == Approx(std::min(least, 1.5f)).epsilon(1e-4));

@@ -36,7 +36,7 @@ TEST_CASE("contacts with normals along the surface of their point are filtered o
     const unsigned seed = test::seed();
     CAPTURE(seed);
     Random random(seed);
-    std::size_t all = 0, kept = 0, back = 0, aslant = 0;
+    std::size_t all = 0, kept = 0, back = 0, oblique = 0;
     const float apart = GENERATE(-2.f, 0.9f);  // minimum normal cosine of face points that are not yet in contact
     for (const auto& [a, b] : touchingPairs(random)) {
         std::vector<Contact> expected, found;
@@ -73,10 +73,10 @@ TEST_CASE("contacts with normals along the surface of their point are filtered o
             REQUIRE(contact.distance > 0);
             REQUIRE_FALSE(point.isSharp);
             REQUIRE(std::abs(glm::dot((ofB ? b : a).pose.rotation * point.normal, contact.normal)) < 0.99997f);
-            ++aslant;
+            ++oblique;
         }
     }
-    CHECK(aslant < kept);
+    CHECK(oblique < kept);
     REQUIRE(kept > 0);
     REQUIRE(kept + back < all);
 }

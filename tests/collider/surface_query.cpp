@@ -17,15 +17,15 @@ TEST_CASE("a point on a face has the face's normal, however near it is to an edg
     Random random(seed);
     const glm::vec3 half(0.3f, 0.2f, 0.1f);
     for (int i = 0; i < 3000; ++i) {
-        const int face = int(random(0, 3)), beside = (face + 1) % 3, along = (face + 2) % 3;
-        const auto depth = float(random(-1e-3, 1e-3)), aside = float(random(0.03, 0.5));  // [voxels]
+        const int face = int(random(0, 3)), sideAxis = (face + 1) % 3, along = (face + 2) % 3;
+        const auto depth = float(random(-1e-3, 1e-3)), toEdge = float(random(0.03, 0.5));  // [voxels]
         glm::vec3 place(0);
         place[face] = half[face] + depth * h;
-        place[beside] = half[beside] - aside * h;
+        place[sideAxis] = half[sideAxis] - toEdge * h;
         place[along] = float(random(-0.8, 0.8)) * half[along];
-        CAPTURE(face, depth, aside);
-        const SurfaceSample touch = surfaceSampleAt(brick().field(), place, brick().field().sample(place), false);
-        REQUIRE(touch.normal[face] > 0.99f);
-        REQUIRE(std::abs(touch.distance) < 2e-3f * h);
+        CAPTURE(face, depth, toEdge);
+        const SurfaceSample sample = surfaceSampleAt(brick().field(), place, brick().field().sample(place), false);
+        REQUIRE(sample.normal[face] > 0.99f);
+        REQUIRE(std::abs(sample.distance) < 2e-3f * h);
     }
 }
