@@ -285,19 +285,19 @@ int run(int argc, char** argv) {
     Options options;
     app.add_option("--mesh", options.meshes, "mesh files or names in the corpus; by default all clean ones");
     app.add_option("--resolution", options.resolutions, "voxels along the longest side");
-    app.add_option("--half-width", options.bands, "of the band [voxels]: W, or EXTERIOR/INTERIOR");
+    app.add_option("--half-width", options.bands, "half width of the band [voxels]: W, or EXTERIOR/INTERIOR");
     app.add_option("--method", options.method, "the method under test")
         ->check(CLI::IsMember(methods))
         ->capture_default_str();
     app.add_option("--samples", options.samples, "active voxels to check; smaller grids are checked whole")
         ->check(CLI::PositiveNumber)
         ->capture_default_str();
-    app.add_option("--seed", options.seed, "of the choice of voxels")->capture_default_str();
+    app.add_option("--seed", options.seed, "seed of the choice of voxels")->capture_default_str();
     app.add_option("--markdown", options.markdownFile, "also write the tables to this file");
     app.add_flag("--json", options.json, "print one JSON array and nothing else");
     app.add_flag("--unsigned", options.unsignedOnly,
                  "judge distances and the band only: for meshes that bound no solid, with equal widths");
-    app.add_flag("--alone", options.alone, "without the peers");
+    app.add_flag("--alone", options.alone, "leave out the peers");
     CLI11_PARSE(app, argc, argv);
 
     openvdb::initialize();

@@ -14,6 +14,8 @@
 #include "bench/measure.h"
 
 namespace bilayer::bench {
+
+using namespace detail;
 namespace {
 
 constexpr std::size_t streamedBytes = std::size_t(1) << 29;  // larger than any cache

@@ -9,8 +9,6 @@
 
 namespace bilayer::bench {
 
-using namespace bilayer::detail;
-
 inline constexpr std::size_t cacheLine = 64;  // [bytes]
 
 /// Bytes per second that `threads` threads read together from a buffer far larger than the caches, in sequence.
@@ -26,6 +24,6 @@ struct Touched {
     double linesEach = 0;    ///< per sample, on average
     double linesShared = 0;  ///< distinct lines over all samples, per sample
 };
-Touched linesTouched(const FieldLayout& field, std::span<const glm::vec3> points);
+Touched linesTouched(const detail::FieldLayout& field, std::span<const glm::vec3> points);
 
 }  // namespace bilayer::bench

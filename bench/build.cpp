@@ -240,12 +240,14 @@ int run(int argc, char** argv) {
     CLI::App app("Builds narrow-band fields with bilayer and with OpenVDB, and compares times and memory.");
     Options options;
     bool quick = false, noMemory = false;
-    app.add_option("--mesh", options.meshes, "names or files; by default all that are here");
+    app.add_option("--mesh", options.meshes, "mesh names or files; by default all that exist");
     app.add_option("--resolution", options.resolutions, "voxels along the longest side")->capture_default_str();
     app.add_option("--method", options.methods, "builders")->capture_default_str();
     app.add_option("--threads", options.threads)->capture_default_str();
-    app.add_option("--repetitions", options.repetitions, "at most, of each builder in a scene")->capture_default_str();
-    app.add_option("--seconds", options.seconds, "that end the repetitions of a builder")->capture_default_str();
+    app.add_option("--repetitions", options.repetitions, "maximum repetitions of each builder in a scene")
+        ->capture_default_str();
+    app.add_option("--seconds", options.seconds, "time after which a builder is not repeated [s]")
+        ->capture_default_str();
     app.add_option("--json", options.json, "also write all times to this file");
     app.add_flag("--no-memory", noMemory, "leave out the peaks of memory");
     app.add_flag("--quick", quick, "only 128 voxels and few repetitions");

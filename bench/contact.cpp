@@ -14,8 +14,8 @@
 #include <random>
 
 #include <bilayer/cl/point_sampler.h>
-#include "bench/heap.h"
 #include "bench/measure.h"
+#include "bench/pile.h"
 #include "bench/program.h"
 #include "demos/shared/outcome.h"
 #include "demos/shared/plot.h"
@@ -30,7 +30,7 @@ namespace {
 
 constexpr float knotSize = 0.2f;   // [m]
 constexpr float room = 1;          // between bodies at the start [diagonal of their box]
-constexpr int smallestHeap = 20;   // bodies for a pen of two by two knots; its edge grows with the count
+constexpr int smallestPile = 20;   // bodies for a pen of two by two knots; its edge grows with the count
 constexpr float wall = 0.1f;       // half of a wall's thickness [knots]
 constexpr float penHeight = 5;     // [knots], for each knot along the floor
 constexpr double measured = 0.02;  // distance of the points at which penetration is measured [size of a body]
@@ -40,7 +40,7 @@ constexpr int bowlCells = 32, boxesInBowl = 60;
 constexpr const char* oneThread = ", 1 thread";
 
 struct Options {
-    HeapOptions heap;
+    PileOptions pile;
     int bodies = 20, hulls = 20;
     float voxels = 64;
     std::vector<int> growBodies{10, 30, 100, 300, 1000};
@@ -94,7 +94,7 @@ struct BoxForm {
 class Knots {
   public:
     Knots(const Mesh& mesh, Rival& rival, int bodies) : knot_(mesh, rival.shape(), measured * double(knotSize)) {
-        const int along = std::max(2, int(std::lround(2 * std::cbrt(float(bodies) / smallestHeap))));
+        const int along = std::max(2, int(std::lround(2 * std::cbrt(float(bodies) / smallestPile))));
         const float thick = wall * knotSize, inside = 0.5f * room * glm::length(knot_.box.size()) * float(along),
                     out = inside + thick, halfHeight = 0.5f * penHeight * knotSize * float(along);
         addWall({0, 0, -thick}, {out + thick, out + thick, thick});
@@ -134,7 +134,7 @@ class Boxes {
 struct Row {
     std::string name;
     double made;  // [s]
-    HeapRun run;
+    PileRun run;
 
     double step() const {
         return median({run.stepMs.begin() + std::ptrdiff_t(run.stepMs.size() / 2), run.stepMs.end()});
@@ -167,7 +167,7 @@ Row onOneThread(const std::function<Row()>& work) {
     return row;
 }
 
-Row playKnots(Rival& rival, const Mesh& mesh, int bodies, const HeapOptions& options) {
+Row playKnots(Rival& rival, const Mesh& mesh, int bodies, const PileOptions& options) {
     const Knots knots(mesh, rival, bodies);
     return {rival.name(), rival.seconds, play(rival, knots.members, options)};
 }
@@ -177,15 +177,15 @@ std::vector<Row> compareKnots(const Options& options) {
     const float voxel = knotSize / options.voxels;
     std::vector<Row> rows;
     const auto field = makeField(mesh, options.voxels);
-    const auto ours = [&] { return playKnots(*field, mesh, options.bodies, options.heap); };
+    const auto ours = [&] { return playKnots(*field, mesh, options.bodies, options.pile); };
     rows.push_back(ours());
     rows.push_back(onOneThread(ours));
     for (const auto& rival : {makeField(mesh, options.voxels, {}, ContactAccuracy::samples),
                               makeField(mesh, options.voxels, {}, ContactAccuracy::exact),
                               makeHulls(mesh, options.hulls, 0.1f * voxel), makeGImpact(mesh, 0.5f * voxel)})
-        rows.push_back(playKnots(*rival, mesh, options.bodies, options.heap));
+        rows.push_back(playKnots(*rival, mesh, options.bodies, options.pile));
     printTable(fmt::format("{} knots of {} triangles in a pen, {:g} voxels each, {:g} steps a second", options.bodies,
-                           mesh.triangles.size(), options.voxels, options.heap.stepsPerSecond),
+                           mesh.triangles.size(), options.voxels, options.pile.stepsPerSecond),
                rows);
     return rows;
 }
@@ -198,7 +198,7 @@ std::vector<Row> compareBoxes(const Options& options) {
                               makeField(bowl, bowlVoxels, {}, ContactAccuracy::exact),
                               makeTriangles(bowl, 0.5f * voxel), makeBulletSdf(bowl, bowlCells)}) {
         const Boxes boxes(bowl, *rival);
-        rows.push_back({rival->name(), rival->seconds, play(*rival, boxes.members, options.heap)});
+        rows.push_back({rival->name(), rival->seconds, play(*rival, boxes.members, options.pile)});
     }
     printTable(fmt::format("{} of Bullet's boxes in a bowl of {} triangles", boxesInBowl, bowl.triangles.size()), rows);
     return rows;
@@ -210,15 +210,15 @@ struct Growth {
 
 Growth grow(const Options& options) {
     const Mesh mesh = knot();
-    HeapOptions heap = options.heap;
-    heap.seconds = options.growSeconds;
+    PileOptions pile = options.pile;
+    pile.seconds = options.growSeconds;
     Growth growth;
-    fmt::print("\n## How the cost grows: {:g} s of knots\n\n", heap.seconds);
+    fmt::print("\n## How the cost grows: {:g} s of knots\n\n", pile.seconds);
     fmt::print("| bodies | voxels | a step [ms] | a step and body [ms] | 99 % of penetrations [voxels] |\n");
     fmt::print("|---|---|---|---|---|\n");
     const auto measure = [&](int bodies, float voxels) {
         const auto field = makeField(mesh, voxels);
-        HeapOptions how = heap;
+        PileOptions how = pile;
         if (bodies > 100) how.measuredFrames = 4;  // a thousand bodies have thousands of pairs
         const Row row = playKnots(*field, mesh, bodies, how);
         const double deep = 1e-3 * row.penetration(0.99) * double(voxels) / double(knotSize);
@@ -240,22 +240,22 @@ Growth grow(const Options& options) {
 // Contact search on the device. The motion of the bodies is bitwise the same, so the steps are comparable.
 void compareDevice(const Options& options) {
     const Mesh mesh = knot();
-    HeapOptions heap = options.heap;
-    heap.seconds = options.growSeconds;
-    heap.measuredFrames = 1;
+    PileOptions pile = options.pile;
+    pile.seconds = options.growSeconds;
+    pile.measuredFrames = 1;
     const Device device = openDevice();
     const OpenclPointSampler sampler = openclPointSampler(device, {.profile = true});
     const auto processor = makeField(mesh, options.voxels);
     const auto sampled = makeField(mesh, options.voxels, sampler);
-    fmt::print("\n## Points sampled by {}: {:g} s of knots, {:g} voxels each\n\n", device.info().name, heap.seconds,
+    fmt::print("\n## Points sampled by {}: {:g} s of knots, {:g} voxels each\n\n", device.info().name, pile.seconds,
                options.voxels);
     fmt::print(
         "| bodies | a step, processor [ms] | a step, device [ms] | its kernels [ms] | transfers [ms] | energies "
         "that differ |\n|---|---|---|---|---|---|\n");
     for (const int bodies : options.growBodies) {
-        const Row ours = playKnots(*processor, mesh, bodies, heap);
+        const Row ours = playKnots(*processor, mesh, bodies, pile);
         const OpenclTimes before = sampler.times();
-        const Row theirs = playKnots(*sampled, mesh, bodies, heap);
+        const Row theirs = playKnots(*sampled, mesh, bodies, pile);
         const OpenclTimes after = sampler.times();
         const double kernels = after.kernels - before.kernels,
                      transfers = after.upload + after.download - before.upload - before.download;
@@ -302,8 +302,8 @@ void draw(const std::string& file, const std::vector<Row>& knots, const Growth& 
     std::vector<Line> steps, energies, depths;
     for (const Row& row : knots) {
         if (row.name.ends_with(oneThread)) continue;  // energies and penetrations are bitwise the same
-        steps.push_back(stepTimeOf(row, double(options.heap.stepsPerSecond)));
-        energies.push_back(energyOf(row, double(options.heap.stepsPerSecond)));
+        steps.push_back(stepTimeOf(row, double(options.pile.stepsPerSecond)));
+        energies.push_back(energyOf(row, double(options.pile.stepsPerSecond)));
         Line depth{row.name, {}, {}};
         for (const double share : {0.5, 0.75, 0.9, 0.95, 0.99, 1.}) {
             depth.x.push_back(100 * share);
@@ -313,7 +313,7 @@ void draw(const std::string& file, const std::vector<Row>& knots, const Growth& 
     }
     // last, so that equal names have equal colours in all plots
     for (const Row& row : knots)
-        if (row.name.ends_with(oneThread)) steps.push_back(stepTimeOf(row, double(options.heap.stepsPerSecond)));
+        if (row.name.ends_with(oneThread)) steps.push_back(stepTimeOf(row, double(options.pile.stepsPerSecond)));
     std::vector<double> bodies(options.growBodies.begin(), options.growBodies.end()),
         voxels(options.growVoxels.begin(), options.growVoxels.end());
     writeSvg(file,
@@ -339,24 +339,28 @@ nlohmann::json jsonOf(const std::vector<Row>& rows) {
 
 int run(int argc, char** argv) {
     CLI::App app(
-        "Heaps of bodies in Bullet: fields beside GImpact, convex hulls, triangles and Bullet's own SDF shape.");
+        "Piles of bodies in Bullet: fields compared with GImpact, convex hulls, triangles and Bullet's own SDF shape.");
     Options options;
-    app.add_option("--bodies", options.bodies, "knots in the pen")->capture_default_str()->check(CLI::PositiveNumber);
-    app.add_option("--voxels", options.voxels, "along a knot")->capture_default_str()->check(CLI::Range(8., 1024.));
-    app.add_option("--hulls", options.hulls, "of the convex decomposition")
+    app.add_option("--bodies", options.bodies, "count of knots in the pen")
         ->capture_default_str()
         ->check(CLI::PositiveNumber);
-    app.add_option("--seconds", options.heap.seconds, "that a heap is simulated")
+    app.add_option("--voxels", options.voxels, "voxels along a knot")
+        ->capture_default_str()
+        ->check(CLI::Range(8., 1024.));
+    app.add_option("--hulls", options.hulls, "count of hulls of the convex decomposition")
         ->capture_default_str()
         ->check(CLI::PositiveNumber);
-    app.add_option("--steps-per-second", options.heap.stepsPerSecond, "of the simulation")
+    app.add_option("--seconds", options.pile.seconds, "simulated time of a pile [s]")
         ->capture_default_str()
         ->check(CLI::PositiveNumber);
-    app.add_option("--patience", options.heap.patience, "seconds of waiting that end a run")->capture_default_str();
-    app.add_option("--grow-bodies", options.growBodies, "numbers of knots to try; 0: none")->capture_default_str();
+    app.add_option("--steps-per-second", options.pile.stepsPerSecond, "steps per second")
+        ->capture_default_str()
+        ->check(CLI::PositiveNumber);
+    app.add_option("--patience", options.pile.patience, "maximum wall-clock time of a run [s]")->capture_default_str();
+    app.add_option("--grow-bodies", options.growBodies, "counts of knots to try; 0: none")->capture_default_str();
     app.add_option("--grow-voxels", options.growVoxels, "voxels along a knot to try; 0: none")->capture_default_str();
     app.add_flag("--on-device", options.onDevice,
-                 "instead of all this: the knots of --grow-bodies beside the same with points sampled by OpenCL");
+                 "only compare the knots of --grow-bodies with the same knots sampled by OpenCL");
     app.add_option("--plot", options.plot, "draws speed, energy and penetration into this SVG file");
     app.add_option("--json", options.json, "also write all numbers to this file");
     CLI11_PARSE(app, argc, argv);

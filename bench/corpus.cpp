@@ -238,19 +238,19 @@ std::string markdown(const std::vector<Row>& rows) {
 }
 
 int run(int argc, char** argv) {
-    CLI::App app("Builds a field of each public mesh, with signs found automatically, and tells what became of it.");
+    CLI::App app("Builds a field of each public mesh, with signs found automatically, and reports the result.");
     Options options;
     app.add_option("--mesh", options.meshes, "mesh files or names in the corpus; by default all of it");
     app.add_option("--resolution", options.resolution, "voxels along the longest side")
         ->check(CLI::PositiveNumber)
         ->capture_default_str();
     app.add_option("--markdown", options.markdownFile, "also write the table to this file");
-    app.add_option("--scenes", options.scenes, "also write what docs/dirty.sh draws into this folder")
+    app.add_option("--scenes", options.scenes, "also write the input of docs/dirty.sh into this folder")
         ->check(CLI::ExistingDirectory);
-    app.add_option("--axis", options.axis, "of the slice in a scene")
+    app.add_option("--axis", options.axis, "axis of the slice in a scene")
         ->check(CLI::IsMember({'x', 'y', 'z'}))
         ->capture_default_str();
-    app.add_option("--at", options.at, "where the slice is, from 0 to 1 through the mesh's bounds")
+    app.add_option("--at", options.at, "position of the slice, from 0 to 1 through the mesh's bounds")
         ->check(CLI::Range(0.f, 1.f))
         ->capture_default_str();
     CLI11_PARSE(app, argc, argv);

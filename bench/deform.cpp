@@ -155,9 +155,9 @@ void deformInPart(const Options& options, double share, int threads) {
 int run(int argc, char** argv) {
     CLI::App app("Builds the field of a deforming mesh for each frame, and counts frames per second.");
     Options options;
-    app.add_option("--mesh", options.mesh, "a name or a file; by default the bunny, or a knot where it is not here");
+    app.add_option("--mesh", options.mesh, "mesh name or file; by default the bunny, or a knot if it does not exist");
     app.add_option("--resolution", options.resolution, "voxels along the longest side")->capture_default_str();
-    app.add_option("--half-width", options.halfWidth, "of the band [voxels]")->capture_default_str();
+    app.add_option("--half-width", options.halfWidth, "half width of the band [voxels]")->capture_default_str();
     app.add_option("--method", options.methods, "builders")->capture_default_str();
     app.add_option("--threads", options.threads)->capture_default_str();
     app.add_option("--frames", options.frames)->capture_default_str()->check(CLI::PositiveNumber);

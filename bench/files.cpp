@@ -270,13 +270,12 @@ int run(int argc, char** argv) {
     options.bilayer = fs::read_symlink("/proc/self/exe").parent_path() / "bilayer";
     CLI::App app("From mesh file to field file, compared with vdb_tool, Assimp with OpenVDB, and Assimp alone.",
                  "bench_files");
-    app.add_option("--meshes", options.meshes, "names or files");
+    app.add_option("--meshes", options.meshes, "mesh names or files");
     app.add_option("--formats", options.formats, "ply, ascii-ply, obj, stl")
         ->check(CLI::IsMember({"ply", "ascii-ply", "obj", "stl"}));
     app.add_option("--resolution", options.resolution, "voxels along the longest side, default 251")
         ->check(CLI::Range(8, 4096));
-    app.add_option("--threads", options.threads, "default 2; vdb_tool takes all that there are")
-        ->check(CLI::Range(1, 1024));
+    app.add_option("--threads", options.threads, "default 2; vdb_tool uses all")->check(CLI::Range(1, 1024));
     app.add_option("--rounds", options.rounds, "runs of each command, default 5")->check(CLI::Range(1, 1000));
     app.add_option("--bilayer", options.bilayer, "the command line, default in this program's folder")
         ->check(CLI::ExistingFile);

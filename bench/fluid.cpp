@@ -259,12 +259,14 @@ void fluidBench(const Options& options) {
 }
 
 int run(int argc, char** argv) {
-    CLI::App app("Times the seeding of liquids beside OpenVDB's tools, and measures what comes of it.");
+    CLI::App app("Times the seeding of liquids compared with OpenVDB's tools, and measures the results.");
     Options options;
-    app.add_option("--mesh", options.meshes, "names, files, or sphere")->capture_default_str();
+    app.add_option("--mesh", options.meshes, "mesh names or files, or sphere")->capture_default_str();
     app.add_option("--resolution", options.resolutions, "voxels along the longest side")->capture_default_str();
     app.add_option("--threads", options.threads)->check(CLI::PositiveNumber)->capture_default_str();
-    app.add_option("--rounds", options.rounds, "turns of each way")->check(CLI::PositiveNumber)->capture_default_str();
+    app.add_option("--rounds", options.rounds, "rounds, in each of which all methods take turns")
+        ->check(CLI::PositiveNumber)
+        ->capture_default_str();
     CLI11_PARSE(app, argc, argv);
     fluidBench(options);
     return 0;

@@ -105,14 +105,16 @@ void growth(const Options& options) {
 int run(int argc, char** argv) {
     CLI::App app("Shows how time and memory of a build grow with triangles and with voxels.");
     Options options;
-    app.add_option("--triangles", options.triangles, "sizes of the meshes")->capture_default_str();
+    app.add_option("--triangles", options.triangles, "triangle counts of the meshes")->capture_default_str();
     app.add_option("--resolutions", options.resolutions, "voxels along the longest side")->capture_default_str();
     app.add_option("--method", options.methods, "builders")->capture_default_str();
-    app.add_option("--resolution", options.resolution, "for all sizes of meshes")->capture_default_str();
-    app.add_option("--fixed-triangles", options.fixedTriangles, "for all resolutions")->capture_default_str();
+    app.add_option("--resolution", options.resolution, "voxels along the longest side for all triangle counts")
+        ->capture_default_str();
+    app.add_option("--fixed-triangles", options.fixedTriangles, "triangle count for all resolutions")
+        ->capture_default_str();
     app.add_option("--threads", options.threads)->capture_default_str();
-    app.add_option("--repetitions", options.repetitions, "at most, of each build")->capture_default_str();
-    app.add_option("--seconds", options.seconds, "that end the repetitions of a build")->capture_default_str();
+    app.add_option("--repetitions", options.repetitions, "maximum repetitions of each build")->capture_default_str();
+    app.add_option("--seconds", options.seconds, "time after which a build is not repeated [s]")->capture_default_str();
     app.add_option("--plot", options.plot, "also draw both as an SVG file");
     CLI11_PARSE(app, argc, argv);
     growth(options);

@@ -133,10 +133,10 @@ void print(const fs::path& file, const Options& options) {
 
 int run(int argc, char** argv) {
     Options options;
-    CLI::App app("Hashes of the fields of all meshes of a folder, by every method and way of finding signs.");
-    app.add_option("--meshes", options.meshes, "the folder")->check(CLI::ExistingDirectory);
+    CLI::App app("Hashes of the fields of all meshes of a folder, by every method and sign option.");
+    app.add_option("--meshes", options.meshes, "folder of the meshes")->check(CLI::ExistingDirectory);
     app.add_option("--resolution", options.resolution, "voxels along the longest side")->capture_default_str();
-    app.add_option("--threads", options.threads, "0: all")->check(CLI::Range(0, 1024));
+    app.add_option("--threads", options.threads, "maximum count of threads; 0: all")->check(CLI::Range(0, 1024));
     CLI11_PARSE(app, argc, argv);
     for (const fs::path& file : filesIn(options.meshes)) print(file, options);
     return 0;

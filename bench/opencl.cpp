@@ -299,18 +299,20 @@ int run(int argc, char** argv) {
     CLI::App app("Builds narrow-band fields on OpenCL devices and with TBB, and compares fields and times.");
     Options options;
     app.add_option("--mesh", options.meshes,
-                   "names or files; by default bunny, dragon and carved box, where they are here");
+                   "mesh names or files; by default bunny, dragon and carved box, if they exist");
     auto* const resolution = app.add_option("--resolution", options.resolutions, "voxels along the longest side");
     app.add_option("--grid", options.grid, "voxels along x, y and z instead: the mesh is scaled along each")
         ->expected(3)
         ->excludes(resolution)
         ->check(CLI::PositiveNumber);
-    app.add_option("--method", options.methods, "of exact, double-layer and prism")
+    app.add_option("--method", options.methods, "methods: exact, double-layer, prism")
         ->check(CLI::IsMember(Options().methods));
     app.add_option("--device", options.device, "part of the name of one device; by default all are measured");
-    app.add_option("--device-memory", options.deviceMemory, "most to use of a device's memory [MiB]");
-    app.add_option("--repetitions", options.repetitions, "at most, of each builder in a scene")->capture_default_str();
-    app.add_option("--seconds", options.seconds, "that end the repetitions of a builder")->capture_default_str();
+    app.add_option("--device-memory", options.deviceMemory, "maximum device memory [MiB]");
+    app.add_option("--repetitions", options.repetitions, "maximum repetitions of each builder in a scene")
+        ->capture_default_str();
+    app.add_option("--seconds", options.seconds, "time after which a builder is not repeated [s]")
+        ->capture_default_str();
     app.add_option("--json", options.json, "also write all times to this file");
     CLI11_PARSE(app, argc, argv);
 

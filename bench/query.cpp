@@ -250,18 +250,20 @@ nlohmann::json compare(const Source& source, float resolution, const Options& op
 }
 
 int run(int argc, char** argv) {
-    CLI::App app("Times queries of the field beside OpenVDB's, NanoVDB's and Embree's.");
+    CLI::App app("Times queries of the field compared with OpenVDB's, NanoVDB's and Embree's.");
     Options options;
-    app.add_option("--mesh", options.mesh, "a name or a file")->capture_default_str();
+    app.add_option("--mesh", options.mesh, "mesh name or file")->capture_default_str();
     app.add_option("--resolution", options.resolutions, "voxels along the longest side")->capture_default_str();
-    app.add_option("--half-width", options.halfWidth, "of the band [voxels]")->capture_default_str();
-    app.add_option("--points", options.points, "to sample")->capture_default_str()->check(CLI::PositiveNumber);
-    app.add_option("--others", options.others, "closest points, and rays")
+    app.add_option("--half-width", options.halfWidth, "half width of the band [voxels]")->capture_default_str();
+    app.add_option("--points", options.points, "count of samples")->capture_default_str()->check(CLI::PositiveNumber);
+    app.add_option("--others", options.others, "count of closest points, and of rays")
         ->capture_default_str()
         ->check(CLI::PositiveNumber);
     app.add_option("--threads", options.threads)->capture_default_str();
-    app.add_option("--rounds", options.rounds, "turns of each peer")->capture_default_str()->check(CLI::PositiveNumber);
-    app.add_option("--seed", options.seed, "of points and rays")->capture_default_str();
+    app.add_option("--rounds", options.rounds, "rounds, in each of which all peers take turns")
+        ->capture_default_str()
+        ->check(CLI::PositiveNumber);
+    app.add_option("--seed", options.seed, "seed of points and rays")->capture_default_str();
     app.add_option("--json", options.json, "also write all numbers to this file");
     CLI11_PARSE(app, argc, argv);
     nlohmann::json grids;

@@ -19,7 +19,6 @@
 #include <stdexcept>
 #include <vector>
 
-#include <bilayer/collider/contact.h>
 #include <bilayer/integration/bullet/dispatcher.h>
 #include <bilayer/integration/bullet/shape.h>
 #include <bilayer/sdf/build.h>

@@ -15,8 +15,6 @@
 
 namespace bilayer::bench {
 
-using namespace bilayer::detail;
-
 /// A collision shape of a mesh, and the dispatcher that supports it.
 class Rival {
   public:

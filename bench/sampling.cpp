@@ -203,12 +203,12 @@ std::vector<Row> measure(const Shape& shape, const test::Truth& triangles, float
 }
 
 int run(int argc, char** argv) {
-    CLI::App app("Measures what samples and closest points are off by.");
+    CLI::App app("Measures the errors of samples and closest points.");
     Options options;
     app.add_option("--shape", options.shapes, "sphere, torus, box, or the name or file of a mesh")
         ->capture_default_str();
     app.add_option("--resolution", options.resolutions, "voxels along the longest side")->capture_default_str();
-    app.add_option("--half-width", options.halfWidth, "of the band [voxels]")->capture_default_str();
+    app.add_option("--half-width", options.halfWidth, "half width of the band [voxels]")->capture_default_str();
     app.add_option("--points", options.points)->capture_default_str()->check(CLI::PositiveNumber);
     app.add_option("--seed", options.seed)->capture_default_str();
     app.add_option("--json", options.json, "also write all numbers to this file");

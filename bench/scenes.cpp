@@ -88,9 +88,11 @@ int run(int argc, char** argv) {
     std::vector<std::string> names, chosen;
     for (const NamedScene& scene : scenes()) names.push_back(scene.name);
     int threads = tbb::info::default_concurrency(), repetitions = 1;
-    app.add_option("--scenes", chosen, "only these")->check(CLI::IsMember(names));
-    app.add_option("--threads", threads, "beside one")->capture_default_str()->check(CLI::Range(1, 1024));
-    app.add_option("--repetitions", repetitions, "of which medians are taken")
+    app.add_option("--scenes", chosen, "names of the scenes; by default all")->check(CLI::IsMember(names));
+    app.add_option("--threads", threads, "count of threads, compared with one")
+        ->capture_default_str()
+        ->check(CLI::Range(1, 1024));
+    app.add_option("--repetitions", repetitions, "repetitions; medians are printed")
         ->capture_default_str()
         ->check(CLI::Range(1, 100));
     bool fingerprints = false;

@@ -112,13 +112,14 @@ Slide slide(const Rival& rival, const Options& options, float height) {
 }
 
 int run(int argc, char** argv) {
-    CLI::App app("A block slides over waves of triangles: the speed that it keeps, beside a point without friction.");
+    CLI::App app(
+        "A block slides over waves of triangles: the speed that it keeps, compared with a point without friction.");
     Options options;
-    app.add_option("--heights", options.heights, "of the waves [m]")->capture_default_str();
+    app.add_option("--heights", options.heights, "amplitudes of the waves [m]")->capture_default_str();
     app.add_option("--cell", options.cell, "edge of the ground's squares [m]")->capture_default_str();
-    app.add_option("--speed", options.speed, "at the start [m/s]")->capture_default_str();
-    app.add_option("--seconds", options.seconds, "how long [s]")->capture_default_str();
-    app.add_option("--steps", options.stepsPerSecond, "a second")->capture_default_str();
+    app.add_option("--speed", options.speed, "initial speed [m/s]")->capture_default_str();
+    app.add_option("--seconds", options.seconds, "simulated time [s]")->capture_default_str();
+    app.add_option("--steps", options.stepsPerSecond, "steps per second")->capture_default_str();
     app.add_option("--voxel", options.voxelSize, "edge of a voxel [m]")->capture_default_str();
     CLI11_PARSE(app, argc, argv);
     fmt::print("Speed kept [%]; a step [ms]\n\n| block |");

@@ -1,4 +1,5 @@
 // Contact generation between two posed bodies.
+// Tested by tests/collider/collide.cpp.
 #pragma once
 
 #include <bilayer/collider/collider.h>

@@ -1,4 +1,5 @@
 // Position and orientation of a rigid body.
+// Tested by tests/collider/collide.cpp.
 #pragma once
 
 #include <glm/gtc/quaternion.hpp>

@@ -1,4 +1,5 @@
 // Arguments and results of field queries.
+// Tested by tests/collider/field.cpp.
 #pragma once
 
 #include <cstdint>

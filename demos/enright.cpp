@@ -5,8 +5,9 @@
 int main(int argc, char** argv) {
     using namespace bilayer::demo;
     EnrightOptions options;
-    Program program("enright", "A sphere and a bunny in Enright's swirl");
+    Program program("enright", "A sphere and a bunny in Enright's deformation flow");
     program.option("--resolution", options.resolution, "voxels along the unit cube")->check(CLI::Range(16, 1000));
-    program.option("--frames", options.framesPerSecond, "of the recording, a second")->check(CLI::Range(1, 100));
+    program.option("--frames", options.framesPerSecond, "frames per second of the recording")
+        ->check(CLI::Range(1, 100));
     return program.run(argc, argv, [&] { return enright(options); });
 }

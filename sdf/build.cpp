@@ -9,6 +9,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "sdf/base/method_names.h"
 #include "sdf/grid/field_filler.h"
 #include "sdf/grid/field_update.h"
 #include "sdf/grid/sign_retry.h"

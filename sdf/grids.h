@@ -1,4 +1,5 @@
 // The OpenVDB grids of a LevelSet. Include this only where grids are accessed: it adds seconds of compile time.
+// Tested by tests/sdf/build.cpp.
 #pragma once
 
 #include <openvdb/openvdb.h>

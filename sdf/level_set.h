@@ -1,4 +1,5 @@
 // A narrow-band signed distance field. grids.h gives access to its OpenVDB grids, whose headers are slow to compile.
+// Tested by tests/sdf/build.cpp.
 #pragma once
 
 #include <cstdint>

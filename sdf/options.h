@@ -1,4 +1,5 @@
 // Options for building a field.
+// Tested by tests/sdf/build.cpp.
 #pragma once
 
 #include <functional>

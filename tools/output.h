@@ -20,8 +20,6 @@
 
 namespace bilayer::tools {
 
-using namespace bilayer::detail;
-
 using Json = nlohmann::ordered_json;
 
 /// Rows of a label and a value, printed in two columns.
@@ -76,9 +74,9 @@ Json toJson(const std::optional<MassProperties>& mass, const glm::dvec3& origin)
 void addRows(Table& table, const std::optional<MassProperties>& mass, const glm::dvec3& origin);
 
 /// The data that is stored for a body in addition to its field.
-Json toJson(const Body& body, const glm::dvec3& origin);
+Json toJson(const detail::Body& body, const glm::dvec3& origin);
 /// Adds all of it except the mass.
-void addRows(Table& table, const Body& body);
+void addRows(Table& table, const detail::Body& body);
 
 /// Measures the seconds since its construction.
 class Stopwatch {

@@ -28,17 +28,15 @@ namespace bilayer::paper {
 using namespace bilayer::detail;
 
 std::vector<Part> parts() {
-    std::vector<Part> all;
+    std::vector<Part> all{same(), table1(), table2(), table3(), table4(), table5()};
     const auto add = [&](const std::vector<Part>& some, const std::vector<const char*>& names) {
         for (const char* name : names)
             for (const Part& part : some)
                 if (std::string(part.name) == name) all.push_back(part);
     };
-    add(accuracyParts(), {"same", "table1"});
-    add(speedParts(), {"table2", "table3", "table4", "table5"});
     add(figureParts(), {"figure7", "figure8", "figure9", "figure10", "figure11"});
     add(claimParts(), {"theorems"});
-    add(accuracyParts(), {"k"});
+    all.push_back(k());
     add(claimParts(), {"walls"});
     return all;
 }
@@ -209,14 +207,16 @@ int run(int argc, char** argv) {
     Run run;
     std::vector<std::string> known;
     for (const Part& part : parts()) known.emplace_back(part.name);
-    app.add_option("parts", names, "what to measure; others keep their last results")->check(CLI::IsMember(known));
-    app.add_option("--rounds", run.rounds, "turns of each builder")->capture_default_str()->check(CLI::Range(1, 99));
-    app.add_option("--docs", docs, "folder of the page; its pictures and results are in paper there")
+    app.add_option("parts", names, "parts to measure; others keep their last results")->check(CLI::IsMember(known));
+    app.add_option("--rounds", run.rounds, "rounds, in each of which all builders take turns")
+        ->capture_default_str()
+        ->check(CLI::Range(1, 99));
+    app.add_option("--docs", docs, "folder of the page, its pictures and results are in the folder paper there")
         ->capture_default_str();
     app.add_option("--store", store, "another folder of the results");
-    app.add_option("--meshes", meshes, "folder of fetched meshes")->capture_default_str();
+    app.add_option("--meshes", meshes, "folder of downloaded meshes")->capture_default_str();
     app.add_flag("--list", list, "names of all parts");
-    app.add_flag("--page", page, "write the page from the results that there are");
+    app.add_flag("--page", page, "write the page from the existing results");
     CLI11_PARSE(app, argc, argv);
     if (list) fmt::print("{}\n", fmt::join(known, "\n"));
     run.meshes = meshes;

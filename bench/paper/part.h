@@ -30,10 +30,15 @@ struct Part {
 /// All parts, in the order of the page.
 std::vector<Part> parts();
 
-// Each group is in the file of the same name.
-std::vector<Part> accuracyParts();  ///< same, table1, k
-std::vector<Part> speedParts();     ///< table2 to table5
-std::vector<Part> figureParts();    ///< figure7 to figure11
-std::vector<Part> claimParts();     ///< theorems, walls
+// Each part is in the file of its name; figures and claims stand together.
+Part same();
+Part table1();
+Part table2();
+Part table3();
+Part table4();
+Part table5();
+Part k();
+std::vector<Part> figureParts();  ///< figure7 to figure11
+std::vector<Part> claimParts();   ///< theorems, walls
 
 }  // namespace bilayer::paper

@@ -1,4 +1,5 @@
 // Device memory within a budget.
+// Tested by tests/cl/field.cpp.
 #pragma once
 
 #include <cstdint>

@@ -7,6 +7,7 @@
 //
 // The method leaks. Around a vertex of more than three edges the side planes do not meet in one line, so the prisms
 // overlap there or leave gaps. The prisms of triangles narrower than the band may close below its full height.
+// Tested by tests/cl/prism.cpp.
 #pragma once
 
 #include <cstddef>

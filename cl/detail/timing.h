@@ -1,4 +1,5 @@
 // Measures device time by the events of queues.
+// Tested by tests/cl/filler.cpp.
 #pragma once
 
 #include <algorithm>

@@ -1,4 +1,5 @@
 // The data of a Collider.
+// Tested by tests/collider/collider.cpp.
 #pragma once
 
 #include <bilayer/collider/collider.h>

@@ -1,4 +1,5 @@
 // The relative motion of two bodies.
+// Tested by tests/collider/collide.cpp.
 #pragma once
 
 #include <glm/geometric.hpp>

@@ -1,4 +1,5 @@
 // Contacts from the results of a PointSampler.
+// Tested by tests/bullet/sampled_pairs.cpp.
 #pragma once
 
 #include <bilayer/collider/contact.h>

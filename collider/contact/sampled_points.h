@@ -1,5 +1,6 @@
 // Batch sampling of the points of many bodies in each other's fields, as a device can do it. A sampler is a function
 // object that its user calls, as a BlockFiller is.
+// Tested by tests/bullet/sampled_pairs.cpp.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,5 @@
 // Checks of batch queries.
+// Tested by tests/collider/field.cpp.
 #pragma once
 
 #include <cstddef>

@@ -1,4 +1,5 @@
 // A coarse distance bound for places far from a field's surface.
+// Tested by tests/collider/field_rays.cpp.
 #pragma once
 
 #include <algorithm>

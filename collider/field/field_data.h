@@ -1,4 +1,5 @@
 // The data of a Field, and its access by queries.
+// Tested by tests/collider/field.cpp.
 #pragma once
 
 #include <algorithm>

@@ -1,4 +1,5 @@
 // Error bounds of a field's interpolated distances; internal.
+// Tested by tests/collider/zero_set.cpp.
 #pragma once
 
 namespace bilayer::detail {

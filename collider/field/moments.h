@@ -1,4 +1,5 @@
 // Volume integrals that mass properties are computed from, for meshes and fields.
+// Tested by tests/collider/mass.cpp.
 #pragma once
 
 #include <glm/mat3x3.hpp>

@@ -1,4 +1,5 @@
 // Straight paths in double precision; internal.
+// Tested by tests/collider/field_rays.cpp.
 #pragma once
 
 #include <algorithm>

@@ -1,4 +1,5 @@
 // Tests of single triangles against rays, swept spheres and boxes in double precision; internal.
+// Tested by tests/collider/mesh_rays.cpp.
 #pragma once
 
 #include <array>

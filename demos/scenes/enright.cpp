@@ -37,7 +37,7 @@ using Field = openvdb::tools::DiscreteField<openvdb::Vec3SGrid>;
 using Advection = openvdb::tools::LevelSetAdvection<FloatGrid, Field>;
 
 // Returns the deformation flow at time zero, at each voxel of the unit cube.
-openvdb::Vec3SGrid::Ptr swirl(int resolution) {
+openvdb::Vec3SGrid::Ptr deformationFlow(int resolution) {
     const auto grid = openvdb::Vec3SGrid::create(openvdb::Vec3f(0));
     grid->setTransform(openvdb::math::Transform::createLinearTransform(1.0 / resolution));
     const openvdb::tools::EnrightField<float> field;
@@ -47,20 +47,20 @@ openvdb::Vec3SGrid::Ptr swirl(int resolution) {
     return grid;
 }
 
-// Later flow is the same times a factor: the cosine of half a revolution over the period. Bodies are therefore where
-// the initial flow alone moves them in the integral of the factor.
-float swirledUntil(double time) {
+// The flow at time t is the initial flow times cos(pi t / period). Bodies are therefore where the initial flow alone
+// moves them in the integral of that factor.
+float flowIntegral(double time) {
     return float(period / pi * std::sin(pi * time / period));
 }
 
 // A seeded body that the flow deforms.
-struct Swirled {
+struct Advected {
     std::string name;
     FloatGrid::Ptr grid;
     std::unique_ptr<Advection> advection{};
     std::vector<double> volumes{};
 
-    Swirled(std::string name, FloatGrid::Ptr seeded, const openvdb::Vec3SGrid& velocity)
+    Advected(std::string name, FloatGrid::Ptr seeded, const openvdb::Vec3SGrid& velocity)
         : name(std::move(name)), grid(std::move(seeded)) {
         advection = std::make_unique<Advection>(*grid, Field(velocity));
         advection->setSpatialScheme(openvdb::math::HJWENO5_BIAS);
@@ -94,17 +94,17 @@ Mesh moved(Mesh mesh, float scale, const glm::vec3& to) {
     return mesh;
 }
 
-std::vector<Swirled> seeded(const openvdb::Vec3SGrid& velocity) {
+std::vector<Advected> seeded(const openvdb::Vec3SGrid& velocity) {
     const auto voxel = float(velocity.voxelSize()[0]);
     const Mesh mesh = bunny().mesh, ball = moved(shapes::sphere(radius, sphereLevels), 1, centre),
-               hare = moved(mesh, 2 * radius / bounds(mesh).longestSide(), centre);
-    std::vector<Swirled> bodies;
+               scaledBunny = moved(mesh, 2 * radius / bounds(mesh).longestSide(), centre);
+    std::vector<Advected> bodies;
     bodies.emplace_back("sphere", ours(ball, voxel), velocity);
     bodies.emplace_back("sphere by OpenVDB",
                         openvdb::tools::createLevelSetSphere<FloatGrid>(radius, {centre.x, centre.y, centre.z}, voxel),
                         velocity);
-    bodies.emplace_back("bunny", ours(hare, voxel), velocity);
-    bodies.emplace_back("bunny by OpenVDB", openVdbs(hare, voxel), velocity);
+    bodies.emplace_back("bunny", ours(scaledBunny, voxel), velocity);
+    bodies.emplace_back("bunny by OpenVDB", openVdbs(scaledBunny, voxel), velocity);
     return bodies;
 }
 
@@ -115,9 +115,9 @@ bool isLevelSet(const FloatGrid& grid) {
            (check.checkTiles() + check.checkFinite() + check.checkRange() + check.checkInactiveValues()).empty();
 }
 
-void keepFrame(Outcome& outcome, std::vector<Swirled>& bodies, double time) {
+void keepFrame(Outcome& outcome, std::vector<Advected>& bodies, double time) {
     std::vector<double> row{time};
-    for (Swirled& body : bodies) row.push_back(body.volumes.back());
+    for (Advected& body : bodies) row.push_back(body.volumes.back());
     outcome.table.rows.push_back(std::move(row));
     // both as seeded by us, side by side
     std::vector<Mesh> surfaces{surfaceOf(*bodies[0].grid, adaptivity), surfaceOf(*bodies[2].grid, adaptivity)};
@@ -126,10 +126,10 @@ void keepFrame(Outcome& outcome, std::vector<Swirled>& bodies, double time) {
     outcome.recording.frame(time, {}, surfaces);
 }
 
-void judge(Outcome& outcome, const std::vector<Swirled>& bodies) {
+void judge(Outcome& outcome, const std::vector<Advected>& bodies) {
     Panel panel{"volume", "s", "% of the first", {}, {}, true};
     int broken = 0;
-    for (const Swirled& body : bodies) {
+    for (const Advected& body : bodies) {
         Line line{body.name, {}, {}};
         for (std::size_t i = 0; i < body.volumes.size(); ++i) {
             line.x.push_back(outcome.table.rows[i][0]);
@@ -150,9 +150,9 @@ void judge(Outcome& outcome, const std::vector<Swirled>& bodies) {
 }  // namespace
 
 Outcome enright(const EnrightOptions& options) {
-    const openvdb::Vec3SGrid::Ptr velocity = swirl(options.resolution);
-    Outcome outcome{Recording("A sphere and a bunny in Enright's swirl")};
-    outcome.title = "A sphere and a bunny in Enright's swirl";
+    const openvdb::Vec3SGrid::Ptr velocity = deformationFlow(options.resolution);
+    Outcome outcome{Recording("A sphere and a bunny in Enright's deformation flow")};
+    outcome.title = "A sphere and a bunny in Enright's deformation flow";
     outcome.voxelSize = 1.0 / options.resolution;
     outcome.table.columns = {"time_s", "sphere", "sphere_by_openvdb", "bunny", "bunny_by_openvdb"};
     outcome.recording.addChanging(sphereLook);
@@ -160,7 +160,7 @@ Outcome enright(const EnrightOptions& options) {
     outcome.recording.view = {
         .target = {0.5f * (1 + apart), 0.5f, 0.45f}, .distance = 3.2f, .elevation = 0.35f, .moment = pictured};
 
-    std::vector<Swirled> bodies = seeded(*velocity);
+    std::vector<Advected> bodies = seeded(*velocity);
     keepFrame(outcome, bodies, 0);
     const int frames = int(std::lround(period * options.framesPerSecond));
     outcome.stepsPerSecond = float(options.framesPerSecond);
@@ -168,8 +168,8 @@ Outcome enright(const EnrightOptions& options) {
         const double before = double(frame - 1) / options.framesPerSecond,
                      after = double(frame) / options.framesPerSecond;
         const auto start = std::chrono::steady_clock::now();
-        for (Swirled& body : bodies) {
-            body.advection->advect(swirledUntil(before), swirledUntil(after));
+        for (Advected& body : bodies) {
+            body.advection->advect(flowIntegral(before), flowIntegral(after));
             body.measure();
         }
         const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - start;

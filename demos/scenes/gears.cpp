@@ -15,7 +15,7 @@
 
 #include <bilayer/collider/mass.h>
 #include <bilayer/sdf/mesh_io.h>
-#include "demos/shared/machines.h"
+#include "demos/shared/gears.h"
 #include "demos/shared/stage.h"
 #include "demos/shared/turning.h"
 #include "integration/bullet/detail/convert.h"

@@ -9,8 +9,8 @@
 
 #include <bilayer/collider/mass.h>
 #include <bilayer/sdf/mesh_io.h>
-#include "demos/shared/machines.h"
 #include "demos/shared/stage.h"
+#include "demos/shared/threads.h"
 #include "demos/shared/turning.h"
 
 namespace bilayer::demo {

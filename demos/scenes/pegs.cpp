@@ -40,14 +40,14 @@ struct Lane {
     float clearance;
     std::shared_ptr<const Thing> block, peg;
     float mouth;                           // z of the hole's opening [m]
-    float aside, tilt;                     // initial, see PegsOptions
+    float offset, tilt;                    // initial, see PegsOptions
     std::size_t blockIndex{}, pegIndex{};  // index in a frame
 };
 
 // Returns a pose with the lower end above the opening, offset from the hole's axis, and tilted about that end.
-Pose startOf(const shapes::Peg& part, float mouth, float aside, float tilt) {
+Pose startOf(const shapes::Peg& part, float mouth, float offset, float tilt) {
     const glm::quat turn = glm::angleAxis(glm::radians(tilt), glm::normalize(glm::vec3(1, 2, 0)));
-    const glm::vec3 end(part.clearance / 2 + aside, 0, mouth + above);
+    const glm::vec3 end(part.clearance / 2 + offset, 0, mouth + above);
     return {end + turn * glm::vec3(0, 0, part.length / 2), turn};
 }
 
@@ -85,7 +85,8 @@ Outcome pegs(const PegsOptions& options) {
     std::vector<Lane> lanes;
     for (const float clearance : options.clearances)
         lanes.push_back({fmt::format("{:g} mm", 1e3f * clearance), clearance, block,
-                         makeThing(shapes::peg({.clearance = clearance}), things), mouth, options.aside, options.tilt});
+                         makeThing(shapes::peg({.clearance = clearance}), things), mouth, options.offset,
+                         options.tilt});
     std::shared_ptr<const Thing> table;
     if (!options.factory.empty()) {
         const Mesh plate = shapes::moved(readMesh(options.factory / factoryPlate), {0, 0, floor});
@@ -99,7 +100,7 @@ Outcome pegs(const PegsOptions& options) {
     for (std::size_t i = 0; i < lanes.size(); ++i) {
         Lane& each = lanes[i];
         const glm::vec3 place(lane * (float(i) - 0.5f * float(lanes.size() - 1)), 0, 0);
-        Pose pose = startOf({.clearance = each.clearance}, each.mouth, each.aside, each.tilt);
+        Pose pose = startOf({.clearance = each.clearance}, each.mouth, each.offset, each.tilt);
         pose.position += place;
         each.blockIndex = 2 * i;
         each.pegIndex = 2 * i + 1;

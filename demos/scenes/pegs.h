@@ -13,9 +13,9 @@ namespace bilayer::demo {
 struct PegsOptions {
     std::vector<float> clearances{1e-3f, 0.5e-3f, 0.2e-3f, 0.1e-3f, 0.05e-3f};  ///< one per peg [m]
     float friction = 0.1f;
-    float aside = 0.2e-3f;  ///< initial offset from the hole's axis, in addition to half the clearance [m]
-    float tilt = 0.5f;      ///< initial tilt [degrees]
-    float seconds = 3;      ///< max duration; ends when all pegs are down
+    float offset = 0.2e-3f;  ///< initial offset from the hole's axis, in addition to half the clearance [m]
+    float tilt = 0.5f;       ///< initial tilt [degrees]
+    float seconds = 3;       ///< max duration; ends when all pegs are down
     float stepsPerSecond = 480;
     int iterations = 100;       ///< of Bullet's solver
     float voxelSize = 0.2e-3f;  ///< [m]

@@ -71,7 +71,7 @@ Outcome spin(const SpinOptions& options) {
     body.setActivationState(DISABLE_DEACTIVATION);
     const btVector3 middle = body.getWorldTransform().getBasis().getColumn(1);
     body.setAngularVelocity(body.getWorldTransform().getBasis() *
-                            btVector3(options.nudge, options.spin, options.nudge));
+                            btVector3(options.perturbation, options.spin, options.perturbation));
 
     const glm::dvec3 start = angularMomentum(body);
     double drift = 0;

@@ -8,9 +8,9 @@ namespace bilayer::demo {
 
 struct SpinOptions {
     float seconds = 60;
-    float spin = 6;            ///< about the intermediate axis [rad/s]
-    float nudge = 0.05f;       ///< initial perturbation about the other two axes [rad/s]
-    float voxelSize = 0.002f;  ///< [m]
+    float spin = 6;              ///< about the intermediate axis [rad/s]
+    float perturbation = 0.05f;  ///< initial perturbation about the other two axes [rad/s]
+    float voxelSize = 0.002f;    ///< [m]
 };
 
 /// Criteria: the angular momentum vector drifts by less than 1 % per minute. The handle flips over. Mass and inertia of

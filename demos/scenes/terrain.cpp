@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "demos/shared/machines.h"
+#include "demos/shared/gears.h"
 #include "demos/shared/shapes.h"
 #include "demos/shared/stage.h"
 #include "demos/shared/waves.h"

@@ -1,5 +1,4 @@
 #include "demos/shared/exact_distance.h"
-#include <bilayer/collider/contact.h>
 
 #include <algorithm>
 #include <cmath>

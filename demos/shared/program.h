@@ -2,6 +2,7 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <filesystem>
 #include <functional>
 #include <string>
 #include <type_traits>
@@ -38,6 +39,17 @@ class Program {
         return app_.add_flag(flag, value, help);
     }
 
+    /// Options that have one meaning in all scenes: --seconds, --steps, --iterations and --voxel.
+    void seconds(float& duration, double min, double max, const std::string& help = "simulated time [s]");
+    void steps(float& perSecond, double min = 30, double max = 10000);
+    void iterations(int& count);
+    void voxel(float& edge, double min, double max);
+    /// --factory: a folder with parts of the Factory data set. If they are missing, run() says so and clears the path.
+    /// @param parts  their names
+    /// @param use    what the scene does with them
+    void factory(std::filesystem::path& folder, const std::string& parts, const std::string& use,
+                 bool (*hasParts)(const std::filesystem::path&));
+
     /// Parses the command line, runs the scene, prints its outcome and writes its files.
     /// @return the exit status: 0; 1 if the scene throws, 2 for wrong usage, 3 if a criterion is not met
     int run(int argc, char** argv, const std::function<Outcome()>& scene);
@@ -46,6 +58,7 @@ class Program {
     Outcome play(const std::function<Outcome()>& scene) const;
 
     std::string name_, out_ = "out";
+    std::function<void()> checkFactory_ = [] {};
     int threads_ = 0;
     bool compare_ = false;
     CLI::App app_;

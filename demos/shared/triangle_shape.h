@@ -10,8 +10,6 @@
 
 namespace bilayer::demo {
 
-using namespace bilayer::bullet::detail;
-
 struct TriangleShape {
     explicit TriangleShape(const Mesh& mesh) {
         using bullet::detail::toBullet;

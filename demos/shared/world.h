@@ -10,15 +10,12 @@
 #include <memory>
 #include <vector>
 
-#include <bilayer/collider/contact.h>
 #include <bilayer/collider/pose.h>
 #include <bilayer/integration/bullet/dispatcher.h>
 #include <bilayer/integration/bullet/extensions.h>
 #include <bilayer/integration/bullet/shape.h>
 
 namespace bilayer::demo {
-
-using namespace bilayer::detail;
 
 /// Material and mass of a body.
 struct Matter {

@@ -1,4 +1,5 @@
 // A Bullet dispatcher that collides fields with all of Bullet's shapes.
+// Tested by tests/bullet/pairs.cpp.
 #pragma once
 
 #include <BulletCollision/CollisionDispatch/btCollisionDispatcher.h>

@@ -1,5 +1,6 @@
 // Work at the end of each step of a Bullet world with fields, in addition to Bullet's own: continuous collision, rest
 // stabilisation and gyroscopic integration.
+// Tested by tests/bullet/gyroscopic_integrator.cpp.
 #pragma once
 
 #include <BulletDynamics/Dynamics/btDynamicsWorld.h>

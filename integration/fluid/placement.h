@@ -1,4 +1,5 @@
 // The placement of a body that becomes liquid or solid in a fluid's voxels.
+// Tested by tests/fluid/seed.cpp.
 #pragma once
 
 #include <glm/vec3.hpp>

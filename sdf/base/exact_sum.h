@@ -1,4 +1,5 @@
 // Floating-point sums without rounding error; internal.
+// Tested by tests/sdf/inspect.cpp.
 #pragma once
 
 #include <array>

@@ -1,4 +1,5 @@
 // Arrays on huge pages, for large data with random access.
+// Tested by tests/sdf/mesh.cpp.
 #pragma once
 
 #include <cstddef>

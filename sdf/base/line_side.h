@@ -1,4 +1,5 @@
 // On which side of a line a point of the plane lies, without rounding error; internal.
+// Tested by tests/sdf/triangulate.cpp.
 #pragma once
 
 #include <cmath>

@@ -1,4 +1,5 @@
 // Morton order: points that are close in space are mostly close in this order.
+// Tested by tests/sdf/flood.cpp.
 #pragma once
 
 #include <array>

@@ -1,4 +1,5 @@
 // Parallel work on the parts of a file that reports the same error as a sequential reader; internal.
+// Tested by tests/sdf/mesh_readers.cpp.
 #pragma once
 
 #include <oneapi/tbb/parallel_for.h>

@@ -1,4 +1,5 @@
 // A parallel loop that can be cancelled.
+// Tested by tests/sdf/progress.cpp.
 #pragma once
 
 #include <oneapi/tbb/blocked_range.h>

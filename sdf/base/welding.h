@@ -1,4 +1,5 @@
 // Vertex welding that reuses what is already known about the mesh; internal.
+// Tested by tests/sdf/mesh.cpp.
 #pragma once
 
 #include <cstddef>

@@ -1,4 +1,5 @@
 // Finds pairs of triangles of a mesh that may intersect, by a fast test of boxes and planes.
+// Tested by tests/sdf/triangle_tree.cpp.
 #pragma once
 
 #include <cstdint>

@@ -3,6 +3,7 @@
 // A. Jacobson, L. Kavan, O. Sorkine-Hornung, "Robust inside-outside segmentation using generalized winding numbers",
 // ACM TOG 32 (2013). Clusters of triangles are approximated by their moments: G. Barill, N. Dickson, R. Schmidt, D.
 // Levin, A. Jacobson, "Fast winding numbers for soups and clouds", ACM TOG 37 (2018).
+// Tested by tests/sdf/winding.cpp.
 #pragma once
 
 #include <array>

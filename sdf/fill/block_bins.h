@@ -1,4 +1,5 @@
 // Finds the balls that reach each block of a brick, by a counting sort per brick.
+// Tested by tests/sdf/exact.cpp.
 #pragma once
 
 #include <algorithm>

@@ -1,4 +1,5 @@
 // A counting sort of the items in a brick by spatial cell.
+// Tested by tests/sdf/exact.cpp.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,5 @@
 // The samples of the double layer method in one brick. They are sorted by spatial cell and stored as columns for SIMD.
+// Tested by tests/sdf/double_layer.cpp.
 #pragma once
 
 #include <array>

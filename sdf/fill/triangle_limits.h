@@ -1,4 +1,5 @@
 // The box that a triangle must overlap to be relevant.
+// Tested by tests/sdf/exact.cpp.
 #pragma once
 
 #include <glm/common.hpp>

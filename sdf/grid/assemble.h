@@ -1,4 +1,5 @@
 // Assembles filled blocks into grids. Expensive to include: it includes OpenVDB.
+// Tested by tests/sdf/build.cpp.
 #pragma once
 
 #include <oneapi/tbb/enumerable_thread_specific.h>

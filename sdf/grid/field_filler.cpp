@@ -11,6 +11,7 @@
 
 #include <bilayer/sdf/grids.h>
 #include <bilayer/sdf/inspect.h>
+#include "sdf/base/method_names.h"
 #include "sdf/fill/double_layer.h"
 #include "sdf/fill/exact.h"
 #include "sdf/fill/pseudonormal.h"
@@ -60,9 +61,9 @@ void FieldFiller::fillWithOwnSigns() {
     Stopwatch part;
     const bool prism = options_.method == Method::prism;
     if (prism)
-        signs_ = {"prisms", "the side of the nearest triangle whose prism holds the voxel"};
+        signs_ = {prismSigns, "the side of the nearest triangle whose prism holds the voxel"};
     else
-        signs_ = {"layers", "the nearer of two layers tells the side"};
+        signs_ = {layerSigns, "the nearer of two layers tells the side"};
     FillParameters parameters = fillParameters(options_);
     if (prism) parameters.reach = reachOf(options_, Sign::normals);
     Assembler assembler(bandOf(options_), options_.triangles, Assembler::Plain::keep, progress_);

@@ -1,4 +1,5 @@
 #include "sdf/grid/field_metadata.h"
+#include "sdf/base/method_names.h"
 
 #include <fmt/format.h>
 

@@ -1,4 +1,5 @@
 #include "sdf/grid/field_update.h"
+#include "sdf/base/method_names.h"
 
 #include <cstddef>
 #include <string>

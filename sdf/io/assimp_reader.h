@@ -1,4 +1,5 @@
 // Reads formats that have no reader of their own here, by Assimp; internal.
+// Tested by tests/sdf/scene_io.cpp.
 #pragma once
 
 #include <filesystem>

@@ -1,4 +1,5 @@
 // Files that appear complete or not at all.
+// Tested by tests/tools/files.cpp.
 #pragma once
 
 #include <filesystem>

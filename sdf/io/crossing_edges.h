@@ -1,4 +1,5 @@
 // Detects whether a polygon in the plane crosses itself; internal.
+// Tested by tests/sdf/triangulate.cpp.
 #pragma once
 
 #include <glm/vec2.hpp>

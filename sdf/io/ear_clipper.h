@@ -1,4 +1,5 @@
 // Triangulates a polygon in the plane by ear clipping; internal.
+// Tested by tests/sdf/triangulate.cpp.
 #pragma once
 
 #include <cstddef>

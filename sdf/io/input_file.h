@@ -1,4 +1,5 @@
 // Checks that an input path is a file.
+// Tested by tests/sdf/mesh_io.cpp.
 #pragma once
 
 #include <filesystem>

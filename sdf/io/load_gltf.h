@@ -1,4 +1,5 @@
 // Loads a glTF file and the buffers that it refers to into tinygltf's model; internal.
+// Tested by tests/sdf/read_gltf.cpp.
 #pragma once
 
 #include <filesystem>

@@ -1,4 +1,5 @@
 // Memory-mapped input files.
+// Tested by tests/sdf/mesh_readers.cpp.
 #pragma once
 
 #include <cstddef>

@@ -1,3 +1,5 @@
+// Writes meshes as OBJ, STL and PLY files.
+// Tested by tests/sdf/mesh_io.cpp.
 #include <fmt/format.h>
 
 #include <algorithm>

@@ -1,4 +1,5 @@
 // A set of points in the plane with search by region; internal.
+// Tested by tests/sdf/triangulate.cpp.
 #pragma once
 
 #include <algorithm>

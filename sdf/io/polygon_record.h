@@ -1,4 +1,5 @@
 // Serialises polygons for transfer from one process to another; internal.
+// Tested by tests/sdf/child_process.cpp.
 #pragma once
 
 #include <cstddef>

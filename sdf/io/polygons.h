@@ -1,4 +1,5 @@
 // The contents of a mesh file: polygons, before triangulation and welding; internal.
+// Tested by tests/sdf/mesh_readers.cpp.
 #pragma once
 
 #include <algorithm>

@@ -1,4 +1,5 @@
 // Text records, mostly one per line, read in parallel; internal.
+// Tested by tests/sdf/mesh_readers.cpp.
 #pragma once
 
 #include <algorithm>

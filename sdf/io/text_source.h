@@ -1,4 +1,5 @@
 // Text files of meshes: words, numbers, and errors with line numbers; internal.
+// Tested by tests/sdf/mesh_readers.cpp.
 #pragma once
 
 #include <cstddef>

@@ -83,34 +83,6 @@ bool hasOwnSigns(Method method) {
     return method == Method::doubleLayer || method == Method::prism;
 }
 
-const char* nameOf(Method method) {
-    switch (method) {
-        case Method::exact:
-            return "exact";
-        case Method::doubleLayer:
-            return "double-layer";
-        case Method::pseudonormal:
-            return "pseudonormal";
-        case Method::prism:
-            return "prism";
-    }
-    return "";
-}
-
-const char* nameOf(Sign sign) {
-    switch (sign) {
-        case Sign::automatic:
-            return "auto";
-        case Sign::normals:
-            return "normals";
-        case Sign::winding:
-            return "winding";
-        case Sign::flood:
-            return "flood";
-    }
-    return "";
-}
-
 BandWidths bandOf(const BuildOptions& options) {
     return {options.exteriorWidth, options.interiorWidth, options.voxelSize};
 }

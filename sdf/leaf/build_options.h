@@ -16,10 +16,6 @@ void checkOptions(const BuildOptions& options);
 /// Returns whether a method finds signs itself, without a sign method.
 bool hasOwnSigns(Method method);
 
-/// The names in the metadata of a field.
-const char* nameOf(Method method);
-const char* nameOf(Sign sign);
-
 BandWidths bandOf(const BuildOptions& options);
 
 /// Returns whether two neighbouring voxels on opposite sides of the surface are both in the band. This holds for a band

@@ -1,4 +1,5 @@
 // Finds vertices of a mesh with equal coordinates.
+// Tested by tests/sdf/mesh.cpp.
 #pragma once
 
 #include <glm/vec3.hpp>

@@ -1,4 +1,5 @@
 // Finds where a surface self-intersects.
+// Tested by tests/sdf/inspect.cpp.
 #pragma once
 
 #include <cstddef>

@@ -2,6 +2,7 @@
 //
 // The winding number is that of A. Jacobson, L. Kavan, O. Sorkine-Hornung, "Robust inside-outside segmentation using
 // generalized winding numbers" (SIGGRAPH 2013), as the mean over all directions of the signed crossings of a ray.
+// Tested by tests/sdf/sign_choice.cpp.
 #pragma once
 
 #include <cstddef>

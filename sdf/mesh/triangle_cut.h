@@ -1,4 +1,5 @@
 // Cuts a triangle along segments in its plane.
+// Tested by tests/sdf/unite.cpp.
 #pragma once
 
 #include <functional>

@@ -1,4 +1,5 @@
 // The thickness of the solid behind a surface.
+// Tested by tests/sdf/triangle_tree.cpp.
 #pragma once
 
 #include <vector>

@@ -52,7 +52,7 @@ struct Sheet {
 
 }  // namespace
 
-TEST_CASE("However fast and however they turn, no bodies pass through a thin plate or gain energy") {
+TEST_CASE("No body passes through a thin plate or gains energy, at any speed and rotation") {
     const float thickness = GENERATE(1.f, 2.f, 4.f);  // of the plate [voxels]
     const unsigned seed = test::seed();
     CAPTURE(thickness, seed);
@@ -109,7 +109,7 @@ TEST_CASE("However fast and however they turn, no bodies pass through a thin pla
             }
 }
 
-TEST_CASE("What a wall holds is not run over by what follows close behind") {
+TEST_CASE("A body stopped by a wall is not overrun by the next body") {
     const float radius = 0.2f;
     // points are followed from 0.25 voxels inside their body to 0.1 below the surface where they enter; and round
     // bodies penetrate further between points (see ColliderOptions::pointSpacing)
@@ -144,7 +144,7 @@ TEST_CASE("What a wall holds is not run over by what follows close behind") {
     CHECK(held > 40);
 }
 
-TEST_CASE("What a wall holds is not run over by a long column, each held by the one before it") {
+TEST_CASE("A body stopped by a wall is not overrun by a long column of bodies") {
     const float radius = 0.2f;
     // as above; both bodies are round and penetrate between points
     const float deepest = 0.35f * h + 2 * 0.23f * 4 * h * h / radius;
@@ -176,7 +176,7 @@ TEST_CASE("What a wall holds is not run over by a long column, each held by the 
     CHECK(held > 40);
 }
 
-TEST_CASE("What is small and thin sinks nowhere, though an impact turns it by half its size in a step") {
+TEST_CASE("Small and thin bodies do not penetrate, even if an impact rotates them by half their size in a step") {
     const float size = GENERATE(0.01f, 0.03f), voxel = size / 32;
     const unsigned seed = test::seed();
     CAPTURE(size, seed);
@@ -248,7 +248,7 @@ TEST_CASE("Two fast bodies do not pass each other, nor what they meet after a bo
     }
 }
 
-TEST_CASE("Edges and tips of what does not move stop fields as well, however thin they are") {
+TEST_CASE("Edges and vertices of static bodies stop fields as well, however thin they are") {
     const float speed = GENERATE(14.f, 30.f, 60.f);
     const int kind = GENERATE(0, 1, 2);
     const unsigned seed = test::seed();
@@ -298,7 +298,7 @@ TEST_CASE("Edges and tips of what does not move stop fields as well, however thi
     }
 }
 
-TEST_CASE("Fields without a margin are not passed either") {
+TEST_CASE("Fields without a margin are not passed through either") {
     Shape plate(exactBox({1.f, 1.f, 0.5f * h}, h), {.margin = 0}), ball(exactSphere(0.2f, h), {.margin = 0});
     btSphereShape sphere(0.2f);
     const bool isField = GENERATE(false, true);
@@ -314,7 +314,7 @@ TEST_CASE("Fields without a margin are not passed either") {
     }
 }
 
-TEST_CASE("A body that Bullet's own CCD stops is not set down behind what it came from") {
+TEST_CASE("A body that Bullet's own CCD stops is not placed on the far side of the obstacle") {
     Shape wall(exactBox({0.5f * h, 1.f, 1.f}, h));
     btSphereShape sphere(0.1f);
     btBoxShape box({0.05f, 0.05f, 0.05f});
@@ -336,7 +336,7 @@ TEST_CASE("A body that Bullet's own CCD stops is not set down behind what it cam
     }
 }
 
-TEST_CASE("What slides, rolls or rests is not held, and a world is as it was when nobody looks after it") {
+TEST_CASE("Sliding, rolling and resting bodies are not stopped, and a world without extensions is unchanged") {
     Shape block(exactBox({0.3f, 0.3f, 0.2f}, h)), floor(exactBox({4, 1, 0.3f}, h)), ball(exactSphere(0.2f, h));
     World world;
     {

@@ -88,7 +88,7 @@ TEST_CASE("Points near hulls are as far away as from the nearest of all their fa
     }
 }
 
-TEST_CASE("What lies on a face meets it along its normal, however near it is") {
+TEST_CASE("A point next to a face has the face's normal at any distance") {
     const unsigned seed = test::seed();
     CAPTURE(seed);
     Random random(seed);
@@ -134,7 +134,7 @@ TEST_CASE("What lies on a face meets it along its normal, however near it is") {
     }
 }
 
-TEST_CASE("Straight ways enter convex shapes where distance says, and only then") {
+TEST_CASE("Straight paths enter convex shapes where the distance is zero, and only there") {
     const unsigned seed = test::seed();
     CAPTURE(seed);
     Random random(seed);
@@ -176,7 +176,7 @@ TEST_CASE("Straight ways enter convex shapes where distance says, and only then"
     CHECK(entries > 1500);
 }
 
-TEST_CASE("Nothing is inside of a flat hull, and ways beside it do not enter it") {
+TEST_CASE("Nothing is inside of a flat hull, and paths next to it do not enter it") {
     const unsigned seed = test::seed();
     CAPTURE(seed);
     Random random(seed);

@@ -12,7 +12,6 @@
 #include <optional>
 #include <vector>
 
-#include <bilayer/collider/contact.h>
 #include <bilayer/sdf/build.h>
 #include "demos/shared/shapes.h"
 #include "integration/bullet/detail/convert.h"
@@ -190,7 +189,7 @@ btTransform anywhere(Random& random, double reach) {
 
 }  // namespace
 
-TEST_CASE("Contact tests between concave bodies tell the distance of their meshes") {
+TEST_CASE("Contact tests between concave bodies return the distance of their meshes") {
     const int kind = GENERATE(range(0, 4)), other = GENERATE(range(0, 4));
     const ContactAccuracy measure =
         GENERATE(ContactAccuracy::samples, ContactAccuracy::exactNearFeatures, ContactAccuracy::exact);
@@ -249,7 +248,7 @@ TEST_CASE("Contact tests that ask for no distance measure the depth by the trian
     CHECK(found > 20);
 }
 
-TEST_CASE("Contact tests find how far round bodies are that nearly touch each other or a plane") {
+TEST_CASE("Contact tests return the distance of round bodies that nearly touch each other or a plane") {
     const float radius = GENERATE(2.f, 3.f, 5.f, 9.f) * voxel;
     const float gap = GENERATE(0.5f, 0.1f, 0.001f) * voxel;
     const bool overPlane = GENERATE(false, true);

@@ -75,7 +75,7 @@ TEST_CASE("Torques and impulses change the angular momentum by what they are") {
     CHECK((momentumOf(*free.body) - expected).length() < 2e-2f * expected.length());
 }
 
-TEST_CASE("Nothing is left behind in the world") {
+TEST_CASE("Extensions leave nothing behind in the world") {
     Free free({1, 5, 2});
     const int flags = free.body->getFlags();
     { const WorldExtensions keeps(free.world.dynamics, gyroscopic); }

@@ -42,7 +42,7 @@ void carry(World& world, btRigidBody& body, const btVector3& velocity, float sec
 
 }  // namespace
 
-TEST_CASE("A kinematic field carries what lies on it, up, down and along") {
+TEST_CASE("A kinematic field carries a body on it, up, down and along") {
     static const auto slabCollider = exactBox({1.5f, 1.5f, 0.3f}, h);
     Shape slab(slabCollider), ring(exactTorus(0.5f, 0.2f, h));
     btBoxShape box({0.4f, 0.3f, 0.2f});

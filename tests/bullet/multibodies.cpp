@@ -59,7 +59,7 @@ struct Robot {
 
 }  // namespace
 
-TEST_CASE("Links move as their places from step to step say") {
+TEST_CASE("The velocities of links are those of their displacements per step") {
     const unsigned seed = test::seed();
     CAPTURE(seed);
     Random random(seed);
@@ -97,7 +97,7 @@ TEST_CASE("Links move as their places from step to step say") {
     }
 }
 
-TEST_CASE("A link passes no plate, thin as it is, as far as Bullet's boxes let them meet") {
+TEST_CASE("A link does not pass through a thin plate if Bullet's bounding boxes overlap") {
     Shape ball(exactSphere(0.2f, h)), plate(exactBox({1, 1, h}, h));
     // Bullet does not extend the bounds of links by their displacement: they must overlap the plate's when the step
     // begins

@@ -1,4 +1,5 @@
 // Every pair of shapes comes to rest at the correct height, in either order of insertion.
+#include <BulletCollision/CollisionDispatch/btGhostObject.h>
 #include <BulletCollision/CollisionShapes/btBox2dShape.h>
 #include <BulletCollision/CollisionShapes/btConvexTriangleMeshShape.h>
 #include <BulletCollision/CollisionShapes/btHeightfieldTerrainShape.h>
@@ -310,7 +311,7 @@ TEST_CASE("Scaled fields rest where scaled bodies do") {
     }
 }
 
-TEST_CASE("Bodies lie at the bottom of a field's bowl") {
+TEST_CASE("Bodies rest at the bottom of a field's bowl") {
     static const auto bowlCollider = exactBowl(1.5f, 0.2f, h);
     Shape bowl(bowlCollider);
     // the lowest place of the cavity is at -1.3
@@ -353,4 +354,31 @@ TEST_CASE("A bump of a field carries a flat face, and a groove both flanks of a 
         btSphereShape sphere(0.6f);
         rests(sphere, torus, {0, 0, 0}, {0, 0, std::sqrt(0.8f * 0.8f - 0.36f)});
     }
+}
+
+TEST_CASE("A ghost object that dispatches its own pairs does not count as a step") {
+    Shape floor(exactBox({1, 1, 0.1f}, h)), ball(exactSphere(0.2f, h));
+    World world;
+    btGhostPairCallback ghosts;
+    world.broadphase.getOverlappingPairCache()->setInternalGhostPairCallback(&ghosts);
+    world.add(floor, 0, {0, 0, -0.1f});
+    for (int i = 0; i < 3; ++i) world.add(ball, 1, {-0.6f + 0.6f * i, 0.5f, 0.2f});
+    btCapsuleShape capsule(0.1f, 0.3f);
+    btPairCachingGhostObject ghost;
+    ghost.setCollisionShape(&capsule);
+    ghost.setWorldTransform(btTransform(btQuaternion::getIdentity(), {0, -0.5f, 0.09f}));
+    world.dynamics.addCollisionObject(&ghost, btBroadphaseProxy::CharacterFilter, btBroadphaseProxy::AllFilter);
+    world.run(0.1f);
+    const bullet::DispatchStatistics before = world.dispatcher.statistics();
+    CHECK(before.pairs >= 4);
+    REQUIRE(ghost.getNumOverlappingObjects() == 1);
+    btHashedOverlappingPairCache& own = *ghost.getOverlappingPairCache();
+    world.dispatcher.dispatchAllCollisionPairs(&own, world.dynamics.getDispatchInfo(), &world.dispatcher);
+    btManifoldArray manifolds;
+    own.getOverlappingPairArray()[0].m_algorithm->getAllContactManifolds(manifolds);
+    REQUIRE(manifolds.size() > 0);
+    CHECK(manifolds[0]->getNumContacts() > 0);
+    CHECK(world.dispatcher.statistics().pairs == before.pairs);
+    CHECK(world.dispatcher.statistics().contactsKept == before.contactsKept);
+    world.dynamics.removeCollisionObject(&ghost);
 }

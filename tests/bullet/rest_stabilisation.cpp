@@ -92,7 +92,7 @@ struct BoxOnIce {
 
 }  // namespace
 
-TEST_CASE("A heap that nothing lets sleep stays where it is, and falls when its bowl is taken away") {
+TEST_CASE("A pile that cannot sleep does not drift, and falls when its bowl is removed") {
     const unsigned start = seed();
     CAPTURE(start);
     Heap heap(start);
@@ -112,7 +112,7 @@ TEST_CASE("A heap that nothing lets sleep stays where it is, and falls when its 
     CHECK(still.restingBodies() == 0);
 }
 
-TEST_CASE("What slept is where it was when it wakes up") {
+TEST_CASE("A body that wakes up is where it fell asleep") {
     const unsigned start = seed();
     const bool byIsland = GENERATE(false, true);  // Bullet then wakes the others, in the middle of a step
     CAPTURE(start, byIsland);
@@ -132,7 +132,7 @@ TEST_CASE("What slept is where it was when it wakes up") {
     CHECK(heap.farthest(2) < 0.02f * h);
 }
 
-TEST_CASE("What moves for a reason is not held: thrown, without weight, hung up, or put elsewhere") {
+TEST_CASE("Rest stabilisation does not stop thrown, weightless, hanging or moved bodies") {
     Shape ball(exactSphere(0.1f, h));
     World world;
     const WorldExtensions still(world.dynamics, resting);
@@ -227,7 +227,7 @@ TEST_CASE("What moves for a reason is not held: thrown, without weight, hung up,
     }
 }
 
-TEST_CASE("What swings gets no energy each time it turns, and comes to rest where it is damped") {
+TEST_CASE("A pendulum gains no energy when it reverses, and comes to rest with damping") {
     // a tilt of 0.05 changes the speed near the turning point by as much per step as a push would
     const float perSecond = GENERATE(60.f, 240.f), damping = GENERATE(0.f, 0.2f), tilt = GENERATE(0.02f, 0.05f, 0.13f);
     CAPTURE(perSecond, damping, tilt);
@@ -267,7 +267,7 @@ TEST_CASE("What swings gets no energy each time it turns, and comes to rest wher
         CHECK(held == int(perSecond));
 }
 
-TEST_CASE("What a platform without weight carries comes along, however slowly, and a sensor carries nothing") {
+TEST_CASE("A body on a slow kinematic platform moves with it, and a sensor carries nothing") {
     const bool isSensor = GENERATE(false, true);
     CAPTURE(isSensor);
     Shape platform(exactBox({1, 1, 0.1f}, h)), box(exactBox({0.1f, 0.1f, 0.1f}, h));
@@ -295,7 +295,7 @@ TEST_CASE("What a platform without weight carries comes along, however slowly, a
     CHECK(still.restingBodies() == (isSensor ? 1 : 0));
 }
 
-TEST_CASE("What a slow lift or a slow belt carries comes along, and what is stacked on it") {
+TEST_CASE("A stack on a slow lift or belt moves with it") {
     const btVector3 way =
         GENERATE(btVector3(0, 0, 1e-4f), btVector3(1e-4f, 0, 0), btVector3(5e-4f, 5e-4f, 0), btVector3(0, 0, -1e-4f));
     // friction-anchor ERP; the size of all bodies; and whether Bullet's own box is used

@@ -49,7 +49,7 @@ struct Roller {
 
 }  // namespace
 
-TEST_CASE("Balls of a few voxels lie as high as their triangles do, on all that is flat") {
+TEST_CASE("Balls of a few voxels rest as high as their triangles do, on all flat shapes") {
     const unsigned seed = test::seed();
     const float voxels = GENERATE(3.f, 4.f, 5.f, 8.f, 12.f);
     CAPTURE(seed, voxels);
@@ -127,7 +127,7 @@ TEST_CASE("Hulls roll over fields") {
     CHECK(roller.body->getLinearVelocity().x() < 1.02f * speed);
 }
 
-TEST_CASE("What spins in place is neither thrown up nor let down") {
+TEST_CASE("Bodies that spin in place neither rise nor sink") {
     const float speed = GENERATE(0.3f, 3.f, 10.f, 30.f), voxels = GENERATE(10.f, 32.f);
     const int ground = GENERATE(0, 1, 2);
     CAPTURE(speed, voxels, ground);

@@ -44,7 +44,7 @@ TEST_CASE("A plate gets three voxels of its thickness") {
     CHECK_FALSE(warnsOf(advice, "voxels thick"));
 }
 
-TEST_CASE("A plate too thin for any affordable field is warned of") {
+TEST_CASE("A plate too thin for any affordable field gets a warning") {
     const Settings advice = recommendSettings(plate(1e-3f), {.speed = 1});
     CHECK(advice.voxelSize == Approx(1.f / 512));
     CHECK(warnsOf(advice, "voxels thick"));
@@ -53,7 +53,7 @@ TEST_CASE("A plate too thin for any affordable field is warned of") {
     CHECK_FALSE(warnsOf(recommendSettings(plate(0.03f), {.voxelSize = 0.015f}), "voxels thick"));
 }
 
-TEST_CASE("A thin tip does not rule the voxel size, but is warned of") {
+TEST_CASE("A thin tip does not determine the voxel size, but gets a warning") {
     // a ball with a thin plate of 1e-5 of its area on top
     Mesh tip = shapes::box({5e-3f, 5e-3f, 1e-4f});
     for (glm::vec3& point : tip.points) point.z += 0.6f;
@@ -81,7 +81,7 @@ TEST_CASE("A ball has no thin wall: its size decides") {
     CHECK_FALSE(warnsOf(recommendSettings(ball(0.5f), {.gap = 0.01f}), "gap"));
 }
 
-TEST_CASE("Speed asks for substeps, or for sweeps") {
+TEST_CASE("Fast bodies get substeps or continuous collision recommended") {
     // 10 m/s at 1/60 s is a displacement of 16.7 cm; half of the plate is 1.5 cm: 11.1 steps. Its spin may then be 20
     // rad/s, 0.33 rad per step.
     const Settings fast = recommendSettings(plate(0.03f), {.speed = 10});
@@ -105,7 +105,7 @@ TEST_CASE("Speed asks for substeps, or for sweeps") {
     CHECK(warnsOf(absurd, "1000000 substeps or more"));
 }
 
-TEST_CASE("What Bullet and its solver ask for is warned of") {
+TEST_CASE("Settings outside the limits of Bullet and its solver get a warning") {
     CHECK(warnsOf(recommendSettings(ball(0.05f), {}), "setSleepingThresholds"));
     CHECK_FALSE(warnsOf(recommendSettings(ball(0.15f), {}), "setSleepingThresholds"));
     CHECK(warnsOf(recommendSettings(ball(5), {.massRatio = 11}), "masses"));
@@ -119,7 +119,7 @@ TEST_CASE("What Bullet and its solver ask for is warned of") {
     CHECK(warnsOf(recommendSettings(inspect(inside), {}), "not clean"));
 }
 
-TEST_CASE("Estimates are near what is built") {
+TEST_CASE("Estimates are near the built field") {
     const Mesh mesh = GENERATE(shapes::sphere(0.5f, 5), shapes::torus(0.4f, 0.1f), shapes::box({0.5f, 0.5f, 0.05f}, 8));
     const Settings advice = recommendSettings(inspect(mesh), {.speed = 1});
     const LevelSet field = build(mesh, {.voxelSize = advice.voxelSize,
@@ -132,7 +132,7 @@ TEST_CASE("Estimates are near what is built") {
     CHECK(advice.buildSeconds > 0);
 }
 
-TEST_CASE("Scenes of no sense are refused by name") {
+TEST_CASE("Invalid scenes are rejected by name") {
     const MeshReport mesh = ball(0.5f);
     const float nan = std::numeric_limits<float>::quiet_NaN();
     CHECK_THROWS_WITH(recommendSettings(mesh, {.step = 0}), Catch::Contains("step"));

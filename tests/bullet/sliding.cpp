@@ -78,7 +78,7 @@ struct Grounds {
 
 }  // namespace
 
-TEST_CASE("What is flat below slides to a stop where friction says, on all that is flat") {
+TEST_CASE("Bodies with a flat base slide to a stop by friction, on all flat shapes") {
     const float steps = GENERATE(60.f, 240.f), voxel = GENERATE(0.01f, 0.004f);
     const unsigned seed = test::seed();
     CAPTURE(seed, steps, voxel);
@@ -119,7 +119,7 @@ TEST_CASE("What is flat below slides to a stop where friction says, on all that 
         }
 }
 
-TEST_CASE("What touches what is flat, a little aslant or not, does so along its normal") {
+TEST_CASE("Contacts with flat shapes have the shape's normal, for slightly tilted bodies too") {
     const unsigned seed = test::seed();
     CAPTURE(seed);
     Random random(seed);
@@ -156,7 +156,7 @@ TEST_CASE("What touches what is flat, a little aslant or not, does so along its 
     }
 }
 
-TEST_CASE("What is round below keeps its speed without friction") {
+TEST_CASE("Bodies with a round base keep their speed without friction") {
     const float steps = GENERATE(60.f, 240.f);
     const unsigned seed = test::seed();
     CAPTURE(seed, steps);

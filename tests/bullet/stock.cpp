@@ -1,5 +1,4 @@
 // Fields with Bullet's own dispatcher.
-#include <bilayer/collider/contact.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -90,7 +89,7 @@ TEST_CASE("Fields collide on a dispatcher of Bullet's own as they do on theirs")
     CHECK(played.gap == expected.gap);
 }
 
-TEST_CASE("Fast fields do not pass a plate on a dispatcher of Bullet's own") {
+TEST_CASE("Fast fields do not pass through a plate on a dispatcher of Bullet's own") {
     Shape plate(exactBox({1, 1, 0.05f}, h)), ball(exactSphere(0.3f, h));
     btDefaultCollisionConfiguration configuration;
     btCollisionDispatcher stock(&configuration);
@@ -155,7 +154,7 @@ struct StockWorld {
 
 }  // namespace
 
-TEST_CASE("A dispatcher that knows no fields is warned of when the first two fall through each other, once") {
+TEST_CASE("A dispatcher without fields gets one warning when the first two bodies fall through each other") {
     const auto slab = exactBox({1, 1, 0.3f}, h), ball = exactSphere(0.3f, h);
     const auto fall = [&](const std::function<void(StockWorld&)>& setUp, const btVector3& from) {
         return errorsOf([&] {

@@ -8,7 +8,7 @@
 #include <limits>
 #include <utility>
 
-#include <bilayer/collider/contact.h>
+#include <bilayer/sdf/build.h>
 #include <bilayer/sdf/grids.h>
 #include "demos/shared/shapes.h"
 #include "integration/bullet/detail/convert.h"
@@ -67,6 +67,11 @@ std::shared_ptr<const Collider> exactCollider(const Mesh& mesh, const std::funct
     auto grids = std::make_shared<Grids>();
     grids->distance = grid;
     return std::make_shared<Collider>(mesh, LevelSet(grids));
+}
+
+std::shared_ptr<const Collider> deepCollider(const Mesh& mesh, float voxelSize, ContactAccuracy accuracy) {
+    return std::make_shared<Collider>(mesh, build(mesh, {.voxelSize = voxelSize, .interiorWidth = 6}),
+                                      ColliderOptions{.accuracy = accuracy});
 }
 
 std::shared_ptr<const Collider> exactBox(const glm::vec3& halfExtents, float voxelSize) {

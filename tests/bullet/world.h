@@ -47,6 +47,10 @@ class World {
 std::shared_ptr<const Collider> exactCollider(const Mesh& mesh, const std::function<float(const glm::vec3&)>& distance,
                                               float voxelSize);
 
+/// The collider of a mesh by the exact method, with a field that reaches six voxels inside.
+std::shared_ptr<const Collider> deepCollider(const Mesh& mesh, float voxelSize,
+                                             ContactAccuracy accuracy = ContactAccuracy::exactNearFeatures);
+
 std::shared_ptr<const Collider> exactBox(const glm::vec3& halfExtents, float voxelSize);
 std::shared_ptr<const Collider> exactSphere(float radius, float voxelSize);
 std::shared_ptr<const Collider> exactTorus(float major, float minor, float voxelSize);

@@ -11,7 +11,9 @@
 
 #include <bilayer/sdf/inspect.h>
 #include "demos/shared/exact_distance.h"
+#include "demos/shared/gears.h"
 #include "demos/shared/shapes.h"
+#include "demos/shared/threads.h"
 #include "tests/support/support.h"
 
 using namespace bilayer;
@@ -211,7 +213,7 @@ TEST_CASE("a nut that follows the thread is as far from its bolt as the clearanc
     }
 }
 
-TEST_CASE("a nut does not leave its thread by a straight pull or a turn without advance") {
+TEST_CASE("a nut does not leave its thread by a straight pull or a rotation without advance") {
     const Thread thread{.clearance = 0.1e-3f};
     const demo::Specimen screw(bolt({.thread = thread, .length = 40e-3f}), 0.5e-3);
     const demo::Specimen hexagon(nut({.thread = thread}), 0.5e-3);
@@ -337,7 +339,7 @@ TEST_CASE("the links of a chain go through their neighbours, and only these, at 
     }
 }
 
-TEST_CASE("parts that cannot be are refused") {
+TEST_CASE("impossible parts are rejected") {
     CHECK_THROWS_AS(bolt({.segments = 50}), std::invalid_argument);
     CHECK_THROWS_AS(bolt({.thread = {.clearance = 0.3e-3f}}), std::invalid_argument);
     CHECK_THROWS_AS(bolt({.thread = {.pitch = 0}}), std::invalid_argument);

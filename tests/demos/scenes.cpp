@@ -219,7 +219,7 @@ TEST_CASE("the gears of Factory keep their ratio") {
     judgeOnce(demo::gears(options));
 }
 
-TEST_CASE("the peg of Factory finds its way through its plate") {
+TEST_CASE("the peg of Factory goes through its plate") {
     const auto path = test::corpusMesh("factory_round_peg_8mm_tight.obj");
     if (!path) return;
     demo::PegsOptions options;
@@ -269,7 +269,7 @@ TEST_CASE("a liquid bunny keeps its volume and stays out of the knot") {
     CHECK_FALSE(demo::liquid(options).criterion("volume off in the end").met());
 }
 
-TEST_CASE("bodies in Enright's swirl stay as whole as OpenVDB's own") {
+TEST_CASE("bodies in Enright's deformation flow lose no more volume than OpenVDB's own") {
     demo::EnrightOptions options;
     options.resolution = 32;
     options.framesPerSecond = 4;

@@ -10,9 +10,11 @@
 #include <string>
 #include <vector>
 
-namespace {
+#include "sources.h"
 
-namespace fs = std::filesystem;
+using namespace bilayer::test;
+
+namespace {
 
 // The libraries, and the programs on top of them: each may include itself and the listed ones.
 const std::map<std::string, std::set<std::string>> allowed{
@@ -26,42 +28,11 @@ const std::map<std::string, std::set<std::string>> allowed{
     {"bench", {"demos", "integration/bullet", "integration/fluid", "collider", "cl", "sdf"}},
 };
 
-// The private folders of a library from the bottom layer up: none may include a later one.
-const std::map<std::string, std::vector<std::string>> floors{
-    {"sdf", {"base", "leaf", "bvh", "io", "mesh", "sign", "fill", "grid"}},
-    {"collider", {"field", "contact"}},
-    {"cl", {"detail"}},
-    {"integration/bullet", {"detail"}},
-    {"integration/fluid", {"detail"}},
-};
-
-const std::vector<std::string> folders{"sdf", "cl", "collider", "integration", "tools", "demos", "bench", "tests"};
-
 // The library or program folder that contains a path, or nothing.
 std::string room(const std::string& path) {
     for (const auto& [name, ignored] : allowed)
         if (path.rfind(name + "/", 0) == 0) return name;
     return {};
-}
-
-bool isSource(const fs::path& path) {
-    static const std::set<std::string> endings{".h", ".cpp", ".cl", ".py", ".sh", ".js", ".html", ".cmake", ".txt"};
-    return endings.count(path.extension().string()) > 0;
-}
-
-template <class Visit>
-void eachLine(Visit visit) {
-    const fs::path root = BILAYER_SOURCES;
-    for (const std::string& folder : folders) {
-        if (!fs::exists(root / folder)) continue;
-        for (const auto& entry : fs::recursive_directory_iterator(root / folder)) {
-            if (!entry.is_regular_file() || !isSource(entry.path())) continue;
-            std::ifstream stream(entry.path());
-            const std::string name = fs::relative(entry.path(), root).generic_string();
-            std::string line;
-            for (int number = 1; std::getline(stream, line); ++number) visit(name, number, line);
-        }
-    }
 }
 
 // The folder of a file within its library; empty for a file directly in it.
@@ -163,7 +134,7 @@ TEST_CASE("public headers are few, the options stand at the bottom, and building
     CHECK(includesOf("sdf/build.h") == std::set<std::string>{"sdf/level_set.h", "sdf/mesh.h", "sdf/options.h"});
 }
 
-TEST_CASE("nothing is left to do, and no path of somebody's machine stands in the code") {
+TEST_CASE("the code has no leftovers and no paths of somebody's machine") {
     // assembled here, so that this file does not match itself
     const std::regex leftover(std::string("\\b(TO") + "DO|FIX" + "ME|X" + "XX)\\b");
     const std::regex machine(std::string("/(ho") + "me|wo" + "rk|Us" + "ers|ro" + "ot)/(?!someone)[a-zA-Z]");
@@ -175,7 +146,7 @@ TEST_CASE("nothing is left to do, and no path of somebody's machine stands in th
     CHECK(wrong == "");
 }
 
-TEST_CASE("what is compiled for several instruction sets has no names that another file may have too") {
+TEST_CASE("code compiled for several instruction sets is in anonymous namespaces") {
     // two classes of one name in one namespace are one class to the linker
     int found = 0;
     std::string wrong;
@@ -193,13 +164,9 @@ TEST_CASE("what is compiled for several instruction sets has no names that anoth
     CHECK(found >= 12);
 }
 
-TEST_CASE("docs/api.md lists each public header once, and no page names a source file that is not there") {
+TEST_CASE("docs/api.md lists each public header once, and no page names a missing source file") {
     const fs::path root = BILAYER_SOURCES;
-    const auto text = [](const fs::path& path) {
-        std::ifstream stream(path);
-        return std::string(std::istreambuf_iterator<char>(stream), {});
-    };
-    const std::string api = text(root / "docs/api.md");
+    const std::string api = contents("docs/api.md");
     for (const auto& [library, ignored] : floors)
         for (const auto& entry : fs::directory_iterator(root / library)) {
             if (entry.path().extension() != ".h") continue;
@@ -211,7 +178,7 @@ TEST_CASE("docs/api.md lists each public header once, and no page names a source
         R"re((?:^|[`( ])((?:sdf|collider|cl|integration|tests|tools|demos|bench)/[a-zA-Z0-9_/]+\.(?:h|cpp|cl)))re");
     for (const auto& entry : fs::directory_iterator(root / "docs")) {
         if (entry.path().extension() != ".md") continue;
-        const std::string page = text(entry.path());
+        const std::string page = contents(fs::relative(entry.path(), root).generic_string());
         for (std::sregex_iterator named(page.begin(), page.end(), source), end; named != end; ++named) {
             CAPTURE(entry.path().filename().string(), (*named)[1].str());
             CHECK(fs::exists(root / (*named)[1].str()));

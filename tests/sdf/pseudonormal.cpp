@@ -1,5 +1,4 @@
-#include "sdf/fill/pseudonormal.h"
-
+// The pseudonormal method against brute force over all triangles.
 #include <oneapi/tbb/global_control.h>
 
 #include <catch2/catch.hpp>
@@ -16,6 +15,7 @@
 #include <bilayer/sdf/mesh_io.h>
 #include "demos/shared/shapes.h"
 #include "sdf/base/progress.h"
+#include "sdf/fill/pseudonormal.h"
 #include "tests/support/support.h"
 
 using namespace bilayer;
@@ -185,36 +185,6 @@ Mesh unwelded(const Mesh& mesh) {
     return soup;
 }
 
-// Counts voxels of different sides by two methods, beyond the distance at which either side is valid.
-std::size_t differentSides(const LevelSet& a, const LevelSet& b) {
-    std::size_t different = 0;
-    const auto values = a.grids().distance->getConstAccessor();
-    for (auto value = b.grids().distance->cbeginValueOn(); value; ++value)
-        different += std::abs(double(*value)) > signsMatter * double(b.voxelSize()) &&
-                     (values.getValue(value.getCoord()) < 0) != (*value < 0);
-    return different;
-}
-
-// An open surface of squares, and the same flipped.
-Mesh doubleSheet(std::mt19937& random) {
-    std::uniform_real_distribution<float> height(-0.2f, 0.2f);
-    const unsigned n = 1 + unsigned(random() % 6);
-    const bool flat = random() % 2;
-    Mesh mesh;
-    for (unsigned i = 0; i <= n; ++i)
-        for (unsigned j = 0; j <= n; ++j)
-            mesh.points.emplace_back(float(i) / float(n), float(j) / float(n), flat ? 0.f : height(random));
-    for (unsigned i = 0; i < n; ++i)
-        for (unsigned j = 0; j < n; ++j) {
-            const unsigned a = i * (n + 1) + j, b = a + n + 1;
-            for (const glm::uvec3& t : {glm::uvec3(a, b, b + 1), {a, b + 1, a + 1}}) {
-                mesh.triangles.push_back(t);
-                mesh.triangles.emplace_back(t.x, t.z, t.y);
-            }
-        }
-    return random() % 2 ? transformed(mesh, turned()) : mesh;
-}
-
 // A spike: a pyramid over a small base.
 Mesh needle(float length, float width, unsigned sides = 3) {
     return shapes::cone(width, length, int(sides));
@@ -284,7 +254,7 @@ TEST_CASE("pseudonormal: a mesh smaller than a voxel") {
     check(shapes::moved(shapes::box({1e-3f, 1e-3f, 1e-3f}), glm::vec3(0.01f, 0, 0)), 1.f);
 }
 
-TEST_CASE("pseudonormal: vertices of their own, duplicate and zero-area faces change nothing") {
+TEST_CASE("pseudonormal: unwelded vertices, duplicate and zero-area faces change nothing") {
     const Mesh cone = transformed(shapes::cone(4, 9, 9), turned());
     Mesh dirty = unwelded(cone);
     for (std::size_t i = 0; i < cone.triangles.size(); i += 3)  // duplicates that begin with another vertex
@@ -320,88 +290,6 @@ TEST_CASE("pseudonormal: meshes of the corpus") {
     if (met == 0) WARN("skipped: no corpus");
 }
 
-TEST_CASE("pseudonormal: signs are found in the same way and are the same as those of the exact method") {
-    const unsigned seed = test::seed();
-    std::mt19937 random(seed);
-    for (const char* name : {"fandisk.obj", "spot.obj", "cow.obj", "cgal-bones.off", "self_intersectA.obj",
-                             "counter.unitsmm.STL", "dragon_vrip_871k.ply", "bunny_5k_open.obj"}) {
-        const auto path = test::corpusMesh(name);
-        if (!path) return;
-        const Mesh mesh = readMesh(*path);
-        // at 52 a single voxel reveals that the cow self-intersects; two triangles there are equally near to float
-        // precision
-        for (const auto resolution : {52.f, float(40 + random() % 100)}) {
-            CAPTURE(seed, name, resolution);
-            const float h = voxelSizeFor(mesh, resolution);
-            const LevelSet field = build(mesh, {.voxelSize = h, .method = Method::pseudonormal});
-            const LevelSet exact = build(mesh, {.voxelSize = h});
-            CHECK(field.sign() == exact.sign());
-            CHECK(field.signReason() == exact.signReason());
-            std::size_t different = 0, met = 0;
-            const auto values = exact.grids().distance->getConstAccessor();
-            for (auto value = field.grids().distance->cbeginValueAll(); value; ++value) {
-                const bool matters = double(std::abs(*value)) > signsMatter * double(h);
-                different += matters && (values.getValue(value.getCoord()) < 0) != (*value < 0);
-                met += matters;
-            }
-            CHECK(met > 1000);
-            CHECK(different == 0);
-        }
-    }
-}
-
-TEST_CASE("pseudonormal: the automatic choice is that of the exact method, whatever the mesh") {
-    const unsigned seed = test::seed();
-    std::mt19937 random(seed);
-    std::uniform_real_distribution<float> unit(0, 1);
-    std::vector<Mesh> meshes;
-    for (int i = 0; i < 12; ++i) {
-        // a surface that self-intersects slightly, strongly, or not at all
-        Mesh mesh = i % 2 ? shapes::sphere(1, 2) : shapes::torus(1, 0.4f, 16, 8);
-        const float noise = std::pow(10.f, -0.5f - 3 * unit(random));
-        for (glm::vec3& p : mesh.points) p += noise * (glm::vec3(unit(random), unit(random), unit(random)) - 0.5f);
-        meshes.push_back(mesh);
-    }
-    // a few of its triangles intersect others by rounding: at 16.1944 voxels the closest features of a leaf give wrong
-    // signs
-    if (const auto path = test::corpusMesh("../cases/sliver110.obj")) meshes.insert(meshes.end(), 6, readMesh(*path));
-    for (std::size_t i = 0; i < meshes.size(); ++i) {
-        Mesh& mesh = meshes[i];
-        glm::uvec3& one = mesh.triangles[random() % mesh.triangles.size()];
-        if (i != 12 && random() % 2) std::swap(one.x, one.y);
-        const float resolution = i == 12 ? 16.1944f : 8 + 50 * unit(random);
-        CAPTURE(seed, i, resolution);
-        const float h = voxelSizeFor(mesh, resolution);
-        const LevelSet exact = build(mesh, {.voxelSize = h});
-        const LevelSet field = build(mesh, {.voxelSize = h, .method = Method::pseudonormal});
-        CHECK(field.method() == "pseudonormal");
-        CHECK(field.sign() == exact.sign());
-        CHECK(field.signReason() == exact.signReason());
-        CHECK(field.signConflicts() == exact.signConflicts());
-        CHECK(differentSides(exact, field) == 0);
-    }
-}
-
-TEST_CASE("pseudonormal: both methods say that a sheet and its back have no inside") {
-    const unsigned seed = test::seed();
-    std::mt19937 random(seed);
-    for (int round = 0; round < 60; ++round) {
-        const Mesh mesh = doubleSheet(random);
-        const float h = 1 / std::uniform_real_distribution<float>(4, 40)(random);
-        for (const Sign sign : {Sign::automatic, Sign::normals}) {
-            for (const Method method : {Method::exact, Method::pseudonormal}) {
-                const LevelSet field = build(mesh, {.voxelSize = h, .method = method, .sign = sign});
-                std::size_t inside = 0;
-                for (auto value = field.grids().distance->cbeginValueOn(); value; ++value)
-                    inside += double(*value) < -signsMatter * double(h);
-                CAPTURE(seed, round, h, sign, method);
-                CHECK(inside == 0);
-                CHECK(field.signConflicts() == 0);
-            }
-        }
-    }
-}
-
 TEST_CASE("pseudonormal: open meshes and soup have distances, and signs from the faces") {
     Mesh open = shapes::sphere(4, 2);
     open.triangles.resize(open.triangles.size() / 2);
@@ -423,7 +311,7 @@ TEST_CASE("pseudonormal: the bytes do not depend on the number of threads") {
     }
 }
 
-TEST_CASE("pseudonormal: what the sink throws ends the work") {
+TEST_CASE("pseudonormal: an exception of the sink ends the work") {
     const Mesh mesh = shapes::sphere(20, 3);
     const std::function<bool(float)> nobody;
     Progress progress(nobody);

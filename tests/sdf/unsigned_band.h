@@ -15,8 +15,6 @@
 
 namespace bilayer::test {
 
-using namespace bilayer::detail;
-
 /// The distances of all voxels nearer to the mesh than `reach` [voxels], in world units.
 inline openvdb::FloatGrid::Ptr unsignedBand(const Mesh& mesh, float voxelSize, float reach) {
     const double h = double(voxelSize), far = double(reach) * h;
@@ -41,7 +39,7 @@ inline openvdb::FloatGrid::Ptr unsignedBand(const Mesh& mesh, float voxelSize, f
 
 /// The first fault of a signed grid as a level set of these widths over `distances`, or "".
 inline std::string fault(const openvdb::FloatGrid& field, const openvdb::FloatGrid& distances,
-                         const BandWidths& widths) {
+                         const detail::BandWidths& widths) {
     const float exterior = widths.exterior * widths.voxelSize, interior = widths.interior * widths.voxelSize;
     if (field.background() != exterior) return "background";
     const auto values = field.getConstAccessor();
@@ -67,7 +65,8 @@ inline bool sameBytes(const openvdb::FloatGrid& a, const openvdb::FloatGrid& b) 
     if (!a.tree().hasSameTopology(b.tree()) || a.background() != b.background()) return false;
     auto other = b.tree().cbeginLeaf();
     for (auto leaf = a.tree().cbeginLeaf(); leaf; ++leaf, ++other)
-        if (std::memcmp(leaf->buffer().data(), other->buffer().data(), sizeof(float) * blockVoxels) != 0) return false;
+        if (std::memcmp(leaf->buffer().data(), other->buffer().data(), sizeof(float) * detail::blockVoxels) != 0)
+            return false;
     auto otherValue = b.cbeginValueAll();
     for (auto value = a.cbeginValueAll(); value; ++value, ++otherValue)
         if (*value != *otherValue || value.getCoord() != otherValue.getCoord()) return false;

@@ -1,8 +1,11 @@
 #include "tests/support/gltf.h"
 
+#include <catch2/catch.hpp>
 #include <cstring>
 #include <fstream>
+#include <stdexcept>
 
+#include "sdf/io/scene_io.h"
 #include "tests/support/support.h"
 
 namespace bilayer::test {
@@ -127,6 +130,28 @@ std::filesystem::path Gltf::writeApart(const std::string& name, const std::strin
     file["buffers"] = {{{"byteLength", bin.size()}, {"uri", uri}}};
     if (!binName.empty()) writeBytes(binName, bin + "padding");
     return writeBytes(name, file.dump());
+}
+
+nlohmann::json& primitive(Gltf& gltf) {
+    return gltf.file["meshes"][0]["primitives"][0];
+}
+
+detail::Polygons readGltf(Gltf gltf) {
+    return detail::readScene(gltf.write("test.gltf"));
+}
+
+void refuses(Gltf gltf, const Strings& words) {
+    const auto path = gltf.write("refused.gltf");
+    INFO(gltf.file.dump().substr(0, 3000));
+    try {
+        detail::readScene(path);
+        FAIL_CHECK("was read");
+    } catch (const std::runtime_error& error) {
+        const std::string text = error.what();
+        CHECK_THAT(text, Catch::Contains(path.string() + ": "));
+        CHECK(text.find('\n') == std::string::npos);
+        for (const std::string& word : words) CHECK_THAT(text, Catch::Contains(word));
+    }
 }
 
 }  // namespace bilayer::test

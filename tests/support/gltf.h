@@ -8,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "sdf/io/polygons.h"
+
 namespace bilayer::test {
 
 /// The vertices of a cube of side 2 around the origin, and its outward triangles.
@@ -39,5 +41,16 @@ struct Gltf {
     std::filesystem::path writeBinary(const std::string& name);
     std::filesystem::path writeApart(const std::string& name, const std::string& uri, const std::string& binName);
 };
+
+/// The first primitive of the first mesh.
+nlohmann::json& primitive(Gltf& gltf);
+
+/// Writes the file and reads it.
+detail::Polygons readGltf(Gltf gltf);
+
+using Strings = std::vector<std::string>;
+
+/// Checks that reading the file fails with one line that names it and contains all words.
+void refuses(Gltf gltf, const Strings& words);
 
 }  // namespace bilayer::test

@@ -10,14 +10,12 @@
 
 namespace bilayer::test {
 
-using namespace bilayer::detail;
-
-inline std::size_t faceCount(const Polygons& p) {
+inline std::size_t faceCount(const detail::Polygons& p) {
     return p.sizes.empty() ? p.corners.size() / 3 : p.sizes.size();
 }
 
 /// The signed volume that flat convex faces enclose; positive if they face outward.
-inline double volume(const Polygons& p) {
+inline double volume(const detail::Polygons& p) {
     double six = 0;
     std::size_t first = 0;
     for (std::size_t face = 0; face < faceCount(p); ++face) {
@@ -29,19 +27,19 @@ inline double volume(const Polygons& p) {
     return six / 6;
 }
 
-inline glm::dvec3 lower(const Polygons& p) {
+inline glm::dvec3 lower(const detail::Polygons& p) {
     glm::dvec3 low(1e300);
     for (const unsigned corner : p.corners) low = glm::min(low, p.points[corner]);
     return low;
 }
 
-inline glm::dvec3 upper(const Polygons& p) {
+inline glm::dvec3 upper(const detail::Polygons& p) {
     glm::dvec3 high(-1e300);
     for (const unsigned corner : p.corners) high = glm::max(high, p.points[corner]);
     return high;
 }
 
-inline bool tells(const Polygons& p, const std::string& text) {
+inline bool tells(const detail::Polygons& p, const std::string& text) {
     return std::any_of(p.notes.begin(), p.notes.end(),
                        [&](const std::string& note) { return note.find(text) != std::string::npos; });
 }

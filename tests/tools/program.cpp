@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <catch2/catch.hpp>
 #include <fstream>
 #include <iterator>
 #include <stdexcept>
@@ -87,6 +88,36 @@ std::filesystem::path sphereFile(const std::string& name, int levels) {
     const std::filesystem::path path = scratch(name);
     if (!std::filesystem::exists(path)) writeMesh(path, shapes::sphere(0.5f, levels));
     return path;
+}
+
+std::string fieldFile() {
+    const std::string path = scratch("sphere.vdb").string();
+    if (!std::filesystem::exists(path)) {
+        const Result r = run({"build", sphereFile().string(), "-o", path, "--voxel-size", "0.05"});
+        INFO(r.err);
+        REQUIRE(r.status == 0);
+    }
+    return path;
+}
+
+nlohmann::json buildSphere(const std::string& output, const Words& options) {
+    Words words{"build", sphereFile().string(), "-o", output, "--json"};
+    words.insert(words.end(), options.begin(), options.end());
+    const Result r = run(words);
+    INFO(r.err);
+    REQUIRE(r.status == 0);
+    CHECK(r.err.empty());
+    return r.json();
+}
+
+std::string rejectedOutput() {
+    return scratch("refused.vdb").string();
+}
+
+Words rejectedBuild(const std::filesystem::path& mesh, Words options) {
+    Words words{"build", mesh.string(), "-o", rejectedOutput()};
+    words.insert(words.end(), options.begin(), options.end());
+    return words;
 }
 
 std::filesystem::path textFile(const std::string& name, const std::string& text) {

@@ -40,6 +40,18 @@ int wait(pid_t process);
 /// A sphere of radius 0.5 as a mesh file.
 std::filesystem::path sphereFile(const std::string& name = "sphere.ply", int levels = 3);
 
+/// A field of that sphere at voxel size 0.05, built once.
+std::string fieldFile();
+
+/// Builds the sphere's field without a message on stderr. Returns the JSON report.
+nlohmann::json buildSphere(const std::string& output, const Words& options);
+
+/// The path of an output that no run creates.
+std::string rejectedOutput();
+
+/// The words of a build that is rejected.
+Words rejectedBuild(const std::filesystem::path& mesh, Words options = {"--voxel-size", "0.1"});
+
 /// The contents of a file.
 std::string contents(const std::filesystem::path& path);
 

@@ -1,4 +1,5 @@
 // The sweep of an object over a step that has ended.
+// Tested by tests/bullet/continuous_collision.cpp.
 #pragma once
 
 #include <BulletDynamics/Dynamics/btRigidBody.h>

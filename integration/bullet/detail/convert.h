@@ -1,4 +1,5 @@
 // Conversions between Bullet's vectors and GLM's.
+// Tested by tests/bullet/pairs.cpp.
 #pragma once
 
 #include <LinearMath/btTransform.h>

@@ -1,3 +1,5 @@
+// Contacts between a field and convex shapes.
+// Tested by tests/bullet/edges.cpp.
 #include <bilayer/collider/contact.h>
 #include <algorithm>
 #include <cmath>

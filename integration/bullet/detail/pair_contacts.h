@@ -1,4 +1,5 @@
 // A pair of bodies, one of them a field: from their shapes to contacts in Bullet.
+// Tested by tests/bullet/pairs.cpp.
 #pragma once
 
 #include <BulletCollision/CollisionDispatch/btCollisionObjectWrapper.h>

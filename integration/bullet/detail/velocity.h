@@ -1,4 +1,5 @@
 // Velocities of the objects of a world.
+// Tested by tests/bullet/multibodies.cpp.
 #pragma once
 
 #include <BulletCollision/CollisionDispatch/btCollisionObject.h>

@@ -1,4 +1,5 @@
 // Resamples bodies into a fluid's own voxels.
+// Tested by tests/fluid/seed.cpp.
 #pragma once
 
 #include <openvdb/openvdb.h>

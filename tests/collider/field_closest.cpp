@@ -2,7 +2,6 @@
 #include <oneapi/tbb/parallel_for.h>
 
 #include <array>
-#include <atomic>
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <cstring>
@@ -20,6 +19,7 @@
 #include <bilayer/sdf/mesh_io.h>
 #include "collider/field/triangle_tests.h"
 #include "demos/shared/shapes.h"
+#include "query_points.h"
 #include "tests/support/random.h"
 #include "tests/support/support.h"
 #include "tests/support/truth.h"
@@ -100,38 +100,12 @@ bool isClear(const Mesh& mesh, const Corners& own, const glm::dvec3& place, cons
     return true;
 }
 
-bool same(const ClosestPoint& a, const ClosestPoint& b) {
-    return a.found == b.found && a.distance == b.distance && a.position == b.position && a.normal == b.normal &&
-           a.triangle == b.triangle && a.feature == b.feature && a.index == b.index;
-}
-
 struct Tally {
     double worst = 0, worstFar = 0;  // [voxels]; relative
     std::size_t points = 0, features = 0, wrongSigns = 0, wrongFeatures = 0, wrongNormals = 0, wrongPlaces = 0,
                 wrongBatch = 0;
     std::array<std::size_t, 3> kinds{};
 };
-
-// Random points: in the band and slightly beyond, anywhere in the box, and far away.
-std::vector<glm::vec3> pointsAround(const Mesh& mesh, double h, int count, unsigned seed) {
-    Random random(seed);
-    const Bounds box = bounds(mesh);
-    const auto inBox = [&](double room) {
-        glm::vec3 p;
-        for (int k = 0; k < 3; ++k) p[k] = float(random(double(box.lower[k]) - room, double(box.upper[k]) + room));
-        return p;
-    };
-    std::vector<glm::vec3> points;
-    for (int i = 0; i < count; ++i) {
-        const Corners c = cornersOf(mesh, std::size_t(random(0, double(mesh.triangles.size()) - 0.5)));
-        const double u = random(0, 1), v = random(0, 1 - u);
-        points.push_back(glm::vec3(c[0] + u * (c[1] - c[0]) + v * (c[2] - c[0]) +
-                                   random(-5, 5) * h * glm::dvec3(random.direction())));
-        if (i % 4 == 0) points.push_back(inBox(6 * h));
-        if (i % 20 == 0) points.push_back(inBox(double(box.longestSide()) * std::pow(10, random(0, 4))));
-    }
-    return points;
-}
 
 // The features and normals of the first `normals` points are checked too, which visits all triangles once more.
 Tally check(const Mesh& mesh, float resolution, int count, int normals, unsigned seed) {
@@ -182,12 +156,6 @@ void require(const std::string& name, const Tally& tally) {
     CHECK(tally.wrongPlaces == 0);
     CHECK(tally.wrongBatch == 0);
     CHECK(tally.features > 100);
-}
-
-// Oblique to the axes, so that nothing is exact by chance.
-Mesh tilted(const Mesh& mesh) {
-    return transformed(mesh, glm::rotate(glm::translate(glm::mat4(1), glm::vec3(0.31f, -0.17f, 0.23f)), 0.7f,
-                                         glm::normalize(glm::vec3(1, 2, 3))));
 }
 
 }  // namespace
@@ -248,7 +216,7 @@ TEST_CASE("closest points need a place, a distance that is not exceeded, and the
     CHECK_THROWS_AS(field.closest(std::vector<glm::vec3>(2), std::span(&one, 1)), std::invalid_argument);
 }
 
-TEST_CASE("at the edges of a mesh that meets itself closest points are on the right side") {
+TEST_CASE("at the edges of a self-intersecting mesh closest points are on the right side") {
     const unsigned seed = test::seed();
     CAPTURE(seed);
     const float voxel = 0.05f;
@@ -319,86 +287,7 @@ TEST_CASE("closest points of meshes that build() has to repair are those of thei
     }
 }
 
-namespace {
-
-// A closed, oriented surface that self-intersects in places, slightly or strongly.
-Mesh crumpled(Random& random) {
-    const float noise = std::pow(10.f, float(random(-2.5, -0.5)));
-    Mesh mesh = random(0, 1) < 0.5 ? shapes::torus(1, 0.3f, 24, 12) : shapes::sphere(1, 3);
-    for (glm::vec3& p : mesh.points) p += noise * random.point(1);
-    return tilted(mesh);
-}
-
-// Counts how often queries contradict each other at points of the band, of the box, and far away.
-struct Contradictions {
-    std::size_t points = 0, inside = 0, sample = 0, batch = 0;
-};
-
-Contradictions contradictions(const Field& field, std::span<const glm::vec3> points) {
-    std::vector<ClosestPoint> batch(points.size());
-    field.closest(points, batch);
-    Contradictions found;
-    for (std::size_t i = 0; i < points.size(); ++i) {
-        const ClosestPoint closest = field.closest(points[i]);
-        const Sample sample = field.sample(points[i]);
-        const bool inside = closest.distance < 0;
-        ++found.points;
-        found.inside += field.inside(points[i]) != inside;
-        // then all voxels around the point lie on its side
-        const bool known = std::abs(closest.distance) > std::sqrt(3.f) * field.voxelSize();
-        found.sample += known && (sample.distance < 0) != inside;
-        found.batch += !same(closest, batch[i]);
-    }
-    return found;
-}
-
-void requireNone(const Contradictions& found) {
-    CAPTURE(found.points);
-    CHECK(found.inside == 0);
-    CHECK(found.sample == 0);
-    CHECK(found.batch == 0);
-}
-
-}  // namespace
-
-TEST_CASE("closest, inside and sample agree on the side where the surface runs through itself by rounding") {
-    const unsigned seed = test::seed();
-    CAPTURE(seed);
-    const auto path = corpusMesh("../cases/sliver110.obj");
-    if (!path) return;
-    const Mesh mesh = readMesh(*path);
-    const Field field(build(mesh, {.voxelSize = voxelSizeFor(mesh, 64)}), mesh);
-    const glm::vec3 given(5329.89f, -20239.19f, 1423.04f);
-    CHECK(field.closest(given).distance > 0);
-    CHECK_FALSE(field.inside(given));
-    CHECK(field.sample(given).distance > 0);
-    Random random(seed);
-    const Bounds box = bounds(mesh);
-    std::vector<glm::vec3> points = pointsAround(mesh, double(field.voxelSize()), 5000, seed);
-    for (int i = 0; i < 20000; ++i) points.push_back(box.centre() + random.point(1000 * double(box.longestSide())));
-    requireNone(contradictions(field, points));
-}
-
-TEST_CASE("closest, inside and sample agree on the side of whatever mesh, however it was signed") {
-    const unsigned seed = test::seed();
-    CAPTURE(seed);
-    Random random(seed);
-    for (int round = 0; round < 24; ++round) {
-        const Mesh mesh = crumpled(random);
-        const float voxelSize = voxelSizeFor(mesh, float(random(10, 60)));
-        for (const Sign sign : {Sign::automatic, Sign::normals, Sign::flood}) {
-            CAPTURE(round, voxelSize, sign);
-            const LevelSet levelSet = build(mesh, {.voxelSize = voxelSize, .sign = sign});
-            const std::vector<glm::vec3> points = pointsAround(mesh, double(voxelSize), 1500, seed + unsigned(round));
-            Contradictions found = contradictions(Field(levelSet, mesh), points);
-            // contradicting voxels form no valid interpolant, and a flood closes gaps half-way between walls
-            if (levelSet.signConflicts() > 0 || sign == Sign::flood) found.sample = 0;
-            requireNone(found);
-        }
-    }
-}
-
-TEST_CASE("a point on an edge or a corner is told the edge or the corner, and the mean of its normals") {
+TEST_CASE("a point on an edge or a vertex has that feature, and its pseudonormal") {
     const unsigned seed = test::seed();
     CAPTURE(seed);
     Random random(seed);

@@ -1,4 +1,4 @@
-#include "bench/heap.h"
+#include "bench/pile.h"
 
 #include <BulletCollision/BroadphaseCollision/btDbvtBroadphase.h>
 #include <BulletCollision/CollisionDispatch/btDefaultCollisionConfiguration.h>
@@ -126,11 +126,11 @@ Form::Form(Mesh from, btCollisionShape& collidesBy, double spacing)
       mass(massProperties(mesh)),
       specimen(std::make_unique<demo::Specimen>(mesh, spacing)) {}
 
-HeapRun play(const Rival& rival, const std::vector<Member>& members, const HeapOptions& options) {
+PileRun play(const Rival& rival, const std::vector<Member>& members, const PileOptions& options) {
     Arena arena(rival, members);
     const int steps = std::max(1, int(std::lround(options.seconds * double(options.stepsPerSecond))));
     const int between = std::max(1, steps / options.measuredFrames);
-    HeapRun run;
+    PileRun run;
     std::vector<std::vector<Pose>> frames;
     const Stopwatch since;
     for (int i = 1; i <= steps && since.seconds() < options.patience; ++i) {

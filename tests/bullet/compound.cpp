@@ -1,6 +1,5 @@
 // Fields as children of compounds.
 #include <BulletCollision/CollisionDispatch/btCompoundCompoundCollisionAlgorithm.h>
-#include <bilayer/collider/contact.h>
 
 #include <catch2/catch.hpp>
 #include <cmath>
@@ -22,7 +21,7 @@ btTransform at(const btVector3& place) {
 
 }  // namespace
 
-TEST_CASE("However fast, no child passes a plate, be it a compound's or one's in a compound's") {
+TEST_CASE("No child of a compound or of a nested compound passes through a plate at any speed") {
     const auto plate = exactBox({1.f, 1.f, h}, h), ball = exactSphere(0.2f, h);
     Shape plateShape(plate), ballShape(ball);
     btSphereShape sphere(0.2f);
@@ -60,7 +59,7 @@ TEST_CASE("However fast, no child passes a plate, be it a compound's or one's in
         }
 }
 
-TEST_CASE("A compound lies on its fields and on its other children alike, until a child is taken away") {
+TEST_CASE("A compound rests on its fields and on its other children, until a child is removed") {
     // two feet far from the middle, and a weight between them without contact
     Shape foot(exactBox({0.1f, 0.3f, 0.2f}, h)), slab(exactBox({2, 1, 0.3f}, h));
     btBoxShape own({0.1f, 0.3f, 0.2f}), weight({0.3f, 0.1f, 0.05f});
@@ -93,7 +92,7 @@ TEST_CASE("A compound lies on its fields and on its other children alike, until 
     }
 }
 
-TEST_CASE("Children that the user leaves out do not collide") {
+TEST_CASE("Children that the user filters out do not collide") {
     Shape ball(exactSphere(0.2f, h)), slab(exactBox({1, 1, 0.3f}, h));
     btCompoundShape compound, ground;
     compound.addChildShape(at({0, 0, 0}), &ball);
@@ -154,7 +153,7 @@ bool look(btManifoldPoint&, const btCollisionObjectWrapper* first, int, int, con
 
 }  // namespace
 
-TEST_CASE("Users see which child touches, and may take its body away") {
+TEST_CASE("Callbacks receive the child in contact, and may remove its body") {
     Shape ball(exactSphere(0.2f, h)), slab(exactBox({1, 1, 0.3f}, h));
     btSphereShape small(0.05f);
     btCompoundShape inner, outer;

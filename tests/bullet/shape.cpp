@@ -1,20 +1,14 @@
-// Queries between steps: rays, sweeps, contact tests, inertia, bounds, drawing.
+// Queries of a field's shape between steps: rays, sweeps, contact tests, inertia; and arguments that it rejects.
 #include <BulletCollision/CollisionDispatch/btCollisionWorld.h>
-#include <BulletCollision/CollisionDispatch/btGhostObject.h>
 #include <BulletCollision/NarrowPhaseCollision/btRaycastCallback.h>
 
 #include <catch2/catch.hpp>
 #include <cmath>
-#include <glm/geometric.hpp>
 #include <limits>
 #include <stdexcept>
 #include <utility>
-#include <vector>
 
-#include <bilayer/collider/contact.h>
-#include <bilayer/integration/bullet/draw.h>
 #include <bilayer/sdf/build.h>
-#include "collider/contact/collider_data.h"
 #include "demos/shared/shapes.h"
 #include "world.h"
 
@@ -47,24 +41,6 @@ struct Contacts : btCollisionWorld::ContactResultCallback {
     float deepest = std::numeric_limits<float>::max();
     btVector3 normal{0, 0, 0};
     const btCollisionObject* firstObject = nullptr;
-};
-
-struct CountingDrawer : btIDebugDraw {
-    void drawLine(const btVector3& from, const btVector3& to, const btVector3&) override {
-        ++lines;
-        for (const btVector3& p : {from, to}) upper.setMax(p), lower.setMin(p);
-    }
-    void drawContactPoint(const btVector3& place, const btVector3& normal, btScalar, int, const btVector3&) override {
-        contacts.emplace_back(place, normal);
-    }
-    void reportErrorWarning(const char*) override {}
-    void draw3dText(const btVector3&, const char*) override {}
-    void setDebugMode(int) override {}
-    int getDebugMode() const override { return mode; }
-    int mode = DBG_DrawWireframe;
-    int lines = 0;
-    std::vector<std::pair<btVector3, btVector3>> contacts;
-    btVector3 lower{1e9f, 1e9f, 1e9f}, upper{-1e9f, -1e9f, -1e9f};
 };
 
 }  // namespace
@@ -150,7 +126,7 @@ TEST_CASE(
     }
 }
 
-TEST_CASE("A ray from within a body without a mesh leaves it as it leaves the mesh") {
+TEST_CASE("A ray from inside a body without a mesh leaves it where it leaves the mesh") {
     const Mesh mesh = shapes::box({0.5f, 0.4f, 0.3f});
     const LevelSet field = build(mesh, {.voxelSize = h});
     Shape ofMesh(std::make_shared<Collider>(mesh, field)), ofField(withoutMesh(mesh, field));
@@ -191,33 +167,6 @@ TEST_CASE("Meshes of more triangles than Bullet's quantized hierarchy can number
     }
 }
 
-TEST_CASE("A ghost that dispatches its own pairs is no step") {
-    Shape floor(exactBox({1, 1, 0.1f}, h)), ball(exactSphere(0.2f, h));
-    World world;
-    btGhostPairCallback ghosts;
-    world.broadphase.getOverlappingPairCache()->setInternalGhostPairCallback(&ghosts);
-    world.add(floor, 0, {0, 0, -0.1f});
-    for (int i = 0; i < 3; ++i) world.add(ball, 1, {-0.6f + 0.6f * i, 0.5f, 0.2f});
-    btCapsuleShape capsule(0.1f, 0.3f);
-    btPairCachingGhostObject ghost;
-    ghost.setCollisionShape(&capsule);
-    ghost.setWorldTransform(btTransform(btQuaternion::getIdentity(), {0, -0.5f, 0.09f}));
-    world.dynamics.addCollisionObject(&ghost, btBroadphaseProxy::CharacterFilter, btBroadphaseProxy::AllFilter);
-    world.run(0.1f);
-    const bullet::DispatchStatistics before = world.dispatcher.statistics();
-    CHECK(before.pairs >= 4);
-    REQUIRE(ghost.getNumOverlappingObjects() == 1);
-    btHashedOverlappingPairCache& own = *ghost.getOverlappingPairCache();
-    world.dispatcher.dispatchAllCollisionPairs(&own, world.dynamics.getDispatchInfo(), &world.dispatcher);
-    btManifoldArray manifolds;
-    own.getOverlappingPairArray()[0].m_algorithm->getAllContactManifolds(manifolds);
-    REQUIRE(manifolds.size() > 0);
-    CHECK(manifolds[0]->getNumContacts() > 0);
-    CHECK(world.dispatcher.statistics().pairs == before.pairs);
-    CHECK(world.dispatcher.statistics().contactsKept == before.contactsKept);
-    world.dynamics.removeCollisionObject(&ghost);
-}
-
 namespace {
 
 // Ignores hits whose normal points up, like characters that are swept along the ground.
@@ -232,7 +181,7 @@ struct Refusing : Callback {
 
 }  // namespace
 
-TEST_CASE("Rays and swept spheres go on behind a hit where their callback does") {
+TEST_CASE("Rays and swept spheres continue behind a hit that their callback ignores") {
     const bool hasMesh = GENERATE(true, false);
     CAPTURE(hasMesh);
     const Mesh mesh = shapes::box({0.5f, 0.4f, 0.3f});
@@ -321,7 +270,7 @@ TEST_CASE("Contact tests give the depth and the normal from the second body to t
     CHECK(world.dispatcher.getNumManifolds() == 0);
 }
 
-TEST_CASE("Contact tests of two fields tell how far apart they are, beyond the band too") {
+TEST_CASE("Contact tests of two fields return their distance, beyond the band too") {
     Shape one(exactSphere(fieldRadius, h)), two(exactBox({0.4f, 0.3f, 0.2f}, h));
     const float gap = GENERATE(0.02f, 0.08f, 0.1f, 0.2f, 0.28f);
     const bool inCompound = GENERATE(false, true);
@@ -375,93 +324,7 @@ TEST_CASE("Inertia is that of the solid, about the centre of mass and its princi
     CHECK((lower - btVector3(1, 2, 3) + expected).length() < 1e-5f);
 }
 
-TEST_CASE("Drawing shows the mesh where the body is") {
-    const Mesh mesh = shapes::sphere(0.5f, 3);
-    Shape shape(std::make_shared<Collider>(mesh, build(mesh, {.voxelSize = h})),
-                {.frame = {{0.1f, 0, 0}, {1, 0, 0, 0}}});
-    shape.setLocalScaling({2, 2, 2});
-    World world;
-    btRigidBody* body = world.add(shape, 1, {1, 2, 3});
-    CountingDrawer drawer;
-    world.dynamics.setDebugDrawer(&drawer);
-    world.dynamics.debugDrawObject(body->getWorldTransform(), &shape, {1, 1, 1});
-    CHECK(drawer.lines == static_cast<int>(3 * mesh.triangles.size()));
-    CHECK((0.5f * (drawer.lower + drawer.upper) - btVector3(1.2f, 2, 3)).length() < 0.01f);
-    world.dynamics.setDebugDrawer(nullptr);
-}
-
-TEST_CASE("The surface of a body without a mesh is drawn") {
-    const Mesh mesh = shapes::sphere(0.5f, 4);
-    const LevelSet field = build(mesh, {.voxelSize = h});
-    Shape shape(withoutMesh(mesh, field));
-    World world;
-    btRigidBody* body = world.add(shape, 1, {1, 2, 3});
-    CountingDrawer drawer;
-    world.dynamics.setDebugDrawer(&drawer);
-    world.dynamics.debugDrawObject(body->getWorldTransform(), &shape, {1, 1, 1});
-    CHECK(drawer.lines > 1000);
-    for (int axis = 0; axis < 3; ++axis) {
-        CHECK(drawer.lower[axis] == Approx(axis + 0.5f).margin(0.1 * h));
-        CHECK(drawer.upper[axis] == Approx(axis + 1.5f).margin(0.1 * h));
-    }
-    world.dynamics.setDebugDrawer(nullptr);
-}
-
-TEST_CASE("Contacts are drawn where bodies touch") {
-    Shape box(exactBox({0.5f, 0.4f, 0.3f}, h));
-    btStaticPlaneShape ground({0, 0, 1}, 0);
-    World world;
-    world.add(ground, 0, {0, 0, 0});
-    world.add(box, 1, {0, 0, 0.3f});
-    world.run(0.1f);
-    CountingDrawer drawer;
-    drawer.mode = btIDebugDraw::DBG_DrawContactPoints;
-    world.dynamics.setDebugDrawer(&drawer);
-    world.dynamics.debugDrawWorld();
-    world.dynamics.setDebugDrawer(nullptr);
-    int contacts = 0;
-    for (int i = 0; i < world.dispatcher.getNumManifolds(); ++i)
-        contacts += world.dispatcher.getManifoldByIndexInternal(i)->getNumContacts();
-    REQUIRE(contacts >= 3);
-    REQUIRE(static_cast<int>(drawer.contacts.size()) == contacts);
-    for (const auto& [place, normal] : drawer.contacts) {
-        CHECK(std::abs(place.z()) < 0.1f * h);
-        CHECK(std::abs(normal.z()) == Approx(1).margin(1e-3));
-    }
-}
-
-TEST_CASE("A band is outlined by the blocks that it lies in") {
-    // a ball in the middle of a leaf, whose band extends one voxel beyond each side: seven leaves in a cross
-    const glm::vec3 centre(4 * h, 4 * h, 4 * h);
-    const float radius = 2.5f * h;
-    Mesh mesh = shapes::sphere(radius, 3);
-    for (glm::vec3& point : mesh.points) point += centre;
-    Shape shape(exactCollider(
-        mesh, [&](const glm::vec3& p) { return glm::distance(p, centre) - radius; }, h));
-    shape.setLocalScaling({2, 2, 2});
-    CountingDrawer drawer;
-    bullet::drawField(shape, btTransform(btQuaternion::getIdentity(), {1, 2, 3}), drawer);
-    // four edges at the end of each arm, four along each axis that arms and the middle share
-    CHECK(drawer.lines == 6 * 4 + 3 * 4);
-    const float block = 2 * 8 * h;
-    CHECK((drawer.lower - btVector3(1, 2, 3) - btVector3(-block, -block, -block)).length() < 1e-5f);
-    CHECK((drawer.upper - btVector3(1, 2, 3) - btVector3(2 * block, 2 * block, 2 * block)).length() < 1e-5f);
-
-    // also inside a compound, with a line per surface point
-    btCompoundShape compound;
-    compound.addChildShape(btTransform(btQuaternion::getIdentity(), {0, 0, 1}), &shape);
-    World world;
-    world.add(compound, 0, {1, 2, 2});
-    CountingDrawer again;
-    bullet::drawFields(world.dynamics, again);
-    CHECK(again.lines == drawer.lines);
-    CHECK((again.lower - drawer.lower).length() < 1e-5f);
-    CountingDrawer points;
-    bullet::drawFields(world.dynamics, points, {.band = false, .points = true});
-    CHECK(points.lines == static_cast<int>(shape.collider().data().points().points().size()));
-}
-
-TEST_CASE("Bad input is refused by name") {
+TEST_CASE("Invalid arguments are rejected by name") {
     Shape shape(exactSphere(0.3f, h));
     CHECK_THROWS_AS(Shape(nullptr), std::invalid_argument);
     CHECK_THROWS_AS(shape.setLocalScaling({1, 2, 1}), std::invalid_argument);

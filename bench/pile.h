@@ -4,7 +4,6 @@
 #include <memory>
 #include <vector>
 
-#include <bilayer/collider/contact.h>
 #include <bilayer/collider/mass.h>
 #include <bilayer/collider/pose.h>
 #include "bench/rivals.h"
@@ -30,7 +29,7 @@ struct Member {
     Pose pose{};
 };
 
-struct HeapOptions {
+struct PileOptions {
     float stepsPerSecond = 240;
     double seconds = 4;
     double patience = 60;  ///< limit of wall-clock time; ends a run that takes longer [s]
@@ -38,7 +37,7 @@ struct HeapOptions {
 };
 
 /// Result of a run.
-struct HeapRun {
+struct PileRun {
     std::vector<double> stepMs;         ///< time of each step [ms]
     std::vector<double> kineticEnergy;  ///< after each step [J]
     std::vector<double> penetrations;   ///< overlapping pairs in the measured frames, by the meshes [m]
@@ -47,6 +46,6 @@ struct HeapRun {
 };
 
 /// Lets the bodies fall. Sleeping is disabled, so each step does its full work.
-HeapRun play(const Rival& rival, const std::vector<Member>& members, const HeapOptions& options);
+PileRun play(const Rival& rival, const std::vector<Member>& members, const PileOptions& options);
 
 }  // namespace bilayer::bench

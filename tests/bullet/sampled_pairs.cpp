@@ -166,7 +166,7 @@ TEST_CASE("bodies that do not fit on the device together take turns") {
     CHECK_THROWS_AS(check(openclPointSampler(device, {.memoryMiB = 1}), first, 0.002f), DeviceError);
 }
 
-TEST_CASE("a heap sampled on a device moves as one on the processor, on any number of threads, bit by bit") {
+TEST_CASE("a pile sampled on a device moves as one on the processor, on any count of threads, bit by bit") {
     const unsigned seed = test::seed();
     CAPTURE(seed);
     const Played expected = play({}, seed);
@@ -183,7 +183,7 @@ TEST_CASE("a heap sampled on a device moves as one on the processor, on any numb
     }
 }
 
-TEST_CASE("the processor takes over where the sampler fails half-way, and nobody can tell by the bodies") {
+TEST_CASE("the processor takes over if the sampler fails half-way, with the same result") {
     const unsigned seed = test::seed();
     CAPTURE(seed);
     const auto works = openclPointSampler(openDevice());

@@ -1,0 +1,27 @@
+// `bilayer` without a command, and `bilayer devices`.
+#include <nanovdb/util/IO.h>
+
+#include <catch2/catch.hpp>
+
+#include "tests/tools/program.h"
+
+using namespace bilayer;
+using namespace bilayer::test;
+
+TEST_CASE("help and version") {
+    CHECK(run({"--help"}).status == 0);
+    CHECK(run({"--version"}).out.rfind("bilayer 0.", 0) == 0);
+    for (const char* command : {"build", "inspect", "info", "query", "surface", "export", "seed", "devices"}) {
+        const Result r = run({command, "--help"});
+        CHECK(r.status == 0);
+        CHECK_FALSE(r.out.empty());
+    }
+}
+
+TEST_CASE("devices reports no device") {
+    CHECK(run({"devices", "--json"}).json()["devices"].is_array());
+    CHECK(run({"devices"}).status == 0);
+    const Result none = run({"devices"}, {.variables = {"OCL_ICD_VENDORS=/nonexistent"}});
+    CHECK(none.status == 0);
+    CHECK(none.out == "no OpenCL device\n");
+}
