@@ -16,6 +16,10 @@ namespace {
 
 /// A separation below this defines no direction [sizes of the larger body].
 constexpr double minDirection = 1e-7;
+/// The refinement of the deepest point: max count of steps, and the first and last distance to the point ahead
+/// [voxels].
+constexpr int refinements = 40;
+constexpr float maxLead = 1024, minLead = 0.01f;
 
 Similarity mapInto(const Placed& into, const Placed& from) {
     const glm::dquat toInto = glm::conjugate(glm::normalize(glm::dquat(into.pose.rotation)));
@@ -60,24 +64,58 @@ bool isInside(const Placed& inner, const Placed& outer) {
     });
 }
 
+// A point of one body's surface inside another body, and the closest point of that body's surface; both in coordinates
+// of the other body.
+struct Depth {
+    glm::vec3 point{0};
+    ClosestPoint closest{.distance = 0};
+};
+
+// The deepest of the surface points.
+Depth deepestSample(const Placed& inner, const Field& field, const Similarity& map) {
+    Depth deepest;
+    for (const SurfacePoint& point : inner.collider.data().points().points()) {
+        const glm::vec3 at(map(glm::dvec3(point.position)));
+        const Sample sample = field.sample(at);
+        const bool shallow = sample.inBand && sample.distance > deepest.closest.distance + field.voxelSize();
+        if (!(sample.distance < 0) || shallow) continue;
+        const ClosestPoint closest = field.closest(at);
+        if (closest.found && closest.distance < deepest.closest.distance) deepest = {at, closest};
+    }
+    return deepest;
+}
+
+// Moves the point along the inner surface as far as it gets deeper: to where the surface is closest to a point that
+// lies ahead in the direction of penetration. The lead is halved when that leads elsewhere.
+Depth refined(Depth depth, const Placed& inner, const Field& field, const Similarity& map) {
+    const Field& own = inner.collider.exactField();
+    const float voxel = field.voxelSize();
+    float lead = field.voxelSize() * maxLead;
+    for (int i = 0; i < refinements && lead > minLead * voxel; ++i) {
+        const glm::vec3 ahead = depth.point - lead * depth.closest.normal;
+        const ClosestPoint onSurface = own.closest(glm::vec3(map.inverse(glm::dvec3(ahead))));
+        if (!onSurface.found) return depth;
+        const glm::vec3 at(map(glm::dvec3(onSurface.position)));
+        const ClosestPoint closest = field.closest(at);
+        if (closest.found && closest.distance < depth.closest.distance)
+            depth = {at, closest};
+        else
+            lead /= 4;
+    }
+    return depth;
+}
+
 // The deepest surface point of one body inside another; at depth 0 if there is none.
 BodyDistance deepestOf(const Placed& inner, const Placed& outer) {
     const Similarity map = mapInto(outer, inner);
     const Field& field = outer.collider.exactField();
-    glm::vec3 deepest(0);
-    ClosestPoint closest{.distance = 0};
-    for (const SurfacePoint& point : inner.collider.data().points().points()) {
-        const glm::vec3 at(map(glm::dvec3(point.position)));
-        const Sample sample = field.sample(at);
-        if (!(sample.distance < 0) || (sample.inBand && sample.distance > closest.distance + field.voxelSize()))
-            continue;
-        const ClosestPoint here = field.closest(at);
-        if (here.found && here.distance < closest.distance) closest = here, deepest = at;
-    }
+    Depth depth = deepestSample(inner, field, map);
+    if (depth.closest.distance < 0) depth = refined(depth, inner, field, map);
+    const ClosestPoint& closest = depth.closest;
     return {.found = true,
             .overlap = Overlap::surfaces,
             .distance = closest.distance * outer.scale,
-            .a = {toWorld(outer, glm::dvec3(deepest))},
+            .a = {toWorld(outer, glm::dvec3(depth.point))},
             .b = {toWorld(outer, glm::dvec3(closest.position)), closest.triangle, closest.feature, closest.index},
             .normal = outer.pose.rotation * closest.normal};
 }
