@@ -327,3 +327,24 @@ TEST_CASE("A body without its mesh is as far apart as the field's zero set") {
     CHECK(distance(Placed{bare}, other).distance ==
           Approx(double(distance(Placed{full}, other).distance)).margin(0.002));
 }
+
+TEST_CASE("Fine meshes at a small distance are as far apart as their triangles") {
+    const unsigned seed = test::seed();
+    CAPTURE(seed);
+    Random random(seed);
+    const Mesh mesh = shapes::carvedBox(20000, 0.4f);
+    const Collider body = colliderOf(mesh, 64);
+    int separated = 0;
+    for (int i = 0; i < 12; ++i) {
+        CAPTURE(i);
+        const Placed a{body, randomPose(random, 0.1)};
+        Placed b{body, randomPose(random, 0.1)};
+        b.pose.position += 3.f * random.direction();
+        for (int k = 0; k < 8; ++k) {
+            const BodyDistance here = distance(a, b);
+            b.pose.position -= (0.1f - here.distance) * here.normal;
+        }
+        separated += checkSeparated(a, b);
+    }
+    CHECK(separated > 6);
+}
