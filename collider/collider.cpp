@@ -109,14 +109,14 @@ ColliderData::ColliderData(const LevelSet& given, Body made)
 }
 
 template <class Make>
-void ColliderData::once(const Make& make) const {
+void ColliderData::once(std::once_flag& flag, const Make& make) {
     // isolated: a waiting thread must not take up a task that enters this same call
-    std::call_once(once_, [&] { tbb::this_task_arena::isolate(make); });
+    std::call_once(flag, [&] { tbb::this_task_arena::isolate(make); });
 }
 
 const Mesh& ColliderData::mesh() const {
     if (body.mesh) return *body.mesh;
-    once([&] {
+    once(once_, [&] {
         zeroSet_ = surface(*levelSet_);
         levelSet_.reset();
     });
@@ -125,8 +125,28 @@ const Mesh& ColliderData::mesh() const {
 
 const Field& ColliderData::exactField() const {
     if (field.mesh() || !body.mesh) return field;
-    once([&] { exact_ = withMesh(field, body.mesh); });
+    once(once_, [&] { exact_ = withMesh(field, body.mesh); });
     return *exact_;
+}
+
+const MeshTree& ColliderData::meshTree() const {
+    if (const MeshTree* tree = exactField().data().mesh.get()) return *tree;
+    once(treeOnce_, [&] { zeroSetTree_.emplace(mesh(), field.voxelSize()); });
+    return *zeroSetTree_;
+}
+
+std::span<const glm::vec3> ColliderData::componentPoints() const {
+    once(componentsOnce_, [&] {
+        const Mesh welded = weld(mesh());
+        ConcurrentDisjointSets sets(welded.points.size());
+        for (const glm::uvec3& t : welded.triangles) {
+            sets.join(t.x, t.y);
+            sets.join(t.x, t.z);
+        }
+        for (unsigned i = 0; i < welded.points.size(); ++i)
+            if (sets.root(i) == i) componentPoints_.push_back(welded.points[i]);
+    });
+    return componentPoints_;
 }
 
 }  // namespace bilayer::detail

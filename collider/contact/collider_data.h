@@ -7,11 +7,14 @@
 #include <cstdint>
 #include <mutex>
 #include <optional>
+#include <span>
+#include <vector>
 
 #include "collider/contact/body.h"
 #include "collider/contact/interpolation_error.h"
 #include "collider/contact/sharp_edges.h"
 #include "collider/contact/surface_points.h"
+#include "collider/field/mesh_tree.h"
 
 namespace bilayer::detail {
 
@@ -31,6 +34,10 @@ struct ColliderData {
         return errorMask.hold(point);
     }
     const SharpEdges& edges() const { return sharpEdges; }
+    /// The hierarchy over the triangles of mesh().
+    const MeshTree& meshTree() const;
+    /// A vertex of each connected component of mesh(), in body coordinates [m].
+    std::span<const glm::vec3> componentPoints() const;
 
     const Body body;
     const Field field;
@@ -40,7 +47,7 @@ struct ColliderData {
 
   private:
     template <class Make>
-    void once(const Make& make) const;
+    static void once(std::once_flag& flag, const Make& make);
 
     // Created on demand, as they are rarely needed and take longer than restoring the rest of a body from a file. The
     // triangles of the field's zero set, for a body without a mesh; and the field with the mesh.
@@ -48,6 +55,9 @@ struct ColliderData {
     mutable std::optional<LevelSet> levelSet_;
     mutable Mesh zeroSet_;
     mutable std::optional<Field> exact_;
+    mutable std::once_flag treeOnce_, componentsOnce_;
+    mutable std::optional<MeshTree> zeroSetTree_;
+    mutable std::vector<glm::vec3> componentPoints_;
 };
 
 }  // namespace bilayer::detail

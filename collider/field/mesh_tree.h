@@ -78,6 +78,8 @@ class MeshTree {
 
     const Mesh& mesh() const { return *mesh_; }
     const WideTree& tree() const { return tree_; }
+    /// The oriented boxes of a node's children.
+    const OrientedGroup& group(std::uint32_t node) const { return groups_[node - tree_.leafCount]; }
     float voxelSize() const { return voxelSize_; }  ///< [m]
     std::size_t memoryBytes() const;
 

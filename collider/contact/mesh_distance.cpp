@@ -1,0 +1,331 @@
+// Branch and bound over pairs of nodes, nearest pair first, as E. Larsen, S. Gottschalk, M. Lin, D. Manocha, "Fast
+// distance queries with rectangular swept sphere volumes", ICRA 2000. Oriented boxes replace their swept rectangles:
+// pieces of surfaces that face each other are flat in them, so that their bounds are tight. Highway compiles it once
+// for each instruction set.
+#include "collider/contact/mesh_distance.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "collider/contact/mesh_distance.cpp"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <utility>
+
+HWY_BEFORE_NAMESPACE();
+namespace bilayer::detail::HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+namespace {
+
+/// Pairs that are nearer by less are not looked for [sizes of the meshes]. Boxes are rounded to floats outward.
+constexpr double tolerance = 3e-7;
+/// Stack size: each of the two trees has at most ten levels, and a level leaves at most seven pending pairs.
+constexpr std::size_t maxPending = 160;
+/// Rounds of projection from one mesh to the other for a first bound.
+constexpr int projections = 4;
+
+// An oriented box in the common frame [m].
+struct OrientedBounds {
+    glm::dmat3 axes{1};  // unit vectors, as columns
+    glm::dvec3 centre{0}, half{0};
+
+    double size2() const { return glm::dot(half, half); }
+};
+
+// A node, and the group and slot that hold its box; no group for a root.
+struct Node {
+    std::uint32_t index;
+    const OrientedGroup* group = nullptr;
+    std::uint32_t slot = 0;
+};
+
+// The frame of a group's boxes in the common frame.
+struct GroupFrame {
+    glm::dmat3 axes;
+    glm::dvec3 origin;
+    double unit;  // a voxel of the tree [m]
+};
+
+// A mesh with its hierarchy in the common frame.
+class PosedTree {
+  public:
+    PosedTree(const MeshTree& mesh, const Similarity& map) : mesh_(mesh), map_(map) {
+        unit_ = map.scale * double(mesh.voxelSize());
+        origin_ = map(glm::dvec3(mesh.tree().base) * double(mesh.voxelSize()));
+        linear_ = map.scale * map.rotation;
+    }
+
+    const WideTree& tree() const { return mesh_.tree(); }
+    const OrientedGroup& group(std::uint32_t node) const { return mesh_.group(node); }
+    std::size_t triangleCount() const { return mesh_.mesh().triangles.size(); }
+
+    GroupFrame frameOf(const OrientedGroup& group) const {
+        glm::dmat3 axes;
+        for (int k = 0; k < 3; ++k)
+            axes[k] = map_.rotation * glm::dvec3(group.axes[k][0], group.axes[k][1], group.axes[k][2]);
+        const glm::dvec3 origin(group.origin[0], group.origin[1], group.origin[2]);
+        return {axes, map_.rotation * (unit_ * origin) + origin_, unit_};
+    }
+
+    OrientedBounds boundsOf(const Node& node) const {
+        if (!node.group) {
+            const glm::dvec3 half = 0.5 * unit_ * glm::dvec3(tree().size);
+            return {map_.rotation, map_.rotation * half + origin_, half};
+        }
+        const GroupFrame frame = frameOf(*node.group);
+        glm::dvec3 lower, upper;
+        for (int k = 0; k < 3; ++k) {
+            lower[k] = unit_ * double(node.group->lower[k][node.slot]);
+            upper[k] = unit_ * double(node.group->upper[k][node.slot]);
+        }
+        return {frame.axes, frame.axes * (0.5 * (lower + upper)) + frame.origin, 0.5 * (upper - lower)};
+    }
+
+    TriangleCorners corners(std::uint32_t triangle) const {
+        const Mesh& mesh = mesh_.mesh();
+        const glm::uvec3& t = mesh.triangles[triangle];
+        const auto posed = [&](const glm::vec3& p) {
+            return linear_[0] * double(p.x) + linear_[1] * double(p.y) + (linear_[2] * double(p.z) + map_.shift);
+        };
+        return {posed(mesh.points[t.x]), posed(mesh.points[t.y]), posed(mesh.points[t.z])};
+    }
+
+    // The triangle nearest to a point of the common frame, and its closest point.
+    std::pair<std::uint32_t, glm::dvec3> nearest(const glm::dvec3& point) const {
+        const glm::dvec3 at = mesh_.approached(map_.inverse(point));
+        const std::uint32_t triangle = mesh_.nearest(at, std::numeric_limits<float>::infinity());
+        if (triangle == noTriangle) return {noTriangle, point};
+        return {triangle, map_(at + mesh_.featureOf(triangle, at).way)};
+    }
+
+  private:
+    const MeshTree& mesh_;
+    const Similarity& map_;
+    double unit_;
+    glm::dvec3 origin_;
+    glm::dmat3 linear_;
+};
+
+// Lower bounds of the squared distances from a box to the boxes of a group: the largest of the distances of their
+// bounds in either frame and along a direction, which points from the group to the box. Returns the slots whose bound
+// is below a limit.
+unsigned boundDistances(const OrientedBounds& box, const OrientedGroup& group, const GroupFrame& frame,
+                        const glm::dvec3& direction, double limit2, double (&bounds2)[treeWidth]) {
+    const hn::CappedTag<double, treeWidth> tag;
+    const hn::Rebind<float, decltype(tag)> floats;
+    const glm::dmat3 toGroup = glm::transpose(frame.axes), turned = toGroup * box.axes;
+    const glm::dvec3 centre = toGroup * (box.centre - frame.origin);
+    glm::dvec3 half(0);
+    for (int j = 0; j < 3; ++j) half += glm::abs(turned[j]) * box.half[j];
+    const glm::dvec3 ahead = toGroup * direction;
+    const double reachAhead = glm::dot(glm::abs(direction * box.axes), box.half);
+    unsigned near = 0;
+    const auto zero = hn::Zero(tag), unit = hn::Set(tag, frame.unit), halved = hn::Set(tag, 0.5);
+    for (std::size_t i = 0; i < treeWidth; i += hn::Lanes(tag)) {
+        auto inGroup2 = zero, inBox2 = zero;
+        hn::Vec<decltype(tag)> middle[3], extent[3];
+        auto used = hn::FirstN(tag, hn::Lanes(tag));
+        for (std::size_t k = 0; k < 3; ++k) {
+            const auto lower = hn::Mul(unit, hn::PromoteTo(tag, hn::Load(floats, group.lower[k] + i)));
+            const auto upper = hn::Mul(unit, hn::PromoteTo(tag, hn::Load(floats, group.upper[k] + i)));
+            const auto at = hn::Set(tag, centre[int(k)]), reach = hn::Set(tag, half[int(k)]);
+            const auto gap =
+                hn::Max(hn::Max(hn::Sub(lower, hn::Add(at, reach)), hn::Sub(hn::Sub(at, reach), upper)), zero);
+            inGroup2 = hn::Add(inGroup2, hn::Mul(gap, gap));
+            middle[k] = hn::Sub(hn::Mul(halved, hn::Add(lower, upper)), at);
+            extent[k] = hn::Mul(halved, hn::Sub(upper, lower));
+            used = hn::And(used, hn::Le(lower, upper));
+        }
+        for (int j = 0; j < 3; ++j) {
+            auto along = zero, reach = hn::Set(tag, box.half[j]);
+            for (std::size_t k = 0; k < 3; ++k) {
+                const auto cosine = hn::Set(tag, turned[j][int(k)]);
+                along = hn::Add(along, hn::Mul(cosine, middle[k]));
+                reach = hn::Add(reach, hn::Mul(hn::Abs(cosine), extent[k]));
+            }
+            const auto gap = hn::Max(hn::Sub(hn::Abs(along), reach), zero);
+            inBox2 = hn::Add(inBox2, hn::Mul(gap, gap));
+        }
+        auto gapAhead = hn::Set(tag, -reachAhead);
+        for (std::size_t k = 0; k < 3; ++k) {
+            const auto cosine = hn::Set(tag, ahead[int(k)]);
+            gapAhead = hn::Sub(gapAhead, hn::Add(hn::Mul(cosine, middle[k]), hn::Mul(hn::Abs(cosine), extent[k])));
+        }
+        gapAhead = hn::Max(gapAhead, zero);
+        const auto bound2 = hn::Max(hn::Max(inGroup2, inBox2), hn::Mul(gapAhead, gapAhead));
+        hn::Store(bound2, tag, bounds2 + i);
+        std::uint8_t bits[8] = {};
+        hn::StoreMaskBits(tag, hn::And(used, hn::Lt(bound2, hn::Set(tag, limit2))), bits);
+        near |= unsigned(bits[0]) << i;
+    }
+    return near;
+}
+
+// The triangles of a leaf. A halved triangle may have several parts in it.
+struct LeafTriangles {
+    void take(const PosedTree& mesh, std::uint32_t index) {
+        if (index == leaf) return;
+        leaf = index;
+        count = 0;
+        for (const std::uint32_t triangle : mesh.tree().leaves[leaf].triangles) {
+            const auto end = indices.begin() + std::ptrdiff_t(count);
+            if (std::find(indices.begin(), end, triangle) != end) continue;
+            indices[count] = triangle;
+            corners[count++] = mesh.corners(triangle);
+        }
+    }
+
+    std::uint32_t leaf = noTriangle;
+    std::size_t count = 0;
+    std::array<std::uint32_t, treeWidth> indices;
+    std::array<TriangleCorners, treeWidth> corners;
+};
+
+class PairSearch {
+  public:
+    PairSearch(const MeshTree& a, const MeshTree& b, const Similarity& aToB, double maxDistance)
+        : a_(a, aToB), b_(b, identity_) {
+        rootA_ = {a.tree().root()}, rootB_ = {b.tree().root()};
+        room_ = tolerance * std::sqrt(std::max(a_.boundsOf(rootA_).size2(), b_.boundsOf(rootB_).size2()));
+        best_.distance = maxDistance;
+        setLimit();
+    }
+
+    void startFrom(const TriangleIndices& start) {
+        if (start.a < a_.triangleCount() && start.b < b_.triangleCount())
+            measure(start.a, a_.corners(start.a), start.b, b_.corners(start.b));
+    }
+
+    void startByProjection() {
+        glm::dvec3 at = a_.boundsOf(rootA_).centre;
+        for (int i = 0; i < projections; ++i) {
+            const auto [triangleB, onB] = b_.nearest(at);
+            const auto [triangleA, onA] = a_.nearest(onB);
+            if (triangleA == noTriangle || triangleB == noTriangle) return;
+            const double before = best_.distance;
+            measure(triangleA, a_.corners(triangleA), triangleB, b_.corners(triangleB));
+            if (i > 0 && !(best_.distance < before)) return;
+            at = onA;
+        }
+    }
+
+    const MeshDistance& run() {
+        stack_[pending_++] = {0, rootA_, rootB_};
+        while (pending_ > 0) {
+            const NodePair pair = stack_[--pending_];
+            if (!(pair.bound2 < limit2_)) continue;
+            const bool leafA = a_.tree().isLeaf(pair.a.index), leafB = b_.tree().isLeaf(pair.b.index);
+            if (leafA && leafB) {
+                measureLeaves(pair.a.index, pair.b.index);
+                continue;
+            }
+            const OrientedBounds boundsA = a_.boundsOf(pair.a), boundsB = b_.boundsOf(pair.b);
+            if (leafB || (!leafA && boundsA.size2() >= boundsB.size2()))
+                open(a_, pair.a.index, boundsB, -direction_,
+                     [&](const Node& child) { return std::pair(child, pair.b); });
+            else
+                open(b_, pair.b.index, boundsA, direction_,
+                     [&](const Node& child) { return std::pair(pair.a, child); });
+        }
+        return best_;
+    }
+
+  private:
+    struct NodePair {
+        double bound2;
+        Node a, b;
+    };
+
+    // Replaces a node by its children that may be near the other one, the nearest last.
+    template <class MakePair>
+    void open(const PosedTree& mesh, std::uint32_t node, const OrientedBounds& other, const glm::dvec3& direction,
+              MakePair&& pairOf) {
+        const OrientedGroup& group = mesh.group(node);
+        alignas(64) double bounds2[treeWidth];
+        const auto first = std::ptrdiff_t(pending_);
+        unsigned near = boundDistances(other, group, mesh.frameOf(group), direction, limit2_, bounds2);
+        for (; near != 0; near &= near - 1) {
+            const auto slot = std::uint32_t(std::countr_zero(near));
+            const auto [a, b] = pairOf(Node{group.firstChild + slot, &group, slot});
+            stack_[pending_++] = {bounds2[slot], a, b};
+        }
+        std::sort(stack_.begin() + first, stack_.begin() + std::ptrdiff_t(pending_),
+                  [](const NodePair& p, const NodePair& q) { return p.bound2 > q.bound2; });
+    }
+
+    void measureLeaves(std::uint32_t a, std::uint32_t b) {
+        ofA_.take(a_, a);
+        ofB_.take(b_, b);
+        const LeafTriangles &ofA = ofA_, &ofB = ofB_;
+        const auto along = [&](const TriangleCorners& c) {
+            return std::array{glm::dot(direction_, c[0]), glm::dot(direction_, c[1]), glm::dot(direction_, c[2])};
+        };
+        std::array<double, treeWidth> farthest{};
+        for (std::size_t k = 0; k < ofB.count; ++k) {
+            const auto heights = along(ofB.corners[k]);
+            farthest[k] = *std::max_element(heights.begin(), heights.end());
+        }
+        for (std::size_t i = 0; i < ofA.count; ++i) {
+            const auto heights = along(ofA.corners[i]);
+            const double nearest = *std::min_element(heights.begin(), heights.end());
+            for (std::size_t k = 0; k < ofB.count; ++k)
+                if (nearest - farthest[k] < limit_)
+                    measure(ofA.indices[i], ofA.corners[i], ofB.indices[k], ofB.corners[k]);
+        }
+    }
+
+    void measure(std::uint32_t a, const TriangleCorners& cornersA, std::uint32_t b, const TriangleCorners& cornersB) {
+        const TrianglePair pair = closestPoints(cornersA, cornersB);
+        if (!(pair.distance2 <= best_.distance * best_.distance)) return;
+        best_ = {a, b, pair.a, pair.b, std::sqrt(pair.distance2)};
+        if (best_.distance > room_) direction_ = (pair.a.position - pair.b.position) / best_.distance;
+        setLimit();
+    }
+
+    void setLimit() {
+        limit_ = std::max(best_.distance - room_, 0.0);
+        limit2_ = limit_ * limit_;
+    }
+
+    const Similarity identity_;
+    PosedTree a_, b_;
+    Node rootA_, rootB_;
+    double room_, limit_, limit2_;
+    MeshDistance best_;
+    glm::dvec3 direction_{0};  // of the closest pair, from B to A: triangles are no closer than along it
+    LeafTriangles ofA_, ofB_;  // of the last leaves
+    std::size_t pending_ = 0;
+    std::array<NodePair, maxPending> stack_;
+};
+
+MeshDistance search(const MeshTree& a, const MeshTree& b, const Similarity& aToB, double maxDistance,
+                    const TriangleIndices& start) {
+    PairSearch search(a, b, aToB, maxDistance);
+    if (start.a != noTriangle)
+        search.startFrom(start);
+    else
+        search.startByProjection();
+    return search.run();
+}
+
+}  // namespace
+}  // namespace bilayer::detail::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace bilayer::detail {
+
+HWY_EXPORT(search);
+
+MeshDistance distanceBetween(const MeshTree& a, const MeshTree& b, const Similarity& aToB, double maxDistance,
+                             const TriangleIndices& start) {
+    return HWY_DYNAMIC_DISPATCH(search)(a, b, aToB, maxDistance, start);
+}
+
+}  // namespace bilayer::detail
+#endif  // HWY_ONCE

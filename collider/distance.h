@@ -1,0 +1,63 @@
+// The distance between two posed bodies.
+#pragma once
+
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <limits>
+
+#include <bilayer/collider/contact.h>
+#include <bilayer/collider/query.h>
+
+namespace bilayer {
+
+struct DistanceOptions {
+    /// The search ends early for bodies that are farther apart than this [m]. Zero finds only overlaps and touches.
+    float maxDistance = std::numeric_limits<float>::infinity();
+};
+
+/// How two solids lie relative to each other.
+enum class Overlap {
+    none,      ///< they are apart, or touch
+    surfaces,  ///< their surfaces intersect
+    aInsideB,  ///< A, or a component of it, lies inside B, and the surfaces do not meet
+    bInsideA,  ///< the same with B inside A
+};
+
+/// A point of a body's surface, and the mesh feature that it lies on.
+struct WitnessPoint {
+    glm::vec3 position{0};                ///< in world coordinates [m]
+    std::uint32_t triangle = noTriangle;  ///< index in Collider::mesh(); `noTriangle`: not known
+    Feature feature = Feature::face;
+    std::uint8_t index = 0;  ///< of the edge (from corner `index` of the triangle to the next) or corner
+};
+
+/// The answer of distance().
+struct BodyDistance {
+    bool found = false;  ///< false: farther apart than the limit; the other members are invalid
+    Overlap overlap = Overlap::none;
+    /// Separation of the solids, or minus the penetration depth of the deepest contact [m].
+    float distance = std::numeric_limits<float>::infinity();
+    WitnessPoint a, b;
+    /// Unit vector from B to A: moving A along it separates the bodies. Zero if touching bodies define none.
+    glm::vec3 normal{0};
+};
+
+/// The triangles of the last answer for a pair of bodies. A search that starts from them is fast while bodies move
+/// little from call to call; the distance is the same.
+struct DistanceStart {
+    std::uint32_t triangleA = noTriangle, triangleB = noTriangle;
+};
+
+/// The signed distance of two bodies at any separation, between their triangle meshes (Collider::mesh()).
+///
+/// - Separated bodies: the distance is exact to 1e-6 of the size of the larger body.
+/// - Surfaces that intersect: the penetration depth of the surface point of one body that is deepest in the other, and
+///   the normal there. Moving the bodies apart may take a longer way.
+/// - One body inside the other: the same for the deepest surface point of the inner body.
+///
+/// Safe from any thread, allocates nothing. The first call for a body takes some time to prepare it.
+/// @param start  null, or where the search starts; receives the triangles of the answer
+BodyDistance distance(const Placed& a, const Placed& b, const DistanceOptions& options = {},
+                      DistanceStart* start = nullptr);
+
+}  // namespace bilayer
