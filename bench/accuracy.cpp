@@ -65,8 +65,8 @@ Builder ours(const std::string& name) {
     if (method == Method::prism) filler = openclFiller(openDevice());
     return {name, [method, filler](const Mesh& mesh, float voxelSize, const test::Band& band) {
                 const BuildOptions options{.voxelSize = voxelSize,
-                                           .exteriorWidth = float(band.exterior),
-                                           .interiorWidth = float(band.interior),
+                                           .exteriorWidthVoxels = float(band.exterior),
+                                           .interiorWidthVoxels = float(band.interior),
                                            .method = method};
                 return build(mesh, options, filler ? &*filler : nullptr).grids().distance;
             }};

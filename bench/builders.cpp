@@ -182,7 +182,7 @@ Outcome run(const Scene& scene, const Job& job) {
 LevelSet fieldOf(const Scene& scene, const Job& job) {
     BuildOptions options;
     options.voxelSize = scene.voxelSize;
-    options.exteriorWidth = options.interiorWidth = job.halfWidth;
+    options.exteriorWidthVoxels = options.interiorWidthVoxels = job.halfWidth;
     options.method = methodOf(job.builder);
     // the method's own signs: the automatic choice would use those of the exact method
     if (options.method == Method::pseudonormal) options.sign = Sign::normals;

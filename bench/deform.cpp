@@ -127,8 +127,8 @@ void deformInPart(const Options& options, double share, int threads) {
     const Scene rest = restingScene(options);
     const Part part = partOf(rest.mesh, share);
     const BuildOptions how{.voxelSize = rest.voxelSize,
-                           .exteriorWidth = options.halfWidth,
-                           .interiorWidth = options.halfWidth,
+                           .exteriorWidthVoxels = options.halfWidth,
+                           .interiorWidthVoxels = options.halfWidth,
                            .threads = threads};
     Mesh before = tugged(rest.mesh, part, rest.voxelSize, 0);
     LevelSet field = build(before, how);
@@ -139,13 +139,11 @@ void deformInPart(const Options& options, double share, int threads) {
         const Mesh after = tugged(rest.mesh, part, rest.voxelSize, i);
         const auto moved = trianglesThatMoved(before, after);
         movedTriangles = std::max(movedTriangles, moved.size());
-        BuildTimes times;
-        build(after, how, nullptr, &times);
-        full.push_back(times.total);
-        const double blocks = double(times.filledBlocks);
-        field = rebuild(field, before, after, moved, how, &times);
-        incremental.push_back(times.total);
-        filled = std::max(filled, double(times.filledBlocks) / blocks);
+        const BuildTimes whole = build(after, how).buildTimes();
+        full.push_back(whole.total);
+        field = rebuild(field, before, after, moved, how);
+        incremental.push_back(field.buildTimes().total);
+        filled = std::max(filled, double(field.buildTimes().filledBlocks) / double(whole.filledBlocks));
         before = after;
     }
     fmt::print("{:>9}{:>9}{:>14.1f} %{:>14.1f}{:>14.1f}{:>20.1f}\n", movedTriangles, threads, 100 * filled,

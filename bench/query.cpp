@@ -195,8 +195,8 @@ double medianSeconds(int rounds, const Work& work) {
 nlohmann::json compare(const Source& source, float resolution, const Options& options) {
     const Scene scene = bench::scene(source, resolution);
     const BuildOptions how{.voxelSize = scene.voxelSize,
-                           .exteriorWidth = options.halfWidth,
-                           .interiorWidth = options.halfWidth,
+                           .exteriorWidthVoxels = options.halfWidth,
+                           .interiorWidthVoxels = options.halfWidth,
                            .triangles = true};
     const LevelSet levelSet = build(scene.mesh, how);
     const Field field(levelSet), small(levelSet, {.storage = Storage::fixed16}), withMesh(levelSet, scene.mesh);

@@ -40,7 +40,7 @@ class Field : public Rival {
                 : measure == ContactAccuracy::exactNearFeatures ? "bilayer"
                                                                 : fmt::format("bilayer, by {}", nameOf(measure))) {
         BuildOptions how{.voxelSize = voxelSizeFor(mesh, voxels)};
-        how.interiorWidth = bandInside;
+        how.interiorWidthVoxels = bandInside;
         const ColliderOptions options{.accuracy = measure};
         shape_ = std::make_unique<bullet::Shape>(std::make_shared<Collider>(mesh, build(mesh, how), options));
     }

@@ -192,7 +192,8 @@ nlohmann::json toJson(const Row& row) {
 std::vector<Row> measure(const Shape& shape, const test::Truth& triangles, float resolution, const Options& options) {
     const float voxel = voxelSizeFor(shape.mesh, resolution), width = options.halfWidth;
     const LevelSet ofMesh =
-        build(shape.mesh, {.voxelSize = voxel, .exteriorWidth = width, .interiorWidth = width, .triangles = true});
+        build(shape.mesh,
+              {.voxelSize = voxel, .exteriorWidthVoxels = width, .interiorWidthVoxels = width, .triangles = true});
     const Distance toMesh = [&](const glm::dvec3& p) { return triangles.signedDistance(p); };
     const LevelSet sampled = shape.solid ? test::levelSetOf(*shape.solid, voxel, width, width) : ofMesh;
     const auto aroundMesh = places(ofMesh, toMesh, options);

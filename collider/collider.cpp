@@ -62,8 +62,8 @@ Filled filledMesh(Mesh outward, const LevelSet& levelSet) {
     FilledMesh filled = fillHoles(std::move(outward), double(crackWidth * levelSet.voxelSize()));
     if (!filled.changed) return {std::move(filled.mesh), std::nullopt};
     LevelSet closed = build(filled.mesh, {.voxelSize = levelSet.voxelSize(),
-                                          .exteriorWidth = levelSet.exteriorWidth(),
-                                          .interiorWidth = levelSet.interiorWidth(),
+                                          .exteriorWidthVoxels = levelSet.exteriorWidth(),
+                                          .interiorWidthVoxels = levelSet.interiorWidth(),
                                           .bandUnit = BandUnit::world});
     filled.mesh = outwardMesh(closed, std::move(filled.mesh));
     return {std::move(filled.mesh), std::move(closed)};
@@ -89,7 +89,7 @@ Body makeBody(Mesh given, const LevelSet& levelSet, const ColliderOptions& optio
     auto mass = massOf(outward, levelSet);
     Filled filled = filledMesh(std::move(outward), levelSet);
     const auto mesh = std::make_shared<const Mesh>(std::move(filled.mesh));
-    return {.points = SurfacePoints(*mesh, options.pointSpacing * levelSet.voxelSize()),
+    return {.points = SurfacePoints(*mesh, options.pointSpacingVoxels * levelSet.voxelSize()),
             .bounds = bounds(*mesh),
             .margin = options.margin < 0 ? levelSet.voxelSize() : options.margin,
             .mass = std::move(mass),

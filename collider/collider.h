@@ -27,9 +27,9 @@ enum class ContactAccuracy {
 const char* nameOf(ContactAccuracy accuracy);
 
 struct ColliderOptions {
-    /// Distance between neighbouring surface points [voxels of the field]. A smaller spacing finds finer contacts and
+    /// Distance between neighbouring surface points, in voxels of the field. A smaller spacing finds finer contacts and
     /// costs more. Curved surfaces get denser points, which limits the penetration between points to 0.05 spacings.
-    float pointSpacing = 2.0f;
+    float pointSpacingVoxels = 2.0f;
     /// Contacts are created up to this separation [m], at most 1000 voxels. Negative: one voxel of the field.
     float margin = -1;
     /// ContactAccuracy::exactNearFeatures queries the triangles where samples are off by more than a tenth of a voxel

@@ -51,45 +51,39 @@ auto withThreads(int threads, const Work& work) {
 
 }  // namespace
 
-LevelSet build(const Mesh& mesh, const BuildOptions& given, const BlockFiller* filler, BuildTimes* times) {
-    const BuildOptions options = optionsInVoxels(given);
+LevelSet build(const Mesh& mesh, const BuildOptions& options, const BlockFiller* filler) {
     checkOptions(options);
     if (filler) refuseForDevices(options, *filler);
     if (!filler) refusePrism(options);
     openvdb::initialize();
-    BuildTimes ignored;
     return withThreads(options.threads, [&] {
-        FieldFiller field(mesh, options, filler, times ? *times : ignored);
+        FieldFiller field(mesh, options, filler);
         fillWhole(field);
         return field.levelSet();
     });
 }
 
 LevelSet rebuild(const LevelSet& old, const Mesh& oldMesh, const Mesh& newMesh, std::span<const std::uint32_t> moved,
-                 const BuildOptions& given, BuildTimes* times) {
-    const BuildOptions options = optionsInVoxels(given);
+                 const BuildOptions& options) {
     checkOptions(options);
     refusePrism(options);
-    BuildTimes ignored;
     return withThreads(options.threads, [&] {
-        FieldFiller field(newMesh, options, nullptr, times ? *times : ignored);
+        FieldFiller field(newMesh, options, nullptr);
         if (!updateField(field, old, oldMesh, moved)) fillWhole(field);
         return field.levelSet();
     });
 }
 
-LevelSet build(const Mesh& mesh, const BuildOptions& options, const BlockFiller& filler, BuildTimes* times) {
-    return build(mesh, options, &filler, times);
+LevelSet build(const Mesh& mesh, const BuildOptions& options, const BlockFiller& filler) {
+    return build(mesh, options, &filler);
 }
 
-void detail::fillOnly(const Mesh& mesh, const BuildOptions& given, const BlockFiller& filler) {
-    const BuildOptions options = optionsInVoxels(given);
+void detail::fillOnly(const Mesh& mesh, const BuildOptions& options, const BlockFiller& filler) {
     checkOptions(options);
     refuseForDevices(options, filler);
     openvdb::initialize();
-    BuildTimes ignored;
     withThreads(options.threads, [&] {
-        FieldFiller field(mesh, options, &filler, ignored);
+        FieldFiller field(mesh, options, &filler);
         fillWhole(field);
     });
 }

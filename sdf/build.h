@@ -29,24 +29,11 @@ struct BlockFiller {
     std::function<void(const detail::FillJob&)> fill;
 };
 
-/// Times of the phases of a build [s], and the count of blocks that it filled.
-struct BuildTimes {
-    double tiles = 0;     ///< sorting triangles into sample tiles, or choosing a sign method
-    double fill = 0;      ///< binning triangles into blocks, computing distances
-    double assemble = 0;  ///< building the tree, signs far from the surface, signs by winding number or flood
-    double total = 0;
-    /// Blocks of 8x8x8 voxels whose distances were computed. A block counts again for each sign method that is tried.
-    /// rebuild() copies all other blocks.
-    std::size_t filledBlocks = 0;
-};
-
 /// Builds the signed distance field of a mesh. The bytes of the result do not depend on the thread count.
 /// @param filler  the device that fills the blocks; null: the CPU, by TBB
-/// @param times   if not null, receives the times
 /// Throws std::invalid_argument that names the invalid option or triangle, Cancelled, and what the filler throws.
-LevelSet build(const Mesh& mesh, const BuildOptions& options, const BlockFiller* filler = nullptr,
-               BuildTimes* times = nullptr);
-LevelSet build(const Mesh& mesh, const BuildOptions& options, const BlockFiller& filler, BuildTimes* times = nullptr);
+LevelSet build(const Mesh& mesh, const BuildOptions& options, const BlockFiller* filler = nullptr);
+LevelSet build(const Mesh& mesh, const BuildOptions& options, const BlockFiller& filler);
 
 /// Updates the field of a mesh after some of its triangles have moved. Fills only the blocks within reach of the old or
 /// new positions of those triangles, and copies all others. The bytes equal those of build(newMesh, options).
@@ -68,7 +55,7 @@ LevelSet build(const Mesh& mesh, const BuildOptions& options, const BlockFiller&
 /// - an index is out of range;
 /// - a triangle has moved but is not in `moved` (the error names the first one).
 LevelSet rebuild(const LevelSet& old, const Mesh& oldMesh, const Mesh& newMesh, std::span<const std::uint32_t> moved,
-                 const BuildOptions& options, BuildTimes* times = nullptr);
+                 const BuildOptions& options);
 
 /// Returns the voxel size that puts `resolution` voxels along the longest side of the mesh's bounds [m]. Throws
 /// std::invalid_argument for a resolution that is not positive or a mesh without extent.

@@ -17,6 +17,8 @@ struct Grids {
     openvdb::Int32Grid::ConstPtr triangle;
     /// Surface points of a collider (collider/collider.h); null for a field without them.
     openvdb::GridBase::ConstPtr points = nullptr;
+    /// Of the build that made the field; zeros for a field from a file.
+    BuildTimes times{};
 };
 
 /// Grid name of a collider's surface points.

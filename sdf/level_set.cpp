@@ -147,6 +147,9 @@ std::uint64_t LevelSet::signConflicts() const {
 float LevelSet::errorBound() const {
     return errorBound_;
 }
+const BuildTimes& LevelSet::buildTimes() const {
+    return grids_->times;
+}
 std::uint64_t LevelSet::meshHash() const {
     return meshHash_;
 }

@@ -2,6 +2,7 @@
 // Tested by tests/sdf/build.cpp.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <glm/vec3.hpp>
 #include <memory>
@@ -10,6 +11,17 @@
 namespace bilayer {
 
 struct Grids;
+
+/// Times of the phases of a build [s], and the count of blocks that it filled.
+struct BuildTimes {
+    double tiles = 0;     ///< sorting triangles into sample tiles, or choosing a sign method
+    double fill = 0;      ///< binning triangles into blocks, computing distances
+    double assemble = 0;  ///< building the tree, signs far from the surface, signs by winding number or flood
+    double total = 0;
+    /// Blocks of 8x8x8 voxels whose distances were computed. A block counts again for each sign method that is tried.
+    /// rebuild() copies all other blocks.
+    std::size_t filledBlocks = 0;
+};
 
 /// An immutable narrow-band signed distance field, cheap to copy and safe to share between threads. Distances are
 /// negative inside, in world units. Voxel centres lie at integer index coordinates times the voxel size.
@@ -39,6 +51,8 @@ class LevelSet {
     std::uint64_t signConflicts() const;    ///< count of voxels and neighbour pairs whose normals disagree
     /// Maximum error of the distances at active voxels [m]; infinity: not bounded; NaN: unknown.
     float errorBound() const;
+    /// Times of the build that made the field; zeros for a field from a file.
+    const BuildTimes& buildTimes() const;
     std::uint64_t meshHash() const;  ///< hash() of the source mesh, or 0
     const Grids& grids() const { return *grids_; }
 

@@ -25,11 +25,14 @@ Mesh readByEnding(const std::filesystem::path& path, ReadReport& report) {
 
 }  // namespace
 
-Mesh readMesh(const std::filesystem::path& path, ReadReport* report) {
-    ReadReport mine;
-    Mesh mesh = readByEnding(path, mine);
-    if (report) *report = std::move(mine);
-    return mesh;
+MeshFile readMeshFile(const std::filesystem::path& path) {
+    MeshFile file;
+    file.mesh = readByEnding(path, file.report);
+    return file;
+}
+
+Mesh readMesh(const std::filesystem::path& path) {
+    return readMeshFile(path).mesh;
 }
 
 }  // namespace bilayer

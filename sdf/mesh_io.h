@@ -22,16 +22,22 @@ struct ReadReport {
     std::vector<std::string> notes;
 };
 
+/// A mesh and what its file contains.
+struct MeshFile {
+    Mesh mesh;
+    ReadReport report;
+};
+
 /// Reads a mesh from OBJ, PLY, STL, OFF, glTF or any other format that Assimp supports. The file extension selects the
 /// format.
 ///
 /// Joins all meshes of the scene under their node transforms, triangulates polygons and welds the result (see weld()).
 /// Coordinates are read in double precision. A mesh farther from the world origin than 1000 times its size is moved
 /// near to it, and Mesh::origin stores the shift.
-/// @param report  if not null, receives the contents of the file
 /// Throws std::runtime_error if the file cannot be read or holds no triangle. The error names the file and, where
 /// known, the line and its text. Throws std::invalid_argument for coordinates that are not finite.
-Mesh readMesh(const std::filesystem::path& path, ReadReport* report = nullptr);
+Mesh readMesh(const std::filesystem::path& path);
+MeshFile readMeshFile(const std::filesystem::path& path);
 
 /// Writes a mesh in world coordinates as .obj, binary .ply or binary .stl. An error leaves no partial file. Coordinates
 /// are floats. A mesh with an origin has doubles in .obj and .ply, and rounded floats in .stl.

@@ -43,13 +43,7 @@ enum class Sign {
     automatic,  ///< normals if the mesh is closed and oriented, else the method that suits the mesh
     normals,    ///< angle-weighted pseudonormal of the closest feature; flips inside-out components first
     winding,    ///< inside: generalized winding number above one half
-    flood,      ///< inside: not reachable from outside through gaps wider than `gap`
-};
-
-/// Unit of the band widths.
-enum class BandUnit {
-    voxels,
-    world,  ///< metres: the band has the same world width at any voxel size
+    flood,      ///< inside: not reachable from outside through gaps wider than `gapVoxels`
 };
 
 struct BuildOptions {
@@ -57,12 +51,12 @@ struct BuildOptions {
     /// to millimetres.
     float voxelSize = 0;
     // Build time grows with the cube of the width in voxels: hundreds of voxels take minutes.
-    float exteriorWidth = 3;  ///< voxels with 0 <= distance < this are active [bandUnit], in (0, 1000] voxels
-    float interiorWidth = 3;  ///< voxels with -this < distance < 0 are active [bandUnit], in (0, 1000] voxels
-    BandUnit bandUnit = BandUnit::voxels;
+    // Divide a width in metres by voxelSize.
+    float exteriorWidthVoxels = 3;  ///< voxels with 0 <= distance < this are active, in (0, 1000]
+    float interiorWidthVoxels = 3;  ///< voxels with -this < distance < 0 are active, in (0, 1000]
     Method method = Method::exact;
     Sign sign = Sign::automatic;
-    float gap = 2;  ///< Sign::flood closes gaps up to this width [voxels], in [0, 100]
+    float gapVoxels = 2;  ///< Sign::flood closes gaps up to this width, in [0, 100]
     /// true: builds the union of overlapping solids. Walls inside the union are ignored, distances inside refer to
     /// the union's outer surface, and winding numbers give the signs. Triangle indices then refer to the mesh with its
     /// outward orientation.

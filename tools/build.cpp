@@ -29,7 +29,6 @@ namespace {
 // The words are part of the command line's contract.
 const std::map<std::string, Method> methods(methodNames.begin(), methodNames.end());
 const std::map<std::string, Sign> signs(signNames.begin(), signNames.end());
-const std::map<std::string, BandUnit> bandUnits{{"voxels", BandUnit::voxels}, {"world", BandUnit::world}};
 const std::map<std::string, ContactAccuracy> measures{
     {nameOf(ContactAccuracy::samples), ContactAccuracy::samples},
     {nameOf(ContactAccuracy::exactNearFeatures), ContactAccuracy::exactNearFeatures},
@@ -43,7 +42,7 @@ struct BuildArguments {
     std::filesystem::path mesh, output;
     BuildOptions options;
     float resolution = 0;
-    float halfWidth = 3;
+    float halfWidth = 3, exteriorWidth = 3, interiorWidth = 3;  // [bandUnit]
     std::string bandUnit = "voxels", method = nameOf(BuildOptions().method), backend = "tbb",
                 sign = nameOf(BuildOptions().sign), device, mapping = "auto",
                 contacts = nameOf(ColliderOptions().accuracy);
@@ -56,6 +55,8 @@ struct BuildArguments {
     std::vector<CLI::Option*> bodyOptions;
     CLI::Option *deviceGiven = nullptr, *memoryGiven = nullptr, *mappingGiven = nullptr;
     std::vector<CLI::Option*> layerOptions;  // options that only the double layer method supports
+
+    bool isBandInWorldUnits() const { return bandUnit == "world"; }
 };
 
 struct Outcome {
@@ -85,7 +86,7 @@ void requireUsage(const BuildArguments& a) {
         throw CLI::ValidationError("--gap", "needs --sign flood or auto, and --method exact or pseudonormal");
     if (a.options.unite && (layers || prism || sign == Sign::flood))
         throw CLI::ValidationError("--union", "needs --method exact or pseudonormal, and no --sign flood");
-    if (a.options.bandUnit == BandUnit::world && !a.halfGiven->count() && !a.exteriorGiven->count())
+    if (a.isBandInWorldUnits() && !a.halfGiven->count() && !a.exteriorGiven->count())
         throw CLI::ValidationError("--band-unit", "world needs --half-width, or --exterior-width and --interior-width");
     for (const CLI::Option* option : a.bodyOptions)
         if (!a.body && option->count()) throw CLI::ValidationError(option->get_name(), "needs --body");
@@ -94,7 +95,7 @@ void requireUsage(const BuildArguments& a) {
 
 // The API's range is (0, 1000] voxels too, but this message names the option.
 void requireWidth(const CLI::Option* option, float width, const BuildArguments& a) {
-    const bool world = a.options.bandUnit == BandUnit::world;
+    const bool world = a.isBandInWorldUnits();
     const double voxels = double(width) / (world ? double(a.options.voxelSize) : 1);
     if (option->count() && !(voxels >= thinnestBand && voxels <= widestBand))
         throw CLI::ValidationError(
@@ -106,8 +107,8 @@ void requireWidth(const CLI::Option* option, float width, const BuildArguments& 
 
 void requireBand(const BuildArguments& a) {
     requireWidth(a.halfGiven, a.halfWidth, a);
-    requireWidth(a.exteriorGiven, a.options.exteriorWidth, a);
-    requireWidth(a.interiorGiven, a.options.interiorWidth, a);
+    requireWidth(a.exteriorGiven, a.exteriorWidth, a);
+    requireWidth(a.interiorGiven, a.interiorWidth, a);
 }
 
 // Returns nothing for the CPU backend.
@@ -125,12 +126,13 @@ LevelSet timedBuild(const Mesh& mesh, const BuildArguments& a, Outcome& outcome)
     const Stopwatch watch;
     LevelSet field = [&] {
         try {
-            return build(mesh, options, filler ? &*filler : nullptr, &outcome.times);
+            return build(mesh, options, filler ? &*filler : nullptr);
         } catch (const std::invalid_argument& error) {
             throw std::invalid_argument(fmt::format("{}: {}", a.mesh.string(), error.what()));
         }
     }();
     outcome.build = watch.seconds();
+    outcome.times = field.buildTimes();
     return field;
 }
 
@@ -149,8 +151,8 @@ void printJson(const BuildArguments& a, const Outcome& o, const Mesh& mesh, cons
               {"triangles", mesh.triangles.size()},
               {"voxelSize", number(field.voxelSize())},
               {"bandUnit", a.bandUnit},
-              {"exteriorWidth", number(a.options.exteriorWidth)},
-              {"interiorWidth", number(a.options.interiorWidth)},
+              {"exteriorWidth", number(a.exteriorWidth)},
+              {"interiorWidth", number(a.interiorWidth)},
               {"activeVoxels", field.activeVoxels()},
               {"leaves", field.leaves()},
               {"memoryBytes", field.memoryBytes()},
@@ -190,12 +192,11 @@ void printTable(const BuildArguments& a, const Outcome& o, const Mesh& mesh, con
 }
 
 void run(BuildArguments a) {
-    a.options.bandUnit = bandUnits.at(a.bandUnit);
     a.options.method = methods.at(a.method);
     a.options.sign = signs.at(a.sign);
     requireUsage(a);
     // widths in the mesh's unit are checked once the voxel size is known
-    if (a.options.bandUnit == BandUnit::voxels || !a.resolutionGiven->count()) requireBand(a);
+    if (!a.isBandInWorldUnits() || !a.resolutionGiven->count()) requireBand(a);
     a.collider.accuracy = a.noMesh ? ContactAccuracy::samples : measures.at(a.contacts);
     std::optional<tbb::global_control> threads;
     if (a.options.threads > 0)
@@ -203,14 +204,18 @@ void run(BuildArguments a) {
 
     Outcome outcome;
     const Stopwatch reading;
-    const Mesh mesh = readMesh(a.mesh, &outcome.file);
+    const auto [mesh, contents] = readMeshFile(a.mesh);
+    outcome.file = contents;
     outcome.read = reading.seconds();
     requireWritable(a.output);
     if (a.resolutionGiven->count()) {
         a.options.voxelSize = voxelSizeFor(mesh, a.resolution);
         requireBand(a);
     }
-    if (!a.exteriorGiven->count()) a.options.exteriorWidth = a.options.interiorWidth = a.halfWidth;
+    if (!a.exteriorGiven->count()) a.exteriorWidth = a.interiorWidth = a.halfWidth;
+    const float unit = a.isBandInWorldUnits() ? a.options.voxelSize : 1;
+    a.options.exteriorWidthVoxels = a.exteriorWidth / unit;
+    a.options.interiorWidthVoxels = a.interiorWidth / unit;
 
     const Stopwatch inspecting;
     if (a.report)
@@ -243,15 +248,15 @@ void addBand(CLI::App& command, BuildArguments& a) {
             .add_option("--half-width", a.halfWidth, "width of the band on each side of the surface, default 3 voxels")
             ->check(positive());
     a.exteriorGiven =
-        command.add_option("--exterior-width", a.options.exteriorWidth, "width of the band outside")->check(positive());
+        command.add_option("--exterior-width", a.exteriorWidth, "width of the band outside")->check(positive());
     a.interiorGiven =
-        command.add_option("--interior-width", a.options.interiorWidth, "width of the band inside")->check(positive());
+        command.add_option("--interior-width", a.interiorWidth, "width of the band inside")->check(positive());
     a.exteriorGiven->needs(a.interiorGiven)->excludes(a.halfGiven);
     a.interiorGiven->needs(a.exteriorGiven)->excludes(a.halfGiven);
     command
         .add_option("--band-unit", a.bandUnit,
                     "unit of the three widths: voxels (default) or world, the mesh's unit; both 0.001 to 1000 voxels")
-        ->check(CLI::IsMember(bandUnits));
+        ->check(CLI::IsMember({"voxels", "world"}));
 }
 
 void addMethod(CLI::App& command, BuildArguments& a) {
@@ -261,10 +266,10 @@ void addMethod(CLI::App& command, BuildArguments& a) {
         ->check(CLI::IsMember(methods));
     command.add_option("--sign", a.sign, "auto (default), normals, winding or flood")->check(CLI::IsMember(signs));
     command.add_flag("--union", a.options.unite, "build the union of overlapping solids, without the walls inside it");
-    a.gapGiven =
-        command
-            .add_option("--gap", a.options.gap, "maximum width of gaps that --sign flood closes [voxels], default 2")
-            ->check(within(0, 100));
+    a.gapGiven = command
+                     .add_option("--gap", a.options.gapVoxels,
+                                 "maximum width of gaps that --sign flood closes [voxels], default 2")
+                     ->check(within(0, 100));
 }
 
 void addLayers(CLI::App& command, BuildArguments& a) {
@@ -297,7 +302,9 @@ void addBody(CLI::App& command, BuildArguments& a) {
     a.bodyOptions = {
         group->add_option("--margin", a.collider.margin, "collision margin in the mesh's unit, default a voxel")
             ->check(positive()),
-        group->add_option("--point-spacing", a.collider.pointSpacing, "spacing of surface points [voxels], default 2")
+        group
+            ->add_option("--point-spacing", a.collider.pointSpacingVoxels,
+                         "spacing of surface points [voxels], default 2")
             ->check(within(0.1, 100)),
         contacts, noMesh->excludes(contacts)};
 }

@@ -54,8 +54,8 @@ std::optional<MassProperties> massOf(const Solid& solid) {
 Json settingsJson(const bullet::Settings& settings) {
     return {{"voxelSize", number(settings.voxelSize)},
             {"margin", number(settings.margin)},
-            {"exteriorWidth", settings.exteriorWidth},
-            {"interiorWidth", settings.interiorWidth},
+            {"exteriorWidth", settings.exteriorWidthVoxels},
+            {"interiorWidth", settings.interiorWidthVoxels},
             {"substeps", settings.substeps},
             {"substepsWithoutSweeps", settings.substepsWithoutSpeculation},
             {"wallVoxels", number(settings.wallVoxels)},
@@ -69,9 +69,9 @@ Json settingsJson(const bullet::Settings& settings) {
 void printSettings(const InspectArguments& a, const bullet::Settings& settings) {
     Table table(fmt::format("recommended settings: impact speeds up to {:g} m/s, steps of {:.4g} s", a.scene.speed,
                             a.scene.step));
-    table.row("build",
-              fmt::format("--voxel-size {:.4g} --exterior-width {} --interior-width {} --body --margin {:.4g}",
-                          settings.voxelSize, settings.exteriorWidth, settings.interiorWidth, settings.margin));
+    table.row("build", fmt::format("--voxel-size {:.4g} --exterior-width {} --interior-width {} --body --margin {:.4g}",
+                                   settings.voxelSize, settings.exteriorWidthVoxels, settings.interiorWidthVoxels,
+                                   settings.margin));
     if (settings.wallVoxels > 0) table.row("walls", fmt::format("{:.3g} voxels", settings.wallVoxels));
     const auto text = [](int substeps) {
         return fmt::format("{}{}", substeps, substeps < bullet::maxSubsteps ? "" : " or more");
@@ -86,8 +86,7 @@ void printSettings(const InspectArguments& a, const bullet::Settings& settings) 
 }
 
 void runInspect(const InspectArguments& a) {
-    ReadReport read;
-    const Mesh mesh = readMesh(a.input, &read);
+    const auto [mesh, read] = readMeshFile(a.input);
     const MeshReport report = inspect(mesh);
     const auto settings =
         a.stepGiven->count() ? std::optional(bullet::recommendSettings(report, a.scene)) : std::nullopt;

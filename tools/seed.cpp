@@ -85,7 +85,8 @@ glm::dvec3 remainder(const SeedArguments& a, const fluid::Placement& placement) 
 
 Input read(const std::filesystem::path& path, const glm::dvec3& moved, ReadReport& file) {
     if (isVdb(path)) return readVdb(path);
-    Mesh mesh = readMesh(path, &file);
+    auto [mesh, contents] = readMeshFile(path);
+    file = std::move(contents);
     if (mesh.origin != glm::dvec3(0)) mesh.origin += moved;
     return mesh;
 }

@@ -197,7 +197,8 @@ json measureWalls(const Run&) {
                         if (truth.distance(point) > wallBand || truth.distance(point) < 1e-4) continue;
                         voxels.push_back({{x, y, z}, truth.signedDistance(point)});
                     }
-            BuildOptions options{.voxelSize = 1, .exteriorWidth = wallHalfWidth, .interiorWidth = wallHalfWidth};
+            BuildOptions options{
+                .voxelSize = 1, .exteriorWidthVoxels = wallHalfWidth, .interiorWidthVoxels = wallHalfWidth};
             judge(*build(mesh, options).grids().distance, voxels, exact);
             options.method = Method::doubleLayer;
             judge(*build(mesh, options).grids().distance, voxels, layers);

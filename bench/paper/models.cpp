@@ -85,7 +85,7 @@ Mesh unevenSphere(double areaVariance, const Lattice& lattice) {
 BuildOptions optionsFor(const Lattice& lattice, Method method, float halfWidth, int threads) {
     BuildOptions options;
     options.voxelSize = lattice.step;
-    options.exteriorWidth = options.interiorWidth = halfWidth;
+    options.exteriorWidthVoxels = options.interiorWidthVoxels = halfWidth;
     options.method = method;
     options.threads = threads;
     return options;

@@ -117,7 +117,7 @@ ResidentFill::ResidentFill(const Device& device, const OpenclOptions& options, D
       memory_(memory),
       job_(job),
       gpuMapping_(wantsGroups(device_, options.mapping)),
-      widths_{job.options.exteriorWidth, job.options.interiorWidth, job.mesh.voxelSize},
+      widths_{job.options.exteriorWidthVoxels, job.options.interiorWidthVoxels, job.mesh.voxelSize},
       timing_(options.profile),
       program_(buildProgram(device_, resident_cl, commonBuildOptions(device_, gpuMapping_))),
       summary_(memory.allocate(sizeof(Summary), purpose)),

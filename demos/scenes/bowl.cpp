@@ -58,9 +58,9 @@ constexpr std::uint32_t colours[] = {0xe07a5f, 0xf2cc8f, 0x81b29a, 0xf4f1de, 0x9
 
 std::shared_ptr<const Thing> bodyOf(const Kind& kind, float resolution) {
     const glm::mat4 toSize = glm::scale(glm::mat4(1), glm::vec3(bodySize / bounds(kind.mesh).longestSide()));
-    return makeThing(
-        transformed(kind.mesh, toSize),
-        {.voxelSize = bodySize / resolution, .interiorWidth = bodyInteriorWidth, .restingFriction = restingFriction});
+    return makeThing(transformed(kind.mesh, toSize), {.voxelSize = bodySize / resolution,
+                                                      .interiorWidthVoxels = bodyInteriorWidth,
+                                                      .restingFriction = restingFriction});
 }
 
 // Returns the max distance of the surface from a point [m].

@@ -92,7 +92,7 @@ struct Knot {
     Pose poseAt(double time) const { return {centre, glm::angleAxis(float(turn * turns * time), glm::vec3(0, 0, 1))}; }
     fluid::Solid at(double time, const Tank& tank) const {
         return fluid::solid(mesh, poseAt(time), *tank.transform,
-                            {.velocity = {{}, {0, 0, float(turn * turns)}}, .halfWidth = skin});
+                            {.velocity = {{}, {0, 0, float(turn * turns)}}, .halfWidthVoxels = skin});
     }
     // Returns the distance to the knot, negative inside; far away it is a bound [m].
     double from(const glm::vec3& point, const Pose& pose) const {

@@ -174,7 +174,8 @@ class Maker {
         constexpr float factor = 2.5f;
         const Mesh small = shapes::box(s_ / factor * halfBox, 4);
         const float fine = s_ / factor * voxel;
-        const auto collider = std::make_shared<Collider>(small, build(small, {.voxelSize = fine, .interiorWidth = 6}));
+        const auto collider =
+            std::make_shared<Collider>(small, build(small, {.voxelSize = fine, .interiorWidthVoxels = 6}));
         const auto shape = std::make_shared<bullet::Shape>(collider);
         shape->setLocalScaling({factor, factor, factor});
         Part scaled = part("field, scaled,", shapes::box(s_ * halfBox), shape, halfBox.z);

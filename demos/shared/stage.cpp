@@ -43,7 +43,7 @@ std::string grouped(std::uint64_t count) {
 std::shared_ptr<const Thing> makeThing(Mesh mesh, const ThingOptions& options) {
     BuildOptions band;
     band.voxelSize = options.voxelSize;
-    band.interiorWidth = options.interiorWidth;
+    band.interiorWidthVoxels = options.interiorWidthVoxels;
     LevelSet field = build(mesh, band);
     auto collider = std::make_shared<Collider>(mesh, field, ColliderOptions{.accuracy = options.accuracy});
     const bullet::ShapeOptions centred{.frame = bullet::centreOfMassFrame(*collider),

@@ -17,10 +17,10 @@
 namespace bilayer::demo {
 
 struct ThingOptions {
-    float voxelSize;          ///< [m]
-    float interiorWidth = 6;  ///< of the band; bodies that penetrate deeper are not detected [voxels]
-    float margin = -1;        ///< contact margin [m]; negative: one voxel
-    bool speculative = true;  ///< speculative contacts for fast bodies (see bullet::ShapeOptions)
+    float voxelSize;                ///< [m]
+    float interiorWidthVoxels = 6;  ///< of the band; bodies that penetrate deeper are not detected [voxels]
+    float margin = -1;              ///< contact margin [m]; negative: one voxel
+    bool speculative = true;        ///< speculative contacts for fast bodies (see bullet::ShapeOptions)
     ContactAccuracy accuracy = ContactAccuracy::exactNearFeatures;  ///< of contacts
     float restingFriction = 1;                                      ///< see bullet::ShapeOptions
 };

@@ -80,10 +80,10 @@ float chosenVoxel(const SceneRequirements& scene, float longestSide, float wall)
 // surface, so that walls thinner than a leaf need as little as half of the memory.
 void estimate(const MeshReport& mesh, Settings& advice) {
     const double h = advice.voxelSize, area = mesh.area / (h * h), volume = std::abs(mesh.volume) / (h * h * h);
-    double inside = area * advice.interiorWidth;
+    double inside = area * advice.interiorWidthVoxels;
     if (mesh.closed()) inside = std::min(inside, volume);
-    const double voxels = area * advice.exteriorWidth + inside;
-    const double blocks = area * (advice.exteriorWidth + advice.interiorWidth + blockWidth) / blockVoxels;
+    const double voxels = area * advice.exteriorWidthVoxels + inside;
+    const double blocks = area * (advice.exteriorWidthVoxels + advice.interiorWidthVoxels + blockWidth) / blockVoxels;
     advice.voxels = std::uint64_t(voxels);
     advice.fieldBytes = std::uint64_t(blocks * blockBytes);
     advice.buildSeconds = secondsPerTriangle * double(mesh.triangles) + secondsPerVoxel * voxels;
@@ -164,8 +164,8 @@ Settings recommendSettings(const MeshReport& mesh, const SceneRequirements& scen
     advice.substeps = std::max(1, wholeFrom(spin * scene.step / straightTurn));
     const float deepest = wallPart * (wall > 0 ? wall : longestSide);
     advice.substepsWithoutSpeculation = std::max(advice.substeps, wholeFrom(stepLength / deepest));
-    advice.exteriorWidth = std::max(1, wholeFrom(advice.margin / h + cellDiagonal));
-    advice.interiorWidth =
+    advice.exteriorWidthVoxels = std::max(1, wholeFrom(advice.margin / h + cellDiagonal));
+    advice.interiorWidthVoxels =
         std::clamp(wholeFrom(stepLength / (float(advice.substeps) * h) + cellDiagonal), minInterior, maxInterior);
     estimate(mesh, advice);
 

@@ -28,8 +28,8 @@ inline constexpr int maxSubsteps = 1'000'000;  ///< upper limit, which also stan
 struct Settings {
     float voxelSize = 0;                 ///< [m]
     float margin = 0;                    ///< ColliderOptions::margin [m]
-    int exteriorWidth = 0;               ///< [voxels]
-    int interiorWidth = 0;               ///< [voxels]
+    float exteriorWidthVoxels = 0;       ///< a whole number
+    float interiorWidthVoxels = 0;       ///< a whole number
     int substeps = 1;                    ///< substeps of a step, with ShapeOptions::speculative; at most maxSubsteps
     int substepsWithoutSpeculation = 1;  ///< substeps without speculative contacts
     /// the thinner of SceneRequirements::thickness and MeshReport::commonWall [voxels]; 0: unknown

@@ -176,7 +176,7 @@ void check(const SolidOptions& options, const Transform& cells) {
     }
     const float lengths = glm::length(options.velocity.linear) + glm::length(options.velocity.angular);
     if (!std::isfinite(lengths)) throw std::invalid_argument("solid: the velocity is not finite");
-    if (!(options.halfWidth >= minHalfWidth && options.halfWidth <= maxHalfWidth))
+    if (!(options.halfWidthVoxels >= minHalfWidth && options.halfWidthVoxels <= maxHalfWidth))
         throw std::invalid_argument("solid: the half width must be in 3..1000 voxels");
 }
 
@@ -185,7 +185,7 @@ Solid solidOf(const Body& body, const Placement& placement, const Transform& cel
     check(options, cells);
     const float voxel = float(cells.voxelSize()[0]);
     Solid solid;
-    solid.distance = regrid(body, placement, cells, options.halfWidth * voxel);
+    solid.distance = regrid(body, placement, cells, options.halfWidthVoxels * voxel);
     solid.distance->setName("solid");
     addFluidFractions(solid, *regrid(body, placement, *cornersOf(cells), minHalfWidth * voxel), cells);
     addVelocity(solid, options.velocity, placement.pose.position);

@@ -27,7 +27,7 @@ struct Solid {
 
 struct SolidOptions {
     Velocity velocity{};
-    float halfWidth = 3;  ///< half width of `distance` and `velocity` [voxels], at least 3
+    float halfWidthVoxels = 3;  ///< half width of `distance` and `velocity`, at least 3
 };
 
 /// Computes the obstacle data of a body. Fluid fractions follow from the distances at the cells' corners, linear

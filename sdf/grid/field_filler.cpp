@@ -45,9 +45,8 @@ Assembler::Plain plainBlocks(const BuildOptions& options, Sign sign) {
 
 }  // namespace
 
-FieldFiller::FieldFiller(const Mesh& mesh, const BuildOptions& options, const BlockFiller* device, BuildTimes& times)
-    : mesh_(mesh), options_(options), device_(device), times_(times), progress_(options.progress) {
-    times_ = {};
+FieldFiller::FieldFiller(const Mesh& mesh, const BuildOptions& options, const BlockFiller* device)
+    : mesh_(mesh), options_(options), device_(device), progress_(options.progress) {
     progress_.poll();
     validate(mesh_);
     progress_.poll();
@@ -128,7 +127,7 @@ void FieldFiller::fillFrom(const Mesh& mesh, const Mesh& solids, Sign sign, cons
     finish(assembler);
     progress_.poll();
     if (sign == Sign::winding) signByWinding(*distance_, solids, widths, balanced(solids, &progress_), &progress_);
-    if (sign == Sign::flood) signByFlood(*distance_, mesh, options_.gap, widths, &progress_);
+    if (sign == Sign::flood) signByFlood(*distance_, mesh, options_.gapVoxels, widths, &progress_);
     if (byNormals) conflicts += assembler.conflicts(*distance_);
     signs_ = {nameOf(sign), reason, conflicts, undecided};
     const bool isKnownToBeClean = options_.inspected && options_.inspected->selfIntersections == 0;
@@ -189,12 +188,12 @@ LevelSet FieldFiller::levelSet() {
         triangle_->setTransform(distance_->transformPtr());
         grids->triangle = triangle_;
     }
-    LevelSet result(std::move(grids));
     progress_.finish();
     times_.assemble += part.lap();
     times_.total = total_.lap();
     times_.filledBlocks = filledBlocks_;
-    return result;
+    grids->times = times_;
+    return LevelSet(std::move(grids));
 }
 
 }  // namespace bilayer::detail

@@ -25,11 +25,10 @@ namespace bilayer::detail {
 /// Fills the field of a mesh.
 class FieldFiller {
   public:
-    /// @param options  valid, with widths in voxels
+    /// @param options  valid
     /// @param device   fills the blocks; null: the CPU
-    /// @param times    receives the times of the phases
     /// Throws as validate() and checkSize() do. The arguments must outlive the filler.
-    FieldFiller(const Mesh& mesh, const BuildOptions& options, const BlockFiller* device, BuildTimes& times);
+    FieldFiller(const Mesh& mesh, const BuildOptions& options, const BlockFiller* device);
 
     /// Fills by a method that finds signs itself.
     void fillWithOwnSigns();
@@ -68,7 +67,7 @@ class FieldFiller {
     const Mesh& mesh_;
     const BuildOptions& options_;
     const BlockFiller* device_;
-    BuildTimes& times_;
+    BuildTimes times_;
     Stopwatch total_;
     Progress progress_;
     MeshExtent extent_;

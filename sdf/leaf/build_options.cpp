@@ -47,16 +47,6 @@ void checkVoxelSize(float voxelSize) {
 
 }  // namespace
 
-BuildOptions optionsInVoxels(BuildOptions options) {
-    if (options.bandUnit == BandUnit::world) {
-        require(options.voxelSize > 0, "voxelSize", "a positive length", options.voxelSize);
-        options.exteriorWidth /= options.voxelSize;
-        options.interiorWidth /= options.voxelSize;
-        options.bandUnit = BandUnit::voxels;
-    }
-    return options;
-}
-
 void checkOptions(const BuildOptions& options) {
     // Comparison in the type of the value, so that 1e-4f passes a limit of 1e-4f; false for NaN.
     const auto within = [](auto value, decltype(value) low, decltype(value) high) {
@@ -66,9 +56,9 @@ void checkOptions(const BuildOptions& options) {
     require(options.voxelSize > 0 && std::isnormal(options.voxelSize), "voxelSize", "a positive length",
             options.voxelSize);
     checkVoxelSize(options.voxelSize);
-    checkWidth("exteriorWidth", options.exteriorWidth, options.voxelSize);
-    checkWidth("interiorWidth", options.interiorWidth, options.voxelSize);
-    require(within(options.gap, 0, 100), "gap", "in 0..100 voxels", options.gap);
+    checkWidth("exteriorWidthVoxels", options.exteriorWidthVoxels, options.voxelSize);
+    checkWidth("interiorWidthVoxels", options.interiorWidthVoxels, options.voxelSize);
+    require(within(options.gapVoxels, 0, 100), "gapVoxels", "in 0..100", options.gapVoxels);
     require(layers.delta >= minDelta && layers.delta <= 4, "delta", "in [0.1, 4] voxels", layers.delta);
     require(within(layers.epsilon, 1e-4f, 1e4f), "epsilon", "in 1e-4..1e4 square voxels", layers.epsilon);
     require(within(layers.neighbourhood, 1, 64), "neighbourhood", "in 1..64", layers.neighbourhood);
@@ -84,18 +74,18 @@ bool hasOwnSigns(Method method) {
 }
 
 BandWidths bandOf(const BuildOptions& options) {
-    return {options.exteriorWidth, options.interiorWidth, options.voxelSize};
+    return {options.exteriorWidthVoxels, options.interiorWidthVoxels, options.voxelSize};
 }
 
 bool enclosesSurface(const BuildOptions& options) {
-    return std::min(options.exteriorWidth, options.interiorWidth) > 1 + reachSlack;
+    return std::min(options.exteriorWidthVoxels, options.interiorWidthVoxels) > 1 + reachSlack;
 }
 
 // Distances up to one voxel are computed even for thinner bands, because sign propagation needs them. A flood needs
 // distances up to the radius of its ball.
 float reachOf(const BuildOptions& options, Sign sign) {
-    const float ball = sign == Sign::flood ? options.gap / 2 + 1 : 1;
-    return std::max({options.exteriorWidth, options.interiorWidth, ball}) + reachSlack;
+    const float ball = sign == Sign::flood ? options.gapVoxels / 2 + 1 : 1;
+    return std::max({options.exteriorWidthVoxels, options.interiorWidthVoxels, ball}) + reachSlack;
 }
 
 // A sample must reach every voxel whose distance it may determine. A voxel of the band is within width + delta of its
@@ -105,7 +95,7 @@ FillParameters fillParameters(const BuildOptions& options) {
     const float cube = float(layers.neighbourhood) + 0.5f;
     if (!layers.fillGaps)
         return {layers.delta, cube, std::numeric_limits<float>::infinity(), layers.neighbourhood, options.triangles};
-    const float width = std::max(options.exteriorWidth, options.interiorWidth);
+    const float width = std::max(options.exteriorWidthVoxels, options.interiorWidthVoxels);
     const float reach = std::max(width + 2 * layers.delta, cube) + reachSlack;
     return {layers.delta, reach, reach - layers.delta, 0, options.triangles};
 }

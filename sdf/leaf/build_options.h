@@ -7,10 +7,7 @@
 
 namespace bilayer::detail {
 
-/// Returns the options with widths in voxels.
-BuildOptions optionsInVoxels(BuildOptions options);
-
-/// Throws std::invalid_argument that names an option out of range. The widths must be in voxels, here and below.
+/// Throws std::invalid_argument that names an option out of range.
 void checkOptions(const BuildOptions& options);
 
 /// Returns whether a method finds signs itself, without a sign method.

@@ -58,7 +58,7 @@ Counts compare(const Mesh& input, int nodes, const DenseOptions& options) {
     high.half = halfOfBlocks + halfError;
     const DenseField one = denseDoubleLayer(mesh, lattice, low), other = denseDoubleLayer(mesh, lattice, high);
 
-    BuildOptions blocks{.voxelSize = lattice.step, .exteriorWidth = width, .interiorWidth = width};
+    BuildOptions blocks{.voxelSize = lattice.step, .exteriorWidthVoxels = width, .interiorWidthVoxels = width};
     blocks.method = Method::doubleLayer;
     blocks.doubleLayer = {.delta = options.delta,
                           .epsilon = options.epsilon,

@@ -112,7 +112,7 @@ TEST_CASE("No body passes through a thin plate or gains energy, at any speed and
 TEST_CASE("A body stopped by a wall is not overrun by the next body") {
     const float radius = 0.2f;
     // points are followed from 0.25 voxels inside their body to 0.1 below the surface where they enter; and round
-    // bodies penetrate further between points (see ColliderOptions::pointSpacing)
+    // bodies penetrate further between points (see ColliderOptions::pointSpacingVoxels)
     const float deepest = 0.35f * h + 0.23f * 4 * h * h / radius;
     Shape ball(exactSphere(radius, h)), wall(exactBox({h, 1, 1}, h));
     const unsigned seed = test::seed();

@@ -171,7 +171,7 @@ TEST_CASE("a body with small holes in its base gains no energy on any ground") {
     Grounds grounds;
     for (const bool isOpen : {false, true}) {
         const Mesh mesh = stone(isOpen);
-        const LevelSet field = build(mesh, {.voxelSize = voxelSizeFor(mesh, 64), .interiorWidth = 6});
+        const LevelSet field = build(mesh, {.voxelSize = voxelSizeFor(mesh, 64), .interiorWidthVoxels = 6});
         CHECK(field.sign() == (isOpen ? "winding" : "normals"));
         const auto collider = std::make_shared<Collider>(mesh, field);
         for (int ground = 0; ground < 5; ++ground)
@@ -195,7 +195,7 @@ TEST_CASE("dirty meshes that are usable as bodies gain no energy on any ground")
         const auto path = corpusMesh(name);
         if (!path) return;
         const Mesh mesh = corpusBody(*path);
-        const LevelSet field = build(mesh, {.voxelSize = voxelSizeFor(mesh, 96), .interiorWidth = 6});
+        const LevelSet field = build(mesh, {.voxelSize = voxelSizeFor(mesh, 96), .interiorWidthVoxels = 6});
         const auto collider = std::make_shared<Collider>(mesh, field);
         for (int ground = 0; ground < 5; ++ground) {
             const Drop result = drop(collider, grounds[ground], 0.3f, {0.1f, -0.05f}, 2);

@@ -178,7 +178,7 @@ TEST_CASE("A field comes to rest on uneven ground, where each contact has a feat
     CAPTURE(asTerrain, interiorWidth);
     const Waves waves;
     const Mesh box = shapes::box({0.5f, 0.4f, 0.1f}, 3);
-    Shape shape(std::make_shared<Collider>(box, build(box, {.voxelSize = h, .interiorWidth = interiorWidth})));
+    Shape shape(std::make_shared<Collider>(box, build(box, {.voxelSize = h, .interiorWidthVoxels = interiorWidth})));
     World world;
     world.dynamics.getSolverInfo().m_solverMode |= SOLVER_USE_2_FRICTION_DIRECTIONS;
     world.dynamics.getSolverInfo().m_splitImpulsePenetrationThreshold = -h;

@@ -27,7 +27,7 @@ namespace {
 std::shared_ptr<const Collider> colliderOf(const Mesh& mesh, float voxels,
                                            ContactAccuracy measure = ContactAccuracy::exactNearFeatures) {
     const float voxel = voxelSizeFor(mesh, voxels);
-    return std::make_shared<Collider>(mesh, build(mesh, {.voxelSize = voxel, .interiorWidth = 5}),
+    return std::make_shared<Collider>(mesh, build(mesh, {.voxelSize = voxel, .interiorWidthVoxels = 5}),
                                       ColliderOptions{.accuracy = measure});
 }
 

@@ -39,7 +39,7 @@ TEST_CASE("A plate gets three voxels of its thickness") {
     CHECK(advice.wallVoxels == Approx(3));
     CHECK(advice.margin == advice.voxelSize);
     // one voxel of margin and a cell's diagonal
-    CHECK(advice.exteriorWidth == 3);
+    CHECK(advice.exteriorWidthVoxels == 3);
     CHECK(advice.splitImpulse == -advice.voxelSize);
     CHECK_FALSE(warnsOf(advice, "voxels thick"));
 }
@@ -89,12 +89,12 @@ TEST_CASE("Fast bodies get substeps or continuous collision recommended") {
     CHECK(fast.substeps == 1);
     CHECK(warnsOf(fast, "swept contacts"));
     CHECK(warnsOf(fast, "WorldExtensions"));
-    CHECK(fast.interiorWidth == 10);
+    CHECK(fast.interiorWidthVoxels == 10);
     // below the margin nothing tunnels
     const Settings slow = recommendSettings(plate(0.03f), {.speed = 0.5f});
     CHECK(slow.substepsWithoutSpeculation == 1);
     CHECK_FALSE(warnsOf(slow, "swept contacts"));
-    CHECK(slow.interiorWidth == 3);
+    CHECK(slow.interiorWidthVoxels == 3);
     // rotation curves the paths of points: at most half a radian per step
     CHECK(recommendSettings(plate(0.03f), {.speed = 1, .spin = 100}).substeps == 4);
     CHECK(recommendSettings(plate(0.03f), {.step = 1.f / 240, .speed = 1, .spin = 100}).substeps == 1);
@@ -123,8 +123,8 @@ TEST_CASE("Estimates are near the built field") {
     const Mesh mesh = GENERATE(shapes::sphere(0.5f, 5), shapes::torus(0.4f, 0.1f), shapes::box({0.5f, 0.5f, 0.05f}, 8));
     const Settings advice = recommendSettings(inspect(mesh), {.speed = 1});
     const LevelSet field = build(mesh, {.voxelSize = advice.voxelSize,
-                                        .exteriorWidth = float(advice.exteriorWidth),
-                                        .interiorWidth = float(advice.interiorWidth)});
+                                        .exteriorWidthVoxels = float(advice.exteriorWidthVoxels),
+                                        .interiorWidthVoxels = float(advice.interiorWidthVoxels)});
     CHECK(double(advice.voxels) == Approx(double(field.activeVoxels())).epsilon(0.2));
     const double bytes = double(Field(field).memoryBytes());
     CHECK(bytes < 1.3 * double(advice.fieldBytes));

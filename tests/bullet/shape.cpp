@@ -148,7 +148,8 @@ TEST_CASE("A ray from inside a body without a mesh leaves it where it leaves the
 TEST_CASE("Meshes of more triangles than Bullet's quantized hierarchy can number are swept against") {
     const Mesh mesh = shapes::box({1, 1, 1}, 420);
     REQUIRE(mesh.triangles.size() > std::size_t(1) << 21);
-    Shape shape(std::make_shared<Collider>(mesh, build(mesh, {.voxelSize = 0.1f}), ColliderOptions{.pointSpacing = 4}));
+    Shape shape(
+        std::make_shared<Collider>(mesh, build(mesh, {.voxelSize = 0.1f}), ColliderOptions{.pointSpacingVoxels = 4}));
     World world;
     world.add(shape, 0, {0, 0, 0});
     btBoxShape box({0.1f, 0.1f, 0.1f});

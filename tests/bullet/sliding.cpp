@@ -86,7 +86,7 @@ TEST_CASE("Bodies with a flat base slide to a stop by friction, on all flat shap
     const float edge = 0.1f;  // half the edge length of the bodies [m]
     Shape cube(exactBox(glm::vec3(edge), voxel));
     const Mesh mesh = crossPrism(2 * edge, edge);
-    Shape cross(std::make_shared<Collider>(mesh, build(mesh, {.voxelSize = voxel, .interiorWidth = 6})));
+    Shape cross(std::make_shared<Collider>(mesh, build(mesh, {.voxelSize = voxel, .interiorWidthVoxels = 6})));
     btBoxShape box(btVector3(edge, edge, edge));
     const struct {
         const char* name;
@@ -125,7 +125,7 @@ TEST_CASE("Contacts with flat shapes have the shape's normal, for slightly tilte
     Random random(seed);
     const float voxel = 0.01f, edge = 0.1f;
     const Mesh mesh = crossPrism(2 * edge, edge);
-    Shape cross(std::make_shared<Collider>(mesh, build(mesh, {.voxelSize = voxel, .interiorWidth = 6})));
+    Shape cross(std::make_shared<Collider>(mesh, build(mesh, {.voxelSize = voxel, .interiorWidthVoxels = 6})));
     Grounds grounds;
     for (const auto& ground : grounds.all()) {
         CAPTURE(ground.name);

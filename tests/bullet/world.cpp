@@ -70,7 +70,7 @@ std::shared_ptr<const Collider> exactCollider(const Mesh& mesh, const std::funct
 }
 
 std::shared_ptr<const Collider> deepCollider(const Mesh& mesh, float voxelSize, ContactAccuracy accuracy) {
-    return std::make_shared<Collider>(mesh, build(mesh, {.voxelSize = voxelSize, .interiorWidth = 6}),
+    return std::make_shared<Collider>(mesh, build(mesh, {.voxelSize = voxelSize, .interiorWidthVoxels = 6}),
                                       ColliderOptions{.accuracy = accuracy});
 }
 

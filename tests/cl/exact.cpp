@@ -20,9 +20,11 @@ constexpr std::size_t manyVoxels = 10000;  // active voxels checked per mesh; sm
 
 void checkExact(const Mesh& mesh, float resolution, const test::Band& band, KernelMapping mapping, unsigned seed) {
     const float voxelSize = voxelSizeFor(mesh, resolution);
-    const LevelSet field = build(
-        mesh, {.voxelSize = voxelSize, .exteriorWidth = float(band.exterior), .interiorWidth = float(band.interior)},
-        openclFiller(openDevice(), {.mapping = mapping}));
+    const LevelSet field = build(mesh,
+                                 {.voxelSize = voxelSize,
+                                  .exteriorWidthVoxels = float(band.exterior),
+                                  .interiorWidthVoxels = float(band.interior)},
+                                 openclFiller(openDevice(), {.mapping = mapping}));
     const openvdb::FloatGrid& grid = *field.grids().distance;
     const auto voxels = test::trueVoxels(test::Truth(mesh), test::chooseVoxels(grid, mesh, band, manyVoxels, seed),
                                          grid.voxelSize()[0]);

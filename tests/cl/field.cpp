@@ -217,10 +217,10 @@ TEST_CASE("a field built to stay on the device answers as the same field from th
         BuildOptions build = optionsFor(mesh, forGpu ? 24 : 90, method);
         CAPTURE(mesh.triangles.size(), forGpu, method == Method::exact);
         checkResident(mesh, build, options);
-        build.exteriorWidth = 4.5f;
-        build.interiorWidth = 1.25f;
+        build.exteriorWidthVoxels = 4.5f;
+        build.interiorWidthVoxels = 1.25f;
         checkResident(mesh, build, options);
-        build.exteriorWidth = 0.7f;
+        build.exteriorWidthVoxels = 0.7f;
         checkResident(mesh, build, options);
     }
 }

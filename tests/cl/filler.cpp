@@ -39,7 +39,7 @@ BuildOptions optionsFor(const Mesh& mesh, float resolution, Method method = Meth
     BuildOptions options;
     options.method = method;
     options.voxelSize = voxelSizeFor(mesh, resolution);
-    options.exteriorWidth = options.interiorWidth = 2;
+    options.exteriorWidthVoxels = options.interiorWidthVoxels = 2;
     return options;
 }
 
@@ -212,8 +212,8 @@ TEST_CASE("OpenCL and TBB agree by the paper to the letter, by recursion and wit
     SECTION("fine samples, thick layers, unequal widths") {
         options.doubleLayer.epsilon = 0.3f;
         options.doubleLayer.delta = 0.9f;
-        options.exteriorWidth = 4.5f;
-        options.interiorWidth = 1.25f;
+        options.exteriorWidthVoxels = 4.5f;
+        options.interiorWidthVoxels = 1.25f;
     }
     checkFillers(mesh, options, {.mapping = way.mapping});
 }
@@ -236,8 +236,8 @@ TEST_CASE("OpenCL and TBB agree on triangles of very different size, however wid
     const Method method = GENERATE(Method::exact, Method::doubleLayer);
     BuildOptions options = optionsFor(mesh, way.resolution, method);
     const float width = GENERATE(1.f, 6.f);
-    options.exteriorWidth = width;
-    options.interiorWidth = 2;
+    options.exteriorWidthVoxels = width;
+    options.interiorWidthVoxels = 2;
     CAPTURE(way.resolution, int(method), width);
     checkFillers(mesh, options, {.mapping = way.mapping});
 }
@@ -337,7 +337,7 @@ TEST_CASE("too little device memory is an error that says how much is needed") {
         const Mesh mesh = shapes::sphere(1.f, 5);
         BuildOptions options = optionsFor(mesh, 100);
         options.triangles = true;
-        options.exteriorWidth = options.interiorWidth = 6;
+        options.exteriorWidthVoxels = options.interiorWidthVoxels = 6;
         CHECK_THROWS_WITH(build(mesh, options, openclFiller(device, {.memoryMiB = 1})),
                           Contains("brick") && Contains("MiB") && Contains(device.info().name));
     }

@@ -78,7 +78,7 @@ TEST_CASE("a device lost half-way is an error that names call and device, and le
     const Mesh mesh = shapes::sphere(1.f, 4);
     BuildOptions options;
     options.method = GENERATE(Method::exact, Method::doubleLayer, Method::prism);
-    options.exteriorWidth = options.interiorWidth = 2;
+    options.exteriorWidthVoxels = options.interiorWidthVoxels = 2;
     options.voxelSize = voxelSizeFor(mesh, 150);
     const BlockFiller filler = openclFiller(device, {.memoryMiB = 8});
     const std::size_t voxels = build(mesh, options, filler).activeVoxels();

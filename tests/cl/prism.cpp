@@ -31,7 +31,7 @@ BuildOptions optionsFor(const Mesh& mesh, float resolution, float halfWidth = 2)
     BuildOptions options;
     options.method = Method::prism;
     options.voxelSize = voxelSizeFor(mesh, resolution);
-    options.exteriorWidth = options.interiorWidth = halfWidth;
+    options.exteriorWidthVoxels = options.interiorWidthVoxels = halfWidth;
     return options;
 }
 

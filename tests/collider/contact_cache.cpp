@@ -25,7 +25,7 @@ const Collider& knot() {
     static const Collider collider = [] {
         const Mesh mesh = shapes::torusKnot(2, 3, 0.3f, 0.09f, 150, 16);
         BuildOptions options{.voxelSize = h};
-        options.interiorWidth = 6;
+        options.interiorWidthVoxels = 6;
         return Collider(mesh, build(mesh, options));
     }();
     return collider;

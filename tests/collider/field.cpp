@@ -245,7 +245,7 @@ TEST_CASE("a level set of OpenVDB's own and one of the double layer method serve
 
 TEST_CASE("bounds of points as far away as floats reach are finite, and so are the boxes of fields") {
     const Mesh ball = shapes::sphere(1, 3);
-    const Field field(build(ball, {.voxelSize = 0.001f, .exteriorWidth = 2, .interiorWidth = 2}));
+    const Field field(build(ball, {.voxelSize = 0.001f, .exteriorWidthVoxels = 2, .interiorWidthVoxels = 2}));
     for (const float away : {1e10f, 1e36f, 3e38f}) {
         const Sample sample = field.sample({0, away, 0});
         CHECK_FALSE(sample.inBand);

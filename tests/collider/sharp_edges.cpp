@@ -31,7 +31,7 @@ TEST_CASE("Sharp edges are those of the mesh, and none crosses a groove") {
         }
         mesh = shapes::join(parts);
     }
-    const Collider collider(mesh, build(mesh, {.voxelSize = h, .interiorWidth = 6}));
+    const Collider collider(mesh, build(mesh, {.voxelSize = h, .interiorWidthVoxels = 6}));
     const auto points = collider.data().points().points();
     double total = 0;
     for (const SharpEdge& edge : collider.data().edges().edges()) {

@@ -11,7 +11,8 @@ using namespace bilayer;
 
 TEST_CASE("fill keeps the band and knows every other voxel of the box") {
     const float h = 0.04f;
-    const LevelSet band = build(shapes::sphere(0.5f, 5), {.voxelSize = h, .exteriorWidth = 4, .interiorWidth = 2});
+    const LevelSet band =
+        build(shapes::sphere(0.5f, 5), {.voxelSize = h, .exteriorWidthVoxels = 4, .interiorWidthVoxels = 2});
     const LevelSet filled = fluid::fill(band);
     const openvdb::FloatGrid &before = *band.grids().distance, &after = *filled.grids().distance;
 
@@ -39,7 +40,8 @@ TEST_CASE("fill keeps the band and knows every other voxel of the box") {
 
 TEST_CASE("fill goes as far as it is asked to") {
     const float h = 0.04f, distance = 0.3f;
-    const LevelSet band = build(shapes::sphere(0.5f, 5), {.voxelSize = h, .exteriorWidth = 4, .interiorWidth = 2});
+    const LevelSet band =
+        build(shapes::sphere(0.5f, 5), {.voxelSize = h, .exteriorWidthVoxels = 4, .interiorWidthVoxels = 2});
     const LevelSet filled = fluid::fill(band, distance);
     const openvdb::FloatGrid &before = *band.grids().distance, &after = *filled.grids().distance;
     CHECK(filled.exteriorWidth() == distance);

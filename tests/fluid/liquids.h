@@ -18,7 +18,7 @@
 namespace bilayer::test {
 
 inline LevelSet fieldOf(const Mesh& mesh, float voxelSize, float width = 3) {
-    return build(mesh, {.voxelSize = voxelSize, .exteriorWidth = width, .interiorWidth = width});
+    return build(mesh, {.voxelSize = voxelSize, .exteriorWidthVoxels = width, .interiorWidthVoxels = width});
 }
 
 inline openvdb::FloatGrid::Ptr emptyLiquid(float voxelSize, float halfWidth = 3) {

@@ -93,8 +93,8 @@ TEST_CASE("faces go as the body turns") {
     const float h = 0.05f;
     const auto cells = Transform::createLinearTransform(h);
     const glm::vec3 centre(0.3f, 0.1f, -0.2f), linear(1, 2, 3), angular(0.5f, -0.25f, 4);
-    const fluid::Solid solid =
-        fluid::solid(shapes::sphere(0.4f, 4), Pose{centre}, *cells, {.velocity = {linear, angular}, .halfWidth = 4});
+    const fluid::Solid solid = fluid::solid(shapes::sphere(0.4f, 4), Pose{centre}, *cells,
+                                            {.velocity = {linear, angular}, .halfWidthVoxels = 4});
     CHECK(solid.velocity->getGridClass() == openvdb::GRID_STAGGERED);
     CHECK(solid.velocity->activeVoxelCount() == solid.distance->activeVoxelCount());
     float most = 0;
@@ -114,7 +114,7 @@ TEST_CASE("bad input is refused") {
     CHECK_THROWS_WITH(fluid::solid(mesh, {{}, {1, 1, -1}}, *cells), Catch::Matchers::Contains("mirror"));
     CHECK_THROWS_WITH(fluid::solid(mesh, {}, *cells, {.velocity = {glm::vec3(nan)}}),
                       Catch::Matchers::Contains("velocity"));
-    CHECK_THROWS_WITH(fluid::solid(mesh, {}, *cells, {.halfWidth = 2}), Catch::Matchers::Contains("half width"));
+    CHECK_THROWS_WITH(fluid::solid(mesh, {}, *cells, {.halfWidthVoxels = 2}), Catch::Matchers::Contains("half width"));
     const auto turned = Transform::createLinearTransform(0.05);
     turned->preRotate(0.3);
     CHECK_THROWS_WITH(fluid::solid(mesh, {}, *turned), Catch::Matchers::Contains("axes"));

@@ -128,7 +128,8 @@ TEST_CASE("far voxels have the right sign, in cavities too") {
     std::mt19937 random(seed);
     std::uniform_real_distribution<double> uniform(-1.5, 4.5);
     for (const float width : {0.3f, 0.5f, 1.f, 3.f, 6.f}) {
-        const LevelSet field = build(mesh, {.voxelSize = 0.02f, .exteriorWidth = width, .interiorWidth = 1.f});
+        const LevelSet field =
+            build(mesh, {.voxelSize = 0.02f, .exteriorWidthVoxels = width, .interiorWidthVoxels = 1.f});
         const auto values = field.grids().distance->getConstAccessor();
         std::size_t wrong = 0;
         for (int i = 0; i < 20000; ++i) {
@@ -145,7 +146,7 @@ TEST_CASE("far voxels have the right sign, in cavities too") {
 
 TEST_CASE("values outside the band are plus the exterior or minus the interior width, exactly") {
     const LevelSet field =
-        build(shapes::torus(1, 0.3f), {.voxelSize = 0.02f, .exteriorWidth = 4, .interiorWidth = 2.5f});
+        build(shapes::torus(1, 0.3f), {.voxelSize = 0.02f, .exteriorWidthVoxels = 4, .interiorWidthVoxels = 2.5f});
     CHECK(field.exteriorWidth() == 4 * 0.02f);
     CHECK(field.interiorWidth() == 2.5f * 0.02f);
     std::size_t inside = 0;
@@ -161,19 +162,11 @@ TEST_CASE("values outside the band are plus the exterior or minus the interior w
     }
 }
 
-TEST_CASE("widths in metres are widths in voxels of that size") {
-    const Mesh mesh = shapes::sphere(1, 4);
-    const LevelSet voxels = build(mesh, {.voxelSize = 0.125f, .exteriorWidth = 4, .interiorWidth = 2.5f});
-    const LevelSet metres = build(
-        mesh, {.voxelSize = 0.125f, .exteriorWidth = 0.5f, .interiorWidth = 0.3125f, .bandUnit = BandUnit::world});
-    CHECK(metres.exteriorWidth() == 0.5f);
-    CHECK(metres.interiorWidth() == 0.3125f);
-    CHECK(sameBytes(*voxels.grids().distance, *metres.grids().distance));
-    // the same band at another resolution
-    const LevelSet fine = build(
-        mesh, {.voxelSize = 0.0625f, .exteriorWidth = 0.5f, .interiorWidth = 0.3125f, .bandUnit = BandUnit::world});
-    CHECK(fine.exteriorWidth() == 0.5f);
-    CHECK(fine.interiorWidth() == 0.3125f);
+TEST_CASE("Widths are stored in metres") {
+    const LevelSet field =
+        build(shapes::sphere(1, 4), {.voxelSize = 0.125f, .exteriorWidthVoxels = 4, .interiorWidthVoxels = 2.5f});
+    CHECK(field.exteriorWidth() == 0.5f);
+    CHECK(field.interiorWidth() == 0.3125f);
 }
 
 TEST_CASE("OpenVDB finds a level set in it") {
@@ -268,21 +261,20 @@ TEST_CASE("bad options and meshes are refused by name") {
     refused({.voxelSize = INFINITY}, "voxelSize");
     refused({.voxelSize = 1e-9f}, "voxelSize");
     refused({.voxelSize = 1e-6f}, "voxelSize");
-    refused({.voxelSize = 1, .exteriorWidth = 0}, "exteriorWidth");
-    refused({.voxelSize = 1, .interiorWidth = 1e6f}, "interiorWidth");
+    refused({.voxelSize = 1, .exteriorWidthVoxels = 0}, "exteriorWidth");
+    refused({.voxelSize = 1, .interiorWidthVoxels = 1e6f}, "interiorWidth");
     refused({.voxelSize = 1, .threads = -1}, "threads");
     for (const float bad : {NAN, -1.f, 101.f, 1e30f, INFINITY})
         for (const Sign sign : {Sign::automatic, Sign::flood})
-            refused({.voxelSize = 1, .sign = sign, .gap = bad}, "gap must be in 0..100 voxels");
-    for (const float bad : {NAN, -1.f, 0.f, 1001.f, INFINITY})
-        for (const BandUnit unit : {BandUnit::voxels, BandUnit::world}) {
-            refused({.voxelSize = 1, .exteriorWidth = bad, .bandUnit = unit}, "exteriorWidth");
-            refused({.voxelSize = 1, .interiorWidth = bad, .bandUnit = unit}, "interiorWidth");
-            refused({.voxelSize = bad > 0 ? INFINITY : bad, .bandUnit = unit}, "voxelSize");
-        }
+            refused({.voxelSize = 1, .sign = sign, .gapVoxels = bad}, "gapVoxels must be in 0..100");
+    for (const float bad : {NAN, -1.f, 0.f, 1001.f, INFINITY}) {
+        refused({.voxelSize = 1, .exteriorWidthVoxels = bad}, "exteriorWidthVoxels");
+        refused({.voxelSize = 1, .interiorWidthVoxels = bad}, "interiorWidthVoxels");
+        refused({.voxelSize = bad > 0 ? INFINITY : bad}, "voxelSize");
+    }
     // widths that overflow or underflow in the mesh's unit
-    refused({.voxelSize = 1e37f, .exteriorWidth = 100}, "exteriorWidth");
-    refused({.voxelSize = 1e-3f, .interiorWidth = 1e-37f}, "interiorWidth");
+    refused({.voxelSize = 1e37f, .exteriorWidthVoxels = 100}, "exteriorWidth");
+    refused({.voxelSize = 1e-3f, .interiorWidthVoxels = 1e-37f}, "interiorWidth");
     refused({.voxelSize = 1, .threads = 4097}, "threads");
     BuildOptions options{.voxelSize = 0.1f};
     for (const float delta : {0.f, 0.099f, 4.1f}) {
@@ -312,11 +304,10 @@ TEST_CASE("bad options and meshes are refused by name") {
     const Mesh flat{{{0, 0, 0}, {1, 0, 0}, {2, 0, 0}}, {{0, 1, 2}}};
     for (const Method method : {Method::exact, Method::doubleLayer, Method::pseudonormal})
         CHECK_THROWS_WITH(build(flat, {.voxelSize = 1, .method = method}), Catch::Contains("no triangle with an area"));
-    refused({.voxelSize = 0.1f, .exteriorWidth = 101, .bandUnit = BandUnit::world}, "exteriorWidth");
-    refused({.voxelSize = 0, .bandUnit = BandUnit::world}, "voxelSize");
     // 3e8 voxels of surface, 2000 voxels across the band at each
-    refused({.voxelSize = 2e-4f, .exteriorWidth = 1000, .interiorWidth = 1000, .method = Method::pseudonormal},
-            "memory");
+    refused(
+        {.voxelSize = 2e-4f, .exteriorWidthVoxels = 1000, .interiorWidthVoxels = 1000, .method = Method::pseudonormal},
+        "memory");
     CHECK_THROWS_AS(voxelSizeFor(mesh, 0), std::invalid_argument);
     CHECK_THROWS_AS(voxelSizeFor(mesh, -5), std::invalid_argument);
 }
@@ -373,8 +364,8 @@ TEST_CASE("what a filler throws ends the build") {
 }
 
 TEST_CASE("times add up") {
-    BuildTimes times;
-    build(shapes::sphere(1, 5), {.voxelSize = 0.02f}, nullptr, &times);
+    const LevelSet field = build(shapes::sphere(1, 5), {.voxelSize = 0.02f});
+    const BuildTimes& times = field.buildTimes();
     CHECK(times.tiles > 0);
     CHECK(times.fill > 0);
     CHECK(times.assemble > 0);

@@ -28,7 +28,7 @@ class Dense {
   public:
     Dense(const Mesh& mesh, const BuildOptions& options, int k) : delta_(options.doubleLayer.delta) {
         const Bounds box = bounds(mesh);
-        const float margin = std::max(options.exteriorWidth, options.interiorWidth) + 3;
+        const float margin = std::max(options.exteriorWidthVoxels, options.interiorWidthVoxels) + 3;
         lower_ = glm::ivec3(glm::floor(box.lower / options.voxelSize - margin));
         size_ = glm::ivec3(glm::ceil(box.upper / options.voxelSize + margin)) - lower_ + 1;
         inner2_.assign(std::size_t(size_.x) * size_.y * size_.z, infinite);
@@ -121,8 +121,9 @@ void compare(const Mesh& mesh, const BuildOptions& options, int k) {
     dense.forEachVoxel([&](const glm::ivec3& v) {
         const openvdb::Coord at(v.x, v.y, v.z);
         const float phi = dense.phi(v);
-        const bool inBand = phi < options.exteriorWidth && phi > -options.interiorWidth;
-        const float edge = std::min(std::abs(phi - options.exteriorWidth), std::abs(phi + options.interiorWidth));
+        const bool inBand = phi < options.exteriorWidthVoxels && phi > -options.interiorWidthVoxels;
+        const float edge =
+            std::min(std::abs(phi - options.exteriorWidthVoxels), std::abs(phi + options.interiorWidthVoxels));
         active += values.isValueOn(at);
         if (dense.tie(v)) return;
         if (values.isValueOn(at) && inBand)
@@ -132,7 +133,7 @@ void compare(const Mesh& mesh, const BuildOptions& options, int k) {
             extra += values.isValueOn(at);
         }
     });
-    CAPTURE(options.exteriorWidth, options.interiorWidth, k, active);
+    CAPTURE(options.exteriorWidthVoxels, options.interiorWidthVoxels, k, active);
     CHECK(missing == 0);
     CHECK(extra == 0);
     CHECK(worst < rounding);
@@ -144,11 +145,11 @@ void compare(const Mesh& mesh, const BuildOptions& options, int k) {
 TEST_CASE("in the band, a voxel has the distance that all samples together give it") {
     const Mesh knot = shapes::torusKnot(2, 3, 5, 1, 150, 12), box = shapes::box({6, 4, 2});
     for (const float width : {0.5f, 1.f, 2.f, 3.f, 3.499f, 7.f}) {  // 3.499: cells end at the same place as samples
-        compare(knot, {.voxelSize = 0.5f, .exteriorWidth = width, .interiorWidth = width}, -1);
-        compare(box, {.voxelSize = 0.31f, .exteriorWidth = width, .interiorWidth = width}, -1);
+        compare(knot, {.voxelSize = 0.5f, .exteriorWidthVoxels = width, .interiorWidthVoxels = width}, -1);
+        compare(box, {.voxelSize = 0.31f, .exteriorWidthVoxels = width, .interiorWidthVoxels = width}, -1);
     }
-    compare(knot, {.voxelSize = 0.5f, .exteriorWidth = 5, .interiorWidth = 1}, -1);
-    compare(knot, {.voxelSize = 0.5f, .exteriorWidth = 0.75f, .interiorWidth = 4}, -1);
+    compare(knot, {.voxelSize = 0.5f, .exteriorWidthVoxels = 5, .interiorWidthVoxels = 1}, -1);
+    compare(knot, {.voxelSize = 0.5f, .exteriorWidthVoxels = 0.75f, .interiorWidthVoxels = 4}, -1);
 }
 
 TEST_CASE("other parameters of the method are obeyed") {
@@ -197,9 +198,9 @@ TEST_CASE("the triangle of a voxel is the owner of the sample that decides its d
 // If only the outer layer is near enough to be known, it is the nearer one, by however little.
 TEST_CASE("beyond the band, voxels lie on the side that exact distances give them") {
     const auto onWrongSide = [](const Mesh& mesh, BuildOptions options) {
-        options.exteriorWidth = options.interiorWidth = 2;
+        options.exteriorWidthVoxels = options.interiorWidthVoxels = 2;
         const LevelSet layers = build(mesh, layered(options));
-        options.exteriorWidth = options.interiorWidth = 4;
+        options.exteriorWidthVoxels = options.interiorWidthVoxels = 4;
         const LevelSet exact = build(mesh, options);
         const auto values = layers.grids().distance->getConstAccessor();
         std::size_t wrong = 0;

@@ -34,8 +34,8 @@ float uniform(Random& random, float low, float high) {
 
 openvdb::FloatGrid::ConstPtr exactGrid(const Mesh& mesh, float voxelSize, const test::Band& band, int threads = 0) {
     return build(mesh, {.voxelSize = voxelSize,
-                        .exteriorWidth = float(band.exterior),
-                        .interiorWidth = float(band.interior),
+                        .exteriorWidthVoxels = float(band.exterior),
+                        .interiorWidthVoxels = float(band.interior),
                         .method = Method::exact,
                         .threads = threads})
         .grids()

@@ -18,7 +18,7 @@ TEST_CASE("Omitted parts of a file are reported") {
     ReadReport report;
     const std::string more =
         "v 7 7 7\nf 1 2\nf 3\nf 1 1 2\nl 1 2\np 1 2 3\ncstype bspline\ncurv 0 1 1 2\nhello world\nhello\n";
-    readMesh(write("more.obj", objOfBox() + more), &report);
+    report = readMeshFile(write("more.obj", objOfBox() + more)).report;
     CHECK(report.vertices == 9);
     CHECK(report.faces == 7);
     CHECK(report.unusedVertices == 1);
@@ -28,9 +28,9 @@ TEST_CASE("Omitted parts of a file are reported") {
                Contains("2 faces with fewer than three corners") && Contains("2 elements that are points or lines") &&
                    Contains("2 statements of free-form") &&
                    Contains("2 lines that begin with a word that is not known; the first is 'hello' on line 23"));
-    readMesh(write("more.ply", plyOfBox({.more = true})), &report);
+    report = readMeshFile(write("more.ply", plyOfBox({.more = true}))).report;
     CHECK_THAT(fmt::format("{}", fmt::join(report.notes, "\n")), Contains("1 element 'camera'"));
-    readMesh(write("more.stl", binaryStlOfBox("") + "xyz"), &report);
+    report = readMeshFile(write("more.stl", binaryStlOfBox("") + "xyz")).report;
     CHECK(report.mergedVertices == 28);
     CHECK_THAT(fmt::format("{}", fmt::join(report.notes, "\n")), Contains("3 bytes after the last triangle"));
     // more than declared
@@ -42,11 +42,11 @@ TEST_CASE("Omitted parts of a file are reported") {
           std::pair("more.ply", replaced(plyOfBox({.format = "binary_big_endian"}), "face 6", "face 5")),
           std::pair("more.ply", plyOfBox({.format = "binary_little_endian"}) + "x")}) {
         CAPTURE(name, text);
-        readMesh(write(name, text), &report);
+        report = readMeshFile(write(name, text)).report;
         CHECK_THAT(fmt::format("{}", fmt::join(report.notes, "\n")), Contains("left out") && Contains("announce"));
     }
     // a bow tie
-    readMesh(write("tie.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nf 1 2 3 4\n"), &report);
+    report = readMeshFile(write("tie.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nf 1 2 3 4\n")).report;
     CHECK_THAT(fmt::format("{}", fmt::join(report.notes, "\n")), Contains("the triangles of 1 face do not cover"));
 }
 

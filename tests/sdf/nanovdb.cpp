@@ -27,7 +27,7 @@ namespace {
 
 LevelSet torus(float voxelSize = 0.05f) {
     return build(shapes::torus(1, 0.3f, 60, 30),
-                 {.voxelSize = voxelSize, .exteriorWidth = 3, .interiorWidth = 2, .triangles = true});
+                 {.voxelSize = voxelSize, .exteriorWidthVoxels = 3, .interiorWidthVoxels = 2, .triangles = true});
 }
 
 template <class Nano>

@@ -126,9 +126,9 @@ TEST_CASE("rebuilding keeps the nearest triangles, asymmetric bands and other wa
     const Mesh after = dented(before, centre, 0.3f, {0.04f, 0.03f, -0.05f});
     const float h = voxelSizeFor(before, 70);
     checkFrame(before, after, {.voxelSize = h, .triangles = true});
-    checkFrame(before, after, {.voxelSize = h, .exteriorWidth = 6.5f, .interiorWidth = 1.5f});
+    checkFrame(before, after, {.voxelSize = h, .exteriorWidthVoxels = 6.5f, .interiorWidthVoxels = 1.5f});
     checkFrame(before, after, {.voxelSize = h, .sign = Sign::normals, .threads = 1});
-    checkFrame(before, after, {.voxelSize = h, .exteriorWidth = 0.4f, .interiorWidth = 1});
+    checkFrame(before, after, {.voxelSize = h, .exteriorWidthVoxels = 0.4f, .interiorWidthVoxels = 1});
     checkFrame(before, after, {.voxelSize = h, .sign = Sign::winding});
     checkFrame(before, after, {.voxelSize = h, .method = Method::pseudonormal});
     checkFrame(before, after, {.voxelSize = h, .method = Method::doubleLayer});
@@ -177,9 +177,10 @@ TEST_CASE("a rebuild fills the blocks around what moved and copies the others") 
     CAPTURE(share);
     REQUIRE((share > 0.005 && share < 0.02));
     const BuildOptions options{.voxelSize = voxelSizeFor(before, 128)};
-    BuildTimes full, part;
-    const LevelSet old = build(before, options), expected = build(after, options, nullptr, &full);
-    CHECK(sameFields(rebuild(old, before, after, moved, options, &part), expected));
+    const LevelSet old = build(before, options), expected = build(after, options);
+    const LevelSet updated = rebuild(old, before, after, moved, options);
+    CHECK(sameFields(updated, expected));
+    const BuildTimes &full = expected.buildTimes(), &part = updated.buildTimes();
     const std::size_t changed = changedLeaves(*old.grids().distance, *expected.grids().distance);
     CAPTURE(full.filledBlocks, part.filledBlocks, changed);
     CHECK(full.filledBlocks >= expected.leaves());
@@ -187,8 +188,9 @@ TEST_CASE("a rebuild fills the blocks around what moved and copies the others") 
     CHECK(changed > 10);
     CHECK(part.filledBlocks < full.filledBlocks / 10);
     // nothing is filled if nothing moved
-    CHECK(sameFields(rebuild(old, before, before, {}, options, &part), old));
-    CHECK(part.filledBlocks == 0);
+    const LevelSet same = rebuild(old, before, before, {}, options);
+    CHECK(sameFields(same, old));
+    CHECK(same.buildTimes().filledBlocks == 0);
 }
 
 TEST_CASE("a rebuild is a build in full where old blocks cannot be copied") {
@@ -196,10 +198,9 @@ TEST_CASE("a rebuild is a build in full where old blocks cannot be copied") {
     const Mesh after = dented(before, before.points[before.points.size() / 3], 0.2f, {0.04f, 0.03f, -0.05f});
     const auto moved = trianglesThatMoved(before, after);
     const auto filledInFull = [&](const LevelSet& old, const BuildOptions& options) {
-        BuildTimes full, part;
-        const LevelSet expected = build(after, options, nullptr, &full);
-        CHECK(sameFields(rebuild(old, before, after, moved, options, &part), expected));
-        return part.filledBlocks == full.filledBlocks;
+        const LevelSet expected = build(after, options), updated = rebuild(old, before, after, moved, options);
+        CHECK(sameFields(updated, expected));
+        return updated.buildTimes().filledBlocks == expected.buildTimes().filledBlocks;
     };
     const float h = 1.f / 32;  // these widths are exact in 16 bits
     const BuildOptions plain{.voxelSize = h};
@@ -207,7 +208,7 @@ TEST_CASE("a rebuild is a build in full where old blocks cannot be copied") {
     for (const BuildOptions& options : {BuildOptions{.voxelSize = h, .sign = Sign::winding},
                                         BuildOptions{.voxelSize = h, .method = Method::pseudonormal},
                                         BuildOptions{.voxelSize = h, .method = Method::doubleLayer},
-                                        BuildOptions{.voxelSize = h, .interiorWidth = 0.9f}})
+                                        BuildOptions{.voxelSize = h, .interiorWidthVoxels = 0.9f}})
         CHECK(filledInFull(build(before, options), options));
 
     // rounded to 16 bits in a file
@@ -245,7 +246,7 @@ TEST_CASE("a rebuild refuses what does not belong together, by name") {
     refused(before, shorter, moved, options, "triangles and now has");
     refused(after, after, {}, options, "another mesh");
     refused(before, after, moved, {.voxelSize = 0.06f}, "voxels of");
-    refused(before, after, moved, {.voxelSize = 0.05f, .exteriorWidth = 4}, "band");
+    refused(before, after, moved, {.voxelSize = 0.05f, .exteriorWidthVoxels = 4}, "band");
     refused(before, after, moved, {.voxelSize = 0.05f, .method = Method::pseudonormal}, "method");
     refused(before, after, moved, {.voxelSize = 0.05f, .triangles = true}, "nearest triangles");
     refused(before, after, moved, {.voxelSize = 0}, "voxelSize");

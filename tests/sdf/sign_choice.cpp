@@ -201,8 +201,9 @@ TEST_CASE("a clean solid has no conflict however narrow its band") {
         for (const float interior : {0.2f, 0.9f, 2.f})
             for (const Mesh& mesh : {shapes::box({1.f, 0.6f, 0.3f}), shapes::torus(1.f, 0.4f)}) {
                 CAPTURE(exterior, interior, mesh.triangles.size());
-                const LevelSet field = build(
-                    mesh, {.voxelSize = voxelSizeFor(mesh, 50), .exteriorWidth = exterior, .interiorWidth = interior});
+                const LevelSet field = build(mesh, {.voxelSize = voxelSizeFor(mesh, 50),
+                                                    .exteriorWidthVoxels = exterior,
+                                                    .interiorWidthVoxels = interior});
                 CHECK(field.sign() == "normals");
                 CHECK(field.signConflicts() == 0);
             }

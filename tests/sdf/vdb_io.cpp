@@ -19,7 +19,7 @@ namespace {
 
 LevelSet torus() {
     return build(shapes::torus(1, 0.3f, 60, 30),
-                 {.voxelSize = 0.05f, .exteriorWidth = 3, .interiorWidth = 2, .triangles = true});
+                 {.voxelSize = 0.05f, .exteriorWidthVoxels = 3, .interiorWidthVoxels = 2, .triangles = true});
 }
 
 std::string bytes(const std::filesystem::path& path) {

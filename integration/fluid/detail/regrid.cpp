@@ -153,9 +153,10 @@ FloatGrid::Ptr regrid(const Mesh& mesh, const Placement& placement, const Transf
     const float widthInVoxels = float(double(width) / voxel);
     const Placed placed = inVoxels(mesh, placement, voxels);
     requireSolid(placed, voxels);
-    const LevelSet field =
-        build(placed.mesh,
-              {.voxelSize = 1, .exteriorWidth = widthInVoxels, .interiorWidth = widthInVoxels, .unite = uniteSolids});
+    const LevelSet field = build(placed.mesh, {.voxelSize = 1,
+                                               .exteriorWidthVoxels = widthInVoxels,
+                                               .interiorWidthVoxels = widthInVoxels,
+                                               .unite = uniteSolids});
     if (field.sign() == byFlood) refuseWithoutInside(field.signReason());
     const auto grid = moved(*field.grids().distance, placed.shift, float(voxel), width);
     grid->setTransform(voxels.copy());
