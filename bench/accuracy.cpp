@@ -19,6 +19,7 @@
 #include <bilayer/sdf/grids.h>
 #include <bilayer/sdf/mesh_io.h>
 #include "bench/program.h"
+#include "sdf/base/openvdb.h"
 #include "tests/support/clean.h"
 #include "tests/support/truth.h"
 #include "tests/support/verdict.h"

@@ -16,6 +16,7 @@
 #include <bilayer/sdf/mesh_io.h>
 #include "bench/measure.h"
 #include "demos/shared/shapes.h"
+#include "sdf/base/openvdb.h"
 
 namespace bilayer::bench {
 namespace {

@@ -20,6 +20,7 @@
 
 #include <bilayer/sdf/grids.h>
 #include <bilayer/sdf/inspect.h>
+#include "sdf/base/openvdb.h"
 #include "sdf/base/physical_memory.h"
 #include "sdf/base/progress.h"
 #include "sdf/fill/double_layer.h"

@@ -8,6 +8,7 @@
 #include <string_view>
 
 #include <bilayer/sdf/grids.h>
+#include "sdf/base/openvdb.h"
 
 namespace bilayer {
 namespace {

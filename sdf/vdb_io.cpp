@@ -25,6 +25,7 @@
 
 #include <bilayer/sdf/grids.h>
 #include "sdf/base/large_array.h"
+#include "sdf/base/openvdb.h"
 #include "sdf/io/atomic_file.h"
 #include "sdf/io/input_file.h"
 #include "sdf/io/mapped_file.h"

@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 #include <openvdb/points/PointAttribute.h>
 #include <openvdb/points/PointConversion.h>
-#include <openvdb/points/PointDataGrid.h>
 
 #include <algorithm>
 #include <cmath>
@@ -18,6 +17,7 @@
 #include <vector>
 
 #include <bilayer/sdf/grids.h>
+#include "sdf/base/openvdb_points.h"
 
 namespace bilayer::detail {
 namespace {

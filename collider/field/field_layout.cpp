@@ -15,6 +15,7 @@
 
 #include <bilayer/sdf/grids.h>
 #include "sdf/base/morton.h"
+#include "sdf/base/openvdb.h"
 
 namespace bilayer::detail {
 namespace {

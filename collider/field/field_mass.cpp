@@ -12,7 +12,6 @@
 //   44 meshes, 128, median       2.9e-3                     1.1e-3                     6.3e-5
 #include <oneapi/tbb/parallel_reduce.h>
 #include <oneapi/tbb/parallel_sort.h>
-#include <openvdb/openvdb.h>
 
 #include <algorithm>
 #include <array>
@@ -23,6 +22,7 @@
 
 #include <bilayer/sdf/grids.h>
 #include "collider/field/moments.h"
+#include "sdf/base/openvdb.h"
 
 namespace bilayer {
 

@@ -2,7 +2,6 @@
 #include "sdf/io/vdb_lengths.h"
 
 #include <fmt/format.h>
-#include <openvdb/openvdb.h>
 #include <openvdb/points/AttributeArray.h>
 
 #include <algorithm>
@@ -15,6 +14,8 @@
 #include <string_view>
 #include <utility>
 #include <vector>
+
+#include "sdf/base/openvdb.h"
 
 namespace bilayer::detail {
 namespace {

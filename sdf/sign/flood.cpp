@@ -10,6 +10,7 @@
 #include <span>
 #include <stdexcept>
 
+#include "sdf/base/openvdb.h"
 #include "sdf/base/progress.h"
 #include "sdf/bvh/winding_number.h"
 #include "sdf/sign/octree_cells.h"

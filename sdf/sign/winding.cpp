@@ -14,6 +14,7 @@
 #include <optional>
 #include <span>
 
+#include "sdf/base/openvdb.h"
 #include "sdf/base/progress.h"
 #include "sdf/mesh/topology.h"
 #include "sdf/sign/octree_cells.h"

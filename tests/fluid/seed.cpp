@@ -19,6 +19,7 @@
 #include <bilayer/sdf/mesh_io.h>
 #include <bilayer/sdf/surface.h>
 #include "demos/shared/shapes.h"
+#include "sdf/base/openvdb.h"
 #include "tests/support/cells.h"
 #include "tests/support/support.h"
 #include "tests/support/truth.h"

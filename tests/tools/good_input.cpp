@@ -1,6 +1,5 @@
 // Every command of `bilayer` on valid input.
 #include <nanovdb/util/IO.h>
-#include <openvdb/openvdb.h>
 #include <openvdb/tools/LevelSetSphere.h>
 
 #include <fmt/format.h>
@@ -17,6 +16,7 @@
 #include <bilayer/sdf/vdb_io.h>
 #include "collider/contact/collider_data.h"
 #include "demos/shared/shapes.h"
+#include "sdf/base/openvdb.h"
 #include "tests/support/support.h"
 #include "tests/tools/program.h"
 
