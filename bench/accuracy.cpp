@@ -20,6 +20,7 @@
 #include <bilayer/sdf/mesh_io.h>
 #include "bench/program.h"
 #include "sdf/base/method_names.h"
+#include "sdf/base/openvdb.h"
 #include "tests/support/clean.h"
 #include "tests/support/truth.h"
 #include "tests/support/verdict.h"

@@ -17,6 +17,7 @@
 #include "bench/measure.h"
 #include "demos/shared/shapes.h"
 #include "sdf/base/method_names.h"
+#include "sdf/base/openvdb.h"
 
 namespace bilayer::bench {
 namespace {

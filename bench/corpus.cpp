@@ -17,6 +17,7 @@
 #include <bilayer/sdf/mesh_io.h>
 #include <bilayer/sdf/surface.h>
 #include "bench/program.h"
+#include "sdf/base/openvdb.h"
 #include "sdf/sign/sign_choice.h"
 
 using namespace bilayer;

@@ -7,6 +7,8 @@
 #include <glm/geometric.hpp>
 #include <stdexcept>
 
+#include "sdf/base/openvdb.h"
+
 namespace bilayer::bench {
 namespace {
 

@@ -3,7 +3,6 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <openvdb/io/File.h>
-#include <openvdb/openvdb.h>
 #include <openvdb/tools/MeshToVolume.h>
 #include <spawn.h>
 #include <sys/wait.h>
@@ -31,6 +30,7 @@
 #include "bench/builders.h"
 #include "bench/measure.h"
 #include "bench/program.h"
+#include "sdf/base/openvdb.h"
 
 extern char** environ;
 

@@ -24,6 +24,7 @@
 #include "bench/measure.h"
 #include "bench/program.h"
 #include "demos/shared/shapes.h"
+#include "sdf/base/openvdb.h"
 #include "tests/support/truth.h"
 
 using namespace bilayer;

@@ -17,6 +17,7 @@
 #include <bilayer/sdf/mesh_io.h>
 #include "bench/builders.h"
 #include "bench/program.h"
+#include "sdf/base/openvdb.h"
 
 using namespace bilayer;
 

@@ -14,6 +14,7 @@
 #include <thread>
 
 #include <bilayer/sdf/grids.h>
+#include "sdf/base/openvdb.h"
 
 namespace bilayer::bench {
 namespace {

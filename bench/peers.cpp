@@ -6,6 +6,8 @@
 #include <openvdb/tools/Interpolation.h>
 #include <openvdb/tools/RayIntersector.h>
 
+#include "sdf/base/openvdb.h"
+
 namespace bilayer::bench {
 namespace {
 

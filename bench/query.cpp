@@ -22,6 +22,7 @@
 #include "bench/questions.h"
 #include "bench/race.h"
 #include "collider/field/field_layout.h"
+#include "sdf/base/openvdb.h"
 
 using namespace bilayer;
 using namespace bilayer::detail;

@@ -7,6 +7,7 @@
 #include <random>
 
 #include <bilayer/sdf/grids.h>
+#include "sdf/base/openvdb.h"
 
 namespace bilayer::bench {
 namespace {

@@ -24,6 +24,7 @@
 #include "bench/builders.h"
 #include "bench/program.h"
 #include "demos/shared/shapes.h"
+#include "sdf/base/openvdb.h"
 #include "tests/support/analytic.h"
 #include "tests/support/truth.h"
 

@@ -17,8 +17,33 @@ set_target_properties(${imported} PROPERTIES IMPORTED_GLOBAL TRUE)
 function(bilayer_flags target)
   target_compile_options(${target} PRIVATE -ffp-contract=off -fno-math-errno -Wall -Wextra -Wpedantic $<$<BOOL:${BILAYER_WERROR}>:-Werror>
     # GCC 12 sees overlaps and overflows in std::string that are none (GCC bug 105329 and its like)
-    $<$<CXX_COMPILER_ID:GNU>:-Wno-restrict> $<$<CXX_COMPILER_ID:GNU>:-Wno-stringop-overflow>)
+    $<$<CXX_COMPILER_ID:GNU>:-Wno-restrict> $<$<CXX_COMPILER_ID:GNU>:-Wno-stringop-overflow>
+    # what ccache needs to keep files with precompiled headers
+    $<$<CXX_COMPILER_ID:GNU>:-fpch-preprocess>)
   target_include_directories(${target} PRIVATE ${PROJECT_SOURCE_DIR})
+endfunction()
+
+# For targets that run for moments or wait for the libraries: compiled in half the time. Results are the same bytes, since
+# GCC changes no arithmetic at any level.
+function(bilayer_mild_optimisation target)
+  # where it inlines less, GCC 12 sees null pointers in std::vector that are none
+  target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-O1> $<$<CXX_COMPILER_ID:GNU>:-Wno-nonnull>)
+endfunction()
+
+# Those files of a target that include sdf/base/openvdb.h share OpenVDB's headers, compiled once: four seconds of each.
+function(bilayer_precompile_openvdb target)
+  get_target_property(sources ${target} SOURCES)
+  foreach(source IN LISTS sources)
+    get_filename_component(path ${source} ABSOLUTE)
+    set(includes "")
+    if(EXISTS ${path})
+      file(STRINGS ${path} includes REGEX "#include \"sdf/base/openvdb(_points)?\\.h\"")
+    endif()
+    if(NOT includes)
+      set_source_files_properties(${source} PROPERTIES SKIP_PRECOMPILE_HEADERS ON)
+    endif()
+  endforeach()
+  target_precompile_headers(${target} PRIVATE ${PROJECT_SOURCE_DIR}/sdf/base/openvdb.h)
 endfunction()
 
 # bilayer_library(NAME FOLDER LINKS...): a library of all source files of a folder, unless no component of BILAYER_COMPONENTS needs it.

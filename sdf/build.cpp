@@ -4,12 +4,11 @@
 #include <fmt/format.h>
 #include <oneapi/tbb/global_control.h>
 #include <oneapi/tbb/task_arena.h>
-#include <openvdb/openvdb.h>
-
 #include <cmath>
 #include <stdexcept>
 
 #include "sdf/base/method_names.h"
+#include "sdf/base/openvdb.h"
 #include "sdf/grid/field_filler.h"
 #include "sdf/grid/field_update.h"
 #include "sdf/grid/sign_retry.h"

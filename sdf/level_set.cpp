@@ -9,6 +9,7 @@
 
 #include <bilayer/sdf/grids.h>
 #include "sdf/base/method_names.h"
+#include "sdf/base/openvdb.h"
 
 namespace bilayer {
 

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include <bilayer/sdf/grids.h>
+#include "sdf/base/openvdb.h"
 #include "sdf/io/atomic_file.h"
 
 namespace bilayer {

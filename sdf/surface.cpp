@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include <bilayer/sdf/grids.h>
+#include "sdf/base/openvdb.h"
 
 namespace bilayer {
 

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include <bilayer/sdf/grids.h>
+#include "sdf/base/openvdb.h"
 #include "sdf/grid/distance_check.h"
 #include "sdf/io/atomic_file.h"
 #include "sdf/io/input_file.h"

@@ -15,6 +15,7 @@
 #include <bilayer/sdf/nanovdb.h>
 #include <bilayer/sdf/surface.h>
 #include <bilayer/sdf/vdb_io.h>
+#include "sdf/base/openvdb.h"
 #include "tools/commands.h"
 #include "tools/output.h"
 

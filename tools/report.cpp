@@ -15,6 +15,7 @@
 #include <bilayer/sdf/mesh_io.h>
 #include <bilayer/sdf/vdb_io.h>
 #include "collider/contact/body.h"
+#include "sdf/base/openvdb.h"
 #include "tools/commands.h"
 #include "tools/output.h"
 

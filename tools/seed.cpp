@@ -17,6 +17,7 @@
 #include <bilayer/sdf/grids.h>
 #include <bilayer/sdf/mesh_io.h>
 #include <bilayer/sdf/vdb_io.h>
+#include "sdf/base/openvdb.h"
 #include "tools/commands.h"
 #include "tools/output.h"
 

@@ -12,6 +12,7 @@
 #include "bench/paper/markdown.h"
 #include "bench/paper/part.h"
 #include "bench/paper/theorems.h"
+#include "sdf/base/openvdb.h"
 #include "tests/support/truth.h"
 
 namespace bilayer::paper {

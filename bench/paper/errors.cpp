@@ -1,6 +1,7 @@
 #include "bench/paper/errors.h"
 
 #include <bilayer/sdf/grids.h>
+#include "sdf/base/openvdb.h"
 
 namespace bilayer::paper {
 

@@ -21,6 +21,7 @@
 #include "bench/paper/part.h"
 #include "bench/paper/published.h"
 #include "bench/program.h"
+#include "sdf/base/openvdb.h"
 #include "sdf/fill/double_layer.h"
 
 namespace bilayer::paper {

@@ -14,6 +14,7 @@
 
 #include <bilayer/sdf/grids.h>
 #include "collider/field/mesh_rays.h"
+#include "sdf/base/openvdb.h"
 
 namespace bilayer::paper {
 

@@ -9,6 +9,7 @@
 #include "bench/paper/models.h"
 #include "bench/paper/part.h"
 #include "bench/paper/scatter.h"
+#include "sdf/base/openvdb.h"
 
 namespace bilayer::paper {
 namespace {

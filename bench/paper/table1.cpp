@@ -13,6 +13,7 @@
 #include "bench/paper/published.h"
 #include "bench/paper/scatter.h"
 #include "demos/shared/shapes.h"
+#include "sdf/base/openvdb.h"
 
 namespace bilayer::paper {
 namespace {

@@ -17,6 +17,7 @@
 #include "collider/contact/stored_mesh.h"
 #include "collider/contact/stored_points.h"
 #include "collider/field/field_data.h"
+#include "sdf/base/openvdb.h"
 
 namespace bilayer::detail {
 namespace {

@@ -15,6 +15,7 @@
 #include <bilayer/sdf/grids.h>
 #include "collider/contact/stored_body.h"
 #include "collider/field/field_data.h"
+#include "sdf/base/openvdb_points.h"
 
 namespace bilayer::detail {
 namespace {

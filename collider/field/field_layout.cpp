@@ -17,6 +17,7 @@
 #include "collider/field/interpolant.h"
 #include "collider/field/leaf_block.h"
 #include "sdf/base/morton.h"
+#include "sdf/base/openvdb.h"
 
 namespace bilayer::detail {
 namespace {

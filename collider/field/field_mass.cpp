@@ -13,7 +13,6 @@
 // Tested by tests/collider/mass.cpp.
 #include <oneapi/tbb/parallel_reduce.h>
 #include <oneapi/tbb/parallel_sort.h>
-#include <openvdb/openvdb.h>
 
 #include <algorithm>
 #include <array>
@@ -26,6 +25,7 @@
 #include "collider/field/field_layout.h"
 #include "collider/field/leaf_block.h"
 #include "collider/field/moments.h"
+#include "sdf/base/openvdb.h"
 
 namespace bilayer {
 

@@ -1,8 +1,6 @@
 // Blocks of 9^3 distances: an OpenVDB leaf, and the first layer of voxels of its seven upper neighbours.
 #pragma once
 
-#include <openvdb/openvdb.h>
-
 namespace bilayer::detail {
 
 /// Copies a leaf, or the tile that stands for it, with its upper neighbours. The last axis is the fastest.

@@ -14,6 +14,7 @@
 #include "demos/scenes/bowl.h"
 #include "demos/shared/shapes.h"
 #include "demos/shared/surface_of.h"
+#include "sdf/base/openvdb.h"
 
 namespace bilayer::demo {
 namespace {

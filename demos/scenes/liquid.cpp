@@ -16,6 +16,7 @@
 #include "demos/shared/shapes.h"
 #include "demos/shared/surface_of.h"
 #include "demos/shared/water.h"
+#include "sdf/base/openvdb.h"
 
 namespace bilayer::demo {
 namespace {

@@ -9,6 +9,7 @@
 
 #include "demos/shared/shapes.h"
 #include "integration/fluid/detail/regrid.h"
+#include "sdf/base/openvdb.h"
 
 namespace bilayer::demo {
 

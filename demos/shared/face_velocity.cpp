@@ -8,6 +8,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "sdf/base/openvdb.h"
+
 namespace bilayer::demo {
 namespace {
 

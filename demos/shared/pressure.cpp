@@ -12,6 +12,8 @@
 #include <utility>
 #include <vector>
 
+#include "sdf/base/openvdb.h"
+
 namespace bilayer::demo {
 namespace {
 

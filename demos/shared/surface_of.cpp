@@ -4,6 +4,7 @@
 
 #include <bilayer/sdf/grids.h>
 #include <bilayer/sdf/surface.h>
+#include "sdf/base/openvdb.h"
 
 namespace bilayer::demo {
 

@@ -7,6 +7,7 @@
 
 #include <bilayer/collider/mass.h>
 #include "demos/shared/surface_of.h"
+#include "sdf/base/openvdb.h"
 
 namespace bilayer::demo {
 namespace {

@@ -13,6 +13,7 @@
 #include <stdexcept>
 
 #include <bilayer/sdf/grids.h>
+#include "sdf/base/openvdb.h"
 #include "sdf/base/physical_memory.h"
 
 namespace bilayer::fluid {

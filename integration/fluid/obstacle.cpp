@@ -12,6 +12,7 @@
 #include <stdexcept>
 
 #include "integration/fluid/detail/regrid.h"
+#include "sdf/base/openvdb.h"
 
 namespace bilayer::fluid {
 

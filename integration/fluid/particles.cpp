@@ -13,6 +13,7 @@
 #include <stdexcept>
 
 #include "collider/field/interpolant.h"
+#include "sdf/base/openvdb_points.h"
 
 namespace bilayer::fluid {
 

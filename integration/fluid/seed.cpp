@@ -11,6 +11,7 @@
 
 #include "integration/fluid/detail/regrid.h"
 #include "integration/fluid/detail/repair.h"
+#include "sdf/base/openvdb.h"
 
 namespace bilayer::fluid {
 

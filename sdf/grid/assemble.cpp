@@ -13,6 +13,7 @@
 #include <map>
 #include <type_traits>
 
+#include "sdf/base/openvdb.h"
 #include "sdf/base/progress.h"
 #include "sdf/leaf/sign_propagation.h"
 

@@ -3,8 +3,6 @@
 #pragma once
 
 #include <oneapi/tbb/enumerable_thread_specific.h>
-#include <openvdb/openvdb.h>
-
 #include <array>
 #include <cstddef>
 #include <functional>
@@ -12,6 +10,7 @@
 #include <vector>
 
 #include <bilayer/sdf/grids.h>
+#include "sdf/base/openvdb.h"
 #include "sdf/leaf/band.h"
 #include "sdf/leaf/blocks.h"
 

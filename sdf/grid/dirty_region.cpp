@@ -15,6 +15,8 @@
 #include <stdexcept>
 #include <vector>
 
+#include "sdf/base/openvdb.h"
+
 namespace bilayer::detail {
 namespace {
 

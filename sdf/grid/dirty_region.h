@@ -3,13 +3,12 @@
 // Tested by tests/sdf/rebuild.cpp.
 #pragma once
 
-#include <openvdb/openvdb.h>
-
 #include <cstdint>
 #include <glm/vec3.hpp>
 #include <span>
 
 #include <bilayer/sdf/mesh.h>
+#include "sdf/base/openvdb.h"
 
 namespace bilayer::detail {
 

@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include <bilayer/sdf/grids.h>
+#include "sdf/base/openvdb.h"
 #include "sdf/io/vdb_archive.h"
 
 namespace bilayer::detail {

@@ -12,6 +12,7 @@
 #include <bilayer/sdf/grids.h>
 #include <bilayer/sdf/inspect.h>
 #include "sdf/base/method_names.h"
+#include "sdf/base/openvdb.h"
 #include "sdf/fill/double_layer.h"
 #include "sdf/fill/exact.h"
 #include "sdf/fill/pseudonormal.h"

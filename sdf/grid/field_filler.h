@@ -2,8 +2,6 @@
 // LevelSet of the last one.
 #pragma once
 
-#include <openvdb/openvdb.h>
-
 #include <atomic>
 #include <cstddef>
 #include <functional>
@@ -13,6 +11,7 @@
 #include <bilayer/sdf/level_set.h>
 #include <bilayer/sdf/mesh.h>
 #include <bilayer/sdf/options.h>
+#include "sdf/base/openvdb.h"
 #include "sdf/base/progress.h"
 #include "sdf/base/stopwatch.h"
 #include "sdf/grid/assemble.h"

@@ -1,5 +1,6 @@
 #include "sdf/grid/field_metadata.h"
 #include "sdf/base/method_names.h"
+#include "sdf/base/openvdb.h"
 
 #include <fmt/format.h>
 

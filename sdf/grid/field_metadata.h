@@ -1,14 +1,13 @@
 // The metadata of a field: how it was built, from what, and how its signs were found.
 #pragma once
 
-#include <openvdb/openvdb.h>
-
 #include <cstddef>
 #include <string>
 
 #include <bilayer/sdf/level_set.h>
 #include <bilayer/sdf/mesh.h>
 #include <bilayer/sdf/options.h>
+#include "sdf/base/openvdb.h"
 
 namespace bilayer::detail {
 

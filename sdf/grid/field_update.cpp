@@ -1,5 +1,6 @@
 #include "sdf/grid/field_update.h"
 #include "sdf/base/method_names.h"
+#include "sdf/base/openvdb.h"
 
 #include <cstddef>
 #include <string>

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "sdf/base/large_array.h"
+#include "sdf/base/openvdb.h"
 
 namespace bilayer::detail {
 namespace {

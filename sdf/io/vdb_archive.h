@@ -1,9 +1,9 @@
 // Writes grids in OpenVDB's file format, compressed on all threads; internal.
 #pragma once
 
-#include <openvdb/openvdb.h>
-
 #include <string>
+
+#include "sdf/base/openvdb.h"
 
 namespace bilayer::detail {
 

@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "sdf/base/openvdb.h"
 #include "sdf/io/vdb_points.h"
 #include "sdf/io/vdb_stream.h"
 #include "sdf/io/vdb_tree.h"

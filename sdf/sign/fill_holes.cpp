@@ -13,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include "sdf/base/openvdb.h"
 #include "sdf/bvh/winding_number.h"
 #include "sdf/mesh/topology.h"
 

@@ -9,6 +9,7 @@
 #include <span>
 #include <stdexcept>
 
+#include "sdf/base/openvdb.h"
 #include "sdf/base/progress.h"
 #include "sdf/bvh/winding_number.h"
 #include "sdf/mesh/topology.h"

@@ -7,6 +7,7 @@
 #include <array>
 
 #include "sdf/base/morton.h"
+#include "sdf/base/openvdb.h"
 #include "sdf/base/progress.h"
 
 namespace bilayer::detail {

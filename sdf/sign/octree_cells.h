@@ -3,13 +3,12 @@
 // Tested by tests/sdf/flood.cpp.
 #pragma once
 
-#include <openvdb/openvdb.h>
-
 #include <cstdint>
 #include <limits>
 #include <span>
 #include <vector>
 
+#include "sdf/base/openvdb.h"
 #include "sdf/leaf/band.h"
 
 namespace bilayer::detail {

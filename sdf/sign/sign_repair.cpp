@@ -19,6 +19,7 @@
 #include <vector>
 
 #include "sdf/base/line_side.h"
+#include "sdf/base/openvdb.h"
 #include "sdf/base/progress.h"
 
 namespace bilayer::detail {

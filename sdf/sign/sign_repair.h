@@ -2,11 +2,10 @@
 // compile.
 #pragma once
 
-#include <openvdb/openvdb.h>
-
 #include <cstddef>
 
 #include <bilayer/sdf/mesh.h>
+#include "sdf/base/openvdb.h"
 
 namespace bilayer::detail {
 

@@ -9,6 +9,7 @@
 #include <optional>
 #include <span>
 
+#include "sdf/base/openvdb.h"
 #include "sdf/base/progress.h"
 #include "sdf/leaf/build_size.h"
 #include "sdf/sign/octree_cells.h"

@@ -2,9 +2,8 @@
 // faces are oriented correctly.
 #pragma once
 
-#include <openvdb/openvdb.h>
-
 #include <bilayer/sdf/mesh.h>
+#include "sdf/base/openvdb.h"
 #include "sdf/leaf/band.h"
 
 namespace bilayer::detail {

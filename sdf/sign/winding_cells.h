@@ -1,10 +1,9 @@
 // Signs of the space between leaves by winding numbers.
 #pragma once
 
-#include <openvdb/openvdb.h>
-
 #include <vector>
 
+#include "sdf/base/openvdb.h"
 #include "sdf/sign/winding_brick.h"
 #include "sdf/sign/winding_query.h"
 

@@ -1,11 +1,10 @@
 // The side of a point by the winding number, and how far that side is valid.
 #pragma once
 
-#include <openvdb/openvdb.h>
-
 #include <cstdint>
 #include <glm/vec3.hpp>
 
+#include "sdf/base/openvdb.h"
 #include "sdf/bvh/winding_number.h"
 #include "sdf/sign/winding_slope.h"
 

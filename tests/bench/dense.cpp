@@ -9,6 +9,7 @@
 #include <bilayer/sdf/mesh_io.h>
 #include "bench/paper/scatter.h"
 #include "demos/shared/shapes.h"
+#include "sdf/base/openvdb.h"
 #include "tests/support/support.h"
 
 using namespace bilayer;

@@ -12,6 +12,7 @@
 #include <bilayer/sdf/grids.h>
 #include "demos/shared/shapes.h"
 #include "integration/bullet/detail/convert.h"
+#include "sdf/base/openvdb.h"
 
 namespace bilayer::test {
 

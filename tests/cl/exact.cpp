@@ -1,5 +1,4 @@
 // The exact method on an OpenCL device against the ground truth: every distance, every sign, the whole band.
-#include <openvdb/openvdb.h>
 #include <catch2/catch.hpp>
 
 #include <bilayer/cl/filler.h>
@@ -7,6 +6,7 @@
 #include <bilayer/sdf/grids.h>
 #include <bilayer/sdf/mesh_io.h>
 #include "demos/shared/shapes.h"
+#include "sdf/base/openvdb.h"
 #include "tests/support/clean.h"
 #include "tests/support/support.h"
 #include "tests/support/truth.h"

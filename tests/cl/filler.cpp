@@ -18,6 +18,7 @@
 #include <bilayer/sdf/mesh_io.h>
 #include "cl/detail/program.h"
 #include "demos/shared/shapes.h"
+#include "sdf/base/openvdb.h"
 #include "sdf/leaf/blocks.h"
 #include "tests/support/support.h"
 #include "tests/support/tiles.h"

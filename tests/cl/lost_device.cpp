@@ -16,6 +16,7 @@
 #include "cl/detail/program.h"
 #include "collider/contact/sampled_contacts.h"
 #include "demos/shared/shapes.h"
+#include "sdf/base/openvdb.h"
 
 using namespace bilayer;
 using namespace bilayer::detail;

@@ -4,7 +4,6 @@
 #include <oneapi/tbb/parallel_for.h>
 #include <openvdb/points/PointAttribute.h>
 #include <openvdb/points/PointCount.h>
-#include <openvdb/points/PointDataGrid.h>
 
 #include <algorithm>
 #include <catch2/catch.hpp>
@@ -21,6 +20,7 @@
 #include <bilayer/sdf/grids.h>
 #include <bilayer/sdf/vdb_io.h>
 #include "demos/shared/shapes.h"
+#include "sdf/base/openvdb_points.h"
 #include "tests/support/analytic.h"
 #include "tests/support/random.h"
 #include "tests/support/support.h"

@@ -14,6 +14,7 @@
 #include "collider/contact/collider_data.h"
 #include "collider/field/field_data.h"
 #include "demos/shared/shapes.h"
+#include "sdf/base/openvdb.h"
 #include "tests/support/random.h"
 #include "tests/support/sampling.h"
 #include "tests/support/support.h"

@@ -1,8 +1,6 @@
 // Files with invalid entries: they are refused, or the result answers all queries safely.
 #include <sys/resource.h>
 
-#include <openvdb/points/PointDataGrid.h>
-
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <cstring>
@@ -23,6 +21,7 @@
 #include "collider/contact/body.h"
 #include "collider/contact/collider_data.h"
 #include "demos/shared/shapes.h"
+#include "sdf/base/openvdb_points.h"
 #include "tests/support/random.h"
 #include "tests/support/support.h"
 

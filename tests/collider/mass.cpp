@@ -20,6 +20,7 @@
 #include <bilayer/sdf/grids.h>
 #include <bilayer/sdf/mesh_io.h>
 #include "demos/shared/shapes.h"
+#include "sdf/base/openvdb.h"
 #include "tests/support/analytic.h"
 #include "tests/support/cells.h"
 #include "tests/support/clean.h"

@@ -9,6 +9,7 @@
 #include <bilayer/integration/fluid/seed.h>
 #include "demos/shared/shapes.h"
 #include "demos/shared/surface_of.h"
+#include "sdf/base/openvdb.h"
 #include "tests/support/support.h"
 
 using namespace bilayer;

@@ -6,6 +6,7 @@
 #include <bilayer/sdf/build.h>
 #include <bilayer/sdf/grids.h>
 #include "demos/shared/shapes.h"
+#include "sdf/base/openvdb.h"
 
 using namespace bilayer;
 

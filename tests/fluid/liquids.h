@@ -1,7 +1,6 @@
 // Liquids and bodies for tests, and checks of liquids.
 #pragma once
 
-#include <openvdb/openvdb.h>
 #include <openvdb/tools/Diagnostics.h>
 #include <openvdb/tools/LevelSetMeasure.h>
 
@@ -13,6 +12,7 @@
 #include <bilayer/sdf/build.h>
 #include <bilayer/sdf/grids.h>
 #include <bilayer/sdf/level_set.h>
+#include "sdf/base/openvdb.h"
 #include "tests/support/support.h"
 
 namespace bilayer::test {

@@ -10,6 +10,7 @@
 
 #include <bilayer/sdf/build.h>
 #include "demos/shared/shapes.h"
+#include "sdf/base/openvdb.h"
 
 using namespace bilayer;
 using openvdb::Coord;

@@ -13,6 +13,7 @@
 #include <bilayer/sdf/surface.h>
 #include "demos/shared/shapes.h"
 #include "liquids.h"
+#include "sdf/base/openvdb.h"
 #include "tests/support/cells.h"
 #include "tests/support/support.h"
 #include "tests/support/truth.h"

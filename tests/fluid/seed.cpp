@@ -15,6 +15,7 @@
 #include <bilayer/sdf/mesh_io.h>
 #include "demos/shared/shapes.h"
 #include "liquids.h"
+#include "sdf/base/openvdb.h"
 #include "tests/support/support.h"
 #include "tests/support/truth.h"
 

@@ -11,6 +11,7 @@
 #include <bilayer/collider/mass.h>
 #include <bilayer/integration/fluid/seed.h>
 #include "demos/shared/shapes.h"
+#include "sdf/base/openvdb.h"
 #include "tests/support/truth.h"
 
 using namespace bilayer;

@@ -13,6 +13,7 @@
 #include <bilayer/sdf/grids.h>
 #include <bilayer/sdf/mesh_io.h>
 #include "demos/shared/shapes.h"
+#include "sdf/base/openvdb.h"
 #include "sdf/leaf/blocks.h"
 #include "tests/support/support.h"
 

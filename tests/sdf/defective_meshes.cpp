@@ -1,5 +1,4 @@
 // Defective meshes: every public mesh gets a valid field, whatever its faults, or a clear error.
-#include <openvdb/openvdb.h>
 
 #include <algorithm>
 #include <catch2/catch.hpp>
@@ -11,6 +10,7 @@
 #include <bilayer/sdf/grids.h>
 #include <bilayer/sdf/mesh_io.h>
 #include "demos/shared/shapes.h"
+#include "sdf/base/openvdb.h"
 #include "sdf/sign/sign_choice.h"
 #include "tests/support/support.h"
 

@@ -12,6 +12,7 @@
 #include <bilayer/sdf/grids.h>
 #include <bilayer/sdf/mesh_io.h>
 #include "demos/shared/shapes.h"
+#include "sdf/base/openvdb.h"
 #include "sdf/fill/layer_samples.h"
 #include "tests/support/support.h"
 #include "tests/support/tiles.h"

@@ -1,7 +1,6 @@
 // The exact method against the ground truth: every distance, every sign, the whole band, over the public meshes and
 // over shapes on which other builders fail. `bench_accuracy` does the same with more voxels.
 #include <oneapi/tbb/global_control.h>
-#include <openvdb/openvdb.h>
 
 #include <algorithm>
 #include <catch2/catch.hpp>
@@ -15,6 +14,7 @@
 #include <bilayer/sdf/grids.h>
 #include <bilayer/sdf/mesh_io.h>
 #include "demos/shared/shapes.h"
+#include "sdf/base/openvdb.h"
 #include "tests/support/clean.h"
 #include "tests/support/support.h"
 #include "tests/support/truth.h"

@@ -8,6 +8,7 @@
 #include <bilayer/sdf/build.h>
 #include <bilayer/sdf/mesh_io.h>
 #include "demos/shared/shapes.h"
+#include "sdf/base/openvdb.h"
 #include "tests/sdf/unsigned_band.h"
 #include "tests/support/support.h"
 

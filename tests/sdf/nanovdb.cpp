@@ -19,6 +19,7 @@
 #include <bilayer/sdf/grids.h>
 #include <bilayer/sdf/vdb_io.h>
 #include "demos/shared/shapes.h"
+#include "sdf/base/openvdb.h"
 #include "tests/support/support.h"
 
 using namespace bilayer;

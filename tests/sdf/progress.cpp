@@ -7,6 +7,7 @@
 #include <random>
 
 #include "demos/shared/shapes.h"
+#include "sdf/base/openvdb.h"
 #include "sdf/bvh/triangle_tree.h"
 #include "sdf/bvh/wide_tree.h"
 #include "sdf/bvh/winding_number.h"

@@ -14,6 +14,7 @@
 #include <bilayer/sdf/grids.h>
 #include <bilayer/sdf/mesh_io.h>
 #include "demos/shared/shapes.h"
+#include "sdf/base/openvdb.h"
 #include "sdf/base/progress.h"
 #include "sdf/fill/pseudonormal.h"
 #include "tests/support/support.h"

@@ -12,6 +12,7 @@
 
 #include <bilayer/sdf/grids.h>
 #include "demos/shared/shapes.h"
+#include "sdf/base/openvdb.h"
 #include "tests/support/support.h"
 
 using namespace bilayer;

@@ -9,6 +9,7 @@
 #include <bilayer/sdf/grids.h>
 #include <bilayer/sdf/inspect.h>
 #include "demos/shared/shapes.h"
+#include "sdf/base/openvdb.h"
 #include "sdf/mesh/orient.h"
 #include "sdf/sign/sign_choice.h"
 #include "tests/support/support.h"

@@ -2,8 +2,6 @@
 // exact.
 #include "sdf/mesh/unite.h"
 
-#include <openvdb/openvdb.h>
-
 #include <algorithm>
 #include <catch2/catch.hpp>
 #include <cmath>
@@ -17,6 +15,7 @@
 #include <bilayer/sdf/inspect.h>
 #include <bilayer/sdf/mesh_io.h>
 #include "demos/shared/shapes.h"
+#include "sdf/base/openvdb.h"
 #include "sdf/sign/sign_choice.h"
 #include "tests/support/cells.h"
 #include "tests/support/support.h"

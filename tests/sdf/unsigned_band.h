@@ -2,14 +2,13 @@
 #pragma once
 
 #include <oneapi/tbb/global_control.h>
-#include <openvdb/openvdb.h>
-
 #include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <string>
 
 #include <bilayer/sdf/mesh.h>
+#include "sdf/base/openvdb.h"
 #include "sdf/leaf/band.h"
 #include "tests/support/support.h"
 

@@ -10,6 +10,7 @@
 #include <bilayer/sdf/build.h>
 #include <bilayer/sdf/grids.h>
 #include "demos/shared/shapes.h"
+#include "sdf/base/openvdb.h"
 #include "tests/support/random.h"
 #include "tests/support/support.h"
 

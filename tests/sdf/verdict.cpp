@@ -1,11 +1,10 @@
 // The comparison of fields with the ground truth itself: it accepts exact fields, and notices each fault.
 #include <oneapi/tbb/global_control.h>
-#include <openvdb/openvdb.h>
-
 #include <algorithm>
 #include <catch2/catch.hpp>
 
 #include "demos/shared/shapes.h"
+#include "sdf/base/openvdb.h"
 #include "tests/support/support.h"
 #include "tests/support/truth.h"
 #include "tests/support/verdict.h"

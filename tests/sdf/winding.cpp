@@ -10,6 +10,7 @@
 #include <bilayer/sdf/inspect.h>
 #include <bilayer/sdf/mesh_io.h>
 #include "demos/shared/shapes.h"
+#include "sdf/base/openvdb.h"
 #include "sdf/bvh/winding_number.h"
 #include "tests/sdf/unsigned_band.h"
 #include "tests/support/support.h"

@@ -1,6 +1,5 @@
 #include "tests/support/analytic.h"
 
-#include <openvdb/openvdb.h>
 #include <openvdb/tools/Prune.h>
 
 #include <algorithm>
@@ -12,6 +11,7 @@
 
 #include <bilayer/sdf/build.h>
 #include <bilayer/sdf/grids.h>
+#include "sdf/base/openvdb.h"
 
 namespace bilayer::test {
 

@@ -10,6 +10,8 @@
 #include <glm/gtc/constants.hpp>
 #include <random>
 
+#include "sdf/base/openvdb.h"
+
 namespace bilayer::test {
 namespace {
 

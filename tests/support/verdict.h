@@ -2,13 +2,12 @@
 // Shared by the accuracy benchmark and the tests of the exact method.
 #pragma once
 
-#include <openvdb/openvdb.h>
-
 #include <cstdint>
 #include <string>
 #include <vector>
 
 #include <bilayer/sdf/mesh.h>
+#include "sdf/base/openvdb.h"
 #include "tests/support/truth.h"
 
 namespace bilayer::test {

@@ -1,8 +1,6 @@
 // `bilayer build`: its options, its report, and what it keeps in the file.
-#include <nanovdb/util/IO.h>
-#include <openvdb/openvdb.h>
-
 #include <fmt/format.h>
+#include <nanovdb/util/IO.h>
 #include <catch2/catch.hpp>
 #include <fstream>
 #include <glm/geometric.hpp>
@@ -14,6 +12,7 @@
 #include <bilayer/sdf/vdb_io.h>
 #include "collider/contact/collider_data.h"
 #include "demos/shared/shapes.h"
+#include "sdf/base/openvdb.h"
 #include "tests/support/support.h"
 #include "tests/tools/program.h"
 

@@ -1,7 +1,5 @@
 // `bilayer query`, `surface` and `export`.
 #include <nanovdb/util/IO.h>
-#include <openvdb/openvdb.h>
-
 #include <catch2/catch.hpp>
 #include <cmath>
 #include <glm/geometric.hpp>
@@ -10,6 +8,7 @@
 #include <bilayer/sdf/grids.h>
 #include <bilayer/sdf/mesh_io.h>
 #include <bilayer/sdf/vdb_io.h>
+#include "sdf/base/openvdb.h"
 #include "tests/support/support.h"
 #include "tests/tools/program.h"
 

@@ -1,6 +1,5 @@
 // `bilayer inspect` and `bilayer info`: what they report of meshes and files.
 #include <nanovdb/util/IO.h>
-#include <openvdb/openvdb.h>
 #include <openvdb/tools/LevelSetSphere.h>
 
 #include <catch2/catch.hpp>
@@ -11,6 +10,7 @@
 #include <bilayer/sdf/vdb_io.h>
 #include "collider/contact/collider_data.h"
 #include "demos/shared/shapes.h"
+#include "sdf/base/openvdb.h"
 #include "tests/support/support.h"
 #include "tests/tools/program.h"
 

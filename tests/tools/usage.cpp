@@ -5,6 +5,7 @@
 #include <catch2/catch.hpp>
 
 #include <bilayer/sdf/grids.h>
+#include "sdf/base/openvdb.h"
 #include "tests/support/support.h"
 #include "tests/tools/program.h"
 

@@ -18,6 +18,7 @@
 #include <bilayer/sdf/build.h>
 #include <bilayer/sdf/grids.h>
 #include <bilayer/sdf/surface.h>
+#include "sdf/base/openvdb.h"
 #include "sdf/sign/hole_width.h"
 #include "sdf/sign/sign_choice.h"
 

@@ -19,6 +19,8 @@
 #include <utility>
 #include <vector>
 
+#include "sdf/base/openvdb.h"
+
 namespace bilayer::fluid::detail {
 
 namespace {
