@@ -147,8 +147,8 @@ double volumeOf(const openvdb::FloatGrid::Ptr& liquid) {
 
 // Adds the report of one seed to the sum of all.
 void add(fluid::SeedReport& all, const fluid::SeedReport& next) {
-    if (next.largestChange > all.largestChange) {
-        all.largestChange = next.largestChange;
+    if (next.maxChangeVoxels > all.maxChangeVoxels) {
+        all.maxChangeVoxels = next.maxChangeVoxels;
         all.where = next.where;
     }
     all.changedVoxels += next.changedVoxels;
@@ -170,7 +170,7 @@ void report(const SeedArguments& a, const openvdb::FloatGrid& liquid, const std:
                       {"volume", volume},
                       {"changes",
                        {{"voxels", changes.changedVoxels},
-                        {"largest", number(changes.largestChange)},
+                        {"largest", number(changes.maxChangeVoxels)},
                         {"where", vector(changes.where)}}},
                       {"particles", particles},
                       {"seconds", seconds}});
@@ -182,7 +182,7 @@ void report(const SeedArguments& a, const openvdb::FloatGrid& liquid, const std:
     table.row("volume", fmt::format("{:.6g} m^3", volume));
     if (changes.changedVoxels)
         table.row("changed", fmt::format("{} voxels by more than 0.1 voxel, at most {:.2f} at {:.10g} {:.10g} {:.10g}",
-                                         grouped(changes.changedVoxels), changes.largestChange, changes.where.x,
+                                         grouped(changes.changedVoxels), changes.maxChangeVoxels, changes.where.x,
                                          changes.where.y, changes.where.z));
     if (a.particlesGiven->count()) table.row("particles", grouped(particles));
     table.row("time", fmt::format("{:.3f} s", seconds));

@@ -1,4 +1,5 @@
 // The device memory of a batch of bricks: its size, its buffers, and the layout of its results.
+// Tested by tests/cl/filler.cpp.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,5 @@
 // Enqueues kernels by name.
+// Tested by tests/cl/filler.cpp.
 #pragma once
 
 #include "cl/detail/program.h"

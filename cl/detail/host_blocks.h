@@ -1,4 +1,5 @@
 // Blocks that a device leaves to the host.
+// Tested by tests/cl/filler.cpp.
 #pragma once
 
 #include <glm/vec3.hpp>

@@ -1,4 +1,5 @@
 // A device buffer that the host reads in place.
+// Tested by tests/cl/filler.cpp.
 #pragma once
 
 #include <cstddef>

@@ -1,4 +1,5 @@
 // The transform from the coordinates of one body into those of another.
+// Tested by tests/collider/collide.cpp.
 #pragma once
 
 #include <bilayer/collider/contact.h>

@@ -1,4 +1,5 @@
 // Refinement of contacts to the closest points of two surfaces.
+// Tested by tests/collider/collide.cpp.
 #pragma once
 
 #include <bilayer/collider/contact.h>

@@ -1,4 +1,5 @@
 // The field of the other body of a pair, as the contact search queries it.
+// Tested by tests/collider/collide.cpp.
 #pragma once
 
 #include <bilayer/collider/contact.h>

@@ -1,4 +1,5 @@
 // The distance between two triangle meshes.
+// Tested by tests/collider/distance.cpp.
 #pragma once
 
 #include <cstdint>

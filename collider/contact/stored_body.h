@@ -1,4 +1,5 @@
 // Conversions and checks that the parts of a stored body share.
+// Tested by tests/collider/body.cpp.
 #pragma once
 
 #include <openvdb/Types.h>

@@ -1,4 +1,5 @@
 // Storage of a body's mesh as a metadata entry of the distance grid.
+// Tested by tests/collider/body.cpp.
 #pragma once
 
 #include <bilayer/sdf/mesh.h>

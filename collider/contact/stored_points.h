@@ -1,4 +1,5 @@
 // Storage of a body's surface points as a grid of OpenVDB points.
+// Tested by tests/collider/body.cpp.
 #pragma once
 
 #include <bilayer/sdf/level_set.h>

@@ -1,4 +1,5 @@
 // The closest points of two triangles.
+// Tested by tests/collider/distance.cpp.
 #pragma once
 
 #include <array>

@@ -1,4 +1,5 @@
 // The distances of a field's coarse cells to the surface, for Clearance.
+// Tested by tests/collider/field.cpp.
 #pragma once
 
 #include <array>

@@ -1,5 +1,8 @@
 // Blocks of 9^3 distances: an OpenVDB leaf, and the first layer of voxels of its seven upper neighbours.
+// Tested by tests/collider/field.cpp.
 #pragma once
+
+#include "sdf/base/openvdb.h"
 
 namespace bilayer::detail {
 

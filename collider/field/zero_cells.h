@@ -1,5 +1,6 @@
 // The cells of a field's interpolant, as the queries of its zero set read them. Lengths in voxels, places from the
 // directory's first voxel.
+// Tested by tests/collider/zero_set.cpp.
 #pragma once
 
 #include <array>

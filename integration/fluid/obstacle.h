@@ -3,7 +3,7 @@
 
 #include <openvdb/openvdb.h>
 
-#include <bilayer/integration/fluid/placement.h>
+#include <bilayer/integration/fluid/seed.h>
 #include <bilayer/sdf/level_set.h>
 #include <bilayer/sdf/mesh.h>
 

@@ -13,6 +13,7 @@
 #include <stdexcept>
 
 #include "collider/field/interpolant.h"
+#include "integration/fluid/detail/placement.h"
 #include "sdf/base/openvdb_points.h"
 
 namespace bilayer::fluid {
@@ -195,7 +196,7 @@ Particles particles(const FloatGrid& liquid, const ParticleOptions& options) {
 
 Particles particles(const Field& field, const Placement& placement, const openvdb::math::Transform& voxels,
                     const ParticleOptions& options) {
-    check(placement);
+    checkPlacement(placement);
     require(voxels, options);
     const Body body(field, placement, voxels);
     return gather(body.blocks(), options, [&](const Coord& origin, std::vector<glm::vec3>& found) {

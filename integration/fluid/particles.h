@@ -10,7 +10,7 @@
 #include <vector>
 
 #include <bilayer/collider/field.h>
-#include <bilayer/integration/fluid/placement.h>
+#include <bilayer/integration/fluid/seed.h>
 
 namespace bilayer::fluid {
 

@@ -6,11 +6,25 @@
 #include <cstddef>
 #include <glm/vec3.hpp>
 
-#include <bilayer/integration/fluid/placement.h>
+#include <bilayer/collider/pose.h>
 #include <bilayer/sdf/level_set.h>
 #include <bilayer/sdf/mesh.h>
 
 namespace bilayer::fluid {
+
+/// The pose of a body in the world, after scaling along its own axes: body coordinates x become pose.toWorld(scale *
+/// x).
+struct Placement {
+    Pose pose{};
+    glm::vec3 scale{1};  ///< positive: a reflection would invert the body
+
+    Placement() = default;
+    Placement(const Pose& placed, const glm::vec3& stretch = glm::vec3(1)) : pose(placed), scale(stretch) {}
+
+    glm::dvec3 toWorld(const glm::dvec3& point) const {
+        return glm::dquat(pose.rotation) * (glm::dvec3(scale) * point) + glm::dvec3(pose.position);
+    }
+};
 
 enum class SeedMode { unite, intersect, subtract };
 
@@ -25,7 +39,7 @@ struct SeedOptions {
 
 /// How far distances were changed to make the result a level set.
 struct SeedReport {
-    float largestChange = 0;        ///< maximum change [voxels], over the voxels that were in the band and still are
+    float maxChangeVoxels = 0;      ///< maximum change, over the voxels that were in the band and still are
     glm::dvec3 where{0};            ///< centre of the voxel with the maximum change [m]
     std::size_t changedVoxels = 0;  ///< voxels that changed by more than 0.1 voxels
 };

@@ -1,4 +1,5 @@
 // The names of build methods and sign methods: on the command line, in metadata, in errors and in benchmarks.
+// Tested by tests/sdf/build.cpp.
 #pragma once
 
 #include <array>

@@ -2,6 +2,7 @@
 //
 // Every file that creates a grid would compile the virtual functions of its tree: reading, writing, counting, ten
 // seconds for each type of grid. The library has them for the types that openvdb::initialize() registers.
+// Tested by tests/sdf/vdb_io.cpp.
 #pragma once
 
 #include <openvdb/openvdb.h>

@@ -1,4 +1,5 @@
 // OpenVDB's points for the sources of this project, as sdf/base/openvdb.h gives its grids.
+// Tested by tests/sdf/vdb_io.cpp.
 #pragma once
 
 #include <openvdb/points/PointDataGrid.h>

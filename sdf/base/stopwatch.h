@@ -1,4 +1,5 @@
 // Measures the phases of a build.
+// Tested by tests/sdf/build.cpp.
 #pragma once
 
 #include <chrono>

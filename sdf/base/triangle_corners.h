@@ -1,4 +1,5 @@
 // The corners of a triangle in double precision.
+// Tested by tests/sdf/exact.cpp.
 #pragma once
 
 #include <array>

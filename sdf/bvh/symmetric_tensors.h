@@ -1,4 +1,5 @@
 // Symmetric tensors of order two and three in 3D: the moments of the triangles of a cluster.
+// Tested by tests/sdf/winding.cpp.
 #pragma once
 
 #include <array>

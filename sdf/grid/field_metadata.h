@@ -1,4 +1,5 @@
 // The metadata of a field: how it was built, from what, and how its signs were found.
+// Tested by tests/sdf/build.cpp.
 #pragma once
 
 #include <cstddef>

@@ -1,4 +1,5 @@
 // Updates the field of a mesh after some of its triangles have moved.
+// Tested by tests/sdf/rebuild.cpp.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,5 @@
 // The header of a PLY file: its elements and their properties; internal.
+// Tested by tests/sdf/ply_reader.cpp.
 #pragma once
 
 #include <cstddef>

@@ -1,4 +1,5 @@
 // The checksum line at the end of .vdb files; internal.
+// Tested by tests/sdf/vdb_io.cpp.
 #pragma once
 
 #include <string>

@@ -1,4 +1,5 @@
 // A .vdb file as a stream whose lengths are checked before they are used; internal.
+// Tested by tests/sdf/vdb_io.cpp.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,5 @@
 // Checks the lengths stored in the trees of a .vdb file; internal.
+// Tested by tests/sdf/vdb_io.cpp.
 #pragma once
 
 #include <array>

@@ -1,4 +1,5 @@
 // The size of a build, estimated before any allocation.
+// Tested by tests/sdf/build.cpp.
 #pragma once
 
 #include <bilayer/sdf/mesh.h>

@@ -1,4 +1,5 @@
 // The consistently oriented components of a mesh, with their volume and their border.
+// Tested by tests/sdf/orient.cpp.
 #pragma once
 
 #include <cstdint>

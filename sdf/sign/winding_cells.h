@@ -1,4 +1,5 @@
 // Signs of the space between leaves by winding numbers.
+// Tested by tests/sdf/winding.cpp.
 #pragma once
 
 #include <vector>

@@ -1,4 +1,5 @@
 // Signs of the voxels of leaves by winding numbers.
+// Tested by tests/sdf/winding.cpp.
 #pragma once
 
 #include "sdf/leaf/band.h"

@@ -1,4 +1,5 @@
 // The gradient of the winding number away from the surface of an open mesh.
+// Tested by tests/sdf/winding.cpp.
 #pragma once
 
 #include <cstddef>

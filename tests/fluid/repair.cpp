@@ -79,8 +79,8 @@ TEST_CASE("shapes of right angles are level sets at any size and place") {
             for (glm::vec3& p : placed.points) p += shift;
             const test::Truth truth(placed);
             const double off = error(*liquid, [&](const glm::dvec3& p) { return truth.signedDistance(p); });
-            CHECK(off <= double(report.largestChange) + 1e-3);
-            CAPTURE(off, report.largestChange);
+            CHECK(off <= double(report.maxChangeVoxels) + 1e-3);
+            CAPTURE(off, report.maxChangeVoxels);
             CHECK((off < 0.1 || report.changedVoxels > 0));
         }
     }
@@ -116,7 +116,7 @@ TEST_CASE("the report has the maximum change of distances, and its position") {
         changed += change > 0.1;
         largest = std::max(largest, change);
     }
-    CHECK(double(report.largestChange) == Approx(largest).margin(1e-3));
+    CHECK(double(report.maxChangeVoxels) == Approx(largest).margin(1e-3));
     CHECK(std::abs(double(report.changedVoxels) - double(changed)) <= 0.1 * double(changed) + 1);
     const openvdb::Vec3d at(report.where.x, report.where.y, report.where.z);
     const double there = double(liquid->tree().getValue(openvdb::Coord::round(liquid->worldToIndex(at))));

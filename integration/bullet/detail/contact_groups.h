@@ -1,4 +1,5 @@
 // Groups of contacts with similar normals: the contact patches before their reduction.
+// Tested by tests/bullet/contact_reduction.cpp.
 #pragma once
 
 #include <bilayer/collider/contact.h>

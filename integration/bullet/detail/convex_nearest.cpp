@@ -1,4 +1,5 @@
 // The nearest point of a convex shape's surface, casts against it, and its curvature there.
+// Tested by tests/bullet/convex.cpp.
 #include <algorithm>
 #include <array>
 #include <cmath>

@@ -1,4 +1,5 @@
 // Contacts of a field's surface points with the faces of triangles.
+// Tested by tests/bullet/sliding.cpp.
 #pragma once
 
 #include <bilayer/collider/contact.h>

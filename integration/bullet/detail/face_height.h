@@ -1,4 +1,5 @@
 // Whether the height of a field's surface point over a triangle is the exact distance of the two.
+// Tested by tests/bullet/sliding.cpp.
 #pragma once
 
 #include <glm/vec3.hpp>

@@ -1,4 +1,5 @@
 // The contacts of a patch that small motions of the bodies meet first.
+// Tested by tests/bullet/contact_reduction.cpp.
 #pragma once
 
 #include <bilayer/collider/contact.h>

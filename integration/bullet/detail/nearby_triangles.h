@@ -1,4 +1,5 @@
 // The triangles of an open surface near a field, as Bullet passes them.
+// Tested by tests/bullet/sliding.cpp.
 #pragma once
 
 #include <BulletCollision/CollisionShapes/btTriangleCallback.h>

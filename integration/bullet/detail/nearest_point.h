@@ -1,4 +1,5 @@
 // The nearest point of a convex shape's surface.
+// Tested by tests/bullet/convex.cpp.
 #pragma once
 
 #include <glm/vec3.hpp>

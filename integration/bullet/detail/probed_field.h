@@ -1,4 +1,5 @@
 // A field that is collided with the triangles of an open surface, and the lengths of the search.
+// Tested by tests/bullet/sliding.cpp.
 #pragma once
 
 #include <bilayer/collider/contact.h>

@@ -1,4 +1,5 @@
 // The distance of a point from a triangle.
+// Tested by tests/bullet/convex.cpp.
 #pragma once
 
 #include <algorithm>

@@ -1,4 +1,5 @@
 // The face of a triangle: its plane, and where points are over it.
+// Tested by tests/bullet/sliding.cpp.
 #pragma once
 
 #include <array>

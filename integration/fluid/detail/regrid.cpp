@@ -18,6 +18,7 @@
 #include <bilayer/sdf/build.h>
 #include <bilayer/sdf/grids.h>
 #include <bilayer/sdf/surface.h>
+#include "integration/fluid/detail/placement.h"
 #include "sdf/base/openvdb.h"
 #include "sdf/sign/hole_width.h"
 #include "sdf/sign/sign_choice.h"
@@ -147,7 +148,7 @@ void requireInside(const FloatGrid& grid) {
 
 FloatGrid::Ptr regrid(const Mesh& mesh, const Placement& placement, const Transform& voxels, float width,
                       bool uniteSolids) {
-    check(placement);
+    checkPlacement(placement);
     requireCubes(voxels);
     validate(mesh);
     const double voxel = voxels.voxelSize()[0];
@@ -165,7 +166,7 @@ FloatGrid::Ptr regrid(const Mesh& mesh, const Placement& placement, const Transf
 }
 
 FloatGrid::Ptr regrid(const LevelSet& field, const Placement& placement, const Transform& voxels, float width) {
-    check(placement);
+    checkPlacement(placement);
     requireCubes(voxels);
     if (std::min(field.exteriorWidth(), field.interiorWidth()) < minFieldWidth * field.voxelSize() * (1 - rounding))
         throw std::invalid_argument("the field's band is narrower than a voxel");

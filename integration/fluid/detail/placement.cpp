@@ -1,11 +1,11 @@
-#include <bilayer/integration/fluid/placement.h>
+#include "integration/fluid/detail/placement.h"
 
 #include <algorithm>
 #include <cmath>
 #include <glm/gtc/quaternion.hpp>
 #include <stdexcept>
 
-namespace bilayer::fluid {
+namespace bilayer::fluid::detail {
 namespace {
 
 constexpr float unitTolerance = 1e-3f;  // tolerance of a rotation's length: rounding of float products
@@ -16,7 +16,7 @@ bool isFinite(const glm::vec3& v) {
 
 }  // namespace
 
-void check(const Placement& placement) {
+void checkPlacement(const Placement& placement) {
     const auto& [position, rotation] = placement.pose;
     if (!isFinite(position)) throw std::invalid_argument("the pose's position is not finite");
     const float length = glm::length(rotation);
@@ -28,4 +28,4 @@ void check(const Placement& placement) {
         throw std::invalid_argument("the scale is not positive: a mirror would turn the body inside out");
 }
 
-}  // namespace bilayer::fluid
+}  // namespace bilayer::fluid::detail
