@@ -260,7 +260,7 @@ MeshReport inspect(const Mesh& input, float wall) {
     report.duplicateTriangles = countDuplicates(topology);
     report.insideOutComponents = countInsideOut(mesh, tree, of, all);
     report.selfIntersections = countIntersectingPairs(mesh, topology, tree);
-    if (!needsNoTurning(report, all)) report.flippedTriangles = orient(mesh).turnedTriangles;
+    if (!needsNoTurning(report, all)) report.flippedTriangles = orient(mesh).flippedTriangles;
     findThinWalls(tree, measures, wall, report);
     return report;
 }

@@ -96,7 +96,7 @@ bool FieldFiller::fillUnion(const Mesh& mesh) {
     UnionSurface united = unite(mesh, &progress_);
     if (!united.changed()) return false;
     const Orientation solids = orient(mesh, &progress_);
-    if (solids.turnedTriangles > 0) united = unite(solids.mesh, &progress_);
+    if (solids.flippedTriangles > 0) united = unite(solids.mesh, &progress_);
     times_.tiles += part.lap();
     fillFrom(united.mesh, solids.mesh, Sign::winding, unionReason(united), options_.method);
     return true;

@@ -59,9 +59,9 @@ void fillWithRequestedSign(FieldFiller& filler) {
     filler.fill(filler.mesh(), options.sign, asAskedFor, options.method);
     if (options.sign != Sign::normals || filler.signs().conflicts == 0) return;
     const Orientation orientation = orient(filler.mesh(), &filler.progress());
-    if (orientation.turnedTriangles > 0)
+    if (orientation.flippedTriangles > 0)
         filler.fill(orientation.mesh, Sign::normals,
-                    fmt::format("as asked for, with {} triangles turned around", orientation.turnedTriangles),
+                    fmt::format("as asked for, with {} triangles flipped", orientation.flippedTriangles),
                     options.method);
 }
 

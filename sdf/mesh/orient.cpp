@@ -70,11 +70,11 @@ Orientation orientOnce(const Mesh& mesh, Progress* progress) {
     for (const unsigned i : consistent.eachTriangle()) {
         if (!components.isFlipped(i)) continue;
         std::swap(orientation.mesh.triangles[i].y, orientation.mesh.triangles[i].z);
-        ++orientation.turnedTriangles;
+        ++orientation.flippedTriangles;
     }
     for (const OrientedComponent& component : components.all()) {
         orientation.mixedComponents += component.mixed;
-        orientation.turnedComponents += component.flipped && !component.mixed;
+        orientation.flippedComponents += component.flipped && !component.mixed;
         if (component.oneSided && !component.twoSided) orientation.oneSidedTriangles += component.triangles.size();
     }
     return orientation;
@@ -92,13 +92,13 @@ Orientation orient(const Mesh& mesh, Progress* progress) {
     validate(mesh);
     Orientation all = orientOnce(mesh, progress);
     // open components are judged by their surroundings, which the previous pass may have flipped
-    for (int pass = 1; pass < maxPasses && all.turnedTriangles > 0; ++pass) {
+    for (int pass = 1; pass < maxPasses && all.flippedTriangles > 0; ++pass) {
         const Orientation next = orientOnce(all.mesh, progress);
-        if (next.turnedTriangles == 0) break;
+        if (next.flippedTriangles == 0) break;
         all.mesh = next.mesh;
-        all.turnedComponents += next.turnedComponents;
+        all.flippedComponents += next.flippedComponents;
     }
-    all.turnedTriangles = countDifferent(mesh, all.mesh);
+    all.flippedTriangles = countDifferent(mesh, all.mesh);
     return all;
 }
 

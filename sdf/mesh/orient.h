@@ -17,8 +17,8 @@ class Progress;
 /// The result of orient().
 struct Orientation {
     Mesh mesh;                          ///< the same triangles in the same order, some of them flipped
-    std::size_t turnedTriangles = 0;    ///< flipped triangles
-    std::size_t turnedComponents = 0;   ///< consistent components that were flipped as a whole
+    std::size_t flippedTriangles = 0;   ///< flipped triangles
+    std::size_t flippedComponents = 0;  ///< consistent components that were flipped as a whole
     std::size_t mixedComponents = 0;    ///< inconsistent components that were made consistent
     std::size_t oneSidedTriangles = 0;  ///< triangles of one-sided components, such as a Moebius strip; left unchanged
     bool orientable() const { return oneSidedTriangles == 0; }

@@ -49,22 +49,23 @@ std::string percent(double part) {
     return fmt::format("{:.0f} %", 100 * part);
 }
 
-std::string turned(const Orientation& orientation) {
-    return orientation.turnedTriangles ? fmt::format("; {} triangles were turned", orientation.turnedTriangles) : "";
+std::string flipped(const Orientation& orientation) {
+    return orientation.flippedTriangles ? fmt::format("; {} triangles were flipped", orientation.flippedTriangles) : "";
 }
 
 // Selects normals for a mesh that flipping triangles has closed, else winding numbers if they separate the sides.
 SignChoice chooseFor(Orientation orientation, std::string trouble, Progress* progress) {
     SignChoice choice;
-    trouble += turned(orientation);
-    const bool closedByTurning = orientation.turnedTriangles > 0 && balanced(orientation.mesh, progress);
+    trouble += flipped(orientation);
+    const bool closedByTurning = orientation.flippedTriangles > 0 && balanced(orientation.mesh, progress);
     const bool oneSided = 2 * orientation.oneSidedTriangles > orientation.mesh.triangles.size();
     const Bounding share = bounding(orientation.mesh, progress);
     const bool separates = !oneSided && share.nothing + share.reversed <= maxIdle;
-    if (orientation.turnedTriangles) choice.repaired = std::move(orientation.mesh);
+    if (orientation.flippedTriangles) choice.repaired = std::move(orientation.mesh);
     choice.sign = !separates ? Sign::flood : closedByTurning ? Sign::normals : Sign::winding;
     if (choice.sign == Sign::normals)
-        choice.reason = fmt::format("closed, and oriented after {} triangles were turned", orientation.turnedTriangles);
+        choice.reason =
+            fmt::format("closed, and oriented after {} triangles were flipped", orientation.flippedTriangles);
     else if (oneSided)
         choice.reason = trouble + "; most of the surface has one side only";
     else

@@ -210,7 +210,7 @@ TEST_CASE("many threads may ask at once for the triangles of a body without a me
     REQUIRE(&copy.mesh() == meshes[0]);
 }
 
-TEST_CASE("a body keeps a mesh whose triangles were turned as it was turned") {
+TEST_CASE("A body keeps the flipped triangles of its mesh") {
     Mesh inside = shapes::torusKnot(2, 3, 0.5f, 0.15f, 200, 16);
     for (glm::uvec3& triangle : inside.triangles) std::swap(triangle.x, triangle.y);
     const Pair knot(inside, 0.03f, {}, {.accuracy = ContactAccuracy::exact});

@@ -103,7 +103,7 @@ TEST_CASE("with the mesh, points are inside where its surface winds around them"
     }
 }
 
-TEST_CASE("triangles that are turned the wrong way do not turn the inside out") {
+TEST_CASE("Flipped triangles do not swap inside and outside") {
     const unsigned seed = test::seed();
     CAPTURE(seed);
     Random random(seed);

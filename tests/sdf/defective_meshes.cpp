@@ -158,8 +158,8 @@ TEST_CASE("public meshes get their signs in the way that suits them") {
     const char *closed = "closed and oriented", *meets = "intersects itself", *open = "boundary edge";
     for (const Case& c :
          {Case{"fandisk.obj", "normals", closed}, Case{"cgal-cheese.off", "normals", closed},
-          Case{"casting_inverted.off", "normals", "turned"}, Case{"cgal-cube-shuffled.off", "normals", "turned"},
-          Case{"cgal-blobby-shuffled.off", "normals", "turned"}, Case{"cow.obj", "winding", meets, 128},
+          Case{"casting_inverted.off", "normals", "flipped"}, Case{"cgal-cube-shuffled.off", "normals", "flipped"},
+          Case{"cgal-blobby-shuffled.off", "normals", "flipped"}, Case{"cow.obj", "winding", meets, 128},
           Case{"cgal-bones.off", "winding", meets, 128}, Case{"bunny_5k_open.obj", "winding", open},
           Case{"cgal-elephant-with-holes.off", "winding", open}, Case{"suzanne.obj", "winding", open},
           Case{"teapot.obj", "winding", open}, Case{"cgal-three_knives.off", "winding", "unbalanced"},
@@ -198,7 +198,7 @@ TEST_CASE("solids that overlap inside one block are noticed") {
     }
 }
 
-TEST_CASE("a mesh inside out is turned around, wherever it lies") {
+TEST_CASE("A mesh inside out is flipped at any position") {
     const Mesh ball = shapes::sphere(1, 3);
     // at the origin its field spreads over eight of the tree's largest nodes, elsewhere over one
     for (const glm::vec3 by : {glm::vec3(0), glm::vec3(5, 6, 7), glm::vec3(0, 40, 0), glm::vec3(-9, 3, -4)}) {
@@ -212,7 +212,7 @@ TEST_CASE("a mesh inside out is turned around, wherever it lies") {
     }
 }
 
-TEST_CASE("one component inside out beside one that is not is turned alone") {
+TEST_CASE("Of two components, only the one inside out is flipped") {
     const Mesh ball = shapes::sphere(1, 3);
     for (const glm::vec3 axis : {glm::vec3(1, 0, 0), glm::vec3(0, 1, 0), glm::vec3(0, 0, 1)})
         for (const float apart : {1.5f, 8.f}) {

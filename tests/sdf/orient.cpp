@@ -23,8 +23,8 @@ Mesh shuffled(Mesh mesh, unsigned seed) {
 
 void checkUntouched(const Mesh& mesh) {
     const Orientation orientation = orient(mesh);
-    CHECK(orientation.turnedTriangles == 0);
-    CHECK(orientation.turnedComponents == 0);
+    CHECK(orientation.flippedTriangles == 0);
+    CHECK(orientation.flippedComponents == 0);
     CHECK(orientation.orientable());
     CHECK(orientation.mesh.triangles == mesh.triangles);
     CHECK(orientation.mesh.points == mesh.points);
@@ -49,12 +49,12 @@ TEST_CASE("a mesh that is fine keeps its triangles") {
         shapes::join({shapes::box({1, 1, 1}), shapes::moved(shapes::box({1, 1, 1}), {2, 2, 0})}));  // share an edge
 }
 
-TEST_CASE("turned triangles and shells are turned back") {
+TEST_CASE("Flipped triangles and shells are flipped back") {
     const unsigned seed = test::seed();
     CAPTURE(seed);
     for (const Mesh& mesh : {shapes::box({1, 2, 3}), shapes::sphere(1, 3), shapes::bowl(1, 0.1f, 64)}) {
-        CHECK(orient(shapes::flipped(mesh)).turnedTriangles == mesh.triangles.size());
-        CHECK(orient(shapes::flipped(mesh)).turnedComponents == 1);
+        CHECK(orient(shapes::flipped(mesh)).flippedTriangles == mesh.triangles.size());
+        CHECK(orient(shapes::flipped(mesh)).flippedComponents == 1);
         const Orientation repaired = orient(shuffled(mesh, seed));
         CHECK(repaired.mixedComponents == 1);
         CHECK(balanced(repaired.mesh));
@@ -62,10 +62,10 @@ TEST_CASE("turned triangles and shells are turned back") {
     }
 }
 
-TEST_CASE("a shell that touches another along an edge is turned alone") {
+TEST_CASE("A shell that touches another along an edge is flipped alone") {
     const Mesh box = shapes::box({1, 1, 1});
     const Orientation repaired = orient(shapes::join({box, shapes::moved(shapes::flipped(box), {2, 2, 0})}));
-    CHECK(repaired.turnedTriangles == box.triangles.size());
+    CHECK(repaired.flippedTriangles == box.triangles.size());
     CHECK(inspect(repaired.mesh).volume == Approx(16));
 }
 
@@ -85,24 +85,24 @@ TEST_CASE("cavities are kept, and found where the file is not to be trusted") {
     // outside of everything a negative winding number is wrong, regardless of neighbours
     const Mesh beside = shapes::join({big, shapes::moved(shapes::flipped(small), {5, 0, 0})});
     CHECK(windingAfter(beside, glm::dvec3(5, 0.1, 0.2)) == Approx(1));
-    CHECK(orient(beside).turnedTriangles == small.triangles.size());
+    CHECK(orient(beside).flippedTriangles == small.triangles.size());
 }
 
 TEST_CASE("open surfaces are oriented by what they would bound") {
     Mesh open = shapes::flipped(shapes::sphere(1, 3));
     open.triangles.resize(open.triangles.size() - 40);
-    CHECK(orient(open).turnedTriangles == open.triangles.size());
-    CHECK(orient(shapes::flipped(open)).turnedTriangles == 0);
+    CHECK(orient(open).flippedTriangles == open.triangles.size());
+    CHECK(orient(shapes::flipped(open)).flippedTriangles == 0);
     // an open flat surface has no inside: the orientation of its majority is kept
     Mesh sheet = shapes::box({1, 1, 1}, 4);
     std::erase_if(sheet.triangles, [&](const glm::uvec3& t) {
         return sheet.points[t.x].z < 1 || sheet.points[t.y].z < 1 || sheet.points[t.z].z < 1;
     });
     REQUIRE(sheet.triangles.size() == 32);
-    CHECK(orient(sheet).turnedTriangles == 0);
-    CHECK(orient(shapes::flipped(sheet)).turnedTriangles == 0);
+    CHECK(orient(sheet).flippedTriangles == 0);
+    CHECK(orient(shapes::flipped(sheet)).flippedTriangles == 0);
     std::swap(sheet.triangles[7].x, sheet.triangles[7].y);
-    CHECK(orient(sheet).turnedTriangles == 1);
+    CHECK(orient(sheet).flippedTriangles == 1);
 }
 
 TEST_CASE("a surface with one side is left alone and told of") {
@@ -123,7 +123,7 @@ TEST_CASE("a surface with one side is left alone and told of") {
     const Orientation orientation = orient(strip);
     CHECK_FALSE(orientation.orientable());
     CHECK(orientation.oneSidedTriangles == strip.triangles.size());
-    CHECK(orientation.turnedTriangles == 0);
+    CHECK(orientation.flippedTriangles == 0);
 }
 
 TEST_CASE("degenerate and repeated triangles do not hide a flip") {
@@ -155,8 +155,8 @@ TEST_CASE("vertices that only coordinates identify are one") {
         }
         soup.triangles.push_back({first, first + 1, first + 2});
     }
-    CHECK(orient(soup).turnedTriangles == soup.triangles.size());
-    CHECK(orient(soup).turnedComponents == 1);
+    CHECK(orient(soup).flippedTriangles == soup.triangles.size());
+    CHECK(orient(soup).flippedComponents == 1);
 }
 
 TEST_CASE("orient() twice is orient() once, on all of the public corpus that is not clean") {
@@ -170,7 +170,7 @@ TEST_CASE("orient() twice is orient() once, on all of the public corpus that is 
         CAPTURE(name);
         const Orientation once = orient(mesh);
         CHECK(once.mesh.triangles.size() == mesh.triangles.size());
-        CHECK(orient(once.mesh).turnedTriangles == 0);
+        CHECK(orient(once.mesh).flippedTriangles == 0);
         if (balanced(mesh)) CHECK(balanced(once.mesh));
     }
 }

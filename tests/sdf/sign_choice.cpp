@@ -192,7 +192,7 @@ TEST_CASE("a clean solid that holds the tree's large tiles has no conflict where
         CHECK(field.signConflicts() == 0);
         // inside out, the same tiles reveal the conflict
         for (glm::uvec3& t : mesh.triangles) std::swap(t.x, t.y);
-        CHECK(build(mesh, options).signReason().find("triangles were turned") != std::string::npos);
+        CHECK(build(mesh, options).signReason().find("triangles were flipped") != std::string::npos);
     }
 }
 

@@ -170,7 +170,7 @@ TEST_CASE("signs of clean solids are right as they are, wherever they lie betwee
     }
 }
 
-TEST_CASE("signs that were turned are turned back") {
+TEST_CASE("Reversed signs are reversed back") {
     const unsigned seed = test::seed();
     CAPTURE(seed);
     Random random(seed);
@@ -240,7 +240,7 @@ TEST_CASE("a solid whose every face is there twice, back to back, is not empty")
             CHECK(balanced(mesh));
             CHECK(hasFacesBackToBack(mesh));
             const Orientation orientation = orient(mesh);
-            CHECK(2 * orientation.turnedTriangles == mesh.triangles.size());
+            CHECK(2 * orientation.flippedTriangles == mesh.triangles.size());
             CHECK(balanced(orientation.mesh));
             const LevelSet field = build(mesh, {.voxelSize = voxelSizeFor(mesh, resolution)});
             CAPTURE(solid.triangles.size(), resolution, field.signReason());
@@ -281,7 +281,7 @@ TEST_CASE("double sheets stay as they are and hold nothing") {
         const Mesh mesh = doubled(surface, random);
         CHECK(balanced(mesh));
         const Orientation orientation = orient(mesh);
-        CHECK(orientation.turnedTriangles == 0);
+        CHECK(orientation.flippedTriangles == 0);
         CHECK(orientation.mesh.triangles == mesh.triangles);
         const LevelSet field = build(mesh, {.voxelSize = voxelSizeFor(mesh, 30)});
         CAPTURE(surface.triangles.size(), field.signReason());

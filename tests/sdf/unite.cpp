@@ -370,7 +370,7 @@ TEST_CASE("fields of unions have exact distances and the right sides") {
     }
 }
 
-TEST_CASE("a union that is inside out is turned around") {
+TEST_CASE("A union that is inside out is flipped") {
     const Box first{{-0.5f, -0.5f, -0.5f}, {0.2f, 0.2f, 0.2f}}, second{{-0.1f, -0.1f, -0.1f}, {0.6f, 0.6f, 0.6f}};
     const Mesh mesh = joined({first, second});
     const LevelSet right = build(mesh, {.voxelSize = 0.05f, .unite = true});
