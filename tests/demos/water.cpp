@@ -35,7 +35,7 @@ FloatGrid::Ptr pool(float height) {
 }
 
 fluid::Solid sphereAt(const glm::vec3& centre, const fluid::Velocity& velocity = {}) {
-    return fluid::solid(shapes::sphere(0.2f, 4), Pose{centre}, *cells(), {.velocity = velocity, .halfWidth = 6});
+    return fluid::solid(shapes::sphere(0.2f, 4), Pose{centre}, *cells(), {.velocity = velocity, .halfWidthVoxels = 6});
 }
 
 }  // namespace
