@@ -44,12 +44,19 @@ struct Node {
     std::uint32_t slot = 0;
 };
 
-// The frame of a group's boxes in the common frame.
+// The frame of a group's boxes in the common frame. The stored axes are orthonormal to floats only, which would make
+// bounds of far pairs too large: these are orthonormal to doubles, and boxes grow by the difference.
 struct GroupFrame {
     glm::dmat3 axes;
     glm::dvec3 origin;
     double unit;  // a voxel of the tree [m]
+    double skew;  // the largest difference to the stored axes
 };
+
+glm::dmat3 orthonormal(const glm::dmat3& m) {
+    const glm::dvec3 x = glm::normalize(m[0]), y = glm::normalize(m[1] - glm::dot(m[1], x) * x), z = glm::cross(x, y);
+    return {x, y, glm::dot(z, m[2]) < 0 ? -z : z};
+}
 
 // A mesh with its hierarchy in the common frame.
 class PosedTree {
@@ -65,11 +72,12 @@ class PosedTree {
     std::size_t triangleCount() const { return mesh_.mesh().triangles.size(); }
 
     GroupFrame frameOf(const OrientedGroup& group) const {
-        glm::dmat3 axes;
-        for (int k = 0; k < 3; ++k)
-            axes[k] = map_.rotation * glm::dvec3(group.axes[k][0], group.axes[k][1], group.axes[k][2]);
+        glm::dmat3 stored;
+        for (int k = 0; k < 3; ++k) stored[k] = glm::dvec3(group.axes[k][0], group.axes[k][1], group.axes[k][2]);
+        const glm::dmat3 axes = orthonormal(stored), off = axes - stored;
+        const double skew = std::max({glm::length(off[0]), glm::length(off[1]), glm::length(off[2])});
         const glm::dvec3 origin(group.origin[0], group.origin[1], group.origin[2]);
-        return {axes, map_.rotation * (unit_ * origin) + origin_, unit_};
+        return {map_.rotation * axes, map_.rotation * (unit_ * origin) + origin_, unit_, skew};
     }
 
     OrientedBounds boundsOf(const Node& node) const {
@@ -83,7 +91,8 @@ class PosedTree {
             lower[k] = unit_ * double(node.group->lower[k][node.slot]);
             upper[k] = unit_ * double(node.group->upper[k][node.slot]);
         }
-        return {frame.axes, frame.axes * (0.5 * (lower + upper)) + frame.origin, 0.5 * (upper - lower)};
+        const double growth = frame.skew * glm::length(glm::max(glm::abs(lower), glm::abs(upper)));
+        return {frame.axes, frame.axes * (0.5 * (lower + upper)) + frame.origin, 0.5 * (upper - lower) + growth};
     }
 
     TriangleCorners corners(std::uint32_t triangle) const {
@@ -127,19 +136,25 @@ unsigned boundDistances(const OrientedBounds& box, const OrientedGroup& group, c
     unsigned near = 0;
     const auto zero = hn::Zero(tag), unit = hn::Set(tag, frame.unit), halved = hn::Set(tag, 0.5);
     for (std::size_t i = 0; i < treeWidth; i += hn::Lanes(tag)) {
-        auto inGroup2 = zero, inBox2 = zero;
-        hn::Vec<decltype(tag)> middle[3], extent[3];
+        auto inGroup2 = zero, inBox2 = zero, farthest2 = zero;
+        hn::Vec<decltype(tag)> lowest[3], highest[3], middle[3], extent[3];
         auto used = hn::FirstN(tag, hn::Lanes(tag));
         for (std::size_t k = 0; k < 3; ++k) {
-            const auto lower = hn::Mul(unit, hn::PromoteTo(tag, hn::Load(floats, group.lower[k] + i)));
-            const auto upper = hn::Mul(unit, hn::PromoteTo(tag, hn::Load(floats, group.upper[k] + i)));
+            lowest[k] = hn::Mul(unit, hn::PromoteTo(tag, hn::Load(floats, group.lower[k] + i)));
+            highest[k] = hn::Mul(unit, hn::PromoteTo(tag, hn::Load(floats, group.upper[k] + i)));
+            used = hn::And(used, hn::Le(lowest[k], highest[k]));
+            const auto far = hn::Max(hn::Abs(lowest[k]), hn::Abs(highest[k]));
+            farthest2 = hn::Add(farthest2, hn::Mul(far, far));
+        }
+        const auto growth = hn::Mul(hn::Set(tag, frame.skew), hn::Sqrt(farthest2));
+        for (std::size_t k = 0; k < 3; ++k) {
+            const auto lower = hn::Sub(lowest[k], growth), upper = hn::Add(highest[k], growth);
             const auto at = hn::Set(tag, centre[int(k)]), reach = hn::Set(tag, half[int(k)]);
             const auto gap =
                 hn::Max(hn::Max(hn::Sub(lower, hn::Add(at, reach)), hn::Sub(hn::Sub(at, reach), upper)), zero);
             inGroup2 = hn::Add(inGroup2, hn::Mul(gap, gap));
             middle[k] = hn::Sub(hn::Mul(halved, hn::Add(lower, upper)), at);
             extent[k] = hn::Mul(halved, hn::Sub(upper, lower));
-            used = hn::And(used, hn::Le(lower, upper));
         }
         for (int j = 0; j < 3; ++j) {
             auto along = zero, reach = hn::Set(tag, box.half[j]);
