@@ -106,6 +106,15 @@ std::filesystem::path corpusFolder() {
     return elsewhere && *elsewhere ? elsewhere : BILAYER_MESHES;
 }
 
+std::vector<std::string> meshFiles(const std::filesystem::path& folder) {
+    std::vector<std::string> names;
+    for (const auto& entry : std::filesystem::recursive_directory_iterator(folder))
+        if (entry.is_regular_file() && entry.path().extension() != ".md")
+            names.push_back(std::filesystem::relative(entry.path(), folder).string());
+    std::sort(names.begin(), names.end());
+    return names;
+}
+
 std::vector<Source> sources() {
     const std::filesystem::path corpus = corpusFolder();
     std::vector<Source> found;

@@ -21,6 +21,9 @@ struct Source {
 /// The folder of the corpus. The environment variable BILAYER_MESHES overrides the path known at compile time.
 std::filesystem::path corpusFolder();
 
+/// The files in a folder and its subfolders, relative to it and sorted, without its texts (.md).
+std::vector<std::string> meshFiles(const std::filesystem::path& folder);
+
 /// The available meshes of the comparison: those of the corpus that are present, and the carved box.
 std::vector<Source> sources();
 

@@ -16,11 +16,13 @@
 #include <bilayer/sdf/inspect.h>
 #include <bilayer/sdf/mesh_io.h>
 #include <bilayer/sdf/surface.h>
+#include "bench/builders.h"
 #include "bench/program.h"
 #include "sdf/base/openvdb.h"
 #include "sdf/sign/sign_choice.h"
 
 using namespace bilayer;
+using namespace bilayer::bench;
 using namespace bilayer::detail;
 
 namespace {
@@ -52,18 +54,8 @@ struct Row {
     double seconds = 0;                 // build time
 };
 
-std::vector<std::string> corpus() {
-    std::vector<std::string> names;
-    const std::filesystem::path folder(BILAYER_MESHES);
-    for (const auto& entry : std::filesystem::recursive_directory_iterator(folder))
-        if (entry.is_regular_file() && entry.path().extension() != ".md")
-            names.push_back(std::filesystem::relative(entry.path(), folder).string());
-    std::sort(names.begin(), names.end());
-    return names;
-}
-
 std::filesystem::path meshPath(const std::string& name) {
-    const std::filesystem::path path = std::filesystem::path(BILAYER_MESHES) / name;
+    const std::filesystem::path path = corpusFolder() / name;
     if (std::filesystem::exists(name)) return name;
     if (std::filesystem::exists(path)) return path;
     throw std::invalid_argument(fmt::format("no mesh {}", name));
@@ -194,7 +186,7 @@ Row judge(const Options& options, const std::string& name) {
     } catch (const std::exception& error) {
         // the message names the file by its full path
         row.error = error.what();
-        const std::string folder = std::string(BILAYER_MESHES) + "/";
+        const std::string folder = corpusFolder().string() + "/";
         if (const auto at = row.error.find(folder); at != std::string::npos) row.error.erase(at, folder.size());
     }
     return row;
@@ -259,7 +251,7 @@ int run(int argc, char** argv) {
     fmt::print("{:<36} {:>7} {:<8} {:>4} {:>6} {:>6} {:<6} {:>6} {:<22} {:>6}\n", "mesh", "tri.", "sign", "con.",
                "in [%]", "br [%]", "border", "area", "volume", "s");
     std::vector<Row> rows;
-    for (const std::string& name : options.meshes.empty() ? corpus() : options.meshes) {
+    for (const std::string& name : options.meshes.empty() ? meshFiles(corpusFolder()) : options.meshes) {
         rows.push_back(judge(options, name));
         print(rows.back());
     }
@@ -274,5 +266,5 @@ int run(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
-    return bench::program("corpus", run, argc, argv);
+    return program("corpus", run, argc, argv);
 }
