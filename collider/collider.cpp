@@ -61,10 +61,10 @@ Filled filledMesh(Mesh outward, const LevelSet& levelSet) {
     if (levelSet.sign() != "winding" || levelSet.meshHash() == 0) return {std::move(outward), std::nullopt};
     FilledMesh filled = fillHoles(std::move(outward), double(crackWidth * levelSet.voxelSize()));
     if (!filled.changed) return {std::move(filled.mesh), std::nullopt};
-    LevelSet closed = build(filled.mesh, {.voxelSize = levelSet.voxelSize(),
-                                          .exteriorWidthVoxels = levelSet.exteriorWidth(),
-                                          .interiorWidthVoxels = levelSet.interiorWidth(),
-                                          .bandUnit = BandUnit::world});
+    const float voxelSize = levelSet.voxelSize();
+    LevelSet closed = build(filled.mesh, {.voxelSize = voxelSize,
+                                          .exteriorWidthVoxels = levelSet.exteriorWidth() / voxelSize,
+                                          .interiorWidthVoxels = levelSet.interiorWidth() / voxelSize});
     filled.mesh = outwardMesh(closed, std::move(filled.mesh));
     return {std::move(filled.mesh), std::move(closed)};
 }

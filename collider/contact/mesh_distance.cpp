@@ -100,7 +100,7 @@ class PosedTree {
         const glm::dvec3 at = mesh_.approached(map_.inverse(point));
         const std::uint32_t triangle = mesh_.nearest(at, std::numeric_limits<float>::infinity());
         if (triangle == noTriangle) return {noTriangle, point};
-        return {triangle, map_(at + mesh_.featureOf(triangle, at).way)};
+        return {triangle, map_(at + mesh_.featureOf(triangle, at).offset)};
     }
 
   private:

@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "sdf/bvh/tree_query.h"
+#include "sdf/bvh/node_list.h"
 
 namespace bilayer::detail {
 namespace {

@@ -25,7 +25,7 @@ void describe(openvdb::FloatGrid& grid, const Mesh& mesh, const BuildOptions& op
     grid.insertMeta(metadata::signUndecided, openvdb::Int64Metadata(std::int64_t(signs.undecided)));
     grid.insertMeta(metadata::errorBound, openvdb::FloatMetadata(errorBound(options) * options.voxelSize));
     grid.insertMeta(metadata::meshHash, openvdb::Int64Metadata(std::int64_t(hash(mesh))));
-    grid.insertMeta(metadata::interiorWidth, openvdb::FloatMetadata(options.interiorWidth * options.voxelSize));
+    grid.insertMeta(metadata::interiorWidth, openvdb::FloatMetadata(options.interiorWidthVoxels * options.voxelSize));
     const glm::dvec3& origin = mesh.origin;
     if (origin != glm::dvec3(0))
         grid.insertMeta(metadata::origin, openvdb::Vec3DMetadata({origin.x, origin.y, origin.z}));
