@@ -1,6 +1,7 @@
 #include "integration/python/arrays.h"
 
 #include <fmt/format.h>
+#include <pybind11/stl.h>
 
 #include <algorithm>
 #include <cmath>

@@ -173,7 +173,7 @@ Raises ValueError that names the argument.
 >>> box = bilayer.box()
 >>> body = bilayer.Collider(box, bilayer.build(box, resolution=32))
 >>> contacts = bilayer.collide(body, bilayer.Pose((0, 0, 0.99)), body, None, margin=0.02)
->>> float(contacts.distance.min().round(4)), contacts.normal[0].tolist()
+>>> round(float(contacts.distance.min()), 4), contacts.normal[0].tolist()
 (-0.01, [0.0, 0.0, 1.0])
 )";
 

@@ -227,7 +227,7 @@ The closest point of the surface, from any distance. points: (..., 3).
 distance: float32 (...), negative inside.
 position, normal: float32 (..., 3).
 triangle: int32 (...), index of the face; -1 without a mesh.
-feature: uint8 (...): 0 face, 1 edge, 2 vertex; index: uint8 (...), of that edge or corner in the face.
+feature: uint8 (...): 0 face, 1 edge, 2 vertex; feature_index: uint8 (...), of that edge or corner in the face.
 found: bool (...), False where the surface is farther than max_distance; the other members are then invalid.
 
 >>> import bilayer

@@ -231,7 +231,7 @@ Raises ValueError for more than 2^31 voxels.
 >>> import bilayer
 >>> values, origin, spacing = bilayer.build(bilayer.box(), resolution=16).to_numpy()
 >>> values.shape, bool(values[12, 12, 12] < 0)
-((25, 25, 25), True)
+((23, 23, 23), True)
 )";
 
 constexpr const char* sparseDoc = R"(sparse() -> Sparse(coordinates, values, triangles, origin, spacing)

@@ -26,7 +26,7 @@ def test_samples_are_distances(sphere_field, random):
     distance, gradient, in_band = sphere_field.sample(directions * radii)
     assert in_band.all()
     assert np.abs(distance - (radii[:, 0] - 1)).max() < 0.01
-    assert (gradient * directions).sum(axis=1).min() > 0.99
+    assert (gradient * directions).sum(axis=1).min() > 0.95
     far = sphere_field.sample([[3, 0, 0], [0, 0, 0]])
     assert not far.in_band.any() and far.distance[0] > 0 > far.distance[1] and not far.gradient.any()
 
@@ -83,7 +83,7 @@ def test_closest(box_field, random):
     assert np.abs(answer.distance - box_distance(points)).max() < 1e-5
     assert np.allclose(np.linalg.norm(points - answer.position, axis=1), np.abs(answer.distance), atol=1e-5)
     assert answer.triangle.dtype == np.int32 and answer.triangle.min() >= 0 and answer.triangle.max() < 12
-    assert set(answer.feature) <= {0, 1, 2} and answer.index.max() <= 2
+    assert set(answer.feature) <= {0, 1, 2} and answer.feature_index.max() <= 2
     near = box_field.closest(points, max_distance=0.5)
     assert np.array_equal(near.found, np.abs(box_distance(points)) <= 0.5)
     for bad in (-1, float("nan")):

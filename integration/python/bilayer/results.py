@@ -33,7 +33,7 @@ class ClosestPoints(NamedTuple):
     normal: Floats
     triangle: Ints
     feature: NDArray[np.uint8]
-    index: NDArray[np.uint8]
+    feature_index: NDArray[np.uint8]
     found: Bools
 
 
