@@ -256,7 +256,7 @@ triangle: int32 (...), -1 where there is none.
 
 constexpr const char* sphereCastDoc = R"(sphere_cast(origins, directions, radii, max_distance=inf) -> Hits
 
-The first contact of a sphere that moves along each ray; as raycast(). distance is the way of its centre.
+The first contact of a sphere that moves along each ray; as raycast(). distance is the path length of its centre.
 
 radii: (...), 0 or above.
 

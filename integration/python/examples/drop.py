@@ -6,7 +6,7 @@ from common import arguments, save
 
 import bilayer
 
-STEP, STEPS, GRAVITY, FRICTION, PASSES, MARGIN = 1 / 240, 480, (0, -9.81, 0), 0.6, 12, 0.01
+STEP, STEPS, GRAVITY, FRICTION, PASSES, MARGIN = 1 / 120, 480, (0, -9.81, 0), 0.6, 15, 0.01
 
 
 class Body:
@@ -32,36 +32,38 @@ def solve(body, found):
     """Sequential impulses with friction: the contacts' normal speeds become 0 or more."""
     axes = body.pose().matrix[:3, :3]
     inverse_inertia = axes @ body.inverse_inertia @ axes.T
-    deepest = np.argsort(found.distance)[:24]
+    deepest = np.argsort(found.distance)[:16]
     arms, normals, gaps = found.position[deepest] - body.place, found.normal[deepest], found.distance[deepest]
+    # levers[i] @ impulse is its torque, and spin @ levers[i] the speed that the spin gives the point
+    levers = np.stack([np.cross(arms, axis) for axis in np.eye(3)], axis=2)
+    turning = np.einsum("nij,jk,nkl->nil", levers.transpose(0, 2, 1), inverse_inertia, levers)
+    pushed = 1 / (1 / body.mass + np.einsum("ni,nij,nj->n", normals, turning, normals))
+    rubbed = 1 / (1 / body.mass + np.trace(turning, axis1=1, axis2=2))
+    allowed = np.where(gaps > 0, gaps, 0.1 * np.minimum(gaps + 0.001, 0)) / STEP
     pushes, rubs = np.zeros(len(arms)), np.zeros((len(arms), 3))
 
-    def push(arm, impulse):
+    def push(lever, impulse):
         body.velocity += impulse / body.mass
-        body.spin += inverse_inertia @ np.cross(arm, impulse)
+        body.spin += inverse_inertia @ (lever @ impulse)
 
     for _ in range(PASSES):
-        for i, (arm, normal, gap) in enumerate(zip(arms, normals, gaps)):
-            speed = body.velocity + np.cross(body.spin, arm)
-            lever = np.cross(arm, normal)
-            allowed = gap / STEP if gap > 0 else 0.1 * min(gap + 0.001, 0) / STEP
-            total = max(pushes[i] - (speed @ normal + allowed) / (1 / body.mass + lever @ inverse_inertia @ lever), 0)
-            push(arm, (total - pushes[i]) * normal)
+        for i, (lever, normal) in enumerate(zip(levers, normals)):
+            speed = (body.velocity + body.spin @ lever) @ normal
+            total = max(pushes[i] - (speed + allowed[i]) * pushed[i], 0)
+            push(lever, (total - pushes[i]) * normal)
             pushes[i] = total
-            slip = body.velocity + np.cross(body.spin, arm)
-            slip -= (slip @ normal) * normal
-            wanted = rubs[i] - slip / (1 / body.mass + np.trace(inverse_inertia) * (arm @ arm) / 2)
-            limit = FRICTION * total / max(np.linalg.norm(wanted), 1e-12)
-            wanted *= min(limit, 1)
-            push(arm, wanted - rubs[i])
+            slip = body.velocity + body.spin @ lever
+            wanted = rubs[i] - (slip - (slip @ normal) * normal) * rubbed[i]
+            wanted *= min(FRICTION * total / max(np.sqrt(wanted @ wanted), 1e-12), 1)
+            push(lever, wanted - rubs[i])
             rubs[i] = wanted
 
 
 mesh, given = arguments(__doc__, "drop.png")
-body = Body(bilayer.Collider(mesh, bilayer.build(mesh, resolution=64, half_width_voxels=5)), 1, (-0.4, 1.6, 0))
-slab = bilayer.box((3.2, 0.4, 2))
+body = Body(bilayer.Collider(mesh, bilayer.build(mesh, resolution=64, half_width_voxels=5)), 1, (-0.4, 1.2, 0), (np.cos(0.1), 0, 0, np.sin(0.1)))
+slab = bilayer.box((3.2, 0.4, 3.2))
 ground = bilayer.Collider(slab, bilayer.build(slab, voxel_size=0.03, half_width_voxels=5))
-tilt = bilayer.Pose((0, -0.2, 0), (np.cos(-0.1), 0, 0, np.sin(-0.1)))
+tilt = bilayer.Pose((0, -0.2, 0), (np.cos(0.02), 0, 0, -np.sin(0.02)))
 cache, track, poses, depths = bilayer.ContactCache(), [], [], []
 for step in range(STEPS):
     body.velocity += STEP * np.array(GRAVITY)
@@ -70,7 +72,7 @@ for step in range(STEPS):
     body.move()
     track.append(body.place.copy())
     depths.append(min(contacts.distance.min(initial=0.0), 0.0))
-    if step % 40 == 0:
+    if step % 30 == 0:
         poses.append(body.pose())
 poses.append(body.pose())
 speed = np.linalg.norm(track[-1] - track[-25]) / (24 * STEP)
@@ -84,7 +86,7 @@ for number, pose in enumerate(poses):
     axes.tripcolor(*outline.reshape(-1, 2).T, np.arange(outline.shape[0] * 3).reshape(-1, 3),
                    facecolors=np.full(outline.shape[0], number), vmin=0, vmax=len(poses), cmap="viridis", alpha=0.5)
 axes.plot(*np.array(track)[:, :2].T, "k-", linewidth=1)
-axes.set(aspect="equal", xlim=(-1.8, 1.8), title="the body every sixth of a second, and the way of its centre")
+axes.set(aspect="equal", xlim=(-1.8, 1.8), title="the body every quarter of a second, and the path of its centre")
 heights.plot(STEP * np.arange(STEPS), np.array(track)[:, 1], label="height of the centre")
 heights.plot(STEP * np.arange(STEPS), depths, label="penetration")
 heights.set(xlabel="time [s]")
