@@ -91,6 +91,13 @@ def test_mypy(tmp_path):
     assert 'Unexpected keyword argument "resolutoin"' in result.stdout and result.stdout.count("error:") == 1, result.stdout
 
 
+def test_the_committed_reference():
+    script = SOURCE / "docs" / "python_reference.py"
+    environment = {"PYTHONPATH": str(PACKAGE.parent), "PATH": "/usr/bin:/bin"}
+    result = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, env=environment, check=True)
+    assert result.stdout == (SOURCE / "docs" / "python-reference.md").read_text(), f"write it anew by {script.name}"
+
+
 def test_the_page_works(tmp_path, monkeypatch):
     page = (SOURCE / "docs" / "python.md").read_text()
     blocks = re.findall(r"```python\n(.*?)```", page, re.S)

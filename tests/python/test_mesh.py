@@ -1,7 +1,10 @@
 """Mesh, files, inspect, meshes of other packages."""
 
+import base64
 import copy
+import json
 import pickle
+from concurrent.futures import ThreadPoolExecutor
 from types import SimpleNamespace
 
 import numpy as np
@@ -110,6 +113,27 @@ def test_bad_files(tmp_path, box):
         box.save(tmp_path / "none" / "box.ply")
     with pytest.raises(TypeError):
         bilayer.read_mesh(3)
+
+
+def test_gltf(tmp_path, box):
+    data = box.vertices.tobytes() + box.faces.tobytes()
+    size = box.vertices.nbytes
+    document = {
+        "asset": {"version": "2.0"},
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"mesh": 0, "translation": [5, 0, 0]}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
+        "buffers": [{"byteLength": len(data), "uri": "data:application/octet-stream;base64," + base64.b64encode(data).decode()}],
+        "bufferViews": [{"buffer": 0, "byteLength": size}, {"buffer": 0, "byteOffset": size, "byteLength": len(data) - size}],
+        "accessors": [
+            {"bufferView": 0, "componentType": 5126, "count": 8, "type": "VEC3", "min": [-1] * 3, "max": [1] * 3},
+            {"bufferView": 1, "componentType": 5125, "count": 36, "type": "SCALAR"},
+        ],
+    }
+    (tmp_path / "box.gltf").write_text(json.dumps(document))
+    with ThreadPoolExecutor(8) as pool:  # each file is read in a child process
+        meshes = list(pool.map(bilayer.read_mesh, [tmp_path / "box.gltf"] * 16))
+    assert all(np.array_equal(mesh.bounds, [[4, -1, -1], [6, 1, 1]]) for mesh in meshes)
 
 
 def test_inspect(box):
