@@ -154,11 +154,12 @@ def run_openvdb(level_set, mesh, given):
     spacing = level_set.voxel_size
     transform = module.createLinearTransform(spacing)
     vertices, faces = mesh.vertices.copy(), mesh.faces.copy()
-    seconds, grid = best(given.repeats, lambda: module.FloatGrid.createLevelSetFromPolygons(
-        vertices, triangles=faces, transform=transform, halfWidth=3.0))
+    make = module.FloatGrid.createLevelSetFromPolygons
+    seconds, grid = best(given.repeats, lambda: make(vertices, triangles=faces, transform=transform, halfWidth=3.0))
     ours, _ = best(given.repeats, lambda: bilayer.build(mesh, voxel_size=spacing))
     sparse = level_set.sparse()
-    chosen = np.random.default_rng(1).choice(len(sparse.values), size=min(given.checked, len(sparse.values)), replace=False)
+    random = np.random.default_rng(1)
+    chosen = random.choice(len(sparse.values), size=min(given.checked, len(sparse.values)), replace=False)
     voxels = sparse.coordinates[chosen]
     truth = brute_force(mesh, spacing * voxels)
     accessor = grid.getConstAccessor()
@@ -166,7 +167,10 @@ def run_openvdb(level_set, mesh, given):
     print(f"\nbuild of {level_set.active_voxels:,} voxels of {spacing:.4g}, errors in voxels at {len(chosen):,} of them")
     for name, time_taken, values in (("bilayer", ours, sparse.values[chosen]), ("OpenVDB", seconds, theirs)):
         error, wrong = np.abs(np.abs(values) - np.abs(truth)), (values < 0) != (truth < 0)
-        print(f"{name + ': build':44}{time_taken:10.3f}   max error {error.max() / spacing:.2e}, wrong signs {wrong.mean():.2%}")
+        print(
+            f"{name + ': build':44}{time_taken:10.3f}   max error {error.max() / spacing:.2e}, "
+            f"wrong signs {wrong.mean():.2%}"
+        )
     print(f"OpenVDB takes {seconds / ours:.1f} times as long")
 
 
@@ -174,7 +178,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("mesh", help="a closed mesh")
     parser.add_argument("--points", type=int, default=1_000_000, help="query points (default: %(default)s)")
-    parser.add_argument("--checked", type=int, default=1000, help="points that brute force checks (default: %(default)s)")
+    parser.add_argument("--checked", type=int, default=1000, help="points checked by brute force (default: %(default)s)")
     parser.add_argument("--samples", type=int, default=1_000_000, help="of the cKDTree (default: %(default)s)")
     parser.add_argument("--resolution", type=int, default=256, help="of the field (default: %(default)s)")
     parser.add_argument("--repeats", type=int, default=5, help="runs of which the best counts (default: %(default)s)")

@@ -8,8 +8,10 @@ GROUPS = {
     "Meshes": ["Mesh", "read_mesh", "inspect", "MeshReport", "as_mesh", "box", "sphere"],
     "Fields": ["build", "rebuild", "LevelSet", "Dense", "Sparse", "devices", "Cancelled", "DeviceError"],
     "Queries": ["Field", "Samples", "ClosestPoints", "Hits"],
-    "Bodies": ["Pose", "Collider", "with_body", "mass_properties", "MassProperties", "collide", "Contacts", "ContactCache",
-               "distance", "distances", "BodyDistance"],
+    "Bodies": [
+        "Pose", "Collider", "with_body", "mass_properties", "MassProperties", "collide", "Contacts", "ContactCache",
+        "distance", "distances", "BodyDistance",
+    ],
     "Liquids": ["seed", "Seeded", "particles", "obstacle", "Obstacle"],
 }
 

@@ -101,8 +101,8 @@ constexpr const char* massDoc =
 Mass properties for density 1, of a closed mesh, or of the inside of a LevelSet.
 
 volume: float. centre: float32 (3,). inertia: float32 (3, 3), about the centre of mass.
-principal_inertia: float32 (3,), ascending. principal_axes: float32 (4,), the quaternion w, x, y, z that rotates them to the
-axes of the mesh.
+principal_inertia: float32 (3,), ascending. principal_axes: float32 (4,), the quaternion w, x, y, z that rotates
+them to the axes of the mesh.
 
 Raises ValueError for a solid without volume.
 

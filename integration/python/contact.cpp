@@ -163,8 +163,8 @@ motion_a, motion_b: displacement and rotation vector over the step, shape (2, 3)
 min_normal_cosine, min_normal_cosine_apart, keeps_oblique_edges: the filter of contacts at inner edges.
 cache: the ContactCache of this pair, which makes the next call faster and changes no contact.
 
-position: float32 (N, 3), on the surface of b. normal: float32 (N, 3), from b to a. distance: float32 (N,), negative where
-the bodies penetrate. feature: uint32 (N,), which point or edge; the top bit is set for those of b. approach and
+position: float32 (N, 3), on the surface of b. normal: float32 (N, 3), from b to a. distance: float32 (N,), negative
+where the bodies penetrate. feature: uint32 (N,), which point or edge; the top bit is set for those of b. approach and
 turning_radius: float32 (N,). points_tested, beyond_band: int, points sampled, and those too deep for the band.
 
 Raises ValueError that names the argument.
@@ -200,7 +200,8 @@ constexpr const char* distancesDoc = R"(distances(colliders, poses, pairs, max_d
 
 The distances of many pairs of bodies, on all cores. inf for a pair farther apart than max_distance.
 
-colliders: a Collider, or one for each pose. poses: a sequence of poses. pairs: integers of shape (N, 2), indices of poses.
+colliders: a Collider, or one for each pose. poses: a sequence of poses. pairs: integers of shape (N, 2), indices of
+poses.
 
 >>> import bilayer
 >>> box = bilayer.box()

@@ -208,8 +208,8 @@ LevelSet extended(const LevelSet& levelSet, std::optional<float> distance) {
 
 constexpr const char* levelSetDoc = R"(An immutable narrow-band signed distance field, in an OpenVDB grid.
 
-build() makes it, LevelSet.load() reads it. Distances are negative inside, in the mesh's unit. Voxel centres lie at whole
-multiples of the voxel size from Mesh.origin. Copies share memory; pickles hold all grids.
+build() makes it, LevelSet.load() reads it. Distances are negative inside, in the mesh's unit. Voxel centres lie at
+whole multiples of the voxel size from Mesh.origin. Copies share memory; pickles hold all grids.
 
 >>> import bilayer, pickle
 >>> level_set = bilayer.build(bilayer.box(), resolution=16)
@@ -250,8 +250,8 @@ True
 
 constexpr const char* extendedDoc = R"(extended(distance=None) -> LevelSet
 
-Extends the field beyond its band by fast sweeping: to a distance on either side of the surface, or to the whole bounding
-box of the band. The band keeps its values; those beyond are of first order.
+Extends the field beyond its band by fast sweeping: to a distance on either side of the surface, or to the whole
+bounding box of the band. The band keeps its values; those beyond are of first order.
 
 Raises ValueError for a field without an inside, and for a distance that is not positive.
 

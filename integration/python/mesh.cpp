@@ -135,7 +135,8 @@ Raises ValueError that names the argument for a wrong shape or dtype, a value th
 range; also for float64 coordinates so far from zero that float32 would round the shape.
 
 >>> import bilayer
->>> tetrahedron = bilayer.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
+>>> faces = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]
+>>> tetrahedron = bilayer.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], faces)
 >>> tetrahedron.vertices.shape, tetrahedron.faces.dtype
 ((4, 3), dtype('uint32'))
 )";

@@ -88,7 +88,8 @@ def test_mypy(tmp_path):
     result = subprocess.run(command + [str(user)], capture_output=True, text=True, env=environment)
     assert "floating[numpy._typing._32Bit]" in result.stdout
     assert "unsignedinteger[numpy._typing._32Bit]" in result.stdout
-    assert 'Unexpected keyword argument "resolutoin"' in result.stdout and result.stdout.count("error:") == 1, result.stdout
+    assert 'Unexpected keyword argument "resolutoin"' in result.stdout
+    assert result.stdout.count("error:") == 1, result.stdout
 
 
 def test_the_committed_reference():

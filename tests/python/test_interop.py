@@ -10,15 +10,16 @@ import bilayer
 
 
 def test_nothing_else_is_imported():
-    code = "import sys, bilayer; print(*(name for name in ('open3d', 'pyopenvdb', 'scipy', 'trimesh', 'meshio') if name in sys.modules))"
+    others = ("open3d", "pyopenvdb", "scipy", "trimesh", "meshio")
+    code = f"import sys, bilayer; print(*(name for name in {others} if name in sys.modules))"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "\n"
 
 
 def test_open3d(box):
     open3d = pytest.importorskip("open3d")
-    legacy = open3d.geometry.TriangleMesh(
-        open3d.utility.Vector3dVector(box.vertices.astype(float)), open3d.utility.Vector3iVector(box.faces.astype(np.int32))
-    )
+    vertices = open3d.utility.Vector3dVector(box.vertices.astype(float))
+    faces = open3d.utility.Vector3iVector(box.faces.astype(np.int32))
+    legacy = open3d.geometry.TriangleMesh(vertices, faces)
     assert bilayer.as_mesh(legacy) == box
     assert bilayer.as_mesh(open3d.t.geometry.TriangleMesh.from_legacy(legacy)) == box
 

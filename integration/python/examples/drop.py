@@ -60,7 +60,8 @@ def solve(body, found):
 
 
 mesh, given = arguments(__doc__, "drop.png")
-body = Body(bilayer.Collider(mesh, bilayer.build(mesh, resolution=64, half_width_voxels=5)), 1, (-0.4, 1.2, 0), (np.cos(0.1), 0, 0, np.sin(0.1)))
+shape = bilayer.Collider(mesh, bilayer.build(mesh, resolution=64, half_width_voxels=5))
+body = Body(shape, 1, (-0.4, 1.2, 0), (np.cos(0.1), 0, 0, np.sin(0.1)))
 slab = bilayer.box((3.2, 0.4, 3.2))
 ground = bilayer.Collider(slab, bilayer.build(slab, voxel_size=0.03, half_width_voxels=5))
 tilt = bilayer.Pose((0, -0.2, 0), (np.cos(0.02), 0, 0, -np.sin(0.02)))
