@@ -164,7 +164,7 @@ def run_openvdb(level_set, mesh, given):
     truth = brute_force(mesh, spacing * voxels)
     accessor = grid.getConstAccessor()
     theirs = np.array([accessor.getValue(tuple(map(int, voxel))) for voxel in voxels])
-    print(f"\nbuild of {level_set.active_voxels:,} voxels of {spacing:.4g}, errors in voxels at {len(chosen):,} of them")
+    print(f"\nbuild of {level_set.active_voxels:,} voxels of {spacing:.4g}, errors [voxels] at {len(chosen):,} of them")
     for name, time_taken, values in (("bilayer", ours, sparse.values[chosen]), ("OpenVDB", seconds, theirs)):
         error, wrong = np.abs(np.abs(values) - np.abs(truth)), (values < 0) != (truth < 0)
         print(
@@ -178,7 +178,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("mesh", help="a closed mesh")
     parser.add_argument("--points", type=int, default=1_000_000, help="query points (default: %(default)s)")
-    parser.add_argument("--checked", type=int, default=1000, help="points checked by brute force (default: %(default)s)")
+    parser.add_argument("--checked", type=int, default=1000, help="points that are checked (default: %(default)s)")
     parser.add_argument("--samples", type=int, default=1_000_000, help="of the cKDTree (default: %(default)s)")
     parser.add_argument("--resolution", type=int, default=256, help="of the field (default: %(default)s)")
     parser.add_argument("--repeats", type=int, default=5, help="runs of which the best counts (default: %(default)s)")
