@@ -1,6 +1,7 @@
 """Threads, memory, and objects that outlive each other."""
 
 import gc
+import pickle
 import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
@@ -111,6 +112,10 @@ def test_memory_does_not_grow(box):
         field = bilayer.Field(level_set, box)
         field.sample(points), field.closest(points), field.raycast(points, [0, 0, 1])
         level_set.to_numpy(), level_set.sparse(), level_set.surface()
+        body = bilayer.Collider(box, level_set)
+        bilayer.collide(body, bilayer.Pose((0, 0, 1.99)), body, None, margin=0.1, cache=bilayer.ContactCache())
+        bilayer.distance(body, bilayer.Pose((3, 0, 0)), body, None)
+        pickle.loads(pickle.dumps(level_set))
         with pytest.raises(ValueError):
             field.sample([1])
 
