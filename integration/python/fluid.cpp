@@ -60,12 +60,11 @@ py::object seedLiquid(const LevelSet& liquid, const py::object& body, const py::
     const fluid::SeedOptions options(byWord(modes, mode, "mode"), uniteSolids);
     const openvdb::FloatGrid::Ptr grid = liquid.grids().distance->deepCopy();
     dropHistory(*grid);
-    const fluid::SeedReport report =
+    const auto [maxChange, where, changedVoxels] =
         withSolid(body, [&](const auto& solid) { return fluid::seed(*grid, solid, placement, options); });
     auto grids = std::make_shared<Grids>();
     grids->distance = grid;
-    return result("Seeded", LevelSet(std::move(grids)), report.largestChange, toArray(report.where),
-                  report.changedVoxels);
+    return result("Seeded", LevelSet(std::move(grids)), maxChange, toArray(where), changedVoxels);
 }
 
 py::object makeParticles(const py::object& liquid, const py::object& pose, const py::object& scale,
@@ -162,8 +161,8 @@ liquid: a LevelSet with a band of 3 voxels or more on each side.
 body: a mesh or a LevelSet. pose: a Pose, a matrix of shape (4, 4), or None. scale: one number or three, above 0.
 mode: "unite", "intersect" or "subtract". unite_solids: ignore walls inside overlapping solids of the mesh.
 
-liquid: the new LevelSet. largest_change: float, in voxels, by which distances were changed near creases; where: float64
-(3,), the voxel; changed_voxels: int, voxels that changed by more than 0.1 voxels.
+liquid: the new LevelSet. max_change_voxels: float, by which distances were changed near creases; where: float64 (3,),
+the voxel; changed_voxels: int, voxels that changed by more than 0.1 voxels.
 
 Raises ValueError for a body that is open or without an inside, and for a liquid that is no level set.
 

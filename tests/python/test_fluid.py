@@ -21,7 +21,7 @@ def test_seed(tank):
     above = bilayer.Pose((0, 0, 1))
     both = bilayer.seed(tank, ball, pose=above)
     assert volume(both.liquid) == pytest.approx(volume(tank) + added, rel=0.003)
-    assert both.changed_voxels >= 0 and both.largest_change >= 0 and both.where.shape == (3,)
+    assert both.changed_voxels >= 0 and both.max_change_voxels >= 0 and both.where.shape == (3,)
     assert both.liquid.voxel_size == tank.voxel_size and both.liquid.mesh_hash == 0
     holed = bilayer.seed(tank, ball, mode="subtract")
     assert volume(holed.liquid) == pytest.approx(volume(tank) - added, rel=0.003)

@@ -105,7 +105,7 @@ class Seeded(NamedTuple):
     """seed(): the new liquid, and how far distances were changed to make it a level set."""
 
     liquid: LevelSet
-    largest_change: float
+    max_change_voxels: float
     where: Doubles
     changed_voxels: int
 
