@@ -23,6 +23,7 @@ const std::map<std::string, std::set<std::string>> allowed{
     {"cl", {"collider", "sdf"}},
     {"integration/bullet", {"collider", "sdf"}},
     {"integration/fluid", {"collider", "sdf"}},
+    {"integration/python", {"integration/fluid", "collider", "cl", "sdf"}},
     {"tools", {"integration/bullet", "integration/fluid", "collider", "cl", "sdf"}},
     {"demos", {"integration/bullet", "integration/fluid", "collider", "cl", "sdf"}},
     {"bench", {"demos", "integration/bullet", "integration/fluid", "collider", "cl", "sdf"}},

@@ -20,3 +20,10 @@ foreach(header IN LISTS installed)
     message(FATAL_ERROR "installed, but no public header: ${header}")
   endif()
 endforeach()
+# the Python package, where it was built
+if(EXISTS ${BUILD}/python/bilayer)
+  file(GLOB package ${prefix}/lib/python3*/*-packages/bilayer)
+  cmake_path(GET package PARENT_PATH packages)
+  step(${CMAKE_COMMAND} -E env PYTHONPATH=${packages} /usr/bin/python3 -c
+    "import bilayer; assert bilayer.__file__.startswith('${packages}'); bilayer.build(bilayer.box(), resolution=8)")
+endif()

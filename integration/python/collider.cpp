@@ -1,0 +1,161 @@
+// Collider, mass_properties(), with_body().
+#include <bilayer/collider/collider.h>
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <optional>
+#include <stdexcept>
+
+#include <bilayer/collider/mass.h>
+
+#include "integration/python/arguments.h"
+#include "integration/python/arrays.h"
+#include "integration/python/bindings.h"
+
+namespace bilayer::python {
+namespace {
+
+constexpr std::array<std::pair<const char*, ContactAccuracy>, 3> accuracies{
+    {{"samples", ContactAccuracy::samples},
+     {"exact-near-features", ContactAccuracy::exactNearFeatures},
+     {"exact", ContactAccuracy::exact}}};
+
+py::object toResult(const MassProperties& mass) {
+    py::array_t<float> inertia({3, 3});
+    for (int row = 0; row < 3; ++row)
+        for (int column = 0; column < 3; ++column) inertia.mutable_at(row, column) = mass.inertia[column][row];
+    const glm::quat& q = mass.principalAxes;
+    const float axes[] = {q.w, q.x, q.y, q.z};
+    return result("MassProperties", mass.volume, toArray(mass.centre), inertia, toArray(mass.principalInertia),
+                  py::array_t<float>(4, axes));
+}
+
+py::object massOf(const py::object& solid) {
+    std::optional<MassProperties> mass;
+    if (py::isinstance<LevelSet>(solid)) {
+        const auto& levelSet = solid.cast<const LevelSet&>();
+        const py::gil_scoped_release release;
+        mass = massProperties(levelSet);
+    } else {
+        const SharedMesh mesh = meshOf(solid);
+        const py::gil_scoped_release release;
+        mass = massProperties(*mesh);
+    }
+    return toResult(*mass);
+}
+
+ColliderOptions optionsOf(float pointSpacing, const py::object& margin, const std::string& accuracy) {
+    requirePositive(double(pointSpacing), "point_spacing_voxels");
+    ColliderOptions options{.pointSpacingVoxels = pointSpacing, .accuracy = byWord(accuracies, accuracy, "accuracy")};
+    if (margin.is_none()) return options;
+    options.margin = margin.cast<float>();
+    if (!(options.margin >= 0) || !std::isfinite(options.margin))
+        throw std::invalid_argument(fmt::format("margin is {}, and must be 0 or above", options.margin));
+    return options;
+}
+
+Collider makeCollider(const py::object& mesh, const LevelSet& levelSet, float pointSpacing, const py::object& margin,
+                      const std::string& accuracy) {
+    const SharedMesh shared = meshOf(mesh);
+    const ColliderOptions options = optionsOf(pointSpacing, margin, accuracy);
+    const py::gil_scoped_release release;
+    return Collider(*shared, levelSet, options);
+}
+
+LevelSet storeBody(const LevelSet& levelSet, const py::object& mesh, float pointSpacing, const py::object& margin,
+                   const std::string& accuracy, bool keepMesh) {
+    const SharedMesh shared = meshOf(mesh);
+    const ColliderOptions options = optionsOf(pointSpacing, margin, accuracy);
+    const py::gil_scoped_release release;
+    return withBody(levelSet, *shared, options, keepMesh);
+}
+
+Collider restore(const LevelSet& levelSet) {
+    const py::gil_scoped_release release;
+    return Collider(levelSet);
+}
+
+constexpr const char* colliderDoc =
+    R"(Collider(mesh, level_set, *, point_spacing_voxels=2, margin=None, accuracy="exact-near-features")
+
+The shape of a rigid body for collide() and distance(): a field, surface points and sharp edges. Immutable; share it
+between bodies and threads.
+
+mesh, level_set: a mesh and the field that build() made of it.
+point_spacing_voxels: distance between neighbouring surface points, in voxels.
+margin: contacts are created up to this separation, in the mesh's unit; None for one voxel.
+accuracy: "samples", "exact-near-features" or "exact": where contacts take distances from the triangles.
+
+Raises ValueError for options out of range, and if the level set belongs to another mesh.
+
+>>> import bilayer
+>>> box = bilayer.box()
+>>> bilayer.Collider(box, bilayer.build(box, resolution=16)).mass.volume
+1.0
+)";
+
+constexpr const char* massDoc =
+    R"(mass_properties(solid) -> MassProperties(volume, centre, inertia, principal_inertia, principal_axes)
+
+Mass properties for density 1, of a closed mesh, or of the inside of a LevelSet.
+
+volume: float. centre: float32 (3,). inertia: float32 (3, 3), about the centre of mass.
+principal_inertia: float32 (3,), ascending. principal_axes: float32 (4,), the quaternion w, x, y, z that rotates
+them to the axes of the mesh.
+
+Raises ValueError for a solid without volume.
+
+>>> import bilayer
+>>> bilayer.mass_properties(bilayer.box((1, 2, 3))).volume
+6.0
+)";
+
+constexpr const char* bodyDoc =
+    R"(with_body(level_set, mesh, *, point_spacing_voxels=2, margin=None, accuracy="exact-near-features",
+          keep_mesh=True) -> LevelSet
+
+The level set with all that Collider.from_level_set() needs, for LevelSet.save() and pickles. Options as for Collider.
+
+keep_mesh: False stores no mesh; contacts then follow the samples, which round sharp edges.
+
+>>> import bilayer
+>>> box = bilayer.box()
+>>> stored = bilayer.with_body(bilayer.build(box, resolution=16), box)
+>>> bilayer.Collider.from_level_set(stored).mass.volume
+1.0
+)";
+
+}  // namespace
+
+void addCollider(py::module_& module) {
+    py::class_<Collider>(module, "Collider", colliderDoc)
+        .def(py::init(&makeCollider), py::arg("mesh"), py::arg("level_set"), py::kw_only(),
+             py::arg("point_spacing_voxels") = 2.f, py::arg("margin") = py::none(),
+             py::arg("accuracy") = "exact-near-features")
+        .def_static("from_level_set", restore, py::arg("level_set"),
+                    "from_level_set(level_set) -> Collider\n\nRestores the collider that with_body() stored. Raises "
+                    "ValueError if there is none.")
+        .def_property_readonly(
+            "mesh", [](const Collider& self) { return std::make_shared<Mesh>(self.mesh()); },
+            "A copy of the mesh, with all faces outward and holes filled.")
+        .def_property_readonly("field", &Collider::field, py::return_value_policy::copy, "The Field.")
+        .def_property_readonly("exact_field", &Collider::exactField, py::return_value_policy::copy,
+                               "The Field with the mesh, if the body has one.")
+        .def_property_readonly("margin", &Collider::margin, "In the mesh's unit.")
+        .def_property_readonly(
+            "mass", [](const Collider& self) { return toResult(self.mass()); },
+            "MassProperties; ValueError if there is no volume.")
+        .def("__copy__", [](const Collider& self) { return self; })
+        .def(
+            "__deepcopy__", [](const Collider& self, const py::dict&) { return self; }, py::arg("memo"))
+        .def("__repr__", [](const Collider& self) {
+            return fmt::format("Collider(voxels of {:g}, margin {:g})", self.field().voxelSize(), self.margin());
+        });
+    module.def("mass_properties", massOf, py::arg("solid"), massDoc);
+    module.def("with_body", storeBody, py::arg("level_set"), py::arg("mesh"), py::kw_only(),
+               py::arg("point_spacing_voxels") = 2.f, py::arg("margin") = py::none(),
+               py::arg("accuracy") = "exact-near-features", py::arg("keep_mesh") = true, bodyDoc);
+}
+
+}  // namespace bilayer::python

@@ -1,0 +1,95 @@
+"""A body dropped on a tilted slab by a solver of thirty lines of numpy on bilayer.collide()."""
+
+import matplotlib.pyplot as plt
+import numpy as np
+from common import arguments, save
+
+import bilayer
+
+STEP, STEPS, GRAVITY, FRICTION, PASSES, MARGIN = 1 / 120, 480, (0, -9.81, 0), 0.6, 15, 0.01
+
+
+class Body:
+    def __init__(self, collider, mass, position, rotation=(1, 0, 0, 0)):
+        self.collider, self.mass, self.centre = collider, mass, np.array(collider.mass.centre, float)
+        self.inverse_inertia = np.linalg.inv(collider.mass.inertia * (mass / collider.mass.volume))
+        self.place, self.spin = np.array(position, float), np.zeros(3)  # of the centre of mass
+        self.rotation, self.velocity = np.array(rotation, float), np.zeros(3)
+
+    def pose(self):
+        turned = bilayer.Pose(rotation=self.rotation).to_world(self.centre)
+        return bilayer.Pose(self.place - turned, self.rotation)
+
+    def move(self):
+        self.place += STEP * self.velocity
+        w, v = self.rotation[0], self.rotation[1:]
+        change = np.concatenate([[-self.spin @ v], w * self.spin + np.cross(self.spin, v)])
+        self.rotation += 0.5 * STEP * change
+        self.rotation /= np.linalg.norm(self.rotation)
+
+
+def solve(body, found):
+    """Sequential impulses with friction: the contacts' normal speeds become 0 or more."""
+    axes = body.pose().matrix[:3, :3]
+    inverse_inertia = axes @ body.inverse_inertia @ axes.T
+    deepest = np.argsort(found.distance)[:16]
+    arms, normals, gaps = found.position[deepest] - body.place, found.normal[deepest], found.distance[deepest]
+    # levers[i] @ impulse is its torque, and spin @ levers[i] the speed that the spin gives the point
+    levers = np.stack([np.cross(arms, axis) for axis in np.eye(3)], axis=2)
+    turning = np.einsum("nij,jk,nkl->nil", levers.transpose(0, 2, 1), inverse_inertia, levers)
+    pushed = 1 / (1 / body.mass + np.einsum("ni,nij,nj->n", normals, turning, normals))
+    rubbed = 1 / (1 / body.mass + np.trace(turning, axis1=1, axis2=2))
+    allowed = np.where(gaps > 0, gaps, 0.1 * np.minimum(gaps + 0.001, 0)) / STEP
+    pushes, rubs = np.zeros(len(arms)), np.zeros((len(arms), 3))
+
+    def push(lever, impulse):
+        body.velocity += impulse / body.mass
+        body.spin += inverse_inertia @ (lever @ impulse)
+
+    for _ in range(PASSES):
+        for i, (lever, normal) in enumerate(zip(levers, normals)):
+            speed = (body.velocity + body.spin @ lever) @ normal
+            total = max(pushes[i] - (speed + allowed[i]) * pushed[i], 0)
+            push(lever, (total - pushes[i]) * normal)
+            pushes[i] = total
+            slip = body.velocity + body.spin @ lever
+            wanted = rubs[i] - (slip - (slip @ normal) * normal) * rubbed[i]
+            wanted *= min(FRICTION * total / max(np.sqrt(wanted @ wanted), 1e-12), 1)
+            push(lever, wanted - rubs[i])
+            rubs[i] = wanted
+
+
+mesh, given = arguments(__doc__, "drop.png")
+shape = bilayer.Collider(mesh, bilayer.build(mesh, resolution=64, half_width_voxels=5))
+body = Body(shape, 1, (-0.4, 1.2, 0), (np.cos(0.1), 0, 0, np.sin(0.1)))
+slab = bilayer.box((3.2, 0.4, 3.2))
+ground = bilayer.Collider(slab, bilayer.build(slab, voxel_size=0.03, half_width_voxels=5))
+tilt = bilayer.Pose((0, -0.2, 0), (np.cos(0.02), 0, 0, -np.sin(0.02)))
+cache, track, poses, depths = bilayer.ContactCache(), [], [], []
+for step in range(STEPS):
+    body.velocity += STEP * np.array(GRAVITY)
+    contacts = bilayer.collide(body.collider, body.pose(), ground, tilt, margin=MARGIN + STEP * 4, cache=cache)
+    solve(body, contacts)
+    body.move()
+    track.append(body.place.copy())
+    depths.append(min(contacts.distance.min(initial=0.0), 0.0))
+    if step % 30 == 0:
+        poses.append(body.pose())
+poses.append(body.pose())
+speed = np.linalg.norm(track[-1] - track[-25]) / (24 * STEP)
+print(f"ends at {np.round(track[-1], 3)}, at {speed:.4f} units/s; deepest penetration {-min(depths):.4f} units")
+
+figure, (axes, heights) = plt.subplots(1, 2, figsize=(12, 5), gridspec_kw={"width_ratios": [3, 2]})
+corners = tilt.to_world(slab.vertices)
+axes.fill(*corners[corners[:, 2] > 0][[0, 1, 3, 2], :2].T, color="0.8")
+for number, pose in enumerate(poses):
+    outline = pose.to_world(mesh.vertices[mesh.faces])[:, :, :2]
+    axes.tripcolor(*outline.reshape(-1, 2).T, np.arange(outline.shape[0] * 3).reshape(-1, 3),
+                   facecolors=np.full(outline.shape[0], number), vmin=0, vmax=len(poses), cmap="viridis", alpha=0.5)
+axes.plot(*np.array(track)[:, :2].T, "k-", linewidth=1)
+axes.set(aspect="equal", xlim=(-1.8, 1.8), title="the body every quarter of a second, and the path of its centre")
+heights.plot(STEP * np.arange(STEPS), np.array(track)[:, 1], label="height of the centre")
+heights.plot(STEP * np.arange(STEPS), depths, label="penetration")
+heights.set(xlabel="time [s]")
+heights.legend()
+save(figure, given.output)

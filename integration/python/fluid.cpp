@@ -1,0 +1,241 @@
+// seed(), particles(), obstacle(): liquids and moving solids.
+#include <fmt/format.h>
+#include <openvdb/tools/Dense.h>
+
+#include <cmath>
+#include <memory>
+#include <optional>
+#include <stdexcept>
+
+#include <bilayer/integration/fluid/obstacle.h>
+#include <bilayer/integration/fluid/particles.h>
+#include <bilayer/integration/fluid/seed.h>
+#include <bilayer/sdf/grids.h>
+
+#include "integration/python/arguments.h"
+#include "integration/python/arrays.h"
+#include "integration/python/bindings.h"
+
+namespace bilayer::python {
+namespace {
+
+using openvdb::math::Transform;
+
+constexpr std::array<std::pair<const char*, fluid::SeedMode>, 3> modes{{{"unite", fluid::SeedMode::unite},
+                                                                        {"intersect", fluid::SeedMode::intersect},
+                                                                        {"subtract", fluid::SeedMode::subtract}}};
+
+fluid::Placement placementOf(const py::object& pose, const py::object& scale) {
+    Floats factors(scale, "scale", {}, Range::nonNegative);
+    factors.broadcast({3});
+    const auto f = factors.as<float>();
+    for (const float factor : f) requirePositive(double(factor), "scale");
+    return {poseOf(pose, "pose"), glm::vec3(f[0], f[1], f[2])};
+}
+
+// Metadata of a mesh do not apply to a liquid; those of the position stay.
+void dropHistory(openvdb::FloatGrid& liquid) {
+    std::vector<std::string> names;
+    for (auto entry = liquid.beginMeta(); entry != liquid.endMeta(); ++entry)
+        if (entry->first.starts_with("bilayer:") && entry->first != metadata::origin) names.push_back(entry->first);
+    for (const std::string& name : names) liquid.removeMeta(name);
+}
+
+// Calls visit(LevelSet or Mesh) without the GIL.
+template <class Visit>
+auto withSolid(const py::object& solid, Visit visit) {
+    if (py::isinstance<LevelSet>(solid)) {
+        const auto& levelSet = solid.cast<const LevelSet&>();
+        const py::gil_scoped_release release;
+        return visit(levelSet);
+    }
+    const SharedMesh mesh = meshOf(solid);
+    const py::gil_scoped_release release;
+    return visit(static_cast<const Mesh&>(*mesh));
+}
+
+py::object seedLiquid(const LevelSet& liquid, const py::object& body, const py::object& pose, const py::object& scale,
+                      const std::string& mode, bool uniteSolids) {
+    const fluid::Placement placement = placementOf(pose, scale);
+    const fluid::SeedOptions options(byWord(modes, mode, "mode"), uniteSolids);
+    const openvdb::FloatGrid::Ptr grid = liquid.grids().distance->deepCopy();
+    dropHistory(*grid);
+    const auto [maxChange, where, changedVoxels] =
+        withSolid(body, [&](const auto& solid) { return fluid::seed(*grid, solid, placement, options); });
+    auto grids = std::make_shared<Grids>();
+    grids->distance = grid;
+    return result("Seeded", LevelSet(std::move(grids)), maxChange, toArray(where), changedVoxels);
+}
+
+py::object makeParticles(const py::object& liquid, const py::object& pose, const py::object& scale,
+                         const py::object& voxelSize, int perVoxel, std::uint64_t seed) {
+    const fluid::ParticleOptions options{.perVoxel = perVoxel, .seed = seed};
+    fluid::Particles particles;
+    if (py::isinstance<LevelSet>(liquid)) {
+        if (!pose.is_none() || !voxelSize.is_none())
+            throw std::invalid_argument("pose and voxel_size are for a Field; a LevelSet has its own voxels");
+        const auto& levelSet = liquid.cast<const LevelSet&>();
+        const py::gil_scoped_release release;
+        particles = fluid::particles(*levelSet.grids().distance, options);
+    } else if (py::isinstance<Field>(liquid)) {
+        const auto& field = liquid.cast<const Field&>();
+        const double edge = voxelSize.is_none() ? double(field.voxelSize()) : voxelSize.cast<double>();
+        requirePositive(edge, "voxel_size");
+        const fluid::Placement placement = placementOf(pose, scale);
+        const py::gil_scoped_release release;
+        particles = fluid::particles(field, placement, *Transform::createLinearTransform(edge), options);
+    } else {
+        throw std::invalid_argument(
+            fmt::format("liquid: expected a LevelSet or a Field, got a '{}'", Py_TYPE(liquid.ptr())->tp_name));
+    }
+    const auto count = py::ssize_t(particles.positions.size());
+    glm::vec3* first = nullptr;
+    const py::capsule owner = owned(std::move(particles.positions), first);
+    return py::array(py::dtype::of<float>(), Shape{count, 3}, reinterpret_cast<const float*>(first), owner);
+}
+
+// The grids of an obstacle, and where their dense arrays begin.
+class Obstacle {
+  public:
+    explicit Obstacle(fluid::Solid solid) : solid_(std::move(solid)) {
+        for (const openvdb::GridBase* grid : {static_cast<const openvdb::GridBase*>(solid_.distance.get()),
+                                              static_cast<const openvdb::GridBase*>(solid_.velocity.get()),
+                                              static_cast<const openvdb::GridBase*>(solid_.openFaces.get()),
+                                              static_cast<const openvdb::GridBase*>(solid_.openVolume.get())})
+            box_.expand(grid->evalActiveVoxelBoundingBox());
+    }
+
+    const fluid::Solid& solid() const { return solid_; }
+    double voxelSize() const { return solid_.distance->voxelSize()[0]; }
+    glm::dvec3 origin() const {
+        const openvdb::Vec3d place = solid_.distance->indexToWorld(box_.min());
+        return {place.x(), place.y(), place.z()};
+    }
+
+    // (nx, ny, nz), with a last axis of three for vectors.
+    template <class Grid>
+    py::array_t<float> dense(const Grid& grid) const {
+        using Value = typename Grid::ValueType;
+        const openvdb::Coord size = box_.dim();
+        Shape shape{size.x(), size.y(), size.z()};
+        if (sizeof(Value) > sizeof(float)) shape.push_back(3);
+        py::array_t<float> values(shape);
+        auto* const memory = reinterpret_cast<Value*>(values.mutable_data());
+        {
+            const py::gil_scoped_release release;
+            openvdb::tools::Dense<Value, openvdb::tools::LayoutZYX> target(box_, memory);
+            openvdb::tools::copyToDense(grid, target);
+        }
+        return values;
+    }
+
+    void save(const py::object& path) const {
+        const std::string file = pathOf(path);
+        const py::gil_scoped_release release;
+        writeGrids(file, {solid_.distance, solid_.velocity, solid_.openFaces, solid_.openVolume});
+    }
+
+  private:
+    fluid::Solid solid_;
+    openvdb::CoordBBox box_;
+};
+
+Obstacle makeObstacle(const py::object& solid, double voxelSize, const py::object& pose, const py::object& scale,
+                      const py::object& velocity, const py::object& angularVelocity, float halfWidth) {
+    requirePositive(voxelSize, "voxel_size");
+    const fluid::Placement placement = placementOf(pose, scale);
+    const fluid::SolidOptions options{
+        .velocity = {vector(velocity, "velocity"), vector(angularVelocity, "angular_velocity")},
+        .halfWidthVoxels = halfWidth};
+    return withSolid(solid, [&](const auto& body) {
+        openvdb::initialize();
+        return Obstacle(fluid::solid(body, placement, *Transform::createLinearTransform(voxelSize), options));
+    });
+}
+
+constexpr const char* seedDoc = R"(seed(liquid, body, pose=None, scale=1, mode="unite", unite_solids=True) -> Seeded
+
+Combines a body with a liquid's level set, in the liquid's voxels. The result passes OpenVDB's check of level sets.
+
+liquid: a LevelSet with a band of 3 voxels or more on each side.
+body: a mesh or a LevelSet. pose: a Pose, a matrix of shape (4, 4), or None. scale: one number or three, above 0.
+mode: "unite", "intersect" or "subtract". unite_solids: ignore walls inside overlapping solids of the mesh.
+
+liquid: the new LevelSet. max_change_voxels: float, by which distances were changed near creases; where: float64 (3,),
+the voxel; changed_voxels: int, voxels that changed by more than 0.1 voxels.
+
+Raises ValueError for a body that is open or without an inside, and for a liquid that is no level set.
+
+>>> import bilayer
+>>> tank = bilayer.build(bilayer.box((2, 2, 1)), voxel_size=0.05)
+>>> both = bilayer.seed(tank, bilayer.sphere(0.4), pose=bilayer.Pose((0, 0, 1.5))).liquid
+>>> round(bilayer.mass_properties(both).volume, 1)
+4.3
+)";
+
+constexpr const char* particlesDoc =
+    R"(particles(liquid, pose=None, scale=1, voxel_size=None, per_voxel=8, seed=0) -> float32 (N, 3)
+
+Marker particles at jittered positions inside a liquid; none outside. The same seed gives the same particles.
+
+liquid: a LevelSet, or a Field in a pose, whose mesh keeps particles from passing thin walls.
+voxel_size: of the solver's grid, for a Field; None for the field's own.
+per_voxel: particles in a voxel that is entirely inside, 1 to 1000.
+
+>>> import bilayer
+>>> points = bilayer.particles(bilayer.build(bilayer.box(), resolution=16))
+>>> points.shape[1], bool(abs(points).max() <= 0.5)
+(3, True)
+)";
+
+constexpr const char* obstacleDoc =
+    R"(obstacle(solid, voxel_size, pose=None, scale=1, velocity=(0, 0, 0), angular_velocity=(0, 0, 0),
+         half_width_voxels=3) -> Obstacle
+
+What a pressure solver needs of a moving body, in cells whose centres are at whole multiples of voxel_size.
+
+solid: a mesh or a LevelSet. pose, scale: as for seed().
+velocity: [unit/s]. angular_velocity: [rad/s], about the pose's position.
+
+Raises ValueError for a body that is open or without an inside.
+
+>>> import bilayer
+>>> obstacle = bilayer.obstacle(bilayer.sphere(1), 0.1)
+>>> float(obstacle.open_volume.min()), obstacle.velocity.shape[3]
+(0.0, 3)
+)";
+
+}  // namespace
+
+void addFluid(py::module_& module) {
+    py::class_<Obstacle>(
+        module, "Obstacle",
+        "A moving body in a solver's grid; obstacle() makes it. Arrays are dense over one box of cells.")
+        .def_property_readonly(
+            "distance", [](const Obstacle& self) { return self.dense(*self.solid().distance); },
+            "float32 (nx, ny, nz): level set at the cell centres, negative inside the body.")
+        .def_property_readonly(
+            "velocity", [](const Obstacle& self) { return self.dense(*self.solid().velocity); },
+            "float32 (nx, ny, nz, 3): velocity across the lower faces of each cell.")
+        .def_property_readonly(
+            "open_faces", [](const Obstacle& self) { return self.dense(*self.solid().openFaces); },
+            "float32 (nx, ny, nz, 3): fluid fraction of the lower faces, 0 to 1.")
+        .def_property_readonly(
+            "open_volume", [](const Obstacle& self) { return self.dense(*self.solid().openVolume); },
+            "float32 (nx, ny, nz): fluid fraction of each cell, 0 to 1.")
+        .def_property_readonly(
+            "origin", [](const Obstacle& self) { return toArray(self.origin()); },
+            "float64 (3,): world coordinates of the centre of cell [0, 0, 0].")
+        .def_property_readonly("voxel_size", &Obstacle::voxelSize, "Edge of a cell.")
+        .def("save", &Obstacle::save, py::arg("path"),
+             "save(path)\n\nWrites the four grids to a .vdb file, whole or not at all.");
+    module.def("seed", seedLiquid, py::arg("liquid"), py::arg("body"), py::arg("pose") = py::none(),
+               py::arg("scale") = 1, py::arg("mode") = "unite", py::arg("unite_solids") = true, seedDoc);
+    module.def("particles", makeParticles, py::arg("liquid"), py::arg("pose") = py::none(), py::arg("scale") = 1,
+               py::arg("voxel_size") = py::none(), py::arg("per_voxel") = 8, py::arg("seed") = 0, particlesDoc);
+    module.def("obstacle", makeObstacle, py::arg("solid"), py::arg("voxel_size"), py::arg("pose") = py::none(),
+               py::arg("scale") = 1, py::arg("velocity") = py::make_tuple(0, 0, 0),
+               py::arg("angular_velocity") = py::make_tuple(0, 0, 0), py::arg("half_width_voxels") = 3.f, obstacleDoc);
+}
+
+}  // namespace bilayer::python

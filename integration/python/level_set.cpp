@@ -1,0 +1,339 @@
+// LevelSet: metadata, files, conversion to numpy, isosurfaces, extension beyond the band.
+#include <fmt/format.h>
+#include <openvdb/io/Stream.h>
+#include <openvdb/tools/Dense.h>
+#include <openvdb/tree/LeafManager.h>
+#include <pybind11/stl.h>
+
+#include <algorithm>
+#include <cmath>
+#include <istream>
+#include <memory>
+#include <optional>
+#include <sstream>
+#include <stdexcept>
+
+#include <bilayer/integration/fluid/extend.h>
+#include <bilayer/sdf/grids.h>
+#include <bilayer/sdf/nanovdb.h>
+#include <bilayer/sdf/surface.h>
+#include <bilayer/sdf/vdb_io.h>
+
+#include "integration/python/arguments.h"
+#include "integration/python/arrays.h"
+#include "integration/python/bindings.h"
+
+namespace bilayer::python {
+namespace {
+
+using openvdb::Coord;
+using openvdb::FloatGrid;
+using openvdb::FloatTree;
+
+constexpr double maxDenseVoxels = 1u << 31;  // 8 GiB; a finer field wants sparse()
+
+glm::dvec3 worldOf(const LevelSet& levelSet, const Coord& voxel) {
+    const openvdb::Vec3d place = levelSet.grids().distance->indexToWorld(voxel);
+    return levelSet.origin() + glm::dvec3(place.x(), place.y(), place.z());
+}
+
+py::object dense(const LevelSet& levelSet, int padding) {
+    if (padding < 0) throw std::invalid_argument(fmt::format("padding is {}, and must be 0 or above", padding));
+    const FloatGrid& grid = *levelSet.grids().distance;
+    openvdb::CoordBBox box = grid.evalActiveVoxelBoundingBox();
+    box.expand(padding);
+    const Coord size = box.dim();
+    if (double(size.x()) * size.y() * size.z() > maxDenseVoxels)
+        throw std::invalid_argument(fmt::format(
+            "a dense array of {} x {} x {} voxels is larger than 8 GiB: use sparse()", size.x(), size.y(), size.z()));
+    py::array_t<float> values({size.x(), size.y(), size.z()});
+    float* const memory = values.mutable_data();
+    {
+        const py::gil_scoped_release release;
+        openvdb::tools::Dense<float, openvdb::tools::LayoutZYX> target(box, memory);
+        openvdb::tools::copyToDense(grid, target);
+    }
+    return result("Dense", values, toArray(worldOf(levelSet, box.min())), levelSet.voxelSize());
+}
+
+// The tree with voxels in place of active tiles, which fields of other programs may have.
+FloatTree::ConstPtr withoutTiles(const FloatGrid& grid) {
+    if (grid.tree().activeTileCount() == 0) return grid.constTreePtr();
+    const auto copy = std::make_shared<FloatTree>(grid.tree());
+    copy->voxelizeActiveTiles();
+    return copy;
+}
+
+struct ActiveVoxels {
+    std::vector<std::int32_t> coordinates;  // three per voxel
+    std::vector<float> values;
+    std::vector<std::int32_t> triangles;  // empty if the level set has none
+};
+
+ActiveVoxels activeVoxels(const LevelSet& levelSet) {
+    const FloatTree::ConstPtr tree = withoutTiles(*levelSet.grids().distance);
+    openvdb::tree::LeafManager<const FloatTree> leaves(*tree);
+    std::vector<std::size_t> begins(leaves.leafCount() + 1, 0);
+    for (std::size_t i = 0; i < leaves.leafCount(); ++i) begins[i + 1] = begins[i] + leaves.leaf(i).onVoxelCount();
+    ActiveVoxels voxels;
+    voxels.coordinates.resize(3 * begins.back());
+    voxels.values.resize(begins.back());
+    const openvdb::Int32Grid* triangle = levelSet.grids().triangle.get();
+    if (triangle) voxels.triangles.resize(begins.back());
+    leaves.foreach ([&](const FloatTree::LeafNodeType& leaf, std::size_t index) {
+        std::size_t at = begins[index];
+        const auto* nearest = triangle ? triangle->tree().probeConstLeaf(leaf.origin()) : nullptr;
+        for (auto voxel = leaf.cbeginValueOn(); voxel; ++voxel, ++at) {
+            const Coord coordinate = voxel.getCoord();
+            std::copy_n(coordinate.asPointer(), 3, &voxels.coordinates[3 * at]);
+            voxels.values[at] = *voxel;
+            if (triangle) voxels.triangles[at] = nearest ? nearest->getValue(voxel.pos()) : -1;
+        }
+    });
+    return voxels;
+}
+
+template <class Value>
+py::array arrayOf(std::vector<Value> values, const Shape& shape) {
+    Value* first = nullptr;
+    const py::capsule owner = owned(std::move(values), first);
+    return py::array(py::dtype::of<Value>(), shape, first, owner);
+}
+
+py::object sparse(const LevelSet& levelSet) {
+    ActiveVoxels voxels;
+    {
+        const py::gil_scoped_release release;
+        voxels = activeVoxels(levelSet);
+    }
+    const auto count = py::ssize_t(voxels.values.size());
+    py::object triangles = py::none();
+    if (levelSet.grids().triangle) triangles = arrayOf(std::move(voxels.triangles), {count});
+    return result("Sparse", arrayOf(std::move(voxels.coordinates), {count, 3}),
+                  arrayOf(std::move(voxels.values), {count}), triangles, toArray(worldOf(levelSet, Coord(0))),
+                  levelSet.voxelSize());
+}
+
+py::dict metadataOf(const LevelSet& levelSet) {
+    const BuildTimes& times = levelSet.buildTimes();
+    py::dict all;
+    all["voxel_size"] = levelSet.voxelSize();
+    all["origin"] = toArray(levelSet.origin());
+    all["exterior_width"] = levelSet.exteriorWidth();
+    all["interior_width"] = levelSet.interiorWidth();
+    all["active_voxels"] = levelSet.activeVoxels();
+    all["leaves"] = levelSet.leaves();
+    all["memory_bytes"] = levelSet.memoryBytes();
+    all["method"] = levelSet.method();
+    all["sign"] = levelSet.sign();
+    all["sign_reason"] = levelSet.signReason();
+    all["sign_conflicts"] = levelSet.signConflicts();
+    all["error_bound"] = levelSet.errorBound();
+    all["mesh_hash"] = levelSet.meshHash();
+    all["build_seconds"] = times.total;
+    return all;
+}
+
+// The grids as they are in memory, for pickles. Files hold them shifted by the origin.
+py::bytes packed(const LevelSet& levelSet) {
+    std::string bytes;
+    {
+        const py::gil_scoped_release release;
+        openvdb::initialize();
+        const Grids& grids = levelSet.grids();
+        openvdb::GridCPtrVec all{grids.distance};
+        if (grids.triangle) all.push_back(grids.triangle);
+        if (grids.points) all.push_back(grids.points);
+        std::ostringstream stream(std::ios::binary);
+        openvdb::io::Stream(stream).write(all);
+        bytes = std::move(stream).str();
+    }
+    return bytes;
+}
+
+LevelSet unpacked(const py::bytes& packed) {
+    const auto view = packed.cast<std::string>();
+    const py::gil_scoped_release release;
+    openvdb::initialize();
+    std::istringstream stream(view, std::ios::binary);
+    const openvdb::GridPtrVecPtr all = openvdb::io::Stream(stream, /*delayLoad=*/false).getGrids();
+    auto grids = std::make_shared<Grids>();
+    for (const auto& grid : *all) {
+        if (grid->getName() == contactPoints)
+            grids->points = grid;
+        else if (grid->isType<openvdb::Int32Grid>())
+            grids->triangle = openvdb::gridPtrCast<openvdb::Int32Grid>(grid);
+        else
+            grids->distance = openvdb::gridPtrCast<FloatGrid>(grid);
+    }
+    return LevelSet(std::move(grids));
+}
+
+bool equal(const LevelSet& a, const LevelSet& b) {
+    const FloatGrid &left = *a.grids().distance, &right = *b.grids().distance;
+    if (&left == &right) return true;
+    if (left.transform() != right.transform() || left.background() != right.background() ||
+        a.interiorWidth() != b.interiorWidth() || a.origin() != b.origin() ||
+        left.activeVoxelCount() != right.activeVoxelCount())
+        return false;
+    const ActiveVoxels one = activeVoxels(a), other = activeVoxels(b);
+    return one.coordinates == other.coordinates && one.values == other.values && one.triangles == other.triangles;
+}
+
+void save(const LevelSet& levelSet, const py::object& path, bool halfFloat) {
+    const std::string file = pathOf(path);
+    const bool nano = file.ends_with(".nvdb");
+    if (!nano && !file.ends_with(".vdb"))
+        throw std::invalid_argument(fmt::format("path: expected a name that ends in .vdb or .nvdb, got '{}'", file));
+    if (nano && halfFloat) throw std::invalid_argument("half_float: .nvdb files hold 32-bit floats");
+    const py::gil_scoped_release release;
+    nano ? writeNanoVdb(file, levelSet) : writeVdb(file, levelSet, {.halfFloat = halfFloat});
+}
+
+LevelSet load(const py::object& path) {
+    const std::string file = existingFile(path);
+    const py::gil_scoped_release release;
+    return readVdb(file);
+}
+
+SharedMesh extract(const LevelSet& levelSet, float isovalue, float adaptivity) {
+    const py::gil_scoped_release release;
+    return std::make_shared<Mesh>(surface(levelSet, {isovalue, adaptivity}));
+}
+
+LevelSet extended(const LevelSet& levelSet, std::optional<float> distance) {
+    const py::gil_scoped_release release;
+    return distance ? fluid::fill(levelSet, *distance) : fluid::fill(levelSet);
+}
+
+constexpr const char* levelSetDoc = R"(An immutable narrow-band signed distance field, in an OpenVDB grid.
+
+build() makes it, LevelSet.load() reads it. Distances are negative inside, in the mesh's unit. Voxel centres lie at
+whole multiples of the voxel size from Mesh.origin. Copies share memory; pickles hold all grids.
+
+>>> import bilayer, pickle
+>>> level_set = bilayer.build(bilayer.box(), resolution=16)
+>>> pickle.loads(pickle.dumps(level_set)) == level_set
+True
+)";
+
+constexpr const char* denseDoc = R"(to_numpy(padding=1) -> Dense(values, origin, spacing)
+
+The field as a dense array over the band's bounding box.
+
+padding: voxels added on each side.
+values: float32 of shape (nx, ny, nz). Outside the band: the exterior width outside, minus the interior width inside.
+origin: float64 of shape (3,), world coordinates of the centre of values[0, 0, 0].
+spacing: the voxel size. values[i, j, k] is at origin + spacing * (i, j, k).
+
+Raises ValueError for more than 2^31 voxels.
+
+>>> import bilayer
+>>> values, origin, spacing = bilayer.build(bilayer.box(), resolution=16).to_numpy()
+>>> values.shape, bool(values[12, 12, 12] < 0)
+((23, 23, 23), True)
+)";
+
+constexpr const char* sparseDoc = R"(sparse() -> Sparse(coordinates, values, triangles, origin, spacing)
+
+The active voxels, in the order of the tree.
+
+coordinates: int32 of shape (N, 3), the voxels' indices. The centre of a voxel is at origin + spacing * coordinates.
+values: float32 of shape (N,), signed distances.
+triangles: int32 of shape (N,), the nearest face; None unless build() was asked for triangles.
+
+>>> import bilayer
+>>> level_set = bilayer.build(bilayer.box(), resolution=16)
+>>> level_set.sparse().values.size == level_set.active_voxels
+True
+)";
+
+constexpr const char* extendedDoc = R"(extended(distance=None) -> LevelSet
+
+Extends the field beyond its band by fast sweeping: to a distance on either side of the surface, or to the whole
+bounding box of the band. The band keeps its values; those beyond are of first order.
+
+Raises ValueError for a field without an inside, and for a distance that is not positive.
+
+>>> import bilayer
+>>> level_set = bilayer.build(bilayer.box(), resolution=16)
+>>> level_set.extended(0.5).exterior_width
+0.5
+)";
+
+constexpr const char* surfaceDoc = R"(surface(isovalue=0, adaptivity=0) -> Mesh
+
+Extracts an isosurface, with faces that point outward.
+
+isovalue: the distance at the surface, within the band.
+adaptivity: 0 for a uniform mesh, to 1 for the fewest faces in flat regions.
+
+Raises ValueError for a value out of range.
+
+>>> import bilayer
+>>> bilayer.inspect(bilayer.build(bilayer.box(), resolution=16).surface()).closed
+True
+)";
+
+constexpr const char* saveDoc = R"(save(path, half_float=False)
+
+Writes a .vdb file, which Houdini, Blender and ParaView open, or a .nvdb file for code on a GPU. The file appears whole
+or not at all.
+
+half_float: store distances as 16-bit floats, half the size, with three decimal digits.
+
+Raises ValueError for another extension, RuntimeError if the file cannot be written.
+)";
+
+}  // namespace
+
+void addLevelSet(py::module_& module) {
+    py::class_<LevelSet>(module, "LevelSet", levelSetDoc)
+        .def_property_readonly("voxel_size", &LevelSet::voxelSize, "Edge of a voxel, in the mesh's unit.")
+        .def_property_readonly(
+            "origin", [](const LevelSet& self) { return toArray(self.origin()); },
+            "float64 of shape (3,): Mesh.origin. Queries use coordinates relative to it.")
+        .def_property_readonly("exterior_width", &LevelSet::exteriorWidth,
+                               "Voxels with 0 <= distance < this are active.")
+        .def_property_readonly("interior_width", &LevelSet::interiorWidth,
+                               "Voxels with -this < distance < 0 are active.")
+        .def_property_readonly("active_voxels", &LevelSet::activeVoxels, "Number of voxels in the band.")
+        .def_property_readonly("memory_bytes", &LevelSet::memoryBytes, "Of all grids.")
+        .def_property_readonly("method", &LevelSet::method, "How distances were computed; '' if not known.")
+        .def_property_readonly("sign", &LevelSet::sign, "How the inside was found; '' if not known.")
+        .def_property_readonly("sign_reason", &LevelSet::signReason, "Why that sign method was chosen.")
+        .def_property_readonly("error_bound", &LevelSet::errorBound,
+                               "Maximum error of active voxels; inf: not bounded; nan: not known.")
+        .def_property_readonly("mesh_hash", &LevelSet::meshHash, "Hash of the mesh, or 0.")
+        .def_property_readonly(
+            "has_triangles", [](const LevelSet& self) { return self.grids().triangle != nullptr; },
+            "Whether the nearest face of each active voxel is stored.")
+        .def_property_readonly("metadata", metadataOf, "All of the above, and more, by name.")
+        .def("to_numpy", dense, py::arg("padding") = 1, denseDoc)
+        .def("sparse", sparse, sparseDoc)
+        .def("surface", extract, py::arg("isovalue") = 0.f, py::arg("adaptivity") = 0.f, surfaceDoc)
+        .def("extended", extended, py::arg("distance") = py::none(), extendedDoc)
+        .def("save", save, py::arg("path"), py::arg("half_float") = false, saveDoc)
+        .def_static(
+            "load", load, py::arg("path"),
+            "load(path) -> LevelSet\n\nReads the first level set of a .vdb file, of bilayer or another program. "
+            "Raises FileNotFoundError, and RuntimeError that names the file if it cannot be read.")
+        .def(
+            "__eq__",
+            [](const LevelSet& a, const LevelSet& b) {
+                const py::gil_scoped_release release;
+                return equal(a, b);
+            },
+            py::is_operator())
+        .def("__hash__", [](const LevelSet& self) { return py::ssize_t(self.meshHash() >> 1); })
+        .def("__copy__", [](const LevelSet& self) { return self; })
+        .def(
+            "__deepcopy__", [](const LevelSet& self, const py::dict&) { return self; }, py::arg("memo"))
+        .def("__repr__",
+             [](const LevelSet& self) {
+                 return fmt::format("LevelSet({} active voxels of {:g})", self.activeVoxels(), self.voxelSize());
+             })
+        .def(py::pickle(&packed, &unpacked));
+}
+
+}  // namespace bilayer::python

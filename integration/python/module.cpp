@@ -1,0 +1,28 @@
+// The native module of the package `bilayer`: pybind11 converts arguments and results, the libraries compute.
+#include <pybind11/pybind11.h>
+
+#include <bilayer/cl/device.h>
+#include <bilayer/sdf/options.h>
+
+#include "integration/python/bindings.h"
+
+PYBIND11_MODULE(_bilayer, module) {
+    using namespace bilayer;
+    namespace py = pybind11;
+    py::options options;
+    options.disable_function_signatures();  // the docstrings name arguments and types of Python
+    module.doc() = "The native part of bilayer. Import bilayer instead.";
+    module.attr("__version__") = BILAYER_VERSION;
+    py::register_exception<Cancelled>(module, "Cancelled", PyExc_RuntimeError).doc() =
+        "Raised by build() and rebuild() after `progress` returned False.";
+    py::register_exception<DeviceError>(module, "DeviceError", PyExc_RuntimeError).doc() =
+        "Error of an OpenCL device, or no such device.";
+    python::addMesh(module);
+    python::addLevelSet(module);
+    python::addBuild(module);
+    python::addField(module);
+    python::addPose(module);
+    python::addCollider(module);
+    python::addContact(module);
+    python::addFluid(module);
+}

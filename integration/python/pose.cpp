@@ -1,0 +1,132 @@
+// Pose: position and orientation of a body.
+#include <bilayer/collider/pose.h>
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/mat3x3.hpp>
+#include <stdexcept>
+
+#include "integration/python/arguments.h"
+#include "integration/python/arrays.h"
+#include "integration/python/bindings.h"
+
+namespace bilayer::python {
+namespace {
+
+/// Tolerance of a unit quaternion's squared length; the pose is normalized.
+constexpr float unitTolerance = 1e-3f;
+
+Pose makePose(const py::object& position, const py::object& rotation) {
+    const glm::vec3 place = vector(position, "position");
+    const Floats numbers(rotation, "rotation", {4});
+    if (!numbers.shape().empty())
+        throw std::invalid_argument("rotation: expected one quaternion w, x, y, z, got " + text(numbers.shape()));
+    const auto q = numbers.as<float>();
+    const glm::quat quaternion(q[0], q[1], q[2], q[3]);
+    if (std::abs(glm::dot(quaternion, quaternion) - 1) > unitTolerance)
+        throw std::invalid_argument(fmt::format(
+            "rotation: expected a quaternion w, x, y, z of length 1, got one of length {:g}", glm::length(quaternion)));
+    const bool unit = glm::dot(quaternion, quaternion) == 1;  // to the bit through pickles
+    return {place, unit ? quaternion : glm::normalize(quaternion)};
+}
+
+py::array_t<float> rotationOf(const Pose& pose) {
+    const glm::quat& q = pose.rotation;
+    const float numbers[] = {q.w, q.x, q.y, q.z};
+    return py::array_t<float>(4, numbers);
+}
+
+py::array_t<float> matrixOf(const Pose& pose) {
+    const glm::mat3 axes = glm::mat3_cast(pose.rotation);
+    py::array_t<float> matrix({4, 4});
+    auto m = matrix.mutable_unchecked<2>();
+    for (int row = 0; row < 3; ++row) {
+        for (int column = 0; column < 3; ++column) m(row, column) = axes[column][row];
+        m(row, 3) = pose.position[row];
+        m(3, row) = 0;
+    }
+    m(3, 3) = 1;
+    return matrix;
+}
+
+template <class Map>
+py::object mapped(const py::object& object, Map map) {
+    const Floats points(object, "points", {3});
+    Shape shape = points.shape();
+    shape.push_back(3);
+    py::array_t<float> result(shape);
+    auto* to = reinterpret_cast<glm::vec3*>(result.mutable_data());
+    {
+        const py::gil_scoped_release release;
+        for (const glm::vec3& point : points.points()) *to++ = map(point);
+    }
+    return result;
+}
+
+// Restores a pose to the bit, without the normalization of a new one.
+Pose restored(const py::tuple& state) {
+    const glm::vec3 place = vector(state[0], "position");
+    const Floats q(state[1], "rotation", {4});
+    const auto n = q.as<float>();
+    return {place, glm::quat(n[0], n[1], n[2], n[3])};
+}
+
+constexpr const char* poseDoc = R"(Pose(position=(0, 0, 0), rotation=(1, 0, 0, 0))
+
+An immutable rigid transform: body coordinates x map to rotation * x + position in the world.
+
+position: three numbers, in the unit of the meshes.
+rotation: a unit quaternion w, x, y, z.
+
+Where functions take a pose, they also take a matrix of shape (4, 4), or None for the identity.
+
+>>> import bilayer
+>>> bilayer.Pose((1, 2, 3)).to_world([0, 0, 1]).tolist()
+[1.0, 2.0, 4.0]
+)";
+
+}  // namespace
+
+void addPose(py::module_& module) {
+    py::class_<Pose>(module, "Pose", poseDoc)
+        .def(py::init(&makePose), py::arg("position") = py::make_tuple(0, 0, 0),
+             py::arg("rotation") = py::make_tuple(1, 0, 0, 0))
+        .def_static(
+            "from_matrix", [](const py::object& matrix) { return poseOf(matrix, "matrix"); }, py::arg("matrix"),
+            "from_matrix(matrix) -> Pose\n\nOf a matrix of shape (4, 4). Raises ValueError for one with a scale.")
+        .def_property_readonly(
+            "position", [](const Pose& pose) { return toArray(pose.position); }, "float32 of shape (3,).")
+        .def_property_readonly("rotation", rotationOf, "float32 of shape (4,): a unit quaternion w, x, y, z.")
+        .def_property_readonly("matrix", matrixOf, "float32 of shape (4, 4).")
+        .def(
+            "to_world",
+            [](const Pose& pose, const py::object& points) {
+                return mapped(points, [&](const glm::vec3& point) { return pose.toWorld(point); });
+            },
+            py::arg("points"), "to_world(points) -> float32 (..., 3)\n\nMaps points (..., 3) of the body to the world.")
+        .def(
+            "to_body",
+            [](const Pose& pose, const py::object& points) {
+                return mapped(points, [&](const glm::vec3& point) { return pose.toBody(point); });
+            },
+            py::arg("points"), "to_body(points) -> float32 (..., 3)\n\nMaps points (..., 3) of the world to the body.")
+        .def(
+            "__eq__", [](const Pose& a, const Pose& b) { return a.position == b.position && a.rotation == b.rotation; },
+            py::is_operator())
+        .def("__copy__", [](const Pose& self) { return self; })
+        .def(
+            "__deepcopy__", [](const Pose& self, const py::dict&) { return self; }, py::arg("memo"))
+        .def("__repr__",
+             [](const Pose& pose) {
+                 const glm::vec3& p = pose.position;
+                 const glm::quat& q = pose.rotation;
+                 return fmt::format("Pose(({:g}, {:g}, {:g}), ({:g}, {:g}, {:g}, {:g}))", p.x, p.y, p.z, q.w, q.x, q.y,
+                                    q.z);
+             })
+        .def(py::pickle([](const Pose& pose) { return py::make_tuple(toArray(pose.position), rotationOf(pose)); },
+                        &restored));
+}
+
+}  // namespace bilayer::python

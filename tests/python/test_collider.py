@@ -1,0 +1,152 @@
+"""Pose, Collider, collide(), distance(), mass properties."""
+
+import copy
+import pickle
+
+import numpy as np
+import pytest
+
+import bilayer
+
+HALF_TURN = (0, 0, 0, 1)
+QUARTER = (np.sqrt(0.5), 0, 0, np.sqrt(0.5))
+
+
+def test_pose(random):
+    pose = bilayer.Pose((1, 2, 3), QUARTER)
+    assert np.allclose(pose.to_world([1, 0, 0]), [1, 3, 3])
+    assert np.allclose(pose.to_body([1, 3, 3]), [1, 0, 0], atol=1e-6)
+    points = random.normal(size=(4, 5, 3))
+    assert np.allclose(pose.to_body(pose.to_world(points)), points, atol=1e-5)
+    assert np.allclose((pose.matrix @ [1, 0, 0, 1])[:3], [1, 3, 3])
+    again = bilayer.Pose.from_matrix(pose.matrix)
+    assert np.allclose(again.rotation, pose.rotation) and np.array_equal(again.position, pose.position)
+    assert pickle.loads(pickle.dumps(pose)) == pose and copy.deepcopy(pose) == pose and pose != bilayer.Pose()
+    assert eval(repr(bilayer.Pose()), {"Pose": bilayer.Pose}) == bilayer.Pose()
+
+
+@pytest.mark.parametrize(
+    "arguments, message",
+    [
+        (((0, 0),), "position: expected"),
+        (((0, 0, float("nan")),), r"position\[2\] is nan"),
+        (((0, 0, 0), (1, 0, 0)), "rotation: expected"),
+        (((0, 0, 0), (1, 1, 0, 0)), "rotation: expected a quaternion w, x, y, z of length 1, got one of length 1.41"),
+    ],
+)
+def test_bad_poses(arguments, message):
+    with pytest.raises(ValueError, match=message):
+        bilayer.Pose(*arguments)
+
+
+@pytest.mark.parametrize(
+    "matrix", [2 * np.eye(4), np.diag([1, 1, -1, 1]), np.ones((4, 4)), np.eye(3), np.zeros((2, 4, 4))]
+)
+def test_bad_matrices(collider, matrix):
+    with pytest.raises(ValueError, match="matrix"):
+        bilayer.Pose.from_matrix(matrix)
+    with pytest.raises(ValueError, match="pose_b"):
+        bilayer.distance(collider, None, collider, matrix)
+
+
+def test_collider(box, box_set, collider, sphere):
+    assert collider.margin == pytest.approx(0.0625) and collider.mesh == box
+    assert collider.mass.volume == pytest.approx(8) and collider.field.voxel_size == 0.0625
+    assert collider.exact_field.closest([2, 0, 0]).distance == 1
+    assert bilayer.Collider(box, box_set, margin=0.5, accuracy="exact").margin == 0.5
+    stored = bilayer.Collider.from_level_set(bilayer.with_body(box_set, box, margin=0.25))
+    assert stored.margin == 0.25
+    for options, message in (
+        ({"margin": -1}, "margin"),
+        ({"margin": float("nan")}, "margin"),
+        ({"accuracy": "best"}, "accuracy: expected one of 'samples'"),
+        ({"point_spacing_voxels": 0}, "point_spacing_voxels"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            bilayer.Collider(box, box_set, **options)
+    with pytest.raises(ValueError, match="mesh"):
+        bilayer.Collider(sphere, box_set)
+    with pytest.raises(ValueError):
+        bilayer.Collider.from_level_set(box_set)
+
+
+def test_mass(sphere, box, sphere_set):
+    mass = bilayer.mass_properties(bilayer.box((1, 2, 3)))
+    assert mass.volume == pytest.approx(6) and not mass.centre.any()
+    assert np.allclose(np.diag(mass.inertia), [6 * 13 / 12, 6 * 10 / 12, 6 * 5 / 12])
+    assert np.allclose(mass.principal_inertia, sorted(np.diag(mass.inertia))) and mass.principal_axes.shape == (4,)
+    volume = bilayer.mass_properties(sphere).volume
+    assert bilayer.mass_properties(sphere_set).volume == pytest.approx(volume, rel=0.005)
+    with pytest.raises(ValueError):
+        bilayer.mass_properties(bilayer.Mesh(box.vertices, box.faces[:1]))
+
+
+def test_contacts_of_a_box_on_a_box(collider):
+    contacts = bilayer.collide(collider, bilayer.Pose((0, 0, 1.99)), collider, None, margin=0.05)
+    assert len(contacts.distance) > 4 and contacts.points_tested > 0 and contacts.beyond_band == 0
+    assert np.allclose(contacts.distance, -0.01, atol=1e-4)
+    assert np.allclose(contacts.normal, [0, 0, 1], atol=1e-4)
+    assert contacts.feature.dtype == np.uint32 and contacts.feature.max() >= 1 << 31
+    matrix = bilayer.Pose((0, 0, 1.99)).matrix
+    assert np.array_equal(bilayer.collide(collider, matrix, collider, None, margin=0.05).position, contacts.position)
+    apart = bilayer.collide(collider, bilayer.Pose((0, 0, 2.2)), collider, None, margin=0.05)
+    assert apart.position.shape == (0, 3) and apart.distance.shape == (0,)
+
+
+def test_contact_options(collider):
+    pose = bilayer.Pose((0, 0, 2.5))
+    moving = bilayer.collide(collider, pose, collider, None, margin=0.05, motion_a=[[0, 0, -1], [0, 0, 0]])
+    assert len(moving.approach) > 0 and (moving.approach > 0).any()
+    large = bilayer.collide(collider, bilayer.Pose((0, 0, 2.99)), collider, None, margin=0.05, scale_b=2)
+    assert np.allclose(large.distance.min(), -0.01, atol=1e-4)
+    for options, message in (
+        ({"margin": -1}, "margin"),
+        ({"scale_a": 0}, "scale_a"),
+        ({"scale_b": float("nan")}, "scale_b"),
+        ({"motion_a": [0, 0, 0]}, "motion_a: expected"),
+        ({"motion_b": np.zeros((3, 2, 3))}, "motion_b: expected"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            bilayer.collide(collider, pose, collider, None, **options)
+
+
+def test_cache_changes_no_contact(collider):
+    cache = bilayer.ContactCache()
+    for step in range(5):
+        pose = bilayer.Pose((0.01 * step, 0, 1.99))
+        fresh = bilayer.collide(collider, pose, collider, None, margin=0.05)
+        cached = bilayer.collide(collider, pose, collider, None, margin=0.05, cache=cache)
+        assert np.array_equal(fresh.position, cached.position) and np.array_equal(fresh.feature, cached.feature)
+
+
+def test_distance(collider):
+    apart = bilayer.distance(collider, bilayer.Pose((5, 0.5, 0), HALF_TURN), collider, None)
+    assert apart.found and apart.overlap == "none" and apart.distance == pytest.approx(3, abs=1e-5)
+    assert apart.normal.tolist() == pytest.approx([1, 0, 0], abs=1e-6) and apart.triangle_a >= 0
+    assert apart.position_a[0] == pytest.approx(4) and apart.position_b[0] == pytest.approx(1)
+    assert not bilayer.distance(collider, bilayer.Pose((5, 0, 0)), collider, None, max_distance=1).found
+    deep = bilayer.distance(collider, bilayer.Pose((1.9, 0.1, 0.2)), collider, None)
+    assert deep.overlap == "surfaces" and deep.distance == pytest.approx(-0.1, abs=1e-4)
+    inner = bilayer.distance(collider, None, collider, None, scale_a=0.25)
+    assert inner.overlap == "a inside b" and inner.distance < 0
+    with pytest.raises(ValueError, match="max_distance"):
+        bilayer.distance(collider, None, collider, None, max_distance=-1)
+
+
+def test_distances(collider, random):
+    poses = [bilayer.Pose(random.uniform(-8, 8, size=3)) for _ in range(12)]
+    pairs = [(i, j) for i in range(12) for j in range(i)]
+    many = bilayer.distances(collider, poses, pairs)
+    single = [bilayer.distance(collider, poses[i], collider, poses[j]).distance for i, j in pairs]
+    assert many.dtype == np.float32 and np.array_equal(many, np.float32(single))
+    assert np.array_equal(bilayer.distances([collider] * 12, poses, pairs), many)
+    assert np.array_equal(bilayer.distances(collider, poses, pairs, max_distance=0.5) == np.inf, many > 0.5)
+    assert bilayer.distances(collider, poses, []).shape == (0,)
+    for colliders, bad, message in (
+        ([collider], pairs, "colliders: expected one for each of 12 poses, got 1"),
+        ([1] * 12, pairs, "colliders: expected a Collider"),
+        (collider, [[0, 12]], r"pairs\[0, 1\] is 12"),
+        (collider, [0, 1], "pairs: expected"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            bilayer.distances(colliders, poses, bad)

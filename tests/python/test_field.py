@@ -1,0 +1,184 @@
+"""Field: queries against analytic answers, shapes, bad arguments."""
+
+import copy
+
+import numpy as np
+import pytest
+
+import bilayer
+from conftest import box_distance
+
+INFINITY = float("inf")
+
+
+@pytest.mark.parametrize("dtype", [np.float16, np.float32, np.float64, np.int32])
+def test_samples_of_any_dtype(box_field, dtype):
+    points = np.array([[0, 0, 1], [1, 1, 0]], dtype=dtype)
+    samples = box_field.sample(points)
+    assert samples.distance.dtype == np.float32 and samples.gradient.shape == (2, 3)
+    assert np.allclose(samples.distance, 0, atol=1e-5) and samples.in_band.all()
+
+
+def test_samples_are_distances(sphere_field, random):
+    directions = random.normal(size=(1000, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    radii = random.uniform(0.97, 1.03, size=(1000, 1))
+    distance, gradient, in_band = sphere_field.sample(directions * radii)
+    assert in_band.all()
+    assert np.abs(distance - (radii[:, 0] - 1)).max() < 0.01
+    assert (gradient * directions).sum(axis=1).min() > 0.95
+    far = sphere_field.sample([[3, 0, 0], [0, 0, 0]])
+    assert not far.in_band.any() and far.distance[0] > 0 > far.distance[1] and not far.gradient.any()
+
+
+def test_leading_shapes(box_field, random):
+    points = random.uniform(-2, 2, size=(4, 5, 3))
+    flat = box_field.sample(points.reshape(-1, 3))
+    grid = box_field.sample(points)
+    assert grid.distance.shape == (4, 5) and grid.gradient.shape == (4, 5, 3)
+    assert np.array_equal(grid.distance.ravel(), flat.distance)
+    single = box_field.sample(points[0, 0])
+    assert single.distance.shape == () and single.gradient.shape == (3,)
+    assert single.distance == flat.distance[0] and isinstance(single.distance, np.float32)
+    empty = box_field.sample(np.zeros((0, 3)))
+    assert empty.distance.shape == (0,) and empty.gradient.shape == (0, 3)
+    assert box_field.closest(np.zeros((0, 3))).position.shape == (0, 3)
+    assert box_field.inside(np.zeros((0, 3))).shape == (0,)
+    transposed = points.transpose(1, 0, 2)
+    assert np.array_equal(box_field.sample(transposed).distance, grid.distance.T)
+
+
+def test_lists_and_broadcast_arrays(box_field):
+    assert np.array_equal(box_field.sample([[0.9, 0, 0]]).distance, box_field.sample(np.array([[0.9, 0, 0]])).distance)
+    repeated = np.broadcast_to(np.float32([0.9, 0, 0]), (7, 3))
+    assert len(set(box_field.sample(repeated).distance.tolist())) == 1
+
+
+@pytest.mark.parametrize(
+    "points, message",
+    [
+        (np.zeros((5, 2)), r"points: expected an array of real numbers of shape \(\.\.\., 3\), got shape \(5, 2\)"),
+        (1.0, r"points: expected .* got shape \(\)"),
+        ([], r"points: .* got shape \(0,\)"),
+        (None, "points: expected"),
+        ("abc", "points: expected"),
+        ([[1, 2], [3]], "points: expected"),
+        (np.array([[1, 2, 3]], dtype=object), "dtype object"),
+        ([[0, 0, 0], [0, np.nan, 0]], r"points\[1, 1\] is nan, and must be finite"),
+        (np.full((2, 2, 3), np.inf), r"points\[0, 0, 0\] is inf"),
+        (np.array([[1e300, 0, 0]]), r"points\[0, 0\] is inf"),
+    ],
+)
+@pytest.mark.parametrize("query", ["sample", "closest", "inside"])
+@pytest.mark.filterwarnings("ignore:overflow")
+def test_bad_points(box_field, query, points, message):
+    with pytest.raises(ValueError, match=message):
+        getattr(box_field, query)(points)
+
+
+def test_closest(box_field, random):
+    points = random.uniform(-3, 3, size=(2000, 3)).astype(np.float32)
+    answer = box_field.closest(points)
+    assert answer.found.all()
+    assert np.abs(answer.distance - box_distance(points)).max() < 1e-5
+    assert np.allclose(np.linalg.norm(points - answer.position, axis=1), np.abs(answer.distance), atol=1e-5)
+    assert answer.triangle.dtype == np.int32 and answer.triangle.min() >= 0 and answer.triangle.max() < 12
+    assert set(answer.feature) <= {0, 1, 2} and answer.feature_index.max() <= 2
+    near = box_field.closest(points, max_distance=0.5)
+    assert np.array_equal(near.found, np.abs(box_distance(points)) <= 0.5)
+    for bad in (-1, float("nan")):
+        with pytest.raises(ValueError, match="max_distance"):
+            box_field.closest(points, bad)
+
+
+def test_closest_without_a_mesh(box_set):
+    answer = bilayer.Field(box_set).closest([2, 0.1, 0.2])
+    assert answer.triangle == -1 and answer.distance == pytest.approx(1, abs=1e-3)
+
+
+def test_inside(box_field, random):
+    points = random.uniform(-1.5, 1.5, size=(5000, 3)).astype(np.float32)
+    inside = box_field.inside(points)
+    assert inside.dtype == bool and np.array_equal(inside, box_distance(points) < 0)
+    assert box_field.inside([0, 0, 0]) and not box_field.inside([0, 0, 2])
+
+
+def test_raycast(box_field):
+    origins = [[5, 0.1, 0.2], [0, 5, 0], [0, 0, 0], [5, 3, 0]]
+    directions = [[-2, 0, 0], [0, -1, 0], [1, 0, 0], [-1, 0, 0]]
+    hits = box_field.raycast(origins, directions)
+    assert hits.hit.tolist() == [True, True, True, False]
+    assert hits.distance.tolist() == [4, 4, 0, INFINITY]
+    assert np.allclose(hits.position[0], [1, 0.1, 0.2]) and np.allclose(hits.normal[0], [1, 0, 0])
+    assert np.isnan(hits.position[3]).all() and hits.triangle[3] == -1 and hits.triangle[0] >= 0
+    short = box_field.raycast(origins, directions, [4.1, 3.9, 1, 1])
+    assert short.hit.tolist() == [True, False, True, False]
+
+
+def test_rays_are_broadcast(box_field):
+    hits = box_field.raycast([[[5, 0, 0]], [[6, 0, 0]]], [[-1, 0, 0], [1, 0, 0], [0, 1, 0]])
+    assert hits.hit.shape == (2, 3) and hits.position.shape == (2, 3, 3)
+    assert hits.distance.tolist() == [[4, INFINITY, INFINITY], [5, INFINITY, INFINITY]]
+    with pytest.raises(ValueError, match=r"directions: shape \(2,\) does not fit origins of shape \(3,\)"):
+        box_field.raycast(np.ones((3, 3)), np.ones((2, 3)))
+
+
+@pytest.mark.parametrize(
+    "arguments, message",
+    [
+        (([0, 0, 0], [0, 0, 0]), "directions: direction 0 is zero"),
+        (([0, 0, 0], [0, 0]), "directions: expected"),
+        (([0, 0], [0, 0, 1]), "origins: expected"),
+        (([0, 0, 0], [0, 0, 1], -1), "max_distance is -1, and must be 0 or above"),
+        (([0, 0, 0], [0, 0, 1], float("nan")), "max_distance is nan"),
+        (([0, 0, 0], [0, 0, 1], "far"), "max_distance: expected real numbers"),
+    ],
+)
+def test_bad_rays(box_field, arguments, message):
+    with pytest.raises(ValueError, match=message):
+        box_field.raycast(*arguments)
+
+
+def test_sphere_cast(box_field):
+    hits = box_field.sphere_cast([5, 0, 0], [-1, 0, 0], [0, 0.5, 4.5])
+    assert np.allclose(hits.distance, [4, 3.5, 0], atol=1e-4)
+    with pytest.raises(ValueError, match=r"radii\[1\] is -1"):
+        box_field.sphere_cast([5, 0, 0], [-1, 0, 0], [1, -1])
+    with pytest.raises(ValueError, match="radii is inf"):
+        box_field.sphere_cast([5, 0, 0], [-1, 0, 0], INFINITY)
+
+
+def test_segment(box_field):
+    hits = box_field.segment([3, 0, 0], [[0, 0, 0], [2, 0, 0]])
+    assert hits.hit.tolist() == [True, False] and hits.distance[0] == 2
+    with pytest.raises(ValueError, match="end: expected"):
+        box_field.segment([0, 0, 0], [0, 0])
+
+
+def test_overlaps(box_field):
+    assert box_field.overlaps_sphere([[2, 0, 0], [2, 0, 0], [0, 0, 0]], [0.9, 1.1, 0]).tolist() == [False, True, True]
+    assert box_field.overlaps_box([[2, 0, 0], [2, 0, 0]], [[0.9, 1, 1], [1.1, 1, 1]]).tolist() == [False, True]
+    turned = [np.cos(np.pi / 8), 0, 0, np.sin(np.pi / 8)]
+    assert not box_field.overlaps_box([2.2, 0, 0], [1, 1, 1]) and box_field.overlaps_box([2.2, 0, 0], [1, 1, 1], turned)
+    with pytest.raises(ValueError, match="rotations: quaternion 0 is not of length 1"):
+        box_field.overlaps_box([0, 0, 0], [1, 1, 1], [1, 1, 0, 0])
+    with pytest.raises(ValueError, match=r"half_sizes\[0\] is -1"):
+        box_field.overlaps_box([0, 0, 0], [-1, 1, 1])
+    with pytest.raises(ValueError, match="radii"):
+        box_field.overlaps_sphere([0, 0, 0], -1)
+
+
+def test_attributes(box, box_set, box_field, sphere):
+    assert box_field.voxel_size == 0.0625 and box_field.exterior_width == box_field.interior_width == 0.1875
+    assert (box_field.bounds[0] < -1).all() and (box_field.bounds[1] > 1).all()
+    assert box_field.mesh == box and bilayer.Field(box_set).mesh is None
+    small = bilayer.Field(box_set, storage="fixed16")
+    assert small.memory_bytes < bilayer.Field(box_set).memory_bytes < box_field.memory_bytes
+    assert small.sample([1.1, 0, 0]).distance == pytest.approx(0.1, abs=1e-5)
+    assert np.array_equal(copy.deepcopy(box_field).sample([1, 2, 3]).distance, box_field.sample([1, 2, 3]).distance)
+    with pytest.raises(ValueError, match="storage: expected one of 'float32', 'fixed16'"):
+        bilayer.Field(box_set, storage="float64")
+    with pytest.raises(ValueError, match="mesh"):
+        bilayer.Field(box_set, sphere)
+    with pytest.raises(TypeError):
+        bilayer.Field(box)

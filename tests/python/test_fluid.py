@@ -1,0 +1,94 @@
+"""seed(), particles(), obstacle()."""
+
+import numpy as np
+import pytest
+
+import bilayer
+
+
+@pytest.fixture(scope="module")
+def tank():
+    return bilayer.build(bilayer.box((2, 2, 1)), voxel_size=0.05)
+
+
+def volume(level_set):
+    return bilayer.mass_properties(level_set).volume
+
+
+def test_seed(tank):
+    ball = bilayer.sphere(0.3)
+    added = bilayer.mass_properties(ball).volume
+    above = bilayer.Pose((0, 0, 1))
+    both = bilayer.seed(tank, ball, pose=above)
+    assert volume(both.liquid) == pytest.approx(volume(tank) + added, rel=0.003)
+    assert both.changed_voxels >= 0 and both.max_change_voxels >= 0 and both.where.shape == (3,)
+    assert both.liquid.voxel_size == tank.voxel_size and both.liquid.mesh_hash == 0
+    holed = bilayer.seed(tank, ball, mode="subtract")
+    assert volume(holed.liquid) == pytest.approx(volume(tank) - added, rel=0.003)
+    twice = bilayer.seed(tank, bilayer.build(ball, voxel_size=0.03), above, scale=(1, 1, 0.5))
+    assert volume(twice.liquid) == pytest.approx(volume(tank) + added / 2, rel=0.005)
+    assert volume(tank) == pytest.approx(4, rel=0.001)
+
+
+def test_bad_seeds(tank):
+    ball = bilayer.sphere(0.3)
+    for options, message in (
+        ({"mode": "add"}, "mode: expected one of 'unite', 'intersect', 'subtract'"),
+        ({"scale": 0}, "scale"),
+        ({"scale": (1, 2)}, "scale|broadcast"),
+        ({"scale": -1}, "scale is -1"),
+        ({"pose": np.eye(3)}, "pose: expected"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            bilayer.seed(tank, ball, **options)
+    with pytest.raises(ValueError):
+        bilayer.seed(tank, bilayer.Mesh(ball.vertices, ball.faces[: len(ball.faces) // 2]))
+    narrow = bilayer.build(ball, voxel_size=0.05, half_width_voxels=2)
+    with pytest.raises(ValueError, match="narrower"):
+        bilayer.seed(narrow, ball)
+
+
+def test_particles(tank):
+    points = bilayer.particles(tank, per_voxel=4)
+    assert points.dtype == np.float32 and points.shape[1] == 3
+    assert len(points) == pytest.approx(4 * 4 / 0.05**3, rel=0.02)
+    assert (np.abs(points) <= np.float32([1, 1, 0.5]) + 1e-5).all()
+    assert np.array_equal(bilayer.particles(tank, per_voxel=4), points)
+    assert not np.array_equal(bilayer.particles(tank, per_voxel=4, seed=1)[:10], points[:10])
+    ball = bilayer.sphere(0.3)
+    field = bilayer.Field(bilayer.build(ball, resolution=32), ball)
+    moved = bilayer.particles(field, bilayer.Pose((5, 0, 0)), scale=2, voxel_size=0.05)
+    assert np.linalg.norm(moved - [5, 0, 0], axis=1).max() <= 0.6 + 1e-5
+    for arguments, message in (
+        ({"per_voxel": 0}, "per"),
+        ({"pose": bilayer.Pose()}, "pose and voxel_size"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            bilayer.particles(tank, **arguments)
+    with pytest.raises(ValueError, match="liquid: expected a LevelSet or a Field"):
+        bilayer.particles(ball)
+    with pytest.raises(ValueError, match="voxel_size"):
+        bilayer.particles(field, voxel_size=-1)
+
+
+def test_obstacle(tmp_path):
+    ball = bilayer.sphere(0.5, subdivisions=4)
+    obstacle = bilayer.obstacle(ball, 0.05, bilayer.Pose((1, 0, 0)), velocity=(0, 0, 3))
+    shape = obstacle.distance.shape
+    assert obstacle.open_volume.shape == shape and obstacle.open_faces.shape == obstacle.velocity.shape == shape + (3,)
+    closed = (1 - obstacle.open_volume).sum() * 0.05**3
+    assert closed == pytest.approx(bilayer.mass_properties(ball).volume, rel=0.01)
+    index = np.stack(np.meshgrid(*map(np.arange, shape), indexing="ij"), axis=-1)
+    truth = np.linalg.norm(obstacle.origin + obstacle.voxel_size * index - [1, 0, 0], axis=-1) - 0.5
+    near = np.abs(truth) < 0.1
+    assert np.abs(obstacle.distance - truth)[near].max() < 0.005
+    assert np.allclose(obstacle.velocity[near][:, 2], 3)
+    obstacle.save(tmp_path / "solid.vdb")
+    assert bilayer.LevelSet.load(tmp_path / "solid.vdb").voxel_size == pytest.approx(0.05)
+    for arguments, message in (
+        ({"voxel_size": 0}, "voxel_size"),
+        ({"voxel_size": 0.05, "velocity": (1, 2)}, "velocity: expected"),
+        ({"voxel_size": 0.05, "half_width_voxels": 1}, "half"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            bilayer.obstacle(ball, **arguments)
