@@ -47,9 +47,11 @@ std::map<std::string, nlohmann::json> recordsIn(const std::string& lines) {
 
 std::map<std::string, std::string> fieldsIn(const fs::path& folder) {
     std::map<std::string, std::string> fields;
-    for (const auto& entry : fs::recursive_directory_iterator(folder)) {
-        const std::string name = entry.path().lexically_relative(folder).generic_string();
-        if (entry.is_regular_file() && name.rfind(".bilayer/", 0) != 0) fields[name] = contents(entry.path());
+    for (fs::recursive_directory_iterator entry(folder), end; entry != end; ++entry) {
+        if (entry->path().filename() == ".bilayer")
+            entry.disable_recursion_pending();
+        else if (entry->is_regular_file())
+            fields[entry->path().lexically_relative(folder).generic_string()] = contents(entry->path());
     }
     return fields;
 }
