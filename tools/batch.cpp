@@ -1,6 +1,5 @@
 // `bilayer batch`: a library of meshes becomes a folder of fields.
 #include <fmt/format.h>
-#include <openvdb/openvdb.h>
 #include <sched.h>
 #include <signal.h>
 
@@ -12,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "sdf/base/openvdb.h"
 #include "sdf/base/physical_memory.h"
 #include "tools/batch/batch_folder.h"
 #include "tools/batch/mesh_list.h"

@@ -13,6 +13,7 @@
 #include <bilayer/sdf/grids.h>
 #include <bilayer/sdf/mesh_io.h>
 #include <bilayer/sdf/vdb_io.h>
+#include "sdf/base/openvdb.h"
 #include "sdf/io/mapped_file.h"
 #include "sdf/io/vdb_checksum.h"
 #include "sdf/leaf/build_options.h"
