@@ -33,7 +33,8 @@ SlurmdPort=$((port + 1))
 SlurmUser=$user
 SlurmdUser=$user
 AuthType=auth/munge
-AuthInfo=socket=$sockets/munge
+# a requeued job waits until its old credentials have expired
+AuthInfo=socket=$sockets/munge,cred_expire=5
 CredType=cred/munge
 StateSaveLocation=$work/state
 SlurmdSpoolDir=$work/spool
@@ -76,7 +77,7 @@ wait_for 30 is_state 2 FAILED
 before=$(lines 000002)
 scontrol requeue "${job}_2"
 is_over() { [[ -z $(squeue -h) ]]; }
-wait_for 180 is_over
+wait_for 120 is_over
 for ((task = 1; task <= shards; ++task)); do
   is_state "$task" COMPLETED || { echo "task $task is $(state "$task")"; cat "task-$task.txt"; exit 1; }
 done

@@ -18,13 +18,13 @@ rule field:
     threads: 1
     shell: "$bilayer batch {input} -o fields --threads {threads} --resolution 32"
 TEXT
-HOME=$work snakemake --cores 2 --quiet || { echo "snakemake failed"; exit 1; }
+HOME=$work snakemake --cores 2 --quiet >snakemake.txt 2>&1 || { cat snakemake.txt; exit 1; }
 "$bilayer" batch meshes/*/*.obj -o direct --resolution 32 >/dev/null
 require_same fields direct
 
 # a mesh that is bad fails alone
 echo "no mesh" >meshes/a/bad.obj
-! HOME=$work snakemake --cores 2 --quiet --keep-going 2>snakemake.txt || { echo "a bad mesh was not reported"; exit 1; }
+! HOME=$work snakemake --cores 2 --quiet --keep-going >snakemake.txt 2>&1 || { echo "a bad mesh was not reported"; exit 1; }
 require_same fields direct
 "$bilayer" batch --report fields | grep -q 'bad.obj: error: ' || { echo "the report lacks the bad mesh"; exit 1; }
 echo "8 meshes by Snakemake, as by one batch"

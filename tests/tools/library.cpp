@@ -45,13 +45,26 @@ std::map<std::string, nlohmann::json> recordsIn(const std::string& lines) {
     return records;
 }
 
+namespace {
+
+// OpenVDB's random identifier and the checksum of the file, which is therefore random too [bytes].
+constexpr std::size_t identifierBegin = 21, identifierEnd = 57, checksumSize = 23;
+
+std::string withoutIdentifier(const std::string& file) {
+    if (file.size() < identifierEnd + checksumSize) return file;
+    return file.substr(0, identifierBegin) + file.substr(identifierEnd, file.size() - identifierEnd - checksumSize);
+}
+
+}  // namespace
+
 std::map<std::string, std::string> fieldsIn(const fs::path& folder) {
     std::map<std::string, std::string> fields;
     for (fs::recursive_directory_iterator entry(folder), end; entry != end; ++entry) {
         if (entry->path().filename() == ".bilayer")
             entry.disable_recursion_pending();
         else if (entry->is_regular_file())
-            fields[entry->path().lexically_relative(folder).generic_string()] = contents(entry->path());
+            fields[entry->path().lexically_relative(folder).generic_string()] =
+                withoutIdentifier(contents(entry->path()));
     }
     return fields;
 }

@@ -24,7 +24,8 @@ Words batchWords(const std::filesystem::path& library, const std::filesystem::pa
 /// Parses lines of JSON. Returns them by their member "file".
 std::map<std::string, nlohmann::json> recordsIn(const std::string& lines);
 
-/// The files below a folder, by relative path, without those in ".bilayer", with their contents.
+/// The files below a folder, by relative path, without those in ".bilayer", with their contents. What
+/// differs between two files of one field is left out: OpenVDB's random identifier and the checksum.
 std::map<std::string, std::string> fieldsIn(const std::filesystem::path& folder);
 
 /// The files that a batch has left in its own folder, other than records and thumbnails. There should be none.

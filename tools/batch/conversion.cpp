@@ -1,6 +1,7 @@
 #include "tools/batch/conversion.h"
 
-#include <openvdb/io/File.h>
+#include <openvdb/io/Archive.h>
+#include <openvdb/io/GridDescriptor.h>
 #include <tbb/global_control.h>
 
 #include <exception>
@@ -41,17 +42,35 @@ bool endsWithItsChecksum(std::string_view bytes) {
     return bytes.size() > line && bytes.ends_with(checksumLine(bytes.substr(0, bytes.size() - line)));
 }
 
+// Reads the metadata of the first grid of a file, which is the distance grid. OpenVDB's File would read all grids of a
+// file without offsets.
+class FirstMetadata : public openvdb::io::Archive {
+  public:
+    openvdb::MetaMap read(std::istream& stream) {
+        readHeader(stream);
+        setFormatVersion(stream);
+        setLibraryVersion(stream);
+        setDataCompression(stream);
+        openvdb::MetaMap ofFile, ofGrid;
+        ofFile.readMeta(stream);
+        readGridCount(stream);
+        openvdb::io::GridDescriptor().read(stream);
+        readGridCompression(stream);
+        ofGrid.readMeta(stream);
+        return ofGrid;
+    }
+};
+
 // Returns whether a file is a whole field with this key. Any other file is not: it is built anew.
 bool isUpToDate(const std::filesystem::path& output, const ContentKey& key) {
     std::error_code absent;
     if (!std::filesystem::is_regular_file(output, absent)) return false;
     try {
         if (!endsWithItsChecksum(MappedFile(output).bytes())) return false;
-        openvdb::io::File file(output.string());
-        file.open(/*delayLoad=*/false);
-        const openvdb::GridBase::Ptr grid = file.readGridMetadata("distance");
-        const auto source = grid->getMetadata<openvdb::Int64Metadata>(sourceName);
-        const auto options = grid->getMetadata<openvdb::Int64Metadata>(optionsName);
+        std::ifstream stream(output, std::ios::binary);
+        const openvdb::MetaMap metadata = FirstMetadata().read(stream);
+        const auto source = metadata.getMetadata<openvdb::Int64Metadata>(sourceName);
+        const auto options = metadata.getMetadata<openvdb::Int64Metadata>(optionsName);
         return source && options && key == ContentKey{std::uint64_t(source->value()), std::uint64_t(options->value())};
     } catch (const std::bad_alloc&) {
         throw;

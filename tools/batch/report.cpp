@@ -21,7 +21,7 @@ void printHistogram(const LogHistogram& histogram) {
     if (histogram.bins.empty()) return;
     fmt::print("{}\n", histogram.title);
     for (const LogHistogram::Bin& bin : histogram.bins)
-        fmt::print("  {:>6.0g} .. {:<6.0g} {:>8}  {}\n", bin.lower, bin.upper, grouped(bin.count),
+        fmt::print("  {:>6g} .. {:<6g} {:>8}  {}\n", bin.lower, bin.upper, grouped(bin.count),
                    std::string((barLength * bin.count + histogram.maxCount() - 1) / histogram.maxCount(), '#'));
 }
 

@@ -108,7 +108,7 @@ std::string drawn(const LogHistogram& histogram) {
     for (const LogHistogram::Bin& bin : histogram.bins) {
         const int length = int(double(barPixels) * double(bin.count) / double(histogram.maxCount()));
         bars += fmt::format(
-            R"(<text x="70" y="{}" text-anchor="end">{:.0g}</text><rect x="76" y="{}" width="{}" height="{}" fill="#47a"/><text x="{}" y="{}">{}</text>)"
+            R"(<text x="70" y="{}" text-anchor="end">{:g}</text><rect x="76" y="{}" width="{}" height="{}" fill="#47a"/><text x="{}" y="{}">{}</text>)"
             "\n",
             y + rowPixels - 5, bin.lower, y + 2, length, rowPixels - 4, 82 + length, y + rowPixels - 5,
             grouped(bin.count));
