@@ -258,7 +258,7 @@ TEST_CASE("a bad mesh fails alone, and its record names the reason") {
 
 TEST_CASE("a large mesh is built alone by all threads") {
     const fs::path library = boxLibrary("mixed", 3), output = emptyFolder("mixed_fields");
-    writeMesh(library / "large.ply", shapes::sphere(10));
+    writeMesh(library / "large.ply", shapes::sphere(20));
     const auto records = convertAll(batchWords(library, output, {"--large-memory", "8", "--threads", "2"}));
     CHECK(countOf(records, "done") == 4);
     CHECK(records.at("large.ply")["alone"] == true);
