@@ -30,6 +30,6 @@ class BatchFolder {
 };
 
 /// Names of files in a work folder.
-inline constexpr const char *workField = "field.vdb", *workThumbnail = "thumbnail.png", *workErrors = "stderr.txt";
+inline constexpr const char *workField = "field.vdb", *workThumbnail = "thumbnail.png";
 
 }  // namespace bilayer::tools

@@ -116,7 +116,7 @@ class Scheduler {
                                   .mayBeLarge = isLarge || plan_.threads == 1};
         running_.push_back(
             std::unique_ptr<RunningMesh>(new RunningMesh{mesh, isLarge, task.threads, std::move(*lock), {}, nullptr}));
-        running_.back()->worker = std::make_unique<Worker>(plan_.limits, work / workErrors, [&, task] {
+        running_.back()->worker = std::make_unique<Worker>(plan_.limits, [&, task] {
             return convert(plan_.conversion, task).dump(-1, ' ', false, Json::error_handler_t::replace);
         });
     }

@@ -5,6 +5,7 @@
 #include <poll.h>
 #include <signal.h>
 #include <string.h>
+#include <sys/mman.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
@@ -14,7 +15,6 @@
 #include <cerrno>
 #include <climits>
 #include <exception>
-#include <fstream>
 #include <new>
 #include <system_error>
 
@@ -23,13 +23,12 @@ namespace {
 
 // Exit statuses of a child.
 constexpr int answered = 0, outOfMemory = 3, unexpectedEnd = 4;
-constexpr std::size_t maxErrorText = 400;  // characters of standard error that a record quotes
+constexpr off_t maxErrorText = 400;  // characters of standard error that a record quotes
 
 // Makes the standard streams those of a process without a terminal.
-bool redirectStreams(const std::filesystem::path& errorFile) {
+bool redirectStreams(int errors) {
     const int null = ::open("/dev/null", O_RDWR | O_CLOEXEC);
-    const int errors = ::open(errorFile.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0666);
-    return null >= 0 && errors >= 0 && ::dup2(null, STDIN_FILENO) >= 0 && ::dup2(null, STDOUT_FILENO) >= 0 &&
+    return null >= 0 && ::dup2(null, STDIN_FILENO) >= 0 && ::dup2(null, STDOUT_FILENO) >= 0 &&
            ::dup2(errors, STDERR_FILENO) >= 0;
 }
 
@@ -51,10 +50,9 @@ void send(int pipe, std::string_view text) {
     }
 }
 
-[[noreturn]] void live(pid_t parent, int pipe, std::uint64_t memory, const std::filesystem::path& errorFile,
-                       const Worker::Work& work) noexcept {
+[[noreturn]] void live(pid_t parent, int pipe, int errors, std::uint64_t memory, const Worker::Work& work) noexcept {
     ::prctl(PR_SET_PDEATHSIG, SIGKILL);
-    if (::getppid() != parent || !redirectStreams(errorFile)) ::_exit(unexpectedEnd);
+    if (::getppid() != parent || !redirectStreams(errors)) ::_exit(unexpectedEnd);
     limitResources(memory);
     try {
         send(pipe, work());
@@ -68,12 +66,13 @@ void send(int pipe, std::string_view text) {
 }
 
 // Returns the last line that a child has written on standard error, or nothing.
-std::string lastLine(const std::filesystem::path& file) {
-    std::ifstream stream(file);
-    std::string last;
-    for (std::string line; std::getline(stream, line);)
-        if (!line.empty()) last = line;
-    return last.substr(0, maxErrorText);
+std::string lastLine(int errors) {
+    const off_t size = ::lseek(errors, 0, SEEK_END);
+    std::string text(std::size_t(std::clamp<off_t>(size, 0, maxErrorText)), '\0');
+    const ssize_t got = ::pread(errors, text.data(), text.size(), size - off_t(text.size()));
+    text.resize(std::size_t(std::max<ssize_t>(got, 0)));
+    text.erase(text.find_last_not_of('\n') + 1);
+    return text.substr(text.find_last_of('\n') + 1);
 }
 
 std::string memoryText(std::uint64_t limit) {
@@ -83,27 +82,32 @@ std::string memoryText(std::uint64_t limit) {
 
 }  // namespace
 
-Worker::Worker(const WorkerLimits& limits, const std::filesystem::path& errorFile, const Work& work)
-    : limits_(limits), errorFile_(errorFile) {
+Worker::Worker(const WorkerLimits& limits, const Work& work) : limits_(limits) {
     int ends[2];
     if (::pipe2(ends, O_CLOEXEC) != 0) throw std::system_error(errno, std::generic_category(), "no pipe");
-    const pid_t parent = ::getpid();
-    process_ = ::fork();
-    const int error = errno;
-    if (process_ == 0) live(parent, ends[1], limits.memory, errorFile, work);
-    ::close(ends[1]);
     pipe_ = ends[0];
+    errors_ = ::memfd_create("stderr", MFD_CLOEXEC);
+    const pid_t parent = ::getpid();
+    if (errors_ >= 0) process_ = ::fork();
+    const int error = errno;
+    if (process_ == 0) live(parent, ends[1], errors_, limits.memory, work);
+    ::close(ends[1]);
     if (process_ > 0) return;
-    ::close(pipe_);
+    closeFiles();
     throw std::system_error(error, std::generic_category(), "no process for a mesh");
 }
 
 Worker::~Worker() {
-    ::close(pipe_);
+    closeFiles();
     if (process_ <= 0) return;
     ::kill(process_, SIGKILL);
     while (::waitpid(process_, nullptr, 0) < 0 && errno == EINTR) {
     }
+}
+
+void Worker::closeFiles() {
+    ::close(pipe_);
+    if (errors_ >= 0) ::close(errors_);
 }
 
 bool Worker::read() {
@@ -142,7 +146,7 @@ void Worker::describe(WorkerEnd& end, int status) const {
         end.answer = answer_;
         return;
     }
-    const std::string line = lastLine(errorFile_);
+    const std::string line = lastLine(errors_);
     const std::string detail = line.empty() ? "" : ": " + line;
     const bool isOutOfMemory =
         WIFEXITED(status) ? WEXITSTATUS(status) == outOfMemory : line.find("std::bad_alloc") != std::string::npos;

@@ -5,7 +5,6 @@
 
 #include <chrono>
 #include <cstdint>
-#include <filesystem>
 #include <functional>
 #include <string>
 
@@ -34,9 +33,8 @@ class Worker {
   public:
     using Work = std::function<std::string()>;
 
-    /// @param errorFile  receives what the child writes on standard error
     /// Throws std::system_error if no process can be created.
-    Worker(const WorkerLimits& limits, const std::filesystem::path& errorFile, const Work& work);
+    Worker(const WorkerLimits& limits, const Work& work);
     ~Worker();
     Worker(const Worker&) = delete;
     Worker& operator=(const Worker&) = delete;
@@ -54,14 +52,15 @@ class Worker {
     WorkerEnd finish();
 
   private:
+    void closeFiles();
     void describe(WorkerEnd& end, int status) const;
 
     WorkerLimits limits_;
-    std::filesystem::path errorFile_;
     std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
     std::string answer_;
     bool hasEnded_ = false;
     int pipe_ = -1;
+    int errors_ = -1;  // a file in memory: what the child writes on standard error
     pid_t process_ = -1;
 };
 
