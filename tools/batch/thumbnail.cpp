@@ -47,6 +47,10 @@ class DepthImage {
   public:
     // Draws a triangle in pixel coordinates. Corners need not be ordered.
     void draw(const glm::vec3& a, const glm::vec3& b, const glm::vec3& c, float facing) {
+        // coordinates near the limits of floats overflow
+        if (!isInside(a) || !isInside(b) || !isInside(c) || !std::isfinite(facing)) return;
+        // thin parts cover no pixel centre
+        for (const glm::vec3* p : {&a, &b, &c}) set(int(p->x), int(p->y), p->z, facing);
         const float area = cross(b - a, c - a);
         if (!(std::abs(area) > 0)) return;
         const auto [left, rightmost] = pixels(a.x, b.x, c.x);
@@ -64,6 +68,10 @@ class DepthImage {
   private:
     static float cross(const glm::vec3& a, const glm::vec3& b) { return a.x * b.y - a.y * b.x; }
 
+    static bool isInside(const glm::vec3& p) {
+        return p.x >= 0 && p.x < thumbnailSize && p.y >= 0 && p.y < thumbnailSize && p.z >= -1 && p.z <= 2;
+    }
+
     // The pixels whose centres lie between three coordinates.
     static std::pair<int, int> pixels(float a, float b, float c) {
         const float last = thumbnailSize - 1;
@@ -75,7 +83,8 @@ class DepthImage {
         const std::size_t at = std::size_t(y) * thumbnailSize + std::size_t(x);
         if (depth <= depths_[at]) return;
         depths_[at] = depth;
-        image_.pixels[at] = std::uint8_t(darkest + range * ((1 - depthShare) * facing + depthShare * depth));
+        image_.pixels[at] =
+            std::uint8_t(darkest + range * ((1 - depthShare) * facing + depthShare * std::clamp(depth, 0.f, 1.f)));
     }
 
     GreyImage image_{thumbnailSize, thumbnailSize,
