@@ -18,6 +18,7 @@
 #include "sdf/base/method_names.h"
 #include "sdf/fill/double_layer.h"
 #include "sdf/sign/sign_choice.h"
+#include "tools/build.h"
 #include "tools/commands.h"
 #include "tools/output.h"
 
@@ -37,36 +38,6 @@ const std::map<std::string, KernelMapping> mappings{{"auto", KernelMapping::auto
                                                     {"block", KernelMapping::blockPerItem},
                                                     {"group", KernelMapping::groupPerBlock}};
 constexpr double thinnestBand = 1e-3, widestBand = 1e3;  // [voxels]
-
-struct BuildArguments {
-    std::filesystem::path mesh, output;
-    BuildOptions options;
-    float resolution = 0;
-    float halfWidth = 3, exteriorWidth = 3, interiorWidth = 3;  // [bandUnit]
-    std::string bandUnit = "voxels", method = nameOf(BuildOptions().method), backend = "tbb",
-                sign = nameOf(BuildOptions().sign), device, mapping = "auto",
-                contacts = nameOf(ColliderOptions().accuracy);
-    std::uint64_t deviceMemory = 0;
-    VdbOptions stored;
-    ColliderOptions collider;
-    bool fill = false, body = false, noMesh = false, report = false, json = false;
-    CLI::Option *resolutionGiven = nullptr, *halfGiven = nullptr, *exteriorGiven = nullptr, *interiorGiven = nullptr;
-    CLI::Option* gapGiven = nullptr;
-    std::vector<CLI::Option*> bodyOptions;
-    CLI::Option *deviceGiven = nullptr, *memoryGiven = nullptr, *mappingGiven = nullptr;
-    std::vector<CLI::Option*> layerOptions;  // options that only the double layer method supports
-
-    bool isBandInWorldUnits() const { return bandUnit == "world"; }
-};
-
-struct Outcome {
-    ReadReport file;
-    bool balanced = false;
-    std::optional<MeshReport> report;
-    std::string device;
-    BuildTimes times;
-    double read = 0, inspect = 0, build = 0, fill = 0, body = 0, write = 0;
-};
 
 void requireUsage(const BuildArguments& a) {
     if (a.backend != "opencl" && (a.deviceGiven->count() || a.memoryGiven->count() || a.mappingGiven->count()))
@@ -90,7 +61,6 @@ void requireUsage(const BuildArguments& a) {
         throw CLI::ValidationError("--band-unit", "world needs --half-width, or --exterior-width and --interior-width");
     for (const CLI::Option* option : a.bodyOptions)
         if (!a.body && option->count()) throw CLI::ValidationError(option->get_name(), "needs --body");
-    requireOther(a.output, a.mesh);
 }
 
 // The API's range is (0, 1000] voxels too, but this message names the option.
@@ -117,7 +87,7 @@ std::optional<BlockFiller> makeFiller(const BuildArguments& a) {
     return openclFiller(openDevice(a.device), {.memoryMiB = a.deviceMemory, .mapping = mappings.at(a.mapping)});
 }
 
-LevelSet timedBuild(const Mesh& mesh, const BuildArguments& a, Outcome& outcome) {
+LevelSet timedBuild(const Mesh& mesh, const BuildArguments& a, BuildOutcome& outcome) {
     const std::optional<BlockFiller> filler = makeFiller(a);
     outcome.device = filler ? filler->device : fmt::format("processor ({})", simdName());
     ProgressBar bar("building");
@@ -137,112 +107,18 @@ LevelSet timedBuild(const Mesh& mesh, const BuildArguments& a, Outcome& outcome)
 }
 
 // Builds a field with the additional data that bodies need.
-LevelSet timedBody(const Mesh& mesh, const LevelSet& field, const BuildArguments& a, Outcome& outcome) {
+LevelSet timedBody(const Mesh& mesh, const LevelSet& field, const BuildArguments& a, BuildOutcome& outcome) {
     const Stopwatch watch;
     LevelSet stored = withBody(field, mesh, a.collider, !a.noMesh);
     outcome.body = watch.seconds();
     return stored;
 }
 
-void printJson(const BuildArguments& a, const Outcome& o, const Mesh& mesh, const LevelSet& field) {
-    Json json{{"file", toJson(o.file)},
-              {"mesh", o.report ? toJson(*o.report, a.options.voxelSize) : toJson(mesh, o.balanced)},
-              {"output", a.output.string()},
-              {"triangles", mesh.triangles.size()},
-              {"voxelSize", number(field.voxelSize())},
-              {"bandUnit", a.bandUnit},
-              {"exteriorWidth", number(a.exteriorWidth)},
-              {"interiorWidth", number(a.interiorWidth)},
-              {"activeVoxels", field.activeVoxels()},
-              {"leaves", field.leaves()},
-              {"memoryBytes", field.memoryBytes()},
-              {"backend", a.backend},
-              {"device", o.device},
-              {"seconds",
-               {{"read", o.read},
-                {"inspect", o.inspect},
-                {"build", o.build},
-                {"parts", {{"tiles", o.times.tiles}, {"fill", o.times.fill}, {"assemble", o.times.assemble}}},
-                {"farFill", o.fill},
-                {"body", o.body},
-                {"write", o.write}}},
-              {"peakRssBytes", peakMemory()}};
-    json.update(provenance(field, a.stored));
-    if (a.body) json["body"] = toJson(bodyOf(field), field.origin());
-    print(json);
-}
-
-void printTable(const BuildArguments& a, const Outcome& o, const Mesh& mesh, const LevelSet& field) {
-    Table input(a.mesh.string());
-    addRows(input, o.file);
-    if (o.report)
-        addRows(input, *o.report, a.options.voxelSize);
-    else
-        addRows(input, mesh, o.balanced);
-    input.print();
-    Table table(a.output.string());
-    addRows(table, field, a.stored);
-    if (a.body) addRows(table, bodyOf(field));
-    table.row("filled by", fmt::format("{} on {}", a.backend, o.device));
-    table.row("build", fmt::format("{:.3f} s: tiles {:.3f}, fill {:.3f}, assemble {:.3f}", o.build, o.times.tiles,
-                                   o.times.fill, o.times.assemble));
-    table.row("files", fmt::format("{:.3f} s to read, {:.3f} s to write", o.read, o.write));
-    table.row("peak memory", bytes(peakMemory()));
-    table.print();
-}
-
-void run(BuildArguments a) {
-    a.options.method = methods.at(a.method);
-    a.options.sign = signs.at(a.sign);
-    requireUsage(a);
-    // widths in the mesh's unit are checked once the voxel size is known
-    if (!a.isBandInWorldUnits() || !a.resolutionGiven->count()) requireBand(a);
-    a.collider.accuracy = a.noMesh ? ContactAccuracy::samples : measures.at(a.contacts);
-    std::optional<tbb::global_control> threads;
-    if (a.options.threads > 0)
-        threads.emplace(tbb::global_control::max_allowed_parallelism, std::size_t(a.options.threads));
-
-    Outcome outcome;
-    const Stopwatch reading;
-    const auto [mesh, contents] = readMeshFile(a.mesh);
-    outcome.file = contents;
-    outcome.read = reading.seconds();
-    requireWritable(a.output);
-    if (a.resolutionGiven->count()) {
-        a.options.voxelSize = voxelSizeFor(mesh, a.resolution);
-        requireBand(a);
-    }
-    if (!a.exteriorGiven->count()) a.exteriorWidth = a.interiorWidth = a.halfWidth;
-    const float unit = a.isBandInWorldUnits() ? a.options.voxelSize : 1;
-    a.options.exteriorWidthVoxels = a.exteriorWidth / unit;
-    a.options.interiorWidthVoxels = a.interiorWidth / unit;
-
-    const Stopwatch inspecting;
-    if (a.report)
-        outcome.report = inspect(mesh, a.options.voxelSize);
-    else
-        outcome.balanced = balanced(mesh);
-    outcome.inspect = inspecting.seconds();
-    a.options.inspected = outcome.report ? &*outcome.report : nullptr;
-    LevelSet field = timedBuild(mesh, a, outcome);
-    if (a.fill) {
-        const Stopwatch filling;
-        field = fluid::fill(field);
-        outcome.fill = filling.seconds();
-    }
-    if (a.body) field = timedBody(mesh, field, a, outcome);
-    const Stopwatch writing;
-    writeVdb(a.output, field, a.stored);
-    outcome.write = writing.seconds();
-    a.json ? printJson(a, outcome, mesh, field) : printTable(a, outcome, mesh, field);
-}
-
-void addBand(CLI::App& command, BuildArguments& a) {
+CLI::Option_group* addBand(CLI::App& command, BuildArguments& a) {
     auto* size = command.add_option_group("voxel size", "exactly one of");
     size->add_option("--voxel-size", a.options.voxelSize, "edge of a voxel in the mesh's unit")->check(positive());
     a.resolutionGiven = size->add_option("--resolution", a.resolution, "voxels along the longest side of the bounds")
                             ->check(positive());
-    size->require_option(1);
     a.halfGiven =
         command
             .add_option("--half-width", a.halfWidth, "width of the band on each side of the surface, default 3 voxels")
@@ -257,6 +133,7 @@ void addBand(CLI::App& command, BuildArguments& a) {
         .add_option("--band-unit", a.bandUnit,
                     "unit of the three widths: voxels (default) or world, the mesh's unit; both 0.001 to 1000 voxels")
         ->check(CLI::IsMember({"voxels", "world"}));
+    return size;
 }
 
 void addMethod(CLI::App& command, BuildArguments& a) {
@@ -325,19 +202,133 @@ void addMachine(CLI::App& command, BuildArguments& a) {
 
 }  // namespace
 
+void checkBuildOptions(BuildArguments& a) {
+    a.options.method = methods.at(a.method);
+    a.options.sign = signs.at(a.sign);
+    requireUsage(a);
+    // widths in the mesh's unit are checked once the voxel size is known
+    if (!a.isBandInWorldUnits() || !a.resolutionGiven->count()) requireBand(a);
+    a.collider.accuracy = a.noMesh ? ContactAccuracy::samples : measures.at(a.contacts);
+}
+
+void setSizes(BuildArguments& a, const Mesh& mesh) {
+    if (a.resolutionGiven->count()) {
+        a.options.voxelSize = voxelSizeFor(mesh, a.resolution);
+        requireBand(a);
+    }
+    if (!a.exteriorGiven->count()) a.exteriorWidth = a.interiorWidth = a.halfWidth;
+    const float unit = a.isBandInWorldUnits() ? a.options.voxelSize : 1;
+    a.options.exteriorWidthVoxels = a.exteriorWidth / unit;
+    a.options.interiorWidthVoxels = a.interiorWidth / unit;
+}
+
+LevelSet buildField(BuildArguments& a, const Mesh& mesh, BuildOutcome& outcome) {
+    const Stopwatch inspecting;
+    if (a.report)
+        outcome.report = inspect(mesh, a.options.voxelSize);
+    else
+        outcome.balanced = balanced(mesh);
+    outcome.inspect = inspecting.seconds();
+    a.options.inspected = outcome.report ? &*outcome.report : nullptr;
+    LevelSet field = timedBuild(mesh, a, outcome);
+    if (a.fill) {
+        const Stopwatch filling;
+        field = fluid::fill(field);
+        outcome.fill = filling.seconds();
+    }
+    return a.body ? timedBody(mesh, field, a, outcome) : field;
+}
+
+Json toJson(const BuildArguments& a, const BuildOutcome& o, const Mesh& mesh, const LevelSet& field) {
+    Json json{{"file", toJson(o.file)},
+              {"mesh", o.report ? toJson(*o.report, a.options.voxelSize) : toJson(mesh, o.balanced)},
+              {"output", a.output.string()},
+              {"triangles", mesh.triangles.size()},
+              {"voxelSize", number(field.voxelSize())},
+              {"bandUnit", a.bandUnit},
+              {"exteriorWidth", number(a.exteriorWidth)},
+              {"interiorWidth", number(a.interiorWidth)},
+              {"activeVoxels", field.activeVoxels()},
+              {"leaves", field.leaves()},
+              {"memoryBytes", field.memoryBytes()},
+              {"backend", a.backend},
+              {"device", o.device},
+              {"seconds",
+               {{"read", o.read},
+                {"inspect", o.inspect},
+                {"build", o.build},
+                {"parts", {{"tiles", o.times.tiles}, {"fill", o.times.fill}, {"assemble", o.times.assemble}}},
+                {"farFill", o.fill},
+                {"body", o.body},
+                {"write", o.write}}},
+              {"peakRssBytes", peakMemory()}};
+    json.update(provenance(field, a.stored));
+    if (a.body) json["body"] = toJson(bodyOf(field), field.origin());
+    return json;
+}
+
+CLI::Option_group* addBuildOptions(CLI::App& command, BuildArguments& a) {
+    CLI::Option_group* size = addBand(command, a);
+    addMethod(command, a);
+    addLayers(command, a);
+    addMachine(command, a);
+    addBody(command, a);
+    command.add_flag("--triangles", a.options.triangles, "also store the nearest triangle of each voxel");
+    command.add_flag("--fill", a.fill, "extend the distances to all voxels of the field's bounding box");
+    command.add_flag("--half-float", a.stored.halfFloat, "store 16-bit distances");
+    return size;
+}
+
+namespace {
+
+void printTable(const BuildArguments& a, const BuildOutcome& o, const Mesh& mesh, const LevelSet& field) {
+    Table input(a.mesh.string());
+    addRows(input, o.file);
+    if (o.report)
+        addRows(input, *o.report, a.options.voxelSize);
+    else
+        addRows(input, mesh, o.balanced);
+    input.print();
+    Table table(a.output.string());
+    addRows(table, field, a.stored);
+    if (a.body) addRows(table, bodyOf(field));
+    table.row("filled by", fmt::format("{} on {}", a.backend, o.device));
+    table.row("build", fmt::format("{:.3f} s: tiles {:.3f}, fill {:.3f}, assemble {:.3f}", o.build, o.times.tiles,
+                                   o.times.fill, o.times.assemble));
+    table.row("files", fmt::format("{:.3f} s to read, {:.3f} s to write", o.read, o.write));
+    table.row("peak memory", bytes(peakMemory()));
+    table.print();
+}
+
+void run(BuildArguments a) {
+    checkBuildOptions(a);
+    requireOther(a.output, a.mesh);
+    std::optional<tbb::global_control> threads;
+    if (a.options.threads > 0)
+        threads.emplace(tbb::global_control::max_allowed_parallelism, std::size_t(a.options.threads));
+
+    BuildOutcome outcome;
+    const Stopwatch reading;
+    const auto [mesh, contents] = readMeshFile(a.mesh);
+    outcome.file = contents;
+    outcome.read = reading.seconds();
+    requireWritable(a.output);
+    setSizes(a, mesh);
+    const LevelSet field = buildField(a, mesh, outcome);
+    const Stopwatch writing;
+    writeVdb(a.output, field, a.stored);
+    outcome.write = writing.seconds();
+    a.json ? print(toJson(a, outcome, mesh, field)) : printTable(a, outcome, mesh, field);
+}
+
+}  // namespace
+
 void addBuild(CLI::App& app) {
     auto* command = app.add_subcommand("build", "Build the field of a mesh");
     const auto a = std::make_shared<BuildArguments>();
     command->add_option("mesh", a->mesh, "OBJ, PLY, STL, OFF, glTF, ...")->required();
     command->add_option("-o,--output", a->output, "the .vdb file")->required();
-    addBand(*command, *a);
-    addMethod(*command, *a);
-    addLayers(*command, *a);
-    addMachine(*command, *a);
-    addBody(*command, *a);
-    command->add_flag("--triangles", a->options.triangles, "also store the nearest triangle of each voxel");
-    command->add_flag("--fill", a->fill, "extend the distances to all voxels of the field's bounding box");
-    command->add_flag("--half-float", a->stored.halfFloat, "store 16-bit distances");
+    addBuildOptions(*command, *a)->require_option(1);
     command->add_flag("--report", a->report,
                       "also inspect the mesh, as the command inspect does, and count walls thinner than a voxel");
     command->add_flag("--json", a->json, "print one JSON object");

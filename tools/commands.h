@@ -57,6 +57,7 @@ inline void requireOther(const std::filesystem::path& output, const std::filesys
 }
 
 void addBuild(CLI::App& app);
+void addBatch(CLI::App& app);
 void addInspect(CLI::App& app);
 void addInfo(CLI::App& app);
 void addQuery(CLI::App& app);

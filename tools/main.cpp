@@ -41,6 +41,7 @@ int main(int count, char** arguments) {
     app.set_version_flag("--version", "bilayer " BILAYER_VERSION);
     app.require_subcommand(1);
     bilayer::tools::addBuild(app);
+    bilayer::tools::addBatch(app);
     bilayer::tools::addInspect(app);
     bilayer::tools::addInfo(app);
     bilayer::tools::addQuery(app);

@@ -56,6 +56,12 @@ MeshExtent extentOf(const Mesh& mesh) {
         });
 }
 
+double estimatedBytes(const Mesh& mesh, const MeshExtent& extent, const BuildOptions& options, float reach) {
+    const double h = options.voxelSize, block = bytesPerBlock * (options.triangles ? 2 : 1);
+    return double(mesh.triangles.size()) * bytesPerTriangle +
+           countBlocks(extent.box, extent.area / (h * h), h, double(reach)) * block;
+}
+
 void checkSize(const Mesh& mesh, const MeshExtent& extent, const BuildOptions& options, float reach) {
     const Bounds& box = extent.box;
     const double h = options.voxelSize;
@@ -73,9 +79,7 @@ void checkSize(const Mesh& mesh, const MeshExtent& extent, const BuildOptions& o
     if (bricks > maxBricks) refuse("its box would have more than 2^28 bricks of 64^3 voxels");
     const double area = extent.area / (h * h);
     if (!(area > 0)) throw std::invalid_argument("the mesh has no triangle with an area");
-    const double block = bytesPerBlock * (options.triangles ? 2 : 1);
-    const double bytes =
-        double(mesh.triangles.size()) * bytesPerTriangle + countBlocks(box, area, h, double(reach)) * block;
+    const double bytes = estimatedBytes(mesh, extent, options, reach);
     const double memory = physicalMemory();
     if (bytes > memory)
         refuse(fmt::format("with its band it would need about {:.0f} GiB of memory", bytes / double(1 << 30)));

@@ -18,10 +18,13 @@ struct MeshExtent {
 
 MeshExtent extentOf(const Mesh& mesh);
 
-/// Throws std::invalid_argument for a build that cannot succeed: its coordinates would leave 32 bits, or its memory
-/// would exceed the machine's.
+/// Returns about how much memory a build needs in addition to the mesh [bytes].
 /// @param extent  of the mesh
 /// @param reach   distance up to which distances are computed [voxels]
+double estimatedBytes(const Mesh& mesh, const MeshExtent& extent, const BuildOptions& options, float reach);
+
+/// Throws std::invalid_argument for a build that cannot succeed: its coordinates would leave 32 bits, or its memory
+/// would exceed the machine's. The parameters are those of estimatedBytes().
 void checkSize(const Mesh& mesh, const MeshExtent& extent, const BuildOptions& options, float reach);
 
 }  // namespace bilayer::detail

@@ -11,7 +11,7 @@ using namespace bilayer::test;
 TEST_CASE("help and version") {
     CHECK(run({"--help"}).status == 0);
     CHECK(run({"--version"}).out.rfind("bilayer 0.", 0) == 0);
-    for (const char* command : {"build", "inspect", "info", "query", "surface", "export", "seed", "devices"}) {
+    for (const char* command : {"build", "batch", "inspect", "info", "query", "surface", "export", "seed", "devices"}) {
         const Result r = run({command, "--help"});
         CHECK(r.status == 0);
         CHECK_FALSE(r.out.empty());

@@ -1,0 +1,30 @@
+#include "tools/batch/batch_folder.h"
+
+#include <fmt/format.h>
+
+#include <stdexcept>
+#include <system_error>
+
+#include "tools/batch/content_hash.h"
+#include "tools/output.h"
+
+namespace bilayer::tools {
+
+void BatchFolder::create() const {
+    for (const char* name : {"records", "locks", "work", "thumbnails"}) {
+        std::error_code error;
+        std::filesystem::create_directories(own() / name, error);
+        if (error)
+            throw std::runtime_error(fmt::format("cannot create {}: {}", (own() / name).string(), error.message()));
+    }
+}
+
+std::filesystem::path BatchFolder::thumbnail(const std::string& name) const {
+    return own() / "thumbnails" / (key(name) + ".png");
+}
+
+std::string BatchFolder::key(const std::string& name) {
+    return hex(contentHash(name));
+}
+
+}  // namespace bilayer::tools

@@ -1,0 +1,83 @@
+#include "tools/batch/mesh_list.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <fstream>
+#include <iostream>
+#include <stdexcept>
+#include <string_view>
+#include <system_error>
+
+#include "sdf/io/input_file.h"
+
+namespace bilayer::tools {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Formats with meshes in use. Other formats that readMesh() supports can be listed by name.
+constexpr std::array<std::string_view, 10> meshEndings{".obj", ".ply", ".stl", ".off", ".gltf",
+                                                       ".glb", ".3mf", ".dae", ".fbx", ".3ds"};
+
+bool isMesh(const fs::directory_entry& entry) {
+    const std::string ending = detail::lowerEnding(entry.path());
+    return std::find(meshEndings.begin(), meshEndings.end(), ending) != meshEndings.end() && !entry.is_directory();
+}
+
+std::string nameOf(const fs::path& file) {
+    const fs::path normal = file.lexically_normal();
+    const bool isInside = normal.is_relative() && !normal.empty() && *normal.begin() != "..";
+    return isInside ? normal.generic_string() : fs::absolute(file).lexically_normal().relative_path().generic_string();
+}
+
+std::vector<fs::path> linesOf(std::istream& stream) {
+    std::vector<fs::path> paths;
+    for (std::string line; std::getline(stream, line);) {
+        if (!line.empty() && line.back() == '\r') line.pop_back();
+        if (!line.empty()) paths.emplace_back(line);
+    }
+    return paths;
+}
+
+}  // namespace
+
+std::vector<BatchMesh> meshesInTree(const fs::path& folder) try {
+    std::vector<BatchMesh> meshes;
+    for (const fs::directory_entry& entry : fs::recursive_directory_iterator(folder))
+        if (isMesh(entry)) meshes.push_back({entry.path(), entry.path().lexically_relative(folder).generic_string()});
+    return meshes;
+} catch (const fs::filesystem_error& error) {
+    const fs::path& at = error.path1().empty() ? folder : error.path1();
+    throw std::runtime_error(fmt::format("{}: {}", at.string(), error.code().message()));
+}
+
+std::vector<fs::path> pathsInList(const fs::path& list) {
+    if (list == "-") return linesOf(std::cin);
+    detail::requireInputFile(list);
+    std::ifstream stream(list);
+    std::vector<fs::path> paths = linesOf(stream);
+    if (stream.bad()) throw std::runtime_error(list.string() + ": cannot be read to its end");
+    return paths;
+}
+
+std::vector<BatchMesh> meshesOf(const std::vector<fs::path>& files) {
+    std::vector<BatchMesh> meshes;
+    for (const fs::path& file : files) meshes.push_back({file, nameOf(file)});
+    return meshes;
+}
+
+std::vector<BatchMesh> shardOf(std::vector<BatchMesh> meshes, const Shard& shard) {
+    std::erase_if(meshes, [&](const BatchMesh& mesh) { return !shard.contains(mesh.name); });
+    std::sort(meshes.begin(), meshes.end(), [](const BatchMesh& a, const BatchMesh& b) { return a.name < b.name; });
+    const auto isSame = [](const BatchMesh& a, const BatchMesh& b) { return a.name == b.name; };
+    for (auto at = meshes.begin(); (at = std::adjacent_find(at, meshes.end(), isSame)) != meshes.end(); ++at)
+        if (fs::absolute(at->file).lexically_normal() != fs::absolute((at + 1)->file).lexically_normal())
+            throw std::runtime_error(
+                fmt::format("{} and {} would have the same output", at->file.string(), (at + 1)->file.string()));
+    meshes.erase(std::unique(meshes.begin(), meshes.end(), isSame), meshes.end());
+    return meshes;
+}
+
+}  // namespace bilayer::tools

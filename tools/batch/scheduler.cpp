@@ -1,0 +1,221 @@
+#include "tools/batch/scheduler.h"
+
+#include <fmt/format.h>
+#include <poll.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstdio>
+#include <deque>
+#include <memory>
+#include <optional>
+#include <system_error>
+
+#include "tools/batch/content_hash.h"
+#include "tools/batch/output_lock.h"
+#include "tools/batch/records.h"
+#include "tools/batch/signal_watch.h"
+
+namespace bilayer::tools {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Time between two looks at outputs that other batches have locked, and max time between two progress lines [ms].
+constexpr int lockInterval = 200, progressInterval = 500;
+
+/// A mesh whose worker runs.
+struct RunningMesh {
+    const BatchMesh* mesh;
+    bool isLarge;
+    int threads;
+    OutputLock lock;
+    Stopwatch watch;
+    std::unique_ptr<Worker> worker;
+};
+
+/// Moves what a worker has made to its place. Returns an error, or nothing.
+std::string place(const fs::path& from, const fs::path& to) {
+    std::error_code error;
+    fs::create_directories(to.parent_path(), error);
+    if (!error) fs::rename(from, to, error);
+    return error ? fmt::format("cannot write {}: {}", to.string(), error.message()) : "";
+}
+
+class Scheduler {
+  public:
+    explicit Scheduler(const BatchPlan& plan)
+        : plan_(plan),
+          records_(plan.folder.records(), plan.shard),
+          optionsHash_(hex(contentHash(plan.conversion.optionsText))) {
+        for (const BatchMesh& mesh : plan.meshes) waiting_.push_back(&mesh);
+        result_.counts.total = plan.meshes.size();
+    }
+
+    ~Scheduler() {
+        for (const auto& running : running_) {
+            running->worker.reset();
+            clean(*running->mesh);
+        }
+    }
+
+    BatchResult run() {
+        for (start(); !running_.empty() || !locked_.empty(); start()) {
+            wait();
+            if ((result_.signal = signals_.arrived()) != 0) break;
+            settleEnded();
+            progress_.show(result_.counts);
+        }
+        return result_;
+    }
+
+  private:
+    // Starts what fits beside the running workers.
+    void start() {
+        while (!waiting_.empty() && canStartSmall()) {
+            const BatchMesh* mesh = waiting_.front();
+            waiting_.pop_front();
+            std::error_code absent;
+            const auto size = fs::file_size(mesh->file, absent);
+            // a mesh takes about as much memory as its file
+            if (!absent && size > plan_.conversion.largeBytes)
+                large_.push_back(mesh);
+            else
+                tryToStart(mesh, /*isLarge=*/false);
+        }
+        while (!large_.empty() && waiting_.empty() && running_.empty()) {
+            const BatchMesh* mesh = large_.front();
+            large_.pop_front();
+            tryToStart(mesh, /*isLarge=*/true);
+        }
+    }
+
+    bool canStartSmall() const {
+        return running_.size() < std::size_t(plan_.threads) && (running_.empty() || !running_.front()->isLarge);
+    }
+
+    // Meshes that are fewer than the threads share them.
+    int threadsOfSmall() const {
+        const std::size_t unfinished = running_.size() + waiting_.size() + 1;
+        return std::max(1, plan_.threads / int(std::min(unfinished, std::size_t(plan_.threads))));
+    }
+
+    void tryToStart(const BatchMesh* mesh, bool isLarge) {
+        std::optional<OutputLock> lock = OutputLock::take(plan_.folder.lock(mesh->name));
+        if (!lock) {
+            locked_.push_back(mesh);
+            return;
+        }
+        clean(*mesh);  // what a batch that was killed has left
+        const fs::path work = plan_.folder.work(mesh->name);
+        fs::create_directory(work);
+        const ConversionTask task{.mesh = mesh->file,
+                                  .output = plan_.folder.field(mesh->name),
+                                  .work = work,
+                                  .threads = isLarge ? plan_.threads : threadsOfSmall(),
+                                  .mayBeLarge = isLarge || plan_.threads == 1};
+        running_.push_back(
+            std::unique_ptr<RunningMesh>(new RunningMesh{mesh, isLarge, task.threads, std::move(*lock), {}, nullptr}));
+        running_.back()->worker = std::make_unique<Worker>(plan_.limits, [&, task] {
+            return convert(plan_.conversion, task).dump(-1, ' ', false, Json::error_handler_t::replace);
+        });
+    }
+
+    // Waits until a worker answers, ends or is late, a signal arrives, or something is to be looked at again.
+    void wait() {
+        std::vector<pollfd> files{{signals_.file(), POLLIN, 0}};
+        int timeout = locked_.empty() ? progressInterval : lockInterval;
+        for (const auto& running : running_) {
+            files.push_back({running->worker->pipe(), POLLIN, 0});
+            if (const int left = running->worker->millisecondsLeft(); left >= 0) timeout = std::min(timeout, left);
+        }
+        if (::poll(files.data(), files.size(), timeout) < 0 && errno != EINTR)
+            throw std::system_error(errno, std::generic_category(), "poll");
+        ready_.clear();
+        for (std::size_t i = 1; i < files.size(); ++i) ready_.push_back(files[i].revents != 0);
+        if (running_.empty()) {
+            waiting_.insert(waiting_.end(), locked_.begin(), locked_.end());
+            locked_.clear();
+        }
+    }
+
+    void settleEnded() {
+        for (std::size_t i = running_.size(); i-- > 0;) {
+            Worker& worker = *running_[i]->worker;
+            const bool hasEnded = ready_[i] && !worker.read();
+            if (!hasEnded && worker.millisecondsLeft() != 0) continue;
+            settle(*running_[i], worker.finish());
+            running_.erase(running_.begin() + std::ptrdiff_t(i));
+        }
+    }
+
+    void settle(const RunningMesh& running, const WorkerEnd& end) {
+        const BatchMesh& mesh = *running.mesh;
+        Json known = Json::parse(end.answer, nullptr, /*allow_exceptions=*/false);
+        if (!known.is_object()) known = {{"outcome", "failed"}, {"reason", end.reason}, {"error", end.error}};
+        const fs::path work = plan_.folder.work(mesh.name);
+        std::error_code absent;
+        fs::rename(work / workThumbnail, plan_.folder.thumbnail(mesh.name), absent);
+        if (known["outcome"] == "done")
+            if (const std::string error = place(work / workField, plan_.folder.field(mesh.name)); !error.empty())
+                known.update(Json{{"outcome", "failed"}, {"reason", "error"}, {"error", error}});
+        clean(mesh);
+        if (known["outcome"] == "large") {
+            large_.push_back(&mesh);
+            return;
+        }
+        count(mesh, known);
+        record(running, end, known);
+    }
+
+    void clean(const BatchMesh& mesh) {
+        std::error_code absent;
+        fs::remove_all(plan_.folder.work(mesh.name), absent);
+    }
+
+    void count(const BatchMesh& mesh, const Json& known) {
+        BatchCounts& counts = result_.counts;
+        const std::string outcome = known["outcome"];
+        ++(outcome == "done" ? counts.done : outcome == "skipped" ? counts.skipped : counts.failed);
+        if (outcome == "failed" && result_.firstFailure.empty())
+            result_.firstFailure = fmt::format("{}: {}", mesh.name, known["error"].get<std::string>());
+    }
+
+    void record(const RunningMesh& running, const WorkerEnd& end, const Json& known) {
+        Json record{{"time", timeText()},
+                    {"file", running.mesh->name},
+                    {"path", running.mesh->file.string()},
+                    {"output", plan_.folder.field(running.mesh->name).string()},
+                    {"shard", plan_.shard.text()},
+                    {"options", plan_.conversion.optionsText},
+                    {"optionsHash", optionsHash_},
+                    {"threads", running.threads},
+                    {"alone", running.isLarge}};
+        record.update(known);
+        record["seconds"]["total"] = running.watch.seconds();
+        record["peakBytes"] = end.peakMemory;
+        const std::string line = lineOf(record);
+        records_.add(line);
+        if (!plan_.printsLines) return;
+        fmt::print("{}", line);
+        std::fflush(stdout);
+    }
+
+    const BatchPlan& plan_;
+    const SignalWatch signals_;
+    RecordFile records_;
+    const std::string optionsHash_;
+    ProgressLine progress_;
+    BatchResult result_;
+    std::deque<const BatchMesh*> waiting_, large_, locked_;
+    std::vector<std::unique_ptr<RunningMesh>> running_;
+    std::vector<bool> ready_;  // of each running mesh: whether its worker has something to read
+};
+
+}  // namespace
+
+BatchResult runBatch(const BatchPlan& plan) {
+    return Scheduler(plan).run();
+}
+
+}  // namespace bilayer::tools

@@ -1,0 +1,16 @@
+// Small pictures of meshes.
+#pragma once
+
+#include <bilayer/sdf/mesh.h>
+#include "tools/batch/png.h"
+
+namespace bilayer::tools {
+
+/// Width and height of a thumbnail [pixels].
+inline constexpr int thumbnailSize = 96;
+
+/// Draws a mesh from above a corner of its box, in parallel projection, z upwards. Brightness tells how a triangle
+/// faces the viewer, and how near it is. The mesh must be valid.
+GreyImage thumbnailOf(const Mesh& mesh);
+
+}  // namespace bilayer::tools
